@@ -1,0 +1,47 @@
+# mbm: `make help` lists what there is.
+
+CARGO ?= cargo
+CC := gcc
+CXX := g++
+BUILD := build
+ARCHIVE := target/release/libmbm.a
+
+WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wundef -Werror
+INCLUDES := -Iinclude -Iexamples/linux -Ic-tests/support -Ic-tests/shim
+CFLAGS := -std=c11 -O1 -g
+CXXFLAGS := -std=c++11 -O1 -g
+MODBUS = $(shell pkg-config --cflags libmodbus)
+LIBS := -Wl,--gc-sections -lmodbus -lcmocka -lpthread
+SANITIZERS := -fsanitize=address,undefined -fno-sanitize-recover=all
+
+SUPPORT := $(wildcard c-tests/support/*.c) examples/linux/mbm_tty.c
+TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
+         $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
+HEADERS := $(wildcard include/*.h c-tests/support/*.h c-tests/shim/* examples/linux/*.h)
+
+.PHONY: help
+help: ## What there is
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 18
+
+.PHONY: archive
+archive: ## The archive for this machine, target/release/libmbm.a
+	@$(CARGO) rustc --quiet --release --lib --crate-type staticlib --features archive
+	@echo "archive: $(ARCHIVE)"
+
+# One folder of test programs a variant: $(1) name, $(2) flags
+define variant
+$(BUILD)/$(1)/%.o: c-tests/%.c $(HEADERS)
+	@mkdir -p $$(@D)
+	@$(CC) $(CFLAGS) $(2) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
+$(BUILD)/$(1)/%.o: c-tests/%.cpp $(HEADERS)
+	@mkdir -p $$(@D)
+	@$(CXX) $(CXXFLAGS) $(2) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
+$(BUILD)/$(1)/%.o: examples/%.c $(HEADERS)
+	@mkdir -p $$(@D)
+	@$(CC) $(CFLAGS) $(2) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
+$(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) archive
+	@$(CXX) $(2) $$(filter %.o,$$^) $(ARCHIVE) $(LIBS) -o $$@
+endef
+$(eval $(call variant,plain,))
+$(eval $(call variant,sanitized,$(SANITIZERS)))
+.SECONDARY:

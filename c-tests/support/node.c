@@ -1,0 +1,35 @@
+#include "node.h"
+#include "test.h"
+
+#include <string.h>
+
+void node_begin(node *n, int fd, uint8_t slave)
+{
+    mbm_port port;
+
+    memset(n, 0, sizeof *n);
+    assert_int_equal(mbm_tty_attach(&n->tty, fd), 0);
+    port = mbm_tty_port(&n->tty);
+    assert_int_equal(mbm_master_setBuffers(&n->master, n->response, MBM_MAX_READ_REGISTERS,
+                                           n->transmit, MBM_MAX_WRITE_REGISTERS, n->frame,
+                                           MBM_MAX_FRAME),
+                     MBM_OK);
+    assert_int_equal(mbm_master_begin(&n->master, slave, &port), MBM_OK);
+    assert_int_equal(mbm_master_setCounters(&n->master, &n->counters), MBM_OK);
+    assert_int_equal(mbm_master_setBaudRate(&n->master, 115200), MBM_OK);
+}
+
+int node_bit(const node *n, unsigned index)
+{
+    return mbm_master_getResponseBuffer(&n->master, (uint8_t)(index / 16)) >> index % 16 & 1;
+}
+
+void node_set_bit(node *n, unsigned index, int on)
+{
+    uint16_t mask = (uint16_t)(1u << index % 16);
+
+    if (on)
+        n->transmit[index / 16] |= mask;
+    else
+        n->transmit[index / 16] &= (uint16_t)~mask;
+}

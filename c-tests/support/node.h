@@ -1,0 +1,25 @@
+/* A master with buffers of full size on a terminal. */
+#ifndef NODE_H
+#define NODE_H
+
+#include "mbm_tty.h"
+
+typedef struct node {
+    mbm_master master;
+    mbm_tty tty;
+    mbm_counters counters;
+    uint16_t response[MBM_MAX_READ_REGISTERS];
+    uint16_t transmit[MBM_MAX_WRITE_REGISTERS];
+    uint8_t frame[MBM_MAX_FRAME];
+} node;
+
+/* Zeroes the node, lends its buffers and begins to talk to `slave` over `fd`. */
+void node_begin(node *n, int fd, uint8_t slave);
+
+/* Bit `index` of the response words. */
+int node_bit(const node *n, unsigned index);
+
+/* Sets bit `index` of the transmit words. */
+void node_set_bit(node *n, unsigned index, int on);
+
+#endif

@@ -1,0 +1,28 @@
+/* A real libmodbus RTU server in a thread, at the far end of a pty. */
+#ifndef SERVER_H
+#define SERVER_H
+
+#include "pty.h"
+
+#include <modbus.h>
+#include <pthread.h>
+
+enum { SERVER_BITS = 3000, SERVER_REGISTERS = 500 };
+
+typedef struct server {
+    pty line;
+    modbus_t *peer;
+    modbus_mapping_t *mapping; /* the server's own memory, for tests to look at */
+    int stop[2];
+    pthread_t thread;
+} server;
+
+/* Starts a server for `unit` whose memory holds a known pattern. */
+void server_start(server *s, int unit);
+void server_stop(server *s);
+
+/* The pattern: every cell differs from its neighbours. */
+uint16_t server_pattern(unsigned address);
+uint8_t server_bit_pattern(unsigned address);
+
+#endif

@@ -1,0 +1,329 @@
+/* The ten functions at their edges, against a real libmodbus server; what was
+ * written is looked up in the server's own memory. */
+#include "node.h"
+#include "server.h"
+#include "test.h"
+
+#include <string.h>
+
+static server peer;
+static node n;
+
+static int start(void **state)
+{
+    (void)state;
+    server_start(&peer, 17);
+    node_begin(&n, peer.line.ours, 17);
+    return 0;
+}
+
+static int stop(void **state)
+{
+    (void)state;
+    server_stop(&peer);
+    return 0;
+}
+
+static void reads_holding_registers(void **state)
+{
+    static const uint16_t quantities[] = {1, 2, 64, 65, 125};
+    size_t q;
+    unsigned i;
+
+    (void)state;
+    for (q = 0; q < COUNT(quantities); q++) {
+        assert_int_equal(mbm_master_readHoldingRegisters(&n.master, 3, quantities[q]), MBM_OK);
+        assert_int_equal(mbm_master_available(&n.master), quantities[q]);
+        for (i = 0; i < quantities[q]; i++)
+            assert_int_equal(mbm_master_getResponseBuffer(&n.master, (uint8_t)i),
+                             server_pattern(3 + i));
+    }
+}
+
+static void reads_input_registers(void **state)
+{
+    static const uint16_t quantities[] = {1, 2, 64, 65, 125};
+    size_t q;
+    unsigned i;
+
+    (void)state;
+    for (q = 0; q < COUNT(quantities); q++) {
+        assert_int_equal(mbm_master_readInputRegisters(&n.master, 9, quantities[q]), MBM_OK);
+        for (i = 0; i < quantities[q]; i++)
+            assert_int_equal(mbm_master_getResponseBuffer(&n.master, (uint8_t)i),
+                             (uint16_t)~server_pattern(9 + i));
+    }
+}
+
+static const uint16_t bit_quantities[] = {1, 8, 16, 17, 1968, 2000};
+
+static void reads_coils(void **state)
+{
+    size_t q;
+    unsigned i;
+
+    (void)state;
+    for (q = 0; q < COUNT(bit_quantities); q++) {
+        assert_int_equal(mbm_master_readCoils(&n.master, 5, bit_quantities[q]), MBM_OK);
+        for (i = 0; i < bit_quantities[q]; i++)
+            assert_int_equal(node_bit(&n, i), server_bit_pattern(5 + i));
+        for (; i % 16; i++)
+            assert_int_equal(node_bit(&n, i), 0);
+    }
+}
+
+static void reads_discrete_inputs(void **state)
+{
+    size_t q;
+    unsigned i;
+
+    (void)state;
+    for (q = 0; q < COUNT(bit_quantities); q++) {
+        assert_int_equal(mbm_master_readDiscreteInputs(&n.master, 7, bit_quantities[q]), MBM_OK);
+        for (i = 0; i < bit_quantities[q]; i++)
+            assert_int_equal(node_bit(&n, i), !server_bit_pattern(7 + i));
+        for (; i % 16; i++)
+            assert_int_equal(node_bit(&n, i), 0);
+    }
+}
+
+static void writes_a_single_coil(void **state)
+{
+    (void)state;
+    assert_int_equal(mbm_master_writeSingleCoil(&n.master, 30, 0), MBM_OK);
+    assert_int_equal(peer.mapping->tab_bits[30], 0);
+    assert_int_equal(mbm_master_writeSingleCoil(&n.master, 30, 1), MBM_OK);
+    assert_int_equal(peer.mapping->tab_bits[30], 1);
+    assert_int_equal(mbm_master_writeSingleCoil(&n.master, 30, 0), MBM_OK);
+    assert_int_equal(mbm_master_writeSingleCoil(&n.master, 30, 0xAA), MBM_OK);
+    assert_int_equal(peer.mapping->tab_bits[30], 1);
+}
+
+static void writes_a_single_register(void **state)
+{
+    (void)state;
+    assert_int_equal(mbm_master_writeSingleRegister(&n.master, 499, 0xBEEF), MBM_OK);
+    assert_int_equal(peer.mapping->tab_registers[499], 0xBEEF);
+    assert_int_equal(mbm_master_writeSingleRegister(&n.master, 0, 0), MBM_OK);
+    assert_int_equal(peer.mapping->tab_registers[0], 0);
+}
+
+static void writes_multiple_coils(void **state)
+{
+    static const uint16_t quantities[] = {1, 8, 16, 17, 1968};
+    size_t q;
+    unsigned i;
+
+    (void)state;
+    for (q = 0; q < COUNT(quantities); q++) {
+        uint16_t quantity = quantities[q];
+
+        memset(peer.mapping->tab_bits, 0, SERVER_BITS);
+        peer.mapping->tab_bits[11 + quantity] = 1;
+        for (i = 0; i < 1968; i++)
+            node_set_bit(&n, i, i % 3 == 0 || i + 1 == quantity);
+        assert_int_equal(mbm_master_writeMultipleCoils(&n.master, 11, quantity), MBM_OK);
+        assert_int_equal(peer.mapping->tab_bits[10], 0);
+        for (i = 0; i < quantity; i++)
+            assert_int_equal(peer.mapping->tab_bits[11 + i], i % 3 == 0 || i + 1 == quantity);
+        assert_int_equal(peer.mapping->tab_bits[11 + quantity], 1);
+    }
+}
+
+static void writes_multiple_registers(void **state)
+{
+    static const uint16_t quantities[] = {1, 2, 64, 65, 123};
+    size_t q;
+    unsigned i;
+
+    (void)state;
+    for (q = 0; q < COUNT(quantities); q++) {
+        uint16_t quantity = quantities[q];
+
+        memset(peer.mapping->tab_registers, 0, 2 * SERVER_REGISTERS);
+        for (i = 0; i < 123; i++)
+            assert_int_equal(
+                mbm_master_setTransmitBuffer(&n.master, (uint8_t)i, (uint16_t)(i * 257 + quantity)),
+                MBM_OK);
+        assert_int_equal(mbm_master_writeMultipleRegisters(&n.master, 21, quantity), MBM_OK);
+        for (i = 0; i < quantity; i++)
+            assert_int_equal(peer.mapping->tab_registers[21 + i], (uint16_t)(i * 257 + quantity));
+        assert_int_equal(peer.mapping->tab_registers[21 + quantity], 0);
+    }
+}
+
+static void mask_writes_a_register(void **state)
+{
+    (void)state;
+    peer.mapping->tab_registers[4] = 0x0012;
+    assert_int_equal(mbm_master_maskWriteRegister(&n.master, 4, 0x00F2, 0x0025), MBM_OK);
+    /* The standard's example, 6.16. */
+    assert_int_equal(peer.mapping->tab_registers[4], 0x0017);
+}
+
+static void reads_and_writes_multiple_registers(void **state)
+{
+    static const struct {
+        uint16_t read, write;
+    } quantities[] = {{1, 1}, {2, 64}, {64, 2}, {125, 121}};
+    size_t q;
+    unsigned i;
+
+    (void)state;
+    for (q = 0; q < COUNT(quantities); q++) {
+        for (i = 0; i < quantities[q].write; i++)
+            mbm_master_setTransmitBuffer(&n.master, (uint8_t)i, (uint16_t)(0x4000 + i * 3));
+        peer.mapping->tab_registers[300 + quantities[q].write] = 0x7777;
+        assert_int_equal(mbm_master_readWriteMultipleRegisters(&n.master, 300, quantities[q].read,
+                                                               300, quantities[q].write),
+                         MBM_OK);
+        assert_int_equal(peer.mapping->tab_registers[300 + quantities[q].write], 0x7777);
+        /* The write comes before the read. */
+        for (i = 0; i < quantities[q].read; i++) {
+            uint16_t value = peer.mapping->tab_registers[300 + i];
+
+            if (i < quantities[q].write)
+                assert_int_equal(value, 0x4000 + i * 3);
+            assert_int_equal(mbm_master_getResponseBuffer(&n.master, (uint8_t)i), value);
+        }
+    }
+}
+
+static void writes_queued_words_and_bits(void **state)
+{
+    (void)state;
+    mbm_master_beginTransmission(&n.master, 40);
+    mbm_master_send(&n.master, 0x1122);
+    mbm_master_send8(&n.master, 0x33);
+    mbm_master_send32(&n.master, 0x44556677);
+    assert_int_equal(mbm_master_writeQueuedRegisters(&n.master), MBM_OK);
+    assert_int_equal(peer.mapping->tab_registers[40], 0x1122);
+    assert_int_equal(peer.mapping->tab_registers[41], 0x0033);
+    assert_int_equal(peer.mapping->tab_registers[42], 0x6677);
+    assert_int_equal(peer.mapping->tab_registers[43], 0x4455);
+
+    memset(peer.mapping->tab_bits, 1, SERVER_BITS);
+    mbm_master_beginTransmission(&n.master, 50);
+    mbm_master_sendBit(&n.master, 0);
+    mbm_master_sendBit(&n.master, 7);
+    mbm_master_sendBit(&n.master, 0);
+    assert_int_equal(mbm_master_writeQueuedCoils(&n.master), MBM_OK);
+    assert_memory_equal(peer.mapping->tab_bits + 49, "\1\0\1\0\1", 5);
+
+    mbm_master_beginTransmission(&n.master, 60);
+    mbm_master_send(&n.master, 0xABCD);
+    assert_int_equal(mbm_master_readWriteQueuedRegisters(&n.master, 59, 2), MBM_OK);
+    assert_int_equal(mbm_master_getResponseBuffer(&n.master, 0), server_pattern(59));
+    assert_int_equal(mbm_master_getResponseBuffer(&n.master, 1), 0xABCD);
+}
+
+static void requests_words_to_receive(void **state)
+{
+    (void)state;
+    assert_int_equal(mbm_master_requestFrom(&n.master, 10, 3), 3);
+    assert_int_equal(mbm_master_available(&n.master), 3);
+    assert_int_equal(mbm_master_receive(&n.master), server_pattern(10));
+    assert_int_equal(mbm_master_receive(&n.master), server_pattern(11));
+    assert_int_equal(mbm_master_available(&n.master), 1);
+    assert_int_equal(mbm_master_receive(&n.master), server_pattern(12));
+    assert_int_equal(mbm_master_available(&n.master), 0);
+    assert_int_equal(mbm_master_receive(&n.master), 0xFFFF);
+}
+
+static void hands_on_exceptions_of_the_server(void **state)
+{
+    (void)state;
+    assert_int_equal(mbm_master_readHoldingRegisters(&n.master, SERVER_REGISTERS, 1),
+                     MBM_ILLEGAL_DATA_ADDRESS);
+    assert_int_equal(mbm_master_getExceptionCode(&n.master), 2);
+    assert_int_equal(mbm_master_writeSingleCoil(&n.master, SERVER_BITS, 1),
+                     MBM_ILLEGAL_DATA_ADDRESS);
+    assert_int_equal(n.counters.exceptions, 2);
+    assert_int_equal(mbm_master_readCoils(&n.master, 0, 1), MBM_OK);
+    assert_int_equal(mbm_master_getExceptionCode(&n.master), 0);
+}
+
+static void reaches_unit(uint8_t unit)
+{
+    server other;
+
+    server_start(&other, unit);
+    node_begin(&n, other.line.ours, unit);
+    assert_int_equal(mbm_master_readHoldingRegisters(&n.master, 0, 1), MBM_OK);
+    assert_int_equal(mbm_master_getResponseBuffer(&n.master, 0), server_pattern(0));
+    server_stop(&other);
+    node_begin(&n, peer.line.ours, 17);
+}
+
+static void reaches_units_1_and_247(void **state)
+{
+    (void)state;
+    reaches_unit(1);
+    reaches_unit(247);
+}
+
+static void a_unit_that_is_not_there_times_out(void **state)
+{
+    (void)state;
+    mbm_master_setSlaveID(&n.master, 18);
+    mbm_master_setResponseTimeout(&n.master, 50);
+    assert_int_equal(mbm_master_readHoldingRegisters(&n.master, 0, 1), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(n.counters.timeouts, 1);
+}
+
+static void a_broadcast_reaches_the_server_and_succeeds(void **state)
+{
+    (void)state;
+    mbm_master_setSlaveID(&n.master, 0);
+    mbm_master_setTurnaroundDelay(&n.master, 60);
+    assert_int_equal(mbm_master_writeSingleRegister(&n.master, 70, 0x5A5A), MBM_OK);
+    assert_int_equal(peer.mapping->tab_registers[70], 0x5A5A);
+    assert_int_equal(mbm_master_readHoldingRegisters(&n.master, 70, 1), MBM_BROADCAST_NOT_ALLOWED);
+    mbm_master_setSlaveID(&n.master, 17);
+    assert_int_equal(mbm_master_readHoldingRegisters(&n.master, 70, 1), MBM_OK);
+    assert_int_equal(mbm_master_getResponseBuffer(&n.master, 0), 0x5A5A);
+}
+
+static void a_non_blocking_request_is_pending_until_polled_to_its_end(void **state)
+{
+    uint8_t status;
+    unsigned polls = 0;
+
+    (void)state;
+    mbm_master_setBlocking(&n.master, 0);
+    assert_int_equal(mbm_master_readHoldingRegisters(&n.master, 3, 2), MBM_PENDING);
+    assert_int_equal(mbm_master_writeSingleRegister(&n.master, 3, 1), MBM_BUSY);
+    while ((status = mbm_master_poll(&n.master)) == MBM_PENDING)
+        polls++;
+    assert_int_equal(status, MBM_OK);
+    assert_true(polls > 2);
+    assert_int_equal(mbm_master_getResponseBuffer(&n.master, 1), server_pattern(4));
+    assert_int_equal(mbm_master_poll(&n.master), MBM_OK);
+}
+
+#define TEST(test) cmocka_unit_test_setup_teardown(test, start, stop)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(reads_holding_registers),
+        TEST(reads_input_registers),
+        TEST(reads_coils),
+        TEST(reads_discrete_inputs),
+        TEST(writes_a_single_coil),
+        TEST(writes_a_single_register),
+        TEST(writes_multiple_coils),
+        TEST(writes_multiple_registers),
+        TEST(mask_writes_a_register),
+        TEST(reads_and_writes_multiple_registers),
+        TEST(writes_queued_words_and_bits),
+        TEST(requests_words_to_receive),
+        TEST(hands_on_exceptions_of_the_server),
+        TEST(reaches_units_1_and_247),
+        TEST(a_unit_that_is_not_there_times_out),
+        TEST(a_broadcast_reaches_the_server_and_succeeds),
+        TEST(a_non_blocking_request_is_pending_until_polled_to_its_end),
+    };
+
+    return cmocka_run_group_tests_name("functions", tests, NULL, NULL);
+}

@@ -1,0 +1,282 @@
+//! `mbm_master_*`: the facade for C.
+
+mod requests;
+mod settings;
+mod words;
+
+pub use requests::*;
+pub use settings::*;
+pub use words::*;
+
+use super::pointers;
+use super::port::mbm_port;
+use super::storage::LentByC;
+use crate::error::Status;
+use crate::master::Master;
+use core::ffi::c_void;
+
+/// Marks an object that was begun; zeroed storage does not carry it.
+const BEGUN: u16 = 0x4D42;
+
+/// A Modbus RTU master: one line, one request at a time.
+///
+/// Storage is yours and must be zero before first use, which a static object
+/// is (`static mbm_master node;`). The fields are not for you. Not re-entrant:
+/// use one object from one thread and never from an interrupt; several
+/// objects are independent of each other.
+#[repr(C)]
+pub struct mbm_master {
+    pointers: [*mut c_void; 14],
+    words: [u32; 21],
+}
+
+/// What lies behind an `mbm_master`.
+pub(super) struct Object {
+    core: Master<mbm_port, LentByC>,
+    mark: u16,
+    blocking: bool,
+}
+
+const _: () = {
+    let room = size_of::<mbm_master>();
+    let used = size_of::<Object>();
+    assert!(align_of::<mbm_master>() >= align_of::<Object>());
+    assert!(used <= room);
+    // Hiding the fields may waste 5 % where RAM is scarce.
+    assert!(size_of::<usize>() > 4 || (room - used) * 20 <= room);
+};
+
+impl Object {
+    /// Says whether this object was begun, without looking at anything else.
+    ///
+    /// # Safety
+    /// `object` points to storage of an object, zeroed or begun.
+    pub(super) unsafe fn is_begun(object: *const Object) -> bool {
+        // SAFETY: the storage is zeroed or written, so readable.
+        unsafe { (&raw const (*object).mark).read() == BEGUN }
+    }
+}
+
+/// A port without hooks, until begin gives one.
+const NO_PORT: mbm_port = mbm_port {
+    context: core::ptr::null_mut(),
+    read: None,
+    write: None,
+    micros: None,
+    flush: None,
+    preTransmission: None,
+    postTransmission: None,
+    idle: None,
+};
+
+/// The object behind `pointer`, with defaults and without port and buffers if
+/// nobody has touched it yet.
+///
+/// # Safety
+/// As for [`pointers::master`].
+unsafe fn master_or_new<'a>(pointer: *mut mbm_master) -> Result<&'a mut Object, Status> {
+    // SAFETY: as the caller promises; the storage is valid for a write.
+    unsafe {
+        match pointers::master(pointer) {
+            Err(Status::NOT_INITIALISED) => {
+                pointer.cast::<Object>().write(Object {
+                    core: Master::new(1, NO_PORT, LentByC::NONE),
+                    mark: BEGUN,
+                    blocking: true,
+                });
+                pointers::master(pointer)
+            }
+            other => other,
+        }
+    }
+}
+
+/// Begins to talk to a slave over a port.
+///
+/// May be called again at any time, which is cheap: to talk to another slave,
+/// or over another port. Settings, buffers and the words in them stay; what
+/// was queued by send is dropped, and a request under way is given up. Opens
+/// nothing: the port is open already.
+///
+/// @param master  the object; zeroed before the first call
+/// @param slave   unit id, 1 to 247; 248 to 255 are sent as they are, 0 is
+///                broadcast (serial line guide V1.02, 2.2)
+/// @param port    copied; read, write and micros must be there
+/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer or a missing hook
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_begin(
+    master: *mut mbm_master,
+    slave: u8,
+    port: *const mbm_port,
+) -> u8 {
+    if port.is_null() {
+        return Status::INVALID_ARGUMENT.code();
+    }
+    // SAFETY: not NULL, so a port.
+    let port = unsafe { *port };
+    if !port.is_complete() {
+        return Status::INVALID_ARGUMENT.code();
+    }
+    // SAFETY: as the header demands.
+    match unsafe { master_or_new(master) } {
+        Ok(master) => {
+            master.core.begin(slave, port);
+            Status::OK.code()
+        }
+        Err(status) => status.code(),
+    }
+}
+
+/// Lends the buffers that requests and replies need, before or after begin.
+///
+/// They must not overlap, and stay valid for as long as the object is used.
+/// MBM_FRAME_BYTES(words) bytes of frame serve any request and reply of so
+/// many words. What does not fit into a smaller buffer is answered with a
+/// status, never cut short.
+///
+/// @param master         the object; zeroed before the first call
+/// @param response       words that reads fill; NULL only with 0 words
+/// @param responseWords  0 to 125; 125 hold any reply
+/// @param transmit       words that writes send; NULL only with 0 words
+/// @param transmitWords  0 to 123; 123 hold any request
+/// @param frame          bytes of one frame; keeps nothing between requests
+/// @param frameBytes     at least 8; 256 hold any frame
+/// @return MBM_OK, MBM_INVALID_ARGUMENT, or MBM_BUSY while a request is under way
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_setBuffers(
+    master: *mut mbm_master,
+    response: *mut u16,
+    responseWords: u16,
+    transmit: *mut u16,
+    transmitWords: u16,
+    frame: *mut u8,
+    frameBytes: u16,
+) -> u8 {
+    let missing = (response.is_null() && responseWords > 0)
+        || (transmit.is_null() && transmitWords > 0)
+        || frame.is_null()
+        || frameBytes < 8;
+    if missing {
+        return Status::INVALID_ARGUMENT.code();
+    }
+    // SAFETY: as the header demands.
+    match unsafe { master_or_new(master) } {
+        Ok(master) if master.core.is_pending() => Status::BUSY.code(),
+        Ok(master) => {
+            let storage = master.core.storage();
+            *storage = LentByC {
+                response,
+                transmit,
+                frame,
+                response_words: responseWords,
+                transmit_words: transmitWords,
+                frame_bytes: frameBytes,
+                ..*storage
+            };
+            Status::OK.code()
+        }
+        Err(status) => status.code(),
+    }
+}
+
+/// Moves a non-blocking request on, without waiting.
+///
+/// Call it as often as you like, at least once per character time of the line
+/// if nothing else buffers its bytes.
+///
+/// @param master  the object
+/// @return MBM_PENDING until the request has ended, then its status, again at
+///         every call; MBM_OK if there was no request yet
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_poll(master: *mut mbm_master) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { pointers::with(master, |master| master.core.poll()) }
+}
+
+/// Gives up the request under way, with the driver switched off; its status
+/// becomes MBM_CANCELLED. Without a request it does nothing.
+///
+/// @param master  the object
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_cancel(master: *mut mbm_master) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        pointers::with(master, |master| {
+            master.core.cancel();
+            Status::OK
+        })
+    }
+}
+
+/// The status of the last request.
+///
+/// @param master  the object
+/// @return MBM_PENDING while it is under way, MBM_OK if there was none
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_status(master: *const mbm_master) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { pointers::with(master.cast_mut(), |master| master.core.status()) }
+}
+
+/// The raw exception code of the last reply, also where it is none that the
+/// standard allows (V1.1b3, 7).
+///
+/// @param master  the object
+/// @return the code; 0 if the last request ended without an exception frame
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_getExceptionCode(master: *const mbm_master) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { pointers::ask(master, 0, |master| master.core.exception_code()) }
+}
+
+/// Starts a request and, in blocking mode, sees it through.
+///
+/// # Safety
+/// As for [`pointers::master`].
+unsafe fn request(
+    pointer: *mut mbm_master,
+    start: impl FnOnce(&mut Master<mbm_port, LentByC>) -> Status,
+) -> u8 {
+    let mut blocking = false;
+    // SAFETY: as the caller promises.
+    let mut status = unsafe {
+        pointers::with(pointer, |master| {
+            if master.core.storage().frame.is_null() || !master.core.port().is_complete() {
+                return Status::NOT_INITIALISED;
+            }
+            blocking = master.blocking;
+            start(&mut master.core)
+        })
+    };
+    while blocking && status == Status::PENDING.code() {
+        // SAFETY: as the caller promises.
+        status = unsafe { wait(pointer) };
+    }
+    status
+}
+
+/// Polls once; calls the idle hook if there was nothing to do.
+///
+/// # Safety
+/// As for [`pointers::master`].
+unsafe fn wait(pointer: *mut mbm_master) -> u8 {
+    let mut idle = None;
+    // SAFETY: as the caller promises. The reference ends before the hook is
+    // called, for the hook may use the object.
+    let status = unsafe {
+        pointers::with(pointer, |master| {
+            let status = master.core.poll();
+            if master.core.is_waiting() {
+                let port = master.core.port();
+                idle = port.idle.map(|hook| (hook, port.context));
+            }
+            status
+        })
+    };
+    if let Some((hook, context)) = idle {
+        // SAFETY: a C function that keeps the contract of its comment.
+        unsafe { hook(context) }
+    }
+    status
+}

@@ -1,0 +1,38 @@
+//! The C ABI, and the only unsafe code.
+//!
+//! Rules of every function here:
+//! - a pointer is NULL, or points to what its comment says; NULL, and an
+//!   object that was never begun, is answered with a status;
+//! - objects are the caller's storage, zeroed before first use;
+//! - integers and pointers only: no enum, no bool, no float by value;
+//! - nothing is re-entrant on one object; any number of objects may be used
+//!   side by side.
+//!
+//! The comments become those of `include/mbm.h`, so they speak to C.
+
+#![allow(non_camel_case_types, non_snake_case)]
+// What a caller must hold is the same for every function, and stands above.
+#![allow(clippy::missing_safety_doc)]
+
+mod limits;
+mod master;
+mod pointers;
+mod port;
+mod status;
+mod storage;
+
+pub use limits::*;
+pub use master::*;
+pub use port::*;
+pub use status::*;
+pub use storage::*;
+
+/// There is no way back from a panic on a microcontroller. The check of the
+/// linked image proves that nothing comes here.
+#[cfg(feature = "archive")]
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    loop {
+        core::hint::spin_loop();
+    }
+}

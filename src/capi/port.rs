@@ -1,0 +1,114 @@
+//! The port that C supplies.
+
+use crate::error::Status;
+use crate::port::Port;
+use core::ffi::c_void;
+
+/// What the firmware supplies: a byte stream, a clock, and optional hooks.
+///
+/// Copied by mbm_master_begin; only `context` must stay valid. Hooks that are
+/// NULL are not called; `read`, `write` and `micros` must be there. No hook
+/// may call a function on the object that called it, except that `idle` may:
+/// it is told MBM_BUSY, and getters work.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct mbm_port {
+    /// Handed to every hook. Yours, may be NULL.
+    pub context: *mut c_void,
+    /// Takes up to `capacity` received bytes without waiting. Returns how
+    /// many, 0 if none has arrived yet, negative if the link is lost.
+    pub read:
+        Option<unsafe extern "C" fn(context: *mut c_void, bytes: *mut u8, capacity: u16) -> i16>,
+    /// Accepts up to `length` bytes to send without waiting for the wire.
+    /// Returns how many, 0 if none just now, negative if the link is lost.
+    pub write:
+        Option<unsafe extern "C" fn(context: *mut c_void, bytes: *const u8, length: u16) -> i16>,
+    /// A clock in microseconds that wraps at 2^32. A platform with a
+    /// millisecond tick returns `tick * 1000`.
+    pub micros: Option<unsafe extern "C" fn(context: *mut c_void) -> u32>,
+    /// Optional: 1 once the last bit has left, 0 while bits are to come. It
+    /// may wait for the last bit instead and return 1.
+    pub flush: Option<unsafe extern "C" fn(context: *mut c_void) -> u8>,
+    /// Optional: called before the first byte of a request (RS-485 driver on).
+    pub preTransmission: Option<unsafe extern "C" fn(context: *mut c_void)>,
+    /// Optional: called after the last bit of a request (RS-485 driver off).
+    pub postTransmission: Option<unsafe extern "C" fn(context: *mut c_void)>,
+    /// Optional: called again and again while a blocking call waits, never
+    /// between preTransmission and postTransmission. It may take its time.
+    pub idle: Option<unsafe extern "C" fn(context: *mut c_void)>,
+}
+
+impl mbm_port {
+    pub(super) fn is_complete(&self) -> bool {
+        self.read.is_some() && self.write.is_some() && self.micros.is_some()
+    }
+}
+
+/// What a read or write hook returned, of at most `most` bytes.
+fn count(returned: i16, most: usize) -> Result<usize, Status> {
+    match usize::try_from(returned) {
+        Ok(count) => Ok(count.min(most)),
+        Err(_) => Err(Status::LINK_LOST),
+    }
+}
+
+/// A length for C; what is longer is offered in pieces.
+fn length(bytes: &[u8]) -> u16 {
+    bytes.len().min(i16::MAX as usize) as u16
+}
+
+// SAFETY, here and below: the hooks are C functions that keep the contract
+// that their comments state, and slices are valid for their length.
+impl Port for mbm_port {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Status> {
+        match self.read {
+            // SAFETY: see above.
+            Some(read) => count(
+                unsafe { read(self.context, bytes.as_mut_ptr(), length(bytes)) },
+                bytes.len(),
+            ),
+            None => Err(Status::LINK_LOST),
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Status> {
+        match self.write {
+            // SAFETY: see above.
+            Some(write) => count(
+                unsafe { write(self.context, bytes.as_ptr(), length(bytes)) },
+                bytes.len(),
+            ),
+            None => Err(Status::LINK_LOST),
+        }
+    }
+
+    fn micros(&mut self) -> u32 {
+        match self.micros {
+            // SAFETY: see above.
+            Some(micros) => unsafe { micros(self.context) },
+            None => 0,
+        }
+    }
+
+    fn flush(&mut self) -> bool {
+        match self.flush {
+            // SAFETY: see above.
+            Some(flush) => unsafe { flush(self.context) != 0 },
+            None => true,
+        }
+    }
+
+    fn pre_transmission(&mut self) {
+        if let Some(hook) = self.preTransmission {
+            // SAFETY: see above.
+            unsafe { hook(self.context) }
+        }
+    }
+
+    fn post_transmission(&mut self) {
+        if let Some(hook) = self.postTransmission {
+            // SAFETY: see above.
+            unsafe { hook(self.context) }
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! The buffers and counters that C lends.
+
+use crate::transaction::{Counter, Lent, Storage, COUNTERS};
+
+/// What happened on the line, since the caller zeroed it. Each wraps at 2^32.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct mbm_counters {
+    /// Requests sent, retries included.
+    pub requests: u32,
+    /// Replies that answered a request, exceptions included.
+    pub replies: u32,
+    /// Replies that were exceptions.
+    pub exceptions: u32,
+    /// Requests whose reply arrived damaged.
+    pub badCrc: u32,
+    /// Requests that were not answered in time.
+    pub timeouts: u32,
+    /// Frames with a right CRC of other units, or that answered no request of
+    /// ours, while a reply was waited for.
+    pub foreignFrames: u32,
+    /// Replies that were found behind bytes that were no frame.
+    pub resynchronisations: u32,
+    /// Bytes sent.
+    pub bytesSent: u32,
+    /// Bytes received, foreign ones and noise included.
+    pub bytesReceived: u32,
+}
+
+const _: () = assert!(size_of::<mbm_counters>() == COUNTERS * size_of::<u32>());
+
+/// What mbm_master_setBuffers was given.
+#[derive(Clone, Copy)]
+pub(super) struct LentByC {
+    pub(super) response: *mut u16,
+    pub(super) transmit: *mut u16,
+    pub(super) frame: *mut u8,
+    pub(super) counters: *mut mbm_counters,
+    pub(super) response_words: u16,
+    pub(super) transmit_words: u16,
+    pub(super) frame_bytes: u16,
+}
+
+impl LentByC {
+    pub(super) const NONE: LentByC = LentByC {
+        response: core::ptr::null_mut(),
+        transmit: core::ptr::null_mut(),
+        frame: core::ptr::null_mut(),
+        counters: core::ptr::null_mut(),
+        response_words: 0,
+        transmit_words: 0,
+        frame_bytes: 0,
+    };
+}
+
+/// The slice of C's pointer and length.
+///
+/// # Safety
+/// `first` is NULL, or `length` items from it are valid and borrowed by
+/// nobody else.
+unsafe fn slice<'a, T>(first: *mut T, length: u16) -> &'a mut [T] {
+    if first.is_null() {
+        &mut []
+    } else {
+        // SAFETY: as the caller promises.
+        unsafe { core::slice::from_raw_parts_mut(first, usize::from(length)) }
+    }
+}
+
+impl Storage for LentByC {
+    fn lend(&mut self) -> Lent<'_> {
+        // SAFETY: mbm_master_setBuffers demands three buffers that do not
+        // overlap, of these lengths, valid for as long as the object is used.
+        unsafe {
+            Lent {
+                frame: slice(self.frame, self.frame_bytes),
+                transmit: slice(self.transmit, self.transmit_words),
+                response: slice(self.response, self.response_words),
+            }
+        }
+    }
+
+    #[cfg(feature = "counters")]
+    fn count(&mut self, counter: Counter, more: usize) {
+        if self.counters.is_null() {
+            return;
+        }
+        // SAFETY: the caller's counters are COUNTERS integers in a row, and
+        // `counter` is less than that.
+        unsafe {
+            let counter = self.counters.cast::<u32>().add(counter as usize);
+            *counter = (*counter).wrapping_add(more as u32);
+        }
+    }
+}

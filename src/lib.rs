@@ -1,0 +1,44 @@
+//! mbm: a Modbus stack for firmware.
+//!
+//! Data flows one way, and a module uses only what stands to its left:
+//!
+//! ```text
+//! bytes -> frame -> pdu -> transaction -> master -> capi
+//! ```
+//!
+//! `error`, `time`, `port` and `data` stand beside that line and may be used
+//! anywhere on it. `make check` holds every module to this rule.
+//!
+//! The core allocates nothing, keeps no globals, never blocks and does not
+//! panic. Time is an argument; input and output are a [`port::Port`].
+
+#![no_std]
+#![deny(unsafe_code)]
+#![warn(missing_docs, clippy::indexing_slicing, clippy::unwrap_used)]
+
+#[cfg(test)]
+extern crate std;
+
+/// cbindgen:ignore
+pub mod error;
+/// cbindgen:ignore
+pub mod port;
+/// cbindgen:ignore
+pub mod time;
+
+/// cbindgen:ignore
+pub mod bytes;
+/// cbindgen:ignore
+pub mod data;
+/// cbindgen:ignore
+pub mod frame;
+/// cbindgen:ignore
+pub mod pdu;
+/// cbindgen:ignore
+pub mod transaction;
+
+/// cbindgen:ignore
+pub mod master;
+
+#[allow(unsafe_code)]
+pub mod capi;

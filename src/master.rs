@@ -1,0 +1,371 @@
+//! The ModbusMaster-shaped facade: words to send, ten functions, words
+//! received. Each function starts a transaction; `poll` ends it.
+
+use crate::data::words;
+use crate::error::Status;
+use crate::pdu::request::Request;
+use crate::pdu::{bits, registers, response};
+use crate::port::Port;
+use crate::time;
+use crate::transaction::{Settings, Storage, Transaction};
+
+/// What is read where there is no word.
+pub const NO_WORD: u16 = 0xFFFF;
+
+/// A master on a serial line, with the port and the buffers it was given.
+pub struct Master<P, S> {
+    transaction: Transaction,
+    settings: Settings,
+    /// Where the writing functions without arguments write.
+    write_address: u16,
+    /// Bits queued in the transmit buffer; 16 to a word.
+    transmit_bits: u16,
+    response_words: u8,
+    response_index: u8,
+    slave: u8,
+    status: Status,
+    port: P,
+    storage: S,
+}
+
+impl<P, S> Master<P, S> {
+    /// A master that talks to `slave` over `port`.
+    pub const fn new(slave: u8, port: P, storage: S) -> Self {
+        Master {
+            transaction: Transaction::NEW,
+            settings: Settings::DEFAULT,
+            write_address: 0,
+            transmit_bits: 0,
+            response_words: 0,
+            response_index: 0,
+            slave,
+            status: Status::OK,
+            port,
+            storage,
+        }
+    }
+
+    /// The port.
+    pub fn port(&mut self) -> &mut P {
+        &mut self.port
+    }
+
+    /// What the caller lent.
+    pub fn storage(&mut self) -> &mut S {
+        &mut self.storage
+    }
+
+    /// How transactions behave.
+    pub fn settings(&mut self) -> &mut Settings {
+        &mut self.settings
+    }
+
+    /// Sets the unit that later requests go to; 0 is broadcast.
+    pub fn set_slave(&mut self, slave: u8) {
+        self.slave = slave;
+    }
+
+    /// The unit that requests go to.
+    pub fn slave(&self) -> u8 {
+        self.slave
+    }
+
+    /// Derives gap, silence and character time from the baud rate.
+    pub fn set_baud_rate(&mut self, baud: u32) {
+        self.settings.silence = time::silence(baud);
+        self.settings.gap = self.settings.silence;
+        self.settings.character = time::character(baud);
+    }
+
+    /// The status of the last request; [`Status::PENDING`] while it is under way.
+    pub fn status(&self) -> Status {
+        self.status
+    }
+
+    /// The raw exception code of the last reply; 0 if it was no exception.
+    pub fn exception_code(&self) -> u8 {
+        self.transaction.exception_code()
+    }
+
+    /// True if the last poll found nothing to do and the driver is off.
+    pub fn is_waiting(&self) -> bool {
+        self.transaction.is_waiting()
+    }
+
+    /// True while a request is under way.
+    pub fn is_pending(&self) -> bool {
+        self.transaction.is_pending()
+    }
+}
+
+impl<P: Port, S: Storage> Master<P, S> {
+    /// Talks to `slave` over `port` from now on. Settings, buffers and their
+    /// words stay; a request under way is given up.
+    pub fn begin(&mut self, slave: u8, port: P) {
+        self.cancel();
+        self.slave = slave;
+        self.port = port;
+        self.transmit_bits = 0;
+        self.line_used();
+    }
+
+    /// Gives up the request under way, if there is one.
+    pub fn cancel(&mut self) {
+        if self.transaction.is_pending() {
+            self.transaction.cancel(&mut self.port);
+            self.status = Status::CANCELLED;
+        }
+    }
+
+    /// Says that somebody else has just used the line.
+    pub fn line_used(&mut self) {
+        let now = self.port.micros();
+        self.transaction.line_used(now);
+    }
+
+    /// Moves the request under way on, without waiting; returns
+    /// [`Status::PENDING`] until it has ended, then how it ended.
+    pub fn poll(&mut self) -> Status {
+        if self.transaction.is_pending() {
+            let now = self.port.micros();
+            let mut status =
+                self.transaction
+                    .poll(now, &mut self.port, &mut self.storage, &self.settings);
+            if status == Status::OK && self.transaction.request().is_read() {
+                status = self.take_words();
+            }
+            self.status = status;
+        }
+        self.status
+    }
+
+    /// Decodes a successful reply into the response words.
+    fn take_words(&mut self) -> Status {
+        let request = self.transaction.request();
+        let lent = self.storage.lend();
+        let data = response::data(request, self.transaction.reply(lent.frame));
+        let count = data.len().div_ceil(2);
+        let Some(words) = lent.response.get_mut(..count) else {
+            return Status::BUFFER_TOO_SMALL;
+        };
+        words::fill(words, data, request.order());
+        if let Some(last) = words.last_mut() {
+            *last &= request.last_word_mask();
+        }
+        self.response_words = count as u8;
+        Status::OK
+    }
+
+    /// Starts what a function built, or fails without sending anything.
+    fn start(&mut self, request: Result<Request, Status>) -> Status {
+        if self.transaction.is_pending() {
+            return Status::BUSY;
+        }
+        self.transmit_bits = 0;
+        self.response_index = 0;
+        self.status = match self.try_start(request) {
+            Ok(()) => Status::PENDING,
+            Err(status) => {
+                self.transaction.forget();
+                status
+            }
+        };
+        self.status
+    }
+
+    /// Starts a write to `address`, with `words` in the transmit buffer first.
+    fn start_write(
+        &mut self,
+        address: u16,
+        words: &[u16],
+        request: Result<Request, Status>,
+    ) -> Status {
+        if !self.transaction.is_pending() {
+            self.write_address = address;
+            for (index, word) in words.iter().enumerate() {
+                self.set_transmit_word(index, *word);
+            }
+        }
+        self.start(request)
+    }
+
+    fn try_start(&mut self, request: Result<Request, Status>) -> Result<(), Status> {
+        let request = request?;
+        if usize::from(request.words()) > self.storage.lend().transmit.len() {
+            return Err(Status::ILLEGAL_DATA_VALUE);
+        }
+        if request.is_read() {
+            self.response_words = 0;
+        }
+        let now = self.port.micros();
+        self.transaction
+            .start(now, self.slave, request, &self.settings)
+    }
+
+    /// 01: reads 1 to 2000 coils into the response words.
+    pub fn read_coils(&mut self, address: u16, quantity: u16) -> Status {
+        self.start(bits::read(bits::READ_COILS, address, quantity))
+    }
+
+    /// 02: reads 1 to 2000 discrete inputs into the response words.
+    pub fn read_discrete_inputs(&mut self, address: u16, quantity: u16) -> Status {
+        self.start(bits::read(bits::READ_DISCRETE_INPUTS, address, quantity))
+    }
+
+    /// 03: reads 1 to 125 holding registers into the response words.
+    pub fn read_holding_registers(&mut self, address: u16, quantity: u16) -> Status {
+        self.start(registers::read(
+            registers::READ_HOLDING_REGISTERS,
+            address,
+            quantity,
+        ))
+    }
+
+    /// 04: reads 1 to 125 input registers into the response words.
+    pub fn read_input_registers(&mut self, address: u16, quantity: u16) -> Status {
+        self.start(registers::read(
+            registers::READ_INPUT_REGISTERS,
+            address,
+            quantity,
+        ))
+    }
+
+    /// 05: switches one coil.
+    pub fn write_single_coil(&mut self, address: u16, on: bool) -> Status {
+        self.start_write(address, &[], Ok(bits::write_single(address, on)))
+    }
+
+    /// 06: writes one register. The value also becomes transmit word 0.
+    pub fn write_single_register(&mut self, address: u16, value: u16) -> Status {
+        let request = registers::write_single(address, value);
+        self.start_write(address, &[value], Ok(request))
+    }
+
+    /// 0F: writes 1 to 1968 coils from the transmit words, lowest bit first.
+    pub fn write_multiple_coils(&mut self, address: u16, quantity: u16) -> Status {
+        self.start_write(address, &[], bits::write_multiple(address, quantity))
+    }
+
+    /// 0F: writes the queued bits to the last write address.
+    pub fn write_queued_coils(&mut self) -> Status {
+        self.write_multiple_coils(self.write_address, self.transmit_bits)
+    }
+
+    /// 10: writes 1 to 123 registers from the transmit words.
+    pub fn write_multiple_registers(&mut self, address: u16, quantity: u16) -> Status {
+        self.start_write(address, &[], registers::write_multiple(address, quantity))
+    }
+
+    /// 10: writes the queued complete words to the last write address.
+    pub fn write_queued_registers(&mut self) -> Status {
+        self.write_multiple_registers(self.write_address, self.transmit_bits >> 4)
+    }
+
+    /// 16: sets a register to `(register & and_mask) | (or_mask & !and_mask)`.
+    /// The masks also become transmit words 0 and 1.
+    pub fn mask_write_register(&mut self, address: u16, and_mask: u16, or_mask: u16) -> Status {
+        let request = registers::mask_write(address, and_mask, or_mask);
+        self.start_write(address, &[and_mask, or_mask], Ok(request))
+    }
+
+    /// 17: writes 1 to 121 registers from the transmit words, then reads 1 to
+    /// 125 into the response words.
+    pub fn read_write_multiple_registers(
+        &mut self,
+        read_address: u16,
+        read_quantity: u16,
+        write_address: u16,
+        write_quantity: u16,
+    ) -> Status {
+        let request =
+            registers::read_write(read_address, read_quantity, write_address, write_quantity);
+        self.start_write(write_address, &[], request)
+    }
+
+    /// 17: writes the queued complete words to the last write address.
+    pub fn read_write_queued_registers(&mut self, read_address: u16, read_quantity: u16) -> Status {
+        self.read_write_multiple_registers(
+            read_address,
+            read_quantity,
+            self.write_address,
+            self.transmit_bits >> 4,
+        )
+    }
+
+    /// A response word; 0xFFFF past the end of the buffer.
+    pub fn response_word(&mut self, index: usize) -> u16 {
+        let words = self.storage.lend().response;
+        words.get(index).copied().unwrap_or(NO_WORD)
+    }
+
+    /// Zeroes the response words.
+    pub fn clear_response(&mut self) {
+        self.storage.lend().response.fill(0);
+    }
+
+    /// Sets a transmit word; false past the end of the buffer.
+    pub fn set_transmit_word(&mut self, index: usize, value: u16) -> bool {
+        match self.storage.lend().transmit.get_mut(index) {
+            Some(word) => {
+                *word = value;
+                true
+            }
+            None => false,
+        }
+    }
+
+    /// Zeroes the transmit words.
+    pub fn clear_transmit(&mut self) {
+        self.storage.lend().transmit.fill(0);
+    }
+
+    /// Sets the write address and empties the queue; the words stay.
+    pub fn begin_transmission(&mut self, address: u16) {
+        self.write_address = address;
+        self.transmit_bits = 0;
+    }
+
+    /// Queues a word; a word begun by [`Master::send_bit`] is left as it is.
+    /// False, and nothing queued, past the end of the buffer.
+    pub fn send(&mut self, word: u16) -> bool {
+        let index = self.transmit_bits.div_ceil(16);
+        let fits = self.set_transmit_word(usize::from(index), word);
+        if fits {
+            self.transmit_bits = (index + 1) << 4;
+        }
+        fits
+    }
+
+    /// Queues a bit behind those queued, lowest first. False, and nothing
+    /// queued, past the end of the buffer.
+    pub fn send_bit(&mut self, on: bool) -> bool {
+        let index = usize::from(self.transmit_bits >> 4);
+        let mask = 1 << (self.transmit_bits & 15);
+        let Some(word) = self.storage.lend().transmit.get_mut(index) else {
+            return false;
+        };
+        if mask == 1 {
+            *word = 0;
+        }
+        if on {
+            *word |= mask;
+        }
+        self.transmit_bits += 1;
+        true
+    }
+
+    /// Words of the last successful read that [`Master::receive`] has not given.
+    pub fn available(&self) -> u8 {
+        self.response_words.saturating_sub(self.response_index)
+    }
+
+    /// The next word of the last successful read; 0xFFFF at the end.
+    pub fn receive(&mut self) -> u16 {
+        if self.available() == 0 {
+            return NO_WORD;
+        }
+        let word = self.response_word(usize::from(self.response_index));
+        self.response_index += 1;
+        word
+    }
+}

@@ -1,0 +1,16 @@
+//! Protocol data units: a function code and its data, free of any framing
+//! (application protocol V1.1b3, clause 6).
+//!
+//! One family of functions is one file. A request is built by one small
+//! function per function code, so that firmware carries what it calls.
+
+pub mod bits;
+pub mod registers;
+pub mod request;
+pub mod response;
+
+/// The longest PDU (application protocol, clause 4.1).
+pub const MAX_PDU: usize = 253;
+
+/// Set in the function code of an exception response (clause 7).
+pub const EXCEPTION: u8 = 0x80;

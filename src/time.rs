@@ -1,0 +1,86 @@
+//! Time: wrapping microseconds, and the silences of the serial line guide.
+//!
+//! Only differences are ever taken, so a clock that wraps is no concern; one
+//! wait may last 71 minutes at most.
+
+/// 3.5 characters at 9600 baud, rounded up: the silence kept while nobody has
+/// told the baud rate.
+pub const DEFAULT_SILENCE: u32 = 4_000;
+
+/// One character of 11 bits at 9600 baud.
+pub const DEFAULT_CHARACTER: u16 = 1_146;
+
+/// The fixed silence above 19200 baud (serial line guide V1.02, 2.5.1.1).
+const FAST_SILENCE: u32 = 1_750;
+
+/// The time from `since` to `now`, in microseconds.
+#[inline(always)]
+pub const fn elapsed(now: u32, since: u32) -> u32 {
+    now.wrapping_sub(since)
+}
+
+/// Milliseconds as microseconds.
+#[inline(always)]
+pub const fn millis(milliseconds: u16) -> u32 {
+    milliseconds as u32 * 1000
+}
+
+/// One character of 11 bits, in microseconds, rounded up; at most 65535.
+pub const fn character(baud: u32) -> u16 {
+    let time = match 11_000_000u32.checked_div(baud) {
+        Some(time) => time,
+        None => return DEFAULT_CHARACTER,
+    };
+    if time >= 0xFFFF {
+        0xFFFF
+    } else {
+        time as u16 + 1
+    }
+}
+
+/// The silence t3.5 that separates two frames, in microseconds.
+pub const fn silence(baud: u32) -> u32 {
+    if baud > 19_200 {
+        FAST_SILENCE
+    } else {
+        match 38_500_000u32.checked_div(baud) {
+            Some(time) => time + 1,
+            None => DEFAULT_SILENCE,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn silence_is_three_and_a_half_characters_up_to_19200_baud() {
+        assert_eq!(silence(9_600), 4_011);
+        assert_eq!(silence(19_200), 2_006);
+        assert_eq!(silence(300), 128_334);
+    }
+
+    #[test]
+    fn silence_is_fixed_above_19200_baud() {
+        assert_eq!(silence(19_201), 1_750);
+        assert_eq!(silence(115_200), 1_750);
+    }
+
+    #[test]
+    fn an_untold_rate_means_the_defaults() {
+        assert_eq!(silence(0), DEFAULT_SILENCE);
+        assert_eq!(character(0), DEFAULT_CHARACTER);
+    }
+
+    #[test]
+    fn a_character_is_eleven_bits() {
+        assert_eq!(character(9_600), 1_146);
+        assert_eq!(character(1), 0xFFFF);
+    }
+
+    #[test]
+    fn elapsed_survives_the_wrap() {
+        assert_eq!(elapsed(5, u32::MAX - 4), 10);
+    }
+}
