@@ -1,4 +1,4 @@
-//! Bounds-checked big-endian reading and writing. Nothing here can panic.
+//! Bounds-checked big-endian reading. Nothing here can panic.
 
 /// Reads from the front of a byte slice.
 #[derive(Clone, Copy)]
@@ -37,60 +37,6 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Writes to the front of a byte slice. What does not fit is not written, and
-/// [`Writer::finish`] tells.
-pub struct Writer<'a> {
-    buffer: &'a mut [u8],
-    at: usize,
-    fits: bool,
-}
-
-impl<'a> Writer<'a> {
-    /// Writes to `buffer` from its front.
-    pub fn new(buffer: &'a mut [u8]) -> Self {
-        Writer {
-            buffer,
-            at: 0,
-            fits: true,
-        }
-    }
-
-    /// Appends a byte.
-    pub fn u8(&mut self, value: u8) {
-        match self.buffer.get_mut(self.at) {
-            Some(place) => {
-                *place = value;
-                self.at += 1;
-            }
-            None => self.fits = false,
-        }
-    }
-
-    /// Appends two bytes, high byte first.
-    pub fn u16(&mut self, value: u16) {
-        for byte in value.to_be_bytes() {
-            self.u8(byte);
-        }
-    }
-
-    /// Appends bytes as they are.
-    pub fn bytes(&mut self, bytes: &[u8]) {
-        for byte in bytes {
-            self.u8(*byte);
-        }
-    }
-
-    /// What has been written so far.
-    pub fn written(&self) -> &[u8] {
-        self.buffer.get(..self.at).unwrap_or_default()
-    }
-
-    /// How many bytes were written; `None` if some did not fit.
-    pub fn finish(&self) -> Option<usize> {
-        self.fits.then_some(self.at)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -104,19 +50,5 @@ mod tests {
         assert_eq!(reader.rest(), [4]);
         assert!(reader.is_empty());
         assert_eq!(reader.u8(), None);
-    }
-
-    #[test]
-    fn writer_writes_big_endian_and_knows_what_fits() {
-        let mut buffer = [0; 4];
-        let mut writer = Writer::new(&mut buffer);
-        writer.u8(1);
-        writer.u16(0x0203);
-        writer.bytes(&[4]);
-        assert_eq!(writer.finish(), Some(4));
-        assert_eq!(writer.written(), [1, 2, 3, 4]);
-        writer.u8(5);
-        assert_eq!(writer.finish(), None);
-        assert_eq!(buffer, [1, 2, 3, 4]);
     }
 }

@@ -4,7 +4,7 @@
 use crate::data::words;
 use crate::error::Status;
 use crate::pdu::request::Request;
-use crate::pdu::{bits, registers, response};
+use crate::pdu::{bits, registers};
 use crate::port::Port;
 use crate::time;
 use crate::transaction::{Settings, Storage, Transaction};
@@ -14,8 +14,7 @@ pub const NO_WORD: u16 = 0xFFFF;
 
 /// A master on a serial line, with the port and the buffers it was given.
 pub struct Master<P, S> {
-    transaction: Transaction,
-    settings: Settings,
+    transaction: Transaction<P, S>,
     /// Where the writing functions without arguments write.
     write_address: u16,
     /// Bits queued in the transmit buffer; 16 to a word.
@@ -24,40 +23,35 @@ pub struct Master<P, S> {
     response_index: u8,
     slave: u8,
     status: Status,
-    port: P,
-    storage: S,
 }
 
 impl<P, S> Master<P, S> {
     /// A master that talks to `slave` over `port`.
     pub const fn new(slave: u8, port: P, storage: S) -> Self {
         Master {
-            transaction: Transaction::NEW,
-            settings: Settings::DEFAULT,
+            transaction: Transaction::new(port, storage),
             write_address: 0,
             transmit_bits: 0,
             response_words: 0,
             response_index: 0,
             slave,
             status: Status::OK,
-            port,
-            storage,
         }
     }
 
     /// The port.
     pub fn port(&mut self) -> &mut P {
-        &mut self.port
+        &mut self.transaction.port
     }
 
     /// What the caller lent.
     pub fn storage(&mut self) -> &mut S {
-        &mut self.storage
+        &mut self.transaction.storage
     }
 
     /// How transactions behave.
     pub fn settings(&mut self) -> &mut Settings {
-        &mut self.settings
+        &mut self.transaction.settings
     }
 
     /// Sets the unit that later requests go to; 0 is broadcast.
@@ -72,9 +66,10 @@ impl<P, S> Master<P, S> {
 
     /// Derives gap, silence and character time from the baud rate.
     pub fn set_baud_rate(&mut self, baud: u32) {
-        self.settings.silence = time::silence(baud);
-        self.settings.gap = self.settings.silence;
-        self.settings.character = time::character(baud);
+        let settings = self.settings();
+        settings.silence = time::silence(baud);
+        settings.gap = settings.silence;
+        settings.character = time::character(baud);
     }
 
     /// The status of the last request; [`Status::PENDING`] while it is under way.
@@ -104,7 +99,7 @@ impl<P: Port, S: Storage> Master<P, S> {
     pub fn begin(&mut self, slave: u8, port: P) {
         self.cancel();
         self.slave = slave;
-        self.port = port;
+        self.transaction.port = port;
         self.transmit_bits = 0;
         self.line_used();
     }
@@ -112,45 +107,41 @@ impl<P: Port, S: Storage> Master<P, S> {
     /// Gives up the request under way, if there is one.
     pub fn cancel(&mut self) {
         if self.transaction.is_pending() {
-            self.transaction.cancel(&mut self.port);
+            self.transaction.cancel();
             self.status = Status::CANCELLED;
         }
     }
 
     /// Says that somebody else has just used the line.
     pub fn line_used(&mut self) {
-        let now = self.port.micros();
-        self.transaction.line_used(now);
+        self.transaction.line_used();
     }
 
     /// Moves the request under way on, without waiting; returns
     /// [`Status::PENDING`] until it has ended, then how it ended.
     pub fn poll(&mut self) -> Status {
         if self.transaction.is_pending() {
-            let now = self.port.micros();
-            let mut status =
-                self.transaction
-                    .poll(now, &mut self.port, &mut self.storage, &self.settings);
-            if status == Status::OK && self.transaction.request().is_read() {
-                status = self.take_words();
-            }
-            self.status = status;
+            let now = self.transaction.port.micros();
+            self.status = match self.transaction.poll(now) {
+                Status::OK if self.transaction.request().is_read() => self.take_words(),
+                status => status,
+            };
         }
         self.status
     }
 
     /// Decodes a successful reply into the response words.
     fn take_words(&mut self) -> Status {
-        let request = self.transaction.request();
-        let lent = self.storage.lend();
-        let data = response::data(request, self.transaction.reply(lent.frame));
+        let order = self.transaction.request().order();
+        let mask = self.transaction.request().last_word_mask();
+        let (data, words) = self.transaction.data_and_words();
         let count = data.len().div_ceil(2);
-        let Some(words) = lent.response.get_mut(..count) else {
+        let Some(words) = words.get_mut(..count) else {
             return Status::BUFFER_TOO_SMALL;
         };
-        words::fill(words, data, request.order());
+        words::fill(words, data, order);
         if let Some(last) = words.last_mut() {
-            *last &= request.last_word_mask();
+            *last &= mask;
         }
         self.response_words = count as u8;
         Status::OK
@@ -191,15 +182,13 @@ impl<P: Port, S: Storage> Master<P, S> {
 
     fn try_start(&mut self, request: Result<Request, Status>) -> Result<(), Status> {
         let request = request?;
-        if usize::from(request.words()) > self.storage.lend().transmit.len() {
+        if usize::from(request.words()) > self.transaction.storage.transmit().len() {
             return Err(Status::ILLEGAL_DATA_VALUE);
         }
         if request.is_read() {
             self.response_words = 0;
         }
-        let now = self.port.micros();
-        self.transaction
-            .start(now, self.slave, request, &self.settings)
+        self.transaction.start(self.slave, request)
     }
 
     /// 01: reads 1 to 2000 coils into the response words.
@@ -294,18 +283,18 @@ impl<P: Port, S: Storage> Master<P, S> {
 
     /// A response word; 0xFFFF past the end of the buffer.
     pub fn response_word(&mut self, index: usize) -> u16 {
-        let words = self.storage.lend().response;
+        let words = self.transaction.storage.response();
         words.get(index).copied().unwrap_or(NO_WORD)
     }
 
     /// Zeroes the response words.
     pub fn clear_response(&mut self) {
-        self.storage.lend().response.fill(0);
+        self.transaction.storage.response().fill(0);
     }
 
     /// Sets a transmit word; false past the end of the buffer.
     pub fn set_transmit_word(&mut self, index: usize, value: u16) -> bool {
-        match self.storage.lend().transmit.get_mut(index) {
+        match self.transaction.storage.transmit().get_mut(index) {
             Some(word) => {
                 *word = value;
                 true
@@ -316,7 +305,7 @@ impl<P: Port, S: Storage> Master<P, S> {
 
     /// Zeroes the transmit words.
     pub fn clear_transmit(&mut self) {
-        self.storage.lend().transmit.fill(0);
+        self.transaction.storage.transmit().fill(0);
     }
 
     /// Sets the write address and empties the queue; the words stay.
@@ -341,7 +330,7 @@ impl<P: Port, S: Storage> Master<P, S> {
     pub fn send_bit(&mut self, on: bool) -> bool {
         let index = usize::from(self.transmit_bits >> 4);
         let mask = 1 << (self.transmit_bits & 15);
-        let Some(word) = self.storage.lend().transmit.get_mut(index) else {
+        let Some(word) = self.transaction.storage.transmit().get_mut(index) else {
             return false;
         };
         if mask == 1 {

@@ -8,11 +8,10 @@
 //! length to an earlier request looks like the reply. After a timeout the
 //! line is therefore given a quiet time before the next request.
 
-use crate::bytes::Writer;
 use crate::error::Status;
-use crate::frame::rtu::{self, Event, Fit, Window};
+use crate::frame::rtu::{self, Seen, Window};
 use crate::pdu::request::Request;
-use crate::pdu::{response, EXCEPTION};
+use crate::pdu::response;
 use crate::port::Port;
 use crate::time::{self, elapsed, millis};
 
@@ -43,20 +42,22 @@ pub enum Counter {
 /// How many kinds of [`Counter`] there are.
 pub const COUNTERS: usize = 9;
 
-/// The buffers that the caller lends.
-pub struct Lent<'a> {
-    /// One frame: of a request first, then of what arrives.
-    pub frame: &'a mut [u8],
-    /// The words that writing requests send.
-    pub transmit: &'a mut [u16],
-    /// The words that a successful read fills.
-    pub response: &'a mut [u16],
-}
-
 /// What the caller lends to a transaction.
 pub trait Storage {
-    /// The buffers.
-    fn lend(&mut self) -> Lent<'_>;
+    /// One frame: of a request first, then of what arrives.
+    fn frame(&mut self) -> &mut [u8];
+
+    /// The words that writing requests send.
+    fn transmit(&mut self) -> &mut [u16];
+
+    /// The words that a successful read fills.
+    fn response(&mut self) -> &mut [u16];
+
+    /// Frame and transmit words at once.
+    fn frame_and_transmit(&mut self) -> (&mut [u8], &[u16]);
+
+    /// Frame and response words at once.
+    fn frame_and_response(&mut self) -> (&[u8], &mut [u16]);
 
     /// Adds to a counter, if there is storage for counters.
     fn count(&mut self, _counter: Counter, _more: usize) {}
@@ -100,90 +101,90 @@ impl Settings {
     };
 }
 
-/// Where a transaction stands. Integers, since C holds the storage.
-mod phase {
+/// Where a transaction stands.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Phase {
     /// Nothing to do.
-    pub const IDLE: u8 = 0;
+    Idle,
     /// Waiting for the line to be silent.
-    pub const GAP: u8 = 1;
+    Gap,
     /// Handing the frame to the port; the driver is on.
-    pub const SEND: u8 = 2;
+    Send,
     /// Waiting for the port to drain; the driver is on.
-    pub const FLUSH: u8 = 3;
+    Flush,
     /// Holding the driver on a little longer.
-    pub const HOLD: u8 = 4;
+    Hold,
     /// Waiting for the reply.
-    pub const REPLY: u8 = 5;
+    Reply,
     /// Waiting for the slaves to carry out a broadcast.
-    pub const TURNAROUND: u8 = 6;
+    Turnaround,
 }
 
-/// What was seen while no reply came, the more telling the greater.
-mod seen {
-    pub const NOTHING: u8 = 0;
-    pub const OTHER_UNIT: u8 = 1;
-    pub const OTHER_FUNCTION: u8 = 2;
-    pub const MALFORMED: u8 = 3;
-    pub const BAD_CRC: u8 = 4;
-    pub const TOO_LONG: u8 = 5;
-}
-
-/// One request and its reply.
-#[derive(Clone, Copy, Debug)]
-pub struct Transaction {
+/// One request and its reply, over the port and in the storage it was given.
+pub struct Transaction<P, S> {
     /// When the phase began.
     since: u32,
     /// When the line was last seen busy.
     last_byte: u32,
-    request: Request,
-    window: Window,
-    /// Bytes of the request frame, and how many of them are sent.
-    length: u16,
-    sent: u16,
-    phase: u8,
+    /// The time that the poll under way was told.
+    now: u32,
+    phase: Phase,
     unit: u8,
-    seen: u8,
     retries: u8,
     exception: u8,
+    /// Bytes of the request that are sent, then where the reply's PDU starts.
+    at: u16,
     /// The phase began with the last poll; its time is that of the next.
     stamp: bool,
     /// The last poll found nothing to do.
     waiting: bool,
-    /// What arrived was searched to its end.
+    /// What has arrived was searched behind its first candidate.
     skimmed: bool,
     /// The last reply timed out, and may still come.
     late: bool,
     /// The request itself is expected to come back before the reply.
     echo: bool,
+    window: Window,
+    request: Request,
+    /// How transactions behave.
+    pub settings: Settings,
+    /// What the caller lends.
+    pub storage: S,
+    /// The byte stream.
+    pub port: P,
 }
 
 /// The unit that every slave listens to (serial line guide 2.2).
 pub const BROADCAST: u8 = 0;
 
-impl Transaction {
-    /// No transaction.
-    pub const NEW: Transaction = Transaction {
-        since: 0,
-        last_byte: 0,
-        request: Request::NONE,
-        window: Window::EMPTY,
-        length: 0,
-        sent: 0,
-        phase: phase::IDLE,
-        unit: 0,
-        seen: 0,
-        retries: 0,
-        exception: 0,
-        stamp: false,
-        waiting: false,
-        skimmed: false,
-        late: false,
-        echo: false,
-    };
+impl<P, S> Transaction<P, S> {
+    /// No transaction yet.
+    pub const fn new(port: P, storage: S) -> Self {
+        Transaction {
+            since: 0,
+            last_byte: 0,
+            now: 0,
+            phase: Phase::Idle,
+            unit: 0,
+            retries: 0,
+            exception: 0,
+            at: 0,
+            stamp: false,
+            waiting: false,
+            skimmed: false,
+            late: false,
+            echo: false,
+            window: Window::EMPTY,
+            request: Request::NONE,
+            settings: Settings::DEFAULT,
+            storage,
+            port,
+        }
+    }
 
     /// True while a request is under way.
-    pub const fn is_pending(&self) -> bool {
-        self.phase != phase::IDLE
+    pub fn is_pending(&self) -> bool {
+        self.phase != Phase::Idle
     }
 
     /// True if the last poll found nothing to do and the driver is off, so
@@ -207,9 +208,56 @@ impl Transaction {
         &self.request
     }
 
-    /// Says that the line was busy at `now`, so the gap counts from there.
-    pub fn line_used(&mut self, now: u32) {
-        self.last_byte = now;
+    /// True once the phase has lasted `time`.
+    fn lasts(&self, time: u32) -> bool {
+        elapsed(self.now, self.since) >= time
+    }
+
+    /// True once the phase has lasted as long as the response timeout.
+    fn is_over(&self) -> bool {
+        self.lasts(millis(self.settings.response_timeout))
+    }
+
+    /// A port that takes nothing or drains nothing is not waited for longer
+    /// than a reply.
+    fn stalled(&self) -> Status {
+        if self.is_over() {
+            Status::LINE_BUSY
+        } else {
+            Status::PENDING
+        }
+    }
+
+    fn listen_from(&mut self, now: u32) {
+        self.phase = Phase::Gap;
+        self.since = now;
+        self.stamp = false;
+    }
+
+    /// Enters a phase whose time counts from the next poll on.
+    fn enter(&mut self, phase: Phase) {
+        self.phase = phase;
+        self.stamp = true;
+    }
+
+    fn wait(&mut self) -> Status {
+        self.waiting = true;
+        Status::PENDING
+    }
+}
+
+impl<P: Port, S: Storage> Transaction<P, S> {
+    /// Says that the line was busy just now, so the gap counts from here.
+    pub fn line_used(&mut self) {
+        self.last_byte = self.port.micros();
+    }
+
+    /// The data bytes of the reply that ended the last transaction, and the
+    /// words to fill from them.
+    pub fn data_and_words(&mut self) -> (&[u8], &mut [u16]) {
+        let (frame, words) = self.storage.frame_and_response();
+        let pdu = frame.get(usize::from(self.at)..).unwrap_or_default();
+        (response::data(&self.request, pdu), words)
     }
 
     /// Starts `request` to `unit`; `poll` does the rest.
@@ -217,13 +265,7 @@ impl Transaction {
     /// # Errors
     /// [`Status::BUSY`] if one is under way, [`Status::BROADCAST_NOT_ALLOWED`]
     /// for a read from unit 0. Nothing is sent then.
-    pub fn start(
-        &mut self,
-        now: u32,
-        unit: u8,
-        request: Request,
-        settings: &Settings,
-    ) -> Result<(), Status> {
+    pub fn start(&mut self, unit: u8, request: Request) -> Result<(), Status> {
         if self.is_pending() {
             return Err(Status::BUSY);
         }
@@ -232,355 +274,257 @@ impl Transaction {
         }
         self.request = request;
         self.unit = unit;
-        self.retries = settings.retries;
+        self.retries = self.settings.retries;
         self.forget();
-        self.enter(phase::GAP);
-        self.since = now;
-        self.stamp = false;
+        let now = self.port.micros();
+        self.listen_from(now);
         Ok(())
     }
 
     /// Gives the request up, with the driver off.
-    pub fn cancel(&mut self, port: &mut impl Port) {
-        if matches!(self.phase, phase::SEND | phase::FLUSH | phase::HOLD) {
-            port.post_transmission();
+    pub fn cancel(&mut self) {
+        if matches!(self.phase, Phase::Send | Phase::Flush | Phase::Hold) {
+            self.port.post_transmission();
         }
-        self.phase = phase::IDLE;
+        self.phase = Phase::Idle;
     }
 
-    /// Moves the transaction on, without waiting: [`Status::PENDING`] until
-    /// it has ended, then how.
-    pub fn poll<P: Port, S: Storage>(
-        &mut self,
-        now: u32,
-        port: &mut P,
-        storage: &mut S,
-        settings: &Settings,
-    ) -> Status {
+    /// Moves the transaction on to the time `now`, without waiting:
+    /// [`Status::PENDING`] until it has ended, then how.
+    pub fn poll(&mut self, now: u32) -> Status {
         self.waiting = false;
+        self.now = now;
         if self.stamp {
             self.stamp = false;
             self.since = now;
             self.last_byte = now;
         }
-        let step = match self.phase {
-            phase::GAP => self.listen(now, port, storage, settings),
-            phase::SEND => self.send(now, port, storage, settings),
-            phase::FLUSH => self.flush(now, port, settings),
-            phase::HOLD => self.hold(now, port, settings),
-            phase::REPLY => self.receive(now, port, storage, settings),
-            phase::TURNAROUND => self.turn_around(now, settings),
-            _ => return Status::OK,
+        let status = match self.phase {
+            Phase::Idle => return Status::OK,
+            Phase::Gap => self.listen(),
+            Phase::Send => self.send(),
+            Phase::Flush => self.flush(),
+            Phase::Hold => self.hold(),
+            Phase::Reply => self.receive(),
+            Phase::Turnaround => self.turn_around(),
         };
-        if step == Status::PENDING {
-            step
-        } else {
-            self.end(now, step, port, storage)
+        if status != Status::PENDING {
+            self.cancel();
         }
-    }
-
-    /// Enters a phase whose time counts from the next poll on.
-    fn enter(&mut self, phase: u8) {
-        self.phase = phase;
-        self.stamp = true;
+        status
     }
 
     /// Listens until the line has been silent, then sends. What arrives here
     /// belongs to no request of ours.
-    fn listen<P: Port, S: Storage>(
-        &mut self,
-        now: u32,
-        port: &mut P,
-        storage: &mut S,
-        settings: &Settings,
-    ) -> Status {
-        let count = match port.read(storage.lend().frame) {
-            Ok(count) => count,
+    fn listen(&mut self) -> Status {
+        match self.port.read(self.storage.frame()) {
             Err(status) => return status,
-        };
-        if count > 0 {
-            storage.count(Counter::BytesReceived, count);
-            self.last_byte = now;
-        }
-        let quiet = if self.late {
-            millis(settings.quiet_time)
-        } else {
-            0
-        };
-        let silent = elapsed(now, self.last_byte);
-        if count == 0 && silent >= settings.gap && silent >= quiet {
-            return self.emit(now, port, storage, settings);
-        }
-        if elapsed(now, self.since) >= millis(settings.response_timeout).saturating_add(quiet) {
-            return Status::LINE_BUSY;
-        }
-        self.waiting = count == 0;
-        Status::PENDING
-    }
-
-    /// Builds the frame and begins to send it.
-    fn emit<P: Port, S: Storage>(
-        &mut self,
-        now: u32,
-        port: &mut P,
-        storage: &mut S,
-        settings: &Settings,
-    ) -> Status {
-        let lent = storage.lend();
-        let mut writer = Writer::new(lent.frame);
-        writer.u8(self.unit);
-        self.request.emit(&mut writer, lent.transmit);
-        rtu::seal(&mut writer);
-        let Some(length) = writer.finish() else {
-            return Status::BUFFER_TOO_SMALL;
-        };
-        self.length = length as u16;
-        self.sent = 0;
-        self.late = false;
-        self.seen = seen::NOTHING;
-        self.skimmed = false;
-        self.echo = settings.echo_discard;
-        self.window = Window::EMPTY;
-        self.since = now;
-        self.phase = phase::SEND;
-        storage.count(Counter::Requests, 1);
-        port.pre_transmission();
-        self.send(now, port, storage, settings)
-    }
-
-    fn send<P: Port, S: Storage>(
-        &mut self,
-        now: u32,
-        port: &mut P,
-        storage: &mut S,
-        settings: &Settings,
-    ) -> Status {
-        let frame = storage.lend().frame;
-        let rest = usize::from(self.sent)..usize::from(self.length);
-        match port.write(frame.get(rest).unwrap_or_default()) {
+            Ok(0) => {}
             Ok(count) => {
-                self.sent += count as u16;
-                storage.count(Counter::BytesSent, count);
+                self.storage.count(Counter::BytesReceived, count);
+                self.last_byte = self.now;
+                return self.stalled();
             }
-            Err(status) => return status,
         }
-        if self.sent >= self.length {
-            self.phase = phase::FLUSH;
-            return self.flush(now, port, settings);
+        let mut gap = self.settings.gap;
+        if self.late {
+            gap = gap.max(millis(self.settings.quiet_time));
         }
-        self.stalled(now, settings)
+        if elapsed(self.now, self.last_byte) < gap {
+            return self.wait();
+        }
+        if !self.write_frame() {
+            return Status::BUFFER_TOO_SMALL;
+        }
+        self.storage.count(Counter::Requests, 1);
+        self.at = 0;
+        self.late = false;
+        self.enter(Phase::Send);
+        self.port.pre_transmission();
+        Status::PENDING
     }
 
-    fn flush<P: Port>(&mut self, now: u32, port: &mut P, settings: &Settings) -> Status {
-        if !port.flush() {
-            return self.stalled(now, settings);
+    /// Writes the request into the frame buffer, if that holds it.
+    fn write_frame(&mut self) -> bool {
+        let request = &self.request;
+        let (frame, words) = self.storage.frame_and_transmit();
+        rtu::write(frame, self.unit, request.length(), |index| {
+            request.byte(index, words)
+        })
+        .is_some()
+    }
+
+    fn send(&mut self) -> Status {
+        let rest = usize::from(self.at)..self.request.length() + rtu::OVERHEAD;
+        let rest = self.storage.frame().get(rest).unwrap_or_default();
+        let left = rest.len();
+        match self.port.write(rest) {
+            Err(status) => status,
+            Ok(count) => {
+                self.storage.count(Counter::BytesSent, count);
+                self.at += count as u16;
+                if count < left {
+                    return self.stalled();
+                }
+                self.phase = Phase::Flush;
+                self.flush()
+            }
         }
-        if settings.post_flush_hold > 0 {
-            self.enter(phase::HOLD);
+    }
+
+    fn flush(&mut self) -> Status {
+        if !self.port.flush() {
+            return self.stalled();
+        }
+        if self.settings.post_flush_hold > 0 {
+            self.enter(Phase::Hold);
         } else {
-            self.release(port);
+            self.release();
         }
         Status::PENDING
     }
 
-    /// A port that takes nothing and drains nothing is not waited for longer
-    /// than a reply.
-    fn stalled(&self, now: u32, settings: &Settings) -> Status {
-        if elapsed(now, self.since) >= millis(settings.response_timeout) {
-            Status::LINE_BUSY
-        } else {
-            Status::PENDING
-        }
-    }
-
-    fn hold<P: Port>(&mut self, now: u32, port: &mut P, settings: &Settings) -> Status {
-        let hold = u32::from(settings.post_flush_hold) * u32::from(settings.character);
-        if elapsed(now, self.since) >= hold {
-            self.release(port);
+    fn hold(&mut self) -> Status {
+        let character = u32::from(self.settings.character);
+        if self.lasts(character * u32::from(self.settings.post_flush_hold)) {
+            self.release();
         }
         Status::PENDING
     }
 
     /// The request is on the wire: the driver goes off, the wait begins.
-    fn release<P: Port>(&mut self, port: &mut P) {
-        port.post_transmission();
+    fn release(&mut self) {
+        self.port.post_transmission();
+        self.window = Window::EMPTY;
+        self.echo = self.settings.echo_discard;
         self.enter(if self.unit == BROADCAST {
-            phase::TURNAROUND
+            Phase::Turnaround
         } else {
-            phase::REPLY
+            Phase::Reply
         });
     }
 
-    fn turn_around(&mut self, now: u32, settings: &Settings) -> Status {
-        if elapsed(now, self.since) >= millis(settings.turnaround_delay) {
+    fn turn_around(&mut self) -> Status {
+        if self.lasts(millis(self.settings.turnaround_delay)) {
             return Status::OK;
         }
-        self.waiting = true;
-        Status::PENDING
+        self.wait()
     }
 
-    fn receive<P: Port, S: Storage>(
-        &mut self,
-        now: u32,
-        port: &mut P,
-        storage: &mut S,
-        settings: &Settings,
-    ) -> Status {
-        let count = match port.read(self.window.room(storage.lend().frame)) {
+    fn receive(&mut self) -> Status {
+        let count = match self.port.read(self.window.room(self.storage.frame())) {
             Ok(count) => count,
             Err(status) => return status,
         };
-        let mut found = Status::PENDING;
+        let over = self.is_over();
+        let mut silent = false;
         if count > 0 {
-            self.last_byte = now;
+            self.storage.count(Counter::BytesReceived, count);
+            self.last_byte = self.now;
             self.skimmed = false;
             self.window.arrived(count);
-            storage.count(Counter::BytesReceived, count);
-            found = self.search(storage, false);
-        }
-        let silent = count == 0 && elapsed(now, self.last_byte) >= settings.silence;
-        let over = elapsed(now, self.since) >= millis(settings.response_timeout);
-        if found == Status::PENDING && (silent || over) && !self.skimmed {
-            found = self.skim(storage);
-        }
-        if found != Status::PENDING {
-            return found;
-        }
-        if over || (silent && self.seen >= seen::BAD_CRC) {
-            self.late = over;
-            return self.failure();
-        }
-        self.waiting = count == 0;
-        Status::PENDING
-    }
-
-    /// Looks for the reply in what has arrived, from the candidate on.
-    fn search<S: Storage>(&mut self, storage: &mut S, skim: bool) -> Status {
-        loop {
-            let frame = storage.lend().frame;
-            let (request, echo) = (&self.request, self.echo);
-            let event = self.window.next(frame, self.unit, skim, |pdu| {
-                if echo {
-                    match request.fit_echo(pdu) {
-                        Fit::No => {}
-                        fit => return fit,
-                    }
-                }
-                response::fit(request, pdu)
-            });
-            match event {
-                Event::More => return Status::PENDING,
-                Event::Frame { at, length } => {
-                    let pdu = frame.get(at..at + length).unwrap_or_default();
-                    if echo && request.fit_echo(pdu) == Fit::Length(length) {
-                        self.echo = false;
-                        self.window.at_boundary();
-                        continue;
-                    }
-                    let status = response::judge(request, pdu);
-                    self.exception = response::exception_code(request, pdu).unwrap_or(0);
-                    if status != Status::MALFORMED_REPLY {
-                        if self.window.has_passed_noise() {
-                            storage.count(Counter::Resynchronisations, 1);
-                        }
-                        return status;
-                    }
-                    self.window.at_boundary();
-                    storage.count(Counter::ForeignFrames, 1);
-                    self.note(seen::MALFORMED);
-                }
-                Event::BadCrc { at } => {
-                    let pdu = frame.get(at..).unwrap_or_default();
-                    if echo && request.fit_echo(pdu) != Fit::No {
-                        self.echo = false;
-                    } else if !skim {
-                        self.note(seen::BAD_CRC);
-                    }
-                }
-                Event::TooLong => self.note(seen::TOO_LONG),
-                Event::Foreign { unit, function } => {
-                    storage.count(Counter::ForeignFrames, 1);
-                    // What looked like a damaged reply was part of this frame.
-                    if self.seen == seen::BAD_CRC {
-                        self.seen = seen::NOTHING;
-                    }
-                    self.note(if unit != self.unit {
-                        seen::OTHER_UNIT
-                    } else if function & !EXCEPTION != self.request.function() {
-                        seen::OTHER_FUNCTION
-                    } else {
-                        seen::MALFORMED
-                    });
-                }
+            let found = self.search(false);
+            if found != Status::PENDING {
+                return found;
             }
+        } else {
+            self.waiting = true;
+            silent = elapsed(self.now, self.last_byte) >= self.settings.silence;
         }
-    }
-
-    /// Looks behind a candidate that does not get complete: it may be noise
-    /// that looks like the reply's first bytes. The candidate is kept, for
-    /// the rest of it may still come.
-    fn skim<S: Storage>(&mut self, storage: &mut S) -> Status {
-        self.skimmed = true;
-        let candidate = self.window;
-        let found = self.search(storage, true);
-        if found == Status::PENDING {
-            self.window = candidate;
-        }
-        found
-    }
-
-    fn note(&mut self, seen: u8) {
-        self.seen = self.seen.max(seen);
-    }
-
-    /// The most telling status for a reply that never came.
-    fn failure(&self) -> Status {
-        match self.seen {
-            seen::OTHER_UNIT => Status::INVALID_SLAVE_ID,
-            seen::OTHER_FUNCTION => Status::INVALID_FUNCTION,
-            seen::MALFORMED => Status::MALFORMED_REPLY,
-            seen::BAD_CRC => Status::INVALID_CRC,
-            seen::TOO_LONG => Status::BUFFER_TOO_SMALL,
-            _ => Status::RESPONSE_TIMED_OUT,
-        }
-    }
-
-    /// Ends an attempt: the driver is off, the outcome counted, and the
-    /// request repeated if that may help.
-    fn end<P: Port, S: Storage>(
-        &mut self,
-        now: u32,
-        status: Status,
-        port: &mut P,
-        storage: &mut S,
-    ) -> Status {
-        self.cancel(port);
-        match status {
-            Status::RESPONSE_TIMED_OUT => storage.count(Counter::Timeouts, 1),
-            Status::INVALID_CRC => storage.count(Counter::BadCrc, 1),
-            Status::OK if self.unit == BROADCAST => {}
-            Status::OK => storage.count(Counter::Replies, 1),
-            status if status.is_exception() => {
-                storage.count(Counter::Replies, 1);
-                storage.count(Counter::Exceptions, 1);
-            }
-            _ => {}
-        }
-        if self.late {
-            self.last_byte = now;
-        }
-        if self.retries > 0 && status.is_worth_a_retry() {
-            self.retries -= 1;
-            self.since = now;
-            self.phase = phase::GAP;
+        if !over && !silent {
             return Status::PENDING;
         }
-        status
+        // A candidate that does not get complete may be noise that looks like
+        // the reply, so look behind it; the rest of it may still come.
+        if !self.skimmed {
+            self.skimmed = true;
+            let found = self.search(true);
+            if found != Status::PENDING {
+                return found;
+            }
+        }
+        if over || self.window.seen() >= Seen::BadCrc {
+            self.fail(over)
+        } else {
+            Status::PENDING
+        }
     }
 
-    /// The PDU of the reply that ended the transaction with success.
-    pub fn reply<'a>(&self, frame: &'a [u8]) -> &'a [u8] {
-        self.window
-            .last_frame(frame, self.request.response_length())
+    /// Looks for the reply in what has arrived.
+    fn search(&mut self, skim: bool) -> Status {
+        loop {
+            let (request, echo) = (&self.request, self.echo);
+            let frame = self.storage.frame();
+            let found = self.window.search(frame, self.unit, skim, |pdu| {
+                if echo && request.agrees(pdu) {
+                    Some(request.length())
+                } else {
+                    response::expected(request, pdu)
+                }
+            });
+            let Some(range) = found else {
+                return Status::PENDING;
+            };
+            let pdu = frame.get(range.clone()).unwrap_or_default();
+            if echo && pdu.len() == request.length() && request.agrees(pdu) {
+                self.echo = false;
+                self.window.drop_echo(frame, range);
+                continue;
+            }
+            let status = response::judge(request, pdu);
+            self.exception = response::exception_code(request, pdu).unwrap_or(0);
+            if status == Status::MALFORMED_REPLY {
+                self.window.refuse(frame, range);
+                continue;
+            }
+            self.at = range.start as u16;
+            self.count_reply(status);
+            return status;
+        }
+    }
+
+    fn count_reply(&mut self, status: Status) {
+        self.storage.count(Counter::Replies, 1);
+        if status != Status::OK {
+            self.storage.count(Counter::Exceptions, 1);
+        }
+        if self.window.has_passed_noise() {
+            self.storage.count(Counter::Resynchronisations, 1);
+        }
+        self.count_foreign();
+    }
+
+    fn count_foreign(&mut self) {
+        let frames = usize::from(self.window.foreign_frames());
+        self.storage.count(Counter::ForeignFrames, frames);
+    }
+
+    /// No reply came: asks again, or says why with the most telling status.
+    fn fail(&mut self, over: bool) -> Status {
+        self.count_foreign();
+        if over {
+            self.late = true;
+            self.last_byte = self.now;
+        }
+        let status = match self.window.seen() {
+            Seen::Nothing => Status::RESPONSE_TIMED_OUT,
+            Seen::OtherUnit => Status::INVALID_SLAVE_ID,
+            Seen::OtherFunction => Status::INVALID_FUNCTION,
+            Seen::Malformed => Status::MALFORMED_REPLY,
+            Seen::BadCrc => Status::INVALID_CRC,
+            Seen::TooLong => return Status::BUFFER_TOO_SMALL,
+        };
+        let counter = if status == Status::INVALID_CRC {
+            Counter::BadCrc
+        } else {
+            Counter::Timeouts
+        };
+        self.storage.count(counter, 1);
+        if self.retries == 0 {
+            return status;
+        }
+        self.retries -= 1;
+        self.listen_from(self.now);
+        Status::PENDING
     }
 }

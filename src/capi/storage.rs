@@ -1,6 +1,6 @@
 //! The buffers and counters that C lends.
 
-use crate::transaction::{Counter, Lent, Storage, COUNTERS};
+use crate::transaction::{Counter, Storage, COUNTERS};
 
 /// What happened on the line, since the caller zeroed it. Each wraps at 2^32.
 #[repr(C)]
@@ -53,13 +53,12 @@ impl LentByC {
     };
 }
 
-/// The slice of C's pointer and length.
+/// The slice of C's pointer and length; a length of 0 may come with NULL.
 ///
 /// # Safety
-/// `first` is NULL, or `length` items from it are valid and borrowed by
-/// nobody else.
+/// `length` items from `first` are valid and borrowed by nobody else.
 unsafe fn slice<'a, T>(first: *mut T, length: u16) -> &'a mut [T] {
-    if first.is_null() {
+    if length == 0 {
         &mut []
     } else {
         // SAFETY: as the caller promises.
@@ -67,20 +66,47 @@ unsafe fn slice<'a, T>(first: *mut T, length: u16) -> &'a mut [T] {
     }
 }
 
+// SAFETY, of all functions here: mbm_master_setBuffers demands three buffers
+// that do not overlap, of these lengths, valid for as long as the object is
+// used; each is lent for as long as `self` is borrowed.
 impl Storage for LentByC {
-    fn lend(&mut self) -> Lent<'_> {
-        // SAFETY: mbm_master_setBuffers demands three buffers that do not
-        // overlap, of these lengths, valid for as long as the object is used.
+    fn frame(&mut self) -> &mut [u8] {
+        // SAFETY: see above.
+        unsafe { slice(self.frame, self.frame_bytes) }
+    }
+
+    fn transmit(&mut self) -> &mut [u16] {
+        // SAFETY: see above.
+        unsafe { slice(self.transmit, self.transmit_words) }
+    }
+
+    fn response(&mut self) -> &mut [u16] {
+        // SAFETY: see above.
+        unsafe { slice(self.response, self.response_words) }
+    }
+
+    fn frame_and_transmit(&mut self) -> (&mut [u8], &[u16]) {
+        // SAFETY: see above; the two do not overlap.
         unsafe {
-            Lent {
-                frame: slice(self.frame, self.frame_bytes),
-                transmit: slice(self.transmit, self.transmit_words),
-                response: slice(self.response, self.response_words),
-            }
+            (
+                slice(self.frame, self.frame_bytes),
+                slice(self.transmit, self.transmit_words),
+            )
+        }
+    }
+
+    fn frame_and_response(&mut self) -> (&[u8], &mut [u16]) {
+        // SAFETY: see above; the two do not overlap.
+        unsafe {
+            (
+                slice(self.frame, self.frame_bytes),
+                slice(self.response, self.response_words),
+            )
         }
     }
 
     #[cfg(feature = "counters")]
+    #[inline(never)]
     fn count(&mut self, counter: Counter, more: usize) {
         if self.counters.is_null() {
             return;

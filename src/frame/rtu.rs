@@ -4,70 +4,63 @@
 //! a reply is searched for: a candidate frame starts at each offset of what
 //! has arrived, and what turns out not to be the frame costs one byte.
 
-use super::checksum::{crc16, Crc16};
-use crate::bytes::Writer;
+use super::checksum::Crc16;
+use core::ops::Range;
 
 /// The longest frame: unit, PDU of 253 bytes, CRC.
 pub const MAX_FRAME: usize = 256;
 
-const CRC: usize = 2;
-
 /// Bytes of a frame around its PDU: the unit before, the CRC behind.
-pub const OVERHEAD: usize = 1 + CRC;
+pub const OVERHEAD: usize = 3;
 
-/// Closes the frame that `writer` holds with its CRC.
-pub fn seal(writer: &mut Writer) {
-    let crc = crc16(writer.written());
-    writer.bytes(&crc.to_bytes());
+/// Writes the frame of a PDU, whose bytes `pdu` gives by their index.
+/// Returns its length; `None` if `buffer` cannot hold it.
+pub fn write(
+    buffer: &mut [u8],
+    unit: u8,
+    length: usize,
+    pdu: impl Fn(usize) -> u8,
+) -> Option<usize> {
+    let total = length + OVERHEAD;
+    let frame = buffer.get_mut(..total)?;
+    let mut crc = Crc16::START;
+    for (index, place) in frame.iter_mut().enumerate() {
+        *place = if index > length {
+            crc.low_byte()
+        } else {
+            match index.checked_sub(1) {
+                None => unit,
+                Some(index) => pdu(index),
+            }
+        };
+        crc.update(&[*place]);
+    }
+    Some(total)
 }
 
-/// What the first bytes of a PDU say of it.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Fit {
-    /// This is not the PDU that is waited for.
-    No,
-    /// Too few bytes to tell.
-    More,
-    /// It may be; the whole PDU has this many bytes.
-    Length(usize),
-}
-
-/// What [`Window::next`] came upon.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Event {
-    /// Nothing more in what has arrived.
-    More,
-    /// A frame of the unit with a right CRC: its PDU starts at `at`.
-    Frame {
-        /// Offset of the PDU in the buffer.
-        at: usize,
-        /// Length of the PDU.
-        length: usize,
-    },
-    /// A complete frame of the unit whose CRC is wrong.
-    BadCrc {
-        /// Offset of the PDU in the buffer.
-        at: usize,
-    },
-    /// The frame of the unit has begun, but the buffer cannot hold it.
+/// What was seen on the way to a reply, the more telling the greater.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum Seen {
+    /// No frame.
+    Nothing,
+    /// A frame of another unit.
+    OtherUnit,
+    /// A frame of our unit with another function.
+    OtherFunction,
+    /// A frame of our unit and function that is not the reply.
+    Malformed,
+    /// A complete frame of our unit and function with a wrong CRC.
+    BadCrc,
+    /// The reply has begun, but the buffer cannot hold it.
     TooLong,
-    /// A frame with a right CRC that was not waited for.
-    Foreign {
-        /// Its unit.
-        unit: u8,
-        /// Its function code.
-        function: u8,
-    },
 }
 
 /// A window that slides over received bytes. The buffer is the caller's and
 /// is passed to each call.
 #[derive(Clone, Copy, Debug)]
 pub struct Window {
-    /// Bytes that have arrived in the buffer.
+    /// Bytes in the buffer; a candidate starts with the first.
     len: u16,
-    /// Where the candidate starts.
-    start: u16,
     /// Bytes of the candidate that `crc` covers.
     checked: u16,
     crc: Crc16,
@@ -77,31 +70,26 @@ pub struct Window {
     passed: u8,
     passed_unit: u8,
     passed_function: u8,
+    seen: Seen,
+    foreign: u8,
 }
 
 impl Window {
     /// A window over nothing.
     pub const EMPTY: Window = Window {
         len: 0,
-        start: 0,
         checked: 0,
         crc: Crc16::START,
         passed_crc: Crc16::START,
         passed: 0,
         passed_unit: 0,
         passed_function: 0,
+        seen: Seen::Nothing,
+        foreign: 0,
     };
 
-    /// Makes room in `buffer` and returns the part to receive into.
-    pub fn room<'a>(&mut self, buffer: &'a mut [u8]) -> &'a mut [u8] {
-        if self.start > 0 {
-            let used = usize::from(self.start)..usize::from(self.len);
-            if used.start <= used.end && used.end <= buffer.len() {
-                buffer.copy_within(used, 0);
-            }
-            self.len -= self.start;
-            self.start = 0;
-        }
+    /// The part of `buffer` to receive into.
+    pub fn room<'a>(&self, buffer: &'a mut [u8]) -> &'a mut [u8] {
         buffer.get_mut(usize::from(self.len)..).unwrap_or_default()
     }
 
@@ -110,79 +98,95 @@ impl Window {
         self.len += count as u16;
     }
 
-    /// The PDU of the frame that was found last, which had `length` bytes.
-    pub fn last_frame<'a>(&self, buffer: &'a [u8], length: u8) -> &'a [u8] {
-        let end = usize::from(self.start).saturating_sub(CRC);
-        let start = end.saturating_sub(usize::from(length));
-        buffer.get(start..end).unwrap_or_default()
+    /// The most telling thing seen so far.
+    pub const fn seen(&self) -> Seen {
+        self.seen
+    }
+
+    /// Frames with a right CRC that were passed over.
+    pub const fn foreign_frames(&self) -> u8 {
+        self.foreign
     }
 
     /// True if bytes were passed over that were no frame.
-    pub fn has_passed_noise(&self) -> bool {
+    pub const fn has_passed_noise(&self) -> bool {
         self.passed > 0
     }
 
-    /// Says that what is passed over next starts at the boundary of a frame.
-    pub fn at_boundary(&mut self) {
-        self.passed = 0;
-    }
-
-    /// True if a candidate has begun and is not complete.
-    pub fn has_begun(&self) -> bool {
-        self.start < self.len
-    }
-
-    /// The next frame of `unit` whose PDU `fits`, or what else is found on the
-    /// way to it. With `skim` an incomplete candidate is passed over too, and
-    /// what is passed over is not looked at as foreign.
-    pub fn next(
+    /// Looks for a frame of `unit` with a right CRC whose PDU is `expected`:
+    /// the length of a PDU that begins with the bytes given, `None` for a PDU
+    /// that is not waited for. Returns where in `buffer` the PDU is.
+    ///
+    /// Stops at a candidate that is not complete yet. With `skim` it looks
+    /// behind that as well, and if there is nothing leaves all as it was.
+    pub fn search(
         &mut self,
-        buffer: &[u8],
+        buffer: &mut [u8],
         unit: u8,
         skim: bool,
-        fits: impl Fn(&[u8]) -> Fit,
-    ) -> Event {
-        loop {
-            let candidate = buffer
-                .get(usize::from(self.start)..usize::from(self.len))
-                .unwrap_or_default();
-            let Some((first, rest)) = candidate.split_first() else {
-                return Event::More;
-            };
-            let fit = if *first == unit { fits(rest) } else { Fit::No };
-            let mut event = Event::More;
-            match fit {
-                Fit::No => {}
-                Fit::Length(length) if length + OVERHEAD > buffer.len() => event = Event::TooLong,
-                Fit::Length(length) => {
-                    let total = length + OVERHEAD;
-                    let known = candidate.get(..total).unwrap_or(candidate);
-                    self.crc
-                        .update(known.get(usize::from(self.checked)..).unwrap_or_default());
-                    self.checked = known.len() as u16;
-                    if candidate.len() >= total {
-                        if self.crc.is_residue() {
-                            let at = usize::from(self.start) + 1;
-                            self.start += total as u16;
-                            self.restart();
-                            return Event::Frame { at, length };
-                        }
-                        event = Event::BadCrc {
-                            at: usize::from(self.start) + 1,
-                        };
-                    } else if !skim {
-                        return Event::More;
+        expected: impl Fn(&[u8]) -> Option<usize>,
+    ) -> Option<Range<usize>> {
+        let kept = *self;
+        let len = usize::from(self.len);
+        let mut start = 0;
+        while let Some((first, pdu)) = buffer.get(start..len).and_then(<[u8]>::split_first) {
+            let length = if *first == unit { expected(pdu) } else { None };
+            if let Some(length) = length {
+                let total = length + OVERHEAD;
+                let complete = pdu.len() + 1 >= total;
+                if total > buffer.len() {
+                    self.see(Seen::TooLong);
+                } else if complete || !skim {
+                    let end = len.min(start + total);
+                    let news = buffer.get(start + usize::from(self.checked)..end);
+                    self.crc.update(news.unwrap_or_default());
+                    self.checked = (end - start) as u16;
+                    if !complete {
+                        break;
+                    }
+                    if self.crc.is_residue() {
+                        self.restart();
+                        return Some(start + 1..start + 1 + length);
+                    }
+                    if !skim {
+                        self.see(Seen::BadCrc);
                     }
                 }
-                Fit::More if !skim => return Event::More,
-                Fit::More => {}
             }
-            let foreign = self.pass(*first, skim);
-            if event == Event::More {
-                event = foreign;
+            self.restart();
+            start += 1;
+            if !skim {
+                let first = *first;
+                self.pass(first, unit, &expected);
             }
-            if event != Event::More {
-                return event;
+        }
+        if skim {
+            *self = kept;
+        } else {
+            self.drop_front(buffer, start);
+        }
+        None
+    }
+
+    /// Refuses the frame that [`Window::search`] found and drops it.
+    pub fn refuse(&mut self, buffer: &mut [u8], pdu: Range<usize>) {
+        self.see(Seen::Malformed);
+        self.foreign = self.foreign.saturating_add(1);
+        self.drop_echo(buffer, pdu);
+    }
+
+    /// Drops the frame that [`Window::search`] found: it is our own.
+    pub fn drop_echo(&mut self, buffer: &mut [u8], pdu: Range<usize>) {
+        self.passed = 0;
+        self.drop_front(buffer, pdu.end + OVERHEAD - 1);
+    }
+
+    fn drop_front(&mut self, buffer: &mut [u8], count: usize) {
+        let len = usize::from(self.len);
+        if let Some(bytes) = buffer.get_mut(..len) {
+            if count > 0 && count <= bytes.len() {
+                bytes.copy_within(count.., 0);
+                self.len -= count as u16;
             }
         }
     }
@@ -192,30 +196,37 @@ impl Window {
         self.crc = Crc16::START;
     }
 
-    /// Slides over the candidate's first byte.
-    fn pass(&mut self, first: u8, skim: bool) -> Event {
-        self.start += 1;
-        self.restart();
-        if skim {
-            return Event::More;
-        }
+    fn see(&mut self, what: Seen) {
+        self.seen = self.seen.max(what);
+    }
+
+    /// Takes in a byte that is passed over. Where such bytes make up a frame,
+    /// a damaged reply seen in it was none.
+    fn pass(&mut self, byte: u8, unit: u8, expected: &impl Fn(&[u8]) -> Option<usize>) {
         match self.passed {
             0 => {
                 self.passed_crc = Crc16::START;
-                self.passed_unit = first;
+                self.passed_unit = byte;
             }
-            1 => self.passed_function = first,
+            1 => self.passed_function = byte,
             _ => {}
         }
         self.passed = self.passed.saturating_add(1);
-        self.passed_crc.update(&[first]);
-        if self.passed >= 4 && self.passed_crc.is_residue() {
-            self.passed = 0;
-            return Event::Foreign {
-                unit: self.passed_unit,
-                function: self.passed_function,
-            };
+        self.passed_crc.update(&[byte]);
+        if self.passed < 4 || !self.passed_crc.is_residue() {
+            return;
         }
-        Event::More
+        self.passed = 0;
+        self.foreign = self.foreign.saturating_add(1);
+        if self.seen == Seen::BadCrc {
+            self.seen = Seen::Nothing;
+        }
+        self.see(if self.passed_unit != unit {
+            Seen::OtherUnit
+        } else if expected(&[self.passed_function]).is_none() {
+            Seen::OtherFunction
+        } else {
+            Seen::Malformed
+        });
     }
 }

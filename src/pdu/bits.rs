@@ -33,9 +33,10 @@ const fn byte_count(quantity: u16) -> u8 {
 /// [`Status::ILLEGAL_DATA_ADDRESS`] if the range passes 65535.
 pub fn read(function: u8, address: u16, quantity: u16) -> Result<Request, Status> {
     check_range(address, quantity, MAX_READ)?;
-    let mut request = Request::new(function, address, quantity);
-    request.answered_by(2 + byte_count(quantity));
-    Ok(request)
+    Ok(Request {
+        response_length: 2 + byte_count(quantity),
+        ..Request::new(function, address, quantity)
+    })
 }
 
 /// Builds 05.
@@ -50,9 +51,11 @@ pub fn write_single(address: u16, on: bool) -> Request {
 /// [`Status::ILLEGAL_DATA_ADDRESS`] if the range passes 65535.
 pub fn write_multiple(address: u16, quantity: u16) -> Result<Request, Status> {
     check_range(address, quantity, MAX_WRITE)?;
-    let mut request = Request::new(WRITE_MULTIPLE_COILS, address, quantity);
-    request.data(byte_count(quantity), last_byte_mask(quantity));
-    Ok(request)
+    Ok(Request {
+        data_length: byte_count(quantity),
+        last_mask: last_byte_mask(quantity),
+        ..Request::new(WRITE_MULTIPLE_COILS, address, quantity)
+    })
 }
 
 pub(super) fn parse_read<'a>(function: u8, reader: &mut Reader) -> Result<Received<'a>, Status> {

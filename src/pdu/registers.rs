@@ -31,9 +31,10 @@ pub const MAX_READ_WRITE: u16 = 121;
 /// [`Status::ILLEGAL_DATA_ADDRESS`] if the range passes 65535.
 pub fn read(function: u8, address: u16, quantity: u16) -> Result<Request, Status> {
     check_range(address, quantity, MAX_READ)?;
-    let mut request = Request::new(function, address, quantity);
-    request.answered_by(2 + 2 * quantity as u8);
-    Ok(request)
+    Ok(Request {
+        response_length: 2 + 2 * quantity as u8,
+        ..Request::new(function, address, quantity)
+    })
 }
 
 /// Builds 06.
@@ -48,16 +49,18 @@ pub fn write_single(address: u16, value: u16) -> Request {
 /// [`Status::ILLEGAL_DATA_ADDRESS`] if the range passes 65535.
 pub fn write_multiple(address: u16, quantity: u16) -> Result<Request, Status> {
     check_range(address, quantity, MAX_WRITE)?;
-    let mut request = Request::new(WRITE_MULTIPLE_REGISTERS, address, quantity);
-    request.data(2 * quantity as u8, 0xFF);
-    Ok(request)
+    Ok(Request {
+        data_length: 2 * quantity as u8,
+        ..Request::new(WRITE_MULTIPLE_REGISTERS, address, quantity)
+    })
 }
 
 /// Builds 16: the register becomes `(register & and) | (or & !and)`.
 pub fn mask_write(address: u16, and_mask: u16, or_mask: u16) -> Request {
     let mut request = Request::new(MASK_WRITE_REGISTER, address, and_mask);
-    request.word(or_mask);
-    request.answered_by(7);
+    [request.head[5], request.head[6]] = or_mask.to_be_bytes();
+    request.head_length = 7;
+    request.response_length = 7;
     request
 }
 
@@ -74,9 +77,10 @@ pub fn read_write(
 ) -> Result<Request, Status> {
     check_range(write_address, write_quantity, MAX_READ_WRITE)?;
     let mut request = read(READ_WRITE_MULTIPLE_REGISTERS, read_address, read_quantity)?;
-    request.word(write_address);
-    request.word(write_quantity);
-    request.data(2 * write_quantity as u8, 0xFF);
+    [request.head[5], request.head[6]] = write_address.to_be_bytes();
+    [request.head[7], request.head[8]] = write_quantity.to_be_bytes();
+    request.head_length = 9;
+    request.data_length = 2 * write_quantity as u8;
     Ok(request)
 }
 

@@ -2,70 +2,42 @@
 //! by whoever receives it.
 
 use super::{bits, registers};
-use crate::bytes::{Reader, Writer};
+use crate::bytes::Reader;
 use crate::data::words::{self, Order};
 use crate::error::Status;
-use crate::frame::rtu::Fit;
 
 /// Function code, and at most four words of address and quantity.
 const HEAD: usize = 9;
 
 /// A request as its sender keeps it until the reply is there: the fixed head,
-/// and what to send behind it of the caller's words.
+/// and how much of the caller's words to send behind it.
 #[derive(Clone, Copy, Debug)]
 pub struct Request {
-    head: [u8; HEAD],
-    head_length: u8,
+    pub(super) head: [u8; HEAD],
+    pub(super) head_length: u8,
     /// Bytes that follow the head and its byte count; 0: neither.
-    data_length: u8,
+    pub(super) data_length: u8,
     /// Keeps the used bits of the last data byte.
-    last_mask: u8,
+    pub(super) last_mask: u8,
     /// Length of the response PDU if the request succeeds.
-    response_length: u8,
+    pub(super) response_length: u8,
 }
 
 impl Request {
     /// No request.
-    pub const NONE: Request = Request {
-        head: [0; HEAD],
-        head_length: 0,
-        data_length: 0,
-        last_mask: 0xFF,
-        response_length: 0,
-    };
+    pub const NONE: Request = Request::new(0, 0, 0);
 
-    /// A request that is `function` and two words.
-    pub(super) fn new(function: u8, first: u16, second: u16) -> Request {
-        let mut request = Request {
-            head_length: 1,
+    /// A request that is `function` and two words, and whose response repeats
+    /// them.
+    pub(super) const fn new(function: u8, first: u16, second: u16) -> Request {
+        let ([a, b], [c, d]) = (first.to_be_bytes(), second.to_be_bytes());
+        Request {
+            head: [function, a, b, c, d, 0, 0, 0, 0],
+            head_length: 5,
+            data_length: 0,
+            last_mask: 0xFF,
             response_length: 5,
-            ..Request::NONE
-        };
-        request.head = [function, 0, 0, 0, 0, 0, 0, 0, 0];
-        request.word(first);
-        request.word(second);
-        request
-    }
-
-    /// Appends a word to the head.
-    pub(super) fn word(&mut self, value: u16) {
-        for byte in value.to_be_bytes() {
-            if let Some(place) = self.head.get_mut(usize::from(self.head_length)) {
-                *place = byte;
-                self.head_length += 1;
-            }
         }
-    }
-
-    /// Sets how many bytes of the caller's words follow.
-    pub(super) fn data(&mut self, length: u8, last_mask: u8) {
-        self.data_length = length;
-        self.last_mask = last_mask;
-    }
-
-    /// Sets the length of the response PDU.
-    pub(super) fn answered_by(&mut self, length: u8) {
-        self.response_length = length;
     }
 
     /// The function code.
@@ -83,27 +55,6 @@ impl Request {
     /// Length of the response PDU if the request succeeds.
     pub const fn response_length(&self) -> u8 {
         self.response_length
-    }
-
-    /// Whether `pdu`, complete or not, may be this request itself, and how
-    /// long it is then.
-    pub fn fit_echo(&self, pdu: &[u8]) -> Fit {
-        let head = self.head();
-        if pdu.len() < head.len() {
-            return if head.starts_with(pdu) {
-                Fit::More
-            } else {
-                Fit::No
-            };
-        }
-        if !pdu.starts_with(head) {
-            return Fit::No;
-        }
-        let data = match self.data_length {
-            0 => 0,
-            length => 1 + usize::from(length),
-        };
-        Fit::Length(head.len() + data)
     }
 
     /// True if the response carries data behind a byte count, false if it
@@ -142,22 +93,38 @@ impl Request {
         self.data_length.div_ceil(2)
     }
 
-    /// Writes the PDU. Words that `source` lacks are sent as zero; the sender
-    /// checks [`Request::words`] beforehand.
-    pub fn emit(&self, writer: &mut Writer, source: &[u16]) {
-        writer.bytes(self.head());
-        if self.data_length == 0 {
-            return;
+    /// Length of the PDU.
+    pub fn length(&self) -> usize {
+        let data = match self.data_length {
+            0 => 0,
+            length => 1 + usize::from(length),
+        };
+        usize::from(self.head_length) + data
+    }
+
+    /// The byte of the PDU at `index`. Words that `source` lacks are zero; the
+    /// sender checks [`Request::words`] beforehand.
+    pub fn byte(&self, index: usize, source: &[u16]) -> u8 {
+        if let Some(byte) = self.head().get(index) {
+            return *byte;
         }
-        writer.u8(self.data_length);
-        let order = self.order();
-        for index in 0..usize::from(self.data_length) {
-            let mut byte = words::byte(source, index, order).unwrap_or(0);
-            if index + 1 == usize::from(self.data_length) {
-                byte &= self.last_mask;
-            }
-            writer.u8(byte);
+        let Some(index) = index.checked_sub(usize::from(self.head_length) + 1) else {
+            return self.data_length;
+        };
+        let byte = words::byte(source, index, self.order()).unwrap_or(0);
+        if index + 1 == usize::from(self.data_length) {
+            byte & self.last_mask
+        } else {
+            byte
         }
+    }
+
+    /// True if `pdu`, complete or not, agrees with the head of this request.
+    pub fn agrees(&self, pdu: &[u8]) -> bool {
+        self.head()
+            .iter()
+            .zip(pdu)
+            .all(|(ours, theirs)| ours == theirs)
     }
 }
 

@@ -4,41 +4,33 @@
 use super::request::Request;
 use super::EXCEPTION;
 use crate::error::Status;
-use crate::frame::rtu::Fit;
 
 /// An exception response is a function code and an exception code.
 const EXCEPTION_LENGTH: usize = 2;
 
-/// Whether `pdu`, complete or not, may be the response to `request`, and how
-/// long it is then.
-pub fn fit(request: &Request, pdu: &[u8]) -> Fit {
-    let Some((function, rest)) = pdu.split_first() else {
-        return Fit::More;
-    };
-    if *function == request.function() | EXCEPTION {
-        return Fit::Length(EXCEPTION_LENGTH);
-    }
-    if *function != request.function() {
-        return Fit::No;
-    }
+/// The length of the response to `request` that begins with the bytes of
+/// `pdu`, as far as they tell; `None` if no response to it begins so.
+pub fn expected(request: &Request, pdu: &[u8]) -> Option<usize> {
     let length = request.response_length();
-    if request.is_read() {
-        match rest.first() {
-            None => return Fit::More,
-            Some(count) if *count != length - 2 => return Fit::No,
-            Some(_) => {}
+    match pdu {
+        [] => {}
+        [function, ..] if *function == request.function() | EXCEPTION => {
+            return Some(EXCEPTION_LENGTH);
         }
+        [function, ..] if *function != request.function() => return None,
+        [_, count, ..] if request.is_read() && *count != length - 2 => return None,
+        _ => {}
     }
-    Fit::Length(usize::from(length))
+    Some(usize::from(length))
 }
 
-/// What a complete `pdu` that [`fit`] found says to `request`: success, an
+/// What a complete `pdu` that is [`expected`] says to `request`: success, an
 /// exception of the remote device, or [`Status::MALFORMED_REPLY`].
 pub fn judge(request: &Request, pdu: &[u8]) -> Status {
     if let Some(code) = exception_code(request, pdu) {
         return Status::exception(code);
     }
-    if request.is_read() || pdu == request.head().get(..pdu.len()).unwrap_or_default() {
+    if request.is_read() || request.agrees(pdu) {
         Status::OK
     } else {
         Status::MALFORMED_REPLY
@@ -53,10 +45,12 @@ pub fn exception_code(request: &Request, pdu: &[u8]) -> Option<u8> {
     }
 }
 
-/// The data bytes of a response that [`judge`] found to be a success.
+/// The data bytes of a response that [`judge`] found to be a success, and
+/// that starts `pdu`.
 pub fn data<'a>(request: &Request, pdu: &'a [u8]) -> &'a [u8] {
     if request.is_read() {
-        pdu.get(2..).unwrap_or_default()
+        let length = usize::from(request.response_length());
+        pdu.get(2..length).unwrap_or_default()
     } else {
         &[]
     }

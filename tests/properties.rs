@@ -1,0 +1,162 @@
+//! What holds for every request and for every string of bytes.
+
+use mbm::error::Status;
+use mbm::frame::checksum::crc16;
+use mbm::frame::rtu::{self, Window};
+use mbm::pdu::request::{Received, Request};
+use mbm::pdu::{bits, registers, response};
+use proptest::prelude::*;
+
+/// Any request that the ten functions build.
+fn any_request() -> impl Strategy<Value = Request> {
+    prop_oneof![
+        (1u8..=2, any::<u16>(), 0u16..2002).prop_map(|(f, a, q)| bits::read(f, a, q).ok()),
+        (3u8..=4, any::<u16>(), 0u16..127).prop_map(|(f, a, q)| registers::read(f, a, q).ok()),
+        any::<(u16, bool)>().prop_map(|(a, on)| Some(bits::write_single(a, on))),
+        any::<(u16, u16)>().prop_map(|(a, v)| Some(registers::write_single(a, v))),
+        (any::<u16>(), 0u16..1970).prop_map(|(a, q)| bits::write_multiple(a, q).ok()),
+        (any::<u16>(), 0u16..125).prop_map(|(a, q)| registers::write_multiple(a, q).ok()),
+        any::<(u16, u16, u16)>().prop_map(|(a, b, c)| Some(registers::mask_write(a, b, c))),
+        (any::<u16>(), 0u16..127, any::<u16>(), 0u16..123)
+            .prop_map(|(ra, rq, wa, wq)| registers::read_write(ra, rq, wa, wq).ok()),
+    ]
+    .prop_filter_map("within the standard", |request| request)
+}
+
+fn emit(unit: u8, request: &Request, words: &[u16]) -> Vec<u8> {
+    let mut buffer = [0; rtu::MAX_FRAME];
+    let byte = |index| request.byte(index, words);
+    let length = rtu::write(&mut buffer, unit, request.length(), byte);
+    buffer[..length.expect("every request fits into a frame")].to_vec()
+}
+
+/// A right reply to `request`, with data bytes from `seed`.
+fn right_reply(unit: u8, request: &Request, seed: u8) -> Vec<u8> {
+    let sent = emit(unit, request, &[]);
+    let mut frame = if request.is_read() {
+        let count = request.response_length() - 2;
+        let mut frame = vec![unit, request.function(), count];
+        frame.extend((0..count).map(|i| seed.wrapping_mul(31).wrapping_add(i)));
+        frame
+    } else {
+        sent[..1 + usize::from(request.response_length())].to_vec()
+    };
+    frame.extend(crc16(&frame).to_bytes());
+    frame
+}
+
+/// Feeds `bytes` in pieces and returns the first frame's PDU.
+fn find(unit: u8, request: &Request, bytes: &[u8], piece: usize, size: usize) -> Option<Vec<u8>> {
+    let mut buffer = vec![0; size];
+    let mut window = Window::EMPTY;
+    let mut rest = bytes;
+    loop {
+        let found = window.search(&mut buffer, unit, false, |pdu| {
+            response::expected(request, pdu)
+        });
+        if found.is_some() || rest.is_empty() {
+            return found.map(|range| buffer[range].to_vec());
+        }
+        let room = window.room(&mut buffer);
+        let count = rest.len().min(piece).min(room.len());
+        assert!(count > 0, "a full window asks for more");
+        room[..count].copy_from_slice(&rest[..count]);
+        window.arrived(count);
+        rest = &rest[count..];
+    }
+}
+
+proptest! {
+    #[test]
+    fn every_emitted_request_parses_back(
+        request in any_request(),
+        words in prop::collection::vec(any::<u16>(), 123),
+    ) {
+        let frame = emit(9, &request, &words);
+        prop_assert!(crc16(&frame).is_residue());
+        let pdu = &frame[1..frame.len() - 2];
+        let received = Received::parse(pdu).expect("a request of ours is in order");
+        let data = |words: &[u16]| -> Vec<u8> {
+            words.iter().flat_map(|word| word.to_be_bytes()).collect()
+        };
+        match received {
+            Received::ReadBits { function, address, quantity } => {
+                prop_assert_eq!(pdu, emit_words(function, &[address, quantity]));
+            }
+            Received::ReadRegisters { function, address, quantity } => {
+                prop_assert_eq!(pdu, emit_words(function, &[address, quantity]));
+            }
+            Received::WriteSingleCoil { address, on } => {
+                prop_assert_eq!(pdu, emit_words(5, &[address, if on { 0xFF00 } else { 0 }]));
+            }
+            Received::WriteSingleRegister { address, value } => {
+                prop_assert_eq!(pdu, emit_words(6, &[address, value]));
+            }
+            Received::MaskWriteRegister { address, and_mask, or_mask } => {
+                prop_assert_eq!(pdu, emit_words(0x16, &[address, and_mask, or_mask]));
+            }
+            Received::WriteMultipleCoils { quantity, data, .. } => {
+                for bit in 0..8 * data.len() {
+                    let on = words[bit / 16] >> (bit % 16) & 1 == 1 && bit < usize::from(quantity);
+                    prop_assert_eq!(data[bit / 8] >> (bit % 8) & 1 == 1, on);
+                }
+            }
+            Received::WriteMultipleRegisters { quantity, data: sent, .. } => {
+                prop_assert_eq!(sent, data(&words[..usize::from(quantity)]));
+            }
+            Received::ReadWriteMultipleRegisters { write_quantity, data: sent, .. } => {
+                prop_assert_eq!(sent, data(&words[..usize::from(write_quantity)]));
+            }
+        }
+    }
+
+    #[test]
+    fn no_byte_string_panics(
+        request in any_request(),
+        bytes in prop::collection::vec(any::<u8>(), 0..600),
+        piece in 1usize..40,
+        size in 8usize..256,
+    ) {
+        let _ = Received::parse(&bytes);
+        let _ = response::judge(&request, &bytes);
+        let _ = response::data(&request, &bytes);
+        let _ = find(bytes.first().copied().unwrap_or(1), &request, &bytes, piece, size);
+    }
+
+    #[test]
+    fn a_right_reply_is_found_behind_bytes_that_are_not_our_unit(
+        request in any_request(),
+        noise in prop::collection::vec(2u8..=255, 0..300),
+        seed: u8,
+        piece in 1usize..300,
+    ) {
+        let reply = right_reply(1, &request, seed);
+        let bytes: Vec<u8> = noise.iter().chain(&reply).copied().collect();
+        let pdu = find(1, &request, &bytes, piece, 256);
+        prop_assert_eq!(pdu.as_deref(), Some(&reply[1..reply.len() - 2]));
+    }
+
+    #[test]
+    fn a_reply_with_one_flipped_bit_is_not_a_reply(
+        request in any_request(),
+        seed: u8,
+        bit: prop::sample::Index,
+    ) {
+        let mut reply = right_reply(1, &request, seed);
+        let bit = bit.index(8 * reply.len());
+        reply[bit / 8] ^= 1 << (bit % 8);
+        prop_assert_eq!(find(1, &request, &reply, 300, 256), None);
+    }
+
+    #[test]
+    fn a_right_reply_is_judged_a_success(request in any_request(), seed: u8) {
+        let reply = right_reply(1, &request, seed);
+        prop_assert_eq!(response::judge(&request, &reply[1..reply.len() - 2]), Status::OK);
+    }
+}
+
+fn emit_words(function: u8, words: &[u16]) -> Vec<u8> {
+    let mut pdu = vec![function];
+    pdu.extend(words.iter().flat_map(|word| word.to_be_bytes()));
+    pdu
+}

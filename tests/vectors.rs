@@ -1,0 +1,237 @@
+//! Frames of the specification and of other implementations' documents, byte
+//! for byte: what we emit, and what we make of a reply.
+
+use mbm::error::Status;
+use mbm::frame::rtu::{self, Window};
+use mbm::pdu::request::{Received, Request};
+use mbm::pdu::{bits, registers, response};
+
+/// The frame of a request to `unit`, with `words` to send.
+fn frame(unit: u8, request: &Request, words: &[u16]) -> Vec<u8> {
+    let mut buffer = [0; rtu::MAX_FRAME];
+    let byte = |index| request.byte(index, words);
+    let length = rtu::write(&mut buffer, unit, request.length(), byte).unwrap();
+    buffer[..length].to_vec()
+}
+
+/// The PDU of a request.
+fn pdu(request: &Request, words: &[u16]) -> Vec<u8> {
+    let frame = frame(1, request, words);
+    frame[1..frame.len() - 2].to_vec()
+}
+
+/// The status and the data bytes of a reply frame to a request.
+fn reply(unit: u8, request: &Request, frame: &[u8]) -> (Status, Vec<u8>) {
+    let mut buffer = frame.to_vec();
+    let mut window = Window::EMPTY;
+    window.arrived(frame.len());
+    let range = window
+        .search(&mut buffer, unit, false, |pdu| {
+            response::expected(request, pdu)
+        })
+        .expect("a reply");
+    let pdu = &buffer[range];
+    let status = response::judge(request, pdu);
+    (status, response::data(request, pdu).to_vec())
+}
+
+#[test]
+fn requests_of_the_specification() {
+    let coils = bits::read(bits::READ_COILS, 0x13, 0x13).unwrap();
+    assert_eq!(pdu(&coils, &[]), [1, 0, 0x13, 0, 0x13]);
+    let inputs = bits::read(bits::READ_DISCRETE_INPUTS, 0xC4, 0x16).unwrap();
+    assert_eq!(pdu(&inputs, &[]), [2, 0, 0xC4, 0, 0x16]);
+    let holding = registers::read(registers::READ_HOLDING_REGISTERS, 0x6B, 3).unwrap();
+    assert_eq!(pdu(&holding, &[]), [3, 0, 0x6B, 0, 3]);
+    let input = registers::read(registers::READ_INPUT_REGISTERS, 8, 1).unwrap();
+    assert_eq!(pdu(&input, &[]), [4, 0, 8, 0, 1]);
+    assert_eq!(
+        pdu(&bits::write_single(0xAC, true), &[]),
+        [5, 0, 0xAC, 0xFF, 0]
+    );
+    assert_eq!(pdu(&registers::write_single(1, 3), &[]), [6, 0, 1, 0, 3]);
+    let coils = bits::write_multiple(0x13, 0x0A).unwrap();
+    assert_eq!(
+        pdu(&coils, &[0x01CD]),
+        [0x0F, 0, 0x13, 0, 0x0A, 2, 0xCD, 0x01]
+    );
+    let registers_ = registers::write_multiple(1, 2).unwrap();
+    assert_eq!(
+        pdu(&registers_, &[0x000A, 0x0102]),
+        [0x10, 0, 1, 0, 2, 4, 0, 0x0A, 1, 2]
+    );
+    assert_eq!(
+        pdu(&registers::mask_write(4, 0xF2, 0x25), &[]),
+        [0x16, 0, 4, 0, 0xF2, 0, 0x25]
+    );
+    let both = registers::read_write(3, 6, 0x0E, 3).unwrap();
+    assert_eq!(
+        pdu(&both, &[0xFF, 0xFF, 0xFF]),
+        [0x17, 0, 3, 0, 6, 0, 0x0E, 0, 3, 6, 0, 0xFF, 0, 0xFF, 0, 0xFF]
+    );
+}
+
+#[test]
+fn request_frames_with_their_crc() {
+    let read = |function, address, quantity| match function {
+        1 | 2 => bits::read(function, address, quantity).unwrap(),
+        _ => registers::read(function, address, quantity).unwrap(),
+    };
+    let cases: &[(u8, Request, &[u16], &[u8])] = &[
+        (
+            0x10,
+            read(1, 0x6B, 3),
+            &[],
+            &[0x10, 1, 0, 0x6B, 0, 3, 0x0E, 0x96],
+        ),
+        (
+            0x10,
+            read(2, 0x6B, 3),
+            &[],
+            &[0x10, 2, 0, 0x6B, 0, 3, 0x4A, 0x96],
+        ),
+        (1, read(3, 0x6B, 1), &[], &[1, 3, 0, 0x6B, 0, 1, 0xF5, 0xD6]),
+        (1, read(4, 0x6B, 1), &[], &[1, 4, 0, 0x6B, 0, 1, 0x40, 0x16]),
+        (
+            0x11,
+            bits::write_single(0x6B, true),
+            &[],
+            &[0x11, 5, 0, 0x6B, 0xFF, 0, 0xFF, 0x76],
+        ),
+        (
+            0x11,
+            registers::write_single(0x6B, 0x0101),
+            &[],
+            &[0x11, 6, 0, 0x6B, 1, 1, 0x3A, 0xD6],
+        ),
+        (
+            0x11,
+            bits::write_multiple(0x0410, 3).unwrap(),
+            &[5],
+            &[0x11, 0x0F, 4, 0x10, 0, 3, 1, 5, 0x8E, 0x1F],
+        ),
+        (
+            0x11,
+            registers::write_multiple(0x0410, 3).unwrap(),
+            &[0x00C8, 0x0082, 0x8701],
+            &[
+                0x11, 0x10, 4, 0x10, 0, 3, 6, 0, 0xC8, 0, 0x82, 0x87, 1, 0x2F, 0x7D,
+            ],
+        ),
+        (
+            0x11,
+            registers::read_write(0x0410, 1, 0x0112, 2).unwrap(),
+            &[0x00C8, 0x0082],
+            &[
+                0x11, 0x17, 4, 0x10, 0, 1, 1, 0x12, 0, 2, 4, 0, 0xC8, 0, 0x82, 0x64, 0xE2,
+            ],
+        ),
+    ];
+    for (unit, request, words, expected) in cases {
+        assert_eq!(frame(*unit, request, words), *expected);
+    }
+}
+
+#[test]
+fn reply_frames_with_their_crc() {
+    let holding = registers::read(3, 0x6B, 1).unwrap();
+    let read = reply(1, &holding, &[1, 3, 2, 0xCD, 0x6B, 0xAD, 0x3B]);
+    assert_eq!(read, (Status::OK, vec![0xCD, 0x6B]));
+    let input = registers::read(4, 0x6B, 1).unwrap();
+    let read = reply(1, &input, &[1, 4, 2, 0xCD, 0x6B, 0xAC, 0x4F]);
+    assert_eq!(read, (Status::OK, vec![0xCD, 0x6B]));
+    let coils = bits::read(1, 0, 16).unwrap();
+    let read = reply(3, &coils, &[3, 1, 2, 0xCD, 0x6B, 0xD5, 0x43]);
+    assert_eq!(read, (Status::OK, vec![0xCD, 0x6B]));
+    let inputs = bits::read(2, 0, 16).unwrap();
+    let read = reply(3, &inputs, &[3, 2, 2, 0xCD, 0x6B, 0xD5, 0x07]);
+    assert_eq!(read, (Status::OK, vec![0xCD, 0x6B]));
+    let both = registers::read_write(0x0410, 1, 0x0112, 2).unwrap();
+    let read = reply(0x11, &both, &[0x11, 0x17, 2, 0xCD, 0x6B, 0x69, 0x08]);
+    assert_eq!(read, (Status::OK, vec![0xCD, 0x6B]));
+    let coils = bits::write_multiple(0x0410, 3).unwrap();
+    let wrote = reply(0x11, &coils, &[0x11, 0x0F, 4, 0x10, 0, 3, 0x17, 0xAF]);
+    assert_eq!(wrote, (Status::OK, vec![]));
+    let words = registers::write_multiple(0x0410, 3).unwrap();
+    let wrote = reply(0x11, &words, &[0x11, 0x10, 4, 0x10, 0, 3, 0x82, 0x6D]);
+    assert_eq!(wrote, (Status::OK, vec![]));
+    let coil = bits::write_single(2, true);
+    let wrote = reply(3, &coil, &[3, 5, 0, 2, 0xFF, 0, 0x2C, 0x18]);
+    assert_eq!(wrote, (Status::OK, vec![]));
+    let refused = reply(
+        0x0A,
+        &bits::read(1, 0, 8).unwrap(),
+        &[0x0A, 0x81, 2, 0xB0, 0x53],
+    );
+    assert_eq!(refused, (Status::ILLEGAL_DATA_ADDRESS, vec![]));
+}
+
+#[test]
+fn a_write_reply_with_another_address_or_value_is_malformed() {
+    let request = registers::write_single(0x6B, 0x0101);
+    for (at, wrong) in [(1, 1), (2, 0x6C), (3, 0), (4, 0)] {
+        let mut pdu = [6, 0, 0x6B, 1, 1];
+        pdu[at] = wrong;
+        assert_eq!(response::judge(&request, &pdu), Status::MALFORMED_REPLY);
+    }
+}
+
+#[test]
+fn exception_codes_of_0_and_from_80_are_malformed() {
+    let request = registers::write_single(1, 2);
+    for code in 0..=255 {
+        let expected = match code {
+            1..=0x7F => Status::from_code(code),
+            _ => Status::MALFORMED_REPLY,
+        };
+        assert_eq!(response::judge(&request, &[0x86, code]), expected);
+        assert_eq!(
+            response::exception_code(&request, &[0x86, code]),
+            Some(code)
+        );
+    }
+}
+
+#[test]
+fn quantities_and_addresses_are_held_to_the_standard() {
+    use Status as S;
+    let value = Err(S::ILLEGAL_DATA_VALUE);
+    let address = Err(S::ILLEGAL_DATA_ADDRESS);
+    let check = |request: Result<Request, Status>| request.map(|_| ());
+    for (most, build) in [
+        (
+            2000,
+            (|a, q| bits::read(1, a, q)) as fn(u16, u16) -> Result<Request, Status>,
+        ),
+        (125, |a, q| registers::read(3, a, q)),
+        (1968, bits::write_multiple),
+        (123, registers::write_multiple),
+        (121, |a, q| registers::read_write(0, 1, a, q)),
+        (125, |a, q| registers::read_write(a, q, 0, 1)),
+    ] {
+        assert_eq!(check(build(0, 0)), value);
+        assert_eq!(check(build(0, 1)), Ok(()));
+        assert_eq!(check(build(0, most)), Ok(()));
+        assert_eq!(check(build(0, most + 1)), value);
+        assert_eq!(check(build(0, 0xFFFF)), value);
+        assert_eq!(check(build(0xFFFF, 1)), Ok(()));
+        assert_eq!(check(build(0xFFFF, 2)), address);
+        assert_eq!(check(build(0u16.wrapping_sub(most), most)), Ok(()));
+    }
+}
+
+#[test]
+fn lying_byte_counts_and_lengths_are_refused() {
+    let value = Err(Status::ILLEGAL_DATA_VALUE);
+    assert_eq!(Received::parse(&[]), Err(Status::ILLEGAL_FUNCTION));
+    assert_eq!(Received::parse(&[0x2B, 1]), Err(Status::ILLEGAL_FUNCTION));
+    assert_eq!(Received::parse(&[3, 0, 0, 0]), value);
+    assert_eq!(Received::parse(&[3, 0, 0, 0, 1, 9]), value);
+    assert_eq!(Received::parse(&[5, 0, 0, 1, 0]), value);
+    assert_eq!(Received::parse(&[0x10, 0, 0, 0, 1, 2, 1]), value);
+    assert_eq!(Received::parse(&[0x10, 0, 0, 0, 1, 3, 1, 2, 3]), value);
+    assert_eq!(Received::parse(&[0x10, 0, 0, 0, 1, 0, 1, 2]), value);
+    assert_eq!(Received::parse(&[0x0F, 0, 0, 0, 9, 1, 1]), value);
+    let past = Received::parse(&[3, 0xFF, 0xFF, 0, 2]);
+    assert_eq!(past, Err(Status::ILLEGAL_DATA_ADDRESS));
+}
