@@ -1,0 +1,31 @@
+/* A scripted device at the far end of a pty: answers each request of eight
+ * bytes with whatever a script plays. */
+#ifndef RESPONDER_H
+#define RESPONDER_H
+
+#include "pty.h"
+
+#include <pthread.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct responder responder;
+
+/* Plays the answer to request number `number`, from 1 on. */
+typedef void (*responder_script)(responder *r, const uint8_t *request, unsigned number);
+
+struct responder {
+    pty line;
+    responder_script script;
+    int stop[2];
+    pthread_t thread;
+};
+
+void responder_start(responder *r, responder_script script);
+void responder_stop(responder *r);
+
+/* For scripts: sends bytes, pauses. */
+void responder_send(responder *r, const uint8_t *bytes, size_t length);
+void responder_pause(unsigned milliseconds);
+
+#endif

@@ -1,0 +1,127 @@
+//! What C sees of `mbm.h` is what Rust means: sizes, offsets, constants. A
+//! probe is compiled by the C compiler, run, and held against Rust.
+
+use mbm::capi::*;
+use std::fs;
+use std::mem::{align_of, offset_of, size_of};
+use std::path::Path;
+use std::process::Command;
+
+/// A C expression and the value that Rust has for it.
+macro_rules! probes {
+    (sizes: $($type:ident)*; offsets: $($owner:ident { $($field:ident)* })*; constants: $($constant:ident)*;) => {
+        vec![
+            $((format!("sizeof({})", stringify!($type)), size_of::<$type>() as u64),
+              (format!("alignof({})", stringify!($type)), align_of::<$type>() as u64),)*
+            $($((format!("offsetof({}, {})", stringify!($owner), stringify!($field)),
+                 offset_of!($owner, $field) as u64),)*)*
+            $((stringify!($constant).to_owned(), u64::from($constant)),)*
+        ]
+    };
+}
+
+fn probes() -> Vec<(String, u64)> {
+    probes! {
+        sizes: mbm_port mbm_counters mbm_master;
+        offsets:
+            mbm_port { context read write micros flush preTransmission postTransmission idle }
+            mbm_counters { requests replies exceptions badCrc timeouts foreignFrames
+                resynchronisations bytesSent bytesReceived };
+        constants:
+            MBM_OK MBM_ILLEGAL_FUNCTION MBM_ILLEGAL_DATA_ADDRESS MBM_ILLEGAL_DATA_VALUE
+            MBM_SLAVE_DEVICE_FAILURE MBM_ACKNOWLEDGE MBM_SLAVE_DEVICE_BUSY
+            MBM_MEMORY_PARITY_ERROR MBM_GATEWAY_PATH_UNAVAILABLE
+            MBM_GATEWAY_TARGET_FAILED_TO_RESPOND MBM_INVALID_SLAVE_ID MBM_INVALID_FUNCTION
+            MBM_RESPONSE_TIMED_OUT MBM_INVALID_CRC MBM_INVALID_ARGUMENT MBM_MALFORMED_REPLY
+            MBM_LINK_LOST MBM_BUSY MBM_BROADCAST_NOT_ALLOWED MBM_BUFFER_TOO_SMALL
+            MBM_NOT_INITIALISED MBM_PENDING MBM_LINE_BUSY MBM_CANCELLED
+            MBM_MAX_READ_REGISTERS MBM_MAX_WRITE_REGISTERS MBM_MAX_READ_WRITE_REGISTERS
+            MBM_MAX_READ_BITS MBM_MAX_WRITE_BITS MBM_MAX_FRAME;
+    }
+}
+
+/// Compiles and runs a C program that prints each expression's value.
+fn values_in_c(compiler: &mut Command, expressions: &[String], folder: &Path) -> Vec<u64> {
+    let mut source = String::from(
+        "#include <stdalign.h>\n#include <stddef.h>\n#include <stdio.h>\n#include \"mbm.h\"\nint main(void)\n{\n",
+    );
+    for expression in expressions {
+        source += &format!("    printf(\"%llu\\n\", (unsigned long long)({expression}));\n");
+    }
+    source += "    return 0;\n}\n";
+    let file = folder.join("probe.c");
+    let program = folder.join("probe");
+    fs::write(&file, source).expect("the probe is written");
+    let compiled = compiler
+        .args(["-std=c11", "-Wall", "-Wextra", "-Werror"])
+        .arg("-I")
+        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("include"))
+        .arg(&file)
+        .arg("-o")
+        .arg(&program)
+        .status()
+        .expect("the C compiler runs");
+    assert!(compiled.success());
+    let output = Command::new(&program).output().expect("the probe runs");
+    String::from_utf8_lossy(&output.stdout)
+        .lines()
+        .map(|line| line.parse().expect("a number"))
+        .collect()
+}
+
+#[test]
+fn sizes_offsets_and_constants_agree_with_c() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let host = &format!("{}-unknown-linux-gnu", std::env::consts::ARCH);
+    let probes = probes();
+    let expressions: Vec<String> = probes.iter().map(|(name, _)| name.clone()).collect();
+    let mut compiler = cc::Build::new()
+        .target(host)
+        .host(host)
+        .opt_level(0)
+        .get_compiler()
+        .to_command();
+    let found = values_in_c(&mut compiler, &expressions, folder);
+    assert_eq!(found.len(), probes.len());
+    for ((name, rust), c) in probes.iter().zip(found) {
+        assert_eq!(*rust, c, "{name}");
+    }
+}
+
+#[test]
+fn the_probe_counts_every_constant_of_the_header() {
+    let header = include_str!("../include/mbm.h");
+    let defined = header
+        .lines()
+        .filter_map(|line| line.strip_prefix("#define MBM_"))
+        .filter(|rest| {
+            rest.split_whitespace()
+                .nth(1)
+                .is_some_and(|value| value.parse::<u64>().is_ok())
+        })
+        .count();
+    let probed = probes()
+        .iter()
+        .filter(|(name, _)| name.starts_with("MBM_"))
+        .count();
+    assert_eq!(defined, probed);
+}
+
+#[test]
+fn every_status_constant_is_explained_and_no_two_alike() {
+    let text = |status| {
+        // SAFETY is the callee's: it returns a constant string.
+        let pointer = mbm_statusText(status);
+        unsafe { std::ffi::CStr::from_ptr(pointer) }
+            .to_str()
+            .unwrap()
+            .to_owned()
+    };
+    let statuses: Vec<u8> = (0..=0x0B).chain(0xE0..=0xED).collect();
+    let mut texts: Vec<String> = statuses.iter().map(|status| text(*status)).collect();
+    texts.sort();
+    texts.dedup();
+    // 07 and 09 are exception codes that the standard does not name.
+    assert_eq!(texts.len(), statuses.len() - 1);
+    assert_eq!(text(0xEE), "not a status");
+}
