@@ -1,8 +1,6 @@
 # mbm: `make help` lists what there is.
 
 CARGO ?= cargo
-CC := gcc
-CXX := g++
 BUILD := build
 ARCHIVE := target/release/libmbm.a
 
@@ -24,24 +22,63 @@ help: ## What there is
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 18
 
 .PHONY: archive
-archive: ## The archive for this machine, target/release/libmbm.a
-	@$(CARGO) rustc --quiet --release --lib --crate-type staticlib --features archive
+archive: $(ARCHIVE) ## The archive for this machine, target/release/libmbm.a
 	@echo "archive: $(ARCHIVE)"
 
-# One folder of test programs a variant: $(1) name, $(2) flags
+# Cargo knows best what is out of date.
+.PHONY: $(ARCHIVE)
+$(ARCHIVE):
+	@$(CARGO) rustc --quiet --release --lib --crate-type staticlib --features archive
+
+.PHONY: header
+header: ## Write include/mbm.h anew from the source
+	@$(CARGO) run --quiet -p mbm-tools --bin header
+
+.PHONY: check
+check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, symbols
+	@$(CARGO) fmt --all --check
+	@$(CARGO) clippy --quiet --workspace --all-targets -- -D warnings
+	@$(CARGO) clippy --quiet --no-default-features -- -D warnings
+	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps
+	@$(CARGO) test --quiet -p mbm-tools >/dev/null
+	@$(CARGO) run --quiet -p mbm-tools --bin layers
+	@$(CARGO) run --quiet -p mbm-tools --bin header -- --check
+	@scripts/check-header
+	@scripts/check-symbols $(ARCHIVE)
+	@echo "check: formatting, lints, layers, header and symbols are in order"
+
+.PHONY: test
+test: need-test tests ## Every test: Rust, C and C++; sanitizers and valgrind
+	@CARGO="$(CARGO)" scripts/test $(TESTS)
+
+.PHONY: fault-table
+fault-table: need-test $(BUILD)/plain/test_bad_wire ## Write docs/fault-table.md from what the test finds
+	@MBM_FAULT_TABLE=$(BUILD)/fault-table.rows scripts/run-c-tests "" $(BUILD)/plain/test_bad_wire
+	@scripts/fault-table
+
+.PHONY: need-check need-test
+need-check:
+	@scripts/need gcc g++ clang libc6-dev binutils
+need-test:
+	@scripts/need gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind
+
+# The test programs, one folder a variant: $(1) name, $(2) C, $(3) C++, $(4) flags
 define variant
 $(BUILD)/$(1)/%.o: c-tests/%.c $(HEADERS)
 	@mkdir -p $$(@D)
-	@$(CC) $(CFLAGS) $(2) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
+	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(BUILD)/$(1)/%.o: c-tests/%.cpp $(HEADERS)
 	@mkdir -p $$(@D)
-	@$(CXX) $(CXXFLAGS) $(2) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
+	@$(3) $(CXXFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(BUILD)/$(1)/%.o: examples/%.c $(HEADERS)
 	@mkdir -p $$(@D)
-	@$(CC) $(CFLAGS) $(2) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
-$(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) archive
-	@$(CXX) $(2) $$(filter %.o,$$^) $(ARCHIVE) $(LIBS) -o $$@
+	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
+$(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(ARCHIVE)
+	@$(3) $(4) $$(filter %.o,$$^) $(ARCHIVE) $(LIBS) -o $$@
 endef
-$(eval $(call variant,plain,))
-$(eval $(call variant,sanitized,$(SANITIZERS)))
+$(eval $(call variant,plain,gcc,g++,))
+$(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS)))
 .SECONDARY:
+
+.PHONY: tests
+tests: $(TESTS:%=$(BUILD)/plain/%) $(TESTS:%=$(BUILD)/sanitized/%)

@@ -5,6 +5,7 @@
 //! has arrived, and what turns out not to be the frame costs one byte.
 
 use super::checksum::Crc16;
+use core::cell::Cell;
 use core::ops::Range;
 
 /// The longest frame: unit, PDU of 253 bytes, CRC.
@@ -162,7 +163,7 @@ impl Window {
         }
         if skim {
             *self = kept;
-        } else {
+        } else if start > 0 {
             self.drop_front(buffer, start);
         }
         None
@@ -182,13 +183,12 @@ impl Window {
     }
 
     fn drop_front(&mut self, buffer: &mut [u8], count: usize) {
-        let len = usize::from(self.len);
-        if let Some(bytes) = buffer.get_mut(..len) {
-            if count > 0 && count <= bytes.len() {
-                bytes.copy_within(count.., 0);
-                self.len -= count as u16;
-            }
+        let cells = Cell::from_mut(buffer).as_slice_of_cells();
+        let kept = cells.get(count..usize::from(self.len)).unwrap_or_default();
+        for (to, from) in cells.iter().zip(kept) {
+            to.set(from.get());
         }
+        self.len = kept.len() as u16;
     }
 
     fn restart(&mut self) {
