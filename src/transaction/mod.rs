@@ -8,98 +8,18 @@
 //! length to an earlier request looks like the reply. After a timeout the
 //! line is therefore given a quiet time before the next request.
 
+mod settings;
+mod storage;
+
+pub use settings::Settings;
+pub use storage::{Counter, Storage, COUNTERS};
+
 use crate::error::Status;
 use crate::frame::rtu::{self, Seen, Window};
 use crate::pdu::request::Request;
 use crate::pdu::response;
 use crate::port::Port;
-use crate::time::{self, elapsed, millis};
-
-/// What is counted, in the order of the counters' storage.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[repr(u8)]
-pub enum Counter {
-    /// Requests sent, retries included.
-    Requests,
-    /// Replies that answered a request, exceptions included.
-    Replies,
-    /// Replies that were exceptions.
-    Exceptions,
-    /// Complete replies with a wrong CRC.
-    BadCrc,
-    /// Requests that were not answered in time.
-    Timeouts,
-    /// Frames with a right CRC that were not for us or no answer.
-    ForeignFrames,
-    /// Replies that were found behind bytes that were no frame.
-    Resynchronisations,
-    /// Bytes sent.
-    BytesSent,
-    /// Bytes received.
-    BytesReceived,
-}
-
-/// How many kinds of [`Counter`] there are.
-pub const COUNTERS: usize = 9;
-
-/// What the caller lends to a transaction.
-pub trait Storage {
-    /// One frame: of a request first, then of what arrives.
-    fn frame(&mut self) -> &mut [u8];
-
-    /// The words that writing requests send.
-    fn transmit(&mut self) -> &mut [u16];
-
-    /// The words that a successful read fills.
-    fn response(&mut self) -> &mut [u16];
-
-    /// Frame and transmit words at once.
-    fn frame_and_transmit(&mut self) -> (&mut [u8], &[u16]);
-
-    /// Frame and response words at once.
-    fn frame_and_response(&mut self) -> (&[u8], &mut [u16]);
-
-    /// Adds to a counter, if there is storage for counters.
-    fn count(&mut self, _counter: Counter, _more: usize) {}
-}
-
-/// How a transaction behaves; kept from one to the next.
-#[derive(Clone, Copy, Debug)]
-pub struct Settings {
-    /// Silence before a request, in microseconds.
-    pub gap: u32,
-    /// The silence t3.5 that ends a frame, in microseconds.
-    pub silence: u32,
-    /// One character, in microseconds.
-    pub character: u16,
-    /// From the end of the request to the end of the reply, in milliseconds.
-    pub response_timeout: u16,
-    /// What slaves are given to carry out a broadcast, in milliseconds.
-    pub turnaround_delay: u16,
-    /// What a late reply is given after a timeout, in milliseconds.
-    pub quiet_time: u16,
-    /// How often a request is repeated that was not answered.
-    pub retries: u8,
-    /// How long the driver is held on after the flush, in characters.
-    pub post_flush_hold: u8,
-    /// Whether each request comes back before its reply.
-    pub echo_discard: bool,
-}
-
-impl Settings {
-    /// What holds until somebody says otherwise.
-    pub const DEFAULT: Settings = Settings {
-        gap: time::DEFAULT_SILENCE,
-        silence: time::DEFAULT_SILENCE,
-        character: time::DEFAULT_CHARACTER,
-        response_timeout: 2000,
-        turnaround_delay: 100,
-        quiet_time: 100,
-        retries: 0,
-        post_flush_hold: 0,
-        echo_discard: false,
-    };
-}
+use crate::time::{elapsed, millis};
 
 /// Where a transaction stands.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
