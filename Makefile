@@ -44,6 +44,7 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, symbols
 	@$(CARGO) run --quiet -p mbm-tools --bin layers
 	@$(CARGO) run --quiet -p mbm-tools --bin header -- --check
 	@scripts/check-header
+	@scripts/check-docs
 	@scripts/check-symbols $(ARCHIVE)
 	@echo "check: formatting, lints, layers, header and symbols are in order"
 
@@ -58,7 +59,7 @@ fault-table: need-test $(BUILD)/plain/test_bad_wire ## Write docs/fault-table.md
 
 .PHONY: need-check need-test
 need-check:
-	@scripts/need gcc g++ clang libc6-dev binutils
+	@scripts/need gcc g++ clang libc6-dev binutils doxygen
 need-test:
 	@scripts/need gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind
 

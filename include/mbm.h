@@ -185,12 +185,18 @@
  * A Modbus RTU master: one line, one request at a time.
  *
  * Storage is yours and must be zero before first use, which a static object
- * is (`static mbm_master node;`). The fields are not for you. Not re-entrant:
+ * is (`static mbm_master node;`). Not re-entrant:
  * use one object from one thread and never from an interrupt; several
  * objects are independent of each other.
  */
 typedef struct mbm_master {
+    /**
+     * Not for you.
+     */
     void *pointers[14];
+    /**
+     * Not for you.
+     */
     uint32_t words[21];
 } mbm_master;
 

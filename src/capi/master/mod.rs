@@ -21,12 +21,14 @@ const BEGUN: u16 = 0x4D42;
 /// A Modbus RTU master: one line, one request at a time.
 ///
 /// Storage is yours and must be zero before first use, which a static object
-/// is (`static mbm_master node;`). The fields are not for you. Not re-entrant:
+/// is (`static mbm_master node;`). Not re-entrant:
 /// use one object from one thread and never from an interrupt; several
 /// objects are independent of each other.
 #[repr(C)]
 pub struct mbm_master {
+    /// Not for you.
     pointers: [*mut c_void; 14],
+    /// Not for you.
     words: [u32; 21],
 }
 
