@@ -15,21 +15,33 @@ pub enum Order {
 /// The byte that stands at `index` when `words` are sent; `None` past the end.
 pub fn byte(words: &[u16], index: usize, order: Order) -> Option<u8> {
     let word = *words.get(index >> 1)?;
-    let high_wanted = (index & 1 == 0) == (order == Order::HighFirst);
-    Some((if high_wanted { word >> 8 } else { word }) as u8)
+    Some(if is_high(index, order) {
+        word >> 8
+    } else {
+        word
+    } as u8)
 }
 
 /// Fills `words` from data bytes; an odd last byte is padded with zero. Bytes
 /// beyond the last word are left out, so the caller checks the room first.
 pub fn fill(words: &mut [u16], bytes: &[u8], order: Order) {
-    for (word, pair) in words.iter_mut().zip(bytes.chunks(2)) {
-        let first = u16::from(pair.first().copied().unwrap_or(0));
-        let second = u16::from(pair.get(1).copied().unwrap_or(0));
-        *word = match order {
-            Order::HighFirst => first << 8 | second,
-            Order::LowFirst => second << 8 | first,
+    for (index, byte) in bytes.iter().enumerate() {
+        let Some(word) = words.get_mut(index >> 1) else {
+            return;
         };
+        let byte = u16::from(*byte);
+        let part = if is_high(index, order) {
+            byte << 8
+        } else {
+            byte
+        };
+        *word = if index & 1 == 0 { part } else { *word | part };
     }
+}
+
+/// True if the byte at `index` on the wire is the high byte of its word.
+const fn is_high(index: usize, order: Order) -> bool {
+    (index & 1 == 0) == matches!(order, Order::HighFirst)
 }
 
 /// The mask that keeps the used bits of the last byte of `quantity` packed bits.
