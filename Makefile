@@ -45,3 +45,15 @@ endef
 $(eval $(call variant,plain,))
 $(eval $(call variant,sanitized,$(SANITIZERS)))
 .SECONDARY:
+
+# The same flags as the peer's package is built with.
+$(eval $(call variant,bench,-O2))
+BENCH := $(BUILD)/bench/bench
+$(BENCH): $(patsubst %,$(BUILD)/bench/%.o,bench support/pty support/server linux/mbm_tty) archive
+	@$(CC) $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
+
+.PHONY: bench
+bench: ## Speed and instructions of mbm beside libmodbus's own client
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
+	@$(MAKE) --no-print-directory $(BENCH)
+	@scripts/bench $(BENCH)
