@@ -38,7 +38,7 @@ $(BUILD)/$(1)/%.o: c-tests/%.cpp $(HEADERS)
 	@$(CXX) $(CXXFLAGS) $(2) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(BUILD)/$(1)/%.o: examples/%.c $(HEADERS)
 	@mkdir -p $$(@D)
-	@$(CC) $(CFLAGS) $(2) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
+	@$(CC) $(CFLAGS) $(2) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) archive
 	@$(CXX) $(2) $$(filter %.o,$$^) $(ARCHIVE) $(LIBS) -o $$@
 endef
@@ -57,3 +57,24 @@ bench: ## Speed and instructions of mbm beside libmodbus's own client
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
 	@$(MAKE) --no-print-directory $(BENCH)
 	@scripts/bench $(BENCH)
+
+DEMO := $(BUILD)/plain/linux/demo
+$(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/frame_words linux/recorder linux/mbm_tty support/pty support/server) archive
+	@$(CC) $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
+$(BUILD)/plain/linux/basic: $(patsubst %,$(BUILD)/plain/%.o,linux/basic linux/mbm_tty) archive
+	@$(CC) $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
+
+.PHONY: demo
+demo: ## Every function at work against a libmodbus server, frame by frame
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev
+	@$(MAKE) --no-print-directory $(DEMO) $(BUILD)/plain/linux/basic
+	@$(DEMO)
+
+# The C of the README compiles as it stands.
+.PHONY: check-readme
+check-readme:
+	@mkdir -p $(BUILD)
+	@sed -n '/^```c$$/,/^```$$/p' README.md | sed '/^```/d' >$(BUILD)/readme.c
+	@test -s $(BUILD)/readme.c
+	@$(CC) -std=c11 $(WARNINGS) -Iinclude -c $(BUILD)/readme.c -o $(BUILD)/readme.o
+	@echo "check-readme: the README's C compiles"
