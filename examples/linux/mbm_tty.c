@@ -19,6 +19,9 @@ enum { LISTENING, SENT, AWAITING };
  * the kernel's own next tick costs more than the rest of a transaction. */
 enum { SHORT_SLEEP = 1, LONG_SLEEP = 5 };
 
+/* No slave answers sooner, in microseconds: it has to receive the request first. */
+enum { TOO_SOON = 100 };
+
 static speed_t speed_of(uint32_t baud)
 {
     switch (baud) {
@@ -48,6 +51,7 @@ int mbm_tty_attach(mbm_tty *tty, int fd)
             return -1;
     }
     tty->fd = fd;
+    tty->now = tty->sent_at = 0;
     tty->phase = LISTENING;
     tty->has_uart = ioctl(fd, TIOCMGET, &lines) == 0;
     return 0;
@@ -104,8 +108,8 @@ static int16_t outcome(ssize_t count)
     return -1;
 }
 
-/* The first look after a request finds nothing, for the slave has not even read
- * it; it is left out, so that idle sleeps at once. */
+/* A look right behind a request finds nothing; it is left out, so that idle
+ * sleeps at once. */
 static int16_t tty_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     mbm_tty *tty = (mbm_tty *)context;
@@ -113,7 +117,8 @@ static int16_t tty_read(void *context, uint8_t *bytes, uint16_t capacity)
 
     if (tty->phase == SENT) {
         tty->phase = AWAITING;
-        return 0;
+        if (tty->now - tty->sent_at < TOO_SOON)
+            return 0;
     }
     count = capacity == 0 ? 0 : outcome(read(tty->fd, bytes, capacity));
     if (count > 0)
@@ -126,16 +131,18 @@ static int16_t tty_write(void *context, const uint8_t *bytes, uint16_t length)
     mbm_tty *tty = (mbm_tty *)context;
 
     tty->phase = SENT;
+    tty->sent_at = tty->now;
     return length == 0 ? 0 : outcome(write(tty->fd, bytes, length));
 }
 
 static uint32_t tty_micros(void *context)
 {
+    mbm_tty *tty = (mbm_tty *)context;
     struct timespec now;
 
-    (void)context;
     clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint32_t)((uint64_t)now.tv_sec * 1000000u + (uint64_t)now.tv_nsec / 1000u);
+    tty->now = (uint32_t)((uint64_t)now.tv_sec * 1000000u + (uint64_t)now.tv_nsec / 1000u);
+    return tty->now;
 }
 
 static uint8_t tty_flush(void *context)

@@ -16,6 +16,8 @@ extern "C" {
 /** A terminal in use as a port; all but `fd` is the port's own. */
 typedef struct mbm_tty {
     int fd;
+    uint32_t now;     /* what the clock said last */
+    uint32_t sent_at; /* and when a request was sent last */
     uint8_t phase;    /* where it stands between a request and its reply */
     uint8_t has_uart; /* whether there is a transmitter to wait for */
 } mbm_tty;
