@@ -141,7 +141,7 @@ static uint32_t tty_micros(void *context)
     struct timespec now;
 
     clock_gettime(CLOCK_MONOTONIC, &now);
-    tty->now = (uint32_t)((uint64_t)now.tv_sec * 1000000u + (uint64_t)now.tv_nsec / 1000u);
+    tty->now = (uint32_t)now.tv_sec * 1000000u + (uint32_t)now.tv_nsec / 1000u;
     return tty->now;
 }
 
