@@ -45,15 +45,18 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, symbols
 	@$(CARGO) run --quiet -p mbm-tools --bin header -- --check
 	@scripts/check-header
 	@scripts/check-docs
+	@$(MAKE) --no-print-directory check-readme
 	@scripts/check-symbols $(ARCHIVE)
 	@echo "check: formatting, lints, layers, header and symbols are in order"
 
 .PHONY: test
-test: need-test tests ## Every test: Rust, C and C++; sanitizers and valgrind
+test: need-test ## Every test: Rust, C and C++; sanitizers and valgrind
+	@$(MAKE) --no-print-directory tests
 	@CARGO="$(CARGO)" scripts/test $(TESTS)
 
 .PHONY: fault-table
-fault-table: need-test $(BUILD)/plain/test_bad_wire ## Write docs/fault-table.md from what the test finds
+fault-table: need-test ## Write docs/fault-table.md from what the test finds
+	@$(MAKE) --no-print-directory $(BUILD)/plain/test_bad_wire
 	@MBM_FAULT_TABLE=$(BUILD)/fault-table.rows scripts/run-c-tests "" $(BUILD)/plain/test_bad_wire
 	@scripts/fault-table
 
@@ -73,7 +76,7 @@ $(BUILD)/$(1)/%.o: c-tests/%.cpp $(HEADERS)
 	@$(3) $(CXXFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(BUILD)/$(1)/%.o: examples/%.c $(HEADERS)
 	@mkdir -p $$(@D)
-	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
+	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(ARCHIVE)
 	@$(3) $(4) $$(filter %.o,$$^) $(ARCHIVE) $(LIBS) -o $$@
 endef
@@ -83,3 +86,36 @@ $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS)))
 
 .PHONY: tests
 tests: $(TESTS:%=$(BUILD)/plain/%) $(TESTS:%=$(BUILD)/sanitized/%)
+
+# The same flags as the peer's package is built with.
+$(eval $(call variant,bench,gcc,g++,-O2))
+BENCH := $(BUILD)/bench/bench
+$(BENCH): $(patsubst %,$(BUILD)/bench/%.o,bench support/pty support/server linux/mbm_tty) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
+
+.PHONY: bench
+bench: ## Speed and instructions of mbm beside libmodbus's own client
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
+	@$(MAKE) --no-print-directory $(BENCH)
+	@scripts/bench $(BENCH)
+
+DEMO := $(BUILD)/plain/linux/demo
+$(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/frame_words linux/recorder linux/mbm_tty support/pty support/server) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
+$(BUILD)/plain/linux/basic: $(patsubst %,$(BUILD)/plain/%.o,linux/basic linux/mbm_tty) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
+
+.PHONY: demo
+demo: ## Every function at work against a libmodbus server, frame by frame
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev
+	@$(MAKE) --no-print-directory $(DEMO) $(BUILD)/plain/linux/basic
+	@$(DEMO)
+
+# The C of the README compiles as it stands.
+.PHONY: check-readme
+check-readme:
+	@mkdir -p $(BUILD)
+	@sed -n '/^```c$$/,/^```$$/p' README.md | sed '/^```/d' >$(BUILD)/readme.c
+	@test -s $(BUILD)/readme.c
+	@gcc -std=c11 $(WARNINGS) -Iinclude -c $(BUILD)/readme.c -o $(BUILD)/readme.o
+	@echo "check-readme: the README's C compiles"

@@ -11,6 +11,17 @@
 #include <time.h>
 #include <unistd.h>
 
+/* Where a terminal stands between a request and its reply. */
+enum { LISTENING, SENT, AWAITING };
+
+/* How long idle sleeps at most, in milliseconds: short where a silence is to be
+ * measured, longer where the next event is a reply. A timer that is nearer than
+ * the kernel's own next tick costs more than the rest of a transaction. */
+enum { SHORT_SLEEP = 1, LONG_SLEEP = 5 };
+
+/* No slave answers sooner, in microseconds: it has to receive the request first. */
+enum { TOO_SOON = 100 };
+
 static speed_t speed_of(uint32_t baud)
 {
     switch (baud) {
@@ -30,6 +41,7 @@ int mbm_tty_attach(mbm_tty *tty, int fd)
 {
     struct termios settings;
     int flags = fcntl(fd, F_GETFL);
+    int lines;
 
     if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) < 0)
         return -1;
@@ -39,6 +51,9 @@ int mbm_tty_attach(mbm_tty *tty, int fd)
             return -1;
     }
     tty->fd = fd;
+    tty->now = tty->sent_at = 0;
+    tty->phase = LISTENING;
+    tty->has_uart = ioctl(fd, TIOCMGET, &lines) == 0;
     return 0;
 }
 
@@ -93,27 +108,41 @@ static int16_t outcome(ssize_t count)
     return -1;
 }
 
+/* A look right behind a request finds nothing; it is left out, so that idle
+ * sleeps at once. */
 static int16_t tty_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
-    const mbm_tty *tty = (const mbm_tty *)context;
+    mbm_tty *tty = (mbm_tty *)context;
+    int16_t count;
 
-    return capacity == 0 ? 0 : outcome(read(tty->fd, bytes, capacity));
+    if (tty->phase == SENT) {
+        tty->phase = AWAITING;
+        if (tty->now - tty->sent_at < TOO_SOON)
+            return 0;
+    }
+    count = capacity == 0 ? 0 : outcome(read(tty->fd, bytes, capacity));
+    if (count > 0)
+        tty->phase = LISTENING;
+    return count;
 }
 
 static int16_t tty_write(void *context, const uint8_t *bytes, uint16_t length)
 {
-    const mbm_tty *tty = (const mbm_tty *)context;
+    mbm_tty *tty = (mbm_tty *)context;
 
+    tty->phase = SENT;
+    tty->sent_at = tty->now;
     return length == 0 ? 0 : outcome(write(tty->fd, bytes, length));
 }
 
 static uint32_t tty_micros(void *context)
 {
+    mbm_tty *tty = (mbm_tty *)context;
     struct timespec now;
 
-    (void)context;
     clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint32_t)((uint64_t)now.tv_sec * 1000000u + (uint64_t)now.tv_nsec / 1000u);
+    tty->now = (uint32_t)now.tv_sec * 1000000u + (uint32_t)now.tv_nsec / 1000u;
+    return tty->now;
 }
 
 static uint8_t tty_flush(void *context)
@@ -124,13 +153,15 @@ static uint8_t tty_flush(void *context)
     return ioctl(tty->fd, TIOCOUTQ, &left) < 0 || left == 0;
 }
 
-/* Sleeps until bytes arrive, for a millisecond at most. */
+/* Sleeps until bytes arrive, for a few milliseconds at most. */
 static void tty_idle(void *context)
 {
-    const mbm_tty *tty = (const mbm_tty *)context;
+    mbm_tty *tty = (mbm_tty *)context;
     struct pollfd line = {tty->fd, POLLIN, 0};
 
-    poll(&line, 1, 1);
+    if (tty->phase == SENT)
+        tty->phase = AWAITING;
+    poll(&line, 1, tty->phase == LISTENING ? SHORT_SLEEP : LONG_SLEEP);
 }
 
 mbm_port mbm_tty_port(mbm_tty *tty)
@@ -141,7 +172,8 @@ mbm_port mbm_tty_port(mbm_tty *tty)
     port.read = tty_read;
     port.write = tty_write;
     port.micros = tty_micros;
-    port.flush = tty_flush;
+    /* A pty has no transmitter that could drain. */
+    port.flush = tty->has_uart ? tty_flush : NULL;
     port.idle = tty_idle;
     return port;
 }

@@ -13,9 +13,13 @@
 extern "C" {
 #endif
 
-/** A terminal in use as a port. */
+/** A terminal in use as a port; all but `fd` is the port's own. */
 typedef struct mbm_tty {
     int fd;
+    uint32_t now;     /* what the clock said last */
+    uint32_t sent_at; /* and when a request was sent last */
+    uint8_t phase;    /* where it stands between a request and its reply */
+    uint8_t has_uart; /* whether there is a transmitter to wait for */
 } mbm_tty;
 
 /**
@@ -36,7 +40,10 @@ int mbm_tty_attach(mbm_tty *tty, int fd);
 /** Closes the terminal. */
 void mbm_tty_close(mbm_tty *tty);
 
-/** The port to give to mbm_master_begin; `tty` must outlive it. */
+/**
+ * The port to give to mbm_master_begin; `tty` must outlive it. While a reply is
+ * waited for it sleeps, so a timeout is noticed up to 5 ms late.
+ */
 mbm_port mbm_tty_port(mbm_tty *tty);
 
 #ifdef __cplusplus

@@ -1,0 +1,219 @@
+/* mbm beside libmodbus's own client: FC03 of ten registers from one libmodbus
+ * server over one pty. The server is a process of its own, so that a profiler
+ * sees the client alone. */
+#define _GNU_SOURCE
+#include "mbm_tty.h"
+#include "pty.h"
+#include "server.h"
+
+#include <sched.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { UNIT = 17, ADDRESS = 7, QUANTITY = 10, ROUNDS = 11, PER_ROUND = 2000, WARM_UP = 200 };
+
+/* A client: makes one transaction; 0 unless it brought the right data. */
+typedef int (*transact)(void);
+
+static mbm_master node;
+static mbm_tty tty;
+static uint16_t response[QUANTITY];
+static uint16_t transmit[1];
+static uint8_t frame[MBM_FRAME_BYTES(QUANTITY)];
+static modbus_t *peer;
+static uint16_t expected[QUANTITY];
+
+static void fail(const char *what)
+{
+    perror(what);
+    exit(1);
+}
+
+static int by_mbm(void)
+{
+    return mbm_master_readHoldingRegisters(&node, ADDRESS, QUANTITY) == MBM_OK &&
+           memcmp(response, expected, sizeof expected) == 0;
+}
+
+static int by_libmodbus(void)
+{
+    uint16_t words[QUANTITY];
+
+    return modbus_read_registers(peer, ADDRESS, QUANTITY, words) == QUANTITY &&
+           memcmp(words, expected, sizeof expected) == 0;
+}
+
+static void begin_clients(int fd)
+{
+    mbm_port port;
+    unsigned i;
+
+    for (i = 0; i < QUANTITY; i++)
+        expected[i] = server_pattern(ADDRESS + i);
+    if (mbm_tty_attach(&tty, fd) != 0)
+        fail("tty");
+    port = mbm_tty_port(&tty);
+    /* libmodbus keeps no gap before a request, so mbm keeps none either. */
+    if (mbm_master_begin(&node, UNIT, &port) != MBM_OK ||
+        mbm_master_setBuffers(&node, response, QUANTITY, transmit, 1, frame, sizeof frame) !=
+            MBM_OK ||
+        mbm_master_setGap(&node, 0) != MBM_OK)
+        fail("mbm");
+    /* Both use the same descriptor, which is non-blocking as libmodbus's own
+     * would be; the name only serves to make the object. */
+    peer = modbus_new_rtu("/dev/null", 115200, 'N', 8, 1);
+    if (!peer || modbus_set_slave(peer, UNIT) != 0 || modbus_set_socket(peer, fd) != 0)
+        fail("libmodbus client");
+}
+
+/* Serves until the line hangs up. */
+static int serve(const char *path)
+{
+    modbus_t *host = modbus_new_rtu(path, 115200, 'N', 8, 1);
+    modbus_mapping_t *mapping = modbus_mapping_new(0, 0, SERVER_REGISTERS, 0);
+    uint8_t request[MODBUS_RTU_MAX_ADU_LENGTH];
+    unsigned i;
+
+    if (!host || !mapping || modbus_set_slave(host, UNIT) != 0 || modbus_connect(host) != 0)
+        fail("libmodbus server");
+    for (i = 0; i < SERVER_REGISTERS; i++)
+        mapping->tab_registers[i] = server_pattern(i);
+    for (;;) {
+        int length = modbus_receive(host, request);
+
+        if (length < 0)
+            break;
+        if (length > 0)
+            modbus_reply(host, request, length, mapping);
+    }
+    modbus_close(host);
+    modbus_free(host);
+    modbus_mapping_free(mapping);
+    return 0;
+}
+
+/* Another image of this program serves the far end. */
+static pid_t start_server(const char *program, const pty *line)
+{
+    pid_t child = fork();
+
+    if (child < 0)
+        fail("fork");
+    if (child == 0) {
+        close(line->ours);
+        close(line->theirs);
+        execl(program, program, "serve", line->path, (char *)NULL);
+        _exit(127);
+    }
+    return child;
+}
+
+static void run(transact one, const char *name, unsigned long count)
+{
+    unsigned long i;
+
+    for (i = 0; i < count; i++) {
+        if (!one()) {
+            fprintf(stderr, "bench: %s: transaction %lu brought wrong data\n", name, i + 1);
+            exit(1);
+        }
+    }
+}
+
+static double per_second(transact one, const char *name)
+{
+    struct timespec from, to;
+
+    clock_gettime(CLOCK_MONOTONIC, &from);
+    run(one, name, PER_ROUND);
+    clock_gettime(CLOCK_MONOTONIC, &to);
+    return PER_ROUND /
+           ((double)(to.tv_sec - from.tv_sec) + (double)(to.tv_nsec - from.tv_nsec) * 1e-9);
+}
+
+static int by_size(const void *left, const void *right)
+{
+    double a = *(const double *)left, b = *(const double *)right;
+
+    return (a > b) - (a < b);
+}
+
+static double median(double *values)
+{
+    qsort(values, ROUNDS, sizeof *values, by_size);
+    return values[ROUNDS / 2];
+}
+
+/* Rounds alternate, so that both meet the same weather. */
+static void compare(const char *where)
+{
+    double mbm[ROUNDS], libmodbus[ROUNDS], ours, theirs;
+    unsigned round;
+
+    run(by_mbm, "mbm", WARM_UP);
+    run(by_libmodbus, "libmodbus", WARM_UP);
+    for (round = 0; round < ROUNDS; round++) {
+        mbm[round] = per_second(by_mbm, "mbm");
+        libmodbus[round] = per_second(by_libmodbus, "libmodbus");
+    }
+    ours = median(mbm);
+    theirs = median(libmodbus);
+    printf("%s: throughput ratio %.2f (goal: at least 1.0); transactions per second, median of "
+           "%d rounds: mbm %.0f, libmodbus %.0f\n",
+           where, ours / theirs, ROUNDS, ours, theirs);
+    fflush(stdout);
+}
+
+/* On one CPU a transaction costs what it costs; on several it depends above all
+ * on where the scheduler puts the two processes. */
+static void compare_on_one_cpu(pid_t server_process)
+{
+    cpu_set_t all, one;
+    size_t cpu = 0;
+
+    if (sched_getaffinity(0, sizeof all, &all) != 0)
+        fail("sched_getaffinity");
+    while (!CPU_ISSET(cpu, &all))
+        cpu++;
+    CPU_ZERO(&one);
+    CPU_SET(cpu, &one);
+    if (sched_setaffinity(0, sizeof one, &one) != 0 ||
+        sched_setaffinity(server_process, sizeof one, &one) != 0)
+        fail("sched_setaffinity");
+    compare("on one CPU");
+    if (sched_setaffinity(0, sizeof all, &all) != 0 ||
+        sched_setaffinity(server_process, sizeof all, &all) != 0)
+        fail("sched_setaffinity");
+}
+
+int main(int argc, char **argv)
+{
+    pty line;
+    pid_t child;
+
+    if (argc == 3 && strcmp(argv[1], "serve") == 0)
+        return serve(argv[2]);
+    pty_open(&line);
+    child = start_server(argv[0], &line);
+    begin_clients(line.ours);
+    if (argc == 1) {
+        compare_on_one_cpu(child);
+        compare("on any CPU");
+    } else if (argc == 3 && strcmp(argv[1], "mbm") == 0) {
+        run(by_mbm, argv[1], strtoul(argv[2], NULL, 10));
+    } else if (argc == 3 && strcmp(argv[1], "libmodbus") == 0) {
+        run(by_libmodbus, argv[1], strtoul(argv[2], NULL, 10));
+    } else {
+        fprintf(stderr, "usage: bench [mbm N | libmodbus N | serve PATH]\n");
+    }
+    modbus_free(peer);
+    kill(child, SIGKILL);
+    waitpid(child, NULL, 0);
+    pty_close(&line);
+    return 0;
+}

@@ -1,0 +1,230 @@
+/* Shows every function of mbm at work against a libmodbus server at the far end
+ * of a pty: the call, the frames in hex and in words, the result. What was
+ * written is looked up in the server's own memory.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#include "frame_words.h"
+#include "mbm_tty.h"
+#include "recorder.h"
+#include "server.h"
+
+#include <stdio.h>
+#include <string.h>
+
+enum { UNIT = 17, NOBODY = 99, WORDS = 8, SHORT_FRAME = 8 };
+
+static server device;
+static recorder wire;
+static mbm_master node;
+static mbm_counters counters;
+static uint16_t response[WORDS];
+static uint16_t transmit[WORDS];
+static uint8_t frame[MBM_FRAME_BYTES(WORDS)];
+static unsigned requests, surprises;
+
+static void expect(int as_expected, const char *what)
+{
+    if (!as_expected) {
+        surprises++;
+        printf("  NOT AS EXPECTED: %s\n", what);
+    }
+}
+
+/* Hex and words on one line, or below each other where the hex is long. */
+static void print_frame(frame_direction direction, const recording *kept)
+{
+    char words[160];
+    size_t i;
+
+    printf("  %-9s", direction == FRAME_REQUEST ? "sent" : "received");
+    if (kept->length == 0) {
+        printf("nothing\n");
+        return;
+    }
+    for (i = 0; i < kept->length; i++)
+        printf("%s%02X", i == 0 ? "" : " ", kept->bytes[i]);
+    if (kept->length > SHORT_FRAME)
+        printf("\n  %-9s", "");
+    else
+        printf("%*s", (int)(3 * (SHORT_FRAME - kept->length) + 2), "");
+    frame_words(words, sizeof words, direction, kept->bytes, kept->length);
+    printf("%s\n", words);
+}
+
+/* Whether the request that was sent last reads; a reply to a write brings no words. */
+static int was_read(void)
+{
+    uint8_t function = wire.sent.bytes[1];
+
+    return function <= 0x04 || function == 0x17;
+}
+
+/* Shows what the request that has just ended put on the wire, and its result:
+ * the status, and the words that a read brought. */
+static void show(uint8_t status, uint8_t expected_status)
+{
+    uint8_t words = was_read() ? mbm_master_available(&node) : 0;
+    uint8_t i;
+
+    requests++;
+    print_frame(FRAME_REQUEST, &wire.sent);
+    print_frame(FRAME_REPLY, &wire.received);
+    printf("  result   %s", mbm_statusText(status));
+    for (i = 0; i < words; i++)
+        printf("%s0x%04X", i == 0 ? ": " : " ", mbm_master_getResponseBuffer(&node, i));
+    printf("\n");
+    expect(status == expected_status, mbm_statusText(expected_status));
+}
+
+/* Makes a call after it has printed it as a user would write it. */
+#define REQUEST(call, expected_status) \
+    do {                               \
+        recorder_clear(&wire);         \
+        printf("%s\n", #call);         \
+        show(call, expected_status);   \
+    } while (0)
+
+/* Whether the words read are `there`, which the server holds. */
+static int read_words(const uint16_t *there, size_t count)
+{
+    return mbm_master_available(&node) == count && memcmp(response, there, 2 * count) == 0;
+}
+
+/* Whether the bits read are `there`, one byte each, which the server holds. */
+static int read_bits(const uint8_t *there, unsigned count)
+{
+    unsigned i;
+
+    for (i = 0; i < count; i++) {
+        if ((mbm_master_getResponseBuffer(&node, (uint8_t)(i / 16)) >> i % 16 & 1) != there[i])
+            return 0;
+    }
+    return 1;
+}
+
+static void begin(void)
+{
+    static mbm_tty tty;
+    mbm_port over_tty, port;
+
+    server_start(&device, UNIT);
+    expect(mbm_tty_attach(&tty, device.line.ours) == 0, "a terminal");
+    over_tty = mbm_tty_port(&tty);
+    port = recorder_port(&wire, &over_tty);
+    expect(mbm_master_begin(&node, UNIT, &port) == MBM_OK, "begin");
+    expect(mbm_master_setBuffers(&node, response, WORDS, transmit, WORDS, frame, sizeof frame) ==
+               MBM_OK,
+           "setBuffers");
+    expect(mbm_master_setBaudRate(&node, 115200) == MBM_OK, "setBaudRate");
+    expect(mbm_master_setCounters(&node, &counters) == MBM_OK, "setCounters");
+    printf("mbm %s as master, a libmodbus server as unit %d, RTU between them over %s\n\n",
+           MBM_VERSION, UNIT, device.line.path);
+}
+
+/* The loop of ModbusMaster's Basic sketch. */
+static void basic_sketch(void)
+{
+    static uint32_t counter = 0x00010000;
+    const uint16_t *registers = device.mapping->tab_registers;
+
+    counter++;
+    printf("counter 0x%08X: mbm_master_setTransmitBuffer(&node, 0, low), ..(&node, 1, high)\n",
+           (unsigned)counter);
+    mbm_master_setTransmitBuffer(&node, 0, (uint16_t)counter);
+    mbm_master_setTransmitBuffer(&node, 1, (uint16_t)(counter >> 16));
+    REQUEST(mbm_master_writeMultipleRegisters(&node, 0, 2), MBM_OK);
+    expect(registers[0] == 1 && registers[1] == 1, "the counter in registers 0 and 1");
+    REQUEST(mbm_master_readHoldingRegisters(&node, 2, 6), MBM_OK);
+    expect(read_words(registers + 2, 6), "registers 2 to 7");
+}
+
+static void other_registers(void)
+{
+    uint16_t *registers = device.mapping->tab_registers;
+
+    REQUEST(mbm_master_writeSingleRegister(&node, 40, 0xBEEF), MBM_OK);
+    expect(registers[40] == 0xBEEF, "0xBEEF in register 40");
+    REQUEST(mbm_master_readInputRegisters(&node, 8, 1), MBM_OK);
+    expect(read_words(device.mapping->tab_input_registers + 8, 1), "input register 8");
+    REQUEST(mbm_master_maskWriteRegister(&node, 40, 0xFF00, 0x0012), MBM_OK);
+    expect(registers[40] == 0xBE12, "0xBE12 in register 40");
+    mbm_master_setTransmitBuffer(&node, 0, 0x0A0B);
+    REQUEST(mbm_master_readWriteMultipleRegisters(&node, 40, 2, 41, 1), MBM_OK);
+    expect(registers[41] == 0x0A0B && read_words(registers + 40, 2), "registers 40 and 41");
+}
+
+static void bits(void)
+{
+    uint8_t *coils = device.mapping->tab_bits;
+
+    REQUEST(mbm_master_writeSingleCoil(&node, 20, 1), MBM_OK);
+    expect(coils[20] == 1, "coil 20 on");
+    mbm_master_setTransmitBuffer(&node, 0, 0x0155);
+    REQUEST(mbm_master_writeMultipleCoils(&node, 21, 9), MBM_OK);
+    expect(coils[21] == 1 && coils[22] == 0 && coils[28] == 0 && coils[29] == 1, "coils 21 to 29");
+    REQUEST(mbm_master_readCoils(&node, 20, 10), MBM_OK);
+    expect(read_bits(coils + 20, 10), "coils 20 to 29");
+    REQUEST(mbm_master_readDiscreteInputs(&node, 30, 8), MBM_OK);
+    expect(read_bits(device.mapping->tab_input_bits + 30, 8), "inputs 30 to 37");
+}
+
+/* The program's own loop goes on while a request is under way. */
+static void without_waiting(void)
+{
+    unsigned rounds = 0;
+    uint8_t status;
+
+    mbm_master_setBlocking(&node, 0);
+    recorder_clear(&wire);
+    printf("mbm_master_setBlocking(&node, 0), then mbm_master_readHoldingRegisters(&node, 0, 2)\n");
+    status = mbm_master_readHoldingRegisters(&node, 0, 2);
+    expect(status == MBM_PENDING, "pending at once");
+    printf("  at once  %s\n", mbm_statusText(status));
+    while ((status = mbm_master_poll(&node)) == MBM_PENDING)
+        rounds++;
+    printf("  while mbm_master_poll(&node) said so, the program went round its loop %u times\n",
+           rounds);
+    show(status, MBM_OK);
+    expect(rounds > 0 && read_words(device.mapping->tab_registers, 2), "registers 0 and 1");
+    mbm_master_setBlocking(&node, 1);
+}
+
+static void what_goes_wrong(void)
+{
+    REQUEST(mbm_master_readHoldingRegisters(&node, SERVER_REGISTERS, 1), MBM_ILLEGAL_DATA_ADDRESS);
+    printf("mbm_master_setSlaveID(&node, %d), mbm_master_setResponseTimeout(&node, 200), then\n",
+           NOBODY);
+    mbm_master_setSlaveID(&node, NOBODY);
+    mbm_master_setResponseTimeout(&node, 200);
+    REQUEST(mbm_master_readHoldingRegisters(&node, 0, 1), MBM_RESPONSE_TIMED_OUT);
+}
+
+static void show_counters(void)
+{
+    printf("\ncounters: requests %u, replies %u, exceptions %u, timeouts %u, bad CRCs %u, "
+           "bytes sent %u, received %u\n",
+           (unsigned)counters.requests, (unsigned)counters.replies, (unsigned)counters.exceptions,
+           (unsigned)counters.timeouts, (unsigned)counters.badCrc, (unsigned)counters.bytesSent,
+           (unsigned)counters.bytesReceived);
+    expect(counters.requests == requests && counters.replies == requests - 1 &&
+               counters.exceptions == 1 && counters.timeouts == 1 && counters.badCrc == 0,
+           "all answered but one");
+}
+
+int main(void)
+{
+    begin();
+    basic_sketch();
+    other_registers();
+    bits();
+    without_waiting();
+    what_goes_wrong();
+    show_counters();
+    server_stop(&device);
+    if (surprises) {
+        printf("demo: %u of the results were not as expected\n", surprises);
+        return 1;
+    }
+    printf("demo: %u requests to a libmodbus server, every result as expected\n", requests);
+    return 0;
+}

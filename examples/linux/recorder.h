@@ -1,0 +1,33 @@
+/**
+ * @file recorder.h
+ * @brief A port that hands everything on to another port and keeps the bytes.
+ *
+ * Licence: MIT OR Apache-2.0.
+ */
+#ifndef RECORDER_H
+#define RECORDER_H
+
+#include "mbm.h"
+
+#include <stddef.h>
+
+/** Bytes of one direction; what does not fit is not kept. */
+typedef struct recording {
+    uint8_t bytes[MBM_MAX_FRAME];
+    size_t length;
+} recording;
+
+/** The port behind, and what has gone through it. */
+typedef struct recorder {
+    mbm_port behind;
+    recording sent;
+    recording received;
+} recorder;
+
+/** Forgets what was recorded. */
+void recorder_clear(recorder *wire);
+
+/** A port that records in `wire`, which must outlive it, and works over `behind`. */
+mbm_port recorder_port(recorder *wire, const mbm_port *behind);
+
+#endif
