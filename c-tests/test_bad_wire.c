@@ -346,7 +346,7 @@ static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[TRANSACTIO
     link_dies = 0;
     responder_start(&device, play);
     node_begin(&n, device.line.ours, UNIT);
-    port = tty_port = mbm_tty_port(&n.tty);
+    port = tty_port = mbm_tty_port(&n.tty, &n.master);
     port.read = read_or_die;
     mbm_master_begin(&n.master, UNIT, &port);
     mbm_master_setResponseTimeout(&n.master, 400);

@@ -243,7 +243,8 @@ typedef struct mbm_port {
     void (*postTransmission)(void *context);
     /**
      * Optional: called again and again while a blocking call waits, never
-     * between preTransmission and postTransmission. It may take its time.
+     * between preTransmission and postTransmission. It may take its time, and
+     * ask mbm_master_pollDelay how much of it there is.
      */
     void (*idle)(void *context);
 } mbm_port;
@@ -349,6 +350,15 @@ uint8_t mbm_master_setBuffers(struct mbm_master *master,
  *         every call; MBM_OK if there was no request yet
  */
 uint8_t mbm_master_poll(struct mbm_master *master);
+
+/**
+ * How long mbm_master_poll will find nothing to do unless a byte arrives, so
+ * that a program or an idle hook may sleep until then.
+ *
+ * @param master  the object
+ * @return microseconds; 0 means poll now, 0xFFFFFFFF that there is no request
+ */
+uint32_t mbm_master_pollDelay(const struct mbm_master *master);
 
 /**
  * Gives up the request under way, with the driver switched off; its status

@@ -130,6 +130,16 @@ impl<P: Port, S: Storage> Master<P, S> {
         self.status
     }
 
+    /// How long, in microseconds, poll will find nothing to do unless a byte
+    /// arrives; the greatest value if there is no request.
+    pub fn poll_delay(&mut self) -> u32 {
+        if !self.is_pending() {
+            return u32::MAX;
+        }
+        let now = self.transaction.port.micros();
+        self.transaction.poll_delay(now)
+    }
+
     /// Decodes a successful reply into the response words.
     fn take_words(&mut self) -> Status {
         let order = self.transaction.request().order();

@@ -25,9 +25,9 @@ fn any_request() -> impl Strategy<Value = Request> {
 
 fn emit(unit: u8, request: &Request, words: &[u16]) -> Vec<u8> {
     let mut buffer = [0; rtu::MAX_FRAME];
-    let byte = |index| request.byte(index, words);
-    let length = rtu::write(&mut buffer, unit, request.length(), byte);
-    buffer[..length.expect("every request fits into a frame")].to_vec()
+    let emit = |pdu: &mut [u8]| request.emit(pdu, words);
+    assert!(rtu::write(&mut buffer, unit, request.length(), emit));
+    buffer[..request.length() + rtu::OVERHEAD].to_vec()
 }
 
 /// A right reply to `request`, with data bytes from `seed`.

@@ -9,9 +9,9 @@ use mbm::pdu::{bits, registers, response};
 /// The frame of a request to `unit`, with `words` to send.
 fn frame(unit: u8, request: &Request, words: &[u16]) -> Vec<u8> {
     let mut buffer = [0; rtu::MAX_FRAME];
-    let byte = |index| request.byte(index, words);
-    let length = rtu::write(&mut buffer, unit, request.length(), byte).unwrap();
-    buffer[..length].to_vec()
+    let emit = |pdu: &mut [u8]| request.emit(pdu, words);
+    assert!(rtu::write(&mut buffer, unit, request.length(), emit));
+    buffer[..request.length() + rtu::OVERHEAD].to_vec()
 }
 
 /// The PDU of a request.

@@ -1,5 +1,5 @@
 /* An mbm_port over a POSIX terminal. Licence: MIT OR Apache-2.0. */
-#define _DEFAULT_SOURCE
+#define _GNU_SOURCE
 #include "mbm_tty.h"
 
 #include <errno.h>
@@ -10,17 +10,6 @@
 #include <termios.h>
 #include <time.h>
 #include <unistd.h>
-
-/* Where a terminal stands between a request and its reply. */
-enum { LISTENING, SENT, AWAITING };
-
-/* How long idle sleeps at most, in milliseconds: short where a silence is to be
- * measured, longer where the next event is a reply. A timer that is nearer than
- * the kernel's own next tick costs more than the rest of a transaction. */
-enum { SHORT_SLEEP = 1, LONG_SLEEP = 5 };
-
-/* No slave answers sooner, in microseconds: it has to receive the request first. */
-enum { TOO_SOON = 100 };
 
 static speed_t speed_of(uint32_t baud)
 {
@@ -51,8 +40,7 @@ int mbm_tty_attach(mbm_tty *tty, int fd)
             return -1;
     }
     tty->fd = fd;
-    tty->now = tty->sent_at = 0;
-    tty->phase = LISTENING;
+    tty->master = NULL;
     tty->has_uart = ioctl(fd, TIOCMGET, &lines) == 0;
     return 0;
 }
@@ -108,41 +96,27 @@ static int16_t outcome(ssize_t count)
     return -1;
 }
 
-/* A look right behind a request finds nothing; it is left out, so that idle
- * sleeps at once. */
 static int16_t tty_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
-    mbm_tty *tty = (mbm_tty *)context;
-    int16_t count;
+    const mbm_tty *tty = (const mbm_tty *)context;
 
-    if (tty->phase == SENT) {
-        tty->phase = AWAITING;
-        if (tty->now - tty->sent_at < TOO_SOON)
-            return 0;
-    }
-    count = capacity == 0 ? 0 : outcome(read(tty->fd, bytes, capacity));
-    if (count > 0)
-        tty->phase = LISTENING;
-    return count;
+    return capacity == 0 ? 0 : outcome(read(tty->fd, bytes, capacity));
 }
 
 static int16_t tty_write(void *context, const uint8_t *bytes, uint16_t length)
 {
-    mbm_tty *tty = (mbm_tty *)context;
+    const mbm_tty *tty = (const mbm_tty *)context;
 
-    tty->phase = SENT;
-    tty->sent_at = tty->now;
     return length == 0 ? 0 : outcome(write(tty->fd, bytes, length));
 }
 
 static uint32_t tty_micros(void *context)
 {
-    mbm_tty *tty = (mbm_tty *)context;
     struct timespec now;
 
+    (void)context;
     clock_gettime(CLOCK_MONOTONIC, &now);
-    tty->now = (uint32_t)now.tv_sec * 1000000u + (uint32_t)now.tv_nsec / 1000u;
-    return tty->now;
+    return (uint32_t)now.tv_sec * 1000000u + (uint32_t)now.tv_nsec / 1000u;
 }
 
 static uint8_t tty_flush(void *context)
@@ -153,21 +127,22 @@ static uint8_t tty_flush(void *context)
     return ioctl(tty->fd, TIOCOUTQ, &left) < 0 || left == 0;
 }
 
-/* Sleeps until bytes arrive, for a few milliseconds at most. */
+/* Sleeps until bytes arrive or the master has something else to do. */
 static void tty_idle(void *context)
 {
-    mbm_tty *tty = (mbm_tty *)context;
+    const mbm_tty *tty = (const mbm_tty *)context;
+    uint32_t delay = mbm_master_pollDelay(tty->master);
+    struct timespec time = {(time_t)(delay / 1000000u), (long)(delay % 1000000u) * 1000};
     struct pollfd line = {tty->fd, POLLIN, 0};
 
-    if (tty->phase == SENT)
-        tty->phase = AWAITING;
-    poll(&line, 1, tty->phase == LISTENING ? SHORT_SLEEP : LONG_SLEEP);
+    ppoll(&line, 1, &time, NULL);
 }
 
-mbm_port mbm_tty_port(mbm_tty *tty)
+mbm_port mbm_tty_port(mbm_tty *tty, const mbm_master *master)
 {
     mbm_port port = {0};
 
+    tty->master = master;
     port.context = tty;
     port.read = tty_read;
     port.write = tty_write;

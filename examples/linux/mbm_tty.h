@@ -13,13 +13,11 @@
 extern "C" {
 #endif
 
-/** A terminal in use as a port; all but `fd` is the port's own. */
+/** A terminal in use as a port. */
 typedef struct mbm_tty {
-    int fd;
-    uint32_t now;     /* what the clock said last */
-    uint32_t sent_at; /* and when a request was sent last */
-    uint8_t phase;    /* where it stands between a request and its reply */
-    uint8_t has_uart; /* whether there is a transmitter to wait for */
+    int fd;                   /**< the terminal */
+    const mbm_master *master; /**< who uses it; says how long to sleep */
+    uint8_t has_uart;         /**< whether there is a transmitter to wait for */
 } mbm_tty;
 
 /**
@@ -41,10 +39,13 @@ int mbm_tty_attach(mbm_tty *tty, int fd);
 void mbm_tty_close(mbm_tty *tty);
 
 /**
- * The port to give to mbm_master_begin; `tty` must outlive it. While a reply is
- * waited for it sleeps, so a timeout is noticed up to 5 ms late.
+ * The port to give to mbm_master_begin. While a call waits, it sleeps until
+ * bytes arrive or `master` has something else to do.
+ *
+ * @param tty     must outlive the port
+ * @param master  the object that the port is for
  */
-mbm_port mbm_tty_port(mbm_tty *tty);
+mbm_port mbm_tty_port(mbm_tty *tty, const mbm_master *master);
 
 #ifdef __cplusplus
 }

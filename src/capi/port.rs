@@ -34,7 +34,8 @@ pub struct mbm_port {
     /// Optional: called after the last bit of a request (RS-485 driver off).
     pub postTransmission: Option<unsafe extern "C" fn(context: *mut c_void)>,
     /// Optional: called again and again while a blocking call waits, never
-    /// between preTransmission and postTransmission. It may take its time.
+    /// between preTransmission and postTransmission. It may take its time, and
+    /// ask mbm_master_pollDelay how much of it there is.
     pub idle: Option<unsafe extern "C" fn(context: *mut c_void)>,
 }
 

@@ -12,36 +12,37 @@ pub enum Order {
     LowFirst,
 }
 
-/// The byte that stands at `index` when `words` are sent; `None` past the end.
-pub fn byte(words: &[u16], index: usize, order: Order) -> Option<u8> {
-    let word = *words.get(index >> 1)?;
-    Some(if is_high(index, order) {
-        word >> 8
-    } else {
-        word
-    } as u8)
+/// Writes `words` as data bytes; bytes for which there is no word stay.
+pub fn send(bytes: &mut [u8], words: &[u16], order: Order) {
+    let (pairs, odd) = bytes.as_chunks_mut();
+    let odd_word = words.get(pairs.len());
+    for (pair, word) in pairs.iter_mut().zip(words) {
+        *pair = in_order(*word, order).to_be_bytes();
+    }
+    if let (Some(place), Some(word)) = (odd.first_mut(), odd_word) {
+        [*place, _] = in_order(*word, order).to_be_bytes();
+    }
 }
 
 /// Fills `words` from data bytes; an odd last byte is padded with zero. Bytes
 /// beyond the last word are left out, so the caller checks the room first.
 pub fn fill(words: &mut [u16], bytes: &[u8], order: Order) {
-    for (index, byte) in bytes.iter().enumerate() {
-        let Some(word) = words.get_mut(index >> 1) else {
-            return;
-        };
-        let byte = u16::from(*byte);
-        let part = if is_high(index, order) {
-            byte << 8
-        } else {
-            byte
-        };
-        *word = if index & 1 == 0 { part } else { *word | part };
+    let (pairs, odd) = bytes.as_chunks();
+    let mut words = words.iter_mut();
+    for (pair, word) in pairs.iter().zip(words.by_ref()) {
+        *word = in_order(u16::from_be_bytes(*pair), order);
+    }
+    if let (Some(byte), Some(word)) = (odd.first(), words.next()) {
+        *word = in_order(u16::from_be_bytes([*byte, 0]), order);
     }
 }
 
-/// True if the byte at `index` on the wire is the high byte of its word.
-const fn is_high(index: usize, order: Order) -> bool {
-    (index & 1 == 0) == matches!(order, Order::HighFirst)
+/// A word with its bytes as `order` has them on the wire.
+const fn in_order(word: u16, order: Order) -> u16 {
+    match order {
+        Order::HighFirst => word,
+        Order::LowFirst => word.swap_bytes(),
+    }
 }
 
 /// The mask that keeps the used bits of the last byte of `quantity` packed bits.
@@ -59,20 +60,22 @@ mod tests {
     #[test]
     fn registers_travel_high_byte_first() {
         let words = [0x0102, 0x0304];
-        let sent: std::vec::Vec<_> = (0..5).map(|i| byte(&words, i, Order::HighFirst)).collect();
-        assert_eq!(sent, [Some(1), Some(2), Some(3), Some(4), None]);
+        let mut sent = [0; 4];
+        send(&mut sent, &words, Order::HighFirst);
+        assert_eq!(sent, [1, 2, 3, 4]);
         let mut back = [0; 2];
-        fill(&mut back, &[1, 2, 3, 4], Order::HighFirst);
+        fill(&mut back, &sent, Order::HighFirst);
         assert_eq!(back, words);
     }
 
     #[test]
     fn bits_fill_a_word_low_byte_first() {
         let words = [0x0201, 0x0003];
-        let sent: std::vec::Vec<_> = (0..3).map(|i| byte(&words, i, Order::LowFirst)).collect();
-        assert_eq!(sent, [Some(1), Some(2), Some(3)]);
+        let mut sent = [0; 3];
+        send(&mut sent, &words, Order::LowFirst);
+        assert_eq!(sent, [1, 2, 3]);
         let mut back = [0xFFFF; 2];
-        fill(&mut back, &[1, 2, 3], Order::LowFirst);
+        fill(&mut back, &sent, Order::LowFirst);
         assert_eq!(back, words);
     }
 

@@ -4,7 +4,7 @@
 //! a reply is searched for: a candidate frame starts at each offset of what
 //! has arrived, and what turns out not to be the frame costs one byte.
 
-use super::checksum::Crc16;
+use super::checksum::{crc16, Crc16};
 use core::cell::Cell;
 use core::ops::Range;
 
@@ -14,29 +14,21 @@ pub const MAX_FRAME: usize = 256;
 /// Bytes of a frame around its PDU: the unit before, the CRC behind.
 pub const OVERHEAD: usize = 3;
 
-/// Writes the frame of a PDU, whose bytes `pdu` gives by their index.
-/// Returns its length; `None` if `buffer` cannot hold it.
-pub fn write(
-    buffer: &mut [u8],
-    unit: u8,
-    length: usize,
-    pdu: impl Fn(usize) -> u8,
-) -> Option<usize> {
-    let total = length + OVERHEAD;
-    let frame = buffer.get_mut(..total)?;
-    let mut crc = Crc16::START;
-    for (index, place) in frame.iter_mut().enumerate() {
-        *place = if index > length {
-            crc.low_byte()
-        } else {
-            match index.checked_sub(1) {
-                None => unit,
-                Some(index) => pdu(index),
-            }
-        };
-        crc.update(&[*place]);
+/// Writes the frame of the PDU that `pdu` writes, `length` bytes long. Returns
+/// false, with nothing written, if `buffer` cannot hold it.
+pub fn write(buffer: &mut [u8], unit: u8, length: usize, pdu: impl FnOnce(&mut [u8])) -> bool {
+    let Some(frame) = buffer.get_mut(..length + OVERHEAD) else {
+        return false;
+    };
+    let Some((content, crc)) = frame.split_last_chunk_mut() else {
+        return false;
+    };
+    if let Some((first, rest)) = content.split_first_mut() {
+        *first = unit;
+        pdu(rest);
     }
-    Some(total)
+    *crc = crc16(content).to_bytes();
+    true
 }
 
 /// What was seen on the way to a reply, the more telling the greater.

@@ -102,20 +102,21 @@ impl Request {
         usize::from(self.head_length) + data
     }
 
-    /// The byte of the PDU at `index`. Words that `source` lacks are zero; the
-    /// sender checks [`Request::words`] beforehand.
-    pub fn byte(&self, index: usize, source: &[u16]) -> u8 {
-        if let Some(byte) = self.head().get(index) {
-            return *byte;
+    /// Writes the PDU into `pdu`, which has [`Request::length`] bytes. Words
+    /// that `source` lacks are zero; the sender checks [`Request::words`].
+    pub fn emit(&self, pdu: &mut [u8], source: &[u16]) {
+        let mut bytes = pdu.iter_mut();
+        for (byte, place) in self.head().iter().zip(bytes.by_ref()) {
+            *place = *byte;
         }
-        let Some(index) = index.checked_sub(usize::from(self.head_length) + 1) else {
-            return self.data_length;
+        let Some(count) = bytes.next() else {
+            return;
         };
-        let byte = words::byte(source, index, self.order()).unwrap_or(0);
-        if index + 1 == usize::from(self.data_length) {
-            byte & self.last_mask
-        } else {
-            byte
+        *count = self.data_length;
+        let data = bytes.into_slice();
+        words::send(data, source, self.order());
+        if let Some(last) = data.last_mut() {
+            *last &= self.last_mask;
         }
     }
 

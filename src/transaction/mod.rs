@@ -212,6 +212,33 @@ impl<P: Port, S: Storage> Transaction<P, S> {
         self.phase = Phase::Idle;
     }
 
+    /// How long, in microseconds from `now`, poll will find nothing to do unless
+    /// a byte arrives; the greatest value if there is no request.
+    pub fn poll_delay(&self, now: u32) -> u32 {
+        let (time, since) = match self.phase {
+            Phase::Idle => return u32::MAX,
+            Phase::Send | Phase::Flush | Phase::Hold => return 0,
+            Phase::Gap => (self.silence_to_keep(), self.last_byte),
+            Phase::Turnaround => (millis(self.settings.turnaround_delay), self.since),
+            Phase::Reply if self.skimmed => (millis(self.settings.response_timeout), self.since),
+            Phase::Reply => (self.settings.silence, self.last_byte),
+        };
+        if self.stamp {
+            time
+        } else {
+            time.saturating_sub(elapsed(now, since))
+        }
+    }
+
+    /// The silence that the next request waits for.
+    fn silence_to_keep(&self) -> u32 {
+        if self.late {
+            self.settings.gap.max(millis(self.settings.quiet_time))
+        } else {
+            self.settings.gap
+        }
+    }
+
     /// Moves the transaction on to the time `now`, without waiting:
     /// [`Status::PENDING`] until it has ended, then how.
     pub fn poll(&mut self, now: u32) -> Status {
@@ -249,11 +276,7 @@ impl<P: Port, S: Storage> Transaction<P, S> {
                 return self.stalled();
             }
         }
-        let mut gap = self.settings.gap;
-        if self.late {
-            gap = gap.max(millis(self.settings.quiet_time));
-        }
-        if elapsed(self.now, self.last_byte) < gap {
+        if elapsed(self.now, self.last_byte) < self.silence_to_keep() {
             return self.wait();
         }
         if !self.write_frame() {
@@ -262,19 +285,19 @@ impl<P: Port, S: Storage> Transaction<P, S> {
         self.storage.count(Counter::Requests, 1);
         self.at = 0;
         self.late = false;
-        self.enter(Phase::Send);
+        self.phase = Phase::Send;
+        self.since = self.now;
         self.port.pre_transmission();
-        Status::PENDING
+        self.send()
     }
 
     /// Writes the request into the frame buffer, if that holds it.
     fn write_frame(&mut self) -> bool {
         let request = &self.request;
         let (frame, words) = self.storage.frame_and_transmit();
-        rtu::write(frame, self.unit, request.length(), |index| {
-            request.byte(index, words)
+        rtu::write(frame, self.unit, request.length(), |pdu| {
+            request.emit(pdu, words);
         })
-        .is_some()
     }
 
     fn send(&mut self) -> Status {
@@ -320,6 +343,9 @@ impl<P: Port, S: Storage> Transaction<P, S> {
         self.port.post_transmission();
         self.window = Window::EMPTY;
         self.echo = self.settings.echo_discard;
+        self.waiting = true;
+        // Nothing has arrived yet.
+        self.skimmed = true;
         self.enter(if self.unit == BROADCAST {
             Phase::Turnaround
         } else {

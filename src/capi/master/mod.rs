@@ -195,6 +195,17 @@ pub unsafe extern "C" fn mbm_master_poll(master: *mut mbm_master) -> u8 {
     unsafe { pointers::with(master, |master| master.core.poll()) }
 }
 
+/// How long mbm_master_poll will find nothing to do unless a byte arrives, so
+/// that a program or an idle hook may sleep until then.
+///
+/// @param master  the object
+/// @return microseconds; 0 means poll now, 0xFFFFFFFF that there is no request
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_pollDelay(master: *const mbm_master) -> u32 {
+    // SAFETY: as the header demands.
+    unsafe { pointers::ask(master, u32::MAX, |master| master.core.poll_delay()) }
+}
+
 /// Gives up the request under way, with the driver switched off; its status
 /// becomes MBM_CANCELLED. Without a request it does nothing.
 ///
