@@ -105,8 +105,8 @@ impl Storage for LentByC {
         }
     }
 
-    // Once, not at every call: flash. Without the feature it is nothing.
-    #[cfg_attr(feature = "counters", inline(never))]
+    // On a microcontroller once, not at every call: flash.
+    #[cfg_attr(all(feature = "counters", target_os = "none"), inline(never))]
     fn count(&mut self, counter: Counter, more: usize) {
         if !cfg!(feature = "counters") || self.counters.is_null() {
             return;

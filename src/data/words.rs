@@ -28,11 +28,10 @@ pub fn send(bytes: &mut [u8], words: &[u16], order: Order) {
 /// beyond the last word are left out, so the caller checks the room first.
 pub fn fill(words: &mut [u16], bytes: &[u8], order: Order) {
     let (pairs, odd) = bytes.as_chunks();
-    let mut words = words.iter_mut();
-    for (pair, word) in pairs.iter().zip(words.by_ref()) {
+    for (word, pair) in words.iter_mut().zip(pairs) {
         *word = in_order(u16::from_be_bytes(*pair), order);
     }
-    if let (Some(byte), Some(word)) = (odd.first(), words.next()) {
+    if let (Some(byte), Some(word)) = (odd.first(), words.get_mut(pairs.len())) {
         *word = in_order(u16::from_be_bytes([*byte, 0]), order);
     }
 }

@@ -1,6 +1,6 @@
 //! Coils and discrete inputs: functions 01, 02, 05 and 0F.
 
-use super::request::{check_range, counted, word, Received, Request};
+use super::request::{check_range, counted, word, Kind, Received, Request};
 use crate::bytes::Reader;
 use crate::data::words::last_byte_mask;
 use crate::error::Status;
@@ -35,13 +35,18 @@ pub fn read(function: u8, address: u16, quantity: u16) -> Result<Request, Status
     check_range(address, quantity, MAX_READ)?;
     Ok(Request {
         response_length: 2 + byte_count(quantity),
-        ..Request::new(function, address, quantity)
+        ..Request::new(Kind::ReadBits, function, address, quantity)
     })
 }
 
 /// Builds 05.
 pub fn write_single(address: u16, on: bool) -> Request {
-    Request::new(WRITE_SINGLE_COIL, address, if on { ON } else { 0 })
+    Request::new(
+        Kind::Write,
+        WRITE_SINGLE_COIL,
+        address,
+        if on { ON } else { 0 },
+    )
 }
 
 /// Builds 0F; the coils are the sender's words, least significant bit first.
@@ -54,7 +59,7 @@ pub fn write_multiple(address: u16, quantity: u16) -> Result<Request, Status> {
     Ok(Request {
         data_length: byte_count(quantity),
         last_mask: last_byte_mask(quantity),
-        ..Request::new(WRITE_MULTIPLE_COILS, address, quantity)
+        ..Request::new(Kind::WriteBits, WRITE_MULTIPLE_COILS, address, quantity)
     })
 }
 

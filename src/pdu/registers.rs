@@ -1,6 +1,6 @@
 //! Holding and input registers: functions 03, 04, 06, 10, 16 and 17.
 
-use super::request::{check_range, counted, word, Received, Request};
+use super::request::{check_range, counted, word, Kind, Received, Request};
 use crate::bytes::Reader;
 use crate::error::Status;
 
@@ -33,13 +33,13 @@ pub fn read(function: u8, address: u16, quantity: u16) -> Result<Request, Status
     check_range(address, quantity, MAX_READ)?;
     Ok(Request {
         response_length: 2 + 2 * quantity as u8,
-        ..Request::new(function, address, quantity)
+        ..Request::new(Kind::ReadRegisters, function, address, quantity)
     })
 }
 
 /// Builds 06.
 pub fn write_single(address: u16, value: u16) -> Request {
-    Request::new(WRITE_SINGLE_REGISTER, address, value)
+    Request::new(Kind::Write, WRITE_SINGLE_REGISTER, address, value)
 }
 
 /// Builds 10; the values are the sender's words.
@@ -51,13 +51,13 @@ pub fn write_multiple(address: u16, quantity: u16) -> Result<Request, Status> {
     check_range(address, quantity, MAX_WRITE)?;
     Ok(Request {
         data_length: 2 * quantity as u8,
-        ..Request::new(WRITE_MULTIPLE_REGISTERS, address, quantity)
+        ..Request::new(Kind::Write, WRITE_MULTIPLE_REGISTERS, address, quantity)
     })
 }
 
 /// Builds 16: the register becomes `(register & and) | (or & !and)`.
 pub fn mask_write(address: u16, and_mask: u16, or_mask: u16) -> Request {
-    let mut request = Request::new(MASK_WRITE_REGISTER, address, and_mask);
+    let mut request = Request::new(Kind::Write, MASK_WRITE_REGISTER, address, and_mask);
     [request.head[5], request.head[6]] = or_mask.to_be_bytes();
     request.head_length = 7;
     request.response_length = 7;

@@ -9,12 +9,26 @@ use crate::error::Status;
 /// Function code, and at most four words of address and quantity.
 const HEAD: usize = 9;
 
+/// What a function does, as far as its sender needs to know.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Kind {
+    /// The response repeats the head.
+    Write,
+    /// As above; the words sent are packed bits.
+    WriteBits,
+    /// The response is a byte count and registers.
+    ReadRegisters,
+    /// The response is a byte count and packed bits.
+    ReadBits,
+}
+
 /// A request as its sender keeps it until the reply is there: the fixed head,
 /// and how much of the caller's words to send behind it.
 #[derive(Clone, Copy, Debug)]
 pub struct Request {
     pub(super) head: [u8; HEAD],
     pub(super) head_length: u8,
+    pub(super) kind: Kind,
     /// Bytes that follow the head and its byte count; 0: neither.
     pub(super) data_length: u8,
     /// Keeps the used bits of the last data byte.
@@ -25,15 +39,16 @@ pub struct Request {
 
 impl Request {
     /// No request.
-    pub const NONE: Request = Request::new(0, 0, 0);
+    pub const NONE: Request = Request::new(Kind::Write, 0, 0, 0);
 
-    /// A request that is `function` and two words, and whose response repeats
-    /// them.
-    pub(super) const fn new(function: u8, first: u16, second: u16) -> Request {
+    /// A request that is `function` and two words; the response to a read is
+    /// yet to be told.
+    pub(super) const fn new(kind: Kind, function: u8, first: u16, second: u16) -> Request {
         let ([a, b], [c, d]) = (first.to_be_bytes(), second.to_be_bytes());
         Request {
             head: [function, a, b, c, d, 0, 0, 0, 0],
             head_length: 5,
+            kind,
             data_length: 0,
             last_mask: 0xFF,
             response_length: 5,
@@ -60,23 +75,14 @@ impl Request {
     /// True if the response carries data behind a byte count, false if it
     /// repeats the request's head.
     pub const fn is_read(&self) -> bool {
-        matches!(
-            self.function(),
-            bits::READ_COILS
-                | bits::READ_DISCRETE_INPUTS
-                | registers::READ_HOLDING_REGISTERS
-                | registers::READ_INPUT_REGISTERS
-                | registers::READ_WRITE_MULTIPLE_REGISTERS
-        )
+        matches!(self.kind, Kind::ReadRegisters | Kind::ReadBits)
     }
 
     /// How data bytes and words correspond for this function.
     pub const fn order(&self) -> Order {
-        match self.function() {
-            bits::READ_COILS | bits::READ_DISCRETE_INPUTS | bits::WRITE_MULTIPLE_COILS => {
-                Order::LowFirst
-            }
-            _ => Order::HighFirst,
+        match self.kind {
+            Kind::ReadBits | Kind::WriteBits => Order::LowFirst,
+            Kind::ReadRegisters | Kind::Write => Order::HighFirst,
         }
     }
 

@@ -27,20 +27,17 @@ pub fn expected(request: &Request, pdu: &[u8]) -> Option<usize> {
 /// What a complete `pdu` that is [`expected`] says to `request`: success, an
 /// exception of the remote device, or [`Status::MALFORMED_REPLY`].
 pub fn judge(request: &Request, pdu: &[u8]) -> Status {
-    if let Some(code) = exception_code(request, pdu) {
-        return Status::exception(code);
-    }
-    if request.is_read() || request.agrees(pdu) {
-        Status::OK
-    } else {
-        Status::MALFORMED_REPLY
+    match exception_code(pdu) {
+        Some(code) => Status::exception(code),
+        None if request.is_read() || request.agrees(pdu) => Status::OK,
+        None => Status::MALFORMED_REPLY,
     }
 }
 
-/// The raw exception code, if `pdu` is an exception response to `request`.
-pub fn exception_code(request: &Request, pdu: &[u8]) -> Option<u8> {
+/// The raw exception code of a response, if that is an exception.
+pub fn exception_code(pdu: &[u8]) -> Option<u8> {
     match pdu {
-        [function, code] if *function == request.function() | EXCEPTION => Some(*code),
+        [function, code, ..] if *function & EXCEPTION != 0 => Some(*code),
         _ => None,
     }
 }

@@ -421,7 +421,7 @@ impl<P: Port, S: Storage> Transaction<P, S> {
                 continue;
             }
             let status = response::judge(request, pdu);
-            self.exception = response::exception_code(request, pdu).unwrap_or(0);
+            self.exception = response::exception_code(pdu).unwrap_or(0);
             if status == Status::MALFORMED_REPLY {
                 self.window.refuse(frame, range);
                 continue;
