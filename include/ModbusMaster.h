@@ -119,7 +119,7 @@ public:
     void begin(uint8_t slave, Stream &stream)
     {
         state.stream = &stream;
-        bind(slave);
+        attach(slave);
     }
 
 #if defined(MODBUSMASTER_SERIAL0)
@@ -135,15 +135,15 @@ public:
         setBaudRate(baud);
         switch (state.port) {
 #if defined(MODBUSMASTER_SERIAL1)
-        case 1: open(MODBUSMASTER_SERIAL1, baud); break;
+        case 1: openPort(MODBUSMASTER_SERIAL1, baud); break;
 #endif
 #if defined(MODBUSMASTER_SERIAL2)
-        case 2: open(MODBUSMASTER_SERIAL2, baud); break;
+        case 2: openPort(MODBUSMASTER_SERIAL2, baud); break;
 #endif
 #if defined(MODBUSMASTER_SERIAL3)
-        case 3: open(MODBUSMASTER_SERIAL3, baud); break;
+        case 3: openPort(MODBUSMASTER_SERIAL3, baud); break;
 #endif
-        default: open(MODBUSMASTER_SERIAL0, baud); break;
+        default: openPort(MODBUSMASTER_SERIAL0, baud); break;
         }
     }
 #endif
@@ -388,17 +388,17 @@ private:
                               transmitWords, frame, frameBytes);
     }
 
-    void bind(uint8_t slave)
+    void attach(uint8_t slave)
     {
         mbm_port port;
         port.context = &state;
-        port.read = read;
-        port.write = write;
-        port.micros = clock;
-        port.flush = flush;
-        port.preTransmission = pre;
-        port.postTransmission = post;
-        port.idle = wait;
+        port.read = readHook;
+        port.write = writeHook;
+        port.micros = clockHook;
+        port.flush = flushHook;
+        port.preTransmission = preHook;
+        port.postTransmission = postHook;
+        port.idle = idleHook;
         mbm_master_begin(&state.master, slave, &port);
     }
 
@@ -408,10 +408,10 @@ private:
         cancel();
         lendBuffers();
         if (state.stream != nullptr)
-            bind(getSlaveID());
+            attach(getSlaveID());
     }
 
-    template <typename Port> void open(Port &port, uint32_t baud)
+    template <typename Port> void openPort(Port &port, uint32_t baud)
     {
         port.begin(baud);
         begin(getSlaveID(), port);
@@ -448,7 +448,7 @@ private:
             callback.function(callback.context);
     }
 
-    static int16_t read(void *context, uint8_t *bytes, uint16_t capacity)
+    static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)
     {
         Stream &stream = *of(context).stream;
         uint8_t *next = bytes;
@@ -456,23 +456,23 @@ private:
             *next++ = static_cast<uint8_t>(stream.read());
         return static_cast<int16_t>(next - bytes);
     }
-    static int16_t write(void *context, const uint8_t *bytes, uint16_t length)
+    static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
     {
         return static_cast<int16_t>(of(context).stream->write(bytes, length));
     }
-    static uint32_t clock(void *) { return static_cast<uint32_t>(micros()); }
-    static uint8_t flush(void *context)
+    static uint32_t clockHook(void *) { return static_cast<uint32_t>(micros()); }
+    static uint8_t flushHook(void *context)
     {
         of(context).stream->flush();
         return 1;
     }
-    static void pre(void *context) { call(of(context).onPre); }
-    static void post(void *context)
+    static void preHook(void *context) { call(of(context).onPre); }
+    static void postHook(void *context)
     {
         of(context).sent = true;
         call(of(context).onPost);
     }
-    static void wait(void *context)
+    static void idleHook(void *context)
     {
         State &state = of(context);
         if (state.sent) {

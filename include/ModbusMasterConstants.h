@@ -54,7 +54,10 @@ public:
     static const uint8_t ku8MBCancelled = MBM_CANCELLED;
 
 protected:
-    /** The object that used a line last; compared, never looked into. */
+    /**
+     * The object that used a line last; compared, never looked into. Threads
+     * that race for it, each with a line of its own, cost a needless gap at most.
+     */
     static const void *lastUser;
 };
 
