@@ -1,0 +1,67 @@
+/* What the tests of the class share: frames, what was sent, a fresh board. */
+#ifndef WIRE_H
+#define WIRE_H
+
+#include "ModbusMaster.h"
+
+extern "C" {
+#include "crc.h"
+#include "test.h"
+}
+
+#include <initializer_list>
+
+typedef HardwareSerial::Bytes Bytes;
+
+inline Bytes raw(std::initializer_list<int> values)
+{
+    Bytes bytes;
+    for (int value : values)
+        bytes.push_back(static_cast<uint8_t>(value));
+    return bytes;
+}
+
+/* Puts the CRC behind the bytes. */
+inline Bytes sealed(Bytes bytes)
+{
+    size_t length = bytes.size();
+    bytes.resize(length + 2);
+    seal(bytes.data(), length);
+    return bytes;
+}
+
+/* A frame: the values and their CRC. */
+inline Bytes adu(std::initializer_list<int> values) { return sealed(raw(values)); }
+
+inline Bytes joined(Bytes first, const Bytes &second)
+{
+    first.insert(first.end(), second.begin(), second.end());
+    return first;
+}
+
+inline void assert_bytes(const Bytes &actual, const Bytes &expected)
+{
+    assert_int_equal(actual.size(), expected.size());
+    assert_memory_equal(actual.data(), expected.data(), expected.size());
+}
+
+/* The one request since the last call is a frame of these values. */
+inline void assert_sent(HardwareSerial &port, std::initializer_list<int> values)
+{
+    assert_int_equal(port.sent.size(), 1);
+    assert_bytes(port.sent[0], adu(values));
+    port.sent.clear();
+}
+
+/* A board just reset. */
+inline int reset_board(void **)
+{
+    bench() = Bench();
+    for (unsigned i = 0; i < 4; i++)
+        shimSerial(i).reset();
+    return 0;
+}
+
+#define TEST(test) cmocka_unit_test_setup(test, reset_board)
+
+#endif

@@ -1,0 +1,381 @@
+/* What sketches rely on: one transaction in its order, and what outlives it. */
+// Before cmocka, whose macro `fail` the C++ library would trip over.
+#include <memory>
+#include <vector>
+
+#include "wire.h"
+
+static void logs_callbacks(ModbusMaster &node)
+{
+    node.preTransmission([] { bench().note("pre"); });
+    node.postTransmission([] { bench().note("post"); });
+    node.idle([] { bench().note("idle"); });
+}
+
+static void a_transaction_drops_then_sends_then_waits(void **)
+{
+    ModbusMaster node;
+    Serial.character = 0;
+    node.begin(1, Serial);
+    logs_callbacks(node);
+    for (int again = 0; again < 2; again++) {
+        bench().log.clear();
+        Serial.inject(adu({1, 3, 2, 0x66, 0x66}));
+        Serial.reply(adu({1, 3, 2, 0, 7}));
+        assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+        assert_int_equal(node.getResponseBuffer(0), 7);
+        assert_string_equal(bench().log.c_str(), "read pre write flush post idle read ");
+    }
+}
+
+static void a_write_taken_in_pieces_stays_between_the_callbacks(void **)
+{
+    ModbusMaster node;
+    Serial.character = 0;
+    Serial.room = 3;
+    node.begin(1, Serial);
+    logs_callbacks(node);
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_sent(Serial, {1, 3, 0, 0, 0, 1});
+    assert_string_equal(bench().log.c_str(), "pre write flush post idle read ");
+}
+
+static void idle_is_called_only_while_a_reply_is_waited_for(void **)
+{
+    static unsigned yields_before_sending;
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setGap(15000);
+    node.setResponseTimeout(20);
+    logs_callbacks(node);
+    node.preTransmission([] { yields_before_sending = bench().yields; });
+    assert_int_equal(node.readCoils(0, 1), ModbusMaster::ku8MBResponseTimedOut);
+    assert_string_equal(bench().log.c_str(), "write flush post idle ");
+    assert_true(yields_before_sending > 100); // the silence was waited for as well
+}
+
+static void the_driver_is_off_again_after_a_failure(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setResponseTimeout(20);
+    logs_callbacks(node);
+    node.idle(nullptr);
+    assert_int_equal(node.writeSingleCoil(0, 1), ModbusMaster::ku8MBResponseTimedOut);
+    assert_string_equal(bench().log.c_str(), "pre write flush post ");
+}
+
+static void the_response_timeout_is_two_seconds(void **)
+{
+    ModbusMaster with_stream, of_version_0_9;
+    with_stream.begin(1, Serial);
+    of_version_0_9.begin(19200);
+    for (ModbusMaster *node : {&with_stream, &of_version_0_9}) {
+        assert_int_equal(node->readCoils(0, 1), ModbusMaster::ku8MBResponseTimedOut);
+        assert_in_range(bench().now - Serial.sentAt, 2000000, 2000200);
+    }
+}
+
+static void exception_codes_are_handed_on_raw(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    for (int code : {1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 0x55, 0x7F}) {
+        Serial.reply(adu({1, 0x83, code}));
+        assert_int_equal(node.readHoldingRegisters(0, 1), code);
+        assert_int_equal(node.getExceptionCode(), code);
+    }
+}
+
+static void each_failure_has_its_status(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    Serial.reply(adu({2, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBInvalidSlaveID);
+    Serial.reply(adu({1, 4, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBInvalidFunction);
+    Serial.reply(raw({1, 3, 2, 0, 7, 0x12, 0x34}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBInvalidCRC);
+    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBResponseTimedOut);
+}
+
+static void old_words_survive_a_failure_and_words_to_send_a_transaction(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setTransmitBuffer(0, 0x0A0B);
+    Serial.reply(adu({1, 3, 4, 0, 7, 0, 8}));
+    assert_int_equal(node.readHoldingRegisters(0, 2), 0);
+    Serial.reply(raw({1, 3, 4, 9, 9, 9, 9, 0, 0}));
+    assert_int_equal(node.readHoldingRegisters(0, 2), ModbusMaster::ku8MBInvalidCRC);
+    assert_int_equal(node.getResponseBuffer(0), 7);
+    assert_int_equal(node.getResponseBuffer(1), 8);
+    Serial.sent.clear();
+    Serial.reply(adu({1, 16, 0, 0, 0, 1}));
+    assert_int_equal(node.writeMultipleRegisters(0, 1), 0);
+    assert_sent(Serial, {1, 16, 0, 0, 0, 1, 2, 0x0A, 0x0B});
+}
+
+static void any_transaction_empties_the_queue(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.beginTransmission(0);
+    node.send(0x1234);
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_int_equal(node.writeMultipleRegisters(), ModbusMaster::ku8MBIllegalDataValue);
+
+    node.beginTransmission(0);
+    node.send(0x1234);
+    node.setResponseTimeout(5);
+    assert_int_equal(node.writeMultipleRegisters(), ModbusMaster::ku8MBResponseTimedOut);
+    Serial.sent.clear();
+    node.send(0x5678);
+    Serial.reply(adu({1, 16, 0, 0, 0, 1}));
+    assert_int_equal(node.writeMultipleRegisters(), 0);
+    assert_sent(Serial, {1, 16, 0, 0, 0, 1, 2, 0x56, 0x78});
+}
+
+static void any_transaction_takes_receive_back_to_the_first_word(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    Serial.reply(adu({1, 3, 4, 0, 7, 0, 8}));
+    assert_int_equal(node.readHoldingRegisters(0, 2), 0);
+    assert_int_equal(node.receive(), 7);
+    Serial.reply(adu({1, 6, 0, 0, 0, 1}));
+    assert_int_equal(node.writeSingleRegister(0, 1), 0);
+    assert_int_equal(node.receive(), 7);
+}
+
+static void the_write_address_is_shared(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.beginTransmission(0x11);
+    Serial.reply(adu({1, 6, 0, 0x55, 0, 1}));
+    assert_int_equal(node.writeSingleRegister(0x55, 1), 0);
+    Serial.sent.clear();
+    node.send(9);
+    Serial.reply(adu({1, 16, 0, 0x55, 0, 1}));
+    assert_int_equal(node.writeMultipleRegisters(), 0);
+    assert_sent(Serial, {1, 16, 0, 0x55, 0, 1, 2, 0, 9});
+}
+
+static void reads_of_65_to_125_registers_are_the_devices_to_judge(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    for (int quantity : {65, 66, 125}) {
+        Serial.reply(adu({1, 0x83, 2}));
+        assert_int_equal(node.readHoldingRegisters(0, static_cast<uint16_t>(quantity)), 2);
+        assert_sent(Serial, {1, 3, 0, 0, 0, quantity});
+    }
+}
+
+static void units_above_247_are_accepted(void **)
+{
+    ModbusMaster node;
+    for (int unit : {247, 248, 255}) {
+        node.begin(static_cast<uint8_t>(unit), Serial);
+        Serial.reply(adu({unit, 3, 2, 0, unit}));
+        assert_int_equal(node.readHoldingRegisters(0xFFFF, 1), 0);
+        assert_sent(Serial, {unit, 3, 0xFF, 0xFF, 0, 1});
+        assert_int_equal(node.getResponseBuffer(0), unit);
+    }
+}
+
+static void callbacks_survive_begin(void **)
+{
+    ModbusMaster node;
+    logs_callbacks(node);
+    node.begin(1, Serial);
+    node.begin(2, Serial);
+    Serial.character = 0;
+    Serial.reply(adu({2, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_string_equal(bench().log.c_str(), "pre write flush post idle read ");
+}
+
+static void zero_and_nullptr_take_callbacks_away(void **)
+{
+    ModbusMaster node;
+    logs_callbacks(node);
+    node.preTransmission(0);
+    node.postTransmission(nullptr);
+    node.idle(0);
+    Serial.character = 0;
+    node.begin(1, Serial);
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_string_equal(bench().log.c_str(), "write flush read ");
+}
+
+static void a_long_idle_does_not_lose_the_reply(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.idle([] { bench().now += 1900000; });
+    Serial.delay = 1500000;
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+}
+
+static void an_idle_callback_may_use_another_object(void **)
+{
+    static ModbusMaster other;
+    ModbusMaster node;
+    other.begin(2, Serial1);
+    node.begin(1, Serial);
+    Serial1.reply(adu({2, 3, 2, 0, 22}));
+    Serial.reply(adu({1, 3, 2, 0, 11}));
+    Serial.delay = 100000;
+    node.idle([] {
+        if (Serial1.sent.empty())
+            assert_int_equal(other.readHoldingRegisters(0, 1), 0);
+    });
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_int_equal(node.getResponseBuffer(0), 11);
+    assert_int_equal(other.getResponseBuffer(0), 22);
+}
+
+static void an_idle_callback_is_refused_on_its_own_object_and_goes_on(void **)
+{
+    static ModbusMaster *self;
+    static unsigned calls;
+    ModbusMaster node;
+    self = &node;
+    calls = 0;
+    node.begin(1, Serial);
+    node.idle([] {
+        calls++;
+        assert_int_equal(self->readCoils(0, 1), ModbusMaster::ku8MBBusy);
+    });
+    Serial.reply(adu({1, 3, 2, 0, 11}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_int_equal(Serial.sent.size(), 1);
+    assert_true(calls > 10);
+}
+
+static void copies_have_buffers_and_callbacks_of_their_own(void **)
+{
+    static int called;
+    called = 0;
+    std::unique_ptr<ModbusMaster> original(new ModbusMaster(5));
+    original->begin(5, Serial);
+    original->setResponseTimeout(40);
+    original->preTransmission([](void *context) { ++*static_cast<int *>(context); }, &called);
+    original->setTransmitBuffer(0, 0x0102);
+    Serial.reply(adu({5, 3, 2, 0, 7}));
+    assert_int_equal(original->readHoldingRegisters(0, 1), 0);
+
+    ModbusMaster copy(*original), assigned;
+    assigned = copy;
+    original.reset();
+    copy.setTransmitBuffer(0, 0x0304);
+    assert_int_equal(copy.getResponseBuffer(0), 7);
+    assert_int_equal(assigned.available(), 1);
+    Serial.sent.clear();
+    Serial.reply(adu({5, 16, 0, 0, 0, 1}));
+    assert_int_equal(assigned.writeMultipleRegisters(0, 1), 0);
+    assert_sent(Serial, {5, 16, 0, 0, 0, 1, 2, 1, 2});
+    Serial.reply(adu({5, 16, 0, 0, 0, 1}));
+    assert_int_equal(copy.writeMultipleRegisters(0, 1), 0);
+    assert_sent(Serial, {5, 16, 0, 0, 0, 1, 2, 3, 4});
+    assert_int_equal(called, 3);
+    assert_int_equal(copy.readCoils(0, 1), ModbusMaster::ku8MBResponseTimedOut);
+    assert_in_range(bench().now - Serial.sentAt, 40000, 40200);
+}
+
+static void a_copy_leaves_a_request_under_way_to_the_original(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setBlocking(false);
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);
+    while (Serial.sent.empty())
+        assert_int_equal(node.poll(), ModbusMaster::ku8MBPending);
+    ModbusMaster copy(node);
+    assert_int_equal(copy.status(), ModbusMaster::ku8MBCancelled);
+    while (node.poll() == ModbusMaster::ku8MBPending) {}
+    assert_int_equal(node.status(), 0);
+    assert_int_equal(node.getResponseBuffer(0), 7);
+    assert_int_equal(copy.getResponseBuffer(0), 0);
+}
+
+static void an_assignment_gives_up_the_request_under_way(void **)
+{
+    ModbusMaster node, other;
+    node.begin(1, Serial);
+    node.setBlocking(false);
+    node.setPostFlushHold(10);
+    logs_callbacks(node);
+    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);
+    while (Serial.sent.empty())
+        assert_int_equal(node.poll(), ModbusMaster::ku8MBPending);
+    assert_string_equal(bench().log.c_str(), "pre write flush ");
+    node = other;
+    assert_string_equal(bench().log.c_str(), "pre write flush post ");
+}
+
+static void an_assignment_to_itself_changes_nothing(void **)
+{
+    ModbusMaster node, &alias = node;
+    node.begin(1, Serial);
+    node.beginTransmission(2);
+    node.send(3);
+    node = alias;
+    Serial.reply(adu({1, 16, 0, 2, 0, 1}));
+    assert_int_equal(node.writeMultipleRegisters(), 0);
+    assert_sent(Serial, {1, 16, 0, 2, 0, 1, 2, 0, 3});
+}
+
+static void objects_live_in_containers_that_move_them(void **)
+{
+    std::vector<ModbusMaster> nodes;
+    for (uint8_t slave = 1; slave < 6; slave++) {
+        nodes.push_back(ModbusMaster());
+        nodes.back().begin(slave, Serial);
+    }
+    for (int slave = 1; slave < 6; slave++) {
+        Serial.reply(adu({slave, 4, 2, 0, slave * 3}));
+        ModbusMaster &node = nodes[static_cast<size_t>(slave) - 1];
+        assert_int_equal(node.readInputRegisters(0, 1), 0);
+        assert_int_equal(node.getResponseBuffer(0), slave * 3);
+    }
+}
+
+int main()
+{
+    const struct CMUnitTest tests[] = {
+        TEST(a_transaction_drops_then_sends_then_waits),
+        TEST(a_write_taken_in_pieces_stays_between_the_callbacks),
+        TEST(idle_is_called_only_while_a_reply_is_waited_for),
+        TEST(the_driver_is_off_again_after_a_failure),
+        TEST(the_response_timeout_is_two_seconds),
+        TEST(exception_codes_are_handed_on_raw),
+        TEST(each_failure_has_its_status),
+        TEST(old_words_survive_a_failure_and_words_to_send_a_transaction),
+        TEST(any_transaction_empties_the_queue),
+        TEST(any_transaction_takes_receive_back_to_the_first_word),
+        TEST(the_write_address_is_shared),
+        TEST(reads_of_65_to_125_registers_are_the_devices_to_judge),
+        TEST(units_above_247_are_accepted),
+        TEST(callbacks_survive_begin),
+        TEST(zero_and_nullptr_take_callbacks_away),
+        TEST(a_long_idle_does_not_lose_the_reply),
+        TEST(an_idle_callback_may_use_another_object),
+        TEST(an_idle_callback_is_refused_on_its_own_object_and_goes_on),
+        TEST(copies_have_buffers_and_callbacks_of_their_own),
+        TEST(a_copy_leaves_a_request_under_way_to_the_original),
+        TEST(an_assignment_gives_up_the_request_under_way),
+        TEST(an_assignment_to_itself_changes_nothing),
+        TEST(objects_live_in_containers_that_move_them),
+    };
+
+    return cmocka_run_group_tests_name("class keeps", tests, nullptr, nullptr);
+}

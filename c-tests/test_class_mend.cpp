@@ -1,0 +1,396 @@
+/* What goes wrong with ModbusMaster 2.0.1 and must not here. */
+#include "wire.h"
+
+#if defined(_UTIL_CRC16_H_)
+#error "the guard of avr-libc's <util/crc16.h> is taken"
+#endif
+
+static const uint32_t untold_gap = 4000;
+
+static void available_counts_every_word(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_int_equal(node.available(), 1);
+    assert_int_equal(node.receive(), 7);
+    assert_int_equal(node.available(), 0);
+}
+
+static void the_largest_reads_are_complete(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    Bytes registers = raw({1, 3, 250}), coils = raw({1, 1, 250});
+    for (int i = 0; i < 250; i++) {
+        registers.push_back(static_cast<uint8_t>(i));
+        coils.push_back(static_cast<uint8_t>(255 - i));
+    }
+    Serial.reply(sealed(registers));
+    assert_int_equal(node.readHoldingRegisters(0, 125), 0);
+    assert_int_equal(node.available(), 125);
+    for (int i = 0; i < 125; i++)
+        assert_int_equal(node.getResponseBuffer(static_cast<uint8_t>(i)),
+                         (2 * i) << 8 | (2 * i + 1));
+    Serial.reply(sealed(coils));
+    assert_int_equal(node.readCoils(0, 2000), 0);
+    for (int i = 0; i < 125; i++)
+        assert_int_equal(node.getResponseBuffer(static_cast<uint8_t>(i)),
+                         (254 - 2 * i) << 8 | (255 - 2 * i));
+}
+
+static void writes_of_more_than_the_buffer_send_nothing(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    for (int quantity : {124, 256, 257, 65535}) {
+        uint16_t words = static_cast<uint16_t>(quantity);
+        assert_int_equal(node.writeMultipleRegisters(0, words), 3);
+        assert_int_equal(node.readWriteMultipleRegisters(0, 1, 0, words), 3);
+    }
+    for (int quantity : {1969, 4096, 4097, 65535})
+        assert_int_equal(node.writeMultipleCoils(0, static_cast<uint16_t>(quantity)), 3);
+    assert_int_equal(Serial.sent.size(), 0);
+}
+
+static void a_byte_count_of_251_to_255_is_malformed(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setResponseTimeout(50);
+    for (int count = 251; count <= 255; count++) {
+        Serial.reply(adu({1, 3, count, 0, 7}));
+        assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBMalformedReply);
+        assert_int_equal(node.getResponseBuffer(0), 0);
+    }
+}
+
+static void fewer_words_than_asked_for_are_malformed(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setResponseTimeout(50);
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 4), ModbusMaster::ku8MBMalformedReply);
+    assert_int_equal(node.getResponseBuffer(0), 0);
+    assert_int_equal(node.available(), 0);
+}
+
+static void an_echo_with_other_values_is_malformed(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setResponseTimeout(50);
+    Serial.reply(adu({1, 6, 0, 2, 0, 7}));
+    assert_int_equal(node.writeSingleRegister(1, 7), ModbusMaster::ku8MBMalformedReply);
+    Serial.reply(adu({1, 6, 0, 1, 0, 8}));
+    assert_int_equal(node.writeSingleRegister(1, 7), ModbusMaster::ku8MBMalformedReply);
+    Serial.reply(adu({1, 5, 0, 1, 0, 0}));
+    assert_int_equal(node.writeSingleCoil(1, 1), ModbusMaster::ku8MBMalformedReply);
+    Serial.reply(adu({1, 16, 0, 1, 0, 1}));
+    assert_int_equal(node.writeMultipleRegisters(1, 2), ModbusMaster::ku8MBMalformedReply);
+    Serial.reply(adu({1, 15, 0, 2, 0, 2}));
+    assert_int_equal(node.writeMultipleCoils(1, 2), ModbusMaster::ku8MBMalformedReply);
+    Serial.reply(adu({1, 0x16, 0, 1, 0, 2, 0, 4}));
+    assert_int_equal(node.maskWriteRegister(1, 2, 3), ModbusMaster::ku8MBMalformedReply);
+}
+
+static void exceptions_are_checked(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setResponseTimeout(50);
+    Serial.reply(raw({1, 0x83, 2, 0, 0}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBInvalidCRC);
+    for (int code : {0, 0x80, 0xE2, 0xFF}) {
+        Serial.reply(adu({1, 0x83, code}));
+        assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBMalformedReply);
+        assert_int_equal(node.getExceptionCode(), code);
+    }
+}
+
+static void noise_and_foreign_frames_before_the_reply_are_passed_over(void **)
+{
+    const Bytes strays[] = {raw({0}), raw({0xFF}), raw({1}), raw({1, 3}), adu({9, 3, 2, 1, 1}),
+                            adu({1, 4, 2, 1, 1}), raw({1, 0x83, 2, 9, 9})};
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setResponseTimeout(100);
+    for (const Bytes &stray : strays) {
+        Serial.reply(joined(stray, adu({1, 3, 2, 0, 7})));
+        node.clearResponseBuffer();
+        assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+        assert_int_equal(node.getResponseBuffer(0), 7);
+        Serial.reply(adu({1, 3, 2, 0, 8}));
+        assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+        assert_int_equal(node.getResponseBuffer(0), 8);
+    }
+}
+
+class Babbler : public Stream {
+public:
+    int available() override { return 1; }
+    int read() override { return 0x55; }
+    int peek() override { return 0x55; }
+    size_t write(uint8_t) override { return 1; }
+};
+
+static void a_line_that_never_falls_silent_is_given_up(void **)
+{
+    Babbler babbler;
+    ModbusMaster node;
+    node.begin(1, babbler);
+    node.setResponseTimeout(100);
+    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBLineBusy);
+    assert_in_range(bench().now, 100000, 101000);
+}
+
+static void a_port_that_takes_no_bytes_is_given_up(void **)
+{
+    ModbusMaster node;
+    Serial.room = 0;
+    node.begin(1, Serial);
+    node.setResponseTimeout(100);
+    node.postTransmission([] { bench().note("post"); });
+    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBLineBusy);
+    assert_string_equal(bench().log.c_str(), "post ");
+}
+
+/* The silence before the request that `read` makes after a successful one. */
+static uint32_t silence_before(ModbusMaster &first, ModbusMaster &second)
+{
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(first.readHoldingRegisters(0, 1), 0);
+    uint32_t end = bench().now;
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(second.readHoldingRegisters(0, 1), 0);
+    return Serial.startedAt - end;
+}
+
+static void a_silence_is_kept_before_each_request(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    assert_in_range(silence_before(node, node), untold_gap - 100, untold_gap + 100);
+    node.setBaudRate(115200);
+    assert_in_range(silence_before(node, node), 1650, 1850);
+    node.setGap(9000);
+    assert_in_range(silence_before(node, node), 8900, 9100);
+    node.begin(9600);
+    assert_in_range(silence_before(node, node), 3911, 4111);
+}
+
+static void the_silence_counts_from_another_objects_last_use(void **)
+{
+    ModbusMaster first, second;
+    first.begin(1, Serial);
+    second.begin(1, Serial);
+    bench().now += 1000000;
+    for (int again = 0; again < 3; again++) {
+        assert_in_range(silence_before(first, second), untold_gap, untold_gap + 100);
+        assert_in_range(silence_before(second, first), untold_gap, untold_gap + 100);
+    }
+}
+
+static void a_silent_line_is_not_waited_for_again(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    bench().now += 1000000;
+    uint32_t asked = bench().now;
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_in_range(Serial.startedAt - asked, 0, 200);
+}
+
+static void the_response_timeout_can_be_set(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    for (int ms : {1, 200, 5000}) {
+        node.setResponseTimeout(static_cast<uint16_t>(ms));
+        node.setQuietTime(0);
+        node.setGap(0);
+        assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBResponseTimedOut);
+        assert_in_range(bench().now - Serial.sentAt, ms * 1000, ms * 1000 + 200);
+    }
+}
+
+static void the_slave_can_be_changed(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setSlaveID(9);
+    assert_int_equal(node.getSlaveID(), 9);
+    Serial.reply(adu({9, 6, 0, 1, 0, 2}));
+    assert_int_equal(node.writeSingleRegister(1, 2), 0);
+    assert_sent(Serial, {9, 6, 0, 1, 0, 2});
+}
+
+static void a_broadcast_succeeds_after_the_turnaround_delay(void **)
+{
+    ModbusMaster node;
+    node.begin(0, Serial);
+    node.setTurnaroundDelay(70);
+    assert_int_equal(node.writeSingleRegister(1, 2), 0);
+    assert_sent(Serial, {0, 6, 0, 1, 0, 2});
+    assert_in_range(bench().now - Serial.sentAt, 70000, 70200);
+    assert_int_equal(node.readCoils(0, 1), ModbusMaster::ku8MBBroadcastNotAllowed);
+    assert_int_equal(Serial.sent.size(), 0);
+}
+
+static void a_reply_complete_as_the_deadline_passes_succeeds(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.idle([] { bench().now += 3000000; });
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_int_equal(node.getResponseBuffer(0), 7);
+}
+
+static void coils_are_padded_with_zeros(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    Serial.reply(adu({1, 1, 1, 0xFF}));
+    assert_int_equal(node.readCoils(0, 3), 0);
+    assert_int_equal(node.getResponseBuffer(0), 0x0007);
+    Serial.sent.clear();
+    node.setTransmitBuffer(0, 0xFFFF);
+    Serial.reply(adu({1, 15, 0, 0, 0, 3}));
+    assert_int_equal(node.writeMultipleCoils(0, 3), 0);
+    assert_sent(Serial, {1, 15, 0, 0, 0, 3, 1, 0x07});
+}
+
+static void a_word_after_bits_starts_a_new_word(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.beginTransmission(0);
+    node.sendBit(true);
+    node.send(0x0203);
+    Serial.reply(adu({1, 16, 0, 0, 0, 2}));
+    assert_int_equal(node.writeMultipleRegisters(), 0);
+    assert_sent(Serial, {1, 16, 0, 0, 0, 2, 4, 0, 1, 2, 3});
+}
+
+static void callbacks_may_have_a_context(void **)
+{
+    char log[] = "...";
+    ModbusMaster node;
+    node.preTransmission([](void *at) { *static_cast<char *>(at) = 'p'; }, log);
+    node.postTransmission([](void *at) { *static_cast<char *>(at) = 'q'; }, log + 1);
+    node.idle([](void *at) { *static_cast<char *>(at) = 'i'; }, log + 2);
+    node.begin(1, Serial);
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_string_equal(log, "pqi");
+}
+
+static void the_driver_can_be_held_on_after_the_flush(void **)
+{
+    static uint32_t released;
+    ModbusMaster node;
+    node.begin(9600);
+    node.setPostFlushHold(2);
+    node.postTransmission([] { released = bench().now; });
+    Serial.delay = 10000;
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_in_range(released - Serial.sentAt, 2 * 1146, 2 * 1146 + 100);
+}
+
+static void an_echo_is_dropped_when_told(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setResponseTimeout(50);
+    node.setEchoDiscard(true);
+    Serial.reply(adu({1, 6, 0, 1, 0, 2}));
+    assert_int_equal(node.writeSingleRegister(1, 2), ModbusMaster::ku8MBResponseTimedOut);
+    Serial.reply(joined(adu({1, 6, 0, 1, 0, 2}), adu({1, 6, 0, 1, 0, 2})));
+    assert_int_equal(node.writeSingleRegister(1, 2), 0);
+    Serial.reply(joined(adu({1, 3, 0, 0, 0, 1}), adu({1, 3, 2, 0, 7})));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+}
+
+static void the_wait_yields(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setResponseTimeout(100);
+    unsigned before = bench().yields;
+    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBResponseTimedOut);
+    assert_true(bench().yields - before > 4000);
+}
+
+static void a_request_without_a_reply_is_repeated_when_told(void **)
+{
+    mbm_counters counters = {};
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setRetries(2);
+    node.setCounters(&counters);
+    node.setResponseTimeout(50);
+    Serial.reply(raw({}));
+    Serial.reply(raw({1, 3, 2, 0, 7, 0, 0}));
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_int_equal(Serial.sent.size(), 3);
+    assert_int_equal(counters.requests, 3);
+    assert_int_equal(counters.timeouts, 1);
+    assert_int_equal(counters.badCrc, 1);
+}
+
+static void a_request_may_be_polled_or_cancelled(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setBlocking(false);
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);
+    assert_int_equal(node.status(), ModbusMaster::ku8MBPending);
+    while (node.poll() == ModbusMaster::ku8MBPending) {}
+    assert_int_equal(node.status(), 0);
+    assert_int_equal(node.receive(), 7);
+    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);
+    node.cancel();
+    assert_int_equal(node.poll(), ModbusMaster::ku8MBCancelled);
+}
+
+int main()
+{
+    const struct CMUnitTest tests[] = {
+        TEST(available_counts_every_word),
+        TEST(the_largest_reads_are_complete),
+        TEST(writes_of_more_than_the_buffer_send_nothing),
+        TEST(a_byte_count_of_251_to_255_is_malformed),
+        TEST(fewer_words_than_asked_for_are_malformed),
+        TEST(an_echo_with_other_values_is_malformed),
+        TEST(exceptions_are_checked),
+        TEST(noise_and_foreign_frames_before_the_reply_are_passed_over),
+        TEST(a_line_that_never_falls_silent_is_given_up),
+        TEST(a_port_that_takes_no_bytes_is_given_up),
+        TEST(a_silence_is_kept_before_each_request),
+        TEST(the_silence_counts_from_another_objects_last_use),
+        TEST(a_silent_line_is_not_waited_for_again),
+        TEST(the_response_timeout_can_be_set),
+        TEST(the_slave_can_be_changed),
+        TEST(a_broadcast_succeeds_after_the_turnaround_delay),
+        TEST(a_reply_complete_as_the_deadline_passes_succeeds),
+        TEST(coils_are_padded_with_zeros),
+        TEST(a_word_after_bits_starts_a_new_word),
+        TEST(callbacks_may_have_a_context),
+        TEST(the_driver_can_be_held_on_after_the_flush),
+        TEST(an_echo_is_dropped_when_told),
+        TEST(the_wait_yields),
+        TEST(a_request_without_a_reply_is_repeated_when_told),
+        TEST(a_request_may_be_polled_or_cancelled),
+    };
+
+    return cmocka_run_group_tests_name("class mends", tests, nullptr, nullptr);
+}

@@ -1,0 +1,126 @@
+/* The class against a real libmodbus server, at the far end of a pty. */
+#include "wire.h"
+
+extern "C" {
+#include "server.h"
+}
+
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+class PtyStream : public Stream {
+public:
+    int fd = -1;
+
+    int available() override
+    {
+        int waiting = 0;
+        return ioctl(fd, FIONREAD, &waiting) == 0 ? waiting : 0;
+    }
+    int read() override
+    {
+        uint8_t value;
+        return available() > 0 && ::read(fd, &value, 1) == 1 ? value : -1;
+    }
+    int peek() override { return -1; }
+    size_t write(uint8_t value) override { return ::write(fd, &value, 1) == 1; }
+};
+
+static server peer;
+static PtyStream line;
+static ModbusMaster node;
+
+static int start(void **)
+{
+    bench().realTime = true;
+    server_start(&peer, 17);
+    line.fd = peer.line.ours;
+    node = ModbusMaster();
+    node.begin(17, line);
+    node.setBaudRate(115200);
+    node.idle([] {
+        struct pollfd ready = {line.fd, POLLIN, 0};
+        ::poll(&ready, 1, 1);
+    });
+    return 0;
+}
+
+static int stop(void **)
+{
+    server_stop(&peer);
+    return 0;
+}
+
+static void reads_what_the_server_holds(void **)
+{
+    assert_int_equal(node.readHoldingRegisters(3, 125), 0);
+    for (unsigned i = 0; i < 125; i++)
+        assert_int_equal(node.getResponseBuffer(static_cast<uint8_t>(i)), server_pattern(3 + i));
+    assert_int_equal(node.readInputRegisters(9, 1), 0);
+    assert_int_equal(node.getResponseBuffer(0), static_cast<uint16_t>(~server_pattern(9)));
+    assert_int_equal(node.readCoils(5, 2000), 0);
+    for (unsigned i = 0; i < 2000; i++)
+        assert_int_equal(node.getResponseBuffer(static_cast<uint8_t>(i / 16)) >> i % 16 & 1,
+                         server_bit_pattern(5 + i));
+    assert_int_equal(node.readDiscreteInputs(7, 3), 0);
+    assert_int_equal(node.getResponseBuffer(0) & 1, !server_bit_pattern(7));
+}
+
+static void writes_reach_the_servers_memory(void **)
+{
+    assert_int_equal(node.writeSingleRegister(40, 0xBEEF), 0);
+    assert_int_equal(peer.mapping->tab_registers[40], 0xBEEF);
+    assert_int_equal(node.writeSingleCoil(30, 1), 0);
+    assert_int_equal(peer.mapping->tab_bits[30], 1);
+    node.beginTransmission(50);
+    node.send(uint32_t(0x11223344));
+    node.send(5);
+    assert_int_equal(node.writeMultipleRegisters(), 0);
+    assert_int_equal(peer.mapping->tab_registers[50], 0x3344);
+    assert_int_equal(peer.mapping->tab_registers[51], 0x1122);
+    assert_int_equal(peer.mapping->tab_registers[52], 5);
+    assert_int_equal(node.maskWriteRegister(50, 0xFF00, 0x0055), 0);
+    assert_int_equal(peer.mapping->tab_registers[50], 0x3355);
+    node.beginTransmission(60);
+    node.sendBit(true);
+    node.sendBit(false);
+    node.sendBit(true);
+    assert_int_equal(node.writeMultipleCoils(), 0);
+    assert_int_equal(peer.mapping->tab_bits[60], 1);
+    assert_int_equal(peer.mapping->tab_bits[61], 0);
+    assert_int_equal(peer.mapping->tab_bits[62], 1);
+    node.setTransmitBuffer(0, 0x7777);
+    assert_int_equal(node.readWriteMultipleRegisters(70, 1, 70, 1), 0);
+    assert_int_equal(node.getResponseBuffer(0), 0x7777);
+}
+
+static void an_exception_of_the_server_is_handed_on(void **)
+{
+    assert_int_equal(node.readHoldingRegisters(SERVER_REGISTERS, 1),
+                     ModbusMaster::ku8MBIllegalDataAddress);
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+}
+
+static void copies_take_turns_on_one_line(void **)
+{
+    ModbusMaster nodes[] = {node, node, node};
+    for (unsigned i = 0; i < 9; i++) {
+        assert_int_equal(nodes[i % 3].readHoldingRegisters(static_cast<uint16_t>(i), 1), 0);
+        assert_int_equal(nodes[i % 3].getResponseBuffer(0), server_pattern(i));
+    }
+}
+
+#define SERVED(test) cmocka_unit_test_setup_teardown(test, start, stop)
+
+int main()
+{
+    const struct CMUnitTest tests[] = {
+        SERVED(reads_what_the_server_holds),
+        SERVED(writes_reach_the_servers_memory),
+        SERVED(an_exception_of_the_server_is_handed_on),
+        SERVED(copies_take_turns_on_one_line),
+    };
+
+    return cmocka_run_group_tests_name("class against libmodbus", tests, nullptr, nullptr);
+}

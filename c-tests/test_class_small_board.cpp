@@ -1,0 +1,111 @@
+/* A board with one UART and little RAM: buffers as on AVR, the frame shared. */
+#define SHIM_UARTS 1
+#define MODBUSMASTER_RESPONSE_WORDS 64
+#define MODBUSMASTER_TRANSMIT_WORDS 64
+#define MODBUSMASTER_SHARE_FRAME
+#include "wire.h"
+
+static void a_uart_that_the_board_lacks_falls_back_to_the_first(void **)
+{
+    for (uint8_t port = 0; port < 5; port++) {
+        reset_board(nullptr);
+        ModbusMaster node(port, 3);
+        node.begin(57600);
+        assert_int_equal(Serial.baud, 57600);
+        Serial.reply(adu({3, 6, 0, 1, 0, 2}));
+        assert_int_equal(node.writeSingleRegister(1, 2), 0);
+        assert_sent(Serial, {3, 6, 0, 1, 0, 2});
+    }
+}
+
+static void objects_are_small(void **)
+{
+    assert_in_range(sizeof(ModbusMaster), 2 * 128, 2 * 128 + sizeof(mbm_master) + 80);
+}
+
+static void objects_may_share_the_frame_buffer(void **)
+{
+    ModbusMaster first, second;
+    first.begin(1, Serial);
+    second.begin(2, Serial);
+    for (int i = 0; i < 3; i++) {
+        Serial.reply(adu({1, 3, 4, 0, 7, 0, i}));
+        assert_int_equal(first.readHoldingRegisters(0, 2), 0);
+        Serial.reply(adu({2, 3, 2, 0x55, 0x55}));
+        assert_int_equal(second.readHoldingRegisters(0, 1), 0);
+        assert_int_equal(first.getResponseBuffer(0), 7);
+        assert_int_equal(first.getResponseBuffer(1), i);
+        assert_int_equal(second.getResponseBuffer(0), 0x5555);
+    }
+}
+
+static void the_buffer_ends_after_64_words(void **)
+{
+    ModbusMaster node;
+    assert_int_equal(node.getResponseBuffer(63), 0);
+    assert_int_equal(node.getResponseBuffer(64), 0xFFFF);
+    assert_int_equal(node.setTransmitBuffer(63, 0), 0);
+    assert_int_equal(node.setTransmitBuffer(64, 0), 2);
+}
+
+static void transfers_of_64_registers_fit(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    Bytes reply = raw({1, 3, 128});
+    for (int i = 0; i < 128; i++)
+        reply.push_back(static_cast<uint8_t>(i));
+    Serial.reply(sealed(reply));
+    assert_int_equal(node.readHoldingRegisters(0, 64), 0);
+    assert_int_equal(node.getResponseBuffer(63), 126 << 8 | 127);
+    Serial.reply(adu({1, 16, 0, 0, 0, 64}));
+    assert_int_equal(node.writeMultipleRegisters(0, 64), 0);
+    reply[1] = 0x17;
+    Serial.reply(sealed(reply));
+    assert_int_equal(node.readWriteMultipleRegisters(0, 64, 0, 64), 0);
+}
+
+static void reads_of_65_registers_are_the_devices_to_judge(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setResponseTimeout(300);
+    for (int quantity : {65, 66, 125}) {
+        Serial.reply(adu({1, 0x83, 2}));
+        assert_int_equal(node.readHoldingRegisters(0, static_cast<uint16_t>(quantity)), 2);
+        assert_sent(Serial, {1, 3, 0, 0, 0, quantity});
+
+        Bytes reply = raw({1, 3, quantity * 2});
+        reply.resize(3 + static_cast<size_t>(quantity) * 2, 0xEE);
+        Serial.reply(sealed(reply));
+        assert_int_equal(node.readHoldingRegisters(0, static_cast<uint16_t>(quantity)),
+                         ModbusMaster::ku8MBBufferTooSmall);
+        assert_int_equal(node.getResponseBuffer(0), 0);
+        Serial.sent.clear();
+    }
+}
+
+static void writes_of_more_than_the_buffer_send_nothing(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    assert_int_equal(node.writeMultipleRegisters(0, 65), 3);
+    assert_int_equal(node.writeMultipleCoils(0, 64 * 16 + 1), 3);
+    assert_int_equal(node.readWriteMultipleRegisters(0, 1, 0, 65), 3);
+    assert_int_equal(Serial.sent.size(), 0);
+}
+
+int main()
+{
+    const struct CMUnitTest tests[] = {
+        TEST(a_uart_that_the_board_lacks_falls_back_to_the_first),
+        TEST(objects_are_small),
+        TEST(objects_may_share_the_frame_buffer),
+        TEST(the_buffer_ends_after_64_words),
+        TEST(transfers_of_64_registers_fit),
+        TEST(reads_of_65_registers_are_the_devices_to_judge),
+        TEST(writes_of_more_than_the_buffer_send_nothing),
+    };
+
+    return cmocka_run_group_tests_name("class on a small board", tests, nullptr, nullptr);
+}

@@ -1,0 +1,486 @@
+/**
+ * @file ModbusMaster.h
+ * @brief A Modbus RTU master for Arduino sketches, over mbm.h.
+ *
+ * Licence: MIT OR Apache-2.0. Header-only, C++11, no heap.
+ *
+ * Sketches written for the ModbusMaster library, 0.9 to 2.0.1, compile and run
+ * unchanged. Addresses are those on the wire, from 0. What differs for the
+ * better: a reply is found behind noise and foreign frames, checked against
+ * its request, and a silence of t3.5 is kept before each request.
+ *
+ * Macros that may be defined before this file is included, alike in every
+ * file of a program:
+ * - MODBUSMASTER_RESPONSE_WORDS  words that a read fills, 1 to 125; 64 on AVR,
+ *   else 125. A longer reply is answered with ku8MBBufferTooSmall.
+ * - MODBUSMASTER_TRANSMIT_WORDS  words that a write sends, 2 to 123; 64 on AVR,
+ *   else 123. A longer write is answered with ku8MBIllegalDataValue.
+ * - MODBUSMASTER_SHARE_FRAME  one frame buffer for all objects, which saves RAM
+ *   where no two of them ever have a request under way at the same time.
+ * - MODBUSMASTER_SERIAL0 to MODBUSMASTER_SERIAL3  what begin(baud) opens, where
+ *   the core does not say which UARTs the board has.
+ * - MODBUSMASTER_YIELD()  what a wait runs; yield() where the core has it.
+ */
+
+#ifndef MODBUSMASTER_H
+#define MODBUSMASTER_H
+
+#include <Arduino.h>
+#include <stdint.h>
+
+#include "ModbusMasterConstants.h"
+#include "mbm.h"
+
+#if !defined(MODBUSMASTER_RESPONSE_WORDS)
+#if defined(__AVR__)
+#define MODBUSMASTER_RESPONSE_WORDS 64
+#else
+#define MODBUSMASTER_RESPONSE_WORDS 125
+#endif
+#endif
+
+#if !defined(MODBUSMASTER_TRANSMIT_WORDS)
+#if defined(__AVR__)
+#define MODBUSMASTER_TRANSMIT_WORDS 64
+#else
+#define MODBUSMASTER_TRANSMIT_WORDS 123
+#endif
+#endif
+
+// Cores with NO_GLOBAL_* leave it to the sketch to make the ports.
+#if !defined(MODBUSMASTER_SERIAL0) && !defined(NO_GLOBAL_INSTANCES) && !defined(NO_GLOBAL_SERIAL)
+#define MODBUSMASTER_SERIAL0 Serial
+#endif
+#if !defined(MODBUSMASTER_SERIAL1) && (defined(HAVE_HWSERIAL1) || defined(UBRR1H))
+#define MODBUSMASTER_SERIAL1 Serial1
+#endif
+#if !defined(MODBUSMASTER_SERIAL2) && (defined(HAVE_HWSERIAL2) || defined(UBRR2H))
+#define MODBUSMASTER_SERIAL2 Serial2
+#endif
+#if !defined(MODBUSMASTER_SERIAL3) && (defined(HAVE_HWSERIAL3) || defined(UBRR3H))
+#define MODBUSMASTER_SERIAL3 Serial3
+#endif
+
+#if !defined(MODBUSMASTER_YIELD)
+#if defined(ESP8266) || defined(ESP32) || (defined(ARDUINO) && ARDUINO >= 10600)
+#define MODBUSMASTER_YIELD() yield()
+#else
+#define MODBUSMASTER_YIELD() static_cast<void>(0)
+#endif
+#endif
+
+/**
+ * A Modbus RTU master: one line, one request at a time.
+ *
+ * Any number of objects may share a Stream, one request after the other. Use
+ * an object from one thread, never from an interrupt. Idle callbacks may call
+ * other objects; on their own object requests are answered with ku8MBBusy.
+ */
+class ModbusMaster : public ModbusMasterStatics<void> {
+public:
+    /** Slave 1; begin(baud) opens Serial. Touches neither clock nor port. */
+    ModbusMaster() : state() { lendBuffers(); }
+
+    /** As ModbusMaster(), for `slave` (1 to 247; 0 is broadcast). */
+    ModbusMaster(uint8_t slave) : ModbusMaster() { setSlaveID(slave); }
+
+    /**
+     * As ModbusMaster(slave), with begin(baud) opening Serial1 to Serial3 for
+     * `port` 1 to 3; Serial for others, and for a UART that the board lacks.
+     */
+    ModbusMaster(uint8_t port, uint8_t slave) : ModbusMaster(slave) { state.port = port; }
+
+    /**
+     * A copy has buffers of its own, with the same words, settings, callbacks
+     * and Stream. Its queue of send is empty, and a request under way stays
+     * with the original; copy between requests, for the driver's sake.
+     */
+    ModbusMaster(const ModbusMaster &other) : state(other.state) { settle(); }
+
+    /** As the copy; a request of this object that is under way is given up. */
+    ModbusMaster &operator=(const ModbusMaster &other)
+    {
+        if (this != &other) {
+            cancel();
+            state = other.state;
+            settle();
+        }
+        return *this;
+    }
+
+    /**
+     * Talks to a slave over a Stream that is open already. Cheap, and may be
+     * called again and again. Callbacks, settings and words stay; what send
+     * queued is dropped, a request under way is given up.
+     *
+     * @param slave   1 to 247; 248 to 255 are sent as they are, 0 is broadcast
+     * @param stream  must outlive its use here
+     */
+    void begin(uint8_t slave, Stream &stream)
+    {
+        state.stream = &stream;
+        attach(slave);
+    }
+
+#if defined(MODBUSMASTER_SERIAL0)
+    /**
+     * Opens the port of the constructor (8N1) and talks to its slave over it.
+     * The response timeout is 2000 ms here too; version 0.9 gave up after 200,
+     * for which call setResponseTimeout(200).
+     *
+     * @param baud  bits per second
+     */
+    void begin(uint32_t baud = 19200)
+    {
+        setBaudRate(baud);
+        switch (state.port) {
+#if defined(MODBUSMASTER_SERIAL1)
+        case 1: openPort(MODBUSMASTER_SERIAL1, baud); break;
+#endif
+#if defined(MODBUSMASTER_SERIAL2)
+        case 2: openPort(MODBUSMASTER_SERIAL2, baud); break;
+#endif
+#if defined(MODBUSMASTER_SERIAL3)
+        case 3: openPort(MODBUSMASTER_SERIAL3, baud); break;
+#endif
+        default: openPort(MODBUSMASTER_SERIAL0, baud); break;
+        }
+    }
+#endif
+
+    /** Called again and again while a reply is waited for; nullptr for none. */
+    void idle(void (*callback)()) { set(state.onIdle, callback); }
+    /** As idle(callback), which is handed `context`. */
+    void idle(void (*callback)(void *), void *context) { set(state.onIdle, callback, context); }
+
+    /** Called before a request is written (RS-485 driver on); nullptr for none. */
+    void preTransmission(void (*callback)()) { set(state.onPre, callback); }
+    /** As preTransmission(callback), which is handed `context`. */
+    void preTransmission(void (*callback)(void *), void *context)
+    {
+        set(state.onPre, callback, context);
+    }
+
+    /** Called once a request has left (RS-485 driver off); nullptr for none. */
+    void postTransmission(void (*callback)()) { set(state.onPost, callback); }
+    /** As postTransmission(callback), which is handed `context`. */
+    void postTransmission(void (*callback)(void *), void *context)
+    {
+        set(state.onPost, callback, context);
+    }
+
+    /** A word of the last successful read; 0xFFFF past the end of the buffer. */
+    uint16_t getResponseBuffer(uint8_t index) const
+    {
+        return mbm_master_getResponseBuffer(&state.master, index);
+    }
+    /** Zeroes the response words; receive goes on where it was. */
+    void clearResponseBuffer() { mbm_master_clearResponseBuffer(&state.master); }
+    /** Sets a word to write: ku8MBSuccess, or 0x02 past the end of the buffer. */
+    uint8_t setTransmitBuffer(uint8_t index, uint16_t value)
+    {
+        return mbm_master_setTransmitBuffer(&state.master, index, value);
+    }
+    /** Zeroes the words to write; the queue of send stays. */
+    void clearTransmitBuffer() { mbm_master_clearTransmitBuffer(&state.master); }
+
+    /** Sets the address of later writes without one; empties the queue of send. */
+    void beginTransmission(uint16_t address)
+    {
+        mbm_master_beginTransmission(&state.master, address);
+    }
+
+    /**
+     * Queues a value: types of up to 16 bits and int as one word, wider ones as
+     * two, the low word first. (int is one word everywhere, so that send(5) means
+     * the same on every board; of a wider int the low 16 bits are sent.)
+     *
+     * @return ku8MBSuccess, or ku8MBBufferTooSmall if a word did not fit
+     */
+    uint8_t send(int value) { return sendWord(static_cast<uint16_t>(value)); }
+    /** @copydoc send(int) */
+    uint8_t send(unsigned char value) { return sendWord(value); }
+    /** @copydoc send(int) */
+    uint8_t send(unsigned short value) { return sendWord(value); }
+    /** @copydoc send(int) */
+    uint8_t send(unsigned int value)
+    {
+        return sizeof value > 2 ? sendWords(value) : sendWord(static_cast<uint16_t>(value));
+    }
+    /** @copydoc send(int) */
+    uint8_t send(unsigned long value) { return sendWords(static_cast<uint32_t>(value)); }
+    /** @copydoc send(int) */
+    uint8_t send(long value) { return sendWords(static_cast<uint32_t>(value)); }
+
+    /** Queues a bit, lowest of a word first; returns as send does. */
+    uint8_t sendBit(bool on) { return mbm_master_sendBit(&state.master, on); }
+
+    /**
+     * Reads 1 to 125 holding registers for receive to give.
+     *
+     * @return how many words receive will give; 0 if the request failed (status
+     *         says how) or, non-blocking, is under way
+     */
+    uint8_t requestFrom(uint16_t address, uint16_t quantity)
+    {
+        return mbm_master_requestFrom(use(), address, quantity);
+    }
+    /** How many words of the last successful read receive has yet to give. */
+    uint8_t available() const { return mbm_master_available(&state.master); }
+    /** The next word of the last successful read; 0xFFFF when none is left. */
+    uint16_t receive() { return mbm_master_receive(&state.master); }
+
+    /**
+     * Function 01: reads 1 to 2000 coils, 16 to a response word, lowest bit first.
+     *
+     * This and the nine other functions wait for the reply, unless setBlocking
+     * said otherwise. All empty the queue of send; response words change only
+     * on success, and the words to write never.
+     *
+     * @return ku8MBSuccess, the device's exception code (0x01 to 0x7F), or why
+     *         there is no reply (0xE0 and up)
+     */
+    uint8_t readCoils(uint16_t address, uint16_t quantity)
+    {
+        return mbm_master_readCoils(use(), address, quantity);
+    }
+    /** Function 02: as readCoils, of 1 to 2000 discrete inputs. */
+    uint8_t readDiscreteInputs(uint16_t address, uint16_t quantity)
+    {
+        return mbm_master_readDiscreteInputs(use(), address, quantity);
+    }
+    /** Function 03: reads 1 to 125 holding registers; see readCoils. */
+    uint8_t readHoldingRegisters(uint16_t address, uint16_t quantity)
+    {
+        return mbm_master_readHoldingRegisters(use(), address, quantity);
+    }
+    /** Function 04: reads 1 to 125 input registers; see readCoils. */
+    uint8_t readInputRegisters(uint16_t address, uint16_t quantity)
+    {
+        return mbm_master_readInputRegisters(use(), address, quantity);
+    }
+    /** Function 05: switches a coil; any `on` but 0 is on. See readCoils. */
+    uint8_t writeSingleCoil(uint16_t address, uint8_t on)
+    {
+        return mbm_master_writeSingleCoil(use(), address, on);
+    }
+    /** Function 06: writes a register, by way of word 0. See readCoils. */
+    uint8_t writeSingleRegister(uint16_t address, uint16_t value)
+    {
+        return mbm_master_writeSingleRegister(use(), address, value);
+    }
+    /** Function 0F: writes coils from word 0 on, lowest bit first. See readCoils. */
+    uint8_t writeMultipleCoils(uint16_t address, uint16_t quantity)
+    {
+        return mbm_master_writeMultipleCoils(use(), address, quantity);
+    }
+    /** Function 0F: writes the queued bits to the last write address. */
+    uint8_t writeMultipleCoils() { return mbm_master_writeQueuedCoils(use()); }
+    /** Function 10: writes 1 to 123 registers from word 0 on. See readCoils. */
+    uint8_t writeMultipleRegisters(uint16_t address, uint16_t quantity)
+    {
+        return mbm_master_writeMultipleRegisters(use(), address, quantity);
+    }
+    /** Function 10: writes the queued complete words to the last write address. */
+    uint8_t writeMultipleRegisters() { return mbm_master_writeQueuedRegisters(use()); }
+    /** Function 16: (register & andMask) | (orMask & ~andMask), by way of words 0 and 1. */
+    uint8_t maskWriteRegister(uint16_t address, uint16_t andMask, uint16_t orMask)
+    {
+        return mbm_master_maskWriteRegister(use(), address, andMask, orMask);
+    }
+    /** Function 17: writes 1 to 121 registers from word 0 on, then reads 1 to 125. */
+    uint8_t readWriteMultipleRegisters(uint16_t readAddress, uint16_t readQuantity,
+                                       uint16_t writeAddress, uint16_t writeQuantity)
+    {
+        return mbm_master_readWriteMultipleRegisters(use(), readAddress, readQuantity,
+                                                     writeAddress, writeQuantity);
+    }
+    /** Function 17: writes the queued words to the last write address, then reads. */
+    uint8_t readWriteMultipleRegisters(uint16_t readAddress, uint16_t readQuantity)
+    {
+        return mbm_master_readWriteQueuedRegisters(use(), readAddress, readQuantity);
+    }
+
+    /** Milliseconds from the end of a request to the end of its reply; 2000 at first. */
+    void setResponseTimeout(uint16_t ms) { mbm_master_setResponseTimeout(&state.master, ms); }
+    /** The unit of later requests: 1 to 247; 248 to 255 as they are, 0 broadcasts. */
+    void setSlaveID(uint8_t slave) { mbm_master_setSlaveID(&state.master, slave); }
+    /** The unit of later requests. */
+    uint8_t getSlaveID() const { return mbm_master_getSlaveID(&state.master); }
+    /** Tells bits per second, for t3.5; 0: untold, 4 ms. Sets nothing on the Stream. */
+    void setBaudRate(uint32_t baud) { mbm_master_setBaudRate(&state.master, baud); }
+    /** Microseconds of silence before a request, in place of t3.5. */
+    void setGap(uint32_t us) { mbm_master_setGap(&state.master, us); }
+    /** Milliseconds that a broadcast takes; 100 at first. */
+    void setTurnaroundDelay(uint16_t ms) { mbm_master_setTurnaroundDelay(&state.master, ms); }
+    /** Milliseconds that the line is left alone after a timeout; 100 at first. */
+    void setQuietTime(uint16_t ms) { mbm_master_setQuietTime(&state.master, ms); }
+    /** How often a request without a proper reply is repeated; 0 at first. */
+    void setRetries(uint8_t retries) { mbm_master_setRetries(&state.master, retries); }
+    /** Drops the request itself where the receiver hears the driver; off at first. */
+    void setEchoDiscard(bool on) { mbm_master_setEchoDiscard(&state.master, on); }
+    /** Character times that the driver stays on where flush returns early; 0 at first. */
+    void setPostFlushHold(uint8_t characters)
+    {
+        mbm_master_setPostFlushHold(&state.master, characters);
+    }
+    /** false: the functions return ku8MBPending at once, and poll ends them. */
+    void setBlocking(bool on) { mbm_master_setBlocking(&state.master, on); }
+    /** Counts into `counters`, which you zeroed; nullptr stops. Copies share them. */
+    void setCounters(mbm_counters *counters) { mbm_master_setCounters(&state.master, counters); }
+
+    /** Moves a non-blocking request on: ku8MBPending until it has ended, then how. */
+    uint8_t poll() { return mbm_master_poll(&state.master); }
+    /** Gives a non-blocking request up, with the driver off. */
+    void cancel() { mbm_master_cancel(&state.master); }
+    /** How the last request ended; ku8MBPending while it is under way. */
+    uint8_t status() const { return mbm_master_status(&state.master); }
+    /** The raw exception code of the last reply; 0 if it was no exception. */
+    uint8_t getExceptionCode() const { return mbm_master_getExceptionCode(&state.master); }
+
+private:
+    static_assert(MODBUSMASTER_RESPONSE_WORDS >= 1 && MODBUSMASTER_RESPONSE_WORDS <= 125,
+                  "MODBUSMASTER_RESPONSE_WORDS is 1 to 125");
+    static_assert(MODBUSMASTER_TRANSMIT_WORDS >= 2 && MODBUSMASTER_TRANSMIT_WORDS <= 123,
+                  "MODBUSMASTER_TRANSMIT_WORDS is 2 to 123");
+
+    enum : uint16_t {
+        responseWords = MODBUSMASTER_RESPONSE_WORDS,
+        transmitWords = MODBUSMASTER_TRANSMIT_WORDS,
+        mostWords = responseWords > transmitWords ? +responseWords : +transmitWords,
+        frameNeed = MBM_FRAME_BYTES(mostWords),
+        frameBytes = frameNeed < MBM_MAX_FRAME ? +frameNeed : MBM_MAX_FRAME
+    };
+
+    struct Callback {
+        void (*function)(void *);
+        void *context;
+    };
+
+    struct State {
+        // What the hooks use comes first, within AVR's short displacements.
+        Stream *stream;
+        Callback onIdle;
+        Callback onPre;
+        Callback onPost;
+        bool sent; // the request is on the wire, so a reply is waited for
+        uint8_t port;
+        mbm_master master;
+        uint16_t response[responseWords];
+        uint16_t transmit[transmitWords];
+#if !defined(MODBUSMASTER_SHARE_FRAME)
+        uint8_t frame[frameBytes];
+#endif
+    };
+
+    State state;
+
+    static State &of(void *context) { return *static_cast<State *>(context); }
+
+    void lendBuffers()
+    {
+#if defined(MODBUSMASTER_SHARE_FRAME)
+        static uint8_t frame[frameBytes];
+#else
+        uint8_t *frame = state.frame;
+#endif
+        mbm_master_setBuffers(&state.master, state.response, responseWords, state.transmit,
+                              transmitWords, frame, frameBytes);
+    }
+
+    void attach(uint8_t slave)
+    {
+        mbm_port port;
+        port.context = &state;
+        port.read = readHook;
+        port.write = writeHook;
+        port.micros = clockHook;
+        port.flush = flushHook;
+        port.preTransmission = preHook;
+        port.postTransmission = postHook;
+        port.idle = idleHook;
+        mbm_master_begin(&state.master, slave, &port);
+    }
+
+    // After a copy: our own buffers and our own context, no request under way.
+    void settle()
+    {
+        cancel();
+        lendBuffers();
+        if (state.stream != nullptr)
+            attach(getSlaveID());
+    }
+
+    template <typename Port> void openPort(Port &port, uint32_t baud)
+    {
+        port.begin(baud);
+        begin(getSlaveID(), port);
+    }
+
+    // Every request passes here: its gap counts from another object's last use.
+    mbm_master *use()
+    {
+        if (lastUser != this) {
+            lastUser = this;
+            mbm_master_lineUsed(&state.master);
+        }
+        state.sent = false;
+        return &state.master;
+    }
+
+    uint8_t sendWord(uint16_t word) { return mbm_master_send(&state.master, word); }
+    uint8_t sendWords(uint32_t words) { return mbm_master_send32(&state.master, words); }
+
+    static void plain(void *callback) { reinterpret_cast<void (*)()>(callback)(); }
+
+    static void set(Callback &callback, void (*function)(void *), void *context)
+    {
+        callback.function = function;
+        callback.context = context;
+    }
+    static void set(Callback &callback, void (*function)())
+    {
+        set(callback, function != nullptr ? plain : nullptr, reinterpret_cast<void *>(function));
+    }
+    static void call(const Callback &callback)
+    {
+        if (callback.function != nullptr)
+            callback.function(callback.context);
+    }
+
+    static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)
+    {
+        Stream &stream = *of(context).stream;
+        uint8_t *next = bytes;
+        for (; capacity > 0 && stream.available() > 0; capacity--)
+            *next++ = static_cast<uint8_t>(stream.read());
+        return static_cast<int16_t>(next - bytes);
+    }
+    static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
+    {
+        return static_cast<int16_t>(of(context).stream->write(bytes, length));
+    }
+    static uint32_t clockHook(void *) { return static_cast<uint32_t>(micros()); }
+    static uint8_t flushHook(void *context)
+    {
+        of(context).stream->flush();
+        return 1;
+    }
+    static void preHook(void *context) { call(of(context).onPre); }
+    static void postHook(void *context)
+    {
+        of(context).sent = true;
+        call(of(context).onPost);
+    }
+    static void idleHook(void *context)
+    {
+        State &state = of(context);
+        if (state.sent) {
+            call(state.onIdle);
+            state.sent = true; // a request that the callback tried was refused
+        }
+        MODBUSMASTER_YIELD();
+    }
+};
+
+#endif
