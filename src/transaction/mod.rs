@@ -361,26 +361,29 @@ impl<P: Port, S: Storage> Transaction<P, S> {
     }
 
     fn receive(&mut self) -> Status {
-        let count = match self.port.read(self.window.room(self.storage.frame())) {
-            Ok(count) => count,
-            Err(status) => return status,
-        };
         let over = self.is_over();
-        let mut silent = false;
-        if count > 0 {
-            self.storage.count(Counter::BytesReceived, count);
-            self.last_byte = self.now;
-            self.skimmed = false;
-            self.window.arrived(count);
-            let found = self.search(false);
-            if found != Status::PENDING {
-                return found;
+        // As the deadline passes, all that has arrived is looked at, even if
+        // the port hands it over byte by byte.
+        for _ in 0..if over { rtu::MAX_FRAME } else { 1 } {
+            match self.port.read(self.window.room(self.storage.frame())) {
+                Err(status) => return status,
+                Ok(0) => {
+                    self.waiting = true;
+                    break;
+                }
+                Ok(count) => {
+                    self.storage.count(Counter::BytesReceived, count);
+                    self.last_byte = self.now;
+                    self.skimmed = false;
+                    self.window.arrived(count);
+                    let found = self.search(false);
+                    if found != Status::PENDING {
+                        return found;
+                    }
+                }
             }
-        } else {
-            self.waiting = true;
-            silent = elapsed(self.now, self.last_byte) >= self.settings.silence;
         }
-        if !over && !silent {
+        if !over && elapsed(self.now, self.last_byte) < self.settings.silence {
             return Status::PENDING;
         }
         // A candidate that does not get complete may be noise that looks like
