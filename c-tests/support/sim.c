@@ -92,7 +92,8 @@ static void byte_sent(sim *s, uint8_t byte)
         memset(frame, 0, sizeof *frame);
         frame->begin = s->now;
         frame->silence = s->now - s->last_byte;
-        s->driver_on = 2;
+        if (s->driver_on)
+            s->driver_on = 2; /* has begun this frame */
     }
     s->transmitted = s->last_byte = frame->end = start + s->character;
     if (frame->length < sizeof frame->bytes)
