@@ -47,6 +47,7 @@ struct sim {
     /* what the test may hook in */
     void (*device)(sim *s, const sim_frame *frame); /* heard a whole request */
     void (*on_idle)(sim *s);
+    void (*tap)(sim *s, uint8_t byte);                  /* the master read a byte */
     void *context;
 
     /* what happened */
