@@ -291,6 +291,22 @@ static void a_reply_in_two_pieces_is_found_at_the_end_of_the_second(void **state
     assert_int_equal(WORD(1), 0x5678);
 }
 
+/* Noise like our head, a pause, and only then the reply: whatever the first
+ * call makes of it, its reply must not become the second call's data. */
+static void a_reply_behind_noise_and_a_pause_is_not_taken_for_the_next(void **state)
+{
+    uint8_t status;
+    NODE;
+
+    sim_answer(s, 1, 500, "11 03 02 00 00 00 00");
+    sim_answer(s, 1, 6500, "11 03 02 11 11 +");
+    status = mbm_master_readHoldingRegisters(n, 100, 1);
+    assert_true(status == MBM_OK || status == MBM_INVALID_CRC);
+    sim_answer(s, 1, 5000, "11 03 02 22 22 +");
+    if (mbm_master_readHoldingRegisters(n, 200, 1) == MBM_OK)
+        assert_int_equal(WORD(0), 0x2222);
+}
+
 static void an_echo_is_dropped_when_told_to_expect_one(void **state)
 {
     NODE;
@@ -384,6 +400,7 @@ int main(void)
         SIM_TEST(a_frame_of_another_unit_in_front_costs_nothing),
         SIM_TEST(a_late_reply_of_another_function_or_length_costs_nothing),
         SIM_TEST(a_reply_in_two_pieces_is_found_at_the_end_of_the_second),
+        SIM_TEST(a_reply_behind_noise_and_a_pause_is_not_taken_for_the_next),
         SIM_TEST(an_echo_is_dropped_when_told_to_expect_one),
         SIM_TEST(an_echo_alone_is_no_success),
         SIM_TEST(an_echo_without_discard_is_passed_over_where_it_is_no_reply),

@@ -226,6 +226,7 @@ static uint8_t ask(sim *s, run *r)
 static int says(const sim *s, const run *r, uint8_t status, const frame *f)
 {
     const uint8_t *b = f->bytes;
+    int bits = r->asked.function <= 2;
     unsigned i;
 
     if (b[0] != r->asked.unit || (b[1] & 0x7F) != r->asked.function)
@@ -239,16 +240,15 @@ static int says(const sim *s, const run *r, uint8_t status, const frame *f)
         return be16(b + 2) == r->asked.address && be16(b + 4) == r->asked.value &&
                (r->asked.function != 0x16 || be16(b + 6) == r->asked.or_mask);
     for (i = 0; i < b[2]; i += 2) {
-        uint16_t last = i + 1 < b[2] ? b[4 + i] : 0;
-        uint16_t word = r->asked.function <= 2 ? (uint16_t)(last << 8 | b[3 + i])
-                                               : (uint16_t)(b[3 + i] << 8 | last);
+        unsigned first = b[3 + i], second = i + 1 < b[2] ? b[4 + i] : 0;
+        unsigned word = bits ? second << 8 | first : first << 8 | second;
 
-        if (i / 2 + 1 == (b[2] + 1u) / 2 && r->asked.function <= 2 && r->asked.quantity % 16)
-            word &= (uint16_t)((1u << r->asked.quantity % 16) - 1);
+        if (bits && i + 2 >= b[2] && r->asked.quantity % 16)
+            word &= (1u << r->asked.quantity % 16) - 1;
         if (s->response[i / 2] != word)
             return 0;
     }
-    return b[2] == (r->asked.function <= 2 ? (r->asked.quantity + 7) / 8 : 2 * r->asked.quantity);
+    return b[2] == (bits ? (r->asked.quantity + 7) / 8 : 2 * r->asked.quantity);
 }
 
 static int was_heard(const run *r, const frame *f)

@@ -212,18 +212,18 @@ int sim_setup(void **state)
 
 int sim_teardown(void **state)
 {
-    sim *s = (sim *)*state;
+    sim *s = (sim *)*state, end = *s;
     unsigned i, cut = 0;
 
-    for (i = 0; i < s->sent; i++)
-        cut += !s->frames[i].whole;
-    assert_int_equal(cut, s->cut_allowed);
-    assert_int_equal(s->idle_while_driving, 0);
-    assert_int_equal(s->write_without_driver, 0);
-    assert_int_equal(s->driver_on, 0);
-    if (cut == 0 && !s->flush_lies && !s->flush_never)
-        assert_int_equal(s->post_before_last_bit, 0);
-    free(s);
+    free(s); /* first, for what follows may not return */
+    for (i = 0; i < end.sent; i++)
+        cut += !end.frames[i].whole;
+    assert_int_equal(cut, end.cut_allowed);
+    assert_int_equal(end.idle_while_driving, 0);
+    assert_int_equal(end.write_without_driver, 0);
+    assert_int_equal(end.driver_on, 0);
+    if (cut == 0 && !end.flush_lies && !end.flush_never)
+        assert_int_equal(end.post_before_last_bit, 0);
     return 0;
 }
 
