@@ -258,6 +258,20 @@ static void noise_that_looks_like_our_header_costs_nothing(void **state)
     assert_int_equal(s->sent, 14);
 }
 
+/* The head of a long reply keeps the line for what may still come; an exception
+ * behind it is found all the same, also if the line was silent between. */
+static void an_exception_behind_noise_that_looks_like_a_longer_reply_is_found(void **state)
+{
+    NODE;
+
+    (void)n;
+    assert_int_equal(read_words(s, 10, "11 03 14 00 / 11 83 02 +"), MBM_ILLEGAL_DATA_ADDRESS);
+    sim_answer(s, 1, 500, "11 03 14 00");
+    sim_answer(s, 1, 20000, "11 83 02 +");
+    assert_int_equal(mbm_master_readHoldingRegisters(n, 0, 10), MBM_ILLEGAL_DATA_ADDRESS);
+    assert_true(s->now - s->frames[1].end < 30000);
+}
+
 static void a_frame_of_another_unit_in_front_costs_nothing(void **state)
 {
     NODE;
@@ -397,6 +411,7 @@ int main(void)
         SIM_TEST(an_echo_with_another_address_or_value_is_malformed),
         SIM_TEST(stray_bytes_in_front_cost_nothing),
         SIM_TEST(noise_that_looks_like_our_header_costs_nothing),
+        SIM_TEST(an_exception_behind_noise_that_looks_like_a_longer_reply_is_found),
         SIM_TEST(a_frame_of_another_unit_in_front_costs_nothing),
         SIM_TEST(a_late_reply_of_another_function_or_length_costs_nothing),
         SIM_TEST(a_reply_in_two_pieces_is_found_at_the_end_of_the_second),
