@@ -321,6 +321,26 @@ static void a_reply_behind_noise_and_a_pause_is_not_taken_for_the_next(void **st
         assert_int_equal(WORD(0), 0x2222);
 }
 
+/* Data may look like anything, so a pause within them ends nothing. */
+static void a_pause_behind_data_that_look_like_a_damaged_exception_ends_nothing(void **state)
+{
+    NODE;
+
+    sim_answer(s, 1, 500, "11 03 08 11 83 01 02 03 04");
+    sim_answer(s, 1, 50000, "05 06 09 D9");
+    OK(mbm_master_readHoldingRegisters(n, 0, 4));
+    assert_int_equal(WORD(3), 0x0506);
+}
+
+static void a_foreign_frame_whose_data_look_like_our_damaged_reply_ends_nothing(void **state)
+{
+    NODE;
+
+    sim_answer(s, 1, 500, "12 03 06 11 83 01 02 03 04 +");
+    sim_answer(s, 1, 20000, "11 03 02 00 2A +");
+    OK(mbm_master_readHoldingRegisters(n, 0, 1));
+}
+
 static void an_echo_is_dropped_when_told_to_expect_one(void **state)
 {
     NODE;
@@ -340,6 +360,28 @@ static void an_echo_is_dropped_when_told_to_expect_one(void **state)
     OK(mbm_master_readWriteMultipleRegisters(n, 1, 1, 3, 1));
     sim_answer(s, 1, 500, "11 05 00 01 FF 00 +");
     OK(mbm_master_writeSingleCoil(n, 1, 1));
+}
+
+static void a_damaged_echo_is_dropped_too(void **state)
+{
+    NODE;
+
+    OK(mbm_master_setEchoDiscard(n, 1));
+    mbm_master_setTransmitBuffer(n, 0, 0x1111);
+    mbm_master_setTransmitBuffer(n, 1, 0x2222);
+    sim_answer(s, 1, 0, "11 10 00 01 00 02 04 11 11 22 23 AB 23");
+    sim_answer(s, 1, 3000, "11 10 00 01 00 02 +");
+    OK(mbm_master_writeMultipleRegisters(n, 1, 2));
+}
+
+static void noise_in_front_of_the_echo_hides_no_foreign_frame_behind_it(void **state)
+{
+    NODE;
+
+    OK(mbm_master_setEchoDiscard(n, 1));
+    assert_int_equal(read_words(s, 1, "00 / 11 03 00 00 00 01 + / 12 03 02 00 01 +"),
+                     MBM_INVALID_SLAVE_ID);
+    assert_int_equal(s->counters.foreignFrames, 1);
 }
 
 static void an_echo_alone_is_no_success(void **state)
@@ -416,7 +458,11 @@ int main(void)
         SIM_TEST(a_late_reply_of_another_function_or_length_costs_nothing),
         SIM_TEST(a_reply_in_two_pieces_is_found_at_the_end_of_the_second),
         SIM_TEST(a_reply_behind_noise_and_a_pause_is_not_taken_for_the_next),
+        SIM_TEST(a_pause_behind_data_that_look_like_a_damaged_exception_ends_nothing),
+        SIM_TEST(a_foreign_frame_whose_data_look_like_our_damaged_reply_ends_nothing),
         SIM_TEST(an_echo_is_dropped_when_told_to_expect_one),
+        SIM_TEST(a_damaged_echo_is_dropped_too),
+        SIM_TEST(noise_in_front_of_the_echo_hides_no_foreign_frame_behind_it),
         SIM_TEST(an_echo_alone_is_no_success),
         SIM_TEST(an_echo_without_discard_is_passed_over_where_it_is_no_reply),
         SIM_TEST(a_device_that_does_not_echo_still_answers_reads_with_discard_on),
