@@ -81,6 +81,22 @@ static void a_reply_read_byte_by_byte_behind_the_deadline_is_a_success(void **st
     answered_read(s, 1500000);
 }
 
+/* However much is read behind the deadline, it must have an end. */
+static void chatter_does_not_hold_a_request_for_ever(void **state)
+{
+    static const uint8_t noise[8000] = {0};
+    NODE;
+
+    mbm_master_setResponseTimeout(n, 50);
+    s->step = 100;
+    s->read_piece = 1;
+    s->character = 0;
+    sim_deliver(s, 4500, noise, sizeof noise);
+    assert_int_equal(read_one(s), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(s->sent, 1);
+    assert_in_range(s->now - s->frames[0].end, 50000, 300000);
+}
+
 static void a_long_idle_while_a_reply_arrives_is_tolerated(void **state)
 {
     NODE;
@@ -271,6 +287,7 @@ int main(void)
         SIM_TEST(the_response_timeout_can_be_set),
         SIM_TEST(a_reply_that_is_complete_as_the_deadline_passes_is_a_success),
         SIM_TEST(a_reply_read_byte_by_byte_behind_the_deadline_is_a_success),
+        SIM_TEST(chatter_does_not_hold_a_request_for_ever),
         SIM_TEST(a_long_idle_while_a_reply_arrives_is_tolerated),
         SIM_TEST(the_line_is_left_alone_after_a_timeout),
         SIM_TEST(a_reply_in_the_quiet_time_is_dropped),
