@@ -1,0 +1,122 @@
+#include "model.h"
+#include "crc.h"
+
+#include <string.h>
+
+void model_start(model *m)
+{
+    unsigned unit, i;
+
+    for (unit = 0; unit < MODEL_UNITS; unit++)
+        for (i = 0; i < MODEL_CELLS; i++) {
+            uint32_t mixed = (unit * 7919u + i + 1u) * 2654435761u;
+
+            m->holding[unit][i] = (uint16_t)(mixed >> 16);
+            m->readings[unit][i] = (uint16_t)(mixed >> 8);
+            m->coils[unit][i] = mixed >> 30 & 1;
+            m->inputs[unit][i] = mixed >> 29 & 1;
+        }
+}
+
+static size_t pack(uint8_t *reply, const uint8_t *cells, unsigned quantity)
+{
+    unsigned i, bytes = (quantity + 7) / 8;
+
+    reply[2] = (uint8_t)bytes;
+    memset(reply + 3, 0, bytes);
+    for (i = 0; i < quantity; i++)
+        reply[3 + i / 8] |= (uint8_t)(cells[i] << i % 8);
+    return 3 + bytes;
+}
+
+static size_t copy(uint8_t *reply, const uint16_t *cells, unsigned quantity)
+{
+    unsigned i;
+
+    reply[2] = (uint8_t)(2 * quantity);
+    for (i = 0; i < quantity; i++) {
+        reply[3 + 2 * i] = (uint8_t)(cells[i] >> 8);
+        reply[4 + 2 * i] = (uint8_t)cells[i];
+    }
+    return 3 + 2 * quantity;
+}
+
+static void store(uint16_t *cells, const uint8_t *data, unsigned quantity)
+{
+    unsigned i;
+
+    for (i = 0; i < quantity; i++)
+        cells[i] = be16(data + 2 * i);
+}
+
+/* The reply of a write: the request's address and value or quantity. */
+static size_t repeat(uint8_t *reply, const request *r)
+{
+    reply[2] = (uint8_t)(r->address >> 8);
+    reply[3] = (uint8_t)r->address;
+    reply[4] = (uint8_t)(r->quantity >> 8);
+    reply[5] = (uint8_t)r->quantity;
+    return 6;
+}
+
+size_t model_answer(model *m, const request *r, uint8_t *reply)
+{
+    unsigned unit = (unsigned)(r->unit - MODEL_FIRST_UNIT) % MODEL_UNITS;
+    unsigned i, at = r->address, to = r->write_address;
+    int reads = r->function <= 4 || r->function == 0x17;
+    uint16_t *cell;
+    size_t length = 0;
+
+    reply[0] = r->unit;
+    reply[1] = r->function;
+    if ((reads && at + r->quantity > MODEL_CELLS) || to + r->written > MODEL_CELLS) {
+        reply[1] |= 0x80;
+        reply[2] = 2;
+        return seal(reply, 3);
+    }
+    cell = &m->holding[unit][to];
+    switch (r->function) {
+    case 0x01:
+        length = pack(reply, &m->coils[unit][at], r->quantity);
+        break;
+    case 0x02:
+        length = pack(reply, &m->inputs[unit][at], r->quantity);
+        break;
+    case 0x03:
+        length = copy(reply, &m->holding[unit][at], r->quantity);
+        break;
+    case 0x04:
+        length = copy(reply, &m->readings[unit][at], r->quantity);
+        break;
+    case 0x05:
+        m->coils[unit][to] = r->value != 0;
+        length = repeat(reply, r);
+        break;
+    case 0x06:
+        *cell = r->value;
+        length = repeat(reply, r);
+        break;
+    case 0x0F:
+        for (i = 0; i < r->written; i++)
+            m->coils[unit][to + i] = r->data[i / 8] >> i % 8 & 1;
+        length = repeat(reply, r);
+        break;
+    case 0x10:
+        store(cell, r->data, r->written);
+        length = repeat(reply, r);
+        break;
+    case 0x16:
+        *cell = (uint16_t)((*cell & r->value) | (r->or_mask & ~r->value));
+        length = repeat(reply, r);
+        reply[length++] = (uint8_t)(r->or_mask >> 8);
+        reply[length++] = (uint8_t)r->or_mask;
+        break;
+    case 0x17:
+        store(cell, r->data, r->written);
+        length = copy(reply, &m->holding[unit][at], r->quantity);
+        break;
+    default:
+        break;
+    }
+    return seal(reply, length);
+}

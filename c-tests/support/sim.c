@@ -1,0 +1,306 @@
+#include "sim.h"
+#include "crc.h"
+#include "request.h"
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static void note(sim *s, char event)
+{
+    if (s->order_length > 0 && s->order[s->order_length - 1] == event)
+        return;
+    if (s->order_length + 1 < SIM_ORDER) {
+        s->order_at[s->order_length] = s->now;
+        s->order[s->order_length++] = event;
+    }
+}
+
+static uint32_t micros(void *context)
+{
+    sim *s = (sim *)context;
+
+    s->now += s->step;
+    if (s->now > s->limit)
+        fail_msg("hang: still waiting after %lu ms", (unsigned long)(s->limit / 1000));
+    return (uint32_t)(s->clock_start + s->now);
+}
+
+static int16_t claimed(const sim *s, uint16_t count)
+{
+    return (int16_t)(count + s->overclaim);
+}
+
+static int16_t read_bytes(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    sim *s = (sim *)context;
+    uint16_t count = 0;
+
+    if (s->read_dead)
+        return -1;
+    if (s->read_piece && capacity > s->read_piece)
+        capacity = s->read_piece;
+    while (count < capacity && s->first < s->last && s->incoming[s->first].at <= s->now) {
+        bytes[count] = s->incoming[s->first++].byte;
+        if (s->tap)
+            s->tap(s, bytes[count]);
+        count++;
+    }
+    if (s->first == s->last)
+        s->first = s->last = 0;
+    if (count > 0) {
+        s->last_byte = s->now;
+        note(s, 'R');
+    }
+    return count == capacity ? claimed(s, count) : (int16_t)count;
+}
+
+void sim_deliver(sim *s, uint64_t at, const uint8_t *bytes, size_t length)
+{
+    size_t i;
+
+    for (i = 0; i < length; i++) {
+        unsigned place;
+
+        at += s->character;
+        assert_true(s->last < SIM_BYTES);
+        for (place = s->last++; place > s->first && s->incoming[place - 1].at > at; place--)
+            s->incoming[place] = s->incoming[place - 1];
+        s->incoming[place].at = at;
+        s->incoming[place].byte = bytes[i];
+    }
+}
+
+/* A whole request has left: now its answers have a time. */
+static void heard(sim *s, const sim_frame *frame)
+{
+    unsigned i;
+
+    for (i = 0; i < s->answered; i++)
+        if (s->answers[i].request == s->sent)
+            sim_deliver(s, frame->end + s->answers[i].delay, s->answers[i].bytes,
+                        s->answers[i].length);
+    if (s->device)
+        s->device(s, frame);
+}
+
+static void byte_sent(sim *s, uint8_t byte)
+{
+    sim_frame *frame = s->sent > 0 ? &s->frames[s->sent - 1] : NULL;
+    uint64_t start = s->transmitted > s->now ? s->transmitted : s->now;
+    request parsed;
+
+    if (!frame || frame->whole || s->driver_on == 1) {
+        assert_true(s->sent < SIM_FRAMES);
+        frame = &s->frames[s->sent++];
+        memset(frame, 0, sizeof *frame);
+        frame->begin = s->now;
+        frame->silence = s->now - s->last_byte;
+        if (s->driver_on)
+            s->driver_on = 2; /* has begun this frame */
+    }
+    s->transmitted = s->last_byte = frame->end = start + s->character;
+    if (frame->length < sizeof frame->bytes)
+        frame->bytes[frame->length++] = byte;
+    if (s->echo)
+        sim_deliver(s, start, &byte, 1);
+    if (request_parse(&parsed, frame->bytes, frame->length)) {
+        frame->whole = 1;
+        heard(s, frame);
+    }
+}
+
+static int16_t write_bytes(void *context, const uint8_t *bytes, uint16_t length)
+{
+    sim *s = (sim *)context;
+    uint16_t i, count = length;
+
+    note(s, 'W');
+    if (s->port.preTransmission && !s->driver_on)
+        s->write_without_driver++;
+    if (s->write_never)
+        return 0;
+    if (s->write_busy && s->busy++ % (s->write_busy + 1) != s->write_busy)
+        return 0;
+    if (s->write_piece && count > s->write_piece)
+        count = s->write_piece;
+    for (i = 0; i < count; i++) {
+        byte_sent(s, bytes[i]);
+        if (s->write_dies_at && s->frames[s->sent - 1].length == s->write_dies_at)
+            return -1;
+    }
+    return count == length ? claimed(s, count) : (int16_t)count;
+}
+
+static uint8_t flush(void *context)
+{
+    sim *s = (sim *)context;
+
+    note(s, 'F');
+    return !s->flush_never && (s->flush_lies || s->now >= s->transmitted);
+}
+
+static void pre(void *context)
+{
+    sim *s = (sim *)context;
+
+    note(s, 'P');
+    assert_int_equal(s->driver_on, 0);
+    s->driver_on = 1;
+}
+
+static void post(void *context)
+{
+    sim *s = (sim *)context;
+
+    note(s, 'O');
+    assert_int_not_equal(s->driver_on, 0);
+    s->driver_on = 0;
+    if (s->now < s->transmitted)
+        s->post_before_last_bit++;
+}
+
+static void idle(void *context)
+{
+    sim *s = (sim *)context;
+    uint64_t next = s->now + s->idle_step;
+
+    note(s, 'I');
+    s->idles++;
+    if (s->driver_on)
+        s->idle_while_driving++;
+    if (s->first < s->last && s->incoming[s->first].at < next && s->incoming[s->first].at > s->now)
+        next = s->incoming[s->first].at;
+    s->now = next;
+    if (s->on_idle)
+        s->on_idle(s);
+}
+
+void sim_begin(sim *s, uint8_t unit)
+{
+    s->port.context = s;
+    s->port.read = read_bytes;
+    s->port.write = write_bytes;
+    s->port.micros = micros;
+    s->port.flush = flush;
+    s->port.preTransmission = pre;
+    s->port.postTransmission = post;
+    s->port.idle = idle;
+    assert_int_equal(mbm_master_begin(&s->master, unit, &s->port), MBM_OK);
+}
+
+int sim_setup(void **state)
+{
+    sim *s = (sim *)calloc(1, sizeof *s);
+
+    if (!s)
+        return -1;
+    *state = s;
+    s->step = 2;
+    s->idle_step = 20;
+    s->character = 100;
+    s->limit = 100000000;
+    assert_int_equal(mbm_master_setBuffers(&s->master, s->response, MBM_MAX_READ_REGISTERS,
+                                           s->transmit, MBM_MAX_WRITE_REGISTERS, s->buffer,
+                                           MBM_MAX_FRAME),
+                     MBM_OK);
+    sim_begin(s, 17);
+    assert_int_equal(mbm_master_setCounters(&s->master, &s->counters), MBM_OK);
+    s->last_byte = s->now;
+    return 0;
+}
+
+int sim_teardown(void **state)
+{
+    sim *s = (sim *)*state, end = *s;
+    unsigned i, cut = 0;
+
+    free(s); /* first, for what follows may not return */
+    for (i = 0; i < end.sent; i++)
+        cut += !end.frames[i].whole;
+    assert_int_equal(cut, end.cut_allowed);
+    assert_int_equal(end.idle_while_driving, 0);
+    assert_int_equal(end.write_without_driver, 0);
+    assert_int_equal(end.driver_on, 0);
+    if (cut == 0 && !end.flush_lies && !end.flush_never)
+        assert_int_equal(end.post_before_last_bit, 0);
+    return 0;
+}
+
+static int digit(char c)
+{
+    return c <= '9' ? c - '0' : (c & ~0x20) - 'A' + 10;
+}
+
+size_t sim_bytes(uint8_t *bytes, const char *text)
+{
+    size_t length = 0, start = 0;
+
+    for (; *text; text++) {
+        if (*text == '+') {
+            length = start + seal(bytes + start, length - start);
+        } else if (*text == '/') {
+            start = length;
+        } else if (*text != ' ') {
+            bytes[length++] = (uint8_t)(digit(text[0]) << 4 | digit(text[1]));
+            text++;
+        }
+    }
+    return length;
+}
+
+void sim_answer(sim *s, unsigned nth, uint32_t delay, const char *text)
+{
+    unsigned at = s->answered++ % SIM_ANSWERS;
+
+    assert_true(s->answered <= SIM_ANSWERS);
+    s->answers[at].request = s->sent + nth;
+    s->answers[at].delay = delay;
+    s->answers[at].length = (uint16_t)sim_bytes(s->answers[at].bytes, text);
+}
+
+void sim_deliver_text(sim *s, uint64_t at, const char *text)
+{
+    uint8_t bytes[512];
+
+    sim_deliver(s, at, bytes, sim_bytes(bytes, text));
+}
+
+void sim_assert_sent(const sim *s, unsigned index, const char *text)
+{
+    uint8_t bytes[512];
+    size_t length = sim_bytes(bytes, text);
+
+    assert_true(index < s->sent);
+    assert_int_equal(s->frames[index].length, length);
+    assert_memory_equal(s->frames[index].bytes, bytes, length);
+}
+
+void sim_assert_order(const sim *s, const char *which, const char *order)
+{
+    char seen[SIM_ORDER + 1];
+    size_t i, length = 0;
+
+    for (i = 0; i < s->order_length; i++)
+        if (strchr(which, s->order[i]) && (length == 0 || seen[length - 1] != s->order[i]))
+            seen[length++] = s->order[i];
+    seen[length] = '\0';
+    assert_string_equal(seen, order);
+}
+
+uint8_t sim_poll(sim *s)
+{
+    uint8_t status;
+
+    while ((status = mbm_master_poll(&s->master)) == MBM_PENDING)
+        s->now += s->idle_step;
+    return status;
+}
+
+uint64_t sim_time_of(const sim *s, char event)
+{
+    const char *at = (const char *)memchr(s->order, event, s->order_length);
+
+    assert_non_null(at);
+    return s->order_at[at - s->order];
+}

@@ -1,0 +1,463 @@
+/* Arguments, objects and buffers of no use: a status, never a crash, and
+ * nothing malformed on the wire. */
+#include "sim.h"
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define NODE sim *s = (sim *)*state; mbm_master *n = &s->master
+#define OK(call) assert_int_equal(call, MBM_OK)
+#define IS(status, call) assert_int_equal(call, status)
+
+/* The functions that make a request. */
+static void all_requests_answer(mbm_master *m, uint8_t status)
+{
+    IS(status, mbm_master_readCoils(m, 0, 1));
+    IS(status, mbm_master_readDiscreteInputs(m, 0, 1));
+    IS(status, mbm_master_readHoldingRegisters(m, 0, 1));
+    IS(status, mbm_master_readInputRegisters(m, 0, 1));
+    IS(status, mbm_master_writeSingleCoil(m, 0, 1));
+    IS(status, mbm_master_writeSingleRegister(m, 0, 1));
+    IS(status, mbm_master_writeMultipleCoils(m, 0, 1));
+    IS(status, mbm_master_writeQueuedCoils(m));
+    IS(status, mbm_master_writeMultipleRegisters(m, 0, 1));
+    IS(status, mbm_master_writeQueuedRegisters(m));
+    IS(status, mbm_master_maskWriteRegister(m, 0, 1, 2));
+    IS(status, mbm_master_readWriteMultipleRegisters(m, 0, 1, 0, 1));
+    IS(status, mbm_master_readWriteQueuedRegisters(m, 0, 1));
+    assert_int_equal(mbm_master_requestFrom(m, 0, 1), 0);
+}
+
+/* All others but begin, setBuffers and statusText. */
+static void all_others_answer(mbm_master *m, uint8_t status)
+{
+    mbm_counters counters;
+
+    IS(status, mbm_master_poll(m));
+    IS(status, mbm_master_cancel(m));
+    IS(status, mbm_master_status(m));
+    IS(status, mbm_master_setSlaveID(m, 1));
+    IS(status, mbm_master_setResponseTimeout(m, 1));
+    IS(status, mbm_master_setBaudRate(m, 9600));
+    IS(status, mbm_master_setGap(m, 1));
+    IS(status, mbm_master_setTurnaroundDelay(m, 1));
+    IS(status, mbm_master_setQuietTime(m, 1));
+    IS(status, mbm_master_setRetries(m, 1));
+    IS(status, mbm_master_setEchoDiscard(m, 1));
+    IS(status, mbm_master_setPostFlushHold(m, 1));
+    IS(status, mbm_master_setBlocking(m, 1));
+    IS(status, mbm_master_setCounters(m, &counters));
+    IS(status, mbm_master_setCounters(m, NULL));
+    IS(status, mbm_master_lineUsed(m));
+    IS(status, mbm_master_clearResponseBuffer(m));
+    IS(status, mbm_master_setTransmitBuffer(m, 0, 1));
+    IS(status, mbm_master_clearTransmitBuffer(m));
+    IS(status, mbm_master_beginTransmission(m, 1));
+    IS(status, mbm_master_send(m, 1));
+    IS(status, mbm_master_send8(m, 1));
+    IS(status, mbm_master_send32(m, 1));
+    IS(status, mbm_master_sendBit(m, 1));
+    assert_int_equal(mbm_master_getExceptionCode(m), 0);
+    assert_int_equal(mbm_master_getSlaveID(m), 0);
+    assert_int_equal(mbm_master_getResponseBuffer(m, 0), 0xFFFF);
+    assert_int_equal(mbm_master_available(m), 0);
+    assert_int_equal(mbm_master_receive(m), 0xFFFF);
+}
+
+static void null_is_an_invalid_argument_everywhere(void **state)
+{
+    mbm_master m;
+    uint16_t words[2] = {0, 0};
+    uint8_t frame[16];
+    NODE;
+
+    (void)n;
+    all_requests_answer(NULL, MBM_INVALID_ARGUMENT);
+    all_others_answer(NULL, MBM_INVALID_ARGUMENT);
+    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(NULL, 1, &s->port));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(NULL, 1, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_setBuffers(NULL, words, 2, words, 2, frame, 16));
+    memset(&m, 0, sizeof m);
+    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(&m, 1, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_setBuffers(&m, NULL, 1, words, 2, frame, 16));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_setBuffers(&m, words, 2, NULL, 1, frame, 16));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_setBuffers(&m, words, 2, words, 2, NULL, 16));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_setBuffers(&m, words, 2, words, 2, NULL, 0));
+    all_requests_answer(&m, MBM_NOT_INITIALISED);
+    all_others_answer(&m, MBM_NOT_INITIALISED);
+}
+
+static void a_zeroed_object_is_not_initialised_and_stays_zero(void **state)
+{
+    static mbm_master m;
+    static const mbm_master zero;
+
+    (void)state;
+    all_requests_answer(&m, MBM_NOT_INITIALISED);
+    all_others_answer(&m, MBM_NOT_INITIALISED);
+    assert_memory_equal(&m, &zero, sizeof m);
+}
+
+static void every_status_has_a_text(void **state)
+{
+    unsigned status;
+
+    (void)state;
+    for (status = 0; status < 256; status++) {
+        assert_non_null(mbm_statusText((uint8_t)status));
+        assert_true(strlen(mbm_statusText((uint8_t)status)) > 0);
+    }
+    assert_string_not_equal(mbm_statusText(MBM_OK), mbm_statusText(MBM_INVALID_CRC));
+}
+
+static void an_object_without_buffers_makes_no_request(void **state)
+{
+    mbm_master m;
+    NODE;
+
+    (void)n;
+    memset(&m, 0, sizeof m);
+    OK(mbm_master_begin(&m, 17, &s->port));
+    all_requests_answer(&m, MBM_NOT_INITIALISED);
+    sim_assert_order(s, "PWFOIR", "");
+    assert_int_equal(mbm_master_getResponseBuffer(&m, 0), 0xFFFF);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_master_setTransmitBuffer(&m, 0, 1));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_master_send(&m, 1));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_master_send32(&m, 1));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_master_sendBit(&m, 1));
+    OK(mbm_master_clearResponseBuffer(&m));
+    OK(mbm_master_clearTransmitBuffer(&m));
+    OK(mbm_master_poll(&m));
+}
+
+/* requestFrom has no status of its own, so status must have it. */
+static void status_says_why_request_from_gave_nothing(void **state)
+{
+    mbm_master m;
+    NODE;
+
+    (void)n;
+    memset(&m, 0, sizeof m);
+    OK(mbm_master_begin(&m, 17, &s->port));
+    assert_int_equal(mbm_master_requestFrom(&m, 0, 1), 0);
+    IS(MBM_NOT_INITIALISED, mbm_master_status(&m));
+}
+
+static void an_object_with_buffers_but_never_begun_makes_no_request(void **state)
+{
+    mbm_master m;
+    uint16_t words[2] = {0, 0};
+    uint8_t frame[32];
+
+    (void)state;
+    memset(&m, 0, sizeof m);
+    OK(mbm_master_setBuffers(&m, words, 1, words + 1, 1, frame, sizeof frame));
+    all_requests_answer(&m, MBM_NOT_INITIALISED);
+    OK(mbm_master_poll(&m));
+    mbm_master_lineUsed(&m);
+    mbm_master_cancel(&m);
+}
+
+static void an_object_with_buffers_but_never_begun_has_no_slave_id(void **state)
+{
+    mbm_master m;
+    uint8_t frame[32];
+
+    (void)state;
+    memset(&m, 0, sizeof m);
+    OK(mbm_master_setBuffers(&m, NULL, 0, NULL, 0, frame, sizeof frame));
+    assert_int_equal(mbm_master_getSlaveID(&m), 0);
+}
+
+static void a_port_without_its_three_hooks_is_refused(void **state)
+{
+    mbm_port read_less, write_less, clock_less, empty;
+    mbm_master m;
+    NODE;
+
+    read_less = write_less = clock_less = s->port;
+    read_less.read = NULL;
+    write_less.write = NULL;
+    clock_less.micros = NULL;
+    memset(&empty, 0, sizeof empty);
+    memset(&m, 0, sizeof m);
+    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(&m, 1, &read_less));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(&m, 1, &write_less));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(&m, 1, &clock_less));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(&m, 1, &empty));
+    all_requests_answer(&m, MBM_NOT_INITIALISED);
+    /* One that was begun keeps what it had. */
+    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(n, 1, &empty));
+    assert_int_equal(mbm_master_getSlaveID(n), 17);
+    sim_answer(s, 1, 500, "11 03 02 00 01 +");
+    OK(mbm_master_readHoldingRegisters(n, 0, 1));
+}
+
+static void forbidden_quantities_are_answered_3_with_nothing_sent(void **state)
+{
+    static const uint16_t beyond[] = {0, 2001, 2048, 4096, 32768, 65535};
+    static const uint16_t registers[] = {0, 126, 128, 256, 257, 512, 32769, 65535};
+    size_t i;
+    NODE;
+
+    for (i = 0; i < COUNT(beyond); i++) {
+        IS(3, mbm_master_readCoils(n, 0, beyond[i]));
+        IS(3, mbm_master_readDiscreteInputs(n, 0, beyond[i]));
+        IS(3, mbm_master_writeMultipleCoils(n, 0, beyond[i]));
+    }
+    IS(3, mbm_master_writeMultipleCoils(n, 0, 1969));
+    for (i = 0; i < COUNT(registers); i++) {
+        IS(3, mbm_master_readHoldingRegisters(n, 0, registers[i]));
+        IS(3, mbm_master_readInputRegisters(n, 0, registers[i]));
+        IS(3, mbm_master_writeMultipleRegisters(n, 0, registers[i]));
+        IS(3, mbm_master_readWriteMultipleRegisters(n, 0, registers[i], 0, 1));
+        IS(3, mbm_master_readWriteMultipleRegisters(n, 0, 1, 0, registers[i]));
+        assert_int_equal(mbm_master_requestFrom(n, 0, registers[i]), 0);
+        IS(3, mbm_master_status(n));
+    }
+    IS(3, mbm_master_writeMultipleRegisters(n, 0, 124));
+    IS(3, mbm_master_readWriteMultipleRegisters(n, 0, 1, 0, 122));
+    assert_int_equal(s->sent, 0);
+    assert_int_equal(mbm_master_getExceptionCode(n), 0);
+    sim_assert_order(s, "PWO", "");
+}
+
+static void ranges_beyond_65535_are_answered_2_with_nothing_sent(void **state)
+{
+    NODE;
+
+    IS(2, mbm_master_readCoils(n, 65535, 2));
+    IS(2, mbm_master_readDiscreteInputs(n, 63537, 2000));
+    IS(2, mbm_master_readHoldingRegisters(n, 65412, 125));
+    IS(2, mbm_master_readInputRegisters(n, 65535, 2));
+    IS(2, mbm_master_writeMultipleCoils(n, 65535, 2));
+    IS(2, mbm_master_writeMultipleRegisters(n, 65414, 123));
+    IS(2, mbm_master_readWriteMultipleRegisters(n, 65535, 2, 0, 1));
+    IS(2, mbm_master_readWriteMultipleRegisters(n, 0, 1, 65535, 2));
+    assert_int_equal(mbm_master_requestFrom(n, 65535, 2), 0);
+    IS(2, mbm_master_status(n));
+    /* A device looks at the quantity first. */
+    IS(3, mbm_master_readHoldingRegisters(n, 65535, 126));
+    assert_int_equal(s->sent, 0);
+}
+
+static void the_last_address_is_in_reach(void **state)
+{
+    NODE;
+
+    sim_answer(s, 1, 500, "11 03 02 00 07 +");
+    OK(mbm_master_readHoldingRegisters(n, 65535, 1));
+    sim_answer(s, 1, 500, "11 0F FF FE 00 02 +");
+    OK(mbm_master_writeMultipleCoils(n, 65534, 2));
+    sim_answer(s, 1, 500, "11 06 FF FF 00 02 +");
+    OK(mbm_master_writeSingleRegister(n, 65535, 2));
+    sim_answer(s, 1, 500, "11 17 02 00 07 +");
+    OK(mbm_master_readWriteMultipleRegisters(n, 65535, 1, 65535, 1));
+}
+
+/* Buffers of exactly these sizes, so that sanitizers see one byte more. */
+typedef struct lent {
+    uint16_t *response, *transmit;
+    uint8_t *frame;
+} lent;
+
+static lent lend(sim *s, uint16_t response, uint16_t transmit, uint16_t frame)
+{
+    lent b;
+
+    b.response = (uint16_t *)calloc(response + 1u, 2);
+    b.transmit = (uint16_t *)calloc(transmit + 1u, 2);
+    b.frame = (uint8_t *)malloc(frame);
+    assert_true(b.response && b.transmit && b.frame);
+    b.response = (uint16_t *)realloc(b.response, response ? response * 2u : 1u);
+    b.transmit = (uint16_t *)realloc(b.transmit, transmit ? transmit * 2u : 1u);
+    OK(mbm_master_setBuffers(&s->master, b.response, response, b.transmit, transmit, b.frame,
+                             frame));
+    return b;
+}
+
+static void take_back(sim *s, lent b)
+{
+    OK(mbm_master_setBuffers(&s->master, s->response, 125, s->transmit, 123, s->buffer, 256));
+    free(b.response);
+    free(b.transmit);
+    free(b.frame);
+}
+
+static void a_frame_buffer_below_8_bytes_is_refused(void **state)
+{
+    uint16_t bytes;
+    NODE;
+
+    for (bytes = 0; bytes < 8; bytes++)
+        IS(MBM_INVALID_ARGUMENT,
+           mbm_master_setBuffers(n, s->response, 125, s->transmit, 123, s->buffer, bytes));
+    OK(mbm_master_setBuffers(n, s->response, 125, s->transmit, 123, s->buffer, 8));
+}
+
+static void a_request_is_sent_whole_or_not_at_all(void **state)
+{
+    uint16_t bytes;
+    NODE;
+
+    mbm_master_setGap(n, 0);
+    mbm_master_setQuietTime(n, 0);
+    mbm_master_setResponseTimeout(n, 50);
+    for (bytes = 8; bytes < 24; bytes++) {
+        lent b = lend(s, 4, 4, bytes);
+
+        s->sent = 0;
+        mbm_master_writeSingleRegister(n, 0, 1);
+        assert_int_equal(s->sent, 1);
+        mbm_master_maskWriteRegister(n, 0, 1, 2);
+        assert_int_equal(s->sent, 1 + (bytes >= 10));
+        s->sent = 0;
+        mbm_master_writeMultipleCoils(n, 0, 17);
+        assert_int_equal(s->sent, bytes >= 12);
+        s->sent = 0;
+        mbm_master_writeMultipleRegisters(n, 0, 4);
+        assert_int_equal(s->sent, bytes >= 17);
+        s->sent = 0;
+        IS(bytes >= 21 ? MBM_RESPONSE_TIMED_OUT : MBM_BUFFER_TOO_SMALL,
+           mbm_master_readWriteMultipleRegisters(n, 0, 1, 0, 4));
+        assert_int_equal(s->sent, bytes >= 21);
+        take_back(s, b);
+    }
+}
+
+static void a_reply_that_passes_the_frame_buffer_is_too_long_and_changes_nothing(void **state)
+{
+    uint16_t bytes;
+    NODE;
+
+    for (bytes = 8; bytes <= 13; bytes++) {
+        lent b = lend(s, 4, 4, bytes);
+
+        s->answered = 0;
+        sim_answer(s, 1, 500, "11 03 08 11 11 22 22 33 33 44 44 +");
+        IS(bytes >= 13 ? MBM_OK : MBM_BUFFER_TOO_SMALL, mbm_master_readHoldingRegisters(n, 0, 4));
+        assert_int_equal(b.response[3], bytes >= 13 ? 0x4444 : 0);
+        assert_int_equal(mbm_master_available(n), bytes >= 13 ? 4 : 0);
+        sim_answer(s, 1, 500, "11 83 02 +");
+        IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_master_readHoldingRegisters(n, 0, 4));
+        sim_answer(s, 1, 500, "11 03 02 12 34 +");
+        OK(mbm_master_readHoldingRegisters(n, 0, 1));
+        take_back(s, b);
+    }
+}
+
+static void buffers_for_64_words_pass_on_what_the_device_says_to_66(void **state)
+{
+    char reply[600] = "11 03 84";
+    unsigned i;
+    lent b;
+    NODE;
+
+    b = lend(s, 64, 64, MBM_FRAME_BYTES(64));
+    sim_answer(s, 1, 500, "11 83 02 +");
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_master_readHoldingRegisters(n, 0, 66));
+    sim_assert_sent(s, 0, "11 03 00 00 00 42 +");
+    for (i = 0; i < 132; i++)
+        strcat(reply, " 77");
+    strcat(reply, " +");
+    sim_answer(s, 1, 500, reply);
+    IS(MBM_BUFFER_TOO_SMALL, mbm_master_readHoldingRegisters(n, 0, 66));
+    for (i = 0; i < 64; i++)
+        assert_int_equal(b.response[i], 0);
+    assert_int_equal(mbm_master_available(n), 0);
+    take_back(s, b);
+}
+
+static void a_reply_that_passes_the_response_words_changes_none(void **state)
+{
+    lent b;
+    NODE;
+
+    b = lend(s, 2, 0, 256);
+    sim_answer(s, 1, 500, "11 03 06 11 11 22 22 33 33 +");
+    IS(MBM_BUFFER_TOO_SMALL, mbm_master_readHoldingRegisters(n, 0, 3));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_master_status(n));
+    sim_answer(s, 1, 500, "11 01 05 11 11 22 22 33 +");
+    IS(MBM_BUFFER_TOO_SMALL, mbm_master_readCoils(n, 0, 33));
+    assert_int_equal(b.response[0], 0);
+    assert_int_equal(b.response[1], 0);
+    sim_answer(s, 1, 500, "11 01 04 11 11 22 22 +");
+    OK(mbm_master_readCoils(n, 0, 32));
+    take_back(s, b);
+    b = lend(s, 0, 0, 256);
+    sim_answer(s, 1, 500, "11 03 02 11 11 +");
+    IS(MBM_BUFFER_TOO_SMALL, mbm_master_readHoldingRegisters(n, 0, 1));
+    assert_int_equal(mbm_master_getResponseBuffer(n, 0), 0xFFFF);
+    take_back(s, b);
+}
+
+static void writes_beyond_the_transmit_words_are_answered_3_with_nothing_sent(void **state)
+{
+    lent b;
+    NODE;
+
+    b = lend(s, 2, 2, 256);
+    IS(3, mbm_master_writeMultipleRegisters(n, 0, 3));
+    IS(3, mbm_master_writeMultipleCoils(n, 0, 33));
+    IS(3, mbm_master_readWriteMultipleRegisters(n, 0, 1, 0, 3));
+    assert_int_equal(s->sent, 0);
+    sim_answer(s, 1, 500, "11 0F 00 00 00 20 +");
+    OK(mbm_master_writeMultipleCoils(n, 0, 32));
+    sim_answer(s, 1, 500, "11 10 00 00 00 02 +");
+    OK(mbm_master_writeMultipleRegisters(n, 0, 2));
+    take_back(s, b);
+}
+
+static void single_writes_need_no_transmit_words(void **state)
+{
+    lent b;
+    NODE;
+
+    b = lend(s, 0, 0, 16);
+    sim_answer(s, 1, 500, "11 06 00 01 12 34 +");
+    OK(mbm_master_writeSingleRegister(n, 1, 0x1234));
+    sim_answer(s, 1, 500, "11 16 00 01 12 34 56 78 +");
+    OK(mbm_master_maskWriteRegister(n, 1, 0x1234, 0x5678));
+    sim_answer(s, 1, 500, "11 05 00 01 FF 00 +");
+    OK(mbm_master_writeSingleCoil(n, 1, 1));
+    take_back(s, b);
+}
+
+static void a_frame_buffer_of_64_kilobytes_is_no_trouble(void **state)
+{
+    lent b;
+    NODE;
+
+    b = lend(s, 125, 123, 65535);
+    sim_answer(s, 1, 500, "00 00 / 11 03 02 12 34 +");
+    OK(mbm_master_readHoldingRegisters(n, 1, 1));
+    take_back(s, b);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        SIM_TEST(null_is_an_invalid_argument_everywhere),
+        SIM_TEST(a_zeroed_object_is_not_initialised_and_stays_zero),
+        SIM_TEST(every_status_has_a_text),
+        SIM_TEST(an_object_without_buffers_makes_no_request),
+        SIM_TEST(status_says_why_request_from_gave_nothing),
+        SIM_TEST(an_object_with_buffers_but_never_begun_makes_no_request),
+        SIM_TEST(an_object_with_buffers_but_never_begun_has_no_slave_id),
+        SIM_TEST(a_port_without_its_three_hooks_is_refused),
+        SIM_TEST(forbidden_quantities_are_answered_3_with_nothing_sent),
+        SIM_TEST(ranges_beyond_65535_are_answered_2_with_nothing_sent),
+        SIM_TEST(the_last_address_is_in_reach),
+        SIM_TEST(a_frame_buffer_below_8_bytes_is_refused),
+        SIM_TEST(a_request_is_sent_whole_or_not_at_all),
+        SIM_TEST(a_reply_that_passes_the_frame_buffer_is_too_long_and_changes_nothing),
+        SIM_TEST(buffers_for_64_words_pass_on_what_the_device_says_to_66),
+        SIM_TEST(a_reply_that_passes_the_response_words_changes_none),
+        SIM_TEST(writes_beyond_the_transmit_words_are_answered_3_with_nothing_sent),
+        SIM_TEST(single_writes_need_no_transmit_words),
+        SIM_TEST(a_frame_buffer_of_64_kilobytes_is_no_trouble),
+    };
+
+    return cmocka_run_group_tests_name("bad input", tests, NULL, NULL);
+}

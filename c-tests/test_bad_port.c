@@ -1,0 +1,221 @@
+/* Ports that stall, lie or die, and clocks that wrap: a status, the driver off,
+ * and the next request works. Unit 17 is 11 on the wire. */
+#include "sim.h"
+#include "test.h"
+
+#define NODE sim *s = (sim *)*state; mbm_master *n = &s->master
+#define OK(call) assert_int_equal(call, MBM_OK)
+#define IS(status, call) assert_int_equal(call, status)
+
+static uint8_t read_one(sim *s)
+{
+    return mbm_master_readHoldingRegisters(&s->master, 0, 1);
+}
+
+static void works(sim *s)
+{
+    sim_answer(s, 1, 500, "11 03 02 00 2A +");
+    OK(read_one(s));
+    assert_int_equal(mbm_master_getResponseBuffer(&s->master, 0), 42);
+}
+
+static void write_may_take_a_byte_at_a_time(void **state)
+{
+    unsigned i;
+    NODE;
+
+    s->write_piece = 1;
+    for (i = 0; i < 123; i++)
+        mbm_master_setTransmitBuffer(n, (uint8_t)i, (uint16_t)(i * 0x0101));
+    sim_answer(s, 1, 500, "11 10 00 00 00 7B +");
+    OK(mbm_master_writeMultipleRegisters(n, 0, 123));
+    assert_int_equal(s->frames[0].length, 255);
+    assert_int_equal(s->frames[0].bytes[7 + 2 * 99], 99);
+}
+
+static void read_may_give_a_byte_at_a_time(void **state)
+{
+    NODE;
+
+    (void)n;
+    s->read_piece = 1;
+    sim_deliver_text(s, s->now, "01 02 03 04 05");
+    works(s);
+}
+
+static void a_write_that_never_takes_a_byte_is_a_busy_line(void **state)
+{
+    NODE;
+
+    (void)n;
+    s->write_never = 1;
+    IS(MBM_LINE_BUSY, read_one(s));
+    assert_int_equal(s->sent, 0);
+    sim_assert_order(s, "PO", "PO");
+    assert_in_range(s->now, 2000000, 2500000);
+    s->write_never = 0;
+    works(s);
+}
+
+static void a_flush_that_never_drains_is_a_busy_line(void **state)
+{
+    NODE;
+
+    (void)n;
+    s->flush_never = 1;
+    IS(MBM_LINE_BUSY, read_one(s));
+    sim_assert_order(s, "PO", "PO");
+    assert_in_range(s->now, 2000000, 2500000);
+    s->flush_never = 0;
+    works(s);
+}
+
+static void a_link_lost_in_the_gap_sends_nothing(void **state)
+{
+    NODE;
+
+    s->read_dead = 1;
+    IS(MBM_LINK_LOST, read_one(s));
+    IS(MBM_LINK_LOST, mbm_master_status(n));
+    assert_int_equal(s->sent, 0);
+    sim_assert_order(s, "PWO", "");
+    s->read_dead = 0;
+    works(s);
+}
+
+static void die_mid_reply(sim *s)
+{
+    if (s->first > 3)
+        s->read_dead = 1;
+}
+
+static void a_link_lost_mid_reply_ends_the_request_at_once(void **state)
+{
+    NODE;
+
+    mbm_master_setRetries(n, 3);
+    s->on_idle = die_mid_reply;
+    sim_answer(s, 1, 500, "11 03 02 00 07 +");
+    IS(MBM_LINK_LOST, read_one(s));
+    assert_int_equal(s->sent, 1);
+    assert_true(s->now < 20000);
+    s->on_idle = NULL;
+    s->read_dead = 0;
+    works(s);
+}
+
+static void a_link_lost_mid_write_switches_the_driver_off(void **state)
+{
+    uint16_t at;
+    NODE;
+
+    (void)n;
+    s->cut_allowed = 7;
+    for (at = 1; at <= 8; at++) {
+        s->write_dies_at = at;
+        IS(MBM_LINK_LOST, read_one(s));
+        assert_int_equal(s->driver_on, 0);
+    }
+    s->write_dies_at = 0;
+    works(s);
+    assert_int_equal(s->sent, 9);
+}
+
+/* The half of a request would grow together with the next one. */
+static void the_gap_is_kept_after_a_link_lost_mid_write(void **state)
+{
+    NODE;
+
+    (void)n;
+    s->character = 0; /* what is handed over is on the wire */
+    s->cut_allowed = 1;
+    s->write_dies_at = 5;
+    IS(MBM_LINK_LOST, read_one(s));
+    s->write_dies_at = 0;
+    works(s);
+    assert_in_range(s->frames[1].begin - s->frames[0].end, 4000, 4100);
+}
+
+static void hooks_that_claim_more_than_asked_are_not_believed(void **state)
+{
+    NODE;
+
+    (void)n;
+    s->overclaim = 1000;
+    works(s);
+    assert_int_equal(s->counters.bytesSent, 8);
+    s->read_piece = 0;
+    sim_deliver_text(s, s->now, "01 02 03 04 05 06 07 08 09");
+    works(s);
+    assert_int_equal(s->frames[1].length, 8);
+}
+
+/* One read with its gap, hold and reply takes 12 ms; the wrap is put at each
+ * quarter of a character of it. */
+static void the_clock_may_wrap_at_any_time_of_a_transaction(void **state)
+{
+    uint32_t ahead;
+
+    (void)state;
+    for (ahead = 0; ahead < 12000; ahead += 25) {
+        void *inner;
+        sim *s;
+
+        assert_int_equal(sim_setup(&inner), 0);
+        s = (sim *)inner;
+        s->clock_start = (uint32_t)(0u - ahead - s->now);
+        mbm_master_setPostFlushHold(&s->master, 1);
+        mbm_master_setResponseTimeout(&s->master, 5);
+        sim_begin(s, 17);
+        sim_answer(s, 1, 3000, "11 03 02 00 2A +");
+        OK(read_one(s));
+        assert_in_range(s->frames[0].silence, 4000, 4100);
+        IS(MBM_RESPONSE_TIMED_OUT, read_one(s));
+        assert_in_range(s->now - s->frames[1].end, 5000 + 1146, 5000 + 1146 + 100);
+        sim_teardown(&inner);
+    }
+}
+
+static void the_clock_may_wrap_in_a_long_wait(void **state)
+{
+    static const uint32_t ahead[] = {100, 5000, 50000, 500000, 1999000, 2050000, 2100000};
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < COUNT(ahead); i++) {
+        void *inner;
+        sim *s;
+
+        assert_int_equal(sim_setup(&inner), 0);
+        s = (sim *)inner;
+        s->clock_start = (uint32_t)(0u - ahead[i] - s->now);
+        sim_begin(s, 17);
+        IS(MBM_RESPONSE_TIMED_OUT, read_one(s));
+        assert_in_range(s->now - s->frames[0].end, 2000000, 2000100);
+        works(s);
+        assert_in_range(s->frames[1].silence, 2000000 + 100000, 2000000 + 100200);
+        mbm_master_setSlaveID(&s->master, 0);
+        OK(mbm_master_writeSingleCoil(&s->master, 0, 0));
+        assert_in_range(s->now - s->frames[2].end, 100000, 100100);
+        sim_teardown(&inner);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        SIM_TEST(write_may_take_a_byte_at_a_time),
+        SIM_TEST(read_may_give_a_byte_at_a_time),
+        SIM_TEST(a_write_that_never_takes_a_byte_is_a_busy_line),
+        SIM_TEST(a_flush_that_never_drains_is_a_busy_line),
+        SIM_TEST(a_link_lost_in_the_gap_sends_nothing),
+        SIM_TEST(a_link_lost_mid_reply_ends_the_request_at_once),
+        SIM_TEST(a_link_lost_mid_write_switches_the_driver_off),
+        SIM_TEST(the_gap_is_kept_after_a_link_lost_mid_write),
+        SIM_TEST(hooks_that_claim_more_than_asked_are_not_believed),
+        SIM_TEST(the_clock_may_wrap_at_any_time_of_a_transaction),
+        SIM_TEST(the_clock_may_wrap_in_a_long_wait),
+    };
+
+    return cmocka_run_group_tests_name("bad port", tests, NULL, NULL);
+}

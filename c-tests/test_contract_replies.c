@@ -1,0 +1,473 @@
+/* What the contract keeps and mends about replies: what is a success, what is
+ * which failure, and that a reply is found in what a bad wire delivers. */
+#include "sim.h"
+#include "test.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define NODE sim *s = (sim *)*state; mbm_master *n = &s->master
+#define OK(call) assert_int_equal(call, MBM_OK)
+#define WORD(index) mbm_master_getResponseBuffer(n, index)
+
+static uint8_t read_words(sim *s, uint16_t quantity, const char *reply)
+{
+    sim_answer(s, 1, 500, reply);
+    return mbm_master_readHoldingRegisters(&s->master, 0, quantity);
+}
+
+/* The next transaction is not poisoned by what came before. */
+static void recovers_at_once(sim *s)
+{
+    OK(read_words(s, 1, "11 03 02 00 2A +"));
+    assert_int_equal(mbm_master_getResponseBuffer(&s->master, 0), 42);
+}
+
+static void found_behind(sim *s, const char *noise)
+{
+    char reply[600];
+
+    snprintf(reply, sizeof reply, "%s / 11 03 04 12 34 56 78 +", noise);
+    OK(read_words(s, 2, reply));
+    assert_int_equal(mbm_master_getResponseBuffer(&s->master, 0), 0x1234);
+    assert_int_equal(mbm_master_getResponseBuffer(&s->master, 1), 0x5678);
+    recovers_at_once(s);
+}
+
+static void exception_codes_of_the_device_are_passed_on_raw(void **state)
+{
+    unsigned code;
+    NODE;
+
+    for (code = 1; code < 0x80; code++) {
+        char reply[20];
+
+        snprintf(reply, sizeof reply, "11 83 %02X +", code);
+        s->answered = 0;
+        assert_int_equal(read_words(s, 1, reply), code);
+        assert_int_equal(mbm_master_getExceptionCode(n), code);
+        assert_int_equal(mbm_master_status(n), code);
+        if (s->sent > SIM_FRAMES - 2)
+            s->sent = 0;
+    }
+    assert_int_equal(s->counters.exceptions, 0x7F);
+    recovers_at_once(s);
+    assert_int_equal(mbm_master_getExceptionCode(n), 0);
+}
+
+static void an_exception_code_of_0_or_from_80_is_malformed_and_kept_raw(void **state)
+{
+    NODE;
+
+    assert_int_equal(read_words(s, 1, "11 83 00 +"), MBM_MALFORMED_REPLY);
+    assert_int_equal(mbm_master_getExceptionCode(n), 0);
+    assert_int_equal(read_words(s, 1, "11 83 80 +"), MBM_MALFORMED_REPLY);
+    assert_int_equal(mbm_master_getExceptionCode(n), 0x80);
+    assert_int_equal(read_words(s, 1, "11 83 E2 +"), MBM_MALFORMED_REPLY);
+    assert_int_equal(mbm_master_getExceptionCode(n), 0xE2);
+    recovers_at_once(s);
+}
+
+static void an_exception_with_a_bad_crc_is_none(void **state)
+{
+    NODE;
+
+    assert_int_equal(read_words(s, 1, "11 83 02 00 00"), MBM_INVALID_CRC);
+    assert_int_equal(mbm_master_getExceptionCode(n), 0);
+    assert_int_equal(s->counters.badCrc, 1);
+    recovers_at_once(s);
+}
+
+static void response_words_survive_a_failure(void **state)
+{
+    static const char *const replies[] = {
+        "11 83 02 +", "11 03 04 AA AA BB BB 00 00", "11 03 02 AA AA +", "11 04 04 AA AA BB BB +",
+        "12 03 04 AA AA BB BB +", "11 03 04 AA", "",
+    };
+    size_t i;
+    NODE;
+
+    OK(read_words(s, 2, "11 03 04 12 34 56 78 +"));
+    for (i = 0; i < COUNT(replies); i++) {
+        assert_int_not_equal(read_words(s, 2, replies[i]), MBM_OK);
+        assert_int_equal(WORD(0), 0x1234);
+        assert_int_equal(WORD(1), 0x5678);
+        assert_int_equal(WORD(2), 0);
+    }
+}
+
+static void each_failure_has_its_status(void **state)
+{
+    NODE;
+
+    assert_int_equal(read_words(s, 1, ""), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(read_words(s, 1, "12 03 02 00 01 +"), MBM_INVALID_SLAVE_ID);
+    assert_int_equal(read_words(s, 1, "11 04 02 00 01 +"), MBM_INVALID_FUNCTION);
+    assert_int_equal(read_words(s, 1, "11 84 02 +"), MBM_INVALID_FUNCTION);
+    assert_int_equal(read_words(s, 1, "11 03 02 00 01 00 00"), MBM_INVALID_CRC);
+    assert_int_equal(read_words(s, 1, "11 03 04 00 01 00 02 +"), MBM_MALFORMED_REPLY);
+    assert_int_equal(read_words(s, 1, "11 03 02 00"), MBM_RESPONSE_TIMED_OUT);
+    recovers_at_once(s);
+    (void)n;
+}
+
+static void the_most_telling_failure_is_reported(void **state)
+{
+    NODE;
+
+    (void)n;
+    assert_int_equal(read_words(s, 1, "12 03 02 00 01 + / 11 04 02 00 01 +"), MBM_INVALID_FUNCTION);
+    assert_int_equal(read_words(s, 1, "11 04 02 00 01 + / 12 03 02 00 01 +"), MBM_INVALID_FUNCTION);
+    assert_int_equal(read_words(s, 1, "11 03 04 00 01 00 02 + / 11 04 02 00 01 +"),
+                     MBM_MALFORMED_REPLY);
+    recovers_at_once(s);
+}
+
+static void a_bad_crc_fails_after_t35_and_not_after_the_timeout(void **state)
+{
+    uint64_t over;
+    NODE;
+
+    (void)n;
+    assert_int_equal(read_words(s, 1, "11 03 02 00 01 00 00"), MBM_INVALID_CRC);
+    over = s->frames[0].end + 500 + 7 * s->character;
+    assert_in_range(s->now, over + 4000, over + 4100);
+}
+
+static void all_125_registers_and_2000_bits_are_readable(void **state)
+{
+    uint8_t reply[256];
+    char text[1024];
+    unsigned i, at;
+    NODE;
+
+    at = (unsigned)snprintf(text, sizeof text, "11 03 FA ");
+    for (i = 0; i < 250; i++)
+        at += (unsigned)snprintf(text + at, sizeof text - at, "%02X ", i);
+    snprintf(text + at, sizeof text - at, "+");
+    assert_int_equal(sim_bytes(reply, text), 255);
+    OK(read_words(s, 125, text));
+    assert_int_equal(mbm_master_available(n), 125);
+    for (i = 0; i < 125; i++)
+        assert_int_equal(mbm_master_receive(n), (2 * i) << 8 | (2 * i + 1));
+    text[4] = '1';
+    sim_answer(s, 1, 500, text);
+    OK(mbm_master_readCoils(n, 0, 2000));
+    for (i = 0; i < 125; i++)
+        assert_int_equal(WORD((uint8_t)i), (2 * i + 1) << 8 | (2 * i));
+}
+
+static void reads_of_65_registers_and_more_are_not_refused_here(void **state)
+{
+    NODE;
+
+    assert_int_equal(read_words(s, 66, "11 83 02 +"), MBM_ILLEGAL_DATA_ADDRESS);
+    sim_assert_sent(s, 0, "11 03 00 00 00 42 +");
+    (void)n;
+}
+
+static void a_byte_count_of_251_to_255_is_malformed(void **state)
+{
+    unsigned count;
+    NODE;
+
+    mbm_master_setResponseTimeout(n, 100);
+    for (count = 251; count < 256; count++) {
+        char reply[40];
+
+        snprintf(reply, sizeof reply, "11 03 %02X 12 34 56 78 +", count);
+        assert_int_equal(read_words(s, 1, reply), MBM_MALFORMED_REPLY);
+        /* With a CRC that is wrong as well it is no frame at all. */
+        reply[strlen(reply) - 1] = '\0';
+        assert_int_not_equal(read_words(s, 1, reply), MBM_OK);
+    }
+    recovers_at_once(s);
+}
+
+static void a_byte_count_other_than_asked_is_malformed(void **state)
+{
+    NODE;
+
+    OK(read_words(s, 2, "11 03 04 11 11 22 22 +"));
+    assert_int_equal(read_words(s, 4, "11 03 02 AA AA +"), MBM_MALFORMED_REPLY);
+    assert_int_equal(WORD(0), 0x1111);
+    sim_answer(s, 1, 500, "11 01 02 FF FF +");
+    assert_int_equal(mbm_master_readCoils(n, 0, 8), MBM_MALFORMED_REPLY);
+    sim_answer(s, 1, 500, "11 17 02 FF FF +");
+    assert_int_equal(mbm_master_readWriteMultipleRegisters(n, 0, 2, 0, 1), MBM_MALFORMED_REPLY);
+    recovers_at_once(s);
+}
+
+static void malformed(sim *s, uint8_t status)
+{
+    assert_int_equal(status, MBM_MALFORMED_REPLY);
+    recovers_at_once(s);
+}
+
+static void an_echo_with_another_address_or_value_is_malformed(void **state)
+{
+    NODE;
+
+    mbm_master_setResponseTimeout(n, 100);
+    sim_answer(s, 1, 500, "11 05 00 02 FF 00 +");
+    malformed(s, mbm_master_writeSingleCoil(n, 1, 1));
+    sim_answer(s, 1, 500, "11 05 00 01 00 00 +");
+    malformed(s, mbm_master_writeSingleCoil(n, 1, 1));
+    sim_answer(s, 1, 500, "11 06 00 02 12 34 +");
+    malformed(s, mbm_master_writeSingleRegister(n, 1, 0x1234));
+    sim_answer(s, 1, 500, "11 06 00 01 12 35 +");
+    malformed(s, mbm_master_writeSingleRegister(n, 1, 0x1234));
+    sim_answer(s, 1, 500, "11 0F 00 01 00 08 +");
+    malformed(s, mbm_master_writeMultipleCoils(n, 1, 9));
+    sim_answer(s, 1, 500, "11 0F 00 00 00 09 +");
+    malformed(s, mbm_master_writeMultipleCoils(n, 1, 9));
+    sim_answer(s, 1, 500, "11 10 00 01 00 01 +");
+    malformed(s, mbm_master_writeMultipleRegisters(n, 1, 2));
+    sim_answer(s, 1, 500, "11 10 01 01 00 02 +");
+    malformed(s, mbm_master_writeMultipleRegisters(n, 1, 2));
+    sim_answer(s, 1, 500, "11 16 00 01 00 02 00 04 +");
+    malformed(s, mbm_master_maskWriteRegister(n, 1, 2, 3));
+    sim_answer(s, 1, 500, "11 16 00 01 00 06 00 03 +");
+    malformed(s, mbm_master_maskWriteRegister(n, 1, 2, 3));
+}
+
+static void stray_bytes_in_front_cost_nothing(void **state)
+{
+    NODE;
+
+    found_behind(s, "00");
+    found_behind(s, "FF FE 7F 00 33");
+    found_behind(s, "11");
+    found_behind(s, "11 11 11 11");
+    assert_int_equal(s->counters.resynchronisations, 4);
+    (void)n;
+}
+
+static void noise_that_looks_like_our_header_costs_nothing(void **state)
+{
+    NODE;
+
+    (void)n;
+    found_behind(s, "11 03");
+    found_behind(s, "11 03 04");
+    found_behind(s, "11 03 04 00");
+    found_behind(s, "11 03 04 12 34 56 78");
+    found_behind(s, "11 03 04 00 00 00 00 00 00");
+    found_behind(s, "11 83");
+    found_behind(s, "11 83 02 00 00");
+    assert_int_equal(s->sent, 14);
+}
+
+/* The head of a long reply keeps the line for what may still come; an exception
+ * behind it is found all the same, also if the line was silent between. */
+static void an_exception_behind_noise_that_looks_like_a_longer_reply_is_found(void **state)
+{
+    NODE;
+
+    (void)n;
+    assert_int_equal(read_words(s, 10, "11 03 14 00 / 11 83 02 +"), MBM_ILLEGAL_DATA_ADDRESS);
+    sim_answer(s, 1, 500, "11 03 14 00");
+    sim_answer(s, 1, 20000, "11 83 02 +");
+    assert_int_equal(mbm_master_readHoldingRegisters(n, 0, 10), MBM_ILLEGAL_DATA_ADDRESS);
+    assert_true(s->now - s->frames[1].end < 30000);
+}
+
+static void a_frame_of_another_unit_in_front_costs_nothing(void **state)
+{
+    NODE;
+
+    (void)n;
+    found_behind(s, "12 03 04 AA AA BB BB +");
+    found_behind(s, "12 83 02 +");
+    found_behind(s, "12 03 00 00 00 02 + / 12 03 04 AA AA BB BB +");
+    assert_int_equal(s->counters.foreignFrames, 4);
+}
+
+static void a_late_reply_of_another_function_or_length_costs_nothing(void **state)
+{
+    NODE;
+
+    (void)n;
+    found_behind(s, "11 04 04 AA AA BB BB +");
+    found_behind(s, "11 03 02 AA AA +");
+    found_behind(s, "11 06 00 01 00 02 +");
+    found_behind(s, "11 84 02 +");
+}
+
+static void a_reply_in_two_pieces_is_found_at_the_end_of_the_second(void **state)
+{
+    NODE;
+
+    sim_answer(s, 1, 500, "11 03 04 12 34");
+    /* The CRC of the whole frame, as a device would send it. */
+    sim_answer(s, 1, 50000, "56 78 90 C6");
+    OK(mbm_master_readHoldingRegisters(n, 0, 2));
+    assert_int_equal(WORD(1), 0x5678);
+}
+
+/* Noise like our head, a pause, and only then the reply: whatever the first
+ * call makes of it, its reply must not become the second call's data. */
+static void a_reply_behind_noise_and_a_pause_is_not_taken_for_the_next(void **state)
+{
+    uint8_t status;
+    NODE;
+
+    sim_answer(s, 1, 500, "11 03 02 00 00 00 00");
+    sim_answer(s, 1, 6500, "11 03 02 11 11 +");
+    status = mbm_master_readHoldingRegisters(n, 100, 1);
+    assert_true(status == MBM_OK || status == MBM_INVALID_CRC);
+    sim_answer(s, 1, 5000, "11 03 02 22 22 +");
+    if (mbm_master_readHoldingRegisters(n, 200, 1) == MBM_OK)
+        assert_int_equal(WORD(0), 0x2222);
+}
+
+/* Data may look like anything, so a pause within them ends nothing. */
+static void a_pause_behind_data_that_look_like_a_damaged_exception_ends_nothing(void **state)
+{
+    NODE;
+
+    sim_answer(s, 1, 500, "11 03 08 11 83 01 02 03 04");
+    sim_answer(s, 1, 50000, "05 06 09 D9");
+    OK(mbm_master_readHoldingRegisters(n, 0, 4));
+    assert_int_equal(WORD(3), 0x0506);
+}
+
+static void a_foreign_frame_whose_data_look_like_our_damaged_reply_ends_nothing(void **state)
+{
+    NODE;
+
+    sim_answer(s, 1, 500, "12 03 06 11 83 01 02 03 04 +");
+    sim_answer(s, 1, 20000, "11 03 02 00 2A +");
+    OK(mbm_master_readHoldingRegisters(n, 0, 1));
+}
+
+static void an_echo_is_dropped_when_told_to_expect_one(void **state)
+{
+    NODE;
+
+    OK(mbm_master_setEchoDiscard(n, 1));
+    s->echo = 1;
+    OK(read_words(s, 1, "11 03 02 00 2A +"));
+    sim_answer(s, 1, 500, "11 06 00 01 00 02 +");
+    OK(mbm_master_writeSingleRegister(n, 1, 2));
+    sim_answer(s, 1, 500, "11 10 00 01 00 02 +");
+    OK(mbm_master_writeMultipleRegisters(n, 1, 2));
+    sim_answer(s, 1, 500, "11 0F 00 01 00 09 +");
+    OK(mbm_master_writeMultipleCoils(n, 1, 9));
+    sim_answer(s, 1, 500, "11 16 00 01 00 02 00 03 +");
+    OK(mbm_master_maskWriteRegister(n, 1, 2, 3));
+    sim_answer(s, 1, 500, "11 17 02 00 2A +");
+    OK(mbm_master_readWriteMultipleRegisters(n, 1, 1, 3, 1));
+    sim_answer(s, 1, 500, "11 05 00 01 FF 00 +");
+    OK(mbm_master_writeSingleCoil(n, 1, 1));
+}
+
+static void a_damaged_echo_is_dropped_too(void **state)
+{
+    NODE;
+
+    OK(mbm_master_setEchoDiscard(n, 1));
+    mbm_master_setTransmitBuffer(n, 0, 0x1111);
+    mbm_master_setTransmitBuffer(n, 1, 0x2222);
+    sim_answer(s, 1, 0, "11 10 00 01 00 02 04 11 11 22 23 AB 23");
+    sim_answer(s, 1, 3000, "11 10 00 01 00 02 +");
+    OK(mbm_master_writeMultipleRegisters(n, 1, 2));
+}
+
+static void noise_in_front_of_the_echo_hides_no_foreign_frame_behind_it(void **state)
+{
+    NODE;
+
+    OK(mbm_master_setEchoDiscard(n, 1));
+    assert_int_equal(read_words(s, 1, "00 / 11 03 00 00 00 01 + / 12 03 02 00 01 +"),
+                     MBM_INVALID_SLAVE_ID);
+    assert_int_equal(s->counters.foreignFrames, 1);
+}
+
+static void an_echo_alone_is_no_success(void **state)
+{
+    NODE;
+
+    OK(mbm_master_setEchoDiscard(n, 1));
+    OK(mbm_master_setResponseTimeout(n, 100));
+    s->echo = 1;
+    assert_int_equal(mbm_master_writeSingleRegister(n, 1, 2), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(mbm_master_writeSingleCoil(n, 1, 1), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(mbm_master_writeMultipleRegisters(n, 1, 2), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(mbm_master_maskWriteRegister(n, 1, 2, 3), MBM_RESPONSE_TIMED_OUT);
+}
+
+static void an_echo_without_discard_is_passed_over_where_it_is_no_reply(void **state)
+{
+    NODE;
+
+    s->echo = 1;
+    OK(read_words(s, 1, "11 03 02 00 2A +"));
+    sim_answer(s, 1, 500, "11 10 00 01 00 02 +");
+    OK(mbm_master_writeMultipleRegisters(n, 1, 2));
+}
+
+static void a_device_that_does_not_echo_still_answers_reads_with_discard_on(void **state)
+{
+    NODE;
+
+    OK(mbm_master_setEchoDiscard(n, 1));
+    OK(read_words(s, 1, "11 03 02 00 2A +"));
+}
+
+static void counters_count_what_happened(void **state)
+{
+    NODE;
+
+    mbm_master_setResponseTimeout(n, 100);
+    recovers_at_once(s);
+    assert_int_equal(read_words(s, 1, "11 83 02 +"), 2);
+    assert_int_equal(read_words(s, 1, ""), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(read_words(s, 1, "11 03 02 00 01 00 00"), MBM_INVALID_CRC);
+    assert_int_equal(s->counters.requests, 4);
+    assert_int_equal(s->counters.replies, 2);
+    assert_int_equal(s->counters.exceptions, 1);
+    assert_int_equal(s->counters.timeouts, 1);
+    assert_int_equal(s->counters.badCrc, 1);
+    assert_int_equal(s->counters.bytesSent, 32);
+    assert_int_equal(s->counters.bytesReceived, 7 + 5 + 7);
+    OK(mbm_master_setCounters(n, NULL));
+    recovers_at_once(s);
+    assert_int_equal(s->counters.requests, 4);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        SIM_TEST(exception_codes_of_the_device_are_passed_on_raw),
+        SIM_TEST(an_exception_code_of_0_or_from_80_is_malformed_and_kept_raw),
+        SIM_TEST(an_exception_with_a_bad_crc_is_none),
+        SIM_TEST(response_words_survive_a_failure),
+        SIM_TEST(each_failure_has_its_status),
+        SIM_TEST(the_most_telling_failure_is_reported),
+        SIM_TEST(a_bad_crc_fails_after_t35_and_not_after_the_timeout),
+        SIM_TEST(all_125_registers_and_2000_bits_are_readable),
+        SIM_TEST(reads_of_65_registers_and_more_are_not_refused_here),
+        SIM_TEST(a_byte_count_of_251_to_255_is_malformed),
+        SIM_TEST(a_byte_count_other_than_asked_is_malformed),
+        SIM_TEST(an_echo_with_another_address_or_value_is_malformed),
+        SIM_TEST(stray_bytes_in_front_cost_nothing),
+        SIM_TEST(noise_that_looks_like_our_header_costs_nothing),
+        SIM_TEST(an_exception_behind_noise_that_looks_like_a_longer_reply_is_found),
+        SIM_TEST(a_frame_of_another_unit_in_front_costs_nothing),
+        SIM_TEST(a_late_reply_of_another_function_or_length_costs_nothing),
+        SIM_TEST(a_reply_in_two_pieces_is_found_at_the_end_of_the_second),
+        SIM_TEST(a_reply_behind_noise_and_a_pause_is_not_taken_for_the_next),
+        SIM_TEST(a_pause_behind_data_that_look_like_a_damaged_exception_ends_nothing),
+        SIM_TEST(a_foreign_frame_whose_data_look_like_our_damaged_reply_ends_nothing),
+        SIM_TEST(an_echo_is_dropped_when_told_to_expect_one),
+        SIM_TEST(a_damaged_echo_is_dropped_too),
+        SIM_TEST(noise_in_front_of_the_echo_hides_no_foreign_frame_behind_it),
+        SIM_TEST(an_echo_alone_is_no_success),
+        SIM_TEST(an_echo_without_discard_is_passed_over_where_it_is_no_reply),
+        SIM_TEST(a_device_that_does_not_echo_still_answers_reads_with_discard_on),
+        SIM_TEST(counters_count_what_happened),
+    };
+
+    return cmocka_run_group_tests_name("contract: replies", tests, NULL, NULL);
+}

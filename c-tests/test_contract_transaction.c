@@ -1,0 +1,276 @@
+/* One transaction of the contract: the order of its steps and the gap before
+ * it, on the simulated clock. Unit 17 is 11 on the wire. */
+#include "sim.h"
+#include "test.h"
+
+#define NODE sim *s = (sim *)*state; mbm_master *n = &s->master
+#define OK(call) assert_int_equal(call, MBM_OK)
+
+/* What the simulation's own steps may add to a time, in microseconds. */
+enum { SLACK = 60 };
+
+static void assert_time(uint64_t time, uint64_t wanted)
+{
+    assert_in_range(time, wanted, wanted + SLACK);
+}
+
+static uint8_t read_one(sim *s)
+{
+    return mbm_master_readHoldingRegisters(&s->master, 0, 1);
+}
+
+static void answered_read(sim *s, uint32_t delay)
+{
+    sim_answer(s, 1, delay, "11 03 02 00 2A +");
+    OK(read_one(s));
+    assert_int_equal(mbm_master_getResponseBuffer(&s->master, 0), 42);
+}
+
+static void steps_come_in_order(void **state)
+{
+    NODE;
+
+    (void)n;
+    sim_deliver_text(s, s->now, "DE AD BE EF");
+    answered_read(s, 5000);
+    /* Stale bytes dropped, driver on, write, flush, driver off, idle, reply. */
+    sim_assert_order(s, "PWFOR", "RPWFOR");
+    sim_assert_order(s, "POI", "IPOI");
+    assert_int_equal(s->counters.resynchronisations, 0);
+    sim_assert_sent(s, 0, "11 03 00 00 00 01 +");
+}
+
+static void steps_come_in_order_when_the_port_takes_bytes_one_by_one(void **state)
+{
+    NODE;
+
+    (void)n;
+    s->write_piece = 1;
+    s->write_busy = 3;
+    answered_read(s, 5000);
+    sim_assert_order(s, "PWFO", "PWFO");
+    assert_int_equal(s->counters.bytesSent, 8);
+}
+
+static void bytes_that_wait_in_the_receiver_are_no_part_of_the_reply(void **state)
+{
+    NODE;
+
+    (void)n;
+    sim_deliver_text(s, s->now, "11 03 02 66 66 +");
+    answered_read(s, 500);
+}
+
+static void the_driver_goes_off_only_behind_the_last_bit(void **state)
+{
+    NODE;
+
+    (void)n;
+    s->character = 1146;
+    answered_read(s, 500);
+    assert_time(sim_time_of(s, 'O'), s->frames[0].end);
+}
+
+static void the_driver_is_held_on_behind_an_early_flush(void **state)
+{
+    NODE;
+
+    s->character = 1146;
+    s->flush_lies = 1;
+    OK(mbm_master_setBaudRate(n, 9600));
+    OK(mbm_master_setPostFlushHold(n, 9));
+    answered_read(s, 500);
+    assert_int_equal(s->post_before_last_bit, 0);
+    assert_time(sim_time_of(s, 'O') - sim_time_of(s, 'F'), 9 * 1146);
+    assert_int_equal(s->idle_while_driving, 0);
+}
+
+static void a_hold_in_an_untold_rate_is_that_of_9600_baud(void **state)
+{
+    NODE;
+
+    s->flush_lies = 1;
+    OK(mbm_master_setPostFlushHold(n, 2));
+    answered_read(s, 500);
+    assert_time(sim_time_of(s, 'O') - sim_time_of(s, 'F'), 2 * 1146);
+}
+
+static void every_hook_but_three_may_be_missing(void **state)
+{
+    NODE;
+
+    s->port.flush = NULL;
+    s->port.preTransmission = NULL;
+    s->port.postTransmission = NULL;
+    s->port.idle = NULL;
+    OK(mbm_master_begin(n, 17, &s->port));
+    answered_read(s, 500);
+    sim_assert_order(s, "PFOI", "");
+}
+
+static void the_first_request_waits_for_the_gap_after_begin(void **state)
+{
+    NODE;
+
+    (void)n;
+    answered_read(s, 500);
+    assert_time(s->frames[0].silence, 4000);
+}
+
+static void gap_after_reply(sim *s, uint32_t wanted)
+{
+    answered_read(s, 500);
+    answered_read(s, 500);
+    assert_time(s->frames[s->sent - 1].silence, wanted);
+}
+
+static void the_gap_is_4_ms_while_the_rate_is_untold(void **state)
+{
+    NODE;
+
+    gap_after_reply(s, 4000);
+    mbm_master_setBaudRate(n, 115200);
+    mbm_master_setBaudRate(n, 0);
+    gap_after_reply(s, 4000);
+}
+
+static void the_gap_is_three_and_a_half_characters_up_to_19200_baud(void **state)
+{
+    NODE;
+
+    OK(mbm_master_setBaudRate(n, 9600));
+    gap_after_reply(s, 4011);
+    OK(mbm_master_setBaudRate(n, 1200));
+    gap_after_reply(s, 32084);
+    OK(mbm_master_setBaudRate(n, 19200));
+    gap_after_reply(s, 2006);
+}
+
+static void the_gap_is_1750_us_above_19200_baud(void **state)
+{
+    NODE;
+
+    OK(mbm_master_setBaudRate(n, 19201));
+    gap_after_reply(s, 1750);
+    OK(mbm_master_setBaudRate(n, 1000000));
+    gap_after_reply(s, 1750);
+}
+
+static void a_gap_of_ones_own_holds_until_the_rate_is_told(void **state)
+{
+    NODE;
+
+    OK(mbm_master_setGap(n, 20000));
+    gap_after_reply(s, 20000);
+    OK(mbm_master_setGap(n, 0));
+    gap_after_reply(s, 0);
+    OK(mbm_master_setBaudRate(n, 115200));
+    gap_after_reply(s, 1750);
+}
+
+static void the_gap_counts_from_the_last_foreign_byte(void **state)
+{
+    NODE;
+
+    (void)n;
+    answered_read(s, 500);
+    sim_deliver_text(s, s->now + 3000, "05 03 02 00 01 +");
+    sim_deliver_text(s, s->now + 6000, "99");
+    answered_read(s, 500);
+    assert_time(s->frames[1].silence, 4000);
+    sim_assert_order(s, "PR", "PRPR");
+}
+
+static void the_gap_counts_from_the_last_byte_sent(void **state)
+{
+    NODE;
+
+    mbm_master_setTurnaroundDelay(n, 0);
+    mbm_master_setSlaveID(n, 0);
+    OK(mbm_master_writeSingleCoil(n, 1, 1));
+    OK(mbm_master_writeSingleCoil(n, 1, 1));
+    assert_time(s->frames[1].begin - s->frames[0].end, 4000);
+}
+
+static void no_gap_is_waited_for_that_has_passed_already(void **state)
+{
+    uint64_t asked;
+    NODE;
+
+    (void)n;
+    answered_read(s, 500);
+    s->now += 10000;
+    asked = s->now;
+    answered_read(s, 500);
+    assert_time(s->frames[1].begin - asked, 0);
+}
+
+static void line_used_makes_the_gap_count_from_now(void **state)
+{
+    uint64_t asked;
+    NODE;
+
+    answered_read(s, 500);
+    s->now += 10000;
+    asked = s->now;
+    OK(mbm_master_lineUsed(n));
+    answered_read(s, 500);
+    assert_time(s->frames[1].begin - asked, 4000);
+}
+
+static void idle_is_not_called_while_bytes_wait(void **state)
+{
+    NODE;
+
+    (void)n;
+    s->character = 0;
+    s->read_piece = 1;
+    answered_read(s, 500);
+    sim_assert_order(s, "IRO", "IOIR");
+}
+
+static void many_objects_share_a_stream(void **state)
+{
+    static mbm_master other;
+    uint16_t words[4];
+    uint8_t frame[MBM_FRAME_BYTES(4)];
+    NODE;
+
+    OK(mbm_master_setBuffers(&other, words, 4, NULL, 0, frame, sizeof frame));
+    OK(mbm_master_begin(&other, 3, &s->port));
+    answered_read(s, 500);
+    mbm_master_lineUsed(&other);
+    sim_answer(s, 1, 500, "03 04 02 00 07 +");
+    OK(mbm_master_readInputRegisters(&other, 0, 1));
+    assert_int_equal(words[0], 7);
+    assert_time(s->frames[1].silence, 4000);
+    assert_int_equal(mbm_master_getResponseBuffer(n, 0), 42);
+    mbm_master_lineUsed(n);
+    answered_read(s, 500);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        SIM_TEST(steps_come_in_order),
+        SIM_TEST(steps_come_in_order_when_the_port_takes_bytes_one_by_one),
+        SIM_TEST(bytes_that_wait_in_the_receiver_are_no_part_of_the_reply),
+        SIM_TEST(the_driver_goes_off_only_behind_the_last_bit),
+        SIM_TEST(the_driver_is_held_on_behind_an_early_flush),
+        SIM_TEST(a_hold_in_an_untold_rate_is_that_of_9600_baud),
+        SIM_TEST(every_hook_but_three_may_be_missing),
+        SIM_TEST(the_first_request_waits_for_the_gap_after_begin),
+        SIM_TEST(the_gap_is_4_ms_while_the_rate_is_untold),
+        SIM_TEST(the_gap_is_three_and_a_half_characters_up_to_19200_baud),
+        SIM_TEST(the_gap_is_1750_us_above_19200_baud),
+        SIM_TEST(a_gap_of_ones_own_holds_until_the_rate_is_told),
+        SIM_TEST(the_gap_counts_from_the_last_foreign_byte),
+        SIM_TEST(the_gap_counts_from_the_last_byte_sent),
+        SIM_TEST(no_gap_is_waited_for_that_has_passed_already),
+        SIM_TEST(line_used_makes_the_gap_count_from_now),
+        SIM_TEST(idle_is_not_called_while_bytes_wait),
+        SIM_TEST(many_objects_share_a_stream),
+    };
+
+    return cmocka_run_group_tests_name("contract: one transaction", tests, NULL, NULL);
+}

@@ -1,0 +1,307 @@
+/* How long a transaction of the contract waits for what: reply, quiet time,
+ * turnaround, a busy line. On the simulated clock; unit 17 is 11 on the wire. */
+#include "sim.h"
+#include "test.h"
+
+#define NODE sim *s = (sim *)*state; mbm_master *n = &s->master
+#define OK(call) assert_int_equal(call, MBM_OK)
+
+/* What the simulation's own steps may add to a time, in microseconds. */
+enum { SLACK = 60 };
+
+static void assert_time(uint64_t time, uint64_t wanted)
+{
+    assert_in_range(time, wanted, wanted + SLACK);
+}
+
+static uint8_t read_one(sim *s)
+{
+    return mbm_master_readHoldingRegisters(&s->master, 0, 1);
+}
+
+static void answered_read(sim *s, uint32_t delay)
+{
+    sim_answer(s, 1, delay, "11 03 02 00 2A +");
+    OK(read_one(s));
+    assert_int_equal(mbm_master_getResponseBuffer(&s->master, 0), 42);
+}
+
+static void gap_after_reply(sim *s, uint32_t wanted)
+{
+    answered_read(s, 500);
+    answered_read(s, 500);
+    assert_time(s->frames[s->sent - 1].silence, wanted);
+}
+
+static void a_reply_may_take_2000_ms(void **state)
+{
+    NODE;
+
+    assert_int_equal(mbm_master_readHoldingRegisters(n, 0, 1), MBM_RESPONSE_TIMED_OUT);
+    assert_time(s->now - sim_time_of(s, 'O'), 2000000);
+    assert_true(s->idles > 1000);
+    assert_int_equal(s->counters.timeouts, 1);
+    answered_read(s, 1990000);
+}
+
+static void the_response_timeout_can_be_set(void **state)
+{
+    NODE;
+
+    OK(mbm_master_setResponseTimeout(n, 7));
+    assert_int_equal(read_one(s), MBM_RESPONSE_TIMED_OUT);
+    assert_time(s->now - sim_time_of(s, 'O'), 7000);
+    OK(mbm_master_setResponseTimeout(n, 65535));
+    answered_read(s, 65000000);
+}
+
+static void idle_away(sim *s)
+{
+    if (s->sent > 0)
+        s->now += 3000000;
+}
+
+static void a_reply_that_is_complete_as_the_deadline_passes_is_a_success(void **state)
+{
+    NODE;
+
+    (void)n;
+    s->on_idle = idle_away;
+    answered_read(s, 1500000);
+}
+
+/* Ports such as Arduino's give a byte at a time; that changes nothing. */
+static void a_reply_read_byte_by_byte_behind_the_deadline_is_a_success(void **state)
+{
+    NODE;
+
+    (void)n;
+    s->on_idle = idle_away;
+    s->read_piece = 1;
+    answered_read(s, 1500000);
+}
+
+/* However much is read behind the deadline, it must have an end. */
+static void chatter_does_not_hold_a_request_for_ever(void **state)
+{
+    static const uint8_t noise[8000] = {0};
+    NODE;
+
+    mbm_master_setResponseTimeout(n, 50);
+    s->step = 100;
+    s->read_piece = 1;
+    s->character = 0;
+    sim_deliver(s, 4500, noise, sizeof noise);
+    assert_int_equal(read_one(s), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(s->sent, 1);
+    assert_in_range(s->now - s->frames[0].end, 50000, 300000);
+}
+
+static void a_long_idle_while_a_reply_arrives_is_tolerated(void **state)
+{
+    NODE;
+
+    mbm_master_setResponseTimeout(n, 10000);
+    s->on_idle = idle_away;
+    answered_read(s, 100);
+    assert_true(s->idles < 1000);
+}
+
+static void the_line_is_left_alone_after_a_timeout(void **state)
+{
+    uint64_t failed;
+    NODE;
+
+    assert_int_equal(read_one(s), MBM_RESPONSE_TIMED_OUT);
+    failed = s->now;
+    answered_read(s, 500);
+    assert_time(s->frames[1].begin - failed, 100000);
+    /* Only then: not after a success. */
+    answered_read(s, 500);
+    assert_time(s->frames[2].silence, 4000);
+    OK(mbm_master_setQuietTime(n, 250));
+    assert_int_equal(read_one(s), MBM_RESPONSE_TIMED_OUT);
+    failed = s->now;
+    answered_read(s, 500);
+    assert_time(s->frames[4].begin - failed, 250000);
+}
+
+static void a_reply_in_the_quiet_time_is_dropped(void **state)
+{
+    uint64_t failed;
+    NODE;
+
+    (void)n;
+    sim_answer(s, 1, 2050000, "11 03 02 66 66 +");
+    assert_int_equal(read_one(s), MBM_RESPONSE_TIMED_OUT);
+    failed = s->now;
+    answered_read(s, 500);
+    /* Whether it makes the quiet time begin anew is left open. */
+    assert_true(s->frames[1].begin >= failed + 100000);
+    assert_true(s->frames[1].silence >= 4000);
+    assert_true(s->frames[1].begin <= failed + 160000);
+}
+
+/* One frame and then silence is not a line that never falls silent. */
+static void a_reply_late_in_the_quiet_time_does_not_make_the_line_busy(void **state)
+{
+    NODE;
+
+    mbm_master_setResponseTimeout(n, 50);
+    sim_answer(s, 1, 130000, "11 03 02 66 66 +");
+    assert_int_equal(read_one(s), MBM_RESPONSE_TIMED_OUT);
+    answered_read(s, 500);
+}
+
+static void a_request_without_reply_is_repeated_as_often_as_told(void **state)
+{
+    NODE;
+
+    OK(mbm_master_setRetries(n, 2));
+    sim_answer(s, 3, 500, "11 03 02 00 2A +");
+    OK(read_one(s));
+    assert_int_equal(s->sent, 3);
+    assert_int_equal(s->counters.requests, 3);
+    assert_int_equal(s->counters.timeouts, 2);
+    assert_time(s->frames[1].silence, 2000000 + 100000);
+    sim_assert_sent(s, 2, "11 03 00 00 00 01 +");
+    assert_int_equal(read_one(s), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(s->sent, 6);
+}
+
+static void damaged_and_malformed_replies_are_worth_a_retry_exceptions_are_not(void **state)
+{
+    NODE;
+
+    OK(mbm_master_setRetries(n, 1));
+    sim_answer(s, 1, 500, "11 03 02 00 2A 00 00");
+    sim_answer(s, 2, 500, "11 03 02 00 2A +");
+    OK(read_one(s));
+    sim_answer(s, 1, 500, "11 03 04 00 00 00 00 +");
+    sim_answer(s, 2, 500, "11 03 02 00 2A +");
+    OK(read_one(s));
+    assert_int_equal(s->sent, 4);
+    sim_answer(s, 1, 500, "11 83 06 +");
+    assert_int_equal(read_one(s), MBM_SLAVE_DEVICE_BUSY);
+    assert_int_equal(s->sent, 5);
+}
+
+static void a_broadcast_succeeds_after_the_turnaround_delay(void **state)
+{
+    NODE;
+
+    OK(mbm_master_setSlaveID(n, 0));
+    OK(mbm_master_writeSingleRegister(n, 1, 2));
+    sim_assert_sent(s, 0, "00 06 00 01 00 02 +");
+    assert_time(s->now - sim_time_of(s, 'O'), 100000);
+    sim_assert_order(s, "OI", "IOI");
+    OK(mbm_master_setTurnaroundDelay(n, 30));
+    OK(mbm_master_writeMultipleCoils(n, 1, 9));
+    assert_time(s->now - s->frames[1].end, 30000);
+    OK(mbm_master_writeMultipleRegisters(n, 1, 2));
+    OK(mbm_master_maskWriteRegister(n, 1, 2, 3));
+    assert_int_equal(s->counters.replies, 0);
+    assert_int_equal(s->idle_while_driving, 0);
+}
+
+static void a_read_is_not_broadcast(void **state)
+{
+    NODE;
+
+    mbm_master_setSlaveID(n, 0);
+    assert_int_equal(mbm_master_readCoils(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
+    assert_int_equal(mbm_master_readDiscreteInputs(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
+    assert_int_equal(mbm_master_readHoldingRegisters(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
+    assert_int_equal(mbm_master_readInputRegisters(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
+    assert_int_equal(mbm_master_readWriteMultipleRegisters(n, 0, 1, 0, 1),
+                     MBM_BROADCAST_NOT_ALLOWED);
+    assert_int_equal(mbm_master_requestFrom(n, 0, 1), 0);
+    assert_int_equal(s->sent, 0);
+}
+
+static void a_line_that_never_falls_silent_is_busy(void **state)
+{
+    static const uint8_t noise[300] = {0};
+    unsigned i;
+    NODE;
+
+    OK(mbm_master_setResponseTimeout(n, 100));
+    s->limit = 1000000;
+    for (i = 0; i < 10; i++)
+        sim_deliver(s, 30000u * i, noise, sizeof noise);
+    assert_int_equal(read_one(s), MBM_LINE_BUSY);
+    assert_int_equal(s->sent, 0);
+    assert_in_range(s->now, 100000, 110000);
+}
+
+static void an_endless_drain_is_bounded_even_if_every_read_gives_bytes(void **state)
+{
+    static const uint8_t noise[4000] = {0};
+    NODE;
+
+    OK(mbm_master_setResponseTimeout(n, 1));
+    s->character = 0;
+    sim_deliver(s, 0, noise, sizeof noise);
+    s->read_piece = 1;
+    assert_int_equal(read_one(s), MBM_LINE_BUSY);
+    assert_in_range(s->now, 1000, 10000);
+}
+
+/* A slow line is not a dead port: bytes leave all the time. */
+static void a_request_that_takes_longer_than_the_reply_may_is_sent(void **state)
+{
+    NODE;
+
+    s->character = 1146;
+    OK(mbm_master_setBaudRate(n, 9600));
+    OK(mbm_master_setResponseTimeout(n, 100));
+    sim_answer(s, 1, 500, "11 10 00 00 00 64 +");
+    OK(mbm_master_writeMultipleRegisters(n, 0, 100));
+}
+
+
+static void a_port_that_takes_a_byte_now_and_then_is_not_busy(void **state)
+{
+    NODE;
+
+    s->character = 1146;
+    s->write_piece = 1;
+    s->write_busy = 500; /* a byte in 1 ms */
+    OK(mbm_master_setResponseTimeout(n, 100));
+    sim_answer(s, 1, 500, "11 10 00 00 00 64 +");
+    OK(mbm_master_writeMultipleRegisters(n, 0, 100));
+}
+
+static void a_gap_longer_than_the_timeout_is_waited_for(void **state)
+{
+    NODE;
+
+    OK(mbm_master_setResponseTimeout(n, 3));
+    gap_after_reply(s, 4000);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        SIM_TEST(a_reply_may_take_2000_ms),
+        SIM_TEST(the_response_timeout_can_be_set),
+        SIM_TEST(a_reply_that_is_complete_as_the_deadline_passes_is_a_success),
+        SIM_TEST(a_reply_read_byte_by_byte_behind_the_deadline_is_a_success),
+        SIM_TEST(chatter_does_not_hold_a_request_for_ever),
+        SIM_TEST(a_long_idle_while_a_reply_arrives_is_tolerated),
+        SIM_TEST(the_line_is_left_alone_after_a_timeout),
+        SIM_TEST(a_reply_in_the_quiet_time_is_dropped),
+        SIM_TEST(a_reply_late_in_the_quiet_time_does_not_make_the_line_busy),
+        SIM_TEST(a_request_without_reply_is_repeated_as_often_as_told),
+        SIM_TEST(damaged_and_malformed_replies_are_worth_a_retry_exceptions_are_not),
+        SIM_TEST(a_broadcast_succeeds_after_the_turnaround_delay),
+        SIM_TEST(a_read_is_not_broadcast),
+        SIM_TEST(a_line_that_never_falls_silent_is_busy),
+        SIM_TEST(an_endless_drain_is_bounded_even_if_every_read_gives_bytes),
+        SIM_TEST(a_request_that_takes_longer_than_the_reply_may_is_sent),
+        SIM_TEST(a_port_that_takes_a_byte_now_and_then_is_not_busy),
+        SIM_TEST(a_gap_longer_than_the_timeout_is_waited_for),
+    };
+
+    return cmocka_run_group_tests_name("contract: waits", tests, NULL, NULL);
+}
