@@ -7,8 +7,6 @@
 #include <string.h>
 
 #define NODE sim *s = (sim *)*state; mbm_master *n = &s->master
-#define OK(call) assert_int_equal(call, MBM_OK)
-#define IS(status, call) assert_int_equal(call, status)
 
 /* The functions that make a request. */
 static void all_requests_answer(mbm_master *m, uint8_t status)
@@ -128,7 +126,7 @@ static void an_object_without_buffers_makes_no_request(void **state)
     IS(MBM_BUFFER_TOO_SMALL, mbm_master_sendBit(&m, 1));
     OK(mbm_master_clearResponseBuffer(&m));
     OK(mbm_master_clearTransmitBuffer(&m));
-    OK(mbm_master_poll(&m));
+    IS(MBM_NOT_INITIALISED, mbm_master_poll(&m));
 }
 
 /* requestFrom has no status of its own, so status must have it. */
@@ -154,12 +152,12 @@ static void an_object_with_buffers_but_never_begun_makes_no_request(void **state
     memset(&m, 0, sizeof m);
     OK(mbm_master_setBuffers(&m, words, 1, words + 1, 1, frame, sizeof frame));
     all_requests_answer(&m, MBM_NOT_INITIALISED);
-    OK(mbm_master_poll(&m));
+    IS(MBM_NOT_INITIALISED, mbm_master_poll(&m));
     mbm_master_lineUsed(&m);
     mbm_master_cancel(&m);
 }
 
-static void an_object_with_buffers_but_never_begun_has_no_slave_id(void **state)
+static void an_object_with_buffers_but_never_begun_has_the_default_slave_id(void **state)
 {
     mbm_master m;
     uint8_t frame[32];
@@ -167,7 +165,7 @@ static void an_object_with_buffers_but_never_begun_has_no_slave_id(void **state)
     (void)state;
     memset(&m, 0, sizeof m);
     OK(mbm_master_setBuffers(&m, NULL, 0, NULL, 0, frame, sizeof frame));
-    assert_int_equal(mbm_master_getSlaveID(&m), 0);
+    assert_int_equal(mbm_master_getSlaveID(&m), 1);
 }
 
 static void a_port_without_its_three_hooks_is_refused(void **state)
@@ -444,7 +442,7 @@ int main(void)
         SIM_TEST(an_object_without_buffers_makes_no_request),
         SIM_TEST(status_says_why_request_from_gave_nothing),
         SIM_TEST(an_object_with_buffers_but_never_begun_makes_no_request),
-        SIM_TEST(an_object_with_buffers_but_never_begun_has_no_slave_id),
+        SIM_TEST(an_object_with_buffers_but_never_begun_has_the_default_slave_id),
         SIM_TEST(a_port_without_its_three_hooks_is_refused),
         SIM_TEST(forbidden_quantities_are_answered_3_with_nothing_sent),
         SIM_TEST(ranges_beyond_65535_are_answered_2_with_nothing_sent),

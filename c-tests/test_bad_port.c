@@ -4,8 +4,6 @@
 #include "test.h"
 
 #define NODE sim *s = (sim *)*state; mbm_master *n = &s->master
-#define OK(call) assert_int_equal(call, MBM_OK)
-#define IS(status, call) assert_int_equal(call, status)
 
 static uint8_t read_one(sim *s)
 {

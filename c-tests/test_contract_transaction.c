@@ -4,7 +4,6 @@
 #include "test.h"
 
 #define NODE sim *s = (sim *)*state; mbm_master *n = &s->master
-#define OK(call) assert_int_equal(call, MBM_OK)
 
 /* What the simulation's own steps may add to a time, in microseconds. */
 enum { SLACK = 60 };

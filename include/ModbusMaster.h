@@ -31,6 +31,7 @@
 #include "ModbusMasterConstants.h"
 #include "mbm.h"
 
+/** @cond the macros are explained at the head of the file */
 #if !defined(MODBUSMASTER_RESPONSE_WORDS)
 #if defined(__AVR__)
 #define MODBUSMASTER_RESPONSE_WORDS 64
@@ -68,6 +69,7 @@
 #define MODBUSMASTER_YIELD() static_cast<void>(0)
 #endif
 #endif
+/** @endcond */
 
 /**
  * A Modbus RTU master: one line, one request at a time.

@@ -61,6 +61,7 @@ protected:
     static const void *lastUser;
 };
 
+/** @cond the homes of what is declared above */
 template <typename Unused> const void *ModbusMasterStatics<Unused>::lastUser = nullptr;
 #define MODBUSMASTER_HOME(name) \
     template <typename Unused> const uint8_t ModbusMasterStatics<Unused>::name
@@ -82,6 +83,7 @@ MODBUSMASTER_HOME(ku8MBPending);
 MODBUSMASTER_HOME(ku8MBLineBusy);
 MODBUSMASTER_HOME(ku8MBCancelled);
 #undef MODBUSMASTER_HOME
+/** @endcond */
 
 // Templates, so that a core's own functions of these names do not clash.
 #if !defined(lowWord)

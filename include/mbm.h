@@ -185,9 +185,10 @@
  * A Modbus RTU master: one line, one request at a time.
  *
  * Storage is yours and must be zero before first use, which a static object
- * is (`static mbm_master node;`). Not re-entrant:
- * use one object from one thread and never from an interrupt; several
- * objects are independent of each other.
+ * is (`static mbm_master node;`). Settings and words want mbm_master_begin or
+ * mbm_master_setBuffers before them, requests want both. Not re-entrant: use
+ * one object from one thread and never from an interrupt; several objects are
+ * independent of each other.
  */
 typedef struct mbm_master {
     /**
@@ -324,9 +325,9 @@ uint8_t mbm_master_begin(struct mbm_master *master,
  *
  * @param master         the object; zeroed before the first call
  * @param response       words that reads fill; NULL only with 0 words
- * @param responseWords  0 to 125; 125 hold any reply
+ * @param responseWords  0 to 255; 125 hold any reply
  * @param transmit       words that writes send; NULL only with 0 words
- * @param transmitWords  0 to 123; 123 hold any request
+ * @param transmitWords  0 to 255; 123 hold any request
  * @param frame          bytes of one frame; keeps nothing between requests
  * @param frameBytes     at least 8; 256 hold any frame
  * @return MBM_OK, MBM_INVALID_ARGUMENT, or MBM_BUSY while a request is under way
@@ -590,7 +591,8 @@ uint8_t mbm_master_setSlaveID(struct mbm_master *master, uint8_t slave);
  * The unit that requests go to.
  *
  * @param master  the object
- * @return the unit id; 0 for an object that was never begun
+ * @return the unit id, 1 until somebody says otherwise; 0 for an object that is
+ *         not ready for settings
  */
 uint8_t mbm_master_getSlaveID(const struct mbm_master *master);
 
@@ -637,12 +639,14 @@ uint8_t mbm_master_setGap(struct mbm_master *master, uint32_t microseconds);
 uint8_t mbm_master_setTurnaroundDelay(struct mbm_master *master, uint16_t milliseconds);
 
 /**
- * Sets how long the line is left alone after a timeout, so that a late reply is
- * not taken for the next one. What arrives meanwhile is dropped.
+ * Sets how long the line is left alone after a request that got no right
+ * reply, so that a late one is not taken for the next. What arrives meanwhile
+ * is dropped.
  *
- * RTU cannot tell a late reply of the same unit, function and length from the
- * one that is waited for; this time is what makes that rare. A slave that may
- * answer after the response timeout plus this time needs a longer timeout.
+ * RTU cannot tell a late reply of the same unit, function and length, nor a
+ * late exception to the same function, from the one that is waited for; this
+ * time is what makes that rare. A slave that may answer after the response
+ * timeout plus this time needs a longer timeout.
  *
  * @param master        the object
  * @param milliseconds  0 to 65535; 100 at first

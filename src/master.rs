@@ -157,6 +157,12 @@ impl<P: Port, S: Storage> Master<P, S> {
         Status::OK
     }
 
+    /// Notes that a request was refused, and why.
+    pub fn refuse(&mut self, status: Status) -> Status {
+        self.status = status;
+        status
+    }
+
     /// Starts what a function built, or fails without sending anything.
     fn start(&mut self, request: Result<Request, Status>) -> Status {
         if self.transaction.is_pending() {

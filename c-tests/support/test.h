@@ -11,4 +11,8 @@
 
 #define COUNT(array) (sizeof(array) / sizeof((array)[0]))
 
+/* What a call of mbm.h returns. */
+#define IS(status, call) assert_int_equal(call, status)
+#define OK(call) IS(MBM_OK, call)
+
 #endif

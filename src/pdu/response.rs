@@ -9,15 +9,17 @@ use crate::error::Status;
 const EXCEPTION_LENGTH: usize = 2;
 
 /// The length of the response to `request` that begins with the bytes of
-/// `pdu`, as far as they tell; `None` if no response to it begins so.
+/// `pdu`, or the least length while they do not tell; `None` if no response to
+/// it begins so.
 pub fn expected(request: &Request, pdu: &[u8]) -> Option<usize> {
     let length = request.response_length();
     match pdu {
-        [] => {}
+        [] => return Some(EXCEPTION_LENGTH),
         [function, ..] if *function == request.function() | EXCEPTION => {
             return Some(EXCEPTION_LENGTH);
         }
         [function, ..] if *function != request.function() => return None,
+        [_] if request.is_read() => return Some(EXCEPTION_LENGTH),
         [_, count, ..] if request.is_read() && *count != length - 2 => return None,
         _ => {}
     }

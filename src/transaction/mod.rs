@@ -5,8 +5,9 @@
 //! echo in front of it cost nothing but their own time.
 //!
 //! What RTU cannot tell apart: a late reply of the same unit, function and
-//! length to an earlier request looks like the reply. After a timeout the
-//! line is therefore given a quiet time before the next request.
+//! length to an earlier request, or a late exception to the same function,
+//! looks like the reply. After a request that got no right reply the line is
+//! therefore given a quiet time before the next request.
 
 mod settings;
 mod storage;
@@ -55,7 +56,7 @@ pub struct Transaction<P, S> {
     waiting: bool,
     /// What has arrived was searched behind its first candidate.
     skimmed: bool,
-    /// The last reply timed out, and may still come.
+    /// The last request went without a right reply, which may still come.
     late: bool,
     /// The request itself is expected to come back before the reply.
     echo: bool,
@@ -136,19 +137,25 @@ impl<P, S> Transaction<P, S> {
         elapsed(self.now, self.since) >= time
     }
 
-    /// True once the phase has lasted as long as the response timeout.
-    fn is_over(&self) -> bool {
-        self.lasts(millis(self.settings.response_timeout))
+    /// True once the phase has lasted as long as the response timeout and
+    /// `more` microseconds.
+    fn is_over(&self, more: u32) -> bool {
+        self.lasts(millis(self.settings.response_timeout).saturating_add(more))
     }
 
-    /// A port that takes nothing or drains nothing is not waited for longer
-    /// than a reply.
-    fn stalled(&self) -> Status {
-        if self.is_over() {
+    /// A line that is not silent, or a port that does not move, is not waited
+    /// for longer than a reply and the `time` that it may take.
+    fn stalled(&self, time: u32) -> Status {
+        if self.is_over(time) {
             Status::LINE_BUSY
         } else {
             Status::PENDING
         }
+    }
+
+    /// How long the request is on the wire.
+    fn send_time(&self) -> u32 {
+        u32::from(self.settings.character) * (self.request.length() + rtu::OVERHEAD) as u32
     }
 
     fn listen_from(&mut self, now: u32) {
@@ -204,12 +211,23 @@ impl<P: Port, S: Storage> Transaction<P, S> {
         Ok(())
     }
 
-    /// Gives the request up, with the driver off.
+    /// Gives the request up, with the driver off. Bytes of it may be on the
+    /// wire, and a whole one may be answered late.
     pub fn cancel(&mut self) {
+        if !matches!(self.phase, Phase::Idle | Phase::Gap) {
+            self.line_used();
+            self.late = self.phase != Phase::Send;
+        }
+        self.end();
+    }
+
+    /// Ends the transaction, with the driver off.
+    fn end(&mut self) {
         if matches!(self.phase, Phase::Send | Phase::Flush | Phase::Hold) {
             self.port.post_transmission();
         }
         self.phase = Phase::Idle;
+        self.waiting = false;
     }
 
     /// How long, in microseconds from `now`, poll will find nothing to do unless
@@ -258,8 +276,11 @@ impl<P: Port, S: Storage> Transaction<P, S> {
             Phase::Reply => self.receive(),
             Phase::Turnaround => self.turn_around(),
         };
-        if status != Status::PENDING {
-            self.cancel();
+        match status {
+            Status::PENDING => {}
+            // The line may come back, and with it what was on its way.
+            Status::LINK_LOST | Status::LINE_BUSY => self.cancel(),
+            _ => self.end(),
         }
         status
     }
@@ -273,7 +294,7 @@ impl<P: Port, S: Storage> Transaction<P, S> {
             Ok(count) => {
                 self.storage.count(Counter::BytesReceived, count);
                 self.last_byte = self.now;
-                return self.stalled();
+                return self.stalled(self.silence_to_keep());
             }
         }
         if elapsed(self.now, self.last_byte) < self.silence_to_keep() {
@@ -309,8 +330,11 @@ impl<P: Port, S: Storage> Transaction<P, S> {
             Ok(count) => {
                 self.storage.count(Counter::BytesSent, count);
                 self.at += count as u16;
+                if count > 0 {
+                    self.since = self.now;
+                }
                 if count < left {
-                    return self.stalled();
+                    return self.stalled(0);
                 }
                 self.phase = Phase::Flush;
                 self.flush()
@@ -320,7 +344,7 @@ impl<P: Port, S: Storage> Transaction<P, S> {
 
     fn flush(&mut self) -> Status {
         if !self.port.flush() {
-            return self.stalled();
+            return self.stalled(self.send_time());
         }
         if self.settings.post_flush_hold > 0 {
             self.enter(Phase::Hold);
@@ -361,7 +385,7 @@ impl<P: Port, S: Storage> Transaction<P, S> {
     }
 
     fn receive(&mut self) -> Status {
-        let over = self.is_over();
+        let over = self.is_over(0);
         // As the deadline passes, all that has arrived is looked at, even if
         // the port hands it over byte by byte.
         for _ in 0..if over { rtu::MAX_FRAME } else { 1 } {
@@ -396,7 +420,7 @@ impl<P: Port, S: Storage> Transaction<P, S> {
             }
         }
         if over || self.window.seen() >= Seen::BadCrc {
-            self.fail(over)
+            self.fail()
         } else {
             Status::PENDING
         }
@@ -452,12 +476,11 @@ impl<P: Port, S: Storage> Transaction<P, S> {
     }
 
     /// No reply came: asks again, or says why with the most telling status.
-    fn fail(&mut self, over: bool) -> Status {
+    fn fail(&mut self) -> Status {
         self.count_foreign();
-        if over {
-            self.late = true;
-            self.last_byte = self.now;
-        }
+        // What was taken for a damaged reply may have been noise.
+        self.late = true;
+        self.last_byte = self.now;
         let status = match self.window.seen() {
             Seen::Nothing => Status::RESPONSE_TIMED_OUT,
             Seen::OtherUnit => Status::INVALID_SLAVE_ID,

@@ -15,7 +15,8 @@ pub struct Settings {
     pub response_timeout: u16,
     /// What slaves are given to carry out a broadcast, in milliseconds.
     pub turnaround_delay: u16,
-    /// What a late reply is given after a timeout, in milliseconds.
+    /// What a late reply is given after a request that got none, in
+    /// milliseconds.
     pub quiet_time: u16,
     /// How often a request is repeated that was not answered.
     pub retries: u8,

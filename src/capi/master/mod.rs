@@ -21,9 +21,10 @@ const BEGUN: u16 = 0x4D42;
 /// A Modbus RTU master: one line, one request at a time.
 ///
 /// Storage is yours and must be zero before first use, which a static object
-/// is (`static mbm_master node;`). Not re-entrant:
-/// use one object from one thread and never from an interrupt; several
-/// objects are independent of each other.
+/// is (`static mbm_master node;`). Settings and words want mbm_master_begin or
+/// mbm_master_setBuffers before them, requests want both. Not re-entrant: use
+/// one object from one thread and never from an interrupt; several objects are
+/// independent of each other.
 #[repr(C)]
 pub struct mbm_master {
     /// Not for you.
@@ -138,9 +139,9 @@ pub unsafe extern "C" fn mbm_master_begin(
 ///
 /// @param master         the object; zeroed before the first call
 /// @param response       words that reads fill; NULL only with 0 words
-/// @param responseWords  0 to 125; 125 hold any reply
+/// @param responseWords  0 to 255; 125 hold any reply
 /// @param transmit       words that writes send; NULL only with 0 words
-/// @param transmitWords  0 to 123; 123 hold any request
+/// @param transmitWords  0 to 255; 123 hold any request
 /// @param frame          bytes of one frame; keeps nothing between requests
 /// @param frameBytes     at least 8; 256 hold any frame
 /// @return MBM_OK, MBM_INVALID_ARGUMENT, or MBM_BUSY while a request is under way
@@ -154,11 +155,12 @@ pub unsafe extern "C" fn mbm_master_setBuffers(
     frame: *mut u8,
     frameBytes: u16,
 ) -> u8 {
-    let missing = (response.is_null() && responseWords > 0)
+    let useless = (response.is_null() && responseWords > 0)
         || (transmit.is_null() && transmitWords > 0)
+        || responseWords.max(transmitWords) > 255
         || frame.is_null()
         || frameBytes < 8;
-    if missing {
+    if useless {
         return Status::INVALID_ARGUMENT.code();
     }
     // SAFETY: as the header demands.
@@ -256,7 +258,7 @@ unsafe fn request(
     let mut status = unsafe {
         pointers::with(pointer, |master| {
             if master.core.storage().frame.is_null() || !master.core.port().is_complete() {
-                return Status::NOT_INITIALISED;
+                return master.core.refuse(Status::NOT_INITIALISED);
             }
             blocking = master.blocking;
             start(&mut master.core)

@@ -24,7 +24,8 @@ pub unsafe extern "C" fn mbm_master_setSlaveID(master: *mut mbm_master, slave: u
 /// The unit that requests go to.
 ///
 /// @param master  the object
-/// @return the unit id; 0 for an object that was never begun
+/// @return the unit id, 1 until somebody says otherwise; 0 for an object that is
+///         not ready for settings
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_getSlaveID(master: *const mbm_master) -> u8 {
     // SAFETY: as the header demands.
@@ -107,12 +108,14 @@ pub unsafe extern "C" fn mbm_master_setTurnaroundDelay(
     }
 }
 
-/// Sets how long the line is left alone after a timeout, so that a late reply is
-/// not taken for the next one. What arrives meanwhile is dropped.
+/// Sets how long the line is left alone after a request that got no right
+/// reply, so that a late one is not taken for the next. What arrives meanwhile
+/// is dropped.
 ///
-/// RTU cannot tell a late reply of the same unit, function and length from the
-/// one that is waited for; this time is what makes that rare. A slave that may
-/// answer after the response timeout plus this time needs a longer timeout.
+/// RTU cannot tell a late reply of the same unit, function and length, nor a
+/// late exception to the same function, from the one that is waited for; this
+/// time is what makes that rare. A slave that may answer after the response
+/// timeout plus this time needs a longer timeout.
 ///
 /// @param master        the object
 /// @param milliseconds  0 to 65535; 100 at first
