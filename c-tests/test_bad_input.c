@@ -6,8 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define NODE sim *s = (sim *)*state; mbm_master *n = &s->master
-
 /* The functions that make a request. */
 static void all_requests_answer(mbm_master *m, uint8_t status)
 {

@@ -3,20 +3,6 @@
 #include "sim.h"
 #include "test.h"
 
-#define NODE sim *s = (sim *)*state; mbm_master *n = &s->master
-
-static uint8_t read_one(sim *s)
-{
-    return mbm_master_readHoldingRegisters(&s->master, 0, 1);
-}
-
-static void works(sim *s)
-{
-    sim_answer(s, 1, 500, "11 03 02 00 2A +");
-    OK(read_one(s));
-    assert_int_equal(mbm_master_getResponseBuffer(&s->master, 0), 42);
-}
-
 static void write_may_take_a_byte_at_a_time(void **state)
 {
     unsigned i;
@@ -38,7 +24,7 @@ static void read_may_give_a_byte_at_a_time(void **state)
     (void)n;
     s->read_piece = 1;
     sim_deliver_text(s, s->now, "01 02 03 04 05");
-    works(s);
+    sim_reads(s, 500);
 }
 
 static void a_write_that_never_takes_a_byte_is_a_busy_line(void **state)
@@ -47,12 +33,12 @@ static void a_write_that_never_takes_a_byte_is_a_busy_line(void **state)
 
     (void)n;
     s->write_never = 1;
-    IS(MBM_LINE_BUSY, read_one(s));
+    IS(MBM_LINE_BUSY, sim_read_one(s));
     assert_int_equal(s->sent, 0);
     sim_assert_order(s, "PO", "PO");
     assert_in_range(s->now, 2000000, 2500000);
     s->write_never = 0;
-    works(s);
+    sim_reads(s, 500);
 }
 
 static void a_flush_that_never_drains_is_a_busy_line(void **state)
@@ -61,11 +47,11 @@ static void a_flush_that_never_drains_is_a_busy_line(void **state)
 
     (void)n;
     s->flush_never = 1;
-    IS(MBM_LINE_BUSY, read_one(s));
+    IS(MBM_LINE_BUSY, sim_read_one(s));
     sim_assert_order(s, "PO", "PO");
     assert_in_range(s->now, 2000000, 2500000);
     s->flush_never = 0;
-    works(s);
+    sim_reads(s, 500);
 }
 
 static void a_link_lost_in_the_gap_sends_nothing(void **state)
@@ -73,12 +59,12 @@ static void a_link_lost_in_the_gap_sends_nothing(void **state)
     NODE;
 
     s->read_dead = 1;
-    IS(MBM_LINK_LOST, read_one(s));
+    IS(MBM_LINK_LOST, sim_read_one(s));
     IS(MBM_LINK_LOST, mbm_master_status(n));
     assert_int_equal(s->sent, 0);
     sim_assert_order(s, "PWO", "");
     s->read_dead = 0;
-    works(s);
+    sim_reads(s, 500);
 }
 
 static void die_mid_reply(sim *s)
@@ -94,12 +80,12 @@ static void a_link_lost_mid_reply_ends_the_request_at_once(void **state)
     mbm_master_setRetries(n, 3);
     s->on_idle = die_mid_reply;
     sim_answer(s, 1, 500, "11 03 02 00 07 +");
-    IS(MBM_LINK_LOST, read_one(s));
+    IS(MBM_LINK_LOST, sim_read_one(s));
     assert_int_equal(s->sent, 1);
     assert_true(s->now < 20000);
     s->on_idle = NULL;
     s->read_dead = 0;
-    works(s);
+    sim_reads(s, 500);
 }
 
 static void a_link_lost_mid_write_switches_the_driver_off(void **state)
@@ -111,11 +97,11 @@ static void a_link_lost_mid_write_switches_the_driver_off(void **state)
     s->cut_allowed = 7;
     for (at = 1; at <= 8; at++) {
         s->write_dies_at = at;
-        IS(MBM_LINK_LOST, read_one(s));
+        IS(MBM_LINK_LOST, sim_read_one(s));
         assert_int_equal(s->driver_on, 0);
     }
     s->write_dies_at = 0;
-    works(s);
+    sim_reads(s, 500);
     assert_int_equal(s->sent, 9);
 }
 
@@ -128,9 +114,9 @@ static void the_gap_is_kept_after_a_link_lost_mid_write(void **state)
     s->character = 0; /* what is handed over is on the wire */
     s->cut_allowed = 1;
     s->write_dies_at = 5;
-    IS(MBM_LINK_LOST, read_one(s));
+    IS(MBM_LINK_LOST, sim_read_one(s));
     s->write_dies_at = 0;
-    works(s);
+    sim_reads(s, 500);
     assert_in_range(s->frames[1].begin - s->frames[0].end, 4000, 4100);
 }
 
@@ -140,11 +126,11 @@ static void hooks_that_claim_more_than_asked_are_not_believed(void **state)
 
     (void)n;
     s->overclaim = 1000;
-    works(s);
+    sim_reads(s, 500);
     assert_int_equal(s->counters.bytesSent, 8);
     s->read_piece = 0;
     sim_deliver_text(s, s->now, "01 02 03 04 05 06 07 08 09");
-    works(s);
+    sim_reads(s, 500);
     assert_int_equal(s->frames[1].length, 8);
 }
 
@@ -166,9 +152,9 @@ static void the_clock_may_wrap_at_any_time_of_a_transaction(void **state)
         mbm_master_setResponseTimeout(&s->master, 5);
         sim_begin(s, 17);
         sim_answer(s, 1, 3000, "11 03 02 00 2A +");
-        OK(read_one(s));
+        OK(sim_read_one(s));
         assert_in_range(s->frames[0].silence, 4000, 4100);
-        IS(MBM_RESPONSE_TIMED_OUT, read_one(s));
+        IS(MBM_RESPONSE_TIMED_OUT, sim_read_one(s));
         assert_in_range(s->now - s->frames[1].end, 5000 + 1146, 5000 + 1146 + 100);
         sim_teardown(&inner);
     }
@@ -188,9 +174,9 @@ static void the_clock_may_wrap_in_a_long_wait(void **state)
         s = (sim *)inner;
         s->clock_start = (uint32_t)(0u - ahead[i] - s->now);
         sim_begin(s, 17);
-        IS(MBM_RESPONSE_TIMED_OUT, read_one(s));
+        IS(MBM_RESPONSE_TIMED_OUT, sim_read_one(s));
         assert_in_range(s->now - s->frames[0].end, 2000000, 2000100);
-        works(s);
+        sim_reads(s, 500);
         assert_in_range(s->frames[1].silence, 2000000 + 100000, 2000000 + 100200);
         mbm_master_setSlaveID(&s->master, 0);
         OK(mbm_master_writeSingleCoil(&s->master, 0, 0));

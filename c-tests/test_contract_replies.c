@@ -6,7 +6,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#define NODE sim *s = (sim *)*state; mbm_master *n = &s->master
 #define WORD(index) mbm_master_getResponseBuffer(n, index)
 
 static uint8_t read_words(sim *s, uint16_t quantity, const char *reply)

@@ -5,7 +5,6 @@
 
 #include <string.h>
 
-#define NODE sim *s = (sim *)*state; mbm_master *n = &s->master
 #define WORD(index) mbm_master_getResponseBuffer(n, index)
 #define LAST(text) sim_assert_sent(s, s->sent - 1, text)
 

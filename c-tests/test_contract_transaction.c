@@ -3,35 +3,13 @@
 #include "sim.h"
 #include "test.h"
 
-#define NODE sim *s = (sim *)*state; mbm_master *n = &s->master
-
-/* What the simulation's own steps may add to a time, in microseconds. */
-enum { SLACK = 60 };
-
-static void assert_time(uint64_t time, uint64_t wanted)
-{
-    assert_in_range(time, wanted, wanted + SLACK);
-}
-
-static uint8_t read_one(sim *s)
-{
-    return mbm_master_readHoldingRegisters(&s->master, 0, 1);
-}
-
-static void answered_read(sim *s, uint32_t delay)
-{
-    sim_answer(s, 1, delay, "11 03 02 00 2A +");
-    OK(read_one(s));
-    assert_int_equal(mbm_master_getResponseBuffer(&s->master, 0), 42);
-}
-
 static void steps_come_in_order(void **state)
 {
     NODE;
 
     (void)n;
     sim_deliver_text(s, s->now, "DE AD BE EF");
-    answered_read(s, 5000);
+    sim_reads(s, 5000);
     /* Stale bytes dropped, driver on, write, flush, driver off, idle, reply. */
     sim_assert_order(s, "PWFOR", "RPWFOR");
     sim_assert_order(s, "POI", "IPOI");
@@ -46,7 +24,7 @@ static void steps_come_in_order_when_the_port_takes_bytes_one_by_one(void **stat
     (void)n;
     s->write_piece = 1;
     s->write_busy = 3;
-    answered_read(s, 5000);
+    sim_reads(s, 5000);
     sim_assert_order(s, "PWFO", "PWFO");
     assert_int_equal(s->counters.bytesSent, 8);
 }
@@ -57,7 +35,7 @@ static void bytes_that_wait_in_the_receiver_are_no_part_of_the_reply(void **stat
 
     (void)n;
     sim_deliver_text(s, s->now, "11 03 02 66 66 +");
-    answered_read(s, 500);
+    sim_reads(s, 500);
 }
 
 static void the_driver_goes_off_only_behind_the_last_bit(void **state)
@@ -66,8 +44,8 @@ static void the_driver_goes_off_only_behind_the_last_bit(void **state)
 
     (void)n;
     s->character = 1146;
-    answered_read(s, 500);
-    assert_time(sim_time_of(s, 'O'), s->frames[0].end);
+    sim_reads(s, 500);
+    sim_assert_time(sim_time_of(s, 'O'), s->frames[0].end);
 }
 
 static void the_driver_is_held_on_behind_an_early_flush(void **state)
@@ -78,9 +56,9 @@ static void the_driver_is_held_on_behind_an_early_flush(void **state)
     s->flush_lies = 1;
     OK(mbm_master_setBaudRate(n, 9600));
     OK(mbm_master_setPostFlushHold(n, 9));
-    answered_read(s, 500);
+    sim_reads(s, 500);
     assert_int_equal(s->post_before_last_bit, 0);
-    assert_time(sim_time_of(s, 'O') - sim_time_of(s, 'F'), 9 * 1146);
+    sim_assert_time(sim_time_of(s, 'O') - sim_time_of(s, 'F'), 9 * 1146);
     assert_int_equal(s->idle_while_driving, 0);
 }
 
@@ -90,8 +68,8 @@ static void a_hold_in_an_untold_rate_is_that_of_9600_baud(void **state)
 
     s->flush_lies = 1;
     OK(mbm_master_setPostFlushHold(n, 2));
-    answered_read(s, 500);
-    assert_time(sim_time_of(s, 'O') - sim_time_of(s, 'F'), 2 * 1146);
+    sim_reads(s, 500);
+    sim_assert_time(sim_time_of(s, 'O') - sim_time_of(s, 'F'), 2 * 1146);
 }
 
 static void every_hook_but_three_may_be_missing(void **state)
@@ -103,7 +81,7 @@ static void every_hook_but_three_may_be_missing(void **state)
     s->port.postTransmission = NULL;
     s->port.idle = NULL;
     OK(mbm_master_begin(n, 17, &s->port));
-    answered_read(s, 500);
+    sim_reads(s, 500);
     sim_assert_order(s, "PFOI", "");
 }
 
@@ -112,15 +90,15 @@ static void the_first_request_waits_for_the_gap_after_begin(void **state)
     NODE;
 
     (void)n;
-    answered_read(s, 500);
-    assert_time(s->frames[0].silence, 4000);
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[0].silence, 4000);
 }
 
 static void gap_after_reply(sim *s, uint32_t wanted)
 {
-    answered_read(s, 500);
-    answered_read(s, 500);
-    assert_time(s->frames[s->sent - 1].silence, wanted);
+    sim_reads(s, 500);
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[s->sent - 1].silence, wanted);
 }
 
 static void the_gap_is_4_ms_while_the_rate_is_untold(void **state)
@@ -172,11 +150,11 @@ static void the_gap_counts_from_the_last_foreign_byte(void **state)
     NODE;
 
     (void)n;
-    answered_read(s, 500);
+    sim_reads(s, 500);
     sim_deliver_text(s, s->now + 3000, "05 03 02 00 01 +");
     sim_deliver_text(s, s->now + 6000, "99");
-    answered_read(s, 500);
-    assert_time(s->frames[1].silence, 4000);
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[1].silence, 4000);
     sim_assert_order(s, "PR", "PRPR");
 }
 
@@ -188,7 +166,7 @@ static void the_gap_counts_from_the_last_byte_sent(void **state)
     mbm_master_setSlaveID(n, 0);
     OK(mbm_master_writeSingleCoil(n, 1, 1));
     OK(mbm_master_writeSingleCoil(n, 1, 1));
-    assert_time(s->frames[1].begin - s->frames[0].end, 4000);
+    sim_assert_time(s->frames[1].begin - s->frames[0].end, 4000);
 }
 
 static void no_gap_is_waited_for_that_has_passed_already(void **state)
@@ -197,11 +175,11 @@ static void no_gap_is_waited_for_that_has_passed_already(void **state)
     NODE;
 
     (void)n;
-    answered_read(s, 500);
+    sim_reads(s, 500);
     s->now += 10000;
     asked = s->now;
-    answered_read(s, 500);
-    assert_time(s->frames[1].begin - asked, 0);
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[1].begin - asked, 0);
 }
 
 static void line_used_makes_the_gap_count_from_now(void **state)
@@ -209,12 +187,12 @@ static void line_used_makes_the_gap_count_from_now(void **state)
     uint64_t asked;
     NODE;
 
-    answered_read(s, 500);
+    sim_reads(s, 500);
     s->now += 10000;
     asked = s->now;
     OK(mbm_master_lineUsed(n));
-    answered_read(s, 500);
-    assert_time(s->frames[1].begin - asked, 4000);
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[1].begin - asked, 4000);
 }
 
 static void idle_is_not_called_while_bytes_wait(void **state)
@@ -224,7 +202,7 @@ static void idle_is_not_called_while_bytes_wait(void **state)
     (void)n;
     s->character = 0;
     s->read_piece = 1;
-    answered_read(s, 500);
+    sim_reads(s, 500);
     sim_assert_order(s, "IRO", "IOIR");
 }
 
@@ -237,15 +215,15 @@ static void many_objects_share_a_stream(void **state)
 
     OK(mbm_master_setBuffers(&other, words, 4, NULL, 0, frame, sizeof frame));
     OK(mbm_master_begin(&other, 3, &s->port));
-    answered_read(s, 500);
+    sim_reads(s, 500);
     mbm_master_lineUsed(&other);
     sim_answer(s, 1, 500, "03 04 02 00 07 +");
     OK(mbm_master_readInputRegisters(&other, 0, 1));
     assert_int_equal(words[0], 7);
-    assert_time(s->frames[1].silence, 4000);
+    sim_assert_time(s->frames[1].silence, 4000);
     assert_int_equal(mbm_master_getResponseBuffer(n, 0), 42);
     mbm_master_lineUsed(n);
-    answered_read(s, 500);
+    sim_reads(s, 500);
 }
 
 int main(void)

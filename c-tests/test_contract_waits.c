@@ -3,33 +3,11 @@
 #include "sim.h"
 #include "test.h"
 
-#define NODE sim *s = (sim *)*state; mbm_master *n = &s->master
-
-/* What the simulation's own steps may add to a time, in microseconds. */
-enum { SLACK = 60 };
-
-static void assert_time(uint64_t time, uint64_t wanted)
-{
-    assert_in_range(time, wanted, wanted + SLACK);
-}
-
-static uint8_t read_one(sim *s)
-{
-    return mbm_master_readHoldingRegisters(&s->master, 0, 1);
-}
-
-static void answered_read(sim *s, uint32_t delay)
-{
-    sim_answer(s, 1, delay, "11 03 02 00 2A +");
-    OK(read_one(s));
-    assert_int_equal(mbm_master_getResponseBuffer(&s->master, 0), 42);
-}
-
 static void gap_after_reply(sim *s, uint32_t wanted)
 {
-    answered_read(s, 500);
-    answered_read(s, 500);
-    assert_time(s->frames[s->sent - 1].silence, wanted);
+    sim_reads(s, 500);
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[s->sent - 1].silence, wanted);
 }
 
 static void a_reply_may_take_2000_ms(void **state)
@@ -37,10 +15,10 @@ static void a_reply_may_take_2000_ms(void **state)
     NODE;
 
     assert_int_equal(mbm_master_readHoldingRegisters(n, 0, 1), MBM_RESPONSE_TIMED_OUT);
-    assert_time(s->now - sim_time_of(s, 'O'), 2000000);
+    sim_assert_time(s->now - sim_time_of(s, 'O'), 2000000);
     assert_true(s->idles > 1000);
     assert_int_equal(s->counters.timeouts, 1);
-    answered_read(s, 1990000);
+    sim_reads(s, 1990000);
 }
 
 static void the_response_timeout_can_be_set(void **state)
@@ -48,10 +26,10 @@ static void the_response_timeout_can_be_set(void **state)
     NODE;
 
     OK(mbm_master_setResponseTimeout(n, 7));
-    assert_int_equal(read_one(s), MBM_RESPONSE_TIMED_OUT);
-    assert_time(s->now - sim_time_of(s, 'O'), 7000);
+    assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
+    sim_assert_time(s->now - sim_time_of(s, 'O'), 7000);
     OK(mbm_master_setResponseTimeout(n, 65535));
-    answered_read(s, 65000000);
+    sim_reads(s, 65000000);
 }
 
 static void idle_away(sim *s)
@@ -66,7 +44,7 @@ static void a_reply_that_is_complete_as_the_deadline_passes_is_a_success(void **
 
     (void)n;
     s->on_idle = idle_away;
-    answered_read(s, 1500000);
+    sim_reads(s, 1500000);
 }
 
 /* Ports such as Arduino's give a byte at a time; that changes nothing. */
@@ -77,7 +55,7 @@ static void a_reply_read_byte_by_byte_behind_the_deadline_is_a_success(void **st
     (void)n;
     s->on_idle = idle_away;
     s->read_piece = 1;
-    answered_read(s, 1500000);
+    sim_reads(s, 1500000);
 }
 
 /* However much is read behind the deadline, it must have an end. */
@@ -91,7 +69,7 @@ static void chatter_does_not_hold_a_request_for_ever(void **state)
     s->read_piece = 1;
     s->character = 0;
     sim_deliver(s, 4500, noise, sizeof noise);
-    assert_int_equal(read_one(s), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(s->sent, 1);
     assert_in_range(s->now - s->frames[0].end, 50000, 300000);
 }
@@ -102,7 +80,7 @@ static void a_long_idle_while_a_reply_arrives_is_tolerated(void **state)
 
     mbm_master_setResponseTimeout(n, 10000);
     s->on_idle = idle_away;
-    answered_read(s, 100);
+    sim_reads(s, 100);
     assert_true(s->idles < 1000);
 }
 
@@ -111,18 +89,18 @@ static void the_line_is_left_alone_after_a_timeout(void **state)
     uint64_t failed;
     NODE;
 
-    assert_int_equal(read_one(s), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
     failed = s->now;
-    answered_read(s, 500);
-    assert_time(s->frames[1].begin - failed, 100000);
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[1].begin - failed, 100000);
     /* Only then: not after a success. */
-    answered_read(s, 500);
-    assert_time(s->frames[2].silence, 4000);
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[2].silence, 4000);
     OK(mbm_master_setQuietTime(n, 250));
-    assert_int_equal(read_one(s), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
     failed = s->now;
-    answered_read(s, 500);
-    assert_time(s->frames[4].begin - failed, 250000);
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[4].begin - failed, 250000);
 }
 
 static void a_reply_in_the_quiet_time_is_dropped(void **state)
@@ -132,9 +110,9 @@ static void a_reply_in_the_quiet_time_is_dropped(void **state)
 
     (void)n;
     sim_answer(s, 1, 2050000, "11 03 02 66 66 +");
-    assert_int_equal(read_one(s), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
     failed = s->now;
-    answered_read(s, 500);
+    sim_reads(s, 500);
     /* Whether it makes the quiet time begin anew is left open. */
     assert_true(s->frames[1].begin >= failed + 100000);
     assert_true(s->frames[1].silence >= 4000);
@@ -148,8 +126,8 @@ static void a_reply_late_in_the_quiet_time_does_not_make_the_line_busy(void **st
 
     mbm_master_setResponseTimeout(n, 50);
     sim_answer(s, 1, 130000, "11 03 02 66 66 +");
-    assert_int_equal(read_one(s), MBM_RESPONSE_TIMED_OUT);
-    answered_read(s, 500);
+    assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
+    sim_reads(s, 500);
 }
 
 static void a_request_without_reply_is_repeated_as_often_as_told(void **state)
@@ -158,13 +136,13 @@ static void a_request_without_reply_is_repeated_as_often_as_told(void **state)
 
     OK(mbm_master_setRetries(n, 2));
     sim_answer(s, 3, 500, "11 03 02 00 2A +");
-    OK(read_one(s));
+    OK(sim_read_one(s));
     assert_int_equal(s->sent, 3);
     assert_int_equal(s->counters.requests, 3);
     assert_int_equal(s->counters.timeouts, 2);
-    assert_time(s->frames[1].silence, 2000000 + 100000);
+    sim_assert_time(s->frames[1].silence, 2000000 + 100000);
     sim_assert_sent(s, 2, "11 03 00 00 00 01 +");
-    assert_int_equal(read_one(s), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(s->sent, 6);
 }
 
@@ -175,13 +153,13 @@ static void damaged_and_malformed_replies_are_worth_a_retry_exceptions_are_not(v
     OK(mbm_master_setRetries(n, 1));
     sim_answer(s, 1, 500, "11 03 02 00 2A 00 00");
     sim_answer(s, 2, 500, "11 03 02 00 2A +");
-    OK(read_one(s));
+    OK(sim_read_one(s));
     sim_answer(s, 1, 500, "11 03 04 00 00 00 00 +");
     sim_answer(s, 2, 500, "11 03 02 00 2A +");
-    OK(read_one(s));
+    OK(sim_read_one(s));
     assert_int_equal(s->sent, 4);
     sim_answer(s, 1, 500, "11 83 06 +");
-    assert_int_equal(read_one(s), MBM_SLAVE_DEVICE_BUSY);
+    assert_int_equal(sim_read_one(s), MBM_SLAVE_DEVICE_BUSY);
     assert_int_equal(s->sent, 5);
 }
 
@@ -192,11 +170,11 @@ static void a_broadcast_succeeds_after_the_turnaround_delay(void **state)
     OK(mbm_master_setSlaveID(n, 0));
     OK(mbm_master_writeSingleRegister(n, 1, 2));
     sim_assert_sent(s, 0, "00 06 00 01 00 02 +");
-    assert_time(s->now - sim_time_of(s, 'O'), 100000);
+    sim_assert_time(s->now - sim_time_of(s, 'O'), 100000);
     sim_assert_order(s, "OI", "IOI");
     OK(mbm_master_setTurnaroundDelay(n, 30));
     OK(mbm_master_writeMultipleCoils(n, 1, 9));
-    assert_time(s->now - s->frames[1].end, 30000);
+    sim_assert_time(s->now - s->frames[1].end, 30000);
     OK(mbm_master_writeMultipleRegisters(n, 1, 2));
     OK(mbm_master_maskWriteRegister(n, 1, 2, 3));
     assert_int_equal(s->counters.replies, 0);
@@ -228,7 +206,7 @@ static void a_line_that_never_falls_silent_is_busy(void **state)
     s->limit = 1000000;
     for (i = 0; i < 10; i++)
         sim_deliver(s, 30000u * i, noise, sizeof noise);
-    assert_int_equal(read_one(s), MBM_LINE_BUSY);
+    assert_int_equal(sim_read_one(s), MBM_LINE_BUSY);
     assert_int_equal(s->sent, 0);
     assert_in_range(s->now, 100000, 110000);
 }
@@ -242,7 +220,7 @@ static void an_endless_drain_is_bounded_even_if_every_read_gives_bytes(void **st
     s->character = 0;
     sim_deliver(s, 0, noise, sizeof noise);
     s->read_piece = 1;
-    assert_int_equal(read_one(s), MBM_LINE_BUSY);
+    assert_int_equal(sim_read_one(s), MBM_LINE_BUSY);
     assert_in_range(s->now, 1000, 10000);
 }
 

@@ -5,20 +5,6 @@
 
 #include <string.h>
 
-#define NODE sim *s = (sim *)*state; mbm_master *n = &s->master
-
-static uint8_t read_one(sim *s)
-{
-    return mbm_master_readHoldingRegisters(&s->master, 0, 1);
-}
-
-static void works(sim *s)
-{
-    sim_answer(s, 1, 500, "11 03 02 00 2A +");
-    OK(read_one(s));
-    assert_int_equal(mbm_master_getResponseBuffer(&s->master, 0), 42);
-}
-
 static void call_back(sim *s)
 {
     mbm_master *n = &s->master;
@@ -53,7 +39,7 @@ static void an_idle_hook_that_makes_requests_is_told_busy_and_changes_nothing(vo
     mbm_master_setTransmitBuffer(n, 0, 0x1111);
     mbm_master_beginTransmission(n, 0x55);
     s->on_idle = call_back;
-    works(s);
+    sim_reads(s, 500);
     assert_true(s->idles > 10);
     s->on_idle = NULL;
     /* The write address is still the one that was set. */
@@ -73,7 +59,7 @@ static void request_from_in_an_idle_hook_changes_nothing(void **state)
 
     (void)n;
     s->on_idle = request_from_idle;
-    works(s);
+    sim_reads(s, 500);
     assert_int_equal(s->sent, 1);
 }
 
@@ -88,7 +74,7 @@ static void an_idle_hook_that_polls_does_no_harm(void **state)
 
     (void)n;
     s->on_idle = poll_from_idle;
-    works(s);
+    sim_reads(s, 500);
 }
 
 static void cancel_after_20_idles(sim *s)
@@ -102,11 +88,11 @@ static void an_idle_hook_may_cancel_before_a_byte_is_sent(void **state)
     NODE;
 
     s->on_idle = cancel_after_20_idles;
-    IS(MBM_CANCELLED, read_one(s));
+    IS(MBM_CANCELLED, sim_read_one(s));
     IS(MBM_CANCELLED, mbm_master_status(n));
     assert_int_equal(s->sent, 0);
     s->on_idle = NULL;
-    works(s);
+    sim_reads(s, 500);
 }
 
 static void cancel_in_the_reply(sim *s)
@@ -121,10 +107,10 @@ static void an_idle_hook_may_cancel_while_the_reply_is_waited_for(void **state)
 
     mbm_master_setRetries(n, 3);
     s->on_idle = cancel_in_the_reply;
-    IS(MBM_CANCELLED, read_one(s));
+    IS(MBM_CANCELLED, sim_read_one(s));
     assert_int_equal(s->sent, 1);
     s->on_idle = NULL;
-    works(s);
+    sim_reads(s, 500);
 }
 
 static void idle_is_not_called_again_once_it_has_cancelled(void **state)
@@ -133,7 +119,7 @@ static void idle_is_not_called_again_once_it_has_cancelled(void **state)
 
     (void)n;
     s->on_idle = cancel_after_20_idles;
-    IS(MBM_CANCELLED, read_one(s));
+    IS(MBM_CANCELLED, sim_read_one(s));
     assert_int_equal(s->idles, 20);
 }
 
@@ -151,9 +137,9 @@ static void a_non_blocking_request_is_ended_by_poll(void **state)
     OK(mbm_master_status(n));
     OK(mbm_master_setBlocking(n, 0));
     sim_answer(s, 1, 500, "11 03 02 00 2A +");
-    IS(MBM_PENDING, read_one(s));
+    IS(MBM_PENDING, sim_read_one(s));
     IS(MBM_PENDING, mbm_master_status(n));
-    IS(MBM_BUSY, read_one(s));
+    IS(MBM_BUSY, sim_read_one(s));
     OK(sim_poll(s));
     OK(mbm_master_poll(n));
     assert_int_equal(mbm_master_receive(n), 42);
@@ -163,7 +149,7 @@ static void a_non_blocking_request_is_ended_by_poll(void **state)
     IS(4, sim_poll(s));
     IS(4, mbm_master_poll(n));
     OK(mbm_master_setBlocking(n, 1));
-    works(s);
+    sim_reads(s, 500);
 }
 
 static void set_buffers_while_pending_is_busy_and_changes_nothing(void **state)
@@ -174,7 +160,7 @@ static void set_buffers_while_pending_is_busy_and_changes_nothing(void **state)
 
     mbm_master_setBlocking(n, 0);
     sim_answer(s, 1, 500, "11 03 02 00 2A +");
-    IS(MBM_PENDING, read_one(s));
+    IS(MBM_PENDING, sim_read_one(s));
     IS(MBM_BUSY, mbm_master_setBuffers(n, words, 1, NULL, 0, frame, 8));
     poll_until(s, 8);
     IS(MBM_BUSY, mbm_master_setBuffers(n, words, 1, NULL, 0, frame, 8));
@@ -191,7 +177,7 @@ static void a_cancel_mid_send_switches_the_driver_off(void **state)
     mbm_master_setBlocking(n, 0);
     s->write_piece = 1;
     s->cut_allowed = 1;
-    IS(MBM_PENDING, read_one(s));
+    IS(MBM_PENDING, sim_read_one(s));
     poll_until(s, 3);
     OK(mbm_master_cancel(n));
     sim_assert_order(s, "PO", "PO");
@@ -200,7 +186,7 @@ static void a_cancel_mid_send_switches_the_driver_off(void **state)
     IS(MBM_CANCELLED, mbm_master_status(n));
     sim_assert_order(s, "PO", "PO");
     mbm_master_setBlocking(n, 1);
-    works(s);
+    sim_reads(s, 500);
 }
 
 static void the_gap_is_kept_after_a_cancel_mid_send(void **state)
@@ -211,11 +197,11 @@ static void the_gap_is_kept_after_a_cancel_mid_send(void **state)
     s->write_piece = 1;
     s->character = 0; /* what is handed over is on the wire */
     s->cut_allowed = 1;
-    IS(MBM_PENDING, read_one(s));
+    IS(MBM_PENDING, sim_read_one(s));
     poll_until(s, 3);
     OK(mbm_master_cancel(n));
     mbm_master_setBlocking(n, 1);
-    works(s);
+    sim_reads(s, 500);
     assert_in_range(s->frames[1].begin - s->frames[0].end, 4000, 4100);
 }
 
@@ -224,13 +210,13 @@ static void a_cancel_while_the_port_drains_switches_the_driver_off(void **state)
     NODE;
 
     mbm_master_setBlocking(n, 0);
-    IS(MBM_PENDING, read_one(s));
+    IS(MBM_PENDING, sim_read_one(s));
     poll_until(s, 8);
     OK(mbm_master_cancel(n));
     sim_assert_order(s, "PO", "PO");
     s->post_before_last_bit = 0; /* the caller wanted it so */
     mbm_master_setBlocking(n, 1);
-    works(s);
+    sim_reads(s, 500);
 }
 
 static void a_cancel_in_the_hold_switches_the_driver_off(void **state)
@@ -239,7 +225,7 @@ static void a_cancel_in_the_hold_switches_the_driver_off(void **state)
 
     mbm_master_setBlocking(n, 0);
     mbm_master_setPostFlushHold(n, 100);
-    IS(MBM_PENDING, read_one(s));
+    IS(MBM_PENDING, sim_read_one(s));
     poll_until(s, 8);
     while (s->now < s->transmitted + 1000)
         IS(MBM_PENDING, mbm_master_poll(n));
@@ -257,7 +243,7 @@ static void begin_mid_send_switches_the_driver_off_on_the_old_port(void **state)
     s->write_piece = 1;
     s->character = 0; /* what is handed over is on the wire */
     s->cut_allowed = 1;
-    IS(MBM_PENDING, read_one(s));
+    IS(MBM_PENDING, sim_read_one(s));
     poll_until(s, 3);
     other = s->port;
     other.postTransmission = NULL;
@@ -267,7 +253,7 @@ static void begin_mid_send_switches_the_driver_off_on_the_old_port(void **state)
     IS(MBM_CANCELLED, mbm_master_poll(n));
     mbm_master_setBlocking(n, 1);
     sim_begin(s, 17);
-    works(s);
+    sim_reads(s, 500);
     assert_in_range(s->frames[1].begin - s->frames[0].end, 4000, 4100);
 }
 
@@ -279,7 +265,7 @@ static void a_refused_begin_leaves_the_request_under_way(void **state)
     memset(&empty, 0, sizeof empty);
     mbm_master_setBlocking(n, 0);
     sim_answer(s, 1, 500, "11 03 02 00 2A +");
-    IS(MBM_PENDING, read_one(s));
+    IS(MBM_PENDING, sim_read_one(s));
     IS(MBM_INVALID_ARGUMENT, mbm_master_begin(n, 3, &empty));
     IS(MBM_INVALID_ARGUMENT, mbm_master_begin(n, 3, NULL));
     OK(sim_poll(s));

@@ -304,3 +304,20 @@ uint64_t sim_time_of(const sim *s, char event)
     assert_non_null(at);
     return s->order_at[at - s->order];
 }
+
+void sim_assert_time(uint64_t time, uint64_t wanted)
+{
+    assert_in_range(time, wanted, wanted + SIM_SLACK);
+}
+
+uint8_t sim_read_one(sim *s)
+{
+    return mbm_master_readHoldingRegisters(&s->master, 0, 1);
+}
+
+void sim_reads(sim *s, uint32_t delay)
+{
+    sim_answer(s, 1, delay, "11 03 02 00 2A +");
+    OK(sim_read_one(s));
+    assert_int_equal(mbm_master_getResponseBuffer(&s->master, 0), 42);
+}

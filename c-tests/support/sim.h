@@ -102,6 +102,18 @@ uint8_t sim_poll(sim *s);
 /* When the first event of a kind happened. */
 uint64_t sim_time_of(const sim *s, char event);
 
+/* What the simulation's own steps may add to a time, in microseconds. */
+enum { SIM_SLACK = 60 };
+void sim_assert_time(uint64_t time, uint64_t wanted);
+
+/* Reads register 0 of unit 17; the second answers that after `delay`, and
+ * asserts that it is read right. */
+uint8_t sim_read_one(sim *s);
+void sim_reads(sim *s, uint32_t delay);
+
+/* The simulation and its master in a test. */
+#define NODE sim *s = (sim *)*state; mbm_master *n = &s->master
+
 #define SIM_TEST(test) cmocka_unit_test_setup_teardown(test, sim_setup, sim_teardown)
 
 #endif
