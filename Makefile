@@ -34,7 +34,7 @@ MCUS := $(shell scripts/archive --list)
 .PHONY: archives
 archives: ## The archives for microcontrollers, build/archives/MCU/libmbm.a
 	@for mcu in $(MCUS); do scripts/archive $$mcu || exit 1; done
-	@ls -l build/archives/*/libmbm.a | awk '{ print "archive:", $$NF, $$5, "bytes" }'
+	@scripts/check-archive
 
 .PHONY: header
 header: ## Write include/mbm.h anew from the source
