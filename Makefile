@@ -36,6 +36,10 @@ archives: ## The archives for microcontrollers, build/archives/MCU/libmbm.a
 	@for mcu in $(MCUS); do scripts/archive $$mcu || exit 1; done
 	@scripts/check-archive
 
+.PHONY: size
+size: ## Flash and RAM that the library adds, and what changed since docs/size.md
+	@scripts/size
+
 .PHONY: header
 header: ## Write include/mbm.h anew from the source
 	@$(CARGO) run --quiet -p mbm-tools --bin header
