@@ -30,6 +30,16 @@ archive: $(ARCHIVE) ## The archive for this machine, target/release/libmbm.a
 $(ARCHIVE):
 	@$(CARGO) rustc --quiet --release --lib --crate-type staticlib --features archive
 
+MCUS := $(shell scripts/archive --list)
+.PHONY: archives
+archives: ## The archives for microcontrollers, build/archives/MCU/libmbm.a
+	@for mcu in $(MCUS); do scripts/archive $$mcu || exit 1; done
+	@scripts/check-archive
+
+.PHONY: size
+size: ## Flash and RAM that the library adds, and what changed since docs/size.md
+	@scripts/size
+
 .PHONY: header
 header: ## Write include/mbm.h anew from the source
 	@$(CARGO) run --quiet -p mbm-tools --bin header

@@ -1,0 +1,11 @@
+/* Reads holding registers, and nothing else. */
+#include "size.h"
+
+int main(void)
+{
+    begin();
+    for (;;) {
+        if (CALL(mbm_master_readHoldingRegisters(&node, 2, 10)) == MBM_OK)
+            uart = (uint8_t)CALL(mbm_master_getResponseBuffer(&node, 0));
+    }
+}

@@ -1,0 +1,68 @@
+/*
+ * What the programs that are measured share: buffers of 64 words and a port
+ * that does next to nothing. With WITHOUT_MBM the same program is built with
+ * every call left out, but with buffers and hooks; the difference is what the
+ * library adds, the calls to it included.
+ */
+#ifndef SIZE_H
+#define SIZE_H
+
+#include "mbm.h"
+
+#define WORDS 64
+
+/* The value is used, as far as the compiler can tell. */
+#define USED(value) __asm__ volatile("" : : "r"(value) : "memory")
+
+static uint16_t response[WORDS];
+static uint16_t transmit[WORDS];
+static uint8_t frame[MBM_FRAME_BYTES(WORDS)];
+
+static volatile uint8_t uart;
+static volatile uint32_t ticks;
+
+static int16_t port_read(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    (void)context;
+    (void)capacity;
+    bytes[0] = uart;
+    return 1;
+}
+
+static int16_t port_write(void *context, const uint8_t *bytes, uint16_t length)
+{
+    (void)context;
+    (void)length;
+    uart = bytes[0];
+    return 1;
+}
+
+static uint32_t port_micros(void *context)
+{
+    (void)context;
+    return ticks;
+}
+
+#ifdef WITHOUT_MBM
+#define CALL(call) 0
+#else
+static mbm_master node;
+#define CALL(call) (call)
+#endif
+
+static inline void begin(void)
+{
+    mbm_port port = {0};
+
+    port.read = port_read;
+    port.write = port_write;
+    port.micros = port_micros;
+    USED(&port);
+    USED(response);
+    USED(transmit);
+    USED(frame);
+    (void)CALL(mbm_master_setBuffers(&node, response, WORDS, transmit, WORDS, frame, sizeof frame));
+    (void)CALL(mbm_master_begin(&node, 1, &port));
+}
+
+#endif
