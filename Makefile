@@ -30,6 +30,12 @@ archive: $(ARCHIVE) ## The archive for this machine, target/release/libmbm.a
 $(ARCHIVE):
 	@$(CARGO) rustc --quiet --release --lib --crate-type staticlib --features archive
 
+MCUS := $(shell scripts/archive --list)
+.PHONY: archives
+archives: ## The archives for microcontrollers, build/archives/MCU/libmbm.a
+	@for mcu in $(MCUS); do scripts/archive $$mcu || exit 1; done
+	@ls -l build/archives/*/libmbm.a | awk '{ print "archive:", $$NF, $$5, "bytes" }'
+
 .PHONY: header
 header: ## Write include/mbm.h anew from the source
 	@$(CARGO) run --quiet -p mbm-tools --bin header
