@@ -125,12 +125,21 @@ static avr_cycle_count_t next_byte(avr_t *avr, avr_cycle_count_t when, void *par
     (void)when;
     /* The simulator has the byte received one byte's time after this. */
     avr_raise_irq(w->end->in, w->queue[w->tail % QUEUE]);
-    w->heard = avr->cycle + 10 * w->bit;
-    w->bytes_heard++;
     w->tail++;
     if (w->tail == w->head)
         return 0;
     return w->due[w->tail % QUEUE] > avr->cycle ? w->due[w->tail % QUEUE] : avr->cycle + 1;
+}
+
+static void received(struct avr_irq_t *irq, uint32_t value, void *parameter)
+{
+    wire *w = parameter;
+
+    (void)irq;
+    if (!value)
+        return;
+    w->heard = w->on->avr->cycle;
+    w->bytes_heard++;
 }
 
 static void byte_out(struct avr_irq_t *irq, uint32_t value, void *parameter)
@@ -184,6 +193,9 @@ wire *board_uart(board *b, char number, wire_device device, void *context)
     avr_ioctl(b->avr, (uint32_t)AVR_IOCTL_UART_SET_FLAGS(number), &flags);
     w->end->in = avr_io_getirq(b->avr, UART_IRQ(number), UART_IRQ_INPUT);
     avr_irq_register_notify(avr_io_getirq(b->avr, UART_IRQ(number), UART_IRQ_OUTPUT), byte_out, w);
+    avr_irq_register_notify(avr_get_interrupt_irq(b->avr, w->end->uart->rxc.vector) +
+                                AVR_INT_IRQ_PENDING,
+                            received, w);
     return w;
 }
 
@@ -370,7 +382,7 @@ static uint16_t stack_pointer(const board *b)
 
 void board_paint(board *b)
 {
-    uint16_t bottom = board_symbol(b, "__heap_start");
+    uint16_t bottom = board_symbol(b, "_end");
 
     b->painted_from = stack_pointer(b);
     memset(b->avr->data + bottom, PAINT, b->painted_from - bottom + 1u);
@@ -378,7 +390,7 @@ void board_paint(board *b)
 
 unsigned board_stack_depth(const board *b)
 {
-    uint16_t at = board_symbol((board *)(uintptr_t)b, "__heap_start");
+    uint16_t at = board_symbol((board *)(uintptr_t)b, "_end");
 
     while (at <= b->painted_from && b->avr->data[at] == PAINT)
         at++;
