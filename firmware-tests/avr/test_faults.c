@@ -181,20 +181,25 @@ typedef struct report {
     uint16_t words[READS][REGISTERS];
 } report;
 
-static report run(wire_device device, void *context)
+static board *start(const char *sketch)
 {
     const char *folder = getenv("MBM_SKETCHES");
     char path[200];
+
+    snprintf(path, sizeof path, "%s/uno/%s.elf", folder ? folder : "build/avr", sketch);
+    return board_new(path, "atmega328p");
+}
+
+static report run(wire_device device, void *context)
+{
+    board *b = start("Probe");
+    uint16_t at = board_symbol(b, "report");
     report r;
-    board *b;
-    uint16_t at;
     unsigned n, i;
 
-    snprintf(path, sizeof path, "%s/uno/Probe.elf", folder ? folder : "build/avr");
-    b = board_new(path, "atmega328p");
-    at = board_symbol(b, "report");
     board_uart(b, '0', device, context);
-    assert_true(board_run_until(b, at++, 1, 5000 * (uint64_t)MS));
+    assert_true(board_run_until(b, at, 1, 5000 * (uint64_t)MS));
+    at++;
     for (n = 0; n < READS; n++)
         r.status[n] = board_byte(b, at++);
     for (n = 0; n < READS; n++)
@@ -273,12 +278,29 @@ static void a_servers_exceptions_come_through(void **state)
     server_stop(&s);
 }
 
+/* The library must take bytes as fast as the line brings them. */
+static void a_reply_of_64_registers_at_115200_baud_arrives_whole(void **state)
+{
+    board *b = start("FullSpeed");
+    uint16_t at = board_symbol(b, "report");
+    unsigned n;
+
+    (void)state;
+    board_uart(b, '0', peer_right, NULL);
+    assert_true(board_run_until(b, at, 1, 2000 * MS));
+    for (n = 0; n < 3; n++)
+        assert_int_equal(board_byte(b, (uint16_t)(at + 1 + n)), MBM_OK);
+    assert_int_equal(board_byte(b, (uint16_t)(at + 4)), 0);
+    board_free(b);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_fault_costs_more_than_it_must),
         cmocka_unit_test(a_server_that_is_not_there_is_a_timeout),
         cmocka_unit_test(a_servers_exceptions_come_through),
+        cmocka_unit_test(a_reply_of_64_registers_at_115200_baud_arrives_whole),
     };
 
     return cmocka_run_group_tests_name("faults on a simulated board", tests, NULL, NULL);
