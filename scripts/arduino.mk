@@ -15,7 +15,7 @@ arduino: avr-archives ## The Arduino library: dist/mbm and its zip
 
 .PHONY: need-avr
 need-avr:
-	@scripts/need gcc libc6-dev arduino-builder arduino-core-avr arduino-ctags gcc-avr avr-libc binutils-avr \
+	@scripts/need gcc clang libc6-dev arduino-builder arduino-core-avr arduino-ctags gcc-avr avr-libc binutils-avr \
 	    libsimavr-dev libelf-dev pkg-config libmodbus-dev libcmocka-dev
 
 # --- sketches, each for the boards that a test runs it on
