@@ -375,16 +375,11 @@ uint16_t board_word(const board *b, uint16_t address)
     return (uint16_t)(b->avr->data[address] | b->avr->data[address + 1] << 8);
 }
 
-static uint16_t stack_pointer(const board *b)
-{
-    return board_word(b, SPL_AT);
-}
-
 void board_paint(board *b)
 {
     uint16_t bottom = board_symbol(b, "_end");
 
-    b->painted_from = stack_pointer(b);
+    b->painted_from = b->avr->cycle ? board_word(b, SPL_AT) : b->avr->ramend;
     memset(b->avr->data + bottom, PAINT, b->painted_from - bottom + 1u);
 }
 

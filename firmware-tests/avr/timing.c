@@ -178,6 +178,13 @@ static void returns(void)
         board_stack_depth(o.on), 0);
     row("static RAM and stack together", "bytes", ram + board_stack_depth(o.on),
         ram + board_stack_depth(o.on), 557);
+    board_paint(reading);
+    board_paint(plain);
+    if (!board_run(plain, MS) || !board_run(reading, 100 * MS))
+        exit(1);
+    ram = board_stack_depth(reading) - board_stack_depth(plain);
+    row("stack from reset on, constructor and begin included, above a serial-only sketch", "bytes",
+        ram, ram, 0);
     board_free(plain);
     board_free(reading);
     o = observe("TimeRead", 100 * MS, call_begins_or_ends);
