@@ -129,3 +129,6 @@ check-readme:
 	@test -s $(BUILD)/readme.c
 	@gcc -std=c11 $(WARNINGS) -Iinclude -c $(BUILD)/readme.c -o $(BUILD)/readme.o
 	@echo "check-readme: the README's C compiles"
+
+# Everything for Arduino and the AVR simulator.
+include scripts/arduino.mk

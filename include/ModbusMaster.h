@@ -28,6 +28,7 @@
 #include <Arduino.h>
 #include <stdint.h>
 
+#include "ModbusMasterBoards.h"
 #include "ModbusMasterConstants.h"
 #include "mbm.h"
 

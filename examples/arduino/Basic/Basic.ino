@@ -1,0 +1,26 @@
+// The calls of the ModbusMaster manual's first example: a counter goes to
+// slave 2 as two words, six registers come back. No pause between rounds.
+#include <ModbusMaster.h>
+
+ModbusMaster node;
+
+void setup() {
+  Serial.begin(19200);
+  node.begin(2, Serial);
+}
+
+void loop() {
+  static uint32_t counter;
+  uint16_t data[6];
+
+  counter++;
+  node.setTransmitBuffer(0, lowWord(counter));
+  node.setTransmitBuffer(1, highWord(counter));
+  uint8_t result = node.writeMultipleRegisters(0, 2);
+
+  result = node.readHoldingRegisters(2, 6);
+  if (result == node.ku8MBSuccess)
+    for (uint8_t i = 0; i < 6; i++)
+      data[i] = node.getResponseBuffer(i);
+  (void)data; // yours to use
+}

@@ -1,0 +1,59 @@
+// Many energy meters hold their readings as 32-bit floats, two input registers
+// each, the high word first; others put the low word first. This one reads
+// voltage, current and power, and switches a load off above 1000 W.
+#include <ModbusMaster.h>
+
+#if defined(HAVE_HWSERIAL1)
+#define BUS Serial1 // Serial stays free for messages
+#else
+#define BUS Serial
+#endif
+
+const uint8_t load = 7;      // a relay
+const uint16_t voltageAt = 0; // from your meter's manual, counted from 0
+const uint16_t currentAt = 6;
+const uint16_t powerAt = 12;
+
+ModbusMaster meter;
+
+float wordsToFloat(uint16_t high, uint16_t low) {
+  uint32_t bits = LONG(high, low);
+  float value;
+  memcpy(&value, &bits, sizeof value);
+  return value;
+}
+
+// False, with the value untouched, if the meter does not answer properly.
+bool readFloat(uint16_t address, float &value) {
+  if (meter.readInputRegisters(address, 2) != meter.ku8MBSuccess)
+    return false;
+  // Low word first? Then exchange the two.
+  value = wordsToFloat(meter.getResponseBuffer(0), meter.getResponseBuffer(1));
+  return true;
+}
+
+void setup() {
+  pinMode(load, OUTPUT);
+  digitalWrite(load, HIGH);
+  Serial.begin(9600);
+  BUS.begin(9600);
+  meter.begin(1, BUS);
+  meter.setBaudRate(9600);
+  meter.setRetries(2);
+}
+
+void loop() {
+  float voltage, current, power;
+  if (readFloat(voltageAt, voltage) && readFloat(currentAt, current) && readFloat(powerAt, power)) {
+    digitalWrite(load, power <= 1000.0f);
+#if defined(HAVE_HWSERIAL1)
+    Serial.print(voltage);
+    Serial.print(" V ");
+    Serial.print(current);
+    Serial.print(" A ");
+    Serial.print(power);
+    Serial.println(" W");
+#endif
+  }
+  delay(500);
+}

@@ -1,0 +1,46 @@
+// The functions return at once, and poll moves the request on: the LED goes on
+// blinking evenly whether the slave answers or not.
+#include <ModbusMaster.h>
+
+ModbusMaster node;
+uint16_t answered;
+
+void setup() {
+  pinMode(LED_BUILTIN, OUTPUT);
+  Serial.begin(19200);
+  node.begin(1, Serial);
+  node.setBaudRate(19200);
+  node.setBlocking(false);
+  node.setResponseTimeout(500);
+}
+
+void blink() {
+  static uint32_t last;
+  if (millis() - last < 50)
+    return;
+  last += 50;
+  digitalWrite(LED_BUILTIN, !digitalRead(LED_BUILTIN));
+}
+
+// Reads a register, writes it elsewhere, and begins again.
+void converse() {
+  static bool reading = false;
+  uint8_t result = node.poll();
+  if (result == node.ku8MBPending)
+    return;
+  if (reading && result == node.ku8MBSuccess) {
+    answered++;
+    node.setTransmitBuffer(0, node.getResponseBuffer(0));
+    node.setTransmitBuffer(1, answered);
+    node.writeMultipleRegisters(40, 2);
+    reading = false;
+  } else {
+    node.readHoldingRegisters(3, 1);
+    reading = true;
+  }
+}
+
+void loop() {
+  blink();
+  converse();
+}

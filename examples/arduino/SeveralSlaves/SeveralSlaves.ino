@@ -1,0 +1,34 @@
+// Three slaves on one bus. Each has an object of its own, which keeps its own
+// words; all share the port, and with MODBUSMASTER_SHARE_FRAME one frame
+// buffer, since no two of them ever have a request under way together. Smaller
+// buffers leave RAM for the rest of the sketch.
+#define MODBUSMASTER_SHARE_FRAME
+#define MODBUSMASTER_RESPONSE_WORDS 16
+#define MODBUSMASTER_TRANSMIT_WORDS 8
+#include <ModbusMaster.h>
+
+const uint8_t sensors = 3;
+ModbusMaster sensor[sensors] = {1, 2, 3}; // their unit ids
+
+void setup() {
+  pinMode(LED_BUILTIN, OUTPUT);
+  Serial.begin(19200);
+  for (uint8_t i = 0; i < sensors; i++) {
+    sensor[i].begin(sensor[i].getSlaveID(), Serial);
+    sensor[i].setBaudRate(19200);
+    sensor[i].setResponseTimeout(200); // one that is missing holds up the others no longer
+  }
+}
+
+void loop() {
+  uint8_t present = 0;
+  for (uint8_t i = 0; i < sensors; i++) {
+    if (sensor[i].readHoldingRegisters(5, 1) != ModbusMaster::ku8MBSuccess)
+      continue;
+    present++;
+    // Each is told what was read of it.
+    sensor[i].writeSingleRegister(6, sensor[i].getResponseBuffer(0));
+  }
+  digitalWrite(LED_BUILTIN, present == sensors);
+  delay(100);
+}

@@ -1,0 +1,46 @@
+// Writes three registers and a few coils of slave 1, reads them back and
+// switches the LED on if they came back as they went.
+#include <ModbusMaster.h>
+
+ModbusMaster node;
+
+bool registersComeBack(uint16_t seed) {
+  node.beginTransmission(10); // where the queued words go
+  node.send(seed);
+  node.send(seed + 1);
+  node.send(seed + 2);
+  if (node.writeMultipleRegisters() != node.ku8MBSuccess)
+    return false;
+  if (node.readHoldingRegisters(10, 3) != node.ku8MBSuccess)
+    return false;
+  for (uint8_t i = 0; i < 3; i++)
+    if (node.getResponseBuffer(i) != uint16_t(seed + i))
+      return false;
+  return true;
+}
+
+bool coilsComeBack(uint16_t pattern) {
+  node.setTransmitBuffer(0, pattern); // the lowest bit is the first coil
+  if (node.writeMultipleCoils(20, 11) != node.ku8MBSuccess)
+    return false;
+  if (node.writeSingleCoil(31, true) != node.ku8MBSuccess)
+    return false;
+  if (node.readCoils(20, 12) != node.ku8MBSuccess)
+    return false;
+  return node.getResponseBuffer(0) == ((pattern & 0x07FF) | 0x0800);
+}
+
+void setup() {
+  pinMode(LED_BUILTIN, OUTPUT);
+  Serial.begin(38400);
+  node.begin(1, Serial);
+  node.setBaudRate(38400);
+}
+
+void loop() {
+  static uint16_t round = 1000;
+  bool good = registersComeBack(round) && coilsComeBack(round);
+  digitalWrite(LED_BUILTIN, good);
+  round += 10;
+  delay(500);
+}

@@ -1,0 +1,74 @@
+/* An AVR board in a simulator, cycle by cycle, and the wires that end at it.
+ * All times are CPU cycles; nothing depends on how fast the host is. */
+#ifndef BOARD_H
+#define BOARD_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum { MHZ = 16, MS = MHZ * 1000, WIRES = 4, FRAME = 300, QUEUE = 2048 };
+
+typedef struct board board;
+typedef struct wire wire;
+
+/* What sits at the far end: told of each frame, once the wire has been silent
+ * for as long as separates frames. Answers with wire_play. */
+typedef void (*wire_device)(wire *w, const uint8_t *frame, size_t length);
+
+struct wire {
+    board *on;
+    wire_device device;
+    void *context;          /* the device's */
+    uint64_t bit;           /* cycles of one bit */
+    unsigned frames;        /* seen so far, the one that the device is told of included */
+    uint64_t first_started; /* first byte of that frame: its start bit */
+    uint64_t last_started;  /* last byte of it: its start bit */
+    uint64_t heard;         /* when the board had the last byte of a reply complete */
+    unsigned bytes_heard;
+    /* not for tests */
+    struct end *end;
+    uint8_t frame[FRAME];
+    size_t length;
+    uint8_t queue[QUEUE];
+    uint64_t due[QUEUE];
+    size_t head, tail;
+    uint64_t last_due;
+};
+
+board *board_new(const char *elf, const char *mcu);
+void board_free(board *b);
+
+/* Connects a device to hardware UART `number`: bits are as long as the board's
+ * own divider says, bytes are ten bits. */
+wire *board_uart(board *b, char number, wire_device device, void *context);
+
+/* Connects a device bit by bit: it listens at the board's pin `port``tx` and
+ * drives `port``rx`. */
+wire *board_pins(board *b, char port, int rx, int tx, unsigned baud, wire_device device,
+                 void *context);
+
+/* Queues bytes for the board, `delay` cycles after now or after what is queued. */
+void wire_play(wire *w, uint64_t delay, const uint8_t *bytes, size_t length);
+
+/* Calls back whenever a pin changes. */
+typedef void (*pin_changed)(void *context, int level, uint64_t cycle);
+void board_watch_pin(board *b, char port, int pin, pin_changed changed, void *context);
+int board_pin(board *b, char port, int pin);
+
+/* Runs for so many cycles; false if the firmware crashed. */
+int board_run(board *b, uint64_t cycles);
+/* Runs until a byte of RAM has a value, for so long at most; false if never. */
+int board_run_until(board *b, uint16_t address, uint8_t value, uint64_t cycles);
+uint64_t board_cycle(const board *b);
+
+/* Where a global of the sketch is; the test fails if there is none. */
+uint16_t board_symbol(board *b, const char *name);
+uint8_t board_byte(const board *b, uint16_t address);
+uint16_t board_word(const board *b, uint16_t address);
+
+/* Fills the RAM below the stack, and says how far the stack has grown since,
+ * in bytes below where it was. */
+void board_paint(board *b);
+unsigned board_stack_depth(const board *b);
+
+#endif

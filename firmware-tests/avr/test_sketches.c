@@ -1,0 +1,464 @@
+/* The examples and a few sketches more, compiled as the IDE would, run on
+ * simulated boards against a real libmodbus server. */
+#include "peer.h"
+#include "test.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* A pin, and where one board and the other have it. */
+typedef struct pin {
+    char port;
+    int bit;
+} pin;
+
+typedef struct kind {
+    const char *name, *mcu;
+    pin led, pin2, pin7;
+} kind;
+
+static const kind uno = {"uno", "atmega328p", {'B', 5}, {'D', 2}, {'D', 7}};
+static const kind mega = {"mega", "atmega2560", {'B', 7}, {'E', 4}, {'H', 4}};
+
+static board *start(const kind *k, const char *sketch)
+{
+    char path[200];
+    const char *folder = getenv("MBM_SKETCHES");
+
+    snprintf(path, sizeof path, "%s/%s/%s.elf", folder ? folder : "build/avr", k->name, sketch);
+    return board_new(path, k->mcu);
+}
+
+static int is_high(board *b, pin p)
+{
+    return board_pin(b, p.port, p.bit);
+}
+
+/* Collects what a sketch prints. */
+typedef struct paper {
+    char text[1000];
+} paper;
+
+static void print(wire *w, const uint8_t *bytes, size_t length)
+{
+    paper *p = w->context;
+    size_t have = strlen(p->text);
+
+    if (have + length < sizeof p->text)
+        memcpy(p->text + have, bytes, length);
+}
+
+static void floats(modbus_mapping_t *mapping, unsigned address, float value)
+{
+    uint32_t bits;
+
+    memcpy(&bits, &value, sizeof bits);
+    mapping->tab_input_registers[address] = (uint16_t)(bits >> 16);
+    mapping->tab_input_registers[address + 1] = (uint16_t)bits;
+}
+
+/* --- the examples, each on both boards */
+
+static void first_read(const kind *k, char bus)
+{
+    board *b = start(k, "FirstRead");
+    paper printed = {""};
+    char expected[100];
+    server s;
+
+    server_start(&s, 1);
+    board_uart(b, bus, peer_libmodbus, &s);
+    if (bus != '0')
+        board_uart(b, '0', print, &printed);
+    assert_true(board_run(b, 400 * MS));
+    assert_true(is_high(b, k->led));
+    if (bus != '0') {
+        snprintf(expected, sizeof expected, "%u %u %u %u %u %u \r\n", server_pattern(2),
+                 server_pattern(3), server_pattern(4), server_pattern(5), server_pattern(6),
+                 server_pattern(7));
+        assert_string_equal(printed.text, expected);
+    }
+    server_stop(&s);
+    board_free(b);
+}
+
+static void first_read_reads_what_the_server_holds(void **state)
+{
+    (void)state;
+    first_read(&uno, '0');
+    first_read(&mega, '1');
+}
+
+static void first_read_says_that_nobody_answers(void **state)
+{
+    board *b = start(&mega, "FirstRead");
+    paper printed = {""};
+    wire *bus;
+
+    (void)state;
+    bus = board_uart(b, '1', NULL, NULL);
+    board_uart(b, '0', print, &printed);
+    assert_true(board_run(b, 2500 * MS));
+    assert_int_equal(bus->frames, 1);
+    assert_false(is_high(b, mega.led));
+    assert_true(strlen(printed.text) > 5);
+    board_free(b);
+}
+
+static void write_and_read_back(const kind *k)
+{
+    board *b = start(k, "WriteAndReadBack");
+    server s;
+
+    server_start(&s, 1);
+    board_uart(b, '0', peer_libmodbus, &s);
+    assert_true(board_run(b, 700 * MS));
+    assert_true(is_high(b, k->led));
+    assert_int_equal(s.mapping->tab_registers[9], server_pattern(9));
+    assert_int_equal(s.mapping->tab_registers[10], 1010); /* the second round */
+    assert_int_equal(s.mapping->tab_registers[12], 1012);
+    assert_int_equal(s.mapping->tab_registers[13], server_pattern(13));
+    assert_int_equal(s.mapping->tab_bits[19], server_bit_pattern(19));
+    for (unsigned i = 0; i < 11; i++)
+        assert_int_equal(s.mapping->tab_bits[20 + i], 1010 >> i & 1);
+    assert_int_equal(s.mapping->tab_bits[31], 1);
+    server_stop(&s);
+    board_free(b);
+}
+
+static void write_and_read_back_writes_to_the_server(void **state)
+{
+    (void)state;
+    write_and_read_back(&uno);
+    write_and_read_back(&mega);
+}
+
+/* The driver-enable pin, and the server behind it. */
+typedef struct driver {
+    server peer;
+    uint64_t rose, fell;
+    unsigned requests;
+    int level;
+} driver;
+
+static void driver_switched(void *context, int level, uint64_t cycle)
+{
+    driver *d = context;
+
+    *(level ? &d->rose : &d->fell) = cycle;
+    d->level = level;
+}
+
+static void behind_driver(wire *w, const uint8_t *frame, size_t length)
+{
+    driver *d = w->context;
+    uint64_t last_bit = w->last_started + 10 * w->bit;
+    uint64_t wire_time = w->first_started + length * 10 * w->bit;
+
+    assert_int_equal(d->level, 0);
+    assert_true(d->rose < w->first_started);
+    assert_true(d->fell >= last_bit && d->fell >= wire_time);
+    /* Off again well within the 3.5 characters that a slave keeps still. */
+    assert_true(d->fell - last_bit < 10 * w->bit);
+    d->requests++;
+    w->context = &d->peer;
+    peer_libmodbus(w, frame, length);
+    w->context = d;
+}
+
+static void half_duplex(const kind *k)
+{
+    board *b = start(k, "HalfDuplex");
+    driver d = {.rose = 0};
+
+    server_start(&d.peer, 1);
+    board_watch_pin(b, k->pin2.port, k->pin2.bit, driver_switched, &d);
+    board_uart(b, '0', behind_driver, &d);
+    assert_true(board_run(b, 500 * MS));
+    assert_true(is_high(b, k->led));
+    assert_true(d.requests >= 4);
+    assert_int_equal(d.peer.mapping->tab_registers[30], (uint16_t)~server_pattern(0));
+    server_stop(&d.peer);
+    board_free(b);
+}
+
+static void the_driver_is_on_from_the_first_to_the_last_bit(void **state)
+{
+    (void)state;
+    half_duplex(&uno);
+    half_duplex(&mega);
+}
+
+/* Three servers share a wire: each hears what is for it. */
+static void shared(wire *w, const uint8_t *frame, size_t length)
+{
+    server *all = w->context;
+
+    if (frame[0] < 1 || frame[0] > 3)
+        return;
+    w->context = &all[frame[0] - 1];
+    peer_libmodbus(w, frame, length);
+    w->context = all;
+}
+
+static void several_slaves(const kind *k)
+{
+    board *b = start(k, "SeveralSlaves");
+    server all[3];
+    uint16_t i;
+
+    for (i = 0; i < 3; i++) {
+        server_start(&all[i], i + 1);
+        all[i].mapping->tab_registers[5] = (uint16_t)(0x1111 * (i + 1));
+    }
+    board_uart(b, '0', shared, all);
+    assert_true(board_run(b, 300 * MS));
+    assert_true(is_high(b, k->led));
+    for (i = 0; i < 3; i++)
+        assert_int_equal(all[i].mapping->tab_registers[6], 0x1111 * (i + 1));
+    for (i = 0; i < 3; i++)
+        server_stop(&all[i]);
+    board_free(b);
+}
+
+static void several_slaves_are_told_apart(void **state)
+{
+    (void)state;
+    several_slaves(&uno);
+    several_slaves(&mega);
+}
+
+/* Longest time between two changes of a pin. */
+typedef struct rhythm {
+    uint64_t last, longest;
+    unsigned changes;
+} rhythm;
+
+static void changed(void *context, int level, uint64_t cycle)
+{
+    rhythm *r = context;
+
+    (void)level;
+    if (r->changes++ && cycle - r->last > r->longest)
+        r->longest = cycle - r->last;
+    r->last = cycle;
+}
+
+static void non_blocking(const kind *k, int answers)
+{
+    board *b = start(k, "NonBlocking");
+    rhythm r = {0, 0, 0};
+    server s;
+    wire *bus;
+
+    server_start(&s, 1);
+    board_watch_pin(b, k->led.port, k->led.bit, changed, &r);
+    bus = board_uart(b, '0', answers ? peer_libmodbus : NULL, &s);
+    assert_true(board_run(b, 1500 * MS));
+    assert_true(r.changes >= 28);
+    /* 50 ms, and the time that a request of 13 bytes takes at 19200 baud: the
+     * core's flush, which the class calls, waits for the last bit. */
+    assert_true(r.longest < 58 * MS);
+    if (answers) {
+        assert_true(bus->frames > 20);
+        assert_int_equal(s.mapping->tab_registers[40], server_pattern(3));
+        assert_true(s.mapping->tab_registers[41] > 10);
+    } else {
+        assert_in_range(bus->frames, 2, 4);
+    }
+    server_stop(&s);
+    board_free(b);
+}
+
+static void without_waiting_the_led_blinks_on(void **state)
+{
+    (void)state;
+    non_blocking(&uno, 1);
+    non_blocking(&uno, 0);
+    non_blocking(&mega, 1);
+}
+
+static void energy_meter(const kind *k, char bus)
+{
+    board *b = start(k, "EnergyMeter");
+    paper printed = {""};
+    server s;
+
+    server_start(&s, 1);
+    floats(s.mapping, 0, 230.5f);
+    floats(s.mapping, 6, 2.25f);
+    floats(s.mapping, 12, 518.6f);
+    board_uart(b, bus, peer_libmodbus, &s);
+    if (bus != '0')
+        board_uart(b, '0', print, &printed);
+    assert_true(board_run(b, 400 * MS));
+    assert_true(is_high(b, k->pin7));
+    if (bus != '0')
+        assert_string_equal(printed.text, "230.50 V 2.25 A 518.60 W\r\n");
+    floats(s.mapping, 12, 1000.1f);
+    assert_true(board_run(b, 700 * MS));
+    assert_false(is_high(b, k->pin7));
+    server_stop(&s);
+    board_free(b);
+}
+
+static void an_energy_meters_floats_are_read(void **state)
+{
+    (void)state;
+    energy_meter(&uno, '0');
+    energy_meter(&mega, '1');
+}
+
+static void basic(const kind *k)
+{
+    board *b = start(k, "Basic");
+    server s;
+    wire *bus;
+    unsigned rounds;
+
+    server_start(&s, 2);
+    bus = board_uart(b, '0', peer_libmodbus, &s);
+    assert_true(board_run(b, 700 * MS));
+    rounds = bus->frames / 2;
+    assert_true(rounds > 10);
+    /* Any round that failed would have taken two seconds. */
+    assert_in_range(s.mapping->tab_registers[0], rounds, rounds + 1);
+    assert_int_equal(s.mapping->tab_registers[1], 0);
+    server_stop(&s);
+    board_free(b);
+}
+
+static void basic_counts_in_the_server(void **state)
+{
+    (void)state;
+    basic(&uno);
+    basic(&mega);
+}
+
+/* Requests of the round, function and quantity, as they came. */
+typedef struct coupler {
+    server peer;
+    uint8_t functions[30], quantities[30], statuses[30];
+    unsigned count;
+} coupler;
+
+static void couple(wire *w, const uint8_t *frame, size_t length)
+{
+    coupler *c = w->context;
+    size_t from = w->head;
+
+    w->context = &c->peer;
+    peer_libmodbus(w, frame, length);
+    w->context = c;
+    if (c->count == 30)
+        return;
+    c->functions[c->count] = frame[1];
+    c->quantities[c->count] = frame[5];
+    c->statuses[c->count++] =
+        w->queue[(from + 1) % QUEUE] & 0x80 ? w->queue[(from + 2) % QUEUE] : 0;
+}
+
+static void phoenix_contact(const kind *k)
+{
+    static const uint8_t functions[11] = {0x17, 6, 6, 3, 16, 1, 3, 3, 3, 3, 3};
+    static const uint8_t quantities[11] = {2, 0, 1, 2, 2, 17, 66, 64, 8, 64, 8};
+    board *b = start(k, "PhoenixContact");
+    coupler c = {.count = 0};
+    unsigned i;
+
+    server_start(&c.peer, 1);
+    /* As the device that refuses 66 registers and gives 64. */
+    c.peer.mapping->nb_registers = 65;
+    board_uart(b, '0', couple, &c);
+    assert_true(board_run(b, 700 * MS));
+    assert_true(c.count >= 11);
+    for (i = 0; i < 11; i++) {
+        assert_int_equal(c.functions[i], functions[i]);
+        assert_int_equal(c.quantities[i], quantities[i]);
+    }
+    assert_int_equal(c.statuses[0], 0);
+    assert_int_equal(c.statuses[1], 2);  /* register 2006 is not there */
+    assert_int_equal(c.statuses[5], 0);
+    assert_int_equal(c.statuses[6], 2);  /* of 66 */
+    assert_int_equal(c.statuses[7], 0);  /* of 64 */
+    assert_int_equal(c.statuses[9], 2);  /* 8 to 71 */
+    assert_int_equal(c.peer.mapping->tab_registers[4], server_pattern(8));
+    assert_int_equal(c.peer.mapping->tab_registers[5], server_pattern(9));
+    server_stop(&c.peer);
+    board_free(b);
+}
+
+static void phoenix_contact_makes_its_calls(void **state)
+{
+    (void)state;
+    phoenix_contact(&uno);
+    phoenix_contact(&mega);
+}
+
+/* --- sketches beyond the examples */
+
+static void a_bus_on_two_pins_works(void **state)
+{
+    board *b = start(&uno, "Soft");
+    uint16_t report = board_symbol(b, "report");
+    unsigned i;
+    server s;
+
+    (void)state;
+    server_start(&s, 1);
+    /* Pins 10 and 11 are port B, bits 2 and 3. */
+    board_pins(b, 'B', 2, 3, 9600, peer_libmodbus, &s);
+    assert_true(board_run_until(b, report, 1, 1000 * MS));
+    for (i = 0; i < 3; i++)
+        assert_int_equal(board_byte(b, (uint16_t)(report + 1 + i)), 0);
+    for (i = 0; i < 6; i++) {
+        assert_int_equal(board_word(b, (uint16_t)(report + 4 + 2 * i)), server_pattern(2 + i));
+        assert_int_equal(s.mapping->tab_registers[20 + i], (uint16_t)~server_pattern(2 + i));
+    }
+    assert_int_equal(s.mapping->tab_bits[3], 1);
+    server_stop(&s);
+    board_free(b);
+}
+
+static void two_ports_are_polled_at_once(void **state)
+{
+    board *b = start(&mega, "TwoPorts");
+    uint16_t report = board_symbol(b, "report");
+    server left, right;
+
+    (void)state;
+    server_start(&left, 1);
+    server_start(&right, 2);
+    board_uart(b, '1', peer_libmodbus, &left);
+    board_uart(b, '2', peer_libmodbus, &right);
+    assert_true(board_run_until(b, report, 1, 2000 * MS));
+    assert_int_equal(board_byte(b, (uint16_t)(report + 3)), 0);
+    assert_int_equal(board_byte(b, (uint16_t)(report + 4)), 0);
+    assert_int_equal(board_word(b, (uint16_t)(report + 5)), server_pattern(7));
+    assert_int_equal(board_word(b, (uint16_t)(report + 7)), server_pattern(8));
+    /* Ten requests of 10 ms each, polled more often than once a millisecond. */
+    assert_true(board_word(b, (uint16_t)(report + 9)) > 50);
+    server_stop(&left);
+    server_stop(&right);
+    board_free(b);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(first_read_reads_what_the_server_holds),
+        cmocka_unit_test(first_read_says_that_nobody_answers),
+        cmocka_unit_test(write_and_read_back_writes_to_the_server),
+        cmocka_unit_test(the_driver_is_on_from_the_first_to_the_last_bit),
+        cmocka_unit_test(several_slaves_are_told_apart),
+        cmocka_unit_test(without_waiting_the_led_blinks_on),
+        cmocka_unit_test(an_energy_meters_floats_are_read),
+        cmocka_unit_test(basic_counts_in_the_server),
+        cmocka_unit_test(phoenix_contact_makes_its_calls),
+        cmocka_unit_test(a_bus_on_two_pins_works),
+        cmocka_unit_test(two_ports_are_polled_at_once),
+    };
+
+    return cmocka_run_group_tests_name("sketches on simulated boards", tests, NULL, NULL);
+}

@@ -1,0 +1,81 @@
+# The Arduino library, and sketches on simulated AVR boards.
+
+AVR_MCUS := atmega328p atmega168 atmega32u4 atmega2560
+
+.PHONY: avr-archives
+avr-archives:
+	@for mcu in $(AVR_MCUS); do scripts/archive $$mcu || exit 1; done
+
+# The library carries every archive that stands under build/archives: run
+# `make archives` first for one that serves all boards.
+.PHONY: arduino
+arduino: avr-archives ## The Arduino library: dist/mbm and its zip
+	@scripts/arduino
+	@scripts/check-arduino
+
+.PHONY: need-avr
+need-avr:
+	@scripts/need gcc clang libc6-dev arduino-builder arduino-core-avr arduino-ctags gcc-avr avr-libc binutils-avr \
+	    libsimavr-dev libelf-dev pkg-config libmodbus-dev libcmocka-dev
+
+# --- sketches, each for the boards that a test runs it on
+
+AVR_OUT := $(BUILD)/avr
+EXAMPLES := $(notdir $(wildcard examples/arduino/*))
+TEST_SKETCHES := $(notdir $(wildcard firmware-tests/avr/sketches/*))
+AVR_ELFS := $(EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(EXAMPLES:%=$(AVR_OUT)/mega/%.elf) \
+            $(patsubst %,$(AVR_OUT)/uno/%.elf,$(filter-out TwoPorts,$(TEST_SKETCHES))) \
+            $(AVR_OUT)/mega/TwoPorts.elf
+# The library as it was when a sketch was last compiled against it.
+DIST_STAMP := $(BUILD)/avr/library
+
+.PHONY: avr-sketches
+avr-sketches: arduino
+	@mkdir -p $(AVR_OUT)
+	@cat dist/*.zip | cmp -s - $(DIST_STAMP) || cat dist/*.zip >$(DIST_STAMP)
+	@$(MAKE) -s --no-print-directory $(AVR_ELFS)
+
+# The examples are part of the library, from where they are compiled.
+SKETCH_SOURCES := scripts/sketch $(wildcard firmware-tests/avr/sketches/*/*.ino)
+define sketches
+$(AVR_OUT)/$(1)/%.elf: examples/arduino/%/ $(SKETCH_SOURCES) $(DIST_STAMP)
+	@scripts/sketch $(1) dist/mbm/examples/$$* $$@
+$(AVR_OUT)/$(1)/%.elf: firmware-tests/avr/sketches/%/ $(SKETCH_SOURCES) $(DIST_STAMP)
+	@scripts/sketch $(1) $$< $$@
+endef
+$(eval $(call sketches,uno))
+$(eval $(call sketches,mega))
+
+# --- the programs that run them
+
+AVR_SUPPORT := $(patsubst %,$(BUILD)/avr-tests/%.o,board peer server pty)
+AVR_TESTS := $(patsubst firmware-tests/avr/%.c,$(BUILD)/avr-tests/%,$(wildcard firmware-tests/avr/test_*.c))
+AVR_FLAGS = -std=c11 -O2 -g $(WARNINGS) -Ifirmware-tests/avr -Ic-tests/support -Iinclude -isystem /usr/include/simavr $(MODBUS)
+AVR_HEADERS := $(wildcard firmware-tests/avr/*.h c-tests/support/*.h)
+
+$(BUILD)/avr-tests/%.o: firmware-tests/avr/%.c $(AVR_HEADERS)
+	@mkdir -p $(@D)
+	@gcc $(AVR_FLAGS) -c $< -o $@
+$(BUILD)/avr-tests/%.o: c-tests/support/%.c $(AVR_HEADERS)
+	@mkdir -p $(@D)
+	@gcc $(AVR_FLAGS) -c $< -o $@
+$(AVR_TESTS) $(BUILD)/avr-tests/timing: %: %.o $(AVR_SUPPORT)
+	@gcc $^ -lsimavr -lelf -lmodbus -lcmocka -lpthread -o $@
+
+.PHONY: avr-tests
+avr-tests: $(AVR_TESTS)
+
+.PHONY: firmware-test-avr
+firmware-test-avr: need-avr
+	@$(MAKE) -s --no-print-directory avr-sketches avr-tests
+	@scripts/check-boards
+	@scripts/run-c-tests "" $(AVR_TESTS)
+
+# Other targets add themselves here.
+.PHONY: firmware-test
+firmware-test: firmware-test-avr ## Sketches run on simulated boards against real peers
+
+.PHONY: timing
+timing: need-avr ## Bus timing, RAM and flash on a simulated Uno, into docs/timing.md
+	@$(MAKE) -s --no-print-directory avr-sketches $(BUILD)/avr-tests/timing
+	@scripts/timing
