@@ -19,7 +19,7 @@ HEADERS := $(wildcard include/*.h c-tests/support/*.h c-tests/shim/* examples/li
 
 .PHONY: help
 help: ## What there is
-	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 18
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 20
 
 .PHONY: archive
 archive: $(ARCHIVE) ## The archive for this machine, target/release/libmbm.a
@@ -125,3 +125,5 @@ check-readme:
 	@test -s $(BUILD)/readme.c
 	@gcc -std=c11 $(WARNINGS) -Iinclude -c $(BUILD)/readme.c -o $(BUILD)/readme.o
 	@echo "check-readme: the README's C compiles"
+
+include firmware-tests/qemu/qemu.mk
