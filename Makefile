@@ -19,7 +19,7 @@ HEADERS := $(wildcard include/*.h c-tests/support/*.h c-tests/shim/* examples/li
 
 .PHONY: help
 help: ## What there is
-	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 18
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 20
 
 .PHONY: archive
 archive: $(ARCHIVE) ## The archive for this machine, target/release/libmbm.a
@@ -132,3 +132,10 @@ check-readme:
 
 # Everything for Arduino and the AVR simulator.
 include scripts/arduino.mk
+include firmware-tests/qemu/qemu.mk
+
+.PHONY: firmware-test
+firmware-test: ## Firmware on simulated chips against a libmodbus server
+	@$(MAKE) --no-print-directory firmware-test-avr
+	@$(MAKE) --no-print-directory firmware-test-qemu
+	@echo "firmware-test: sketches on AVR boards and bare metal on QEMU work"

@@ -29,6 +29,10 @@ static void *serve(void *argument)
         if (waits[1].revents)
             return NULL;
         length = modbus_receive(s->peer, request);
+        /* After a frame for another unit libmodbus takes the next one for that
+         * unit's reply. It is not to be one of ours. */
+        if (length == 0)
+            modbus_receive(s->peer, request);
         if (length > 0)
             modbus_reply(s->peer, request, length, s->mapping);
     }
@@ -42,7 +46,7 @@ void server_start(server *s, int unit)
     s->peer = modbus_new_rtu(s->line.path, 115200, 'N', 8, 1);
     s->mapping = modbus_mapping_new(SERVER_BITS, SERVER_BITS, SERVER_REGISTERS, SERVER_REGISTERS);
     if (!s->peer || !s->mapping || modbus_set_slave(s->peer, unit) || modbus_connect(s->peer) ||
-        pipe(s->stop)) {
+        modbus_set_response_timeout(s->peer, 0, 20000) || pipe(s->stop)) {
         perror("libmodbus server");
         abort();
     }

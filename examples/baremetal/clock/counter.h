@@ -1,0 +1,13 @@
+/* A counter that runs freely; clock/counter.c makes microseconds of it.
+ * Licence: MIT OR Apache-2.0. */
+#ifndef COUNTER_H
+#define COUNTER_H
+
+#include <stdint.h>
+
+void counter_start(void);
+
+/* TICKS_PER_MICRO (machine.h) a microsecond, upwards, wrapping at 2^32. */
+uint32_t counter_read(void);
+
+#endif

@@ -1,0 +1,26 @@
+/* TIMER0 of the nRF51 at 1 MHz and 32 bits; its Cortex-M0 has no SysTick.
+ * Licence: MIT OR Apache-2.0. */
+#include "board.h"
+#include "counter.h"
+
+#define TIMER0 0x40008000u
+#define START REGISTER(TIMER0 + 0x000)
+#define CAPTURE REGISTER(TIMER0 + 0x040)
+#define BIT_MODE REGISTER(TIMER0 + 0x508)
+#define PRESCALER REGISTER(TIMER0 + 0x510)
+#define CAPTURED REGISTER(TIMER0 + 0x540)
+
+enum { BITS_32 = 3, DIVIDE_BY_16 = 4 };
+
+void counter_start(void)
+{
+    BIT_MODE = BITS_32;
+    PRESCALER = DIVIDE_BY_16;
+    START = 1;
+}
+
+uint32_t counter_read(void)
+{
+    CAPTURE = 1;
+    return CAPTURED;
+}

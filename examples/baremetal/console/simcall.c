@@ -1,0 +1,33 @@
+/* The console of Xtensa's simulator. Licence: MIT OR Apache-2.0. */
+#include "simcall.h"
+#include "board.h"
+
+int32_t simcall(int32_t number, int32_t first, int32_t second, int32_t third)
+{
+    register int32_t a2 __asm__("a2") = number;
+    register int32_t a3 __asm__("a3") = first;
+    register int32_t a4 __asm__("a4") = second;
+    register int32_t a5 __asm__("a5") = third;
+
+    __asm__ volatile("simcall" : "+r"(a2), "+r"(a3) : "r"(a4), "r"(a5) : "memory");
+    return a2;
+}
+
+void console_print(const char *text)
+{
+    static int32_t file = -1;
+    int32_t length = 0;
+
+    /* Files 0 to 2 are the serial line. */
+    if (file < 0)
+        file = simcall(SIMCALL_OPEN, (int32_t)(uintptr_t) "/dev/stderr", 1, 0);
+    while (text[length] != '\0')
+        length++;
+    simcall(SIMCALL_WRITE, file, (int32_t)(uintptr_t)text, length);
+}
+
+_Noreturn void console_exit(uint8_t code)
+{
+    for (;;)
+        simcall(SIMCALL_EXIT, code, 0, 0);
+}

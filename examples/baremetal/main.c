@@ -1,0 +1,148 @@
+/* A Modbus master on a board without an operating system: it sends each kind
+ * of request once and reports what came of it.
+ * Licence: MIT OR Apache-2.0. */
+#include "board.h"
+#include "mbm.h"
+#include "report.h"
+
+/* All storage is the program's own; mbm allocates nothing. */
+static mbm_master node;
+static mbm_counters counters;
+static uint16_t response[MBM_MAX_READ_REGISTERS];
+static uint16_t transmit[REPORT_SIZE];
+static uint8_t frame[MBM_FRAME_BYTES(MBM_MAX_READ_REGISTERS)];
+
+static uint16_t report[REPORT_SIZE];
+
+/* Notes how a request ended: its status, and the words that it brought. */
+static void note(enum step step, const char *name, uint8_t status, uint8_t expected)
+{
+    uint16_t *words = report + REPORT_HEAD + STEP_SIZE * (unsigned)step;
+    uint8_t i, count = mbm_master_available(&node);
+    uint16_t sum = 0;
+
+    /* The place of a word counts, so that words in a wrong order show. */
+    for (i = 0; i < count; i++)
+        sum = (uint16_t)(sum + (i + 1u) * mbm_master_receive(&node));
+    words[STEP_STATUS] = status;
+    words[STEP_WORDS] = count;
+    words[STEP_SUM] = sum;
+    if (status != expected)
+        report[REPORT_UNEXPECTED]++;
+    console_print(name);
+    console_print(": ");
+    console_print(mbm_statusText(status));
+    console_print("\n");
+}
+
+static void write(void)
+{
+    note(WRITE_REGISTER, "write a register", mbm_master_writeSingleRegister(&node, 100, 0xBEEF),
+         MBM_OK);
+
+    mbm_master_beginTransmission(&node, 101);
+    mbm_master_send(&node, 0x1122);
+    mbm_master_send32(&node, 0x33445566);
+    note(WRITE_REGISTERS, "write registers", mbm_master_writeQueuedRegisters(&node), MBM_OK);
+
+    note(WRITE_COIL, "write a coil", mbm_master_writeSingleCoil(&node, 40, 1), MBM_OK);
+
+    mbm_master_setTransmitBuffer(&node, 0, 0xA5C3);
+    mbm_master_setTransmitBuffer(&node, 1, 0x0005);
+    note(WRITE_COILS, "write 19 coils", mbm_master_writeMultipleCoils(&node, 50, 19), MBM_OK);
+}
+
+static void read(void)
+{
+    note(READ_HOLDING, "read holding registers",
+         mbm_master_readHoldingRegisters(&node, 20, 10), MBM_OK);
+    note(READ_INPUT_REGISTERS, "read input registers",
+         mbm_master_readInputRegisters(&node, 30, 10), MBM_OK);
+    note(READ_COILS, "read 37 coils", mbm_master_readCoils(&node, 45, 37), MBM_OK);
+    note(READ_INPUTS, "read 21 discrete inputs", mbm_master_readDiscreteInputs(&node, 70, 21),
+         MBM_OK);
+}
+
+static void write_and_read(void)
+{
+    note(MASK_WRITE, "mask a register", mbm_master_maskWriteRegister(&node, 102, 0x00FF, 0x3400),
+         MBM_OK);
+
+    mbm_master_setTransmitBuffer(&node, 0, 0xCAFE);
+    mbm_master_setTransmitBuffer(&node, 1, 0xF00D);
+    note(READ_WRITE, "write 2 registers and read 6",
+         mbm_master_readWriteMultipleRegisters(&node, 100, 6, 104, 2), MBM_OK);
+
+    note(READ_LONGEST, "read 125 registers", mbm_master_readHoldingRegisters(&node, 0, 125),
+         MBM_OK);
+}
+
+static void meet_refusals(void)
+{
+    uint32_t start;
+
+    note(READ_ABSENT_REGISTER, "read a register that is not there",
+         mbm_master_readHoldingRegisters(&node, 60000, 1), MBM_ILLEGAL_DATA_ADDRESS);
+
+    mbm_master_setSlaveID(&node, 0);
+    note(BROADCAST, "write a register of every unit",
+         mbm_master_writeSingleRegister(&node, 130, 0x5A5A), MBM_OK);
+    mbm_master_setSlaveID(&node, UNIT);
+    note(READ_WHAT_WAS_BROADCAST, "read it", mbm_master_readHoldingRegisters(&node, 130, 1),
+         MBM_OK);
+
+    mbm_master_setSlaveID(&node, ABSENT_UNIT);
+    mbm_master_setResponseTimeout(&node, ABSENT_TIMEOUT);
+    start = clock_micros(0);
+    note(ASK_ABSENT_UNIT, "ask a unit that is not there",
+         mbm_master_readHoldingRegisters(&node, 0, 1), MBM_RESPONSE_TIMED_OUT);
+    report[REPORT_ABSENT_MILLIS] = (uint16_t)((clock_micros(0) - start) / 1000u);
+    mbm_master_setResponseTimeout(&node, 1000);
+    mbm_master_setSlaveID(&node, UNIT);
+    note(READ_AGAIN, "read again", mbm_master_readHoldingRegisters(&node, 100, 2), MBM_OK);
+}
+
+static uint8_t send_report(void)
+{
+    uint8_t i;
+
+    report[REPORT_MAGIC] = REPORT_IS_HERE;
+    report[REPORT_STEPS] = STEPS;
+    report[REPORT_REQUESTS] = (uint16_t)counters.requests;
+    report[REPORT_REPLIES] = (uint16_t)counters.replies;
+    report[REPORT_EXCEPTIONS] = (uint16_t)counters.exceptions;
+    report[REPORT_BAD_CRC] = (uint16_t)counters.badCrc;
+    report[REPORT_TIMEOUTS] = (uint16_t)counters.timeouts;
+    report[REPORT_FOREIGN_FRAMES] = (uint16_t)counters.foreignFrames;
+    report[REPORT_RESYNCHRONISATIONS] = (uint16_t)counters.resynchronisations;
+    for (i = 0; i < REPORT_SIZE; i++)
+        mbm_master_setTransmitBuffer(&node, i, report[i]);
+    return mbm_master_writeMultipleRegisters(&node, REPORT_ADDRESS, REPORT_SIZE);
+}
+
+int main(void)
+{
+    mbm_port port = {0};
+
+    uart_start();
+    clock_start();
+
+    port.read = uart_read;
+    port.write = uart_write;
+    port.micros = clock_micros;
+    port.flush = uart_flush;
+    mbm_master_setBuffers(&node, response, MBM_MAX_READ_REGISTERS, transmit, REPORT_SIZE, frame,
+                          sizeof frame);
+    mbm_master_begin(&node, UNIT, &port);
+    mbm_master_setBaudRate(&node, BAUD);
+    mbm_master_setResponseTimeout(&node, 1000);
+    mbm_master_setCounters(&node, &counters);
+
+    write();
+    read();
+    write_and_read();
+    meet_refusals();
+    if (send_report() != MBM_OK)
+        return 255;
+    return report[REPORT_UNEXPECTED];
+}

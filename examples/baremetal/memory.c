@@ -1,0 +1,104 @@
+/* The functions that compilers call on their own account, for programs without
+ * a C library. Built with -fno-tree-loop-distribute-patterns, or the
+ * loops would become calls to themselves.
+ * Licence: MIT OR Apache-2.0. */
+#include <stddef.h>
+
+void *memcpy(void *restrict to, const void *restrict from, size_t length);
+void *memmove(void *to, const void *from, size_t length);
+void *memset(void *to, int value, size_t length);
+int memcmp(const void *left, const void *right, size_t length);
+
+void *memcpy(void *restrict to, const void *restrict from, size_t length)
+{
+    unsigned char *out = to;
+    const unsigned char *in = from;
+
+    while (length-- > 0)
+        *out++ = *in++;
+    return to;
+}
+
+void *memmove(void *to, const void *from, size_t length)
+{
+    unsigned char *out = to;
+    const unsigned char *in = from;
+
+    if (out < in)
+        return memcpy(to, from, length);
+    while (length-- > 0)
+        out[length] = in[length];
+    return to;
+}
+
+void *memset(void *to, int value, size_t length)
+{
+    unsigned char *out = to;
+
+    while (length-- > 0)
+        *out++ = (unsigned char)value;
+    return to;
+}
+
+int memcmp(const void *left, const void *right, size_t length)
+{
+    const unsigned char *a = left, *b = right;
+
+    for (; length > 0; length--, a++, b++)
+        if (*a != *b)
+            return *a - *b;
+    return 0;
+}
+
+#if defined(__arm__)
+/* The names that Arm's interface for compilers has for them. The figures are
+ * the alignment of both ends. */
+void __aeabi_memcpy(void *to, const void *from, size_t length);
+void __aeabi_memcpy4(void *to, const void *from, size_t length);
+void __aeabi_memcpy8(void *to, const void *from, size_t length);
+void __aeabi_memset(void *to, size_t length, int value);
+void __aeabi_memset4(void *to, size_t length, int value);
+void __aeabi_memclr(void *to, size_t length);
+void __aeabi_memclr4(void *to, size_t length);
+void __aeabi_memclr8(void *to, size_t length);
+
+void __aeabi_memcpy(void *to, const void *from, size_t length)
+{
+    memcpy(to, from, length);
+}
+
+void __aeabi_memcpy4(void *to, const void *from, size_t length)
+{
+    memcpy(to, from, length);
+}
+
+void __aeabi_memcpy8(void *to, const void *from, size_t length)
+{
+    memcpy(to, from, length);
+}
+
+void __aeabi_memset(void *to, size_t length, int value)
+{
+    memset(to, value, length);
+}
+
+void __aeabi_memset4(void *to, size_t length, int value)
+{
+    memset(to, value, length);
+}
+
+void __aeabi_memclr(void *to, size_t length)
+{
+    memset(to, 0, length);
+}
+
+void __aeabi_memclr4(void *to, size_t length)
+{
+    memset(to, 0, length);
+}
+
+void __aeabi_memclr8(void *to, size_t length)
+{
+    memset(to, 0, length);
+}
+#endif

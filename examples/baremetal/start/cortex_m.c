@@ -1,0 +1,55 @@
+/* Start-up of every Cortex-M: the first vectors, and memory as C expects it.
+ * Licence: MIT OR Apache-2.0. */
+#include "board.h"
+
+#include <stddef.h>
+
+/* The linker script says where. */
+extern uint32_t stack_top[], data_load[], data_start[], data_end[], bss_start[], bss_end[];
+
+void reset_handler(void);
+void fault_handler(void);
+
+/* On a board of your own: safe outputs, then a reset. */
+void fault_handler(void)
+{
+    console_print("fault\n");
+    console_exit(254);
+}
+
+/* Where clocks and pins are right after reset, as QEMU's mostly are. */
+__attribute__((weak)) void machine_start(void)
+{
+}
+
+void reset_handler(void)
+{
+    const uint32_t *from = data_load;
+    uint32_t *to;
+
+#if defined(__ARM_FP)
+    /* Full access to the FPU, before the first function that may use it. */
+    REGISTER(0xE000ED88) |= 0xFu << 20;
+    __asm__ volatile("dsb\n isb" ::: "memory");
+#endif
+    for (to = data_start; to < data_end; to++)
+        *to = *from++;
+    for (to = bss_start; to < bss_end; to++)
+        *to = 0;
+    machine_start();
+    console_exit((uint8_t)main());
+}
+
+struct vectors {
+    uint32_t *stack;
+    void (*handlers[15])(void);
+};
+
+/* From reset to SysTick. No interrupt is used. */
+__attribute__((section(".vectors"), used)) static const struct vectors vectors = {
+    stack_top,
+    {
+        reset_handler, fault_handler, fault_handler, fault_handler, fault_handler, fault_handler,
+        NULL, NULL, NULL, NULL, fault_handler, fault_handler, NULL, fault_handler, fault_handler,
+    },
+};

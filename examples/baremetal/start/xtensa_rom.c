@@ -1,0 +1,33 @@
+/* What the ESP8266 has in ROM and the simulated core has not: division, which
+ * the core has no instruction for, and a place where impossible branches end.
+ * Licence: MIT OR Apache-2.0. */
+#include "board.h"
+
+unsigned __udivsi3(unsigned dividend, unsigned divisor);
+unsigned __umodsi3(unsigned dividend, unsigned divisor);
+_Noreturn void abort(void);
+
+unsigned __udivsi3(unsigned dividend, unsigned divisor)
+{
+    unsigned quotient = 0, rest = 0, bit;
+
+    for (bit = 1u << 31; bit != 0; bit >>= 1) {
+        rest = rest << 1 | ((dividend & bit) != 0);
+        if (rest >= divisor) {
+            rest -= divisor;
+            quotient |= bit;
+        }
+    }
+    return quotient;
+}
+
+unsigned __umodsi3(unsigned dividend, unsigned divisor)
+{
+    return dividend - __udivsi3(dividend, divisor) * divisor;
+}
+
+void abort(void)
+{
+    console_print("abort\n");
+    console_exit(253);
+}

@@ -1,0 +1,66 @@
+/* Nordic's nRF51 UART. Licence: MIT OR Apache-2.0. */
+#include "board.h"
+#include "machine.h"
+
+#define START_RX REGISTER(UART_BASE + 0x000)
+#define START_TX REGISTER(UART_BASE + 0x008)
+#define RX_READY REGISTER(UART_BASE + 0x108)
+#define TX_READY REGISTER(UART_BASE + 0x11C)
+#define ENABLE REGISTER(UART_BASE + 0x500)
+#define TX_PIN REGISTER(UART_BASE + 0x50C)
+#define RX_PIN REGISTER(UART_BASE + 0x514)
+#define RX_DATA REGISTER(UART_BASE + 0x518)
+#define TX_DATA REGISTER(UART_BASE + 0x51C)
+#define RATE REGISTER(UART_BASE + 0x524)
+
+enum { ENABLED = 4 };
+
+/* 2^32 times the rate over 16 MHz, of which the lowest 12 bits do not count. */
+#define RATE_OF(baud) ((uint32_t)(((uint64_t)(baud) << 32) / 16000000u + 0x800u) & 0xFFFFF000u)
+
+/* TX_READY says that the last byte has left; before the first one it is silent. */
+static uint8_t sending;
+
+void uart_start(void)
+{
+    TX_PIN = UART_TX_PIN;
+    RX_PIN = UART_RX_PIN;
+    RATE = RATE_OF(BAUD);
+    ENABLE = ENABLED;
+    RX_READY = 0;
+    TX_READY = 0;
+    START_RX = 1;
+    START_TX = 1;
+}
+
+int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    int16_t count = 0;
+
+    (void)context;
+    while (count < capacity && RX_READY) {
+        /* In this order: the next byte may raise it as soon as one is taken. */
+        RX_READY = 0;
+        bytes[count++] = (uint8_t)RX_DATA;
+    }
+    return count;
+}
+
+uint8_t uart_flush(void *context)
+{
+    (void)context;
+    if (sending && TX_READY) {
+        TX_READY = 0;
+        sending = 0;
+    }
+    return !sending;
+}
+
+int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
+{
+    if (length == 0 || !uart_flush(context))
+        return 0;
+    sending = 1;
+    TX_DATA = bytes[0];
+    return 1;
+}

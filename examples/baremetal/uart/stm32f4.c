@@ -1,0 +1,44 @@
+/* The USART of STM32 F1, F2 and F4. Licence: MIT OR Apache-2.0. */
+#include "board.h"
+#include "machine.h"
+
+#define STATUS REGISTER(UART_BASE + 0x00)
+#define DATA REGISTER(UART_BASE + 0x04)
+#define DIVISOR REGISTER(UART_BASE + 0x08)
+#define CONTROL REGISTER(UART_BASE + 0x0C)
+
+enum { RX_FULL = 1 << 5, TX_DONE = 1 << 6, TX_EMPTY = 1 << 7 };
+enum { RX_ENABLE = 1 << 2, TX_ENABLE = 1 << 3, ENABLE = 1 << 13 };
+
+/* Clocks and pins of the peripheral are the chip's start-up's business. */
+void uart_start(void)
+{
+    DIVISOR = (UART_HZ + BAUD / 2u) / BAUD;
+    CONTROL = ENABLE | TX_ENABLE | RX_ENABLE;
+}
+
+int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    int16_t count = 0;
+
+    (void)context;
+    while (count < capacity && (STATUS & RX_FULL))
+        bytes[count++] = (uint8_t)DATA;
+    return count;
+}
+
+int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
+{
+    int16_t count = 0;
+
+    (void)context;
+    while (count < length && (STATUS & TX_EMPTY))
+        DATA = bytes[count++];
+    return count;
+}
+
+uint8_t uart_flush(void *context)
+{
+    (void)context;
+    return (STATUS & TX_DONE) != 0;
+}

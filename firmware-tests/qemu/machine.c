@@ -1,0 +1,110 @@
+#define _GNU_SOURCE
+#include "machine.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+/* A run takes one second; the machine under the test may be busy. */
+enum { PATIENCE = 30 /* s */ };
+
+#define ARM(board) {"qemu-system-arm", "-M", board, "-kernel", NULL}
+
+const machine machines[] = {
+    {"lm3s6965evb", ARM("lm3s6965evb")},
+    {"microbit", ARM("microbit")},
+    {"virt", {"qemu-system-riscv32", "-M", "virt", "-bios", "none", "-kernel", NULL}},
+    {"netduinoplus2", ARM("netduinoplus2")},
+    {"mps2-an500", ARM("mps2-an500")},
+    /* With -kernel this machine would not start at the image's entry. */
+    {"lx106", {"qemu-system-xtensa", "-M", "sim", "-cpu", "lx106", "-device", NULL}},
+};
+const unsigned machine_count = sizeof machines / sizeof machines[0];
+
+static void become_qemu(const machine *m, int line, int console)
+{
+    const char *folder = getenv("MBM_FIRMWARE");
+    char image[512], set[64];
+    const char *arguments[32];
+    unsigned n = 0;
+
+    /* Not to survive the test, whatever ends it. */
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    dup2(console, 1);
+    dup2(console, 2);
+    while (m->arguments[n]) {
+        arguments[n] = m->arguments[n];
+        n++;
+    }
+    snprintf(image, sizeof image, "%s%s/%s/firmware.elf",
+             strcmp(arguments[n - 1], "-device") ? "" : "loader,cpu-num=0,file=",
+             folder ? folder : "build/baremetal", m->name);
+    arguments[n++] = image;
+    /* The descriptor itself, not its name: no wait for the other end to open,
+     * and no byte lost before it has. */
+    snprintf(set, sizeof set, "fd=%d,set=1", line);
+    arguments[n++] = "-add-fd";
+    arguments[n++] = set;
+    arguments[n++] = "-chardev";
+    arguments[n++] = "serial,id=line,path=/dev/fdset/1";
+    arguments[n++] = "-serial";
+    arguments[n++] = "chardev:line";
+    arguments[n++] = "-semihosting-config";
+    arguments[n++] = "enable=on,target=native";
+    arguments[n++] = "-display";
+    arguments[n++] = "none";
+    arguments[n++] = "-monitor";
+    arguments[n++] = "none";
+    arguments[n++] = "-no-reboot";
+    arguments[n] = NULL;
+    execvp(arguments[0], (char **)(uintptr_t)arguments);
+    perror(arguments[0]);
+    _exit(127);
+}
+
+/* Waits without blocking for good; 0 if the time passed. */
+static int wait_for(pid_t child, int *status)
+{
+    unsigned naps;
+
+    for (naps = 0; naps < 100 * PATIENCE; naps++) {
+        if (waitpid(child, status, WNOHANG) == child)
+            return 1;
+        usleep(10000);
+    }
+    return 0;
+}
+
+run machine_run(const machine *m, int line)
+{
+    FILE *console = tmpfile();
+    run result = {0, -1, ""};
+    pid_t child;
+    int status = 0;
+    size_t length;
+
+    if (!console || (child = fork()) < 0) {
+        perror("machine_run");
+        abort();
+    }
+    if (child == 0)
+        become_qemu(m, line, fileno(console));
+    result.ended = wait_for(child, &status);
+    if (!result.ended) {
+        kill(child, SIGKILL);
+        waitpid(child, &status, 0);
+    } else if (WIFEXITED(status)) {
+        result.code = WEXITSTATUS(status);
+    }
+    rewind(console);
+    length = fread(result.console, 1, sizeof result.console - 1, console);
+    result.console[length] = '\0';
+    fclose(console);
+    return result;
+}

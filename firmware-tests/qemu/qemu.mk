@@ -1,0 +1,24 @@
+# The bare metal firmware on machines that QEMU plays.
+
+BAREMETAL := examples/baremetal/Makefile
+# Of the firmware's Makefile.
+MACHINES = $(shell $(MAKE) -s --no-print-directory -f $(BAREMETAL) machines)
+
+QEMU_TEST := $(BUILD)/firmware/test_qemu
+QEMU_SOURCES := $(wildcard firmware-tests/qemu/*.c) $(patsubst %,c-tests/support/%.c,pty server model request)
+$(QEMU_TEST): $(QEMU_SOURCES) $(wildcard firmware-tests/qemu/*.h c-tests/support/*.h) examples/baremetal/report.h include/mbm.h
+	@mkdir -p $(@D)
+	@gcc $(CFLAGS) $(WARNINGS) -Iinclude -Ic-tests/support -Iexamples/baremetal $(MODBUS) $(QEMU_SOURCES) \
+		-lmodbus -lcmocka -lpthread -o $@
+
+.PHONY: firmware-test-qemu
+firmware-test-qemu: ## Bare metal firmware on six machines in QEMU: Arm, RISC-V, Xtensa
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev libcmocka-dev qemu-system-arm qemu-system-misc \
+		gcc-arm-none-eabi gcc-riscv64-unknown-elf gcc-xtensa-lx106
+	@set -e; for machine in $(MACHINES); do \
+		scripts/archive $$($(MAKE) -s --no-print-directory -f $(BAREMETAL) mcu MACHINE=$$machine); \
+		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$machine; \
+	done
+	@$(MAKE) --no-print-directory $(QEMU_TEST)
+	@scripts/run-c-tests "" $(QEMU_TEST)
+	@echo "firmware-test-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against a libmodbus server and a bad wire"

@@ -1,0 +1,359 @@
+/* The bare metal firmware on every machine that QEMU plays: against a real
+ * libmodbus server, whose memory is looked at, and against a device of the
+ * tests' own on a line with faults. What the firmware reports is checked too.
+ *
+ *     test_qemu [MACHINE...] */
+#include "device.h"
+#include "faults.h"
+#include "machine.h"
+#include "mbm.h"
+#include "report.h"
+#include "server.h"
+#include "test.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+static const machine *board;
+static server peer;
+static run done;
+
+/* Words of the report, and of a step in it. */
+static uint16_t head(const uint16_t *registers, unsigned word)
+{
+    return registers[REPORT_ADDRESS + word];
+}
+
+static uint16_t of(const uint16_t *registers, enum step step, unsigned word)
+{
+    return registers[REPORT_ADDRESS + REPORT_HEAD + STEP_SIZE * (unsigned)step + word];
+}
+
+/* The firmware's sum over words, in which the place counts. */
+static uint16_t sum_of(const uint16_t *words, unsigned count)
+{
+    unsigned i, sum = 0;
+
+    for (i = 0; i < count; i++)
+        sum += (i + 1) * words[i];
+    return (uint16_t)sum;
+}
+
+static uint16_t sum_of_bits(const uint8_t *bits, unsigned count)
+{
+    uint16_t words[8] = {0};
+    unsigned i;
+
+    for (i = 0; i < count; i++)
+        if (bits[i])
+            words[i / 16] |= (uint16_t)(1u << i % 16);
+    return sum_of(words, (count + 15) / 16);
+}
+
+static void brought(const uint16_t *registers, enum step step, unsigned words, uint16_t sum)
+{
+    assert_int_equal(of(registers, step, STEP_STATUS), MBM_OK);
+    assert_int_equal(of(registers, step, STEP_WORDS), words);
+    assert_int_equal(of(registers, step, STEP_SUM), sum);
+}
+
+/* The run was not killed, and so many steps went otherwise than expected. */
+static void ended_with(int code)
+{
+    if (!done.ended || done.code != code)
+        print_error("%s", done.console);
+    assert_true(done.ended);
+    assert_int_equal(done.code, code);
+}
+
+static uint16_t *held(void)
+{
+    assert_int_equal(head(peer.mapping->tab_registers, REPORT_MAGIC), REPORT_IS_HERE);
+    return peer.mapping->tab_registers;
+}
+
+static int run_with_libmodbus(void **state)
+{
+    (void)state;
+    server_start(&peer, UNIT);
+    done = machine_run(board, peer.line.ours);
+    return 0;
+}
+
+static int stop(void **state)
+{
+    (void)state;
+    server_stop(&peer);
+    return 0;
+}
+
+/* Every step went as the firmware expects, and it says so in its own words. */
+static void ends_with_every_request_as_expected(void **state)
+{
+    (void)state;
+    ended_with(0);
+    assert_int_equal(head(held(), REPORT_STEPS), STEPS);
+    assert_int_equal(head(held(), REPORT_UNEXPECTED), 0);
+    assert_non_null(strstr(done.console, "read again: "));
+}
+
+static void writes_a_register(void **state)
+{
+    (void)state;
+    assert_int_equal(of(held(), WRITE_REGISTER, STEP_STATUS), MBM_OK);
+    assert_int_equal(held()[100], 0xBEEF);
+    assert_int_equal(held()[99], server_pattern(99));
+}
+
+static void writes_queued_registers(void **state)
+{
+    (void)state;
+    assert_int_equal(of(held(), WRITE_REGISTERS, STEP_STATUS), MBM_OK);
+    assert_int_equal(held()[101], 0x1122);
+    assert_int_equal(held()[103], 0x3344);
+    assert_int_equal(held()[106], server_pattern(106));
+}
+
+static void writes_a_coil(void **state)
+{
+    (void)state;
+    assert_int_equal(of(held(), WRITE_COIL, STEP_STATUS), MBM_OK);
+    assert_int_equal(peer.mapping->tab_bits[40], 1);
+}
+
+static void writes_coils(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    assert_int_equal(of(held(), WRITE_COILS, STEP_STATUS), MBM_OK);
+    assert_int_equal(peer.mapping->tab_bits[49], server_bit_pattern(49));
+    for (i = 0; i < 19; i++)
+        assert_int_equal(peer.mapping->tab_bits[50 + i], 0x5A5C3u >> i & 1);
+    assert_int_equal(peer.mapping->tab_bits[69], server_bit_pattern(69));
+}
+
+static void reads_holding_registers(void **state)
+{
+    (void)state;
+    brought(held(), READ_HOLDING, 10, sum_of(held() + 20, 10));
+}
+
+static void reads_input_registers(void **state)
+{
+    (void)state;
+    brought(held(), READ_INPUT_REGISTERS, 10, sum_of(peer.mapping->tab_input_registers + 30, 10));
+}
+
+static void reads_coils(void **state)
+{
+    (void)state;
+    brought(held(), READ_COILS, 3, sum_of_bits(peer.mapping->tab_bits + 45, 37));
+}
+
+static void reads_discrete_inputs(void **state)
+{
+    (void)state;
+    brought(held(), READ_INPUTS, 2, sum_of_bits(peer.mapping->tab_input_bits + 70, 21));
+}
+
+static void mask_writes_a_register(void **state)
+{
+    (void)state;
+    assert_int_equal(of(held(), MASK_WRITE, STEP_STATUS), MBM_OK);
+    assert_int_equal(held()[102], (0x5566 & 0x00FF) | 0x3400);
+}
+
+static void writes_and_reads_in_one_request(void **state)
+{
+    (void)state;
+    assert_int_equal(held()[104], 0xCAFE);
+    assert_int_equal(held()[105], 0xF00D);
+    brought(held(), READ_WRITE, 6, sum_of(held() + 100, 6));
+}
+
+static void reads_125_registers(void **state)
+{
+    (void)state;
+    brought(held(), READ_LONGEST, 125, sum_of(held(), 125));
+}
+
+static void hands_on_an_exception(void **state)
+{
+    (void)state;
+    assert_int_equal(of(held(), READ_ABSENT_REGISTER, STEP_STATUS), MBM_ILLEGAL_DATA_ADDRESS);
+    assert_int_equal(head(held(), REPORT_EXCEPTIONS), 1);
+}
+
+static void a_broadcast_arrives_and_is_not_waited_for(void **state)
+{
+    (void)state;
+    assert_int_equal(of(held(), BROADCAST, STEP_STATUS), MBM_OK);
+    assert_int_equal(held()[130], 0x5A5A);
+    brought(held(), READ_WHAT_WAS_BROADCAST, 1, 0x5A5A);
+}
+
+static void an_absent_unit_times_out_when_it_should(void **state)
+{
+    uint16_t millis = head(held(), REPORT_ABSENT_MILLIS);
+
+    (void)state;
+    assert_int_equal(of(held(), ASK_ABSENT_UNIT, STEP_STATUS), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(head(held(), REPORT_TIMEOUTS), 1);
+    /* The gap before it counts, and whatever else this computer does. */
+    assert_in_range(millis, ABSENT_TIMEOUT, 4 * ABSENT_TIMEOUT);
+    brought(held(), READ_AGAIN, 2, sum_of(held() + 100, 2));
+}
+
+static void counts_what_happened(void **state)
+{
+    (void)state;
+    assert_int_equal(head(held(), REPORT_REQUESTS), STEPS);
+    /* Neither the broadcast nor the absent unit is answered. */
+    assert_int_equal(head(held(), REPORT_REPLIES), STEPS - 2);
+    assert_int_equal(head(held(), REPORT_BAD_CRC), 0);
+    assert_int_equal(head(held(), REPORT_FOREIGN_FRAMES), 0);
+    assert_int_equal(head(held(), REPORT_RESYNCHRONISATIONS), 0);
+}
+
+/* What every step must bring from the device of our own; `met` is what the
+ * request that meets the fault ends with. */
+static void all_is_right(const device *d, uint8_t met)
+{
+    const uint16_t *registers = d->memory.holding[0];
+    unsigned i;
+
+    assert_int_equal(head(registers, REPORT_MAGIC), REPORT_IS_HERE);
+    assert_int_equal(d->malformed, 0);
+    assert_int_equal(d->number, STEPS + 1);
+    for (i = 0; i < STEPS; i++) {
+        uint16_t status = of(registers, (enum step)i, STEP_STATUS);
+
+        if (i == READ_HOLDING)
+            assert_int_equal(status, met);
+        else if (i == READ_ABSENT_REGISTER)
+            assert_int_equal(status, MBM_ILLEGAL_DATA_ADDRESS);
+        else if (i == ASK_ABSENT_UNIT)
+            assert_int_equal(status, MBM_RESPONSE_TIMED_OUT);
+        else
+            assert_int_equal(status, MBM_OK);
+    }
+    if (met == MBM_OK)
+        brought(registers, READ_HOLDING, 10, sum_of(registers + 20, 10));
+    brought(registers, READ_INPUT_REGISTERS, 10, sum_of(d->memory.readings[0] + 30, 10));
+    brought(registers, READ_COILS, 3, sum_of_bits(d->memory.coils[0] + 45, 37));
+    brought(registers, READ_WRITE, 6, sum_of(registers + 100, 6));
+}
+
+static void run_with_device(device *d, device_fault spoil, int code)
+{
+    device_start(d, READ_HOLDING + 1, spoil);
+    done = machine_run(board, d->line.ours);
+    device_stop(d);
+    ended_with(code);
+}
+
+static void the_clock_keeps_time(void **state)
+{
+    static device d;
+    const uint32_t right = 1000u * (ABSENT_TIMEOUT + 100);
+    uint32_t waited;
+
+    (void)state;
+    run_with_device(&d, NULL, 0);
+    all_is_right(&d, MBM_OK);
+    /* From the absent unit's request to the next: its timeout and the quiet time of
+     * 100 ms, give or take what else this computer does. */
+    waited = (uint32_t)(d.at[READ_AGAIN + 1] - d.at[ASK_ABSENT_UNIT + 1]);
+    assert_in_range(waited, right / 10 * 8, right / 10 * 19);
+}
+
+static void meets(void **state)
+{
+    static device d;
+    const fault *f = *state;
+    const uint16_t *registers = d.memory.holding[0];
+    uint8_t failed = f->status != MBM_OK;
+
+    run_with_device(&d, f->spoil, failed);
+    all_is_right(&d, f->status);
+    assert_int_equal(head(registers, REPORT_UNEXPECTED), failed);
+    assert_int_equal(head(registers, REPORT_BAD_CRC), f->status == MBM_INVALID_CRC);
+    assert_int_equal(head(registers, REPORT_TIMEOUTS), 1 + (f->status == MBM_RESPONSE_TIMED_OUT));
+    assert_int_equal(head(registers, REPORT_RESYNCHRONISATIONS), f->resynchronisation);
+    assert_int_equal(head(registers, REPORT_FOREIGN_FRAMES), f->foreign);
+}
+
+#define TEST(test) {#test, test}
+
+static const struct {
+    const char *name;
+    CMUnitTestFunction function;
+} behaviours[] = {
+    TEST(ends_with_every_request_as_expected),
+    TEST(writes_a_register),
+    TEST(writes_queued_registers),
+    TEST(writes_a_coil),
+    TEST(writes_coils),
+    TEST(reads_holding_registers),
+    TEST(reads_input_registers),
+    TEST(reads_coils),
+    TEST(reads_discrete_inputs),
+    TEST(mask_writes_a_register),
+    TEST(writes_and_reads_in_one_request),
+    TEST(reads_125_registers),
+    TEST(hands_on_an_exception),
+    TEST(a_broadcast_arrives_and_is_not_waited_for),
+    TEST(an_absent_unit_times_out_when_it_should),
+    TEST(counts_what_happened),
+    TEST(the_clock_keeps_time),
+};
+
+enum { MOST_TESTS = 40, MOST_NAME = 100 };
+
+static int test_machine(const machine *m)
+{
+    struct CMUnitTest tests[MOST_TESTS];
+    char names[MOST_TESTS][MOST_NAME];
+    unsigned i, count = 0;
+    char *space;
+
+    memset(tests, 0, sizeof tests);
+    for (i = 0; i < COUNT(behaviours) + fault_count && count < MOST_TESTS; i++, count++) {
+        int plain = i < COUNT(behaviours);
+        const fault *f = plain ? NULL : &faults[i - COUNT(behaviours)];
+
+        snprintf(names[i], MOST_NAME, "%s: %s", m->name, plain ? behaviours[i].name : f->name);
+        for (space = names[i]; *space; space++)
+            if (*space == '_')
+                *space = ' ';
+        tests[i].name = names[i];
+        tests[i].test_func = plain ? behaviours[i].function : meets;
+        tests[i].initial_state = (void *)(uintptr_t)f;
+    }
+    board = m;
+    return _cmocka_run_group_tests(m->name, tests, count, run_with_libmodbus, stop);
+}
+
+int main(int argc, char **argv)
+{
+    int failed = 0, asked = 0, a;
+    unsigned m;
+
+    /* Should all other waits fail: ends this program, and QEMU with it. */
+    alarm(1800);
+    for (m = 0; m < machine_count; m++) {
+        int wanted = argc == 1;
+
+        for (a = 1; a < argc; a++)
+            wanted |= strcmp(argv[a], machines[m].name) == 0;
+        if (wanted) {
+            failed += test_machine(&machines[m]);
+            asked++;
+        }
+    }
+    if (asked == 0)
+        fprintf(stderr, "test_qemu: no such machine\n");
+    return failed != 0 || asked == 0;
+}
