@@ -71,9 +71,6 @@ firmware-test-avr: need-avr
 	@scripts/check-boards
 	@scripts/run-c-tests "" $(AVR_TESTS)
 
-# Other targets add themselves here.
-.PHONY: firmware-test
-firmware-test: firmware-test-avr ## Sketches run on simulated boards against real peers
 
 .PHONY: timing
 timing: need-avr ## Bus timing, RAM and flash on a simulated Uno, into docs/timing.md
