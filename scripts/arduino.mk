@@ -22,10 +22,13 @@ need-avr:
 
 AVR_OUT := $(BUILD)/avr
 EXAMPLES := $(notdir $(wildcard examples/arduino/*))
+# These want more than one port.
+MEGA_SKETCHES := TwoPorts OlderCalls
 TEST_SKETCHES := $(notdir $(wildcard firmware-tests/avr/sketches/*))
 AVR_ELFS := $(EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(EXAMPLES:%=$(AVR_OUT)/mega/%.elf) \
-            $(patsubst %,$(AVR_OUT)/uno/%.elf,$(filter-out TwoPorts,$(TEST_SKETCHES))) \
-            $(AVR_OUT)/mega/TwoPorts.elf
+            $(EXAMPLES:%=$(AVR_OUT)/leonardo/%.elf) \
+            $(patsubst %,$(AVR_OUT)/uno/%.elf,$(filter-out $(MEGA_SKETCHES),$(TEST_SKETCHES))) \
+            $(MEGA_SKETCHES:%=$(AVR_OUT)/mega/%.elf)
 # The library as it was when a sketch was last compiled against it.
 DIST_STAMP := $(BUILD)/avr/library
 
@@ -45,6 +48,8 @@ $(AVR_OUT)/$(1)/%.elf: firmware-tests/avr/sketches/%/ $(SKETCH_SOURCES) $(DIST_S
 endef
 $(eval $(call sketches,uno))
 $(eval $(call sketches,mega))
+# Compiled only: the simulator has no USB for its Serial.
+$(eval $(call sketches,leonardo))
 
 # --- the programs that run them
 

@@ -1,5 +1,6 @@
 // The calls of the ModbusMaster manual's first example: a counter goes to
 // slave 2 as two words, six registers come back. No pause between rounds.
+// Boards whose Serial is their USB port have the bus on Serial1.
 #include <ModbusMaster.h>
 
 ModbusMaster node;

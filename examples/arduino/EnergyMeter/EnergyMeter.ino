@@ -2,14 +2,16 @@
 // each, the high word first; others put the low word first. This one reads
 // voltage, current and power, and switches a load off above 1000 W.
 #include <ModbusMaster.h>
+#include <string.h>
 
-#if defined(HAVE_HWSERIAL1)
-#define BUS Serial1 // Serial stays free for messages
+#if defined(__AVR_ATmega328P__) || defined(__AVR_ATmega168__) || defined(ESP8266)
+#define BUS Serial // the only UART: take the bus off it to upload
 #else
-#define BUS Serial
+#define BUS Serial1 // Serial stays free for messages
+#define MESSAGES
 #endif
 
-const uint8_t load = 7;      // a relay
+const uint8_t load = 4;       // a relay
 const uint16_t voltageAt = 0; // from your meter's manual, counted from 0
 const uint16_t currentAt = 6;
 const uint16_t powerAt = 12;
@@ -35,7 +37,9 @@ bool readFloat(uint16_t address, float &value) {
 void setup() {
   pinMode(load, OUTPUT);
   digitalWrite(load, HIGH);
+#if defined(MESSAGES)
   Serial.begin(9600);
+#endif
   BUS.begin(9600);
   meter.begin(1, BUS);
   meter.setBaudRate(9600);
@@ -46,7 +50,7 @@ void loop() {
   float voltage, current, power;
   if (readFloat(voltageAt, voltage) && readFloat(currentAt, current) && readFloat(powerAt, power)) {
     digitalWrite(load, power <= 1000.0f);
-#if defined(HAVE_HWSERIAL1)
+#if defined(MESSAGES)
     Serial.print(voltage);
     Serial.print(" V ");
     Serial.print(current);

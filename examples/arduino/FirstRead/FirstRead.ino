@@ -2,17 +2,22 @@
 // that works. Where the board has a second UART, the values are printed.
 #include <ModbusMaster.h>
 
-#if defined(HAVE_HWSERIAL1)
-#define BUS Serial1 // Serial stays free for messages
+#if defined(__AVR_ATmega328P__) || defined(__AVR_ATmega168__) || defined(ESP8266)
+#define BUS Serial // the only UART: take the bus off it to upload
 #else
-#define BUS Serial // the only UART of an Uno: take the bus off it to upload
+#define BUS Serial1 // Serial stays free for messages
+#define MESSAGES
 #endif
+
+const uint8_t led = 13; // the built-in one of many boards
 
 ModbusMaster node;
 
 void setup() {
-  pinMode(LED_BUILTIN, OUTPUT);
+  pinMode(led, OUTPUT);
+#if defined(MESSAGES)
   Serial.begin(19200);
+#endif
   BUS.begin(19200);
   node.begin(1, BUS);
   node.setBaudRate(19200); // the silence before each request follows from it
@@ -21,8 +26,8 @@ void setup() {
 void loop() {
   // Addresses are those on the wire: 2 is what manuals may call 40003.
   uint8_t result = node.readHoldingRegisters(2, 6);
-  digitalWrite(LED_BUILTIN, result == node.ku8MBSuccess);
-#if defined(HAVE_HWSERIAL1)
+  digitalWrite(led, result == node.ku8MBSuccess);
+#if defined(MESSAGES)
   if (result == node.ku8MBSuccess) {
     for (uint8_t i = 0; i < 6; i++) {
       Serial.print(node.getResponseBuffer(i));
@@ -30,7 +35,8 @@ void loop() {
     }
     Serial.println();
   } else {
-    Serial.println(mbm_statusText(result));
+    Serial.print(F("status 0x")); // explained in ModbusMasterConstants.h
+    Serial.println(result, HEX);
   }
 #endif
   delay(1000);

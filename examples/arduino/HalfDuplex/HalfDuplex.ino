@@ -2,7 +2,14 @@
 // pin 2, drives the line only while a request is being sent.
 #include <ModbusMaster.h>
 
+#if defined(__AVR_ATmega328P__) || defined(__AVR_ATmega168__) || defined(ESP8266)
+#define BUS Serial // the only UART: take the bus off it to upload
+#else
+#define BUS Serial1 // Serial stays free for messages
+#endif
+
 const uint8_t driverEnable = 2;
+const uint8_t led = 13; // the built-in one of many boards
 
 ModbusMaster node;
 
@@ -10,12 +17,12 @@ void driverOn() { digitalWrite(driverEnable, HIGH); }
 void driverOff() { digitalWrite(driverEnable, LOW); }
 
 void setup() {
-  pinMode(LED_BUILTIN, OUTPUT);
+  pinMode(led, OUTPUT);
   driverOff();
   pinMode(driverEnable, OUTPUT);
 
-  Serial.begin(9600);
-  node.begin(1, Serial);
+  BUS.begin(9600);
+  node.begin(1, BUS);
   node.setBaudRate(9600);
   node.preTransmission(driverOn);
   node.postTransmission(driverOff); // the last bit has left by then
@@ -31,6 +38,6 @@ void loop() {
   uint8_t result = node.readInputRegisters(0, 4);
   if (result == node.ku8MBSuccess)
     result = node.writeSingleRegister(30, node.getResponseBuffer(0));
-  digitalWrite(LED_BUILTIN, result == node.ku8MBSuccess);
+  digitalWrite(led, result == node.ku8MBSuccess);
   delay(200);
 }

@@ -2,13 +2,21 @@
 // blinking evenly whether the slave answers or not.
 #include <ModbusMaster.h>
 
+#if defined(__AVR_ATmega328P__) || defined(__AVR_ATmega168__) || defined(ESP8266)
+#define BUS Serial // the only UART: take the bus off it to upload
+#else
+#define BUS Serial1 // Serial stays free for messages
+#endif
+
+const uint8_t led = 13; // the built-in one of many boards
+
 ModbusMaster node;
 uint16_t answered;
 
 void setup() {
-  pinMode(LED_BUILTIN, OUTPUT);
-  Serial.begin(19200);
-  node.begin(1, Serial);
+  pinMode(led, OUTPUT);
+  BUS.begin(19200);
+  node.begin(1, BUS);
   node.setBaudRate(19200);
   node.setBlocking(false);
   node.setResponseTimeout(500);
@@ -19,7 +27,7 @@ void blink() {
   if (millis() - last < 50)
     return;
   last += 50;
-  digitalWrite(LED_BUILTIN, !digitalRead(LED_BUILTIN));
+  digitalWrite(led, !digitalRead(led));
 }
 
 // Reads a register, writes it elsewhere, and begins again.

@@ -1,5 +1,6 @@
 // The calls that the ModbusMaster manual makes to a Phoenix Contact bus
 // coupler. It refuses reads of more than 64 registers with exception 02.
+// Boards whose Serial is their USB port have the bus on Serial1.
 #include <ModbusMaster.h>
 
 ModbusMaster node;

@@ -7,14 +7,22 @@
 #define MODBUSMASTER_TRANSMIT_WORDS 8
 #include <ModbusMaster.h>
 
+#if defined(__AVR_ATmega328P__) || defined(__AVR_ATmega168__) || defined(ESP8266)
+#define BUS Serial // the only UART: take the bus off it to upload
+#else
+#define BUS Serial1 // Serial stays free for messages
+#endif
+
+const uint8_t led = 13; // the built-in one of many boards
+
 const uint8_t sensors = 3;
 ModbusMaster sensor[sensors] = {1, 2, 3}; // their unit ids
 
 void setup() {
-  pinMode(LED_BUILTIN, OUTPUT);
-  Serial.begin(19200);
+  pinMode(led, OUTPUT);
+  BUS.begin(19200);
   for (uint8_t i = 0; i < sensors; i++) {
-    sensor[i].begin(sensor[i].getSlaveID(), Serial);
+    sensor[i].begin(sensor[i].getSlaveID(), BUS);
     sensor[i].setBaudRate(19200);
     sensor[i].setResponseTimeout(200); // one that is missing holds up the others no longer
   }
@@ -29,6 +37,6 @@ void loop() {
     // Each is told what was read of it.
     sensor[i].writeSingleRegister(6, sensor[i].getResponseBuffer(0));
   }
-  digitalWrite(LED_BUILTIN, present == sensors);
+  digitalWrite(led, present == sensors);
   delay(100);
 }

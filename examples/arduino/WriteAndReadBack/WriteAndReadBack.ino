@@ -2,6 +2,14 @@
 // switches the LED on if they came back as they went.
 #include <ModbusMaster.h>
 
+#if defined(__AVR_ATmega328P__) || defined(__AVR_ATmega168__) || defined(ESP8266)
+#define BUS Serial // the only UART: take the bus off it to upload
+#else
+#define BUS Serial1 // Serial stays free for messages
+#endif
+
+const uint8_t led = 13; // the built-in one of many boards
+
 ModbusMaster node;
 
 bool registersComeBack(uint16_t seed) {
@@ -31,16 +39,16 @@ bool coilsComeBack(uint16_t pattern) {
 }
 
 void setup() {
-  pinMode(LED_BUILTIN, OUTPUT);
-  Serial.begin(38400);
-  node.begin(1, Serial);
+  pinMode(led, OUTPUT);
+  BUS.begin(38400);
+  node.begin(1, BUS);
   node.setBaudRate(38400);
 }
 
 void loop() {
   static uint16_t round = 1000;
   bool good = registersComeBack(round) && coilsComeBack(round);
-  digitalWrite(LED_BUILTIN, good);
+  digitalWrite(led, good);
   round += 10;
   delay(500);
 }
