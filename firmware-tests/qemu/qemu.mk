@@ -19,6 +19,6 @@ firmware-test-qemu: ## Bare metal firmware on seven machines in QEMU: Arm, RISC-
 		scripts/archive $$($(MAKE) -s --no-print-directory -f $(BAREMETAL) mcu MACHINE=$$machine); \
 		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$machine; \
 	done
-	@$(MAKE) --no-print-directory $(QEMU_TEST)
+	@$(MAKE) -s --no-print-directory $(QEMU_TEST)
 	@scripts/run-c-tests "" $(QEMU_TEST)
 	@echo "firmware-test-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against a libmodbus server and a bad wire"
