@@ -22,8 +22,9 @@ const machine machines[] = {
     {"virt", {"qemu-system-riscv32", "-M", "virt", "-bios", "none", "-kernel", NULL}},
     {"netduinoplus2", ARM("netduinoplus2")},
     {"mps2-an500", ARM("mps2-an500")},
-    /* With -kernel this machine would not start at the image's entry. */
+    /* With -kernel these would not start at the image's entry. */
     {"lx106", {"qemu-system-xtensa", "-M", "sim", "-cpu", "lx106", "-device", NULL}},
+    {"dc233c", {"qemu-system-xtensa", "-M", "sim", "-cpu", "dc233c", "-device", NULL}},
 };
 const unsigned machine_count = sizeof machines / sizeof machines[0];
 

@@ -12,13 +12,13 @@ $(QEMU_TEST): $(QEMU_SOURCES) $(wildcard firmware-tests/qemu/*.h c-tests/support
 		-lmodbus -lcmocka -lpthread -o $@
 
 .PHONY: firmware-test-qemu
-firmware-test-qemu: ## Bare metal firmware on six machines in QEMU: Arm, RISC-V, Xtensa
+firmware-test-qemu: ## Bare metal firmware on seven machines in QEMU: Arm, RISC-V, Xtensa
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev libcmocka-dev qemu-system-arm qemu-system-misc \
-		gcc-arm-none-eabi gcc-riscv64-unknown-elf gcc-xtensa-lx106
+		gcc-arm-none-eabi gcc-riscv64-unknown-elf gcc-xtensa-lx106 clang-22 llvm-22
 	@set -e; for machine in $(MACHINES); do \
 		scripts/archive $$($(MAKE) -s --no-print-directory -f $(BAREMETAL) mcu MACHINE=$$machine); \
 		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$machine; \
 	done
-	@$(MAKE) --no-print-directory $(QEMU_TEST)
+	@$(MAKE) -s --no-print-directory $(QEMU_TEST)
 	@scripts/run-c-tests "" $(QEMU_TEST)
 	@echo "firmware-test-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against a libmodbus server and a bad wire"

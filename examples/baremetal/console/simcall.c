@@ -2,17 +2,6 @@
 #include "simcall.h"
 #include "board.h"
 
-int32_t simcall(int32_t number, int32_t first, int32_t second, int32_t third)
-{
-    register int32_t a2 __asm__("a2") = number;
-    register int32_t a3 __asm__("a3") = first;
-    register int32_t a4 __asm__("a4") = second;
-    register int32_t a5 __asm__("a5") = third;
-
-    __asm__ volatile("simcall" : "+r"(a2), "+r"(a3) : "r"(a4), "r"(a5) : "memory");
-    return a2;
-}
-
 void console_print(const char *text)
 {
     static int32_t file = -1;

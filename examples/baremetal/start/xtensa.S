@@ -16,3 +16,10 @@ start:
 2:  call0 main
     extui a2, a2, 0, 8
     call0 console_exit
+
+    .text
+    .globl simcall
+    .align 4
+simcall:
+    simcall
+    ret
