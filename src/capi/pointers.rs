@@ -3,55 +3,56 @@
 use super::master::{mbm_master, Object};
 use crate::error::Status;
 
-/// The master behind a pointer from C.
-///
-/// # Errors
+/// Whether there is a master behind a pointer from C: [`Status::OK`],
 /// [`Status::INVALID_ARGUMENT`] for NULL, [`Status::NOT_INITIALISED`] for an
 /// object that was never begun.
 ///
 /// # Safety
-/// `master` is NULL or points to an `mbm_master`, zeroed or begun, that
-/// nothing else uses while the reference lives.
-pub(super) unsafe fn master<'a>(master: *mut mbm_master) -> Result<&'a mut Object, Status> {
+/// `master` is NULL or points to an `mbm_master`, zeroed or begun.
+pub(super) unsafe fn check(master: *const mbm_master) -> Status {
     if master.is_null() {
-        return Err(Status::INVALID_ARGUMENT);
+        return Status::INVALID_ARGUMENT;
     }
-    let object = master.cast::<Object>();
     // SAFETY: not NULL, so storage of an object, which has room for it.
-    if !unsafe { Object::is_begun(object) } {
-        return Err(Status::NOT_INITIALISED);
+    if unsafe { Object::is_begun(master.cast()) } {
+        Status::OK
+    } else {
+        Status::NOT_INITIALISED
     }
-    // SAFETY: begun, so every field is valid; exclusive as the caller promises.
-    Ok(unsafe { &mut *object })
 }
 
 /// Runs `action` on a master, or returns the status that says why not.
 ///
 /// # Safety
-/// As for [`master`].
+/// As for [`check`]; nothing else uses the object meanwhile.
 pub(super) unsafe fn with(
-    pointer: *mut mbm_master,
+    master: *mut mbm_master,
     action: impl FnOnce(&mut Object) -> Status,
 ) -> u8 {
-    // SAFETY: as the caller promises.
-    match unsafe { master(pointer) } {
-        Ok(master) => action(master).code(),
-        Err(status) => status.code(),
-    }
+    // SAFETY: begun, so every field is valid; exclusive as the caller promises.
+    let status = unsafe {
+        match check(master) {
+            Status::OK => action(&mut *master.cast()),
+            refused => refused,
+        }
+    };
+    status.code()
 }
 
 /// Asks a master something; `otherwise` where there is none.
 ///
 /// # Safety
-/// As for [`master`].
+/// As for [`with`].
 pub(super) unsafe fn ask<T>(
-    pointer: *const mbm_master,
+    master: *const mbm_master,
     otherwise: T,
     question: impl FnOnce(&mut Object) -> T,
 ) -> T {
-    // SAFETY: as the caller promises; every object is writable storage.
-    match unsafe { master(pointer.cast_mut()) } {
-        Ok(master) => question(master),
-        Err(_) => otherwise,
+    // SAFETY: as above; every object is writable storage.
+    unsafe {
+        match check(master) {
+            Status::OK => question(&mut *master.cast_mut().cast()),
+            _ => otherwise,
+        }
     }
 }
