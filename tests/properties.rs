@@ -68,8 +68,11 @@ impl Wanted for Wanting<'_> {
     fn function(&self) -> u8 {
         self.1.function()
     }
-    fn length(&self, pdu: &[u8]) -> Option<NonZeroU8> {
-        response::expected(self.1, pdu)
+    fn length(&self, frame: &[u8]) -> Option<NonZeroU8> {
+        match frame {
+            [unit, pdu @ ..] if *unit == self.0 => response::expected(self.1, pdu),
+            _ => None,
+        }
     }
     fn judge(&mut self, _: &[u8]) -> Verdict {
         Verdict::Right

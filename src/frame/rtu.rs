@@ -15,6 +15,9 @@ pub const MAX_FRAME: usize = 256;
 /// Bytes of a frame around its PDU: the unit before, the CRC behind.
 pub const OVERHEAD: usize = 3;
 
+/// Where the PDU of a frame starts.
+pub const PDU: usize = 1;
+
 /// Writes the frame of the PDU that `pdu` writes, `length` bytes long. Returns
 /// false, with nothing written, if `buffer` cannot hold it.
 pub fn write(buffer: &mut [u8], unit: u8, length: usize, pdu: impl FnOnce(&mut [u8])) -> bool {
@@ -83,9 +86,9 @@ pub trait Wanted {
     /// may stand.
     fn function(&self) -> u8;
 
-    /// The length of a PDU that begins with these bytes; `None` for a PDU that
-    /// is not waited for.
-    fn length(&self, pdu: &[u8]) -> Option<NonZeroU8>;
+    /// The length of the PDU of a frame that begins with these bytes; `None`
+    /// for a frame that is not waited for.
+    fn length(&self, frame: &[u8]) -> Option<NonZeroU8>;
 
     /// What a whole frame of such a PDU is.
     fn judge(&mut self, frame: &[u8]) -> Verdict;
@@ -182,19 +185,14 @@ impl Window {
         self.start += count;
     }
 
-    /// Where in the buffer the window ends.
-    pub const fn end(&self) -> u16 {
-        self.end
-    }
-
     /// The bytes of the window.
     pub fn bytes<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]> {
         buffer.get(usize::from(self.start)..usize::from(self.end))
     }
 
-    /// The bytes from the data of the candidate on, past unit and function.
-    pub fn data<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]> {
-        buffer.get(usize::from(self.start) + 2..)
+    /// The bytes from `offset` into the candidate on.
+    pub fn behind<'a>(&self, buffer: &'a [u8], offset: usize) -> Option<&'a [u8]> {
+        buffer.get(usize::from(self.start) + offset..)
     }
 
     /// The most telling thing seen so far.
@@ -219,14 +217,11 @@ impl Window {
     /// was called; then, if there is nothing, all is left as it was.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn search(&mut self, buffer: &[u8], wanted: &mut impl Wanted) -> bool {
-        let Some(mut rest) = self.bytes(buffer) else {
-            return false;
-        };
-        while let [first, pdu @ ..] = rest {
-            if *first == wanted.unit() {
-                if let Some(length) = wanted.length(pdu) {
+        'found: while let Some(mut rest) = self.bytes(buffer) {
+            while let [first, behind @ ..] = rest {
+                if let Some(length) = wanted.length(rest) {
                     let total = usize::from(length.get()) + OVERHEAD;
-                    if let Some((frame, behind)) = rest.split_at_checked(total) {
+                    if let Some(frame) = rest.get(..total) {
                         if crc16(frame).is_residue() {
                             self.start = self.end - rest.len() as u16;
                             match wanted.judge(frame) {
@@ -236,8 +231,7 @@ impl Window {
                             }
                             self.passed = 0;
                             self.advance(total as u16);
-                            rest = behind;
-                            continue;
+                            continue 'found;
                         }
                         if !self.skim {
                             self.see(Seen::BAD_CRC);
@@ -245,14 +239,15 @@ impl Window {
                     } else if total > buffer.len() {
                         self.see(Seen::TOO_LONG);
                     } else if !self.skim {
-                        break;
+                        return false;
                     }
                 }
+                rest = behind;
+                if !self.skim {
+                    self.pass(*first, wanted);
+                }
             }
-            rest = pdu;
-            if !self.skim {
-                self.pass(*first, wanted);
-            }
+            return false;
         }
         false
     }

@@ -102,6 +102,7 @@ impl Request {
 
     /// Writes the PDU into `pdu`, which has [`Request::length`] bytes. Words
     /// that `source` lacks are zero; the sender checks [`Request::words`].
+    #[cfg_attr(target_os = "none", inline(never))]
     pub fn emit(&self, pdu: &mut [u8], source: &[u16]) {
         let mut bytes = pdu.iter_mut();
         for (byte, place) in self.head().zip(bytes.by_ref()) {
@@ -113,15 +114,13 @@ impl Request {
         }
     }
 
-    /// Fills words from what follows the function code of a successful response:
-    /// byte count and data. Returns false, with nothing filled, if they are too
-    /// few.
-    pub fn take(&self, words: &mut [u16], counted: &[u8]) -> bool {
+    /// Fills words from the data of a successful response, which start `data`;
+    /// returns false, with nothing filled, if they are too few.
+    pub fn take(&self, words: &mut [u16], data: &[u8]) -> bool {
         let Some(take) = self.take else {
             return true;
         };
-        let words = words.get_mut(..usize::from(self.response_words()));
-        let (Some(words), [_, data @ ..]) = (words, counted) else {
+        let Some(words) = words.get_mut(..usize::from(self.response_words())) else {
             return false;
         };
         take(words, data, self.head[4]);

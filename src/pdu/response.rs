@@ -6,6 +6,9 @@ use super::EXCEPTION;
 use crate::error::Status;
 use core::num::NonZeroU8;
 
+/// Where the data of a read's response start, behind function and byte count.
+pub const DATA: usize = 2;
+
 /// An exception response is a function code and an exception code.
 const EXCEPTION_LENGTH: u8 = 2;
 

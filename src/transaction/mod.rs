@@ -8,7 +8,11 @@
 //! length to an earlier request, or a late exception to the same function,
 //! looks like the reply. After a request that got no right reply the line is
 //! therefore given a quiet time before the next request.
+//!
+//! A microcontroller's compiler is kept from inlining the steps: each has few
+//! values in use at a time, so they stay in registers, and the code is small.
 
+mod answer;
 mod settings;
 mod storage;
 
@@ -16,12 +20,12 @@ pub use settings::Settings;
 pub use storage::{Counter, Storage, COUNTERS};
 
 use crate::error::Status;
-use crate::frame::rtu::{self, Seen, Verdict, Wanted, Window};
+use crate::frame::rtu::{self, Seen, Window};
 use crate::pdu::request::Request;
 use crate::pdu::response;
 use crate::port::Port;
 use crate::time::elapsed;
-use core::num::NonZeroU8;
+use answer::Answer;
 
 /// Where a transaction stands.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -57,70 +61,19 @@ pub struct Transaction<P, S> {
     late: bool,
     /// Over what is to be sent, then over what arrives.
     window: Window,
-    wanted: Answer,
     /// When the phase began.
     since: u32,
     /// When the line was last seen busy.
     last_byte: u32,
     /// The time that the poll under way was told.
     now: u32,
-    /// The byte stream.
-    pub port: P,
     /// What the caller lends.
     pub storage: S,
+    /// The byte stream.
+    pub port: P,
+    wanted: Answer,
     /// How transactions behave.
     pub settings: Settings,
-}
-
-/// What answers a request.
-#[repr(C)]
-struct Answer {
-    unit: u8,
-    /// The request itself is expected to come back first.
-    echo: bool,
-    /// The exception code of the last response; 0 if it was none.
-    exception: u8,
-    request: Request,
-}
-
-impl Answer {
-    /// True if `pdu`, complete or not, is the request itself.
-    fn is_echo(&self, pdu: &[u8]) -> bool {
-        cfg!(feature = "echo") && self.echo && self.request.agrees(pdu)
-    }
-}
-
-impl Wanted for Answer {
-    fn unit(&self) -> u8 {
-        self.unit
-    }
-
-    fn function(&self) -> u8 {
-        self.request.function()
-    }
-
-    #[cfg_attr(target_os = "none", inline(never))]
-    fn length(&self, pdu: &[u8]) -> Option<NonZeroU8> {
-        if self.is_echo(pdu) {
-            NonZeroU8::new(self.request.length())
-        } else {
-            response::expected(&self.request, pdu)
-        }
-    }
-
-    #[cfg_attr(target_os = "none", inline(never))]
-    fn judge(&mut self, frame: &[u8]) -> Verdict {
-        let pdu = rtu::pdu(frame);
-        if pdu.len() == usize::from(self.request.length()) && self.is_echo(pdu) {
-            self.echo = false;
-            return Verdict::Own;
-        }
-        self.exception = response::exception_code(pdu).unwrap_or(0);
-        match response::judge(&self.request, pdu) {
-            Status::MALFORMED_REPLY => Verdict::Wrong,
-            _ => Verdict::Right,
-        }
-    }
 }
 
 /// The unit that every slave listens to (serial line guide 2.2).
@@ -139,12 +92,7 @@ impl<P, S> Transaction<P, S> {
             waiting: false,
             late: false,
             window: Window::EMPTY,
-            wanted: Answer {
-                unit: 0,
-                echo: false,
-                exception: 0,
-                request: Request::NONE,
-            },
+            wanted: Answer::NONE,
             settings: Settings::DEFAULT,
             storage,
             port,
@@ -178,11 +126,13 @@ impl<P, S> Transaction<P, S> {
     }
 
     /// True once the phase has lasted `time`.
+    #[inline(always)]
     fn lasts(&self, time: u32) -> bool {
         self.has_passed(time, false)
     }
 
     /// True once the line has been silent for `time`.
+    #[inline(always)]
     fn is_silent(&self, time: u32) -> bool {
         self.has_passed(time, true)
     }
@@ -239,7 +189,7 @@ impl<P: Port, S: Storage> Transaction<P, S> {
     /// false, with nothing filled, if they are too few.
     pub fn take_words(&mut self) -> bool {
         let (frame, words) = self.storage.frame_and_response();
-        match self.window.data(frame) {
+        match self.window.behind(frame, rtu::PDU + response::DATA) {
             Some(data) => self.wanted.request.take(words, data),
             None => false,
         }
@@ -414,9 +364,9 @@ impl<P: Port, S: Storage> Transaction<P, S> {
 
     #[cfg_attr(target_os = "none", inline(never))]
     fn flush(&mut self) -> Status {
-        let character = self.settings.character;
         if !self.port.flush() {
-            return self.stalled(character * u32::from(self.window.end()));
+            // No request takes longer than a frame of 256 characters.
+            return self.stalled(self.settings.character << 8);
         }
         if cfg!(feature = "hold") && self.settings.post_flush_hold > 0 {
             self.enter(Phase::Hold);
@@ -485,24 +435,15 @@ impl<P: Port, S: Storage> Transaction<P, S> {
                 }
                 self.window.skim();
             }
-            let found = self.search();
-            if found != Status::PENDING {
-                return found;
+            if self.window.search(self.storage.frame(), &mut self.wanted) {
+                return self.found();
             }
         }
     }
 
-    /// Looks for the reply in what has arrived.
-    fn search(&mut self) -> Status {
-        if !self.window.search(self.storage.frame(), &mut self.wanted) {
-            return Status::PENDING;
-        }
+    /// The reply is there: counts it and returns what it says.
+    fn found(&mut self) -> Status {
         let status = Status::from_code(self.wanted.exception);
-        self.count_reply(status);
-        status
-    }
-
-    fn count_reply(&mut self, status: Status) {
         self.storage.count(Counter::Replies, 1);
         if status != Status::OK {
             self.storage.count(Counter::Exceptions, 1);
@@ -511,6 +452,7 @@ impl<P: Port, S: Storage> Transaction<P, S> {
             self.storage.count(Counter::Resynchronisations, 1);
         }
         self.count_foreign();
+        status
     }
 
     fn count_foreign(&mut self) {
