@@ -153,18 +153,17 @@ impl<P, S> Transaction<P, S> {
     /// for longer than a reply and the `time` that it may take.
     #[cfg_attr(target_os = "none", inline(never))]
     fn stalled(&self, time: u32) -> Status {
-        if self.lasts(self.settings.response_timeout.saturating_add(time)) {
+        if self.lasts(self.settings.response_timeout.wrapping_add(time)) {
             Status::LINE_BUSY
         } else {
             Status::PENDING
         }
     }
 
-    fn listen_from(&mut self, now: u32) {
-        self.phase = Phase::Gap;
-        self.since = now;
-        self.stamp = false;
+    /// Waits for silence, then sends; from the next poll on.
+    fn listen_anew(&mut self) {
         self.window.clear();
+        self.enter(Phase::Gap);
     }
 
     /// Enters a phase whose time counts from the next poll on.
@@ -204,8 +203,7 @@ impl<P: Port, S: Storage> Transaction<P, S> {
         }
         self.wanted.unit = unit;
         self.retries = self.settings.retries;
-        let now = self.port.micros();
-        self.listen_from(now);
+        self.listen_anew();
         Status::PENDING
     }
 
@@ -241,7 +239,7 @@ impl<P: Port, S: Storage> Transaction<P, S> {
             }
             Phase::Reply => (self.settings.silence, self.last_byte),
         };
-        if self.stamp {
+        if self.stamp && self.phase != Phase::Gap {
             time
         } else {
             time.saturating_sub(elapsed(now, since))
@@ -266,7 +264,10 @@ impl<P: Port, S: Storage> Transaction<P, S> {
         if self.stamp {
             self.stamp = false;
             self.since = now;
-            self.last_byte = now;
+            // Behind a request of ours; of what was before it, that is known.
+            if self.phase != Phase::Gap {
+                self.last_byte = now;
+            }
         }
         let status = match self.phase {
             Phase::Idle => return Status::OK,
@@ -277,11 +278,11 @@ impl<P: Port, S: Storage> Transaction<P, S> {
             Phase::Reply => self.receive(),
             Phase::Turnaround => self.turn_around(),
         };
-        match status {
-            Status::PENDING => {}
-            // The line may come back, and with it what was on its way.
-            Status::LINK_LOST | Status::LINE_BUSY => self.cancel(),
-            _ => self.end(),
+        if status.is_failure() {
+            // What was on its way may still come.
+            self.cancel();
+        } else if status != Status::PENDING {
+            self.end();
         }
         status
     }
@@ -464,9 +465,6 @@ impl<P: Port, S: Storage> Transaction<P, S> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn fail(&mut self) -> Status {
         self.count_foreign();
-        // What was taken for a damaged reply may have been noise.
-        self.late = true;
-        self.last_byte = self.now;
         let status = self.window.seen().status();
         if status == Status::BUFFER_TOO_SMALL {
             return status;
@@ -481,7 +479,10 @@ impl<P: Port, S: Storage> Transaction<P, S> {
             return status;
         }
         self.retries -= 1;
-        self.listen_from(self.now);
+        // What was taken for a damaged reply may have been noise.
+        self.late = true;
+        self.last_byte = self.now;
+        self.listen_anew();
         Status::PENDING
     }
 }
