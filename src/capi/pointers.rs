@@ -21,6 +21,35 @@ pub(super) unsafe fn check(master: *const mbm_master) -> Status {
     }
 }
 
+/// The master behind a pointer.
+///
+/// # Safety
+/// [`check`] found one, and nothing else uses it while the reference lives.
+pub(super) unsafe fn object<'a>(master: *mut mbm_master) -> &'a mut Object {
+    // SAFETY: begun, so every field is valid; exclusive as the caller promises.
+    unsafe { &mut *master.cast() }
+}
+
+/// As [`check`], but what nobody has touched yet becomes a master, with
+/// defaults and without port and buffers.
+///
+/// # Safety
+/// As for [`with`].
+#[cfg_attr(target_os = "none", inline(never))]
+pub(super) unsafe fn prepare(master: *mut mbm_master) -> Status {
+    // SAFETY: as the caller promises; what is not begun is zeroed, and zero is
+    // a value of every field.
+    unsafe {
+        match check(master) {
+            Status::NOT_INITIALISED => {
+                object(master).preset();
+                Status::OK
+            }
+            other => other,
+        }
+    }
+}
+
 /// Runs `action` on a master, or returns the status that says why not.
 ///
 /// # Safety
@@ -29,10 +58,28 @@ pub(super) unsafe fn with(
     master: *mut mbm_master,
     action: impl FnOnce(&mut Object) -> Status,
 ) -> u8 {
-    // SAFETY: begun, so every field is valid; exclusive as the caller promises.
+    // SAFETY: checked; exclusive as the caller promises.
     let status = unsafe {
         match check(master) {
-            Status::OK => action(&mut *master.cast()),
+            Status::OK => action(object(master)),
+            refused => refused,
+        }
+    };
+    status.code()
+}
+
+/// As [`with`], for what [`prepare`] makes a master of.
+///
+/// # Safety
+/// As for [`with`].
+pub(super) unsafe fn with_new(
+    master: *mut mbm_master,
+    action: impl FnOnce(&mut Object) -> Status,
+) -> u8 {
+    // SAFETY: prepared; exclusive as the caller promises.
+    let status = unsafe {
+        match prepare(master) {
+            Status::OK => action(object(master)),
             refused => refused,
         }
     };
@@ -48,10 +95,11 @@ pub(super) unsafe fn ask<T>(
     otherwise: T,
     question: impl FnOnce(&mut Object) -> T,
 ) -> T {
-    // SAFETY: as above; every object is writable storage.
+    // SAFETY: checked; exclusive as the caller promises, and every object is
+    // writable storage.
     unsafe {
         match check(master) {
-            Status::OK => question(&mut *master.cast_mut().cast()),
+            Status::OK => question(object(master.cast_mut())),
             _ => otherwise,
         }
     }

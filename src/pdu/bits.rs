@@ -1,6 +1,6 @@
 //! Coils and discrete inputs: functions 01, 02, 05 and 0F.
 
-use super::request::{check_range, counted, in_range, word, Received, Request};
+use super::request::{counted, in_range, word, Received, Request};
 use crate::bytes::Reader;
 use crate::data::bits;
 use crate::error::Status;
@@ -38,10 +38,10 @@ pub fn read_discrete_inputs(request: &mut Request, address: u16, quantity: u16) 
 }
 
 fn read(request: &mut Request, function: u8, address: u16, quantity: u16) -> Status {
-    request.set(function, address, quantity);
+    let status = request.set_range(function, address, quantity, MAX_READ);
     request.response_length = byte_count(quantity).wrapping_add(2);
     request.take = Some(bits::take);
-    check_range(address, quantity, MAX_READ)
+    status
 }
 
 /// Builds 05; a `value` of 0 is off, any other is on.
@@ -55,9 +55,9 @@ pub fn write_single(request: &mut Request, address: u16, value: u16) -> Status {
 /// [`Status::OK`], [`Status::ILLEGAL_DATA_VALUE`] unless `quantity` is 1 to 1968,
 /// or [`Status::ILLEGAL_DATA_ADDRESS`] if the range passes 65535.
 pub fn write_multiple(request: &mut Request, address: u16, quantity: u16) -> Status {
-    request.set(WRITE_MULTIPLE_COILS, address, quantity);
+    let status = request.set_range(WRITE_MULTIPLE_COILS, address, quantity, MAX_WRITE);
     request.append(byte_count(quantity), bits::send);
-    check_range(address, quantity, MAX_WRITE)
+    status
 }
 
 pub(super) fn parse_read<'a>(function: u8, reader: &mut Reader) -> Result<Received<'a>, Status> {

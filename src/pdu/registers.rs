@@ -41,10 +41,10 @@ pub fn read_input(request: &mut Request, address: u16, quantity: u16) -> Status 
 }
 
 fn read(request: &mut Request, function: u8, address: u16, quantity: u16) -> Status {
-    request.set(function, address, quantity);
+    let status = request.set_range(function, address, quantity, MAX_READ);
     request.response_length = byte_count(quantity).wrapping_add(2);
     request.take = Some(registers::take);
-    check_range(address, quantity, MAX_READ)
+    status
 }
 
 /// Builds 06.
@@ -57,9 +57,9 @@ pub fn write_single(request: &mut Request, address: u16, value: u16) -> Status {
 /// [`Status::ILLEGAL_DATA_VALUE`] unless `quantity` is 1 to 123, or
 /// [`Status::ILLEGAL_DATA_ADDRESS`] if the range passes 65535.
 pub fn write_multiple(request: &mut Request, address: u16, quantity: u16) -> Status {
-    request.set(WRITE_MULTIPLE_REGISTERS, address, quantity);
+    let status = request.set_range(WRITE_MULTIPLE_REGISTERS, address, quantity, MAX_WRITE);
     request.append(byte_count(quantity), registers::send);
-    check_range(address, quantity, MAX_WRITE)
+    status
 }
 
 /// Builds 16: the register becomes `(register & and) | (or & !and)`.

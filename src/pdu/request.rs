@@ -63,6 +63,20 @@ impl Request {
         self.take = None;
     }
 
+    /// As [`Request::set`], for a range of addresses; says whether every device
+    /// would accept that.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn set_range(
+        &mut self,
+        function: u8,
+        address: u16,
+        quantity: u16,
+        most: u16,
+    ) -> Status {
+        self.set(function, address, quantity);
+        check_range(address, quantity, most)
+    }
+
     /// Has `bytes` of the caller's words follow the head.
     pub(super) fn append(&mut self, bytes: u8, send: Send) {
         self.length = bytes.wrapping_add(self.head_length + 1);

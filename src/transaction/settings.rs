@@ -4,7 +4,7 @@ use crate::time::{self, millis};
 
 /// How a transaction behaves; kept from one to the next. Times are in
 /// microseconds.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(C)]
 pub struct Settings {
     /// Silence before a request.
@@ -51,5 +51,27 @@ impl Settings {
         self.turnaround_delay = Settings::DEFAULT.turnaround_delay;
         self.quiet_time = Settings::DEFAULT.quiet_time;
         self.character = Settings::DEFAULT.character;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zeroed_settings_become_the_default() {
+        let mut settings = Settings {
+            gap: 0,
+            silence: 0,
+            response_timeout: 0,
+            turnaround_delay: 0,
+            quiet_time: 0,
+            character: 0,
+            retries: 0,
+            post_flush_hold: 0,
+            echo_discard: false,
+        };
+        settings.preset();
+        assert_eq!(settings, Settings::DEFAULT);
     }
 }

@@ -62,28 +62,13 @@ impl Object {
         // SAFETY: the storage is zeroed or written, so readable.
         unsafe { (&raw const (*object).mark).read() == BEGUN }
     }
-}
 
-/// Turns an object that nobody has touched yet into one with defaults and
-/// without port and buffers; returns what [`pointers::check`] then finds.
-///
-/// # Safety
-/// As for [`pointers::with`].
-#[cfg_attr(target_os = "none", inline(never))]
-unsafe fn prepare(pointer: *mut mbm_master) -> Status {
-    // SAFETY: as the caller promises; what is not begun is zeroed, which is a
-    // value that every field may have.
-    unsafe {
-        let status = pointers::check(pointer);
-        if status != Status::NOT_INITIALISED {
-            return status;
-        }
-        let object = &mut *pointer.cast::<Object>();
-        object.core.preset();
-        object.core.storage().preset();
-        object.mark = BEGUN;
+    /// Turns a zeroed object into one that is begun, without port and buffers.
+    pub(super) fn preset(&mut self) {
+        self.core.preset();
+        self.core.storage().preset();
+        self.mark = BEGUN;
     }
-    Status::OK
 }
 
 /// Begins to talk to a slave over a port.
@@ -113,13 +98,12 @@ pub unsafe extern "C" fn mbm_master_begin(
         return Status::INVALID_ARGUMENT.code();
     }
     // SAFETY: as the header demands.
-    let status = unsafe { prepare(master) };
-    if status == Status::OK {
-        // SAFETY: prepared, so an object.
-        let core = unsafe { &mut (*master.cast::<Object>()).core };
-        core.begin(slave, port);
+    unsafe {
+        pointers::with_new(master, |master| {
+            master.core.begin(slave, port);
+            Status::OK
+        })
     }
-    status.code()
 }
 
 /// Lends the buffers that requests and replies need, before or after begin.
@@ -156,28 +140,26 @@ pub unsafe extern "C" fn mbm_master_setBuffers(
         return Status::INVALID_ARGUMENT.code();
     }
     // SAFETY: as the header demands.
-    let status = unsafe { prepare(master) };
-    if status != Status::OK {
-        return status.code();
+    unsafe {
+        pointers::with_new(master, |master| {
+            if master.core.is_pending() {
+                return Status::BUSY;
+            }
+            let storage = master.core.storage();
+            // No words start where words were before, but not at NULL.
+            if !response.is_null() {
+                storage.response = response;
+            }
+            if !transmit.is_null() {
+                storage.transmit = transmit;
+            }
+            storage.frame = frame;
+            storage.response_words = responseWords as u8;
+            storage.transmit_words = transmitWords as u8;
+            storage.frame_bytes = frameBytes.min(MBM_MAX_FRAME).into();
+            Status::OK
+        })
     }
-    // SAFETY: prepared, so an object.
-    let core = unsafe { &mut (*master.cast::<Object>()).core };
-    if core.is_pending() {
-        return Status::BUSY.code();
-    }
-    let storage = core.storage();
-    // No words start where words were before, but not at NULL.
-    if !response.is_null() {
-        storage.response = response;
-    }
-    if !transmit.is_null() {
-        storage.transmit = transmit;
-    }
-    storage.frame = frame;
-    storage.response_words = responseWords as u8;
-    storage.transmit_words = transmitWords as u8;
-    storage.frame_bytes = frameBytes.min(MBM_MAX_FRAME).into();
-    Status::OK.code()
 }
 
 /// Moves a non-blocking request on, without waiting.
@@ -270,12 +252,15 @@ unsafe fn request(pointer: *mut mbm_master, start: impl FnOnce(&mut Core) -> Sta
 /// # Safety
 /// As for [`pointers::with`]; the status is what that master said last.
 unsafe fn finish(pointer: *mut mbm_master, mut status: u8) -> u8 {
-    let object = pointer.cast::<Object>();
-    // SAFETY: pending, so begun. Each reference ends before the hook is called,
+    if status != Status::PENDING.code() {
+        return status;
+    }
+    // SAFETY: pending, so begun. No reference lives while the hook is called,
     // for the hook may use the object.
     unsafe {
-        while status == Status::PENDING.code() && !(*object).non_blocking {
-            let core = &mut (*object).core;
+        let blocking = !pointers::object(pointer).non_blocking;
+        while blocking && status == Status::PENDING.code() {
+            let core = &mut pointers::object(pointer).core;
             status = core.poll().code();
             if core.is_waiting() {
                 let port = core.port();
