@@ -57,7 +57,7 @@ fn reply(unit: u8, request: &Request, frame: &[u8]) -> (Status, Vec<u8>) {
     let mut window = Window::EMPTY;
     window.arrived(frame.len() as u16);
     assert!(window.search(&buffer, &mut Wanting(unit, request)));
-    let pdu = rtu::pdu(&buffer);
+    let pdu = &buffer[rtu::PDU..buffer.len() - 2];
     let status = response::judge(request, pdu);
     let read = status == Status::OK && request.is_read();
     (status, if read { pdu[2..].to_vec() } else { vec![] })

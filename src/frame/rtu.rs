@@ -35,14 +35,6 @@ pub fn write(buffer: &mut [u8], unit: u8, length: usize, pdu: impl FnOnce(&mut [
     true
 }
 
-/// The PDU of a frame.
-pub fn pdu(frame: &[u8]) -> &[u8] {
-    match frame {
-        [_, pdu @ .., _, _] => pdu,
-        _ => &[],
-    }
-}
-
 /// What was seen on the way to a reply, the more telling the greater. The low
 /// digit is that of the status it becomes.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Debug)]

@@ -57,8 +57,10 @@ impl Wanted for Answer {
 
     #[cfg_attr(target_os = "none", inline(never))]
     fn judge(&mut self, frame: &[u8]) -> Verdict {
-        let pdu = rtu::pdu(frame);
-        if pdu.len() == usize::from(self.request.length()) && self.is_echo(pdu) {
+        // What looks at the PDU knows its length, so the CRC may stand behind.
+        let pdu = frame.get(rtu::PDU..).unwrap_or_default();
+        let length = usize::from(self.request.length()) + rtu::OVERHEAD;
+        if frame.len() == length && self.is_echo(pdu) {
             self.echo = false;
             return Verdict::Own;
         }
