@@ -194,11 +194,11 @@ typedef struct mbm_master {
     /**
      * Not for you.
      */
-    void *pointers[14];
+    void *pointers[21];
     /**
      * Not for you.
      */
-    uint32_t words[21];
+    uint32_t words[18];
 } mbm_master;
 
 /**

@@ -74,16 +74,9 @@ impl Status {
         Status(code)
     }
 
-    /// True if the reply was missing or unusable, so that asking again may help.
-    pub const fn is_worth_a_retry(self) -> bool {
-        matches!(
-            self,
-            Status::INVALID_SLAVE_ID
-                | Status::INVALID_FUNCTION
-                | Status::RESPONSE_TIMED_OUT
-                | Status::INVALID_CRC
-                | Status::MALFORMED_REPLY
-        )
+    /// True if a request ended without an answer of the remote device.
+    pub const fn is_failure(self) -> bool {
+        self.0 >= 0x80 && self.0 != Status::PENDING.0
     }
 
     /// True for an exception that the remote device sent.

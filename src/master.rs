@@ -1,7 +1,6 @@
 //! The ModbusMaster-shaped facade: words to send, ten functions, words
 //! received. Each function starts a transaction; `poll` ends it.
 
-use crate::data::words;
 use crate::error::Status;
 use crate::pdu::request::Request;
 use crate::pdu::{bits, registers};
@@ -12,17 +11,22 @@ use crate::transaction::{Settings, Storage, Transaction};
 /// What is read where there is no word.
 pub const NO_WORD: u16 = 0xFFFF;
 
+/// What builds the request of a function that is an address and a word.
+pub type Build = fn(&mut Request, u16, u16) -> Status;
+
 /// A master on a serial line, with the port and the buffers it was given.
+// Small fields first: see `Transaction`.
+#[repr(C)]
 pub struct Master<P, S> {
-    transaction: Transaction<P, S>,
-    /// Where the writing functions without arguments write.
-    write_address: u16,
-    /// Bits queued in the transmit buffer; 16 to a word.
-    transmit_bits: u16,
     response_words: u8,
     response_index: u8,
     slave: u8,
     status: Status,
+    /// Where the writing functions without arguments write.
+    write_address: u16,
+    /// Bits queued in the transmit buffer; 16 to a word.
+    transmit_bits: u16,
+    transaction: Transaction<P, S>,
 }
 
 impl<P, S> Master<P, S> {
@@ -69,7 +73,7 @@ impl<P, S> Master<P, S> {
         let settings = self.settings();
         settings.silence = time::silence(baud);
         settings.gap = settings.silence;
-        settings.character = time::character(baud);
+        settings.character = time::character(baud).into();
     }
 
     /// The status of the last request; [`Status::PENDING`] while it is under way.
@@ -96,12 +100,21 @@ impl<P, S> Master<P, S> {
 impl<P: Port, S: Storage> Master<P, S> {
     /// Talks to `slave` over `port` from now on. Settings, buffers and their
     /// words stay; a request under way is given up.
-    pub fn begin(&mut self, slave: u8, port: P) {
+    pub fn begin(&mut self, slave: u8, port: &P)
+    where
+        P: Copy,
+    {
         self.cancel();
         self.slave = slave;
-        self.transaction.port = port;
+        self.transaction.port = *port;
         self.transmit_bits = 0;
-        self.line_used();
+        self.transaction.line_used();
+    }
+
+    /// Turns zeroed storage into a master without port and buffers.
+    pub fn preset(&mut self) {
+        self.slave = 1;
+        self.transaction.settings.preset();
     }
 
     /// Gives up the request under way, if there is one.
@@ -114,7 +127,9 @@ impl<P: Port, S: Storage> Master<P, S> {
 
     /// Says that somebody else has just used the line.
     pub fn line_used(&mut self) {
-        self.transaction.line_used();
+        if self.transaction.port.is_ready() {
+            self.transaction.line_used();
+        }
     }
 
     /// Moves the request under way on, without waiting; returns
@@ -142,113 +157,101 @@ impl<P: Port, S: Storage> Master<P, S> {
 
     /// Decodes a successful reply into the response words.
     fn take_words(&mut self) -> Status {
-        let order = self.transaction.request().order();
-        let mask = self.transaction.request().last_word_mask();
-        let (data, words) = self.transaction.data_and_words();
-        let count = data.len().div_ceil(2);
-        let Some(words) = words.get_mut(..count) else {
+        if !self.transaction.take_words() {
             return Status::BUFFER_TOO_SMALL;
-        };
-        words::fill(words, data, order);
-        if let Some(last) = words.last_mut() {
-            *last &= mask;
         }
-        self.response_words = count as u8;
+        self.response_words = self.transaction.request().response_words();
         Status::OK
     }
 
-    /// Notes that a request was refused, and why.
-    pub fn refuse(&mut self, status: Status) -> Status {
-        self.status = status;
-        status
-    }
-
-    /// Starts what a function built, or fails without sending anything.
-    fn start(&mut self, request: Result<Request, Status>) -> Status {
-        if self.transaction.is_pending() {
+    /// [`Status::OK`] if a request may be built, else why not.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn readiness(&mut self) -> Status {
+        if self.is_pending() {
             return Status::BUSY;
         }
-        self.transmit_bits = 0;
-        self.response_index = 0;
-        self.status = match self.try_start(request) {
-            Ok(()) => Status::PENDING,
-            Err(status) => {
-                self.transaction.forget();
-                status
-            }
-        };
+        if self.transaction.port.is_ready() && !self.storage().frame().is_empty() {
+            return Status::OK;
+        }
+        self.status = Status::NOT_INITIALISED;
         self.status
     }
 
-    /// Starts a write to `address`, with `words` in the transmit buffer first.
-    fn start_write(
-        &mut self,
-        address: u16,
-        words: &[u16],
-        request: Result<Request, Status>,
-    ) -> Status {
-        if !self.transaction.is_pending() {
-            self.write_address = address;
-            for (index, word) in words.iter().enumerate() {
-                self.set_transmit_word(index, *word);
-            }
+    /// Sends the request of an address and a word that `build` builds, or
+    /// refuses it with nothing sent. What is written to becomes the write
+    /// address.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub fn request(&mut self, address: u16, word: u16, build: Build) -> Status {
+        let ready = self.readiness();
+        if ready != Status::OK {
+            return ready;
         }
-        self.start(request)
+        let request = self.transaction.request();
+        let built = build(request, address, word);
+        if !request.is_read() {
+            self.write_address = address;
+        }
+        self.start(built)
     }
 
-    fn try_start(&mut self, request: Result<Request, Status>) -> Result<(), Status> {
-        let request = request?;
-        if usize::from(request.words()) > self.transaction.storage.transmit().len() {
-            return Err(Status::ILLEGAL_DATA_VALUE);
+    /// Starts what was built, unless that was refused.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn start(&mut self, built: Status) -> Status {
+        self.transmit_bits = 0;
+        self.response_index = 0;
+        self.transaction.forget();
+        self.status = built;
+        if built == Status::OK {
+            let request = self.transaction.request();
+            if request.is_read() {
+                self.response_words = 0;
+            }
+            let words = usize::from(request.words());
+            self.status = if words > self.transaction.storage.transmit().len() {
+                Status::ILLEGAL_DATA_VALUE
+            } else {
+                self.transaction.start(self.slave)
+            };
         }
-        if request.is_read() {
-            self.response_words = 0;
-        }
-        self.transaction.start(self.slave, request)
+        self.status
     }
 
     /// 01: reads 1 to 2000 coils into the response words.
     pub fn read_coils(&mut self, address: u16, quantity: u16) -> Status {
-        self.start(bits::read(bits::READ_COILS, address, quantity))
+        self.request(address, quantity, bits::read_coils)
     }
 
     /// 02: reads 1 to 2000 discrete inputs into the response words.
     pub fn read_discrete_inputs(&mut self, address: u16, quantity: u16) -> Status {
-        self.start(bits::read(bits::READ_DISCRETE_INPUTS, address, quantity))
+        self.request(address, quantity, bits::read_discrete_inputs)
     }
 
     /// 03: reads 1 to 125 holding registers into the response words.
     pub fn read_holding_registers(&mut self, address: u16, quantity: u16) -> Status {
-        self.start(registers::read(
-            registers::READ_HOLDING_REGISTERS,
-            address,
-            quantity,
-        ))
+        self.request(address, quantity, registers::read_holding)
     }
 
     /// 04: reads 1 to 125 input registers into the response words.
     pub fn read_input_registers(&mut self, address: u16, quantity: u16) -> Status {
-        self.start(registers::read(
-            registers::READ_INPUT_REGISTERS,
-            address,
-            quantity,
-        ))
+        self.request(address, quantity, registers::read_input)
     }
 
-    /// 05: switches one coil.
-    pub fn write_single_coil(&mut self, address: u16, on: bool) -> Status {
-        self.start_write(address, &[], Ok(bits::write_single(address, on)))
+    /// 05: switches one coil; 0 is off.
+    pub fn write_single_coil(&mut self, address: u16, on: u16) -> Status {
+        self.request(address, on, bits::write_single)
     }
 
     /// 06: writes one register. The value also becomes transmit word 0.
     pub fn write_single_register(&mut self, address: u16, value: u16) -> Status {
-        let request = registers::write_single(address, value);
-        self.start_write(address, &[value], Ok(request))
+        if self.readiness() == Status::OK {
+            self.set_transmit_word(0, value);
+        }
+        self.request(address, value, registers::write_single)
     }
 
     /// 0F: writes 1 to 1968 coils from the transmit words, lowest bit first.
     pub fn write_multiple_coils(&mut self, address: u16, quantity: u16) -> Status {
-        self.start_write(address, &[], bits::write_multiple(address, quantity))
+        self.request(address, quantity, bits::write_multiple)
     }
 
     /// 0F: writes the queued bits to the last write address.
@@ -258,7 +261,7 @@ impl<P: Port, S: Storage> Master<P, S> {
 
     /// 10: writes 1 to 123 registers from the transmit words.
     pub fn write_multiple_registers(&mut self, address: u16, quantity: u16) -> Status {
-        self.start_write(address, &[], registers::write_multiple(address, quantity))
+        self.request(address, quantity, registers::write_multiple)
     }
 
     /// 10: writes the queued complete words to the last write address.
@@ -269,8 +272,16 @@ impl<P: Port, S: Storage> Master<P, S> {
     /// 16: sets a register to `(register & and_mask) | (or_mask & !and_mask)`.
     /// The masks also become transmit words 0 and 1.
     pub fn mask_write_register(&mut self, address: u16, and_mask: u16, or_mask: u16) -> Status {
-        let request = registers::mask_write(address, and_mask, or_mask);
-        self.start_write(address, &[and_mask, or_mask], Ok(request))
+        let ready = self.readiness();
+        if ready != Status::OK {
+            return ready;
+        }
+        self.write_address = address;
+        self.set_transmit_word(0, and_mask);
+        self.set_transmit_word(1, or_mask);
+        let request = self.transaction.request();
+        let built = registers::mask_write(request, address, and_mask, or_mask);
+        self.start(built)
     }
 
     /// 17: writes 1 to 121 registers from the transmit words, then reads 1 to
@@ -282,9 +293,19 @@ impl<P: Port, S: Storage> Master<P, S> {
         write_address: u16,
         write_quantity: u16,
     ) -> Status {
-        let request =
-            registers::read_write(read_address, read_quantity, write_address, write_quantity);
-        self.start_write(write_address, &[], request)
+        let ready = self.readiness();
+        if ready != Status::OK {
+            return ready;
+        }
+        self.write_address = write_address;
+        let built = registers::read_write(
+            self.transaction.request(),
+            read_address,
+            read_quantity,
+            write_address,
+            write_quantity,
+        );
+        self.start(built)
     }
 
     /// 17: writes the queued complete words to the last write address.

@@ -1,22 +1,19 @@
 //! The byte stream that the firmware supplies.
 
-use crate::error::Status;
-
 /// What an object needs of the outside world. Nothing here may block.
 pub trait Port {
+    /// True if there is a stream behind this; the rest is called only then.
+    fn is_ready(&self) -> bool {
+        true
+    }
+
     /// Takes up to `bytes.len()` received bytes, in order; returns how many
-    /// there were, 0 if none has arrived yet.
-    ///
-    /// # Errors
-    /// [`Status::LINK_LOST`] if no byte will ever come.
-    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Status>;
+    /// there were, 0 if none has arrived yet, less if none will ever come.
+    fn read(&mut self, bytes: &mut [u8]) -> i16;
 
     /// Hands over bytes to send; returns how many were accepted, 0 if none
-    /// just now.
-    ///
-    /// # Errors
-    /// [`Status::LINK_LOST`] if no byte will ever be sent.
-    fn write(&mut self, bytes: &[u8]) -> Result<usize, Status>;
+    /// just now, less if none will ever be sent.
+    fn write(&mut self, bytes: &[u8]) -> i16;
 
     /// A clock in microseconds that wraps at 2^32.
     fn micros(&mut self) -> u32;

@@ -1,24 +1,32 @@
 //! What holds for every request and for every string of bytes.
 
+use core::num::NonZeroU8;
 use mbm::error::Status;
 use mbm::frame::checksum::crc16;
-use mbm::frame::rtu::{self, Window};
+use mbm::frame::rtu::{self, Verdict, Wanted, Window};
 use mbm::pdu::request::{Received, Request};
 use mbm::pdu::{bits, registers, response};
 use proptest::prelude::*;
 
+fn build(build: impl FnOnce(&mut Request) -> Status) -> Option<Request> {
+    Request::build(build).ok()
+}
+
 /// Any request that the ten functions build.
 fn any_request() -> impl Strategy<Value = Request> {
     prop_oneof![
-        (1u8..=2, any::<u16>(), 0u16..2002).prop_map(|(f, a, q)| bits::read(f, a, q).ok()),
-        (3u8..=4, any::<u16>(), 0u16..127).prop_map(|(f, a, q)| registers::read(f, a, q).ok()),
-        any::<(u16, bool)>().prop_map(|(a, on)| Some(bits::write_single(a, on))),
-        any::<(u16, u16)>().prop_map(|(a, v)| Some(registers::write_single(a, v))),
-        (any::<u16>(), 0u16..1970).prop_map(|(a, q)| bits::write_multiple(a, q).ok()),
-        (any::<u16>(), 0u16..125).prop_map(|(a, q)| registers::write_multiple(a, q).ok()),
-        any::<(u16, u16, u16)>().prop_map(|(a, b, c)| Some(registers::mask_write(a, b, c))),
+        (any::<u16>(), 0u16..2002).prop_map(|(a, q)| build(|r| bits::read_coils(r, a, q))),
+        (any::<u16>(), 0u16..2002)
+            .prop_map(|(a, q)| build(|r| bits::read_discrete_inputs(r, a, q))),
+        (any::<u16>(), 0u16..127).prop_map(|(a, q)| build(|r| registers::read_holding(r, a, q))),
+        (any::<u16>(), 0u16..127).prop_map(|(a, q)| build(|r| registers::read_input(r, a, q))),
+        any::<(u16, u16)>().prop_map(|(a, on)| build(|r| bits::write_single(r, a, on))),
+        any::<(u16, u16)>().prop_map(|(a, v)| build(|r| registers::write_single(r, a, v))),
+        (any::<u16>(), 0u16..1970).prop_map(|(a, q)| build(|r| bits::write_multiple(r, a, q))),
+        (any::<u16>(), 0u16..125).prop_map(|(a, q)| build(|r| registers::write_multiple(r, a, q))),
+        any::<(u16, u16, u16)>().prop_map(|(a, b, c)| build(|r| registers::mask_write(r, a, b, c))),
         (any::<u16>(), 0u16..127, any::<u16>(), 0u16..123)
-            .prop_map(|(ra, rq, wa, wq)| registers::read_write(ra, rq, wa, wq).ok()),
+            .prop_map(|(ra, rq, wa, wq)| build(|r| registers::read_write(r, ra, rq, wa, wq))),
     ]
     .prop_filter_map("within the standard", |request| request)
 }
@@ -26,8 +34,13 @@ fn any_request() -> impl Strategy<Value = Request> {
 fn emit(unit: u8, request: &Request, words: &[u16]) -> Vec<u8> {
     let mut buffer = [0; rtu::MAX_FRAME];
     let emit = |pdu: &mut [u8]| request.emit(pdu, words);
-    assert!(rtu::write(&mut buffer, unit, request.length(), emit));
-    buffer[..request.length() + rtu::OVERHEAD].to_vec()
+    assert!(rtu::write(
+        &mut buffer,
+        unit,
+        usize::from(request.length()),
+        emit
+    ));
+    buffer[..usize::from(request.length()) + rtu::OVERHEAD].to_vec()
 }
 
 /// A right reply to `request`, with data bytes from `seed`.
@@ -45,23 +58,47 @@ fn right_reply(unit: u8, request: &Request, seed: u8) -> Vec<u8> {
     frame
 }
 
+/// The response of a unit to a request.
+struct Wanting<'a>(u8, &'a Request);
+
+impl Wanted for Wanting<'_> {
+    fn unit(&self) -> u8 {
+        self.0
+    }
+    fn function(&self) -> u8 {
+        self.1.function()
+    }
+    fn length(&self, frame: &[u8]) -> Option<NonZeroU8> {
+        match frame {
+            [unit, pdu @ ..] if *unit == self.0 => response::expected(self.1, pdu),
+            _ => None,
+        }
+    }
+    fn judge(&mut self, _: &[u8]) -> Verdict {
+        Verdict::Right
+    }
+}
+
 /// Feeds `bytes` in pieces and returns the first frame's PDU.
 fn find(unit: u8, request: &Request, bytes: &[u8], piece: usize, size: usize) -> Option<Vec<u8>> {
     let mut buffer = vec![0; size];
     let mut window = Window::EMPTY;
     let mut rest = bytes;
     loop {
-        let found = window.search(&mut buffer, unit, false, |pdu| {
-            response::expected(request, pdu)
-        });
-        if found.is_some() || rest.is_empty() {
-            return found.map(|range| buffer[range].to_vec());
+        let found = window.search(&buffer, &mut Wanting(unit, request));
+        if found {
+            let pdu = &window.bytes(&buffer)?[1..];
+            let length = response::expected(request, pdu).map(|length| usize::from(length.get()));
+            return Some(pdu[..length?].to_vec());
         }
-        let room = window.room(&mut buffer);
+        if rest.is_empty() {
+            return None;
+        }
+        let room = window.room(&mut buffer).expect("room");
         let count = rest.len().min(piece).min(room.len());
         assert!(count > 0, "a full window asks for more");
         room[..count].copy_from_slice(&rest[..count]);
-        window.arrived(count);
+        window.arrived(count as u16);
         rest = &rest[count..];
     }
 }
@@ -119,7 +156,7 @@ proptest! {
     ) {
         let _ = Received::parse(&bytes);
         let _ = response::judge(&request, &bytes);
-        let _ = response::data(&request, &bytes);
+        let _ = request.take(&mut [0; 125], &bytes);
         let _ = find(bytes.first().copied().unwrap_or(1), &request, &bytes, piece, size);
     }
 

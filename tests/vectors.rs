@@ -1,17 +1,27 @@
 //! Frames of the specification and of other implementations' documents, byte
 //! for byte: what we emit, and what we make of a reply.
 
+use core::num::NonZeroU8;
 use mbm::error::Status;
-use mbm::frame::rtu::{self, Window};
+use mbm::frame::rtu::{self, Verdict, Wanted, Window};
 use mbm::pdu::request::{Received, Request};
 use mbm::pdu::{bits, registers, response};
+
+fn build(build: impl FnOnce(&mut Request) -> Status) -> Request {
+    Request::build(build).unwrap()
+}
 
 /// The frame of a request to `unit`, with `words` to send.
 fn frame(unit: u8, request: &Request, words: &[u16]) -> Vec<u8> {
     let mut buffer = [0; rtu::MAX_FRAME];
     let emit = |pdu: &mut [u8]| request.emit(pdu, words);
-    assert!(rtu::write(&mut buffer, unit, request.length(), emit));
-    buffer[..request.length() + rtu::OVERHEAD].to_vec()
+    assert!(rtu::write(
+        &mut buffer,
+        unit,
+        usize::from(request.length()),
+        emit
+    ));
+    buffer[..usize::from(request.length()) + rtu::OVERHEAD].to_vec()
 }
 
 /// The PDU of a request.
@@ -20,51 +30,72 @@ fn pdu(request: &Request, words: &[u16]) -> Vec<u8> {
     frame[1..frame.len() - 2].to_vec()
 }
 
+/// The response of a unit to a request.
+struct Wanting<'a>(u8, &'a Request);
+
+impl Wanted for Wanting<'_> {
+    fn unit(&self) -> u8 {
+        self.0
+    }
+    fn function(&self) -> u8 {
+        self.1.function()
+    }
+    fn length(&self, frame: &[u8]) -> Option<NonZeroU8> {
+        match frame {
+            [unit, pdu @ ..] if *unit == self.0 => response::expected(self.1, pdu),
+            _ => None,
+        }
+    }
+    fn judge(&mut self, _: &[u8]) -> Verdict {
+        Verdict::Right
+    }
+}
+
 /// The status and the data bytes of a reply frame to a request.
 fn reply(unit: u8, request: &Request, frame: &[u8]) -> (Status, Vec<u8>) {
-    let mut buffer = frame.to_vec();
+    let buffer = frame.to_vec();
     let mut window = Window::EMPTY;
-    window.arrived(frame.len());
-    let range = window
-        .search(&mut buffer, unit, false, |pdu| {
-            response::expected(request, pdu)
-        })
-        .expect("a reply");
-    let pdu = &buffer[range];
+    window.arrived(frame.len() as u16);
+    assert!(window.search(&buffer, &mut Wanting(unit, request)));
+    let pdu = &buffer[rtu::PDU..buffer.len() - 2];
     let status = response::judge(request, pdu);
-    (status, response::data(request, pdu).to_vec())
+    let read = status == Status::OK && request.is_read();
+    (status, if read { pdu[2..].to_vec() } else { vec![] })
 }
 
 #[test]
 fn requests_of_the_specification() {
-    let coils = bits::read(bits::READ_COILS, 0x13, 0x13).unwrap();
+    let coils = build(|r| bits::read_coils(r, 0x13, 0x13));
     assert_eq!(pdu(&coils, &[]), [1, 0, 0x13, 0, 0x13]);
-    let inputs = bits::read(bits::READ_DISCRETE_INPUTS, 0xC4, 0x16).unwrap();
+    let inputs = build(|r| bits::read_discrete_inputs(r, 0xC4, 0x16));
     assert_eq!(pdu(&inputs, &[]), [2, 0, 0xC4, 0, 0x16]);
-    let holding = registers::read(registers::READ_HOLDING_REGISTERS, 0x6B, 3).unwrap();
+    let holding = build(|r| registers::read_holding(r, 0x6B, 3));
     assert_eq!(pdu(&holding, &[]), [3, 0, 0x6B, 0, 3]);
-    let input = registers::read(registers::READ_INPUT_REGISTERS, 8, 1).unwrap();
+    let input = build(|r| registers::read_input(r, 8, 1));
     assert_eq!(pdu(&input, &[]), [4, 0, 8, 0, 1]);
     assert_eq!(
-        pdu(&bits::write_single(0xAC, true), &[]),
+        pdu(&build(|r| bits::write_single(r, 0xAC, 1)), &[]),
         [5, 0, 0xAC, 0xFF, 0]
     );
-    assert_eq!(pdu(&registers::write_single(1, 3), &[]), [6, 0, 1, 0, 3]);
-    let coils = bits::write_multiple(0x13, 0x0A).unwrap();
+    assert_eq!(
+        pdu(&build(|r| registers::write_single(r, 1, 3)), &[]),
+        [6, 0, 1, 0, 3]
+    );
+    let coils = build(|r| bits::write_multiple(r, 0x13, 0x0A));
     assert_eq!(
         pdu(&coils, &[0x01CD]),
         [0x0F, 0, 0x13, 0, 0x0A, 2, 0xCD, 0x01]
     );
-    let registers_ = registers::write_multiple(1, 2).unwrap();
+    let registers_ = build(|r| registers::write_multiple(r, 1, 2));
     assert_eq!(
         pdu(&registers_, &[0x000A, 0x0102]),
         [0x10, 0, 1, 0, 2, 4, 0, 0x0A, 1, 2]
     );
     assert_eq!(
-        pdu(&registers::mask_write(4, 0xF2, 0x25), &[]),
+        pdu(&build(|r| registers::mask_write(r, 4, 0xF2, 0x25)), &[]),
         [0x16, 0, 4, 0, 0xF2, 0, 0x25]
     );
-    let both = registers::read_write(3, 6, 0x0E, 3).unwrap();
+    let both = build(|r| registers::read_write(r, 3, 6, 0x0E, 3));
     assert_eq!(
         pdu(&both, &[0xFF, 0xFF, 0xFF]),
         [0x17, 0, 3, 0, 6, 0, 0x0E, 0, 3, 6, 0, 0xFF, 0, 0xFF, 0, 0xFF]
@@ -74,8 +105,10 @@ fn requests_of_the_specification() {
 #[test]
 fn request_frames_with_their_crc() {
     let read = |function, address, quantity| match function {
-        1 | 2 => bits::read(function, address, quantity).unwrap(),
-        _ => registers::read(function, address, quantity).unwrap(),
+        1 => build(|r| bits::read_coils(r, address, quantity)),
+        2 => build(|r| bits::read_discrete_inputs(r, address, quantity)),
+        3 => build(|r| registers::read_holding(r, address, quantity)),
+        _ => build(|r| registers::read_input(r, address, quantity)),
     };
     let cases: &[(u8, Request, &[u16], &[u8])] = &[
         (
@@ -94,25 +127,25 @@ fn request_frames_with_their_crc() {
         (1, read(4, 0x6B, 1), &[], &[1, 4, 0, 0x6B, 0, 1, 0x40, 0x16]),
         (
             0x11,
-            bits::write_single(0x6B, true),
+            build(|r| bits::write_single(r, 0x6B, 1)),
             &[],
             &[0x11, 5, 0, 0x6B, 0xFF, 0, 0xFF, 0x76],
         ),
         (
             0x11,
-            registers::write_single(0x6B, 0x0101),
+            build(|r| registers::write_single(r, 0x6B, 0x0101)),
             &[],
             &[0x11, 6, 0, 0x6B, 1, 1, 0x3A, 0xD6],
         ),
         (
             0x11,
-            bits::write_multiple(0x0410, 3).unwrap(),
+            build(|r| bits::write_multiple(r, 0x0410, 3)),
             &[5],
             &[0x11, 0x0F, 4, 0x10, 0, 3, 1, 5, 0x8E, 0x1F],
         ),
         (
             0x11,
-            registers::write_multiple(0x0410, 3).unwrap(),
+            build(|r| registers::write_multiple(r, 0x0410, 3)),
             &[0x00C8, 0x0082, 0x8701],
             &[
                 0x11, 0x10, 4, 0x10, 0, 3, 6, 0, 0xC8, 0, 0x82, 0x87, 1, 0x2F, 0x7D,
@@ -120,7 +153,7 @@ fn request_frames_with_their_crc() {
         ),
         (
             0x11,
-            registers::read_write(0x0410, 1, 0x0112, 2).unwrap(),
+            build(|r| registers::read_write(r, 0x0410, 1, 0x0112, 2)),
             &[0x00C8, 0x0082],
             &[
                 0x11, 0x17, 4, 0x10, 0, 1, 1, 0x12, 0, 2, 4, 0, 0xC8, 0, 0x82, 0x64, 0xE2,
@@ -134,33 +167,33 @@ fn request_frames_with_their_crc() {
 
 #[test]
 fn reply_frames_with_their_crc() {
-    let holding = registers::read(3, 0x6B, 1).unwrap();
+    let holding = build(|r| registers::read_holding(r, 0x6B, 1));
     let read = reply(1, &holding, &[1, 3, 2, 0xCD, 0x6B, 0xAD, 0x3B]);
     assert_eq!(read, (Status::OK, vec![0xCD, 0x6B]));
-    let input = registers::read(4, 0x6B, 1).unwrap();
+    let input = build(|r| registers::read_input(r, 0x6B, 1));
     let read = reply(1, &input, &[1, 4, 2, 0xCD, 0x6B, 0xAC, 0x4F]);
     assert_eq!(read, (Status::OK, vec![0xCD, 0x6B]));
-    let coils = bits::read(1, 0, 16).unwrap();
+    let coils = build(|r| bits::read_coils(r, 0, 16));
     let read = reply(3, &coils, &[3, 1, 2, 0xCD, 0x6B, 0xD5, 0x43]);
     assert_eq!(read, (Status::OK, vec![0xCD, 0x6B]));
-    let inputs = bits::read(2, 0, 16).unwrap();
+    let inputs = build(|r| bits::read_discrete_inputs(r, 0, 16));
     let read = reply(3, &inputs, &[3, 2, 2, 0xCD, 0x6B, 0xD5, 0x07]);
     assert_eq!(read, (Status::OK, vec![0xCD, 0x6B]));
-    let both = registers::read_write(0x0410, 1, 0x0112, 2).unwrap();
+    let both = build(|r| registers::read_write(r, 0x0410, 1, 0x0112, 2));
     let read = reply(0x11, &both, &[0x11, 0x17, 2, 0xCD, 0x6B, 0x69, 0x08]);
     assert_eq!(read, (Status::OK, vec![0xCD, 0x6B]));
-    let coils = bits::write_multiple(0x0410, 3).unwrap();
+    let coils = build(|r| bits::write_multiple(r, 0x0410, 3));
     let wrote = reply(0x11, &coils, &[0x11, 0x0F, 4, 0x10, 0, 3, 0x17, 0xAF]);
     assert_eq!(wrote, (Status::OK, vec![]));
-    let words = registers::write_multiple(0x0410, 3).unwrap();
+    let words = build(|r| registers::write_multiple(r, 0x0410, 3));
     let wrote = reply(0x11, &words, &[0x11, 0x10, 4, 0x10, 0, 3, 0x82, 0x6D]);
     assert_eq!(wrote, (Status::OK, vec![]));
-    let coil = bits::write_single(2, true);
+    let coil = build(|r| bits::write_single(r, 2, 1));
     let wrote = reply(3, &coil, &[3, 5, 0, 2, 0xFF, 0, 0x2C, 0x18]);
     assert_eq!(wrote, (Status::OK, vec![]));
     let refused = reply(
         0x0A,
-        &bits::read(1, 0, 8).unwrap(),
+        &build(|r| bits::read_coils(r, 0, 8)),
         &[0x0A, 0x81, 2, 0xB0, 0x53],
     );
     assert_eq!(refused, (Status::ILLEGAL_DATA_ADDRESS, vec![]));
@@ -168,7 +201,7 @@ fn reply_frames_with_their_crc() {
 
 #[test]
 fn a_write_reply_with_another_address_or_value_is_malformed() {
-    let request = registers::write_single(0x6B, 0x0101);
+    let request = build(|r| registers::write_single(r, 0x6B, 0x0101));
     for (at, wrong) in [(1, 1), (2, 0x6C), (3, 0), (4, 0)] {
         let mut pdu = [6, 0, 0x6B, 1, 1];
         pdu[at] = wrong;
@@ -178,7 +211,7 @@ fn a_write_reply_with_another_address_or_value_is_malformed() {
 
 #[test]
 fn exception_codes_of_0_and_from_80_are_malformed() {
-    let request = registers::write_single(1, 2);
+    let request = build(|r| registers::write_single(r, 1, 2));
     for code in 0..=255 {
         let expected = match code {
             1..=0x7F => Status::from_code(code),
@@ -194,26 +227,28 @@ fn quantities_and_addresses_are_held_to_the_standard() {
     use Status as S;
     let value = Err(S::ILLEGAL_DATA_VALUE);
     let address = Err(S::ILLEGAL_DATA_ADDRESS);
-    let check = |request: Result<Request, Status>| request.map(|_| ());
-    for (most, build) in [
+    let build = |build: fn(&mut Request, u16, u16) -> Status, a, q| {
+        Request::build(|request| build(request, a, q)).map(|_| ())
+    };
+    for (most, function) in [
         (
             2000,
-            (|a, q| bits::read(1, a, q)) as fn(u16, u16) -> Result<Request, Status>,
+            bits::read_coils as fn(&mut Request, u16, u16) -> Status,
         ),
-        (125, |a, q| registers::read(3, a, q)),
+        (125, registers::read_holding),
         (1968, bits::write_multiple),
         (123, registers::write_multiple),
-        (121, |a, q| registers::read_write(0, 1, a, q)),
-        (125, |a, q| registers::read_write(a, q, 0, 1)),
+        (121, |r, a, q| registers::read_write(r, 0, 1, a, q)),
+        (125, |r, a, q| registers::read_write(r, a, q, 0, 1)),
     ] {
-        assert_eq!(check(build(0, 0)), value);
-        assert_eq!(check(build(0, 1)), Ok(()));
-        assert_eq!(check(build(0, most)), Ok(()));
-        assert_eq!(check(build(0, most + 1)), value);
-        assert_eq!(check(build(0, 0xFFFF)), value);
-        assert_eq!(check(build(0xFFFF, 1)), Ok(()));
-        assert_eq!(check(build(0xFFFF, 2)), address);
-        assert_eq!(check(build(0u16.wrapping_sub(most), most)), Ok(()));
+        assert_eq!(build(function, 0, 0), value);
+        assert_eq!(build(function, 0, 1), Ok(()));
+        assert_eq!(build(function, 0, most), Ok(()));
+        assert_eq!(build(function, 0, most + 1), value);
+        assert_eq!(build(function, 0, 0xFFFF), value);
+        assert_eq!(build(function, 0xFFFF, 1), Ok(()));
+        assert_eq!(build(function, 0xFFFF, 2), address);
+        assert_eq!(build(function, 0u16.wrapping_sub(most), most), Ok(()));
     }
 }
 

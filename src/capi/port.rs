@@ -1,6 +1,5 @@
 //! The port that C supplies.
 
-use crate::error::Status;
 use crate::port::Port;
 use core::ffi::c_void;
 
@@ -45,50 +44,36 @@ impl mbm_port {
     }
 }
 
-/// What a read or write hook returned, of at most `most` bytes.
-fn count(returned: i16, most: usize) -> Result<usize, Status> {
-    match usize::try_from(returned) {
-        Ok(count) => Ok(count.min(most)),
-        Err(_) => Err(Status::LINK_LOST),
-    }
-}
-
-/// A length for C; what is longer is offered in pieces.
-fn length(bytes: &[u8]) -> u16 {
-    bytes.len().min(i16::MAX as usize) as u16
-}
-
 // SAFETY, here and below: the hooks are C functions that keep the contract
-// that their comments state, and slices are valid for their length.
+// that their comments state, slices are valid for their length and at most as
+// long as a frame, and what a complete port has is called of such a port only.
 impl Port for mbm_port {
-    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Status> {
-        match self.read {
-            // SAFETY: see above.
-            Some(read) => count(
-                unsafe { read(self.context, bytes.as_mut_ptr(), length(bytes)) },
-                bytes.len(),
-            ),
-            None => Err(Status::LINK_LOST),
-        }
+    fn is_ready(&self) -> bool {
+        // Begin takes complete ports only.
+        self.read.is_some()
     }
 
-    fn write(&mut self, bytes: &[u8]) -> Result<usize, Status> {
-        match self.write {
-            // SAFETY: see above.
-            Some(write) => count(
-                unsafe { write(self.context, bytes.as_ptr(), length(bytes)) },
-                bytes.len(),
-            ),
-            None => Err(Status::LINK_LOST),
-        }
+    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+        // SAFETY: see above.
+        let count = unsafe {
+            let read = self.read.unwrap_unchecked();
+            read(self.context, bytes.as_mut_ptr(), bytes.len() as u16)
+        };
+        count.min(bytes.len() as i16)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> i16 {
+        // SAFETY: see above.
+        let count = unsafe {
+            let write = self.write.unwrap_unchecked();
+            write(self.context, bytes.as_ptr(), bytes.len() as u16)
+        };
+        count.min(bytes.len() as i16)
     }
 
     fn micros(&mut self) -> u32 {
-        match self.micros {
-            // SAFETY: see above.
-            Some(micros) => unsafe { micros(self.context) },
-            None => 0,
-        }
+        // SAFETY: see above.
+        unsafe { self.micros.unwrap_unchecked()(self.context) }
     }
 
     fn flush(&mut self) -> bool {

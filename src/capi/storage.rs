@@ -1,6 +1,7 @@
 //! The buffers and counters that C lends.
 
 use crate::transaction::{Counter, Storage, COUNTERS};
+use core::slice::{from_raw_parts, from_raw_parts_mut};
 
 /// What happened on the line, since the caller zeroed it. Each wraps at 2^32.
 #[repr(C)]
@@ -30,67 +31,53 @@ pub struct mbm_counters {
 const _: () = assert!(size_of::<mbm_counters>() == COUNTERS * size_of::<u32>());
 
 /// What mbm_master_setBuffers was given.
-#[derive(Clone, Copy)]
+// In this order: see `Transaction`.
+#[repr(C)]
 pub(super) struct LentByC {
     pub(super) response: *mut u16,
     pub(super) transmit: *mut u16,
     pub(super) frame: *mut u8,
     pub(super) counters: *mut mbm_counters,
-    pub(super) response_words: u16,
-    pub(super) transmit_words: u16,
-    pub(super) frame_bytes: u16,
+    pub(super) frame_bytes: usize,
+    pub(super) response_words: u8,
+    pub(super) transmit_words: u8,
 }
 
 impl LentByC {
-    pub(super) const NONE: LentByC = LentByC {
-        response: core::ptr::null_mut(),
-        transmit: core::ptr::null_mut(),
-        frame: core::ptr::null_mut(),
-        counters: core::ptr::null_mut(),
-        response_words: 0,
-        transmit_words: 0,
-        frame_bytes: 0,
-    };
-}
-
-/// The slice of C's pointer and length; a length of 0 may come with NULL.
-///
-/// # Safety
-/// `length` items from `first` are valid and borrowed by nobody else.
-unsafe fn slice<'a, T>(first: *mut T, length: u16) -> &'a mut [T] {
-    if length == 0 {
-        &mut []
-    } else {
-        // SAFETY: as the caller promises.
-        unsafe { core::slice::from_raw_parts_mut(first, usize::from(length)) }
+    /// Turns zeroed storage into no buffers; a slice may not start at NULL.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn preset(&mut self) {
+        self.response = core::ptr::dangling_mut();
+        self.transmit = core::ptr::dangling_mut();
+        self.frame = core::ptr::dangling_mut();
     }
 }
 
 // SAFETY, of all functions here: mbm_master_setBuffers demands three buffers
 // that do not overlap, of these lengths, valid for as long as the object is
-// used; each is lent for as long as `self` is borrowed.
+// used (until then, and where it was given none, the length is 0); each is lent for as long as `self` is borrowed.
 impl Storage for LentByC {
     fn frame(&mut self) -> &mut [u8] {
         // SAFETY: see above.
-        unsafe { slice(self.frame, self.frame_bytes) }
+        unsafe { from_raw_parts_mut(self.frame, self.frame_bytes) }
     }
 
     fn transmit(&mut self) -> &mut [u16] {
         // SAFETY: see above.
-        unsafe { slice(self.transmit, self.transmit_words) }
+        unsafe { from_raw_parts_mut(self.transmit, self.transmit_words.into()) }
     }
 
     fn response(&mut self) -> &mut [u16] {
         // SAFETY: see above.
-        unsafe { slice(self.response, self.response_words) }
+        unsafe { from_raw_parts_mut(self.response, self.response_words.into()) }
     }
 
     fn frame_and_transmit(&mut self) -> (&mut [u8], &[u16]) {
         // SAFETY: see above; the two do not overlap.
         unsafe {
             (
-                slice(self.frame, self.frame_bytes),
-                slice(self.transmit, self.transmit_words),
+                from_raw_parts_mut(self.frame, self.frame_bytes),
+                from_raw_parts(self.transmit, self.transmit_words.into()),
             )
         }
     }
@@ -99,15 +86,15 @@ impl Storage for LentByC {
         // SAFETY: see above; the two do not overlap.
         unsafe {
             (
-                slice(self.frame, self.frame_bytes),
-                slice(self.response, self.response_words),
+                from_raw_parts(self.frame, self.frame_bytes),
+                from_raw_parts_mut(self.response, self.response_words.into()),
             )
         }
     }
 
     // On a microcontroller once, not at every call: flash.
     #[cfg_attr(all(feature = "counters", target_os = "none"), inline(never))]
-    fn count(&mut self, counter: Counter, more: usize) {
+    fn count(&mut self, counter: Counter, more: u16) {
         if !cfg!(feature = "counters") || self.counters.is_null() {
             return;
         }
@@ -115,7 +102,7 @@ impl Storage for LentByC {
         // `counter` is less than that.
         unsafe {
             let counter = self.counters.cast::<u32>().add(counter as usize);
-            *counter = (*counter).wrapping_add(more as u32);
+            *counter = (*counter).wrapping_add(more.into());
         }
     }
 }

@@ -19,14 +19,15 @@ impl Crc16 {
     /// The CRC of no bytes.
     pub const START: Crc16 = Crc16(0xFFFF);
 
-    /// Takes `bytes` in.
+    /// The CRC with `bytes` taken in as well.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn update(&mut self, bytes: &[u8]) {
+    #[must_use]
+    pub fn with(self, bytes: &[u8]) -> Crc16 {
         // The crate reflects the initial value; reflecting it here as well
         // cancels out, so a running value can be carried on.
         let mut digest = CRC.digest_with_initial(self.0.reverse_bits());
         digest.update(bytes);
-        self.0 = digest.finalize();
+        Crc16(digest.finalize())
     }
 
     /// The two bytes as sent, low byte first.
@@ -42,9 +43,7 @@ impl Crc16 {
 
 /// The CRC-16 of `bytes`.
 pub fn crc16(bytes: &[u8]) -> Crc16 {
-    let mut crc = Crc16::START;
-    crc.update(bytes);
-    crc
+    Crc16::START.with(bytes)
 }
 
 #[cfg(test)]
@@ -72,9 +71,7 @@ mod tests {
         #[test]
         fn bytes_may_arrive_in_any_pieces(bytes: std::vec::Vec<u8>, cut: usize) {
             let (front, back) = bytes.split_at(cut % (bytes.len() + 1));
-            let mut crc = Crc16::START;
-            crc.update(front);
-            crc.update(back);
+            let crc = Crc16::START.with(front).with(back);
             prop_assert_eq!(crc, crc16(&bytes));
         }
     }

@@ -5,14 +5,18 @@
 //! has arrived, and what turns out not to be the frame costs one byte.
 
 use super::checksum::{crc16, Crc16};
+use crate::error::Status;
 use core::cell::Cell;
-use core::ops::Range;
+use core::num::NonZeroU8;
 
 /// The longest frame: unit, PDU of 253 bytes, CRC.
 pub const MAX_FRAME: usize = 256;
 
 /// Bytes of a frame around its PDU: the unit before, the CRC behind.
 pub const OVERHEAD: usize = 3;
+
+/// Where the PDU of a frame starts.
+pub const PDU: usize = 1;
 
 /// Writes the frame of the PDU that `pdu` writes, `length` bytes long. Returns
 /// false, with nothing written, if `buffer` cannot hold it.
@@ -31,64 +35,156 @@ pub fn write(buffer: &mut [u8], unit: u8, length: usize, pdu: impl FnOnce(&mut [
     true
 }
 
-/// What was seen on the way to a reply, the more telling the greater.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub enum Seen {
+/// What was seen on the way to a reply, the more telling the greater. The low
+/// digit is that of the status it becomes.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Debug)]
+pub struct Seen(u8);
+
+impl Seen {
     /// No frame.
-    Nothing,
+    pub const NOTHING: Seen = Seen(0x02);
     /// A frame of another unit.
-    OtherUnit,
+    pub const OTHER_UNIT: Seen = Seen(0x10);
     /// A frame of our unit with another function.
-    OtherFunction,
+    pub const OTHER_FUNCTION: Seen = Seen(0x21);
     /// A frame of our unit and function that is not the reply.
-    Malformed,
+    pub const MALFORMED: Seen = Seen(0x35);
     /// A complete frame of our unit and function with a wrong CRC.
-    BadCrc,
+    pub const BAD_CRC: Seen = Seen(0x43);
     /// The reply has begun, but the buffer cannot hold it.
-    TooLong,
+    pub const TOO_LONG: Seen = Seen(0x59);
+
+    /// The status of a request for which nothing better was seen.
+    pub const fn status(self) -> Status {
+        Status::from_code(0xE0 | (self.0 & 0x0F))
+    }
 }
+
+const _: () = {
+    assert!(Seen::NOTHING.status().code() == Status::RESPONSE_TIMED_OUT.code());
+    assert!(Seen::OTHER_UNIT.status().code() == Status::INVALID_SLAVE_ID.code());
+    assert!(Seen::OTHER_FUNCTION.status().code() == Status::INVALID_FUNCTION.code());
+    assert!(Seen::MALFORMED.status().code() == Status::MALFORMED_REPLY.code());
+    assert!(Seen::BAD_CRC.status().code() == Status::INVALID_CRC.code());
+    assert!(Seen::TOO_LONG.status().code() == Status::BUFFER_TOO_SMALL.code());
+};
+
+/// What a frame is searched for.
+pub trait Wanted {
+    /// The unit that sends it.
+    fn unit(&self) -> u8;
+
+    /// The function code of its PDU, for which that with the highest bit set
+    /// may stand.
+    fn function(&self) -> u8;
+
+    /// The length of the PDU of a frame that begins with these bytes; `None`
+    /// for a frame that is not waited for.
+    fn length(&self, frame: &[u8]) -> Option<NonZeroU8>;
+
+    /// What a whole frame of such a PDU is.
+    fn judge(&mut self, frame: &[u8]) -> Verdict;
+}
+
+/// What a frame is that looked like the one that is wanted.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Verdict {
+    /// The one.
+    Right,
+    /// One of our own, of which nothing more is to be said.
+    Own,
+    /// Not the one.
+    Wrong,
+}
+
+/// The least bytes of a frame: unit, function, CRC.
+const MIN_FRAME: u8 = 4;
 
 /// A window that slides over received bytes. The buffer is the caller's and
 /// is passed to each call.
 #[derive(Clone, Copy, Debug)]
 pub struct Window {
-    /// Bytes in the buffer; a candidate starts with the first.
-    len: u16,
-    /// Bytes of the candidate that `crc` covers.
-    checked: u16,
-    crc: Crc16,
+    /// Where in the buffer the candidate starts, and where what arrived ends.
+    start: u16,
+    end: u16,
     /// The bytes passed over since a frame boundary, for they may turn out to
-    /// be somebody else's frame: their CRC, count, unit and function code.
+    /// be somebody else's frame: their CRC, count, and what such a frame is.
     passed_crc: Crc16,
     passed: u8,
-    passed_unit: u8,
-    passed_function: u8,
+    passed_as: Seen,
     seen: Seen,
     foreign: u8,
+    /// Also what stands behind a candidate that is not complete is searched.
+    skim: bool,
 }
 
 impl Window {
     /// A window over nothing.
     pub const EMPTY: Window = Window {
-        len: 0,
-        checked: 0,
-        crc: Crc16::START,
+        start: 0,
+        end: 0,
         passed_crc: Crc16::START,
         passed: 0,
-        passed_unit: 0,
-        passed_function: 0,
-        seen: Seen::Nothing,
+        passed_as: Seen::NOTHING,
+        seen: Seen::NOTHING,
         foreign: 0,
+        skim: false,
     };
 
-    /// The part of `buffer` to receive into.
-    pub fn room<'a>(&self, buffer: &'a mut [u8]) -> &'a mut [u8] {
-        buffer.get_mut(usize::from(self.len)..).unwrap_or_default()
+    /// The part of `buffer` to receive into; the candidate moves to the front.
+    pub fn room<'a>(&mut self, buffer: &'a mut [u8]) -> Option<&'a mut [u8]> {
+        if self.start > 0 {
+            let cells = Cell::from_mut(&mut *buffer).as_slice_of_cells();
+            let kept = cells.get(usize::from(self.start)..)?;
+            for (to, from) in cells.iter().zip(kept) {
+                to.set(from.get());
+            }
+            self.end -= self.start;
+            self.start = 0;
+        }
+        buffer.get_mut(usize::from(self.end)..)
     }
 
-    /// Says that `count` bytes were received into [`Window::room`].
-    pub fn arrived(&mut self, count: usize) {
-        self.len += count as u16;
+    /// Becomes a window over nothing, of which nothing is left to be skimmed.
+    pub fn clear(&mut self) {
+        self.skim = true;
+        self.start = 0;
+        self.end = 0;
+        self.passed = 0;
+        self.seen = Seen::NOTHING;
+        self.foreign = 0;
+    }
+
+    /// Says that `count` bytes more are in the buffer, as in [`Window::room`].
+    pub fn arrived(&mut self, count: u16) {
+        self.end += count;
+        self.skim = false;
+    }
+
+    /// Has the next search look behind a candidate that is not complete, which
+    /// may be noise; the rest of it may still come.
+    pub fn skim(&mut self) {
+        self.skim = true;
+    }
+
+    /// True if nothing arrived since [`Window::skim`].
+    pub const fn is_skimmed(&self) -> bool {
+        self.skim
+    }
+
+    /// Passes over `count` bytes.
+    pub fn advance(&mut self, count: u16) {
+        self.start += count;
+    }
+
+    /// The bytes of the window.
+    pub fn bytes<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]> {
+        buffer.get(usize::from(self.start)..usize::from(self.end))
+    }
+
+    /// The bytes from `offset` into the candidate on.
+    pub fn behind<'a>(&self, buffer: &'a [u8], offset: usize) -> Option<&'a [u8]> {
+        buffer.get(usize::from(self.start) + offset..)
     }
 
     /// The most telling thing seen so far.
@@ -106,119 +202,96 @@ impl Window {
         self.passed > 0
     }
 
-    /// Looks for a frame of `unit` with a right CRC whose PDU is `expected`:
-    /// the length of a PDU that begins with the bytes given, `None` for a PDU
-    /// that is not waited for. Returns where in `buffer` the PDU is.
+    /// Looks for a frame with a right CRC that is what is `wanted`, and starts
+    /// there; false if there is none.
     ///
-    /// Stops at a candidate that is not complete yet. With `skim` it looks
-    /// behind that as well, and if there is nothing leaves all as it was.
-    pub fn search(
-        &mut self,
-        buffer: &mut [u8],
-        unit: u8,
-        skim: bool,
-        expected: impl Fn(&[u8]) -> Option<usize>,
-    ) -> Option<Range<usize>> {
-        let kept = *self;
-        let len = usize::from(self.len);
-        let mut start = 0;
-        while let Some((first, pdu)) = buffer.get(start..len).and_then(<[u8]>::split_first) {
-            let length = if *first == unit { expected(pdu) } else { None };
-            if let Some(length) = length {
-                let total = length + OVERHEAD;
-                let complete = pdu.len() + 1 >= total;
-                if total > buffer.len() {
-                    self.see(Seen::TooLong);
-                } else if complete || !skim {
-                    let end = len.min(start + total);
-                    let news = buffer.get(start + usize::from(self.checked)..end);
-                    self.crc.update(news.unwrap_or_default());
-                    self.checked = (end - start) as u16;
-                    if !complete {
-                        break;
-                    }
-                    if self.crc.is_residue() {
-                        self.restart();
-                        return Some(start + 1..start + 1 + length);
-                    }
-                    if !skim {
-                        self.see(Seen::BadCrc);
+    /// Stops at a candidate that is not complete yet, unless [`Window::skim`]
+    /// was called; then, if there is nothing, all is left as it was.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub fn search(&mut self, buffer: &[u8], wanted: &mut impl Wanted) -> bool {
+        'found: while let Some(mut rest) = self.bytes(buffer) {
+            while let [first, behind @ ..] = rest {
+                if let Some(length) = wanted.length(rest) {
+                    let total = usize::from(length.get()) + OVERHEAD;
+                    if let Some(frame) = rest.get(..total) {
+                        if crc16(frame).is_residue() {
+                            self.start = self.end - rest.len() as u16;
+                            match wanted.judge(frame) {
+                                Verdict::Right => return true,
+                                Verdict::Own => {}
+                                Verdict::Wrong => self.see_foreign(Seen::MALFORMED),
+                            }
+                            self.passed = 0;
+                            self.advance(total as u16);
+                            continue 'found;
+                        }
+                        if !self.skim {
+                            self.see(Seen::BAD_CRC);
+                        }
+                    } else if total > buffer.len() {
+                        self.see(Seen::TOO_LONG);
+                    } else if !self.skim {
+                        return false;
                     }
                 }
+                rest = behind;
+                if !self.skim {
+                    self.pass(*first, wanted);
+                }
             }
-            self.restart();
-            start += 1;
-            if !skim {
-                let first = *first;
-                self.pass(first, unit, &expected);
-            }
+            return false;
         }
-        if skim {
-            *self = kept;
-        } else if start > 0 {
-            self.drop_front(buffer, start);
+        false
+    }
+
+    /// Notes a frame with a right CRC that is not the one.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn see_foreign(&mut self, what: Seen) {
+        if cfg!(feature = "counters") {
+            self.foreign = self.foreign.saturating_add(1);
         }
-        None
+        self.see(what);
     }
 
-    /// Refuses the frame that [`Window::search`] found and drops it.
-    pub fn refuse(&mut self, buffer: &mut [u8], pdu: Range<usize>) {
-        self.see(Seen::Malformed);
-        self.foreign = self.foreign.saturating_add(1);
-        self.drop_echo(buffer, pdu);
-    }
-
-    /// Drops the frame that [`Window::search`] found: it is our own.
-    pub fn drop_echo(&mut self, buffer: &mut [u8], pdu: Range<usize>) {
-        self.passed = 0;
-        self.drop_front(buffer, pdu.end + OVERHEAD - 1);
-    }
-
-    fn drop_front(&mut self, buffer: &mut [u8], count: usize) {
-        let cells = Cell::from_mut(buffer).as_slice_of_cells();
-        let kept = cells.get(count..usize::from(self.len)).unwrap_or_default();
-        for (to, from) in cells.iter().zip(kept) {
-            to.set(from.get());
-        }
-        self.len = kept.len() as u16;
-    }
-
-    fn restart(&mut self) {
-        self.checked = 0;
-        self.crc = Crc16::START;
-    }
-
+    #[cfg_attr(target_os = "none", inline(never))]
     fn see(&mut self, what: Seen) {
-        self.seen = self.seen.max(what);
+        if self.seen < what {
+            self.seen = what;
+        }
     }
 
     /// Takes in a byte that is passed over. Where such bytes make up a frame,
     /// a damaged reply seen in it was none.
-    fn pass(&mut self, byte: u8, unit: u8, expected: &impl Fn(&[u8]) -> Option<usize>) {
-        match self.passed {
-            0 => {
-                self.passed_crc = Crc16::START;
-                self.passed_unit = byte;
-            }
-            1 => self.passed_function = byte,
-            _ => {}
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn pass(&mut self, byte: u8, wanted: &impl Wanted) {
+        self.advance(1);
+        if !cfg!(feature = "diagnosis") {
+            return;
         }
-        self.passed = self.passed.saturating_add(1);
-        self.passed_crc.update(&[byte]);
-        if self.passed < 4 || !self.passed_crc.is_residue() {
+        if self.passed == 0 {
+            self.passed_crc = Crc16::START;
+            self.passed_as = if byte == wanted.unit() {
+                Seen::MALFORMED
+            } else {
+                Seen::OTHER_UNIT
+            };
+        } else if self.passed == 1
+            && self.passed_as == Seen::MALFORMED
+            && byte & 0x7F != wanted.function()
+        {
+            self.passed_as = Seen::OTHER_FUNCTION;
+        }
+        self.passed_crc = self.passed_crc.with(&[byte]);
+        if self.passed < MIN_FRAME {
+            self.passed += 1;
+        }
+        if self.passed < MIN_FRAME || !self.passed_crc.is_residue() {
             return;
         }
         self.passed = 0;
-        self.foreign = self.foreign.saturating_add(1);
-        if self.seen == Seen::BadCrc {
-            self.seen = Seen::Nothing;
+        if self.seen == Seen::BAD_CRC {
+            self.seen = Seen::NOTHING;
         }
-        self.see(if self.passed_unit != unit {
-            Seen::OtherUnit
-        } else if expected(&[self.passed_function]).is_none() {
-            Seen::OtherFunction
-        } else {
-            Seen::Malformed
-        });
+        self.see_foreign(self.passed_as);
     }
 }

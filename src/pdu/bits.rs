@@ -1,8 +1,8 @@
 //! Coils and discrete inputs: functions 01, 02, 05 and 0F.
 
-use super::request::{check_range, counted, word, Kind, Received, Request};
+use super::request::{counted, in_range, word, Received, Request};
 use crate::bytes::Reader;
-use crate::data::words::last_byte_mask;
+use crate::data::bits;
 use crate::error::Status;
 
 /// Read Coils (clause 6.1).
@@ -26,46 +26,43 @@ const fn byte_count(quantity: u16) -> u8 {
     quantity.div_ceil(8) as u8
 }
 
-/// Builds 01 or 02.
-///
-/// # Errors
-/// [`Status::ILLEGAL_DATA_VALUE`] unless `quantity` is 1 to 2000,
-/// [`Status::ILLEGAL_DATA_ADDRESS`] if the range passes 65535.
-pub fn read(function: u8, address: u16, quantity: u16) -> Result<Request, Status> {
-    check_range(address, quantity, MAX_READ)?;
-    Ok(Request {
-        response_length: 2 + byte_count(quantity),
-        ..Request::new(Kind::ReadBits, function, address, quantity)
-    })
+/// Builds 01: [`Status::OK`], [`Status::ILLEGAL_DATA_VALUE`] unless `quantity`
+/// is 1 to 2000, or [`Status::ILLEGAL_DATA_ADDRESS`] if the range passes 65535.
+pub fn read_coils(request: &mut Request, address: u16, quantity: u16) -> Status {
+    read(request, READ_COILS, address, quantity)
 }
 
-/// Builds 05.
-pub fn write_single(address: u16, on: bool) -> Request {
-    Request::new(
-        Kind::Write,
-        WRITE_SINGLE_COIL,
-        address,
-        if on { ON } else { 0 },
-    )
+/// Builds 02, as [`read_coils`].
+pub fn read_discrete_inputs(request: &mut Request, address: u16, quantity: u16) -> Status {
+    read(request, READ_DISCRETE_INPUTS, address, quantity)
+}
+
+fn read(request: &mut Request, function: u8, address: u16, quantity: u16) -> Status {
+    let status = request.set_range(function, address, quantity, MAX_READ);
+    request.response_length = byte_count(quantity).wrapping_add(2);
+    request.take = Some(bits::take);
+    status
+}
+
+/// Builds 05; a `value` of 0 is off, any other is on.
+pub fn write_single(request: &mut Request, address: u16, value: u16) -> Status {
+    let value = if value == 0 { 0 } else { ON };
+    request.set(WRITE_SINGLE_COIL, address, value);
+    Status::OK
 }
 
 /// Builds 0F; the coils are the sender's words, least significant bit first.
-///
-/// # Errors
-/// [`Status::ILLEGAL_DATA_VALUE`] unless `quantity` is 1 to 1968,
-/// [`Status::ILLEGAL_DATA_ADDRESS`] if the range passes 65535.
-pub fn write_multiple(address: u16, quantity: u16) -> Result<Request, Status> {
-    check_range(address, quantity, MAX_WRITE)?;
-    Ok(Request {
-        data_length: byte_count(quantity),
-        last_mask: last_byte_mask(quantity),
-        ..Request::new(Kind::WriteBits, WRITE_MULTIPLE_COILS, address, quantity)
-    })
+/// [`Status::OK`], [`Status::ILLEGAL_DATA_VALUE`] unless `quantity` is 1 to 1968,
+/// or [`Status::ILLEGAL_DATA_ADDRESS`] if the range passes 65535.
+pub fn write_multiple(request: &mut Request, address: u16, quantity: u16) -> Status {
+    let status = request.set_range(WRITE_MULTIPLE_COILS, address, quantity, MAX_WRITE);
+    request.append(byte_count(quantity), bits::send);
+    status
 }
 
 pub(super) fn parse_read<'a>(function: u8, reader: &mut Reader) -> Result<Received<'a>, Status> {
     let (address, quantity) = (word(reader)?, word(reader)?);
-    check_range(address, quantity, MAX_READ)?;
+    in_range(address, quantity, MAX_READ)?;
     Ok(Received::ReadBits {
         function,
         address,
@@ -85,7 +82,7 @@ pub(super) fn parse_write_single<'a>(reader: &mut Reader) -> Result<Received<'a>
 
 pub(super) fn parse_write_multiple<'a>(reader: &mut Reader<'a>) -> Result<Received<'a>, Status> {
     let (address, quantity) = (word(reader)?, word(reader)?);
-    check_range(address, quantity, MAX_WRITE)?;
+    in_range(address, quantity, MAX_WRITE)?;
     let data = counted(reader, u16::from(byte_count(quantity)))?;
     Ok(Received::WriteMultipleCoils {
         address,

@@ -3,56 +3,84 @@
 
 use super::{bits, registers};
 use crate::bytes::Reader;
-use crate::data::words::{self, Order};
+use crate::data::{Send, Take};
 use crate::error::Status;
 
 /// Function code, and at most four words of address and quantity.
 const HEAD: usize = 9;
 
-/// What a function does, as far as its sender needs to know.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Kind {
-    /// The response repeats the head.
-    Write,
-    /// As above; the words sent are packed bits.
-    WriteBits,
-    /// The response is a byte count and registers.
-    ReadRegisters,
-    /// The response is a byte count and packed bits.
-    ReadBits,
-}
-
 /// A request as its sender keeps it until the reply is there: the fixed head,
 /// and how much of the caller's words to send behind it.
+///
+/// How words travel is known by pointers to the family's functions, so that
+/// firmware carries those of the functions it calls.
 #[derive(Clone, Copy, Debug)]
 pub struct Request {
     pub(super) head: [u8; HEAD],
     pub(super) head_length: u8,
-    pub(super) kind: Kind,
-    /// Bytes that follow the head and its byte count; 0: neither.
-    pub(super) data_length: u8,
-    /// Keeps the used bits of the last data byte.
-    pub(super) last_mask: u8,
+    /// Length of the PDU: of head, byte count and data.
+    pub(super) length: u8,
     /// Length of the response PDU if the request succeeds.
     pub(super) response_length: u8,
+    /// `None`: neither byte count nor data follow the head.
+    pub(super) send: Option<Send>,
+    /// `None`: the response repeats the head.
+    pub(super) take: Option<Take>,
 }
 
 impl Request {
     /// No request.
-    pub const NONE: Request = Request::new(Kind::Write, 0, 0, 0);
+    pub const NONE: Request = Request {
+        head: [0; HEAD],
+        head_length: 0,
+        length: 0,
+        response_length: 0,
+        send: None,
+        take: None,
+    };
 
-    /// A request that is `function` and two words; the response to a read is
-    /// yet to be told.
-    pub(super) const fn new(kind: Kind, function: u8, first: u16, second: u16) -> Request {
-        let ([a, b], [c, d]) = (first.to_be_bytes(), second.to_be_bytes());
-        Request {
-            head: [function, a, b, c, d, 0, 0, 0, 0],
-            head_length: 5,
-            kind,
-            data_length: 0,
-            last_mask: 0xFF,
-            response_length: 5,
+    /// The request that `build` writes.
+    ///
+    /// # Errors
+    /// The status with which `build` refuses.
+    pub fn build(build: impl FnOnce(&mut Request) -> Status) -> Result<Request, Status> {
+        let mut request = Request::NONE;
+        match build(&mut request) {
+            Status::OK => Ok(request),
+            refused => Err(refused),
         }
+    }
+
+    /// Becomes `function` and two words, which the response repeats.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn set(&mut self, function: u8, first: u16, second: u16) {
+        let ([a, b], [c, d]) = (first.to_be_bytes(), second.to_be_bytes());
+        self.head = [function, a, b, c, d, 0, 0, 0, 0];
+        self.head_length = 5;
+        self.length = 5;
+        self.response_length = 5;
+        self.send = None;
+        self.take = None;
+    }
+
+    /// As [`Request::set`], for a range of addresses; says whether every device
+    /// would accept that.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn set_range(
+        &mut self,
+        function: u8,
+        address: u16,
+        quantity: u16,
+        most: u16,
+    ) -> Status {
+        self.set(function, address, quantity);
+        check_range(address, quantity, most)
+    }
+
+    /// Has `bytes` of the caller's words follow the head.
+    pub(super) fn append(&mut self, bytes: u8, send: Send) {
+        self.length = bytes.wrapping_add(self.head_length + 1);
+        self.send = Some(send);
     }
 
     /// The function code.
@@ -61,10 +89,8 @@ impl Request {
     }
 
     /// The head as sent.
-    pub(super) fn head(&self) -> &[u8] {
-        self.head
-            .get(..usize::from(self.head_length))
-            .unwrap_or_default()
+    fn head(&self) -> impl Iterator<Item = &u8> {
+        self.head.iter().take(usize::from(self.head_length))
     }
 
     /// Length of the response PDU if the request succeeds.
@@ -75,75 +101,74 @@ impl Request {
     /// True if the response carries data behind a byte count, false if it
     /// repeats the request's head.
     pub const fn is_read(&self) -> bool {
-        matches!(self.kind, Kind::ReadRegisters | Kind::ReadBits)
-    }
-
-    /// How data bytes and words correspond for this function.
-    pub const fn order(&self) -> Order {
-        match self.kind {
-            Kind::ReadBits | Kind::WriteBits => Order::LowFirst,
-            Kind::ReadRegisters | Kind::Write => Order::HighFirst,
-        }
-    }
-
-    /// The mask that keeps what was asked for of the last word received.
-    pub const fn last_word_mask(&self) -> u16 {
-        match (self.order(), self.head[4] & 15) {
-            (Order::HighFirst, _) | (_, 0) => 0xFFFF,
-            (Order::LowFirst, used) => (1 << used) - 1,
-        }
+        self.take.is_some()
     }
 
     /// How many of the caller's words are sent.
     pub const fn words(&self) -> u8 {
-        self.data_length.div_ceil(2)
+        (self.length - self.head_length) >> 1
     }
 
     /// Length of the PDU.
-    pub fn length(&self) -> usize {
-        let data = match self.data_length {
-            0 => 0,
-            length => 1 + usize::from(length),
-        };
-        usize::from(self.head_length) + data
+    pub const fn length(&self) -> u8 {
+        self.length
     }
 
     /// Writes the PDU into `pdu`, which has [`Request::length`] bytes. Words
     /// that `source` lacks are zero; the sender checks [`Request::words`].
+    #[cfg_attr(target_os = "none", inline(never))]
     pub fn emit(&self, pdu: &mut [u8], source: &[u16]) {
         let mut bytes = pdu.iter_mut();
-        for (byte, place) in self.head().iter().zip(bytes.by_ref()) {
+        for (byte, place) in self.head().zip(bytes.by_ref()) {
             *place = *byte;
         }
-        let Some(count) = bytes.next() else {
-            return;
-        };
-        *count = self.data_length;
-        let data = bytes.into_slice();
-        words::send(data, source, self.order());
-        if let Some(last) = data.last_mut() {
-            *last &= self.last_mask;
+        if let (Some(send), Some(count)) = (self.send, bytes.next()) {
+            *count = self.length - self.head_length - 1;
+            send(bytes.into_slice(), source, self.head[4]);
         }
+    }
+
+    /// Fills words from the data of a successful response, which start `data`;
+    /// returns false, with nothing filled, if they are too few.
+    pub fn take(&self, words: &mut [u16], data: &[u8]) -> bool {
+        let Some(take) = self.take else {
+            return true;
+        };
+        let Some(words) = words.get_mut(..usize::from(self.response_words())) else {
+            return false;
+        };
+        take(words, data, self.head[4]);
+        true
+    }
+
+    /// How many words the data of a successful response fill.
+    pub const fn response_words(&self) -> u8 {
+        (self.response_length - 1) >> 1
     }
 
     /// True if `pdu`, complete or not, agrees with the head of this request.
     pub fn agrees(&self, pdu: &[u8]) -> bool {
-        self.head()
-            .iter()
-            .zip(pdu)
-            .all(|(ours, theirs)| ours == theirs)
+        self.head().zip(pdu).all(|(ours, theirs)| ours == theirs)
     }
 }
 
 /// Checks a range of addresses as every device would (application protocol,
 /// figures 11 and following: quantity first, then addresses).
-pub(super) fn check_range(address: u16, quantity: u16, most: u16) -> Result<(), Status> {
+pub(super) fn check_range(address: u16, quantity: u16, most: u16) -> Status {
     if quantity == 0 || quantity > most {
-        Err(Status::ILLEGAL_DATA_VALUE)
+        Status::ILLEGAL_DATA_VALUE
     } else if address.checked_add(quantity - 1).is_none() {
-        Err(Status::ILLEGAL_DATA_ADDRESS)
+        Status::ILLEGAL_DATA_ADDRESS
     } else {
-        Ok(())
+        Status::OK
+    }
+}
+
+/// As [`check_range`], for a parser.
+pub(super) fn in_range(address: u16, quantity: u16, most: u16) -> Result<(), Status> {
+    match check_range(address, quantity, most) {
+        Status::OK => Ok(()),
+        refused => Err(refused),
     }
 }
 

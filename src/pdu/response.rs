@@ -4,26 +4,29 @@
 use super::request::Request;
 use super::EXCEPTION;
 use crate::error::Status;
+use core::num::NonZeroU8;
+
+/// Where the data of a read's response start, behind function and byte count.
+pub const DATA: usize = 2;
 
 /// An exception response is a function code and an exception code.
-const EXCEPTION_LENGTH: usize = 2;
+const EXCEPTION_LENGTH: u8 = 2;
 
 /// The length of the response to `request` that begins with the bytes of
 /// `pdu`, or the least length while they do not tell; `None` if no response to
 /// it begins so.
-pub fn expected(request: &Request, pdu: &[u8]) -> Option<usize> {
+pub fn expected(request: &Request, pdu: &[u8]) -> Option<NonZeroU8> {
     let length = request.response_length();
-    match pdu {
-        [] => return Some(EXCEPTION_LENGTH),
-        [function, ..] if *function == request.function() | EXCEPTION => {
-            return Some(EXCEPTION_LENGTH);
-        }
-        [function, ..] if *function != request.function() => return None,
-        [_] if request.is_read() => return Some(EXCEPTION_LENGTH),
-        [_, count, ..] if request.is_read() && *count != length - 2 => return None,
-        _ => {}
-    }
-    Some(usize::from(length))
+    NonZeroU8::new(match pdu {
+        [] => EXCEPTION_LENGTH,
+        [function, rest @ ..] if *function == request.function() => match rest {
+            [] if request.is_read() => EXCEPTION_LENGTH,
+            [count, ..] if request.is_read() && *count != length - 2 => return None,
+            _ => length,
+        },
+        [function, ..] if *function == request.function() | EXCEPTION => EXCEPTION_LENGTH,
+        _ => return None,
+    })
 }
 
 /// What a complete `pdu` that is [`expected`] says to `request`: success, an
@@ -41,16 +44,5 @@ pub fn exception_code(pdu: &[u8]) -> Option<u8> {
     match pdu {
         [function, code, ..] if *function & EXCEPTION != 0 => Some(*code),
         _ => None,
-    }
-}
-
-/// The data bytes of a response that [`judge`] found to be a success, and
-/// that starts `pdu`.
-pub fn data<'a>(request: &Request, pdu: &'a [u8]) -> &'a [u8] {
-    if request.is_read() {
-        let length = usize::from(request.response_length());
-        pdu.get(2..length).unwrap_or_default()
-    } else {
-        &[]
     }
 }

@@ -8,7 +8,11 @@
 //! length to an earlier request, or a late exception to the same function,
 //! looks like the reply. After a request that got no right reply the line is
 //! therefore given a quiet time before the next request.
+//!
+//! A microcontroller's compiler is kept from inlining the steps: each has few
+//! values in use at a time, so they stay in registers, and the code is small.
 
+mod answer;
 mod settings;
 mod storage;
 
@@ -20,7 +24,8 @@ use crate::frame::rtu::{self, Seen, Window};
 use crate::pdu::request::Request;
 use crate::pdu::response;
 use crate::port::Port;
-use crate::time::{elapsed, millis};
+use crate::time::elapsed;
+use answer::Answer;
 
 /// Where a transaction stands.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -47,33 +52,26 @@ enum Phase {
 #[repr(C)]
 pub struct Transaction<P, S> {
     phase: Phase,
-    unit: u8,
     retries: u8,
-    exception: u8,
     /// The phase began with the last poll; its time is that of the next.
     stamp: bool,
     /// The last poll found nothing to do.
     waiting: bool,
-    /// What has arrived was searched behind its first candidate.
-    skimmed: bool,
     /// The last request went without a right reply, which may still come.
     late: bool,
-    /// The request itself is expected to come back before the reply.
-    echo: bool,
-    request: Request,
+    /// Over what is to be sent, then over what arrives.
     window: Window,
-    /// Bytes of the request that are sent, then where the reply's PDU starts.
-    at: u16,
     /// When the phase began.
     since: u32,
     /// When the line was last seen busy.
     last_byte: u32,
     /// The time that the poll under way was told.
     now: u32,
-    /// The byte stream.
-    pub port: P,
     /// What the caller lends.
     pub storage: S,
+    /// The byte stream.
+    pub port: P,
+    wanted: Answer,
     /// How transactions behave.
     pub settings: Settings,
 }
@@ -89,17 +87,12 @@ impl<P, S> Transaction<P, S> {
             last_byte: 0,
             now: 0,
             phase: Phase::Idle,
-            unit: 0,
             retries: 0,
-            exception: 0,
-            at: 0,
             stamp: false,
             waiting: false,
-            skimmed: false,
             late: false,
-            echo: false,
             window: Window::EMPTY,
-            request: Request::NONE,
+            wanted: Answer::NONE,
             settings: Settings::DEFAULT,
             storage,
             port,
@@ -119,49 +112,58 @@ impl<P, S> Transaction<P, S> {
 
     /// The raw exception code of the last reply; 0 if it was none.
     pub const fn exception_code(&self) -> u8 {
-        self.exception
+        self.wanted.exception
+    }
+
+    /// The request, which [`Transaction::start`] sends.
+    pub fn request(&mut self) -> &mut Request {
+        &mut self.wanted.request
     }
 
     /// Forgets the outcome of the last transaction.
     pub fn forget(&mut self) {
-        self.exception = 0;
-    }
-
-    /// The request that was started last.
-    pub const fn request(&self) -> &Request {
-        &self.request
+        self.wanted.exception = 0;
     }
 
     /// True once the phase has lasted `time`.
+    #[inline(always)]
     fn lasts(&self, time: u32) -> bool {
-        elapsed(self.now, self.since) >= time
+        self.has_passed(time, false)
     }
 
-    /// True once the phase has lasted as long as the response timeout and
-    /// `more` microseconds.
-    fn is_over(&self, more: u32) -> bool {
-        self.lasts(millis(self.settings.response_timeout).saturating_add(more))
+    /// True once the line has been silent for `time`.
+    #[inline(always)]
+    fn is_silent(&self, time: u32) -> bool {
+        self.has_passed(time, true)
+    }
+
+    /// True once `time` has passed since the phase began, or since the line was
+    /// last busy. (One function: 32 bits are much work for an AVR.)
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn has_passed(&self, time: u32, since_last_byte: bool) -> bool {
+        let since = if since_last_byte {
+            self.last_byte
+        } else {
+            self.since
+        };
+        elapsed(self.now, since) >= time
     }
 
     /// A line that is not silent, or a port that does not move, is not waited
     /// for longer than a reply and the `time` that it may take.
+    #[cfg_attr(target_os = "none", inline(never))]
     fn stalled(&self, time: u32) -> Status {
-        if self.is_over(time) {
+        if self.lasts(self.settings.response_timeout.wrapping_add(time)) {
             Status::LINE_BUSY
         } else {
             Status::PENDING
         }
     }
 
-    /// How long the request is on the wire.
-    fn send_time(&self) -> u32 {
-        u32::from(self.settings.character) * (self.request.length() + rtu::OVERHEAD) as u32
-    }
-
-    fn listen_from(&mut self, now: u32) {
-        self.phase = Phase::Gap;
-        self.since = now;
-        self.stamp = false;
+    /// Waits for silence, then sends; from the next poll on.
+    fn listen_anew(&mut self) {
+        self.window.clear();
+        self.enter(Phase::Gap);
     }
 
     /// Enters a phase whose time counts from the next poll on.
@@ -182,33 +184,27 @@ impl<P: Port, S: Storage> Transaction<P, S> {
         self.last_byte = self.port.micros();
     }
 
-    /// The data bytes of the reply that ended the last transaction, and the
-    /// words to fill from them.
-    pub fn data_and_words(&mut self) -> (&[u8], &mut [u16]) {
+    /// Fills the response words from the reply that ended the last transaction;
+    /// false, with nothing filled, if they are too few.
+    pub fn take_words(&mut self) -> bool {
         let (frame, words) = self.storage.frame_and_response();
-        let pdu = frame.get(usize::from(self.at)..).unwrap_or_default();
-        (response::data(&self.request, pdu), words)
+        match self.window.behind(frame, rtu::PDU + response::DATA) {
+            Some(data) => self.wanted.request.take(words, data),
+            None => false,
+        }
     }
 
-    /// Starts `request` to `unit`; `poll` does the rest.
-    ///
-    /// # Errors
-    /// [`Status::BUSY`] if one is under way, [`Status::BROADCAST_NOT_ALLOWED`]
-    /// for a read from unit 0. Nothing is sent then.
-    pub fn start(&mut self, unit: u8, request: Request) -> Result<(), Status> {
-        if self.is_pending() {
-            return Err(Status::BUSY);
+    /// Starts the request to `unit`; `poll` does the rest.
+    /// [`Status::BROADCAST_NOT_ALLOWED`], and nothing is sent, for a read from
+    /// unit 0.
+    pub fn start(&mut self, unit: u8) -> Status {
+        if unit == BROADCAST && self.wanted.request.is_read() {
+            return Status::BROADCAST_NOT_ALLOWED;
         }
-        if unit == BROADCAST && request.is_read() {
-            return Err(Status::BROADCAST_NOT_ALLOWED);
-        }
-        self.request = request;
-        self.unit = unit;
+        self.wanted.unit = unit;
         self.retries = self.settings.retries;
-        self.forget();
-        let now = self.port.micros();
-        self.listen_from(now);
-        Ok(())
+        self.listen_anew();
+        Status::PENDING
     }
 
     /// Gives the request up, with the driver off. Bytes of it may be on the
@@ -237,11 +233,13 @@ impl<P: Port, S: Storage> Transaction<P, S> {
             Phase::Idle => return u32::MAX,
             Phase::Send | Phase::Flush | Phase::Hold => return 0,
             Phase::Gap => (self.silence_to_keep(), self.last_byte),
-            Phase::Turnaround => (millis(self.settings.turnaround_delay), self.since),
-            Phase::Reply if self.skimmed => (millis(self.settings.response_timeout), self.since),
+            Phase::Turnaround => (self.settings.turnaround_delay, self.since),
+            Phase::Reply if self.window.is_skimmed() => {
+                (self.settings.response_timeout, self.since)
+            }
             Phase::Reply => (self.settings.silence, self.last_byte),
         };
-        if self.stamp {
+        if self.stamp && self.phase != Phase::Gap {
             time
         } else {
             time.saturating_sub(elapsed(now, since))
@@ -249,9 +247,10 @@ impl<P: Port, S: Storage> Transaction<P, S> {
     }
 
     /// The silence that the next request waits for.
+    #[cfg_attr(target_os = "none", inline(never))]
     fn silence_to_keep(&self) -> u32 {
         if self.late {
-            self.settings.gap.max(millis(self.settings.quiet_time))
+            self.settings.gap.max(self.settings.quiet_time)
         } else {
             self.settings.gap
         }
@@ -265,7 +264,10 @@ impl<P: Port, S: Storage> Transaction<P, S> {
         if self.stamp {
             self.stamp = false;
             self.since = now;
-            self.last_byte = now;
+            // Behind a request of ours; of what was before it, that is known.
+            if self.phase != Phase::Gap {
+                self.last_byte = now;
+            }
         }
         let status = match self.phase {
             Phase::Idle => return Status::OK,
@@ -276,35 +278,49 @@ impl<P: Port, S: Storage> Transaction<P, S> {
             Phase::Reply => self.receive(),
             Phase::Turnaround => self.turn_around(),
         };
-        match status {
-            Status::PENDING => {}
-            // The line may come back, and with it what was on its way.
-            Status::LINK_LOST | Status::LINE_BUSY => self.cancel(),
-            _ => self.end(),
+        if status.is_failure() {
+            // What was on its way may still come.
+            self.cancel();
+        } else if status != Status::PENDING {
+            self.end();
         }
         status
     }
 
+    /// Receives into the window's room: how many bytes, negative if the link
+    /// is lost.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn hear(&mut self) -> i16 {
+        let Some(room) = self.window.room(self.storage.frame()) else {
+            return 0;
+        };
+        let heard = self.port.read(room);
+        if heard > 0 {
+            self.storage.count(Counter::BytesReceived, heard as u16);
+            self.last_byte = self.now;
+        }
+        heard
+    }
+
     /// Listens until the line has been silent, then sends. What arrives here
     /// belongs to no request of ours.
+    #[cfg_attr(target_os = "none", inline(never))]
     fn listen(&mut self) -> Status {
-        match self.port.read(self.storage.frame()) {
-            Err(status) => return status,
-            Ok(0) => {}
-            Ok(count) => {
-                self.storage.count(Counter::BytesReceived, count);
-                self.last_byte = self.now;
-                return self.stalled(self.silence_to_keep());
-            }
+        let heard = self.hear();
+        if heard < 0 {
+            return Status::LINK_LOST;
         }
-        if elapsed(self.now, self.last_byte) < self.silence_to_keep() {
+        let silence = self.silence_to_keep();
+        if heard > 0 {
+            return self.stalled(silence);
+        }
+        if !self.is_silent(silence) {
             return self.wait();
         }
         if !self.write_frame() {
             return Status::BUFFER_TOO_SMALL;
         }
         self.storage.count(Counter::Requests, 1);
-        self.at = 0;
         self.late = false;
         self.phase = Phase::Send;
         self.since = self.now;
@@ -313,40 +329,47 @@ impl<P: Port, S: Storage> Transaction<P, S> {
     }
 
     /// Writes the request into the frame buffer, if that holds it.
+    #[cfg_attr(target_os = "none", inline(never))]
     fn write_frame(&mut self) -> bool {
-        let request = &self.request;
+        let request = &self.wanted.request;
+        let length = usize::from(request.length());
         let (frame, words) = self.storage.frame_and_transmit();
-        rtu::write(frame, self.unit, request.length(), |pdu| {
+        self.window.arrived((length + rtu::OVERHEAD) as u16);
+        rtu::write(frame, self.wanted.unit, length, |pdu| {
             request.emit(pdu, words);
         })
     }
 
+    #[cfg_attr(target_os = "none", inline(never))]
     fn send(&mut self) -> Status {
-        let rest = usize::from(self.at)..self.request.length() + rtu::OVERHEAD;
-        let rest = self.storage.frame().get(rest).unwrap_or_default();
+        let Some(rest) = self.window.bytes(self.storage.frame()) else {
+            return Status::BUFFER_TOO_SMALL;
+        };
         let left = rest.len();
-        match self.port.write(rest) {
-            Err(status) => status,
-            Ok(count) => {
-                self.storage.count(Counter::BytesSent, count);
-                self.at += count as u16;
-                if count > 0 {
-                    self.since = self.now;
-                }
-                if count < left {
-                    return self.stalled(0);
-                }
-                self.phase = Phase::Flush;
-                self.flush()
-            }
+        let sent = self.port.write(rest);
+        if sent < 0 {
+            return Status::LINK_LOST;
         }
+        let sent = sent as u16;
+        self.storage.count(Counter::BytesSent, sent);
+        self.window.advance(sent);
+        if sent > 0 {
+            self.since = self.now;
+        }
+        if usize::from(sent) < left {
+            return self.stalled(0);
+        }
+        self.phase = Phase::Flush;
+        self.flush()
     }
 
+    #[cfg_attr(target_os = "none", inline(never))]
     fn flush(&mut self) -> Status {
         if !self.port.flush() {
-            return self.stalled(self.send_time());
+            // No request takes longer than a frame of 256 characters.
+            return self.stalled(self.settings.character << 8);
         }
-        if self.settings.post_flush_hold > 0 {
+        if cfg!(feature = "hold") && self.settings.post_flush_hold > 0 {
             self.enter(Phase::Hold);
         } else {
             self.release();
@@ -355,22 +378,21 @@ impl<P: Port, S: Storage> Transaction<P, S> {
     }
 
     fn hold(&mut self) -> Status {
-        let character = u32::from(self.settings.character);
-        if self.lasts(character * u32::from(self.settings.post_flush_hold)) {
+        let hold = self.settings.character * u32::from(self.settings.post_flush_hold);
+        if cfg!(feature = "hold") && self.lasts(hold) {
             self.release();
         }
         Status::PENDING
     }
 
     /// The request is on the wire: the driver goes off, the wait begins.
+    #[cfg_attr(target_os = "none", inline(never))]
     fn release(&mut self) {
+        self.window.clear();
         self.port.post_transmission();
-        self.window = Window::EMPTY;
-        self.echo = self.settings.echo_discard;
+        self.wanted.echo = self.settings.echo_discard;
         self.waiting = true;
-        // Nothing has arrived yet.
-        self.skimmed = true;
-        self.enter(if self.unit == BROADCAST {
+        self.enter(if self.wanted.unit == BROADCAST {
             Phase::Turnaround
         } else {
             Phase::Reply
@@ -378,88 +400,51 @@ impl<P: Port, S: Storage> Transaction<P, S> {
     }
 
     fn turn_around(&mut self) -> Status {
-        if self.lasts(millis(self.settings.turnaround_delay)) {
+        if self.lasts(self.settings.turnaround_delay) {
             return Status::OK;
         }
         self.wait()
     }
 
+    #[cfg_attr(target_os = "none", inline(never))]
     fn receive(&mut self) -> Status {
-        let over = self.is_over(0);
+        let over = self.stalled(0) != Status::PENDING;
         // As the deadline passes, all that has arrived is looked at, even if
         // the port hands it over byte by byte.
-        for _ in 0..if over { rtu::MAX_FRAME } else { 1 } {
-            match self.port.read(self.window.room(self.storage.frame())) {
-                Err(status) => return status,
-                Ok(0) => {
-                    self.waiting = true;
-                    break;
-                }
-                Ok(count) => {
-                    self.storage.count(Counter::BytesReceived, count);
-                    self.last_byte = self.now;
-                    self.skimmed = false;
-                    self.window.arrived(count);
-                    let found = self.search(false);
-                    if found != Status::PENDING {
-                        return found;
-                    }
-                }
-            }
-        }
-        if !over && elapsed(self.now, self.last_byte) < self.settings.silence {
-            return Status::PENDING;
-        }
-        // A candidate that does not get complete may be noise that looks like
-        // the reply, so look behind it; the rest of it may still come.
-        if !self.skimmed {
-            self.skimmed = true;
-            let found = self.search(true);
-            if found != Status::PENDING {
-                return found;
-            }
-        }
-        if over || self.window.seen() >= Seen::BadCrc {
-            self.fail()
-        } else {
-            Status::PENDING
-        }
-    }
-
-    /// Looks for the reply in what has arrived.
-    fn search(&mut self, skim: bool) -> Status {
+        let mut reads = if over { u8::MAX } else { 1 };
         loop {
-            let (request, echo) = (&self.request, self.echo);
-            let frame = self.storage.frame();
-            let found = self.window.search(frame, self.unit, skim, |pdu| {
-                if echo && request.agrees(pdu) {
-                    Some(request.length())
-                } else {
-                    response::expected(request, pdu)
+            let heard = if reads > 0 { self.hear() } else { 0 };
+            if heard < 0 {
+                return Status::LINK_LOST;
+            }
+            if heard > 0 {
+                reads -= 1;
+                self.window.arrived(heard as u16);
+            } else {
+                self.waiting = reads > 0;
+                if !over && !self.is_silent(self.settings.silence) {
+                    return Status::PENDING;
                 }
-            });
-            let Some(range) = found else {
-                return Status::PENDING;
-            };
-            let pdu = frame.get(range.clone()).unwrap_or_default();
-            if echo && pdu.len() == request.length() && request.agrees(pdu) {
-                self.echo = false;
-                self.window.drop_echo(frame, range);
-                continue;
+                if self.window.is_skimmed() {
+                    // Without diagnosis it is not known whether it was a reply.
+                    let damaged = self.window.seen() >= Seen::BAD_CRC;
+                    return if over || (cfg!(feature = "diagnosis") && damaged) {
+                        self.fail()
+                    } else {
+                        Status::PENDING
+                    };
+                }
+                self.window.skim();
             }
-            let status = response::judge(request, pdu);
-            self.exception = response::exception_code(pdu).unwrap_or(0);
-            if status == Status::MALFORMED_REPLY {
-                self.window.refuse(frame, range);
-                continue;
+            if self.window.search(self.storage.frame(), &mut self.wanted) {
+                return self.found();
             }
-            self.at = range.start as u16;
-            self.count_reply(status);
-            return status;
         }
     }
 
-    fn count_reply(&mut self, status: Status) {
+    /// The reply is there: counts it and returns what it says.
+    fn found(&mut self) -> Status {
+        let status = Status::from_code(self.wanted.exception);
         self.storage.count(Counter::Replies, 1);
         if status != Status::OK {
             self.storage.count(Counter::Exceptions, 1);
@@ -468,38 +453,36 @@ impl<P: Port, S: Storage> Transaction<P, S> {
             self.storage.count(Counter::Resynchronisations, 1);
         }
         self.count_foreign();
+        status
     }
 
     fn count_foreign(&mut self) {
-        let frames = usize::from(self.window.foreign_frames());
+        let frames = u16::from(self.window.foreign_frames());
         self.storage.count(Counter::ForeignFrames, frames);
     }
 
     /// No reply came: asks again, or says why with the most telling status.
+    #[cfg_attr(target_os = "none", inline(never))]
     fn fail(&mut self) -> Status {
         self.count_foreign();
-        // What was taken for a damaged reply may have been noise.
-        self.late = true;
-        self.last_byte = self.now;
-        let status = match self.window.seen() {
-            Seen::Nothing => Status::RESPONSE_TIMED_OUT,
-            Seen::OtherUnit => Status::INVALID_SLAVE_ID,
-            Seen::OtherFunction => Status::INVALID_FUNCTION,
-            Seen::Malformed => Status::MALFORMED_REPLY,
-            Seen::BadCrc => Status::INVALID_CRC,
-            Seen::TooLong => return Status::BUFFER_TOO_SMALL,
-        };
+        let status = self.window.seen().status();
+        if status == Status::BUFFER_TOO_SMALL {
+            return status;
+        }
         let counter = if status == Status::INVALID_CRC {
             Counter::BadCrc
         } else {
             Counter::Timeouts
         };
         self.storage.count(counter, 1);
-        if self.retries == 0 {
+        if !cfg!(feature = "retries") || self.retries == 0 {
             return status;
         }
         self.retries -= 1;
-        self.listen_from(self.now);
+        // What was taken for a damaged reply may have been noise.
+        self.late = true;
+        self.last_byte = self.now;
+        self.listen_anew();
         Status::PENDING
     }
 }

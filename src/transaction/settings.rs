@@ -1,23 +1,24 @@
 //! How transactions behave.
 
-use crate::time;
+use crate::time::{self, millis};
 
-/// How a transaction behaves; kept from one to the next.
-#[derive(Clone, Copy, Debug)]
+/// How a transaction behaves; kept from one to the next. Times are in
+/// microseconds.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(C)]
 pub struct Settings {
-    /// Silence before a request, in microseconds.
+    /// Silence before a request.
     pub gap: u32,
-    /// The silence t3.5 that ends a frame, in microseconds.
+    /// The silence t3.5 that ends a frame.
     pub silence: u32,
-    /// One character, in microseconds.
-    pub character: u16,
-    /// From the end of the request to the end of the reply, in milliseconds.
-    pub response_timeout: u16,
-    /// What slaves are given to carry out a broadcast, in milliseconds.
-    pub turnaround_delay: u16,
-    /// What a late reply is given after a request that got none, in
-    /// milliseconds.
-    pub quiet_time: u16,
+    /// From the end of the request to the end of the reply.
+    pub response_timeout: u32,
+    /// What slaves are given to carry out a broadcast.
+    pub turnaround_delay: u32,
+    /// What a late reply is given after a request that got none.
+    pub quiet_time: u32,
+    /// One character.
+    pub character: u32,
     /// How often a request is repeated that was not answered.
     pub retries: u8,
     /// How long the driver is held on after the flush, in characters.
@@ -31,12 +32,46 @@ impl Settings {
     pub const DEFAULT: Settings = Settings {
         gap: time::DEFAULT_SILENCE,
         silence: time::DEFAULT_SILENCE,
-        character: time::DEFAULT_CHARACTER,
-        response_timeout: 2000,
-        turnaround_delay: 100,
-        quiet_time: 100,
+        response_timeout: millis(2000),
+        turnaround_delay: millis(100),
+        quiet_time: millis(100),
+        character: time::DEFAULT_CHARACTER as u32,
         retries: 0,
         post_flush_hold: 0,
         echo_discard: false,
     };
+
+    /// Turns zeroed settings into the default. (Assigned as a whole, that would
+    /// be copied from a constant, which takes flash, and RAM on an AVR.)
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub fn preset(&mut self) {
+        self.gap = Settings::DEFAULT.gap;
+        self.silence = Settings::DEFAULT.silence;
+        self.response_timeout = Settings::DEFAULT.response_timeout;
+        self.turnaround_delay = Settings::DEFAULT.turnaround_delay;
+        self.quiet_time = Settings::DEFAULT.quiet_time;
+        self.character = Settings::DEFAULT.character;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zeroed_settings_become_the_default() {
+        let mut settings = Settings {
+            gap: 0,
+            silence: 0,
+            response_timeout: 0,
+            turnaround_delay: 0,
+            quiet_time: 0,
+            character: 0,
+            retries: 0,
+            post_flush_hold: 0,
+            echo_discard: false,
+        };
+        settings.preset();
+        assert_eq!(settings, Settings::DEFAULT);
+    }
 }

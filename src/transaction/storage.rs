@@ -45,5 +45,5 @@ pub trait Storage {
     fn frame_and_response(&mut self) -> (&[u8], &mut [u16]);
 
     /// Adds to a counter, if there is storage for counters.
-    fn count(&mut self, _counter: Counter, _more: usize) {}
+    fn count(&mut self, _counter: Counter, _more: u16) {}
 }

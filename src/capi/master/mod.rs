@@ -8,15 +8,16 @@ pub use requests::*;
 pub use settings::*;
 pub use words::*;
 
+use super::limits::MBM_MAX_FRAME;
 use super::pointers;
 use super::port::mbm_port;
 use super::storage::LentByC;
 use crate::error::Status;
-use crate::master::Master;
+use crate::master::{Build, Master};
 use core::ffi::c_void;
 
 /// Marks an object that was begun; zeroed storage does not carry it.
-const BEGUN: u16 = 0x4D42;
+const BEGUN: u8 = 0x4D;
 
 /// A Modbus RTU master: one line, one request at a time.
 ///
@@ -28,17 +29,20 @@ const BEGUN: u16 = 0x4D42;
 #[repr(C)]
 pub struct mbm_master {
     /// Not for you.
-    pointers: [*mut c_void; 14],
+    pointers: [*mut c_void; 21],
     /// Not for you.
-    words: [u32; 21],
+    words: [u32; 18],
 }
 
 /// What lies behind an `mbm_master`.
+#[repr(C)]
 pub(super) struct Object {
-    core: Master<mbm_port, LentByC>,
-    mark: u16,
-    blocking: bool,
+    mark: u8,
+    non_blocking: bool,
+    core: Core,
 }
+
+type Core = Master<mbm_port, LentByC>;
 
 const _: () = {
     let room = size_of::<mbm_master>();
@@ -58,39 +62,12 @@ impl Object {
         // SAFETY: the storage is zeroed or written, so readable.
         unsafe { (&raw const (*object).mark).read() == BEGUN }
     }
-}
 
-/// A port without hooks, until begin gives one.
-const NO_PORT: mbm_port = mbm_port {
-    context: core::ptr::null_mut(),
-    read: None,
-    write: None,
-    micros: None,
-    flush: None,
-    preTransmission: None,
-    postTransmission: None,
-    idle: None,
-};
-
-/// The object behind `pointer`, with defaults and without port and buffers if
-/// nobody has touched it yet.
-///
-/// # Safety
-/// As for [`pointers::master`].
-unsafe fn master_or_new<'a>(pointer: *mut mbm_master) -> Result<&'a mut Object, Status> {
-    // SAFETY: as the caller promises; the storage is valid for a write.
-    unsafe {
-        match pointers::master(pointer) {
-            Err(Status::NOT_INITIALISED) => {
-                pointer.cast::<Object>().write(Object {
-                    core: Master::new(1, NO_PORT, LentByC::NONE),
-                    mark: BEGUN,
-                    blocking: true,
-                });
-                pointers::master(pointer)
-            }
-            other => other,
-        }
+    /// Turns a zeroed object into one that is begun, without port and buffers.
+    pub(super) fn preset(&mut self) {
+        self.core.preset();
+        self.core.storage().preset();
+        self.mark = BEGUN;
     }
 }
 
@@ -116,17 +93,16 @@ pub unsafe extern "C" fn mbm_master_begin(
         return Status::INVALID_ARGUMENT.code();
     }
     // SAFETY: not NULL, so a port.
-    let port = unsafe { *port };
+    let port = unsafe { &*port };
     if !port.is_complete() {
         return Status::INVALID_ARGUMENT.code();
     }
     // SAFETY: as the header demands.
-    match unsafe { master_or_new(master) } {
-        Ok(master) => {
+    unsafe {
+        pointers::with_new(master, |master| {
             master.core.begin(slave, port);
-            Status::OK.code()
-        }
-        Err(status) => status.code(),
+            Status::OK
+        })
     }
 }
 
@@ -157,29 +133,32 @@ pub unsafe extern "C" fn mbm_master_setBuffers(
 ) -> u8 {
     let useless = (response.is_null() && responseWords > 0)
         || (transmit.is_null() && transmitWords > 0)
-        || responseWords.max(transmitWords) > 255
+        || (responseWords | transmitWords) > 255
         || frame.is_null()
         || frameBytes < 8;
     if useless {
         return Status::INVALID_ARGUMENT.code();
     }
     // SAFETY: as the header demands.
-    match unsafe { master_or_new(master) } {
-        Ok(master) if master.core.is_pending() => Status::BUSY.code(),
-        Ok(master) => {
+    unsafe {
+        pointers::with_new(master, |master| {
+            if master.core.is_pending() {
+                return Status::BUSY;
+            }
             let storage = master.core.storage();
-            *storage = LentByC {
-                response,
-                transmit,
-                frame,
-                response_words: responseWords,
-                transmit_words: transmitWords,
-                frame_bytes: frameBytes,
-                ..*storage
-            };
-            Status::OK.code()
-        }
-        Err(status) => status.code(),
+            // No words start where words were before, but not at NULL.
+            if !response.is_null() {
+                storage.response = response;
+            }
+            if !transmit.is_null() {
+                storage.transmit = transmit;
+            }
+            storage.frame = frame;
+            storage.response_words = responseWords as u8;
+            storage.transmit_words = transmitWords as u8;
+            storage.frame_bytes = frameBytes.min(MBM_MAX_FRAME).into();
+            Status::OK
+        })
     }
 }
 
@@ -245,53 +224,51 @@ pub unsafe extern "C" fn mbm_master_getExceptionCode(master: *const mbm_master) 
     unsafe { pointers::ask(master, 0, |master| master.core.exception_code()) }
 }
 
+/// Requests what `build` builds of an address and a word and, in blocking mode,
+/// sees it through.
+///
+/// # Safety
+/// As for [`pointers::with`].
+unsafe fn call(pointer: *mut mbm_master, address: u16, word: u16, build: Build) -> u8 {
+    // SAFETY: as the caller promises.
+    unsafe { request(pointer, |master| master.request(address, word, build)) }
+}
+
 /// Starts a request and, in blocking mode, sees it through.
 ///
 /// # Safety
-/// As for [`pointers::master`].
-unsafe fn request(
-    pointer: *mut mbm_master,
-    start: impl FnOnce(&mut Master<mbm_port, LentByC>) -> Status,
-) -> u8 {
-    let mut blocking = false;
+/// As for [`pointers::with`].
+unsafe fn request(pointer: *mut mbm_master, start: impl FnOnce(&mut Core) -> Status) -> u8 {
     // SAFETY: as the caller promises.
-    let mut status = unsafe {
-        pointers::with(pointer, |master| {
-            if master.core.storage().frame.is_null() || !master.core.port().is_complete() {
-                return master.core.refuse(Status::NOT_INITIALISED);
-            }
-            blocking = master.blocking;
-            start(&mut master.core)
-        })
-    };
-    while blocking && status == Status::PENDING.code() {
-        // SAFETY: as the caller promises.
-        status = unsafe { wait(pointer) };
+    unsafe {
+        let status = pointers::with(pointer, |master| start(&mut master.core));
+        finish(pointer, status)
     }
-    status
 }
 
-/// Polls once; calls the idle hook if there was nothing to do.
+/// In blocking mode, polls a request until it has ended; calls the idle hook
+/// where there is nothing to do.
 ///
 /// # Safety
-/// As for [`pointers::master`].
-unsafe fn wait(pointer: *mut mbm_master) -> u8 {
-    let mut idle = None;
-    // SAFETY: as the caller promises. The reference ends before the hook is
-    // called, for the hook may use the object.
-    let status = unsafe {
-        pointers::with(pointer, |master| {
-            let status = master.core.poll();
-            if master.core.is_waiting() {
-                let port = master.core.port();
-                idle = port.idle.map(|hook| (hook, port.context));
+/// As for [`pointers::with`]; the status is what that master said last.
+unsafe fn finish(pointer: *mut mbm_master, mut status: u8) -> u8 {
+    if status != Status::PENDING.code() {
+        return status;
+    }
+    // SAFETY: pending, so begun. No reference lives while the hook is called,
+    // for the hook may use the object.
+    unsafe {
+        let blocking = !pointers::object(pointer).non_blocking;
+        while blocking && status == Status::PENDING.code() {
+            let core = &mut pointers::object(pointer).core;
+            status = core.poll().code();
+            if core.is_waiting() {
+                let port = core.port();
+                if let Some(idle) = port.idle {
+                    idle(port.context);
+                }
             }
-            status
-        })
-    };
-    if let Some((hook, context)) = idle {
-        // SAFETY: a C function that keeps the contract of its comment.
-        unsafe { hook(context) }
+        }
     }
     status
 }

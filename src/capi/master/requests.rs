@@ -1,6 +1,7 @@
 //! The ten functions, and their forms without arguments.
 
-use super::{mbm_master, request};
+use super::{call, mbm_master, request};
+use crate::pdu::{bits, registers};
 
 /// Function 01: reads coils into the response words, 16 to a word, lowest bit
 /// first, the last word padded with zeros (V1.1b3, 6.1).
@@ -29,7 +30,7 @@ pub unsafe extern "C" fn mbm_master_readCoils(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { request(master, |master| master.read_coils(address, quantity)) }
+    unsafe { call(master, address, quantity, bits::read_coils) }
 }
 
 /// Function 02: reads discrete inputs into the response words, 16 to a word,
@@ -46,11 +47,7 @@ pub unsafe extern "C" fn mbm_master_readDiscreteInputs(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe {
-        request(master, |master| {
-            master.read_discrete_inputs(address, quantity)
-        })
-    }
+    unsafe { call(master, address, quantity, bits::read_discrete_inputs) }
 }
 
 /// Function 03: reads holding registers into the response words (V1.1b3, 6.3).
@@ -66,11 +63,7 @@ pub unsafe extern "C" fn mbm_master_readHoldingRegisters(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe {
-        request(master, |master| {
-            master.read_holding_registers(address, quantity)
-        })
-    }
+    unsafe { call(master, address, quantity, registers::read_holding) }
 }
 
 /// Function 04: reads input registers into the response words (V1.1b3, 6.4).
@@ -86,11 +79,7 @@ pub unsafe extern "C" fn mbm_master_readInputRegisters(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe {
-        request(master, |master| {
-            master.read_input_registers(address, quantity)
-        })
-    }
+    unsafe { call(master, address, quantity, registers::read_input) }
 }
 
 /// Function 05: switches one coil (V1.1b3, 6.5). Unit 0 broadcasts.
@@ -106,11 +95,7 @@ pub unsafe extern "C" fn mbm_master_writeSingleCoil(
     state: u8,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe {
-        request(master, |master| {
-            master.write_single_coil(address, state != 0)
-        })
-    }
+    unsafe { call(master, address, state.into(), bits::write_single) }
 }
 
 /// Function 06: writes one register (V1.1b3, 6.6). Unit 0 broadcasts.
@@ -147,11 +132,7 @@ pub unsafe extern "C" fn mbm_master_writeMultipleCoils(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe {
-        request(master, |master| {
-            master.write_multiple_coils(address, quantity)
-        })
-    }
+    unsafe { call(master, address, quantity, bits::write_multiple) }
 }
 
 /// Function 0F: writes the queued bits to the last write address
@@ -179,11 +160,7 @@ pub unsafe extern "C" fn mbm_master_writeMultipleRegisters(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe {
-        request(master, |master| {
-            master.write_multiple_registers(address, quantity)
-        })
-    }
+    unsafe { call(master, address, quantity, registers::write_multiple) }
 }
 
 /// Function 10: writes the queued complete words to the last write address

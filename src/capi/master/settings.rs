@@ -4,6 +4,16 @@ use super::mbm_master;
 use crate::capi::pointers::{ask, with};
 use crate::capi::storage::mbm_counters;
 use crate::error::Status;
+use crate::time::millis;
+
+/// What a setting is answered with that an archive may lack.
+fn built_in(has: bool) -> Status {
+    if has {
+        Status::OK
+    } else {
+        Status::INVALID_ARGUMENT
+    }
+}
 
 /// Sets the unit that later requests go to.
 ///
@@ -46,7 +56,7 @@ pub unsafe extern "C" fn mbm_master_setResponseTimeout(
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            master.core.settings().response_timeout = milliseconds;
+            master.core.settings().response_timeout = millis(milliseconds);
             Status::OK
         })
     }
@@ -102,7 +112,7 @@ pub unsafe extern "C" fn mbm_master_setTurnaroundDelay(
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            master.core.settings().turnaround_delay = milliseconds;
+            master.core.settings().turnaround_delay = millis(milliseconds);
             Status::OK
         })
     }
@@ -125,7 +135,7 @@ pub unsafe extern "C" fn mbm_master_setQuietTime(master: *mut mbm_master, millis
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            master.core.settings().quiet_time = milliseconds;
+            master.core.settings().quiet_time = millis(milliseconds);
             Status::OK
         })
     }
@@ -143,7 +153,7 @@ pub unsafe extern "C" fn mbm_master_setRetries(master: *mut mbm_master, retries:
     unsafe {
         with(master, |master| {
             master.core.settings().retries = retries;
-            Status::OK
+            built_in(cfg!(feature = "retries") || retries == 0)
         })
     }
 }
@@ -160,7 +170,7 @@ pub unsafe extern "C" fn mbm_master_setEchoDiscard(master: *mut mbm_master, on: 
     unsafe {
         with(master, |master| {
             master.core.settings().echo_discard = on != 0;
-            Status::OK
+            built_in(cfg!(feature = "echo") || on == 0)
         })
     }
 }
@@ -181,7 +191,7 @@ pub unsafe extern "C" fn mbm_master_setPostFlushHold(
     unsafe {
         with(master, |master| {
             master.core.settings().post_flush_hold = characters;
-            Status::OK
+            built_in(cfg!(feature = "hold") || characters == 0)
         })
     }
 }
@@ -197,7 +207,7 @@ pub unsafe extern "C" fn mbm_master_setBlocking(master: *mut mbm_master, on: u8)
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            master.blocking = on != 0;
+            master.non_blocking = on == 0;
             Status::OK
         })
     }
@@ -218,7 +228,7 @@ pub unsafe extern "C" fn mbm_master_setCounters(
     unsafe {
         with(master, |master| {
             master.core.storage().counters = counters;
-            Status::OK
+            built_in(cfg!(feature = "counters") || counters.is_null())
         })
     }
 }

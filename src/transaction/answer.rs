@@ -1,0 +1,73 @@
+//! What a transaction waits for: the answer of a unit to its request.
+
+use crate::error::Status;
+use crate::frame::rtu::{self, Verdict, Wanted};
+use crate::pdu::request::Request;
+use crate::pdu::response;
+use core::num::NonZeroU8;
+
+/// What answers a request.
+#[repr(C)]
+pub(super) struct Answer {
+    pub(super) unit: u8,
+    /// The request itself is expected to come back first.
+    pub(super) echo: bool,
+    /// The exception code of the last response; 0 if it was none.
+    pub(super) exception: u8,
+    pub(super) request: Request,
+}
+
+impl Answer {
+    /// Nothing is waited for.
+    pub(super) const NONE: Answer = Answer {
+        unit: 0,
+        echo: false,
+        exception: 0,
+        request: Request::NONE,
+    };
+
+    /// True if `pdu`, complete or not, is the request itself.
+    fn is_echo(&self, pdu: &[u8]) -> bool {
+        cfg!(feature = "echo") && self.echo && self.request.agrees(pdu)
+    }
+}
+
+impl Wanted for Answer {
+    fn unit(&self) -> u8 {
+        self.unit
+    }
+
+    fn function(&self) -> u8 {
+        self.request.function()
+    }
+
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn length(&self, frame: &[u8]) -> Option<NonZeroU8> {
+        match frame {
+            [unit, pdu @ ..] if *unit == self.unit => {
+                if self.is_echo(pdu) {
+                    NonZeroU8::new(self.request.length())
+                } else {
+                    response::expected(&self.request, pdu)
+                }
+            }
+            _ => None,
+        }
+    }
+
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn judge(&mut self, frame: &[u8]) -> Verdict {
+        // What looks at the PDU knows its length, so the CRC may stand behind.
+        let pdu = frame.get(rtu::PDU..).unwrap_or_default();
+        let length = usize::from(self.request.length()) + rtu::OVERHEAD;
+        if frame.len() == length && self.is_echo(pdu) {
+            self.echo = false;
+            return Verdict::Own;
+        }
+        self.exception = response::exception_code(pdu).unwrap_or(0);
+        match response::judge(&self.request, pdu) {
+            Status::MALFORMED_REPLY => Verdict::Wrong,
+            _ => Verdict::Right,
+        }
+    }
+}
