@@ -194,11 +194,11 @@ typedef struct mbm_master {
     /**
      * Not for you.
      */
-    void *pointers[21];
+    void *pointers[20];
     /**
      * Not for you.
      */
-    uint32_t words[18];
+    uint32_t words[20];
 } mbm_master;
 
 /**

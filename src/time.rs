@@ -3,6 +3,10 @@
 //! Only differences are ever taken, so a clock that wraps is no concern; one
 //! wait may last 71 minutes at most.
 
+/// How far a clock may step back, as one does that adds a millisecond tick and
+/// a counter read beside its interrupt: in microseconds.
+const STEP_BACK: u32 = 0x1_0000;
+
 /// 3.5 characters at 9600 baud, rounded up: the silence kept while nobody has
 /// told the baud rate.
 pub const DEFAULT_SILENCE: u32 = 4_000;
@@ -13,10 +17,16 @@ pub const DEFAULT_CHARACTER: u16 = 1_146;
 /// The fixed silence above 19200 baud (serial line guide V1.02, 2.5.1.1).
 const FAST_SILENCE: u32 = 1_750;
 
-/// The time from `since` to `now`, in microseconds.
+/// The time from `since` to `now`, in microseconds; none where the clock stepped
+/// back a little.
 #[inline(always)]
 pub const fn elapsed(now: u32, since: u32) -> u32 {
-    now.wrapping_sub(since)
+    let time = now.wrapping_sub(since);
+    if time > u32::MAX - STEP_BACK {
+        0
+    } else {
+        time
+    }
 }
 
 /// Milliseconds as microseconds.
@@ -82,5 +92,12 @@ mod tests {
     #[test]
     fn elapsed_survives_the_wrap() {
         assert_eq!(elapsed(5, u32::MAX - 4), 10);
+    }
+
+    #[test]
+    fn a_clock_that_steps_back_a_little_has_not_moved() {
+        assert_eq!(elapsed(1_000, 1_001), 0);
+        assert_eq!(elapsed(1_000, 2_000), 0);
+        assert_eq!(elapsed(0xFFFF_0000, 0xFFFF_FFFF), 0);
     }
 }

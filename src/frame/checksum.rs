@@ -1,15 +1,43 @@
 //! The CRC-16 of an RTU frame (serial line guide V1.02, 6.2.2).
 
-use crc::{Crc, CRC_16_MODBUS};
+/// Takes `bytes` in with a table, which a host has room for. The larger tables
+/// of the crate come with code that can panic.
+#[cfg(any(test, not(target_os = "none")))]
+fn by_table(crc: u16, bytes: &[u8]) -> u16 {
+    const CRC: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS);
+    // The crate reflects the initial value; reflecting it here as well cancels
+    // out, so a running value can be carried on.
+    let mut digest = CRC.digest_with_initial(crc.reverse_bits());
+    digest.update(bytes);
+    digest.finalize()
+}
 
-/// A table would cost RAM on an AVR and half a kilobyte of flash elsewhere. The
-/// larger tables of the crate come with code that can panic.
-#[cfg(target_os = "none")]
-type Implementation = crc::NoTable;
+/// Takes `bytes` in without a table, which would cost RAM on an AVR and half a
+/// kilobyte of flash elsewhere, and without the crate's loop over bits, which
+/// took a third of the time between a reply and the next request on an AVR:
+/// eight steps at once, which come down to the parity of the byte and two shifts.
+#[cfg(any(test, target_os = "none"))]
+fn by_parity(crc: u16, bytes: &[u8]) -> u16 {
+    bytes.iter().fold(crc, |crc, byte| {
+        let low = crc as u8 ^ byte;
+        let folded = low ^ low >> 4;
+        let folded = folded ^ folded >> 2;
+        let odd = (folded ^ folded >> 1) & 1 != 0;
+        let low = u16::from(low);
+        let crc = crc >> 8 ^ low << 6 ^ low << 7;
+        if odd {
+            crc ^ 0xC001
+        } else {
+            crc
+        }
+    })
+}
+
 #[cfg(not(target_os = "none"))]
-type Implementation = crc::Table<1>;
+use by_table as update;
 
-const CRC: Crc<u16, Implementation> = Crc::<u16, Implementation>::new(&CRC_16_MODBUS);
+#[cfg(target_os = "none")]
+use by_parity as update;
 
 /// A CRC-16 that grows as bytes arrive.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -23,11 +51,7 @@ impl Crc16 {
     #[cfg_attr(target_os = "none", inline(never))]
     #[must_use]
     pub fn with(self, bytes: &[u8]) -> Crc16 {
-        // The crate reflects the initial value; reflecting it here as well
-        // cancels out, so a running value can be carried on.
-        let mut digest = CRC.digest_with_initial(self.0.reverse_bits());
-        digest.update(bytes);
-        Crc16(digest.finalize())
+        Crc16(update(self.0, bytes))
     }
 
     /// The two bytes as sent, low byte first.
@@ -54,6 +78,17 @@ mod tests {
     #[test]
     fn check_value_of_the_catalogue() {
         assert_eq!(crc16(b"123456789").to_bytes(), [0x37, 0x4B]);
+    }
+
+    #[test]
+    fn both_ways_agree_on_every_byte_and_running_value() {
+        for crc in 0..=u16::MAX {
+            let byte = [(crc >> 8) as u8 ^ 0x5A];
+            assert_eq!(by_parity(crc, &byte), by_table(crc, &byte));
+        }
+        for byte in 0..=u8::MAX {
+            assert_eq!(by_parity(0x1234, &[byte]), by_table(0x1234, &[byte]));
+        }
     }
 
     #[test]

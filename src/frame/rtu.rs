@@ -107,6 +107,9 @@ pub struct Window {
     /// Where in the buffer the candidate starts, and where what arrived ends.
     start: u16,
     end: u16,
+    /// The CRC of the candidate's first bytes, and how many those are.
+    crc: Crc16,
+    checked: u16,
     /// The bytes passed over since a frame boundary, for they may turn out to
     /// be somebody else's frame: their CRC, count, and what such a frame is.
     passed_crc: Crc16,
@@ -123,6 +126,8 @@ impl Window {
     pub const EMPTY: Window = Window {
         start: 0,
         end: 0,
+        crc: Crc16::START,
+        checked: 0,
         passed_crc: Crc16::START,
         passed: 0,
         passed_as: Seen::NOTHING,
@@ -150,6 +155,7 @@ impl Window {
         self.skim = true;
         self.start = 0;
         self.end = 0;
+        self.advance(0);
         self.passed = 0;
         self.seen = Seen::NOTHING;
         self.foreign = 0;
@@ -172,9 +178,20 @@ impl Window {
         self.skim
     }
 
-    /// Passes over `count` bytes.
+    /// Passes over `count` bytes; another candidate begins.
     pub fn advance(&mut self, count: u16) {
         self.start += count;
+        self.crc = Crc16::START;
+        self.checked = 0;
+    }
+
+    /// The CRC of the candidate up to the end of `known`, which grows as bytes
+    /// arrive, so that little is left to do when the last one does.
+    fn checked(&mut self, known: &[u8]) -> Crc16 {
+        let news = known.get(usize::from(self.checked)..).unwrap_or_default();
+        self.crc = self.crc.with(news);
+        self.checked = known.len() as u16;
+        self.crc
     }
 
     /// The bytes of the window.
@@ -214,7 +231,12 @@ impl Window {
                 if let Some(length) = wanted.length(rest) {
                     let total = usize::from(length.get()) + OVERHEAD;
                     if let Some(frame) = rest.get(..total) {
-                        if crc16(frame).is_residue() {
+                        let crc = if self.skim {
+                            crc16(frame)
+                        } else {
+                            self.checked(frame)
+                        };
+                        if crc.is_residue() {
                             self.start = self.end - rest.len() as u16;
                             match wanted.judge(frame) {
                                 Verdict::Right => return true,
@@ -231,6 +253,7 @@ impl Window {
                     } else if total > buffer.len() {
                         self.see(Seen::TOO_LONG);
                     } else if !self.skim {
+                        self.checked(rest);
                         return false;
                     }
                 }

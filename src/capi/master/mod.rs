@@ -29,9 +29,9 @@ const BEGUN: u8 = 0x4D;
 #[repr(C)]
 pub struct mbm_master {
     /// Not for you.
-    pointers: [*mut c_void; 21],
+    pointers: [*mut c_void; 20],
     /// Not for you.
-    words: [u32; 18],
+    words: [u32; 20],
 }
 
 /// What lies behind an `mbm_master`.
