@@ -1,9 +1,11 @@
 //! What holds for every request and for every string of bytes.
 
-use core::num::NonZeroU8;
+mod common;
+
+use common::{frame, Wanting};
 use mbm::error::Status;
 use mbm::frame::checksum::crc16;
-use mbm::frame::rtu::{self, Verdict, Wanted, Window};
+use mbm::frame::rtu::Window;
 use mbm::pdu::request::{Received, Request};
 use mbm::pdu::{bits, registers, response};
 use proptest::prelude::*;
@@ -31,21 +33,9 @@ fn any_request() -> impl Strategy<Value = Request> {
     .prop_filter_map("within the standard", |request| request)
 }
 
-fn emit(unit: u8, request: &Request, words: &[u16]) -> Vec<u8> {
-    let mut buffer = [0; rtu::MAX_FRAME];
-    let emit = |pdu: &mut [u8]| request.emit(pdu, words);
-    assert!(rtu::write(
-        &mut buffer,
-        unit,
-        usize::from(request.length()),
-        emit
-    ));
-    buffer[..usize::from(request.length()) + rtu::OVERHEAD].to_vec()
-}
-
 /// A right reply to `request`, with data bytes from `seed`.
 fn right_reply(unit: u8, request: &Request, seed: u8) -> Vec<u8> {
-    let sent = emit(unit, request, &[]);
+    let sent = frame(unit, request, &[]);
     let mut frame = if request.is_read() {
         let count = request.response_length() - 2;
         let mut frame = vec![unit, request.function(), count];
@@ -56,27 +46,6 @@ fn right_reply(unit: u8, request: &Request, seed: u8) -> Vec<u8> {
     };
     frame.extend(crc16(&frame).to_bytes());
     frame
-}
-
-/// The response of a unit to a request.
-struct Wanting<'a>(u8, &'a Request);
-
-impl Wanted for Wanting<'_> {
-    fn unit(&self) -> u8 {
-        self.0
-    }
-    fn function(&self) -> u8 {
-        self.1.function()
-    }
-    fn length(&self, frame: &[u8]) -> Option<NonZeroU8> {
-        match frame {
-            [unit, pdu @ ..] if *unit == self.0 => response::expected(self.1, pdu),
-            _ => None,
-        }
-    }
-    fn judge(&mut self, _: &[u8]) -> Verdict {
-        Verdict::Right
-    }
 }
 
 /// Feeds `bytes` in pieces and returns the first frame's PDU.
@@ -109,7 +78,7 @@ proptest! {
         request in any_request(),
         words in prop::collection::vec(any::<u16>(), 123),
     ) {
-        let frame = emit(9, &request, &words);
+        let frame = frame(9, &request, &words);
         prop_assert!(crc16(&frame).is_residue());
         let pdu = &frame[1..frame.len() - 2];
         let received = Received::parse(pdu).expect("a request of ours is in order");

@@ -1,9 +1,11 @@
 //! Frames of the specification and of other implementations' documents, byte
 //! for byte: what we emit, and what we make of a reply.
 
-use core::num::NonZeroU8;
+mod common;
+
+use common::{frame, Wanting};
 use mbm::error::Status;
-use mbm::frame::rtu::{self, Verdict, Wanted, Window};
+use mbm::frame::rtu::{self, Window};
 use mbm::pdu::request::{Received, Request};
 use mbm::pdu::{bits, registers, response};
 
@@ -11,44 +13,10 @@ fn build(build: impl FnOnce(&mut Request) -> Status) -> Request {
     Request::build(build).unwrap()
 }
 
-/// The frame of a request to `unit`, with `words` to send.
-fn frame(unit: u8, request: &Request, words: &[u16]) -> Vec<u8> {
-    let mut buffer = [0; rtu::MAX_FRAME];
-    let emit = |pdu: &mut [u8]| request.emit(pdu, words);
-    assert!(rtu::write(
-        &mut buffer,
-        unit,
-        usize::from(request.length()),
-        emit
-    ));
-    buffer[..usize::from(request.length()) + rtu::OVERHEAD].to_vec()
-}
-
 /// The PDU of a request.
 fn pdu(request: &Request, words: &[u16]) -> Vec<u8> {
     let frame = frame(1, request, words);
     frame[1..frame.len() - 2].to_vec()
-}
-
-/// The response of a unit to a request.
-struct Wanting<'a>(u8, &'a Request);
-
-impl Wanted for Wanting<'_> {
-    fn unit(&self) -> u8 {
-        self.0
-    }
-    fn function(&self) -> u8 {
-        self.1.function()
-    }
-    fn length(&self, frame: &[u8]) -> Option<NonZeroU8> {
-        match frame {
-            [unit, pdu @ ..] if *unit == self.0 => response::expected(self.1, pdu),
-            _ => None,
-        }
-    }
-    fn judge(&mut self, _: &[u8]) -> Verdict {
-        Verdict::Right
-    }
 }
 
 /// The status and the data bytes of a reply frame to a request.

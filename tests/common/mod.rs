@@ -1,0 +1,40 @@
+//! What several tests need: a request's frame, and a search for its response.
+
+use mbm::frame::rtu::{self, Verdict, Wanted};
+use mbm::pdu::request::Request;
+use mbm::pdu::response;
+use std::num::NonZeroU8;
+
+/// The frame of a request to `unit`, with `words` to send.
+pub fn frame(unit: u8, request: &Request, words: &[u16]) -> Vec<u8> {
+    let mut buffer = [0; rtu::MAX_FRAME];
+    let emit = |pdu: &mut [u8]| request.emit(pdu, words);
+    assert!(rtu::write(
+        &mut buffer,
+        unit,
+        usize::from(request.length()),
+        emit
+    ));
+    buffer[..usize::from(request.length()) + rtu::OVERHEAD].to_vec()
+}
+
+/// The response of a unit to a request.
+pub struct Wanting<'a>(pub u8, pub &'a Request);
+
+impl Wanted for Wanting<'_> {
+    fn unit(&self) -> u8 {
+        self.0
+    }
+    fn function(&self) -> u8 {
+        self.1.function()
+    }
+    fn length(&self, frame: &[u8]) -> Option<NonZeroU8> {
+        match frame {
+            [unit, pdu @ ..] if *unit == self.0 => response::expected(self.1, pdu),
+            _ => None,
+        }
+    }
+    fn judge(&mut self, _: &[u8]) -> Verdict {
+        Verdict::Right
+    }
+}
