@@ -1,4 +1,6 @@
-//! Bounds-checked big-endian reading. Nothing here can panic.
+//! Bounds-checked big-endian reading and writing. Nothing here can panic.
+
+use crate::error::Status;
 
 /// Reads from the front of a byte slice.
 #[derive(Clone, Copy)]
@@ -26,6 +28,13 @@ impl<'a> Reader<'a> {
         Some(u16::from_be_bytes(*first))
     }
 
+    /// The next `count` bytes.
+    pub fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+        let (first, rest) = self.rest.split_at_checked(count)?;
+        self.rest = rest;
+        Some(first)
+    }
+
     /// All that is left, which leaves nothing.
     pub fn rest(&mut self) -> &'a [u8] {
         core::mem::take(&mut self.rest)
@@ -37,18 +46,90 @@ impl<'a> Reader<'a> {
     }
 }
 
+/// Writes to the front of a byte slice. What does not fit is noted, and said by
+/// [`Writer::finish`].
+pub struct Writer<'a> {
+    bytes: &'a mut [u8],
+    length: usize,
+}
+
+impl<'a> Writer<'a> {
+    /// Writes into `bytes` from its front.
+    pub const fn new(bytes: &'a mut [u8]) -> Self {
+        Writer { bytes, length: 0 }
+    }
+
+    /// Writes all of `bytes`.
+    pub fn put(&mut self, bytes: &[u8]) {
+        let end = self.length.saturating_add(bytes.len());
+        if let Some(room) = self.bytes.get_mut(self.length..end) {
+            for (place, byte) in room.iter_mut().zip(bytes) {
+                *place = *byte;
+            }
+        }
+        self.length = end;
+    }
+
+    /// Writes a byte.
+    pub fn u8(&mut self, byte: u8) {
+        self.put(&[byte]);
+    }
+
+    /// Writes two bytes, high byte first.
+    pub fn u16(&mut self, word: u16) {
+        self.put(&word.to_be_bytes());
+    }
+
+    /// Writes a byte count and the bytes that it counts.
+    pub fn counted(&mut self, bytes: &[u8]) {
+        self.u8(bytes.len() as u8);
+        self.put(bytes);
+    }
+
+    /// How many bytes were written.
+    ///
+    /// # Errors
+    /// [`Status::BUFFER_TOO_SMALL`] if they did not fit.
+    pub fn finish(self) -> Result<usize, Status> {
+        if self.length <= self.bytes.len() {
+            Ok(self.length)
+        } else {
+            Err(Status::BUFFER_TOO_SMALL)
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn reader_takes_big_endian_and_ends_with_none() {
-        let mut reader = Reader::new(&[1, 2, 3, 4]);
+        let mut reader = Reader::new(&[1, 2, 3, 4, 5]);
         assert_eq!(reader.u16(), Some(0x0102));
         assert_eq!(reader.u8(), Some(3));
+        assert_eq!(reader.take(3), None);
+        assert_eq!(reader.take(1), Some(&[4][..]));
         assert_eq!(reader.u16(), None);
-        assert_eq!(reader.rest(), [4]);
+        assert_eq!(reader.rest(), [5]);
         assert!(reader.is_empty());
         assert_eq!(reader.u8(), None);
+    }
+
+    #[test]
+    fn writer_says_what_does_not_fit() {
+        let mut bytes = [0; 3];
+        let mut writer = Writer::new(&mut bytes);
+        writer.u16(0x0102);
+        writer.u8(3);
+        assert_eq!(writer.finish(), Ok(3));
+        assert_eq!(bytes, [1, 2, 3]);
+
+        let mut writer = Writer::new(&mut bytes);
+        writer.u16(0x0A0B);
+        writer.u16(0x0C0D);
+        writer.u8(9);
+        assert_eq!(writer.finish(), Err(Status::BUFFER_TOO_SMALL));
+        assert_eq!(bytes, [0x0A, 0x0B, 3]);
     }
 }

@@ -2,7 +2,7 @@
 //! received. Each function starts a transaction; `poll` ends it.
 
 use crate::error::Status;
-use crate::pdu::request::Request;
+use crate::pdu::query::Query;
 use crate::pdu::{bits, registers};
 use crate::port::Port;
 use crate::time;
@@ -12,7 +12,7 @@ use crate::transaction::{Settings, Storage, Transaction};
 pub const NO_WORD: u16 = 0xFFFF;
 
 /// What builds the request of a function that is an address and a word.
-pub type Build = fn(&mut Request, u16, u16) -> Status;
+pub type Build = fn(&mut Query, u16, u16) -> Status;
 
 /// A master on a serial line, with the port and the buffers it was given.
 // Small fields first: see `Transaction`.

@@ -6,16 +6,17 @@ use common::{frame, Wanting};
 use mbm::error::Status;
 use mbm::frame::checksum::crc16;
 use mbm::frame::rtu::Window;
-use mbm::pdu::request::{Received, Request};
-use mbm::pdu::{bits, registers, response};
+use mbm::pdu::query::Query;
+use mbm::pdu::request::Request;
+use mbm::pdu::{bits, registers, reply};
 use proptest::prelude::*;
 
-fn build(build: impl FnOnce(&mut Request) -> Status) -> Option<Request> {
-    Request::build(build).ok()
+fn build(build: impl FnOnce(&mut Query) -> Status) -> Option<Query> {
+    Query::build(build).ok()
 }
 
 /// Any request that the ten functions build.
-fn any_request() -> impl Strategy<Value = Request> {
+fn any_request() -> impl Strategy<Value = Query> {
     prop_oneof![
         (any::<u16>(), 0u16..2002).prop_map(|(a, q)| build(|r| bits::read_coils(r, a, q))),
         (any::<u16>(), 0u16..2002)
@@ -34,7 +35,7 @@ fn any_request() -> impl Strategy<Value = Request> {
 }
 
 /// A right reply to `request`, with data bytes from `seed`.
-fn right_reply(unit: u8, request: &Request, seed: u8) -> Vec<u8> {
+fn right_reply(unit: u8, request: &Query, seed: u8) -> Vec<u8> {
     let sent = frame(unit, request, &[]);
     let mut frame = if request.is_read() {
         let count = request.response_length() - 2;
@@ -49,7 +50,7 @@ fn right_reply(unit: u8, request: &Request, seed: u8) -> Vec<u8> {
 }
 
 /// Feeds `bytes` in pieces and returns the first frame's PDU.
-fn find(unit: u8, request: &Request, bytes: &[u8], piece: usize, size: usize) -> Option<Vec<u8>> {
+fn find(unit: u8, request: &Query, bytes: &[u8], piece: usize, size: usize) -> Option<Vec<u8>> {
     let mut buffer = vec![0; size];
     let mut window = Window::EMPTY;
     let mut rest = bytes;
@@ -57,7 +58,7 @@ fn find(unit: u8, request: &Request, bytes: &[u8], piece: usize, size: usize) ->
         let found = window.search(&buffer, &mut Wanting(unit, request));
         if found {
             let pdu = &window.bytes(&buffer)?[1..];
-            let length = response::expected(request, pdu).map(|length| usize::from(length.get()));
+            let length = reply::expected(request, pdu).map(|length| usize::from(length.get()));
             return Some(pdu[..length?].to_vec());
         }
         if rest.is_empty() {
@@ -81,38 +82,39 @@ proptest! {
         let frame = frame(9, &request, &words);
         prop_assert!(crc16(&frame).is_residue());
         let pdu = &frame[1..frame.len() - 2];
-        let received = Received::parse(pdu).expect("a request of ours is in order");
+        let received = Request::parse(pdu).expect("a request of ours is in order");
         let data = |words: &[u16]| -> Vec<u8> {
             words.iter().flat_map(|word| word.to_be_bytes()).collect()
         };
         match received {
-            Received::ReadBits { function, address, quantity } => {
+            Request::ReadBits { function, address, quantity } => {
                 prop_assert_eq!(pdu, emit_words(function, &[address, quantity]));
             }
-            Received::ReadRegisters { function, address, quantity } => {
+            Request::ReadRegisters { function, address, quantity } => {
                 prop_assert_eq!(pdu, emit_words(function, &[address, quantity]));
             }
-            Received::WriteSingleCoil { address, on } => {
+            Request::WriteSingleCoil { address, on } => {
                 prop_assert_eq!(pdu, emit_words(5, &[address, if on { 0xFF00 } else { 0 }]));
             }
-            Received::WriteSingleRegister { address, value } => {
+            Request::WriteSingleRegister { address, value } => {
                 prop_assert_eq!(pdu, emit_words(6, &[address, value]));
             }
-            Received::MaskWriteRegister { address, and_mask, or_mask } => {
+            Request::MaskWriteRegister { address, and_mask, or_mask } => {
                 prop_assert_eq!(pdu, emit_words(0x16, &[address, and_mask, or_mask]));
             }
-            Received::WriteMultipleCoils { quantity, data, .. } => {
+            Request::WriteMultipleCoils { quantity, data, .. } => {
                 for bit in 0..8 * data.len() {
                     let on = words[bit / 16] >> (bit % 16) & 1 == 1 && bit < usize::from(quantity);
                     prop_assert_eq!(data[bit / 8] >> (bit % 8) & 1 == 1, on);
                 }
             }
-            Received::WriteMultipleRegisters { quantity, data: sent, .. } => {
+            Request::WriteMultipleRegisters { quantity, data: sent, .. } => {
                 prop_assert_eq!(sent, data(&words[..usize::from(quantity)]));
             }
-            Received::ReadWriteMultipleRegisters { write_quantity, data: sent, .. } => {
+            Request::ReadWriteMultipleRegisters { write_quantity, data: sent, .. } => {
                 prop_assert_eq!(sent, data(&words[..usize::from(write_quantity)]));
             }
+            other => prop_assert!(false, "{:?} is no request of the facade", other),
         }
     }
 
@@ -123,8 +125,8 @@ proptest! {
         piece in 1usize..40,
         size in 8usize..256,
     ) {
-        let _ = Received::parse(&bytes);
-        let _ = response::judge(&request, &bytes);
+        let _ = Request::parse(&bytes);
+        let _ = reply::judge(&request, &bytes);
         let _ = request.take(&mut [0; 125], &bytes);
         let _ = find(bytes.first().copied().unwrap_or(1), &request, &bytes, piece, size);
     }
@@ -157,7 +159,7 @@ proptest! {
     #[test]
     fn a_right_reply_is_judged_a_success(request in any_request(), seed: u8) {
         let reply = right_reply(1, &request, seed);
-        prop_assert_eq!(response::judge(&request, &reply[1..reply.len() - 2]), Status::OK);
+        prop_assert_eq!(reply::judge(&request, &reply[1..reply.len() - 2]), Status::OK);
     }
 }
 

@@ -6,27 +6,28 @@ mod common;
 use common::{frame, Wanting};
 use mbm::error::Status;
 use mbm::frame::rtu::{self, Window};
-use mbm::pdu::request::{Received, Request};
-use mbm::pdu::{bits, registers, response};
+use mbm::pdu::query::Query;
+use mbm::pdu::request::Request;
+use mbm::pdu::{bits, registers, reply};
 
-fn build(build: impl FnOnce(&mut Request) -> Status) -> Request {
-    Request::build(build).unwrap()
+fn build(build: impl FnOnce(&mut Query) -> Status) -> Query {
+    Query::build(build).unwrap()
 }
 
 /// The PDU of a request.
-fn pdu(request: &Request, words: &[u16]) -> Vec<u8> {
+fn pdu(request: &Query, words: &[u16]) -> Vec<u8> {
     let frame = frame(1, request, words);
     frame[1..frame.len() - 2].to_vec()
 }
 
 /// The status and the data bytes of a reply frame to a request.
-fn reply(unit: u8, request: &Request, frame: &[u8]) -> (Status, Vec<u8>) {
+fn reply(unit: u8, request: &Query, frame: &[u8]) -> (Status, Vec<u8>) {
     let buffer = frame.to_vec();
     let mut window = Window::EMPTY;
     window.arrived(frame.len() as u16);
     assert!(window.search(&buffer, &mut Wanting(unit, request)));
     let pdu = &buffer[rtu::PDU..buffer.len() - 2];
-    let status = response::judge(request, pdu);
+    let status = reply::judge(request, pdu);
     let read = status == Status::OK && request.is_read();
     (status, if read { pdu[2..].to_vec() } else { vec![] })
 }
@@ -78,7 +79,7 @@ fn request_frames_with_their_crc() {
         3 => build(|r| registers::read_holding(r, address, quantity)),
         _ => build(|r| registers::read_input(r, address, quantity)),
     };
-    let cases: &[(u8, Request, &[u16], &[u8])] = &[
+    let cases: &[(u8, Query, &[u16], &[u8])] = &[
         (
             0x10,
             read(1, 0x6B, 3),
@@ -173,7 +174,7 @@ fn a_write_reply_with_another_address_or_value_is_malformed() {
     for (at, wrong) in [(1, 1), (2, 0x6C), (3, 0), (4, 0)] {
         let mut pdu = [6, 0, 0x6B, 1, 1];
         pdu[at] = wrong;
-        assert_eq!(response::judge(&request, &pdu), Status::MALFORMED_REPLY);
+        assert_eq!(reply::judge(&request, &pdu), Status::MALFORMED_REPLY);
     }
 }
 
@@ -185,8 +186,8 @@ fn exception_codes_of_0_and_from_80_are_malformed() {
             1..=0x7F => Status::from_code(code),
             _ => Status::MALFORMED_REPLY,
         };
-        assert_eq!(response::judge(&request, &[0x86, code]), expected);
-        assert_eq!(response::exception_code(&[0x86, code]), Some(code));
+        assert_eq!(reply::judge(&request, &[0x86, code]), expected);
+        assert_eq!(reply::exception_code(&[0x86, code]), Some(code));
     }
 }
 
@@ -195,14 +196,11 @@ fn quantities_and_addresses_are_held_to_the_standard() {
     use Status as S;
     let value = Err(S::ILLEGAL_DATA_VALUE);
     let address = Err(S::ILLEGAL_DATA_ADDRESS);
-    let build = |build: fn(&mut Request, u16, u16) -> Status, a, q| {
-        Request::build(|request| build(request, a, q)).map(|_| ())
+    let build = |build: fn(&mut Query, u16, u16) -> Status, a, q| {
+        Query::build(|request| build(request, a, q)).map(|_| ())
     };
     for (most, function) in [
-        (
-            2000,
-            bits::read_coils as fn(&mut Request, u16, u16) -> Status,
-        ),
+        (2000, bits::read_coils as fn(&mut Query, u16, u16) -> Status),
         (125, registers::read_holding),
         (1968, bits::write_multiple),
         (123, registers::write_multiple),
@@ -223,15 +221,15 @@ fn quantities_and_addresses_are_held_to_the_standard() {
 #[test]
 fn lying_byte_counts_and_lengths_are_refused() {
     let value = Err(Status::ILLEGAL_DATA_VALUE);
-    assert_eq!(Received::parse(&[]), Err(Status::ILLEGAL_FUNCTION));
-    assert_eq!(Received::parse(&[0x2B, 1]), Err(Status::ILLEGAL_FUNCTION));
-    assert_eq!(Received::parse(&[3, 0, 0, 0]), value);
-    assert_eq!(Received::parse(&[3, 0, 0, 0, 1, 9]), value);
-    assert_eq!(Received::parse(&[5, 0, 0, 1, 0]), value);
-    assert_eq!(Received::parse(&[0x10, 0, 0, 0, 1, 2, 1]), value);
-    assert_eq!(Received::parse(&[0x10, 0, 0, 0, 1, 3, 1, 2, 3]), value);
-    assert_eq!(Received::parse(&[0x10, 0, 0, 0, 1, 0, 1, 2]), value);
-    assert_eq!(Received::parse(&[0x0F, 0, 0, 0, 9, 1, 1]), value);
-    let past = Received::parse(&[3, 0xFF, 0xFF, 0, 2]);
+    assert_eq!(Request::parse(&[]), Err(Status::ILLEGAL_FUNCTION));
+    assert_eq!(Request::parse(&[0x2C, 1]), Err(Status::ILLEGAL_FUNCTION));
+    assert_eq!(Request::parse(&[3, 0, 0, 0]), value);
+    assert_eq!(Request::parse(&[3, 0, 0, 0, 1, 9]), value);
+    assert_eq!(Request::parse(&[5, 0, 0, 1, 0]), value);
+    assert_eq!(Request::parse(&[0x10, 0, 0, 0, 1, 2, 1]), value);
+    assert_eq!(Request::parse(&[0x10, 0, 0, 0, 1, 3, 1, 2, 3]), value);
+    assert_eq!(Request::parse(&[0x10, 0, 0, 0, 1, 0, 1, 2]), value);
+    assert_eq!(Request::parse(&[0x0F, 0, 0, 0, 9, 1, 1]), value);
+    let past = Request::parse(&[3, 0xFF, 0xFF, 0, 2]);
     assert_eq!(past, Err(Status::ILLEGAL_DATA_ADDRESS));
 }

@@ -1,7 +1,7 @@
 //! The limits of the standard, as C constants.
 
 use crate::frame::rtu;
-use crate::pdu::{bits, registers};
+use crate::pdu::limits;
 
 /// Most registers that one request reads (V1.1b3, 6.3 and 6.4).
 pub const MBM_MAX_READ_REGISTERS: u16 = 125;
@@ -17,10 +17,10 @@ pub const MBM_MAX_WRITE_BITS: u16 = 1968;
 pub const MBM_MAX_FRAME: u16 = 256;
 
 const _: () = {
-    assert!(MBM_MAX_READ_REGISTERS == registers::MAX_READ);
-    assert!(MBM_MAX_WRITE_REGISTERS == registers::MAX_WRITE);
-    assert!(MBM_MAX_READ_WRITE_REGISTERS == registers::MAX_READ_WRITE);
-    assert!(MBM_MAX_READ_BITS == bits::MAX_READ);
-    assert!(MBM_MAX_WRITE_BITS == bits::MAX_WRITE);
+    assert!(MBM_MAX_READ_REGISTERS == limits::MAX_READ_REGISTERS);
+    assert!(MBM_MAX_WRITE_REGISTERS == limits::MAX_WRITE_REGISTERS);
+    assert!(MBM_MAX_READ_WRITE_REGISTERS == limits::MAX_READ_WRITE_REGISTERS);
+    assert!(MBM_MAX_READ_BITS == limits::MAX_READ_BITS);
+    assert!(MBM_MAX_WRITE_BITS == limits::MAX_WRITE_BITS);
     assert!(MBM_MAX_FRAME as usize == rtu::MAX_FRAME);
 };

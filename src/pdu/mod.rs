@@ -5,12 +5,18 @@
 //! function per function code, so that firmware carries what it calls.
 
 pub mod bits;
+pub mod custom;
+pub mod diagnostics;
+mod fields;
+pub mod files;
+pub mod identification;
+pub mod length;
+pub mod limits;
+pub mod query;
 pub mod registers;
+pub mod reply;
 pub mod request;
 pub mod response;
-
-/// The longest PDU (application protocol, clause 4.1).
-pub const MAX_PDU: usize = 253;
 
 /// Set in the function code of an exception response (clause 7).
 pub const EXCEPTION: u8 = 0x80;

@@ -1,7 +1,11 @@
 //! Holding and input registers: functions 03, 04, 06, 10, 16 and 17.
 
-use super::request::{check_range, counted, in_range, word, Received, Request};
-use crate::bytes::Reader;
+use super::fields::{counted, in_range, word};
+use super::limits::{MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_REGISTERS};
+use super::query::{check_range, Query};
+use super::request::Request;
+use super::response::Response;
+use crate::bytes::{Reader, Writer};
 use crate::data::registers;
 use crate::error::Status;
 
@@ -18,37 +22,30 @@ pub const MASK_WRITE_REGISTER: u8 = 0x16;
 /// Read/Write Multiple Registers (clause 6.17).
 pub const READ_WRITE_MULTIPLE_REGISTERS: u8 = 0x17;
 
-/// Most registers that one request reads.
-pub const MAX_READ: u16 = 125;
-/// Most registers that one request writes.
-pub const MAX_WRITE: u16 = 123;
-/// Most registers that function 17 writes.
-pub const MAX_READ_WRITE: u16 = 121;
-
 const fn byte_count(quantity: u16) -> u8 {
     (quantity << 1) as u8
 }
 
 /// Builds 03: [`Status::OK`], [`Status::ILLEGAL_DATA_VALUE`] unless `quantity`
 /// is 1 to 125, or [`Status::ILLEGAL_DATA_ADDRESS`] if the range passes 65535.
-pub fn read_holding(request: &mut Request, address: u16, quantity: u16) -> Status {
+pub fn read_holding(request: &mut Query, address: u16, quantity: u16) -> Status {
     read(request, READ_HOLDING_REGISTERS, address, quantity)
 }
 
 /// Builds 04, as [`read_holding`].
-pub fn read_input(request: &mut Request, address: u16, quantity: u16) -> Status {
+pub fn read_input(request: &mut Query, address: u16, quantity: u16) -> Status {
     read(request, READ_INPUT_REGISTERS, address, quantity)
 }
 
-fn read(request: &mut Request, function: u8, address: u16, quantity: u16) -> Status {
-    let status = request.set_range(function, address, quantity, MAX_READ);
+fn read(request: &mut Query, function: u8, address: u16, quantity: u16) -> Status {
+    let status = request.set_range(function, address, quantity, MAX_READ_REGISTERS);
     request.response_length = byte_count(quantity).wrapping_add(2);
     request.take = Some(registers::take);
     status
 }
 
 /// Builds 06.
-pub fn write_single(request: &mut Request, address: u16, value: u16) -> Status {
+pub fn write_single(request: &mut Query, address: u16, value: u16) -> Status {
     request.set(WRITE_SINGLE_REGISTER, address, value);
     Status::OK
 }
@@ -56,14 +53,19 @@ pub fn write_single(request: &mut Request, address: u16, value: u16) -> Status {
 /// Builds 10; the values are the sender's words. [`Status::OK`],
 /// [`Status::ILLEGAL_DATA_VALUE`] unless `quantity` is 1 to 123, or
 /// [`Status::ILLEGAL_DATA_ADDRESS`] if the range passes 65535.
-pub fn write_multiple(request: &mut Request, address: u16, quantity: u16) -> Status {
-    let status = request.set_range(WRITE_MULTIPLE_REGISTERS, address, quantity, MAX_WRITE);
+pub fn write_multiple(request: &mut Query, address: u16, quantity: u16) -> Status {
+    let status = request.set_range(
+        WRITE_MULTIPLE_REGISTERS,
+        address,
+        quantity,
+        MAX_WRITE_REGISTERS,
+    );
     request.append(byte_count(quantity), registers::send);
     status
 }
 
 /// Builds 16: the register becomes `(register & and) | (or & !and)`.
-pub fn mask_write(request: &mut Request, address: u16, and_mask: u16, or_mask: u16) -> Status {
+pub fn mask_write(request: &mut Query, address: u16, and_mask: u16, or_mask: u16) -> Status {
     request.set(MASK_WRITE_REGISTER, address, and_mask);
     [request.head[5], request.head[6]] = or_mask.to_be_bytes();
     request.head_length = 7;
@@ -76,7 +78,7 @@ pub fn mask_write(request: &mut Request, address: u16, and_mask: u16, or_mask: u
 /// [`Status::ILLEGAL_DATA_VALUE`] unless 1 to 125 registers are read and 1 to
 /// 121 written, or [`Status::ILLEGAL_DATA_ADDRESS`] if a range passes 65535.
 pub fn read_write(
-    request: &mut Request,
+    request: &mut Query,
     read_address: u16,
     read_quantity: u16,
     write_address: u16,
@@ -92,59 +94,116 @@ pub fn read_write(
     [request.head[7], request.head[8]] = write_quantity.to_be_bytes();
     request.head_length = 9;
     request.append(byte_count(write_quantity), registers::send);
-    match check_range(write_address, write_quantity, MAX_READ_WRITE) {
+    match check_range(write_address, write_quantity, MAX_READ_WRITE_REGISTERS) {
         Status::OK => readable,
         refused => refused,
     }
 }
 
-pub(super) fn parse_read<'a>(function: u8, reader: &mut Reader) -> Result<Received<'a>, Status> {
+pub(super) fn parse_read<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Status> {
     let (address, quantity) = (word(reader)?, word(reader)?);
-    in_range(address, quantity, MAX_READ)?;
-    Ok(Received::ReadRegisters {
+    in_range(address, quantity, MAX_READ_REGISTERS)?;
+    Ok(Request::ReadRegisters {
         function,
         address,
         quantity,
     })
 }
 
-pub(super) fn parse_write_single<'a>(reader: &mut Reader) -> Result<Received<'a>, Status> {
-    Ok(Received::WriteSingleRegister {
+pub(super) fn parse_write_single<'a>(reader: &mut Reader) -> Result<Request<'a>, Status> {
+    Ok(Request::WriteSingleRegister {
         address: word(reader)?,
         value: word(reader)?,
     })
 }
 
-pub(super) fn parse_write_multiple<'a>(reader: &mut Reader<'a>) -> Result<Received<'a>, Status> {
+pub(super) fn parse_write_multiple<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
     let (address, quantity) = (word(reader)?, word(reader)?);
-    in_range(address, quantity, MAX_WRITE)?;
-    let data = counted(reader, 2 * quantity)?;
-    Ok(Received::WriteMultipleRegisters {
+    in_range(address, quantity, MAX_WRITE_REGISTERS)?;
+    Ok(Request::WriteMultipleRegisters {
         address,
         quantity,
-        data,
+        data: values(reader, quantity)?,
     })
 }
 
-pub(super) fn parse_mask_write<'a>(reader: &mut Reader) -> Result<Received<'a>, Status> {
-    Ok(Received::MaskWriteRegister {
+pub(super) fn parse_mask_write<'a>(reader: &mut Reader) -> Result<Request<'a>, Status> {
+    Ok(Request::MaskWriteRegister {
         address: word(reader)?,
         and_mask: word(reader)?,
         or_mask: word(reader)?,
     })
 }
 
-pub(super) fn parse_read_write<'a>(reader: &mut Reader<'a>) -> Result<Received<'a>, Status> {
+pub(super) fn parse_read_write<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
     let (read_address, read_quantity) = (word(reader)?, word(reader)?);
     let (write_address, write_quantity) = (word(reader)?, word(reader)?);
-    in_range(read_address, read_quantity, MAX_READ)?;
-    in_range(write_address, write_quantity, MAX_READ_WRITE)?;
-    let data = counted(reader, 2 * write_quantity)?;
-    Ok(Received::ReadWriteMultipleRegisters {
+    in_range(read_address, read_quantity, MAX_READ_REGISTERS)?;
+    in_range(write_address, write_quantity, MAX_READ_WRITE_REGISTERS)?;
+    Ok(Request::ReadWriteMultipleRegisters {
         read_address,
         read_quantity,
         write_address,
         write_quantity,
-        data,
+        data: values(reader, write_quantity)?,
+    })
+}
+
+/// The counted data of `quantity` registers.
+fn values<'a>(reader: &mut Reader<'a>, quantity: u16) -> Result<&'a [u8], Status> {
+    let data = counted(reader)?;
+    if data.len() == 2 * usize::from(quantity) {
+        Ok(data)
+    } else {
+        Err(Status::ILLEGAL_DATA_VALUE)
+    }
+}
+
+pub(super) fn emit_mask_write(writer: &mut Writer, address: u16, and_mask: u16, or_mask: u16) {
+    writer.u8(MASK_WRITE_REGISTER);
+    writer.u16(address);
+    writer.u16(and_mask);
+    writer.u16(or_mask);
+}
+
+pub(super) fn parse_read_response<'a>(
+    function: u8,
+    reader: &mut Reader<'a>,
+) -> Result<Response<'a>, Status> {
+    let data = counted(reader)?;
+    let most = 2 * usize::from(MAX_READ_REGISTERS);
+    if data.is_empty() || data.len() > most || !data.len().is_multiple_of(2) {
+        return Err(Status::MALFORMED_REPLY);
+    }
+    Ok(Response::ReadRegisters { function, data })
+}
+
+pub(super) fn parse_write_single_response<'a>(reader: &mut Reader) -> Result<Response<'a>, Status> {
+    Ok(Response::WriteSingleRegister {
+        address: word(reader)?,
+        value: word(reader)?,
+    })
+}
+
+/// The response of 0F or 10, which writes at `most` so many.
+pub(super) fn parse_write_multiple_response<'a>(
+    function: u8,
+    most: u16,
+    reader: &mut Reader,
+) -> Result<Response<'a>, Status> {
+    let (address, quantity) = (word(reader)?, word(reader)?);
+    in_range(address, quantity, most)?;
+    Ok(Response::WriteMultiple {
+        function,
+        address,
+        quantity,
+    })
+}
+
+pub(super) fn parse_mask_write_response<'a>(reader: &mut Reader) -> Result<Response<'a>, Status> {
+    Ok(Response::MaskWriteRegister {
+        address: word(reader)?,
+        and_mask: word(reader)?,
+        or_mask: word(reader)?,
     })
 }

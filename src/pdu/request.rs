@@ -1,186 +1,25 @@
-//! A request PDU: built head first, sent with the words behind it, read back
-//! by whoever receives it.
+//! Request PDUs, whole: read by whoever receives one, written by whoever sends
+//! one. Data borrow from the bytes.
 
-use super::{bits, registers};
-use crate::bytes::Reader;
-use crate::data::{Send, Take};
+use super::files::{Reads, Writes};
+use super::length::Length;
+use super::limits::MAX_PDU;
+use super::{bits, custom, diagnostics, files, identification, registers};
+use crate::bytes::{Reader, Writer};
 use crate::error::Status;
 
-/// Function code, and at most four words of address and quantity.
-const HEAD: usize = 9;
-
-/// A request as its sender keeps it until the reply is there: the fixed head,
-/// and how much of the caller's words to send behind it.
-///
-/// How words travel is known by pointers to the family's functions, so that
-/// firmware carries those of the functions it calls.
-#[derive(Clone, Copy, Debug)]
-pub struct Request {
-    pub(super) head: [u8; HEAD],
-    pub(super) head_length: u8,
-    /// Length of the PDU: of head, byte count and data.
-    pub(super) length: u8,
-    /// Length of the response PDU if the request succeeds.
-    pub(super) response_length: u8,
-    /// `None`: neither byte count nor data follow the head.
-    pub(super) send: Option<Send>,
-    /// `None`: the response repeats the head.
-    pub(super) take: Option<Take>,
-}
-
-impl Request {
-    /// No request.
-    pub const NONE: Request = Request {
-        head: [0; HEAD],
-        head_length: 0,
-        length: 0,
-        response_length: 0,
-        send: None,
-        take: None,
-    };
-
-    /// The request that `build` writes.
-    ///
-    /// # Errors
-    /// The status with which `build` refuses.
-    pub fn build(build: impl FnOnce(&mut Request) -> Status) -> Result<Request, Status> {
-        let mut request = Request::NONE;
-        match build(&mut request) {
-            Status::OK => Ok(request),
-            refused => Err(refused),
-        }
-    }
-
-    /// Becomes `function` and two words, which the response repeats.
-    #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn set(&mut self, function: u8, first: u16, second: u16) {
-        let ([a, b], [c, d]) = (first.to_be_bytes(), second.to_be_bytes());
-        self.head = [function, a, b, c, d, 0, 0, 0, 0];
-        self.head_length = 5;
-        self.length = 5;
-        self.response_length = 5;
-        self.send = None;
-        self.take = None;
-    }
-
-    /// As [`Request::set`], for a range of addresses; says whether every device
-    /// would accept that.
-    #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn set_range(
-        &mut self,
-        function: u8,
-        address: u16,
-        quantity: u16,
-        most: u16,
-    ) -> Status {
-        self.set(function, address, quantity);
-        check_range(address, quantity, most)
-    }
-
-    /// Has `bytes` of the caller's words follow the head.
-    pub(super) fn append(&mut self, bytes: u8, send: Send) {
-        self.length = bytes.wrapping_add(self.head_length + 1);
-        self.send = Some(send);
-    }
-
-    /// The function code.
-    pub const fn function(&self) -> u8 {
-        self.head[0]
-    }
-
-    /// The head as sent.
-    fn head(&self) -> impl Iterator<Item = &u8> {
-        self.head.iter().take(usize::from(self.head_length))
-    }
-
-    /// Length of the response PDU if the request succeeds.
-    pub const fn response_length(&self) -> u8 {
-        self.response_length
-    }
-
-    /// True if the response carries data behind a byte count, false if it
-    /// repeats the request's head.
-    pub const fn is_read(&self) -> bool {
-        self.take.is_some()
-    }
-
-    /// How many of the caller's words are sent.
-    pub const fn words(&self) -> u8 {
-        (self.length - self.head_length) >> 1
-    }
-
-    /// Length of the PDU.
-    pub const fn length(&self) -> u8 {
-        self.length
-    }
-
-    /// Writes the PDU into `pdu`, which has [`Request::length`] bytes. Words
-    /// that `source` lacks are zero; the sender checks [`Request::words`].
-    #[cfg_attr(target_os = "none", inline(never))]
-    pub fn emit(&self, pdu: &mut [u8], source: &[u16]) {
-        let mut bytes = pdu.iter_mut();
-        for (byte, place) in self.head().zip(bytes.by_ref()) {
-            *place = *byte;
-        }
-        if let (Some(send), Some(count)) = (self.send, bytes.next()) {
-            *count = self.length - self.head_length - 1;
-            send(bytes.into_slice(), source, self.head[4]);
-        }
-    }
-
-    /// Fills words from the data of a successful response, which start `data`;
-    /// returns false, with nothing filled, if they are too few.
-    pub fn take(&self, words: &mut [u16], data: &[u8]) -> bool {
-        let Some(take) = self.take else {
-            return true;
-        };
-        let Some(words) = words.get_mut(..usize::from(self.response_words())) else {
-            return false;
-        };
-        take(words, data, self.head[4]);
-        true
-    }
-
-    /// How many words the data of a successful response fill.
-    pub const fn response_words(&self) -> u8 {
-        (self.response_length - 1) >> 1
-    }
-
-    /// True if `pdu`, complete or not, agrees with the head of this request.
-    pub fn agrees(&self, pdu: &[u8]) -> bool {
-        self.head().zip(pdu).all(|(ours, theirs)| ours == theirs)
-    }
-}
-
-/// Checks a range of addresses as every device would (application protocol,
-/// figures 11 and following: quantity first, then addresses).
-pub(super) fn check_range(address: u16, quantity: u16, most: u16) -> Status {
-    if quantity == 0 || quantity > most {
-        Status::ILLEGAL_DATA_VALUE
-    } else if address.checked_add(quantity - 1).is_none() {
-        Status::ILLEGAL_DATA_ADDRESS
-    } else {
-        Status::OK
-    }
-}
-
-/// As [`check_range`], for a parser.
-pub(super) fn in_range(address: u16, quantity: u16, most: u16) -> Result<(), Status> {
-    match check_range(address, quantity, most) {
-        Status::OK => Ok(()),
-        refused => Err(refused),
-    }
-}
-
-/// A request PDU as its receiver sees it. Data borrow from the bytes.
+/// A request PDU. Register data are as on the wire, high bytes first; bit data
+/// begin with the lowest bit of the first byte.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
-pub enum Received<'a> {
+pub enum Request<'a> {
+    /// 01 or 02.
     ReadBits {
         function: u8,
         address: u16,
         quantity: u16,
     },
+    /// 03 or 04.
     ReadRegisters {
         function: u8,
         address: u16,
@@ -194,6 +33,13 @@ pub enum Received<'a> {
         address: u16,
         value: u16,
     },
+    ReadExceptionStatus,
+    Diagnostics {
+        sub_function: u16,
+        data: &'a [u8],
+    },
+    GetCommEventCounter,
+    GetCommEventLog,
     WriteMultipleCoils {
         address: u16,
         quantity: u16,
@@ -204,6 +50,9 @@ pub enum Received<'a> {
         quantity: u16,
         data: &'a [u8],
     },
+    ReportServerId,
+    ReadFileRecord(Reads<'a>),
+    WriteFileRecord(Writes<'a>),
     MaskWriteRegister {
         address: u16,
         and_mask: u16,
@@ -216,33 +65,66 @@ pub enum Received<'a> {
         write_quantity: u16,
         data: &'a [u8],
     },
+    ReadFifoQueue {
+        address: u16,
+    },
+    ReadDeviceIdentification {
+        code: u8,
+        object: u8,
+    },
+    /// 2B with any other MEI type.
+    EncapsulatedInterface {
+        mei_type: u8,
+        data: &'a [u8],
+    },
+    /// A function that a user defined.
+    Custom {
+        function: u8,
+        data: &'a [u8],
+    },
 }
 
-impl<'a> Received<'a> {
-    /// Reads a request PDU.
+impl<'a> Request<'a> {
+    /// Reads a request PDU; functions from 65 to 72 and 100 to 110 are the
+    /// user's.
     ///
     /// # Errors
     /// The exception that a server answers: [`Status::ILLEGAL_FUNCTION`] for
-    /// an unknown function, [`Status::ILLEGAL_DATA_VALUE`] for a length,
-    /// quantity or value out of order, [`Status::ILLEGAL_DATA_ADDRESS`] for
-    /// addresses beyond 65535.
+    /// an unknown function or sub-function, [`Status::ILLEGAL_DATA_VALUE`] for
+    /// a length, quantity or value out of order,
+    /// [`Status::ILLEGAL_DATA_ADDRESS`] for addresses beyond 65535.
     pub fn parse(pdu: &'a [u8]) -> Result<Self, Status> {
+        if pdu.len() > MAX_PDU {
+            return Err(Status::ILLEGAL_DATA_VALUE);
+        }
         let mut reader = Reader::new(pdu);
         let function = reader.u8().ok_or(Status::ILLEGAL_FUNCTION)?;
+        let reader = &mut reader;
         let request = match function {
-            bits::READ_COILS | bits::READ_DISCRETE_INPUTS => {
-                bits::parse_read(function, &mut reader)
-            }
-            bits::WRITE_SINGLE_COIL => bits::parse_write_single(&mut reader),
-            bits::WRITE_MULTIPLE_COILS => bits::parse_write_multiple(&mut reader),
+            bits::READ_COILS | bits::READ_DISCRETE_INPUTS => bits::parse_read(function, reader),
             registers::READ_HOLDING_REGISTERS | registers::READ_INPUT_REGISTERS => {
-                registers::parse_read(function, &mut reader)
+                registers::parse_read(function, reader)
             }
-            registers::WRITE_SINGLE_REGISTER => registers::parse_write_single(&mut reader),
-            registers::WRITE_MULTIPLE_REGISTERS => registers::parse_write_multiple(&mut reader),
-            registers::MASK_WRITE_REGISTER => registers::parse_mask_write(&mut reader),
-            registers::READ_WRITE_MULTIPLE_REGISTERS => registers::parse_read_write(&mut reader),
-            _ => return Err(Status::ILLEGAL_FUNCTION),
+            bits::WRITE_SINGLE_COIL => bits::parse_write_single(reader),
+            registers::WRITE_SINGLE_REGISTER => registers::parse_write_single(reader),
+            diagnostics::READ_EXCEPTION_STATUS => Ok(Request::ReadExceptionStatus),
+            diagnostics::DIAGNOSTICS => diagnostics::parse_diagnostics(reader),
+            diagnostics::GET_COMM_EVENT_COUNTER => Ok(Request::GetCommEventCounter),
+            diagnostics::GET_COMM_EVENT_LOG => Ok(Request::GetCommEventLog),
+            bits::WRITE_MULTIPLE_COILS => bits::parse_write_multiple(reader),
+            registers::WRITE_MULTIPLE_REGISTERS => registers::parse_write_multiple(reader),
+            diagnostics::REPORT_SERVER_ID => Ok(Request::ReportServerId),
+            files::READ_FILE_RECORD => files::parse_read(reader),
+            files::WRITE_FILE_RECORD => files::parse_write(reader),
+            registers::MASK_WRITE_REGISTER => registers::parse_mask_write(reader),
+            registers::READ_WRITE_MULTIPLE_REGISTERS => registers::parse_read_write(reader),
+            files::READ_FIFO_QUEUE => files::parse_fifo(reader),
+            identification::ENCAPSULATED_INTERFACE_TRANSPORT => identification::parse(reader),
+            function if custom::is_user_defined(function) => Ok(Request::Custom {
+                function,
+                data: reader.rest(),
+            }),
+            _ => Err(Status::ILLEGAL_FUNCTION),
         }?;
         if reader.is_empty() {
             Ok(request)
@@ -250,20 +132,158 @@ impl<'a> Received<'a> {
             Err(Status::ILLEGAL_DATA_VALUE)
         }
     }
-}
 
-/// The next word of a request that must have it.
-pub(super) fn word(reader: &mut Reader) -> Result<u16, Status> {
-    reader.u16().ok_or(Status::ILLEGAL_DATA_VALUE)
-}
+    /// The function code.
+    pub const fn function(&self) -> u8 {
+        match *self {
+            Request::ReadBits { function, .. }
+            | Request::ReadRegisters { function, .. }
+            | Request::Custom { function, .. } => function,
+            Request::WriteSingleCoil { .. } => bits::WRITE_SINGLE_COIL,
+            Request::WriteSingleRegister { .. } => registers::WRITE_SINGLE_REGISTER,
+            Request::ReadExceptionStatus => diagnostics::READ_EXCEPTION_STATUS,
+            Request::Diagnostics { .. } => diagnostics::DIAGNOSTICS,
+            Request::GetCommEventCounter => diagnostics::GET_COMM_EVENT_COUNTER,
+            Request::GetCommEventLog => diagnostics::GET_COMM_EVENT_LOG,
+            Request::WriteMultipleCoils { .. } => bits::WRITE_MULTIPLE_COILS,
+            Request::WriteMultipleRegisters { .. } => registers::WRITE_MULTIPLE_REGISTERS,
+            Request::ReportServerId => diagnostics::REPORT_SERVER_ID,
+            Request::ReadFileRecord(_) => files::READ_FILE_RECORD,
+            Request::WriteFileRecord(_) => files::WRITE_FILE_RECORD,
+            Request::MaskWriteRegister { .. } => registers::MASK_WRITE_REGISTER,
+            Request::ReadWriteMultipleRegisters { .. } => registers::READ_WRITE_MULTIPLE_REGISTERS,
+            Request::ReadFifoQueue { .. } => files::READ_FIFO_QUEUE,
+            Request::ReadDeviceIdentification { .. } | Request::EncapsulatedInterface { .. } => {
+                identification::ENCAPSULATED_INTERFACE_TRANSPORT
+            }
+        }
+    }
 
-/// The byte count and the data that end a request.
-pub(super) fn counted<'a>(reader: &mut Reader<'a>, bytes: u16) -> Result<&'a [u8], Status> {
-    let count = reader.u8().ok_or(Status::ILLEGAL_DATA_VALUE)?;
-    let data = reader.rest();
-    if u16::from(count) == bytes && data.len() == usize::from(bytes) {
-        Ok(data)
-    } else {
-        Err(Status::ILLEGAL_DATA_VALUE)
+    /// Writes the PDU to the front of `pdu`; returns its length.
+    ///
+    /// # Errors
+    /// What [`Request::parse`] says of such a request, so that nothing malformed
+    /// is ever sent; [`Status::BUFFER_TOO_SMALL`] if it does not fit.
+    pub fn emit(&self, pdu: &mut [u8]) -> Result<usize, Status> {
+        let mut writer = Writer::new(pdu);
+        self.write(&mut writer);
+        let length = writer.finish()?;
+        let written = pdu.get(..length).unwrap_or_default();
+        match self {
+            // A code beyond the user's ranges is the user's own will.
+            Request::Custom { function, data } => custom::check(*function, data.len())?,
+            _ => drop(Request::parse(written)?),
+        }
+        Ok(length)
+    }
+
+    fn write(&self, writer: &mut Writer) {
+        match *self {
+            Request::ReadBits {
+                function,
+                address,
+                quantity,
+            }
+            | Request::ReadRegisters {
+                function,
+                address,
+                quantity,
+            } => {
+                writer.u8(function);
+                writer.u16(address);
+                writer.u16(quantity);
+            }
+            Request::WriteSingleCoil { address, on } => {
+                bits::emit_write_single(writer, address, on);
+            }
+            Request::WriteSingleRegister { address, value } => {
+                writer.u8(registers::WRITE_SINGLE_REGISTER);
+                writer.u16(address);
+                writer.u16(value);
+            }
+            Request::ReadExceptionStatus
+            | Request::GetCommEventCounter
+            | Request::GetCommEventLog
+            | Request::ReportServerId => writer.u8(self.function()),
+            Request::Diagnostics { sub_function, data } => {
+                diagnostics::emit_diagnostics(writer, sub_function, data);
+            }
+            Request::WriteMultipleCoils {
+                address,
+                quantity,
+                data,
+            }
+            | Request::WriteMultipleRegisters {
+                address,
+                quantity,
+                data,
+            } => {
+                writer.u8(self.function());
+                writer.u16(address);
+                writer.u16(quantity);
+                writer.counted(data);
+            }
+            Request::ReadFileRecord(Reads(groups)) | Request::WriteFileRecord(Writes(groups)) => {
+                writer.u8(self.function());
+                writer.counted(groups);
+            }
+            Request::MaskWriteRegister {
+                address,
+                and_mask,
+                or_mask,
+            } => registers::emit_mask_write(writer, address, and_mask, or_mask),
+            Request::ReadWriteMultipleRegisters {
+                read_address,
+                read_quantity,
+                write_address,
+                write_quantity,
+                data,
+            } => {
+                writer.u8(registers::READ_WRITE_MULTIPLE_REGISTERS);
+                writer.u16(read_address);
+                writer.u16(read_quantity);
+                writer.u16(write_address);
+                writer.u16(write_quantity);
+                writer.counted(data);
+            }
+            Request::ReadFifoQueue { address } => {
+                writer.u8(files::READ_FIFO_QUEUE);
+                writer.u16(address);
+            }
+            Request::ReadDeviceIdentification { code, object } => {
+                identification::emit_identification(writer, code, object);
+            }
+            Request::EncapsulatedInterface { mei_type, data } => {
+                identification::emit(writer, mei_type, data);
+            }
+            Request::Custom { function, data } => {
+                writer.u8(function);
+                writer.put(data);
+            }
+        }
+    }
+
+    /// The length of the response PDU if the request succeeds, as far as the
+    /// request tells.
+    pub fn response_length(&self, functions: &[custom::Function]) -> Length {
+        match *self {
+            Request::ReadBits { quantity, .. } => {
+                Length::Exactly(2 + usize::from(quantity).div_ceil(8))
+            }
+            Request::ReadRegisters { quantity, .. }
+            | Request::ReadWriteMultipleRegisters {
+                read_quantity: quantity,
+                ..
+            } => Length::Exactly(2 + 2 * usize::from(quantity)),
+            Request::ReadFileRecord(reads) => Length::Exactly(reads.response_length()),
+            // The response repeats the request.
+            Request::WriteFileRecord(writes) => Length::Exactly(2 + writes.bytes().len()),
+            Request::Diagnostics { data, .. } => Length::Exactly(3 + data.len()),
+            Request::ReadDeviceIdentification { .. } => Length::AtLeast(7),
+            Request::EncapsulatedInterface { mei_type, .. } => {
+                super::length::response(&[self.function(), mei_type], functions)
+            }
+            _ => super::length::response(&[self.function()], functions),
+        }
     }
 }

@@ -1,48 +1,294 @@
-//! Response PDUs, as the sender of the request judges them: the length rule
-//! that finds one, and whether its content answers the request.
+//! Response PDUs, whole: read by whoever receives one, written by whoever sends
+//! one. Data borrow from the bytes.
 
-use super::request::Request;
-use super::EXCEPTION;
+use super::files::{Records, Writes};
+use super::identification::Objects;
+use super::limits::{MAX_PDU, MAX_WRITE_BITS, MAX_WRITE_REGISTERS};
+use super::{bits, custom, diagnostics, files, identification, registers, EXCEPTION};
+use crate::bytes::{Reader, Writer};
 use crate::error::Status;
-use core::num::NonZeroU8;
 
-/// Where the data of a read's response start, behind function and byte count.
-pub const DATA: usize = 2;
+/// A response PDU. Register data are as on the wire, high bytes first; bit data
+/// begin with the lowest bit of the first byte.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs)]
+pub enum Response<'a> {
+    /// 01 or 02.
+    ReadBits {
+        function: u8,
+        data: &'a [u8],
+    },
+    /// 03, 04 or 17.
+    ReadRegisters {
+        function: u8,
+        data: &'a [u8],
+    },
+    WriteSingleCoil {
+        address: u16,
+        on: bool,
+    },
+    WriteSingleRegister {
+        address: u16,
+        value: u16,
+    },
+    /// 07.
+    ExceptionStatus {
+        outputs: u8,
+    },
+    Diagnostics {
+        sub_function: u16,
+        data: &'a [u8],
+    },
+    /// 0B. The status word is FFFF while a program command is carried out.
+    CommEventCounter {
+        status: u16,
+        events: u16,
+    },
+    /// 0C. The latest event comes first.
+    CommEventLog {
+        status: u16,
+        events: u16,
+        messages: u16,
+        log: &'a [u8],
+    },
+    /// 0F or 10.
+    WriteMultiple {
+        function: u8,
+        address: u16,
+        quantity: u16,
+    },
+    /// 11. The byte count, which some devices let end before the data do.
+    ServerId {
+        count: u8,
+        data: &'a [u8],
+    },
+    ReadFileRecord(Records<'a>),
+    WriteFileRecord(Writes<'a>),
+    MaskWriteRegister {
+        address: u16,
+        and_mask: u16,
+        or_mask: u16,
+    },
+    /// 18.
+    FifoQueue {
+        data: &'a [u8],
+    },
+    /// 2B/0E.
+    DeviceIdentification {
+        code: u8,
+        conformity: u8,
+        more_follows: bool,
+        next_object: u8,
+        objects: Objects<'a>,
+    },
+    /// 2B with any other MEI type.
+    EncapsulatedInterface {
+        mei_type: u8,
+        data: &'a [u8],
+    },
+    /// The function of the request, without the highest bit, and the code.
+    Exception {
+        function: u8,
+        code: u8,
+    },
+    /// A function that a user defined.
+    Custom {
+        function: u8,
+        data: &'a [u8],
+    },
+}
 
-/// An exception response is a function code and an exception code.
-const EXCEPTION_LENGTH: u8 = 2;
+impl<'a> Response<'a> {
+    /// Reads a response PDU; functions from 65 to 72 and 100 to 110 are the
+    /// user's.
+    ///
+    /// # Errors
+    /// [`Status::INVALID_FUNCTION`] for an unknown function,
+    /// [`Status::MALFORMED_REPLY`] for whatever else is out of order.
+    pub fn parse(pdu: &'a [u8]) -> Result<Self, Status> {
+        if pdu.len() > MAX_PDU {
+            return Err(Status::MALFORMED_REPLY);
+        }
+        let mut reader = Reader::new(pdu);
+        let function = reader.u8().ok_or(Status::MALFORMED_REPLY)?;
+        let reader = &mut reader;
+        let response = match function {
+            bits::READ_COILS | bits::READ_DISCRETE_INPUTS => {
+                bits::parse_read_response(function, reader)
+            }
+            registers::READ_HOLDING_REGISTERS
+            | registers::READ_INPUT_REGISTERS
+            | registers::READ_WRITE_MULTIPLE_REGISTERS => {
+                registers::parse_read_response(function, reader)
+            }
+            bits::WRITE_SINGLE_COIL => bits::parse_write_single_response(reader),
+            registers::WRITE_SINGLE_REGISTER => registers::parse_write_single_response(reader),
+            diagnostics::READ_EXCEPTION_STATUS => diagnostics::parse_exception_status(reader),
+            diagnostics::DIAGNOSTICS => diagnostics::parse_diagnostics_response(reader),
+            diagnostics::GET_COMM_EVENT_COUNTER => diagnostics::parse_event_counter(reader),
+            diagnostics::GET_COMM_EVENT_LOG => diagnostics::parse_event_log(reader),
+            bits::WRITE_MULTIPLE_COILS => {
+                registers::parse_write_multiple_response(function, MAX_WRITE_BITS, reader)
+            }
+            registers::WRITE_MULTIPLE_REGISTERS => {
+                registers::parse_write_multiple_response(function, MAX_WRITE_REGISTERS, reader)
+            }
+            diagnostics::REPORT_SERVER_ID => diagnostics::parse_server_id(reader),
+            files::READ_FILE_RECORD => files::parse_read_response(reader),
+            files::WRITE_FILE_RECORD => files::parse_write_response(reader),
+            registers::MASK_WRITE_REGISTER => registers::parse_mask_write_response(reader),
+            files::READ_FIFO_QUEUE => files::parse_fifo_response(reader),
+            identification::ENCAPSULATED_INTERFACE_TRANSPORT => {
+                identification::parse_response(reader)
+            }
+            function if function & EXCEPTION != 0 => parse_exception(function, reader),
+            function if custom::is_user_defined(function) => Ok(Response::Custom {
+                function,
+                data: reader.rest(),
+            }),
+            _ => return Err(Status::INVALID_FUNCTION),
+        };
+        match response {
+            Ok(response) if reader.is_empty() => Ok(response),
+            _ => Err(Status::MALFORMED_REPLY),
+        }
+    }
 
-/// The length of the response to `request` that begins with the bytes of
-/// `pdu`, or the least length while they do not tell; `None` if no response to
-/// it begins so.
-pub fn expected(request: &Request, pdu: &[u8]) -> Option<NonZeroU8> {
-    let length = request.response_length();
-    NonZeroU8::new(match pdu {
-        [] => EXCEPTION_LENGTH,
-        [function, rest @ ..] if *function == request.function() => match rest {
-            [] if request.is_read() => EXCEPTION_LENGTH,
-            [count, ..] if request.is_read() && *count != length - 2 => return None,
-            _ => length,
-        },
-        [function, ..] if *function == request.function() | EXCEPTION => EXCEPTION_LENGTH,
-        _ => return None,
+    /// The function code, of an exception that of the request.
+    pub const fn function(&self) -> u8 {
+        match *self {
+            Response::ReadBits { function, .. }
+            | Response::ReadRegisters { function, .. }
+            | Response::WriteMultiple { function, .. }
+            | Response::Exception { function, .. }
+            | Response::Custom { function, .. } => function,
+            Response::WriteSingleCoil { .. } => bits::WRITE_SINGLE_COIL,
+            Response::WriteSingleRegister { .. } => registers::WRITE_SINGLE_REGISTER,
+            Response::ExceptionStatus { .. } => diagnostics::READ_EXCEPTION_STATUS,
+            Response::Diagnostics { .. } => diagnostics::DIAGNOSTICS,
+            Response::CommEventCounter { .. } => diagnostics::GET_COMM_EVENT_COUNTER,
+            Response::CommEventLog { .. } => diagnostics::GET_COMM_EVENT_LOG,
+            Response::ServerId { .. } => diagnostics::REPORT_SERVER_ID,
+            Response::ReadFileRecord(_) => files::READ_FILE_RECORD,
+            Response::WriteFileRecord(_) => files::WRITE_FILE_RECORD,
+            Response::MaskWriteRegister { .. } => registers::MASK_WRITE_REGISTER,
+            Response::FifoQueue { .. } => files::READ_FIFO_QUEUE,
+            Response::DeviceIdentification { .. } | Response::EncapsulatedInterface { .. } => {
+                identification::ENCAPSULATED_INTERFACE_TRANSPORT
+            }
+        }
+    }
+
+    /// Writes the PDU to the front of `pdu`; returns its length.
+    ///
+    /// # Errors
+    /// What [`Response::parse`] says of such a response, so that nothing
+    /// malformed is ever sent; [`Status::BUFFER_TOO_SMALL`] if it does not fit.
+    pub fn emit(&self, pdu: &mut [u8]) -> Result<usize, Status> {
+        let mut writer = Writer::new(pdu);
+        self.write(&mut writer);
+        let length = writer.finish()?;
+        let written = pdu.get(..length).unwrap_or_default();
+        match self {
+            // A code beyond the user's ranges is the user's own will.
+            Response::Custom { function, data } => custom::check(*function, data.len())?,
+            _ => drop(Response::parse(written)?),
+        }
+        Ok(length)
+    }
+
+    fn write(&self, writer: &mut Writer) {
+        match *self {
+            Response::ReadBits { function, data } | Response::ReadRegisters { function, data } => {
+                writer.u8(function);
+                writer.counted(data);
+            }
+            Response::WriteSingleCoil { address, on } => {
+                bits::emit_write_single(writer, address, on);
+            }
+            Response::WriteSingleRegister { address, value } => {
+                writer.u8(registers::WRITE_SINGLE_REGISTER);
+                writer.u16(address);
+                writer.u16(value);
+            }
+            Response::ExceptionStatus { outputs } => {
+                writer.u8(diagnostics::READ_EXCEPTION_STATUS);
+                writer.u8(outputs);
+            }
+            Response::Diagnostics { sub_function, data } => {
+                diagnostics::emit_diagnostics(writer, sub_function, data);
+            }
+            Response::CommEventCounter { status, events } => {
+                writer.u8(diagnostics::GET_COMM_EVENT_COUNTER);
+                writer.u16(status);
+                writer.u16(events);
+            }
+            Response::CommEventLog {
+                status,
+                events,
+                messages,
+                log,
+            } => diagnostics::emit_event_log(writer, [status, events, messages], log),
+            Response::WriteMultiple {
+                function,
+                address,
+                quantity,
+            } => {
+                writer.u8(function);
+                writer.u16(address);
+                writer.u16(quantity);
+            }
+            Response::ServerId { count, data } => {
+                writer.u8(diagnostics::REPORT_SERVER_ID);
+                writer.u8(count);
+                writer.put(data);
+            }
+            Response::ReadFileRecord(Records(groups))
+            | Response::WriteFileRecord(Writes(groups)) => {
+                writer.u8(self.function());
+                writer.counted(groups);
+            }
+            Response::MaskWriteRegister {
+                address,
+                and_mask,
+                or_mask,
+            } => registers::emit_mask_write(writer, address, and_mask, or_mask),
+            Response::FifoQueue { data } => files::emit_fifo_response(writer, data),
+            Response::DeviceIdentification {
+                code,
+                conformity,
+                more_follows,
+                next_object,
+                objects,
+            } => identification::emit_identification_response(
+                writer,
+                [code, conformity],
+                more_follows,
+                next_object,
+                objects,
+            ),
+            Response::EncapsulatedInterface { mei_type, data } => {
+                identification::emit(writer, mei_type, data);
+            }
+            Response::Exception { function, code } => {
+                writer.u8(function | EXCEPTION);
+                writer.u8(code);
+            }
+            Response::Custom { function, data } => {
+                writer.u8(function);
+                writer.put(data);
+            }
+        }
+    }
+}
+
+fn parse_exception<'a>(function: u8, reader: &mut Reader) -> Result<Response<'a>, Status> {
+    let code = reader.u8().ok_or(Status::MALFORMED_REPLY)?;
+    if Status::exception(code) == Status::MALFORMED_REPLY {
+        return Err(Status::MALFORMED_REPLY);
+    }
+    Ok(Response::Exception {
+        function: function & !EXCEPTION,
+        code,
     })
-}
-
-/// What a complete `pdu` that is [`expected`] says to `request`: success, an
-/// exception of the remote device, or [`Status::MALFORMED_REPLY`].
-pub fn judge(request: &Request, pdu: &[u8]) -> Status {
-    match exception_code(pdu) {
-        Some(code) => Status::exception(code),
-        None if request.is_read() || request.agrees(pdu) => Status::OK,
-        None => Status::MALFORMED_REPLY,
-    }
-}
-
-/// The raw exception code of a response, if that is an exception.
-pub fn exception_code(pdu: &[u8]) -> Option<u8> {
-    match pdu {
-        [function, code, ..] if *function & EXCEPTION != 0 => Some(*code),
-        _ => None,
-    }
 }

@@ -2,8 +2,8 @@
 
 use crate::error::Status;
 use crate::frame::rtu::{self, Verdict, Wanted};
-use crate::pdu::request::Request;
-use crate::pdu::response;
+use crate::pdu::query::Query;
+use crate::pdu::reply;
 use core::num::NonZeroU8;
 
 /// What answers a request.
@@ -14,7 +14,7 @@ pub(super) struct Answer {
     pub(super) echo: bool,
     /// The exception code of the last response; 0 if it was none.
     pub(super) exception: u8,
-    pub(super) request: Request,
+    pub(super) request: Query,
 }
 
 impl Answer {
@@ -23,7 +23,7 @@ impl Answer {
         unit: 0,
         echo: false,
         exception: 0,
-        request: Request::NONE,
+        request: Query::NONE,
     };
 
     /// True if `pdu`, complete or not, is the request itself.
@@ -48,7 +48,7 @@ impl Wanted for Answer {
                 if self.is_echo(pdu) {
                     NonZeroU8::new(self.request.length())
                 } else {
-                    response::expected(&self.request, pdu)
+                    reply::expected(&self.request, pdu)
                 }
             }
             _ => None,
@@ -64,8 +64,8 @@ impl Wanted for Answer {
             self.echo = false;
             return Verdict::Own;
         }
-        self.exception = response::exception_code(pdu).unwrap_or(0);
-        match response::judge(&self.request, pdu) {
+        self.exception = reply::exception_code(pdu).unwrap_or(0);
+        match reply::judge(&self.request, pdu) {
             Status::MALFORMED_REPLY => Verdict::Wrong,
             _ => Verdict::Right,
         }

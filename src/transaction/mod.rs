@@ -21,8 +21,8 @@ pub use storage::{Counter, Storage, COUNTERS};
 
 use crate::error::Status;
 use crate::frame::rtu::{self, Seen, Window};
-use crate::pdu::request::Request;
-use crate::pdu::response;
+use crate::pdu::query::Query;
+use crate::pdu::reply;
 use crate::port::Port;
 use crate::time::elapsed;
 use answer::Answer;
@@ -116,7 +116,7 @@ impl<P, S> Transaction<P, S> {
     }
 
     /// The request, which [`Transaction::start`] sends.
-    pub fn request(&mut self) -> &mut Request {
+    pub fn request(&mut self) -> &mut Query {
         &mut self.wanted.request
     }
 
@@ -188,7 +188,7 @@ impl<P: Port, S: Storage> Transaction<P, S> {
     /// false, with nothing filled, if they are too few.
     pub fn take_words(&mut self) -> bool {
         let (frame, words) = self.storage.frame_and_response();
-        match self.window.behind(frame, rtu::PDU + response::DATA) {
+        match self.window.behind(frame, rtu::PDU + reply::DATA) {
             Some(data) => self.wanted.request.take(words, data),
             None => false,
         }

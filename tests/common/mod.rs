@@ -1,12 +1,12 @@
 //! What several tests need: a request's frame, and a search for its response.
 
 use mbm::frame::rtu::{self, Verdict, Wanted};
-use mbm::pdu::request::Request;
-use mbm::pdu::response;
+use mbm::pdu::query::Query;
+use mbm::pdu::reply;
 use std::num::NonZeroU8;
 
 /// The frame of a request to `unit`, with `words` to send.
-pub fn frame(unit: u8, request: &Request, words: &[u16]) -> Vec<u8> {
+pub fn frame(unit: u8, request: &Query, words: &[u16]) -> Vec<u8> {
     let mut buffer = [0; rtu::MAX_FRAME];
     let emit = |pdu: &mut [u8]| request.emit(pdu, words);
     assert!(rtu::write(
@@ -19,7 +19,7 @@ pub fn frame(unit: u8, request: &Request, words: &[u16]) -> Vec<u8> {
 }
 
 /// The response of a unit to a request.
-pub struct Wanting<'a>(pub u8, pub &'a Request);
+pub struct Wanting<'a>(pub u8, pub &'a Query);
 
 impl Wanted for Wanting<'_> {
     fn unit(&self) -> u8 {
@@ -30,7 +30,7 @@ impl Wanted for Wanting<'_> {
     }
     fn length(&self, frame: &[u8]) -> Option<NonZeroU8> {
         match frame {
-            [unit, pdu @ ..] if *unit == self.0 => response::expected(self.1, pdu),
+            [unit, pdu @ ..] if *unit == self.0 => reply::expected(self.1, pdu),
             _ => None,
         }
     }

@@ -1,0 +1,39 @@
+//! What the parsers of all families share. A fault is the status that a server
+//! answers; [`super::response`] says what it means in a response.
+
+use super::query::check_range;
+use crate::bytes::Reader;
+use crate::error::Status;
+
+/// The next byte of a PDU that must have it.
+pub(super) fn byte(reader: &mut Reader) -> Result<u8, Status> {
+    reader.u8().ok_or(Status::ILLEGAL_DATA_VALUE)
+}
+
+/// The next word of a PDU that must have it.
+pub(super) fn word(reader: &mut Reader) -> Result<u16, Status> {
+    reader.u16().ok_or(Status::ILLEGAL_DATA_VALUE)
+}
+
+/// The byte count and the data that it counts.
+pub(super) fn counted<'a>(reader: &mut Reader<'a>) -> Result<&'a [u8], Status> {
+    let count = usize::from(byte(reader)?);
+    reader.take(count).ok_or(Status::ILLEGAL_DATA_VALUE)
+}
+
+/// As [`check_range`].
+pub(super) fn in_range(address: u16, quantity: u16, most: u16) -> Result<(), Status> {
+    match check_range(address, quantity, most) {
+        Status::OK => Ok(()),
+        refused => Err(refused),
+    }
+}
+
+/// True if `count` lies within `limits`, least and most.
+pub(super) fn within(count: usize, limits: (usize, usize)) -> Result<(), Status> {
+    if (limits.0..=limits.1).contains(&count) {
+        Ok(())
+    } else {
+        Err(Status::ILLEGAL_DATA_VALUE)
+    }
+}

@@ -1,0 +1,207 @@
+//! File records and FIFO queues: functions 14, 15 and 18.
+
+use super::fields::{counted, within, word};
+use super::limits::{FILE_DATA_BYTES, MAX_FIFO, MAX_RECORD, READ_FILE_BYTES, WRITE_FILE_BYTES};
+use super::request::Request;
+use super::response::Response;
+use crate::bytes::{Reader, Writer};
+use crate::error::Status;
+
+/// Read File Record (clause 6.14).
+pub const READ_FILE_RECORD: u8 = 0x14;
+/// Write File Record (clause 6.15).
+pub const WRITE_FILE_RECORD: u8 = 0x15;
+/// Read FIFO Queue (clause 6.18).
+pub const READ_FIFO_QUEUE: u8 = 0x18;
+
+/// The only reference type there is.
+pub const REFERENCE_TYPE: u8 = 6;
+
+/// Which records of a file a sub-request names.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Record {
+    /// File number, from 1 on.
+    pub file: u16,
+    /// First record, 0 to 9999.
+    pub record: u16,
+    /// How many records, each a register.
+    pub length: u16,
+}
+
+/// The sub-requests of 14.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Reads<'a>(pub(super) &'a [u8]);
+
+/// The sub-requests of 15, and of its response.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Writes<'a>(pub(super) &'a [u8]);
+
+/// The sub-responses of 14.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Records<'a>(pub(super) &'a [u8]);
+
+/// The next sub-request's head, or why there is none.
+fn head(reader: &mut Reader) -> Result<Record, Status> {
+    let reference = reader.u8().ok_or(Status::ILLEGAL_DATA_VALUE)?;
+    let record = Record {
+        file: word(reader)?,
+        record: word(reader)?,
+        length: word(reader)?,
+    };
+    let last = u32::from(record.record) + u32::from(record.length);
+    if reference != REFERENCE_TYPE || record.file == 0 || last > u32::from(MAX_RECORD) + 1 {
+        Err(Status::ILLEGAL_DATA_ADDRESS)
+    } else if record.length == 0 {
+        Err(Status::ILLEGAL_DATA_VALUE)
+    } else {
+        Ok(record)
+    }
+}
+
+impl<'a> Reads<'a> {
+    /// The sub-requests that these bytes are.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_VALUE`] for counts out of order, or records that
+    /// no response can hold; [`Status::ILLEGAL_DATA_ADDRESS`] for a reference
+    /// type, file or record number that there cannot be.
+    pub fn new(bytes: &'a [u8]) -> Result<Self, Status> {
+        within(bytes.len(), READ_FILE_BYTES)?;
+        let mut reader = Reader::new(bytes);
+        let mut answer = 0;
+        while !reader.is_empty() {
+            answer += 2 + 2 * usize::from(head(&mut reader)?.length);
+        }
+        if answer > FILE_DATA_BYTES.1 {
+            return Err(Status::ILLEGAL_DATA_VALUE);
+        }
+        Ok(Reads(bytes))
+    }
+
+    /// The sub-requests as sent.
+    pub const fn bytes(&self) -> &'a [u8] {
+        self.0
+    }
+
+    /// What each sub-request names.
+    pub fn iter(&self) -> impl Iterator<Item = Record> + 'a {
+        let mut reader = Reader::new(self.0);
+        core::iter::from_fn(move || head(&mut reader).ok())
+    }
+
+    /// Length of the response PDU.
+    pub fn response_length(&self) -> usize {
+        let records = self.iter().map(|record| 2 + 2 * usize::from(record.length));
+        2 + records.sum::<usize>()
+    }
+}
+
+/// The next sub-request of 15: its head and its data.
+fn written<'a>(reader: &mut Reader<'a>) -> Result<(Record, &'a [u8]), Status> {
+    let record = head(reader)?;
+    let data = reader.take(2 * usize::from(record.length));
+    Ok((record, data.ok_or(Status::ILLEGAL_DATA_VALUE)?))
+}
+
+impl<'a> Writes<'a> {
+    /// As [`Reads::new`].
+    ///
+    /// # Errors
+    /// As [`Reads::new`].
+    pub fn new(bytes: &'a [u8]) -> Result<Self, Status> {
+        within(bytes.len(), WRITE_FILE_BYTES)?;
+        let mut reader = Reader::new(bytes);
+        while !reader.is_empty() {
+            written(&mut reader)?;
+        }
+        Ok(Writes(bytes))
+    }
+
+    /// The sub-requests as sent.
+    pub const fn bytes(&self) -> &'a [u8] {
+        self.0
+    }
+
+    /// What each sub-request names, and the data for it, high bytes first.
+    pub fn iter(&self) -> impl Iterator<Item = (Record, &'a [u8])> + 'a {
+        let mut reader = Reader::new(self.0);
+        core::iter::from_fn(move || written(&mut reader).ok())
+    }
+}
+
+/// The data of the next sub-response of 14.
+fn read<'a>(reader: &mut Reader<'a>) -> Result<&'a [u8], Status> {
+    let group = counted(reader)?;
+    match group.split_first() {
+        Some((&REFERENCE_TYPE, data)) if !data.is_empty() && data.len().is_multiple_of(2) => {
+            Ok(data)
+        }
+        _ => Err(Status::ILLEGAL_DATA_VALUE),
+    }
+}
+
+impl<'a> Records<'a> {
+    /// The sub-responses that these bytes are.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_VALUE`] for counts out of order.
+    pub fn new(bytes: &'a [u8]) -> Result<Self, Status> {
+        // One record of one register takes four bytes, though the standard's
+        // table begins at seven.
+        within(bytes.len(), (4, FILE_DATA_BYTES.1))?;
+        let mut reader = Reader::new(bytes);
+        while !reader.is_empty() {
+            read(&mut reader)?;
+        }
+        Ok(Records(bytes))
+    }
+
+    /// The sub-responses as sent.
+    pub const fn bytes(&self) -> &'a [u8] {
+        self.0
+    }
+
+    /// The data of each sub-response, high bytes first.
+    pub fn iter(&self) -> impl Iterator<Item = &'a [u8]> + 'a {
+        let mut reader = Reader::new(self.0);
+        core::iter::from_fn(move || read(&mut reader).ok())
+    }
+}
+
+pub(super) fn parse_read<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
+    Ok(Request::ReadFileRecord(Reads::new(counted(reader)?)?))
+}
+
+pub(super) fn parse_write<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
+    Ok(Request::WriteFileRecord(Writes::new(counted(reader)?)?))
+}
+
+pub(super) fn parse_fifo<'a>(reader: &mut Reader) -> Result<Request<'a>, Status> {
+    let address = word(reader)?;
+    Ok(Request::ReadFifoQueue { address })
+}
+
+pub(super) fn parse_read_response<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
+    Ok(Response::ReadFileRecord(Records::new(counted(reader)?)?))
+}
+
+pub(super) fn parse_write_response<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
+    Ok(Response::WriteFileRecord(Writes::new(counted(reader)?)?))
+}
+
+pub(super) fn parse_fifo_response<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
+    let (bytes, count) = (word(reader)?, word(reader)?);
+    let data = reader.rest();
+    let agree = count <= MAX_FIFO && bytes == 2 + 2 * count && data.len() == 2 * usize::from(count);
+    if !agree {
+        return Err(Status::ILLEGAL_DATA_VALUE);
+    }
+    Ok(Response::FifoQueue { data })
+}
+
+pub(super) fn emit_fifo_response(writer: &mut Writer, data: &[u8]) {
+    writer.u8(READ_FIFO_QUEUE);
+    writer.u16(data.len() as u16 + 2);
+    writer.u16(data.len() as u16 / 2);
+    writer.put(data);
+}

@@ -1,0 +1,133 @@
+//! Encapsulated interface transport, and the device identification in it:
+//! function 2B.
+
+use super::fields::{byte, counted};
+use super::request::Request;
+use super::response::Response;
+use crate::bytes::{Reader, Writer};
+use crate::error::Status;
+
+/// Encapsulated Interface Transport (clause 6.19).
+pub const ENCAPSULATED_INTERFACE_TRANSPORT: u8 = 0x2B;
+
+/// CANopen General Reference (clause 6.20).
+pub const MEI_CANOPEN: u8 = 0x0D;
+/// Read Device Identification (clause 6.21).
+pub const MEI_READ_DEVICE_IDENTIFICATION: u8 = 0x0E;
+
+/// Read device id code: the basic objects, as a stream.
+pub const BASIC: u8 = 1;
+/// Read device id code: the regular objects, as a stream.
+pub const REGULAR: u8 = 2;
+/// Read device id code: the extended objects, as a stream.
+pub const EXTENDED: u8 = 3;
+/// Read device id code: one object.
+pub const INDIVIDUAL: u8 = 4;
+
+/// More follows, in a response.
+const MORE: u8 = 0xFF;
+
+/// The objects of a response, each an id and a value.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Objects<'a> {
+    pub(super) count: u8,
+    pub(super) bytes: &'a [u8],
+}
+
+/// The next object.
+fn object<'a>(reader: &mut Reader<'a>) -> Result<(u8, &'a [u8]), Status> {
+    let id = byte(reader)?;
+    Ok((id, counted(reader)?))
+}
+
+impl<'a> Objects<'a> {
+    /// The `count` objects that these bytes are.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_VALUE`] if they are not just so many.
+    pub fn new(count: u8, bytes: &'a [u8]) -> Result<Self, Status> {
+        let mut reader = Reader::new(bytes);
+        for _ in 0..count {
+            object(&mut reader)?;
+        }
+        if reader.is_empty() {
+            Ok(Objects { count, bytes })
+        } else {
+            Err(Status::ILLEGAL_DATA_VALUE)
+        }
+    }
+
+    /// How many objects there are.
+    pub const fn count(&self) -> u8 {
+        self.count
+    }
+
+    /// The objects as sent: id, length and value of each.
+    pub const fn bytes(&self) -> &'a [u8] {
+        self.bytes
+    }
+
+    /// Id and value of each object.
+    pub fn iter(&self) -> impl Iterator<Item = (u8, &'a [u8])> + 'a {
+        let mut reader = Reader::new(self.bytes);
+        core::iter::from_fn(move || object(&mut reader).ok())
+    }
+}
+
+pub(super) fn parse<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
+    let mei_type = byte(reader)?;
+    if mei_type != MEI_READ_DEVICE_IDENTIFICATION {
+        let data = reader.rest();
+        return Ok(Request::EncapsulatedInterface { mei_type, data });
+    }
+    let (code, object) = (byte(reader)?, byte(reader)?);
+    if !(BASIC..=INDIVIDUAL).contains(&code) {
+        return Err(Status::ILLEGAL_DATA_VALUE);
+    }
+    Ok(Request::ReadDeviceIdentification { code, object })
+}
+
+pub(super) fn emit_identification(writer: &mut Writer, code: u8, object: u8) {
+    emit(writer, MEI_READ_DEVICE_IDENTIFICATION, &[code, object]);
+}
+
+/// Emits a request or response of any MEI type.
+pub(super) fn emit(writer: &mut Writer, mei_type: u8, data: &[u8]) {
+    writer.u8(ENCAPSULATED_INTERFACE_TRANSPORT);
+    writer.u8(mei_type);
+    writer.put(data);
+}
+
+pub(super) fn parse_response<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
+    let mei_type = byte(reader)?;
+    if mei_type != MEI_READ_DEVICE_IDENTIFICATION {
+        let data = reader.rest();
+        return Ok(Response::EncapsulatedInterface { mei_type, data });
+    }
+    let (code, conformity) = (byte(reader)?, byte(reader)?);
+    let (more, next_object, count) = (byte(reader)?, byte(reader)?, byte(reader)?);
+    if !(BASIC..=INDIVIDUAL).contains(&code) || (more != 0 && more != MORE) {
+        return Err(Status::ILLEGAL_DATA_VALUE);
+    }
+    Ok(Response::DeviceIdentification {
+        code,
+        conformity,
+        more_follows: more == MORE,
+        next_object,
+        objects: Objects::new(count, reader.rest())?,
+    })
+}
+
+pub(super) fn emit_identification_response(
+    writer: &mut Writer,
+    head: [u8; 2],
+    more_follows: bool,
+    next_object: u8,
+    objects: Objects,
+) {
+    let [code, conformity] = head;
+    let more = if more_follows { MORE } else { 0 };
+    let head = [code, conformity, more, next_object, objects.count];
+    emit(writer, MEI_READ_DEVICE_IDENTIFICATION, &head);
+    writer.put(objects.bytes);
+}

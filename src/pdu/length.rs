@@ -1,0 +1,136 @@
+//! How long a PDU is, as its first bytes tell.
+
+use super::custom::{find, Function, Rule};
+use super::diagnostics::sub_function::RETURN_QUERY_DATA;
+use super::identification::MEI_READ_DEVICE_IDENTIFICATION;
+use super::{bits, diagnostics, files, identification, registers, EXCEPTION};
+
+/// How long a PDU is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Length {
+    /// So many bytes.
+    Exactly(usize),
+    /// So many bytes at least, which will tell more.
+    AtLeast(usize),
+    /// Only the end of the frame tells: silence, or the framing's own length.
+    Silence,
+    /// Nobody knows this function.
+    Unknown,
+}
+
+/// A length that the byte at `offset` counts, with `more` bytes behind what it
+/// counts.
+fn counted(pdu: &[u8], offset: usize, more: usize) -> Length {
+    match pdu.get(offset) {
+        Some(count) => Length::Exactly(offset + 1 + usize::from(*count) + more),
+        None => Length::AtLeast(offset + 1),
+    }
+}
+
+fn by_rule(pdu: &[u8], rule: Rule) -> Length {
+    match rule {
+        Rule::Fixed(length) => Length::Exactly(usize::from(length)),
+        Rule::Counted(offset, more) => counted(pdu, usize::from(offset), usize::from(more)),
+        Rule::Silence => Length::Silence,
+    }
+}
+
+/// The sub-functions of 08 carry one word, but for one.
+fn diagnostics(pdu: &[u8]) -> Length {
+    match pdu.get(1..3) {
+        None => Length::AtLeast(3),
+        Some(sub_function) if sub_function == RETURN_QUERY_DATA.to_be_bytes() => Length::Silence,
+        Some(_) => Length::Exactly(5),
+    }
+}
+
+/// The length of the request PDU that begins with these bytes.
+pub fn request(pdu: &[u8], functions: &[Function]) -> Length {
+    let Some(&code) = pdu.first() else {
+        return Length::AtLeast(1);
+    };
+    match code {
+        bits::READ_COILS
+        | bits::READ_DISCRETE_INPUTS
+        | bits::WRITE_SINGLE_COIL
+        | registers::READ_HOLDING_REGISTERS
+        | registers::READ_INPUT_REGISTERS
+        | registers::WRITE_SINGLE_REGISTER => Length::Exactly(5),
+        bits::WRITE_MULTIPLE_COILS | registers::WRITE_MULTIPLE_REGISTERS => counted(pdu, 5, 0),
+        registers::MASK_WRITE_REGISTER => Length::Exactly(7),
+        registers::READ_WRITE_MULTIPLE_REGISTERS => counted(pdu, 9, 0),
+        diagnostics::READ_EXCEPTION_STATUS
+        | diagnostics::GET_COMM_EVENT_COUNTER
+        | diagnostics::GET_COMM_EVENT_LOG
+        | diagnostics::REPORT_SERVER_ID => Length::Exactly(1),
+        diagnostics::DIAGNOSTICS => diagnostics(pdu),
+        files::READ_FILE_RECORD | files::WRITE_FILE_RECORD => counted(pdu, 1, 0),
+        files::READ_FIFO_QUEUE => Length::Exactly(3),
+        identification::ENCAPSULATED_INTERFACE_TRANSPORT => match pdu.get(1) {
+            None => Length::AtLeast(2),
+            Some(&MEI_READ_DEVICE_IDENTIFICATION) => Length::Exactly(4),
+            Some(_) => Length::Silence,
+        },
+        code => match find(functions, code) {
+            Some(function) => by_rule(pdu, function.request),
+            None => Length::Unknown,
+        },
+    }
+}
+
+/// The length of the response PDU that begins with these bytes.
+pub fn response(pdu: &[u8], functions: &[Function]) -> Length {
+    let Some(&code) = pdu.first() else {
+        return Length::AtLeast(1);
+    };
+    match code {
+        bits::READ_COILS
+        | bits::READ_DISCRETE_INPUTS
+        | registers::READ_HOLDING_REGISTERS
+        | registers::READ_INPUT_REGISTERS
+        | registers::READ_WRITE_MULTIPLE_REGISTERS
+        | diagnostics::GET_COMM_EVENT_LOG
+        | diagnostics::REPORT_SERVER_ID
+        | files::READ_FILE_RECORD
+        | files::WRITE_FILE_RECORD => counted(pdu, 1, 0),
+        bits::WRITE_SINGLE_COIL
+        | bits::WRITE_MULTIPLE_COILS
+        | registers::WRITE_SINGLE_REGISTER
+        | registers::WRITE_MULTIPLE_REGISTERS
+        | diagnostics::GET_COMM_EVENT_COUNTER => Length::Exactly(5),
+        registers::MASK_WRITE_REGISTER => Length::Exactly(7),
+        diagnostics::READ_EXCEPTION_STATUS => Length::Exactly(2),
+        diagnostics::DIAGNOSTICS => diagnostics(pdu),
+        files::READ_FIFO_QUEUE => match pdu.get(1..3) {
+            Some([high, low]) => {
+                Length::Exactly(3 + usize::from(u16::from_be_bytes([*high, *low])))
+            }
+            _ => Length::AtLeast(3),
+        },
+        identification::ENCAPSULATED_INTERFACE_TRANSPORT => match pdu.get(1) {
+            None => Length::AtLeast(2),
+            Some(&MEI_READ_DEVICE_IDENTIFICATION) => objects(pdu),
+            Some(_) => Length::Silence,
+        },
+        code if code & EXCEPTION != 0 => Length::Exactly(2),
+        code => match find(functions, code) {
+            Some(function) => by_rule(pdu, function.response),
+            None => Length::Unknown,
+        },
+    }
+}
+
+/// Device identification carries its length object by object.
+fn objects(pdu: &[u8]) -> Length {
+    let mut end = 7;
+    let Some(count) = pdu.get(6) else {
+        return Length::AtLeast(end);
+    };
+    for _ in 0..*count {
+        match pdu.get(end + 1) {
+            Some(length) => end += 2 + usize::from(*length),
+            None => return Length::AtLeast(end + 2),
+        }
+    }
+    Length::Exactly(end)
+}
