@@ -182,6 +182,16 @@
 #define MBM_CANCELLED 237
 
 /**
+ * A frame that is not whole yet: more bytes are to come.
+ */
+#define MBM_INCOMPLETE_FRAME 238
+
+/**
+ * No frame of this framing begins like that, or has such a length.
+ */
+#define MBM_MALFORMED_FRAME 239
+
+/**
  * A Modbus RTU master: one line, one request at a time.
  *
  * Storage is yours and must be zero before first use, which a static object

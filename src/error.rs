@@ -52,6 +52,11 @@ impl Status {
     /// The caller cancelled the transaction.
     pub const CANCELLED: Status = Status(0xED);
 
+    /// The frame is not whole yet.
+    pub const INCOMPLETE_FRAME: Status = Status(0xEE);
+    /// No frame of this framing begins like that.
+    pub const MALFORMED_FRAME: Status = Status(0xEF);
+
     /// The status that an exception code of the remote device becomes.
     ///
     /// Code 0 and codes from 0x80 are no exception codes (they would collide

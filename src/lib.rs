@@ -15,6 +15,7 @@
 #![no_std]
 #![deny(unsafe_code)]
 #![warn(missing_docs, clippy::indexing_slicing, clippy::unwrap_used)]
+#![cfg_attr(test, allow(clippy::indexing_slicing, clippy::unwrap_used))]
 
 #[cfg(test)]
 extern crate std;

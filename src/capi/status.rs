@@ -75,6 +75,10 @@ pub const MBM_PENDING: u8 = 0xEB;
 pub const MBM_LINE_BUSY: u8 = 0xEC;
 /// The request was given up by mbm_master_cancel or mbm_master_begin.
 pub const MBM_CANCELLED: u8 = 0xED;
+/// A frame that is not whole yet: more bytes are to come.
+pub const MBM_INCOMPLETE_FRAME: u8 = 0xEE;
+/// No frame of this framing begins like that, or has such a length.
+pub const MBM_MALFORMED_FRAME: u8 = 0xEF;
 
 statuses! {
     MBM_OK = Status::OK, c"success";
@@ -101,6 +105,8 @@ statuses! {
     MBM_PENDING = Status::PENDING, c"under way, poll again";
     MBM_LINE_BUSY = Status::LINE_BUSY, c"the line never fell silent or the port took no bytes";
     MBM_CANCELLED = Status::CANCELLED, c"cancelled";
+    MBM_INCOMPLETE_FRAME = Status::INCOMPLETE_FRAME, c"the frame is not whole yet";
+    MBM_MALFORMED_FRAME = Status::MALFORMED_FRAME, c"no frame of this framing begins like that";
 }
 
 /// Explains a status in a few words of English.

@@ -1,4 +1,5 @@
-//! The CRC-16 of an RTU frame (serial line guide V1.02, 6.2.2).
+//! The CRC-16 of an RTU frame and the LRC of an ASCII frame (serial line guide
+//! V1.02, 6.2.2 and 6.2.1).
 
 /// Takes `bytes` in with a table, which a host has room for. The larger tables
 /// of the crate come with code that can panic.
@@ -68,6 +69,12 @@ impl Crc16 {
 /// The CRC-16 of `bytes`.
 pub fn crc16(bytes: &[u8]) -> Crc16 {
     Crc16::START.with(bytes)
+}
+
+/// The LRC of `bytes`: what makes their sum zero.
+pub fn lrc(bytes: &[u8]) -> u8 {
+    let sum = bytes.iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte));
+    sum.wrapping_neg()
 }
 
 #[cfg(test)]

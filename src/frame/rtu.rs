@@ -5,6 +5,7 @@
 //! has arrived, and what turns out not to be the frame costs one byte.
 
 use super::checksum::{crc16, Crc16};
+use super::Adu;
 use crate::error::Status;
 use core::cell::Cell;
 use core::num::NonZeroU8;
@@ -33,6 +34,44 @@ pub fn write(buffer: &mut [u8], unit: u8, length: usize, pdu: impl FnOnce(&mut [
     }
     *crc = crc16(content).to_bytes();
     true
+}
+
+/// The frame that is the whole of `bytes`.
+///
+/// # Errors
+/// [`Status::INCOMPLETE_FRAME`] for less than any frame has,
+/// [`Status::MALFORMED_FRAME`] for more, [`Status::INVALID_CRC`].
+pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Status> {
+    if bytes.len() < usize::from(MIN_FRAME) {
+        return Err(Status::INCOMPLETE_FRAME);
+    }
+    if bytes.len() > MAX_FRAME {
+        return Err(Status::MALFORMED_FRAME);
+    }
+    match bytes {
+        [unit, pdu @ .., _, _] if crc16(bytes).is_residue() => Ok(Adu {
+            transaction: 0,
+            unit: *unit,
+            pdu,
+        }),
+        _ => Err(Status::INVALID_CRC),
+    }
+}
+
+/// Writes the frame of the PDU that `pdu` writes; returns its length.
+///
+/// # Errors
+/// As `pdu` says; [`Status::BUFFER_TOO_SMALL`].
+pub fn emit(
+    buffer: &mut [u8],
+    unit: u8,
+    pdu: impl FnOnce(&mut [u8]) -> Result<usize, Status>,
+) -> Result<usize, Status> {
+    let room = buffer.len().saturating_sub(OVERHEAD);
+    let place = buffer.get_mut(PDU..PDU + room);
+    let length = pdu(place.ok_or(Status::BUFFER_TOO_SMALL)?)?;
+    write(buffer, unit, length, |_| ());
+    Ok(length + OVERHEAD)
 }
 
 /// What was seen on the way to a reply, the more telling the greater. The low

@@ -1,0 +1,192 @@
+//! ASCII: a colon, hexadecimal characters, LRC, carriage return and an end
+//! character (serial line guide V1.02, 2.5.2).
+
+use super::checksum::lrc;
+use super::Adu;
+use crate::error::Status;
+
+/// What a frame begins with.
+pub const START: u8 = b':';
+/// What stands before the end character.
+pub const RETURN: u8 = b'\r';
+/// The end character, unless sub-function 03 of 08 changed it.
+pub const END: u8 = b'\n';
+
+/// The longest frame: colon, unit, PDU of 253 bytes and LRC in two characters
+/// each, and the two that end it.
+pub const MAX_FRAME: usize = 1 + 2 * (1 + 253 + 1) + 2;
+
+/// Characters of a frame that are no bytes of content.
+const AROUND: usize = 3;
+
+/// The least bytes of content: unit, function, LRC.
+const MIN_CONTENT: usize = 3;
+
+const fn digit(character: u8) -> Option<u8> {
+    match character {
+        b'0'..=b'9' => Some(character - b'0'),
+        b'A'..=b'F' => Some(character - b'A' + 10),
+        b'a'..=b'f' => Some(character - b'a' + 10),
+        _ => None,
+    }
+}
+
+const fn character(digit: u8) -> u8 {
+    if digit < 10 {
+        b'0' + digit
+    } else {
+        b'A' - 10 + digit
+    }
+}
+
+/// The frame that is the whole of `bytes`, decoded where it stands. Lower case
+/// digits are taken too.
+///
+/// # Errors
+/// [`Status::INCOMPLETE_FRAME`] without its end; [`Status::MALFORMED_FRAME`]
+/// without a colon, or for characters that are no pairs of digits;
+/// [`Status::INVALID_CRC`] for a wrong LRC. The bytes may then be overwritten.
+pub fn parse(bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Status> {
+    if bytes.first().is_some_and(|first| *first != START) || bytes.len() > MAX_FRAME {
+        return Err(Status::MALFORMED_FRAME);
+    }
+    let Some(characters) = bytes.len().checked_sub(AROUND) else {
+        return Err(Status::INCOMPLETE_FRAME);
+    };
+    if !bytes.ends_with(&[RETURN, end]) {
+        return Err(Status::INCOMPLETE_FRAME);
+    }
+    let length = characters / 2;
+    if characters % 2 != 0 || length < MIN_CONTENT {
+        return Err(Status::MALFORMED_FRAME);
+    }
+    for index in 0..length {
+        let at = 1 + 2 * index;
+        let byte = match bytes.get(at..at + 2) {
+            Some([high, low]) => digit(*high).zip(digit(*low)),
+            _ => None,
+        };
+        let (high, low) = byte.ok_or(Status::MALFORMED_FRAME)?;
+        if let Some(place) = bytes.get_mut(index) {
+            *place = high << 4 | low;
+        }
+    }
+    match bytes.get(..length) {
+        Some([content @ .., check]) if lrc(content) == *check => match content {
+            [unit, pdu @ ..] => Ok(Adu {
+                transaction: 0,
+                unit: *unit,
+                pdu,
+            }),
+            [] => Err(Status::MALFORMED_FRAME),
+        },
+        _ => Err(Status::INVALID_CRC),
+    }
+}
+
+/// Writes the frame of the PDU that `pdu` writes; returns its length. The PDU
+/// stands in the buffer's front first.
+///
+/// # Errors
+/// As `pdu` says; [`Status::BUFFER_TOO_SMALL`].
+pub fn emit(
+    buffer: &mut [u8],
+    unit: u8,
+    end: u8,
+    pdu: impl FnOnce(&mut [u8]) -> Result<usize, Status>,
+) -> Result<usize, Status> {
+    let Some((first, place)) = buffer.split_first_mut() else {
+        return Err(Status::BUFFER_TOO_SMALL);
+    };
+    *first = unit;
+    let content = 1 + pdu(place)?;
+    let total = 2 * (content + 1) + AROUND;
+    let Some(frame) = buffer.get_mut(..total) else {
+        return Err(Status::BUFFER_TOO_SMALL);
+    };
+    let check = lrc(frame.get(..content).unwrap_or_default());
+    // From the back, so that nothing is overwritten before it is taken.
+    for index in (0..=content).rev() {
+        let byte = match frame.get(index) {
+            Some(byte) if index < content => *byte,
+            _ => check,
+        };
+        let at = 1 + 2 * index;
+        if let Some([high, low]) = frame.get_mut(at..at + 2) {
+            *high = character(byte >> 4);
+            *low = character(byte & 0x0F);
+        }
+    }
+    if let [first, .., return_, last] = frame {
+        *first = START;
+        *return_ = RETURN;
+        *last = end;
+    }
+    Ok(total)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Read Exception Status of unit 2, with its LRC.
+    const FRAME: &[u8] = b":0207F7\r\n";
+
+    #[test]
+    fn a_frame_is_read_and_written() {
+        let mut bytes = FRAME.to_vec();
+        let adu = parse(&mut bytes, END).unwrap();
+        assert_eq!((adu.unit, adu.pdu), (2, &[7][..]));
+        let mut buffer = [0; 9];
+        let length = emit(&mut buffer, 2, END, |pdu| {
+            pdu[0] = 7;
+            Ok(1)
+        });
+        assert_eq!((length, &buffer[..]), (Ok(9), FRAME));
+        assert_eq!(
+            emit(&mut buffer[..8], 2, END, |_| Ok(1)),
+            Err(Status::BUFFER_TOO_SMALL)
+        );
+    }
+
+    #[test]
+    fn lower_case_digits_are_taken() {
+        assert!(parse(&mut b":0207f7\r\n".to_vec(), END).is_ok());
+    }
+
+    #[test]
+    fn a_frame_without_its_end_is_incomplete() {
+        for end in 0..FRAME.len() {
+            let mut bytes = FRAME[..end].to_vec();
+            assert_eq!(parse(&mut bytes, END), Err(Status::INCOMPLETE_FRAME));
+        }
+        assert_eq!(
+            parse(&mut FRAME.to_vec(), b'!'),
+            Err(Status::INCOMPLETE_FRAME)
+        );
+    }
+
+    #[test]
+    fn characters_that_are_no_pairs_of_digits_are_malformed() {
+        for frame in [
+            &b":0207F\r\n"[..],
+            b":0207FG\r\n",
+            b"0207F7\r\n",
+            b":07\r\n",
+        ] {
+            let mut bytes = frame.to_vec();
+            assert_eq!(parse(&mut bytes, END), Err(Status::MALFORMED_FRAME));
+        }
+    }
+
+    #[test]
+    fn a_wrong_lrc_is_found() {
+        let mut bytes = b":0207F6\r\n".to_vec();
+        assert_eq!(parse(&mut bytes, END), Err(Status::INVALID_CRC));
+    }
+
+    #[test]
+    fn the_end_character_can_be_changed() {
+        assert!(parse(&mut b":0207F7\r!".to_vec(), b'!').is_ok());
+    }
+}
