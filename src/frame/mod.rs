@@ -3,7 +3,10 @@
 pub mod ascii;
 pub mod checksum;
 pub mod rtu;
+mod search;
 pub mod tcp;
+
+pub use search::{Search, Seen, Verdict, Wanted};
 
 use crate::error::Status;
 
