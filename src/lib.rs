@@ -3,7 +3,7 @@
 //! Data flows one way, and a module uses only what stands to its left:
 //!
 //! ```text
-//! bytes -> frame -> pdu -> transaction -> master -> capi
+//! bytes -> frame -> pdu -> transaction -> {master, client} -> capi
 //! ```
 //!
 //! `error`, `time`, `port` and `data` stand beside that line and may be used
@@ -38,6 +38,8 @@ pub mod pdu;
 /// cbindgen:ignore
 pub mod transaction;
 
+/// cbindgen:ignore
+pub mod client;
 /// cbindgen:ignore
 pub mod master;
 

@@ -14,6 +14,8 @@
 // What a caller must hold is the same for every function, and stands above.
 #![allow(clippy::missing_safety_doc)]
 
+mod client;
+mod client_pointers;
 mod limits;
 mod master;
 mod pointers;
@@ -21,6 +23,7 @@ mod port;
 mod status;
 mod storage;
 
+pub use client::*;
 pub use limits::*;
 pub use master::*;
 pub use port::*;

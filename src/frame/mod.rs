@@ -1,6 +1,7 @@
 //! Application data units: how a PDU and its unit travel on a line.
 
 pub mod ascii;
+pub mod ascii_window;
 pub mod checksum;
 pub mod rtu;
 mod search;

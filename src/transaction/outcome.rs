@@ -5,6 +5,11 @@ use crate::frame::{rtu, Search};
 use crate::pdu::reply;
 
 impl<P, S, Q: Question, W: Search> Transaction<P, S, Q, W> {
+    /// How frames are found.
+    pub fn search(&mut self) -> &mut W {
+        &mut self.window
+    }
+
     /// The raw exception code of the last reply; 0 if it was none.
     pub const fn exception_code(&self) -> u8 {
         self.wanted.exception
