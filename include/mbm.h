@@ -540,13 +540,14 @@ uint8_t mbm_client_cancel(struct mbm_client *client, struct mbm_request *request
 
 /**
  * Makes an object a client of a serial line, in RTU frames (serial line guide
- * V1.02, 2.5.1). All settings are as at first.
+ * V1.02, 2.5.1).
  *
- * @param client      the object; zeroed before the first call
+ * @param client      the object, zeroed
  * @param port        copied; read, write and micros must be there
  * @param frame       bytes of one frame, valid for as long as the client is used
  * @param frameBytes  at least 8; 256 hold any frame
- * @return MBM_OK, MBM_BUSY while requests are pending, or MBM_INVALID_ARGUMENT
+ * @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
+ *         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_client_beginRtu(struct mbm_client *client,
                             const struct mbm_port *port,
@@ -558,11 +559,12 @@ uint8_t mbm_client_beginRtu(struct mbm_client *client,
  * V1.02, 2.5.2). No gap is kept between frames; a second without a character
  * ends one that is not whole.
  *
- * @param client      the object; zeroed before the first call
+ * @param client      the object, zeroed
  * @param port        copied; read, write and micros must be there
  * @param frame       bytes of one frame, valid for as long as the client is used
  * @param frameBytes  at least 17; 513 hold any frame
- * @return MBM_OK, MBM_BUSY while requests are pending, or MBM_INVALID_ARGUMENT
+ * @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
+ *         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_client_beginAscii(struct mbm_client *client,
                               const struct mbm_port *port,
@@ -573,11 +575,12 @@ uint8_t mbm_client_beginAscii(struct mbm_client *client,
  * Makes an object a client that sends RTU frames through a TCP stream, for
  * converters that pass on what they get. No gap is kept, nothing is broadcast.
  *
- * @param client      the object; zeroed before the first call
+ * @param client      the object, zeroed
  * @param port        copied; read, write and micros must be there
  * @param frame       bytes of one frame, valid for as long as the client is used
  * @param frameBytes  at least 8; 256 hold any frame
- * @return MBM_OK, MBM_BUSY while requests are pending, or MBM_INVALID_ARGUMENT
+ * @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
+ *         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
                                    const struct mbm_port *port,
@@ -589,7 +592,7 @@ uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
  * (messaging on TCP/IP guide V1.0b, 3.1.3). All 16 requests may be under way at
  * once; responses are matched by their transaction id, in any order.
  *
- * @param client         the object; zeroed before the first call
+ * @param client         the object, zeroed
  * @param port           copied; read, write and micros must be there
  * @param incoming       received bytes, valid for as long as the client is used
  * @param incomingBytes  at least 9; 260 hold any frame, more take in more
@@ -597,7 +600,8 @@ uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
  * @param outgoing       bytes to send, valid for as long as the client is used
  * @param outgoingBytes  at least 12; 260 hold any frame, more gather more
  *                       requests for one write
- * @return MBM_OK, MBM_BUSY while requests are pending, or MBM_INVALID_ARGUMENT
+ * @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
+ *         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_client_beginTcp(struct mbm_client *client,
                             const struct mbm_port *port,
@@ -1114,8 +1118,8 @@ uint8_t mbm_client_setPostFlushHold(struct mbm_client *client, uint8_t character
 
 /**
  * Sets how often a request is repeated whose response is missing, damaged or
- * malformed; holds for requests that are queued later. Exceptions are responses
- * and are not repeated, nor is what a lost link interrupted.
+ * malformed. Exceptions are responses and are not repeated, nor is what a lost link
+ * interrupted.
  *
  * @param client   the object
  * @param retries  0 to 255; 0 at first

@@ -22,11 +22,15 @@ macro_rules! probes {
 
 fn probes() -> Vec<(String, u64)> {
     probes! {
-        sizes: mbm_port mbm_counters mbm_master;
+        sizes: mbm_port mbm_counters mbm_master mbm_client mbm_request mbm_unit mbm_link;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
             mbm_counters { requests replies exceptions badCrc timeouts foreignFrames
-                resynchronisations bytesSent bytesReceived };
+                resynchronisations bytesSent bytesReceived }
+            mbm_request { done context data reply replyBytes transaction unit status exception
+                length }
+            mbm_unit { requests replies exceptions retries delay unit status }
+            mbm_link { context disconnect connect };
         constants:
             MBM_OK MBM_ILLEGAL_FUNCTION MBM_ILLEGAL_DATA_ADDRESS MBM_ILLEGAL_DATA_VALUE
             MBM_SLAVE_DEVICE_FAILURE MBM_ACKNOWLEDGE MBM_SLAVE_DEVICE_BUSY
@@ -35,7 +39,9 @@ fn probes() -> Vec<(String, u64)> {
             MBM_RESPONSE_TIMED_OUT MBM_INVALID_CRC MBM_INVALID_ARGUMENT MBM_MALFORMED_REPLY
             MBM_LINK_LOST MBM_BUSY MBM_BROADCAST_NOT_ALLOWED MBM_BUFFER_TOO_SMALL
             MBM_NOT_INITIALISED MBM_PENDING MBM_LINE_BUSY MBM_CANCELLED
-            MBM_INCOMPLETE_FRAME MBM_MALFORMED_FRAME
+            MBM_INCOMPLETE_FRAME MBM_MALFORMED_FRAME MBM_QUEUE_FULL
+            MBM_DUPLICATE_TRANSACTION MBM_NOT_PENDING MBM_CLIENT_DEPTH MBM_REPLY_COUNTED
+            MBM_BACKOFF_NONE MBM_BACKOFF_FIXED MBM_BACKOFF_LINEAR MBM_BACKOFF_EXPONENTIAL
             MBM_MAX_READ_REGISTERS MBM_MAX_WRITE_REGISTERS MBM_MAX_READ_WRITE_REGISTERS
             MBM_MAX_READ_BITS MBM_MAX_WRITE_BITS MBM_MAX_FRAME;
     }
@@ -118,7 +124,7 @@ fn every_status_constant_is_explained_and_no_two_alike() {
             .unwrap()
             .to_owned()
     };
-    let statuses: Vec<u8> = (0..=0x0B).chain(0xE0..=0xEF).collect();
+    let statuses: Vec<u8> = (0..=0x0B).chain(0xE0..=0xF2).collect();
     let mut texts: Vec<String> = statuses.iter().map(|status| text(*status)).collect();
     texts.sort();
     texts.dedup();

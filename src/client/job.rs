@@ -39,7 +39,7 @@ pub struct Ticket {
     /// Bytes of data received.
     pub length: u8,
     stage: Stage,
-    /// How often it may be asked again.
+    /// How often it was asked again.
     pub(super) retries: u8,
     /// Its number on the wire, for TCP.
     pub(super) wire: u16,

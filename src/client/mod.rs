@@ -163,7 +163,7 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
         }
         ticket.exception = 0;
         ticket.length = 0;
-        ticket.retries = self.shared.policy.retries;
+        ticket.retries = 0;
         ticket.enter(Stage::Queued, 0, 0);
         self.shared.look = true;
         self.shared.queue.push_back(job)

@@ -106,7 +106,7 @@ impl<J: Job, const N: usize> Shared<J, N> {
         means: &mut impl Means,
     ) -> Option<J> {
         let ticket = job.ticket_mut();
-        let again = ticket.retries > 0 && status.may_be_repeated();
+        let again = ticket.retries < self.policy.retries && status.may_be_repeated();
         if let Some(unit) = units::find(means.units(), ticket.unit) {
             unit.note(status, again, now);
         }
@@ -115,13 +115,8 @@ impl<J: Job, const N: usize> Shared<J, N> {
             ticket.status = status;
             return Some(job);
         }
-        let retry = self
-            .policy
-            .retries
-            .wrapping_sub(ticket.retries)
-            .wrapping_add(1);
-        ticket.retries -= 1;
-        let wait = self.policy.wait(retry, means.random());
+        ticket.retries += 1;
+        let wait = self.policy.wait(ticket.retries, means.random());
         ticket.enter(Stage::Queued, now, wait);
         // There is room: it came out of the queue, or was counted as if in it.
         self.queue.push_front(job).err()

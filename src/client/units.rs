@@ -7,7 +7,7 @@ use crate::transaction::Storage;
 /// One unit: how it is to be treated, and how it behaves. The counts wrap at
 /// 2^32.
 #[repr(C)]
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Unit {
     /// Requests that ended, retries apart.
     pub requests: u32,
@@ -31,6 +31,21 @@ pub struct Unit {
 }
 
 impl Unit {
+    /// A unit that was not asked yet, with a rest of so many microseconds.
+    pub const fn new(unit: u8, delay: u32) -> Unit {
+        Unit {
+            requests: 0,
+            replies: 0,
+            exceptions: 0,
+            retries: 0,
+            delay,
+            last: 0,
+            unit,
+            status: 0,
+            tired: false,
+        }
+    }
+
     /// How much longer the unit rests.
     pub(super) fn rest(&mut self, now: u32) -> u32 {
         let rest = self.delay.saturating_sub(elapsed(now, self.last));

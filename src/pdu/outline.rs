@@ -375,6 +375,8 @@ impl Outline {
     /// 2B/0E: read device id code 1 to 4 and the object to begin with.
     pub fn read_device_identification(&mut self, code: u8, object: u8) -> Status {
         self.encapsulated(MEI_READ_DEVICE_IDENTIFICATION, 0);
+        // Its data begin behind the code.
+        self.form.0 += 1 << DATA;
         self.head[2] = code;
         self.head[3] = object;
         self.head_length = 4;
@@ -585,12 +587,11 @@ impl Outline {
             _ if !echoed => false,
             _ if self.form.has(REPEATS_DATA) => {
                 let mut data = data.iter();
-                // A byte count is as right as the length that it makes.
-                if self.form.has(COUNTED) {
-                    data.next();
-                }
-                data.enumerate()
-                    .all(|(index, theirs)| *theirs == byte(index))
+                let counted = !self.form.has(COUNTED) || data.next() == Some(&self.data_length);
+                counted
+                    && data
+                        .enumerate()
+                        .all(|(index, theirs)| *theirs == byte(index))
             }
             [_, count, group, reference, ..] if self.form.has(GROUP) => {
                 group == count.wrapping_sub(1) && reference == files::REFERENCE_TYPE

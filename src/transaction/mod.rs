@@ -114,6 +114,11 @@ impl<P, S, Q: Question, W: Search> Transaction<P, S, Q, W> {
         self.waiting
     }
 
+    /// True if the next poll is what the time of a phase counts from.
+    pub const fn is_to_be_stamped(&self) -> bool {
+        self.stamp
+    }
+
     /// The request, which [`Transaction::start`] sends.
     pub fn request(&mut self) -> &mut Q {
         &mut self.wanted.request

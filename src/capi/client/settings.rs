@@ -209,8 +209,8 @@ fn built_in(has: bool) -> Status {
 }
 
 /// Sets how often a request is repeated whose response is missing, damaged or
-/// malformed; holds for requests that are queued later. Exceptions are responses
-/// and are not repeated, nor is what a lost link interrupted.
+/// malformed. Exceptions are responses and are not repeated, nor is what a lost link
+/// interrupted.
 ///
 /// @param client   the object
 /// @param retries  0 to 255; 0 at first
