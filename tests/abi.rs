@@ -22,8 +22,8 @@ macro_rules! probes {
 
 fn probes() -> Vec<(String, u64)> {
     probes! {
-        sizes: mbm_port mbm_counters mbm_master mbm_rule mbm_function mbm_length mbm_packet
-            mbm_record mbm_object mbm_framing;
+        sizes: mbm_port mbm_counters mbm_master mbm_ring mbm_rule mbm_function mbm_length
+            mbm_packet mbm_record mbm_object mbm_framing;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
             mbm_counters { requests replies exceptions badCrc timeouts foreignFrames

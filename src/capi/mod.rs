@@ -21,6 +21,7 @@ mod master;
 mod packet;
 mod pointers;
 mod port;
+mod ring;
 mod status;
 mod storage;
 
@@ -30,6 +31,7 @@ pub use limits::*;
 pub use master::*;
 pub use packet::*;
 pub use port::*;
+pub use ring::*;
 pub use status::*;
 pub use storage::*;
 
