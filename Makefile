@@ -32,8 +32,8 @@ $(ARCHIVE):
 
 MCUS := $(shell scripts/archive --list)
 .PHONY: archives
-archives: ## The archives for microcontrollers, build/archives/MCU/libmbm.a
-	@for mcu in $(MCUS); do scripts/archive $$mcu || exit 1; done
+archives: ## The archives for microcontrollers, build/archives and build/minimal
+	@for mcu in $(MCUS); do scripts/archive $$mcu && scripts/archive $$mcu minimal || exit 1; done
 	@scripts/check-archive
 
 .PHONY: size

@@ -303,6 +303,30 @@ typedef struct mbm_counters {
     uint32_t bytesReceived;
 } mbm_counters;
 
+/**
+ * A receive ring between an interrupt handler and the main loop.
+ *
+ * One side puts bytes in with mbm_ring_put or mbm_ring_write: an interrupt
+ * handler, a DMA callback or a thread. One side takes them out with
+ * mbm_ring_read: the main loop, as the `read` hook of a port. Each may
+ * interrupt the other at any point; neither may be two at once. No interrupt
+ * is ever disabled.
+ */
+typedef struct mbm_ring {
+    /**
+     * Not for you.
+     */
+    uint8_t *bytes;
+    /**
+     * Not for you.
+     */
+    uint16_t size;
+    /**
+     * Not for you.
+     */
+    uint16_t positions[3];
+} mbm_ring;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -826,6 +850,68 @@ uint8_t mbm_master_available(const struct mbm_master *master);
  * @return the word; 0xFFFF when none is left
  */
 uint16_t mbm_master_receive(struct mbm_master *master);
+
+/**
+ * Makes a ring of your bytes, empty. Neither side may use it meanwhile.
+ *
+ * @param ring   the object
+ * @param bytes  storage, yours, valid for as long as the ring is used
+ * @param size   2 to 65535, on an AVR 2 to 256; the ring holds one byte less
+ * @return MBM_OK or MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_ring_begin(struct mbm_ring *ring, uint8_t *bytes, uint16_t size);
+
+/**
+ * Puts a byte in. An interrupt may call it.
+ *
+ * @param ring  the object
+ * @param byte  the byte received
+ * @return 1, or 0 if there was no room: the byte counts as lost
+ */
+uint8_t mbm_ring_put(struct mbm_ring *ring, uint8_t byte);
+
+/**
+ * Puts bytes in, in order. An interrupt may call it.
+ *
+ * @param ring    the object
+ * @param bytes   the bytes received; NULL only with length 0
+ * @param length  how many
+ * @return how many found room; the others count as lost
+ */
+uint16_t mbm_ring_write(struct mbm_ring *ring, const uint8_t *bytes, uint16_t length);
+
+/**
+ * Takes bytes out, in order, without waiting.
+ *
+ * @param ring      the object
+ * @param bytes     where they go; NULL only with capacity 0
+ * @param capacity  at most so many
+ * @return how many there were
+ */
+uint16_t mbm_ring_read(struct mbm_ring *ring, uint8_t *bytes, uint16_t capacity);
+
+/**
+ * How many bytes there are to take out, for the side that takes.
+ *
+ * @param ring  the object
+ * @return bytes; 0 also if the ring was never begun
+ */
+uint16_t mbm_ring_available(const struct mbm_ring *ring);
+
+/**
+ * Forgets what there is to take out, for the side that takes.
+ *
+ * @param ring  the object
+ */
+void mbm_ring_clear(struct mbm_ring *ring);
+
+/**
+ * How many bytes found no room since begin; either side may ask.
+ *
+ * @param ring  the object
+ * @return bytes; wraps at 65536, on an AVR at 256
+ */
+uint16_t mbm_ring_lost(const struct mbm_ring *ring);
 
 /**
  * Explains a status in a few words of English.

@@ -6,7 +6,7 @@
 //! bytes -> frame -> pdu -> transaction -> master -> capi
 //! ```
 //!
-//! `error`, `time`, `port` and `data` stand beside that line and may be used
+//! `error`, `time`, `port`, `ring` and `data` stand beside that line and may be used
 //! anywhere on it. `make check` holds every module to this rule.
 //!
 //! The core allocates nothing, keeps no globals, never blocks and does not
@@ -24,6 +24,8 @@ extern crate std;
 pub mod error;
 /// cbindgen:ignore
 pub mod port;
+/// cbindgen:ignore
+pub mod ring;
 /// cbindgen:ignore
 pub mod time;
 

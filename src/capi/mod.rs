@@ -18,12 +18,14 @@ mod limits;
 mod master;
 mod pointers;
 mod port;
+mod ring;
 mod status;
 mod storage;
 
 pub use limits::*;
 pub use master::*;
 pub use port::*;
+pub use ring::*;
 pub use status::*;
 pub use storage::*;
 

@@ -179,11 +179,11 @@ impl Window {
     pub fn room<'a>(&mut self, buffer: &'a mut [u8]) -> Option<&'a mut [u8]> {
         if self.start > 0 {
             let cells = Cell::from_mut(&mut *buffer).as_slice_of_cells();
-            let kept = cells.get(usize::from(self.start)..)?;
+            let kept = cells.get(usize::from(self.start)..usize::from(self.end))?;
             for (to, from) in cells.iter().zip(kept) {
                 to.set(from.get());
             }
-            self.end -= self.start;
+            self.end = kept.len() as u16;
             self.start = 0;
         }
         buffer.get_mut(usize::from(self.end)..)
@@ -204,6 +204,11 @@ impl Window {
     pub fn arrived(&mut self, count: u16) {
         self.end += count;
         self.skim = false;
+    }
+
+    /// Says that the buffer holds `count` bytes to be sent.
+    pub fn hold(&mut self, count: u16) {
+        self.end = count;
     }
 
     /// Has the next search look behind a candidate that is not complete, which
