@@ -305,12 +305,21 @@ fn file_records_out_of_order_cannot_be_made() {
     assert_eq!(Reads::new(&[]), Err(value));
     assert_eq!(Reads::new(&[6, 0, 1, 0, 0, 0, 1, 6]), Err(value));
     assert_eq!(Reads::new(&[6, 0, 1, 0, 0, 0x80, 0]), Err(value));
+    let most = [6, 0, 1, 0, 0, 0, 1].repeat(35);
+    assert!(Reads::new(&most).is_ok());
+    let more = [6, 0, 1, 0, 0, 0, 1].repeat(36);
+    assert_eq!(Reads::new(&more), Err(value));
     assert_eq!(Reads::new(&[6, 0, 0, 0, 0, 0, 1]), Err(address));
     assert_eq!(Writes::new(&[6, 0, 1, 0, 0, 0, 2, 1, 2]), Err(value));
     assert_eq!(
         Writes::new(&[6, 0, 1, 0x27, 0x10, 0, 1, 1, 2]),
         Err(address)
     );
+    for (records, status) in [(0x7A, Ok(())), (0x7B, Err(value))] {
+        let head = [6, 0, 1, 0, 0, 0, records];
+        let bytes = [&head[..], &vec![0; 2 * usize::from(records)]].concat();
+        assert_eq!(Writes::new(&bytes).map(drop), status);
+    }
     assert_eq!(Records::new(&[3, 6, 1]), Err(value));
     assert_eq!(Records::new(&[5, 6, 1, 2, 3]), Err(value));
     assert_eq!(Records::new(&[2, 6, 1, 0]), Err(value));
