@@ -148,7 +148,7 @@ static void a_packet_that_cannot_be_is_not_built(void **state)
         {MBM_ILLEGAL_DATA_VALUE, {.function = 0x10, .quantity = 2, .dataLength = 4 + 256}},
         {MBM_ILLEGAL_DATA_VALUE, {.function = 0x10, .quantity = 125, .dataLength = 250}},
         {MBM_ILLEGAL_DATA_VALUE, {.function = 0x14, .dataLength = 0}},
-        {MBM_ILLEGAL_DATA_ADDRESS, {.function = 0x14, .dataLength = 7}},
+        {MBM_ILLEGAL_DATA_VALUE, {.function = 0x14, .dataLength = 7}},
         {MBM_ILLEGAL_DATA_VALUE, {.function = 0x15, .dataLength = 600}},
         {MBM_ILLEGAL_DATA_VALUE, {.function = 0x17, .quantity = 1, .writeQuantity = 0}},
         {MBM_ILLEGAL_DATA_VALUE, {.function = 0x2B, .meiType = 0x0E, .readDeviceIdCode = 5}},

@@ -674,7 +674,7 @@ typedef struct mbm_packet {
      */
     uint8_t moreFollows;
     /**
-     * 2B/0E: the object to ask for next.
+     * 2B/0E: the object to ask for next; 0 if none follows.
      */
     uint8_t nextObjectId;
     /**
