@@ -20,6 +20,7 @@ typedef struct kind {
 } kind;
 
 static const kind uno = {"uno", "atmega328p", '0', {'B', 5}, {'D', 2}, {'D', 4}};
+static const kind minimal = {"uno-minimal", "atmega328p", '0', {'B', 5}, {'D', 2}, {'D', 4}};
 static const kind mega = {"mega", "atmega2560", '1', {'B', 7}, {'E', 4}, {'G', 5}};
 
 static board *start(const kind *k, const char *sketch)
@@ -311,6 +312,18 @@ static void an_energy_meters_floats_are_read(void **state)
     energy_meter(&mega);
 }
 
+static void values_pass_between_sketch_and_archive(void **state)
+{
+    board *b = start(&uno, "Values");
+    paper printed = {""};
+
+    (void)state;
+    board_uart(b, '0', print, &printed);
+    assert_true(board_run(b, 100 * MS));
+    assert_string_equal(printed.text, "none\r\n");
+    board_free(b);
+}
+
 static void basic(const kind *k)
 {
     board *b = start(k, "Basic");
@@ -334,6 +347,7 @@ static void basic_counts_in_the_server(void **state)
 {
     (void)state;
     basic(&uno);
+    basic(&minimal);
     basic(&mega);
 }
 
@@ -394,6 +408,7 @@ static void phoenix_contact_makes_its_calls(void **state)
 {
     (void)state;
     phoenix_contact(&uno);
+    phoenix_contact(&minimal);
     phoenix_contact(&mega);
 }
 
@@ -480,6 +495,7 @@ int main(void)
         cmocka_unit_test(several_slaves_are_told_apart),
         cmocka_unit_test(without_waiting_the_led_blinks_on),
         cmocka_unit_test(an_energy_meters_floats_are_read),
+        cmocka_unit_test(values_pass_between_sketch_and_archive),
         cmocka_unit_test(basic_counts_in_the_server),
         cmocka_unit_test(phoenix_contact_makes_its_calls),
         cmocka_unit_test(a_bus_on_two_pins_works),

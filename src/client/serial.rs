@@ -85,7 +85,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         now: u32,
         _: bool,
     ) -> Option<J> {
-        if !self.engine.is_pending() {
+        let started = if !self.engine.is_pending() {
             let job = shared.take_due(now, self.engine.storage.units(), |_| true)?;
             if job.ticket().is(Stage::Lost) {
                 return shared.end(job, Status::LINK_LOST, now, &mut self.engine.storage);
@@ -93,10 +93,14 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
             let unit = job.ticket().unit;
             self.engine.forget();
             self.engine.request().job = Some(job);
-            // Broadcasts were looked at when it was queued.
-            self.engine.start(unit);
-        }
-        let status = self.engine.poll(now);
+            self.engine.start(unit)
+        } else {
+            Status::PENDING
+        };
+        let status = match started {
+            Status::PENDING => self.engine.poll(now),
+            refused => refused,
+        };
         if status == Status::PENDING {
             return None;
         }

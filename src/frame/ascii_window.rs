@@ -81,9 +81,13 @@ impl Search for Window {
         delimiter: END,
     };
 
-    fn frame_length(length: usize) -> u16 {
+    fn hold(&mut self, count: u16) {
+        self.end = count;
+    }
+
+    fn frame_length(length: u8) -> u16 {
         // Colon, unit, PDU and LRC in two characters each, and the two at the end.
-        (2 * length + 7) as u16
+        2 * u16::from(length) + 7
     }
 
     fn write(

@@ -78,7 +78,10 @@ pub trait Search: Sized {
     const EMPTY: Self;
 
     /// Bytes of the frame of a PDU of `length` bytes.
-    fn frame_length(length: usize) -> u16;
+    fn frame_length(length: u8) -> u16;
+
+    /// Says that the buffer holds `count` bytes to be sent.
+    fn hold(&mut self, count: u16);
 
     /// Writes the frame of the PDU that `pdu` writes, `length` bytes long; false
     /// if `buffer` cannot hold it.

@@ -4,7 +4,7 @@
 //! What distinguishes one function from another is a number, so that firmware
 //! which calls every function carries next to nothing for each.
 
-use super::custom::{self, Rule};
+use super::custom::Rule;
 use super::diagnostics::{self, sub_function};
 use super::identification::{self, MEI_READ_DEVICE_IDENTIFICATION};
 use super::length::Length;
@@ -405,10 +405,10 @@ impl Outline {
         if kind != OWN && length == 0 {
             return Status::INVALID_ARGUMENT;
         }
-        match custom::check(function, bytes.into()) {
-            Ok(()) => self.follow(bytes),
-            Err(refused) => refused,
+        if function == 0 || function & EXCEPTION != 0 {
+            return Status::ILLEGAL_FUNCTION;
         }
+        self.follow(bytes)
     }
 
     /// So many bytes of data follow the head.
