@@ -37,11 +37,6 @@
 #define MBM_CLIENT_DEPTH 16
 
 /**
- * mbm_client_custom: what a response counts itself, at an offset; see there.
- */
-#define MBM_REPLY_COUNTED 32768
-
-/**
  * mbm_client_setBackoff: a request is asked again at once.
  */
 #define MBM_BACKOFF_NONE 0
@@ -742,6 +737,26 @@ typedef struct mbm_master {
 } mbm_master;
 
 /**
+ * How long the PDU of a function of your own is, function code included.
+ * Zeroed: as long as its frame.
+ */
+typedef struct mbm_rule {
+    /**
+     * MBM_RULE_SILENCE, MBM_RULE_FIXED or MBM_RULE_COUNTED.
+     */
+    uint8_t kind;
+    /**
+     * FIXED: bytes of the PDU, 1 to 253. COUNTED: where the counting byte
+     * stands, 1 to 252 bytes behind the function code.
+     */
+    uint8_t bytes;
+    /**
+     * COUNTED: bytes that follow those that are counted.
+     */
+    uint8_t more;
+} mbm_rule;
+
+/**
  * What happened on the line, since the caller zeroed it. Each wraps at 2^32.
  */
 typedef struct mbm_counters {
@@ -827,26 +842,6 @@ typedef struct mbm_unit {
      */
     uint8_t tired;
 } mbm_unit;
-
-/**
- * How long the PDU of a function of your own is, function code included.
- * Zeroed: as long as its frame.
- */
-typedef struct mbm_rule {
-    /**
-     * MBM_RULE_SILENCE, MBM_RULE_FIXED or MBM_RULE_COUNTED.
-     */
-    uint8_t kind;
-    /**
-     * FIXED: bytes of the PDU, 1 to 253. COUNTED: where the counting byte
-     * stands, 1 to 252 bytes behind the function code.
-     */
-    uint8_t bytes;
-    /**
-     * COUNTED: bytes that follow those that are counted.
-     */
-    uint8_t more;
-} mbm_rule;
 
 /**
  * A function of your own. Codes 65 to 72 and 100 to 110 are left to users, of
@@ -1816,21 +1811,18 @@ uint8_t mbm_client_encapsulatedInterfaceTransport(struct mbm_client *client,
  * Any function: sends bytes of `data` behind the function code, and reads what is
  * behind it in the response.
  *
- * @param client   the object
- * @param request  the request
+ * @param client    the object
+ * @param request   the request
  * @param function  1 to 127
- * @param bytes  0 to 252
- * @param replyLength  bytes of the response with its function code, 1 to 253; or
- *                 MBM_REPLY_COUNTED | offset << 8 | more, where the byte at that offset (1 to
- *                 127) from the function code counts the bytes behind it, and so many more
- *                 follow; or 0: it ends by silence, or as the framing says
+ * @param bytes     0 to 252
+ * @param response  how long the response is; used during this call only
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_custom(struct mbm_client *client,
                           struct mbm_request *request,
                           uint8_t function,
                           uint16_t bytes,
-                          uint16_t replyLength);
+                          const struct mbm_rule *response);
 
 /**
  * Sets how long a response may take, from the end of the request on a serial

@@ -26,6 +26,9 @@ static inline mbm_port client_port(void)
 /* Every function of the standard, and one of the user's. */
 static inline void every_function(void)
 {
+    static const mbm_rule rule = {MBM_RULE_FIXED, 5, 0};
+
+    USED(&rule);
 #ifndef WITHOUT_MBM
     request.unit = 1;
     request.data = transmit;
@@ -52,7 +55,7 @@ static inline void every_function(void)
     uart = CALL(mbm_client_readFifoQueue(&client, &request, 2));
     uart = CALL(mbm_client_readDeviceIdentification(&client, &request, 1, 0));
     uart = CALL(mbm_client_encapsulatedInterfaceTransport(&client, &request, 0x0D, 2));
-    uart = CALL(mbm_client_custom(&client, &request, 0x41, 2, 5));
+    uart = CALL(mbm_client_custom(&client, &request, 0x41, 2, &rule));
     uart = CALL(mbm_client_poll(&client));
 }
 

@@ -2,12 +2,9 @@
 
 use super::request::Inside;
 use super::{mbm_client, mbm_request, pointers, Lent};
+use crate::capi::functions::{mbm_rule, rule};
 use crate::error::Status;
-use crate::pdu::custom::Rule;
 use crate::pdu::outline::{Form, Outline};
-
-/// mbm_client_custom: what a response counts itself, at an offset; see there.
-pub const MBM_REPLY_COUNTED: u16 = 0x8000;
 
 /// The request behind a pointer, if it may be queued.
 ///
@@ -654,14 +651,11 @@ pub unsafe extern "C" fn mbm_client_encapsulatedInterfaceTransport(
 /// Any function: sends bytes of `data` behind the function code, and reads what is
 /// behind it in the response.
 ///
-/// @param client   the object
-/// @param request  the request
+/// @param client    the object
+/// @param request   the request
 /// @param function  1 to 127
-/// @param bytes  0 to 252
-/// @param replyLength  bytes of the response with its function code, 1 to 253; or
-///                 MBM_REPLY_COUNTED | offset << 8 | more, where the byte at that offset (1 to
-///                 127) from the function code counts the bytes behind it, and so many more
-///                 follow; or 0: it ends by silence, or as the framing says
+/// @param bytes     0 to 252
+/// @param response  how long the response is; used during this call only
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_custom(
@@ -669,25 +663,14 @@ pub unsafe extern "C" fn mbm_client_custom(
     request: *mut mbm_request,
     function: u8,
     bytes: u16,
-    replyLength: u16,
+    response: *const mbm_rule,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        queue(client, request, |outline| {
-            outline.custom(function, bytes, rule(replyLength))
+        let rule = response.as_ref().and_then(|response| rule(*response));
+        queue(client, request, |outline| match rule {
+            Some(rule) => outline.custom(function, bytes, rule),
+            None => Status::INVALID_ARGUMENT,
         })
-    }
-}
-
-/// The rule that C's number means.
-fn rule(length: u16) -> Rule {
-    let [high, low] = length.to_be_bytes();
-    if length & MBM_REPLY_COUNTED != 0 {
-        Rule::Counted(high & 0x7F, low)
-    } else if length == 0 {
-        Rule::Silence
-    } else {
-        // What no response is as long as is refused.
-        Rule::Fixed(if high == 0 { low } else { 0 })
     }
 }
