@@ -49,35 +49,61 @@ impl<'a> Reader<'a> {
 /// Writes to the front of a byte slice. What does not fit is noted, and said by
 /// [`Writer::finish`].
 pub struct Writer<'a> {
-    bytes: &'a mut [u8],
+    /// The room that is left; none once something did not fit.
+    rest: &'a mut [u8],
     length: usize,
+    fits: bool,
 }
 
 impl<'a> Writer<'a> {
     /// Writes into `bytes` from its front.
     pub const fn new(bytes: &'a mut [u8]) -> Self {
-        Writer { bytes, length: 0 }
+        Writer {
+            rest: bytes,
+            length: 0,
+            fits: true,
+        }
+    }
+
+    /// Notes that something did not fit.
+    #[cold]
+    fn miss(&mut self) {
+        self.fits = false;
+        self.rest = &mut [];
     }
 
     /// Writes all of `bytes`.
     pub fn put(&mut self, bytes: &[u8]) {
-        let end = self.length.saturating_add(bytes.len());
-        if let Some(room) = self.bytes.get_mut(self.length..end) {
-            for (place, byte) in room.iter_mut().zip(bytes) {
-                *place = *byte;
+        self.length = self.length.saturating_add(bytes.len());
+        match core::mem::take(&mut self.rest).split_at_mut_checked(bytes.len()) {
+            Some((place, rest)) => {
+                place.copy_from_slice(bytes);
+                self.rest = rest;
             }
+            None => self.miss(),
         }
-        self.length = end;
+    }
+
+    /// Writes as many bytes as the array has.
+    fn array<const COUNT: usize>(&mut self, bytes: [u8; COUNT]) {
+        self.length = self.length.saturating_add(COUNT);
+        match core::mem::take(&mut self.rest).split_first_chunk_mut() {
+            Some((place, rest)) => {
+                *place = bytes;
+                self.rest = rest;
+            }
+            None => self.miss(),
+        }
     }
 
     /// Writes a byte.
     pub fn u8(&mut self, byte: u8) {
-        self.put(&[byte]);
+        self.array([byte]);
     }
 
     /// Writes two bytes, high byte first.
     pub fn u16(&mut self, word: u16) {
-        self.put(&word.to_be_bytes());
+        self.array(word.to_be_bytes());
     }
 
     /// Writes a byte count and the bytes that it counts.
@@ -96,7 +122,7 @@ impl<'a> Writer<'a> {
     /// # Errors
     /// [`Status::BUFFER_TOO_SMALL`] if they did not fit.
     pub fn finish(self) -> Result<usize, Status> {
-        if self.length <= self.bytes.len() {
+        if self.fits {
             Ok(self.length)
         } else {
             Err(Status::BUFFER_TOO_SMALL)

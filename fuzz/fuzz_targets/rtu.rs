@@ -74,21 +74,21 @@ impl Naive<'_> {
         let mut at = self.at;
         while at < self.bytes.len() {
             let rest = &self.bytes[at..];
-            match self.asked.frame_length(rest) {
-                Some(length) if length <= rest.len() => {
-                    if naive::has_crc(&rest[..length]) {
-                        self.at = at + length;
-                        at = self.at;
-                        if self.asked.is_answered_by(&rest[..length]) {
-                            return Some(rest[..length].to_vec());
-                        }
-                        continue;
+            let length = self.asked.frame_length(rest);
+            match length.and_then(|length| rest.get(..length)) {
+                Some(frame) if naive::has_crc(frame) => {
+                    let (right, found) = (self.asked.is_answered_by(frame), frame.to_vec());
+                    at += found.len();
+                    self.at = at;
+                    if right {
+                        return Some(found);
                     }
+                    continue;
                 }
+                Some(_) => {}
                 // What the buffer cannot hold is passed over.
-                Some(length) if length > self.room => {}
-                Some(_) if !skim => break,
-                _ => {}
+                None if length.is_some_and(|length| length <= self.room) && !skim => break,
+                None => {}
             }
             at += 1;
         }

@@ -23,7 +23,7 @@ const fn tables() -> [[Table; 4]; 4] {
         while following < 16 {
             let mut bit = 0;
             while bit < 8 {
-                crc = crc >> 1 ^ (crc & 1) * 0xA001;
+                crc = (crc >> 1) ^ ((crc & 1) * 0xA001);
                 bit += 1;
             }
             tables[following / 4][following % 4][byte] = crc;
