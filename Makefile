@@ -47,7 +47,7 @@ header: ## Write include/mbm.h anew from the source
 .PHONY: check
 check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, symbols
 	@$(CARGO) fmt --all --check
-	@$(CARGO) fmt --manifest-path fuzz/Cargo.toml --check
+	@for crate in fuzz bench; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml --check || exit 1; done
 	@$(CARGO) clippy --quiet --workspace --all-targets -- -D warnings
 	@$(CARGO) clippy --quiet --no-default-features -- -D warnings
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps
@@ -115,10 +115,11 @@ $(BENCH): $(patsubst %,$(BUILD)/bench/%.o,bench support/pty support/server linux
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
 
 .PHONY: bench
-bench: ## Speed and instructions of mbm beside libmodbus's own client
+bench: ## Speed and instructions beside libmodbus and rmodbus; writes docs/speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
 	@$(MAKE) --no-print-directory $(BENCH)
 	@scripts/bench $(BENCH)
+	@CARGO="$(CARGO)" scripts/bench-frames
 
 DEMO := $(BUILD)/plain/linux/demo
 $(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/frame_words linux/recorder linux/mbm_tty support/pty support/server) $(ARCHIVE)
