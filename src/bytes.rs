@@ -49,61 +49,35 @@ impl<'a> Reader<'a> {
 /// Writes to the front of a byte slice. What does not fit is noted, and said by
 /// [`Writer::finish`].
 pub struct Writer<'a> {
-    /// The room that is left; none once something did not fit.
-    rest: &'a mut [u8],
+    bytes: &'a mut [u8],
     length: usize,
-    fits: bool,
 }
 
 impl<'a> Writer<'a> {
     /// Writes into `bytes` from its front.
     pub const fn new(bytes: &'a mut [u8]) -> Self {
-        Writer {
-            rest: bytes,
-            length: 0,
-            fits: true,
-        }
-    }
-
-    /// Notes that something did not fit.
-    #[cold]
-    fn miss(&mut self) {
-        self.fits = false;
-        self.rest = &mut [];
+        Writer { bytes, length: 0 }
     }
 
     /// Writes all of `bytes`.
     pub fn put(&mut self, bytes: &[u8]) {
-        self.length = self.length.saturating_add(bytes.len());
-        match core::mem::take(&mut self.rest).split_at_mut_checked(bytes.len()) {
-            Some((place, rest)) => {
-                place.copy_from_slice(bytes);
-                self.rest = rest;
+        let end = self.length.saturating_add(bytes.len());
+        if let Some(room) = self.bytes.get_mut(self.length..end) {
+            for (place, byte) in room.iter_mut().zip(bytes) {
+                *place = *byte;
             }
-            None => self.miss(),
         }
-    }
-
-    /// Writes as many bytes as the array has.
-    fn array<const COUNT: usize>(&mut self, bytes: [u8; COUNT]) {
-        self.length = self.length.saturating_add(COUNT);
-        match core::mem::take(&mut self.rest).split_first_chunk_mut() {
-            Some((place, rest)) => {
-                *place = bytes;
-                self.rest = rest;
-            }
-            None => self.miss(),
-        }
+        self.length = end;
     }
 
     /// Writes a byte.
     pub fn u8(&mut self, byte: u8) {
-        self.array([byte]);
+        self.put(&[byte]);
     }
 
     /// Writes two bytes, high byte first.
     pub fn u16(&mut self, word: u16) {
-        self.array(word.to_be_bytes());
+        self.put(&word.to_be_bytes());
     }
 
     /// Writes a byte count and the bytes that it counts.
@@ -122,7 +96,7 @@ impl<'a> Writer<'a> {
     /// # Errors
     /// [`Status::BUFFER_TOO_SMALL`] if they did not fit.
     pub fn finish(self) -> Result<usize, Status> {
-        if self.fits {
+        if self.length <= self.bytes.len() {
             Ok(self.length)
         } else {
             Err(Status::BUFFER_TOO_SMALL)

@@ -32,35 +32,22 @@ pub struct Header {
 /// [`Status::INCOMPLETE_FRAME`] while bytes are missing,
 /// [`Status::MALFORMED_FRAME`] if this can be no Modbus TCP frame.
 pub fn header(bytes: &[u8]) -> Result<Header, Status> {
-    let Some(header) = bytes.first_chunk() else {
-        return Err(incomplete(bytes));
-    };
-    let [a, b, protocol @ .., c, d, unit]: [u8; PDU] = *header;
-    let total = HEADER + usize::from(u16::from_be_bytes([c, d]));
-    if protocol != [0, 0] || !(PDU + 1..=MAX_FRAME).contains(&total) {
+    let mut reader = Reader::new(bytes);
+    let incomplete = Status::INCOMPLETE_FRAME;
+    let transaction = reader.u16().ok_or(incomplete)?;
+    if reader.u16().ok_or(incomplete)? != 0 {
         return Err(Status::MALFORMED_FRAME);
     }
+    let total = HEADER + usize::from(reader.u16().ok_or(incomplete)?);
+    if !(PDU + 1..=MAX_FRAME).contains(&total) {
+        return Err(Status::MALFORMED_FRAME);
+    }
+    let unit = reader.u8().ok_or(incomplete)?;
     Ok(Header {
-        transaction: u16::from_be_bytes([a, b]),
+        transaction,
         total,
         unit,
     })
-}
-
-/// What a part of a header is: no frame begins with another protocol, or with a
-/// length that no frame has.
-#[cold]
-fn incomplete(bytes: &[u8]) -> Status {
-    let mut reader = Reader::new(bytes);
-    let (_, protocol, length) = (reader.u16(), reader.u16(), reader.u16());
-    let least = (PDU + 1 - HEADER) as u16;
-    let most = (MAX_FRAME - HEADER) as u16;
-    let right = length.is_none_or(|length| (least..=most).contains(&length));
-    if protocol.unwrap_or(0) == 0 && right {
-        Status::INCOMPLETE_FRAME
-    } else {
-        Status::MALFORMED_FRAME
-    }
 }
 
 /// The frame that is the whole of `bytes`.
