@@ -1585,6 +1585,71 @@ uint8_t mbm_client_writeSingleRegister(struct mbm_client *client,
                                        uint16_t value);
 
 /**
+ * Function 0F: writes the coils of `data`, eight to a byte, the lowest bit first
+ * (V1.1b3, 6.11).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  first coil, 0 to 65535, as on the wire
+ * @param quantity  1 to 1968
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_writeMultipleCoils(struct mbm_client *client,
+                                      struct mbm_request *request,
+                                      uint16_t address,
+                                      uint16_t quantity);
+
+/**
+ * Function 10: writes the words of `data` (V1.1b3, 6.12).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  first register, 0 to 65535, as on the wire
+ * @param quantity  1 to 123
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_writeMultipleRegisters(struct mbm_client *client,
+                                          struct mbm_request *request,
+                                          uint16_t address,
+                                          uint16_t quantity);
+
+/**
+ * Function 16: sets a holding register to (register & andMask) | (orMask & ~andMask)
+ * (V1.1b3, 6.16).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  0 to 65535, as on the wire
+ * @param andMask  bits to keep
+ * @param orMask  bits to set where none are kept
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_maskWriteRegister(struct mbm_client *client,
+                                     struct mbm_request *request,
+                                     uint16_t address,
+                                     uint16_t andMask,
+                                     uint16_t orMask);
+
+/**
+ * Function 17: writes the words of `data`, then reads into the words of `reply`
+ * (V1.1b3, 6.17).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param readAddress  first register to read
+ * @param readQuantity  1 to 125
+ * @param writeAddress  first register to write
+ * @param writeQuantity  1 to 121
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readWriteMultipleRegisters(struct mbm_client *client,
+                                              struct mbm_request *request,
+                                              uint16_t readAddress,
+                                              uint16_t readQuantity,
+                                              uint16_t writeAddress,
+                                              uint16_t writeQuantity);
+
+/**
  * Function 07: reads eight outputs into a byte (V1.1b3, 6.7).
  *
  * @param client   the object
@@ -1630,35 +1695,6 @@ uint8_t mbm_client_getCommEventCounter(struct mbm_client *client,
  */
 uint8_t mbm_client_getCommEventLog(struct mbm_client *client,
                                    struct mbm_request *request);
-
-/**
- * Function 0F: writes the coils of `data`, eight to a byte, the lowest bit first
- * (V1.1b3, 6.11).
- *
- * @param client   the object
- * @param request  the request
- * @param address  first coil, 0 to 65535, as on the wire
- * @param quantity  1 to 1968
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_writeMultipleCoils(struct mbm_client *client,
-                                      struct mbm_request *request,
-                                      uint16_t address,
-                                      uint16_t quantity);
-
-/**
- * Function 10: writes the words of `data` (V1.1b3, 6.12).
- *
- * @param client   the object
- * @param request  the request
- * @param address  first register, 0 to 65535, as on the wire
- * @param quantity  1 to 123
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_writeMultipleRegisters(struct mbm_client *client,
-                                          struct mbm_request *request,
-                                          uint16_t address,
-                                          uint16_t quantity);
 
 /**
  * Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13).
@@ -1727,42 +1763,6 @@ uint8_t mbm_client_readFileRecords(struct mbm_client *client,
 uint8_t mbm_client_writeFileRecords(struct mbm_client *client,
                                     struct mbm_request *request,
                                     uint16_t bytes);
-
-/**
- * Function 16: sets a holding register to (register & andMask) | (orMask & ~andMask)
- * (V1.1b3, 6.16).
- *
- * @param client   the object
- * @param request  the request
- * @param address  0 to 65535, as on the wire
- * @param andMask  bits to keep
- * @param orMask  bits to set where none are kept
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_maskWriteRegister(struct mbm_client *client,
-                                     struct mbm_request *request,
-                                     uint16_t address,
-                                     uint16_t andMask,
-                                     uint16_t orMask);
-
-/**
- * Function 17: writes the words of `data`, then reads into the words of `reply`
- * (V1.1b3, 6.17).
- *
- * @param client   the object
- * @param request  the request
- * @param readAddress  first register to read
- * @param readQuantity  1 to 125
- * @param writeAddress  first register to write
- * @param writeQuantity  1 to 121
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_readWriteMultipleRegisters(struct mbm_client *client,
-                                              struct mbm_request *request,
-                                              uint16_t readAddress,
-                                              uint16_t readQuantity,
-                                              uint16_t writeAddress,
-                                              uint16_t writeQuantity);
 
 /**
  * Function 18: reads up to 31 registers of a queue into words (V1.1b3, 6.18).

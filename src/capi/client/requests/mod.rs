@@ -1,0 +1,105 @@
+//! One function for each request.
+
+mod data;
+mod device;
+
+pub use data::*;
+pub use device::*;
+
+use super::request::Inside;
+use super::{mbm_client, mbm_request, pointers, Lent};
+use crate::error::Status;
+use crate::pdu::outline::{Form, Outline};
+
+/// The request behind a pointer, if it may be queued.
+///
+/// # Safety
+/// As the header demands.
+#[cfg_attr(target_os = "none", inline(never))]
+unsafe fn prepare<'a>(
+    client: *const mbm_client,
+    request: *mut mbm_request,
+) -> Result<&'a mut Inside, Status> {
+    // SAFETY: as the caller promises; what is not pending is used by nobody.
+    unsafe {
+        match pointers::check(client) {
+            Status::OK => {}
+            refused => return Err(refused),
+        }
+        let request = request.cast::<Inside>().as_mut();
+        let inside = request.ok_or(Status::INVALID_ARGUMENT)?;
+        if inside.ticket.status == Status::PENDING {
+            return Err(Status::BUSY);
+        }
+        Ok(inside)
+    }
+}
+
+/// Queues a request that was built, unless that was refused.
+///
+/// # Safety
+/// As the header demands; the request is [`prepare`]d.
+#[cfg_attr(target_os = "none", inline(never))]
+unsafe fn submit(client: *mut mbm_client, inside: &mut Inside, built: Status) -> Status {
+    let ticket = &mut inside.ticket;
+    let outline = &ticket.outline;
+    let status = if built != Status::OK {
+        built
+    } else if outline.data_length() > 0 && inside.data.is_null() {
+        Status::INVALID_ARGUMENT
+    } else if !inside.reply.is_null() && u16::from(outline.known_data()) > ticket.capacity {
+        Status::BUFFER_TOO_SMALL
+    } else {
+        let pointer = (&raw mut *inside).cast();
+        // SAFETY: as the caller promises.
+        return unsafe {
+            match Lent::new(pointer) {
+                Some(request) => {
+                    let object = pointers::object(client);
+                    (object.calls().queue)(object, request)
+                }
+                None => Status::INVALID_ARGUMENT,
+            }
+        };
+    };
+    ticket.status = status;
+    status
+}
+
+/// Queues the request that `build` outlines.
+///
+/// # Safety
+/// As the header demands.
+#[inline(always)]
+unsafe fn queue(
+    client: *mut mbm_client,
+    request: *mut mbm_request,
+    build: impl FnOnce(&mut Outline) -> Status,
+) -> u8 {
+    // SAFETY: as the caller promises.
+    unsafe {
+        match prepare(client, request) {
+            Ok(inside) => {
+                let built = build(&mut inside.ticket.outline);
+                submit(client, inside, built).code()
+            }
+            Err(refused) => refused.code(),
+        }
+    }
+}
+
+/// Queues a request of two words at most.
+///
+/// # Safety
+/// As the header demands.
+#[cfg_attr(target_os = "none", inline(never))]
+unsafe fn plain(
+    client: *mut mbm_client,
+    request: *mut mbm_request,
+    first: u16,
+    second: u16,
+    form: Form,
+) -> u8 {
+    // SAFETY: as the caller promises.
+    unsafe { queue(client, request, |outline| outline.set(form, first, second)) }
+}
