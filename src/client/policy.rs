@@ -88,7 +88,7 @@ impl Policy {
 /// So many 65536ths of a time. (In steps, which need no wide multiplication.)
 fn share(time: u32, part: u16) -> u32 {
     let part = u32::from(part);
-    (time >> 16) * part + ((time & 0xFFFF) * part >> 16)
+    (time >> 16) * part + (((time & 0xFFFF) * part) >> 16)
 }
 
 #[cfg(test)]

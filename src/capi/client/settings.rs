@@ -272,7 +272,7 @@ pub unsafe extern "C" fn mbm_client_setJitter(
             if percent > 100 || (random.is_none() && percent > 0) {
                 return Status::INVALID_ARGUMENT;
             }
-            parts.policy.jitter = (u16::from(percent) * 163 >> 6).min(255) as u8;
+            parts.policy.jitter = ((u16::from(percent) * 163) >> 6).min(255) as u8;
             parts.means.random = random;
             parts.means.random_context = context;
             Status::OK
