@@ -30,13 +30,16 @@ fn times<L: Line<Task>>(end: &End, client: &mut Client<L, Task, 4>) -> (Vec<u32>
     panic!("no task ended");
 }
 
-const POLICY: Policy = Policy {
-    wait: 300_000,
-    most: 1_000_000,
-    backoff: Backoff::Exponential,
-    jitter: 0,
-    retries: 4,
-};
+fn policy(backoff: Backoff, wait: u32, retries: u8) -> Policy {
+    let mut policy = Policy::DEFAULT;
+    policy.set_backoff(backoff, wait, 1_000_000.max(wait));
+    policy.retries = retries;
+    policy
+}
+
+fn exponential() -> Policy {
+    policy(Backoff::Exponential, 300_000, 4)
+}
 
 fn serial(lent: Lent) -> (End, Client<Serial<End, Lent, Task>, Task, 4>) {
     let end = End::default();
@@ -59,7 +62,7 @@ fn pauses(times: &[u32]) -> Vec<u32> {
 #[test]
 fn retries_wait_as_the_backoff_says() {
     let (end, mut client) = tcp(Lent::default());
-    *client.policy() = POLICY;
+    *client.policy() = exponential();
     assert!(client.queue(read(1)).is_ok());
     let (times, task) = times(&end, &mut client);
     assert_eq!(task.ticket.status, Status::RESPONSE_TIMED_OUT);
@@ -69,7 +72,7 @@ fn retries_wait_as_the_backoff_says() {
 #[test]
 fn a_serial_line_waits_as_well() {
     let (end, mut client) = serial(Lent::default());
-    *client.policy() = POLICY;
+    *client.policy() = exponential();
     assert!(client.queue(read(1)).is_ok());
     let (times, task) = times(&end, &mut client);
     assert_eq!(task.ticket.status, Status::RESPONSE_TIMED_OUT);
@@ -86,11 +89,8 @@ fn jitter_takes_off_a_part_of_the_wait() {
         ..Lent::default()
     };
     let (end, mut client) = tcp(lent);
-    *client.policy() = Policy {
-        jitter: 128,
-        backoff: Backoff::Fixed,
-        ..POLICY
-    };
+    *client.policy() = policy(Backoff::Fixed, 300_000, 4);
+    client.policy().jitter = 128;
     assert!(client.queue(read(1)).is_ok());
     let (times, _) = times(&end, &mut client);
     assert_eq!(pauses(&times), [225_000; 4]);
@@ -111,12 +111,7 @@ fn without_retries_a_request_is_sent_once() {
 #[test]
 fn others_are_asked_while_one_waits_to_be_asked_again() {
     let (end, mut client) = serial(Lent::default());
-    *client.policy() = Policy {
-        wait: 10_000_000,
-        most: 10_000_000,
-        retries: 1,
-        ..POLICY
-    };
+    *client.policy() = policy(Backoff::Fixed, 10_000_000, 1);
     assert!(client.queue(read(1)).is_ok());
     assert!(client.queue(read(2)).is_ok());
     let mut order = Vec::new();
@@ -126,7 +121,7 @@ fn others_are_asked_while_one_waits_to_be_asked_again() {
         if ended.is_some_and(|task| task.ticket.unit == 1) {
             break;
         }
-        end.pass(client.poll_delay(end.now()).max(1).min(1_000_000));
+        end.pass(client.poll_delay(end.now()).clamp(1, 1_000_000));
     }
     assert_eq!(order, [1, 2, 1]);
 }
@@ -148,7 +143,7 @@ fn a_unit_is_given_its_rest_and_others_are_not_kept_waiting() {
         if let Some(unit) = end.sent().get(6) {
             sent.push((*unit, end.now()));
         }
-        end.pass(client.poll_delay(end.now()).max(1).min(1_000_000));
+        end.pass(client.poll_delay(end.now()).clamp(1, 1_000_000));
     }
     // Nobody answers within two seconds.
     assert_eq!(sent, [(1, 0), (2, 2_000_000), (1, 5_000_000)]);
@@ -217,7 +212,7 @@ fn a_clock_that_jumps_ends_the_wait_and_not_the_request_that_was_answered() {
 fn the_clock_may_wrap() {
     let (end, mut client) = tcp(Lent::default());
     end.pass(u32::MAX - 3_000_000);
-    *client.policy() = POLICY;
+    *client.policy() = exponential();
     assert!(client.queue(read(1)).is_ok());
     let (times, _) = times(&end, &mut client);
     assert_eq!(pauses(&times), [300_000, 600_000, 1_000_000, 1_000_000]);

@@ -5,12 +5,7 @@ static uint8_t outgoing[MBM_FRAME_BYTES(WORDS)];
 
 int main(void)
 {
-    mbm_port port = client_port();
-
-    USED(&port);
-    USED(response);
-    USED(transmit);
-    USED(frame);
+    begin_port();
     USED(outgoing);
     for (;;) {
         uart = CALL(mbm_client_beginRtu(&client, &port, frame, sizeof frame));

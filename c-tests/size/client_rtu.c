@@ -3,12 +3,7 @@
 
 int main(void)
 {
-    mbm_port port = client_port();
-
-    USED(&port);
-    USED(response);
-    USED(transmit);
-    USED(frame);
+    begin_port();
     (void)CALL(mbm_client_beginRtu(&client, &port, frame, sizeof frame));
     for (;;)
         every_function();

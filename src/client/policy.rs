@@ -1,7 +1,5 @@
 //! When a request is asked again that was not answered.
 
-use crate::error::Status;
-
 /// How the wait grows from one retry to the next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
@@ -29,16 +27,22 @@ impl Backoff {
     }
 }
 
+/// The wait before a retry of a number, given any number for the jitter.
+type Grow = fn(&Policy, u8, u32) -> u32;
+
 /// How long to wait before a retry. Times are in microseconds.
 #[repr(C)]
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Policy {
     /// The wait before the first retry.
-    pub wait: u32,
+    wait: u32,
     /// The longest wait.
-    pub most: u32,
-    /// How the wait grows.
-    pub backoff: Backoff,
+    most: u32,
+    /// How the wait grows: `None` for not at all. (A pointer, so that firmware
+    /// without a backoff carries none.)
+    grow: Option<Grow>,
+    /// How the wait grows, for that.
+    backoff: Backoff,
     /// How much of the wait is left to chance, in parts of 256.
     pub jitter: u8,
     /// How often a request is repeated that was not answered.
@@ -50,26 +54,31 @@ impl Policy {
     pub const DEFAULT: Policy = Policy {
         wait: 0,
         most: 0,
+        grow: None,
         backoff: Backoff::None,
         jitter: 0,
         retries: 0,
     };
 
-    /// Sets the backoff of a number, and its times.
-    /// [`Status::INVALID_ARGUMENT`] if there is no such.
-    pub fn set_backoff(&mut self, code: u8, wait: u32, most: u32) -> Status {
-        let Some(backoff) = Backoff::from_code(code) else {
-            return Status::INVALID_ARGUMENT;
-        };
+    /// Sets how the wait grows.
+    pub fn set_backoff(&mut self, backoff: Backoff, wait: u32, most: u32) {
+        self.grow = Some(Policy::grown);
         self.backoff = backoff;
         self.wait = wait;
         self.most = most;
-        Status::OK
     }
 
-    /// The wait before retry number `retry`, from 1 on; `random` is any number,
-    /// and decides how much of the jitter is taken off.
-    pub fn wait(&self, retry: u8, random: u32) -> u32 {
+    /// The wait before retry number `retry`, from 1 on; `random` gives any number,
+    /// which decides how much of the jitter is taken off.
+    #[inline]
+    pub fn wait(&self, retry: u8, random: impl FnOnce() -> u32) -> u32 {
+        match self.grow {
+            Some(grow) => grow(self, retry, random()),
+            None => 0,
+        }
+    }
+
+    fn grown(&self, retry: u8, random: u32) -> u32 {
         // Added up, for a product would be a wide one.
         let (mut wait, mut step) = (0, self.wait);
         for count in 0..retry {
@@ -96,13 +105,9 @@ mod tests {
     use super::*;
 
     fn waits(backoff: Backoff) -> [u32; 5] {
-        let policy = Policy {
-            wait: 1000,
-            most: 3500,
-            backoff,
-            ..Policy::DEFAULT
-        };
-        [1, 2, 3, 4, 255].map(|retry| policy.wait(retry, 0))
+        let mut policy = Policy::DEFAULT;
+        policy.set_backoff(backoff, 1000, 3500);
+        [1, 2, 3, 4, 255].map(|retry| policy.wait(retry, || 0))
     }
 
     #[test]
@@ -115,15 +120,11 @@ mod tests {
 
     #[test]
     fn jitter_takes_off_up_to_its_share() {
-        let policy = Policy {
-            wait: 1000,
-            most: 1000,
-            backoff: Backoff::Fixed,
-            jitter: 77,
-            ..Policy::DEFAULT
-        };
-        assert_eq!(policy.wait(1, 0), 1000);
-        assert_eq!(policy.wait(1, 1 << 15), 850);
-        assert_eq!(policy.wait(1, u32::MAX), 701);
+        let mut policy = Policy::DEFAULT;
+        policy.set_backoff(Backoff::Fixed, 1000, 1000);
+        policy.jitter = 77;
+        assert_eq!(policy.wait(1, || 0), 1000);
+        assert_eq!(policy.wait(1, || 1 << 15), 850);
+        assert_eq!(policy.wait(1, || u32::MAX), 701);
     }
 }

@@ -116,7 +116,7 @@ impl<J: Job, const N: usize> Shared<J, N> {
             return Some(job);
         }
         ticket.retries += 1;
-        let wait = self.policy.wait(ticket.retries, means.random());
+        let wait = self.policy.wait(ticket.retries, || means.random());
         ticket.enter(Stage::Queued, now, wait);
         // There is room: it came out of the queue, or was counted as if in it.
         self.queue.push_front(job).err()

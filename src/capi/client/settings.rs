@@ -244,9 +244,12 @@ pub unsafe extern "C" fn mbm_client_setBackoff(
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts
-                .policy
-                .set_backoff(backoff, millis(milliseconds), millis(mostMilliseconds))
+            let Some(backoff) = Backoff::from_code(backoff) else {
+                return Status::INVALID_ARGUMENT;
+            };
+            let (wait, most) = (millis(milliseconds), millis(mostMilliseconds));
+            parts.policy.set_backoff(backoff, wait, most);
+            Status::OK
         })
     }
 }

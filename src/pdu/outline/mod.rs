@@ -189,7 +189,11 @@ impl Outline {
     /// what only its end ends.
     fn own_length(&self, pdu: &[u8], whole: Option<usize>) -> usize {
         let rule = match self.head {
-            [files::READ_FIFO_QUEUE, ..] => length::response(pdu, &[]),
+            [files::READ_FIFO_QUEUE, ..] => match pdu.get(1..3) {
+                Some([0, low]) => Length::Exactly(3 + usize::from(*low)),
+                Some(_) => Length::Exactly(MAX_PDU + 1),
+                None => Length::AtLeast(3),
+            },
             [identification::ENCAPSULATED_INTERFACE_TRANSPORT, MEI_READ_DEVICE_IDENTIFICATION, ..] => {
                 length::objects(pdu)
             }

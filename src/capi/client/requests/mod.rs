@@ -11,27 +11,19 @@ use super::{mbm_client, mbm_request, pointers, Lent};
 use crate::error::Status;
 use crate::pdu::outline::{Form, Outline};
 
-/// The request behind a pointer, if it may be queued.
+/// Whether the request behind a pointer may be queued.
 ///
 /// # Safety
 /// As the header demands.
 #[cfg_attr(target_os = "none", inline(never))]
-unsafe fn prepare<'a>(
-    client: *const mbm_client,
-    request: *mut mbm_request,
-) -> Result<&'a mut Inside, Status> {
-    // SAFETY: as the caller promises; what is not pending is used by nobody.
+unsafe fn prepare(client: *const mbm_client, request: *mut mbm_request) -> Status {
+    // SAFETY: as the caller promises.
     unsafe {
         match pointers::check(client) {
-            Status::OK => {}
-            refused => return Err(refused),
+            Status::OK if request.is_null() => Status::INVALID_ARGUMENT,
+            Status::OK if (*request).status == Status::PENDING.code() => Status::BUSY,
+            other => other,
         }
-        let request = request.cast::<Inside>().as_mut();
-        let inside = request.ok_or(Status::INVALID_ARGUMENT)?;
-        if inside.ticket.status == Status::PENDING {
-            return Err(Status::BUSY);
-        }
-        Ok(inside)
     }
 }
 
@@ -40,7 +32,9 @@ unsafe fn prepare<'a>(
 /// # Safety
 /// As the header demands; the request is [`prepare`]d.
 #[cfg_attr(target_os = "none", inline(never))]
-unsafe fn submit(client: *mut mbm_client, inside: &mut Inside, built: Status) -> Status {
+unsafe fn submit(client: *mut mbm_client, request: *mut mbm_request, built: Status) -> Status {
+    // SAFETY: prepared, so a request that nobody uses.
+    let inside = unsafe { &mut *request.cast::<Inside>() };
     let ticket = &mut inside.ticket;
     let outline = &ticket.outline;
     let status = if built != Status::OK {
@@ -50,10 +44,9 @@ unsafe fn submit(client: *mut mbm_client, inside: &mut Inside, built: Status) ->
     } else if !inside.reply.is_null() && u16::from(outline.known_data()) > ticket.capacity {
         Status::BUFFER_TOO_SMALL
     } else {
-        let pointer = (&raw mut *inside).cast();
         // SAFETY: as the caller promises.
         return unsafe {
-            match Lent::new(pointer) {
+            match Lent::new(request) {
                 Some(request) => {
                     let object = pointers::object(client);
                     (object.calls().queue)(object, request)
@@ -78,13 +71,13 @@ unsafe fn queue(
 ) -> u8 {
     // SAFETY: as the caller promises.
     unsafe {
-        match prepare(client, request) {
-            Ok(inside) => {
-                let built = build(&mut inside.ticket.outline);
-                submit(client, inside, built).code()
-            }
-            Err(refused) => refused.code(),
+        let mut status = prepare(client, request);
+        if status == Status::OK {
+            let inside = &mut *request.cast::<Inside>();
+            let built = build(&mut inside.ticket.outline);
+            status = submit(client, request, built);
         }
+        status.code()
     }
 }
 
