@@ -9,6 +9,7 @@ use crate::error::Status;
 use crate::frame::tcp::{self, Header};
 use crate::port::Port;
 use crate::transaction::{Counter, Settings};
+use core::cell::Cell;
 
 /// As many requests at once as the queue holds, in TCP frames. Received bytes
 /// stand in the frame buffer, those to send in [`Means::outgoing`].
@@ -78,11 +79,15 @@ impl<P, S> Tcp<P, S> {
 impl<P: Port, S: Means> Tcp<P, S> {
     /// Receives what there is; false if the link is lost.
     fn hear(&mut self) -> bool {
-        let range = usize::from(self.start)..usize::from(self.end);
         let frame = self.means.frame();
         if self.start > 0 {
-            frame.copy_within(range, 0);
-            self.end -= self.start;
+            let cells = Cell::from_mut(&mut *frame).as_slice_of_cells();
+            let kept = cells.get(usize::from(self.start)..usize::from(self.end));
+            let kept = kept.unwrap_or_default();
+            for (to, from) in cells.iter().zip(kept) {
+                to.set(from.get());
+            }
+            self.end = kept.len() as u16;
             self.start = 0;
         }
         let Some(room) = frame.get_mut(usize::from(self.end)..) else {
