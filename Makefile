@@ -12,7 +12,7 @@ MODBUS = $(shell pkg-config --cflags libmodbus)
 LIBS := -Wl,--gc-sections -lmodbus -lcmocka -lpthread
 SANITIZERS := -fsanitize=address,undefined -fno-sanitize-recover=all
 
-SUPPORT := $(wildcard c-tests/support/*.c) examples/linux/mbm_tty.c
+SUPPORT := $(wildcard c-tests/support/*.c) $(wildcard examples/linux/mbm_*.c)
 TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
 HEADERS := $(wildcard include/*.h c-tests/support/*.h c-tests/shim/* examples/linux/*.h)
