@@ -36,6 +36,19 @@ archives: ## The archives for microcontrollers, build/archives and build/minimal
 	@for mcu in $(MCUS); do scripts/archive $$mcu && scripts/archive $$mcu minimal || exit 1; done
 	@scripts/check-archive
 
+.PHONY: install
+install: $(ARCHIVE) ## Library, header, ports, pkg-config and CMake files, below PREFIX
+	@PREFIX="$(PREFIX)" LIBDIR="$(LIBDIR)" DESTDIR="$(DESTDIR)" scripts/install
+
+.PHONY: dist
+dist: $(ARCHIVE) ## Sources and what archives stand built, dist/mbm-VERSION.tar.gz
+	@scripts/dist
+
+.PHONY: check-install
+check-install: $(ARCHIVE) ## Installs, builds and runs the README's program; packs twice
+	@scripts/need gcc libc6-dev make cmake pkg-config
+	@scripts/check-install
+
 .PHONY: size
 size: ## Flash and RAM that the library adds, and what changed since docs/size.md
 	@scripts/size
