@@ -58,7 +58,7 @@ header: ## Write include/mbm.h anew from the source
 	@$(CARGO) run --quiet -p mbm-tools --bin header
 
 .PHONY: check
-check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, symbols
+check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, symbols
 	@$(CARGO) fmt --all --check
 	@$(CARGO) clippy --quiet --workspace --all-targets -- -D warnings
 	@$(CARGO) clippy --quiet --no-default-features -- -D warnings
@@ -68,6 +68,7 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, symbols
 	@$(CARGO) run --quiet -p mbm-tools --bin header -- --check
 	@scripts/check-header
 	@scripts/check-docs
+	@scripts/check-functions
 	@$(MAKE) --no-print-directory check-readme
 	@scripts/check-symbols $(ARCHIVE)
 	@echo "check: formatting, lints, layers, header and symbols are in order"

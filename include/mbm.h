@@ -25,6 +25,257 @@
 /** Bytes of a frame buffer for any request and reply of so many words. */
 #define MBM_FRAME_BYTES(words) (2u * (words) + 13u)
 
+#if defined(__AVR__) && __SIZEOF_DOUBLE__ != 4
+/* The archive has a double of 32 bits: what calls these must not link. */
+#define mbm_registers_getDouble mbm_registers_getDouble_wants_mdouble_32
+#define mbm_registers_setDouble mbm_registers_setDouble_wants_mdouble_32
+#endif
+
+/**
+ * Serial line, binary, CRC-16 (serial line guide V1.02, 2.5.1).
+ */
+#define MBM_FRAMING_RTU 0
+
+/**
+ * Serial line, hexadecimal characters, LRC (serial line guide V1.02, 2.5.2).
+ */
+#define MBM_FRAMING_ASCII 1
+
+/**
+ * TCP, behind the MBAP header (messaging on TCP/IP guide V1.0b, 3.1.3).
+ */
+#define MBM_FRAMING_TCP 2
+
+/**
+ * RTU frames in a TCP stream.
+ */
+#define MBM_FRAMING_RTU_OVER_TCP 3
+
+/**
+ * Most bytes of a TCP frame.
+ */
+#define MBM_MAX_TCP_FRAME 260
+
+/**
+ * Most characters of an ASCII frame.
+ */
+#define MBM_MAX_ASCII_FRAME 513
+
+/**
+ * Read Coils (V1.1b3, 6.1).
+ */
+#define MBM_FC_READ_COILS 1
+
+/**
+ * Read Discrete Inputs (V1.1b3, 6.2).
+ */
+#define MBM_FC_READ_DISCRETE_INPUTS 2
+
+/**
+ * Read Holding Registers (V1.1b3, 6.3).
+ */
+#define MBM_FC_READ_HOLDING_REGISTERS 3
+
+/**
+ * Read Input Registers (V1.1b3, 6.4).
+ */
+#define MBM_FC_READ_INPUT_REGISTERS 4
+
+/**
+ * Write Single Coil (V1.1b3, 6.5).
+ */
+#define MBM_FC_WRITE_SINGLE_COIL 5
+
+/**
+ * Write Single Register (V1.1b3, 6.6).
+ */
+#define MBM_FC_WRITE_SINGLE_REGISTER 6
+
+/**
+ * Read Exception Status (V1.1b3, 6.7).
+ */
+#define MBM_FC_READ_EXCEPTION_STATUS 7
+
+/**
+ * Diagnostics (V1.1b3, 6.8).
+ */
+#define MBM_FC_DIAGNOSTICS 8
+
+/**
+ * Get Comm Event Counter (V1.1b3, 6.9).
+ */
+#define MBM_FC_GET_COMM_EVENT_COUNTER 11
+
+/**
+ * Get Comm Event Log (V1.1b3, 6.10).
+ */
+#define MBM_FC_GET_COMM_EVENT_LOG 12
+
+/**
+ * Write Multiple Coils (V1.1b3, 6.11).
+ */
+#define MBM_FC_WRITE_MULTIPLE_COILS 15
+
+/**
+ * Write Multiple Registers (V1.1b3, 6.12).
+ */
+#define MBM_FC_WRITE_MULTIPLE_REGISTERS 16
+
+/**
+ * Report Server ID (V1.1b3, 6.13).
+ */
+#define MBM_FC_REPORT_SERVER_ID 17
+
+/**
+ * Read File Record (V1.1b3, 6.14).
+ */
+#define MBM_FC_READ_FILE_RECORD 20
+
+/**
+ * Write File Record (V1.1b3, 6.15).
+ */
+#define MBM_FC_WRITE_FILE_RECORD 21
+
+/**
+ * Mask Write Register (V1.1b3, 6.16).
+ */
+#define MBM_FC_MASK_WRITE_REGISTER 22
+
+/**
+ * Read/Write Multiple Registers (V1.1b3, 6.17).
+ */
+#define MBM_FC_READ_WRITE_MULTIPLE_REGISTERS 23
+
+/**
+ * Read FIFO Queue (V1.1b3, 6.18).
+ */
+#define MBM_FC_READ_FIFO_QUEUE 24
+
+/**
+ * Encapsulated Interface Transport (V1.1b3, 6.19).
+ */
+#define MBM_FC_ENCAPSULATED_INTERFACE 43
+
+/**
+ * Sub-function of 08: the data come back; any number of words (V1.1b3, 6.8.1).
+ */
+#define MBM_DIAGNOSTICS_RETURN_QUERY_DATA 0
+
+/**
+ * Sub-function of 08; data FF 00 also clear the event log.
+ */
+#define MBM_DIAGNOSTICS_RESTART_COMMUNICATIONS 1
+
+/**
+ * Sub-function of 08.
+ */
+#define MBM_DIAGNOSTICS_RETURN_DIAGNOSTIC_REGISTER 2
+
+/**
+ * Sub-function of 08; the first byte of the data is the character.
+ */
+#define MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER 3
+
+/**
+ * Sub-function of 08, which nothing answers.
+ */
+#define MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY 4
+
+/**
+ * Sub-function of 08; clears the diagnostic register too.
+ */
+#define MBM_DIAGNOSTICS_CLEAR_COUNTERS 10
+
+/**
+ * Sub-function of 08: messages seen on the bus.
+ */
+#define MBM_DIAGNOSTICS_BUS_MESSAGE_COUNT 11
+
+/**
+ * Sub-function of 08: messages with a wrong CRC.
+ */
+#define MBM_DIAGNOSTICS_BUS_COMMUNICATION_ERROR_COUNT 12
+
+/**
+ * Sub-function of 08: exceptions answered.
+ */
+#define MBM_DIAGNOSTICS_BUS_EXCEPTION_ERROR_COUNT 13
+
+/**
+ * Sub-function of 08: messages for this device.
+ */
+#define MBM_DIAGNOSTICS_SERVER_MESSAGE_COUNT 14
+
+/**
+ * Sub-function of 08: messages that were not answered.
+ */
+#define MBM_DIAGNOSTICS_SERVER_NO_RESPONSE_COUNT 15
+
+/**
+ * Sub-function of 08: messages answered with a NAK.
+ */
+#define MBM_DIAGNOSTICS_SERVER_NAK_COUNT 16
+
+/**
+ * Sub-function of 08: messages answered with busy.
+ */
+#define MBM_DIAGNOSTICS_SERVER_BUSY_COUNT 17
+
+/**
+ * Sub-function of 08: messages lost to character overruns.
+ */
+#define MBM_DIAGNOSTICS_BUS_CHARACTER_OVERRUN_COUNT 18
+
+/**
+ * Sub-function of 08.
+ */
+#define MBM_DIAGNOSTICS_CLEAR_OVERRUN_COUNTER 20
+
+/**
+ * MEI type of 2B: CANopen General Reference (V1.1b3, 6.20).
+ */
+#define MBM_MEI_CANOPEN 13
+
+/**
+ * MEI type of 2B: Read Device Identification (V1.1b3, 6.21).
+ */
+#define MBM_MEI_READ_DEVICE_IDENTIFICATION 14
+
+/**
+ * Read device id code: the basic objects, 00 to 02.
+ */
+#define MBM_DEVICE_ID_BASIC 1
+
+/**
+ * Read device id code: the regular objects, 00 to 7F.
+ */
+#define MBM_DEVICE_ID_REGULAR 2
+
+/**
+ * Read device id code: all objects, 00 to FF.
+ */
+#define MBM_DEVICE_ID_EXTENDED 3
+
+/**
+ * Read device id code: one object.
+ */
+#define MBM_DEVICE_ID_INDIVIDUAL 4
+
+/**
+ * Length rule: only silence on the line, or what frames the PDU, ends it.
+ */
+#define MBM_RULE_SILENCE 0
+
+/**
+ * Length rule: always so many bytes.
+ */
+#define MBM_RULE_FIXED 1
+
+/**
+ * Length rule: a byte counts the bytes behind it.
+ */
+#define MBM_RULE_COUNTED 2
+
 /**
  * Most registers that one request reads (V1.1b3, 6.3 and 6.4).
  */
@@ -54,6 +305,92 @@
  * Most bytes of an RTU frame (serial line guide V1.02, 2.5.1).
  */
 #define MBM_MAX_FRAME 256
+
+/**
+ * A request: what a client sends.
+ */
+#define MBM_PACKET_REQUEST 0
+
+/**
+ * A response: what a server sends if the request succeeds.
+ */
+#define MBM_PACKET_RESPONSE 1
+
+/**
+ * An exception: what a server sends if the request fails (V1.1b3, clause 7).
+ */
+#define MBM_PACKET_EXCEPTION 2
+
+/**
+ * Most bytes of a PDU: function code and data (V1.1b3, 4.1).
+ */
+#define MBM_MAX_PDU 253
+
+/**
+ * `bytes` is the length.
+ */
+#define MBM_LENGTH_EXACT 0
+
+/**
+ * It has `bytes` at least. Once so many are there, ask again.
+ */
+#define MBM_LENGTH_AT_LEAST 1
+
+/**
+ * Silence on the line tells, in ASCII the end character. `bytes` is 0.
+ */
+#define MBM_LENGTH_SILENCE 2
+
+/**
+ * Nobody knows this function; declare it. `bytes` is 0.
+ */
+#define MBM_LENGTH_UNKNOWN 3
+
+/**
+ * The order of the registers that a function is given; in these, MBM_ORDER_ABCD.
+ */
+#define MBM_ORDER_DEFAULT 0
+
+/**
+ * High word first, high byte first: what most devices do. A is the most
+ * significant byte; 2923517522, which is 0xAE415652, arrives as AE41 5652.
+ */
+#define MBM_ORDER_ABCD 1
+
+/**
+ * Low word first, high byte first: 5652 AE41.
+ */
+#define MBM_ORDER_CDAB 2
+
+/**
+ * High word first, low byte first: 41AE 5256.
+ */
+#define MBM_ORDER_BADC 3
+
+/**
+ * Low word first, low byte first: 5256 41AE.
+ */
+#define MBM_ORDER_DCBA 4
+
+/**
+ * mbm_registers.kind: words to read, as those of mbm_master.
+ */
+#define MBM_REGISTERS_OF_WORDS 1
+
+/**
+ * mbm_registers.kind: bytes to read, high byte first.
+ */
+#define MBM_REGISTERS_OF_BYTES 2
+
+/**
+ * mbm_registers.kind: words to write and to read.
+ */
+#define MBM_REGISTERS_INTO_WORDS 3
+
+/**
+ * mbm_registers.kind: bytes to write and to read, high byte first.
+ */
+#define MBM_REGISTERS_INTO_BYTES 4
 
 /**
  * The call succeeded.
@@ -192,6 +529,227 @@
 #define MBM_MALFORMED_FRAME 239
 
 /**
+ * How long the PDU of a function of your own is, function code included.
+ * Zeroed: as long as its frame.
+ */
+typedef struct mbm_rule {
+    /**
+     * MBM_RULE_SILENCE, MBM_RULE_FIXED or MBM_RULE_COUNTED.
+     */
+    uint8_t kind;
+    /**
+     * FIXED: bytes of the PDU, 1 to 253. COUNTED: where the counting byte
+     * stands, 1 to 252 bytes behind the function code.
+     */
+    uint8_t bytes;
+    /**
+     * COUNTED: bytes that follow those that are counted.
+     */
+    uint8_t more;
+} mbm_rule;
+
+/**
+ * A function of your own. Codes 65 to 72 and 100 to 110 are left to users, of
+ * any length unless you declare them; another code that the standard does not
+ * define works once it is declared. A code of the standard keeps its meaning.
+ */
+typedef struct mbm_function {
+    /**
+     * 1 to 127.
+     */
+    uint8_t code;
+    /**
+     * Its requests.
+     */
+    struct mbm_rule request;
+    /**
+     * Its responses.
+     */
+    struct mbm_rule response;
+} mbm_function;
+
+/**
+ * How frames look, and what is in them beside the standard. Zeroed: RTU, and
+ * the functions of the standard.
+ */
+typedef struct mbm_framing {
+    /**
+     * Functions of your own; may be NULL if there are none.
+     */
+    const struct mbm_function *functions;
+    /**
+     * How many.
+     */
+    uint8_t functionCount;
+    /**
+     * MBM_FRAMING_RTU, _ASCII, _TCP or _RTU_OVER_TCP.
+     */
+    uint8_t kind;
+    /**
+     * ASCII: the last character of a frame; 0 is line feed (V1.1b3, 6.8.1,
+     * sub-function 03).
+     */
+    uint8_t end;
+} mbm_framing;
+
+/**
+ * A request, response or exception of any function. Parsing zeroes it first,
+ * and sets what the function has; building reads that and ignores the rest:
+ *
+ * function | request | response
+ * ---------|---------|---------
+ * 01, 02, 03, 04 | address, quantity | data
+ * 05 | address, value | address, value
+ * 06 | address, value | address, value
+ * 07 | | exceptionStatus
+ * 08 | subFunction, data | subFunction, data
+ * 0B | | commStatus, eventCount
+ * 0C | | commStatus, eventCount, messageCount, data (events, the latest first)
+ * 0F, 10 | address, quantity, data | address, quantity
+ * 11 | | byteCount, data
+ * 14 | data (records) | data (records)
+ * 15 | data (records) | data (records)
+ * 16 | address, andMask, orMask | address, andMask, orMask
+ * 17 | address, quantity, writeAddress, writeQuantity, data | data
+ * 18 | address | data (registers)
+ * 2B, MEI type 0E | meiType, readDeviceIdCode, objectId | meiType, readDeviceIdCode, conformity, moreFollows, nextObjectId, objectCount, data (objects)
+ * 2B, others | meiType, data | meiType, data
+ * your own | data | data
+ *
+ * An exception has exceptionCode, and the function of the request. Register
+ * data are as on the wire, high bytes first; bits begin with the lowest of the
+ * first byte. Records and objects: mbm_packet_nextRecord, mbm_packet_addRecord
+ * and their likes for objects.
+ */
+typedef struct mbm_packet {
+    /**
+     * The data, without the byte count in front of them. After parsing they
+     * lie within the bytes that were parsed; to build, they are yours. May be
+     * NULL if dataLength is 0.
+     */
+    const uint8_t *data;
+    /**
+     * Bytes of data.
+     */
+    uint16_t dataLength;
+    /**
+     * Transaction identifier of a TCP frame; 0 in other framings.
+     */
+    uint16_t transaction;
+    /**
+     * First coil, input or register, counted from 0; 17: that is read.
+     */
+    uint16_t address;
+    /**
+     * Coils, inputs or registers; 17: that are read.
+     */
+    uint16_t quantity;
+    /**
+     * 17: first register that is written.
+     */
+    uint16_t writeAddress;
+    /**
+     * 17: registers that are written.
+     */
+    uint16_t writeQuantity;
+    /**
+     * 05: 0 is off, anything else is on (parsed: 1). 06: the register.
+     */
+    uint16_t value;
+    /**
+     * 16: bits that are kept.
+     */
+    uint16_t andMask;
+    /**
+     * 16: bits that replace those that are not kept.
+     */
+    uint16_t orMask;
+    /**
+     * 08: one of MBM_DIAGNOSTICS_.
+     */
+    uint16_t subFunction;
+    /**
+     * 0B, 0C: FFFF while a command is carried out, else 0.
+     */
+    uint16_t commStatus;
+    /**
+     * 0B, 0C: successful messages.
+     */
+    uint16_t eventCount;
+    /**
+     * 0C: messages.
+     */
+    uint16_t messageCount;
+    /**
+     * MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE or MBM_PACKET_EXCEPTION.
+     */
+    uint8_t kind;
+    /**
+     * The unit that is asked, or that answers. Of frames only.
+     */
+    uint8_t unit;
+    /**
+     * Function code, 1 to 127; of an exception that of the request.
+     */
+    uint8_t function;
+    /**
+     * Exception: 1 to 127, the same numbers as MBM_ILLEGAL_FUNCTION and others.
+     */
+    uint8_t exceptionCode;
+    /**
+     * 07: eight outputs.
+     */
+    uint8_t exceptionStatus;
+    /**
+     * 11: the byte count. It is dataLength, or less: some devices count the id
+     * only and send more behind it.
+     */
+    uint8_t byteCount;
+    /**
+     * 2B: MBM_MEI_READ_DEVICE_IDENTIFICATION or another.
+     */
+    uint8_t meiType;
+    /**
+     * 2B/0E: one of MBM_DEVICE_ID_.
+     */
+    uint8_t readDeviceIdCode;
+    /**
+     * 2B/0E: the first object, or the only one.
+     */
+    uint8_t objectId;
+    /**
+     * 2B/0E: 01 to 03 or 81 to 83.
+     */
+    uint8_t conformity;
+    /**
+     * 2B/0E: 1 if another request is needed for the rest, else 0.
+     */
+    uint8_t moreFollows;
+    /**
+     * 2B/0E: the object to ask for next; 0 if none follows.
+     */
+    uint8_t nextObjectId;
+    /**
+     * 2B/0E: how many objects the data are.
+     */
+    uint8_t objectCount;
+} mbm_packet;
+
+/**
+ * How long something is.
+ */
+typedef struct mbm_length {
+    /**
+     * All of it, from its first byte, as `kind` says.
+     */
+    uint16_t bytes;
+    /**
+     * MBM_LENGTH_EXACT, _AT_LEAST, _SILENCE or _UNKNOWN.
+     */
+    uint8_t kind;
+} mbm_length;
+
+/**
  * A Modbus RTU master: one line, one request at a time.
  *
  * Storage is yours and must be zero before first use, which a static object
@@ -204,11 +762,11 @@ typedef struct mbm_master {
     /**
      * Not for you.
      */
-    void *pointers[20];
+    void *pointers[21];
     /**
      * Not for you.
      */
-    uint32_t words[20];
+    uint32_t words[19];
 } mbm_master;
 
 /**
@@ -304,6 +862,79 @@ typedef struct mbm_counters {
 } mbm_counters;
 
 /**
+ * Registers in a row, seen as values by the addresses that the device gives
+ * them. It owns nothing: what `data` points to is the caller's.
+ *
+ * One of the functions mbm_registers_of... and mbm_registers_into... fills it
+ * in, as do mbm_master_getResponseRegisters and mbm_master_getTransmitRegisters;
+ * each field may be set by hand too. Functions that get or set do not change
+ * it, so any thread may use it beside others that only get.
+ */
+typedef struct mbm_registers {
+    /**
+     * The words or bytes, as `kind` says. NULL: none, MBM_NOT_INITIALISED.
+     */
+    const void *data;
+    /**
+     * The device's address of the first register.
+     */
+    uint16_t first;
+    /**
+     * How many registers there are; `first + count` is 65536 at most.
+     */
+    uint16_t count;
+    /**
+     * One of MBM_REGISTERS_...
+     */
+    uint8_t kind;
+    /**
+     * One of MBM_ORDER_..., for calls that say MBM_ORDER_DEFAULT.
+     */
+    uint8_t order;
+} mbm_registers;
+
+/**
+ * Registers of a file: a sub-request of 14 or 15, or what answers it.
+ */
+typedef struct mbm_record {
+    /**
+     * The registers, high bytes first, 2 * length bytes. A request of 14,
+     * which reads them, has none: NULL, and ignored.
+     */
+    const uint8_t *data;
+    /**
+     * File number, 1 to 65535; 0 in a response of 14, which does not say.
+     */
+    uint16_t file;
+    /**
+     * The first record, 0 to 9999; 0 in a response of 14.
+     */
+    uint16_t record;
+    /**
+     * How many registers.
+     */
+    uint16_t length;
+} mbm_record;
+
+/**
+ * An object of a device identification.
+ */
+typedef struct mbm_object {
+    /**
+     * Its value, most often text, without an end.
+     */
+    const uint8_t *data;
+    /**
+     * Bytes of the value.
+     */
+    uint8_t length;
+    /**
+     * 0 vendor name, 1 product code, 2 revision and so on (V1.1b3, 6.21).
+     */
+    uint8_t id;
+} mbm_object;
+
+/**
  * A receive ring between an interrupt handler and the main loop.
  *
  * One side puts bytes in with mbm_ring_put or mbm_ring_write: an interrupt
@@ -330,6 +961,291 @@ typedef struct mbm_ring {
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
+
+/**
+ * Packs coils for a write, the first into the lowest bit of the first byte (V1.1b3,
+ * 6.11); unused bits of the last byte become 0, bytes behind it stay.
+ *
+ * @param coils     a byte a coil: 0 is off, anything else is on
+ * @param quantity  how many coils, 0 to 65535
+ * @param bytes     gets the bits, 8 a byte
+ * @param length    how many bytes there are
+ * @return MBM_OK, or with nothing packed MBM_BUFFER_TOO_SMALL or
+ *         MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_bits_pack(const uint8_t *coils,
+                      uint16_t quantity,
+                      uint8_t *bytes,
+                      uint16_t length);
+
+/**
+ * Unpacks the coils or discrete inputs of a read (V1.1b3, 6.1).
+ *
+ * @param bytes     the bits, 8 a byte, the first coil the lowest
+ * @param length    how many bytes there are
+ * @param coils     gets 0 or 1 a coil
+ * @param quantity  how many coils, 0 to 65535
+ * @return MBM_OK, or with nothing unpacked MBM_ILLEGAL_DATA_ADDRESS if there are
+ *         not so many bits, MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_bits_unpack(const uint8_t *bytes,
+                        uint16_t length,
+                        uint8_t *coils,
+                        uint16_t quantity);
+
+/**
+ * Whether a coil or discrete input is set, by the device's address.
+ *
+ * @param bytes     the bits of a read, 8 a byte, the first coil the lowest
+ * @param first     the address of the first coil
+ * @param quantity  how many coils were read; `bytes` has room for so many
+ * @param address   the coil
+ * @param on        gets 0 or 1
+ * @return MBM_OK, or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS for a coil that
+ *         is not among them or a range that passes 65535, MBM_INVALID_ARGUMENT
+ *         for a NULL pointer
+ */
+uint8_t mbm_bits_isSet(const uint8_t *bytes,
+                       uint16_t first,
+                       uint16_t quantity,
+                       uint16_t address,
+                       uint8_t *on);
+
+/**
+ * Sets a coil for a write, by the device's address; the others stay.
+ *
+ * @param bytes     the bits of a write, 8 a byte, the first coil the lowest
+ * @param first     the address of the first coil
+ * @param quantity  how many coils are written; `bytes` has room for so many
+ * @param address   the coil
+ * @param on        0 is off, anything else is on
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a coil that is
+ *         not among them or a range that passes 65535, MBM_INVALID_ARGUMENT for
+ *         a NULL pointer
+ */
+uint8_t mbm_bits_set(uint8_t *bytes,
+                     uint16_t first,
+                     uint16_t quantity,
+                     uint16_t address,
+                     uint8_t on);
+
+/**
+ * As mbm_bits_pack, into words such as mbm_master's transmit words, 16 to a word.
+ *
+ * @param coils     a byte a coil: 0 is off, anything else is on
+ * @param quantity  how many coils, 0 to 65535
+ * @param words     gets the bits, 16 a word
+ * @param length    how many words there are
+ * @return MBM_OK, or with nothing packed MBM_BUFFER_TOO_SMALL or
+ *         MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_bits_packWords(const uint8_t *coils,
+                           uint16_t quantity,
+                           uint16_t *words,
+                           uint16_t length);
+
+/**
+ * As mbm_bits_unpack, of words such as mbm_master's response words.
+ *
+ * @param words     the bits, 16 a word, the first coil the lowest
+ * @param length    how many words there are
+ * @param coils     gets 0 or 1 a coil
+ * @param quantity  how many coils, 0 to 65535
+ * @return MBM_OK, or with nothing unpacked MBM_ILLEGAL_DATA_ADDRESS if there are
+ *         not so many bits, MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_bits_unpackWords(const uint16_t *words,
+                             uint16_t length,
+                             uint8_t *coils,
+                             uint16_t quantity);
+
+/**
+ * As mbm_bits_isSet, in words such as mbm_master's response words.
+ *
+ * @param words     the bits of a read, 16 a word, the first coil the lowest
+ * @param first     the address of the first coil
+ * @param quantity  how many coils were read; `words` has room for so many
+ * @param address   the coil
+ * @param on        gets 0 or 1
+ * @return MBM_OK, or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS for a coil that
+ *         is not among them or a range that passes 65535, MBM_INVALID_ARGUMENT
+ *         for a NULL pointer
+ */
+uint8_t mbm_bits_isSetInWords(const uint16_t *words,
+                              uint16_t first,
+                              uint16_t quantity,
+                              uint16_t address,
+                              uint8_t *on);
+
+/**
+ * As mbm_bits_set, in words such as mbm_master's transmit words.
+ *
+ * @param words     the bits of a write, 16 a word, the first coil the lowest
+ * @param first     the address of the first coil
+ * @param quantity  how many coils are written; `words` has room for so many
+ * @param address   the coil
+ * @param on        0 is off, anything else is on
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a coil that is
+ *         not among them or a range that passes 65535, MBM_INVALID_ARGUMENT for
+ *         a NULL pointer
+ */
+uint8_t mbm_bits_setInWords(uint16_t *words,
+                            uint16_t first,
+                            uint16_t quantity,
+                            uint16_t address,
+                            uint8_t on);
+
+/**
+ * Writes the frame of a packet: request, response or exception. Nothing
+ * malformed is ever built.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param framing   how frames look
+ * @param packet    what to build, with its unit, and for TCP the transaction
+ * @param frame     receives the frame; may not overlap the packet's data
+ * @param capacity  bytes of `frame`; MBM_MAX_FRAME do for RTU,
+ *                  MBM_MAX_TCP_FRAME for TCP, MBM_MAX_ASCII_FRAME for all
+ * @param length    receives the frame's length, if the status is MBM_OK
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
+ *         that mbm_frame_parse finds in such a frame
+ */
+uint8_t mbm_frame_build(const struct mbm_framing *framing,
+                        const struct mbm_packet *packet,
+                        uint8_t *frame,
+                        uint16_t capacity,
+                        uint16_t *length);
+
+/**
+ * Reads a frame. The packet's data point into it.
+ *
+ * A request that is refused with an exception code can be answered with that:
+ * see mbm_frame_exception.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param framing      how frames look
+ * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
+ *                     and exceptions
+ * @param frame        the frame, from its first byte to its last. ASCII is
+ *                     decoded where it stands, which overwrites it
+ * @param frameLength  its bytes
+ * @param packet       receives what it says. If the frame is sound, but not
+ *                     what it carries: kind, unit, transaction and function
+ *                     alone; if the frame is not sound: kind alone
+ * @return MBM_OK, also for an exception; of the frame MBM_INCOMPLETE_FRAME,
+ *         MBM_MALFORMED_FRAME, or MBM_INVALID_CRC, also for a wrong LRC; what
+ *         mbm_packet_parse says of what it carries; MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_frame_parse(const struct mbm_framing *framing,
+                        uint8_t kind,
+                        uint8_t *frame,
+                        uint16_t frameLength,
+                        struct mbm_packet *packet);
+
+/**
+ * Writes the exception that answers a request, where one may: to a request
+ * that mbm_frame_parse refused, with its status; to one that your device
+ * refuses, with the exception code of your choice.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param framing   how frames look
+ * @param request   the request, as mbm_frame_parse left it
+ * @param code      1 to 127, MBM_ILLEGAL_FUNCTION for example
+ * @param frame     receives the frame; it may be that of the request
+ * @param capacity  bytes of `frame`; 11 always do
+ * @param length    receives the frame's length, if the status is MBM_OK
+ * @return MBM_OK; MBM_BROADCAST_NOT_ALLOWED: on a serial line nobody answers
+ *         unit 0; MBM_ILLEGAL_FUNCTION for a function from 0x80, which no
+ *         exception can name; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also
+ *         for a status that is no exception code
+ */
+uint8_t mbm_frame_exception(const struct mbm_framing *framing,
+                            const struct mbm_packet *request,
+                            uint8_t code,
+                            uint8_t *frame,
+                            uint16_t capacity,
+                            uint16_t *length);
+
+/**
+ * How long the frame is that begins with these bytes.
+ *
+ * Any thread or interrupt may call it. For ASCII it takes 260 bytes of stack.
+ *
+ * @param framing   how frames look
+ * @param kind      MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and
+ *                  exceptions
+ * @param bytes     the frame's first bytes; more may follow
+ * @param have      how many; may be 0
+ * @param expected  receives the length
+ * @return MBM_OK; MBM_MALFORMED_FRAME if no frame begins like that, or none is
+ *         so long; MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_frame_expectedLength(const struct mbm_framing *framing,
+                                 uint8_t kind,
+                                 const uint8_t *bytes,
+                                 uint16_t have,
+                                 struct mbm_length *expected);
+
+/**
+ * How long the frame will be that answers a request, if that succeeds. Else it
+ * is an exception: 5 bytes in RTU, 9 in TCP, 11 characters in ASCII.
+ *
+ * Any thread or interrupt may call it. It takes 260 bytes of stack.
+ *
+ * @param framing   how frames look
+ * @param request   the request, as for mbm_frame_build
+ * @param expected  receives the length; MBM_LENGTH_EXACT and 0 if nothing ever
+ *                  answers it: a broadcast, 08 with sub-function 04
+ * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a packet that is no request;
+ *         else why such a request is never built
+ */
+uint8_t mbm_frame_replyLength(const struct mbm_framing *framing,
+                              const struct mbm_packet *request,
+                              struct mbm_length *expected);
+
+/**
+ * Says whether bytes look like a Modbus TCP frame, request or response, and how
+ * long that is. The first eight tell.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param bytes         the first bytes
+ * @param have          how many
+ * @param allowUnknown  0: only with a function code of the standard, or one
+ *                      that it leaves to users; else: with any but 0
+ * @param expected      receives the bytes of the frame, if the status is MBM_OK
+ * @return MBM_OK; MBM_INCOMPLETE_FRAME if more bytes must tell;
+ *         MBM_MALFORMED_FRAME if this is something else; MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_frame_looksLikeTcp(const uint8_t *bytes,
+                               uint16_t have,
+                               uint8_t allowUnknown,
+                               uint16_t *expected);
+
+/**
+ * The CRC-16 of an RTU frame (serial line guide V1.02, 6.2.2). On the line its
+ * low byte comes first.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param bytes   unit and PDU
+ * @param length  how many
+ * @return the CRC; 0xFFFF for NULL or no bytes
+ */
+uint16_t mbm_frame_crc16(const uint8_t *bytes, uint16_t length);
+
+/**
+ * The LRC of an ASCII frame (serial line guide V1.02, 6.2.1).
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param bytes   unit and PDU as bytes, not as characters
+ * @param length  how many
+ * @return the LRC; 0 for NULL or no bytes
+ */
+uint8_t mbm_frame_lrc(const uint8_t *bytes, uint16_t length);
 
 /**
  * Begins to talk to a slave over a port.
@@ -749,6 +1665,48 @@ uint8_t mbm_master_setCounters(struct mbm_master *master, struct mbm_counters *c
 uint8_t mbm_master_lineUsed(struct mbm_master *master);
 
 /**
+ * Sets the order of values in the views that mbm_master_getResponseRegisters
+ * and mbm_master_getTransmitRegisters give from now on.
+ *
+ * @param master  the object
+ * @param order   one of MBM_ORDER_...; MBM_ORDER_ABCD at first
+ * @return MBM_OK, MBM_INVALID_ARGUMENT, also for another order, or
+ *         MBM_NOT_INITIALISED
+ */
+uint8_t mbm_master_setWordOrder(struct mbm_master *master, uint8_t order);
+
+/**
+ * Sees the response words as registers to get values from. Copies nothing: it
+ * sees what a later read puts there.
+ *
+ * All words of the buffer are there, those too that the last read did not
+ * reach; look at values only once it has succeeded.
+ *
+ * @param master     the object; its buffers stay as they are while the view is used
+ * @param first      the device's address of word 0: that of the read, or 0 to
+ *                   count from word 0
+ * @param registers  the view to fill in
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_master_getResponseRegisters(const struct mbm_master *master,
+                                        uint16_t first,
+                                        struct mbm_registers *registers);
+
+/**
+ * Sees the transmit words as registers to set values in, for the functions
+ * that write. The queue of send does not move.
+ *
+ * @param master     the object; its buffers stay as they are while the view is used
+ * @param first      the device's address of word 0: that of the write, or 0 to
+ *                   count from word 0
+ * @param registers  the view to fill in
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_master_getTransmitRegisters(const struct mbm_master *master,
+                                        uint16_t first,
+                                        struct mbm_registers *registers);
+
+/**
  * A word of the last successful read.
  *
  * @param master  the object
@@ -850,6 +1808,644 @@ uint8_t mbm_master_available(const struct mbm_master *master);
  * @return the word; 0xFFFF when none is left
  */
 uint16_t mbm_master_receive(struct mbm_master *master);
+
+/**
+ * Writes the PDU of a packet: what goes into a frame. Nothing is written
+ * behind it, and nothing malformed is ever built.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param packet         what to build; unit and transaction are not in a PDU
+ * @param functions      functions of your own; may be NULL if there are none
+ * @param functionCount  how many
+ * @param pdu            receives it; may not overlap the packet's data
+ * @param capacity       bytes of `pdu`; MBM_MAX_PDU always do
+ * @param length         receives the PDU's length, if the status is MBM_OK
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
+ *         that mbm_packet_parse finds in such a PDU
+ */
+uint8_t mbm_packet_build(const struct mbm_packet *packet,
+                         const struct mbm_function *functions,
+                         uint8_t functionCount,
+                         uint8_t *pdu,
+                         uint16_t capacity,
+                         uint16_t *length);
+
+/**
+ * Reads a PDU: what stands in a frame. The packet's data point into it.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param kind           MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for
+ *                       responses and exceptions
+ * @param pdu            the PDU
+ * @param pduLength      its bytes
+ * @param functions      functions of your own; may be NULL if there are none
+ * @param functionCount  how many
+ * @param packet         receives what it says; if the PDU is refused, its kind
+ *                       and function alone
+ * @return MBM_OK, also for an exception; MBM_INVALID_ARGUMENT. Of a request
+ *         else the exception that answers it: MBM_ILLEGAL_FUNCTION,
+ *         MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE. Of a response
+ *         else MBM_INVALID_FUNCTION for one that nobody knows, or
+ *         MBM_MALFORMED_REPLY
+ */
+uint8_t mbm_packet_parse(uint8_t kind,
+                         const uint8_t *pdu,
+                         uint16_t pduLength,
+                         const struct mbm_function *functions,
+                         uint8_t functionCount,
+                         struct mbm_packet *packet);
+
+/**
+ * How long the PDU is that begins with these bytes.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param kind           MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for
+ *                       responses and exceptions
+ * @param pdu            its first bytes; more may follow
+ * @param have           how many; may be 0
+ * @param functions      functions of your own; may be NULL if there are none
+ * @param functionCount  how many
+ * @param expected       receives the length
+ * @return MBM_OK; MBM_MALFORMED_FRAME for a length that no PDU has;
+ *         MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_packet_expectedLength(uint8_t kind,
+                                  const uint8_t *pdu,
+                                  uint16_t have,
+                                  const struct mbm_function *functions,
+                                  uint8_t functionCount,
+                                  struct mbm_length *expected);
+
+/**
+ * How long the PDU will be that answers a request, if that succeeds. Else it is
+ * an exception of two bytes.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param request        the request, as for mbm_packet_build
+ * @param functions      functions of your own; may be NULL if there are none
+ * @param functionCount  how many
+ * @param expected       receives the length; MBM_LENGTH_EXACT and 0 if nothing
+ *                       ever answers it (08 with sub-function 04)
+ * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a packet that is no request;
+ *         else why such a request is never built
+ */
+uint8_t mbm_packet_replyLength(const struct mbm_packet *request,
+                               const struct mbm_function *functions,
+                               uint8_t functionCount,
+                               struct mbm_length *expected);
+
+/**
+ * Gives the records of 14 or 15 one by one:
+ * `for (cursor = 0; mbm_packet_nextRecord(&packet, &cursor, &record);)`
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param packet  a request or response of 14 or 15, as parsed or built
+ * @param cursor  where it goes on; yours, 0 to begin
+ * @param record  receives the record, whose data point into the packet's
+ * @return 1; 0 if there is none left, or for NULL
+ */
+uint8_t mbm_packet_nextRecord(const struct mbm_packet *packet,
+                              uint16_t *cursor,
+                              struct mbm_record *record);
+
+/**
+ * Gives the objects of a device identification one by one, as
+ * mbm_packet_nextRecord does records.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param packet  a response of 2B/0E, as parsed or built
+ * @param cursor  where it goes on; yours, 0 to begin
+ * @param object  receives the object, whose data point into the packet's
+ * @return 1; 0 if there is none left, or for NULL
+ */
+uint8_t mbm_packet_nextObject(const struct mbm_packet *packet,
+                              uint16_t *cursor,
+                              struct mbm_object *object);
+
+/**
+ * Adds a record to a packet of 14 or 15, to be built then. Set the packet's
+ * kind and function first, and dataLength to 0.
+ *
+ * @param packet    grows by the record; unchanged if it is refused
+ * @param storage   receives the packet's data, for all its records the same
+ * @param capacity  bytes of `storage`; 251 always do
+ * @param record    the record; its data may not lie in `storage`
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_ILLEGAL_FUNCTION if this is not 14
+ *         or 15; MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE for a
+ *         record that there cannot be; MBM_INVALID_ARGUMENT, also for data
+ *         that are elsewhere
+ */
+uint8_t mbm_packet_addRecord(struct mbm_packet *packet,
+                             uint8_t *storage,
+                             uint16_t capacity,
+                             const struct mbm_record *record);
+
+/**
+ * Adds an object to a response of 2B/0E, to be built then. Set the packet's
+ * kind, function and meiType first, and dataLength and objectCount to 0.
+ *
+ * @param packet    grows by the object; unchanged if it is refused
+ * @param storage   receives the packet's data, for all its objects the same
+ * @param capacity  bytes of `storage`; 246 always do
+ * @param object    the object; its data may not lie in `storage`
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL: if 246 bytes are, set moreFollows and
+ *         nextObjectId; MBM_ILLEGAL_FUNCTION if this is no such response;
+ *         MBM_INVALID_ARGUMENT, also for data that are elsewhere
+ */
+uint8_t mbm_packet_addObject(struct mbm_packet *packet,
+                             uint8_t *storage,
+                             uint16_t capacity,
+                             const struct mbm_object *object);
+
+/**
+ * Sees words that were read as registers, in order MBM_ORDER_ABCD until
+ * `registers->order` is set. Copies nothing: it sees what the words are then.
+ *
+ * @param registers  the view to fill in
+ * @param words      words as mbm_master's response words; valid while it is used
+ * @param count      how many words
+ * @param first      the device's address of the first, 0 to 65535
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if they pass address 65535, or
+ *         MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_registers_ofWords(struct mbm_registers *registers,
+                              const uint16_t *words,
+                              uint16_t count,
+                              uint16_t first);
+
+/**
+ * As mbm_registers_ofWords, of the data bytes of a reply or a request.
+ *
+ * @param registers  the view to fill in
+ * @param bytes      register bytes, each high byte first (V1.1b3, 4.2); valid
+ *                   while it is used
+ * @param length     how many bytes, an even number
+ * @param first      the device's address of the first register, 0 to 65535
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if they pass address 65535, or
+ *         MBM_INVALID_ARGUMENT for a NULL pointer or odd bytes
+ */
+uint8_t mbm_registers_ofBytes(struct mbm_registers *registers,
+                              const uint8_t *bytes,
+                              uint16_t length,
+                              uint16_t first);
+
+/**
+ * As mbm_registers_ofWords, of words that are also written, such as
+ * mbm_master's transmit words.
+ *
+ * @param registers  the view to fill in
+ * @param words      words to write; valid while it is used
+ * @param count      how many words
+ * @param first      the device's address of the first, 0 to 65535
+ * @return as mbm_registers_ofWords
+ */
+uint8_t mbm_registers_intoWords(struct mbm_registers *registers,
+                                uint16_t *words,
+                                uint16_t count,
+                                uint16_t first);
+
+/**
+ * As mbm_registers_ofBytes, of bytes that are also written.
+ *
+ * @param registers  the view to fill in
+ * @param bytes      register bytes to write; valid while it is used
+ * @param length     how many bytes, an even number
+ * @param first      the device's address of the first register, 0 to 65535
+ * @return as mbm_registers_ofBytes
+ */
+uint8_t mbm_registers_intoBytes(struct mbm_registers *registers,
+                                uint8_t *bytes,
+                                uint16_t length,
+                                uint16_t first);
+
+/**
+ * One bit of a register.
+ *
+ * @param registers  the registers
+ * @param address    the register, by the device's address
+ * @param bit        0, the least significant, to 15
+ * @param on         gets 0 or 1
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for a register that is not there,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `on` unchanged
+ */
+uint8_t mbm_registers_getBit(const struct mbm_registers *registers,
+                             uint16_t address,
+                             uint8_t bit,
+                             uint8_t *on);
+
+/**
+ * One byte of a register, 0 to 255.
+ *
+ * @param registers  the registers
+ * @param address    the register, by the device's address
+ * @param high       0 for the low byte, anything else for the high byte, which
+ *                   travels first
+ * @param value      gets the byte
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for a register that is not there,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ */
+uint8_t mbm_registers_getUint8(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t high,
+                               uint8_t *value);
+
+/**
+ * As mbm_registers_getUint8, -128 to 127.
+ *
+ * @param registers  the registers
+ * @param address    the register, by the device's address
+ * @param high       0 for the low byte, anything else for the high byte
+ * @param value      gets the byte
+ * @return as mbm_registers_getUint8
+ */
+uint8_t mbm_registers_getInt8(const struct mbm_registers *registers,
+                              uint16_t address,
+                              uint8_t high,
+                              int8_t *value);
+
+/**
+ * A number of one register, 0 to 65535. Of the order only the bytes matter.
+ *
+ * @param registers  the registers
+ * @param address    the register, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      gets the number
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for a register that is not there,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ */
+uint8_t mbm_registers_getUint16(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                uint16_t *value);
+
+/**
+ * As mbm_registers_getUint16, -32768 to 32767.
+ *
+ * @param registers  the registers
+ * @param address    the register, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      gets the number
+ * @return as mbm_registers_getUint16
+ */
+uint8_t mbm_registers_getInt16(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               int16_t *value);
+
+/**
+ * A number of two registers, 0 to 4294967295.
+ *
+ * @param registers  the registers
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      gets the number
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for two registers that are not both there,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ */
+uint8_t mbm_registers_getUint32(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                uint32_t *value);
+
+/**
+ * As mbm_registers_getUint32, two's complement.
+ *
+ * @param registers  the registers
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      gets the number
+ * @return as mbm_registers_getUint32
+ */
+uint8_t mbm_registers_getInt32(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               int32_t *value);
+
+/**
+ * A number of four registers.
+ *
+ * @param registers  the registers
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      gets the number
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for four registers that are not all there,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ */
+uint8_t mbm_registers_getUint64(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                uint64_t *value);
+
+/**
+ * As mbm_registers_getUint64, two's complement.
+ *
+ * @param registers  the registers
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      gets the number
+ * @return as mbm_registers_getUint64
+ */
+uint8_t mbm_registers_getInt64(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               int64_t *value);
+
+/**
+ * A float of two registers, an IEEE 754 binary32. Its bits are copied, those
+ * of what is not a number too.
+ *
+ * @param registers  the registers
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      gets the number
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for two registers that are not both there,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ */
+uint8_t mbm_registers_getFloat(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               float *value);
+
+/**
+ * A double of four registers, an IEEE 754 binary64. Its bits are copied; on AVR,
+ * where C's double has 32 bits (-mdouble=32), it is rounded to the nearest.
+ *
+ * @param registers  the registers
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      gets the number
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for four registers that are not all there,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ */
+uint8_t mbm_registers_getDouble(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                double *value);
+
+/**
+ * A text, which ends at its first NUL or with its field.
+ *
+ * Its registers follow each other in every order. In one with the low byte
+ * first, the first of two characters is a register's low byte. Characters are
+ * copied as they are, ASCII or not.
+ *
+ * @param registers  the registers
+ * @param address    the first of its registers, by the device's address
+ * @param length     bytes of its field, two a register; an odd one ends with a
+ *                   register's first character
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param text       gets the text and a NUL
+ * @param capacity   bytes of `text`; `length + 1` are always enough
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the field is not all there,
+ *         MBM_BUFFER_TOO_SMALL, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED,
+ *         with `text` unchanged
+ */
+uint8_t mbm_registers_getString(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint16_t length,
+                                uint8_t order,
+                                char *text,
+                                uint16_t capacity);
+
+/**
+ * Raw bytes as they travel, high byte first in every order.
+ *
+ * @param registers  the registers
+ * @param address    the register whose high byte is the first, by the device's
+ *                   address
+ * @param bytes      gets the bytes; must not overlap the registers
+ * @param length     how many bytes, two a register; may be odd
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if they are not all there,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `bytes` unchanged
+ */
+uint8_t mbm_registers_getBytes(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t *bytes,
+                               uint16_t length);
+
+/**
+ * Whether registers hold these raw bytes, high byte first in every order.
+ *
+ * @param registers  the registers
+ * @param address    the register whose high byte is the first, by the device's
+ *                   address
+ * @param bytes      the bytes to compare with
+ * @param length     how many bytes, two a register; may be odd
+ * @param equal      gets 0 or 1
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if there are not so many,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `equal` unchanged
+ */
+uint8_t mbm_registers_isEqual(const struct mbm_registers *registers,
+                              uint16_t address,
+                              const uint8_t *bytes,
+                              uint16_t length,
+                              uint8_t *equal);
+
+/**
+ * Sets one bit of a register; the others stay.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the register, by the device's address
+ * @param bit        0, the least significant, to 15
+ * @param on         0 is off, anything else is on
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a register that
+ *         is not there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setBit(const struct mbm_registers *registers,
+                             uint16_t address,
+                             uint8_t bit,
+                             uint8_t on);
+
+/**
+ * Sets one byte of a register; the other stays.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the register, by the device's address
+ * @param high       0 for the low byte, anything else for the high byte, which
+ *                   travels first
+ * @param value      the byte
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a register that
+ *         is not there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setUint8(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t high,
+                               uint8_t value);
+
+/**
+ * As mbm_registers_setUint8, -128 to 127.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the register, by the device's address
+ * @param high       0 for the low byte, anything else for the high byte
+ * @param value      the byte
+ * @return as mbm_registers_setUint8
+ */
+uint8_t mbm_registers_setInt8(const struct mbm_registers *registers,
+                              uint16_t address,
+                              uint8_t high,
+                              int8_t value);
+
+/**
+ * Sets a number of one register. Of the order only the bytes matter.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the register, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      the number
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a register
+ *         that is not there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setUint16(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                uint16_t value);
+
+/**
+ * As mbm_registers_setUint16, -32768 to 32767.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the register, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      the number
+ * @return as mbm_registers_setUint16
+ */
+uint8_t mbm_registers_setInt16(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               int16_t value);
+
+/**
+ * Sets a number of two registers.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      the number
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for two registers
+ *         that are not both there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setUint32(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                uint32_t value);
+
+/**
+ * As mbm_registers_setUint32, two's complement.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      the number
+ * @return as mbm_registers_setUint32
+ */
+uint8_t mbm_registers_setInt32(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               int32_t value);
+
+/**
+ * Sets a number of four registers.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      points to the number
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for four registers
+ *         that are not all there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setUint64(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                const uint64_t *value);
+
+/**
+ * As mbm_registers_setUint64, two's complement.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      points to the number
+ * @return as mbm_registers_setUint64
+ */
+uint8_t mbm_registers_setInt64(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               const int64_t *value);
+
+/**
+ * Sets a float of two registers, an IEEE 754 binary32. Its bits are copied.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      points to the number
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for two registers
+ *         that are not both there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setFloat(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               const float *value);
+
+/**
+ * Sets a double of four registers, an IEEE 754 binary64. On AVR, where C's
+ * double has 32 bits (-mdouble=32), to the value that it has there.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      points to the number
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for four registers
+ *         that are not all there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setDouble(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                const double *value);
+
+/**
+ * Fills a field with a text and NULs behind it, laid out as
+ * mbm_registers_getString reads it.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the first of its registers, by the device's address
+ * @param length     bytes of the field, two a register; if it is odd, the byte
+ *                   behind the field becomes 0 too
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param text       ends with a NUL, which needs no room in the field
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS if the field is not
+ *         all there, MBM_BUFFER_TOO_SMALL for a text longer than the field,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setString(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint16_t length,
+                                uint8_t order,
+                                const char *text);
+
+/**
+ * Sets raw bytes as they travel, high byte first in every order.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the register whose high byte is the first, by the device's
+ *                   address
+ * @param bytes      the bytes; must not overlap the registers
+ * @param length     how many bytes, two a register; if odd, the low byte of the
+ *                   last register stays
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS if there are not so
+ *         many registers, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
+                               uint16_t address,
+                               const uint8_t *bytes,
+                               uint16_t length);
 
 /**
  * Makes a ring of your bytes, empty. Neither side may use it meanwhile.

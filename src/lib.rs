@@ -3,7 +3,7 @@
 //! Data flows one way, and a module uses only what stands to its left:
 //!
 //! ```text
-//! bytes -> frame -> pdu -> transaction -> master -> capi
+//! bytes -> frame -> pdu -> packet -> transaction -> master -> capi
 //! ```
 //!
 //! `error`, `time`, `port`, `ring` and `data` stand beside that line and may be used
@@ -35,6 +35,8 @@ pub mod bytes;
 pub mod data;
 /// cbindgen:ignore
 pub mod frame;
+/// cbindgen:ignore
+pub mod packet;
 /// cbindgen:ignore
 pub mod pdu;
 /// cbindgen:ignore

@@ -70,6 +70,10 @@ pub fn emit(
     let room = buffer.len().saturating_sub(OVERHEAD);
     let place = buffer.get_mut(PDU..PDU + room);
     let length = pdu(place.ok_or(Status::BUFFER_TOO_SMALL)?)?;
+    // Also tells the compiler that the length of the frame cannot overflow.
+    if length > room {
+        return Err(Status::BUFFER_TOO_SMALL);
+    }
     write(buffer, unit, length, |_| ());
     Ok(length + OVERHEAD)
 }
