@@ -22,11 +22,33 @@ macro_rules! probes {
 
 fn probes() -> Vec<(String, u64)> {
     probes! {
-        sizes: mbm_port mbm_counters mbm_master;
+        sizes: mbm_port mbm_counters mbm_master mbm_server mbm_unit mbm_service
+            mbm_registerTable mbm_bitTable mbm_cells mbm_file mbm_files mbm_fifo mbm_fifos
+            mbm_exceptionStatus mbm_serverId mbm_object mbm_identification mbm_request
+            mbm_custom mbm_switches mbm_diagnostics;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
             mbm_counters { requests replies exceptions badCrc timeouts foreignFrames
-                resynchronisations bytesSent bytesReceived };
+                resynchronisations bytesSent bytesReceived }
+            mbm_service { next serve }
+            mbm_unit { services monitor diagnostics id }
+            mbm_registerTable { service words valid before after context base size kind }
+            mbm_bitTable { service bits valid before after context base size kind }
+            mbm_cells { service context isValid get set before after }
+            mbm_file { records size number }
+            mbm_files { service files count before after context }
+            mbm_fifo { words address count }
+            mbm_fifos { service fifos count }
+            mbm_exceptionStatus { service outputs }
+            mbm_serverId { service id additional idLength additionalLength running }
+            mbm_object { value length id }
+            mbm_identification { service objects count }
+            mbm_request { data length unit function }
+            mbm_custom { service serve context code fixedLength countAt countMore }
+            mbm_switches { service off }
+            mbm_diagnostics { service restart context diagnosticRegister busMessages
+                busCommunicationErrors exceptionErrors serverMessages noResponses naks busy
+                characterOverruns events listenOnly hidden };
         constants:
             MBM_OK MBM_ILLEGAL_FUNCTION MBM_ILLEGAL_DATA_ADDRESS MBM_ILLEGAL_DATA_VALUE
             MBM_SLAVE_DEVICE_FAILURE MBM_ACKNOWLEDGE MBM_SLAVE_DEVICE_BUSY
@@ -37,7 +59,9 @@ fn probes() -> Vec<(String, u64)> {
             MBM_NOT_INITIALISED MBM_PENDING MBM_LINE_BUSY MBM_CANCELLED
             MBM_INCOMPLETE_FRAME MBM_MALFORMED_FRAME
             MBM_MAX_READ_REGISTERS MBM_MAX_WRITE_REGISTERS MBM_MAX_READ_WRITE_REGISTERS
-            MBM_MAX_READ_BITS MBM_MAX_WRITE_BITS MBM_MAX_FRAME;
+            MBM_MAX_READ_BITS MBM_MAX_WRITE_BITS MBM_MAX_FRAME
+            MBM_SERVER_RTU_BYTES MBM_SERVER_ASCII_BYTES MBM_SERVER_TCP_BYTES
+            MBM_REPLY_EXCEPTION MBM_REPLY_NONE MBM_REPLY_PENDING;
     }
 }
 

@@ -18,12 +18,14 @@ mod limits;
 mod master;
 mod pointers;
 mod port;
+mod server;
 mod status;
 mod storage;
 
 pub use limits::*;
 pub use master::*;
 pub use port::*;
+pub use server::*;
 pub use status::*;
 pub use storage::*;
 

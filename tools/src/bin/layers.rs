@@ -14,7 +14,7 @@ const LAYERS: [&[&str]; 8] = [
     &["frame"],
     &["pdu"],
     &["transaction"],
-    &["master"],
+    &["master", "server"],
     &["capi"],
 ];
 
