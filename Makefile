@@ -32,8 +32,8 @@ $(ARCHIVE):
 
 MCUS := $(shell scripts/archive --list)
 .PHONY: archives
-archives: ## The archives for microcontrollers, build/archives/MCU/libmbm.a
-	@for mcu in $(MCUS); do scripts/archive $$mcu || exit 1; done
+archives: ## The archives for microcontrollers, build/archives and build/minimal
+	@for mcu in $(MCUS); do scripts/archive $$mcu && scripts/archive $$mcu minimal || exit 1; done
 	@scripts/check-archive
 
 .PHONY: size
@@ -45,7 +45,7 @@ header: ## Write include/mbm.h anew from the source
 	@$(CARGO) run --quiet -p mbm-tools --bin header
 
 .PHONY: check
-check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, symbols
+check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, symbols
 	@$(CARGO) fmt --all --check
 	@$(CARGO) clippy --quiet --workspace --all-targets -- -D warnings
 	@$(CARGO) clippy --quiet --no-default-features -- -D warnings
@@ -55,6 +55,7 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, symbols
 	@$(CARGO) run --quiet -p mbm-tools --bin header -- --check
 	@scripts/check-header
 	@scripts/check-docs
+	@scripts/check-functions
 	@$(MAKE) --no-print-directory check-readme
 	@scripts/check-symbols $(ARCHIVE)
 	@echo "check: formatting, lints, layers, header and symbols are in order"

@@ -26,6 +26,251 @@
 #define MBM_FRAME_BYTES(words) (2u * (words) + 13u)
 
 /**
+ * Serial line, binary, CRC-16 (serial line guide V1.02, 2.5.1).
+ */
+#define MBM_FRAMING_RTU 0
+
+/**
+ * Serial line, hexadecimal characters, LRC (serial line guide V1.02, 2.5.2).
+ */
+#define MBM_FRAMING_ASCII 1
+
+/**
+ * TCP, behind the MBAP header (messaging on TCP/IP guide V1.0b, 3.1.3).
+ */
+#define MBM_FRAMING_TCP 2
+
+/**
+ * RTU frames in a TCP stream.
+ */
+#define MBM_FRAMING_RTU_OVER_TCP 3
+
+/**
+ * Most bytes of a TCP frame.
+ */
+#define MBM_MAX_TCP_FRAME 260
+
+/**
+ * Most characters of an ASCII frame.
+ */
+#define MBM_MAX_ASCII_FRAME 513
+
+/**
+ * Read Coils (V1.1b3, 6.1).
+ */
+#define MBM_FC_READ_COILS 1
+
+/**
+ * Read Discrete Inputs (V1.1b3, 6.2).
+ */
+#define MBM_FC_READ_DISCRETE_INPUTS 2
+
+/**
+ * Read Holding Registers (V1.1b3, 6.3).
+ */
+#define MBM_FC_READ_HOLDING_REGISTERS 3
+
+/**
+ * Read Input Registers (V1.1b3, 6.4).
+ */
+#define MBM_FC_READ_INPUT_REGISTERS 4
+
+/**
+ * Write Single Coil (V1.1b3, 6.5).
+ */
+#define MBM_FC_WRITE_SINGLE_COIL 5
+
+/**
+ * Write Single Register (V1.1b3, 6.6).
+ */
+#define MBM_FC_WRITE_SINGLE_REGISTER 6
+
+/**
+ * Read Exception Status (V1.1b3, 6.7).
+ */
+#define MBM_FC_READ_EXCEPTION_STATUS 7
+
+/**
+ * Diagnostics (V1.1b3, 6.8).
+ */
+#define MBM_FC_DIAGNOSTICS 8
+
+/**
+ * Get Comm Event Counter (V1.1b3, 6.9).
+ */
+#define MBM_FC_GET_COMM_EVENT_COUNTER 11
+
+/**
+ * Get Comm Event Log (V1.1b3, 6.10).
+ */
+#define MBM_FC_GET_COMM_EVENT_LOG 12
+
+/**
+ * Write Multiple Coils (V1.1b3, 6.11).
+ */
+#define MBM_FC_WRITE_MULTIPLE_COILS 15
+
+/**
+ * Write Multiple Registers (V1.1b3, 6.12).
+ */
+#define MBM_FC_WRITE_MULTIPLE_REGISTERS 16
+
+/**
+ * Report Server ID (V1.1b3, 6.13).
+ */
+#define MBM_FC_REPORT_SERVER_ID 17
+
+/**
+ * Read File Record (V1.1b3, 6.14).
+ */
+#define MBM_FC_READ_FILE_RECORD 20
+
+/**
+ * Write File Record (V1.1b3, 6.15).
+ */
+#define MBM_FC_WRITE_FILE_RECORD 21
+
+/**
+ * Mask Write Register (V1.1b3, 6.16).
+ */
+#define MBM_FC_MASK_WRITE_REGISTER 22
+
+/**
+ * Read/Write Multiple Registers (V1.1b3, 6.17).
+ */
+#define MBM_FC_READ_WRITE_MULTIPLE_REGISTERS 23
+
+/**
+ * Read FIFO Queue (V1.1b3, 6.18).
+ */
+#define MBM_FC_READ_FIFO_QUEUE 24
+
+/**
+ * Encapsulated Interface Transport (V1.1b3, 6.19).
+ */
+#define MBM_FC_ENCAPSULATED_INTERFACE 43
+
+/**
+ * Sub-function of 08: the data come back; any number of words (V1.1b3, 6.8.1).
+ */
+#define MBM_DIAGNOSTICS_RETURN_QUERY_DATA 0
+
+/**
+ * Sub-function of 08; data FF 00 also clear the event log.
+ */
+#define MBM_DIAGNOSTICS_RESTART_COMMUNICATIONS 1
+
+/**
+ * Sub-function of 08.
+ */
+#define MBM_DIAGNOSTICS_RETURN_DIAGNOSTIC_REGISTER 2
+
+/**
+ * Sub-function of 08; the first byte of the data is the character.
+ */
+#define MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER 3
+
+/**
+ * Sub-function of 08, which nothing answers.
+ */
+#define MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY 4
+
+/**
+ * Sub-function of 08; clears the diagnostic register too.
+ */
+#define MBM_DIAGNOSTICS_CLEAR_COUNTERS 10
+
+/**
+ * Sub-function of 08: messages seen on the bus.
+ */
+#define MBM_DIAGNOSTICS_BUS_MESSAGE_COUNT 11
+
+/**
+ * Sub-function of 08: messages with a wrong CRC.
+ */
+#define MBM_DIAGNOSTICS_BUS_COMMUNICATION_ERROR_COUNT 12
+
+/**
+ * Sub-function of 08: exceptions answered.
+ */
+#define MBM_DIAGNOSTICS_BUS_EXCEPTION_ERROR_COUNT 13
+
+/**
+ * Sub-function of 08: messages for this device.
+ */
+#define MBM_DIAGNOSTICS_SERVER_MESSAGE_COUNT 14
+
+/**
+ * Sub-function of 08: messages that were not answered.
+ */
+#define MBM_DIAGNOSTICS_SERVER_NO_RESPONSE_COUNT 15
+
+/**
+ * Sub-function of 08: messages answered with a NAK.
+ */
+#define MBM_DIAGNOSTICS_SERVER_NAK_COUNT 16
+
+/**
+ * Sub-function of 08: messages answered with busy.
+ */
+#define MBM_DIAGNOSTICS_SERVER_BUSY_COUNT 17
+
+/**
+ * Sub-function of 08: messages lost to character overruns.
+ */
+#define MBM_DIAGNOSTICS_BUS_CHARACTER_OVERRUN_COUNT 18
+
+/**
+ * Sub-function of 08.
+ */
+#define MBM_DIAGNOSTICS_CLEAR_OVERRUN_COUNTER 20
+
+/**
+ * MEI type of 2B: CANopen General Reference (V1.1b3, 6.20).
+ */
+#define MBM_MEI_CANOPEN 13
+
+/**
+ * MEI type of 2B: Read Device Identification (V1.1b3, 6.21).
+ */
+#define MBM_MEI_READ_DEVICE_IDENTIFICATION 14
+
+/**
+ * Read device id code: the basic objects, 00 to 02.
+ */
+#define MBM_DEVICE_ID_BASIC 1
+
+/**
+ * Read device id code: the regular objects, 00 to 7F.
+ */
+#define MBM_DEVICE_ID_REGULAR 2
+
+/**
+ * Read device id code: all objects, 00 to FF.
+ */
+#define MBM_DEVICE_ID_EXTENDED 3
+
+/**
+ * Read device id code: one object.
+ */
+#define MBM_DEVICE_ID_INDIVIDUAL 4
+
+/**
+ * Length rule: only silence on the line, or what frames the PDU, ends it.
+ */
+#define MBM_RULE_SILENCE 0
+
+/**
+ * Length rule: always so many bytes.
+ */
+#define MBM_RULE_FIXED 1
+
+/**
+ * Length rule: a byte counts the bytes behind it.
+ */
+#define MBM_RULE_COUNTED 2
+
+/**
  * Most registers that one request reads (V1.1b3, 6.3 and 6.4).
  */
 #define MBM_MAX_READ_REGISTERS 125
@@ -56,19 +301,44 @@
 #define MBM_MAX_FRAME 256
 
 /**
- * Bytes of a frame buffer for any request and response in RTU.
+ * A request: what a client sends.
  */
-#define MBM_SERVER_RTU_BYTES 256
+#define MBM_PACKET_REQUEST 0
 
 /**
- * Bytes of a frame buffer for any request and response in ASCII.
+ * A response: what a server sends if the request succeeds.
  */
-#define MBM_SERVER_ASCII_BYTES 513
+#define MBM_PACKET_RESPONSE 1
 
 /**
- * Bytes of a frame buffer for any request and response over TCP.
+ * An exception: what a server sends if the request fails (V1.1b3, clause 7).
  */
-#define MBM_SERVER_TCP_BYTES 260
+#define MBM_PACKET_EXCEPTION 2
+
+/**
+ * Most bytes of a PDU: function code and data (V1.1b3, 4.1).
+ */
+#define MBM_MAX_PDU 253
+
+/**
+ * `bytes` is the length.
+ */
+#define MBM_LENGTH_EXACT 0
+
+/**
+ * It has `bytes` at least. Once so many are there, ask again.
+ */
+#define MBM_LENGTH_AT_LEAST 1
+
+/**
+ * Silence on the line tells, in ASCII the end character. `bytes` is 0.
+ */
+#define MBM_LENGTH_SILENCE 2
+
+/**
+ * Nobody knows this function; declare it. `bytes` is 0.
+ */
+#define MBM_LENGTH_UNKNOWN 3
 
 /**
  * What a function of yours returns for an exception: this, or-ed with the code.
@@ -223,6 +493,227 @@
 #define MBM_MALFORMED_FRAME 239
 
 /**
+ * How long the PDU of a function of your own is, function code included.
+ * Zeroed: as long as its frame.
+ */
+typedef struct mbm_rule {
+    /**
+     * MBM_RULE_SILENCE, MBM_RULE_FIXED or MBM_RULE_COUNTED.
+     */
+    uint8_t kind;
+    /**
+     * FIXED: bytes of the PDU, 1 to 253. COUNTED: where the counting byte
+     * stands, 1 to 252 bytes behind the function code.
+     */
+    uint8_t bytes;
+    /**
+     * COUNTED: bytes that follow those that are counted.
+     */
+    uint8_t more;
+} mbm_rule;
+
+/**
+ * A function of your own. Codes 65 to 72 and 100 to 110 are left to users, of
+ * any length unless you declare them; another code that the standard does not
+ * define works once it is declared. A code of the standard keeps its meaning.
+ */
+typedef struct mbm_function {
+    /**
+     * 1 to 127.
+     */
+    uint8_t code;
+    /**
+     * Its requests.
+     */
+    struct mbm_rule request;
+    /**
+     * Its responses.
+     */
+    struct mbm_rule response;
+} mbm_function;
+
+/**
+ * How frames look, and what is in them beside the standard. Zeroed: RTU, and
+ * the functions of the standard.
+ */
+typedef struct mbm_framing {
+    /**
+     * Functions of your own; may be NULL if there are none.
+     */
+    const struct mbm_function *functions;
+    /**
+     * How many.
+     */
+    uint8_t functionCount;
+    /**
+     * MBM_FRAMING_RTU, _ASCII, _TCP or _RTU_OVER_TCP.
+     */
+    uint8_t kind;
+    /**
+     * ASCII: the last character of a frame; 0 is line feed (V1.1b3, 6.8.1,
+     * sub-function 03).
+     */
+    uint8_t end;
+} mbm_framing;
+
+/**
+ * A request, response or exception of any function. Parsing zeroes it first,
+ * and sets what the function has; building reads that and ignores the rest:
+ *
+ * function | request | response
+ * ---------|---------|---------
+ * 01, 02, 03, 04 | address, quantity | data
+ * 05 | address, value | address, value
+ * 06 | address, value | address, value
+ * 07 | | exceptionStatus
+ * 08 | subFunction, data | subFunction, data
+ * 0B | | commStatus, eventCount
+ * 0C | | commStatus, eventCount, messageCount, data (events, the latest first)
+ * 0F, 10 | address, quantity, data | address, quantity
+ * 11 | | byteCount, data
+ * 14 | data (records) | data (records)
+ * 15 | data (records) | data (records)
+ * 16 | address, andMask, orMask | address, andMask, orMask
+ * 17 | address, quantity, writeAddress, writeQuantity, data | data
+ * 18 | address | data (registers)
+ * 2B, MEI type 0E | meiType, readDeviceIdCode, objectId | meiType, readDeviceIdCode, conformity, moreFollows, nextObjectId, objectCount, data (objects)
+ * 2B, others | meiType, data | meiType, data
+ * your own | data | data
+ *
+ * An exception has exceptionCode, and the function of the request. Register
+ * data are as on the wire, high bytes first; bits begin with the lowest of the
+ * first byte. Records and objects: mbm_packet_nextRecord, mbm_packet_addRecord
+ * and their likes for objects.
+ */
+typedef struct mbm_packet {
+    /**
+     * The data, without the byte count in front of them. After parsing they
+     * lie within the bytes that were parsed; to build, they are yours. May be
+     * NULL if dataLength is 0.
+     */
+    const uint8_t *data;
+    /**
+     * Bytes of data.
+     */
+    uint16_t dataLength;
+    /**
+     * Transaction identifier of a TCP frame; 0 in other framings.
+     */
+    uint16_t transaction;
+    /**
+     * First coil, input or register, counted from 0; 17: that is read.
+     */
+    uint16_t address;
+    /**
+     * Coils, inputs or registers; 17: that are read.
+     */
+    uint16_t quantity;
+    /**
+     * 17: first register that is written.
+     */
+    uint16_t writeAddress;
+    /**
+     * 17: registers that are written.
+     */
+    uint16_t writeQuantity;
+    /**
+     * 05: 0 is off, anything else is on (parsed: 1). 06: the register.
+     */
+    uint16_t value;
+    /**
+     * 16: bits that are kept.
+     */
+    uint16_t andMask;
+    /**
+     * 16: bits that replace those that are not kept.
+     */
+    uint16_t orMask;
+    /**
+     * 08: one of MBM_DIAGNOSTICS_.
+     */
+    uint16_t subFunction;
+    /**
+     * 0B, 0C: FFFF while a command is carried out, else 0.
+     */
+    uint16_t commStatus;
+    /**
+     * 0B, 0C: successful messages.
+     */
+    uint16_t eventCount;
+    /**
+     * 0C: messages.
+     */
+    uint16_t messageCount;
+    /**
+     * MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE or MBM_PACKET_EXCEPTION.
+     */
+    uint8_t kind;
+    /**
+     * The unit that is asked, or that answers. Of frames only.
+     */
+    uint8_t unit;
+    /**
+     * Function code, 1 to 127; of an exception that of the request.
+     */
+    uint8_t function;
+    /**
+     * Exception: 1 to 127, the same numbers as MBM_ILLEGAL_FUNCTION and others.
+     */
+    uint8_t exceptionCode;
+    /**
+     * 07: eight outputs.
+     */
+    uint8_t exceptionStatus;
+    /**
+     * 11: the byte count. It is dataLength, or less: some devices count the id
+     * only and send more behind it.
+     */
+    uint8_t byteCount;
+    /**
+     * 2B: MBM_MEI_READ_DEVICE_IDENTIFICATION or another.
+     */
+    uint8_t meiType;
+    /**
+     * 2B/0E: one of MBM_DEVICE_ID_.
+     */
+    uint8_t readDeviceIdCode;
+    /**
+     * 2B/0E: the first object, or the only one.
+     */
+    uint8_t objectId;
+    /**
+     * 2B/0E: 01 to 03 or 81 to 83.
+     */
+    uint8_t conformity;
+    /**
+     * 2B/0E: 1 if another request is needed for the rest, else 0.
+     */
+    uint8_t moreFollows;
+    /**
+     * 2B/0E: the object to ask for next; 0 if none follows.
+     */
+    uint8_t nextObjectId;
+    /**
+     * 2B/0E: how many objects the data are.
+     */
+    uint8_t objectCount;
+} mbm_packet;
+
+/**
+ * How long something is.
+ */
+typedef struct mbm_length {
+    /**
+     * All of it, from its first byte, as `kind` says.
+     */
+    uint16_t bytes;
+    /**
+     * MBM_LENGTH_EXACT, _AT_LEAST, _SILENCE or _UNKNOWN.
+     */
+    uint8_t kind;
+} mbm_length;
+
+/**
  * A Modbus RTU master: one line, one request at a time.
  *
  * Storage is yours and must be zero before first use, which a static object
@@ -333,6 +824,71 @@ typedef struct mbm_counters {
      */
     uint32_t bytesReceived;
 } mbm_counters;
+
+/**
+ * Registers of a file: a sub-request of 14 or 15, or what answers it.
+ */
+typedef struct mbm_record {
+    /**
+     * The registers, high bytes first, 2 * length bytes. A request of 14,
+     * which reads them, has none: NULL, and ignored.
+     */
+    const uint8_t *data;
+    /**
+     * File number, 1 to 65535; 0 in a response of 14, which does not say.
+     */
+    uint16_t file;
+    /**
+     * The first record, 0 to 9999; 0 in a response of 14.
+     */
+    uint16_t record;
+    /**
+     * How many registers.
+     */
+    uint16_t length;
+} mbm_record;
+
+/**
+ * An object of a device identification.
+ */
+typedef struct mbm_object {
+    /**
+     * Its value, most often text, without an end.
+     */
+    const uint8_t *data;
+    /**
+     * Bytes of the value.
+     */
+    uint8_t length;
+    /**
+     * 0 vendor name, 1 product code, 2 revision and so on (V1.1b3, 6.21).
+     */
+    uint8_t id;
+} mbm_object;
+
+/**
+ * A receive ring between an interrupt handler and the main loop.
+ *
+ * One side puts bytes in with mbm_ring_put or mbm_ring_write: an interrupt
+ * handler, a DMA callback or a thread. One side takes them out with
+ * mbm_ring_read: the main loop, as the `read` hook of a port. Each may
+ * interrupt the other at any point; neither may be two at once. No interrupt
+ * is ever disabled.
+ */
+typedef struct mbm_ring {
+    /**
+     * Not for you.
+     */
+    uint8_t *bytes;
+    /**
+     * Not for you.
+     */
+    uint16_t size;
+    /**
+     * Not for you.
+     */
+    uint16_t positions[3];
+} mbm_ring;
 
 /**
  * A Modbus server on one line or one connection.
@@ -557,19 +1113,10 @@ typedef struct mbm_custom {
      */
     uint8_t code;
     /**
-     * How long its requests are, for streams of RTU frames, which tell no length
-     * otherwise: bytes of data, if they are always so many.
+     * How long its request PDUs are, which RTU over TCP asks. Zeroed, a request is
+     * whole once its CRC is right.
      */
-    uint8_t fixedLength;
-    /**
-     * Else the place of a byte among the data, from 1 on, that counts those
-     * behind it. With neither, a request is whole once its CRC is right.
-     */
-    uint8_t countAt;
-    /**
-     * Bytes that follow those that are counted.
-     */
-    uint8_t countMore;
+    struct mbm_rule length;
 } mbm_custom;
 
 /**
@@ -727,26 +1274,6 @@ typedef struct mbm_serverId {
 } mbm_serverId;
 
 /**
- * An object of a device identification.
- */
-typedef struct mbm_object {
-    /**
-     * Its value; text as a rule, not ended by a zero.
-     */
-    const uint8_t *value;
-    /**
-     * Bytes of the value, at most 244.
-     */
-    uint8_t length;
-    /**
-     * 0 vendor name, 1 product code, 2 revision, which every device has; 3 vendor
-     * URL, 4 product name, 5 model name, 6 application name; from 0x80 on yours
-     * (V1.1b3, 6.21).
-     */
-    uint8_t id;
-} mbm_object;
-
-/**
  * A device identification. Zero it, set both, and hand it to
  * mbm_server_serveIdentification.
  */
@@ -756,7 +1283,9 @@ typedef struct mbm_identification {
      */
     struct mbm_service service;
     /**
-     * The objects, in any order.
+     * The objects, in any order: ids 0 vendor name, 1 product code and 2 revision,
+     * which every device has; 3 vendor URL, 4 product name, 5 model name, 6 application
+     * name; from 0x80 on yours. Each has 244 bytes at most.
      */
     const struct mbm_object *objects;
     /**
@@ -865,6 +1394,158 @@ typedef struct mbm_registerTable {
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
+
+/**
+ * Writes the frame of a packet: request, response or exception. Nothing
+ * malformed is ever built.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param framing   how frames look
+ * @param packet    what to build, with its unit, and for TCP the transaction
+ * @param frame     receives the frame; may not overlap the packet's data
+ * @param capacity  bytes of `frame`; MBM_MAX_FRAME do for RTU,
+ *                  MBM_MAX_TCP_FRAME for TCP, MBM_MAX_ASCII_FRAME for all
+ * @param length    receives the frame's length, if the status is MBM_OK
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
+ *         that mbm_frame_parse finds in such a frame
+ */
+uint8_t mbm_frame_build(const struct mbm_framing *framing,
+                        const struct mbm_packet *packet,
+                        uint8_t *frame,
+                        uint16_t capacity,
+                        uint16_t *length);
+
+/**
+ * Reads a frame. The packet's data point into it.
+ *
+ * A request that is refused with an exception code can be answered with that:
+ * see mbm_frame_exception.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param framing      how frames look
+ * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
+ *                     and exceptions
+ * @param frame        the frame, from its first byte to its last. ASCII is
+ *                     decoded where it stands, which overwrites it
+ * @param frameLength  its bytes
+ * @param packet       receives what it says. If the frame is sound, but not
+ *                     what it carries: kind, unit, transaction and function
+ *                     alone; if the frame is not sound: kind alone
+ * @return MBM_OK, also for an exception; of the frame MBM_INCOMPLETE_FRAME,
+ *         MBM_MALFORMED_FRAME, or MBM_INVALID_CRC, also for a wrong LRC; what
+ *         mbm_packet_parse says of what it carries; MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_frame_parse(const struct mbm_framing *framing,
+                        uint8_t kind,
+                        uint8_t *frame,
+                        uint16_t frameLength,
+                        struct mbm_packet *packet);
+
+/**
+ * Writes the exception that answers a request, where one may: to a request
+ * that mbm_frame_parse refused, with its status; to one that your device
+ * refuses, with the exception code of your choice.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param framing   how frames look
+ * @param request   the request, as mbm_frame_parse left it
+ * @param code      1 to 127, MBM_ILLEGAL_FUNCTION for example
+ * @param frame     receives the frame; it may be that of the request
+ * @param capacity  bytes of `frame`; 11 always do
+ * @param length    receives the frame's length, if the status is MBM_OK
+ * @return MBM_OK; MBM_BROADCAST_NOT_ALLOWED: on a serial line nobody answers
+ *         unit 0; MBM_ILLEGAL_FUNCTION for a function from 0x80, which no
+ *         exception can name; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also
+ *         for a status that is no exception code
+ */
+uint8_t mbm_frame_exception(const struct mbm_framing *framing,
+                            const struct mbm_packet *request,
+                            uint8_t code,
+                            uint8_t *frame,
+                            uint16_t capacity,
+                            uint16_t *length);
+
+/**
+ * How long the frame is that begins with these bytes.
+ *
+ * Any thread or interrupt may call it. For ASCII it takes 260 bytes of stack.
+ *
+ * @param framing   how frames look
+ * @param kind      MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and
+ *                  exceptions
+ * @param bytes     the frame's first bytes; more may follow
+ * @param have      how many; may be 0
+ * @param expected  receives the length
+ * @return MBM_OK; MBM_MALFORMED_FRAME if no frame begins like that, or none is
+ *         so long; MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_frame_expectedLength(const struct mbm_framing *framing,
+                                 uint8_t kind,
+                                 const uint8_t *bytes,
+                                 uint16_t have,
+                                 struct mbm_length *expected);
+
+/**
+ * How long the frame will be that answers a request, if that succeeds. Else it
+ * is an exception: 5 bytes in RTU, 9 in TCP, 11 characters in ASCII.
+ *
+ * Any thread or interrupt may call it. It takes 260 bytes of stack.
+ *
+ * @param framing   how frames look
+ * @param request   the request, as for mbm_frame_build
+ * @param expected  receives the length; MBM_LENGTH_EXACT and 0 if nothing ever
+ *                  answers it: a broadcast, 08 with sub-function 04
+ * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a packet that is no request;
+ *         else why such a request is never built
+ */
+uint8_t mbm_frame_replyLength(const struct mbm_framing *framing,
+                              const struct mbm_packet *request,
+                              struct mbm_length *expected);
+
+/**
+ * Says whether bytes look like a Modbus TCP frame, request or response, and how
+ * long that is. The first eight tell.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param bytes         the first bytes
+ * @param have          how many
+ * @param allowUnknown  0: only with a function code of the standard, or one
+ *                      that it leaves to users; else: with any but 0
+ * @param expected      receives the bytes of the frame, if the status is MBM_OK
+ * @return MBM_OK; MBM_INCOMPLETE_FRAME if more bytes must tell;
+ *         MBM_MALFORMED_FRAME if this is something else; MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_frame_looksLikeTcp(const uint8_t *bytes,
+                               uint16_t have,
+                               uint8_t allowUnknown,
+                               uint16_t *expected);
+
+/**
+ * The CRC-16 of an RTU frame (serial line guide V1.02, 6.2.2). On the line its
+ * low byte comes first.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param bytes   unit and PDU
+ * @param length  how many
+ * @return the CRC; 0xFFFF for NULL or no bytes
+ */
+uint16_t mbm_frame_crc16(const uint8_t *bytes, uint16_t length);
+
+/**
+ * The LRC of an ASCII frame (serial line guide V1.02, 6.2.1).
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param bytes   unit and PDU as bytes, not as characters
+ * @param length  how many
+ * @return the LRC; 0 for NULL or no bytes
+ */
+uint8_t mbm_frame_lrc(const uint8_t *bytes, uint16_t length);
 
 /**
  * Begins to talk to a slave over a port.
@@ -1387,6 +2068,222 @@ uint8_t mbm_master_available(const struct mbm_master *master);
 uint16_t mbm_master_receive(struct mbm_master *master);
 
 /**
+ * Writes the PDU of a packet: what goes into a frame. Nothing is written
+ * behind it, and nothing malformed is ever built.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param packet         what to build; unit and transaction are not in a PDU
+ * @param functions      functions of your own; may be NULL if there are none
+ * @param functionCount  how many
+ * @param pdu            receives it; may not overlap the packet's data
+ * @param capacity       bytes of `pdu`; MBM_MAX_PDU always do
+ * @param length         receives the PDU's length, if the status is MBM_OK
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
+ *         that mbm_packet_parse finds in such a PDU
+ */
+uint8_t mbm_packet_build(const struct mbm_packet *packet,
+                         const struct mbm_function *functions,
+                         uint8_t functionCount,
+                         uint8_t *pdu,
+                         uint16_t capacity,
+                         uint16_t *length);
+
+/**
+ * Reads a PDU: what stands in a frame. The packet's data point into it.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param kind           MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for
+ *                       responses and exceptions
+ * @param pdu            the PDU
+ * @param pduLength      its bytes
+ * @param functions      functions of your own; may be NULL if there are none
+ * @param functionCount  how many
+ * @param packet         receives what it says; if the PDU is refused, its kind
+ *                       and function alone
+ * @return MBM_OK, also for an exception; MBM_INVALID_ARGUMENT. Of a request
+ *         else the exception that answers it: MBM_ILLEGAL_FUNCTION,
+ *         MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE. Of a response
+ *         else MBM_INVALID_FUNCTION for one that nobody knows, or
+ *         MBM_MALFORMED_REPLY
+ */
+uint8_t mbm_packet_parse(uint8_t kind,
+                         const uint8_t *pdu,
+                         uint16_t pduLength,
+                         const struct mbm_function *functions,
+                         uint8_t functionCount,
+                         struct mbm_packet *packet);
+
+/**
+ * How long the PDU is that begins with these bytes.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param kind           MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for
+ *                       responses and exceptions
+ * @param pdu            its first bytes; more may follow
+ * @param have           how many; may be 0
+ * @param functions      functions of your own; may be NULL if there are none
+ * @param functionCount  how many
+ * @param expected       receives the length
+ * @return MBM_OK; MBM_MALFORMED_FRAME for a length that no PDU has;
+ *         MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_packet_expectedLength(uint8_t kind,
+                                  const uint8_t *pdu,
+                                  uint16_t have,
+                                  const struct mbm_function *functions,
+                                  uint8_t functionCount,
+                                  struct mbm_length *expected);
+
+/**
+ * How long the PDU will be that answers a request, if that succeeds. Else it is
+ * an exception of two bytes.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param request        the request, as for mbm_packet_build
+ * @param functions      functions of your own; may be NULL if there are none
+ * @param functionCount  how many
+ * @param expected       receives the length; MBM_LENGTH_EXACT and 0 if nothing
+ *                       ever answers it (08 with sub-function 04)
+ * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a packet that is no request;
+ *         else why such a request is never built
+ */
+uint8_t mbm_packet_replyLength(const struct mbm_packet *request,
+                               const struct mbm_function *functions,
+                               uint8_t functionCount,
+                               struct mbm_length *expected);
+
+/**
+ * Gives the records of 14 or 15 one by one:
+ * `for (cursor = 0; mbm_packet_nextRecord(&packet, &cursor, &record);)`
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param packet  a request or response of 14 or 15, as parsed or built
+ * @param cursor  where it goes on; yours, 0 to begin
+ * @param record  receives the record, whose data point into the packet's
+ * @return 1; 0 if there is none left, or for NULL
+ */
+uint8_t mbm_packet_nextRecord(const struct mbm_packet *packet,
+                              uint16_t *cursor,
+                              struct mbm_record *record);
+
+/**
+ * Gives the objects of a device identification one by one, as
+ * mbm_packet_nextRecord does records.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param packet  a response of 2B/0E, as parsed or built
+ * @param cursor  where it goes on; yours, 0 to begin
+ * @param object  receives the object, whose data point into the packet's
+ * @return 1; 0 if there is none left, or for NULL
+ */
+uint8_t mbm_packet_nextObject(const struct mbm_packet *packet,
+                              uint16_t *cursor,
+                              struct mbm_object *object);
+
+/**
+ * Adds a record to a packet of 14 or 15, to be built then. Set the packet's
+ * kind and function first, and dataLength to 0.
+ *
+ * @param packet    grows by the record; unchanged if it is refused
+ * @param storage   receives the packet's data, for all its records the same
+ * @param capacity  bytes of `storage`; 251 always do
+ * @param record    the record; its data may not lie in `storage`
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_ILLEGAL_FUNCTION if this is not 14
+ *         or 15; MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE for a
+ *         record that there cannot be; MBM_INVALID_ARGUMENT, also for data
+ *         that are elsewhere
+ */
+uint8_t mbm_packet_addRecord(struct mbm_packet *packet,
+                             uint8_t *storage,
+                             uint16_t capacity,
+                             const struct mbm_record *record);
+
+/**
+ * Adds an object to a response of 2B/0E, to be built then. Set the packet's
+ * kind, function and meiType first, and dataLength and objectCount to 0.
+ *
+ * @param packet    grows by the object; unchanged if it is refused
+ * @param storage   receives the packet's data, for all its objects the same
+ * @param capacity  bytes of `storage`; 246 always do
+ * @param object    the object; its data may not lie in `storage`
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL: if 246 bytes are, set moreFollows and
+ *         nextObjectId; MBM_ILLEGAL_FUNCTION if this is no such response;
+ *         MBM_INVALID_ARGUMENT, also for data that are elsewhere
+ */
+uint8_t mbm_packet_addObject(struct mbm_packet *packet,
+                             uint8_t *storage,
+                             uint16_t capacity,
+                             const struct mbm_object *object);
+
+/**
+ * Makes a ring of your bytes, empty. Neither side may use it meanwhile.
+ *
+ * @param ring   the object
+ * @param bytes  storage, yours, valid for as long as the ring is used
+ * @param size   2 to 65535, on an AVR 2 to 256; the ring holds one byte less
+ * @return MBM_OK or MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_ring_begin(struct mbm_ring *ring, uint8_t *bytes, uint16_t size);
+
+/**
+ * Puts a byte in. An interrupt may call it.
+ *
+ * @param ring  the object
+ * @param byte  the byte received
+ * @return 1, or 0 if there was no room: the byte counts as lost
+ */
+uint8_t mbm_ring_put(struct mbm_ring *ring, uint8_t byte);
+
+/**
+ * Puts bytes in, in order. An interrupt may call it.
+ *
+ * @param ring    the object
+ * @param bytes   the bytes received; NULL only with length 0
+ * @param length  how many
+ * @return how many found room; the others count as lost
+ */
+uint16_t mbm_ring_write(struct mbm_ring *ring, const uint8_t *bytes, uint16_t length);
+
+/**
+ * Takes bytes out, in order, without waiting.
+ *
+ * @param ring      the object
+ * @param bytes     where they go; NULL only with capacity 0
+ * @param capacity  at most so many
+ * @return how many there were
+ */
+uint16_t mbm_ring_read(struct mbm_ring *ring, uint8_t *bytes, uint16_t capacity);
+
+/**
+ * How many bytes there are to take out, for the side that takes.
+ *
+ * @param ring  the object
+ * @return bytes; 0 also if the ring was never begun
+ */
+uint16_t mbm_ring_available(const struct mbm_ring *ring);
+
+/**
+ * Forgets what there is to take out, for the side that takes.
+ *
+ * @param ring  the object
+ */
+void mbm_ring_clear(struct mbm_ring *ring);
+
+/**
+ * How many bytes found no room since begin; either side may ask.
+ *
+ * @param ring  the object
+ * @return bytes; wraps at 65536, on an AVR at 256
+ */
+uint16_t mbm_ring_lost(const struct mbm_ring *ring);
+
+/**
  * Moves the server on, without waiting: takes bytes in, carries a request out
  * once it is whole, sends the response.
  *
@@ -1425,7 +2322,7 @@ uint32_t mbm_server_pollDelay(const struct mbm_server *server);
  * @param units   what is served: one unit, or an array of them
  * @param count   how many units
  * @param frame   bytes of one frame, for requests and responses
- * @param bytes   at least 16; MBM_SERVER_RTU_BYTES hold any frame. Longer
+ * @param bytes   at least 16; MBM_MAX_FRAME hold any frame. Longer
  *                requests are not heard, longer responses become exception 04
  * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or
  *         a buffer of no use
@@ -1446,7 +2343,7 @@ uint8_t mbm_server_begin(struct mbm_server *server,
  * @param units   see mbm_server_begin
  * @param count   see mbm_server_begin
  * @param frame   see mbm_server_begin
- * @param bytes   at least 32; MBM_SERVER_ASCII_BYTES hold any frame
+ * @param bytes   at least 32; MBM_MAX_ASCII_FRAME hold any frame
  * @return MBM_OK or MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_server_beginAscii(struct mbm_server *server,
@@ -1465,7 +2362,7 @@ uint8_t mbm_server_beginAscii(struct mbm_server *server,
  * @param units   see mbm_server_begin; the unit ids 0 and 255 mean the first
  * @param count   see mbm_server_begin
  * @param frame   see mbm_server_begin; one for each connection
- * @param bytes   at least MBM_SERVER_TCP_BYTES
+ * @param bytes   at least MBM_MAX_TCP_FRAME
  * @return MBM_OK or MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_server_beginTcp(struct mbm_server *server,
@@ -1486,7 +2383,7 @@ uint8_t mbm_server_beginTcp(struct mbm_server *server,
  * @param units   see mbm_server_begin; the unit ids 0 and 255 mean the first
  * @param count   see mbm_server_begin
  * @param frame   see mbm_server_begin; one for each connection
- * @param bytes   at least 16; MBM_SERVER_RTU_BYTES hold any frame
+ * @param bytes   at least 16; MBM_MAX_FRAME hold any frame
  * @return MBM_OK or MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_server_beginRtuOverTcp(struct mbm_server *server,
@@ -1536,8 +2433,8 @@ uint8_t mbm_server_serveCallbacks(struct mbm_unit *unit,
  *
  * @param unit    the unit
  * @param custom  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, no function, or a
- *         code from 128 on
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, no function, a code
+ *         from 128 on, or a length that is no rule
  */
 uint8_t mbm_server_serveCustom(struct mbm_unit *unit, struct mbm_custom *custom);
 

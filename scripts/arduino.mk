@@ -4,12 +4,12 @@ AVR_MCUS := atmega328p atmega168 atmega32u4 atmega2560
 
 .PHONY: avr-archives
 avr-archives:
-	@for mcu in $(AVR_MCUS); do scripts/archive $$mcu || exit 1; done
+	@for mcu in $(AVR_MCUS); do scripts/archive $$mcu && scripts/archive $$mcu minimal || exit 1; done
 
-# The library carries every archive that stands under build/archives: run
-# `make archives` first for one that serves all boards.
+# The library carries every archive that stands under build/archives, the small
+# one those under build/minimal: run `make archives` first for all boards.
 .PHONY: arduino
-arduino: avr-archives ## The Arduino library: dist/mbm and its zip
+arduino: avr-archives ## The Arduino libraries: dist/mbm, dist/minimal/mbm-minimal, a zip of each
 	@scripts/arduino
 	@scripts/check-arduino
 
@@ -29,14 +29,16 @@ AVR_ELFS := $(EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(EXAMPLES:%=$(AVR_OUT)/mega/%.el
             $(EXAMPLES:%=$(AVR_OUT)/leonardo/%.elf) \
             $(patsubst %,$(AVR_OUT)/uno/%.elf,$(filter-out $(MEGA_SKETCHES),$(TEST_SKETCHES))) \
             $(MEGA_SKETCHES:%=$(AVR_OUT)/mega/%.elf)
+# What it takes with the small library.
+MINIMAL_ELFS := $(patsubst %,$(AVR_OUT)/uno-minimal/%.elf,SizeFC03 Basic PhoenixContact Probe)
 # The library as it was when a sketch was last compiled against it.
 DIST_STAMP := $(BUILD)/avr/library
 
 .PHONY: avr-sketches
 avr-sketches: arduino
 	@mkdir -p $(AVR_OUT)
-	@cat dist/*.zip | cmp -s - $(DIST_STAMP) || cat dist/*.zip >$(DIST_STAMP)
-	@$(MAKE) -s --no-print-directory $(AVR_ELFS)
+	@cat dist/*.zip dist/minimal/*.zip | cmp -s - $(DIST_STAMP) || cat dist/*.zip dist/minimal/*.zip >$(DIST_STAMP)
+	@$(MAKE) -s --no-print-directory $(AVR_ELFS) $(MINIMAL_ELFS)
 
 # The examples are part of the library, from where they are compiled.
 SKETCH_SOURCES := scripts/sketch $(wildcard firmware-tests/avr/sketches/*/*.ino)
@@ -50,6 +52,7 @@ $(eval $(call sketches,uno))
 $(eval $(call sketches,mega))
 # Compiled only: the simulator has no USB for its Serial.
 $(eval $(call sketches,leonardo))
+$(eval $(call sketches,uno-minimal))
 
 # --- the programs that run them
 

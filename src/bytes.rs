@@ -86,6 +86,11 @@ impl<'a> Writer<'a> {
         self.put(bytes);
     }
 
+    /// How many bytes were written, whether they fit or not.
+    pub const fn length(&self) -> usize {
+        self.length
+    }
+
     /// How many bytes were written.
     ///
     /// # Errors

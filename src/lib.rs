@@ -3,10 +3,10 @@
 //! Data flows one way, and a module uses only what stands to its left:
 //!
 //! ```text
-//! bytes -> frame -> pdu -> transaction -> master -> capi
+//! bytes -> frame -> pdu -> packet -> transaction -> master -> capi
 //! ```
 //!
-//! `error`, `time`, `port` and `data` stand beside that line and may be used
+//! `error`, `time`, `port`, `ring` and `data` stand beside that line and may be used
 //! anywhere on it. `make check` holds every module to this rule.
 //!
 //! The core allocates nothing, keeps no globals, never blocks and does not
@@ -25,6 +25,8 @@ pub mod error;
 /// cbindgen:ignore
 pub mod port;
 /// cbindgen:ignore
+pub mod ring;
+/// cbindgen:ignore
 pub mod time;
 
 /// cbindgen:ignore
@@ -33,6 +35,8 @@ pub mod bytes;
 pub mod data;
 /// cbindgen:ignore
 pub mod frame;
+/// cbindgen:ignore
+pub mod packet;
 /// cbindgen:ignore
 pub mod pdu;
 /// cbindgen:ignore

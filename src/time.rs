@@ -29,6 +29,13 @@ pub const fn elapsed(now: u32, since: u32) -> u32 {
     }
 }
 
+/// True once `time` has [`elapsed`] from `since` to `now`; not before where the
+/// clock stepped back a little. (One comparison: 32 bits are much work for an AVR.)
+#[inline(always)]
+pub const fn has_elapsed(time: u32, now: u32, since: u32) -> bool {
+    now.wrapping_sub(since).wrapping_add(STEP_BACK) >= time.wrapping_add(STEP_BACK)
+}
+
 /// Milliseconds as microseconds.
 #[inline(always)]
 pub const fn millis(milliseconds: u16) -> u32 {
@@ -99,5 +106,16 @@ mod tests {
         assert_eq!(elapsed(1_000, 1_001), 0);
         assert_eq!(elapsed(1_000, 2_000), 0);
         assert_eq!(elapsed(0xFFFF_0000, 0xFFFF_FFFF), 0);
+        assert!(!has_elapsed(1, 1_000, 1_001));
+        assert!(!has_elapsed(0, 1_000, 2_000));
+        assert!(!has_elapsed(1_000, 0xFFFF_0000, 0xFFFF_FFFF));
+    }
+
+    #[test]
+    fn a_time_has_elapsed_once_it_is_reached() {
+        assert!(has_elapsed(0, 7, 7));
+        assert!(has_elapsed(10, 5, u32::MAX - 4));
+        assert!(!has_elapsed(11, 5, u32::MAX - 4));
+        assert!(has_elapsed(millis(u16::MAX), millis(u16::MAX), 0));
     }
 }

@@ -22,14 +22,25 @@ macro_rules! probes {
 
 fn probes() -> Vec<(String, u64)> {
     probes! {
-        sizes: mbm_port mbm_counters mbm_master mbm_server mbm_unit mbm_service
-            mbm_registerTable mbm_bitTable mbm_cells mbm_file mbm_files mbm_fifo mbm_fifos
-            mbm_exceptionStatus mbm_serverId mbm_object mbm_identification mbm_request
-            mbm_custom mbm_switches mbm_diagnostics;
+        sizes: mbm_port mbm_counters mbm_master mbm_ring mbm_rule mbm_function mbm_length
+            mbm_packet mbm_record mbm_object mbm_framing
+            mbm_server mbm_unit mbm_service mbm_registerTable mbm_bitTable mbm_cells mbm_file
+            mbm_files mbm_fifo mbm_fifos mbm_exceptionStatus mbm_serverId mbm_identification
+            mbm_request mbm_custom mbm_switches mbm_diagnostics;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
             mbm_counters { requests replies exceptions badCrc timeouts foreignFrames
                 resynchronisations bytesSent bytesReceived }
+            mbm_rule { kind bytes more }
+            mbm_function { code request response }
+            mbm_length { bytes kind }
+            mbm_packet { data dataLength transaction address quantity writeAddress writeQuantity
+                value andMask orMask subFunction commStatus eventCount messageCount kind unit
+                function exceptionCode exceptionStatus byteCount meiType readDeviceIdCode objectId
+                conformity moreFollows nextObjectId objectCount }
+            mbm_record { data file record length }
+            mbm_object { data length id }
+            mbm_framing { functions functionCount kind end }
             mbm_service { next serve }
             mbm_unit { services monitor diagnostics id }
             mbm_registerTable { service words valid before after context base size kind }
@@ -41,10 +52,9 @@ fn probes() -> Vec<(String, u64)> {
             mbm_fifos { service fifos count }
             mbm_exceptionStatus { service outputs }
             mbm_serverId { service id additional idLength additionalLength running }
-            mbm_object { value length id }
             mbm_identification { service objects count }
             mbm_request { data length unit function }
-            mbm_custom { service serve context code fixedLength countAt countMore }
+            mbm_custom { service serve context code length }
             mbm_switches { service off }
             mbm_diagnostics { service restart context diagnosticRegister busMessages
                 busCommunicationErrors exceptionErrors serverMessages noResponses naks busy
@@ -60,7 +70,27 @@ fn probes() -> Vec<(String, u64)> {
             MBM_INCOMPLETE_FRAME MBM_MALFORMED_FRAME
             MBM_MAX_READ_REGISTERS MBM_MAX_WRITE_REGISTERS MBM_MAX_READ_WRITE_REGISTERS
             MBM_MAX_READ_BITS MBM_MAX_WRITE_BITS MBM_MAX_FRAME
-            MBM_SERVER_RTU_BYTES MBM_SERVER_ASCII_BYTES MBM_SERVER_TCP_BYTES
+            MBM_FC_READ_COILS MBM_FC_READ_DISCRETE_INPUTS MBM_FC_READ_HOLDING_REGISTERS
+            MBM_FC_READ_INPUT_REGISTERS MBM_FC_WRITE_SINGLE_COIL MBM_FC_WRITE_SINGLE_REGISTER
+            MBM_FC_READ_EXCEPTION_STATUS MBM_FC_DIAGNOSTICS MBM_FC_GET_COMM_EVENT_COUNTER
+            MBM_FC_GET_COMM_EVENT_LOG MBM_FC_WRITE_MULTIPLE_COILS MBM_FC_WRITE_MULTIPLE_REGISTERS
+            MBM_FC_REPORT_SERVER_ID MBM_FC_READ_FILE_RECORD MBM_FC_WRITE_FILE_RECORD
+            MBM_FC_MASK_WRITE_REGISTER MBM_FC_READ_WRITE_MULTIPLE_REGISTERS MBM_FC_READ_FIFO_QUEUE
+            MBM_FC_ENCAPSULATED_INTERFACE MBM_DIAGNOSTICS_RETURN_QUERY_DATA
+            MBM_DIAGNOSTICS_RESTART_COMMUNICATIONS MBM_DIAGNOSTICS_RETURN_DIAGNOSTIC_REGISTER
+            MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY
+            MBM_DIAGNOSTICS_CLEAR_COUNTERS MBM_DIAGNOSTICS_BUS_MESSAGE_COUNT
+            MBM_DIAGNOSTICS_BUS_COMMUNICATION_ERROR_COUNT
+            MBM_DIAGNOSTICS_BUS_EXCEPTION_ERROR_COUNT MBM_DIAGNOSTICS_SERVER_MESSAGE_COUNT
+            MBM_DIAGNOSTICS_SERVER_NO_RESPONSE_COUNT MBM_DIAGNOSTICS_SERVER_NAK_COUNT
+            MBM_DIAGNOSTICS_SERVER_BUSY_COUNT MBM_DIAGNOSTICS_BUS_CHARACTER_OVERRUN_COUNT
+            MBM_DIAGNOSTICS_CLEAR_OVERRUN_COUNTER MBM_MEI_CANOPEN
+            MBM_MEI_READ_DEVICE_IDENTIFICATION MBM_DEVICE_ID_BASIC MBM_DEVICE_ID_REGULAR
+            MBM_DEVICE_ID_EXTENDED MBM_DEVICE_ID_INDIVIDUAL MBM_RULE_SILENCE MBM_RULE_FIXED
+            MBM_RULE_COUNTED MBM_PACKET_REQUEST MBM_PACKET_RESPONSE MBM_PACKET_EXCEPTION
+            MBM_MAX_PDU MBM_LENGTH_EXACT MBM_LENGTH_AT_LEAST MBM_LENGTH_SILENCE MBM_LENGTH_UNKNOWN
+            MBM_FRAMING_RTU MBM_FRAMING_ASCII MBM_FRAMING_TCP MBM_FRAMING_RTU_OVER_TCP
+            MBM_MAX_TCP_FRAME MBM_MAX_ASCII_FRAME
             MBM_REPLY_EXCEPTION MBM_REPLY_NONE MBM_REPLY_PENDING;
     }
 }

@@ -181,12 +181,15 @@ typedef struct report {
     uint16_t words[READS][REGISTERS];
 } report;
 
+/* Where the sketches are: with the library, or with the small one. */
+static const char *place = "uno";
+
 static board *start(const char *sketch)
 {
     const char *folder = getenv("MBM_SKETCHES");
     char path[200];
 
-    snprintf(path, sizeof path, "%s/uno/%s.elf", folder ? folder : "build/avr", sketch);
+    snprintf(path, sizeof path, "%s/%s/%s.elf", folder ? folder : "build/avr", place, sketch);
     return board_new(path, "atmega328p");
 }
 
@@ -241,6 +244,13 @@ static void no_fault_costs_more_than_it_must(void **state)
         }
     }
     assert_int_equal(worse, 0);
+}
+
+static void the_small_library_copes_with_every_fault_too(void **state)
+{
+    place = "uno-minimal";
+    no_fault_costs_more_than_it_must(state);
+    place = "uno";
 }
 
 static void a_server_that_is_not_there_is_a_timeout(void **state)
@@ -298,6 +308,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_fault_costs_more_than_it_must),
+        cmocka_unit_test(the_small_library_copes_with_every_fault_too),
         cmocka_unit_test(a_server_that_is_not_there_is_a_timeout),
         cmocka_unit_test(a_servers_exceptions_come_through),
         cmocka_unit_test(a_reply_of_64_registers_at_115200_baud_arrives_whole),

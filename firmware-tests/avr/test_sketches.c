@@ -20,6 +20,7 @@ typedef struct kind {
 } kind;
 
 static const kind uno = {"uno", "atmega328p", '0', {'B', 5}, {'D', 2}, {'D', 4}};
+static const kind minimal = {"uno-minimal", "atmega328p", '0', {'B', 5}, {'D', 2}, {'D', 4}};
 static const kind mega = {"mega", "atmega2560", '1', {'B', 7}, {'E', 4}, {'G', 5}};
 
 static board *start(const kind *k, const char *sketch)
@@ -334,6 +335,7 @@ static void basic_counts_in_the_server(void **state)
 {
     (void)state;
     basic(&uno);
+    basic(&minimal);
     basic(&mega);
 }
 
@@ -394,6 +396,7 @@ static void phoenix_contact_makes_its_calls(void **state)
 {
     (void)state;
     phoenix_contact(&uno);
+    phoenix_contact(&minimal);
     phoenix_contact(&mega);
 }
 

@@ -14,17 +14,25 @@
 // What a caller must hold is the same for every function, and stands above.
 #![allow(clippy::missing_safety_doc)]
 
+mod frame;
+mod functions;
 mod limits;
 mod master;
+mod packet;
 mod pointers;
 mod port;
+mod ring;
 mod server;
 mod status;
 mod storage;
 
+pub use frame::*;
+pub use functions::*;
 pub use limits::*;
 pub use master::*;
+pub use packet::*;
 pub use port::*;
+pub use ring::*;
 pub use server::*;
 pub use status::*;
 pub use storage::*;

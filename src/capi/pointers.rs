@@ -1,7 +1,88 @@
-//! The only place where a pointer to an object becomes a reference.
+//! The only place where a pointer from C becomes a reference.
 
 use super::master::{mbm_master, Object};
 use crate::error::Status;
+use core::slice::{from_raw_parts, from_raw_parts_mut};
+
+/// The `count` things from a pointer on; none for NULL, or for more than any
+/// memory has.
+///
+/// # Safety
+/// `first` is NULL or points to so many, which nothing changes meanwhile.
+pub(super) unsafe fn lent<'a, T>(first: *const T, count: usize) -> Option<&'a [T]> {
+    if first.is_null() || count > isize::MAX as usize / size_of::<T>() {
+        return None;
+    }
+    // SAFETY: not NULL and not too long; the rest as the caller promises.
+    Some(unsafe { from_raw_parts(first, count) })
+}
+
+/// As [`lent`], where no pointer is needed to nothing.
+///
+/// # Safety
+/// As for [`lent`].
+pub(super) unsafe fn lent_or_none<'a, T>(first: *const T, count: usize) -> Option<&'a [T]> {
+    if count == 0 {
+        return Some(&[]);
+    }
+    // SAFETY: as the caller promises.
+    unsafe { lent(first, count) }
+}
+
+/// The buffer of so many bytes that starts at a pointer; none for NULL.
+///
+/// # Safety
+/// `first` is NULL or points to so many bytes, which nothing else uses
+/// meanwhile: see [`overlap`].
+pub(super) unsafe fn buffer<'a>(first: *mut u8, capacity: u16) -> Option<&'a mut [u8]> {
+    let capacity = usize::from(capacity);
+    if first.is_null() || capacity > isize::MAX as usize {
+        return None;
+    }
+    // SAFETY: not NULL and not too long; the rest as the caller promises.
+    Some(unsafe { from_raw_parts_mut(first, capacity) })
+}
+
+/// True if two stretches of bytes have one in common.
+pub(super) fn overlap(one: *const u8, bytes: u16, other: *const u8, more: u16) -> bool {
+    let (one, other) = (one as usize, other as usize);
+    one < other.saturating_add(usize::from(more)) && other < one.saturating_add(usize::from(bytes))
+}
+
+/// What a pointer points to; none for NULL.
+///
+/// # Safety
+/// `place` is NULL or points to a value.
+pub(super) unsafe fn get<T: Copy>(place: *const T) -> Option<T> {
+    // SAFETY: as the caller promises.
+    (!place.is_null()).then(|| unsafe { place.read() })
+}
+
+/// Leaves a value where a pointer points to, and [`Status::OK`] for C;
+/// [`Status::INVALID_ARGUMENT`] for NULL.
+///
+/// # Safety
+/// `place` is NULL or points to room for a value.
+pub(super) unsafe fn put<T>(place: *mut T, value: T) -> u8 {
+    if place.is_null() {
+        return Status::INVALID_ARGUMENT.code();
+    }
+    // SAFETY: not NULL; the rest as the caller promises.
+    unsafe { place.write(value) }
+    Status::OK.code()
+}
+
+/// As [`put`], of a length or the status that says why there is none.
+///
+/// # Safety
+/// As for [`put`].
+pub(super) unsafe fn put_length(place: *mut u16, length: Result<usize, Status>) -> u8 {
+    match length {
+        // SAFETY: as the caller promises.
+        Ok(length) => unsafe { put(place, length as u16) },
+        Err(refused) => refused.code(),
+    }
+}
 
 /// Whether there is a master behind a pointer from C: [`Status::OK`],
 /// [`Status::INVALID_ARGUMENT`] for NULL, [`Status::NOT_INITIALISED`] for an

@@ -39,6 +39,17 @@ const fn character(digit: u8) -> u8 {
     }
 }
 
+/// The byte that a pair of digits is.
+pub const fn byte(pair: &[u8]) -> Option<u8> {
+    match pair {
+        [high, low] => match (digit(*high), digit(*low)) {
+            (Some(high), Some(low)) => Some(high << 4 | low),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
 /// The frame that is the whole of `bytes`, decoded where it stands. Lower case
 /// digits are taken too.
 ///
@@ -62,13 +73,10 @@ pub fn parse(bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Status> {
     }
     for index in 0..length {
         let at = 1 + 2 * index;
-        let byte = match bytes.get(at..at + 2) {
-            Some([high, low]) => digit(*high).zip(digit(*low)),
-            _ => None,
-        };
-        let (high, low) = byte.ok_or(Status::MALFORMED_FRAME)?;
+        let pair = bytes.get(at..at + 2).and_then(byte);
+        let decoded = pair.ok_or(Status::MALFORMED_FRAME)?;
         if let Some(place) = bytes.get_mut(index) {
-            *place = high << 4 | low;
+            *place = decoded;
         }
     }
     match bytes.get(..length) {

@@ -86,6 +86,10 @@ pub fn emit(
     let room = buffer.len().saturating_sub(OVERHEAD);
     let place = buffer.get_mut(PDU..PDU + room);
     let length = pdu(place.ok_or(Status::BUFFER_TOO_SMALL)?)?;
+    // Also tells the compiler that the length of the frame cannot overflow.
+    if length > room {
+        return Err(Status::BUFFER_TOO_SMALL);
+    }
     write(buffer, unit, length, |_| ());
     Ok(length + OVERHEAD)
 }
@@ -195,11 +199,11 @@ impl Window {
     pub fn room<'a>(&mut self, buffer: &'a mut [u8]) -> Option<&'a mut [u8]> {
         if self.start > 0 {
             let cells = Cell::from_mut(&mut *buffer).as_slice_of_cells();
-            let kept = cells.get(usize::from(self.start)..)?;
+            let kept = cells.get(usize::from(self.start)..usize::from(self.end))?;
             for (to, from) in cells.iter().zip(kept) {
                 to.set(from.get());
             }
-            self.end -= self.start;
+            self.end = kept.len() as u16;
             self.start = 0;
         }
         buffer.get_mut(usize::from(self.end)..)
@@ -220,6 +224,11 @@ impl Window {
     pub fn arrived(&mut self, count: u16) {
         self.end += count;
         self.skim = false;
+    }
+
+    /// Says that the buffer holds `count` bytes to be sent.
+    pub fn hold(&mut self, count: u16) {
+        self.end = count;
     }
 
     /// Has the next search look behind a candidate that is not complete, which

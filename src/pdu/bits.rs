@@ -61,7 +61,7 @@ pub fn write_multiple(request: &mut Query, address: u16, quantity: u16) -> Statu
 
 pub(super) fn parse_read<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Status> {
     let (address, quantity) = (word(reader)?, word(reader)?);
-    in_range(address, quantity, MAX_READ_BITS)?;
+    in_range(reader, address, quantity, MAX_READ_BITS)?;
     Ok(Request::ReadBits {
         function,
         address,
@@ -77,11 +77,11 @@ pub(super) fn parse_write_single<'a>(reader: &mut Reader) -> Result<Request<'a>,
 
 pub(super) fn parse_write_multiple<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
     let (address, quantity) = (word(reader)?, word(reader)?);
-    in_range(address, quantity, MAX_WRITE_BITS)?;
     let data = counted(reader)?;
     if data.len() != usize::from(byte_count(quantity)) {
         return Err(Status::ILLEGAL_DATA_VALUE);
     }
+    in_range(reader, address, quantity, MAX_WRITE_BITS)?;
     Ok(Request::WriteMultipleCoils {
         address,
         quantity,

@@ -1,7 +1,7 @@
 //! Functions that a user defines, whose lengths only the user knows.
 
-use super::limits::MAX_PDU;
-use super::EXCEPTION;
+use super::length::{by_rule, Length};
+use super::{is_public, EXCEPTION};
 use crate::error::Status;
 
 /// How long a PDU of a user's function is.
@@ -20,7 +20,8 @@ pub enum Rule {
 /// A function that a user defines: its code and the lengths of its PDUs.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Function {
-    /// The function code, 1 to 127.
+    /// The function code, 1 to 127; what the standard says of its own functions
+    /// stands.
     pub code: u8,
     /// The request.
     pub request: Rule,
@@ -33,15 +34,28 @@ pub const fn is_user_defined(function: u8) -> bool {
     matches!(function, 65..=72 | 100..=110)
 }
 
-/// Says whether a PDU of a user's function, with so many bytes of data, may be
-/// sent.
-pub(super) fn check(function: u8, data: usize) -> Result<(), Status> {
-    if function == 0 || function & EXCEPTION != 0 {
-        Err(Status::ILLEGAL_FUNCTION)
-    } else if data >= MAX_PDU {
-        Err(Status::ILLEGAL_DATA_VALUE)
-    } else {
+/// True for a code that a user may give a meaning to: any that no function of
+/// the standard has.
+pub(super) const fn is_free(function: u8) -> bool {
+    function != 0 && function & EXCEPTION == 0 && !is_public(function)
+}
+
+/// Says whether the length of a user's PDU agrees with its rule; a function
+/// that nobody declared may only be of the user's codes, and has any length.
+pub(super) fn check(pdu: &[u8], function: u8, rule: Option<Rule>) -> Result<(), Status> {
+    if !is_free(function) {
+        return Err(Status::ILLEGAL_FUNCTION);
+    }
+    let agrees = match rule.map(|rule| by_rule(pdu, rule)) {
+        None if !is_user_defined(function) => return Err(Status::ILLEGAL_FUNCTION),
+        None | Some(Length::Silence) => true,
+        Some(Length::Exactly(length)) => length == pdu.len(),
+        Some(_) => false,
+    };
+    if agrees {
         Ok(())
+    } else {
+        Err(Status::ILLEGAL_DATA_VALUE)
     }
 }
 

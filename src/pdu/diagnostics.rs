@@ -105,6 +105,9 @@ pub(super) fn parse_diagnostics_response<'a>(
     reader: &mut Reader<'a>,
 ) -> Result<Response<'a>, Status> {
     let (sub_function, data) = sub_function_and_data(reader)?;
+    if sub_function == sub_function::FORCE_LISTEN_ONLY {
+        return Err(Status::MALFORMED_REPLY);
+    }
     Ok(Response::Diagnostics { sub_function, data })
 }
 
@@ -133,7 +136,7 @@ pub(super) fn parse_event_log<'a>(reader: &mut Reader<'a>) -> Result<Response<'a
 
 pub(super) fn emit_event_log(writer: &mut Writer, words: [u16; 3], log: &[u8]) {
     writer.u8(GET_COMM_EVENT_LOG);
-    writer.u8(log.len() as u8 + 6);
+    writer.u8((log.len() as u8).wrapping_add(6));
     for word in words {
         writer.u16(word);
     }

@@ -21,15 +21,31 @@ pub(super) fn counted<'a>(reader: &mut Reader<'a>) -> Result<&'a [u8], Status> {
     reader.take(count).ok_or(Status::ILLEGAL_DATA_VALUE)
 }
 
-/// As [`check_range`].
-pub(super) fn in_range(address: u16, quantity: u16, most: u16) -> Result<(), Status> {
+/// As [`check_range`], once nothing is left to read: lengths and quantities are
+/// judged before addresses (figures 11 and following).
+pub(super) fn in_range(
+    reader: &Reader,
+    address: u16,
+    quantity: u16,
+    most: u16,
+) -> Result<(), Status> {
+    end(reader)?;
     match check_range(address, quantity, most) {
         Status::OK => Ok(()),
         refused => Err(refused),
     }
 }
 
-/// True if `count` lies within `limits`, least and most.
+/// Says whether a PDU ends where it should.
+pub(super) fn end(reader: &Reader) -> Result<(), Status> {
+    if reader.is_empty() {
+        Ok(())
+    } else {
+        Err(Status::ILLEGAL_DATA_VALUE)
+    }
+}
+
+/// Says whether `count` lies within `limits`, least and most.
 pub(super) fn within(count: usize, limits: (usize, usize)) -> Result<(), Status> {
     if (limits.0..=limits.1).contains(&count) {
         Ok(())

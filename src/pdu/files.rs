@@ -1,6 +1,6 @@
 //! File records and FIFO queues: functions 14, 15 and 18.
 
-use super::fields::{counted, within, word};
+use super::fields::{byte, counted, end, within, word};
 use super::limits::{FILE_DATA_BYTES, MAX_FIFO, MAX_RECORD, READ_FILE_BYTES, WRITE_FILE_BYTES};
 use super::request::Request;
 use super::response::Response;
@@ -40,21 +40,31 @@ pub struct Writes<'a>(pub(super) &'a [u8]);
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Records<'a>(pub(super) &'a [u8]);
 
-/// The next sub-request's head, or why there is none.
-fn head(reader: &mut Reader) -> Result<Record, Status> {
-    let reference = reader.u8().ok_or(Status::ILLEGAL_DATA_VALUE)?;
+/// The next sub-request's head, and whether there can be such records: counts
+/// are judged before that (figures 24 and 25).
+fn head(reader: &mut Reader) -> Result<(Record, bool), Status> {
+    let reference = byte(reader)?;
     let record = Record {
         file: word(reader)?,
         record: word(reader)?,
         length: word(reader)?,
     };
-    let last = u32::from(record.record) + u32::from(record.length);
-    if reference != REFERENCE_TYPE || record.file == 0 || last > u32::from(MAX_RECORD) + 1 {
-        Err(Status::ILLEGAL_DATA_ADDRESS)
-    } else if record.length == 0 {
-        Err(Status::ILLEGAL_DATA_VALUE)
+    if record.length == 0 {
+        return Err(Status::ILLEGAL_DATA_VALUE);
+    }
+    let last = record.record.checked_add(record.length - 1);
+    let exists = reference == REFERENCE_TYPE
+        && record.file != 0
+        && last.is_some_and(|last| last <= MAX_RECORD);
+    Ok((record, exists))
+}
+
+/// The verdict on sub-requests whose counts are in order.
+fn all_exist(exist: bool) -> Result<(), Status> {
+    if exist {
+        Ok(())
     } else {
-        Ok(record)
+        Err(Status::ILLEGAL_DATA_ADDRESS)
     }
 }
 
@@ -68,13 +78,15 @@ impl<'a> Reads<'a> {
     pub fn new(bytes: &'a [u8]) -> Result<Self, Status> {
         within(bytes.len(), READ_FILE_BYTES)?;
         let mut reader = Reader::new(bytes);
-        let mut answer = 0;
+        let mut room = FILE_DATA_BYTES.1;
+        let mut exist = true;
         while !reader.is_empty() {
-            answer += 2 + 2 * usize::from(head(&mut reader)?.length);
+            let (record, exists) = head(&mut reader)?;
+            let answer = answer_length(record.length);
+            room = room.checked_sub(answer).ok_or(Status::ILLEGAL_DATA_VALUE)?;
+            exist &= exists;
         }
-        if answer > FILE_DATA_BYTES.1 {
-            return Err(Status::ILLEGAL_DATA_VALUE);
-        }
+        all_exist(exist)?;
         Ok(Reads(bytes))
     }
 
@@ -86,21 +98,27 @@ impl<'a> Reads<'a> {
     /// What each sub-request names.
     pub fn iter(&self) -> impl Iterator<Item = Record> + 'a {
         let mut reader = Reader::new(self.0);
-        core::iter::from_fn(move || head(&mut reader).ok())
+        core::iter::from_fn(move || Some(head(&mut reader).ok()?.0))
     }
 
     /// Length of the response PDU.
     pub fn response_length(&self) -> usize {
-        let records = self.iter().map(|record| 2 + 2 * usize::from(record.length));
-        2 + records.sum::<usize>()
+        let answers = self.iter().map(|record| answer_length(record.length));
+        2 + answers.sum::<usize>()
     }
 }
 
-/// The next sub-request of 15: its head and its data.
-fn written<'a>(reader: &mut Reader<'a>) -> Result<(Record, &'a [u8]), Status> {
-    let record = head(reader)?;
-    let data = reader.take(2 * usize::from(record.length));
-    Ok((record, data.ok_or(Status::ILLEGAL_DATA_VALUE)?))
+/// Bytes of a sub-response of so many records.
+fn answer_length(records: u16) -> usize {
+    usize::from(records).saturating_mul(2).saturating_add(2)
+}
+
+/// The next sub-request of 15: its head, its data, and whether there can be
+/// such records.
+fn written<'a>(reader: &mut Reader<'a>) -> Result<(Record, &'a [u8], bool), Status> {
+    let (record, exists) = head(reader)?;
+    let data = reader.take(usize::from(record.length).saturating_mul(2));
+    Ok((record, data.ok_or(Status::ILLEGAL_DATA_VALUE)?, exists))
 }
 
 impl<'a> Writes<'a> {
@@ -111,9 +129,11 @@ impl<'a> Writes<'a> {
     pub fn new(bytes: &'a [u8]) -> Result<Self, Status> {
         within(bytes.len(), WRITE_FILE_BYTES)?;
         let mut reader = Reader::new(bytes);
+        let mut exist = true;
         while !reader.is_empty() {
-            written(&mut reader)?;
+            exist &= written(&mut reader)?.2;
         }
+        all_exist(exist)?;
         Ok(Writes(bytes))
     }
 
@@ -125,7 +145,10 @@ impl<'a> Writes<'a> {
     /// What each sub-request names, and the data for it, high bytes first.
     pub fn iter(&self) -> impl Iterator<Item = (Record, &'a [u8])> + 'a {
         let mut reader = Reader::new(self.0);
-        core::iter::from_fn(move || written(&mut reader).ok())
+        core::iter::from_fn(move || {
+            let (record, data, _) = written(&mut reader).ok()?;
+            Some((record, data))
+        })
     }
 }
 
@@ -169,11 +192,15 @@ impl<'a> Records<'a> {
 }
 
 pub(super) fn parse_read<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
-    Ok(Request::ReadFileRecord(Reads::new(counted(reader)?)?))
+    let bytes = counted(reader)?;
+    end(reader)?;
+    Ok(Request::ReadFileRecord(Reads::new(bytes)?))
 }
 
 pub(super) fn parse_write<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
-    Ok(Request::WriteFileRecord(Writes::new(counted(reader)?)?))
+    let bytes = counted(reader)?;
+    end(reader)?;
+    Ok(Request::WriteFileRecord(Writes::new(bytes)?))
 }
 
 pub(super) fn parse_fifo<'a>(reader: &mut Reader) -> Result<Request<'a>, Status> {
@@ -201,7 +228,7 @@ pub(super) fn parse_fifo_response<'a>(reader: &mut Reader<'a>) -> Result<Respons
 
 pub(super) fn emit_fifo_response(writer: &mut Writer, data: &[u8]) {
     writer.u8(READ_FIFO_QUEUE);
-    writer.u16(data.len() as u16 + 2);
+    writer.u16((data.len() as u16).wrapping_add(2));
     writer.u16(data.len() as u16 / 2);
     writer.put(data);
 }

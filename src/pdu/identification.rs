@@ -27,6 +27,12 @@ pub const INDIVIDUAL: u8 = 4;
 /// More follows, in a response.
 const MORE: u8 = 0xFF;
 
+/// True for basic, regular or extended identification, by stream alone or, with
+/// the highest bit, one object at a time too.
+const fn is_conformity_level(level: u8) -> bool {
+    matches!(level, 0x01..=0x03 | 0x81..=0x83)
+}
+
 /// The objects of a response, each an id and a value.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Objects<'a> {
@@ -106,7 +112,13 @@ pub(super) fn parse_response<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>
     }
     let (code, conformity) = (byte(reader)?, byte(reader)?);
     let (more, next_object, count) = (byte(reader)?, byte(reader)?, byte(reader)?);
-    if !(BASIC..=INDIVIDUAL).contains(&code) || (more != 0 && more != MORE) {
+    let follows = match (code, more) {
+        (BASIC..=INDIVIDUAL, 0) => next_object == 0,
+        (BASIC..=EXTENDED, MORE) => true,
+        _ => false,
+    };
+    let one_if_asked = code != INDIVIDUAL || count == 1;
+    if !follows || !one_if_asked || !is_conformity_level(conformity) {
         return Err(Status::ILLEGAL_DATA_VALUE);
     }
     Ok(Response::DeviceIdentification {

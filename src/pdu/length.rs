@@ -8,7 +8,8 @@ use super::{bits, diagnostics, files, identification, registers, EXCEPTION};
 /// How long a PDU is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Length {
-    /// So many bytes.
+    /// So many bytes. There is no PDU of more than
+    /// [`MAX_PDU`](super::limits::MAX_PDU), whatever its first bytes claim.
     Exactly(usize),
     /// So many bytes at least, which will tell more.
     AtLeast(usize),
@@ -27,7 +28,8 @@ fn counted(pdu: &[u8], offset: usize, more: usize) -> Length {
     }
 }
 
-fn by_rule(pdu: &[u8], rule: Rule) -> Length {
+/// The length of a PDU of a user's function.
+pub(super) fn by_rule(pdu: &[u8], rule: Rule) -> Length {
     match rule {
         Rule::Fixed(length) => Length::Exactly(usize::from(length)),
         Rule::Counted(offset, more) => counted(pdu, usize::from(offset), usize::from(more)),
@@ -78,7 +80,8 @@ pub fn request(pdu: &[u8], functions: &[Function]) -> Length {
     }
 }
 
-/// The length of the response PDU that begins with these bytes.
+/// The length of the response PDU that begins with these bytes. That of Report
+/// Server ID is the standard's, though some devices send more than they count.
 pub fn response(pdu: &[u8], functions: &[Function]) -> Length {
     let Some(&code) = pdu.first() else {
         return Length::AtLeast(1);
@@ -103,7 +106,8 @@ pub fn response(pdu: &[u8], functions: &[Function]) -> Length {
         diagnostics::DIAGNOSTICS => diagnostics(pdu),
         files::READ_FIFO_QUEUE => match pdu.get(1..3) {
             Some([high, low]) => {
-                Length::Exactly(3 + usize::from(u16::from_be_bytes([*high, *low])))
+                let count = u16::from_be_bytes([*high, *low]);
+                Length::Exactly(usize::from(count.saturating_add(3)))
             }
             _ => Length::AtLeast(3),
         },

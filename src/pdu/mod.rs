@@ -18,5 +18,10 @@ pub mod reply;
 pub mod request;
 pub mod response;
 
+/// True for the functions of the standard that this module knows (clause 6).
+pub const fn is_public(function: u8) -> bool {
+    matches!(function, 0x01..=0x08 | 0x0B | 0x0C | 0x0F..=0x11 | 0x14..=0x18 | 0x2B)
+}
+
 /// Set in the function code of an exception response (clause 7).
 pub const EXCEPTION: u8 = 0x80;

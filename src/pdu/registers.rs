@@ -1,6 +1,6 @@
 //! Holding and input registers: functions 03, 04, 06, 10, 16 and 17.
 
-use super::fields::{counted, in_range, word};
+use super::fields::{counted, in_range, within, word};
 use super::limits::{MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_REGISTERS};
 use super::query::{check_range, Query};
 use super::request::Request;
@@ -102,7 +102,7 @@ pub fn read_write(
 
 pub(super) fn parse_read<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Status> {
     let (address, quantity) = (word(reader)?, word(reader)?);
-    in_range(address, quantity, MAX_READ_REGISTERS)?;
+    in_range(reader, address, quantity, MAX_READ_REGISTERS)?;
     Ok(Request::ReadRegisters {
         function,
         address,
@@ -119,11 +119,12 @@ pub(super) fn parse_write_single<'a>(reader: &mut Reader) -> Result<Request<'a>,
 
 pub(super) fn parse_write_multiple<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
     let (address, quantity) = (word(reader)?, word(reader)?);
-    in_range(address, quantity, MAX_WRITE_REGISTERS)?;
+    let data = values(reader, quantity)?;
+    in_range(reader, address, quantity, MAX_WRITE_REGISTERS)?;
     Ok(Request::WriteMultipleRegisters {
         address,
         quantity,
-        data: values(reader, quantity)?,
+        data,
     })
 }
 
@@ -138,21 +139,30 @@ pub(super) fn parse_mask_write<'a>(reader: &mut Reader) -> Result<Request<'a>, S
 pub(super) fn parse_read_write<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
     let (read_address, read_quantity) = (word(reader)?, word(reader)?);
     let (write_address, write_quantity) = (word(reader)?, word(reader)?);
-    in_range(read_address, read_quantity, MAX_READ_REGISTERS)?;
-    in_range(write_address, write_quantity, MAX_READ_WRITE_REGISTERS)?;
+    let data = values(reader, write_quantity)?;
+    // Both quantities before either range of addresses.
+    let most = usize::from(MAX_READ_WRITE_REGISTERS);
+    within(usize::from(write_quantity), (1, most))?;
+    in_range(reader, read_address, read_quantity, MAX_READ_REGISTERS)?;
+    in_range(
+        reader,
+        write_address,
+        write_quantity,
+        MAX_READ_WRITE_REGISTERS,
+    )?;
     Ok(Request::ReadWriteMultipleRegisters {
         read_address,
         read_quantity,
         write_address,
         write_quantity,
-        data: values(reader, write_quantity)?,
+        data,
     })
 }
 
 /// The counted data of `quantity` registers.
 fn values<'a>(reader: &mut Reader<'a>, quantity: u16) -> Result<&'a [u8], Status> {
     let data = counted(reader)?;
-    if data.len() == 2 * usize::from(quantity) {
+    if data.len().is_multiple_of(2) && data.len() / 2 == usize::from(quantity) {
         Ok(data)
     } else {
         Err(Status::ILLEGAL_DATA_VALUE)
@@ -192,7 +202,7 @@ pub(super) fn parse_write_multiple_response<'a>(
     reader: &mut Reader,
 ) -> Result<Response<'a>, Status> {
     let (address, quantity) = (word(reader)?, word(reader)?);
-    in_range(address, quantity, most)?;
+    in_range(reader, address, quantity, most)?;
     Ok(Response::WriteMultiple {
         function,
         address,

@@ -1,12 +1,14 @@
 //! Request PDUs, whole: read by whoever receives one, written by whoever sends
 //! one. Data borrow from the bytes.
 
+use super::fields::end;
 use super::files::{Reads, Writes};
 use super::length::Length;
 use super::limits::MAX_PDU;
 use super::{bits, custom, diagnostics, files, identification, registers};
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
+use core::mem::discriminant;
 
 /// A request PDU. Register data are as on the wire, high bytes first; bit data
 /// begin with the lowest bit of the first byte.
@@ -94,6 +96,15 @@ impl<'a> Request<'a> {
     /// a length, quantity or value out of order,
     /// [`Status::ILLEGAL_DATA_ADDRESS`] for addresses beyond 65535.
     pub fn parse(pdu: &'a [u8]) -> Result<Self, Status> {
+        Request::parse_with(pdu, &[])
+    }
+
+    /// As [`Request::parse`], with functions that a user declared; their
+    /// lengths are held to what was declared.
+    ///
+    /// # Errors
+    /// As [`Request::parse`].
+    pub fn parse_with(pdu: &'a [u8], functions: &[custom::Function]) -> Result<Self, Status> {
         if pdu.len() > MAX_PDU {
             return Err(Status::ILLEGAL_DATA_VALUE);
         }
@@ -120,17 +131,15 @@ impl<'a> Request<'a> {
             registers::READ_WRITE_MULTIPLE_REGISTERS => registers::parse_read_write(reader),
             files::READ_FIFO_QUEUE => files::parse_fifo(reader),
             identification::ENCAPSULATED_INTERFACE_TRANSPORT => identification::parse(reader),
-            function if custom::is_user_defined(function) => Ok(Request::Custom {
-                function,
-                data: reader.rest(),
-            }),
-            _ => Err(Status::ILLEGAL_FUNCTION),
+            function => {
+                let declared = custom::find(functions, function);
+                custom::check(pdu, function, declared.map(|it| it.request))?;
+                let data = reader.rest();
+                Ok(Request::Custom { function, data })
+            }
         }?;
-        if reader.is_empty() {
-            Ok(request)
-        } else {
-            Err(Status::ILLEGAL_DATA_VALUE)
-        }
+        end(reader)?;
+        Ok(request)
     }
 
     /// The function code.
@@ -167,14 +176,22 @@ impl<'a> Request<'a> {
     pub fn emit(&self, pdu: &mut [u8]) -> Result<usize, Status> {
         let mut writer = Writer::new(pdu);
         self.write(&mut writer);
+        if writer.length() > MAX_PDU {
+            return Err(Status::ILLEGAL_DATA_VALUE);
+        }
         let length = writer.finish()?;
         let written = pdu.get(..length).unwrap_or_default();
-        match self {
+        let same = match self {
             // A code beyond the user's ranges is the user's own will.
-            Request::Custom { function, data } => custom::check(*function, data.len())?,
-            _ => drop(Request::parse(written)?),
+            Request::Custom { function, .. } => custom::is_free(*function),
+            // No variant says what belongs to another.
+            _ => discriminant(&Request::parse(written)?) == discriminant(self),
+        };
+        if same {
+            Ok(length)
+        } else {
+            Err(Status::ILLEGAL_FUNCTION)
         }
-        Ok(length)
     }
 
     fn write(&self, writer: &mut Writer) {
@@ -264,20 +281,24 @@ impl<'a> Request<'a> {
     }
 
     /// The length of the response PDU if the request succeeds, as far as the
-    /// request tells.
+    /// request tells; 0 if there is no response.
     pub fn response_length(&self, functions: &[custom::Function]) -> Length {
         match *self {
             Request::ReadBits { quantity, .. } => {
-                Length::Exactly(2 + usize::from(quantity).div_ceil(8))
+                Length::Exactly(usize::from(quantity.div_ceil(8)).saturating_add(2))
             }
             Request::ReadRegisters { quantity, .. }
             | Request::ReadWriteMultipleRegisters {
                 read_quantity: quantity,
                 ..
-            } => Length::Exactly(2 + 2 * usize::from(quantity)),
+            } => Length::Exactly(usize::from(quantity).saturating_mul(2).saturating_add(2)),
             Request::ReadFileRecord(reads) => Length::Exactly(reads.response_length()),
             // The response repeats the request.
             Request::WriteFileRecord(writes) => Length::Exactly(2 + writes.bytes().len()),
+            Request::Diagnostics {
+                sub_function: diagnostics::sub_function::FORCE_LISTEN_ONLY,
+                ..
+            } => Length::Exactly(0),
             Request::Diagnostics { data, .. } => Length::Exactly(3 + data.len()),
             Request::ReadDeviceIdentification { .. } => Length::AtLeast(7),
             Request::EncapsulatedInterface { mei_type, .. } => {

@@ -7,6 +7,7 @@ use super::limits::{MAX_PDU, MAX_WRITE_BITS, MAX_WRITE_REGISTERS};
 use super::{bits, custom, diagnostics, files, identification, registers, EXCEPTION};
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
+use core::mem::discriminant;
 
 /// A response PDU. Register data are as on the wire, high bytes first; bit data
 /// begin with the lowest bit of the first byte.
@@ -106,6 +107,15 @@ impl<'a> Response<'a> {
     /// [`Status::INVALID_FUNCTION`] for an unknown function,
     /// [`Status::MALFORMED_REPLY`] for whatever else is out of order.
     pub fn parse(pdu: &'a [u8]) -> Result<Self, Status> {
+        Response::parse_with(pdu, &[])
+    }
+
+    /// As [`Response::parse`], with functions that a user declared; their
+    /// lengths are held to what was declared.
+    ///
+    /// # Errors
+    /// As [`Response::parse`].
+    pub fn parse_with(pdu: &'a [u8], functions: &[custom::Function]) -> Result<Self, Status> {
         if pdu.len() > MAX_PDU {
             return Err(Status::MALFORMED_REPLY);
         }
@@ -142,11 +152,16 @@ impl<'a> Response<'a> {
                 identification::parse_response(reader)
             }
             function if function & EXCEPTION != 0 => parse_exception(function, reader),
-            function if custom::is_user_defined(function) => Ok(Response::Custom {
-                function,
-                data: reader.rest(),
-            }),
-            _ => return Err(Status::INVALID_FUNCTION),
+            function => {
+                let declared = custom::find(functions, function);
+                match custom::check(pdu, function, declared.map(|it| it.response)) {
+                    Err(Status::ILLEGAL_FUNCTION) => return Err(Status::INVALID_FUNCTION),
+                    checked => checked.map(|()| {
+                        let data = reader.rest();
+                        Response::Custom { function, data }
+                    }),
+                }
+            }
         };
         match response {
             Ok(response) if reader.is_empty() => Ok(response),
@@ -187,14 +202,23 @@ impl<'a> Response<'a> {
     pub fn emit(&self, pdu: &mut [u8]) -> Result<usize, Status> {
         let mut writer = Writer::new(pdu);
         self.write(&mut writer);
+        if writer.length() > MAX_PDU {
+            return Err(Status::MALFORMED_REPLY);
+        }
         let length = writer.finish()?;
         let written = pdu.get(..length).unwrap_or_default();
-        match self {
+        let same = match self {
             // A code beyond the user's ranges is the user's own will.
-            Response::Custom { function, data } => custom::check(*function, data.len())?,
-            _ => drop(Response::parse(written)?),
+            Response::Custom { function, .. } => custom::is_free(*function),
+            Response::Exception { function, .. } if function & EXCEPTION != 0 => false,
+            // No variant says what belongs to another.
+            _ => discriminant(&Response::parse(written)?) == discriminant(self),
+        };
+        if same {
+            Ok(length)
+        } else {
+            Err(Status::INVALID_FUNCTION)
         }
-        Ok(length)
     }
 
     fn write(&self, writer: &mut Writer) {

@@ -24,7 +24,7 @@ use crate::frame::rtu::{self, Seen, Window};
 use crate::pdu::query::Query;
 use crate::pdu::reply;
 use crate::port::Port;
-use crate::time::elapsed;
+use crate::time::{elapsed, has_elapsed};
 use answer::Answer;
 
 /// Where a transaction stands.
@@ -146,7 +146,7 @@ impl<P, S> Transaction<P, S> {
         } else {
             self.since
         };
-        elapsed(self.now, since) >= time
+        has_elapsed(time, self.now, since)
     }
 
     /// A line that is not silent, or a port that does not move, is not waited
@@ -158,12 +158,6 @@ impl<P, S> Transaction<P, S> {
         } else {
             Status::PENDING
         }
-    }
-
-    /// Waits for silence, then sends; from the next poll on.
-    fn listen_anew(&mut self) {
-        self.window.clear();
-        self.enter(Phase::Gap);
     }
 
     /// Enters a phase whose time counts from the next poll on.
@@ -203,7 +197,16 @@ impl<P: Port, S: Storage> Transaction<P, S> {
         }
         self.wanted.unit = unit;
         self.retries = self.settings.retries;
-        self.listen_anew();
+        self.listen_anew()
+    }
+
+    /// Waits for silence, then sends; from the next poll on.
+    fn listen_anew(&mut self) -> Status {
+        self.window.clear();
+        if !self.write_frame() {
+            return Status::BUFFER_TOO_SMALL;
+        }
+        self.enter(Phase::Gap);
         Status::PENDING
     }
 
@@ -312,14 +315,15 @@ impl<P: Port, S: Storage> Transaction<P, S> {
         }
         let silence = self.silence_to_keep();
         if heard > 0 {
+            // It stands where the request stood.
+            self.write_frame();
             return self.stalled(silence);
         }
         if !self.is_silent(silence) {
             return self.wait();
         }
-        if !self.write_frame() {
-            return Status::BUFFER_TOO_SMALL;
-        }
+        let length = u16::from(self.wanted.request.length());
+        self.window.hold(length + rtu::OVERHEAD as u16);
         self.storage.count(Counter::Requests, 1);
         self.late = false;
         self.phase = Phase::Send;
@@ -328,13 +332,13 @@ impl<P: Port, S: Storage> Transaction<P, S> {
         self.send()
     }
 
-    /// Writes the request into the frame buffer, if that holds it.
+    /// Writes the request into the frame buffer, if that holds it: before the
+    /// silence, so that this lasts no longer than it must.
     #[cfg_attr(target_os = "none", inline(never))]
     fn write_frame(&mut self) -> bool {
         let request = &self.wanted.request;
         let length = usize::from(request.length());
         let (frame, words) = self.storage.frame_and_transmit();
-        self.window.arrived((length + rtu::OVERHEAD) as u16);
         rtu::write(frame, self.wanted.unit, length, |pdu| {
             request.emit(pdu, words);
         })
@@ -482,7 +486,6 @@ impl<P: Port, S: Storage> Transaction<P, S> {
         // What was taken for a damaged reply may have been noise.
         self.late = true;
         self.last_byte = self.now;
-        self.listen_anew();
-        Status::PENDING
+        self.listen_anew()
     }
 }

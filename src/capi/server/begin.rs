@@ -1,17 +1,10 @@
 //! Beginning a server, and how it behaves.
 
 use super::{check, mbm_server, mbm_unit, object, Core, Object, BEGUN};
+use crate::capi::frame::MBM_MAX_TCP_FRAME;
 use crate::capi::port::mbm_port;
 use crate::error::Status;
-use crate::frame::{ascii, tcp};
 use crate::time;
-
-/// Bytes of a frame buffer for any request and response in RTU.
-pub const MBM_SERVER_RTU_BYTES: u16 = 256;
-/// Bytes of a frame buffer for any request and response in ASCII.
-pub const MBM_SERVER_ASCII_BYTES: u16 = 513;
-/// Bytes of a frame buffer for any request and response over TCP.
-pub const MBM_SERVER_TCP_BYTES: u16 = 260;
 
 /// The least that a frame buffer may have for RTU.
 const LEAST: u16 = 16;
@@ -71,7 +64,7 @@ unsafe fn begin(
 /// @param units   what is served: one unit, or an array of them
 /// @param count   how many units
 /// @param frame   bytes of one frame, for requests and responses
-/// @param bytes   at least 16; MBM_SERVER_RTU_BYTES hold any frame. Longer
+/// @param bytes   at least 16; MBM_MAX_FRAME hold any frame. Longer
 ///                requests are not heard, longer responses become exception 04
 /// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or
 ///         a buffer of no use
@@ -104,7 +97,7 @@ pub unsafe extern "C" fn mbm_server_begin(
 /// @param units   see mbm_server_begin
 /// @param count   see mbm_server_begin
 /// @param frame   see mbm_server_begin
-/// @param bytes   at least 32; MBM_SERVER_ASCII_BYTES hold any frame
+/// @param bytes   at least 32; MBM_MAX_ASCII_FRAME hold any frame
 /// @return MBM_OK or MBM_INVALID_ARGUMENT
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginAscii(
@@ -135,7 +128,7 @@ pub unsafe extern "C" fn mbm_server_beginAscii(
 /// @param units   see mbm_server_begin; the unit ids 0 and 255 mean the first
 /// @param count   see mbm_server_begin
 /// @param frame   see mbm_server_begin; one for each connection
-/// @param bytes   at least MBM_SERVER_TCP_BYTES
+/// @param bytes   at least MBM_MAX_TCP_FRAME
 /// @return MBM_OK or MBM_INVALID_ARGUMENT
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginTcp(
@@ -149,7 +142,7 @@ pub unsafe extern "C" fn mbm_server_beginTcp(
     // SAFETY: as the header demands.
     unsafe {
         match begin(server, port, units, count, frame, bytes) {
-            Some(core) if bytes >= MBM_SERVER_TCP_BYTES => {
+            Some(core) if bytes >= MBM_MAX_TCP_FRAME => {
                 core.begin_tcp();
                 Status::OK.code()
             }
@@ -168,7 +161,7 @@ pub unsafe extern "C" fn mbm_server_beginTcp(
 /// @param units   see mbm_server_begin; the unit ids 0 and 255 mean the first
 /// @param count   see mbm_server_begin
 /// @param frame   see mbm_server_begin; one for each connection
-/// @param bytes   at least 16; MBM_SERVER_RTU_BYTES hold any frame
+/// @param bytes   at least 16; MBM_MAX_FRAME hold any frame
 /// @return MBM_OK or MBM_INVALID_ARGUMENT
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
@@ -220,9 +213,3 @@ pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u
     // SAFETY: as the header demands.
     unsafe { mbm_server_setSilence(server, time::silence(baud)) }
 }
-
-const _: () = {
-    assert!(MBM_SERVER_RTU_BYTES as usize == crate::frame::rtu::MAX_FRAME);
-    assert!(MBM_SERVER_ASCII_BYTES as usize == ascii::MAX_FRAME);
-    assert!(MBM_SERVER_TCP_BYTES as usize == tcp::MAX_FRAME);
-};

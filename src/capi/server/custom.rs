@@ -2,6 +2,7 @@
 
 use super::units::{add, add_first, request};
 use super::{mbm_service, mbm_unit};
+use crate::capi::functions::{self, mbm_rule};
 use crate::error::Status;
 use crate::pdu::custom::Rule;
 use crate::server::custom::{self, Outcome};
@@ -54,14 +55,9 @@ pub struct mbm_custom {
     /// The function code, 1 to 127; 0 is every function that nothing before it
     /// serves. 65 to 72 and 100 to 110 are left to users (V1.1b3, 5).
     pub code: u8,
-    /// How long its requests are, for streams of RTU frames, which tell no length
-    /// otherwise: bytes of data, if they are always so many.
-    pub fixedLength: u8,
-    /// Else the place of a byte among the data, from 1 on, that counts those
-    /// behind it. With neither, a request is whole once its CRC is right.
-    pub countAt: u8,
-    /// Bytes that follow those that are counted.
-    pub countMore: u8,
+    /// How long its request PDUs are, which RTU over TCP asks. Zeroed, a request is
+    /// whole once its CRC is right.
+    pub length: mbm_rule,
 }
 
 /// Functions that a unit answers with exception 01, though it could serve them:
@@ -131,14 +127,7 @@ pub(super) unsafe fn rule(service: *const mbm_service, function: u8) -> Option<R
         if (*record).code != function {
             return None;
         }
-        let (fixed, at) = ((*record).fixedLength, (*record).countAt);
-        Some(if fixed > 0 {
-            Rule::Fixed(fixed.saturating_add(1))
-        } else if at > 0 {
-            Rule::Counted(at, (*record).countMore)
-        } else {
-            Rule::Silence
-        })
+        functions::rule((*record).length)
     }
 }
 
@@ -146,8 +135,8 @@ pub(super) unsafe fn rule(service: *const mbm_service, function: u8) -> Option<R
 ///
 /// @param unit    the unit
 /// @param custom  yours, for as long as the unit is used
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, no function, or a
-///         code from 128 on
+/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, no function, a code
+///         from 128 on, or a length that is no rule
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_serveCustom(
     unit: *mut mbm_unit,
@@ -155,7 +144,11 @@ pub unsafe extern "C" fn mbm_server_serveCustom(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        if custom.is_null() || (*custom).serve.is_none() || (*custom).code > 127 {
+        if custom.is_null()
+            || (*custom).serve.is_none()
+            || (*custom).code > 127
+            || functions::rule((*custom).length).is_none()
+        {
             return Status::INVALID_ARGUMENT.code();
         }
         add(unit, custom.cast(), serve)

@@ -2,6 +2,7 @@
 
 use super::units::{add, request};
 use super::{mbm_service, mbm_unit};
+use crate::capi::packet::mbm_object;
 use crate::server::identity::{self, Objects};
 use core::ffi::c_void;
 use core::slice::from_raw_parts;
@@ -35,26 +36,15 @@ pub struct mbm_serverId {
     pub running: u8,
 }
 
-/// An object of a device identification.
-#[repr(C)]
-pub struct mbm_object {
-    /// Its value; text as a rule, not ended by a zero.
-    pub value: *const u8,
-    /// Bytes of the value, at most 244.
-    pub length: u8,
-    /// 0 vendor name, 1 product code, 2 revision, which every device has; 3 vendor
-    /// URL, 4 product name, 5 model name, 6 application name; from 0x80 on yours
-    /// (V1.1b3, 6.21).
-    pub id: u8,
-}
-
 /// A device identification. Zero it, set both, and hand it to
 /// mbm_server_serveIdentification.
 #[repr(C)]
 pub struct mbm_identification {
     /// Not for you.
     pub service: mbm_service,
-    /// The objects, in any order.
+    /// The objects, in any order: ids 0 vendor name, 1 product code and 2 revision,
+    /// which every device has; 3 vendor URL, 4 product name, 5 model name, 6 application
+    /// name; from 0x80 on yours. Each has 244 bytes at most.
     pub objects: *const mbm_object,
     /// How many.
     pub count: u16,
@@ -118,7 +108,7 @@ impl Objects for ObjectsByC {
             }
             for _ in 0..(*self.0).count {
                 if (*object).id == id {
-                    return Some(bytes((*object).value, (*object).length));
+                    return Some(bytes((*object).data, (*object).length));
                 }
                 object = object.add(1);
             }

@@ -7,12 +7,13 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// The layers from left to right; modules of one string stand side by side.
-const LAYERS: [&[&str]; 8] = [
+const LAYERS: [&[&str]; 9] = [
     &["error", "time"],
-    &["port", "data"],
+    &["port", "ring", "data"],
     &["bytes"],
     &["frame"],
     &["pdu"],
+    &["packet"],
     &["transaction"],
     &["master", "server"],
     &["capi"],

@@ -1,0 +1,281 @@
+/* Frames cut short and changed, MBAP lengths, ASCII characters, NULL. */
+#include "examples.h"
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static const mbm_framing rtu = {.kind = MBM_FRAMING_RTU};
+static const mbm_framing ascii = {.kind = MBM_FRAMING_ASCII};
+static const mbm_framing tcp = {.kind = MBM_FRAMING_TCP};
+
+/* Example `i`, built, for unit 0x11. */
+static uint16_t framed(size_t i, const mbm_framing *f, uint8_t *frame)
+{
+    uint8_t pdu[MBM_MAX_PDU];
+    mbm_packet packet;
+    uint16_t length;
+
+    example_load(&examples[i], pdu, &packet);
+    packet.unit = 0x11;
+    packet.transaction = 0x8180;
+    OK(mbm_frame_build(f, &packet, frame, MBM_MAX_ASCII_FRAME, &length));
+    return length;
+}
+
+/* Parses a copy in memory of just that size, so that sanitizers see a read
+ * beyond; what is parsed is built to the same bytes, but for lower case. */
+static uint8_t parsed(const mbm_framing *f, uint8_t side, const uint8_t *frame, uint16_t length)
+{
+    uint8_t *copy = malloc(length ? length : 1), again[MBM_MAX_ASCII_FRAME];
+    mbm_packet packet;
+    uint16_t size, i;
+    uint8_t status;
+
+    assert_non_null(copy);
+    memcpy(copy, frame, length);
+    status = mbm_frame_parse(f, side, copy, length, &packet);
+    if (status == MBM_OK) {
+        OK(mbm_frame_build(f, &packet, again, sizeof again, &size));
+        assert_int_equal(size, length);
+        for (i = 0; i < length; i++)
+            if (f->kind == MBM_FRAMING_ASCII && frame[i] >= 'a' && frame[i] <= 'f')
+                assert_int_equal(again[i], frame[i] - 'a' + 'A');
+            else
+                assert_int_equal(again[i], frame[i]);
+    } else if (status >= MBM_INCOMPLETE_FRAME || status == MBM_INVALID_CRC) {
+        assert_int_equal(packet.function, 0);
+    } else {
+        assert_int_equal(packet.unit, f->kind == MBM_FRAMING_TCP ? frame[6] : 0x11);
+    }
+    free(copy);
+    return status;
+}
+
+static void an_rtu_frame_that_is_cut_or_changed_is_refused(void **state)
+{
+    uint8_t frame[MBM_MAX_ASCII_FRAME];
+    uint16_t length, at;
+    unsigned flip;
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < example_count; i++) {
+        uint8_t side = example_side(&examples[i]);
+
+        length = framed(i, &rtu, frame);
+        for (at = 0; at < length; at++)
+            IS(at < 4 ? MBM_INCOMPLETE_FRAME : MBM_INVALID_CRC, parsed(&rtu, side, frame, at));
+        for (at = 0; at < length; at++) {
+            for (flip = 1; flip < 256; flip++) {
+                frame[at] ^= (uint8_t)flip;
+                IS(MBM_INVALID_CRC, parsed(&rtu, side, frame, length));
+                frame[at] ^= (uint8_t)flip;
+            }
+        }
+    }
+    memset(frame, 0, sizeof frame);
+    IS(MBM_MALFORMED_FRAME, parsed(&rtu, MBM_PACKET_REQUEST, frame, 257));
+}
+
+static void a_tcp_frame_that_is_cut_or_changed_is_parsed_right_or_refused(void **state)
+{
+    uint8_t frame[MBM_MAX_ASCII_FRAME];
+    uint16_t length, at;
+    unsigned flip;
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < example_count; i++) {
+        uint8_t side = example_side(&examples[i]);
+
+        length = framed(i, &tcp, frame);
+        for (at = 0; at < length; at++)
+            IS(MBM_INCOMPLETE_FRAME, parsed(&tcp, side, frame, at));
+        for (at = 0; at < length; at++) {
+            for (flip = 1; flip < 256; flip++) {
+                uint8_t status;
+
+                frame[at] ^= (uint8_t)flip;
+                status = parsed(&tcp, side, frame, length);
+                if (at == 2 || at == 3 || at == 4)
+                    assert_int_equal(status, MBM_MALFORMED_FRAME);
+                if (at == 5)
+                    assert_true(status == MBM_MALFORMED_FRAME || status == MBM_INCOMPLETE_FRAME);
+                frame[at] ^= (uint8_t)flip;
+            }
+        }
+    }
+}
+
+static void an_ascii_frame_that_is_cut_or_changed_is_parsed_right_or_refused(void **state)
+{
+    uint8_t frame[MBM_MAX_ASCII_FRAME];
+    uint16_t length, at;
+    unsigned value, right;
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < example_count; i++) {
+        uint8_t side = example_side(&examples[i]);
+
+        length = framed(i, &ascii, frame);
+        for (at = 0; at < length; at++)
+            IS(MBM_INCOMPLETE_FRAME, parsed(&ascii, side, frame, at));
+        for (at = 0; at < length; at++) {
+            uint8_t was = frame[at];
+
+            for (value = right = 0; value < 256; value++) {
+                frame[at] = (uint8_t)value;
+                right += parsed(&ascii, side, frame, length) == MBM_OK;
+            }
+            /* A letter may stand in lower case. */
+            assert_int_equal(right, was >= 'A' && was <= 'F' ? 2 : 1);
+            frame[at] = was;
+        }
+    }
+}
+
+static void mbap_lengths_that_no_frame_has_are_malformed(void **state)
+{
+    static const uint16_t lengths[] = {0, 1, 255, 256, 65535};
+    uint8_t frame[600] = {0, 1, 0, 0, 0, 6, 1, 3, 0, 0, 0, 1};
+    mbm_length expected;
+    uint16_t total;
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < COUNT(lengths); i++) {
+        frame[4] = (uint8_t)(lengths[i] >> 8);
+        frame[5] = (uint8_t)lengths[i];
+        IS(MBM_MALFORMED_FRAME, parsed(&tcp, MBM_PACKET_REQUEST, frame, 12));
+        IS(MBM_MALFORMED_FRAME, parsed(&tcp, MBM_PACKET_REQUEST, frame, 261));
+        IS(MBM_MALFORMED_FRAME,
+           mbm_frame_expectedLength(&tcp, MBM_PACKET_REQUEST, frame, 6, &expected));
+        IS(MBM_MALFORMED_FRAME, mbm_frame_looksLikeTcp(frame, 12, 1, &total));
+    }
+    frame[4] = 0;
+    frame[5] = 254;
+    OK(mbm_frame_expectedLength(&tcp, MBM_PACKET_REQUEST, frame, 7, &expected));
+    assert_int_equal(expected.bytes, MBM_MAX_TCP_FRAME);
+    IS(MBM_INCOMPLETE_FRAME, parsed(&tcp, MBM_PACKET_REQUEST, frame, 12));
+    frame[5] = 5;
+    IS(MBM_MALFORMED_FRAME, parsed(&tcp, MBM_PACKET_REQUEST, frame, 12));
+}
+
+static void ascii_is_taken_in_lower_case_and_in_pairs_only(void **state)
+{
+    static const struct {
+        uint8_t status;
+        const char *text;
+    } frames[] = {
+        {MBM_OK, ":0207F7\r\n"},
+        {MBM_OK, ":0207f7\r\n"},
+        {MBM_MALFORMED_FRAME, ":0207F\r\n"},
+        {MBM_MALFORMED_FRAME, ":0207FG\r\n"},
+        {MBM_MALFORMED_FRAME, ":02 7F7\r\n"},
+        {MBM_MALFORMED_FRAME, "0207F7\r\n"},
+        {MBM_MALFORMED_FRAME, ":02FE\r\n"},
+        {MBM_MALFORMED_FRAME, ":\r\n"},
+        {MBM_INVALID_CRC, ":0207F6\r\n"},
+        {MBM_INCOMPLETE_FRAME, ":0207F7\r"},
+        {MBM_INCOMPLETE_FRAME, ":0207F7\n"},
+        {MBM_INCOMPLETE_FRAME, ":0207F7\n\r"},
+        {MBM_INCOMPLETE_FRAME, ":0207F7"},
+        {MBM_INCOMPLETE_FRAME, ""},
+    };
+    mbm_framing other = {.kind = MBM_FRAMING_ASCII, .end = '!'};
+    mbm_length expected;
+    mbm_packet packet;
+    uint8_t text[600];
+    uint16_t length;
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < COUNT(frames); i++) {
+        length = (uint16_t)strlen(frames[i].text);
+        memcpy(text, frames[i].text, length);
+        IS(frames[i].status,
+           mbm_frame_parse(&ascii, MBM_PACKET_REQUEST, text, length, &packet));
+    }
+    memcpy(text, ":0207F7\r!", 9);
+    IS(MBM_INCOMPLETE_FRAME, parsed(&ascii, MBM_PACKET_REQUEST, text, 9));
+    OK(mbm_frame_expectedLength(&other, MBM_PACKET_REQUEST, text, 9, &expected));
+    assert_int_equal(expected.bytes, 9);
+    IS(MBM_MALFORMED_FRAME,
+       mbm_frame_expectedLength(&ascii, MBM_PACKET_REQUEST, text, 9, &expected));
+    OK(mbm_frame_parse(&other, MBM_PACKET_REQUEST, text, 9, &packet));
+    OK(mbm_frame_build(&other, &packet, text, 9, &length));
+    assert_memory_equal(text, ":0207F7\r!", 9);
+    memset(text, '0', sizeof text);
+    text[0] = ':';
+    IS(MBM_MALFORMED_FRAME, parsed(&ascii, MBM_PACKET_REQUEST, text, 514));
+}
+
+static void the_first_bytes_of_no_frame_are_malformed(void **state)
+{
+    mbm_length expected;
+
+    (void)state;
+#define FIRST(framing, text)                                                                       \
+    mbm_frame_expectedLength(&framing, MBM_PACKET_RESPONSE, (const uint8_t *)(text),               \
+                             sizeof(text) - 1, &expected)
+    IS(MBM_MALFORMED_FRAME, FIRST(rtu, "\x01\x03\xFC"));
+    IS(MBM_MALFORMED_FRAME, FIRST(tcp, "\x00\x01\x00\x01"));
+    IS(MBM_MALFORMED_FRAME, FIRST(ascii, "0"));
+    IS(MBM_MALFORMED_FRAME, FIRST(ascii, ":0x"));
+    IS(MBM_MALFORMED_FRAME, FIRST(ascii, ":0103FC"));
+    OK(FIRST(rtu, "\x01\x55"));
+    assert_int_equal(expected.kind, MBM_LENGTH_UNKNOWN);
+    OK(FIRST(ascii, ":0155"));
+    assert_int_equal(expected.kind, MBM_LENGTH_SILENCE);
+}
+
+static void null_is_an_invalid_argument(void **state)
+{
+    const mbm_framing unknown = {.kind = 4}, no_list = {.functionCount = 1};
+    mbm_packet packet = {.unit = 1, .function = 0x03, .quantity = 1};
+    mbm_length expected;
+    uint8_t frame[16];
+    uint16_t length;
+
+    (void)state;
+    OK(mbm_frame_build(&rtu, &packet, frame, 16, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(NULL, &packet, frame, 16, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&unknown, &packet, frame, 16, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&no_list, &packet, frame, 16, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, NULL, frame, 16, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, &packet, NULL, 16, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, &packet, frame, 16, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_parse(NULL, 0, frame, 8, &packet));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_parse(&rtu, 2, frame, 8, &packet));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_parse(&rtu, 0, NULL, 8, &packet));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_parse(&rtu, 0, frame, 8, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(NULL, &packet, 1, frame, 16, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(&rtu, NULL, 1, frame, 16, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(&rtu, &packet, 1, NULL, 16, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(&rtu, &packet, 1, frame, 16, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(&rtu, &packet, 0, frame, 16, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(NULL, 0, frame, 1, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(&rtu, 2, frame, 1, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(&rtu, 0, NULL, 1, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(&rtu, 0, frame, 1, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(NULL, &packet, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(&rtu, NULL, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(&rtu, &packet, NULL));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(an_rtu_frame_that_is_cut_or_changed_is_refused),
+        cmocka_unit_test(a_tcp_frame_that_is_cut_or_changed_is_parsed_right_or_refused),
+        cmocka_unit_test(an_ascii_frame_that_is_cut_or_changed_is_parsed_right_or_refused),
+        cmocka_unit_test(mbap_lengths_that_no_frame_has_are_malformed),
+        cmocka_unit_test(ascii_is_taken_in_lower_case_and_in_pairs_only),
+        cmocka_unit_test(the_first_bytes_of_no_frame_are_malformed),
+        cmocka_unit_test(null_is_an_invalid_argument),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

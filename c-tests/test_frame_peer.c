@@ -1,0 +1,290 @@
+/* mbm_frame_* against libmodbus, RTU over a pty and TCP over loopback: what its
+ * client sends is what we build, what its server answers is what we parse. */
+#define _GNU_SOURCE
+#include "examples.h"
+#include "server.h"
+#include "test.h"
+
+#include <arpa/inet.h>
+#include <poll.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+static const mbm_framing rtu = {.kind = MBM_FRAMING_RTU};
+static const mbm_framing tcp = {.kind = MBM_FRAMING_TCP};
+
+/* Reads one frame, as long as its first bytes tell. */
+static uint16_t receive(int fd, const mbm_framing *f, uint8_t kind, uint8_t *frame)
+{
+    uint16_t have = 0;
+    mbm_length expected;
+
+    for (;;) {
+        struct pollfd wait = {fd, POLLIN, 0};
+        ssize_t count;
+
+        OK(mbm_frame_expectedLength(f, kind, frame, have, &expected));
+        assert_true(expected.kind == MBM_LENGTH_EXACT || expected.kind == MBM_LENGTH_AT_LEAST);
+        if (have == expected.bytes) {
+            assert_int_equal(expected.kind, MBM_LENGTH_EXACT);
+            return have;
+        }
+        assert_int_equal(poll(&wait, 1, 5000), 1);
+        count = read(fd, frame + have, (size_t)(expected.bytes - have));
+        assert_true(count > 0);
+        have = (uint16_t)(have + count);
+    }
+}
+
+/* The calls of libmodbus's client, and the packet that each sends. */
+enum { CALLS = 11 };
+static const uint16_t words[] = {0x1234, 0xABCD, 0x0001};
+static const uint8_t wire_words[] = {0x12, 0x34, 0xAB, 0xCD, 0x00, 0x01};
+static const uint8_t bits[] = {1, 0, 1, 1, 0, 0, 0, 1, 1, 1}, wire_bits[] = {0x8D, 0x03};
+
+static void call(modbus_t *client, unsigned number)
+{
+    uint8_t bytes[MODBUS_MAX_READ_BITS];
+    uint16_t registers[MODBUS_MAX_READ_REGISTERS];
+    int done = 0;
+
+    switch (number) {
+    case 0: done = modbus_read_bits(client, 0x13, 0x25, bytes); break;
+    case 1: done = modbus_read_input_bits(client, 0xC4, 0x16, bytes); break;
+    case 2: done = modbus_read_registers(client, 0x6B, 3, registers); break;
+    case 3: done = modbus_read_input_registers(client, 8, 125, registers); break;
+    case 4: done = modbus_write_bit(client, 0xAC, 1); break;
+    case 5: done = modbus_write_register(client, 1, 3); break;
+    case 6: done = modbus_write_bits(client, 0x13, 10, bits); break;
+    case 7: done = modbus_write_registers(client, 1, 3, words); break;
+    case 8: done = modbus_mask_write_register(client, 4, 0xF2, 0x25); break;
+    case 9: done = modbus_write_and_read_registers(client, 14, 3, words, 3, 6, registers); break;
+    case 10: done = modbus_report_slave_id(client, (int)sizeof bytes, bytes); break;
+    }
+    /* Nobody answers. */
+    assert_int_equal(done, -1);
+}
+
+static const mbm_packet sent[CALLS] = {
+    {.function = 0x01, .address = 0x13, .quantity = 0x25},
+    {.function = 0x02, .address = 0xC4, .quantity = 0x16},
+    {.function = 0x03, .address = 0x6B, .quantity = 3},
+    {.function = 0x04, .address = 8, .quantity = 125},
+    {.function = 0x05, .address = 0xAC, .value = 1},
+    {.function = 0x06, .address = 1, .value = 3},
+    {.function = 0x0F, .address = 0x13, .quantity = 10, .data = wire_bits, .dataLength = 2},
+    {.function = 0x10, .address = 1, .quantity = 3, .data = wire_words, .dataLength = 6},
+    {.function = 0x16, .address = 4, .andMask = 0xF2, .orMask = 0x25},
+    {.function = 0x17, .address = 3, .quantity = 6, .writeAddress = 14, .writeQuantity = 3,
+     .data = wire_words, .dataLength = 6},
+    {.function = 0x11},
+};
+
+static void sends_what_we_build(modbus_t *client, int fd, const mbm_framing *f)
+{
+    uint8_t frame[MBM_MAX_TCP_FRAME], built[MBM_MAX_TCP_FRAME];
+    mbm_packet found, wanted;
+    uint16_t length, size;
+    unsigned number;
+
+    assert_int_equal(modbus_set_slave(client, 17), 0);
+    assert_int_equal(modbus_set_response_timeout(client, 0, 1000), 0);
+    for (number = 0; number < CALLS; number++) {
+        call(client, number);
+        length = receive(fd, f, MBM_PACKET_REQUEST, frame);
+        wanted = sent[number];
+        wanted.unit = 17;
+        memcpy(built, frame, length);
+        OK(mbm_frame_parse(f, MBM_PACKET_REQUEST, built, length, &found));
+        wanted.transaction = found.transaction;
+        assert_same_packet(&found, &wanted);
+        OK(mbm_frame_build(f, &wanted, built, sizeof built, &size));
+        assert_int_equal(size, length);
+        assert_memory_equal(built, frame, length);
+    }
+}
+
+static void what_libmodbus_sends_over_rtu_is_what_we_build(void **state)
+{
+    pty line;
+    modbus_t *client;
+
+    (void)state;
+    pty_open(&line);
+    client = modbus_new_rtu(line.path, 115200, 'N', 8, 1);
+    assert_non_null(client);
+    assert_int_equal(modbus_connect(client), 0);
+    sends_what_we_build(client, line.ours, &rtu);
+    modbus_close(client);
+    modbus_free(client);
+    pty_close(&line);
+}
+
+/* The port that the system chose for a listening socket. */
+static int port_of(int listener)
+{
+    struct sockaddr_in address = {0};
+    socklen_t size = sizeof address;
+
+    assert_int_equal(getsockname(listener, (struct sockaddr *)&address, &size), 0);
+    return ntohs(address.sin_port);
+}
+
+static void what_libmodbus_sends_over_tcp_is_what_we_build(void **state)
+{
+    struct sockaddr_in address = {.sin_family = AF_INET};
+    int listener = socket(AF_INET, SOCK_STREAM, 0), peer;
+    modbus_t *client;
+
+    (void)state;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    assert_int_equal(bind(listener, (struct sockaddr *)&address, sizeof address), 0);
+    assert_int_equal(listen(listener, 1), 0);
+    client = modbus_new_tcp("127.0.0.1", port_of(listener));
+    assert_non_null(client);
+    assert_int_equal(modbus_connect(client), 0);
+    peer = accept(listener, NULL, NULL);
+    assert_true(peer >= 0);
+    sends_what_we_build(client, peer, &tcp);
+    modbus_close(client);
+    modbus_free(client);
+    close(peer);
+    close(listener);
+}
+
+/* Sends a request and parses the reply, which must be as long as was told. */
+static void ask(int fd, const mbm_framing *f, mbm_packet request, uint8_t *frame, mbm_packet *reply)
+{
+    mbm_length expected;
+    uint16_t length;
+
+    request.unit = 17;
+    request.transaction = f->kind == MBM_FRAMING_TCP ? 0xDA87 : 0;
+    OK(mbm_frame_replyLength(f, &request, &expected));
+    OK(mbm_frame_build(f, &request, frame, MBM_MAX_TCP_FRAME, &length));
+    assert_int_equal(write(fd, frame, length), length);
+    length = receive(fd, f, MBM_PACKET_RESPONSE, frame);
+    OK(mbm_frame_parse(f, MBM_PACKET_RESPONSE, frame, length, reply));
+    if (reply->kind != MBM_PACKET_EXCEPTION && expected.kind == MBM_LENGTH_EXACT)
+        assert_int_equal(length, expected.bytes);
+    assert_int_equal(reply->function, request.function);
+    assert_int_equal(reply->unit, 17);
+    assert_int_equal(reply->transaction, request.transaction);
+}
+
+static uint16_t word(const mbm_packet *reply, unsigned index)
+{
+    return (uint16_t)(reply->data[2 * index] << 8 | reply->data[2 * index + 1]);
+}
+
+static void answers_what_we_parse(int fd, const mbm_framing *f, const modbus_mapping_t *memory)
+{
+    uint8_t frame[MBM_MAX_TCP_FRAME];
+    mbm_packet reply;
+    unsigned i;
+
+    for (i = 0; i < CALLS; i++) {
+        const mbm_packet *request = &sent[i];
+        unsigned at;
+
+        ask(fd, f, *request, frame, &reply);
+        assert_int_equal(reply.kind, MBM_PACKET_RESPONSE);
+        assert_int_equal(reply.address, reply.dataLength ? 0 : request->address);
+        assert_int_equal(reply.value, request->value);
+        assert_int_equal(reply.andMask, request->andMask);
+        assert_int_equal(reply.orMask, request->orMask);
+        for (at = 0; at < request->quantity && reply.dataLength; at++) {
+            unsigned cell = request->address + at;
+
+            if (request->function <= 0x02)
+                assert_int_equal(reply.data[at / 8] >> at % 8 & 1,
+                                 request->function == 0x01 ? memory->tab_bits[cell]
+                                                           : memory->tab_input_bits[cell]);
+            else
+                assert_int_equal(word(&reply, at), request->function == 0x04
+                                                       ? memory->tab_input_registers[cell]
+                                                       : memory->tab_registers[cell]);
+        }
+    }
+    assert_int_equal(reply.function, 0x11);
+    assert_int_equal(reply.byteCount, reply.dataLength);
+    assert_int_equal(memory->tab_bits[0xAC], 1);
+    assert_int_equal(memory->tab_registers[14], 0x1234);
+    assert_int_equal(memory->tab_registers[16], 0x0001);
+    ask(fd, f, (mbm_packet){.function = 0x03, .address = 0xFF00, .quantity = 1}, frame, &reply);
+    assert_int_equal(reply.kind, MBM_PACKET_EXCEPTION);
+    assert_int_equal(reply.exceptionCode, MBM_ILLEGAL_DATA_ADDRESS);
+}
+
+static void what_libmodbus_answers_over_rtu_is_what_we_parse(void **state)
+{
+    static server peer;
+
+    (void)state;
+    server_start(&peer, 17);
+    answers_what_we_parse(peer.line.ours, &rtu, peer.mapping);
+    server_stop(&peer);
+}
+
+typedef struct listening {
+    modbus_t *peer;
+    modbus_mapping_t *mapping;
+    int listener;
+} listening;
+
+static void *serve(void *argument)
+{
+    listening *l = (listening *)argument;
+    uint8_t request[MODBUS_TCP_MAX_ADU_LENGTH];
+    int length;
+
+    modbus_tcp_accept(l->peer, &l->listener);
+    while ((length = modbus_receive(l->peer, request)) >= 0)
+        modbus_reply(l->peer, request, length, l->mapping);
+    return NULL;
+}
+
+static void what_libmodbus_answers_over_tcp_is_what_we_parse(void **state)
+{
+    struct sockaddr_in address = {.sin_family = AF_INET};
+    listening l = {modbus_new_tcp("127.0.0.1", 0), NULL, -1};
+    pthread_t thread;
+    int fd = socket(AF_INET, SOCK_STREAM, 0);
+    unsigned i;
+
+    (void)state;
+    l.mapping = modbus_mapping_new(SERVER_BITS, SERVER_BITS, SERVER_REGISTERS, SERVER_REGISTERS);
+    assert_true(l.peer && l.mapping);
+    for (i = 0; i < SERVER_REGISTERS; i++) {
+        l.mapping->tab_registers[i] = server_pattern(i);
+        l.mapping->tab_input_registers[i] = (uint16_t)~server_pattern(i);
+        l.mapping->tab_bits[i] = server_bit_pattern(i);
+        l.mapping->tab_input_bits[i] = !server_bit_pattern(i);
+    }
+    l.listener = modbus_tcp_listen(l.peer, 1);
+    assert_true(l.listener >= 0);
+    address.sin_port = htons((uint16_t)port_of(l.listener));
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    assert_int_equal(pthread_create(&thread, NULL, serve, &l), 0);
+    assert_int_equal(connect(fd, (struct sockaddr *)&address, sizeof address), 0);
+    answers_what_we_parse(fd, &tcp, l.mapping);
+    close(fd);
+    pthread_join(thread, NULL);
+    modbus_close(l.peer);
+    modbus_free(l.peer);
+    modbus_mapping_free(l.mapping);
+    close(l.listener);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_libmodbus_sends_over_rtu_is_what_we_build),
+        cmocka_unit_test(what_libmodbus_sends_over_tcp_is_what_we_build),
+        cmocka_unit_test(what_libmodbus_answers_over_rtu_is_what_we_parse),
+        cmocka_unit_test(what_libmodbus_answers_over_tcp_is_what_we_parse),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

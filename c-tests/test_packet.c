@@ -1,0 +1,418 @@
+/* mbm_packet_*: every function in both directions, PDUs cut short and changed,
+ * and packets that are none. */
+#include "examples.h"
+#include "test.h"
+
+#include <string.h>
+
+static const mbm_rule three_bytes = {MBM_RULE_FIXED, 3, 0};
+
+static void every_example_is_parsed_to_what_it_says(void **state)
+{
+    uint8_t pdu[MBM_MAX_PDU];
+    mbm_packet wanted, found;
+    uint16_t length;
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < example_count; i++) {
+        length = example_load(&examples[i], pdu, &wanted);
+        OK(mbm_packet_parse(example_side(&examples[i]), pdu, length, NULL, 0, &found));
+        assert_same_packet(&found, &wanted);
+        if (found.dataLength)
+            assert_ptr_equal(found.data, wanted.data);
+    }
+}
+
+static void every_example_is_built_byte_for_byte(void **state)
+{
+    uint8_t pdu[MBM_MAX_PDU], built[MBM_MAX_PDU];
+    mbm_packet packet;
+    uint16_t length, found;
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < example_count; i++) {
+        length = example_load(&examples[i], pdu, &packet);
+        memset(built, 0xEE, sizeof built);
+        OK(mbm_packet_build(&packet, NULL, 0, built, length, &found));
+        assert_int_equal(found, length);
+        assert_memory_equal(built, pdu, length);
+        assert_int_equal(built[length], 0xEE);
+        IS(MBM_BUFFER_TOO_SMALL,
+           mbm_packet_build(&packet, NULL, 0, built, (uint16_t)(length - 1), &found));
+    }
+}
+
+static void every_sub_function_of_08_is_built_and_parsed(void **state)
+{
+    static const uint8_t zero[2];
+    uint8_t pdu[5];
+    unsigned sub_function, known = 0;
+
+    (void)state;
+    for (sub_function = 0; sub_function < 0x200; sub_function++) {
+        mbm_packet packet = {.function = MBM_FC_DIAGNOSTICS, .data = zero, .dataLength = 2}, found;
+        uint16_t length;
+        uint8_t status;
+
+        packet.subFunction = (uint16_t)sub_function;
+        status = mbm_packet_build(&packet, NULL, 0, pdu, sizeof pdu, &length);
+        if (status == MBM_OK) {
+            OK(mbm_packet_parse(MBM_PACKET_REQUEST, pdu, length, NULL, 0, &found));
+            assert_same_packet(&found, &packet);
+            known++;
+        } else {
+            assert_int_equal(status, MBM_ILLEGAL_FUNCTION);
+        }
+        packet.kind = MBM_PACKET_RESPONSE;
+        /* Nothing answers Force Listen Only Mode. */
+        IS(status == MBM_OK && sub_function != MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY
+               ? MBM_OK
+               : MBM_MALFORMED_REPLY,
+           mbm_packet_build(&packet, NULL, 0, pdu, sizeof pdu, &length));
+    }
+    assert_int_equal(known, 15);
+}
+
+/* Parsed right, so that building gives the same bytes, or refused with a status
+ * that such a PDU has. */
+static unsigned parsed_right(uint8_t side, const uint8_t *pdu, uint16_t length)
+{
+    uint8_t again[MBM_MAX_PDU];
+    mbm_packet packet;
+    uint16_t found;
+    uint8_t status = mbm_packet_parse(side, pdu, length, NULL, 0, &packet);
+
+    if (status == MBM_OK) {
+        OK(mbm_packet_build(&packet, NULL, 0, again, sizeof again, &found));
+        assert_int_equal(found, length);
+        assert_memory_equal(again, pdu, length);
+        return 1;
+    }
+    if (side == MBM_PACKET_REQUEST)
+        assert_in_range(status, MBM_ILLEGAL_FUNCTION, MBM_ILLEGAL_DATA_VALUE);
+    else
+        assert_true(status == MBM_INVALID_FUNCTION || status == MBM_MALFORMED_REPLY);
+    assert_null(packet.data);
+    assert_int_equal(packet.kind, side);
+    assert_int_equal(packet.function, length ? pdu[0] : 0);
+    return 0;
+}
+
+static void a_pdu_cut_short_is_parsed_right_or_refused(void **state)
+{
+    uint8_t pdu[MBM_MAX_PDU];
+    mbm_packet packet;
+    uint16_t length, cut;
+    unsigned right = 0;
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < example_count; i++) {
+        length = example_load(&examples[i], pdu, &packet);
+        for (cut = 0; cut < length; cut++)
+            right += parsed_right(example_side(&examples[i]), pdu, cut);
+    }
+    /* 08/00, 11 beyond its count, 2B/0D and 41 end where their frames do. */
+    assert_in_range(right, 1, 16);
+}
+
+static void a_pdu_with_one_byte_changed_is_parsed_right_or_refused(void **state)
+{
+    uint8_t pdu[MBM_MAX_PDU];
+    mbm_packet packet;
+    uint16_t length, at;
+    unsigned value, right = 0, all = 0;
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < example_count; i++) {
+        length = example_load(&examples[i], pdu, &packet);
+        for (at = 0; at < length; at++) {
+            uint8_t was = pdu[at];
+
+            for (value = 0; value < 256; value++) {
+                pdu[at] = (uint8_t)value;
+                right += parsed_right(example_side(&examples[i]), pdu, length);
+                all++;
+            }
+            pdu[at] = was;
+        }
+    }
+    assert_in_range(right, 1, all - 1);
+}
+
+static void a_byte_too_many_is_refused_unless_the_frame_ends_the_pdu(void **state)
+{
+    uint8_t pdu[MBM_MAX_PDU + 1];
+    mbm_packet packet;
+    unsigned right = 0;
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < example_count; i++) {
+        uint16_t length = example_load(&examples[i], pdu, &packet);
+
+        pdu[length] = 0;
+        right += parsed_right(example_side(&examples[i]), pdu, (uint16_t)(length + 1));
+    }
+    /* 11, and 2B/0D and 41 in both directions. */
+    assert_int_equal(right, 5);
+}
+
+static void a_packet_that_cannot_be_is_not_built(void **state)
+{
+    static const uint8_t data[600];
+    static const struct {
+        uint8_t status;
+        mbm_packet packet;
+    } refused[] = {
+        {MBM_ILLEGAL_DATA_VALUE, {.function = 0x01, .quantity = 0}},
+        {MBM_ILLEGAL_DATA_VALUE, {.function = 0x01, .quantity = 2001}},
+        {MBM_ILLEGAL_DATA_ADDRESS, {.function = 0x02, .address = 0xFFFF, .quantity = 2}},
+        {MBM_ILLEGAL_DATA_VALUE, {.function = 0x03, .quantity = 126}},
+        {MBM_ILLEGAL_DATA_VALUE, {.function = 0x08, .dataLength = 3}},
+        {MBM_ILLEGAL_FUNCTION, {.function = 0x08, .subFunction = 5, .dataLength = 2}},
+        {MBM_ILLEGAL_DATA_VALUE, {.function = 0x0F, .quantity = 9, .dataLength = 1}},
+        {MBM_ILLEGAL_DATA_VALUE, {.function = 0x10, .quantity = 2, .dataLength = 3}},
+        {MBM_ILLEGAL_DATA_VALUE, {.function = 0x10, .quantity = 2, .dataLength = 4 + 256}},
+        {MBM_ILLEGAL_DATA_VALUE, {.function = 0x10, .quantity = 125, .dataLength = 250}},
+        {MBM_ILLEGAL_DATA_VALUE, {.function = 0x14, .dataLength = 0}},
+        {MBM_ILLEGAL_DATA_VALUE, {.function = 0x14, .dataLength = 7}},
+        {MBM_ILLEGAL_DATA_VALUE, {.function = 0x15, .dataLength = 600}},
+        {MBM_ILLEGAL_DATA_VALUE, {.function = 0x17, .quantity = 1, .writeQuantity = 0}},
+        {MBM_ILLEGAL_DATA_VALUE, {.function = 0x2B, .meiType = 0x0E, .readDeviceIdCode = 5}},
+        {MBM_ILLEGAL_DATA_VALUE, {.function = 0x41, .dataLength = 253}},
+        {MBM_ILLEGAL_FUNCTION, {.function = 0x00}},
+        {MBM_ILLEGAL_FUNCTION, {.function = 0x09}},
+        {MBM_ILLEGAL_FUNCTION, {.function = 0x83}},
+        {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_RESPONSE, .function = 0x01}},
+        {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_RESPONSE, .function = 0x03, .dataLength = 1}},
+        {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_RESPONSE, .function = 0x04, .dataLength = 252}},
+        {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_RESPONSE, .function = 0x0C, .dataLength = 65}},
+        {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_RESPONSE, .function = 0x11, .byteCount = 1}},
+        {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_RESPONSE, .function = 0x14, .dataLength = 4}},
+        {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_RESPONSE, .function = 0x15, .dataLength = 9}},
+        {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_RESPONSE, .function = 0x18, .dataLength = 64}},
+        {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_RESPONSE, .function = 0x2B, .meiType = 0x0E,
+                               .readDeviceIdCode = 1, .objectCount = 1}},
+        {MBM_INVALID_FUNCTION, {.kind = MBM_PACKET_RESPONSE, .function = 0x09}},
+        {MBM_INVALID_FUNCTION, {.kind = MBM_PACKET_EXCEPTION, .function = 0x81,
+                                .exceptionCode = 1}},
+        {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_EXCEPTION, .function = 0x01}},
+        {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_EXCEPTION, .function = 1,
+                               .exceptionCode = 0x80}},
+        {MBM_INVALID_ARGUMENT, {.kind = 3, .function = 0x03, .quantity = 1}},
+        {MBM_INVALID_ARGUMENT, {.kind = 255, .function = 0x03, .quantity = 1}},
+    };
+    uint8_t built[700];
+    uint16_t length = 0x5555;
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < COUNT(refused); i++) {
+        mbm_packet packet = refused[i].packet;
+
+        packet.data = data;
+        IS(refused[i].status, mbm_packet_build(&packet, NULL, 0, built, sizeof built, &length));
+        IS(refused[i].status, mbm_packet_build(&packet, NULL, 0, built, MBM_MAX_PDU, &length));
+        assert_int_equal(length, 0x5555);
+    }
+}
+
+static void the_first_bytes_tell_how_long_a_pdu_is(void **state)
+{
+    uint8_t pdu[MBM_MAX_PDU];
+    mbm_packet packet;
+    mbm_length expected;
+    uint16_t length, have;
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < example_count; i++) {
+        uint8_t side = example_side(&examples[i]), kind = MBM_LENGTH_UNKNOWN;
+        uint8_t id_goes_on = examples[i].packet.byteCount;
+
+        length = example_load(&examples[i], pdu, &packet);
+        for (have = 0; have <= length; have++) {
+            OK(mbm_packet_expectedLength(side, pdu, have, NULL, 0, &expected));
+            kind = expected.kind;
+            if (kind == MBM_LENGTH_EXACT)
+                assert_int_equal(expected.bytes, id_goes_on ? id_goes_on + 2 : length);
+            else if (kind == MBM_LENGTH_AT_LEAST)
+                assert_in_range(expected.bytes, have + 1, length);
+            else
+                assert_int_equal(expected.bytes, 0);
+        }
+        if (packet.function == 0x41)
+            assert_int_equal(kind, MBM_LENGTH_UNKNOWN);
+        else if ((packet.function == 0x08 && packet.subFunction == 0) || packet.meiType == 0x0D)
+            assert_int_equal(kind, MBM_LENGTH_SILENCE);
+        else
+            assert_int_equal(kind, MBM_LENGTH_EXACT);
+    }
+    OK(mbm_packet_expectedLength(MBM_PACKET_RESPONSE, (const uint8_t *)"\x03\xFB", 2, NULL, 0,
+                                 &expected));
+    IS(MBM_MALFORMED_FRAME, mbm_packet_expectedLength(MBM_PACKET_RESPONSE,
+                                                      (const uint8_t *)"\x03\xFC", 2, NULL, 0,
+                                                      &expected));
+}
+
+static void a_request_tells_how_long_its_response_is(void **state)
+{
+    uint8_t pdu[MBM_MAX_PDU], reply[MBM_MAX_PDU];
+    mbm_packet request, response;
+    mbm_length expected;
+    unsigned exact = 0;
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < example_count; i++) {
+        uint16_t length;
+
+        example_load(&examples[i], pdu, &request);
+        if (request.kind != MBM_PACKET_REQUEST) {
+            IS(MBM_INVALID_ARGUMENT, mbm_packet_replyLength(&request, NULL, 0, &expected));
+            continue;
+        }
+        length = example_load(&examples[i + 1], reply, &response);
+        OK(mbm_packet_replyLength(&request, NULL, 0, &expected));
+        if (request.function == 0x03)
+            assert_int_equal(expected.bytes, 2 + 2 * request.quantity);
+        if (expected.kind == MBM_LENGTH_EXACT) {
+            assert_int_equal(expected.bytes, length);
+            exact++;
+        }
+        if (expected.kind == MBM_LENGTH_AT_LEAST)
+            assert_in_range(expected.bytes, 1, length);
+    }
+    assert_int_equal(exact, 18);
+    request = (mbm_packet){.function = 0x03, .quantity = 126};
+    IS(MBM_ILLEGAL_DATA_VALUE, mbm_packet_replyLength(&request, NULL, 0, &expected));
+    request = (mbm_packet){.function = 0x08, .subFunction = 4, .dataLength = 2,
+                           .data = (const uint8_t *)"\0"};
+    OK(mbm_packet_replyLength(&request, NULL, 0, &expected));
+    assert_int_equal(expected.kind, MBM_LENGTH_EXACT);
+    assert_int_equal(expected.bytes, 0);
+}
+
+static void a_declared_function_keeps_its_length(void **state)
+{
+    const mbm_function own[] = {
+        {0x41, three_bytes, {MBM_RULE_COUNTED, 1, 2}},
+        {0x55, {MBM_RULE_SILENCE, 0, 0}, three_bytes},
+    };
+    static const uint8_t request[] = {0x41, 1, 2}, response[] = {0x41, 1, 9, 8, 7};
+    static const uint8_t beyond[] = {0x55, 1, 2};
+    mbm_packet packet;
+    mbm_length expected;
+    uint8_t built[8];
+    uint16_t length;
+
+    (void)state;
+    OK(mbm_packet_parse(MBM_PACKET_REQUEST, request, 3, own, 2, &packet));
+    OK(mbm_packet_build(&packet, own, 2, built, sizeof built, &length));
+    assert_int_equal(length, 3);
+    OK(mbm_packet_replyLength(&packet, own, 2, &expected));
+    assert_int_equal(expected.kind, MBM_LENGTH_AT_LEAST);
+    packet.dataLength = 1;
+    IS(MBM_ILLEGAL_DATA_VALUE, mbm_packet_build(&packet, own, 2, built, sizeof built, &length));
+    IS(MBM_ILLEGAL_DATA_VALUE, mbm_packet_parse(MBM_PACKET_REQUEST, request, 2, own, 2, &packet));
+    OK(mbm_packet_parse(MBM_PACKET_RESPONSE, response, 5, own, 2, &packet));
+    IS(MBM_MALFORMED_REPLY, mbm_packet_parse(MBM_PACKET_RESPONSE, response, 4, own, 2, &packet));
+    OK(mbm_packet_expectedLength(MBM_PACKET_RESPONSE, response, 2, own, 2, &expected));
+    assert_int_equal(expected.bytes, 5);
+
+    IS(MBM_ILLEGAL_FUNCTION, mbm_packet_parse(MBM_PACKET_REQUEST, beyond, 3, NULL, 0, &packet));
+    OK(mbm_packet_parse(MBM_PACKET_REQUEST, beyond, 3, own, 2, &packet));
+    OK(mbm_packet_build(&packet, own, 2, built, sizeof built, &length));
+    IS(MBM_ILLEGAL_FUNCTION, mbm_packet_build(&packet, own, 1, built, sizeof built, &length));
+}
+
+static void a_declaration_that_cannot_be_is_an_invalid_argument(void **state)
+{
+    static const mbm_function wrong[] = {
+        {0, {0, 0, 0}, {0, 0, 0}},
+        {0x80, {0, 0, 0}, {0, 0, 0}},
+        {0x41, {3, 1, 0}, {0, 0, 0}},
+        {0x41, {0, 0, 0}, {MBM_RULE_FIXED, 0, 0}},
+        {0x41, {MBM_RULE_FIXED, 254, 0}, {0, 0, 0}},
+        {0x41, {MBM_RULE_COUNTED, 0, 0}, {0, 0, 0}},
+        {0x41, {MBM_RULE_COUNTED, 253, 0}, {0, 0, 0}},
+    };
+    static const uint8_t pdu[] = {0x41, 1, 2};
+    mbm_packet packet;
+    mbm_length expected;
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < COUNT(wrong); i++) {
+        IS(MBM_INVALID_ARGUMENT,
+           mbm_packet_parse(MBM_PACKET_REQUEST, pdu, 3, &wrong[i], 1, &packet));
+        IS(MBM_INVALID_ARGUMENT,
+           mbm_packet_expectedLength(MBM_PACKET_REQUEST, pdu, 3, &wrong[i], 1, &expected));
+    }
+}
+
+static void null_is_an_invalid_argument(void **state)
+{
+    uint8_t pdu[8] = {0x03, 0, 0, 0, 1};
+    mbm_packet packet;
+    mbm_length expected;
+    uint16_t length;
+
+    (void)state;
+    OK(mbm_packet_parse(MBM_PACKET_REQUEST, pdu, 5, NULL, 0, &packet));
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_parse(MBM_PACKET_REQUEST, NULL, 5, NULL, 0, &packet));
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_parse(MBM_PACKET_REQUEST, pdu, 5, NULL, 1, &packet));
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_parse(MBM_PACKET_REQUEST, pdu, 5, NULL, 0, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_parse(MBM_PACKET_EXCEPTION, pdu, 5, NULL, 0, &packet));
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_build(NULL, NULL, 0, pdu, 8, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_build(&packet, NULL, 1, pdu, 8, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_build(&packet, NULL, 0, NULL, 8, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_build(&packet, NULL, 0, pdu, 8, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_expectedLength(3, pdu, 1, NULL, 0, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_expectedLength(0, NULL, 1, NULL, 0, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_expectedLength(0, pdu, 1, NULL, 0, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_replyLength(NULL, NULL, 0, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_replyLength(&packet, NULL, 0, NULL));
+    packet.function = 0x41;
+    packet.dataLength = 1;
+    packet.data = NULL;
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_build(&packet, NULL, 0, pdu, 8, &length));
+}
+
+static void data_that_lie_in_the_buffer_to_be_written_are_an_invalid_argument(void **state)
+{
+    uint8_t pdu[8] = {0x41, 1, 2};
+    mbm_packet packet;
+    uint16_t length;
+
+    (void)state;
+    OK(mbm_packet_parse(MBM_PACKET_REQUEST, pdu, 3, NULL, 0, &packet));
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_build(&packet, NULL, 0, pdu, 8, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_packet_build(&packet, NULL, 0, pdu + 2, 6, &length));
+    OK(mbm_packet_build(&packet, NULL, 0, pdu + 3, 5, &length));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_example_is_parsed_to_what_it_says),
+        cmocka_unit_test(every_example_is_built_byte_for_byte),
+        cmocka_unit_test(every_sub_function_of_08_is_built_and_parsed),
+        cmocka_unit_test(a_pdu_cut_short_is_parsed_right_or_refused),
+        cmocka_unit_test(a_pdu_with_one_byte_changed_is_parsed_right_or_refused),
+        cmocka_unit_test(a_byte_too_many_is_refused_unless_the_frame_ends_the_pdu),
+        cmocka_unit_test(a_packet_that_cannot_be_is_not_built),
+        cmocka_unit_test(the_first_bytes_tell_how_long_a_pdu_is),
+        cmocka_unit_test(a_request_tells_how_long_its_response_is),
+        cmocka_unit_test(a_declared_function_keeps_its_length),
+        cmocka_unit_test(a_declaration_that_cannot_be_is_an_invalid_argument),
+        cmocka_unit_test(null_is_an_invalid_argument),
+        cmocka_unit_test(data_that_lie_in_the_buffer_to_be_written_are_an_invalid_argument),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,194 @@
+//! The groups that the data of some functions consist of, one at a time: file
+//! records of 14 and 15, objects of a device identification.
+
+use super::Side;
+use crate::bytes::{Reader, Writer};
+use crate::error::Status;
+use crate::pdu::files::WRITE_FILE_RECORD;
+use crate::pdu::files::{Reads, Record, Records, Writes, READ_FILE_RECORD, REFERENCE_TYPE};
+
+/// Names no record: the responses of 14 carry data only.
+const NOWHERE: Record = Record {
+    file: 0,
+    record: 0,
+    length: 0,
+};
+
+/// The first record in the data of 14 or 15, its data, and its bytes in all.
+/// The requests of 14 carry none of the data, and the responses nothing else.
+pub fn record(side: Side, function: u8, groups: &[u8]) -> Option<(Record, &[u8], usize)> {
+    match (function, side) {
+        (READ_FILE_RECORD, Side::Request) => {
+            let record = Reads::new(groups).ok()?.iter().next()?;
+            Some((record, &[], 7))
+        }
+        (READ_FILE_RECORD, Side::Response) => {
+            let data = Records::new(groups).ok()?.iter().next()?;
+            let length = (data.len() / 2) as u16;
+            Some((Record { length, ..NOWHERE }, data, 2 + data.len()))
+        }
+        (WRITE_FILE_RECORD, _) => {
+            let (record, data) = Writes::new(groups).ok()?.iter().next()?;
+            Some((record, data, 7 + data.len()))
+        }
+        _ => None,
+    }
+}
+
+/// Writes a record as [`record`] reads it; returns its bytes in all.
+///
+/// # Errors
+/// [`Status::ILLEGAL_FUNCTION`] for other functions; what a request or response
+/// of this record alone would be refused with; [`Status::BUFFER_TOO_SMALL`].
+pub fn put_record(
+    side: Side,
+    function: u8,
+    head: Record,
+    data: &[u8],
+    place: &mut [u8],
+) -> Result<usize, Status> {
+    let mut writer = Writer::new(place);
+    let is_read = function == READ_FILE_RECORD;
+    if !is_read && function != WRITE_FILE_RECORD {
+        return Err(Status::ILLEGAL_FUNCTION);
+    }
+    if is_read && side == Side::Response {
+        // What does not fit a byte is no group, as is found below.
+        writer.u8(data.len().saturating_add(1).min(0xFF) as u8);
+        writer.u8(REFERENCE_TYPE);
+    } else {
+        writer.u8(REFERENCE_TYPE);
+        writer.u16(head.file);
+        writer.u16(head.record);
+        writer.u16(head.length);
+    }
+    writer.put(data);
+    let length = writer.finish()?;
+    let group = place.get(..length).unwrap_or_default();
+    match (is_read, side) {
+        (true, Side::Request) => Reads::new(group).map(|_| ()),
+        (true, Side::Response) => Records::new(group).map(|_| ()),
+        (false, _) => Writes::new(group).map(|_| ()),
+    }?;
+    Ok(length)
+}
+
+/// The first object in a device identification: id, value, and its bytes in all.
+pub fn object(groups: &[u8]) -> Option<(u8, &[u8], usize)> {
+    let mut reader = Reader::new(groups);
+    let (id, length) = (reader.u8()?, usize::from(reader.u8()?));
+    Some((id, reader.take(length)?, 2 + length))
+}
+
+/// Writes an object as [`object`] reads it; returns its bytes in all.
+///
+/// # Errors
+/// [`Status::ILLEGAL_DATA_VALUE`] for more than 255 bytes;
+/// [`Status::BUFFER_TOO_SMALL`].
+pub fn put_object(id: u8, value: &[u8], place: &mut [u8]) -> Result<usize, Status> {
+    if value.len() > 0xFF {
+        return Err(Status::ILLEGAL_DATA_VALUE);
+    }
+    let mut writer = Writer::new(place);
+    writer.u8(id);
+    writer.counted(value);
+    writer.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn records_are_written_as_they_are_read() {
+        let place = Record {
+            file: 4,
+            record: 7,
+            length: 2,
+        };
+        let data = [0x06, 0xAF, 0x04, 0xBE];
+        for (side, function, head, data) in [
+            (Side::Request, 0x14, place, &data[..0]),
+            (
+                Side::Response,
+                0x14,
+                Record {
+                    length: 2,
+                    ..NOWHERE
+                },
+                &data,
+            ),
+            (Side::Request, 0x15, place, &data),
+            (Side::Response, 0x15, place, &data),
+        ] {
+            let mut bytes = [0; 11];
+            let length = put_record(side, function, head, data, &mut bytes).unwrap();
+            let found = record(side, function, &bytes[..length]);
+            assert_eq!(found, Some((head, data, length)));
+            let short = put_record(side, function, head, data, &mut bytes[..length - 1]);
+            assert_eq!(short, Err(Status::BUFFER_TOO_SMALL));
+        }
+    }
+
+    #[test]
+    fn a_record_that_cannot_be_is_not_written() {
+        let mut bytes = [0; 600];
+        let head = |file, length| Record {
+            file,
+            record: 0,
+            length,
+        };
+        for (side, function, head, count, status) in [
+            (
+                Side::Request,
+                0x14,
+                head(0, 1),
+                0,
+                Status::ILLEGAL_DATA_ADDRESS,
+            ),
+            (
+                Side::Request,
+                0x14,
+                head(1, 0),
+                0,
+                Status::ILLEGAL_DATA_VALUE,
+            ),
+            (
+                Side::Request,
+                0x15,
+                head(1, 2),
+                2,
+                Status::ILLEGAL_DATA_VALUE,
+            ),
+            (
+                Side::Request,
+                0x15,
+                head(1, 250),
+                500,
+                Status::ILLEGAL_DATA_VALUE,
+            ),
+            (Side::Response, 0x14, NOWHERE, 3, Status::ILLEGAL_DATA_VALUE),
+            (
+                Side::Response,
+                0x14,
+                NOWHERE,
+                510,
+                Status::ILLEGAL_DATA_VALUE,
+            ),
+            (Side::Request, 0x18, head(1, 1), 0, Status::ILLEGAL_FUNCTION),
+        ] {
+            let found = put_record(side, function, head, &[0; 510][..count], &mut bytes);
+            assert_eq!(found, Err(status));
+        }
+    }
+
+    #[test]
+    fn an_object_is_written_as_it_is_read() {
+        let mut bytes = [0; 5];
+        assert_eq!(put_object(1, b"mbm", &mut bytes), Ok(5));
+        assert_eq!(object(&bytes), Some((1, &b"mbm"[..], 5)));
+        assert_eq!(object(&bytes[..4]), None);
+        let short = put_object(1, b"mbms", &mut bytes);
+        assert_eq!(short, Err(Status::BUFFER_TOO_SMALL));
+    }
+}

@@ -1,0 +1,367 @@
+//! Nothing malformed is ever sent, and what does not fit is said.
+
+#[path = "common/vectors.rs"]
+mod vectors;
+
+use mbm::error::Status;
+use mbm::pdu::files::{Reads, Records, Writes};
+use mbm::pdu::identification::Objects;
+use mbm::pdu::request::Request;
+use mbm::pdu::response::Response;
+use vectors::{right_pdus, Direction};
+
+/// Room for more than any PDU.
+const ROOM: usize = 1000;
+
+fn refused(request: Request, status: Status) {
+    let emitted = request.emit(&mut [0; ROOM]);
+    assert_eq!(emitted, Err(status), "{request:?}");
+}
+
+fn response_refused(response: Response, status: Status) {
+    let emitted = response.emit(&mut [0; ROOM]);
+    assert_eq!(emitted, Err(status), "{response:?}");
+}
+
+#[test]
+fn every_buffer_too_small_is_said_and_the_right_one_suffices() {
+    for vector in right_pdus() {
+        let needed = vector.bytes.len();
+        for size in 0..=needed {
+            let mut buffer = vec![0; size];
+            let emitted = match vector.direction {
+                Direction::Request => Request::parse(&vector.bytes).unwrap().emit(&mut buffer),
+                Direction::Response => Response::parse(&vector.bytes).unwrap().emit(&mut buffer),
+            };
+            let expected = match size == needed {
+                true => Ok(needed),
+                false => Err(Status::BUFFER_TOO_SMALL),
+            };
+            assert_eq!(emitted, expected, "{} into {size}", vector.name);
+        }
+    }
+}
+
+#[test]
+fn bytes_behind_an_emitted_pdu_stay() {
+    for vector in right_pdus() {
+        let mut buffer = [0xA5; ROOM];
+        let emitted = match vector.direction {
+            Direction::Request => Request::parse(&vector.bytes).unwrap().emit(&mut buffer),
+            Direction::Response => Response::parse(&vector.bytes).unwrap().emit(&mut buffer),
+        };
+        assert_eq!(emitted, Ok(vector.bytes.len()));
+        assert!(buffer[vector.bytes.len()..]
+            .iter()
+            .all(|byte| *byte == 0xA5));
+    }
+}
+
+#[test]
+fn reads_of_no_or_too_many_items_are_not_sent() {
+    for (functions, most) in [([1, 2], 2000), ([3, 4], 125)] {
+        for function in functions {
+            for (address, quantity, status) in [
+                (0, 0, Status::ILLEGAL_DATA_VALUE),
+                (0, most + 1, Status::ILLEGAL_DATA_VALUE),
+                (0xFFFF, 0xFFFF, Status::ILLEGAL_DATA_VALUE),
+                (0xFFFF, 2, Status::ILLEGAL_DATA_ADDRESS),
+            ] {
+                let read = if most == 2000 {
+                    Request::ReadBits {
+                        function,
+                        address,
+                        quantity,
+                    }
+                } else {
+                    Request::ReadRegisters {
+                        function,
+                        address,
+                        quantity,
+                    }
+                };
+                refused(read, status);
+            }
+        }
+    }
+}
+
+#[test]
+fn writes_whose_data_are_not_what_the_quantity_says_are_not_sent() {
+    let data = [0; 300];
+    for (quantity, length) in [(0, 0), (1, 0), (1, 1), (1, 3), (2, 2), (124, 248)] {
+        let write = Request::WriteMultipleRegisters {
+            address: 0,
+            quantity,
+            data: &data[..length],
+        };
+        refused(write, Status::ILLEGAL_DATA_VALUE);
+        let both = Request::ReadWriteMultipleRegisters {
+            read_address: 0,
+            read_quantity: 1,
+            write_address: 0,
+            write_quantity: quantity,
+            data: &data[..length],
+        };
+        refused(both, Status::ILLEGAL_DATA_VALUE);
+    }
+    for (quantity, length) in [(0, 0), (1, 0), (1, 2), (9, 1), (1969, 247), (8, 257)] {
+        let write = Request::WriteMultipleCoils {
+            address: 0,
+            quantity,
+            data: &data[..length],
+        };
+        refused(write, Status::ILLEGAL_DATA_VALUE);
+    }
+}
+
+#[test]
+fn a_variant_with_the_function_of_another_is_not_sent() {
+    for function in 0..=255u8 {
+        let bits = Request::ReadBits {
+            function,
+            address: 0,
+            quantity: 1,
+        };
+        let registers = Request::ReadRegisters {
+            function,
+            address: 0,
+            quantity: 1,
+        };
+        let custom = Request::Custom {
+            function,
+            data: &[0, 0, 0, 1],
+        };
+        let sent = |request: Request| request.emit(&mut [0; ROOM]).is_ok();
+        assert_eq!(sent(bits), matches!(function, 1 | 2));
+        assert_eq!(sent(registers), matches!(function, 3 | 4));
+        let free = (1..0x80).contains(&function) && !mbm::pdu::is_public(function);
+        assert_eq!(sent(custom), free);
+
+        let bits = Response::ReadBits {
+            function,
+            data: &[0, 0],
+        };
+        let registers = Response::ReadRegisters {
+            function,
+            data: &[0, 0],
+        };
+        let wrote = Response::WriteMultiple {
+            function,
+            address: 0,
+            quantity: 1,
+        };
+        let custom = Response::Custom {
+            function,
+            data: &[],
+        };
+        let exception = Response::Exception { function, code: 1 };
+        let sent = |response: Response| response.emit(&mut [0; ROOM]).is_ok();
+        assert_eq!(sent(bits), matches!(function, 1 | 2));
+        assert_eq!(sent(registers), matches!(function, 3 | 4 | 0x17));
+        assert_eq!(sent(wrote), matches!(function, 0x0F | 0x10));
+        assert_eq!(sent(custom), free);
+        assert_eq!(sent(exception), function < 0x80);
+    }
+}
+
+#[test]
+fn device_identification_is_not_sent_as_an_interface_of_any_type() {
+    let (mei_type, data) = (0x0E, &[1, 0][..]);
+    let asked = Request::EncapsulatedInterface { mei_type, data };
+    refused(asked, Status::ILLEGAL_FUNCTION);
+    let data = &[1, 1, 0, 0, 0];
+    let answer = Response::EncapsulatedInterface { mei_type, data };
+    response_refused(answer, Status::INVALID_FUNCTION);
+    let data = &[];
+    let answer = Response::EncapsulatedInterface { mei_type, data };
+    response_refused(answer, Status::MALFORMED_REPLY);
+}
+
+#[test]
+fn reserved_sub_functions_and_values_are_not_sent() {
+    for sub_function in 0..=0xFFFFu16 {
+        let data = &[0, 0];
+        let known = matches!(sub_function, 0..=4 | 0x0A..=0x12 | 0x14);
+        let request = Request::Diagnostics { sub_function, data };
+        assert_eq!(request.emit(&mut [0; 8]).is_ok(), known);
+        let response = Response::Diagnostics { sub_function, data };
+        let answered = known && sub_function != 4;
+        assert_eq!(response.emit(&mut [0; 8]).is_ok(), answered);
+        let data = &[0, 0, 0, 0];
+        let request = Request::Diagnostics { sub_function, data };
+        assert_eq!(request.emit(&mut [0; 8]).is_ok(), sub_function == 0);
+    }
+    for (sub_function, data) in [(0, &[][..]), (0, &[1]), (1, &[0, 1]), (3, &[1, 1])] {
+        let request = Request::Diagnostics { sub_function, data };
+        refused(request, Status::ILLEGAL_DATA_VALUE);
+    }
+}
+
+#[test]
+fn data_longer_than_any_pdu_are_refused_whatever_the_buffer() {
+    let data = &[0; 70_000][..];
+    for length in [252, 253, 255, 256, 257, 65534, 65535, 65536, 65540] {
+        // Even and odd lengths, and those that wrap a byte or a word count.
+        let data = &data[..length];
+        let long = [
+            Request::Diagnostics {
+                sub_function: 0,
+                data,
+            },
+            Request::WriteMultipleCoils {
+                address: 0,
+                quantity: 8,
+                data,
+            },
+            Request::WriteMultipleRegisters {
+                address: 0,
+                quantity: 1,
+                data,
+            },
+            Request::EncapsulatedInterface { mei_type: 1, data },
+        ];
+        for request in long {
+            for room in [0, 253, 254, 66_000, 70_100] {
+                let emitted = request.emit(&mut vec![0; room]);
+                let expected = Err(Status::ILLEGAL_DATA_VALUE);
+                assert_eq!(emitted, expected, "{length} into {room}");
+            }
+        }
+        let long = [
+            Response::ReadBits { function: 1, data },
+            Response::ReadRegisters { function: 3, data },
+            Response::Diagnostics {
+                sub_function: 0,
+                data,
+            },
+            Response::CommEventLog {
+                status: 0,
+                events: 0,
+                messages: 0,
+                log: data,
+            },
+            Response::ServerId { count: 1, data },
+            Response::FifoQueue { data },
+            Response::EncapsulatedInterface { mei_type: 1, data },
+        ];
+        for response in long {
+            for room in [0, 253, 254, 66_000, 70_100] {
+                let emitted = response.emit(&mut vec![0; room]);
+                let expected = Err(Status::MALFORMED_REPLY);
+                assert_eq!(emitted, expected, "{length} into {room}");
+            }
+        }
+    }
+    let data = &data[..253];
+    let function = 0x41;
+    refused(
+        Request::Custom { function, data },
+        Status::ILLEGAL_DATA_VALUE,
+    );
+    let custom = Response::Custom { function, data };
+    response_refused(custom, Status::MALFORMED_REPLY);
+}
+
+#[test]
+fn an_event_log_of_more_than_64_events_is_not_sent() {
+    for events in 65..=300 {
+        let response = Response::CommEventLog {
+            status: 0,
+            events: 0,
+            messages: 0,
+            log: &vec![0; events],
+        };
+        response_refused(response, Status::MALFORMED_REPLY);
+    }
+}
+
+#[test]
+fn a_fifo_queue_of_half_a_register_or_more_than_31_is_not_sent() {
+    for length in (0..=300).filter(|length| length % 2 != 0 || *length > 62) {
+        let data = &vec![0; length];
+        response_refused(Response::FifoQueue { data }, Status::MALFORMED_REPLY);
+    }
+}
+
+#[test]
+fn read_data_of_no_or_too_many_bytes_or_odd_registers_are_not_sent() {
+    let data = [0; 260];
+    for length in 0..=251 {
+        let data = &data[..length];
+        let bits = Response::ReadBits { function: 1, data };
+        let sent = bits.emit(&mut [0; ROOM]).is_ok();
+        assert_eq!(sent, (1..=250).contains(&length), "{length}");
+        let registers = Response::ReadRegisters { function: 3, data };
+        let sent = registers.emit(&mut [0; ROOM]).is_ok();
+        assert_eq!(sent, (1..=250).contains(&length) && length % 2 == 0);
+    }
+}
+
+#[test]
+fn file_records_out_of_order_cannot_be_made() {
+    let value = Status::ILLEGAL_DATA_VALUE;
+    let address = Status::ILLEGAL_DATA_ADDRESS;
+    assert_eq!(Reads::new(&[]), Err(value));
+    assert_eq!(Reads::new(&[6, 0, 1, 0, 0, 0, 1, 6]), Err(value));
+    assert_eq!(Reads::new(&[6, 0, 1, 0, 0, 0x80, 0]), Err(value));
+    let most = [6, 0, 1, 0, 0, 0, 1].repeat(35);
+    assert!(Reads::new(&most).is_ok());
+    let more = [6, 0, 1, 0, 0, 0, 1].repeat(36);
+    assert_eq!(Reads::new(&more), Err(value));
+    assert_eq!(Reads::new(&[6, 0, 0, 0, 0, 0, 1]), Err(address));
+    assert_eq!(Writes::new(&[6, 0, 1, 0, 0, 0, 2, 1, 2]), Err(value));
+    assert_eq!(
+        Writes::new(&[6, 0, 1, 0x27, 0x10, 0, 1, 1, 2]),
+        Err(address)
+    );
+    for (records, status) in [(0x7A, Ok(())), (0x7B, Err(value))] {
+        let head = [6, 0, 1, 0, 0, 0, records];
+        let bytes = [&head[..], &vec![0; 2 * usize::from(records)]].concat();
+        assert_eq!(Writes::new(&bytes).map(drop), status);
+    }
+    assert_eq!(Records::new(&[3, 6, 1]), Err(value));
+    assert_eq!(Records::new(&[5, 6, 1, 2, 3]), Err(value));
+    assert_eq!(Records::new(&[2, 6, 1, 0]), Err(value));
+}
+
+#[test]
+fn objects_that_overrun_or_are_not_so_many_cannot_be_made() {
+    let value = Err(Status::ILLEGAL_DATA_VALUE);
+    assert_eq!(Objects::new(1, &[0, 2, 65]), value);
+    assert_eq!(Objects::new(1, &[0]), value);
+    assert_eq!(Objects::new(2, &[0, 1, 65]), value);
+    assert_eq!(Objects::new(0, &[0, 1, 65]), value);
+    assert_eq!(Objects::new(255, &[0, 0]), value);
+    assert!(Objects::new(2, &[0, 1, 65, 1, 0]).is_ok());
+}
+
+#[test]
+fn device_identification_that_contradicts_itself_is_not_sent() {
+    let objects: [&[u8]; 3] = [&[], &[0, 1, 65], &[0, 1, 65, 1, 0]];
+    for code in 0..=255 {
+        for conformity in 0..=255 {
+            for (count, bytes) in (0..).zip(objects) {
+                for (more_follows, next_object) in [(false, 0), (false, 2), (true, 2), (true, 0)] {
+                    let response = Response::DeviceIdentification {
+                        code,
+                        conformity,
+                        more_follows,
+                        next_object,
+                        objects: Objects::new(count, bytes).unwrap(),
+                    };
+                    let level = matches!(conformity & 0x7F, 1..=3);
+                    let follows = more_follows || next_object == 0;
+                    let one = code != 4 || (count == 1 && !more_follows);
+                    let right = (1..=4).contains(&code) && level && follows && one;
+                    let emitted = response.emit(&mut [0; ROOM]);
+                    let expected = match right {
+                        true => Ok(7 + bytes.len()),
+                        false => Err(Status::MALFORMED_REPLY),
+                    };
+                    assert_eq!(emitted, expected, "{response:?}");
+                }
+            }
+        }
+    }
+}
