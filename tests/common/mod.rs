@@ -2,6 +2,8 @@
 
 #[allow(dead_code)]
 pub mod device;
+#[allow(dead_code)]
+pub mod line;
 
 use mbm::frame::rtu::{self, Verdict, Wanted};
 use mbm::pdu::query::Query;
