@@ -7,6 +7,7 @@ use common::device::sealed;
 use common::line::{Line, CHARACTER, SILENCE};
 use mbm::error::Status;
 use mbm::frame::Framing;
+use mbm::server::Server;
 
 const READ: [u8; 6] = [17, 3, 0, 100, 0, 1];
 const ANSWER: [u8; 5] = [17, 3, 2, 0x10, 0];
@@ -137,6 +138,21 @@ fn a_frame_longer_than_the_buffer_is_dropped_and_the_next_is_answered() {
     let long = sealed(&vec![17; 1_000]);
     let pieces = [(0, long), (SILENCE + CHARACTER, sealed(&READ))];
     assert_eq!(rtu(&pieces), [sealed(&ANSWER)]);
+}
+
+#[test]
+fn the_longest_frame_fits_into_a_buffer_of_its_length() {
+    let tap = common::line::Tap::default();
+    let wire = tap.0.clone();
+    let mut server = Server::with_framing(Framing::Rtu, tap, [0; 256]);
+    let mut device = common::device::Device::new();
+    let query = sealed(&[&[17, 8, 0, 0][..], &[0xA5; 250]].concat());
+    wire.borrow_mut().arriving = query.iter().map(|byte| (0, *byte)).collect();
+    for now in [0, 1_000, 2_000, 3_999, 4_000, 4_001] {
+        wire.borrow_mut().now = now;
+        device.with_unit(|unit| server.serve(now, &mut [unit][..]));
+    }
+    assert_eq!(wire.borrow().sent[0], (4_000, query));
 }
 
 #[test]

@@ -89,12 +89,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// nobody saw, for poll came late, the last frame counts: one of ours that
     /// is followed by another is no longer waited for.
     fn receive_rtu(&mut self) -> Status {
-        let frame = self.lent.frame();
-        if usize::from(self.end) == frame.len() {
-            shift(frame, SLIDE);
-            self.end -= SLIDE as u16;
-            self.request.overrun = true;
-        }
+        self.make_room();
         let heard = self.hear_rtu(usize::MAX);
         if heard < 0 {
             return Status::LINK_LOST;
@@ -103,6 +98,17 @@ impl<P: Port, B: Lent> Server<P, B> {
             return Status::OK;
         }
         self.last_frame()
+    }
+
+    /// Gives up the oldest bytes of a full buffer, unless it ends with a frame.
+    fn make_room(&mut self) {
+        let frame = self.lent.frame();
+        let length = frame.len();
+        if usize::from(self.end) == length && rtu::last(frame) == length {
+            shift(frame, SLIDE);
+            self.end -= SLIDE as u16;
+            self.request.overrun = true;
+        }
     }
 
     /// Moves the last frame of what arrived to the front.
@@ -149,11 +155,7 @@ impl<P: Port, B: Lent> Server<P, B> {
                 Some((total, _)) if !self.astray => total,
                 _ => usize::MAX,
             };
-            if end == capacity {
-                shift(self.lent.frame(), SLIDE);
-                self.end -= SLIDE as u16;
-                self.request.overrun = true;
-            }
+            self.make_room();
             let heard = self.hear_rtu(until);
             if heard < 0 {
                 return Status::LINK_LOST;

@@ -190,6 +190,9 @@ impl<P: Port, B: Lent> Server<P, B> {
         let Some(room) = frame.get_mut(usize::from(self.end)..until) else {
             return 0;
         };
+        if room.is_empty() {
+            return 0;
+        }
         let heard = self.port.read(room);
         if heard > 0 {
             self.end += heard as u16;
