@@ -14,6 +14,7 @@
 // What a caller must hold is the same for every function, and stands above.
 #![allow(clippy::missing_safety_doc)]
 
+mod bits;
 mod frame;
 mod functions;
 mod limits;
@@ -21,17 +22,20 @@ mod master;
 mod packet;
 mod pointers;
 mod port;
+mod registers;
 mod ring;
 mod server;
 mod status;
 mod storage;
 
+pub use bits::*;
 pub use frame::*;
 pub use functions::*;
 pub use limits::*;
 pub use master::*;
 pub use packet::*;
 pub use port::*;
+pub use registers::*;
 pub use ring::*;
 pub use server::*;
 pub use status::*;
