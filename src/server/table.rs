@@ -42,13 +42,14 @@ impl Kind {
         self.0 <= Kind::DISCRETE_INPUTS.0
     }
 
-    /// Data bytes of so many cells.
+    /// Data bytes of so many cells, if those are no more than a request has.
     const fn bytes(self, quantity: u16) -> usize {
-        if self.is_bits() {
-            (quantity as usize + 7) / 8
+        let bytes = if self.is_bits() {
+            quantity.wrapping_add(7) >> 3
         } else {
-            quantity as usize * 2
-        }
+            quantity << 1
+        };
+        bytes as usize
     }
 }
 
