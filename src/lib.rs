@@ -44,6 +44,8 @@ pub mod transaction;
 
 /// cbindgen:ignore
 pub mod master;
+/// cbindgen:ignore
+pub mod server;
 
 #[allow(unsafe_code)]
 pub mod capi;

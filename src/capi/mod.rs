@@ -24,6 +24,7 @@ mod pointers;
 mod port;
 mod registers;
 mod ring;
+mod server;
 mod status;
 mod storage;
 
@@ -36,6 +37,7 @@ pub use packet::*;
 pub use port::*;
 pub use registers::*;
 pub use ring::*;
+pub use server::*;
 pub use status::*;
 pub use storage::*;
 
