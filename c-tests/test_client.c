@@ -13,9 +13,9 @@ enum { UNIT = 17 };
 
 static asker a;
 
-static mbm_request asked(uint8_t unit, void *reply, uint16_t bytes, const void *data)
+static mbm_clientRequest asked(uint8_t unit, void *reply, uint16_t bytes, const void *data)
 {
-    mbm_request request = {0};
+    mbm_clientRequest request = {0};
 
     request.unit = unit;
     request.reply = reply;
@@ -24,7 +24,7 @@ static mbm_request asked(uint8_t unit, void *reply, uint16_t bytes, const void *
     return request;
 }
 
-static void ends(uint8_t status, mbm_request *request, uint8_t queued)
+static void ends(uint8_t status, mbm_clientRequest *request, uint8_t queued)
 {
     assert_int_equal(queued, MBM_PENDING);
     assert_int_equal(request->status, MBM_PENDING);
@@ -37,7 +37,7 @@ static void every_function_of_libmodbus(modbus_mapping_t *memory)
     uint16_t words[125], values[] = {0x1234, 0xFEDC, 7};
     uint8_t bits[250], coils[] = {0xCD, 0x01};
     mbm_client *c = &a.client;
-    mbm_request r = asked(UNIT, bits, sizeof bits, NULL);
+    mbm_clientRequest r = asked(UNIT, bits, sizeof bits, NULL);
     unsigned i;
 
     ends(MBM_OK, &r, mbm_client_readCoils(c, &r, 3, 1999));
@@ -123,7 +123,7 @@ static void every_function_over_tcp(void **state)
 
 static void sixteen_requests_are_pipelined(void **state)
 {
-    mbm_request requests[MBM_CLIENT_DEPTH + 1];
+    mbm_clientRequest requests[MBM_CLIENT_DEPTH + 1];
     uint16_t words[MBM_CLIENT_DEPTH][10];
     tcp_server s;
     unsigned i, round;
@@ -153,8 +153,7 @@ static void sixteen_requests_are_pipelined(void **state)
 
 static void a_lost_connection_is_told_and_made_anew(void **state)
 {
-    mbm_request r = asked(UNIT, NULL, 0, NULL), waiting = asked(UNIT, NULL, 0, NULL);
-    mbm_link link;
+    mbm_clientRequest r = asked(UNIT, NULL, 0, NULL), waiting = asked(UNIT, NULL, 0, NULL);
     tcp_server s;
 
     (void)state;
@@ -169,8 +168,7 @@ static void a_lost_connection_is_told_and_made_anew(void **state)
     assert_int_equal(r.status, MBM_LINK_LOST);
     assert_int_equal(waiting.status, MBM_LINK_LOST);
     assert_false(mbm_client_isConnected(&a.client));
-    link = mbm_tcp_link(&a.tcp);
-    IS(MBM_PENDING, mbm_client_reconnect(&a.client, &link));
+    IS(MBM_PENDING, mbm_client_reconnect(&a.client, &a.link));
     ends(MBM_OK, &r, mbm_client_readHoldingRegisters(&a.client, &r, 0, 1));
     mbm_tcp_close(&a.tcp);
     tcp_server_stop(&s);
@@ -180,7 +178,7 @@ static unsigned called;
 static uint8_t polled_inside;
 
 /* Queues itself again, thrice, and tries what is refused. */
-static void again(void *context, mbm_request *request)
+static void again(void *context, mbm_clientRequest *request)
 {
     assert_ptr_equal(context, &a);
     assert_int_equal(request->status, MBM_OK);
@@ -191,7 +189,7 @@ static void again(void *context, mbm_request *request)
 
 static void a_callback_may_queue_and_may_not_poll(void **state)
 {
-    mbm_request r = asked(UNIT, NULL, 0, NULL);
+    mbm_clientRequest r = asked(UNIT, NULL, 0, NULL);
     tcp_server s;
 
     (void)state;
@@ -214,7 +212,7 @@ static void the_facade_uses_the_line_between_the_clients_requests(void **state)
     uint16_t words[4], more[4], none[1];
     uint8_t frame[64];
     mbm_master node;
-    mbm_request r = asked(UNIT, words, sizeof words, NULL);
+    mbm_clientRequest r = asked(UNIT, words, sizeof words, NULL);
     server s;
 
     (void)state;
@@ -251,7 +249,7 @@ static void bad_calls_are_refused_with_a_status(void **state)
 {
     static mbm_client fresh;
     uint16_t words[2];
-    mbm_request r = asked(UNIT, words, sizeof words, NULL), other;
+    mbm_clientRequest r = asked(UNIT, words, sizeof words, NULL), other;
     mbm_port nothing = {0};
     mbm_client *c = &a.client;
     server s;
@@ -305,8 +303,8 @@ static void bad_calls_are_refused_with_a_status(void **state)
 
 static void a_broadcast_reaches_and_a_rest_is_kept(void **state)
 {
-    mbm_unit units[1] = {{0}};
-    mbm_request r = asked(0, NULL, 0, NULL);
+    mbm_clientUnit units[1] = {{0}};
+    mbm_clientRequest r = asked(0, NULL, 0, NULL);
     uint32_t begun;
     server s;
 

@@ -23,7 +23,7 @@ static int16_t read_or_die(void *context, uint8_t *bytes, uint16_t capacity)
 static char transact(asker *a, const fault *f, unsigned number, uint8_t *status)
 {
     uint16_t words[FAULT_REGISTERS];
-    mbm_request request = {0};
+    mbm_clientRequest request = {0};
     unsigned i;
 
     request.unit = FAULT_UNIT;

@@ -196,7 +196,7 @@ static void *run_device(void *argument)
 /* --- the client */
 
 typedef struct job {
-    mbm_request request;
+    mbm_clientRequest request;
     uint16_t words[QUANTITY];
     unsigned pending;
 } job;
@@ -208,7 +208,7 @@ static unsigned seed = 4711;
 
 static void ask(job *j);
 
-static void done(void *context, mbm_request *request)
+static void done(void *context, mbm_clientRequest *request)
 {
     job *j = (job *)context;
     unsigned i, wrong = 0;
@@ -252,7 +252,6 @@ static void every_request_ends_once_and_with_its_own_data(void **state)
     static device d;
     unsigned long reconnected = 0;
     uint16_t port;
-    mbm_link link;
     unsigned i;
 
     (void)state;
@@ -262,22 +261,16 @@ static void every_request_ends_once_and_with_its_own_data(void **state)
     d.random = 1;
     assert_int_equal(pthread_create(&d.thread, NULL, run_device, &d), 0);
     asker_begin_tcp(&a, port);
-    link = mbm_tcp_link(&a.tcp);
     OK(mbm_client_setResponseTimeout(&a.client, TIMEOUT));
     OK(mbm_client_setRetries(&a.client, 1));
     for (i = 0; i < MBM_CLIENT_DEPTH && queued < total; i++)
         ask(&jobs[i]);
     while (mbm_client_poll(&a.client) == MBM_PENDING) {
-        uint32_t delay = mbm_client_pollDelay(&a.client);
-        struct timespec time = {(time_t)(delay / 1000000u), (long)(delay % 1000000u) * 1000};
-        struct pollfd line = {a.tcp.fd, POLLIN, 0};
-
         if (!mbm_client_isConnected(&a.client)) {
             reconnected++;
-            IS(MBM_PENDING, mbm_client_reconnect(&a.client, &link));
+            IS(MBM_PENDING, mbm_client_reconnect(&a.client, &a.link));
         } else {
-            line.events = (short)(POLLIN | (a.tcp.connecting ? POLLOUT : 0));
-            ppoll(&line, 1, &time, NULL);
+            asker_rest(&a);
         }
     }
     printf("%lu right, %lu exceptions, %lu failed, %lu reconnected, %u foreign, %u timeouts, "

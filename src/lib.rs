@@ -46,6 +46,8 @@ pub mod transaction;
 pub mod client;
 /// cbindgen:ignore
 pub mod master;
+/// cbindgen:ignore
+pub mod server;
 
 #[allow(unsafe_code)]
 pub mod capi;

@@ -22,15 +22,18 @@ macro_rules! probes {
 
 fn probes() -> Vec<(String, u64)> {
     probes! {
-        sizes: mbm_port mbm_counters mbm_master mbm_registers mbm_ring mbm_rule mbm_function mbm_length
-            mbm_packet mbm_record mbm_object mbm_framing mbm_client mbm_request mbm_unit mbm_link;
+        sizes: mbm_port mbm_counters mbm_master mbm_registers mbm_ring mbm_rule mbm_function
+            mbm_length mbm_packet mbm_record mbm_object mbm_framing mbm_server mbm_unit
+            mbm_service mbm_registerTable mbm_bitTable mbm_cells mbm_file mbm_files mbm_fifo
+            mbm_fifos mbm_exceptionStatus mbm_serverId mbm_identification mbm_request mbm_custom
+            mbm_switches mbm_diagnostics mbm_client mbm_clientRequest mbm_clientUnit mbm_link;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
             mbm_counters { requests replies exceptions badCrc timeouts foreignFrames
                 resynchronisations bytesSent bytesReceived }
-            mbm_request { done context data reply replyBytes transaction unit status exception
+            mbm_clientRequest { done context data reply replyBytes transaction unit status exception
                 length }
-            mbm_unit { requests replies exceptions retries delay unit status }
+            mbm_clientUnit { requests replies exceptions retries delay unit status }
             mbm_link { context disconnect connect }
             mbm_rule { kind bytes more }
             mbm_function { code request response }
@@ -42,7 +45,25 @@ fn probes() -> Vec<(String, u64)> {
             mbm_record { data file record length }
             mbm_object { data length id }
             mbm_framing { functions functionCount kind end }
-            mbm_registers { data first count kind order };
+            mbm_registers { data first count kind order }
+            mbm_service { next serve }
+            mbm_unit { services monitor diagnostics id }
+            mbm_registerTable { service words valid before after context base size kind }
+            mbm_bitTable { service bits valid before after context base size kind }
+            mbm_cells { service context isValid get set before after }
+            mbm_file { records size number }
+            mbm_files { service files count before after context }
+            mbm_fifo { words address count }
+            mbm_fifos { service fifos count }
+            mbm_exceptionStatus { service outputs }
+            mbm_serverId { service id additional idLength additionalLength running }
+            mbm_identification { service objects count }
+            mbm_request { data length unit function }
+            mbm_custom { service serve context code length }
+            mbm_switches { service off }
+            mbm_diagnostics { service restart context diagnosticRegister busMessages
+                busCommunicationErrors exceptionErrors serverMessages noResponses naks busy
+                characterOverruns events listenOnly hidden };
         constants:
             MBM_OK MBM_ILLEGAL_FUNCTION MBM_ILLEGAL_DATA_ADDRESS MBM_ILLEGAL_DATA_VALUE
             MBM_SLAVE_DEVICE_FAILURE MBM_ACKNOWLEDGE MBM_SLAVE_DEVICE_BUSY
@@ -59,9 +80,10 @@ fn probes() -> Vec<(String, u64)> {
             MBM_FC_READ_COILS MBM_FC_READ_DISCRETE_INPUTS MBM_FC_READ_HOLDING_REGISTERS
             MBM_FC_READ_INPUT_REGISTERS MBM_FC_WRITE_SINGLE_COIL MBM_FC_WRITE_SINGLE_REGISTER
             MBM_FC_READ_EXCEPTION_STATUS MBM_FC_DIAGNOSTICS MBM_FC_GET_COMM_EVENT_COUNTER
-            MBM_FC_GET_COMM_EVENT_LOG MBM_FC_WRITE_MULTIPLE_COILS MBM_FC_WRITE_MULTIPLE_REGISTERS
-            MBM_FC_REPORT_SERVER_ID MBM_FC_READ_FILE_RECORD MBM_FC_WRITE_FILE_RECORD
-            MBM_FC_MASK_WRITE_REGISTER MBM_FC_READ_WRITE_MULTIPLE_REGISTERS MBM_FC_READ_FIFO_QUEUE
+            MBM_FC_GET_COMM_EVENT_LOG MBM_FC_WRITE_MULTIPLE_COILS
+            MBM_FC_WRITE_MULTIPLE_REGISTERS MBM_FC_REPORT_SERVER_ID MBM_FC_READ_FILE_RECORD
+            MBM_FC_WRITE_FILE_RECORD MBM_FC_MASK_WRITE_REGISTER
+            MBM_FC_READ_WRITE_MULTIPLE_REGISTERS MBM_FC_READ_FIFO_QUEUE
             MBM_FC_ENCAPSULATED_INTERFACE MBM_DIAGNOSTICS_RETURN_QUERY_DATA
             MBM_DIAGNOSTICS_RESTART_COMMUNICATIONS MBM_DIAGNOSTICS_RETURN_DIAGNOSTIC_REGISTER
             MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY
@@ -74,12 +96,12 @@ fn probes() -> Vec<(String, u64)> {
             MBM_MEI_READ_DEVICE_IDENTIFICATION MBM_DEVICE_ID_BASIC MBM_DEVICE_ID_REGULAR
             MBM_DEVICE_ID_EXTENDED MBM_DEVICE_ID_INDIVIDUAL MBM_RULE_SILENCE MBM_RULE_FIXED
             MBM_RULE_COUNTED MBM_PACKET_REQUEST MBM_PACKET_RESPONSE MBM_PACKET_EXCEPTION
-            MBM_MAX_PDU MBM_LENGTH_EXACT MBM_LENGTH_AT_LEAST MBM_LENGTH_SILENCE MBM_LENGTH_UNKNOWN
-            MBM_FRAMING_RTU MBM_FRAMING_ASCII MBM_FRAMING_TCP MBM_FRAMING_RTU_OVER_TCP
-            MBM_MAX_TCP_FRAME MBM_MAX_ASCII_FRAME
-            MBM_ORDER_DEFAULT MBM_ORDER_ABCD MBM_ORDER_CDAB MBM_ORDER_BADC MBM_ORDER_DCBA
-            MBM_REGISTERS_OF_WORDS MBM_REGISTERS_OF_BYTES MBM_REGISTERS_INTO_WORDS
-            MBM_REGISTERS_INTO_BYTES;
+            MBM_MAX_PDU MBM_LENGTH_EXACT MBM_LENGTH_AT_LEAST MBM_LENGTH_SILENCE
+            MBM_LENGTH_UNKNOWN MBM_FRAMING_RTU MBM_FRAMING_ASCII MBM_FRAMING_TCP
+            MBM_FRAMING_RTU_OVER_TCP MBM_MAX_TCP_FRAME MBM_MAX_ASCII_FRAME MBM_ORDER_DEFAULT
+            MBM_ORDER_ABCD MBM_ORDER_CDAB MBM_ORDER_BADC MBM_ORDER_DCBA MBM_REGISTERS_OF_WORDS
+            MBM_REGISTERS_OF_BYTES MBM_REGISTERS_INTO_WORDS MBM_REGISTERS_INTO_BYTES
+            MBM_REPLY_EXCEPTION MBM_REPLY_NONE MBM_REPLY_PENDING;
     }
 }
 

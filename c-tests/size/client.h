@@ -10,7 +10,7 @@
 #else
 #include "size.h"
 static mbm_client client;
-static mbm_request request;
+static mbm_clientRequest request;
 #endif
 
 static mbm_port port;

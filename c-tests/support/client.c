@@ -18,7 +18,10 @@ static void begin_tcp(asker *a, uint16_t port)
     memset(a, 0, sizeof *a);
     snprintf(a->service, sizeof a->service, "%u", port);
     assert_int_equal(mbm_tcp_open(&a->tcp, "127.0.0.1", a->service), 0);
-    a->port = mbm_tcp_port(&a->tcp);
+    a->port = mbm_tcp_port(&a->tcp, NULL);
+    a->link.context = &a->tcp;
+    a->link.connect = mbm_tcp_connect;
+    a->link.disconnect = mbm_tcp_disconnect;
 }
 
 void asker_begin_rtu(asker *a, int fd)
@@ -52,23 +55,23 @@ void asker_begin_rtu_over_tcp(asker *a, uint16_t port)
 }
 
 /* Sleeps until bytes arrive or the client has something else to do. */
-static void rest(asker *a)
+void asker_rest(asker *a)
 {
     uint32_t delay = mbm_client_pollDelay(&a->client);
     struct timespec time = {(time_t)(delay / 1000000u), (long)(delay % 1000000u) * 1000};
-    struct pollfd line = {a->tcp.host ? a->tcp.fd : a->tty.fd, POLLIN, 0};
+    struct pollfd line = {a->service[0] ? a->tcp.fd : a->tty.fd, POLLIN, 0};
 
-    if (a->tcp.host)
-        line.events = (short)(POLLIN | (mbm_tcp_is_connecting(&a->tcp) ? POLLOUT : 0));
+    if (a->service[0] && mbm_tcp_isConnected(&a->tcp) == 0)
+        line.events |= POLLOUT;
     ppoll(&line, 1, &time, NULL);
 }
 
-uint8_t asker_wait(asker *a, const mbm_request *request)
+uint8_t asker_wait(asker *a, const mbm_clientRequest *request)
 {
     while (request->status == MBM_PENDING) {
         (void)mbm_client_poll(&a->client);
         if (request->status == MBM_PENDING)
-            rest(a);
+            asker_rest(a);
     }
     return request->status;
 }
@@ -76,5 +79,5 @@ uint8_t asker_wait(asker *a, const mbm_request *request)
 void asker_wait_all(asker *a)
 {
     while (mbm_client_poll(&a->client) == MBM_PENDING)
-        rest(a);
+        asker_rest(a);
 }

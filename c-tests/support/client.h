@@ -10,6 +10,7 @@ typedef struct asker {
     mbm_port port;
     mbm_tty tty;
     mbm_tcp tcp;
+    mbm_link link;
     mbm_counters counters;
     char service[8];
     uint8_t incoming[1024], outgoing[1024];
@@ -23,8 +24,11 @@ void asker_begin_ascii(asker *a, int fd);
 void asker_begin_tcp(asker *a, uint16_t port);
 void asker_begin_rtu_over_tcp(asker *a, uint16_t port);
 
+/* Sleeps until bytes arrive or the client has something else to do. */
+void asker_rest(asker *a);
+
 /* Polls, and sleeps between, until a request or all of them have ended. */
-uint8_t asker_wait(asker *a, const mbm_request *request);
+uint8_t asker_wait(asker *a, const mbm_clientRequest *request);
 void asker_wait_all(asker *a);
 
 #endif

@@ -26,6 +26,7 @@ mod pointers;
 mod port;
 mod registers;
 mod ring;
+mod server;
 mod status;
 mod storage;
 
@@ -39,6 +40,7 @@ pub use packet::*;
 pub use port::*;
 pub use registers::*;
 pub use ring::*;
+pub use server::*;
 pub use status::*;
 pub use storage::*;
 

@@ -8,7 +8,7 @@ mod settings;
 
 pub use begin::*;
 pub use line::*;
-pub use request::mbm_request;
+pub use request::mbm_clientRequest;
 pub use requests::*;
 pub use settings::*;
 
@@ -348,7 +348,7 @@ pub unsafe extern "C" fn mbm_client_pending(client: *const mbm_client) -> u8 {
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_cancel(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {

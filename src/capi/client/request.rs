@@ -13,10 +13,10 @@ use core::ptr::NonNull;
 /// machine's byte order where a function transfers registers; where it transfers
 /// coils or bytes, they are bytes as on the wire, of coils the lowest bit first.
 #[repr(C)]
-pub struct mbm_request {
+pub struct mbm_clientRequest {
     /// Optional: called by mbm_client_poll when the request has ended. It may
     /// queue requests, this one too, and cancel others.
-    pub done: Option<unsafe extern "C" fn(context: *mut c_void, request: *mut mbm_request)>,
+    pub done: Option<unsafe extern "C" fn(context: *mut c_void, request: *mut mbm_clientRequest)>,
     /// Handed to `done`. Yours, may be NULL.
     pub context: *mut c_void,
     /// What functions that write send.
@@ -41,10 +41,10 @@ pub struct mbm_request {
     words: [u32; 8],
 }
 
-/// What lies behind an `mbm_request`.
+/// What lies behind an `mbm_clientRequest`.
 #[repr(C)]
 pub(super) struct Inside {
-    done: Option<unsafe extern "C" fn(context: *mut c_void, request: *mut mbm_request)>,
+    done: Option<unsafe extern "C" fn(context: *mut c_void, request: *mut mbm_clientRequest)>,
     context: *mut c_void,
     pub(super) data: *const u8,
     pub(super) reply: *mut u8,
@@ -53,15 +53,15 @@ pub(super) struct Inside {
 
 const _: () = {
     const TICKET: usize = offset_of!(Inside, ticket);
-    assert!(size_of::<Inside>() <= size_of::<mbm_request>());
-    assert!(align_of::<Inside>() <= align_of::<mbm_request>());
-    assert!(size_of::<mbm_request>() - size_of::<Inside>() <= 4);
-    assert!(offset_of!(mbm_request, replyBytes) == TICKET + offset_of!(Ticket, capacity));
-    assert!(offset_of!(mbm_request, transaction) == TICKET + offset_of!(Ticket, transaction));
-    assert!(offset_of!(mbm_request, unit) == TICKET + offset_of!(Ticket, unit));
-    assert!(offset_of!(mbm_request, status) == TICKET + offset_of!(Ticket, status));
-    assert!(offset_of!(mbm_request, exception) == TICKET + offset_of!(Ticket, exception));
-    assert!(offset_of!(mbm_request, length) == TICKET + offset_of!(Ticket, length));
+    assert!(size_of::<Inside>() <= size_of::<mbm_clientRequest>());
+    assert!(align_of::<Inside>() <= align_of::<mbm_clientRequest>());
+    assert!(size_of::<mbm_clientRequest>() - size_of::<Inside>() <= 4);
+    assert!(offset_of!(mbm_clientRequest, replyBytes) == TICKET + offset_of!(Ticket, capacity));
+    assert!(offset_of!(mbm_clientRequest, transaction) == TICKET + offset_of!(Ticket, transaction));
+    assert!(offset_of!(mbm_clientRequest, unit) == TICKET + offset_of!(Ticket, unit));
+    assert!(offset_of!(mbm_clientRequest, status) == TICKET + offset_of!(Ticket, status));
+    assert!(offset_of!(mbm_clientRequest, exception) == TICKET + offset_of!(Ticket, exception));
+    assert!(offset_of!(mbm_clientRequest, length) == TICKET + offset_of!(Ticket, length));
 };
 
 /// A request that C lends until it has ended.
@@ -74,7 +74,7 @@ impl Lent {
     /// # Safety
     /// It is NULL, or points to a request that is zeroed or was used before, and
     /// stays valid for as long as it is pending.
-    pub(super) unsafe fn new(request: *mut mbm_request) -> Option<Self> {
+    pub(super) unsafe fn new(request: *mut mbm_clientRequest) -> Option<Self> {
         NonNull::new(request.cast()).map(Lent)
     }
 

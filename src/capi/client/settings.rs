@@ -26,7 +26,7 @@ const _: () = {
 /// What is kept for one unit, in an array of yours for mbm_client_setUnits. The
 /// counts are yours to read and to zero; each wraps at 2^32.
 #[repr(C)]
-pub struct mbm_unit {
+pub struct mbm_clientUnit {
     /// Requests that ended, retries apart.
     pub requests: u32,
     /// Of these, those that were answered, exceptions included.
@@ -50,11 +50,11 @@ pub struct mbm_unit {
 
 const _: () = {
     use core::mem::offset_of;
-    assert!(size_of::<mbm_unit>() == size_of::<Unit>());
-    assert!(align_of::<mbm_unit>() == align_of::<Unit>());
-    assert!(offset_of!(mbm_unit, delay) == offset_of!(Unit, delay));
-    assert!(offset_of!(mbm_unit, unit) == offset_of!(Unit, unit));
-    assert!(offset_of!(mbm_unit, status) == offset_of!(Unit, status));
+    assert!(size_of::<mbm_clientUnit>() == size_of::<Unit>());
+    assert!(align_of::<mbm_clientUnit>() == align_of::<Unit>());
+    assert!(offset_of!(mbm_clientUnit, delay) == offset_of!(Unit, delay));
+    assert!(offset_of!(mbm_clientUnit, unit) == offset_of!(Unit, unit));
+    assert!(offset_of!(mbm_clientUnit, status) == offset_of!(Unit, status));
 };
 
 /// Changes a setting.
@@ -314,7 +314,7 @@ pub unsafe extern "C" fn mbm_client_setCounters(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setUnits(
     client: *mut mbm_client,
-    units: *mut mbm_unit,
+    units: *mut mbm_clientUnit,
     count: u8,
 ) -> u8 {
     // SAFETY: as the header demands.

@@ -15,7 +15,7 @@ const LAYERS: [&[&str]; 9] = [
     &["pdu"],
     &["packet"],
     &["transaction"],
-    &["master", "client"],
+    &["master", "client", "server"],
     &["capi"],
 ];
 

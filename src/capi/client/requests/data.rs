@@ -1,7 +1,7 @@
 //! Requests for coils, discrete inputs and registers.
 
 use super::{plain, queue};
-use crate::capi::client::{mbm_client, mbm_request};
+use crate::capi::client::{mbm_client, mbm_clientRequest};
 use crate::pdu::outline::Form;
 
 /// Function 01: reads coils into `reply`, eight to a byte, the lowest bit first, the
@@ -27,7 +27,7 @@ use crate::pdu::outline::Form;
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readCoils(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     address: u16,
     quantity: u16,
 ) -> u8 {
@@ -44,7 +44,7 @@ pub unsafe extern "C" fn mbm_client_readCoils(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readSingleCoil(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     address: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
@@ -61,7 +61,7 @@ pub unsafe extern "C" fn mbm_client_readSingleCoil(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readDiscreteInputs(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     address: u16,
     quantity: u16,
 ) -> u8 {
@@ -86,7 +86,7 @@ pub unsafe extern "C" fn mbm_client_readDiscreteInputs(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readSingleDiscreteInput(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     address: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
@@ -103,7 +103,7 @@ pub unsafe extern "C" fn mbm_client_readSingleDiscreteInput(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readHoldingRegisters(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     address: u16,
     quantity: u16,
 ) -> u8 {
@@ -128,7 +128,7 @@ pub unsafe extern "C" fn mbm_client_readHoldingRegisters(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readSingleHoldingRegister(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     address: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
@@ -145,7 +145,7 @@ pub unsafe extern "C" fn mbm_client_readSingleHoldingRegister(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readInputRegisters(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     address: u16,
     quantity: u16,
 ) -> u8 {
@@ -170,7 +170,7 @@ pub unsafe extern "C" fn mbm_client_readInputRegisters(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readSingleInputRegister(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     address: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
@@ -187,7 +187,7 @@ pub unsafe extern "C" fn mbm_client_readSingleInputRegister(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_writeSingleCoil(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     address: u16,
     on: u8,
 ) -> u8 {
@@ -213,7 +213,7 @@ pub unsafe extern "C" fn mbm_client_writeSingleCoil(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_writeSingleRegister(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     address: u16,
     value: u16,
 ) -> u8 {
@@ -232,7 +232,7 @@ pub unsafe extern "C" fn mbm_client_writeSingleRegister(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_writeMultipleCoils(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     address: u16,
     quantity: u16,
 ) -> u8 {
@@ -258,7 +258,7 @@ pub unsafe extern "C" fn mbm_client_writeMultipleCoils(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_writeMultipleRegisters(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     address: u16,
     quantity: u16,
 ) -> u8 {
@@ -286,7 +286,7 @@ pub unsafe extern "C" fn mbm_client_writeMultipleRegisters(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_maskWriteRegister(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     address: u16,
     andMask: u16,
     orMask: u16,
@@ -312,7 +312,7 @@ pub unsafe extern "C" fn mbm_client_maskWriteRegister(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readWriteMultipleRegisters(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     readAddress: u16,
     readQuantity: u16,
     writeAddress: u16,

@@ -2,7 +2,7 @@
 //! user's.
 
 use super::{plain, queue};
-use crate::capi::client::{mbm_client, mbm_request};
+use crate::capi::client::{mbm_client, mbm_clientRequest};
 use crate::capi::functions::{mbm_rule, rule};
 use crate::error::Status;
 use crate::pdu::outline::Form;
@@ -15,7 +15,7 @@ use crate::pdu::outline::Form;
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readExceptionStatus(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe { plain(client, request, 0, 0, Form::READ_EXCEPTION_STATUS) }
@@ -32,7 +32,7 @@ pub unsafe extern "C" fn mbm_client_readExceptionStatus(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_diagnostics(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     subFunction: u16,
     words: u16,
 ) -> u8 {
@@ -53,7 +53,7 @@ pub unsafe extern "C" fn mbm_client_diagnostics(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_getCommEventCounter(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe { plain(client, request, 0, 0, Form::GET_COMM_EVENT_COUNTER) }
@@ -68,7 +68,7 @@ pub unsafe extern "C" fn mbm_client_getCommEventCounter(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_getCommEventLog(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe { plain(client, request, 0, 0, Form::GET_COMM_EVENT_LOG) }
@@ -82,7 +82,7 @@ pub unsafe extern "C" fn mbm_client_getCommEventLog(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_reportServerId(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe { plain(client, request, 0, 0, Form::REPORT_SERVER_ID) }
@@ -99,7 +99,7 @@ pub unsafe extern "C" fn mbm_client_reportServerId(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readFileRecord(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     file: u16,
     record: u16,
     quantity: u16,
@@ -124,7 +124,7 @@ pub unsafe extern "C" fn mbm_client_readFileRecord(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_writeFileRecord(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     file: u16,
     record: u16,
     quantity: u16,
@@ -147,7 +147,7 @@ pub unsafe extern "C" fn mbm_client_writeFileRecord(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readFileRecords(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     bytes: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
@@ -164,7 +164,7 @@ pub unsafe extern "C" fn mbm_client_readFileRecords(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_writeFileRecords(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     bytes: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
@@ -180,7 +180,7 @@ pub unsafe extern "C" fn mbm_client_writeFileRecords(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readFifoQueue(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     address: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
@@ -199,7 +199,7 @@ pub unsafe extern "C" fn mbm_client_readFifoQueue(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readDeviceIdentification(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     code: u8,
     object: u8,
 ) -> u8 {
@@ -222,7 +222,7 @@ pub unsafe extern "C" fn mbm_client_readDeviceIdentification(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_encapsulatedInterfaceTransport(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     meiType: u8,
     bytes: u16,
 ) -> u8 {
@@ -246,7 +246,7 @@ pub unsafe extern "C" fn mbm_client_encapsulatedInterfaceTransport(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_custom(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     function: u8,
     bytes: u16,
     response: *const mbm_rule,

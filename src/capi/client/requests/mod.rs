@@ -7,7 +7,7 @@ pub use data::*;
 pub use device::*;
 
 use super::request::Inside;
-use super::{mbm_client, mbm_request, pointers, Lent};
+use super::{mbm_client, mbm_clientRequest, pointers, Lent};
 use crate::error::Status;
 use crate::pdu::outline::{Form, Outline};
 
@@ -16,7 +16,7 @@ use crate::pdu::outline::{Form, Outline};
 /// # Safety
 /// As the header demands.
 #[cfg_attr(target_os = "none", inline(never))]
-unsafe fn prepare(client: *const mbm_client, request: *mut mbm_request) -> Status {
+unsafe fn prepare(client: *const mbm_client, request: *mut mbm_clientRequest) -> Status {
     // SAFETY: as the caller promises.
     unsafe {
         match pointers::check(client) {
@@ -32,7 +32,11 @@ unsafe fn prepare(client: *const mbm_client, request: *mut mbm_request) -> Statu
 /// # Safety
 /// As the header demands; the request is [`prepare`]d.
 #[cfg_attr(target_os = "none", inline(never))]
-unsafe fn submit(client: *mut mbm_client, request: *mut mbm_request, built: Status) -> Status {
+unsafe fn submit(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+    built: Status,
+) -> Status {
     // SAFETY: prepared, so a request that nobody uses.
     let inside = unsafe { &mut *request.cast::<Inside>() };
     let ticket = &mut inside.ticket;
@@ -66,7 +70,7 @@ unsafe fn submit(client: *mut mbm_client, request: *mut mbm_request, built: Stat
 #[inline(always)]
 unsafe fn queue(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     build: impl FnOnce(&mut Outline) -> Status,
 ) -> u8 {
     // SAFETY: as the caller promises.
@@ -88,7 +92,7 @@ unsafe fn queue(
 #[cfg_attr(target_os = "none", inline(never))]
 unsafe fn plain(
     client: *mut mbm_client,
-    request: *mut mbm_request,
+    request: *mut mbm_clientRequest,
     first: u16,
     second: u16,
     form: Form,
