@@ -25,14 +25,14 @@ pub fn write(buffer: &mut [u8], unit: u8, length: usize, pdu: impl FnOnce(&mut [
     let Some(frame) = buffer.get_mut(..length + OVERHEAD) else {
         return false;
     };
-    let Some((content, crc)) = frame.split_last_chunk_mut() else {
+    let [content @ .., low, high] = frame else {
         return false;
     };
     if let Some((first, rest)) = content.split_first_mut() {
         *first = unit;
         pdu(rest);
     }
-    *crc = crc16(content).to_bytes();
+    [*low, *high] = crc16(content).to_bytes();
     true
 }
 
