@@ -44,6 +44,37 @@ static void every_example_is_built_byte_for_byte(void **state)
     }
 }
 
+static void every_sub_function_of_08_is_built_and_parsed(void **state)
+{
+    static const uint8_t zero[2];
+    uint8_t pdu[5];
+    unsigned sub_function, known = 0;
+
+    (void)state;
+    for (sub_function = 0; sub_function < 0x200; sub_function++) {
+        mbm_packet packet = {.function = MBM_FC_DIAGNOSTICS, .data = zero, .dataLength = 2}, found;
+        uint16_t length;
+        uint8_t status;
+
+        packet.subFunction = (uint16_t)sub_function;
+        status = mbm_packet_build(&packet, NULL, 0, pdu, sizeof pdu, &length);
+        if (status == MBM_OK) {
+            OK(mbm_packet_parse(MBM_PACKET_REQUEST, pdu, length, NULL, 0, &found));
+            assert_same_packet(&found, &packet);
+            known++;
+        } else {
+            assert_int_equal(status, MBM_ILLEGAL_FUNCTION);
+        }
+        packet.kind = MBM_PACKET_RESPONSE;
+        /* Nothing answers Force Listen Only Mode. */
+        IS(status == MBM_OK && sub_function != MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY
+               ? MBM_OK
+               : MBM_MALFORMED_REPLY,
+           mbm_packet_build(&packet, NULL, 0, pdu, sizeof pdu, &length));
+    }
+    assert_int_equal(known, 15);
+}
+
 /* Parsed right, so that building gives the same bytes, or refused with a status
  * that such a PDU has. */
 static unsigned parsed_right(uint8_t side, const uint8_t *pdu, uint16_t length)
@@ -148,7 +179,7 @@ static void a_packet_that_cannot_be_is_not_built(void **state)
         {MBM_ILLEGAL_DATA_VALUE, {.function = 0x10, .quantity = 2, .dataLength = 4 + 256}},
         {MBM_ILLEGAL_DATA_VALUE, {.function = 0x10, .quantity = 125, .dataLength = 250}},
         {MBM_ILLEGAL_DATA_VALUE, {.function = 0x14, .dataLength = 0}},
-        {MBM_ILLEGAL_DATA_ADDRESS, {.function = 0x14, .dataLength = 7}},
+        {MBM_ILLEGAL_DATA_VALUE, {.function = 0x14, .dataLength = 7}},
         {MBM_ILLEGAL_DATA_VALUE, {.function = 0x15, .dataLength = 600}},
         {MBM_ILLEGAL_DATA_VALUE, {.function = 0x17, .quantity = 1, .writeQuantity = 0}},
         {MBM_ILLEGAL_DATA_VALUE, {.function = 0x2B, .meiType = 0x0E, .readDeviceIdCode = 5}},
@@ -370,6 +401,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_example_is_parsed_to_what_it_says),
         cmocka_unit_test(every_example_is_built_byte_for_byte),
+        cmocka_unit_test(every_sub_function_of_08_is_built_and_parsed),
         cmocka_unit_test(a_pdu_cut_short_is_parsed_right_or_refused),
         cmocka_unit_test(a_pdu_with_one_byte_changed_is_parsed_right_or_refused),
         cmocka_unit_test(a_byte_too_many_is_refused_unless_the_frame_ends_the_pdu),

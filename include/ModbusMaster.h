@@ -30,6 +30,7 @@
 
 #include "ModbusMasterBoards.h"
 #include "ModbusMasterConstants.h"
+#include "ModbusMasterValues.h"
 #include "mbm.h"
 
 /** @cond the macros are explained at the head of the file */
@@ -79,7 +80,7 @@
  * an object from one thread, never from an interrupt. Idle callbacks may call
  * other objects; on their own object requests are answered with ku8MBBusy.
  */
-class ModbusMaster : public ModbusMasterStatics<void> {
+class ModbusMaster : public ModbusMasterStatics<void>, public ModbusMasterValues<ModbusMaster> {
 public:
     /** Slave 1; begin(baud) opens Serial. Touches neither clock nor port. */
     ModbusMaster() : state() { lendBuffers(); }
@@ -359,6 +360,8 @@ private:
         void (*function)(void *);
         void *context;
     };
+
+    friend class ModbusMasterValues<ModbusMaster>;
 
     struct State {
         // What the hooks use comes first, within AVR's short displacements.

@@ -25,6 +25,12 @@
 /** Bytes of a frame buffer for any request and reply of so many words. */
 #define MBM_FRAME_BYTES(words) (2u * (words) + 13u)
 
+#if defined(__AVR__) && __SIZEOF_DOUBLE__ != 4
+/* The archive has a double of 32 bits: what calls these must not link. */
+#define mbm_registers_getDouble mbm_registers_getDouble_wants_mdouble_32
+#define mbm_registers_setDouble mbm_registers_setDouble_wants_mdouble_32
+#endif
+
 /**
  * Serial line, binary, CRC-16 (serial line guide V1.02, 2.5.1).
  */
@@ -339,6 +345,52 @@
  * Nobody knows this function; declare it. `bytes` is 0.
  */
 #define MBM_LENGTH_UNKNOWN 3
+
+/**
+ * The order of the registers that a function is given; in these, MBM_ORDER_ABCD.
+ */
+#define MBM_ORDER_DEFAULT 0
+
+/**
+ * High word first, high byte first: what most devices do. A is the most
+ * significant byte; 2923517522, which is 0xAE415652, arrives as AE41 5652.
+ */
+#define MBM_ORDER_ABCD 1
+
+/**
+ * Low word first, high byte first: 5652 AE41.
+ */
+#define MBM_ORDER_CDAB 2
+
+/**
+ * High word first, low byte first: 41AE 5256.
+ */
+#define MBM_ORDER_BADC 3
+
+/**
+ * Low word first, low byte first: 5256 41AE.
+ */
+#define MBM_ORDER_DCBA 4
+
+/**
+ * mbm_registers.kind: words to read, as those of mbm_master.
+ */
+#define MBM_REGISTERS_OF_WORDS 1
+
+/**
+ * mbm_registers.kind: bytes to read, high byte first.
+ */
+#define MBM_REGISTERS_OF_BYTES 2
+
+/**
+ * mbm_registers.kind: words to write and to read.
+ */
+#define MBM_REGISTERS_INTO_WORDS 3
+
+/**
+ * mbm_registers.kind: bytes to write and to read, high byte first.
+ */
+#define MBM_REGISTERS_INTO_BYTES 4
 
 /**
  * The call succeeded.
@@ -674,7 +726,7 @@ typedef struct mbm_packet {
      */
     uint8_t moreFollows;
     /**
-     * 2B/0E: the object to ask for next.
+     * 2B/0E: the object to ask for next; 0 if none follows.
      */
     uint8_t nextObjectId;
     /**
@@ -710,11 +762,11 @@ typedef struct mbm_master {
     /**
      * Not for you.
      */
-    void *pointers[20];
+    void *pointers[21];
     /**
      * Not for you.
      */
-    uint32_t words[20];
+    uint32_t words[19];
 } mbm_master;
 
 /**
@@ -810,6 +862,38 @@ typedef struct mbm_counters {
 } mbm_counters;
 
 /**
+ * Registers in a row, seen as values by the addresses that the device gives
+ * them. It owns nothing: what `data` points to is the caller's.
+ *
+ * One of the functions mbm_registers_of... and mbm_registers_into... fills it
+ * in, as do mbm_master_getResponseRegisters and mbm_master_getTransmitRegisters;
+ * each field may be set by hand too. Functions that get or set do not change
+ * it, so any thread may use it beside others that only get.
+ */
+typedef struct mbm_registers {
+    /**
+     * The words or bytes, as `kind` says. NULL: none, MBM_NOT_INITIALISED.
+     */
+    const void *data;
+    /**
+     * The device's address of the first register.
+     */
+    uint16_t first;
+    /**
+     * How many registers there are; `first + count` is 65536 at most.
+     */
+    uint16_t count;
+    /**
+     * One of MBM_REGISTERS_...
+     */
+    uint8_t kind;
+    /**
+     * One of MBM_ORDER_..., for calls that say MBM_ORDER_DEFAULT.
+     */
+    uint8_t order;
+} mbm_registers;
+
+/**
  * Registers of a file: a sub-request of 14 or 15, or what answers it.
  */
 typedef struct mbm_record {
@@ -877,6 +961,139 @@ typedef struct mbm_ring {
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
+
+/**
+ * Packs coils for a write, the first into the lowest bit of the first byte (V1.1b3,
+ * 6.11); unused bits of the last byte become 0, bytes behind it stay.
+ *
+ * @param coils     a byte a coil: 0 is off, anything else is on
+ * @param quantity  how many coils, 0 to 65535
+ * @param bytes     gets the bits, 8 a byte
+ * @param length    how many bytes there are
+ * @return MBM_OK, or with nothing packed MBM_BUFFER_TOO_SMALL or
+ *         MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_bits_pack(const uint8_t *coils,
+                      uint16_t quantity,
+                      uint8_t *bytes,
+                      uint16_t length);
+
+/**
+ * Unpacks the coils or discrete inputs of a read (V1.1b3, 6.1).
+ *
+ * @param bytes     the bits, 8 a byte, the first coil the lowest
+ * @param length    how many bytes there are
+ * @param coils     gets 0 or 1 a coil
+ * @param quantity  how many coils, 0 to 65535
+ * @return MBM_OK, or with nothing unpacked MBM_ILLEGAL_DATA_ADDRESS if there are
+ *         not so many bits, MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_bits_unpack(const uint8_t *bytes,
+                        uint16_t length,
+                        uint8_t *coils,
+                        uint16_t quantity);
+
+/**
+ * Whether a coil or discrete input is set, by the device's address.
+ *
+ * @param bytes     the bits of a read, 8 a byte, the first coil the lowest
+ * @param first     the address of the first coil
+ * @param quantity  how many coils were read; `bytes` has room for so many
+ * @param address   the coil
+ * @param on        gets 0 or 1
+ * @return MBM_OK, or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS for a coil that
+ *         is not among them or a range that passes 65535, MBM_INVALID_ARGUMENT
+ *         for a NULL pointer
+ */
+uint8_t mbm_bits_isSet(const uint8_t *bytes,
+                       uint16_t first,
+                       uint16_t quantity,
+                       uint16_t address,
+                       uint8_t *on);
+
+/**
+ * Sets a coil for a write, by the device's address; the others stay.
+ *
+ * @param bytes     the bits of a write, 8 a byte, the first coil the lowest
+ * @param first     the address of the first coil
+ * @param quantity  how many coils are written; `bytes` has room for so many
+ * @param address   the coil
+ * @param on        0 is off, anything else is on
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a coil that is
+ *         not among them or a range that passes 65535, MBM_INVALID_ARGUMENT for
+ *         a NULL pointer
+ */
+uint8_t mbm_bits_set(uint8_t *bytes,
+                     uint16_t first,
+                     uint16_t quantity,
+                     uint16_t address,
+                     uint8_t on);
+
+/**
+ * As mbm_bits_pack, into words such as mbm_master's transmit words, 16 to a word.
+ *
+ * @param coils     a byte a coil: 0 is off, anything else is on
+ * @param quantity  how many coils, 0 to 65535
+ * @param words     gets the bits, 16 a word
+ * @param length    how many words there are
+ * @return MBM_OK, or with nothing packed MBM_BUFFER_TOO_SMALL or
+ *         MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_bits_packWords(const uint8_t *coils,
+                           uint16_t quantity,
+                           uint16_t *words,
+                           uint16_t length);
+
+/**
+ * As mbm_bits_unpack, of words such as mbm_master's response words.
+ *
+ * @param words     the bits, 16 a word, the first coil the lowest
+ * @param length    how many words there are
+ * @param coils     gets 0 or 1 a coil
+ * @param quantity  how many coils, 0 to 65535
+ * @return MBM_OK, or with nothing unpacked MBM_ILLEGAL_DATA_ADDRESS if there are
+ *         not so many bits, MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_bits_unpackWords(const uint16_t *words,
+                             uint16_t length,
+                             uint8_t *coils,
+                             uint16_t quantity);
+
+/**
+ * As mbm_bits_isSet, in words such as mbm_master's response words.
+ *
+ * @param words     the bits of a read, 16 a word, the first coil the lowest
+ * @param first     the address of the first coil
+ * @param quantity  how many coils were read; `words` has room for so many
+ * @param address   the coil
+ * @param on        gets 0 or 1
+ * @return MBM_OK, or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS for a coil that
+ *         is not among them or a range that passes 65535, MBM_INVALID_ARGUMENT
+ *         for a NULL pointer
+ */
+uint8_t mbm_bits_isSetInWords(const uint16_t *words,
+                              uint16_t first,
+                              uint16_t quantity,
+                              uint16_t address,
+                              uint8_t *on);
+
+/**
+ * As mbm_bits_set, in words such as mbm_master's transmit words.
+ *
+ * @param words     the bits of a write, 16 a word, the first coil the lowest
+ * @param first     the address of the first coil
+ * @param quantity  how many coils are written; `words` has room for so many
+ * @param address   the coil
+ * @param on        0 is off, anything else is on
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a coil that is
+ *         not among them or a range that passes 65535, MBM_INVALID_ARGUMENT for
+ *         a NULL pointer
+ */
+uint8_t mbm_bits_setInWords(uint16_t *words,
+                            uint16_t first,
+                            uint16_t quantity,
+                            uint16_t address,
+                            uint8_t on);
 
 /**
  * Writes the frame of a packet: request, response or exception. Nothing
@@ -1448,6 +1665,48 @@ uint8_t mbm_master_setCounters(struct mbm_master *master, struct mbm_counters *c
 uint8_t mbm_master_lineUsed(struct mbm_master *master);
 
 /**
+ * Sets the order of values in the views that mbm_master_getResponseRegisters
+ * and mbm_master_getTransmitRegisters give from now on.
+ *
+ * @param master  the object
+ * @param order   one of MBM_ORDER_...; MBM_ORDER_ABCD at first
+ * @return MBM_OK, MBM_INVALID_ARGUMENT, also for another order, or
+ *         MBM_NOT_INITIALISED
+ */
+uint8_t mbm_master_setWordOrder(struct mbm_master *master, uint8_t order);
+
+/**
+ * Sees the response words as registers to get values from. Copies nothing: it
+ * sees what a later read puts there.
+ *
+ * All words of the buffer are there, those too that the last read did not
+ * reach; look at values only once it has succeeded.
+ *
+ * @param master     the object; its buffers stay as they are while the view is used
+ * @param first      the device's address of word 0: that of the read, or 0 to
+ *                   count from word 0
+ * @param registers  the view to fill in
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_master_getResponseRegisters(const struct mbm_master *master,
+                                        uint16_t first,
+                                        struct mbm_registers *registers);
+
+/**
+ * Sees the transmit words as registers to set values in, for the functions
+ * that write. The queue of send does not move.
+ *
+ * @param master     the object; its buffers stay as they are while the view is used
+ * @param first      the device's address of word 0: that of the write, or 0 to
+ *                   count from word 0
+ * @param registers  the view to fill in
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_master_getTransmitRegisters(const struct mbm_master *master,
+                                        uint16_t first,
+                                        struct mbm_registers *registers);
+
+/**
  * A word of the last successful read.
  *
  * @param master  the object
@@ -1703,6 +1962,490 @@ uint8_t mbm_packet_addObject(struct mbm_packet *packet,
                              uint8_t *storage,
                              uint16_t capacity,
                              const struct mbm_object *object);
+
+/**
+ * Sees words that were read as registers, in order MBM_ORDER_ABCD until
+ * `registers->order` is set. Copies nothing: it sees what the words are then.
+ *
+ * @param registers  the view to fill in
+ * @param words      words as mbm_master's response words; valid while it is used
+ * @param count      how many words
+ * @param first      the device's address of the first, 0 to 65535
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if they pass address 65535, or
+ *         MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_registers_ofWords(struct mbm_registers *registers,
+                              const uint16_t *words,
+                              uint16_t count,
+                              uint16_t first);
+
+/**
+ * As mbm_registers_ofWords, of the data bytes of a reply or a request.
+ *
+ * @param registers  the view to fill in
+ * @param bytes      register bytes, each high byte first (V1.1b3, 4.2); valid
+ *                   while it is used
+ * @param length     how many bytes, an even number
+ * @param first      the device's address of the first register, 0 to 65535
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if they pass address 65535, or
+ *         MBM_INVALID_ARGUMENT for a NULL pointer or odd bytes
+ */
+uint8_t mbm_registers_ofBytes(struct mbm_registers *registers,
+                              const uint8_t *bytes,
+                              uint16_t length,
+                              uint16_t first);
+
+/**
+ * As mbm_registers_ofWords, of words that are also written, such as
+ * mbm_master's transmit words.
+ *
+ * @param registers  the view to fill in
+ * @param words      words to write; valid while it is used
+ * @param count      how many words
+ * @param first      the device's address of the first, 0 to 65535
+ * @return as mbm_registers_ofWords
+ */
+uint8_t mbm_registers_intoWords(struct mbm_registers *registers,
+                                uint16_t *words,
+                                uint16_t count,
+                                uint16_t first);
+
+/**
+ * As mbm_registers_ofBytes, of bytes that are also written.
+ *
+ * @param registers  the view to fill in
+ * @param bytes      register bytes to write; valid while it is used
+ * @param length     how many bytes, an even number
+ * @param first      the device's address of the first register, 0 to 65535
+ * @return as mbm_registers_ofBytes
+ */
+uint8_t mbm_registers_intoBytes(struct mbm_registers *registers,
+                                uint8_t *bytes,
+                                uint16_t length,
+                                uint16_t first);
+
+/**
+ * One bit of a register.
+ *
+ * @param registers  the registers
+ * @param address    the register, by the device's address
+ * @param bit        0, the least significant, to 15
+ * @param on         gets 0 or 1
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for a register that is not there,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `on` unchanged
+ */
+uint8_t mbm_registers_getBit(const struct mbm_registers *registers,
+                             uint16_t address,
+                             uint8_t bit,
+                             uint8_t *on);
+
+/**
+ * One byte of a register, 0 to 255.
+ *
+ * @param registers  the registers
+ * @param address    the register, by the device's address
+ * @param high       0 for the low byte, anything else for the high byte, which
+ *                   travels first
+ * @param value      gets the byte
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for a register that is not there,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ */
+uint8_t mbm_registers_getUint8(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t high,
+                               uint8_t *value);
+
+/**
+ * As mbm_registers_getUint8, -128 to 127.
+ *
+ * @param registers  the registers
+ * @param address    the register, by the device's address
+ * @param high       0 for the low byte, anything else for the high byte
+ * @param value      gets the byte
+ * @return as mbm_registers_getUint8
+ */
+uint8_t mbm_registers_getInt8(const struct mbm_registers *registers,
+                              uint16_t address,
+                              uint8_t high,
+                              int8_t *value);
+
+/**
+ * A number of one register, 0 to 65535. Of the order only the bytes matter.
+ *
+ * @param registers  the registers
+ * @param address    the register, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      gets the number
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for a register that is not there,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ */
+uint8_t mbm_registers_getUint16(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                uint16_t *value);
+
+/**
+ * As mbm_registers_getUint16, -32768 to 32767.
+ *
+ * @param registers  the registers
+ * @param address    the register, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      gets the number
+ * @return as mbm_registers_getUint16
+ */
+uint8_t mbm_registers_getInt16(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               int16_t *value);
+
+/**
+ * A number of two registers, 0 to 4294967295.
+ *
+ * @param registers  the registers
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      gets the number
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for two registers that are not both there,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ */
+uint8_t mbm_registers_getUint32(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                uint32_t *value);
+
+/**
+ * As mbm_registers_getUint32, two's complement.
+ *
+ * @param registers  the registers
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      gets the number
+ * @return as mbm_registers_getUint32
+ */
+uint8_t mbm_registers_getInt32(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               int32_t *value);
+
+/**
+ * A number of four registers.
+ *
+ * @param registers  the registers
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      gets the number
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for four registers that are not all there,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ */
+uint8_t mbm_registers_getUint64(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                uint64_t *value);
+
+/**
+ * As mbm_registers_getUint64, two's complement.
+ *
+ * @param registers  the registers
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      gets the number
+ * @return as mbm_registers_getUint64
+ */
+uint8_t mbm_registers_getInt64(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               int64_t *value);
+
+/**
+ * A float of two registers, an IEEE 754 binary32. Its bits are copied, those
+ * of what is not a number too.
+ *
+ * @param registers  the registers
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      gets the number
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for two registers that are not both there,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ */
+uint8_t mbm_registers_getFloat(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               float *value);
+
+/**
+ * A double of four registers, an IEEE 754 binary64. Its bits are copied; on AVR,
+ * where C's double has 32 bits (-mdouble=32), it is rounded to the nearest.
+ *
+ * @param registers  the registers
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      gets the number
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for four registers that are not all there,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ */
+uint8_t mbm_registers_getDouble(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                double *value);
+
+/**
+ * A text, which ends at its first NUL or with its field.
+ *
+ * Its registers follow each other in every order. In one with the low byte
+ * first, the first of two characters is a register's low byte. Characters are
+ * copied as they are, ASCII or not.
+ *
+ * @param registers  the registers
+ * @param address    the first of its registers, by the device's address
+ * @param length     bytes of its field, two a register; an odd one ends with a
+ *                   register's first character
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param text       gets the text and a NUL
+ * @param capacity   bytes of `text`; `length + 1` are always enough
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the field is not all there,
+ *         MBM_BUFFER_TOO_SMALL, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED,
+ *         with `text` unchanged
+ */
+uint8_t mbm_registers_getString(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint16_t length,
+                                uint8_t order,
+                                char *text,
+                                uint16_t capacity);
+
+/**
+ * Raw bytes as they travel, high byte first in every order.
+ *
+ * @param registers  the registers
+ * @param address    the register whose high byte is the first, by the device's
+ *                   address
+ * @param bytes      gets the bytes; must not overlap the registers
+ * @param length     how many bytes, two a register; may be odd
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if they are not all there,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `bytes` unchanged
+ */
+uint8_t mbm_registers_getBytes(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t *bytes,
+                               uint16_t length);
+
+/**
+ * Whether registers hold these raw bytes, high byte first in every order.
+ *
+ * @param registers  the registers
+ * @param address    the register whose high byte is the first, by the device's
+ *                   address
+ * @param bytes      the bytes to compare with
+ * @param length     how many bytes, two a register; may be odd
+ * @param equal      gets 0 or 1
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if there are not so many,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `equal` unchanged
+ */
+uint8_t mbm_registers_isEqual(const struct mbm_registers *registers,
+                              uint16_t address,
+                              const uint8_t *bytes,
+                              uint16_t length,
+                              uint8_t *equal);
+
+/**
+ * Sets one bit of a register; the others stay.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the register, by the device's address
+ * @param bit        0, the least significant, to 15
+ * @param on         0 is off, anything else is on
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a register that
+ *         is not there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setBit(const struct mbm_registers *registers,
+                             uint16_t address,
+                             uint8_t bit,
+                             uint8_t on);
+
+/**
+ * Sets one byte of a register; the other stays.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the register, by the device's address
+ * @param high       0 for the low byte, anything else for the high byte, which
+ *                   travels first
+ * @param value      the byte
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a register that
+ *         is not there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setUint8(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t high,
+                               uint8_t value);
+
+/**
+ * As mbm_registers_setUint8, -128 to 127.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the register, by the device's address
+ * @param high       0 for the low byte, anything else for the high byte
+ * @param value      the byte
+ * @return as mbm_registers_setUint8
+ */
+uint8_t mbm_registers_setInt8(const struct mbm_registers *registers,
+                              uint16_t address,
+                              uint8_t high,
+                              int8_t value);
+
+/**
+ * Sets a number of one register. Of the order only the bytes matter.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the register, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      the number
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a register
+ *         that is not there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setUint16(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                uint16_t value);
+
+/**
+ * As mbm_registers_setUint16, -32768 to 32767.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the register, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      the number
+ * @return as mbm_registers_setUint16
+ */
+uint8_t mbm_registers_setInt16(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               int16_t value);
+
+/**
+ * Sets a number of two registers.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      the number
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for two registers
+ *         that are not both there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setUint32(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                uint32_t value);
+
+/**
+ * As mbm_registers_setUint32, two's complement.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      the number
+ * @return as mbm_registers_setUint32
+ */
+uint8_t mbm_registers_setInt32(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               int32_t value);
+
+/**
+ * Sets a number of four registers.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      points to the number
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for four registers
+ *         that are not all there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setUint64(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                const uint64_t *value);
+
+/**
+ * As mbm_registers_setUint64, two's complement.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      points to the number
+ * @return as mbm_registers_setUint64
+ */
+uint8_t mbm_registers_setInt64(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               const int64_t *value);
+
+/**
+ * Sets a float of two registers, an IEEE 754 binary32. Its bits are copied.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      points to the number
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for two registers
+ *         that are not both there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setFloat(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               const float *value);
+
+/**
+ * Sets a double of four registers, an IEEE 754 binary64. On AVR, where C's
+ * double has 32 bits (-mdouble=32), to the value that it has there.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the first of its registers, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param value      points to the number
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for four registers
+ *         that are not all there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setDouble(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint8_t order,
+                                const double *value);
+
+/**
+ * Fills a field with a text and NULs behind it, laid out as
+ * mbm_registers_getString reads it.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the first of its registers, by the device's address
+ * @param length     bytes of the field, two a register; if it is odd, the byte
+ *                   behind the field becomes 0 too
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param text       ends with a NUL, which needs no room in the field
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS if the field is not
+ *         all there, MBM_BUFFER_TOO_SMALL for a text longer than the field,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setString(const struct mbm_registers *registers,
+                                uint16_t address,
+                                uint16_t length,
+                                uint8_t order,
+                                const char *text);
+
+/**
+ * Sets raw bytes as they travel, high byte first in every order.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the register whose high byte is the first, by the device's
+ *                   address
+ * @param bytes      the bytes; must not overlap the registers
+ * @param length     how many bytes, two a register; if odd, the low byte of the
+ *                   last register stays
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS if there are not so
+ *         many registers, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
+                               uint16_t address,
+                               const uint8_t *bytes,
+                               uint16_t length);
 
 /**
  * Makes a ring of your bytes, empty. Neither side may use it meanwhile.

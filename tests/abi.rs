@@ -22,7 +22,7 @@ macro_rules! probes {
 
 fn probes() -> Vec<(String, u64)> {
     probes! {
-        sizes: mbm_port mbm_counters mbm_master mbm_ring mbm_rule mbm_function mbm_length
+        sizes: mbm_port mbm_counters mbm_master mbm_registers mbm_ring mbm_rule mbm_function mbm_length
             mbm_packet mbm_record mbm_object mbm_framing;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
@@ -37,7 +37,8 @@ fn probes() -> Vec<(String, u64)> {
                 conformity moreFollows nextObjectId objectCount }
             mbm_record { data file record length }
             mbm_object { data length id }
-            mbm_framing { functions functionCount kind end };
+            mbm_framing { functions functionCount kind end }
+            mbm_registers { data first count kind order };
         constants:
             MBM_OK MBM_ILLEGAL_FUNCTION MBM_ILLEGAL_DATA_ADDRESS MBM_ILLEGAL_DATA_VALUE
             MBM_SLAVE_DEVICE_FAILURE MBM_ACKNOWLEDGE MBM_SLAVE_DEVICE_BUSY
@@ -69,7 +70,10 @@ fn probes() -> Vec<(String, u64)> {
             MBM_RULE_COUNTED MBM_PACKET_REQUEST MBM_PACKET_RESPONSE MBM_PACKET_EXCEPTION
             MBM_MAX_PDU MBM_LENGTH_EXACT MBM_LENGTH_AT_LEAST MBM_LENGTH_SILENCE MBM_LENGTH_UNKNOWN
             MBM_FRAMING_RTU MBM_FRAMING_ASCII MBM_FRAMING_TCP MBM_FRAMING_RTU_OVER_TCP
-            MBM_MAX_TCP_FRAME MBM_MAX_ASCII_FRAME;
+            MBM_MAX_TCP_FRAME MBM_MAX_ASCII_FRAME
+            MBM_ORDER_DEFAULT MBM_ORDER_ABCD MBM_ORDER_CDAB MBM_ORDER_BADC MBM_ORDER_DCBA
+            MBM_REGISTERS_OF_WORDS MBM_REGISTERS_OF_BYTES MBM_REGISTERS_INTO_WORDS
+            MBM_REGISTERS_INTO_BYTES;
     }
 }
 

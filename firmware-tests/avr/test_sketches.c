@@ -312,6 +312,18 @@ static void an_energy_meters_floats_are_read(void **state)
     energy_meter(&mega);
 }
 
+static void values_pass_between_sketch_and_archive(void **state)
+{
+    board *b = start(&uno, "Values");
+    paper printed = {""};
+
+    (void)state;
+    board_uart(b, '0', print, &printed);
+    assert_true(board_run(b, 100 * MS));
+    assert_string_equal(printed.text, "none\r\n");
+    board_free(b);
+}
+
 static void basic(const kind *k)
 {
     board *b = start(k, "Basic");
@@ -483,6 +495,7 @@ int main(void)
         cmocka_unit_test(several_slaves_are_told_apart),
         cmocka_unit_test(without_waiting_the_led_blinks_on),
         cmocka_unit_test(an_energy_meters_floats_are_read),
+        cmocka_unit_test(values_pass_between_sketch_and_archive),
         cmocka_unit_test(basic_counts_in_the_server),
         cmocka_unit_test(phoenix_contact_makes_its_calls),
         cmocka_unit_test(a_bus_on_two_pins_works),

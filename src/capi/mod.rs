@@ -14,6 +14,7 @@
 // What a caller must hold is the same for every function, and stands above.
 #![allow(clippy::missing_safety_doc)]
 
+mod bits;
 mod frame;
 mod functions;
 mod limits;
@@ -21,16 +22,19 @@ mod master;
 mod packet;
 mod pointers;
 mod port;
+mod registers;
 mod ring;
 mod status;
 mod storage;
 
+pub use bits::*;
 pub use frame::*;
 pub use functions::*;
 pub use limits::*;
 pub use master::*;
 pub use packet::*;
 pub use port::*;
+pub use registers::*;
 pub use ring::*;
 pub use status::*;
 pub use storage::*;

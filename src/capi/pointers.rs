@@ -185,3 +185,66 @@ pub(super) unsafe fn ask<T>(
         }
     }
 }
+
+/// Puts what `find` gives where C wants it, and nothing if it gives a status.
+///
+/// # Safety
+/// `place` is NULL or points to a `T`.
+pub(super) unsafe fn put_found<T>(
+    place: *mut T,
+    find: impl FnOnce() -> Result<T, Status>,
+) -> Result<(), Status> {
+    if place.is_null() {
+        return Err(Status::INVALID_ARGUMENT);
+    }
+    let found = find()?;
+    // SAFETY: not NULL, so room for it.
+    unsafe { place.write(found) };
+    Ok(())
+}
+
+/// An array of C; NULL is one of no items alone.
+///
+/// # Safety
+/// `items` is NULL or points to `count` items that nobody writes meanwhile.
+pub(super) unsafe fn slice<'a, T>(items: *const T, count: usize) -> Result<&'a [T], Status> {
+    match (items.is_null(), count) {
+        (_, 0) => Ok(&[]),
+        (true, _) => Err(Status::INVALID_ARGUMENT),
+        // SAFETY: not NULL, so an array.
+        (false, _) => Ok(unsafe { from_raw_parts(items, count) }),
+    }
+}
+
+/// As [`slice`], to write.
+///
+/// # Safety
+/// As for [`slice`], and nobody else reads them meanwhile.
+pub(super) unsafe fn slice_mut<'a, T>(items: *mut T, count: usize) -> Result<&'a mut [T], Status> {
+    match (items.is_null(), count) {
+        (_, 0) => Ok(&mut []),
+        (true, _) => Err(Status::INVALID_ARGUMENT),
+        // SAFETY: not NULL, so an array.
+        (false, _) => Ok(unsafe { from_raw_parts_mut(items, count) }),
+    }
+}
+
+/// The characters of a C string, without its NUL.
+///
+/// Looks at no more than `most` and one: of a longer string it gives so many.
+///
+/// # Safety
+/// `text` is NULL or points to characters that a NUL ends.
+pub(super) unsafe fn text<'a>(text: *const u8, most: usize) -> Result<&'a [u8], Status> {
+    if text.is_null() {
+        return Err(Status::INVALID_ARGUMENT);
+    }
+    let mut count = 0;
+    // SAFETY: nothing behind the NUL is looked at.
+    unsafe {
+        while count <= most && *text.add(count) != 0 {
+            count += 1;
+        }
+        slice(text, count)
+    }
+}

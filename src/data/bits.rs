@@ -1,6 +1,8 @@
 //! Coils and discrete inputs: packed, least significant bit first, so 16 of
 //! them fill a word low byte first.
 
+use crate::error::Status;
+
 /// Writes the bits of `words` as data bytes, the unused ones of the last byte
 /// zero; bytes for which there is no word stay.
 pub fn send(bytes: &mut [u8], words: &[u16], quantity: u8) {
@@ -34,6 +36,126 @@ const fn mask(used: u8) -> u16 {
     }
 }
 
+/// What holds packed bits: a data byte, or a word as the facade keeps them.
+pub trait Packed: Copy {
+    /// How many bits it holds.
+    const BITS: usize;
+    /// None of them set.
+    const ZERO: Self;
+
+    /// Whether one is set, 0 the least significant.
+    fn bit(self, bit: usize) -> bool;
+
+    /// The same with one of them as told.
+    fn with_bit(self, bit: usize, on: bool) -> Self;
+}
+
+macro_rules! packed {
+    ($($unit:ident)*) => {
+        $(impl Packed for $unit {
+            const BITS: usize = $unit::BITS as usize;
+            const ZERO: Self = 0;
+
+            fn bit(self, bit: usize) -> bool {
+                self >> (bit % <Self as Packed>::BITS) & 1 != 0
+            }
+
+            fn with_bit(self, bit: usize, on: bool) -> Self {
+                let mask = 1 << (bit % <Self as Packed>::BITS);
+                if on {
+                    self | mask
+                } else {
+                    self & !mask
+                }
+            }
+        })*
+    };
+}
+
+packed!(u8 u16);
+
+/// Packs bits from the front of `units` on, the unused ones of the last unit
+/// zero. Units behind that stay.
+///
+/// # Errors
+/// [`Status::BUFFER_TOO_SMALL`], with nothing packed.
+pub fn pack<T: Packed>(
+    units: &mut [T],
+    bits: impl ExactSizeIterator<Item = bool>,
+) -> Result<(), Status> {
+    let used = units
+        .get_mut(..bits.len().div_ceil(T::BITS))
+        .ok_or(Status::BUFFER_TOO_SMALL)?;
+    let mut bits = bits.fuse();
+    for unit in used {
+        *unit = T::ZERO;
+        for (place, on) in (0..T::BITS).zip(&mut bits) {
+            *unit = unit.with_bit(place, on);
+        }
+    }
+    Ok(())
+}
+
+/// The first `quantity` bits.
+///
+/// # Errors
+/// [`Status::ILLEGAL_DATA_ADDRESS`] if there are not so many.
+pub fn unpack<T: Packed>(
+    units: &[T],
+    quantity: usize,
+) -> Result<impl Iterator<Item = bool> + '_, Status> {
+    let used = units
+        .get(..quantity.div_ceil(T::BITS))
+        .ok_or(Status::ILLEGAL_DATA_ADDRESS)?;
+    Ok(used
+        .iter()
+        .flat_map(|unit| (0..T::BITS).map(|place| unit.bit(place)))
+        .take(quantity))
+}
+
+/// Where a coil lies among `quantity` from `first` on.
+fn place(first: u16, quantity: u16, address: u16) -> Result<usize, Status> {
+    match address.checked_sub(first) {
+        // Addresses end at 65535, so the range may not pass them.
+        Some(place) if place < quantity && quantity - 1 <= u16::MAX - first => Ok(place.into()),
+        _ => Err(Status::ILLEGAL_DATA_ADDRESS),
+    }
+}
+
+/// Whether the coil `address` is set among `quantity` from the coil `first` on.
+///
+/// # Errors
+/// [`Status::ILLEGAL_DATA_ADDRESS`]
+pub fn is_set<T: Packed>(
+    units: &[T],
+    first: u16,
+    quantity: u16,
+    address: u16,
+) -> Result<bool, Status> {
+    let place = place(first, quantity, address)?;
+    let unit = units.get(place / T::BITS);
+    Ok(unit.ok_or(Status::ILLEGAL_DATA_ADDRESS)?.bit(place))
+}
+
+/// Sets the coil `address` among `quantity` from the coil `first` on.
+///
+/// # Errors
+/// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing set.
+pub fn set<T: Packed>(
+    units: &mut [T],
+    first: u16,
+    quantity: u16,
+    address: u16,
+    on: bool,
+) -> Result<(), Status> {
+    let place = place(first, quantity, address)?;
+    let unit = units
+        .get_mut(place / T::BITS)
+        .ok_or(Status::ILLEGAL_DATA_ADDRESS)?;
+    *unit = unit.with_bit(place, on);
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -55,5 +177,74 @@ mod tests {
         assert_eq!(mask(7), 0x7F);
         assert_eq!(mask(0) as u8, 0xFF);
         assert_eq!(mask(17 & 15), 0x01);
+    }
+
+    // The example of V1.1b3, 6.1: coils 20 to 38.
+    const COILS: [u8; 3] = [0xCD, 0x6B, 0x05];
+
+    #[test]
+    fn a_coil_is_found_by_its_address() {
+        for (address, on) in [
+            (19, true),
+            (20, false),
+            (22, true),
+            (26, true),
+            (27, true),
+            (29, false),
+            (30, true),
+            (35, true),
+            (36, false),
+            (37, true),
+        ] {
+            assert_eq!(is_set(&COILS, 19, 19, address), Ok(on), "{address}");
+            let words = [0x6BCD_u16, 0x0005];
+            assert_eq!(is_set(&words, 19, 19, address), Ok(on), "{address}");
+        }
+    }
+
+    #[test]
+    fn a_coil_outside_has_no_state() {
+        let none = Err(Status::ILLEGAL_DATA_ADDRESS);
+        for address in [0, 18, 38, 39, 65535] {
+            assert_eq!(is_set(&COILS, 19, 19, address), none);
+            assert_eq!(
+                set(&mut COILS.clone(), 19, 19, address, true),
+                none.map(|_| ())
+            );
+        }
+        // More than the bytes hold, more than there are addresses, none at all.
+        assert_eq!(is_set(&COILS, 0, 25, 24), none);
+        assert_eq!(is_set(&COILS, 65535, 2, 65535), none);
+        assert_eq!(is_set(&COILS, 65535, 1, 65535), Ok(true));
+        assert_eq!(is_set(&COILS, 0, 0, 0), none);
+    }
+
+    #[test]
+    fn setting_a_coil_leaves_the_others() {
+        let mut coils = COILS;
+        assert_eq!(set(&mut coils, 19, 19, 20, true), Ok(()));
+        assert_eq!(set(&mut coils, 19, 19, 37, false), Ok(()));
+        assert_eq!(coils, [0xCF, 0x6B, 0x01]);
+    }
+
+    #[test]
+    fn packed_bits_begin_with_the_lowest_and_end_with_zeros() {
+        let coils = [1, 0, 1, 1, 0, 0, 1, 1, 1, 0].map(|coil| coil == 1);
+        let mut bytes = [0xFF_u8; 3];
+        assert_eq!(pack(&mut bytes, coils.into_iter()), Ok(()));
+        assert_eq!(bytes, [0xCD, 0x01, 0xFF]);
+        let mut words = [0xFFFF_u16; 2];
+        assert_eq!(pack(&mut words, coils.into_iter()), Ok(()));
+        assert_eq!(words, [0x01CD, 0xFFFF]);
+        assert!(unpack(&bytes, 10).unwrap().eq(coils));
+        assert!(unpack(&words, 10).unwrap().eq(coils));
+    }
+
+    #[test]
+    fn bits_that_do_not_fit_are_not_packed() {
+        let mut bytes = [0xFF_u8];
+        let status = pack(&mut bytes, [false; 9].into_iter());
+        assert_eq!((status, bytes), (Err(Status::BUFFER_TOO_SMALL), [0xFF]));
+        assert_eq!(unpack(&bytes, 9).err(), Some(Status::ILLEGAL_DATA_ADDRESS));
     }
 }

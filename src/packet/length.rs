@@ -5,7 +5,6 @@ use super::Side;
 use crate::error::Status;
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::custom::{is_user_defined, Function};
-use crate::pdu::diagnostics::sub_function::FORCE_LISTEN_ONLY;
 use crate::pdu::length::{response as response_length, Length};
 use crate::pdu::limits::MAX_PDU;
 use crate::pdu::request::Request;
@@ -125,20 +124,9 @@ pub fn of_reply(framing: Framing, unit: u8, request: &Request, functions: &[Func
     if framing.is_serial() && unit == 0 {
         return Length::Exactly(0);
     }
-    match of_reply_pdu(request, functions) {
+    match request.response_length(functions) {
         Length::Exactly(0) => Length::Exactly(0),
         length => of_frame(framing, length),
-    }
-}
-
-/// As [`of_reply`], of the PDU alone.
-pub fn of_reply_pdu(request: &Request, functions: &[Function]) -> Length {
-    match request {
-        Request::Diagnostics {
-            sub_function: FORCE_LISTEN_ONLY,
-            ..
-        } => Length::Exactly(0),
-        _ => request.response_length(functions),
     }
 }
 

@@ -78,7 +78,7 @@ pub struct Refusal {
 }
 
 /// The request in a frame that is the whole of `bytes`, as
-/// [`Framing::parse`] and [`super::request`] find it.
+/// [`Framing::parse`] and [`Request::parse_with`] find it.
 ///
 /// # Errors
 /// The fault, and the exception that answers it if one can.
@@ -98,7 +98,7 @@ pub fn request<'a>(
         unit: adu.unit,
         function: adu.pdu.first().copied().unwrap_or_default(),
     };
-    match super::request(adu.pdu, functions) {
+    match Request::parse_with(adu.pdu, functions) {
         Ok(request) => Ok((head, request)),
         Err(status) => Err(Refusal {
             status,

@@ -2,7 +2,6 @@
 // each, the high word first; others put the low word first. This one reads
 // voltage, current and power, and switches a load off above 1000 W.
 #include <ModbusMaster.h>
-#include <string.h>
 
 #if defined(__AVR_ATmega328P__) || defined(__AVR_ATmega168__) || defined(ESP8266)
 #define BUS Serial // the only UART: take the bus off it to upload
@@ -18,20 +17,10 @@ const uint16_t powerAt = 12;
 
 ModbusMaster meter;
 
-float wordsToFloat(uint16_t high, uint16_t low) {
-  uint32_t bits = LONG(high, low);
-  float value;
-  memcpy(&value, &bits, sizeof value);
-  return value;
-}
-
 // False, with the value untouched, if the meter does not answer properly.
 bool readFloat(uint16_t address, float &value) {
-  if (meter.readInputRegisters(address, 2) != meter.ku8MBSuccess)
-    return false;
-  // Low word first? Then exchange the two.
-  value = wordsToFloat(meter.getResponseBuffer(0), meter.getResponseBuffer(1));
-  return true;
+  return meter.readInputRegisters(address, 2) == meter.ku8MBSuccess &&
+         meter.getResponseFloat(0, value);
 }
 
 void setup() {
@@ -44,6 +33,7 @@ void setup() {
   meter.begin(1, BUS);
   meter.setBaudRate(9600);
   meter.setRetries(2);
+  // meter.setWordOrder(meter.orderCDAB); // low word first? Then this.
 }
 
 void loop() {

@@ -2,10 +2,12 @@
 
 mod requests;
 mod settings;
+mod values;
 mod words;
 
 pub use requests::*;
 pub use settings::*;
+pub use values::*;
 pub use words::*;
 
 use super::limits::MBM_MAX_FRAME;
@@ -29,9 +31,9 @@ const BEGUN: u8 = 0x4D;
 #[repr(C)]
 pub struct mbm_master {
     /// Not for you.
-    pointers: [*mut c_void; 20],
+    pointers: [*mut c_void; 21],
     /// Not for you.
-    words: [u32; 20],
+    words: [u32; 19],
 }
 
 /// What lies behind an `mbm_master`.
@@ -40,6 +42,8 @@ pub(super) struct Object {
     mark: u8,
     non_blocking: bool,
     core: Core,
+    /// Of values in the words, as C counts it; last, as it is seldom wanted.
+    order: u8,
 }
 
 type Core = Master<mbm_port, LentByC>;

@@ -8,10 +8,12 @@ pub use groups::*;
 use super::functions::{declared, mbm_function};
 use super::pointers::{buffer, get, lent, lent_or_none, overlap, put, put_length};
 use crate::error::Status;
-use crate::packet::{self, length, Side};
+use crate::packet::{self, Side};
 use crate::pdu::custom::Function;
 use crate::pdu::length::Length;
 use crate::pdu::limits::MAX_PDU;
+use crate::pdu::request::Request;
+use crate::pdu::response::Response;
 
 /// A request: what a client sends.
 pub const MBM_PACKET_REQUEST: u8 = 0;
@@ -140,7 +142,7 @@ pub struct mbm_packet {
     pub conformity: u8,
     /// 2B/0E: 1 if another request is needed for the rest, else 0.
     pub moreFollows: u8,
-    /// 2B/0E: the object to ask for next.
+    /// 2B/0E: the object to ask for next; 0 if none follows.
     pub nextObjectId: u8,
     /// 2B/0E: how many objects the data are.
     pub objectCount: u8,
@@ -192,8 +194,8 @@ impl mbm_packet {
         functions: &[Function],
     ) -> Result<(), Status> {
         match side {
-            Side::Request => self.take_request(&packet::request(pdu, functions)?),
-            Side::Response => self.take_response(&packet::response(pdu, functions)?),
+            Side::Request => self.take_request(&Request::parse_with(pdu, functions)?),
+            Side::Response => self.take_response(&Response::parse_with(pdu, functions)?),
         }
         Ok(())
     }
@@ -359,7 +361,7 @@ pub unsafe extern "C" fn mbm_packet_replyLength(
             let packet = get(request).ok_or(Status::INVALID_ARGUMENT)?;
             let own = own(functions, functionCount, Some(packet.function))?;
             reply_length(&packet, own.as_slice(), |request| {
-                length::of_reply_pdu(request, own.as_slice())
+                request.response_length(own.as_slice())
             })
         };
         put_expected(expected, measure())
@@ -373,7 +375,7 @@ pub unsafe extern "C" fn mbm_packet_replyLength(
 pub(super) unsafe fn reply_length(
     packet: &mbm_packet,
     functions: &[Function],
-    measure: impl FnOnce(&crate::pdu::request::Request) -> Length,
+    measure: impl FnOnce(&Request) -> Length,
 ) -> Result<Length, Status> {
     if packet.kind != MBM_PACKET_REQUEST {
         return Err(Status::INVALID_ARGUMENT);

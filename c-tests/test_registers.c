@@ -1,0 +1,451 @@
+/* Values in registers, held against constants: what another library makes of
+ * the same bytes is its own affair. */
+#include "mbm.h"
+#include "test.h"
+
+#include <math.h>
+#include <string.h>
+
+static const uint8_t orders[] = {MBM_ORDER_ABCD, MBM_ORDER_CDAB, MBM_ORDER_BADC, MBM_ORDER_DCBA};
+
+/* 2923517522 in each of the orders, and the double of pi. */
+static const uint8_t double_words[4][4] = {
+    {0xAE, 0x41, 0x56, 0x52},
+    {0x56, 0x52, 0xAE, 0x41},
+    {0x41, 0xAE, 0x52, 0x56},
+    {0x52, 0x56, 0x41, 0xAE},
+};
+static const uint8_t pi[4][8] = {
+    {0x40, 0x09, 0x21, 0xFB, 0x54, 0x44, 0x2D, 0x18},
+    {0x2D, 0x18, 0x54, 0x44, 0x21, 0xFB, 0x40, 0x09},
+    {0x09, 0x40, 0xFB, 0x21, 0x44, 0x54, 0x18, 0x2D},
+    {0x18, 0x2D, 0x44, 0x54, 0xFB, 0x21, 0x09, 0x40},
+};
+
+/* Bytes as words, as a master keeps them. */
+static void to_words(uint16_t *words, const uint8_t *bytes, unsigned count)
+{
+    for (; count > 0; count--, bytes += 2)
+        *words++ = (uint16_t)(bytes[0] << 8 | bytes[1]);
+}
+
+static int same(const void *a, const void *b, size_t size) { return memcmp(a, b, size) == 0; }
+
+static void a_double_word_is_read_in_four_orders(void **state)
+{
+    uint16_t words[2];
+    mbm_registers r;
+    uint32_t value;
+    int32_t negative;
+    unsigned i, over_words;
+
+    (void)state;
+    for (i = 0; i < 4; i++) {
+        for (over_words = 0; over_words < 2; over_words++) {
+            to_words(words, double_words[i], 2);
+            if (over_words)
+                OK(mbm_registers_ofWords(&r, words, 2, 30001));
+            else
+                OK(mbm_registers_ofBytes(&r, double_words[i], 4, 30001));
+            OK(mbm_registers_getUint32(&r, 30001, orders[i], &value));
+            assert_int_equal(value, 2923517522u);
+            r.order = orders[i];
+            OK(mbm_registers_getInt32(&r, 30001, MBM_ORDER_DEFAULT, &negative));
+            assert_int_equal(negative, -1371449774);
+        }
+    }
+}
+
+static void the_order_at_first_is_high_word_first(void **state)
+{
+    mbm_registers r;
+    uint32_t value;
+
+    (void)state;
+    OK(mbm_registers_ofBytes(&r, double_words[0], 4, 0));
+    assert_int_equal(r.order, MBM_ORDER_ABCD);
+    OK(mbm_registers_getUint32(&r, 0, MBM_ORDER_DEFAULT, &value));
+    assert_int_equal(value, 2923517522u);
+    r.order = MBM_ORDER_DEFAULT;
+    OK(mbm_registers_getUint32(&r, 0, MBM_ORDER_DEFAULT, &value));
+    assert_int_equal(value, 2923517522u);
+}
+
+static void floats_are_those_of_ieee_754(void **state)
+{
+    static const struct {
+        float value;
+        uint16_t high, low;
+    } cases[] = {
+        {1.0f, 0x3F80, 0x0000},   {-2.0f, 0xC000, 0x0000}, {230.5f, 0x4366, 0x8000},
+        {0.1f, 0x3DCC, 0xCCCD},   {0.0f, 0x0000, 0x0000},  {INFINITY, 0x7F80, 0x0000},
+        {-123456.789f, 0xC7F1, 0x2065},
+    };
+    uint16_t words[2];
+    mbm_registers r;
+    unsigned i;
+    float value;
+
+    (void)state;
+    OK(mbm_registers_intoWords(&r, words, 2, 0));
+    for (i = 0; i < COUNT(cases); i++) {
+        words[0] = cases[i].high;
+        words[1] = cases[i].low;
+        OK(mbm_registers_getFloat(&r, 0, MBM_ORDER_ABCD, &value));
+        assert_true(same(&value, &cases[i].value, 4));
+        OK(mbm_registers_setFloat(&r, 0, MBM_ORDER_CDAB, &value));
+        assert_int_equal(words[0], cases[i].low);
+        assert_int_equal(words[1], cases[i].high);
+    }
+    words[0] = 0x7FC0;
+    words[1] = 0x1234;
+    OK(mbm_registers_getFloat(&r, 0, MBM_ORDER_ABCD, &value));
+    assert_true(isnan(value));
+    OK(mbm_registers_setFloat(&r, 0, MBM_ORDER_DCBA, &value));
+    assert_int_equal(words[0], 0x3412);
+    assert_int_equal(words[1], 0xC07F);
+}
+
+static void values_of_four_registers_have_four_orders_too(void **state)
+{
+    mbm_registers r, w;
+    uint64_t wide;
+    int64_t negative;
+    double value;
+    uint8_t bytes[8];
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < 4; i++) {
+        OK(mbm_registers_ofBytes(&r, pi[i], 8, 100));
+        OK(mbm_registers_getDouble(&r, 100, orders[i], &value));
+        assert_true(value > 3.14159265358979 && value < 3.14159265358980);
+        OK(mbm_registers_getUint64(&r, 100, orders[i], &wide));
+        assert_true(wide == 0x400921FB54442D18u);
+        OK(mbm_registers_getInt64(&r, 100, orders[i], &negative));
+        assert_true(negative == 0x400921FB54442D18);
+
+        OK(mbm_registers_intoBytes(&w, bytes, 8, 100));
+        w.order = orders[i];
+        memset(bytes, 0, 8);
+        OK(mbm_registers_setDouble(&w, 100, MBM_ORDER_DEFAULT, &value));
+        assert_memory_equal(bytes, pi[i], 8);
+        memset(bytes, 0, 8);
+        OK(mbm_registers_setUint64(&w, 100, MBM_ORDER_DEFAULT, &wide));
+        assert_memory_equal(bytes, pi[i], 8);
+        negative = -2;
+        OK(mbm_registers_setInt64(&w, 100, MBM_ORDER_ABCD, &negative));
+        OK(mbm_registers_getUint64(&w, 100, MBM_ORDER_ABCD, &wide));
+        assert_true(wide == 0xFFFFFFFFFFFFFFFEu);
+    }
+}
+
+static void a_double_word_is_written_in_four_orders(void **state)
+{
+    uint8_t bytes[4];
+    uint16_t words[2], wanted[2];
+    mbm_registers b, w;
+    unsigned i;
+
+    (void)state;
+    OK(mbm_registers_intoBytes(&b, bytes, 4, 9));
+    OK(mbm_registers_intoWords(&w, words, 2, 9));
+    for (i = 0; i < 4; i++) {
+        to_words(wanted, double_words[i], 2);
+        OK(mbm_registers_setUint32(&b, 9, orders[i], 2923517522u));
+        OK(mbm_registers_setInt32(&w, 9, orders[i], -1371449774));
+        assert_memory_equal(bytes, double_words[i], 4);
+        assert_memory_equal(words, wanted, 4);
+    }
+}
+
+static void one_register_has_numbers_bytes_and_bits(void **state)
+{
+    uint16_t words[] = {0x80FE, 0xAAAA};
+    mbm_registers r;
+    uint16_t word;
+    int16_t number;
+    uint8_t byte;
+    int8_t small;
+
+    (void)state;
+    OK(mbm_registers_intoWords(&r, words, 2, 5));
+    OK(mbm_registers_getUint16(&r, 5, MBM_ORDER_DEFAULT, &word));
+    assert_int_equal(word, 0x80FE);
+    OK(mbm_registers_getUint16(&r, 5, MBM_ORDER_CDAB, &word));
+    assert_int_equal(word, 0x80FE);
+    OK(mbm_registers_getUint16(&r, 5, MBM_ORDER_BADC, &word));
+    assert_int_equal(word, 0xFE80);
+    OK(mbm_registers_getInt16(&r, 5, MBM_ORDER_DEFAULT, &number));
+    assert_int_equal(number, -32514);
+    OK(mbm_registers_getUint8(&r, 5, 1, &byte));
+    assert_int_equal(byte, 0x80);
+    OK(mbm_registers_getUint8(&r, 5, 0, &byte));
+    assert_int_equal(byte, 0xFE);
+    OK(mbm_registers_getInt8(&r, 5, 1, &small));
+    assert_int_equal(small, -128);
+    OK(mbm_registers_getInt8(&r, 5, 0, &small));
+    assert_int_equal(small, -2);
+    OK(mbm_registers_getBit(&r, 5, 15, &byte));
+    assert_int_equal(byte, 1);
+    OK(mbm_registers_getBit(&r, 5, 0, &byte));
+    assert_int_equal(byte, 0);
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getBit(&r, 5, 16, &byte));
+
+    OK(mbm_registers_setBit(&r, 6, 0, 7));
+    OK(mbm_registers_setBit(&r, 6, 15, 0));
+    assert_int_equal(words[1], 0x2AAB);
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBit(&r, 6, 16, 0));
+    OK(mbm_registers_setUint8(&r, 6, 1, 0x12));
+    OK(mbm_registers_setInt8(&r, 6, 0, -1));
+    assert_int_equal(words[1], 0x12FF);
+    OK(mbm_registers_setUint16(&r, 6, MBM_ORDER_DCBA, 0x3456));
+    assert_int_equal(words[1], 0x5634);
+    OK(mbm_registers_setInt16(&r, 6, MBM_ORDER_DEFAULT, -2));
+    assert_int_equal(words[1], 0xFFFE);
+}
+
+static void a_text_ends_at_its_first_nul_or_with_its_field(void **state)
+{
+    static const uint8_t bytes[] = {'M', 'E', 'T', 'E', 'R', ' ', '7', 0, 'X', 'Y'};
+    static const uint8_t swapped[] = {'E', 'M', 'E', 'T', ' ', 'R', 0, '7'};
+    mbm_registers r;
+    char text[11];
+
+    (void)state;
+    OK(mbm_registers_ofBytes(&r, bytes, sizeof bytes, 10));
+    OK(mbm_registers_getString(&r, 10, 10, MBM_ORDER_DEFAULT, text, sizeof text));
+    assert_string_equal(text, "METER 7");
+    OK(mbm_registers_getString(&r, 10, 5, MBM_ORDER_CDAB, text, sizeof text));
+    assert_string_equal(text, "METER");
+    OK(mbm_registers_getString(&r, 14, 2, MBM_ORDER_DEFAULT, text, 3));
+    assert_string_equal(text, "XY");
+    strcpy(text, "old");
+    IS(MBM_BUFFER_TOO_SMALL, mbm_registers_getString(&r, 14, 2, MBM_ORDER_DEFAULT, text, 2));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_registers_getString(&r, 14, 2, MBM_ORDER_DEFAULT, text, 0));
+    IS(MBM_ILLEGAL_DATA_ADDRESS,
+       mbm_registers_getString(&r, 14, 3, MBM_ORDER_DEFAULT, text, sizeof text));
+    assert_string_equal(text, "old");
+    OK(mbm_registers_ofBytes(&r, swapped, sizeof swapped, 10));
+    OK(mbm_registers_getString(&r, 10, 8, MBM_ORDER_BADC, text, sizeof text));
+    assert_string_equal(text, "METER 7");
+}
+
+static void a_text_is_written_with_zeros_behind_it(void **state)
+{
+    uint8_t bytes[9] = "........";
+    mbm_registers r;
+
+    (void)state;
+    OK(mbm_registers_intoBytes(&r, bytes, 8, 0));
+    OK(mbm_registers_setString(&r, 0, 5, MBM_ORDER_DEFAULT, "ABC"));
+    assert_memory_equal(bytes, "ABC\0\0\0..", 8);
+    OK(mbm_registers_setString(&r, 1, 4, MBM_ORDER_DCBA, "ABCD"));
+    assert_memory_equal(bytes, "ABBADC..", 8);
+    IS(MBM_BUFFER_TOO_SMALL, mbm_registers_setString(&r, 0, 4, MBM_ORDER_DEFAULT, "abcde"));
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_setString(&r, 1, 7, MBM_ORDER_DEFAULT, "abc"));
+    assert_memory_equal(bytes, "ABBADC..", 8);
+}
+
+static void raw_bytes_are_copied_and_compared_as_they_travel(void **state)
+{
+    static const uint8_t three[] = {3, 4, 5}, other[] = {3, 4, 6}, five[] = {3, 4, 5, 6, 7};
+    uint16_t words[] = {0x0102, 0x0304, 0x0506};
+    uint8_t bytes[3] = {0}, equal = 7;
+    mbm_registers r;
+
+    (void)state;
+    OK(mbm_registers_intoWords(&r, words, 3, 40));
+    r.order = MBM_ORDER_DCBA;
+    OK(mbm_registers_getBytes(&r, 41, bytes, 3));
+    assert_memory_equal(bytes, three, 3);
+    OK(mbm_registers_isEqual(&r, 41, three, 3, &equal));
+    assert_int_equal(equal, 1);
+    OK(mbm_registers_isEqual(&r, 41, other, 3, &equal));
+    assert_int_equal(equal, 0);
+    equal = 7;
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_isEqual(&r, 41, five, 5, &equal));
+    assert_int_equal(equal, 7);
+    OK(mbm_registers_setBytes(&r, 40, three, 3));
+    assert_int_equal(words[0], 0x0304);
+    assert_int_equal(words[1], 0x0504);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_setBytes(&r, 42, three, 3));
+    assert_int_equal(words[2], 0x0506);
+}
+
+static void what_lies_outside_is_a_status_and_changes_nothing(void **state)
+{
+    uint16_t words[4] = {0xAAAA, 0xAAAA, 0xAAAA, 0xAAAA};
+    mbm_registers r;
+    uint64_t wide = 5;
+    uint32_t value = 5;
+    float number = 5;
+    unsigned address;
+
+    (void)state;
+    OK(mbm_registers_intoWords(&r, words, 4, 65532));
+    for (address = 0; address <= 65535; address++) {
+        uint16_t at = (uint16_t)address;
+
+        if (address < 65532 || address == 65535) {
+            IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_getUint32(&r, at, 0, &value));
+            IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_getFloat(&r, at, 0, &number));
+            IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_setUint32(&r, at, 0, 1));
+        }
+        if (address != 65532) {
+            IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_getUint64(&r, at, 0, &wide));
+            IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_setUint64(&r, at, 0, &wide));
+        }
+    }
+    assert_int_equal(value, 5);
+    assert_true(wide == 5);
+    assert_true(words[0] == 0xAAAA && words[3] == 0xAAAA);
+    OK(mbm_registers_getUint64(&r, 65532, 0, &wide));
+    OK(mbm_registers_setUint32(&r, 65534, 0, 1));
+    assert_int_equal(words[3], 1);
+}
+
+static void registers_beyond_65535_are_no_view(void **state)
+{
+    uint16_t words[2] = {0}, word;
+    uint8_t bytes[4] = {0};
+    mbm_registers r;
+
+    (void)state;
+    OK(mbm_registers_ofWords(&r, words, 1, 65535));
+    OK(mbm_registers_getUint16(&r, 65535, 0, &word));
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_ofWords(&r, words, 2, 65535));
+    IS(MBM_NOT_INITIALISED, mbm_registers_getUint16(&r, 65535, 0, &word));
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_intoBytes(&r, bytes, 4, 65535));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_ofBytes(&r, bytes, 3, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_intoBytes(&r, bytes, 1, 0));
+    OK(mbm_registers_ofBytes(&r, bytes, 4, 65534));
+    r.first = 65535;
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_getUint16(&r, 65535, 0, &word));
+    OK(mbm_registers_ofWords(&r, words, 0, 0));
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_getUint16(&r, 0, 0, &word));
+}
+
+static void null_and_nonsense_are_answered_with_a_status(void **state)
+{
+    static const uint8_t bytes[4] = {1, 2, 3, 4};
+    mbm_registers r, none = {0};
+    uint16_t word = 9;
+    uint32_t value;
+    uint8_t byte;
+    char text[4];
+
+    (void)state;
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_ofWords(NULL, &word, 1, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_ofWords(&r, NULL, 1, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_intoBytes(&r, NULL, 2, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint16(NULL, 0, 0, &word));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setUint16(NULL, 0, 0, 1));
+    IS(MBM_NOT_INITIALISED, mbm_registers_getUint16(&none, 0, 0, &word));
+    IS(MBM_NOT_INITIALISED, mbm_registers_setUint16(&none, 0, 0, 1));
+
+    OK(mbm_registers_ofBytes(&r, bytes, 4, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint16(&r, 0, 0, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getDouble(&r, 0, 0, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getBit(&r, 0, 0, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint8(&r, 0, 0, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getString(&r, 0, 2, 0, NULL, 4));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getBytes(&r, 0, NULL, 2));
+    OK(mbm_registers_getBytes(&r, 0, NULL, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_isEqual(&r, 0, NULL, 2, &byte));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_isEqual(&r, 0, bytes, 2, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint32(&r, 0, MBM_ORDER_DCBA + 1, &value));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint32(&r, 0, 255, &value));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getString(&r, 0, 2, 255, text, 4));
+    r.order = 9;
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint32(&r, 0, MBM_ORDER_DEFAULT, &value));
+    OK(mbm_registers_ofBytes(&r, bytes, 4, 0));
+    r.kind = 0;
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint32(&r, 0, 0, &value));
+    r.kind = 5;
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint32(&r, 0, 0, &value));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setUint32(&r, 0, 0, 1));
+    OK(mbm_registers_intoWords(&r, &word, 1, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setFloat(&r, 0, 0, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setString(&r, 0, 2, 0, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytes(&r, 0, NULL, 2));
+    assert_int_equal(word, 9);
+}
+
+static void what_was_lent_to_read_is_not_written(void **state)
+{
+    uint16_t words[4] = {1, 2, 3, 4};
+    uint8_t bytes[2] = {1, 2};
+    mbm_registers r;
+
+    (void)state;
+    OK(mbm_registers_ofWords(&r, words, 4, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setUint16(&r, 0, 0, 9));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBit(&r, 0, 0, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setUint8(&r, 0, 0, 9));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytes(&r, 0, bytes, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setString(&r, 0, 2, 0, ""));
+    assert_int_equal(words[0], 1);
+    OK(mbm_registers_ofBytes(&r, bytes, 2, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setUint16(&r, 0, 0, 9));
+    assert_int_equal(bytes[1], 2);
+}
+
+static void a_masters_words_are_registers(void **state)
+{
+    static mbm_master node;
+    static const mbm_master fresh;
+    uint16_t response[4] = {0x4366, 0x8000, 0x8000, 0x4366}, transmit[2] = {0};
+    uint8_t frame[MBM_FRAME_BYTES(4)];
+    mbm_registers r;
+    float value;
+
+    (void)state;
+    IS(MBM_NOT_INITIALISED, mbm_master_getResponseRegisters(&fresh, 0, &r));
+    IS(MBM_NOT_INITIALISED, mbm_master_setWordOrder(&node, MBM_ORDER_CDAB));
+    OK(mbm_master_setBuffers(&node, response, 4, transmit, 2, frame, sizeof frame));
+    OK(mbm_master_getResponseRegisters(&node, 100, &r));
+    assert_int_equal(r.count, 4);
+    OK(mbm_registers_getFloat(&r, 100, MBM_ORDER_DEFAULT, &value));
+    assert_true(value == 230.5f);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_getFloat(&r, 103, MBM_ORDER_DEFAULT, &value));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setFloat(&r, 100, MBM_ORDER_DEFAULT, &value));
+
+    OK(mbm_master_setWordOrder(&node, MBM_ORDER_CDAB));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_setWordOrder(&node, 5));
+    OK(mbm_master_getResponseRegisters(&node, 0, &r));
+    OK(mbm_registers_getFloat(&r, 2, MBM_ORDER_DEFAULT, &value));
+    assert_true(value == 230.5f);
+    OK(mbm_master_getTransmitRegisters(&node, 65534, &r));
+    OK(mbm_registers_setFloat(&r, 65534, MBM_ORDER_DEFAULT, &value));
+    assert_int_equal(transmit[0], 0x8000);
+    assert_int_equal(transmit[1], 0x4366);
+    /* The last addresses: as many words as there are. */
+    OK(mbm_master_getResponseRegisters(&node, 65534, &r));
+    assert_int_equal(r.count, 2);
+    OK(mbm_registers_getFloat(&r, 65534, MBM_ORDER_ABCD, &value));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_getResponseRegisters(&node, 0, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_getTransmitRegisters(NULL, 0, &r));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_double_word_is_read_in_four_orders),
+        cmocka_unit_test(the_order_at_first_is_high_word_first),
+        cmocka_unit_test(floats_are_those_of_ieee_754),
+        cmocka_unit_test(values_of_four_registers_have_four_orders_too),
+        cmocka_unit_test(a_double_word_is_written_in_four_orders),
+        cmocka_unit_test(one_register_has_numbers_bytes_and_bits),
+        cmocka_unit_test(a_text_ends_at_its_first_nul_or_with_its_field),
+        cmocka_unit_test(a_text_is_written_with_zeros_behind_it),
+        cmocka_unit_test(raw_bytes_are_copied_and_compared_as_they_travel),
+        cmocka_unit_test(what_lies_outside_is_a_status_and_changes_nothing),
+        cmocka_unit_test(registers_beyond_65535_are_no_view),
+        cmocka_unit_test(null_and_nonsense_are_answered_with_a_status),
+        cmocka_unit_test(what_was_lent_to_read_is_not_written),
+        cmocka_unit_test(a_masters_words_are_registers),
+    };
+
+    return cmocka_run_group_tests_name("registers", tests, NULL, NULL);
+}

@@ -1,0 +1,298 @@
+/**
+ * @file ModbusMasterValues.h
+ * @brief What ModbusMaster adds: floats, wide integers, texts and single bits.
+ *
+ * Licence: MIT OR Apache-2.0. Included by ModbusMaster.h. A sketch that calls
+ * none of it is not a byte larger.
+ */
+
+#ifndef MODBUSMASTER_VALUES_H
+#define MODBUSMASTER_VALUES_H
+
+#include <math.h>
+#include <stdint.h>
+
+#include "mbm.h"
+
+/**
+ * The words of a ModbusMaster as values. `index` counts words from 0, as with
+ * getResponseBuffer and setTransmitBuffer: a float at index 2 is in words 2 and 3.
+ *
+ * Each value is read in two ways. With a variable behind the index, the result is
+ * true, or false with the variable unchanged if the buffer ends before the value
+ * does. Without, the value is the result: of such a one, 0 or NaN. Both give what
+ * the last successful read put there, so ask whether it was successful.
+ *
+ * What sets a value gives ku8MBSuccess, or 0x02 with nothing set if the buffer
+ * ends before the value does.
+ */
+template <typename Master> class ModbusMasterValues {
+public:
+    /** How a device lays 0xAABBCCDD out, byte by byte, in two registers. */
+    enum WordOrder : uint8_t {
+        orderDefault = MBM_ORDER_DEFAULT, /**< as setWordOrder says */
+        orderABCD = MBM_ORDER_ABCD,       /**< high word first: most devices */
+        orderCDAB = MBM_ORDER_CDAB,       /**< low word first, as send does */
+        orderBADC = MBM_ORDER_BADC,       /**< high word first, low byte first */
+        orderDCBA = MBM_ORDER_DCBA        /**< low word first, low byte first */
+    };
+
+    /** The order of values where a call names none; orderABCD at first. */
+    void setWordOrder(WordOrder order) { mbm_master_setWordOrder(&core(), order); }
+
+    /** An integer in the response: a word, 0 to 65535; only the bytes of its order matter. */
+    bool getResponseUInt16(uint8_t index, uint16_t &value, WordOrder order = orderDefault) const
+    {
+        return get(mbm_registers_getUint16, index, value, order);
+    }
+    /** As above; 0 past the end of the buffer. */
+    uint16_t getResponseUInt16(uint8_t index, WordOrder order = orderDefault) const
+    {
+        uint16_t value = 0;
+        getResponseUInt16(index, value, order);
+        return value;
+    }
+
+    /** An integer in the response: a word, -32768 to 32767. */
+    bool getResponseInt16(uint8_t index, int16_t &value, WordOrder order = orderDefault) const
+    {
+        return get(mbm_registers_getInt16, index, value, order);
+    }
+    /** As above; 0 past the end of the buffer. */
+    int16_t getResponseInt16(uint8_t index, WordOrder order = orderDefault) const
+    {
+        int16_t value = 0;
+        getResponseInt16(index, value, order);
+        return value;
+    }
+
+    /** An integer in the response: two words, 0 to 4294967295. */
+    bool getResponseUInt32(uint8_t index, uint32_t &value, WordOrder order = orderDefault) const
+    {
+        return get(mbm_registers_getUint32, index, value, order);
+    }
+    /** As above; 0 past the end of the buffer. */
+    uint32_t getResponseUInt32(uint8_t index, WordOrder order = orderDefault) const
+    {
+        uint32_t value = 0;
+        getResponseUInt32(index, value, order);
+        return value;
+    }
+
+    /** An integer in the response: two words, two's complement. */
+    bool getResponseInt32(uint8_t index, int32_t &value, WordOrder order = orderDefault) const
+    {
+        return get(mbm_registers_getInt32, index, value, order);
+    }
+    /** As above; 0 past the end of the buffer. */
+    int32_t getResponseInt32(uint8_t index, WordOrder order = orderDefault) const
+    {
+        int32_t value = 0;
+        getResponseInt32(index, value, order);
+        return value;
+    }
+
+    /** An integer in the response: four words, without a sign. */
+    bool getResponseUInt64(uint8_t index, uint64_t &value, WordOrder order = orderDefault) const
+    {
+        return get(mbm_registers_getUint64, index, value, order);
+    }
+    /** As above; 0 past the end of the buffer. */
+    uint64_t getResponseUInt64(uint8_t index, WordOrder order = orderDefault) const
+    {
+        uint64_t value = 0;
+        getResponseUInt64(index, value, order);
+        return value;
+    }
+
+    /** An integer in the response: four words, two's complement. */
+    bool getResponseInt64(uint8_t index, int64_t &value, WordOrder order = orderDefault) const
+    {
+        return get(mbm_registers_getInt64, index, value, order);
+    }
+    /** As above; 0 past the end of the buffer. */
+    int64_t getResponseInt64(uint8_t index, WordOrder order = orderDefault) const
+    {
+        int64_t value = 0;
+        getResponseInt64(index, value, order);
+        return value;
+    }
+
+    /** A float in the response: two words, IEEE 754. */
+    bool getResponseFloat(uint8_t index, float &value, WordOrder order = orderDefault) const
+    {
+        return get(mbm_registers_getFloat, index, value, order);
+    }
+    /** As above; NAN past the end of the buffer. */
+    float getResponseFloat(uint8_t index, WordOrder order = orderDefault) const
+    {
+        float value = static_cast<float>(NAN);
+        getResponseFloat(index, value, order);
+        return value;
+    }
+
+    /** A double in the response: four words, IEEE 754; rounded where a double has 32 bits, as on AVR. */
+    bool getResponseDouble(uint8_t index, double &value, WordOrder order = orderDefault) const
+    {
+        return get(mbm_registers_getDouble, index, value, order);
+    }
+    /** As above; NAN past the end of the buffer. */
+    double getResponseDouble(uint8_t index, WordOrder order = orderDefault) const
+    {
+        double value = static_cast<double>(NAN);
+        getResponseDouble(index, value, order);
+        return value;
+    }
+
+    /**
+     * A text in the response, up to its first NUL or the end of its field.
+     *
+     * @param index   the word it begins in
+     * @param length  bytes of its field, two a word
+     * @param text    gets the text and a NUL
+     * @param size    bytes of `text`: length + 1 are always enough
+     * @param order   with orderBADC or orderDCBA the low byte of a word comes first
+     * @return false with `text` unchanged if the buffer ends before the field
+     *         does, or `text` is too small
+     */
+    bool getResponseString(uint8_t index, uint8_t length, char *text, uint16_t size,
+                           WordOrder order = orderDefault) const
+    {
+        mbm_registers words;
+        return response(words) &&
+               mbm_registers_getString(&words, index, length, order, text, size) == MBM_OK;
+    }
+
+    /** Whether a coil or input of the response is on: `bit` 0 is the first one read. */
+    bool getResponseBit(uint16_t bit, bool &on) const
+    {
+        mbm_registers words;
+        uint8_t value;
+        bool found = response(words) &&
+                     mbm_registers_getBit(&words, bit / 16, bit % 16, &value) == MBM_OK;
+        if (found)
+            on = value != 0;
+        return found;
+    }
+    /** As above; false past the end of the buffer. */
+    bool getResponseBit(uint16_t bit) const
+    {
+        bool on = false;
+        getResponseBit(bit, on);
+        return on;
+    }
+
+    /** Sets an integer to write: a word, 0 to 65535; only the bytes of its order matter. */
+    uint8_t setTransmitUInt16(uint8_t index, uint16_t value, WordOrder order = orderDefault)
+    {
+        mbm_registers words;
+        uint8_t status = transmit(words);
+        return status == MBM_OK ? mbm_registers_setUint16(&words, index, order, value) : status;
+    }
+
+    /** Sets an integer to write: a word, -32768 to 32767. */
+    uint8_t setTransmitInt16(uint8_t index, int16_t value, WordOrder order = orderDefault)
+    {
+        mbm_registers words;
+        uint8_t status = transmit(words);
+        return status == MBM_OK ? mbm_registers_setInt16(&words, index, order, value) : status;
+    }
+
+    /** Sets an integer to write: two words, 0 to 4294967295. */
+    uint8_t setTransmitUInt32(uint8_t index, uint32_t value, WordOrder order = orderDefault)
+    {
+        mbm_registers words;
+        uint8_t status = transmit(words);
+        return status == MBM_OK ? mbm_registers_setUint32(&words, index, order, value) : status;
+    }
+
+    /** Sets an integer to write: two words, two's complement. */
+    uint8_t setTransmitInt32(uint8_t index, int32_t value, WordOrder order = orderDefault)
+    {
+        mbm_registers words;
+        uint8_t status = transmit(words);
+        return status == MBM_OK ? mbm_registers_setInt32(&words, index, order, value) : status;
+    }
+
+    /** Sets an integer to write: four words, without a sign. */
+    uint8_t setTransmitUInt64(uint8_t index, uint64_t value, WordOrder order = orderDefault)
+    {
+        mbm_registers words;
+        uint8_t status = transmit(words);
+        return status == MBM_OK ? mbm_registers_setUint64(&words, index, order, &value) : status;
+    }
+
+    /** Sets an integer to write: four words, two's complement. */
+    uint8_t setTransmitInt64(uint8_t index, int64_t value, WordOrder order = orderDefault)
+    {
+        mbm_registers words;
+        uint8_t status = transmit(words);
+        return status == MBM_OK ? mbm_registers_setInt64(&words, index, order, &value) : status;
+    }
+
+    /** Sets a float to write: two words, IEEE 754. */
+    uint8_t setTransmitFloat(uint8_t index, float value, WordOrder order = orderDefault)
+    {
+        mbm_registers words;
+        uint8_t status = transmit(words);
+        return status == MBM_OK ? mbm_registers_setFloat(&words, index, order, &value) : status;
+    }
+
+    /** Sets a double to write: four words, IEEE 754; rounded where a double has 32 bits, as on AVR. */
+    uint8_t setTransmitDouble(uint8_t index, double value, WordOrder order = orderDefault)
+    {
+        mbm_registers words;
+        uint8_t status = transmit(words);
+        return status == MBM_OK ? mbm_registers_setDouble(&words, index, order, &value) : status;
+    }
+
+    /**
+     * Sets a text to write, with NULs behind it up to the end of its field.
+     *
+     * @param index   the word it begins in
+     * @param length  bytes of its field, two a word
+     * @param text    ends with a NUL, which needs no room in the field
+     * @param order   with orderBADC or orderDCBA the low byte of a word comes first
+     * @return ku8MBSuccess, or with nothing set 0x02 if the buffer ends before the
+     *         field does, ku8MBBufferTooSmall if the field ends before the text does
+     */
+    uint8_t setTransmitString(uint8_t index, uint8_t length, const char *text,
+                              WordOrder order = orderDefault)
+    {
+        mbm_registers words;
+        uint8_t status = transmit(words);
+        return status == MBM_OK ? mbm_registers_setString(&words, index, length, order, text)
+                                : status;
+    }
+
+    /** Sets a coil to write: `bit` 0 is the first one written. */
+    uint8_t setTransmitBit(uint16_t bit, bool on)
+    {
+        mbm_registers words;
+        uint8_t status = transmit(words);
+        return status == MBM_OK ? mbm_registers_setBit(&words, bit / 16, bit % 16, on) : status;
+    }
+
+private:
+    const mbm_master &core() const { return static_cast<const Master *>(this)->state.master; }
+    mbm_master &core() { return static_cast<Master *>(this)->state.master; }
+
+    bool response(mbm_registers &words) const
+    {
+        return mbm_master_getResponseRegisters(&core(), 0, &words) == MBM_OK;
+    }
+    uint8_t transmit(mbm_registers &words)
+    {
+        return mbm_master_getTransmitRegisters(&core(), 0, &words);
+    }
+
+    template <typename Value>
+    bool get(uint8_t (*getter)(const mbm_registers *, uint16_t, uint8_t, Value *), uint8_t index,
+             Value &value, WordOrder order) const
+    {
+        mbm_registers words;
+        return response(words) && getter(&words, index, order, &value) == MBM_OK;
+    }
+};
+
+#endif

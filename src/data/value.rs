@@ -1,0 +1,190 @@
+//! The numbers that registers hold. Of floats only the bits are moved.
+
+/// A number of one, two or four registers.
+pub trait Value: Copy {
+    /// Its bytes, the most significant first.
+    type Bytes: Copy + Default + AsRef<[u8]> + AsMut<[u8]>;
+
+    /// The number of these bytes.
+    fn from_bytes(bytes: Self::Bytes) -> Self;
+
+    /// The bytes of this number.
+    fn to_bytes(self) -> Self::Bytes;
+}
+
+macro_rules! values {
+    ($($number:ident)*) => {
+        $(impl Value for $number {
+            type Bytes = [u8; size_of::<$number>()];
+
+            fn from_bytes(bytes: Self::Bytes) -> Self {
+                $number::from_be_bytes(bytes)
+            }
+
+            fn to_bytes(self) -> Self::Bytes {
+                self.to_be_bytes()
+            }
+        })*
+    };
+}
+
+values!(u16 i16 u32 i32 u64 i64 f32 f64);
+
+/// A number of four registers, an IEEE 754 binary64, where the machine has
+/// only a binary32 for it: what C calls `double` on an AVR.
+#[repr(transparent)]
+#[derive(Clone, Copy, Debug)]
+pub struct ShortDouble(pub f32);
+
+impl Value for ShortDouble {
+    type Bytes = [u8; 8];
+
+    fn from_bytes(bytes: [u8; 8]) -> Self {
+        let [a, b, c, d, e, f, g, h] = bytes;
+        let high = u32::from_be_bytes([a, b, c, d]);
+        let low = u32::from_be_bytes([e, f, g, h]);
+        ShortDouble(f32::from_bits(narrow(high, low)))
+    }
+
+    fn to_bytes(self) -> [u8; 8] {
+        let (high, low) = widen(self.0.to_bits());
+        let ([a, b, c, d], [e, f, g, h]) = (high.to_be_bytes(), low.to_be_bytes());
+        [a, b, c, d, e, f, g, h]
+    }
+}
+
+/// What the exponents of the two formats differ by.
+const BIAS: u32 = 1023 - 127;
+/// The exponent of infinity and of what is not a number.
+const WIDE_MOST: u32 = 0x7FF;
+const SHORT_MOST: u32 = 0xFF;
+/// The bit in front of a binary32's fraction, which is not stored.
+const HIDDEN: u32 = 1 << 23;
+
+/// The binary32 that is nearest to a binary64, ties to even, in bits.
+fn narrow(high: u32, low: u32) -> u32 {
+    let sign = high & 0x8000_0000;
+    let exponent = high >> 20 & WIDE_MOST;
+    // 23 bits of the fraction, and the 29 below them.
+    let fraction = (high & 0x000F_FFFF) << 3 | low >> 29;
+    let below = low << 3;
+    if exponent == WIDE_MOST {
+        let is_number = fraction == 0 && below == 0;
+        let quiet = if is_number { 0 } else { HIDDEN >> 1 };
+        return sign | SHORT_MOST << 23 | fraction | quiet;
+    }
+    let mut kept = fraction;
+    let mut lost = below;
+    if exponent > BIAS {
+        if exponent >= BIAS + SHORT_MOST {
+            return sign | SHORT_MOST << 23;
+        }
+        kept |= (exponent - BIAS) << 23;
+    } else {
+        // Too small for an exponent: the hidden bit moves into the fraction.
+        kept |= HIDDEN;
+        let mut more = BIAS + 1 - exponent;
+        if more > 25 {
+            return sign;
+        }
+        while more > 0 {
+            // What was lost before only counts as more than nothing.
+            lost = (kept & 1) << 31 | lost >> 1 | u32::from(lost & 1 != 0);
+            kept >>= 1;
+            more -= 1;
+        }
+    }
+    let half = 0x8000_0000;
+    let up = lost > half || lost == half && kept & 1 == 1;
+    // A carry out of the fraction is the next exponent, infinity at last.
+    sign | (kept + u32::from(up))
+}
+
+/// The binary64 that a binary32 equals, in two words of bits.
+fn widen(bits: u32) -> (u32, u32) {
+    let sign = bits & 0x8000_0000;
+    let mut fraction = bits & (HIDDEN - 1);
+    let exponent = match bits >> 23 & SHORT_MOST {
+        SHORT_MOST => WIDE_MOST,
+        0 if fraction == 0 => 0,
+        0 => {
+            let mut exponent = BIAS + 1;
+            while fraction & HIDDEN == 0 {
+                fraction <<= 1;
+                exponent -= 1;
+            }
+            fraction &= HIDDEN - 1;
+            exponent
+        }
+        exponent => exponent + BIAS,
+    };
+    (sign | exponent << 20 | fraction >> 3, fraction << 29)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn narrowed(value: f64) -> u32 {
+        ShortDouble::from_bytes(value.to_be_bytes()).0.to_bits()
+    }
+
+    #[test]
+    fn a_double_becomes_the_nearest_float() {
+        let next = |bits: u64| f64::from_bits(bits);
+        for value in [
+            0.0,
+            -0.0,
+            1.0,
+            230.1,
+            -1e-3,
+            f64::from(f32::MAX),
+            3.402_823_567e38,
+            f64::MAX,
+            f64::MIN_POSITIVE,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::from(f32::MIN_POSITIVE),
+            // The least fraction, its half, a little more, three halves of it.
+            next(0x36A0_0000_0000_0000),
+            next(0x3690_0000_0000_0000),
+            next(0x3690_0000_0000_0001),
+            next(0x36A8_0000_0000_0000),
+            next(0x3680_0000_0000_0000),
+            // A tie to even, down and up, and all bits set.
+            next(0x3FF0_0000_1000_0000),
+            next(0x3FF0_0000_3000_0000),
+            next(0x3FFF_FFFF_FFFF_FFFF),
+            next(0x380F_FFFF_FFFF_FFFF),
+            next(0x47EF_FFFF_F000_0000),
+        ] {
+            assert_eq!(narrowed(value), (value as f32).to_bits(), "{value:e}");
+        }
+    }
+
+    #[test]
+    fn a_double_that_is_no_number_stays_one() {
+        for bits in [0x7FF0_0000_0000_0001, 0x7FF8_0000_0000_0000, u64::MAX] {
+            assert!(f32::from_bits(narrowed(f64::from_bits(bits))).is_nan());
+        }
+    }
+
+    #[test]
+    fn a_float_becomes_the_double_that_it_equals() {
+        let smallest = f32::from_bits(1);
+        for value in [
+            0.0,
+            -0.0,
+            1.0,
+            -230.1,
+            f32::MAX,
+            f32::MIN_POSITIVE,
+            smallest,
+            f32::INFINITY,
+        ] {
+            let wide = f64::from_be_bytes(ShortDouble(value).to_bytes());
+            assert_eq!(wide.to_bits(), f64::from(value).to_bits());
+        }
+        assert!(f64::from_be_bytes(ShortDouble(f32::NAN).to_bytes()).is_nan());
+    }
+}

@@ -1,0 +1,367 @@
+//! Registers seen as values, by the addresses that the device gives them:
+//! over data bytes as they travel, or over words as the facade keeps them.
+//!
+//! What lies outside is [`Status::ILLEGAL_DATA_ADDRESS`]; nothing panics.
+
+use super::order::Order;
+use super::value::Value;
+use crate::error::Status;
+
+/// Registers in a row, as bytes in the order in which they travel.
+pub trait Cells {
+    /// How many bytes there are, two a register.
+    fn length(&self) -> usize;
+
+    /// One of them.
+    fn byte(&self, place: usize) -> Option<u8>;
+}
+
+/// Registers that can be written too.
+pub trait CellsMut: Cells {
+    /// Sets a byte; past the end, none.
+    fn set_byte(&mut self, place: usize, value: u8);
+}
+
+impl Cells for &[u8] {
+    fn length(&self) -> usize {
+        self.len()
+    }
+
+    fn byte(&self, place: usize) -> Option<u8> {
+        self.get(place).copied()
+    }
+}
+
+impl Cells for &[u16] {
+    fn length(&self) -> usize {
+        self.len().saturating_mul(2)
+    }
+
+    fn byte(&self, place: usize) -> Option<u8> {
+        let [high, low] = self.get(place / 2)?.to_be_bytes();
+        Some(if place.is_multiple_of(2) { high } else { low })
+    }
+}
+
+impl Cells for &mut [u8] {
+    fn length(&self) -> usize {
+        self.len()
+    }
+
+    fn byte(&self, place: usize) -> Option<u8> {
+        self.get(place).copied()
+    }
+}
+
+impl CellsMut for &mut [u8] {
+    fn set_byte(&mut self, place: usize, value: u8) {
+        if let Some(byte) = self.get_mut(place) {
+            *byte = value;
+        }
+    }
+}
+
+impl Cells for &mut [u16] {
+    fn length(&self) -> usize {
+        self.len().saturating_mul(2)
+    }
+
+    fn byte(&self, place: usize) -> Option<u8> {
+        (&**self).byte(place)
+    }
+}
+
+impl CellsMut for &mut [u16] {
+    fn set_byte(&mut self, place: usize, value: u8) {
+        if let Some(word) = self.get_mut(place / 2) {
+            let [high, low] = word.to_be_bytes();
+            *word = u16::from_be_bytes(if place.is_multiple_of(2) {
+                [value, low]
+            } else {
+                [high, value]
+            });
+        }
+    }
+}
+
+/// Registers to read, and to write where the cells are.
+#[derive(Clone, Copy)]
+pub struct Registers<C> {
+    cells: C,
+    first: u16,
+    /// How the device lays its values out, for calls that do not say.
+    pub order: Order,
+}
+
+impl<C: Cells> Registers<C> {
+    /// Over words or data bytes, the first of them the register `first`.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`] if they pass address 65535,
+    /// [`Status::INVALID_ARGUMENT`] if a byte of the last is missing.
+    pub fn new(cells: C, first: u16, order: Order) -> Result<Self, Status> {
+        let length = cells.length();
+        if !length.is_multiple_of(2) {
+            return Err(Status::INVALID_ARGUMENT);
+        }
+        if length / 2 > usize::from(u16::MAX - first).saturating_add(1) {
+            return Err(Status::ILLEGAL_DATA_ADDRESS);
+        }
+        Ok(Registers {
+            cells,
+            first,
+            order,
+        })
+    }
+
+    /// Where so many bytes from the high byte of `address` on begin.
+    fn find(&self, address: u16, length: usize) -> Result<usize, Status> {
+        let Some(before) = address.checked_sub(self.first) else {
+            return Err(Status::ILLEGAL_DATA_ADDRESS);
+        };
+        // In registers, so that nothing overflows where `usize` is 16 bits.
+        let whole = self.cells.length() / 2;
+        let wanted = length.div_ceil(2);
+        match whole.checked_sub(before.into()) {
+            Some(left) if wanted <= left => Ok(2 * usize::from(before)),
+            _ => Err(Status::ILLEGAL_DATA_ADDRESS),
+        }
+    }
+
+    /// Fills `bytes` from the high byte of `address` on, the byte that travels
+    /// at `place` into that at `place ^ mask`; see [`Order::mask`].
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing filled.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub fn load(&self, address: u16, mask: usize, bytes: &mut [u8]) -> Result<(), Status> {
+        let start = self.find(address, bytes.len())?;
+        for (place, byte) in bytes.iter_mut().enumerate() {
+            *byte = self.cells.byte(start + (place ^ mask)).unwrap_or(0);
+        }
+        Ok(())
+    }
+
+    /// The number that begins at `address`, in the order of these registers.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]
+    pub fn get<T: Value>(&self, address: u16) -> Result<T, Status> {
+        self.get_in(self.order, address)
+    }
+
+    /// As [`Registers::get`], in another order.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]
+    pub fn get_in<T: Value>(&self, order: Order, address: u16) -> Result<T, Status> {
+        let mut bytes = T::Bytes::default();
+        let mask = order.mask(bytes.as_ref().len());
+        self.load(address, mask, bytes.as_mut())?;
+        Ok(T::from_bytes(bytes))
+    }
+
+    /// Raw bytes as they travel, from the high byte of `address` on.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing copied.
+    pub fn bytes(&self, address: u16, bytes: &mut [u8]) -> Result<(), Status> {
+        self.load(address, 0, bytes)
+    }
+
+    /// The high or the low byte of a register as it travels.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]
+    pub fn u8(&self, address: u16, high: bool) -> Result<u8, Status> {
+        let place = self.find(address, 2)? + usize::from(!high);
+        Ok(self.cells.byte(place).unwrap_or(0))
+    }
+
+    /// As [`Registers::u8`], signed.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]
+    pub fn i8(&self, address: u16, high: bool) -> Result<i8, Status> {
+        self.u8(address, high).map(u8::cast_signed)
+    }
+
+    /// Bit `bit` of a register as it travels, 0 the least significant.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]; [`Status::INVALID_ARGUMENT`] for a bit
+    /// beyond 15.
+    pub fn bit(&self, address: u16, bit: u8) -> Result<bool, Status> {
+        let (high, mask) = half(bit)?;
+        Ok(self.u8(address, high)? & mask != 0)
+    }
+
+    /// Copies a text out of a field of `length` bytes, up to its first NUL and
+    /// without it. Its registers follow each other in every order; in one that
+    /// swaps bytes, the first of two characters is the low byte.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`], or [`Status::BUFFER_TOO_SMALL`] with
+    /// nothing copied.
+    pub fn text<'b>(
+        &self,
+        address: u16,
+        length: usize,
+        buffer: &'b mut [u8],
+    ) -> Result<&'b mut [u8], Status> {
+        self.text_in(self.order, address, length, buffer)
+    }
+
+    /// As [`Registers::text`], in another order.
+    ///
+    /// # Errors
+    /// As [`Registers::text`].
+    pub fn text_in<'b>(
+        &self,
+        order: Order,
+        address: u16,
+        length: usize,
+        buffer: &'b mut [u8],
+    ) -> Result<&'b mut [u8], Status> {
+        let start = self.find(address, length)?;
+        let mask = usize::from(order.swaps_bytes());
+        let character = |place| self.cells.byte(start + (place ^ mask)).unwrap_or(0);
+        let mut count = 0;
+        while count < length && character(count) != 0 {
+            count += 1;
+        }
+        let text = buffer.get_mut(..count).ok_or(Status::BUFFER_TOO_SMALL)?;
+        for (place, byte) in text.iter_mut().enumerate() {
+            *byte = character(place);
+        }
+        Ok(text)
+    }
+
+    /// Whether these are the raw bytes from the high byte of `address` on.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]
+    pub fn is_equal(&self, address: u16, bytes: &[u8]) -> Result<bool, Status> {
+        let start = self.find(address, bytes.len())?;
+        let mut held = bytes.iter().enumerate();
+        Ok(held.all(|(place, byte)| self.cells.byte(start + place) == Some(*byte)))
+    }
+}
+
+impl<C: CellsMut> Registers<C> {
+    /// Sets `bytes` from the high byte of `address` on, as [`Registers::load`]
+    /// reads them.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing set.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub fn store(&mut self, address: u16, mask: usize, bytes: &[u8]) -> Result<(), Status> {
+        let start = self.find(address, bytes.len())?;
+        for (place, byte) in bytes.iter().enumerate() {
+            self.cells.set_byte(start + (place ^ mask), *byte);
+        }
+        Ok(())
+    }
+
+    /// Sets the number that begins at `address`, in the order of these registers.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing set.
+    pub fn set<T: Value>(&mut self, address: u16, value: T) -> Result<(), Status> {
+        self.set_in(self.order, address, value)
+    }
+
+    /// As [`Registers::set`], in another order.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing set.
+    pub fn set_in<T: Value>(&mut self, order: Order, address: u16, value: T) -> Result<(), Status> {
+        let bytes = value.to_bytes();
+        let mask = order.mask(bytes.as_ref().len());
+        self.store(address, mask, bytes.as_ref())
+    }
+
+    /// Sets raw bytes as they travel, from the high byte of `address` on. Of an
+    /// odd number the last is a high byte, and the low one beside it stays.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing set.
+    pub fn set_bytes(&mut self, address: u16, bytes: &[u8]) -> Result<(), Status> {
+        self.store(address, 0, bytes)
+    }
+
+    /// Sets the high or the low byte of a register as it travels; the other
+    /// stays.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]
+    pub fn set_u8(&mut self, address: u16, high: bool, value: u8) -> Result<(), Status> {
+        let place = self.find(address, 2)? + usize::from(!high);
+        self.cells.set_byte(place, value);
+        Ok(())
+    }
+
+    /// As [`Registers::set_u8`], signed.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]
+    pub fn set_i8(&mut self, address: u16, high: bool, value: i8) -> Result<(), Status> {
+        self.set_u8(address, high, value.cast_unsigned())
+    }
+
+    /// Sets bit `bit` of a register as it travels, 0 the least significant; the
+    /// others stay.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]; [`Status::INVALID_ARGUMENT`] for a bit
+    /// beyond 15.
+    pub fn set_bit(&mut self, address: u16, bit: u8, on: bool) -> Result<(), Status> {
+        let (high, mask) = half(bit)?;
+        let others = self.u8(address, high)? & !mask;
+        self.set_u8(address, high, if on { others | mask } else { others })
+    }
+
+    /// Fills a field of `length` bytes with a text and NULs behind it, laid out
+    /// as [`Registers::text`] reads it. If `length` is odd, the byte behind the
+    /// field becomes 0 too.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`], or [`Status::BUFFER_TOO_SMALL`] for a
+    /// text that is longer than the field, with nothing set.
+    pub fn set_text(&mut self, address: u16, length: usize, text: &[u8]) -> Result<(), Status> {
+        self.set_text_in(self.order, address, length, text)
+    }
+
+    /// As [`Registers::set_text`], in another order.
+    ///
+    /// # Errors
+    /// As [`Registers::set_text`].
+    pub fn set_text_in(
+        &mut self,
+        order: Order,
+        address: u16,
+        length: usize,
+        text: &[u8],
+    ) -> Result<(), Status> {
+        let start = self.find(address, length)?;
+        if text.len() > length {
+            return Err(Status::BUFFER_TOO_SMALL);
+        }
+        let mask = usize::from(order.swaps_bytes());
+        for place in 0..length + length % 2 {
+            let character = text.get(place).copied().unwrap_or(0);
+            self.cells.set_byte(start + (place ^ mask), character);
+        }
+        Ok(())
+    }
+}
+
+/// The half of a register that a bit is in, true for the high one, and the bit
+/// in that byte.
+fn half(bit: u8) -> Result<(bool, u8), Status> {
+    if bit < 16 {
+        Ok((bit >= 8, 1 << (bit % 8)))
+    } else {
+        Err(Status::INVALID_ARGUMENT)
+    }
+}

@@ -1,0 +1,338 @@
+//! Typed values in registers: what they are in each order, that they come back
+//! as they were written, and that nothing outside is ever read or written.
+
+use mbm::data::bits;
+use mbm::data::order::Order;
+use mbm::data::value::{ShortDouble, Value};
+use mbm::data::view::{Cells, Registers};
+use mbm::error::Status;
+use proptest::prelude::*;
+use std::fmt::Debug;
+
+const OUTSIDE: Status = Status::ILLEGAL_DATA_ADDRESS;
+
+/// Data bytes as words.
+fn words(bytes: &[u8]) -> Vec<u16> {
+    let pairs = bytes.chunks(2);
+    pairs
+        .map(|pair| u16::from_be_bytes([pair[0], pair[1]]))
+        .collect()
+}
+
+fn ordered<C: Cells>(cells: C, first: u16, order: Order) -> Registers<C> {
+    Registers::new(cells, first, order).unwrap()
+}
+
+fn over<C: Cells>(cells: C, first: u16) -> Registers<C> {
+    ordered(cells, first, Order::Abcd)
+}
+
+fn refused<C: Cells>(cells: C, first: u16) -> Option<Status> {
+    Registers::new(cells, first, Order::Abcd).err()
+}
+
+/// What `bytes` hold at address 100, over bytes and over words.
+fn read<T: Value + PartialEq + Debug>(bytes: &[u8], order: Order) -> T {
+    let words = words(bytes);
+    let mut registers = over(&words[..], 100);
+    let value = registers.get_in(order, 100).unwrap();
+    registers.order = order;
+    assert_eq!(registers.get::<T>(100), Ok(value));
+    assert_eq!(over(bytes, 100).get_in::<T>(order, 100), Ok(value));
+    value
+}
+
+/// The bytes that `value` becomes, over bytes and over words.
+fn written<T: Value>(value: T, order: Order) -> Vec<u8> {
+    let size = size_of::<T::Bytes>();
+    let mut bytes = vec![0xEE; size];
+    let mut words = vec![0xEEEE_u16; size / 2];
+    over(&mut bytes[..], 100).set_in(order, 100, value).unwrap();
+    let mut registers = over(&mut words[..], 100);
+    registers.order = order;
+    registers.set(100, value).unwrap();
+    let of_words: Vec<u8> = words.iter().flat_map(|word| word.to_be_bytes()).collect();
+    assert_eq!(of_words, bytes);
+    bytes
+}
+
+#[test]
+fn a_double_word_lies_in_four_ways() {
+    for (order, bytes) in [
+        (Order::Abcd, [0xAE, 0x41, 0x56, 0x52]),
+        (Order::Cdab, [0x56, 0x52, 0xAE, 0x41]),
+        (Order::Badc, [0x41, 0xAE, 0x52, 0x56]),
+        (Order::Dcba, [0x52, 0x56, 0x41, 0xAE]),
+    ] {
+        assert_eq!(read::<u32>(&bytes, order), 2_923_517_522, "{order:?}");
+        assert_eq!(read::<i32>(&bytes, order), -1_371_449_774, "{order:?}");
+        assert_eq!(written(2_923_517_522_u32, order), bytes);
+        assert_eq!(written(-1_371_449_774_i32, order), bytes);
+    }
+}
+
+#[test]
+fn floats_are_those_of_ieee_754() {
+    for (value, [a, b, c, d]) in [
+        (1.0_f32, [0x3F, 0x80, 0, 0]),
+        (-2.0, [0xC0, 0, 0, 0]),
+        (230.5, [0x43, 0x66, 0x80, 0]),
+        (std::f32::consts::PI, [0x40, 0x49, 0x0F, 0xDB]),
+        (f32::INFINITY, [0x7F, 0x80, 0, 0]),
+        (f32::MIN_POSITIVE, [0, 0x80, 0, 0]),
+    ] {
+        for (order, bytes) in [
+            (Order::Abcd, [a, b, c, d]),
+            (Order::Cdab, [c, d, a, b]),
+            (Order::Badc, [b, a, d, c]),
+            (Order::Dcba, [d, c, b, a]),
+        ] {
+            assert_eq!(read::<f32>(&bytes, order), value);
+            assert_eq!(written(value, order), bytes);
+        }
+    }
+}
+
+#[test]
+fn doubles_are_those_of_ieee_754() {
+    let [a, b, c, d, e, f, g, h] = [0x40, 0x09, 0x21, 0xFB, 0x54, 0x44, 0x2D, 0x18];
+    for (order, bytes) in [
+        (Order::Abcd, [a, b, c, d, e, f, g, h]),
+        (Order::Cdab, [g, h, e, f, c, d, a, b]),
+        (Order::Badc, [b, a, d, c, f, e, h, g]),
+        (Order::Dcba, [h, g, f, e, d, c, b, a]),
+    ] {
+        assert_eq!(read::<f64>(&bytes, order), std::f64::consts::PI);
+        assert_eq!(read::<u64>(&bytes, order), 0x4009_21FB_5444_2D18);
+        assert_eq!(read::<i64>(&bytes, order), 0x4009_21FB_5444_2D18);
+        assert_eq!(written(std::f64::consts::PI, order), bytes);
+        assert_eq!(written(0x4009_21FB_5444_2D18_u64, order), bytes);
+    }
+}
+
+#[test]
+fn one_register_has_bits_and_bytes_as_they_travel() {
+    let bytes = [0x80_u8, 0xFE];
+    let registers = ordered(&bytes[..], 7, Order::Dcba);
+    assert_eq!(registers.u8(7, true), Ok(0x80));
+    assert_eq!(registers.u8(7, false), Ok(0xFE));
+    assert_eq!(registers.i8(7, true), Ok(-128));
+    assert_eq!(registers.i8(7, false), Ok(-2));
+    assert_eq!(registers.bit(7, 15), Ok(true));
+    assert_eq!(registers.bit(7, 14), Ok(false));
+    assert_eq!(registers.bit(7, 1), Ok(true));
+    assert_eq!(registers.bit(7, 0), Ok(false));
+    assert_eq!(registers.bit(7, 16), Err(Status::INVALID_ARGUMENT));
+    assert_eq!(registers.get::<u16>(7), Ok(0xFE80));
+    assert_eq!(registers.get_in::<i16>(Order::Cdab, 7), Ok(-32514));
+}
+
+#[test]
+fn setting_a_bit_or_a_byte_leaves_its_neighbours() {
+    let mut words = [0xAAAA_u16; 3];
+    let mut registers = over(&mut words[..], 0);
+    registers.set_bit(0, 0, true).unwrap();
+    registers.set_bit(0, 15, false).unwrap();
+    registers.set_u8(1, true, 0x12).unwrap();
+    registers.set_i8(2, false, -1).unwrap();
+    assert_eq!(
+        registers.set_bit(0, 16, true),
+        Err(Status::INVALID_ARGUMENT)
+    );
+    assert_eq!(registers.set_bit(3, 0, true), Err(OUTSIDE));
+    assert_eq!(words, [0x2AAB, 0x12AA, 0xAAFF]);
+}
+
+#[test]
+fn a_text_ends_at_its_first_nul_or_with_its_field() {
+    let bytes = *b"METER 7\0XY";
+    let registers = over(&bytes[..], 10);
+    let mut buffer = [0; 8];
+    assert_eq!(registers.text(10, 10, &mut buffer).unwrap(), b"METER 7");
+    assert_eq!(registers.text(10, 5, &mut buffer).unwrap(), b"METER");
+    assert_eq!(registers.text(14, 2, &mut buffer).unwrap(), b"XY");
+    assert_eq!(registers.text(15, 0, &mut buffer).unwrap(), b"");
+    assert_eq!(registers.text(14, 3, &mut buffer), Err(OUTSIDE));
+    let low_word_first = registers.text_in(Order::Cdab, 10, 10, &mut buffer);
+    assert_eq!(low_word_first.unwrap(), b"METER 7");
+    let swapped = ordered(&b"EMET R\x007"[..], 10, Order::Badc);
+    assert_eq!(swapped.text(10, 8, &mut buffer).unwrap(), b"METER 7");
+    assert_eq!(swapped.text(10, 3, &mut buffer).unwrap(), b"MET");
+}
+
+#[test]
+fn a_text_that_does_not_fit_its_buffer_is_not_cut_short() {
+    let mut buffer = *b"...";
+    let status = over(&b"ABCD"[..], 0).text(0, 4, &mut buffer).err();
+    assert_eq!((status, &buffer), (Some(Status::BUFFER_TOO_SMALL), b"..."));
+}
+
+#[test]
+fn a_text_is_written_with_zeros_behind_it() {
+    let mut bytes = *b"........";
+    let mut registers = over(&mut bytes[..], 0);
+    registers.set_text(0, 5, b"ABC").unwrap();
+    let too_long = registers.set_text(0, 5, b"ABCDEF");
+    assert_eq!(too_long, Err(Status::BUFFER_TOO_SMALL));
+    assert_eq!(registers.set_text(2, 5, b"A"), Err(OUTSIDE));
+    assert_eq!(bytes, *b"ABC\0\0\0..");
+    let mut registers = over(&mut bytes[..], 0);
+    registers.set_text_in(Order::Dcba, 1, 4, b"ABCD").unwrap();
+    assert_eq!(bytes, *b"ABBADC..");
+}
+
+#[test]
+fn raw_bytes_are_copied_and_compared_as_they_travel() {
+    let mut held = [0x0102_u16, 0x0304, 0x0506];
+    let mut registers = ordered(&mut held[..], 40, Order::Dcba);
+    let mut bytes = [0; 3];
+    registers.bytes(41, &mut bytes).unwrap();
+    assert_eq!(bytes, [3, 4, 5]);
+    assert_eq!(registers.is_equal(41, &[3, 4, 5]), Ok(true));
+    assert_eq!(registers.is_equal(41, &[3, 4, 6]), Ok(false));
+    assert_eq!(registers.is_equal(41, &[3, 4, 5, 6, 7]), Err(OUTSIDE));
+    assert_eq!(registers.is_equal(42, &[]), Ok(true));
+    assert_eq!(registers.bytes(39, &mut bytes), Err(OUTSIDE));
+    registers.set_bytes(40, &[9, 8, 7]).unwrap();
+    assert_eq!(registers.set_bytes(42, &[1, 1, 1]), Err(OUTSIDE));
+    assert_eq!(registers.is_equal(40, &[9, 8, 7]), Ok(true));
+    assert_eq!(held, [0x0908, 0x0704, 0x0506]);
+}
+
+#[test]
+fn registers_end_at_address_65535() {
+    let words = [1_u16, 2, 3, 4];
+    let last = over(&words[..], 65532);
+    assert_eq!(last.get::<u16>(65535), Ok(4));
+    assert_eq!(last.get::<u32>(65535), Err(OUTSIDE));
+    assert_eq!(last.get::<u64>(65532), Ok(0x0001_0002_0003_0004));
+    assert_eq!(last.get::<u64>(65533), Err(OUTSIDE));
+    assert_eq!(last.get::<u16>(0), Err(OUTSIDE));
+    assert_eq!(refused(&words[..], 65533), Some(OUTSIDE));
+    assert_eq!(refused(&[0_u8; 4][..], 65535), Some(OUTSIDE));
+    assert_eq!(refused(&[0_u16; 65536][..], 0), None);
+    assert_eq!(refused(&[0_u16; 65537][..], 0), Some(OUTSIDE));
+    assert_eq!(refused(&mut [0_u16; 2][..], 65535), Some(OUTSIDE));
+}
+
+#[test]
+fn odd_data_bytes_are_no_registers() {
+    assert_eq!(
+        refused(&[1_u8, 2, 3][..], 0),
+        Some(Status::INVALID_ARGUMENT)
+    );
+    assert_eq!(refused(&mut [1_u8][..], 0), Some(Status::INVALID_ARGUMENT));
+}
+
+fn any_order() -> impl Strategy<Value = Order> {
+    prop::sample::select(Order::ALL.to_vec())
+}
+
+/// Writes a value, reads it back, and finds nothing changed beside it.
+fn round_trip<T: Value>(value: T, order: Order, address: u16, first: u16, fill: u16) {
+    let size = size_of::<T::Bytes>() / 2;
+    let mut words = [fill; 9];
+    let mut registers = ordered(&mut words[..], first, order);
+    let status = registers.set(address, value);
+    let start = usize::from(address.wrapping_sub(first));
+    if address < first || start + size > 9 {
+        assert_eq!(status, Err(OUTSIDE));
+        assert_eq!(registers.get::<T>(address).err(), Some(OUTSIDE));
+        assert_eq!(words, [fill; 9]);
+        return;
+    }
+    assert_eq!(status, Ok(()));
+    let back: T = registers.get(address).unwrap();
+    assert_eq!(back.to_bytes().as_ref(), value.to_bytes().as_ref());
+    for (index, word) in words.iter().enumerate() {
+        assert!(*word == fill || (start..start + size).contains(&index));
+    }
+}
+
+proptest! {
+    #[test]
+    fn every_value_comes_back_in_every_order_or_lies_outside(
+        bits: u64, order in any_order(), first in 0..65528_u16, step in -3..14_i32, fill: u16,
+    ) {
+        let address = (i32::from(first) + step).clamp(0, 65535) as u16;
+        round_trip(bits as u16, order, address, first, fill);
+        round_trip(bits as i16, order, address, first, fill);
+        round_trip(bits as u32, order, address, first, fill);
+        round_trip(bits as i32, order, address, first, fill);
+        round_trip(bits, order, address, first, fill);
+        round_trip(bits as i64, order, address, first, fill);
+        round_trip(f32::from_bits(bits as u32), order, address, first, fill);
+        round_trip(f64::from_bits(bits), order, address, first, fill);
+    }
+
+    #[test]
+    fn no_address_and_no_length_is_too_much(
+        bytes in prop::collection::vec(any::<u8>(), 0..40),
+        first: u16, address: u16, length in 0..200_usize, near: bool, order in any_order(),
+    ) {
+        let address = if near { first.saturating_add(address % 24) } else { address };
+        let mut copy = bytes.clone();
+        let Ok(registers) = Registers::new(&bytes[..], first, order) else {
+            prop_assert!(bytes.len() % 2 == 1 || bytes.len() / 2 > 65536 - usize::from(first));
+            return Ok(());
+        };
+        let start = 2 * (usize::from(address).wrapping_sub(first.into()) & 0xFFFF);
+        let inside = address >= first && start + length + length % 2 <= bytes.len();
+        let mut buffer = vec![0; length];
+        let wanted = if inside { Ok(()) } else { Err(OUTSIDE) };
+        prop_assert_eq!(registers.bytes(address, &mut buffer), wanted);
+        if inside {
+            prop_assert_eq!(&buffer[..], &bytes[start..start + length]);
+            prop_assert_eq!(registers.is_equal(address, &buffer), Ok(true));
+        }
+        prop_assert_eq!(registers.text(address, length, &mut [0; 200]).is_ok(), inside);
+        prop_assert_eq!(registers.get::<u16>(address).is_ok(), address >= first && start + 2 <= bytes.len());
+        prop_assert_eq!(registers.bit(address, 3).is_ok(), registers.u8(address, true).is_ok());
+        let mut registers = ordered(&mut copy[..], first, order);
+        prop_assert_eq!(registers.set_bytes(address, &buffer), wanted);
+        prop_assert_eq!(registers.set_text(address, length, &[]), wanted);
+        prop_assert_eq!(registers.set_bit(address, 3, true), registers.set_u8(address, true, 1));
+    }
+
+    #[test]
+    fn a_text_comes_back(text in "[ -~]{0,12}", order in any_order(), length in 12..16_usize) {
+        let mut words = [0xFFFF_u16; 8];
+        let mut registers = ordered(&mut words[..], 0, order);
+        registers.set_text(0, length, text.as_bytes()).unwrap();
+        let mut buffer = [0; 16];
+        prop_assert_eq!(registers.text(0, length, &mut buffer).unwrap(), text.as_bytes());
+    }
+
+    #[test]
+    fn bits_come_back_packed_in_bytes_and_in_words(
+        coils in prop::collection::vec(any::<bool>(), 0..100), first in 0..65436_u16, address: u16,
+    ) {
+        let mut bytes = [0xAA_u8; 13];
+        let mut words = [0xAAAA_u16; 7];
+        bits::pack(&mut bytes, coils.iter().copied()).unwrap();
+        bits::pack(&mut words, coils.iter().copied()).unwrap();
+        prop_assert!(bits::unpack(&bytes, coils.len()).unwrap().eq(coils.iter().copied()));
+        prop_assert!(bits::unpack(&words, coils.len()).unwrap().eq(coils.iter().copied()));
+        let quantity = coils.len() as u16;
+        for address in (first..first + 100).chain([address]) {
+            let coil = coils.get(usize::from(address.wrapping_sub(first)));
+            let wanted = coil.copied().ok_or(OUTSIDE);
+            prop_assert_eq!(bits::is_set(&bytes, first, quantity, address), wanted);
+            prop_assert_eq!(bits::is_set(&words, first, quantity, address), wanted);
+        }
+    }
+
+    #[test]
+    fn a_double_in_32_bits_is_the_nearest(bits: u64, exponent in 870..1160_u64, near: bool) {
+        // Most doubles are out of a float's reach: half of them are near.
+        let bits = if near { bits & 0x800F_FFFF_FFFF_FFFF | exponent << 52 } else { bits };
+        let value = f64::from_bits(bits);
+        let short = ShortDouble::from_bytes(bits.to_be_bytes()).0;
+        prop_assert_eq!(short.is_nan(), value.is_nan());
+        if !value.is_nan() {
+            prop_assert_eq!(short.to_bits(), (value as f32).to_bits());
+            let wide = f64::from_be_bytes(ShortDouble(short).to_bytes());
+            prop_assert_eq!(wide.to_bits(), f64::from(short).to_bits());
+        }
+    }
+}
