@@ -23,7 +23,7 @@ macro_rules! probes {
 fn probes() -> Vec<(String, u64)> {
     probes! {
         sizes: mbm_port mbm_counters mbm_master mbm_registers mbm_ring mbm_rule mbm_function mbm_length
-            mbm_packet mbm_record mbm_object mbm_framing;
+            mbm_packet mbm_record mbm_object mbm_framing mbm_sniffer mbm_event;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
             mbm_counters { requests replies exceptions badCrc timeouts foreignFrames
@@ -38,7 +38,9 @@ fn probes() -> Vec<(String, u64)> {
             mbm_record { data file record length }
             mbm_object { data length id }
             mbm_framing { functions functionCount kind end }
-            mbm_registers { data first count kind order };
+            mbm_registers { data first count kind order }
+            mbm_event { frame pdu packet time responseTime frameLength pduLength length address
+                quantity kind status unit function asked askedLength };
         constants:
             MBM_OK MBM_ILLEGAL_FUNCTION MBM_ILLEGAL_DATA_ADDRESS MBM_ILLEGAL_DATA_VALUE
             MBM_SLAVE_DEVICE_FAILURE MBM_ACKNOWLEDGE MBM_SLAVE_DEVICE_BUSY
@@ -73,7 +75,10 @@ fn probes() -> Vec<(String, u64)> {
             MBM_MAX_TCP_FRAME MBM_MAX_ASCII_FRAME
             MBM_ORDER_DEFAULT MBM_ORDER_ABCD MBM_ORDER_CDAB MBM_ORDER_BADC MBM_ORDER_DCBA
             MBM_REGISTERS_OF_WORDS MBM_REGISTERS_OF_BYTES MBM_REGISTERS_INTO_WORDS
-            MBM_REGISTERS_INTO_BYTES;
+            MBM_REGISTERS_INTO_BYTES
+            MBM_EVENT_REQUEST MBM_EVENT_REPLY MBM_EVENT_EXCEPTION MBM_EVENT_UNPAIRED
+            MBM_EVENT_TIMEOUT MBM_EVENT_BAD_CRC MBM_EVENT_NOISE MBM_TAP_BOTH MBM_TAP_CLIENT
+            MBM_TAP_SERVER MBM_MIN_SNIFFER_BUFFER MBM_MAX_SNIFFER_FUNCTIONS;
     }
 }
 

@@ -24,8 +24,10 @@ mod pointers;
 mod port;
 mod registers;
 mod ring;
+mod sniffer;
 mod status;
 mod storage;
+mod text;
 
 pub use bits::*;
 pub use frame::*;
@@ -36,8 +38,10 @@ pub use packet::*;
 pub use port::*;
 pub use registers::*;
 pub use ring::*;
+pub use sniffer::*;
 pub use status::*;
 pub use storage::*;
+pub use text::*;
 
 /// There is no way back from a panic on a microcontroller. The check of the
 /// linked image proves that nothing comes here.

@@ -6,6 +6,9 @@ pub mod names;
 pub use line::Line;
 
 use crate::bytes::Reader;
+use crate::error::Status;
+use crate::frame::{ascii, rtu, tcp, Adu, Framing};
+use crate::packet::Side;
 use crate::pdu::diagnostics::sub_function as sub;
 use crate::pdu::diagnostics::CLEAR_LOG;
 use crate::pdu::files::{Reads, Record, Writes};
@@ -36,6 +39,54 @@ pub fn bytes(line: &mut Line, what: &str, count: usize) {
     line.put(", ");
     line.number(count as u32);
     line.put(if count == 1 { " byte" } else { " bytes" });
+}
+
+/// Writes what a frame carries, or what is wrong with it. `end` is the last
+/// character of an ASCII frame.
+pub fn frame(line: &mut Line, framing: Framing, side: Side, frame: &[u8], end: u8) {
+    let parsed = match framing {
+        Framing::Rtu | Framing::RtuOverTcp => rtu::parse(frame),
+        Framing::Tcp => tcp::parse(frame),
+        Framing::Ascii => return characters(line, side, frame, end),
+    };
+    adu(line, side, parsed, frame.len());
+}
+
+/// As [`frame`], of an ASCII frame, which is decoded in a place of its own.
+#[inline(never)]
+fn characters(line: &mut Line, side: Side, frame: &[u8], end: u8) {
+    let mut copy = [0; ascii::MAX_FRAME];
+    let parsed = match copy.get_mut(..frame.len()) {
+        Some(copy) => {
+            for (to, from) in copy.iter_mut().zip(frame) {
+                *to = *from;
+            }
+            ascii::parse(copy, end)
+        }
+        None => Err(Status::MALFORMED_FRAME),
+    };
+    adu(line, side, parsed, frame.len());
+}
+
+fn adu(line: &mut Line, side: Side, parsed: Result<Adu, Status>, length: usize) {
+    match parsed {
+        Ok(adu) if side == Side::Request => {
+            start(line, adu.unit, "request");
+            request(line, adu.pdu);
+        }
+        Ok(adu) => {
+            let is_exception = adu.pdu.first().is_some_and(|code| code & EXCEPTION != 0);
+            start(
+                line,
+                adu.unit,
+                if is_exception { "exception" } else { "reply" },
+            );
+            response(line, adu.pdu, &[]);
+        }
+        Err(Status::INVALID_CRC) => bytes(line, "bad CRC", length),
+        Err(Status::INCOMPLETE_FRAME) => bytes(line, "incomplete frame", length),
+        Err(_) => bytes(line, "no frame", length),
+    }
 }
 
 /// Writes a function's code and name.

@@ -3,7 +3,6 @@
 use super::pairing::Asked;
 use crate::error::Status;
 use crate::explain::{self, Line};
-use crate::packet;
 use crate::pdu::custom::Function;
 use crate::pdu::request::Request;
 use crate::pdu::response::Response;
@@ -63,11 +62,27 @@ pub struct Event<'a> {
     pub asked: Option<Asked>,
 }
 
+impl Kind {
+    /// The kind of a number that C hands back.
+    pub const fn from_code(code: u8) -> Option<Kind> {
+        match code {
+            0 => Some(Kind::Request),
+            1 => Some(Kind::Reply),
+            2 => Some(Kind::Exception),
+            3 => Some(Kind::Unpaired),
+            4 => Some(Kind::Timeout),
+            5 => Some(Kind::BadCrc),
+            6 => Some(Kind::Noise),
+            _ => None,
+        }
+    }
+}
+
 impl<'a> Event<'a> {
     /// What a request asks for, if it can be read.
     pub fn request(&self, functions: &[Function]) -> Option<Request<'a>> {
         match self.kind {
-            Kind::Request => packet::request(self.pdu, functions).ok(),
+            Kind::Request => Request::parse_with(self.pdu, functions).ok(),
             _ => None,
         }
     }
@@ -76,9 +91,17 @@ impl<'a> Event<'a> {
     pub fn response(&self, functions: &[Function]) -> Option<Response<'a>> {
         match self.kind {
             Kind::Reply | Kind::Exception | Kind::Unpaired => {
-                packet::response(self.pdu, functions).ok()
+                Response::parse_with(self.pdu, functions).ok()
             }
             _ => None,
+        }
+    }
+
+    /// What this is about: its request, or what of that a reply is known to answer.
+    pub fn subject(&self) -> Option<Asked> {
+        match self.kind {
+            Kind::Request => Some(Asked::new(self.pdu)),
+            _ => self.asked,
         }
     }
 

@@ -7,7 +7,7 @@ use crate::frame::checksum::{crc16, Crc16};
 use crate::frame::{ascii, rtu, tcp};
 use crate::packet::Side;
 use crate::pdu::custom::Function;
-use crate::pdu::diagnostics::DIAGNOSTICS;
+use crate::pdu::diagnostics::{DIAGNOSTICS, REPORT_SERVER_ID};
 use crate::pdu::length::Length;
 use crate::pdu::EXCEPTION;
 
@@ -66,12 +66,22 @@ impl Context<'_> {
         };
         let is_exception = code.is_some_and(|code| code & EXCEPTION != 0);
         let request = (self.request && !is_exception).then(|| of(Side::Request));
+        let response = || match (of(Side::Response), self.requests.reply_length(*unit, pdu)) {
+            (_, Some(length)) => Length::Exactly(length + rtu::OVERHEAD),
+            // Some devices count the id alone and send more behind it.
+            (Length::Exactly(total), _)
+                if code == Some(REPORT_SERVER_ID)
+                    && self.requests.is_waiting(*unit, pdu)
+                    && frame
+                        .get(..total)
+                        .is_some_and(|all| !crc16(all).is_residue()) =>
+            {
+                Length::Silence
+            }
+            (length, _) => length,
+        };
         // Nobody answers a broadcast.
-        let response =
-            (self.response && *unit != 0).then(|| match self.requests.reply_length(*unit, pdu) {
-                Some(length) => Length::Exactly(length + rtu::OVERHEAD),
-                None => of(Side::Response),
-            });
+        let response = (self.response && *unit != 0).then(response);
         [request.filter(fits), response.filter(fits)]
     }
 
@@ -100,38 +110,37 @@ impl Context<'_> {
         })
     }
 
-    /// An RTU frame whose length only silence tells.
+    /// An RTU frame that silence ends.
     fn by_silence(&self, lane: &Lane, bytes: &[u8]) -> Option<usize> {
         let quiet = lane.quiet(self.now) >= self.timing.silence;
-        let last = quiet.then_some(lane.end);
-        let mut ended = bytes.len() >= rtu::MAX_FRAME;
-        for end in lane.silences(lane.at).chain(last) {
-            ended = true;
+        let mut ends = lane.silences(lane.at).chain(quiet.then_some(lane.end));
+        ends.find_map(|end| {
             let total = usize::from(end - lane.at);
-            let frame = bytes.get(..total).unwrap_or_default();
-            if (MIN_RTU..=rtu::MAX_FRAME).contains(&total) && crc16(frame).is_residue() {
-                return Some(total);
-            }
-        }
-        if !ended || lane.at != lane.start {
+            let is_frame = (MIN_RTU..=rtu::MAX_FRAME).contains(&total)
+                && crc16(bytes.get(..total)?).is_residue();
+            is_frame.then_some(total)
+        })
+    }
+
+    /// The shortest RTU frame whose CRC is right, where several came as one piece
+    /// and their lengths do not tell them apart.
+    fn by_crc(&self, lane: &Lane, bytes: &[u8]) -> Option<usize> {
+        let is_ended = bytes.len() >= rtu::MAX_FRAME
+            || lane.quiet(self.now) >= self.timing.silence
+            || lane.silences(lane.at).next().is_some();
+        if !is_ended {
             return None;
         }
-        // Several frames came as one piece: the shortest that is right.
-        let step = if bytes.get(1) == Some(&DIAGNOSTICS) {
-            2
-        } else {
-            1
-        };
-        let least = MIN_RTU * step;
-        let mut crc = Crc16::START.with(bytes.get(..least)?);
-        let mut total = least;
+        let is_words = bytes.get(1) == Some(&DIAGNOSTICS);
+        let step = if is_words { 2 } else { 1 };
+        let mut total = MIN_RTU * step;
+        let mut crc = Crc16::START.with(bytes.get(..total)?);
         while !crc.is_residue() {
-            let more = bytes.get(total..total + step)?;
+            crc = crc.with(bytes.get(total..total + step)?);
             total += step;
             if total > rtu::MAX_FRAME {
                 return None;
             }
-            crc = crc.with(more);
         }
         Some(total)
     }
@@ -155,8 +164,17 @@ impl Context<'_> {
         let open =
             |length: &Option<Length>| matches!(length, Some(Length::Silence | Length::Unknown));
         let [as_request, as_response] = lengths.map(|length| open(&length));
-        if as_request || as_response {
+        let is_open = as_request || as_response;
+        let is_aligned = lane.at == lane.start;
+        if is_open || is_aligned {
+            // Between two silences the CRC alone decides: some devices miscount.
             if let Some(total) = self.by_silence(lane, bytes) {
+                let [as_request, as_response] = lengths.map(|length| length.is_some());
+                return Verdict::Right(total, as_request, as_response);
+            }
+        }
+        if is_open && is_aligned {
+            if let Some(total) = self.by_crc(lane, bytes) {
                 return Verdict::Right(total, as_request, as_response);
             }
         }

@@ -10,6 +10,8 @@ struct Mark {
     end: u16,
     /// The line was silent after them.
     silent: bool,
+    /// As large on every core, for the sake of the storage that C sets aside.
+    _even: u8,
 }
 
 const MARKS: usize = 8;
@@ -64,6 +66,7 @@ impl Lane {
             time: 0,
             end: 0,
             silent: false,
+            _even: 0,
         }; MARKS],
     };
 
@@ -156,6 +159,7 @@ impl Lane {
                         time,
                         end,
                         silent: false,
+                        _even: 0,
                     };
                     if let Some(place) = self.marks.get_mut(usize::from(self.count)) {
                         *place = mark;

@@ -1,10 +1,10 @@
 //! Requests that wait for their replies.
 
-use crate::packet::length::of_reply_pdu;
-use crate::packet::{self, Side};
+use crate::packet::Side;
 use crate::pdu::custom::Function;
-use crate::pdu::diagnostics::sub_function::FORCE_LISTEN_ONLY;
 use crate::pdu::length::Length;
+use crate::pdu::request::Request;
+use crate::pdu::response::Response;
 use crate::pdu::{bits, diagnostics, files, identification, registers, EXCEPTION};
 use crate::time::elapsed;
 
@@ -23,7 +23,8 @@ impl Asked {
         length: 0,
     };
 
-    fn new(pdu: &[u8]) -> Asked {
+    /// The head of a request PDU.
+    pub fn new(pdu: &[u8]) -> Asked {
         let mut asked = Asked::NOTHING;
         for (place, byte) in asked.head.iter_mut().zip(pdu) {
             *place = *byte;
@@ -86,8 +87,8 @@ pub(super) struct Slot {
     pub time: u32,
     pub asked: Asked,
     /// The whole request's and the reply's bytes; 0 if only the reply tells.
-    length: u16,
-    reply: u16,
+    length: u8,
+    reply: u8,
 }
 
 impl Slot {
@@ -243,8 +244,8 @@ impl Requests {
                 return Role::Reply(index);
             }
         }
-        let is_response = seen.response && packet::response(pdu, functions).is_ok();
-        let is_request = seen.request && packet::request(pdu, functions).is_ok();
+        let is_response = seen.response && Response::parse_with(pdu, functions).is_ok();
+        let is_request = seen.request && Request::parse_with(pdu, functions).is_ok();
         if seen.request && (is_request || !is_response) {
             Role::Request
         } else {
@@ -287,19 +288,17 @@ impl Requests {
                 slot.state = State::Free;
             }
         }
-        let is_silenced = pdu.starts_with(&[diagnostics::DIAGNOSTICS])
-            && pdu
-                .get(1..3)
-                .is_some_and(|sub_function| sub_function == FORCE_LISTEN_ONLY.to_be_bytes());
-        if is_broadcast || is_silenced {
+        if is_broadcast {
             return;
         }
-        let length = match packet::request(pdu, functions) {
-            Ok(request) => of_reply_pdu(&request, functions),
+        let length = match Request::parse_with(pdu, functions) {
+            Ok(request) => request.response_length(functions),
             Err(_) => Side::Response.length(&[function], functions),
         };
         let reply = match length {
-            Length::Exactly(length) => length as u16,
+            // Force Listen Only Mode.
+            Length::Exactly(0) => return,
+            Length::Exactly(length) => length as u8,
             _ => 0,
         };
         let free = self.slots.iter().position(|slot| slot.state == State::Free);
@@ -311,7 +310,7 @@ impl Requests {
                 transaction,
                 time,
                 asked: Asked::new(pdu),
-                length: pdu.len() as u16,
+                length: pdu.len() as u8,
                 reply,
             };
         }

@@ -7,8 +7,9 @@ use super::pairing::{Role, Seen, State};
 use super::{Sniffer, Step};
 use crate::error::Status;
 use crate::frame::{tcp, Framing};
-use crate::packet;
 use crate::pdu::custom::Function;
+use crate::pdu::request::Request;
+use crate::pdu::response::Response;
 use crate::pdu::EXCEPTION;
 use crate::time::elapsed;
 
@@ -140,7 +141,9 @@ impl Sniffer {
                 let is_broadcast = unit == 0 && self.framing != Framing::Tcp;
                 self.requests.keep(&seen, is_broadcast, functions, time);
                 event.kind = Kind::Request;
-                event.status = packet::request(pdu, functions).err().unwrap_or(Status::OK);
+                event.status = Request::parse_with(pdu, functions)
+                    .err()
+                    .unwrap_or(Status::OK);
             }
             Role::Reply(index) => {
                 let slot = self.requests.get(index);
@@ -181,7 +184,7 @@ fn content(framing: Framing, frame: &[u8]) -> (u16, u8, &[u8]) {
 
 /// What a response says of itself.
 fn answer(pdu: &[u8], functions: &[Function]) -> Status {
-    match (packet::response(pdu, functions), pdu) {
+    match (Response::parse_with(pdu, functions), pdu) {
         (Err(refused), _) => refused,
         (Ok(_), [code, exception, ..]) if code & EXCEPTION != 0 => Status::exception(*exception),
         (Ok(_), _) => Status::OK,

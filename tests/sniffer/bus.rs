@@ -358,3 +358,14 @@ fn a_declared_function_needs_no_silence() {
     assert_eq!(bench.kinds(), [Kind::Request, Kind::Reply]);
     assert_eq!(bench.told[0].status, Status::OK);
 }
+
+#[test]
+fn a_frame_between_silences_may_be_longer_than_it_counts() {
+    let mut bench = Bench::new(Framing::Rtu);
+    bench.feed(&rtu(17, &[0x11]));
+    bench.wait(10_000);
+    bench.feed(&rtu(17, &[0x11, 1, 0xFF, b'm', b'b', b'm']));
+    bench.wait(10_000);
+    assert_eq!(bench.kinds(), [Kind::Request, Kind::Reply]);
+    assert_eq!(bench.told[1].status, Status::OK);
+}
