@@ -47,6 +47,7 @@ header: ## Write include/mbm.h anew from the source
 .PHONY: check
 check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, symbols
 	@$(CARGO) fmt --all --check
+	@for crate in fuzz bench; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml --check || exit 1; done
 	@$(CARGO) clippy --quiet --workspace --all-targets -- -D warnings
 	@$(CARGO) clippy --quiet --no-default-features -- -D warnings
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps
@@ -62,8 +63,17 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, sy
 
 .PHONY: test
 test: need-test ## Every test: Rust, C and C++; sanitizers and valgrind
-	@$(MAKE) --no-print-directory tests
+	@$(MAKE) --no-print-directory venv tests
 	@CARGO="$(CARGO)" scripts/test $(TESTS)
+
+.PHONY: venv
+venv: ## The Python environment with the peers of tests/peer, build/venv
+	@scripts/venv
+
+.PHONY: fuzz
+fuzz: ## Fuzz every decoder for FUZZ_SECONDS in all (60)
+	@scripts/need g++ libc6-dev libmodbus-dev
+	@CARGO="$(CARGO)" scripts/fuzz
 
 .PHONY: fault-table
 fault-table: need-test ## Write docs/fault-table.md from what the test finds
@@ -75,7 +85,7 @@ fault-table: need-test ## Write docs/fault-table.md from what the test finds
 need-check:
 	@scripts/need gcc g++ clang libc6-dev binutils doxygen
 need-test:
-	@scripts/need gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind
+	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind
 
 # The test programs, one folder a variant: $(1) name, $(2) C, $(3) C++, $(4) flags
 define variant
@@ -105,10 +115,11 @@ $(BENCH): $(patsubst %,$(BUILD)/bench/%.o,bench support/pty support/server linux
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
 
 .PHONY: bench
-bench: ## Speed and instructions of mbm beside libmodbus's own client
+bench: ## Speed and instructions beside libmodbus and rmodbus; writes docs/speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
 	@$(MAKE) --no-print-directory $(BENCH)
 	@scripts/bench $(BENCH)
+	@CARGO="$(CARGO)" scripts/bench-frames
 
 DEMO := $(BUILD)/plain/linux/demo
 $(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/recorder linux/mbm_tty support/pty support/server) $(ARCHIVE)
