@@ -1035,7 +1035,7 @@ typedef struct mbm_sniffer {
     /**
      * Not for you.
      */
-    uint32_t words[188];
+    uint32_t words[164];
 } mbm_sniffer;
 
 /**
