@@ -122,6 +122,7 @@ impl Sniffer {
         let Some((request, response)) = right else {
             return event;
         };
+        let request = request && code & EXCEPTION == 0;
         if let Some(overdue) = self.requests.overdue(time, self.timeout) {
             return self.give_up(overdue, time);
         }

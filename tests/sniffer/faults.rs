@@ -239,3 +239,15 @@ fn a_buffer_too_small_for_the_words_is_said() {
     assert_eq!(line.finish(), Err(Status::BUFFER_TOO_SMALL));
     assert_eq!(&text, b"unit 17  request   \0");
 }
+
+#[test]
+fn an_exception_with_a_code_that_there_cannot_be_is_no_request() {
+    for framing in [Framing::Rtu, Framing::Ascii, Framing::Tcp] {
+        let mut bench = Bench::new(framing);
+        bench.feed(&frame(framing, 1, 17, READ));
+        bench.feed(&frame(framing, 2, 18, &[0x83, 0]));
+        bench.wait(100);
+        assert_eq!(bench.kinds(), [Kind::Request, Kind::Unpaired]);
+        assert_eq!(bench.told[1].status, Status::MALFORMED_REPLY);
+    }
+}

@@ -1,6 +1,6 @@
 //! Random traffic, random noise, random bytes.
 
-use crate::bench::{rtu, Bench};
+use crate::bench::{frame, rtu, Bench};
 use crate::exchanges::EXCHANGES;
 use mbm::frame::checksum::crc16;
 use mbm::frame::Framing;
@@ -132,5 +132,38 @@ proptest! {
         } else {
             prop_assert_eq!(told, count);
         }
+    }
+
+    #[test]
+    fn ascii_and_tcp_frames_are_found_in_order_in_pieces_of_any_length(
+        which in prop::collection::vec((0..EXCHANGES.len(), "[ -9;-~]{0,9}"), 1..8),
+        piece in 1usize..300,
+        is_tcp: bool,
+    ) {
+        let framing = if is_tcp { Framing::Tcp } else { Framing::Ascii };
+        let (mut bytes, mut wanted) = (Vec::new(), Vec::new());
+        for (index, (which, noise)) in which.iter().enumerate() {
+            let (request, reply, ..) = EXCHANGES[*which];
+            if !is_tcp {
+                bytes.extend(noise.bytes());
+            }
+            for (kind, pdu) in [(Kind::Request, request), (Kind::Reply, reply)] {
+                bytes.extend(frame(framing, index as u16, 17, pdu));
+                wanted.push((kind, pdu.to_vec()));
+            }
+        }
+        let mut bench = Bench::new(framing);
+        for some in bytes.chunks(piece) {
+            bench.feed(some);
+            bench.now += 1_000;
+        }
+        let found: Vec<_> = bench
+            .frames()
+            .into_iter()
+            .filter(|(kind, _)| *kind != Kind::Noise)
+            .collect();
+        prop_assert_eq!(found, wanted);
+        let told: usize = bench.told.iter().map(|told| told.length).sum();
+        prop_assert_eq!(told, bytes.len());
     }
 }
