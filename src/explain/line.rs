@@ -65,21 +65,25 @@ impl<'a> Line<'a> {
         }
     }
 
+    fn digit(&mut self, digit: u8) {
+        self.byte(if digit < 10 {
+            b'0' + digit
+        } else {
+            b'A' - 10 + digit
+        });
+    }
+
     /// Adds two hexadecimal digits.
     pub fn hex(&mut self, byte: u8) {
-        for digit in [byte >> 4, byte & 0x0F] {
-            self.byte(match digit {
-                0..=9 => b'0' + digit,
-                _ => b'A' - 10 + digit,
-            });
-        }
+        self.digit(byte >> 4);
+        self.digit(byte & 0x0F);
     }
 
     /// Adds four hexadecimal digits.
     pub fn hex_word(&mut self, word: u16) {
-        for byte in word.to_be_bytes() {
-            self.hex(byte);
-        }
+        // Without an iterator: the facade's would no longer be inlined.
+        self.hex((word >> 8) as u8);
+        self.hex(word as u8);
     }
 
     /// Adds bytes in hexadecimal, a blank before each.

@@ -129,12 +129,12 @@ impl Sniffer {
         if !self.is_apart {
             return buffer;
         }
-        let (first, second) = buffer.split_at_mut(most / 2);
-        if lane == 0 {
-            first
+        let half = if lane == 0 {
+            buffer.get_mut(..most / 2)
         } else {
-            second
-        }
+            buffer.get_mut(most / 2..)
+        };
+        half.unwrap_or_default()
     }
 
     /// Takes bytes of which the last arrived now, in microseconds; how many there
