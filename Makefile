@@ -12,7 +12,7 @@ MODBUS = $(shell pkg-config --cflags libmodbus)
 LIBS := -Wl,--gc-sections -lmodbus -lcmocka -lpthread
 SANITIZERS := -fsanitize=address,undefined -fno-sanitize-recover=all
 
-SUPPORT := $(wildcard c-tests/support/*.c) examples/linux/mbm_tty.c
+SUPPORT := $(wildcard c-tests/support/*.c) $(wildcard examples/linux/mbm_*.c)
 TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
 HEADERS := $(wildcard include/*.h c-tests/support/*.h c-tests/shim/* examples/linux/*.h)
@@ -35,6 +35,19 @@ MCUS := $(shell scripts/archive --list)
 archives: ## The archives for microcontrollers, build/archives and build/minimal
 	@for mcu in $(MCUS); do scripts/archive $$mcu && scripts/archive $$mcu minimal || exit 1; done
 	@scripts/check-archive
+
+.PHONY: install
+install: $(ARCHIVE) ## Library, header, ports, pkg-config and CMake files, below PREFIX
+	@PREFIX="$(PREFIX)" LIBDIR="$(LIBDIR)" DESTDIR="$(DESTDIR)" scripts/install
+
+.PHONY: dist
+dist: $(ARCHIVE) ## Sources and what archives stand built, dist/mbm-VERSION.tar.gz
+	@scripts/dist
+
+.PHONY: check-install
+check-install: $(ARCHIVE) ## Installs, builds and runs the README's program; packs twice
+	@scripts/need gcc libc6-dev make cmake pkg-config
+	@scripts/check-install
 
 .PHONY: size
 size: ## Flash and RAM that the library adds, and what changed since docs/size.md

@@ -393,6 +393,22 @@
 #define MBM_REGISTERS_INTO_BYTES 4
 
 /**
+ * What a function of yours returns for an exception: this, or-ed with the code.
+ */
+#define MBM_REPLY_EXCEPTION 256
+
+/**
+ * What a function of yours returns for no response at all.
+ */
+#define MBM_REPLY_NONE 512
+
+/**
+ * What a function of yours returns to be asked again at the next poll, with the
+ * same request. The server hears nothing meanwhile.
+ */
+#define MBM_REPLY_PENDING 768
+
+/**
  * A request.
  */
 #define MBM_EVENT_REQUEST 0
@@ -1018,6 +1034,507 @@ typedef struct mbm_ring {
      */
     uint16_t positions[3];
 } mbm_ring;
+
+/**
+ * A Modbus server on one line or one connection.
+ *
+ * Storage is yours and must be zero before first use, which a static object is
+ * (`static mbm_server server;`). What it serves are units, which several
+ * servers may share: one on a serial line and four TCP connections, for
+ * example, are five servers with the same units. Not re-entrant: use a server
+ * and its units from one thread and never from an interrupt; servers that share
+ * units belong to one thread.
+ */
+typedef struct mbm_server {
+    /**
+     * Not for you.
+     */
+    void *pointers[14];
+    /**
+     * Not for you.
+     */
+    uint32_t words[8];
+} mbm_server;
+
+/**
+ * What the functions named mbm_server_serve... hang onto a unit: one family of
+ * functions. The head of each record that they take; not for you.
+ */
+typedef struct mbm_service {
+    /**
+     * The service behind it.
+     */
+    struct mbm_service *next;
+    /**
+     * Serves a request, if it is one of this family.
+     */
+    uint16_t (*serve)(struct mbm_service *service, uint8_t *pdu, const void *heading);
+} mbm_service;
+
+/**
+ * What a unit knows of its line. Zero it, and hand it to
+ * mbm_server_serveDiagnostics. Counters wrap at 2^16; read them as you like.
+ */
+typedef struct mbm_diagnostics {
+    /**
+     * Not for you.
+     */
+    struct mbm_service service;
+    /**
+     * Optional: told that the client restarted the line with sub-function 01 of
+     * 08; `clearLog` is 1 if it cleared the event log too.
+     */
+    void (*restart)(void *context, uint8_t clearLog);
+    /**
+     * Handed to `restart`. Yours, may be NULL.
+     */
+    void *context;
+    /**
+     * What sub-function 02 of 08 returns: yours.
+     */
+    uint16_t diagnosticRegister;
+    /**
+     * Sub-function 0B: frames with a right CRC, for whichever unit.
+     */
+    uint16_t busMessages;
+    /**
+     * Sub-function 0C: frames that arrived damaged.
+     */
+    uint16_t busCommunicationErrors;
+    /**
+     * Sub-function 0D: exceptions, those of broadcasts too.
+     */
+    uint16_t exceptionErrors;
+    /**
+     * Sub-function 0E: requests for this unit, and broadcasts.
+     */
+    uint16_t serverMessages;
+    /**
+     * Sub-function 0F: requests that were not answered.
+     */
+    uint16_t noResponses;
+    /**
+     * Sub-function 10: exceptions 07.
+     */
+    uint16_t naks;
+    /**
+     * Sub-function 11: exceptions 06.
+     */
+    uint16_t busy;
+    /**
+     * Sub-function 12: frames that the buffer could not hold.
+     */
+    uint16_t characterOverruns;
+    /**
+     * What 0B returns: requests that were carried out.
+     */
+    uint16_t events;
+    /**
+     * 1 in listen only mode.
+     */
+    uint8_t listenOnly;
+    /**
+     * Not for you.
+     */
+    uint8_t hidden[67];
+} mbm_diagnostics;
+
+/**
+ * A unit that servers answer for. Zero it, set `id`, and say what it serves with
+ * mbm_server_serveCoils and its sisters.
+ */
+typedef struct mbm_unit {
+    /**
+     * Not for you.
+     */
+    struct mbm_service *services;
+    /**
+     * Not for you.
+     */
+    uint16_t (*monitor)(struct mbm_unit *unit,
+                        const void *heading,
+                        uint8_t concern,
+                        uint8_t *pdu);
+    /**
+     * Not for you.
+     */
+    struct mbm_diagnostics *diagnostics;
+    /**
+     * The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers, over TCP,
+     * to every id.
+     */
+    uint8_t id;
+} mbm_unit;
+
+/**
+ * Cells that your functions hold, one by one, in place of an array. Zero it, set
+ * what you need, and hand it to mbm_server_serveCallbacks.
+ */
+typedef struct mbm_cells {
+    /**
+     * Not for you.
+     */
+    struct mbm_service service;
+    /**
+     * Handed to each function. Yours, may be NULL.
+     */
+    void *context;
+    /**
+     * Optional, NULL if every address is there: 1 if this one is. What is not
+     * there is answered with exception 02.
+     */
+    uint8_t (*isValid)(void *context, uint16_t address);
+    /**
+     * A cell that is there; of a bit, 0 or anything else.
+     */
+    uint16_t (*get)(void *context, uint16_t address);
+    /**
+     * Sets a cell that is there; a bit to 0 or 1. Not needed for what is only read.
+     */
+    void (*set)(void *context, uint16_t address, uint16_t value);
+    /**
+     * As in mbm_registerTable.
+     */
+    uint8_t (*before)(void *context,
+                      uint16_t address,
+                      uint16_t quantity,
+                      const uint8_t *data);
+    /**
+     * As in mbm_registerTable.
+     */
+    void (*after)(void *context, uint16_t address, uint16_t quantity);
+} mbm_cells;
+
+/**
+ * A request for a function of yours.
+ */
+typedef struct mbm_request {
+    /**
+     * What stands behind the function code.
+     */
+    const uint8_t *data;
+    /**
+     * Bytes of it, 0 to 252.
+     */
+    uint16_t length;
+    /**
+     * The unit that it was sent to; on a serial line 0 is broadcast, whose
+     * response nobody will see.
+     */
+    uint8_t unit;
+    /**
+     * The function code.
+     */
+    uint8_t function;
+} mbm_request;
+
+/**
+ * A function of yours. Zero it, set what you need, and hand it to
+ * mbm_server_serveCustom.
+ */
+typedef struct mbm_custom {
+    /**
+     * Not for you.
+     */
+    struct mbm_service service;
+    /**
+     * Carries out a request and writes the data of the response, which stand
+     * behind the function code, to `response`. `capacity` is what the frame
+     * buffer has left behind the request, at most 252 of it are used. Returns
+     * how many bytes it wrote, or MBM_REPLY_EXCEPTION | code, MBM_REPLY_NONE or
+     * MBM_REPLY_PENDING.
+     */
+    uint16_t (*serve)(void *context,
+                      const struct mbm_request *request,
+                      uint8_t *response,
+                      uint16_t capacity);
+    /**
+     * Handed to `serve`. Yours, may be NULL.
+     */
+    void *context;
+    /**
+     * The function code, 1 to 127; 0 is every function that nothing before it
+     * serves. 65 to 72 and 100 to 110 are left to users (V1.1b3, 5).
+     */
+    uint8_t code;
+    /**
+     * How long its request PDUs are, which RTU over TCP asks. Zeroed, a request is
+     * whole once its CRC is right.
+     */
+    struct mbm_rule length;
+} mbm_custom;
+
+/**
+ * Functions that a unit answers with exception 01, though it could serve them:
+ * see mbm_server_switchOff.
+ */
+typedef struct mbm_switches {
+    /**
+     * Not for you.
+     */
+    struct mbm_service service;
+    /**
+     * Not for you.
+     */
+    uint8_t off[16];
+} mbm_switches;
+
+/**
+ * One file: an array of records, each a register.
+ */
+typedef struct mbm_file {
+    /**
+     * The records, from record 0 on.
+     */
+    uint16_t *records;
+    /**
+     * How many, up to 10000.
+     */
+    uint16_t size;
+    /**
+     * The file number, from 1 on.
+     */
+    uint16_t number;
+} mbm_file;
+
+/**
+ * Files of yours. Zero it, set what you need, and hand it to
+ * mbm_server_serveFiles.
+ */
+typedef struct mbm_files {
+    /**
+     * Not for you.
+     */
+    struct mbm_service service;
+    /**
+     * The files.
+     */
+    const struct mbm_file *files;
+    /**
+     * How many.
+     */
+    uint16_t count;
+    /**
+     * Optional: asked before records are written, for each group of a request
+     * before any is written. `data` are the new values, high bytes first.
+     * Returns 0, or an exception code that refuses the whole request.
+     */
+    uint8_t (*before)(void *context,
+                      uint16_t file,
+                      uint16_t record,
+                      uint16_t length,
+                      const uint8_t *data);
+    /**
+     * Optional: told what was written, once a group.
+     */
+    void (*after)(void *context, uint16_t file, uint16_t record, uint16_t length);
+    /**
+     * Handed to both hooks. Yours, may be NULL.
+     */
+    void *context;
+} mbm_files;
+
+/**
+ * One queue of registers.
+ */
+typedef struct mbm_fifo {
+    /**
+     * The registers, the first to leave first.
+     */
+    const uint16_t *words;
+    /**
+     * The address of the queue.
+     */
+    uint16_t address;
+    /**
+     * How many registers it holds now; more than 31 are answered with exception
+     * 03 (V1.1b3, 6.18).
+     */
+    uint16_t count;
+} mbm_fifo;
+
+/**
+ * Queues of yours. Zero it, set both, and hand it to mbm_server_serveFifos.
+ */
+typedef struct mbm_fifos {
+    /**
+     * Not for you.
+     */
+    struct mbm_service service;
+    /**
+     * The queues. Reading does not empty them.
+     */
+    const struct mbm_fifo *fifos;
+    /**
+     * How many.
+     */
+    uint16_t count;
+} mbm_fifos;
+
+/**
+ * The eight outputs of function 07. Zero it, and hand it to
+ * mbm_server_serveExceptionStatus.
+ */
+typedef struct mbm_exceptionStatus {
+    /**
+     * Not for you.
+     */
+    struct mbm_service service;
+    /**
+     * The outputs; change them at any time.
+     */
+    uint8_t outputs;
+} mbm_exceptionStatus;
+
+/**
+ * What function 11 answers. Zero it, set what you need, and hand it to
+ * mbm_server_serveServerId. All together at most 251 bytes, less what the frame
+ * buffer lacks; more is answered with exception 04.
+ */
+typedef struct mbm_serverId {
+    /**
+     * Not for you.
+     */
+    struct mbm_service service;
+    /**
+     * The id; NULL only with 0 bytes.
+     */
+    const uint8_t *id;
+    /**
+     * What stands behind the run indicator; NULL only with 0 bytes.
+     */
+    const uint8_t *additional;
+    /**
+     * Bytes of the id.
+     */
+    uint8_t idLength;
+    /**
+     * Bytes behind the run indicator.
+     */
+    uint8_t additionalLength;
+    /**
+     * The run indicator: 0 is answered as 00, anything else as FF.
+     */
+    uint8_t running;
+} mbm_serverId;
+
+/**
+ * A device identification. Zero it, set both, and hand it to
+ * mbm_server_serveIdentification.
+ */
+typedef struct mbm_identification {
+    /**
+     * Not for you.
+     */
+    struct mbm_service service;
+    /**
+     * The objects, in any order: ids 0 vendor name, 1 product code and 2 revision,
+     * which every device has; 3 vendor URL, 4 product name, 5 model name, 6 application
+     * name; from 0x80 on yours. Each has 244 bytes at most.
+     */
+    const struct mbm_object *objects;
+    /**
+     * How many.
+     */
+    uint16_t count;
+} mbm_identification;
+
+/**
+ * Coils or discrete inputs in an array of yours, eight to a byte, lowest bit
+ * first; as mbm_registerTable.
+ */
+typedef struct mbm_bitTable {
+    /**
+     * Not for you.
+     */
+    struct mbm_service service;
+    /**
+     * The bits.
+     */
+    uint8_t *bits;
+    /**
+     * As in mbm_registerTable.
+     */
+    const uint8_t *valid;
+    /**
+     * As in mbm_registerTable; `data` are bits, lowest first.
+     */
+    uint8_t (*before)(void *context,
+                      uint16_t address,
+                      uint16_t quantity,
+                      const uint8_t *data);
+    /**
+     * As in mbm_registerTable.
+     */
+    void (*after)(void *context, uint16_t address, uint16_t quantity);
+    /**
+     * As in mbm_registerTable.
+     */
+    void *context;
+    /**
+     * The address of the first bit.
+     */
+    uint16_t base;
+    /**
+     * How many bits there are.
+     */
+    uint16_t size;
+    /**
+     * Not for you.
+     */
+    uint8_t kind;
+} mbm_bitTable;
+
+/**
+ * Holding or input registers in an array of yours. Zero it, set what you need,
+ * and hand it to mbm_server_serveHoldingRegisters or
+ * mbm_server_serveInputRegisters. You may change words and settings at any
+ * time, but not from within a hook of this table.
+ */
+typedef struct mbm_registerTable {
+    /**
+     * Not for you.
+     */
+    struct mbm_service service;
+    /**
+     * The registers.
+     */
+    uint16_t *words;
+    /**
+     * Optional, NULL if every register is there: a bit for each, lowest bit of
+     * the first byte first; 0 answers exception 02.
+     */
+    const uint8_t *valid;
+    /**
+     * Optional: asked before registers are written, once a request. `data` are
+     * the new values, high bytes first. Returns 0, or an exception code that
+     * refuses the whole request.
+     */
+    uint8_t (*before)(void *context,
+                      uint16_t address,
+                      uint16_t quantity,
+                      const uint8_t *data);
+    /**
+     * Optional: told what was written.
+     */
+    void (*after)(void *context, uint16_t address, uint16_t quantity);
+    /**
+     * Handed to both hooks. Yours, may be NULL.
+     */
+    void *context;
+    /**
+     * The address of the first register.
+     */
+    uint16_t base;
+    /**
+     * How many registers there are.
+     */
+    uint16_t size;
+    /**
+     * Not for you.
+     */
+    uint8_t kind;
+} mbm_registerTable;
 
 /**
  * A sniffer: finds the frames on a bus that others use, and pairs requests with
@@ -2669,6 +3186,319 @@ void mbm_ring_clear(struct mbm_ring *ring);
  * @return bytes; wraps at 65536, on an AVR at 256
  */
 uint16_t mbm_ring_lost(const struct mbm_ring *ring);
+
+/**
+ * Moves the server on, without waiting: takes bytes in, carries a request out
+ * once it is whole, sends the response.
+ *
+ * Call it as often as you like, at least once per character time of the line
+ * if nothing else buffers its bytes. On a serial line a response begins with
+ * the first call after the line has been silent for t3.5.
+ *
+ * @param server  the object
+ * @return MBM_OK; MBM_LINK_LOST if the port said so, which ends a connection;
+ *         MBM_MALFORMED_FRAME if what came over TCP is not Modbus, so that
+ *         the connection is to be closed; MBM_INVALID_ARGUMENT or
+ *         MBM_NOT_INITIALISED
+ */
+uint8_t mbm_server_poll(struct mbm_server *server);
+
+/**
+ * How long mbm_server_poll will find nothing to do unless a byte arrives, so
+ * that a program may sleep until then.
+ *
+ * @param server  the object
+ * @return microseconds; 0 means poll now, 0xFFFFFFFF until a byte arrives
+ */
+uint32_t mbm_server_pollDelay(const struct mbm_server *server);
+
+/**
+ * Begins to serve units on a serial line, RTU. The rate is untold, so a frame
+ * ends with 4 ms of silence: see mbm_server_setBaudRate.
+ *
+ * May be called again at any time; what was under way is dropped. Opens
+ * nothing: the port is open already. Units are yours, may be shared between
+ * servers, and stay where they are for as long as the object is used, as does
+ * the buffer, which keeps nothing between requests.
+ *
+ * @param server  the object; zeroed before the first call
+ * @param port    copied; read, write and micros must be there
+ * @param units   what is served: one unit, or an array of them
+ * @param count   how many units
+ * @param frame   bytes of one frame, for requests and responses
+ * @param bytes   at least 16; MBM_MAX_FRAME hold any frame. Longer
+ *                requests are not heard, longer responses become exception 04
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or
+ *         a buffer of no use
+ */
+uint8_t mbm_server_begin(struct mbm_server *server,
+                         const struct mbm_port *port,
+                         struct mbm_unit *units,
+                         uint8_t count,
+                         uint8_t *frame,
+                         uint16_t bytes);
+
+/**
+ * Begins to serve units on a serial line, ASCII (serial line guide V1.02,
+ * 2.5.2). A frame whose next character takes longer than a second is dropped.
+ *
+ * @param server  see mbm_server_begin
+ * @param port    see mbm_server_begin
+ * @param units   see mbm_server_begin
+ * @param count   see mbm_server_begin
+ * @param frame   see mbm_server_begin
+ * @param bytes   at least 32; MBM_MAX_ASCII_FRAME hold any frame
+ * @return MBM_OK or MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_server_beginAscii(struct mbm_server *server,
+                              const struct mbm_port *port,
+                              struct mbm_unit *units,
+                              uint8_t count,
+                              uint8_t *frame,
+                              uint16_t bytes);
+
+/**
+ * Begins to serve units on a TCP connection that was accepted. Requests that
+ * wait behind one another in the stream are answered in turn.
+ *
+ * @param server  see mbm_server_begin; one for each connection
+ * @param port    see mbm_server_begin; read, write and clock of the connection
+ * @param units   see mbm_server_begin; the unit ids 0 and 255 mean the first
+ * @param count   see mbm_server_begin
+ * @param frame   see mbm_server_begin; one for each connection
+ * @param bytes   at least MBM_MAX_TCP_FRAME
+ * @return MBM_OK or MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_server_beginTcp(struct mbm_server *server,
+                            const struct mbm_port *port,
+                            struct mbm_unit *units,
+                            uint8_t count,
+                            uint8_t *frame,
+                            uint16_t bytes);
+
+/**
+ * Begins to serve units over a stream of RTU frames, in which silence tells
+ * nothing: a TCP connection of RTU over TCP, or a serial adapter that hands
+ * bytes over in lumps. A frame ends where its own bytes say so; behind one that
+ * is damaged, half a second of silence does.
+ *
+ * @param server  see mbm_server_begin; one for each connection
+ * @param port    see mbm_server_begin
+ * @param units   see mbm_server_begin; the unit ids 0 and 255 mean the first
+ * @param count   see mbm_server_begin
+ * @param frame   see mbm_server_begin; one for each connection
+ * @param bytes   at least 16; MBM_MAX_FRAME hold any frame
+ * @return MBM_OK or MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_server_beginRtuOverTcp(struct mbm_server *server,
+                                   const struct mbm_port *port,
+                                   struct mbm_unit *units,
+                                   uint8_t count,
+                                   uint8_t *frame,
+                                   uint16_t bytes);
+
+/**
+ * Sets the silence that ends a frame: t3.5 of RTU, the time between two
+ * characters of ASCII. mbm_server_begin and its sisters set it back.
+ *
+ * @param server        the object
+ * @param microseconds  counted from the last byte seen
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t microseconds);
+
+/**
+ * Tells the baud rate of an RTU line, from which t3.5 follows (serial line guide
+ * V1.02, 2.5.1.1). It sets nothing on the line.
+ *
+ * @param server  the object
+ * @param baud    bits per second; 0 goes back to untold
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
+
+/**
+ * Serves cells that your functions hold.
+ *
+ * @param unit   the unit
+ * @param cells  yours, for as long as the unit is used
+ * @param table  the function that reads them: 1 coils (01, 05, 0F), 2 discrete
+ *               inputs (02), 3 holding registers (03, 06, 10, 16, 17), 4 input
+ *               registers (04)
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, no `get`, no `set`
+ *         where it is needed, or another table
+ */
+uint8_t mbm_server_serveCallbacks(struct mbm_unit *unit,
+                                  struct mbm_cells *cells,
+                                  uint8_t table);
+
+/**
+ * Serves a function of yours, on every framing.
+ *
+ * @param unit    the unit
+ * @param custom  yours, for as long as the unit is used
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, no function, a code
+ *         from 128 on, or a length that is no rule
+ */
+uint8_t mbm_server_serveCustom(struct mbm_unit *unit, struct mbm_custom *custom);
+
+/**
+ * Switches a function of a unit off: it is answered with exception 01 from now
+ * on, whatever serves it.
+ *
+ * @param unit      the unit
+ * @param switches  yours, for as long as the unit is used; zeroed before the
+ *                  first call. One for each unit
+ * @param code      1 to 127
+ * @return MBM_OK or MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_server_switchOff(struct mbm_unit *unit,
+                             struct mbm_switches *switches,
+                             uint8_t code);
+
+/**
+ * Switches a function on again.
+ *
+ * @param switches  what mbm_server_switchOff was given
+ * @param code      1 to 127
+ * @return MBM_OK or MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_server_switchOn(struct mbm_switches *switches, uint8_t code);
+
+/**
+ * Serves diagnostics: functions 08 with every sub-function, 0B and 0C. From now
+ * on the unit counts what its lines bring, logs events, and can be forced into
+ * listen only mode.
+ *
+ * @param unit         the unit
+ * @param diagnostics  yours, for as long as the unit is used; one for each unit
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_server_serveDiagnostics(struct mbm_unit *unit,
+                                    struct mbm_diagnostics *diagnostics);
+
+/**
+ * Serves files: functions 14 and 15. A request is carried out whole or not at
+ * all. It takes 250 bytes of stack.
+ *
+ * @param unit   the unit
+ * @param files  yours, for as long as the unit is used
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_server_serveFiles(struct mbm_unit *unit, struct mbm_files *files);
+
+/**
+ * Serves FIFO queues: function 18.
+ *
+ * @param unit   the unit
+ * @param fifos  yours, for as long as the unit is used
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_server_serveFifos(struct mbm_unit *unit, struct mbm_fifos *fifos);
+
+/**
+ * Serves the exception status: function 07.
+ *
+ * @param unit    the unit
+ * @param status  yours, for as long as the unit is used
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_server_serveExceptionStatus(struct mbm_unit *unit,
+                                        struct mbm_exceptionStatus *status);
+
+/**
+ * Serves the server id: function 11.
+ *
+ * @param unit  the unit
+ * @param id    yours, for as long as the unit is used
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_server_serveServerId(struct mbm_unit *unit, struct mbm_serverId *id);
+
+/**
+ * Serves the device identification: function 2B/0E, as streams of objects and
+ * one by one. What does not fit into one response follows in the next that the
+ * client asks for. The conformity level is that of the objects there are.
+ *
+ * @param unit            the unit
+ * @param identification  yours, for as long as the unit is used
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_server_serveIdentification(struct mbm_unit *unit,
+                                       struct mbm_identification *identification);
+
+/**
+ * Answers one request, without a server: takes a frame from a buffer and writes
+ * the response frame over it.
+ *
+ * @param framing    0 RTU, 1 ASCII with LF as its delimiter, 2 TCP, 3 RTU over
+ *                   TCP
+ * @param units      what is served: one unit, or an array of them
+ * @param count      how many units
+ * @param frame      the whole request, and room for the response
+ * @param length     bytes of the request
+ * @param capacity   bytes of the buffer: 256 hold any response in RTU, 513 in
+ *                   ASCII, 260 over TCP; a longer response becomes exception 04
+ * @param response   bytes of the response; 0 where there is none: for a damaged
+ *                   frame, another unit, or a broadcast
+ * @return MBM_OK; MBM_PENDING, with the buffer to be filled anew, if a function
+ *         of yours is not done; MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_server_respond(uint8_t framing,
+                           struct mbm_unit *units,
+                           uint8_t count,
+                           uint8_t *frame,
+                           uint16_t length,
+                           uint16_t capacity,
+                           uint16_t *response);
+
+/**
+ * Serves coils: functions 01, 05 and 0F.
+ *
+ * @param unit   the unit
+ * @param table  yours, for as long as the unit is used
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_server_serveCoils(struct mbm_unit *unit, struct mbm_bitTable *table);
+
+/**
+ * Serves discrete inputs: function 02.
+ *
+ * @param unit   the unit
+ * @param table  yours, for as long as the unit is used
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_server_serveDiscreteInputs(struct mbm_unit *unit, struct mbm_bitTable *table);
+
+/**
+ * Serves holding registers: functions 03, 06 and 10. For 16 and 17 too, call
+ * mbm_server_serveMaskAndReadWrite behind it.
+ *
+ * @param unit   the unit
+ * @param table  yours, for as long as the unit is used
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_server_serveHoldingRegisters(struct mbm_unit *unit,
+                                         struct mbm_registerTable *table);
+
+/**
+ * Serves input registers: function 04.
+ *
+ * @param unit   the unit
+ * @param table  yours, for as long as the unit is used
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_server_serveInputRegisters(struct mbm_unit *unit,
+                                       struct mbm_registerTable *table);
+
+/**
+ * Serves functions 16 and 17 beside 03, 06 and 10: a call of its own, so that
+ * firmware without it is smaller.
+ *
+ * @param table  holding registers that mbm_server_serveHoldingRegisters took
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL and other tables
+ */
+uint8_t mbm_server_serveMaskAndReadWrite(struct mbm_registerTable *table);
 
 /**
  * Begins to listen. May be called again: what was heard is forgotten, and the

@@ -3,7 +3,7 @@
 //! Data flows one way, and a module uses only what stands to its left:
 //!
 //! ```text
-//! bytes -> frame -> pdu -> packet -> explain -> {sniffer, transaction} -> master -> capi
+//! bytes -> frame -> pdu -> packet -> explain -> {sniffer, transaction} -> {master, server} -> capi
 //! ```
 //!
 //! `error`, `time`, `port`, `ring` and `data` stand beside that line and may be used
@@ -48,6 +48,8 @@ pub mod transaction;
 
 /// cbindgen:ignore
 pub mod master;
+/// cbindgen:ignore
+pub mod server;
 
 #[allow(unsafe_code)]
 pub mod capi;

@@ -22,8 +22,11 @@ macro_rules! probes {
 
 fn probes() -> Vec<(String, u64)> {
     probes! {
-        sizes: mbm_port mbm_counters mbm_master mbm_registers mbm_ring mbm_rule mbm_function mbm_length
-            mbm_packet mbm_record mbm_object mbm_framing mbm_sniffer mbm_event;
+        sizes: mbm_port mbm_counters mbm_master mbm_registers mbm_ring mbm_rule mbm_function
+            mbm_length mbm_packet mbm_record mbm_object mbm_framing mbm_server mbm_unit
+            mbm_service mbm_registerTable mbm_bitTable mbm_cells mbm_file mbm_files mbm_fifo
+            mbm_fifos mbm_exceptionStatus mbm_serverId mbm_identification mbm_request mbm_custom
+            mbm_switches mbm_diagnostics mbm_sniffer mbm_event;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
             mbm_counters { requests replies exceptions badCrc timeouts foreignFrames
@@ -39,6 +42,24 @@ fn probes() -> Vec<(String, u64)> {
             mbm_object { data length id }
             mbm_framing { functions functionCount kind end }
             mbm_registers { data first count kind order }
+            mbm_service { next serve }
+            mbm_unit { services monitor diagnostics id }
+            mbm_registerTable { service words valid before after context base size kind }
+            mbm_bitTable { service bits valid before after context base size kind }
+            mbm_cells { service context isValid get set before after }
+            mbm_file { records size number }
+            mbm_files { service files count before after context }
+            mbm_fifo { words address count }
+            mbm_fifos { service fifos count }
+            mbm_exceptionStatus { service outputs }
+            mbm_serverId { service id additional idLength additionalLength running }
+            mbm_identification { service objects count }
+            mbm_request { data length unit function }
+            mbm_custom { service serve context code length }
+            mbm_switches { service off }
+            mbm_diagnostics { service restart context diagnosticRegister busMessages
+                busCommunicationErrors exceptionErrors serverMessages noResponses naks busy
+                characterOverruns events listenOnly hidden }
             mbm_event { frame pdu packet time responseTime frameLength pduLength length address
                 quantity kind status unit function asked askedLength };
         constants:
@@ -48,16 +69,16 @@ fn probes() -> Vec<(String, u64)> {
             MBM_GATEWAY_TARGET_FAILED_TO_RESPOND MBM_INVALID_SLAVE_ID MBM_INVALID_FUNCTION
             MBM_RESPONSE_TIMED_OUT MBM_INVALID_CRC MBM_INVALID_ARGUMENT MBM_MALFORMED_REPLY
             MBM_LINK_LOST MBM_BUSY MBM_BROADCAST_NOT_ALLOWED MBM_BUFFER_TOO_SMALL
-            MBM_NOT_INITIALISED MBM_PENDING MBM_LINE_BUSY MBM_CANCELLED
-            MBM_INCOMPLETE_FRAME MBM_MALFORMED_FRAME
-            MBM_MAX_READ_REGISTERS MBM_MAX_WRITE_REGISTERS MBM_MAX_READ_WRITE_REGISTERS
-            MBM_MAX_READ_BITS MBM_MAX_WRITE_BITS MBM_MAX_FRAME
+            MBM_NOT_INITIALISED MBM_PENDING MBM_LINE_BUSY MBM_CANCELLED MBM_INCOMPLETE_FRAME
+            MBM_MALFORMED_FRAME MBM_MAX_READ_REGISTERS MBM_MAX_WRITE_REGISTERS
+            MBM_MAX_READ_WRITE_REGISTERS MBM_MAX_READ_BITS MBM_MAX_WRITE_BITS MBM_MAX_FRAME
             MBM_FC_READ_COILS MBM_FC_READ_DISCRETE_INPUTS MBM_FC_READ_HOLDING_REGISTERS
             MBM_FC_READ_INPUT_REGISTERS MBM_FC_WRITE_SINGLE_COIL MBM_FC_WRITE_SINGLE_REGISTER
             MBM_FC_READ_EXCEPTION_STATUS MBM_FC_DIAGNOSTICS MBM_FC_GET_COMM_EVENT_COUNTER
-            MBM_FC_GET_COMM_EVENT_LOG MBM_FC_WRITE_MULTIPLE_COILS MBM_FC_WRITE_MULTIPLE_REGISTERS
-            MBM_FC_REPORT_SERVER_ID MBM_FC_READ_FILE_RECORD MBM_FC_WRITE_FILE_RECORD
-            MBM_FC_MASK_WRITE_REGISTER MBM_FC_READ_WRITE_MULTIPLE_REGISTERS MBM_FC_READ_FIFO_QUEUE
+            MBM_FC_GET_COMM_EVENT_LOG MBM_FC_WRITE_MULTIPLE_COILS
+            MBM_FC_WRITE_MULTIPLE_REGISTERS MBM_FC_REPORT_SERVER_ID MBM_FC_READ_FILE_RECORD
+            MBM_FC_WRITE_FILE_RECORD MBM_FC_MASK_WRITE_REGISTER
+            MBM_FC_READ_WRITE_MULTIPLE_REGISTERS MBM_FC_READ_FIFO_QUEUE
             MBM_FC_ENCAPSULATED_INTERFACE MBM_DIAGNOSTICS_RETURN_QUERY_DATA
             MBM_DIAGNOSTICS_RESTART_COMMUNICATIONS MBM_DIAGNOSTICS_RETURN_DIAGNOSTIC_REGISTER
             MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY
@@ -70,15 +91,14 @@ fn probes() -> Vec<(String, u64)> {
             MBM_MEI_READ_DEVICE_IDENTIFICATION MBM_DEVICE_ID_BASIC MBM_DEVICE_ID_REGULAR
             MBM_DEVICE_ID_EXTENDED MBM_DEVICE_ID_INDIVIDUAL MBM_RULE_SILENCE MBM_RULE_FIXED
             MBM_RULE_COUNTED MBM_PACKET_REQUEST MBM_PACKET_RESPONSE MBM_PACKET_EXCEPTION
-            MBM_MAX_PDU MBM_LENGTH_EXACT MBM_LENGTH_AT_LEAST MBM_LENGTH_SILENCE MBM_LENGTH_UNKNOWN
-            MBM_FRAMING_RTU MBM_FRAMING_ASCII MBM_FRAMING_TCP MBM_FRAMING_RTU_OVER_TCP
-            MBM_MAX_TCP_FRAME MBM_MAX_ASCII_FRAME
-            MBM_ORDER_DEFAULT MBM_ORDER_ABCD MBM_ORDER_CDAB MBM_ORDER_BADC MBM_ORDER_DCBA
-            MBM_REGISTERS_OF_WORDS MBM_REGISTERS_OF_BYTES MBM_REGISTERS_INTO_WORDS
-            MBM_REGISTERS_INTO_BYTES
-            MBM_EVENT_REQUEST MBM_EVENT_REPLY MBM_EVENT_EXCEPTION MBM_EVENT_UNPAIRED
-            MBM_EVENT_TIMEOUT MBM_EVENT_BAD_CRC MBM_EVENT_NOISE MBM_TAP_BOTH MBM_TAP_CLIENT
-            MBM_TAP_SERVER MBM_MIN_SNIFFER_BUFFER MBM_MAX_SNIFFER_FUNCTIONS;
+            MBM_MAX_PDU MBM_LENGTH_EXACT MBM_LENGTH_AT_LEAST MBM_LENGTH_SILENCE
+            MBM_LENGTH_UNKNOWN MBM_FRAMING_RTU MBM_FRAMING_ASCII MBM_FRAMING_TCP
+            MBM_FRAMING_RTU_OVER_TCP MBM_MAX_TCP_FRAME MBM_MAX_ASCII_FRAME MBM_ORDER_DEFAULT
+            MBM_ORDER_ABCD MBM_ORDER_CDAB MBM_ORDER_BADC MBM_ORDER_DCBA MBM_REGISTERS_OF_WORDS
+            MBM_REGISTERS_OF_BYTES MBM_REGISTERS_INTO_WORDS MBM_REGISTERS_INTO_BYTES
+            MBM_REPLY_EXCEPTION MBM_REPLY_NONE MBM_REPLY_PENDING MBM_EVENT_REQUEST MBM_EVENT_REPLY MBM_EVENT_EXCEPTION
+            MBM_EVENT_UNPAIRED MBM_EVENT_TIMEOUT MBM_EVENT_BAD_CRC MBM_EVENT_NOISE MBM_TAP_BOTH
+            MBM_TAP_CLIENT MBM_TAP_SERVER MBM_MIN_SNIFFER_BUFFER MBM_MAX_SNIFFER_FUNCTIONS;
     }
 }
 

@@ -168,7 +168,7 @@ pub struct mbm_function {
 }
 
 /// The core's word for a rule; none if it is no rule.
-fn rule(rule: mbm_rule) -> Option<Rule> {
+pub(super) fn rule(rule: mbm_rule) -> Option<Rule> {
     let fits = |most| (1..=most).contains(&rule.bytes);
     match rule.kind {
         MBM_RULE_SILENCE => Some(Rule::Silence),

@@ -111,11 +111,28 @@ impl Crc16 {
     /// The CRC of no bytes.
     pub const START: Crc16 = Crc16(0xFFFF);
 
+    /// What the bytes of a frame including its CRC leave, if that is right.
+    pub const RESIDUE: Crc16 = Crc16(0);
+
     /// The CRC with `bytes` taken in as well.
     #[cfg_attr(target_os = "none", inline(never))]
     #[must_use]
     pub fn with(self, bytes: &[u8]) -> Crc16 {
         Crc16(update(self.0, bytes))
+    }
+
+    /// The CRC before `byte` was taken in, from the CRC with it.
+    #[must_use]
+    pub fn before(self, byte: u8) -> Crc16 {
+        let mut crc = self.0;
+        for _ in 0..8 {
+            let odd = crc & 0x8000 != 0;
+            crc <<= 1;
+            if odd {
+                crc ^= 0x4003;
+            }
+        }
+        Crc16(crc ^ u16::from(byte))
     }
 
     /// The two bytes as sent, low byte first.
@@ -183,6 +200,11 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn a_byte_can_be_taken_back(crc: u16, byte: u8) {
+            prop_assert_eq!(Crc16(crc).with(&[byte]).before(byte), Crc16(crc));
+        }
+
         #[test]
         fn bytes_may_arrive_in_any_pieces(bytes: std::vec::Vec<u8>, cut: usize) {
             let (front, back) = bytes.split_at(cut % (bytes.len() + 1));

@@ -1,10 +1,16 @@
 //! What several tests need: a request's frame, and a search for its response.
 
+#[allow(dead_code)]
+pub mod device;
+#[allow(dead_code)]
+pub mod line;
+
 use mbm::frame::rtu::{self, Verdict, Wanted};
 use mbm::pdu::query::Query;
 use mbm::pdu::reply;
 use std::num::NonZeroU8;
 
+#[allow(dead_code)]
 /// The frame of a request to `unit`, with `words` to send.
 pub fn frame(unit: u8, request: &Query, words: &[u16]) -> Vec<u8> {
     let mut buffer = [0; rtu::MAX_FRAME];
@@ -18,6 +24,7 @@ pub fn frame(unit: u8, request: &Query, words: &[u16]) -> Vec<u8> {
     buffer[..usize::from(request.length()) + rtu::OVERHEAD].to_vec()
 }
 
+#[allow(dead_code)]
 /// The response of a unit to a request.
 pub struct Wanting<'a>(pub u8, pub &'a Query);
 

@@ -1,0 +1,321 @@
+/* A million requests to tables in C, most of them nearly right, against a model
+ * of the test's own: every answer agrees, and every cell behind it. */
+#include "crc.h"
+#include "mbm.h"
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { CELLS = 64, BASE = 0xFFC0 - CELLS, UNIT = 9, GUARD = 8 };
+
+static uint64_t seed = 0x9E3779B97F4A7C15u;
+
+static unsigned below(unsigned limit)
+{
+    seed ^= seed << 13;
+    seed ^= seed >> 7;
+    seed ^= seed << 17;
+    return (unsigned)(seed >> 24) % limit;
+}
+
+/* What the server has, with guards around that nothing may touch. */
+static struct {
+    uint16_t before[GUARD], holding[CELLS], between[GUARD], inputs[CELLS], behind[GUARD];
+    uint8_t bits_before[GUARD], coils[CELLS / 8], bits_between[GUARD], discrete[CELLS / 8];
+    uint8_t bits_behind[GUARD];
+} memory;
+
+/* What it should have. */
+static struct {
+    uint16_t words[2][CELLS];
+    uint8_t bits[2][CELLS];
+} model;
+
+static mbm_unit unit;
+static mbm_registerTable holding, inputs;
+static mbm_bitTable coils, discrete;
+static uint8_t valid[CELLS / 8];
+
+static int there(unsigned address, unsigned quantity)
+{
+    unsigned i;
+
+    if (address < BASE || address + quantity > BASE + CELLS)
+        return 0;
+    for (i = address - BASE; i < address - BASE + quantity; i++)
+        if (i == 20 || i == 33)
+            return 0;
+    return 1;
+}
+
+static unsigned word(const uint8_t *bytes)
+{
+    return (unsigned)(bytes[0] << 8 | bytes[1]);
+}
+
+static size_t refuse(uint8_t *out, uint8_t function, uint8_t code)
+{
+    out[0] = function | 0x80;
+    out[1] = code;
+    return 2;
+}
+
+static size_t words_of(uint8_t *out, uint8_t function, const uint16_t *cells, unsigned quantity)
+{
+    unsigned i;
+
+    out[0] = function;
+    out[1] = (uint8_t)(2 * quantity);
+    for (i = 0; i < quantity; i++) {
+        out[2 + 2 * i] = (uint8_t)(cells[i] >> 8);
+        out[3 + 2 * i] = (uint8_t)cells[i];
+    }
+    return 2 + 2 * quantity;
+}
+
+/* The response, by the book; the model changes as the server should. */
+static size_t by_the_book(const uint8_t *pdu, size_t length, uint8_t *out)
+{
+    uint8_t function = pdu[0];
+    unsigned address = length >= 3 ? word(pdu + 1) : 0, quantity = length >= 5 ? word(pdu + 3) : 0;
+    unsigned i, bytes, written, to;
+
+    memcpy(out, pdu, length < 7 ? length : 7);
+    switch (function) {
+    case 1:
+    case 2:
+        if (length != 5 || quantity < 1 || quantity > 2000)
+            return refuse(out, function, 3);
+        if (!there(address, quantity))
+            return refuse(out, function, 2);
+        bytes = (quantity + 7) / 8;
+        memset(out + 1, 0, 1 + bytes);
+        out[1] = (uint8_t)bytes;
+        for (i = 0; i < quantity; i++)
+            out[2 + i / 8] |= (uint8_t)(model.bits[function - 1][address - BASE + i] << i % 8);
+        return 2 + bytes;
+    case 3:
+    case 4:
+        if (length != 5 || quantity < 1 || quantity > 125)
+            return refuse(out, function, 3);
+        if (!there(address, quantity))
+            return refuse(out, function, 2);
+        return words_of(out, function, &model.words[function - 3][address - BASE], quantity);
+    case 5:
+    case 6:
+        if (length != 5 || (function == 5 && quantity != 0 && quantity != 0xFF00))
+            return refuse(out, function, 3);
+        if (!there(address, 1))
+            return refuse(out, function, 2);
+        if (function == 5)
+            model.bits[0][address - BASE] = quantity != 0;
+        else
+            model.words[0][address - BASE] = (uint16_t)quantity;
+        return 5;
+    case 0x0F:
+    case 0x10:
+        bytes = function == 0x0F ? (quantity + 7) / 8 : 2 * quantity;
+        if (length < 6 || quantity < 1 || quantity > (function == 0x0F ? 1968 : 123) ||
+            pdu[5] != bytes || length != 6 + bytes)
+            return refuse(out, function, 3);
+        if (!there(address, quantity))
+            return refuse(out, function, 2);
+        for (i = 0; i < quantity; i++)
+            if (function == 0x0F)
+                model.bits[0][address - BASE + i] = pdu[6 + i / 8] >> i % 8 & 1;
+            else
+                model.words[0][address - BASE + i] = (uint16_t)word(pdu + 6 + 2 * i);
+        return 5;
+    case 0x16:
+        if (length != 7)
+            return refuse(out, function, 3);
+        if (!there(address, 1))
+            return refuse(out, function, 2);
+        to = model.words[0][address - BASE];
+        model.words[0][address - BASE] = (uint16_t)((to & quantity) | (word(pdu + 5) & ~quantity));
+        return 7;
+    case 0x17:
+        to = length >= 10 ? word(pdu + 5) : 0;
+        written = length >= 10 ? word(pdu + 7) : 0;
+        if (length < 10 || quantity < 1 || quantity > 125 || written < 1 || written > 121 ||
+            pdu[9] != 2 * written || length != 10 + 2 * written)
+            return refuse(out, function, 3);
+        if (!there(address, quantity) || !there(to, written))
+            return refuse(out, function, 2);
+        for (i = 0; i < written; i++)
+            model.words[0][to - BASE + i] = (uint16_t)word(pdu + 10 + 2 * i);
+        return words_of(out, function, &model.words[0][address - BASE], quantity);
+    default:
+        return refuse(out, function, 1);
+    }
+}
+
+static size_t put(uint8_t *place, unsigned value)
+{
+    place[0] = (uint8_t)(value >> 8);
+    place[1] = (uint8_t)value;
+    return 2;
+}
+
+static unsigned some_address(void)
+{
+    return below(8) ? BASE - 2 + below(CELLS + 4) : below(0x10000);
+}
+
+static unsigned some_quantity(void)
+{
+    static const unsigned edges[] = {0, 1, 121, 122, 123, 124, 125, 126, 1968, 1969, 2000, 2001};
+
+    switch (below(8)) {
+    case 0:
+        return below(0x10000);
+    case 1:
+        return edges[below(COUNT(edges))];
+    default:
+        return below(20);
+    }
+}
+
+static size_t some_request(uint8_t *pdu)
+{
+    static const uint8_t functions[] = {1, 2, 3, 4, 5, 6, 0x0F, 0x10, 0x16, 0x17, 0x18, 0x41, 0, 0x83};
+    static const unsigned values[] = {0, 0xFF00, 0x100, 0xFF01};
+    size_t n = 1;
+    unsigned quantity, bytes;
+
+    pdu[0] = functions[below(COUNT(functions))];
+    n += put(pdu + n, some_address());
+    switch (pdu[0]) {
+    case 5:
+        n += put(pdu + n, values[below(COUNT(values))]);
+        break;
+    case 0x16:
+        n += put(pdu + n, below(0x10000));
+        n += put(pdu + n, below(0x10000));
+        break;
+    case 0x0F:
+    case 0x10:
+    case 0x17:
+        if (pdu[0] == 0x17) {
+            n += put(pdu + n, some_quantity());
+            n += put(pdu + n, some_address());
+        }
+        quantity = some_quantity();
+        n += put(pdu + n, quantity);
+        bytes = pdu[0] == 0x0F ? (quantity + 7) / 8 : 2 * quantity;
+        bytes = bytes < 240 ? bytes : 240;
+        pdu[n++] = (uint8_t)bytes;
+        while (bytes--)
+            pdu[n++] = (uint8_t)below(256);
+        break;
+    default:
+        n += put(pdu + n, pdu[0] == 6 ? below(0x10000) : some_quantity());
+    }
+    switch (below(24)) {
+    case 0:
+        return 1 + below((unsigned)n);
+    case 1:
+        pdu[n] = (uint8_t)below(256);
+        return n < 253 ? n + 1 : n;
+    case 2:
+        pdu[below((unsigned)n)] = (uint8_t)below(256);
+        return n;
+    default:
+        return n;
+    }
+}
+
+static int prepare(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    memset(&memory, 0xA5, sizeof memory);
+    memset(memory.coils, 0, sizeof memory.coils);
+    memset(memory.discrete, 0, sizeof memory.discrete);
+    memset(valid, 0xFF, sizeof valid);
+    valid[20 / 8] &= (uint8_t)~(1u << 20 % 8);
+    valid[33 / 8] &= (uint8_t)~(1u << 33 % 8);
+    for (i = 0; i < CELLS; i++) {
+        model.words[0][i] = memory.holding[i] = (uint16_t)below(0x10000);
+        model.words[1][i] = memory.inputs[i] = (uint16_t)below(0x10000);
+        model.bits[0][i] = (uint8_t)below(2);
+        model.bits[1][i] = (uint8_t)below(2);
+        memory.coils[i / 8] |= (uint8_t)(model.bits[0][i] << i % 8);
+        memory.discrete[i / 8] |= (uint8_t)(model.bits[1][i] << i % 8);
+    }
+    unit.id = UNIT;
+    holding.words = memory.holding;
+    inputs.words = memory.inputs;
+    coils.bits = memory.coils;
+    discrete.bits = memory.discrete;
+    holding.base = inputs.base = coils.base = discrete.base = BASE;
+    holding.size = inputs.size = coils.size = discrete.size = CELLS;
+    holding.valid = inputs.valid = coils.valid = discrete.valid = valid;
+    return mbm_server_serveHoldingRegisters(&unit, &holding) | mbm_server_serveInputRegisters(&unit, &inputs) |
+           mbm_server_serveCoils(&unit, &coils) | mbm_server_serveDiscreteInputs(&unit, &discrete) |
+           mbm_server_serveMaskAndReadWrite(&holding);
+}
+
+static int untouched(const void *guard, size_t bytes)
+{
+    const uint8_t *byte = (const uint8_t *)guard;
+
+    while (bytes--)
+        if (*byte++ != 0xA5)
+            return 0;
+    return 1;
+}
+
+static void only_valid_writes_change_anything(void **state)
+{
+    const char *told = getenv("MBM_TRANSACTIONS");
+    long rounds = told ? atol(told) : 1000000, round;
+    uint8_t packed[2][CELLS / 8];
+    unsigned i;
+
+    (void)state;
+    for (round = 0; round < rounds; round++) {
+        uint8_t pdu[300], expected[300], frame[256];
+        uint16_t answered;
+        size_t length = some_request(pdu), wanted;
+        int damaged = below(16) == 0;
+
+        frame[0] = UNIT;
+        memcpy(frame + 1, pdu, length);
+        seal(frame, length + 1);
+        if (damaged)
+            frame[below((unsigned)length + 3)] ^= (uint8_t)(1u << below(8));
+        OK(mbm_server_respond(MBM_FRAMING_RTU, &unit, 1, frame, (uint16_t)(length + 3), sizeof frame, &answered));
+        if (damaged) {
+            assert_int_equal(answered, 0);
+        } else {
+            wanted = by_the_book(pdu, length, expected);
+            assert_int_equal(answered, wanted + 3);
+            assert_memory_equal(frame + 1, expected, wanted);
+            assert_int_equal(crc16(frame, answered), 0);
+        }
+        memset(packed, 0, sizeof packed);
+        for (i = 0; i < CELLS; i++) {
+            packed[0][i / 8] |= (uint8_t)(model.bits[0][i] << i % 8);
+            packed[1][i / 8] |= (uint8_t)(model.bits[1][i] << i % 8);
+        }
+        assert_memory_equal(memory.holding, model.words[0], sizeof memory.holding);
+        assert_memory_equal(memory.inputs, model.words[1], sizeof memory.inputs);
+        assert_memory_equal(memory.coils, packed[0], sizeof packed[0]);
+        assert_memory_equal(memory.discrete, packed[1], sizeof packed[1]);
+    }
+    assert_true(untouched(memory.before, sizeof memory.before));
+    assert_true(untouched(memory.between, sizeof memory.between));
+    assert_true(untouched(memory.behind, sizeof memory.behind));
+    assert_true(untouched(memory.bits_before, GUARD) && untouched(memory.bits_between, GUARD) &&
+                untouched(memory.bits_behind, GUARD));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(only_valid_writes_change_anything)};
+
+    return cmocka_run_group_tests(tests, prepare, NULL);
+}

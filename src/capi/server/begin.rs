@@ -1,0 +1,215 @@
+//! Beginning a server, and how it behaves.
+
+use super::{check, mbm_server, mbm_unit, object, Core, Object, BEGUN};
+use crate::capi::frame::MBM_MAX_TCP_FRAME;
+use crate::capi::port::mbm_port;
+use crate::error::Status;
+use crate::time;
+
+/// The least that a frame buffer may have for RTU.
+const LEAST: u16 = 16;
+
+/// Begins a server: port, units and buffer are checked and kept; `framing` does
+/// the rest.
+///
+/// # Safety
+/// As the header demands of each argument.
+#[cfg_attr(target_os = "none", inline(never))]
+unsafe fn begin(
+    server: *mut mbm_server,
+    port: *const mbm_port,
+    units: *mut mbm_unit,
+    count: u8,
+    frame: *mut u8,
+    bytes: u16,
+) -> Option<&'static mut Core> {
+    if server.is_null() || port.is_null() || units.is_null() || frame.is_null() || bytes < LEAST {
+        return None;
+    }
+    // SAFETY: not NULL, so a port, and an object of which zero is a value of
+    // every field.
+    unsafe {
+        if !(*port).is_complete() {
+            return None;
+        }
+        let object: &mut Object = &mut *server.cast();
+        object.mark = BEGUN;
+        let core = &mut object.core;
+        // Field by field, which needs no memory function.
+        core.port.context = (*port).context;
+        core.port.read = (*port).read;
+        core.port.write = (*port).write;
+        core.port.micros = (*port).micros;
+        core.port.flush = (*port).flush;
+        core.port.preTransmission = (*port).preTransmission;
+        core.port.postTransmission = (*port).postTransmission;
+        core.lent.frame = frame;
+        core.lent.units = units;
+        core.lent.bytes = bytes;
+        core.lent.count = count;
+        Some(core)
+    }
+}
+
+/// Begins to serve units on a serial line, RTU. The rate is untold, so a frame
+/// ends with 4 ms of silence: see mbm_server_setBaudRate.
+///
+/// May be called again at any time; what was under way is dropped. Opens
+/// nothing: the port is open already. Units are yours, may be shared between
+/// servers, and stay where they are for as long as the object is used, as does
+/// the buffer, which keeps nothing between requests.
+///
+/// @param server  the object; zeroed before the first call
+/// @param port    copied; read, write and micros must be there
+/// @param units   what is served: one unit, or an array of them
+/// @param count   how many units
+/// @param frame   bytes of one frame, for requests and responses
+/// @param bytes   at least 16; MBM_MAX_FRAME hold any frame. Longer
+///                requests are not heard, longer responses become exception 04
+/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or
+///         a buffer of no use
+#[no_mangle]
+pub unsafe extern "C" fn mbm_server_begin(
+    server: *mut mbm_server,
+    port: *const mbm_port,
+    units: *mut mbm_unit,
+    count: u8,
+    frame: *mut u8,
+    bytes: u16,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        match begin(server, port, units, count, frame, bytes) {
+            Some(core) => {
+                core.begin_rtu();
+                Status::OK.code()
+            }
+            None => Status::INVALID_ARGUMENT.code(),
+        }
+    }
+}
+
+/// Begins to serve units on a serial line, ASCII (serial line guide V1.02,
+/// 2.5.2). A frame whose next character takes longer than a second is dropped.
+///
+/// @param server  see mbm_server_begin
+/// @param port    see mbm_server_begin
+/// @param units   see mbm_server_begin
+/// @param count   see mbm_server_begin
+/// @param frame   see mbm_server_begin
+/// @param bytes   at least 32; MBM_MAX_ASCII_FRAME hold any frame
+/// @return MBM_OK or MBM_INVALID_ARGUMENT
+#[no_mangle]
+pub unsafe extern "C" fn mbm_server_beginAscii(
+    server: *mut mbm_server,
+    port: *const mbm_port,
+    units: *mut mbm_unit,
+    count: u8,
+    frame: *mut u8,
+    bytes: u16,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        match begin(server, port, units, count, frame, bytes) {
+            Some(core) if bytes >= 2 * LEAST => {
+                core.begin_ascii();
+                Status::OK.code()
+            }
+            _ => Status::INVALID_ARGUMENT.code(),
+        }
+    }
+}
+
+/// Begins to serve units on a TCP connection that was accepted. Requests that
+/// wait behind one another in the stream are answered in turn.
+///
+/// @param server  see mbm_server_begin; one for each connection
+/// @param port    see mbm_server_begin; read, write and clock of the connection
+/// @param units   see mbm_server_begin; the unit ids 0 and 255 mean the first
+/// @param count   see mbm_server_begin
+/// @param frame   see mbm_server_begin; one for each connection
+/// @param bytes   at least MBM_MAX_TCP_FRAME
+/// @return MBM_OK or MBM_INVALID_ARGUMENT
+#[no_mangle]
+pub unsafe extern "C" fn mbm_server_beginTcp(
+    server: *mut mbm_server,
+    port: *const mbm_port,
+    units: *mut mbm_unit,
+    count: u8,
+    frame: *mut u8,
+    bytes: u16,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        match begin(server, port, units, count, frame, bytes) {
+            Some(core) if bytes >= MBM_MAX_TCP_FRAME => {
+                core.begin_tcp();
+                Status::OK.code()
+            }
+            _ => Status::INVALID_ARGUMENT.code(),
+        }
+    }
+}
+
+/// Begins to serve units over a stream of RTU frames, in which silence tells
+/// nothing: a TCP connection of RTU over TCP, or a serial adapter that hands
+/// bytes over in lumps. A frame ends where its own bytes say so; behind one that
+/// is damaged, half a second of silence does.
+///
+/// @param server  see mbm_server_begin; one for each connection
+/// @param port    see mbm_server_begin
+/// @param units   see mbm_server_begin; the unit ids 0 and 255 mean the first
+/// @param count   see mbm_server_begin
+/// @param frame   see mbm_server_begin; one for each connection
+/// @param bytes   at least 16; MBM_MAX_FRAME hold any frame
+/// @return MBM_OK or MBM_INVALID_ARGUMENT
+#[no_mangle]
+pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
+    server: *mut mbm_server,
+    port: *const mbm_port,
+    units: *mut mbm_unit,
+    count: u8,
+    frame: *mut u8,
+    bytes: u16,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        match begin(server, port, units, count, frame, bytes) {
+            Some(core) => {
+                core.begin_rtu_over_tcp();
+                Status::OK.code()
+            }
+            None => Status::INVALID_ARGUMENT.code(),
+        }
+    }
+}
+
+/// Sets the silence that ends a frame: t3.5 of RTU, the time between two
+/// characters of ASCII. mbm_server_begin and its sisters set it back.
+///
+/// @param server        the object
+/// @param microseconds  counted from the last byte seen
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, microseconds: u32) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        let status = check(server);
+        if status == Status::OK {
+            object(server).core.set_silence(microseconds);
+        }
+        status.code()
+    }
+}
+
+/// Tells the baud rate of an RTU line, from which t3.5 follows (serial line guide
+/// V1.02, 2.5.1.1). It sets nothing on the line.
+///
+/// @param server  the object
+/// @param baud    bits per second; 0 goes back to untold
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u32) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { mbm_server_setSilence(server, time::silence(baud)) }
+}

@@ -1,0 +1,171 @@
+//! `mbm_server_*`: a server on a line or connection for C.
+
+mod begin;
+mod callbacks;
+mod custom;
+mod diagnostics;
+mod files;
+mod identity;
+mod respond;
+mod tables;
+mod units;
+
+pub use begin::*;
+pub use callbacks::*;
+pub use custom::*;
+pub use diagnostics::*;
+pub use files::*;
+pub use identity::*;
+pub use respond::*;
+pub use tables::*;
+pub use units::*;
+
+use super::port::mbm_port;
+use crate::error::Status;
+use crate::pdu::custom::Rule;
+use crate::port::Port;
+use crate::server::{Lent, Reply, Server};
+use core::ffi::c_void;
+use core::slice::from_raw_parts_mut;
+
+/// Marks an object that was begun; zeroed storage does not carry it.
+const BEGUN: u8 = 0x53;
+
+/// A Modbus server on one line or one connection.
+///
+/// Storage is yours and must be zero before first use, which a static object is
+/// (`static mbm_server server;`). What it serves are units, which several
+/// servers may share: one on a serial line and four TCP connections, for
+/// example, are five servers with the same units. Not re-entrant: use a server
+/// and its units from one thread and never from an interrupt; servers that share
+/// units belong to one thread.
+#[repr(C)]
+pub struct mbm_server {
+    /// Not for you.
+    pointers: [*mut c_void; 14],
+    /// Not for you.
+    words: [u32; 8],
+}
+
+/// What lies behind an `mbm_server`.
+#[repr(C)]
+struct Object {
+    mark: u8,
+    core: Core,
+}
+
+type Core = Server<mbm_port, LentByC>;
+
+const _: () = {
+    let room = size_of::<mbm_server>();
+    let used = size_of::<Object>();
+    assert!(align_of::<mbm_server>() >= align_of::<Object>());
+    assert!(used <= room);
+    // Hiding the fields may waste 5 % where RAM is scarce.
+    assert!(size_of::<usize>() > 4 || (room - used) * 20 <= room);
+};
+
+/// What mbm_server_begin and its sisters were given.
+#[repr(C)]
+struct LentByC {
+    frame: *mut u8,
+    units: *mut mbm_unit,
+    bytes: u16,
+    count: u8,
+}
+
+impl Lent for LentByC {
+    fn frame(&mut self) -> &mut [u8] {
+        // SAFETY: begin demands a buffer of so many bytes for as long as the
+        // object is used.
+        unsafe { from_raw_parts_mut(self.frame, usize::from(self.bytes)) }
+    }
+
+    fn rule(&self, function: u8) -> Option<Rule> {
+        // SAFETY: begin demands so many units for as long as the object is used.
+        unsafe { units::rule(self.units, self.count, function) }
+    }
+}
+
+/// Whether there is a server behind a pointer from C: [`Status::OK`],
+/// [`Status::INVALID_ARGUMENT`] for NULL, [`Status::NOT_INITIALISED`] for an
+/// object that was never begun.
+///
+/// # Safety
+/// `server` is NULL or points to an `mbm_server`, zeroed or begun.
+unsafe fn check(server: *const mbm_server) -> Status {
+    if server.is_null() {
+        return Status::INVALID_ARGUMENT;
+    }
+    // SAFETY: not NULL, so storage of an object, zeroed or written.
+    if unsafe { (&raw const (*server.cast::<Object>()).mark).read() } == BEGUN {
+        Status::OK
+    } else {
+        Status::NOT_INITIALISED
+    }
+}
+
+/// The server behind a pointer.
+///
+/// # Safety
+/// [`check`] found one, and nothing else uses it while the reference lives.
+unsafe fn object<'a>(server: *mut mbm_server) -> &'a mut Object {
+    // SAFETY: begun, so every field is valid; exclusive as the caller promises.
+    unsafe { &mut *server.cast() }
+}
+
+/// Moves the server on, without waiting: takes bytes in, carries a request out
+/// once it is whole, sends the response.
+///
+/// Call it as often as you like, at least once per character time of the line
+/// if nothing else buffers its bytes. On a serial line a response begins with
+/// the first call after the line has been silent for t3.5.
+///
+/// @param server  the object
+/// @return MBM_OK; MBM_LINK_LOST if the port said so, which ends a connection;
+///         MBM_MALFORMED_FRAME if what came over TCP is not Modbus, so that
+///         the connection is to be closed; MBM_INVALID_ARGUMENT or
+///         MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_server_poll(server: *mut mbm_server) -> u8 {
+    // SAFETY: as the header demands. No reference to the object lives while
+    // units are served, whose hooks are the caller's.
+    unsafe {
+        let status = check(server);
+        if status != Status::OK {
+            return status.code();
+        }
+        loop {
+            let core = &mut object(server).core;
+            let now = core.port.micros();
+            let status = core.poll(now);
+            if status != Status::PENDING {
+                return status.code();
+            }
+            let heading = &raw const core.request;
+            let pdu = core.lent.frame.add((*heading).head.into());
+            let reply = units::serve(core.lent.units, core.lent.count, heading, pdu);
+            if !object(server).core.answer(Reply::from_number(reply)) {
+                return Status::OK.code();
+            }
+        }
+    }
+}
+
+/// How long mbm_server_poll will find nothing to do unless a byte arrives, so
+/// that a program may sleep until then.
+///
+/// @param server  the object
+/// @return microseconds; 0 means poll now, 0xFFFFFFFF until a byte arrives
+#[no_mangle]
+pub unsafe extern "C" fn mbm_server_pollDelay(server: *const mbm_server) -> u32 {
+    // SAFETY: as the header demands; every object is writable storage.
+    unsafe {
+        if check(server) != Status::OK {
+            return u32::MAX;
+        }
+        let core = &mut object(server.cast_mut()).core;
+        let now = core.port.micros();
+        core.poll_delay(now)
+    }
+}

@@ -1,0 +1,89 @@
+//! Functions that a user defines.
+
+use super::{Reply, Service};
+use crate::pdu::limits::MAX_PDU;
+use core::cell::Cell;
+
+/// Serves a request of a user's function. Its data are the front `length` bytes
+/// of `pdu` less the function code; `handler` sees them, writes the data of the
+/// response into the room behind them, and says how many bytes those are, or
+/// [`Reply`]'s word for anything else.
+pub fn serve(
+    pdu: &mut [u8],
+    length: usize,
+    handler: impl FnOnce(&[u8], &mut [u8]) -> Outcome,
+) -> Reply {
+    let Some((request, room)) = pdu.split_at_mut_checked(length) else {
+        return Reply::SERVER_DEVICE_FAILURE;
+    };
+    let data = request.get(1..).unwrap_or_default();
+    let bytes = match handler(data, room) {
+        Outcome::Data(bytes) if bytes <= room.len() && bytes < MAX_PDU => bytes,
+        Outcome::Data(_) => return Reply::SERVER_DEVICE_FAILURE,
+        Outcome::Exception(code) => return Reply::exception(code),
+        Outcome::Silent => return Reply::SILENT,
+        Outcome::Pending => return Reply::PENDING,
+    };
+    // The data move to right behind the function code.
+    let cells = Cell::from_mut(pdu).as_slice_of_cells();
+    let behind = cells.get(length..length + bytes).unwrap_or_default();
+    for (to, from) in cells.get(1..).unwrap_or_default().iter().zip(behind) {
+        to.set(from.get());
+    }
+    Reply::length(1 + bytes)
+}
+
+/// What a user's function makes of a request.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Outcome {
+    /// A response with so many bytes of data.
+    Data(usize),
+    /// An exception.
+    Exception(u8),
+    /// No response.
+    Silent,
+    /// Not yet: ask again.
+    Pending,
+}
+
+/// Serves one function code with a closure, as [`serve`].
+pub struct Custom<F> {
+    /// The function code; 0 is all that no service before serves.
+    pub function: u8,
+    /// Sees the request's data, and writes the response's.
+    pub handler: F,
+}
+
+impl<F: FnMut(u8, &[u8], &mut [u8]) -> Outcome> Service for Custom<F> {
+    fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
+        match pdu.first() {
+            Some(&function) if self.function == 0 || self.function == function => {
+                serve(pdu, length, |data, room| {
+                    (self.handler)(function, data, room)
+                })
+            }
+            _ => Reply::NOT_MINE,
+        }
+    }
+}
+
+/// Answers exception 01 to functions that are switched off; stands before the
+/// services that would serve them.
+pub struct SwitchedOff(pub [u8; 16]);
+
+impl SwitchedOff {
+    /// Says whether a function is switched off.
+    pub fn is_off(&self, function: u8) -> bool {
+        let byte = self.0.get(usize::from(function / 8));
+        byte.is_some_and(|byte| byte >> (function % 8) & 1 != 0)
+    }
+}
+
+impl Service for SwitchedOff {
+    fn serve(&mut self, pdu: &mut [u8], _length: usize) -> Reply {
+        match pdu.first() {
+            Some(function) if self.is_off(*function) => Reply::ILLEGAL_FUNCTION,
+            _ => Reply::NOT_MINE,
+        }
+    }
+}

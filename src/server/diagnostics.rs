@@ -1,0 +1,305 @@
+//! Functions 08, 0B and 0C: counters of a line, listen only mode, event log.
+
+use super::{Concern, Heading, Reply};
+use crate::pdu::diagnostics::sub_function as sub;
+use crate::pdu::diagnostics::{CLEAR_LOG, DIAGNOSTICS, GET_COMM_EVENT_COUNTER, GET_COMM_EVENT_LOG};
+use crate::pdu::limits::MAX_EVENTS;
+
+/// What a unit knows of its line. All zero at first.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(C)]
+pub struct Diagnostics {
+    /// What 02 of 08 returns: the program's own.
+    pub diagnostic_register: u16,
+    /// Frames with a right CRC, for whichever unit.
+    pub bus_messages: u16,
+    /// Frames that arrived damaged.
+    pub bus_communication_errors: u16,
+    /// Exceptions, those of broadcasts too.
+    pub exception_errors: u16,
+    /// Requests for this unit and broadcasts.
+    pub server_messages: u16,
+    /// Requests that were not answered.
+    pub no_responses: u16,
+    /// Exceptions 07.
+    pub naks: u16,
+    /// Exceptions 06.
+    pub busy: u16,
+    /// Frames that the buffer could not hold.
+    pub character_overruns: u16,
+    /// What 0B returns: requests that were carried out.
+    pub events: u16,
+    /// 1 in listen only mode.
+    pub listen_only: u8,
+    /// Events in the log, and where the next one goes.
+    pub logged: u8,
+    /// Where in the log the next event goes.
+    pub next: u8,
+    /// The request cleared the counters, and is not counted itself.
+    pub cleared: u8,
+    /// The events of 0C, a ring.
+    pub log: [u8; MAX_EVENTS],
+}
+
+/// What a request is about that changes the line, which the server may have to
+/// hear of.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Restart {
+    /// Nothing.
+    None,
+    /// The line is to be restarted; the log stays.
+    KeepLog,
+    /// The line is to be restarted; the log was cleared.
+    ClearLog,
+}
+
+// Bits of a receive event and of a send event (clause 6.10).
+const RECEIVED: u8 = 0x80;
+const BROADCAST: u8 = 0x40;
+const RECEIVED_LISTEN_ONLY: u8 = 0x20;
+const OVERRUN: u8 = 0x10;
+const COMMUNICATION_ERROR: u8 = 0x02;
+const SENT: u8 = 0x40;
+const SENT_LISTEN_ONLY: u8 = 0x20;
+const ENTERED_LISTEN_ONLY: u8 = 0x04;
+const RESTARTED: u8 = 0x00;
+
+const RESTART: [u8; 2] = sub::RESTART_COMMUNICATIONS.to_be_bytes();
+
+fn count(counter: &mut u16) {
+    *counter = counter.wrapping_add(1);
+}
+
+impl Diagnostics {
+    /// Nothing has happened yet.
+    pub const NEW: Diagnostics = Diagnostics {
+        diagnostic_register: 0,
+        bus_messages: 0,
+        bus_communication_errors: 0,
+        exception_errors: 0,
+        server_messages: 0,
+        no_responses: 0,
+        naks: 0,
+        busy: 0,
+        character_overruns: 0,
+        events: 0,
+        listen_only: 0,
+        logged: 0,
+        next: 0,
+        cleared: 0,
+        log: [0; MAX_EVENTS],
+    };
+
+    fn note(&mut self, event: u8) {
+        let next = usize::from(self.next) % MAX_EVENTS;
+        if let Some(place) = self.log.get_mut(next) {
+            *place = event;
+        }
+        self.next = ((next + 1) % MAX_EVENTS) as u8;
+        self.logged = (self.logged + 1).min(MAX_EVENTS as u8);
+    }
+
+    /// Takes notice of a frame, before it is served. False if it is not to be:
+    /// in listen only mode, all but a restart.
+    pub fn hear(&mut self, heading: &Heading, concern: Concern, pdu: &[u8]) -> bool {
+        if heading.again {
+            return true;
+        }
+        let damaged = heading.length == 0;
+        count(if damaged {
+            &mut self.bus_communication_errors
+        } else {
+            &mut self.bus_messages
+        });
+        if heading.overrun {
+            count(&mut self.character_overruns);
+        }
+        let broadcast = heading.serial && heading.to == 0 && !damaged;
+        if concern == Concern::Foreign && !damaged && !broadcast {
+            return false;
+        }
+        let mut event = RECEIVED;
+        if broadcast {
+            event |= BROADCAST;
+        }
+        if self.listen_only != 0 {
+            event |= RECEIVED_LISTEN_ONLY;
+        }
+        if heading.overrun {
+            event |= OVERRUN;
+        }
+        if damaged {
+            event |= COMMUNICATION_ERROR;
+        }
+        self.note(event);
+        if damaged {
+            return false;
+        }
+        count(&mut self.server_messages);
+        let is_restart = matches!(pdu, [DIAGNOSTICS, rest @ ..] if rest.starts_with(&RESTART));
+        let served = concern != Concern::Foreign && (self.listen_only == 0 || is_restart);
+        if !served {
+            count(&mut self.no_responses);
+        }
+        served
+    }
+
+    /// Takes notice of what became of a request for which `hear` was true.
+    pub fn done(&mut self, concern: Concern, function: u8, reply: Reply) {
+        let code = reply.exception_code();
+        if self.cleared != 0 {
+            self.cleared = 0;
+        } else if code != 0 {
+            count(&mut self.exception_errors);
+        } else if function != GET_COMM_EVENT_COUNTER {
+            count(&mut self.events);
+        }
+        if reply == Reply::SILENT || concern == Concern::Broadcast {
+            count(&mut self.no_responses);
+        }
+        let bits = match code {
+            0 => 0,
+            1..=3 => 0x01,
+            4 => 0x02,
+            5 | 6 => 0x04,
+            7 => 0x08,
+            _ => 0x01,
+        };
+        match code {
+            6 => count(&mut self.busy),
+            7 => count(&mut self.naks),
+            _ => {}
+        }
+        let listening = if self.listen_only != 0 {
+            SENT_LISTEN_ONLY
+        } else {
+            0
+        };
+        self.note(SENT | bits | listening);
+    }
+
+    fn clear_counters(&mut self) {
+        let kept = (self.diagnostic_register, self.listen_only);
+        let (logged, next, log) = (self.logged, self.next, self.log);
+        *self = Diagnostics::NEW;
+        (self.diagnostic_register, self.listen_only) = kept;
+        (self.logged, self.next, self.log) = (logged, next, log);
+        self.cleared = 1;
+    }
+
+    /// Serves 08, 0B and 0C: the request PDU is the front `length` bytes of
+    /// `pdu`, which the response overwrites. Says too whether to restart.
+    pub fn serve(&mut self, pdu: &mut [u8], length: usize) -> (Reply, Restart) {
+        let reply = match pdu.first() {
+            Some(&DIAGNOSTICS) => return self.diagnose(pdu, length),
+            Some(&(GET_COMM_EVENT_COUNTER | GET_COMM_EVENT_LOG)) if length != 1 => {
+                Reply::ILLEGAL_DATA_VALUE
+            }
+            Some(&GET_COMM_EVENT_COUNTER) => match pdu {
+                [_, a, b, c, d, ..] => {
+                    [*a, *b] = [0, 0];
+                    [*c, *d] = self.events.to_be_bytes();
+                    Reply::length(5)
+                }
+                _ => Reply::SERVER_DEVICE_FAILURE,
+            },
+            Some(&GET_COMM_EVENT_LOG) => self.tell_log(pdu),
+            _ => Reply::NOT_MINE,
+        };
+        (reply, Restart::None)
+    }
+
+    fn tell_log(&self, pdu: &mut [u8]) -> Reply {
+        let logged = usize::from(self.logged).min(MAX_EVENTS);
+        let total = 8 + logged;
+        let Some([_, count, a, b, c, d, e, f, log @ ..]) = pdu.get_mut(..total) else {
+            return Reply::SERVER_DEVICE_FAILURE;
+        };
+        *count = total as u8 - 2;
+        [*a, *b] = [0, 0];
+        [*c, *d] = self.events.to_be_bytes();
+        [*e, *f] = self.bus_messages.to_be_bytes();
+        // The latest first.
+        for (back, place) in (1..).zip(log) {
+            let index = (usize::from(self.next) + MAX_EVENTS - back) % MAX_EVENTS;
+            *place = self.log.get(index).copied().unwrap_or(0);
+        }
+        Reply::length(total)
+    }
+
+    fn diagnose(&mut self, pdu: &mut [u8], length: usize) -> (Reply, Restart) {
+        let refuse = |reply| (reply, Restart::None);
+        let Some(&mut [_, a, b, ref mut c, ref mut d]) = pdu.first_chunk_mut() else {
+            return refuse(Reply::SERVER_DEVICE_FAILURE);
+        };
+        if length < 3 {
+            return refuse(Reply::ILLEGAL_DATA_VALUE);
+        }
+        let sub_function = u16::from_be_bytes([a, b]);
+        if !matches!(sub_function, 0..=4 | 0x0A..=0x12 | 0x14) {
+            return refuse(Reply::ILLEGAL_FUNCTION);
+        }
+        let data = u16::from_be_bytes([*c, *d]);
+        let whole = match sub_function {
+            sub::RETURN_QUERY_DATA => length >= 5 && length % 2 == 1,
+            sub::RESTART_COMMUNICATIONS => length == 5 && (data == 0 || data == CLEAR_LOG),
+            sub::CHANGE_ASCII_INPUT_DELIMITER => length == 5 && data & 0xFF == 0,
+            _ => length == 5 && data == 0,
+        };
+        if !whole {
+            return refuse(Reply::ILLEGAL_DATA_VALUE);
+        }
+        let value = match sub_function {
+            sub::RETURN_QUERY_DATA => return refuse(Reply::length(length)),
+            sub::RESTART_COMMUNICATIONS => return self.restart(data == CLEAR_LOG),
+            sub::FORCE_LISTEN_ONLY => {
+                self.listen_only = 1;
+                self.note(ENTERED_LISTEN_ONLY);
+                return refuse(Reply::SILENT);
+            }
+            sub::CLEAR_COUNTERS => {
+                self.clear_counters();
+                self.diagnostic_register = 0;
+                0
+            }
+            sub::CLEAR_OVERRUN_COUNTER => {
+                self.character_overruns = 0;
+                0
+            }
+            sub::RETURN_DIAGNOSTIC_REGISTER => self.diagnostic_register,
+            sub::BUS_MESSAGE_COUNT => self.bus_messages,
+            sub::BUS_COMMUNICATION_ERROR_COUNT => self.bus_communication_errors,
+            sub::BUS_EXCEPTION_ERROR_COUNT => self.exception_errors,
+            sub::SERVER_MESSAGE_COUNT => self.server_messages,
+            sub::SERVER_NO_RESPONSE_COUNT => self.no_responses,
+            sub::SERVER_NAK_COUNT => self.naks,
+            sub::SERVER_BUSY_COUNT => self.busy,
+            sub::BUS_CHARACTER_OVERRUN_COUNT => self.character_overruns,
+            // The delimiter: the server takes it from the response.
+            _ => data,
+        };
+        [*c, *d] = value.to_be_bytes();
+        (Reply::length(5), Restart::None)
+    }
+
+    /// Ends listen only mode; a restart in it is not answered.
+    fn restart(&mut self, clear_log: bool) -> (Reply, Restart) {
+        let reply = if self.listen_only != 0 {
+            Reply::SILENT
+        } else {
+            Reply::length(5)
+        };
+        self.clear_counters();
+        self.listen_only = 0;
+        if clear_log {
+            self.logged = 0;
+        }
+        self.note(RESTARTED);
+        let restart = if clear_log {
+            Restart::ClearLog
+        } else {
+            Restart::KeepLog
+        };
+        (reply, restart)
+    }
+}

@@ -1,0 +1,147 @@
+//! File records and FIFO queues: functions 14, 15 and 18.
+
+use super::Reply;
+use crate::error::Status;
+use crate::pdu::files::{
+    Reads, Record, Writes, READ_FIFO_QUEUE, READ_FILE_RECORD, REFERENCE_TYPE, WRITE_FILE_RECORD,
+};
+use crate::pdu::limits::{MAX_FIFO, READ_FILE_BYTES};
+
+/// The records of files, each a register.
+pub trait Files {
+    /// True if all these records are there.
+    fn covers(&self, record: Record) -> bool;
+
+    /// Fills `data`, high bytes first, from records that are there.
+    fn load(&self, record: Record, data: &mut [u8]);
+
+    /// Sets records that are there from `data`, high bytes first.
+    fn store(&mut self, record: Record, data: &[u8]);
+
+    /// Asked before records are written; an exception code refuses the whole
+    /// request, 0 allows.
+    fn before(&mut self, record: Record, data: &[u8]) -> u8 {
+        let _ = (record, data);
+        0
+    }
+
+    /// Told what was written.
+    fn after(&mut self, record: Record) {
+        let _ = record;
+    }
+}
+
+/// FIFO queues of registers.
+pub trait Fifos {
+    /// How many registers the queue at this address holds, if there is one.
+    fn count(&self, address: u16) -> Option<u16>;
+
+    /// Fills `data`, high bytes first, from the front of the queue.
+    fn load(&self, address: u16, data: &mut [u8]);
+}
+
+fn refusal(status: Status) -> Reply {
+    Reply::exception(status.code())
+}
+
+/// Serves 14 and 15: the request PDU is the front `length` bytes of `pdu`, which
+/// the response overwrites.
+pub fn serve(files: &mut impl Files, pdu: &mut [u8], length: usize) -> Reply {
+    let (function, count) = match pdu.get(..length) {
+        Some([function @ (READ_FILE_RECORD | WRITE_FILE_RECORD), count, ..]) => (*function, *count),
+        Some([READ_FILE_RECORD | WRITE_FILE_RECORD]) => return Reply::ILLEGAL_DATA_VALUE,
+        _ => return Reply::NOT_MINE,
+    };
+    if usize::from(count) + 2 != length {
+        return Reply::ILLEGAL_DATA_VALUE;
+    }
+    if function == READ_FILE_RECORD {
+        read(files, pdu, length)
+    } else {
+        write(files, pdu.get(2..length).unwrap_or_default(), length)
+    }
+}
+
+fn read(files: &impl Files, pdu: &mut [u8], length: usize) -> Reply {
+    // The response may overtake the request, which is therefore put aside.
+    let mut aside = [0; READ_FILE_BYTES.1];
+    let request = pdu.get(2..length).unwrap_or_default();
+    let Some(kept) = aside.get_mut(..request.len()) else {
+        return Reply::ILLEGAL_DATA_VALUE;
+    };
+    kept.copy_from_slice(request);
+    let reads = match Reads::new(kept) {
+        Ok(reads) => reads,
+        Err(refused) => return refusal(refused),
+    };
+    if !reads.iter().all(|record| files.covers(record)) {
+        return Reply::ILLEGAL_DATA_ADDRESS;
+    }
+    let total = reads.response_length();
+    let Some([_, count, rest @ ..]) = pdu.get_mut(..total) else {
+        return Reply::SERVER_DEVICE_FAILURE;
+    };
+    *count = rest.len() as u8;
+    let mut rest = rest;
+    for record in reads.iter() {
+        let bytes = 2 * usize::from(record.length);
+        let Some((group, behind)) = rest.split_at_mut_checked(2 + bytes) else {
+            break;
+        };
+        if let [length, reference, data @ ..] = group {
+            *length = bytes as u8 + 1;
+            *reference = REFERENCE_TYPE;
+            files.load(record, data);
+        }
+        rest = behind;
+    }
+    Reply::length(total)
+}
+
+fn write(files: &mut impl Files, request: &[u8], length: usize) -> Reply {
+    let writes = match Writes::new(request) {
+        Ok(writes) => writes,
+        Err(refused) => return refusal(refused),
+    };
+    if !writes.iter().all(|(record, _)| files.covers(record)) {
+        return Reply::ILLEGAL_DATA_ADDRESS;
+    }
+    for (record, data) in writes.iter() {
+        let refused = files.before(record, data);
+        if refused != 0 {
+            return Reply::exception(refused);
+        }
+    }
+    for (record, data) in writes.iter() {
+        files.store(record, data);
+    }
+    for (record, _) in writes.iter() {
+        files.after(record);
+    }
+    Reply::length(length)
+}
+
+/// Serves 18, as [`serve`].
+pub fn serve_fifos(fifos: &impl Fifos, pdu: &mut [u8], length: usize) -> Reply {
+    if pdu.first() != Some(&READ_FIFO_QUEUE) {
+        return Reply::NOT_MINE;
+    }
+    let address = match pdu.get(1..length) {
+        Some(&[high, low]) => u16::from_be_bytes([high, low]),
+        _ => return Reply::ILLEGAL_DATA_VALUE,
+    };
+    let Some(count) = fifos.count(address) else {
+        return Reply::ILLEGAL_DATA_ADDRESS;
+    };
+    if count > MAX_FIFO {
+        return Reply::ILLEGAL_DATA_VALUE;
+    }
+    let bytes = 2 * usize::from(count);
+    let Some([_, a, b, c, d, data @ ..]) = pdu.get_mut(..5 + bytes) else {
+        return Reply::SERVER_DEVICE_FAILURE;
+    };
+    [*a, *b] = (bytes as u16 + 2).to_be_bytes();
+    [*c, *d] = count.to_be_bytes();
+    fifos.load(address, data);
+    Reply::length(5 + bytes)
+}

@@ -1,0 +1,275 @@
+//! How each framing finds a request in what arrives, and seals a response.
+
+use super::line::{Lent, Server};
+use crate::error::Status;
+use crate::frame::{ascii, rtu, tcp};
+use crate::pdu::custom::Function;
+use crate::pdu::length::{self, Length};
+use crate::port::Port;
+use crate::time;
+use core::cell::Cell;
+
+/// Bytes that are given up at once where the buffer is full.
+const SLIDE: usize = 16;
+
+/// The inter-character timeout of ASCII (serial line guide V1.02, 2.5.2.1).
+const ASCII_TIMEOUT: u32 = time::millis(1000);
+
+/// What a frame that tells its length may take to arrive between two bytes.
+const STREAM_TIMEOUT: u32 = time::millis(500);
+
+/// What a PDU may take of a buffer for RTU. More than a PDU is room for the
+/// response of a user's function beside its request.
+pub(super) const fn rtu_room(buffer: usize) -> usize {
+    buffer.saturating_sub(rtu::OVERHEAD)
+}
+
+/// As [`rtu_room`], for ASCII: colon, two characters a byte of unit, PDU and LRC,
+/// carriage return and delimiter.
+pub(super) const fn ascii_room(buffer: usize) -> usize {
+    (buffer.saturating_sub(3) / 2).saturating_sub(2)
+}
+
+/// As [`rtu_room`], for TCP.
+pub(super) const fn tcp_room(buffer: usize) -> usize {
+    buffer.saturating_sub(tcp::PDU)
+}
+
+/// Moves bytes to the front, over the first `by`.
+#[cfg_attr(target_os = "none", inline(never))]
+fn shift(bytes: &mut [u8], by: usize) {
+    let cells = Cell::from_mut(bytes).as_slice_of_cells();
+    for (to, from) in cells.iter().zip(cells.get(by..).unwrap_or_default()) {
+        to.set(from.get());
+    }
+}
+
+impl<P: Port, B: Lent> Server<P, B> {
+    /// Listens for RTU frames, which silence ends, at an untold baud rate.
+    pub fn begin_rtu(&mut self) {
+        let room = rtu_room(self.lent.frame().len());
+        self.begin(1, room, Self::receive_rtu, Self::seal_rtu);
+        self.set_silence(time::DEFAULT_SILENCE);
+        self.request.serial = true;
+    }
+
+    /// Listens for RTU frames in a stream, where silence tells nothing.
+    pub fn begin_rtu_over_tcp(&mut self) {
+        let room = rtu_room(self.lent.frame().len());
+        self.begin(1, room, Self::receive_by_length, Self::seal_rtu);
+        self.set_silence(STREAM_TIMEOUT);
+    }
+
+    /// Listens for ASCII frames.
+    pub fn begin_ascii(&mut self) {
+        let room = ascii_room(self.lent.frame().len());
+        self.begin(1, room, Self::receive_ascii, Self::seal_ascii);
+        self.delimiter = ascii::END;
+        self.set_silence(ASCII_TIMEOUT);
+        self.request.serial = true;
+    }
+
+    /// Listens for TCP frames.
+    pub fn begin_tcp(&mut self) {
+        let room = tcp_room(self.lent.frame().len());
+        self.begin(tcp::PDU as u8, room, Self::receive_tcp, Self::seal_tcp);
+        self.set_silence(u32::MAX);
+    }
+
+    /// Receives, and takes the bytes into the CRC.
+    fn hear_rtu(&mut self, until: usize) -> i16 {
+        let start = usize::from(self.end);
+        let heard = self.hear(until);
+        let frame = self.lent.frame().get(start..usize::from(self.end));
+        self.crc = self.crc.with(frame.unwrap_or_default());
+        heard
+    }
+
+    /// A frame is what stands between two silences. Where there was silence that
+    /// nobody saw, for poll came late, the last frame counts: one of ours that
+    /// is followed by another is no longer waited for.
+    fn receive_rtu(&mut self) -> Status {
+        self.make_room();
+        let heard = self.hear_rtu(usize::MAX);
+        if heard < 0 {
+            return Status::LINK_LOST;
+        }
+        if heard > 0 || self.end == 0 || !self.is_silent() {
+            return Status::OK;
+        }
+        self.last_frame()
+    }
+
+    /// Gives up the oldest bytes of a full buffer, unless it ends with a frame.
+    fn make_room(&mut self) {
+        let frame = self.lent.frame();
+        let length = frame.len();
+        if usize::from(self.end) == length && rtu::last(frame) == length {
+            shift(frame, SLIDE);
+            self.end -= SLIDE as u16;
+            self.request.overrun = true;
+        }
+    }
+
+    /// Moves the last frame of what arrived to the front.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn last_frame(&mut self) -> Status {
+        let end = usize::from(self.end);
+        let frame = self.lent.frame().get_mut(..end).unwrap_or_default();
+        let start = if self.crc.is_residue() && !self.request.overrun {
+            0
+        } else {
+            rtu::last(frame)
+        };
+        shift(frame, start);
+        self.found((end - start).saturating_sub(rtu::OVERHEAD))
+    }
+
+    /// Frames that tell their length are taken one by one; for others, and to
+    /// find the way back, there is silence.
+    fn receive_by_length(&mut self) -> Status {
+        loop {
+            let end = usize::from(self.end);
+            let frame = self.lent.frame();
+            let capacity = frame.len();
+            let pdu = frame.get(rtu::PDU..end).unwrap_or_default();
+            let code = pdu.first().copied().unwrap_or(0);
+            let total = match self.length(code) {
+                _ if self.astray => None,
+                Length::Exactly(length) => Some((length + rtu::OVERHEAD, true)),
+                Length::AtLeast(length) => Some((length + rtu::PDU, false)),
+                Length::Silence | Length::Unknown => None,
+            };
+            let total = total.filter(|(total, _)| *total <= capacity);
+            let whole = match total {
+                Some((total, whole)) => whole && end >= total,
+                None => end > rtu::OVERHEAD,
+            };
+            if whole && self.crc.is_residue() {
+                return self.last_frame();
+            }
+            if whole {
+                self.astray = true;
+            }
+            let until = match total {
+                Some((total, _)) if !self.astray => total,
+                _ => usize::MAX,
+            };
+            self.make_room();
+            let heard = self.hear_rtu(until);
+            if heard < 0 {
+                return Status::LINK_LOST;
+            }
+            if heard == 0 {
+                if self.end == 0 || !self.is_silent() {
+                    return Status::OK;
+                }
+                return self.last_frame();
+            }
+        }
+    }
+
+    /// The length of the request that has begun to arrive.
+    fn length(&mut self, code: u8) -> Length {
+        let function = self.lent.rule(code).map(|rule| Function {
+            code,
+            request: rule,
+            response: rule,
+        });
+        let end = usize::from(self.end);
+        let pdu = self.lent.frame().get(rtu::PDU..end).unwrap_or_default();
+        length::request(pdu, function.as_slice())
+    }
+
+    fn seal_rtu(&mut self, length: usize) -> usize {
+        let frame = self.lent.frame();
+        let unit = frame.first().copied().unwrap_or(0);
+        rtu::write(frame, unit, length, |_| ());
+        length + rtu::OVERHEAD
+    }
+
+    /// Byte by byte, for a colon begins a frame wherever it stands, and what
+    /// follows a frame belongs to the next.
+    fn receive_ascii(&mut self) -> Status {
+        loop {
+            let end = usize::from(self.end);
+            let heard = self.hear(end + 1);
+            if heard < 0 {
+                return Status::LINK_LOST;
+            }
+            if heard == 0 {
+                let full = end == self.lent.frame().len();
+                if end == 0 || !(full || self.is_silent()) {
+                    return Status::OK;
+                }
+                self.request.overrun = full;
+                return self.found(0);
+            }
+            let delimiter = self.delimiter;
+            let frame = self.lent.frame().get_mut(..=end).unwrap_or_default();
+            match frame {
+                [first, .., ascii::START] => {
+                    *first = ascii::START;
+                    self.end = 1;
+                }
+                [ascii::START] => {}
+                [_] => self.end = 0,
+                [.., ascii::RETURN, last] if *last == delimiter => {
+                    let length = ascii::parse(frame, delimiter).map_or(0, |adu| adu.pdu.len());
+                    return self.found(length);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn seal_ascii(&mut self, length: usize) -> usize {
+        let delimiter = self.delimiter;
+        let frame = self.lent.frame();
+        let unit = frame.first().copied().unwrap_or(0);
+        // Sub-function 03 of 08 holds for the messages behind it.
+        if let Some(&[_, 0x08, 0, 3, character, 0]) = frame.first_chunk() {
+            self.delimiter = character;
+        }
+        let frame = self.lent.frame();
+        ascii::emit(frame, unit, delimiter, |_| Ok(length)).unwrap_or(0)
+    }
+
+    /// Never more than one frame is taken from the stream, so that its response
+    /// has the whole buffer.
+    fn receive_tcp(&mut self) -> Status {
+        let mut until = tcp::PDU + 1;
+        loop {
+            match tcp::header(
+                self.lent
+                    .frame()
+                    .get(..usize::from(self.end))
+                    .unwrap_or_default(),
+            ) {
+                Ok(header) => until = header.total,
+                Err(Status::INCOMPLETE_FRAME) => {}
+                Err(_) => return self.give_up(),
+            }
+            if usize::from(self.end) == until {
+                return self.found(until - tcp::PDU);
+            }
+            let heard = self.hear(until);
+            if heard <= 0 {
+                return if heard < 0 {
+                    Status::LINK_LOST
+                } else {
+                    Status::OK
+                };
+            }
+        }
+    }
+
+    fn seal_tcp(&mut self, length: usize) -> usize {
+        let [_, _, _, _, high, low] = match self.lent.frame().first_chunk_mut() {
+            Some(header) => header,
+            None => return 0,
+        };
+        [*high, *low] = (length as u16 + 1).to_be_bytes();
+        tcp::PDU + length
+    }
+}

@@ -1,0 +1,125 @@
+//! What a device tells of itself: functions 07, 11 and 2B/0E.
+
+use super::Reply;
+use crate::pdu::diagnostics::{READ_EXCEPTION_STATUS, REPORT_SERVER_ID};
+use crate::pdu::identification::{
+    BASIC, ENCAPSULATED_INTERFACE_TRANSPORT, EXTENDED, INDIVIDUAL, MEI_READ_DEVICE_IDENTIFICATION,
+    REGULAR,
+};
+use crate::pdu::limits::MAX_PDU;
+
+/// Serves 07 with eight outputs: the request PDU is the front `length` bytes of
+/// `pdu`, which the response overwrites.
+pub fn serve_exception_status(outputs: u8, pdu: &mut [u8], length: usize) -> Reply {
+    match pdu {
+        [READ_EXCEPTION_STATUS, ..] if length != 1 => Reply::ILLEGAL_DATA_VALUE,
+        [READ_EXCEPTION_STATUS, data, ..] => {
+            *data = outputs;
+            Reply::length(2)
+        }
+        _ => Reply::NOT_MINE,
+    }
+}
+
+/// Serves 11, as [`serve_exception_status`]: the server's id, whether it runs,
+/// and what else it has to say.
+pub fn serve_server_id(
+    id: &[u8],
+    running: bool,
+    additional: &[u8],
+    pdu: &mut [u8],
+    length: usize,
+) -> Reply {
+    if pdu.first() != Some(&REPORT_SERVER_ID) {
+        return Reply::NOT_MINE;
+    }
+    if length != 1 {
+        return Reply::ILLEGAL_DATA_VALUE;
+    }
+    let bytes = id.len() + 1 + additional.len();
+    let room = pdu.get_mut(..2 + bytes).filter(|pdu| pdu.len() <= MAX_PDU);
+    let Some([_, count, data @ ..]) = room else {
+        return Reply::SERVER_DEVICE_FAILURE;
+    };
+    *count = bytes as u8;
+    let running = [if running { 0xFF } else { 0 }];
+    let all = id.iter().chain(&running).chain(additional);
+    for (place, byte) in data.iter_mut().zip(all) {
+        *place = *byte;
+    }
+    Reply::length(2 + bytes)
+}
+
+/// The objects of a device identification (clause 6.21).
+pub trait Objects {
+    /// The value of an object, if there is one of this id.
+    fn object(&self, id: u8) -> Option<&[u8]>;
+}
+
+/// The last object of each category.
+const LAST: [u8; 3] = [0x02, 0x7F, 0xFF];
+
+/// Bytes of a response before its objects.
+const OBJECTS: usize = 7;
+
+/// Serves 2B/0E, as [`serve_exception_status`].
+pub fn serve_identification(objects: &impl Objects, pdu: &mut [u8], length: usize) -> Reply {
+    let (code, id) = match pdu.get(..length) {
+        Some([ENCAPSULATED_INTERFACE_TRANSPORT, MEI_READ_DEVICE_IDENTIFICATION, rest @ ..]) => {
+            match rest {
+                &[code @ BASIC..=INDIVIDUAL, id] => (code, id),
+                _ => return Reply::ILLEGAL_DATA_VALUE,
+            }
+        }
+        _ => return Reply::NOT_MINE,
+    };
+    let has = |mut ids: core::ops::RangeInclusive<u8>| ids.any(|id| objects.object(id).is_some());
+    let level = if has(0x80..=0xFF) {
+        EXTENDED
+    } else if has(0x03..=0x7F) {
+        REGULAR
+    } else {
+        BASIC
+    };
+    let (first, last) = if code == INDIVIDUAL {
+        if objects.object(id).is_none() {
+            return Reply::ILLEGAL_DATA_ADDRESS;
+        }
+        (id, id)
+    } else {
+        // A category that the device does not have is answered with what it has,
+        // an object that is not in it with the first one.
+        let index = usize::from(code.min(level)) - 1;
+        let last = LAST.get(index).copied().unwrap_or(0xFF);
+        let known = id <= last && objects.object(id).is_some();
+        (if known { id } else { 0 }, last)
+    };
+    let (mut end, mut count, mut next) = (OBJECTS, 0u8, None);
+    for id in first..=last {
+        let Some(value) = objects.object(id) else {
+            continue;
+        };
+        let fits = end + 2 + value.len() <= MAX_PDU;
+        let room = pdu.get_mut(end..end + 2 + value.len()).filter(|_| fits);
+        let Some([head, size, place @ ..]) = room else {
+            next = Some(id);
+            break;
+        };
+        *head = id;
+        *size = value.len() as u8;
+        place.copy_from_slice(value);
+        end += 2 + value.len();
+        count += 1;
+    }
+    // An object that no response holds.
+    if count == 0 && next.is_some() {
+        return Reply::SERVER_DEVICE_FAILURE;
+    }
+    if let Some([_, _, _, conformity, more, following, objects]) = pdu.first_chunk_mut() {
+        *conformity = level | 0x80;
+        *more = if next.is_some() { 0xFF } else { 0 };
+        *following = next.unwrap_or(0);
+        *objects = count;
+    }
+    Reply::length(end)
+}

@@ -1,0 +1,310 @@
+//! A server on one line or connection, moved on by `poll`.
+//!
+//! It knows nothing of units and services: it finds a request, hands its PDU
+//! out, takes the reply and sends it. So no reference to it need live while a
+//! request is carried out. A framing is two functions kept in the object, so
+//! that firmware carries those it begins with.
+
+use super::{Heading, Reply, Units};
+use crate::error::Status;
+use crate::frame::checksum::Crc16;
+use crate::frame::{ascii, Framing};
+use crate::pdu::custom::Rule;
+use crate::pdu::limits::MAX_PDU;
+use crate::port::Port;
+use crate::time::{self, elapsed};
+
+/// What the caller lends to a server.
+pub trait Lent {
+    /// The storage of one frame: a request first, then its response.
+    fn frame(&mut self) -> &mut [u8];
+
+    /// How long the requests of a user's function are, for framings without
+    /// silence.
+    fn rule(&self, function: u8) -> Option<Rule> {
+        let _ = function;
+        None
+    }
+}
+
+impl Lent for &mut [u8] {
+    fn frame(&mut self) -> &mut [u8] {
+        self
+    }
+}
+
+impl<const N: usize> Lent for [u8; N] {
+    fn frame(&mut self) -> &mut [u8] {
+        self
+    }
+}
+
+/// Where a server stands.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+enum Phase {
+    /// Waiting for a request.
+    Listen,
+    /// A request is there, to be answered.
+    Request,
+    /// Handing the response to the port; the driver is on.
+    Send,
+    /// Waiting for the port to drain; the driver is on.
+    Flush,
+    /// What arrives is no Modbus.
+    Over,
+}
+
+/// Looks for a request in what arrives: [`Status::PENDING`] once there is one,
+/// with its PDU behind the head and its length noted.
+pub(super) type Receive<P, B> = fn(&mut Server<P, B>) -> Status;
+
+/// Makes a frame of the response PDU of so many bytes; returns its length.
+pub(super) type Seal<P, B> = fn(&mut Server<P, B>, usize) -> usize;
+
+/// A server on one line or connection.
+// In this order, small fields first: see `Transaction`.
+#[repr(C)]
+pub struct Server<P, B> {
+    phase: Phase,
+    /// What arrives is no frame that tells its length.
+    pub(super) astray: bool,
+    /// Ends an ASCII frame.
+    pub(super) delimiter: u8,
+    /// The CRC of what arrived.
+    pub(super) crc: Crc16,
+    /// Where in the buffer ends what arrived, or what is to be sent.
+    pub(super) end: u16,
+    /// What of the response was sent.
+    sent: u16,
+    /// The request that was found last.
+    pub request: Heading,
+    last_byte: u32,
+    now: u32,
+    /// The silence that ends a frame.
+    silence: u32,
+    receive: Option<Receive<P, B>>,
+    seal: Option<Seal<P, B>>,
+    /// What the caller lends.
+    pub lent: B,
+    /// The byte stream.
+    pub port: P,
+}
+
+impl<P: Port, B: Lent> Server<P, B> {
+    /// A server that has no framing yet.
+    pub const fn new(port: P, lent: B) -> Self {
+        Server {
+            phase: Phase::Listen,
+            astray: false,
+            delimiter: ascii::END,
+            crc: Crc16::START,
+            end: 0,
+            sent: 0,
+            request: Heading::NONE,
+            last_byte: 0,
+            now: 0,
+            silence: time::DEFAULT_SILENCE,
+            receive: None,
+            seal: None,
+            lent,
+            port,
+        }
+    }
+
+    /// A server of this framing.
+    pub fn with_framing(framing: Framing, port: P, lent: B) -> Self {
+        let mut server = Server::new(port, lent);
+        match framing {
+            Framing::Rtu => server.begin_rtu(),
+            Framing::Ascii => server.begin_ascii(),
+            Framing::Tcp => server.begin_tcp(),
+            Framing::RtuOverTcp => server.begin_rtu_over_tcp(),
+        }
+        server
+    }
+
+    /// Begins to listen: drops what was under way.
+    #[inline(always)]
+    pub(super) fn begin(
+        &mut self,
+        head: u8,
+        room: usize,
+        receive: Receive<P, B>,
+        seal: Seal<P, B>,
+    ) {
+        self.request.head = head;
+        self.request.serial = false;
+        self.request.room = room as u16;
+        self.receive = Some(receive);
+        self.seal = Some(seal);
+        self.listen();
+    }
+
+    /// Sets the silence that ends a frame, in microseconds: t3.5 for RTU, the
+    /// inter-character timeout for ASCII.
+    pub fn set_silence(&mut self, microseconds: u32) {
+        self.silence = microseconds;
+    }
+
+    /// Waits for the next request.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn listen(&mut self) {
+        self.phase = Phase::Listen;
+        self.end = 0;
+        self.request.overrun = false;
+        self.astray = false;
+        self.crc = Crc16::START;
+    }
+
+    /// Moves the server on to the time `now`, without waiting:
+    /// [`Status::PENDING`] if there is a request to be answered,
+    /// [`Status::LINK_LOST`], [`Status::MALFORMED_FRAME`] if the stream is none
+    /// of Modbus TCP, else [`Status::OK`].
+    pub fn poll(&mut self, now: u32) -> Status {
+        self.now = now;
+        match self.phase {
+            Phase::Listen => match self.receive {
+                Some(receive) => receive(self),
+                None => Status::NOT_INITIALISED,
+            },
+            Phase::Request => Status::PENDING,
+            Phase::Send => self.send(),
+            Phase::Flush => self.flush(),
+            Phase::Over => Status::MALFORMED_FRAME,
+        }
+    }
+
+    /// Nothing more is to be expected of this stream.
+    pub(super) fn give_up(&mut self) -> Status {
+        self.phase = Phase::Over;
+        Status::MALFORMED_FRAME
+    }
+
+    /// Receives up to the place `until` of the buffer: how many bytes, negative
+    /// if the link is lost.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn hear(&mut self, until: usize) -> i16 {
+        let frame = self.lent.frame();
+        let until = until.min(frame.len());
+        let Some(room) = frame.get_mut(usize::from(self.end)..until) else {
+            return 0;
+        };
+        if room.is_empty() {
+            return 0;
+        }
+        let heard = self.port.read(room);
+        if heard > 0 {
+            self.end += heard as u16;
+            self.last_byte = self.now;
+        }
+        heard
+    }
+
+    /// True once the line has been silent for as long as ends a frame.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn is_silent(&self) -> bool {
+        elapsed(self.now, self.last_byte) >= self.silence
+    }
+
+    /// How long, in microseconds from `now`, poll will find nothing to do unless
+    /// a byte arrives.
+    pub fn poll_delay(&self, now: u32) -> u32 {
+        match self.phase {
+            Phase::Listen if self.end == 0 || self.silence == u32::MAX => u32::MAX,
+            Phase::Listen => self.silence.saturating_sub(elapsed(now, self.last_byte)),
+            Phase::Over => u32::MAX,
+            _ => 0,
+        }
+    }
+
+    /// Says that a request was found whose PDU has so many bytes; 0 for a frame
+    /// that arrived damaged.
+    pub(super) fn found(&mut self, length: usize) -> Status {
+        let head = usize::from(self.request.head);
+        let unit = self.lent.frame().get(head - 1);
+        self.request.to = unit.copied().unwrap_or(0);
+        self.request.length = if length > MAX_PDU { 0 } else { length as u16 };
+        self.phase = Phase::Request;
+        Status::PENDING
+    }
+
+    /// The request's PDU and the room behind it, which the response may take.
+    pub fn pdu(&mut self) -> &mut [u8] {
+        let head = usize::from(self.request.head);
+        let room = usize::from(self.request.room);
+        self.lent
+            .frame()
+            .get_mut(head..head + room)
+            .unwrap_or_default()
+    }
+
+    /// As [`Server::poll`], with requests served by `units` and answered.
+    pub fn serve(&mut self, now: u32, units: &mut (impl Units + ?Sized)) -> Status {
+        loop {
+            let status = self.poll(now);
+            if status != Status::PENDING {
+                return status;
+            }
+            let heading = self.request;
+            let reply = units.serve(&heading, self.pdu());
+            if !self.answer(reply) {
+                return Status::OK;
+            }
+        }
+    }
+
+    /// Takes the reply to the request: a response stands where its PDU stood.
+    /// False, with the request kept, for [`Reply::PENDING`].
+    pub fn answer(&mut self, reply: Reply) -> bool {
+        self.request.again = reply == Reply::PENDING;
+        if self.request.again {
+            return false;
+        }
+        let length = reply.settle(self.pdu());
+        match self.seal {
+            Some(seal) if length != 0 => {
+                self.end = seal(self, length) as u16;
+                self.sent = 0;
+                self.phase = Phase::Send;
+                self.port.pre_transmission();
+            }
+            _ => self.listen(),
+        }
+        true
+    }
+
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn send(&mut self) -> Status {
+        let frame = self.lent.frame();
+        let rest = frame.get(usize::from(self.sent)..usize::from(self.end));
+        let rest = rest.unwrap_or_default();
+        let sent = self.port.write(rest);
+        if sent < 0 {
+            self.port.post_transmission();
+            self.listen();
+            return Status::LINK_LOST;
+        }
+        self.sent += sent as u16;
+        if self.sent < self.end {
+            return Status::OK;
+        }
+        self.phase = Phase::Flush;
+        self.flush()
+    }
+
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn flush(&mut self) -> Status {
+        if self.port.flush() {
+            self.port.post_transmission();
+            // What a serial line brought meanwhile is an echo of ours.
+            loop {
+                self.listen();
+                if !self.request.serial || self.hear(usize::MAX) <= 0 {
+                    break;
+                }
+            }
+        }
+        Status::OK
+    }
+}

@@ -1,0 +1,82 @@
+//! What a service makes of a request, in one word: the core of a server hands
+//! it from function to function, and a microcontroller returns it in a register.
+
+use crate::pdu::EXCEPTION;
+
+/// What became of a request.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(transparent)]
+pub struct Reply(u16);
+
+impl Reply {
+    /// The service does not serve this function; another may.
+    pub const NOT_MINE: Reply = Reply(0);
+    /// Carried out, or not, but there is no response.
+    pub const SILENT: Reply = Reply(0x0200);
+    /// Not done yet: the server is to ask again, with the same request.
+    pub const PENDING: Reply = Reply(0x0300);
+
+    /// Exception 01.
+    pub const ILLEGAL_FUNCTION: Reply = Reply::exception(1);
+    /// Exception 02.
+    pub const ILLEGAL_DATA_ADDRESS: Reply = Reply::exception(2);
+    /// Exception 03.
+    pub const ILLEGAL_DATA_VALUE: Reply = Reply::exception(3);
+    /// Exception 04; also where a response does not fit into the buffer.
+    pub const SERVER_DEVICE_FAILURE: Reply = Reply::exception(4);
+
+    /// A response PDU of so many bytes, 1 to 253, stands where the request stood.
+    pub const fn length(bytes: usize) -> Reply {
+        Reply(bytes as u8 as u16)
+    }
+
+    /// An exception response.
+    pub const fn exception(code: u8) -> Reply {
+        Reply(0x0100 | code as u16)
+    }
+
+    /// The number of this reply, as C sees it.
+    pub const fn code(self) -> u16 {
+        self.0
+    }
+
+    /// The reply of a number that C hands back; what is none is exception 04.
+    pub const fn from_code(code: u16) -> Reply {
+        match code {
+            0..=253 | 0x0101..=0x017F | 0x0200 | 0x0300 => Reply(code),
+            _ => Reply::SERVER_DEVICE_FAILURE,
+        }
+    }
+
+    /// The reply of a number that [`Reply::code`] gave.
+    pub const fn from_number(code: u16) -> Reply {
+        Reply(code)
+    }
+
+    /// The exception code; 0 if this is none.
+    pub const fn exception_code(self) -> u8 {
+        if self.0 >> 8 == 1 {
+            self.0 as u8
+        } else {
+            0
+        }
+    }
+
+    /// Writes an exception response over the request at the front of `pdu`.
+    /// Returns the length of the response; 0 if there is none.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub fn settle(self, pdu: &mut [u8]) -> usize {
+        let code = match self {
+            Reply::NOT_MINE => 1,
+            other => other.exception_code(),
+        };
+        if code == 0 {
+            return usize::from(self.0 as u8);
+        }
+        if let [function, data, ..] = pdu {
+            *function |= EXCEPTION;
+            *data = code;
+        }
+        2
+    }
+}

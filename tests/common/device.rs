@@ -1,0 +1,203 @@
+//! A device with everything that a server serves, for tests to ask.
+
+use mbm::frame::checksum::crc16;
+use mbm::frame::Framing;
+use mbm::pdu::files::Record;
+use mbm::server::custom::{Custom, Outcome, SwitchedOff};
+use mbm::server::diagnostics::Diagnostics;
+use mbm::server::files::{self, Fifos, Files};
+use mbm::server::identity::{self, Objects};
+use mbm::server::respond::respond;
+use mbm::server::storage::{Bits, Coils, DiscreteInputs, HoldingRegisters, InputRegisters, Words};
+use mbm::server::{Reply, Service, Unit};
+
+/// Bytes with their CRC behind them.
+pub fn sealed(bytes: &[u8]) -> Vec<u8> {
+    let mut frame = bytes.to_vec();
+    frame.extend(crc16(bytes).to_bytes());
+    frame
+}
+
+/// Unit 17: ten registers and 20 bits of each kind from address 100 on, files 3
+/// and 4 of ten records, queues of 2, 31 and 32 registers.
+pub struct Device {
+    pub id: u8,
+    pub holding: [u16; 10],
+    pub inputs: [u16; 10],
+    pub coils: [u8; 3],
+    pub discrete: [u8; 3],
+    /// Which registers there are.
+    pub valid: Option<[u8; 2]>,
+    /// Writes of this register are refused with this exception.
+    pub refuse: Option<(u16, u8)>,
+    /// What the hooks were told.
+    pub asked: Vec<(u16, u16, Vec<u8>)>,
+    pub written: Vec<(u16, u16)>,
+    pub files: [[u16; 10]; 2],
+    pub objects: Vec<(u8, Vec<u8>)>,
+    pub diagnostics: Diagnostics,
+    pub off: [u8; 16],
+    /// What function 41 does.
+    pub custom: fn(&[u8], &mut [u8]) -> Outcome,
+}
+
+struct Stored<'a>(&'a mut [[u16; 10]; 2]);
+struct Queues;
+struct Named<'a>(&'a [(u8, Vec<u8>)]);
+struct Told;
+
+impl Files for Stored<'_> {
+    fn covers(&self, record: Record) -> bool {
+        (3..5).contains(&record.file) && record.record + record.length <= 10
+    }
+    fn load(&self, record: Record, data: &mut [u8]) {
+        let words = &self.0[usize::from(record.file) - 3][usize::from(record.record)..];
+        for (pair, word) in data.chunks_mut(2).zip(words) {
+            pair.copy_from_slice(&word.to_be_bytes());
+        }
+    }
+    fn store(&mut self, record: Record, data: &[u8]) {
+        let words = &mut self.0[usize::from(record.file) - 3][usize::from(record.record)..];
+        for (pair, word) in data.chunks(2).zip(words) {
+            *word = u16::from_be_bytes([pair[0], pair[1]]);
+        }
+    }
+}
+
+impl Fifos for Queues {
+    fn count(&self, address: u16) -> Option<u16> {
+        match address {
+            0x04DE => Some(2),
+            31 | 32 => Some(address),
+            _ => None,
+        }
+    }
+    fn load(&self, address: u16, data: &mut [u8]) {
+        if address == 0x04DE {
+            data.copy_from_slice(&[0x01, 0xB8, 0x12, 0x84]);
+        }
+    }
+}
+
+impl Objects for Named<'_> {
+    fn object(&self, id: u8) -> Option<&[u8]> {
+        let object = self.0.iter().find(|object| object.0 == id);
+        object.map(|object| &object.1[..])
+    }
+}
+
+impl Service for Stored<'_> {
+    fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
+        files::serve(self, pdu, length)
+    }
+}
+
+impl Service for Queues {
+    fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
+        files::serve_fifos(self, pdu, length)
+    }
+}
+
+impl Service for Named<'_> {
+    fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
+        identity::serve_identification(self, pdu, length)
+    }
+}
+
+impl Service for Told {
+    fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
+        match identity::serve_exception_status(0x6D, pdu, length) {
+            Reply::NOT_MINE => identity::serve_server_id(b"id", true, b"mbm", pdu, length),
+            reply => reply,
+        }
+    }
+}
+
+impl Device {
+    pub fn new() -> Self {
+        Device {
+            id: 17,
+            holding: std::array::from_fn(|index| 0x1000 + index as u16),
+            inputs: std::array::from_fn(|index| 0x2000 + index as u16),
+            coils: [0b0100_1001, 0b1001_0010, 0b0010],
+            discrete: [0b1011_0110, 0b0110_1101, 0b1011],
+            valid: None,
+            refuse: None,
+            asked: Vec::new(),
+            written: Vec::new(),
+            files: [
+                std::array::from_fn(|index| 0x300 + index as u16),
+                std::array::from_fn(|index| 0x400 + index as u16),
+            ],
+            objects: Vec::new(),
+            diagnostics: Diagnostics::NEW,
+            off: [0; 16],
+            custom: |_, _| Outcome::Exception(1),
+        }
+    }
+
+    /// Runs `action` on the device's unit.
+    pub fn with_unit<R>(&mut self, action: impl FnOnce(Unit) -> R) -> R {
+        let (refuse, asked, written) = (self.refuse, &mut self.asked, &mut self.written);
+        let mut before = |address: u16, quantity: u16, data: &[u8]| {
+            asked.push((address, quantity, data.to_vec()));
+            match refuse {
+                Some((cell, code)) if (address..address + quantity).contains(&cell) => code,
+                _ => 0,
+            }
+        };
+        let mut after = |address, quantity| written.push((address, quantity));
+        let mut holding = HoldingRegisters(Words::new(100, &mut self.holding));
+        holding.0.valid = self.valid.as_ref().map(|valid| &valid[..]);
+        holding.0.before = Some(&mut before);
+        holding.0.after = Some(&mut after);
+        let mut coils = Coils(Bits::new(100, &mut self.coils));
+        coils.0.size = 20;
+        let mut discrete = DiscreteInputs(Bits::new(100, &mut self.discrete));
+        discrete.0.size = 20;
+        let custom = self.custom;
+        action(Unit {
+            id: self.id,
+            services: &mut [
+                &mut SwitchedOff(self.off),
+                &mut holding,
+                &mut InputRegisters(Words::new(100, &mut self.inputs)),
+                &mut coils,
+                &mut discrete,
+                &mut Stored(&mut self.files),
+                &mut Queues,
+                &mut Named(&self.objects),
+                &mut Told,
+                &mut Custom {
+                    function: 0x42,
+                    handler: |_, data: &[u8], room: &mut [u8]| custom(data, room),
+                },
+            ],
+            diagnostics: Some(&mut self.diagnostics),
+        })
+    }
+}
+
+/// Asks a device over RTU; returns the response's PDU.
+pub fn ask(device: &mut Device, pdu: &[u8]) -> Vec<u8> {
+    let mut buffer = [0; 256];
+    let request = sealed(&[&[17], pdu].concat());
+    buffer[..request.len()].copy_from_slice(&request);
+    let sent = device.with_unit(|unit| {
+        respond(
+            Framing::Rtu,
+            10,
+            &mut buffer,
+            request.len(),
+            &mut [unit][..],
+        )
+    });
+    let sent = sent.expect("an answer");
+    if sent == 0 {
+        return Vec::new();
+    }
+    let response = &buffer[..sent];
+    assert_eq!(response[0], 17);
+    assert!(crc16(response).is_residue());
+    response[1..sent - 2].to_vec()
+}

@@ -1,0 +1,225 @@
+//! Diagnostics, functions of a user, and functions switched off.
+
+mod common;
+
+use common::device::{ask, sealed, Device};
+use mbm::frame::Framing;
+use mbm::server::custom::Outcome;
+use mbm::server::respond::respond;
+
+/// A word that a sub-function of 08 returns.
+fn told(device: &mut Device, sub_function: u8) -> u16 {
+    let answer = ask(device, &[8, 0, sub_function, 0, 0]);
+    assert_eq!(answer[..3], [8, 0, sub_function]);
+    u16::from_be_bytes([answer[3], answer[4]])
+}
+
+/// Hands a frame to the device, which may not be for it.
+fn hear(device: &mut Device, frame: &[u8]) -> usize {
+    let mut buffer = [0; 256];
+    buffer[..frame.len()].copy_from_slice(frame);
+    let length = frame.len();
+    device
+        .with_unit(|unit| respond(Framing::Rtu, 10, &mut buffer, length, &mut [unit][..]))
+        .unwrap()
+}
+
+#[test]
+fn query_data_come_back_whatever_they_are() {
+    let mut device = Device::new();
+    for words in 1..=125 {
+        let request = [&[8, 0, 0][..], &vec![0xA5; 2 * words]].concat();
+        assert_eq!(ask(&mut device, &request), request);
+    }
+    assert_eq!(ask(&mut device, &[8, 0, 0, 1, 2, 3]), [0x88, 3]);
+}
+
+#[test]
+fn unknown_sub_functions_and_wrong_data_are_refused() {
+    let mut device = Device::new();
+    for sub_function in [5, 6, 9, 0x13, 0x15, 0xFF] {
+        assert_eq!(ask(&mut device, &[8, 0, sub_function, 0, 0]), [0x88, 1]);
+        assert_eq!(ask(&mut device, &[8, 1, sub_function, 0, 0]), [0x88, 1]);
+    }
+    for sub_function in [1, 2, 3, 4, 0x0A, 0x0B, 0x12, 0x14] {
+        assert_eq!(ask(&mut device, &[8, 0, sub_function, 1, 1]), [0x88, 3]);
+        assert_eq!(ask(&mut device, &[8, 0, sub_function, 0]), [0x88, 3]);
+        let long = [8, 0, sub_function, 0, 0, 0, 0];
+        assert_eq!(ask(&mut device, &long), [0x88, 3]);
+    }
+}
+
+#[test]
+fn counters_count_what_the_standard_says() {
+    let mut device = Device::new();
+    hear(&mut device, &sealed(&[18, 3, 0, 0, 0, 1]));
+    hear(&mut device, &[17, 3, 0, 0, 0, 1, 9, 9]);
+    hear(&mut device, &sealed(&[0, 6, 0, 100, 0, 1]));
+    hear(&mut device, &sealed(&[0, 3, 0, 100, 0, 1]));
+    ask(&mut device, &[3, 0, 100, 0, 1]);
+    ask(&mut device, &[3, 0, 0, 0, 1]);
+    device.refuse = Some((100, 6));
+    ask(&mut device, &[6, 0, 100, 0, 1]);
+    device.refuse = Some((100, 7));
+    ask(&mut device, &[6, 0, 100, 0, 1]);
+    // The request itself is one of the messages.
+    assert_eq!(told(&mut device, 0x0B), 8);
+    assert_eq!(told(&mut device, 0x0C), 1);
+    assert_eq!(told(&mut device, 0x0D), 3);
+    assert_eq!(told(&mut device, 0x0E), 6 + 4);
+    assert_eq!(told(&mut device, 0x0F), 2);
+    assert_eq!(told(&mut device, 0x10), 1);
+    assert_eq!(told(&mut device, 0x11), 1);
+    assert_eq!(told(&mut device, 0x12), 0);
+    device.diagnostics.character_overruns = 5;
+    assert_eq!(told(&mut device, 0x12), 5);
+    told(&mut device, 0x14);
+    assert_eq!(told(&mut device, 0x12), 0);
+}
+
+#[test]
+fn clearing_leaves_nothing_but_the_log() {
+    let mut device = Device::new();
+    device.diagnostics.diagnostic_register = 0x1234;
+    assert_eq!(told(&mut device, 0x02), 0x1234);
+    ask(&mut device, &[3, 0, 0, 0, 1]);
+    told(&mut device, 0x0A);
+    let line = &device.diagnostics;
+    assert_eq!(
+        (line.bus_messages, line.events, line.exception_errors),
+        (0, 0, 0)
+    );
+    assert_eq!(line.diagnostic_register, 0);
+    assert!(line.logged > 0);
+    assert_eq!(told(&mut device, 0x0B), 1);
+}
+
+#[test]
+fn the_event_counter_counts_what_was_carried_out() {
+    let mut device = Device::new();
+    assert_eq!(ask(&mut device, &[0x0B]), [0x0B, 0, 0, 0, 0]);
+    ask(&mut device, &[3, 0, 100, 0, 1]);
+    ask(&mut device, &[6, 0, 100, 0, 1]);
+    ask(&mut device, &[3, 0, 0, 0, 1]);
+    assert_eq!(ask(&mut device, &[0x0B]), [0x0B, 0, 0, 0, 2]);
+    assert_eq!(ask(&mut device, &[0x0B]), [0x0B, 0, 0, 0, 2]);
+}
+
+#[test]
+fn the_event_log_tells_the_latest_first() {
+    let mut device = Device::new();
+    ask(&mut device, &[3, 0, 100, 0, 1]);
+    ask(&mut device, &[3, 0, 0, 0, 1]);
+    hear(&mut device, &[17, 3, 0, 0, 0, 1, 9, 9]);
+    hear(&mut device, &sealed(&[0, 6, 0, 100, 0, 1]));
+    let log = ask(&mut device, &[0x0C]);
+    assert_eq!(log[..8], [0x0C, 14, 0, 0, 0, 2, 0, 4]);
+    // Received; sent and received of the broadcast; damaged; exception; read.
+    assert_eq!(log[8..], [0x80, 0x40, 0xC0, 0x82, 0x41, 0x80, 0x40, 0x80]);
+}
+
+#[test]
+fn the_event_log_keeps_64_events() {
+    let mut device = Device::new();
+    for _ in 0..100 {
+        ask(&mut device, &[3, 0, 100, 0, 1]);
+    }
+    let log = ask(&mut device, &[0x0C]);
+    assert_eq!((log.len(), log[1]), (8 + 64, 70));
+    assert_eq!(log[8..12], [0x80, 0x40, 0x80, 0x40]);
+}
+
+#[test]
+fn listen_only_mode_ends_with_a_restart_that_is_not_answered() {
+    let mut device = Device::new();
+    assert_eq!(ask(&mut device, &[8, 0, 4, 0, 0]), []);
+    assert_eq!(device.diagnostics.listen_only, 1);
+    for request in [
+        &[3, 0, 100, 0, 1][..],
+        &[6, 0, 100, 9, 9],
+        &[8, 0, 0, 1, 2],
+        &[0x0B],
+    ] {
+        assert_eq!(ask(&mut device, request), []);
+    }
+    assert_eq!(device.holding, Device::new().holding);
+    hear(&mut device, &sealed(&[0, 6, 0, 100, 9, 9]));
+    assert_eq!(device.holding, Device::new().holding);
+    assert_eq!(ask(&mut device, &[8, 0, 1, 0, 0]), []);
+    assert_eq!(device.diagnostics.listen_only, 0);
+    assert_eq!(ask(&mut device, &[3, 0, 100, 0, 1]).len(), 4);
+}
+
+#[test]
+fn a_restart_clears_counters_and_if_told_the_log() {
+    let mut device = Device::new();
+    ask(&mut device, &[3, 0, 0, 0, 1]);
+    assert_eq!(ask(&mut device, &[8, 0, 1, 0, 0]), [8, 0, 1, 0, 0]);
+    assert_eq!(device.diagnostics.exception_errors, 0);
+    let kept = device.diagnostics.logged;
+    assert!(kept > 4);
+    assert_eq!(ask(&mut device, &[8, 0, 1, 0xFF, 0]), [8, 0, 1, 0xFF, 0]);
+    // The restart, and that it was answered.
+    assert_eq!(device.diagnostics.logged, 2);
+    assert_eq!(ask(&mut device, &[0x0B]), [0x0B, 0, 0, 0, 0]);
+}
+
+#[test]
+fn a_function_of_a_user_sees_its_data_and_writes_its_own() {
+    let mut device = Device::new();
+    device.custom = |data, room| {
+        for (place, byte) in room.iter_mut().zip(data) {
+            *place = !byte;
+        }
+        Outcome::Data(data.len() * 2)
+    };
+    assert_eq!(ask(&mut device, &[0x42]), [0x42]);
+    assert_eq!(ask(&mut device, &[0x42, 1, 2])[..3], [0x42, 0xFE, 0xFD]);
+    device.custom = |_, _| Outcome::Exception(0x0B);
+    assert_eq!(ask(&mut device, &[0x42, 1, 2]), [0xC2, 0x0B]);
+    device.custom = |_, _| Outcome::Silent;
+    assert_eq!(ask(&mut device, &[0x42, 1, 2]), []);
+    // More than there is room for.
+    device.custom = |_, room| Outcome::Data(room.len() + 1);
+    assert_eq!(ask(&mut device, &[0x42, 1, 2]), [0xC2, 4]);
+    device.custom = |_, room| Outcome::Data(room.len());
+    assert_eq!(ask(&mut device, &[0x42, 1, 2]).len(), 1 + 250);
+}
+
+#[test]
+fn a_function_that_is_not_done_is_asked_again() {
+    let mut device = Device::new();
+    device.custom = |_, _| Outcome::Pending;
+    let mut line = common::line::Line::new(Framing::Tcp);
+    line.device = device;
+    line.arrive(0, &[0, 1, 0, 0, 0, 3, 17, 0x42, 7]);
+    assert!(line.run(100_000, 100).is_empty());
+    assert_eq!(line.device.diagnostics.server_messages, 1);
+    line.device.custom = |data, room| {
+        room[0] = data[0];
+        Outcome::Data(1)
+    };
+    assert_eq!(line.frames(1_000, 100), [[0, 1, 0, 0, 0, 3, 17, 0x42, 7]]);
+    assert_eq!(line.device.diagnostics.events, 1);
+}
+
+#[test]
+fn what_is_switched_off_is_exception_01_and_nothing_happens() {
+    for (function, request) in [
+        (3u8, &[3, 0, 100, 0, 1][..]),
+        (6, &[6, 0, 100, 9, 9]),
+        (7, &[7]),
+        (8, &[8, 0, 0, 1, 1]),
+        (0x0B, &[0x0B]),
+        (0x10, &[0x10, 0, 100, 0, 1, 2, 9, 9]),
+        (0x17, &[0x17, 0, 100, 0, 1, 0, 100, 0, 1, 2, 9, 9]),
+        (0x2B, &[0x2B, 0x0E, 1, 0]),
+        (0x42, &[0x42]),
+    ] {
+        let mut device = Device::new();
+        device.off[usize::from(function / 8)] |= 1 << (function % 8);
+        assert_eq!(ask(&mut device, request), [function | 0x80, 1]);
+        assert_eq!(device.holding, Device::new().holding);
+        assert_eq!(ask(&mut device, &[4, 0, 100, 0, 1]).len(), 4);
+    }
+}

@@ -1,0 +1,324 @@
+//! The server on a line: how it finds requests among whatever arrives, and when
+//! it answers.
+
+mod common;
+
+use common::device::sealed;
+use common::line::{Line, CHARACTER, SILENCE};
+use mbm::error::Status;
+use mbm::frame::Framing;
+use mbm::server::Server;
+
+const READ: [u8; 6] = [17, 3, 0, 100, 0, 1];
+const ANSWER: [u8; 5] = [17, 3, 2, 0x10, 0];
+
+/// What a server sends for these pieces, each with the silence before it.
+fn sent(framing: Framing, pieces: &[(u32, Vec<u8>)]) -> Vec<Vec<u8>> {
+    let mut line = Line::new(framing);
+    for (after, bytes) in pieces {
+        line.arrive(*after, bytes);
+    }
+    let time = line.wire.borrow().arriving.len() as u32 * CHARACTER;
+    let silences: u32 = pieces.iter().map(|piece| piece.0).sum();
+    line.frames(time + silences + 2_000_000, 50)
+}
+
+fn rtu(pieces: &[(u32, Vec<u8>)]) -> Vec<Vec<u8>> {
+    sent(Framing::Rtu, pieces)
+}
+
+#[test]
+fn an_answer_begins_at_t35_after_the_request() {
+    let mut line = Line::new(Framing::Rtu);
+    line.arrive(0, &sealed(&READ));
+    let end = line.wire.borrow().arriving.back().unwrap().0;
+    let sent = line.run(30_000, 10);
+    assert_eq!(sent.len(), 1);
+    assert_eq!(sent[0].1, sealed(&ANSWER));
+    let gap = sent[0].0.wrapping_sub(end);
+    assert!((SILENCE..SILENCE + SILENCE / 20).contains(&gap), "{gap}");
+    assert!(!line.wire.borrow().driver);
+}
+
+#[test]
+fn every_request_of_a_row_is_answered() {
+    let pieces = vec![(10_000, sealed(&READ)); 5];
+    assert_eq!(rtu(&pieces), vec![sealed(&ANSWER); 5]);
+}
+
+#[test]
+fn noise_before_a_request_is_passed_over() {
+    for noise in 0..40 {
+        let noise: Vec<u8> = (0..noise).map(|index| (index * 37 + 17) as u8).collect();
+        let pieces = [(0, [&noise[..], &sealed(&READ)[..]].concat())];
+        assert_eq!(rtu(&pieces), [sealed(&ANSWER)], "{noise:02X?}");
+    }
+}
+
+#[test]
+fn bytes_behind_a_request_make_it_none_and_the_next_is_answered() {
+    for behind in [&[1][..], &[1, 2, 3]] {
+        let damaged = [&sealed(&READ)[..], behind].concat();
+        let pieces = [(0, damaged), (5_000, sealed(&READ))];
+        assert_eq!(rtu(&pieces), [sealed(&ANSWER)]);
+    }
+}
+
+#[test]
+fn zero_values_with_data_behind_are_refused_in_time() {
+    let mut line = Line::new(Framing::Rtu);
+    line.arrive(0, &sealed(&[17, 0x10, 0, 100, 0, 0, 0, 1, 2]));
+    let end = line.wire.borrow().arriving.back().unwrap().0;
+    let sent = line.run(30_000, 10);
+    assert_eq!(sent[0].1, sealed(&[17, 0x90, 3]));
+    assert!(sent[0].0.wrapping_sub(end) < SILENCE + SILENCE / 20);
+}
+
+#[test]
+fn damaged_frames_and_those_of_other_units_are_not_answered() {
+    let mut damaged = sealed(&READ);
+    damaged[2] ^= 1;
+    for frame in [
+        damaged,
+        sealed(&READ)[..7].to_vec(),
+        vec![17],
+        sealed(&[18, 3, 0, 100, 0, 1]),
+        sealed(&[0, 3, 0, 100, 0, 1]),
+    ] {
+        assert_eq!(
+            rtu(&[(0, frame.clone())]),
+            Vec::<Vec<u8>>::new(),
+            "{frame:02X?}"
+        );
+        let pieces = [(0, frame), (SILENCE + CHARACTER, sealed(&READ))];
+        assert_eq!(rtu(&pieces), [sealed(&ANSWER)]);
+    }
+}
+
+#[test]
+fn foreign_traffic_back_to_back_never_confuses() {
+    let request = sealed(&[18, 3, 0, 0, 0, 20]);
+    // Its data look like a request for us, but for the CRC.
+    let mut content = vec![18, 3, 40];
+    for _ in 0..5 {
+        content.extend([17, 6, 0, 100, 0xDE, 0xAD, 0, 0]);
+    }
+    let response = sealed(&content);
+    for gap in [0, CHARACTER, SILENCE, 3 * SILENCE] {
+        let mut pieces = Vec::new();
+        for _ in 0..6 {
+            pieces.push((gap, request.clone()));
+            pieces.push((gap, response.clone()));
+        }
+        pieces.push((gap, sealed(&READ)));
+        assert_eq!(rtu(&pieces), [sealed(&ANSWER)], "{gap}");
+    }
+}
+
+#[test]
+fn a_request_of_ours_inside_a_foreign_frame_is_not_carried_out() {
+    let mut content = vec![18, 3, 8];
+    content.extend(sealed(&[17, 6, 0, 100, 0xDE, 0xAD]));
+    let pieces = [(0, sealed(&content)), (5_000, sealed(&READ))];
+    assert_eq!(rtu(&pieces), [sealed(&ANSWER)]);
+}
+
+#[test]
+fn a_poll_that_comes_late_still_finds_the_last_request() {
+    let mut line = Line::new(Framing::Rtu);
+    line.arrive(0, &sealed(&[18, 3, 0, 0, 0, 1]));
+    line.arrive(5_000, &sealed(&[18, 3, 2, 1, 1]));
+    line.arrive(5_000, &sealed(&READ));
+    line.wire.borrow_mut().now = 0x1_0000;
+    assert_eq!(line.frames(10_000, 50), [sealed(&ANSWER)]);
+}
+
+#[test]
+fn a_frame_longer_than_the_buffer_is_dropped_and_the_next_is_answered() {
+    let long = sealed(&vec![17; 1_000]);
+    let pieces = [(0, long), (SILENCE + CHARACTER, sealed(&READ))];
+    assert_eq!(rtu(&pieces), [sealed(&ANSWER)]);
+}
+
+#[test]
+fn the_longest_frame_fits_into_a_buffer_of_its_length() {
+    let tap = common::line::Tap::default();
+    let wire = tap.0.clone();
+    let mut server = Server::with_framing(Framing::Rtu, tap, [0; 256]);
+    let mut device = common::device::Device::new();
+    let query = sealed(&[&[17, 8, 0, 0][..], &[0xA5; 250]].concat());
+    wire.borrow_mut().arriving = query.iter().map(|byte| (0, *byte)).collect();
+    for now in [0, 1_000, 2_000, 3_999, 4_000, 4_001] {
+        wire.borrow_mut().now = now;
+        device.with_unit(|unit| server.serve(now, &mut [unit][..]));
+    }
+    assert_eq!(wire.borrow().sent[0], (4_000, query));
+}
+
+#[test]
+fn our_own_echo_is_no_request() {
+    let mut line = Line::new(Framing::Rtu);
+    line.wire.borrow_mut().echo = true;
+    // An answer that is the request, and one that looks like a wrong one.
+    for request in [&[17, 6, 0, 100, 1, 2][..], &READ] {
+        line.arrive(0, &sealed(request));
+        assert_eq!(line.frames(100_000, 50).len(), 1);
+    }
+}
+
+#[test]
+fn a_port_that_takes_little_is_given_the_rest_later() {
+    let mut line = Line::new(Framing::Rtu);
+    line.wire.borrow_mut().piece = 1;
+    line.arrive(0, &sealed(&READ));
+    assert_eq!(line.frames(30_000, 50), [sealed(&ANSWER)]);
+}
+
+#[test]
+fn a_lost_link_is_told_and_a_line_may_come_back() {
+    let mut line = Line::new(Framing::Rtu);
+    line.wire.borrow_mut().lost = true;
+    assert_eq!(line.poll(), Status::LINK_LOST);
+    line.wire.borrow_mut().lost = false;
+    line.arrive(0, &sealed(&READ));
+    assert_eq!(line.frames(30_000, 50), [sealed(&ANSWER)]);
+}
+
+#[test]
+fn the_delay_of_a_poll_is_the_silence_that_is_left() {
+    let mut line = Line::new(Framing::Rtu);
+    assert_eq!(line.server.poll_delay(0xFFFF_0000), u32::MAX);
+    line.arrive(0, &[17]);
+    line.poll();
+    assert_eq!(line.server.poll_delay(0xFFFF_0000), SILENCE);
+    assert_eq!(line.server.poll_delay(0xFFFF_0000 + 6), SILENCE - 6);
+    assert_eq!(line.server.poll_delay(0xFFFF_FFFF), 0);
+}
+
+fn ascii(pdu: &[u8], end: u8) -> Vec<u8> {
+    let mut buffer = [0; 600];
+    let length = Framing::Ascii.emit(&mut buffer, 0, 17, end, |place| {
+        place[..pdu.len()].copy_from_slice(pdu);
+        Ok(pdu.len())
+    });
+    buffer[..length.unwrap()].to_vec()
+}
+
+#[test]
+fn an_ascii_request_is_answered_as_its_end_arrives() {
+    let request = ascii(&READ[1..], b'\n');
+    let answer = ascii(&ANSWER[1..], b'\n');
+    for bytes in [request.clone(), [b"03\r\n:11:0", &request[..]].concat()] {
+        assert_eq!(sent(Framing::Ascii, &[(0, bytes)])[..], [&answer[..]]);
+    }
+    let pieces = vec![(10_000, request); 3];
+    assert_eq!(sent(Framing::Ascii, &pieces), vec![answer; 3]);
+}
+
+#[test]
+fn an_ascii_frame_that_pauses_a_second_is_dropped() {
+    let request = ascii(&READ[1..], b'\n');
+    let (front, back) = request.split_at(7);
+    for (pause, answers) in [(900_000, 1), (1_100_000, 0)] {
+        let pieces = [(0, front.to_vec()), (pause, back.to_vec())];
+        assert_eq!(sent(Framing::Ascii, &pieces).len(), answers, "{pause}");
+    }
+}
+
+#[test]
+fn a_wrong_lrc_is_not_answered() {
+    let mut request = ascii(&READ[1..], b'\n');
+    request[5] ^= 1;
+    assert!(sent(Framing::Ascii, &[(0, request)]).is_empty());
+}
+
+#[test]
+fn the_delimiter_is_changed_behind_the_answer() {
+    let change = ascii(&[8, 0, 3, b'!', 0], b'\n');
+    let request = ascii(&READ[1..], b'!');
+    let pieces = [(0, change.clone()), (10_000, request)];
+    let answers = sent(Framing::Ascii, &pieces);
+    assert_eq!(answers, [change, ascii(&ANSWER[1..], b'!')]);
+}
+
+fn tcp(transaction: u8, pdu: &[u8]) -> Vec<u8> {
+    let head = [0, transaction, 0, 0, 0, pdu.len() as u8 + 1, 17];
+    [&head[..], pdu].concat()
+}
+
+#[test]
+fn requests_in_a_stream_are_answered_in_turn() {
+    // The answer of the first is longer than its request.
+    let stream = [
+        tcp(1, &[3, 0, 100, 0, 10]),
+        tcp(2, &[7]),
+        tcp(3, &READ[1..]),
+    ]
+    .concat();
+    let answers = sent(Framing::Tcp, &[(0, stream)]);
+    assert_eq!(answers.len(), 3);
+    assert_eq!(answers[0][..9], [0, 1, 0, 0, 0, 23, 17, 3, 20]);
+    assert_eq!(answers[1], tcp(2, &[7, 0x6D]));
+    assert_eq!(answers[2], tcp(3, &ANSWER[1..]));
+}
+
+#[test]
+fn one_byte_a_second_is_waited_for_over_tcp() {
+    let mut line = Line::new(Framing::Tcp);
+    for byte in tcp(9, &READ[1..]) {
+        line.arrive(1_000_000, &[byte]);
+    }
+    assert_eq!(line.frames(13_000_000, 10_000), [tcp(9, &ANSWER[1..])]);
+}
+
+#[test]
+fn a_stream_that_is_no_modbus_ends() {
+    for bytes in [
+        &b"GET / HTTP/1.1"[..],
+        &[0, 1, 0, 1, 0, 6, 17, 3],
+        &[0, 1, 0, 0, 0, 1, 17, 3],
+        &[0, 1, 0, 0, 0, 255, 17, 3],
+    ] {
+        let mut line = Line::new(Framing::Tcp);
+        line.arrive(0, bytes);
+        line.run(20_000, 50);
+        assert_eq!(line.poll(), Status::MALFORMED_FRAME);
+        line.arrive(0, &tcp(1, &READ[1..]));
+        assert!(line.run(20_000, 50).is_empty());
+    }
+}
+
+#[test]
+fn requests_of_rtu_over_tcp_are_answered_without_silence() {
+    let stream = [sealed(&READ), sealed(&[17, 7]), sealed(&READ)].concat();
+    let mut line = Line::new(Framing::RtuOverTcp);
+    line.arrive(0, &stream);
+    line.wire.borrow_mut().now = 0x1_0000;
+    let answers = line.frames(1_000, 50);
+    assert_eq!(
+        answers,
+        [sealed(&ANSWER), sealed(&[17, 7, 0x6D]), sealed(&ANSWER)]
+    );
+}
+
+#[test]
+fn unknown_functions_of_rtu_over_tcp_are_refused() {
+    let pieces = [(0, sealed(&[17, 0x55, 1, 2, 3])), (100_000, sealed(&READ))];
+    let answers = sent(Framing::RtuOverTcp, &pieces);
+    assert_eq!(answers, [sealed(&[17, 0xD5, 1]), sealed(&ANSWER)]);
+}
+
+#[test]
+fn rtu_over_tcp_finds_its_way_back_after_damage() {
+    let mut damaged = sealed(&READ);
+    damaged[3] ^= 8;
+    for rubbish in [
+        damaged,
+        vec![17, 0x10, 1],
+        vec![1, 2, 3, 4, 5, 6, 7, 8, 9, 10],
+    ] {
+        let pieces = [(0, rubbish.clone()), (700_000, sealed(&READ))];
+        let answers = sent(Framing::RtuOverTcp, &pieces);
+        assert_eq!(answers, [sealed(&ANSWER)], "{rubbish:02X?}");
+    }
+}
