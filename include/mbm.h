@@ -2033,6 +2033,19 @@ uint8_t mbm_client_beginAscii(struct mbm_client *client,
                               uint16_t frameBytes);
 
 /**
+ * Sets the character that ends ASCII frames behind CR, in place of LF, in both
+ * directions; for devices that were told another one (function 08 with
+ * sub-function 03, V1.1b3, 6.8.1). That request is answered with the old one: call
+ * this when it has ended, for example from its `done`.
+ *
+ * @param client     the object, begun with mbm_client_beginAscii
+ * @param character  1 to 127, but CR, the colon and hexadecimal digits
+ * @return MBM_OK; MBM_BUSY while a request is under way; MBM_INVALID_ARGUMENT, also
+ *         for a client of another framing; MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setDelimiter(struct mbm_client *client, uint8_t character);
+
+/**
  * Makes an object a client that sends RTU frames through a TCP stream, for
  * converters that pass on what they get. No gap is kept, nothing is broadcast.
  *
