@@ -21,4 +21,4 @@ firmware-test-qemu: ## Bare metal firmware on seven machines in QEMU: Arm, RISC-
 	done
 	@$(MAKE) -s --no-print-directory $(QEMU_TEST)
 	@scripts/run-c-tests "" $(QEMU_TEST)
-	@echo "firmware-test-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against a libmodbus server and a bad wire"
+	@echo "firmware-test-qemu: $(words $(MACHINES)) firmwares ($(MACHINES)) against a libmodbus server and a bad wire"
