@@ -273,6 +273,41 @@ static void a_delimiter_that_cannot_be_is_refused(void **state)
     end();
 }
 
+static void as_many_are_under_way_over_tcp_as_the_server_takes(void **state)
+{
+    mbm_clientRequest requests[MBM_CLIENT_DEPTH];
+    uint16_t words[MBM_CLIENT_DEPTH];
+    static mbm_client fresh;
+    unsigned i;
+
+    (void)state;
+    IS(MBM_INVALID_ARGUMENT, mbm_client_setInFlight(NULL, 1));
+    IS(MBM_NOT_INITIALISED, mbm_client_setInFlight(&fresh, 1));
+    begin(MBM_FRAMING_RTU);
+    OK(mbm_client_setInFlight(&a.client, 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_setInFlight(&a.client, 2));
+    end();
+    begin(MBM_FRAMING_TCP);
+    IS(MBM_INVALID_ARGUMENT, mbm_client_setInFlight(&a.client, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_setInFlight(&a.client, MBM_CLIENT_DEPTH + 1));
+    OK(mbm_client_setInFlight(&a.client, MBM_CLIENT_DEPTH));
+    OK(mbm_client_setInFlight(&a.client, 1));
+    for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
+        requests[i] = asked(SERVED_UNIT, &words[i], sizeof words[i], NULL);
+        IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &requests[i],
+                                                        (uint16_t)(SERVED_BASE + i), 1));
+    }
+    while (mbm_client_poll(&a.client) == MBM_PENDING) {
+        assert_true(a.counters.requests - a.counters.replies <= 1);
+        asker_rest(&a);
+    }
+    for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
+        assert_int_equal(requests[i].status, MBM_OK);
+        assert_int_equal(words[i], s.words[i]);
+    }
+    end();
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -282,6 +317,7 @@ int main(void)
         cmocka_unit_test(every_function_in_rtu_over_tcp),
         cmocka_unit_test(a_broadcast_reaches_every_unit_in_ascii_and_is_refused_over_tcp),
         cmocka_unit_test(the_ascii_delimiter_follows_the_devices),
+        cmocka_unit_test(as_many_are_under_way_over_tcp_as_the_server_takes),
         cmocka_unit_test(a_delimiter_that_cannot_be_is_refused),
     };
 

@@ -2085,6 +2085,19 @@ uint8_t mbm_client_beginTcp(struct mbm_client *client,
                             uint16_t outgoingBytes);
 
 /**
+ * Sets how many requests are under way at once on TCP, for servers that take fewer
+ * at a time (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 1 to
+ * 16); some drop what comes in one segment with another request. The queue holds 16 in any case.
+ *
+ * @param client  the object
+ * @param most    1 to 16, which is so at first; on a serial line, and in RTU over
+ *                TCP, 1
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setInFlight(struct mbm_client *client,
+                               uint8_t most);
+
+/**
  * Closes the link and opens it anew. What was half received is forgotten, and
  * requests that were under way end with MBM_LINK_LOST at the next polls; those
  * that still waited go over the new link.

@@ -2,6 +2,7 @@
 
 use super::{client, mbm_client, pointers, Kind, Lent, LentByC, Object, BEGUN};
 use super::{Ascii, Rtu, TcpIp};
+use crate::capi::frame::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
 use crate::capi::port::mbm_port;
 use crate::client::{Client, Line, Serial, Tcp, ASCII_SILENCE, STREAM_SILENCE};
 use crate::error::Status;
@@ -115,7 +116,7 @@ pub unsafe extern "C" fn mbm_client_beginAscii(
             begin_serial::<ascii_window::Window>(client, port, frame, frameBytes, true, silence);
         if status == Status::OK.code() {
             let object = pointers::object(client);
-            object.is_ascii = true;
+            object.framing = MBM_FRAMING_ASCII;
             *delimiter(object) = ascii::END;
         }
         status
@@ -143,7 +144,10 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
     // SAFETY: as the header demands.
     unsafe {
         pointers::with(client, |object| {
-            if !object.is_ascii || !(1..=127).contains(&character) || part_of_a_frame {
+            if object.framing != MBM_FRAMING_ASCII
+                || !(1..=127).contains(&character)
+                || part_of_a_frame
+            {
                 return Status::INVALID_ARGUMENT;
             }
             let ascii: &mut Ascii = super::client(object);
@@ -208,12 +212,37 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
         let status = begin::<Tcp<mbm_port, LentByC>>(client, port, incoming, incomingBytes);
         if status == Status::OK {
             let object = pointers::object(client);
+            object.framing = MBM_FRAMING_TCP;
             let tcp: &mut TcpIp = super::client(object);
             tcp.line.limit(super::MBM_CLIENT_DEPTH);
             tcp.line.means.outgoing = outgoing;
             tcp.line.means.outgoing_bytes = outgoingBytes;
         }
         status.code()
+    }
+}
+
+/// Sets how many requests are under way at once on TCP, for servers that take fewer
+/// at a time (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 1 to
+/// 16); some drop what comes in one segment with another request. The queue holds 16 in any case.
+///
+/// @param client  the object
+/// @param most    1 to 16, which is so at first; on a serial line, and in RTU over
+///                TCP, 1
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_setInFlight(client: *mut mbm_client, most: u8) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        pointers::with(client, |object| match (object.framing, most) {
+            (MBM_FRAMING_TCP, 1..=super::MBM_CLIENT_DEPTH) => {
+                let tcp: &mut TcpIp = super::client(object);
+                tcp.line.limit(most);
+                Status::OK
+            }
+            (MBM_FRAMING_RTU | MBM_FRAMING_ASCII, 1) => Status::OK,
+            _ => Status::INVALID_ARGUMENT,
+        })
     }
 }
 
