@@ -3,6 +3,7 @@
 //!
 //! `make test` makes the Python environment first; alone, `scripts/venv` does.
 
+mod client;
 mod process;
 mod requests;
 mod responses;
