@@ -98,7 +98,7 @@ fault-table: need-test ## Write docs/fault-table.md from what the test finds
 need-check:
 	@scripts/need gcc g++ clang libc6-dev binutils doxygen
 need-test:
-	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind
+	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind mbpoll
 
 # The test programs, one folder a variant: $(1) name, $(2) C, $(3) C++, $(4) flags
 define variant
@@ -118,8 +118,13 @@ $(eval $(call variant,plain,gcc,g++,))
 $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS)))
 .SECONDARY:
 
+# What peers of another house ask.
+SERVE := $(BUILD)/plain/serve
+$(SERVE): $(patsubst %,$(BUILD)/plain/%.o,serve support/served support/pty) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lpthread -o $@
+
 .PHONY: tests
-tests: $(TESTS:%=$(BUILD)/plain/%) $(TESTS:%=$(BUILD)/sanitized/%)
+tests: $(TESTS:%=$(BUILD)/plain/%) $(TESTS:%=$(BUILD)/sanitized/%) $(SERVE)
 
 # The same flags as the peer's package is built with.
 $(eval $(call variant,bench,gcc,g++,-O2))
