@@ -184,6 +184,8 @@ impl<P: Port, B: Lent> Server<P, B> {
     fn seal_rtu(&mut self, length: usize) -> usize {
         let frame = self.lent.frame();
         let unit = frame.first().copied().unwrap_or(0);
+        // Tells the compiler that the length of the frame cannot overflow.
+        let length = length.min(frame.len());
         rtu::write(frame, unit, length, |_| ());
         length + rtu::OVERHEAD
     }
