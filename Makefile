@@ -15,6 +15,8 @@ SANITIZERS := -fsanitize=address,undefined -fno-sanitize-recover=all
 SUPPORT := $(wildcard c-tests/support/*.c) $(wildcard examples/linux/mbm_*.c)
 TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
+# Examples that a test named after each drives.
+TESTED_EXAMPLES := custom_command gateway
 HEADERS := $(wildcard include/*.h c-tests/support/*.h c-tests/shim/* examples/linux/*.h)
 
 .PHONY: help
@@ -113,6 +115,9 @@ $(BUILD)/$(1)/%.o: examples/%.c $(HEADERS)
 	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(ARCHIVE)
 	@$(3) $(4) $$(filter %.o,$$^) $(ARCHIVE) $(LIBS) -o $$@
+$(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tty.o $(ARCHIVE)
+	@$(2) $(4) $$(filter %.o,$$^) $(ARCHIVE) -Wl,--gc-sections -o $$@
+$(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)/linux/%
 endef
 $(eval $(call variant,plain,gcc,g++,))
 $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS)))
