@@ -1090,17 +1090,16 @@ typedef struct mbm_unit {
     /**
      * Not for you.
      */
-    uint16_t (*monitor)(struct mbm_unit *unit,
-                        const void *heading,
-                        uint8_t concern,
-                        uint8_t *pdu);
+    uint16_t (*serve)(struct mbm_unit *unit,
+                      const void *heading,
+                      uint8_t concern,
+                      uint8_t *pdu);
     /**
      * Not for you.
      */
     struct mbm_diagnostics *diagnostics;
     /**
-     * The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers, over TCP,
-     * to every id.
+     * The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers to every id.
      */
     uint8_t id;
 } mbm_unit;

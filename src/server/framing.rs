@@ -2,6 +2,7 @@
 
 use super::line::{Lent, Server};
 use crate::error::Status;
+use crate::frame::checksum::crc16;
 use crate::frame::{ascii, rtu, tcp};
 use crate::pdu::custom::Function;
 use crate::pdu::length::{self, Length};
@@ -80,8 +81,9 @@ impl<P: Port, B: Lent> Server<P, B> {
     fn hear_rtu(&mut self, until: usize) -> i16 {
         let start = usize::from(self.end);
         let heard = self.hear(until);
-        let frame = self.lent.frame().get(start..usize::from(self.end));
-        self.crc = self.crc.with(frame.unwrap_or_default());
+        if let Some(news) = self.lent.frame().get(start..usize::from(self.end)) {
+            self.crc = self.crc.with(news);
+        }
         heard
     }
 
@@ -115,7 +117,9 @@ impl<P: Port, B: Lent> Server<P, B> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn last_frame(&mut self) -> Status {
         let end = usize::from(self.end);
-        let frame = self.lent.frame().get_mut(..end).unwrap_or_default();
+        let Some(frame) = self.lent.frame().get_mut(..end) else {
+            return Status::OK;
+        };
         let start = if self.crc.is_residue() && !self.request.overrun {
             0
         } else {
@@ -182,9 +186,12 @@ impl<P: Port, B: Lent> Server<P, B> {
     }
 
     fn seal_rtu(&mut self, length: usize) -> usize {
-        let frame = self.lent.frame();
-        let unit = frame.first().copied().unwrap_or(0);
-        rtu::write(frame, unit, length, |_| ());
+        let end = rtu::PDU + length;
+        if let Some((content, behind)) = self.lent.frame().split_at_mut_checked(end) {
+            if let Some(crc) = behind.first_chunk_mut() {
+                *crc = crc16(content).to_bytes();
+            }
+        }
         length + rtu::OVERHEAD
     }
 

@@ -277,8 +277,9 @@ impl<P: Port, B: Lent> Server<P, B> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn send(&mut self) -> Status {
         let frame = self.lent.frame();
-        let rest = frame.get(usize::from(self.sent)..usize::from(self.end));
-        let rest = rest.unwrap_or_default();
+        let Some(rest) = frame.get(usize::from(self.sent)..usize::from(self.end)) else {
+            return Status::OK;
+        };
         let sent = self.port.write(rest);
         if sent < 0 {
             self.port.post_transmission();
