@@ -12,7 +12,7 @@ MODBUS = $(shell pkg-config --cflags libmodbus)
 LIBS := -Wl,--gc-sections -lmodbus -lcmocka -lpthread
 SANITIZERS := -fsanitize=address,undefined -fno-sanitize-recover=all
 
-SUPPORT := $(wildcard c-tests/support/*.c) examples/linux/mbm_tty.c
+SUPPORT := $(wildcard c-tests/support/*.c) $(wildcard examples/linux/mbm_*.c)
 TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
 HEADERS := $(wildcard include/*.h c-tests/support/*.h c-tests/shim/* examples/linux/*.h)
@@ -36,6 +36,19 @@ archives: ## The archives for microcontrollers, build/archives and build/minimal
 	@for mcu in $(MCUS); do scripts/archive $$mcu && scripts/archive $$mcu minimal || exit 1; done
 	@scripts/check-archive
 
+.PHONY: install
+install: $(ARCHIVE) ## Library, header, ports, pkg-config and CMake files, below PREFIX
+	@PREFIX="$(PREFIX)" LIBDIR="$(LIBDIR)" DESTDIR="$(DESTDIR)" scripts/install
+
+.PHONY: dist
+dist: $(ARCHIVE) ## Sources and what archives stand built, dist/mbm-VERSION.tar.gz
+	@scripts/dist
+
+.PHONY: check-install
+check-install: $(ARCHIVE) ## Installs, builds and runs the README's program; packs twice
+	@scripts/need gcc libc6-dev make cmake pkg-config
+	@scripts/check-install
+
 .PHONY: size
 size: ## Flash and RAM that the library adds, and what changed since docs/size.md
 	@scripts/size
@@ -47,6 +60,7 @@ header: ## Write include/mbm.h anew from the source
 .PHONY: check
 check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, symbols
 	@$(CARGO) fmt --all --check
+	@for crate in fuzz bench; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml --check || exit 1; done
 	@$(CARGO) clippy --quiet --workspace --all-targets -- -D warnings
 	@$(CARGO) clippy --quiet --no-default-features -- -D warnings
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps
@@ -62,8 +76,17 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, sy
 
 .PHONY: test
 test: need-test ## Every test: Rust, C and C++; sanitizers and valgrind
-	@$(MAKE) --no-print-directory tests
+	@$(MAKE) --no-print-directory venv tests
 	@CARGO="$(CARGO)" scripts/test $(TESTS)
+
+.PHONY: venv
+venv: ## The Python environment with the peers of tests/peer, build/venv
+	@scripts/venv
+
+.PHONY: fuzz
+fuzz: ## Fuzz every decoder for FUZZ_SECONDS in all (60)
+	@scripts/need g++ libc6-dev libmodbus-dev
+	@CARGO="$(CARGO)" scripts/fuzz
 
 .PHONY: fault-table
 fault-table: need-test ## Write docs/fault-table.md from what the test finds
@@ -75,7 +98,7 @@ fault-table: need-test ## Write docs/fault-table.md from what the test finds
 need-check:
 	@scripts/need gcc g++ clang libc6-dev binutils doxygen
 need-test:
-	@scripts/need gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind
+	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind
 
 # The test programs, one folder a variant: $(1) name, $(2) C, $(3) C++, $(4) flags
 define variant
@@ -105,10 +128,11 @@ $(BENCH): $(patsubst %,$(BUILD)/bench/%.o,bench support/pty support/server linux
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
 
 .PHONY: bench
-bench: ## Speed and instructions of mbm beside libmodbus's own client
+bench: ## Speed and instructions beside libmodbus and rmodbus; writes docs/speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
 	@$(MAKE) --no-print-directory $(BENCH)
 	@scripts/bench $(BENCH)
+	@CARGO="$(CARGO)" scripts/bench-frames
 
 DEMO := $(BUILD)/plain/linux/demo
 $(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/frame_words linux/recorder linux/mbm_tty support/pty support/server) $(ARCHIVE)

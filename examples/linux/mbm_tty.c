@@ -6,108 +6,340 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <stddef.h>
+#include <string.h>
+#include <sys/file.h>
 #include <sys/ioctl.h>
-#include <termios.h>
 #include <time.h>
 #include <unistd.h>
 
+#ifdef __linux__
+#include <linux/serial.h>
+#endif
+
+/* POSIX has those up to 38400; the others are there or not. */
+static const struct {
+    uint32_t baud;
+    speed_t speed;
+} RATES[] = {
+    {50, B50},
+    {75, B75},
+    {110, B110},
+    {134, B134},
+    {150, B150},
+    {200, B200},
+    {300, B300},
+    {600, B600},
+    {1200, B1200},
+    {1800, B1800},
+    {2400, B2400},
+    {4800, B4800},
+    {9600, B9600},
+    {19200, B19200},
+    {38400, B38400},
+#ifdef B57600
+    {57600, B57600},
+#endif
+#ifdef B76800
+    {76800, B76800},
+#endif
+#ifdef B115200
+    {115200, B115200},
+#endif
+#ifdef B153600
+    {153600, B153600},
+#endif
+#ifdef B230400
+    {230400, B230400},
+#endif
+#ifdef B307200
+    {307200, B307200},
+#endif
+#ifdef B460800
+    {460800, B460800},
+#endif
+#ifdef B500000
+    {500000, B500000},
+#endif
+#ifdef B576000
+    {576000, B576000},
+#endif
+#ifdef B614400
+    {614400, B614400},
+#endif
+#ifdef B921600
+    {921600, B921600},
+#endif
+#ifdef B1000000
+    {1000000, B1000000},
+#endif
+#ifdef B1152000
+    {1152000, B1152000},
+#endif
+#ifdef B1500000
+    {1500000, B1500000},
+#endif
+#ifdef B2000000
+    {2000000, B2000000},
+#endif
+#ifdef B2500000
+    {2500000, B2500000},
+#endif
+#ifdef B3000000
+    {3000000, B3000000},
+#endif
+#ifdef B3500000
+    {3500000, B3500000},
+#endif
+#ifdef B4000000
+    {4000000, B4000000},
+#endif
+};
+
 static speed_t speed_of(uint32_t baud)
 {
-    switch (baud) {
-    case 1200: return B1200;
-    case 2400: return B2400;
-    case 4800: return B4800;
-    case 9600: return B9600;
-    case 19200: return B19200;
-    case 38400: return B38400;
-    case 57600: return B57600;
-    case 115200: return B115200;
-    default: return B0;
+    size_t i;
+
+    for (i = 0; i < sizeof RATES / sizeof RATES[0]; i++)
+        if (RATES[i].baud == baud)
+            return RATES[i].speed;
+    return B0;
+}
+
+static int refuse(int error)
+{
+    errno = error;
+    return -1;
+}
+
+int mbm_tty_settings(struct termios *settings, const mbm_tty_options *options)
+{
+    speed_t speed = speed_of(options->baud);
+    uint8_t data = options->data == 0 ? 8 : options->data;
+    tcflag_t flags = CLOCAL | CREAD;
+
+    if (speed == B0 || (data != 7 && data != 8) || options->stop < 1 || options->stop > 2)
+        return refuse(EINVAL);
+    switch (options->parity) {
+    case 'N': break;
+    case 'E': flags |= PARENB; break;
+    case 'O': flags |= PARENB | PARODD; break;
+    default: return refuse(EINVAL);
     }
+    flags |= data == 7 ? CS7 : CS8;
+    flags |= options->stop == 2 ? CSTOPB : 0;
+
+    cfmakeraw(settings);
+    /* A device with one wrong parity bit is heard all the same: the CRC tells. */
+    settings->c_iflag &= ~(tcflag_t)(INPCK | IXOFF | IXANY);
+    settings->c_cflag &= ~(tcflag_t)(CSIZE | PARENB | PARODD | CSTOPB | HUPCL);
+#ifdef CRTSCTS
+    settings->c_cflag &= ~(tcflag_t)CRTSCTS;
+#endif
+    settings->c_cflag |= flags;
+    if (cfsetispeed(settings, speed) < 0 || cfsetospeed(settings, speed) < 0)
+        return -1;
+    return 0;
+}
+
+#ifdef TIOCSRS485
+static int begin_rs485(mbm_tty *tty, const mbm_tty_options *options)
+{
+    struct serial_rs485 now;
+
+    if (ioctl(tty->fd, TIOCGRS485, &now) < 0)
+        return -1;
+    memcpy(tty->rs485_before, &now, sizeof tty->rs485_before);
+    now.flags = SER_RS485_ENABLED;
+    now.flags |= options->rtsLow ? SER_RS485_RTS_AFTER_SEND : SER_RS485_RTS_ON_SEND;
+    if (options->hearSelf)
+        now.flags |= SER_RS485_RX_DURING_TX;
+    now.delay_rts_before_send = options->rtsDelayBefore;
+    now.delay_rts_after_send = options->rtsDelayAfter;
+    if (ioctl(tty->fd, TIOCSRS485, &now) < 0)
+        return -1;
+    tty->is_rs485 = 1;
+    /* The driver drops what it cannot do, and says so only here. */
+    if (ioctl(tty->fd, TIOCGRS485, &now) < 0)
+        return -1;
+    if (!(now.flags & SER_RS485_ENABLED) || now.delay_rts_before_send != options->rtsDelayBefore ||
+        now.delay_rts_after_send != options->rtsDelayAfter)
+        return refuse(EINVAL);
+    return 0;
+}
+
+static void end_rs485(mbm_tty *tty)
+{
+    struct serial_rs485 before;
+
+    memcpy(&before, tty->rs485_before, sizeof before);
+    ioctl(tty->fd, TIOCSRS485, &before);
+}
+
+_Static_assert(sizeof(struct serial_rs485) == sizeof(((mbm_tty *)0)->rs485_before),
+               "room for what the driver was told before");
+#else
+static int begin_rs485(mbm_tty *tty, const mbm_tty_options *options)
+{
+    (void)tty;
+    (void)options;
+    return refuse(ENOTTY);
+}
+
+static void end_rs485(mbm_tty *tty)
+{
+    (void)tty;
+}
+#endif
+
+/* Makes the terminal raw and non-blocking, after it has kept how it was. */
+static int take(mbm_tty *tty)
+{
+    struct termios settings;
+    int lines;
+
+    tty->flags_before = fcntl(tty->fd, F_GETFL);
+    if (tty->flags_before < 0 || fcntl(tty->fd, F_SETFL, tty->flags_before | O_NONBLOCK) < 0)
+        return -1;
+    if (tcgetattr(tty->fd, &tty->before) == 0) {
+        settings = tty->before;
+        cfmakeraw(&settings);
+        if (tcsetattr(tty->fd, TCSANOW, &settings) < 0) {
+            fcntl(tty->fd, F_SETFL, tty->flags_before);
+            return -1;
+        }
+        tty->has_before = 1;
+    }
+    tty->has_uart = ioctl(tty->fd, TIOCMGET, &lines) == 0;
+    return 0;
 }
 
 int mbm_tty_attach(mbm_tty *tty, int fd)
 {
-    struct termios settings;
-    int flags = fcntl(fd, F_GETFL);
-    int lines;
-
-    if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) < 0)
-        return -1;
-    if (tcgetattr(fd, &settings) == 0) {
-        cfmakeraw(&settings);
-        if (tcsetattr(fd, TCSANOW, &settings) < 0)
-            return -1;
-    }
+    memset(tty, 0, sizeof *tty);
     tty->fd = fd;
-    tty->master = NULL;
-    tty->has_uart = ioctl(fd, TIOCMGET, &lines) == 0;
+    if (take(tty) < 0) {
+        tty->fd = -1;
+        return -1;
+    }
+    return 0;
+}
+
+void mbm_tty_detach(mbm_tty *tty)
+{
+    if (tty->fd < 0)
+        return;
+    if (tty->has_before)
+        tcsetattr(tty->fd, TCSADRAIN, &tty->before);
+    if (tty->is_rs485)
+        end_rs485(tty);
+    if (tty->is_exclusive) {
+        ioctl(tty->fd, TIOCNXCL);
+        flock(tty->fd, LOCK_UN);
+    }
+    fcntl(tty->fd, F_SETFL, tty->flags_before);
+    tty->fd = -1;
+}
+
+void mbm_tty_close(mbm_tty *tty)
+{
+    int fd = tty->fd;
+
+    if (fd < 0)
+        return;
+    mbm_tty_detach(tty);
+    close(fd);
+}
+
+/* The lock of the terminal stops others, that of the file root too, which the
+ * first lets pass. */
+static int lock(mbm_tty *tty)
+{
+    if (flock(tty->fd, LOCK_EX | LOCK_NB) < 0)
+        return errno == EWOULDBLOCK ? refuse(EBUSY) : -1;
+    tty->is_exclusive = 1;
+    return ioctl(tty->fd, TIOCEXCL);
+}
+
+/* tcsetattr is content if it could do anything of what it was asked. A pty has
+ * no bits on a wire, and its driver drops parity and seven bits. */
+static int set(const mbm_tty *tty, const mbm_tty_options *options)
+{
+    const tcflag_t frame = CSIZE | PARENB | PARODD | CSTOPB;
+    struct termios wanted, got;
+
+    if (tcgetattr(tty->fd, &wanted) < 0 || mbm_tty_settings(&wanted, options) < 0 ||
+        tcsetattr(tty->fd, TCSANOW, &wanted) < 0 || tcgetattr(tty->fd, &got) < 0)
+        return -1;
+    if (cfgetospeed(&got) != cfgetospeed(&wanted) ||
+        (tty->has_uart && ((got.c_cflag ^ wanted.c_cflag) & frame) != 0))
+        return refuse(EINVAL);
+    /* What arrived at another rate is of no use. */
+    return tcflush(tty->fd, TCIOFLUSH);
+}
+
+int mbm_tty_openWith(mbm_tty *tty, const char *path, const mbm_tty_options *options)
+{
+    struct termios unused = {0};
+    int error;
+
+    memset(tty, 0, sizeof *tty);
+    tty->fd = -1;
+    if (mbm_tty_settings(&unused, options) < 0)
+        return -1;
+    tty->fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    if (tty->fd < 0)
+        return -1;
+    tty->flags_before = O_RDWR;
+    /* Locked first, so that a terminal of another is left as it is. */
+    if ((options->exclusive && lock(tty) < 0) || take(tty) < 0 || set(tty, options) < 0 ||
+        (options->rs485 && begin_rs485(tty, options) < 0)) {
+        error = errno;
+        mbm_tty_close(tty);
+        return refuse(error);
+    }
     return 0;
 }
 
 int mbm_tty_open(mbm_tty *tty, const char *path, uint32_t baud, char parity, int stop)
 {
-    struct termios settings;
-    speed_t speed = speed_of(baud);
-    int fd;
+    mbm_tty_options options = {0};
 
-    if (speed == B0 || (parity != 'N' && parity != 'E' && parity != 'O') || stop < 1 || stop > 2) {
-        errno = EINVAL;
-        return -1;
-    }
-    fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK);
-    if (fd < 0)
-        return -1;
-    if (mbm_tty_attach(tty, fd) < 0 || tcgetattr(fd, &settings) < 0)
-        goto failed;
-    cfsetispeed(&settings, speed);
-    cfsetospeed(&settings, speed);
-    settings.c_cflag |= CLOCAL | CREAD;
-    settings.c_cflag &= ~(tcflag_t)(PARENB | PARODD | CSTOPB);
-    if (parity != 'N')
-        settings.c_cflag |= PARENB;
-    if (parity == 'O')
-        settings.c_cflag |= PARODD;
-    if (stop == 2)
-        settings.c_cflag |= CSTOPB;
-    if (tcsetattr(fd, TCSANOW, &settings) < 0)
-        goto failed;
-    return 0;
-
-failed:
-    close(fd);
-    return -1;
-}
-
-void mbm_tty_close(mbm_tty *tty)
-{
-    close(tty->fd);
-    tty->fd = -1;
+    options.baud = baud;
+    options.parity = parity;
+    options.stop = (uint8_t)(stop == 1 || stop == 2 ? stop : 0);
+    return mbm_tty_openWith(tty, path, &options);
 }
 
 /* A signal and "try again" mean that nothing was moved; all else that the
  * link is gone. */
-static int16_t outcome(ssize_t count)
+static int16_t outcome(mbm_tty *tty, ssize_t count)
 {
     if (count > 0)
         return (int16_t)count;
     if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR))
         return 0;
+    /* An end of file is the hang-up of a line. */
+    tty->error = count < 0 ? errno : EPIPE;
     return -1;
+}
+
+static size_t at_most(uint16_t length)
+{
+    return length > INT16_MAX ? INT16_MAX : length;
 }
 
 static int16_t tty_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
-    const mbm_tty *tty = (const mbm_tty *)context;
+    mbm_tty *tty = (mbm_tty *)context;
 
-    return capacity == 0 ? 0 : outcome(read(tty->fd, bytes, capacity));
+    return capacity == 0 ? 0 : outcome(tty, read(tty->fd, bytes, at_most(capacity)));
 }
 
 static int16_t tty_write(void *context, const uint8_t *bytes, uint16_t length)
 {
-    const mbm_tty *tty = (const mbm_tty *)context;
+    mbm_tty *tty = (mbm_tty *)context;
 
-    return length == 0 ? 0 : outcome(write(tty->fd, bytes, length));
+    return length == 0 ? 0 : outcome(tty, write(tty->fd, bytes, at_most(length)));
 }
 
 static uint32_t tty_micros(void *context)
@@ -127,15 +359,26 @@ static uint8_t tty_flush(void *context)
     return ioctl(tty->fd, TIOCOUTQ, &left) < 0 || left == 0;
 }
 
+int mbm_tty_wait(const mbm_tty *tty, uint32_t micros)
+{
+    struct timespec time = {(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
+    struct pollfd line = {tty->fd, POLLIN, 0};
+    int ready;
+
+    if (tty->fd < 0)
+        return refuse(EBADF);
+    ready = ppoll(&line, 1, micros == MBM_TTY_FOREVER ? NULL : &time, NULL);
+    if (ready < 0)
+        return errno == EINTR ? 0 : -1;
+    return ready > 0;
+}
+
 /* Sleeps until bytes arrive or the master has something else to do. */
 static void tty_idle(void *context)
 {
     const mbm_tty *tty = (const mbm_tty *)context;
-    uint32_t delay = mbm_master_pollDelay(tty->master);
-    struct timespec time = {(time_t)(delay / 1000000u), (long)(delay % 1000000u) * 1000};
-    struct pollfd line = {tty->fd, POLLIN, 0};
 
-    ppoll(&line, 1, &time, NULL);
+    mbm_tty_wait(tty, mbm_master_pollDelay(tty->master));
 }
 
 mbm_port mbm_tty_port(mbm_tty *tty, const mbm_master *master)
@@ -149,6 +392,6 @@ mbm_port mbm_tty_port(mbm_tty *tty, const mbm_master *master)
     port.micros = tty_micros;
     /* A pty has no transmitter that could drain. */
     port.flush = tty->has_uart ? tty_flush : NULL;
-    port.idle = tty_idle;
+    port.idle = master ? tty_idle : NULL;
     return port;
 }

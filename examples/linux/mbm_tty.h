@@ -2,6 +2,10 @@
  * @file mbm_tty.h
  * @brief An mbm_port over a POSIX terminal: a serial line, a USB adapter, a pty.
  *
+ * Functions that return int return -1 with errno set when they fail; nothing is
+ * left open or changed then. None is re-entrant on one mbm_tty; any number may
+ * be used side by side.
+ *
  * Licence: MIT OR Apache-2.0.
  */
 #ifndef MBM_TTY_H
@@ -9,41 +13,122 @@
 
 #include "mbm.h"
 
+#include <termios.h>
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
+/** For mbm_tty_wait: as long as it takes. */
+#define MBM_TTY_FOREVER UINT32_MAX
+
+/** How a serial line is set; what is 0 is as said. */
+typedef struct mbm_tty_options {
+    uint32_t baud;     /**< bits per second: any rate of which termios has a constant */
+    char parity;       /**< 'N', 'E' or 'O' */
+    uint8_t stop;      /**< stop bits, 1 or 2 */
+    uint8_t data;      /**< data bits: 8, which 0 means too, or 7 for ASCII */
+    uint8_t exclusive; /**< 1: nobody else may open the terminal meanwhile */
+    uint8_t rs485;     /**< 1: the driver of the system switches RTS for RS-485 */
+    uint8_t rtsLow;    /**< with rs485, 1: RTS is low while sending, else high */
+    uint8_t hearSelf;  /**< with rs485, 1: what is sent is received too */
+    uint16_t rtsDelayBefore; /**< with rs485: from RTS to the first bit, milliseconds */
+    uint16_t rtsDelayAfter;  /**< with rs485: from the last bit to RTS, milliseconds */
+} mbm_tty_options;
+
 /** A terminal in use as a port. */
 typedef struct mbm_tty {
-    int fd;                   /**< the terminal */
+    int fd;                   /**< the terminal; -1 once closed */
+    int error;                /**< errno of what lost the link; 0 while it is there */
     const mbm_master *master; /**< who uses it; says how long to sleep */
     uint8_t has_uart;         /**< whether there is a transmitter to wait for */
+    uint8_t has_before;       /**< not for you */
+    uint8_t is_exclusive;     /**< not for you */
+    uint8_t is_rs485;         /**< not for you */
+    int flags_before;         /**< not for you */
+    uint32_t rs485_before[8]; /**< not for you */
+    struct termios before;    /**< not for you */
 } mbm_tty;
+
+/**
+ * Opens a terminal, raw and non-blocking, with eight data bits.
+ *
+ * @param tty     receives the descriptor
+ * @param path    for example "/dev/ttyUSB0"
+ * @param baud    bits per second, as in mbm_tty_options
+ * @param parity  'N', 'E' or 'O'
+ * @param stop    stop bits, 1 or 2
+ * @return 0, or -1 with errno as of mbm_tty_openWith
+ */
+int mbm_tty_open(mbm_tty *tty, const char *path, uint32_t baud, char parity, int stop);
 
 /**
  * Opens a terminal, raw and non-blocking.
  *
- * @param tty     receives the descriptor
- * @param path    for example "/dev/ttyUSB0"
- * @param baud    1200 to 115200, one of the usual rates
- * @param parity  'N', 'E' or 'O'
- * @param stop    stop bits, 1 or 2
- * @return 0, or -1 with errno set (EINVAL for a rate or parity unknown)
+ * @param tty      receives the descriptor
+ * @param path     for example "/dev/ttyUSB0"
+ * @param options  how the line is set
+ * @return 0, or -1 with errno set: EINVAL for options that no terminal has or
+ *         that this one does not take, EBUSY if it is another's exclusively,
+ *         ENOTTY for RS-485 where the driver knows none, or as of open
  */
-int mbm_tty_open(mbm_tty *tty, const char *path, uint32_t baud, char parity, int stop);
+int mbm_tty_openWith(mbm_tty *tty, const char *path, const mbm_tty_options *options);
 
-/** Uses a descriptor that is open already; makes it raw and non-blocking. */
+/**
+ * Uses a descriptor that is open already; makes it raw and non-blocking. What
+ * is no terminal, a socket or a pipe, is made non-blocking only.
+ *
+ * @param tty  receives the descriptor
+ * @param fd   open for reading and writing
+ * @return 0, or -1 with errno set
+ */
 int mbm_tty_attach(mbm_tty *tty, int fd);
 
-/** Closes the terminal. */
+/**
+ * Writes options into the settings of a terminal, raw; sets nothing. For who
+ * holds a terminal in another way.
+ *
+ * @param settings  of tcgetattr, for tcsetattr
+ * @param options   how the line is to be; exclusive and RS-485 are not in it
+ * @return 0, or -1 with errno EINVAL
+ */
+int mbm_tty_settings(struct termios *settings, const mbm_tty_options *options);
+
+/**
+ * Closes the terminal and leaves it set as it was found. Waits for bytes that
+ * are still to leave. Nothing happens if it is closed already.
+ *
+ * @param tty  the terminal
+ */
 void mbm_tty_close(mbm_tty *tty);
 
 /**
- * The port to give to mbm_master_begin. While a call waits, it sleeps until
- * bytes arrive or `master` has something else to do.
+ * Leaves the descriptor set as it was found, and open.
+ *
+ * @param tty  the terminal; the descriptor is yours again
+ */
+void mbm_tty_detach(mbm_tty *tty);
+
+/**
+ * Sleeps until there is something to read or a time is over. With the time that
+ * a pollDelay function told, a program sleeps for exactly as long as it may.
+ *
+ * @param tty     the terminal
+ * @param micros  at most so long, in microseconds, or MBM_TTY_FOREVER
+ * @return 1 if bytes are there or the link is lost, which the next read tells;
+ *         0 if the time is over or a signal came; -1 with errno set
+ */
+int mbm_tty_wait(const mbm_tty *tty, uint32_t micros);
+
+/**
+ * The port to give to mbm_master_begin and its like. While a blocking call of
+ * `master` waits, it sleeps until bytes arrive or `master` has something else to
+ * do.
  *
  * @param tty     must outlive the port
- * @param master  the object that the port is for
+ * @param master  the object that the port is for; NULL for an object that never
+ *                waits by itself, and there is no idle hook
+ * @return the port; its read and write keep errno in `error` when the link is lost
  */
 mbm_port mbm_tty_port(mbm_tty *tty, const mbm_master *master);
 

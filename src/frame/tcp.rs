@@ -3,6 +3,7 @@
 use super::Adu;
 use crate::bytes::Reader;
 use crate::error::Status;
+use core::cmp::Ordering;
 
 /// Bytes of a frame before its PDU: transaction, protocol, length, unit.
 pub const PDU: usize = 7;
@@ -55,15 +56,15 @@ pub fn header(bytes: &[u8]) -> Result<Header, Status> {
 /// As [`header`]; [`Status::MALFORMED_FRAME`] also for bytes behind the frame.
 pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Status> {
     let header = header(bytes)?;
-    if bytes.len() > header.total {
-        return Err(Status::MALFORMED_FRAME);
+    match (bytes.len().cmp(&header.total), bytes.get(PDU..)) {
+        (Ordering::Equal, Some(pdu)) => Ok(Adu {
+            transaction: header.transaction,
+            unit: header.unit,
+            pdu,
+        }),
+        (Ordering::Greater, _) => Err(Status::MALFORMED_FRAME),
+        _ => Err(Status::INCOMPLETE_FRAME),
     }
-    let pdu = bytes.get(PDU..header.total);
-    Ok(Adu {
-        transaction: header.transaction,
-        unit: header.unit,
-        pdu: pdu.ok_or(Status::INCOMPLETE_FRAME)?,
-    })
 }
 
 /// Writes the frame of the PDU that `pdu` writes; returns its length.

@@ -100,10 +100,15 @@ pub(super) fn parse_read_response<'a>(
     reader: &mut Reader<'a>,
 ) -> Result<Response<'a>, Status> {
     let data = counted(reader)?;
-    if data.is_empty() || data.len() > usize::from(byte_count(MAX_READ_BITS)) {
+    if !is_response_data(data) {
         return Err(Status::MALFORMED_REPLY);
     }
     Ok(Response::ReadBits { function, data })
+}
+
+/// True for as many bytes as a read can bring.
+pub(super) fn is_response_data(data: &[u8]) -> bool {
+    !data.is_empty() && data.len() <= usize::from(byte_count(MAX_READ_BITS))
 }
 
 pub(super) fn parse_write_single_response<'a>(reader: &mut Reader) -> Result<Response<'a>, Status> {

@@ -36,6 +36,11 @@ pub(super) fn in_range(
     }
 }
 
+/// True for a range that [`check_range`] finds right.
+pub(super) fn is_range(address: u16, quantity: u16, most: u16) -> bool {
+    check_range(address, quantity, most) == Status::OK
+}
+
 /// Says whether a PDU ends where it should.
 pub(super) fn end(reader: &Reader) -> Result<(), Status> {
     if reader.is_empty() {

@@ -181,11 +181,16 @@ pub(super) fn parse_read_response<'a>(
     reader: &mut Reader<'a>,
 ) -> Result<Response<'a>, Status> {
     let data = counted(reader)?;
-    let most = 2 * usize::from(MAX_READ_REGISTERS);
-    if data.is_empty() || data.len() > most || !data.len().is_multiple_of(2) {
+    if !is_response_data(data) {
         return Err(Status::MALFORMED_REPLY);
     }
     Ok(Response::ReadRegisters { function, data })
+}
+
+/// True for as many bytes as a read can bring.
+pub(super) fn is_response_data(data: &[u8]) -> bool {
+    let most = 2 * usize::from(MAX_READ_REGISTERS);
+    !data.is_empty() && data.len() <= most && data.len().is_multiple_of(2)
 }
 
 pub(super) fn parse_write_single_response<'a>(reader: &mut Reader) -> Result<Response<'a>, Status> {

@@ -1,0 +1,193 @@
+//! The work, done by mbm.
+
+use mbm::data::{bits, registers};
+use mbm::error::Status;
+use mbm::frame::{ascii, rtu, tcp, Adu, Framing};
+use mbm::pdu::query::Query;
+use mbm::pdu::reply;
+use mbm::pdu::request::Request;
+use mbm::pdu::response::Response;
+use std::hint::black_box;
+
+pub const UNIT: u8 = 17;
+pub const TRANSACTION: u16 = 1;
+
+/// What a server holds.
+pub struct Model {
+    pub words: [u16; 512],
+    pub coils: [u16; 128],
+}
+
+impl Model {
+    pub fn new() -> Self {
+        Model {
+            words: std::array::from_fn(|index| (index as u16).wrapping_mul(40503)),
+            coils: std::array::from_fn(|index| (index as u16).wrapping_mul(25717)),
+        }
+    }
+}
+
+#[inline(always)]
+pub fn emit(
+    framing: Framing,
+    buffer: &mut [u8],
+    pdu: impl FnOnce(&mut [u8]) -> Result<usize, Status>,
+) -> Result<usize, Status> {
+    match framing {
+        Framing::Rtu => rtu::emit(buffer, UNIT, pdu),
+        Framing::Ascii => ascii::emit(buffer, UNIT, ascii::END, pdu),
+        _ => tcp::emit(buffer, TRANSACTION, UNIT, pdu),
+    }
+}
+
+#[inline(always)]
+pub fn open(framing: Framing, frame: &[u8]) -> Result<Adu<'_>, Status> {
+    match framing {
+        Framing::Rtu => rtu::parse(frame),
+        _ => tcp::parse(frame),
+    }
+}
+
+/// Parses a request and emits the response to it, from and to the model.
+#[inline(always)]
+pub fn answer(
+    framing: Framing,
+    frame: &[u8],
+    buffer: &mut [u8],
+    model: &mut Model,
+) -> Result<usize, Status> {
+    let request = Request::parse(open(framing, frame)?.pdu)?;
+    let mut place = [0; 256];
+    let response = match request {
+        // From addresses that begin a word, as the peers' tables do a byte.
+        Request::ReadBits {
+            function,
+            address,
+            quantity,
+        } => {
+            let words = model.coils.get(usize::from(address / 16)..);
+            let data = &mut place[..usize::from(quantity).div_ceil(8)];
+            bits::send(
+                data,
+                words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?,
+                quantity as u8,
+            );
+            Response::ReadBits { function, data }
+        }
+        Request::ReadRegisters {
+            function,
+            address,
+            quantity,
+        } => {
+            let from = usize::from(address);
+            let words = model.words.get(from..from + usize::from(quantity));
+            let data = &mut place[..2 * usize::from(quantity)];
+            registers::send(data, words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?, 0);
+            Response::ReadRegisters { function, data }
+        }
+        Request::WriteSingleCoil { address, on } => {
+            let word = model.coils.get_mut(usize::from(address / 16));
+            let bit = 1 << (address % 16);
+            let word = word.ok_or(Status::ILLEGAL_DATA_ADDRESS)?;
+            *word = if on { *word | bit } else { *word & !bit };
+            Response::WriteSingleCoil { address, on }
+        }
+        Request::WriteSingleRegister { address, value } => {
+            let word = model.words.get_mut(usize::from(address));
+            *word.ok_or(Status::ILLEGAL_DATA_ADDRESS)? = value;
+            Response::WriteSingleRegister { address, value }
+        }
+        Request::WriteMultipleCoils {
+            address,
+            quantity,
+            data,
+        } => {
+            let from = usize::from(address / 16);
+            let words = model
+                .coils
+                .get_mut(from..from + usize::from(quantity).div_ceil(16));
+            bits::take(
+                words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?,
+                data,
+                quantity as u8,
+            );
+            Response::WriteMultiple {
+                function: 15,
+                address,
+                quantity,
+            }
+        }
+        Request::WriteMultipleRegisters {
+            address,
+            quantity,
+            data,
+        } => {
+            let from = usize::from(address);
+            let words = model.words.get_mut(from..from + usize::from(quantity));
+            registers::take(words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?, data, 0);
+            Response::WriteMultiple {
+                function: 16,
+                address,
+                quantity,
+            }
+        }
+        Request::MaskWriteRegister {
+            address,
+            and_mask,
+            or_mask,
+        } => {
+            let word = model.words.get_mut(usize::from(address));
+            let word = word.ok_or(Status::ILLEGAL_DATA_ADDRESS)?;
+            *word = (*word & and_mask) | (or_mask & !and_mask);
+            Response::MaskWriteRegister {
+                address,
+                and_mask,
+                or_mask,
+            }
+        }
+        Request::ReadWriteMultipleRegisters {
+            read_address,
+            read_quantity,
+            write_address,
+            write_quantity,
+            data,
+        } => {
+            let from = usize::from(write_address);
+            let words = model
+                .words
+                .get_mut(from..from + usize::from(write_quantity));
+            registers::take(words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?, data, 0);
+            let from = usize::from(read_address);
+            let words = model.words.get(from..from + usize::from(read_quantity));
+            let data = &mut place[..2 * usize::from(read_quantity)];
+            registers::send(data, words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?, 0);
+            Response::ReadRegisters {
+                function: 0x17,
+                data,
+            }
+        }
+        _ => return Err(Status::ILLEGAL_FUNCTION),
+    };
+    emit(framing, buffer, |pdu| response.emit(pdu))
+}
+
+/// Parses a response and takes the registers out of it; bits stay where they are.
+#[inline(always)]
+pub fn receive(framing: Framing, frame: &[u8], words: &mut [u16]) {
+    let adu = open(framing, frame).expect("a frame");
+    let response = Response::parse(adu.pdu);
+    if let Ok(Response::ReadRegisters { data, .. }) = response {
+        registers::take(words, data, 0);
+    }
+    black_box(&response);
+    assert!(response.is_ok());
+}
+
+/// Finds that a frame is the response to a write, and repeats what was written.
+#[inline(always)]
+pub fn judge(framing: Framing, query: &Query, frame: &[u8]) {
+    let adu = open(framing, frame).expect("a frame");
+    let length = reply::expected(query, adu.pdu).map(|length| usize::from(length.get()));
+    let whole = adu.unit == UNIT && length == Some(adu.pdu.len());
+    assert!(whole && reply::judge(query, adu.pdu) == Status::OK);
+}

@@ -1,0 +1,455 @@
+/* The peer that plays faults over TCP does play them: each is looked at on a
+ * plain socket, so that what tests of clients find is the client's. */
+#define _GNU_SOURCE
+#include "tcp_peer.h"
+#include "test.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { SHORT_MS = 40, REPLY = 11 }; /* bytes of a reply of one register */
+
+static tcp_peer *peer;
+static uint16_t port;
+static int s;
+
+static int dial(void)
+{
+    struct sockaddr_in address = {0};
+    int fd = socket(AF_INET, SOCK_STREAM, 0);
+
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    assert_int_equal(connect(fd, (struct sockaddr *)&address, sizeof address), 0);
+    return fd;
+}
+
+static int begin(void **state)
+{
+    (void)state;
+    peer = tcp_peer_new();
+    port = tcp_peer_start(peer, 0);
+    s = dial();
+    return 0;
+}
+
+static int end(void **state)
+{
+    (void)state;
+    close(s);
+    tcp_peer_stop(peer);
+    return 0;
+}
+
+static int64_t now_ms(void)
+{
+    struct timespec now;
+
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+/* Asks unit 7 for register `id`, which tells the reply as well as its id does. */
+static void ask(unsigned id)
+{
+    const uint8_t request[12] = {(uint8_t)(id >> 8), (uint8_t)id, 0, 0, 0, 6, 7, 3,
+                                 (uint8_t)(id >> 8), (uint8_t)id, 0, 1};
+
+    assert_int_equal(send(s, request, sizeof request, MSG_NOSIGNAL), sizeof request);
+}
+
+/* What one recv takes, 0 at the end of the stream, -1 if nothing came for ms. */
+static ssize_t take(uint8_t *bytes, size_t capacity, int ms)
+{
+    struct pollfd wait = {s, POLLIN, 0};
+
+    return poll(&wait, 1, ms) == 0 ? -1 : recv(s, bytes, capacity, 0);
+}
+
+/* Takes exactly so many bytes. */
+static void take_all(uint8_t *bytes, size_t length)
+{
+    while (length > 0) {
+        ssize_t count = take(bytes, length, 2000);
+
+        assert_true(count > 0);
+        bytes += count;
+        length -= (size_t)count;
+    }
+}
+
+static void right_reply(uint8_t *reply, unsigned id)
+{
+    const uint8_t head[9] = {(uint8_t)(id >> 8), (uint8_t)id, 0, 0, 0, 5, 7, 3, 2};
+
+    memcpy(reply, head, sizeof head);
+    reply[9] = (uint8_t)(tcp_peer_word(id) >> 8);
+    reply[10] = (uint8_t)tcp_peer_word(id);
+}
+
+static void expect(unsigned id)
+{
+    uint8_t reply[REPLY], right[REPLY];
+
+    right_reply(right, id);
+    take_all(reply, sizeof reply);
+    assert_memory_equal(reply, right, sizeof right);
+}
+
+static void expect_silence(void)
+{
+    uint8_t byte;
+
+    assert_int_equal(take(&byte, 1, SHORT_MS), -1);
+}
+
+static void the_right_reply_comes_from_the_memory(void **state)
+{
+    const uint8_t write_one[12] = {0, 9, 0, 0, 0, 6, 7, 6, 0, 30, 0xAB, 0xCD};
+    const uint8_t no_such[12] = {0, 9, 0, 0, 0, 6, 7, 3, 0xFF, 0, 0, 1};
+    const uint8_t no_function[9] = {0, 9, 0, 0, 0, 3, 7, 7, 0};
+    const uint8_t unknown[9] = {0, 9, 0, 0, 0, 3, 7, 0x87, 1};
+    uint8_t reply[12];
+
+    (void)state;
+    ask(1);
+    expect(1);
+    assert_int_equal(send(s, write_one, 12, 0), 12);
+    take_all(reply, 12);
+    assert_memory_equal(reply, write_one, 12);
+    assert_int_equal(tcp_peer_memory(peer)->tab_registers[30], 0xABCD);
+    assert_int_equal(send(s, no_such, 12, 0), 12);
+    take_all(reply, 9);
+    assert_int_equal(reply[7], 0x83);
+    assert_int_equal(reply[8], 2);
+    assert_int_equal(send(s, no_function, 9, 0), 9);
+    take_all(reply, 9);
+    assert_memory_equal(reply, unknown, 9);
+    ask(2);
+    expect(2);
+}
+
+static void requests_in_one_send_and_in_pieces_are_found(void **state)
+{
+    const uint8_t two[24] = {0, 1, 0, 0, 0, 6, 7, 3, 0, 1, 0, 1,
+                             0, 2, 0, 0, 0, 6, 7, 3, 0, 2, 0, 1};
+    size_t i;
+
+    (void)state;
+    assert_int_equal(send(s, two, sizeof two, 0), sizeof two);
+    expect(1);
+    expect(2);
+    for (i = 0; i < sizeof two; i++) {
+        assert_int_equal(send(s, two + i, 1, 0), 1);
+        usleep(500);
+    }
+    expect(1);
+    expect(2);
+    assert_int_equal(tcp_peer_count(peer).requests, 4);
+    assert_int_equal(tcp_peer_count(peer).replies, 4);
+}
+
+static void a_delay_holds_up_one_reply_only(void **state)
+{
+    int64_t start = now_ms();
+
+    (void)state;
+    tcp_peer_fault(peer, 1, FAULT_DELAY, 300);
+    ask(1);
+    ask(2);
+    expect(2);
+    assert_true(now_ms() - start < 300);
+    expect(1);
+    assert_true(now_ms() - start >= 300);
+}
+
+static void hold_turns_the_order_of_replies(void **state)
+{
+    (void)state;
+    tcp_peer_fault(peer, 1, FAULT_HOLD, 2);
+    tcp_peer_fault(peer, 4, FAULT_HOLD, 3);
+    ask(1);
+    ask(2);
+    ask(3);
+    expect(2);
+    expect(3);
+    expect(1);
+    /* Nothing follows: it comes by itself. */
+    ask(4);
+    expect_silence();
+    expect(4);
+}
+
+static void join_puts_replies_into_one_send(void **state)
+{
+    uint8_t got[64], right[3 * REPLY];
+
+    (void)state;
+    tcp_peer_fault(peer, 1, FAULT_JOIN, 2);
+    ask(1);
+    ask(2);
+    expect_silence();
+    ask(3);
+    assert_int_equal(take(got, sizeof got, 2000), sizeof right);
+    right_reply(right, 1);
+    right_reply(right + REPLY, 2);
+    right_reply(right + 2 * REPLY, 3);
+    assert_memory_equal(got, right, sizeof right);
+    tcp_peer_fault(peer, 4, FAULT_JOIN, 1);
+    ask(4);
+    expect(4);
+}
+
+static void drop_carries_out_and_does_not_answer(void **state)
+{
+    const uint8_t write_one[12] = {0, 9, 0, 0, 0, 6, 7, 6, 0, 30, 0, 5};
+
+    (void)state;
+    tcp_peer_fault(peer, 1, FAULT_DROP, 0);
+    assert_int_equal(send(s, write_one, 12, 0), 12);
+    expect_silence();
+    assert_int_equal(tcp_peer_memory(peer)->tab_registers[30], 5);
+    ask(1);
+    expect(1);
+    assert_int_equal(tcp_peer_count(peer).faults[FAULT_DROP], 1);
+    assert_int_equal(tcp_peer_count(peer).replies, 1);
+}
+
+static void twice_sends_the_reply_twice(void **state)
+{
+    (void)state;
+    tcp_peer_fault(peer, 1, FAULT_TWICE, 0);
+    ask(1);
+    expect(1);
+    expect(1);
+    expect_silence();
+}
+
+static void split_sends_single_bytes(void **state)
+{
+    int64_t start = now_ms();
+    uint8_t got[64];
+
+    (void)state;
+    tcp_peer_fault(peer, 1, FAULT_SPLIT, 20);
+    ask(1);
+    assert_int_equal(take(got, sizeof got, 2000), 1);
+    take_all(got + 1, REPLY - 1);
+    assert_true(now_ms() - start >= 20 * (REPLY - 1));
+    expect_silence();
+}
+
+/* Asks once, and expects the reply but for one byte. */
+static void expect_changed(tcp_fault fault, unsigned argument, size_t at, uint8_t to)
+{
+    uint8_t reply[REPLY], right[REPLY];
+
+    tcp_peer_fault(peer, tcp_peer_count(peer).requests + 1, fault, argument);
+    ask(5);
+    right_reply(right, 5);
+    right[at] = to;
+    take_all(reply, sizeof reply);
+    assert_memory_equal(reply, right, sizeof right);
+}
+
+static void a_wrong_field_is_wrong_and_the_rest_is_right(void **state)
+{
+    (void)state;
+    expect_changed(FAULT_OTHER_ID, 3, 1, 8);
+    expect_changed(FAULT_OTHER_ID, 0x8000, 0, 0x80);
+    expect_changed(FAULT_WRONG_PROTOCOL, 1, 3, 1);
+    expect_changed(FAULT_WRONG_UNIT, 2, 6, 9);
+    expect_changed(FAULT_WRONG_FUNCTION, 4, 7, 4);
+    expect_changed(FAULT_SHORT_LENGTH, 1, 5, 4);
+    expect_silence();
+    expect_changed(FAULT_ALSO_OTHER_ID, 3, 1, 8);
+    expect(5);
+}
+
+static void an_exception_leaves_the_memory_alone(void **state)
+{
+    const uint8_t write_one[12] = {0, 9, 0, 0, 0, 6, 7, 6, 0, 30, 0, 5};
+    const uint8_t busy[9] = {0, 9, 0, 0, 0, 3, 7, 0x86, 6};
+    uint8_t reply[9];
+
+    (void)state;
+    tcp_peer_fault(peer, 1, FAULT_EXCEPTION, 6);
+    assert_int_equal(send(s, write_one, 12, 0), 12);
+    take_all(reply, 9);
+    assert_memory_equal(reply, busy, 9);
+    assert_int_equal(tcp_peer_memory(peer)->tab_registers[30], tcp_peer_word(30));
+}
+
+static void garbage_comes_before_the_reply_and_is_no_header(void **state)
+{
+    uint8_t got[7 + REPLY];
+    size_t i;
+
+    (void)state;
+    tcp_peer_fault(peer, 1, FAULT_GARBAGE, 7);
+    ask(0x100);
+    take_all(got, 7);
+    for (i = 0; i < 7; i++)
+        assert_int_equal(got[i], 0xA5);
+    take_all(got + 7, REPLY - 2);
+    for (i = 0; i < 7; i++) {
+        unsigned protocol = (unsigned)got[i + 2] << 8 | got[i + 3];
+        unsigned length = (unsigned)got[i + 4] << 8 | got[i + 5];
+
+        assert_true(protocol != 0 || length < 2 || length > 254);
+    }
+}
+
+static void half_a_reply_is_followed_by_the_end_of_the_stream(void **state)
+{
+    uint8_t got[64];
+
+    (void)state;
+    tcp_peer_fault(peer, 1, FAULT_HALF, 4);
+    ask(1);
+    ask(2);
+    take_all(got, 4);
+    assert_int_equal(take(got, sizeof got, 2000), 0);
+    assert_int_equal(tcp_peer_count(peer).replies, 0);
+}
+
+static void close_ends_the_stream_and_reset_breaks_it(void **state)
+{
+    uint8_t byte;
+
+    (void)state;
+    tcp_peer_fault(peer, 1, FAULT_CLOSE, 0);
+    tcp_peer_fault(peer, 2, FAULT_RESET, 0);
+    ask(1);
+    assert_int_equal(take(&byte, 1, 2000), 0);
+    close(s);
+    s = dial();
+    ask(2);
+    assert_int_equal(take(&byte, 1, 2000), -1);
+    assert_int_equal(errno, ECONNRESET);
+    close(s);
+    s = dial();
+    ask(3);
+    expect(3);
+    assert_int_equal(tcp_peer_count(peer).connections, 3);
+}
+
+static void what_is_no_request_ends_the_connection(void **state)
+{
+    const uint8_t nonsense[8] = {0, 1, 0, 1, 0, 6, 7, 3};
+    uint8_t byte;
+
+    (void)state;
+    assert_int_equal(send(s, nonsense, sizeof nonsense, 0), sizeof nonsense);
+    assert_true(take(&byte, 1, 2000) <= 0);
+    assert_int_equal(tcp_peer_count(peer).malformed, 1);
+}
+
+static void a_connection_too_many_is_refused(void **state)
+{
+    int others[TCP_PEER_CONNECTIONS], first = s;
+    uint8_t byte;
+    unsigned i;
+
+    (void)state;
+    ask(1);
+    expect(1);
+    for (i = 0; i < TCP_PEER_CONNECTIONS; i++)
+        others[i] = dial();
+    s = others[TCP_PEER_CONNECTIONS - 1];
+    assert_true(take(&byte, 1, 2000) <= 0);
+    s = others[TCP_PEER_CONNECTIONS - 2];
+    ask(2);
+    expect(2);
+    assert_int_equal(tcp_peer_count(peer).refused, 1);
+    for (i = 0; i < TCP_PEER_CONNECTIONS; i++)
+        close(others[i]);
+    s = first;
+}
+
+static void hang_up_and_a_restart_at_the_same_port(void **state)
+{
+    uint8_t byte;
+
+    (void)state;
+    ask(1);
+    expect(1);
+    tcp_peer_hang_up(peer);
+    assert_int_equal(take(&byte, 1, 2000), 0);
+    tcp_peer_halt(peer);
+    close(s);
+    assert_int_equal(tcp_peer_start(peer, port), port);
+    s = dial();
+    ask(2);
+    expect(2);
+}
+
+/* Counts of one run of chaos. */
+static tcp_peer_counts run_chaos(uint32_t seed)
+{
+    static const tcp_fault kinds[] = {FAULT_DROP, FAULT_TWICE, FAULT_OTHER_ID, FAULT_GARBAGE};
+    tcp_peer_counts counts;
+    unsigned i;
+    uint8_t got[512];
+
+    tcp_peer_chaos(peer, seed, 40, kinds, COUNT(kinds), 0);
+    for (i = 0; i < 200; i++)
+        ask(i);
+    do
+        usleep(1000);
+    while ((counts = tcp_peer_count(peer)).requests < 200);
+    while (take(got, sizeof got, SHORT_MS) > 0)
+        ;
+    return counts;
+}
+
+static void chaos_of_one_seed_repeats_itself(void **state)
+{
+    tcp_peer_counts first = run_chaos(7), again, other;
+
+    end(state);
+    begin(state);
+    again = run_chaos(7);
+    end(state);
+    begin(state);
+    other = run_chaos(8);
+    assert_memory_equal(first.faults, again.faults, sizeof first.faults);
+    assert_memory_not_equal(first.faults, other.faults, sizeof first.faults);
+    assert_in_range(200 - first.faults[FAULT_NONE], 50, 110);
+    assert_true(first.faults[FAULT_DROP] > 0 && first.faults[FAULT_GARBAGE] > 0);
+    assert_int_equal(first.replies, 200 - first.faults[FAULT_DROP] - first.faults[FAULT_OTHER_ID]);
+}
+
+#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(the_right_reply_comes_from_the_memory),
+        TEST(requests_in_one_send_and_in_pieces_are_found),
+        TEST(a_delay_holds_up_one_reply_only),
+        TEST(hold_turns_the_order_of_replies),
+        TEST(join_puts_replies_into_one_send),
+        TEST(drop_carries_out_and_does_not_answer),
+        TEST(twice_sends_the_reply_twice),
+        TEST(split_sends_single_bytes),
+        TEST(a_wrong_field_is_wrong_and_the_rest_is_right),
+        TEST(an_exception_leaves_the_memory_alone),
+        TEST(garbage_comes_before_the_reply_and_is_no_header),
+        TEST(half_a_reply_is_followed_by_the_end_of_the_stream),
+        TEST(close_ends_the_stream_and_reset_breaks_it),
+        TEST(what_is_no_request_ends_the_connection),
+        TEST(a_connection_too_many_is_refused),
+        TEST(hang_up_and_a_restart_at_the_same_port),
+        TEST(chaos_of_one_seed_repeats_itself),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,472 @@
+/* The port over TCP sockets: as a client of a peer that plays faults, as a
+ * server, and what it does while there is no connection. */
+#define _GNU_SOURCE
+#include "mbm_tcp.h"
+#include "model.h"
+#include "tcp_peer.h"
+#include "test.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { SECOND = 1000000 };
+
+static tcp_peer *peer;
+static mbm_tcp tcp;
+static mbm_port port;
+static char service[8];
+
+static void assert_fails(int error, int result)
+{
+    assert_int_equal(result, -1);
+    assert_int_equal(errno, error);
+}
+
+static int begin(void **state)
+{
+    (void)state;
+    peer = tcp_peer_new();
+    snprintf(service, sizeof service, "%u", tcp_peer_start(peer, 0));
+    memset(&tcp, 0, sizeof tcp);
+    port = mbm_tcp_port(&tcp, NULL);
+    return 0;
+}
+
+static int end(void **state)
+{
+    (void)state;
+    mbm_tcp_close(&tcp);
+    tcp_peer_stop(peer);
+    return 0;
+}
+
+static double seconds(void)
+{
+    struct timespec now;
+
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+}
+
+/* A blocking socket to a listener of this machine. */
+static int dial(uint16_t to)
+{
+    struct sockaddr_in address = {0};
+    int fd = socket(AF_INET, SOCK_STREAM, 0);
+
+    address.sin_family = AF_INET;
+    address.sin_port = htons(to);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    assert_int_equal(connect(fd, (struct sockaddr *)&address, sizeof address), 0);
+    return fd;
+}
+
+/* Takes bytes until so many are there or the link is lost. */
+static int16_t take(uint8_t *bytes, uint16_t length)
+{
+    uint16_t have = 0;
+
+    while (have < length) {
+        int16_t count = port.read(port.context, bytes + have, (uint16_t)(length - have));
+
+        if (count < 0)
+            return count;
+        have = (uint16_t)(have + count);
+        if (count == 0)
+            assert_true(mbm_tcp_wait(&tcp, 1, NULL, -1, 5 * SECOND) == 1);
+    }
+    return (int16_t)have;
+}
+
+static void await_connection(void)
+{
+    while (mbm_tcp_isConnected(&tcp) == 0)
+        assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 5 * SECOND), 1);
+}
+
+/* Asks for register 5; what taking the reply of 11 bytes says. */
+static int16_t ask(void)
+{
+    const uint8_t read_one[12] = {0, 1, 0, 0, 0, 6, 7, 3, 0, 5, 0, 1};
+    uint8_t reply[11] = {0};
+    int16_t count;
+
+    await_connection();
+    count = port.write(port.context, read_one, sizeof read_one);
+    if (count < 0)
+        return count;
+    assert_int_equal(count, sizeof read_one);
+    count = take(reply, sizeof reply);
+    if (count > 0)
+        assert_int_equal(reply[9] << 8 | reply[10], tcp_peer_word(5));
+    return count;
+}
+
+static void a_client_asks_and_reads_the_reply(void **state)
+{
+    uint32_t before, after;
+
+    (void)state;
+    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_int_equal(ask(), 11);
+    assert_int_equal(ask(), 11);
+    assert_int_equal(tcp.error, 0);
+    before = port.micros(port.context);
+    usleep(2000);
+    after = port.micros(port.context);
+    assert_in_range(after - before, 2000, SECOND);
+}
+
+static int option(int level, int name)
+{
+    socklen_t size = sizeof(int);
+    int value = 0;
+
+    assert_int_equal(getsockopt(tcp.fd, level, name, &value, &size), 0);
+    return value;
+}
+
+static void a_socket_sends_at_once_and_finds_a_dead_peer(void **state)
+{
+    (void)state;
+    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_true(option(IPPROTO_TCP, TCP_NODELAY));
+    assert_true(option(SOL_SOCKET, SO_KEEPALIVE));
+    assert_in_range(option(IPPROTO_TCP, TCP_KEEPIDLE) +
+                        option(IPPROTO_TCP, TCP_KEEPINTVL) * option(IPPROTO_TCP, TCP_KEEPCNT),
+                    1, 30);
+    assert_int_equal(option(IPPROTO_TCP, TCP_USER_TIMEOUT), 30000);
+    assert_true(fcntl(tcp.fd, F_GETFL) & O_NONBLOCK);
+    assert_true(fcntl(tcp.fd, F_GETFD) & FD_CLOEXEC);
+}
+
+/* A listener whose queue is full answers no connection until it takes one. */
+static void until_connected_nothing_is_read_and_nothing_taken(void **state)
+{
+    struct sockaddr_in address = {0};
+    socklen_t size = sizeof address;
+    int listener = socket(AF_INET, SOCK_STREAM, 0), first, second, taken;
+    uint8_t byte = 0;
+
+    (void)state;
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    assert_int_equal(bind(listener, (struct sockaddr *)&address, size), 0);
+    assert_int_equal(listen(listener, 0), 0);
+    assert_int_equal(getsockname(listener, (struct sockaddr *)&address, &size), 0);
+    first = dial(ntohs(address.sin_port));
+    snprintf(service, sizeof service, "%u", ntohs(address.sin_port));
+
+    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_int_equal(mbm_tcp_isConnected(&tcp), 0);
+    assert_int_equal(port.read(port.context, &byte, 1), 0);
+    assert_int_equal(port.write(port.context, &byte, 1), 0);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 20000), 0);
+
+    taken = accept(listener, NULL, NULL);
+    await_connection();
+    assert_int_equal(port.write(port.context, (const uint8_t *)"x", 1), 1);
+    second = accept(listener, NULL, NULL);
+    assert_int_equal(read(second, &byte, 1), 1);
+    assert_int_equal(byte, 'x');
+    close(first);
+    close(second);
+    close(taken);
+    close(listener);
+}
+
+static void a_refused_connection_is_a_lost_link(void **state)
+{
+    uint8_t byte = 0;
+
+    (void)state;
+    tcp_peer_halt(peer);
+    if (mbm_tcp_open(&tcp, "127.0.0.1", service) == 0) {
+        await_connection();
+        assert_int_equal(port.read(port.context, &byte, 1), -1);
+        assert_int_equal(port.write(port.context, &byte, 1), -1);
+    }
+    assert_int_equal(tcp.error, ECONNREFUSED);
+    assert_int_equal(mbm_tcp_isConnected(&tcp), -1);
+}
+
+static void of_several_addresses_the_one_that_answers_is_taken(void **state)
+{
+    (void)state;
+    assert_int_equal(mbm_tcp_open(&tcp, NULL, service), 0);
+    assert_int_equal(ask(), 11);
+}
+
+static void what_cannot_be_opened_says_why(void **state)
+{
+    (void)state;
+    assert_fails(EADDRNOTAVAIL, mbm_tcp_open(&tcp, "127.0.0.1", "no-such-service"));
+    assert_fails(EBADF, mbm_tcp_attach(&tcp, -1));
+    assert_int_equal(mbm_tcp_connect(&tcp), MBM_LINK_LOST);
+    assert_int_equal(tcp.error, ENOTCONN);
+    mbm_tcp_close(&tcp);
+    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_fails(EBUSY, mbm_tcp_open(&tcp, "127.0.0.1", service));
+    assert_fails(EBUSY, mbm_tcp_attach(&tcp, 0));
+}
+
+static void a_peer_that_ends_the_stream_is_told_from_one_that_resets_it(void **state)
+{
+    uint8_t byte;
+
+    (void)state;
+    tcp_peer_fault(peer, 1, FAULT_CLOSE, 0);
+    tcp_peer_fault(peer, 2, FAULT_RESET, 0);
+    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_int_equal(ask(), -1);
+    assert_int_equal(tcp.error, EPIPE);
+    assert_int_equal(port.read(port.context, &byte, 1), -1);
+    assert_int_equal(mbm_tcp_isConnected(&tcp), -1);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
+
+    assert_in_set(mbm_tcp_connect(&tcp), ((const unsigned long[]){MBM_OK, MBM_PENDING}), 2);
+    assert_int_equal(ask(), -1);
+    assert_int_equal(tcp.error, ECONNRESET);
+
+    assert_in_set(mbm_tcp_connect(&tcp), ((const unsigned long[]){MBM_OK, MBM_PENDING}), 2);
+    assert_int_equal(ask(), 11);
+    assert_int_equal(tcp.error, 0);
+}
+
+static void what_came_before_the_end_is_still_read(void **state)
+{
+    uint8_t bytes[4];
+
+    (void)state;
+    tcp_peer_fault(peer, 1, FAULT_HALF, 4);
+    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    await_connection();
+    assert_int_equal(port.write(port.context,
+                                (const uint8_t[12]){0, 1, 0, 0, 0, 6, 7, 3, 0, 5, 0, 1}, 12),
+                     12);
+    assert_int_equal(take(bytes, 4), 4);
+    assert_int_equal(take(bytes, 1), -1);
+}
+
+static void a_disconnected_link_is_lost_until_it_is_connected(void **state)
+{
+    uint8_t byte = 0;
+
+    (void)state;
+    mbm_tcp_disconnect(&tcp);
+    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_int_equal(ask(), 11);
+    mbm_tcp_disconnect(&tcp);
+    assert_int_equal(port.write(port.context, &byte, 1), -1);
+    mbm_tcp_connect(&tcp);
+    assert_int_equal(ask(), 11);
+    assert_int_equal(tcp_peer_count(peer).connections, 2);
+}
+
+static void a_full_socket_takes_no_more_and_wait_tells_of_room(void **state)
+{
+    static uint8_t much[60000];
+    int pair[2], rounds = 0;
+    int16_t taken;
+
+    (void)state;
+    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, pair), 0);
+    assert_int_equal(mbm_tcp_attach(&tcp, pair[0]), 0);
+    while ((taken = port.write(port.context, much, sizeof much)) > 0)
+        assert_true(++rounds < 1000);
+    assert_int_equal(taken, 0);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 10000), 0);
+    assert_int_equal(fcntl(pair[1], F_SETFL, O_NONBLOCK), 0);
+    while (read(pair[1], much, sizeof much) > 0)
+        ;
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
+    assert_true(port.write(port.context, much, 10) == 10);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
+    close(pair[1]);
+    assert_int_equal(port.write(port.context, much, 10), -1);
+    assert_int_equal(tcp.error, EPIPE);
+}
+
+static void wait_ends_with_the_time_or_with_any_of_its_sockets(void **state)
+{
+    static mbm_tcp many[MBM_TCP_WAITS];
+    mbm_tcp_listener listener = {0};
+    int pipes[2], client;
+    double start = seconds();
+    char byte;
+
+    (void)state;
+    assert_int_equal(mbm_tcp_wait(many, MBM_TCP_WAITS - 2, NULL, -1, 20500), 0);
+    assert_true(seconds() - start >= 0.0205);
+    assert_fails(EINVAL, mbm_tcp_wait(many, MBM_TCP_WAITS - 1, NULL, -1, 0));
+
+    assert_int_equal(pipe(pipes), 0);
+    assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
+    assert_int_equal(mbm_tcp_wait(many, 3, &listener, pipes[0], 1000), 0);
+    assert_int_equal(write(pipes[1], "x", 1), 1);
+    assert_int_equal(mbm_tcp_wait(many, 3, &listener, pipes[0], MBM_TCP_FOREVER), 1);
+    assert_int_equal(read(pipes[0], &byte, 1), 1);
+
+    client = dial(listener.port);
+    assert_int_equal(mbm_tcp_wait(many, 3, &listener, pipes[0], MBM_TCP_FOREVER), 1);
+    assert_int_equal(mbm_tcp_accept(&listener, many + 1, 2), 0);
+    assert_int_equal(mbm_tcp_wait(many, 3, &listener, pipes[0], 1000), 0);
+    assert_int_equal(write(client, "x", 1), 1);
+    assert_int_equal(mbm_tcp_wait(many, 3, &listener, pipes[0], MBM_TCP_FOREVER), 1);
+    close(client);
+    close(pipes[0]);
+    close(pipes[1]);
+    mbm_tcp_close(&many[1]);
+    mbm_tcp_closeListener(&listener);
+}
+
+static void a_connection_without_a_place_is_ended_politely(void **state)
+{
+    mbm_tcp_listener listener = {0};
+    mbm_tcp places[2] = {0};
+    mbm_port line;
+    int clients[4], i;
+    char byte;
+
+    (void)state;
+    assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
+    assert_fails(EAGAIN, mbm_tcp_accept(&listener, places, 2));
+    for (i = 0; i < 4; i++) {
+        clients[i] = dial(listener.port);
+        assert_int_equal(write(clients[i], "x", 1), 1);
+    }
+    assert_int_equal(mbm_tcp_accept(&listener, places, 2), 0);
+    assert_int_equal(mbm_tcp_accept(&listener, places, 2), 1);
+    assert_fails(EAGAIN, mbm_tcp_accept(&listener, places, 2));
+    assert_int_equal(listener.refused, 2);
+    assert_int_equal(read(clients[2], &byte, 1), 0);
+    assert_int_equal(read(clients[3], &byte, 1), 0);
+
+    /* One that is lost keeps its place, since an object still uses it. */
+    close(clients[0]);
+    line = mbm_tcp_port(&places[0], NULL);
+    assert_int_equal(line.read(line.context, (uint8_t *)&byte, 1), 1);
+    while (line.read(line.context, (uint8_t *)&byte, 1) == 0)
+        mbm_tcp_wait(places, 1, NULL, -1, SECOND);
+    clients[0] = dial(listener.port);
+    assert_fails(EAGAIN, mbm_tcp_accept(&listener, places, 2));
+    assert_int_equal(listener.refused, 3);
+    mbm_tcp_close(&places[0]);
+    close(clients[2]);
+    clients[2] = dial(listener.port);
+    assert_int_equal(mbm_tcp_accept(&listener, places, 2), 0);
+
+    for (i = 0; i < 4; i++)
+        close(clients[i]);
+    mbm_tcp_close(&places[0]);
+    mbm_tcp_close(&places[1]);
+    mbm_tcp_closeListener(&listener);
+    mbm_tcp_closeListener(&listener);
+    assert_fails(EBADF, mbm_tcp_accept(&listener, places, 2));
+}
+
+static void a_port_in_use_cannot_be_listened_at(void **state)
+{
+    mbm_tcp_listener first = {0}, second = {0};
+    char number[8];
+
+    (void)state;
+    assert_int_equal(mbm_tcp_listen(&first, "127.0.0.1", "0"), 0);
+    snprintf(number, sizeof number, "%u", first.port);
+    assert_fails(EBUSY, mbm_tcp_listen(&first, "127.0.0.1", "0"));
+    assert_fails(EADDRINUSE, mbm_tcp_listen(&second, "127.0.0.1", number));
+    mbm_tcp_closeListener(&first);
+    assert_int_equal(mbm_tcp_listen(&second, NULL, number), 0);
+    mbm_tcp_closeListener(&second);
+}
+
+/* A device that talks RTU through a TCP stream, for one connection. */
+static void *device(void *argument)
+{
+    mbm_tcp_listener *listener = (mbm_tcp_listener *)argument;
+    static model memory;
+    mbm_tcp place = {0};
+    mbm_port line = mbm_tcp_port(&place, NULL);
+    uint8_t frame[MBM_MAX_FRAME], reply[MBM_MAX_FRAME];
+    size_t have = 0;
+    int16_t count = 0;
+
+    model_start(&memory);
+    while (mbm_tcp_accept(listener, &place, 1) < 0)
+        mbm_tcp_wait(NULL, 0, listener, -1, SECOND);
+    for (; count >= 0; mbm_tcp_wait(&place, 1, NULL, -1, SECOND)) {
+        request asked;
+
+        count = line.read(line.context, frame + have, (uint16_t)(sizeof frame - have));
+        if (count > 0)
+            have += (size_t)count;
+        if (have > 0 && request_parse(&asked, frame, have)) {
+            line.write(line.context, reply, (uint16_t)model_answer(&memory, &asked, reply));
+            have = 0;
+        }
+    }
+    mbm_tcp_close(&place);
+    return NULL;
+}
+
+static void a_master_reads_rtu_through_a_stream(void **state)
+{
+    static mbm_master node;
+    static uint16_t response[100];
+    static uint8_t frame[MBM_FRAME_BYTES(100)];
+    static model memory;
+    mbm_tcp_listener listener = {0};
+    pthread_t thread;
+    unsigned i;
+
+    (void)state;
+    model_start(&memory);
+    assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
+    assert_int_equal(pthread_create(&thread, NULL, device, &listener), 0);
+    snprintf(service, sizeof service, "%u", listener.port);
+    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    port = mbm_tcp_port(&tcp, &node);
+    OK(mbm_master_setBuffers(&node, response, 100, NULL, 0, frame, sizeof frame));
+    OK(mbm_master_begin(&node, MODEL_FIRST_UNIT, &port));
+    OK(mbm_master_setGap(&node, 0));
+    for (i = 1; i <= 100; i++) {
+        OK(mbm_master_readHoldingRegisters(&node, (uint16_t)i, (uint16_t)i));
+        assert_memory_equal(response, &memory.holding[0][i], 2 * i);
+    }
+    mbm_tcp_disconnect(&tcp);
+    IS(MBM_LINK_LOST, mbm_master_readHoldingRegisters(&node, 0, 1));
+    pthread_join(thread, NULL);
+    mbm_tcp_closeListener(&listener);
+}
+
+#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(a_client_asks_and_reads_the_reply),
+        TEST(a_socket_sends_at_once_and_finds_a_dead_peer),
+        TEST(until_connected_nothing_is_read_and_nothing_taken),
+        TEST(a_refused_connection_is_a_lost_link),
+        TEST(of_several_addresses_the_one_that_answers_is_taken),
+        TEST(what_cannot_be_opened_says_why),
+        TEST(a_peer_that_ends_the_stream_is_told_from_one_that_resets_it),
+        TEST(what_came_before_the_end_is_still_read),
+        TEST(a_disconnected_link_is_lost_until_it_is_connected),
+        TEST(a_full_socket_takes_no_more_and_wait_tells_of_room),
+        TEST(wait_ends_with_the_time_or_with_any_of_its_sockets),
+        TEST(a_connection_without_a_place_is_ended_politely),
+        TEST(a_port_in_use_cannot_be_listened_at),
+        TEST(a_master_reads_rtu_through_a_stream),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,447 @@
+/* The port over a terminal. A pty shows what the system does with it; what a
+ * pty has not, a driver that knows RS-485, is played by the test's own ioctl. */
+#define _GNU_SOURCE
+#include "mbm_tty.h"
+#include "pty.h"
+#include "test.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <linux/serial.h>
+#include <pthread.h>
+#include <signal.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <time.h>
+#include <unistd.h>
+
+static pty line;
+static const mbm_tty_options PLAIN = {.baud = 19200, .parity = 'E', .stop = 1};
+
+/* The driver that is played: whether it is there, the longest delay it can. */
+static struct {
+    int there;
+    uint32_t longest;
+    struct serial_rs485 state;
+} driver;
+
+/* The program's own comes before that of libc. */
+int ioctl(int fd, unsigned long request, ...)
+{
+    va_list arguments;
+    void *argument;
+
+    va_start(arguments, request);
+    argument = va_arg(arguments, void *);
+    va_end(arguments);
+    if (driver.there && request == TIOCGRS485) {
+        memcpy(argument, &driver.state, sizeof driver.state);
+        return 0;
+    }
+    if (driver.there && request == TIOCSRS485) {
+        memcpy(&driver.state, argument, sizeof driver.state);
+        if (driver.state.delay_rts_before_send > driver.longest)
+            driver.state.delay_rts_before_send = driver.longest;
+        return 0;
+    }
+    return (int)syscall(SYS_ioctl, fd, request, argument);
+}
+
+static int begin(void **state)
+{
+    (void)state;
+    memset(&driver, 0, sizeof driver);
+    pty_open(&line);
+    return 0;
+}
+
+static int end(void **state)
+{
+    (void)state;
+    pty_close(&line);
+    return 0;
+}
+
+static struct termios settings_of(int fd)
+{
+    struct termios settings;
+
+    assert_int_equal(tcgetattr(fd, &settings), 0);
+    return settings;
+}
+
+static void assert_same(const struct termios *a, const struct termios *b)
+{
+    assert_int_equal(a->c_iflag, b->c_iflag);
+    assert_int_equal(a->c_oflag, b->c_oflag);
+    assert_int_equal(a->c_cflag, b->c_cflag);
+    assert_int_equal(a->c_lflag, b->c_lflag);
+    assert_memory_equal(a->c_cc, b->c_cc, sizeof a->c_cc);
+}
+
+static double seconds(void)
+{
+    struct timespec now;
+
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+}
+
+static void assert_fails(int error, int result)
+{
+    assert_int_equal(result, -1);
+    assert_int_equal(errno, error);
+}
+
+static void parity_stop_and_data_bits_become_settings(void **state)
+{
+    static const struct {
+        char parity;
+        uint8_t stop, data;
+        tcflag_t flags;
+    } rows[] = {
+        {'N', 1, 8, CS8},          {'N', 2, 8, CS8 | CSTOPB},
+        {'E', 1, 0, CS8 | PARENB}, {'O', 1, 8, CS8 | PARENB | PARODD},
+        {'E', 1, 7, CS7 | PARENB}, {'O', 2, 7, CS7 | PARENB | PARODD | CSTOPB},
+    };
+    const tcflag_t all = CSIZE | PARENB | PARODD | CSTOPB | CRTSCTS | HUPCL | CLOCAL | CREAD;
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < COUNT(rows); i++) {
+        mbm_tty_options options = {.baud = 9600};
+        struct termios settings;
+
+        memset(&settings, 0xFF, sizeof settings);
+        options.parity = rows[i].parity;
+        options.stop = rows[i].stop;
+        options.data = rows[i].data;
+        assert_int_equal(mbm_tty_settings(&settings, &options), 0);
+        assert_int_equal(settings.c_cflag & all, rows[i].flags | CLOCAL | CREAD);
+        assert_int_equal(settings.c_iflag & (INPCK | IXON | IXOFF | ISTRIP | ICRNL), 0);
+        assert_int_equal(settings.c_lflag & (ICANON | ECHO | ISIG), 0);
+        assert_int_equal(settings.c_cc[VMIN], 1);
+        assert_int_equal(cfgetospeed(&settings), B9600);
+        assert_int_equal(cfgetispeed(&settings), B9600);
+    }
+}
+
+static void every_rate_of_termios_can_be_set(void **state)
+{
+    static const struct {
+        uint32_t baud;
+        speed_t speed;
+    } rows[] = {{50, B50},         {134, B134},         {1200, B1200},       {38400, B38400},
+                {57600, B57600},   {115200, B115200},   {230400, B230400},   {460800, B460800},
+                {500000, B500000}, {921600, B921600},   {1000000, B1000000}, {1500000, B1500000},
+                {3000000, B3000000}, {4000000, B4000000}};
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < COUNT(rows); i++) {
+        struct termios settings;
+        mbm_tty tty;
+
+        assert_int_equal(mbm_tty_open(&tty, line.path, rows[i].baud, 'N', 2), 0);
+        settings = settings_of(tty.fd);
+        assert_int_equal(cfgetospeed(&settings), rows[i].speed);
+        assert_int_equal(settings.c_cflag & CSTOPB, CSTOPB);
+        mbm_tty_close(&tty);
+    }
+}
+
+static void options_that_no_terminal_has_are_refused_with_einval(void **state)
+{
+    static const mbm_tty_options bad[] = {
+        {.baud = 0, .parity = 'N', .stop = 1},     {.baud = 19201, .parity = 'N', .stop = 1},
+        {.baud = 9600, .parity = 0, .stop = 1},    {.baud = 9600, .parity = 'n', .stop = 1},
+        {.baud = 9600, .parity = 'M', .stop = 1},  {.baud = 9600, .parity = 'N', .stop = 0},
+        {.baud = 9600, .parity = 'N', .stop = 3},  {.baud = 9600, .parity = 'N', .stop = 1, .data = 6},
+        {.baud = 9600, .parity = 'N', .stop = 1, .data = 9},
+    };
+    struct termios settings = settings_of(line.theirs);
+    mbm_tty tty;
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < COUNT(bad); i++) {
+        assert_fails(EINVAL, mbm_tty_openWith(&tty, line.path, &bad[i]));
+        assert_int_equal(tty.fd, -1);
+        assert_fails(EINVAL, mbm_tty_settings(&settings, &bad[i]));
+    }
+    assert_fails(EINVAL, mbm_tty_open(&tty, line.path, 9600, 'N', 257));
+    assert_fails(EINVAL, mbm_tty_open(&tty, line.path, 9600, 'N', -255));
+}
+
+static void what_cannot_be_opened_says_why(void **state)
+{
+    mbm_tty tty;
+
+    (void)state;
+    assert_fails(ENOENT, mbm_tty_openWith(&tty, "/dev/no-such-terminal", &PLAIN));
+    assert_fails(ENOTTY, mbm_tty_openWith(&tty, "/dev/null", &PLAIN));
+    assert_int_equal(tty.fd, -1);
+    assert_fails(EBADF, mbm_tty_attach(&tty, -1));
+    assert_fails(EBADF, mbm_tty_wait(&tty, 0));
+    mbm_tty_close(&tty);
+}
+
+static void close_leaves_the_terminal_as_it_was_found(void **state)
+{
+    struct termios found = settings_of(line.theirs), now;
+    mbm_tty tty;
+
+    (void)state;
+    found.c_lflag |= ECHO | ICANON;
+    found.c_cc[VMIN] = 7;
+    cfsetispeed(&found, B1200);
+    cfsetospeed(&found, B1200);
+    assert_int_equal(tcsetattr(line.theirs, TCSANOW, &found), 0);
+    found = settings_of(line.theirs);
+
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
+    now = settings_of(line.theirs);
+    assert_int_equal(now.c_lflag & (ECHO | ICANON), 0);
+    assert_int_equal(cfgetospeed(&now), B19200);
+    mbm_tty_close(&tty);
+    assert_int_equal(tty.fd, -1);
+    now = settings_of(line.theirs);
+    assert_same(&now, &found);
+    mbm_tty_close(&tty);
+}
+
+static void detach_gives_the_descriptor_back_as_it_was(void **state)
+{
+    struct termios found, now;
+    int flags = fcntl(line.ours, F_GETFL);
+    mbm_tty tty;
+
+    (void)state;
+    found = settings_of(line.ours);
+    found.c_lflag |= ECHO;
+    assert_int_equal(tcsetattr(line.ours, TCSANOW, &found), 0);
+    found = settings_of(line.ours);
+    assert_int_equal(mbm_tty_attach(&tty, line.ours), 0);
+    assert_true(fcntl(line.ours, F_GETFL) & O_NONBLOCK);
+    mbm_tty_detach(&tty);
+    assert_int_equal(tty.fd, -1);
+    assert_int_equal(fcntl(line.ours, F_GETFL), flags);
+    now = settings_of(line.ours);
+    assert_same(&now, &found);
+}
+
+static void an_exclusive_terminal_is_busy_for_a_second_one(void **state)
+{
+    mbm_tty_options options = PLAIN;
+    struct termios before, after;
+    mbm_tty first, second;
+    int exclusive = 0;
+
+    (void)state;
+    options.exclusive = 1;
+    assert_int_equal(mbm_tty_openWith(&first, line.path, &options), 0);
+    assert_int_equal(ioctl(line.theirs, TIOCGEXCL, &exclusive), 0);
+    assert_int_equal(exclusive, 1);
+    before = settings_of(line.theirs);
+    options.baud = 1200;
+    assert_fails(EBUSY, mbm_tty_openWith(&second, line.path, &options));
+    after = settings_of(line.theirs);
+    assert_same(&before, &after);
+
+    mbm_tty_close(&first);
+    assert_int_equal(ioctl(line.theirs, TIOCGEXCL, &exclusive), 0);
+    assert_int_equal(exclusive, 0);
+    assert_int_equal(mbm_tty_openWith(&second, line.path, &options), 0);
+    mbm_tty_close(&second);
+}
+
+static void rs485_where_the_driver_knows_none_is_refused_and_nothing_is_changed(void **state)
+{
+    struct termios before = settings_of(line.theirs), after;
+    mbm_tty_options options = PLAIN;
+    mbm_tty tty;
+
+    (void)state;
+    options.rs485 = 1;
+    assert_fails(ENOTTY, mbm_tty_openWith(&tty, line.path, &options));
+    assert_int_equal(tty.fd, -1);
+    after = settings_of(line.theirs);
+    assert_same(&before, &after);
+}
+
+static void rs485_tells_the_driver_and_close_takes_it_back(void **state)
+{
+    mbm_tty_options options = PLAIN;
+    mbm_tty tty;
+
+    (void)state;
+    driver.there = 1;
+    driver.longest = 100;
+    driver.state.delay_rts_after_send = 42;
+    options.rs485 = 1;
+    options.rtsDelayBefore = 3;
+    options.rtsDelayAfter = 5;
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &options), 0);
+    assert_int_equal(driver.state.flags, SER_RS485_ENABLED | SER_RS485_RTS_ON_SEND);
+    assert_int_equal(driver.state.delay_rts_before_send, 3);
+    assert_int_equal(driver.state.delay_rts_after_send, 5);
+    mbm_tty_close(&tty);
+    assert_int_equal(driver.state.flags, 0);
+    assert_int_equal(driver.state.delay_rts_after_send, 42);
+
+    options.rtsLow = 1;
+    options.hearSelf = 1;
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &options), 0);
+    assert_int_equal(driver.state.flags,
+                     SER_RS485_ENABLED | SER_RS485_RTS_AFTER_SEND | SER_RS485_RX_DURING_TX);
+    mbm_tty_close(&tty);
+}
+
+static void an_rs485_delay_that_the_driver_cuts_short_is_refused(void **state)
+{
+    mbm_tty_options options = PLAIN;
+    mbm_tty tty;
+
+    (void)state;
+    driver.there = 1;
+    driver.longest = 100;
+    options.rs485 = 1;
+    options.rtsDelayBefore = 101;
+    assert_fails(EINVAL, mbm_tty_openWith(&tty, line.path, &options));
+    assert_int_equal(driver.state.flags, 0);
+}
+
+static void wait_ends_with_a_byte_with_the_time_or_with_the_line(void **state)
+{
+    mbm_tty tty;
+    double start;
+
+    (void)state;
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
+    assert_int_equal(mbm_tty_wait(&tty, 0), 0);
+    start = seconds();
+    assert_int_equal(mbm_tty_wait(&tty, 30500), 0);
+    assert_true(seconds() - start >= 0.0305);
+    assert_int_equal(write(line.ours, "x", 1), 1);
+    assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), 1);
+    close(line.ours);
+    line.ours = -1;
+    assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), 1);
+    mbm_tty_close(&tty);
+}
+
+static void nothing(int signal_number)
+{
+    (void)signal_number;
+}
+
+static void *interrupt(void *thread)
+{
+    usleep(30000);
+    pthread_kill(*(pthread_t *)thread, SIGUSR1);
+    return NULL;
+}
+
+static void a_signal_ends_the_wait(void **state)
+{
+    struct sigaction action = {0};
+    pthread_t self = pthread_self(), other;
+    mbm_tty tty;
+
+    (void)state;
+    action.sa_handler = nothing;
+    sigaction(SIGUSR1, &action, NULL);
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
+    assert_int_equal(pthread_create(&other, NULL, interrupt, &self), 0);
+    assert_int_equal(mbm_tty_wait(&tty, 20000000), 0);
+    pthread_join(other, NULL);
+    mbm_tty_close(&tty);
+}
+
+static void a_lost_line_is_told_with_its_errno(void **state)
+{
+    uint8_t byte;
+    mbm_port port;
+    mbm_tty tty;
+
+    (void)state;
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
+    port = mbm_tty_port(&tty, NULL);
+    assert_null(port.idle);
+    assert_int_equal(port.read(port.context, &byte, 1), 0);
+    assert_int_equal(port.write(port.context, (const uint8_t *)"ab", 2), 2);
+    assert_int_equal(read(line.ours, &byte, 1), 1);
+    assert_int_equal(tty.error, 0);
+    close(line.ours);
+    line.ours = -1;
+    assert_true(port.read(port.context, &byte, 1) < 0);
+    assert_true(tty.error == EIO || tty.error == EPIPE);
+    tty.error = 0;
+    assert_true(port.write(port.context, &byte, 1) < 0);
+    assert_int_equal(tty.error, EIO);
+    mbm_tty_close(&tty);
+}
+
+static void a_full_line_takes_no_more_and_is_not_lost(void **state)
+{
+    static uint8_t much[40000];
+    int16_t taken;
+    mbm_port port;
+    mbm_tty tty;
+    unsigned rounds = 0;
+
+    (void)state;
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
+    port = mbm_tty_port(&tty, NULL);
+    while ((taken = port.write(port.context, much, sizeof much)) > 0)
+        assert_true(++rounds < 1000);
+    assert_int_equal(taken, 0);
+    assert_int_equal(tcflush(tty.fd, TCIOFLUSH), 0);
+    mbm_tty_close(&tty);
+}
+
+static void a_socket_can_be_attached(void **state)
+{
+    int pair[2];
+    mbm_tty tty;
+    mbm_port port;
+    uint8_t byte;
+
+    (void)state;
+    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, pair), 0);
+    assert_int_equal(mbm_tty_attach(&tty, pair[0]), 0);
+    port = mbm_tty_port(&tty, NULL);
+    assert_null(port.flush);
+    assert_int_equal(port.read(port.context, &byte, 1), 0);
+    close(pair[1]);
+    assert_int_equal(port.read(port.context, &byte, 1), -1);
+    assert_int_equal(tty.error, EPIPE);
+    mbm_tty_close(&tty);
+}
+
+#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(parity_stop_and_data_bits_become_settings),
+        TEST(every_rate_of_termios_can_be_set),
+        TEST(options_that_no_terminal_has_are_refused_with_einval),
+        TEST(what_cannot_be_opened_says_why),
+        TEST(close_leaves_the_terminal_as_it_was_found),
+        TEST(detach_gives_the_descriptor_back_as_it_was),
+        TEST(an_exclusive_terminal_is_busy_for_a_second_one),
+        TEST(rs485_where_the_driver_knows_none_is_refused_and_nothing_is_changed),
+        TEST(rs485_tells_the_driver_and_close_takes_it_back),
+        TEST(an_rs485_delay_that_the_driver_cuts_short_is_refused),
+        TEST(wait_ends_with_a_byte_with_the_time_or_with_the_line),
+        TEST(a_signal_ends_the_wait),
+        TEST(a_lost_line_is_told_with_its_errno),
+        TEST(a_full_line_takes_no_more_and_is_not_lost),
+        TEST(a_socket_can_be_attached),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,403 @@
+/* An mbm_port over a TCP socket. Licence: MIT OR Apache-2.0. */
+#define _GNU_SOURCE
+#include "mbm_tcp.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+/* Of mbm_tcp.state. A lost one keeps its place: an object may still use it. */
+enum { FREE, CONNECTING, CONNECTED, LOST };
+
+/* Seconds of silence, between the probes that follow, and how many: what finds a
+ * peer that is gone while nothing is sent. While something is, milliseconds. */
+enum { QUIET_S = 15, PROBE_S = 5, PROBES = 3, UNANSWERED_MS = 30000 };
+
+static int refuse(int error)
+{
+    errno = error;
+    return -1;
+}
+
+static int has_socket(const mbm_tcp *tcp)
+{
+    return tcp->state == CONNECTING || tcp->state == CONNECTED;
+}
+
+static void lose(mbm_tcp *tcp, int error)
+{
+    if (has_socket(tcp))
+        close(tcp->fd);
+    tcp->fd = -1;
+    tcp->error = error;
+    tcp->state = LOST;
+}
+
+static void set(int fd, int level, int option, int value)
+{
+    /* A socket without it, of another family, works all the same. */
+    (void)setsockopt(fd, level, option, &value, sizeof value);
+}
+
+static int prepare(int fd)
+{
+    int flags = fcntl(fd, F_GETFL);
+
+    if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) < 0 ||
+        fcntl(fd, F_SETFD, FD_CLOEXEC) < 0)
+        return -1;
+    set(fd, IPPROTO_TCP, TCP_NODELAY, 1);
+    set(fd, SOL_SOCKET, SO_KEEPALIVE, 1);
+#ifdef TCP_KEEPIDLE
+    set(fd, IPPROTO_TCP, TCP_KEEPIDLE, QUIET_S);
+    set(fd, IPPROTO_TCP, TCP_KEEPINTVL, PROBE_S);
+    set(fd, IPPROTO_TCP, TCP_KEEPCNT, PROBES);
+#endif
+#ifdef TCP_USER_TIMEOUT
+    set(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, UNANSWERED_MS);
+#endif
+    return 0;
+}
+
+/* Begins with the next address; lost with `error` if there is none. */
+static int try_next(mbm_tcp *tcp, int error)
+{
+    if (has_socket(tcp))
+        close(tcp->fd);
+    tcp->state = LOST;
+    while (tcp->next < tcp->count) {
+        const struct sockaddr_storage *address = &tcp->addresses[tcp->next];
+        socklen_t length = tcp->lengths[tcp->next++];
+
+        tcp->fd = socket(address->ss_family, SOCK_STREAM, 0);
+        if (tcp->fd < 0) {
+            error = errno;
+            continue;
+        }
+        tcp->state = CONNECTING;
+        if (prepare(tcp->fd) == 0) {
+            if (connect(tcp->fd, (const struct sockaddr *)address, length) == 0) {
+                tcp->state = CONNECTED;
+                return 0;
+            }
+            if (errno == EINPROGRESS || errno == EINTR)
+                return 0;
+        }
+        error = errno;
+        close(tcp->fd);
+        tcp->state = LOST;
+    }
+    lose(tcp, error);
+    return -1;
+}
+
+static int look_up(const char *host, const char *service, int flags, struct addrinfo **found)
+{
+    struct addrinfo hints = {0};
+
+    hints.ai_socktype = SOCK_STREAM;
+    hints.ai_flags = flags;
+    switch (getaddrinfo(host, service, &hints, found)) {
+    case 0: return 0;
+    case EAI_SYSTEM: return -1;
+    case EAI_AGAIN: return refuse(EAGAIN);
+    case EAI_MEMORY: return refuse(ENOMEM);
+    default: return refuse(EADDRNOTAVAIL);
+    }
+}
+
+int mbm_tcp_open(mbm_tcp *tcp, const char *host, const char *service)
+{
+    struct addrinfo *found, *one;
+
+    if (tcp->state != FREE)
+        return refuse(EBUSY);
+    if (look_up(host, service, 0, &found) < 0)
+        return -1;
+    memset(tcp, 0, sizeof *tcp);
+    for (one = found; one && tcp->count < MBM_TCP_ADDRESSES; one = one->ai_next) {
+        if (one->ai_addrlen > sizeof tcp->addresses[0])
+            continue;
+        memcpy(&tcp->addresses[tcp->count], one->ai_addr, one->ai_addrlen);
+        tcp->lengths[tcp->count++] = one->ai_addrlen;
+    }
+    freeaddrinfo(found);
+    if (try_next(tcp, EADDRNOTAVAIL) < 0) {
+        tcp->state = FREE;
+        return refuse(tcp->error);
+    }
+    return 0;
+}
+
+int mbm_tcp_attach(mbm_tcp *tcp, int fd)
+{
+    if (tcp->state != FREE)
+        return refuse(EBUSY);
+    if (prepare(fd) < 0)
+        return -1;
+    memset(tcp, 0, sizeof *tcp);
+    tcp->fd = fd;
+    tcp->state = CONNECTED;
+    return 0;
+}
+
+void mbm_tcp_close(mbm_tcp *tcp)
+{
+    if (has_socket(tcp))
+        close(tcp->fd);
+    tcp->fd = -1;
+    tcp->state = FREE;
+}
+
+/* 1 once connected, 0 before, -1 if there is no link. */
+static int progress(mbm_tcp *tcp)
+{
+    struct pollfd wait = {tcp->fd, POLLOUT, 0};
+    socklen_t size = sizeof(int);
+    int error = 0;
+
+    while (tcp->state == CONNECTING) {
+        wait.fd = tcp->fd;
+        if (poll(&wait, 1, 0) <= 0)
+            return 0;
+        if (getsockopt(tcp->fd, SOL_SOCKET, SO_ERROR, &error, &size) < 0)
+            error = errno;
+        if (error == 0)
+            tcp->state = CONNECTED;
+        else
+            try_next(tcp, error);
+    }
+    return tcp->state == CONNECTED ? 1 : -1;
+}
+
+int mbm_tcp_isConnected(mbm_tcp *tcp)
+{
+    return progress(tcp);
+}
+
+uint8_t mbm_tcp_connect(void *context)
+{
+    mbm_tcp *tcp = (mbm_tcp *)context;
+
+    tcp->next = 0;
+    tcp->is_full = 0;
+    tcp->error = 0;
+    if (try_next(tcp, ENOTCONN) < 0)
+        return MBM_LINK_LOST;
+    return tcp->state == CONNECTED ? MBM_OK : MBM_PENDING;
+}
+
+void mbm_tcp_disconnect(void *context)
+{
+    mbm_tcp *tcp = (mbm_tcp *)context;
+
+    if (tcp->state != FREE)
+        lose(tcp, ENOTCONN);
+}
+
+/* A signal and "try again" mean that nothing was moved; all else that the link
+ * is gone. */
+static int16_t outcome(mbm_tcp *tcp, ssize_t count)
+{
+    if (count > 0)
+        return (int16_t)count;
+    if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR))
+        return 0;
+    lose(tcp, count < 0 ? errno : EPIPE);
+    return -1;
+}
+
+static size_t at_most(uint16_t length)
+{
+    return length > INT16_MAX ? INT16_MAX : length;
+}
+
+static int16_t tcp_read(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    mbm_tcp *tcp = (mbm_tcp *)context;
+    int there = progress(tcp);
+
+    if (there <= 0 || capacity == 0)
+        return (int16_t)(there < 0 ? -1 : 0);
+    return outcome(tcp, recv(tcp->fd, bytes, at_most(capacity), 0));
+}
+
+static int16_t tcp_write(void *context, const uint8_t *bytes, uint16_t length)
+{
+    mbm_tcp *tcp = (mbm_tcp *)context;
+    int there = progress(tcp);
+    int16_t taken;
+
+    if (there <= 0 || length == 0)
+        return (int16_t)(there < 0 ? -1 : 0);
+    taken = outcome(tcp, send(tcp->fd, bytes, at_most(length), MSG_NOSIGNAL));
+    tcp->is_full = taken >= 0 && taken < length;
+    return taken;
+}
+
+static uint32_t tcp_micros(void *context)
+{
+    struct timespec now;
+
+    (void)context;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint32_t)now.tv_sec * 1000000u + (uint32_t)now.tv_nsec / 1000u;
+}
+
+static void tcp_idle(void *context)
+{
+    const mbm_tcp *tcp = (const mbm_tcp *)context;
+
+    mbm_tcp_wait(tcp, 1, NULL, -1, mbm_master_pollDelay(tcp->master));
+}
+
+mbm_port mbm_tcp_port(mbm_tcp *tcp, const mbm_master *master)
+{
+    mbm_port port = {0};
+
+    tcp->master = master;
+    port.context = tcp;
+    port.read = tcp_read;
+    port.write = tcp_write;
+    port.micros = tcp_micros;
+    port.idle = master ? tcp_idle : NULL;
+    return port;
+}
+
+static uint16_t port_of(int fd)
+{
+    struct sockaddr_storage address;
+    socklen_t size = sizeof address;
+
+    memset(&address, 0, sizeof address);
+    if (getsockname(fd, (struct sockaddr *)&address, &size) < 0)
+        return 0;
+    if (address.ss_family == AF_INET6)
+        return ntohs(((struct sockaddr_in6 *)&address)->sin6_port);
+    return ntohs(((struct sockaddr_in *)&address)->sin_port);
+}
+
+static int listen_at(const struct addrinfo *address)
+{
+    int fd = socket(address->ai_family, SOCK_STREAM, 0), error;
+
+    if (fd < 0)
+        return -1;
+    /* A server that restarts is not kept from its port by what it left. */
+    set(fd, SOL_SOCKET, SO_REUSEADDR, 1);
+    if (fcntl(fd, F_SETFL, O_NONBLOCK) == 0 && fcntl(fd, F_SETFD, FD_CLOEXEC) == 0 &&
+        bind(fd, address->ai_addr, address->ai_addrlen) == 0 && listen(fd, SOMAXCONN) == 0)
+        return fd;
+    error = errno;
+    close(fd);
+    return refuse(error);
+}
+
+int mbm_tcp_listen(mbm_tcp_listener *listener, const char *host, const char *service)
+{
+    struct addrinfo *found, *one;
+    int fd = -1, error;
+
+    if (listener->port != 0)
+        return refuse(EBUSY);
+    if (look_up(host, service, AI_PASSIVE, &found) < 0)
+        return -1;
+    errno = EADDRNOTAVAIL;
+    for (one = found; one && fd < 0; one = one->ai_next)
+        fd = listen_at(one);
+    error = errno;
+    freeaddrinfo(found);
+    if (fd < 0)
+        return refuse(error);
+    listener->fd = fd;
+    listener->port = port_of(fd);
+    listener->refused = 0;
+    return 0;
+}
+
+/* The end of the stream and no reset, also if a request came with the client. */
+static void turn_away(int fd)
+{
+    uint8_t unread[512];
+    int rounds = 0;
+
+    shutdown(fd, SHUT_WR);
+    while (rounds++ < 8 && recv(fd, unread, sizeof unread, MSG_DONTWAIT) > 0)
+        ;
+    close(fd);
+}
+
+int mbm_tcp_accept(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
+{
+    size_t place = 0;
+    int fd;
+
+    if (listener->port == 0)
+        return refuse(EBADF);
+    while (place < count && tcps[place].state != FREE)
+        place++;
+    for (;;) {
+        fd = accept(listener->fd, NULL, NULL);
+        if (fd < 0 && (errno == EINTR || errno == ECONNABORTED))
+            continue;
+        if (fd < 0)
+            return errno == EWOULDBLOCK ? refuse(EAGAIN) : -1;
+        if (place < count)
+            break;
+        listener->refused++;
+        turn_away(fd);
+    }
+    if (mbm_tcp_attach(&tcps[place], fd) < 0) {
+        int error = errno;
+
+        close(fd);
+        return refuse(error);
+    }
+    return (int)place;
+}
+
+void mbm_tcp_closeListener(mbm_tcp_listener *listener)
+{
+    if (listener->port != 0)
+        close(listener->fd);
+    listener->fd = -1;
+    listener->port = 0;
+}
+
+int mbm_tcp_wait(const mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, int fd,
+                 uint32_t micros)
+{
+    struct timespec time = {(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
+    struct pollfd waits[MBM_TCP_WAITS];
+    nfds_t used = 0;
+    size_t i;
+    int ready;
+
+    if (count > MBM_TCP_WAITS - 2)
+        return refuse(EINVAL);
+    for (i = 0; i < count; i++) {
+        short events = POLLIN;
+
+        if (!has_socket(&tcps[i]))
+            continue;
+        if (tcps[i].state == CONNECTING)
+            events = POLLOUT;
+        else if (tcps[i].is_full)
+            events |= POLLOUT;
+        waits[used++] = (struct pollfd){tcps[i].fd, events, 0};
+    }
+    if (listener && listener->port != 0)
+        waits[used++] = (struct pollfd){listener->fd, POLLIN, 0};
+    if (fd >= 0)
+        waits[used++] = (struct pollfd){fd, POLLIN, 0};
+    ready = ppoll(waits, used, micros == MBM_TCP_FOREVER ? NULL : &time, NULL);
+    if (ready < 0)
+        return errno == EINTR ? 0 : -1;
+    return ready > 0;
+}

@@ -1,0 +1,279 @@
+//! Transactions over a port that brings anything at any time. A transaction may
+//! succeed only if a right reply to its request was among the bytes; it always
+//! ends, with the request sent byte for byte and the driver off.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use mbm::error::Status;
+use mbm::port::Port;
+use mbm::transaction::{Settings, Storage, Transaction, BROADCAST};
+use mbm_fuzz::asked::{words, Asked};
+use mbm_fuzz::stream::{event, Event};
+use mbm_fuzz::Input;
+use std::collections::VecDeque;
+
+/// What the line does next, when its time has come.
+enum Next {
+    Bytes(VecDeque<u8>),
+    LinkLost,
+}
+
+struct Line {
+    now: u32,
+    /// What comes, and how long after the one before.
+    script: VecDeque<(u32, Next)>,
+    since: u32,
+    /// Bytes that one write accepts; 0 at every other.
+    accept: usize,
+    writes: usize,
+    flushes: u8,
+    driver: bool,
+    sent: Vec<u8>,
+    requests: Vec<Vec<u8>>,
+    /// What came since the last request.
+    heard: Vec<u8>,
+    lost: bool,
+}
+
+impl Port for Line {
+    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+        assert!(!self.driver, "it listens to itself");
+        let Some((delay, next)) = self.script.front_mut() else {
+            return 0;
+        };
+        if self.now.wrapping_sub(self.since) < *delay {
+            return 0;
+        }
+        let Next::Bytes(waiting) = next else {
+            self.lost = true;
+            return -1;
+        };
+        let count = waiting.len().min(bytes.len());
+        for (place, byte) in bytes.iter_mut().zip(waiting.drain(..count)) {
+            *place = byte;
+            self.heard.push(byte);
+        }
+        if waiting.is_empty() {
+            self.script.pop_front();
+            self.since = self.now;
+        }
+        count as i16
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> i16 {
+        assert!(self.driver, "it talks with the driver off");
+        self.writes += 1;
+        if self.accept > 0 && self.writes.is_multiple_of(2) {
+            return 0;
+        }
+        let count = match self.accept {
+            0 => bytes.len(),
+            some => bytes.len().min(some),
+        };
+        self.sent.extend_from_slice(&bytes[..count]);
+        count as i16
+    }
+
+    fn micros(&mut self) -> u32 {
+        self.now
+    }
+
+    fn flush(&mut self) -> bool {
+        assert!(self.driver, "the driver is off before the last bit");
+        if self.flushes > 0 {
+            self.flushes -= 1;
+        }
+        self.flushes == 0
+    }
+
+    fn pre_transmission(&mut self) {
+        assert!(!self.driver);
+        self.driver = true;
+        self.sent.clear();
+    }
+
+    fn post_transmission(&mut self) {
+        assert!(self.driver);
+        self.driver = false;
+        self.requests.push(std::mem::take(&mut self.sent));
+        self.heard.clear();
+    }
+}
+
+struct Buffers {
+    frame: Vec<u8>,
+    transmit: Vec<u16>,
+    response: Vec<u16>,
+}
+
+impl Storage for Buffers {
+    fn frame(&mut self) -> &mut [u8] {
+        &mut self.frame
+    }
+    fn transmit(&mut self) -> &mut [u16] {
+        &mut self.transmit
+    }
+    fn response(&mut self) -> &mut [u16] {
+        &mut self.response
+    }
+    fn frame_and_transmit(&mut self) -> (&mut [u8], &[u16]) {
+        (&mut self.frame, &self.transmit)
+    }
+    fn frame_and_response(&mut self) -> (&[u8], &mut [u16]) {
+        (&self.frame, &mut self.response)
+    }
+}
+
+fuzz_target!(|data: &[u8]| {
+    let mut input = Input(data);
+    let input = &mut input;
+    let line = Line {
+        now: u32::from(input.u16()) << 16,
+        script: VecDeque::new(),
+        since: 0,
+        accept: usize::from(input.u8() % 8),
+        writes: 0,
+        flushes: input.u8() % 4,
+        driver: false,
+        sent: Vec::new(),
+        requests: Vec::new(),
+        heard: Vec::new(),
+        lost: false,
+    };
+    let buffers = Buffers {
+        frame: vec![0; 4 + usize::from(input.u8()) % 253],
+        transmit: words(),
+        response: vec![0; 125],
+    };
+    let mut transaction = Transaction::new(line, buffers);
+    let time = |input: &mut Input| u32::from(input.u8()) * 64;
+    transaction.settings = Settings {
+        gap: time(input),
+        silence: time(input),
+        response_timeout: 1000 + 4 * time(input),
+        turnaround_delay: time(input),
+        quiet_time: 2 * time(input),
+        character: u32::from(input.u8()),
+        retries: input.u8() % 3,
+        post_flush_hold: input.u8() % 4,
+        echo_discard: input.u8() & 1 == 1,
+    };
+    for _ in 0..2 {
+        let Some(asked) = Asked::new(input) else {
+            return;
+        };
+        let port = &mut transaction.port;
+        port.since = port.now;
+        for _ in 0..input.u8() % 16 {
+            let delay = u32::from(input.u8()).pow(2) / 2;
+            let next = match event(input, &asked) {
+                Event::Silence if input.u8() == 0xFF => Next::LinkLost,
+                Event::Silence => continue,
+                Event::Bytes(bytes) => Next::Bytes(bytes.into()),
+            };
+            port.script.push_back((delay, next));
+        }
+        let step = 20 + u32::from(input.u8()) * 8;
+        run(&mut transaction, &asked, step);
+    }
+});
+
+fn run(transaction: &mut Transaction<Line, Buffers>, asked: &Asked, step: u32) {
+    transaction.forget();
+    *transaction.request() = asked.query;
+    transaction.port.requests.clear();
+    transaction.port.heard.clear();
+    let started = transaction.start(asked.unit);
+    let fits = asked.frame().len() <= transaction.storage.frame.len();
+    if started != Status::PENDING {
+        let broadcast_read = asked.unit == BROADCAST && asked.data.is_some();
+        assert!(match started {
+            Status::BROADCAST_NOT_ALLOWED => broadcast_read,
+            Status::BUFFER_TOO_SMALL => !fits,
+            _ => false,
+        });
+        return;
+    }
+    assert!(fits);
+    let mut polls = 0;
+    let status = loop {
+        let now = transaction.port.now;
+        let status = transaction.poll(now);
+        if status != Status::PENDING {
+            break status;
+        }
+        // As a program would that does other work, and sleeps for as long as it
+        // may.
+        let time = match transaction.poll_delay(now) {
+            0 => step,
+            delay => delay.min(step),
+        };
+        transaction.port.now = now.wrapping_add(time);
+        polls += 1;
+        assert!(polls < 100_000, "it never ends");
+    };
+    judge(transaction, asked, status);
+}
+
+fn judge(transaction: &mut Transaction<Line, Buffers>, asked: &Asked, status: Status) {
+    let port = &transaction.port;
+    assert!(!port.driver && !transaction.is_pending());
+    let frame = asked.frame();
+    let whole = |sent: &Vec<u8>| *sent == frame;
+    let settings = transaction.settings;
+    assert!(port.requests.len() <= 1 + usize::from(settings.retries));
+    let cut_off = matches!(status, Status::LINE_BUSY | Status::LINK_LOST);
+    match port.requests.split_last() {
+        Some((last, before)) => {
+            assert!(before.iter().all(whole));
+            assert!(whole(last) || (cut_off && frame.starts_with(last)));
+        }
+        None => assert!(cut_off),
+    }
+    let success = status == Status::OK || status.is_exception();
+    assert!(status != Status::LINK_LOST || port.lost);
+    if asked.unit == BROADCAST {
+        assert!(!status.is_exception());
+        return;
+    }
+    let replies = || {
+        (0..port.heard.len()).filter_map(|at| {
+            let rest = &port.heard[at..];
+            let reply = rest.get(..asked.frame_length(rest)?)?;
+            asked.is_answered_by(reply).then_some(reply)
+        })
+    };
+    if !success {
+        assert!((0xE0..=0xEC).contains(&status.code()), "{status:?}");
+        return;
+    }
+    if status.is_exception() {
+        let told = |reply: &[u8]| reply[1] & 0x80 != 0 && reply[2] == status.code();
+        assert!(replies().any(told), "an exception that nobody sent");
+        return;
+    }
+    let right: Vec<Vec<u8>> = replies()
+        .filter(|reply| reply[1] & 0x80 == 0)
+        .map(<[u8]>::to_vec)
+        .collect();
+    assert!(!right.is_empty(), "a success that nobody sent");
+    if asked.data.is_some() {
+        assert!(transaction.take_words());
+        let words = &transaction.storage.response;
+        let brought = |reply: &Vec<u8>| {
+            let data = &reply[3..reply.len() - 2];
+            match asked.bits {
+                None => data
+                    .chunks(2)
+                    .zip(words)
+                    .all(|(bytes, word)| *bytes == word.to_be_bytes()),
+                // The bits beyond those asked for are zero, to the end of the word.
+                Some(quantity) => (0..usize::from(quantity).next_multiple_of(16)).all(|bit| {
+                    let on = bit < usize::from(quantity) && data[bit / 8] >> (bit % 8) & 1 == 1;
+                    (words[bit / 16] >> (bit % 16) & 1 == 1) == on
+                }),
+            }
+        };
+        assert!(right.iter().any(brought), "data that nobody sent");
+    }
+}

@@ -1,0 +1,167 @@
+//! A request of the facade, as mbm builds it and as the standard says that it
+//! looks, and what answers it.
+
+use crate::{be, naive, Input};
+use mbm::error::Status;
+use mbm::pdu::query::Query;
+use mbm::pdu::{bits, registers};
+
+/// A request and its PDU.
+pub struct Asked {
+    pub unit: u8,
+    pub query: Query,
+    pub pdu: Vec<u8>,
+    /// How many bytes of data a response of a read has.
+    pub data: Option<usize>,
+    /// How many bits a read asks for.
+    pub bits: Option<u16>,
+}
+
+/// The words that are sent; pseudo-random, as no code looks at them.
+pub fn words() -> Vec<u16> {
+    (0..125u16)
+        .map(|index| index.wrapping_mul(0x9E37) ^ 0x5A5A)
+        .collect()
+}
+
+type Build = fn(&mut Query, u16, u16) -> Status;
+
+impl Asked {
+    /// The request that an input describes, if it is one within the standard.
+    pub fn new(input: &mut Input) -> Option<Asked> {
+        let (kind, unit) = (input.u8() % 10, input.u8());
+        let (a, b, c, d) = (input.u16(), input.u16(), input.u16(), input.u16());
+        let words = words();
+        let read = |function, most| {
+            let build: Build = match function {
+                1 => bits::read_coils,
+                2 => bits::read_discrete_inputs,
+                3 => registers::read_holding,
+                _ => registers::read_input,
+            };
+            (function, build, 1 + b % most)
+        };
+        let head = |function: u8, words: &[u16]| [vec![function], be(words)].concat();
+        let counted = |head: Vec<u8>, data: Vec<u8>| [head, vec![data.len() as u8], data].concat();
+        let (built, pdu, data) = match kind {
+            0..=3 => {
+                let (function, build, quantity) = read(kind + 1, if kind < 2 { 2000 } else { 125 });
+                let data = match kind {
+                    0 | 1 => usize::from(quantity).div_ceil(8),
+                    _ => 2 * usize::from(quantity),
+                };
+                let pdu = head(function, &[a, quantity]);
+                (Query::build(|q| build(q, a, quantity)), pdu, Some(data))
+            }
+            4 => {
+                let value = if b == 0 { 0 } else { 0xFF00 };
+                let built = Query::build(|q| bits::write_single(q, a, b));
+                (built, head(5, &[a, value]), None)
+            }
+            5 => {
+                let built = Query::build(|q| registers::write_single(q, a, b));
+                (built, head(6, &[a, b]), None)
+            }
+            6 => {
+                let quantity = 1 + b % 1968;
+                let pdu = counted(head(15, &[a, quantity]), naive::coils(&words, quantity));
+                let built = Query::build(|q| bits::write_multiple(q, a, quantity));
+                (built, pdu, None)
+            }
+            7 => {
+                let quantity = 1 + b % 123;
+                let data = be(&words[..quantity.into()]);
+                let built = Query::build(|q| registers::write_multiple(q, a, quantity));
+                (built, counted(head(16, &[a, quantity]), data), None)
+            }
+            8 => {
+                let built = Query::build(|q| registers::mask_write(q, a, b, c));
+                (built, head(22, &[a, b, c]), None)
+            }
+            _ => {
+                let (reads, writes) = (1 + b % 125, 1 + d % 121);
+                let built = Query::build(|q| registers::read_write(q, a, reads, c, writes));
+                let data = be(&words[..writes.into()]);
+                let pdu = counted(head(23, &[a, reads, c, writes]), data);
+                (built, pdu, Some(2 * usize::from(reads)))
+            }
+        };
+        let query = built.ok()?;
+        let bits = (kind < 2).then_some(1 + b % 2000);
+        Some(Asked {
+            unit,
+            bits,
+            query,
+            pdu,
+            data,
+        })
+    }
+
+    /// The function code.
+    pub fn function(&self) -> u8 {
+        self.pdu[0]
+    }
+
+    /// The request's frame.
+    pub fn frame(&self) -> Vec<u8> {
+        naive::with_crc(&[&[self.unit], &self.pdu[..]].concat())
+    }
+
+    /// A right response PDU, with data from the input.
+    pub fn response(&self, input: &mut Input) -> Vec<u8> {
+        match self.data {
+            Some(count) => {
+                let mut pdu = vec![self.function(), count as u8];
+                pdu.extend_from_slice(input.take(count.min(4)));
+                pdu.resize(2 + count, 0x55);
+                pdu
+            }
+            None => self.pdu[..self.repeated()].to_vec(),
+        }
+    }
+
+    /// How many bytes of the request the response of a write repeats.
+    fn repeated(&self) -> usize {
+        if self.function() == 22 {
+            7
+        } else {
+            5
+        }
+    }
+
+    /// How long the frame of a response is that begins with these bytes, or at
+    /// least is; `None` if none begins so.
+    pub fn frame_length(&self, bytes: &[u8]) -> Option<usize> {
+        if *bytes.first()? != self.unit {
+            return None;
+        }
+        let exception = Some(1 + 2 + 2);
+        let Some(function) = bytes.get(1) else {
+            return exception;
+        };
+        if *function == self.function() | 0x80 {
+            return exception;
+        }
+        if *function != self.function() {
+            return None;
+        }
+        match (self.data, bytes.get(2)) {
+            (None, _) => Some(1 + self.repeated() + 2),
+            (Some(_), None) => exception,
+            (Some(data), Some(count)) if usize::from(*count) == data => Some(1 + 2 + data + 2),
+            (Some(_), Some(_)) => None,
+        }
+    }
+
+    /// True for a whole frame that answers the request.
+    pub fn is_answered_by(&self, frame: &[u8]) -> bool {
+        if self.frame_length(frame) != Some(frame.len()) || !naive::has_crc(frame) {
+            return false;
+        }
+        let pdu = &frame[1..frame.len() - 2];
+        if pdu[0] & 0x80 != 0 {
+            return (1..0x80).contains(&pdu[1]);
+        }
+        self.data.is_some() || self.pdu.starts_with(pdu)
+    }
+}

@@ -1,0 +1,67 @@
+//! Checks and framings written down once more, the slow and plain way, from the
+//! serial line guide and not from mbm.
+
+/// The CRC-16, bit by bit, as sent.
+pub fn crc(bytes: &[u8]) -> [u8; 2] {
+    let mut crc = 0xFFFFu16;
+    for byte in bytes {
+        crc ^= u16::from(*byte);
+        for _ in 0..8 {
+            let out = crc & 1;
+            crc >>= 1;
+            if out == 1 {
+                crc ^= 0xA001;
+            }
+        }
+    }
+    crc.to_le_bytes()
+}
+
+/// Bytes with their CRC behind them.
+pub fn with_crc(bytes: &[u8]) -> Vec<u8> {
+    [bytes, &crc(bytes)].concat()
+}
+
+/// True for bytes that end with their CRC.
+pub fn has_crc(frame: &[u8]) -> bool {
+    frame.len() >= 2 && crc(&frame[..frame.len() - 2]) == frame[frame.len() - 2..]
+}
+
+/// Unit and PDU of an ASCII frame that ends with `end`.
+pub fn ascii(frame: &[u8], end: u8) -> Option<Vec<u8>> {
+    let hex = frame.strip_prefix(b":")?.strip_suffix(&[b'\r', end])?;
+    if frame.len() > 513 || !hex.len().is_multiple_of(2) || hex.len() < 6 {
+        return None;
+    }
+    if !hex.iter().all(u8::is_ascii_hexdigit) {
+        return None;
+    }
+    let text = std::str::from_utf8(hex).ok()?;
+    let mut bytes: Vec<u8> = (0..hex.len() / 2)
+        .map(|at| u8::from_str_radix(&text[2 * at..2 * at + 2], 16).expect("two digits"))
+        .collect();
+    let sum: u32 = bytes.iter().copied().map(u32::from).sum();
+    bytes.pop();
+    sum.is_multiple_of(256).then_some(bytes)
+}
+
+/// Transaction, unit and PDU of a TCP frame.
+pub fn tcp(frame: &[u8]) -> Option<(u16, u8, &[u8])> {
+    if !(8..=260).contains(&frame.len()) || frame[2..4] != [0, 0] {
+        return None;
+    }
+    let counted = usize::from(frame[4]) * 256 + usize::from(frame[5]);
+    let transaction = u16::from(frame[0]) * 256 + u16::from(frame[1]);
+    (counted == frame.len() - 6).then(|| (transaction, frame[6], &frame[7..]))
+}
+
+/// Bits as they travel, from words, least significant bit first.
+pub fn coils(words: &[u16], quantity: u16) -> Vec<u8> {
+    let mut bytes = vec![0; usize::from(quantity).div_ceil(8)];
+    for coil in 0..usize::from(quantity) {
+        if words[coil / 16] >> (coil % 16) & 1 == 1 {
+            bytes[coil / 8] |= 1 << (coil % 8);
+        }
+    }
+    bytes
+}

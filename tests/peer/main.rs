@@ -1,0 +1,65 @@
+//! Requests and responses held against pymodbus, in both directions and over
+//! every framing: what libmodbus lacks, and the rest too.
+//!
+//! `make test` makes the Python environment first; alone, `scripts/venv` does.
+
+mod process;
+mod requests;
+mod responses;
+mod served;
+
+use mbm::error::Status;
+use mbm::frame::{ascii, Adu, Framing};
+
+/// The unit and the transaction of every frame.
+const UNIT: u8 = 17;
+const TRANSACTION: u16 = 0x1234;
+
+/// The framings and the peer's names for them.
+const FRAMINGS: [(Framing, &str); 3] = [
+    (Framing::Rtu, "rtu"),
+    (Framing::Ascii, "ascii"),
+    (Framing::Tcp, "tcp"),
+];
+
+/// A frame of the PDU that `pdu` writes.
+fn frame(framing: Framing, pdu: impl FnOnce(&mut [u8]) -> Result<usize, Status>) -> Vec<u8> {
+    let mut buffer = [0; 600];
+    let length = framing
+        .emit(&mut buffer, TRANSACTION, UNIT, ascii::END, pdu)
+        .expect("it fits");
+    buffer[..length].to_vec()
+}
+
+/// What is in a frame, of our unit and transaction.
+fn open(framing: Framing, frame: &mut [u8]) -> Adu<'_> {
+    let adu = framing.parse(frame, ascii::END).expect("a frame");
+    assert_eq!(adu.unit, UNIT);
+    let transaction = if framing == Framing::Tcp {
+        TRANSACTION
+    } else {
+        0
+    };
+    assert_eq!(adu.transaction, transaction);
+    adu
+}
+
+/// How the peer begins what it read in a frame.
+fn read_as(framing: &str, fields: &str) -> String {
+    let transaction = if framing == "tcp" { TRANSACTION } else { 0 };
+    format!("{UNIT} {transaction} {fields}")
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn unhex(digits: &str) -> Vec<u8> {
+    let pairs = digits.as_bytes().chunks(2);
+    pairs
+        .map(|pair| {
+            let pair = std::str::from_utf8(pair).expect("digits");
+            u8::from_str_radix(pair, 16).unwrap_or_else(|_| panic!("no frame: {digits}"))
+        })
+        .collect()
+}

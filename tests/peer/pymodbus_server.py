@@ -1,0 +1,116 @@
+"""A pymodbus server for tests.
+
+    pymodbus_server.py --framing rtu --tty /dev/pts/3
+    pymodbus_server.py --framing tcp --port 0
+
+Prints `ready PORT` once it listens (port 0 for a tty), and serves until its
+standard input ends. Each of the four tables has 2048 cells: holding register A
+is A * 40503 + 0x1234, an input register all bits of that turned around, a coil
+bit 7 of the holding register, a discrete input the opposite. A 0 for the unit
+answers for every unit.
+"""
+
+import argparse
+import asyncio
+import logging
+import sys
+
+from pymodbus import FramerType, ModbusDeviceIdentification
+from pymodbus.pdu import ModbusPDU
+from pymodbus.server import ModbusSerialServer, ModbusTcpServer
+from pymodbus.simulator import DataType, SimData, SimDevice
+
+CELLS = 2048
+FRAMINGS = {
+    "rtu": FramerType.RTU,
+    "ascii": FramerType.ASCII,
+    "tcp": FramerType.SOCKET,
+    "rtu-over-tcp": FramerType.RTU,
+}
+
+
+class Custom(ModbusPDU):
+    """A function of the user, 41: one byte that counts, and what it counts; the
+    response brings the data back in reverse."""
+
+    function_code = 0x41
+    rtu_byte_count_pos = 2
+
+    def __init__(self, data=b"", dev_id=1, transaction_id=0):
+        super().__init__(dev_id=dev_id, transaction_id=transaction_id)
+        self.data = data
+
+    def encode(self):
+        return bytes([len(self.data)]) + self.data
+
+    def decode(self, data):
+        self.data = data[1 : 1 + data[0]]
+
+    async def datastore_update(self, context, device_id):
+        return Custom(self.data[::-1], device_id, self.transaction_id)
+
+
+def device(unit):
+    words = [(cell * 40503 + 0x1234) & 0xFFFF for cell in range(CELLS)]
+    coils = [bool(word >> 7 & 1) for word in words]
+
+    def table(values, datatype):
+        return [SimData(0, values=values, datatype=datatype)]
+
+    return SimDevice(
+        unit,
+        simdata=(
+            table(coils, DataType.BITS),
+            table([not coil for coil in coils], DataType.BITS),
+            table(words, DataType.REGISTERS),
+            table([word ^ 0xFFFF for word in words], DataType.REGISTERS),
+        ),
+    )
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description="A pymodbus server for tests.")
+    parser.add_argument("--framing", choices=FRAMINGS, required=True)
+    where = parser.add_mutually_exclusive_group(required=True)
+    where.add_argument("--tty", help="the device to serve on")
+    where.add_argument("--port", type=int, help="the TCP port to serve on; 0 takes a free one")
+    parser.add_argument("--unit", type=int, default=17)
+    parser.add_argument("--baud", type=int, default=115200)
+    return parser.parse_args()
+
+
+async def main():
+    logging.disable(logging.CRITICAL)
+    args = arguments()
+    identity = ModbusDeviceIdentification(
+        info_name={
+            "VendorName": "Vendor",
+            "ProductCode": "PC",
+            "MajorMinorRevision": "V2.11",
+            "VendorUrl": "example.org",
+        }
+    )
+    common = {
+        "framer": FRAMINGS[args.framing],
+        "identity": identity,
+        "ignore_missing_devices": args.framing != "tcp",
+        "broadcast_enable": args.framing in ("rtu", "ascii"),
+        "custom_pdu": [Custom],
+    }
+    if args.tty:
+        server = ModbusSerialServer(
+            device(args.unit), port=args.tty, baudrate=args.baud, **common
+        )
+    else:
+        server = ModbusTcpServer(
+            device(args.unit), address=("127.0.0.1", args.port), **common
+        )
+    await server.serve_forever(background=True)
+    port = 0 if args.tty else server.transport.sockets[0].getsockname()[1]
+    print(f"ready {port}", flush=True)
+    # Who started it holds the other end.
+    await asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
+    await server.shutdown()
+
+
+asyncio.run(main())
