@@ -1141,6 +1141,10 @@ typedef struct mbm_cells {
      * As in mbm_registerTable.
      */
     void (*after)(void *context, uint16_t address, uint16_t quantity);
+    /**
+     * Not for you.
+     */
+    uint8_t kind;
 } mbm_cells;
 
 /**
