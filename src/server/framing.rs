@@ -77,22 +77,12 @@ impl<P: Port, B: Lent> Server<P, B> {
         self.set_silence(u32::MAX);
     }
 
-    /// Receives, and takes the bytes into the CRC.
-    fn hear_rtu(&mut self, until: usize) -> i16 {
-        let start = usize::from(self.end);
-        let heard = self.hear(until);
-        if let Some(news) = self.lent.frame().get(start..usize::from(self.end)) {
-            self.crc = self.crc.with(news);
-        }
-        heard
-    }
-
     /// A frame is what stands between two silences. Where there was silence that
     /// nobody saw, for poll came late, the last frame counts: one of ours that
     /// is followed by another is no longer waited for.
     fn receive_rtu(&mut self) -> Status {
         self.make_room();
-        let heard = self.hear_rtu(usize::MAX);
+        let heard = self.hear(usize::MAX);
         if heard < 0 {
             return Status::LINK_LOST;
         }
@@ -160,7 +150,7 @@ impl<P: Port, B: Lent> Server<P, B> {
                 _ => usize::MAX,
             };
             self.make_room();
-            let heard = self.hear_rtu(until);
+            let heard = self.hear(until);
             if heard < 0 {
                 return Status::LINK_LOST;
             }

@@ -181,7 +181,7 @@ impl<P: Port, B: Lent> Server<P, B> {
         Status::MALFORMED_FRAME
     }
 
-    /// Receives up to the place `until` of the buffer: how many bytes, negative
+    /// Receives up to the place `until` of the buffer, into the CRC too: how many bytes, negative
     /// if the link is lost.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn hear(&mut self, until: usize) -> i16 {
@@ -195,6 +195,9 @@ impl<P: Port, B: Lent> Server<P, B> {
         }
         let heard = self.port.read(room);
         if heard > 0 {
+            if let Some(news) = room.get(..heard as usize) {
+                self.crc = self.crc.with(news);
+            }
             self.end += heard as u16;
             self.last_byte = self.now;
         }
@@ -261,7 +264,11 @@ impl<P: Port, B: Lent> Server<P, B> {
         if self.request.again {
             return false;
         }
-        let length = reply.settle(self.pdu());
+        let head = usize::from(self.request.head);
+        let Some(pdu) = self.lent.frame().get_mut(head..) else {
+            return true;
+        };
+        let length = reply.settle(pdu);
         match self.seal {
             Some(seal) if length != 0 => {
                 self.end = seal(self, length) as u16;
