@@ -90,6 +90,7 @@ static void an_object_that_was_never_begun_is_told(void **state)
     IS(MBM_NOT_INITIALISED, mbm_server_poll(&server));
     IS(MBM_NOT_INITIALISED, mbm_server_setSilence(&server, 1));
     IS(MBM_NOT_INITIALISED, mbm_server_setBaudRate(&server, 9600));
+    IS(MBM_NOT_INITIALISED, mbm_server_setEchoDiscard(&server, 1));
     assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFFu);
 }
 

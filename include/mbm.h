@@ -3160,6 +3160,18 @@ uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t microseconds);
 uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
 
 /**
+ * Tells that the receiver of an RTU line hears what the driver sends, so that as
+ * many bytes as were sent are dropped behind each response. mbm_server_begin
+ * sets it back.
+ *
+ * @param server  the object
+ * @param on      0 (at first) or 1
+ * @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings, or
+ *         MBM_NOT_INITIALISED
+ */
+uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
+
+/**
  * Serves cells that your functions hold.
  *
  * @param unit   the unit

@@ -1,6 +1,6 @@
 //! How each framing finds a request in what arrives, and seals a response.
 
-use super::line::{Lent, Server};
+use super::line::{Lent, Receive, Server};
 use crate::error::Status;
 use crate::frame::checksum::crc16;
 use crate::frame::{ascii, rtu, tcp};
@@ -90,6 +90,41 @@ impl<P: Port, B: Lent> Server<P, B> {
             return Status::OK;
         }
         self.last_frame()
+    }
+
+    /// Says whether the receiver hears what the driver sends, so that as many
+    /// bytes as were sent are dropped behind each response; false if this is no
+    /// RTU line. (A function of its own, so that only who calls it carries it.)
+    pub fn set_echo_discard(&mut self, on: bool) -> bool {
+        let plain: Receive<P, B> = Self::receive_rtu;
+        let echoing: Receive<P, B> = Self::receive_behind_echo;
+        let is_rtu = self.receive.is_some_and(|receive| {
+            core::ptr::fn_addr_eq(receive, plain) || core::ptr::fn_addr_eq(receive, echoing)
+        });
+        if is_rtu {
+            self.receive = Some(if on { echoing } else { plain });
+            self.sent = 0;
+        }
+        is_rtu
+    }
+
+    /// As [`Server::receive_rtu`], once our own echo has passed, or the line been
+    /// silent without one.
+    fn receive_behind_echo(&mut self) -> Status {
+        if self.sent == 0 {
+            return self.receive_rtu();
+        }
+        let heard = self.hear(usize::from(self.sent));
+        if heard < 0 {
+            return Status::LINK_LOST;
+        }
+        if heard > 0 {
+            self.sent -= heard as u16;
+            self.listen();
+        } else if self.is_silent() {
+            self.sent = 0;
+        }
+        Status::OK
     }
 
     /// Gives up the oldest bytes of a full buffer, unless it ends with a frame.

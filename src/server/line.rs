@@ -75,15 +75,15 @@ pub struct Server<P, B> {
     pub(super) crc: Crc16,
     /// Where in the buffer ends what arrived, or what is to be sent.
     pub(super) end: u16,
-    /// What of the response was sent.
-    sent: u16,
+    /// What of the response was sent; of that, what may still come back.
+    pub(super) sent: u16,
     /// The request that was found last.
     pub request: Heading,
     last_byte: u32,
     now: u32,
     /// The silence that ends a frame.
     silence: u32,
-    receive: Option<Receive<P, B>>,
+    pub(super) receive: Option<Receive<P, B>>,
     seal: Option<Seal<P, B>>,
     /// What the caller lends.
     pub lent: B,
@@ -305,13 +305,9 @@ impl<P: Port, B: Lent> Server<P, B> {
     fn flush(&mut self) -> Status {
         if self.port.flush() {
             self.port.post_transmission();
-            // What a serial line brought meanwhile is an echo of ours.
-            loop {
-                self.listen();
-                if !self.request.serial || self.hear(usize::MAX) <= 0 {
-                    break;
-                }
-            }
+            // An echo, where one is waited for, comes from here on.
+            self.last_byte = self.now;
+            self.listen();
         }
         Status::OK
     }

@@ -10,8 +10,7 @@ use crate::pdu::{bits, files, registers};
 pub struct Heading {
     /// The unit that it is for.
     pub to: u8,
-    /// On a serial line: unit 0 is broadcast, and what arrives while we send is
-    /// an echo.
+    /// On a serial line: unit 0 is broadcast.
     pub serial: bool,
     /// Bytes are missing at its front: the buffer could not hold them.
     pub overrun: bool,
