@@ -409,6 +409,67 @@
 #define MBM_REPLY_PENDING 768
 
 /**
+ * A request.
+ */
+#define MBM_EVENT_REQUEST 0
+
+/**
+ * The reply to a request.
+ */
+#define MBM_EVENT_REPLY 1
+
+/**
+ * The exception that answers a request.
+ */
+#define MBM_EVENT_EXCEPTION 2
+
+/**
+ * A reply or exception to no request that waits for one: a late one, one whose
+ * request was not seen, or one that does not answer what was asked.
+ */
+#define MBM_EVENT_UNPAIRED 3
+
+/**
+ * A request that nobody answered within the timeout, or before the next request.
+ */
+#define MBM_EVENT_TIMEOUT 4
+
+/**
+ * What looks like a frame, but has a wrong CRC or LRC, or too few bytes.
+ */
+#define MBM_EVENT_BAD_CRC 5
+
+/**
+ * Bytes that are no frame.
+ */
+#define MBM_EVENT_NOISE 6
+
+/**
+ * Heard on a line that carries both directions.
+ */
+#define MBM_TAP_BOTH 0
+
+/**
+ * Heard where only the client sends.
+ */
+#define MBM_TAP_CLIENT 1
+
+/**
+ * Heard where only servers send.
+ */
+#define MBM_TAP_SERVER 2
+
+/**
+ * Least bytes of a sniffer's buffer.
+ */
+#define MBM_MIN_SNIFFER_BUFFER 32
+
+/**
+ * Most functions of your own that a sniffer takes.
+ */
+#define MBM_MAX_SNIFFER_FUNCTIONS 19
+
+/**
  * The call succeeded.
  */
 #define MBM_OK 0
@@ -1477,6 +1538,106 @@ typedef struct mbm_registerTable {
      */
     uint8_t kind;
 } mbm_registerTable;
+
+/**
+ * A sniffer: finds the frames on a bus that others use, and pairs requests with
+ * replies. It only listens, and has no port: you feed it what you hear.
+ *
+ * Storage is yours and must be zero before first use, which a static object is.
+ * Everything but mbm_sniffer_begin wants that before. Not re-entrant: use one
+ * object from one thread and never from an interrupt; put an mbm_ring between.
+ */
+typedef struct mbm_sniffer {
+    /**
+     * Not for you.
+     */
+    void *pointers[1];
+    /**
+     * Not for you.
+     */
+    uint32_t words[164];
+} mbm_sniffer;
+
+/**
+ * Something that happened on the bus.
+ *
+ * What it points to lies in the sniffer's buffer, and is valid until the next
+ * call with that sniffer.
+ */
+typedef struct mbm_event {
+    /**
+     * The frame; of noise the bytes. An ASCII frame is decoded: unit, PDU, LRC.
+     */
+    const uint8_t *frame;
+    /**
+     * The PDU in the frame; NULL if there is none.
+     */
+    const uint8_t *pdu;
+    /**
+     * What the PDU says, as mbm_packet_parse tells it. If it cannot be read, of a
+     * timeout and of what is no frame: kind, unit, transaction and function alone.
+     */
+    struct mbm_packet packet;
+    /**
+     * When its last byte arrived, in microseconds; of a timeout when the request
+     * was given up.
+     */
+    uint32_t time;
+    /**
+     * From the last byte of the request to the last byte of its reply, or until it
+     * was given up, in microseconds; else 0.
+     */
+    uint32_t responseTime;
+    /**
+     * Bytes of `frame`.
+     */
+    uint16_t frameLength;
+    /**
+     * Bytes of `pdu`.
+     */
+    uint16_t pduLength;
+    /**
+     * How many bytes on the line this was.
+     */
+    uint16_t length;
+    /**
+     * What this is about, also of a reply that does not say so itself: the first
+     * coil, input or register of the request; 17: that is read.
+     */
+    uint16_t address;
+    /**
+     * How many; 17: that are read.
+     */
+    uint16_t quantity;
+    /**
+     * One of MBM_EVENT_.
+     */
+    uint8_t kind;
+    /**
+     * MBM_OK; of a request the exception that a server answers to it; the code of
+     * an exception; MBM_MALFORMED_REPLY if a reply does not answer what was asked;
+     * MBM_RESPONSE_TIMED_OUT; MBM_INVALID_CRC; MBM_BUFFER_TOO_SMALL of noise that
+     * may have been a frame longer than the buffer.
+     */
+    uint8_t status;
+    /**
+     * The unit that is asked, or answers; of a bad CRC the byte in its place.
+     */
+    uint8_t unit;
+    /**
+     * The function code, of an exception that of the request; of a bad CRC the
+     * byte in its place.
+     */
+    uint8_t function;
+    /**
+     * The first bytes of the request's PDU, of replies and timeouts.
+     */
+    uint8_t asked[9];
+    /**
+     * How many those are; 0 if the request is not known.
+     */
+    uint8_t askedLength;
+} mbm_event;
 
 #ifdef __cplusplus
 extern "C" {
@@ -3355,6 +3516,95 @@ uint8_t mbm_server_serveInputRegisters(struct mbm_unit *unit,
 uint8_t mbm_server_serveMaskAndReadWrite(struct mbm_registerTable *table);
 
 /**
+ * Begins to listen. May be called again: what was heard is forgotten, and the
+ * settings are as at first.
+ *
+ * @param sniffer  the object
+ * @param framing  how frames look; copied
+ * @param buffer   where bytes are kept until they are understood; yours, valid
+ *                 for as long as the sniffer is used
+ * @param size     its bytes, MBM_MIN_SNIFFER_BUFFER or more. MBM_MAX_FRAME hold
+ *                 any RTU frame, MBM_MAX_TCP_FRAME any of TCP,
+ *                 MBM_MAX_ASCII_FRAME any of ASCII; twice as many where the
+ *                 directions are heard apart. A longer frame is told of as noise
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also for more than
+ *         MBM_MAX_SNIFFER_FUNCTIONS functions
+ */
+uint8_t mbm_sniffer_begin(struct mbm_sniffer *sniffer,
+                          const struct mbm_framing *framing,
+                          uint8_t *buffer,
+                          uint16_t size);
+
+/**
+ * Tells the rate of a serial line, from which follow the silence between RTU
+ * frames, and when each of several bytes that are fed at once arrived. At first
+ * it is untold: 4 ms of silence, and what is fed at once arrived at once.
+ *
+ * @param sniffer  the object
+ * @param baud     bits per second; 0 is untold
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_sniffer_setBaudRate(struct mbm_sniffer *sniffer, uint32_t baud);
+
+/**
+ * Sets how long a request may stay unanswered before that is told; 1000 ms at
+ * first. On a serial line the next request ends it too. A longer time than the
+ * master's own pairs late replies.
+ *
+ * @param sniffer       the object
+ * @param milliseconds  1 to 65535
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_sniffer_setTimeout(struct mbm_sniffer *sniffer, uint16_t milliseconds);
+
+/**
+ * Sets how long the rest of a frame that has begun is waited for: how coarse
+ * your time stamps are. At first 50 ms in RTU, which a USB adapter needs, and
+ * 1000 ms in ASCII and TCP.
+ *
+ * @param sniffer       the object
+ * @param milliseconds  1 to 65535
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_sniffer_setPatience(struct mbm_sniffer *sniffer, uint16_t milliseconds);
+
+/**
+ * Takes bytes that were heard. Call mbm_sniffer_next until there is nothing
+ * more, then feed the rest, if not all were taken, with the same time: nothing
+ * is lost.
+ *
+ * @param sniffer  the object
+ * @param tap      MBM_TAP_BOTH, or where the directions are heard apart
+ *                 MBM_TAP_CLIENT or MBM_TAP_SERVER. Do not mix them: at a change
+ *                 what is not told of is forgotten
+ * @param bytes    what was heard; NULL only with length 0
+ * @param length   how many
+ * @param now      when the last of them arrived, in microseconds; may wrap
+ * @return how many were taken; 0 also if the sniffer was never begun
+ */
+uint16_t mbm_sniffer_feed(struct mbm_sniffer *sniffer,
+                          uint8_t tap,
+                          const uint8_t *bytes,
+                          uint16_t length,
+                          uint32_t now);
+
+/**
+ * Tells what happened next on the bus, in the order of time. Call it after each
+ * feed until there is nothing more, and now and then while nothing is heard (at
+ * least every half hour): silence ends frames, and requests time out.
+ *
+ * @param sniffer  the object
+ * @param now      the time, in microseconds
+ * @param event    receives what happened; valid until the next call with this
+ *                 sniffer
+ * @return 1 if there is an event, 0 if nothing more is known yet, or the sniffer
+ *         was never begun
+ */
+uint8_t mbm_sniffer_next(struct mbm_sniffer *sniffer,
+                         uint32_t now,
+                         struct mbm_event *event);
+
+/**
  * Explains a status in a few words of English.
  *
  * Any thread or interrupt may call it.
@@ -3363,6 +3613,42 @@ uint8_t mbm_server_serveMaskAndReadWrite(struct mbm_registerTable *table);
  * @return a constant string, never NULL
  */
 const char *mbm_statusText(uint8_t status);
+
+/**
+ * Explains a frame in one line of words, for example
+ * "unit 17  request    03 read holding registers  107..109", or
+ * "bad CRC, 8 bytes" if it is damaged.
+ *
+ * Any thread or interrupt may call it. For ASCII it takes 600 bytes of stack.
+ *
+ * @param framing      how frames look
+ * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
+ *                     and exceptions
+ * @param frame        the frame, from its first byte to its last
+ * @param frameLength  its bytes
+ * @param text         receives the line, which a zero byte ends in any case
+ * @param size         bytes of `text`; 200 do for most frames, 1200 for all
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL: the line is cut; MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_frame_text(const struct mbm_framing *framing,
+                       uint8_t kind,
+                       const uint8_t *frame,
+                       uint16_t frameLength,
+                       char *text,
+                       uint16_t size);
+
+/**
+ * Explains an event in one line of words, for example
+ * "unit 17  reply      03 read holding registers  107..109: 555 0 100".
+ *
+ * Any thread may call it while the event is valid.
+ *
+ * @param event  what mbm_sniffer_next gave
+ * @param text   receives the line, which a zero byte ends in any case
+ * @param size   bytes of `text`; 200 do for most events, 2400 for all
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL: the line is cut; MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_event_text(const struct mbm_event *event, char *text, uint16_t size);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -26,7 +26,7 @@ fn probes() -> Vec<(String, u64)> {
             mbm_length mbm_packet mbm_record mbm_object mbm_framing mbm_server mbm_unit
             mbm_service mbm_registerTable mbm_bitTable mbm_cells mbm_file mbm_files mbm_fifo
             mbm_fifos mbm_exceptionStatus mbm_serverId mbm_identification mbm_request mbm_custom
-            mbm_switches mbm_diagnostics;
+            mbm_switches mbm_diagnostics mbm_sniffer mbm_event;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
             mbm_counters { requests replies exceptions badCrc timeouts foreignFrames
@@ -59,7 +59,9 @@ fn probes() -> Vec<(String, u64)> {
             mbm_switches { service off }
             mbm_diagnostics { service restart context diagnosticRegister busMessages
                 busCommunicationErrors exceptionErrors serverMessages noResponses naks busy
-                characterOverruns events listenOnly hidden };
+                characterOverruns events listenOnly hidden }
+            mbm_event { frame pdu packet time responseTime frameLength pduLength length address
+                quantity kind status unit function asked askedLength };
         constants:
             MBM_OK MBM_ILLEGAL_FUNCTION MBM_ILLEGAL_DATA_ADDRESS MBM_ILLEGAL_DATA_VALUE
             MBM_SLAVE_DEVICE_FAILURE MBM_ACKNOWLEDGE MBM_SLAVE_DEVICE_BUSY
@@ -94,7 +96,9 @@ fn probes() -> Vec<(String, u64)> {
             MBM_FRAMING_RTU_OVER_TCP MBM_MAX_TCP_FRAME MBM_MAX_ASCII_FRAME MBM_ORDER_DEFAULT
             MBM_ORDER_ABCD MBM_ORDER_CDAB MBM_ORDER_BADC MBM_ORDER_DCBA MBM_REGISTERS_OF_WORDS
             MBM_REGISTERS_OF_BYTES MBM_REGISTERS_INTO_WORDS MBM_REGISTERS_INTO_BYTES
-            MBM_REPLY_EXCEPTION MBM_REPLY_NONE MBM_REPLY_PENDING;
+            MBM_REPLY_EXCEPTION MBM_REPLY_NONE MBM_REPLY_PENDING MBM_EVENT_REQUEST MBM_EVENT_REPLY MBM_EVENT_EXCEPTION
+            MBM_EVENT_UNPAIRED MBM_EVENT_TIMEOUT MBM_EVENT_BAD_CRC MBM_EVENT_NOISE MBM_TAP_BOTH
+            MBM_TAP_CLIENT MBM_TAP_SERVER MBM_MIN_SNIFFER_BUFFER MBM_MAX_SNIFFER_FUNCTIONS;
     }
 }
 

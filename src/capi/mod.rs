@@ -25,8 +25,10 @@ mod port;
 mod registers;
 mod ring;
 mod server;
+mod sniffer;
 mod status;
 mod storage;
+mod text;
 
 pub use bits::*;
 pub use frame::*;
@@ -38,8 +40,10 @@ pub use port::*;
 pub use registers::*;
 pub use ring::*;
 pub use server::*;
+pub use sniffer::*;
 pub use status::*;
 pub use storage::*;
+pub use text::*;
 
 /// There is no way back from a panic on a microcontroller. The check of the
 /// linked image proves that nothing comes here.
