@@ -5,7 +5,6 @@ mod common;
 use common::device::{ask, Device};
 use mbm::frame::Framing;
 use mbm::server::respond::respond;
-use mbm::server::storage::{HoldingRegisters, Words};
 use mbm::server::Service;
 
 /// Asks a device of ten registers and 20 bits of each kind, from address 100 on.
