@@ -3,7 +3,7 @@
 //! Data flows one way, and a module uses only what stands to its left:
 //!
 //! ```text
-//! bytes -> frame -> pdu -> packet -> explain -> {sniffer, transaction} -> {master, server} -> capi
+//! bytes -> frame -> pdu -> packet -> explain -> {sniffer, transaction} -> {master, client, server} -> capi
 //! ```
 //!
 //! `error`, `time`, `port`, `ring` and `data` stand beside that line and may be used
@@ -46,6 +46,8 @@ pub mod sniffer;
 /// cbindgen:ignore
 pub mod transaction;
 
+/// cbindgen:ignore
+pub mod client;
 /// cbindgen:ignore
 pub mod master;
 /// cbindgen:ignore

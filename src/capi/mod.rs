@@ -15,6 +15,8 @@
 #![allow(clippy::missing_safety_doc)]
 
 mod bits;
+mod client;
+mod client_pointers;
 mod frame;
 mod functions;
 mod limits;
@@ -31,6 +33,7 @@ mod storage;
 mod text;
 
 pub use bits::*;
+pub use client::*;
 pub use frame::*;
 pub use functions::*;
 pub use limits::*;

@@ -39,7 +39,6 @@ pub struct mbm_port {
 }
 
 impl mbm_port {
-    // Inlined, as it was when the master alone asked: not a byte more for that.
     #[inline(always)]
     pub(super) fn is_complete(&self) -> bool {
         self.read.is_some() && self.write.is_some() && self.micros.is_some()

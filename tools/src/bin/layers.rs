@@ -16,7 +16,7 @@ const LAYERS: [&[&str]; 10] = [
     &["packet"],
     &["explain"],
     &["sniffer", "transaction"],
-    &["master", "server"],
+    &["master", "client", "server"],
     &["capi"],
 ];
 
