@@ -277,7 +277,7 @@ fn a_response_of_unknown_length_may_be_as_long_as_a_frame() {
     for length in 250..=253 {
         let (end, mut client) = client::<rtu::Window>();
         let build: fn(&mut Outline) -> Status = |o| o.custom(0x43, 0, Rule::Silence);
-        assert!(client.queue(Task::new(17, 1, &[], &build)).is_ok());
+        assert!(client.queue(Task::new(17, 1, &[], build)).is_ok());
         sent(&end, &mut client);
         let mut response = vec![0x5A; length];
         response[0] = 0x43;
