@@ -1,46 +1,41 @@
-/* libmodbus servers for scripts: unit 17 behind a terminal, and any unit over TCP.
- * Prints `ready PATH PORT` and serves until its standard input ends. */
-#include "pty.h"
-#include "server.h"
-#include "tcp_server.h"
+/* Serves everything that support/served.h has, for peers of another house:
+ *
+ *     serve rtu | ascii | tcp | rtu-over-tcp
+ *
+ * Prints `ready PATH` or `ready PORT`, and serves until its input ends. */
+#include "served.h"
 
-#include <poll.h>
 #include <stdio.h>
+#include <string.h>
 #include <unistd.h>
 
-static void copy(int from, int to)
+static served device;
+
+int main(int argc, char **argv)
 {
-    char bytes[512];
-    ssize_t count = read(from, bytes, sizeof bytes);
+    static const char *const names[] = {"rtu", "ascii", "tcp", "rtu-over-tcp"};
+    static const int framings[] = {MBM_FRAMING_RTU, MBM_FRAMING_ASCII, MBM_FRAMING_TCP,
+                                   MBM_FRAMING_RTU_OVER_TCP};
+    unsigned i = 0;
+    char byte;
 
-    if (count > 0 && write(to, bytes, (size_t)count) != count)
-        perror("serve");
-}
-
-int main(void)
-{
-    static server rtu;
-    static tcp_server tcp;
-    pty line; /* what a client opens; the server's own has one end only with a name */
-
-    server_start(&rtu, 17);
-    tcp_server_start(&tcp);
-    pty_open(&line);
-    printf("ready %s %u\n", line.path, tcp.port);
-    fflush(stdout);
-    for (;;) {
-        struct pollfd waits[] = {{0, POLLIN, 0}, {line.ours, POLLIN, 0}, {rtu.line.ours, POLLIN, 0}};
-
-        poll(waits, 3, -1);
-        if (waits[0].revents)
-            break;
-        if (waits[1].revents & POLLIN)
-            copy(line.ours, rtu.line.ours);
-        if (waits[2].revents & POLLIN)
-            copy(rtu.line.ours, line.ours);
+    while (argc == 2 && i < 4 && strcmp(argv[1], names[i]) != 0)
+        i++;
+    if (argc != 2 || i == 4) {
+        fprintf(stderr, "usage: %s rtu | ascii | tcp | rtu-over-tcp\n", argv[0]);
+        return 2;
     }
-    pty_close(&line);
-    tcp_server_stop(&tcp);
-    server_stop(&rtu);
+    served_prepare(&device);
+    if (i < 2) {
+        served_on_line(&device, framings[i]);
+        printf("ready %s\n", device.line.path);
+    } else {
+        served_on_tcp(&device, framings[i]);
+        printf("ready %d\n", device.port);
+    }
+    fflush(stdout);
+    while (read(STDIN_FILENO, &byte, 1) > 0)
+        ;
+    served_stop(&device);
     return 0;
 }
