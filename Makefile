@@ -126,6 +126,9 @@ $(eval $(call variant,bench,gcc,g++,-O2))
 BENCH := $(BUILD)/bench/bench
 $(BENCH): $(patsubst %,$(BUILD)/bench/%.o,bench support/pty support/server linux/mbm_tty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
+BENCH_CLIENT := $(BUILD)/bench/bench_client
+$(BENCH_CLIENT): $(patsubst %,$(BUILD)/bench/%.o,bench_client support/pty support/server linux/mbm_tty linux/mbm_tcp) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
 
 .PHONY: bench
 bench: ## Speed and instructions beside libmodbus and rmodbus; writes docs/speed.md

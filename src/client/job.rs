@@ -104,6 +104,13 @@ pub trait Job {
     /// indices below [`Ticket::capacity`] only.
     fn put(&mut self, index: usize, byte: u8);
 
+    /// Takes all of the response's data, from the first byte on.
+    fn put_all(&mut self, bytes: &[u8]) {
+        for (index, byte) in bytes.iter().enumerate() {
+            self.put(index, *byte);
+        }
+    }
+
     /// True if the response's data are wanted at all.
     fn wants_data(&self) -> bool {
         true
@@ -123,9 +130,7 @@ pub(super) fn deliver<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
     }
     let mask = ticket.outline.mask();
     job.ticket_mut().length = data.len() as u8;
-    for (index, byte) in data.iter().enumerate() {
-        job.put(index, *byte);
-    }
+    job.put_all(data);
     // The bits behind the last one are zero.
     if let (Some(last), true) = (data.last(), mask != 0xFF) {
         job.put(data.len() - 1, *last & mask);

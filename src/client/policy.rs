@@ -1,5 +1,9 @@
 //! When a request is asked again that was not answered.
 
+use super::job::{Stage, Ticket};
+use super::units::Means;
+use crate::error::Status;
+
 /// How the wait grows from one retry to the next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
@@ -76,6 +80,28 @@ impl Policy {
             Some(grow) => grow(self, retry, random()),
             None => 0,
         }
+    }
+
+    /// What becomes of a request that ended with `status`: true if it has ended for
+    /// good, false if it waits to be asked again.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn ends(
+        &self,
+        ticket: &mut Ticket,
+        status: Status,
+        now: u32,
+        means: &mut impl Means,
+    ) -> bool {
+        let again = ticket.retries < self.retries && status.may_be_repeated();
+        means.note(ticket.unit, status, again, now);
+        if again {
+            ticket.retries += 1;
+            let wait = self.wait(ticket.retries, || means.random());
+            ticket.enter(Stage::Queued, now, wait);
+        } else {
+            ticket.status = status;
+        }
+        !again
     }
 
     fn grown(&self, retry: u8, random: u32) -> u32 {

@@ -86,10 +86,12 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         _: bool,
     ) -> Option<J> {
         let started = if !self.engine.is_pending() {
-            let job = shared.take_due(now, self.engine.storage.units(), |_| true)?;
+            let at = shared.due(now, &mut self.engine.storage, |_| true)?;
+            let job = shared.queue.get(at)?;
             if job.ticket().is(Stage::Lost) {
-                return shared.end(job, Status::LINK_LOST, now, &mut self.engine.storage);
+                return shared.end(at, Status::LINK_LOST, now, &mut self.engine.storage);
             }
+            let job = shared.remove(at)?;
             let unit = job.ticket().unit;
             self.engine.forget();
             self.engine.request().job = Some(job);
@@ -111,7 +113,9 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         } else {
             shared.connected = true;
         }
-        shared.end(job, status, now, &mut self.engine.storage)
+        // There is room: it came out of the queue, and was counted as if in it.
+        shared.put_first(job);
+        shared.end(0, status, now, &mut self.engine.storage)
     }
 
     fn withdraw(&mut self, is: impl FnOnce(&J) -> bool) -> Option<J> {
@@ -126,7 +130,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         self.engine.cancel();
         if let Some(mut job) = self.engine.request().job.take() {
             job.ticket_mut().enter(Stage::Lost, 0, 0);
-            let _ = shared.queue.push_front(job);
+            shared.put_first(job);
             shared.look = true;
         }
     }

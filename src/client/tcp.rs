@@ -127,8 +127,8 @@ impl<P: Port, S: Means> Tcp<P, S> {
                 }
             };
             let (arrived, room) = (rest.len(), self.means.frame().len());
-            let known = shared.queue.iter().any(|job| answers(job, &header));
-            if !known && self.astray {
+            let place = shared.place(|job| answers(job, &header));
+            if place.is_none() && self.astray {
                 self.start += 1;
                 continue;
             }
@@ -139,20 +139,18 @@ impl<P: Port, S: Means> Tcp<P, S> {
             let end = usize::from(self.start) + header.total;
             // What does not fit is passed over as it arrives.
             self.skip = header.total as u16;
-            if !known {
+            let Some(at) = place else {
                 self.means.count(Counter::ForeignFrames, 1);
                 self.note(shared, &header);
                 continue;
-            }
-            let mut job = shared.take(|job| answers(job, &header))?;
+            };
             let status = match self.means.frame().get(begin..end) {
-                Some(pdu) => judge(&mut job, pdu),
+                Some(pdu) => judge(shared.queue.get_mut(at)?, pdu),
                 None => Status::BUFFER_TOO_SMALL,
             };
             if self.astray && status.is_failure() && status != Status::BUFFER_TOO_SMALL {
                 // It only looked like that.
                 self.skip = 1;
-                let _ = shared.queue.push_front(job);
                 continue;
             }
             self.astray = false;
@@ -164,7 +162,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
                     self.means.count(Counter::Exceptions, 1);
                 }
             }
-            if let Some(job) = shared.end(job, status, now, &mut self.means) {
+            if let Some(job) = shared.end(at, status, now, &mut self.means) {
                 return Some(job);
             }
         }
@@ -261,8 +259,8 @@ impl<P: Port, S: Means> Tcp<P, S> {
     fn lose<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>, now: u32) -> Option<J> {
         self.clear();
         shared.lose();
-        let job = shared.take_due(now, &mut [], |_| true)?;
-        shared.end(job, Status::LINK_LOST, now, &mut self.means)
+        let at = shared.due(now, &mut self.means, |_| true)?;
+        shared.end(at, Status::LINK_LOST, now, &mut self.means)
     }
 }
 
@@ -340,7 +338,7 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
             let filled = usize::from(self.filled) + tcp::PDU;
             let room = self.means.outgoing().len();
             let mut blocked = false;
-            let due = shared.take_due(now, self.means.units(), |job| {
+            let due = shared.due(now, &mut self.means, |job| {
                 let ticket = job.ticket();
                 let length = filled + usize::from(ticket.outline.request_length());
                 let fits = length <= room || filled == tcp::PDU;
@@ -349,21 +347,18 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
                 accepted
             });
             self.blocked = blocked;
-            let Some(mut job) = due else {
+            let Some(at) = due else {
                 break;
             };
+            let job = shared.queue.get_mut(at)?;
             let status = if job.ticket().is(Stage::Queued) {
-                match self.encode(&mut job, now) {
-                    Ok(()) => {
-                        let _ = shared.queue.push_back(job);
-                        continue;
-                    }
+                match self.encode(job, now) {
+                    Ok(()) => continue,
                     Err(refused) => refused,
                 }
             } else if job.ticket().is_sent() {
                 if self.start < self.end {
                     // What began to arrive may hide the response.
-                    let _ = shared.queue.push_front(job);
                     self.stray();
                     match self.dispatch(shared, now) {
                         Some(job) => return Some(job),
@@ -371,11 +366,11 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
                     }
                 }
                 self.flying = self.flying.saturating_sub(1);
-                self.overdue(&job)
+                self.overdue(job)
             } else {
                 Status::LINK_LOST
             };
-            if let Some(job) = shared.end(job, status, now, &mut self.means) {
+            if let Some(job) = shared.end(at, status, now, &mut self.means) {
                 return Some(job);
             }
         }

@@ -51,7 +51,10 @@ unsafe fn begin_serial<W: Search + 'static>(
     frame_bytes: u16,
     broadcasts: bool,
     silence: Option<u32>,
-) -> u8 {
+) -> u8
+where
+    Serial<mbm_port, LentByC, Lent, W>: Kind,
+{
     // SAFETY: as the header demands.
     unsafe {
         let status = begin::<Serial<mbm_port, LentByC, Lent, W>>(pointer, port, frame, frame_bytes);

@@ -1,8 +1,8 @@
 //! How a client behaves.
 
-use super::{mbm_client, pointers, Parts};
+use super::{mbm_client, parts, pointers, Parts};
 use crate::capi::storage::mbm_counters;
-use crate::client::{Backoff, Unit};
+use crate::client::{note, rest, Backoff, Unit};
 use crate::error::Status;
 use crate::time::{self, millis};
 use core::ffi::c_void;
@@ -64,7 +64,7 @@ const _: () = {
 #[cfg_attr(target_os = "none", inline(always))]
 unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> Status) -> u8 {
     // SAFETY: as the caller promises.
-    unsafe { pointers::with(client, |object| change((object.calls().parts)(object))) }
+    unsafe { pointers::with(client, |object| change(parts(object))) }
 }
 
 /// Sets how long a response may take, from the end of the request on a serial
@@ -322,7 +322,18 @@ pub unsafe extern "C" fn mbm_client_setUnits(
         set(client, |parts| {
             parts.means.units = units.cast();
             parts.means.unit_count = count;
+            parts.means.treat = (!units.is_null()).then_some(treat);
             Status::OK
         })
+    }
+}
+
+fn treat(units: &mut [Unit], unit: u8, now: u32, told: Option<(Status, bool)>) -> u32 {
+    match told {
+        None => rest(units, unit, now),
+        Some((status, again)) => {
+            note(units, unit, status, again, now);
+            0
+        }
     }
 }
