@@ -155,8 +155,8 @@ void mbm_tcp_close(mbm_tcp *tcp)
     tcp->state = FREE;
 }
 
-/* 1 once connected, 0 before, -1 if there is no link. */
-static int progress(mbm_tcp *tcp)
+/* As progress, of what is no longer connected, or not yet. */
+static int connecting(mbm_tcp *tcp)
 {
     struct pollfd wait = {tcp->fd, POLLOUT, 0};
     socklen_t size = sizeof(int);
@@ -174,6 +174,12 @@ static int progress(mbm_tcp *tcp)
             try_next(tcp, error);
     }
     return tcp->state == CONNECTED ? 1 : -1;
+}
+
+/* 1 once connected, 0 before, -1 if there is no link. */
+static inline int progress(mbm_tcp *tcp)
+{
+    return tcp->state == CONNECTED ? 1 : connecting(tcp);
 }
 
 int mbm_tcp_isConnected(mbm_tcp *tcp)

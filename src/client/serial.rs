@@ -86,7 +86,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         _: bool,
     ) -> Option<J> {
         let started = if !self.engine.is_pending() {
-            let at = shared.due(now, &mut self.engine.storage, |_| true)?;
+            let at = shared.due(0, now, &mut self.engine.storage, |_| true)?;
             let job = shared.queue.get(at)?;
             if job.ticket().is(Stage::Lost) {
                 return shared.end(at, Status::LINK_LOST, now, &mut self.engine.storage);

@@ -69,19 +69,25 @@ impl<J: Job, const N: usize> Shared<J, N> {
         self.queue.iter().position(is)
     }
 
-    /// The place of the first job that is due and that the line would `accept`; if
-    /// there is none, notes when somebody will be.
+    /// The place of the first job, `from` a place on, that is due and that the line
+    /// would `accept`; if there is none, notes when somebody will be. Who goes on
+    /// where the last one was found keeps what was noted on the way there.
     pub(super) fn due(
         &mut self,
+        from: usize,
         now: u32,
         means: &mut impl Means,
         mut accept: impl FnMut(&J) -> bool,
     ) -> Option<usize> {
-        if self.delay(now) > 0 {
-            return None;
+        let mut least = self.wait;
+        if from == 0 {
+            if self.delay(now) > 0 {
+                return None;
+            }
+            least = u32::MAX;
         }
-        let mut least = u32::MAX;
-        let found = self.place(|job| {
+        let mut rest = self.queue.get(from..)?.iter();
+        let found = rest.position(|job| {
             let ticket = job.ticket();
             let mut wait = ticket.wait.saturating_sub(elapsed(now, ticket.since));
             if ticket.is(Stage::Queued) {
@@ -95,7 +101,7 @@ impl<J: Job, const N: usize> Shared<J, N> {
         self.look = found.is_some();
         self.since = now;
         self.wait = least;
-        found
+        found.map(|at| from + at)
     }
 
     /// What becomes of the job in a place, whose request ended with `status`: it

@@ -107,15 +107,23 @@ impl<P: Port, S: Means> Tcp<P, S> {
     }
 
     /// Finds the next response among what arrived; gives back a job that ended.
+    #[inline]
     fn dispatch<J: Job, const N: usize>(
         &mut self,
         shared: &mut Shared<J, N>,
         now: u32,
     ) -> Option<J> {
+        self.pass();
+        if self.start == self.end {
+            return None;
+        }
+        self.find(shared, now)
+    }
+
+    /// As [`Tcp::dispatch`], of bytes that are there.
+    fn find<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>, now: u32) -> Option<J> {
         loop {
-            let skipped = self.skip.min(self.end - self.start);
-            self.start += skipped;
-            self.skip -= skipped;
+            self.pass();
             let range = usize::from(self.start)..usize::from(self.end);
             let rest = self.means.frame().get(range)?;
             let header = match tcp::header(rest) {
@@ -166,6 +174,13 @@ impl<P: Port, S: Means> Tcp<P, S> {
                 return Some(job);
             }
         }
+    }
+
+    /// Passes over what is left of a frame that is known already.
+    fn pass(&mut self) {
+        let skipped = self.skip.min(self.end - self.start);
+        self.start += skipped;
+        self.skip -= skipped;
     }
 
     /// Passes over a byte that begins no frame.
@@ -259,7 +274,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
     fn lose<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>, now: u32) -> Option<J> {
         self.clear();
         shared.lose();
-        let at = shared.due(now, &mut self.means, |_| true)?;
+        let at = shared.due(0, now, &mut self.means, |_| true)?;
         shared.end(at, Status::LINK_LOST, now, &mut self.means)
     }
 }
@@ -333,12 +348,12 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
                 return Some(job);
             }
         }
+        let (mut from, mut blocked) = (0, false);
         loop {
             let (flying, most) = (self.flying, self.most);
             let filled = usize::from(self.filled) + tcp::PDU;
             let room = self.means.outgoing().len();
-            let mut blocked = false;
-            let due = shared.due(now, &mut self.means, |job| {
+            let due = shared.due(from, now, &mut self.means, |job| {
                 let ticket = job.ticket();
                 let length = filled + usize::from(ticket.outline.request_length());
                 let fits = length <= room || filled == tcp::PDU;
@@ -353,13 +368,17 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
             let job = shared.queue.get_mut(at)?;
             let status = if job.ticket().is(Stage::Queued) {
                 match self.encode(job, now) {
-                    Ok(()) => continue,
+                    Ok(()) => {
+                        from = at;
+                        continue;
+                    }
                     Err(refused) => refused,
                 }
             } else if job.ticket().is_sent() {
                 if self.start < self.end {
                     // What began to arrive may hide the response.
                     self.stray();
+                    (from, blocked) = (0, false);
                     match self.dispatch(shared, now) {
                         Some(job) => return Some(job),
                         None => continue,
@@ -373,6 +392,8 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
             if let Some(job) = shared.end(at, status, now, &mut self.means) {
                 return Some(job);
             }
+            // There may be room for those that were passed.
+            (from, blocked) = (0, false);
         }
         if !self.flush(shared) {
             return self.lose(shared, now);

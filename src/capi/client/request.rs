@@ -145,11 +145,19 @@ impl Job for Lent {
             reply.copy_from_slice(bytes);
             return;
         }
-        let words = bytes.chunks_exact(2);
-        for (place, word) in reply.chunks_exact_mut(2).zip(words) {
-            if let (&mut [ref mut low, ref mut high], &[from_high, from_low]) = (place, word) {
-                *low = from_low;
-                *high = from_high;
+        // Four words at a time.
+        const LOW: u64 = 0x00FF_00FF_00FF_00FF;
+        let (mut places, mut fours) = (reply.chunks_exact_mut(8), bytes.chunks_exact(8));
+        for (place, four) in places.by_ref().zip(fours.by_ref()) {
+            if let (Ok(place), Ok(four)) = (<&mut [u8; 8]>::try_from(place), four.try_into()) {
+                let four = u64::from_ne_bytes(four);
+                *place = (((four & LOW) << 8) | ((four >> 8) & LOW)).to_ne_bytes();
+            }
+        }
+        let rest = places.into_remainder().chunks_exact_mut(2);
+        for (place, word) in rest.zip(fours.remainder().chunks_exact(2)) {
+            if let (Ok(place), Ok(word)) = (<&mut [u8; 2]>::try_from(place), word.try_into()) {
+                *place = u16::from_be_bytes(word).to_ne_bytes();
             }
         }
     }
