@@ -155,8 +155,9 @@ impl<J: Job> Asked<J> {
         }
     }
 
-    fn byte(&self, index: usize) -> u8 {
-        self.job.as_ref().map_or(0, |job| job.byte(index))
+    /// What gives the bytes to send. (One type, so one function for all who ask.)
+    fn bytes(&self) -> impl Fn(usize) -> u8 + '_ {
+        |index| self.job.as_ref().map_or(0, |job| job.byte(index))
     }
 }
 
@@ -178,7 +179,7 @@ impl<J: Job> Question for Asked<J> {
     }
 
     fn emit(&self, pdu: &mut [u8], _: &[u16]) {
-        self.outline().emit(pdu, |index| self.byte(index));
+        self.outline().emit(pdu, self.bytes());
     }
 
     fn may_be_broadcast(&self) -> bool {
@@ -206,7 +207,7 @@ impl<J: Job> Question for Asked<J> {
     fn judge(&mut self, pdu: &[u8]) -> Status {
         let pdu = pdu.get(..pdu.len().saturating_sub(2)).unwrap_or_default();
         self.length = pdu.len() as u8;
-        self.outline().judge(pdu, |index| self.byte(index))
+        self.outline().judge(pdu, self.bytes())
     }
 
     fn ends(&mut self, ended: bool) {

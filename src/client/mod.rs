@@ -13,7 +13,7 @@ mod tcp;
 mod units;
 
 pub use job::{Asked, Job, Ticket};
-pub use policy::{Backoff, Policy};
+pub use policy::{again, Backoff, Policy};
 pub use serial::Serial;
 pub use shared::Shared;
 pub use tcp::Tcp;

@@ -92,13 +92,9 @@ impl Policy {
         now: u32,
         means: &mut impl Means,
     ) -> bool {
-        let again = ticket.retries < self.retries && status.may_be_repeated();
+        let again = means.again(self, ticket, status, now);
         means.note(ticket.unit, status, again, now);
-        if again {
-            ticket.retries += 1;
-            let wait = self.wait(ticket.retries, || means.random());
-            ticket.enter(Stage::Queued, now, wait);
-        } else {
+        if !again {
             ticket.status = status;
         }
         !again
@@ -118,6 +114,24 @@ impl Policy {
         }
         wait - share(share(wait, u16::from(self.jitter) << 8), random as u16)
     }
+}
+
+/// True if a request that ended with `status` is asked again; then it waits for
+/// that. `random` gives any number.
+pub fn again(
+    policy: &Policy,
+    ticket: &mut Ticket,
+    status: Status,
+    now: u32,
+    random: impl FnOnce() -> u32,
+) -> bool {
+    if ticket.retries >= policy.retries || !status.may_be_repeated() {
+        return false;
+    }
+    ticket.retries += 1;
+    let wait = policy.wait(ticket.retries, random);
+    ticket.enter(Stage::Queued, now, wait);
+    true
 }
 
 /// So many 65536ths of a time. (In steps, which need no wide multiplication.)

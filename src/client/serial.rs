@@ -50,6 +50,11 @@ impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
         &mut self.engine
     }
 
+    /// Moves the request under way on.
+    fn step(&mut self, now: u32) -> Status {
+        self.engine.poll(now)
+    }
+
     fn received(&mut self, job: &mut J, status: Status) -> Status {
         let ticket = job.ticket_mut();
         ticket.exception = self.engine.exception_code();
@@ -87,11 +92,10 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
     ) -> Option<J> {
         let started = if !self.engine.is_pending() {
             let at = shared.due(0, now, &mut self.engine.storage, |_| true)?;
-            let job = shared.queue.get(at)?;
-            if job.ticket().is(Stage::Lost) {
-                return shared.end(at, Status::LINK_LOST, now, &mut self.engine.storage);
-            }
             let job = shared.remove(at)?;
+            if job.ticket().is(Stage::Lost) {
+                return shared.conclude(job, Status::LINK_LOST, now, &mut self.engine.storage);
+            }
             let unit = job.ticket().unit;
             self.engine.forget();
             self.engine.request().job = Some(job);
@@ -100,7 +104,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
             Status::PENDING
         };
         let status = match started {
-            Status::PENDING => self.engine.poll(now),
+            Status::PENDING => self.step(now),
             refused => refused,
         };
         if status == Status::PENDING {
@@ -114,8 +118,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
             shared.connected = true;
         }
         // There is room: it came out of the queue, and was counted as if in it.
-        shared.put_first(job);
-        shared.end(0, status, now, &mut self.engine.storage)
+        shared.conclude(job, status, now, &mut self.engine.storage)
     }
 
     fn withdraw(&mut self, is: impl FnOnce(&J) -> bool) -> Option<J> {

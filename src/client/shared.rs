@@ -121,6 +121,23 @@ impl<J: Job, const N: usize> Shared<J, N> {
         None
     }
 
+    /// As [`Shared::end`], of a job that was taken out of the queue; there is room
+    /// for it.
+    pub(super) fn conclude(
+        &mut self,
+        mut job: J,
+        status: Status,
+        now: u32,
+        means: &mut impl Means,
+    ) -> Option<J> {
+        self.look = true;
+        if self.policy.ends(job.ticket_mut(), status, now, means) {
+            return Some(job);
+        }
+        self.put_first(job);
+        None
+    }
+
     /// The link is gone, and with it all that was to be asked over it.
     pub(super) fn lose(&mut self) {
         self.connected = false;

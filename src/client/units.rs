@@ -1,5 +1,7 @@
 //! What is kept for each unit, in storage that the caller lends.
 
+use super::job::Ticket;
+use super::policy::{again, Policy};
 use crate::error::Status;
 use crate::time::elapsed;
 use crate::transaction::Storage;
@@ -114,6 +116,11 @@ pub trait Means: Storage {
     /// Takes note of a request to a unit that ended, or is to be asked `again`.
     fn note(&mut self, unit: u8, status: Status, again: bool, now: u32) {
         note(self.units(), unit, status, again, now);
+    }
+
+    /// True if a request that ended with `status` is asked again.
+    fn again(&mut self, policy: &Policy, ticket: &mut Ticket, status: Status, now: u32) -> bool {
+        again(policy, ticket, status, now, || self.random())
     }
 
     /// Any number, another each time; for jitter.

@@ -15,7 +15,7 @@ pub use settings::*;
 use super::client_pointers as pointers;
 use super::port::mbm_port;
 use super::storage::mbm_counters;
-use crate::client::{self as core_client, Client, Job, Means, Policy, Serial, Tcp, Unit};
+use crate::client::{self as core_client, Client, Job, Means, Policy, Serial, Tcp, Ticket, Unit};
 use crate::error::Status;
 use crate::frame::{ascii_window, rtu, Search};
 use crate::port::Port;
@@ -214,10 +214,14 @@ unsafe fn poll<L: Kind>(pointer: *mut Object) -> Status {
         }
         let now = client.line.parts().2.micros();
         object.polling = true;
-        for round in (0..=MBM_CLIENT_DEPTH).rev() {
-            match self::client::<L>(&mut *pointer).poll(now, round == MBM_CLIENT_DEPTH) {
-                Some(request) => request.call(),
-                None => break,
+        let mut left = MBM_CLIENT_DEPTH + 1;
+        while let Some(request) =
+            self::client::<L>(&mut *pointer).poll(now, left > MBM_CLIENT_DEPTH)
+        {
+            request.call();
+            left -= 1;
+            if left == 0 {
+                break;
             }
         }
         let object = &mut *pointer;
@@ -251,10 +255,21 @@ fn parts(object: &mut Object) -> Parts<'_> {
     })
 }
 
-/// Treats a unit as its record says: gives how long it rests, or notes what is
-/// told, a status and whether it is asked again. (A pointer, so that firmware
+/// Says whether a request is asked again. (A pointer, as [`Treatment`].)
+type Again = fn(&mut LentByC, &Policy, &mut Ticket, Status, now: u32) -> bool;
+
+/// How a unit is treated as its record says. (Behind a pointer, so that firmware
 /// without records carries none of it.)
-type Treat = fn(&mut [Unit], unit: u8, now: u32, told: Option<(Status, bool)>) -> u32;
+struct Treatment {
+    rest: fn(&mut LentByC, unit: u8, now: u32) -> u32,
+    note: fn(&mut LentByC, unit: u8, told: Told, now: u32),
+}
+
+/// How a request to a unit ended, and whether it is asked again.
+struct Told {
+    status: Status,
+    again: bool,
+}
 
 /// What the begin functions and settings lend.
 #[repr(C)]
@@ -263,7 +278,8 @@ struct LentByC {
     outgoing: *mut u8,
     counters: *mut mbm_counters,
     units: *mut Unit,
-    treat: Option<Treat>,
+    treatment: Option<&'static Treatment>,
+    again: Option<Again>,
     random: Option<unsafe extern "C" fn(context: *mut c_void) -> u32>,
     random_context: *mut c_void,
     frame_bytes: u16,
@@ -311,15 +327,22 @@ impl Means for LentByC {
     }
 
     fn rest(&mut self, unit: u8, now: u32) -> u32 {
-        match self.treat {
-            Some(treat) => treat(self.units(), unit, now, None),
+        match self.treatment {
+            Some(treatment) => (treatment.rest)(self, unit, now),
             None => 0,
         }
     }
 
     fn note(&mut self, unit: u8, status: Status, again: bool, now: u32) {
-        if let Some(treat) = self.treat {
-            treat(self.units(), unit, now, Some((status, again)));
+        if let Some(treatment) = self.treatment {
+            (treatment.note)(self, unit, Told { status, again }, now);
+        }
+    }
+
+    fn again(&mut self, policy: &Policy, ticket: &mut Ticket, status: Status, now: u32) -> bool {
+        match self.again {
+            Some(again) => again(self, policy, ticket, status, now),
+            None => false,
         }
     }
 

@@ -1,8 +1,8 @@
 //! How a client behaves.
 
-use super::{mbm_client, parts, pointers, Parts};
+use super::{mbm_client, parts, pointers, Parts, Treatment};
 use crate::capi::storage::mbm_counters;
-use crate::client::{note, rest, Backoff, Unit};
+use crate::client::{again, note, rest, Backoff, Means as _, Unit};
 use crate::error::Status;
 use crate::time::{self, millis};
 use core::ffi::c_void;
@@ -221,6 +221,9 @@ pub unsafe extern "C" fn mbm_client_setRetries(client: *mut mbm_client, retries:
     unsafe {
         set(client, |parts| {
             parts.policy.retries = retries;
+            parts.means.again = Some(|means, policy, ticket, status, now| {
+                again(policy, ticket, status, now, || means.random())
+            });
             Status::OK
         })
     }
@@ -322,18 +325,13 @@ pub unsafe extern "C" fn mbm_client_setUnits(
         set(client, |parts| {
             parts.means.units = units.cast();
             parts.means.unit_count = count;
-            parts.means.treat = (!units.is_null()).then_some(treat);
+            parts.means.treatment = (!units.is_null()).then_some(&TREATMENT);
             Status::OK
         })
     }
 }
 
-fn treat(units: &mut [Unit], unit: u8, now: u32, told: Option<(Status, bool)>) -> u32 {
-    match told {
-        None => rest(units, unit, now),
-        Some((status, again)) => {
-            note(units, unit, status, again, now);
-            0
-        }
-    }
-}
+const TREATMENT: Treatment = Treatment {
+    rest: |means, unit, now| rest(means.units(), unit, now),
+    note: |means, unit, told, now| note(means.units(), unit, told.status, told.again, now),
+};

@@ -253,10 +253,11 @@ pub unsafe extern "C" fn mbm_client_custom(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        let rule = response.as_ref().and_then(|response| rule(*response));
-        queue(client, request, |outline| match rule {
-            Some(rule) => outline.custom(function, bytes, rule),
-            None => Status::INVALID_ARGUMENT,
+        queue(client, request, |outline| {
+            match response.as_ref().and_then(|response| rule(*response)) {
+                Some(rule) => outline.custom(function, bytes, rule),
+                None => Status::INVALID_ARGUMENT,
+            }
         })
     }
 }
