@@ -131,10 +131,11 @@ $(BENCH_CLIENT): $(patsubst %,$(BUILD)/bench/%.o,bench_client support/pty suppor
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
 
 .PHONY: bench
-bench: ## Speed and instructions beside libmodbus and rmodbus; writes docs/speed.md
+bench: ## Speed and instructions beside libmodbus and rmodbus; writes docs/speed.md, docs/client-speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
-	@$(MAKE) --no-print-directory $(BENCH)
+	@$(MAKE) --no-print-directory $(BENCH) $(BENCH_CLIENT)
 	@scripts/bench $(BENCH)
+	@scripts/bench-client $(BENCH_CLIENT)
 	@CARGO="$(CARGO)" scripts/bench-frames
 
 DEMO := $(BUILD)/plain/linux/demo

@@ -170,7 +170,7 @@ impl Outline {
         self.head[3] = object;
         self.head_length = 4;
         self.repeated = 3;
-        value((1..=4).contains(&code))
+        value(matches!(code, 1..=4))
     }
 
     /// 2B of any MEI type and so many `bytes` of data; the response ends by
