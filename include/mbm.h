@@ -1334,17 +1334,16 @@ typedef struct mbm_unit {
     /**
      * Not for you.
      */
-    uint16_t (*monitor)(struct mbm_unit *unit,
-                        const void *heading,
-                        uint8_t concern,
-                        uint8_t *pdu);
+    uint16_t (*serve)(struct mbm_unit *unit,
+                      const void *heading,
+                      uint8_t concern,
+                      uint8_t *pdu);
     /**
      * Not for you.
      */
     struct mbm_diagnostics *diagnostics;
     /**
-     * The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers, over TCP,
-     * to every id.
+     * The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers to every id.
      */
     uint8_t id;
 } mbm_unit;
@@ -1386,6 +1385,10 @@ typedef struct mbm_cells {
      * As in mbm_registerTable.
      */
     void (*after)(void *context, uint16_t address, uint16_t quantity);
+    /**
+     * Not for you.
+     */
+    uint8_t kind;
 } mbm_cells;
 
 /**
@@ -4183,6 +4186,18 @@ uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t microseconds);
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
+
+/**
+ * Tells that the receiver of an RTU line hears what the driver sends, so that as
+ * many bytes as were sent are dropped behind each response. mbm_server_begin
+ * sets it back.
+ *
+ * @param server  the object
+ * @param on      0 (at first) or 1
+ * @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings, or
+ *         MBM_NOT_INITIALISED
+ */
+uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
 
 /**
  * Serves cells that your functions hold.

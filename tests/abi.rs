@@ -47,10 +47,10 @@ fn probes() -> Vec<(String, u64)> {
             mbm_framing { functions functionCount kind end }
             mbm_registers { data first count kind order }
             mbm_service { next serve }
-            mbm_unit { services monitor diagnostics id }
+            mbm_unit { services serve diagnostics id }
             mbm_registerTable { service words valid before after context base size kind }
             mbm_bitTable { service bits valid before after context base size kind }
-            mbm_cells { service context isValid get set before after }
+            mbm_cells { service context isValid get set before after kind }
             mbm_file { records size number }
             mbm_files { service files count before after context }
             mbm_fifo { words address count }

@@ -155,8 +155,8 @@ void mbm_tcp_close(mbm_tcp *tcp)
     tcp->state = FREE;
 }
 
-/* As progress, of what is no longer connected, or not yet. */
-static int connecting(mbm_tcp *tcp)
+/* 1 once connected, 0 before, -1 if there is no link. */
+static int progress_slowly(mbm_tcp *tcp)
 {
     struct pollfd wait = {tcp->fd, POLLOUT, 0};
     socklen_t size = sizeof(int);
@@ -176,10 +176,9 @@ static int connecting(mbm_tcp *tcp)
     return tcp->state == CONNECTED ? 1 : -1;
 }
 
-/* 1 once connected, 0 before, -1 if there is no link. */
-static inline int progress(mbm_tcp *tcp)
+static int progress(mbm_tcp *tcp)
 {
-    return tcp->state == CONNECTED ? 1 : connecting(tcp);
+    return tcp->state == CONNECTED ? 1 : progress_slowly(tcp);
 }
 
 int mbm_tcp_isConnected(mbm_tcp *tcp)

@@ -25,14 +25,16 @@ pub fn write(buffer: &mut [u8], unit: u8, length: usize, pdu: impl FnOnce(&mut [
     let Some(frame) = buffer.get_mut(..length + OVERHEAD) else {
         return false;
     };
-    let [content @ .., low, high] = frame else {
+    let Some((content, crc)) = frame.split_at_mut_checked(length + PDU) else {
         return false;
     };
     if let Some((first, rest)) = content.split_first_mut() {
         *first = unit;
         pdu(rest);
     }
-    [*low, *high] = crc16(content).to_bytes();
+    if let [low, high] = crc {
+        [*low, *high] = crc16(content).to_bytes();
+    }
     true
 }
 
