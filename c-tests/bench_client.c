@@ -396,7 +396,7 @@ static int begin_stream(void)
 {
     struct sockaddr_in at = {0};
     socklen_t length = sizeof at;
-    int listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), far, on = 1;
+    int listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), far = -1, on = 1;
     mbm_port port;
 
     at.sin_family = AF_INET;
