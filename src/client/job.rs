@@ -2,6 +2,7 @@
 //! data go.
 
 use crate::error::Status;
+use crate::pdu::limits::MAX_PDU;
 use crate::pdu::outline::Outline;
 use crate::transaction::Question;
 use core::num::NonZeroU8;
@@ -128,10 +129,10 @@ pub(super) fn deliver<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
     if data.len() > usize::from(ticket.capacity) {
         return Status::BUFFER_TOO_SMALL;
     }
-    let mask = ticket.outline.mask();
     job.ticket_mut().length = data.len() as u8;
     job.put_all(data);
     // The bits behind the last one are zero.
+    let mask = job.ticket().outline.mask();
     if let (Some(last), true) = (data.last(), mask != 0xFF) {
         job.put(data.len() - 1, *last & mask);
     }
@@ -197,9 +198,10 @@ impl<J: Job> Question for Asked<J> {
     fn expected(&self, pdu: &[u8]) -> Option<NonZeroU8> {
         let whole = if self.ended {
             // What arrived last is the check.
-            Some(pdu.len().saturating_sub(2))
+            pdu.len().saturating_sub(2)
         } else {
-            None
+            // While more may come, it is never complete, but for the longest.
+            pdu.len().min(MAX_PDU)
         };
         self.outline().expected(pdu, whole)
     }

@@ -160,9 +160,9 @@ impl Outline {
 
     /// The length of the response that begins with the bytes of `pdu`, or the
     /// least length while they do not tell; `None` if no response to it begins
-    /// so. `whole` is how long it is, once it is known to have ended.
+    /// so. Where nothing but its end tells, it is `whole`.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn expected(&self, pdu: &[u8], whole: Option<usize>) -> Option<NonZeroU8> {
+    pub fn expected(&self, pdu: &[u8], whole: usize) -> Option<NonZeroU8> {
         let length = match pdu {
             [] => 2,
             [function, ..] if *function == self.function() | EXCEPTION => 2,
@@ -192,7 +192,7 @@ impl Outline {
 
     /// The length where the response's own rules tell: of 18 and 2B/0E, or of
     /// what only its end ends.
-    fn own_length(&self, pdu: &[u8], whole: Option<usize>) -> usize {
+    fn own_length(&self, pdu: &[u8], whole: usize) -> usize {
         let rule = match self.head {
             [files::READ_FIFO_QUEUE, ..] => match pdu.get(1..3) {
                 Some([0, low]) => Length::Exactly(3 + usize::from(*low)),
@@ -206,8 +206,7 @@ impl Outline {
         };
         match rule {
             Length::Exactly(length) | Length::AtLeast(length) => length,
-            // While more may come, it is never complete, but for the longest.
-            _ => whole.unwrap_or(pdu.len().min(MAX_PDU)).max(2),
+            _ => whole.max(2),
         }
     }
 
