@@ -184,6 +184,38 @@ static void a_response_begins_after_the_silence(void **)
     assert_in_range(Serial.startedAt - last, 4000, 4000 + 6 * bench().tick);
 }
 
+static void a_request_may_pause_for_t15(void **)
+{
+    const uint32_t t15 = t35 * 3 / 7;
+    ModbusRegisterArray<1> registers;
+    ModbusServer server;
+    server.holdingRegisters(registers);
+    server.begin(17, Serial, 19200);
+    Bytes request = adu({17, 6, 0, 0, 0, 1});
+    Bytes front(request.begin(), request.begin() + 4), rest(request.begin() + 4, request.end());
+    Serial.inject(front);
+    Serial.arrive(rest, bench().now + t15, 573);
+    loops(server);
+    assert_sent(Serial, {17, 6, 0, 0, 0, 1});
+    registers[0] = 0;
+    Serial.inject(front);
+    Serial.arrive(rest, bench().now + 2 * t35, 573);
+    loops(server);
+    assert_int_equal(Serial.sent.size(), 0);
+    assert_int_equal(registers[0], 0);
+}
+
+static void the_driver_is_off_until_the_silence_has_passed(void **)
+{
+    static uint32_t on;
+    ModbusServer server;
+    server.begin(17, Serial, 19200);
+    server.preTransmission([] { on = bench().now; });
+    uint32_t asked = bench().now;
+    answers(server, {17, 3, 0, 0, 0, 1}, {17, 0x83, 1});
+    assert_in_range(on - asked, t35, t35 + 6 * bench().tick);
+}
+
 static void a_sketch_may_sleep_for_as_long_as_nothing_is_to_do(void **)
 {
     ModbusServer server;
@@ -191,7 +223,8 @@ static void a_sketch_may_sleep_for_as_long_as_nothing_is_to_do(void **)
     assert_int_equal(server.pollDelay(), 0xFFFFFFFF);
     Serial.inject(raw({17}));
     server.poll();
-    assert_in_range(server.pollDelay(), t35 - 6 * bench().tick, t35);
+    // A request is carried out while the silence before its response lasts.
+    assert_in_range(server.pollDelay(), t35 / 2 - 6 * bench().tick, t35 / 2);
 }
 
 static void the_driver_is_on_while_a_response_leaves(void **)
@@ -486,6 +519,8 @@ int main()
         TEST(cells_that_are_not_there_are_refused),
         TEST(mask_and_read_write_are_served_when_asked_for),
         TEST(a_response_begins_after_the_silence),
+        TEST(a_request_may_pause_for_t15),
+        TEST(the_driver_is_off_until_the_silence_has_passed),
         TEST(a_sketch_may_sleep_for_as_long_as_nothing_is_to_do),
         TEST(the_driver_is_on_while_a_response_leaves),
         TEST(callbacks_are_handed_their_context),

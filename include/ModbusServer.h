@@ -165,28 +165,28 @@ public:
     uint8_t begin(uint8_t id, Stream &stream, uint32_t baud = 0)
     {
         setUnitID(id);
-        return listen(mbm_server_begin, *this, 1, stream, baud);
+        return beginRtu(*this, 1, stream, baud);
     }
 
     /** As begin, for all units of an array, which answer in place of this one. */
     template <size_t N> uint8_t begin(ModbusUnit (&units)[N], Stream &stream, uint32_t baud = 0)
     {
         static_assert(N <= 247, "a line has 247 units");
-        return listen(mbm_server_begin, units[0], N, stream, baud);
+        return beginRtu(units[0], N, stream, baud);
     }
 
     /** As begin, with ASCII in place of RTU; a frame needs twice the bytes and 1. */
     uint8_t beginAscii(uint8_t id, Stream &stream)
     {
         setUnitID(id);
-        return listen(mbm_server_beginAscii, *this, 1, stream, 0);
+        return listen(mbm_server_beginAscii, *this, 1, stream);
     }
 
     /** As beginAscii, for all units of an array. */
     template <size_t N> uint8_t beginAscii(ModbusUnit (&units)[N], Stream &stream)
     {
         static_assert(N <= 247, "a line has 247 units");
-        return listen(mbm_server_beginAscii, units[0], N, stream, 0);
+        return listen(mbm_server_beginAscii, units[0], N, stream);
     }
 
     /**
@@ -221,14 +221,28 @@ public:
     }
 
     /** Tells bits per second, for t3.5; 0: untold, 4 ms. Sets nothing on the Stream. */
-    void setBaudRate(uint32_t baud) { mbm_server_setBaudRate(&state.server, baud); }
-    /** Microseconds of silence that end a frame, in place of t3.5; after begin. */
-    void setSilence(uint32_t us) { mbm_server_setSilence(&state.server, us); }
+    void setBaudRate(uint32_t baud)
+    {
+        setSilence(baud == 0 ? 4000 : baud > 19200 ? 1750 : 38500000 / baud + 1);
+    }
+    /**
+     * Microseconds of silence before a response, in place of t3.5; of RTU, after
+     * begin. After half of it, which is more than the t1.5 that a frame may pause
+     * (serial line guide V1.02, 2.5.1.1), a request is carried out, so that
+     * the response is ready in time.
+     */
+    void setSilence(uint32_t us)
+    {
+        state.silence = us;
+        mbm_server_setSilence(&state.server, us / 2);
+    }
 
 private:
     static_assert(MODBUSSERVER_FRAME_BYTES >= 32 && MODBUSSERVER_FRAME_BYTES <= 256,
                   "MODBUSSERVER_FRAME_BYTES is 32 to 256");
     static_assert(sizeof(ModbusUnit) == sizeof(mbm_unit), "an array of one is one of the other");
+
+    enum : uint8_t { shortWait = 100 }; // microseconds
 
     struct Callback {
         void (*function)(void *);
@@ -240,6 +254,9 @@ private:
         Stream *stream;
         Callback onPre;
         Callback onPost;
+        uint32_t heard; // when the last byte was seen
+        uint32_t silence;
+        bool ready; // a response waits for the silence to end
         mbm_server server;
         uint8_t frame[MODBUSSERVER_FRAME_BYTES];
     };
@@ -250,10 +267,12 @@ private:
 
     uint8_t listen(uint8_t (*how)(mbm_server *, const mbm_port *, mbm_unit *, uint8_t, uint8_t *,
                                   uint16_t),
-                   ModbusUnit &first, uint8_t count, Stream &stream, uint32_t baud)
+                   ModbusUnit &first, uint8_t count, Stream &stream)
     {
         mbm_port port;
         state.stream = &stream;
+        state.silence = 0;
+        state.ready = false;
         port.context = &state;
         port.read = readHook;
         port.write = writeHook;
@@ -262,10 +281,13 @@ private:
         port.preTransmission = preHook;
         port.postTransmission = postHook;
         port.idle = nullptr;
-        uint8_t status = how(&state.server, &port, &first.unit, count, state.frame,
-                             MODBUSSERVER_FRAME_BYTES);
-        if (baud != 0)
-            setBaudRate(baud);
+        return how(&state.server, &port, &first.unit, count, state.frame,
+                   MODBUSSERVER_FRAME_BYTES);
+    }
+    uint8_t beginRtu(ModbusUnit &first, uint8_t count, Stream &stream, uint32_t baud)
+    {
+        uint8_t status = listen(mbm_server_begin, first, count, stream);
+        setBaudRate(baud);
         return status;
     }
 
@@ -292,11 +314,23 @@ private:
         uint8_t *next = bytes;
         for (; capacity > 0 && stream.available() > 0; capacity--)
             *next++ = static_cast<uint8_t>(stream.read());
+        if (next != bytes)
+            of(context).heard = clockHook(context);
         return static_cast<int16_t>(next - bytes);
     }
     static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
     {
-        return static_cast<int16_t>(of(context).stream->write(bytes, length));
+        State &state = of(context);
+        if (state.ready) {
+            // The last of it is waited for here: loop may take longer.
+            if (clockHook(context) - state.heard + shortWait < state.silence)
+                return 0;
+            while (clockHook(context) - state.heard < state.silence) {
+            }
+            state.ready = false;
+            call(state.onPre);
+        }
+        return static_cast<int16_t>(state.stream->write(bytes, length));
     }
     static uint32_t clockHook(void *) { return static_cast<uint32_t>(micros()); }
     static uint8_t flushHook(void *context)
@@ -304,7 +338,8 @@ private:
         of(context).stream->flush();
         return 1;
     }
-    static void preHook(void *context) { call(of(context).onPre); }
+    // The driver stays off until the silence has passed.
+    static void preHook(void *context) { of(context).ready = true; }
     static void postHook(void *context) { call(of(context).onPost); }
 };
 
