@@ -135,10 +135,20 @@ bench: ## Speed and instructions beside libmodbus and rmodbus; writes docs/speed
 	@CARGO="$(CARGO)" scripts/bench-frames
 
 DEMO := $(BUILD)/plain/linux/demo
-$(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/frame_words linux/recorder linux/mbm_tty support/pty support/server) $(ARCHIVE)
+$(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/recorder linux/mbm_tty support/pty support/server) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
 $(BUILD)/plain/linux/basic: $(patsubst %,$(BUILD)/plain/%.o,linux/basic linux/mbm_tty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
+
+SNIFF := $(BUILD)/plain/linux/sniff
+$(SNIFF): $(patsubst %,$(BUILD)/plain/%.o,linux/sniff linux/mbm_tty) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
+
+.PHONY: sniff
+sniff: ## The example that watches a bus, build/plain/linux/sniff
+	@scripts/need gcc libc6-dev
+	@$(MAKE) --no-print-directory $(SNIFF)
+	@scripts/check-sniff $(SNIFF)
 
 .PHONY: demo
 demo: ## Every function at work against a libmodbus server, frame by frame

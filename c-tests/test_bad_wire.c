@@ -1,340 +1,46 @@
-/* What becomes of five transactions when the first meets a fault. The device
- * is a script on a pty. Prints the table of docs/fault-table.md, and fails if
- * a row is worse than it was. */
-#include "crc.h"
+/* What becomes of five transactions of the facade when the first meets a fault.
+ * The device is a script on a pty. Prints the table of docs/fault-table.md, and
+ * fails if a row is worse than it was. */
+#include "faults.h"
 #include "node.h"
-#include "responder.h"
 #include "test.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { UNIT = 1, TRANSACTIONS = 5, REGISTERS = 10, MOST = 260 };
-
-typedef struct fault {
-    const char *name;
-    void (*play)(responder *r, const uint8_t *request);
-    uint8_t function;      /* of the five requests, 03 or 06 */
-    uint8_t echo;          /* the master is told to expect its echo */
-    const char *expected;  /* without a retry */
-    uint8_t status;        /* of the first transaction */
-    const char *retried;   /* with one retry */
-} fault;
-
-static const fault *playing;
-static int link_dies;
-
-/* Every register's value tells its address, so that stale data shows. */
-static uint16_t value_at(unsigned address)
-{
-    return (uint16_t)(address * 7919u + 1u);
-}
-
-/* The right reply to a request, with its CRC. */
-static size_t right_reply(uint8_t *frame, const uint8_t *request)
-{
-    unsigned address = (unsigned)request[2] << 8 | request[3];
-    unsigned quantity = (unsigned)request[4] << 8 | request[5];
-    unsigned i;
-
-    memcpy(frame, request, 6);
-    if (request[1] == 6)
-        return seal(frame, 6);
-    frame[2] = (uint8_t)(2 * quantity);
-    for (i = 0; i < quantity; i++) {
-        frame[3 + 2 * i] = (uint8_t)(value_at(address + i) >> 8);
-        frame[4 + 2 * i] = (uint8_t)value_at(address + i);
-    }
-    return seal(frame, 3 + 2 * quantity);
-}
-
-/* Sends bytes and the right reply behind them in one piece. */
-static void reply_behind(responder *r, const uint8_t *request, const void *bytes, size_t length)
-{
-    uint8_t all[2 * MOST];
-
-    memcpy(all, bytes, length);
-    responder_send(r, all, length + right_reply(all + length, request));
-}
-
-static void right(responder *r, const uint8_t *request)
-{
-    reply_behind(r, request, "", 0);
-}
-
-static void leading_zero(responder *r, const uint8_t *request)
-{
-    reply_behind(r, request, "\0", 1);
-}
-
-static void five_bytes_of_noise(responder *r, const uint8_t *request)
-{
-    reply_behind(r, request, "\xFF\x00\x55\x01\x99", 5);
-}
-
-static void noise_like_our_header(responder *r, const uint8_t *request)
-{
-    const uint8_t header[] = {UNIT, 3, 2 * REGISTERS};
-
-    reply_behind(r, request, header, sizeof header);
-}
-
-/* The right reply to another request in front of ours. */
-static void reply_behind_reply_to(responder *r, const uint8_t *request, uint8_t unit,
-                                  uint8_t function, uint16_t quantity)
-{
-    const uint8_t other[] = {unit, function, 3, 0x21, (uint8_t)(quantity >> 8), (uint8_t)quantity};
-    uint8_t frame[MOST];
-
-    reply_behind(r, request, frame, right_reply(frame, other));
-}
-
-static void foreign_reply(responder *r, const uint8_t *request)
-{
-    reply_behind_reply_to(r, request, UNIT + 1, 3, REGISTERS);
-}
-
-static void reply_of_another_function(responder *r, const uint8_t *request)
-{
-    reply_behind_reply_to(r, request, UNIT, 4, REGISTERS);
-}
-
-static void local_echo(responder *r, const uint8_t *request)
-{
-    reply_behind(r, request, request, 8);
-}
-
-static void late_reply_of_another_length(responder *r, const uint8_t *request)
-{
-    reply_behind_reply_to(r, request, UNIT, 3, REGISTERS - 1);
-}
-
-static void late_reply_to_another_write(responder *r, const uint8_t *request)
-{
-    reply_behind_reply_to(r, request, UNIT, 6, 0x5AA5);
-}
-
-static void late_exception_of_another_function(responder *r, const uint8_t *request)
-{
-    uint8_t frame[5] = {UNIT, 0x90, 2};
-
-    reply_behind(r, request, frame, seal(frame, 3));
-}
-
-static void a_byte_every_5_ms(responder *r, const uint8_t *request)
-{
-    uint8_t frame[MOST];
-    size_t length = right_reply(frame, request);
-    size_t i;
-
-    for (i = 0; i < length; i++) {
-        responder_send(r, frame + i, 1);
-        responder_pause(5);
-    }
-}
-
-static void a_pause_inside(responder *r, const uint8_t *request)
-{
-    uint8_t frame[MOST];
-    size_t length = right_reply(frame, request);
-
-    responder_send(r, frame, length / 2);
-    responder_pause(30);
-    responder_send(r, frame + length / 2, length - length / 2);
-}
-
-static void two_replies_glued(responder *r, const uint8_t *request)
-{
-    uint8_t frame[MOST];
-
-    reply_behind(r, request, frame, right_reply(frame, request));
-}
-
-static void one_byte_too_long(responder *r, const uint8_t *request)
-{
-    uint8_t frame[MOST];
-    size_t length = right_reply(frame, request);
-
-    frame[length] = 0x7E;
-    responder_send(r, frame, length + 1);
-}
-
-static void noise_of_300_bytes(responder *r)
-{
-    uint8_t noise[10];
-    unsigned i, piece, state = 12345;
-
-    for (piece = 0; piece < 30; piece++) {
-        for (i = 0; i < sizeof noise; i++) {
-            state = state * 1103515245u + 12345u;
-            noise[i] = (uint8_t)(state >> 16);
-        }
-        responder_send(r, noise, sizeof noise);
-        responder_pause(1);
-    }
-}
-
-static void reply_behind_300_bytes_of_noise(responder *r, const uint8_t *request)
-{
-    noise_of_300_bytes(r);
-    right(r, request);
-}
-
-static void only_300_bytes_of_noise(responder *r, const uint8_t *request)
-{
-    (void)request;
-    noise_of_300_bytes(r);
-}
-
-static void bad_crc(responder *r, const uint8_t *request)
-{
-    uint8_t frame[MOST];
-    size_t length = right_reply(frame, request);
-
-    frame[length - 1] ^= 0x40;
-    responder_send(r, frame, length);
-}
-
-static void truncated(responder *r, const uint8_t *request)
-{
-    uint8_t frame[MOST];
-
-    responder_send(r, frame, right_reply(frame, request) - 7);
-}
-
-static void one_byte_lost(responder *r, const uint8_t *request)
-{
-    uint8_t frame[MOST];
-    size_t length = right_reply(frame, request);
-
-    memmove(frame + 8, frame + 9, length - 9);
-    responder_send(r, frame, length - 1);
-}
-
-static void wrong_byte_count(responder *r, const uint8_t *request)
-{
-    uint8_t shorter[8], frame[MOST];
-
-    memcpy(shorter, request, 6);
-    shorter[5] = 1;
-    responder_send(r, frame, right_reply(frame, shorter));
-}
-
-static void echo_of_another_address(responder *r, const uint8_t *request)
-{
-    uint8_t frame[MOST];
-
-    right_reply(frame, request);
-    frame[3] ^= 1;
-    responder_send(r, frame, seal(frame, 6));
-}
-
-static void exception_with_bad_crc(responder *r, const uint8_t *request)
-{
-    uint8_t frame[5] = {UNIT, 0, 2};
-    size_t length;
-
-    frame[1] = request[1] | 0x80;
-    length = seal(frame, 3);
-    frame[4] ^= 0x10;
-    responder_send(r, frame, length);
-}
-
-static void no_reply(responder *r, const uint8_t *request)
-{
-    (void)r;
-    (void)request;
-}
-
-static void link_dies_inside(responder *r, const uint8_t *request)
-{
-    uint8_t frame[MOST];
-
-    right_reply(frame, request);
-    responder_send(r, frame, 9);
-    responder_pause(20);
-    link_dies = 1;
-}
-
-static const fault faults[] = {
-    {"no fault", right, 3, 0, ".....", MBM_OK, "....."},
-    {"leading 0x00", leading_zero, 3, 0, ".....", MBM_OK, "....."},
-    {"5 bytes of noise before the reply", five_bytes_of_noise, 3, 0, ".....", MBM_OK, "....."},
-    {"noise that looks like our header", noise_like_our_header, 3, 0, ".....", MBM_OK, "....."},
-    {"a foreign unit's reply, then ours", foreign_reply, 3, 0, ".....", MBM_OK, "....."},
-    {"a reply of another function, then ours", reply_of_another_function, 3, 0, ".....", MBM_OK,
-     "....."},
-    {"local echo, then ours (read)", local_echo, 3, 1, ".....", MBM_OK, "....."},
-    {"local echo, then ours (write)", local_echo, 6, 1, ".....", MBM_OK, "....."},
-    {"late exception of another function, then ours", late_exception_of_another_function, 3, 0,
-     ".....", MBM_OK, "....."},
-    {"late reply of another length, then ours", late_reply_of_another_length, 3, 0, ".....",
-     MBM_OK, "....."},
-    {"late reply to another write, then ours", late_reply_to_another_write, 6, 0, ".....", MBM_OK,
-     "....."},
-    {"one byte every 5 ms", a_byte_every_5_ms, 3, 0, ".....", MBM_OK, "....."},
-    {"cut in two by a pause longer than t3.5", a_pause_inside, 3, 0, ".....", MBM_OK, "....."},
-    {"two replies glued", two_replies_glued, 3, 0, ".....", MBM_OK, "....."},
-    {"one byte too long", one_byte_too_long, 3, 0, ".....", MBM_OK, "....."},
-    {"300 bytes of continuous noise, then ours", reply_behind_300_bytes_of_noise, 3, 0, ".....",
-     MBM_OK, "....."},
-    {"300 bytes of continuous noise, no reply", only_300_bytes_of_noise, 3, 0, "F....",
-     MBM_RESPONSE_TIMED_OUT, "....."},
-    {"no reply", no_reply, 3, 0, "F....", MBM_RESPONSE_TIMED_OUT, "....."},
-    {"bad CRC", bad_crc, 3, 0, "F....", MBM_INVALID_CRC, "....."},
-    {"truncated", truncated, 3, 0, "F....", MBM_RESPONSE_TIMED_OUT, "....."},
-    {"one byte lost", one_byte_lost, 3, 0, "F....", MBM_RESPONSE_TIMED_OUT, "....."},
-    {"wrong byte count with right CRC", wrong_byte_count, 3, 0, "F....", MBM_MALFORMED_REPLY,
-     "....."},
-    {"echo of a write with a wrong address", echo_of_another_address, 6, 0, "F....",
-     MBM_MALFORMED_REPLY, "....."},
-    {"exception with bad CRC", exception_with_bad_crc, 3, 0, "F....", MBM_INVALID_CRC, "....."},
-    {"the link dies inside the reply", link_dies_inside, 3, 0, "F....", MBM_LINK_LOST, "F...."},
-};
-
-static void play(responder *r, const uint8_t *request, unsigned number)
-{
-    if (number == 1)
-        playing->play(r, request);
-    else if (playing->echo)
-        local_echo(r, request);
-    else
-        right(r, request);
-}
-
 static mbm_port tty_port;
 
 /* The terminal's read, until a script says that the link is gone. */
 static int16_t read_or_die(void *context, uint8_t *bytes, uint16_t capacity)
 {
-    if (link_dies) {
-        link_dies = 0;
+    if (fault_link_dies) {
+        fault_link_dies = 0;
         return -1;
     }
     return tty_port.read(context, bytes, capacity);
 }
 
 /* '.' right, 'F' a failed call, 'W' success with wrong data. */
-static char transact(node *n, unsigned number, uint8_t *status)
+static char transact(node *n, const fault *f, unsigned number, uint8_t *status)
 {
     unsigned i;
 
-    if (playing->function == 6) {
+    if (f->function == 6) {
         *status = mbm_master_writeSingleRegister(&n->master, (uint16_t)number, (uint16_t)~number);
         return *status == MBM_OK ? '.' : 'F';
     }
-    *status = mbm_master_readHoldingRegisters(&n->master, (uint16_t)(100 * number), REGISTERS);
+    *status = mbm_master_readHoldingRegisters(&n->master, (uint16_t)(100 * number), FAULT_REGISTERS);
     if (*status != MBM_OK)
         return 'F';
-    for (i = 0; i < REGISTERS; i++)
-        if (mbm_master_getResponseBuffer(&n->master, (uint8_t)i) != value_at(100 * number + i))
+    for (i = 0; i < FAULT_REGISTERS; i++)
+        if (mbm_master_getResponseBuffer(&n->master, (uint8_t)i) != fault_value(100 * number + i))
             return 'W';
     return '.';
 }
 
 /* Plays a fault; returns the status of the first transaction. */
-static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[TRANSACTIONS + 1])
+static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRANSACTIONS + 1])
 {
     responder device;
     node n;
@@ -342,43 +48,34 @@ static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[TRANSACTIO
     uint8_t first = MBM_OK, status;
     unsigned i;
 
-    playing = f;
-    link_dies = 0;
-    responder_start(&device, play);
-    node_begin(&n, device.line.ours, UNIT);
+    fault_start(&device, f);
+    node_begin(&n, device.line.ours, FAULT_UNIT);
     port = tty_port = mbm_tty_port(&n.tty, &n.master);
     port.read = read_or_die;
-    mbm_master_begin(&n.master, UNIT, &port);
+    mbm_master_begin(&n.master, FAULT_UNIT, &port);
     mbm_master_setResponseTimeout(&n.master, 400);
     mbm_master_setEchoDiscard(&n.master, f->echo);
     mbm_master_setRetries(&n.master, retries);
-    for (i = 0; i < TRANSACTIONS; i++) {
-        outcomes[i] = transact(&n, i + 1, &status);
+    for (i = 0; i < FAULT_TRANSACTIONS; i++) {
+        outcomes[i] = transact(&n, f, i + 1, &status);
         if (i == 0)
             first = status;
     }
-    outcomes[TRANSACTIONS] = '\0';
+    outcomes[FAULT_TRANSACTIONS] = '\0';
     responder_stop(&device);
     return first;
-}
-
-/* True if no transaction fares worse than expected. */
-static int as_good(const char *found, const char *expected)
-{
-    return strspn(found, ".F") == TRANSACTIONS &&
-           !(strchr(found, 'F') && strcmp(found, expected) != 0);
 }
 
 static void no_row_of_the_fault_table_gets_worse(void **state)
 {
     const char *path = getenv("MBM_FAULT_TABLE");
     FILE *table = path ? fopen(path, "w") : NULL;
-    char plain[TRANSACTIONS + 1], retried[TRANSACTIONS + 1];
+    char plain[FAULT_TRANSACTIONS + 1], retried[FAULT_TRANSACTIONS + 1];
     int worse = 0;
-    size_t i;
+    unsigned i;
 
     (void)state;
-    for (i = 0; i < COUNT(faults); i++) {
+    for (i = 0; i < fault_count; i++) {
         const fault *f = &faults[i];
         uint8_t status = outcome(f, 0, plain);
 
@@ -388,7 +85,7 @@ static void no_row_of_the_fault_table_gets_worse(void **state)
         if (table)
             fprintf(table, "| %s | `%s` | `%s` | %s |\n", f->name, plain, retried,
                     status == MBM_OK ? "" : mbm_statusText(status));
-        if (!as_good(plain, f->expected) || !as_good(retried, f->retried) || status != f->status) {
+        if (!fault_as_good(plain, f->expected) || !fault_as_good(retried, f->retried) || status != f->status) {
             printf("    worse: expected %s %s %s\n", f->expected, f->retried,
                    mbm_statusText(f->status));
             worse++;

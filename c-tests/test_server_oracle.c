@@ -258,6 +258,67 @@ static int prepare(void **state)
            mbm_server_serveMaskAndReadWrite(&holding);
 }
 
+/* The same memory behind functions, cell by cell. */
+static mbm_unit called;
+static mbm_cells callbacks[4];
+
+static uint8_t is_valid(void *context, uint16_t address)
+{
+    (void)context;
+    return (uint8_t)there(address, 1);
+}
+
+static uint16_t get(void *context, uint16_t address)
+{
+    unsigned i = (unsigned)address - BASE;
+
+    assert_true(there(address, 1));
+    switch ((int)((mbm_cells *)context - callbacks) + 1) {
+    case 1:
+        return memory.coils[i / 8] >> i % 8 & 1;
+    case 2:
+        return memory.discrete[i / 8] >> i % 8 & 1 ? 0x100 : 0;
+    case 3:
+        return memory.holding[i];
+    default:
+        return memory.inputs[i];
+    }
+}
+
+static void set(void *context, uint16_t address, uint16_t value)
+{
+    unsigned i = (unsigned)address - BASE;
+
+    assert_true(there(address, 1));
+    if (context == &callbacks[2]) {
+        memory.holding[i] = value;
+        return;
+    }
+    assert_true(context == &callbacks[0] && value <= 1);
+    memory.coils[i / 8] &= (uint8_t)~(1u << i % 8);
+    memory.coils[i / 8] |= (uint8_t)(value << i % 8);
+}
+
+static int prepare_callbacks(void **state)
+{
+    uint8_t i, status = MBM_OK;
+
+    (void)state;
+    called.id = UNIT;
+    for (i = 0; i < 4; i++) {
+        callbacks[i].isValid = is_valid;
+        callbacks[i].get = get;
+        callbacks[i].context = &callbacks[i];
+        if (i % 2 == 0) {
+            IS(MBM_INVALID_ARGUMENT, mbm_server_serveCallbacks(&called, &callbacks[i], (uint8_t)(i + 1)));
+            callbacks[i].set = set;
+        }
+        status |= mbm_server_serveCallbacks(&called, &callbacks[i], (uint8_t)(i + 1));
+    }
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveCallbacks(&called, &callbacks[0], 5));
+    return status;
+}
+
 static int untouched(const void *guard, size_t bytes)
 {
     const uint8_t *byte = (const uint8_t *)guard;
@@ -268,14 +329,13 @@ static int untouched(const void *guard, size_t bytes)
     return 1;
 }
 
-static void only_valid_writes_change_anything(void **state)
+static void ask(mbm_unit *asked)
 {
     const char *told = getenv("MBM_TRANSACTIONS");
     long rounds = told ? atol(told) : 1000000, round;
     uint8_t packed[2][CELLS / 8];
     unsigned i;
 
-    (void)state;
     for (round = 0; round < rounds; round++) {
         uint8_t pdu[300], expected[300], frame[256];
         uint16_t answered;
@@ -287,7 +347,7 @@ static void only_valid_writes_change_anything(void **state)
         seal(frame, length + 1);
         if (damaged)
             frame[below((unsigned)length + 3)] ^= (uint8_t)(1u << below(8));
-        OK(mbm_server_respond(MBM_FRAMING_RTU, &unit, 1, frame, (uint16_t)(length + 3), sizeof frame, &answered));
+        OK(mbm_server_respond(MBM_FRAMING_RTU, asked, 1, frame, (uint16_t)(length + 3), sizeof frame, &answered));
         if (damaged) {
             assert_int_equal(answered, 0);
         } else {
@@ -313,9 +373,24 @@ static void only_valid_writes_change_anything(void **state)
                 untouched(memory.bits_behind, GUARD));
 }
 
+static void only_valid_writes_change_an_array(void **state)
+{
+    (void)state;
+    ask(&unit);
+}
+
+static void only_valid_writes_reach_a_function(void **state)
+{
+    (void)state;
+    ask(&called);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(only_valid_writes_change_anything)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(only_valid_writes_change_an_array),
+        cmocka_unit_test_setup(only_valid_writes_reach_a_function, prepare_callbacks),
+    };
 
     return cmocka_run_group_tests(tests, prepare, NULL);
 }

@@ -237,6 +237,9 @@ public:
         mbm_server_setSilence(&state.server, us / 2);
     }
 
+    /** Drops the response itself where the receiver hears the driver; of RTU, after begin. */
+    void setEchoDiscard(bool on) { mbm_server_setEchoDiscard(&state.server, on); }
+
 private:
     static_assert(MODBUSSERVER_FRAME_BYTES >= 32 && MODBUSSERVER_FRAME_BYTES <= 256,
                   "MODBUSSERVER_FRAME_BYTES is 32 to 256");

@@ -32,6 +32,31 @@
 #endif
 
 /**
+ * The most requests that wait or are under way in one client.
+ */
+#define MBM_CLIENT_DEPTH 16
+
+/**
+ * mbm_client_setBackoff: a request is asked again at once.
+ */
+#define MBM_BACKOFF_NONE 0
+
+/**
+ * mbm_client_setBackoff: always the same wait.
+ */
+#define MBM_BACKOFF_FIXED 1
+
+/**
+ * mbm_client_setBackoff: once, twice, three times the wait, up to the most.
+ */
+#define MBM_BACKOFF_LINEAR 2
+
+/**
+ * mbm_client_setBackoff: once, twice, four times the wait, up to the most.
+ */
+#define MBM_BACKOFF_EXPONENTIAL 3
+
+/**
  * Serial line, binary, CRC-16 (serial line guide V1.02, 2.5.1).
  */
 #define MBM_FRAMING_RTU 0
@@ -409,6 +434,67 @@
 #define MBM_REPLY_PENDING 768
 
 /**
+ * A request.
+ */
+#define MBM_EVENT_REQUEST 0
+
+/**
+ * The reply to a request.
+ */
+#define MBM_EVENT_REPLY 1
+
+/**
+ * The exception that answers a request.
+ */
+#define MBM_EVENT_EXCEPTION 2
+
+/**
+ * A reply or exception to no request that waits for one: a late one, one whose
+ * request was not seen, or one that does not answer what was asked.
+ */
+#define MBM_EVENT_UNPAIRED 3
+
+/**
+ * A request that nobody answered within the timeout, or before the next request.
+ */
+#define MBM_EVENT_TIMEOUT 4
+
+/**
+ * What looks like a frame, but has a wrong CRC or LRC, or too few bytes.
+ */
+#define MBM_EVENT_BAD_CRC 5
+
+/**
+ * Bytes that are no frame.
+ */
+#define MBM_EVENT_NOISE 6
+
+/**
+ * Heard on a line that carries both directions.
+ */
+#define MBM_TAP_BOTH 0
+
+/**
+ * Heard where only the client sends.
+ */
+#define MBM_TAP_CLIENT 1
+
+/**
+ * Heard where only servers send.
+ */
+#define MBM_TAP_SERVER 2
+
+/**
+ * Least bytes of a sniffer's buffer.
+ */
+#define MBM_MIN_SNIFFER_BUFFER 32
+
+/**
+ * Most functions of your own that a sniffer takes.
+ */
+#define MBM_MAX_SNIFFER_FUNCTIONS 19
+
+/**
  * The call succeeded.
  */
 #define MBM_OK 0
@@ -545,6 +631,189 @@
 #define MBM_MALFORMED_FRAME 239
 
 /**
+ * The client has 16 requests already; nothing was queued.
+ */
+#define MBM_QUEUE_FULL 240
+
+/**
+ * Another pending request of the client has this transaction id; nothing was
+ * queued.
+ */
+#define MBM_DUPLICATE_TRANSACTION 241
+
+/**
+ * The request has ended already, or was never queued.
+ */
+#define MBM_NOT_PENDING 242
+
+/**
+ * A client of one serial line or one TCP stream: up to 16 requests are queued,
+ * mbm_client_poll moves them on, and nothing ever waits.
+ *
+ * Storage is yours and must be zero before first use, which a static object is.
+ * One of the mbm_client_begin functions comes first. Not re-entrant: use one
+ * object from one thread and never from an interrupt; several objects are
+ * independent of each other.
+ */
+typedef struct mbm_client {
+    /**
+     * Not for you.
+     */
+    void *pointers[47];
+    /**
+     * Not for you.
+     */
+    uint32_t words[18];
+} mbm_client;
+
+/**
+ * A request to a device, and what comes of it. Yours, and zero before you set
+ * the fields that you need; it may be used again and again.
+ *
+ * From the call that queues it until it has ended, which `done` or `status`
+ * tells, leave it alone, and what it points to. Data and reply are words in the
+ * machine's byte order where a function transfers registers; where it transfers
+ * coils or bytes, they are bytes as on the wire, of coils the lowest bit first.
+ */
+typedef struct mbm_clientRequest {
+    /**
+     * Optional: called by mbm_client_poll when the request has ended. It may
+     * queue requests, this one too, and cancel others.
+     */
+    void (*done)(void *context, struct mbm_clientRequest *request);
+    /**
+     * Handed to `done`. Yours, may be NULL.
+     */
+    void *context;
+    /**
+     * What functions that write send.
+     */
+    const void *data;
+    /**
+     * What functions that read fill; NULL if only the status is wanted.
+     */
+    void *reply;
+    /**
+     * Bytes that `reply` has room for.
+     */
+    uint16_t replyBytes;
+    /**
+     * A number of yours. On TCP no two pending requests may have the same one,
+     * but for 0.
+     */
+    uint16_t transaction;
+    /**
+     * Whom it is for: 1 to 247 on a serial line, 0 is everybody there; 1 to 255
+     * on TCP.
+     */
+    uint8_t unit;
+    /**
+     * MBM_PENDING from being queued to its end, then how it ended.
+     */
+    uint8_t status;
+    /**
+     * The raw exception code of the response; 0 if it was none.
+     */
+    uint8_t exception;
+    /**
+     * Bytes received in `reply`.
+     */
+    uint8_t length;
+    /**
+     * Not for you.
+     */
+    uint32_t words[8];
+} mbm_clientRequest;
+
+/**
+ * What the firmware supplies: a byte stream, a clock, and optional hooks.
+ *
+ * Copied by mbm_master_begin; only `context` must stay valid. Hooks that are
+ * NULL are not called; `read`, `write` and `micros` must be there. No hook
+ * may call a function on the object that called it, except that `idle` may:
+ * it is told MBM_BUSY, and getters work.
+ */
+typedef struct mbm_port {
+    /**
+     * Handed to every hook. Yours, may be NULL.
+     */
+    void *context;
+    /**
+     * Takes up to `capacity` received bytes without waiting. Returns how
+     * many, 0 if none has arrived yet, negative if the link is lost.
+     */
+    int16_t (*read)(void *context, uint8_t *bytes, uint16_t capacity);
+    /**
+     * Accepts up to `length` bytes to send without waiting for the wire.
+     * Returns how many, 0 if none just now, negative if the link is lost.
+     */
+    int16_t (*write)(void *context, const uint8_t *bytes, uint16_t length);
+    /**
+     * A clock in microseconds that wraps at 2^32. A platform with a
+     * millisecond tick returns `tick * 1000`.
+     */
+    uint32_t (*micros)(void *context);
+    /**
+     * Optional: 1 once the last bit has left, 0 while bits are to come. It
+     * may wait for the last bit instead and return 1.
+     */
+    uint8_t (*flush)(void *context);
+    /**
+     * Optional: called before the first byte of a request (RS-485 driver on).
+     */
+    void (*preTransmission)(void *context);
+    /**
+     * Optional: called after the last bit of a request (RS-485 driver off).
+     */
+    void (*postTransmission)(void *context);
+    /**
+     * Optional: called again and again while a blocking call waits, never
+     * between preTransmission and postTransmission. It may take its time, and
+     * ask mbm_master_pollDelay how much of it there is.
+     */
+    void (*idle)(void *context);
+} mbm_port;
+
+/**
+ * What closes a link and opens it anew, for mbm_client_reconnect.
+ */
+typedef struct mbm_link {
+    /**
+     * Handed to both hooks. Yours, may be NULL.
+     */
+    void *context;
+    /**
+     * Optional: closes the link, if it is open.
+     */
+    void (*disconnect)(void *context);
+    /**
+     * Optional: opens the link without waiting. Returns MBM_OK, MBM_PENDING if
+     * that goes on while the port takes no bytes yet, or another status.
+     */
+    uint8_t (*connect)(void *context);
+} mbm_link;
+
+/**
+ * A Modbus RTU master: one line, one request at a time.
+ *
+ * Storage is yours and must be zero before first use, which a static object
+ * is (`static mbm_master node;`). Settings and words want mbm_master_begin or
+ * mbm_master_setBuffers before them, requests want both. Not re-entrant: use
+ * one object from one thread and never from an interrupt; several objects are
+ * independent of each other.
+ */
+typedef struct mbm_master {
+    /**
+     * Not for you.
+     */
+    void *pointers[21];
+    /**
+     * Not for you.
+     */
+    uint32_t words[19];
+} mbm_master;
+
+/**
  * How long the PDU of a function of your own is, function code included.
  * Zeroed: as long as its frame.
  */
@@ -563,6 +832,93 @@ typedef struct mbm_rule {
      */
     uint8_t more;
 } mbm_rule;
+
+/**
+ * What happened on the line, since the caller zeroed it. Each wraps at 2^32.
+ */
+typedef struct mbm_counters {
+    /**
+     * Requests sent, retries included.
+     */
+    uint32_t requests;
+    /**
+     * Replies that answered a request, exceptions included.
+     */
+    uint32_t replies;
+    /**
+     * Replies that were exceptions.
+     */
+    uint32_t exceptions;
+    /**
+     * Requests whose reply arrived damaged.
+     */
+    uint32_t badCrc;
+    /**
+     * Requests that were not answered in time.
+     */
+    uint32_t timeouts;
+    /**
+     * Frames with a right CRC of other units, or that answered no request of
+     * ours, while a reply was waited for.
+     */
+    uint32_t foreignFrames;
+    /**
+     * Replies that were found behind bytes that were no frame.
+     */
+    uint32_t resynchronisations;
+    /**
+     * Bytes sent.
+     */
+    uint32_t bytesSent;
+    /**
+     * Bytes received, foreign ones and noise included.
+     */
+    uint32_t bytesReceived;
+} mbm_counters;
+
+/**
+ * What is kept for one unit, in an array of yours for mbm_client_setUnits. The
+ * counts are yours to read and to zero; each wraps at 2^32.
+ */
+typedef struct mbm_clientUnit {
+    /**
+     * Requests that ended, retries apart.
+     */
+    uint32_t requests;
+    /**
+     * Of these, those that were answered, exceptions included.
+     */
+    uint32_t replies;
+    /**
+     * Of the answers, those that were exceptions.
+     */
+    uint32_t exceptions;
+    /**
+     * Requests that were asked again.
+     */
+    uint32_t retries;
+    /**
+     * Set by you: rest for this unit from the end of a request to the next, in
+     * microseconds.
+     */
+    uint32_t delay;
+    /**
+     * Not for you.
+     */
+    uint32_t last;
+    /**
+     * Set by you: which unit this is.
+     */
+    uint8_t unit;
+    /**
+     * How the last request ended, MBM_OK if there was none.
+     */
+    uint8_t status;
+    /**
+     * Not for you.
+     */
+    uint8_t tired;
+} mbm_clientUnit;
 
 /**
  * A function of your own. Codes 65 to 72 and 100 to 110 are left to users, of
@@ -764,118 +1120,6 @@ typedef struct mbm_length {
      */
     uint8_t kind;
 } mbm_length;
-
-/**
- * A Modbus RTU master: one line, one request at a time.
- *
- * Storage is yours and must be zero before first use, which a static object
- * is (`static mbm_master node;`). Settings and words want mbm_master_begin or
- * mbm_master_setBuffers before them, requests want both. Not re-entrant: use
- * one object from one thread and never from an interrupt; several objects are
- * independent of each other.
- */
-typedef struct mbm_master {
-    /**
-     * Not for you.
-     */
-    void *pointers[21];
-    /**
-     * Not for you.
-     */
-    uint32_t words[19];
-} mbm_master;
-
-/**
- * What the firmware supplies: a byte stream, a clock, and optional hooks.
- *
- * Copied by mbm_master_begin; only `context` must stay valid. Hooks that are
- * NULL are not called; `read`, `write` and `micros` must be there. No hook
- * may call a function on the object that called it, except that `idle` may:
- * it is told MBM_BUSY, and getters work.
- */
-typedef struct mbm_port {
-    /**
-     * Handed to every hook. Yours, may be NULL.
-     */
-    void *context;
-    /**
-     * Takes up to `capacity` received bytes without waiting. Returns how
-     * many, 0 if none has arrived yet, negative if the link is lost.
-     */
-    int16_t (*read)(void *context, uint8_t *bytes, uint16_t capacity);
-    /**
-     * Accepts up to `length` bytes to send without waiting for the wire.
-     * Returns how many, 0 if none just now, negative if the link is lost.
-     */
-    int16_t (*write)(void *context, const uint8_t *bytes, uint16_t length);
-    /**
-     * A clock in microseconds that wraps at 2^32. A platform with a
-     * millisecond tick returns `tick * 1000`.
-     */
-    uint32_t (*micros)(void *context);
-    /**
-     * Optional: 1 once the last bit has left, 0 while bits are to come. It
-     * may wait for the last bit instead and return 1.
-     */
-    uint8_t (*flush)(void *context);
-    /**
-     * Optional: called before the first byte of a request (RS-485 driver on).
-     */
-    void (*preTransmission)(void *context);
-    /**
-     * Optional: called after the last bit of a request (RS-485 driver off).
-     */
-    void (*postTransmission)(void *context);
-    /**
-     * Optional: called again and again while a blocking call waits, never
-     * between preTransmission and postTransmission. It may take its time, and
-     * ask mbm_master_pollDelay how much of it there is.
-     */
-    void (*idle)(void *context);
-} mbm_port;
-
-/**
- * What happened on the line, since the caller zeroed it. Each wraps at 2^32.
- */
-typedef struct mbm_counters {
-    /**
-     * Requests sent, retries included.
-     */
-    uint32_t requests;
-    /**
-     * Replies that answered a request, exceptions included.
-     */
-    uint32_t replies;
-    /**
-     * Replies that were exceptions.
-     */
-    uint32_t exceptions;
-    /**
-     * Requests whose reply arrived damaged.
-     */
-    uint32_t badCrc;
-    /**
-     * Requests that were not answered in time.
-     */
-    uint32_t timeouts;
-    /**
-     * Frames with a right CRC of other units, or that answered no request of
-     * ours, while a reply was waited for.
-     */
-    uint32_t foreignFrames;
-    /**
-     * Replies that were found behind bytes that were no frame.
-     */
-    uint32_t resynchronisations;
-    /**
-     * Bytes sent.
-     */
-    uint32_t bytesSent;
-    /**
-     * Bytes received, foreign ones and noise included.
-     */
-    uint32_t bytesReceived;
-} mbm_counters;
 
 /**
  * Registers in a row, seen as values by the addresses that the device gives
@@ -1090,17 +1334,16 @@ typedef struct mbm_unit {
     /**
      * Not for you.
      */
-    uint16_t (*monitor)(struct mbm_unit *unit,
-                        const void *heading,
-                        uint8_t concern,
-                        uint8_t *pdu);
+    uint16_t (*serve)(struct mbm_unit *unit,
+                      const void *heading,
+                      uint8_t concern,
+                      uint8_t *pdu);
     /**
      * Not for you.
      */
     struct mbm_diagnostics *diagnostics;
     /**
-     * The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers, over TCP,
-     * to every id.
+     * The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers to every id.
      */
     uint8_t id;
 } mbm_unit;
@@ -1142,6 +1385,10 @@ typedef struct mbm_cells {
      * As in mbm_registerTable.
      */
     void (*after)(void *context, uint16_t address, uint16_t quantity);
+    /**
+     * Not for you.
+     */
+    uint8_t kind;
 } mbm_cells;
 
 /**
@@ -1475,6 +1722,106 @@ typedef struct mbm_registerTable {
     uint8_t kind;
 } mbm_registerTable;
 
+/**
+ * A sniffer: finds the frames on a bus that others use, and pairs requests with
+ * replies. It only listens, and has no port: you feed it what you hear.
+ *
+ * Storage is yours and must be zero before first use, which a static object is.
+ * Everything but mbm_sniffer_begin wants that before. Not re-entrant: use one
+ * object from one thread and never from an interrupt; put an mbm_ring between.
+ */
+typedef struct mbm_sniffer {
+    /**
+     * Not for you.
+     */
+    void *pointers[1];
+    /**
+     * Not for you.
+     */
+    uint32_t words[164];
+} mbm_sniffer;
+
+/**
+ * Something that happened on the bus.
+ *
+ * What it points to lies in the sniffer's buffer, and is valid until the next
+ * call with that sniffer.
+ */
+typedef struct mbm_event {
+    /**
+     * The frame; of noise the bytes. An ASCII frame is decoded: unit, PDU, LRC.
+     */
+    const uint8_t *frame;
+    /**
+     * The PDU in the frame; NULL if there is none.
+     */
+    const uint8_t *pdu;
+    /**
+     * What the PDU says, as mbm_packet_parse tells it. If it cannot be read, of a
+     * timeout and of what is no frame: kind, unit, transaction and function alone.
+     */
+    struct mbm_packet packet;
+    /**
+     * When its last byte arrived, in microseconds; of a timeout when the request
+     * was given up.
+     */
+    uint32_t time;
+    /**
+     * From the last byte of the request to the last byte of its reply, or until it
+     * was given up, in microseconds; else 0.
+     */
+    uint32_t responseTime;
+    /**
+     * Bytes of `frame`.
+     */
+    uint16_t frameLength;
+    /**
+     * Bytes of `pdu`.
+     */
+    uint16_t pduLength;
+    /**
+     * How many bytes on the line this was.
+     */
+    uint16_t length;
+    /**
+     * What this is about, also of a reply that does not say so itself: the first
+     * coil, input or register of the request; 17: that is read.
+     */
+    uint16_t address;
+    /**
+     * How many; 17: that are read.
+     */
+    uint16_t quantity;
+    /**
+     * One of MBM_EVENT_.
+     */
+    uint8_t kind;
+    /**
+     * MBM_OK; of a request the exception that a server answers to it; the code of
+     * an exception; MBM_MALFORMED_REPLY if a reply does not answer what was asked;
+     * MBM_RESPONSE_TIMED_OUT; MBM_INVALID_CRC; MBM_BUFFER_TOO_SMALL of noise that
+     * may have been a frame longer than the buffer.
+     */
+    uint8_t status;
+    /**
+     * The unit that is asked, or answers; of a bad CRC the byte in its place.
+     */
+    uint8_t unit;
+    /**
+     * The function code, of an exception that of the request; of a bad CRC the
+     * byte in its place.
+     */
+    uint8_t function;
+    /**
+     * The first bytes of the request's PDU, of replies and timeouts.
+     */
+    uint8_t asked[9];
+    /**
+     * How many those are; 0 if the request is not known.
+     */
+    uint8_t askedLength;
+} mbm_event;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -1611,6 +1958,690 @@ uint8_t mbm_bits_setInWords(uint16_t *words,
                             uint16_t quantity,
                             uint16_t address,
                             uint8_t on);
+
+/**
+ * Moves all requests on, without waiting, and calls `done` of those that have
+ * ended, of at most 17 in one call.
+ *
+ * Call it as often as you like; mbm_client_pollDelay tells when the next call
+ * is due.
+ *
+ * @param client  the object
+ * @return MBM_PENDING while requests wait or are under way, MBM_OK if there are
+ *         none, MBM_BUSY from within `done` and while the line is lent;
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_poll(struct mbm_client *client);
+
+/**
+ * How long mbm_client_poll will find nothing to do unless a byte arrives, so
+ * that a program may wait for one in select, or sleep, until then.
+ *
+ * @param client  the object
+ * @return microseconds; 0 means poll now, 0xFFFFFFFF that there is no request
+ */
+uint32_t mbm_client_pollDelay(const struct mbm_client *client);
+
+/**
+ * How many requests wait or are under way.
+ *
+ * @param client  the object
+ * @return 0 to 16
+ */
+uint8_t mbm_client_pending(const struct mbm_client *client);
+
+/**
+ * Gives a request up. It is yours again at once, with the status MBM_CANCELLED;
+ * `done` is not called. It may have reached the device, and may still be answered.
+ *
+ * @param client   the object
+ * @param request  a request that this client was given
+ * @return MBM_OK; MBM_NOT_PENDING, with nothing changed, for a request that has
+ *         ended already or was never queued here; MBM_INVALID_ARGUMENT or
+ *         MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_cancel(struct mbm_client *client, struct mbm_clientRequest *request);
+
+/**
+ * Makes an object a client of a serial line, in RTU frames (serial line guide
+ * V1.02, 2.5.1).
+ *
+ * @param client      the object, zeroed
+ * @param port        copied; read, write and micros must be there
+ * @param frame       bytes of one frame, valid for as long as the client is used
+ * @param frameBytes  at least 8; 256 hold any frame
+ * @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
+ *         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_client_beginRtu(struct mbm_client *client,
+                            const struct mbm_port *port,
+                            uint8_t *frame,
+                            uint16_t frameBytes);
+
+/**
+ * Makes an object a client of a serial line, in ASCII frames (serial line guide
+ * V1.02, 2.5.2). No gap is kept between frames; a second without a character
+ * ends one that is not whole.
+ *
+ * @param client      the object, zeroed
+ * @param port        copied; read, write and micros must be there
+ * @param frame       bytes of one frame, valid for as long as the client is used
+ * @param frameBytes  at least 17; 513 hold any frame
+ * @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
+ *         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_client_beginAscii(struct mbm_client *client,
+                              const struct mbm_port *port,
+                              uint8_t *frame,
+                              uint16_t frameBytes);
+
+/**
+ * Makes an object a client that sends RTU frames through a TCP stream, for
+ * converters that pass on what they get. No gap is kept, nothing is broadcast.
+ *
+ * @param client      the object, zeroed
+ * @param port        copied; read, write and micros must be there
+ * @param frame       bytes of one frame, valid for as long as the client is used
+ * @param frameBytes  at least 8; 256 hold any frame
+ * @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
+ *         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
+                                   const struct mbm_port *port,
+                                   uint8_t *frame,
+                                   uint16_t frameBytes);
+
+/**
+ * Makes an object a client of a TCP stream, in frames with the MBAP header
+ * (messaging on TCP/IP guide V1.0b, 3.1.3). All 16 requests may be under way at
+ * once; responses are matched by their transaction id, in any order.
+ *
+ * @param client         the object, zeroed
+ * @param port           copied; read, write and micros must be there
+ * @param incoming       received bytes, valid for as long as the client is used
+ * @param incomingBytes  at least 9; 260 hold any frame, more take in more
+ *                       responses at a time
+ * @param outgoing       bytes to send, valid for as long as the client is used
+ * @param outgoingBytes  at least 12; 260 hold any frame, more gather more
+ *                       requests for one write
+ * @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
+ *         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_client_beginTcp(struct mbm_client *client,
+                            const struct mbm_port *port,
+                            uint8_t *incoming,
+                            uint16_t incomingBytes,
+                            uint8_t *outgoing,
+                            uint16_t outgoingBytes);
+
+/**
+ * Closes the link and opens it anew. What was half received is forgotten, and
+ * requests that were under way end with MBM_LINK_LOST at the next polls; those
+ * that still waited go over the new link.
+ *
+ * @param client  the object
+ * @param link    what does it, used during this call only; NULL if that has been
+ *                done already
+ * @return what `connect` returns, MBM_OK without it; MBM_BUSY while the line is
+ *         lent, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_reconnect(struct mbm_client *client, const struct mbm_link *link);
+
+/**
+ * Whether the link is not known to be lost.
+ *
+ * @param client  the object
+ * @return 0 from a request that ended with MBM_LINK_LOST on, until one succeeds
+ *         or mbm_client_reconnect is called; 1 else
+ */
+uint8_t mbm_client_isConnected(const struct mbm_client *client);
+
+/**
+ * Lends the line to a facade, whose functions then use the client's port; the
+ * client's requests wait until mbm_client_takeBack. One of the two has the line
+ * at any time.
+ *
+ * @param client  the object, of a serial line or of RTU over TCP
+ * @param master  a facade with buffers, which gets the client's port; NULL if
+ *                you use the line in another way
+ * @return MBM_OK; MBM_BUSY if a request is under way or the line is lent already;
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_lend(struct mbm_client *client, struct mbm_master *master);
+
+/**
+ * Takes the line back. The facade has no port then, so that its functions refuse
+ * with MBM_NOT_INITIALISED.
+ *
+ * @param client  the object
+ * @param master  as for mbm_client_lend
+ * @return MBM_OK, MBM_BUSY while the facade has a request under way,
+ *         MBM_INVALID_ARGUMENT if the line was not lent, MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_takeBack(struct mbm_client *client, struct mbm_master *master);
+
+/**
+ * Function 01: reads coils into `reply`, eight to a byte, the lowest bit first, the
+ * last byte padded with zeros (V1.1b3, 6.1).
+ *
+ * This and the other functions behave alike: they queue a request and return. The
+ * request has ended when its `status` is no longer MBM_PENDING: MBM_OK, an exception
+ * of the device (0x01 to 0x7F), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
+ * MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION, MBM_LINK_LOST,
+ * MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes on MBM_OK only.
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  first coil, 0 to 65535, as on the wire
+ * @param quantity  1 to 2000
+ * @return MBM_PENDING: the request is queued; or, with nothing queued,
+ *         MBM_ILLEGAL_DATA_VALUE or MBM_ILLEGAL_DATA_ADDRESS for what no device
+ *         could accept, MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL,
+ *         MBM_DUPLICATE_TRANSACTION, MBM_BUFFER_TOO_SMALL if `reply` has no room
+ *         for the data, MBM_INVALID_ARGUMENT for `data` that are NULL,
+ *         MBM_NOT_INITIALISED; MBM_BUSY, with the request unchanged, if it is
+ *         pending already
+ */
+uint8_t mbm_client_readCoils(struct mbm_client *client,
+                             struct mbm_clientRequest *request,
+                             uint16_t address,
+                             uint16_t quantity);
+
+/**
+ * Function 01: reads one coil into the lowest bit of a byte (V1.1b3, 6.1).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  0 to 65535, as on the wire
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readSingleCoil(struct mbm_client *client,
+                                  struct mbm_clientRequest *request,
+                                  uint16_t address);
+
+/**
+ * Function 02: reads discrete inputs, as mbm_client_readCoils (V1.1b3, 6.2).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  first input, 0 to 65535, as on the wire
+ * @param quantity  1 to 2000
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readDiscreteInputs(struct mbm_client *client,
+                                      struct mbm_clientRequest *request,
+                                      uint16_t address,
+                                      uint16_t quantity);
+
+/**
+ * Function 02: reads one discrete input into the lowest bit of a byte (V1.1b3, 6.2).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  0 to 65535, as on the wire
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readSingleDiscreteInput(struct mbm_client *client,
+                                           struct mbm_clientRequest *request,
+                                           uint16_t address);
+
+/**
+ * Function 03: reads holding registers into the words of `reply` (V1.1b3, 6.3).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  first register, 0 to 65535, as on the wire
+ * @param quantity  1 to 125
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readHoldingRegisters(struct mbm_client *client,
+                                        struct mbm_clientRequest *request,
+                                        uint16_t address,
+                                        uint16_t quantity);
+
+/**
+ * Function 03: reads one holding register into a word (V1.1b3, 6.3).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  0 to 65535, as on the wire
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readSingleHoldingRegister(struct mbm_client *client,
+                                             struct mbm_clientRequest *request,
+                                             uint16_t address);
+
+/**
+ * Function 04: reads input registers into the words of `reply` (V1.1b3, 6.4).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  first register, 0 to 65535, as on the wire
+ * @param quantity  1 to 125
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readInputRegisters(struct mbm_client *client,
+                                      struct mbm_clientRequest *request,
+                                      uint16_t address,
+                                      uint16_t quantity);
+
+/**
+ * Function 04: reads one input register into a word (V1.1b3, 6.4).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  0 to 65535, as on the wire
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readSingleInputRegister(struct mbm_client *client,
+                                           struct mbm_clientRequest *request,
+                                           uint16_t address);
+
+/**
+ * Function 05: switches a coil (V1.1b3, 6.5).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  0 to 65535, as on the wire
+ * @param on  0 is off, anything else is on
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_writeSingleCoil(struct mbm_client *client,
+                                   struct mbm_clientRequest *request,
+                                   uint16_t address,
+                                   uint8_t on);
+
+/**
+ * Function 06: writes a holding register (V1.1b3, 6.6).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  0 to 65535, as on the wire
+ * @param value  the value
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_writeSingleRegister(struct mbm_client *client,
+                                       struct mbm_clientRequest *request,
+                                       uint16_t address,
+                                       uint16_t value);
+
+/**
+ * Function 0F: writes the coils of `data`, eight to a byte, the lowest bit first
+ * (V1.1b3, 6.11).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  first coil, 0 to 65535, as on the wire
+ * @param quantity  1 to 1968
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_writeMultipleCoils(struct mbm_client *client,
+                                      struct mbm_clientRequest *request,
+                                      uint16_t address,
+                                      uint16_t quantity);
+
+/**
+ * Function 10: writes the words of `data` (V1.1b3, 6.12).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  first register, 0 to 65535, as on the wire
+ * @param quantity  1 to 123
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_writeMultipleRegisters(struct mbm_client *client,
+                                          struct mbm_clientRequest *request,
+                                          uint16_t address,
+                                          uint16_t quantity);
+
+/**
+ * Function 16: sets a holding register to (register & andMask) | (orMask & ~andMask)
+ * (V1.1b3, 6.16).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  0 to 65535, as on the wire
+ * @param andMask  bits to keep
+ * @param orMask  bits to set where none are kept
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_maskWriteRegister(struct mbm_client *client,
+                                     struct mbm_clientRequest *request,
+                                     uint16_t address,
+                                     uint16_t andMask,
+                                     uint16_t orMask);
+
+/**
+ * Function 17: writes the words of `data`, then reads into the words of `reply`
+ * (V1.1b3, 6.17).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param readAddress  first register to read
+ * @param readQuantity  1 to 125
+ * @param writeAddress  first register to write
+ * @param writeQuantity  1 to 121
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readWriteMultipleRegisters(struct mbm_client *client,
+                                              struct mbm_clientRequest *request,
+                                              uint16_t readAddress,
+                                              uint16_t readQuantity,
+                                              uint16_t writeAddress,
+                                              uint16_t writeQuantity);
+
+/**
+ * Function 07: reads eight outputs into a byte (V1.1b3, 6.7).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readExceptionStatus(struct mbm_client *client,
+                                       struct mbm_clientRequest *request);
+
+/**
+ * Function 08: sends the words of `data`, and reads as many into `reply` (V1.1b3,
+ * 6.8). Nobody responds to sub-function 04, Force Listen Only Mode.
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param subFunction  0 (Return Query Data) to 0x14
+ * @param words  1; 1 to 125 for sub-function 0
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_diagnostics(struct mbm_client *client,
+                               struct mbm_clientRequest *request,
+                               uint16_t subFunction,
+                               uint16_t words);
+
+/**
+ * Function 0B: reads the status word and the event count into two words (V1.1b3,
+ * 6.9).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_getCommEventCounter(struct mbm_client *client,
+                                       struct mbm_clientRequest *request);
+
+/**
+ * Function 0C: reads status, event count and message count, two bytes each with the
+ * high byte first, and up to 64 events, the latest first (V1.1b3, 6.10).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_getCommEventLog(struct mbm_client *client,
+                                   struct mbm_clientRequest *request);
+
+/**
+ * Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_reportServerId(struct mbm_client *client,
+                                  struct mbm_clientRequest *request);
+
+/**
+ * Function 14: reads records in a row of one file into words (V1.1b3, 6.14).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param file  1 to 65535
+ * @param record  first record, 0 to 9999
+ * @param quantity  1 to 121
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readFileRecord(struct mbm_client *client,
+                                  struct mbm_clientRequest *request,
+                                  uint16_t file,
+                                  uint16_t record,
+                                  uint16_t quantity);
+
+/**
+ * Function 15: writes the words of `data` to records in a row of one file (V1.1b3,
+ * 6.15).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param file  1 to 65535
+ * @param record  first record, 0 to 9999
+ * @param quantity  1 to 122
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_writeFileRecord(struct mbm_client *client,
+                                   struct mbm_clientRequest *request,
+                                   uint16_t file,
+                                   uint16_t record,
+                                   uint16_t quantity);
+
+/**
+ * Function 14 of several groups: `data` are the sub-requests as on the wire, seven
+ * bytes each; `reply` gets the sub-responses as on the wire (V1.1b3, 6.14).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param bytes  7 to 245, a multiple of 7
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readFileRecords(struct mbm_client *client,
+                                   struct mbm_clientRequest *request,
+                                   uint16_t bytes);
+
+/**
+ * Function 15 of several groups: `data` are the sub-requests as on the wire (V1.1b3,
+ * 6.15).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param bytes  9 to 251
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_writeFileRecords(struct mbm_client *client,
+                                    struct mbm_clientRequest *request,
+                                    uint16_t bytes);
+
+/**
+ * Function 18: reads up to 31 registers of a queue into words (V1.1b3, 6.18).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  the pointer address of the queue
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readFifoQueue(struct mbm_client *client,
+                                 struct mbm_clientRequest *request,
+                                 uint16_t address);
+
+/**
+ * Function 2B/0E: reads objects that identify the device (V1.1b3, 6.21). `reply` gets,
+ * as on the wire, conformity level, more follows (0 or FF), the next object id, how
+ * many objects there are, and of each its id, length and value.
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param code  1 basic, 2 regular, 3 extended, 4 one object
+ * @param object  the object to begin with
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readDeviceIdentification(struct mbm_client *client,
+                                            struct mbm_clientRequest *request,
+                                            uint8_t code,
+                                            uint8_t object);
+
+/**
+ * Function 2B of any MEI type: sends bytes of `data` and reads what comes (V1.1b3,
+ * 6.19). On RTU, silence ends the response.
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param meiType  0x0D is CANopen
+ * @param bytes  0 to 251
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_encapsulatedInterfaceTransport(struct mbm_client *client,
+                                                  struct mbm_clientRequest *request,
+                                                  uint8_t meiType,
+                                                  uint16_t bytes);
+
+/**
+ * Any function: sends bytes of `data` behind the function code, and reads what is
+ * behind it in the response.
+ *
+ * @param client    the object
+ * @param request   the request
+ * @param function  1 to 127
+ * @param bytes     0 to 252
+ * @param response  how long the response is; used during this call only
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_custom(struct mbm_client *client,
+                          struct mbm_clientRequest *request,
+                          uint8_t function,
+                          uint16_t bytes,
+                          const struct mbm_rule *response);
+
+/**
+ * Sets how long a response may take, from the end of the request on a serial
+ * line, from its being handed to the port on TCP.
+ *
+ * @param client        the object
+ * @param milliseconds  0 to 65535; 2000 at first
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setResponseTimeout(struct mbm_client *client, uint16_t milliseconds);
+
+/**
+ * Tells the baud rate of an RTU line, from which the gap before a request (t3.5,
+ * serial line guide V1.02, 2.5.1.1) and the length of a character follow. It sets
+ * nothing on the line. Untold, the gap is 4 ms, which is safe from 9600 up.
+ *
+ * @param client  the object
+ * @param baud    bits per second; 0 goes back to untold
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setBaudRate(struct mbm_client *client, uint32_t baud);
+
+/**
+ * Sets the silence before a request, in place of t3.5; a later
+ * mbm_client_setBaudRate sets it back. Without effect on TCP.
+ *
+ * @param client        the object
+ * @param microseconds  counted from the last byte seen or sent
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setGap(struct mbm_client *client, uint32_t microseconds);
+
+/**
+ * Sets how long a request takes that nobody responds to: a broadcast (serial
+ * line guide V1.02, 2.4.1), and 08 with sub-function 04.
+ *
+ * @param client        the object
+ * @param milliseconds  0 to 65535; 100 at first
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setTurnaroundDelay(struct mbm_client *client, uint16_t milliseconds);
+
+/**
+ * Sets how long a serial line is left alone after a request that got no right
+ * reply; see mbm_master_setQuietTime.
+ *
+ * @param client        the object
+ * @param milliseconds  0 to 65535; 100 at first
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setQuietTime(struct mbm_client *client, uint16_t milliseconds);
+
+/**
+ * Tells that the receiver hears what the driver sends, so each request comes back
+ * before its reply and is to be dropped. Without effect on TCP.
+ *
+ * @param client  the object
+ * @param on      0 (at first) or 1
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setEchoDiscard(struct mbm_client *client, uint8_t on);
+
+/**
+ * Holds the driver on after the port's flush, for platforms whose flush returns
+ * before the last bit has left. Without effect on TCP.
+ *
+ * @param client      the object
+ * @param characters  times one character of the told baud rate (9600 if untold);
+ *                    0 at first
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setPostFlushHold(struct mbm_client *client, uint8_t characters);
+
+/**
+ * Sets how often a request is repeated whose response is missing, damaged or
+ * malformed. Exceptions are responses and are not repeated, nor is what a lost link
+ * interrupted.
+ *
+ * @param client   the object
+ * @param retries  0 to 255; 0 at first
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setRetries(struct mbm_client *client, uint8_t retries);
+
+/**
+ * Sets how long a request waits before it is repeated. Other requests are sent
+ * meanwhile.
+ *
+ * @param client            the object
+ * @param backoff           MBM_BACKOFF_NONE (at first) to MBM_BACKOFF_EXPONENTIAL
+ * @param milliseconds      the wait before the first repetition
+ * @param mostMilliseconds  the longest wait
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setBackoff(struct mbm_client *client,
+                              uint8_t backoff,
+                              uint16_t milliseconds,
+                              uint16_t mostMilliseconds);
+
+/**
+ * Leaves a part of each wait before a repetition to chance, so that several
+ * clients do not keep in step.
+ *
+ * @param client   the object
+ * @param percent  0 (at first) to 100: how much of the wait may be taken off
+ * @param random   gives any number, another each time; it may not use the client
+ * @param context  handed to `random`
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setJitter(struct mbm_client *client,
+                             uint8_t percent,
+                             uint32_t (*random)(void *context),
+                             void *context);
+
+/**
+ * Counts into storage of yours from now on. Read and zero it as you like, but not
+ * from an interrupt. On TCP, foreign frames are those with an id that nobody waits
+ * for, and resynchronisations are bytes that were no frame.
+ *
+ * @param client    the object
+ * @param counters  zeroed by you; NULL stops counting
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setCounters(struct mbm_client *client, struct mbm_counters *counters);
+
+/**
+ * Keeps a record of some units: how often they were asked and answered, and how
+ * long each is left alone between two requests.
+ *
+ * @param client  the object
+ * @param units   zeroed by you but for `unit` and `delay`; NULL for none
+ * @param count   how many records, 0 to 255
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setUnits(struct mbm_client *client,
+                            struct mbm_clientUnit *units,
+                            uint8_t count);
 
 /**
  * Writes the frame of a packet: request, response or exception. Nothing
@@ -3157,6 +4188,18 @@ uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t microseconds);
 uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
 
 /**
+ * Tells that the receiver of an RTU line hears what the driver sends, so that as
+ * many bytes as were sent are dropped behind each response. mbm_server_begin
+ * sets it back.
+ *
+ * @param server  the object
+ * @param on      0 (at first) or 1
+ * @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings, or
+ *         MBM_NOT_INITIALISED
+ */
+uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
+
+/**
  * Serves cells that your functions hold.
  *
  * @param unit   the unit
@@ -3340,6 +4383,95 @@ uint8_t mbm_server_serveInputRegisters(struct mbm_unit *unit,
 uint8_t mbm_server_serveMaskAndReadWrite(struct mbm_registerTable *table);
 
 /**
+ * Begins to listen. May be called again: what was heard is forgotten, and the
+ * settings are as at first.
+ *
+ * @param sniffer  the object
+ * @param framing  how frames look; copied
+ * @param buffer   where bytes are kept until they are understood; yours, valid
+ *                 for as long as the sniffer is used
+ * @param size     its bytes, MBM_MIN_SNIFFER_BUFFER or more. MBM_MAX_FRAME hold
+ *                 any RTU frame, MBM_MAX_TCP_FRAME any of TCP,
+ *                 MBM_MAX_ASCII_FRAME any of ASCII; twice as many where the
+ *                 directions are heard apart. A longer frame is told of as noise
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also for more than
+ *         MBM_MAX_SNIFFER_FUNCTIONS functions
+ */
+uint8_t mbm_sniffer_begin(struct mbm_sniffer *sniffer,
+                          const struct mbm_framing *framing,
+                          uint8_t *buffer,
+                          uint16_t size);
+
+/**
+ * Tells the rate of a serial line, from which follow the silence between RTU
+ * frames, and when each of several bytes that are fed at once arrived. At first
+ * it is untold: 4 ms of silence, and what is fed at once arrived at once.
+ *
+ * @param sniffer  the object
+ * @param baud     bits per second; 0 is untold
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_sniffer_setBaudRate(struct mbm_sniffer *sniffer, uint32_t baud);
+
+/**
+ * Sets how long a request may stay unanswered before that is told; 1000 ms at
+ * first. On a serial line the next request ends it too. A longer time than the
+ * master's own pairs late replies.
+ *
+ * @param sniffer       the object
+ * @param milliseconds  1 to 65535
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_sniffer_setTimeout(struct mbm_sniffer *sniffer, uint16_t milliseconds);
+
+/**
+ * Sets how long the rest of a frame that has begun is waited for: how coarse
+ * your time stamps are. At first 50 ms in RTU, which a USB adapter needs, and
+ * 1000 ms in ASCII and TCP.
+ *
+ * @param sniffer       the object
+ * @param milliseconds  1 to 65535
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_sniffer_setPatience(struct mbm_sniffer *sniffer, uint16_t milliseconds);
+
+/**
+ * Takes bytes that were heard. Call mbm_sniffer_next until there is nothing
+ * more, then feed the rest, if not all were taken, with the same time: nothing
+ * is lost.
+ *
+ * @param sniffer  the object
+ * @param tap      MBM_TAP_BOTH, or where the directions are heard apart
+ *                 MBM_TAP_CLIENT or MBM_TAP_SERVER. Do not mix them: at a change
+ *                 what is not told of is forgotten
+ * @param bytes    what was heard; NULL only with length 0
+ * @param length   how many
+ * @param now      when the last of them arrived, in microseconds; may wrap
+ * @return how many were taken; 0 also if the sniffer was never begun
+ */
+uint16_t mbm_sniffer_feed(struct mbm_sniffer *sniffer,
+                          uint8_t tap,
+                          const uint8_t *bytes,
+                          uint16_t length,
+                          uint32_t now);
+
+/**
+ * Tells what happened next on the bus, in the order of time. Call it after each
+ * feed until there is nothing more, and now and then while nothing is heard (at
+ * least every half hour): silence ends frames, and requests time out.
+ *
+ * @param sniffer  the object
+ * @param now      the time, in microseconds
+ * @param event    receives what happened; valid until the next call with this
+ *                 sniffer
+ * @return 1 if there is an event, 0 if nothing more is known yet, or the sniffer
+ *         was never begun
+ */
+uint8_t mbm_sniffer_next(struct mbm_sniffer *sniffer,
+                         uint32_t now,
+                         struct mbm_event *event);
+
+/**
  * Explains a status in a few words of English.
  *
  * Any thread or interrupt may call it.
@@ -3348,6 +4480,42 @@ uint8_t mbm_server_serveMaskAndReadWrite(struct mbm_registerTable *table);
  * @return a constant string, never NULL
  */
 const char *mbm_statusText(uint8_t status);
+
+/**
+ * Explains a frame in one line of words, for example
+ * "unit 17  request    03 read holding registers  107..109", or
+ * "bad CRC, 8 bytes" if it is damaged.
+ *
+ * Any thread or interrupt may call it. For ASCII it takes 600 bytes of stack.
+ *
+ * @param framing      how frames look
+ * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
+ *                     and exceptions
+ * @param frame        the frame, from its first byte to its last
+ * @param frameLength  its bytes
+ * @param text         receives the line, which a zero byte ends in any case
+ * @param size         bytes of `text`; 200 do for most frames, 1200 for all
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL: the line is cut; MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_frame_text(const struct mbm_framing *framing,
+                       uint8_t kind,
+                       const uint8_t *frame,
+                       uint16_t frameLength,
+                       char *text,
+                       uint16_t size);
+
+/**
+ * Explains an event in one line of words, for example
+ * "unit 17  reply      03 read holding registers  107..109: 555 0 100".
+ *
+ * Any thread may call it while the event is valid.
+ *
+ * @param event  what mbm_sniffer_next gave
+ * @param text   receives the line, which a zero byte ends in any case
+ * @param size   bytes of `text`; 200 do for most events, 2400 for all
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL: the line is cut; MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_event_text(const struct mbm_event *event, char *text, uint16_t size);
 
 #ifdef __cplusplus
 }  // extern "C"

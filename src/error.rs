@@ -57,6 +57,13 @@ impl Status {
     /// No frame of this framing begins like that.
     pub const MALFORMED_FRAME: Status = Status(0xEF);
 
+    /// The client's queue holds no more.
+    pub const QUEUE_FULL: Status = Status(0xF0);
+    /// Another pending request has this transaction id.
+    pub const DUPLICATE_TRANSACTION: Status = Status(0xF1);
+    /// The request is not pending: it has ended, or was never queued.
+    pub const NOT_PENDING: Status = Status(0xF2);
+
     /// The status that an exception code of the remote device becomes.
     ///
     /// Code 0 and codes from 0x80 are no exception codes (they would collide
@@ -82,6 +89,14 @@ impl Status {
     /// True if a request ended without an answer of the remote device.
     pub const fn is_failure(self) -> bool {
         self.0 >= 0x80 && self.0 != Status::PENDING.0
+    }
+
+    /// True if the same request may well succeed the next time.
+    pub const fn may_be_repeated(self) -> bool {
+        self.is_failure()
+            && self.0 != Status::LINK_LOST.0
+            && self.0 != Status::BUFFER_TOO_SMALL.0
+            && self.0 != Status::CANCELLED.0
     }
 
     /// True for an exception that the remote device sent.

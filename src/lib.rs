@@ -3,7 +3,7 @@
 //! Data flows one way, and a module uses only what stands to its left:
 //!
 //! ```text
-//! bytes -> frame -> pdu -> packet -> transaction -> master -> capi
+//! bytes -> frame -> pdu -> packet -> explain -> {sniffer, transaction} -> {master, client, server} -> capi
 //! ```
 //!
 //! `error`, `time`, `port`, `ring` and `data` stand beside that line and may be used
@@ -34,14 +34,20 @@ pub mod bytes;
 /// cbindgen:ignore
 pub mod data;
 /// cbindgen:ignore
+pub mod explain;
+/// cbindgen:ignore
 pub mod frame;
 /// cbindgen:ignore
 pub mod packet;
 /// cbindgen:ignore
 pub mod pdu;
 /// cbindgen:ignore
+pub mod sniffer;
+/// cbindgen:ignore
 pub mod transaction;
 
+/// cbindgen:ignore
+pub mod client;
 /// cbindgen:ignore
 pub mod master;
 /// cbindgen:ignore

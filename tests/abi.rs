@@ -26,11 +26,15 @@ fn probes() -> Vec<(String, u64)> {
             mbm_length mbm_packet mbm_record mbm_object mbm_framing mbm_server mbm_unit
             mbm_service mbm_registerTable mbm_bitTable mbm_cells mbm_file mbm_files mbm_fifo
             mbm_fifos mbm_exceptionStatus mbm_serverId mbm_identification mbm_request mbm_custom
-            mbm_switches mbm_diagnostics;
+            mbm_switches mbm_diagnostics mbm_sniffer mbm_event mbm_client mbm_clientRequest mbm_clientUnit mbm_link;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
             mbm_counters { requests replies exceptions badCrc timeouts foreignFrames
                 resynchronisations bytesSent bytesReceived }
+            mbm_clientRequest { done context data reply replyBytes transaction unit status exception
+                length }
+            mbm_clientUnit { requests replies exceptions retries delay unit status }
+            mbm_link { context disconnect connect }
             mbm_rule { kind bytes more }
             mbm_function { code request response }
             mbm_length { bytes kind }
@@ -43,10 +47,10 @@ fn probes() -> Vec<(String, u64)> {
             mbm_framing { functions functionCount kind end }
             mbm_registers { data first count kind order }
             mbm_service { next serve }
-            mbm_unit { services monitor diagnostics id }
+            mbm_unit { services serve diagnostics id }
             mbm_registerTable { service words valid before after context base size kind }
             mbm_bitTable { service bits valid before after context base size kind }
-            mbm_cells { service context isValid get set before after }
+            mbm_cells { service context isValid get set before after kind }
             mbm_file { records size number }
             mbm_files { service files count before after context }
             mbm_fifo { words address count }
@@ -59,7 +63,9 @@ fn probes() -> Vec<(String, u64)> {
             mbm_switches { service off }
             mbm_diagnostics { service restart context diagnosticRegister busMessages
                 busCommunicationErrors exceptionErrors serverMessages noResponses naks busy
-                characterOverruns events listenOnly hidden };
+                characterOverruns events listenOnly hidden }
+            mbm_event { frame pdu packet time responseTime frameLength pduLength length address
+                quantity kind status unit function asked askedLength };
         constants:
             MBM_OK MBM_ILLEGAL_FUNCTION MBM_ILLEGAL_DATA_ADDRESS MBM_ILLEGAL_DATA_VALUE
             MBM_SLAVE_DEVICE_FAILURE MBM_ACKNOWLEDGE MBM_SLAVE_DEVICE_BUSY
@@ -67,9 +73,12 @@ fn probes() -> Vec<(String, u64)> {
             MBM_GATEWAY_TARGET_FAILED_TO_RESPOND MBM_INVALID_SLAVE_ID MBM_INVALID_FUNCTION
             MBM_RESPONSE_TIMED_OUT MBM_INVALID_CRC MBM_INVALID_ARGUMENT MBM_MALFORMED_REPLY
             MBM_LINK_LOST MBM_BUSY MBM_BROADCAST_NOT_ALLOWED MBM_BUFFER_TOO_SMALL
-            MBM_NOT_INITIALISED MBM_PENDING MBM_LINE_BUSY MBM_CANCELLED MBM_INCOMPLETE_FRAME
-            MBM_MALFORMED_FRAME MBM_MAX_READ_REGISTERS MBM_MAX_WRITE_REGISTERS
-            MBM_MAX_READ_WRITE_REGISTERS MBM_MAX_READ_BITS MBM_MAX_WRITE_BITS MBM_MAX_FRAME
+            MBM_NOT_INITIALISED MBM_PENDING MBM_LINE_BUSY MBM_CANCELLED
+            MBM_INCOMPLETE_FRAME MBM_MALFORMED_FRAME MBM_QUEUE_FULL
+            MBM_DUPLICATE_TRANSACTION MBM_NOT_PENDING MBM_CLIENT_DEPTH
+            MBM_BACKOFF_NONE MBM_BACKOFF_FIXED MBM_BACKOFF_LINEAR MBM_BACKOFF_EXPONENTIAL
+            MBM_MAX_READ_REGISTERS MBM_MAX_WRITE_REGISTERS MBM_MAX_READ_WRITE_REGISTERS
+            MBM_MAX_READ_BITS MBM_MAX_WRITE_BITS MBM_MAX_FRAME
             MBM_FC_READ_COILS MBM_FC_READ_DISCRETE_INPUTS MBM_FC_READ_HOLDING_REGISTERS
             MBM_FC_READ_INPUT_REGISTERS MBM_FC_WRITE_SINGLE_COIL MBM_FC_WRITE_SINGLE_REGISTER
             MBM_FC_READ_EXCEPTION_STATUS MBM_FC_DIAGNOSTICS MBM_FC_GET_COMM_EVENT_COUNTER
@@ -94,7 +103,9 @@ fn probes() -> Vec<(String, u64)> {
             MBM_FRAMING_RTU_OVER_TCP MBM_MAX_TCP_FRAME MBM_MAX_ASCII_FRAME MBM_ORDER_DEFAULT
             MBM_ORDER_ABCD MBM_ORDER_CDAB MBM_ORDER_BADC MBM_ORDER_DCBA MBM_REGISTERS_OF_WORDS
             MBM_REGISTERS_OF_BYTES MBM_REGISTERS_INTO_WORDS MBM_REGISTERS_INTO_BYTES
-            MBM_REPLY_EXCEPTION MBM_REPLY_NONE MBM_REPLY_PENDING;
+            MBM_REPLY_EXCEPTION MBM_REPLY_NONE MBM_REPLY_PENDING MBM_EVENT_REQUEST MBM_EVENT_REPLY MBM_EVENT_EXCEPTION
+            MBM_EVENT_UNPAIRED MBM_EVENT_TIMEOUT MBM_EVENT_BAD_CRC MBM_EVENT_NOISE MBM_TAP_BOTH
+            MBM_TAP_CLIENT MBM_TAP_SERVER MBM_MIN_SNIFFER_BUFFER MBM_MAX_SNIFFER_FUNCTIONS;
     }
 }
 
@@ -175,7 +186,7 @@ fn every_status_constant_is_explained_and_no_two_alike() {
             .unwrap()
             .to_owned()
     };
-    let statuses: Vec<u8> = (0..=0x0B).chain(0xE0..=0xEF).collect();
+    let statuses: Vec<u8> = (0..=0x0B).chain(0xE0..=0xF2).collect();
     let mut texts: Vec<String> = statuses.iter().map(|status| text(*status)).collect();
     texts.sort();
     texts.dedup();

@@ -1,4 +1,4 @@
-//! Diagnostics, functions of a user, and functions switched off.
+//! Diagnostics, functions of a user, functions switched off, and several units.
 
 mod common;
 
@@ -6,6 +6,8 @@ use common::device::{ask, sealed, Device};
 use mbm::frame::Framing;
 use mbm::server::custom::Outcome;
 use mbm::server::respond::respond;
+use mbm::server::storage::{HoldingRegisters, Words};
+use mbm::server::Unit;
 
 /// A word that a sub-function of 08 returns.
 fn told(device: &mut Device, sub_function: u8) -> u16 {
@@ -222,4 +224,34 @@ fn what_is_switched_off_is_exception_01_and_nothing_happens() {
         assert_eq!(device.holding, Device::new().holding);
         assert_eq!(ask(&mut device, &[4, 0, 100, 0, 1]).len(), 4);
     }
+}
+
+#[test]
+fn the_unit_that_is_meant_answers_and_a_broadcast_reaches_all() {
+    let (mut first, mut second) = ([0x1000], [0x2200]);
+    let mut ask = |frame: &[u8]| {
+        let mut buffer = [0; 256];
+        let frame = sealed(frame);
+        buffer[..frame.len()].copy_from_slice(&frame);
+        let units = &mut [
+            Unit {
+                id: 1,
+                services: &mut [&mut HoldingRegisters(Words::new(0, &mut first))],
+                diagnostics: None,
+            },
+            Unit {
+                id: 2,
+                services: &mut [&mut HoldingRegisters(Words::new(0, &mut second))],
+                diagnostics: None,
+            },
+        ];
+        let sent = respond(Framing::Rtu, 10, &mut buffer, frame.len(), &mut units[..]);
+        buffer[..sent.unwrap()].to_vec()
+    };
+    assert_eq!(ask(&[1, 3, 0, 0, 0, 1])[..4], [1, 3, 2, 0x10]);
+    assert_eq!(ask(&[2, 3, 0, 0, 0, 1])[..4], [2, 3, 2, 0x22]);
+    assert_eq!(ask(&[3, 3, 0, 0, 0, 1]), []);
+    assert_eq!(ask(&[0, 6, 0, 0, 0x33, 0x44]), []);
+    assert_eq!(ask(&[1, 3, 0, 0, 0, 1])[..4], [1, 3, 2, 0x33]);
+    assert_eq!(ask(&[2, 3, 0, 0, 0, 1])[..4], [2, 3, 2, 0x33]);
 }

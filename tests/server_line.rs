@@ -159,11 +159,42 @@ fn the_longest_frame_fits_into_a_buffer_of_its_length() {
 fn our_own_echo_is_no_request() {
     let mut line = Line::new(Framing::Rtu);
     line.wire.borrow_mut().echo = true;
+    assert!(line.server.set_echo_discard(true));
     // An answer that is the request, and one that looks like a wrong one.
     for request in [&[17, 6, 0, 100, 1, 2][..], &READ] {
         line.arrive(0, &sealed(request));
         assert_eq!(line.frames(100_000, 50).len(), 1);
     }
+}
+
+#[test]
+fn an_echo_that_does_not_come_costs_nothing() {
+    let mut line = Line::new(Framing::Rtu);
+    assert!(line.server.set_echo_discard(true));
+    for _ in 0..3 {
+        line.arrive(10_000, &sealed(&READ));
+        assert_eq!(line.frames(30_000, 50), [sealed(&ANSWER)]);
+    }
+    assert!(!Line::new(Framing::Tcp).server.set_echo_discard(true));
+}
+
+#[test]
+fn a_request_right_behind_the_answer_is_not_taken_for_an_echo() {
+    let mut line = Line::new(Framing::Rtu);
+    line.arrive(0, &sealed(&READ));
+    while line.wire.borrow().sent.is_empty() {
+        line.poll();
+        {
+            let mut w = line.wire.borrow_mut();
+            w.now = w.now.wrapping_add(50);
+        }
+    }
+    line.arrive(0, &sealed(&READ));
+    {
+        let mut w = line.wire.borrow_mut();
+        w.now = w.now.wrapping_add(50_000);
+    };
+    assert_eq!(line.frames(30_000, 50).len(), 2);
 }
 
 #[test]

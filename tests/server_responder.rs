@@ -5,8 +5,7 @@ mod common;
 use common::device::{ask, Device};
 use mbm::frame::Framing;
 use mbm::server::respond::respond;
-use mbm::server::storage::{HoldingRegisters, Words};
-use mbm::server::{Service, Unit};
+use mbm::server::Service;
 
 /// Asks a device of ten registers and 20 bits of each kind, from address 100 on.
 fn answer(request: &[u8]) -> Vec<u8> {
@@ -472,34 +471,4 @@ fn over_tcp_units_0_and_255_are_the_server_itself_and_a_unit_0_is_any() {
             device.with_unit(|unit| respond(Framing::Tcp, 10, &mut buffer, 12, &mut [unit][..]));
         assert_eq!(sent != Ok(0), answers, "{id} {to}");
     }
-}
-
-#[test]
-fn the_unit_that_is_meant_answers_and_a_broadcast_reaches_all() {
-    let (mut first, mut second) = ([0x1000], [0x2200]);
-    let mut ask = |frame: &[u8]| {
-        let mut buffer = [0; 256];
-        let frame = common::device::sealed(frame);
-        buffer[..frame.len()].copy_from_slice(&frame);
-        let units = &mut [
-            Unit {
-                id: 1,
-                services: &mut [&mut HoldingRegisters(Words::new(0, &mut first))],
-                diagnostics: None,
-            },
-            Unit {
-                id: 2,
-                services: &mut [&mut HoldingRegisters(Words::new(0, &mut second))],
-                diagnostics: None,
-            },
-        ];
-        let sent = respond(Framing::Rtu, 10, &mut buffer, frame.len(), &mut units[..]);
-        buffer[..sent.unwrap()].to_vec()
-    };
-    assert_eq!(ask(&[1, 3, 0, 0, 0, 1])[..4], [1, 3, 2, 0x10]);
-    assert_eq!(ask(&[2, 3, 0, 0, 0, 1])[..4], [2, 3, 2, 0x22]);
-    assert_eq!(ask(&[3, 3, 0, 0, 0, 1]), []);
-    assert_eq!(ask(&[0, 6, 0, 0, 0x33, 0x44]), []);
-    assert_eq!(ask(&[1, 3, 0, 0, 0, 1])[..4], [1, 3, 2, 0x33]);
-    assert_eq!(ask(&[2, 3, 0, 0, 0, 1])[..4], [2, 3, 2, 0x33]);
 }

@@ -46,8 +46,12 @@ static uint32_t port_micros(void *context)
 #ifdef WITHOUT_MBM
 #define CALL(call) 0
 #else
-static mbm_master node;
 #define CALL(call) (call)
+#endif
+
+#ifndef SIZE_CLIENT_H
+#ifndef WITHOUT_MBM
+static mbm_master node;
 #endif
 
 static inline void begin(void)
@@ -64,5 +68,7 @@ static inline void begin(void)
     (void)CALL(mbm_master_setBuffers(&node, response, WORDS, transmit, WORDS, frame, sizeof frame));
     (void)CALL(mbm_master_begin(&node, 1, &port));
 }
+
+#endif
 
 #endif

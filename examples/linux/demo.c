@@ -3,7 +3,6 @@
  * written is looked up in the server's own memory.
  *
  * Licence: MIT OR Apache-2.0. */
-#include "frame_words.h"
 #include "mbm_tty.h"
 #include "recorder.h"
 #include "server.h"
@@ -31,12 +30,13 @@ static void expect(int as_expected, const char *what)
 }
 
 /* Hex and words on one line, or below each other where the hex is long. */
-static void print_frame(frame_direction direction, const recording *kept)
+static void print_frame(uint8_t direction, const recording *kept)
 {
+    const mbm_framing rtu = {0};
     char words[160];
     size_t i;
 
-    printf("  %-9s", direction == FRAME_REQUEST ? "sent" : "received");
+    printf("  %-9s", direction == MBM_PACKET_REQUEST ? "sent" : "received");
     if (kept->length == 0) {
         printf("nothing\n");
         return;
@@ -47,7 +47,7 @@ static void print_frame(frame_direction direction, const recording *kept)
         printf("\n  %-9s", "");
     else
         printf("%*s", (int)(3 * (SHORT_FRAME - kept->length) + 2), "");
-    frame_words(words, sizeof words, direction, kept->bytes, kept->length);
+    mbm_frame_text(&rtu, direction, kept->bytes, (uint16_t)kept->length, words, sizeof words);
     printf("%s\n", words);
 }
 
@@ -67,8 +67,8 @@ static void show(uint8_t status, uint8_t expected_status)
     uint8_t i;
 
     requests++;
-    print_frame(FRAME_REQUEST, &wire.sent);
-    print_frame(FRAME_REPLY, &wire.received);
+    print_frame(MBM_PACKET_REQUEST, &wire.sent);
+    print_frame(MBM_PACKET_RESPONSE, &wire.received);
     printf("  result   %s", mbm_statusText(status));
     for (i = 0; i < words; i++)
         printf("%s0x%04X", i == 0 ? ": " : " ", mbm_master_getResponseBuffer(&node, i));

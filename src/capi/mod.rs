@@ -15,6 +15,8 @@
 #![allow(clippy::missing_safety_doc)]
 
 mod bits;
+mod client;
+mod client_pointers;
 mod frame;
 mod functions;
 mod limits;
@@ -25,10 +27,13 @@ mod port;
 mod registers;
 mod ring;
 mod server;
+mod sniffer;
 mod status;
 mod storage;
+mod text;
 
 pub use bits::*;
+pub use client::*;
 pub use frame::*;
 pub use functions::*;
 pub use limits::*;
@@ -38,8 +43,10 @@ pub use port::*;
 pub use registers::*;
 pub use ring::*;
 pub use server::*;
+pub use sniffer::*;
 pub use status::*;
 pub use storage::*;
+pub use text::*;
 
 /// There is no way back from a panic on a microcontroller. The check of the
 /// linked image proves that nothing comes here.

@@ -39,6 +39,7 @@ pub struct mbm_port {
 }
 
 impl mbm_port {
+    #[inline(always)]
     pub(super) fn is_complete(&self) -> bool {
         self.read.is_some() && self.write.is_some() && self.micros.is_some()
     }

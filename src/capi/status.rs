@@ -79,6 +79,13 @@ pub const MBM_CANCELLED: u8 = 0xED;
 pub const MBM_INCOMPLETE_FRAME: u8 = 0xEE;
 /// No frame of this framing begins like that, or has such a length.
 pub const MBM_MALFORMED_FRAME: u8 = 0xEF;
+/// The client has 16 requests already; nothing was queued.
+pub const MBM_QUEUE_FULL: u8 = 0xF0;
+/// Another pending request of the client has this transaction id; nothing was
+/// queued.
+pub const MBM_DUPLICATE_TRANSACTION: u8 = 0xF1;
+/// The request has ended already, or was never queued.
+pub const MBM_NOT_PENDING: u8 = 0xF2;
 
 statuses! {
     MBM_OK = Status::OK, c"success";
@@ -107,6 +114,9 @@ statuses! {
     MBM_CANCELLED = Status::CANCELLED, c"cancelled";
     MBM_INCOMPLETE_FRAME = Status::INCOMPLETE_FRAME, c"the frame is not whole yet";
     MBM_MALFORMED_FRAME = Status::MALFORMED_FRAME, c"no frame of this framing begins like that";
+    MBM_QUEUE_FULL = Status::QUEUE_FULL, c"the queue is full";
+    MBM_DUPLICATE_TRANSACTION = Status::DUPLICATE_TRANSACTION, c"another pending request has this transaction id";
+    MBM_NOT_PENDING = Status::NOT_PENDING, c"the request is not pending";
 }
 
 /// Explains a status in a few words of English.

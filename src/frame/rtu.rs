@@ -5,10 +5,10 @@
 //! has arrived, and what turns out not to be the frame costs one byte.
 
 use super::checksum::{crc16, Crc16};
-use super::Adu;
+pub use super::search::{Seen, Verdict, Wanted};
+use super::{Adu, Search};
 use crate::error::Status;
 use core::cell::Cell;
-use core::num::NonZeroU8;
 
 /// The longest frame: unit, PDU of 253 bytes, CRC.
 pub const MAX_FRAME: usize = 256;
@@ -25,14 +25,16 @@ pub fn write(buffer: &mut [u8], unit: u8, length: usize, pdu: impl FnOnce(&mut [
     let Some(frame) = buffer.get_mut(..length + OVERHEAD) else {
         return false;
     };
-    let Some((content, crc)) = frame.split_last_chunk_mut() else {
+    let Some((content, crc)) = frame.split_at_mut_checked(length + PDU) else {
         return false;
     };
     if let Some((first, rest)) = content.split_first_mut() {
         *first = unit;
         pdu(rest);
     }
-    *crc = crc16(content).to_bytes();
+    if let [low, high] = crc {
+        [*low, *high] = crc16(content).to_bytes();
+    }
     true
 }
 
@@ -94,68 +96,6 @@ pub fn emit(
     Ok(length + OVERHEAD)
 }
 
-/// What was seen on the way to a reply, the more telling the greater. The low
-/// digit is that of the status it becomes.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Debug)]
-pub struct Seen(u8);
-
-impl Seen {
-    /// No frame.
-    pub const NOTHING: Seen = Seen(0x02);
-    /// A frame of another unit.
-    pub const OTHER_UNIT: Seen = Seen(0x10);
-    /// A frame of our unit with another function.
-    pub const OTHER_FUNCTION: Seen = Seen(0x21);
-    /// A frame of our unit and function that is not the reply.
-    pub const MALFORMED: Seen = Seen(0x35);
-    /// A complete frame of our unit and function with a wrong CRC.
-    pub const BAD_CRC: Seen = Seen(0x43);
-    /// The reply has begun, but the buffer cannot hold it.
-    pub const TOO_LONG: Seen = Seen(0x59);
-
-    /// The status of a request for which nothing better was seen.
-    pub const fn status(self) -> Status {
-        Status::from_code(0xE0 | (self.0 & 0x0F))
-    }
-}
-
-const _: () = {
-    assert!(Seen::NOTHING.status().code() == Status::RESPONSE_TIMED_OUT.code());
-    assert!(Seen::OTHER_UNIT.status().code() == Status::INVALID_SLAVE_ID.code());
-    assert!(Seen::OTHER_FUNCTION.status().code() == Status::INVALID_FUNCTION.code());
-    assert!(Seen::MALFORMED.status().code() == Status::MALFORMED_REPLY.code());
-    assert!(Seen::BAD_CRC.status().code() == Status::INVALID_CRC.code());
-    assert!(Seen::TOO_LONG.status().code() == Status::BUFFER_TOO_SMALL.code());
-};
-
-/// What a frame is searched for.
-pub trait Wanted {
-    /// The unit that sends it.
-    fn unit(&self) -> u8;
-
-    /// The function code of its PDU, for which that with the highest bit set
-    /// may stand.
-    fn function(&self) -> u8;
-
-    /// The length of the PDU of a frame that begins with these bytes; `None`
-    /// for a frame that is not waited for.
-    fn length(&self, frame: &[u8]) -> Option<NonZeroU8>;
-
-    /// What a whole frame of such a PDU is.
-    fn judge(&mut self, frame: &[u8]) -> Verdict;
-}
-
-/// What a frame is that looked like the one that is wanted.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Verdict {
-    /// The one.
-    Right,
-    /// One of our own, of which nothing more is to be said.
-    Own,
-    /// Not the one.
-    Wrong,
-}
-
 /// The least bytes of a frame: unit, function, CRC.
 const MIN_FRAME: u8 = 4;
 
@@ -196,6 +136,8 @@ impl Window {
     };
 
     /// The part of `buffer` to receive into; the candidate moves to the front.
+    // Always, as long as firmware has one caller of it: 22 bytes of flash.
+    #[inline(always)]
     pub fn room<'a>(&mut self, buffer: &'a mut [u8]) -> Option<&'a mut [u8]> {
         if self.start > 0 {
             let cells = Cell::from_mut(&mut *buffer).as_slice_of_cells();
@@ -380,5 +322,76 @@ impl Window {
             self.seen = Seen::NOTHING;
         }
         self.see_foreign(self.passed_as);
+    }
+}
+
+impl Search for Window {
+    const EMPTY: Window = Window::EMPTY;
+
+    fn frame_length(length: u8) -> u16 {
+        u16::from(length) + OVERHEAD as u16
+    }
+
+    fn hold(&mut self, count: u16) {
+        self.hold(count);
+    }
+
+    fn write(
+        &self,
+        buffer: &mut [u8],
+        unit: u8,
+        length: usize,
+        pdu: impl FnOnce(&mut [u8]),
+    ) -> bool {
+        write(buffer, unit, length, pdu)
+    }
+
+    #[inline(always)]
+    fn room<'a>(&mut self, buffer: &'a mut [u8]) -> Option<&'a mut [u8]> {
+        self.room(buffer)
+    }
+
+    fn clear(&mut self) {
+        self.clear();
+    }
+
+    fn arrived(&mut self, count: u16) {
+        self.arrived(count);
+    }
+
+    fn advance(&mut self, count: u16) {
+        self.advance(count);
+    }
+
+    fn skim(&mut self) {
+        self.skim();
+    }
+
+    fn is_skimmed(&self) -> bool {
+        self.is_skimmed()
+    }
+
+    fn bytes<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]> {
+        self.bytes(buffer)
+    }
+
+    fn behind<'a>(&self, buffer: &'a [u8], offset: usize) -> Option<&'a [u8]> {
+        self.behind(buffer, offset)
+    }
+
+    fn seen(&self) -> Seen {
+        self.seen()
+    }
+
+    fn foreign_frames(&self) -> u8 {
+        self.foreign_frames()
+    }
+
+    fn has_passed_noise(&self) -> bool {
+        self.has_passed_noise()
+    }
+
+    fn search(&mut self, buffer: &mut [u8], wanted: &mut impl Wanted) -> bool {
+        self.search(buffer, wanted)
     }
 }

@@ -125,7 +125,7 @@ pub fn response(pdu: &[u8], functions: &[Function]) -> Length {
 }
 
 /// Device identification carries its length object by object.
-fn objects(pdu: &[u8]) -> Length {
+pub(super) fn objects(pdu: &[u8]) -> Length {
     let mut end = 7;
     let Some(count) = pdu.get(6) else {
         return Length::AtLeast(end);

@@ -12,6 +12,7 @@ pub mod files;
 pub mod identification;
 pub mod length;
 pub mod limits;
+pub mod outline;
 pub mod query;
 pub mod registers;
 pub mod reply;

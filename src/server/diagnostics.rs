@@ -114,7 +114,7 @@ impl Diagnostics {
         if heading.overrun {
             count(&mut self.character_overruns);
         }
-        let broadcast = heading.serial && heading.to == 0 && !damaged;
+        let broadcast = heading.is_broadcast() && !damaged;
         if concern == Concern::Foreign && !damaged && !broadcast {
             return false;
         }

@@ -69,7 +69,9 @@ fn read(files: &impl Files, pdu: &mut [u8], length: usize) -> Reply {
     let Some(kept) = aside.get_mut(..request.len()) else {
         return Reply::ILLEGAL_DATA_VALUE;
     };
-    kept.copy_from_slice(request);
+    for (place, byte) in kept.iter_mut().zip(request) {
+        *place = *byte;
+    }
     let reads = match Reads::new(kept) {
         Ok(reads) => reads,
         Err(refused) => return refusal(refused),

@@ -1,7 +1,8 @@
 //! How each framing finds a request in what arrives, and seals a response.
 
-use super::line::{Lent, Server};
+use super::line::{Lent, Receive, Server};
 use crate::error::Status;
+use crate::frame::checksum::crc16;
 use crate::frame::{ascii, rtu, tcp};
 use crate::pdu::custom::Function;
 use crate::pdu::length::{self, Length};
@@ -76,21 +77,12 @@ impl<P: Port, B: Lent> Server<P, B> {
         self.set_silence(u32::MAX);
     }
 
-    /// Receives, and takes the bytes into the CRC.
-    fn hear_rtu(&mut self, until: usize) -> i16 {
-        let start = usize::from(self.end);
-        let heard = self.hear(until);
-        let frame = self.lent.frame().get(start..usize::from(self.end));
-        self.crc = self.crc.with(frame.unwrap_or_default());
-        heard
-    }
-
     /// A frame is what stands between two silences. Where there was silence that
     /// nobody saw, for poll came late, the last frame counts: one of ours that
     /// is followed by another is no longer waited for.
     fn receive_rtu(&mut self) -> Status {
         self.make_room();
-        let heard = self.hear_rtu(usize::MAX);
+        let heard = self.hear(usize::MAX);
         if heard < 0 {
             return Status::LINK_LOST;
         }
@@ -98,6 +90,41 @@ impl<P: Port, B: Lent> Server<P, B> {
             return Status::OK;
         }
         self.last_frame()
+    }
+
+    /// Says whether the receiver hears what the driver sends, so that as many
+    /// bytes as were sent are dropped behind each response; false if this is no
+    /// RTU line. (A function of its own, so that only who calls it carries it.)
+    pub fn set_echo_discard(&mut self, on: bool) -> bool {
+        let plain: Receive<P, B> = Self::receive_rtu;
+        let echoing: Receive<P, B> = Self::receive_behind_echo;
+        let is_rtu = self.receive.is_some_and(|receive| {
+            core::ptr::fn_addr_eq(receive, plain) || core::ptr::fn_addr_eq(receive, echoing)
+        });
+        if is_rtu {
+            self.receive = Some(if on { echoing } else { plain });
+            self.sent = 0;
+        }
+        is_rtu
+    }
+
+    /// As [`Server::receive_rtu`], once our own echo has passed, or the line been
+    /// silent without one.
+    fn receive_behind_echo(&mut self) -> Status {
+        if self.sent == 0 {
+            return self.receive_rtu();
+        }
+        let heard = self.hear(usize::from(self.sent));
+        if heard < 0 {
+            return Status::LINK_LOST;
+        }
+        if heard > 0 {
+            self.sent -= heard as u16;
+            self.listen();
+        } else if self.is_silent() {
+            self.sent = 0;
+        }
+        Status::OK
     }
 
     /// Gives up the oldest bytes of a full buffer, unless it ends with a frame.
@@ -115,7 +142,9 @@ impl<P: Port, B: Lent> Server<P, B> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn last_frame(&mut self) -> Status {
         let end = usize::from(self.end);
-        let frame = self.lent.frame().get_mut(..end).unwrap_or_default();
+        let Some(frame) = self.lent.frame().get_mut(..end) else {
+            return Status::OK;
+        };
         let start = if self.crc.is_residue() && !self.request.overrun {
             0
         } else {
@@ -156,7 +185,7 @@ impl<P: Port, B: Lent> Server<P, B> {
                 _ => usize::MAX,
             };
             self.make_room();
-            let heard = self.hear_rtu(until);
+            let heard = self.hear(until);
             if heard < 0 {
                 return Status::LINK_LOST;
             }
@@ -182,9 +211,12 @@ impl<P: Port, B: Lent> Server<P, B> {
     }
 
     fn seal_rtu(&mut self, length: usize) -> usize {
-        let frame = self.lent.frame();
-        let unit = frame.first().copied().unwrap_or(0);
-        rtu::write(frame, unit, length, |_| ());
+        let end = rtu::PDU + length;
+        if let Some((content, behind)) = self.lent.frame().split_at_mut_checked(end) {
+            if let Some(crc) = behind.first_chunk_mut() {
+                *crc = crc16(content).to_bytes();
+            }
+        }
         length + rtu::OVERHEAD
     }
 

@@ -107,7 +107,9 @@ pub fn serve_identification(objects: &impl Objects, pdu: &mut [u8], length: usiz
         };
         *head = id;
         *size = value.len() as u8;
-        place.copy_from_slice(value);
+        for (to, from) in place.iter_mut().zip(value) {
+            *to = *from;
+        }
         end += 2 + value.len();
         count += 1;
     }

@@ -75,15 +75,15 @@ pub struct Server<P, B> {
     pub(super) crc: Crc16,
     /// Where in the buffer ends what arrived, or what is to be sent.
     pub(super) end: u16,
-    /// What of the response was sent.
-    sent: u16,
+    /// What of the response was sent; of that, what may still come back.
+    pub(super) sent: u16,
     /// The request that was found last.
     pub request: Heading,
     last_byte: u32,
     now: u32,
     /// The silence that ends a frame.
     silence: u32,
-    receive: Option<Receive<P, B>>,
+    pub(super) receive: Option<Receive<P, B>>,
     seal: Option<Seal<P, B>>,
     /// What the caller lends.
     pub lent: B,
@@ -181,7 +181,7 @@ impl<P: Port, B: Lent> Server<P, B> {
         Status::MALFORMED_FRAME
     }
 
-    /// Receives up to the place `until` of the buffer: how many bytes, negative
+    /// Receives up to the place `until` of the buffer, into the CRC too: how many bytes, negative
     /// if the link is lost.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn hear(&mut self, until: usize) -> i16 {
@@ -195,6 +195,9 @@ impl<P: Port, B: Lent> Server<P, B> {
         }
         let heard = self.port.read(room);
         if heard > 0 {
+            if let Some(news) = room.get(..heard as usize) {
+                self.crc = self.crc.with(news);
+            }
             self.end += heard as u16;
             self.last_byte = self.now;
         }
@@ -261,7 +264,11 @@ impl<P: Port, B: Lent> Server<P, B> {
         if self.request.again {
             return false;
         }
-        let length = reply.settle(self.pdu());
+        let head = usize::from(self.request.head);
+        let Some(pdu) = self.lent.frame().get_mut(head..) else {
+            return true;
+        };
+        let length = reply.settle(pdu);
         match self.seal {
             Some(seal) if length != 0 => {
                 self.end = seal(self, length) as u16;
@@ -277,8 +284,9 @@ impl<P: Port, B: Lent> Server<P, B> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn send(&mut self) -> Status {
         let frame = self.lent.frame();
-        let rest = frame.get(usize::from(self.sent)..usize::from(self.end));
-        let rest = rest.unwrap_or_default();
+        let Some(rest) = frame.get(usize::from(self.sent)..usize::from(self.end)) else {
+            return Status::OK;
+        };
         let sent = self.port.write(rest);
         if sent < 0 {
             self.port.post_transmission();
@@ -297,13 +305,9 @@ impl<P: Port, B: Lent> Server<P, B> {
     fn flush(&mut self) -> Status {
         if self.port.flush() {
             self.port.post_transmission();
-            // What a serial line brought meanwhile is an echo of ours.
-            loop {
-                self.listen();
-                if !self.request.serial || self.hear(usize::MAX) <= 0 {
-                    break;
-                }
-            }
+            // An echo, where one is waited for, comes from here on.
+            self.last_byte = self.now;
+            self.listen();
         }
         Status::OK
     }

@@ -1,8 +1,8 @@
 //! The server: requests in, responses out.
 //!
-//! A request passes through three hands. A [`Server`] finds it on a line or
-//! connection, or [`respond`](respond::respond) takes it from a buffer. The
-//! [`Units`] see whether it is for one of them. The services of that unit look
+//! A request passes through three hands. A `Server` finds it on a line or
+//! connection, or `respond` takes it from a buffer. The
+//! `Units` see whether it is for one of them. The services of that unit look
 //! at its PDU one after the other, until one serves the function, and write the
 //! response over it.
 //!
@@ -26,4 +26,4 @@ mod units;
 
 pub use line::{Lent, Server};
 pub use reply::Reply;
-pub use units::{only_writes, Concern, Heading, Service, Unit, Units};
+pub use units::{Concern, Heading, Service, Unit, Units};

@@ -6,11 +6,15 @@
 //! at all.
 
 use super::Reply;
+use crate::pdu::bits::{READ_COILS, WRITE_MULTIPLE_COILS, WRITE_SINGLE_COIL};
 use crate::pdu::limits::{
     MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_BITS,
     MAX_WRITE_REGISTERS,
 };
-use crate::pdu::registers::{MASK_WRITE_REGISTER, READ_WRITE_MULTIPLE_REGISTERS};
+use crate::pdu::registers::{
+    MASK_WRITE_REGISTER, READ_WRITE_MULTIPLE_REGISTERS, WRITE_MULTIPLE_REGISTERS,
+    WRITE_SINGLE_REGISTER,
+};
 
 /// Which table, by the function that reads it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -92,54 +96,63 @@ pub fn serve(kind: Kind, cells: &mut impl Cells, pdu: &mut [u8], length: usize) 
     let Some(&[function, a, b, c, d, count]) = pdu.first_chunk() else {
         return Reply::NOT_MINE;
     };
+    if kind_of(function) != kind.0 {
+        return Reply::NOT_MINE;
+    }
     let address = u16::from_be_bytes([a, b]);
     let mut quantity = u16::from_be_bytes([c, d]);
     let bits = kind.is_bits();
-    let (single, multiple) = (5 + (kind.0 >> 1), 0x0F + (kind.0 >> 1));
-    let mut expected = 5;
-    // Where the data to write stand.
-    let mut at = 3;
-    let most = if function == kind.0 {
-        if bits {
-            MAX_READ_BITS
-        } else {
-            MAX_READ_REGISTERS
-        }
-    } else if kind.0 & 1 == 0 {
-        return Reply::NOT_MINE;
-    } else if function == single {
+    let several = function > WRITE_SINGLE_REGISTER;
+    let most = match (bits, function < WRITE_SINGLE_COIL) {
+        (true, true) => MAX_READ_BITS,
+        (true, false) => MAX_WRITE_BITS,
+        (false, true) => MAX_READ_REGISTERS,
+        (false, false) => MAX_WRITE_REGISTERS,
+    };
+    if !several && function >= WRITE_SINGLE_COIL {
         // A coil is on with FF00, and off with 0000.
-        let wrong = bits && (d != 0 || (c.wrapping_add(1) > 1));
-        quantity = u16::from(!wrong);
-        1
-    } else if function == multiple {
+        quantity = u16::from(!bits || quantity == 0 || quantity == 0xFF00);
+    }
+    let bytes = kind.bytes(quantity);
+    // Where the data to write stand.
+    let (mut at, mut expected) = (3, 5);
+    if several {
         at = 6;
-        expected = 6 + usize::from(count);
-        if usize::from(count) != kind.bytes(quantity) {
+        expected = 6 + bytes;
+        if bytes != usize::from(count) {
             quantity = 0;
         }
-        if bits {
-            MAX_WRITE_BITS
-        } else {
-            MAX_WRITE_REGISTERS
-        }
-    } else {
-        return Reply::NOT_MINE;
-    };
+    }
     if length != expected || quantity.wrapping_sub(1) >= most {
         return Reply::ILLEGAL_DATA_VALUE;
     }
     if !cells.covers(address, quantity) {
         return Reply::ILLEGAL_DATA_ADDRESS;
     }
-    let bytes = kind.bytes(quantity);
     if function == kind.0 {
         return read(cells, pdu, address, quantity, bytes);
     }
     let Some(data) = pdu.get_mut(at..at + bytes) else {
         return Reply::SERVER_DEVICE_FAILURE;
     };
-    write(cells, address, quantity, data, 5)
+    write_cells(cells, address, quantity, data, 5)
+}
+
+/// The kind of the table that a function is about; 0 if it is about none. (Not a
+/// match: a microcontroller would keep a table of it.)
+const fn kind_of(function: u8) -> u8 {
+    // The functions that write come in pairs, for coils and holding registers.
+    let (first, next) = if function >= WRITE_MULTIPLE_COILS {
+        (WRITE_MULTIPLE_COILS, WRITE_MULTIPLE_REGISTERS)
+    } else if function >= WRITE_SINGLE_COIL {
+        (WRITE_SINGLE_COIL, WRITE_SINGLE_REGISTER)
+    } else {
+        return function;
+    };
+    if function > next {
+        return 0;
+    }
+    READ_COILS + 2 * (function - first)
 }
 
 /// Writes the response of a read: behind the function a byte count and data.
@@ -160,7 +173,7 @@ fn read(
 
 /// Writes cells that are there from data as on the wire, hooks around it; the
 /// response is of `length`.
-fn write(
+fn write_cells(
     cells: &mut impl Cells,
     address: u16,
     quantity: u16,
@@ -194,7 +207,7 @@ pub fn serve_more(cells: &mut impl Cells, pdu: &mut [u8], length: usize) -> Repl
             cells.transfer(Way::Read, address, 1, &mut value);
             let value = u16::from_be_bytes(value);
             let value = (value & quantity) | (write_address & !quantity);
-            write(cells, address, 1, &mut value.to_be_bytes(), 7)
+            write_cells(cells, address, 1, &mut value.to_be_bytes(), 7)
         }
         READ_WRITE_MULTIPLE_REGISTERS => {
             let bytes = usize::from(count);
@@ -213,7 +226,7 @@ pub fn serve_more(cells: &mut impl Cells, pdu: &mut [u8], length: usize) -> Repl
                 return Reply::SERVER_DEVICE_FAILURE;
             }
             let data = pdu.get_mut(10..length).unwrap_or_default();
-            let reply = write(cells, write_address, written, data, 0);
+            let reply = write_cells(cells, write_address, written, data, 0);
             if reply.exception_code() != 0 {
                 return reply;
             }

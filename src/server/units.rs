@@ -10,8 +10,7 @@ use crate::pdu::{bits, files, registers};
 pub struct Heading {
     /// The unit that it is for.
     pub to: u8,
-    /// On a serial line: unit 0 is broadcast, and what arrives while we send is
-    /// an echo.
+    /// On a serial line: unit 0 is broadcast.
     pub serial: bool,
     /// Bytes are missing at its front: the buffer could not hold them.
     pub overrun: bool,
@@ -37,10 +36,8 @@ pub enum Concern {
     Broadcast,
 }
 
-/// In a stream: the unit id of a unit that answers to any, and ids that every
-/// server answers to (messaging on TCP/IP guide V1.0b, 4.4.1.2).
+/// The id of a unit that answers to any.
 pub const ANY: u8 = 0;
-const SERVER_ITSELF: u8 = 0xFF;
 
 impl Heading {
     /// No frame yet.
@@ -54,23 +51,28 @@ impl Heading {
         room: 0,
     };
 
-    /// What the frame is to the unit `id`.
-    pub const fn concern(&self, id: u8) -> Concern {
+    /// What the frame is, to a unit that it is for if it is for one.
+    pub const fn concern(&self, function: u8) -> Concern {
         if self.length == 0 {
-            return Concern::Foreign;
-        }
-        if self.serial {
-            if self.to == 0 {
-                return Concern::Broadcast;
-            }
-        } else if id == ANY || self.to == ANY || self.to == SERVER_ITSELF {
-            return Concern::Own;
-        }
-        if self.to == id {
+            Concern::Foreign
+        } else if !self.is_broadcast() {
             Concern::Own
+        } else if only_writes(function) {
+            Concern::Broadcast
         } else {
             Concern::Foreign
         }
+    }
+
+    /// True if everybody is meant.
+    pub const fn is_broadcast(&self) -> bool {
+        self.serial && self.to == 0
+    }
+
+    /// True if a unit of this id is meant. In a stream, the ids 0 and 255 mean
+    /// the server itself (messaging on TCP/IP guide V1.0b, 4.4.1.2).
+    pub const fn is_for(&self, id: u8) -> bool {
+        self.to == id || id == ANY || (!self.serial && self.to.wrapping_add(1) <= 1)
     }
 }
 
@@ -148,18 +150,17 @@ impl Unit<'_> {
 
 impl Units for [Unit<'_>] {
     fn serve(&mut self, heading: &Heading, pdu: &mut [u8]) -> Reply {
-        let writes = pdu.first().is_some_and(|code| only_writes(*code));
+        let mut all = heading.concern(pdu.first().copied().unwrap_or(0));
         let mut answer = Reply::SILENT;
         for unit in self {
-            let mut concern = heading.concern(unit.id);
-            if concern == Concern::Own && answer != Reply::SILENT
-                || concern == Concern::Broadcast && !writes
-            {
+            let mut concern = all;
+            if all == Concern::Own && !heading.is_for(unit.id) {
                 concern = Concern::Foreign;
             }
             let reply = unit.serve(heading, concern, pdu);
             if concern == Concern::Own {
                 answer = reply;
+                all = Concern::Foreign;
             }
         }
         answer

@@ -1,29 +1,29 @@
 //! What a transaction waits for: the answer of a unit to its request.
 
+use super::Question;
 use crate::error::Status;
-use crate::frame::rtu::{self, Verdict, Wanted};
-use crate::pdu::query::Query;
+use crate::frame::{rtu, Verdict, Wanted};
 use crate::pdu::reply;
 use core::num::NonZeroU8;
 
 /// What answers a request.
 #[repr(C)]
-pub(super) struct Answer {
+pub(super) struct Answer<Q> {
     pub(super) unit: u8,
     /// The request itself is expected to come back first.
     pub(super) echo: bool,
     /// The exception code of the last response; 0 if it was none.
     pub(super) exception: u8,
-    pub(super) request: Query,
+    pub(super) request: Q,
 }
 
-impl Answer {
+impl<Q: Question> Answer<Q> {
     /// Nothing is waited for.
-    pub(super) const NONE: Answer = Answer {
+    pub(super) const NONE: Self = Answer {
         unit: 0,
         echo: false,
         exception: 0,
-        request: Query::NONE,
+        request: Q::NONE,
     };
 
     /// True if `pdu`, complete or not, is the request itself.
@@ -32,7 +32,7 @@ impl Answer {
     }
 }
 
-impl Wanted for Answer {
+impl<Q: Question> Wanted for Answer<Q> {
     fn unit(&self) -> u8 {
         self.unit
     }
@@ -48,7 +48,7 @@ impl Wanted for Answer {
                 if self.is_echo(pdu) {
                     NonZeroU8::new(self.request.length())
                 } else {
-                    reply::expected(&self.request, pdu)
+                    self.request.expected(pdu)
                 }
             }
             _ => None,
@@ -65,9 +65,13 @@ impl Wanted for Answer {
             return Verdict::Own;
         }
         self.exception = reply::exception_code(pdu).unwrap_or(0);
-        match reply::judge(&self.request, pdu) {
+        match self.request.judge(pdu) {
             Status::MALFORMED_REPLY => Verdict::Wrong,
             _ => Verdict::Right,
         }
+    }
+
+    fn ends(&mut self, ended: bool) {
+        self.request.ends(ended);
     }
 }

@@ -13,16 +13,20 @@
 //! values in use at a time, so they stay in registers, and the code is small.
 
 mod answer;
+mod outcome;
+mod question;
 mod settings;
 mod storage;
 
+pub use question::Question;
 pub use settings::Settings;
 pub use storage::{Counter, Storage, COUNTERS};
 
 use crate::error::Status;
-use crate::frame::rtu::{self, Seen, Window};
+use crate::frame::rtu::Window;
+use crate::frame::Wanted as _;
+use crate::frame::{Search, Seen};
 use crate::pdu::query::Query;
-use crate::pdu::reply;
 use crate::port::Port;
 use crate::time::{elapsed, has_elapsed};
 use answer::Answer;
@@ -50,7 +54,7 @@ enum Phase {
 // In this order, small fields first: what lies far from the start of an object
 // costs a Cortex-M0 and an AVR an instruction more at each access.
 #[repr(C)]
-pub struct Transaction<P, S> {
+pub struct Transaction<P, S, Q = Query, W = Window> {
     phase: Phase,
     retries: u8,
     /// The phase began with the last poll; its time is that of the next.
@@ -60,7 +64,7 @@ pub struct Transaction<P, S> {
     /// The last request went without a right reply, which may still come.
     late: bool,
     /// Over what is to be sent, then over what arrives.
-    window: Window,
+    window: W,
     /// When the phase began.
     since: u32,
     /// When the line was last seen busy.
@@ -71,7 +75,7 @@ pub struct Transaction<P, S> {
     pub storage: S,
     /// The byte stream.
     pub port: P,
-    wanted: Answer,
+    wanted: Answer<Q>,
     /// How transactions behave.
     pub settings: Settings,
 }
@@ -79,7 +83,7 @@ pub struct Transaction<P, S> {
 /// The unit that every slave listens to (serial line guide 2.2).
 pub const BROADCAST: u8 = 0;
 
-impl<P, S> Transaction<P, S> {
+impl<P, S, Q: Question, W: Search> Transaction<P, S, Q, W> {
     /// No transaction yet.
     pub const fn new(port: P, storage: S) -> Self {
         Transaction {
@@ -91,7 +95,7 @@ impl<P, S> Transaction<P, S> {
             stamp: false,
             waiting: false,
             late: false,
-            window: Window::EMPTY,
+            window: W::EMPTY,
             wanted: Answer::NONE,
             settings: Settings::DEFAULT,
             storage,
@@ -110,19 +114,14 @@ impl<P, S> Transaction<P, S> {
         self.waiting
     }
 
-    /// The raw exception code of the last reply; 0 if it was none.
-    pub const fn exception_code(&self) -> u8 {
-        self.wanted.exception
+    /// True if the next poll is what the time of a phase counts from.
+    pub const fn is_to_be_stamped(&self) -> bool {
+        self.stamp
     }
 
     /// The request, which [`Transaction::start`] sends.
-    pub fn request(&mut self) -> &mut Query {
+    pub fn request(&mut self) -> &mut Q {
         &mut self.wanted.request
-    }
-
-    /// Forgets the outcome of the last transaction.
-    pub fn forget(&mut self) {
-        self.wanted.exception = 0;
     }
 
     /// True once the phase has lasted `time`.
@@ -172,27 +171,17 @@ impl<P, S> Transaction<P, S> {
     }
 }
 
-impl<P: Port, S: Storage> Transaction<P, S> {
+impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
     /// Says that the line was busy just now, so the gap counts from here.
     pub fn line_used(&mut self) {
         self.last_byte = self.port.micros();
-    }
-
-    /// Fills the response words from the reply that ended the last transaction;
-    /// false, with nothing filled, if they are too few.
-    pub fn take_words(&mut self) -> bool {
-        let (frame, words) = self.storage.frame_and_response();
-        match self.window.behind(frame, rtu::PDU + reply::DATA) {
-            Some(data) => self.wanted.request.take(words, data),
-            None => false,
-        }
     }
 
     /// Starts the request to `unit`; `poll` does the rest.
     /// [`Status::BROADCAST_NOT_ALLOWED`], and nothing is sent, for a read from
     /// unit 0.
     pub fn start(&mut self, unit: u8) -> Status {
-        if unit == BROADCAST && self.wanted.request.is_read() {
+        if unit == BROADCAST && !self.wanted.request.may_be_broadcast() {
             return Status::BROADCAST_NOT_ALLOWED;
         }
         self.wanted.unit = unit;
@@ -322,8 +311,8 @@ impl<P: Port, S: Storage> Transaction<P, S> {
         if !self.is_silent(silence) {
             return self.wait();
         }
-        let length = u16::from(self.wanted.request.length());
-        self.window.hold(length + rtu::OVERHEAD as u16);
+        let length = self.wanted.request.length();
+        self.window.hold(W::frame_length(length));
         self.storage.count(Counter::Requests, 1);
         self.late = false;
         self.phase = Phase::Send;
@@ -339,7 +328,7 @@ impl<P: Port, S: Storage> Transaction<P, S> {
         let request = &self.wanted.request;
         let length = usize::from(request.length());
         let (frame, words) = self.storage.frame_and_transmit();
-        rtu::write(frame, self.wanted.unit, length, |pdu| {
+        self.window.write(frame, self.wanted.unit, length, |pdu| {
             request.emit(pdu, words);
         })
     }
@@ -396,11 +385,13 @@ impl<P: Port, S: Storage> Transaction<P, S> {
         self.port.post_transmission();
         self.wanted.echo = self.settings.echo_discard;
         self.waiting = true;
-        self.enter(if self.wanted.unit == BROADCAST {
-            Phase::Turnaround
-        } else {
-            Phase::Reply
-        });
+        self.enter(
+            if self.wanted.unit == BROADCAST || !self.wanted.request.is_answered() {
+                Phase::Turnaround
+            } else {
+                Phase::Reply
+            },
+        );
     }
 
     fn turn_around(&mut self) -> Status {
@@ -424,6 +415,7 @@ impl<P: Port, S: Storage> Transaction<P, S> {
             if heard > 0 {
                 reads -= 1;
                 self.window.arrived(heard as u16);
+                self.wanted.ends(false);
             } else {
                 self.waiting = reads > 0;
                 if !over && !self.is_silent(self.settings.silence) {
@@ -439,6 +431,7 @@ impl<P: Port, S: Storage> Transaction<P, S> {
                     };
                 }
                 self.window.skim();
+                self.wanted.ends(true);
             }
             if self.window.search(self.storage.frame(), &mut self.wanted) {
                 return self.found();
@@ -479,7 +472,7 @@ impl<P: Port, S: Storage> Transaction<P, S> {
             Counter::Timeouts
         };
         self.storage.count(counter, 1);
-        if !cfg!(feature = "retries") || self.retries == 0 {
+        if !cfg!(feature = "retries") || !Q::REPEATS || self.retries == 0 {
             return status;
         }
         self.retries -= 1;

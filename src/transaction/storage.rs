@@ -33,16 +33,24 @@ pub trait Storage {
     fn frame(&mut self) -> &mut [u8];
 
     /// The words that writing requests send.
-    fn transmit(&mut self) -> &mut [u16];
+    fn transmit(&mut self) -> &mut [u16] {
+        &mut []
+    }
 
     /// The words that a successful read fills.
-    fn response(&mut self) -> &mut [u16];
+    fn response(&mut self) -> &mut [u16] {
+        &mut []
+    }
 
     /// Frame and transmit words at once.
-    fn frame_and_transmit(&mut self) -> (&mut [u8], &[u16]);
+    fn frame_and_transmit(&mut self) -> (&mut [u8], &[u16]) {
+        (self.frame(), &[])
+    }
 
     /// Frame and response words at once.
-    fn frame_and_response(&mut self) -> (&[u8], &mut [u16]);
+    fn frame_and_response(&mut self) -> (&[u8], &mut [u16]) {
+        (self.frame(), &mut [])
+    }
 
     /// Adds to a counter, if there is storage for counters.
     fn count(&mut self, _counter: Counter, _more: u16) {}

@@ -46,7 +46,7 @@ pub(super) struct Object {
     order: u8,
 }
 
-type Core = Master<mbm_port, LentByC>;
+pub(super) type Core = Master<mbm_port, LentByC>;
 
 const _: () = {
     let room = size_of::<mbm_master>();
@@ -65,6 +65,11 @@ impl Object {
     pub(super) unsafe fn is_begun(object: *const Object) -> bool {
         // SAFETY: the storage is zeroed or written, so readable.
         unsafe { (&raw const (*object).mark).read() == BEGUN }
+    }
+
+    /// The facade itself.
+    pub(super) fn core(&mut self) -> &mut Core {
+        &mut self.core
     }
 
     /// Turns a zeroed object into one that is begun, without port and buffers.

@@ -213,3 +213,23 @@ pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u
     // SAFETY: as the header demands.
     unsafe { mbm_server_setSilence(server, time::silence(baud)) }
 }
+
+/// Tells that the receiver of an RTU line hears what the driver sends, so that as
+/// many bytes as were sent are dropped behind each response. mbm_server_begin
+/// sets it back.
+///
+/// @param server  the object
+/// @param on      0 (at first) or 1
+/// @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings, or
+///         MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_server_setEchoDiscard(server: *mut mbm_server, on: u8) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        match check(server) {
+            Status::OK if object(server).core.set_echo_discard(on != 0) => Status::OK.code(),
+            Status::OK => Status::INVALID_ARGUMENT.code(),
+            refused => refused.code(),
+        }
+    }
+}

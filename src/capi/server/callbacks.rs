@@ -3,11 +3,8 @@
 use super::units::{add, request};
 use super::{mbm_service, mbm_unit};
 use crate::error::Status;
-use crate::server::storage::{
-    BitRead, BitWrite, Coils, DiscreteInputs, HoldingRegisters, InputRegisters, RegisterRead,
-    RegisterWrite,
-};
-use crate::server::{Reply, Service};
+use crate::server::table::{self, Cells, Kind, Way};
+use crate::server::Reply;
 use core::ffi::c_void;
 
 /// Cells that your functions hold, one by one, in place of an array. Zero it, set
@@ -36,6 +33,8 @@ pub struct mbm_cells {
     >,
     /// As in mbm_registerTable.
     pub after: Option<unsafe extern "C" fn(context: *mut c_void, address: u16, quantity: u16)>,
+    /// Not for you.
+    pub kind: u8,
 }
 
 /// Cells of C, which its functions may look at: no reference to them is kept.
@@ -68,7 +67,49 @@ impl ByC {
             }
         }
     }
-    fn before(self, address: u16, quantity: u16, data: &[u8]) -> u8 {
+}
+
+impl Cells for ByC {
+    fn covers(&self, address: u16, quantity: u16) -> bool {
+        let last = address.checked_add(quantity.wrapping_sub(1));
+        last.is_some_and(|last| (address..=last).all(|cell| self.is_valid(cell)))
+    }
+
+    fn transfer(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) {
+        // SAFETY: see above.
+        let bits = Kind::from_code(unsafe { (*self.0).kind }).is_bits();
+        for index in 0..quantity {
+            let cell = address.wrapping_add(index);
+            if bits {
+                let Some(byte) = data.get_mut(usize::from(index / 8)) else {
+                    return;
+                };
+                let bit = 1 << (index % 8);
+                if way == Way::Write {
+                    self.set(cell, u16::from(*byte & bit != 0));
+                } else {
+                    if bit == 1 {
+                        *byte = 0;
+                    }
+                    if self.get(cell) != 0 {
+                        *byte |= bit;
+                    }
+                }
+            } else {
+                let at = 2 * usize::from(index);
+                let Some([high, low]) = data.get_mut(at..at + 2) else {
+                    return;
+                };
+                if way == Way::Write {
+                    self.set(cell, u16::from_be_bytes([*high, *low]));
+                } else {
+                    [*high, *low] = self.get(cell).to_be_bytes();
+                }
+            }
+        }
+    }
+
+    fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
         // SAFETY: see above.
         unsafe {
             let hook = (*self.0).before;
@@ -77,7 +118,8 @@ impl ByC {
             })
         }
     }
-    fn after(self, address: u16, quantity: u16) {
+
+    fn after(&mut self, address: u16, quantity: u16) {
         // SAFETY: see above.
         unsafe {
             if let Some(hook) = (*self.0).after {
@@ -87,95 +129,24 @@ impl ByC {
     }
 }
 
-impl RegisterRead for ByC {
-    fn is_valid(&self, address: u16) -> bool {
-        ByC::is_valid(*self, address)
-    }
-    fn get(&self, address: u16) -> u16 {
-        ByC::get(*self, address)
-    }
-}
-
-impl RegisterWrite for ByC {
-    fn set(&mut self, address: u16, value: u16) {
-        ByC::set(*self, address, value);
-    }
-    fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
-        ByC::before(*self, address, quantity, data)
-    }
-    fn after(&mut self, address: u16, quantity: u16) {
-        ByC::after(*self, address, quantity);
-    }
-}
-
-impl BitRead for ByC {
-    fn is_valid(&self, address: u16) -> bool {
-        ByC::is_valid(*self, address)
-    }
-    fn get(&self, address: u16) -> bool {
-        ByC::get(*self, address) != 0
-    }
-}
-
-impl BitWrite for ByC {
-    fn set(&mut self, address: u16, on: bool) {
-        ByC::set(*self, address, on.into());
-    }
-    fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
-        ByC::before(*self, address, quantity, data)
-    }
-    fn after(&mut self, address: u16, quantity: u16) {
-        ByC::after(*self, address, quantity);
-    }
-}
-
-/// Serves cells as what `table` makes of them.
+/// Serves cells.
 ///
 /// # Safety
 /// `service` is the head of a record of them; `pdu` has the bytes and room of
 /// `heading`.
-unsafe fn serve<T: Service>(
-    service: *mut mbm_service,
-    pdu: *mut u8,
-    heading: *const c_void,
-    table: fn(ByC) -> T,
-) -> u16 {
+unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, heading: *const c_void) -> u16 {
     // SAFETY: as the caller promises.
-    let (pdu, length) = unsafe { request(pdu, heading) };
-    let reply: Reply = table(ByC(service.cast())).serve(pdu, length);
-    reply.code()
-}
-
-unsafe extern "C" fn coils(service: *mut mbm_service, pdu: *mut u8, heading: *const c_void) -> u16 {
-    // SAFETY: as for `serve`, here and below.
-    unsafe { serve(service, pdu, heading, Coils) }
-}
-
-unsafe extern "C" fn inputs(
-    service: *mut mbm_service,
-    pdu: *mut u8,
-    heading: *const c_void,
-) -> u16 {
-    // SAFETY: see above.
-    unsafe { serve(service, pdu, heading, DiscreteInputs) }
-}
-
-unsafe extern "C" fn holding(
-    service: *mut mbm_service,
-    pdu: *mut u8,
-    heading: *const c_void,
-) -> u16 {
-    // SAFETY: see above.
-    unsafe { serve(service, pdu, heading, HoldingRegisters) }
-}
-
-unsafe extern "C" fn input_registers(
-    service: *mut mbm_service,
-    pdu: *mut u8,
-    heading: *const c_void,
-) -> u16 {
-    // SAFETY: see above.
-    unsafe { serve(service, pdu, heading, InputRegisters) }
+    unsafe {
+        let record = service.cast::<mbm_cells>();
+        let kind = Kind::from_code((*record).kind);
+        let (pdu, length) = request(pdu, heading);
+        let mut cells = ByC(record);
+        let mut reply = table::serve(kind, &mut cells, pdu, length);
+        if reply == Reply::NOT_MINE && kind == Kind::HOLDING_REGISTERS {
+            reply = table::serve_more(&mut cells, pdu, length);
+        }
+        reply.code()
+    }
 }
 
 /// Serves cells that your functions hold.
@@ -197,13 +168,10 @@ pub unsafe extern "C" fn mbm_server_serveCallbacks(
     unsafe {
         let useless =
             cells.is_null() || (*cells).get.is_none() || (table & 1 != 0 && (*cells).set.is_none());
-        match table {
-            _ if useless => Status::INVALID_ARGUMENT.code(),
-            1 => add(unit, cells.cast(), coils),
-            2 => add(unit, cells.cast(), inputs),
-            3 => add(unit, cells.cast(), holding),
-            4 => add(unit, cells.cast(), input_registers),
-            _ => Status::INVALID_ARGUMENT.code(),
+        if useless || !(1..=4).contains(&table) {
+            return Status::INVALID_ARGUMENT.code();
         }
+        (*cells).kind = table;
+        add(unit, cells.cast(), serve)
     }
 }

@@ -133,7 +133,7 @@ pub unsafe extern "C" fn mbm_server_serveDiagnostics(
         let status = add(unit, diagnostics.cast(), serve);
         if status == Status::OK.code() {
             (*unit).diagnostics = diagnostics;
-            (*unit).monitor = Some(monitor);
+            (*unit).serve = Some(monitor);
         }
         status
     }

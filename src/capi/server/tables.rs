@@ -93,20 +93,6 @@ unsafe fn bit(map: *const u8, index: u16) -> bool {
     unsafe { *map.add(usize::from(index >> 3)) >> (index & 7) & 1 != 0 }
 }
 
-/// Sets the bit of a byte to whether `value` is not 0.
-///
-/// # Safety
-/// `byte` points to one.
-unsafe fn copy_bit(byte: *mut u8, bit: u8, value: u8) {
-    // SAFETY: as the caller promises.
-    unsafe {
-        *byte &= !bit;
-        if value != 0 {
-            *byte |= bit;
-        }
-    }
-}
-
 // SAFETY, of all functions here: the record is the caller's and stays where it
 // is, as the header demands, with arrays of `size` cells behind its pointers; a
 // cell that is `covered` lies in them.
@@ -134,32 +120,34 @@ impl Cells for Table {
     #[cfg_attr(target_os = "none", inline(never))]
     fn transfer(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) {
         let first = self.index(address);
+        let write = way == Way::Write;
         // SAFETY: see above; data have room for so many cells.
         unsafe {
-            let words = (*self.0).words;
+            let cells = (*self.0).words.cast::<u8>();
             let bits = Kind::from_code((*self.0).kind).is_bits();
             let mut data = data.as_mut_ptr();
             let mut mask = 1u8;
             for index in first..first + quantity {
                 if bits {
-                    let cell = words.cast::<u8>().add(usize::from(index >> 3));
-                    let bit = 1 << (index & 7);
-                    if way == Way::Write {
-                        copy_bit(cell, bit, *data & mask);
+                    let (cell, bit) = (cells.add(usize::from(index >> 3)), 1 << (index & 7));
+                    let (to, to_bit, from, from_bit) = if write {
+                        (cell, bit, data, mask)
                     } else {
-                        if mask == 1 {
-                            *data = 0;
-                        }
-                        copy_bit(data, mask, *cell & bit);
+                        (data, mask, cell, bit)
+                    };
+                    // A byte that is begun has no bits yet.
+                    let mut value = if write || mask != 1 { *to & !to_bit } else { 0 };
+                    if *from & from_bit != 0 {
+                        value |= to_bit;
                     }
-                    mask <<= 1;
-                    if mask == 0 {
-                        mask = 1;
+                    *to = value;
+                    mask = mask.rotate_left(1);
+                    if mask == 1 {
                         data = data.add(1);
                     }
                 } else {
-                    let cell = words.add(index.into());
-                    if way == Way::Write {
+                    let cell = cells.add(2 * usize::from(index)).cast::<u16>();
+                    if write {
                         *cell = u16::from_be_bytes([*data, *data.add(1)]);
                     } else {
                         let [high, low] = (*cell).to_be_bytes();

@@ -3,7 +3,7 @@
 use super::{custom, mbm_diagnostics};
 use crate::error::Status;
 use crate::pdu::custom::Rule;
-use crate::server::{only_writes, Concern, Heading, Reply};
+use crate::server::{Concern, Heading, Reply};
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 
@@ -35,7 +35,7 @@ pub struct mbm_unit {
     /// Not for you.
     pub services: *mut mbm_service,
     /// Not for you.
-    pub monitor: Option<
+    pub serve: Option<
         unsafe extern "C" fn(
             unit: *mut mbm_unit,
             heading: *const c_void,
@@ -45,8 +45,7 @@ pub struct mbm_unit {
     >,
     /// Not for you.
     pub diagnostics: *mut mbm_diagnostics,
-    /// The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers, over TCP,
-    /// to every id.
+    /// The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers to every id.
     pub id: u8,
 }
 
@@ -62,6 +61,9 @@ pub(super) unsafe fn add(unit: *mut mbm_unit, service: *mut mbm_service, serve: 
     }
     // SAFETY: not NULL; services hang together as this function hung them.
     unsafe {
+        if (*unit).serve.is_none() {
+            (*unit).serve = Some(serve_plainly);
+        }
         let mut place = &raw mut (*unit).services;
         while *place != service {
             if (*place).is_null() {
@@ -127,25 +129,42 @@ pub(super) unsafe fn serve(
     let mut unit = units;
     // SAFETY: as the caller promises.
     unsafe {
+        let mut concern = (*heading).concern(*pdu);
         for _ in 0..count {
-            let mut concern = (*heading).concern((*unit).id);
-            if concern == Concern::Own && answer != Reply::SILENT.code()
-                || concern == Concern::Broadcast && !only_writes(*pdu)
-            {
-                concern = Concern::Foreign;
-            }
-            let reply = match (*unit).monitor {
-                Some(monitor) => monitor(unit, heading.cast(), concern as u8, pdu),
-                None if concern == Concern::Foreign => Reply::SILENT.code(),
-                None => walk(unit, pdu, heading),
+            let own = (*heading).is_for((*unit).id);
+            let concerned = if concern == Concern::Own && !own {
+                Concern::Foreign
+            } else {
+                concern
             };
-            if concern == Concern::Own {
-                answer = reply;
+            if let Some(serve) = (*unit).serve {
+                let reply = serve(unit, heading.cast(), concerned as u8, pdu);
+                if concerned == Concern::Own {
+                    answer = reply;
+                    concern = Concern::Foreign;
+                }
             }
             unit = unit.add(1);
         }
     }
     answer
+}
+
+/// Serves a frame without taking notice of those that are not for the unit.
+///
+/// # Safety
+/// As for [`walk`].
+unsafe extern "C" fn serve_plainly(
+    unit: *mut mbm_unit,
+    heading: *const c_void,
+    concern: u8,
+    pdu: *mut u8,
+) -> u16 {
+    if concern == Concern::Foreign as u8 {
+        return Reply::SILENT.code();
+    }
+    // SAFETY: as the caller promises.
+    unsafe { walk(unit, pdu, heading.cast()) }
 }
 
 /// Hangs a service before all that a unit has.

@@ -7,15 +7,16 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// The layers from left to right; modules of one string stand side by side.
-const LAYERS: [&[&str]; 9] = [
+const LAYERS: [&[&str]; 10] = [
     &["error", "time"],
     &["port", "ring", "data"],
     &["bytes"],
     &["frame"],
     &["pdu"],
     &["packet"],
-    &["transaction"],
-    &["master", "server"],
+    &["explain"],
+    &["sniffer", "transaction"],
+    &["master", "client", "server"],
     &["capi"],
 ];
 

@@ -1,0 +1,83 @@
+#define _GNU_SOURCE
+#include "client.h"
+#include "test.h"
+
+#include <poll.h>
+#include <stdio.h>
+#include <string.h>
+
+static void begin_tty(asker *a, int fd)
+{
+    memset(a, 0, sizeof *a);
+    assert_int_equal(mbm_tty_attach(&a->tty, fd), 0);
+    a->port = mbm_tty_port(&a->tty, NULL);
+}
+
+static void begin_tcp(asker *a, uint16_t port)
+{
+    memset(a, 0, sizeof *a);
+    snprintf(a->service, sizeof a->service, "%u", port);
+    assert_int_equal(mbm_tcp_open(&a->tcp, "127.0.0.1", a->service), 0);
+    a->port = mbm_tcp_port(&a->tcp, NULL);
+    a->link.context = &a->tcp;
+    a->link.connect = mbm_tcp_connect;
+    a->link.disconnect = mbm_tcp_disconnect;
+}
+
+void asker_begin_rtu(asker *a, int fd)
+{
+    begin_tty(a, fd);
+    OK(mbm_client_beginRtu(&a->client, &a->port, a->incoming, sizeof a->incoming));
+    OK(mbm_client_setBaudRate(&a->client, 115200));
+    OK(mbm_client_setCounters(&a->client, &a->counters));
+}
+
+void asker_begin_ascii(asker *a, int fd)
+{
+    begin_tty(a, fd);
+    OK(mbm_client_beginAscii(&a->client, &a->port, a->incoming, sizeof a->incoming));
+    OK(mbm_client_setCounters(&a->client, &a->counters));
+}
+
+void asker_begin_tcp(asker *a, uint16_t port)
+{
+    begin_tcp(a, port);
+    OK(mbm_client_beginTcp(&a->client, &a->port, a->incoming, sizeof a->incoming, a->outgoing,
+                           sizeof a->outgoing));
+    OK(mbm_client_setCounters(&a->client, &a->counters));
+}
+
+void asker_begin_rtu_over_tcp(asker *a, uint16_t port)
+{
+    begin_tcp(a, port);
+    OK(mbm_client_beginRtuOverTcp(&a->client, &a->port, a->incoming, sizeof a->incoming));
+    OK(mbm_client_setCounters(&a->client, &a->counters));
+}
+
+/* Sleeps until bytes arrive or the client has something else to do. */
+void asker_rest(asker *a)
+{
+    uint32_t delay = mbm_client_pollDelay(&a->client);
+    struct timespec time = {(time_t)(delay / 1000000u), (long)(delay % 1000000u) * 1000};
+    struct pollfd line = {a->service[0] ? a->tcp.fd : a->tty.fd, POLLIN, 0};
+
+    if (a->service[0] && mbm_tcp_isConnected(&a->tcp) == 0)
+        line.events |= POLLOUT;
+    ppoll(&line, 1, &time, NULL);
+}
+
+uint8_t asker_wait(asker *a, const mbm_clientRequest *request)
+{
+    while (request->status == MBM_PENDING) {
+        (void)mbm_client_poll(&a->client);
+        if (request->status == MBM_PENDING)
+            asker_rest(a);
+    }
+    return request->status;
+}
+
+void asker_wait_all(asker *a)
+{
+    while (mbm_client_poll(&a->client) == MBM_PENDING)
+        asker_rest(a);
+}

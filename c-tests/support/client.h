@@ -1,0 +1,34 @@
+/* A client with buffers of full size, and what tests want of it. */
+#ifndef CLIENT_H
+#define CLIENT_H
+
+#include "mbm_tcp.h"
+#include "mbm_tty.h"
+
+typedef struct asker {
+    mbm_client client;
+    mbm_port port;
+    mbm_tty tty;
+    mbm_tcp tcp;
+    mbm_link link;
+    mbm_counters counters;
+    char service[8];
+    uint8_t incoming[1024], outgoing[1024];
+} asker;
+
+/* Zeroes it and begins a client of a terminal, told 115200 baud. */
+void asker_begin_rtu(asker *a, int fd);
+void asker_begin_ascii(asker *a, int fd);
+
+/* Zeroes it and begins a client of a TCP port of this machine. */
+void asker_begin_tcp(asker *a, uint16_t port);
+void asker_begin_rtu_over_tcp(asker *a, uint16_t port);
+
+/* Sleeps until bytes arrive or the client has something else to do. */
+void asker_rest(asker *a);
+
+/* Polls, and sleeps between, until a request or all of them have ended. */
+uint8_t asker_wait(asker *a, const mbm_clientRequest *request);
+void asker_wait_all(asker *a);
+
+#endif

@@ -1,0 +1,36 @@
+/* What a bad wire does to the first of five transactions, and what is to become
+ * of them: run by the facade and by the client. */
+#ifndef FAULTS_H
+#define FAULTS_H
+
+#include "mbm.h"
+#include "responder.h"
+
+enum { FAULT_UNIT = 1, FAULT_TRANSACTIONS = 5, FAULT_REGISTERS = 10 };
+
+typedef struct fault {
+    const char *name;
+    void (*play)(responder *r, const uint8_t *request);
+    uint8_t function;      /* of the five requests, 03 or 06 */
+    uint8_t echo;          /* the master is told to expect its echo */
+    const char *expected;  /* without a retry */
+    uint8_t status;        /* of the first transaction */
+    const char *retried;   /* with one retry */
+} fault;
+
+extern const fault faults[];
+extern const unsigned fault_count;
+
+/* Set by a script: the next read says that the link is gone. */
+extern int fault_link_dies;
+
+/* Every register's value tells its address, so that stale data shows. */
+uint16_t fault_value(unsigned address);
+
+/* Starts a device that plays the fault at the first request. */
+void fault_start(responder *device, const fault *f);
+
+/* True if no transaction fares worse than expected: '.' right, 'F' failed. */
+int fault_as_good(const char *found, const char *expected);
+
+#endif

@@ -1,0 +1,96 @@
+#define _GNU_SOURCE
+#include "tcp_server.h"
+#include "server.h"
+
+#include <arpa/inet.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+int tcp_listen(uint16_t *port)
+{
+    struct sockaddr_in at;
+    socklen_t length = sizeof at;
+    int listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+
+    memset(&at, 0, sizeof at);
+    at.sin_family = AF_INET;
+    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    if (listener < 0 || bind(listener, (struct sockaddr *)&at, sizeof at) < 0 ||
+        listen(listener, 4) < 0 || getsockname(listener, (struct sockaddr *)&at, &length) < 0) {
+        perror("listen");
+        abort();
+    }
+    *port = ntohs(at.sin_port);
+    return listener;
+}
+
+static void *serve(void *argument)
+{
+    tcp_server *s = (tcp_server *)argument;
+    uint8_t request[MODBUS_TCP_MAX_ADU_LENGTH];
+    int peer = -1;
+
+    for (;;) {
+        struct pollfd waits[2] = {{peer < 0 ? s->listener : peer, POLLIN, 0},
+                                  {s->stop[0], POLLIN, 0}};
+        int length;
+
+        poll(waits, 2, -1);
+        if (waits[1].revents)
+            break;
+        if (peer < 0) {
+            peer = accept(s->listener, NULL, NULL);
+            modbus_set_socket(s->peer, peer);
+            continue;
+        }
+        length = modbus_receive(s->peer, request);
+        if (length > 0)
+            modbus_reply(s->peer, request, length, s->mapping);
+        if (length < 0) {
+            close(peer);
+            peer = -1;
+        }
+    }
+    if (peer >= 0)
+        close(peer);
+    return NULL;
+}
+
+void tcp_server_start(tcp_server *s)
+{
+    unsigned i;
+
+    s->listener = tcp_listen(&s->port);
+    s->peer = modbus_new_tcp("127.0.0.1", s->port);
+    s->mapping = modbus_mapping_new(SERVER_BITS, SERVER_BITS, SERVER_REGISTERS, SERVER_REGISTERS);
+    if (!s->peer || !s->mapping || pipe(s->stop)) {
+        perror("libmodbus server");
+        abort();
+    }
+    for (i = 0; i < SERVER_REGISTERS; i++) {
+        s->mapping->tab_registers[i] = server_pattern(i);
+        s->mapping->tab_input_registers[i] = (uint16_t)~server_pattern(i);
+    }
+    for (i = 0; i < SERVER_BITS; i++) {
+        s->mapping->tab_bits[i] = server_bit_pattern(i);
+        s->mapping->tab_input_bits[i] = !server_bit_pattern(i);
+    }
+    if (pthread_create(&s->thread, NULL, serve, s))
+        abort();
+}
+
+void tcp_server_stop(tcp_server *s)
+{
+    if (write(s->stop[1], "", 1) != 1)
+        abort();
+    pthread_join(s->thread, NULL);
+    modbus_free(s->peer);
+    modbus_mapping_free(s->mapping);
+    close(s->listener);
+    close(s->stop[0]);
+    close(s->stop[1]);
+}

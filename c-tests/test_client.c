@@ -1,0 +1,343 @@
+/* The client for C against libmodbus: RTU over a pty, TCP over loopback; and what
+ * it says to bad calls. */
+#define _GNU_SOURCE
+#include "client.h"
+#include "server.h"
+#include "tcp_server.h"
+#include "test.h"
+
+#include <string.h>
+#include <sys/socket.h>
+
+enum { UNIT = 17 };
+
+static asker a;
+
+static mbm_clientRequest asked(uint8_t unit, void *reply, uint16_t bytes, const void *data)
+{
+    mbm_clientRequest request = {0};
+
+    request.unit = unit;
+    request.reply = reply;
+    request.replyBytes = bytes;
+    request.data = data;
+    return request;
+}
+
+static void ends(uint8_t status, mbm_clientRequest *request, uint8_t queued)
+{
+    assert_int_equal(queued, MBM_PENDING);
+    assert_int_equal(request->status, MBM_PENDING);
+    assert_int_equal(asker_wait(&a, request), status);
+}
+
+/* Every function that libmodbus's server has, against its own memory. */
+static void every_function_of_libmodbus(modbus_mapping_t *memory)
+{
+    uint16_t words[125], values[] = {0x1234, 0xFEDC, 7};
+    uint8_t bits[250], coils[] = {0xCD, 0x01};
+    mbm_client *c = &a.client;
+    mbm_clientRequest r = asked(UNIT, bits, sizeof bits, NULL);
+    unsigned i;
+
+    ends(MBM_OK, &r, mbm_client_readCoils(c, &r, 3, 1999));
+    assert_int_equal(r.length, 250);
+    for (i = 0; i < 1999; i++)
+        assert_int_equal(bits[i / 8] >> i % 8 & 1, memory->tab_bits[3 + i]);
+    ends(MBM_OK, &r, mbm_client_readDiscreteInputs(c, &r, 5, 13));
+    assert_int_equal(r.length, 2);
+    assert_int_equal(bits[1] >> 5, 0);
+    for (i = 0; i < 13; i++)
+        assert_int_equal(bits[i / 8] >> i % 8 & 1, memory->tab_input_bits[5 + i]);
+    ends(MBM_OK, &r, mbm_client_readSingleCoil(c, &r, 9));
+    assert_int_equal(bits[0], memory->tab_bits[9]);
+    ends(MBM_OK, &r, mbm_client_readSingleDiscreteInput(c, &r, 9));
+    assert_int_equal(bits[0], memory->tab_input_bits[9]);
+
+    r = asked(UNIT, words, sizeof words, NULL);
+    ends(MBM_OK, &r, mbm_client_readHoldingRegisters(c, &r, 2, 125));
+    assert_int_equal(r.length, 250);
+    assert_memory_equal(words, memory->tab_registers + 2, 250);
+    ends(MBM_OK, &r, mbm_client_readInputRegisters(c, &r, 4, 3));
+    assert_memory_equal(words, memory->tab_input_registers + 4, 6);
+    ends(MBM_OK, &r, mbm_client_readSingleHoldingRegister(c, &r, 6));
+    assert_int_equal(words[0], memory->tab_registers[6]);
+    ends(MBM_OK, &r, mbm_client_readSingleInputRegister(c, &r, 6));
+    assert_int_equal(words[0], memory->tab_input_registers[6]);
+
+    r = asked(UNIT, NULL, 0, NULL);
+    ends(MBM_OK, &r, mbm_client_writeSingleCoil(c, &r, 11, 1));
+    assert_int_equal(memory->tab_bits[11], 1);
+    ends(MBM_OK, &r, mbm_client_writeSingleCoil(c, &r, 11, 0));
+    assert_int_equal(memory->tab_bits[11], 0);
+    ends(MBM_OK, &r, mbm_client_writeSingleRegister(c, &r, 12, 0xBEEF));
+    assert_int_equal(memory->tab_registers[12], 0xBEEF);
+    r.data = coils;
+    ends(MBM_OK, &r, mbm_client_writeMultipleCoils(c, &r, 20, 9));
+    for (i = 0; i < 9; i++)
+        assert_int_equal(memory->tab_bits[20 + i], coils[i / 8] >> i % 8 & 1);
+    r.data = values;
+    ends(MBM_OK, &r, mbm_client_writeMultipleRegisters(c, &r, 30, 3));
+    assert_memory_equal(values, memory->tab_registers + 30, 6);
+    memory->tab_registers[40] = 0x12;
+    ends(MBM_OK, &r, mbm_client_maskWriteRegister(c, &r, 40, 0xF2, 0x25));
+    assert_int_equal(memory->tab_registers[40], 0x17);
+
+    r = asked(UNIT, words, sizeof words, values);
+    ends(MBM_OK, &r, mbm_client_readWriteMultipleRegisters(c, &r, 50, 4, 51, 2));
+    assert_int_equal(r.length, 8);
+    assert_memory_equal(words + 1, values, 4);
+    assert_memory_equal(words, memory->tab_registers + 50, 8);
+    r = asked(UNIT, bits, sizeof bits, NULL);
+    ends(MBM_OK, &r, mbm_client_reportServerId(c, &r));
+    assert_true(r.length > 2 && memcmp(bits + 2, "LMB", 3) == 0);
+
+    ends(MBM_ILLEGAL_DATA_ADDRESS, &r, mbm_client_readHoldingRegisters(c, &r, 65000, 1));
+    assert_int_equal(r.exception, 2);
+    assert_int_equal(r.length, 0);
+}
+
+static void every_function_over_a_pty(void **state)
+{
+    server s;
+
+    (void)state;
+    server_start(&s, UNIT);
+    asker_begin_rtu(&a, s.line.ours);
+    every_function_of_libmodbus(s.mapping);
+    assert_int_equal(a.counters.foreignFrames, 0);
+    server_stop(&s);
+}
+
+static void every_function_over_tcp(void **state)
+{
+    tcp_server s;
+
+    (void)state;
+    tcp_server_start(&s);
+    asker_begin_tcp(&a, s.port);
+    every_function_of_libmodbus(s.mapping);
+    mbm_tcp_close(&a.tcp);
+    tcp_server_stop(&s);
+}
+
+static void sixteen_requests_are_pipelined(void **state)
+{
+    mbm_clientRequest requests[MBM_CLIENT_DEPTH + 1];
+    uint16_t words[MBM_CLIENT_DEPTH][10];
+    tcp_server s;
+    unsigned i, round;
+
+    (void)state;
+    tcp_server_start(&s);
+    asker_begin_tcp(&a, s.port);
+    for (round = 0; round < 20; round++) {
+        for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
+            requests[i] = asked(UNIT, words[i], sizeof words[i], NULL);
+            requests[i].transaction = (uint16_t)(i + 1);
+            IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &requests[i],
+                                                            (uint16_t)(10 * i), 10));
+        }
+        requests[i] = asked(UNIT, NULL, 0, NULL);
+        IS(MBM_QUEUE_FULL, mbm_client_readHoldingRegisters(&a.client, &requests[i], 0, 1));
+        asker_wait_all(&a);
+        for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
+            assert_int_equal(requests[i].status, MBM_OK);
+            assert_memory_equal(words[i], s.mapping->tab_registers + 10 * i, 20);
+        }
+    }
+    assert_int_equal(a.counters.replies, 20 * MBM_CLIENT_DEPTH);
+    mbm_tcp_close(&a.tcp);
+    tcp_server_stop(&s);
+}
+
+static void a_lost_connection_is_told_and_made_anew(void **state)
+{
+    mbm_clientRequest r = asked(UNIT, NULL, 0, NULL), waiting = asked(UNIT, NULL, 0, NULL);
+    tcp_server s;
+
+    (void)state;
+    tcp_server_start(&s);
+    asker_begin_tcp(&a, s.port);
+    ends(MBM_OK, &r, mbm_client_readHoldingRegisters(&a.client, &r, 0, 1));
+    assert_true(mbm_client_isConnected(&a.client));
+    shutdown(a.tcp.fd, SHUT_RDWR);
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &r, 0, 1));
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &waiting, 0, 1));
+    asker_wait_all(&a);
+    assert_int_equal(r.status, MBM_LINK_LOST);
+    assert_int_equal(waiting.status, MBM_LINK_LOST);
+    assert_false(mbm_client_isConnected(&a.client));
+    IS(MBM_PENDING, mbm_client_reconnect(&a.client, &a.link));
+    ends(MBM_OK, &r, mbm_client_readHoldingRegisters(&a.client, &r, 0, 1));
+    mbm_tcp_close(&a.tcp);
+    tcp_server_stop(&s);
+}
+
+static unsigned called;
+static uint8_t polled_inside;
+
+/* Queues itself again, thrice, and tries what is refused. */
+static void again(void *context, mbm_clientRequest *request)
+{
+    assert_ptr_equal(context, &a);
+    assert_int_equal(request->status, MBM_OK);
+    polled_inside = mbm_client_poll(&a.client);
+    if (++called < 4)
+        IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, request, 0, 1));
+}
+
+static void a_callback_may_queue_and_may_not_poll(void **state)
+{
+    mbm_clientRequest r = asked(UNIT, NULL, 0, NULL);
+    tcp_server s;
+
+    (void)state;
+    tcp_server_start(&s);
+    asker_begin_tcp(&a, s.port);
+    called = 0;
+    r.done = again;
+    r.context = &a;
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &r, 0, 1));
+    IS(MBM_BUSY, mbm_client_readHoldingRegisters(&a.client, &r, 0, 1));
+    asker_wait_all(&a);
+    assert_int_equal(called, 4);
+    assert_int_equal(polled_inside, MBM_BUSY);
+    mbm_tcp_close(&a.tcp);
+    tcp_server_stop(&s);
+}
+
+static void the_facade_uses_the_line_between_the_clients_requests(void **state)
+{
+    uint16_t words[4], more[4], none[1];
+    uint8_t frame[64];
+    mbm_master node;
+    mbm_clientRequest r = asked(UNIT, words, sizeof words, NULL);
+    server s;
+
+    (void)state;
+    memset(&node, 0, sizeof node);
+    server_start(&s, UNIT);
+    asker_begin_rtu(&a, s.line.ours);
+    OK(mbm_master_setBuffers(&node, more, 4, none, 1, frame, sizeof frame));
+    IS(MBM_NOT_INITIALISED, mbm_master_readHoldingRegisters(&node, 0, 4));
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &r, 0, 4));
+    (void)mbm_client_poll(&a.client);
+    IS(MBM_BUSY, mbm_client_lend(&a.client, &node));
+    asker_wait_all(&a);
+    OK(mbm_client_lend(&a.client, &node));
+    IS(MBM_BUSY, mbm_client_lend(&a.client, &node));
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &r, 0, 4));
+    IS(MBM_BUSY, mbm_client_poll(&a.client));
+    a.port.idle = NULL;
+    OK(mbm_master_setSlaveID(&node, UNIT));
+    OK(mbm_master_setBlocking(&node, 0));
+    IS(MBM_PENDING, mbm_master_readHoldingRegisters(&node, 0, 4));
+    IS(MBM_BUSY, mbm_client_takeBack(&a.client, &node));
+    while (mbm_master_poll(&node) == MBM_PENDING)
+        ;
+    OK(mbm_master_status(&node));
+    OK(mbm_client_takeBack(&a.client, &node));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_takeBack(&a.client, &node));
+    assert_int_equal(asker_wait(&a, &r), MBM_OK);
+    assert_memory_equal(words, more, sizeof words);
+    IS(MBM_NOT_INITIALISED, mbm_master_readHoldingRegisters(&node, 0, 4));
+    server_stop(&s);
+}
+
+static void bad_calls_are_refused_with_a_status(void **state)
+{
+    static mbm_client fresh;
+    uint16_t words[2];
+    mbm_clientRequest r = asked(UNIT, words, sizeof words, NULL), other;
+    mbm_port nothing = {0};
+    mbm_client *c = &a.client;
+    server s;
+
+    (void)state;
+    server_start(&s, UNIT);
+    asker_begin_rtu(&a, s.line.ours);
+    IS(MBM_INVALID_ARGUMENT, mbm_client_poll(NULL));
+    IS(MBM_NOT_INITIALISED, mbm_client_poll(&fresh));
+    IS(MBM_NOT_INITIALISED, mbm_client_readCoils(&fresh, &r, 0, 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_readCoils(c, NULL, 0, 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_beginRtu(&fresh, &nothing, a.outgoing, 256));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_beginRtu(&fresh, &a.port, NULL, 256));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_beginRtu(&fresh, NULL, a.outgoing, 256));
+    IS(MBM_BUSY, mbm_client_beginTcp(c, &a.port, a.incoming, 260, a.outgoing, 260));
+    assert_int_equal(mbm_client_pollDelay(&fresh), 0xFFFFFFFFu);
+    assert_int_equal(mbm_client_pollDelay(c), 0xFFFFFFFFu);
+
+    IS(MBM_ILLEGAL_DATA_VALUE, mbm_client_readHoldingRegisters(c, &r, 0, 126));
+    IS(MBM_ILLEGAL_DATA_VALUE, mbm_client_readCoils(c, &r, 0, 0));
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_client_readHoldingRegisters(c, &r, 65535, 2));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_client_readHoldingRegisters(c, &r, 0, 3));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_writeMultipleRegisters(c, &r, 0, 1));
+    IS(MBM_ILLEGAL_DATA_VALUE, mbm_client_readDeviceIdentification(c, &r, 5, 0));
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_client_readFileRecord(c, &r, 0, 0, 1));
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_client_readFileRecord(c, &r, 1, 9999, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_custom(c, &r, 0x41, 0, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_setBackoff(c, 4, 1, 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_setJitter(c, 10, NULL, NULL));
+    assert_int_equal(r.status, MBM_INVALID_ARGUMENT);
+    r.unit = 0;
+    IS(MBM_BROADCAST_NOT_ALLOWED, mbm_client_readHoldingRegisters(c, &r, 0, 1));
+    assert_int_equal(mbm_client_pending(c), 0);
+
+    r.unit = UNIT;
+    other = r;
+    IS(MBM_NOT_PENDING, mbm_client_cancel(c, &r));
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(c, &r, 0, 2));
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(c, &other, 0, 2));
+    assert_int_equal(mbm_client_pending(c), 2);
+    (void)mbm_client_poll(c);
+    OK(mbm_client_cancel(c, &r));
+    OK(mbm_client_cancel(c, &other));
+    IS(MBM_NOT_PENDING, mbm_client_cancel(c, &r));
+    assert_int_equal(r.status, MBM_CANCELLED);
+    IS(MBM_INVALID_ARGUMENT, mbm_client_cancel(c, NULL));
+    assert_int_equal(mbm_client_pending(c), 0);
+    OK(mbm_client_poll(c));
+    server_stop(&s);
+}
+
+static void a_broadcast_reaches_and_a_rest_is_kept(void **state)
+{
+    mbm_clientUnit units[1] = {{0}};
+    mbm_clientRequest r = asked(0, NULL, 0, NULL);
+    uint32_t begun;
+    server s;
+
+    (void)state;
+    server_start(&s, UNIT);
+    asker_begin_rtu(&a, s.line.ours);
+    ends(MBM_OK, &r, mbm_client_writeSingleRegister(&a.client, &r, 5, 0x5A5A));
+    assert_int_equal(s.mapping->tab_registers[5], 0x5A5A);
+    units[0].unit = UNIT;
+    units[0].delay = 50000;
+    OK(mbm_client_setUnits(&a.client, units, 1));
+    r.unit = UNIT;
+    ends(MBM_OK, &r, mbm_client_readHoldingRegisters(&a.client, &r, 0, 1));
+    begun = a.port.micros(a.port.context);
+    ends(MBM_OK, &r, mbm_client_readHoldingRegisters(&a.client, &r, 0, 1));
+    assert_true(a.port.micros(a.port.context) - begun >= 49000);
+    assert_int_equal(units[0].requests, 2);
+    assert_int_equal(units[0].replies, 2);
+    server_stop(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_function_over_a_pty),
+        cmocka_unit_test(every_function_over_tcp),
+        cmocka_unit_test(sixteen_requests_are_pipelined),
+        cmocka_unit_test(a_lost_connection_is_told_and_made_anew),
+        cmocka_unit_test(a_callback_may_queue_and_may_not_poll),
+        cmocka_unit_test(the_facade_uses_the_line_between_the_clients_requests),
+        cmocka_unit_test(bad_calls_are_refused_with_a_status),
+        cmocka_unit_test(a_broadcast_reaches_and_a_rest_is_kept),
+    };
+
+    return cmocka_run_group_tests_name("client", tests, NULL, NULL);
+}

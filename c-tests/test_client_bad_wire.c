@@ -1,0 +1,106 @@
+/* What becomes of five requests of a client when the first meets a fault: the
+ * same faults as the facade's, and the same gate. */
+#include "client.h"
+#include "faults.h"
+#include "test.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static mbm_port tty_port;
+
+/* The terminal's read, until a script says that the link is gone. */
+static int16_t read_or_die(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    if (fault_link_dies) {
+        fault_link_dies = 0;
+        return -1;
+    }
+    return tty_port.read(context, bytes, capacity);
+}
+
+/* '.' right, 'F' a failed request, 'W' success with wrong data. */
+static char transact(asker *a, const fault *f, unsigned number, uint8_t *status)
+{
+    uint16_t words[FAULT_REGISTERS];
+    mbm_clientRequest request = {0};
+    unsigned i;
+
+    request.unit = FAULT_UNIT;
+    request.reply = words;
+    request.replyBytes = sizeof words;
+    if (f->function == 6)
+        IS(MBM_PENDING, mbm_client_writeSingleRegister(&a->client, &request, (uint16_t)number,
+                                                       (uint16_t)~number));
+    else
+        IS(MBM_PENDING, mbm_client_readHoldingRegisters(
+                            &a->client, &request, (uint16_t)(100 * number), FAULT_REGISTERS));
+    *status = asker_wait(a, &request);
+    if (*status != MBM_OK)
+        return 'F';
+    for (i = 0; i < FAULT_REGISTERS && f->function == 3; i++)
+        if (words[i] != fault_value(100 * number + i))
+            return 'W';
+    return '.';
+}
+
+/* Plays a fault; returns the status of the first request. */
+static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRANSACTIONS + 1])
+{
+    responder device;
+    asker a;
+    uint8_t first = MBM_OK, status;
+    unsigned i;
+
+    fault_start(&device, f);
+    memset(&a, 0, sizeof a);
+    assert_int_equal(mbm_tty_attach(&a.tty, device.line.ours), 0);
+    a.port = tty_port = mbm_tty_port(&a.tty, NULL);
+    a.port.read = read_or_die;
+    OK(mbm_client_beginRtu(&a.client, &a.port, a.incoming, 256));
+    OK(mbm_client_setBaudRate(&a.client, 115200));
+    OK(mbm_client_setResponseTimeout(&a.client, 400));
+    OK(mbm_client_setEchoDiscard(&a.client, f->echo));
+    OK(mbm_client_setRetries(&a.client, retries));
+    for (i = 0; i < FAULT_TRANSACTIONS; i++) {
+        outcomes[i] = transact(&a, f, i + 1, &status);
+        if (i == 0)
+            first = status;
+    }
+    outcomes[FAULT_TRANSACTIONS] = '\0';
+    responder_stop(&device);
+    return first;
+}
+
+static void the_client_fares_as_well_as_the_facade(void **state)
+{
+    char plain[FAULT_TRANSACTIONS + 1], retried[FAULT_TRANSACTIONS + 1];
+    int worse = 0;
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < fault_count; i++) {
+        const fault *f = &faults[i];
+        uint8_t status = outcome(f, 0, plain);
+
+        outcome(f, 1, retried);
+        printf("%-46s %s  %s  %s\n", f->name, plain, retried,
+               status == MBM_OK ? "" : mbm_statusText(status));
+        if (!fault_as_good(plain, f->expected) || !fault_as_good(retried, f->retried) ||
+            status != f->status) {
+            printf("    worse: expected %s %s %s\n", f->expected, f->retried,
+                   mbm_statusText(f->status));
+            worse++;
+        }
+    }
+    assert_int_equal(worse, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_client_fares_as_well_as_the_facade),
+    };
+
+    return cmocka_run_group_tests_name("client on a bad wire", tests, NULL, NULL);
+}

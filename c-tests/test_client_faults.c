@@ -1,0 +1,302 @@
+/* Many requests over TCP to a device that splits, joins, reorders, doubles, drops
+ * and delays its responses, answers with other ids, sends garbage and resets the
+ * connection: every request ends once, and with its own data. */
+#define _GNU_SOURCE
+#include "client.h"
+#include "tcp_server.h"
+#include "test.h"
+
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { FRAME = 12, HELD = 64, QUANTITY = 5, TIMEOUT = 30 };
+
+/* --- the device */
+
+typedef struct device {
+    int listener, peer;
+    volatile int stop;
+    unsigned random;
+    struct { uint8_t bytes[64]; size_t length; uint64_t at; } held[HELD];
+    unsigned count;
+    pthread_t thread;
+} device;
+
+static unsigned chance(unsigned *state, unsigned of)
+{
+    *state = *state * 1103515245u + 12345u;
+    return (*state >> 16) % of;
+}
+
+static uint64_t milliseconds(void)
+{
+    struct timespec now;
+
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint64_t)now.tv_sec * 1000u + (uint64_t)now.tv_nsec / 1000000u;
+}
+
+static uint16_t value_at(unsigned address)
+{
+    return (uint16_t)(address * 40503u + 7u);
+}
+
+static size_t respond(uint8_t *frame, const uint8_t *request)
+{
+    unsigned address = (unsigned)request[8] << 8 | request[9], i;
+
+    memcpy(frame, request, 8);
+    frame[5] = 3 + 2 * QUANTITY;
+    frame[8] = 2 * QUANTITY;
+    for (i = 0; i < QUANTITY; i++) {
+        frame[9 + 2 * i] = (uint8_t)(value_at(address + i) >> 8);
+        frame[10 + 2 * i] = (uint8_t)value_at(address + i);
+    }
+    return 9 + 2 * QUANTITY;
+}
+
+static void hold(device *d, const uint8_t *bytes, size_t length, unsigned delay)
+{
+    if (d->count == HELD)
+        return;
+    memcpy(d->held[d->count].bytes, bytes, length);
+    d->held[d->count].length = length;
+    d->held[d->count++].at = milliseconds() + delay;
+}
+
+/* What becomes of the response to a request; 0 if the connection is to go. */
+static int mistreat(device *d, const uint8_t *request)
+{
+    uint8_t frame[64];
+    size_t length = respond(frame, request);
+
+    switch (chance(&d->random, 2000)) {
+    case 0: /* never */
+    case 1:
+        return 1;
+    case 2: /* after the timeout */
+        hold(d, frame, length, 2 * TIMEOUT);
+        return 1;
+    case 3: /* twice */
+    case 4:
+        hold(d, frame, length, 0);
+        break;
+    case 5: /* with another id, too */
+    case 6:
+        frame[0] ^= 0x80;
+        hold(d, frame, length, 0);
+        frame[0] ^= 0x80;
+        break;
+    case 7: { /* behind garbage */
+        uint8_t garbage[9] = {0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF};
+
+        hold(d, garbage, sizeof garbage, 0);
+        break;
+    }
+    case 8: /* an exception instead */
+        frame[5] = 3;
+        frame[7] |= 0x80;
+        frame[8] = 6;
+        length = 9;
+        break;
+    case 9:
+        return chance(&d->random, 4) != 0;
+    default:
+        break;
+    }
+    hold(d, frame, length, chance(&d->random, 500) == 0 ? 3 : 0);
+    return 1;
+}
+
+/* Sends what is due, the last first now and then, in pieces now and then. */
+static void send_due(device *d)
+{
+    uint8_t all[HELD * 64];
+    size_t length = 0, sent = 0;
+    uint64_t now = milliseconds();
+    unsigned i;
+
+    for (i = 0; i < d->count;) {
+        unsigned at = i;
+
+        if (chance(&d->random, 3) == 0)
+            at = d->count - 1;
+        if (d->held[at].at > now) {
+            i++;
+            continue;
+        }
+        memcpy(all + length, d->held[at].bytes, d->held[at].length);
+        length += d->held[at].length;
+        d->held[at] = d->held[--d->count];
+    }
+    while (sent < length) {
+        size_t piece = chance(&d->random, 8) == 0 ? 1 + chance(&d->random, 20) : length - sent;
+        ssize_t done;
+
+        if (piece > length - sent)
+            piece = length - sent;
+        done = send(d->peer, all + sent, piece, MSG_NOSIGNAL);
+        if (done < 0)
+            return;
+        sent += (size_t)done;
+    }
+}
+
+static void *run_device(void *argument)
+{
+    device *d = (device *)argument;
+    uint8_t bytes[4096];
+    size_t have = 0;
+    int on = 1;
+
+    while (!d->stop) {
+        struct pollfd wait = {d->peer < 0 ? d->listener : d->peer, POLLIN, 0};
+        size_t used = 0;
+        ssize_t count;
+
+        if (poll(&wait, 1, d->count > 0 ? 1 : 10) > 0) {
+            if (d->peer < 0) {
+                d->peer = accept(d->listener, NULL, NULL);
+                /* Pieces would wait for each other, longer than the timeout. */
+                setsockopt(d->peer, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+                d->count = 0;
+                have = 0;
+                continue;
+            }
+            count = recv(d->peer, bytes + have, sizeof bytes - have, 0);
+            have += count > 0 ? (size_t)count : 0;
+            while (count > 0 && have - used >= FRAME) {
+                if (!mistreat(d, bytes + used))
+                    count = 0;
+                used += FRAME;
+            }
+            memmove(bytes, bytes + used, have - used);
+            have -= used;
+            if (count <= 0) {
+                close(d->peer);
+                d->peer = -1;
+                continue;
+            }
+        }
+        if (d->peer >= 0)
+            send_due(d);
+    }
+    if (d->peer >= 0)
+        close(d->peer);
+    return NULL;
+}
+
+/* --- the client */
+
+typedef struct job {
+    mbm_clientRequest request;
+    uint16_t words[QUANTITY];
+    unsigned pending;
+} job;
+
+static asker a;
+static job jobs[MBM_CLIENT_DEPTH];
+static unsigned long queued, ended, right, exceptions, failed, crossed, doubled, total;
+static unsigned seed = 4711;
+
+static void ask(job *j);
+
+static void done(void *context, mbm_clientRequest *request)
+{
+    job *j = (job *)context;
+    unsigned i, wrong = 0;
+
+    doubled += j->pending != 1;
+    j->pending = 0;
+    ended++;
+    if (request->status == MBM_OK) {
+        for (i = 0; i < QUANTITY; i++)
+            wrong |= j->words[i] != value_at(request->transaction + i);
+        right += !wrong;
+        crossed += wrong;
+    } else if (request->status < 0x80) {
+        exceptions++;
+    } else {
+        failed++;
+    }
+    if (queued < total)
+        ask(j);
+}
+
+static void ask(job *j)
+{
+    memset(j->words, 0xEE, sizeof j->words);
+    memset(&j->request, 0, sizeof j->request);
+    j->request.unit = (uint8_t)(1 + chance(&seed, 3));
+    j->request.done = done;
+    j->request.context = j;
+    j->request.reply = j->words;
+    j->request.replyBytes = sizeof j->words;
+    j->request.transaction = (uint16_t)(1 + queued % 60000);
+    j->pending = 1;
+    queued++;
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &j->request,
+                                                    j->request.transaction, QUANTITY));
+}
+
+static void every_request_ends_once_and_with_its_own_data(void **state)
+{
+    const char *fewer = getenv("MBM_TRANSACTIONS");
+    static device d;
+    unsigned long reconnected = 0;
+    uint16_t port;
+    unsigned i;
+
+    (void)state;
+    total = fewer ? strtoul(fewer, NULL, 10) : 200000;
+    d.listener = tcp_listen(&port);
+    d.peer = -1;
+    d.random = 1;
+    assert_int_equal(pthread_create(&d.thread, NULL, run_device, &d), 0);
+    asker_begin_tcp(&a, port);
+    OK(mbm_client_setResponseTimeout(&a.client, TIMEOUT));
+    OK(mbm_client_setRetries(&a.client, 1));
+    for (i = 0; i < MBM_CLIENT_DEPTH && queued < total; i++)
+        ask(&jobs[i]);
+    while (mbm_client_poll(&a.client) == MBM_PENDING) {
+        if (!mbm_client_isConnected(&a.client)) {
+            reconnected++;
+            IS(MBM_PENDING, mbm_client_reconnect(&a.client, &a.link));
+        } else {
+            asker_rest(&a);
+        }
+    }
+    printf("%lu right, %lu exceptions, %lu failed, %lu reconnected, %u foreign, %u timeouts, "
+           "%u resynchronised\n",
+           right, exceptions, failed, reconnected, a.counters.foreignFrames, a.counters.timeouts,
+           a.counters.resynchronisations);
+    assert_int_equal(queued, total);
+    assert_int_equal(ended, total);
+    assert_int_equal(right + exceptions + failed, total);
+    assert_int_equal(crossed, 0);
+    assert_int_equal(doubled, 0);
+    /* A failure is a lost connection, or no answer to a retry either. */
+    assert_true(right > total - total / 50 - 50);
+    assert_true(fewer || (reconnected > 0 && exceptions > 0 && a.counters.foreignFrames > 0 &&
+                          a.counters.timeouts > 0 && a.counters.resynchronisations > 0));
+    d.stop = 1;
+    pthread_join(d.thread, NULL);
+    mbm_tcp_close(&a.tcp);
+    close(d.listener);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_request_ends_once_and_with_its_own_data),
+    };
+
+    return cmocka_run_group_tests_name("client over a bad TCP stream", tests, NULL, NULL);
+}

@@ -1,0 +1,365 @@
+/* What mbm_server_* answers to bad input, and what of it only C sees. */
+#include "crc.h"
+#include "mbm.h"
+#include "test.h"
+
+#include <string.h>
+
+static mbm_server server;
+static mbm_unit unit;
+static mbm_registerTable table;
+static mbm_custom custom;
+static mbm_switches switches;
+static mbm_diagnostics diagnostics;
+static uint16_t words[10];
+static uint8_t frame[MBM_MAX_ASCII_FRAME];
+
+/* A stream of the test's own: what arrives, what was sent, and a clock. */
+static struct {
+    uint8_t arriving[600], sent[600];
+    size_t first, last, length;
+    uint32_t now;
+    int lost;
+} wire;
+
+static int16_t wire_read(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    int16_t count = 0;
+
+    (void)context;
+    assert_true(capacity > 0);
+    if (wire.lost)
+        return -1;
+    while (count < capacity && wire.first < wire.last)
+        bytes[count++] = wire.arriving[wire.first++];
+    return count;
+}
+
+static int16_t wire_write(void *context, const uint8_t *bytes, uint16_t length)
+{
+    (void)context;
+    memcpy(wire.sent + wire.length, bytes, length);
+    wire.length += length;
+    return (int16_t)length;
+}
+
+static uint32_t wire_micros(void *context)
+{
+    (void)context;
+    return wire.now += 100;
+}
+
+static const mbm_port port = {.read = wire_read, .write = wire_write, .micros = wire_micros};
+
+static int reset(void **state)
+{
+    (void)state;
+    memset(&server, 0, sizeof server);
+    memset(&unit, 0, sizeof unit);
+    memset(&table, 0, sizeof table);
+    memset(&custom, 0, sizeof custom);
+    memset(&switches, 0, sizeof switches);
+    memset(&diagnostics, 0, sizeof diagnostics);
+    memset(&wire, 0, sizeof wire);
+    memset(words, 0, sizeof words);
+    unit.id = 17;
+    table.words = words;
+    table.size = 10;
+    return 0;
+}
+
+/* Lets the frame of a PDU arrive, polls, and gives what was sent. */
+static size_t ask(const char *pdu, size_t length)
+{
+    unsigned i;
+
+    wire.arriving[0] = 17;
+    memcpy(wire.arriving + 1, pdu, length);
+    wire.first = wire.length = 0;
+    wire.last = seal(wire.arriving, length + 1);
+    for (i = 0; i < 100; i++)
+        OK(mbm_server_poll(&server));
+    return wire.length;
+}
+
+#define ASK(pdu) ask(pdu, sizeof pdu - 1)
+
+static void an_object_that_was_never_begun_is_told(void **state)
+{
+    (void)state;
+    IS(MBM_NOT_INITIALISED, mbm_server_poll(&server));
+    IS(MBM_NOT_INITIALISED, mbm_server_setSilence(&server, 1));
+    IS(MBM_NOT_INITIALISED, mbm_server_setBaudRate(&server, 9600));
+    IS(MBM_NOT_INITIALISED, mbm_server_setEchoDiscard(&server, 1));
+    assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFFu);
+}
+
+static void null_is_an_invalid_argument(void **state)
+{
+    const mbm_port deaf = {.write = wire_write, .micros = wire_micros};
+    uint16_t length;
+
+    (void)state;
+    IS(MBM_INVALID_ARGUMENT, mbm_server_poll(NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_setSilence(NULL, 1));
+    assert_int_equal(mbm_server_pollDelay(NULL), 0xFFFFFFFFu);
+    IS(MBM_INVALID_ARGUMENT, mbm_server_begin(NULL, &port, &unit, 1, frame, 256));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_begin(&server, NULL, &unit, 1, frame, 256));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_begin(&server, &port, NULL, 1, frame, 256));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_begin(&server, &port, &unit, 1, NULL, 256));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_begin(&server, &deaf, &unit, 1, frame, 256));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_begin(&server, &port, &unit, 1, frame, 15));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_beginAscii(&server, &port, &unit, 1, frame, 31));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_beginTcp(&server, &port, &unit, 1, frame, 259));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtuOverTcp(&server, &port, NULL, 1, frame, 256));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveCoils(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveDiscreteInputs(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveHoldingRegisters(NULL, &table));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveInputRegisters(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveMaskAndReadWrite(NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveCallbacks(&unit, NULL, 3));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveFiles(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveFifos(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveExceptionStatus(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveServerId(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveIdentification(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveDiagnostics(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveDiagnostics(NULL, &diagnostics));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveCustom(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveCustom(&unit, &custom));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_switchOff(&unit, NULL, 3));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_switchOff(&unit, &switches, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_switchOff(&unit, &switches, 128));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_switchOn(NULL, 3));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_respond(4, &unit, 1, frame, 8, 256, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_respond(0, NULL, 1, frame, 8, 256, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_respond(0, &unit, 1, NULL, 8, 256, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_respond(0, &unit, 1, frame, 8, 256, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_respond(0, &unit, 1, frame, 9, 8, &length));
+}
+
+static void a_unit_that_serves_nothing_refuses_everything(void **state)
+{
+    (void)state;
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    assert_int_equal(ASK("\x04\0\0\0\1"), 5);
+    assert_memory_equal(wire.sent, "\x11\x84\x01", 3);
+}
+
+static void tables_without_storage_have_no_cells(void **state)
+{
+    (void)state;
+    table.words = NULL;
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    assert_int_equal(ASK("\x03\0\0\0\1"), 5);
+    assert_memory_equal(wire.sent, "\x11\x83\x02", 3);
+}
+
+static void serving_twice_is_serving_once(void **state)
+{
+    mbm_registerTable inputs = {.words = words, .size = 10};
+
+    (void)state;
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_server_serveInputRegisters(&unit, &inputs));
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    assert_int_equal(ASK("\x04\0\0\0\1"), 7);
+    assert_int_equal(ASK("\x05\0\0\0\0"), 5);
+    assert_memory_equal(wire.sent, "\x11\x85\x01", 3);
+}
+
+static void mask_and_read_write_want_holding_registers(void **state)
+{
+    (void)state;
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveMaskAndReadWrite(&table));
+    OK(mbm_server_serveInputRegisters(&unit, &table));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveMaskAndReadWrite(&table));
+}
+
+static void a_function_is_switched_off_and_on(void **state)
+{
+    (void)state;
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_server_switchOff(&unit, &switches, MBM_FC_WRITE_SINGLE_REGISTER));
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_server_switchOff(&unit, &switches, MBM_FC_READ_FIFO_QUEUE));
+    assert_int_equal(ASK("\x06\0\0\1\2"), 5);
+    assert_memory_equal(wire.sent, "\x11\x86\x01", 3);
+    assert_int_equal(words[0], 0);
+    assert_int_equal(ASK("\x03\0\0\0\1"), 7);
+    OK(mbm_server_switchOn(&switches, MBM_FC_WRITE_SINGLE_REGISTER));
+    assert_int_equal(ASK("\x06\0\0\1\2"), 8);
+    assert_int_equal(words[0], 0x0102);
+}
+
+static uint16_t said;
+static mbm_request seen;
+static unsigned calls;
+
+static uint16_t own(void *context, const mbm_request *request, uint8_t *response, uint16_t capacity)
+{
+    assert_ptr_equal(context, &said);
+    assert_true(capacity >= 252);
+    seen = *request;
+    calls++;
+    memset(response, 0x5A, said < 253 ? said : 0);
+    return said;
+}
+
+static void a_function_of_ours_says_what_is_answered(void **state)
+{
+    (void)state;
+    custom.serve = own;
+    custom.context = &said;
+    custom.code = 0x64;
+    OK(mbm_server_serveDiagnostics(&unit, &diagnostics));
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_server_serveCustom(&unit, &custom));
+    said = 2;
+    assert_int_equal(ASK("\x64" "abc"), 6);
+    assert_memory_equal(wire.sent, "\x11\x64\x5A\x5A", 4);
+    assert_int_equal(seen.length, 3);
+    assert_int_equal(seen.unit, 17);
+    assert_int_equal(seen.function, 0x64);
+    said = 252;
+    assert_int_equal(ASK("\x64"), 256);
+    said = MBM_REPLY_EXCEPTION | 0x0B;
+    assert_int_equal(ASK("\x64"), 5);
+    assert_int_equal(wire.sent[2], 0x0B);
+    said = MBM_REPLY_NONE;
+    assert_int_equal(ASK("\x64"), 0);
+    /* What is no answer is a failure of the server. */
+    for (said = 253; said < 0x101; said++) {
+        assert_int_equal(ASK("\x64"), 5);
+        assert_int_equal(wire.sent[2], 4);
+    }
+    said = 0xFFFF;
+    assert_int_equal(ASK("\x64"), 5);
+    assert_int_equal(wire.sent[2], 4);
+    calls = 0;
+    diagnostics.serverMessages = 0;
+    said = MBM_REPLY_PENDING;
+    assert_int_equal(ASK("\x64"), 0);
+    assert_true(calls > 10);
+    assert_int_equal(diagnostics.serverMessages, 1);
+    said = 0;
+    OK(mbm_server_poll(&server));
+    OK(mbm_server_poll(&server));
+    assert_int_equal(wire.length, 4);
+}
+
+static void a_function_of_code_0_is_every_other(void **state)
+{
+    (void)state;
+    custom.serve = own;
+    custom.context = &said;
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_server_serveCustom(&unit, &custom));
+    said = 0;
+    calls = 0;
+    assert_int_equal(ASK("\x03\0\0\0\1"), 7);
+    assert_int_equal(calls, 0);
+    assert_int_equal(ASK("\x04\0\0\0\1"), 4);
+    assert_int_equal(ASK("\x2A"), 4);
+    assert_int_equal(calls, 2);
+}
+
+static void the_length_of_ours_frames_rtu_over_tcp(void **state)
+{
+    const mbm_rule rules[] = {{MBM_RULE_FIXED, 4, 0}, {MBM_RULE_COUNTED, 1, 1}, {MBM_RULE_SILENCE, 0, 0}};
+    const char *pdus[] = {"\x64" "abc", "\x64\1x!", "\x64" "12345"};
+    const size_t lengths[] = {4, 4, 6};
+    unsigned i;
+
+    (void)state;
+    custom.serve = own;
+    custom.context = &said;
+    custom.code = 0x64;
+    custom.length = (mbm_rule){MBM_RULE_FIXED, 0, 0};
+    IS(MBM_INVALID_ARGUMENT, mbm_server_serveCustom(&unit, &custom));
+    said = 1;
+    for (i = 0; i < COUNT(rules); i++) {
+        unsigned k;
+
+        custom.length = rules[i];
+        OK(mbm_server_serveCustom(&unit, &custom));
+        OK(mbm_server_beginRtuOverTcp(&server, &port, &unit, 1, frame, sizeof frame));
+        wire.first = wire.last = wire.length = 0;
+        /* Two in one lump; without a rule they must come one by one. */
+        for (k = 0; k < (rules[i].kind == MBM_RULE_SILENCE ? 1u : 2u); k++) {
+            wire.arriving[wire.last] = 17;
+            memcpy(wire.arriving + wire.last + 1, pdus[i], lengths[i]);
+            wire.last += seal(wire.arriving + wire.last, lengths[i] + 1);
+        }
+        for (k = 0; k < 10; k++)
+            OK(mbm_server_poll(&server));
+        assert_int_equal(wire.length, rules[i].kind == MBM_RULE_SILENCE ? 5 : 10);
+        assert_int_equal(seen.length, lengths[i] - 1);
+    }
+}
+
+static unsigned restarts, cleared;
+
+static void restart(void *context, uint8_t clear_log)
+{
+    assert_ptr_equal(context, &diagnostics);
+    restarts++;
+    cleared += clear_log;
+}
+
+static void a_restart_is_told(void **state)
+{
+    (void)state;
+    diagnostics.restart = restart;
+    diagnostics.context = &diagnostics;
+    diagnostics.diagnosticRegister = 0xABCD;
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_server_serveDiagnostics(&unit, &diagnostics));
+    assert_int_equal(ASK("\x08\0\2\0\0"), 8);
+    assert_memory_equal(wire.sent, "\x11\x08\0\2\xAB\xCD", 6);
+    assert_int_equal(ASK("\x08\0\1\0\0"), 8);
+    assert_int_equal(restarts * 10 + cleared, 10);
+    assert_int_equal(ASK("\x08\0\1\xFF\0"), 8);
+    assert_int_equal(restarts * 10 + cleared, 21);
+}
+
+static void a_lost_link_is_told_and_the_delay_is_that_of_the_line(void **state)
+{
+    (void)state;
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_server_setSilence(&server, 5000));
+    assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFFu);
+    wire.arriving[0] = 17;
+    wire.last = 1;
+    OK(mbm_server_poll(&server));
+    assert_int_equal(mbm_server_pollDelay(&server), 4900);
+    wire.lost = 1;
+    IS(MBM_LINK_LOST, mbm_server_poll(&server));
+}
+
+#define TEST(test) cmocka_unit_test_setup(test, reset)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(an_object_that_was_never_begun_is_told),
+        TEST(null_is_an_invalid_argument),
+        TEST(a_unit_that_serves_nothing_refuses_everything),
+        TEST(tables_without_storage_have_no_cells),
+        TEST(serving_twice_is_serving_once),
+        TEST(mask_and_read_write_want_holding_registers),
+        TEST(a_function_is_switched_off_and_on),
+        TEST(a_function_of_ours_says_what_is_answered),
+        TEST(a_function_of_code_0_is_every_other),
+        TEST(the_length_of_ours_frames_rtu_over_tcp),
+        TEST(a_restart_is_told),
+        TEST(a_lost_link_is_told_and_the_delay_is_that_of_the_line),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

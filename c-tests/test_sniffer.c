@@ -1,0 +1,335 @@
+/* mbm_sniffer_*: what a bus of the test's own comes out as, and what is refused. */
+#include "examples.h"
+#include "mbm.h"
+#include "test.h"
+
+#include <string.h>
+
+static mbm_sniffer sniffer;
+static uint8_t buffer[2 * MBM_MAX_ASCII_FRAME];
+static uint32_t now;
+
+static const uint8_t request[] = {3, 0, 107, 0, 3}, reply[] = {3, 6, 2, 0x2B, 0, 0, 0, 100};
+
+static void begin(uint8_t kind)
+{
+    mbm_framing framing = {0};
+
+    framing.kind = kind;
+    now = 0;
+    OK(mbm_sniffer_begin(&sniffer, &framing, buffer, sizeof buffer));
+}
+
+/* Writes the frame of a PDU of unit 17. */
+static uint16_t frame_of(uint8_t kind, const uint8_t *pdu, uint16_t length, uint8_t side,
+                         uint8_t *frame)
+{
+    mbm_framing framing = {0};
+    mbm_packet packet;
+    uint16_t size = 0;
+
+    framing.kind = kind;
+    OK(mbm_packet_parse(side, pdu, length, NULL, 0, &packet));
+    packet.unit = 17;
+    packet.transaction = 7;
+    OK(mbm_frame_build(&framing, &packet, frame, MBM_MAX_ASCII_FRAME, &size));
+    return size;
+}
+
+static void hear(const uint8_t *bytes, uint16_t length)
+{
+    assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, bytes, length, now), length);
+}
+
+/* Asserts what happened next, in words. */
+static void assert_next(const char *words)
+{
+    mbm_event event;
+    char text[200];
+
+    assert_int_equal(mbm_sniffer_next(&sniffer, now, &event), 1);
+    OK(mbm_event_text(&event, text, sizeof text));
+    assert_string_equal(text, words);
+}
+
+static void assert_nothing(void)
+{
+    mbm_event event;
+
+    assert_int_equal(mbm_sniffer_next(&sniffer, now, &event), 0);
+}
+
+static void a_request_and_its_reply_are_told_with_values_in_each_framing(void **state)
+{
+    uint8_t kind, frame[MBM_MAX_ASCII_FRAME];
+    mbm_event event;
+    uint16_t length;
+
+    (void)state;
+    for (kind = MBM_FRAMING_RTU; kind <= MBM_FRAMING_RTU_OVER_TCP; kind++) {
+        begin(kind);
+        length = frame_of(kind, request, sizeof request, MBM_PACKET_REQUEST, frame);
+        hear(frame, length);
+        assert_int_equal(mbm_sniffer_next(&sniffer, now, &event), 1);
+        assert_int_equal(event.kind, MBM_EVENT_REQUEST);
+        assert_int_equal(event.length, length);
+        assert_int_equal(event.packet.address, 107);
+        assert_int_equal(event.packet.quantity, 3);
+        assert_memory_equal(event.pdu, request, sizeof request);
+        if (kind != MBM_FRAMING_ASCII)
+            assert_memory_equal(event.frame, frame, length);
+        now += 12345;
+        hear(frame, frame_of(kind, reply, sizeof reply, MBM_PACKET_RESPONSE, frame));
+        assert_int_equal(mbm_sniffer_next(&sniffer, now, &event), 1);
+        assert_int_equal(event.kind, MBM_EVENT_REPLY);
+        assert_int_equal(event.status, MBM_OK);
+        assert_int_equal(event.unit, 17);
+        assert_int_equal(event.function, 3);
+        assert_int_equal(event.time, 12345);
+        assert_int_equal(event.responseTime, 12345);
+        assert_int_equal(event.address, 107);
+        assert_int_equal(event.quantity, 3);
+        assert_int_equal(event.packet.kind, MBM_PACKET_RESPONSE);
+        assert_int_equal(event.packet.transaction, kind == MBM_FRAMING_TCP ? 7 : 0);
+        assert_int_equal(event.packet.dataLength, 6);
+        assert_memory_equal(event.packet.data, reply + 2, 6);
+        assert_memory_equal(event.asked, request, sizeof request);
+        assert_int_equal(event.askedLength, sizeof request);
+        assert_nothing();
+    }
+}
+
+static void every_example_is_found_as_a_frame(void **state)
+{
+    uint8_t kind, pdu[MBM_MAX_PDU], frame[MBM_MAX_ASCII_FRAME];
+    mbm_framing framing = {0};
+    mbm_packet packet;
+    mbm_event event;
+    uint16_t length, size;
+    size_t i;
+
+    (void)state;
+    for (kind = MBM_FRAMING_RTU; kind <= MBM_FRAMING_TCP; kind++) {
+        framing.kind = kind;
+        for (i = 0; i < example_count; i++) {
+            uint8_t side = example_side(&examples[i]);
+
+            begin(kind);
+            length = example_load(&examples[i], pdu, &packet);
+            packet.unit = 17;
+            OK(mbm_frame_build(&framing, &packet, frame, sizeof frame, &size));
+            /* Only the direction tells an unasked reply from a request. */
+            assert_int_equal(mbm_sniffer_feed(&sniffer, side == MBM_PACKET_REQUEST
+                                                            ? MBM_TAP_CLIENT
+                                                            : MBM_TAP_SERVER, frame, size, now),
+                             size);
+            now += 10000;
+            assert_int_equal(mbm_sniffer_next(&sniffer, now, &event), 1);
+            assert_int_equal(event.kind, side == MBM_PACKET_REQUEST ? MBM_EVENT_REQUEST
+                                                                    : MBM_EVENT_UNPAIRED);
+            assert_int_equal(event.pduLength, length);
+            assert_memory_equal(event.pdu, pdu, length);
+        }
+    }
+}
+
+static void timeouts_damage_and_noise_are_told(void **state)
+{
+    uint8_t frame[MBM_MAX_ASCII_FRAME];
+    uint16_t length = frame_of(MBM_FRAMING_RTU, request, sizeof request, MBM_PACKET_REQUEST, frame);
+
+    (void)state;
+    begin(MBM_FRAMING_RTU);
+    OK(mbm_sniffer_setBaudRate(&sniffer, 19200));
+    OK(mbm_sniffer_setTimeout(&sniffer, 200));
+    OK(mbm_sniffer_setPatience(&sniffer, 20));
+    hear(frame, length);
+    now += 199999;
+    assert_next("unit 17  request    03 read holding registers  107..109");
+    assert_nothing();
+    now += 1;
+    assert_next("unit 17  timeout    03 read holding registers  107..109");
+    frame[3] ^= 1;
+    hear(frame, length);
+    now += 20000;
+    assert_next("bad CRC, 8 bytes");
+    hear((const uint8_t *)"\xFF\xFF\xFF", 3);
+    now += 20000;
+    assert_next("noise, 3 bytes");
+    hear((const uint8_t *)"\x11\x83\x02\xC1\x34", 5);
+    assert_next("unit 17  unpaired   03 read holding registers: exception 02 illegal data address");
+    assert_nothing();
+}
+
+static void more_than_the_buffer_holds_is_fed_in_parts(void **state)
+{
+    static uint8_t traffic[6000];
+    mbm_framing framing = {0};
+    uint8_t small[MBM_MAX_FRAME], frame[MBM_MAX_ASCII_FRAME];
+    uint16_t length = 0, fed = 0, size;
+    unsigned requests = 0, replies = 0;
+    mbm_event event;
+
+    (void)state;
+    while (length + 100u < sizeof traffic) {
+        size = frame_of(MBM_FRAMING_RTU, request, sizeof request, MBM_PACKET_REQUEST, frame);
+        memcpy(traffic + length, frame, size);
+        length = (uint16_t)(length + size);
+        size = frame_of(MBM_FRAMING_RTU, reply, sizeof reply, MBM_PACKET_RESPONSE, frame);
+        memcpy(traffic + length, frame, size);
+        length = (uint16_t)(length + size);
+    }
+    OK(mbm_sniffer_begin(&sniffer, &framing, small, sizeof small));
+    while (fed < length) {
+        uint16_t taken = mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, traffic + fed,
+                                          (uint16_t)(length - fed), 0);
+
+        assert_true(taken > 0);
+        fed = (uint16_t)(fed + taken);
+        while (mbm_sniffer_next(&sniffer, 0, &event)) {
+            requests += event.kind == MBM_EVENT_REQUEST;
+            replies += event.kind == MBM_EVENT_REPLY;
+        }
+    }
+    assert_int_equal(requests, length / 19);
+    assert_int_equal(replies, length / 19);
+}
+
+static void functions_of_your_own_are_taken(void **state)
+{
+    const mbm_function own[] = {{0x55, {MBM_RULE_FIXED, 3, 0}, {MBM_RULE_COUNTED, 1, 0}}};
+    mbm_function many[MBM_MAX_SNIFFER_FUNCTIONS + 1];
+    mbm_framing framing = {0};
+    mbm_packet packet = {0};
+    uint8_t frame[MBM_MAX_FRAME];
+    uint16_t size;
+    size_t i;
+
+    (void)state;
+    framing.functions = own;
+    framing.functionCount = 1;
+    OK(mbm_sniffer_begin(&sniffer, &framing, buffer, sizeof buffer));
+    packet.unit = 17;
+    packet.function = 0x55;
+    packet.data = (const uint8_t *)"\x01\x02";
+    packet.dataLength = 2;
+    OK(mbm_frame_build(&framing, &packet, frame, sizeof frame, &size));
+    now = 0;
+    hear(frame, size);
+    assert_next("unit 17  request    55 unknown function: 01 02");
+    for (i = 0; i < COUNT(many); i++)
+        many[i] = own[0];
+    framing.functions = many;
+    framing.functionCount = COUNT(many);
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(&sniffer, &framing, buffer, sizeof buffer));
+    many[0].code = 0;
+    framing.functionCount = 1;
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(&sniffer, &framing, buffer, sizeof buffer));
+}
+
+static void a_sniffer_never_begun_or_of_no_use_is_refused(void **state)
+{
+    static mbm_sniffer zeroed;
+    mbm_framing framing = {0};
+    mbm_event event;
+
+    (void)state;
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(NULL, &framing, buffer, sizeof buffer));
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(&zeroed, NULL, buffer, sizeof buffer));
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(&zeroed, &framing, NULL, 64));
+    IS(MBM_BUFFER_TOO_SMALL,
+       mbm_sniffer_begin(&zeroed, &framing, buffer, MBM_MIN_SNIFFER_BUFFER - 1));
+    framing.kind = 4;
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(&zeroed, &framing, buffer, sizeof buffer));
+    IS(MBM_NOT_INITIALISED, mbm_sniffer_setBaudRate(&zeroed, 9600));
+    IS(MBM_NOT_INITIALISED, mbm_sniffer_setTimeout(&zeroed, 1));
+    IS(MBM_NOT_INITIALISED, mbm_sniffer_setPatience(&zeroed, 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setBaudRate(NULL, 9600));
+    assert_int_equal(mbm_sniffer_feed(&zeroed, MBM_TAP_BOTH, request, 1, 0), 0);
+    assert_int_equal(mbm_sniffer_feed(NULL, MBM_TAP_BOTH, request, 1, 0), 0);
+    assert_int_equal(mbm_sniffer_next(&zeroed, 0, &event), 0);
+    begin(MBM_FRAMING_RTU);
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setTimeout(&sniffer, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setPatience(&sniffer, 0));
+    assert_int_equal(mbm_sniffer_feed(&sniffer, 3, request, 1, 0), 0);
+    assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, NULL, 1, 0), 0);
+    assert_int_equal(mbm_sniffer_next(&sniffer, 0, NULL), 0);
+}
+
+static void a_frame_is_explained_in_each_framing_and_refused_in_words(void **state)
+{
+    uint8_t kind, frame[MBM_MAX_ASCII_FRAME];
+    mbm_framing framing = {0};
+    char text[100];
+    uint16_t length;
+
+    (void)state;
+    for (kind = MBM_FRAMING_RTU; kind <= MBM_FRAMING_RTU_OVER_TCP; kind++) {
+        framing.kind = kind;
+        length = frame_of(kind, reply, sizeof reply, MBM_PACKET_RESPONSE, frame);
+        OK(mbm_frame_text(&framing, MBM_PACKET_RESPONSE, frame, length, text, sizeof text));
+        assert_string_equal(text, "unit 17  reply      03 read holding registers: 555 0 100");
+        length = frame_of(kind, request, sizeof request, MBM_PACKET_REQUEST, frame);
+        OK(mbm_frame_text(&framing, MBM_PACKET_REQUEST, frame, length, text, sizeof text));
+        assert_string_equal(text, "unit 17  request    03 read holding registers  107..109");
+    }
+    framing.kind = MBM_FRAMING_RTU;
+    OK(mbm_frame_text(&framing, MBM_PACKET_REQUEST, frame, 8, text, sizeof text));
+    frame[2] ^= 1;
+    OK(mbm_frame_text(&framing, MBM_PACKET_REQUEST, frame, 8, text, sizeof text));
+    assert_string_equal(text, "bad CRC, 8 bytes");
+    OK(mbm_frame_text(&framing, MBM_PACKET_REQUEST, frame, 3, text, sizeof text));
+    assert_string_equal(text, "incomplete frame, 3 bytes");
+    OK(mbm_frame_text(&framing, MBM_PACKET_REQUEST, buffer, 300, text, sizeof text));
+    assert_string_equal(text, "no frame, 300 bytes");
+    framing.kind = MBM_FRAMING_ASCII;
+    memset(buffer, ':', sizeof buffer);
+    OK(mbm_frame_text(&framing, MBM_PACKET_REQUEST, buffer, sizeof buffer, text, sizeof text));
+    assert_string_equal(text, "no frame, 1026 bytes");
+}
+
+static void a_text_that_does_not_fit_is_cut_and_ends_all_the_same(void **state)
+{
+    uint8_t frame[MBM_MAX_ASCII_FRAME];
+    mbm_framing framing = {0};
+    mbm_event event = {0};
+    char text[57];
+    uint16_t length = frame_of(MBM_FRAMING_RTU, reply, sizeof reply, MBM_PACKET_RESPONSE, frame);
+
+    (void)state;
+    memset(text, 'x', sizeof text);
+    IS(MBM_BUFFER_TOO_SMALL,
+       mbm_frame_text(&framing, MBM_PACKET_RESPONSE, frame, length, text, 15));
+    assert_string_equal(text, "unit 17  reply");
+    assert_int_equal(text[15], 'x');
+    IS(MBM_BUFFER_TOO_SMALL, mbm_frame_text(&framing, MBM_PACKET_RESPONSE, frame, length, text, 56));
+    OK(mbm_frame_text(&framing, MBM_PACKET_RESPONSE, frame, length, text, 57));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_frame_text(&framing, MBM_PACKET_RESPONSE, frame, length, text, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_text(&framing, 2, frame, length, text, 57));
+    assert_string_equal(text, "");
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_text(NULL, 0, frame, length, text, 57));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_text(&framing, 0, NULL, length, text, 57));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_text(&framing, 0, frame, length, NULL, 57));
+    IS(MBM_INVALID_ARGUMENT, mbm_event_text(NULL, text, 57));
+    event.kind = 7;
+    IS(MBM_INVALID_ARGUMENT, mbm_event_text(&event, text, 57));
+    event.kind = MBM_EVENT_TIMEOUT;
+    event.askedLength = 200;
+    OK(mbm_event_text(&event, text, 57));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_request_and_its_reply_are_told_with_values_in_each_framing),
+        cmocka_unit_test(every_example_is_found_as_a_frame),
+        cmocka_unit_test(timeouts_damage_and_noise_are_told),
+        cmocka_unit_test(more_than_the_buffer_holds_is_fed_in_parts),
+        cmocka_unit_test(functions_of_your_own_are_taken),
+        cmocka_unit_test(a_sniffer_never_begun_or_of_no_use_is_refused),
+        cmocka_unit_test(a_frame_is_explained_in_each_framing_and_refused_in_words),
+        cmocka_unit_test(a_text_that_does_not_fit_is_cut_and_ends_all_the_same),
+    };
+
+    return cmocka_run_group_tests_name("sniffer", tests, NULL, NULL);
+}

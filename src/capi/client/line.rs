@@ -1,0 +1,137 @@
+//! The line under a client: lost and found, lent and taken back.
+
+use super::{mbm_client, pointers, Action};
+use crate::capi::master::mbm_master;
+use crate::capi::pointers as masters;
+use crate::error::Status;
+use core::ffi::c_void;
+
+/// What closes a link and opens it anew, for mbm_client_reconnect.
+#[repr(C)]
+pub struct mbm_link {
+    /// Handed to both hooks. Yours, may be NULL.
+    pub context: *mut c_void,
+    /// Optional: closes the link, if it is open.
+    pub disconnect: Option<unsafe extern "C" fn(context: *mut c_void)>,
+    /// Optional: opens the link without waiting. Returns MBM_OK, MBM_PENDING if
+    /// that goes on while the port takes no bytes yet, or another status.
+    pub connect: Option<unsafe extern "C" fn(context: *mut c_void) -> u8>,
+}
+
+/// Closes the link and opens it anew. What was half received is forgotten, and
+/// requests that were under way end with MBM_LINK_LOST at the next polls; those
+/// that still waited go over the new link.
+///
+/// @param client  the object
+/// @param link    what does it, used during this call only; NULL if that has been
+///                done already
+/// @return what `connect` returns, MBM_OK without it; MBM_BUSY while the line is
+///         lent, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_reconnect(
+    client: *mut mbm_client,
+    link: *const mbm_link,
+) -> u8 {
+    // SAFETY: as the header demands; the hooks do not use the client.
+    unsafe {
+        let status = pointers::with(client, |object| {
+            if (object.calls().act)(object, Action::IsLent, 0) != 0 {
+                return Status::BUSY;
+            }
+            (object.calls().act)(object, Action::Reconnect, 0);
+            Status::OK
+        });
+        if status != Status::OK.code() || link.is_null() {
+            return status;
+        }
+        if let Some(disconnect) = (*link).disconnect {
+            disconnect((*link).context);
+        }
+        match (*link).connect {
+            Some(connect) => connect((*link).context),
+            None => status,
+        }
+    }
+}
+
+/// Whether the link is not known to be lost.
+///
+/// @param client  the object
+/// @return 0 from a request that ended with MBM_LINK_LOST on, until one succeeds
+///         or mbm_client_reconnect is called; 1 else
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        pointers::ask(client, 0, |object| {
+            (object.calls().act)(object, Action::IsConnected, 0) as u8
+        })
+    }
+}
+
+/// Lends the line to a facade, whose functions then use the client's port; the
+/// client's requests wait until mbm_client_takeBack. One of the two has the line
+/// at any time.
+///
+/// @param client  the object, of a serial line or of RTU over TCP
+/// @param master  a facade with buffers, which gets the client's port; NULL if
+///                you use the line in another way
+/// @return MBM_OK; MBM_BUSY if a request is under way or the line is lent already;
+///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_lend(client: *mut mbm_client, master: *mut mbm_master) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        pointers::with(client, |object| {
+            if !master.is_null() {
+                match masters::prepare(master) {
+                    Status::OK if masters::object(master).core().is_pending() => {
+                        return Status::BUSY;
+                    }
+                    Status::OK => {}
+                    refused => return refused,
+                }
+            }
+            if (object.calls().act)(object, Action::Lend, 0) == 0 {
+                return Status::BUSY;
+            }
+            if !master.is_null() {
+                let core = masters::object(master).core();
+                *core.port() = *(object.calls().parts)(object).port;
+                core.line_used();
+            }
+            Status::OK
+        })
+    }
+}
+
+/// Takes the line back. The facade has no port then, so that its functions refuse
+/// with MBM_NOT_INITIALISED.
+///
+/// @param client  the object
+/// @param master  as for mbm_client_lend
+/// @return MBM_OK, MBM_BUSY while the facade has a request under way,
+///         MBM_INVALID_ARGUMENT if the line was not lent, MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_takeBack(
+    client: *mut mbm_client,
+    master: *mut mbm_master,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        pointers::with(client, |object| {
+            if (object.calls().act)(object, Action::IsLent, 0) == 0 {
+                return Status::INVALID_ARGUMENT;
+            }
+            if masters::check(master) == Status::OK {
+                let core = masters::object(master).core();
+                if core.is_pending() {
+                    return Status::BUSY;
+                }
+                core.port().read = None;
+            }
+            (object.calls().act)(object, Action::TakeBack, 0);
+            Status::OK
+        })
+    }
+}

@@ -1,0 +1,262 @@
+//! Requests for what a device tells of itself, its files, and functions of the
+//! user's.
+
+use super::{plain, queue};
+use crate::capi::client::{mbm_client, mbm_clientRequest};
+use crate::capi::functions::{mbm_rule, rule};
+use crate::error::Status;
+use crate::pdu::outline::Form;
+
+/// Function 07: reads eight outputs into a byte (V1.1b3, 6.7).
+///
+/// @param client   the object
+/// @param request  the request
+/// @return a status; see mbm_client_readCoils
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_readExceptionStatus(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { plain(client, request, 0, 0, Form::READ_EXCEPTION_STATUS) }
+}
+
+/// Function 08: sends the words of `data`, and reads as many into `reply` (V1.1b3,
+/// 6.8). Nobody responds to sub-function 04, Force Listen Only Mode.
+///
+/// @param client   the object
+/// @param request  the request
+/// @param subFunction  0 (Return Query Data) to 0x14
+/// @param words  1; 1 to 125 for sub-function 0
+/// @return a status; see mbm_client_readCoils
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_diagnostics(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+    subFunction: u16,
+    words: u16,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        queue(client, request, |outline| {
+            outline.diagnostics(subFunction, words)
+        })
+    }
+}
+
+/// Function 0B: reads the status word and the event count into two words (V1.1b3,
+/// 6.9).
+///
+/// @param client   the object
+/// @param request  the request
+/// @return a status; see mbm_client_readCoils
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_getCommEventCounter(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { plain(client, request, 0, 0, Form::GET_COMM_EVENT_COUNTER) }
+}
+
+/// Function 0C: reads status, event count and message count, two bytes each with the
+/// high byte first, and up to 64 events, the latest first (V1.1b3, 6.10).
+///
+/// @param client   the object
+/// @param request  the request
+/// @return a status; see mbm_client_readCoils
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_getCommEventLog(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { plain(client, request, 0, 0, Form::GET_COMM_EVENT_LOG) }
+}
+
+/// Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13).
+///
+/// @param client   the object
+/// @param request  the request
+/// @return a status; see mbm_client_readCoils
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_reportServerId(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { plain(client, request, 0, 0, Form::REPORT_SERVER_ID) }
+}
+
+/// Function 14: reads records in a row of one file into words (V1.1b3, 6.14).
+///
+/// @param client   the object
+/// @param request  the request
+/// @param file  1 to 65535
+/// @param record  first record, 0 to 9999
+/// @param quantity  1 to 121
+/// @return a status; see mbm_client_readCoils
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_readFileRecord(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+    file: u16,
+    record: u16,
+    quantity: u16,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        queue(client, request, |outline| {
+            outline.read_file_record(file, record, quantity)
+        })
+    }
+}
+
+/// Function 15: writes the words of `data` to records in a row of one file (V1.1b3,
+/// 6.15).
+///
+/// @param client   the object
+/// @param request  the request
+/// @param file  1 to 65535
+/// @param record  first record, 0 to 9999
+/// @param quantity  1 to 122
+/// @return a status; see mbm_client_readCoils
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_writeFileRecord(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+    file: u16,
+    record: u16,
+    quantity: u16,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        queue(client, request, |outline| {
+            outline.write_file_record(file, record, quantity)
+        })
+    }
+}
+
+/// Function 14 of several groups: `data` are the sub-requests as on the wire, seven
+/// bytes each; `reply` gets the sub-responses as on the wire (V1.1b3, 6.14).
+///
+/// @param client   the object
+/// @param request  the request
+/// @param bytes  7 to 245, a multiple of 7
+/// @return a status; see mbm_client_readCoils
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_readFileRecords(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+    bytes: u16,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { queue(client, request, |outline| outline.read_file_records(bytes)) }
+}
+
+/// Function 15 of several groups: `data` are the sub-requests as on the wire (V1.1b3,
+/// 6.15).
+///
+/// @param client   the object
+/// @param request  the request
+/// @param bytes  9 to 251
+/// @return a status; see mbm_client_readCoils
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_writeFileRecords(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+    bytes: u16,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { queue(client, request, |outline| outline.write_file_records(bytes)) }
+}
+
+/// Function 18: reads up to 31 registers of a queue into words (V1.1b3, 6.18).
+///
+/// @param client   the object
+/// @param request  the request
+/// @param address  the pointer address of the queue
+/// @return a status; see mbm_client_readCoils
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_readFifoQueue(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+    address: u16,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { plain(client, request, address, 0, Form::READ_FIFO_QUEUE) }
+}
+
+/// Function 2B/0E: reads objects that identify the device (V1.1b3, 6.21). `reply` gets,
+/// as on the wire, conformity level, more follows (0 or FF), the next object id, how
+/// many objects there are, and of each its id, length and value.
+///
+/// @param client   the object
+/// @param request  the request
+/// @param code  1 basic, 2 regular, 3 extended, 4 one object
+/// @param object  the object to begin with
+/// @return a status; see mbm_client_readCoils
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_readDeviceIdentification(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+    code: u8,
+    object: u8,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        queue(client, request, |outline| {
+            outline.read_device_identification(code, object)
+        })
+    }
+}
+
+/// Function 2B of any MEI type: sends bytes of `data` and reads what comes (V1.1b3,
+/// 6.19). On RTU, silence ends the response.
+///
+/// @param client   the object
+/// @param request  the request
+/// @param meiType  0x0D is CANopen
+/// @param bytes  0 to 251
+/// @return a status; see mbm_client_readCoils
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_encapsulatedInterfaceTransport(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+    meiType: u8,
+    bytes: u16,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        queue(client, request, |outline| {
+            outline.encapsulated(meiType, bytes)
+        })
+    }
+}
+
+/// Any function: sends bytes of `data` behind the function code, and reads what is
+/// behind it in the response.
+///
+/// @param client    the object
+/// @param request   the request
+/// @param function  1 to 127
+/// @param bytes     0 to 252
+/// @param response  how long the response is; used during this call only
+/// @return a status; see mbm_client_readCoils
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_custom(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+    function: u8,
+    bytes: u16,
+    response: *const mbm_rule,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        let rule = response.as_ref().and_then(|response| rule(*response));
+        queue(client, request, |outline| match rule {
+            Some(rule) => outline.custom(function, bytes, rule),
+            None => Status::INVALID_ARGUMENT,
+        })
+    }
+}

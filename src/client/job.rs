@@ -1,0 +1,210 @@
+//! What a client is asked to do: a request, its data, and where the response's
+//! data go.
+
+use crate::error::Status;
+use crate::pdu::outline::Outline;
+use crate::transaction::Question;
+use core::num::NonZeroU8;
+
+/// Where a request stands.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub(super) enum Stage {
+    /// Waits to be sent.
+    Queued,
+    /// Waits for its response.
+    Sent,
+    /// Was on its way when the link was lost.
+    Lost,
+    /// Waits for its response; another unit answered in its place.
+    Strayed,
+}
+
+/// What the client keeps of a request. The public fields are the caller's: those
+/// above `length` are set before the request is queued, the others are read when
+/// it has ended.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct Ticket {
+    /// Bytes that the response's data may have.
+    pub capacity: u16,
+    /// The caller's own number for it.
+    pub transaction: u16,
+    /// Whom it is for.
+    pub unit: u8,
+    /// [`Status::PENDING`] from being queued to its end, then how it ended.
+    pub status: Status,
+    /// The raw exception code of the response; 0 if it was none.
+    pub exception: u8,
+    /// Bytes of data received.
+    pub length: u8,
+    stage: Stage,
+    /// How often it was asked again.
+    pub(super) retries: u8,
+    /// Its number on the wire, for TCP.
+    pub(super) wire: u16,
+    /// It is due when `wait` has passed since `since`.
+    pub(super) since: u32,
+    pub(super) wait: u32,
+    /// What is asked.
+    pub outline: Outline,
+}
+
+impl Ticket {
+    /// Nothing asked of nobody.
+    pub const NONE: Ticket = Ticket {
+        capacity: 0,
+        transaction: 0,
+        unit: 0,
+        status: Status::OK,
+        exception: 0,
+        length: 0,
+        stage: Stage::Queued,
+        retries: 0,
+        wire: 0,
+        since: 0,
+        wait: 0,
+        outline: Outline::NONE,
+    };
+
+    pub(super) fn is(&self, stage: Stage) -> bool {
+        self.stage == stage
+    }
+
+    /// True if its response is waited for.
+    pub(super) fn is_sent(&self) -> bool {
+        matches!(self.stage, Stage::Sent | Stage::Strayed)
+    }
+
+    /// Notes that another unit answered in its place.
+    pub(super) fn stray(&mut self) {
+        self.stage = Stage::Strayed;
+    }
+
+    /// Enters a stage at the time `now`, to be looked at again after `wait`.
+    pub(super) fn enter(&mut self, stage: Stage, now: u32, wait: u32) {
+        self.stage = stage;
+        self.since = now;
+        self.wait = wait;
+    }
+}
+
+/// A request that a client is given and gives back when it has ended.
+pub trait Job {
+    /// What the client keeps of it.
+    fn ticket(&self) -> &Ticket;
+
+    /// As [`Job::ticket`].
+    fn ticket_mut(&mut self) -> &mut Ticket;
+
+    /// A byte of the data to send, as on the wire.
+    fn byte(&self, index: usize) -> u8;
+
+    /// Takes a byte of the response's data, as on the wire. Called for the
+    /// indices below [`Ticket::capacity`] only.
+    fn put(&mut self, index: usize, byte: u8);
+
+    /// True if the response's data are wanted at all.
+    fn wants_data(&self) -> bool {
+        true
+    }
+}
+
+/// Hands the data of `pdu`, a complete response, to the job.
+pub(super) fn deliver<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
+    let ticket = job.ticket();
+    let at = usize::from(ticket.outline.data_at());
+    if at == 0 || !job.wants_data() {
+        return Status::OK;
+    }
+    let data = pdu.get(at..).unwrap_or_default();
+    if data.len() > usize::from(ticket.capacity) {
+        return Status::BUFFER_TOO_SMALL;
+    }
+    let mask = ticket.outline.mask();
+    job.ticket_mut().length = data.len() as u8;
+    for (index, byte) in data.iter().enumerate() {
+        job.put(index, *byte);
+    }
+    // The bits behind the last one are zero.
+    if let (Some(last), true) = (data.last(), mask != 0xFF) {
+        job.put(data.len() - 1, *last & mask);
+    }
+    Status::OK
+}
+
+/// The job that a transaction is about.
+pub struct Asked<J> {
+    pub(super) job: Option<J>,
+    /// Nothing more belongs to the frame that arrives.
+    ended: bool,
+    /// Length of the response PDU.
+    pub(super) length: u8,
+}
+
+impl<J: Job> Asked<J> {
+    fn outline(&self) -> &Outline {
+        match &self.job {
+            Some(job) => &job.ticket().outline,
+            None => &Outline::NONE,
+        }
+    }
+
+    fn byte(&self, index: usize) -> u8 {
+        self.job.as_ref().map_or(0, |job| job.byte(index))
+    }
+}
+
+impl<J: Job> Question for Asked<J> {
+    const NONE: Self = Asked {
+        job: None,
+        ended: false,
+        length: 0,
+    };
+    // The client asks again, after the backoff.
+    const REPEATS: bool = false;
+
+    fn function(&self) -> u8 {
+        self.outline().function()
+    }
+
+    fn length(&self) -> u8 {
+        self.outline().request_length()
+    }
+
+    fn emit(&self, pdu: &mut [u8], _: &[u16]) {
+        self.outline().emit(pdu, |index| self.byte(index));
+    }
+
+    fn may_be_broadcast(&self) -> bool {
+        self.outline().may_be_broadcast()
+    }
+
+    fn is_answered(&self) -> bool {
+        self.outline().is_answered()
+    }
+
+    fn agrees(&self, pdu: &[u8]) -> bool {
+        self.outline().agrees(pdu)
+    }
+
+    fn expected(&self, pdu: &[u8]) -> Option<NonZeroU8> {
+        let whole = if self.ended {
+            // What arrived last is the check.
+            Some(pdu.len().saturating_sub(2))
+        } else {
+            None
+        };
+        self.outline().expected(pdu, whole)
+    }
+
+    fn judge(&mut self, pdu: &[u8]) -> Status {
+        let pdu = pdu.get(..pdu.len().saturating_sub(2)).unwrap_or_default();
+        self.length = pdu.len() as u8;
+        self.outline().judge(pdu, |index| self.byte(index))
+    }
+
+    fn ends(&mut self, ended: bool) {
+        self.ended = ended;
+    }
+}

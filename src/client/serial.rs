@@ -1,0 +1,142 @@
+//! A client's serial line, or a stream that carries the frames of one: one
+//! request at a time.
+
+use super::job::{deliver, Asked, Job, Stage};
+use super::shared::Shared;
+use super::units::Means;
+use super::Line;
+use crate::error::Status;
+use crate::frame::rtu::Window;
+use crate::frame::Search;
+use crate::port::Port;
+use crate::transaction::{Transaction, BROADCAST};
+
+/// One request at a time, in RTU frames, or with [`crate::frame::ascii_window`]
+/// in ASCII frames.
+#[repr(C)]
+pub struct Serial<P, S, J, W = Window> {
+    broadcasts: bool,
+    engine: Transaction<P, S, Asked<J>, W>,
+}
+
+impl<P, S, J: Job, W: Search> Serial<P, S, J, W> {
+    /// A serial line, where unit 0 is everybody.
+    pub const fn new(port: P, means: S) -> Self {
+        Serial {
+            broadcasts: true,
+            engine: Transaction::new(port, means),
+        }
+    }
+
+    /// The frames of a serial line in a TCP stream: no gap between them, and
+    /// nobody to broadcast to.
+    pub const fn over_tcp(port: P, means: S) -> Self {
+        let mut line = Self::new(port, means);
+        line.broadcasts = false;
+        line.engine.settings.gap = 0;
+        line.engine.settings.silence = super::STREAM_SILENCE;
+        line
+    }
+}
+
+impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
+    /// Says whether unit 0 is everybody.
+    pub fn set_broadcasts(&mut self, on: bool) {
+        self.broadcasts = on;
+    }
+
+    /// The transactions under it.
+    pub fn transaction(&mut self) -> &mut Transaction<P, S, Asked<J>, W> {
+        &mut self.engine
+    }
+
+    fn received(&mut self, job: &mut J, status: Status) -> Status {
+        let ticket = job.ticket_mut();
+        ticket.exception = self.engine.exception_code();
+        let answered = ticket.unit != BROADCAST && ticket.outline.is_answered();
+        if status != Status::OK || !answered {
+            return status;
+        }
+        let length = usize::from(self.engine.request().length);
+        let pdu = self.engine.reply().get(..length).unwrap_or_default();
+        deliver(job, pdu)
+    }
+}
+
+impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
+    const MOST: usize = 1;
+    const HAS_IDS: bool = false;
+
+    fn broadcasts(&self) -> bool {
+        self.broadcasts
+    }
+
+    fn held(&self) -> usize {
+        usize::from(self.engine.is_pending())
+    }
+
+    fn is_idle(&self) -> bool {
+        !self.engine.is_pending()
+    }
+
+    fn advance<const N: usize>(
+        &mut self,
+        shared: &mut Shared<J, N>,
+        now: u32,
+        _: bool,
+    ) -> Option<J> {
+        let started = if !self.engine.is_pending() {
+            let job = shared.take_due(now, self.engine.storage.units(), |_| true)?;
+            if job.ticket().is(Stage::Lost) {
+                return shared.end(job, Status::LINK_LOST, now, &mut self.engine.storage);
+            }
+            let unit = job.ticket().unit;
+            self.engine.forget();
+            self.engine.request().job = Some(job);
+            self.engine.start(unit)
+        } else {
+            Status::PENDING
+        };
+        let status = match started {
+            Status::PENDING => self.engine.poll(now),
+            refused => refused,
+        };
+        if status == Status::PENDING {
+            return None;
+        }
+        let mut job = self.engine.request().job.take()?;
+        let status = self.received(&mut job, status);
+        if status == Status::LINK_LOST {
+            shared.lose();
+        } else {
+            shared.connected = true;
+        }
+        shared.end(job, status, now, &mut self.engine.storage)
+    }
+
+    fn withdraw(&mut self, is: impl FnOnce(&J) -> bool) -> Option<J> {
+        if !self.engine.request().job.as_ref().is_some_and(is) {
+            return None;
+        }
+        self.engine.cancel();
+        self.engine.request().job.take()
+    }
+
+    fn interrupt<const N: usize>(&mut self, shared: &mut Shared<J, N>) {
+        self.engine.cancel();
+        if let Some(mut job) = self.engine.request().job.take() {
+            job.ticket_mut().enter(Stage::Lost, 0, 0);
+            let _ = shared.queue.push_front(job);
+            shared.look = true;
+        }
+    }
+
+    fn delay(&self, now: u32) -> Option<u32> {
+        let delay = || match self.engine.is_to_be_stamped() {
+            // Who slept now would wait twice.
+            true => 0,
+            false => self.engine.poll_delay(now),
+        };
+        self.engine.is_pending().then(delay)
+    }
+}

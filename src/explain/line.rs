@@ -1,0 +1,200 @@
+//! A line of text that grows in a buffer of the caller's. The formatting of
+//! `core` would be kilobytes in an image.
+
+use crate::error::Status;
+
+/// A line of ASCII text. What does not fit is left out, and said by
+/// [`Line::finish`]; a zero byte always ends the text.
+pub struct Line<'a> {
+    text: &'a mut [u8],
+    length: usize,
+    is_cut: bool,
+}
+
+impl<'a> Line<'a> {
+    /// An empty line in `text`, which needs a byte more than its characters.
+    pub const fn new(text: &'a mut [u8]) -> Self {
+        Line {
+            text,
+            length: 0,
+            is_cut: false,
+        }
+    }
+
+    /// Adds a character.
+    pub fn byte(&mut self, byte: u8) {
+        match self.text.get_mut(self.length..) {
+            Some([place, _, ..]) => {
+                *place = byte;
+                self.length += 1;
+            }
+            _ => self.is_cut = true,
+        }
+    }
+
+    /// Adds words.
+    pub fn put(&mut self, words: &str) {
+        for byte in words.bytes() {
+            self.byte(byte);
+        }
+    }
+
+    /// Adds a word and blanks behind it, up to a width.
+    pub fn padded(&mut self, word: &str, width: usize) {
+        self.put(word);
+        for _ in word.len()..width {
+            self.byte(b' ');
+        }
+    }
+
+    /// Adds a decimal number.
+    pub fn number(&mut self, number: u32) {
+        let mut digits = [0; 10];
+        let mut rest = number;
+        let mut count = 0;
+        for place in digits.iter_mut().rev() {
+            *place = b'0' + (rest % 10) as u8;
+            rest /= 10;
+            count += 1;
+            if rest == 0 {
+                break;
+            }
+        }
+        for digit in digits.iter().skip(digits.len() - count) {
+            self.byte(*digit);
+        }
+    }
+
+    fn digit(&mut self, digit: u8) {
+        self.byte(if digit < 10 {
+            b'0' + digit
+        } else {
+            b'A' - 10 + digit
+        });
+    }
+
+    /// Adds two hexadecimal digits.
+    pub fn hex(&mut self, byte: u8) {
+        self.digit(byte >> 4);
+        self.digit(byte & 0x0F);
+    }
+
+    /// Adds four hexadecimal digits.
+    pub fn hex_word(&mut self, word: u16) {
+        // Without an iterator: the facade's would no longer be inlined.
+        self.hex((word >> 8) as u8);
+        self.hex(word as u8);
+    }
+
+    /// Adds bytes in hexadecimal, a blank before each.
+    pub fn bytes(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.byte(b' ');
+            self.hex(*byte);
+        }
+    }
+
+    /// Adds registers in decimal, a blank before each.
+    pub fn registers(&mut self, data: &[u8]) {
+        for pair in data.as_chunks().0 {
+            self.byte(b' ');
+            self.number(u16::from_be_bytes(*pair).into());
+        }
+    }
+
+    /// Adds the first `count` bits, a blank before every eight.
+    pub fn bits(&mut self, data: &[u8], count: usize) {
+        let mut left = count;
+        for byte in data {
+            if left == 0 {
+                break;
+            }
+            self.byte(b' ');
+            for bit in 0..left.min(8) {
+                self.byte(b'0' + (byte >> bit & 1));
+            }
+            left = left.saturating_sub(8);
+        }
+    }
+
+    /// Adds what others call text, in quotes; what is no ASCII as a point.
+    pub fn quoted(&mut self, text: &[u8]) {
+        self.byte(b'"');
+        for byte in text {
+            self.byte(match byte {
+                b'"' => b'\'',
+                b' '..=b'~' => *byte,
+                _ => b'.',
+            });
+        }
+        self.byte(b'"');
+    }
+
+    /// Ends the text; how many characters it has.
+    ///
+    /// # Errors
+    /// [`Status::BUFFER_TOO_SMALL`] if something was left out.
+    pub fn finish(self) -> Result<usize, Status> {
+        if let Some(end) = self.text.get_mut(self.length) {
+            *end = 0;
+        } else {
+            return Err(Status::BUFFER_TOO_SMALL);
+        }
+        if self.is_cut {
+            Err(Status::BUFFER_TOO_SMALL)
+        } else {
+            Ok(self.length)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::String;
+
+    fn text(size: usize, write: impl FnOnce(&mut Line)) -> (Result<usize, Status>, String) {
+        let mut buffer = std::vec![0xEE; size];
+        let mut line = Line::new(&mut buffer);
+        write(&mut line);
+        let outcome = line.finish();
+        let end = buffer.iter().position(|byte| *byte == 0).unwrap_or(0);
+        (outcome, String::from_utf8_lossy(&buffer[..end]).into())
+    }
+
+    #[test]
+    fn numbers_are_written_in_full() {
+        let (outcome, words) = text(64, |line| {
+            for number in [0, 9, 10, 65_535, u32::MAX] {
+                line.number(number);
+                line.byte(b' ');
+            }
+            line.hex_word(0x0AF9);
+        });
+        assert_eq!(words, "0 9 10 65535 4294967295 0AF9");
+        assert_eq!(outcome, Ok(words.len()));
+    }
+
+    #[test]
+    fn bits_come_in_eights_and_no_more_than_there_are() {
+        let (_, words) = text(64, |line| line.bits(&[0xCD, 0x01], 10));
+        assert_eq!(words, " 10110011 10");
+        let (_, words) = text(64, |line| line.bits(&[0xFF], 100));
+        assert_eq!(words, " 11111111");
+    }
+
+    #[test]
+    fn what_does_not_fit_is_cut_and_the_text_still_ends() {
+        assert_eq!(text(4, |line| line.put("abc")), (Ok(3), "abc".into()));
+        let short = Err(Status::BUFFER_TOO_SMALL);
+        assert_eq!(text(3, |line| line.put("abc")), (short, "ab".into()));
+        assert_eq!(text(1, |line| line.put("abc")), (short, "".into()));
+        assert_eq!(text(0, |_| ()), (short, "".into()));
+    }
+
+    #[test]
+    fn quoted_text_holds_no_control_characters() {
+        let (_, words) = text(64, |line| line.quoted(b"a\"b\n\xFF"));
+        assert_eq!(words, "\"a'b..\"");
+    }
+}

@@ -1,0 +1,495 @@
+//! Requests and responses in words, one line each.
+
+mod line;
+pub mod names;
+
+pub use line::Line;
+
+use crate::bytes::Reader;
+use crate::error::Status;
+use crate::frame::{ascii, rtu, tcp, Adu, Framing};
+use crate::packet::Side;
+use crate::pdu::diagnostics::sub_function as sub;
+use crate::pdu::diagnostics::CLEAR_LOG;
+use crate::pdu::files::{Reads, Record, Writes};
+use crate::pdu::request::Request;
+use crate::pdu::response::Response;
+use crate::pdu::{bits, files, registers, EXCEPTION};
+
+/// Bytes of a request PDU that say what its reply means.
+pub const HEAD: usize = 9;
+
+/// Writes the unit, and a word that says what this is.
+pub fn start(line: &mut Line, unit: u8, what: &str) {
+    line.put("unit ");
+    line.number(unit.into());
+    line.put(if unit < 10 {
+        "   "
+    } else if unit < 100 {
+        "  "
+    } else {
+        " "
+    });
+    line.padded(what, 11);
+}
+
+/// Writes how many bytes there are of something that is no frame.
+pub fn bytes(line: &mut Line, what: &str, count: usize) {
+    line.put(what);
+    line.put(", ");
+    line.number(count as u32);
+    line.put(if count == 1 { " byte" } else { " bytes" });
+}
+
+/// Writes what a frame carries, or what is wrong with it. `end` is the last
+/// character of an ASCII frame.
+pub fn frame(line: &mut Line, framing: Framing, side: Side, frame: &[u8], end: u8) {
+    let parsed = match framing {
+        Framing::Rtu | Framing::RtuOverTcp => rtu::parse(frame),
+        Framing::Tcp => tcp::parse(frame),
+        Framing::Ascii => return characters(line, side, frame, end),
+    };
+    adu(line, side, parsed, frame.len());
+}
+
+/// As [`frame`], of an ASCII frame, which is decoded in a place of its own.
+#[inline(never)]
+fn characters(line: &mut Line, side: Side, frame: &[u8], end: u8) {
+    let mut copy = [0; ascii::MAX_FRAME];
+    let parsed = match copy.get_mut(..frame.len()) {
+        Some(copy) => {
+            for (to, from) in copy.iter_mut().zip(frame) {
+                *to = *from;
+            }
+            ascii::parse(copy, end)
+        }
+        None => Err(Status::MALFORMED_FRAME),
+    };
+    adu(line, side, parsed, frame.len());
+}
+
+fn adu(line: &mut Line, side: Side, parsed: Result<Adu, Status>, length: usize) {
+    match parsed {
+        Ok(adu) if side == Side::Request => {
+            start(line, adu.unit, "request");
+            request(line, adu.pdu);
+        }
+        Ok(adu) => {
+            let is_exception = adu.pdu.first().is_some_and(|code| code & EXCEPTION != 0);
+            start(
+                line,
+                adu.unit,
+                if is_exception { "exception" } else { "reply" },
+            );
+            response(line, adu.pdu, &[]);
+        }
+        Err(Status::INVALID_CRC) => bytes(line, "bad CRC", length),
+        Err(Status::INCOMPLETE_FRAME) => bytes(line, "incomplete frame", length),
+        Err(_) => bytes(line, "no frame", length),
+    }
+}
+
+/// Writes a function's code and name.
+fn function(line: &mut Line, code: u8) {
+    line.hex(code);
+    line.byte(b' ');
+    line.put(names::function(code));
+}
+
+/// Writes the addresses of so many items; they may pass 65535, for a request
+/// may be wrong.
+fn range(line: &mut Line, address: u16, quantity: u16) {
+    line.number(address.into());
+    if quantity != 1 {
+        line.put("..");
+        line.number((u32::from(address) + u32::from(quantity)).saturating_sub(1));
+    }
+}
+
+fn records(line: &mut Line, record: Record) {
+    line.put(" file ");
+    line.number(record.file.into());
+    line.put(if record.length == 1 {
+        " record "
+    } else {
+        " records "
+    });
+    range(line, record.record, record.length);
+}
+
+fn writes(line: &mut Line, writes: &Writes) {
+    let mut first = true;
+    for (record, data) in writes.iter() {
+        line.put(if first { " " } else { "," });
+        first = false;
+        records(line, record);
+        line.byte(b':');
+        line.registers(data);
+    }
+}
+
+fn masks(line: &mut Line, address: u16, and_mask: u16, or_mask: u16) {
+    line.number(address.into());
+    line.put(": and ");
+    line.hex_word(and_mask);
+    line.put(" or ");
+    line.hex_word(or_mask);
+}
+
+fn diagnostics(line: &mut Line, code: u16, data: &[u8], is_response: bool) {
+    line.put(", ");
+    line.put(names::sub_function(code));
+    match (code, data) {
+        (sub::RETURN_QUERY_DATA, data) => {
+            line.byte(b':');
+            line.bytes(data);
+        }
+        (sub::RESTART_COMMUNICATIONS, data) if data == CLEAR_LOG.to_be_bytes() => {
+            line.put(" and clear the log");
+        }
+        (sub::CHANGE_ASCII_INPUT_DELIMITER, [character, ..]) => {
+            line.put(": ");
+            line.hex(*character);
+        }
+        (sub::RETURN_DIAGNOSTIC_REGISTER, [high, low]) if is_response => {
+            line.put(": ");
+            line.hex_word(u16::from_be_bytes([*high, *low]));
+        }
+        (sub::BUS_MESSAGE_COUNT..=sub::BUS_CHARACTER_OVERRUN_COUNT, data) if is_response => {
+            line.byte(b':');
+            line.registers(data);
+        }
+        _ => (),
+    }
+}
+
+/// What cannot be parsed, as it is.
+fn malformed(line: &mut Line, pdu: &[u8]) {
+    if let Some((code, data)) = pdu.split_first() {
+        function(line, *code);
+        line.put(", malformed:");
+        line.bytes(data);
+    } else {
+        line.put("no function");
+    }
+}
+
+/// Data of which nothing is known.
+fn raw(line: &mut Line, data: &[u8]) {
+    if !data.is_empty() {
+        line.byte(b':');
+        line.bytes(data);
+    }
+}
+
+/// A function that nobody defined but its user.
+fn unknown(line: &mut Line, pdu: &[u8]) -> bool {
+    match pdu.split_first() {
+        Some((code, data)) if names::function(*code) == names::function(0) => {
+            function(line, *code);
+            raw(line, data);
+            true
+        }
+        _ => false,
+    }
+}
+
+/// Writes what a request PDU asks for.
+pub fn request(line: &mut Line, pdu: &[u8]) {
+    if unknown(line, pdu) {
+        return;
+    }
+    let Ok(request) = Request::parse(pdu) else {
+        return malformed(line, pdu);
+    };
+    function(line, request.function());
+    match request {
+        Request::ReadBits {
+            address, quantity, ..
+        }
+        | Request::ReadRegisters {
+            address, quantity, ..
+        } => {
+            line.put("  ");
+            range(line, address, quantity);
+        }
+        Request::WriteSingleCoil { address, on } => single_coil(line, address, on),
+        Request::WriteSingleRegister { address, value } => single_register(line, address, value),
+        Request::ReadExceptionStatus
+        | Request::GetCommEventCounter
+        | Request::GetCommEventLog
+        | Request::ReportServerId => (),
+        Request::Diagnostics { sub_function, data } => {
+            diagnostics(line, sub_function, data, false);
+        }
+        Request::WriteMultipleCoils {
+            address,
+            quantity,
+            data,
+        } => {
+            line.put("  ");
+            range(line, address, quantity);
+            line.byte(b':');
+            line.bits(data, quantity.into());
+        }
+        Request::WriteMultipleRegisters {
+            address,
+            quantity,
+            data,
+        } => {
+            line.put("  ");
+            range(line, address, quantity);
+            line.byte(b':');
+            line.registers(data);
+        }
+        Request::ReadFileRecord(reads) => {
+            let mut first = true;
+            for record in reads.iter() {
+                line.put(if first { " " } else { "," });
+                first = false;
+                records(line, record);
+            }
+        }
+        Request::WriteFileRecord(groups) => writes(line, &groups),
+        Request::MaskWriteRegister {
+            address,
+            and_mask,
+            or_mask,
+        } => {
+            line.put("  ");
+            masks(line, address, and_mask, or_mask);
+        }
+        Request::ReadWriteMultipleRegisters {
+            read_address,
+            read_quantity,
+            write_address,
+            write_quantity,
+            data,
+        } => {
+            line.put("  read ");
+            range(line, read_address, read_quantity);
+            line.put(", write ");
+            range(line, write_address, write_quantity);
+            line.byte(b':');
+            line.registers(data);
+        }
+        Request::ReadFifoQueue { address } => {
+            line.put("  ");
+            line.number(address.into());
+        }
+        Request::ReadDeviceIdentification { code, object } => {
+            line.put(", device identification, ");
+            line.put(names::device_id(code));
+            line.put(", object ");
+            line.number(object.into());
+        }
+        Request::EncapsulatedInterface { mei_type, data } => {
+            line.put(", MEI type ");
+            line.hex(mei_type);
+            raw(line, data);
+        }
+        Request::Custom { data, .. } => raw(line, data),
+    }
+}
+
+fn single_coil(line: &mut Line, address: u16, on: bool) {
+    line.put("  ");
+    line.number(address.into());
+    line.put(if on { ": on" } else { ": off" });
+}
+
+fn single_register(line: &mut Line, address: u16, value: u16) {
+    line.put("  ");
+    line.number(address.into());
+    line.put(": ");
+    line.number(value.into());
+}
+
+/// What a request asked for, as its first bytes tell, as far as a reply does
+/// not repeat it.
+#[derive(Clone, Copy)]
+enum Asked {
+    Nothing,
+    Range(u16, u16),
+    Queue(u16),
+    Record(Record),
+}
+
+/// What the head of a request PDU asked for.
+fn meaning(head: &[u8]) -> Asked {
+    let mut reader = Reader::new(head);
+    match reader.u8() {
+        Some(
+            bits::READ_COILS
+            | bits::READ_DISCRETE_INPUTS
+            | bits::WRITE_MULTIPLE_COILS
+            | registers::READ_HOLDING_REGISTERS
+            | registers::READ_INPUT_REGISTERS
+            | registers::WRITE_MULTIPLE_REGISTERS
+            | registers::READ_WRITE_MULTIPLE_REGISTERS,
+        ) => match (reader.u16(), reader.u16()) {
+            (Some(address), Some(quantity)) => Asked::Range(address, quantity),
+            _ => Asked::Nothing,
+        },
+        Some(files::READ_FIFO_QUEUE) => reader.u16().map_or(Asked::Nothing, Asked::Queue),
+        Some(files::READ_FILE_RECORD) => {
+            // The head holds the first sub-request; of others only the data are told.
+            let _ = reader.u8();
+            let first = Reads::new(reader.rest()).ok();
+            let record = first.and_then(|reads| reads.iter().next());
+            record.map_or(Asked::Nothing, Asked::Record)
+        }
+        _ => Asked::Nothing,
+    }
+}
+
+/// Writes what was asked for, as far as the head of a request PDU tells.
+pub fn head(line: &mut Line, head: &[u8]) {
+    let Some(code) = head.first() else {
+        return;
+    };
+    match meaning(head) {
+        _ if Request::parse(head).is_ok() => request(line, head),
+        Asked::Range(address, quantity) => {
+            function(line, *code);
+            line.put("  ");
+            range(line, address, quantity);
+        }
+        _ => function(line, *code),
+    }
+}
+
+/// Writes what a response PDU brings; the head of its request, if that is
+/// known, says where the values are from.
+pub fn response(line: &mut Line, pdu: &[u8], head: &[u8]) {
+    let is_exception = pdu.first().is_some_and(|code| code & EXCEPTION != 0);
+    if !is_exception && unknown(line, pdu) {
+        return;
+    }
+    let Ok(response) = Response::parse(pdu) else {
+        return malformed(line, pdu);
+    };
+    function(line, response.function());
+    let asked = meaning(head);
+    if let (
+        Asked::Range(address, quantity),
+        Response::ReadBits { .. } | Response::ReadRegisters { .. },
+    ) = (asked, response)
+    {
+        line.put("  ");
+        range(line, address, quantity);
+    }
+    match response {
+        Response::ReadBits { data, .. } => {
+            let count = match asked {
+                Asked::Range(_, quantity) => quantity.into(),
+                _ => 8 * data.len(),
+            };
+            line.byte(b':');
+            line.bits(data, count);
+        }
+        Response::ReadRegisters { data, .. } => {
+            line.byte(b':');
+            line.registers(data);
+        }
+        Response::WriteSingleCoil { address, on } => single_coil(line, address, on),
+        Response::WriteSingleRegister { address, value } => single_register(line, address, value),
+        Response::ExceptionStatus { outputs } => {
+            line.byte(b':');
+            line.bits(&[outputs], 8);
+        }
+        Response::Diagnostics { sub_function, data } => diagnostics(line, sub_function, data, true),
+        Response::CommEventCounter { status, events } => event_counter(line, status, events),
+        Response::CommEventLog {
+            status,
+            events,
+            messages,
+            log,
+        } => {
+            event_counter(line, status, events);
+            line.put(", messages ");
+            line.number(messages.into());
+            raw(line, log);
+        }
+        Response::WriteMultiple {
+            address, quantity, ..
+        } => {
+            line.put("  ");
+            range(line, address, quantity);
+        }
+        Response::ServerId { data, .. } => {
+            raw(line, data);
+            line.byte(b' ');
+            line.quoted(data);
+        }
+        Response::ReadFileRecord(groups) => {
+            let mut separator = " ";
+            for data in groups.iter() {
+                line.put(separator);
+                if let (Asked::Record(record), " ") = (asked, separator) {
+                    records(line, record);
+                    line.byte(b':');
+                }
+                line.registers(data);
+                separator = ",";
+            }
+        }
+        Response::WriteFileRecord(groups) => writes(line, &groups),
+        Response::MaskWriteRegister {
+            address,
+            and_mask,
+            or_mask,
+        } => {
+            line.put("  ");
+            masks(line, address, and_mask, or_mask);
+        }
+        Response::FifoQueue { data } => {
+            if let Asked::Queue(address) = asked {
+                line.put("  ");
+                line.number(address.into());
+            }
+            line.byte(b':');
+            line.registers(data);
+        }
+        Response::DeviceIdentification {
+            code,
+            more_follows,
+            next_object,
+            objects,
+            ..
+        } => {
+            line.put(", device identification, ");
+            line.put(names::device_id(code));
+            line.byte(b':');
+            for (id, value) in objects.iter() {
+                line.byte(b' ');
+                line.number(id.into());
+                line.byte(b' ');
+                line.quoted(value);
+            }
+            if more_follows {
+                line.put(", more from object ");
+                line.number(next_object.into());
+            }
+        }
+        Response::EncapsulatedInterface { mei_type, data } => {
+            line.put(", MEI type ");
+            line.hex(mei_type);
+            raw(line, data);
+        }
+        Response::Exception { code, .. } => {
+            line.put(": exception ");
+            line.hex(code);
+            line.byte(b' ');
+            line.put(names::exception(code));
+        }
+        Response::Custom { data, .. } => raw(line, data),
+    }
+}
+
+fn event_counter(line: &mut Line, status: u16, events: u16) {
+    line.put(": status ");
+    line.hex_word(status);
+    line.put(", events ");
+    line.number(events.into());
+}

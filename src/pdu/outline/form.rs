@@ -1,0 +1,178 @@
+//! What distinguishes one function from another, as a number.
+
+use super::super::{bits, diagnostics, files, identification, registers};
+
+/// What a function's request and response look like, as flags and small numbers.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(transparent)]
+pub struct Form(pub(super) u32);
+
+/// A byte count stands between head and data.
+pub(super) const COUNTED: u32 = 1 << 8;
+/// The data to send are words.
+pub(super) const SENDS_WORDS: u32 = 1 << 9;
+/// The data received are words.
+pub(super) const TAKES_WORDS: u32 = 1 << 10;
+/// The response repeats the data behind the head.
+pub(super) const REPEATS_DATA: u32 = 1 << 11;
+/// Every unit may be told at once.
+pub(super) const BROADCAST: u32 = 1 << 12;
+/// The data of the response are one group of a file.
+pub(super) const GROUP: u32 = 1 << 13;
+/// Nothing responds.
+pub(super) const UNANSWERED: u32 = 1 << 14;
+/// The second word is a quantity.
+pub(super) const RANGE: u32 = 1 << 15;
+/// ... and one of bits.
+pub(super) const BITS: u32 = 1 << 16;
+
+/// How the length of the response is known, two bits: it is so long,
+pub(super) const FIXED: u32 = 0;
+/// so long, and its second byte counts,
+pub(super) const READ: u32 = 1 << 17;
+/// the byte at an offset counts,
+pub(super) const COUNTS: u32 = 2 << 17;
+/// its own rules say, or nothing but its end.
+pub(super) const OWN: u32 = 3 << 17;
+pub(super) const KIND: u32 = 3 << 17;
+
+/// From this bit on, three bits each: length of the head and of the response,
+/// or the offset of the byte that counts; how much the response repeats; where
+/// its data begin, 0 for none.
+pub(super) const HEAD_LENGTH: u32 = 19;
+pub(super) const LENGTH: u32 = 22;
+pub(super) const REPEATED: u32 = 25;
+pub(super) const DATA: u32 = 28;
+
+impl Form {
+    pub(super) const fn new(
+        function: u8,
+        flags: u32,
+        head: u32,
+        length: u32,
+        repeated: u32,
+        data: u32,
+    ) -> Form {
+        Form(
+            function as u32
+                | flags
+                | head << HEAD_LENGTH
+                | length << LENGTH
+                | repeated << REPEATED
+                | data << DATA,
+        )
+    }
+
+    /// 01, 02.
+    pub(super) const fn bits(function: u8) -> Form {
+        Form::new(function, RANGE | BITS | READ, 5, 0, 0, 2)
+    }
+
+    /// 03, 04.
+    pub(super) const fn registers(function: u8) -> Form {
+        Form::new(function, RANGE | READ | TAKES_WORDS, 5, 0, 0, 2)
+    }
+
+    /// What the response repeats whole.
+    pub(super) const fn echoed(function: u8, flags: u32) -> Form {
+        Form::new(function, flags | BROADCAST, 5, 5, 5, 0)
+    }
+
+    /// Nothing but a function code.
+    pub(super) const fn bare(function: u8, flags: u32, length: u32, data: u32) -> Form {
+        Form::new(function, flags, 1, length, 0, data)
+    }
+
+    pub(super) const fn has(self, flag: u32) -> bool {
+        self.0 & flag != 0
+    }
+
+    pub(super) const fn number(self, at: u32) -> u8 {
+        (self.0 >> at) as u8 & 7
+    }
+
+    /// 01: address and quantity.
+    pub const READ_COILS: Form = Form::bits(bits::READ_COILS);
+    /// 02: address and quantity.
+    pub const READ_DISCRETE_INPUTS: Form = Form::bits(bits::READ_DISCRETE_INPUTS);
+    /// 03: address and quantity.
+    pub const READ_HOLDING_REGISTERS: Form = Form::registers(registers::READ_HOLDING_REGISTERS);
+    /// 04: address and quantity.
+    pub const READ_INPUT_REGISTERS: Form = Form::registers(registers::READ_INPUT_REGISTERS);
+    /// 05: address, and FF00 or 0.
+    pub const WRITE_SINGLE_COIL: Form = Form::echoed(bits::WRITE_SINGLE_COIL, 0);
+    /// 06: address and value.
+    pub const WRITE_SINGLE_REGISTER: Form = Form::echoed(registers::WRITE_SINGLE_REGISTER, 0);
+    /// 07.
+    pub const READ_EXCEPTION_STATUS: Form =
+        Form::bare(diagnostics::READ_EXCEPTION_STATUS, FIXED, 2, 1);
+    /// 0B; two words are received.
+    pub const GET_COMM_EVENT_COUNTER: Form = Form::bare(
+        diagnostics::GET_COMM_EVENT_COUNTER,
+        FIXED | TAKES_WORDS,
+        5,
+        1,
+    );
+    /// 0C; status, events and messages as words with the high byte first, then
+    /// the events.
+    pub const GET_COMM_EVENT_LOG: Form = Form::bare(diagnostics::GET_COMM_EVENT_LOG, COUNTS, 1, 2);
+    /// 0F: address and quantity.
+    pub const WRITE_MULTIPLE_COILS: Form =
+        Form::echoed(bits::WRITE_MULTIPLE_COILS, RANGE | BITS | COUNTED);
+    /// 10: address and quantity.
+    pub const WRITE_MULTIPLE_REGISTERS: Form = Form::echoed(
+        registers::WRITE_MULTIPLE_REGISTERS,
+        RANGE | COUNTED | SENDS_WORDS,
+    );
+    /// 11.
+    pub const REPORT_SERVER_ID: Form = Form::bare(diagnostics::REPORT_SERVER_ID, COUNTS, 1, 2);
+    /// 16, of which the OR mask is to be added.
+    pub(super) const MASK_WRITE_REGISTER: Form =
+        Form::new(registers::MASK_WRITE_REGISTER, BROADCAST, 7, 7, 7, 0);
+    /// 18: address.
+    pub const READ_FIFO_QUEUE: Form =
+        Form::new(files::READ_FIFO_QUEUE, OWN | TAKES_WORDS, 3, 0, 0, 5);
+
+    pub(super) const DIAGNOSTICS: Form = Form::new(
+        diagnostics::DIAGNOSTICS,
+        FIXED | SENDS_WORDS | TAKES_WORDS,
+        3,
+        0,
+        3,
+        3,
+    );
+    pub(super) const READ_FILE_RECORD: Form = Form::new(
+        files::READ_FILE_RECORD,
+        READ | GROUP | TAKES_WORDS,
+        0,
+        0,
+        0,
+        4,
+    );
+    pub(super) const WRITE_FILE_RECORD: Form = Form::new(
+        files::WRITE_FILE_RECORD,
+        FIXED | SENDS_WORDS | REPEATS_DATA | BROADCAST,
+        0,
+        0,
+        0,
+        0,
+    );
+    pub(super) const READ_FILE_RECORDS: Form =
+        Form::new(files::READ_FILE_RECORD, COUNTS | COUNTED, 1, 1, 0, 2);
+    pub(super) const WRITE_FILE_RECORDS: Form = Form::new(
+        files::WRITE_FILE_RECORD,
+        FIXED | COUNTED | REPEATS_DATA | BROADCAST,
+        1,
+        0,
+        1,
+        0,
+    );
+    pub(super) const ENCAPSULATED: Form = Form::new(
+        identification::ENCAPSULATED_INTERFACE_TRANSPORT,
+        OWN,
+        2,
+        0,
+        2,
+        2,
+    );
+}

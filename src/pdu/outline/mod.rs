@@ -1,0 +1,246 @@
+//! A request in outline: the head of its PDU, how the caller's data follow it,
+//! and how its response is known. The data stay where they are.
+//!
+//! What distinguishes one function from another is a number, so that firmware
+//! which calls every function carries next to nothing for each.
+
+mod build;
+mod form;
+
+pub use form::Form;
+
+use super::identification::{self, MEI_READ_DEVICE_IDENTIFICATION};
+use super::length::Length;
+use super::limits::{MAX_FIFO, MAX_PDU};
+use super::{files, length, EXCEPTION};
+use crate::error::Status;
+use core::num::NonZeroU8;
+use form::*;
+
+/// The longest head: that of 17, and of 14 and 15 with one group.
+const HEAD: usize = 9;
+
+/// A request in outline.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct Outline {
+    form: Form,
+    head: [u8; HEAD],
+    head_length: u8,
+    /// Bytes of the caller's data.
+    data_length: u8,
+    /// Length of the response PDU, or the offset of the byte that counts.
+    length: u8,
+    /// Bytes behind those that are counted.
+    more: u8,
+    /// How much of the request the response repeats.
+    repeated: u8,
+}
+
+impl Outline {
+    /// No request.
+    pub const NONE: Outline = Outline {
+        form: Form(0),
+        head: [0; HEAD],
+        head_length: 0,
+        data_length: 0,
+        length: 0,
+        more: 0,
+        repeated: 0,
+    };
+
+    /// The head as sent.
+    fn head(&self) -> &[u8] {
+        self.head
+            .get(..usize::from(self.head_length))
+            .unwrap_or_default()
+    }
+
+    /// The function code.
+    pub const fn function(&self) -> u8 {
+        self.head[0]
+    }
+
+    /// Bytes of the caller's data that are sent.
+    pub const fn data_length(&self) -> u8 {
+        self.data_length
+    }
+
+    /// True if the data to send are words.
+    pub const fn sends_words(&self) -> bool {
+        self.form.has(SENDS_WORDS)
+    }
+
+    /// True if the data received are words.
+    pub const fn takes_words(&self) -> bool {
+        self.form.has(TAKES_WORDS)
+    }
+
+    /// True if the request may be sent to all units at once: 05, 06, 0F, 10, 15,
+    /// 16, and of 08 the sub-functions 01, 04, 0A and 14.
+    pub const fn may_be_broadcast(&self) -> bool {
+        self.form.has(BROADCAST)
+    }
+
+    /// False for what turns a device mute (08 with sub-function 04).
+    pub const fn is_answered(&self) -> bool {
+        !self.form.has(UNANSWERED)
+    }
+
+    /// Where in the response its data begin; 0 if there are none.
+    pub const fn data_at(&self) -> u8 {
+        self.form.number(DATA)
+    }
+
+    /// How many bytes of data the response has, if that is known already; 0 else.
+    pub const fn known_data(&self) -> u8 {
+        if self.data_at() > 0 && matches!(self.form.0 & KIND, FIXED | READ) {
+            self.length.saturating_sub(self.data_at())
+        } else {
+            0
+        }
+    }
+
+    /// Length of the request PDU.
+    pub const fn request_length(&self) -> u8 {
+        let length = self.head_length + self.data_length;
+        if self.form.has(COUNTED) {
+            length + 1
+        } else {
+            length
+        }
+    }
+
+    /// The bits of the last byte of data that are used.
+    pub fn mask(&self) -> u8 {
+        match self.head[4] & 7 {
+            used if used > 0 && self.form.has(BITS) => (1 << used) - 1,
+            _ => 0xFF,
+        }
+    }
+
+    /// Writes the request PDU into `pdu`, which has
+    /// [`Outline::request_length`] bytes; `byte` gives those of the data.
+    #[inline]
+    pub fn emit(&self, pdu: &mut [u8], byte: impl Fn(usize) -> u8) {
+        let mut places = pdu.iter_mut();
+        for byte in self.head() {
+            if let Some(place) = places.next() {
+                *place = *byte;
+            }
+        }
+        if self.form.has(COUNTED) {
+            if let Some(place) = places.next() {
+                *place = self.data_length;
+            }
+        }
+        for (index, place) in places.enumerate() {
+            *place = byte(index);
+        }
+        // Of a request that writes bits, the last byte is one of data.
+        if self.form.has(COUNTED) {
+            if let Some(last) = pdu.last_mut() {
+                *last &= self.mask();
+            }
+        }
+    }
+
+    /// True if `pdu`, complete or not, agrees with the head of this request.
+    pub fn agrees(&self, pdu: &[u8]) -> bool {
+        let mut theirs = pdu.iter();
+        self.head()
+            .iter()
+            .all(|ours| theirs.next().is_none_or(|theirs| theirs == ours))
+    }
+
+    /// The length of the response that begins with the bytes of `pdu`, or the
+    /// least length while they do not tell; `None` if no response to it begins
+    /// so. `whole` is how long it is, once it is known to have ended.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub fn expected(&self, pdu: &[u8], whole: Option<usize>) -> Option<NonZeroU8> {
+        let length = match pdu {
+            [] => 2,
+            [function, ..] if *function == self.function() | EXCEPTION => 2,
+            [function, ..] if *function != self.function() => return None,
+            _ => match self.form.0 & KIND {
+                FIXED => usize::from(self.length),
+                READ => match pdu {
+                    [_, count, ..] if *count != self.length - 2 => return None,
+                    _ => usize::from(self.length),
+                },
+                COUNTS => {
+                    let offset = usize::from(self.length);
+                    match pdu.get(offset) {
+                        Some(count) => offset + 1 + usize::from(*count) + usize::from(self.more),
+                        None => offset + 1,
+                    }
+                }
+                _ => self.own_length(pdu, whole),
+            },
+        };
+        if length > MAX_PDU {
+            None
+        } else {
+            NonZeroU8::new(length as u8)
+        }
+    }
+
+    /// The length where the response's own rules tell: of 18 and 2B/0E, or of
+    /// what only its end ends.
+    fn own_length(&self, pdu: &[u8], whole: Option<usize>) -> usize {
+        let rule = match self.head {
+            [files::READ_FIFO_QUEUE, ..] => match pdu.get(1..3) {
+                Some([0, low]) => Length::Exactly(3 + usize::from(*low)),
+                Some(_) => Length::Exactly(MAX_PDU + 1),
+                None => Length::AtLeast(3),
+            },
+            [identification::ENCAPSULATED_INTERFACE_TRANSPORT, MEI_READ_DEVICE_IDENTIFICATION, ..] => {
+                length::objects(pdu)
+            }
+            _ => Length::Silence,
+        };
+        match rule {
+            Length::Exactly(length) | Length::AtLeast(length) => length,
+            // While more may come, it is never complete.
+            _ => whole.unwrap_or(pdu.len()).max(2),
+        }
+    }
+
+    /// What a complete response of the [`Outline::expected`] length says:
+    /// success, an exception of the remote device, or
+    /// [`Status::MALFORMED_REPLY`]; `byte` gives the data that were sent.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub fn judge(&self, pdu: &[u8], byte: impl Fn(usize) -> u8) -> Status {
+        if let [function, code, ..] = pdu {
+            if function & EXCEPTION != 0 {
+                return Status::exception(*code);
+            }
+        }
+        let repeated = usize::from(self.repeated);
+        let data = pdu.get(repeated..).unwrap_or_default();
+        let echoed = pdu.get(..repeated).is_some_and(|echo| self.agrees(echo));
+        let right = match *pdu {
+            _ if !echoed => false,
+            _ if self.form.has(REPEATS_DATA) => {
+                let mut data = data.iter();
+                let counted = !self.form.has(COUNTED) || data.next() == Some(&self.data_length);
+                counted
+                    && data
+                        .enumerate()
+                        .all(|(index, theirs)| *theirs == byte(index))
+            }
+            [_, count, group, reference, ..] if self.form.has(GROUP) => {
+                group == count.wrapping_sub(1) && reference == files::REFERENCE_TYPE
+            }
+            [files::READ_FIFO_QUEUE, _, bytes, high, words, ..] => {
+                high == 0 && u16::from(words) <= MAX_FIFO && bytes == 2 * words + 2
+            }
+            _ => pdu.len() >= usize::from(self.data_at()),
+        };
+        if right {
+            Status::OK
+        } else {
+            Status::MALFORMED_REPLY
+        }
+    }
+}

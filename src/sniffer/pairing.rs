@@ -1,0 +1,318 @@
+//! Requests that wait for their replies.
+
+use crate::packet::Side;
+use crate::pdu::custom::Function;
+use crate::pdu::length::Length;
+use crate::pdu::request::Request;
+use crate::pdu::response::Response;
+use crate::pdu::{bits, diagnostics, files, identification, registers, EXCEPTION};
+use crate::time::elapsed;
+
+pub use crate::explain::HEAD;
+
+/// The first bytes of a request PDU, which say what its reply means.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Asked {
+    head: [u8; HEAD],
+    length: u8,
+}
+
+impl Asked {
+    const NOTHING: Asked = Asked {
+        head: [0; HEAD],
+        length: 0,
+    };
+
+    /// The head of a request PDU.
+    pub fn new(pdu: &[u8]) -> Asked {
+        let mut asked = Asked::NOTHING;
+        for (place, byte) in asked.head.iter_mut().zip(pdu) {
+            *place = *byte;
+            asked.length += 1;
+        }
+        asked
+    }
+
+    /// What was kept of the request PDU, from its function code on.
+    pub fn head(&self) -> &[u8] {
+        self.head.get(..self.length.into()).unwrap_or_default()
+    }
+
+    fn word(&self, at: usize) -> u16 {
+        match self.head().get(at..at + 2) {
+            Some([high, low]) => u16::from_be_bytes([*high, *low]),
+            _ => 0,
+        }
+    }
+
+    /// The function code.
+    pub const fn function(&self) -> u8 {
+        let [function, ..] = self.head;
+        function
+    }
+
+    /// The first address, of 17 that is read; 0 where there is none.
+    pub fn address(&self) -> u16 {
+        match self.function() {
+            1..=6 | 0x0F | 0x10 | 0x16..=0x18 => self.word(1),
+            _ => 0,
+        }
+    }
+
+    /// How many, of 17 that are read; 0 where that is not said.
+    pub fn quantity(&self) -> u16 {
+        match self.function() {
+            1..=4 | 0x0F | 0x10 | 0x17 => self.word(3),
+            5 | 6 | 0x16 => 1,
+            _ => 0,
+        }
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum State {
+    Free,
+    /// Waits for its reply.
+    Open,
+    /// Was given up; its reply may still come.
+    Late,
+}
+
+/// A request that was seen.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slot {
+    pub state: State,
+    pub unit: u8,
+    pub transaction: u16,
+    pub time: u32,
+    pub asked: Asked,
+    /// The whole request's and the reply's bytes; 0 if only the reply tells.
+    length: u8,
+    reply: u8,
+}
+
+impl Slot {
+    pub const FREE: Slot = Slot {
+        state: State::Free,
+        unit: 0,
+        transaction: 0,
+        time: 0,
+        asked: Asked::NOTHING,
+        length: 0,
+        reply: 0,
+    };
+
+    /// True if a response with this head comes from whom was asked.
+    fn is_of(&self, unit: u8, transaction: u16, pdu: &[u8]) -> bool {
+        self.unit == unit
+            && self.transaction == transaction
+            && pdu
+                .first()
+                .is_some_and(|code| code & !EXCEPTION == self.asked.function())
+    }
+
+    /// True if this PDU answers the request, its length and what it repeats.
+    fn is_answered_by(&self, pdu: &[u8]) -> bool {
+        if pdu.first().is_some_and(|code| code & EXCEPTION != 0) {
+            return pdu.len() == 2;
+        }
+        let head = self.asked.head();
+        let repeated = match self.asked.function() {
+            bits::WRITE_SINGLE_COIL
+            | registers::WRITE_SINGLE_REGISTER
+            | bits::WRITE_MULTIPLE_COILS
+            | registers::WRITE_MULTIPLE_REGISTERS => 5,
+            registers::MASK_WRITE_REGISTER => 7,
+            files::WRITE_FILE_RECORD => HEAD,
+            diagnostics::DIAGNOSTICS => 3,
+            identification::ENCAPSULATED_INTERFACE_TRANSPORT => match head.get(1) {
+                Some(&identification::MEI_READ_DEVICE_IDENTIFICATION) => 3,
+                _ => 2,
+            },
+            // Three bytes of coils make a reply as long as the request.
+            bits::READ_COILS | bits::READ_DISCRETE_INPUTS if pdu == head => return false,
+            _ => 1,
+        };
+        let repeats = head.iter().zip(pdu).take(repeated).all(|(a, b)| a == b);
+        repeats && (self.reply == 0 || usize::from(self.reply) == pdu.len())
+    }
+
+    /// True if this PDU is the request once more.
+    fn is_repeated_by(&self, pdu: &[u8]) -> bool {
+        usize::from(self.length) == pdu.len() && pdu.starts_with(self.asked.head())
+    }
+}
+
+/// What a PDU is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Role {
+    Request,
+    /// Answers the request in this place, which is open or was given up.
+    Reply(usize),
+    /// Answers nothing; true if its unit and function were asked something else.
+    Unpaired(bool),
+}
+
+/// A frame as the requests see it.
+#[derive(Clone, Copy)]
+pub(super) struct Seen<'a> {
+    pub unit: u8,
+    pub transaction: u16,
+    pub pdu: &'a [u8],
+    /// What its length allows it to be.
+    pub request: bool,
+    pub response: bool,
+}
+
+/// How many requests may wait at once: as many as a TCP server may have under
+/// way (messaging on TCP/IP guide V1.0b, 4.4.1.3).
+pub(super) const SLOTS: usize = 16;
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Requests {
+    slots: [Slot; SLOTS],
+}
+
+impl Requests {
+    pub const NONE: Requests = Requests {
+        slots: [Slot::FREE; SLOTS],
+    };
+
+    pub fn get(&self, index: usize) -> Slot {
+        self.slots.get(index).copied().unwrap_or(Slot::FREE)
+    }
+
+    pub fn set_state(&mut self, index: usize, state: State) {
+        if let Some(slot) = self.slots.get_mut(index) {
+            slot.state = state;
+        }
+    }
+
+    /// The earliest request in a state for which `wanted` holds.
+    fn earliest(&self, now: u32, state: State, wanted: impl Fn(&Slot) -> bool) -> Option<usize> {
+        let mut found: Option<(usize, u32)> = None;
+        for (index, slot) in self.slots.iter().enumerate() {
+            let age = elapsed(now, slot.time);
+            if slot.state == state && wanted(slot) && found.is_none_or(|(_, most)| age > most) {
+                found = Some((index, age));
+            }
+        }
+        found.map(|(index, _)| index)
+    }
+
+    /// A request that is open for `timeout` or longer.
+    pub fn overdue(&self, now: u32, timeout: u32) -> Option<usize> {
+        self.earliest(now, State::Open, |slot| elapsed(now, slot.time) >= timeout)
+    }
+
+    /// The data of 08/00 are as many as were sent.
+    pub fn reply_length(&self, unit: u8, pdu: &[u8]) -> Option<usize> {
+        let slot = self.slots.iter().find(|slot| {
+            slot.state == State::Open
+                && slot.is_of(unit, slot.transaction, pdu)
+                && slot.asked.function() == diagnostics::DIAGNOSTICS
+        })?;
+        let is_long_enough = pdu.len() >= 3 && slot.reply != 0;
+        (is_long_enough && slot.asked.head().starts_with(pdu.get(..3)?))
+            .then_some(slot.reply.into())
+    }
+
+    /// True if this answers an open request.
+    pub fn is_waiting(&self, unit: u8, pdu: &[u8]) -> bool {
+        self.slots
+            .iter()
+            .any(|slot| slot.state == State::Open && slot.is_of(unit, slot.transaction, pdu))
+    }
+
+    /// What a frame is.
+    pub fn role(&self, seen: &Seen, functions: &[Function], now: u32) -> Role {
+        let Seen {
+            unit,
+            transaction,
+            pdu,
+            ..
+        } = *seen;
+        let of = |slot: &Slot| slot.is_of(unit, transaction, pdu);
+        if seen.response {
+            let answered = |slot: &Slot| of(slot) && slot.is_answered_by(pdu);
+            if let Some(index) = self.earliest(now, State::Open, answered) {
+                return Role::Reply(index);
+            }
+            // What looks like the request is the request once more.
+            let late = |slot: &Slot| answered(slot) && !(seen.request && slot.is_repeated_by(pdu));
+            if let Some(index) = self.earliest(now, State::Late, late) {
+                return Role::Reply(index);
+            }
+        }
+        let is_response = seen.response && Response::parse_with(pdu, functions).is_ok();
+        let is_request = seen.request && Request::parse_with(pdu, functions).is_ok();
+        if seen.request && (is_request || !is_response) {
+            Role::Request
+        } else {
+            Role::Unpaired(
+                self.slots
+                    .iter()
+                    .any(|slot| slot.state == State::Open && of(slot)),
+            )
+        }
+    }
+
+    /// An open request that a new one ends: on a serial line any, elsewhere that
+    /// of the same transaction; or the earliest, if there is no place for another.
+    pub fn ended_by(&self, seen: &Seen, one_at_a_time: bool, now: u32) -> Option<usize> {
+        let same = |slot: &Slot| {
+            one_at_a_time || (slot.unit == seen.unit && slot.transaction == seen.transaction)
+        };
+        let any = |_: &Slot| true;
+        let ended = self.earliest(now, State::Open, same);
+        ended.or_else(|| {
+            let is_full = self.slots.iter().all(|slot| slot.state == State::Open);
+            is_full
+                .then(|| self.earliest(now, State::Open, any))
+                .flatten()
+        })
+    }
+
+    /// Keeps a request, if there is to be a reply to it.
+    pub fn keep(&mut self, seen: &Seen, is_broadcast: bool, functions: &[Function], time: u32) {
+        let Seen {
+            unit,
+            transaction,
+            pdu,
+            ..
+        } = *seen;
+        let function = pdu.first().copied().unwrap_or_default();
+        for slot in &mut self.slots {
+            let same = slot.unit == unit && slot.asked.function() == function;
+            if slot.state == State::Late && same && slot.transaction == transaction {
+                slot.state = State::Free;
+            }
+        }
+        if is_broadcast {
+            return;
+        }
+        let length = match Request::parse_with(pdu, functions) {
+            Ok(request) => request.response_length(functions),
+            Err(_) => Side::Response.length(&[function], functions),
+        };
+        let reply = match length {
+            // Force Listen Only Mode.
+            Length::Exactly(0) => return,
+            Length::Exactly(length) => length as u8,
+            _ => 0,
+        };
+        let free = self.slots.iter().position(|slot| slot.state == State::Free);
+        let place = free.or_else(|| self.earliest(time, State::Late, |_| true));
+        if let Some(slot) = place.and_then(|index| self.slots.get_mut(index)) {
+            *slot = Slot {
+                state: State::Open,
+                unit,
+                transaction,
+                time,
+                asked: Asked::new(pdu),
+                length: pdu.len() as u8,
+                reply,
+            };
+        }
+    }
+}

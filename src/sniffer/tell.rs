@@ -1,0 +1,234 @@
+//! What was found becomes an event.
+
+use super::event::{Event, Kind};
+use super::find::{Context, MIN_RTU};
+use super::lane::Lane;
+use super::pairing::{Role, Seen, State};
+use super::{Sniffer, Step};
+use crate::error::Status;
+use crate::frame::{tcp, Framing};
+use crate::pdu::custom::Function;
+use crate::pdu::request::Request;
+use crate::pdu::response::Response;
+use crate::pdu::EXCEPTION;
+use crate::time::elapsed;
+
+impl Sniffer {
+    /// Tells of a request that nobody answered.
+    pub(super) fn give_up<'b>(&mut self, index: usize, now: u32) -> Event<'b> {
+        let slot = self.requests.get(index);
+        self.requests.set_state(index, State::Late);
+        Event {
+            kind: Kind::Timeout,
+            status: Status::RESPONSE_TIMED_OUT,
+            time: now,
+            response_time: elapsed(now, slot.time),
+            transaction: slot.transaction,
+            unit: slot.unit,
+            function: slot.asked.function(),
+            frame: &[],
+            pdu: &[],
+            length: 0,
+            asked: Some(slot.asked),
+        }
+    }
+
+    /// Makes an event of a step, and goes on behind it.
+    pub(super) fn tell<'b>(
+        &mut self,
+        buffer: &'b mut [u8],
+        functions: &[Function],
+        index: usize,
+        step: Step,
+        now: u32,
+    ) -> Event<'b> {
+        let part: &'b [u8] = self.part(buffer, index);
+        let mut lane = self.lanes.get(index).copied().unwrap_or(Lane::EMPTY);
+        let event = match step {
+            Step::Junk {
+                length,
+                status,
+                more,
+            } => {
+                let bytes = part.get(lane.start.into()..).unwrap_or_default();
+                let bytes = bytes.get(..length).unwrap_or_default();
+                let end = lane.start + length as u16;
+                let is_ended = lane.silences(lane.start).any(|at| at == end)
+                    || (end == lane.end && lane.quiet(now) >= self.timing.silence);
+                let time = lane.time(end, &self.timing);
+                let context = self.context(functions, index, now);
+                let event = junk(self.framing, &context, bytes, status, is_ended);
+                // The rest of what is too long is so too.
+                let cut = lane.cut && !is_ended;
+                lane.consume(end);
+                lane.cut = cut;
+                lane.skip = more as u16;
+                Event {
+                    time,
+                    length: length + more,
+                    ..event
+                }
+            }
+            Step::Frame {
+                total,
+                content,
+                right,
+            } => {
+                let end = lane.at + total as u16;
+                let time = lane.time(end, &self.timing);
+                let bytes = part.get(lane.at.into()..).unwrap_or_default();
+                let bytes = bytes.get(..content).unwrap_or_default();
+                let told = self.frame(functions, bytes, right, time);
+                if told.kind == Kind::Timeout {
+                    // The frame itself comes next.
+                    return told;
+                }
+                lane.consume(end);
+                Event {
+                    length: total,
+                    ..told
+                }
+            }
+        };
+        if let Some(place) = self.lanes.get_mut(index) {
+            *place = lane;
+        }
+        event
+    }
+
+    /// Tells of a frame, or of a request that was given up before it.
+    fn frame<'b>(
+        &mut self,
+        functions: &[Function],
+        frame: &'b [u8],
+        right: Option<(bool, bool)>,
+        time: u32,
+    ) -> Event<'b> {
+        let (transaction, unit, pdu) = content(self.framing, frame);
+        let code = pdu.first().copied().unwrap_or_default();
+        let mut event = Event {
+            kind: Kind::BadCrc,
+            status: Status::INVALID_CRC,
+            time,
+            response_time: 0,
+            transaction,
+            unit,
+            function: code & !EXCEPTION,
+            frame,
+            pdu,
+            length: frame.len(),
+            asked: None,
+        };
+        let Some((request, response)) = right else {
+            return event;
+        };
+        let request = request && code & EXCEPTION == 0;
+        if let Some(overdue) = self.requests.overdue(time, self.timeout) {
+            return self.give_up(overdue, time);
+        }
+        let seen = Seen {
+            unit,
+            transaction,
+            pdu,
+            request,
+            response,
+        };
+        match self.requests.role(&seen, functions, time) {
+            Role::Request => {
+                let one_at_a_time = self.framing != Framing::Tcp;
+                if let Some(ended) = self.requests.ended_by(&seen, one_at_a_time, time) {
+                    return self.give_up(ended, time);
+                }
+                let is_broadcast = unit == 0 && self.framing != Framing::Tcp;
+                self.requests.keep(&seen, is_broadcast, functions, time);
+                event.kind = Kind::Request;
+                event.status = Request::parse_with(pdu, functions)
+                    .err()
+                    .unwrap_or(Status::OK);
+            }
+            Role::Reply(index) => {
+                let slot = self.requests.get(index);
+                self.requests.set_state(index, State::Free);
+                event.asked = Some(slot.asked);
+                event.response_time = elapsed(time, slot.time);
+                event.kind = match slot.state {
+                    State::Open if code & EXCEPTION != 0 => Kind::Exception,
+                    State::Open => Kind::Reply,
+                    _ => Kind::Unpaired,
+                };
+                event.status = answer(pdu, functions);
+            }
+            Role::Unpaired(is_waited_for) => {
+                event.kind = Kind::Unpaired;
+                event.status = match answer(pdu, functions) {
+                    Status::OK if is_waited_for => Status::MALFORMED_REPLY,
+                    status => status,
+                };
+            }
+        }
+        event
+    }
+}
+
+/// Transaction, unit and PDU of a frame.
+fn content(framing: Framing, frame: &[u8]) -> (u16, u8, &[u8]) {
+    match (framing, frame) {
+        (Framing::Rtu | Framing::RtuOverTcp, [unit, pdu @ .., _, _]) => (0, *unit, pdu),
+        (Framing::Ascii, [unit, pdu @ .., _]) => (0, *unit, pdu),
+        (Framing::Tcp, frame) => match tcp::parse(frame) {
+            Ok(adu) => (adu.transaction, adu.unit, adu.pdu),
+            Err(_) => (0, 0, &[]),
+        },
+        _ => (0, 0, &[]),
+    }
+}
+
+/// What a response says of itself.
+fn answer(pdu: &[u8], functions: &[Function]) -> Status {
+    match (Response::parse_with(pdu, functions), pdu) {
+        (Err(refused), _) => refused,
+        (Ok(_), [code, exception, ..]) if code & EXCEPTION != 0 => Status::exception(*exception),
+        (Ok(_), _) => Status::OK,
+    }
+}
+
+/// Tells of bytes in which there is no frame. On a line of RTU frames they are a
+/// damaged one if they have its length, or stand alone and begin like one.
+fn junk<'b>(
+    framing: Framing,
+    context: &Context,
+    bytes: &'b [u8],
+    status: Status,
+    is_ended: bool,
+) -> Event<'b> {
+    let is_rtu = matches!(framing, Framing::Rtu | Framing::RtuOverTcp);
+    let looks_like_one = (MIN_RTU..=framing.max_frame()).contains(&bytes.len())
+        && ((is_ended && context.is_known(bytes)) || context.has_length(bytes, bytes.len()));
+    let is_damaged = is_rtu && status == Status::OK && looks_like_one;
+    let (_, unit, pdu) = if is_damaged {
+        content(framing, bytes)
+    } else {
+        (0, 0, &[][..])
+    };
+    Event {
+        kind: if is_damaged {
+            Kind::BadCrc
+        } else {
+            Kind::Noise
+        },
+        status: if is_damaged {
+            Status::INVALID_CRC
+        } else {
+            status
+        },
+        time: 0,
+        response_time: 0,
+        transaction: 0,
+        unit,
+        function: pdu.first().copied().unwrap_or_default() & !EXCEPTION,
+        frame: bytes,
+        pdu,
+        length: bytes.len(),
+        asked: None,
+    }
+}

@@ -1,0 +1,219 @@
+//! When a client asks, and asks again; what it keeps of units.
+
+#[path = "common/wire.rs"]
+mod wire;
+
+use mbm::client::{Backoff, Client, Line, Policy, Serial, Tcp, Unit};
+use mbm::error::Status;
+use mbm::pdu::outline::Form;
+use wire::{End, Lent, Task};
+
+fn read(unit: u8) -> Task {
+    Task::new(unit, 0, &[], |outline| {
+        outline.set(Form::READ_HOLDING_REGISTERS, 0, 1)
+    })
+}
+
+/// Follows what `poll_delay` says, and notes when what was sent; ends with the
+/// task.
+fn times<L: Line<Task>>(end: &End, client: &mut Client<L, Task, 4>) -> (Vec<u32>, Task) {
+    let mut times = Vec::new();
+    for _ in 0..10_000 {
+        if let Some(task) = client.poll(end.now(), true) {
+            return (times, task);
+        }
+        if !end.sent().is_empty() {
+            times.push(end.now());
+        }
+        end.pass(client.poll_delay(end.now()).clamp(1, 5_000_000));
+    }
+    panic!("no task ended");
+}
+
+fn policy(backoff: Backoff, wait: u32, retries: u8) -> Policy {
+    let mut policy = Policy::DEFAULT;
+    policy.set_backoff(backoff, wait, 1_000_000.max(wait));
+    policy.retries = retries;
+    policy
+}
+
+fn exponential() -> Policy {
+    policy(Backoff::Exponential, 300_000, 4)
+}
+
+fn serial(lent: Lent) -> (End, Client<Serial<End, Lent, Task>, Task, 4>) {
+    let end = End::default();
+    (end.clone(), Client::new(Serial::new(end, lent)))
+}
+
+fn tcp(lent: Lent) -> (End, Client<Tcp<End, Lent>, Task, 4>) {
+    let end = End::default();
+    (end.clone(), Client::new(Tcp::new(end, lent)))
+}
+
+/// The pauses between what was sent, less the response timeout of two seconds.
+fn pauses(times: &[u32]) -> Vec<u32> {
+    times
+        .windows(2)
+        .map(|pair| pair[1].wrapping_sub(pair[0]) - 2_000_000)
+        .collect()
+}
+
+#[test]
+fn retries_wait_as_the_backoff_says() {
+    let (end, mut client) = tcp(Lent::default());
+    *client.policy() = exponential();
+    assert!(client.queue(read(1)).is_ok());
+    let (times, task) = times(&end, &mut client);
+    assert_eq!(task.ticket.status, Status::RESPONSE_TIMED_OUT);
+    assert_eq!(pauses(&times), [300_000, 600_000, 1_000_000, 1_000_000]);
+}
+
+#[test]
+fn a_serial_line_waits_as_well() {
+    let (end, mut client) = serial(Lent::default());
+    *client.policy() = exponential();
+    assert!(client.queue(read(1)).is_ok());
+    let (times, task) = times(&end, &mut client);
+    assert_eq!(task.ticket.status, Status::RESPONSE_TIMED_OUT);
+    let expected = [300_000, 600_000, 1_000_000, 1_000_000];
+    for (pause, expected) in pauses(&times).iter().zip(expected) {
+        assert!(pause.abs_diff(expected) < 100, "{pause} {expected}");
+    }
+}
+
+#[test]
+fn jitter_takes_off_a_part_of_the_wait() {
+    let lent = Lent {
+        random: 0x8000,
+        ..Lent::default()
+    };
+    let (end, mut client) = tcp(lent);
+    *client.policy() = policy(Backoff::Fixed, 300_000, 4);
+    client.policy().jitter = 128;
+    assert!(client.queue(read(1)).is_ok());
+    let (times, _) = times(&end, &mut client);
+    assert_eq!(pauses(&times), [225_000; 4]);
+}
+
+#[test]
+fn without_retries_a_request_is_sent_once() {
+    let (end, mut client) = tcp(Lent::default());
+    assert!(client.queue(read(1)).is_ok());
+    let (times, task) = times(&end, &mut client);
+    assert_eq!(
+        (times.len(), task.ticket.status),
+        (1, Status::RESPONSE_TIMED_OUT)
+    );
+    assert_eq!(end.now(), 2_000_000);
+}
+
+#[test]
+fn others_are_asked_while_one_waits_to_be_asked_again() {
+    let (end, mut client) = serial(Lent::default());
+    *client.policy() = policy(Backoff::Fixed, 10_000_000, 1);
+    assert!(client.queue(read(1)).is_ok());
+    assert!(client.queue(read(2)).is_ok());
+    let mut order = Vec::new();
+    for _ in 0..100_000 {
+        let ended = client.poll(end.now(), true);
+        order.extend(end.sent().first().copied());
+        if ended.is_some_and(|task| task.ticket.unit == 1) {
+            break;
+        }
+        end.pass(client.poll_delay(end.now()).clamp(1, 1_000_000));
+    }
+    assert_eq!(order, [1, 2, 1]);
+}
+
+#[test]
+fn a_unit_is_given_its_rest_and_others_are_not_kept_waiting() {
+    let units = vec![Unit::new(1, 3_000_000)];
+    let (end, mut client) = tcp(Lent {
+        units,
+        ..Lent::default()
+    });
+    client.line.limit(1);
+    for unit in [1, 1, 2] {
+        assert!(client.queue(read(unit)).is_ok());
+    }
+    let mut sent = Vec::new();
+    while client.pending() > 0 {
+        while client.poll(end.now(), true).is_some() {}
+        if let Some(unit) = end.sent().get(6) {
+            sent.push((*unit, end.now()));
+        }
+        end.pass(client.poll_delay(end.now()).clamp(1, 1_000_000));
+    }
+    // Nobody answers within two seconds.
+    assert_eq!(sent, [(1, 0), (2, 2_000_000), (1, 5_000_000)]);
+}
+
+#[test]
+fn what_became_of_requests_is_kept_for_each_unit() {
+    let units = vec![Unit::new(9, 0), Unit::new(1, 0)];
+    let (end, mut client) = tcp(Lent {
+        units,
+        ..Lent::default()
+    });
+    client.policy().retries = 2;
+    assert!(client.queue(read(1)).is_ok());
+    times(&end, &mut client);
+    for pdu in [&[3, 2, 0, 7][..], &[0x83, 4]] {
+        assert!(client.queue(read(1)).is_ok());
+        client.poll(end.now(), true);
+        let request = end.sent();
+        let mut frame = vec![request[0], request[1], 0, 0, 0, pdu.len() as u8 + 1, 1];
+        frame.extend(pdu);
+        end.deliver(0, &frame);
+        assert!(client.poll(end.now(), true).is_some());
+    }
+    let unit = client.line.means.units[1];
+    assert_eq!(
+        (unit.requests, unit.replies, unit.exceptions, unit.retries),
+        (3, 2, 1, 2)
+    );
+    assert_eq!(unit.status, 4);
+    assert_eq!(client.line.means.units[0].requests, 0);
+}
+
+#[test]
+fn a_clock_that_jumps_ends_the_wait_and_not_the_request_that_was_answered() {
+    let (end, mut client) = serial(Lent::default());
+    assert!(client.queue(read(1)).is_ok());
+    for _ in 0..100 {
+        assert!(client.poll(end.now(), true).is_none());
+        end.pass(100);
+    }
+    assert!(!end.sent().is_empty());
+    end.deliver(0, &[1, 3, 2, 0, 7, 0xF9, 0x86]);
+    // Ahead by a quarter of an hour: the answer has arrived all the same.
+    end.pass(900_000_000);
+    let task = client.poll(end.now(), true).unwrap();
+    assert_eq!(
+        (task.ticket.status, task.received()),
+        (Status::OK, &[0, 7][..])
+    );
+    // Back by a minute: nobody waits for 71 minutes.
+    assert!(client.queue(read(1)).is_ok());
+    let queued = end.now();
+    while end.sent().is_empty() {
+        assert!(client.poll(end.now(), true).is_none());
+        end.pass(100);
+        assert!(end.now().wrapping_sub(queued) < 1_000_000);
+    }
+    assert!(client.poll(end.now(), true).is_none());
+    end.pass(0u32.wrapping_sub(60_000_000));
+    let task = client.poll(end.now(), true).unwrap();
+    assert_eq!(task.ticket.status, Status::RESPONSE_TIMED_OUT);
+}
+
+#[test]
+fn the_clock_may_wrap() {
+    let (end, mut client) = tcp(Lent::default());
+    end.pass(u32::MAX - 3_000_000);
+    *client.policy() = exponential();
+    assert!(client.queue(read(1)).is_ok());
+    let (times, _) = times(&end, &mut client);
+    assert_eq!(pauses(&times), [300_000, 600_000, 1_000_000, 1_000_000]);
+}

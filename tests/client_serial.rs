@@ -1,0 +1,493 @@
+//! The client on a serial line: every function, and what becomes of requests.
+
+#[path = "common/wire.rs"]
+mod wire;
+
+use mbm::client::{Client, Serial};
+use mbm::error::Status;
+use mbm::frame::{ascii, ascii_window, rtu, Search};
+use mbm::pdu::custom::Rule;
+use mbm::pdu::outline::{Form, Outline};
+use wire::{End, Lent, Task};
+
+type Rtu<W = rtu::Window> = Client<Serial<End, Lent, Task, W>, Task, 4>;
+
+fn client<W: Search>() -> (End, Rtu<W>) {
+    let end = End::default();
+    (end.clone(), Client::new(Serial::new(end, Lent::default())))
+}
+
+/// Polls every 100 us until a task ends, for at most ten seconds.
+fn run<W: Search>(end: &End, client: &mut Rtu<W>) -> Task {
+    for _ in 0..100_000 {
+        if let Some(task) = client.poll(end.now(), true) {
+            return task;
+        }
+        end.pass(100);
+    }
+    panic!("no task ended");
+}
+
+/// Polls until something was sent.
+fn sent<W: Search>(end: &End, client: &mut Rtu<W>) -> Vec<u8> {
+    for _ in 0..3_000 {
+        assert!(client.poll(end.now(), true).is_none());
+        let bytes = end.sent();
+        if !bytes.is_empty() {
+            return bytes;
+        }
+        end.pass(100);
+    }
+    panic!("nothing was sent");
+}
+
+fn frame(unit: u8, pdu: &[u8]) -> Vec<u8> {
+    let mut buffer = [0; 256];
+    let length = rtu::emit(&mut buffer, unit, |place| {
+        place[..pdu.len()].copy_from_slice(pdu);
+        Ok(pdu.len())
+    });
+    buffer[..length.unwrap()].to_vec()
+}
+
+fn characters(unit: u8, pdu: &[u8]) -> Vec<u8> {
+    let mut buffer = [0; 513];
+    let length = ascii::emit(&mut buffer, unit, ascii::END, |place| {
+        place[..pdu.len()].copy_from_slice(pdu);
+        Ok(pdu.len())
+    });
+    buffer[..length.unwrap()].to_vec()
+}
+
+/// A request, its data, PDU and response PDU, and the data of the response.
+type Case = (
+    fn(&mut Outline) -> Status,
+    &'static [u8],
+    &'static [u8],
+    &'static [u8],
+    &'static [u8],
+);
+
+/// The examples of the application protocol, clause 6, and some of ours.
+const CASES: &[Case] = &[
+    (
+        |o| o.set(Form::READ_COILS, 0x13, 0x13),
+        &[],
+        &[1, 0, 0x13, 0, 0x13],
+        &[1, 3, 0xCD, 0x6B, 0xFD],
+        &[0xCD, 0x6B, 0x05],
+    ),
+    (
+        |o| o.set(Form::READ_DISCRETE_INPUTS, 0xC4, 0x16),
+        &[],
+        &[2, 0, 0xC4, 0, 0x16],
+        &[2, 3, 0xAC, 0xDB, 0x35],
+        &[0xAC, 0xDB, 0x35],
+    ),
+    (
+        |o| o.set(Form::READ_HOLDING_REGISTERS, 0x6B, 3),
+        &[],
+        &[3, 0, 0x6B, 0, 3],
+        &[3, 6, 2, 0x2B, 0, 0, 0, 0x64],
+        &[2, 0x2B, 0, 0, 0, 0x64],
+    ),
+    (
+        |o| o.set(Form::READ_INPUT_REGISTERS, 8, 1),
+        &[],
+        &[4, 0, 8, 0, 1],
+        &[4, 2, 0, 0x0A],
+        &[0, 0x0A],
+    ),
+    (
+        |o| o.set(Form::WRITE_SINGLE_COIL, 0xAC, 0xFF00),
+        &[],
+        &[5, 0, 0xAC, 0xFF, 0],
+        &[5, 0, 0xAC, 0xFF, 0],
+        &[],
+    ),
+    (
+        |o| o.set(Form::WRITE_SINGLE_REGISTER, 1, 3),
+        &[],
+        &[6, 0, 1, 0, 3],
+        &[6, 0, 1, 0, 3],
+        &[],
+    ),
+    (
+        |o| o.set(Form::READ_EXCEPTION_STATUS, 0, 0),
+        &[],
+        &[7],
+        &[7, 0x6D],
+        &[0x6D],
+    ),
+    (
+        |o| o.diagnostics(0, 2),
+        &[0xA5, 0x37, 1, 2],
+        &[8, 0, 0, 0xA5, 0x37, 1, 2],
+        &[8, 0, 0, 0xA5, 0x37, 1, 2],
+        &[0xA5, 0x37, 1, 2],
+    ),
+    (
+        |o| o.diagnostics(0x0B, 1),
+        &[0, 0],
+        &[8, 0, 0x0B, 0, 0],
+        &[8, 0, 0x0B, 0, 9],
+        &[0, 9],
+    ),
+    (
+        |o| o.set(Form::GET_COMM_EVENT_COUNTER, 0, 0),
+        &[],
+        &[0x0B],
+        &[0x0B, 0xFF, 0xFF, 1, 8],
+        &[0xFF, 0xFF, 1, 8],
+    ),
+    (
+        |o| o.set(Form::GET_COMM_EVENT_LOG, 0, 0),
+        &[],
+        &[0x0C],
+        &[0x0C, 8, 0, 0, 1, 8, 1, 0x21, 0x20, 0],
+        &[0, 0, 1, 8, 1, 0x21, 0x20, 0],
+    ),
+    (
+        |o| o.set(Form::WRITE_MULTIPLE_COILS, 0x13, 10),
+        &[0xCD, 0xFD],
+        &[0x0F, 0, 0x13, 0, 10, 2, 0xCD, 1],
+        &[0x0F, 0, 0x13, 0, 10],
+        &[],
+    ),
+    (
+        |o| o.set(Form::WRITE_MULTIPLE_REGISTERS, 1, 2),
+        &[0, 0x0A, 1, 2],
+        &[0x10, 0, 1, 0, 2, 4, 0, 0x0A, 1, 2],
+        &[0x10, 0, 1, 0, 2],
+        &[],
+    ),
+    (
+        |o| o.set(Form::REPORT_SERVER_ID, 0, 0),
+        &[],
+        &[0x11],
+        &[0x11, 3, 0x42, 0xFF, 7],
+        &[0x42, 0xFF, 7],
+    ),
+    (
+        |o| o.read_file_record(4, 1, 2),
+        &[],
+        &[0x14, 7, 6, 0, 4, 0, 1, 0, 2],
+        &[0x14, 6, 5, 6, 0x0D, 0xFE, 0, 0x20],
+        &[0x0D, 0xFE, 0, 0x20],
+    ),
+    (
+        |o| o.read_file_records(14),
+        &[6, 0, 4, 0, 1, 0, 2, 6, 0, 3, 0, 9, 0, 2],
+        &[0x14, 14, 6, 0, 4, 0, 1, 0, 2, 6, 0, 3, 0, 9, 0, 2],
+        &[
+            0x14, 12, 5, 6, 0x0D, 0xFE, 0, 0x20, 5, 6, 0x33, 0xCD, 0, 0x40,
+        ],
+        &[5, 6, 0x0D, 0xFE, 0, 0x20, 5, 6, 0x33, 0xCD, 0, 0x40],
+    ),
+    (
+        |o| o.write_file_record(4, 7, 3),
+        &[6, 0xAF, 4, 0xBE, 0x10, 0x0D],
+        &[0x15, 13, 6, 0, 4, 0, 7, 0, 3, 6, 0xAF, 4, 0xBE, 0x10, 0x0D],
+        &[0x15, 13, 6, 0, 4, 0, 7, 0, 3, 6, 0xAF, 4, 0xBE, 0x10, 0x0D],
+        &[],
+    ),
+    (
+        |o| o.write_file_records(9),
+        &[6, 0, 4, 0, 7, 0, 1, 6, 0xAF],
+        &[0x15, 9, 6, 0, 4, 0, 7, 0, 1, 6, 0xAF],
+        &[0x15, 9, 6, 0, 4, 0, 7, 0, 1, 6, 0xAF],
+        &[],
+    ),
+    (
+        |o| o.mask_write_register(4, 0xF2, 0x25),
+        &[],
+        &[0x16, 0, 4, 0, 0xF2, 0, 0x25],
+        &[0x16, 0, 4, 0, 0xF2, 0, 0x25],
+        &[],
+    ),
+    (
+        |o| o.read_write_registers(3, 2, 0x0E, 1),
+        &[0, 0xFF],
+        &[0x17, 0, 3, 0, 2, 0, 0x0E, 0, 1, 2, 0, 0xFF],
+        &[0x17, 4, 0, 0xFE, 0x0A, 0xCD],
+        &[0, 0xFE, 0x0A, 0xCD],
+    ),
+    (
+        |o| o.set(Form::READ_FIFO_QUEUE, 0x4DE, 0),
+        &[],
+        &[0x18, 4, 0xDE],
+        &[0x18, 0, 6, 0, 2, 1, 0xB8, 0x12, 0x84],
+        &[1, 0xB8, 0x12, 0x84],
+    ),
+    (
+        |o| o.read_device_identification(1, 0),
+        &[],
+        &[0x2B, 0x0E, 1, 0],
+        &[0x2B, 0x0E, 1, 1, 0, 0, 2, 0, 2, 0x41, 0x42, 1, 1, 0x43],
+        &[1, 0, 0, 2, 0, 2, 0x41, 0x42, 1, 1, 0x43],
+    ),
+    (
+        |o| o.encapsulated(0x0D, 2),
+        &[1, 2],
+        &[0x2B, 0x0D, 1, 2],
+        &[0x2B, 0x0D, 9, 8, 7],
+        &[9, 8, 7],
+    ),
+    (
+        |o| o.custom(0x41, 2, Rule::Fixed(3)),
+        &[1, 2],
+        &[0x41, 1, 2],
+        &[0x41, 3, 4],
+        &[3, 4],
+    ),
+    (
+        |o| o.custom(0x42, 1, Rule::Counted(2, 1)),
+        &[5],
+        &[0x42, 5],
+        &[0x42, 0, 2, 6, 7, 8],
+        &[0, 2, 6, 7, 8],
+    ),
+    (
+        |o| o.custom(0x43, 0, Rule::Silence),
+        &[],
+        &[0x43],
+        &[0x43, 1, 2, 3, 4, 5],
+        &[1, 2, 3, 4, 5],
+    ),
+];
+
+#[test]
+fn every_function_is_sent_and_answered_in_rtu() {
+    for (build, data, request, response, received) in CASES {
+        let (end, mut client) = client::<rtu::Window>();
+        assert!(client.queue(Task::new(17, 1, data, build)).is_ok());
+        assert_eq!(sent(&end, &mut client), frame(17, request));
+        // In two pieces, with a pause that is longer than t3.5 between them.
+        let reply = frame(17, response);
+        end.deliver(1_000, &reply[..3]);
+        end.deliver(9_000, &reply[3..]);
+        let task = run(&end, &mut client);
+        assert_eq!(task.ticket.status, Status::OK, "{request:02X?}");
+        assert_eq!(task.received(), *received, "{request:02X?}");
+    }
+}
+
+#[test]
+fn every_function_is_sent_and_answered_in_ascii() {
+    for (build, data, request, response, received) in CASES {
+        let (end, mut client) = client::<ascii_window::Window>();
+        assert!(client.queue(Task::new(17, 1, data, build)).is_ok());
+        assert_eq!(sent(&end, &mut client), characters(17, request));
+        end.deliver(1_000, b"\xFF:11");
+        end.deliver(1_000, &characters(18, response));
+        end.deliver(2_000, &characters(17, response));
+        let task = run(&end, &mut client);
+        assert_eq!(task.ticket.status, Status::OK, "{request:02X?}");
+        assert_eq!(task.received(), *received, "{request:02X?}");
+    }
+}
+
+#[test]
+fn an_exception_of_every_function_is_told() {
+    for (build, data, request, ..) in CASES {
+        let (end, mut client) = client::<rtu::Window>();
+        assert!(client.queue(Task::new(17, 1, data, build)).is_ok());
+        sent(&end, &mut client);
+        end.deliver(1_000, &frame(17, &[request[0] | 0x80, 6]));
+        let task = run(&end, &mut client);
+        assert_eq!(task.ticket.status.code(), 6);
+        assert_eq!(task.ticket.exception, 6);
+        assert_eq!(task.reply[0], 0xEE);
+    }
+}
+
+#[test]
+fn a_response_that_does_not_answer_is_malformed() {
+    for (build, data, request, response, _) in CASES {
+        for at in 1..response.len() {
+            let (end, mut client) = client::<rtu::Window>();
+            assert!(client.queue(Task::new(17, 1, data, build)).is_ok());
+            sent(&end, &mut client);
+            let mut wrong = response.to_vec();
+            wrong[at] ^= 0x40;
+            end.deliver(1_000, &frame(17, &wrong));
+            let task = run(&end, &mut client);
+            let free = task.ticket.status == Status::OK;
+            if free {
+                // Only what the device is free to say may differ.
+                assert!(!matches!(request[0], 5 | 6 | 0x0F | 0x10 | 0x15 | 0x16));
+                assert!(at >= usize::from(task.ticket.outline.data_at()));
+            } else {
+                assert!(
+                    matches!(
+                        task.ticket.status,
+                        Status::MALFORMED_REPLY | Status::RESPONSE_TIMED_OUT
+                    ),
+                    "{request:02X?} {at} {:?}",
+                    task.ticket.status
+                );
+            }
+        }
+    }
+}
+
+fn read(unit: u8, transaction: u16) -> Task {
+    Task::new(unit, transaction, &[], |outline| {
+        outline.set(Form::READ_HOLDING_REGISTERS, 0, 1)
+    })
+}
+
+#[test]
+fn requests_are_sent_one_after_the_other_and_in_order() {
+    let (end, mut client) = client::<rtu::Window>();
+    for number in 1..=4 {
+        assert!(client.queue(read(number as u8, number)).is_ok());
+    }
+    let refused = client.queue(read(9, 9)).err().unwrap();
+    assert_eq!(refused.ticket.status, Status::QUEUE_FULL);
+    for number in 1..=4u8 {
+        let request = sent(&end, &mut client);
+        assert_eq!(request[0], number);
+        // Nothing else is sent while this one is under way.
+        end.pass(5_000);
+        assert!(client.poll(end.now(), true).is_none());
+        assert!(end.sent().is_empty());
+        end.deliver(0, &frame(number, &[3, 2, 0, number]));
+        let task = run(&end, &mut client);
+        assert_eq!(
+            (task.ticket.transaction, task.received()),
+            (number.into(), &[0, number][..])
+        );
+    }
+    assert_eq!(client.pending(), 0);
+    assert_eq!(client.poll_delay(end.now()), u32::MAX);
+}
+
+#[test]
+fn a_broadcast_is_a_write_and_takes_the_turnaround_delay() {
+    let (end, mut client) = client::<rtu::Window>();
+    for (build, data, request, ..) in CASES {
+        let broadcast = matches!(request[0], 5 | 6 | 0x0F | 0x10 | 0x15 | 0x16);
+        match client.queue(Task::new(0, 0, data, build)) {
+            Ok(()) => {
+                assert!(broadcast);
+                assert_eq!(sent(&end, &mut client)[0], 0);
+                let begun = end.now();
+                assert_eq!(run(&end, &mut client).ticket.status, Status::OK);
+                assert!((100_000..101_000).contains(&(end.now() - begun)));
+            }
+            Err(task) => {
+                assert!(!broadcast);
+                assert_eq!(task.ticket.status, Status::BROADCAST_NOT_ALLOWED);
+            }
+        }
+    }
+    for sub_function in 0..0x15 {
+        let task = Task::new(0, 0, &[0, 0], |outline| {
+            outline.diagnostics(sub_function, 1)
+        });
+        let queued = client.queue(task).is_ok();
+        assert_eq!(queued, matches!(sub_function, 1 | 4 | 0x0A | 0x14));
+        if queued {
+            run(&end, &mut client);
+        }
+    }
+}
+
+#[test]
+fn nobody_responds_to_force_listen_only_mode() {
+    let (end, mut client) = client::<rtu::Window>();
+    let task = Task::new(17, 0, &[0, 0], |outline| outline.diagnostics(4, 1));
+    assert!(client.queue(task).is_ok());
+    assert_eq!(run(&end, &mut client).ticket.status, Status::OK);
+    assert!(end.now() < 110_000);
+}
+
+#[test]
+fn a_dead_link_ends_the_request_under_way_and_those_that_wait() {
+    let (end, mut client) = client::<rtu::Window>();
+    for number in 1..=3 {
+        assert!(client.queue(read(number as u8, number)).is_ok());
+    }
+    sent(&end, &mut client);
+    assert!(client.is_connected());
+    end.0.borrow_mut().dead = true;
+    for number in 1..=3 {
+        let task = client.poll(end.now(), true).unwrap();
+        assert_eq!(task.ticket.status, Status::LINK_LOST);
+        assert_eq!(task.ticket.transaction, number);
+    }
+    assert!(client.poll(end.now(), true).is_none());
+    assert!(!client.is_connected());
+    end.0.borrow_mut().dead = false;
+    client.reconnect();
+    assert!(client.is_connected());
+}
+
+#[test]
+fn a_reconnect_ends_only_what_was_under_way() {
+    let (end, mut client) = client::<rtu::Window>();
+    for number in 1..=2 {
+        assert!(client.queue(read(number as u8, number)).is_ok());
+    }
+    sent(&end, &mut client);
+    end.deliver(0, &[1, 3]);
+    client.poll(end.now(), true);
+    client.reconnect();
+    let task = run(&end, &mut client);
+    assert_eq!(
+        (task.ticket.transaction, task.ticket.status),
+        (1, Status::LINK_LOST)
+    );
+    assert_eq!(sent(&end, &mut client)[0], 2);
+}
+
+#[test]
+fn a_request_is_cancelled_wherever_it_is() {
+    let (end, mut client) = client::<rtu::Window>();
+    for number in 1..=3 {
+        assert!(client.queue(read(number as u8, number)).is_ok());
+    }
+    sent(&end, &mut client);
+    for number in [1, 3] {
+        let task = client
+            .cancel(|task| task.ticket.transaction == number)
+            .unwrap();
+        assert_eq!(task.ticket.status, Status::CANCELLED);
+        assert!(client
+            .cancel(|task| task.ticket.transaction == number)
+            .is_none());
+    }
+    assert_eq!(sent(&end, &mut client)[0], 2);
+    assert_eq!(client.pending(), 1);
+}
+
+#[test]
+fn a_lent_line_is_left_alone() {
+    let (end, mut client) = client::<rtu::Window>();
+    assert!(client.lend());
+    assert!(!client.lend());
+    assert!(client.queue(read(1, 1)).is_ok());
+    end.pass(50_000);
+    assert!(client.poll(end.now(), true).is_none());
+    assert_eq!(client.poll_delay(end.now()), u32::MAX);
+    assert!(end.sent().is_empty());
+    client.take_back();
+    sent(&end, &mut client);
+    assert!(!client.lend());
+}
+
+#[test]
+fn a_reply_too_long_for_the_job_is_told_and_not_cut() {
+    let (end, mut client) = client::<rtu::Window>();
+    let mut task = Task::new(1, 1, &[], |outline| {
+        outline.set(Form::REPORT_SERVER_ID, 0, 0)
+    });
+    task.ticket.capacity = 2;
+    assert!(client.queue(task).is_ok());
+    sent(&end, &mut client);
+    end.deliver(0, &frame(1, &[0x11, 3, 1, 2, 3]));
+    let task = run(&end, &mut client);
+    assert_eq!(task.ticket.status, Status::BUFFER_TOO_SMALL);
+    assert_eq!((task.ticket.length, task.reply[0]), (0, 0xEE));
+}

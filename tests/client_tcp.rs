@@ -1,0 +1,406 @@
+//! The client on a TCP stream: many requests at once, in a stream that does what
+//! it likes.
+
+#[path = "common/wire.rs"]
+mod wire;
+
+use mbm::client::{Client, Tcp};
+use mbm::error::Status;
+use mbm::frame::tcp;
+use mbm::pdu::outline::Form;
+use mbm::transaction::Counter;
+use proptest::prelude::*;
+use wire::{End, Lent, Task};
+
+type TcpIp = Client<Tcp<End, Lent>, Task, 16>;
+
+fn client() -> (End, TcpIp) {
+    let end = End::default();
+    (end.clone(), Client::new(Tcp::new(end, Lent::default())))
+}
+
+fn read(unit: u8, transaction: u16) -> Task {
+    Task::new(unit, transaction, &[], |outline| {
+        outline.set(Form::READ_HOLDING_REGISTERS, transaction, 1)
+    })
+}
+
+/// The requests that were sent: wire id, unit, address.
+fn requests(bytes: &[u8]) -> Vec<(u16, u8, u16)> {
+    let mut rest = bytes;
+    let mut found = Vec::new();
+    while !rest.is_empty() {
+        let header = tcp::header(rest).unwrap();
+        let pdu = &rest[tcp::PDU..header.total];
+        assert_eq!(pdu[0], 3);
+        found.push((
+            header.transaction,
+            header.unit,
+            u16::from_be_bytes([pdu[1], pdu[2]]),
+        ));
+        rest = &rest[header.total..];
+    }
+    found
+}
+
+/// The response to the read of one register: its address.
+fn response((wire, unit, address): (u16, u8, u16)) -> Vec<u8> {
+    let [a, b] = wire.to_be_bytes();
+    let [c, d] = address.to_be_bytes();
+    vec![a, b, 0, 0, 0, 5, unit, 3, 2, c, d]
+}
+
+/// Polls once as C does: until nothing more has ended.
+fn poll(end: &End, client: &mut TcpIp) -> Vec<Task> {
+    let mut ended = Vec::new();
+    while let Some(task) = client.poll(end.now(), ended.is_empty()) {
+        ended.push(task);
+    }
+    ended
+}
+
+fn assert_right(task: &Task) {
+    assert_eq!(task.ticket.status, Status::OK);
+    assert_eq!(task.received(), task.ticket.transaction.to_be_bytes());
+}
+
+#[test]
+fn all_requests_are_under_way_at_once_and_answered_in_any_order() {
+    let (end, mut client) = client();
+    for number in 1..=16 {
+        assert!(client.queue(read(1, number)).is_ok());
+    }
+    assert_eq!(
+        client.queue(read(1, 17)).err().unwrap().ticket.status,
+        Status::QUEUE_FULL
+    );
+    assert!(poll(&end, &mut client).is_empty());
+    let sent = requests(&end.sent());
+    assert_eq!(sent.len(), 16);
+    let all: Vec<u8> = sent
+        .iter()
+        .rev()
+        .flat_map(|request| response(*request))
+        .collect();
+    end.deliver(0, &all);
+    let ended = poll(&end, &mut client);
+    assert_eq!(ended.len(), 16);
+    for (task, number) in ended.iter().zip((1..=16).rev()) {
+        assert_right(task);
+        assert_eq!(task.ticket.transaction, number);
+    }
+}
+
+#[test]
+fn a_response_may_come_byte_by_byte_and_a_request_go_so() {
+    let (end, mut client) = client();
+    end.0.borrow_mut().piece = Some(1);
+    assert!(client.queue(read(1, 7)).is_ok());
+    let mut request = Vec::new();
+    while request.len() < 12 {
+        assert!(poll(&end, &mut client).is_empty());
+        request.extend(end.sent());
+    }
+    for byte in response(requests(&request)[0]) {
+        assert!(poll(&end, &mut client).is_empty());
+        end.deliver(0, &[byte]);
+    }
+    assert_right(&poll(&end, &mut client)[0]);
+}
+
+#[test]
+fn unknown_ids_are_dropped_and_counted() {
+    let (end, mut client) = client();
+    let counters = client.line.means.counters.clone();
+    assert!(client.queue(read(1, 7)).is_ok());
+    poll(&end, &mut client);
+    let (wire, unit, address) = requests(&end.sent())[0];
+    end.deliver(0, &response((wire.wrapping_add(1), unit, address)));
+    end.deliver(0, &response((wire, unit, address)));
+    // The second answer to the same request.
+    end.deliver(0, &response((wire, unit, address)));
+    assert!(poll(&end, &mut client).is_empty());
+    assert_right(&poll(&end, &mut client)[0]);
+    assert!(client.queue(read(1, 8)).is_ok());
+    poll(&end, &mut client);
+    assert!(poll(&end, &mut client).is_empty());
+    assert_eq!(counters.borrow()[Counter::ForeignFrames as usize], 2);
+}
+
+#[test]
+fn another_unit_does_not_answer() {
+    let (end, mut client) = client();
+    assert!(client.queue(read(1, 7)).is_ok());
+    poll(&end, &mut client);
+    let (wire, _, address) = requests(&end.sent())[0];
+    end.deliver(0, &response((wire, 2, address)));
+    assert!(poll(&end, &mut client).is_empty());
+    end.pass(2_000_000);
+    assert_eq!(
+        poll(&end, &mut client)[0].ticket.status,
+        Status::INVALID_SLAVE_ID
+    );
+}
+
+#[test]
+fn a_response_that_does_not_answer_fails_at_once() {
+    for (pdu, status) in [
+        (&[4, 2, 0, 7][..], Status::INVALID_FUNCTION),
+        (&[3, 4, 0, 7, 0, 8], Status::MALFORMED_REPLY),
+        (&[3, 2, 0, 7, 0], Status::MALFORMED_REPLY),
+        (&[3, 2, 0], Status::MALFORMED_REPLY),
+        (&[3], Status::MALFORMED_REPLY),
+        (&[0x83, 0], Status::MALFORMED_REPLY),
+        (&[0x83, 2], Status::ILLEGAL_DATA_ADDRESS),
+    ] {
+        let (end, mut client) = client();
+        assert!(client.queue(read(1, 7)).is_ok());
+        poll(&end, &mut client);
+        let (wire, unit, _) = requests(&end.sent())[0];
+        let [a, b] = wire.to_be_bytes();
+        let mut frame = vec![a, b, 0, 0, 0, pdu.len() as u8 + 1, unit];
+        frame.extend(pdu);
+        end.deliver(0, &frame);
+        assert_eq!(
+            poll(&end, &mut client)[0].ticket.status,
+            status,
+            "{pdu:02X?}"
+        );
+    }
+}
+
+#[test]
+fn frames_are_found_again_behind_garbage() {
+    for garbage in [
+        &[0xFF; 3][..],
+        &[0, 1, 0, 1, 2, 3, 4, 5, 6, 7],
+        &[0; 40],
+        // What looks like the header of a long frame.
+        &[0x12, 0x34, 0, 0, 0, 0xFE, 1, 3],
+    ] {
+        let (end, mut client) = client();
+        assert!(client.queue(read(1, 7)).is_ok());
+        poll(&end, &mut client);
+        end.deliver(0, garbage);
+        end.deliver(0, &response(requests(&end.sent())[0]));
+        let mut ended = Vec::new();
+        for _ in 0..30 {
+            ended.extend(poll(&end, &mut client));
+            end.pass(100_000);
+        }
+        assert_right(&ended[0]);
+        // And the stream is in step again.
+        assert!(client.queue(read(1, 8)).is_ok());
+        poll(&end, &mut client);
+        end.deliver(0, &response(requests(&end.sent())[0]));
+        assert_right(&poll(&end, &mut client)[0]);
+    }
+}
+
+#[test]
+fn two_pending_requests_do_not_share_a_number() {
+    let (end, mut client) = client();
+    assert!(client.queue(read(1, 7)).is_ok());
+    let refused = client.queue(read(2, 7)).err().unwrap();
+    assert_eq!(refused.ticket.status, Status::DUPLICATE_TRANSACTION);
+    assert!(client.queue(read(1, 0)).is_ok());
+    assert!(client.queue(read(1, 0)).is_ok());
+    poll(&end, &mut client);
+    assert_eq!(requests(&end.sent()).len(), 3);
+}
+
+#[test]
+fn nothing_is_broadcast_over_tcp() {
+    let (_, mut client) = client();
+    let task = Task::new(0, 1, &[], |outline| {
+        outline.set(Form::WRITE_SINGLE_REGISTER, 1, 2)
+    });
+    assert_eq!(
+        client.queue(task).err().unwrap().ticket.status,
+        Status::BROADCAST_NOT_ALLOWED
+    );
+}
+
+#[test]
+fn no_more_requests_fly_than_the_limit_says() {
+    let (end, mut client) = client();
+    client.line.limit(2);
+    for number in 1..=5 {
+        assert!(client.queue(read(1, number)).is_ok());
+    }
+    let mut ended = 0;
+    for number in [2, 2, 1] {
+        ended += poll(&end, &mut client).len();
+        let sent = requests(&end.sent());
+        assert_eq!(sent.len(), number);
+        for request in sent {
+            end.deliver(0, &response(request));
+        }
+        ended += poll(&end, &mut client).len();
+        ended += poll(&end, &mut client).len();
+    }
+    assert_eq!(ended, 5);
+}
+
+#[test]
+fn a_small_buffer_gathers_what_it_holds() {
+    let (end, mut client) = client();
+    client.line.means.outgoing = vec![0; 30];
+    client.line.means.frame = vec![0; 12];
+    for number in 1..=5 {
+        assert!(client.queue(read(1, number)).is_ok());
+    }
+    let mut ended = 0;
+    for _ in 0..20 {
+        for task in poll(&end, &mut client) {
+            assert_right(&task);
+            ended += 1;
+        }
+        for request in requests(&end.sent()) {
+            end.deliver(0, &response(request));
+        }
+    }
+    assert_eq!(ended, 5);
+}
+
+#[test]
+fn a_response_longer_than_the_buffer_is_passed_over_and_told() {
+    let (end, mut client) = client();
+    client.line.means.frame = vec![0; 12];
+    assert!(client.queue(read(1, 7)).is_ok());
+    let long = Task::new(1, 8, &[], |outline| {
+        outline.set(Form::READ_HOLDING_REGISTERS, 8, 20)
+    });
+    assert!(client.queue(long).is_ok());
+    poll(&end, &mut client);
+    let sent = requests(&end.sent());
+    let [a, b] = sent[1].0.to_be_bytes();
+    let mut frame = vec![a, b, 0, 0, 0, 43, 1, 3, 40];
+    frame.extend([0xA5; 40]);
+    end.deliver(0, &frame);
+    end.deliver(0, &response(sent[0]));
+    let mut ended = Vec::new();
+    for _ in 0..10 {
+        ended.extend(poll(&end, &mut client));
+    }
+    assert_eq!(ended[0].ticket.status, Status::BUFFER_TOO_SMALL);
+    assert_right(&ended[1]);
+}
+
+#[test]
+fn a_dead_link_ends_all_requests() {
+    let (end, mut client) = client();
+    for number in 1..=5 {
+        assert!(client.queue(read(1, number)).is_ok());
+    }
+    poll(&end, &mut client);
+    end.0.borrow_mut().dead = true;
+    let ended = poll(&end, &mut client);
+    assert_eq!(ended.len(), 5);
+    assert!(ended
+        .iter()
+        .all(|task| task.ticket.status == Status::LINK_LOST));
+    assert!(!client.is_connected());
+}
+
+#[test]
+fn a_reconnect_forgets_what_was_half_received() {
+    let (end, mut client) = client();
+    assert!(client.queue(read(1, 1)).is_ok());
+    poll(&end, &mut client);
+    let sent = requests(&end.sent());
+    end.deliver(0, &response(sent[0])[..9]);
+    poll(&end, &mut client);
+    assert!(client.queue(read(1, 2)).is_ok());
+    client.reconnect();
+    let ended = poll(&end, &mut client);
+    assert_eq!(
+        (ended[0].ticket.transaction, ended[0].ticket.status),
+        (1, Status::LINK_LOST)
+    );
+    let sent = requests(&end.sent());
+    assert_eq!(sent[0].2, 2);
+    end.deliver(0, &response(sent[0]));
+    assert_right(&poll(&end, &mut client)[0]);
+}
+
+#[test]
+fn a_cancelled_request_makes_room() {
+    let (end, mut client) = client();
+    client.line.limit(1);
+    assert!(client.queue(read(1, 1)).is_ok());
+    assert!(client.queue(read(1, 2)).is_ok());
+    poll(&end, &mut client);
+    let first = requests(&end.sent())[0];
+    assert!(client.cancel(|task| task.ticket.transaction == 1).is_some());
+    end.deliver(0, &response(first));
+    assert!(poll(&end, &mut client).is_empty());
+    end.deliver(0, &response(requests(&end.sent())[0]));
+    // What answers the first is dropped.
+    assert!(poll(&end, &mut client).is_empty());
+    assert_right(&poll(&end, &mut client)[0]);
+}
+
+#[test]
+fn a_port_that_takes_nothing_is_a_busy_line() {
+    let (end, mut client) = client();
+    end.0.borrow_mut().stuck = true;
+    assert!(client.queue(read(1, 1)).is_ok());
+    poll(&end, &mut client);
+    end.pass(2_000_000);
+    assert_eq!(poll(&end, &mut client)[0].ticket.status, Status::LINE_BUSY);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Responses come in any order and any pieces, some twice, some never, with
+    /// garbage between; each request ends once, right or not answered.
+    #[test]
+    fn every_request_ends_once_and_with_its_own_data(
+        script in prop::collection::vec((any::<u8>(), any::<u8>(), 0u8..12), 200),
+    ) {
+        let (end, mut client) = client();
+        let mut held: Vec<Vec<u8>> = Vec::new();
+        let (mut next, mut ended) = (0u16, Vec::new());
+        for (order, piece, fault) in script {
+            if client.queue(read(1 + order % 3, next + 1)).is_ok() {
+                next += 1;
+            }
+            held.extend(requests(&end.sent()).into_iter().map(response));
+            if !held.is_empty() {
+                let frame = held.swap_remove(usize::from(order) % held.len());
+                match fault {
+                    0 => {}
+                    1 => { end.deliver(0, &frame); end.deliver(0, &frame); }
+                    2 => { end.deliver(0, &vec![order | 1; usize::from(piece % 20)]); held.push(frame); }
+                    3 => {}
+                    _ => {
+                        let (front, back) = frame.split_at(usize::from(piece) % frame.len());
+                        end.deliver(0, front);
+                        end.deliver(0, back);
+                    }
+                }
+            }
+            end.0.borrow_mut().incoming.retain(|(_, bytes)| !bytes.is_empty());
+            end.pass(50_000);
+            ended.extend(poll(&end, &mut client));
+        }
+        held.clear();
+        for _ in 0..200 {
+            end.pass(50_000);
+            ended.extend(poll(&end, &mut client));
+        }
+        prop_assert_eq!(client.pending(), 0);
+        prop_assert_eq!(ended.len(), usize::from(next));
+        let mut numbers: Vec<u16> = ended.iter().map(|task| task.ticket.transaction).collect();
+        numbers.sort_unstable();
+        prop_assert_eq!(numbers, (1..=next).collect::<Vec<_>>());
+        for task in ended {
+            match task.ticket.status {
+                Status::OK => assert_right(&task),
+                other => prop_assert!(other.is_failure()),
+            }
+        }
+    }
+}

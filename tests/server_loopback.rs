@@ -1,0 +1,221 @@
+//! Our master asks our server over one wire, good and bad.
+
+mod common;
+
+use common::device::Device;
+use mbm::error::Status;
+use mbm::frame::Framing;
+use mbm::master::Master;
+use mbm::port::Port;
+use mbm::server::Server;
+use mbm::transaction::Storage;
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+/// Two ends and a clock; each byte takes a character at 115200 baud.
+#[derive(Default)]
+struct Wire {
+    now: u32,
+    to: [VecDeque<(u32, u8)>; 2],
+    /// One byte in so many is lost, or gets a bit changed; 0 is none.
+    lost: u32,
+    changed: u32,
+    random: u32,
+}
+
+const CHARACTER: u32 = 96;
+
+impl Wire {
+    fn chance(&mut self, one_in: u32) -> bool {
+        self.random = self
+            .random
+            .wrapping_mul(1_664_525)
+            .wrapping_add(1_013_904_223);
+        one_in != 0 && (self.random >> 8).is_multiple_of(one_in)
+    }
+}
+
+#[derive(Clone)]
+struct End(Rc<RefCell<Wire>>, usize);
+
+impl Port for End {
+    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+        let wire = &mut *self.0.borrow_mut();
+        let mut count = 0;
+        for place in bytes {
+            match wire.to[self.1].front() {
+                Some((at, byte)) if *at <= wire.now => *place = *byte,
+                _ => break,
+            }
+            wire.to[self.1].pop_front();
+            count += 1;
+        }
+        count
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> i16 {
+        let wire = &mut *self.0.borrow_mut();
+        let mut at = wire.now;
+        for byte in bytes {
+            at += CHARACTER;
+            if wire.chance(wire.lost) {
+                continue;
+            }
+            let bit = u8::from(wire.chance(wire.changed)) << (wire.random >> 28 & 7);
+            wire.to[1 - self.1].push_back((at, byte ^ bit));
+        }
+        bytes.len() as i16
+    }
+
+    fn micros(&mut self) -> u32 {
+        self.0.borrow().now
+    }
+
+    fn flush(&mut self) -> bool {
+        let wire = &*self.0.borrow();
+        wire.to[1 - self.1]
+            .back()
+            .is_none_or(|last| last.0 <= wire.now)
+    }
+}
+
+struct Buffers([u8; 256], [u16; 123], [u16; 125]);
+
+impl Storage for Buffers {
+    fn frame(&mut self) -> &mut [u8] {
+        &mut self.0
+    }
+    fn transmit(&mut self) -> &mut [u16] {
+        &mut self.1
+    }
+    fn response(&mut self) -> &mut [u16] {
+        &mut self.2
+    }
+    fn frame_and_transmit(&mut self) -> (&mut [u8], &[u16]) {
+        (&mut self.0, &self.1)
+    }
+    fn frame_and_response(&mut self) -> (&[u8], &mut [u16]) {
+        (&self.0, &mut self.2)
+    }
+}
+
+struct Loop {
+    wire: Rc<RefCell<Wire>>,
+    master: Master<End, Buffers>,
+    server: Server<End, [u8; 256]>,
+    device: Device,
+}
+
+impl Loop {
+    fn new() -> Self {
+        let wire = Rc::new(RefCell::new(Wire::default()));
+        let buffers = Buffers([0; 256], [0; 123], [0; 125]);
+        let mut master = Master::new(17, End(wire.clone(), 0), buffers);
+        master.set_baud_rate(115_200);
+        master.settings().response_timeout = 100_000;
+        let mut server = Server::with_framing(Framing::Rtu, End(wire.clone(), 1), [0; 256]);
+        server.set_silence(mbm::time::silence(115_200));
+        Loop {
+            wire,
+            master,
+            server,
+            device: Device::new(),
+        }
+    }
+
+    /// Sees a request through.
+    fn finish(&mut self, started: Status) -> Status {
+        let mut status = started;
+        while status == Status::PENDING {
+            self.wire.borrow_mut().now += 50;
+            let now = self.wire.borrow().now;
+            let server = &mut self.server;
+            self.device
+                .with_unit(|unit| server.serve(now, &mut [unit][..]));
+            status = self.master.poll();
+        }
+        status
+    }
+}
+
+#[test]
+fn every_function_of_the_master_is_answered() {
+    let mut line = Loop::new();
+    let started = line.master.read_holding_registers(100, 10);
+    assert_eq!(line.finish(started), Status::OK);
+    assert_eq!(line.master.response_word(9), 0x1009);
+    let started = line.master.read_input_registers(100, 10);
+    assert_eq!(line.finish(started), Status::OK);
+    assert_eq!(line.master.response_word(9), 0x2009);
+    let started = line.master.read_coils(100, 20);
+    assert_eq!(line.finish(started), Status::OK);
+    assert_eq!(line.master.response_word(0), 0x9249);
+    let started = line.master.read_discrete_inputs(100, 20);
+    assert_eq!(line.finish(started), Status::OK);
+    assert_eq!(line.master.response_word(1), 0b1011);
+    let started = line.master.write_single_register(100, 7);
+    assert_eq!(line.finish(started), Status::OK);
+    let started = line.master.write_single_coil(101, 1);
+    assert_eq!(line.finish(started), Status::OK);
+    line.master.set_transmit_word(0, 0xABCD);
+    line.master.set_transmit_word(1, 0x1234);
+    let started = line.master.write_multiple_registers(103, 2);
+    assert_eq!(line.finish(started), Status::OK);
+    let started = line.master.write_multiple_coils(104, 16);
+    assert_eq!(line.finish(started), Status::OK);
+    let started = line.master.mask_write_register(100, 0, 0x0FF0);
+    assert_eq!(line.finish(started), Status::OK);
+    line.master.set_transmit_word(0, 0xABCD);
+    let started = line.master.read_write_multiple_registers(100, 4, 102, 1);
+    assert_eq!(line.finish(started), Status::OK);
+    let words: Vec<u16> = (0..4).map(|at| line.master.response_word(at)).collect();
+    assert_eq!(words, [0x0FF0, 0x1001, 0xABCD, 0xABCD]);
+    assert_eq!(line.device.holding[4], 0x1234);
+    let started = line.master.read_holding_registers(110, 1);
+    assert_eq!(line.finish(started), Status::ILLEGAL_DATA_ADDRESS);
+}
+
+#[test]
+fn a_bad_wire_costs_requests_but_never_a_wrong_value() {
+    for (lost, changed) in [(40, 0), (0, 40), (80, 80)] {
+        let mut line = Loop::new();
+        (line.wire.borrow_mut().lost, line.wire.borrow_mut().changed) = (lost, changed);
+        line.master.settings().retries = 2;
+        let (mut right, mut value) = (0, [0u16; 10]);
+        value.copy_from_slice(&line.device.holding);
+        for round in 0..500u16 {
+            let cell = usize::from(round % 10);
+            let started = line.master.write_single_register(100 + round % 10, round);
+            let wrote = line.finish(started);
+            if wrote == Status::OK {
+                value[cell] = round;
+            }
+            // A write whose answer was lost may have been carried out.
+            let held = line.device.holding[cell];
+            assert!(held == value[cell] || (wrote != Status::OK && held == round));
+            value[cell] = held;
+            let started = line.master.read_holding_registers(100, 10);
+            if line.finish(started) == Status::OK {
+                right += 1;
+                for (at, wanted) in value.iter().enumerate() {
+                    assert_eq!(line.master.response_word(at), *wanted, "{round}");
+                }
+            }
+        }
+        assert!(right > 300, "{right} of 500 with {lost} {changed}");
+    }
+}
+
+#[test]
+fn after_the_wire_is_good_again_the_next_request_is_answered() {
+    let mut line = Loop::new();
+    for round in 0..200 {
+        line.wire.borrow_mut().changed = 6;
+        let started = line.master.read_holding_registers(100, 10);
+        line.finish(started);
+        line.wire.borrow_mut().changed = 0;
+        let started = line.master.read_holding_registers(100, 10);
+        assert_eq!(line.finish(started), Status::OK, "{round}");
+    }
+}

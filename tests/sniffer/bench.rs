@@ -1,0 +1,124 @@
+//! A sniffer with its buffer and a clock, and all that it told.
+
+use mbm::error::Status;
+use mbm::explain::Line;
+use mbm::frame::{ascii, Framing};
+use mbm::pdu::custom::Function;
+use mbm::sniffer::{Kind, Sniffer, Tap};
+
+/// An event, kept.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Told {
+    pub kind: Kind,
+    pub status: Status,
+    pub time: u32,
+    pub response_time: u32,
+    pub unit: u8,
+    pub function: u8,
+    pub pdu: Vec<u8>,
+    pub frame: Vec<u8>,
+    pub length: usize,
+    pub transaction: u16,
+    pub asked: Option<(u16, u16)>,
+    pub words: String,
+}
+
+/// A sniffer with its buffer, and all that it told.
+pub struct Bench {
+    pub sniffer: Sniffer,
+    pub buffer: Vec<u8>,
+    pub functions: Vec<Function>,
+    pub now: u32,
+    pub told: Vec<Told>,
+}
+
+impl Bench {
+    pub fn new(framing: Framing) -> Self {
+        Bench::with_buffer(framing, framing.max_frame())
+    }
+
+    pub fn with_buffer(framing: Framing, size: usize) -> Self {
+        Bench {
+            sniffer: Sniffer::new(framing),
+            buffer: vec![0; size],
+            functions: Vec::new(),
+            now: 0,
+            told: Vec::new(),
+        }
+    }
+
+    pub fn listen(&mut self) {
+        while let Some(event) = self
+            .sniffer
+            .next(&mut self.buffer, &self.functions, self.now)
+        {
+            let mut text = [0; 2000];
+            let mut line = Line::new(&mut text);
+            event.explain(&mut line);
+            let length = line.finish().unwrap();
+            self.told.push(Told {
+                kind: event.kind,
+                status: event.status,
+                time: event.time,
+                response_time: event.response_time,
+                unit: event.unit,
+                function: event.function,
+                pdu: event.pdu.to_vec(),
+                frame: event.frame.to_vec(),
+                length: event.length,
+                transaction: event.transaction,
+                asked: event.asked.map(|asked| (asked.address(), asked.quantity())),
+                words: String::from_utf8(text[..length].to_vec()).unwrap(),
+            });
+        }
+    }
+
+    pub fn feed_at(&mut self, tap: Tap, bytes: &[u8]) {
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            let taken = self.sniffer.feed(&mut self.buffer, tap, rest, self.now);
+            let before = self.told.len();
+            self.listen();
+            assert!(taken > 0 || self.told.len() > before, "no progress");
+            rest = &rest[taken..];
+        }
+    }
+
+    /// Bytes that arrive now.
+    pub fn feed(&mut self, bytes: &[u8]) {
+        self.feed_at(Tap::Both, bytes);
+    }
+
+    /// Time without bytes.
+    pub fn wait(&mut self, time: u32) {
+        self.now = self.now.wrapping_add(time);
+        self.listen();
+    }
+
+    pub fn kinds(&self) -> Vec<Kind> {
+        self.told.iter().map(|told| told.kind).collect()
+    }
+
+    pub fn words(&self) -> Vec<&str> {
+        self.told.iter().map(|told| told.words.as_str()).collect()
+    }
+
+    /// Requests and what answers them, without what is told of silence.
+    pub fn frames(&self) -> Vec<(Kind, Vec<u8>)> {
+        let frames = self.told.iter().filter(|told| told.kind != Kind::Timeout);
+        frames.map(|told| (told.kind, told.pdu.clone())).collect()
+    }
+}
+
+pub fn frame(framing: Framing, transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
+    let mut buffer = [0; 600];
+    let length = framing.emit(&mut buffer, transaction, unit, ascii::END, |place| {
+        place[..pdu.len()].copy_from_slice(pdu);
+        Ok(pdu.len())
+    });
+    buffer[..length.unwrap()].to_vec()
+}
+
+pub fn rtu(unit: u8, pdu: &[u8]) -> Vec<u8> {
+    frame(Framing::Rtu, 0, unit, pdu)
+}

@@ -1,0 +1,371 @@
+//! What is paired, in each framing and however bytes come.
+
+use crate::bench::{frame, rtu, Bench};
+use crate::exchanges::{assert_exchanges, EXCHANGES, READ, READ_REPLY, WRITE};
+use mbm::error::Status;
+use mbm::frame::Framing;
+use mbm::pdu::custom::{Function, Rule};
+use mbm::sniffer::{Kind, Tap};
+
+#[test]
+fn every_function_is_told_of_in_every_framing() {
+    for framing in [
+        Framing::Rtu,
+        Framing::Ascii,
+        Framing::Tcp,
+        Framing::RtuOverTcp,
+    ] {
+        let mut bench = Bench::new(framing);
+        for (index, (request, reply, ..)) in EXCHANGES.iter().enumerate() {
+            bench.feed(&frame(framing, index as u16, 17, request));
+            bench.wait(10_000);
+            bench.feed(&frame(framing, index as u16, 17, reply));
+            bench.wait(10_000);
+        }
+        bench.wait(2_000_000);
+        assert_exchanges(&bench, EXCHANGES);
+        for told in &bench.told {
+            let response_time = if told.kind == Kind::Reply { 10_000 } else { 0 };
+            assert_eq!(told.response_time, response_time);
+        }
+    }
+}
+
+#[test]
+fn bytes_may_come_one_by_one() {
+    for framing in [Framing::Rtu, Framing::Ascii, Framing::Tcp] {
+        let mut bench = Bench::new(framing);
+        bench.sniffer.set_baud_rate(9_600);
+        for (index, (request, reply, ..)) in EXCHANGES.iter().enumerate() {
+            for pdu in [request, reply] {
+                for byte in frame(framing, index as u16, 17, pdu) {
+                    bench.wait(1_146);
+                    bench.feed(&[byte]);
+                }
+                bench.wait(5_000);
+            }
+        }
+        bench.wait(2_000_000);
+        assert_exchanges(&bench, EXCHANGES);
+    }
+}
+
+#[test]
+fn all_frames_may_come_at_once() {
+    for framing in [Framing::Rtu, Framing::Ascii, Framing::Tcp] {
+        let mut bench = Bench::new(framing);
+        let mut bytes = Vec::new();
+        for (index, (request, reply, ..)) in EXCHANGES.iter().enumerate() {
+            bytes.extend(frame(framing, index as u16, 17, request));
+            bytes.extend(frame(framing, index as u16, 17, reply));
+        }
+        bench.feed(&bytes);
+        bench.wait(2_000_000);
+        assert_exchanges(&bench, EXCHANGES);
+    }
+}
+
+#[test]
+fn a_frame_in_pieces_with_pauses_is_still_a_frame() {
+    let mut bench = Bench::new(Framing::Rtu);
+    let mut bytes = rtu(17, READ);
+    bytes.extend(rtu(17, READ_REPLY));
+    for piece in bytes.chunks(3) {
+        bench.feed(piece);
+        bench.wait(16_000);
+    }
+    assert_eq!(bench.kinds(), [Kind::Request, Kind::Reply]);
+}
+
+#[test]
+fn a_request_that_is_repeated_was_not_answered() {
+    let mut bench = Bench::new(Framing::Rtu);
+    bench.feed(&rtu(17, READ));
+    bench.wait(300_000);
+    bench.feed(&rtu(17, READ));
+    bench.wait(10_000);
+    bench.feed(&rtu(17, READ_REPLY));
+    bench.wait(2_000_000);
+    let kinds = [Kind::Request, Kind::Timeout, Kind::Request, Kind::Reply];
+    assert_eq!(bench.kinds(), kinds);
+    assert_eq!(
+        bench.told[1].words,
+        "unit 17  timeout    03 read holding registers  107..109"
+    );
+    assert_eq!(
+        (bench.told[1].time, bench.told[1].response_time),
+        (300_000, 300_000)
+    );
+    assert_eq!(bench.told[3].asked, Some((107, 3)));
+}
+
+#[test]
+fn an_echo_that_equals_its_request_is_the_reply_and_after_the_timeout_a_request() {
+    for pdu in [
+        WRITE,
+        &[5, 0, 172, 0, 0],
+        &[0x16, 0, 4, 0, 0xF2, 0, 0x25],
+        &[8, 0, 1, 0, 0],
+    ] {
+        let mut bench = Bench::new(Framing::Rtu);
+        bench.feed(&rtu(17, pdu));
+        bench.wait(10_000);
+        bench.feed(&rtu(17, pdu));
+        bench.wait(10_000);
+        bench.feed(&rtu(17, pdu));
+        bench.wait(1_000_000);
+        bench.feed(&rtu(17, pdu));
+        let kinds = [
+            Kind::Request,
+            Kind::Reply,
+            Kind::Request,
+            Kind::Timeout,
+            Kind::Request,
+        ];
+        assert_eq!(bench.kinds(), kinds);
+    }
+}
+
+#[test]
+fn a_reply_as_long_as_a_request_is_told_apart_by_what_was_asked() {
+    // 19 coils make a reply of the length of a request for coils from 0x03CD on.
+    let (request, reply) = ([1, 3, 0x10, 0, 19], [1, 3, 0xCD, 0, 5]);
+    let mut bench = Bench::new(Framing::Rtu);
+    for _ in 0..2 {
+        bench.feed(&rtu(17, &request));
+        bench.feed(&rtu(17, &reply));
+    }
+    bench.feed(&rtu(17, &request));
+    bench.feed(&rtu(17, &request));
+    bench.feed(&rtu(17, &reply));
+    bench.feed(&rtu(17, &reply));
+    use Kind::{Reply, Request, Timeout};
+    let kinds = [
+        Request, Reply, Request, Reply, Request, Timeout, Request, Reply, Request,
+    ];
+    assert_eq!(bench.kinds(), kinds);
+}
+
+#[test]
+fn a_late_reply_is_unpaired_and_its_request_still_explains_it() {
+    let mut bench = Bench::new(Framing::Rtu);
+    bench.sniffer.set_timeout(100_000);
+    bench.feed(&rtu(17, READ));
+    bench.wait(150_000);
+    bench.feed(&rtu(17, READ_REPLY));
+    bench.wait(10_000);
+    bench.feed(&rtu(17, READ_REPLY));
+    assert_eq!(
+        bench.kinds(),
+        [Kind::Request, Kind::Timeout, Kind::Unpaired, Kind::Unpaired]
+    );
+    assert_eq!(bench.told[2].response_time, 150_000);
+    assert_eq!(
+        bench.words()[2..],
+        [
+            "unit 17  unpaired   03 read holding registers  107..109: 555 0 100",
+            "unit 17  unpaired   03 read holding registers: 555 0 100",
+        ]
+    );
+}
+
+#[test]
+fn a_reply_that_comes_too_late_in_one_piece_with_others_is_late_all_the_same() {
+    let mut bench = Bench::new(Framing::Rtu);
+    bench.feed(&rtu(17, READ));
+    bench.now = 1_500_000;
+    bench.feed(&rtu(17, READ_REPLY));
+    assert_eq!(
+        bench.kinds(),
+        [Kind::Request, Kind::Timeout, Kind::Unpaired]
+    );
+}
+
+#[test]
+fn a_reply_that_does_not_answer_what_was_asked_is_unpaired_and_malformed() {
+    let mut bench = Bench::new(Framing::Rtu);
+    bench.feed(&rtu(17, READ));
+    bench.feed(&rtu(17, &[3, 2, 0, 1]));
+    bench.feed(&rtu(17, READ_REPLY));
+    assert_eq!(bench.kinds(), [Kind::Request, Kind::Unpaired, Kind::Reply]);
+    assert_eq!(bench.told[1].status, Status::MALFORMED_REPLY);
+}
+
+#[test]
+fn units_in_turn_are_kept_apart() {
+    let mut bench = Bench::new(Framing::Rtu);
+    for round in 0..4 {
+        for unit in [1, 2, 247] {
+            bench.feed(&rtu(unit, &[3, unit, round, 0, 1]));
+            bench.feed(&rtu(unit, &[3, 2, unit, round]));
+        }
+    }
+    assert_eq!(bench.told.len(), 24);
+    for pair in bench.told.chunks(2) {
+        assert_eq!((pair[0].kind, pair[1].kind), (Kind::Request, Kind::Reply));
+        assert_eq!(pair[0].unit, pair[1].unit);
+        let address = u16::from_be_bytes([pair[0].pdu[1], pair[0].pdu[2]]);
+        assert_eq!(pair[1].asked, Some((address, 1)));
+    }
+}
+
+#[test]
+fn a_second_master_that_cuts_in_ends_the_first_ones_wait() {
+    let mut bench = Bench::new(Framing::Rtu);
+    bench.feed(&rtu(1, READ));
+    bench.feed(&rtu(2, READ));
+    bench.feed(&rtu(2, READ_REPLY));
+    bench.feed(&rtu(1, READ_REPLY));
+    let kinds = [
+        Kind::Request,
+        Kind::Timeout,
+        Kind::Request,
+        Kind::Reply,
+        Kind::Unpaired,
+    ];
+    assert_eq!(bench.kinds(), kinds);
+    let units: Vec<_> = bench.told.iter().map(|told| told.unit).collect();
+    assert_eq!(units, [1, 1, 2, 2, 1]);
+    assert_eq!(bench.told[4].asked, Some((107, 3)));
+}
+
+#[test]
+fn tcp_requests_wait_side_by_side() {
+    let mut bench = Bench::new(Framing::Tcp);
+    for transaction in 0..16 {
+        bench.feed(&frame(
+            Framing::Tcp,
+            transaction,
+            17,
+            &[3, 0, transaction as u8, 0, 1],
+        ));
+    }
+    for transaction in (0..16).rev() {
+        bench.feed(&frame(
+            Framing::Tcp,
+            transaction,
+            17,
+            &[3, 2, 0, transaction as u8],
+        ));
+    }
+    bench.wait(2_000_000);
+    assert_eq!(bench.told.len(), 32);
+    for told in &bench.told[16..] {
+        assert_eq!(told.kind, Kind::Reply);
+        assert_eq!(told.asked, Some((told.transaction, 1)));
+    }
+    // A 17th ends the first.
+    for transaction in 0..17 {
+        bench.feed(&frame(Framing::Tcp, transaction, 17, READ));
+    }
+    assert_eq!(bench.told[48].kind, Kind::Timeout);
+    assert_eq!(bench.told[48].transaction, 0);
+    assert_eq!(bench.told.len(), 50);
+}
+
+#[test]
+fn directions_may_be_heard_apart_byte_by_byte_and_mixed() {
+    for framing in [Framing::Rtu, Framing::Ascii, Framing::Tcp] {
+        let mut bench = Bench::with_buffer(framing, 2 * framing.max_frame());
+        // The echo of a write is never a request here.
+        bench.feed_at(Tap::Server, &frame(framing, 1, 17, WRITE));
+        bench.wait(10_000);
+        let (request, other) = (
+            frame(framing, 2, 17, READ),
+            frame(framing, 1, 17, READ_REPLY),
+        );
+        for (index, byte) in request.iter().enumerate() {
+            bench.feed_at(Tap::Client, &[*byte]);
+            if let Some(byte) = other.get(index) {
+                bench.feed_at(Tap::Server, &[*byte]);
+            }
+        }
+        bench.feed_at(Tap::Server, &other[request.len().min(other.len())..]);
+        bench.wait(10_000);
+        bench.feed_at(Tap::Server, &frame(framing, 2, 17, READ_REPLY));
+        let kinds = bench.kinds();
+        assert_eq!(kinds[0], Kind::Unpaired, "{framing:?} {kinds:?}");
+        assert_eq!(
+            kinds.iter().filter(|kind| **kind == Kind::Request).count(),
+            1
+        );
+        assert_eq!(kinds.iter().filter(|kind| **kind == Kind::Reply).count(), 1);
+        assert_eq!(kinds.len(), 4);
+    }
+}
+
+#[test]
+fn broadcasts_and_listen_only_are_never_timeouts() {
+    for (framing, unit, pdu) in [
+        (Framing::Rtu, 0, WRITE),
+        (Framing::Ascii, 0, WRITE),
+        (Framing::Rtu, 17, &[8, 0, 4, 0, 0]),
+        (Framing::Tcp, 17, &[8, 0, 4, 0, 0]),
+    ] {
+        let mut bench = Bench::new(framing);
+        bench.feed(&frame(framing, 1, unit, pdu));
+        bench.wait(10_000);
+        bench.feed(&frame(framing, 2, 17, READ));
+        bench.feed(&frame(framing, 2, 17, READ_REPLY));
+        bench.wait(3_000_000);
+        assert_eq!(bench.kinds(), [Kind::Request, Kind::Request, Kind::Reply]);
+    }
+}
+
+#[test]
+fn a_broadcast_that_is_repeated_is_a_request_each_time() {
+    let mut bench = Bench::new(Framing::Rtu);
+    bench.feed(&rtu(0, WRITE));
+    bench.feed(&rtu(0, WRITE));
+    assert_eq!(bench.kinds(), [Kind::Request; 2]);
+}
+
+#[test]
+fn a_request_is_given_up_just_when_the_timeout_has_passed() {
+    let mut bench = Bench::new(Framing::Tcp);
+    bench.sniffer.set_timeout(50_000);
+    bench.feed(&frame(Framing::Tcp, 1, 17, READ));
+    bench.wait(49_999);
+    assert_eq!(bench.told.len(), 1);
+    bench.wait(1);
+    assert_eq!(bench.kinds(), [Kind::Request, Kind::Timeout]);
+}
+
+#[test]
+fn the_rate_tells_when_each_of_several_frames_in_one_piece_ended() {
+    let mut bench = Bench::new(Framing::Rtu);
+    bench.sniffer.set_baud_rate(9_600);
+    let mut bytes = rtu(17, READ);
+    bytes.extend(rtu(17, READ_REPLY));
+    bench.now = 1_000_000;
+    bench.feed(&bytes);
+    assert_eq!(bench.told[1].time, 1_000_000);
+    assert_eq!(bench.told[0].time, 1_000_000 - 11 * 1_146);
+    assert_eq!(bench.told[1].response_time, 11 * 1_146);
+}
+
+#[test]
+fn a_declared_function_needs_no_silence() {
+    let own = Function {
+        code: 0x55,
+        request: Rule::Fixed(3),
+        response: Rule::Counted(1, 0),
+    };
+    let mut bench = Bench::new(Framing::Rtu);
+    bench.functions = vec![own];
+    bench.feed(&rtu(17, &[0x55, 1, 2]));
+    bench.feed(&rtu(17, &[0x55, 3, 7, 8, 9]));
+    assert_eq!(bench.kinds(), [Kind::Request, Kind::Reply]);
+    assert_eq!(bench.told[0].status, Status::OK);
+}
+
+#[test]
+fn a_frame_between_silences_may_be_longer_than_it_counts() {
+    let mut bench = Bench::new(Framing::Rtu);
+    bench.feed(&rtu(17, &[0x11]));
+    bench.wait(10_000);
+    bench.feed(&rtu(17, &[0x11, 1, 0xFF, b'm', b'b', b'm']));
+    bench.wait(10_000);
+    assert_eq!(bench.kinds(), [Kind::Request, Kind::Reply]);
+    assert_eq!(bench.told[1].status, Status::OK);
+}

@@ -1,0 +1,253 @@
+//! What is damaged, refused, too long or no frame at all.
+
+use crate::bench::{frame, rtu, Bench};
+use crate::exchanges::{READ, READ_REPLY};
+use mbm::error::Status;
+use mbm::explain::Line;
+use mbm::frame::Framing;
+use mbm::sniffer::{Kind, Tap};
+
+#[test]
+fn exceptions_are_told_in_words_with_their_code() {
+    for framing in [Framing::Rtu, Framing::Ascii, Framing::Tcp] {
+        for (code, words) in [
+            (1, "01 illegal function"),
+            (2, "02 illegal data address"),
+            (3, "03 illegal data value"),
+            (4, "04 server device failure"),
+            (5, "05 acknowledge"),
+            (6, "06 server device busy"),
+            (8, "08 memory parity error"),
+            (10, "0A gateway path unavailable"),
+            (11, "0B gateway target device failed to respond"),
+            (0x7F, "7F unknown code"),
+        ] {
+            let mut bench = Bench::new(framing);
+            bench.feed(&frame(framing, 1, 17, READ));
+            bench.feed(&frame(framing, 1, 17, &[0x83, code]));
+            bench.feed(&frame(framing, 1, 17, &[0x83, code]));
+            assert_eq!(
+                bench.kinds(),
+                [Kind::Request, Kind::Exception, Kind::Unpaired]
+            );
+            let wanted = format!("03 read holding registers: exception {words}");
+            assert_eq!(bench.told[1].words, format!("unit 17  exception  {wanted}"));
+            assert_eq!(bench.told[1].status.code(), code);
+            assert_eq!(
+                (bench.told[2].function, bench.told[2].status.code()),
+                (3, code)
+            );
+        }
+    }
+}
+
+#[test]
+fn a_request_that_a_server_refuses_is_told_with_the_fault() {
+    let mut bench = Bench::new(Framing::Rtu);
+    bench.feed(&rtu(17, &[3, 0, 0, 0, 200]));
+    bench.feed(&rtu(17, &[0x83, 3]));
+    assert_eq!(bench.kinds(), [Kind::Request, Kind::Exception]);
+    assert_eq!(bench.told[0].status, Status::ILLEGAL_DATA_VALUE);
+    assert_eq!(
+        bench.told[0].words,
+        "unit 17  request    03 read holding registers, malformed: 00 00 00 C8"
+    );
+}
+
+#[test]
+fn a_damaged_request_or_reply_is_told_and_the_next_frame_is_found() {
+    for damaged in 0..3 {
+        let mut frames = [
+            rtu(17, READ),
+            rtu(17, READ_REPLY),
+            rtu(17, READ),
+            rtu(17, READ_REPLY),
+        ];
+        frames[damaged][4] ^= 0x10;
+        for silent in [false, true] {
+            let mut bench = Bench::new(Framing::Rtu);
+            for frame in &frames {
+                bench.feed(frame);
+                bench.wait(if silent { 5_000 } else { 0 });
+            }
+            bench.wait(100_000);
+            let found: Vec<_> = bench.kinds();
+            use Kind::{BadCrc, Reply, Request, Timeout, Unpaired};
+            let wanted = match damaged {
+                0 => vec![BadCrc, Unpaired, Request, Reply],
+                1 => vec![Request, BadCrc, Timeout, Request, Reply],
+                _ => vec![Request, Reply, BadCrc, Unpaired],
+            };
+            assert_eq!(found, wanted, "{damaged} {silent}");
+            let told = bench.told.iter().find(|told| told.kind == BadCrc).unwrap();
+            assert_eq!(
+                (told.unit, told.function, told.status),
+                (17, 3, Status::INVALID_CRC)
+            );
+            assert_eq!(told.frame, frames[damaged]);
+            assert_eq!(
+                told.words,
+                format!("bad CRC, {} bytes", frames[damaged].len())
+            );
+        }
+    }
+}
+
+#[test]
+fn an_ascii_frame_with_a_wrong_lrc_is_a_damaged_frame() {
+    let mut bench = Bench::new(Framing::Ascii);
+    let mut frame = frame(Framing::Ascii, 0, 17, READ);
+    frame[4] = b'4';
+    bench.feed(&frame);
+    bench.feed(&self::frame(Framing::Ascii, 0, 17, READ));
+    assert_eq!(bench.kinds(), [Kind::BadCrc, Kind::Request]);
+    assert_eq!((bench.told[0].unit, bench.told[0].function), (17, 4));
+    assert_eq!(bench.told[0].length, 17);
+}
+
+#[test]
+fn ascii_frames_without_an_end_or_with_other_characters_are_noise() {
+    let good = frame(Framing::Ascii, 0, 17, READ);
+    for bad in [
+        &b":1103006B0003"[..],
+        b":11G3006B00037E\r\n",
+        b":1103006B0003E\r\n",
+        b"garbage\r\n",
+        b":11\r\n",
+    ] {
+        let mut bench = Bench::new(Framing::Ascii);
+        bench.feed(bad);
+        bench.feed(&good);
+        bench.wait(100);
+        assert_eq!(bench.kinds(), [Kind::Noise, Kind::Request], "{bad:?}");
+        assert_eq!(bench.told[0].length, bad.len());
+        assert_eq!(bench.told[0].frame, bad);
+    }
+}
+
+#[test]
+fn another_end_character_of_ascii_can_be_set() {
+    let mut bench = Bench::new(Framing::Ascii);
+    bench.sniffer.set_end(b'!');
+    let mut frame = frame(Framing::Ascii, 0, 17, READ);
+    *frame.last_mut().unwrap() = b'!';
+    bench.feed(&frame);
+    assert_eq!(bench.kinds(), [Kind::Request]);
+}
+
+#[test]
+fn noise_before_and_behind_a_frame_is_counted() {
+    for silent in [0, 5_000] {
+        let mut bench = Bench::new(Framing::Rtu);
+        bench.feed(&[0xFF, 0xFF, 0x00]);
+        bench.wait(silent);
+        bench.feed(&rtu(17, READ));
+        bench.wait(silent);
+        bench.feed(&[0xFE]);
+        bench.wait(silent);
+        bench.feed(&rtu(17, READ_REPLY));
+        bench.wait(silent);
+        bench.feed(&[0xFF, 0xFF]);
+        bench.wait(100_000);
+        let kinds = [
+            Kind::Noise,
+            Kind::Request,
+            Kind::Noise,
+            Kind::Reply,
+            Kind::Noise,
+        ];
+        assert_eq!(bench.kinds(), kinds);
+        assert_eq!(bench.words()[0], "noise, 3 bytes");
+        assert_eq!(bench.words()[2], "noise, 1 byte");
+        assert_eq!(bench.told[4].length, 2);
+    }
+}
+
+#[test]
+fn a_tcp_stream_that_is_joined_in_the_middle_is_found_again() {
+    let mut bench = Bench::new(Framing::Tcp);
+    let tail = [0x02, 0x2B, 0x17, 0x64];
+    bench.feed(&tail);
+    bench.feed(&frame(Framing::Tcp, 0x1234, 17, READ));
+    bench.wait(100);
+    assert_eq!(bench.kinds(), [Kind::Noise, Kind::Request]);
+    assert_eq!(bench.told[0].length, 4);
+}
+
+#[test]
+fn the_clock_may_wrap() {
+    let mut bench = Bench::new(Framing::Rtu);
+    bench.now = u32::MAX - 5_000;
+    bench.feed(&rtu(17, READ));
+    bench.wait(10_000);
+    bench.feed(&rtu(17, READ_REPLY));
+    bench.now = u32::MAX - 5_000;
+    bench.feed(&rtu(17, READ));
+    bench.wait(1_000_000);
+    assert_eq!(
+        bench.kinds(),
+        [Kind::Request, Kind::Reply, Kind::Request, Kind::Timeout]
+    );
+    assert_eq!(bench.told[1].response_time, 10_000);
+    assert_eq!(bench.told[3].response_time, 1_000_000);
+}
+
+#[test]
+fn a_frame_longer_than_the_buffer_is_told_and_the_next_is_found() {
+    let long: Vec<u8> = [&[3, 200][..], &[7; 200]].concat();
+    for framing in [Framing::Rtu, Framing::Ascii, Framing::Tcp] {
+        let mut bench = Bench::with_buffer(framing, 64);
+        bench.feed(&frame(framing, 1, 17, &[3, 0, 0, 0, 100]));
+        bench.wait(10_000);
+        bench.feed(&frame(framing, 1, 17, &long));
+        bench.wait(10_000);
+        bench.feed(&frame(framing, 2, 17, READ));
+        bench.feed(&frame(framing, 2, 17, READ_REPLY));
+        let kinds = bench.kinds();
+        let told = &bench.told;
+        let good: Vec<_> = kinds
+            .iter()
+            .filter(|kind| **kind != Kind::Noise && **kind != Kind::Timeout)
+            .collect();
+        assert_eq!(
+            good,
+            [&Kind::Request, &Kind::Request, &Kind::Reply],
+            "{framing:?} {:?}",
+            bench.words()
+        );
+        assert!(told
+            .iter()
+            .any(|told| told.status == Status::BUFFER_TOO_SMALL));
+        let noise: usize = told
+            .iter()
+            .filter(|told| told.kind == Kind::Noise)
+            .map(|told| told.length)
+            .sum();
+        assert_eq!(noise, frame(framing, 1, 17, &long).len());
+    }
+}
+
+#[test]
+fn a_buffer_too_small_for_the_words_is_said() {
+    let mut bench = Bench::new(Framing::Rtu);
+    let bytes = rtu(17, READ);
+    bench.sniffer.feed(&mut bench.buffer, Tap::Both, &bytes, 0);
+    let event = bench.sniffer.next(&mut bench.buffer, &[], 0).unwrap();
+    let mut text = [0xEE; 20];
+    let mut line = Line::new(&mut text);
+    event.explain(&mut line);
+    assert_eq!(line.finish(), Err(Status::BUFFER_TOO_SMALL));
+    assert_eq!(&text, b"unit 17  request   \0");
+}
+
+#[test]
+fn an_exception_with_a_code_that_there_cannot_be_is_no_request() {
+    for framing in [Framing::Rtu, Framing::Ascii, Framing::Tcp] {
+        let mut bench = Bench::new(framing);
+        bench.feed(&frame(framing, 1, 17, READ));
+        bench.feed(&frame(framing, 2, 18, &[0x83, 0]));
+        bench.wait(100);
+        assert_eq!(bench.kinds(), [Kind::Request, Kind::Unpaired]);
+        assert_eq!(bench.told[1].status, Status::MALFORMED_REPLY);
+    }
+}

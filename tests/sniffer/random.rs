@@ -1,0 +1,169 @@
+//! Random traffic, random noise, random bytes.
+
+use crate::bench::{frame, rtu, Bench};
+use crate::exchanges::EXCHANGES;
+use mbm::frame::checksum::crc16;
+use mbm::frame::Framing;
+use mbm::sniffer::{Kind, Tap};
+use proptest::prelude::*;
+
+/// Noise, an exchange, and silence behind each.
+type Traffic = Vec<(Vec<u8>, usize, u32)>;
+
+fn traffic() -> impl Strategy<Value = Traffic> {
+    let noise = prop::collection::vec(any::<u8>(), 0..12);
+    let silence = prop_oneof![Just(0), Just(5_000)];
+    prop::collection::vec((noise, 0..EXCHANGES.len(), silence), 1..8)
+}
+
+/// True if noise with what follows it happens to be a frame, or noise with
+/// what follows is one's beginning that swallows: a right CRC over bytes
+/// that begin in noise.
+fn is_accident(bytes: &[u8], noise: &[(usize, usize)]) -> bool {
+    noise.iter().any(|(start, end)| {
+        (*start..*end).any(|from| {
+            (4..=256).any(|length| {
+                bytes
+                    .get(from..from + length)
+                    .is_some_and(|frame| crc16(frame).is_residue())
+            })
+        })
+    })
+}
+
+proptest! {
+    #[test]
+    fn rtu_frames_between_noise_are_found_in_order_and_nothing_is_invented(
+        traffic in traffic(),
+        piece in 1usize..300,
+    ) {
+        let mut bytes = Vec::new();
+        let mut noise = Vec::new();
+        let mut wanted = Vec::new();
+        for (before, which, _) in &traffic {
+            // Frames that only silence ends are found between silences alone.
+            let (request, reply, ..) = EXCHANGES[*which % 7];
+            noise.push((bytes.len(), bytes.len() + before.len()));
+            bytes.extend(before);
+            bytes.extend(rtu(17, request));
+            bytes.extend(rtu(17, reply));
+            wanted.push((Kind::Request, request.to_vec()));
+            wanted.push((Kind::Reply, reply.to_vec()));
+        }
+        prop_assume!(!is_accident(&bytes, &noise));
+        let mut bench = Bench::new(Framing::Rtu);
+        for some in bytes.chunks(piece) {
+            bench.feed(some);
+            bench.now += 1_000;
+        }
+        bench.wait(100_000);
+        let found: Vec<_> = bench
+            .frames()
+            .into_iter()
+            .filter(|(kind, _)| !matches!(kind, Kind::Noise | Kind::BadCrc))
+            .collect();
+        prop_assert_eq!(found, wanted);
+        let told: usize = bench.told.iter().map(|told| told.length).sum();
+        prop_assert_eq!(told, bytes.len());
+    }
+
+    #[test]
+    fn every_function_is_found_between_silences_with_noise_in_the_gaps(
+        traffic in traffic(),
+    ) {
+        let mut bench = Bench::new(Framing::Rtu);
+        let (mut wanted, mut all, mut noise) = (Vec::new(), Vec::new(), Vec::new());
+        for (before, which, silence) in &traffic {
+            let (request, reply, ..) = EXCHANGES[*which];
+            let (request_frame, reply_frame) = (rtu(17, request), rtu(17, reply));
+            noise.push((all.len(), all.len() + before.len()));
+            all.extend([&before[..], &request_frame, &reply_frame].concat());
+            bench.feed(before);
+            bench.wait(5_000 + silence);
+            for (kind, frame, pdu) in [
+                (Kind::Request, request_frame, request),
+                (Kind::Reply, reply_frame, reply),
+            ] {
+                bench.feed(&frame);
+                bench.wait(5_000 + silence);
+                wanted.push((kind, pdu.to_vec()));
+            }
+        }
+        bench.wait(100_000);
+        prop_assume!(!is_accident(&all, &noise));
+        let found: Vec<_> = bench
+            .frames()
+            .into_iter()
+            .filter(|(kind, _)| !matches!(kind, Kind::Noise | Kind::BadCrc))
+            .collect();
+        prop_assert_eq!(found, wanted);
+        let told: usize = bench.told.iter().map(|told| told.length).sum();
+        prop_assert_eq!(told, all.len());
+    }
+
+    #[test]
+    fn any_bytes_are_all_told_of(
+        pieces in prop::collection::vec(
+            (prop::collection::vec(any::<u8>(), 0..100), any::<u32>(), 0u8..3), 0..20),
+        framing in 0u8..4,
+        size in 0usize..600,
+        is_apart: bool,
+        baud in prop_oneof![Just(0), Just(9_600), any::<u32>()],
+    ) {
+        let framing = Framing::from_code(framing).unwrap();
+        let mut bench = Bench::with_buffer(framing, 64 + size);
+        bench.sniffer.set_baud_rate(baud);
+        let mut count = 0;
+        for (bytes, time, tap) in pieces {
+            let tap = match (is_apart, tap) {
+                (false, _) => Tap::Both,
+                (true, 0) => Tap::Client,
+                _ => Tap::Server,
+            };
+            bench.feed_at(tap, &bytes);
+            bench.wait(time % 3_000_000);
+            count += bytes.len();
+        }
+        bench.wait(10_000_000);
+        let told: usize = bench.told.iter().map(|told| told.length).sum();
+        if framing == Framing::Tcp {
+            // What a header promises may never come.
+            prop_assert!(told >= count);
+        } else {
+            prop_assert_eq!(told, count);
+        }
+    }
+
+    #[test]
+    fn ascii_and_tcp_frames_are_found_in_order_in_pieces_of_any_length(
+        which in prop::collection::vec((0..EXCHANGES.len(), "[ -9;-~]{0,9}"), 1..8),
+        piece in 1usize..300,
+        is_tcp: bool,
+    ) {
+        let framing = if is_tcp { Framing::Tcp } else { Framing::Ascii };
+        let (mut bytes, mut wanted) = (Vec::new(), Vec::new());
+        for (index, (which, noise)) in which.iter().enumerate() {
+            let (request, reply, ..) = EXCHANGES[*which];
+            if !is_tcp {
+                bytes.extend(noise.bytes());
+            }
+            for (kind, pdu) in [(Kind::Request, request), (Kind::Reply, reply)] {
+                bytes.extend(frame(framing, index as u16, 17, pdu));
+                wanted.push((kind, pdu.to_vec()));
+            }
+        }
+        let mut bench = Bench::new(framing);
+        for some in bytes.chunks(piece) {
+            bench.feed(some);
+            bench.now += 1_000;
+        }
+        let found: Vec<_> = bench
+            .frames()
+            .into_iter()
+            .filter(|(kind, _)| *kind != Kind::Noise)
+            .collect();
+        prop_assert_eq!(found, wanted);
+        let told: usize = bench.told.iter().map(|told| told.length).sum();
+        prop_assert_eq!(told, bytes.len());
+    }
+}
