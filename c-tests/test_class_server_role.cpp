@@ -208,7 +208,9 @@ static void a_request_may_pause_for_t15(void **)
 static void the_driver_is_off_until_the_silence_has_passed(void **)
 {
     static uint32_t on;
+    ModbusRegisterArray<1> registers;
     ModbusServer server;
+    server.inputRegisters(registers);
     server.begin(17, Serial, 19200);
     server.preTransmission([] { on = bench().now; });
     uint32_t asked = bench().now;
@@ -253,7 +255,9 @@ static void counts(void *context) { ++*static_cast<int *>(context); }
 static void callbacks_are_handed_their_context(void **)
 {
     int on = 0, off = 0;
+    ModbusRegisterArray<1> registers;
     ModbusServer server;
+    server.inputRegisters(registers);
     server.begin(17, Serial, 19200);
     server.preTransmission(counts, &on);
     server.postTransmission(counts, &off);
@@ -288,6 +292,13 @@ static void a_write_taken_in_pieces_is_one_response(void **)
     server.postTransmission([] { bench().note("post"); });
     answers(server, {17, 3, 0, 0, 0, 2}, {17, 3, 4, 0, 0, 0, 0});
     assert_string_equal(bench().log.c_str(), "read pre write flush post ");
+}
+
+static void a_unit_that_serves_nothing_is_silent(void **)
+{
+    ModbusServer server;
+    server.begin(17, Serial, 19200);
+    keeps_silent(server, adu({17, 3, 0, 0, 0, 1}));
 }
 
 static void several_units_each_have_their_own(void **)
@@ -527,6 +538,7 @@ int main()
         TEST(callbacks_are_handed_their_context),
         TEST(an_echo_of_the_response_is_dropped_if_told_to),
         TEST(a_write_taken_in_pieces_is_one_response),
+        TEST(a_unit_that_serves_nothing_is_silent),
         TEST(several_units_each_have_their_own),
         TEST(damaged_and_foreign_frames_are_not_answered),
         TEST(a_function_of_the_sketch_is_served),
