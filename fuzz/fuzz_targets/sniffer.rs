@@ -1,0 +1,135 @@
+//! A sniffer on any bus: every byte that was fed is told of once and in order,
+//! frames are what was on the line, and a reply has a request before it.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use mbm::explain::Line;
+use mbm::frame::{ascii, Framing};
+use mbm::sniffer::{Kind, Sniffer, Tap, MIN_BUFFER};
+use mbm_fuzz::asked::Asked;
+use mbm_fuzz::{naive, Input};
+
+fuzz_target!(|data: &[u8]| {
+    let mut input = Input(data);
+    let code = input.u8() % 4;
+    let framing = Framing::from_code(code).expect("one of four");
+    let size = MIN_BUFFER + usize::from(input.u16() % 600);
+    let piece = 1 + usize::from(input.u8());
+    let mut bus = Bus {
+        framing,
+        sniffer: Sniffer::new(framing),
+        buffer: vec![0; size],
+        now: 0u32.wrapping_sub(u32::from(input.u16())),
+        line: Vec::new(),
+        told: 0,
+        requests: Vec::new(),
+    };
+    let Some(asked) = Asked::new(&mut input) else {
+        return;
+    };
+    while !input.is_empty() {
+        let bytes = match input.u8() % 6 {
+            0 => {
+                bus.now = bus.now.wrapping_add(u32::from(input.u16()) * 100);
+                bus.listen();
+                continue;
+            }
+            1 => input.counted().to_vec(),
+            2 => framed(framing, input.u8(), input.counted()),
+            3 => framed(framing, asked.unit, &asked.pdu),
+            4 => framed(framing, asked.unit, &asked.response(&mut input)),
+            _ => framed(framing, asked.unit, &[asked.function() | 0x80, input.u8()]),
+        };
+        for some in bytes.chunks(piece) {
+            bus.feed(some);
+        }
+    }
+    // Nothing is waited for any longer.
+    for _ in 0..3 {
+        bus.now = bus.now.wrapping_add(3_000_000);
+        bus.listen();
+    }
+    // A TCP frame beyond the buffer is told of before the rest of it has come.
+    let ahead = framing == Framing::Tcp && size < framing.max_frame();
+    assert!(
+        bus.told == bus.line.len() || ahead && bus.told > bus.line.len(),
+        "bytes that nobody told of, or twice"
+    );
+});
+
+/// A PDU in a frame.
+fn framed(framing: Framing, unit: u8, pdu: &[u8]) -> Vec<u8> {
+    let mut buffer = [0; 600];
+    let pdu = &pdu[..pdu.len().min(253)];
+    let length = framing.emit(&mut buffer, 7, unit, ascii::END, |place| {
+        place[..pdu.len()].copy_from_slice(pdu);
+        Ok(pdu.len())
+    });
+    buffer[..length.expect("there is room")].to_vec()
+}
+
+struct Bus {
+    framing: Framing,
+    sniffer: Sniffer,
+    buffer: Vec<u8>,
+    now: u32,
+    /// All that was fed, and how much of it was told of.
+    line: Vec<u8>,
+    told: usize,
+    /// Unit and function of every request.
+    requests: Vec<(u8, u8)>,
+}
+
+impl Bus {
+    fn feed(&mut self, bytes: &[u8]) {
+        self.line.extend_from_slice(bytes);
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            let taken = self
+                .sniffer
+                .feed(&mut self.buffer, Tap::Both, rest, self.now);
+            let before = self.told;
+            self.listen();
+            assert!(taken > 0 || self.told > before, "no progress");
+            rest = &rest[taken..];
+        }
+    }
+
+    fn listen(&mut self) {
+        while let Some(event) = self.sniffer.next(&mut self.buffer, &[], self.now) {
+            let mut text = [0; 20_000];
+            let mut words = Line::new(&mut text);
+            event.explain(&mut words);
+            words.finish().expect("there is room for words");
+            if event.kind == Kind::Timeout {
+                assert!(self.requests.contains(&(event.unit, event.function)));
+                continue;
+            }
+            assert!(event.length > 0, "nothing is told of");
+            let start = self.told;
+            self.told += event.length;
+            match event.kind {
+                Kind::Request => self.requests.push((event.unit, event.function)),
+                Kind::Reply | Kind::Exception => {
+                    assert!(self.requests.contains(&(event.unit, event.function)));
+                    assert!(event.asked.is_some());
+                }
+                Kind::Unpaired => {}
+                _ => continue,
+            }
+            let heard = &self.line[start..self.told];
+            let content = match self.framing {
+                Framing::Rtu | Framing::RtuOverTcp => {
+                    assert!(naive::has_crc(heard), "no frame");
+                    heard[..heard.len() - 2].to_vec()
+                }
+                Framing::Ascii => naive::ascii(heard, ascii::END).expect("a frame"),
+                Framing::Tcp => {
+                    let (_, unit, pdu) = naive::tcp(heard).expect("a frame");
+                    [&[unit], pdu].concat()
+                }
+            };
+            assert_eq!((event.unit, event.pdu), (content[0], &content[1..]));
+        }
+    }
+}
