@@ -15,6 +15,8 @@ SANITIZERS := -fsanitize=address,undefined -fno-sanitize-recover=all
 SUPPORT := $(wildcard c-tests/support/*.c) $(wildcard examples/linux/mbm_*.c)
 TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
+# Examples that a test named after each drives.
+TESTED_EXAMPLES := custom_command gateway
 HEADERS := $(wildcard include/*.h c-tests/support/*.h c-tests/shim/* examples/linux/*.h)
 
 .PHONY: help
@@ -98,7 +100,7 @@ fault-table: need-test ## Write docs/fault-table.md from what the test finds
 need-check:
 	@scripts/need gcc g++ clang libc6-dev binutils doxygen
 need-test:
-	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind
+	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind mbpoll
 
 # The test programs, one folder a variant: $(1) name, $(2) C, $(3) C++, $(4) flags
 define variant
@@ -113,25 +115,37 @@ $(BUILD)/$(1)/%.o: examples/%.c $(HEADERS)
 	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(ARCHIVE)
 	@$(3) $(4) $$(filter %.o,$$^) $(ARCHIVE) $(LIBS) -o $$@
+$(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tty.o $(ARCHIVE)
+	@$(2) $(4) $$(filter %.o,$$^) $(ARCHIVE) -Wl,--gc-sections -o $$@
+$(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)/linux/%
 endef
 $(eval $(call variant,plain,gcc,g++,))
 $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS)))
 .SECONDARY:
 
+# What peers of another house ask.
+SERVE := $(BUILD)/plain/serve
+$(SERVE): $(patsubst %,$(BUILD)/plain/%.o,serve support/served support/pty) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lpthread -o $@
+
 .PHONY: tests
-tests: $(TESTS:%=$(BUILD)/plain/%) $(TESTS:%=$(BUILD)/sanitized/%)
+tests: $(TESTS:%=$(BUILD)/plain/%) $(TESTS:%=$(BUILD)/sanitized/%) $(SERVE)
 
 # The same flags as the peer's package is built with.
 $(eval $(call variant,bench,gcc,g++,-O2))
 BENCH := $(BUILD)/bench/bench
 $(BENCH): $(patsubst %,$(BUILD)/bench/%.o,bench support/pty support/server linux/mbm_tty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
+BENCH_SERVER := $(BUILD)/bench/bench_server
+$(BENCH_SERVER): $(patsubst %,$(BUILD)/bench/%.o,bench_server linux/mbm_tcp linux/mbm_tty) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -o $@
 
 .PHONY: bench
 bench: ## Speed and instructions beside libmodbus and rmodbus; writes docs/speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
-	@$(MAKE) --no-print-directory $(BENCH)
+	@$(MAKE) --no-print-directory $(BENCH) $(BENCH_SERVER)
 	@scripts/bench $(BENCH)
+	@scripts/bench-server $(BENCH_SERVER)
 	@CARGO="$(CARGO)" scripts/bench-frames
 
 DEMO := $(BUILD)/plain/linux/demo

@@ -127,6 +127,47 @@ static void slow_and_half_open_connections_stall_nobody(void **state)
     close(silent);
 }
 
+/* Until its socket takes no more; then all that was taken is answered, in turn. */
+static void a_client_that_reads_nothing_stalls_nobody(void **state)
+{
+    static uint8_t answers[300];
+    uint8_t one[] = {0, 0, 0, 0, 0, 6, SERVED_UNIT, 4, 0, SERVED_BASE, 0, 125};
+    int fd = connected(&tcp);
+    size_t sent = 0, got, i;
+    uint16_t word;
+
+    (void)state;
+    for (;;) {
+        struct pollfd writable = {fd, POLLOUT, 0};
+
+        if (poll(&writable, 1, 200) <= 0)
+            break;
+        one[0] = (uint8_t)(sent / sizeof one >> 8);
+        one[1] = (uint8_t)(sent / sizeof one);
+        i = sent % sizeof one;
+        {
+            ssize_t count = send(fd, one + i, sizeof one - i, MSG_DONTWAIT);
+
+            assert_true(count > 0);
+            sent += (size_t)count;
+        }
+    }
+    assert_true(sent > 1000 * sizeof one);
+    for (i = 0; i < 20; i++)
+        assert_int_equal(modbus_read_registers(client, SERVED_BASE, 1, &word), 1);
+    for (i = 0; i < sent / sizeof one; i++) {
+        for (got = 0; got < 259;) {
+            ssize_t count = read(fd, answers + got, 259 - got);
+
+            assert_true(count > 0);
+            got += (size_t)count;
+        }
+        assert_int_equal(answers[0] << 8 | answers[1], i & 0xFFFF);
+        assert_int_equal(answers[8], 250);
+    }
+    close(fd);
+}
+
 static void connections_beyond_the_storage_are_closed_and_the_others_served(void **state)
 {
     int fds[SERVED_CONNECTIONS + 8];
@@ -193,6 +234,7 @@ int main(void)
         cmocka_unit_test(every_function_is_served),
         cmocka_unit_test(requests_in_one_segment_are_answered_in_turn),
         cmocka_unit_test(slow_and_half_open_connections_stall_nobody),
+        cmocka_unit_test(a_client_that_reads_nothing_stalls_nobody),
         cmocka_unit_test(connections_beyond_the_storage_are_closed_and_the_others_served),
         cmocka_unit_test(a_stream_that_is_no_modbus_is_closed),
         cmocka_unit_test(a_connection_that_breaks_leaves_its_place),

@@ -273,6 +273,24 @@ fn every_function_is_sent_and_answered_in_rtu() {
 }
 
 #[test]
+fn a_response_of_unknown_length_may_be_as_long_as_a_frame() {
+    for length in 250..=253 {
+        let (end, mut client) = client::<rtu::Window>();
+        let build: fn(&mut Outline) -> Status = |o| o.custom(0x43, 0, Rule::Silence);
+        assert!(client.queue(Task::new(17, 1, &[], build)).is_ok());
+        sent(&end, &mut client);
+        let mut response = vec![0x5A; length];
+        response[0] = 0x43;
+        let reply = frame(17, &response);
+        end.deliver(1_000, &reply[..100]);
+        end.deliver(2_000, &reply[100..]);
+        let task = run(&end, &mut client);
+        assert_eq!(task.ticket.status, Status::OK, "{length}");
+        assert_eq!(task.received(), &response[1..]);
+    }
+}
+
+#[test]
 fn every_function_is_sent_and_answered_in_ascii() {
     for (build, data, request, response, received) in CASES {
         let (end, mut client) = client::<ascii_window::Window>();

@@ -156,7 +156,7 @@ void mbm_tcp_close(mbm_tcp *tcp)
 }
 
 /* 1 once connected, 0 before, -1 if there is no link. */
-static int progress(mbm_tcp *tcp)
+static int progress_slowly(mbm_tcp *tcp)
 {
     struct pollfd wait = {tcp->fd, POLLOUT, 0};
     socklen_t size = sizeof(int);
@@ -174,6 +174,11 @@ static int progress(mbm_tcp *tcp)
             try_next(tcp, error);
     }
     return tcp->state == CONNECTED ? 1 : -1;
+}
+
+static int progress(mbm_tcp *tcp)
+{
+    return tcp->state == CONNECTED ? 1 : progress_slowly(tcp);
 }
 
 int mbm_tcp_isConnected(mbm_tcp *tcp)

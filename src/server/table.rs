@@ -91,7 +91,7 @@ pub trait Cells {
 
 /// Serves a request for a table, if it is one: the request PDU is the front
 /// `length` bytes of `pdu`, which the response overwrites.
-#[cfg_attr(target_os = "none", inline(never))]
+#[inline(never)]
 pub fn serve(kind: Kind, cells: &mut impl Cells, pdu: &mut [u8], length: usize) -> Reply {
     let Some(&[function, a, b, c, d, count]) = pdu.first_chunk() else {
         return Reply::NOT_MINE;
@@ -140,7 +140,7 @@ pub fn serve(kind: Kind, cells: &mut impl Cells, pdu: &mut [u8], length: usize) 
 
 /// The kind of the table that a function is about; 0 if it is about none. (Not a
 /// match: a microcontroller would keep a table of it.)
-const fn kind_of(function: u8) -> u8 {
+pub(crate) const fn kind_of(function: u8) -> u8 {
     // The functions that write come in pairs, for coils and holding registers.
     let (first, next) = if function >= WRITE_MULTIPLE_COILS {
         (WRITE_MULTIPLE_COILS, WRITE_MULTIPLE_REGISTERS)

@@ -1,8 +1,10 @@
 //! Requests and responses held against pymodbus, in both directions and over
 //! every framing: what libmodbus lacks, and the rest too.
 //!
-//! `make test` makes the Python environment first; alone, `scripts/venv` does.
+//! `make test` makes the Python environment and our server first; alone,
+//! `make venv build/plain/serve` does.
 
+mod asking;
 mod process;
 mod requests;
 mod responses;

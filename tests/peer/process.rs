@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::{Mutex, OnceLock};
 
-/// A Python script that is spoken to line by line; it ends with its input.
+/// A program that is spoken to line by line; it ends with its input.
 pub struct Script {
     child: Child,
     input: Option<ChildStdin>,
@@ -13,22 +13,25 @@ pub struct Script {
 }
 
 impl Script {
-    /// Starts a script of this folder.
+    /// Starts a Python script of this folder.
     pub fn start(name: &str, arguments: &[&str]) -> Script {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let python: PathBuf = root.join("build/venv/bin/python");
-        assert!(
-            python.exists(),
-            "{} is missing: `make venv` makes it, and `make test` does so first",
-            python.display()
-        );
-        let mut child = Command::new(python)
-            .arg(root.join("tests/peer").join(name))
-            .args(arguments)
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/peer");
+        let python = made("build/venv/bin/python", "venv");
+        Script::spawn(Command::new(python).arg(script.join(name)).args(arguments))
+    }
+
+    /// Starts our server in C, `c-tests/serve.c`.
+    pub fn serve(framing: &str) -> Script {
+        let program = made("build/plain/serve", "build/plain/serve");
+        Script::spawn(Command::new(program).arg(framing))
+    }
+
+    fn spawn(command: &mut Command) -> Script {
+        let mut child = command
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
-            .expect("python starts");
+            .expect("it starts");
         let input = child.stdin.take();
         let output = BufReader::new(child.stdout.take().expect("its output"));
         Script {
@@ -52,6 +55,17 @@ impl Script {
         writeln!(input, "{line}").expect("it listens");
         self.line()
     }
+}
+
+/// What make is to have made before.
+fn made(path: &str, target: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+    assert!(
+        path.exists(),
+        "{} is missing: `make {target}` makes it, and `make test` does so first",
+        path.display()
+    );
+    path
 }
 
 impl Drop for Script {

@@ -5,6 +5,7 @@ use super::{mbm_service, mbm_unit};
 use crate::server::table::{self, Cells, Kind, Way};
 use crate::server::Reply;
 use core::ffi::c_void;
+use core::slice::from_raw_parts_mut;
 
 /// Holding or input registers in an array of yours. Zero it, set what you need,
 /// and hand it to mbm_server_serveHoldingRegisters or
@@ -125,6 +126,15 @@ impl Cells for Table {
         unsafe {
             let cells = (*self.0).words.cast::<u8>();
             let bits = Kind::from_code((*self.0).kind).is_bits();
+            // A host has room for code that takes many cells at a time.
+            if cfg!(not(target_os = "none")) {
+                if bits {
+                    transfer_bits(cells, write, first, quantity, data);
+                } else {
+                    transfer_words(cells.cast(), write, first, quantity, data);
+                }
+                return;
+            }
             let mut data = data.as_mut_ptr();
             let mut mask = 1u8;
             for index in first..first + quantity {
@@ -180,6 +190,56 @@ impl Cells for Table {
     }
 }
 
+/// Moves registers from `first` on, from or into data.
+///
+/// # Safety
+/// Behind `words` are all of them, and nothing else uses them meanwhile.
+unsafe fn transfer_words(words: *mut u16, write: bool, first: u16, quantity: u16, data: &mut [u8]) {
+    // SAFETY: as the caller promises.
+    let words = unsafe { from_raw_parts_mut(words.add(first.into()), quantity.into()) };
+    let (pairs, _) = data.as_chunks_mut::<2>();
+    for (word, pair) in words.iter_mut().zip(pairs) {
+        if write {
+            *word = u16::from_be_bytes(*pair);
+        } else {
+            *pair = word.to_be_bytes();
+        }
+    }
+}
+
+/// Moves bits from `first` on, from or into data, eight at a time.
+///
+/// # Safety
+/// Behind `cells` are all bytes that have some of them, and nothing else uses
+/// them meanwhile.
+unsafe fn transfer_bits(cells: *mut u8, write: bool, first: u16, quantity: u16, data: &mut [u8]) {
+    let shift = first & 7;
+    let count = usize::from((shift + quantity).div_ceil(8));
+    // SAFETY: as the caller promises.
+    let cells = unsafe { from_raw_parts_mut(cells.add(usize::from(first >> 3)), count) };
+    let mut left = quantity;
+    for (index, byte) in data.iter_mut().enumerate() {
+        // What of this byte is meant, and where it stands in two of the cells.
+        let mask = if left < 8 { (1u16 << left) - 1 } else { 0xFF };
+        let behind = cells.get(index + 1).copied().unwrap_or(0);
+        let Some(cell) = cells.get_mut(index) else {
+            return;
+        };
+        let both = u16::from_le_bytes([*cell, behind]);
+        if write {
+            let value = (both & !(mask << shift)) | ((u16::from(*byte) & mask) << shift);
+            let [low, high] = value.to_le_bytes();
+            *cell = low;
+            if let Some(next) = cells.get_mut(index + 1) {
+                *next = high;
+            }
+        } else {
+            *byte = (both >> shift & mask) as u8;
+        }
+        left = left.saturating_sub(8);
+    }
+}
+
 /// Serves a table.
 ///
 /// # Safety
@@ -188,6 +248,10 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, heading: *co
     // SAFETY: as the caller promises.
     unsafe {
         let table = service.cast::<mbm_registerTable>();
+        // Soon done with what another table serves.
+        if cfg!(not(target_os = "none")) && table::kind_of(*pdu) != (*table).kind {
+            return Reply::NOT_MINE.code();
+        }
         let (pdu, length) = request(pdu, heading);
         let kind = Kind::from_code((*table).kind);
         table::serve(kind, &mut Table(table), pdu, length).code()

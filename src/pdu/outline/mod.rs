@@ -201,8 +201,8 @@ impl Outline {
         };
         match rule {
             Length::Exactly(length) | Length::AtLeast(length) => length,
-            // While more may come, it is never complete.
-            _ => whole.unwrap_or(pdu.len()).max(2),
+            // While more may come, it is never complete, but for the longest.
+            _ => whole.unwrap_or(pdu.len().min(MAX_PDU)).max(2),
         }
     }
 

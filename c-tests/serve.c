@@ -1,0 +1,41 @@
+/* Serves everything that support/served.h has, for peers of another house:
+ *
+ *     serve rtu | ascii | tcp | rtu-over-tcp
+ *
+ * Prints `ready PATH` or `ready PORT`, and serves until its input ends. */
+#include "served.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+static served device;
+
+int main(int argc, char **argv)
+{
+    static const char *const names[] = {"rtu", "ascii", "tcp", "rtu-over-tcp"};
+    static const int framings[] = {MBM_FRAMING_RTU, MBM_FRAMING_ASCII, MBM_FRAMING_TCP,
+                                   MBM_FRAMING_RTU_OVER_TCP};
+    unsigned i = 0;
+    char byte;
+
+    while (argc == 2 && i < 4 && strcmp(argv[1], names[i]) != 0)
+        i++;
+    if (argc != 2 || i == 4) {
+        fprintf(stderr, "usage: %s rtu | ascii | tcp | rtu-over-tcp\n", argv[0]);
+        return 2;
+    }
+    served_prepare(&device);
+    if (i < 2) {
+        served_on_line(&device, framings[i]);
+        printf("ready %s\n", device.line.path);
+    } else {
+        served_on_tcp(&device, framings[i]);
+        printf("ready %d\n", device.port);
+    }
+    fflush(stdout);
+    while (read(STDIN_FILENO, &byte, 1) > 0)
+        ;
+    served_stop(&device);
+    return 0;
+}

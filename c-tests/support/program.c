@@ -1,0 +1,85 @@
+#define _GNU_SOURCE
+#include "program.h"
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+static void must(int ok, const char *what)
+{
+    if (!ok) {
+        perror(what);
+        abort();
+    }
+}
+
+void program_start(program *p, const char *name, const char *const *arguments)
+{
+    const char *argv[16] = {name};
+    char path[4096];
+    ssize_t length = readlink("/proc/self/exe", path, sizeof path - 64);
+    int in[2], out[2];
+    char *end;
+    size_t i;
+
+    must(length > 0, "/proc/self/exe");
+    path[length] = 0;
+    end = strrchr(path, '/');
+    must(end != NULL && strlen(name) < 48, name);
+    sprintf(end, "/linux/%s", name);
+    for (i = 0; arguments[i] && i < 14; i++)
+        argv[i + 1] = arguments[i];
+    must(pipe2(in, O_CLOEXEC) == 0 && pipe2(out, O_CLOEXEC) == 0, "pipe");
+    p->pid = fork();
+    must(p->pid >= 0, "fork");
+    if (p->pid == 0) {
+        dup2(in[0], STDIN_FILENO);
+        dup2(out[1], STDOUT_FILENO);
+        /* Lines and sockets of the test are to hang up when the test lets go. */
+        close_range(3, ~0u, 0);
+        execv(path, (char *const *)(size_t)argv);
+        perror(path);
+        _exit(127);
+    }
+    close(in[0]);
+    close(out[1]);
+    p->input = in[1];
+    p->output = out[0];
+}
+
+size_t program_line(const program *p, char *text, size_t room)
+{
+    size_t length = 0;
+
+    while (length + 1 < room && read(p->output, text + length, 1) == 1)
+        if (text[length++] == '\n')
+            break;
+    text[length] = 0;
+    return length;
+}
+
+size_t program_rest(const program *p, char *text, size_t room)
+{
+    size_t length = 0;
+    ssize_t count;
+
+    while (length + 1 < room && (count = read(p->output, text + length, room - 1 - length)) > 0)
+        length += (size_t)count;
+    text[length] = 0;
+    return length;
+}
+
+int program_end(program *p)
+{
+    int status;
+
+    if (p->input >= 0)
+        close(p->input);
+    p->input = -1;
+    must(waitpid(p->pid, &status, 0) == p->pid, "waitpid");
+    close(p->output);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}

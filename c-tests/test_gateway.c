@@ -1,0 +1,339 @@
+/* The gateway example between libmodbus's TCP client and devices on ptys: one of
+ * libmodbus, one of ours. */
+#define _GNU_SOURCE
+#include "asked.h"
+#include "program.h"
+#include "server.h"
+#include "test.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { PEER_UNIT = 5, ABSENT = 6, NO_LINE = 200, DEAD_LINE = 40, TIMEOUT_MS = 300 };
+
+static program gateway;
+static int port;
+static modbus_t *client;
+static served ours;
+
+/* A libmodbus server at the near end of a pty, whose far end the gateway opens. */
+static pty line;
+static modbus_t *peer;
+static modbus_mapping_t *mapping;
+static pthread_t thread;
+static int stop_peer[2];
+
+static void *serve(void *argument)
+{
+    uint8_t request[MODBUS_RTU_MAX_ADU_LENGTH];
+
+    (void)argument;
+    for (;;) {
+        struct pollfd waits[2] = {{line.ours, POLLIN, 0}, {stop_peer[0], POLLIN, 0}};
+        int length;
+
+        poll(waits, 2, -1);
+        if (waits[1].revents)
+            return NULL;
+        /* What is not for it, it takes with what follows: see server.c. */
+        length = modbus_receive(peer, request);
+        if (length == 0)
+            modbus_receive(peer, request);
+        if (length > 0)
+            modbus_reply(peer, request, length, mapping);
+    }
+}
+
+static int start(void **state)
+{
+    char paths[3][128], text[64];
+    const char *arguments[] = {"0", "300", paths[0], paths[1], paths[2], NULL};
+    unsigned i;
+
+    (void)state;
+    pty_open(&line);
+    peer = modbus_new_rtu("/dev/null", 115200, 'N', 8, 1);
+    mapping = modbus_mapping_new(SERVER_BITS, SERVER_BITS, SERVER_REGISTERS, SERVER_REGISTERS);
+    if (!peer || !mapping || modbus_set_slave(peer, PEER_UNIT) ||
+        modbus_set_socket(peer, line.ours) || modbus_set_response_timeout(peer, 0, 20000) ||
+        pipe(stop_peer) || pthread_create(&thread, NULL, serve, NULL))
+        return -1;
+    for (i = 0; i < SERVER_REGISTERS; i++)
+        mapping->tab_registers[i] = server_pattern(i);
+    for (i = 0; i < SERVER_BITS; i++)
+        mapping->tab_bits[i] = server_bit_pattern(i);
+    served_prepare(&ours);
+    served_on_line(&ours, MBM_FRAMING_RTU);
+
+    snprintf(paths[0], sizeof paths[0], "%s,115200,N1,1-10", line.path);
+    snprintf(paths[1], sizeof paths[1], "%s,115200,N1,11-30", ours.line.path);
+    snprintf(paths[2], sizeof paths[2], "/dev/no-such-line,9600,E1,40-41");
+    program_start(&gateway, "gateway", arguments);
+    program_line(&gateway, text, sizeof text);
+    if (sscanf(text, "ready %d", &port) != 1)
+        return -1;
+    client = modbus_new_tcp("127.0.0.1", port);
+    if (!client || modbus_connect(client))
+        return -1;
+    modbus_set_response_timeout(client, 3, 0);
+    return 0;
+}
+
+static int stop(void **state)
+{
+    (void)state;
+    modbus_close(client);
+    modbus_free(client);
+    kill(gateway.pid, SIGTERM);
+    assert_int_equal(program_end(&gateway), 0);
+    assert_int_equal(write(stop_peer[1], "", 1), 1);
+    pthread_join(thread, NULL);
+    modbus_free(peer);
+    modbus_mapping_free(mapping);
+    pty_close(&line);
+    served_stop(&ours);
+    return 0;
+}
+
+static int connected(void)
+{
+    struct sockaddr_in address = {.sin_family = AF_INET,
+                                  .sin_addr = {htonl(INADDR_LOOPBACK)},
+                                  .sin_port = htons((uint16_t)port)};
+    int fd = socket(AF_INET, SOCK_STREAM, 0);
+
+    assert_int_equal(connect(fd, (struct sockaddr *)&address, sizeof address), 0);
+    return fd;
+}
+
+static double seconds(void)
+{
+    struct timespec now;
+
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+}
+
+static void expect_exception(int code, uint8_t unit)
+{
+    uint16_t word;
+
+    modbus_set_slave(client, unit);
+    errno = 0;
+    assert_int_equal(modbus_read_registers(client, 0, 1, &word), -1);
+    assert_int_equal(errno, MODBUS_ENOBASE + code);
+}
+
+static void libmodbus_reads_and_writes_through_it(void **state)
+{
+    uint16_t words[125], values[] = {1, 0xFFFE, 0x1234};
+    uint8_t cells[2000];
+    int i;
+
+    (void)state;
+    modbus_set_slave(client, PEER_UNIT);
+    assert_int_equal(modbus_read_registers(client, 3, 125, words), 125);
+    assert_memory_equal(words, mapping->tab_registers + 3, sizeof words);
+    assert_int_equal(modbus_read_bits(client, 1, 2000, cells), 2000);
+    for (i = 0; i < 2000; i++)
+        assert_int_equal(cells[i], mapping->tab_bits[1 + i]);
+    assert_int_equal(modbus_write_register(client, 7, 0xABCD), 1);
+    assert_int_equal(mapping->tab_registers[7], 0xABCD);
+    assert_int_equal(modbus_write_registers(client, 20, 3, values), 3);
+    assert_memory_equal(mapping->tab_registers + 20, values, sizeof values);
+    assert_int_equal(modbus_write_bit(client, 9, 1), 1);
+    assert_int_equal(mapping->tab_bits[9], 1);
+    assert_int_equal(modbus_mask_write_register(client, 7, 0x00F0, 0x000F), 1);
+    assert_int_equal(mapping->tab_registers[7], 0x00CF);
+    assert_int_equal(modbus_write_and_read_registers(client, 30, 3, values, 29, 4, words), 4);
+    assert_memory_equal(words + 1, values, sizeof values);
+}
+
+static void exceptions_of_a_device_pass_through(void **state)
+{
+    uint16_t word;
+
+    (void)state;
+    modbus_set_slave(client, PEER_UNIT);
+    assert_int_equal(modbus_read_registers(client, SERVER_REGISTERS, 1, &word), -1);
+    assert_int_equal(errno, EMBXILADD);
+    modbus_set_slave(client, SERVED_UNIT);
+    assert_int_equal(modbus_write_register(client, SERVED_REFUSED, 0xBEEF), -1);
+    assert_int_equal(errno, EMBXILVAL);
+}
+
+static void every_function_passes_through(void **state)
+{
+    int fd = connected();
+
+    (void)state;
+    asked_functions(fd, MBM_FRAMING_TCP, &ours);
+    close(fd);
+    fd = connected();
+    asked_lies(fd, MBM_FRAMING_TCP, &ours);
+    close(fd);
+}
+
+static void an_absent_device_is_0b_after_the_timeout(void **state)
+{
+    double before = seconds(), took;
+
+    (void)state;
+    expect_exception(0x0B, ABSENT);
+    took = seconds() - before;
+    assert_true(took > TIMEOUT_MS * 0.9e-3 && took < 2);
+    modbus_set_slave(client, PEER_UNIT);
+    libmodbus_reads_and_writes_through_it(state);
+}
+
+static void a_unit_without_a_line_is_0a(void **state)
+{
+    double before = seconds();
+
+    (void)state;
+    expect_exception(0x0A, NO_LINE);
+    expect_exception(0x0A, 31);
+    expect_exception(0x0A, DEAD_LINE);
+    /* Nobody was asked. */
+    assert_true(seconds() - before < TIMEOUT_MS * 0.9e-3);
+}
+
+static void requests_of_many_connections_wait_for_their_turn(void **state)
+{
+    enum { MANY = 12 };
+    int fds[MANY];
+    unsigned i, round;
+
+    (void)state;
+    for (i = 0; i < MANY; i++)
+        fds[i] = connected();
+    for (round = 0; round < 5; round++) {
+        for (i = 0; i < MANY; i++) {
+            uint8_t request[] = {(uint8_t)round, (uint8_t)i, 0, 0, 0, 6,
+                                 i % 2 ? PEER_UNIT : SERVED_UNIT, 3, 0, (uint8_t)(160 + i), 0, 1};
+
+            assert_int_equal(write(fds[i], request, sizeof request), sizeof request);
+        }
+        for (i = 0; i < MANY; i++) {
+            uint8_t answer[600];
+            uint16_t word = i % 2 ? mapping->tab_registers[160 + i] : ours.words[60 + i];
+            const uint8_t expected[] = {(uint8_t)round, (uint8_t)i, 0, 0, 0, 5,
+                                        i % 2 ? PEER_UNIT : SERVED_UNIT, 3, 2,
+                                        (uint8_t)(word >> 8), (uint8_t)word};
+
+            assert_int_equal(asked_bytes(fds[i], expected, 0, answer, 3000), sizeof expected);
+            assert_memory_equal(answer, expected, sizeof expected);
+        }
+    }
+    for (i = 0; i < MANY; i++)
+        close(fds[i]);
+}
+
+static void a_line_that_waits_holds_up_no_other(void **state)
+{
+    static const uint8_t absent[] = {0, 1, 0, 0, 0, 6, ABSENT, 3, 0, 0, 0, 1};
+    uint8_t answer[600];
+    uint16_t word;
+    int fd = connected();
+    double before;
+    unsigned i;
+
+    (void)state;
+    assert_int_equal(write(fd, absent, sizeof absent), sizeof absent);
+    usleep(20000);
+    before = seconds();
+    modbus_set_slave(client, SERVED_UNIT);
+    for (i = 0; i < 5; i++)
+        assert_int_equal(modbus_read_registers(client, SERVED_BASE, 1, &word), 1);
+    assert_true(seconds() - before < TIMEOUT_MS * 0.8e-3);
+    assert_int_equal(asked_bytes(fd, absent, 0, answer, 3000), 9);
+    assert_int_equal(answer[8], 0x0B);
+    close(fd);
+}
+
+static void a_connection_that_breaks_takes_its_request_along(void **state)
+{
+    const struct linger hard = {1, 0};
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < 40; i++) {
+        static const uint8_t request[] = {0, 1, 0, 0, 0, 6, PEER_UNIT, 3, 0, 0, 0, 1};
+        int fd = connected();
+
+        assert_int_equal(write(fd, request, sizeof request), sizeof request);
+        if (i % 2)
+            setsockopt(fd, SOL_SOCKET, SO_LINGER, &hard, sizeof hard);
+        if (i % 3)
+            usleep(1000);
+        close(fd);
+    }
+    libmodbus_reads_and_writes_through_it(state);
+}
+
+static void connections_beyond_its_places_are_closed(void **state)
+{
+    int fds[40];
+    uint8_t byte;
+    unsigned i, refused = 0;
+
+    (void)state;
+    usleep(50000);
+    for (i = 0; i < COUNT(fds); i++)
+        fds[i] = connected();
+    usleep(100000);
+    for (i = 0; i < COUNT(fds); i++)
+        refused += recv(fds[i], &byte, 1, MSG_DONTWAIT) == 0;
+    /* One of the sixteen is the client's. */
+    assert_int_equal(refused, COUNT(fds) - 15);
+    libmodbus_reads_and_writes_through_it(state);
+    for (i = 0; i < COUNT(fds); i++)
+        close(fds[i]);
+    usleep(50000);
+}
+
+/* The last, for the line does not come back. */
+static void a_line_that_is_lost_is_0a(void **state)
+{
+    uint16_t word;
+
+    (void)state;
+    assert_int_equal(write(stop_peer[1], "", 1), 1);
+    pthread_join(thread, NULL);
+    assert_int_equal(read(stop_peer[0], &(char){0}, 1), 1);
+    pty_close(&line);
+    expect_exception(0x0A, PEER_UNIT);
+    expect_exception(0x0A, PEER_UNIT);
+    modbus_set_slave(client, SERVED_UNIT);
+    assert_int_equal(modbus_read_registers(client, SERVED_BASE, 1, &word), 1);
+    pty_open(&line);
+    modbus_set_socket(peer, line.ours);
+    assert_int_equal(pthread_create(&thread, NULL, serve, NULL), 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(libmodbus_reads_and_writes_through_it),
+        cmocka_unit_test(exceptions_of_a_device_pass_through),
+        cmocka_unit_test(every_function_passes_through),
+        cmocka_unit_test(an_absent_device_is_0b_after_the_timeout),
+        cmocka_unit_test(a_unit_without_a_line_is_0a),
+        cmocka_unit_test(requests_of_many_connections_wait_for_their_turn),
+        cmocka_unit_test(a_line_that_waits_holds_up_no_other),
+        cmocka_unit_test(a_connection_that_breaks_takes_its_request_along),
+        cmocka_unit_test(connections_beyond_its_places_are_closed),
+        cmocka_unit_test(a_line_that_is_lost_is_0a),
+    };
+
+    return cmocka_run_group_tests(tests, start, stop);
+}

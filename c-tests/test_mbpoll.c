@@ -1,0 +1,161 @@
+/* mbpoll, a program of others, asks our server: over TCP and over a pty. */
+#define _GNU_SOURCE
+#include "served.h"
+#include "test.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+
+static served tcp, rtu;
+static char place[2][128];
+static char output[8192];
+
+static int start(void **state)
+{
+    (void)state;
+    served_prepare(&tcp);
+    served_on_tcp(&tcp, MBM_FRAMING_TCP);
+    served_prepare(&rtu);
+    served_on_line(&rtu, MBM_FRAMING_RTU);
+    snprintf(place[0], sizeof place[0], "-m tcp -p %d 127.0.0.1", tcp.port);
+    snprintf(place[1], sizeof place[1], "-m rtu -b 115200 -P none %s", rtu.line.path);
+    return 0;
+}
+
+static int stop(void **state)
+{
+    (void)state;
+    served_stop(&tcp);
+    served_stop(&rtu);
+    return 0;
+}
+
+/* Runs mbpoll and keeps what it prints; its exit code. What is to be written stands
+ * behind the place. */
+static int mbpoll(const char *where, const char *arguments, const char *values)
+{
+    char command[512];
+    size_t length = 0, count;
+    FILE *pipe;
+
+    snprintf(command, sizeof command, "mbpoll -0 -1 -o 5 %s %s %s 2>&1", arguments, where, values);
+    pipe = popen(command, "r");
+    assert_non_null(pipe);
+    while ((count = fread(output + length, 1, sizeof output - 1 - length, pipe)) > 0)
+        length += count;
+    output[length] = 0;
+    count = (size_t)pclose(pipe);
+    assert_true(WIFEXITED((int)count));
+    return WEXITSTATUS((int)count);
+}
+
+/* What it printed of a reference. */
+static unsigned long value(unsigned reference, int base)
+{
+    char label[16];
+    const char *found;
+
+    snprintf(label, sizeof label, "[%u]: \t", reference);
+    found = strstr(output, label);
+    if (!found)
+        print_error("%s", output);
+    assert_non_null(found);
+    return strtoul(found + strlen(label), NULL, base);
+}
+
+static void shows(const char *text)
+{
+    if (!strstr(output, text))
+        print_error("%s", output);
+    assert_non_null(strstr(output, text));
+}
+
+static void it_reads_every_table(void **state)
+{
+    unsigned where, i;
+
+    (void)state;
+    for (where = 0; where < 2; where++) {
+        assert_int_equal(mbpoll(place[where], "-a 17 -r 103 -c 125", ""), 0);
+        for (i = 103; i < 103 + 125; i++)
+            assert_int_equal(value(i, 10), served_pattern(i));
+        assert_int_equal(mbpoll(place[where], "-a 17 -r 399 -c 1 -t 3:hex", ""), 0);
+        assert_int_equal(value(399, 16), (uint16_t)~served_pattern(399));
+        assert_int_equal(mbpoll(place[where], "-a 17 -r 111 -c 19 -t 0", ""), 0);
+        for (i = 111; i < 111 + 19; i++)
+            assert_int_equal(value(i, 10), served_bit_pattern(i));
+        assert_int_equal(mbpoll(place[where], "-a 17 -r 101 -c 9 -t 1", ""), 0);
+        for (i = 101; i < 101 + 9; i++)
+            assert_int_equal(value(i, 10), !served_bit_pattern(i));
+    }
+}
+
+static void it_writes_one_and_several(void **state)
+{
+    served *servers[] = {&tcp, &rtu};
+    unsigned where;
+
+    (void)state;
+    for (where = 0; where < 2; where++) {
+        const uint16_t words[] = {7, 65535, 4711};
+        uint8_t before = servers[where]->bits[2];
+
+        assert_int_equal(mbpoll(place[where], "-a 17 -r 120", "4660"), 0);
+        shows("Written 1 references");
+        assert_int_equal(servers[where]->words[20], 4660);
+        assert_int_equal(mbpoll(place[where], "-a 17 -r 130", "7 65535 4711"), 0);
+        shows("Written 3 references");
+        assert_memory_equal(&servers[where]->words[30], words, sizeof words);
+        assert_int_equal(mbpoll(place[where], "-a 17 -r 118 -t 0", "1 0 1 1"), 0);
+        assert_int_equal(servers[where]->bits[2], (before & 3) | 0x34 | (before & 0xC0));
+    }
+}
+
+static void it_is_told_exceptions(void **state)
+{
+    unsigned where;
+
+    (void)state;
+    for (where = 0; where < 2; where++) {
+        assert_int_equal(mbpoll(place[where], "-a 17 -r 99", ""), 1);
+        shows("Illegal data address");
+        assert_int_equal(mbpoll(place[where], "-a 17 -r 260", "48879"), 1);
+        shows("Illegal data value");
+        assert_int_equal(mbpoll(place[where], "-a 18 -r 0 -t 1", ""), 1);
+        shows("Illegal function");
+    }
+}
+
+static void it_reads_two_units_of_one_line(void **state)
+{
+    (void)state;
+    rtu.other_words[3] = 1234;
+    tcp.other_words[3] = 4321;
+    assert_int_equal(mbpoll(place[1], "-a 18 -r 3", ""), 0);
+    assert_int_equal(value(3, 10), 1234);
+    assert_int_equal(mbpoll(place[0], "-a 18 -r 3", ""), 0);
+    assert_int_equal(value(3, 10), 4321);
+    assert_int_equal(mbpoll(place[1], "-a 17 -r 399", ""), 0);
+    assert_int_equal(value(399, 10), served_pattern(399));
+}
+
+static void it_reads_the_server_id(void **state)
+{
+    (void)state;
+    assert_int_equal(mbpoll(place[1], "-a 17 -u", ""), 0);
+    shows("Length: 8");
+    shows("Data  : m\\FFtest");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(it_reads_every_table),          cmocka_unit_test(it_writes_one_and_several),
+        cmocka_unit_test(it_is_told_exceptions),         cmocka_unit_test(it_reads_two_units_of_one_line),
+        cmocka_unit_test(it_reads_the_server_id),
+    };
+
+    return cmocka_run_group_tests(tests, start, stop);
+}

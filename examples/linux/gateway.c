@@ -1,0 +1,351 @@
+/* A gateway: Modbus TCP comes in, RTU goes out to the devices of serial lines.
+ *
+ *     gateway PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...
+ *     gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,32-40
+ *
+ * The unit id says which line a request is for; a device has so many milliseconds
+ * to respond. Nothing waits: while one line waits for a device, the others and all
+ * connections go on. A connection has one request under way; what it sends behind
+ * that waits in its socket. Prints `ready PORT` once it listens.
+ *
+ * Where there is no response to hand on, the gateway answers itself (V1.1b3, 7):
+ * 0A for a unit of no line, a line that cannot be opened, is lost, or has as many
+ * requests as it holds; 0B for a device that does not respond, or only with damage.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#define _GNU_SOURCE
+#include "mbm_tcp.h"
+#include "mbm_tty.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+enum {
+    CONNECTIONS = 16, /* no more than a client holds requests */
+    LINES = 4,
+    DATA = 252,
+    REOPEN_MICROS = 1000000,
+    PATH_UNAVAILABLE = MBM_REPLY_EXCEPTION | 0x0A,
+    NO_RESPONSE = MBM_REPLY_EXCEPTION | 0x0B
+};
+
+/* A serial line and the client that asks its devices. */
+typedef struct line {
+    mbm_tty tty;
+    mbm_tty_options options;
+    mbm_client client;
+    const char *path;
+    uint32_t tried;  /* when it was opened last, if it is not open */
+    uint8_t is_open;
+    uint8_t frame[MBM_MAX_FRAME];
+} line;
+
+/* A connection, whose one unit is every unit. */
+typedef struct connection {
+    mbm_server server;
+    mbm_unit unit;
+    mbm_custom every;
+    mbm_clientRequest request;
+    line *asked; /* whose device has the request; else NULL */
+    uint8_t reply[DATA];
+    uint8_t frame[2 * MBM_MAX_TCP_FRAME]; /* a request and, behind it, its response */
+} connection;
+
+/* All storage is the program's own; mbm allocates nothing. */
+static line lines[LINES];
+static unsigned line_count;
+static line *route[256];
+static connection connections[CONNECTIONS];
+static mbm_tcp tcps[CONNECTIONS];
+static uint8_t is_used[CONNECTIONS];
+static mbm_tcp_listener listener;
+static volatile sig_atomic_t is_over;
+static sigset_t awake; /* the signals that come while it works wait for its sleep */
+
+static void finish(int number)
+{
+    (void)number;
+    is_over = 1;
+}
+
+static uint32_t micros(void)
+{
+    struct timespec now;
+
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint32_t)now.tv_sec * 1000000u + (uint32_t)now.tv_nsec / 1000u;
+}
+
+/* --- lines --- */
+
+static void close_line(void *context)
+{
+    line *l = (line *)context;
+
+    if (l->is_open)
+        mbm_tty_close(&l->tty);
+    l->is_open = 0;
+}
+
+static uint8_t open_line(void *context)
+{
+    line *l = (line *)context;
+
+    l->tried = micros();
+    l->is_open = mbm_tty_openWith(&l->tty, l->path, &l->options) == 0;
+    return l->is_open ? MBM_OK : MBM_LINK_LOST;
+}
+
+/* Opens a line that is not open, now and then. */
+static int is_there(line *l)
+{
+    const mbm_link link = {l, close_line, open_line};
+
+    if (!l->is_open && micros() - l->tried >= REOPEN_MICROS)
+        mbm_client_reconnect(&l->client, &link);
+    return l->is_open;
+}
+
+/* Moves the requests of a line on. A line that is lost has ended them all. */
+static void poll_line(line *l)
+{
+    mbm_client_poll(&l->client);
+    if (l->is_open && l->tty.error != 0 && mbm_client_pending(&l->client) == 0) {
+        fprintf(stderr, "%s: %s\n", l->path, strerror(l->tty.error));
+        close_line(l);
+        l->tried = micros();
+    }
+}
+
+/* PATH,BAUD,PARITY+STOP,FIRST-LAST */
+static int add_line(char *text, uint16_t timeout)
+{
+    line *l = &lines[line_count];
+    unsigned baud, stop, first, last, unit;
+    char parity;
+    mbm_port port;
+    char *rest = strchr(text, ',');
+
+    if (!rest || line_count == LINES)
+        return -1;
+    *rest++ = 0;
+    if (sscanf(rest, "%u,%c%u,%u-%u", &baud, &parity, &stop, &first, &last) != 5 || first < 1 ||
+        last > 247 || stop > 2)
+        return -1;
+    line_count++;
+    l->path = text;
+    l->options.baud = baud;
+    l->options.parity = parity;
+    l->options.stop = (uint8_t)stop;
+    port = mbm_tty_port(&l->tty, NULL);
+    if (open_line(l) != MBM_OK)
+        perror(text);
+    if (mbm_client_beginRtu(&l->client, &port, l->frame, sizeof l->frame) != MBM_OK ||
+        mbm_client_setBaudRate(&l->client, baud) != MBM_OK ||
+        mbm_client_setResponseTimeout(&l->client, timeout) != MBM_OK)
+        return -1;
+    for (unit = first; unit <= last; unit++)
+        route[unit] = l;
+    return 0;
+}
+
+/* --- requests --- */
+
+/* How long the response is; of other functions, silence tells. */
+static mbm_rule length_of(uint8_t function)
+{
+    mbm_rule rule = {0};
+
+    switch (function) {
+    case 0x01: case 0x02: case 0x03: case 0x04:
+    case 0x0C: case 0x11: case 0x14: case 0x15: case 0x17:
+        rule.kind = MBM_RULE_COUNTED;
+        rule.bytes = 1;
+        break;
+    case 0x05: case 0x06: case 0x0B: case 0x0F: case 0x10:
+        rule.kind = MBM_RULE_FIXED;
+        rule.bytes = 5;
+        break;
+    case 0x07:
+        rule.kind = MBM_RULE_FIXED;
+        rule.bytes = 2;
+        break;
+    case 0x16:
+        rule.kind = MBM_RULE_FIXED;
+        rule.bytes = 7;
+        break;
+    default:
+        break;
+    }
+    return rule;
+}
+
+/* What became of a request that a device had. */
+static uint16_t outcome(const connection *c, uint8_t *response, uint16_t capacity)
+{
+    if (c->request.status == MBM_OK) {
+        if (c->request.length > capacity)
+            return MBM_REPLY_EXCEPTION | MBM_SLAVE_DEVICE_FAILURE;
+        memcpy(response, c->reply, c->request.length);
+        return c->request.length;
+    }
+    if (c->request.exception != 0)
+        return (uint16_t)(MBM_REPLY_EXCEPTION | c->request.exception);
+    if (c->request.status == MBM_LINK_LOST || c->request.status == MBM_LINE_BUSY)
+        return PATH_UNAVAILABLE;
+    return NO_RESPONSE;
+}
+
+/* Serves every function of every unit: asks the device, and is asked again until
+ * that has answered. */
+static uint16_t forward(void *context, const mbm_request *request, uint8_t *response,
+                        uint16_t capacity)
+{
+    connection *c = (connection *)context;
+    const mbm_rule rule = length_of(request->function);
+    line *l = route[request->unit];
+
+    if (c->asked) {
+        if (c->request.status == MBM_PENDING)
+            return MBM_REPLY_PENDING;
+        c->asked = NULL;
+        return outcome(c, response, capacity);
+    }
+    if (!l || !is_there(l))
+        return PATH_UNAVAILABLE;
+    memset(&c->request, 0, sizeof c->request);
+    c->request.unit = request->unit;
+    /* It stays where it is until it is answered. */
+    c->request.data = request->data;
+    c->request.reply = c->reply;
+    c->request.replyBytes = sizeof c->reply;
+    switch (mbm_client_custom(&l->client, &c->request, request->function, request->length, &rule)) {
+    case MBM_PENDING: c->asked = l; return MBM_REPLY_PENDING;
+    case MBM_QUEUE_FULL: return PATH_UNAVAILABLE;
+    default: return MBM_REPLY_EXCEPTION | MBM_SLAVE_DEVICE_FAILURE;
+    }
+}
+
+/* --- connections --- */
+
+static void take_connections(void)
+{
+    int place;
+
+    while ((place = mbm_tcp_accept(&listener, tcps, CONNECTIONS)) >= 0) {
+        connection *c = &connections[place];
+        mbm_port port = mbm_tcp_port(&tcps[place], NULL);
+
+        memset(c, 0, sizeof *c);
+        c->every.serve = forward;
+        c->every.context = c;
+        is_used[place] = mbm_server_serveCustom(&c->unit, &c->every) == MBM_OK &&
+                         mbm_server_beginTcp(&c->server, &port, &c->unit, 1, c->frame,
+                                             sizeof c->frame) == MBM_OK;
+        if (!is_used[place])
+            mbm_tcp_close(&tcps[place]);
+    }
+}
+
+static void drop_connection(unsigned place)
+{
+    connection *c = &connections[place];
+
+    /* What it asked is nobody's any more. */
+    if (c->asked)
+        mbm_client_cancel(&c->asked->client, &c->request);
+    mbm_tcp_close(&tcps[place]);
+    is_used[place] = 0;
+}
+
+/* --- all of it --- */
+
+/* Sleeps until there is something to do. */
+static void wait_for_work(void)
+{
+    struct pollfd waits[1 + LINES + CONNECTIONS];
+    uint32_t delay = UINT32_MAX;
+    struct timespec time;
+    unsigned i;
+
+    waits[0] = (struct pollfd){listener.fd, POLLIN, 0};
+    for (i = 0; i < LINES; i++) {
+        const mbm_client *client = &lines[i].client;
+        uint32_t own = i < line_count ? mbm_client_pollDelay(client) : UINT32_MAX;
+        int is_busy = i < line_count && lines[i].is_open && mbm_client_pending(client) != 0;
+
+        waits[1 + i] = (struct pollfd){is_busy ? lines[i].tty.fd : -1, POLLIN, 0};
+        delay = own < delay ? own : delay;
+    }
+    for (i = 0; i < CONNECTIONS; i++) {
+        struct pollfd *one = &waits[1 + LINES + i];
+
+        *one = (struct pollfd){is_used[i] ? tcps[i].fd : -1, POLLIN, 0};
+        /* Its next request may wait. */
+        if (is_used[i] && connections[i].asked)
+            one->events = connections[i].request.status == MBM_PENDING ? 0 : POLLOUT;
+        /* The socket was full. */
+        else if (is_used[i] && mbm_server_pollDelay(&connections[i].server) == 0)
+            one->events = POLLOUT;
+    }
+    time = (struct timespec){(time_t)(delay / 1000000u), (long)(delay % 1000000u) * 1000};
+    if (ppoll(waits, 1 + LINES + CONNECTIONS, delay == UINT32_MAX ? NULL : &time,
+              &awake) <= 0)
+        return;
+    for (i = 0; i < CONNECTIONS; i++)
+        if (is_used[i] && connections[i].asked &&
+            (waits[1 + LINES + i].revents & (POLLERR | POLLHUP | POLLNVAL)))
+            drop_connection(i);
+}
+
+int main(int argc, char **argv)
+{
+    struct sigaction action = {0};
+    sigset_t ends;
+    unsigned long timeout = argc > 3 ? strtoul(argv[2], NULL, 10) : 0;
+    int i;
+
+    for (i = 3; timeout > 0 && timeout <= UINT16_MAX && i < argc; i++)
+        if (add_line(argv[i], (uint16_t)timeout) != 0)
+            break;
+    if (i < 4 || i < argc) {
+        fprintf(stderr, "usage: %s PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...\n", argv[0]);
+        return 2;
+    }
+    if (mbm_tcp_listen(&listener, NULL, argv[1]) != 0) {
+        perror(argv[1]);
+        return 1;
+    }
+    sigemptyset(&ends);
+    sigaddset(&ends, SIGINT);
+    sigaddset(&ends, SIGTERM);
+    sigprocmask(SIG_BLOCK, &ends, &awake);
+    action.sa_handler = finish;
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    printf("ready %u\n", listener.port);
+    fflush(stdout);
+    while (!is_over) {
+        unsigned place;
+
+        take_connections();
+        for (place = 0; place < line_count; place++)
+            poll_line(&lines[place]);
+        for (place = 0; place < CONNECTIONS; place++)
+            if (is_used[place] && mbm_server_poll(&connections[place].server) != MBM_OK)
+                drop_connection(place);
+        wait_for_work();
+    }
+    for (i = 0; i < CONNECTIONS; i++)
+        if (is_used[i])
+            drop_connection((unsigned)i);
+    for (i = 0; i < (int)line_count; i++)
+        close_line(&lines[i]);
+    mbm_tcp_closeListener(&listener);
+    return 0;
+}

@@ -1,0 +1,34 @@
+//! A pymodbus client asks our server in C for every function that it has, and
+//! checks each value: see `pymodbus_client.py`.
+
+use crate::process::Script;
+
+fn a_client_is_answered(framing: &str) {
+    let mut server = Script::serve(framing);
+    let ready = server.line();
+    let place = ready.strip_prefix("ready ").expect("it is ready");
+    let mut client = Script::start("pymodbus_client.py", &[framing, place]);
+    let said = client.line();
+    let answers = said.strip_suffix(" answers").and_then(|n| n.parse().ok());
+    assert!(answers.is_some_and(|n: u32| n > 80), "{framing}: {said}");
+}
+
+#[test]
+fn a_pymodbus_client_is_answered_every_function_over_tcp() {
+    a_client_is_answered("tcp");
+}
+
+#[test]
+fn a_pymodbus_client_is_answered_every_function_over_rtu() {
+    a_client_is_answered("rtu");
+}
+
+#[test]
+fn a_pymodbus_client_is_answered_every_function_over_ascii() {
+    a_client_is_answered("ascii");
+}
+
+#[test]
+fn a_pymodbus_client_is_answered_every_function_over_rtu_in_tcp() {
+    a_client_is_answered("rtu-over-tcp");
+}
