@@ -136,16 +136,20 @@ $(eval $(call variant,bench,gcc,g++,-O2))
 BENCH := $(BUILD)/bench/bench
 $(BENCH): $(patsubst %,$(BUILD)/bench/%.o,bench support/pty support/server linux/mbm_tty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
+BENCH_CLIENT := $(BUILD)/bench/bench_client
+$(BENCH_CLIENT): $(patsubst %,$(BUILD)/bench/%.o,bench_client support/pty support/server linux/mbm_tty linux/mbm_tcp) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
 BENCH_SERVER := $(BUILD)/bench/bench_server
 $(BENCH_SERVER): $(patsubst %,$(BUILD)/bench/%.o,bench_server linux/mbm_tcp linux/mbm_tty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -o $@
 
 .PHONY: bench
-bench: ## Speed and instructions beside libmodbus and rmodbus; writes docs/speed.md
+bench: ## Speed and instructions beside libmodbus and rmodbus; writes docs/*speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
-	@$(MAKE) --no-print-directory $(BENCH) $(BENCH_SERVER)
+	@$(MAKE) --no-print-directory $(BENCH) $(BENCH_SERVER) $(BENCH_CLIENT)
 	@scripts/bench $(BENCH)
 	@scripts/bench-server $(BENCH_SERVER)
+	@scripts/bench-client $(BENCH_CLIENT)
 	@CARGO="$(CARGO)" scripts/bench-frames
 
 DEMO := $(BUILD)/plain/linux/demo

@@ -30,7 +30,8 @@ AVR_ELFS := $(EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(EXAMPLES:%=$(AVR_OUT)/mega/%.el
             $(patsubst %,$(AVR_OUT)/uno/%.elf,$(filter-out $(MEGA_SKETCHES),$(TEST_SKETCHES))) \
             $(MEGA_SKETCHES:%=$(AVR_OUT)/mega/%.elf)
 # What it takes with the small library.
-MINIMAL_ELFS := $(patsubst %,$(AVR_OUT)/uno-minimal/%.elf,SizeFC03 Basic PhoenixContact Probe)
+MINIMAL_ELFS := $(patsubst %,$(AVR_OUT)/uno-minimal/%.elf,SizeFC03 Basic PhoenixContact Probe \
+                ServeSensorAndRelay)
 # The library as it was when a sketch was last compiled against it.
 DIST_STAMP := $(BUILD)/avr/library
 
@@ -56,7 +57,7 @@ $(eval $(call sketches,uno-minimal))
 
 # --- the programs that run them
 
-AVR_SUPPORT := $(patsubst %,$(BUILD)/avr-tests/%.o,board peer server pty)
+AVR_SUPPORT := $(patsubst %,$(BUILD)/avr-tests/%.o,board bus peer server pty)
 AVR_TESTS := $(patsubst firmware-tests/avr/%.c,$(BUILD)/avr-tests/%,$(wildcard firmware-tests/avr/test_*.c))
 AVR_FLAGS = -std=c11 -O2 -g $(WARNINGS) -Ifirmware-tests/avr -Ic-tests/support -Iinclude -isystem /usr/include/simavr $(MODBUS)
 AVR_HEADERS := $(wildcard firmware-tests/avr/*.h c-tests/support/*.h)

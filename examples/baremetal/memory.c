@@ -56,6 +56,8 @@ int memcmp(const void *left, const void *right, size_t length)
 void __aeabi_memcpy(void *to, const void *from, size_t length);
 void __aeabi_memcpy4(void *to, const void *from, size_t length);
 void __aeabi_memcpy8(void *to, const void *from, size_t length);
+void __aeabi_memmove(void *to, const void *from, size_t length);
+void __aeabi_memmove4(void *to, const void *from, size_t length);
 void __aeabi_memset(void *to, size_t length, int value);
 void __aeabi_memset4(void *to, size_t length, int value);
 void __aeabi_memclr(void *to, size_t length);
@@ -75,6 +77,16 @@ void __aeabi_memcpy4(void *to, const void *from, size_t length)
 void __aeabi_memcpy8(void *to, const void *from, size_t length)
 {
     memcpy(to, from, length);
+}
+
+void __aeabi_memmove(void *to, const void *from, size_t length)
+{
+    memmove(to, from, length);
+}
+
+void __aeabi_memmove4(void *to, const void *from, size_t length)
+{
+    memmove(to, from, length);
 }
 
 void __aeabi_memset(void *to, size_t length, int value)

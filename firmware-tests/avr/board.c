@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <simavr/avr_adc.h>
 #include <simavr/avr_ioport.h>
 #include <simavr/avr_uart.h>
 #include <simavr/sim_avr.h>
@@ -11,6 +12,7 @@
 
 /* The simulator's macros are signed. */
 #define UART_IRQ(number) ((uint32_t)AVR_IOCTL_UART_GETIRQ(number))
+#define ADC_IRQ(channel) (ADC_IRQ_ADC0 + (channel))
 #define PORT_IRQ(port) ((uint32_t)AVR_IOCTL_IOPORT_GETIRQ(port))
 
 enum { PAINT = 0xC5, SPL_AT = 0x5D };
@@ -66,6 +68,7 @@ board *board_new(const char *elf, const char *mcu)
         die("unknown to the simulator", mcu);
     avr_init(b->avr);
     b->firmware.frequency = MHZ * 1000000;
+    b->firmware.vcc = b->firmware.avcc = b->firmware.aref = 5000;
     avr_load_firmware(b->avr, &b->firmware);
     return b;
 }
@@ -317,6 +320,11 @@ int board_pin(board *b, char port, int pin)
 
     avr_ioctl(b->avr, (uint32_t)AVR_IOCTL_IOPORT_GETSTATE(port), &state);
     return state.port >> pin & 1;
+}
+
+void board_sensor(board *b, int channel, unsigned millivolts)
+{
+    avr_raise_irq(avr_io_getirq(b->avr, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ(channel)), millivolts);
 }
 
 /* --- running */

@@ -55,6 +55,9 @@ typedef void (*pin_changed)(void *context, int level, uint64_t cycle);
 void board_watch_pin(board *b, char port, int pin, pin_changed changed, void *context);
 int board_pin(board *b, char port, int pin);
 
+/* The voltage at an analogue pin, of the 5 V that the board runs on. */
+void board_sensor(board *b, int channel, unsigned millivolts);
+
 /* Runs for so many cycles; false if the firmware crashed. */
 int board_run(board *b, uint64_t cycles);
 /* Runs until a byte of RAM has a value, for so long at most; false if never. */

@@ -29,7 +29,7 @@ const machine machines[] = {
 };
 const unsigned machine_count = sizeof machines / sizeof machines[0];
 
-static void become_qemu(const machine *m, int line, int console)
+static void become_qemu(const machine *m, const char *name, int line, int console)
 {
     const char *folder = getenv("MBM_FIRMWARE");
     char image[512], set[64];
@@ -44,9 +44,9 @@ static void become_qemu(const machine *m, int line, int console)
         arguments[n] = m->arguments[n];
         n++;
     }
-    snprintf(image, sizeof image, "%s%s/%s/firmware.elf",
+    snprintf(image, sizeof image, "%s%s/%s/%s.elf",
              strcmp(arguments[n - 1], "-device") ? "" : "loader,cpu-num=0,file=",
-             folder ? folder : "build/baremetal", m->name);
+             folder ? folder : "build/baremetal", m->name, name);
     arguments[n++] = image;
     /* The descriptor itself, not its name: no wait for the other end to open,
      * and no byte lost before it has. */
@@ -83,30 +83,62 @@ static int wait_for(pid_t child, int *status)
     return 0;
 }
 
-run machine_run(const machine *m, int line)
+running machine_start(const machine *m, const char *image, int line)
 {
-    FILE *console = tmpfile();
+    running r = {tmpfile(), -1};
+
+    if (!r.console || (r.child = fork()) < 0) {
+        perror("machine_start");
+        abort();
+    }
+    if (r.child == 0)
+        become_qemu(m, image, line, fileno(r.console));
+    return r;
+}
+
+int machine_says(const running *r, const char *text)
+{
+    char console[4096];
+    unsigned naps;
+
+    for (naps = 0; naps < 100 * PATIENCE; naps++) {
+        /* At a place of its own: the console's writer shares the other. */
+        ssize_t length = pread(fileno(r->console), console, sizeof console - 1, 0);
+
+        console[length < 0 ? 0 : length] = '\0';
+        if (strstr(console, text))
+            return 1;
+        usleep(10000);
+    }
+    return 0;
+}
+
+run machine_finish(running *r, int patient)
+{
     run result = {0, -1, ""};
-    pid_t child;
     int status = 0;
     size_t length;
 
-    if (!console || (child = fork()) < 0) {
-        perror("machine_run");
-        abort();
-    }
-    if (child == 0)
-        become_qemu(m, line, fileno(console));
-    result.ended = wait_for(child, &status);
+    if (!r->console)
+        return result;
+    result.ended = patient && wait_for(r->child, &status);
     if (!result.ended) {
-        kill(child, SIGKILL);
-        waitpid(child, &status, 0);
+        kill(r->child, SIGKILL);
+        waitpid(r->child, &status, 0);
     } else if (WIFEXITED(status)) {
         result.code = WEXITSTATUS(status);
     }
-    rewind(console);
-    length = fread(result.console, 1, sizeof result.console - 1, console);
+    rewind(r->console);
+    length = fread(result.console, 1, sizeof result.console - 1, r->console);
     result.console[length] = '\0';
-    fclose(console);
+    fclose(r->console);
+    r->console = NULL;
     return result;
+}
+
+run machine_run(const machine *m, int line)
+{
+    running r = machine_start(m, "firmware", line);
+
+    return machine_finish(&r, 1);
 }

@@ -3,12 +3,14 @@
 BAREMETAL := examples/baremetal/Makefile
 # Of the firmware's Makefile.
 MACHINES = $(shell $(MAKE) -s --no-print-directory -f $(BAREMETAL) machines)
+VARIANTS = $(shell $(MAKE) -s --no-print-directory -f $(BAREMETAL) variants)
 
-QEMU_TEST := $(BUILD)/firmware/test_qemu
-QEMU_SOURCES := $(wildcard firmware-tests/qemu/*.c) $(patsubst %,c-tests/support/%.c,pty server model request)
-$(QEMU_TEST): $(QEMU_SOURCES) $(wildcard firmware-tests/qemu/*.h c-tests/support/*.h) examples/baremetal/report.h include/mbm.h
+QEMU_TESTS := $(patsubst firmware-tests/qemu/%.c,$(BUILD)/firmware/%,$(wildcard firmware-tests/qemu/test_*.c))
+QEMU_SOURCES := $(filter-out firmware-tests/qemu/test_%,$(wildcard firmware-tests/qemu/*.c)) \
+                $(patsubst %,c-tests/support/%.c,pty server model request)
+$(QEMU_TESTS): $(BUILD)/firmware/%: firmware-tests/qemu/%.c $(QEMU_SOURCES) $(wildcard firmware-tests/qemu/*.h c-tests/support/*.h examples/baremetal/*.h) include/mbm.h
 	@mkdir -p $(@D)
-	@gcc $(CFLAGS) $(WARNINGS) -Iinclude -Ic-tests/support -Iexamples/baremetal $(MODBUS) $(QEMU_SOURCES) \
+	@gcc $(CFLAGS) $(WARNINGS) -Iinclude -Ic-tests/support -Iexamples/baremetal $(MODBUS) $< $(QEMU_SOURCES) \
 		-lmodbus -lcmocka -lpthread -o $@
 
 .PHONY: firmware-test-qemu
@@ -18,7 +20,9 @@ firmware-test-qemu: ## Bare metal firmware on seven machines in QEMU: Arm, RISC-
 	@set -e; for machine in $(MACHINES); do \
 		scripts/archive $$($(MAKE) -s --no-print-directory -f $(BAREMETAL) mcu MACHINE=$$machine); \
 		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$machine; \
+		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$machine PROGRAM=serve; \
 	done
-	@$(MAKE) -s --no-print-directory $(QEMU_TEST)
-	@scripts/run-c-tests "" $(QEMU_TEST)
-	@echo "firmware-test-qemu: $(words $(MACHINES)) firmwares ($(MACHINES)) against a libmodbus server and a bad wire"
+	@set -e; for variant in $(VARIANTS); do $(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$variant; done
+	@$(MAKE) -s --no-print-directory $(QEMU_TESTS)
+	@scripts/run-c-tests "" $(QEMU_TESTS)
+	@echo "firmware-test-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against libmodbus, server and client, and a bad wire"

@@ -169,7 +169,7 @@ pub struct mbm_function {
 
 /// The core's word for a rule; none if it is no rule.
 pub(super) fn rule(rule: mbm_rule) -> Option<Rule> {
-    let fits = |most| (1..=most).contains(&rule.bytes);
+    let fits = |most| rule.bytes > 0 && rule.bytes <= most;
     match rule.kind {
         MBM_RULE_SILENCE => Some(Rule::Silence),
         MBM_RULE_FIXED if fits(MAX_PDU as u8) => Some(Rule::Fixed(rule.bytes)),

@@ -43,6 +43,18 @@ impl mbm_port {
     pub(super) fn is_complete(&self) -> bool {
         self.read.is_some() && self.write.is_some() && self.micros.is_some()
     }
+
+    /// Becomes as another. (Field by field: at once would be a call of memcpy.)
+    pub(super) fn copy(&mut self, from: &mbm_port) {
+        self.context = from.context;
+        self.read = from.read;
+        self.write = from.write;
+        self.micros = from.micros;
+        self.flush = from.flush;
+        self.preTransmission = from.preTransmission;
+        self.postTransmission = from.postTransmission;
+        self.idle = from.idle;
+    }
 }
 
 // SAFETY, here and below: the hooks are C functions that keep the contract

@@ -2,6 +2,7 @@
 //! data go.
 
 use crate::error::Status;
+use crate::pdu::limits::MAX_PDU;
 use crate::pdu::outline::Outline;
 use crate::transaction::Question;
 use core::num::NonZeroU8;
@@ -104,6 +105,13 @@ pub trait Job {
     /// indices below [`Ticket::capacity`] only.
     fn put(&mut self, index: usize, byte: u8);
 
+    /// Takes all of the response's data, from the first byte on.
+    fn put_all(&mut self, bytes: &[u8]) {
+        for (index, byte) in bytes.iter().enumerate() {
+            self.put(index, *byte);
+        }
+    }
+
     /// True if the response's data are wanted at all.
     fn wants_data(&self) -> bool {
         true
@@ -121,12 +129,10 @@ pub(super) fn deliver<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
     if data.len() > usize::from(ticket.capacity) {
         return Status::BUFFER_TOO_SMALL;
     }
-    let mask = ticket.outline.mask();
     job.ticket_mut().length = data.len() as u8;
-    for (index, byte) in data.iter().enumerate() {
-        job.put(index, *byte);
-    }
+    job.put_all(data);
     // The bits behind the last one are zero.
+    let mask = job.ticket().outline.mask();
     if let (Some(last), true) = (data.last(), mask != 0xFF) {
         job.put(data.len() - 1, *last & mask);
     }
@@ -150,8 +156,9 @@ impl<J: Job> Asked<J> {
         }
     }
 
-    fn byte(&self, index: usize) -> u8 {
-        self.job.as_ref().map_or(0, |job| job.byte(index))
+    /// What gives the bytes to send. (One type, so one function for all who ask.)
+    fn bytes(&self) -> impl Fn(usize) -> u8 + '_ {
+        |index| self.job.as_ref().map_or(0, |job| job.byte(index))
     }
 }
 
@@ -173,7 +180,7 @@ impl<J: Job> Question for Asked<J> {
     }
 
     fn emit(&self, pdu: &mut [u8], _: &[u16]) {
-        self.outline().emit(pdu, |index| self.byte(index));
+        self.outline().emit(pdu, self.bytes());
     }
 
     fn may_be_broadcast(&self) -> bool {
@@ -191,9 +198,10 @@ impl<J: Job> Question for Asked<J> {
     fn expected(&self, pdu: &[u8]) -> Option<NonZeroU8> {
         let whole = if self.ended {
             // What arrived last is the check.
-            Some(pdu.len().saturating_sub(2))
+            pdu.len().saturating_sub(2)
         } else {
-            None
+            // While more may come, it is never complete, but for the longest.
+            pdu.len().min(MAX_PDU)
         };
         self.outline().expected(pdu, whole)
     }
@@ -201,7 +209,7 @@ impl<J: Job> Question for Asked<J> {
     fn judge(&mut self, pdu: &[u8]) -> Status {
         let pdu = pdu.get(..pdu.len().saturating_sub(2)).unwrap_or_default();
         self.length = pdu.len() as u8;
-        self.outline().judge(pdu, |index| self.byte(index))
+        self.outline().judge(pdu, self.bytes())
     }
 
     fn ends(&mut self, ended: bool) {

@@ -13,11 +13,11 @@ mod tcp;
 mod units;
 
 pub use job::{Asked, Job, Ticket};
-pub use policy::{Backoff, Policy};
+pub use policy::{again, Backoff, Policy};
 pub use serial::Serial;
 pub use shared::Shared;
 pub use tcp::Tcp;
-pub use units::{Means, Unit};
+pub use units::{note, rest, Means, Unit};
 
 use crate::error::Status;
 use crate::time::millis;
@@ -108,6 +108,16 @@ impl<L, J, const N: usize> Client<L, J, N> {
     pub const fn is_connected(&self) -> bool {
         self.shared.connected
     }
+
+    /// Ends what [`Client::lend`] began.
+    pub fn take_back(&mut self) {
+        self.lent = false;
+    }
+
+    /// True while somebody else uses the line.
+    pub const fn is_lent(&self) -> bool {
+        self.lent
+    }
 }
 
 impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
@@ -191,7 +201,7 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
         ticket.retries = 0;
         ticket.enter(Stage::Queued, 0, 0);
         self.shared.look = true;
-        self.shared.queue.push_back(job)
+        self.shared.queue.push(job)
     }
 
     /// [`Status::PENDING`] if a job may be queued, else why not.
@@ -237,7 +247,13 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// pending.
     pub fn cancel(&mut self, is: impl Fn(&J) -> bool) -> Option<J> {
         let held = self.line.withdraw(&is);
-        let mut job = held.or_else(|| self.shared.take(|job| is(job)))?;
+        let mut job = match held {
+            Some(job) => job,
+            None => {
+                let at = self.shared.place(|job| is(job))?;
+                self.shared.remove(at)?
+            }
+        };
         self.line.released(&job);
         self.shared.look = true;
         job.ticket_mut().status = Status::CANCELLED;
@@ -258,15 +274,5 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
         let free = !self.lent && self.line.is_idle();
         self.lent |= free;
         free
-    }
-
-    /// Ends what [`Client::lend`] began.
-    pub fn take_back(&mut self) {
-        self.lent = false;
-    }
-
-    /// True while somebody else uses the line.
-    pub const fn is_lent(&self) -> bool {
-        self.lent
     }
 }

@@ -1,5 +1,9 @@
 //! When a request is asked again that was not answered.
 
+use super::job::{Stage, Ticket};
+use super::units::Means;
+use crate::error::Status;
+
 /// How the wait grows from one retry to the next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
@@ -78,6 +82,24 @@ impl Policy {
         }
     }
 
+    /// What becomes of a request that ended with `status`: true if it has ended for
+    /// good, false if it waits to be asked again.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn ends(
+        &self,
+        ticket: &mut Ticket,
+        status: Status,
+        now: u32,
+        means: &mut impl Means,
+    ) -> bool {
+        let again = means.again(self, ticket, status, now);
+        means.note(ticket.unit, status, again, now);
+        if !again {
+            ticket.status = status;
+        }
+        !again
+    }
+
     fn grown(&self, retry: u8, random: u32) -> u32 {
         // Added up, for a product would be a wide one.
         let (mut wait, mut step) = (0, self.wait);
@@ -92,6 +114,24 @@ impl Policy {
         }
         wait - share(share(wait, u16::from(self.jitter) << 8), random as u16)
     }
+}
+
+/// True if a request that ended with `status` is asked again; then it waits for
+/// that. `random` gives any number.
+pub fn again(
+    policy: &Policy,
+    ticket: &mut Ticket,
+    status: Status,
+    now: u32,
+    random: impl FnOnce() -> u32,
+) -> bool {
+    if ticket.retries >= policy.retries || !status.may_be_repeated() {
+        return false;
+    }
+    ticket.retries += 1;
+    let wait = policy.wait(ticket.retries, random);
+    ticket.enter(Stage::Queued, now, wait);
+    true
 }
 
 /// So many 65536ths of a time. (In steps, which need no wide multiplication.)

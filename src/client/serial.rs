@@ -50,6 +50,11 @@ impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
         &mut self.engine
     }
 
+    /// Moves the request under way on.
+    fn step(&mut self, now: u32) -> Status {
+        self.engine.poll(now)
+    }
+
     fn received(&mut self, job: &mut J, status: Status) -> Status {
         let ticket = job.ticket_mut();
         ticket.exception = self.engine.exception_code();
@@ -86,9 +91,10 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         _: bool,
     ) -> Option<J> {
         let started = if !self.engine.is_pending() {
-            let job = shared.take_due(now, self.engine.storage.units(), |_| true)?;
+            let at = shared.due(0, now, &mut self.engine.storage, |_| true)?;
+            let job = shared.remove(at)?;
             if job.ticket().is(Stage::Lost) {
-                return shared.end(job, Status::LINK_LOST, now, &mut self.engine.storage);
+                return shared.conclude(job, Status::LINK_LOST, now, &mut self.engine.storage);
             }
             let unit = job.ticket().unit;
             self.engine.forget();
@@ -98,7 +104,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
             Status::PENDING
         };
         let status = match started {
-            Status::PENDING => self.engine.poll(now),
+            Status::PENDING => self.step(now),
             refused => refused,
         };
         if status == Status::PENDING {
@@ -111,7 +117,8 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         } else {
             shared.connected = true;
         }
-        shared.end(job, status, now, &mut self.engine.storage)
+        // There is room: it came out of the queue, and was counted as if in it.
+        shared.conclude(job, status, now, &mut self.engine.storage)
     }
 
     fn withdraw(&mut self, is: impl FnOnce(&J) -> bool) -> Option<J> {
@@ -126,7 +133,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         self.engine.cancel();
         if let Some(mut job) = self.engine.request().job.take() {
             job.ticket_mut().enter(Stage::Lost, 0, 0);
-            let _ = shared.queue.push_front(job);
+            shared.put_first(job);
             shared.look = true;
         }
     }

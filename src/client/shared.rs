@@ -3,10 +3,10 @@
 
 use super::job::{Job, Stage};
 use super::policy::Policy;
-use super::units::{self, Means, Unit};
+use super::units::Means;
 use crate::error::Status;
 use crate::time::elapsed;
-use heapless::Deque;
+use heapless::Vec;
 
 /// The requests of a client and its policy.
 #[repr(C)]
@@ -18,7 +18,7 @@ pub struct Shared<J, const N: usize> {
     since: u32,
     wait: u32,
     pub(super) policy: Policy,
-    pub(super) queue: Deque<J, N>,
+    pub(super) queue: Vec<J, N>,
 }
 
 impl<J, const N: usize> Shared<J, N> {
@@ -29,7 +29,7 @@ impl<J, const N: usize> Shared<J, N> {
             since: 0,
             wait: u32::MAX,
             policy: Policy::DEFAULT,
-            queue: Deque::new(),
+            queue: Vec::new(),
         }
     }
 }
@@ -46,43 +46,52 @@ impl<J: Job, const N: usize> Shared<J, N> {
         }
     }
 
-    /// Takes the first job out of the queue that `is` the one.
+    /// Takes a job out of its place in the queue.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn take(&mut self, mut is: impl FnMut(&mut J) -> bool) -> Option<J> {
-        let mut found = None;
-        for passed in 0..self.queue.len() {
-            let mut job = self.queue.pop_front()?;
-            if found.is_none() && is(&mut job) {
-                if passed == 0 {
-                    return Some(job);
-                }
-                found = Some(job);
-            } else {
-                let _ = self.queue.push_back(job);
-            }
+    pub(super) fn remove(&mut self, at: usize) -> Option<J> {
+        let mut moved = self.queue.pop()?;
+        for place in self.queue.get_mut(at..)?.iter_mut().rev() {
+            core::mem::swap(place, &mut moved);
         }
-        found
+        Some(moved)
     }
 
-    /// Takes the first job that is due and that the line would `accept`; if there
-    /// is none, notes when somebody will be.
-    pub(super) fn take_due(
-        &mut self,
-        now: u32,
-        units: &mut [Unit],
-        mut accept: impl FnMut(&J) -> bool,
-    ) -> Option<J> {
-        if self.delay(now) > 0 {
-            return None;
+    /// Puts a job before all others; there is room for it.
+    pub(super) fn put_first(&mut self, mut job: J) {
+        for place in self.queue.iter_mut() {
+            core::mem::swap(place, &mut job);
         }
-        let mut least = u32::MAX;
-        let found = self.take(|job| {
+        let _ = self.queue.push(job);
+    }
+
+    /// The place of the first job that `is` the one.
+    pub(super) fn place(&self, is: impl FnMut(&J) -> bool) -> Option<usize> {
+        self.queue.iter().position(is)
+    }
+
+    /// The place of the first job, `from` a place on, that is due and that the line
+    /// would `accept`; if there is none, notes when somebody will be. Who goes on
+    /// where the last one was found keeps what was noted on the way there.
+    pub(super) fn due(
+        &mut self,
+        from: usize,
+        now: u32,
+        means: &mut impl Means,
+        mut accept: impl FnMut(&J) -> bool,
+    ) -> Option<usize> {
+        let mut least = self.wait;
+        if from == 0 {
+            if self.delay(now) > 0 {
+                return None;
+            }
+            least = u32::MAX;
+        }
+        let mut rest = self.queue.get(from..)?.iter();
+        let found = rest.position(|job| {
             let ticket = job.ticket();
             let mut wait = ticket.wait.saturating_sub(elapsed(now, ticket.since));
             if ticket.is(Stage::Queued) {
-                if let Some(unit) = units::find(units, ticket.unit) {
-                    wait = wait.max(unit.rest(now));
-                }
+                wait = wait.max(means.rest(ticket.unit, now));
             }
             if wait > 0 {
                 least = least.min(wait);
@@ -92,34 +101,41 @@ impl<J: Job, const N: usize> Shared<J, N> {
         self.look = found.is_some();
         self.since = now;
         self.wait = least;
-        found
+        found.map(|at| from + at)
     }
 
-    /// What becomes of a job whose request ended with `status`: it waits to be
-    /// asked again, or is given back.
-    #[cfg_attr(target_os = "none", inline(never))]
+    /// What becomes of the job in a place, whose request ended with `status`: it
+    /// waits there to be asked again, or is given back.
     pub(super) fn end(
+        &mut self,
+        at: usize,
+        status: Status,
+        now: u32,
+        means: &mut impl Means,
+    ) -> Option<J> {
+        self.look = true;
+        let ticket = self.queue.get_mut(at)?.ticket_mut();
+        if self.policy.ends(ticket, status, now, means) {
+            return self.remove(at);
+        }
+        None
+    }
+
+    /// As [`Shared::end`], of a job that was taken out of the queue; there is room
+    /// for it.
+    pub(super) fn conclude(
         &mut self,
         mut job: J,
         status: Status,
         now: u32,
         means: &mut impl Means,
     ) -> Option<J> {
-        let ticket = job.ticket_mut();
-        let again = ticket.retries < self.policy.retries && status.may_be_repeated();
-        if let Some(unit) = units::find(means.units(), ticket.unit) {
-            unit.note(status, again, now);
-        }
         self.look = true;
-        if !again {
-            ticket.status = status;
+        if self.policy.ends(job.ticket_mut(), status, now, means) {
             return Some(job);
         }
-        ticket.retries += 1;
-        let wait = self.policy.wait(ticket.retries, || means.random());
-        ticket.enter(Stage::Queued, now, wait);
-        // There is room: it came out of the queue, or was counted as if in it.
-        self.queue.push_front(job).err()
+        self.put_first(job);
+        None
     }
 
     /// The link is gone, and with it all that was to be asked over it.

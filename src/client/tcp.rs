@@ -107,15 +107,23 @@ impl<P: Port, S: Means> Tcp<P, S> {
     }
 
     /// Finds the next response among what arrived; gives back a job that ended.
+    #[inline]
     fn dispatch<J: Job, const N: usize>(
         &mut self,
         shared: &mut Shared<J, N>,
         now: u32,
     ) -> Option<J> {
+        self.pass();
+        if self.start == self.end {
+            return None;
+        }
+        self.find(shared, now)
+    }
+
+    /// As [`Tcp::dispatch`], of bytes that are there.
+    fn find<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>, now: u32) -> Option<J> {
         loop {
-            let skipped = self.skip.min(self.end - self.start);
-            self.start += skipped;
-            self.skip -= skipped;
+            self.pass();
             let range = usize::from(self.start)..usize::from(self.end);
             let rest = self.means.frame().get(range)?;
             let header = match tcp::header(rest) {
@@ -127,8 +135,8 @@ impl<P: Port, S: Means> Tcp<P, S> {
                 }
             };
             let (arrived, room) = (rest.len(), self.means.frame().len());
-            let known = shared.queue.iter().any(|job| answers(job, &header));
-            if !known && self.astray {
+            let place = shared.place(|job| answers(job, &header));
+            if place.is_none() && self.astray {
                 self.start += 1;
                 continue;
             }
@@ -139,20 +147,18 @@ impl<P: Port, S: Means> Tcp<P, S> {
             let end = usize::from(self.start) + header.total;
             // What does not fit is passed over as it arrives.
             self.skip = header.total as u16;
-            if !known {
+            let Some(at) = place else {
                 self.means.count(Counter::ForeignFrames, 1);
                 self.note(shared, &header);
                 continue;
-            }
-            let mut job = shared.take(|job| answers(job, &header))?;
+            };
             let status = match self.means.frame().get(begin..end) {
-                Some(pdu) => judge(&mut job, pdu),
+                Some(pdu) => judge(shared.queue.get_mut(at)?, pdu),
                 None => Status::BUFFER_TOO_SMALL,
             };
             if self.astray && status.is_failure() && status != Status::BUFFER_TOO_SMALL {
                 // It only looked like that.
                 self.skip = 1;
-                let _ = shared.queue.push_front(job);
                 continue;
             }
             self.astray = false;
@@ -164,10 +170,17 @@ impl<P: Port, S: Means> Tcp<P, S> {
                     self.means.count(Counter::Exceptions, 1);
                 }
             }
-            if let Some(job) = shared.end(job, status, now, &mut self.means) {
+            if let Some(job) = shared.end(at, status, now, &mut self.means) {
                 return Some(job);
             }
         }
+    }
+
+    /// Passes over what is left of a frame that is known already.
+    fn pass(&mut self) {
+        let skipped = self.skip.min(self.end - self.start);
+        self.start += skipped;
+        self.skip -= skipped;
     }
 
     /// Passes over a byte that begins no frame.
@@ -261,8 +274,8 @@ impl<P: Port, S: Means> Tcp<P, S> {
     fn lose<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>, now: u32) -> Option<J> {
         self.clear();
         shared.lose();
-        let job = shared.take_due(now, &mut [], |_| true)?;
-        shared.end(job, Status::LINK_LOST, now, &mut self.means)
+        let at = shared.due(0, now, &mut self.means, |_| true)?;
+        shared.end(at, Status::LINK_LOST, now, &mut self.means)
     }
 }
 
@@ -274,7 +287,7 @@ fn answers<J: Job>(job: &J, header: &Header) -> bool {
 /// What the response `pdu` says to the job, which takes its data.
 fn judge<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
     let outline = &job.ticket().outline;
-    match outline.expected(pdu, Some(pdu.len())) {
+    match outline.expected(pdu, pdu.len()) {
         Some(length) if usize::from(length.get()) == pdu.len() => {}
         None if pdu.first().map(|code| code & 0x7F) != Some(outline.function()) => {
             return Status::INVALID_FUNCTION;
@@ -335,12 +348,12 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
                 return Some(job);
             }
         }
+        let (mut from, mut blocked) = (0, false);
         loop {
             let (flying, most) = (self.flying, self.most);
             let filled = usize::from(self.filled) + tcp::PDU;
             let room = self.means.outgoing().len();
-            let mut blocked = false;
-            let due = shared.take_due(now, self.means.units(), |job| {
+            let due = shared.due(from, now, &mut self.means, |job| {
                 let ticket = job.ticket();
                 let length = filled + usize::from(ticket.outline.request_length());
                 let fits = length <= room || filled == tcp::PDU;
@@ -349,13 +362,14 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
                 accepted
             });
             self.blocked = blocked;
-            let Some(mut job) = due else {
+            let Some(at) = due else {
                 break;
             };
+            let job = shared.queue.get_mut(at)?;
             let status = if job.ticket().is(Stage::Queued) {
-                match self.encode(&mut job, now) {
+                match self.encode(job, now) {
                     Ok(()) => {
-                        let _ = shared.queue.push_back(job);
+                        from = at;
                         continue;
                     }
                     Err(refused) => refused,
@@ -363,21 +377,23 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
             } else if job.ticket().is_sent() {
                 if self.start < self.end {
                     // What began to arrive may hide the response.
-                    let _ = shared.queue.push_front(job);
                     self.stray();
+                    (from, blocked) = (0, false);
                     match self.dispatch(shared, now) {
                         Some(job) => return Some(job),
                         None => continue,
                     }
                 }
                 self.flying = self.flying.saturating_sub(1);
-                self.overdue(&job)
+                self.overdue(job)
             } else {
                 Status::LINK_LOST
             };
-            if let Some(job) = shared.end(job, status, now, &mut self.means) {
+            if let Some(job) = shared.end(at, status, now, &mut self.means) {
                 return Some(job);
             }
+            // There may be room for those that were passed.
+            (from, blocked) = (0, false);
         }
         if !self.flush(shared) {
             return self.lose(shared, now);

@@ -1,5 +1,7 @@
 //! What is kept for each unit, in storage that the caller lends.
 
+use super::job::Ticket;
+use super::policy::{again, Policy};
 use crate::error::Status;
 use crate::time::elapsed;
 use crate::transaction::Storage;
@@ -21,13 +23,13 @@ pub struct Unit {
     /// microseconds.
     pub delay: u32,
     /// When the last request to it ended.
-    pub(super) last: u32,
+    last: u32,
     /// Which unit this is.
     pub unit: u8,
     /// How the last request ended.
     pub status: u8,
     /// It may still need its rest.
-    pub(super) tired: bool,
+    tired: bool,
 }
 
 impl Unit {
@@ -47,7 +49,7 @@ impl Unit {
     }
 
     /// How much longer the unit rests.
-    pub(super) fn rest(&mut self, now: u32) -> u32 {
+    fn rest(&mut self, now: u32) -> u32 {
         let rest = self.delay.saturating_sub(elapsed(now, self.last));
         self.tired &= rest > 0;
         if self.tired {
@@ -58,7 +60,7 @@ impl Unit {
     }
 
     /// Takes note of a request that ended, or is to be asked again.
-    pub(super) fn note(&mut self, status: Status, again: bool, now: u32) {
+    fn note(&mut self, status: Status, again: bool, now: u32) {
         self.last = now;
         self.tired = true;
         self.status = status.code();
@@ -77,8 +79,21 @@ impl Unit {
 }
 
 /// The record of a unit, if the caller lent one.
-pub(super) fn find(units: &mut [Unit], unit: u8) -> Option<&mut Unit> {
+fn find(units: &mut [Unit], unit: u8) -> Option<&mut Unit> {
     units.iter_mut().find(|record| record.unit == unit)
+}
+
+/// How much longer a unit rests, by its record among `units`.
+pub fn rest(units: &mut [Unit], unit: u8, now: u32) -> u32 {
+    find(units, unit).map_or(0, |unit| unit.rest(now))
+}
+
+/// Takes note, in the record of a unit among `units`, of a request to it that
+/// ended, or is to be asked `again`.
+pub fn note(units: &mut [Unit], unit: u8, status: Status, again: bool, now: u32) {
+    if let Some(unit) = find(units, unit) {
+        unit.note(status, again, now);
+    }
 }
 
 /// What the caller lends to a client, besides the frame buffer.
@@ -91,6 +106,21 @@ pub trait Means: Storage {
     /// A record for each unit that is to be treated in its own way.
     fn units(&mut self) -> &mut [Unit] {
         &mut []
+    }
+
+    /// How much longer a unit rests, in microseconds.
+    fn rest(&mut self, unit: u8, now: u32) -> u32 {
+        rest(self.units(), unit, now)
+    }
+
+    /// Takes note of a request to a unit that ended, or is to be asked `again`.
+    fn note(&mut self, unit: u8, status: Status, again: bool, now: u32) {
+        note(self.units(), unit, status, again, now);
+    }
+
+    /// True if a request that ended with `status` is asked again.
+    fn again(&mut self, policy: &Policy, ticket: &mut Ticket, status: Status, now: u32) -> bool {
+        again(policy, ticket, status, now, || self.random())
     }
 
     /// Any number, another each time; for jitter.

@@ -22,7 +22,7 @@ unsafe fn begin<L: Kind>(
         return Status::INVALID_ARGUMENT;
     }
     // SAFETY: not NULL, so a port.
-    let port = unsafe { *port };
+    let port = unsafe { &*port };
     if !port.is_complete() {
         return Status::INVALID_ARGUMENT;
     }
@@ -38,7 +38,7 @@ unsafe fn begin<L: Kind>(
     client.preset();
     let (settings, means, place) = client.line.parts();
     settings.preset();
-    *place = port;
+    place.copy(port);
     means.frame = frame;
     means.frame_bytes = frame_bytes;
     Status::OK
@@ -52,7 +52,10 @@ unsafe fn begin_serial<W: Search + 'static>(
     frame_bytes: u16,
     broadcasts: bool,
     silence: Option<u32>,
-) -> u8 {
+) -> u8
+where
+    Serial<mbm_port, LentByC, Lent, W>: Kind,
+{
     // SAFETY: as the header demands.
     unsafe {
         let status = begin::<Serial<mbm_port, LentByC, Lent, W>>(pointer, port, frame, frame_bytes);

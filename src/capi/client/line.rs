@@ -1,6 +1,6 @@
 //! The line under a client: lost and found, lent and taken back.
 
-use super::{mbm_client, pointers, Action};
+use super::{client, common, mbm_client, on_line, parts, pointers, Ascii, Line, Rtu, TcpIp};
 use crate::capi::master::mbm_master;
 use crate::capi::pointers as masters;
 use crate::error::Status;
@@ -35,10 +35,10 @@ pub unsafe extern "C" fn mbm_client_reconnect(
     // SAFETY: as the header demands; the hooks do not use the client.
     unsafe {
         let status = pointers::with(client, |object| {
-            if (object.calls().act)(object, Action::IsLent, 0) != 0 {
+            if common(object).is_lent() {
                 return Status::BUSY;
             }
-            (object.calls().act)(object, Action::Reconnect, 0);
+            on_line!(object, client => client.reconnect());
             Status::OK
         });
         if status != Status::OK.code() || link.is_null() {
@@ -62,11 +62,7 @@ pub unsafe extern "C" fn mbm_client_reconnect(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8 {
     // SAFETY: as the header demands.
-    unsafe {
-        pointers::ask(client, 0, |object| {
-            (object.calls().act)(object, Action::IsConnected, 0) as u8
-        })
-    }
+    unsafe { pointers::ask(client, 0, |object| common(object).is_connected().into()) }
 }
 
 /// Lends the line to a facade, whose functions then use the client's port; the
@@ -92,12 +88,12 @@ pub unsafe extern "C" fn mbm_client_lend(client: *mut mbm_client, master: *mut m
                     refused => return refused,
                 }
             }
-            if (object.calls().act)(object, Action::Lend, 0) == 0 {
+            if !on_line!(object, client => client.lend()) {
                 return Status::BUSY;
             }
             if !master.is_null() {
                 let core = masters::object(master).core();
-                *core.port() = *(object.calls().parts)(object).port;
+                *core.port() = *parts(object).port;
                 core.line_used();
             }
             Status::OK
@@ -120,7 +116,7 @@ pub unsafe extern "C" fn mbm_client_takeBack(
     // SAFETY: as the header demands.
     unsafe {
         pointers::with(client, |object| {
-            if (object.calls().act)(object, Action::IsLent, 0) == 0 {
+            if !common(object).is_lent() {
                 return Status::INVALID_ARGUMENT;
             }
             if masters::check(master) == Status::OK {
@@ -130,7 +126,7 @@ pub unsafe extern "C" fn mbm_client_takeBack(
                 }
                 core.port().read = None;
             }
-            (object.calls().act)(object, Action::TakeBack, 0);
+            common(object).take_back();
             Status::OK
         })
     }

@@ -15,7 +15,7 @@ pub use settings::*;
 use super::client_pointers as pointers;
 use super::port::mbm_port;
 use super::storage::mbm_counters;
-use crate::client::{Client, Job, Line, Means, Policy, Serial, Tcp, Unit};
+use crate::client::{self as core_client, Client, Job, Means, Policy, Serial, Tcp, Ticket, Unit};
 use crate::error::Status;
 use crate::frame::{ascii_window, rtu, Search};
 use crate::port::Port;
@@ -96,31 +96,20 @@ impl Object {
 }
 
 /// What differs from one kind of line to the next; firmware carries what its
-/// mbm_client_begin function names.
+/// mbm_client_begin function names. What is called seldom is not here, so that it
+/// is carried only by who calls it: see [`on_line`].
 struct Calls {
-    poll: fn(&mut Object, u32, bool) -> Option<Lent>,
+    kind: Line,
+    poll: unsafe fn(*mut Object) -> Status,
     queue: fn(&mut Object, Lent) -> Status,
-    act: fn(&mut Object, Action, u32) -> u32,
-    parts: fn(&mut Object) -> Parts<'_>,
 }
 
-/// What is done to a client seldom.
-enum Action {
-    /// Gives the request up: 1 if it was pending.
-    Cancel(Lent),
-    /// How long poll will find nothing to do.
-    Delay,
-    /// How many requests are pending.
-    Pending,
-    /// 1 if the link is not known to be lost.
-    IsConnected,
-    /// Takes the link for a new one.
-    Reconnect,
-    /// 1 if the line was lent.
-    Lend,
-    /// 1 while the line is lent.
-    IsLent,
-    TakeBack,
+/// The kinds of line that C has.
+#[derive(Clone, Copy)]
+enum Line {
+    Rtu,
+    Ascii,
+    Tcp,
 }
 
 /// The parts of a client that settings reach.
@@ -131,28 +120,49 @@ struct Parts<'a> {
     policy: &'a mut Policy,
 }
 
-/// A kind of line that C has.
-trait Kind: Line<Lent> + Sized + 'static {
-    fn parts(&mut self) -> (&mut Settings, &mut LentByC, &mut mbm_port);
+type LineParts<'a> = (&'a mut Settings, &'a mut LentByC, &'a mut mbm_port);
 
-    const CALLS: Calls = Calls {
-        poll: poll::<Self>,
-        queue: queue::<Self>,
-        act: act::<Self>,
-        parts: parts::<Self>,
-    };
+/// A kind of line that C has.
+trait Kind: core_client::Line<Lent> + Sized + 'static {
+    const CALLS: Calls;
+
+    fn parts(&mut self) -> LineParts<'_>;
 }
 
-impl<W: Search + 'static> Kind for Serial<mbm_port, LentByC, Lent, W> {
-    fn parts(&mut self) -> (&mut Settings, &mut LentByC, &mut mbm_port) {
-        let engine = self.transaction();
-        (&mut engine.settings, &mut engine.storage, &mut engine.port)
+impl Kind for Serial<mbm_port, LentByC, Lent, rtu::Window> {
+    const CALLS: Calls = calls::<Self>(Line::Rtu);
+
+    fn parts(&mut self) -> LineParts<'_> {
+        parts_of(self)
     }
 }
 
+impl Kind for Serial<mbm_port, LentByC, Lent, ascii_window::Window> {
+    const CALLS: Calls = calls::<Self>(Line::Ascii);
+
+    fn parts(&mut self) -> LineParts<'_> {
+        parts_of(self)
+    }
+}
+
+fn parts_of<W: Search>(line: &mut Serial<mbm_port, LentByC, Lent, W>) -> LineParts<'_> {
+    let engine = line.transaction();
+    (&mut engine.settings, &mut engine.storage, &mut engine.port)
+}
+
 impl Kind for Tcp<mbm_port, LentByC> {
-    fn parts(&mut self) -> (&mut Settings, &mut LentByC, &mut mbm_port) {
+    const CALLS: Calls = calls::<Self>(Line::Tcp);
+
+    fn parts(&mut self) -> LineParts<'_> {
         (&mut self.settings, &mut self.means, &mut self.port)
+    }
+}
+
+const fn calls<L: Kind>(kind: Line) -> Calls {
+    Calls {
+        kind,
+        poll: poll::<L>,
+        queue: queue::<L>,
     }
 }
 
@@ -162,8 +172,66 @@ fn client<L>(object: &mut Object) -> &mut Client<L, Lent, DEPTH> {
     unsafe { &mut *(&raw mut object.client).cast() }
 }
 
-fn poll<L: Kind>(object: &mut Object, now: u32, fresh: bool) -> Option<Lent> {
-    client::<L>(object).poll(now, fresh)
+/// What clients of every line have in common.
+fn common(object: &mut Object) -> &mut Client<(), Lent, DEPTH> {
+    // SAFETY: as `client`; the line is the last of its fields, whose order is C's.
+    unsafe { &mut *(&raw mut object.client).cast() }
+}
+
+/// Does something with the client in an object, whatever its line.
+macro_rules! on_line {
+    ($object:expr, $client:ident => $action:expr) => {
+        match $object.calls().kind {
+            Line::Rtu => {
+                let $client: &mut Rtu = client($object);
+                $action
+            }
+            Line::Ascii => {
+                let $client: &mut Ascii = client($object);
+                $action
+            }
+            Line::Tcp => {
+                let $client: &mut TcpIp = client($object);
+                $action
+            }
+        }
+    };
+}
+use on_line;
+
+/// Polls, and calls `done` of those that ended.
+///
+/// # Safety
+/// `pointer` is an object that is begun, as a client of `L`; nothing else uses it,
+/// but for what `done` calls.
+unsafe fn poll<L: Kind>(pointer: *mut Object) -> Status {
+    // SAFETY: begun; no reference lives while `done` is called, for that may use
+    // the object.
+    unsafe {
+        let object = &mut *pointer;
+        let client = client::<L>(object);
+        if client.is_lent() {
+            return Status::BUSY;
+        }
+        let now = client.line.parts().2.micros();
+        object.polling = true;
+        let mut left = MBM_CLIENT_DEPTH + 1;
+        while let Some(request) =
+            self::client::<L>(&mut *pointer).poll(now, left > MBM_CLIENT_DEPTH)
+        {
+            request.call();
+            left -= 1;
+            if left == 0 {
+                break;
+            }
+        }
+        let object = &mut *pointer;
+        object.polling = false;
+        match self::client::<L>(object).pending() {
+            0 => Status::OK,
+            _ => Status::PENDING,
+        }
+    }
 }
 
 fn queue<L: Kind>(object: &mut Object, request: Lent) -> Status {
@@ -173,35 +241,35 @@ fn queue<L: Kind>(object: &mut Object, request: Lent) -> Status {
     }
 }
 
-fn act<L: Kind>(object: &mut Object, action: Action, now: u32) -> u32 {
-    let client = client::<L>(object);
-    match action {
-        Action::Cancel(request) => client.cancel(|job| *job == request).is_some().into(),
-        Action::Delay => client.poll_delay(now),
-        Action::Pending => client.pending() as u32,
-        Action::IsConnected => client.is_connected().into(),
-        Action::Reconnect => {
-            client.reconnect();
-            0
+/// The parts of the client in an object.
+#[cfg_attr(target_os = "none", inline(never))]
+fn parts(object: &mut Object) -> Parts<'_> {
+    on_line!(object, client => {
+        let (policy, line) = client.parts();
+        let (settings, means, port) = Kind::parts(line);
+        Parts {
+            settings,
+            means,
+            port,
+            policy,
         }
-        Action::Lend => client.lend().into(),
-        Action::IsLent => client.is_lent().into(),
-        Action::TakeBack => {
-            client.take_back();
-            0
-        }
-    }
+    })
 }
 
-fn parts<L: Kind>(object: &mut Object) -> Parts<'_> {
-    let (policy, line) = client::<L>(object).parts();
-    let (settings, means, port) = line.parts();
-    Parts {
-        settings,
-        means,
-        port,
-        policy,
-    }
+/// Says whether a request is asked again. (A pointer, as [`Treatment`].)
+type Again = fn(&mut LentByC, &Policy, &mut Ticket, Status, now: u32) -> bool;
+
+/// How a unit is treated as its record says. (Behind a pointer, so that firmware
+/// without records carries none of it.)
+struct Treatment {
+    rest: fn(&mut LentByC, unit: u8, now: u32) -> u32,
+    note: fn(&mut LentByC, unit: u8, told: Told, now: u32),
+}
+
+/// How a request to a unit ended, and whether it is asked again.
+struct Told {
+    status: Status,
+    again: bool,
 }
 
 /// What the begin functions and settings lend.
@@ -211,6 +279,8 @@ struct LentByC {
     outgoing: *mut u8,
     counters: *mut mbm_counters,
     units: *mut Unit,
+    treatment: Option<&'static Treatment>,
+    again: Option<Again>,
     random: Option<unsafe extern "C" fn(context: *mut c_void) -> u32>,
     random_context: *mut c_void,
     frame_bytes: u16,
@@ -257,6 +327,26 @@ impl Means for LentByC {
         unsafe { from_raw_parts_mut(self.units, self.unit_count.into()) }
     }
 
+    fn rest(&mut self, unit: u8, now: u32) -> u32 {
+        match self.treatment {
+            Some(treatment) => (treatment.rest)(self, unit, now),
+            None => 0,
+        }
+    }
+
+    fn note(&mut self, unit: u8, status: Status, again: bool, now: u32) {
+        if let Some(treatment) = self.treatment {
+            (treatment.note)(self, unit, Told { status, again }, now);
+        }
+    }
+
+    fn again(&mut self, policy: &Policy, ticket: &mut Ticket, status: Status, now: u32) -> bool {
+        match self.again {
+            Some(again) => again(self, policy, ticket, status, now),
+            None => false,
+        }
+    }
+
     fn random(&mut self) -> u32 {
         match self.random {
             // SAFETY: the hook keeps the contract of mbm_client_setJitter.
@@ -286,25 +376,11 @@ pub unsafe extern "C" fn mbm_client_poll(client: *mut mbm_client) -> u8 {
             return status.code();
         }
         let object = pointers::object(client);
-        let calls = object.calls();
-        if object.polling || (calls.act)(object, Action::IsLent, 0) != 0 {
+        if object.polling {
             return Status::BUSY.code();
         }
-        object.polling = true;
-        let now = (calls.parts)(object).port.micros();
-        for round in 0..=MBM_CLIENT_DEPTH {
-            match (calls.poll)(pointers::object(client), now, round == 0) {
-                Some(request) => request.call(),
-                None => break,
-            }
-        }
-        let object = pointers::object(client);
-        object.polling = false;
-        if (calls.act)(object, Action::Pending, 0) == 0 {
-            Status::OK.code()
-        } else {
-            Status::PENDING.code()
-        }
+        let poll = object.calls().poll;
+        poll(object).code()
     }
 }
 
@@ -318,8 +394,10 @@ pub unsafe extern "C" fn mbm_client_pollDelay(client: *const mbm_client) -> u32 
     // SAFETY: as the header demands.
     unsafe {
         pointers::ask(client, u32::MAX, |object| {
-            let now = (object.calls().parts)(object).port.micros();
-            (object.calls().act)(object, Action::Delay, now)
+            on_line!(object, client => {
+                let now = client.line.parts().2.micros();
+                client.poll_delay(now)
+            })
         })
     }
 }
@@ -332,9 +410,11 @@ pub unsafe extern "C" fn mbm_client_pollDelay(client: *const mbm_client) -> u32 
 pub unsafe extern "C" fn mbm_client_pending(client: *const mbm_client) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        pointers::ask(client, 0, |object| {
-            (object.calls().act)(object, Action::Pending, 0) as u8
-        })
+        pointers::ask(
+            client,
+            0,
+            |object| on_line!(object, client => client.pending() as u8),
+        )
     }
 }
 
@@ -355,9 +435,10 @@ pub unsafe extern "C" fn mbm_client_cancel(
     unsafe {
         pointers::with(client, |object| match Lent::new(request) {
             None => Status::INVALID_ARGUMENT,
-            Some(request) => match (object.calls().act)(object, Action::Cancel(request), 0) {
-                0 => Status::NOT_PENDING,
-                _ => Status::OK,
+            Some(request) => match on_line!(object, client => client.cancel(|job| *job == request))
+            {
+                None => Status::NOT_PENDING,
+                Some(_) => Status::OK,
             },
         })
     }

@@ -1,8 +1,8 @@
 //! How a client behaves.
 
-use super::{mbm_client, pointers, Parts};
+use super::{mbm_client, parts, pointers, Parts, Treatment};
 use crate::capi::storage::mbm_counters;
-use crate::client::{Backoff, Unit};
+use crate::client::{again, note, rest, Backoff, Means as _, Unit};
 use crate::error::Status;
 use crate::time::{self, millis};
 use core::ffi::c_void;
@@ -64,7 +64,7 @@ const _: () = {
 #[cfg_attr(target_os = "none", inline(always))]
 unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> Status) -> u8 {
     // SAFETY: as the caller promises.
-    unsafe { pointers::with(client, |object| change((object.calls().parts)(object))) }
+    unsafe { pointers::with(client, |object| change(parts(object))) }
 }
 
 /// Sets how long a response may take, from the end of the request on a serial
@@ -221,6 +221,9 @@ pub unsafe extern "C" fn mbm_client_setRetries(client: *mut mbm_client, retries:
     unsafe {
         set(client, |parts| {
             parts.policy.retries = retries;
+            parts.means.again = Some(|means, policy, ticket, status, now| {
+                again(policy, ticket, status, now, || means.random())
+            });
             Status::OK
         })
     }
@@ -322,7 +325,13 @@ pub unsafe extern "C" fn mbm_client_setUnits(
         set(client, |parts| {
             parts.means.units = units.cast();
             parts.means.unit_count = count;
+            parts.means.treatment = (!units.is_null()).then_some(&TREATMENT);
             Status::OK
         })
     }
 }
+
+const TREATMENT: Treatment = Treatment {
+    rest: |means, unit, now| rest(means.units(), unit, now),
+    note: |means, unit, told, now| note(means.units(), unit, told.status, told.again, now),
+};

@@ -170,7 +170,7 @@ impl Outline {
         self.head[3] = object;
         self.head_length = 4;
         self.repeated = 3;
-        value((1..=4).contains(&code))
+        value(matches!(code, 1..=4))
     }
 
     /// 2B of any MEI type and so many `bytes` of data; the response ends by
@@ -183,15 +183,16 @@ impl Outline {
     /// A function of the user's with so many `bytes` of data, whose response is
     /// as long as `rule` says.
     pub fn custom(&mut self, function: u8, bytes: u16, rule: Rule) -> Status {
+        self.set(Form::new(function, OWN, 1, 0, 0, 1), 0, 0);
         let (kind, length, more) = match rule {
             Rule::Fixed(length) => (FIXED, length, 0),
             Rule::Counted(offset, more) => (COUNTS, offset, more),
-            Rule::Silence => (OWN, 0, 0),
+            Rule::Silence => (OWN, 1, 0),
         };
-        self.set(Form::new(function, kind, 1, 0, 0, 1), 0, 0);
+        self.form.0 -= OWN - kind;
         self.length = length;
         self.more = more;
-        if kind != OWN && length == 0 {
+        if length == 0 {
             return Status::INVALID_ARGUMENT;
         }
         if function == 0 || function & EXCEPTION != 0 {

@@ -13,7 +13,7 @@ pub(super) const COUNTED: u32 = 1 << 8;
 pub(super) const SENDS_WORDS: u32 = 1 << 9;
 /// The data received are words.
 pub(super) const TAKES_WORDS: u32 = 1 << 10;
-/// The response repeats the data behind the head.
+/// The response repeats all of the request.
 pub(super) const REPEATS_DATA: u32 = 1 << 11;
 /// Every unit may be told at once.
 pub(super) const BROADCAST: u32 = 1 << 12;

@@ -33,7 +33,7 @@ pub struct Outline {
     length: u8,
     /// Bytes behind those that are counted.
     more: u8,
-    /// How much of the request the response repeats.
+    /// How much of the request the response repeats, if not all.
     repeated: u8,
 }
 
@@ -119,23 +119,28 @@ impl Outline {
         }
     }
 
+    /// The byte of the request PDU at `index`; `byte` gives those of the data.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn at(&self, index: usize, byte: &impl Fn(usize) -> u8) -> u8 {
+        if let Some(byte) = self.head().get(index) {
+            return *byte;
+        }
+        let mut behind = index.wrapping_sub(usize::from(self.head_length));
+        if self.form.has(COUNTED) {
+            if behind == 0 {
+                return self.data_length;
+            }
+            behind -= 1;
+        }
+        byte(behind)
+    }
+
     /// Writes the request PDU into `pdu`, which has
     /// [`Outline::request_length`] bytes; `byte` gives those of the data.
     #[inline]
     pub fn emit(&self, pdu: &mut [u8], byte: impl Fn(usize) -> u8) {
-        let mut places = pdu.iter_mut();
-        for byte in self.head() {
-            if let Some(place) = places.next() {
-                *place = *byte;
-            }
-        }
-        if self.form.has(COUNTED) {
-            if let Some(place) = places.next() {
-                *place = self.data_length;
-            }
-        }
-        for (index, place) in places.enumerate() {
-            *place = byte(index);
+        for (index, place) in pdu.iter_mut().enumerate() {
+            *place = self.at(index, &byte);
         }
         // Of a request that writes bits, the last byte is one of data.
         if self.form.has(COUNTED) {
@@ -155,9 +160,9 @@ impl Outline {
 
     /// The length of the response that begins with the bytes of `pdu`, or the
     /// least length while they do not tell; `None` if no response to it begins
-    /// so. `whole` is how long it is, once it is known to have ended.
+    /// so. Where nothing but its end tells, it is `whole`.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn expected(&self, pdu: &[u8], whole: Option<usize>) -> Option<NonZeroU8> {
+    pub fn expected(&self, pdu: &[u8], whole: usize) -> Option<NonZeroU8> {
         let length = match pdu {
             [] => 2,
             [function, ..] if *function == self.function() | EXCEPTION => 2,
@@ -187,7 +192,7 @@ impl Outline {
 
     /// The length where the response's own rules tell: of 18 and 2B/0E, or of
     /// what only its end ends.
-    fn own_length(&self, pdu: &[u8], whole: Option<usize>) -> usize {
+    fn own_length(&self, pdu: &[u8], whole: usize) -> usize {
         let rule = match self.head {
             [files::READ_FIFO_QUEUE, ..] => match pdu.get(1..3) {
                 Some([0, low]) => Length::Exactly(3 + usize::from(*low)),
@@ -201,8 +206,7 @@ impl Outline {
         };
         match rule {
             Length::Exactly(length) | Length::AtLeast(length) => length,
-            // While more may come, it is never complete, but for the longest.
-            _ => whole.unwrap_or(pdu.len().min(MAX_PDU)).max(2),
+            _ => whole.max(2),
         }
     }
 
@@ -217,18 +221,14 @@ impl Outline {
             }
         }
         let repeated = usize::from(self.repeated);
-        let data = pdu.get(repeated..).unwrap_or_default();
-        let echoed = pdu.get(..repeated).is_some_and(|echo| self.agrees(echo));
+        let echoed = if self.form.has(REPEATS_DATA) {
+            let mut theirs = pdu.iter().enumerate();
+            theirs.all(|(index, theirs)| *theirs == self.at(index, &byte))
+        } else {
+            pdu.get(..repeated).is_some_and(|echo| self.agrees(echo))
+        };
         let right = match *pdu {
             _ if !echoed => false,
-            _ if self.form.has(REPEATS_DATA) => {
-                let mut data = data.iter();
-                let counted = !self.form.has(COUNTED) || data.next() == Some(&self.data_length);
-                counted
-                    && data
-                        .enumerate()
-                        .all(|(index, theirs)| *theirs == byte(index))
-            }
             [_, count, group, reference, ..] if self.form.has(GROUP) => {
                 group == count.wrapping_sub(1) && reference == files::REFERENCE_TYPE
             }

@@ -1,7 +1,7 @@
 //! Requests for what a device tells of itself, its files, and functions of the
 //! user's.
 
-use super::{plain, queue};
+use super::{bare, plain, queue};
 use crate::capi::client::{mbm_client, mbm_clientRequest};
 use crate::capi::functions::{mbm_rule, rule};
 use crate::error::Status;
@@ -18,7 +18,7 @@ pub unsafe extern "C" fn mbm_client_readExceptionStatus(
     request: *mut mbm_clientRequest,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { plain(client, request, 0, 0, Form::READ_EXCEPTION_STATUS) }
+    unsafe { bare(client, request, Form::READ_EXCEPTION_STATUS) }
 }
 
 /// Function 08: sends the words of `data`, and reads as many into `reply` (V1.1b3,
@@ -56,7 +56,7 @@ pub unsafe extern "C" fn mbm_client_getCommEventCounter(
     request: *mut mbm_clientRequest,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { plain(client, request, 0, 0, Form::GET_COMM_EVENT_COUNTER) }
+    unsafe { bare(client, request, Form::GET_COMM_EVENT_COUNTER) }
 }
 
 /// Function 0C: reads status, event count and message count, two bytes each with the
@@ -71,7 +71,7 @@ pub unsafe extern "C" fn mbm_client_getCommEventLog(
     request: *mut mbm_clientRequest,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { plain(client, request, 0, 0, Form::GET_COMM_EVENT_LOG) }
+    unsafe { bare(client, request, Form::GET_COMM_EVENT_LOG) }
 }
 
 /// Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13).
@@ -85,7 +85,7 @@ pub unsafe extern "C" fn mbm_client_reportServerId(
     request: *mut mbm_clientRequest,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { plain(client, request, 0, 0, Form::REPORT_SERVER_ID) }
+    unsafe { bare(client, request, Form::REPORT_SERVER_ID) }
 }
 
 /// Function 14: reads records in a row of one file into words (V1.1b3, 6.14).
@@ -253,10 +253,11 @@ pub unsafe extern "C" fn mbm_client_custom(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        let rule = response.as_ref().and_then(|response| rule(*response));
-        queue(client, request, |outline| match rule {
-            Some(rule) => outline.custom(function, bytes, rule),
-            None => Status::INVALID_ARGUMENT,
+        queue(client, request, |outline| {
+            match response.as_ref().and_then(|response| rule(*response)) {
+                Some(rule) => outline.custom(function, bytes, rule),
+                None => Status::INVALID_ARGUMENT,
+            }
         })
     }
 }

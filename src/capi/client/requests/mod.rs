@@ -100,3 +100,13 @@ unsafe fn plain(
     // SAFETY: as the caller promises.
     unsafe { queue(client, request, |outline| outline.set(form, first, second)) }
 }
+
+/// Queues a request that is no more than a function code.
+///
+/// # Safety
+/// As the header demands.
+#[cfg_attr(target_os = "none", inline(never))]
+unsafe fn bare(client: *mut mbm_client, request: *mut mbm_clientRequest, form: Form) -> u8 {
+    // SAFETY: as the caller promises.
+    unsafe { plain(client, request, 0, 0, form) }
+}

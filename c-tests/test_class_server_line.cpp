@@ -1,0 +1,207 @@
+/* The class that serves: silences, the driver, echoes and damage on its line. */
+#include "serving.h"
+
+static void a_response_begins_after_the_silence(void **)
+{
+    ModbusRegisterArray<1> registers;
+    ModbusServer server;
+    server.holdingRegisters(registers);
+    server.begin(17, Serial, 19200);
+    Bytes request = adu({17, 3, 0, 0, 0, 1});
+    uint32_t last = bench().now + 100 + 573 * static_cast<uint32_t>(request.size() - 1);
+    Serial.arrive(request, bench().now + 100, 573);
+    loops(server);
+    assert_int_equal(Serial.sent.size(), 1);
+    assert_in_range(Serial.startedAt - last, t35, t35 + 6 * bench().tick);
+    Serial.sent.clear();
+    server.setSilence(9000);
+    last = bench().now;
+    hears(server, request);
+    assert_in_range(Serial.startedAt - last, 9000, 9000 + 6 * bench().tick);
+    server.setBaudRate(0); // untold: 4 ms
+    last = bench().now;
+    hears(server, request);
+    assert_in_range(Serial.startedAt - last, 4000, 4000 + 6 * bench().tick);
+}
+
+static void a_request_may_pause_for_t15(void **)
+{
+    const uint32_t t15 = t35 * 3 / 7;
+    ModbusRegisterArray<1> registers;
+    ModbusServer server;
+    server.holdingRegisters(registers);
+    server.begin(17, Serial, 19200);
+    Bytes request = adu({17, 6, 0, 0, 0, 1});
+    Bytes front(request.begin(), request.begin() + 4), rest(request.begin() + 4, request.end());
+    Serial.inject(front);
+    Serial.arrive(rest, bench().now + t15, 573);
+    loops(server);
+    assert_sent(Serial, {17, 6, 0, 0, 0, 1});
+    registers[0] = 0;
+    Serial.inject(front);
+    Serial.arrive(rest, bench().now + 2 * t35, 573);
+    loops(server);
+    assert_int_equal(Serial.sent.size(), 0);
+    assert_int_equal(registers[0], 0);
+}
+
+static void the_driver_is_off_until_the_silence_has_passed(void **)
+{
+    static uint32_t on;
+    ModbusRegisterArray<1> registers;
+    ModbusServer server;
+    server.inputRegisters(registers);
+    server.begin(17, Serial, 19200);
+    server.preTransmission([] { on = bench().now; });
+    uint32_t asked = bench().now;
+    answers(server, {17, 3, 0, 0, 0, 1}, {17, 0x83, 1});
+    assert_in_range(on - asked, t35, t35 + 6 * bench().tick);
+}
+
+static void a_sketch_may_sleep_for_as_long_as_nothing_is_to_do(void **)
+{
+    ModbusServer server;
+    server.begin(17, Serial, 19200);
+    assert_int_equal(server.pollDelay(), 0xFFFFFFFF);
+    Serial.inject(raw({17}));
+    server.poll();
+    // A request is carried out while the silence before its response lasts.
+    assert_in_range(server.pollDelay(), t35 / 2 - 6 * bench().tick, t35 / 2);
+}
+
+static void the_driver_is_on_while_a_response_leaves(void **)
+{
+    ModbusRegisterArray<1> registers;
+    ModbusServer server;
+    server.holdingRegisters(registers);
+    server.begin(17, Serial, 19200);
+    server.preTransmission([] { bench().note("pre"); });
+    server.postTransmission([] { bench().note("post"); });
+    hears(server, adu({17, 3, 0, 0, 0, 1}));
+    assert_string_equal(bench().log.c_str(), "read pre write flush post ");
+    bench().log.clear();
+    Serial.sent.clear();
+    keeps_silent(server, adu({18, 3, 0, 0, 0, 1}));
+    assert_string_equal(bench().log.c_str(), "read ");
+    server.preTransmission(nullptr);
+    server.postTransmission(nullptr);
+    bench().log.clear();
+    hears(server, adu({17, 3, 0, 0, 0, 1}));
+    assert_string_equal(bench().log.c_str(), "read write flush ");
+}
+
+static void counts(void *context) { ++*static_cast<int *>(context); }
+
+static void callbacks_are_handed_their_context(void **)
+{
+    int on = 0, off = 0;
+    ModbusRegisterArray<1> registers;
+    ModbusServer server;
+    server.inputRegisters(registers);
+    server.begin(17, Serial, 19200);
+    server.preTransmission(counts, &on);
+    server.postTransmission(counts, &off);
+    answers(server, {17, 3, 0, 0, 0, 1}, {17, 0x83, 1});
+    answers(server, {17, 3, 0, 0, 0, 1}, {17, 0x83, 1});
+    assert_int_equal(on, 2);
+    assert_int_equal(off, 2);
+}
+
+static void an_echo_of_the_response_is_dropped_if_told_to(void **)
+{
+    ModbusRegisterArray<2> registers;
+    ModbusServer server;
+    server.holdingRegisters(registers);
+    server.begin(17, Serial, 19200);
+    server.setEchoDiscard(true);
+    // The echo of function 06 is a request, word for word.
+    server.preTransmission([] { Serial.inject(adu({17, 6, 0, 1, 0, 7})); });
+    answers(server, {17, 6, 0, 1, 0, 7}, {17, 6, 0, 1, 0, 7});
+    server.preTransmission(nullptr);
+    answers(server, {17, 3, 0, 1, 0, 1}, {17, 3, 2, 0, 7});
+}
+
+static void a_write_taken_in_pieces_is_one_response(void **)
+{
+    ModbusRegisterArray<2> registers;
+    ModbusServer server;
+    Serial.room = 2;
+    server.holdingRegisters(registers);
+    server.begin(17, Serial, 19200);
+    server.preTransmission([] { bench().note("pre"); });
+    server.postTransmission([] { bench().note("post"); });
+    answers(server, {17, 3, 0, 0, 0, 2}, {17, 3, 4, 0, 0, 0, 0});
+    assert_string_equal(bench().log.c_str(), "read pre write flush post ");
+}
+
+static void damaged_and_foreign_frames_are_not_answered(void **)
+{
+    ModbusRegisterArray<1> registers;
+    ModbusServer server;
+    server.holdingRegisters(registers);
+    server.begin(17, Serial, 19200);
+    Bytes damaged = adu({17, 6, 0, 0, 0, 9});
+    damaged[5] ^= 1;
+    keeps_silent(server, damaged);
+    keeps_silent(server, adu({18, 6, 0, 0, 0, 9}));
+    keeps_silent(server, adu({18, 3, 2, 0, 9}));
+    keeps_silent(server, raw({17, 6, 0}));
+    assert_int_equal(registers[0], 0);
+    answers(server, {17, 6, 0, 0, 0, 9}, {17, 6, 0, 0, 0, 9});
+}
+
+static void ascii_is_served(void **)
+{
+    ModbusRegisterArray<1> registers;
+    ModbusUnit units[1] = {{17}};
+    ModbusServer server;
+    static const char request[] = ":110300000001EB\r\n", response[] = ":1103020000EA\r\n";
+    Bytes asked(request, request + sizeof request - 1);
+    Bytes answer(response, response + sizeof response - 1);
+    server.holdingRegisters(registers);
+    units[0].holdingRegisters(registers);
+    assert_int_equal(server.beginAscii(17, Serial), MBM_OK);
+    hears(server, asked);
+    assert_int_equal(Serial.sent.size(), 1);
+    assert_bytes(Serial.sent[0], answer);
+    Serial.sent.clear();
+    assert_int_equal(server.beginAscii(units, Serial), MBM_OK);
+    hears(server, asked);
+    assert_int_equal(Serial.sent.size(), 1);
+    assert_bytes(Serial.sent[0], answer);
+}
+
+static void begin_may_be_called_again(void **)
+{
+    ModbusRegisterArray<1> registers;
+    ModbusServer server;
+    assert_int_equal(server.poll(), MBM_NOT_INITIALISED);
+    assert_int_equal(server.pollDelay(), 0xFFFFFFFF);
+    server.begin(17, Serial1, 19200);
+    server.holdingRegisters(registers);
+    Serial1.inject(raw({18, 3}));
+    server.poll();
+    server.begin(18, Serial, 19200);
+    answers(server, {18, 3, 0, 0, 0, 1}, {18, 3, 2, 0, 0});
+    keeps_silent(server, adu({17, 3, 0, 0, 0, 1}));
+    assert_int_equal(Serial1.sent.size(), 0);
+}
+
+int main()
+{
+    const struct CMUnitTest tests[] = {
+        TEST(a_response_begins_after_the_silence),
+        TEST(a_request_may_pause_for_t15),
+        TEST(the_driver_is_off_until_the_silence_has_passed),
+        TEST(a_sketch_may_sleep_for_as_long_as_nothing_is_to_do),
+        TEST(the_driver_is_on_while_a_response_leaves),
+        TEST(callbacks_are_handed_their_context),
+        TEST(an_echo_of_the_response_is_dropped_if_told_to),
+        TEST(a_write_taken_in_pieces_is_one_response),
+        TEST(damaged_and_foreign_frames_are_not_answered),
+        TEST(ascii_is_served),
+        TEST(begin_may_be_called_again),
+    };
+
+    return cmocka_run_group_tests_name("class that serves, line", tests, nullptr, nullptr);
+}

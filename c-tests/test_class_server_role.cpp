@@ -1,0 +1,324 @@
+/* The class that serves: what a sketch is promised, on the shim's board. */
+#include "serving.h"
+
+static void registers_and_bits_of_arrays_are_served(void **)
+{
+    uint16_t words[] = {0x1111, 0x2222, 0x3333};
+    uint8_t bytes[] = {0x05, 0x80};
+    ModbusRegisters holding(words, 100), some(words, 2, 7);
+    ModbusBits coils(bytes), inputs(bytes, 3, 20);
+    ModbusServer server;
+    assert_int_equal(server.holdingRegisters(holding), MBM_OK);
+    assert_int_equal(server.inputRegisters(some), MBM_OK);
+    assert_int_equal(server.coils(coils), MBM_OK);
+    assert_int_equal(server.discreteInputs(inputs), MBM_OK);
+    assert_int_equal(server.begin(17, Serial, 19200), MBM_OK);
+    answers(server, {17, 3, 0, 100, 0, 3}, {17, 3, 6, 0x11, 0x11, 0x22, 0x22, 0x33, 0x33});
+    answers(server, {17, 3, 0, 99, 0, 1}, {17, 0x83, 2});
+    answers(server, {17, 3, 0, 101, 0, 3}, {17, 0x83, 2});
+    answers(server, {17, 4, 0, 8, 0, 1}, {17, 4, 2, 0x22, 0x22});
+    answers(server, {17, 4, 0, 8, 0, 2}, {17, 0x84, 2});
+    answers(server, {17, 1, 0, 0, 0, 16}, {17, 1, 2, 0x05, 0x80});
+    answers(server, {17, 2, 0, 20, 0, 3}, {17, 2, 1, 5});
+    answers(server, {17, 2, 0, 20, 0, 4}, {17, 0x82, 2});
+    assert_int_equal(holding.size(), 3);
+    assert_int_equal(holding.address(), 100);
+    assert_int_equal(coils.size(), 16);
+    assert_int_equal(inputs.size(), 3);
+}
+
+static void writes_reach_the_arrays(void **)
+{
+    ModbusRegisterArray<4> registers(10);
+    ModbusBitArray<9> coils;
+    ModbusServer server;
+    server.holdingRegisters(registers);
+    server.coils(coils);
+    server.begin(17, Serial, 19200);
+    answers(server, {17, 6, 0, 11, 0xBE, 0xEF}, {17, 6, 0, 11, 0xBE, 0xEF});
+    assert_int_equal(registers[1], 0xBEEF);
+    answers(server, {17, 16, 0, 12, 0, 2, 4, 1, 2, 3, 4}, {17, 16, 0, 12, 0, 2});
+    assert_int_equal(registers[2], 0x0102);
+    assert_int_equal(registers[3], 0x0304);
+    answers(server, {17, 16, 0, 13, 0, 2, 4, 9, 9, 9, 9}, {17, 0x90, 2});
+    assert_int_equal(registers[3], 0x0304); // all of it or nothing
+    answers(server, {17, 5, 0, 8, 0xFF, 0}, {17, 5, 0, 8, 0xFF, 0});
+    assert_true(coils[8]);
+    answers(server, {17, 15, 0, 1, 0, 3, 1, 5}, {17, 15, 0, 1, 0, 3});
+    assert_true(coils[1] && !coils[2] && coils[3]);
+    answers(server, {17, 5, 0, 8, 0x12, 0}, {17, 0x85, 3});
+    answers(server, {17, 5, 0, 9, 0, 0}, {17, 0x85, 2});
+}
+
+static void a_sketch_sets_what_a_client_reads(void **)
+{
+    ModbusRegisterArray<2> readings;
+    ModbusBitArray<10> inputs;
+    ModbusServer server;
+    server.inputRegisters(readings);
+    server.discreteInputs(inputs);
+    server.begin(1, Serial, 19200);
+    answers(server, {1, 4, 0, 0, 0, 2}, {1, 4, 4, 0, 0, 0, 0});
+    readings[1] = 513;
+    inputs.set(9, true);
+    inputs.set(1, true);
+    inputs.set(2, true);
+    inputs.set(1, false);
+    answers(server, {1, 4, 0, 0, 0, 2}, {1, 4, 4, 0, 0, 2, 1});
+    answers(server, {1, 2, 0, 0, 0, 10}, {1, 2, 2, 4, 2});
+    const ModbusRegisters &same = readings;
+    assert_int_equal(same[1], 513);
+}
+
+static uint16_t told_address, told_quantity, told_count;
+
+static void a_hook_refuses_a_write_and_another_is_told_of_it(void **)
+{
+    ModbusRegisterArray<4> registers(10);
+    ModbusServer server;
+    told_count = 0;
+    registers.beforeWrite([](uint16_t address, uint16_t quantity, const uint8_t *data) -> uint8_t {
+        assert_int_equal(address, 11);
+        assert_int_equal(quantity, 1);
+        return data[0] > 0x10 ? 4 : 0;
+    });
+    registers.afterWrite([](uint16_t address, uint16_t quantity) {
+        told_address = address;
+        told_quantity = quantity;
+        told_count++;
+    });
+    server.holdingRegisters(registers);
+    server.begin(17, Serial, 19200);
+    answers(server, {17, 6, 0, 11, 0x11, 0}, {17, 0x86, 4});
+    assert_int_equal(registers[1], 0);
+    assert_int_equal(told_count, 0);
+    answers(server, {17, 6, 0, 11, 0x10, 0}, {17, 6, 0, 11, 0x10, 0});
+    assert_int_equal(registers[1], 0x1000);
+    assert_int_equal(told_count, 1);
+    assert_int_equal(told_address, 11);
+    assert_int_equal(told_quantity, 1);
+    registers.beforeWrite(nullptr);
+    registers.afterWrite(nullptr);
+    answers(server, {17, 6, 0, 10, 0x11, 0}, {17, 6, 0, 10, 0x11, 0});
+    assert_int_equal(told_count, 1);
+}
+
+static void cells_that_are_not_there_are_refused(void **)
+{
+    static const uint8_t valid[] = {0x05};
+    ModbusRegisterArray<3> registers;
+    ModbusServer server;
+    registers.setValid(valid);
+    server.holdingRegisters(registers);
+    server.begin(17, Serial, 19200);
+    answers(server, {17, 3, 0, 2, 0, 1}, {17, 3, 2, 0, 0});
+    answers(server, {17, 3, 0, 0, 0, 3}, {17, 0x83, 2});
+}
+
+static void mask_and_read_write_are_served_when_asked_for(void **)
+{
+    ModbusRegisterArray<4> registers;
+    ModbusServer server;
+    server.holdingRegisters(registers);
+    server.begin(17, Serial, 19200);
+    registers[0] = 0x0012;
+    answers(server, {17, 22, 0, 0, 0, 0xF2, 0, 0x25}, {17, 0x96, 1});
+    assert_int_equal(server.maskAndReadWrite(registers), MBM_OK);
+    answers(server, {17, 22, 0, 0, 0, 0xF2, 0, 0x25}, {17, 22, 0, 0, 0, 0xF2, 0, 0x25});
+    assert_int_equal(registers[0], 0x0017);
+    answers(server, {17, 23, 0, 0, 0, 2, 0, 1, 0, 1, 2, 7, 8}, {17, 23, 4, 0, 0x17, 7, 8});
+}
+
+static void a_unit_that_serves_nothing_is_silent(void **)
+{
+    ModbusServer server;
+    server.begin(17, Serial, 19200);
+    keeps_silent(server, adu({17, 3, 0, 0, 0, 1}));
+}
+
+static void several_units_each_have_their_own(void **)
+{
+    ModbusUnit units[2] = {{5}, {6}};
+    ModbusRegisterArray<1> left, right;
+    ModbusServer server;
+    units[0].holdingRegisters(left);
+    units[1].holdingRegisters(right);
+    assert_int_equal(server.begin(units, Serial, 19200), MBM_OK);
+    answers(server, {5, 6, 0, 0, 0, 5}, {5, 6, 0, 0, 0, 5});
+    answers(server, {6, 6, 0, 0, 0, 6}, {6, 6, 0, 0, 0, 6});
+    assert_int_equal(left[0], 5);
+    assert_int_equal(right[0], 6);
+    keeps_silent(server, adu({1, 6, 0, 0, 0, 7}));
+    keeps_silent(server, adu({0, 6, 0, 0, 0, 8}));
+    assert_int_equal(left[0], 8);
+    assert_int_equal(right[0], 8);
+    units[1].setUnitID(9);
+    assert_int_equal(units[1].getUnitID(), 9);
+    answers(server, {9, 3, 0, 0, 0, 1}, {9, 3, 2, 0, 8});
+    keeps_silent(server, adu({6, 3, 0, 0, 0, 1}));
+}
+
+static uint16_t adds(const mbm_request &request, uint8_t *response, uint16_t capacity)
+{
+    if (request.length != 2 || capacity < 1)
+        return MBM_REPLY_EXCEPTION | MBM_ILLEGAL_DATA_VALUE;
+    if (request.data[0] == 0xFF)
+        return MBM_REPLY_NONE;
+    response[0] = static_cast<uint8_t>(request.data[0] + request.data[1]);
+    return 1;
+}
+
+static void a_function_of_the_sketch_is_served(void **)
+{
+    ModbusFunction sum(65, adds), none(66, nullptr);
+    ModbusServer server;
+    assert_int_equal(server.function(sum), MBM_OK);
+    assert_int_equal(server.function(none), MBM_INVALID_ARGUMENT);
+    server.begin(17, Serial, 19200);
+    answers(server, {17, 65, 3, 4}, {17, 65, 7});
+    answers(server, {17, 65, 3}, {17, 65 | 0x80, 3});
+    keeps_silent(server, adu({17, 65, 0xFF, 1}));
+    answers(server, {17, 66, 3, 4}, {17, 66 | 0x80, 1});
+}
+
+static void a_function_can_be_switched_off_and_on(void **)
+{
+    mbm_switches switches = {};
+    ModbusRegisterArray<1> registers;
+    ModbusServer server;
+    server.holdingRegisters(registers);
+    server.begin(17, Serial, 19200);
+    assert_int_equal(server.switchOff(switches, 6), MBM_OK);
+    answers(server, {17, 6, 0, 0, 0, 9}, {17, 0x86, 1});
+    answers(server, {17, 3, 0, 0, 0, 1}, {17, 3, 2, 0, 0});
+    assert_int_equal(server.switchOn(switches, 6), MBM_OK);
+    answers(server, {17, 6, 0, 0, 0, 9}, {17, 6, 0, 0, 0, 9});
+}
+
+static uint16_t address_itself(void *, uint16_t address) { return address; }
+
+static void the_other_functions_are_served_from_their_records(void **)
+{
+    static const uint8_t name[] = {'m', 'b', 'm'};
+    static uint16_t records[] = {1, 2};
+    static const uint16_t queued[] = {8, 9};
+    mbm_exceptionStatus status = {};
+    mbm_diagnostics diagnostics = {};
+    mbm_serverId id = {};
+    mbm_file file = {records, 2, 4};
+    mbm_files files = {};
+    mbm_fifo fifo = {queued, 30, 2};
+    mbm_fifos fifos = {};
+    mbm_object object = {};
+    mbm_identification identification = {};
+    mbm_cells cells = {};
+    ModbusServer server;
+    status.outputs = 0x6D;
+    id.id = name;
+    id.idLength = 3;
+    id.running = 1;
+    files.files = &file;
+    files.count = 1;
+    fifos.fifos = &fifo;
+    fifos.count = 1;
+    object.data = name;
+    object.length = 3;
+    identification.objects = &object;
+    identification.count = 1;
+    cells.get = address_itself;
+    assert_int_equal(server.serve(status), MBM_OK);
+    assert_int_equal(server.serve(diagnostics), MBM_OK);
+    assert_int_equal(server.serve(id), MBM_OK);
+    assert_int_equal(server.serve(files), MBM_OK);
+    assert_int_equal(server.serve(fifos), MBM_OK);
+    assert_int_equal(server.serve(identification), MBM_OK);
+    assert_int_equal(server.serve(cells, 4), MBM_OK);
+    server.begin(17, Serial, 19200);
+    answers(server, {17, 7}, {17, 7, 0x6D});
+    answers(server, {17, 8, 0, 0, 0xA5, 0x37}, {17, 8, 0, 0, 0xA5, 0x37});
+    answers(server, {17, 17}, {17, 17, 4, 'm', 'b', 'm', 0xFF});
+    answers(server, {17, 20, 7, 6, 0, 4, 0, 1, 0, 1}, {17, 20, 4, 3, 6, 0, 2});
+    answers(server, {17, 24, 0, 30}, {17, 24, 0, 6, 0, 2, 0, 8, 0, 9});
+    answers(server, {17, 43, 14, 4, 0}, {17, 43, 14, 4, 0x81, 0, 0, 1, 0, 3, 'm', 'b', 'm'});
+    answers(server, {17, 4, 0x12, 0x34, 0, 1}, {17, 4, 2, 0x12, 0x34});
+}
+
+/* Two ends of one wire, each a Stream. */
+class Loop : public Stream {
+public:
+    Loop *far = nullptr;
+    std::deque<uint8_t> arrived;
+
+    int available() override { return static_cast<int>(arrived.size()); }
+    int read() override
+    {
+        uint8_t value = arrived.front();
+        arrived.pop_front();
+        return value;
+    }
+    int peek() override { return arrived.front(); }
+    size_t write(uint8_t value) override
+    {
+        far->arrived.push_back(value);
+        return 1;
+    }
+};
+
+static void master_and_server_understand_each_other(void **)
+{
+    static ModbusServer server;
+    ModbusRegisterArray<125> registers, inputs;
+    ModbusBitArray<2000> coils;
+    ModbusMaster node;
+    Loop left, right;
+    left.far = &right;
+    right.far = &left;
+    server.holdingRegisters(registers);
+    server.maskAndReadWrite(registers);
+    server.inputRegisters(inputs);
+    server.coils(coils);
+    server.begin(17, right, 19200);
+    node.begin(17, left);
+    node.setBaudRate(19200);
+    node.idle([] { server.poll(); });
+    for (uint16_t i = 0; i < 125; i++)
+        inputs[i] = static_cast<uint16_t>(i * 517);
+    assert_int_equal(node.readInputRegisters(0, 125), 0);
+    for (uint8_t i = 0; i < 125; i++)
+        assert_int_equal(node.getResponseBuffer(i), i * 517);
+    assert_int_equal(node.writeSingleRegister(3, 0xBEEF), 0);
+    assert_int_equal(registers[3], 0xBEEF);
+    assert_int_equal(node.maskWriteRegister(3, 0xFF00, 0x0055), 0);
+    assert_int_equal(registers[3], 0xBE55);
+    node.beginTransmission(50);
+    node.send(uint32_t(0x11223344));
+    assert_int_equal(node.readWriteMultipleRegisters(3, 1), 0);
+    assert_int_equal(node.getResponseBuffer(0), 0xBE55);
+    assert_int_equal(registers[51], 0x1122);
+    node.setTransmitBuffer(0, 0xA5C3);
+    assert_int_equal(node.writeMultipleCoils(1990, 10), 0);
+    assert_int_equal(node.readCoils(1984, 16), 0);
+    assert_int_equal(node.getResponseBuffer(0), (0xA5C3 & 0x3FF) << 6 & 0xFFFF);
+    assert_int_equal(node.writeSingleCoil(2000, 1), ModbusMaster::ku8MBIllegalDataAddress);
+    assert_int_equal(node.readDiscreteInputs(0, 1), ModbusMaster::ku8MBIllegalFunction);
+}
+
+int main()
+{
+    const struct CMUnitTest tests[] = {
+        TEST(registers_and_bits_of_arrays_are_served),
+        TEST(writes_reach_the_arrays),
+        TEST(a_sketch_sets_what_a_client_reads),
+        TEST(a_hook_refuses_a_write_and_another_is_told_of_it),
+        TEST(cells_that_are_not_there_are_refused),
+        TEST(mask_and_read_write_are_served_when_asked_for),
+        TEST(a_unit_that_serves_nothing_is_silent),
+        TEST(several_units_each_have_their_own),
+        TEST(a_function_of_the_sketch_is_served),
+        TEST(a_function_can_be_switched_off_and_on),
+        TEST(the_other_functions_are_served_from_their_records),
+        TEST(master_and_server_understand_each_other),
+    };
+
+    return cmocka_run_group_tests_name("class that serves", tests, nullptr, nullptr);
+}

@@ -1,0 +1,99 @@
+/* A Modbus server on a board without an operating system: four arrays, of which
+ * the inputs follow what is written to the others.
+ * Licence: MIT OR Apache-2.0. */
+#include "serve.h"
+#include "board.h"
+#include "mbm.h"
+
+static mbm_server server;
+static mbm_unit unit;
+static uint8_t frame[MBM_MAX_FRAME];
+
+static uint16_t holding_words[SERVE_CELLS], input_words[SERVE_CELLS];
+static uint8_t coil_bits[(SERVE_CELLS + 7) / 8], input_bits[(SERVE_CELLS + 7) / 8];
+static mbm_registerTable holding, inputs;
+static mbm_bitTable coils, discrete;
+
+/* Refuses a write of which one value is too high. */
+static uint8_t registers_come(void *context, uint16_t address, uint16_t quantity,
+                              const uint8_t *data)
+{
+    (void)context;
+    (void)address;
+    for (; quantity > 0; quantity--, data += 2)
+        if ((data[0] << 8 | data[1]) > SERVE_MOST)
+            return MBM_ILLEGAL_DATA_VALUE;
+    return 0;
+}
+
+static void registers_written(void *context, uint16_t address, uint16_t quantity)
+{
+    (void)context;
+    for (; quantity > 0; quantity--, address++)
+        input_words[address - SERVE_BASE] = (uint16_t)~holding_words[address - SERVE_BASE];
+}
+
+static void coils_written(void *context, uint16_t address, uint16_t quantity)
+{
+    uint16_t i;
+
+    (void)context;
+    (void)address;
+    (void)quantity;
+    for (i = 0; i < sizeof coil_bits; i++)
+        input_bits[i] = (uint8_t)~coil_bits[i];
+}
+
+static uint8_t is_over(void)
+{
+    enum { END = SERVE_END - SERVE_BASE };
+
+    /* The response to the write that ends this has to leave first. */
+    return (coil_bits[END / 8] >> END % 8 & 1) && mbm_server_pollDelay(&server) == UINT32_MAX;
+}
+
+static void fill(void)
+{
+    holding.words = holding_words;
+    holding.base = SERVE_BASE;
+    holding.size = SERVE_CELLS;
+    holding.before = registers_come;
+    holding.after = registers_written;
+    inputs.words = input_words;
+    inputs.base = SERVE_BASE;
+    inputs.size = SERVE_CELLS;
+    coils.bits = coil_bits;
+    coils.base = SERVE_BASE;
+    coils.size = SERVE_CELLS;
+    coils.after = coils_written;
+    discrete.bits = input_bits;
+    discrete.base = SERVE_BASE;
+    discrete.size = SERVE_CELLS;
+}
+
+int main(void)
+{
+    mbm_port port = {0};
+    uint8_t status = MBM_OK;
+
+    uart_start();
+    clock_start();
+
+    port.read = uart_read;
+    port.write = uart_write;
+    port.micros = clock_micros;
+    port.flush = uart_flush;
+
+    fill();
+    unit.id = SERVE_UNIT;
+    mbm_server_serveHoldingRegisters(&unit, &holding);
+    mbm_server_serveInputRegisters(&unit, &inputs);
+    mbm_server_serveCoils(&unit, &coils);
+    mbm_server_serveDiscreteInputs(&unit, &discrete);
+    mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame);
+    mbm_server_setSilence(&server, SERVE_SILENCE);
+    console_print("serving\n");
+    while (status == MBM_OK && !is_over())
+        status = mbm_server_poll(&server);
+    return status;
+}

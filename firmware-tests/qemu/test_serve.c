@@ -1,0 +1,240 @@
+/* The bare metal firmware that serves, on every machine that QEMU plays, asked
+ * by a real libmodbus client.
+ *
+ *     test_serve [MACHINE...] */
+#define _GNU_SOURCE
+#include "crc.h"
+#include "machine.h"
+#include "mbm.h"
+#include "pty.h"
+#include "serve.h"
+#include "test.h"
+
+#include <errno.h>
+#include <modbus.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+/* Longer than what ends a frame. */
+enum { SILENCE_MS = 2 * SERVE_SILENCE / 1000 };
+
+static const machine *board;
+static pty line;
+static running firmware;
+static modbus_t *client;
+
+static uint16_t value(unsigned i)
+{
+    return (uint16_t)((i * 40503u + 77u) % SERVE_MOST);
+}
+
+static uint8_t bit(unsigned i)
+{
+    return value(i) >> 6 & 1;
+}
+
+static int start(void **state)
+{
+    (void)state;
+    pty_open(&line);
+    firmware = machine_start(board, "serve", line.ours);
+    if (!machine_says(&firmware, "serving"))
+        return -1;
+    client = modbus_new_rtu(line.path, 115200, 'N', 8, 1);
+    if (!client || modbus_set_slave(client, SERVE_UNIT) || modbus_connect(client) ||
+        modbus_set_response_timeout(client, 10, 0))
+        return -1;
+    return 0;
+}
+
+static int stop(void **state)
+{
+    (void)state;
+    modbus_close(client);
+    modbus_free(client);
+    machine_finish(&firmware, 0);
+    pty_close(&line);
+    return 0;
+}
+
+#define FAILS(error, call)                                                                         \
+    do {                                                                                           \
+        errno = 0;                                                                                 \
+        assert_int_equal(call, -1);                                                                \
+        assert_int_equal(errno, error);                                                            \
+    } while (0)
+#define EXCEPTION(code, call) FAILS(MODBUS_ENOBASE + (code), call)
+
+/* The client. libmodbus sends at once behind a response, where the standard has
+ * it wait for t3.5; a pty has no characters that take time. */
+static modbus_t *asking(void)
+{
+    usleep(20000);
+    return client;
+}
+
+static void registers_are_written_and_read(void **state)
+{
+    uint16_t words[SERVE_CELLS], back[SERVE_CELLS];
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < SERVE_CELLS; i++)
+        words[i] = value(i);
+    assert_int_equal(modbus_write_registers(asking(), SERVE_BASE, 123, words), 123);
+    assert_int_equal(modbus_write_registers(asking(), SERVE_BASE + 123, 7, words + 123), 7);
+    assert_int_equal(modbus_read_registers(asking(), SERVE_BASE, 125, back), 125);
+    assert_memory_equal(words, back, 250);
+    assert_int_equal(modbus_read_registers(asking(), SERVE_BASE + 5, 125, back), 125);
+    assert_memory_equal(words + 5, back, 250);
+    assert_int_equal(modbus_write_register(asking(), SERVE_BASE + 129, 4711), 1);
+    assert_int_equal(modbus_read_registers(asking(), SERVE_BASE + 128, 2, back), 2);
+    assert_int_equal(back[0], value(128));
+    assert_int_equal(back[1], 4711);
+    /* As the hook behind the write left them. */
+    assert_int_equal(modbus_read_input_registers(asking(), SERVE_BASE + 9, 120, back), 120);
+    for (i = 0; i < 120; i++)
+        assert_int_equal(back[i], (uint16_t)~value(9 + i));
+}
+
+static void coils_are_written_and_read(void **state)
+{
+    uint8_t bits[SERVE_CELLS], back[SERVE_CELLS];
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < SERVE_CELLS; i++)
+        bits[i] = bit(i);
+    assert_int_equal(modbus_write_bits(asking(), SERVE_BASE, 129, bits), 129);
+    assert_int_equal(modbus_read_bits(asking(), SERVE_BASE + 3, 126, back), 126);
+    assert_memory_equal(bits + 3, back, 126);
+    assert_int_equal(modbus_write_bit(asking(), SERVE_BASE + 50, !bit(50)), 1);
+    assert_int_equal(modbus_read_bits(asking(), SERVE_BASE + 49, 3, back), 3);
+    assert_int_equal(back[0], bit(49));
+    assert_int_equal(back[1], !bit(50));
+    assert_int_equal(back[2], bit(51));
+    assert_int_equal(modbus_read_input_bits(asking(), SERVE_BASE + 1, 49, back), 49);
+    for (i = 0; i < 49; i++)
+        assert_int_equal(back[i], !bit(1 + i));
+}
+
+static void refuses(const uint8_t *request, size_t length, uint8_t exception)
+{
+    uint8_t answer[MODBUS_RTU_MAX_ADU_LENGTH];
+
+    assert_true(modbus_send_raw_request(asking(), (uint8_t *)(uintptr_t)request, (int)length) > 0);
+    assert_int_equal(modbus_receive_confirmation(client, answer), 5);
+    assert_int_equal(answer[1], request[1] | 0x80);
+    assert_int_equal(answer[2], exception);
+}
+
+static void refusals_are_exceptions(void **state)
+{
+    static const uint8_t no_quantity[] = {17, 3, 0, 100, 0, 0}, half_on[] = {17, 5, 0, 100, 1, 0};
+    static const uint8_t unknown[] = {17, 100, 1};
+    uint16_t words[2] = {1, SERVE_MOST + 1};
+    uint8_t bits[2];
+
+    (void)state;
+    assert_int_equal(modbus_write_register(asking(), SERVE_BASE, 9), 1);
+    EXCEPTION(2, modbus_read_registers(asking(), SERVE_BASE - 1, 2, words));
+    EXCEPTION(2, modbus_read_input_registers(asking(), SERVE_BASE + 129, 2, words));
+    EXCEPTION(2, modbus_read_bits(asking(), SERVE_BASE + 129, 2, bits));
+    EXCEPTION(2, modbus_read_input_bits(asking(), 65535, 1, bits));
+    EXCEPTION(1, modbus_mask_write_register(asking(), SERVE_BASE, 0, 1));
+    words[0] = 1;
+    words[1] = SERVE_MOST + 1;
+    EXCEPTION(3, modbus_write_registers(asking(), SERVE_BASE, 2, words));
+    refuses(no_quantity, sizeof no_quantity, 3);
+    refuses(half_on, sizeof half_on, 3);
+    refuses(unknown, sizeof unknown, 1);
+    assert_int_equal(modbus_read_registers(asking(), SERVE_BASE, 1, words), 1);
+    assert_int_equal(words[0], 9);
+}
+
+/* Bytes by themselves, with silence before and behind; nothing comes back. */
+static void is_ignored(const uint8_t *frame, size_t length)
+{
+    uint8_t byte;
+
+    usleep(SILENCE_MS * 1000);
+    assert_int_equal(write(modbus_get_socket(client), frame, length), length);
+    usleep(2 * SILENCE_MS * 1000);
+    assert_int_not_equal(read(modbus_get_socket(client), &byte, 1), 1);
+}
+
+static void damage_and_other_units_are_met_with_silence(void **state)
+{
+    uint8_t frame[16] = {SERVE_UNIT, 6, 0, 102, 0x12, 0x34};
+    size_t length = seal(frame, 6);
+    uint16_t word;
+
+    (void)state;
+    assert_int_equal(modbus_write_register(asking(), 102, 5), 1);
+    frame[5] ^= 0x10;
+    is_ignored(frame, length);
+    frame[5] ^= 0x10;
+    is_ignored(frame, length - 1);
+    frame[0]++;
+    is_ignored(frame, seal(frame, 6));
+    assert_int_equal(modbus_read_registers(asking(), 102, 1, &word), 1);
+    assert_int_equal(word, 5);
+}
+
+static void a_broadcast_is_carried_out_in_silence(void **state)
+{
+    uint8_t frame[16] = {0, 6, 0, 103, 0x12, 0x34};
+    uint16_t word;
+
+    (void)state;
+    is_ignored(frame, seal(frame, 6));
+    assert_int_equal(modbus_read_registers(asking(), 103, 1, &word), 1);
+    assert_int_equal(word, 0x1234);
+}
+
+static void the_firmware_ends_when_it_is_told_to(void **state)
+{
+    run done;
+
+    (void)state;
+    assert_int_equal(modbus_write_bit(asking(), SERVE_END, 1), 1);
+    done = machine_finish(&firmware, 1);
+    if (done.code != 0)
+        print_error("%s", done.console);
+    assert_true(done.ended);
+    assert_int_equal(done.code, 0);
+    assert_non_null(strstr(done.console, "serving"));
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(registers_are_written_and_read),
+        cmocka_unit_test(coils_are_written_and_read),
+        cmocka_unit_test(refusals_are_exceptions),
+        cmocka_unit_test(damage_and_other_units_are_met_with_silence),
+        cmocka_unit_test(a_broadcast_is_carried_out_in_silence),
+        cmocka_unit_test(the_firmware_ends_when_it_is_told_to),
+    };
+    int failed = 0, asked = 0, a;
+    unsigned m;
+
+    for (m = 0; m < machine_count; m++) {
+        /* The application with the client is the same machine. */
+        int wanted = argc == 1 && !strstr(machines[m].name, "-client");
+
+        for (a = 1; a < argc; a++)
+            wanted |= strcmp(argv[a], machines[m].name) == 0;
+        if (!wanted)
+            continue;
+        board = &machines[m];
+        /* Should all other waits fail: ends this program, and QEMU with it. */
+        alarm(240);
+        failed += cmocka_run_group_tests_name(board->name, tests, start, stop);
+        asked++;
+    }
+    if (asked == 0)
+        fprintf(stderr, "test_serve: no such machine\n");
+    return failed != 0 || asked == 0;
+}

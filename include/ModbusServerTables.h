@@ -1,0 +1,193 @@
+/**
+ * @file ModbusServerTables.h
+ * @brief What a ModbusServer serves: registers, bits and functions of a sketch.
+ *
+ * Licence: MIT OR Apache-2.0. Included by ModbusServer.h.
+ */
+
+#ifndef MODBUSSERVERTABLES_H
+#define MODBUSSERVERTABLES_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "mbm.h"
+
+/**
+ * What both kinds of table have in common.
+ *
+ * Hooks are told the address on the wire of the first cell and how many there
+ * are. They may read this table's cells, and leave changes of them to loop.
+ */
+template <typename Table> class ModbusTable {
+public:
+    ModbusTable(const ModbusTable &) = delete;
+    ModbusTable &operator=(const ModbusTable &) = delete;
+
+    /**
+     * Asked before cells are written, once a request: `data` are the new values,
+     * of registers high bytes first, of bits lowest bit first. Returns 0, or an
+     * exception code that refuses the whole request. nullptr for none.
+     */
+    void beforeWrite(uint8_t (*hook)(uint16_t address, uint16_t quantity, const uint8_t *data))
+    {
+        onBefore = hook;
+        table.before = hook != nullptr ? beforeHook : nullptr;
+    }
+    /** Told what was written; nullptr for none. */
+    void afterWrite(void (*hook)(uint16_t address, uint16_t quantity))
+    {
+        onAfter = hook;
+        table.after = hook != nullptr ? afterHook : nullptr;
+    }
+    /**
+     * Which cells are there: a bit for each, lowest bit of the first byte first.
+     * Others are answered with exception 02. nullptr: all are.
+     */
+    void setValid(const uint8_t *bits) { table.valid = bits; }
+    /** The address of the first cell. */
+    uint16_t address() const { return table.base; }
+    /** How many cells there are. */
+    uint16_t size() const { return table.size; }
+
+protected:
+    /** @cond what the two kinds use */
+    ModbusTable(uint16_t size, uint16_t address) : table(), onBefore(), onAfter()
+    {
+        table.context = this;
+        table.size = size;
+        table.base = address;
+    }
+
+    Table table;
+    /** @endcond */
+
+private:
+    friend class ModbusUnit;
+
+    uint8_t (*onBefore)(uint16_t, uint16_t, const uint8_t *);
+    void (*onAfter)(uint16_t, uint16_t);
+
+    Table *use() { return &table; }
+
+    static uint8_t beforeHook(void *context, uint16_t address, uint16_t quantity,
+                              const uint8_t *data)
+    {
+        return static_cast<ModbusTable *>(context)->onBefore(address, quantity, data);
+    }
+    static void afterHook(void *context, uint16_t address, uint16_t quantity)
+    {
+        static_cast<ModbusTable *>(context)->onAfter(address, quantity);
+    }
+};
+
+/** Holding or input registers in an array of yours. */
+class ModbusRegisters : public ModbusTable<mbm_registerTable> {
+public:
+    /** All words of an array, from `address` on. */
+    template <size_t N>
+    ModbusRegisters(uint16_t (&words)[N], uint16_t address = 0)
+        : ModbusRegisters(words, N, address)
+    {
+        static_assert(N <= 65535, "a table has at most 65535 registers");
+    }
+    /** `quantity` words, from `address` on. */
+    ModbusRegisters(uint16_t *words, uint16_t quantity, uint16_t address)
+        : ModbusTable(quantity, address)
+    {
+        table.words = words;
+    }
+
+    /** The register `index`, counted from the first of the table: below size(). */
+    uint16_t &operator[](uint16_t index) { return table.words[index]; }
+    /** @copydoc operator[] */
+    const uint16_t &operator[](uint16_t index) const { return table.words[index]; }
+};
+
+/** Coils or discrete inputs in an array of yours, lowest bit of a byte first. */
+class ModbusBits : public ModbusTable<mbm_bitTable> {
+public:
+    /** All bits of an array, eight to a byte, from `address` on. */
+    template <size_t N>
+    ModbusBits(uint8_t (&bytes)[N], uint16_t address = 0) : ModbusBits(bytes, N * 8, address)
+    {
+        static_assert(N <= 8191, "a table has at most 65535 bits");
+    }
+    /** `quantity` bits, from `address` on. */
+    ModbusBits(uint8_t *bytes, uint16_t quantity, uint16_t address)
+        : ModbusTable(quantity, address)
+    {
+        table.bits = bytes;
+    }
+
+    /** The bit `index`, counted from the first of the table: below size(). */
+    bool operator[](uint16_t index) const { return (table.bits[index / 8] >> index % 8 & 1) != 0; }
+    /** Sets the bit `index`, which is below size(). */
+    void set(uint16_t index, bool on)
+    {
+        uint8_t bit = static_cast<uint8_t>(1u << index % 8);
+        uint8_t &byte = table.bits[index / 8];
+        byte = static_cast<uint8_t>(on ? byte | bit : byte & ~bit);
+    }
+};
+
+/** Registers with storage of their own, all 0 at first. */
+template <uint16_t Quantity> class ModbusRegisterArray : public ModbusRegisters {
+public:
+    /** The first stands at `address`. */
+    ModbusRegisterArray(uint16_t address = 0)
+        : ModbusRegisters(storage, Quantity, address), storage()
+    {
+    }
+
+private:
+    uint16_t storage[Quantity];
+};
+
+/** Bits with storage of their own, all 0 at first. */
+template <uint16_t Quantity> class ModbusBitArray : public ModbusBits {
+public:
+    /** The first stands at `address`. */
+    ModbusBitArray(uint16_t address = 0) : ModbusBits(storage, Quantity, address), storage() {}
+
+private:
+    uint8_t storage[(Quantity + 7u) / 8u];
+};
+
+/** A function of yours, for ModbusUnit::function. */
+class ModbusFunction {
+public:
+    /**
+     * @param code     1 to 127, of which 65 to 72 and 100 to 110 are left to
+     *                 users; 0 is every function that nothing before it serves
+     * @param handler  writes the data of the response, at most `capacity` bytes, and
+     *                 returns how many; or MBM_REPLY_EXCEPTION | code,
+     *                 MBM_REPLY_NONE, MBM_REPLY_PENDING to be called again
+     */
+    ModbusFunction(uint8_t code, uint16_t (*handler)(const mbm_request &request, uint8_t *response,
+                                                     uint16_t capacity))
+        : custom(), handle(handler)
+    {
+        custom.code = code;
+        custom.context = this;
+        custom.serve = handler != nullptr ? serveHook : nullptr;
+    }
+    ModbusFunction(const ModbusFunction &) = delete;
+    ModbusFunction &operator=(const ModbusFunction &) = delete;
+
+private:
+    friend class ModbusUnit;
+
+    mbm_custom custom;
+    uint16_t (*handle)(const mbm_request &, uint8_t *, uint16_t);
+
+    mbm_custom *use() { return &custom; }
+
+    static uint16_t serveHook(void *context, const mbm_request *request, uint8_t *response,
+                              uint16_t capacity)
+    {
+        return static_cast<ModbusFunction *>(context)->handle(*request, response, capacity);
+    }
+};
+
+#endif
