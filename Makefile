@@ -168,6 +168,19 @@ sniff: ## The example that watches a bus, build/plain/linux/sniff
 	@$(MAKE) --no-print-directory $(SNIFF)
 	@scripts/check-sniff $(SNIFF)
 
+CLIENTS := $(patsubst %,$(BUILD)/plain/linux/%,poll_table scan logger)
+$(CLIENTS): %: %.o $(patsubst %,$(BUILD)/plain/linux/%.o,line mbm_tty mbm_tcp) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
+PEERS := $(BUILD)/plain/serve_libmodbus
+$(PEERS): $(patsubst %,$(BUILD)/plain/%.o,serve_libmodbus support/server support/tcp_server support/pty) $(ARCHIVE)
+	@gcc $(filter %.o,$^) -lmodbus -lpthread -o $@
+
+.PHONY: clients
+clients: ## Examples with the client, checked: poll_table, scan, logger in build/plain/linux
+	@scripts/need python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
+	@$(MAKE) --no-print-directory venv $(CLIENTS) $(PEERS)
+	@$(BUILD)/venv/bin/python scripts/check-clients $(BUILD)/plain
+
 .PHONY: demo
 demo: ## Every function at work against a libmodbus server, frame by frame
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev

@@ -2036,6 +2036,19 @@ uint8_t mbm_client_beginAscii(struct mbm_client *client,
                               uint16_t frameBytes);
 
 /**
+ * Sets the character that ends ASCII frames behind CR, in place of LF, in both
+ * directions; for devices that were told another one (function 08 with
+ * sub-function 03, V1.1b3, 6.8.1). That request is answered with the old one: call
+ * this when it has ended, for example from its `done`.
+ *
+ * @param client     the object, begun with mbm_client_beginAscii
+ * @param character  1 to 127, but CR, the colon and hexadecimal digits
+ * @return MBM_OK; MBM_BUSY while a request is under way; MBM_INVALID_ARGUMENT, also
+ *         for a client of another framing; MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setDelimiter(struct mbm_client *client, uint8_t character);
+
+/**
  * Makes an object a client that sends RTU frames through a TCP stream, for
  * converters that pass on what they get. No gap is kept, nothing is broadcast.
  *
@@ -2073,6 +2086,19 @@ uint8_t mbm_client_beginTcp(struct mbm_client *client,
                             uint16_t incomingBytes,
                             uint8_t *outgoing,
                             uint16_t outgoingBytes);
+
+/**
+ * Sets how many requests are under way at once on TCP, for servers that take fewer
+ * at a time (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 1 to
+ * 16); some drop what comes in one segment with another request. The queue holds 16 in any case.
+ *
+ * @param client  the object
+ * @param most    1 to 16, which is so at first; on a serial line, and in RTU over
+ *                TCP, 1
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setInFlight(struct mbm_client *client,
+                               uint8_t most);
 
 /**
  * Closes the link and opens it anew. What was half received is forgotten, and

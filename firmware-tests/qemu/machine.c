@@ -18,6 +18,7 @@ enum { PATIENCE = 30 /* s */ };
 
 const machine machines[] = {
     {"lm3s6965evb", ARM("lm3s6965evb")},
+    {"lm3s6965evb-client", ARM("lm3s6965evb")},
     {"microbit", ARM("microbit")},
     {"virt", {"qemu-system-riscv32", "-M", "virt", "-bios", "none", "-kernel", NULL}},
     {"netduinoplus2", ARM("netduinoplus2")},

@@ -3,6 +3,7 @@
 BAREMETAL := examples/baremetal/Makefile
 # Of the firmware's Makefile.
 MACHINES = $(shell $(MAKE) -s --no-print-directory -f $(BAREMETAL) machines)
+VARIANTS = $(shell $(MAKE) -s --no-print-directory -f $(BAREMETAL) variants)
 
 QEMU_TESTS := $(patsubst firmware-tests/qemu/%.c,$(BUILD)/firmware/%,$(wildcard firmware-tests/qemu/test_*.c))
 QEMU_SOURCES := $(filter-out firmware-tests/qemu/test_%,$(wildcard firmware-tests/qemu/*.c)) \
@@ -21,6 +22,7 @@ firmware-test-qemu: ## Bare metal firmware on seven machines in QEMU: Arm, RISC-
 		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$machine; \
 		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$machine PROGRAM=serve; \
 	done
+	@set -e; for variant in $(VARIANTS); do $(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$variant; done
 	@$(MAKE) -s --no-print-directory $(QEMU_TESTS)
 	@scripts/run-c-tests "" $(QEMU_TESTS)
 	@echo "firmware-test-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against libmodbus, server and client, and a bad wire"

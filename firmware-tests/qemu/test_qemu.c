@@ -219,6 +219,24 @@ static void counts_what_happened(void **state)
     assert_int_equal(head(held(), REPORT_RESYNCHRONISATIONS), 0);
 }
 
+/* Only the firmware with the client polls a ring that an interrupt fills; it polls
+ * when something is due or has arrived, and sleeps else. */
+static void sleeps_instead_of_polling(void **state)
+{
+    unsigned polls = head(held(), REPORT_POLLS), sleeps = head(held(), REPORT_SLEEPS);
+
+    (void)state;
+    assert_int_equal(head(held(), REPORT_LOST_BYTES), 0);
+    if (!strstr(board->name, "-client")) {
+        assert_int_equal(polls + sleeps, 0);
+        return;
+    }
+    print_message("%s: %u polls, %u sleeps\n", board->name, polls, sleeps);
+    assert_in_range(sleeps, STEPS, polls);
+    /* The wire takes seconds at full length; a loop would poll a million times. */
+    assert_in_range(polls, STEPS, 3000);
+}
+
 /* What every step must bring from the device of our own; `met` is what the
  * request that meets the fault ends with. */
 static void all_is_right(const device *d, uint8_t met)
@@ -311,6 +329,7 @@ static const struct {
     TEST(a_broadcast_arrives_and_is_not_waited_for),
     TEST(an_absent_unit_times_out_when_it_should),
     TEST(counts_what_happened),
+    TEST(sleeps_instead_of_polling),
     TEST(the_clock_keeps_time),
 };
 

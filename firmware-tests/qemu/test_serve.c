@@ -221,7 +221,8 @@ int main(int argc, char **argv)
     unsigned m;
 
     for (m = 0; m < machine_count; m++) {
-        int wanted = argc == 1;
+        /* The application with the client is the same machine. */
+        int wanted = argc == 1 && !strstr(machines[m].name, "-client");
 
         for (a = 1; a < argc; a++)
             wanted |= strcmp(argv[a], machines[m].name) == 0;

@@ -124,6 +124,31 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// Holds at compile time that the line carries `M` requests at once and the
     /// queue has room for them: 1 on a serial line, which is half duplex.
     ///
+    /// ```
+    /// # use mbm::client::*;
+    /// fn one_at_a_time<J: Job, P: mbm::port::Port, S: Means>(client: Client<Serial<P, S, J>, J, 4>) {
+    ///     client.in_flight::<1>();
+    /// }
+    /// # struct P; impl mbm::port::Port for P {
+    /// #     fn read(&mut self, _: &mut [u8]) -> i16 { 0 }
+    /// #     fn write(&mut self, _: &[u8]) -> i16 { 0 }
+    /// #     fn micros(&mut self) -> u32 { 0 }
+    /// # }
+    /// # struct J; impl Job for J {
+    /// #     fn ticket(&self) -> &Ticket { &Ticket::NONE }
+    /// #     fn ticket_mut(&mut self) -> &mut Ticket { todo!() }
+    /// #     fn byte(&self, _: usize) -> u8 { 0 }
+    /// #     fn put(&mut self, _: usize, _: u8) {}
+    /// # }
+    /// # struct S; impl Means for S {}
+    /// # impl mbm::transaction::Storage for S {
+    /// #     fn frame(&mut self) -> &mut [u8] { &mut [] }
+    /// # }
+    /// # fn main() { one_at_a_time::<J, P, S>(Client::new(Serial::new(P, S))); }
+    /// ```
+    ///
+    /// Two do not compile:
+    ///
     /// ```compile_fail
     /// # use mbm::client::*;
     /// fn two_at_once<J: Job, P: mbm::port::Port, S: Means>(client: Client<Serial<P, S, J>, J, 4>) {

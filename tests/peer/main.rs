@@ -5,6 +5,7 @@
 //! `make venv build/plain/serve` does.
 
 mod asking;
+mod client;
 mod process;
 mod requests;
 mod responses;

@@ -38,15 +38,15 @@ fn pty() -> (File, String) {
 }
 
 /// A server and the line to it.
-struct Served {
+pub struct Served {
     framing: Framing,
-    out: Box<dyn Write>,
-    arrived: mpsc::Receiver<Vec<u8>>,
+    pub out: Box<dyn Write>,
+    pub arrived: mpsc::Receiver<Vec<u8>>,
     _server: Script,
 }
 
 impl Served {
-    fn new(framing: Framing) -> Served {
+    pub fn new(framing: Framing) -> Served {
         let unit = UNIT.to_string();
         let start = |name, place: [&str; 2]| {
             let arguments = ["--framing", name, place[0], place[1], "--unit", &unit];
@@ -121,7 +121,7 @@ impl Served {
 }
 
 /// What the server's holding register holds.
-fn pattern(address: u16) -> [u8; 2] {
+pub fn pattern(address: u16) -> [u8; 2] {
     address
         .wrapping_mul(40503)
         .wrapping_add(0x1234)

@@ -45,7 +45,8 @@ struct vectors {
     void (*handlers[15])(void);
 };
 
-/* From reset to SysTick. No interrupt is used. */
+/* From reset to SysTick. A machine that uses interrupts has their handlers in
+ * .vectors.machine, which comes behind. */
 __attribute__((section(".vectors"), used)) static const struct vectors vectors = {
     stack_top,
     {

@@ -2,8 +2,9 @@
 
 use super::{client, mbm_client, pointers, Kind, Lent, LentByC, Object, BEGUN};
 use super::{Ascii, Rtu, TcpIp};
+use crate::capi::frame::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
 use crate::capi::port::mbm_port;
-use crate::client::{Client, Serial, Tcp, ASCII_SILENCE, STREAM_SILENCE};
+use crate::client::{Client, Line, Serial, Tcp, ASCII_SILENCE, STREAM_SILENCE};
 use crate::error::Status;
 use crate::frame::{ascii, ascii_window, rtu, Search};
 
@@ -117,18 +118,48 @@ pub unsafe extern "C" fn mbm_client_beginAscii(
         let status =
             begin_serial::<ascii_window::Window>(client, port, frame, frameBytes, true, silence);
         if status == Status::OK.code() {
-            set_delimiter(client, ascii::END);
+            let object = pointers::object(client);
+            object.framing = MBM_FRAMING_ASCII;
+            *delimiter(object) = ascii::END;
         }
         status
     }
 }
 
-unsafe fn set_delimiter(pointer: *mut mbm_client, delimiter: u8) {
-    // SAFETY: an ASCII client that was begun.
+/// What ends the frames of an ASCII client.
+fn delimiter(object: &mut Object) -> &mut u8 {
+    let ascii: &mut Ascii = client(object);
+    &mut ascii.line.transaction().search().delimiter
+}
+
+/// Sets the character that ends ASCII frames behind CR, in place of LF, in both
+/// directions; for devices that were told another one (function 08 with
+/// sub-function 03, V1.1b3, 6.8.1). That request is answered with the old one: call
+/// this when it has ended, for example from its `done`.
+///
+/// @param client     the object, begun with mbm_client_beginAscii
+/// @param character  1 to 127, but CR, the colon and hexadecimal digits
+/// @return MBM_OK; MBM_BUSY while a request is under way; MBM_INVALID_ARGUMENT, also
+///         for a client of another framing; MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, character: u8) -> u8 {
+    let part_of_a_frame = character.is_ascii_hexdigit() || matches!(character, b':' | b'\r');
+    // SAFETY: as the header demands.
     unsafe {
-        let object = pointers::object(pointer);
-        let client: &mut Ascii = client(object);
-        client.line.transaction().search().delimiter = delimiter;
+        pointers::with(client, |object| {
+            if object.framing != MBM_FRAMING_ASCII
+                || !(1..=127).contains(&character)
+                || part_of_a_frame
+            {
+                return Status::INVALID_ARGUMENT;
+            }
+            let ascii: &mut Ascii = super::client(object);
+            if !ascii.line.is_idle() {
+                return Status::BUSY;
+            }
+            *delimiter(object) = character;
+            Status::OK
+        })
     }
 }
 
@@ -184,12 +215,37 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
         let status = begin::<Tcp<mbm_port, LentByC>>(client, port, incoming, incomingBytes);
         if status == Status::OK {
             let object = pointers::object(client);
+            object.framing = MBM_FRAMING_TCP;
             let tcp: &mut TcpIp = super::client(object);
             tcp.line.limit(super::MBM_CLIENT_DEPTH);
             tcp.line.means.outgoing = outgoing;
             tcp.line.means.outgoing_bytes = outgoingBytes;
         }
         status.code()
+    }
+}
+
+/// Sets how many requests are under way at once on TCP, for servers that take fewer
+/// at a time (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 1 to
+/// 16); some drop what comes in one segment with another request. The queue holds 16 in any case.
+///
+/// @param client  the object
+/// @param most    1 to 16, which is so at first; on a serial line, and in RTU over
+///                TCP, 1
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_setInFlight(client: *mut mbm_client, most: u8) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        pointers::with(client, |object| match (object.framing, most) {
+            (MBM_FRAMING_TCP, 1..=super::MBM_CLIENT_DEPTH) => {
+                let tcp: &mut TcpIp = super::client(object);
+                tcp.line.limit(most);
+                Status::OK
+            }
+            (MBM_FRAMING_RTU | MBM_FRAMING_ASCII, 1) => Status::OK,
+            _ => Status::INVALID_ARGUMENT,
+        })
     }
 }
 

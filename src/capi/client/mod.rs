@@ -58,6 +58,7 @@ type TcpIp = Client<Tcp<mbm_port, LentByC>, Lent, DEPTH>;
 pub(super) struct Object {
     mark: u8,
     polling: bool,
+    framing: u8,
     calls: *const Calls,
     client: Either,
 }

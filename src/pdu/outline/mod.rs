@@ -232,6 +232,7 @@ impl Outline {
             [_, count, group, reference, ..] if self.form.has(GROUP) => {
                 group == count.wrapping_sub(1) && reference == files::REFERENCE_TYPE
             }
+            [files::READ_FILE_RECORD, ..] => self.answers_groups(pdu, byte),
             [files::READ_FIFO_QUEUE, _, bytes, high, words, ..] => {
                 high == 0 && u16::from(words) <= MAX_FIFO && bytes == 2 * words + 2
             }
@@ -242,5 +243,21 @@ impl Outline {
         } else {
             Status::MALFORMED_REPLY
         }
+    }
+
+    /// True if a response to 14 has the groups that were asked for, each as long.
+    fn answers_groups(&self, pdu: &[u8], byte: impl Fn(usize) -> u8) -> bool {
+        let mut theirs = pdu.get(2..).unwrap_or_default();
+        for at in (5..usize::from(self.data_length)).step_by(7) {
+            // A length above 255 is of no request that a response could answer.
+            let bytes = usize::from(byte(at + 1)) << 1;
+            theirs = match theirs {
+                [count, files::REFERENCE_TYPE, rest @ ..] if usize::from(*count) == bytes + 1 => {
+                    rest.get(bytes..).unwrap_or(&[0])
+                }
+                _ => return false,
+            };
+        }
+        theirs.is_empty()
     }
 }

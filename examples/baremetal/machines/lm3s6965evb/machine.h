@@ -5,5 +5,6 @@
 #define TICKS_PER_MICRO (256u * 50u)
 #define UART_BASE 0x4000C000u
 #define UART_HZ 50000000u
+#define UART_INTERRUPT 5u
 
 #endif

@@ -1,0 +1,325 @@
+/* The client against our own server, in each framing: every function that both
+ * have, and what one framing has and the others have not. */
+#include "client.h"
+#include "served.h"
+#include "test.h"
+
+#include <string.h>
+#include <unistd.h>
+
+static asker a;
+static served s;
+
+static mbm_clientRequest asked(uint8_t unit, void *reply, uint16_t bytes, const void *data)
+{
+    mbm_clientRequest request = {0};
+
+    request.unit = unit;
+    request.reply = reply;
+    request.replyBytes = bytes;
+    request.data = data;
+    return request;
+}
+
+static void ends(uint8_t status, mbm_clientRequest *request, uint8_t queued)
+{
+    assert_int_equal(queued, MBM_PENDING);
+    assert_int_equal(asker_wait(&a, request), status);
+}
+
+static void brought(const mbm_clientRequest *request, const void *bytes, size_t length)
+{
+    assert_int_equal(request->length, length);
+    assert_memory_equal(request->reply, bytes, length);
+}
+
+static void begin(int framing)
+{
+    served_prepare(&s);
+    switch (framing) {
+    case MBM_FRAMING_RTU:
+        served_on_line(&s, framing);
+        asker_begin_rtu(&a, s.line.theirs);
+        break;
+    case MBM_FRAMING_ASCII:
+        served_on_line(&s, framing);
+        asker_begin_ascii(&a, s.line.theirs);
+        break;
+    case MBM_FRAMING_TCP:
+        served_on_tcp(&s, framing);
+        asker_begin_tcp(&a, (uint16_t)s.port);
+        break;
+    default:
+        served_on_tcp(&s, framing);
+        asker_begin_rtu_over_tcp(&a, (uint16_t)s.port);
+        break;
+    }
+}
+
+static void end(void)
+{
+    if (a.service[0])
+        mbm_tcp_close(&a.tcp);
+    else
+        mbm_tty_detach(&a.tty);
+    served_stop(&s);
+}
+
+static void reads_and_writes(void)
+{
+    static const uint16_t values[] = {0x1234, 0xFEDC, 7};
+    static const uint8_t coils[] = {0xCD, 0x01};
+    mbm_client *c = &a.client;
+    uint16_t words[125];
+    uint8_t bits[250];
+    mbm_clientRequest r = asked(SERVED_UNIT, bits, sizeof bits, NULL);
+
+    ends(MBM_OK, &r, mbm_client_readCoils(c, &r, SERVED_BASE, 2000));
+    brought(&r, s.bits, 250);
+    ends(MBM_OK, &r, mbm_client_readDiscreteInputs(c, &r, SERVED_BASE, 2000));
+    brought(&r, s.input_bits, 250);
+    r = asked(SERVED_UNIT, words, sizeof words, NULL);
+    ends(MBM_OK, &r, mbm_client_readHoldingRegisters(c, &r, SERVED_BASE, 125));
+    brought(&r, s.words, 250);
+    ends(MBM_OK, &r, mbm_client_readInputRegisters(c, &r, SERVED_BASE + 100, 125));
+    brought(&r, s.input_words + 100, 250);
+    ends(MBM_OK, &r, mbm_client_writeSingleCoil(c, &r, SERVED_BASE, 1));
+    ends(MBM_OK, &r, mbm_client_writeSingleRegister(c, &r, SERVED_BASE + 3, 0xA55A));
+    assert_int_equal(s.bits[0] & 1, 1);
+    assert_int_equal(s.words[3], 0xA55A);
+    r.data = coils;
+    ends(MBM_OK, &r, mbm_client_writeMultipleCoils(c, &r, SERVED_BASE + 8, 9));
+    assert_int_equal(s.bits[1], 0xCD);
+    assert_int_equal(s.bits[2] & 1, 1);
+    r.data = values;
+    ends(MBM_OK, &r, mbm_client_writeMultipleRegisters(c, &r, SERVED_BASE + 10, 3));
+    assert_memory_equal(s.words + 10, values, 6);
+    ends(MBM_OK, &r, mbm_client_maskWriteRegister(c, &r, SERVED_BASE + 3, 0xFF00, 0x0025));
+    assert_int_equal(s.words[3], 0xA525);
+    ends(MBM_OK, &r, mbm_client_readWriteMultipleRegisters(c, &r, SERVED_BASE + 9, 4,
+                                                           SERVED_BASE + 10, 2));
+    brought(&r, s.words + 9, 8);
+    ends(MBM_ILLEGAL_DATA_ADDRESS, &r, mbm_client_readHoldingRegisters(c, &r, 0, 1));
+}
+
+static void files_and_queues(void)
+{
+    static const uint16_t values[] = {0x1234, 0x5678};
+    static const uint8_t groups[] = {6, 0, 4, 0, 7, 0, 2, 6, 0, 4, 0, 1, 0, 1};
+    static const uint8_t records[] = {5, 6, 0x12, 0x34, 0x56, 0x78, 3, 6, 0xBE, 0xEF};
+    static const uint8_t written[] = {6, 0, 4, 0, 1, 0, 1, 0xBE, 0xEF};
+    mbm_client *c = &a.client;
+    uint8_t bytes[250];
+    uint16_t words[125];
+    mbm_clientRequest r = asked(SERVED_UNIT, words, sizeof words, values);
+
+    ends(MBM_OK, &r, mbm_client_writeFileRecord(c, &r, 4, 7, 2));
+    assert_memory_equal(s.records + 7, values, 4);
+    ends(MBM_OK, &r, mbm_client_readFileRecord(c, &r, 4, 0, 20));
+    brought(&r, s.records, 40);
+    ends(MBM_OK, &r, mbm_client_readFifoQueue(c, &r, 0x04DE));
+    brought(&r, s.queue, 4);
+    r = asked(SERVED_UNIT, bytes, sizeof bytes, written);
+    ends(MBM_OK, &r, mbm_client_writeFileRecords(c, &r, sizeof written));
+    r.data = groups;
+    ends(MBM_OK, &r, mbm_client_readFileRecords(c, &r, sizeof groups));
+    brought(&r, records, sizeof records);
+    ends(MBM_ILLEGAL_DATA_ADDRESS, &r, mbm_client_readFileRecord(c, &r, 4, 19, 2));
+    ends(MBM_ILLEGAL_DATA_ADDRESS, &r, mbm_client_readFifoQueue(c, &r, 0x04DF));
+}
+
+static void identities_and_diagnostics(void)
+{
+    static const uint16_t query[] = {0xA537, 0x0102};
+    static const uint8_t own[] = "own data";
+    static const mbm_rule eight = {.kind = MBM_RULE_FIXED, .bytes = 9};
+    mbm_client *c = &a.client;
+    uint8_t bytes[250];
+    uint16_t words[4];
+    mbm_clientRequest r = asked(SERVED_UNIT, bytes, sizeof bytes, NULL);
+
+    ends(MBM_OK, &r, mbm_client_readExceptionStatus(c, &r));
+    brought(&r, "\x6D", 1);
+    ends(MBM_OK, &r, mbm_client_reportServerId(c, &r));
+    brought(&r, "mbm\xFFtest", 8);
+    ends(MBM_OK, &r, mbm_client_getCommEventLog(c, &r));
+    assert_true(r.length >= 6);
+    ends(MBM_OK, &r, mbm_client_readDeviceIdentification(c, &r, 1, 0));
+    brought(&r, "\x83\x00\x00\x03\x00\x05Maker\x01\x05Thing\x02\x04V1.0", 24);
+    ends(MBM_ILLEGAL_DATA_ADDRESS, &r, mbm_client_readDeviceIdentification(c, &r, 4, 0x44));
+    r.data = "\x04\x80";
+    ends(MBM_OK, &r, mbm_client_encapsulatedInterfaceTransport(c, &r, 0x0E, 2));
+    brought(&r, "\x04\x83\x00\x00\x01\x80\x03own", 10);
+    r.data = own;
+    ends(MBM_OK, &r, mbm_client_custom(c, &r, SERVED_ECHO, 8, &eight));
+    brought(&r, own, 8);
+    ends(MBM_ILLEGAL_FUNCTION, &r, mbm_client_custom(c, &r, 0x42, 8, &eight));
+    r = asked(SERVED_UNIT, words, sizeof words, query);
+    ends(MBM_OK, &r, mbm_client_diagnostics(c, &r, MBM_DIAGNOSTICS_RETURN_QUERY_DATA, 2));
+    brought(&r, query, 4);
+    ends(MBM_OK, &r, mbm_client_getCommEventCounter(c, &r));
+    assert_int_equal(r.length, 4);
+    assert_int_equal(words[0], 0);
+    assert_true(words[1] > 0);
+    r.unit = SERVED_UNIT + 1;
+    ends(MBM_OK, &r, mbm_client_writeSingleRegister(c, &r, 3, 0x0102));
+    assert_int_equal(s.other_words[3], 0x0102);
+}
+
+static void every_function(int framing)
+{
+    begin(framing);
+    reads_and_writes();
+    files_and_queues();
+    identities_and_diagnostics();
+    assert_int_equal(a.counters.timeouts + a.counters.badCrc + a.counters.foreignFrames, 0);
+    end();
+}
+
+static void every_function_in_rtu(void **state)
+{
+    (void)state;
+    every_function(MBM_FRAMING_RTU);
+}
+
+static void every_function_in_ascii(void **state)
+{
+    (void)state;
+    every_function(MBM_FRAMING_ASCII);
+}
+
+static void every_function_in_tcp(void **state)
+{
+    (void)state;
+    every_function(MBM_FRAMING_TCP);
+}
+
+static void every_function_in_rtu_over_tcp(void **state)
+{
+    (void)state;
+    every_function(MBM_FRAMING_RTU_OVER_TCP);
+}
+
+static void a_broadcast_reaches_every_unit_in_ascii_and_is_refused_over_tcp(void **state)
+{
+    mbm_clientRequest r = asked(0, NULL, 0, NULL);
+
+    (void)state;
+    begin(MBM_FRAMING_ASCII);
+    ends(MBM_OK, &r, mbm_client_writeSingleRegister(&a.client, &r, SERVED_BASE, 0x5A5A));
+    assert_int_equal(s.words[0], 0x5A5A);
+    end();
+    begin(MBM_FRAMING_RTU_OVER_TCP);
+    IS(MBM_BROADCAST_NOT_ALLOWED, mbm_client_writeSingleRegister(&a.client, &r, SERVED_BASE, 1));
+    end();
+}
+
+static uint8_t set_in_done;
+
+static void change(void *context, mbm_clientRequest *request)
+{
+    if (request->status == MBM_OK)
+        set_in_done = mbm_client_setDelimiter((mbm_client *)context, '!');
+}
+
+static void the_ascii_delimiter_follows_the_devices(void **state)
+{
+    static const uint16_t wanted[] = {'!' << 8};
+    uint16_t words[2];
+    mbm_clientRequest r = asked(SERVED_UNIT, words, sizeof words, wanted);
+
+    (void)state;
+    begin(MBM_FRAMING_ASCII);
+    r.done = change;
+    r.context = &a.client;
+    set_in_done = MBM_PENDING;
+    ends(MBM_OK, &r, mbm_client_diagnostics(&a.client, &r,
+                                            MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER, 1));
+    assert_int_equal(set_in_done, MBM_OK);
+    r = asked(SERVED_UNIT, words, sizeof words, NULL);
+    ends(MBM_OK, &r, mbm_client_readHoldingRegisters(&a.client, &r, SERVED_BASE, 2));
+    brought(&r, s.words, 4);
+    /* A device that still wants LF is not answered by one that wants another. */
+    OK(mbm_client_setDelimiter(&a.client, '\n'));
+    OK(mbm_client_setResponseTimeout(&a.client, 50));
+    ends(MBM_RESPONSE_TIMED_OUT, &r, mbm_client_readHoldingRegisters(&a.client, &r, SERVED_BASE, 2));
+    end();
+}
+
+static void a_delimiter_that_cannot_be_is_refused(void **state)
+{
+    static const uint8_t wrong[] = {0, ':', '\r', '0', '9', 'A', 'F', 'a', 'f', 128, 255};
+    static mbm_client fresh;
+    uint16_t words[2];
+    mbm_clientRequest r = asked(SERVED_UNIT, words, sizeof words, NULL);
+    unsigned i;
+
+    (void)state;
+    IS(MBM_INVALID_ARGUMENT, mbm_client_setDelimiter(NULL, '!'));
+    IS(MBM_NOT_INITIALISED, mbm_client_setDelimiter(&fresh, '!'));
+    begin(MBM_FRAMING_RTU);
+    IS(MBM_INVALID_ARGUMENT, mbm_client_setDelimiter(&a.client, '!'));
+    end();
+    begin(MBM_FRAMING_TCP);
+    IS(MBM_INVALID_ARGUMENT, mbm_client_setDelimiter(&a.client, '!'));
+    end();
+    begin(MBM_FRAMING_ASCII);
+    for (i = 0; i < sizeof wrong; i++)
+        IS(MBM_INVALID_ARGUMENT, mbm_client_setDelimiter(&a.client, wrong[i]));
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &r, SERVED_BASE, 2));
+    (void)mbm_client_poll(&a.client);
+    IS(MBM_BUSY, mbm_client_setDelimiter(&a.client, '!'));
+    assert_int_equal(asker_wait(&a, &r), MBM_OK);
+    end();
+}
+
+static void as_many_are_under_way_over_tcp_as_the_server_takes(void **state)
+{
+    mbm_clientRequest requests[MBM_CLIENT_DEPTH];
+    uint16_t words[MBM_CLIENT_DEPTH];
+    static mbm_client fresh;
+    unsigned i;
+
+    (void)state;
+    IS(MBM_INVALID_ARGUMENT, mbm_client_setInFlight(NULL, 1));
+    IS(MBM_NOT_INITIALISED, mbm_client_setInFlight(&fresh, 1));
+    begin(MBM_FRAMING_RTU);
+    OK(mbm_client_setInFlight(&a.client, 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_setInFlight(&a.client, 2));
+    end();
+    begin(MBM_FRAMING_TCP);
+    IS(MBM_INVALID_ARGUMENT, mbm_client_setInFlight(&a.client, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_setInFlight(&a.client, MBM_CLIENT_DEPTH + 1));
+    OK(mbm_client_setInFlight(&a.client, MBM_CLIENT_DEPTH));
+    OK(mbm_client_setInFlight(&a.client, 1));
+    for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
+        requests[i] = asked(SERVED_UNIT, &words[i], sizeof words[i], NULL);
+        IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &requests[i],
+                                                        (uint16_t)(SERVED_BASE + i), 1));
+    }
+    while (mbm_client_poll(&a.client) == MBM_PENDING) {
+        assert_true(a.counters.requests - a.counters.replies <= 1);
+        asker_rest(&a);
+    }
+    for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
+        assert_int_equal(requests[i].status, MBM_OK);
+        assert_int_equal(words[i], s.words[i]);
+    }
+    end();
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_function_in_rtu),
+        cmocka_unit_test(every_function_in_ascii),
+        cmocka_unit_test(every_function_in_tcp),
+        cmocka_unit_test(every_function_in_rtu_over_tcp),
+        cmocka_unit_test(a_broadcast_reaches_every_unit_in_ascii_and_is_refused_over_tcp),
+        cmocka_unit_test(the_ascii_delimiter_follows_the_devices),
+        cmocka_unit_test(as_many_are_under_way_over_tcp_as_the_server_takes),
+        cmocka_unit_test(a_delimiter_that_cannot_be_is_refused),
+    };
+
+    return cmocka_run_group_tests_name("client in each framing", tests, NULL, NULL);
+}

@@ -1,0 +1,78 @@
+/* Sleeping until an interrupt: of the UART, or of a timer that is set for it.
+ * Licence: MIT OR Apache-2.0. */
+#include "board.h"
+#include "machine.h"
+#include "sleep.h"
+
+#define RUN_CLOCKS REGISTER(0x400FE104u)
+#define TIMER 0x40030000u
+#define CONFIGURATION REGISTER(TIMER + 0x000)
+#define MODE REGISTER(TIMER + 0x004)
+#define CONTROL REGISTER(TIMER + 0x00C)
+#define INTERRUPT_MASK REGISTER(TIMER + 0x018)
+#define INTERRUPT_CLEAR REGISTER(TIMER + 0x024)
+#define TICKS REGISTER(TIMER + 0x028)
+#define NVIC_ENABLE REGISTER(0xE000E100u)
+
+enum {
+    TIMER_CLOCK = 1 << 16,
+    ONE_COUNTER = 0, /* of 32 bits, not two of 16 */
+    ONCE = 1,
+    ENABLE = 1,
+    TIME_OVER = 1,
+    TIMER_INTERRUPT = 19,
+    LONGEST = 100000 /* microseconds: the clock's counter turns in 335 ms */
+};
+
+uint32_t sleeps;
+static volatile uint8_t is_over;
+
+void sleep_start(void)
+{
+    RUN_CLOCKS |= TIMER_CLOCK;
+    (void)RUN_CLOCKS;
+    (void)RUN_CLOCKS;
+    CONTROL = 0;
+    CONFIGURATION = ONE_COUNTER;
+    MODE = ONCE;
+    INTERRUPT_MASK = TIME_OVER;
+    NVIC_ENABLE = 1u << TIMER_INTERRUPT;
+}
+
+void sleep_interrupt(void)
+{
+    INTERRUPT_CLEAR = TIME_OVER;
+    is_over = 1;
+}
+
+void sleep_at_most(uint32_t micros)
+{
+    if (micros == 0)
+        return;
+    if (micros > LONGEST)
+        micros = LONGEST;
+    is_over = 0;
+    TICKS = micros * (TICKS_PER_MICRO / 256u);
+    CONTROL = ENABLE;
+    /* What comes between the question and the sleep ends the sleep at once: an
+     * interrupt that is held back wakes the core too. */
+    __asm__ volatile("cpsid i" ::: "memory");
+    if (!is_over && !uart_has_bytes()) {
+        sleeps++;
+        __asm__ volatile("dsb\n wfi" ::: "memory");
+    }
+    __asm__ volatile("cpsie i\n isb" ::: "memory");
+    CONTROL = 0;
+    /* A time that was over meanwhile is not to wake the next sleep. */
+    INTERRUPT_CLEAR = TIME_OVER;
+}
+
+void fault_handler(void);
+
+/* Behind those of the core: of the two that are enabled, and of what must not come. */
+#define NONE fault_handler
+__attribute__((section(".vectors.machine"), used)) static void (*const vectors[])(void) = {
+    NONE, NONE, NONE, NONE, NONE, uart_interrupt, NONE, NONE, NONE, NONE,
+    NONE, NONE, NONE, NONE, NONE, NONE, NONE, NONE, NONE, sleep_interrupt,
+};
+_Static_assert(sizeof vectors / sizeof vectors[0] == TIMER_INTERRUPT + 1, "a vector an interrupt");

@@ -1,0 +1,83 @@
+/* Arm's PL011 under interrupt: what arrives goes into a ring, from which the main
+ * loop takes it. The FIFO covers the time until the handler runs.
+ * Licence: MIT OR Apache-2.0. */
+#include "board.h"
+#include "machine.h"
+#include "mbm.h"
+#include "sleep.h"
+
+#define DATA REGISTER(UART_BASE + 0x00)
+#define FLAGS REGISTER(UART_BASE + 0x18)
+#define DIVISOR REGISTER(UART_BASE + 0x24)
+#define FRACTION REGISTER(UART_BASE + 0x28)
+#define LINE REGISTER(UART_BASE + 0x2C)
+#define CONTROL REGISTER(UART_BASE + 0x30)
+#define FIFO_LEVELS REGISTER(UART_BASE + 0x34)
+#define INTERRUPT_MASK REGISTER(UART_BASE + 0x38)
+#define INTERRUPT_CLEAR REGISTER(UART_BASE + 0x44)
+#define NVIC_ENABLE REGISTER(0xE000E100u)
+
+enum { BUSY = 1 << 3, RX_EMPTY = 1 << 4, TX_FULL = 1 << 5 };
+enum { FIFOS = 1 << 4, EIGHT_BITS = 3 << 5 };
+enum { ENABLE = 1 << 0, TX_ENABLE = 1 << 8, RX_ENABLE = 1 << 9 };
+/* Two bytes of sixteen, or one that stays alone for 32 bits. */
+enum { AN_EIGHTH = 0, RX = 1 << 4, RX_ALONE = 1 << 6 };
+
+/* Room for the longest frame; the handler may be ahead of the main loop by it. */
+static uint8_t bytes[MBM_MAX_FRAME + 1];
+static mbm_ring ring;
+
+void uart_start(void)
+{
+    /* In 64ths of the clock divided by 16. */
+    uint32_t divisor = (UART_HZ * 4u + BAUD / 2u) / BAUD;
+
+    mbm_ring_begin(&ring, bytes, sizeof bytes);
+    CONTROL = 0;
+    DIVISOR = divisor / 64;
+    FRACTION = divisor % 64;
+    LINE = FIFOS | EIGHT_BITS;
+    FIFO_LEVELS = AN_EIGHTH;
+    INTERRUPT_MASK = RX | RX_ALONE;
+    NVIC_ENABLE = 1u << UART_INTERRUPT;
+    CONTROL = ENABLE | TX_ENABLE | RX_ENABLE;
+}
+
+void uart_interrupt(void)
+{
+    INTERRUPT_CLEAR = RX | RX_ALONE;
+    while (!(FLAGS & RX_EMPTY))
+        mbm_ring_put(&ring, (uint8_t)DATA);
+}
+
+int16_t uart_read(void *context, uint8_t *to, uint16_t capacity)
+{
+    (void)context;
+    return (int16_t)mbm_ring_read(&ring, to, capacity);
+}
+
+uint8_t uart_has_bytes(void)
+{
+    return mbm_ring_available(&ring) > 0;
+}
+
+uint16_t uart_lost(void)
+{
+    return mbm_ring_lost(&ring);
+}
+
+int16_t uart_write(void *context, const uint8_t *from, uint16_t length)
+{
+    int16_t count = 0;
+
+    (void)context;
+    while (count < length && !(FLAGS & TX_FULL))
+        DATA = from[count++];
+    return count;
+}
+
+uint8_t uart_flush(void *context)
+{
+    (void)context;
+    return !(FLAGS & BUSY);
+}

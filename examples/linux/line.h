@@ -1,0 +1,59 @@
+/* What the examples with a client share: a place named on the command line, and a
+ * client at it.
+ *
+ *     rtu:/dev/ttyUSB0,19200,E       a serial line: rate 19200 and parity N if left out
+ *     ascii:/dev/ttyUSB0,9600,E      the same with ASCII frames and seven bits
+ *     tcp:192.168.0.7,502            Modbus TCP: port 502 if left out
+ *     rtuovertcp:192.168.0.7,4001    RTU frames in a TCP stream
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef LINE_H
+#define LINE_H
+
+#include "mbm_tcp.h"
+#include "mbm_tty.h"
+
+#include <signal.h>
+
+#define LINE_PLACES "rtu:PATH[,BAUD[,N|E|O]]  ascii:PATH[,BAUD[,N|E|O]]  tcp:HOST[,PORT]  rtuovertcp:HOST[,PORT]"
+
+typedef struct line {
+    mbm_client client;
+    mbm_counters counters;
+    mbm_tty tty;
+    mbm_tcp tcp;
+    uint8_t is_tcp;
+    uint32_t connected; /* when it was last tried, in milliseconds */
+    uint8_t incoming[1024], outgoing[1024];
+} line;
+
+/* Opens a place and begins its client; 0, or -1 with the reason on stderr. */
+int line_open(line *l, const char *place);
+void line_close(line *l);
+
+/* Moves requests on, and connects anew to a server that is gone, once a second. */
+void line_poll(line *l);
+
+/* Sleeps until the client has something to do, for `milliseconds` at most. */
+void line_rest(line *l, uint32_t milliseconds);
+
+/* A clock that wraps. */
+uint32_t line_milliseconds(void);
+
+/* Ctrl-C and SIGTERM set this. */
+extern volatile sig_atomic_t line_ended;
+
+/* The function to read with, 1 to 4, and what it reads; NULL for another one. */
+const char *line_tables(long function);
+
+/* Queues a read of up to 125 registers or bits of function 1 to 4. */
+uint8_t line_read(line *l, mbm_clientRequest *request, long function, uint16_t address,
+                  uint16_t quantity);
+
+/* Item `index` of what such a read brought. */
+uint16_t line_value(const mbm_clientRequest *request, long function, unsigned index);
+
+/* A number of the command line from `least` to `most`; else ends the program. */
+long line_number(const char *text, long least, long most);
+
+#endif

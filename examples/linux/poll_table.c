@@ -1,0 +1,134 @@
+/* Polls a device and shows what it holds as a table, which a terminal shows in place.
+ *
+ *     poll_table rtu:/dev/ttyUSB0,19200 -u 17 100 10 200 4
+ *     poll_table tcp:192.168.0.7 -f 4 -i 250 0 20
+ *
+ * reads 10 registers from address 100 on and 4 from 200 on, every second. -u is the
+ * unit (1), -f the function, 1 to 4 (3), -i the interval in milliseconds (1000), -n
+ * how often (until Ctrl-C), -p how many requests at once over TCP (16; some servers take
+ * one only). What changed since the time before is marked.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#define _GNU_SOURCE
+#include "line.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { MOST = 125 };
+
+/* One stretch of addresses: one request, all of them queued at once. */
+typedef struct range {
+    mbm_clientRequest request;
+    uint16_t address, quantity;
+    uint16_t reply[MOST], before[MOST];
+    uint8_t has_before;
+} range;
+
+static line at;
+static range ranges[MBM_CLIENT_DEPTH];
+static unsigned count;
+static long unit = 1, function = 3, interval = 1000, rounds, at_once;
+
+static void show_range(range *r)
+{
+    unsigned i;
+
+    if (r->request.status != MBM_OK) {
+        printf("  %7u    %s\n", r->address, mbm_statusText(r->request.status));
+        return;
+    }
+    for (i = 0; i < r->quantity; i++) {
+        uint16_t value = line_value(&r->request, function, i);
+        char mark = r->has_before && value != r->before[i] ? '*' : ' ';
+
+        if (function > 2)
+            printf("%c %7u  %6u  %04X  %6d\n", mark, r->address + i, value, value, (int16_t)value);
+        else
+            printf("%c %7u  %6u\n", mark, r->address + i, value);
+        r->before[i] = value;
+    }
+    r->has_before = 1;
+}
+
+static void show(long round)
+{
+    unsigned i, answered = 0;
+
+    for (i = 0; i < count; i++)
+        answered += ranges[i].request.status == MBM_OK;
+    if (isatty(1))
+        printf("\033[H\033[J");
+    printf("unit %ld, %s, round %ld: %u of %u requests answered\n", unit, line_tables(function),
+           round, answered, count);
+    for (i = 0; i < count; i++)
+        show_range(&ranges[i]);
+    fflush(stdout);
+}
+
+static void ask(range *r)
+{
+    memset(&r->request, 0, sizeof r->request);
+    r->request.unit = (uint8_t)unit;
+    r->request.reply = r->reply;
+    r->request.replyBytes = sizeof r->reply;
+    (void)line_read(&at, &r->request, function, r->address, r->quantity);
+}
+
+static int usage(void)
+{
+    fprintf(stderr, "usage: poll_table PLACE [-u UNIT] [-f 1..4] [-i MILLISECONDS] [-n ROUNDS] [-p REQUESTS] "
+                    "ADDRESS QUANTITY...\nplaces: %s\n", LINE_PLACES);
+    return 2;
+}
+
+int main(int argc, char **argv)
+{
+    uint32_t due;
+    unsigned i;
+    int option;
+    long round;
+
+    while ((option = getopt(argc, argv, "u:f:i:n:p:")) != -1) {
+        switch (option) {
+        case 'u': unit = line_number(optarg, 1, 255); break;
+        case 'f': function = line_number(optarg, 1, 4); break;
+        case 'i': interval = line_number(optarg, 1, 3600000); break;
+        case 'n': rounds = line_number(optarg, 1, 1000000000); break;
+        case 'p': at_once = line_number(optarg, 1, MBM_CLIENT_DEPTH); break;
+        default: return usage();
+        }
+    }
+    if (argc - optind < 3 || (argc - optind) % 2 == 0 ||
+        argc - optind > 1 + 2 * MBM_CLIENT_DEPTH)
+        return usage();
+    for (i = (unsigned)optind + 1; i < (unsigned)argc; i += 2, count++) {
+        ranges[count].address = (uint16_t)line_number(argv[i], 0, 65535);
+        ranges[count].quantity = (uint16_t)line_number(argv[i + 1], 1, MOST);
+    }
+    if (line_open(&at, argv[optind]) != 0)
+        return 1;
+    if (at_once)
+        (void)mbm_client_setInFlight(&at.client, (uint8_t)at_once);
+
+    due = line_milliseconds();
+    for (round = 1; !line_ended && (rounds == 0 || round <= rounds); round++) {
+        for (i = 0; i < count; i++)
+            ask(&ranges[i]);
+        while (!line_ended && mbm_client_pending(&at.client) > 0) {
+            line_poll(&at);
+            line_rest(&at, 1000);
+        }
+        if (line_ended)
+            break;
+        show(round);
+        due += (uint32_t)interval;
+        while (!line_ended && round != rounds && (int32_t)(due - line_milliseconds()) > 0) {
+            line_poll(&at);
+            line_rest(&at, due - line_milliseconds());
+        }
+    }
+    line_close(&at);
+    return 0;
+}

@@ -1,0 +1,114 @@
+/* Looks for the units of a bus: reads holding register 0 of each, and whoever answers,
+ * with a value or an exception, is there.
+ *
+ *     scan rtu:/dev/ttyUSB0,19200
+ *     scan tcp:192.168.0.7 -t 2000 1 20
+ *
+ * scans 1 to 247, or the units named. -t is how long to wait for each, in
+ * milliseconds: 100 on a serial line, 1000 over TCP, where all that fit are asked at
+ * once and a gateway may be behind it; -p is how many at once. Progress goes to stderr.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#define _GNU_SOURCE
+#include "line.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { UNITS = 256 };
+
+static line at;
+static mbm_clientRequest requests[UNITS];
+static uint16_t words[UNITS];
+static unsigned first = 1, last = 247, asked, told, there;
+
+static void tell(const mbm_clientRequest *request)
+{
+    unsigned unit = request->unit;
+
+    switch (request->status) {
+    case MBM_OK:
+        printf("unit %3u: holding register 0 is %u\n", unit, words[unit]);
+        break;
+    case MBM_RESPONSE_TIMED_OUT:
+    case MBM_GATEWAY_PATH_UNAVAILABLE:
+    case MBM_GATEWAY_TARGET_FAILED_TO_RESPOND:
+        return;
+    case MBM_INVALID_CRC:
+    case MBM_MALFORMED_REPLY:
+        printf("unit %3u: %s; two with one address?\n", unit, mbm_statusText(request->status));
+        break;
+    default:
+        printf("unit %3u: %s\n", unit, mbm_statusText(request->status));
+        there += request->exception != 0;
+        fflush(stdout);
+        return;
+    }
+    there++;
+    fflush(stdout);
+}
+
+/* Keeps the queue full, and tells what has ended in the order of the units. */
+static void scan(void)
+{
+    while (!line_ended && told <= last) {
+        while (asked <= last) {
+            mbm_clientRequest *request = &requests[asked];
+
+            request->unit = (uint8_t)asked;
+            request->reply = &words[asked];
+            request->replyBytes = sizeof words[asked];
+            if (mbm_client_readHoldingRegisters(&at.client, request, 0, 1) != MBM_PENDING)
+                break;
+            asked++;
+        }
+        line_poll(&at);
+        while (told < asked && requests[told].status != MBM_PENDING) {
+            if (isatty(2))
+                fprintf(stderr, "\r%u of %u \r", told - first + 1, last - first + 1);
+            tell(&requests[told++]);
+        }
+        if (told <= last)
+            line_rest(&at, 1000);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    long timeout = 0, at_once = 0;
+    int option;
+
+    while ((option = getopt(argc, argv, "t:p:")) != -1) {
+        if (option == '?')
+            return 2;
+        if (option == 'p')
+            at_once = line_number(optarg, 1, MBM_CLIENT_DEPTH);
+        else
+            timeout = line_number(optarg, 1, 65535);
+    }
+    argc -= optind;
+    argv += optind;
+    if (argc < 1 || argc > 3) {
+        fprintf(stderr, "usage: scan PLACE [-t MILLISECONDS] [-p REQUESTS] [FIRST [LAST]]\nplaces: %s\n",
+                LINE_PLACES);
+        return 2;
+    }
+    if (argc > 1)
+        first = last = (unsigned)line_number(argv[1], 1, 255);
+    if (argc > 2)
+        last = (unsigned)line_number(argv[2], (long)first, 255);
+    if (line_open(&at, argv[0]) != 0)
+        return 1;
+    if (at_once)
+        (void)mbm_client_setInFlight(&at.client, (uint8_t)at_once);
+    asked = told = first;
+    if (timeout == 0)
+        timeout = at.is_tcp ? 1000 : 100;
+    mbm_client_setResponseTimeout(&at.client, (uint16_t)timeout);
+    mbm_client_setQuietTime(&at.client, 0);
+    scan();
+    printf("%u of %u units answer\n", there, told - first);
+    line_close(&at);
+    return 0;
+}

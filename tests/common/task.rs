@@ -1,0 +1,104 @@
+//! A job that owns its data, and what a client is lent.
+
+use mbm::client::{Job, Means, Ticket, Unit};
+use mbm::error::Status;
+use mbm::pdu::outline::Outline;
+use mbm::transaction::{Counter, Storage, COUNTERS};
+use std::cell::RefCell;
+use std::rc::Rc;
+
+/// Buffers of full size, counters and records of units.
+pub struct Lent {
+    pub frame: Vec<u8>,
+    pub outgoing: Vec<u8>,
+    pub counters: Rc<RefCell<[u32; COUNTERS]>>,
+    pub units: Vec<Unit>,
+    pub random: u32,
+}
+
+impl Default for Lent {
+    fn default() -> Self {
+        Lent {
+            frame: vec![0; 513],
+            outgoing: vec![0; 520],
+            counters: Rc::default(),
+            units: Vec::new(),
+            random: 0,
+        }
+    }
+}
+
+impl Storage for Lent {
+    fn frame(&mut self) -> &mut [u8] {
+        &mut self.frame
+    }
+
+    fn count(&mut self, counter: Counter, more: u16) {
+        self.counters.borrow_mut()[counter as usize] += u32::from(more);
+    }
+}
+
+impl Means for Lent {
+    fn outgoing(&mut self) -> &mut [u8] {
+        &mut self.outgoing
+    }
+
+    fn units(&mut self) -> &mut [Unit] {
+        &mut self.units
+    }
+
+    fn random(&mut self) -> u32 {
+        self.random
+    }
+}
+
+/// A job that owns its data, as bytes on the wire.
+pub struct Task {
+    pub ticket: Ticket,
+    pub data: Vec<u8>,
+    pub reply: Vec<u8>,
+}
+
+impl Task {
+    /// What `build` outlines, for `unit`, with `data` and the caller's number.
+    pub fn new(
+        unit: u8,
+        transaction: u16,
+        data: &[u8],
+        build: impl FnOnce(&mut Outline) -> Status,
+    ) -> Task {
+        let mut ticket = Ticket::NONE;
+        ticket.unit = unit;
+        ticket.transaction = transaction;
+        ticket.capacity = 252;
+        assert_eq!(build(&mut ticket.outline), Status::OK);
+        Task {
+            ticket,
+            data: data.to_vec(),
+            reply: vec![0xEE; 252],
+        }
+    }
+
+    /// The data received.
+    pub fn received(&self) -> &[u8] {
+        &self.reply[..usize::from(self.ticket.length)]
+    }
+}
+
+impl Job for Task {
+    fn ticket(&self) -> &Ticket {
+        &self.ticket
+    }
+
+    fn ticket_mut(&mut self) -> &mut Ticket {
+        &mut self.ticket
+    }
+
+    fn byte(&self, index: usize) -> u8 {
+        self.data[index]
+    }
+
+    fn put(&mut self, index: usize, byte: u8) {
+        self.reply[index] = byte;
+    }
+}
