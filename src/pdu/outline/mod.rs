@@ -249,14 +249,17 @@ impl Outline {
     fn answers_groups(&self, pdu: &[u8], byte: impl Fn(usize) -> u8) -> bool {
         let mut theirs = pdu.get(2..).unwrap_or_default();
         for at in (5..usize::from(self.data_length)).step_by(7) {
-            // A length above 255 is of no request that a response could answer.
-            let bytes = usize::from(byte(at + 1)) << 1;
-            theirs = match theirs {
+            let records = u16::from_be_bytes([byte(at), byte(at + 1)]);
+            let bytes = usize::from(records) << 1;
+            match theirs {
                 [count, files::REFERENCE_TYPE, rest @ ..] if usize::from(*count) == bytes + 1 => {
-                    rest.get(bytes..).unwrap_or(&[0])
+                    match rest.get(bytes..) {
+                        Some(more) => theirs = more,
+                        None => return false,
+                    }
                 }
                 _ => return false,
-            };
+            }
         }
         theirs.is_empty()
     }
