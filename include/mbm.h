@@ -659,11 +659,11 @@ typedef struct mbm_client {
     /**
      * Not for you.
      */
-    void *pointers[47];
+    void *pointers[46];
     /**
      * Not for you.
      */
-    uint32_t words[18];
+    uint32_t words[19];
 } mbm_client;
 
 /**

@@ -42,9 +42,9 @@ const BEGUN: u8 = 0x43;
 #[repr(C)]
 pub struct mbm_client {
     /// Not for you.
-    pointers: [*mut c_void; 47],
+    pointers: [*mut c_void; 46],
     /// Not for you.
-    words: [u32; 18],
+    words: [u32; 19],
 }
 
 /// What a client of a serial line in RTU frames, one in ASCII frames and one of
