@@ -1,6 +1,7 @@
 /* Sketches that serve, on simulated boards, asked by a real libmodbus client. */
 #include "bus.h"
 #include "crc.h"
+#include "kind.h"
 #include "mbm.h"
 #include "test.h"
 
@@ -9,33 +10,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct pin {
-    char port;
-    int bit;
-} pin;
-
-typedef struct kind {
-    const char *name, *mcu;
-    char bus; /* the UART that BUS is */
-    pin driver, relay;
-} kind;
-
-static const kind uno = {"uno", "atmega328p", '0', {'D', 2}, {'D', 4}};
-static const kind minimal = {"uno-minimal", "atmega328p", '0', {'D', 2}, {'D', 4}};
-static const kind mega = {"mega", "atmega2560", '1', {'E', 4}, {'G', 5}};
 static const kind *const kinds[] = {&uno, &minimal, &mega};
 
 /* t3.5 at 19200 baud, in cycles, less a tick of the core's clock. */
 enum { T35 = 32080, TICK = 64 };
-
-static board *start(const kind *k, const char *sketch)
-{
-    char path[200];
-    const char *folder = getenv("MBM_SKETCHES");
-
-    snprintf(path, sizeof path, "%s/%s/%s.elf", folder ? folder : "build/avr", k->name, sketch);
-    return board_new(path, k->mcu);
-}
 
 #define FAILS(error, call)                                                                         \
     do {                                                                                           \
@@ -94,14 +72,14 @@ static void response_seen(void *context, const wire *w, size_t length)
 static served *example(const kind *k)
 {
     served *s = calloc(1, sizeof *s);
-    board *b = start(k, "ServeSensorAndRelay");
+    board *b = kind_start(k, "ServeSensorAndRelay");
 
     assert_non_null(s);
     s->on = k;
     bus_open(&s->line, b, k->bus, 17);
     s->line.watcher = response_seen;
     s->line.context = s;
-    board_watch_pin(b, k->driver.port, k->driver.bit, driver_switched, s);
+    board_watch_pin(b, k->pin2.port, k->pin2.bit, driver_switched, s);
     board_sensor(b, 0, 2500);
     assert_true(board_run(b, 250 * MS));
     return s;
@@ -117,7 +95,7 @@ static void done(served *s)
 
 static int relay(const served *s)
 {
-    return board_pin(s->line.on, s->on->relay.port, s->on->relay.bit);
+    return is_high(s->line.on, s->on->pin4);
 }
 
 #define ON_ALL(test)                                                                               \
@@ -272,7 +250,7 @@ static void arrays_units_hooks_and_a_function_are_served(void **state)
 {
     static const uint8_t busy[] = {17, 6, 0, 100, 0xFF, 0}, nothing[] = {17, 65};
     static const uint8_t adds[] = {17, 65, 200, 100, 7}, sum[] = {17, 65, 1, 51};
-    board *b = start(&uno, "Serve");
+    board *b = kind_start(&uno, "Serve");
     uint16_t report = board_symbol(b, "report"), words = board_symbol(b, "words");
     uint16_t sent[64], back[64];
     uint8_t bits[64], frame[16];

@@ -1,41 +1,12 @@
 /* The examples and a few sketches more, compiled as the IDE would, run on
  * simulated boards against a real libmodbus server. */
+#include "kind.h"
 #include "peer.h"
 #include "test.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* A pin, and where one board and the other have it. */
-typedef struct pin {
-    char port;
-    int bit;
-} pin;
-
-typedef struct kind {
-    const char *name, *mcu;
-    char bus; /* the UART that BUS is */
-    pin led, pin2, pin4;
-} kind;
-
-static const kind uno = {"uno", "atmega328p", '0', {'B', 5}, {'D', 2}, {'D', 4}};
-static const kind minimal = {"uno-minimal", "atmega328p", '0', {'B', 5}, {'D', 2}, {'D', 4}};
-static const kind mega = {"mega", "atmega2560", '1', {'B', 7}, {'E', 4}, {'G', 5}};
-
-static board *start(const kind *k, const char *sketch)
-{
-    char path[200];
-    const char *folder = getenv("MBM_SKETCHES");
-
-    snprintf(path, sizeof path, "%s/%s/%s.elf", folder ? folder : "build/avr", k->name, sketch);
-    return board_new(path, k->mcu);
-}
-
-static int is_high(board *b, pin p)
-{
-    return board_pin(b, p.port, p.bit);
-}
 
 /* Collects what a sketch prints. */
 typedef struct paper {
@@ -64,7 +35,7 @@ static void floats(modbus_mapping_t *mapping, unsigned address, float value)
 
 static void first_read(const kind *k)
 {
-    board *b = start(k, "FirstRead");
+    board *b = kind_start(k, "FirstRead");
     paper printed = {""};
     char expected[100];
     server s;
@@ -94,7 +65,7 @@ static void first_read_reads_what_the_server_holds(void **state)
 
 static void first_read_says_that_nobody_answers(void **state)
 {
-    board *b = start(&mega, "FirstRead");
+    board *b = kind_start(&mega, "FirstRead");
     paper printed = {""};
     wire *bus;
 
@@ -110,7 +81,7 @@ static void first_read_says_that_nobody_answers(void **state)
 
 static void write_and_read_back(const kind *k)
 {
-    board *b = start(k, "WriteAndReadBack");
+    board *b = kind_start(k, "WriteAndReadBack");
     server s;
 
     server_start(&s, 1);
@@ -171,7 +142,7 @@ static void behind_driver(wire *w, const uint8_t *frame, size_t length)
 
 static void half_duplex(const kind *k)
 {
-    board *b = start(k, "HalfDuplex");
+    board *b = kind_start(k, "HalfDuplex");
     driver d = {.rose = 0};
 
     server_start(&d.peer, 1);
@@ -206,7 +177,7 @@ static void shared(wire *w, const uint8_t *frame, size_t length)
 
 static void several_slaves(const kind *k)
 {
-    board *b = start(k, "SeveralSlaves");
+    board *b = kind_start(k, "SeveralSlaves");
     server all[3];
     uint16_t i;
 
@@ -249,7 +220,7 @@ static void changed(void *context, int level, uint64_t cycle)
 
 static void non_blocking(const kind *k, int answers)
 {
-    board *b = start(k, "NonBlocking");
+    board *b = kind_start(k, "NonBlocking");
     rhythm r = {0, 0, 0};
     server s;
     wire *bus;
@@ -283,7 +254,7 @@ static void without_waiting_the_led_blinks_on(void **state)
 
 static void energy_meter(const kind *k)
 {
-    board *b = start(k, "EnergyMeter");
+    board *b = kind_start(k, "EnergyMeter");
     paper printed = {""};
     server s;
 
@@ -314,7 +285,7 @@ static void an_energy_meters_floats_are_read(void **state)
 
 static void values_pass_between_sketch_and_archive(void **state)
 {
-    board *b = start(&uno, "Values");
+    board *b = kind_start(&uno, "Values");
     paper printed = {""};
 
     (void)state;
@@ -326,7 +297,7 @@ static void values_pass_between_sketch_and_archive(void **state)
 
 static void basic(const kind *k)
 {
-    board *b = start(k, "Basic");
+    board *b = kind_start(k, "Basic");
     server s;
     wire *bus;
     unsigned rounds;
@@ -378,7 +349,7 @@ static void phoenix_contact(const kind *k)
 {
     static const uint8_t functions[11] = {0x17, 6, 6, 3, 16, 1, 3, 3, 3, 3, 3};
     static const uint8_t quantities[11] = {2, 0, 1, 2, 2, 17, 66, 64, 8, 64, 8};
-    board *b = start(k, "PhoenixContact");
+    board *b = kind_start(k, "PhoenixContact");
     coupler c = {.count = 0};
     unsigned i;
 
@@ -416,7 +387,7 @@ static void phoenix_contact_makes_its_calls(void **state)
 
 static void a_bus_on_two_pins_works(void **state)
 {
-    board *b = start(&uno, "Soft");
+    board *b = kind_start(&uno, "Soft");
     uint16_t report = board_symbol(b, "report");
     unsigned i;
     server s;
@@ -439,7 +410,7 @@ static void a_bus_on_two_pins_works(void **state)
 
 static void two_ports_are_polled_at_once(void **state)
 {
-    board *b = start(&mega, "TwoPorts");
+    board *b = kind_start(&mega, "TwoPorts");
     uint16_t report = board_symbol(b, "report");
     server left, right;
 
@@ -462,7 +433,7 @@ static void two_ports_are_polled_at_once(void **state)
 
 static void calls_of_version_0_9_work_on_a_second_port(void **state)
 {
-    board *b = start(&mega, "OlderCalls");
+    board *b = kind_start(&mega, "OlderCalls");
     uint16_t report = board_symbol(b, "report");
     unsigned i;
     server s;

@@ -1,0 +1,22 @@
+#include "kind.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+const kind uno = {"uno", "atmega328p", '0', {'B', 5}, {'D', 2}, {'D', 4}};
+const kind minimal = {"uno-minimal", "atmega328p", '0', {'B', 5}, {'D', 2}, {'D', 4}};
+const kind mega = {"mega", "atmega2560", '1', {'B', 7}, {'E', 4}, {'G', 5}};
+
+board *kind_start(const kind *k, const char *sketch)
+{
+    char path[200];
+    const char *folder = getenv("MBM_SKETCHES");
+
+    snprintf(path, sizeof path, "%s/%s/%s.elf", folder ? folder : "build/avr", k->name, sketch);
+    return board_new(path, k->mcu);
+}
+
+int is_high(board *b, pin p)
+{
+    return board_pin(b, p.port, p.bit);
+}
