@@ -136,7 +136,7 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// # }
     /// # struct J; impl Job for J {
     /// #     fn ticket(&self) -> &Ticket { &Ticket::NONE }
-    /// #     fn ticket_mut(&mut self) -> &mut Ticket { todo!() }
+    /// #     fn ticket_mut(&mut self) -> &mut Ticket { unreachable!() }
     /// #     fn byte(&self, _: usize) -> u8 { 0 }
     /// #     fn put(&mut self, _: usize, _: u8) {}
     /// # }
@@ -161,7 +161,7 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// # }
     /// # struct J; impl Job for J {
     /// #     fn ticket(&self) -> &Ticket { &Ticket::NONE }
-    /// #     fn ticket_mut(&mut self) -> &mut Ticket { todo!() }
+    /// #     fn ticket_mut(&mut self) -> &mut Ticket { unreachable!() }
     /// #     fn byte(&self, _: usize) -> u8 { 0 }
     /// #     fn put(&mut self, _: usize, _: u8) {}
     /// # }
