@@ -199,4 +199,12 @@ pub const CASES: &[Case] = &[
         &[0x43, 1, 2, 3, 4, 5],
         &[1, 2, 3, 4, 5],
     ),
+    // A function of the standard as a user's own, as a gateway hands it on.
+    (
+        |o| o.custom(0x14, 8, Rule::Counted(1, 0)),
+        &[7, 6, 0, 4, 0, 0, 0, 2],
+        &[0x14, 7, 6, 0, 4, 0, 0, 0, 2],
+        &[0x14, 6, 5, 6, 0, 1, 0, 2],
+        &[6, 5, 6, 0, 1, 0, 2],
+    ),
 ];

@@ -232,7 +232,9 @@ impl Outline {
             [_, count, group, reference, ..] if self.form.has(GROUP) => {
                 group == count.wrapping_sub(1) && reference == files::REFERENCE_TYPE
             }
-            [files::READ_FILE_RECORD, ..] => self.answers_groups(pdu, byte),
+            [files::READ_FILE_RECORD, ..] if self.form.has(COUNTED) => {
+                self.answers_groups(pdu, byte)
+            }
             [files::READ_FIFO_QUEUE, _, bytes, high, words, ..] => {
                 high == 0 && u16::from(words) <= MAX_FIFO && bytes == 2 * words + 2
             }
