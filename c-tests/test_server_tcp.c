@@ -110,19 +110,13 @@ static void slow_and_half_open_connections_stall_nobody(void **state)
 
     (void)state;
     assert_int_equal(write(silent, one, 5), 5);
-    for (i = 0; i < sizeof one; i++) {
+    for (i = 0; i < sizeof one - 1; i++) {
         assert_int_equal(asked_bytes(slow, &one[i], 1, answer, 0), 0);
         for (k = 0; k < 20; k++)
             assert_int_equal(modbus_read_registers(client, SERVED_BASE, 1, &word), 1);
-        if (i == sizeof one - 2)
-            usleep(1100000);
     }
-    {
-        struct pollfd readable = {slow, POLLIN, 0};
-
-        if (poll(&readable, 1, 2000) > 0)
-            assert_int_equal(read(slow, answer, sizeof answer), 11);
-    }
+    usleep(1100000);
+    assert_int_equal(asked_bytes(slow, &one[i], 1, answer, 2000), 11);
     close(slow);
     close(silent);
 }
