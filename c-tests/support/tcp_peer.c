@@ -1,5 +1,6 @@
 #define _GNU_SOURCE
 #include "tcp_peer.h"
+#include "tcp_server.h"
 #include "tcp_stream.h"
 
 #include <arpa/inet.h>
@@ -397,31 +398,19 @@ void tcp_peer_clock(tcp_peer *p, held_clock *clock)
     p->clock = clock;
 }
 
-/* A free port, which nobody else gets while the peer is halted. */
-static void reserve(tcp_peer *p, struct sockaddr_in *address)
-{
-    socklen_t size = sizeof *address;
-    const int on = 1;
-
-    if (p->reserved >= 0)
-        close(p->reserved);
-    p->reserved = socket(AF_INET, SOCK_STREAM, 0);
-    must(p->reserved >= 0, "socket");
-    setsockopt(p->reserved, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    must(bind(p->reserved, (struct sockaddr *)address, size) == 0, "bind");
-    must(getsockname(p->reserved, (struct sockaddr *)address, &size) == 0, "getsockname");
-}
-
 uint16_t tcp_peer_start(tcp_peer *p, uint16_t port)
 {
     struct sockaddr_in address = {0};
     const int on = 1;
 
+    if (port == 0) {
+        if (p->reserved >= 0)
+            close(p->reserved);
+        p->reserved = tcp_reserve(&port);
+    }
     address.sin_family = AF_INET;
     address.sin_port = htons(port);
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    if (port == 0)
-        reserve(p, &address);
     p->listener = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0);
     must(p->listener >= 0, "socket");
     setsockopt(p->listener, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
