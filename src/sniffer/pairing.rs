@@ -205,6 +205,15 @@ impl Requests {
         self.earliest(now, State::Open, |slot| elapsed(now, slot.time) >= timeout)
     }
 
+    /// Forgets what was asked `age` ago or longer and was given up.
+    pub fn forget(&mut self, now: u32, age: u32) {
+        for slot in &mut self.slots {
+            if slot.state == State::Late && elapsed(now, slot.time) >= age {
+                slot.state = State::Free;
+            }
+        }
+    }
+
     /// The data of 08/00 are as many as were sent.
     pub fn reply_length(&self, unit: u8, pdu: &[u8]) -> Option<usize> {
         let slot = self.slots.iter().find(|slot| {

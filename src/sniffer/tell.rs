@@ -123,7 +123,7 @@ impl Sniffer {
             return event;
         };
         let request = request && code & EXCEPTION == 0;
-        if let Some(overdue) = self.requests.overdue(time, self.timeout) {
+        if let Some(overdue) = self.overdue(time) {
             return self.give_up(overdue, time);
         }
         let seen = Seen {
