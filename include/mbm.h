@@ -1090,7 +1090,7 @@ typedef struct mbm_packet {
      */
     uint8_t objectId;
     /**
-     * 2B/0E: 01 to 03 or 81 to 83.
+     * 2B/0E: 01 to 03 or 81 to 83 by the standard; not checked.
      */
     uint8_t conformity;
     /**
@@ -1098,7 +1098,8 @@ typedef struct mbm_packet {
      */
     uint8_t moreFollows;
     /**
-     * 2B/0E: the object to ask for next; 0 if none follows.
+     * 2B/0E: the object to ask for next; if none follows, 0 by the standard, and
+     * not checked.
      */
     uint8_t nextObjectId;
     /**
