@@ -3805,6 +3805,23 @@ uint8_t mbm_registers_getBytes(const struct mbm_registers *registers,
                                uint16_t length);
 
 /**
+ * As mbm_registers_getBytes, from a device that swaps the bytes of its registers:
+ * with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte of each comes first.
+ *
+ * @param registers  the registers
+ * @param address    the first register, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param bytes      gets the bytes; must not overlap the registers
+ * @param length     how many bytes, two a register; may be odd
+ * @return as mbm_registers_getBytes
+ */
+uint8_t mbm_registers_getBytesInOrder(const struct mbm_registers *registers,
+                                      uint16_t address,
+                                      uint8_t order,
+                                      uint8_t *bytes,
+                                      uint16_t length);
+
+/**
  * Whether registers hold these raw bytes, high byte first in every order.
  *
  * @param registers  the registers
@@ -4021,6 +4038,24 @@ uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
                                uint16_t address,
                                const uint8_t *bytes,
                                uint16_t length);
+
+/**
+ * As mbm_registers_setBytes, for a device that swaps the bytes of its registers:
+ * with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte of each comes first.
+ *
+ * @param registers  the registers, of a kind to write
+ * @param address    the first register, by the device's address
+ * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param bytes      the bytes; must not overlap the registers
+ * @param length     how many bytes, two a register; if odd, the other byte of the
+ *                   last register stays
+ * @return as mbm_registers_setBytes
+ */
+uint8_t mbm_registers_setBytesInOrder(const struct mbm_registers *registers,
+                                      uint16_t address,
+                                      uint8_t order,
+                                      const uint8_t *bytes,
+                                      uint16_t length);
 
 /**
  * Makes a ring of your bytes, empty. Neither side may use it meanwhile.
