@@ -119,7 +119,8 @@ statuses! {
     MBM_NOT_PENDING = Status::NOT_PENDING, c"the request is not pending";
 }
 
-/// Explains a status in a few words of English.
+/// Explains a status in a few words of English. On an AVR, where constants lie in
+/// RAM, a program that calls it has about 1100 bytes less of that: show the number.
 ///
 /// Any thread or interrupt may call it.
 ///
