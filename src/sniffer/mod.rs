@@ -18,7 +18,7 @@ pub use pairing::Asked;
 use crate::error::Status;
 use crate::frame::{ascii, Framing};
 use crate::pdu::custom::Function;
-use crate::time::{character, elapsed, silence, DEFAULT_SILENCE};
+use crate::time::{character, silence, DEFAULT_SILENCE};
 use find::{Context, Verdict};
 use lane::{Lane, Timing};
 use pairing::Requests;
@@ -170,17 +170,17 @@ impl Sniffer {
         functions: &[Function],
         now: u32,
     ) -> Option<Event<'b>> {
-        for index in 0..2 {
+        // What was heard first is told first.
+        let timing = self.timing;
+        let [first, second] = self.lanes.each_ref().map(|lane| lane.waited(now, &timing));
+        let order = if second > first { [1, 0] } else { [0, 1] };
+        for index in order {
             if let Some(step) = self.step(buffer, functions, index, now) {
                 return Some(self.tell(buffer, functions, index, step, now));
             }
         }
         // Bytes that are not understood yet may hold the reply.
-        let waiting = self.lanes.iter().filter(|lane| !lane.is_empty());
-        let known = waiting
-            .map(|lane| lane.time(lane.start + 1, &self.timing))
-            .max_by_key(|time| elapsed(now, *time))
-            .unwrap_or(now);
+        let known = now.wrapping_sub(first.max(second));
         let overdue = self.overdue(known)?;
         Some(self.give_up(overdue, now))
     }

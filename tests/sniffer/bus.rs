@@ -333,6 +333,42 @@ fn directions_may_be_heard_apart_byte_by_byte_and_mixed() {
 }
 
 #[test]
+fn what_was_heard_first_is_told_first_where_directions_are_heard_apart() {
+    for gap in [2_000_000, 10_000_000, 1_700_000_000] {
+        let mut bench = Bench::with_buffer(Framing::Tcp, 2 * Framing::Tcp.max_frame());
+        bench.now = 5_000;
+        // A header that promises more than ever comes hides a reply.
+        bench.feed_at(Tap::Server, &[0, 9, 0, 0, 0, 50]);
+        bench.feed_at(Tap::Server, &frame(Framing::Tcp, 1, 17, READ_REPLY));
+        bench.now += gap;
+        bench.feed_at(Tap::Client, &frame(Framing::Tcp, 2, 17, READ));
+        bench.wait(10_000);
+        bench.feed_at(Tap::Server, &frame(Framing::Tcp, 2, 17, READ_REPLY));
+        let kinds = [Kind::Noise, Kind::Unpaired, Kind::Request, Kind::Reply];
+        assert_eq!(bench.kinds(), kinds);
+        let times: Vec<_> = bench.told.iter().map(|told| told.time).collect();
+        assert_eq!(times, [5_000, 5_000, 5_000 + gap, 15_000 + gap]);
+        assert_eq!(bench.told[3].response_time, 10_000);
+    }
+}
+
+#[test]
+fn a_frame_heard_before_a_request_is_no_reason_to_give_that_up() {
+    let mut bench = Bench::with_buffer(Framing::Tcp, 2 * Framing::Tcp.max_frame());
+    bench.sniffer.set_patience(60_000_000);
+    let reply = frame(Framing::Tcp, 1, 17, READ_REPLY);
+    bench.feed_at(Tap::Server, &[&[0, 9, 0, 0, 0, 50], &reply[..]].concat());
+    bench.now = 1_000_000;
+    bench.feed_at(Tap::Client, &frame(Framing::Tcp, 2, 17, READ));
+    bench.now = 1_500_000;
+    // Now it is no frame, and what is in it is heard of at last.
+    bench.sniffer.set_patience(1_000_000);
+    bench.listen();
+    let kinds = [Kind::Request, Kind::Noise, Kind::Unpaired];
+    assert_eq!(bench.kinds(), kinds);
+}
+
+#[test]
 fn broadcasts_and_listen_only_are_never_timeouts() {
     for (framing, unit, pdu) in [
         (Framing::Rtu, 0, WRITE),
