@@ -367,7 +367,8 @@
 #define MBM_LENGTH_SILENCE 2
 
 /**
- * Nobody knows this function; declare it. `bytes` is 0.
+ * Nobody knows this function: declare it. Also what silence ends, in RTU over TCP,
+ * where there is none. `bytes` is 0.
  */
 #define MBM_LENGTH_UNKNOWN 3
 
@@ -2405,7 +2406,9 @@ uint8_t mbm_client_getCommEventLog(struct mbm_client *client,
                                    struct mbm_clientRequest *request);
 
 /**
- * Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13).
+ * Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13). `reply`
+ * gets what stands behind the byte count; on TCP also what a device sends that counts
+ * the id alone. On a serial line the count must be true.
  *
  * @param client   the object
  * @param request  the request

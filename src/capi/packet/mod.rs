@@ -33,7 +33,8 @@ pub const MBM_LENGTH_EXACT: u8 = 0;
 pub const MBM_LENGTH_AT_LEAST: u8 = 1;
 /// Silence on the line tells, in ASCII the end character. `bytes` is 0.
 pub const MBM_LENGTH_SILENCE: u8 = 2;
-/// Nobody knows this function; declare it. `bytes` is 0.
+/// Nobody knows this function: declare it. Also what silence ends, in RTU over TCP,
+/// where there is none. `bytes` is 0.
 pub const MBM_LENGTH_UNKNOWN: u8 = 3;
 
 /// How long something is.
