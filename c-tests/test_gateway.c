@@ -5,9 +5,9 @@
 #include "await.h"
 #include "program.h"
 #include "server.h"
+#include "tcp_server.h"
 #include "test.h"
 
-#include <arpa/inet.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -118,17 +118,6 @@ static int stop(void **state)
     return 0;
 }
 
-static int connected(void)
-{
-    struct sockaddr_in address = {.sin_family = AF_INET,
-                                  .sin_addr = {htonl(INADDR_LOOPBACK)},
-                                  .sin_port = htons((uint16_t)port)};
-    int fd = socket(AF_INET, SOCK_STREAM, 0);
-
-    assert_int_equal(connect(fd, (struct sockaddr *)&address, sizeof address), 0);
-    return fd;
-}
-
 static double seconds(void)
 {
     struct timespec now;
@@ -187,12 +176,12 @@ static void exceptions_of_a_device_pass_through(void **state)
 
 static void every_function_passes_through(void **state)
 {
-    int fd = connected();
+    int fd = tcp_connect((uint16_t)port);
 
     (void)state;
     asked_functions(fd, MBM_FRAMING_TCP, &ours);
     close(fd);
-    fd = connected();
+    fd = tcp_connect((uint16_t)port);
     asked_lies(fd, MBM_FRAMING_TCP, &ours);
     close(fd);
 }
@@ -229,7 +218,7 @@ static void requests_of_many_connections_wait_for_their_turn(void **state)
 
     (void)state;
     for (i = 0; i < MANY; i++)
-        fds[i] = connected();
+        fds[i] = tcp_connect((uint16_t)port);
     for (round = 0; round < 5; round++) {
         for (i = 0; i < MANY; i++) {
             uint8_t request[] = {(uint8_t)round, (uint8_t)i, 0, 0, 0, 6,
@@ -257,7 +246,7 @@ static void a_line_that_waits_holds_up_no_other(void **state)
     static const uint8_t absent[] = {0, 1, 0, 0, 0, 6, ABSENT, 3, 0, 0, 0, 1};
     uint8_t answer[600];
     uint16_t word;
-    int fd = connected();
+    int fd = tcp_connect((uint16_t)port);
     double before;
     unsigned i;
 
@@ -281,7 +270,7 @@ static void a_connection_that_breaks_takes_its_request_along(void **state)
     (void)state;
     for (i = 0; i < 40; i++) {
         static const uint8_t request[] = {0, 1, 0, 0, 0, 6, PEER_UNIT, 3, 0, 0, 0, 1};
-        int fd = connected();
+        int fd = tcp_connect((uint16_t)port);
 
         assert_int_equal(write(fd, request, sizeof request), sizeof request);
         if (i % 2)
@@ -319,7 +308,7 @@ static void connections_beyond_its_places_are_closed(void **state)
 
     (void)state;
     for (i = 0; i < COUNT(fds); i++)
-        fds[i] = connected();
+        fds[i] = tcp_connect((uint16_t)port);
     /* One of the places is the client's. */
     for (i = 0; i < COUNT(fds); i++)
         assert_int_equal(is_served(fds[i]), i < PLACES - 1);
