@@ -14,6 +14,9 @@ use crate::pdu::limits::MAX_PDU;
 use crate::port::Port;
 use crate::time::{self, elapsed};
 
+/// How soon to look again at what only the port or a service can bring on.
+const NOT_BY_ITSELF: u32 = time::millis(1);
+
 /// What the caller lends to a server.
 pub trait Lent {
     /// The storage of one frame: a request first, then its response.
@@ -215,13 +218,16 @@ impl<P: Port, B: Lent> Server<P, B> {
     }
 
     /// How long, in microseconds from `now`, poll will find nothing to do unless
-    /// a byte arrives.
+    /// a byte arrives. While a service is not done, or a stream does not take the
+    /// response, 1000: to go on sooner, poll when that has changed.
     pub fn poll_delay(&self, now: u32) -> u32 {
         match self.phase {
             Phase::Listen if self.end == 0 || self.silence == u32::MAX => u32::MAX,
             Phase::Listen => self.silence.saturating_sub(elapsed(now, self.last_byte)),
             Phase::Over => u32::MAX,
-            _ => 0,
+            // On a line no byte and no driver may be late.
+            Phase::Send | Phase::Flush if self.request.serial => 0,
+            _ => NOT_BY_ITSELF,
         }
     }
 

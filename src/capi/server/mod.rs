@@ -156,7 +156,10 @@ pub unsafe extern "C" fn mbm_server_poll(server: *mut mbm_server) -> u8 {
 /// that a program may sleep until then.
 ///
 /// @param server  the object
-/// @return microseconds; 0 means poll now, 0xFFFFFFFF until a byte arrives
+/// @return microseconds; 0 means poll now, 0xFFFFFFFF until a byte arrives; 1000
+///         while a function of yours returns MBM_REPLY_PENDING or a connection does
+///         not take the response: to go on sooner, poll when that has changed. No
+///         byte is taken meanwhile, so do not wait for one
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_pollDelay(server: *const mbm_server) -> u32 {
     // SAFETY: as the header demands; every object is writable storage.
