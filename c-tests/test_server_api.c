@@ -246,6 +246,7 @@ static void a_function_of_ours_says_what_is_answered(void **state)
     assert_int_equal(ASK("\x64"), 0);
     assert_true(calls > 10);
     assert_int_equal(diagnostics.serverMessages, 1);
+    assert_int_equal(mbm_server_pollDelay(&server), 1000);
     said = 0;
     OK(mbm_server_poll(&server));
     OK(mbm_server_poll(&server));

@@ -1975,10 +1975,13 @@ uint8_t mbm_client_poll(struct mbm_client *client);
 
 /**
  * How long mbm_client_poll will find nothing to do unless a byte arrives, so
- * that a program may wait for one in select, or sleep, until then.
+ * that a program may wait for one in select, or sleep, until then. Bytes are taken
+ * only while a request is pending: with none, wait for something else.
  *
  * @param client  the object
- * @return microseconds; 0 means poll now, 0xFFFFFFFF that there is no request
+ * @return microseconds; 0 means poll now, 0xFFFFFFFF that there is no request; 1000
+ *         while a TCP port does not take what is to be sent: to poll sooner, wait
+ *         for that too, as mbm_tcp_wait does
  */
 uint32_t mbm_client_pollDelay(const struct mbm_client *client);
 
@@ -4104,7 +4107,10 @@ uint8_t mbm_server_poll(struct mbm_server *server);
  * that a program may sleep until then.
  *
  * @param server  the object
- * @return microseconds; 0 means poll now, 0xFFFFFFFF until a byte arrives
+ * @return microseconds; 0 means poll now, 0xFFFFFFFF until a byte arrives; 1000
+ *         while a function of yours returns MBM_REPLY_PENDING or a connection does
+ *         not take the response: to go on sooner, poll when that has changed. No
+ *         byte is taken meanwhile, so do not wait for one
  */
 uint32_t mbm_server_pollDelay(const struct mbm_server *server);
 
