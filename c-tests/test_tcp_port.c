@@ -295,41 +295,6 @@ static void a_full_socket_takes_no_more_and_wait_tells_of_room(void **state)
     assert_int_equal(tcp.error, EPIPE);
 }
 
-/* The peer floods and takes nothing: the program that cannot answer sleeps. */
-static void what_nobody_reads_does_not_end_the_wait_again(void **state)
-{
-    static uint8_t much[60000];
-    uint8_t bytes[4];
-    int pair[2];
-
-    (void)state;
-    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, pair), 0);
-    assert_int_equal(mbm_tcp_attach(&tcp, pair[0]), 0);
-    assert_int_equal(write(pair[1], "abcd", 4), 4);
-    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
-    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
-    /* It does once somebody read, or had said all that was to be said before. */
-    assert_int_equal(port.read(port.context, bytes, 2), 2);
-    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
-    while (port.write(port.context, much, sizeof much) > 0)
-        ;
-    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
-    assert_int_equal(fcntl(pair[1], F_SETFL, O_NONBLOCK), 0);
-    while (read(pair[1], much, sizeof much) > 0)
-        ;
-    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
-    assert_int_equal(port.write(port.context, much, 10), 10);
-    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
-    assert_int_equal(port.read(port.context, bytes, 4), 2);
-    /* Nor does the end of the stream, once it was told. */
-    assert_int_equal(read(pair[1], much, sizeof much), 10);
-    close(pair[1]);
-    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
-    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
-    assert_int_equal(mbm_tcp_isConnected(&tcp), -1);
-    assert_int_equal(tcp.error, EPIPE);
-}
-
 static void wait_ends_with_the_time_or_with_any_of_its_sockets(void **state)
 {
     static mbm_tcp many[MBM_TCP_WAITS];
@@ -497,7 +462,6 @@ int main(void)
         TEST(what_came_before_the_end_is_still_read),
         TEST(a_disconnected_link_is_lost_until_it_is_connected),
         TEST(a_full_socket_takes_no_more_and_wait_tells_of_room),
-        TEST(what_nobody_reads_does_not_end_the_wait_again),
         TEST(wait_ends_with_the_time_or_with_any_of_its_sockets),
         TEST(a_connection_without_a_place_is_ended_politely),
         TEST(a_port_in_use_cannot_be_listened_at),

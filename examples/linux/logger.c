@@ -79,7 +79,8 @@ static void take_sample(void)
     (void)line_read(&at, &request, function, address, quantity);
     while (!line_ended && request.status == MBM_PENDING) {
         line_poll(&at);
-        line_rest(&at, 1000);
+        if (request.status == MBM_PENDING)
+            line_rest(&at, 1000);
     }
     if (request.status == MBM_PENDING)
         return;
@@ -89,12 +90,14 @@ static void take_sample(void)
     show_progress();
 }
 
-static int usage(void)
-{
-    fprintf(stderr, "usage: logger PLACE [-u UNIT] [-f 1..4] [-i MILLISECONDS] [-n SAMPLES] "
-                    "[-o FILE] [-r RETRIES] ADDRESS QUANTITY\nplaces: %s\n", LINE_PLACES);
-    return 2;
-}
+static const char USAGE[] =
+    "logger PLACE [options] ADDRESS QUANTITY\n"
+    "  -u UNIT          1 to 255, 1 if left out\n"
+    "  -f FUNCTION      1 coils, 2 discrete inputs, 3 holding registers (if left out), 4 input registers\n"
+    "  -i MILLISECONDS  from one sample to the next, 1000 if left out\n"
+    "  -n SAMPLES       until Ctrl-C if left out\n"
+    "  -o FILE          CSV, stdout if left out\n"
+    "  -r RETRIES       how often a sample is asked again, 2 if left out";
 
 int main(int argc, char **argv)
 {
@@ -103,6 +106,8 @@ int main(int argc, char **argv)
     uint32_t due;
     int option;
 
+    if (line_wants_help(argc, argv))
+        return line_usage(0, USAGE);
     while ((option = getopt(argc, argv, "u:f:i:n:o:r:")) != -1) {
         switch (option) {
         case 'u': unit = line_number(optarg, 1, 255); break;
@@ -111,11 +116,11 @@ int main(int argc, char **argv)
         case 'n': samples = line_number(optarg, 1, 1000000000); break;
         case 'o': path = optarg; break;
         case 'r': retries = line_number(optarg, 0, 255); break;
-        default: return usage();
+        default: return line_usage(1, USAGE);
         }
     }
     if (argc - optind != 3)
-        return usage();
+        return line_usage(1, USAGE);
     address = (uint16_t)line_number(argv[optind + 1], 0, 65535);
     quantity = (uint16_t)line_number(argv[optind + 2], 1, MOST);
     if (line_open(&at, argv[optind]) != 0)

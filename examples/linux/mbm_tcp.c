@@ -427,8 +427,12 @@ int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, 
     ready = ppoll(waits, used, micros == MBM_TCP_FOREVER ? NULL : &time, NULL);
     if (ready < 0)
         return errno == EINTR ? 0 : -1;
-    for (i = 0; i < sockets; i++)
+    for (i = 0; i < sockets; i++) {
         if (owners[i]->state == CONNECTED && (waits[i].revents & ~POLLOUT))
             owners[i]->is_unread = 1;
+        /* Known from now on, though nobody may use the port yet. */
+        if (owners[i]->state == CONNECTING && waits[i].revents)
+            progress_slowly(owners[i]);
+    }
     return ready > 0;
 }
