@@ -31,6 +31,7 @@ static modbus_t *peer;
 static modbus_mapping_t *mapping;
 static pthread_t thread;
 static int stop_peer[2];
+static char name[64]; /* of the peer's line, whichever terminal that is */
 
 static void *serve(void *argument)
 {
@@ -74,7 +75,10 @@ static int start(void **state)
     served_prepare(&ours);
     served_on_line(&ours, MBM_FRAMING_RTU);
 
-    snprintf(paths[0], sizeof paths[0], "%s,115200,N1,1-10", line.path);
+    snprintf(name, sizeof name, "/tmp/mbm-gateway-%d", (int)getpid());
+    if (symlink(line.path, name) != 0)
+        return -1;
+    snprintf(paths[0], sizeof paths[0], "%s,115200,N1,1-10", name);
     snprintf(paths[1], sizeof paths[1], "%s,115200,N1,11-30", ours.line.path);
     snprintf(paths[2], sizeof paths[2], "/dev/no-such-line,9600,E1,40-41");
     program_start(&gateway, "gateway", arguments);
@@ -100,6 +104,7 @@ static int stop(void **state)
     modbus_free(peer);
     modbus_mapping_free(mapping);
     pty_close(&line);
+    unlink(name);
     served_stop(&ours);
     return 0;
 }
@@ -301,23 +306,75 @@ static void connections_beyond_its_places_are_closed(void **state)
     usleep(50000);
 }
 
-/* The last, for the line does not come back. */
-static void a_line_that_is_lost_is_0a(void **state)
+static void lose_line(void)
 {
-    uint16_t word;
-
-    (void)state;
     assert_int_equal(write(stop_peer[1], "", 1), 1);
     pthread_join(thread, NULL);
     assert_int_equal(read(stop_peer[0], &(char){0}, 1), 1);
     pty_close(&line);
+}
+
+static void have_line(void)
+{
+    pty_open(&line);
+    assert_int_equal(unlink(name), 0);
+    assert_int_equal(symlink(line.path, name), 0);
+    modbus_set_socket(peer, line.ours);
+    assert_int_equal(pthread_create(&thread, NULL, serve, NULL), 0);
+}
+
+static void a_line_that_is_lost_is_0a_until_it_is_back(void **state)
+{
+    double start;
+    uint16_t word;
+
+    (void)state;
+    lose_line();
     expect_exception(0x0A, PEER_UNIT);
     expect_exception(0x0A, PEER_UNIT);
     modbus_set_slave(client, SERVED_UNIT);
     assert_int_equal(modbus_read_registers(client, SERVED_BASE, 1, &word), 1);
-    pty_open(&line);
-    modbus_set_socket(peer, line.ours);
-    assert_int_equal(pthread_create(&thread, NULL, serve, NULL), 0);
+    have_line();
+    start = seconds();
+    modbus_set_slave(client, PEER_UNIT);
+    while (modbus_read_registers(client, 0, 1, &word) != 1)
+        assert_true(seconds() - start < 5);
+}
+
+static void a_line_that_was_lost_while_nobody_asked_costs_no_request(void **state)
+{
+    uint16_t word;
+
+    (void)state;
+    lose_line();
+    have_line();
+    modbus_set_slave(client, PEER_UNIT);
+    assert_int_equal(modbus_read_registers(client, 0, 1, &word), 1);
+}
+
+/* Starts a gateway with arguments that are none; what it says where it would listen. */
+static void bad_arguments_are_told(void **state)
+{
+    static const char *const bad[][6] = {
+        {"0", "300", "/dev/null,19200,E1,9-1"},
+        {"0", "300", "/dev/null,1,E1,1-9"},
+        {"0", "300", "/dev/null,19200,X1,1-9"},
+        {"0", "300", "/dev/null,19200,E3,1-9"},
+        {"0", "300", "/dev/null,19200,E1,1-9", "/dev/zero,19200,E1,9-12"},
+        {"0", "300x", "/dev/null,19200,E1,1-9"},
+        {"0", "300", "/dev/null,19200,E1,1-9,and more"},
+    };
+    char text[64];
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(bad); i++) {
+        program one;
+
+        program_start(&one, "gateway", bad[i]);
+        assert_int_equal(program_rest(&one, text, sizeof text), 0);
+        assert_int_equal(program_end(&one), 2);
+    }
 }
 
 int main(void)
@@ -332,7 +389,9 @@ int main(void)
         cmocka_unit_test(a_line_that_waits_holds_up_no_other),
         cmocka_unit_test(a_connection_that_breaks_takes_its_request_along),
         cmocka_unit_test(connections_beyond_its_places_are_closed),
-        cmocka_unit_test(a_line_that_is_lost_is_0a),
+        cmocka_unit_test(a_line_that_is_lost_is_0a_until_it_is_back),
+        cmocka_unit_test(a_line_that_was_lost_while_nobody_asked_costs_no_request),
+        cmocka_unit_test(bad_arguments_are_told),
     };
 
     return cmocka_run_group_tests(tests, start, stop);

@@ -111,6 +111,13 @@ static int is_there(line *l)
     return l->is_open;
 }
 
+/* A line that hung up while nobody asked is opened again by who does. */
+static void hang_up(line *l)
+{
+    close_line(l);
+    l->tried = micros() - REOPEN_MICROS;
+}
+
 /* Moves the requests of a line on. A line that is lost has ended them all. */
 static void poll_line(line *l)
 {
@@ -126,22 +133,28 @@ static void poll_line(line *l)
 static int add_line(char *text, uint16_t timeout)
 {
     line *l = &lines[line_count];
+    struct termios unused = {0};
     unsigned baud, stop, first, last, unit;
-    char parity;
+    char parity, behind;
     mbm_port port;
     char *rest = strchr(text, ',');
 
     if (!rest || line_count == LINES)
         return -1;
     *rest++ = 0;
-    if (sscanf(rest, "%u,%c%u,%u-%u", &baud, &parity, &stop, &first, &last) != 5 || first < 1 ||
-        last > 247 || stop > 2)
+    if (sscanf(rest, "%u,%c%u,%u-%u%c", &baud, &parity, &stop, &first, &last, &behind) != 5 ||
+        first < 1 || first > last || last > 247 || stop > 2)
         return -1;
-    line_count++;
     l->path = text;
     l->options.baud = baud;
     l->options.parity = parity;
     l->options.stop = (uint8_t)stop;
+    if (mbm_tty_settings(&unused, &l->options) != 0)
+        return -1;
+    for (unit = first; unit <= last; unit++)
+        if (route[unit])
+            return -1;
+    line_count++;
     port = mbm_tty_port(&l->tty, NULL);
     if (open_line(l) != MBM_OK)
         perror(text);
@@ -279,7 +292,9 @@ static void wait_for_work(void)
         uint32_t own = i < line_count ? mbm_client_pollDelay(client) : UINT32_MAX;
         int is_busy = i < line_count && lines[i].is_open && mbm_client_pending(client) != 0;
 
-        waits[1 + i] = (struct pollfd){is_busy ? lines[i].tty.fd : -1, POLLIN, 0};
+        /* An idle client takes no bytes; that its line hangs up is always told. */
+        waits[1 + i] = (struct pollfd){lines[i].is_open ? lines[i].tty.fd : -1,
+                                       is_busy ? POLLIN : 0, 0};
         delay = own < delay ? own : delay;
     }
     for (i = 0; i < CONNECTIONS; i++) {
@@ -297,6 +312,9 @@ static void wait_for_work(void)
     if (ppoll(waits, 1 + LINES + CONNECTIONS, delay == UINT32_MAX ? NULL : &time,
               &awake) <= 0)
         return;
+    for (i = 0; i < line_count; i++)
+        if (!waits[1 + i].events && waits[1 + i].revents)
+            hang_up(&lines[i]);
     for (i = 0; i < CONNECTIONS; i++)
         if (is_used[i] && connections[i].asked &&
             (waits[1 + LINES + i].revents & (POLLERR | POLLHUP | POLLNVAL)))
@@ -307,15 +325,23 @@ int main(int argc, char **argv)
 {
     struct sigaction action = {0};
     sigset_t ends;
-    unsigned long timeout = argc > 3 ? strtoul(argv[2], NULL, 10) : 0;
+    char *behind = "";
+    unsigned long timeout = argc > 3 ? strtoul(argv[2], &behind, 10) : 0;
+    const int is_asked = argc == 2 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0);
     int i;
 
     for (i = 3; timeout > 0 && timeout <= UINT16_MAX && i < argc; i++)
         if (add_line(argv[i], (uint16_t)timeout) != 0)
             break;
-    if (i < 4 || i < argc) {
-        fprintf(stderr, "usage: %s PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...\n", argv[0]);
-        return 2;
+    if (i < 4 || i < argc || *behind) {
+        fprintf(is_asked ? stdout : stderr,
+                "usage: gateway PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...\n"
+                "  PORT                 where it listens, 0 for one that is free\n"
+                "  MILLISECONDS         that a device has to respond, up to 65535\n"
+                "  PATH,BAUD,...        up to 4 serial lines, the parity N, E or O, 1 or 2 stop bits,\n"
+                "                       and the units on it, 1 to 247, each on one line\n"
+                "for example: gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,32-40\n");
+        return is_asked ? 0 : 2;
     }
     if (mbm_tcp_listen(&listener, NULL, argv[1]) != 0) {
         perror(argv[1]);
