@@ -147,6 +147,22 @@ static void a_unit_that_serves_nothing_refuses_everything(void **state)
     assert_memory_equal(wire.sent, "\x11\x84\x01", 3);
 }
 
+static void a_unit_without_services_is_silent(void **state)
+{
+    static mbm_unit places[3];
+
+    (void)state;
+    memset(places, 0, sizeof places);
+    OK(mbm_server_begin(&server, &port, places, 3, frame, sizeof frame));
+    assert_int_equal(ASK("\x03\0\0\0\1"), 0);
+    places[1].id = 17;
+    assert_int_equal(ASK("\x03\0\0\0\1"), 0);
+    places[2].id = 17;
+    OK(mbm_server_serveHoldingRegisters(&places[2], &table));
+    assert_int_equal(ASK("\x04\0\0\0\1"), 5);
+    assert_memory_equal(wire.sent, "\x11\x84\x01", 3);
+}
+
 static void tables_without_storage_have_no_cells(void **state)
 {
     (void)state;
@@ -351,6 +367,7 @@ int main(void)
         TEST(an_object_that_was_never_begun_is_told),
         TEST(null_is_an_invalid_argument),
         TEST(a_unit_that_serves_nothing_refuses_everything),
+        TEST(a_unit_without_services_is_silent),
         TEST(tables_without_storage_have_no_cells),
         TEST(serving_twice_is_serving_once),
         TEST(mask_and_read_write_want_holding_registers),

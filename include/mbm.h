@@ -1343,7 +1343,8 @@ typedef struct mbm_unit {
      */
     struct mbm_diagnostics *diagnostics;
     /**
-     * The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers to every id.
+     * The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers to every id. A
+     * unit that serves nothing is silent, as if it were not there.
      */
     uint8_t id;
 } mbm_unit;
