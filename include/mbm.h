@@ -2131,7 +2131,7 @@ uint8_t mbm_client_isConnected(const struct mbm_client *client);
  * client's requests wait until mbm_client_takeBack. One of the two has the line
  * at any time.
  *
- * @param client  the object, of a serial line or of RTU over TCP
+ * @param client  the object; for a facade, of RTU frames on a line or over TCP
  * @param master  a facade with buffers, which gets the client's port; NULL if
  *                you use the line in another way
  * @return MBM_OK; MBM_BUSY if a request is under way or the line is lent already;
