@@ -4093,7 +4093,8 @@ uint16_t mbm_ring_lost(const struct mbm_ring *ring);
  *
  * Call it as often as you like, at least once per character time of the line
  * if nothing else buffers its bytes. On a serial line a response begins with
- * the first call after the line has been silent for t3.5.
+ * the first call after the line has been silent for t3.5. What units call, hooks and
+ * functions of yours, may not poll the server that called it.
  *
  * @param server  the object
  * @return MBM_OK; MBM_LINK_LOST if the port said so, which ends a connection;

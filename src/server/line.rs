@@ -17,6 +17,10 @@ use crate::time::{self, elapsed};
 /// How soon to look again at what only the port or a service can bring on.
 const NOT_BY_ITSELF: u32 = time::millis(1);
 
+/// Requests that one poll takes at most of which none is answered: a peer that floods
+/// with those of others holds nobody up.
+pub const MOST_REQUESTS: u8 = 16;
+
 /// What the caller lends to a server.
 pub trait Lent {
     /// The storage of one frame: a request first, then its response.
@@ -254,7 +258,7 @@ impl<P: Port, B: Lent> Server<P, B> {
 
     /// As [`Server::poll`], with requests served by `units` and answered.
     pub fn serve(&mut self, now: u32, units: &mut (impl Units + ?Sized)) -> Status {
-        loop {
+        for _ in 0..MOST_REQUESTS {
             let status = self.poll(now);
             if status != Status::PENDING {
                 return status;
@@ -262,9 +266,10 @@ impl<P: Port, B: Lent> Server<P, B> {
             let heading = self.request;
             let reply = units.serve(&heading, self.pdu());
             if !self.answer(reply) {
-                return Status::OK;
+                break;
             }
         }
+        Status::OK
     }
 
     /// Takes the reply to the request: a response stands where its PDU stood.
