@@ -229,6 +229,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
 
     /// Takes a request back that was not sent, so that it is not sent later. True if
     /// it was not, or only half.
+    #[cold]
     fn unsend(&mut self, wire: u16) -> bool {
         let filled = usize::from(self.filled);
         let bytes = self.means.outgoing().get_mut(..filled);
@@ -280,6 +281,20 @@ impl<P: Port, S: Means> Tcp<P, S> {
         true
     }
 
+    /// Half of a request that was given up is all that is left to be sent: if it does
+    /// not go, which is so for true, what waits for its room would wait for ever.
+    /// `None` if the link is lost.
+    #[cold]
+    fn push_half<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>) -> Option<bool> {
+        let half = self.sent;
+        if !self.flush(shared) {
+            return None;
+        }
+        let stuck = half == self.sent;
+        shared.look |= stuck && self.blocked;
+        Some(stuck)
+    }
+
     /// The request was not answered in time: what that means.
     fn overdue<J: Job>(&mut self, job: &J) -> Status {
         let ticket = job.ticket();
@@ -305,6 +320,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
 }
 
 /// Moves what stands behind the first `by` bytes over them.
+#[cfg_attr(target_os = "none", inline(never))]
 fn close_up(bytes: &mut [u8], by: usize) {
     let cells = Cell::from_mut(bytes).as_slice_of_cells();
     for (to, from) in cells.iter().zip(cells.get(by..).unwrap_or_default()) {
@@ -384,15 +400,12 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
                 return Some(job);
             }
         }
-        // Half of a request that was given up is all that is left to be sent: if it
-        // does not go, what waits for its room would wait for ever.
-        let (half, mut stuck) = (self.sent, false);
-        if self.flying == 0 && half < self.filled {
-            if !self.flush(shared) {
+        let mut stuck = false;
+        if self.flying == 0 && self.sent < self.filled {
+            let Some(is_stuck) = self.push_half(shared) else {
                 return self.lose(shared, now);
-            }
-            stuck = half == self.sent;
-            shared.look |= stuck && self.blocked;
+            };
+            stuck = is_stuck;
         }
         let (mut from, mut blocked) = (0, false);
         loop {
