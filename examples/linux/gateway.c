@@ -143,10 +143,11 @@ static int add_line(char *text, uint16_t timeout)
         return -1;
     *rest++ = 0;
     if (sscanf(rest, "%u,%c%u,%u-%u%c", &baud, &parity, &stop, &first, &last, &behind) != 5 ||
-        first < 1 || first > last || last > 247 || stop > 2)
+        first < 1 || first > last || last > 247 || stop > 2 || baud < 50)
         return -1;
     l->path = text;
     l->options.baud = baud;
+    l->options.anyRate = 1;
     l->options.parity = parity;
     l->options.stop = (uint8_t)stop;
     if (mbm_tty_settings(&unused, &l->options) != 0)

@@ -26,7 +26,8 @@ uint32_t line_milliseconds(void)
 
 static int open_tty(line *l, char *path, int ascii)
 {
-    const mbm_tty_options options = {.baud = 19200, .parity = 'N', .stop = 1, .data = ascii ? 7 : 8};
+    const mbm_tty_options options = {
+        .baud = 19200, .anyRate = 1, .parity = 'N', .stop = 1, .data = ascii ? 7 : 8};
     char *baud = strchr(path, ','), *parity = baud ? strchr(baud + 1, ',') : NULL;
     mbm_port port;
 
