@@ -27,6 +27,14 @@ static uint16_t reply[MOST];
 static long unit = 1, function = 3, interval = 1000, samples;
 static uint16_t address, quantity;
 static unsigned long taken, failed;
+static int unwritten; /* errno of what could not be written */
+
+static void end_line(void)
+{
+    fputc('\n', csv);
+    if (fflush(csv) != 0)
+        unwritten = errno;
+}
 
 static void write_head(void)
 {
@@ -35,7 +43,7 @@ static void write_head(void)
     fprintf(csv, "time,unit,status");
     for (i = 0; i < quantity; i++)
         fprintf(csv, ",%u", address + i);
-    fprintf(csv, "\n");
+    end_line();
 }
 
 static void write_sample(const struct timespec *when)
@@ -53,8 +61,7 @@ static void write_sample(const struct timespec *when)
         if (request.status == MBM_OK)
             fprintf(csv, "%u", line_value(&request, function, i));
     }
-    fputc('\n', csv);
-    fflush(csv);
+    end_line();
 }
 
 static void show_progress(void)
@@ -134,13 +141,13 @@ int main(int argc, char **argv)
     mbm_client_setBackoff(&at.client, MBM_BACKOFF_EXPONENTIAL, 50, 1000);
     write_head();
     due = line_milliseconds();
-    while (!line_ended && (samples == 0 || taken < (unsigned long)samples)) {
+    while (!line_ended && !unwritten && (samples == 0 || taken < (unsigned long)samples)) {
         take_sample();
         /* A sample that took longer is followed by the next at once. */
         due += (uint32_t)interval;
         if ((int32_t)(due - line_milliseconds()) < 0)
             due = line_milliseconds();
-        while (!line_ended && taken != (unsigned long)samples &&
+        while (!line_ended && !unwritten && taken != (unsigned long)samples &&
                (int32_t)(due - line_milliseconds()) > 0) {
             line_poll(&at);
             line_rest(&at, due - line_milliseconds());
@@ -148,10 +155,10 @@ int main(int argc, char **argv)
     }
     if (isatty(2))
         fputc('\n', stderr);
-    if (ferror(csv) || (path && fclose(csv) != 0)) {
-        fprintf(stderr, "%s: %s\n", path ? path : "stdout", strerror(errno));
-        return 1;
-    }
     line_close(&at);
-    return 0;
+    if (path && fclose(csv) != 0 && !unwritten)
+        unwritten = errno;
+    if (unwritten)
+        fprintf(stderr, "%s: %s\n", path ? path : "stdout", strerror(unwritten));
+    return unwritten ? 1 : 0;
 }
