@@ -1345,7 +1345,8 @@ typedef struct mbm_unit {
      */
     struct mbm_diagnostics *diagnostics;
     /**
-     * The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers to every id.
+     * The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers to every id. A
+     * unit that serves nothing is silent, as if it were not there.
      */
     uint8_t id;
 } mbm_unit;
@@ -1977,10 +1978,13 @@ uint8_t mbm_client_poll(struct mbm_client *client);
 
 /**
  * How long mbm_client_poll will find nothing to do unless a byte arrives, so
- * that a program may wait for one in select, or sleep, until then.
+ * that a program may wait for one in select, or sleep, until then. Bytes are taken
+ * only while a request is pending: with none, wait for something else.
  *
  * @param client  the object
- * @return microseconds; 0 means poll now, 0xFFFFFFFF that there is no request
+ * @return microseconds; 0 means poll now, 0xFFFFFFFF that there is no request; 1000
+ *         while a TCP port does not take what is to be sent: to poll sooner, wait
+ *         for that too, as mbm_tcp_wait does
  */
 uint32_t mbm_client_pollDelay(const struct mbm_client *client);
 
@@ -2129,7 +2133,7 @@ uint8_t mbm_client_isConnected(const struct mbm_client *client);
  * client's requests wait until mbm_client_takeBack. One of the two has the line
  * at any time.
  *
- * @param client  the object, of a serial line or of RTU over TCP
+ * @param client  the object; for a facade, of RTU frames on a line or over TCP
  * @param master  a facade with buffers, which gets the client's port; NULL if
  *                you use the line in another way
  * @return MBM_OK; MBM_BUSY if a request is under way or the line is lent already;
@@ -4128,7 +4132,8 @@ uint16_t mbm_ring_lost(const struct mbm_ring *ring);
  *
  * Call it as often as you like, at least once per character time of the line
  * if nothing else buffers its bytes. On a serial line a response begins with
- * the first call after the line has been silent for t3.5.
+ * the first call after the line has been silent for t3.5. What units call, hooks and
+ * functions of yours, may not poll the server that called it.
  *
  * @param server  the object
  * @return MBM_OK; MBM_LINK_LOST if the port said so, which ends a connection;
@@ -4143,7 +4148,10 @@ uint8_t mbm_server_poll(struct mbm_server *server);
  * that a program may sleep until then.
  *
  * @param server  the object
- * @return microseconds; 0 means poll now, 0xFFFFFFFF until a byte arrives
+ * @return microseconds; 0 means poll now, 0xFFFFFFFF until a byte arrives; 1000
+ *         while a function of yours returns MBM_REPLY_PENDING or a connection does
+ *         not take the response: to go on sooner, poll when that has changed. No
+ *         byte is taken meanwhile, so do not wait for one
  */
 uint32_t mbm_server_pollDelay(const struct mbm_server *server);
 

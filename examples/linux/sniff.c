@@ -185,6 +185,15 @@ static int replay(void)
     return 0;
 }
 
+static int usage(int wrong)
+{
+    fprintf(wrong ? stderr : stdout,
+            "usage: sniff [-a] path baud [N|E|O]   or   sniff [-a|-t] -\n"
+            "  -a  ASCII frames, -t TCP frames; else RTU\n"
+            "  -   a recording from stdin\n");
+    return wrong ? 2 : 0;
+}
+
 int main(int argc, char **argv)
 {
     struct sigaction action = {0};
@@ -192,17 +201,17 @@ int main(int argc, char **argv)
     int option, failed;
     uint32_t baud = 0;
 
-    while ((option = getopt(argc, argv, "at")) != -1) {
-        if (option == '?')
-            return 2;
+    if (argc > 1 && strcmp(argv[1], "--help") == 0)
+        return usage(0);
+    while ((option = getopt(argc, argv, "aht")) != -1) {
+        if (option == '?' || option == 'h')
+            return usage(option == '?');
         framing.kind = option == 'a' ? MBM_FRAMING_ASCII : MBM_FRAMING_TCP;
     }
     argc -= optind;
     argv += optind;
-    if (argc < 1 || (argc < 2 && strcmp(argv[0], "-") != 0)) {
-        fprintf(stderr, "usage: sniff [-a] path baud [N|E|O]   or   sniff [-a|-t] -\n");
-        return 2;
-    }
+    if (argc < 1 || (argc < 2 && strcmp(argv[0], "-") != 0))
+        return usage(1);
     if (argc > 1)
         baud = (uint32_t)strtoul(argv[1], NULL, 10);
     action.sa_handler = end;
