@@ -250,7 +250,9 @@ impl Outline {
     /// True if a response to 14 has the groups that were asked for, each as long.
     fn answers_groups(&self, pdu: &[u8], byte: impl Fn(usize) -> u8) -> bool {
         let mut theirs = pdu.get(2..).unwrap_or_default();
-        for at in (5..usize::from(self.data_length)).step_by(7) {
+        // In steps, for step_by divides, which a Cortex-M0 has no instruction for.
+        let mut at = 5;
+        while at < usize::from(self.data_length) {
             let records = u16::from_be_bytes([byte(at), byte(at + 1)]);
             let bytes = usize::from(records) << 1;
             match theirs {
@@ -262,6 +264,7 @@ impl Outline {
                 }
                 _ => return false,
             }
+            at += 7;
         }
         theirs.is_empty()
     }
