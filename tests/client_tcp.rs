@@ -264,6 +264,22 @@ fn a_small_buffer_gathers_what_it_holds() {
 }
 
 #[test]
+fn a_request_that_waits_for_room_follows_one_that_left_in_pieces() {
+    let (end, mut client) = client();
+    client.line.means.outgoing = vec![0; 12];
+    end.0.borrow_mut().piece = Some(6);
+    for number in 1..=3 {
+        assert!(client.queue(read(1, number)).is_ok());
+    }
+    let mut sent = Vec::new();
+    for _ in 0..6 {
+        assert!(poll(&end, &mut client).is_empty());
+        sent.extend(end.sent());
+    }
+    assert_eq!(requests(&sent).len(), 3);
+}
+
+#[test]
 fn a_response_longer_than_the_buffer_is_passed_over_and_told() {
     let (end, mut client) = client();
     client.line.means.frame = vec![0; 12];
@@ -285,6 +301,28 @@ fn a_response_longer_than_the_buffer_is_passed_over_and_told() {
     }
     assert_eq!(ended[0].ticket.status, Status::BUFFER_TOO_SMALL);
     assert_right(&ended[1]);
+}
+
+#[test]
+fn what_looks_like_the_response_inside_a_frame_that_is_passed_over_is_none() {
+    let (end, mut client) = client();
+    client.line.means.frame = vec![0; 24];
+    assert!(client.queue(read(1, 7)).is_ok());
+    poll(&end, &mut client);
+    let (wire, unit, address) = requests(&end.sent())[0];
+    let [a, b] = wire.wrapping_add(1).to_be_bytes();
+    let mut frame = vec![a, b, 0, 0, 0, 43, unit, 3, 40];
+    frame.resize(24, 0);
+    frame.extend(response((wire, unit, 0xBAD)));
+    frame.resize(49, 0);
+    end.deliver(0, &frame);
+    end.deliver(0, &response((wire, unit, address)));
+    let mut ended = Vec::new();
+    for _ in 0..10 {
+        ended.extend(poll(&end, &mut client));
+    }
+    assert_eq!(ended.len(), 1);
+    assert_right(&ended[0]);
 }
 
 #[test]

@@ -91,7 +91,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         _: bool,
     ) -> Option<J> {
         let started = if !self.engine.is_pending() {
-            let at = shared.due(0, now, &mut self.engine.storage, |_| true)?;
+            let at = shared.due(now, &mut self.engine.storage)?;
             let job = shared.remove(at)?;
             if job.ticket().is(Stage::Lost) {
                 return shared.conclude(job, Status::LINK_LOST, now, &mut self.engine.storage);

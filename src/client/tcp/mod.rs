@@ -1,15 +1,17 @@
 //! A client's TCP stream: many requests at once, told apart by the number in
 //! their header.
 
-use super::job::{deliver, Job, Stage};
+mod find;
+
+use super::job::{Job, Stage};
 use super::shared::Shared;
 use super::units::Means;
 use super::Line;
 use crate::error::Status;
-use crate::frame::tcp::{self, Header};
+use crate::frame::tcp;
 use crate::port::Port;
 use crate::transaction::{Counter, Settings};
-use core::cell::Cell;
+use crate::FAST;
 
 /// As many requests at once as the queue holds, in TCP frames. Received bytes
 /// stand in the frame buffer, those to send in [`Means::outgoing`].
@@ -79,20 +81,14 @@ impl<P, S> Tcp<P, S> {
 impl<P: Port, S: Means> Tcp<P, S> {
     /// Receives what there is; false if the link is lost.
     fn hear(&mut self) -> bool {
-        let frame = self.means.frame();
-        if self.start > 0 {
-            let cells = Cell::from_mut(&mut *frame).as_slice_of_cells();
-            let kept = cells.get(usize::from(self.start)..usize::from(self.end));
-            let kept = kept.unwrap_or_default();
-            for (to, from) in cells.iter().zip(kept) {
-                to.set(from.get());
-            }
-            self.end = kept.len() as u16;
+        if self.start == self.end {
             self.start = 0;
+            self.end = 0;
+        } else if self.start > 0 {
+            self.gather();
         }
-        let Some(room) = frame.get_mut(usize::from(self.end)..) else {
-            return true;
-        };
+        let room = self.means.frame().get_mut(usize::from(self.end)..);
+        let room = room.unwrap_or_default();
         if room.is_empty() {
             return true;
         }
@@ -106,134 +102,125 @@ impl<P: Port, S: Means> Tcp<P, S> {
         true
     }
 
-    /// Finds the next response among what arrived; gives back a job that ended.
+    /// Ends what is overdue, and sends what may be; gives back a job that ended.
     #[inline]
-    fn dispatch<J: Job, const N: usize>(
-        &mut self,
-        shared: &mut Shared<J, N>,
-        now: u32,
-    ) -> Option<J> {
-        self.pass();
-        if self.start == self.end {
-            return None;
-        }
-        self.find(shared, now)
-    }
-
-    /// As [`Tcp::dispatch`], of bytes that are there.
-    fn find<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>, now: u32) -> Option<J> {
-        loop {
-            self.pass();
-            let range = usize::from(self.start)..usize::from(self.end);
-            let rest = self.means.frame().get(range)?;
-            let header = match tcp::header(rest) {
-                Ok(header) => header,
-                Err(Status::INCOMPLETE_FRAME) => return None,
-                Err(_) => {
-                    self.stray();
-                    continue;
-                }
+    fn send<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>, now: u32) -> Option<J> {
+        while shared.delay(now) == 0 {
+            let Some((at, status)) = self.tend(shared, now) else {
+                break;
             };
-            let (arrived, room) = (rest.len(), self.means.frame().len());
-            let place = shared.place(|job| answers(job, &header));
-            if place.is_none() && self.astray {
-                self.start += 1;
-                continue;
-            }
-            if arrived < header.total && header.total <= room {
-                return None;
-            }
-            let begin = usize::from(self.start) + tcp::PDU;
-            let end = usize::from(self.start) + header.total;
-            // What does not fit is passed over as it arrives.
-            self.skip = header.total as u16;
-            let Some(at) = place else {
-                self.means.count(Counter::ForeignFrames, 1);
-                self.note(shared, &header);
-                continue;
-            };
-            let status = match self.means.frame().get(begin..end) {
-                Some(pdu) => judge(shared.queue.get_mut(at)?, pdu),
-                None => Status::BUFFER_TOO_SMALL,
-            };
-            if self.astray && status.is_failure() && status != Status::BUFFER_TOO_SMALL {
-                // It only looked like that.
-                self.skip = 1;
-                continue;
-            }
-            self.astray = false;
-            self.flying = self.flying.saturating_sub(1);
-            shared.connected = true;
-            if !status.is_failure() {
-                self.means.count(Counter::Replies, 1);
-                if status != Status::OK {
-                    self.means.count(Counter::Exceptions, 1);
-                }
-            }
-            if let Some(job) = shared.end(at, status, now, &mut self.means) {
+            if let Some(job) = self.conclude(shared, at, status, now) {
                 return Some(job);
             }
         }
-    }
-
-    /// Passes over what is left of a frame that is known already.
-    fn pass(&mut self) {
-        let skipped = self.skip.min(self.end - self.start);
-        self.start += skipped;
-        self.skip -= skipped;
-    }
-
-    /// Passes over a byte that begins no frame.
-    fn stray(&mut self) {
-        self.start += 1;
-        if !self.astray {
-            self.astray = true;
-            self.means.count(Counter::Resynchronisations, 1);
+        if !self.flush(shared) {
+            return self.lose(shared, now);
         }
+        None
     }
 
-    /// Notes that another unit answered a request of ours.
-    fn note<J: Job, const N: usize>(&self, shared: &mut Shared<J, N>, header: &Header) {
-        for job in shared.queue.iter_mut() {
-            let ticket = job.ticket_mut();
-            if ticket.is_sent() && ticket.wire == header.transaction {
-                ticket.stray();
+    /// What becomes of a request that [`Tcp::tend`] found.
+    #[cold]
+    fn conclude<J: Job, const N: usize>(
+        &mut self,
+        shared: &mut Shared<J, N>,
+        at: usize,
+        mut status: Status,
+        now: u32,
+    ) -> Option<J> {
+        if status == Status::PENDING {
+            if self.start < self.end {
+                // What began to arrive may hide the response.
+                self.stray();
+                return self.find(shared, now);
             }
+            self.flying = self.flying.wrapping_sub(1);
+            status = self.overdue(shared.queue.get(at)?);
         }
+        shared.end(at, status, now, &mut self.means)
     }
 
-    /// Puts a request behind those that are to be sent.
-    fn encode<J: Job>(&mut self, job: &mut J, now: u32) -> Result<(), Status> {
-        let wire = self.next;
+    /// Sends what is to be sent; gives the place of a request that has ended, and
+    /// how: [`Status::PENDING`] if its time is over.
+    fn tend<J: Job, const N: usize>(
+        &mut self,
+        shared: &mut Shared<J, N>,
+        now: u32,
+    ) -> Option<(usize, Status)> {
+        let mut least = u32::MAX;
+        self.blocked = false;
+        let mut jobs = shared.queue.iter_mut();
+        let ended = loop {
+            let Some(job) = jobs.next() else {
+                shared.rest(now, least);
+                return None;
+            };
+            let ticket = job.ticket();
+            let mut wait = ticket.remains(now, &mut self.means);
+            if wait == 0 {
+                if ticket.is_sent() {
+                    break Status::PENDING;
+                }
+                if !ticket.is(Stage::Queued) {
+                    break Status::LINK_LOST;
+                }
+                match self.encode(job, now) {
+                    Status::OK => wait = job.ticket().wait,
+                    Status::BUSY => {
+                        self.blocked = true;
+                        continue;
+                    }
+                    refused => break refused,
+                }
+            }
+            least = least.min(wait);
+        };
+        let left = jobs.len();
+        Some((shared.queue.len() - 1 - left, ended))
+    }
+
+    /// Puts a request behind those that are to be sent; [`Status::BUSY`] if it has
+    /// to wait for others, [`Status::BUFFER_TOO_SMALL`] if it never fits.
+    fn encode<J: Job>(&mut self, job: &mut J, now: u32) -> Status {
+        if self.flying >= self.most {
+            return Status::BUSY;
+        }
         let ticket = job.ticket();
-        let (unit, outline) = (ticket.unit, ticket.outline);
+        let (unit, outline) = (ticket.unit, &ticket.outline);
         let begin = usize::from(self.filled);
-        let buffer = self.means.outgoing().get_mut(begin..);
-        let buffer = buffer.unwrap_or_default();
-        let length = tcp::emit(buffer, wire, unit, |place| {
-            let length = usize::from(outline.request_length());
-            let place = place.get_mut(..length).ok_or(Status::BUFFER_TOO_SMALL)?;
-            outline.emit(place, |index| job.byte(index));
-            Ok(length)
-        })?;
-        self.filled += length as u16;
-        self.next = wire.wrapping_add(1);
-        self.flying = self.flying.saturating_add(1);
-        self.means.count(Counter::Requests, 1);
-        let wait = if outline.is_answered() {
+        let Some(room) = self.means.outgoing().get_mut(begin..) else {
+            return Status::BUSY;
+        };
+        let length = match (outline.two_words(), room.first_chunk_mut()) {
+            (Some(words), Some(frame)) => {
+                let start = tcp::start(self.next, 5, unit, outline.function());
+                *frame = tcp::short(start, *words);
+                frame.len()
+            }
+            _ => match emit(job, room, self.next) {
+                Ok(length) => length,
+                Err(refused) if begin == 0 => return refused,
+                Err(_) => return Status::BUSY,
+            },
+        };
+        let ticket = job.ticket_mut();
+        let wait = if ticket.outline.is_answered() {
             self.settings.response_timeout
         } else {
             self.settings.turnaround_delay
         };
-        let ticket = job.ticket_mut();
-        ticket.wire = wire;
+        ticket.wire = self.next;
         ticket.enter(Stage::Sent, now, wait);
-        Ok(())
+        self.filled += length as u16;
+        self.next = self.next.wrapping_add(1);
+        self.flying += 1;
+        self.means.count(Counter::Requests, 1);
+        Status::OK
     }
 
     /// Hands over what is to be sent; false if the link is lost.
     fn flush<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>) -> bool {
-        if self.sent == self.filled {
+        if self.sent >= self.filled {
             return true;
         }
         let range = usize::from(self.sent)..usize::from(self.filled);
@@ -256,6 +243,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
     }
 
     /// The request was not answered in time: what that means.
+    #[cold]
     fn overdue<J: Job>(&mut self, job: &J) -> Status {
         let ticket = job.ticket();
         if !ticket.outline.is_answered() {
@@ -271,39 +259,26 @@ impl<P: Port, S: Means> Tcp<P, S> {
         }
     }
 
+    /// The link is lost, and with it all that waits for it.
+    #[cold]
     fn lose<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>, now: u32) -> Option<J> {
         self.clear();
         shared.lose();
-        let at = shared.due(0, now, &mut self.means, |_| true)?;
-        shared.end(at, Status::LINK_LOST, now, &mut self.means)
+        shared.end(0, Status::LINK_LOST, now, &mut self.means)
     }
 }
 
-fn answers<J: Job>(job: &J, header: &Header) -> bool {
+/// Writes the frame of a request, whatever it is.
+#[cold]
+fn emit<J: Job>(job: &J, place: &mut [u8], wire: u16) -> Result<usize, Status> {
     let ticket = job.ticket();
-    ticket.is_sent() && ticket.wire == header.transaction && ticket.unit == header.unit
-}
-
-/// What the response `pdu` says to the job, which takes its data.
-fn judge<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
-    let outline = &job.ticket().outline;
-    match outline.expected(pdu, pdu.len()) {
-        Some(length) if usize::from(length.get()) == pdu.len() => {}
-        None if pdu.first().map(|code| code & 0x7F) != Some(outline.function()) => {
-            return Status::INVALID_FUNCTION;
-        }
-        _ => return Status::MALFORMED_REPLY,
-    }
-    let status = outline.judge(pdu, |index| job.byte(index));
-    if let [function, code, ..] = *pdu {
-        if function & 0x80 != 0 {
-            job.ticket_mut().exception = code;
-        }
-    }
-    match status {
-        Status::OK => deliver(job, pdu),
-        other => other,
-    }
+    let outline = &ticket.outline;
+    tcp::emit(place, wire, ticket.unit, |pdu| {
+        let length = usize::from(outline.request_length());
+        let pdu = pdu.get_mut(..length).ok_or(Status::BUFFER_TOO_SMALL)?;
+        outline.emit(pdu, |index| job.byte(index));
+        Ok(length)
+    })
 }
 
 impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
@@ -324,7 +299,7 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
 
     fn released(&mut self, job: &J) {
         if job.ticket().is_sent() {
-            self.flying = self.flying.saturating_sub(1);
+            self.flying = self.flying.wrapping_sub(1);
         }
     }
 
@@ -337,68 +312,26 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
         if shared.queue.is_empty() {
             return None;
         }
-        if let Some(job) = self.dispatch(shared, now) {
-            return Some(job);
-        }
-        if fresh && self.flying > 0 {
+        let mut fresh = fresh && self.flying > 0;
+        loop {
+            if self.start < self.end {
+                if FAST {
+                    if let Some(job) = self.find_read(shared, now) {
+                        return Some(job);
+                    }
+                }
+                if let Some(job) = self.find(shared, now) {
+                    return Some(job);
+                }
+            }
+            if !fresh {
+                return self.send(shared, now);
+            }
             if !self.hear() {
                 return self.lose(shared, now);
             }
-            if let Some(job) = self.dispatch(shared, now) {
-                return Some(job);
-            }
+            fresh = false;
         }
-        let (mut from, mut blocked) = (0, false);
-        loop {
-            let (flying, most) = (self.flying, self.most);
-            let filled = usize::from(self.filled) + tcp::PDU;
-            let room = self.means.outgoing().len();
-            let due = shared.due(from, now, &mut self.means, |job| {
-                let ticket = job.ticket();
-                let length = filled + usize::from(ticket.outline.request_length());
-                let fits = length <= room || filled == tcp::PDU;
-                let accepted = !ticket.is(Stage::Queued) || (flying < most && fits);
-                blocked |= !accepted;
-                accepted
-            });
-            self.blocked = blocked;
-            let Some(at) = due else {
-                break;
-            };
-            let job = shared.queue.get_mut(at)?;
-            let status = if job.ticket().is(Stage::Queued) {
-                match self.encode(job, now) {
-                    Ok(()) => {
-                        from = at;
-                        continue;
-                    }
-                    Err(refused) => refused,
-                }
-            } else if job.ticket().is_sent() {
-                if self.start < self.end {
-                    // What began to arrive may hide the response.
-                    self.stray();
-                    (from, blocked) = (0, false);
-                    match self.dispatch(shared, now) {
-                        Some(job) => return Some(job),
-                        None => continue,
-                    }
-                }
-                self.flying = self.flying.saturating_sub(1);
-                self.overdue(job)
-            } else {
-                Status::LINK_LOST
-            };
-            if let Some(job) = shared.end(at, status, now, &mut self.means) {
-                return Some(job);
-            }
-            // There may be room for those that were passed.
-            (from, blocked) = (0, false);
-        }
-        if !self.flush(shared) {
-            return self.lose(shared, now);
-        }
-        None
     }
 
     fn withdraw(&mut self, _: impl FnOnce(&J) -> bool) -> Option<J> {

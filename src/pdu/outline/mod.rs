@@ -14,6 +14,7 @@ use super::length::Length;
 use super::limits::{MAX_FIFO, MAX_PDU};
 use super::{files, length, EXCEPTION};
 use crate::error::Status;
+use crate::FAST;
 use core::num::NonZeroU8;
 use form::*;
 
@@ -113,9 +114,12 @@ impl Outline {
 
     /// The bits of the last byte of data that are used.
     pub fn mask(&self) -> u8 {
+        if !self.form.has(BITS) {
+            return 0xFF;
+        }
         match self.head[4] & 7 {
-            used if used > 0 && self.form.has(BITS) => (1 << used) - 1,
-            _ => 0xFF,
+            0 => 0xFF,
+            used => (1 << used) - 1,
         }
     }
 
@@ -133,6 +137,17 @@ impl Outline {
             behind -= 1;
         }
         byte(behind)
+    }
+
+    /// The words of a request that is a function code and two words, as sent, at
+    /// little cost. Firmware, where code is dearer, has [`Outline::emit`] alone.
+    #[inline]
+    pub fn two_words(&self) -> Option<&[u8; 4]> {
+        if FAST && self.head_length == 5 && self.data_length == 0 && !self.form.has(COUNTED) {
+            self.head.first_chunk::<5>()?.last_chunk()
+        } else {
+            None
+        }
     }
 
     /// Writes the request PDU into `pdu`, which has
@@ -208,6 +223,13 @@ impl Outline {
             Length::Exactly(length) | Length::AtLeast(length) => length,
             _ => whole.max(2),
         }
+    }
+
+    /// How many bytes of data answer a read, behind function code and byte count;
+    /// `None` of other requests.
+    #[inline]
+    pub fn data_of_read(&self) -> Option<u8> {
+        (self.form.0 & (KIND | GROUP) == READ).then_some(self.length.wrapping_sub(2))
     }
 
     /// What a complete response of the [`Outline::expected`] length says:
