@@ -96,7 +96,7 @@ impl Outline {
     /// How many bytes of data the response has, if that is known already; 0 else.
     pub const fn known_data(&self) -> u8 {
         if self.data_at() > 0 && matches!(self.form.0 & KIND, FIXED | READ) {
-            self.length.saturating_sub(self.data_at())
+            self.length.wrapping_sub(self.data_at())
         } else {
             0
         }
