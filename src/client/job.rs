@@ -133,9 +133,10 @@ pub trait Job {
 
 /// Hands the data of `pdu`, a complete response, to the job.
 pub(super) fn deliver<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
-    match usize::from(job.ticket().outline.data_at()) {
-        0 => Status::OK,
-        at => take(job, pdu.get(at..).unwrap_or_default()),
+    let at = usize::from(job.ticket().outline.data_at());
+    match pdu.get(at..) {
+        Some(data) if at > 0 => take(job, data),
+        _ => Status::OK,
     }
 }
 
@@ -152,9 +153,11 @@ pub(super) fn take<J: Job>(job: &mut J, data: &[u8]) -> Status {
     ticket.length = data.len() as u8;
     job.put_all(data);
     let mask = job.ticket().outline.mask();
-    // The bits behind the last one are zero.
-    if let (Some(last), true) = (data.last(), mask != 0xFF) {
-        job.put(data.len() - 1, *last & mask);
+    if mask != 0xFF {
+        // The bits behind the last one are zero.
+        if let Some((last, before)) = data.split_last() {
+            job.put(before.len(), *last & mask);
+        }
     }
     Status::OK
 }

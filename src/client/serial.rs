@@ -63,8 +63,10 @@ impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
             return status;
         }
         let length = usize::from(self.engine.request().length);
-        let pdu = self.engine.reply().get(..length).unwrap_or_default();
-        deliver(job, pdu)
+        match self.engine.reply().get(..length) {
+            Some(pdu) => deliver(job, pdu),
+            None => status,
+        }
     }
 }
 
@@ -91,8 +93,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         _: bool,
     ) -> Option<J> {
         let started = if !self.engine.is_pending() {
-            let at = shared.due(now, &mut self.engine.storage)?;
-            let job = shared.remove(at)?;
+            let job = shared.take_due(now, &mut self.engine.storage)?;
             if job.ticket().is(Stage::Lost) {
                 return shared.conclude(job, Status::LINK_LOST, now, &mut self.engine.storage);
             }

@@ -78,9 +78,9 @@ impl<J: Job, const N: usize> Shared<J, N> {
         self.queue.iter().position(is)
     }
 
-    /// The place of the first job that is due; if there is none, notes when somebody
-    /// will be.
-    pub(super) fn due(&mut self, now: u32, means: &mut impl Means) -> Option<usize> {
+    /// Takes the first job that is due out of the queue; if there is none, notes when
+    /// somebody will be.
+    pub(super) fn take_due(&mut self, now: u32, means: &mut impl Means) -> Option<J> {
         if self.delay(now) > 0 {
             return None;
         }
@@ -90,10 +90,11 @@ impl<J: Job, const N: usize> Shared<J, N> {
             least = least.min(wait);
             wait == 0
         });
-        if found.is_none() {
+        let Some(at) = found else {
             self.rest(now, least);
-        }
-        found
+            return None;
+        };
+        self.remove(at)
     }
 
     /// Notes that nobody is due for so long.

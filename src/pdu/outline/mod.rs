@@ -271,7 +271,9 @@ impl Outline {
 
     /// True if a response to 14 has the groups that were asked for, each as long.
     fn answers_groups(&self, pdu: &[u8], byte: impl Fn(usize) -> u8) -> bool {
-        let mut theirs = pdu.get(2..).unwrap_or_default();
+        let Some(mut theirs) = pdu.get(2..) else {
+            return false;
+        };
         // In steps, for step_by divides, which a Cortex-M0 has no instruction for.
         let mut at = 5;
         while at < usize::from(self.data_length) {
