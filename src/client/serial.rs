@@ -9,7 +9,7 @@ use crate::error::Status;
 use crate::frame::rtu::Window;
 use crate::frame::Search;
 use crate::port::Port;
-use crate::transaction::{Transaction, BROADCAST};
+use crate::transaction::Transaction;
 
 /// One request at a time, in RTU frames, or with [`crate::frame::ascii_window`]
 /// in ASCII frames.
@@ -56,16 +56,12 @@ impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
     }
 
     fn received(&mut self, job: &mut J, status: Status) -> Status {
-        let ticket = job.ticket_mut();
-        ticket.exception = self.engine.exception_code();
-        let answered = ticket.unit != BROADCAST && ticket.outline.is_answered();
-        if status != Status::OK || !answered {
-            return status;
-        }
+        job.ticket_mut().exception = self.engine.exception_code();
+        // 0 if nothing answered: the request was a broadcast, or of that kind.
         let length = usize::from(self.engine.request().length);
         match self.engine.reply().get(..length) {
-            Some(pdu) => deliver(job, pdu),
-            None => status,
+            Some(pdu) if status == Status::OK && length > 0 => deliver(job, pdu),
+            _ => status,
         }
     }
 }
@@ -100,6 +96,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
             let unit = job.ticket().unit;
             self.engine.forget();
             self.engine.request().job = Some(job);
+            self.engine.request().length = 0;
             self.engine.start(unit)
         } else {
             Status::PENDING
