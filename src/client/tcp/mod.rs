@@ -80,6 +80,7 @@ impl<P, S> Tcp<P, S> {
 
 impl<P: Port, S: Means> Tcp<P, S> {
     /// Receives what there is; false if the link is lost.
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn hear(&mut self) -> bool {
         if self.start == self.end {
             self.start = 0;
@@ -105,11 +106,12 @@ impl<P: Port, S: Means> Tcp<P, S> {
     /// Ends what is overdue, and sends what may be; gives back a job that ended.
     #[inline]
     fn send<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>, now: u32) -> Option<J> {
+        let mut reads = u8::MAX;
         while shared.delay(now) == 0 {
             let Some((at, status)) = self.tend(shared, now) else {
                 break;
             };
-            if let Some(job) = self.conclude(shared, at, status, now) {
+            if let Some(job) = self.conclude(shared, at, status, now, &mut reads) {
                 return Some(job);
             }
         }
@@ -119,7 +121,8 @@ impl<P: Port, S: Means> Tcp<P, S> {
         None
     }
 
-    /// What becomes of a request that [`Tcp::tend`] found.
+    /// What becomes of a request that [`Tcp::tend`] found. So many `reads` are left
+    /// before it is given up.
     #[cold]
     fn conclude<J: Job, const N: usize>(
         &mut self,
@@ -127,11 +130,21 @@ impl<P: Port, S: Means> Tcp<P, S> {
         at: usize,
         mut status: Status,
         now: u32,
+        reads: &mut u8,
     ) -> Option<J> {
         if status == Status::PENDING {
+            // As the deadline passes, all that has arrived is looked at, even if the
+            // buffer cannot hold it at once.
+            let had = self.end - self.start;
+            if *reads > 0 && !self.hear() {
+                return self.lose(shared, now);
+            }
+            *reads = reads.saturating_sub(1);
             if self.start < self.end {
-                // What began to arrive may hide the response.
-                self.stray();
+                if self.end - self.start == had {
+                    // What began to arrive may hide the response.
+                    self.stray();
+                }
                 return self.find(shared, now);
             }
             self.flying = self.flying.wrapping_sub(1);
