@@ -1,63 +1,14 @@
 //! The client on a TCP stream: many requests at once, in a stream that does what
 //! it likes.
 
-#[path = "common/wire.rs"]
-mod wire;
+#[path = "common/stream.rs"]
+mod stream;
 
-use mbm::client::{Client, Tcp};
 use mbm::error::Status;
-use mbm::frame::tcp;
 use mbm::pdu::outline::Form;
 use mbm::transaction::Counter;
 use proptest::prelude::*;
-use wire::{End, Lent, Task};
-
-type TcpIp = Client<Tcp<End, Lent>, Task, 16>;
-
-fn client() -> (End, TcpIp) {
-    let end = End::default();
-    (end.clone(), Client::new(Tcp::new(end, Lent::default())))
-}
-
-fn read(unit: u8, transaction: u16) -> Task {
-    Task::new(unit, transaction, &[], |outline| {
-        outline.set(Form::READ_HOLDING_REGISTERS, transaction, 1)
-    })
-}
-
-/// The requests that were sent: wire id, unit, address.
-fn requests(bytes: &[u8]) -> Vec<(u16, u8, u16)> {
-    let mut rest = bytes;
-    let mut found = Vec::new();
-    while !rest.is_empty() {
-        let header = tcp::header(rest).unwrap();
-        let pdu = &rest[tcp::PDU..header.total];
-        assert_eq!(pdu[0], 3);
-        found.push((
-            header.transaction,
-            header.unit,
-            u16::from_be_bytes([pdu[1], pdu[2]]),
-        ));
-        rest = &rest[header.total..];
-    }
-    found
-}
-
-/// The response to the read of one register: its address.
-fn response((wire, unit, address): (u16, u8, u16)) -> Vec<u8> {
-    let [a, b] = wire.to_be_bytes();
-    let [c, d] = address.to_be_bytes();
-    vec![a, b, 0, 0, 0, 5, unit, 3, 2, c, d]
-}
-
-/// Polls once as C does: until nothing more has ended.
-fn poll(end: &End, client: &mut TcpIp) -> Vec<Task> {
-    let mut ended = Vec::new();
-    while let Some(task) = client.poll(end.now(), ended.is_empty()) {
-        ended.push(task);
-    }
-    ended
-}
+use stream::{client, poll, read, requests, response, wire::Task};
 
 fn assert_right(task: &Task) {
     assert_eq!(task.ticket.status, Status::OK);

@@ -142,6 +142,12 @@ mod tests {
     }
 
     #[test]
+    fn a_frame_of_two_words_may_be_written_at_once() {
+        let start = start(0x8180, 5, 0x10, 1);
+        assert_eq!(short(start, [0, 0x6B, 0, 3]), FRAME);
+    }
+
+    #[test]
     fn a_part_of_a_frame_is_incomplete() {
         for end in 0..FRAME.len() {
             assert_eq!(parse(&FRAME[..end]), Err(Status::INCOMPLETE_FRAME));
