@@ -1,63 +1,15 @@
 //! The client on a TCP stream: many requests at once, in a stream that does what
 //! it likes.
 
-#[path = "common/wire.rs"]
-mod wire;
+#[path = "common/stream.rs"]
+mod stream;
 
-use mbm::client::{Client, Tcp};
 use mbm::error::Status;
 use mbm::frame::tcp;
 use mbm::pdu::outline::{Form, Outline};
 use mbm::transaction::Counter;
 use proptest::prelude::*;
-use wire::{End, Lent, Task};
-
-type TcpIp = Client<Tcp<End, Lent>, Task, 16>;
-
-fn client() -> (End, TcpIp) {
-    let end = End::default();
-    (end.clone(), Client::new(Tcp::new(end, Lent::default())))
-}
-
-fn read(unit: u8, transaction: u16) -> Task {
-    Task::new(unit, transaction, &[], |outline| {
-        outline.set(Form::READ_HOLDING_REGISTERS, transaction, 1)
-    })
-}
-
-/// The requests that were sent: wire id, unit, address.
-fn requests(bytes: &[u8]) -> Vec<(u16, u8, u16)> {
-    let mut rest = bytes;
-    let mut found = Vec::new();
-    while !rest.is_empty() {
-        let header = tcp::header(rest).unwrap();
-        let pdu = &rest[tcp::PDU..header.total];
-        assert_eq!(pdu[0], 3);
-        found.push((
-            header.transaction,
-            header.unit,
-            u16::from_be_bytes([pdu[1], pdu[2]]),
-        ));
-        rest = &rest[header.total..];
-    }
-    found
-}
-
-/// The response to the read of one register: its address.
-fn response((wire, unit, address): (u16, u8, u16)) -> Vec<u8> {
-    let [a, b] = wire.to_be_bytes();
-    let [c, d] = address.to_be_bytes();
-    vec![a, b, 0, 0, 0, 5, unit, 3, 2, c, d]
-}
-
-/// Polls once as C does: until nothing more has ended.
-fn poll(end: &End, client: &mut TcpIp) -> Vec<Task> {
-    let mut ended = Vec::new();
-    while let Some(task) = client.poll(end.now(), ended.is_empty()) {
-        ended.push(task);
-    }
-    ended
-}
+use stream::{client, poll, read, requests, response, wire::Task};
 
 fn assert_right(task: &Task) {
     assert_eq!(task.ticket.status, Status::OK);
@@ -328,6 +280,22 @@ fn noise_without_an_end_does_not_keep_a_poll_from_its_deadline() {
 }
 
 #[test]
+fn a_request_that_waits_for_room_follows_one_that_left_in_pieces() {
+    let (end, mut client) = client();
+    client.line.means.outgoing = vec![0; 12];
+    end.0.borrow_mut().piece = Some(6);
+    for number in 1..=3 {
+        assert!(client.queue(read(1, number)).is_ok());
+    }
+    let mut sent = Vec::new();
+    for _ in 0..6 {
+        assert!(poll(&end, &mut client).is_empty());
+        sent.extend(end.sent());
+    }
+    assert_eq!(requests(&sent).len(), 3);
+}
+
+#[test]
 fn a_response_longer_than_the_buffer_is_passed_over_and_told() {
     let (end, mut client) = client();
     client.line.means.frame = vec![0; 12];
@@ -349,6 +317,28 @@ fn a_response_longer_than_the_buffer_is_passed_over_and_told() {
     }
     assert_eq!(ended[0].ticket.status, Status::BUFFER_TOO_SMALL);
     assert_right(&ended[1]);
+}
+
+#[test]
+fn what_looks_like_the_response_inside_a_frame_that_is_passed_over_is_none() {
+    let (end, mut client) = client();
+    client.line.means.frame = vec![0; 24];
+    assert!(client.queue(read(1, 7)).is_ok());
+    poll(&end, &mut client);
+    let (wire, unit, address) = requests(&end.sent())[0];
+    let [a, b] = wire.wrapping_add(1).to_be_bytes();
+    let mut frame = vec![a, b, 0, 0, 0, 43, unit, 3, 40];
+    frame.resize(24, 0);
+    frame.extend(response((wire, unit, 0xBAD)));
+    frame.resize(49, 0);
+    end.deliver(0, &frame);
+    end.deliver(0, &response((wire, unit, address)));
+    let mut ended = Vec::new();
+    for _ in 0..10 {
+        ended.extend(poll(&end, &mut client));
+    }
+    assert_eq!(ended.len(), 1);
+    assert_right(&ended[0]);
 }
 
 #[test]

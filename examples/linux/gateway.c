@@ -310,7 +310,7 @@ static void wait_for_work(void)
         if (is_used[i] && connections[i].asked)
             one->events = connections[i].request.status == MBM_PENDING ? 0 : POLLOUT;
         /* The socket was full. */
-        else if (is_used[i] && tcps[i].is_full)
+        else if (is_used[i] && (tcps[i].awaits & POLLOUT))
             one->events = POLLOUT;
     }
     time = (struct timespec){(time_t)(delay / 1000000u), (long)(delay % 1000000u) * 1000};

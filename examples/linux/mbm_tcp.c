@@ -25,6 +25,15 @@ static int refuse(int error)
     return -1;
 }
 
+static void enter(mbm_tcp *tcp, uint8_t state)
+{
+    static const uint8_t awaited[] = {
+        [FREE] = 0, [CONNECTING] = POLLOUT, [CONNECTED] = POLLIN, [LOST] = 0};
+
+    tcp->state = state;
+    tcp->awaits = awaited[state];
+}
+
 static int has_socket(const mbm_tcp *tcp)
 {
     return tcp->state == CONNECTING || tcp->state == CONNECTED;
@@ -36,7 +45,7 @@ static void lose(mbm_tcp *tcp, int error)
         close(tcp->fd);
     tcp->fd = -1;
     tcp->error = error;
-    tcp->state = LOST;
+    enter(tcp, LOST);
 }
 
 static void set(int fd, int level, int option, int value)
@@ -70,7 +79,7 @@ static int try_next(mbm_tcp *tcp, int error)
 {
     if (has_socket(tcp))
         close(tcp->fd);
-    tcp->state = LOST;
+    enter(tcp, LOST);
     while (tcp->next < tcp->count) {
         const struct sockaddr_storage *address = &tcp->addresses[tcp->next];
         socklen_t length = tcp->lengths[tcp->next++];
@@ -80,10 +89,10 @@ static int try_next(mbm_tcp *tcp, int error)
             error = errno;
             continue;
         }
-        tcp->state = CONNECTING;
+        enter(tcp, CONNECTING);
         if (prepare(tcp->fd) == 0) {
             if (connect(tcp->fd, (const struct sockaddr *)address, length) == 0) {
-                tcp->state = CONNECTED;
+                enter(tcp, CONNECTED);
                 return 0;
             }
             if (errno == EINPROGRESS || errno == EINTR)
@@ -91,7 +100,7 @@ static int try_next(mbm_tcp *tcp, int error)
         }
         error = errno;
         close(tcp->fd);
-        tcp->state = LOST;
+        enter(tcp, LOST);
     }
     lose(tcp, error);
     return -1;
@@ -129,7 +138,7 @@ int mbm_tcp_open(mbm_tcp *tcp, const char *host, const char *service)
     }
     freeaddrinfo(found);
     if (try_next(tcp, EADDRNOTAVAIL) < 0) {
-        tcp->state = FREE;
+        enter(tcp, FREE);
         return refuse(tcp->error);
     }
     return 0;
@@ -143,7 +152,7 @@ int mbm_tcp_attach(mbm_tcp *tcp, int fd)
         return -1;
     memset(tcp, 0, sizeof *tcp);
     tcp->fd = fd;
-    tcp->state = CONNECTED;
+    enter(tcp, CONNECTED);
     return 0;
 }
 
@@ -152,7 +161,7 @@ void mbm_tcp_close(mbm_tcp *tcp)
     if (has_socket(tcp))
         close(tcp->fd);
     tcp->fd = -1;
-    tcp->state = FREE;
+    enter(tcp, FREE);
 }
 
 /* 1 once connected, 0 before, -1 if there is no link. */
@@ -169,7 +178,7 @@ static int progress_slowly(mbm_tcp *tcp)
         if (getsockopt(tcp->fd, SOL_SOCKET, SO_ERROR, &error, &size) < 0)
             error = errno;
         if (error == 0)
-            tcp->state = CONNECTED;
+            enter(tcp, CONNECTED);
         else
             try_next(tcp, error);
     }
@@ -202,8 +211,6 @@ uint8_t mbm_tcp_connect(void *context)
     mbm_tcp *tcp = (mbm_tcp *)context;
 
     tcp->next = 0;
-    tcp->is_full = 0;
-    tcp->is_unread = 0;
     tcp->error = 0;
     if (try_next(tcp, ENOTCONN) < 0)
         return MBM_LINK_LOST;
@@ -220,14 +227,17 @@ void mbm_tcp_disconnect(void *context)
 
 /* A signal and "try again" mean that nothing was moved; all else that the link
  * is gone. */
-static int16_t outcome(mbm_tcp *tcp, ssize_t count)
+static int16_t refused(mbm_tcp *tcp, ssize_t count)
 {
-    if (count > 0)
-        return (int16_t)count;
     if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR))
         return 0;
     lose(tcp, count < 0 ? errno : EPIPE);
     return -1;
+}
+
+static int16_t outcome(mbm_tcp *tcp, ssize_t count)
+{
+    return count > 0 ? (int16_t)count : refused(tcp, count);
 }
 
 static size_t at_most(uint16_t length)
@@ -235,32 +245,33 @@ static size_t at_most(uint16_t length)
     return length > INT16_MAX ? INT16_MAX : length;
 }
 
+/* Of a read or write that moves nothing. */
+static int16_t nothing(mbm_tcp *tcp)
+{
+    return (int16_t)(progress(tcp) < 0 ? -1 : 0);
+}
+
 static int16_t tcp_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     mbm_tcp *tcp = (mbm_tcp *)context;
-    int there = progress(tcp);
 
-    if (there <= 0 || capacity == 0)
-        return (int16_t)(there < 0 ? -1 : 0);
+    if (tcp->state != CONNECTED || capacity == 0)
+        return nothing(tcp);
     /* Who reads is not stuck with what is to be sent. */
-    tcp->is_full = 0;
-    tcp->is_unread = 0;
+    tcp->awaits = POLLIN;
     return outcome(tcp, recv(tcp->fd, bytes, at_most(capacity), 0));
 }
 
 static int16_t tcp_write(void *context, const uint8_t *bytes, uint16_t length)
 {
     mbm_tcp *tcp = (mbm_tcp *)context;
-    int there = progress(tcp);
-    int16_t taken;
+    ssize_t taken;
 
-    if (there <= 0 || length == 0)
-        return (int16_t)(there < 0 ? -1 : 0);
-    taken = outcome(tcp, send(tcp->fd, bytes, at_most(length), MSG_NOSIGNAL));
-    tcp->is_full = taken >= 0 && taken < length;
-    if (!tcp->is_full)
-        tcp->is_unread = 0;
-    return taken;
+    if (tcp->state != CONNECTED || length == 0)
+        return nothing(tcp);
+    taken = send(tcp->fd, bytes, at_most(length), MSG_NOSIGNAL);
+    tcp->awaits = taken == length ? POLLIN : (uint8_t)(tcp->awaits | POLLOUT);
+    return outcome(tcp, taken);
 }
 
 static uint32_t tcp_micros(void *context)
@@ -397,29 +408,16 @@ int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, 
 {
     struct timespec time = {(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
     struct pollfd waits[MBM_TCP_WAITS];
-    mbm_tcp *owners[MBM_TCP_WAITS];
-    nfds_t used = 0, sockets;
+    nfds_t used = 0;
     size_t i;
     int ready;
 
     if (count > MBM_TCP_WAITS - 2)
         return refuse(EINVAL);
-    for (i = 0; i < count; i++) {
-        short events = tcps[i].is_unread ? 0 : POLLIN;
-
-        if (!has_socket(&tcps[i]))
-            continue;
-        if (tcps[i].state == CONNECTING)
-            events = POLLOUT;
-        else if (tcps[i].is_full)
-            events |= POLLOUT;
-        /* A hang-up would end the wait whatever is asked for. */
-        if (events == 0)
-            continue;
-        owners[used] = &tcps[i];
-        waits[used++] = (struct pollfd){tcps[i].fd, events, 0};
-    }
-    sockets = used;
+    /* Of who awaits nothing a hang-up would end the wait too. */
+    for (i = 0; i < count; i++)
+        if (tcps[i].awaits != 0)
+            waits[used++] = (struct pollfd){tcps[i].fd, tcps[i].awaits, 0};
     if (listener && listener->port != 0)
         waits[used++] = (struct pollfd){listener->fd, POLLIN, 0};
     if (fd >= 0)
@@ -427,12 +425,15 @@ int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, 
     ready = ppoll(waits, used, micros == MBM_TCP_FOREVER ? NULL : &time, NULL);
     if (ready < 0)
         return errno == EINTR ? 0 : -1;
-    for (i = 0; i < sockets; i++) {
-        if (owners[i]->state == CONNECTED && (waits[i].revents & ~POLLOUT))
-            owners[i]->is_unread = 1;
+    used = 0;
+    for (i = 0; i < count; i++) {
+        const short told = tcps[i].awaits != 0 ? waits[used++].revents : 0;
+
         /* Known from now on, though nobody may use the port yet. */
-        if (owners[i]->state == CONNECTING && waits[i].revents)
-            progress_slowly(owners[i]);
+        if (tcps[i].state == CONNECTING && told)
+            progress_slowly(&tcps[i]);
+        else if (told & ~POLLOUT)
+            tcps[i].awaits &= POLLOUT;
     }
     return ready > 0;
 }

@@ -41,8 +41,7 @@ typedef struct mbm_tcp {
     int error;                /**< errno of what lost the link, EPIPE if the peer closed it; else 0 */
     const mbm_master *master; /**< who uses it; says how long to sleep */
     uint8_t state;            /**< not for you */
-    uint8_t is_full;          /**< 1 while it takes no more bytes, so wait for room too */
-    uint8_t is_unread;        /**< not for you */
+    uint8_t awaits;           /**< what to poll it for: POLLIN, and POLLOUT while it takes no more */
     uint8_t count;            /**< not for you */
     uint8_t next;             /**< not for you */
     socklen_t lengths[MBM_TCP_ADDRESSES];               /**< not for you */

@@ -167,7 +167,9 @@ pub struct mbm_function {
     pub response: mbm_rule,
 }
 
-/// The core's word for a rule; none if it is no rule.
+/// The core's word for a rule; none if it is no rule. (Inlined: to pack and unpack
+/// what it returns takes more than what it does.)
+#[inline(always)]
 pub(super) fn rule(rule: mbm_rule) -> Option<Rule> {
     let fits = |most| rule.bytes > 0 && rule.bytes <= most;
     match rule.kind {

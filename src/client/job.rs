@@ -1,9 +1,11 @@
 //! What a client is asked to do: a request, its data, and where the response's
 //! data go.
 
+use super::units::Means;
 use crate::error::Status;
 use crate::pdu::limits::MAX_PDU;
 use crate::pdu::outline::Outline;
+use crate::time::elapsed;
 use crate::transaction::Question;
 use core::num::NonZeroU8;
 
@@ -77,6 +79,17 @@ impl Ticket {
         matches!(self.stage, Stage::Sent | Stage::Strayed)
     }
 
+    /// How long it is not due yet.
+    #[inline(always)]
+    pub(super) fn remains(&self, now: u32, means: &mut impl Means) -> u32 {
+        let wait = self.wait.saturating_sub(elapsed(now, self.since));
+        if self.is(Stage::Queued) {
+            wait.max(means.rest(self.unit, now))
+        } else {
+            wait
+        }
+    }
+
     /// Notes that another unit answered in its place.
     pub(super) fn stray(&mut self) {
         self.stage = Stage::Strayed;
@@ -120,21 +133,31 @@ pub trait Job {
 
 /// Hands the data of `pdu`, a complete response, to the job.
 pub(super) fn deliver<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
-    let ticket = job.ticket();
-    let at = usize::from(ticket.outline.data_at());
-    if at == 0 || !job.wants_data() {
+    let at = usize::from(job.ticket().outline.data_at());
+    match pdu.get(at..) {
+        Some(data) if at > 0 => take(job, data),
+        _ => Status::OK,
+    }
+}
+
+/// Hands the data of a response to the job.
+#[cfg_attr(not(target_os = "none"), inline(always))]
+pub(super) fn take<J: Job>(job: &mut J, data: &[u8]) -> Status {
+    if !job.wants_data() {
         return Status::OK;
     }
-    let data = pdu.get(at..).unwrap_or_default();
+    let ticket = job.ticket_mut();
     if data.len() > usize::from(ticket.capacity) {
         return Status::BUFFER_TOO_SMALL;
     }
-    job.ticket_mut().length = data.len() as u8;
+    ticket.length = data.len() as u8;
     job.put_all(data);
-    // The bits behind the last one are zero.
     let mask = job.ticket().outline.mask();
-    if let (Some(last), true) = (data.last(), mask != 0xFF) {
-        job.put(data.len() - 1, *last & mask);
+    if mask != 0xFF {
+        // The bits behind the last one are zero.
+        if let Some((last, before)) = data.split_last() {
+            job.put(before.len(), *last & mask);
+        }
     }
     Status::OK
 }

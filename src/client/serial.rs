@@ -9,7 +9,7 @@ use crate::error::Status;
 use crate::frame::rtu::Window;
 use crate::frame::Search;
 use crate::port::Port;
-use crate::transaction::{Counter, Transaction, BROADCAST};
+use crate::transaction::{Counter, Transaction};
 
 /// One request at a time, in RTU frames, or with [`crate::frame::ascii_window`]
 /// in ASCII frames.
@@ -69,15 +69,13 @@ impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
     }
 
     fn received(&mut self, job: &mut J, status: Status) -> Status {
-        let ticket = job.ticket_mut();
-        ticket.exception = self.engine.exception_code();
-        let answered = ticket.unit != BROADCAST && ticket.outline.is_answered();
-        if status != Status::OK || !answered {
-            return status;
-        }
+        job.ticket_mut().exception = self.engine.exception_code();
+        // 0 if nothing answered: the request was a broadcast, or of that kind.
         let length = usize::from(self.engine.request().length);
-        let pdu = self.engine.reply().get(..length).unwrap_or_default();
-        deliver(job, pdu)
+        match self.engine.reply().get(..length) {
+            Some(pdu) if status == Status::OK && length > 0 => deliver(job, pdu),
+            _ => status,
+        }
     }
 }
 
@@ -104,19 +102,19 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         fresh: bool,
     ) -> Option<J> {
         let started = if !self.engine.is_pending() {
-            let Some(at) = shared.due(0, now, &mut self.engine.storage, |_| true) else {
+            let Some(job) = shared.take_due(now, &mut self.engine.storage) else {
                 if cfg!(not(target_os = "none")) && fresh && !shared.queue.is_empty() {
                     self.drop_late(shared);
                 }
                 return None;
             };
-            let job = shared.remove(at)?;
             if job.ticket().is(Stage::Lost) {
                 return shared.conclude(job, Status::LINK_LOST, now, &mut self.engine.storage);
             }
             let unit = job.ticket().unit;
             self.engine.forget();
             self.engine.request().job = Some(job);
+            self.engine.request().length = 0;
             self.engine.start(unit)
         } else {
             Status::PENDING

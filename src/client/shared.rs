@@ -6,6 +6,7 @@ use super::policy::Policy;
 use super::units::Means;
 use crate::error::Status;
 use crate::time::elapsed;
+use crate::FAST;
 use heapless::Vec;
 
 /// The requests of a client and its policy.
@@ -49,7 +50,15 @@ impl<J: Job, const N: usize> Shared<J, N> {
     /// Takes a job out of its place in the queue.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn remove(&mut self, at: usize) -> Option<J> {
-        let mut moved = self.queue.pop()?;
+        let moved = self.queue.pop()?;
+        if FAST && at == self.queue.len() {
+            return Some(moved);
+        }
+        self.close_up(at, moved)
+    }
+
+    #[cfg_attr(not(target_os = "none"), inline(never))]
+    fn close_up(&mut self, at: usize, mut moved: J) -> Option<J> {
         for place in self.queue.get_mut(at..)?.iter_mut().rev() {
             core::mem::swap(place, &mut moved);
         }
@@ -69,43 +78,35 @@ impl<J: Job, const N: usize> Shared<J, N> {
         self.queue.iter().position(is)
     }
 
-    /// The place of the first job, `from` a place on, that is due and that the line
-    /// would `accept`; if there is none, notes when somebody will be. Who goes on
-    /// where the last one was found keeps what was noted on the way there.
-    pub(super) fn due(
-        &mut self,
-        from: usize,
-        now: u32,
-        means: &mut impl Means,
-        mut accept: impl FnMut(&J) -> bool,
-    ) -> Option<usize> {
-        let mut least = self.wait;
-        if from == 0 {
-            if self.delay(now) > 0 {
-                return None;
-            }
-            least = u32::MAX;
+    /// Takes the first job that is due out of the queue; if there is none, notes when
+    /// somebody will be.
+    pub(super) fn take_due(&mut self, now: u32, means: &mut impl Means) -> Option<J> {
+        if self.delay(now) > 0 {
+            return None;
         }
-        let mut rest = self.queue.get(from..)?.iter();
-        let found = rest.position(|job| {
-            let ticket = job.ticket();
-            let mut wait = ticket.wait.saturating_sub(elapsed(now, ticket.since));
-            if ticket.is(Stage::Queued) {
-                wait = wait.max(means.rest(ticket.unit, now));
-            }
-            if wait > 0 {
-                least = least.min(wait);
-            }
-            wait == 0 && accept(job)
+        let mut least = u32::MAX;
+        let found = self.queue.iter().position(|job| {
+            let wait = job.ticket().remains(now, means);
+            least = least.min(wait);
+            wait == 0
         });
-        self.look = found.is_some();
+        let Some(at) = found else {
+            self.rest(now, least);
+            return None;
+        };
+        self.remove(at)
+    }
+
+    /// Notes that nobody is due for so long.
+    pub(super) fn rest(&mut self, now: u32, wait: u32) {
+        self.look = false;
         self.since = now;
-        self.wait = least;
-        found.map(|at| from + at)
+        self.wait = wait;
     }
 
     /// What becomes of the job in a place, whose request ended with `status`: it
     /// waits there to be asked again, or is given back.
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn end(
         &mut self,
         at: usize,

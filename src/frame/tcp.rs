@@ -1,9 +1,9 @@
 //! TCP: the MBAP header and a PDU (messaging on TCP/IP guide V1.0b, 3.1.3).
 
 use super::Adu;
-use crate::bytes::Reader;
 use crate::error::Status;
 use core::cmp::Ordering;
+use core::ops::RangeInclusive;
 
 /// Bytes of a frame before its PDU: transaction, protocol, length, unit.
 pub const PDU: usize = 7;
@@ -13,6 +13,9 @@ pub const MAX_FRAME: usize = PDU + 253;
 
 /// Bytes of the header that the length does not count: all but the unit.
 pub const HEADER: usize = 6;
+
+/// What the length of a header may be: unit and PDU.
+const LENGTHS: RangeInclusive<u16> = 2..=(MAX_FRAME - HEADER) as u16;
 
 /// The MBAP header.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -32,22 +35,55 @@ pub struct Header {
 /// [`Status::INCOMPLETE_FRAME`] while bytes are missing,
 /// [`Status::MALFORMED_FRAME`] if this can be no Modbus TCP frame.
 pub fn header(bytes: &[u8]) -> Result<Header, Status> {
-    let mut reader = Reader::new(bytes);
-    let incomplete = Status::INCOMPLETE_FRAME;
-    let transaction = reader.u16().ok_or(incomplete)?;
-    if reader.u16().ok_or(incomplete)? != 0 {
+    let Some([a, b, c, d, e, f, unit]) = bytes.first_chunk() else {
+        return Err(begun(bytes));
+    };
+    let length = u16::from_be_bytes([*e, *f]);
+    if u16::from_ne_bytes([*c, *d]) != 0 || !LENGTHS.contains(&length) {
         return Err(Status::MALFORMED_FRAME);
     }
-    let total = HEADER + usize::from(reader.u16().ok_or(incomplete)?);
-    if !(PDU + 1..=MAX_FRAME).contains(&total) {
-        return Err(Status::MALFORMED_FRAME);
-    }
-    let unit = reader.u8().ok_or(incomplete)?;
     Ok(Header {
-        transaction,
-        total,
-        unit,
+        transaction: u16::from_be_bytes([*a, *b]),
+        total: HEADER + usize::from(length),
+        unit: *unit,
     })
+}
+
+/// The first eight bytes of a frame, the header and a function code, as one
+/// number; `length` is that of the PDU.
+#[inline]
+pub fn start(transaction: u16, length: u8, unit: u8, function: u8) -> u64 {
+    let first = u32::from(transaction) << 16;
+    let second = (u32::from(length) + 1) << 16 | u32::from(unit) << 8 | u32::from(function);
+    u64::from(first) << 32 | u64::from(second)
+}
+
+/// A frame of its [`start`] and two words, as sent.
+#[inline]
+pub fn short(start: u64, words: [u8; 4]) -> [u8; 12] {
+    let mut frame = [0; 12];
+    if let Some(place) = frame.first_chunk_mut() {
+        *place = start.to_be_bytes();
+    }
+    if let Some(place) = frame.last_chunk_mut() {
+        *place = words;
+    }
+    frame
+}
+
+/// What there is to say of less than a header.
+#[cold]
+fn begun(bytes: &[u8]) -> Status {
+    let right = match *bytes {
+        [_, _, c, d, e, f, ..] => c | d == 0 && LENGTHS.contains(&u16::from_be_bytes([e, f])),
+        [_, _, c, d, ..] => c | d == 0,
+        _ => true,
+    };
+    if right {
+        Status::INCOMPLETE_FRAME
+    } else {
+        Status::MALFORMED_FRAME
+    }
 }
 
 /// The frame that is the whole of `bytes`.
@@ -103,6 +139,12 @@ mod tests {
             Ok(5)
         });
         assert_eq!((length, buffer), (Ok(12), FRAME));
+    }
+
+    #[test]
+    fn a_frame_of_two_words_may_be_written_at_once() {
+        let start = start(0x8180, 5, 0x10, 1);
+        assert_eq!(short(start, [0, 0x6B, 0, 3]), FRAME);
     }
 
     #[test]

@@ -215,14 +215,10 @@ unsafe fn poll<L: Kind>(pointer: *mut Object) -> Status {
         }
         let now = client.line.parts().2.micros();
         object.polling = true;
-        let mut left = MBM_CLIENT_DEPTH + 1;
-        while let Some(request) =
-            self::client::<L>(&mut *pointer).poll(now, left > MBM_CLIENT_DEPTH)
-        {
-            request.call();
-            left -= 1;
-            if left == 0 {
-                break;
+        for turn in 0..MBM_CLIENT_DEPTH + 1 {
+            match self::client::<L>(&mut *pointer).poll(now, turn == 0) {
+                Some(request) => request.call(),
+                None => break,
             }
         }
         let object = &mut *pointer;
@@ -312,10 +308,7 @@ impl Storage for LentByC {
 
 impl Means for LentByC {
     fn outgoing(&mut self) -> &mut [u8] {
-        if self.outgoing.is_null() {
-            return &mut [];
-        }
-        // SAFETY: see above.
+        // SAFETY: see above; a TCP client is begun with one, no other asks for it.
         unsafe { from_raw_parts_mut(self.outgoing, self.outgoing_bytes.into()) }
     }
 
@@ -384,6 +377,12 @@ pub unsafe extern "C" fn mbm_client_poll(client: *mut mbm_client) -> u8 {
     }
 }
 
+#[cfg_attr(not(target_os = "none"), inline(never))]
+fn poll_delay<L: Kind>(client: &mut Client<L, Lent, DEPTH>) -> u32 {
+    let now = client.line.parts().2.micros();
+    client.poll_delay(now)
+}
+
 /// How long mbm_client_poll will find nothing to do unless a byte arrives, so
 /// that a program may wait for one in select, or sleep, until then. Bytes are taken
 /// only while a request is pending: with none, wait for something else.
@@ -396,12 +395,11 @@ pub unsafe extern "C" fn mbm_client_poll(client: *mut mbm_client) -> u8 {
 pub unsafe extern "C" fn mbm_client_pollDelay(client: *const mbm_client) -> u32 {
     // SAFETY: as the header demands.
     unsafe {
-        pointers::ask(client, u32::MAX, |object| {
-            on_line!(object, client => {
-                let now = client.line.parts().2.micros();
-                client.poll_delay(now)
-            })
-        })
+        pointers::ask(
+            client,
+            u32::MAX,
+            |object| on_line!(object, client => poll_delay(client)),
+        )
     }
 }
 

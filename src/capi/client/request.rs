@@ -136,6 +136,7 @@ impl Job for Lent {
 
     // A microcontroller has the loop over bytes anyway.
     #[cfg(not(target_os = "none"))]
+    #[inline(always)]
     fn put_all(&mut self, bytes: &[u8]) {
         let inside = self.inside_mut();
         // SAFETY: the reply is not NULL and has room for `capacity` bytes, of which
@@ -145,19 +146,23 @@ impl Job for Lent {
             reply.copy_from_slice(bytes);
             return;
         }
-        // Four words at a time.
-        const LOW: u64 = 0x00FF_00FF_00FF_00FF;
-        let (mut places, mut fours) = (reply.chunks_exact_mut(8), bytes.chunks_exact(8));
-        for (place, four) in places.by_ref().zip(fours.by_ref()) {
-            if let (Ok(place), Ok(four)) = (<&mut [u8; 8]>::try_from(place), four.try_into()) {
-                let four = u64::from_ne_bytes(four);
-                *place = (((four & LOW) << 8) | ((four >> 8) & LOW)).to_ne_bytes();
-            }
+        let (words, places) = (bytes.as_chunks().0, reply.as_chunks_mut().0);
+        let native = |word| u16::from_be_bytes(word).to_ne_bytes();
+        // Eight at a time; the last eight may overlap the ones before.
+        for (place, eight) in places
+            .as_chunks_mut::<8>()
+            .0
+            .iter_mut()
+            .zip(words.as_chunks().0)
+        {
+            *place = eight.map(native);
         }
-        let rest = places.into_remainder().chunks_exact_mut(2);
-        for (place, word) in rest.zip(fours.remainder().chunks_exact(2)) {
-            if let (Ok(place), Ok(word)) = (<&mut [u8; 2]>::try_from(place), word.try_into()) {
-                *place = u16::from_be_bytes(word).to_ne_bytes();
+        match (places.last_chunk_mut(), words.last_chunk::<8>()) {
+            (Some(place), Some(eight)) => *place = eight.map(native),
+            _ => {
+                for (place, word) in places.iter_mut().zip(words) {
+                    *place = native(*word);
+                }
             }
         }
     }

@@ -1,0 +1,55 @@
+//! The response to the first request on a TCP stream, which is told in a way of its
+//! own.
+
+#[path = "common/stream.rs"]
+mod stream;
+
+use stream::{client, poll, read, requests, response};
+
+#[test]
+fn a_response_means_the_same_to_the_first_request_and_to_one_behind_it() {
+    let right = response((0, 1, 7));
+    let mut all = vec![right.clone()];
+    for at in 2..right.len() {
+        for change in [1, 0x80] {
+            let mut other = right.clone();
+            other[at] ^= change;
+            all.push(other);
+        }
+    }
+    for (length, shape) in [
+        (4, [3, 2, 0].as_slice()),
+        (6, &[3, 2, 0, 7, 0]),
+        (3, &[0x83, 2]),
+    ] {
+        let mut other = vec![0, 0, 0, 0, 0, length, 1];
+        other.extend(shape);
+        all.push(other);
+    }
+    for answer in all {
+        let [first, behind] = [0, 1].map(|others| {
+            let (end, mut client) = client();
+            for number in 0..=others {
+                assert!(client.queue(read(1, 7 + others - number)).is_ok());
+            }
+            poll(&end, &mut client);
+            let wire = requests(&end.sent())[usize::from(others)].0;
+            let mut answer = answer.clone();
+            answer[..2].copy_from_slice(&wire.to_be_bytes());
+            end.deliver(0, &answer);
+            let mut ended = Vec::new();
+            for _ in 0..10 {
+                ended.extend(poll(&end, &mut client));
+                end.pass(500_000);
+            }
+            let task = ended.iter().find(|task| task.ticket.transaction == 7);
+            let task = task.unwrap();
+            (
+                task.ticket.status,
+                task.ticket.exception,
+                task.received().to_vec(),
+            )
+        });
+        assert_eq!(first, behind, "{answer:?}");
+    }
+}
