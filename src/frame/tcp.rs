@@ -1,7 +1,6 @@
 //! TCP: the MBAP header and a PDU (messaging on TCP/IP guide V1.0b, 3.1.3).
 
 use super::Adu;
-use crate::bytes::Reader;
 use crate::error::Status;
 use core::cmp::Ordering;
 
@@ -32,22 +31,25 @@ pub struct Header {
 /// [`Status::INCOMPLETE_FRAME`] while bytes are missing,
 /// [`Status::MALFORMED_FRAME`] if this can be no Modbus TCP frame.
 pub fn header(bytes: &[u8]) -> Result<Header, Status> {
-    let mut reader = Reader::new(bytes);
-    let incomplete = Status::INCOMPLETE_FRAME;
-    let transaction = reader.u16().ok_or(incomplete)?;
-    if reader.u16().ok_or(incomplete)? != 0 {
-        return Err(Status::MALFORMED_FRAME);
+    let (total, rest) = match bytes {
+        [_, _, 0, 0, high, low, rest @ ..] => {
+            let total = HEADER + usize::from(u16::from_be_bytes([*high, *low]));
+            if !(PDU + 1..=MAX_FRAME).contains(&total) {
+                return Err(Status::MALFORMED_FRAME);
+            }
+            (total, rest)
+        }
+        [_, _, 0, 0, ..] | [] | [_] | [_, _] | [_, _, _] => return Err(Status::INCOMPLETE_FRAME),
+        _ => return Err(Status::MALFORMED_FRAME),
+    };
+    match (bytes.first_chunk(), rest) {
+        (Some(transaction), [unit, ..]) => Ok(Header {
+            transaction: u16::from_be_bytes(*transaction),
+            total,
+            unit: *unit,
+        }),
+        _ => Err(Status::INCOMPLETE_FRAME),
     }
-    let total = HEADER + usize::from(reader.u16().ok_or(incomplete)?);
-    if !(PDU + 1..=MAX_FRAME).contains(&total) {
-        return Err(Status::MALFORMED_FRAME);
-    }
-    let unit = reader.u8().ok_or(incomplete)?;
-    Ok(Header {
-        transaction,
-        total,
-        unit,
-    })
 }
 
 /// The frame that is the whole of `bytes`.
