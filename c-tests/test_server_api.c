@@ -20,6 +20,8 @@ static struct {
     size_t first, last, length;
     uint32_t now;
     int lost;
+    /* The most that is taken at once, 0 for all; and how often a drain is not done. */
+    unsigned piece, drains, draining;
 } wire;
 
 static int16_t wire_read(void *context, uint8_t *bytes, uint16_t capacity)
@@ -38,9 +40,21 @@ static int16_t wire_read(void *context, uint8_t *bytes, uint16_t capacity)
 static int16_t wire_write(void *context, const uint8_t *bytes, uint16_t length)
 {
     (void)context;
+    if (wire.piece && length > wire.piece)
+        length = (uint16_t)wire.piece;
     memcpy(wire.sent + wire.length, bytes, length);
     wire.length += length;
+    wire.draining = wire.drains;
     return (int16_t)length;
+}
+
+static uint8_t wire_flush(void *context)
+{
+    (void)context;
+    if (wire.draining == 0)
+        return 1;
+    wire.draining--;
+    return 0;
 }
 
 static uint32_t wire_micros(void *context)
@@ -49,7 +63,8 @@ static uint32_t wire_micros(void *context)
     return wire.now += 100;
 }
 
-static const mbm_port port = {.read = wire_read, .write = wire_write, .micros = wire_micros};
+static const mbm_port port = {
+    .read = wire_read, .write = wire_write, .micros = wire_micros, .flush = wire_flush};
 
 static int reset(void **state)
 {
@@ -69,11 +84,11 @@ static int reset(void **state)
 }
 
 /* Lets the frame of a PDU arrive, polls, and gives what was sent. */
-static size_t ask(const char *pdu, size_t length)
+static size_t ask(uint8_t to, const char *pdu, size_t length)
 {
     unsigned i;
 
-    wire.arriving[0] = 17;
+    wire.arriving[0] = to;
     memcpy(wire.arriving + 1, pdu, length);
     wire.first = wire.length = 0;
     wire.last = seal(wire.arriving, length + 1);
@@ -82,7 +97,8 @@ static size_t ask(const char *pdu, size_t length)
     return wire.length;
 }
 
-#define ASK(pdu) ask(pdu, sizeof pdu - 1)
+#define ASK(pdu) ask(17, pdu, sizeof pdu - 1)
+#define BROADCAST(pdu) ask(0, pdu, sizeof pdu - 1)
 
 static void an_object_that_was_never_begun_is_told(void **state)
 {
@@ -321,6 +337,82 @@ static void a_function_of_code_0_is_every_other(void **state)
     assert_int_equal(calls, 2);
 }
 
+static unsigned reads;
+
+static uint16_t count_reads(void *context, uint16_t address)
+{
+    (void)context;
+    (void)address;
+    return (uint16_t)++reads;
+}
+
+/* Serial line guide V1.02, 2.1. */
+static void a_broadcast_of_what_does_not_only_write_is_not_carried_out(void **state)
+{
+    static mbm_cells cells;
+
+    (void)state;
+    memset(&cells, 0, sizeof cells);
+    cells.get = count_reads;
+    custom.serve = own;
+    custom.context = &said;
+    said = 0;
+    calls = reads = 0;
+    OK(mbm_server_serveDiagnostics(&unit, &diagnostics));
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_server_serveMaskAndReadWrite(&table));
+    OK(mbm_server_serveCallbacks(&unit, &cells, 4));
+    OK(mbm_server_serveCustom(&unit, &custom));
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    diagnostics.diagnosticRegister = 7;
+    assert_int_equal(BROADCAST("\x17\0\0\0\1\0\0\0\1\2\x12\x34"), 0);
+    assert_int_equal(BROADCAST("\x08\0\x0A\0\0"), 0);
+    assert_int_equal(BROADCAST("\x04\0\0\0\1"), 0);
+    assert_int_equal(BROADCAST("\x2A"), 0);
+    assert_int_equal(words[0], 0);
+    assert_int_equal(diagnostics.diagnosticRegister, 7);
+    assert_int_equal(diagnostics.noResponses, 4);
+    assert_int_equal(calls + reads, 0);
+    /* What only writes is, and so are functions of users. */
+    assert_int_equal(BROADCAST("\x16\0\0\xFF\xFF\x12\x34"), 0);
+    assert_int_equal(BROADCAST("\x06\0\1\x56\x78"), 0);
+    assert_int_equal(BROADCAST("\x41"), 0);
+    assert_int_equal(words[1], 0x5678);
+    assert_int_equal(calls, 1);
+    assert_int_equal(diagnostics.noResponses, 7);
+    assert_int_equal(ASK("\x04\0\0\0\1"), 7);
+    assert_int_equal(reads, 1);
+}
+
+/* A unit without any service is none: the next one answers. */
+static void a_unit_without_a_service_is_passed_over(void **state)
+{
+    static mbm_unit units[2];
+
+    (void)state;
+    memset(units, 0, sizeof units);
+    units[1].id = 17;
+    OK(mbm_server_begin(&server, &port, units, 2, frame, sizeof frame));
+    assert_int_equal(ASK("\x03\0\0\0\1"), 0);
+    OK(mbm_server_serveHoldingRegisters(&units[1], &table));
+    assert_int_equal(ASK("\x03\0\0\0\1"), 7);
+    assert_int_equal(BROADCAST("\x06\0\1\x56\x78"), 0);
+    assert_int_equal(words[1], 0x5678);
+}
+
+static void a_response_that_the_port_takes_in_pieces_arrives_whole(void **state)
+{
+    (void)state;
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    for (wire.piece = 1; wire.piece < 9; wire.piece++) {
+        wire.drains = wire.piece % 3;
+        assert_int_equal(ASK("\x03\0\0\0\1"), 7);
+        assert_memory_equal(wire.sent, "\x11\x03\x02\0\0", 5);
+        assert_int_equal(wire.draining, 0);
+    }
+}
+
 static void the_length_of_ours_frames_rtu_over_tcp(void **state)
 {
     const mbm_rule rules[] = {{MBM_RULE_FIXED, 4, 0}, {MBM_RULE_COUNTED, 1, 1}, {MBM_RULE_SILENCE, 0, 0}};
@@ -410,6 +502,9 @@ int main(void)
         TEST(a_function_is_switched_off_and_on),
         TEST(a_function_of_ours_says_what_is_answered),
         TEST(a_function_of_code_0_is_every_other),
+        TEST(a_broadcast_of_what_does_not_only_write_is_not_carried_out),
+        TEST(a_unit_without_a_service_is_passed_over),
+        TEST(a_response_that_the_port_takes_in_pieces_arrives_whole),
         TEST(the_length_of_ours_frames_rtu_over_tcp),
         TEST(a_restart_is_told),
         TEST(a_lost_link_is_told_and_the_delay_is_that_of_the_line),

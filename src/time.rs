@@ -7,6 +7,9 @@
 /// a counter read beside its interrupt: in microseconds.
 const STEP_BACK: u32 = 0x1_0000;
 
+/// The longest time that may be waited for.
+pub const LONGEST: u32 = u32::MAX - STEP_BACK;
+
 /// 3.5 characters at 9600 baud, rounded up: the silence kept while nobody has
 /// told the baud rate.
 pub const DEFAULT_SILENCE: u32 = 4_000;

@@ -313,6 +313,60 @@ fn requests_in_a_stream_are_answered_in_turn() {
     assert_eq!(answers[2], tcp(3, &ANSWER[1..]));
 }
 
+/// Requests of 8 to 30 bytes, with the response of each.
+fn mixed() -> Vec<[Vec<u8>; 2]> {
+    let write = [&[0x10, 0, 100, 0, 8, 16][..], &[7; 16]].concat();
+    vec![
+        [tcp(1, &[7]), tcp(1, &[7, 0x6D])],
+        [tcp(2, &[7]), tcp(2, &[7, 0x6D])],
+        [tcp(3, &write), tcp(3, &write[..5])],
+        [
+            tcp(4, &[0x18, 4, 0xDE]),
+            tcp(4, &[0x18, 0, 6, 0, 2, 1, 0xB8, 0x12, 0x84]),
+        ],
+        [tcp(5, &READ[1..]), tcp(5, &[3, 2, 7, 7])],
+        [tcp(6, &[7]), tcp(6, &[7, 0x6D])],
+    ]
+}
+
+#[test]
+fn requests_in_a_stream_are_answered_however_it_is_cut() {
+    let (requests, wanted): (Vec<_>, Vec<_>) = mixed().into_iter().map(|[a, b]| (a, b)).unzip();
+    let stream = requests.concat();
+    for cut in 0..stream.len() {
+        let mut line = Line::new(Framing::Tcp);
+        let mut answers = Vec::new();
+        for piece in [&stream[..cut], &stream[cut..]] {
+            let now = line.wire.borrow().now;
+            let arriving = piece.iter().map(|byte| (now, *byte));
+            line.wire.borrow_mut().arriving.extend(arriving);
+            answers.extend(line.frames(1_000, 50));
+        }
+        assert_eq!(answers, wanted, "{cut}");
+    }
+}
+
+#[test]
+fn a_server_that_begins_anew_forgets_the_bytes_behind_a_short_request() {
+    let mut line = Line::new(Framing::Tcp);
+    let now = line.wire.borrow().now;
+    let bytes = [tcp(1, &[7]), vec![1, 2, 3, 4]].concat();
+    let arriving = bytes.iter().map(|byte| (now, *byte));
+    line.wire.borrow_mut().arriving.extend(arriving);
+    assert_eq!(line.frames(100, 50), [tcp(1, &[7, 0x6D])]);
+    line.server.begin_tcp();
+    line.arrive(0, &tcp(2, &READ[1..]));
+    assert_eq!(line.frames(20_000, 50), [tcp(2, &ANSWER[1..])]);
+}
+
+#[test]
+fn the_longest_silence_never_ends_a_frame() {
+    let mut line = Line::new(Framing::Rtu);
+    line.server.set_silence(u32::MAX);
+    line.arrive(0, &sealed(&READ));
+    assert_eq!(line.frames(3_000_000, 500), [[0; 0]; 0]);
+}
+
 #[test]
 fn one_byte_a_second_is_waited_for_over_tcp() {
     let mut line = Line::new(Framing::Tcp);

@@ -1,35 +1,11 @@
 /* A client and a server with everything: the ten functions, and every family
  * that a server serves, on a serial line in RTU and ASCII and over TCP. */
-#include "server.h"
-
-#ifndef WITHOUT_MBM
-static mbm_diagnostics diagnostics;
-static mbm_exceptionStatus exceptions;
-static mbm_serverId id;
-static mbm_files files;
-static mbm_fifos fifos;
-static mbm_identification identification;
-static mbm_custom custom;
-static mbm_cells cells;
-static mbm_switches switches;
-#endif
+#include "everything.h"
 
 int main(void)
 {
-    serve();
+    serve_everything();
     begin();
-    (void)CALL(mbm_server_serveMaskAndReadWrite(&holding));
-    (void)CALL(mbm_server_serveDiagnostics(&unit, &diagnostics));
-    (void)CALL(mbm_server_serveExceptionStatus(&unit, &exceptions));
-    (void)CALL(mbm_server_serveServerId(&unit, &id));
-    (void)CALL(mbm_server_serveFiles(&unit, &files));
-    (void)CALL(mbm_server_serveFifos(&unit, &fifos));
-    (void)CALL(mbm_server_serveIdentification(&unit, &identification));
-    (void)CALL(mbm_server_serveCustom(&unit, &custom));
-    (void)CALL(mbm_server_serveCallbacks(&unit, &cells, 3));
-    (void)CALL(mbm_server_switchOff(&unit, &switches, 8));
-    (void)CALL(mbm_server_beginAscii(&server, (const mbm_port *)0, &unit, 1, frame, sizeof frame));
-    (void)CALL(mbm_server_beginTcp(&server, (const mbm_port *)0, &unit, 1, frame, sizeof frame));
     for (;;) {
         uart = CALL(mbm_server_poll(&server));
         uart = CALL(mbm_master_readCoils(&node, 2, 10));

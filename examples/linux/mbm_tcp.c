@@ -19,6 +19,12 @@ enum { FREE, CONNECTING, CONNECTED, LOST };
  * peer that is gone while nothing is sent. While something is, milliseconds. */
 enum { QUIET_S = 15, PROBE_S = 5, PROBES = 3, UNANSWERED_MS = 30000 };
 
+/* Kept out of the way of what is done for every request. */
+#define SELDOM __attribute__((cold, noinline))
+
+static int16_t tcp_read(void *context, uint8_t *bytes, uint16_t capacity);
+static int16_t tcp_write(void *context, const uint8_t *bytes, uint16_t length);
+
 static int refuse(int error)
 {
     errno = error;
@@ -225,9 +231,8 @@ void mbm_tcp_disconnect(void *context)
         lose(tcp, ENOTCONN);
 }
 
-/* A signal and "try again" mean that nothing was moved; all else that the link
- * is gone. */
-static int16_t refused(mbm_tcp *tcp, ssize_t count)
+/* Nothing was moved, for a signal or for now; or else the link is gone. */
+SELDOM static int16_t nothing(mbm_tcp *tcp, ssize_t count)
 {
     if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR))
         return 0;
@@ -235,43 +240,61 @@ static int16_t refused(mbm_tcp *tcp, ssize_t count)
     return -1;
 }
 
-static int16_t outcome(mbm_tcp *tcp, ssize_t count)
+/* 1 if so many bytes may be moved at once. */
+static int is_ready(const mbm_tcp *tcp, uint16_t length)
 {
-    return count > 0 ? (int16_t)count : refused(tcp, count);
+    return tcp->state == CONNECTED && (int16_t)length > 0;
 }
 
-static size_t at_most(uint16_t length)
+SELDOM static int16_t read_slowly(mbm_tcp *tcp, uint8_t *bytes, uint16_t capacity)
 {
-    return length > INT16_MAX ? INT16_MAX : length;
-}
+    int there = progress(tcp);
 
-/* Of a read or write that moves nothing. */
-static int16_t nothing(mbm_tcp *tcp)
-{
-    return (int16_t)(progress(tcp) < 0 ? -1 : 0);
+    if (there <= 0 || capacity == 0)
+        return (int16_t)(there < 0 ? -1 : 0);
+    return tcp_read(tcp, bytes, capacity > INT16_MAX ? INT16_MAX : capacity);
 }
 
 static int16_t tcp_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     mbm_tcp *tcp = (mbm_tcp *)context;
+    ssize_t count;
 
-    if (tcp->state != CONNECTED || capacity == 0)
-        return nothing(tcp);
+    if (!is_ready(tcp, capacity))
+        return read_slowly(tcp, bytes, capacity);
     /* Who reads is not stuck with what is to be sent. */
     tcp->awaits = POLLIN;
-    return outcome(tcp, recv(tcp->fd, bytes, at_most(capacity), 0));
+    count = recv(tcp->fd, bytes, capacity, 0);
+    return count > 0 ? (int16_t)count : nothing(tcp, count);
+}
+
+SELDOM static int16_t write_slowly(mbm_tcp *tcp, const uint8_t *bytes, uint16_t length)
+{
+    int there = progress(tcp);
+    const uint8_t awaits = tcp->awaits;
+    int16_t taken;
+
+    if (there <= 0 || length == 0)
+        return (int16_t)(there < 0 ? -1 : 0);
+    if (length <= INT16_MAX)
+        return tcp_write(tcp, bytes, length);
+    /* More than can be said to be taken, so it is never all. */
+    taken = tcp_write(tcp, bytes, INT16_MAX);
+    if (taken >= 0)
+        tcp->awaits = (uint8_t)(awaits | POLLOUT);
+    return taken;
 }
 
 static int16_t tcp_write(void *context, const uint8_t *bytes, uint16_t length)
 {
     mbm_tcp *tcp = (mbm_tcp *)context;
-    ssize_t taken;
+    ssize_t count;
 
-    if (tcp->state != CONNECTED || length == 0)
-        return nothing(tcp);
-    taken = send(tcp->fd, bytes, at_most(length), MSG_NOSIGNAL);
-    tcp->awaits = taken == length ? POLLIN : (uint8_t)(tcp->awaits | POLLOUT);
-    return outcome(tcp, taken);
+    if (!is_ready(tcp, length))
+        return write_slowly(tcp, bytes, length);
+    count = send(tcp->fd, bytes, length, MSG_NOSIGNAL);
+    tcp->awaits = count == length ? POLLIN : (uint8_t)(tcp->awaits | POLLOUT);
+    return count > 0 ? (int16_t)count : nothing(tcp, count);
 }
 
 static uint32_t tcp_micros(void *context)

@@ -357,12 +357,9 @@ int mbm_tty_open(mbm_tty *tty, const char *path, uint32_t baud, char parity, int
     return mbm_tty_openWith(tty, path, &options);
 }
 
-/* A signal and "try again" mean that nothing was moved; all else that the
- * link is gone. */
-static int16_t outcome(mbm_tty *tty, ssize_t count)
+/* Nothing was moved, for a signal or for now; or else the link is gone. */
+static int16_t nothing(mbm_tty *tty, ssize_t count)
 {
-    if (count > 0)
-        return (int16_t)count;
     if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR))
         return 0;
     /* An end of file is the hang-up of a line. */
@@ -378,15 +375,23 @@ static size_t at_most(uint16_t length)
 static int16_t tty_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     mbm_tty *tty = (mbm_tty *)context;
+    ssize_t count;
 
-    return capacity == 0 ? 0 : outcome(tty, read(tty->fd, bytes, at_most(capacity)));
+    if (capacity == 0)
+        return 0;
+    count = read(tty->fd, bytes, at_most(capacity));
+    return count > 0 ? (int16_t)count : nothing(tty, count);
 }
 
 static int16_t tty_write(void *context, const uint8_t *bytes, uint16_t length)
 {
     mbm_tty *tty = (mbm_tty *)context;
+    ssize_t count;
 
-    return length == 0 ? 0 : outcome(tty, write(tty->fd, bytes, at_most(length)));
+    if (length == 0)
+        return 0;
+    count = write(tty->fd, bytes, at_most(length));
+    return count > 0 ? (int16_t)count : nothing(tty, count);
 }
 
 static uint32_t tty_micros(void *context)

@@ -23,6 +23,17 @@ const ASCII_TIMEOUT: u32 = time::millis(1000);
 /// What a frame that tells its length may take to arrive between two bytes.
 const STREAM_TIMEOUT: u32 = time::millis(500);
 
+/// The shortest TCP frame.
+const LEAST_TCP: usize = tcp::PDU + 1;
+
+/// What is taken of a TCP stream before its header is known: what most requests
+/// have, so that a host asks once. [`Server::keep_ahead`] puts aside 4 bytes.
+const AT_ONCE: usize = if cfg!(target_os = "none") {
+    LEAST_TCP
+} else {
+    LEAST_TCP + 4
+};
+
 /// What a PDU may take of a buffer for RTU. More than a PDU is room for the
 /// response of a user's function beside its request.
 pub(super) const fn rtu_room(buffer: usize) -> usize {
@@ -46,6 +57,16 @@ fn shift(bytes: &mut [u8], by: usize) {
     let cells = Cell::from_mut(bytes).as_slice_of_cells();
     for (to, from) in cells.iter().zip(cells.get(by..).unwrap_or_default()) {
         to.set(from.get());
+    }
+}
+
+/// The status of a port that gave no byte.
+#[inline(always)]
+fn nothing_heard(heard: i16) -> Status {
+    if heard < 0 {
+        Status::LINK_LOST
+    } else {
+        Status::OK
     }
 }
 
@@ -77,8 +98,9 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// Listens for TCP frames.
     pub fn begin_tcp(&mut self) {
         let room = tcp_room(self.lent.frame().len());
-        self.begin(tcp::PDU as u8, room, Self::receive_tcp, Self::seal_tcp);
-        self.set_silence(u32::MAX);
+        self.begin(tcp::PDU as u8, room, Self::receive_tcp, |server, length| {
+            server.seal_tcp(length)
+        });
     }
 
     /// A frame is what stands between two silences. Where there was silence that
@@ -86,14 +108,41 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// is followed by another is no longer waited for.
     fn receive_rtu(&mut self) -> Status {
         self.make_room();
-        let heard = self.hear(usize::MAX);
+        if cfg!(target_os = "none") {
+            let heard = self.hear(usize::MAX);
+            return if heard > 0 {
+                Status::OK
+            } else {
+                self.receive_no_more(heard)
+            };
+        }
+        let heard = self.take(usize::MAX);
+        if heard > 0 {
+            self.note(heard as u16);
+            return Status::OK;
+        }
+        self.receive_no_more(heard)
+    }
+
+    /// The port gave no byte: a frame has ended where that lasts.
+    #[cfg_attr(target_os = "none", inline(always))]
+    #[cfg_attr(not(target_os = "none"), inline(never))]
+    fn receive_no_more(&mut self, heard: i16) -> Status {
         if heard < 0 {
             return Status::LINK_LOST;
         }
-        if heard > 0 || self.end == 0 || !self.is_silent() {
+        if self.end == 0 || !self.is_silent() {
             return Status::OK;
         }
         self.last_frame()
+    }
+
+    /// True if what is sent comes back.
+    #[inline(always)]
+    pub(super) fn drops_echo(&self) -> bool {
+        let echoing: Receive<P, B> = Self::receive_behind_echo;
+        self.receive
+            .is_some_and(|receive| core::ptr::fn_addr_eq(receive, echoing))
     }
 
     /// Says whether the receiver hears what the driver sends, so that as many
@@ -132,10 +181,18 @@ impl<P: Port, B: Lent> Server<P, B> {
     }
 
     /// Gives up the oldest bytes of a full buffer, unless it ends with a frame.
+    #[inline(always)]
     fn make_room(&mut self) {
+        if usize::from(self.end) == self.lent.frame().len() {
+            self.slide();
+        }
+    }
+
+    #[cfg_attr(target_os = "none", inline(always))]
+    #[cfg_attr(not(target_os = "none"), cold)]
+    fn slide(&mut self) {
         let frame = self.lent.frame();
-        let length = frame.len();
-        if usize::from(self.end) == length && rtu::last(frame) == length {
+        if rtu::last(frame) == frame.len() {
             shift(frame, SLIDE);
             self.end -= SLIDE as u16;
             self.request.overrun = true;
@@ -146,6 +203,9 @@ impl<P: Port, B: Lent> Server<P, B> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn last_frame(&mut self) -> Status {
         let end = usize::from(self.end);
+        if cfg!(not(target_os = "none")) && self.crc.is_residue() && !self.request.overrun {
+            return self.found(end.saturating_sub(rtu::OVERHEAD));
+        }
         let Some(frame) = self.lent.frame().get_mut(..end) else {
             return Status::OK;
         };
@@ -154,9 +214,7 @@ impl<P: Port, B: Lent> Server<P, B> {
         } else {
             rtu::last(frame)
         };
-        if cfg!(target_os = "none") || start != 0 {
-            shift(frame, start);
-        }
+        shift(frame, start);
         self.found((end - start).saturating_sub(rtu::OVERHEAD))
     }
 
@@ -275,35 +333,117 @@ impl<P: Port, B: Lent> Server<P, B> {
     }
 
     /// Never more than one frame is taken from the stream, so that its response
-    /// has the whole buffer.
+    /// has the whole buffer; but for a few bytes behind a very short one.
     fn receive_tcp(&mut self) -> Status {
-        let mut until = tcp::PDU + 1;
+        if cfg!(not(target_os = "none")) && self.end == 0 {
+            // What most requests have.
+            if let Some(front) = self.lent.frame().first_chunk_mut::<AT_ONCE>() {
+                let heard = self.port.read(front);
+                if heard != AT_ONCE as i16 {
+                    return self.heard_less(heard);
+                }
+                self.end = AT_ONCE as u16;
+                let &mut [_, _, a, b, c, d, unit, ..] = front;
+                // Protocol identifier and length, judged below where they are rare.
+                let total = (u32::from_be_bytes([a, b, c, d]) as usize).wrapping_add(tcp::HEADER);
+                if total == AT_ONCE {
+                    return self.found_for(unit, (AT_ONCE - tcp::PDU) as u16);
+                }
+                if total > AT_ONCE && total <= tcp::MAX_FRAME {
+                    return self.receive_rest(total, unit);
+                }
+            }
+        }
+        self.receive_on()
+    }
+
+    /// Less than what most requests have has arrived, or nothing.
+    #[inline(never)]
+    fn heard_less(&mut self, heard: i16) -> Status {
+        if heard <= 0 {
+            return nothing_heard(heard);
+        }
+        self.end = heard as u16;
+        self.receive_on()
+    }
+
+    /// Takes what is left of a frame of `total` bytes.
+    #[inline(never)]
+    fn receive_rest(&mut self, total: usize, unit: u8) -> Status {
+        let heard = self.take(total);
+        if usize::from(self.end) == total {
+            return self.found_for(unit, (total - tcp::PDU) as u16);
+        }
+        if heard > 0 {
+            return self.receive_on();
+        }
+        nothing_heard(heard)
+    }
+
+    /// Goes on with what begins in the buffer.
+    #[cfg_attr(not(target_os = "none"), inline(never))]
+    fn receive_on(&mut self) -> Status {
         loop {
-            match tcp::header(
-                self.lent
-                    .frame()
-                    .get(..usize::from(self.end))
-                    .unwrap_or_default(),
-            ) {
+            let end = usize::from(self.end);
+            let mut until = AT_ONCE;
+            let frame = self.lent.frame();
+            match tcp::header(frame.get(..end).unwrap_or_default()) {
                 Ok(header) => until = header.total,
                 Err(Status::INCOMPLETE_FRAME) => {}
                 Err(_) => return self.give_up(),
             }
-            if usize::from(self.end) == until {
-                return self.found(until - tcp::PDU);
+            if end >= until {
+                return self.found_in_stream(until);
             }
-            let heard = self.hear(until);
+            let heard = if cfg!(target_os = "none") {
+                self.hear(until)
+            } else {
+                self.take(until)
+            };
             if heard <= 0 {
-                return if heard < 0 {
-                    Status::LINK_LOST
-                } else {
-                    Status::OK
-                };
+                return nothing_heard(heard);
             }
         }
     }
 
-    fn seal_tcp(&mut self, length: usize) -> usize {
+    /// The first frame of what arrived is of this length.
+    #[inline(always)]
+    fn found_in_stream(&mut self, length: usize) -> Status {
+        let end = usize::from(self.end);
+        if AT_ONCE > LEAST_TCP && end != length {
+            self.keep_ahead(length);
+        }
+        self.found(length - tcp::PDU)
+    }
+
+    /// Puts aside what stands behind a frame that is shorter than what is taken
+    /// at once.
+    #[cold]
+    fn keep_ahead(&mut self, length: usize) {
+        let end = usize::from(self.end);
+        let behind = self.lent.frame().get(length..end).unwrap_or_default();
+        let mut aside = [0; 4];
+        for (place, byte) in aside.iter_mut().zip(behind) {
+            *place = *byte;
+        }
+        self.last_byte = u32::from_ne_bytes(aside);
+        self.ahead = behind.len() as u8;
+    }
+
+    /// Begins the next frame with what was put aside.
+    #[cold]
+    pub(super) fn take_ahead(&mut self) {
+        let aside = self.last_byte.to_ne_bytes();
+        let count = core::mem::take(&mut self.ahead);
+        let aside = aside.get(..count.into()).unwrap_or_default();
+        for (place, byte) in self.lent.frame().iter_mut().zip(aside) {
+            *place = *byte;
+        }
+        self.end = count.into();
+    }
+
+    #[inline(always)]
+    pub(super) fn seal_tcp(&mut self, length: usize) -> usize {
         let [_, _, _, _, high, low] = match self.lent.frame().first_chunk_mut() {
             Some(header) => header,
             None => return 0,

@@ -8,7 +8,7 @@
 use super::{Heading, Reply, Units};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
-use crate::frame::{ascii, rtu, Framing};
+use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::custom::Rule;
 use crate::pdu::limits::MAX_PDU;
 use crate::port::Port;
@@ -54,12 +54,9 @@ enum Phase {
     Listen,
     /// A request is there, to be answered.
     Request,
-    /// Handing the response to the port; the driver is on.
+    /// Handing the response to the port, and waiting for the port to drain; the
+    /// driver is on.
     Send,
-    /// Waiting for the port to drain; the driver is on.
-    Flush,
-    /// What arrives is no Modbus.
-    Over,
 }
 
 /// Looks for a request in what arrives: [`Status::PENDING`] once there is one,
@@ -78,6 +75,8 @@ pub struct Server<P, B> {
     pub(super) astray: bool,
     /// Ends an ASCII frame.
     pub(super) delimiter: u8,
+    /// Over TCP: how many bytes of `last_byte` are the front of the next frame.
+    pub(super) ahead: u8,
     /// The CRC of what arrived.
     pub(super) crc: Crc16,
     /// Where in the buffer ends what arrived, or what is to be sent.
@@ -86,7 +85,8 @@ pub struct Server<P, B> {
     pub(super) sent: u16,
     /// The request that was found last.
     pub request: Heading,
-    last_byte: u32,
+    /// When the last byte arrived; see [`Server::keeps_time`].
+    pub(super) last_byte: u32,
     now: u32,
     /// The silence that ends a frame.
     silence: u32,
@@ -105,6 +105,7 @@ impl<P: Port, B: Lent> Server<P, B> {
             phase: Phase::Listen,
             astray: false,
             delimiter: ascii::END,
+            ahead: 0,
             crc: Crc16::START,
             end: 0,
             sent: 0,
@@ -145,46 +146,65 @@ impl<P: Port, B: Lent> Server<P, B> {
         self.request.room = room as u16;
         self.receive = Some(receive);
         self.seal = Some(seal);
+        self.ahead = 0;
         self.listen();
     }
 
     /// Sets the silence that ends a frame, in microseconds: t3.5 for RTU, the
     /// inter-character timeout for ASCII.
     pub fn set_silence(&mut self, microseconds: u32) {
-        self.silence = microseconds;
+        self.silence = microseconds.min(time::LONGEST);
     }
 
     /// Waits for the next request.
     #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn listen(&mut self) {
         self.phase = Phase::Listen;
         self.end = 0;
         self.request.overrun = false;
         self.astray = false;
         self.crc = Crc16::START;
+        if cfg!(not(target_os = "none")) && self.ahead != 0 {
+            self.take_ahead();
+        }
+    }
+
+    /// False if [`Server::poll`] may be told any time: over TCP nothing hangs on it.
+    #[inline(always)]
+    pub(crate) fn keeps_time(&self) -> bool {
+        usize::from(self.request.head) != tcp::PDU
     }
 
     /// Moves the server on to the time `now`, without waiting:
     /// [`Status::PENDING`] if there is a request to be answered,
     /// [`Status::LINK_LOST`], [`Status::MALFORMED_FRAME`] if the stream is none
     /// of Modbus TCP, else [`Status::OK`].
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn poll(&mut self, now: u32) -> Status {
         self.now = now;
+        if self.phase != Phase::Listen {
+            return self.poll_on();
+        }
+        match self.receive {
+            Some(receive) => receive(self),
+            None => Status::NOT_INITIALISED,
+        }
+    }
+
+    /// [`Server::poll`] of a server that does not listen.
+    #[cfg_attr(not(target_os = "none"), inline(never))]
+    fn poll_on(&mut self) -> Status {
         match self.phase {
-            Phase::Listen => match self.receive {
-                Some(receive) => receive(self),
-                None => Status::NOT_INITIALISED,
-            },
+            Phase::Listen => Status::OK,
             Phase::Request => Status::PENDING,
             Phase::Send => self.send(),
-            Phase::Flush => self.flush(),
-            Phase::Over => Status::MALFORMED_FRAME,
         }
     }
 
     /// Nothing more is to be expected of this stream.
     pub(super) fn give_up(&mut self) -> Status {
-        self.phase = Phase::Over;
+        self.receive = Some(|_| Status::MALFORMED_FRAME);
         Status::MALFORMED_FRAME
     }
 
@@ -215,10 +235,39 @@ impl<P: Port, B: Lent> Server<P, B> {
         heard
     }
 
+    /// So many bytes have arrived of an RTU frame, up to the end of what has: what
+    /// [`Server::hear`] does behind [`Server::take`].
+    #[inline(never)]
+    pub(super) fn note(&mut self, heard: u16) {
+        self.last_byte = self.now;
+        let frame = self.lent.frame();
+        if let Some(news) = frame.get(usize::from(self.end - heard)..usize::from(self.end)) {
+            self.crc = self.crc.with(news);
+        }
+    }
+
+    /// As [`Server::hear`], without CRC and time.
+    #[inline(always)]
+    pub(super) fn take(&mut self, until: usize) -> i16 {
+        let frame = self.lent.frame();
+        let until = until.min(frame.len());
+        let Some(room) = frame.get_mut(usize::from(self.end)..until) else {
+            return 0;
+        };
+        if room.is_empty() {
+            return 0;
+        }
+        let heard = self.port.read(room);
+        if heard > 0 {
+            self.end += heard as u16;
+        }
+        heard
+    }
+
     /// True once the line has been silent for as long as ends a frame.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn is_silent(&self) -> bool {
-        elapsed(self.now, self.last_byte) >= self.silence
+        time::has_elapsed(self.silence, self.now, self.last_byte)
     }
 
     /// How long, in microseconds from `now`, poll will find nothing to do unless
@@ -226,11 +275,10 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// response, 1000: to go on sooner, poll when that has changed.
     pub fn poll_delay(&self, now: u32) -> u32 {
         match self.phase {
-            Phase::Listen if self.end == 0 || self.silence == u32::MAX => u32::MAX,
+            Phase::Listen if self.end == 0 || !self.keeps_time() => u32::MAX,
             Phase::Listen => self.silence.saturating_sub(elapsed(now, self.last_byte)),
-            Phase::Over => u32::MAX,
             // On a line no byte and no driver may be late.
-            Phase::Send | Phase::Flush if self.request.serial => 0,
+            Phase::Send if self.request.serial => 0,
             _ => NOT_BY_ITSELF,
         }
     }
@@ -240,8 +288,16 @@ impl<P: Port, B: Lent> Server<P, B> {
     pub(super) fn found(&mut self, length: usize) -> Status {
         let head = usize::from(self.request.head);
         let unit = self.lent.frame().get(head - 1);
-        self.request.to = unit.copied().unwrap_or(0);
-        self.request.length = if length > MAX_PDU { 0 } else { length as u16 };
+        let unit = unit.copied().unwrap_or(0);
+        self.found_for(unit, if length > MAX_PDU { 0 } else { length as u16 })
+    }
+
+    /// As [`Server::found`], for this unit, with a length that a PDU has.
+    #[inline(always)]
+    pub(super) fn found_for(&mut self, unit: u8, length: u16) -> Status {
+        self.request.to = unit;
+        self.request.length = length;
+        self.request.again = false;
         self.phase = Phase::Request;
         Status::PENDING
     }
@@ -265,8 +321,8 @@ impl<P: Port, B: Lent> Server<P, B> {
             }
             let heading = self.request;
             let reply = units.serve(&heading, self.pdu());
-            if !self.answer(reply) {
-                break;
+            if let Some(status) = self.conclude(reply) {
+                return status;
             }
         }
         Status::OK
@@ -275,8 +331,8 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// Takes the reply to the request: a response stands where its PDU stood.
     /// False, with the request kept, for [`Reply::PENDING`].
     pub fn answer(&mut self, reply: Reply) -> bool {
-        self.request.again = reply == Reply::PENDING;
-        if self.request.again {
+        if reply == Reply::PENDING {
+            self.request.again = true;
             return false;
         }
         let head = usize::from(self.request.head);
@@ -296,34 +352,117 @@ impl<P: Port, B: Lent> Server<P, B> {
         true
     }
 
-    #[cfg_attr(target_os = "none", inline(never))]
-    fn send(&mut self) -> Status {
-        let frame = self.lent.frame();
-        let Some(rest) = frame.get(usize::from(self.sent)..usize::from(self.end)) else {
-            return Status::OK;
+    /// As [`Server::answer`], and what to return, unless [`Server::poll`] is to go
+    /// on: it sends, or looks for the next request.
+    #[inline(always)]
+    pub(crate) fn conclude(&mut self, reply: Reply) -> Option<Status> {
+        if !cfg!(target_os = "none") {
+            return self.answer_at_once(reply);
+        }
+        if self.answer(reply) {
+            None
+        } else {
+            Some(Status::OK)
+        }
+    }
+
+    /// As [`Server::conclude`], and sends what it can, for a host, which saves a turn
+    /// of [`Server::poll`].
+    #[inline(always)]
+    pub(crate) fn answer_at_once(&mut self, reply: Reply) -> Option<Status> {
+        let mut length = reply.response_length();
+        if length == 0 {
+            length = match reply.exception_code() {
+                0 if reply != Reply::NOT_MINE => return self.answer_nothing(reply),
+                _ => self.settle(reply),
+            };
+        }
+        self.port.pre_transmission();
+        let end = match self.seal {
+            Some(seal) if self.keeps_time() => {
+                let end = seal(self, length);
+                self.expect_echo(end as u16);
+                end
+            }
+            _ => self.seal_tcp(length),
         };
-        let sent = self.port.write(rest);
+        let Some(frame) = self.lent.frame().get(..end) else {
+            self.end_transmission();
+            return None;
+        };
+        let sent = self.port.write(frame);
+        if usize::from(sent as u16) != end || !self.port.flush() {
+            return Some(self.sent_some(end, sent));
+        }
+        self.end_transmission();
+        Some(Status::OK)
+    }
+
+    /// Where what is sent comes back, it comes from here on.
+    #[inline(never)]
+    fn expect_echo(&mut self, bytes: u16) {
+        if self.drops_echo() {
+            self.last_byte = self.port.micros();
+            self.sent = bytes;
+        }
+    }
+
+    /// The port took so many of the bytes of a response at once, or is lost.
+    #[cold]
+    fn sent_some(&mut self, end: usize, sent: i16) -> Status {
+        self.end = end as u16;
+        self.sent = sent.max(0) as u16;
         if sent < 0 {
-            self.port.post_transmission();
-            self.listen();
+            self.end_transmission();
             return Status::LINK_LOST;
         }
-        self.sent += sent as u16;
-        if self.sent < self.end {
-            return Status::OK;
+        self.phase = Phase::Send;
+        Status::OK
+    }
+
+    #[cold]
+    fn answer_nothing(&mut self, reply: Reply) -> Option<Status> {
+        if self.answer(reply) {
+            None
+        } else {
+            Some(Status::OK)
         }
-        self.phase = Phase::Flush;
-        self.flush()
+    }
+
+    #[inline(never)]
+    fn settle(&mut self, reply: Reply) -> usize {
+        reply.settle(self.pdu())
     }
 
     #[cfg_attr(target_os = "none", inline(never))]
-    fn flush(&mut self) -> Status {
+    fn send(&mut self) -> Status {
+        let frame = self.lent.frame();
+        let rest = frame.get(usize::from(self.sent)..usize::from(self.end));
+        let rest = rest.unwrap_or_default();
+        if !rest.is_empty() {
+            let sent = self.port.write(rest);
+            if sent < 0 {
+                self.end_transmission();
+                return Status::LINK_LOST;
+            }
+            self.sent += sent as u16;
+            if self.sent < self.end {
+                return Status::OK;
+            }
+        }
         if self.port.flush() {
-            self.port.post_transmission();
             // An echo, where one is waited for, comes from here on.
-            self.last_byte = self.now;
-            self.listen();
+            if cfg!(target_os = "none") || self.keeps_time() {
+                self.last_byte = self.now;
+            }
+            self.end_transmission();
         }
         Status::OK
+    }
+
+    #[cfg_attr(not(target_os = "none"), inline(always))]
+    fn end_transmission(&mut self) {
+        self.port.post_transmission();
+        self.listen();
     }
 }

@@ -62,6 +62,17 @@ impl Reply {
         }
     }
 
+    /// The length of a response that stands where the request stood; 0 for any
+    /// other reply.
+    #[inline(always)]
+    pub(super) const fn response_length(self) -> usize {
+        if self.0 <= 0xFF {
+            self.0 as usize
+        } else {
+            0
+        }
+    }
+
     /// Writes an exception response over the request at the front of `pdu`.
     /// Returns the length of the response; 0 if there is none.
     #[cfg_attr(target_os = "none", inline(never))]

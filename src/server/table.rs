@@ -6,15 +6,12 @@
 //! at all.
 
 use super::Reply;
-use crate::pdu::bits::{READ_COILS, WRITE_MULTIPLE_COILS, WRITE_SINGLE_COIL};
+use crate::pdu::bits::{WRITE_MULTIPLE_COILS, WRITE_SINGLE_COIL};
 use crate::pdu::limits::{
     MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_BITS,
     MAX_WRITE_REGISTERS,
 };
-use crate::pdu::registers::{
-    MASK_WRITE_REGISTER, READ_WRITE_MULTIPLE_REGISTERS, WRITE_MULTIPLE_REGISTERS,
-    WRITE_SINGLE_REGISTER,
-};
+use crate::pdu::registers::{MASK_WRITE_REGISTER, READ_WRITE_MULTIPLE_REGISTERS};
 
 /// Which table, by the function that reads it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -48,12 +45,12 @@ impl Kind {
 
     /// Data bytes of so many cells, if those are no more than a request has.
     const fn bytes(self, quantity: u16) -> usize {
-        let bytes = if self.is_bits() {
+        let quantity = quantity as usize;
+        if self.is_bits() {
             quantity.wrapping_add(7) >> 3
         } else {
             quantity << 1
-        };
-        bytes as usize
+        }
     }
 }
 
@@ -76,6 +73,11 @@ pub trait Cells {
     /// high byte first, bits lowest first, unused bits 0.
     fn transfer(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]);
 
+    /// False if nobody is asked before cells are written, nor told.
+    fn has_hooks(&self) -> bool {
+        true
+    }
+
     /// Asked before cells are written, with the data as on the wire; an
     /// exception code refuses, 0 allows.
     fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
@@ -89,149 +91,235 @@ pub trait Cells {
     }
 }
 
-/// Serves a request for a table, if it is one: the request PDU is the front
-/// `length` bytes of `pdu`, which the response overwrites.
+/// What serving a request needs of [`Cells`]; an object, so that firmware carries
+/// what serves less common functions once for all kinds of them.
+pub trait Access {
+    /// As [`Cells::covers`].
+    fn has(&self, address: u16, quantity: u16) -> bool;
+
+    /// Moves cells that are there, hooks around it where they are written: the
+    /// exception code of a hook that refuses, or 0.
+    fn access(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) -> u8;
+}
+
+impl<T: Cells> Access for T {
+    #[inline(always)]
+    fn has(&self, address: u16, quantity: u16) -> bool {
+        self.covers(address, quantity)
+    }
+
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
+    fn access(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) -> u8 {
+        let writes = way == Way::Write;
+        // A host keeps what hooks need out of the way of what needs none.
+        if cfg!(not(target_os = "none")) && writes && self.has_hooks() {
+            return write_with_hooks(self, address, quantity, data);
+        }
+        if cfg!(target_os = "none") && writes {
+            let refused = self.before(address, quantity, data);
+            if refused != 0 {
+                return refused;
+            }
+        }
+        self.transfer(way, address, quantity, data);
+        if cfg!(target_os = "none") && writes {
+            self.after(address, quantity);
+        }
+        0
+    }
+}
+
 #[inline(never)]
-pub fn serve(kind: Kind, cells: &mut impl Cells, pdu: &mut [u8], length: usize) -> Reply {
-    let Some(&[function, a, b, c, d, count]) = pdu.first_chunk() else {
-        return Reply::NOT_MINE;
-    };
-    if kind_of(function) != kind.0 {
-        return Reply::NOT_MINE;
+fn write_with_hooks(cells: &mut impl Cells, address: u16, quantity: u16, data: &mut [u8]) -> u8 {
+    let refused = cells.before(address, quantity, data);
+    if refused == 0 {
+        cells.transfer(Way::Write, address, quantity, data);
+        cells.after(address, quantity);
     }
-    let address = u16::from_be_bytes([a, b]);
-    let mut quantity = u16::from_be_bytes([c, d]);
-    let bits = kind.is_bits();
-    let several = function > WRITE_SINGLE_REGISTER;
-    let most = match (bits, function < WRITE_SINGLE_COIL) {
-        (true, true) => MAX_READ_BITS,
-        (true, false) => MAX_WRITE_BITS,
-        (false, true) => MAX_READ_REGISTERS,
-        (false, false) => MAX_WRITE_REGISTERS,
-    };
-    if !several && function >= WRITE_SINGLE_COIL {
-        // A coil is on with FF00, and off with 0000.
-        quantity = u16::from(!bits || quantity == 0 || quantity == 0xFF00);
+    refused
+}
+
+/// What a request does to a table: where in its PDU, or in that of its response,
+/// the data of cells stand.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(transparent)]
+pub struct Role(u8);
+
+impl Role {
+    /// Nothing.
+    pub const NONE: Role = Role(0);
+    /// Reads cells.
+    pub const READ: Role = Role(2);
+    /// Writes one.
+    pub const WRITE_ONE: Role = Role(3);
+    /// Writes any number.
+    pub const WRITE_SEVERAL: Role = Role(6);
+}
+
+/// Data bytes of the most cells that are read, and that are written: as many of
+/// bits as of registers.
+const MAX_READ: usize = 2 * MAX_READ_REGISTERS as usize;
+const MAX_WRITTEN: usize = 2 * MAX_WRITE_REGISTERS as usize;
+const _: () = assert!(MAX_READ * 8 == MAX_READ_BITS as usize);
+const _: () = assert!(MAX_WRITTEN * 8 == MAX_WRITE_BITS as usize);
+
+/// What a function does to a table of this kind.
+#[inline(always)]
+pub(crate) const fn role(kind: Kind, function: u8) -> Role {
+    if function == kind.0 {
+        return Role::READ;
     }
-    let bytes = kind.bytes(quantity);
-    // Where the data to write stand.
-    let (mut at, mut expected) = (3, 5);
-    if several {
-        at = 6;
-        expected = 6 + bytes;
-        if bytes != usize::from(count) {
-            quantity = 0;
+    // The functions that write come in pairs, for coils and holding registers.
+    if kind.0 & 1 != 0 {
+        match function.wrapping_sub(kind.0 >> 1) {
+            WRITE_SINGLE_COIL => return Role::WRITE_ONE,
+            WRITE_MULTIPLE_COILS => return Role::WRITE_SEVERAL,
+            _ => {}
         }
     }
-    if length != expected || quantity.wrapping_sub(1) >= most {
+    Role::NONE
+}
+
+/// Serves a request for a table, if it is one: the request PDU is the front
+/// `length` bytes of `pdu`, which the response overwrites.
+#[cfg_attr(target_os = "none", inline(never))]
+pub fn serve(kind: Kind, cells: &mut impl Access, pdu: &mut [u8], length: usize) -> Reply {
+    let function = pdu.first().copied().unwrap_or(0);
+    serve_as(role(kind, function), kind, cells, pdu, length)
+}
+
+/// As [`serve`], of a request that does this to the table.
+#[inline(always)]
+pub fn serve_as(
+    role: Role,
+    kind: Kind,
+    cells: &mut impl Access,
+    pdu: &mut [u8],
+    length: usize,
+) -> Reply {
+    if role == Role::NONE {
+        return Reply::NOT_MINE;
+    }
+    let Some(&[_, a, b, c, d, count]) = pdu.first_chunk() else {
+        return Reply::NOT_MINE;
+    };
+    let address = u16::from_be_bytes([a, b]);
+    let mut quantity = u16::from_be_bytes([c, d]);
+    if role == Role::WRITE_ONE {
+        // A coil is on with FF00, and off with 0000.
+        let is_right = !kind.is_bits() || quantity == 0 || quantity == 0xFF00;
+        quantity = is_right.into();
+    }
+    // So that the bytes are not more than can be counted.
+    if quantity > MAX_READ_BITS {
         return Reply::ILLEGAL_DATA_VALUE;
     }
-    if !cells.covers(address, quantity) {
+    let bytes = kind.bytes(quantity);
+    let (mut end, mut most) = (5, MAX_READ);
+    if role == Role::WRITE_SEVERAL {
+        (end, most) = (6 + usize::from(count), MAX_WRITTEN);
+        if bytes != usize::from(count) {
+            return Reply::ILLEGAL_DATA_VALUE;
+        }
+    }
+    if length != end || bytes.wrapping_sub(1) >= most {
+        return Reply::ILLEGAL_DATA_VALUE;
+    }
+    if !cells.has(address, quantity) {
         return Reply::ILLEGAL_DATA_ADDRESS;
     }
-    if function == kind.0 {
-        return read(cells, pdu, address, quantity, bytes);
-    }
+    let at = usize::from(role.0);
     let Some(data) = pdu.get_mut(at..at + bytes) else {
         return Reply::SERVER_DEVICE_FAILURE;
     };
-    write_cells(cells, address, quantity, data, 5)
-}
-
-/// The kind of the table that a function is about; 0 if it is about none. (Not a
-/// match: a microcontroller would keep a table of it.)
-pub(crate) const fn kind_of(function: u8) -> u8 {
-    // The functions that write come in pairs, for coils and holding registers.
-    let (first, next) = if function >= WRITE_MULTIPLE_COILS {
-        (WRITE_MULTIPLE_COILS, WRITE_MULTIPLE_REGISTERS)
-    } else if function >= WRITE_SINGLE_COIL {
-        (WRITE_SINGLE_COIL, WRITE_SINGLE_REGISTER)
-    } else {
-        return function;
-    };
-    if function > next {
-        return 0;
+    if role == Role::READ {
+        cells.access(Way::Read, address, quantity, data);
+        return counted(pdu, bytes);
     }
-    READ_COILS + 2 * (function - first)
+    match cells.access(Way::Write, address, quantity, data) {
+        0 => Reply::length(5),
+        refused => Reply::exception(refused),
+    }
 }
 
-/// Writes the response of a read: behind the function a byte count and data.
-fn read(
-    cells: &mut impl Cells,
-    pdu: &mut [u8],
-    address: u16,
-    quantity: u16,
-    bytes: usize,
-) -> Reply {
-    let Some([_, count, data @ ..]) = pdu.get_mut(..2 + bytes) else {
-        return Reply::SERVER_DEVICE_FAILURE;
-    };
-    *count = bytes as u8;
-    cells.transfer(Way::Read, address, quantity, data);
+/// The response of a read whose data are there.
+#[inline(always)]
+fn counted(pdu: &mut [u8], bytes: usize) -> Reply {
+    if let Some(count) = pdu.get_mut(1) {
+        *count = bytes as u8;
+    }
     Reply::length(2 + bytes)
 }
 
-/// Writes cells that are there from data as on the wire, hooks around it; the
-/// response is of `length`.
-fn write_cells(
-    cells: &mut impl Cells,
-    address: u16,
-    quantity: u16,
-    data: &mut [u8],
-    length: usize,
-) -> Reply {
-    let refused = cells.before(address, quantity, data);
-    if refused != 0 {
-        return Reply::exception(refused);
-    }
-    cells.transfer(Way::Write, address, quantity, data);
-    cells.after(address, quantity);
-    Reply::length(length)
+/// True for functions that [`serve_more`] serves.
+#[inline(always)]
+pub(crate) const fn is_more(function: u8) -> bool {
+    matches!(
+        function,
+        MASK_WRITE_REGISTER | READ_WRITE_MULTIPLE_REGISTERS
+    )
 }
 
 /// Serves 16 and 17 for holding registers, as [`serve`].
 #[cfg_attr(target_os = "none", inline(never))]
-pub fn serve_more(cells: &mut impl Cells, pdu: &mut [u8], length: usize) -> Reply {
-    let kind = Kind::HOLDING_REGISTERS;
-    let Some(&[function, a, b, c, d, e, f, g, h, count]) = pdu.first_chunk() else {
-        return Reply::NOT_MINE;
-    };
-    let words = [[a, b], [c, d], [e, f], [g, h]].map(u16::from_be_bytes);
-    let [address, quantity, write_address, written] = words;
-    match function {
-        MASK_WRITE_REGISTER if length != 7 => Reply::ILLEGAL_DATA_VALUE,
-        MASK_WRITE_REGISTER if !cells.covers(address, 1) => Reply::ILLEGAL_DATA_ADDRESS,
-        MASK_WRITE_REGISTER => {
-            // The second word is the AND mask, the third the OR mask.
-            let mut value = [0; 2];
-            cells.transfer(Way::Read, address, 1, &mut value);
-            let value = u16::from_be_bytes(value);
-            let value = (value & quantity) | (write_address & !quantity);
-            write_cells(cells, address, 1, &mut value.to_be_bytes(), 7)
-        }
-        READ_WRITE_MULTIPLE_REGISTERS => {
-            let bytes = usize::from(count);
-            if quantity.wrapping_sub(1) >= MAX_READ_REGISTERS
-                || written.wrapping_sub(1) >= MAX_READ_WRITE_REGISTERS
-                || bytes != kind.bytes(written)
-                || length != 10 + bytes
-            {
-                return Reply::ILLEGAL_DATA_VALUE;
-            }
-            if !cells.covers(address, quantity) || !cells.covers(write_address, written) {
-                return Reply::ILLEGAL_DATA_ADDRESS;
-            }
-            // Nothing is written that could not be answered.
-            if pdu.len() < 2 + kind.bytes(quantity) {
-                return Reply::SERVER_DEVICE_FAILURE;
-            }
-            let data = pdu.get_mut(10..length).unwrap_or_default();
-            let reply = write_cells(cells, write_address, written, data, 0);
-            if reply.exception_code() != 0 {
-                return reply;
-            }
-            read(cells, pdu, address, quantity, kind.bytes(quantity))
-        }
+pub fn serve_more(cells: &mut (impl Access + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
+    match pdu.first() {
+        Some(&MASK_WRITE_REGISTER) => mask_write(cells, pdu, length),
+        Some(&READ_WRITE_MULTIPLE_REGISTERS) => read_write(cells, pdu, length),
         _ => Reply::NOT_MINE,
     }
+}
+
+fn mask_write(cells: &mut (impl Access + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
+    let Some(&[_, a, b, c, d, e, f]) = pdu.first_chunk().filter(|_| length == 7) else {
+        return Reply::ILLEGAL_DATA_VALUE;
+    };
+    let address = u16::from_be_bytes([a, b]);
+    let mut value = [0; 2];
+    if !cells.has(address, 1) {
+        return Reply::ILLEGAL_DATA_ADDRESS;
+    }
+    cells.access(Way::Read, address, 1, &mut value);
+    // The AND mask, and the OR mask.
+    let [high, low] = &mut value;
+    *high = (*high & c) | (e & !c);
+    *low = (*low & d) | (f & !d);
+    match cells.access(Way::Write, address, 1, &mut value) {
+        0 => Reply::length(7),
+        refused => Reply::exception(refused),
+    }
+}
+
+fn read_write(cells: &mut (impl Access + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
+    let kind = Kind::HOLDING_REGISTERS;
+    let Some(&[_, a, b, c, d, e, f, g, h, count]) = pdu.first_chunk() else {
+        return Reply::SERVER_DEVICE_FAILURE;
+    };
+    let (address, quantity) = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
+    let (write_address, written) = (u16::from_be_bytes([e, f]), u16::from_be_bytes([g, h]));
+    let bytes = usize::from(count);
+    if quantity.wrapping_sub(1) >= MAX_READ_REGISTERS
+        || written.wrapping_sub(1) >= MAX_READ_WRITE_REGISTERS
+        || bytes != kind.bytes(written)
+        || length != 10 + bytes
+    {
+        return Reply::ILLEGAL_DATA_VALUE;
+    }
+    if !cells.has(address, quantity) || !cells.has(write_address, written) {
+        return Reply::ILLEGAL_DATA_ADDRESS;
+    }
+    // Nothing is written that could not be answered.
+    let bytes = kind.bytes(quantity);
+    if pdu.len() < 2 + bytes {
+        return Reply::SERVER_DEVICE_FAILURE;
+    }
+    let data = pdu.get_mut(10..length).unwrap_or_default();
+    let refused = cells.access(Way::Write, write_address, written, data);
+    if refused != 0 {
+        return Reply::exception(refused);
+    }
+    let data = pdu.get_mut(2..2 + bytes).unwrap_or_default();
+    cells.access(Way::Read, address, quantity, data);
+    counted(pdu, bytes)
 }

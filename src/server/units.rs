@@ -53,14 +53,20 @@ impl Heading {
 
     /// What the frame is, to a unit that it is for if it is for one.
     pub const fn concern(&self, function: u8) -> Concern {
+        match self.concern_of_all() {
+            Concern::Broadcast if !only_writes(function) => Concern::Foreign,
+            concern => concern,
+        }
+    }
+
+    /// As [`Heading::concern`], of any function.
+    pub const fn concern_of_all(&self) -> Concern {
         if self.length == 0 {
             Concern::Foreign
-        } else if !self.is_broadcast() {
-            Concern::Own
-        } else if only_writes(function) {
+        } else if self.is_broadcast() {
             Concern::Broadcast
         } else {
-            Concern::Foreign
+            Concern::Own
         }
     }
 

@@ -1,9 +1,9 @@
 //! The four tables, cell by cell, where the caller's callbacks hold them.
 
-use super::units::{add, request};
+use super::units::{add, is_unheard, request};
 use super::{mbm_service, mbm_unit};
 use crate::error::Status;
-use crate::server::table::{self, Cells, Kind, Way};
+use crate::server::table::{self, Access, Cells, Kind, Way};
 use crate::server::Reply;
 use core::ffi::c_void;
 
@@ -139,12 +139,18 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, heading: *co
     unsafe {
         let record = service.cast::<mbm_cells>();
         let kind = Kind::from_code((*record).kind);
+        if is_unheard(heading, *pdu) {
+            return Reply::NOT_MINE.code();
+        }
+        let is_more = kind == Kind::HOLDING_REGISTERS && table::is_more(*pdu);
         let (pdu, length) = request(pdu, heading);
         let mut cells = ByC(record);
-        let mut reply = table::serve(kind, &mut cells, pdu, length);
-        if reply == Reply::NOT_MINE && kind == Kind::HOLDING_REGISTERS {
-            reply = table::serve_more(&mut cells, pdu, length);
-        }
+        let reply = if is_more {
+            let cells: &mut dyn Access = &mut cells;
+            table::serve_more(cells, pdu, length)
+        } else {
+            table::serve(kind, &mut cells, pdu, length)
+        };
         reply.code()
     }
 }

@@ -1,6 +1,6 @@
 //! Functions that the caller defines, and functions switched off.
 
-use super::units::{add, add_first, request};
+use super::units::{add, add_first, is_unheard, request};
 use super::{mbm_service, mbm_unit};
 use crate::capi::functions::{self, mbm_rule};
 use crate::error::Status;
@@ -81,7 +81,7 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, heading: *co
         let to = (*heading.cast::<Heading>()).to;
         let (pdu, length) = request(pdu, heading);
         let function = pdu.first().copied().unwrap_or(0);
-        if (*record).code != 0 && (*record).code != function {
+        if (*record).code != 0 && (*record).code != function || is_unheard(heading, function) {
             return Reply::NOT_MINE.code();
         }
         let Some(handler) = (*record).serve else {

@@ -1,6 +1,6 @@
 //! Counters of a line, listen only mode and event log.
 
-use super::units::{add, request, walk};
+use super::units::{add, is_unheard, request, walk};
 use super::{mbm_service, mbm_unit};
 use crate::error::Status;
 use crate::server::diagnostics::{Diagnostics, Restart};
@@ -98,7 +98,7 @@ unsafe extern "C" fn monitor(
         let record = (*unit).diagnostics;
         let concern = match concern {
             1 => Concern::Own,
-            2 => Concern::Broadcast,
+            2 if !is_unheard(heading, *pdu) => Concern::Broadcast,
             _ => Concern::Foreign,
         };
         let (bytes, length) = request(pdu, heading);

@@ -50,8 +50,13 @@ pub struct mbm_server {
 /// What lies behind an `mbm_server`.
 #[repr(C)]
 struct Object {
+    // Where one instruction reaches it; on a host, where the core has the address
+    // of the object.
+    #[cfg(target_os = "none")]
     mark: u8,
     core: Core,
+    #[cfg(not(target_os = "none"))]
+    mark: u8,
 }
 
 type Core = Server<mbm_port, LentByC>;
@@ -77,8 +82,11 @@ struct LentByC {
 impl Lent for LentByC {
     fn frame(&mut self) -> &mut [u8] {
         // SAFETY: begin demands a buffer of so many bytes for as long as the
-        // object is used.
-        unsafe { from_raw_parts_mut(self.frame, usize::from(self.bytes)) }
+        // object is used, and takes no NULL.
+        unsafe {
+            core::hint::assert_unchecked(!self.frame.is_null());
+            from_raw_parts_mut(self.frame, usize::from(self.bytes))
+        }
     }
 
     fn rule(&self, function: u8) -> Option<Rule> {
@@ -138,7 +146,11 @@ pub unsafe extern "C" fn mbm_server_poll(server: *mut mbm_server) -> u8 {
         }
         for _ in 0..MOST_REQUESTS {
             let core = &mut object(server).core;
-            let now = core.port.micros();
+            let now = if cfg!(target_os = "none") || core.keeps_time() {
+                core.port.micros()
+            } else {
+                0
+            };
             let status = core.poll(now);
             if status != Status::PENDING {
                 return status.code();
@@ -146,8 +158,9 @@ pub unsafe extern "C" fn mbm_server_poll(server: *mut mbm_server) -> u8 {
             let heading = &raw const core.request;
             let pdu = core.lent.frame.add((*heading).head.into());
             let reply = units::serve(core.lent.units, core.lent.count, heading, pdu);
-            if !object(server).core.answer(Reply::from_number(reply)) {
-                break;
+            let reply = Reply::from_number(reply);
+            if let Some(status) = object(server).core.conclude(reply) {
+                return status.code();
             }
         }
     }

@@ -1,8 +1,8 @@
 //! The four tables, in arrays of the caller.
 
-use super::units::{add, request};
+use super::units::{add, is_unheard, request};
 use super::{mbm_service, mbm_unit};
-use crate::server::table::{self, Cells, Kind, Way};
+use crate::server::table::{self, Access, Cells, Kind, Role, Way};
 use crate::server::Reply;
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
@@ -109,8 +109,8 @@ impl Cells for Table {
         let first = self.index(address);
         // SAFETY: see above.
         unsafe {
-            let size = (*self.0).size;
-            if (*self.0).words.is_null() || first > size || quantity > size - first {
+            let end = first.checked_add(quantity);
+            if (*self.0).words.is_null() || end.is_none_or(|end| end > (*self.0).size) {
                 return false;
             }
             let valid = (*self.0).valid;
@@ -119,6 +119,7 @@ impl Cells for Table {
     }
 
     #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn transfer(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) {
         let first = self.index(address);
         let write = way == Way::Write;
@@ -128,46 +129,61 @@ impl Cells for Table {
             let bits = Kind::from_code((*self.0).kind).is_bits();
             // A host has room for code that takes many cells at a time.
             if cfg!(not(target_os = "none")) {
-                if bits {
+                if bits && write && quantity == 1 {
+                    let cell = cells.add(usize::from(first >> 3));
+                    let on = data.first().is_some_and(|data| data & 1 != 0);
+                    let rest = *cell & !(1 << (first & 7));
+                    *cell = rest | u8::from(on) << (first & 7);
+                } else if bits {
                     transfer_bits(cells, write, first, quantity, data);
                 } else {
                     transfer_words(cells.cast(), write, first, quantity, data);
                 }
                 return;
             }
-            let mut data = data.as_mut_ptr();
-            let mut mask = 1u8;
-            for index in first..first + quantity {
-                if bits {
-                    let (cell, bit) = (cells.add(usize::from(index >> 3)), 1 << (index & 7));
-                    let (to, to_bit, from, from_bit) = if write {
-                        (cell, bit, data, mask)
-                    } else {
-                        (data, mask, cell, bit)
-                    };
-                    // A byte that is begun has no bits yet.
-                    let mut value = if write || mask != 1 { *to & !to_bit } else { 0 };
-                    if *from & from_bit != 0 {
-                        value |= to_bit;
-                    }
-                    *to = value;
-                    mask = mask.rotate_left(1);
-                    if mask == 1 {
-                        data = data.add(1);
-                    }
-                } else {
-                    let cell = cells.add(2 * usize::from(index)).cast::<u16>();
-                    if write {
-                        *cell = u16::from_be_bytes([*data, *data.add(1)]);
-                    } else {
-                        let [high, low] = (*cell).to_be_bytes();
-                        *data = high;
-                        *data.add(1) = low;
-                    }
+            if !bits {
+                let mut words = cells.add(2 * usize::from(first));
+                let mut data = data.as_mut_ptr();
+                if write {
+                    core::mem::swap(&mut words, &mut data);
+                }
+                // From one order of bytes to the other, whichever is which.
+                let high = usize::from(cfg!(target_endian = "little"));
+                for _ in 0..quantity {
+                    *data = *words.add(high);
+                    *data.add(1) = *words.add(1 - high);
+                    words = words.add(2);
                     data = data.add(2);
                 }
+                return;
+            }
+            let (mut from, mut from_bit) = (cells.add(usize::from(first >> 3)), 1u8 << (first & 7));
+            let (mut to, mut to_bit) = (data.as_mut_ptr(), 1u8);
+            if !write {
+                // There are bits without a cell.
+                *to.add(usize::from((quantity - 1) >> 3)) = 0;
+            } else {
+                core::mem::swap(&mut from, &mut to);
+                core::mem::swap(&mut from_bit, &mut to_bit);
+            }
+            for _ in 0..quantity {
+                let rest = *to & !to_bit;
+                *to = if *from & from_bit != 0 {
+                    rest | to_bit
+                } else {
+                    rest
+                };
+                from_bit = from_bit.rotate_left(1);
+                from = from.add(usize::from(from_bit & 1));
+                to_bit = to_bit.rotate_left(1);
+                to = to.add(usize::from(to_bit & 1));
             }
         }
+    }
+
+    fn has_hooks(&self) -> bool {
+        // SAFETY: see above.
+        unsafe { (*self.0).before.is_some() || (*self.0).after.is_some() }
     }
 
     fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
@@ -193,17 +209,46 @@ impl Cells for Table {
 /// Moves registers from `first` on, from or into data.
 ///
 /// # Safety
-/// Behind `words` are all of them, and nothing else uses them meanwhile.
+/// Behind `words` are all of them, and nothing else uses them meanwhile; data have
+/// room for them.
+#[inline(always)]
 unsafe fn transfer_words(words: *mut u16, write: bool, first: u16, quantity: u16, data: &mut [u8]) {
     // SAFETY: as the caller promises.
-    let words = unsafe { from_raw_parts_mut(words.add(first.into()), quantity.into()) };
-    let (pairs, _) = data.as_chunks_mut::<2>();
-    for (word, pair) in words.iter_mut().zip(pairs) {
-        if write {
-            *word = u16::from_be_bytes(*pair);
+    unsafe {
+        let words = words.add(first.into()).cast::<u8>();
+        let data = data.as_mut_ptr();
+        let (from, to) = if write {
+            (data.cast_const(), words)
         } else {
-            *pair = word.to_be_bytes();
+            (words.cast_const(), data)
+        };
+        let end = 2 * usize::from(quantity);
+        let Some(last) = end.checked_sub(16) else {
+            for at in (0..end).step_by(2) {
+                turn::<1>(from.add(at), to.add(at));
+            }
+            return;
+        };
+        // Eight at a time; the last eight overlap those before.
+        let mut at = 0;
+        while at < last {
+            turn::<8>(from.add(at), to.add(at));
+            at += 16;
         }
+        turn::<8>(from.add(last), to.add(last));
+    }
+}
+
+/// Moves so many registers to or from the order of the wire.
+///
+/// # Safety
+/// There are so many at both pointers, which need not be aligned.
+#[inline(always)]
+unsafe fn turn<const N: usize>(from: *const u8, to: *mut u8) {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let words = from.cast::<[u16; N]>().read_unaligned();
+        to.cast::<[u16; N]>().write_unaligned(words.map(u16::to_be));
     }
 }
 
@@ -212,6 +257,7 @@ unsafe fn transfer_words(words: *mut u16, write: bool, first: u16, quantity: u16
 /// # Safety
 /// Behind `cells` are all bytes that have some of them, and nothing else uses
 /// them meanwhile.
+#[inline(never)]
 unsafe fn transfer_bits(cells: *mut u8, write: bool, first: u16, quantity: u16, data: &mut [u8]) {
     let shift = first & 7;
     let count = usize::from((shift + quantity).div_ceil(8));
@@ -248,13 +294,89 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, heading: *co
     // SAFETY: as the caller promises.
     unsafe {
         let table = service.cast::<mbm_registerTable>();
-        // Soon done with what another table serves.
-        if cfg!(not(target_os = "none")) && table::kind_of(*pdu) != (*table).kind {
-            return Reply::NOT_MINE.code();
+        let kind = Kind::from_code((*table).kind);
+        match table::role(kind, *pdu) {
+            role if cfg!(target_os = "none") => serve_as(role, table, pdu, heading),
+            // A host takes a way of its own for each.
+            Role::READ => serve_read(table, pdu, heading),
+            Role::WRITE_ONE => serve_write_one(table, pdu, heading),
+            Role::WRITE_SEVERAL => serve_write_several(table, pdu, heading),
+            _ => Reply::NOT_MINE.code(),
         }
+    }
+}
+
+/// Serves a request that does this to the table.
+///
+/// # Safety
+/// As for [`serve`].
+#[inline(always)]
+unsafe fn serve_as(
+    role: Role,
+    table: *mut mbm_registerTable,
+    pdu: *mut u8,
+    heading: *const c_void,
+) -> u16 {
+    // SAFETY: as the caller promises.
+    unsafe {
         let (pdu, length) = request(pdu, heading);
         let kind = Kind::from_code((*table).kind);
-        table::serve(kind, &mut Table(table), pdu, length).code()
+        let cells = &mut Table(table);
+        if cfg!(target_os = "none") || kind.is_bits() {
+            table::serve_as(role, kind, cells, pdu, length).code()
+        } else {
+            table::serve_as(role, Kind::HOLDING_REGISTERS, cells, pdu, length).code()
+        }
+    }
+}
+
+/// # Safety
+/// As for [`serve`].
+#[inline(never)]
+unsafe fn serve_read(table: *mut mbm_registerTable, pdu: *mut u8, heading: *const c_void) -> u16 {
+    // SAFETY: as the caller promises.
+    unsafe { serve_as(Role::READ, table, pdu, heading) }
+}
+
+/// # Safety
+/// As for [`serve`].
+#[inline(never)]
+unsafe fn serve_write_one(
+    table: *mut mbm_registerTable,
+    pdu: *mut u8,
+    heading: *const c_void,
+) -> u16 {
+    // SAFETY: as the caller promises.
+    unsafe { serve_as(Role::WRITE_ONE, table, pdu, heading) }
+}
+
+/// # Safety
+/// As for [`serve`].
+#[inline(never)]
+unsafe fn serve_write_several(
+    table: *mut mbm_registerTable,
+    pdu: *mut u8,
+    heading: *const c_void,
+) -> u16 {
+    // SAFETY: as the caller promises.
+    unsafe { serve_as(Role::WRITE_SEVERAL, table, pdu, heading) }
+}
+
+/// Serves 16 and 17 of a table of holding registers.
+///
+/// # Safety
+/// As for [`serve`].
+#[cfg_attr(not(target_os = "none"), inline(never))]
+unsafe fn serve_more(table: *mut mbm_registerTable, pdu: *mut u8, heading: *const c_void) -> u16 {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let (pdu, length) = request(pdu, heading);
+        let mut cells = Table(table);
+        if cfg!(target_os = "none") {
+            let cells: &mut dyn Access = &mut cells;
+            return table::serve_more(cells, pdu, length).code();
+        }
+        table::serve_more(&mut cells, pdu, length).code()
     }
 }
 
@@ -269,12 +391,13 @@ unsafe extern "C" fn serve_all(
 ) -> u16 {
     // SAFETY: as the caller promises.
     unsafe {
-        let reply = serve(service, pdu, heading);
-        if reply != Reply::NOT_MINE.code() {
-            return reply;
+        if !table::is_more(*pdu) {
+            serve(service, pdu, heading)
+        } else if is_unheard(heading, *pdu) {
+            Reply::NOT_MINE.code()
+        } else {
+            serve_more(service.cast(), pdu, heading)
         }
-        let (pdu, length) = request(pdu, heading);
-        table::serve_more(&mut Table(service.cast()), pdu, length).code()
     }
 }
 

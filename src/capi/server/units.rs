@@ -3,7 +3,7 @@
 use super::{custom, mbm_diagnostics};
 use crate::error::Status;
 use crate::pdu::custom::Rule;
-use crate::server::{Concern, Heading, Reply};
+use crate::server::{only_writes, Concern, Heading, Reply};
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 
@@ -62,9 +62,6 @@ pub(super) unsafe fn add(unit: *mut mbm_unit, service: *mut mbm_service, serve: 
     }
     // SAFETY: not NULL; services hang together as this function hung them.
     unsafe {
-        if (*unit).serve.is_none() {
-            (*unit).serve = Some(serve_plainly);
-        }
         let mut place = &raw mut (*unit).services;
         while *place != service {
             if (*place).is_null() {
@@ -97,6 +94,7 @@ pub(super) unsafe fn request<'a>(pdu: *mut u8, heading: *const c_void) -> (&'a m
 /// # Safety
 /// `unit` is one, and `pdu` has the bytes and the room that `heading` says.
 #[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline(always))]
 pub(super) unsafe fn walk(unit: *mut mbm_unit, pdu: *mut u8, heading: *const Heading) -> u16 {
     // SAFETY: as the caller promises.
     unsafe {
@@ -120,30 +118,66 @@ pub(super) unsafe fn walk(unit: *mut mbm_unit, pdu: *mut u8, heading: *const Hea
 /// `units` points to `count` units, and `pdu` has the bytes and the room that
 /// `heading` says.
 #[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline(always))]
 pub(super) unsafe fn serve(
     units: *mut mbm_unit,
     count: u8,
     heading: *const Heading,
     pdu: *mut u8,
 ) -> u16 {
-    let mut answer = Reply::SILENT.code();
-    let mut unit = units;
     // SAFETY: as the caller promises.
     unsafe {
-        let mut concern = (*heading).concern(*pdu);
-        for _ in 0..count {
-            let own = (*heading).is_for((*unit).id);
-            let concerned = if concern == Concern::Own && !own {
-                Concern::Foreign
-            } else {
-                concern
-            };
-            if let Some(serve) = (*unit).serve {
-                let reply = serve(unit, heading.cast(), concerned as u8, pdu);
-                if concerned == Concern::Own {
-                    answer = reply;
-                    concern = Concern::Foreign;
-                }
+        // One unit alone, which takes no notice of what is others', and is asked by
+        // its id: soon done.
+        if cfg!(not(target_os = "none"))
+            && count == 1
+            && (*units).serve.is_none()
+            && (*heading).length != 0
+            && (*heading).to == (*units).id
+            && (*heading).to != 0
+            && !(*units).services.is_null()
+        {
+            return walk(units, pdu, heading);
+        }
+        serve_each(units, count, heading, pdu)
+    }
+}
+
+/// [`serve`], whatever the units.
+///
+/// # Safety
+/// As for [`serve`].
+#[cfg_attr(not(target_os = "none"), inline(never))]
+unsafe fn serve_each(
+    units: *mut mbm_unit,
+    count: u8,
+    heading: *const Heading,
+    pdu: *mut u8,
+) -> u16 {
+    let mut answer = Reply::SILENT.code();
+    // SAFETY: as the caller promises.
+    unsafe {
+        let mut unit = units;
+        let end = units.add(count.into());
+        let mut all = (*heading).concern_of_all();
+        while unit != end {
+            let mut concern = all;
+            if concern == Concern::Own && !(*heading).is_for((*unit).id) {
+                concern = Concern::Foreign;
+            }
+            // Only who takes notice of all frames has a function for that, and a
+            // unit without any service is none.
+            let mut reply = Reply::SILENT.code();
+            if let Some(monitor) = (*unit).serve {
+                reply = monitor(unit, heading.cast(), concern as u8, pdu);
+            } else if (*unit).services.is_null() {
+                concern = Concern::Foreign;
+            } else if concern != Concern::Foreign {
+                reply = walk(unit, pdu, heading);
+            }
+            if concern == Concern::Own {
+                answer = reply;
+                all = Concern::Foreign;
             }
             unit = unit.add(1);
         }
@@ -151,21 +185,14 @@ pub(super) unsafe fn serve(
     answer
 }
 
-/// Serves a frame without taking notice of those that are not for the unit.
+/// True for a broadcast of a function that is not carried out then.
 ///
 /// # Safety
-/// As for [`walk`].
-unsafe extern "C" fn serve_plainly(
-    unit: *mut mbm_unit,
-    heading: *const c_void,
-    concern: u8,
-    pdu: *mut u8,
-) -> u16 {
-    if concern == Concern::Foreign as u8 {
-        return Reply::SILENT.code();
-    }
+/// As for [`Serve`].
+#[cfg_attr(target_os = "none", inline(never))]
+pub(super) unsafe fn is_unheard(heading: *const c_void, function: u8) -> bool {
     // SAFETY: as the caller promises.
-    unsafe { walk(unit, pdu, heading.cast()) }
+    unsafe { (*heading.cast::<Heading>()).is_broadcast() && !only_writes(function) }
 }
 
 /// Hangs a service before all that a unit has.

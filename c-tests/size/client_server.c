@@ -1,0 +1,22 @@
+/* A client of every kind of line with every function, and a server with everything. */
+#include "client.h"
+
+#include "everything.h"
+
+static uint8_t outgoing[MBM_FRAME_BYTES(WORDS)];
+
+int main(void)
+{
+    serve_everything();
+    begin_port();
+    USED(outgoing);
+    for (;;) {
+        uart = CALL(mbm_server_poll(&server));
+        uart = CALL(mbm_client_beginRtu(&client, &port, frame, sizeof frame));
+        uart = CALL(mbm_client_beginAscii(&client, &port, frame, sizeof frame));
+        uart = CALL(mbm_client_beginRtuOverTcp(&client, &port, frame, sizeof frame));
+        uart = CALL(mbm_client_beginTcp(&client, &port, frame, sizeof frame, outgoing,
+                                        sizeof outgoing));
+        every_function();
+    }
+}

@@ -1,0 +1,36 @@
+/* A server with everything: every family that it serves, in RTU, ASCII and TCP. */
+#ifndef SIZE_EVERYTHING_H
+#define SIZE_EVERYTHING_H
+
+#include "server.h"
+
+#ifndef WITHOUT_MBM
+static mbm_diagnostics diagnostics;
+static mbm_exceptionStatus exceptions;
+static mbm_serverId id;
+static mbm_files files;
+static mbm_fifos fifos;
+static mbm_identification identification;
+static mbm_custom custom;
+static mbm_cells cells;
+static mbm_switches switches;
+#endif
+
+static inline void serve_everything(void)
+{
+    serve();
+    (void)CALL(mbm_server_serveMaskAndReadWrite(&holding));
+    (void)CALL(mbm_server_serveDiagnostics(&unit, &diagnostics));
+    (void)CALL(mbm_server_serveExceptionStatus(&unit, &exceptions));
+    (void)CALL(mbm_server_serveServerId(&unit, &id));
+    (void)CALL(mbm_server_serveFiles(&unit, &files));
+    (void)CALL(mbm_server_serveFifos(&unit, &fifos));
+    (void)CALL(mbm_server_serveIdentification(&unit, &identification));
+    (void)CALL(mbm_server_serveCustom(&unit, &custom));
+    (void)CALL(mbm_server_serveCallbacks(&unit, &cells, 3));
+    (void)CALL(mbm_server_switchOff(&unit, &switches, 8));
+    (void)CALL(mbm_server_beginAscii(&server, (const mbm_port *)0, &unit, 1, frame, sizeof frame));
+    (void)CALL(mbm_server_beginTcp(&server, (const mbm_port *)0, &unit, 1, frame, sizeof frame));
+}
+
+#endif
