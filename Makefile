@@ -180,6 +180,7 @@ clients: ## Examples with the client, checked: poll_table, scan, logger in build
 	@scripts/need python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
 	@$(MAKE) --no-print-directory venv $(CLIENTS) $(PEERS)
 	@$(BUILD)/venv/bin/python scripts/check-clients $(BUILD)/plain
+	@$(BUILD)/venv/bin/python scripts/check-clients-lost $(BUILD)/plain
 
 .PHONY: demo
 demo: ## Every function at work against a libmodbus server, frame by frame

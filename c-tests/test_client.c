@@ -247,6 +247,32 @@ static void the_facade_uses_the_line_between_the_clients_requests(void **state)
     server_stop(&s);
 }
 
+static void a_facade_gets_no_line_that_carries_other_frames(void **state)
+{
+    static mbm_client tcp, ascii;
+    static mbm_master node;
+    static uint16_t words[2];
+    static uint8_t frame[MBM_FRAME_BYTES(2)];
+    pty line;
+
+    (void)state;
+    pty_open(&line);
+    memset(&a, 0, sizeof a);
+    assert_int_equal(mbm_tty_attach(&a.tty, line.ours), 0);
+    a.port = mbm_tty_port(&a.tty, NULL);
+    OK(mbm_master_setBuffers(&node, words, 2, words, 2, frame, sizeof frame));
+    OK(mbm_master_begin(&node, UNIT, &a.port));
+    OK(mbm_client_beginTcp(&tcp, &a.port, a.incoming, 260, a.outgoing, 260));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_lend(&tcp, &node));
+    OK(mbm_client_beginAscii(&ascii, &a.port, a.incoming, 513));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_lend(&ascii, &node));
+    OK(mbm_client_poll(&ascii));
+    /* What the program does with it is its own. */
+    OK(mbm_client_lend(&tcp, NULL));
+    OK(mbm_client_takeBack(&tcp, NULL));
+    pty_close(&line);
+}
+
 static void bad_calls_are_refused_with_a_status(void **state)
 {
     static mbm_client fresh;
@@ -337,6 +363,7 @@ int main(void)
         cmocka_unit_test(a_lost_connection_is_told_and_made_anew),
         cmocka_unit_test(a_callback_may_queue_and_may_not_poll),
         cmocka_unit_test(the_facade_uses_the_line_between_the_clients_requests),
+        cmocka_unit_test(a_facade_gets_no_line_that_carries_other_frames),
         cmocka_unit_test(bad_calls_are_refused_with_a_status),
         cmocka_unit_test(a_broadcast_reaches_and_a_rest_is_kept),
     };

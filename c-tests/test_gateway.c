@@ -5,9 +5,9 @@
 #include "await.h"
 #include "program.h"
 #include "server.h"
+#include "tcp_server.h"
 #include "test.h"
 
-#include <arpa/inet.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -34,6 +34,7 @@ static modbus_mapping_t *mapping;
 static pthread_t thread;
 static int stop_peer[2];
 static int peer_runs;
+static char name[64]; /* of the peer's line, whichever terminal that is */
 
 static void *serve(void *argument)
 {
@@ -56,40 +57,11 @@ static void *serve(void *argument)
     }
 }
 
-static int start(void **state)
+static void run_peer(void)
 {
-    char paths[3][128], text[64];
-    const char *arguments[] = {"0", "3000", paths[0], paths[1], paths[2], NULL};
-    unsigned i;
-
-    (void)state;
-    pty_open(&line);
-    peer = modbus_new_rtu("/dev/null", 115200, 'N', 8, 1);
-    mapping = modbus_mapping_new(SERVER_BITS, SERVER_BITS, SERVER_REGISTERS, SERVER_REGISTERS);
-    if (!peer || !mapping || modbus_set_slave(peer, PEER_UNIT) ||
-        modbus_set_socket(peer, line.ours) || modbus_set_response_timeout(peer, 0, 20000) ||
-        pipe(stop_peer) || pthread_create(&thread, NULL, serve, NULL))
-        return -1;
+    assert_int_equal(pipe(stop_peer), 0);
+    assert_int_equal(pthread_create(&thread, NULL, serve, NULL), 0);
     peer_runs = 1;
-    for (i = 0; i < SERVER_REGISTERS; i++)
-        mapping->tab_registers[i] = server_pattern(i);
-    for (i = 0; i < SERVER_BITS; i++)
-        mapping->tab_bits[i] = server_bit_pattern(i);
-    served_prepare(&ours);
-    served_on_line(&ours, MBM_FRAMING_RTU);
-
-    snprintf(paths[0], sizeof paths[0], "%s,115200,N1,1-10", line.path);
-    snprintf(paths[1], sizeof paths[1], "%s,115200,N1,11-30", ours.line.path);
-    snprintf(paths[2], sizeof paths[2], "/dev/no-such-line,9600,E1,40-41");
-    program_start(&gateway, "gateway", arguments);
-    program_line(&gateway, text, sizeof text);
-    if (sscanf(text, "ready %d", &port) != 1)
-        return -1;
-    client = modbus_new_tcp("127.0.0.1", port);
-    if (!client || modbus_connect(client))
-        return -1;
-    modbus_set_response_timeout(client, PATIENCE_MS / 1000, 0);
-    return 0;
 }
 
 static void halt_peer(void)
@@ -103,6 +75,44 @@ static void halt_peer(void)
     peer_runs = 0;
 }
 
+static int start(void **state)
+{
+    char paths[3][128], text[64];
+    const char *arguments[] = {"0", "3000", paths[0], paths[1], paths[2], NULL};
+    unsigned i;
+
+    (void)state;
+    pty_open(&line);
+    peer = modbus_new_rtu("/dev/null", 115200, 'N', 8, 1);
+    mapping = modbus_mapping_new(SERVER_BITS, SERVER_BITS, SERVER_REGISTERS, SERVER_REGISTERS);
+    if (!peer || !mapping || modbus_set_slave(peer, PEER_UNIT) ||
+        modbus_set_socket(peer, line.ours) || modbus_set_response_timeout(peer, 0, 20000))
+        return -1;
+    run_peer();
+    for (i = 0; i < SERVER_REGISTERS; i++)
+        mapping->tab_registers[i] = server_pattern(i);
+    for (i = 0; i < SERVER_BITS; i++)
+        mapping->tab_bits[i] = server_bit_pattern(i);
+    served_prepare(&ours);
+    served_on_line(&ours, MBM_FRAMING_RTU);
+
+    snprintf(name, sizeof name, "/tmp/mbm-gateway-%d", (int)getpid());
+    if (symlink(line.path, name) != 0)
+        return -1;
+    snprintf(paths[0], sizeof paths[0], "%s,115200,N1,1-10", name);
+    snprintf(paths[1], sizeof paths[1], "%s,115200,N1,11-30", ours.line.path);
+    snprintf(paths[2], sizeof paths[2], "/dev/no-such-line,9600,E1,40-41");
+    program_start(&gateway, "gateway", arguments);
+    program_line(&gateway, text, sizeof text);
+    if (sscanf(text, "ready %d", &port) != 1)
+        return -1;
+    client = modbus_new_tcp("127.0.0.1", port);
+    if (!client || modbus_connect(client))
+        return -1;
+    modbus_set_response_timeout(client, PATIENCE_MS / 1000, 0);
+    return 0;
+}
+
 static int stop(void **state)
 {
     (void)state;
@@ -114,19 +124,9 @@ static int stop(void **state)
     modbus_free(peer);
     modbus_mapping_free(mapping);
     pty_close(&line);
+    unlink(name);
     served_stop(&ours);
     return 0;
-}
-
-static int connected(void)
-{
-    struct sockaddr_in address = {.sin_family = AF_INET,
-                                  .sin_addr = {htonl(INADDR_LOOPBACK)},
-                                  .sin_port = htons((uint16_t)port)};
-    int fd = socket(AF_INET, SOCK_STREAM, 0);
-
-    assert_int_equal(connect(fd, (struct sockaddr *)&address, sizeof address), 0);
-    return fd;
 }
 
 static double seconds(void)
@@ -187,12 +187,12 @@ static void exceptions_of_a_device_pass_through(void **state)
 
 static void every_function_passes_through(void **state)
 {
-    int fd = connected();
+    int fd = tcp_connect((uint16_t)port);
 
     (void)state;
     asked_functions(fd, MBM_FRAMING_TCP, &ours);
     close(fd);
-    fd = connected();
+    fd = tcp_connect((uint16_t)port);
     asked_lies(fd, MBM_FRAMING_TCP, &ours);
     close(fd);
 }
@@ -244,7 +244,7 @@ static void requests_of_many_connections_wait_for_their_turn(void **state)
 
     (void)state;
     for (i = 0; i < MANY; i++)
-        fds[i] = connected();
+        fds[i] = tcp_connect((uint16_t)port);
     for (round = 0; round < 5; round++) {
         for (i = 0; i < MANY; i++) {
             uint8_t request[] = {(uint8_t)round, (uint8_t)i, 0, 0, 0, 6,
@@ -272,7 +272,7 @@ static void a_line_that_waits_holds_up_no_other(void **state)
     static const uint8_t absent[] = {0, 1, 0, 0, 0, 6, ABSENT, 3, 0, 0, 0, 1};
     uint8_t answer[600];
     uint16_t word;
-    int fd = connected();
+    int fd = tcp_connect((uint16_t)port);
     unsigned i, attempts;
 
     (void)state;
@@ -300,7 +300,7 @@ static void a_connection_that_breaks_takes_its_request_along(void **state)
     (void)state;
     for (i = 0; i < 40; i++) {
         static const uint8_t request[] = {0, 1, 0, 0, 0, 6, PEER_UNIT, 3, 0, 0, 0, 1};
-        int fd = connected();
+        int fd = tcp_connect((uint16_t)port);
 
         assert_int_equal(write(fd, request, sizeof request), sizeof request);
         if (i % 2)
@@ -338,7 +338,7 @@ static void connections_beyond_its_places_are_closed(void **state)
 
     (void)state;
     for (i = 0; i < COUNT(fds); i++)
-        fds[i] = connected();
+        fds[i] = tcp_connect((uint16_t)port);
     /* One of the places is the client's. */
     for (i = 0; i < COUNT(fds); i++)
         assert_int_equal(is_served(fds[i]), i < PLACES - 1);
@@ -347,17 +347,73 @@ static void connections_beyond_its_places_are_closed(void **state)
         close(fds[i]);
 }
 
-static void a_line_that_is_lost_is_0a(void **state)
+static void lose_line(void)
 {
+    halt_peer();
+    pty_close(&line);
+}
+
+static void have_line(void)
+{
+    pty_open(&line);
+    assert_int_equal(unlink(name), 0);
+    assert_int_equal(symlink(line.path, name), 0);
+    modbus_set_socket(peer, line.ours);
+    run_peer();
+}
+
+static void a_line_that_is_lost_is_0a_until_it_is_back(void **state)
+{
+    double start;
     uint16_t word;
 
     (void)state;
-    halt_peer();
-    pty_close(&line);
+    lose_line();
     expect_exception(0x0A, PEER_UNIT);
     expect_exception(0x0A, PEER_UNIT);
     modbus_set_slave(client, SERVED_UNIT);
     assert_int_equal(modbus_read_registers(client, SERVED_BASE, 1, &word), 1);
+    have_line();
+    start = seconds();
+    modbus_set_slave(client, PEER_UNIT);
+    while (modbus_read_registers(client, 0, 1, &word) != 1)
+        assert_true(seconds() - start < PATIENCE_MS / 1000);
+}
+
+static void a_line_that_was_lost_while_nobody_asked_costs_no_request(void **state)
+{
+    uint16_t word;
+
+    (void)state;
+    lose_line();
+    have_line();
+    modbus_set_slave(client, PEER_UNIT);
+    assert_int_equal(modbus_read_registers(client, 0, 1, &word), 1);
+}
+
+/* Starts a gateway with arguments that are none; what it says where it would listen. */
+static void bad_arguments_are_told(void **state)
+{
+    static const char *const bad[][6] = {
+        {"0", "300", "/dev/null,19200,E1,9-1"},
+        {"0", "300", "/dev/null,1,E1,1-9"},
+        {"0", "300", "/dev/null,19200,X1,1-9"},
+        {"0", "300", "/dev/null,19200,E3,1-9"},
+        {"0", "300", "/dev/null,19200,E1,1-9", "/dev/zero,19200,E1,9-12"},
+        {"0", "300x", "/dev/null,19200,E1,1-9"},
+        {"0", "300", "/dev/null,19200,E1,1-9,and more"},
+    };
+    char text[64];
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(bad); i++) {
+        program one;
+
+        program_start(&one, "gateway", bad[i]);
+        assert_int_equal(program_rest(&one, text, sizeof text), 0);
+        assert_int_equal(program_end(&one), 2);
+    }
 }
 
 /* A gateway of its own for each, so that none finds what another left behind. */
@@ -375,7 +431,9 @@ int main(void)
         TEST(a_line_that_waits_holds_up_no_other),
         TEST(a_connection_that_breaks_takes_its_request_along),
         TEST(connections_beyond_its_places_are_closed),
-        TEST(a_line_that_is_lost_is_0a),
+        TEST(a_line_that_is_lost_is_0a_until_it_is_back),
+        TEST(a_line_that_was_lost_while_nobody_asked_costs_no_request),
+        TEST(bad_arguments_are_told),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

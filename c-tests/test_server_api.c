@@ -147,6 +147,57 @@ static void a_unit_that_serves_nothing_refuses_everything(void **state)
     assert_memory_equal(wire.sent, "\x11\x84\x01", 3);
 }
 
+static void a_unit_without_services_is_silent(void **state)
+{
+    static mbm_unit places[3];
+
+    (void)state;
+    memset(places, 0, sizeof places);
+    OK(mbm_server_begin(&server, &port, places, 3, frame, sizeof frame));
+    assert_int_equal(ASK("\x03\0\0\0\1"), 0);
+    places[1].id = 17;
+    assert_int_equal(ASK("\x03\0\0\0\1"), 0);
+    places[2].id = 17;
+    OK(mbm_server_serveHoldingRegisters(&places[2], &table));
+    assert_int_equal(ASK("\x04\0\0\0\1"), 5);
+    assert_memory_equal(wire.sent, "\x11\x84\x01", 3);
+}
+
+/* A peer that asks another unit faster than anybody reads. */
+static int16_t flooded_read(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    const char *request = (const char *)context;
+    uint16_t i;
+
+    for (i = 0; i < capacity; i++)
+        bytes[i] = (uint8_t)request[wire.first++ % 12];
+    assert_true(wire.first < 12 * 1000);
+    return (int16_t)capacity;
+}
+
+static void a_poll_ends_though_a_peer_floods(void **state)
+{
+    static char request[] = "\0\1\0\0\0\6\x63\x03\0\0\0\1";
+    mbm_port flooded = port;
+
+    (void)state;
+    flooded.read = flooded_read;
+    flooded.context = request;
+    OK(mbm_server_beginTcp(&server, &flooded, &unit, 1, frame, sizeof frame));
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_server_poll(&server));
+    assert_int_equal(wire.length, 0);
+    request[6] = 17;
+    wire.first = 0;
+    OK(mbm_server_poll(&server));
+    assert_int_equal(wire.length, 11);
+    /* As RTU over TCP this is noise. */
+    wire.first = wire.length = 0;
+    OK(mbm_server_beginRtuOverTcp(&server, &flooded, &unit, 1, frame, sizeof frame));
+    OK(mbm_server_poll(&server));
+    assert_int_equal(wire.length, 0);
+}
+
 static void tables_without_storage_have_no_cells(void **state)
 {
     (void)state;
@@ -246,6 +297,7 @@ static void a_function_of_ours_says_what_is_answered(void **state)
     assert_int_equal(ASK("\x64"), 0);
     assert_true(calls > 10);
     assert_int_equal(diagnostics.serverMessages, 1);
+    assert_int_equal(mbm_server_pollDelay(&server), 1000);
     said = 0;
     OK(mbm_server_poll(&server));
     OK(mbm_server_poll(&server));
@@ -350,6 +402,8 @@ int main(void)
         TEST(an_object_that_was_never_begun_is_told),
         TEST(null_is_an_invalid_argument),
         TEST(a_unit_that_serves_nothing_refuses_everything),
+        TEST(a_unit_without_services_is_silent),
+        TEST(a_poll_ends_though_a_peer_floods),
         TEST(tables_without_storage_have_no_cells),
         TEST(serving_twice_is_serving_once),
         TEST(mask_and_read_write_want_holding_registers),

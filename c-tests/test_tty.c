@@ -25,7 +25,11 @@ static struct {
     int there;
     uint32_t longest;
     struct serial_rs485 state;
+    uint32_t nearest; /* what it makes of any rate that has no constant; 0 for that itself */
 } driver;
+
+/* TCGETS2, which <termios.h> does not have. */
+#define GET_WITH_RATE _IOR('T', 0x2A, uint32_t[11])
 
 /* The program's own comes before that of libc. */
 int ioctl(int fd, unsigned long request, ...)
@@ -44,6 +48,12 @@ int ioctl(int fd, unsigned long request, ...)
         memcpy(&driver.state, argument, sizeof driver.state);
         if (driver.state.delay_rts_before_send > driver.longest)
             driver.state.delay_rts_before_send = driver.longest;
+        return 0;
+    }
+    if (driver.nearest && request == GET_WITH_RATE) {
+        if (syscall(SYS_ioctl, fd, request, argument) < 0)
+            return -1;
+        ((uint32_t *)argument)[10] = driver.nearest;
         return 0;
     }
     return (int)syscall(SYS_ioctl, fd, request, argument);
@@ -150,6 +160,47 @@ static void every_rate_of_termios_can_be_set(void **state)
         assert_int_equal(settings.c_cflag & CSTOPB, CSTOPB);
         mbm_tty_close(&tty);
     }
+}
+
+static uint32_t rate_of(int fd)
+{
+    uint32_t settings[11]; /* the kernel's termios2: the rates are its last two words */
+
+    assert_int_equal(ioctl(fd, GET_WITH_RATE, settings), 0);
+    return settings[10];
+}
+
+static void any_rate_is_set_where_it_is_asked_for(void **state)
+{
+    static const uint32_t rates[] = {76800, 100000, 250000, 19201, 3250000, 9600};
+    struct termios before = settings_of(line.theirs), after;
+    mbm_tty_options options = PLAIN;
+    uint32_t rate = rate_of(line.theirs);
+    mbm_tty tty;
+    size_t i;
+
+    (void)state;
+    options.anyRate = 1;
+    for (i = 0; i < COUNT(rates); i++) {
+        options.baud = rates[i];
+        assert_int_equal(mbm_tty_openWith(&tty, line.path, &options), 0);
+        assert_int_equal(rate_of(tty.fd), rates[i]);
+        mbm_tty_close(&tty);
+        after = settings_of(line.theirs);
+        assert_same(&before, &after);
+        assert_int_equal(rate_of(line.theirs), rate);
+    }
+    options.baud = 0;
+    assert_fails(EINVAL, mbm_tty_openWith(&tty, line.path, &options));
+    /* A driver that takes the nearest that it has. */
+    options.baud = 250000;
+    driver.nearest = 245200;
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &options), 0);
+    mbm_tty_close(&tty);
+    driver.nearest = 230400;
+    assert_fails(EINVAL, mbm_tty_openWith(&tty, line.path, &options));
+    after = settings_of(line.theirs);
+    assert_same(&before, &after);
 }
 
 static void options_that_no_terminal_has_are_refused_with_einval(void **state)
@@ -436,6 +487,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(parity_stop_and_data_bits_become_settings),
         TEST(every_rate_of_termios_can_be_set),
+        TEST(any_rate_is_set_where_it_is_asked_for),
         TEST(options_that_no_terminal_has_are_refused_with_einval),
         TEST(what_cannot_be_opened_says_why),
         TEST(close_leaves_the_terminal_as_it_was_found),

@@ -34,6 +34,7 @@
 
 #include "ModbusMasterBoards.h"
 #include "ModbusServerTables.h"
+#include "ModbusStatusText.h"
 #include "mbm.h"
 
 /** @cond the macro is explained at the head of the file */
@@ -200,7 +201,8 @@ public:
 
     /**
      * How long poll will find nothing to do unless a byte arrives: microseconds,
-     * 0 for now, 0xFFFFFFFF until a byte arrives.
+     * 0 for now, 0xFFFFFFFF until a byte arrives; 1000 while a function of yours is
+     * not done.
      */
     uint32_t pollDelay() const { return mbm_server_pollDelay(&state.server); }
 

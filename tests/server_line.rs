@@ -226,6 +226,26 @@ fn the_delay_of_a_poll_is_the_silence_that_is_left() {
     assert_eq!(line.server.poll_delay(0xFFFF_FFFF), 0);
 }
 
+#[test]
+fn a_full_connection_is_looked_at_each_millisecond_and_a_line_at_once() {
+    for (framing, request, delay) in [
+        (Framing::Tcp, tcp(1, &READ[1..]), 1000),
+        (Framing::RtuOverTcp, sealed(&READ), 1000),
+        (Framing::Rtu, sealed(&READ), 0),
+    ] {
+        let mut line = Line::new(framing);
+        line.wire.borrow_mut().piece = 1;
+        line.arrive(0, &request);
+        while line.wire.borrow().sent.is_empty() {
+            let now = line.wire.borrow().now;
+            line.wire.borrow_mut().now = now.wrapping_add(50);
+            line.poll();
+        }
+        let now = line.wire.borrow().now;
+        assert_eq!(line.server.poll_delay(now), delay, "{framing:?}");
+    }
+}
+
 fn ascii(pdu: &[u8], end: u8) -> Vec<u8> {
     let mut buffer = [0; 600];
     let length = Framing::Ascii.emit(&mut buffer, 0, 17, end, |place| {

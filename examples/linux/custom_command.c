@@ -250,12 +250,28 @@ static int obey(const char *command, char *rest)
     return -1;
 }
 
-int main(void)
+/* What it is asked with --help, and how it is not to be asked. */
+static int usage(const char *asked)
+{
+    const int is_help = strcmp(asked, "--help") == 0 || strcmp(asked, "-h") == 0;
+
+    fprintf(is_help ? stdout : stderr,
+            "usage: custom_command [<SCRIPT]\n"
+            "a prompt, or a script with one command a line:\n"
+            "  read A N        N registers from A on, by function 41; there are ten\n"
+            "  write A V...    writes values there, by function 42\n"
+            "  raw F B...      any function with any data, all in hexadecimal\n");
+    return is_help ? 0 : 2;
+}
+
+int main(int argc, char **argv)
 {
     const int is_asked = isatty(STDIN_FILENO);
     int result = 0;
     char line[2048];
 
+    if (argc > 1)
+        return usage(argv[1]);
     setvbuf(stdout, NULL, _IOLBF, 0);
     if (begin() != 0) {
         perror("custom_command");

@@ -101,11 +101,22 @@ static uint8_t open_line(void *context)
     return l->is_open ? MBM_OK : MBM_LINK_LOST;
 }
 
+/* A line that hung up while nobody asked is opened again by who does. */
+static void hang_up(line *l)
+{
+    close_line(l);
+    l->tried = micros() - REOPEN_MICROS;
+}
+
 /* Opens a line that is not open, now and then. */
 static int is_there(line *l)
 {
     const mbm_link link = {l, close_line, open_line};
+    struct pollfd idle = {l->tty.fd, 0, 0};
 
+    /* It may have hung up since the last wait. */
+    if (l->is_open && mbm_client_pending(&l->client) == 0 && poll(&idle, 1, 0) > 0)
+        hang_up(l);
     if (!l->is_open && micros() - l->tried >= REOPEN_MICROS)
         mbm_client_reconnect(&l->client, &link);
     return l->is_open;
@@ -126,22 +137,29 @@ static void poll_line(line *l)
 static int add_line(char *text, uint16_t timeout)
 {
     line *l = &lines[line_count];
+    struct termios unused = {0};
     unsigned baud, stop, first, last, unit;
-    char parity;
+    char parity, behind;
     mbm_port port;
     char *rest = strchr(text, ',');
 
     if (!rest || line_count == LINES)
         return -1;
     *rest++ = 0;
-    if (sscanf(rest, "%u,%c%u,%u-%u", &baud, &parity, &stop, &first, &last) != 5 || first < 1 ||
-        last > 247 || stop > 2)
+    if (sscanf(rest, "%u,%c%u,%u-%u%c", &baud, &parity, &stop, &first, &last, &behind) != 5 ||
+        first < 1 || first > last || last > 247 || stop > 2 || baud < 50)
         return -1;
-    line_count++;
     l->path = text;
     l->options.baud = baud;
+    l->options.anyRate = 1;
     l->options.parity = parity;
     l->options.stop = (uint8_t)stop;
+    if (mbm_tty_settings(&unused, &l->options) != 0)
+        return -1;
+    for (unit = first; unit <= last; unit++)
+        if (route[unit])
+            return -1;
+    line_count++;
     port = mbm_tty_port(&l->tty, NULL);
     if (open_line(l) != MBM_OK)
         perror(text);
@@ -279,7 +297,9 @@ static void wait_for_work(void)
         uint32_t own = i < line_count ? mbm_client_pollDelay(client) : UINT32_MAX;
         int is_busy = i < line_count && lines[i].is_open && mbm_client_pending(client) != 0;
 
-        waits[1 + i] = (struct pollfd){is_busy ? lines[i].tty.fd : -1, POLLIN, 0};
+        /* An idle client takes no bytes; that its line hangs up is always told. */
+        waits[1 + i] = (struct pollfd){lines[i].is_open ? lines[i].tty.fd : -1,
+                                       is_busy ? POLLIN : 0, 0};
         delay = own < delay ? own : delay;
     }
     for (i = 0; i < CONNECTIONS; i++) {
@@ -290,13 +310,16 @@ static void wait_for_work(void)
         if (is_used[i] && connections[i].asked)
             one->events = connections[i].request.status == MBM_PENDING ? 0 : POLLOUT;
         /* The socket was full. */
-        else if (is_used[i] && mbm_server_pollDelay(&connections[i].server) == 0)
+        else if (is_used[i] && tcps[i].is_full)
             one->events = POLLOUT;
     }
     time = (struct timespec){(time_t)(delay / 1000000u), (long)(delay % 1000000u) * 1000};
     if (ppoll(waits, 1 + LINES + CONNECTIONS, delay == UINT32_MAX ? NULL : &time,
               &awake) <= 0)
         return;
+    for (i = 0; i < line_count; i++)
+        if (!waits[1 + i].events && waits[1 + i].revents)
+            hang_up(&lines[i]);
     for (i = 0; i < CONNECTIONS; i++)
         if (is_used[i] && connections[i].asked &&
             (waits[1 + LINES + i].revents & (POLLERR | POLLHUP | POLLNVAL)))
@@ -307,15 +330,23 @@ int main(int argc, char **argv)
 {
     struct sigaction action = {0};
     sigset_t ends;
-    unsigned long timeout = argc > 3 ? strtoul(argv[2], NULL, 10) : 0;
+    char *behind = "";
+    unsigned long timeout = argc > 3 ? strtoul(argv[2], &behind, 10) : 0;
+    const int is_asked = argc == 2 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0);
     int i;
 
     for (i = 3; timeout > 0 && timeout <= UINT16_MAX && i < argc; i++)
         if (add_line(argv[i], (uint16_t)timeout) != 0)
             break;
-    if (i < 4 || i < argc) {
-        fprintf(stderr, "usage: %s PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...\n", argv[0]);
-        return 2;
+    if (i < 4 || i < argc || *behind) {
+        fprintf(is_asked ? stdout : stderr,
+                "usage: gateway PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...\n"
+                "  PORT                 where it listens, 0 for one that is free\n"
+                "  MILLISECONDS         that a device has to respond, up to 65535\n"
+                "  PATH,BAUD,...        up to 4 serial lines, the parity N, E or O, 1 or 2 stop bits,\n"
+                "                       and the units on it, 1 to 247, each on one line\n"
+                "for example: gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,32-40\n");
+        return is_asked ? 0 : 2;
     }
     if (mbm_tcp_listen(&listener, NULL, argv[1]) != 0) {
         perror(argv[1]);

@@ -2,6 +2,7 @@
 #include "line.h"
 
 #include <errno.h>
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -25,25 +26,32 @@ uint32_t line_milliseconds(void)
 
 static int open_tty(line *l, char *path, int ascii)
 {
-    mbm_tty_options options = {.baud = 19200, .parity = 'N', .stop = 1, .data = ascii ? 7 : 8};
+    const mbm_tty_options options = {
+        .baud = 19200, .anyRate = 1, .parity = 'N', .stop = 1, .data = ascii ? 7 : 8};
     char *baud = strchr(path, ','), *parity = baud ? strchr(baud + 1, ',') : NULL;
     mbm_port port;
 
+    l->options = options;
     if (parity) {
         *parity = '\0';
-        options.parity = parity[1];
+        l->options.parity = parity[1] && !parity[2] ? parity[1] : '?';
     }
     if (baud) {
         *baud = '\0';
-        options.baud = (uint32_t)line_number(baud + 1, 50, 4000000);
+        l->options.baud = (uint32_t)line_number(baud + 1, 50, 4000000);
     }
-    if (mbm_tty_openWith(&l->tty, path, &options) != 0)
+    if (strlen(path) >= sizeof l->path) {
+        errno = ENAMETOOLONG;
+        return -1;
+    }
+    strcpy(l->path, path);
+    if (mbm_tty_openWith(&l->tty, path, &l->options) != 0)
         return -1;
     port = mbm_tty_port(&l->tty, NULL);
     if (ascii)
         return mbm_client_beginAscii(&l->client, &port, l->incoming, sizeof l->incoming);
     mbm_client_beginRtu(&l->client, &port, l->incoming, sizeof l->incoming);
-    return mbm_client_setBaudRate(&l->client, options.baud);
+    return mbm_client_setBaudRate(&l->client, l->options.baud);
 }
 
 static int open_tcp(line *l, char *host, int rtu)
@@ -82,7 +90,7 @@ int line_open(line *l, const char *place)
             failed = open_tcp(l, rest, copy[0] == 'r');
     }
     if (failed) {
-        fprintf(stderr, "%s: %s\nplaces: %s\n", place, strerror(errno), LINE_PLACES);
+        fprintf(stderr, "%s: %s\n%s", place, strerror(errno), errno == EINVAL ? LINE_HELP : "");
         return -1;
     }
     mbm_client_setCounters(&l->client, &l->counters);
@@ -100,28 +108,92 @@ void line_close(line *l)
         mbm_tty_close(&l->tty);
 }
 
+static void close_tty(void *context)
+{
+    mbm_tty_close(&((line *)context)->tty);
+}
+
+static uint8_t open_tty_again(void *context)
+{
+    line *l = (line *)context;
+
+    return mbm_tty_openWith(&l->tty, l->path, &l->options) == 0 ? MBM_OK : MBM_LINK_LOST;
+}
+
+/* An idle client takes no bytes, so it does not see that a server hangs up. */
+static int is_lost(line *l)
+{
+    if (!mbm_client_isConnected(&l->client))
+        return 1;
+    if (mbm_client_pending(&l->client) > 0)
+        return 0;
+    return l->is_tcp ? mbm_tcp_isConnected(&l->tcp) < 0 : l->tty.fd < 0;
+}
+
 void line_poll(line *l)
 {
-    const mbm_link anew = {&l->tcp, mbm_tcp_disconnect, mbm_tcp_connect};
+    const mbm_link socket = {&l->tcp, mbm_tcp_disconnect, mbm_tcp_connect};
+    const mbm_link terminal = {l, close_tty, open_tty_again};
 
     (void)mbm_client_poll(&l->client);
-    if (l->is_tcp && !mbm_client_isConnected(&l->client) &&
-        line_milliseconds() - l->connected >= 1000) {
+    if (line_milliseconds() - l->connected >= 1000 && is_lost(l)) {
         l->connected = line_milliseconds();
-        (void)mbm_client_reconnect(&l->client, &anew);
+        (void)mbm_client_reconnect(&l->client, l->is_tcp ? &socket : &terminal);
     }
+}
+
+int line_connect(line *l)
+{
+    int there = 1;
+
+    while (l->is_tcp && !line_ended && (there = mbm_tcp_isConnected(&l->tcp)) == 0)
+        (void)mbm_tcp_wait(&l->tcp, 1, NULL, -1, 1000000);
+    if (there < 0)
+        fprintf(stderr, "%s\n", line_reason(l));
+    return there < 0 ? -1 : 0;
+}
+
+const char *line_reason(const line *l)
+{
+    return strerror(l->is_tcp ? l->tcp.error : l->tty.error);
 }
 
 void line_rest(line *l, uint32_t milliseconds)
 {
     uint32_t micros = mbm_client_pollDelay(&l->client);
 
+    /* Not for longer, so that a signal just before it is not slept over. */
+    if (milliseconds > 1000)
+        milliseconds = 1000;
     if (micros / 1000 >= milliseconds)
         micros = milliseconds * 1000;
-    if (l->is_tcp)
+    if (l->is_tcp) {
         (void)mbm_tcp_wait(&l->tcp, 1, NULL, -1, micros);
-    else
+    } else if (mbm_client_pending(&l->client) > 0) {
         (void)mbm_tty_wait(&l->tty, micros);
+    } else {
+        /* Bytes that nobody takes, or a line that is lost, would end that at once. */
+        const struct timespec time = {0, (long)(micros % 1000000u) * 1000};
+        const struct timespec second = {1, 0};
+
+        (void)ppoll(NULL, 0, micros >= 1000000u ? &second : &time, NULL);
+    }
+}
+
+int line_usage(int wrong, const char *usage)
+{
+    fprintf(wrong ? stderr : stdout, "usage: %s\n%s", usage, LINE_HELP);
+    return wrong ? 2 : 0;
+}
+
+int line_wants_help(int argc, char **argv)
+{
+    int i;
+
+    for (i = 1; i < argc; i++)
+        if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0)
+            return 1;
+    return 0;
 }
 
 const char *line_tables(long function)
@@ -157,7 +229,7 @@ uint16_t line_value(const mbm_clientRequest *request, long function, unsigned in
 long line_number(const char *text, long least, long most)
 {
     char *rest;
-    long number = strtol(text, &rest, 0);
+    long number = strtol(text, &rest, strpbrk(text, "xX") ? 16 : 10);
 
     if (rest == text || *rest || number < least || number > most) {
         fprintf(stderr, "%s: not a number from %ld to %ld\n", text, least, most);

@@ -15,13 +15,23 @@
 
 #include <signal.h>
 
-#define LINE_PLACES "rtu:PATH[,BAUD[,N|E|O]]  ascii:PATH[,BAUD[,N|E|O]]  tcp:HOST[,PORT]  rtuovertcp:HOST[,PORT]"
+
+/* What it says of places, for a usage. */
+#define LINE_HELP                                                                        \
+    "places:\n"                                                                          \
+    "  rtu:PATH[,BAUD[,N|E|O]]     a serial line, 19200 and N if left out\n"             \
+    "  ascii:PATH[,BAUD[,N|E|O]]   the same in ASCII frames and seven bits\n"            \
+    "  tcp:HOST[,PORT]             Modbus TCP, port 502 if left out\n"                   \
+    "  rtuovertcp:HOST[,PORT]      RTU frames in a TCP stream\n"                         \
+    "Numbers are decimal, or hexadecimal behind 0x.\n"
 
 typedef struct line {
     mbm_client client;
     mbm_counters counters;
     mbm_tty tty;
     mbm_tcp tcp;
+    mbm_tty_options options;
+    char path[256];
     uint8_t is_tcp;
     uint32_t connected; /* when it was last tried, in milliseconds */
     uint8_t incoming[1024], outgoing[1024];
@@ -31,11 +41,25 @@ typedef struct line {
 int line_open(line *l, const char *place);
 void line_close(line *l);
 
-/* Moves requests on, and connects anew to a server that is gone, once a second. */
+/* Moves requests on, and opens anew a terminal or a connection that is gone, once a
+ * second. */
 void line_poll(line *l);
 
-/* Sleeps until the client has something to do, for `milliseconds` at most. */
+/* Waits until a connection is there; 0, or -1 with the reason on stderr. */
+int line_connect(line *l);
+
+/* Why the link is lost. */
+const char *line_reason(const line *l);
+
+/* Sleeps until the client has something to do, for `milliseconds` or a second at most. */
 void line_rest(line *l, uint32_t milliseconds);
+
+/* Prints how a program is used: where `wrong` is 0 to stdout, else to stderr. Returns
+ * what main then does. */
+int line_usage(int wrong, const char *usage);
+
+/* Whether --help or -h is among the arguments. */
+int line_wants_help(int argc, char **argv);
 
 /* A clock that wraps. */
 uint32_t line_milliseconds(void);

@@ -27,6 +27,14 @@ static uint16_t reply[MOST];
 static long unit = 1, function = 3, interval = 1000, samples;
 static uint16_t address, quantity;
 static unsigned long taken, failed;
+static int unwritten; /* errno of what could not be written */
+
+static void end_line(void)
+{
+    fputc('\n', csv);
+    if (fflush(csv) != 0)
+        unwritten = errno;
+}
 
 static void write_head(void)
 {
@@ -35,7 +43,7 @@ static void write_head(void)
     fprintf(csv, "time,unit,status");
     for (i = 0; i < quantity; i++)
         fprintf(csv, ",%u", address + i);
-    fprintf(csv, "\n");
+    end_line();
 }
 
 static void write_sample(const struct timespec *when)
@@ -53,8 +61,7 @@ static void write_sample(const struct timespec *when)
         if (request.status == MBM_OK)
             fprintf(csv, "%u", line_value(&request, function, i));
     }
-    fputc('\n', csv);
-    fflush(csv);
+    end_line();
 }
 
 static void show_progress(void)
@@ -79,7 +86,8 @@ static void take_sample(void)
     (void)line_read(&at, &request, function, address, quantity);
     while (!line_ended && request.status == MBM_PENDING) {
         line_poll(&at);
-        line_rest(&at, 1000);
+        if (request.status == MBM_PENDING)
+            line_rest(&at, 1000);
     }
     if (request.status == MBM_PENDING)
         return;
@@ -89,12 +97,14 @@ static void take_sample(void)
     show_progress();
 }
 
-static int usage(void)
-{
-    fprintf(stderr, "usage: logger PLACE [-u UNIT] [-f 1..4] [-i MILLISECONDS] [-n SAMPLES] "
-                    "[-o FILE] [-r RETRIES] ADDRESS QUANTITY\nplaces: %s\n", LINE_PLACES);
-    return 2;
-}
+static const char USAGE[] =
+    "logger PLACE [options] ADDRESS QUANTITY\n"
+    "  -u UNIT          1 to 255, 1 if left out\n"
+    "  -f FUNCTION      1 coils, 2 discrete inputs, 3 holding registers (if left out), 4 input registers\n"
+    "  -i MILLISECONDS  from one sample to the next, 1000 if left out\n"
+    "  -n SAMPLES       until Ctrl-C if left out\n"
+    "  -o FILE          CSV, stdout if left out\n"
+    "  -r RETRIES       how often a sample is asked again, 2 if left out";
 
 int main(int argc, char **argv)
 {
@@ -103,6 +113,8 @@ int main(int argc, char **argv)
     uint32_t due;
     int option;
 
+    if (line_wants_help(argc, argv))
+        return line_usage(0, USAGE);
     while ((option = getopt(argc, argv, "u:f:i:n:o:r:")) != -1) {
         switch (option) {
         case 'u': unit = line_number(optarg, 1, 255); break;
@@ -111,11 +123,11 @@ int main(int argc, char **argv)
         case 'n': samples = line_number(optarg, 1, 1000000000); break;
         case 'o': path = optarg; break;
         case 'r': retries = line_number(optarg, 0, 255); break;
-        default: return usage();
+        default: return line_usage(1, USAGE);
         }
     }
     if (argc - optind != 3)
-        return usage();
+        return line_usage(1, USAGE);
     address = (uint16_t)line_number(argv[optind + 1], 0, 65535);
     quantity = (uint16_t)line_number(argv[optind + 2], 1, MOST);
     if (line_open(&at, argv[optind]) != 0)
@@ -129,13 +141,13 @@ int main(int argc, char **argv)
     mbm_client_setBackoff(&at.client, MBM_BACKOFF_EXPONENTIAL, 50, 1000);
     write_head();
     due = line_milliseconds();
-    while (!line_ended && (samples == 0 || taken < (unsigned long)samples)) {
+    while (!line_ended && !unwritten && (samples == 0 || taken < (unsigned long)samples)) {
         take_sample();
         /* A sample that took longer is followed by the next at once. */
         due += (uint32_t)interval;
         if ((int32_t)(due - line_milliseconds()) < 0)
             due = line_milliseconds();
-        while (!line_ended && taken != (unsigned long)samples &&
+        while (!line_ended && !unwritten && taken != (unsigned long)samples &&
                (int32_t)(due - line_milliseconds()) > 0) {
             line_poll(&at);
             line_rest(&at, due - line_milliseconds());
@@ -143,10 +155,10 @@ int main(int argc, char **argv)
     }
     if (isatty(2))
         fputc('\n', stderr);
-    if (ferror(csv) || (path && fclose(csv) != 0)) {
-        fprintf(stderr, "%s: %s\n", path ? path : "stdout", strerror(errno));
-        return 1;
-    }
     line_close(&at);
-    return 0;
+    if (path && fclose(csv) != 0 && !unwritten)
+        unwritten = errno;
+    if (unwritten)
+        fprintf(stderr, "%s: %s\n", path ? path : "stdout", strerror(unwritten));
+    return unwritten ? 1 : 0;
 }

@@ -183,7 +183,18 @@ static int progress(mbm_tcp *tcp)
 
 int mbm_tcp_isConnected(mbm_tcp *tcp)
 {
-    return progress(tcp);
+    int there = progress(tcp);
+    ssize_t count;
+    char byte;
+
+    if (there == 1) {
+        count = recv(tcp->fd, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
+        if (count == 0 || (count < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)) {
+            lose(tcp, count < 0 ? errno : EPIPE);
+            there = -1;
+        }
+    }
+    return there;
 }
 
 uint8_t mbm_tcp_connect(void *context)
@@ -192,6 +203,7 @@ uint8_t mbm_tcp_connect(void *context)
 
     tcp->next = 0;
     tcp->is_full = 0;
+    tcp->is_unread = 0;
     tcp->error = 0;
     if (try_next(tcp, ENOTCONN) < 0)
         return MBM_LINK_LOST;
@@ -230,6 +242,9 @@ static int16_t tcp_read(void *context, uint8_t *bytes, uint16_t capacity)
 
     if (there <= 0 || capacity == 0)
         return (int16_t)(there < 0 ? -1 : 0);
+    /* Who reads is not stuck with what is to be sent. */
+    tcp->is_full = 0;
+    tcp->is_unread = 0;
     return outcome(tcp, recv(tcp->fd, bytes, at_most(capacity), 0));
 }
 
@@ -243,6 +258,8 @@ static int16_t tcp_write(void *context, const uint8_t *bytes, uint16_t length)
         return (int16_t)(there < 0 ? -1 : 0);
     taken = outcome(tcp, send(tcp->fd, bytes, at_most(length), MSG_NOSIGNAL));
     tcp->is_full = taken >= 0 && taken < length;
+    if (!tcp->is_full)
+        tcp->is_unread = 0;
     return taken;
 }
 
@@ -257,7 +274,7 @@ static uint32_t tcp_micros(void *context)
 
 static void tcp_idle(void *context)
 {
-    const mbm_tcp *tcp = (const mbm_tcp *)context;
+    mbm_tcp *tcp = (mbm_tcp *)context;
 
     mbm_tcp_wait(tcp, 1, NULL, -1, mbm_master_pollDelay(tcp->master));
 }
@@ -375,19 +392,20 @@ void mbm_tcp_closeListener(mbm_tcp_listener *listener)
     listener->port = 0;
 }
 
-int mbm_tcp_wait(const mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, int fd,
+int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, int fd,
                  uint32_t micros)
 {
     struct timespec time = {(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
     struct pollfd waits[MBM_TCP_WAITS];
-    nfds_t used = 0;
+    mbm_tcp *owners[MBM_TCP_WAITS];
+    nfds_t used = 0, sockets;
     size_t i;
     int ready;
 
     if (count > MBM_TCP_WAITS - 2)
         return refuse(EINVAL);
     for (i = 0; i < count; i++) {
-        short events = POLLIN;
+        short events = tcps[i].is_unread ? 0 : POLLIN;
 
         if (!has_socket(&tcps[i]))
             continue;
@@ -395,8 +413,13 @@ int mbm_tcp_wait(const mbm_tcp *tcps, size_t count, const mbm_tcp_listener *list
             events = POLLOUT;
         else if (tcps[i].is_full)
             events |= POLLOUT;
+        /* A hang-up would end the wait whatever is asked for. */
+        if (events == 0)
+            continue;
+        owners[used] = &tcps[i];
         waits[used++] = (struct pollfd){tcps[i].fd, events, 0};
     }
+    sockets = used;
     if (listener && listener->port != 0)
         waits[used++] = (struct pollfd){listener->fd, POLLIN, 0};
     if (fd >= 0)
@@ -404,5 +427,12 @@ int mbm_tcp_wait(const mbm_tcp *tcps, size_t count, const mbm_tcp_listener *list
     ready = ppoll(waits, used, micros == MBM_TCP_FOREVER ? NULL : &time, NULL);
     if (ready < 0)
         return errno == EINTR ? 0 : -1;
+    for (i = 0; i < sockets; i++) {
+        if (owners[i]->state == CONNECTED && (waits[i].revents & ~POLLOUT))
+            owners[i]->is_unread = 1;
+        /* Known from now on, though nobody may use the port yet. */
+        if (owners[i]->state == CONNECTING && waits[i].revents)
+            progress_slowly(owners[i]);
+    }
     return ready > 0;
 }

@@ -41,7 +41,8 @@ typedef struct mbm_tcp {
     int error;                /**< errno of what lost the link, EPIPE if the peer closed it; else 0 */
     const mbm_master *master; /**< who uses it; says how long to sleep */
     uint8_t state;            /**< not for you */
-    uint8_t is_full;          /**< not for you */
+    uint8_t is_full;          /**< 1 while it takes no more bytes, so wait for room too */
+    uint8_t is_unread;        /**< not for you */
     uint8_t count;            /**< not for you */
     uint8_t next;             /**< not for you */
     socklen_t lengths[MBM_TCP_ADDRESSES];               /**< not for you */
@@ -88,7 +89,8 @@ int mbm_tcp_attach(mbm_tcp *tcp, int fd);
 void mbm_tcp_close(mbm_tcp *tcp);
 
 /**
- * Whether there is a connection, as far as it is known without asking the peer.
+ * Whether there is a connection, as far as it is known without asking the peer. An
+ * end of the stream is seen behind what is still to be read.
  *
  * @param tcp  the socket
  * @return 1 if there is, 0 while it is being made, -1 if it is lost or closed
@@ -157,7 +159,9 @@ void mbm_tcp_closeListener(mbm_tcp_listener *listener);
 /**
  * Sleeps until one of several sockets has something to do, or a time is over:
  * bytes or a connection arrived, a connection came to be or is lost, or there is
- * room again for bytes that a full socket did not take.
+ * room again for bytes that a full socket did not take. Bytes and an end that it told
+ * of do not end it again before the port was used, for a client without requests and
+ * a server that is not done take none.
  *
  * @param tcps      the sockets; those that are free or lost are passed over
  * @param count     how many, at most MBM_TCP_WAITS - 2
@@ -168,7 +172,7 @@ void mbm_tcp_closeListener(mbm_tcp_listener *listener);
  * @return 1 if there is something; 0 if the time is over or a signal came; -1 with
  *         errno set, EINVAL for too many
  */
-int mbm_tcp_wait(const mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, int fd,
+int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, int fd,
                  uint32_t micros);
 
 #ifdef __cplusplus

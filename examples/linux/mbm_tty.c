@@ -105,6 +105,12 @@ static speed_t speed_of(uint32_t baud)
     return B0;
 }
 
+/* What stands in for a rate without a constant, until that is set. */
+static speed_t stand_in(const mbm_tty_options *options)
+{
+    return options->anyRate && options->baud > 0 ? B38400 : B0;
+}
+
 static int refuse(int error)
 {
     errno = error;
@@ -113,7 +119,7 @@ static int refuse(int error)
 
 int mbm_tty_settings(struct termios *settings, const mbm_tty_options *options)
 {
-    speed_t speed = speed_of(options->baud);
+    speed_t speed = speed_of(options->baud) == B0 ? stand_in(options) : speed_of(options->baud);
     uint8_t data = options->data == 0 ? 8 : options->data;
     tcflag_t flags = CLOCAL | CREAD;
 
@@ -188,6 +194,45 @@ static int begin_rs485(mbm_tty *tty, const mbm_tty_options *options)
 static void end_rs485(mbm_tty *tty)
 {
     (void)tty;
+}
+#endif
+
+#if defined(__linux__) && (defined(__x86_64__) || defined(__i386__) || defined(__arm__) ||         \
+                           defined(__aarch64__) || defined(__riscv))
+/* struct termios2, its requests and flags: <asm/termbits.h> has them, but not
+ * beside <termios.h>. */
+typedef struct rated {
+    uint32_t iflag, oflag, cflag, lflag;
+    uint8_t line, cc[19];
+    uint32_t in, out;
+} rated;
+
+#define GET_RATED _IOR('T', 0x2A, rated)
+#define SET_RATED _IOW('T', 0x2B, rated)
+enum { RATE = 0010017, RATE_IN = 0010017 << 16, OTHER_RATE = 0010000 };
+
+static int set_rate(const mbm_tty *tty, uint32_t baud)
+{
+    rated settings;
+
+    if (ioctl(tty->fd, GET_RATED, &settings) < 0)
+        return -1;
+    settings.cflag &= ~(uint32_t)(RATE | RATE_IN);
+    settings.cflag |= OTHER_RATE;
+    settings.in = settings.out = baud;
+    if (ioctl(tty->fd, SET_RATED, &settings) < 0 || ioctl(tty->fd, GET_RATED, &settings) < 0)
+        return -1;
+    /* The driver takes the nearest rate that it has. */
+    if (settings.out < baud - baud / 50 || settings.out > baud + baud / 50)
+        return refuse(EINVAL);
+    return 0;
+}
+#else
+static int set_rate(const mbm_tty *tty, uint32_t baud)
+{
+    (void)tty;
+    (void)baud;
+    return refuse(EINVAL);
 }
 #endif
 
@@ -273,6 +318,8 @@ static int set(const mbm_tty *tty, const mbm_tty_options *options)
     if (cfgetospeed(&got) != cfgetospeed(&wanted) ||
         (tty->has_uart && ((got.c_cflag ^ wanted.c_cflag) & frame) != 0))
         return refuse(EINVAL);
+    if (speed_of(options->baud) == B0 && set_rate(tty, options->baud) < 0)
+        return -1;
     /* What arrived at another rate is of no use. */
     return tcflush(tty->fd, TCIOFLUSH);
 }

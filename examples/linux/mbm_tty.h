@@ -25,6 +25,7 @@ extern "C" {
 /** How a serial line is set; what is 0 is as said. */
 typedef struct mbm_tty_options {
     uint32_t baud;     /**< bits per second: any rate of which termios has a constant */
+    uint8_t anyRate;   /**< 1: others too, where the system has them, as Linux; to 2 % */
     char parity;       /**< 'N', 'E' or 'O' */
     uint8_t stop;      /**< stop bits, 1 or 2 */
     uint8_t data;      /**< data bits: 8, which 0 means too, or 7 for ASCII */
@@ -89,7 +90,8 @@ int mbm_tty_attach(mbm_tty *tty, int fd);
  * holds a terminal in another way.
  *
  * @param settings  of tcgetattr, for tcsetattr
- * @param options   how the line is to be; exclusive and RS-485 are not in it
+ * @param options   how the line is to be; exclusive, RS-485 and a rate without a
+ *                  constant are not in it
  * @return 0, or -1 with errno EINVAL
  */
 int mbm_tty_settings(struct termios *settings, const mbm_tty_options *options);

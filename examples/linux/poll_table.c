@@ -76,12 +76,13 @@ static void ask(range *r)
     (void)line_read(&at, &r->request, function, r->address, r->quantity);
 }
 
-static int usage(void)
-{
-    fprintf(stderr, "usage: poll_table PLACE [-u UNIT] [-f 1..4] [-i MILLISECONDS] [-n ROUNDS] [-p REQUESTS] "
-                    "ADDRESS QUANTITY...\nplaces: %s\n", LINE_PLACES);
-    return 2;
-}
+static const char USAGE[] =
+    "poll_table PLACE [options] ADDRESS QUANTITY...\n"
+    "  -u UNIT          1 to 255, 1 if left out\n"
+    "  -f FUNCTION      1 coils, 2 discrete inputs, 3 holding registers (if left out), 4 input registers\n"
+    "  -i MILLISECONDS  from one round to the next, 1000 if left out\n"
+    "  -n ROUNDS        until Ctrl-C if left out\n"
+    "  -p REQUESTS      at once over TCP, 16 if left out";
 
 int main(int argc, char **argv)
 {
@@ -90,6 +91,8 @@ int main(int argc, char **argv)
     int option;
     long round;
 
+    if (line_wants_help(argc, argv))
+        return line_usage(0, USAGE);
     while ((option = getopt(argc, argv, "u:f:i:n:p:")) != -1) {
         switch (option) {
         case 'u': unit = line_number(optarg, 1, 255); break;
@@ -97,12 +100,12 @@ int main(int argc, char **argv)
         case 'i': interval = line_number(optarg, 1, 3600000); break;
         case 'n': rounds = line_number(optarg, 1, 1000000000); break;
         case 'p': at_once = line_number(optarg, 1, MBM_CLIENT_DEPTH); break;
-        default: return usage();
+        default: return line_usage(1, USAGE);
         }
     }
     if (argc - optind < 3 || (argc - optind) % 2 == 0 ||
         argc - optind > 1 + 2 * MBM_CLIENT_DEPTH)
-        return usage();
+        return line_usage(1, USAGE);
     for (i = (unsigned)optind + 1; i < (unsigned)argc; i += 2, count++) {
         ranges[count].address = (uint16_t)line_number(argv[i], 0, 65535);
         ranges[count].quantity = (uint16_t)line_number(argv[i + 1], 1, MOST);
@@ -118,7 +121,8 @@ int main(int argc, char **argv)
             ask(&ranges[i]);
         while (!line_ended && mbm_client_pending(&at.client) > 0) {
             line_poll(&at);
-            line_rest(&at, 1000);
+            if (mbm_client_pending(&at.client) > 0)
+                line_rest(&at, 1000);
         }
         if (line_ended)
             break;

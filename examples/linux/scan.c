@@ -49,8 +49,14 @@ static void tell(const mbm_clientRequest *request)
     fflush(stdout);
 }
 
+static const char USAGE[] =
+    "scan PLACE [options] [FIRST [LAST]]\n"
+    "  -t MILLISECONDS  for each unit; 100 on a serial line, 1000 over TCP if left out\n"
+    "  -p REQUESTS      at once over TCP, 16 if left out\n"
+    "FIRST to LAST are units, 1 to 247 if left out";
+
 /* Keeps the queue full, and tells what has ended in the order of the units. */
-static void scan(void)
+static int scan(void)
 {
     while (!line_ended && told <= last) {
         while (asked <= last) {
@@ -67,21 +73,28 @@ static void scan(void)
         while (told < asked && requests[told].status != MBM_PENDING) {
             if (isatty(2))
                 fprintf(stderr, "\r%u of %u \r", told - first + 1, last - first + 1);
+            if (requests[told].status == MBM_LINK_LOST) {
+                fprintf(stderr, "unit %u: the link was lost: %s\n", told, line_reason(&at));
+                return -1;
+            }
             tell(&requests[told++]);
         }
         if (told <= last)
             line_rest(&at, 1000);
     }
+    return 0;
 }
 
 int main(int argc, char **argv)
 {
     long timeout = 0, at_once = 0;
-    int option;
+    int option, lost;
 
+    if (line_wants_help(argc, argv))
+        return line_usage(0, USAGE);
     while ((option = getopt(argc, argv, "t:p:")) != -1) {
         if (option == '?')
-            return 2;
+            return line_usage(1, USAGE);
         if (option == 'p')
             at_once = line_number(optarg, 1, MBM_CLIENT_DEPTH);
         else
@@ -89,16 +102,15 @@ int main(int argc, char **argv)
     }
     argc -= optind;
     argv += optind;
-    if (argc < 1 || argc > 3) {
-        fprintf(stderr, "usage: scan PLACE [-t MILLISECONDS] [-p REQUESTS] [FIRST [LAST]]\nplaces: %s\n",
-                LINE_PLACES);
-        return 2;
-    }
+    if (argc < 1 || argc > 3)
+        return line_usage(1, USAGE);
     if (argc > 1)
         first = last = (unsigned)line_number(argv[1], 1, 255);
     if (argc > 2)
         last = (unsigned)line_number(argv[2], (long)first, 255);
     if (line_open(&at, argv[0]) != 0)
+        return 1;
+    if (line_connect(&at) != 0)
         return 1;
     if (at_once)
         (void)mbm_client_setInFlight(&at.client, (uint8_t)at_once);
@@ -107,8 +119,8 @@ int main(int argc, char **argv)
         timeout = at.is_tcp ? 1000 : 100;
     mbm_client_setResponseTimeout(&at.client, (uint16_t)timeout);
     mbm_client_setQuietTime(&at.client, 0);
-    scan();
+    lost = scan();
     printf("%u of %u units answer\n", there, told - first);
     line_close(&at);
-    return 0;
+    return lost ? 1 : 0;
 }

@@ -57,9 +57,18 @@ impl mbm_port {
     }
 }
 
+/// Bytes of a buffer that are used: more a port's hooks could not count.
+pub(super) const fn countable(bytes: u16) -> u16 {
+    if bytes > i16::MAX as u16 {
+        i16::MAX as u16
+    } else {
+        bytes
+    }
+}
+
 // SAFETY, here and below: the hooks are C functions that keep the contract
-// that their comments state, slices are valid for their length and at most as
-// long as a frame, and what a complete port has is called of such a port only.
+// that their comments state, slices are valid for their length and no longer than
+// an i16 counts, and what a complete port has is called of such a port only.
 impl Port for mbm_port {
     fn is_ready(&self) -> bool {
         // Begin takes complete ports only.

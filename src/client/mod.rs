@@ -30,6 +30,9 @@ pub const STREAM_SILENCE: u32 = millis(20);
 /// The pause within an ASCII frame that ends it (serial line guide V1.02, 2.5.2.1).
 pub const ASCII_SILENCE: u32 = millis(1000);
 
+/// How soon to look again whether a port takes bytes that it did not take.
+const FULL_PORT: u32 = millis(1);
+
 /// How requests travel.
 pub trait Line<J> {
     /// The most requests under way at once.
@@ -234,7 +237,8 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     }
 
     /// How long, in microseconds from `now`, poll will find nothing to do unless
-    /// a byte arrives; the greatest value if there is no request.
+    /// a byte arrives; the greatest value if there is no request, and then no byte is
+    /// taken either. While a TCP port does not take what is to be sent, 1000.
     pub fn poll_delay(&self, now: u32) -> u32 {
         match self.line.delay(now) {
             _ if self.lent => u32::MAX,

@@ -9,7 +9,7 @@ use crate::error::Status;
 use crate::frame::rtu::Window;
 use crate::frame::Search;
 use crate::port::Port;
-use crate::transaction::{Transaction, BROADCAST};
+use crate::transaction::{Counter, Transaction, BROADCAST};
 
 /// One request at a time, in RTU frames, or with [`crate::frame::ascii_window`]
 /// in ASCII frames.
@@ -55,6 +55,19 @@ impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
         self.engine.poll(now)
     }
 
+    /// Takes what comes while requests wait to be asked again, for who waits for bytes
+    /// in select would not sleep. (An interrupt wakes a microcontroller but once.)
+    fn drop_late<const N: usize>(&mut self, shared: &mut Shared<J, N>) {
+        let heard = self.engine.port.read(self.engine.storage.frame());
+        if heard < 0 {
+            shared.lose();
+        } else if heard > 0 {
+            let counter = Counter::BytesReceived;
+            self.engine.storage.count(counter, heard as u16);
+            self.engine.line_used();
+        }
+    }
+
     fn received(&mut self, job: &mut J, status: Status) -> Status {
         let ticket = job.ticket_mut();
         ticket.exception = self.engine.exception_code();
@@ -88,10 +101,15 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         &mut self,
         shared: &mut Shared<J, N>,
         now: u32,
-        _: bool,
+        fresh: bool,
     ) -> Option<J> {
         let started = if !self.engine.is_pending() {
-            let at = shared.due(0, now, &mut self.engine.storage, |_| true)?;
+            let Some(at) = shared.due(0, now, &mut self.engine.storage, |_| true) else {
+                if cfg!(not(target_os = "none")) && fresh && !shared.queue.is_empty() {
+                    self.drop_late(shared);
+                }
+                return None;
+            };
             let job = shared.remove(at)?;
             if job.ticket().is(Stage::Lost) {
                 return shared.conclude(job, Status::LINK_LOST, now, &mut self.engine.storage);

@@ -7,6 +7,7 @@ use super::units::Means;
 use super::Line;
 use crate::error::Status;
 use crate::frame::tcp::{self, Header};
+use crate::pdu::diagnostics::REPORT_SERVER_ID;
 use crate::port::Port;
 use crate::transaction::{Counter, Settings};
 use core::cell::Cell;
@@ -81,13 +82,9 @@ impl<P: Port, S: Means> Tcp<P, S> {
     fn hear(&mut self) -> bool {
         let frame = self.means.frame();
         if self.start > 0 {
-            let cells = Cell::from_mut(&mut *frame).as_slice_of_cells();
-            let kept = cells.get(usize::from(self.start)..usize::from(self.end));
-            let kept = kept.unwrap_or_default();
-            for (to, from) in cells.iter().zip(kept) {
-                to.set(from.get());
-            }
-            self.end = kept.len() as u16;
+            let kept = frame.get_mut(..usize::from(self.end));
+            close_up(kept.unwrap_or_default(), self.start.into());
+            self.end -= self.start;
             self.start = 0;
         }
         let Some(room) = frame.get_mut(usize::from(self.end)..) else {
@@ -231,6 +228,35 @@ impl<P: Port, S: Means> Tcp<P, S> {
         Ok(())
     }
 
+    /// Takes a request back that was not sent, so that it is not sent later. True if
+    /// it was not, or only half.
+    #[cold]
+    fn unsend(&mut self, wire: u16) -> bool {
+        let filled = usize::from(self.filled);
+        let bytes = self.means.outgoing().get_mut(..filled);
+        let (bytes, mut at) = (bytes.unwrap_or_default(), 0);
+        while let Some(rest) = bytes.get_mut(at..) {
+            let Ok(header) = tcp::header(rest) else {
+                break;
+            };
+            let end = at + header.total;
+            if header.transaction != wire {
+                at = end;
+                continue;
+            }
+            if at >= usize::from(self.sent) {
+                close_up(rest, header.total);
+                self.filled -= header.total as u16;
+                if self.sent == self.filled {
+                    self.sent = 0;
+                    self.filled = 0;
+                }
+            }
+            return end > usize::from(self.sent);
+        }
+        false
+    }
+
     /// Hands over what is to be sent; false if the link is lost.
     fn flush<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>) -> bool {
         if self.sent == self.filled {
@@ -251,8 +277,23 @@ impl<P: Port, S: Means> Tcp<P, S> {
             self.sent = 0;
             self.filled = 0;
             shared.look |= self.blocked;
+            self.blocked = false;
         }
         true
+    }
+
+    /// Half of a request that was given up is all that is left to be sent: if it does
+    /// not go, which is so for true, what waits for its room would wait for ever.
+    /// `None` if the link is lost.
+    #[cold]
+    fn push_half<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>) -> Option<bool> {
+        let half = self.sent;
+        if !self.flush(shared) {
+            return None;
+        }
+        let stuck = half == self.sent;
+        shared.look |= stuck && self.blocked;
+        Some(stuck)
     }
 
     /// The request was not answered in time: what that means.
@@ -262,7 +303,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
             return Status::OK;
         }
         self.means.count(Counter::Timeouts, 1);
-        if self.sent < self.filled {
+        if self.unsend(ticket.wire) {
             Status::LINE_BUSY
         } else if ticket.is(Stage::Strayed) {
             Status::INVALID_SLAVE_ID
@@ -279,6 +320,15 @@ impl<P: Port, S: Means> Tcp<P, S> {
     }
 }
 
+/// Moves what stands behind the first `by` bytes over them.
+#[cfg_attr(target_os = "none", inline(never))]
+fn close_up(bytes: &mut [u8], by: usize) {
+    let cells = Cell::from_mut(bytes).as_slice_of_cells();
+    for (to, from) in cells.iter().zip(cells.get(by..).unwrap_or_default()) {
+        to.set(from.get());
+    }
+}
+
 fn answers<J: Job>(job: &J, header: &Header) -> bool {
     let ticket = job.ticket();
     ticket.is_sent() && ticket.wire == header.transaction && ticket.unit == header.unit
@@ -289,6 +339,9 @@ fn judge<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
     let outline = &job.ticket().outline;
     match outline.expected(pdu, pdu.len()) {
         Some(length) if usize::from(length.get()) == pdu.len() => {}
+        // Some devices count the id alone and send more behind it.
+        Some(length)
+            if pdu.first() == Some(&REPORT_SERVER_ID) && usize::from(length.get()) < pdu.len() => {}
         None if pdu.first().map(|code| code & 0x7F) != Some(outline.function()) => {
             return Status::INVALID_FUNCTION;
         }
@@ -323,8 +376,10 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
     }
 
     fn released(&mut self, job: &J) {
-        if job.ticket().is_sent() {
+        let ticket = job.ticket();
+        if ticket.is_sent() {
             self.flying = self.flying.saturating_sub(1);
+            self.unsend(ticket.wire);
         }
     }
 
@@ -340,13 +395,21 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
         if let Some(job) = self.dispatch(shared, now) {
             return Some(job);
         }
-        if fresh && self.flying > 0 {
+        // What comes late is taken too, for who waits in select would not sleep.
+        if fresh && (self.flying > 0 || shared.delay(now) > 0) {
             if !self.hear() {
                 return self.lose(shared, now);
             }
             if let Some(job) = self.dispatch(shared, now) {
                 return Some(job);
             }
+        }
+        let mut stuck = false;
+        if self.flying == 0 && self.sent < self.filled {
+            let Some(is_stuck) = self.push_half(shared) else {
+                return self.lose(shared, now);
+            };
+            stuck = is_stuck;
         }
         let (mut from, mut blocked) = (0, false);
         let mut reads = u8::MAX;
@@ -357,12 +420,12 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
             let due = shared.due(from, now, &mut self.means, |job| {
                 let ticket = job.ticket();
                 let length = filled + usize::from(ticket.outline.request_length());
-                let fits = length <= room || filled == tcp::PDU;
+                let fits = length <= room || filled == tcp::PDU || stuck;
                 let accepted = !ticket.is(Stage::Queued) || (flying < most && fits);
                 blocked |= !accepted;
                 accepted
             });
-            self.blocked = blocked;
+            self.blocked |= blocked;
             let Some(at) = due else {
                 break;
             };
@@ -373,6 +436,7 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
                         from = at;
                         continue;
                     }
+                    Err(_) if stuck => Status::LINE_BUSY,
                     Err(refused) => refused,
                 }
             } else if job.ticket().is_sent() {
@@ -421,6 +485,6 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
     }
 
     fn delay(&self, _: u32) -> Option<u32> {
-        (self.sent < self.filled).then_some(0)
+        (self.sent < self.filled).then_some(super::FULL_PORT)
     }
 }

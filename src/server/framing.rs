@@ -13,6 +13,10 @@ use core::cell::Cell;
 /// Bytes that are given up at once where the buffer is full.
 const SLIDE: usize = 16;
 
+/// Reads of one poll at most, where a peer floods with what is no frame. As many as a
+/// frame has bytes, and more.
+const MOST_READS: u16 = 512;
+
 /// The inter-character timeout of ASCII (serial line guide V1.02, 2.5.2.1).
 const ASCII_TIMEOUT: u32 = time::millis(1000);
 
@@ -159,7 +163,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// Frames that tell their length are taken one by one; for others, and to
     /// find the way back, there is silence.
     fn receive_by_length(&mut self) -> Status {
-        loop {
+        for _ in 0..MOST_READS {
             let end = usize::from(self.end);
             let frame = self.lent.frame();
             let capacity = frame.len();
@@ -198,6 +202,7 @@ impl<P: Port, B: Lent> Server<P, B> {
                 return self.last_frame();
             }
         }
+        Status::OK
     }
 
     /// The length of the request that has begun to arrive.

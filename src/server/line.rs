@@ -14,6 +14,13 @@ use crate::pdu::limits::MAX_PDU;
 use crate::port::Port;
 use crate::time::{self, elapsed};
 
+/// How soon to look again at what only the port or a service can bring on.
+const NOT_BY_ITSELF: u32 = time::millis(1);
+
+/// Requests that one poll takes at most of which none is answered: a peer that floods
+/// with those of others holds nobody up.
+pub const MOST_REQUESTS: u8 = 16;
+
 /// What the caller lends to a server.
 pub trait Lent {
     /// The storage of one frame: a request first, then its response.
@@ -215,13 +222,16 @@ impl<P: Port, B: Lent> Server<P, B> {
     }
 
     /// How long, in microseconds from `now`, poll will find nothing to do unless
-    /// a byte arrives.
+    /// a byte arrives. While a service is not done, or a stream does not take the
+    /// response, 1000: to go on sooner, poll when that has changed.
     pub fn poll_delay(&self, now: u32) -> u32 {
         match self.phase {
             Phase::Listen if self.end == 0 || self.silence == u32::MAX => u32::MAX,
             Phase::Listen => self.silence.saturating_sub(elapsed(now, self.last_byte)),
             Phase::Over => u32::MAX,
-            _ => 0,
+            // On a line no byte and no driver may be late.
+            Phase::Send | Phase::Flush if self.request.serial => 0,
+            _ => NOT_BY_ITSELF,
         }
     }
 
@@ -248,7 +258,7 @@ impl<P: Port, B: Lent> Server<P, B> {
 
     /// As [`Server::poll`], with requests served by `units` and answered.
     pub fn serve(&mut self, now: u32, units: &mut (impl Units + ?Sized)) -> Status {
-        loop {
+        for _ in 0..MOST_REQUESTS {
             let status = self.poll(now);
             if status != Status::PENDING {
                 return status;
@@ -256,9 +266,10 @@ impl<P: Port, B: Lent> Server<P, B> {
             let heading = self.request;
             let reply = units.serve(&heading, self.pdu());
             if !self.answer(reply) {
-                return Status::OK;
+                break;
             }
         }
+        Status::OK
     }
 
     /// Takes the reply to the request: a response stands where its PDU stood.

@@ -24,6 +24,6 @@ pub mod storage;
 pub mod table;
 mod units;
 
-pub use line::{Lent, Server};
+pub use line::{Lent, Server, MOST_REQUESTS};
 pub use reply::Reply;
 pub use units::{Concern, Heading, Service, Unit, Units};

@@ -3,7 +3,7 @@
 use super::{client, mbm_client, pointers, Kind, Lent, LentByC, Object, BEGUN};
 use super::{Ascii, Rtu, TcpIp};
 use crate::capi::frame::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
-use crate::capi::port::mbm_port;
+use crate::capi::port::{countable, mbm_port};
 use crate::client::{Client, Line, Serial, Tcp, ASCII_SILENCE, STREAM_SILENCE};
 use crate::error::Status;
 use crate::frame::{ascii, ascii_window, rtu, Search};
@@ -40,7 +40,7 @@ unsafe fn begin<L: Kind>(
     settings.preset();
     place.copy(port);
     means.frame = frame;
-    means.frame_bytes = frame_bytes;
+    means.frame_bytes = countable(frame_bytes);
     Status::OK
 }
 
@@ -219,7 +219,7 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
             let tcp: &mut TcpIp = super::client(object);
             tcp.line.limit(super::MBM_CLIENT_DEPTH);
             tcp.line.means.outgoing = outgoing;
-            tcp.line.means.outgoing_bytes = outgoingBytes;
+            tcp.line.means.outgoing_bytes = countable(outgoingBytes);
         }
         status.code()
     }

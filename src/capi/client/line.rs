@@ -1,6 +1,7 @@
 //! The line under a client: lost and found, lent and taken back.
 
 use super::{client, common, mbm_client, on_line, parts, pointers, Ascii, Line, Rtu, TcpIp};
+use crate::capi::frame::MBM_FRAMING_RTU;
 use crate::capi::master::mbm_master;
 use crate::capi::pointers as masters;
 use crate::error::Status;
@@ -69,7 +70,7 @@ pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8
 /// client's requests wait until mbm_client_takeBack. One of the two has the line
 /// at any time.
 ///
-/// @param client  the object, of a serial line or of RTU over TCP
+/// @param client  the object; for a facade, of RTU frames on a line or over TCP
 /// @param master  a facade with buffers, which gets the client's port; NULL if
 ///                you use the line in another way
 /// @return MBM_OK; MBM_BUSY if a request is under way or the line is lent already;
@@ -81,6 +82,8 @@ pub unsafe extern "C" fn mbm_client_lend(client: *mut mbm_client, master: *mut m
         pointers::with(client, |object| {
             if !master.is_null() {
                 match masters::prepare(master) {
+                    // A facade speaks RTU.
+                    _ if object.framing != MBM_FRAMING_RTU => return Status::INVALID_ARGUMENT,
                     Status::OK if masters::object(master).core().is_pending() => {
                         return Status::BUSY;
                     }

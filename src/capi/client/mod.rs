@@ -385,10 +385,13 @@ pub unsafe extern "C" fn mbm_client_poll(client: *mut mbm_client) -> u8 {
 }
 
 /// How long mbm_client_poll will find nothing to do unless a byte arrives, so
-/// that a program may wait for one in select, or sleep, until then.
+/// that a program may wait for one in select, or sleep, until then. Bytes are taken
+/// only while a request is pending: with none, wait for something else.
 ///
 /// @param client  the object
-/// @return microseconds; 0 means poll now, 0xFFFFFFFF that there is no request
+/// @return microseconds; 0 means poll now, 0xFFFFFFFF that there is no request; 1000
+///         while a TCP port does not take what is to be sent: to poll sooner, wait
+///         for that too, as mbm_tcp_wait does
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_pollDelay(client: *const mbm_client) -> u32 {
     // SAFETY: as the header demands.

@@ -2,7 +2,7 @@
 
 use super::{check, mbm_server, mbm_unit, object, Core, Object, BEGUN};
 use crate::capi::frame::MBM_MAX_TCP_FRAME;
-use crate::capi::port::mbm_port;
+use crate::capi::port::{countable, mbm_port};
 use crate::error::Status;
 use crate::time;
 
@@ -45,7 +45,7 @@ unsafe fn begin(
         core.port.postTransmission = (*port).postTransmission;
         core.lent.frame = frame;
         core.lent.units = units;
-        core.lent.bytes = bytes;
+        core.lent.bytes = countable(bytes);
         core.lent.count = count;
         Some(core)
     }

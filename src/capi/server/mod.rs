@@ -24,7 +24,7 @@ use super::port::mbm_port;
 use crate::error::Status;
 use crate::pdu::custom::Rule;
 use crate::port::Port;
-use crate::server::{Lent, Reply, Server};
+use crate::server::{Lent, Reply, Server, MOST_REQUESTS};
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 
@@ -119,7 +119,8 @@ unsafe fn object<'a>(server: *mut mbm_server) -> &'a mut Object {
 ///
 /// Call it as often as you like, at least once per character time of the line
 /// if nothing else buffers its bytes. On a serial line a response begins with
-/// the first call after the line has been silent for t3.5.
+/// the first call after the line has been silent for t3.5. What units call, hooks and
+/// functions of yours, may not poll the server that called it.
 ///
 /// @param server  the object
 /// @return MBM_OK; MBM_LINK_LOST if the port said so, which ends a connection;
@@ -135,7 +136,7 @@ pub unsafe extern "C" fn mbm_server_poll(server: *mut mbm_server) -> u8 {
         if status != Status::OK {
             return status.code();
         }
-        loop {
+        for _ in 0..MOST_REQUESTS {
             let core = &mut object(server).core;
             let now = core.port.micros();
             let status = core.poll(now);
@@ -146,17 +147,21 @@ pub unsafe extern "C" fn mbm_server_poll(server: *mut mbm_server) -> u8 {
             let pdu = core.lent.frame.add((*heading).head.into());
             let reply = units::serve(core.lent.units, core.lent.count, heading, pdu);
             if !object(server).core.answer(Reply::from_number(reply)) {
-                return Status::OK.code();
+                break;
             }
         }
     }
+    Status::OK.code()
 }
 
 /// How long mbm_server_poll will find nothing to do unless a byte arrives, so
 /// that a program may sleep until then.
 ///
 /// @param server  the object
-/// @return microseconds; 0 means poll now, 0xFFFFFFFF until a byte arrives
+/// @return microseconds; 0 means poll now, 0xFFFFFFFF until a byte arrives; 1000
+///         while a function of yours returns MBM_REPLY_PENDING or a connection does
+///         not take the response: to go on sooner, poll when that has changed. No
+///         byte is taken meanwhile, so do not wait for one
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_pollDelay(server: *const mbm_server) -> u32 {
     // SAFETY: as the header demands; every object is writable storage.

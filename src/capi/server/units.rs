@@ -45,7 +45,8 @@ pub struct mbm_unit {
     >,
     /// Not for you.
     pub diagnostics: *mut mbm_diagnostics,
-    /// The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers to every id.
+    /// The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers to every id. A
+    /// unit that serves nothing is silent, as if it were not there.
     pub id: u8,
 }
 

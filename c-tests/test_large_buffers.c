@@ -1,0 +1,142 @@
+/* Buffers longer than an int16_t counts, which a port's read and write return. */
+#include "crc.h"
+#include "mbm.h"
+#include "test.h"
+
+#include <string.h>
+
+enum { LARGE = UINT16_MAX };
+
+static uint8_t incoming[LARGE], outgoing[LARGE];
+
+static struct {
+    uint8_t arriving[300], sent[300];
+    size_t first, last, length;
+    uint32_t now;
+} wire;
+
+static int16_t wire_read(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    int16_t count = 0;
+
+    (void)context;
+    assert_in_range(capacity, 1, INT16_MAX);
+    while (count < capacity && wire.first < wire.last)
+        bytes[count++] = wire.arriving[wire.first++];
+    return count;
+}
+
+static int16_t wire_write(void *context, const uint8_t *bytes, uint16_t length)
+{
+    (void)context;
+    memcpy(wire.sent + wire.length, bytes, length);
+    wire.length += length;
+    return (int16_t)length;
+}
+
+static uint32_t wire_micros(void *context)
+{
+    (void)context;
+    return wire.now += 1000;
+}
+
+static const mbm_port port = {.read = wire_read, .write = wire_write, .micros = wire_micros};
+
+static void arrives(const uint8_t *bytes, size_t length)
+{
+    memcpy(wire.arriving, bytes, length);
+    wire.first = 0;
+    wire.last = length;
+}
+
+static void a_client_uses_of_them_what_a_port_can_count(void **state)
+{
+    static const uint8_t response[] = {0, 0, 0, 0, 0, 7, 1, 3, 4, 0, 1, 0, 2};
+    static mbm_client client;
+    mbm_clientRequest request = {0};
+    uint16_t words[2] = {0};
+
+    (void)state;
+    memset(&wire, 0, sizeof wire);
+    OK(mbm_client_beginTcp(&client, &port, incoming, LARGE, outgoing, LARGE));
+    request.unit = 1;
+    request.reply = words;
+    request.replyBytes = sizeof words;
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 2));
+    IS(MBM_PENDING, mbm_client_poll(&client));
+    arrives(response, sizeof response);
+    OK(mbm_client_poll(&client));
+    assert_int_equal(request.status, MBM_OK);
+    assert_int_equal(words[1], 2);
+}
+
+static void a_client_of_a_serial_line_does_so(void **state)
+{
+    uint8_t response[] = {1, 3, 4, 0, 1, 0, 2, 0, 0};
+    static mbm_client client;
+    mbm_clientRequest request = {0};
+    uint16_t words[2] = {0};
+    unsigned i;
+
+    (void)state;
+    memset(&wire, 0, sizeof wire);
+    OK(mbm_client_beginRtu(&client, &port, incoming, LARGE));
+    request.unit = 1;
+    request.reply = words;
+    request.replyBytes = sizeof words;
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 2));
+    for (i = 0; i < 10; i++)
+        IS(MBM_PENDING, mbm_client_poll(&client));
+    (void)seal(response, 7);
+    arrives(response, sizeof response);
+    for (i = 0; i < 10; i++)
+        (void)mbm_client_poll(&client);
+    assert_int_equal(request.status, MBM_OK);
+    assert_int_equal(words[1], 2);
+}
+
+static void serves(uint8_t (*begin)(mbm_server *, const mbm_port *, mbm_unit *, uint8_t, uint8_t *,
+                                    uint16_t),
+                   const uint8_t *request, size_t length, size_t answered)
+{
+    static mbm_server server;
+    static uint16_t words[2];
+    mbm_unit unit = {0};
+    mbm_registerTable table = {0};
+    unsigned i;
+
+    memset(&server, 0, sizeof server);
+    memset(&wire, 0, sizeof wire);
+    unit.id = 1;
+    table.words = words;
+    table.size = 2;
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(begin(&server, &port, &unit, 1, incoming, LARGE));
+    arrives(request, length);
+    for (i = 0; i < 10; i++)
+        OK(mbm_server_poll(&server));
+    assert_int_equal(wire.length, answered);
+}
+
+static void a_server_does_so(void **state)
+{
+    static const uint8_t over_tcp[] = {0, 0, 0, 0, 0, 6, 1, 3, 0, 0, 0, 2};
+    uint8_t over_rtu[] = {1, 3, 0, 0, 0, 2, 0, 0};
+
+    (void)state;
+    (void)seal(over_rtu, 6);
+    serves(mbm_server_beginTcp, over_tcp, sizeof over_tcp, 13);
+    serves(mbm_server_begin, over_rtu, sizeof over_rtu, 9);
+    serves(mbm_server_beginRtuOverTcp, over_rtu, sizeof over_rtu, 9);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_client_uses_of_them_what_a_port_can_count),
+        cmocka_unit_test(a_client_of_a_serial_line_does_so),
+        cmocka_unit_test(a_server_does_so),
+    };
+
+    return cmocka_run_group_tests_name("large buffers", tests, NULL, NULL);
+}

@@ -1,0 +1,91 @@
+/* mbm_tcp_wait sleeps where nobody would do anything about what it could tell. */
+#define _GNU_SOURCE
+#include "mbm_tcp.h"
+#include "tcp_peer.h"
+#include "test.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { SECOND = 1000000 };
+
+static tcp_peer *peer;
+static mbm_tcp tcp;
+static mbm_port port;
+static char service[8];
+
+static int begin(void **state)
+{
+    (void)state;
+    peer = tcp_peer_new();
+    snprintf(service, sizeof service, "%u", tcp_peer_start(peer, 0));
+    memset(&tcp, 0, sizeof tcp);
+    port = mbm_tcp_port(&tcp, NULL);
+    return 0;
+}
+
+static int end(void **state)
+{
+    (void)state;
+    mbm_tcp_close(&tcp);
+    tcp_peer_stop(peer);
+    return 0;
+}
+
+static void a_connection_that_comes_to_be_ends_the_wait_once(void **state)
+{
+    (void)state;
+    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 5 * SECOND), 1);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
+}
+
+/* The peer floods and takes nothing: the program that cannot answer sleeps. */
+static void what_nobody_reads_does_not_end_the_wait_again(void **state)
+{
+    static uint8_t much[60000];
+    uint8_t bytes[4];
+    int pair[2];
+
+    (void)state;
+    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, pair), 0);
+    assert_int_equal(mbm_tcp_attach(&tcp, pair[0]), 0);
+    assert_int_equal(write(pair[1], "abcd", 4), 4);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
+    /* It does once somebody read, or had said all that was to be said before. */
+    assert_int_equal(port.read(port.context, bytes, 2), 2);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
+    while (port.write(port.context, much, sizeof much) > 0)
+        ;
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
+    assert_int_equal(fcntl(pair[1], F_SETFL, O_NONBLOCK), 0);
+    while (read(pair[1], much, sizeof much) > 0)
+        ;
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
+    assert_int_equal(port.write(port.context, much, 10), 10);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
+    assert_int_equal(port.read(port.context, bytes, 4), 2);
+    /* Nor does the end of the stream, once it was told. */
+    assert_int_equal(read(pair[1], much, sizeof much), 10);
+    close(pair[1]);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
+    assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
+    assert_int_equal(mbm_tcp_isConnected(&tcp), -1);
+    assert_int_equal(tcp.error, EPIPE);
+}
+
+#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(a_connection_that_comes_to_be_ends_the_wait_once),
+        TEST(what_nobody_reads_does_not_end_the_wait_again),
+    };
+
+    return cmocka_run_group_tests_name("waiting for TCP", tests, NULL, NULL);
+}
