@@ -197,13 +197,22 @@ static void every_function_passes_through(void **state)
     close(fd);
 }
 
+/* A busy machine makes times longer, and never shorter: the shortest of so many
+ * attempts counts. */
+enum { ATTEMPTS = 5 };
+
 static void an_absent_device_is_0b_after_the_timeout(void **state)
 {
-    double before = seconds(), took;
+    double took = TIMEOUT_MS;
+    unsigned i;
 
     (void)state;
-    expect_exception(0x0B, ABSENT);
-    took = seconds() - before;
+    for (i = 0; i < ATTEMPTS && took > TIMEOUT_MS * 2e-3; i++) {
+        double before = seconds();
+
+        expect_exception(0x0B, ABSENT);
+        took = seconds() - before;
+    }
     assert_true(took > TIMEOUT_MS * 0.9e-3 && took < TIMEOUT_MS * 2e-3);
     modbus_set_slave(client, PEER_UNIT);
     libmodbus_reads_and_writes_through_it(state);
@@ -211,14 +220,20 @@ static void an_absent_device_is_0b_after_the_timeout(void **state)
 
 static void a_unit_without_a_line_is_0a(void **state)
 {
-    double before = seconds();
+    double took = TIMEOUT_MS;
+    unsigned i;
 
     (void)state;
-    expect_exception(0x0A, NO_LINE);
-    expect_exception(0x0A, 31);
-    expect_exception(0x0A, DEAD_LINE);
+    for (i = 0; i < ATTEMPTS && took > TIMEOUT_MS * 0.9e-3; i++) {
+        double before = seconds();
+
+        expect_exception(0x0A, NO_LINE);
+        expect_exception(0x0A, 31);
+        expect_exception(0x0A, DEAD_LINE);
+        took = seconds() - before;
+    }
     /* Nobody was asked. */
-    assert_true(seconds() - before < TIMEOUT_MS * 0.9e-3);
+    assert_true(took < TIMEOUT_MS * 0.9e-3);
 }
 
 static void requests_of_many_connections_wait_for_their_turn(void **state)
@@ -258,18 +273,22 @@ static void a_line_that_waits_holds_up_no_other(void **state)
     uint8_t answer[600];
     uint16_t word;
     int fd = tcp_connect((uint16_t)port);
-    double before;
-    unsigned i;
+    unsigned i, attempts;
 
     (void)state;
-    before = seconds();
-    assert_int_equal(write(fd, absent, sizeof absent), sizeof absent);
     modbus_set_slave(client, SERVED_UNIT);
-    for (i = 0; i < 10; i++)
-        assert_int_equal(modbus_read_registers(client, SERVED_BASE, 1, &word), 1);
-    assert_true(seconds() - before < TIMEOUT_MS * 0.8e-3);
-    assert_int_equal(asked_bytes(fd, absent, 0, answer, 9), 9);
-    assert_int_equal(answer[8], 0x0B);
+    for (i = attempts = 0; i < 5 && attempts < ATTEMPTS; attempts++) {
+        struct pollfd told = {fd, POLLIN, 0};
+
+        assert_int_equal(write(fd, absent, sizeof absent), sizeof absent);
+        for (i = 0; i < 5 && poll(&told, 1, 0) == 0; i++)
+            assert_int_equal(modbus_read_registers(client, SERVED_BASE, 1, &word), 1);
+        i = poll(&told, 1, 0) == 0 ? i : 0;
+        assert_int_equal(asked_bytes(fd, absent, 0, answer, 9), 9);
+        assert_int_equal(answer[8], 0x0B);
+    }
+    /* All were answered while the other line still waited. */
+    assert_int_equal(i, 5);
     close(fd);
 }
 

@@ -7,7 +7,7 @@
 #include "report.h"
 #include "sleep.h"
 
-enum { TIMEOUT = 1000 /* ms */ };
+enum { TIMEOUT = PRESENT_TIMEOUT };
 
 /* A request of main.c, what its end should be, and what queues it. */
 typedef struct task {

@@ -97,7 +97,7 @@ static void meet_refusals(void)
     note(ASK_ABSENT_UNIT, "ask a unit that is not there",
          mbm_master_readHoldingRegisters(&node, 0, 1), MBM_RESPONSE_TIMED_OUT);
     report[REPORT_ABSENT_MILLIS] = (uint16_t)((clock_micros(0) - start) / 1000u);
-    mbm_master_setResponseTimeout(&node, 1000);
+    mbm_master_setResponseTimeout(&node, PRESENT_TIMEOUT);
     mbm_master_setSlaveID(&node, UNIT);
     note(READ_AGAIN, "read again", mbm_master_readHoldingRegisters(&node, 100, 2), MBM_OK);
 }
@@ -135,7 +135,7 @@ int main(void)
                           sizeof frame);
     mbm_master_begin(&node, UNIT, &port);
     mbm_master_setBaudRate(&node, BAUD);
-    mbm_master_setResponseTimeout(&node, 1000);
+    mbm_master_setResponseTimeout(&node, PRESENT_TIMEOUT);
     mbm_master_setCounters(&node, &counters);
 
     write();

@@ -53,7 +53,10 @@ enum {
     REPORT_IS_HERE = 0x6D62,
     UNIT = 17,
     ABSENT_UNIT = 99,
-    ABSENT_TIMEOUT = 150 /* ms */
+    /* Milliseconds. A simulator hands bytes over one by one, slowly where it has not
+     * much of a computer. */
+    PRESENT_TIMEOUT = 10000,
+    ABSENT_TIMEOUT = 150
 };
 
 #endif

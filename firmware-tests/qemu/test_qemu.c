@@ -375,7 +375,7 @@ static int test_machine(const machine *m)
     }
     board = m;
     /* Should all other waits fail: ends this program, and QEMU with it. */
-    alarm(240);
+    alarm(900);
     return _cmocka_run_group_tests(m->name, tests, count, run_with_libmodbus, stop);
 }
 

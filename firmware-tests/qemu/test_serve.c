@@ -44,7 +44,8 @@ static int start(void **state)
         return -1;
     client = modbus_new_rtu(line.path, 115200, 'N', 8, 1);
     if (!client || modbus_set_slave(client, SERVE_UNIT) || modbus_connect(client) ||
-        modbus_set_response_timeout(client, 60, 0))
+        modbus_set_response_timeout(client, 60, 0) ||
+        modbus_set_byte_timeout(client, 60, 0))
         return -1;
     return 0;
 }
@@ -256,7 +257,7 @@ int main(int argc, char **argv)
             continue;
         board = &machines[m];
         /* Should all other waits fail: ends this program, and QEMU with it. */
-        alarm(240);
+        alarm(900);
         failed += cmocka_run_group_tests_name(board->name, tests, start, stop);
         asked++;
     }
