@@ -2,7 +2,9 @@
  *
  *     serve rtu | ascii | tcp | rtu-over-tcp
  *
- * Prints `ready PATH` or `ready PORT`, and serves until its input ends. */
+ * Prints `ready PATH` or `ready PORT`, and serves until its input ends. For each
+ * line of that it prints how many frames unit 17 has heard: who asks without a
+ * response to come sees so that it was heard. */
 #include "served.h"
 
 #include <stdio.h>
@@ -34,8 +36,12 @@ int main(int argc, char **argv)
         printf("ready %d\n", device.port);
     }
     fflush(stdout);
-    while (read(STDIN_FILENO, &byte, 1) > 0)
-        ;
+    while (read(STDIN_FILENO, &byte, 1) > 0) {
+        if (byte == '\n') {
+            printf("%u\n", device.diagnostics.busMessages);
+            fflush(stdout);
+        }
+    }
     served_stop(&device);
     return 0;
 }

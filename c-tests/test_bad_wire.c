@@ -9,18 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static mbm_port tty_port;
-
-/* The terminal's read, until a script says that the link is gone. */
-static int16_t read_or_die(void *context, uint8_t *bytes, uint16_t capacity)
-{
-    if (fault_link_dies) {
-        fault_link_dies = 0;
-        return -1;
-    }
-    return tty_port.read(context, bytes, capacity);
-}
-
 /* '.' right, 'F' a failed call, 'W' success with wrong data. */
 static char transact(node *n, const fault *f, unsigned number, uint8_t *status)
 {
@@ -50,8 +38,8 @@ static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRAN
 
     fault_start(&device, f);
     node_begin(&n, device.line.ours, FAULT_UNIT);
-    port = tty_port = mbm_tty_port(&n.tty, &n.master);
-    port.read = read_or_die;
+    port = mbm_tty_port(&n.tty, &n.master);
+    port = fault_port(&device, &port);
     mbm_master_begin(&n.master, FAULT_UNIT, &port);
     mbm_master_setResponseTimeout(&n.master, 400);
     mbm_master_setEchoDiscard(&n.master, f->echo);

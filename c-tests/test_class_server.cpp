@@ -2,6 +2,7 @@
 #include "wire.h"
 
 extern "C" {
+#include "await.h"
 #include "server.h"
 }
 
@@ -39,6 +40,7 @@ static int start(void **)
     node = ModbusMaster();
     node.begin(17, line);
     node.setBaudRate(115200);
+    node.setResponseTimeout(PATIENCE_MS);
     node.idle([] {
         struct pollfd ready = {line.fd, POLLIN, 0};
         ::poll(&ready, 1, 1);

@@ -1,6 +1,7 @@
 /* The client for C against libmodbus: RTU over a pty, TCP over loopback; and what
  * it says to bad calls. */
 #define _GNU_SOURCE
+#include "await.h"
 #include "client.h"
 #include "server.h"
 #include "tcp_server.h"
@@ -232,6 +233,7 @@ static void the_facade_uses_the_line_between_the_clients_requests(void **state)
     a.port.idle = NULL;
     OK(mbm_master_setSlaveID(&node, UNIT));
     OK(mbm_master_setBlocking(&node, 0));
+    OK(mbm_master_setResponseTimeout(&node, PATIENCE_MS));
     IS(MBM_PENDING, mbm_master_readHoldingRegisters(&node, 0, 4));
     IS(MBM_BUSY, mbm_client_takeBack(&a.client, &node));
     while (mbm_master_poll(&node) == MBM_PENDING)
@@ -338,7 +340,7 @@ static void a_broadcast_reaches_and_a_rest_is_kept(void **state)
     server_start(&s, UNIT);
     asker_begin_rtu(&a, s.line.ours);
     ends(MBM_OK, &r, mbm_client_writeSingleRegister(&a.client, &r, 5, 0x5A5A));
-    assert_int_equal(s.mapping->tab_registers[5], 0x5A5A);
+    AWAIT(s.mapping->tab_registers[5] == 0x5A5A);
     units[0].unit = UNIT;
     units[0].delay = 50000;
     OK(mbm_client_setUnits(&a.client, units, 1));

@@ -7,18 +7,6 @@
 #include <stdio.h>
 #include <string.h>
 
-static mbm_port tty_port;
-
-/* The terminal's read, until a script says that the link is gone. */
-static int16_t read_or_die(void *context, uint8_t *bytes, uint16_t capacity)
-{
-    if (fault_link_dies) {
-        fault_link_dies = 0;
-        return -1;
-    }
-    return tty_port.read(context, bytes, capacity);
-}
-
 /* '.' right, 'F' a failed request, 'W' success with wrong data. */
 static char transact(asker *a, const fault *f, unsigned number, uint8_t *status)
 {
@@ -55,8 +43,8 @@ static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRAN
     fault_start(&device, f);
     memset(&a, 0, sizeof a);
     assert_int_equal(mbm_tty_attach(&a.tty, device.line.ours), 0);
-    a.port = tty_port = mbm_tty_port(&a.tty, NULL);
-    a.port.read = read_or_die;
+    a.port = mbm_tty_port(&a.tty, NULL);
+    a.port = fault_port(&device, &a.port);
     OK(mbm_client_beginRtu(&a.client, &a.port, a.incoming, 256));
     OK(mbm_client_setBaudRate(&a.client, 115200));
     OK(mbm_client_setResponseTimeout(&a.client, 400));

@@ -13,7 +13,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <time.h>
 #include <unistd.h>
 
 enum { FRAME = 12, HELD = 64, QUANTITY = 5, TIMEOUT = 30 };
@@ -24,7 +23,8 @@ typedef struct device {
     int listener, peer;
     volatile int stop;
     unsigned random;
-    struct { uint8_t bytes[64]; size_t length; uint64_t at; } held[HELD];
+    held_clock clock;
+    struct { uint8_t bytes[64]; size_t length; int64_t at; } held[HELD];
     unsigned count;
     pthread_t thread;
 } device;
@@ -33,14 +33,6 @@ static unsigned chance(unsigned *state, unsigned of)
 {
     *state = *state * 1103515245u + 12345u;
     return (*state >> 16) % of;
-}
-
-static uint64_t milliseconds(void)
-{
-    struct timespec now;
-
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * 1000u + (uint64_t)now.tv_nsec / 1000000u;
 }
 
 static uint16_t value_at(unsigned address)
@@ -68,7 +60,7 @@ static void hold(device *d, const uint8_t *bytes, size_t length, unsigned delay)
         return;
     memcpy(d->held[d->count].bytes, bytes, length);
     d->held[d->count].length = length;
-    d->held[d->count++].at = milliseconds() + delay;
+    d->held[d->count++].at = held_clock_now(&d->clock) + 1000 * (int64_t)delay;
 }
 
 /* What becomes of the response to a request; 0 if the connection is to go. */
@@ -120,7 +112,7 @@ static void send_due(device *d)
 {
     uint8_t all[HELD * 64];
     size_t length = 0, sent = 0;
-    uint64_t now = milliseconds();
+    int64_t now = held_clock_now(&d->clock);
     unsigned i;
 
     for (i = 0; i < d->count;) {
@@ -149,11 +141,24 @@ static void send_due(device *d)
     }
 }
 
+/* The client's clock waits for what is to be sent. */
+static void tell_due(device *d)
+{
+    int64_t due = HELD_CLOCK_NEVER;
+    unsigned i;
+
+    for (i = 0; i < d->count; i++)
+        if (d->held[i].at < due)
+            due = d->held[i].at;
+    held_clock_due(&d->clock, due);
+}
+
 static void *run_device(void *argument)
 {
     device *d = (device *)argument;
     uint8_t bytes[4096];
     size_t have = 0;
+    unsigned link = 0;
     int on = 1;
 
     while (!d->stop) {
@@ -164,9 +169,9 @@ static void *run_device(void *argument)
         if (poll(&wait, 1, d->count > 0 ? 1 : 10) > 0) {
             if (d->peer < 0) {
                 d->peer = accept(d->listener, NULL, NULL);
+                link = held_clock_link(&d->clock);
                 /* Pieces would wait for each other, longer than the timeout. */
                 setsockopt(d->peer, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-                d->count = 0;
                 have = 0;
                 continue;
             }
@@ -176,17 +181,22 @@ static void *run_device(void *argument)
                 if (!mistreat(d, bytes + used))
                     count = 0;
                 used += FRAME;
+                tell_due(d);
+                held_clock_done(&d->clock, link, FRAME);
             }
             memmove(bytes, bytes + used, have - used);
             have -= used;
             if (count <= 0) {
                 close(d->peer);
                 d->peer = -1;
+                d->count = 0;
+                tell_due(d);
                 continue;
             }
         }
         if (d->peer >= 0)
             send_due(d);
+        tell_due(d);
     }
     if (d->peer >= 0)
         close(d->peer);
@@ -259,8 +269,9 @@ static void every_request_ends_once_and_with_its_own_data(void **state)
     d.listener = tcp_listen(&port);
     d.peer = -1;
     d.random = 1;
+    held_clock_start(&d.clock);
     assert_int_equal(pthread_create(&d.thread, NULL, run_device, &d), 0);
-    asker_begin_tcp(&a, port);
+    asker_begin_tcp_by(&a, port, &d.clock);
     OK(mbm_client_setResponseTimeout(&a.client, TIMEOUT));
     OK(mbm_client_setRetries(&a.client, 1));
     for (i = 0; i < MBM_CLIENT_DEPTH && queued < total; i++)

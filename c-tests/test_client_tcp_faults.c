@@ -11,6 +11,7 @@
 enum { TIMEOUT = 150, WORDS = 5, MET = 3, ASKED = 8 };
 
 static asker a;
+static held_clock by_clock;
 static tcp_peer *peer;
 static mbm_clientRequest requests[ASKED];
 static uint16_t words[ASKED][WORDS];
@@ -19,7 +20,9 @@ static int begin(void **state)
 {
     (void)state;
     peer = tcp_peer_new();
-    asker_begin_tcp(&a, tcp_peer_start(peer, 0));
+    held_clock_start(&by_clock);
+    tcp_peer_clock(peer, &by_clock);
+    asker_begin_tcp_by(&a, tcp_peer_start(peer, 0), &by_clock);
     OK(mbm_client_setResponseTimeout(&a.client, TIMEOUT));
     return 0;
 }

@@ -1,6 +1,7 @@
 /* mbm_frame_* against libmodbus, RTU over a pty and TCP over loopback: what its
  * client sends is what we build, what its server answers is what we parse. */
 #define _GNU_SOURCE
+#include "await.h"
 #include "examples.h"
 #include "server.h"
 #include "test.h"
@@ -30,7 +31,7 @@ static uint16_t receive(int fd, const mbm_framing *f, uint8_t kind, uint8_t *fra
             assert_int_equal(expected.kind, MBM_LENGTH_EXACT);
             return have;
         }
-        assert_int_equal(poll(&wait, 1, 5000), 1);
+        assert_int_equal(poll(&wait, 1, PATIENCE_MS), 1);
         count = read(fd, frame + have, (size_t)(expected.bytes - have));
         assert_true(count > 0);
         have = (uint16_t)(have + count);

@@ -1,5 +1,6 @@
 /* The ten functions at their edges, against a real libmodbus server; what was
  * written is looked up in the server's own memory. */
+#include "await.h"
 #include "node.h"
 #include "server.h"
 #include "test.h"
@@ -277,7 +278,7 @@ static void a_broadcast_reaches_the_server_and_succeeds(void **state)
     mbm_master_setSlaveID(&n.master, 0);
     mbm_master_setTurnaroundDelay(&n.master, 60);
     assert_int_equal(mbm_master_writeSingleRegister(&n.master, 70, 0x5A5A), MBM_OK);
-    assert_int_equal(peer.mapping->tab_registers[70], 0x5A5A);
+    AWAIT(peer.mapping->tab_registers[70] == 0x5A5A);
     assert_int_equal(mbm_master_readHoldingRegisters(&n.master, 70, 1), MBM_BROADCAST_NOT_ALLOWED);
     mbm_master_setSlaveID(&n.master, 17);
     assert_int_equal(mbm_master_readHoldingRegisters(&n.master, 70, 1), MBM_OK);
@@ -293,10 +294,13 @@ static void a_non_blocking_request_is_pending_until_polled_to_its_end(void **sta
     mbm_master_setBlocking(&n.master, 0);
     assert_int_equal(mbm_master_readHoldingRegisters(&n.master, 3, 2), MBM_PENDING);
     assert_int_equal(mbm_master_writeSingleRegister(&n.master, 3, 1), MBM_BUSY);
+    assert_int_equal(n.counters.requests, 0);
     while ((status = mbm_master_poll(&n.master)) == MBM_PENDING)
         polls++;
     assert_int_equal(status, MBM_OK);
-    assert_true(polls > 2);
+    /* One sent it; how many found no reply yet is the server's affair. */
+    assert_true(polls > 0);
+    assert_int_equal(n.counters.requests, 1);
     assert_int_equal(mbm_master_getResponseBuffer(&n.master, 1), server_pattern(4));
     assert_int_equal(mbm_master_poll(&n.master), MBM_OK);
 }

@@ -40,7 +40,7 @@ static int mbpoll(const char *where, const char *arguments, const char *values)
     size_t length = 0, count;
     FILE *pipe;
 
-    snprintf(command, sizeof command, "mbpoll -0 -1 -o 5 %s %s %s 2>&1", arguments, where, values);
+    snprintf(command, sizeof command, "mbpoll -0 -1 -o 10 %s %s %s 2>&1", arguments, where, values);
     pipe = popen(command, "r");
     assert_non_null(pipe);
     while ((count = fread(output + length, 1, sizeof output - 1 - length, pipe)) > 0)

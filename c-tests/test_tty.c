@@ -388,10 +388,15 @@ static void nothing(int signal_number)
     (void)signal_number;
 }
 
+static volatile int waited;
+
+/* A signal before the wait is lost on it: so one after the other. */
 static void *interrupt(void *thread)
 {
-    usleep(30000);
-    pthread_kill(*(pthread_t *)thread, SIGUSR1);
+    while (!waited) {
+        usleep(10000);
+        pthread_kill(*(pthread_t *)thread, SIGUSR1);
+    }
     return NULL;
 }
 
@@ -399,6 +404,7 @@ static void a_signal_ends_the_wait(void **state)
 {
     struct sigaction action = {0};
     pthread_t self = pthread_self(), other;
+    double start = seconds();
     mbm_tty tty;
 
     (void)state;
@@ -406,8 +412,10 @@ static void a_signal_ends_the_wait(void **state)
     sigaction(SIGUSR1, &action, NULL);
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
     assert_int_equal(pthread_create(&other, NULL, interrupt, &self), 0);
-    assert_int_equal(mbm_tty_wait(&tty, 20000000), 0);
+    assert_int_equal(mbm_tty_wait(&tty, 60000000), 0);
+    waited = 1;
     pthread_join(other, NULL);
+    assert_true(seconds() - start < 50);
     mbm_tty_close(&tty);
 }
 

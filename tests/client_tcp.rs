@@ -263,6 +263,46 @@ fn a_small_buffer_gathers_what_it_holds() {
     assert_eq!(ended, 5);
 }
 
+/// A program that was busy for long finds more than the buffer holds.
+#[test]
+fn a_late_poll_takes_all_that_has_arrived_before_a_deadline_counts() {
+    let (end, mut client) = client();
+    let counters = client.line.means.counters.clone();
+    client.line.means.frame = vec![0; 16];
+    for number in 1..=5 {
+        assert!(client.queue(read(1, number)).is_ok());
+    }
+    assert!(poll(&end, &mut client).is_empty());
+    // In pieces that end inside of a response.
+    let all: Vec<u8> = requests(&end.sent())
+        .into_iter()
+        .flat_map(response)
+        .collect();
+    for piece in all.chunks(7) {
+        end.deliver(0, piece);
+    }
+    end.pass(3_000_000);
+    let ended = poll(&end, &mut client);
+    assert_eq!(ended.len(), 5);
+    ended.iter().for_each(assert_right);
+    assert_eq!(counters.borrow()[Counter::Resynchronisations as usize], 0);
+}
+
+/// A line full of noise is not listened to for good.
+#[test]
+fn noise_without_an_end_does_not_keep_a_poll_from_its_deadline() {
+    let (end, mut client) = client();
+    assert!(client.queue(read(1, 1)).is_ok());
+    assert!(poll(&end, &mut client).is_empty());
+    for _ in 0..5000 {
+        end.deliver(0, &[0xA5; 7]);
+    }
+    end.pass(3_000_000);
+    let ended = poll(&end, &mut client);
+    assert_eq!(ended.len(), 1);
+    assert_eq!(ended[0].ticket.status, Status::RESPONSE_TIMED_OUT);
+}
+
 #[test]
 fn a_response_longer_than_the_buffer_is_passed_over_and_told() {
     let (end, mut client) = client();

@@ -1,5 +1,6 @@
 #define _GNU_SOURCE
 #include "asked.h"
+#include "await.h"
 #include "crc.h"
 #include "test.h"
 
@@ -168,13 +169,16 @@ static size_t frame_of(int framing, uint8_t unit, const uint8_t *pdu, size_t len
     }
 }
 
-size_t asked_bytes(int fd, const uint8_t *bytes, size_t length, uint8_t *answer, int wait)
+/* What should not come is waited for this long. */
+enum { PAUSE_MS = 30 };
+
+size_t asked_bytes(int fd, const uint8_t *bytes, size_t length, uint8_t *answer, size_t expected)
 {
     struct pollfd readable = {fd, POLLIN, 0};
     size_t got = 0;
 
     assert_int_equal(write(fd, bytes, length), length);
-    while (poll(&readable, 1, got ? 30 : wait) > 0) {
+    while (poll(&readable, 1, got < expected ? PATIENCE_MS : PAUSE_MS) > 0) {
         ssize_t count = read(fd, answer + got, 600 - got);
 
         if (count <= 0)
@@ -189,10 +193,11 @@ void asked_frames(int fd, int framing, uint8_t unit, const uint8_t *pdu, size_t 
 {
     uint8_t frame[600], answer[600], wanted[600];
     size_t size = frame_of(framing, unit, pdu, length, frame);
-    size_t got = asked_bytes(fd, frame, size, answer, expected ? 2000 : 50);
+    size_t got;
 
     if (expected)
         expected = frame_of(framing, unit, response, expected, wanted);
+    got = asked_bytes(fd, frame, size, answer, expected);
     assert_int_equal(got, expected);
     assert_memory_equal(answer, wanted, expected);
 }

@@ -12,9 +12,9 @@ void asked_writes(modbus_t *client, served *s);
 void asked_edges(modbus_t *client);
 void asked_refusals(modbus_t *client, served *s);
 
-/* Sends bytes and collects what comes back: how many, 0 if nothing comes within
- * so many milliseconds. */
-size_t asked_bytes(int fd, const uint8_t *bytes, size_t length, uint8_t *answer, int wait);
+/* Sends bytes and collects what comes back, up to 600 bytes: waits for so many as are
+ * expected, and a while for more, which should not come. Returns how many. */
+size_t asked_bytes(int fd, const uint8_t *bytes, size_t length, uint8_t *answer, size_t expected);
 
 /* Sends the frame of a PDU to a unit, and expects the frame of another, or none
  * if that is of no bytes. */

@@ -1,5 +1,6 @@
 #define _GNU_SOURCE
 #include "client.h"
+#include "await.h"
 #include "test.h"
 
 #include <poll.h>
@@ -13,15 +14,29 @@ static void begin_tty(asker *a, int fd)
     a->port = mbm_tty_port(&a->tty, NULL);
 }
 
+static uint8_t connect_anew(void *context)
+{
+    asker *a = (asker *)context;
+
+    if (a->clock)
+        held_clock_forget(a->clock);
+    return mbm_tcp_connect(&a->tcp);
+}
+
+static void disconnect(void *context)
+{
+    mbm_tcp_disconnect(&((asker *)context)->tcp);
+}
+
 static void begin_tcp(asker *a, uint16_t port)
 {
     memset(a, 0, sizeof *a);
     snprintf(a->service, sizeof a->service, "%u", port);
     assert_int_equal(mbm_tcp_open(&a->tcp, "127.0.0.1", a->service), 0);
     a->port = mbm_tcp_port(&a->tcp, NULL);
-    a->link.context = &a->tcp;
-    a->link.connect = mbm_tcp_connect;
-    a->link.disconnect = mbm_tcp_disconnect;
+    a->link.context = a;
+    a->link.connect = connect_anew;
+    a->link.disconnect = disconnect;
 }
 
 void asker_begin_rtu(asker *a, int fd)
@@ -29,6 +44,7 @@ void asker_begin_rtu(asker *a, int fd)
     begin_tty(a, fd);
     OK(mbm_client_beginRtu(&a->client, &a->port, a->incoming, sizeof a->incoming));
     OK(mbm_client_setBaudRate(&a->client, 115200));
+    OK(mbm_client_setResponseTimeout(&a->client, PATIENCE_MS));
     OK(mbm_client_setCounters(&a->client, &a->counters));
 }
 
@@ -36,14 +52,24 @@ void asker_begin_ascii(asker *a, int fd)
 {
     begin_tty(a, fd);
     OK(mbm_client_beginAscii(&a->client, &a->port, a->incoming, sizeof a->incoming));
+    OK(mbm_client_setResponseTimeout(&a->client, PATIENCE_MS));
     OK(mbm_client_setCounters(&a->client, &a->counters));
 }
 
 void asker_begin_tcp(asker *a, uint16_t port)
 {
+    asker_begin_tcp_by(a, port, NULL);
+}
+
+void asker_begin_tcp_by(asker *a, uint16_t port, held_clock *clock)
+{
     begin_tcp(a, port);
+    a->clock = clock;
+    if (clock)
+        a->port = held_clock_port(clock, &a->port);
     OK(mbm_client_beginTcp(&a->client, &a->port, a->incoming, sizeof a->incoming, a->outgoing,
                            sizeof a->outgoing));
+    OK(mbm_client_setResponseTimeout(&a->client, PATIENCE_MS));
     OK(mbm_client_setCounters(&a->client, &a->counters));
 }
 
@@ -51,6 +77,7 @@ void asker_begin_rtu_over_tcp(asker *a, uint16_t port)
 {
     begin_tcp(a, port);
     OK(mbm_client_beginRtuOverTcp(&a->client, &a->port, a->incoming, sizeof a->incoming));
+    OK(mbm_client_setResponseTimeout(&a->client, PATIENCE_MS));
     OK(mbm_client_setCounters(&a->client, &a->counters));
 }
 

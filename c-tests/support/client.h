@@ -2,6 +2,7 @@
 #ifndef CLIENT_H
 #define CLIENT_H
 
+#include "held_clock.h"
 #include "mbm_tcp.h"
 #include "mbm_tty.h"
 
@@ -11,6 +12,7 @@ typedef struct asker {
     mbm_tty tty;
     mbm_tcp tcp;
     mbm_link link;
+    held_clock *clock; /* NULL is the machine's */
     mbm_counters counters;
     char service[8];
     uint8_t incoming[1024], outgoing[1024];
@@ -23,6 +25,9 @@ void asker_begin_ascii(asker *a, int fd);
 /* Zeroes it and begins a client of a TCP port of this machine. */
 void asker_begin_tcp(asker *a, uint16_t port);
 void asker_begin_rtu_over_tcp(asker *a, uint16_t port);
+
+/* By a clock that waits for the peer, also for one that a->link connects anew. */
+void asker_begin_tcp_by(asker *a, uint16_t port, held_clock *clock);
 
 /* Sleeps until bytes arrive or the client has something else to do. */
 void asker_rest(asker *a);

@@ -6,8 +6,9 @@
 
 enum { UNIT = FAULT_UNIT, REGISTERS = FAULT_REGISTERS, MOST = 260 };
 
-int fault_link_dies;
 static const fault *playing;
+static mbm_port line_port;
+static volatile int link_dies;
 
 /* Every register's value tells its address, so that stale data shows. */
 uint16_t fault_value(unsigned address)
@@ -114,7 +115,7 @@ static void a_byte_every_5_ms(responder *r, const uint8_t *request)
 
     for (i = 0; i < length; i++) {
         responder_send(r, frame + i, 1);
-        responder_pause(5);
+        responder_pause(r, 5);
     }
 }
 
@@ -124,7 +125,7 @@ static void a_pause_inside(responder *r, const uint8_t *request)
     size_t length = right_reply(frame, request);
 
     responder_send(r, frame, length / 2);
-    responder_pause(30);
+    responder_pause(r, 30);
     responder_send(r, frame + length / 2, length - length / 2);
 }
 
@@ -155,7 +156,7 @@ static void noise_of_300_bytes(responder *r)
             noise[i] = (uint8_t)(state >> 16);
         }
         responder_send(r, noise, sizeof noise);
-        responder_pause(1);
+        responder_pause(r, 1);
     }
 }
 
@@ -237,8 +238,8 @@ static void link_dies_inside(responder *r, const uint8_t *request)
 
     right_reply(frame, request);
     responder_send(r, frame, 9);
-    responder_pause(20);
-    fault_link_dies = 1;
+    responder_pause(r, 20);
+    link_dies = 1;
 }
 
 const fault faults[] = {
@@ -292,8 +293,26 @@ static void play(responder *r, const uint8_t *request, unsigned number)
 void fault_start(responder *device, const fault *f)
 {
     playing = f;
-    fault_link_dies = 0;
+    link_dies = 0;
     responder_start(device, play);
+}
+
+/* The line's read, until a script says that the link is gone. */
+static int16_t read_or_die(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    if (link_dies) {
+        link_dies = 0;
+        return -1;
+    }
+    return line_port.read(context, bytes, capacity);
+}
+
+mbm_port fault_port(responder *device, const mbm_port *line)
+{
+    mbm_port port = line_port = held_clock_port(&device->clock, line);
+
+    port.read = read_or_die;
+    return port;
 }
 
 int fault_as_good(const char *found, const char *expected)

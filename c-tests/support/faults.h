@@ -21,14 +21,14 @@ typedef struct fault {
 extern const fault faults[];
 extern const unsigned fault_count;
 
-/* Set by a script: the next read says that the link is gone. */
-extern int fault_link_dies;
-
 /* Every register's value tells its address, so that stale data shows. */
 uint16_t fault_value(unsigned address);
 
 /* Starts a device that plays the fault at the first request. */
 void fault_start(responder *device, const fault *f);
+
+/* The master's port over a line to it: the device's clock, and the link may die. */
+mbm_port fault_port(responder *device, const mbm_port *line);
 
 /* True if no transaction fares worse than expected: '.' right, 'F' failed. */
 int fault_as_good(const char *found, const char *expected);

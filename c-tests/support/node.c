@@ -1,4 +1,5 @@
 #include "node.h"
+#include "await.h"
 #include "test.h"
 
 #include <string.h>
@@ -17,6 +18,7 @@ void node_begin(node *n, int fd, uint8_t slave)
     assert_int_equal(mbm_master_begin(&n->master, slave, &port), MBM_OK);
     assert_int_equal(mbm_master_setCounters(&n->master, &n->counters), MBM_OK);
     assert_int_equal(mbm_master_setBaudRate(&n->master, 115200), MBM_OK);
+    assert_int_equal(mbm_master_setResponseTimeout(&n->master, PATIENCE_MS), MBM_OK);
 }
 
 int node_bit(const node *n, unsigned index)

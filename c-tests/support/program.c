@@ -2,9 +2,11 @@
 #include "program.h"
 
 #include <fcntl.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -36,6 +38,8 @@ void program_start(program *p, const char *name, const char *const *arguments)
     p->pid = fork();
     must(p->pid >= 0, "fork");
     if (p->pid == 0) {
+        /* Not to survive the test, whatever ends it. */
+        prctl(PR_SET_PDEATHSIG, SIGKILL);
         dup2(in[0], STDIN_FILENO);
         dup2(out[1], STDOUT_FILENO);
         /* Lines and sockets of the test are to hang up when the test lets go. */

@@ -3,6 +3,7 @@
 
 #include <poll.h>
 #include <stdlib.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 void responder_send(responder *r, const uint8_t *bytes, size_t length)
@@ -17,8 +18,15 @@ void responder_send(responder *r, const uint8_t *bytes, size_t length)
     }
 }
 
-void responder_pause(unsigned milliseconds)
+void responder_pause(responder *r, unsigned milliseconds)
 {
+    int untaken = 0;
+    unsigned naps = 0;
+
+    /* What was sent before the pause is heard before it. */
+    while (ioctl(r->line.ours, FIONREAD, &untaken) == 0 && untaken > 0 && naps++ < 1000)
+        usleep(1000);
+    held_clock_pass(&r->clock, 1000 * (int64_t)milliseconds);
     usleep(milliseconds * 1000);
 }
 
@@ -43,6 +51,7 @@ static void *respond(void *argument)
         if (have == sizeof request) {
             have = 0;
             r->script(r, request, ++number);
+            held_clock_done(&r->clock, 0, sizeof request);
         }
     }
 }
@@ -51,6 +60,7 @@ void responder_start(responder *r, responder_script script)
 {
     r->script = script;
     pty_open(&r->line);
+    held_clock_start(&r->clock);
     if (pipe(r->stop) || pthread_create(&r->thread, NULL, respond, r))
         abort();
 }

@@ -3,6 +3,7 @@
 #ifndef RESPONDER_H
 #define RESPONDER_H
 
+#include "held_clock.h"
 #include "pty.h"
 
 #include <pthread.h>
@@ -16,6 +17,7 @@ typedef void (*responder_script)(responder *r, const uint8_t *request, unsigned 
 
 struct responder {
     pty line;
+    held_clock clock; /* for the master */
     responder_script script;
     int stop[2];
     pthread_t thread;
@@ -26,6 +28,6 @@ void responder_stop(responder *r);
 
 /* For scripts: sends bytes, pauses. */
 void responder_send(responder *r, const uint8_t *bytes, size_t length);
-void responder_pause(unsigned milliseconds);
+void responder_pause(responder *r, unsigned milliseconds);
 
 #endif

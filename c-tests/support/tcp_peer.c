@@ -1,5 +1,6 @@
 #define _GNU_SOURCE
 #include "tcp_peer.h"
+#include "tcp_server.h"
 #include "tcp_stream.h"
 
 #include <arpa/inet.h>
@@ -21,7 +22,8 @@ typedef struct scripted {
 } scripted;
 
 struct tcp_peer {
-    int listener, wake[2], capture[2], running;
+    int listener, reserved, wake[2], capture[2], running;
+    held_clock *clock, own_clock;
     modbus_t *replier;
     modbus_mapping_t *memory;
     pthread_t thread;
@@ -53,6 +55,12 @@ uint16_t tcp_peer_word(unsigned address)
 uint8_t tcp_peer_bit(unsigned address)
 {
     return (uint8_t)(tcp_peer_word(address) >> 7 & 1u);
+}
+
+/* Milliseconds of the clock that delays count by. */
+static int64_t now_ms(tcp_peer *p)
+{
+    return held_clock_now(p->clock) / 1000;
 }
 
 /* --- what is played */
@@ -141,20 +149,20 @@ static void add16(uint8_t *bytes, unsigned more)
 
 /* Plays what is not the right reply in one piece. Returns whether the right
  * reply went out as well. */
-static int play(stream *c, tcp_fault fault, unsigned argument, reply *r)
+static int play(tcp_peer *p, stream *c, tcp_fault fault, unsigned argument, reply *r)
 {
     uint8_t garbage[TCP_PEER_FRAME];
     reply wrong = *r;
 
     switch (fault) {
     case FAULT_DELAY:
-        stream_hold(c, r, stream_now() + argument, 0);
+        stream_hold(c, r, now_ms(p) + argument, 0);
         return 1;
     case FAULT_HOLD:
-        stream_hold(c, r, stream_now() + PATIENCE_MS, argument);
+        stream_hold(c, r, now_ms(p) + PATIENCE_MS, argument);
         return 1;
     case FAULT_JOIN:
-        stream_join(c, r, stream_now() + PATIENCE_MS, argument);
+        stream_join(c, r, now_ms(p) + PATIENCE_MS, argument);
         return 1;
     case FAULT_TWICE:
         stream_send_whole(c, r);
@@ -215,7 +223,7 @@ static void serve(tcp_peer *p, stream *c, const uint8_t *request, size_t length)
     else
         answer(p, request, length, &r);
     if (fault != FAULT_NONE && fault != FAULT_EXCEPTION) {
-        int right = play(c, fault, argument, &r);
+        int right = play(p, c, fault, argument, &r);
 
         p->counts.replies += right ? 1 : 0;
         if (!right || fault == FAULT_DELAY || fault == FAULT_HOLD)
@@ -224,13 +232,30 @@ static void serve(tcp_peer *p, stream *c, const uint8_t *request, size_t length)
         p->counts.replies++;
         stream_send_whole(c, &r);
     }
-    stream_release(c, stream_now(), 1);
+    stream_release(c, now_ms(p), 1);
 }
 
 /* --- the thread */
 
+static int64_t due_ms(const tcp_peer *p, int64_t latest)
+{
+    size_t i;
+
+    for (i = 0; i < TCP_PEER_CONNECTIONS; i++)
+        latest = stream_due(&p->streams[i], latest);
+    return latest;
+}
+
+static void tell_due(tcp_peer *p)
+{
+    int64_t due = due_ms(p, HELD_CLOCK_NEVER / 1000);
+
+    held_clock_due(p->clock, due < HELD_CLOCK_NEVER / 1000 ? 1000 * due : HELD_CLOCK_NEVER);
+}
+
 static void hear(tcp_peer *p, stream *c)
 {
+    const unsigned link = c->link;
     ssize_t count = recv(c->fd, c->input + c->have, sizeof c->input - c->have, 0);
     size_t at = 0;
 
@@ -253,6 +278,8 @@ static void hear(tcp_peer *p, stream *c)
         if (c->have - at < HEADER + length)
             break;
         serve(p, c, frame, HEADER + length);
+        tell_due(p);
+        held_clock_done(p->clock, link, (uint32_t)(HEADER + length));
         if (c->fd < 0 || c->ended) {
             c->have = 0;
             return;
@@ -282,16 +309,14 @@ static void welcome(tcp_peer *p)
     setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
     p->streams[i].fd = fd;
+    p->streams[i].link = held_clock_link(p->clock);
     p->counts.connections++;
 }
 
-static int sleep_ms(const tcp_peer *p)
+static int sleep_ms(tcp_peer *p)
 {
-    int64_t now = stream_now(), first = now + 1000;
-    size_t i;
+    int64_t now = now_ms(p), first = due_ms(p, now + 1000);
 
-    for (i = 0; i < TCP_PEER_CONNECTIONS; i++)
-        first = stream_due(&p->streams[i], first);
     return first > now ? (int)(first - now) : 0;
 }
 
@@ -321,10 +346,11 @@ static void *run(void *argument)
             if (c->fd >= 0 && waits[i].revents)
                 hear(p, c);
             if (c->fd >= 0)
-                stream_release(c, stream_now(), 0);
+                stream_release(c, now_ms(p), 0);
             if (c->fd >= 0 && p->hang_up)
                 stream_end(c);
         }
+        tell_due(p);
         p->hang_up = 0;
         if (waits[i].revents)
             welcome(p);
@@ -361,16 +387,27 @@ tcp_peer *tcp_peer_new(void)
     }
     for (i = 0; i < TCP_PEER_CONNECTIONS; i++)
         p->streams[i].fd = -1;
-    p->listener = -1;
+    p->listener = p->reserved = -1;
+    held_clock_start(&p->own_clock);
+    p->clock = &p->own_clock;
     return p;
+}
+
+void tcp_peer_clock(tcp_peer *p, held_clock *clock)
+{
+    p->clock = clock;
 }
 
 uint16_t tcp_peer_start(tcp_peer *p, uint16_t port)
 {
     struct sockaddr_in address = {0};
-    socklen_t size = sizeof address;
     const int on = 1;
 
+    if (port == 0) {
+        if (p->reserved >= 0)
+            close(p->reserved);
+        p->reserved = tcp_reserve(&port);
+    }
     address.sin_family = AF_INET;
     address.sin_port = htons(port);
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
@@ -379,7 +416,6 @@ uint16_t tcp_peer_start(tcp_peer *p, uint16_t port)
     setsockopt(p->listener, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
     must(bind(p->listener, (struct sockaddr *)&address, sizeof address) == 0, "bind");
     must(listen(p->listener, 64) == 0, "listen");
-    must(getsockname(p->listener, (struct sockaddr *)&address, &size) == 0, "getsockname");
     must(pthread_create(&p->thread, NULL, run, p) == 0, "pthread_create");
     p->running = 1;
     return ntohs(address.sin_port);
@@ -453,6 +489,8 @@ void tcp_peer_stop(tcp_peer *p)
     close(p->capture[1]);
     close(p->wake[0]);
     close(p->wake[1]);
+    if (p->reserved >= 0)
+        close(p->reserved);
     pthread_mutex_destroy(&p->lock);
     free(p);
 }

@@ -13,6 +13,8 @@
 #ifndef TCP_PEER_H
 #define TCP_PEER_H
 
+#include "held_clock.h"
+
 #include <modbus.h>
 #include <pthread.h>
 #include <stddef.h>
@@ -59,6 +61,10 @@ typedef struct tcp_peer_counts {
 } tcp_peer_counts;
 
 tcp_peer *tcp_peer_new(void);
+
+/* For a client that is never to find the peer late: a clock that waits for it, and
+ * by which delays count. A client that connects anew forgets what it wrote before. */
+void tcp_peer_clock(tcp_peer *peer, held_clock *clock);
 
 /* Listens at 127.0.0.1; port 0 is one that is free. Returns the port. A stopped
  * peer may be started again, at the same port too. */

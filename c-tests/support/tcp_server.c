@@ -28,6 +28,25 @@ int tcp_listen(uint16_t *port)
     return listener;
 }
 
+int tcp_reserve(uint16_t *port)
+{
+    struct sockaddr_in at = {0};
+    socklen_t length = sizeof at;
+    const int on = 1;
+    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+
+    at.sin_family = AF_INET;
+    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    if (fd < 0 || setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) < 0 ||
+        bind(fd, (struct sockaddr *)&at, sizeof at) < 0 ||
+        getsockname(fd, (struct sockaddr *)&at, &length) < 0) {
+        perror("reserve");
+        abort();
+    }
+    *port = ntohs(at.sin_port);
+    return fd;
+}
+
 static void *serve(void *argument)
 {
     tcp_server *s = (tcp_server *)argument;

@@ -23,4 +23,7 @@ void tcp_server_stop(tcp_server *s);
 /* A socket that listens on a free port of this machine. */
 int tcp_listen(uint16_t *port);
 
+/* One that keeps a free port for listeners with SO_REUSEADDR: nobody else gets it. */
+int tcp_reserve(uint16_t *port);
+
 #endif

@@ -3,16 +3,7 @@
 
 #include <string.h>
 #include <sys/socket.h>
-#include <time.h>
 #include <unistd.h>
-
-int64_t stream_now(void)
-{
-    struct timespec now;
-
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
 
 void stream_let_go(stream *c)
 {
@@ -113,7 +104,7 @@ void stream_hold(stream *c, const reply *r, int64_t due, unsigned behind)
 
     if (c->holds == STREAM_HELD) {
         c->held[0].due = 0;
-        stream_release(c, stream_now(), 0);
+        stream_release(c, 0, 0);
     }
     w = &c->held[c->holds++];
     w->what = *r;

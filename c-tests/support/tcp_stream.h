@@ -21,6 +21,7 @@ typedef struct waiting {
 
 typedef struct stream {
     int fd;                /* -1 if the place is free */
+    unsigned link;         /* as the clock counts them */
     int ended;             /* our end of the stream is closed; what comes is dropped */
     uint8_t input[STREAM_INPUT];
     size_t have;
@@ -31,9 +32,6 @@ typedef struct stream {
     unsigned join_more;    /* replies that are still to join */
     int64_t join_due;
 } stream;
-
-/* Milliseconds of a clock that only goes on. */
-int64_t stream_now(void);
 
 /* Closes, if it is open, and makes the place free. */
 void stream_let_go(stream *c);

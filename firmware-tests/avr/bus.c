@@ -87,6 +87,13 @@ void bus_halt(bus *l)
     pthread_join(l->thread, NULL);
 }
 
+void bus_settle(bus *l)
+{
+    from_client(l);
+    if (!board_run(l->on, 100 * MS))
+        abort();
+}
+
 int bus_send(bus *l, const uint8_t *frame, size_t length)
 {
     unsigned before = l->line->frames;

@@ -36,6 +36,10 @@ void bus_close(bus *l);
 void bus_go(bus *l);
 void bus_halt(bus *l);
 
+/* With the board halted: it hears what the client wrote and did not wait for, and
+ * silence behind it. */
+void bus_settle(bus *l);
+
 /* With the board halted: sends a frame, bad or good, and says whether a frame
  * came back within 100 ms of the board's time. */
 int bus_send(bus *l, const uint8_t *frame, size_t length);

@@ -408,6 +408,7 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
             stuck = is_stuck;
         }
         let (mut from, mut blocked) = (0, false);
+        let mut reads = u8::MAX;
         loop {
             let (flying, most) = (self.flying, self.most);
             let filled = usize::from(self.filled) + tcp::PDU;
@@ -435,9 +436,18 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
                     Err(refused) => refused,
                 }
             } else if job.ticket().is_sent() {
+                // As the deadline passes, all that has arrived is looked at, even if
+                // the buffer cannot hold it at once.
+                let had = self.end - self.start;
+                if reads > 0 && !self.hear() {
+                    return self.lose(shared, now);
+                }
+                reads = reads.saturating_sub(1);
                 if self.start < self.end {
                     // What began to arrive may hide the response.
-                    self.stray();
+                    if self.end - self.start == had {
+                        self.stray();
+                    }
                     (from, blocked) = (0, false);
                     match self.dispatch(shared, now) {
                         Some(job) => return Some(job),

@@ -4,7 +4,7 @@
 #[path = "../common/task.rs"]
 mod task;
 
-use crate::served::{pattern, Served};
+use crate::served::{pattern, Served, PATIENCE};
 use crate::UNIT;
 use mbm::client::{Client, Line, Serial, Tcp};
 use mbm::error::Status;
@@ -16,6 +16,9 @@ use std::collections::VecDeque;
 use std::io::Write;
 use std::time::{Duration, Instant};
 use task::{Lent, Task};
+
+/// In microseconds; what a malformed response takes to be told.
+const TIMEOUT: u32 = 10_000_000;
 
 /// The server's line as a port, with a clock.
 struct Wire {
@@ -72,7 +75,7 @@ impl<L: Line<Task>> Asker<L> {
     /// Asks, and waits for the end.
     fn ask(&mut self, data: &[u8], build: impl FnOnce(&mut Outline) -> Status) -> Task {
         assert!(self.client.queue(Task::new(UNIT, 1, data, build)).is_ok());
-        let until = Instant::now() + Duration::from_secs(10);
+        let until = Instant::now() + PATIENCE;
         while Instant::now() < until {
             let now = self.begun.elapsed().as_micros() as u32;
             if let Some(task) = self.client.poll(now, true) {
@@ -206,6 +209,7 @@ impl<L: Line<Task>> Asker<L> {
 
 fn serial<W: Search>(framing: Framing) -> Asker<Serial<Wire, Lent, Task, W>> {
     let mut asker = Asker::new(Serial::new(Wire::new(framing), Lent::default()));
+    asker.client.line.transaction().settings.response_timeout = TIMEOUT;
     if framing == Framing::Ascii {
         let settings = &mut asker.client.line.transaction().settings;
         settings.gap = 0;
@@ -226,13 +230,15 @@ fn the_client_asks_pymodbus_for_every_function_over_ascii() {
 
 #[test]
 fn the_client_asks_pymodbus_for_every_function_over_tcp() {
-    let wire = Wire::new(Framing::Tcp);
-    Asker::new(Tcp::new(wire, Lent::default())).every_function();
+    let mut line = Tcp::new(Wire::new(Framing::Tcp), Lent::default());
+    line.settings.response_timeout = TIMEOUT;
+    Asker::new(line).every_function();
 }
 
 #[test]
 fn the_client_asks_pymodbus_for_every_function_over_rtu_in_tcp() {
     let wire = Wire::new(Framing::RtuOverTcp);
-    let line: Serial<Wire, Lent, Task> = Serial::over_tcp(wire, Lent::default());
+    let mut line: Serial<Wire, Lent, Task> = Serial::over_tcp(wire, Lent::default());
+    line.transaction().settings.response_timeout = TIMEOUT;
     Asker::new(line).every_function();
 }

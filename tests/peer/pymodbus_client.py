@@ -4,7 +4,8 @@
 
 FRAMING is rtu, ascii, tcp or rtu-over-tcp, PLACE a tty or a port. The server is
 c-tests/serve.c; what it holds is told in c-tests/support/served.h. Prints how many
-answers were right, or the first that was not, and ends with its input.
+answers were right, or the first that was not, and ends with its input. Around a
+request without an answer it says `silent` and `sent`, and waits for a line.
 """
 
 import sys
@@ -83,9 +84,16 @@ class Asker:
         self.right += 1
 
     def silent(self, name, *args, **named):
-        """There is to be no answer."""
+        """There is to be no answer; whoever started this sees that it was heard."""
+        self.say("silent")
         getattr(self.client, name)(*args, device_id=UNIT, no_response_expected=True, **named)
+        self.say("sent")
         self.right += 1
+
+    def say(self, text):
+        """Goes on when told to."""
+        print(text, flush=True)
+        sys.stdin.readline()
 
 
 def tables(ask):
@@ -249,7 +257,7 @@ def custom(ask):
 def main():
     framing, place = sys.argv[1:]
     # No answer is asked for twice: the server counts.
-    common = {"framer": FRAMERS[framing], "timeout": 5, "retries": 0}
+    common = {"framer": FRAMERS[framing], "timeout": 60, "retries": 0}
     if framing in ("rtu", "ascii"):
         client = ModbusSerialClient(place, baudrate=115200, **common)
     else:

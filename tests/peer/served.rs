@@ -15,6 +15,9 @@ use std::os::fd::FromRawFd;
 use std::sync::mpsc;
 use std::time::Duration;
 
+/// How long a peer may take on a busy machine.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+
 extern "C" {
     fn posix_openpt(flags: c_int) -> c_int;
     fn grantpt(fd: c_int) -> c_int;
@@ -105,7 +108,7 @@ impl Served {
         let mut reply = Vec::new();
         let mut whole = Vec::new();
         while self.framing.parse(&mut whole, ascii::END).is_err() {
-            let more = self.arrived.recv_timeout(Duration::from_secs(10));
+            let more = self.arrived.recv_timeout(PATIENCE);
             reply
                 .extend(more.unwrap_or_else(|_| panic!("{request:?}: no reply, but {reply:02X?}")));
             whole.clone_from(&reply);

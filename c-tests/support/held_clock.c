@@ -1,0 +1,162 @@
+#define _GNU_SOURCE
+#include "held_clock.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+static int64_t machine(void)
+{
+    struct timespec now;
+
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
+static int64_t look(held_clock *c)
+{
+    int64_t now = machine();
+
+    if (c->bytes > 0)
+        return c->stopped;
+    if (now - c->behind > c->due)
+        c->behind = now - c->due;
+    return now - c->behind;
+}
+
+/* Goes on from where it stands, with so many bytes to do. */
+static void set(held_clock *c, uint32_t bytes)
+{
+    int64_t shown = look(c);
+
+    c->stopped = shown;
+    c->bytes = bytes;
+    c->behind = machine() - shown;
+}
+
+void held_clock_start(held_clock *c)
+{
+    memset(c, 0, sizeof *c);
+    c->due = HELD_CLOCK_NEVER;
+    c->told = machine();
+    if (pthread_mutex_init(&c->lock, NULL)) {
+        perror("held_clock");
+        abort();
+    }
+}
+
+int64_t held_clock_now(held_clock *c)
+{
+    int64_t shown;
+
+    pthread_mutex_lock(&c->lock);
+    shown = look(c);
+    pthread_mutex_unlock(&c->lock);
+    return shown;
+}
+
+void held_clock_done(held_clock *c, unsigned link, uint32_t bytes)
+{
+    pthread_mutex_lock(&c->lock);
+    /* What others wrote, a client without this clock, it was not told of. */
+    if (link == c->link)
+        set(c, c->bytes > bytes ? c->bytes - bytes : 0);
+    pthread_mutex_unlock(&c->lock);
+}
+
+unsigned held_clock_link(held_clock *c)
+{
+    unsigned link;
+
+    pthread_mutex_lock(&c->lock);
+    link = c->link;
+    pthread_mutex_unlock(&c->lock);
+    return link;
+}
+
+void held_clock_forget(held_clock *c)
+{
+    pthread_mutex_lock(&c->lock);
+    set(c, 0);
+    c->link++;
+    pthread_mutex_unlock(&c->lock);
+}
+
+void held_clock_pass(held_clock *c, int64_t microseconds)
+{
+    pthread_mutex_lock(&c->lock);
+    c->stopped += microseconds;
+    pthread_mutex_unlock(&c->lock);
+}
+
+void held_clock_due(held_clock *c, int64_t at)
+{
+    pthread_mutex_lock(&c->lock);
+    set(c, c->bytes);
+    c->due = at > c->stopped ? at : c->stopped;
+    pthread_mutex_unlock(&c->lock);
+}
+
+/* --- the port */
+
+static int16_t clock_read(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    const held_clock *c = (held_clock *)context;
+
+    return c->port.read(c->port.context, bytes, capacity);
+}
+
+static int16_t clock_write(void *context, const uint8_t *bytes, uint16_t length)
+{
+    held_clock *c = (held_clock *)context;
+    int16_t taken;
+
+    /* Before: the device may be done at once. Nor is the master ever late: it writes
+     * at the time that it knows. */
+    pthread_mutex_lock(&c->lock);
+    set(c, c->bytes);
+    if (c->bytes == 0)
+        c->stopped = c->told;
+    c->bytes += length;
+    pthread_mutex_unlock(&c->lock);
+    taken = c->port.write(c->port.context, bytes, length);
+    held_clock_done(c, c->link, taken < 0 ? length : (uint32_t)(length - taken));
+    return taken;
+}
+
+static uint32_t clock_micros(void *context)
+{
+    held_clock *c = (held_clock *)context;
+    uint32_t told;
+
+    pthread_mutex_lock(&c->lock);
+    c->told = look(c);
+    told = (uint32_t)c->told;
+    pthread_mutex_unlock(&c->lock);
+    return told;
+}
+
+static uint8_t clock_flush(void *context)
+{
+    const held_clock *c = (held_clock *)context;
+
+    return c->port.flush(c->port.context);
+}
+
+static void clock_idle(void *context)
+{
+    const held_clock *c = (held_clock *)context;
+
+    c->port.idle(c->port.context);
+}
+
+mbm_port held_clock_port(held_clock *c, const mbm_port *line)
+{
+    mbm_port port = {.context = c, .read = clock_read, .write = clock_write, .micros = clock_micros};
+
+    c->port = *line;
+    port.flush = line->flush ? clock_flush : NULL;
+    port.idle = line->idle ? clock_idle : NULL;
+    return port;
+}
