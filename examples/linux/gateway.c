@@ -101,21 +101,19 @@ static uint8_t open_line(void *context)
     return l->is_open ? MBM_OK : MBM_LINK_LOST;
 }
 
-/* Opens a line that is not open, now and then. */
+/* Opens a line that is not open, now and then, and one that hung up while nobody asked. */
 static int is_there(line *l)
 {
     const mbm_link link = {l, close_line, open_line};
+    struct pollfd hung = {l->tty.fd, 0, 0};
 
+    if (l->is_open && mbm_client_pending(&l->client) == 0 && poll(&hung, 1, 0) > 0) {
+        close_line(l);
+        l->tried = micros() - REOPEN_MICROS;
+    }
     if (!l->is_open && micros() - l->tried >= REOPEN_MICROS)
         mbm_client_reconnect(&l->client, &link);
     return l->is_open;
-}
-
-/* A line that hung up while nobody asked is opened again by who does. */
-static void hang_up(line *l)
-{
-    close_line(l);
-    l->tried = micros() - REOPEN_MICROS;
 }
 
 /* Moves the requests of a line on. A line that is lost has ended them all. */
@@ -293,9 +291,7 @@ static void wait_for_work(void)
         uint32_t own = i < line_count ? mbm_client_pollDelay(client) : UINT32_MAX;
         int is_busy = i < line_count && lines[i].is_open && mbm_client_pending(client) != 0;
 
-        /* An idle client takes no bytes; that its line hangs up is always told. */
-        waits[1 + i] = (struct pollfd){lines[i].is_open ? lines[i].tty.fd : -1,
-                                       is_busy ? POLLIN : 0, 0};
+        waits[1 + i] = (struct pollfd){is_busy ? lines[i].tty.fd : -1, POLLIN, 0};
         delay = own < delay ? own : delay;
     }
     for (i = 0; i < CONNECTIONS; i++) {
@@ -313,9 +309,6 @@ static void wait_for_work(void)
     if (ppoll(waits, 1 + LINES + CONNECTIONS, delay == UINT32_MAX ? NULL : &time,
               &awake) <= 0)
         return;
-    for (i = 0; i < line_count; i++)
-        if (!waits[1 + i].events && waits[1 + i].revents)
-            hang_up(&lines[i]);
     for (i = 0; i < CONNECTIONS; i++)
         if (is_used[i] && connections[i].asked &&
             (waits[1 + LINES + i].revents & (POLLERR | POLLHUP | POLLNVAL)))
