@@ -342,6 +342,16 @@ static void constants_serve_as_values_labels_and_references(void **)
 
 typedef long LONG; // as FatFs has it
 
+static void every_status_has_the_words_that_it_has_in_c(void **)
+{
+    for (unsigned status = 0; status < 256; status++) {
+        const uint8_t number = static_cast<uint8_t>(status);
+        const __FlashStringHelper *text = modbusStatusText(number);
+
+        assert_string_equal(reinterpret_cast<const char *>(text), mbm_statusText(number));
+    }
+}
+
 static void helpers_split_and_join_words(void **)
 {
     LONG untouched = 1;
@@ -390,6 +400,7 @@ int main()
         TEST(reading_and_writing_at_once_has_two_forms),
         TEST(write_single_register_overwrites_word_0),
         TEST(constants_serve_as_values_labels_and_references),
+        TEST(every_status_has_the_words_that_it_has_in_c),
         TEST(helpers_split_and_join_words),
         TEST(arrays_hold_independent_objects),
     };

@@ -4,9 +4,9 @@
 #include "await.h"
 #include "examples.h"
 #include "server.h"
+#include "tcp_server.h"
 #include "test.h"
 
-#include <arpa/inet.h>
 #include <poll.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -122,27 +122,14 @@ static void what_libmodbus_sends_over_rtu_is_what_we_build(void **state)
     pty_close(&line);
 }
 
-/* The port that the system chose for a listening socket. */
-static int port_of(int listener)
-{
-    struct sockaddr_in address = {0};
-    socklen_t size = sizeof address;
-
-    assert_int_equal(getsockname(listener, (struct sockaddr *)&address, &size), 0);
-    return ntohs(address.sin_port);
-}
-
 static void what_libmodbus_sends_over_tcp_is_what_we_build(void **state)
 {
-    struct sockaddr_in address = {.sin_family = AF_INET};
-    int listener = socket(AF_INET, SOCK_STREAM, 0), peer;
     modbus_t *client;
+    uint16_t port;
+    int listener = tcp_listen(&port), peer;
 
     (void)state;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    assert_int_equal(bind(listener, (struct sockaddr *)&address, sizeof address), 0);
-    assert_int_equal(listen(listener, 1), 0);
-    client = modbus_new_tcp("127.0.0.1", port_of(listener));
+    client = modbus_new_tcp("127.0.0.1", port);
     assert_non_null(client);
     assert_int_equal(modbus_connect(client), 0);
     peer = accept(listener, NULL, NULL);
@@ -228,54 +215,17 @@ static void what_libmodbus_answers_over_rtu_is_what_we_parse(void **state)
     server_stop(&peer);
 }
 
-typedef struct listening {
-    modbus_t *peer;
-    modbus_mapping_t *mapping;
-    int listener;
-} listening;
-
-static void *serve(void *argument)
-{
-    listening *l = (listening *)argument;
-    uint8_t request[MODBUS_TCP_MAX_ADU_LENGTH];
-    int length;
-
-    modbus_tcp_accept(l->peer, &l->listener);
-    while ((length = modbus_receive(l->peer, request)) >= 0)
-        modbus_reply(l->peer, request, length, l->mapping);
-    return NULL;
-}
-
 static void what_libmodbus_answers_over_tcp_is_what_we_parse(void **state)
 {
-    struct sockaddr_in address = {.sin_family = AF_INET};
-    listening l = {modbus_new_tcp("127.0.0.1", 0), NULL, -1};
-    pthread_t thread;
-    int fd = socket(AF_INET, SOCK_STREAM, 0);
-    unsigned i;
+    tcp_server peer;
+    int fd;
 
     (void)state;
-    l.mapping = modbus_mapping_new(SERVER_BITS, SERVER_BITS, SERVER_REGISTERS, SERVER_REGISTERS);
-    assert_true(l.peer && l.mapping);
-    for (i = 0; i < SERVER_REGISTERS; i++) {
-        l.mapping->tab_registers[i] = server_pattern(i);
-        l.mapping->tab_input_registers[i] = (uint16_t)~server_pattern(i);
-        l.mapping->tab_bits[i] = server_bit_pattern(i);
-        l.mapping->tab_input_bits[i] = !server_bit_pattern(i);
-    }
-    l.listener = modbus_tcp_listen(l.peer, 1);
-    assert_true(l.listener >= 0);
-    address.sin_port = htons((uint16_t)port_of(l.listener));
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    assert_int_equal(pthread_create(&thread, NULL, serve, &l), 0);
-    assert_int_equal(connect(fd, (struct sockaddr *)&address, sizeof address), 0);
-    answers_what_we_parse(fd, &tcp, l.mapping);
+    tcp_server_start(&peer);
+    fd = tcp_connect(peer.port);
+    answers_what_we_parse(fd, &tcp, peer.mapping);
     close(fd);
-    pthread_join(thread, NULL);
-    modbus_close(l.peer);
-    modbus_free(l.peer);
-    modbus_mapping_free(l.mapping);
-    close(l.listener);
+    tcp_server_stop(&peer);
 }
 
 int main(void)

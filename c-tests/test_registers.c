@@ -273,6 +273,47 @@ static void raw_bytes_are_copied_and_compared_as_they_travel(void **state)
     assert_int_equal(words[2], 0x0506);
 }
 
+static void bytes_of_a_device_that_swaps_them_are_put_in_order(void **state)
+{
+    static const uint8_t straight[] = {1, 2, 3, 4, 5}, swapped[] = {2, 1, 4, 3, 6};
+    const uint8_t data[] = {1, 2, 3, 4, 5, 6};
+    uint16_t words[] = {0x0102, 0x0304, 0x0506};
+    uint8_t bytes[5], back[6];
+    mbm_registers r;
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < COUNT(orders); i++) {
+        const uint8_t *wanted = i < 2 ? straight : swapped;
+
+        OK(mbm_registers_ofBytes(&r, data, 6, 40));
+        OK(mbm_registers_getBytesInOrder(&r, 40, orders[i], bytes, 5));
+        assert_memory_equal(bytes, wanted, 5);
+        OK(mbm_registers_ofWords(&r, words, 3, 40));
+        r.order = orders[i];
+        OK(mbm_registers_getBytesInOrder(&r, 40, MBM_ORDER_DEFAULT, bytes, 5));
+        assert_memory_equal(bytes, wanted, 5);
+        memset(back, 9, 6);
+        OK(mbm_registers_intoBytes(&r, back, 6, 40));
+        OK(mbm_registers_setBytesInOrder(&r, 40, orders[i], wanted, 5));
+        assert_memory_equal(back, data, 4);
+        assert_int_equal(back[4], i < 2 ? 5 : 9);
+        assert_int_equal(back[5], i < 2 ? 9 : 6);
+    }
+    memset(bytes, 7, 5);
+    IS(MBM_ILLEGAL_DATA_ADDRESS,
+       mbm_registers_getBytesInOrder(&r, 41, MBM_ORDER_BADC, bytes, 5));
+    IS(MBM_ILLEGAL_DATA_ADDRESS,
+       mbm_registers_setBytesInOrder(&r, 41, MBM_ORDER_BADC, straight, 5));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getBytesInOrder(&r, 40, 5, bytes, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytesInOrder(&r, 40, 5, straight, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getBytesInOrder(&r, 40, 0, NULL, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytesInOrder(NULL, 40, 0, straight, 2));
+    OK(mbm_registers_ofBytes(&r, data, 6, 40));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytesInOrder(&r, 40, 0, straight, 2));
+    assert_int_equal(bytes[0], 7);
+}
+
 static void what_lies_outside_is_a_status_and_changes_nothing(void **state)
 {
     uint16_t words[4] = {0xAAAA, 0xAAAA, 0xAAAA, 0xAAAA};
@@ -440,6 +481,7 @@ int main(void)
         cmocka_unit_test(a_text_ends_at_its_first_nul_or_with_its_field),
         cmocka_unit_test(a_text_is_written_with_zeros_behind_it),
         cmocka_unit_test(raw_bytes_are_copied_and_compared_as_they_travel),
+        cmocka_unit_test(bytes_of_a_device_that_swaps_them_are_put_in_order),
         cmocka_unit_test(what_lies_outside_is_a_status_and_changes_nothing),
         cmocka_unit_test(registers_beyond_65535_are_no_view),
         cmocka_unit_test(null_and_nonsense_are_answered_with_a_status),

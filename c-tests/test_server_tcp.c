@@ -4,6 +4,7 @@
 #include "asked.h"
 #include "await.h"
 #include "crc.h"
+#include "tcp_server.h"
 #include "test.h"
 
 #include <arpa/inet.h>
@@ -15,17 +16,6 @@
 
 static served tcp, rtu;
 static modbus_t *client;
-
-static int connected(const served *s)
-{
-    struct sockaddr_in address = {.sin_family = AF_INET,
-                                  .sin_addr = {htonl(INADDR_LOOPBACK)},
-                                  .sin_port = htons((uint16_t)s->port)};
-    int fd = socket(AF_INET, SOCK_STREAM, 0);
-
-    assert_int_equal(connect(fd, (struct sockaddr *)&address, sizeof address), 0);
-    return fd;
-}
 
 /* One of the server's places is the client's. */
 enum { FREE = SERVED_CONNECTIONS - 1 };
@@ -93,7 +83,7 @@ static void all_places_are_free(void)
         if (tries++ == PATIENCE_MS / 10)
             fail_msg("of %u places %u are free", FREE, taken);
         for (i = 0; i < FREE; i++)
-            fds[i] = connected(&tcp);
+            fds[i] = tcp_connect((uint16_t)tcp.port);
         for (i = taken = 0; i < FREE; i++)
             taken += (unsigned)is_served(fds[i]);
         for (i = 0; i < FREE; i++)
@@ -123,7 +113,7 @@ static void libmodbus_without_a_unit_is_answered(void **state)
 
 static void every_function_is_served(void **state)
 {
-    int fd = connected(&tcp), other = connected(&rtu);
+    int fd = tcp_connect((uint16_t)tcp.port), other = tcp_connect((uint16_t)rtu.port);
 
     (void)state;
     asked_functions(fd, MBM_FRAMING_TCP, &tcp);
@@ -138,7 +128,7 @@ static void requests_in_one_segment_are_answered_in_turn(void **state)
 {
     static const uint8_t one[] = {0, 1, 0, 0, 0, 6, SERVED_UNIT, 4, 0, SERVED_BASE, 0, 1};
     uint8_t bytes[20 * sizeof one], answer[600];
-    int fd = connected(&tcp);
+    int fd = tcp_connect((uint16_t)tcp.port);
     unsigned i;
 
     (void)state;
@@ -156,7 +146,7 @@ static void requests_in_one_segment_are_answered_in_turn(void **state)
 static void slow_and_half_open_connections_stall_nobody(void **state)
 {
     static const uint8_t one[] = {0, 7, 0, 0, 0, 6, SERVED_UNIT, 4, 0, SERVED_BASE, 0, 1};
-    int slow = connected(&tcp), silent = connected(&tcp);
+    int slow = tcp_connect((uint16_t)tcp.port), silent = tcp_connect((uint16_t)tcp.port);
     uint8_t answer[600];
     uint16_t word;
     unsigned i, k;
@@ -204,7 +194,7 @@ static void a_client_that_reads_nothing_stalls_nobody(void **state)
 {
     static uint8_t answers[300];
     uint8_t one[] = {0, 0, 0, 0, 0, 6, SERVED_UNIT, 4, 0, SERVED_BASE, 0, 125};
-    int fd = connected(&tcp), theirs;
+    int fd = tcp_connect((uint16_t)tcp.port), theirs;
     size_t sent = 0, got, i;
     unsigned naps = 0;
 
@@ -252,7 +242,7 @@ static void connections_beyond_the_storage_are_closed_and_the_others_served(void
 
     (void)state;
     for (i = 0; i < COUNT(fds); i++) {
-        fds[i] = connected(&tcp);
+        fds[i] = tcp_connect((uint16_t)tcp.port);
         go_round();
     }
     for (i = 0; i < COUNT(fds); i++)
@@ -265,7 +255,7 @@ static void connections_beyond_the_storage_are_closed_and_the_others_served(void
 static void a_stream_that_is_no_modbus_is_closed(void **state)
 {
     uint8_t byte;
-    int fd = connected(&tcp);
+    int fd = tcp_connect((uint16_t)tcp.port);
     struct pollfd readable = {fd, POLLIN, 0};
 
     (void)state;
@@ -282,7 +272,7 @@ static void a_connection_that_breaks_leaves_its_place(void **state)
 
     (void)state;
     for (i = 0; i < 50; i++) {
-        int fd = connected(&tcp);
+        int fd = tcp_connect((uint16_t)tcp.port);
 
         assert_int_equal(write(fd, "\0\1\0\0\0\6", i % 7), i % 7);
         if (i % 2)

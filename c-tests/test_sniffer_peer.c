@@ -5,9 +5,9 @@
 #include "mbm.h"
 #include "pty.h"
 #include "server.h"
+#include "tcp_server.h"
 #include "test.h"
 
-#include <arpa/inet.h>
 #include <poll.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,7 +15,7 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { EVENTS = 64, CALLS = 12, FIRST_PORT = 20000 };
+enum { EVENTS = 64, CALLS = 12 };
 
 /* An event, kept. */
 typedef struct told {
@@ -199,79 +199,16 @@ static void what_libmodbus_says_on_a_serial_line_is_told(void **state)
     pty_close(&ours);
 }
 
-/* A libmodbus TCP server of one connection. */
-typedef struct tcp_server {
-    modbus_t *peer;
-    modbus_mapping_t *mapping;
-    int listening;
-} tcp_server;
-
-static void *serve_tcp(void *context)
-{
-    tcp_server *s = (tcp_server *)context;
-    uint8_t request[MODBUS_TCP_MAX_ADU_LENGTH];
-    int length;
-
-    if (modbus_tcp_accept(s->peer, &s->listening) < 0)
-        return NULL;
-    while ((length = modbus_receive(s->peer, request)) >= 0)
-        modbus_reply(s->peer, request, length, s->mapping);
-    return NULL;
-}
-
-static int connect_to(int port)
-{
-    struct sockaddr_in address = {0};
-    int fd = socket(AF_INET, SOCK_STREAM, 0);
-
-    address.sin_family = AF_INET;
-    address.sin_port = htons((uint16_t)port);
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    assert_int_equal(connect(fd, (struct sockaddr *)&address, sizeof address), 0);
-    return fd;
-}
-
-/* A socket that listens on a free port. */
-static int listen_anywhere(int *port)
-{
-    struct sockaddr_in address = {0};
-    socklen_t size = sizeof address;
-    int fd = socket(AF_INET, SOCK_STREAM, 0);
-
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    assert_int_equal(bind(fd, (struct sockaddr *)&address, size), 0);
-    assert_int_equal(listen(fd, 1), 0);
-    assert_int_equal(getsockname(fd, (struct sockaddr *)&address, &size), 0);
-    *port = ntohs(address.sin_port);
-    return fd;
-}
-
 static void over_tcp(uint8_t apart)
 {
-    tcp_server device = {0};
-    pthread_t thread;
+    tcp_server device;
     modbus_t *client;
-    int port, server_port = FIRST_PORT + getpid() % 10000, proxy, to_client, to_server;
-    unsigned i;
+    uint16_t port;
+    int proxy, to_client, to_server;
 
-    device.mapping = modbus_mapping_new(SERVER_BITS, SERVER_BITS, SERVER_REGISTERS,
-                                        SERVER_REGISTERS);
-    for (i = 0; i < SERVER_REGISTERS; i++) {
-        device.mapping->tab_registers[i] = server_pattern(i);
-        device.mapping->tab_input_registers[i] = (uint16_t)~server_pattern(i);
-    }
-    for (i = 0; i < SERVER_BITS; i++)
-        device.mapping->tab_bits[i] = server_bit_pattern(i);
-    do {
-        device.peer = modbus_new_tcp("127.0.0.1", ++server_port);
-        device.listening = modbus_tcp_listen(device.peer, 1);
-        if (device.listening < 0)
-            modbus_free(device.peer);
-    } while (device.listening < 0);
-    assert_int_equal(pthread_create(&thread, NULL, serve_tcp, &device), 0);
-    to_server = connect_to(server_port);
-    proxy = listen_anywhere(&port);
+    tcp_server_start(&device);
+    to_server = tcp_connect(device.port);
+    proxy = tcp_listen(&port);
     client = modbus_new_tcp("127.0.0.1", port);
     modbus_set_slave(client, 17);
     assert_int_equal(modbus_connect(client), 0);
@@ -286,11 +223,7 @@ static void over_tcp(uint8_t apart)
     close(to_server);
     close(to_client);
     close(proxy);
-    pthread_join(thread, NULL);
-    close(device.listening);
-    modbus_close(device.peer);
-    modbus_free(device.peer);
-    modbus_mapping_free(device.mapping);
+    tcp_server_stop(&device);
 }
 
 static void what_libmodbus_says_over_tcp_is_told(void **state)

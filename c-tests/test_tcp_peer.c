@@ -3,9 +3,9 @@
 #define _GNU_SOURCE
 #include "await.h"
 #include "tcp_peer.h"
+#include "tcp_server.h"
 #include "test.h"
 
-#include <arpa/inet.h>
 #include <errno.h>
 #include <linux/tcp.h>
 #include <netinet/in.h>
@@ -22,24 +22,12 @@ static tcp_peer *peer;
 static uint16_t port;
 static int s;
 
-static int dial(void)
-{
-    struct sockaddr_in address = {0};
-    int fd = socket(AF_INET, SOCK_STREAM, 0);
-
-    address.sin_family = AF_INET;
-    address.sin_port = htons(port);
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    assert_int_equal(connect(fd, (struct sockaddr *)&address, sizeof address), 0);
-    return fd;
-}
-
 static int begin(void **state)
 {
     (void)state;
     peer = tcp_peer_new();
     port = tcp_peer_start(peer, 0);
-    s = dial();
+    s = tcp_connect(port);
     return 0;
 }
 
@@ -357,12 +345,12 @@ static void close_ends_the_stream_and_reset_breaks_it(void **state)
     ask(1);
     assert_int_equal(take(&byte, 1, PATIENCE_MS), 0);
     close(s);
-    s = dial();
+    s = tcp_connect(port);
     ask(2);
     assert_int_equal(take(&byte, 1, PATIENCE_MS), -1);
     assert_int_equal(errno, ECONNRESET);
     close(s);
-    s = dial();
+    s = tcp_connect(port);
     ask(3);
     expect(3);
     assert_int_equal(tcp_peer_count(peer).connections, 3);
@@ -389,7 +377,7 @@ static void a_connection_too_many_is_refused(void **state)
     ask(1);
     expect(1);
     for (i = 0; i < TCP_PEER_CONNECTIONS; i++)
-        others[i] = dial();
+        others[i] = tcp_connect(port);
     s = others[TCP_PEER_CONNECTIONS - 1];
     assert_true(take(&byte, 1, PATIENCE_MS) <= 0);
     s = others[TCP_PEER_CONNECTIONS - 2];
@@ -413,7 +401,7 @@ static void hang_up_and_a_restart_at_the_same_port(void **state)
     tcp_peer_halt(peer);
     close(s);
     assert_int_equal(tcp_peer_start(peer, port), port);
-    s = dial();
+    s = tcp_connect(port);
     ask(2);
     expect(2);
 }

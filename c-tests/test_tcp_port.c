@@ -5,6 +5,7 @@
 #include "mbm_tcp.h"
 #include "model.h"
 #include "tcp_peer.h"
+#include "tcp_server.h"
 #include "test.h"
 
 #include <arpa/inet.h>
@@ -55,19 +56,6 @@ static double seconds(void)
 
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-}
-
-/* A blocking socket to a listener of this machine. */
-static int dial(uint16_t to)
-{
-    struct sockaddr_in address = {0};
-    int fd = socket(AF_INET, SOCK_STREAM, 0);
-
-    address.sin_family = AF_INET;
-    address.sin_port = htons(to);
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    assert_int_equal(connect(fd, (struct sockaddr *)&address, sizeof address), 0);
-    return fd;
 }
 
 /* Takes bytes until so many are there or the link is lost. */
@@ -166,7 +154,7 @@ static void until_connected_nothing_is_read_and_nothing_taken(void **state)
     assert_int_equal(bind(listener, (struct sockaddr *)&address, size), 0);
     assert_int_equal(listen(listener, 0), 0);
     assert_int_equal(getsockname(listener, (struct sockaddr *)&address, &size), 0);
-    first = dial(ntohs(address.sin_port));
+    first = tcp_connect(ntohs(address.sin_port));
     snprintf(service, sizeof service, "%u", ntohs(address.sin_port));
 
     assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
@@ -319,7 +307,7 @@ static void wait_ends_with_the_time_or_with_any_of_its_sockets(void **state)
     assert_int_equal(mbm_tcp_wait(many, 3, &listener, pipes[0], MBM_TCP_FOREVER), 1);
     assert_int_equal(read(pipes[0], &byte, 1), 1);
 
-    client = dial(listener.port);
+    client = tcp_connect(listener.port);
     assert_int_equal(mbm_tcp_wait(many, 3, &listener, pipes[0], MBM_TCP_FOREVER), 1);
     assert_int_equal(mbm_tcp_accept(&listener, many + 1, 2), 0);
     assert_int_equal(mbm_tcp_wait(many, 3, &listener, pipes[0], 1000), 0);
@@ -354,7 +342,7 @@ static void a_connection_without_a_place_is_ended_politely(void **state)
     assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
     assert_fails(EAGAIN, mbm_tcp_accept(&listener, places, 2));
     for (i = 0; i < 4; i++) {
-        clients[i] = dial(listener.port);
+        clients[i] = tcp_connect(listener.port);
         assert_int_equal(write(clients[i], "x", 1), 1);
     }
     AWAIT(waiting(&listener) == 4);
@@ -370,13 +358,13 @@ static void a_connection_without_a_place_is_ended_politely(void **state)
     line = mbm_tcp_port(&places[0], NULL);
     AWAIT(line.read(line.context, (uint8_t *)&byte, 1) == 1);
     AWAIT(line.read(line.context, (uint8_t *)&byte, 1) < 0);
-    clients[0] = dial(listener.port);
+    clients[0] = tcp_connect(listener.port);
     AWAIT(waiting(&listener) == 1);
     assert_fails(EAGAIN, mbm_tcp_accept(&listener, places, 2));
     assert_int_equal(listener.refused, 3);
     mbm_tcp_close(&places[0]);
     close(clients[2]);
-    clients[2] = dial(listener.port);
+    clients[2] = tcp_connect(listener.port);
     AWAIT(waiting(&listener) == 1);
     assert_int_equal(mbm_tcp_accept(&listener, places, 2), 0);
 

@@ -31,6 +31,7 @@
 #include "ModbusMasterBoards.h"
 #include "ModbusMasterConstants.h"
 #include "ModbusMasterValues.h"
+#include "ModbusStatusText.h"
 #include "mbm.h"
 
 /** @cond the macros are explained at the head of the file */

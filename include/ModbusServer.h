@@ -34,6 +34,7 @@
 
 #include "ModbusMasterBoards.h"
 #include "ModbusServerTables.h"
+#include "ModbusStatusText.h"
 #include "mbm.h"
 
 /** @cond the macro is explained at the head of the file */

@@ -85,3 +85,8 @@ firmware-test-avr: need-avr
 timing: need-avr ## Bus timing, RAM and flash on a simulated Uno, into docs/timing.md
 	@$(MAKE) -s --no-print-directory avr-sketches $(BUILD)/avr-tests/timing
 	@scripts/timing
+
+.PHONY: check-timing
+check-timing: need-avr ## Bus timing on a simulated Uno against docs/timing.md
+	@$(MAKE) -s --no-print-directory avr-sketches $(BUILD)/avr-tests/timing
+	@scripts/timing --check

@@ -7,7 +7,7 @@ mod wire;
 use mbm::client::{Client, Tcp};
 use mbm::error::Status;
 use mbm::frame::tcp;
-use mbm::pdu::outline::Form;
+use mbm::pdu::outline::{Form, Outline};
 use mbm::transaction::Counter;
 use proptest::prelude::*;
 use wire::{End, Lent, Task};
@@ -166,6 +166,30 @@ fn a_response_that_does_not_answer_fails_at_once() {
             status,
             "{pdu:02X?}"
         );
+    }
+}
+
+#[test]
+fn a_server_id_longer_than_it_counts_is_taken_whole() {
+    for (pdu, status) in [
+        (&[0x11, 2, 1, 2, 0xFF, 7, 8][..], Status::OK),
+        (&[0x11, 5, 1, 2, 0xFF, 7, 8], Status::OK),
+        (&[0x11, 6, 1, 2, 0xFF, 7, 8], Status::MALFORMED_REPLY),
+        (&[0x11], Status::MALFORMED_REPLY),
+        (&[0x91, 2, 1], Status::MALFORMED_REPLY),
+    ] {
+        let (end, mut client) = client();
+        let form = |outline: &mut Outline| outline.set(Form::REPORT_SERVER_ID, 0, 0);
+        assert!(client.queue(Task::new(1, 7, &[], form)).is_ok());
+        poll(&end, &mut client);
+        let [a, b] = tcp::header(&end.sent()).unwrap().transaction.to_be_bytes();
+        let head = [a, b, 0, 0, 0, pdu.len() as u8 + 1, 1];
+        end.deliver(0, &[&head, pdu].concat());
+        let task = &poll(&end, &mut client)[0];
+        assert_eq!(task.ticket.status, status, "{pdu:02X?}");
+        if status == Status::OK {
+            assert_eq!(task.received(), [1, 2, 0xFF, 7, 8]);
+        }
     }
 }
 

@@ -377,6 +377,25 @@ fn read_device_identification_regular_extended_and_individual() {
 }
 
 #[test]
+fn read_device_identification_of_devices_that_take_its_useless_fields_lightly() {
+    let objects = objects(&[(0, "A")]);
+    for (name, conformity, next_object) in [
+        ("2B-0E-conformity-of-nobody-answer", 0, 0),
+        ("2B-0E-conformity-84-answer", 0x84, 0),
+        ("2B-0E-next-without-more-answer", 1, 1),
+    ] {
+        let expected = Response::DeviceIdentification {
+            code: BASIC,
+            conformity,
+            more_follows: false,
+            next_object,
+            objects: Objects::new(1, &objects).unwrap(),
+        };
+        response(name, expected);
+    }
+}
+
+#[test]
 fn encapsulated_interface_transport_of_any_type() {
     let (mei_type, data) = (0x0D, &[0, 0x2A, 0][..]);
     let canopen = Request::EncapsulatedInterface { mei_type, data };

@@ -200,6 +200,27 @@ fn raw_bytes_are_copied_and_compared_as_they_travel() {
 }
 
 #[test]
+fn bytes_of_a_device_that_swaps_them_are_put_in_order() {
+    for order in Order::ALL {
+        let wanted: &[u8] = match order.swaps_bytes() {
+            false => &[1, 2, 3, 4, 5],
+            true => &[2, 1, 4, 3, 6],
+        };
+        let mut bytes = [0; 5];
+        let held = over(&[1u8, 2, 3, 4, 5, 6][..], 40);
+        assert_eq!(held.bytes_in(order, 40, &mut bytes), Ok(()));
+        assert_eq!(bytes, wanted);
+        let mut words = [0x0909u16; 3];
+        let mut written = over(&mut words[..], 40);
+        assert_eq!(written.set_bytes_in(order, 40, wanted), Ok(()));
+        let refused = written.set_bytes_in(order, 41, wanted);
+        assert_eq!(refused, Err(Status::ILLEGAL_DATA_ADDRESS));
+        let last = if order.swaps_bytes() { 0x0906 } else { 0x0509 };
+        assert_eq!(words, [0x0102, 0x0304, last]);
+    }
+}
+
+#[test]
 fn registers_end_at_address_65535() {
     let words = [1_u16, 2, 3, 4];
     let last = over(&words[..], 65532);

@@ -16,6 +16,10 @@
 #define SHIM_UARTS 4
 #endif
 
+/* Texts that an AVR keeps in flash. */
+class __FlashStringHelper;
+#define F(text) (reinterpret_cast<const __FlashStringHelper *>(text))
+
 inline unsigned long micros() { return bench().micros(); }
 inline unsigned long millis() { return bench().micros() / 1000; }
 inline void yield() { bench().yields++; }

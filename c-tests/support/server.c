@@ -16,6 +16,25 @@ uint8_t server_bit_pattern(unsigned address)
     return (uint8_t)(server_pattern(address) >> 7 & 1u);
 }
 
+modbus_mapping_t *server_memory(void)
+{
+    modbus_mapping_t *memory =
+        modbus_mapping_new(SERVER_BITS, SERVER_BITS, SERVER_REGISTERS, SERVER_REGISTERS);
+    unsigned i;
+
+    if (!memory)
+        abort();
+    for (i = 0; i < SERVER_REGISTERS; i++) {
+        memory->tab_registers[i] = server_pattern(i);
+        memory->tab_input_registers[i] = (uint16_t)~server_pattern(i);
+    }
+    for (i = 0; i < SERVER_BITS; i++) {
+        memory->tab_bits[i] = server_bit_pattern(i);
+        memory->tab_input_bits[i] = !server_bit_pattern(i);
+    }
+    return memory;
+}
+
 static void *serve(void *argument)
 {
     server *s = (server *)argument;
@@ -40,23 +59,13 @@ static void *serve(void *argument)
 
 void server_start(server *s, int unit)
 {
-    unsigned i;
-
     pty_open(&s->line);
     s->peer = modbus_new_rtu(s->line.path, 115200, 'N', 8, 1);
-    s->mapping = modbus_mapping_new(SERVER_BITS, SERVER_BITS, SERVER_REGISTERS, SERVER_REGISTERS);
-    if (!s->peer || !s->mapping || modbus_set_slave(s->peer, unit) || modbus_connect(s->peer) ||
+    s->mapping = server_memory();
+    if (!s->peer || modbus_set_slave(s->peer, unit) || modbus_connect(s->peer) ||
         modbus_set_response_timeout(s->peer, 0, 20000) || pipe(s->stop)) {
         perror("libmodbus server");
         abort();
-    }
-    for (i = 0; i < SERVER_REGISTERS; i++) {
-        s->mapping->tab_registers[i] = server_pattern(i);
-        s->mapping->tab_input_registers[i] = (uint16_t)~server_pattern(i);
-    }
-    for (i = 0; i < SERVER_BITS; i++) {
-        s->mapping->tab_bits[i] = server_bit_pattern(i);
-        s->mapping->tab_input_bits[i] = !server_bit_pattern(i);
     }
     if (pthread_create(&s->thread, NULL, serve, s))
         abort();

@@ -21,6 +21,9 @@ typedef struct server {
 void server_start(server *s, int unit);
 void server_stop(server *s);
 
+/* A memory that holds it, as every server here has. */
+modbus_mapping_t *server_memory(void);
+
 /* The pattern: every cell differs from its neighbours. */
 uint16_t server_pattern(unsigned address);
 uint8_t server_bit_pattern(unsigned address);

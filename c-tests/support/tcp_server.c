@@ -47,6 +47,22 @@ int tcp_reserve(uint16_t *port)
     return fd;
 }
 
+int tcp_connect(uint16_t port)
+{
+    struct sockaddr_in to;
+    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+
+    memset(&to, 0, sizeof to);
+    to.sin_family = AF_INET;
+    to.sin_port = htons(port);
+    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    if (fd < 0 || connect(fd, (struct sockaddr *)&to, sizeof to) < 0) {
+        perror("connect");
+        abort();
+    }
+    return fd;
+}
+
 static void *serve(void *argument)
 {
     tcp_server *s = (tcp_server *)argument;
@@ -81,22 +97,12 @@ static void *serve(void *argument)
 
 void tcp_server_start(tcp_server *s)
 {
-    unsigned i;
-
     s->listener = tcp_listen(&s->port);
     s->peer = modbus_new_tcp("127.0.0.1", s->port);
-    s->mapping = modbus_mapping_new(SERVER_BITS, SERVER_BITS, SERVER_REGISTERS, SERVER_REGISTERS);
-    if (!s->peer || !s->mapping || pipe(s->stop)) {
+    s->mapping = server_memory();
+    if (!s->peer || pipe(s->stop)) {
         perror("libmodbus server");
         abort();
-    }
-    for (i = 0; i < SERVER_REGISTERS; i++) {
-        s->mapping->tab_registers[i] = server_pattern(i);
-        s->mapping->tab_input_registers[i] = (uint16_t)~server_pattern(i);
-    }
-    for (i = 0; i < SERVER_BITS; i++) {
-        s->mapping->tab_bits[i] = server_bit_pattern(i);
-        s->mapping->tab_input_bits[i] = !server_bit_pattern(i);
     }
     if (pthread_create(&s->thread, NULL, serve, s))
         abort();

@@ -20,8 +20,9 @@ typedef struct tcp_server {
 void tcp_server_start(tcp_server *s);
 void tcp_server_stop(tcp_server *s);
 
-/* A socket that listens on a free port of this machine. */
+/* A socket that listens on a free port of this machine, and one connected to such. */
 int tcp_listen(uint16_t *port);
+int tcp_connect(uint16_t port);
 
 /* One that keeps a free port for listeners with SO_REUSEADDR: nobody else gets it. */
 int tcp_reserve(uint16_t *port);

@@ -101,16 +101,22 @@ static uint8_t open_line(void *context)
     return l->is_open ? MBM_OK : MBM_LINK_LOST;
 }
 
-/* Opens a line that is not open, now and then, and one that hung up while nobody asked. */
+/* A line that hung up while nobody asked is opened again by who does. */
+static void hang_up(line *l)
+{
+    close_line(l);
+    l->tried = micros() - REOPEN_MICROS;
+}
+
+/* Opens a line that is not open, now and then. */
 static int is_there(line *l)
 {
     const mbm_link link = {l, close_line, open_line};
-    struct pollfd hung = {l->tty.fd, 0, 0};
+    struct pollfd idle = {l->tty.fd, 0, 0};
 
-    if (l->is_open && mbm_client_pending(&l->client) == 0 && poll(&hung, 1, 0) > 0) {
-        close_line(l);
-        l->tried = micros() - REOPEN_MICROS;
-    }
+    /* It may have hung up since the last wait. */
+    if (l->is_open && mbm_client_pending(&l->client) == 0 && poll(&idle, 1, 0) > 0)
+        hang_up(l);
     if (!l->is_open && micros() - l->tried >= REOPEN_MICROS)
         mbm_client_reconnect(&l->client, &link);
     return l->is_open;
@@ -291,7 +297,9 @@ static void wait_for_work(void)
         uint32_t own = i < line_count ? mbm_client_pollDelay(client) : UINT32_MAX;
         int is_busy = i < line_count && lines[i].is_open && mbm_client_pending(client) != 0;
 
-        waits[1 + i] = (struct pollfd){is_busy ? lines[i].tty.fd : -1, POLLIN, 0};
+        /* An idle client takes no bytes; that its line hangs up is always told. */
+        waits[1 + i] = (struct pollfd){lines[i].is_open ? lines[i].tty.fd : -1,
+                                       is_busy ? POLLIN : 0, 0};
         delay = own < delay ? own : delay;
     }
     for (i = 0; i < CONNECTIONS; i++) {
@@ -309,6 +317,9 @@ static void wait_for_work(void)
     if (ppoll(waits, 1 + LINES + CONNECTIONS, delay == UINT32_MAX ? NULL : &time,
               &awake) <= 0)
         return;
+    for (i = 0; i < line_count; i++)
+        if (!waits[1 + i].events && waits[1 + i].revents)
+            hang_up(&lines[i]);
     for (i = 0; i < CONNECTIONS; i++)
         if (is_used[i] && connections[i].asked &&
             (waits[1 + LINES + i].revents & (POLLERR | POLLHUP | POLLNVAL)))

@@ -1,7 +1,7 @@
 /* Watches a bus that others use, and tells what they say, one line an event.
  *
  *     sniff /dev/ttyUSB0 19200          a serial line, RTU; Ctrl-C ends
- *     sniff -a /dev/ttyUSB0 9600 E      ASCII, even parity
+ *     sniff -a /dev/ttyUSB0 9600 E      ASCII, seven bits, even parity
  *     sniff - <recording                a recording, -t for Modbus TCP
  *
  * A line of a recording is a time in milliseconds with a colon, which may be
@@ -21,12 +21,20 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { LINE_STEP = 10000, KINDS = MBM_EVENT_NOISE + 1, ALL_ENDED = 2000000 };
+/* Microseconds, but for the first. */
+enum {
+    KINDS = MBM_EVENT_NOISE + 1,
+    LINE_STEP = 10000,
+    LOOK_STEP = 100000,
+    ALL_ENDED = 2000000,
+    SELDOM_STEP = 600000000
+};
 
 static mbm_sniffer sniffer;
 static uint8_t buffer[MBM_MAX_ASCII_FRAME];
 static unsigned long totals[KINDS];
-static uint32_t first, slowest;
+static uint64_t first, now; /* microseconds that do not wrap, as the sniffer's do */
+static uint32_t slowest;
 static volatile sig_atomic_t ended;
 
 static void end(int signal_number)
@@ -35,25 +43,25 @@ static void end(int signal_number)
     ended = 1;
 }
 
-static uint32_t micros(void)
+static uint64_t micros(void)
 {
-    struct timespec now;
+    struct timespec time;
 
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint32_t)now.tv_sec * 1000000u + (uint32_t)now.tv_nsec / 1000u;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return (uint64_t)time.tv_sec * 1000000u + (uint64_t)time.tv_nsec / 1000u;
 }
 
 static void tell(const mbm_event *event)
 {
     static char text[2400];
-    uint32_t time = event->time - first;
+    uint64_t time = now - ((uint32_t)now - event->time) - first;
 
     totals[event->kind]++;
     if (event->kind == MBM_EVENT_REPLY && event->responseTime > slowest)
         slowest = event->responseTime;
     mbm_event_text(event, text, sizeof text);
-    printf("%6lu.%03lu  ", (unsigned long)(time / 1000000u),
-           (unsigned long)(time / 1000u % 1000u));
+    printf("%6llu.%03llu  ", (unsigned long long)(time / 1000000u),
+           (unsigned long long)(time / 1000u % 1000u));
     if (event->responseTime)
         printf("%6.1f ms  ", event->responseTime / 1000.0);
     else
@@ -61,33 +69,37 @@ static void tell(const mbm_event *event)
     printf("%s\n", text);
 }
 
-static void tell_all(uint32_t now)
+/* Tells what is known by `time`. */
+static void tell_all(uint64_t time)
 {
     mbm_event event;
 
-    while (mbm_sniffer_next(&sniffer, now, &event))
+    now = time;
+    while (mbm_sniffer_next(&sniffer, (uint32_t)now, &event))
         tell(&event);
     fflush(stdout);
 }
 
-static void hear(const uint8_t *bytes, uint16_t length, uint32_t now)
+static void hear(const uint8_t *bytes, uint16_t length)
 {
     uint16_t fed = 0;
 
     while (fed < length) {
         fed = (uint16_t)(fed + mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, bytes + fed,
-                                                (uint16_t)(length - fed), now));
+                                                (uint16_t)(length - fed), (uint32_t)now));
         tell_all(now);
     }
 }
 
-static int watch(const char *path, uint32_t baud, char parity)
+static int watch(const char *path, uint32_t baud, char parity, uint8_t data)
 {
+    mbm_tty_options options = {.baud = baud, .parity = parity, .stop = 1, .data = data};
     mbm_tty tty;
     uint8_t bytes[256];
     ssize_t length;
+    int failed = 0;
 
-    if (mbm_tty_open(&tty, path, baud, parity, 1) != 0) {
+    if (mbm_tty_openWith(&tty, path, &options) != 0) {
         perror(path);
         return 1;
     }
@@ -97,15 +109,19 @@ static int watch(const char *path, uint32_t baud, char parity)
 
         poll(&line, 1, 5);
         length = read(tty.fd, bytes, sizeof bytes);
-        if (length > 0)
-            hear(bytes, (uint16_t)length, micros());
-        else if (length == 0 || (errno != EAGAIN && errno != EINTR))
+        now = micros();
+        if (length > 0) {
+            hear(bytes, (uint16_t)length);
+        } else if (length == 0 || (errno != EAGAIN && errno != EINTR)) {
+            fprintf(stderr, "%s: %s\n", path, length == 0 ? "gone" : strerror(errno));
+            failed = 1;
             break;
-        tell_all(micros());
+        }
+        tell_all(now);
     }
     mbm_tty_close(&tty);
     tell_all(micros());
-    return 0;
+    return failed;
 }
 
 /* The bytes of hex digits; -1 if there is anything else. */
@@ -127,30 +143,45 @@ static int bytes_of(const char *text, uint8_t *bytes, int capacity)
     return count;
 }
 
+/* Looks now and then, as on a line: often while requests may time out. */
+static void pass_time(uint64_t until)
+{
+    uint64_t silent = now;
+
+    while (now < until) {
+        uint64_t step = now - silent < ALL_ENDED ? LOOK_STEP : SELDOM_STEP;
+
+        tell_all(until - now < step ? until : now + step);
+    }
+}
+
 static int replay(void)
 {
     char text[8192];
     uint8_t bytes[2700];
-    uint32_t now = 0;
     unsigned number = 0;
     int length;
 
     while (!ended && fgets(text, sizeof text, stdin)) {
-        char *hex = strchr(text, ':');
+        char *hex = strchr(text, ':'), *behind = hex;
+        double told = hex ? strtod(text, &behind) * 1000.0 : (double)(now + LINE_STEP);
 
         number++;
         if (text[0] == '#')
             continue;
-        now = hex ? (uint32_t)(strtod(text, NULL) * 1000.0) : now + LINE_STEP;
-        tell_all(now);
+        if (behind != hex || !(told >= (double)now && told < 1e15)) {
+            fprintf(stderr, "line %u: no time, or earlier than the line before\n", number);
+            return 1;
+        }
+        pass_time((uint64_t)told);
         length = bytes_of(hex ? hex + 1 : text, bytes, sizeof bytes);
         if (length < 0) {
             fprintf(stderr, "line %u: not hex\n", number);
             return 1;
         }
-        hear(bytes, (uint16_t)length, now);
+        hear(bytes, (uint16_t)length);
     }
-    tell_all(now + ALL_ENDED);
+    pass_time(now + ALL_ENDED);
     return 0;
 }
 
@@ -191,7 +222,8 @@ int main(int argc, char **argv)
     if (strcmp(argv[0], "-") == 0)
         failed = replay();
     else
-        failed = watch(argv[0], baud, argc > 2 ? argv[2][0] : 'N');
+        failed = watch(argv[0], baud, argc > 2 ? argv[2][0] : 'N',
+                       framing.kind == MBM_FRAMING_ASCII ? 7 : 8);
     printf("%lu requests, %lu replies, %lu exceptions, %lu unpaired, %lu timeouts, %lu bad CRCs, "
            "noise %lu times; slowest reply %.1f ms\n",
            totals[MBM_EVENT_REQUEST], totals[MBM_EVENT_REPLY], totals[MBM_EVENT_EXCEPTION],

@@ -343,7 +343,8 @@ pub unsafe extern "C" fn mbm_sniffer_setBaudRate(sniffer: *mut mbm_sniffer, baud
 
 /// Sets how long a request may stay unanswered before that is told; 1000 ms at
 /// first. On a serial line the next request ends it too. A longer time than the
-/// master's own pairs late replies.
+/// master's own pairs late replies. For ten times as long, a reply to a request
+/// that was given up is still told with what was asked, as MBM_EVENT_UNPAIRED.
 ///
 /// @param sniffer       the object
 /// @param milliseconds  1 to 65535

@@ -169,6 +169,15 @@ impl<C: Cells> Registers<C> {
         self.load(address, 0, bytes)
     }
 
+    /// As [`Registers::bytes`], the low byte of each register first in an order
+    /// that swaps them. Registers follow each other in every order.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing copied.
+    pub fn bytes_in(&self, order: Order, address: u16, bytes: &mut [u8]) -> Result<(), Status> {
+        self.load(address, order.swaps_bytes().into(), bytes)
+    }
+
     /// The high or the low byte of a register as it travels.
     ///
     /// # Errors
@@ -288,6 +297,14 @@ impl<C: CellsMut> Registers<C> {
     /// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing set.
     pub fn set_bytes(&mut self, address: u16, bytes: &[u8]) -> Result<(), Status> {
         self.store(address, 0, bytes)
+    }
+
+    /// As [`Registers::set_bytes`], laid out as [`Registers::bytes_in`] reads them.
+    ///
+    /// # Errors
+    /// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing set.
+    pub fn set_bytes_in(&mut self, order: Order, address: u16, bytes: &[u8]) -> Result<(), Status> {
+        self.store(address, order.swaps_bytes().into(), bytes)
     }
 
     /// Sets the high or the low byte of a register as it travels; the other

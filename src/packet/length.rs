@@ -5,6 +5,7 @@ use super::Side;
 use crate::error::Status;
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::custom::{is_user_defined, Function};
+use crate::pdu::diagnostics::REPORT_SERVER_ID;
 use crate::pdu::length::{response as response_length, Length};
 use crate::pdu::limits::MAX_PDU;
 use crate::pdu::request::Request;
@@ -112,7 +113,13 @@ fn of_characters(
     let pdu = content.get(1..count).unwrap_or_default();
     match of_frame(framing, side.length(pdu, functions)) {
         // So long already, and no end is there.
-        Length::Exactly(length) if bytes.len() >= length => Err(Status::MALFORMED_FRAME),
+        Length::Exactly(length) if bytes.len() >= length => {
+            // Some devices count the id alone and send more behind it.
+            match (side, pdu) {
+                (Side::Response, [REPORT_SERVER_ID, ..]) => Ok(Length::Silence),
+                _ => Err(Status::MALFORMED_FRAME),
+            }
+        }
         length => Ok(length),
     }
 }
@@ -198,6 +205,23 @@ mod tests {
         for bad in [&b"x"[..], b":1G", b":\r1", b":0207F777", b":0207F7\rX"] {
             let length = of(Framing::Ascii, Side::Request, bad);
             assert_eq!(length, Err(Status::MALFORMED_FRAME));
+        }
+    }
+
+    #[test]
+    fn the_end_decides_where_a_device_sends_more_than_it_counts() {
+        // It counts its id alone: two bytes of five.
+        let frame = b":10110201020001023F\r\n";
+        for have in 0..=frame.len() {
+            let length = of(Framing::Ascii, Side::Response, &frame[..have]);
+            let wanted = match have {
+                0..=4 => Length::AtLeast(9),
+                5..=6 => Length::AtLeast(11),
+                7..=14 => Length::Exactly(15),
+                15..=20 => Length::Silence,
+                _ => Length::Exactly(21),
+            };
+            assert_eq!(length, Ok(wanted), "{have}");
         }
     }
 

@@ -27,12 +27,6 @@ pub const INDIVIDUAL: u8 = 4;
 /// More follows, in a response.
 const MORE: u8 = 0xFF;
 
-/// True for basic, regular or extended identification, by stream alone or, with
-/// the highest bit, one object at a time too.
-const fn is_conformity_level(level: u8) -> bool {
-    matches!(level, 0x01..=0x03 | 0x81..=0x83)
-}
-
 /// The objects of a response, each an id and a value.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Objects<'a> {
@@ -112,13 +106,14 @@ pub(super) fn parse_response<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>
     }
     let (code, conformity) = (byte(reader)?, byte(reader)?);
     let (more, next_object, count) = (byte(reader)?, byte(reader)?, byte(reader)?);
-    let follows = match (code, more) {
-        (BASIC..=INDIVIDUAL, 0) => next_object == 0,
-        (BASIC..=EXTENDED, MORE) => true,
+    // Devices take the level, and the next object where none follows, lightly;
+    // nothing depends on them.
+    let is_right = match (code, more) {
+        (BASIC..=EXTENDED, 0 | MORE) => true,
+        (INDIVIDUAL, 0) => count == 1,
         _ => false,
     };
-    let one_if_asked = code != INDIVIDUAL || count == 1;
-    if !follows || !one_if_asked || !is_conformity_level(conformity) {
+    if !is_right {
         return Err(Status::ILLEGAL_DATA_VALUE);
     }
     Ok(Response::DeviceIdentification {

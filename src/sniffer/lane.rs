@@ -228,6 +228,15 @@ impl Lane {
         self.last
     }
 
+    /// How long the first byte that was not told of is there; 0 if there is none.
+    pub fn waited(&self, now: u32, timing: &Timing) -> u32 {
+        if self.is_empty() {
+            0
+        } else {
+            elapsed(now, self.time(self.start + 1, timing))
+        }
+    }
+
     /// Has everything before `offset` told of.
     pub fn consume(&mut self, offset: u16) {
         while let Some(first) = self.marks().first() {

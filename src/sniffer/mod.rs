@@ -18,7 +18,7 @@ pub use pairing::Asked;
 use crate::error::Status;
 use crate::frame::{ascii, Framing};
 use crate::pdu::custom::Function;
-use crate::time::{character, elapsed, silence, DEFAULT_SILENCE};
+use crate::time::{character, silence, DEFAULT_SILENCE};
 use find::{Context, Verdict};
 use lane::{Lane, Timing};
 use pairing::Requests;
@@ -29,6 +29,10 @@ pub const MIN_BUFFER: usize = 32;
 
 /// How long a request may stay unanswered, at first, in microseconds.
 pub const DEFAULT_TIMEOUT: u32 = 1_000_000;
+
+/// For so many timeouts a late reply is known to answer its request. Later, the
+/// next frame like it is more likely another's.
+const LATE: u32 = 10;
 
 /// How long the rest of an RTU frame is waited for, at first: time stamps of a
 /// USB adapter are off by 16 ms and more.
@@ -105,7 +109,8 @@ impl Sniffer {
         self.timing.character = if baud == 0 { 0 } else { character(baud) as u32 };
     }
 
-    /// Sets how long a request may stay unanswered, in microseconds.
+    /// Sets how long a request may stay unanswered, in microseconds. For ten times
+    /// as long, a late reply is still known to answer it.
     pub const fn set_timeout(&mut self, timeout: u32) {
         self.timeout = timeout;
     }
@@ -165,19 +170,25 @@ impl Sniffer {
         functions: &[Function],
         now: u32,
     ) -> Option<Event<'b>> {
-        for index in 0..2 {
+        // What was heard first is told first.
+        let timing = self.timing;
+        let [first, second] = self.lanes.each_ref().map(|lane| lane.waited(now, &timing));
+        let order = if second > first { [1, 0] } else { [0, 1] };
+        for index in order {
             if let Some(step) = self.step(buffer, functions, index, now) {
                 return Some(self.tell(buffer, functions, index, step, now));
             }
         }
         // Bytes that are not understood yet may hold the reply.
-        let waiting = self.lanes.iter().filter(|lane| !lane.is_empty());
-        let known = waiting
-            .map(|lane| lane.time(lane.start + 1, &self.timing))
-            .max_by_key(|time| elapsed(now, *time))
-            .unwrap_or(now);
-        let overdue = self.requests.overdue(known, self.timeout)?;
+        let known = now.wrapping_sub(first.max(second));
+        let overdue = self.overdue(known)?;
         Some(self.give_up(overdue, now))
+    }
+
+    /// A request that is to be given up by now; those given up long ago go.
+    fn overdue(&mut self, now: u32) -> Option<usize> {
+        self.requests.forget(now, self.timeout.saturating_mul(LATE));
+        self.requests.overdue(now, self.timeout)
     }
 
     fn context<'c>(&'c self, functions: &'c [Function], lane: usize, now: u32) -> Context<'c> {

@@ -6,7 +6,6 @@ use crate::pdu::length::Length;
 use crate::pdu::request::Request;
 use crate::pdu::response::Response;
 use crate::pdu::{bits, diagnostics, files, identification, registers, EXCEPTION};
-use crate::time::elapsed;
 
 pub use crate::explain::HEAD;
 
@@ -143,6 +142,15 @@ impl Slot {
     }
 }
 
+/// How long ago something was, up to half an hour; what came behind `now`, heard
+/// in the other direction, has no age.
+pub(super) fn age(now: u32, time: u32) -> u32 {
+    match now.wrapping_sub(time) {
+        age if age <= u32::MAX / 2 => age,
+        _ => 0,
+    }
+}
+
 /// What a PDU is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Role {
@@ -192,7 +200,7 @@ impl Requests {
     fn earliest(&self, now: u32, state: State, wanted: impl Fn(&Slot) -> bool) -> Option<usize> {
         let mut found: Option<(usize, u32)> = None;
         for (index, slot) in self.slots.iter().enumerate() {
-            let age = elapsed(now, slot.time);
+            let age = age(now, slot.time);
             if slot.state == state && wanted(slot) && found.is_none_or(|(_, most)| age > most) {
                 found = Some((index, age));
             }
@@ -202,7 +210,16 @@ impl Requests {
 
     /// A request that is open for `timeout` or longer.
     pub fn overdue(&self, now: u32, timeout: u32) -> Option<usize> {
-        self.earliest(now, State::Open, |slot| elapsed(now, slot.time) >= timeout)
+        self.earliest(now, State::Open, |slot| age(now, slot.time) >= timeout)
+    }
+
+    /// Forgets what was asked `old` ago or longer and was given up.
+    pub fn forget(&mut self, now: u32, old: u32) {
+        for slot in &mut self.slots {
+            if slot.state == State::Late && age(now, slot.time) >= old {
+                slot.state = State::Free;
+            }
+        }
     }
 
     /// The data of 08/00 are as many as were sent.

@@ -3,7 +3,7 @@
 use super::event::{Event, Kind};
 use super::find::{Context, MIN_RTU};
 use super::lane::Lane;
-use super::pairing::{Role, Seen, State};
+use super::pairing::{age, Role, Seen, State};
 use super::{Sniffer, Step};
 use crate::error::Status;
 use crate::frame::{tcp, Framing};
@@ -11,7 +11,6 @@ use crate::pdu::custom::Function;
 use crate::pdu::request::Request;
 use crate::pdu::response::Response;
 use crate::pdu::EXCEPTION;
-use crate::time::elapsed;
 
 impl Sniffer {
     /// Tells of a request that nobody answered.
@@ -22,7 +21,7 @@ impl Sniffer {
             kind: Kind::Timeout,
             status: Status::RESPONSE_TIMED_OUT,
             time: now,
-            response_time: elapsed(now, slot.time),
+            response_time: age(now, slot.time),
             transaction: slot.transaction,
             unit: slot.unit,
             function: slot.asked.function(),
@@ -123,7 +122,7 @@ impl Sniffer {
             return event;
         };
         let request = request && code & EXCEPTION == 0;
-        if let Some(overdue) = self.requests.overdue(time, self.timeout) {
+        if let Some(overdue) = self.overdue(time) {
             return self.give_up(overdue, time);
         }
         let seen = Seen {
@@ -150,7 +149,7 @@ impl Sniffer {
                 let slot = self.requests.get(index);
                 self.requests.set_state(index, State::Free);
                 event.asked = Some(slot.asked);
-                event.response_time = elapsed(time, slot.time);
+                event.response_time = age(time, slot.time);
                 event.kind = match slot.state {
                     State::Open if code & EXCEPTION != 0 => Kind::Exception,
                     State::Open => Kind::Reply,

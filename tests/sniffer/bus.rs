@@ -170,6 +170,44 @@ fn a_late_reply_is_unpaired_and_its_request_still_explains_it() {
 }
 
 #[test]
+fn a_request_that_was_given_up_long_ago_explains_nothing_any_more() {
+    // Just too long ago, an hour, and as the clock has wrapped.
+    for (framing, steps) in [(Framing::Rtu, 1), (Framing::Tcp, 2), (Framing::Ascii, 4)] {
+        let mut bench = Bench::new(framing);
+        bench.sniffer.set_timeout(500_000);
+        bench.feed(&frame(framing, 1, 17, READ));
+        bench.wait(500_000);
+        for _ in 0..steps {
+            bench.wait(4_500_000 + (steps - 1) * 400_000_000);
+        }
+        // The request for other registers was not heard.
+        bench.feed(&frame(framing, 1, 17, READ_REPLY));
+        bench.wait(10_000);
+        assert_eq!(
+            bench.words()[2..],
+            ["unit 17  unpaired   03 read holding registers: 555 0 100"]
+        );
+        assert_eq!(bench.told[2].asked, None);
+        assert_eq!(bench.told[2].response_time, 0);
+    }
+}
+
+#[test]
+fn a_request_that_looks_like_the_reply_to_one_long_given_up_is_a_request() {
+    let (asked, request) = ([1, 3, 0x10, 0, 19], [1, 3, 0xCD, 0, 5]);
+    let mut bench = Bench::new(Framing::Rtu);
+    bench.feed(&rtu(17, &asked));
+    for _ in 0..60 {
+        bench.wait(60_000_000);
+    }
+    bench.feed(&rtu(17, &request));
+    bench.wait(10_000);
+    bench.feed(&rtu(17, &[1, 1, 0x15]));
+    let kinds = [Kind::Request, Kind::Timeout, Kind::Request, Kind::Reply];
+    assert_eq!(bench.kinds(), kinds);
+}
+
+#[test]
 fn a_reply_that_comes_too_late_in_one_piece_with_others_is_late_all_the_same() {
     let mut bench = Bench::new(Framing::Rtu);
     bench.feed(&rtu(17, READ));
@@ -292,6 +330,42 @@ fn directions_may_be_heard_apart_byte_by_byte_and_mixed() {
         assert_eq!(kinds.iter().filter(|kind| **kind == Kind::Reply).count(), 1);
         assert_eq!(kinds.len(), 4);
     }
+}
+
+#[test]
+fn what_was_heard_first_is_told_first_where_directions_are_heard_apart() {
+    for gap in [2_000_000, 10_000_000, 1_700_000_000] {
+        let mut bench = Bench::with_buffer(Framing::Tcp, 2 * Framing::Tcp.max_frame());
+        bench.now = 5_000;
+        // A header that promises more than ever comes hides a reply.
+        bench.feed_at(Tap::Server, &[0, 9, 0, 0, 0, 50]);
+        bench.feed_at(Tap::Server, &frame(Framing::Tcp, 1, 17, READ_REPLY));
+        bench.now += gap;
+        bench.feed_at(Tap::Client, &frame(Framing::Tcp, 2, 17, READ));
+        bench.wait(10_000);
+        bench.feed_at(Tap::Server, &frame(Framing::Tcp, 2, 17, READ_REPLY));
+        let kinds = [Kind::Noise, Kind::Unpaired, Kind::Request, Kind::Reply];
+        assert_eq!(bench.kinds(), kinds);
+        let times: Vec<_> = bench.told.iter().map(|told| told.time).collect();
+        assert_eq!(times, [5_000, 5_000, 5_000 + gap, 15_000 + gap]);
+        assert_eq!(bench.told[3].response_time, 10_000);
+    }
+}
+
+#[test]
+fn a_frame_heard_before_a_request_is_no_reason_to_give_that_up() {
+    let mut bench = Bench::with_buffer(Framing::Tcp, 2 * Framing::Tcp.max_frame());
+    bench.sniffer.set_patience(60_000_000);
+    let reply = frame(Framing::Tcp, 1, 17, READ_REPLY);
+    bench.feed_at(Tap::Server, &[&[0, 9, 0, 0, 0, 50], &reply[..]].concat());
+    bench.now = 1_000_000;
+    bench.feed_at(Tap::Client, &frame(Framing::Tcp, 2, 17, READ));
+    bench.now = 1_500_000;
+    // Now it is no frame, and what is in it is heard of at last.
+    bench.sniffer.set_patience(1_000_000);
+    bench.listen();
+    let kinds = [Kind::Request, Kind::Noise, Kind::Unpaired];
+    assert_eq!(bench.kinds(), kinds);
 }
 
 #[test]

@@ -33,7 +33,8 @@ pub const MBM_LENGTH_EXACT: u8 = 0;
 pub const MBM_LENGTH_AT_LEAST: u8 = 1;
 /// Silence on the line tells, in ASCII the end character. `bytes` is 0.
 pub const MBM_LENGTH_SILENCE: u8 = 2;
-/// Nobody knows this function; declare it. `bytes` is 0.
+/// Nobody knows this function: declare it. Also what silence ends, in RTU over TCP,
+/// where there is none. `bytes` is 0.
 pub const MBM_LENGTH_UNKNOWN: u8 = 3;
 
 /// How long something is.
@@ -138,11 +139,12 @@ pub struct mbm_packet {
     pub readDeviceIdCode: u8,
     /// 2B/0E: the first object, or the only one.
     pub objectId: u8,
-    /// 2B/0E: 01 to 03 or 81 to 83.
+    /// 2B/0E: 01 to 03 or 81 to 83 by the standard; not checked.
     pub conformity: u8,
     /// 2B/0E: 1 if another request is needed for the rest, else 0.
     pub moreFollows: u8,
-    /// 2B/0E: the object to ask for next; 0 if none follows.
+    /// 2B/0E: the object to ask for next; if none follows, 0 by the standard, and
+    /// not checked.
     pub nextObjectId: u8,
     /// 2B/0E: how many objects the data are.
     pub objectCount: u8,

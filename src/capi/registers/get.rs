@@ -343,6 +343,32 @@ pub unsafe extern "C" fn mbm_registers_getBytes(
     })
 }
 
+/// As mbm_registers_getBytes, from a device that swaps the bytes of its registers:
+/// with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte of each comes first.
+///
+/// @param registers  the registers
+/// @param address    the first register, by the device's address
+/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+/// @param bytes      gets the bytes; must not overlap the registers
+/// @param length     how many bytes, two a register; may be odd
+/// @return as mbm_registers_getBytes
+#[no_mangle]
+pub unsafe extern "C" fn mbm_registers_getBytesInOrder(
+    registers: *const mbm_registers,
+    address: u16,
+    order: u8,
+    bytes: *mut u8,
+    length: u16,
+) -> u8 {
+    // SAFETY: as the header demands.
+    code(unsafe {
+        lent(registers, order, false).and_then(|registers| {
+            let bytes = slice_mut(bytes, length.into())?;
+            registers.bytes_in(registers.order, address, bytes)
+        })
+    })
+}
+
 /// Whether registers hold these raw bytes, high byte first in every order.
 ///
 /// @param registers  the registers

@@ -329,3 +329,29 @@ pub unsafe extern "C" fn mbm_registers_setBytes(
         })
     }
 }
+
+/// As mbm_registers_setBytes, for a device that swaps the bytes of its registers:
+/// with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte of each comes first.
+///
+/// @param registers  the registers, of a kind to write
+/// @param address    the first register, by the device's address
+/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+/// @param bytes      the bytes; must not overlap the registers
+/// @param length     how many bytes, two a register; if odd, the other byte of the
+///                   last register stays
+/// @return as mbm_registers_setBytes
+#[no_mangle]
+pub unsafe extern "C" fn mbm_registers_setBytesInOrder(
+    registers: *const mbm_registers,
+    address: u16,
+    order: u8,
+    bytes: *const u8,
+    length: u16,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(registers, order, |registers| {
+            registers.set_bytes_in(registers.order, address, slice(bytes, length.into())?)
+        })
+    }
+}

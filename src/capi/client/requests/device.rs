@@ -74,7 +74,9 @@ pub unsafe extern "C" fn mbm_client_getCommEventLog(
     unsafe { bare(client, request, Form::GET_COMM_EVENT_LOG) }
 }
 
-/// Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13).
+/// Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13). `reply`
+/// gets what stands behind the byte count; on TCP also what a device sends that counts
+/// the id alone. On a serial line the count must be true.
 ///
 /// @param client   the object
 /// @param request  the request
