@@ -109,7 +109,7 @@ pub unsafe extern "C" fn mbm_master_begin(
     // SAFETY: as the header demands.
     unsafe {
         pointers::with_new(master, |master| {
-            master.core.begin(slave, port);
+            master.core.begin(slave, |place| place.copy(port));
             Status::OK
         })
     }
