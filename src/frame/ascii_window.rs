@@ -21,6 +21,10 @@ pub struct Window {
 }
 
 impl Window {
+    fn pass(&mut self, count: usize) {
+        self.start += count as u16;
+    }
+
     fn see(&mut self, what: Seen) {
         if self.seen < what {
             self.seen = what;
@@ -135,8 +139,8 @@ impl Search for Window {
         self.skim = false;
     }
 
-    fn advance(&mut self, count: u16) {
-        self.start += count;
+    fn advance(&mut self, _: &mut [u8], count: u16) {
+        self.pass(count.into());
     }
 
     fn skim(&mut self) {
@@ -192,16 +196,16 @@ impl Search for Window {
             }
             let Some(end) = end else {
                 // A return at the end may belong to what follows; noise does not.
-                self.advance(first as u16);
+                self.pass(first);
                 return false;
             };
             if let Some(frame) = rest.get_mut(first..end) {
                 if !frame.is_empty() && self.judge(frame, wanted) {
-                    self.advance(first as u16);
+                    self.pass(first);
                     return true;
                 }
             }
-            self.advance(end as u16);
+            self.pass(end);
         }
     }
 }

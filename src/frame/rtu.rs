@@ -103,8 +103,7 @@ const MIN_FRAME: u8 = 4;
 /// is passed to each call.
 #[derive(Clone, Copy, Debug)]
 pub struct Window {
-    /// Where in the buffer the candidate starts, and where what arrived ends.
-    start: u16,
+    /// Where in the buffer what arrived ends; the candidate stands at its front.
     end: u16,
     /// The CRC of the candidate's first bytes, and how many those are.
     crc: Crc16,
@@ -123,7 +122,6 @@ pub struct Window {
 impl Window {
     /// A window over nothing.
     pub const EMPTY: Window = Window {
-        start: 0,
         end: 0,
         crc: Crc16::START,
         checked: 0,
@@ -135,28 +133,16 @@ impl Window {
         skim: false,
     };
 
-    /// The part of `buffer` to receive into; the candidate moves to the front.
-    // Always, as long as firmware has one caller of it: 22 bytes of flash.
-    #[inline(always)]
-    pub fn room<'a>(&mut self, buffer: &'a mut [u8]) -> Option<&'a mut [u8]> {
-        if self.start > 0 {
-            let cells = Cell::from_mut(&mut *buffer).as_slice_of_cells();
-            let kept = cells.get(usize::from(self.start)..usize::from(self.end))?;
-            for (to, from) in cells.iter().zip(kept) {
-                to.set(from.get());
-            }
-            self.end = kept.len() as u16;
-            self.start = 0;
-        }
+    /// The part of `buffer` to receive into.
+    pub fn room<'a>(&self, buffer: &'a mut [u8]) -> Option<&'a mut [u8]> {
         buffer.get_mut(usize::from(self.end)..)
     }
 
     /// Becomes a window over nothing, of which nothing is left to be skimmed.
     pub fn clear(&mut self) {
         self.skim = true;
-        self.start = 0;
         self.end = 0;
-        self.advance(0);
+        self.begin();
         self.passed = 0;
         self.seen = Seen::NOTHING;
         self.foreign = 0;
@@ -184,11 +170,23 @@ impl Window {
         self.skim
     }
 
-    /// Passes over `count` bytes; another candidate begins.
-    pub fn advance(&mut self, count: u16) {
-        self.start += count;
+    /// Nothing is known of the candidate.
+    fn begin(&mut self) {
         self.crc = Crc16::START;
         self.checked = 0;
+    }
+
+    /// Passes over `count` bytes: what stands behind them moves to the front.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub fn advance(&mut self, buffer: &mut [u8], count: u16) {
+        let cells = Cell::from_mut(buffer).as_slice_of_cells();
+        let Some(kept) = cells.get(usize::from(count)..usize::from(self.end)) else {
+            return;
+        };
+        for (to, from) in cells.iter().zip(kept) {
+            to.set(from.get());
+        }
+        self.end = kept.len() as u16;
     }
 
     /// The CRC of the candidate up to the end of `known`, which grows as bytes
@@ -202,12 +200,12 @@ impl Window {
 
     /// The bytes of the window.
     pub fn bytes<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]> {
-        buffer.get(usize::from(self.start)..usize::from(self.end))
+        buffer.get(..usize::from(self.end))
     }
 
     /// The bytes from `offset` into the candidate on.
     pub fn behind<'a>(&self, buffer: &'a [u8], offset: usize) -> Option<&'a [u8]> {
-        buffer.get(usize::from(self.start) + offset..)
+        buffer.get(offset..)
     }
 
     /// The most telling thing seen so far.
@@ -231,46 +229,56 @@ impl Window {
     /// Stops at a candidate that is not complete yet, unless [`Window::skim`]
     /// was called; then, if there is nothing, all is left as it was.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn search(&mut self, buffer: &[u8], wanted: &mut impl Wanted) -> bool {
-        'found: while let Some(mut rest) = self.bytes(buffer) {
-            while let [first, behind @ ..] = rest {
-                if let Some(length) = wanted.length(rest) {
-                    let total = usize::from(length.get()) + OVERHEAD;
-                    if let Some(frame) = rest.get(..total) {
-                        let crc = if self.skim {
-                            crc16(frame)
-                        } else {
-                            self.checked(frame)
-                        };
-                        if crc.is_residue() {
-                            self.start = self.end - rest.len() as u16;
-                            match wanted.judge(frame) {
-                                Verdict::Right => return true,
-                                Verdict::Own => {}
-                                Verdict::Wrong => self.see_foreign(Seen::MALFORMED),
+    pub fn search(&mut self, buffer: &mut [u8], wanted: &mut impl Wanted) -> bool {
+        let mut found = false;
+        let Some(mut rest) = self.bytes(buffer) else {
+            return false;
+        };
+        // What stays in the buffer.
+        let mut kept = rest.len();
+        while let [first, behind @ ..] = rest {
+            if let Some(length) = wanted.length(rest) {
+                let total = usize::from(length.get()) + OVERHEAD;
+                if let Some((frame, next)) = rest.split_at_checked(total) {
+                    let crc = if self.skim {
+                        crc16(frame)
+                    } else {
+                        self.checked(frame)
+                    };
+                    if crc.is_residue() {
+                        kept = rest.len();
+                        match wanted.judge(frame) {
+                            Verdict::Right => {
+                                found = true;
+                                break;
                             }
-                            self.passed = 0;
-                            self.advance(total as u16);
-                            continue 'found;
+                            Verdict::Own => {}
+                            Verdict::Wrong => self.see_foreign(Seen::MALFORMED),
                         }
-                        if !self.skim {
-                            self.see(Seen::BAD_CRC);
-                        }
-                    } else if total > buffer.len() {
-                        self.see(Seen::TOO_LONG);
-                    } else if !self.skim {
-                        self.checked(rest);
-                        return false;
+                        self.passed = 0;
+                        self.begin();
+                        rest = next;
+                        kept = rest.len();
+                        continue;
                     }
-                }
-                rest = behind;
-                if !self.skim {
-                    self.pass(*first, wanted);
+                    if !self.skim {
+                        self.see(Seen::BAD_CRC);
+                    }
+                } else if total > buffer.len() {
+                    self.see(Seen::TOO_LONG);
+                } else if !self.skim {
+                    self.checked(rest);
+                    break;
                 }
             }
-            return false;
+            rest = behind;
+            if !self.skim {
+                self.pass(*first, wanted);
+                kept = rest.len();
+            }
         }
-        false
+        self.advance(buffer, self.end - kept as u16);
+        found
     }
 
     /// Notes a frame with a right CRC that is not the one.
@@ -293,7 +301,7 @@ impl Window {
     /// a damaged reply seen in it was none.
     #[cfg_attr(target_os = "none", inline(never))]
     fn pass(&mut self, byte: u8, wanted: &impl Wanted) {
-        self.advance(1);
+        self.begin();
         if !cfg!(feature = "diagnosis") {
             return;
         }
@@ -346,9 +354,8 @@ impl Search for Window {
         write(buffer, unit, length, pdu)
     }
 
-    #[inline(always)]
     fn room<'a>(&mut self, buffer: &'a mut [u8]) -> Option<&'a mut [u8]> {
-        self.room(buffer)
+        Window::room(self, buffer)
     }
 
     fn clear(&mut self) {
@@ -359,8 +366,8 @@ impl Search for Window {
         self.arrived(count);
     }
 
-    fn advance(&mut self, count: u16) {
-        self.advance(count);
+    fn advance(&mut self, buffer: &mut [u8], count: u16) {
+        self.advance(buffer, count);
     }
 
     fn skim(&mut self) {

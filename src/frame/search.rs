@@ -102,8 +102,8 @@ pub trait Search: Sized {
     /// Says that `count` bytes more are in the buffer, as in [`Search::room`].
     fn arrived(&mut self, count: u16);
 
-    /// Passes over `count` bytes.
-    fn advance(&mut self, count: u16);
+    /// Passes over the first `count` of the bytes that it stands over.
+    fn advance(&mut self, buffer: &mut [u8], count: u16);
 
     /// Has the next search look behind what is not complete.
     fn skim(&mut self);

@@ -345,7 +345,7 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
         }
         let sent = sent as u16;
         self.storage.count(Counter::BytesSent, sent);
-        self.window.advance(sent);
+        self.window.advance(self.storage.frame(), sent);
         if sent > 0 {
             self.since = self.now;
         }
