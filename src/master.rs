@@ -73,7 +73,7 @@ impl<P, S> Master<P, S> {
         let settings = self.settings();
         settings.silence = time::silence(baud);
         settings.gap = settings.silence;
-        settings.character = time::character(baud).into();
+        settings.character = time::character(baud);
     }
 
     /// The status of the last request; [`Status::PENDING`] while it is under way.

@@ -28,7 +28,7 @@ use crate::frame::Wanted as _;
 use crate::frame::{Search, Seen};
 use crate::pdu::query::Query;
 use crate::port::Port;
-use crate::time::{elapsed, has_elapsed};
+use crate::time::{characters, elapsed, has_elapsed};
 use answer::Answer;
 
 /// Where a transaction stands.
@@ -360,7 +360,7 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
     fn flush(&mut self) -> Status {
         if !self.port.flush() {
             // No request takes longer than a frame of 256 characters.
-            return self.stalled(self.settings.character << 8);
+            return self.stalled(u32::from(self.settings.character) << 8);
         }
         if cfg!(feature = "hold") && self.settings.post_flush_hold > 0 {
             self.enter(Phase::Hold);
@@ -371,7 +371,7 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
     }
 
     fn hold(&mut self) -> Status {
-        let hold = self.settings.character * u32::from(self.settings.post_flush_hold);
+        let hold = characters(self.settings.character, self.settings.post_flush_hold);
         if cfg!(feature = "hold") && self.lasts(hold) {
             self.release();
         }
