@@ -86,6 +86,7 @@ impl Search for Window {
     };
 
     fn hold(&mut self, count: u16) {
+        self.start = 0;
         self.end = count;
     }
 
@@ -139,8 +140,8 @@ impl Search for Window {
         self.skim = false;
     }
 
-    fn advance(&mut self, _: &mut [u8], count: u16) {
-        self.pass(count.into());
+    fn sent(&mut self, count: u16) {
+        self.start += count;
     }
 
     fn skim(&mut self) {
@@ -151,7 +152,7 @@ impl Search for Window {
         self.skim
     }
 
-    fn bytes<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]> {
+    fn unsent<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]> {
         buffer.get(usize::from(self.start)..usize::from(self.end))
     }
 

@@ -105,7 +105,8 @@ const MIN_FRAME: u8 = 4;
 pub struct Window {
     /// Where in the buffer what arrived ends; the candidate stands at its front.
     end: u16,
-    /// The CRC of the candidate's first bytes, and how many those are.
+    /// The CRC of the candidate's first bytes, and how many those are; of what is
+    /// to be sent, how many bytes were.
     crc: Crc16,
     checked: u16,
     /// The bytes passed over since a frame boundary, for they may turn out to
@@ -157,6 +158,20 @@ impl Window {
     /// Says that the buffer holds `count` bytes to be sent.
     pub fn hold(&mut self, count: u16) {
         self.end = count;
+        self.checked = 0;
+    }
+
+    /// Says that `count` bytes more were sent.
+    pub fn sent(&mut self, count: u16) {
+        self.checked += count;
+    }
+
+    /// The bytes that are yet to be sent.
+    pub fn unsent<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]> {
+        // One after the other: both at once are more code on an AVR.
+        buffer
+            .get(..usize::from(self.end))?
+            .get(usize::from(self.checked)..)
     }
 
     /// Has the next search look behind a candidate that is not complete, which
@@ -178,7 +193,7 @@ impl Window {
 
     /// Passes over `count` bytes: what stands behind them moves to the front.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn advance(&mut self, buffer: &mut [u8], count: u16) {
+    fn advance(&mut self, buffer: &mut [u8], count: u16) {
         let cells = Cell::from_mut(buffer).as_slice_of_cells();
         let Some(kept) = cells.get(usize::from(count)..usize::from(self.end)) else {
             return;
@@ -366,8 +381,8 @@ impl Search for Window {
         self.arrived(count);
     }
 
-    fn advance(&mut self, buffer: &mut [u8], count: u16) {
-        self.advance(buffer, count);
+    fn sent(&mut self, count: u16) {
+        self.sent(count);
     }
 
     fn skim(&mut self) {
@@ -378,8 +393,8 @@ impl Search for Window {
         self.is_skimmed()
     }
 
-    fn bytes<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]> {
-        self.bytes(buffer)
+    fn unsent<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]> {
+        Window::unsent(self, buffer)
     }
 
     fn behind<'a>(&self, buffer: &'a [u8], offset: usize) -> Option<&'a [u8]> {
