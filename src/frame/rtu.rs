@@ -251,7 +251,7 @@ impl Window {
         };
         // What stays in the buffer.
         let mut kept = rest.len();
-        while let [first, behind @ ..] = rest {
+        while let [_, behind @ ..] = rest {
             if let Some(length) = wanted.length(rest) {
                 let total = usize::from(length.get()) + OVERHEAD;
                 if let Some((frame, next)) = rest.split_at_checked(total) {
@@ -286,11 +286,11 @@ impl Window {
                     break;
                 }
             }
-            rest = behind;
             if !self.skim {
-                self.pass(*first, wanted);
-                kept = rest.len();
+                self.pass(rest, wanted);
+                kept = behind.len();
             }
+            rest = behind;
         }
         self.advance(buffer, self.end - kept as u16);
         found
@@ -312,28 +312,25 @@ impl Window {
         }
     }
 
-    /// Takes in a byte that is passed over. Where such bytes make up a frame,
-    /// a damaged reply seen in it was none.
+    /// Takes in the first byte of `rest`, which is passed over. Where such bytes
+    /// make up a frame, a damaged reply seen in it was none.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn pass(&mut self, byte: u8, wanted: &impl Wanted) {
+    fn pass(&mut self, rest: &[u8], wanted: &impl Wanted) {
         self.begin();
         if !cfg!(feature = "diagnosis") {
             return;
         }
         if self.passed == 0 {
             self.passed_crc = Crc16::START;
-            self.passed_as = if byte == wanted.unit() {
-                Seen::MALFORMED
-            } else {
-                Seen::OTHER_UNIT
+            self.passed_as = match rest {
+                [unit, ..] if *unit != wanted.unit() => Seen::OTHER_UNIT,
+                [_, function, ..] if function & 0x7F != wanted.function() => Seen::OTHER_FUNCTION,
+                _ => Seen::MALFORMED,
             };
-        } else if self.passed == 1
-            && self.passed_as == Seen::MALFORMED
-            && byte & 0x7F != wanted.function()
-        {
-            self.passed_as = Seen::OTHER_FUNCTION;
         }
-        self.passed_crc = self.passed_crc.with(&[byte]);
+        // A slice of what is there: a byte of its own would be put on the stack.
+        let first = rest.get(..1).unwrap_or_default();
+        self.passed_crc = self.passed_crc.with(first);
         if self.passed < MIN_FRAME {
             self.passed += 1;
         }
