@@ -292,7 +292,10 @@ impl Window {
             }
             rest = behind;
         }
-        self.advance(buffer, self.end - kept as u16);
+        let passed = self.end - kept as u16;
+        if passed > 0 {
+            self.advance(buffer, passed);
+        }
         found
     }
 
