@@ -73,7 +73,7 @@ impl<P, S> Master<P, S> {
         let settings = self.settings();
         settings.silence = time::silence(baud);
         settings.gap = settings.silence;
-        settings.character = time::character(baud).into();
+        settings.character = time::character(baud);
     }
 
     /// The status of the last request; [`Status::PENDING`] while it is under way.
@@ -98,15 +98,12 @@ impl<P, S> Master<P, S> {
 }
 
 impl<P: Port, S: Storage> Master<P, S> {
-    /// Talks to `slave` over `port` from now on. Settings, buffers and their
-    /// words stay; a request under way is given up.
-    pub fn begin(&mut self, slave: u8, port: &P)
-    where
-        P: Copy,
-    {
+    /// Talks to `slave` from now on, over what `port` makes of the port. Settings,
+    /// buffers and their words stay; a request under way is given up.
+    pub fn begin(&mut self, slave: u8, port: impl FnOnce(&mut P)) {
         self.cancel();
         self.slave = slave;
-        self.transaction.port = *port;
+        port(&mut self.transaction.port);
         self.transmit_bits = 0;
         self.transaction.line_used();
     }

@@ -58,6 +58,19 @@ pub const fn character(baud: u32) -> u16 {
     }
 }
 
+/// `count` characters that last `character` each.
+#[inline(always)]
+pub const fn characters(character: u16, count: u8) -> u32 {
+    if cfg!(any(test, target_arch = "avr")) {
+        // Bytes it multiplies itself; 32 bits are 84 bytes of libgcc.
+        let [low, high] = character.to_le_bytes();
+        let (low, high) = (low as u16 * count as u16, high as u16 * count as u16);
+        ((high as u32) << 8) + low as u32
+    } else {
+        character as u32 * count as u32
+    }
+}
+
 /// The silence t3.5 that separates two frames, in microseconds.
 pub const fn silence(baud: u32) -> u32 {
     if baud > 19_200 {
@@ -97,6 +110,16 @@ mod tests {
     fn a_character_is_eleven_bits() {
         assert_eq!(character(9_600), 1_146);
         assert_eq!(character(1), 0xFFFF);
+    }
+
+    #[test]
+    fn characters_take_as_long_as_all_of_them() {
+        for character in [0, 1, 255, 256, 1_146, 0xFF00, 0xFFFF] {
+            for count in 0..=255 {
+                let time = u32::from(character) * u32::from(count);
+                assert_eq!(characters(character, count), time);
+            }
+        }
     }
 
     #[test]

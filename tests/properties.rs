@@ -55,7 +55,7 @@ fn find(unit: u8, request: &Query, bytes: &[u8], piece: usize, size: usize) -> O
     let mut window = Window::EMPTY;
     let mut rest = bytes;
     loop {
-        let found = window.search(&buffer, &mut Wanting(unit, request));
+        let found = window.search(&mut buffer, &mut Wanting(unit, request));
         if found {
             let pdu = &window.bytes(&buffer)?[1..];
             let length = reply::expected(request, pdu).map(|length| usize::from(length.get()));

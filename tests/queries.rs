@@ -20,10 +20,10 @@ fn build(build: impl FnOnce(&mut Query) -> Status) -> Query {
 
 /// The status and the data bytes of a reply frame to a request.
 fn reply(unit: u8, request: &Query, frame: &[u8]) -> (Status, Vec<u8>) {
-    let buffer = frame.to_vec();
+    let mut buffer = frame.to_vec();
     let mut window = Window::EMPTY;
     window.arrived(frame.len() as u16);
-    assert!(window.search(&buffer, &mut Wanting(unit, request)));
+    assert!(window.search(&mut buffer, &mut Wanting(unit, request)));
     let pdu = &buffer[rtu::PDU..buffer.len() - 2];
     let status = reply::judge(request, pdu);
     let read = status == Status::OK && request.is_read();

@@ -58,8 +58,11 @@ impl LentByC {
 // used (until then, and where it was given none, the length is 0); each is lent for as long as `self` is borrowed.
 impl Storage for LentByC {
     fn frame(&mut self) -> &mut [u8] {
-        // SAFETY: see above.
-        unsafe { from_raw_parts_mut(self.frame, self.frame_bytes) }
+        // SAFETY: see above. (The compiler tests for NULL where it is not told.)
+        unsafe {
+            core::hint::assert_unchecked(!self.frame.is_null());
+            from_raw_parts_mut(self.frame, self.frame_bytes)
+        }
     }
 
     fn transmit(&mut self) -> &mut [u16] {

@@ -21,6 +21,10 @@ pub struct Window {
 }
 
 impl Window {
+    fn pass(&mut self, count: usize) {
+        self.start += count as u16;
+    }
+
     fn see(&mut self, what: Seen) {
         if self.seen < what {
             self.seen = what;
@@ -82,6 +86,7 @@ impl Search for Window {
     };
 
     fn hold(&mut self, count: u16) {
+        self.start = 0;
         self.end = count;
     }
 
@@ -135,7 +140,7 @@ impl Search for Window {
         self.skim = false;
     }
 
-    fn advance(&mut self, count: u16) {
+    fn sent(&mut self, count: u16) {
         self.start += count;
     }
 
@@ -147,7 +152,7 @@ impl Search for Window {
         self.skim
     }
 
-    fn bytes<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]> {
+    fn unsent<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]> {
         buffer.get(usize::from(self.start)..usize::from(self.end))
     }
 
@@ -192,16 +197,16 @@ impl Search for Window {
             }
             let Some(end) = end else {
                 // A return at the end may belong to what follows; noise does not.
-                self.advance(first as u16);
+                self.pass(first);
                 return false;
             };
             if let Some(frame) = rest.get_mut(first..end) {
                 if !frame.is_empty() && self.judge(frame, wanted) {
-                    self.advance(first as u16);
+                    self.pass(first);
                     return true;
                 }
             }
-            self.advance(end as u16);
+            self.pass(end);
         }
     }
 }

@@ -103,10 +103,10 @@ const MIN_FRAME: u8 = 4;
 /// is passed to each call.
 #[derive(Clone, Copy, Debug)]
 pub struct Window {
-    /// Where in the buffer the candidate starts, and where what arrived ends.
-    start: u16,
+    /// Where in the buffer what arrived ends; the candidate stands at its front.
     end: u16,
-    /// The CRC of the candidate's first bytes, and how many those are.
+    /// The CRC of the candidate's first bytes, and how many those are; of what is
+    /// to be sent, how many bytes were.
     crc: Crc16,
     checked: u16,
     /// The bytes passed over since a frame boundary, for they may turn out to
@@ -123,7 +123,6 @@ pub struct Window {
 impl Window {
     /// A window over nothing.
     pub const EMPTY: Window = Window {
-        start: 0,
         end: 0,
         crc: Crc16::START,
         checked: 0,
@@ -135,28 +134,16 @@ impl Window {
         skim: false,
     };
 
-    /// The part of `buffer` to receive into; the candidate moves to the front.
-    // Always, as long as firmware has one caller of it: 22 bytes of flash.
-    #[inline(always)]
-    pub fn room<'a>(&mut self, buffer: &'a mut [u8]) -> Option<&'a mut [u8]> {
-        if self.start > 0 {
-            let cells = Cell::from_mut(&mut *buffer).as_slice_of_cells();
-            let kept = cells.get(usize::from(self.start)..usize::from(self.end))?;
-            for (to, from) in cells.iter().zip(kept) {
-                to.set(from.get());
-            }
-            self.end = kept.len() as u16;
-            self.start = 0;
-        }
+    /// The part of `buffer` to receive into.
+    pub fn room<'a>(&self, buffer: &'a mut [u8]) -> Option<&'a mut [u8]> {
         buffer.get_mut(usize::from(self.end)..)
     }
 
     /// Becomes a window over nothing, of which nothing is left to be skimmed.
     pub fn clear(&mut self) {
         self.skim = true;
-        self.start = 0;
         self.end = 0;
-        self.advance(0);
+        self.begin();
         self.passed = 0;
         self.seen = Seen::NOTHING;
         self.foreign = 0;
@@ -171,6 +158,20 @@ impl Window {
     /// Says that the buffer holds `count` bytes to be sent.
     pub fn hold(&mut self, count: u16) {
         self.end = count;
+        self.checked = 0;
+    }
+
+    /// Says that `count` bytes more were sent.
+    pub fn sent(&mut self, count: u16) {
+        self.checked += count;
+    }
+
+    /// The bytes that are yet to be sent.
+    pub fn unsent<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]> {
+        // One after the other: both at once are more code on an AVR.
+        buffer
+            .get(..usize::from(self.end))?
+            .get(usize::from(self.checked)..)
     }
 
     /// Has the next search look behind a candidate that is not complete, which
@@ -184,11 +185,23 @@ impl Window {
         self.skim
     }
 
-    /// Passes over `count` bytes; another candidate begins.
-    pub fn advance(&mut self, count: u16) {
-        self.start += count;
+    /// Nothing is known of the candidate.
+    fn begin(&mut self) {
         self.crc = Crc16::START;
         self.checked = 0;
+    }
+
+    /// Passes over `count` bytes: what stands behind them moves to the front.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn advance(&mut self, buffer: &mut [u8], count: u16) {
+        let cells = Cell::from_mut(buffer).as_slice_of_cells();
+        let Some(kept) = cells.get(usize::from(count)..usize::from(self.end)) else {
+            return;
+        };
+        for (to, from) in cells.iter().zip(kept) {
+            to.set(from.get());
+        }
+        self.end = kept.len() as u16;
     }
 
     /// The CRC of the candidate up to the end of `known`, which grows as bytes
@@ -202,12 +215,12 @@ impl Window {
 
     /// The bytes of the window.
     pub fn bytes<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]> {
-        buffer.get(usize::from(self.start)..usize::from(self.end))
+        buffer.get(..usize::from(self.end))
     }
 
     /// The bytes from `offset` into the candidate on.
     pub fn behind<'a>(&self, buffer: &'a [u8], offset: usize) -> Option<&'a [u8]> {
-        buffer.get(usize::from(self.start) + offset..)
+        buffer.get(offset..)
     }
 
     /// The most telling thing seen so far.
@@ -231,46 +244,59 @@ impl Window {
     /// Stops at a candidate that is not complete yet, unless [`Window::skim`]
     /// was called; then, if there is nothing, all is left as it was.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn search(&mut self, buffer: &[u8], wanted: &mut impl Wanted) -> bool {
-        'found: while let Some(mut rest) = self.bytes(buffer) {
-            while let [first, behind @ ..] = rest {
-                if let Some(length) = wanted.length(rest) {
-                    let total = usize::from(length.get()) + OVERHEAD;
-                    if let Some(frame) = rest.get(..total) {
-                        let crc = if self.skim {
-                            crc16(frame)
-                        } else {
-                            self.checked(frame)
-                        };
-                        if crc.is_residue() {
-                            self.start = self.end - rest.len() as u16;
-                            match wanted.judge(frame) {
-                                Verdict::Right => return true,
-                                Verdict::Own => {}
-                                Verdict::Wrong => self.see_foreign(Seen::MALFORMED),
+    pub fn search(&mut self, buffer: &mut [u8], wanted: &mut impl Wanted) -> bool {
+        let mut found = false;
+        let Some(mut rest) = self.bytes(buffer) else {
+            return false;
+        };
+        // What stays in the buffer.
+        let mut kept = rest.len();
+        while let [_, behind @ ..] = rest {
+            if let Some(length) = wanted.length(rest) {
+                let total = usize::from(length.get()) + OVERHEAD;
+                if let Some((frame, next)) = rest.split_at_checked(total) {
+                    let crc = if self.skim {
+                        crc16(frame)
+                    } else {
+                        self.checked(frame)
+                    };
+                    if crc.is_residue() {
+                        kept = rest.len();
+                        match wanted.judge(frame) {
+                            Verdict::Right => {
+                                found = true;
+                                break;
                             }
-                            self.passed = 0;
-                            self.advance(total as u16);
-                            continue 'found;
+                            Verdict::Own => {}
+                            Verdict::Wrong => self.see_foreign(Seen::MALFORMED),
                         }
-                        if !self.skim {
-                            self.see(Seen::BAD_CRC);
-                        }
-                    } else if total > buffer.len() {
-                        self.see(Seen::TOO_LONG);
-                    } else if !self.skim {
-                        self.checked(rest);
-                        return false;
+                        self.passed = 0;
+                        self.begin();
+                        rest = next;
+                        kept = rest.len();
+                        continue;
                     }
-                }
-                rest = behind;
-                if !self.skim {
-                    self.pass(*first, wanted);
+                    if !self.skim {
+                        self.see(Seen::BAD_CRC);
+                    }
+                } else if total > buffer.len() {
+                    self.see(Seen::TOO_LONG);
+                } else if !self.skim {
+                    self.checked(rest);
+                    break;
                 }
             }
-            return false;
+            if !self.skim {
+                self.pass(rest, wanted);
+                kept = behind.len();
+            }
+            rest = behind;
         }
-        false
+        let passed = self.end - kept as u16;
+        if passed > 0 {
+            self.advance(buffer, passed);
+        }
+        found
     }
 
     /// Notes a frame with a right CRC that is not the one.
@@ -289,28 +315,25 @@ impl Window {
         }
     }
 
-    /// Takes in a byte that is passed over. Where such bytes make up a frame,
-    /// a damaged reply seen in it was none.
+    /// Takes in the first byte of `rest`, which is passed over. Where such bytes
+    /// make up a frame, a damaged reply seen in it was none.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn pass(&mut self, byte: u8, wanted: &impl Wanted) {
-        self.advance(1);
+    fn pass(&mut self, rest: &[u8], wanted: &impl Wanted) {
+        self.begin();
         if !cfg!(feature = "diagnosis") {
             return;
         }
         if self.passed == 0 {
             self.passed_crc = Crc16::START;
-            self.passed_as = if byte == wanted.unit() {
-                Seen::MALFORMED
-            } else {
-                Seen::OTHER_UNIT
+            self.passed_as = match rest {
+                [unit, ..] if *unit != wanted.unit() => Seen::OTHER_UNIT,
+                [_, function, ..] if function & 0x7F != wanted.function() => Seen::OTHER_FUNCTION,
+                _ => Seen::MALFORMED,
             };
-        } else if self.passed == 1
-            && self.passed_as == Seen::MALFORMED
-            && byte & 0x7F != wanted.function()
-        {
-            self.passed_as = Seen::OTHER_FUNCTION;
         }
-        self.passed_crc = self.passed_crc.with(&[byte]);
+        // A slice of what is there: a byte of its own would be put on the stack.
+        let first = rest.get(..1).unwrap_or_default();
+        self.passed_crc = self.passed_crc.with(first);
         if self.passed < MIN_FRAME {
             self.passed += 1;
         }
@@ -346,9 +369,8 @@ impl Search for Window {
         write(buffer, unit, length, pdu)
     }
 
-    #[inline(always)]
     fn room<'a>(&mut self, buffer: &'a mut [u8]) -> Option<&'a mut [u8]> {
-        self.room(buffer)
+        Window::room(self, buffer)
     }
 
     fn clear(&mut self) {
@@ -359,8 +381,8 @@ impl Search for Window {
         self.arrived(count);
     }
 
-    fn advance(&mut self, count: u16) {
-        self.advance(count);
+    fn sent(&mut self, count: u16) {
+        self.sent(count);
     }
 
     fn skim(&mut self) {
@@ -371,8 +393,8 @@ impl Search for Window {
         self.is_skimmed()
     }
 
-    fn bytes<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]> {
-        self.bytes(buffer)
+    fn unsent<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]> {
+        Window::unsent(self, buffer)
     }
 
     fn behind<'a>(&self, buffer: &'a [u8], offset: usize) -> Option<&'a [u8]> {

@@ -80,7 +80,7 @@ pub trait Search: Sized {
     /// Bytes of the frame of a PDU of `length` bytes.
     fn frame_length(length: u8) -> u16;
 
-    /// Says that the buffer holds `count` bytes to be sent.
+    /// Stands over `count` bytes to be sent, which the buffer holds.
     fn hold(&mut self, count: u16);
 
     /// Writes the frame of the PDU that `pdu` writes, `length` bytes long; false
@@ -102,8 +102,8 @@ pub trait Search: Sized {
     /// Says that `count` bytes more are in the buffer, as in [`Search::room`].
     fn arrived(&mut self, count: u16);
 
-    /// Passes over `count` bytes.
-    fn advance(&mut self, count: u16);
+    /// Says that `count` bytes more were sent.
+    fn sent(&mut self, count: u16);
 
     /// Has the next search look behind what is not complete.
     fn skim(&mut self);
@@ -111,8 +111,8 @@ pub trait Search: Sized {
     /// True if nothing arrived since [`Search::skim`].
     fn is_skimmed(&self) -> bool;
 
-    /// The bytes that it stands over.
-    fn bytes<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]>;
+    /// The bytes that are yet to be sent.
+    fn unsent<'a>(&self, buffer: &'a [u8]) -> Option<&'a [u8]>;
 
     /// The bytes from `offset` into the frame that was found.
     fn behind<'a>(&self, buffer: &'a [u8], offset: usize) -> Option<&'a [u8]>;

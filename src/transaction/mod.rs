@@ -28,7 +28,7 @@ use crate::frame::Wanted as _;
 use crate::frame::{Search, Seen};
 use crate::pdu::query::Query;
 use crate::port::Port;
-use crate::time::{elapsed, has_elapsed};
+use crate::time::{characters, elapsed, has_elapsed};
 use answer::Answer;
 
 /// Where a transaction stands.
@@ -185,13 +185,15 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
             return Status::BROADCAST_NOT_ALLOWED;
         }
         self.wanted.unit = unit;
-        self.retries = self.settings.retries;
+        if cfg!(feature = "retries") && Q::REPEATS {
+            self.retries = self.settings.retries;
+        }
         self.listen_anew()
     }
 
     /// Waits for silence, then sends; from the next poll on.
     fn listen_anew(&mut self) -> Status {
-        self.window.clear();
+        self.window.hold(0);
         if !self.write_frame() {
             return Status::BUFFER_TOO_SMALL;
         }
@@ -335,7 +337,7 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
 
     #[cfg_attr(target_os = "none", inline(never))]
     fn send(&mut self) -> Status {
-        let Some(rest) = self.window.bytes(self.storage.frame()) else {
+        let Some(rest) = self.window.unsent(self.storage.frame()) else {
             return Status::BUFFER_TOO_SMALL;
         };
         let left = rest.len();
@@ -345,7 +347,7 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
         }
         let sent = sent as u16;
         self.storage.count(Counter::BytesSent, sent);
-        self.window.advance(sent);
+        self.window.sent(sent);
         if sent > 0 {
             self.since = self.now;
         }
@@ -360,7 +362,7 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
     fn flush(&mut self) -> Status {
         if !self.port.flush() {
             // No request takes longer than a frame of 256 characters.
-            return self.stalled(self.settings.character << 8);
+            return self.stalled(u32::from(self.settings.character) << 8);
         }
         if cfg!(feature = "hold") && self.settings.post_flush_hold > 0 {
             self.enter(Phase::Hold);
@@ -371,7 +373,7 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
     }
 
     fn hold(&mut self) -> Status {
-        let hold = self.settings.character * u32::from(self.settings.post_flush_hold);
+        let hold = characters(self.settings.character, self.settings.post_flush_hold);
         if cfg!(feature = "hold") && self.lasts(hold) {
             self.release();
         }
@@ -383,7 +385,9 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
     fn release(&mut self) {
         self.window.clear();
         self.port.post_transmission();
-        self.wanted.echo = self.settings.echo_discard;
+        if cfg!(feature = "echo") {
+            self.wanted.echo = self.settings.echo_discard;
+        }
         self.waiting = true;
         self.enter(
             if self.wanted.unit == BROADCAST || !self.wanted.request.is_answered() {

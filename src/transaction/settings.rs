@@ -18,7 +18,7 @@ pub struct Settings {
     /// What a late reply is given after a request that got none.
     pub quiet_time: u32,
     /// One character.
-    pub character: u32,
+    pub character: u16,
     /// How often a request is repeated that was not answered.
     pub retries: u8,
     /// How long the driver is held on after the flush, in characters.
@@ -35,7 +35,7 @@ impl Settings {
         response_timeout: millis(2000),
         turnaround_delay: millis(100),
         quiet_time: millis(100),
-        character: time::DEFAULT_CHARACTER as u32,
+        character: time::DEFAULT_CHARACTER,
         retries: 0,
         post_flush_hold: 0,
         echo_discard: false,

@@ -101,7 +101,7 @@ pub unsafe extern "C" fn mbm_client_setBaudRate(client: *mut mbm_client, baud: u
         set(client, |parts| {
             parts.settings.silence = time::silence(baud);
             parts.settings.gap = parts.settings.silence;
-            parts.settings.character = time::character(baud).into();
+            parts.settings.character = time::character(baud);
             Status::OK
         })
     }

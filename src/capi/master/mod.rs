@@ -33,7 +33,7 @@ pub struct mbm_master {
     /// Not for you.
     pointers: [*mut c_void; 21],
     /// Not for you.
-    words: [u32; 19],
+    words: [u32; 18],
 }
 
 /// What lies behind an `mbm_master`.
@@ -109,7 +109,7 @@ pub unsafe extern "C" fn mbm_master_begin(
     // SAFETY: as the header demands.
     unsafe {
         pointers::with_new(master, |master| {
-            master.core.begin(slave, port);
+            master.core.begin(slave, |place| place.copy(port));
             Status::OK
         })
     }
