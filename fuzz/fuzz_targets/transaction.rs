@@ -153,7 +153,7 @@ fuzz_target!(|data: &[u8]| {
         response_timeout: 1000 + 4 * time(input),
         turnaround_delay: time(input),
         quiet_time: 2 * time(input),
-        character: u32::from(input.u8()),
+        character: u16::from(input.u8()),
         retries: input.u8() % 3,
         post_flush_hold: input.u8() % 4,
         echo_discard: input.u8() & 1 == 1,
