@@ -113,7 +113,7 @@ fn search(mut input: Input) {
         bytes: Vec::new(),
         at: 0,
     };
-    let check = |window: &mut Window, naive: &mut Naive, buffer: &[u8], skim| {
+    let check = |window: &mut Window, naive: &mut Naive, buffer: &mut [u8], skim| {
         let found = window
             .search(buffer, &mut Ours(&asked))
             .then(|| window.bytes(buffer).expect("within the buffer"));
@@ -128,7 +128,7 @@ fn search(mut input: Input) {
         match event(&mut input, &asked) {
             Event::Silence => {
                 window.skim();
-                if check(&mut window, &mut naive, &buffer, true) {
+                if check(&mut window, &mut naive, &mut buffer, true) {
                     return;
                 }
             }
@@ -142,7 +142,7 @@ fn search(mut input: Input) {
                     window.arrived(now.len() as u16);
                     naive.bytes.extend_from_slice(now);
                     rest = later;
-                    if check(&mut window, &mut naive, &buffer, false) {
+                    if check(&mut window, &mut naive, &mut buffer, false) {
                         return;
                     }
                 }
