@@ -154,7 +154,7 @@ static void null_is_an_invalid_argument(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_server_respond(0, &unit, 1, frame, 9, 8, &length));
 }
 
-static void a_unit_that_serves_nothing_refuses_everything(void **state)
+static void what_a_unit_does_not_serve_is_exception_01(void **state)
 {
     (void)state;
     OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
@@ -163,7 +163,7 @@ static void a_unit_that_serves_nothing_refuses_everything(void **state)
     assert_memory_equal(wire.sent, "\x11\x84\x01", 3);
 }
 
-static void a_unit_without_services_is_silent(void **state)
+static void a_unit_without_services_is_none(void **state)
 {
     static mbm_unit places[3];
 
@@ -173,10 +173,12 @@ static void a_unit_without_services_is_silent(void **state)
     assert_int_equal(ASK("\x03\0\0\0\1"), 0);
     places[1].id = 17;
     assert_int_equal(ASK("\x03\0\0\0\1"), 0);
+    /* The next one answers. */
     places[2].id = 17;
     OK(mbm_server_serveHoldingRegisters(&places[2], &table));
-    assert_int_equal(ASK("\x04\0\0\0\1"), 5);
-    assert_memory_equal(wire.sent, "\x11\x84\x01", 3);
+    assert_int_equal(ASK("\x03\0\0\0\1"), 7);
+    assert_int_equal(BROADCAST("\x06\0\1\x56\x78"), 0);
+    assert_int_equal(words[1], 0x5678);
 }
 
 /* A peer that asks another unit faster than anybody reads. */
@@ -384,22 +386,6 @@ static void a_broadcast_of_what_does_not_only_write_is_not_carried_out(void **st
     assert_int_equal(reads, 1);
 }
 
-/* A unit without any service is none: the next one answers. */
-static void a_unit_without_a_service_is_passed_over(void **state)
-{
-    static mbm_unit units[2];
-
-    (void)state;
-    memset(units, 0, sizeof units);
-    units[1].id = 17;
-    OK(mbm_server_begin(&server, &port, units, 2, frame, sizeof frame));
-    assert_int_equal(ASK("\x03\0\0\0\1"), 0);
-    OK(mbm_server_serveHoldingRegisters(&units[1], &table));
-    assert_int_equal(ASK("\x03\0\0\0\1"), 7);
-    assert_int_equal(BROADCAST("\x06\0\1\x56\x78"), 0);
-    assert_int_equal(words[1], 0x5678);
-}
-
 static void a_response_that_the_port_takes_in_pieces_arrives_whole(void **state)
 {
     (void)state;
@@ -493,8 +479,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(an_object_that_was_never_begun_is_told),
         TEST(null_is_an_invalid_argument),
-        TEST(a_unit_that_serves_nothing_refuses_everything),
-        TEST(a_unit_without_services_is_silent),
+        TEST(what_a_unit_does_not_serve_is_exception_01),
+        TEST(a_unit_without_services_is_none),
         TEST(a_poll_ends_though_a_peer_floods),
         TEST(tables_without_storage_have_no_cells),
         TEST(serving_twice_is_serving_once),
@@ -503,7 +489,6 @@ int main(void)
         TEST(a_function_of_ours_says_what_is_answered),
         TEST(a_function_of_code_0_is_every_other),
         TEST(a_broadcast_of_what_does_not_only_write_is_not_carried_out),
-        TEST(a_unit_without_a_service_is_passed_over),
         TEST(a_response_that_the_port_takes_in_pieces_arrives_whole),
         TEST(the_length_of_ours_frames_rtu_over_tcp),
         TEST(a_restart_is_told),

@@ -105,39 +105,6 @@ static void assert_fails(int error, int result)
     assert_int_equal(errno, error);
 }
 
-static void parity_stop_and_data_bits_become_settings(void **state)
-{
-    static const struct {
-        char parity;
-        uint8_t stop, data;
-        tcflag_t flags;
-    } rows[] = {
-        {'N', 1, 8, CS8},          {'N', 2, 8, CS8 | CSTOPB},
-        {'E', 1, 0, CS8 | PARENB}, {'O', 1, 8, CS8 | PARENB | PARODD},
-        {'E', 1, 7, CS7 | PARENB}, {'O', 2, 7, CS7 | PARENB | PARODD | CSTOPB},
-    };
-    const tcflag_t all = CSIZE | PARENB | PARODD | CSTOPB | CRTSCTS | HUPCL | CLOCAL | CREAD;
-    size_t i;
-
-    (void)state;
-    for (i = 0; i < COUNT(rows); i++) {
-        mbm_tty_options options = {.baud = 9600};
-        struct termios settings;
-
-        memset(&settings, 0xFF, sizeof settings);
-        options.parity = rows[i].parity;
-        options.stop = rows[i].stop;
-        options.data = rows[i].data;
-        assert_int_equal(mbm_tty_settings(&settings, &options), 0);
-        assert_int_equal(settings.c_cflag & all, rows[i].flags | CLOCAL | CREAD);
-        assert_int_equal(settings.c_iflag & (INPCK | IXON | IXOFF | ISTRIP | ICRNL), 0);
-        assert_int_equal(settings.c_lflag & (ICANON | ECHO | ISIG), 0);
-        assert_int_equal(settings.c_cc[VMIN], 1);
-        assert_int_equal(cfgetospeed(&settings), B9600);
-        assert_int_equal(cfgetispeed(&settings), B9600);
-    }
-}
-
 static void every_rate_of_termios_can_be_set(void **state)
 {
     static const struct {
@@ -485,7 +452,6 @@ static void a_socket_can_be_attached(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(parity_stop_and_data_bits_become_settings),
         TEST(every_rate_of_termios_can_be_set),
         TEST(any_rate_is_set_where_it_is_asked_for),
         TEST(options_that_no_terminal_has_are_refused_with_einval),
