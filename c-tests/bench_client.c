@@ -2,6 +2,7 @@
  * server over loopback TCP, and over one pty. The server is a process of its
  * own, so that a profiler sees the client alone. */
 #define _GNU_SOURCE
+#include "clock.h"
 #include "mbm_tcp.h"
 #include "mbm_tty.h"
 #include "pty.h"
@@ -19,7 +20,6 @@
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 enum {
@@ -240,14 +240,6 @@ static void run(transact clients, bench *b, unsigned long count)
 }
 
 /* --- what is measured */
-
-static double seconds(void)
-{
-    struct timespec now;
-
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-}
 
 static int by_size(const void *left, const void *right)
 {

@@ -14,17 +14,6 @@ enum { UNIT = 17 };
 
 static asker a;
 
-static mbm_clientRequest asked(uint8_t unit, void *reply, uint16_t bytes, const void *data)
-{
-    mbm_clientRequest request = {0};
-
-    request.unit = unit;
-    request.reply = reply;
-    request.replyBytes = bytes;
-    request.data = data;
-    return request;
-}
-
 static void ends(uint8_t status, mbm_clientRequest *request, uint8_t queued)
 {
     assert_int_equal(queued, MBM_PENDING);
@@ -38,7 +27,7 @@ static void every_function_of_libmodbus(modbus_mapping_t *memory)
     uint16_t words[125], values[] = {0x1234, 0xFEDC, 7};
     uint8_t bits[250], coils[] = {0xCD, 0x01};
     mbm_client *c = &a.client;
-    mbm_clientRequest r = asked(UNIT, bits, sizeof bits, NULL);
+    mbm_clientRequest r = asker_request(UNIT, bits, sizeof bits, NULL);
     unsigned i;
 
     ends(MBM_OK, &r, mbm_client_readCoils(c, &r, 3, 1999));
@@ -55,7 +44,7 @@ static void every_function_of_libmodbus(modbus_mapping_t *memory)
     ends(MBM_OK, &r, mbm_client_readSingleDiscreteInput(c, &r, 9));
     assert_int_equal(bits[0], memory->tab_input_bits[9]);
 
-    r = asked(UNIT, words, sizeof words, NULL);
+    r = asker_request(UNIT, words, sizeof words, NULL);
     ends(MBM_OK, &r, mbm_client_readHoldingRegisters(c, &r, 2, 125));
     assert_int_equal(r.length, 250);
     assert_memory_equal(words, memory->tab_registers + 2, 250);
@@ -66,7 +55,7 @@ static void every_function_of_libmodbus(modbus_mapping_t *memory)
     ends(MBM_OK, &r, mbm_client_readSingleInputRegister(c, &r, 6));
     assert_int_equal(words[0], memory->tab_input_registers[6]);
 
-    r = asked(UNIT, NULL, 0, NULL);
+    r = asker_request(UNIT, NULL, 0, NULL);
     ends(MBM_OK, &r, mbm_client_writeSingleCoil(c, &r, 11, 1));
     assert_int_equal(memory->tab_bits[11], 1);
     ends(MBM_OK, &r, mbm_client_writeSingleCoil(c, &r, 11, 0));
@@ -84,12 +73,12 @@ static void every_function_of_libmodbus(modbus_mapping_t *memory)
     ends(MBM_OK, &r, mbm_client_maskWriteRegister(c, &r, 40, 0xF2, 0x25));
     assert_int_equal(memory->tab_registers[40], 0x17);
 
-    r = asked(UNIT, words, sizeof words, values);
+    r = asker_request(UNIT, words, sizeof words, values);
     ends(MBM_OK, &r, mbm_client_readWriteMultipleRegisters(c, &r, 50, 4, 51, 2));
     assert_int_equal(r.length, 8);
     assert_memory_equal(words + 1, values, 4);
     assert_memory_equal(words, memory->tab_registers + 50, 8);
-    r = asked(UNIT, bits, sizeof bits, NULL);
+    r = asker_request(UNIT, bits, sizeof bits, NULL);
     ends(MBM_OK, &r, mbm_client_reportServerId(c, &r));
     assert_true(r.length > 2 && memcmp(bits + 2, "LMB", 3) == 0);
 
@@ -134,12 +123,12 @@ static void sixteen_requests_are_pipelined(void **state)
     asker_begin_tcp(&a, s.port);
     for (round = 0; round < 20; round++) {
         for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
-            requests[i] = asked(UNIT, words[i], sizeof words[i], NULL);
+            requests[i] = asker_request(UNIT, words[i], sizeof words[i], NULL);
             requests[i].transaction = (uint16_t)(i + 1);
             IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &requests[i],
                                                             (uint16_t)(10 * i), 10));
         }
-        requests[i] = asked(UNIT, NULL, 0, NULL);
+        requests[i] = asker_request(UNIT, NULL, 0, NULL);
         IS(MBM_QUEUE_FULL, mbm_client_readHoldingRegisters(&a.client, &requests[i], 0, 1));
         asker_wait_all(&a);
         for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
@@ -154,7 +143,8 @@ static void sixteen_requests_are_pipelined(void **state)
 
 static void a_lost_connection_is_told_and_made_anew(void **state)
 {
-    mbm_clientRequest r = asked(UNIT, NULL, 0, NULL), waiting = asked(UNIT, NULL, 0, NULL);
+    mbm_clientRequest r = asker_request(UNIT, NULL, 0, NULL);
+    mbm_clientRequest waiting = asker_request(UNIT, NULL, 0, NULL);
     tcp_server s;
 
     (void)state;
@@ -190,7 +180,7 @@ static void again(void *context, mbm_clientRequest *request)
 
 static void a_callback_may_queue_and_may_not_poll(void **state)
 {
-    mbm_clientRequest r = asked(UNIT, NULL, 0, NULL);
+    mbm_clientRequest r = asker_request(UNIT, NULL, 0, NULL);
     tcp_server s;
 
     (void)state;
@@ -213,7 +203,7 @@ static void the_facade_uses_the_line_between_the_clients_requests(void **state)
     uint16_t words[4], more[4], none[1];
     uint8_t frame[64];
     mbm_master node;
-    mbm_clientRequest r = asked(UNIT, words, sizeof words, NULL);
+    mbm_clientRequest r = asker_request(UNIT, words, sizeof words, NULL);
     server s;
 
     (void)state;
@@ -277,7 +267,7 @@ static void bad_calls_are_refused_with_a_status(void **state)
 {
     static mbm_client fresh;
     uint16_t words[2];
-    mbm_clientRequest r = asked(UNIT, words, sizeof words, NULL), other;
+    mbm_clientRequest r = asker_request(UNIT, words, sizeof words, NULL), other;
     mbm_port nothing = {0};
     mbm_client *c = &a.client;
     server s;
@@ -332,7 +322,7 @@ static void bad_calls_are_refused_with_a_status(void **state)
 static void a_broadcast_reaches_and_a_rest_is_kept(void **state)
 {
     mbm_clientUnit units[1] = {{0}};
-    mbm_clientRequest r = asked(0, NULL, 0, NULL);
+    mbm_clientRequest r = asker_request(0, NULL, 0, NULL);
     uint32_t begun;
     server s;
 

@@ -11,17 +11,6 @@
 static asker a;
 static served s;
 
-static mbm_clientRequest asked(uint8_t unit, void *reply, uint16_t bytes, const void *data)
-{
-    mbm_clientRequest request = {0};
-
-    request.unit = unit;
-    request.reply = reply;
-    request.replyBytes = bytes;
-    request.data = data;
-    return request;
-}
-
 static void ends(uint8_t status, mbm_clientRequest *request, uint8_t queued)
 {
     assert_int_equal(queued, MBM_PENDING);
@@ -73,13 +62,13 @@ static void reads_and_writes(void)
     mbm_client *c = &a.client;
     uint16_t words[125];
     uint8_t bits[250];
-    mbm_clientRequest r = asked(SERVED_UNIT, bits, sizeof bits, NULL);
+    mbm_clientRequest r = asker_request(SERVED_UNIT, bits, sizeof bits, NULL);
 
     ends(MBM_OK, &r, mbm_client_readCoils(c, &r, SERVED_BASE, 2000));
     brought(&r, s.bits, 250);
     ends(MBM_OK, &r, mbm_client_readDiscreteInputs(c, &r, SERVED_BASE, 2000));
     brought(&r, s.input_bits, 250);
-    r = asked(SERVED_UNIT, words, sizeof words, NULL);
+    r = asker_request(SERVED_UNIT, words, sizeof words, NULL);
     ends(MBM_OK, &r, mbm_client_readHoldingRegisters(c, &r, SERVED_BASE, 125));
     brought(&r, s.words, 250);
     ends(MBM_OK, &r, mbm_client_readInputRegisters(c, &r, SERVED_BASE + 100, 125));
@@ -112,7 +101,7 @@ static void files_and_queues(void)
     mbm_client *c = &a.client;
     uint8_t bytes[250];
     uint16_t words[125];
-    mbm_clientRequest r = asked(SERVED_UNIT, words, sizeof words, values);
+    mbm_clientRequest r = asker_request(SERVED_UNIT, words, sizeof words, values);
 
     ends(MBM_OK, &r, mbm_client_writeFileRecord(c, &r, 4, 7, 2));
     assert_memory_equal(s.records + 7, values, 4);
@@ -120,7 +109,7 @@ static void files_and_queues(void)
     brought(&r, s.records, 40);
     ends(MBM_OK, &r, mbm_client_readFifoQueue(c, &r, 0x04DE));
     brought(&r, s.queue, 4);
-    r = asked(SERVED_UNIT, bytes, sizeof bytes, written);
+    r = asker_request(SERVED_UNIT, bytes, sizeof bytes, written);
     ends(MBM_OK, &r, mbm_client_writeFileRecords(c, &r, sizeof written));
     r.data = groups;
     ends(MBM_OK, &r, mbm_client_readFileRecords(c, &r, sizeof groups));
@@ -137,7 +126,7 @@ static void identities_and_diagnostics(void)
     mbm_client *c = &a.client;
     uint8_t bytes[250];
     uint16_t words[4];
-    mbm_clientRequest r = asked(SERVED_UNIT, bytes, sizeof bytes, NULL);
+    mbm_clientRequest r = asker_request(SERVED_UNIT, bytes, sizeof bytes, NULL);
 
     ends(MBM_OK, &r, mbm_client_readExceptionStatus(c, &r));
     brought(&r, "\x6D", 1);
@@ -155,7 +144,7 @@ static void identities_and_diagnostics(void)
     ends(MBM_OK, &r, mbm_client_custom(c, &r, SERVED_ECHO, 8, &eight));
     brought(&r, own, 8);
     ends(MBM_ILLEGAL_FUNCTION, &r, mbm_client_custom(c, &r, 0x42, 8, &eight));
-    r = asked(SERVED_UNIT, words, sizeof words, query);
+    r = asker_request(SERVED_UNIT, words, sizeof words, query);
     ends(MBM_OK, &r, mbm_client_diagnostics(c, &r, MBM_DIAGNOSTICS_RETURN_QUERY_DATA, 2));
     brought(&r, query, 4);
     ends(MBM_OK, &r, mbm_client_getCommEventCounter(c, &r));
@@ -203,7 +192,7 @@ static void every_function_in_rtu_over_tcp(void **state)
 
 static void a_broadcast_reaches_every_unit_in_ascii_and_is_refused_over_tcp(void **state)
 {
-    mbm_clientRequest r = asked(0, NULL, 0, NULL);
+    mbm_clientRequest r = asker_request(0, NULL, 0, NULL);
 
     (void)state;
     begin(MBM_FRAMING_ASCII);
@@ -227,7 +216,7 @@ static void the_ascii_delimiter_follows_the_devices(void **state)
 {
     static const uint16_t wanted[] = {'!' << 8};
     uint16_t words[2];
-    mbm_clientRequest r = asked(SERVED_UNIT, words, sizeof words, wanted);
+    mbm_clientRequest r = asker_request(SERVED_UNIT, words, sizeof words, wanted);
 
     (void)state;
     begin(MBM_FRAMING_ASCII);
@@ -237,7 +226,7 @@ static void the_ascii_delimiter_follows_the_devices(void **state)
     ends(MBM_OK, &r, mbm_client_diagnostics(&a.client, &r,
                                             MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER, 1));
     assert_int_equal(set_in_done, MBM_OK);
-    r = asked(SERVED_UNIT, words, sizeof words, NULL);
+    r = asker_request(SERVED_UNIT, words, sizeof words, NULL);
     ends(MBM_OK, &r, mbm_client_readHoldingRegisters(&a.client, &r, SERVED_BASE, 2));
     brought(&r, s.words, 4);
     /* A device that still wants LF is not answered by one that wants another. */
@@ -252,7 +241,7 @@ static void a_delimiter_that_cannot_be_is_refused(void **state)
     static const uint8_t wrong[] = {0, ':', '\r', '0', '9', 'A', 'F', 'a', 'f', 128, 255};
     static mbm_client fresh;
     uint16_t words[2];
-    mbm_clientRequest r = asked(SERVED_UNIT, words, sizeof words, NULL);
+    mbm_clientRequest r = asker_request(SERVED_UNIT, words, sizeof words, NULL);
     unsigned i;
 
     (void)state;
@@ -294,7 +283,7 @@ static void as_many_are_under_way_over_tcp_as_the_server_takes(void **state)
     OK(mbm_client_setInFlight(&a.client, MBM_CLIENT_DEPTH));
     OK(mbm_client_setInFlight(&a.client, 1));
     for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
-        requests[i] = asked(SERVED_UNIT, &words[i], sizeof words[i], NULL);
+        requests[i] = asker_request(SERVED_UNIT, &words[i], sizeof words[i], NULL);
         IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &requests[i],
                                                         (uint16_t)(SERVED_BASE + i), 1));
     }

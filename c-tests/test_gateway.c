@@ -3,6 +3,7 @@
 #define _GNU_SOURCE
 #include "asked.h"
 #include "await.h"
+#include "clock.h"
 #include "program.h"
 #include "server.h"
 #include "tcp_server.h"
@@ -16,7 +17,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <time.h>
 #include <unistd.h>
 
 /* The timeout is one that a device in a thread of a busy machine keeps. */
@@ -127,14 +127,6 @@ static int stop(void **state)
     unlink(name);
     served_stop(&ours);
     return 0;
-}
-
-static double seconds(void)
-{
-    struct timespec now;
-
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 }
 
 static void expect_exception(int code, uint8_t unit)
@@ -312,25 +304,6 @@ static void a_connection_that_breaks_takes_its_request_along(void **state)
     libmodbus_reads_and_writes_through_it(state);
 }
 
-/* The gateway answers itself; 0 if the connection was closed instead. */
-static int is_served(int fd)
-{
-    static const uint8_t request[] = {0, 1, 0, 0, 0, 2, NO_LINE, 7};
-    struct pollfd told = {fd, POLLIN, 0};
-    uint8_t answer[9];
-    ssize_t count;
-
-    if (send(fd, request, sizeof request, MSG_NOSIGNAL) != sizeof request)
-        return 0;
-    assert_int_equal(poll(&told, 1, PATIENCE_MS), 1);
-    count = recv(fd, answer, sizeof answer, 0);
-    if (count <= 0)
-        return 0;
-    assert_int_equal(count, sizeof answer);
-    assert_int_equal(answer[8], 0x0A);
-    return 1;
-}
-
 static void connections_beyond_its_places_are_closed(void **state)
 {
     int fds[40];
@@ -341,7 +314,7 @@ static void connections_beyond_its_places_are_closed(void **state)
         fds[i] = tcp_connect((uint16_t)port);
     /* One of the places is the client's. */
     for (i = 0; i < COUNT(fds); i++)
-        assert_int_equal(is_served(fds[i]), i < PLACES - 1);
+        assert_int_equal(asked_is_served(fds[i], NO_LINE, 0x0A), i < PLACES - 1);
     libmodbus_reads_and_writes_through_it(state);
     for (i = 0; i < COUNT(fds); i++)
         close(fds[i]);

@@ -54,25 +54,6 @@ static void go_round(void)
         assert_int_equal(modbus_read_registers(client, SERVED_BASE, 1, &word), 1);
 }
 
-/* Whether a connection is served: if there is no place for it, it is closed. */
-static int is_served(int fd)
-{
-    static const uint8_t request[] = {0, 1, 0, 0, 0, 2, SERVED_UNIT, 7};
-    struct pollfd told = {fd, POLLIN, 0};
-    uint8_t answer[9];
-    ssize_t count;
-
-    if (send(fd, request, sizeof request, MSG_NOSIGNAL) != sizeof request)
-        return 0;
-    assert_int_equal(poll(&told, 1, PATIENCE_MS), 1);
-    count = recv(fd, answer, sizeof answer, 0);
-    if (count <= 0)
-        return 0;
-    assert_int_equal(count, sizeof answer);
-    assert_int_equal(answer[8], 0x6D);
-    return 1;
-}
-
 /* Every place but the client's is free, once the server knows of it. */
 static void all_places_are_free(void)
 {
@@ -85,7 +66,7 @@ static void all_places_are_free(void)
         for (i = 0; i < FREE; i++)
             fds[i] = tcp_connect((uint16_t)tcp.port);
         for (i = taken = 0; i < FREE; i++)
-            taken += (unsigned)is_served(fds[i]);
+            taken += (unsigned)asked_is_served(fds[i], SERVED_UNIT, 0x6D);
         for (i = 0; i < FREE; i++)
             close(fds[i]);
         poll(NULL, 0, taken < FREE ? 10 : 0);
@@ -199,7 +180,7 @@ static void a_client_that_reads_nothing_stalls_nobody(void **state)
     unsigned naps = 0;
 
     (void)state;
-    assert_true(is_served(fd));
+    assert_true(asked_is_served(fd, SERVED_UNIT, 0x6D));
     theirs = far_end(fd);
     while (!is_full(fd) || !is_full(theirs)) {
         ssize_t count;
@@ -246,7 +227,7 @@ static void connections_beyond_the_storage_are_closed_and_the_others_served(void
         go_round();
     }
     for (i = 0; i < COUNT(fds); i++)
-        assert_int_equal(is_served(fds[i]), i < FREE);
+        assert_int_equal(asked_is_served(fds[i], SERVED_UNIT, 0x6D), i < FREE);
     for (i = 0; i < COUNT(fds); i++)
         close(fds[i]);
     all_places_are_free();

@@ -2,6 +2,7 @@
  * server, and what it does while there is no connection. */
 #define _GNU_SOURCE
 #include "await.h"
+#include "clock.h"
 #include "mbm_tcp.h"
 #include "model.h"
 #include "tcp_peer.h"
@@ -16,7 +17,6 @@
 #include <pthread.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 enum { SECOND = 1000000, PATIENCE = 1000 * PATIENCE_MS };
@@ -48,14 +48,6 @@ static int end(void **state)
     mbm_tcp_close(&tcp);
     tcp_peer_stop(peer);
     return 0;
-}
-
-static double seconds(void)
-{
-    struct timespec now;
-
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 }
 
 /* Takes bytes until so many are there or the link is lost. */

@@ -1,6 +1,7 @@
 /* The port over a terminal. A pty shows what the system does with it; what a
  * pty has not, a driver that knows RS-485, is played by the test's own ioctl. */
 #define _GNU_SOURCE
+#include "clock.h"
 #include "mbm_tty.h"
 #include "pty.h"
 #include "test.h"
@@ -14,7 +15,6 @@
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
-#include <time.h>
 #include <unistd.h>
 
 static pty line;
@@ -89,14 +89,6 @@ static void assert_same(const struct termios *a, const struct termios *b)
     assert_int_equal(a->c_cflag, b->c_cflag);
     assert_int_equal(a->c_lflag, b->c_lflag);
     assert_memory_equal(a->c_cc, b->c_cc, sizeof a->c_cc);
-}
-
-static double seconds(void)
-{
-    struct timespec now;
-
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 }
 
 static void assert_fails(int error, int result)

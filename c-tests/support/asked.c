@@ -7,6 +7,7 @@
 #include <errno.h>
 #include <poll.h>
 #include <string.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #define EXCEPTION(code, call)                                                                      \
@@ -186,6 +187,24 @@ size_t asked_bytes(int fd, const uint8_t *bytes, size_t length, uint8_t *answer,
         got += (size_t)count;
     }
     return got;
+}
+
+int asked_is_served(int fd, uint8_t unit, uint8_t last)
+{
+    const uint8_t request[] = {0, 1, 0, 0, 0, 2, unit, 7};
+    struct pollfd told = {fd, POLLIN, 0};
+    uint8_t answer[9];
+    ssize_t count;
+
+    if (send(fd, request, sizeof request, MSG_NOSIGNAL) != sizeof request)
+        return 0;
+    assert_int_equal(poll(&told, 1, PATIENCE_MS), 1);
+    count = recv(fd, answer, sizeof answer, 0);
+    if (count <= 0)
+        return 0;
+    assert_int_equal(count, sizeof answer);
+    assert_int_equal(answer[8], last);
+    return 1;
 }
 
 void asked_frames(int fd, int framing, uint8_t unit, const uint8_t *pdu, size_t length,

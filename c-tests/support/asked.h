@@ -16,6 +16,10 @@ void asked_refusals(modbus_t *client, served *s);
  * expected, and a while for more, which should not come. Returns how many. */
 size_t asked_bytes(int fd, const uint8_t *bytes, size_t length, uint8_t *answer, size_t expected);
 
+/* Asks a unit for its exception status over TCP, and expects a response that ends with
+ * this byte; 0 if the connection, for which there is no place, was closed instead. */
+int asked_is_served(int fd, uint8_t unit, uint8_t last);
+
 /* Sends the frame of a PDU to a unit, and expects the frame of another, or none
  * if that is of no bytes. */
 void asked_frames(int fd, int framing, uint8_t unit, const uint8_t *pdu, size_t length,

@@ -81,6 +81,17 @@ void asker_begin_rtu_over_tcp(asker *a, uint16_t port)
     OK(mbm_client_setCounters(&a->client, &a->counters));
 }
 
+mbm_clientRequest asker_request(uint8_t unit, void *reply, uint16_t bytes, const void *data)
+{
+    mbm_clientRequest request = {0};
+
+    request.unit = unit;
+    request.reply = reply;
+    request.replyBytes = bytes;
+    request.data = data;
+    return request;
+}
+
 /* Sleeps until bytes arrive or the client has something else to do. */
 void asker_rest(asker *a)
 {

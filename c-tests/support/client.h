@@ -29,6 +29,9 @@ void asker_begin_rtu_over_tcp(asker *a, uint16_t port);
 /* By a clock that waits for the peer, also for one that a->link connects anew. */
 void asker_begin_tcp_by(asker *a, uint16_t port, held_clock *clock);
 
+/* A request to a unit: where its response goes, and what it brings along. */
+mbm_clientRequest asker_request(uint8_t unit, void *reply, uint16_t bytes, const void *data);
+
 /* Sleeps until bytes arrive or the client has something else to do. */
 void asker_rest(asker *a);
 

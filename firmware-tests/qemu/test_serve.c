@@ -3,6 +3,7 @@
  *
  *     test_serve [MACHINE...] */
 #define _GNU_SOURCE
+#include "clock.h"
 #include "crc.h"
 #include "machine.h"
 #include "mbm.h"
@@ -14,7 +15,6 @@
 #include <modbus.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 /* Longer than what ends a frame. */
@@ -153,14 +153,6 @@ static void refusals_are_exceptions(void **state)
     refuses(unknown, sizeof unknown, 1);
     assert_int_equal(modbus_read_registers(asking(), SERVE_BASE, 1, words), 1);
     assert_int_equal(words[0], 9);
-}
-
-static double seconds(void)
-{
-    struct timespec now;
-
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 }
 
 /* A stretch in which this computer was never late, so that the firmware, too, has
