@@ -196,22 +196,6 @@ static int progress(mbm_tcp *tcp)
     return tcp->state == CONNECTED ? 1 : progress_slowly(tcp);
 }
 
-int mbm_tcp_isConnected(mbm_tcp *tcp)
-{
-    int there = progress(tcp);
-    ssize_t count;
-    char byte;
-
-    if (there == 1) {
-        count = recv(tcp->fd, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
-        if (count == 0 || (count < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)) {
-            lose(tcp, count < 0 ? errno : EPIPE);
-            there = -1;
-        }
-    }
-    return there;
-}
-
 uint8_t mbm_tcp_connect(void *context)
 {
     mbm_tcp *tcp = (mbm_tcp *)context;
@@ -238,6 +222,20 @@ SELDOM static int16_t nothing(mbm_tcp *tcp, ssize_t count)
         return 0;
     lose(tcp, count < 0 ? errno : EPIPE);
     return -1;
+}
+
+int mbm_tcp_isConnected(mbm_tcp *tcp)
+{
+    int there = progress(tcp);
+    ssize_t count;
+    char byte;
+
+    if (there == 1) {
+        count = recv(tcp->fd, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
+        if (count <= 0 && nothing(tcp, count) < 0)
+            there = -1;
+    }
+    return there;
 }
 
 /* 1 if so many bytes may be moved at once. */
