@@ -5,7 +5,6 @@ use crate::error::Status;
 use crate::pdu::query::Query;
 use crate::pdu::{bits, registers};
 use crate::port::Port;
-use crate::time;
 use crate::transaction::{Settings, Storage, Transaction};
 
 /// What is read where there is no word.
@@ -70,10 +69,7 @@ impl<P, S> Master<P, S> {
 
     /// Derives gap, silence and character time from the baud rate.
     pub fn set_baud_rate(&mut self, baud: u32) {
-        let settings = self.settings();
-        settings.silence = time::silence(baud);
-        settings.gap = settings.silence;
-        settings.character = time::character(baud);
+        self.settings().set_baud_rate(baud);
     }
 
     /// The status of the last request; [`Status::PENDING`] while it is under way.

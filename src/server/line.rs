@@ -153,7 +153,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// Sets the silence that ends a frame, in microseconds: t3.5 for RTU, the
     /// inter-character timeout for ASCII.
     pub fn set_silence(&mut self, microseconds: u32) {
-        self.silence = microseconds.min(time::LONGEST);
+        self.silence = time::clamped(microseconds);
     }
 
     /// Waits for the next request.

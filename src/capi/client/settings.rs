@@ -4,7 +4,7 @@ use super::{mbm_client, parts, pointers, Parts, Treatment};
 use crate::capi::storage::mbm_counters;
 use crate::client::{again, note, rest, Backoff, Means as _, Unit};
 use crate::error::Status;
-use crate::time::{self, millis};
+use crate::time::millis;
 use core::ffi::c_void;
 
 /// mbm_client_setBackoff: a request is asked again at once.
@@ -36,7 +36,7 @@ pub struct mbm_clientUnit {
     /// Requests that were asked again.
     pub retries: u32,
     /// Set by you: rest for this unit from the end of a request to the next, in
-    /// microseconds.
+    /// microseconds; more than 2^31 (36 minutes) means 2^31.
     pub delay: u32,
     /// Not for you.
     last: u32,
@@ -99,9 +99,7 @@ pub unsafe extern "C" fn mbm_client_setBaudRate(client: *mut mbm_client, baud: u
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.settings.silence = time::silence(baud);
-            parts.settings.gap = parts.settings.silence;
-            parts.settings.character = time::character(baud);
+            parts.settings.set_baud_rate(baud);
             Status::OK
         })
     }
@@ -111,14 +109,15 @@ pub unsafe extern "C" fn mbm_client_setBaudRate(client: *mut mbm_client, baud: u
 /// mbm_client_setBaudRate sets it back. Without effect on TCP.
 ///
 /// @param client        the object
-/// @param microseconds  counted from the last byte seen or sent
+/// @param microseconds  counted from the last byte seen or sent; more than 2^31
+///                      (36 minutes) means 2^31
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setGap(client: *mut mbm_client, microseconds: u32) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.settings.gap = microseconds;
+            parts.settings.set_gap(microseconds);
             Status::OK
         })
     }
@@ -144,11 +143,12 @@ pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
     }
 }
 
-/// Sets how long a serial line is left alone after a request that got no right
-/// reply; see mbm_master_setQuietTime.
+/// Sets the quiet time of a serial line, which keeps a late reply from being taken
+/// for the answer to a later request; see mbm_master_setQuietTime. Without effect on
+/// TCP, where responses have a number.
 ///
 /// @param client        the object
-/// @param milliseconds  0 to 65535; 100 at first
+/// @param milliseconds  0 to 65535; 100 at first; 0 holds no reply
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setQuietTime(client: *mut mbm_client, milliseconds: u16) -> u8 {
