@@ -811,7 +811,7 @@ typedef struct mbm_master {
     /**
      * Not for you.
      */
-    uint32_t words[18];
+    uint32_t words[19];
 } mbm_master;
 
 /**
@@ -900,7 +900,7 @@ typedef struct mbm_clientUnit {
     uint32_t retries;
     /**
      * Set by you: rest for this unit from the end of a request to the next, in
-     * microseconds.
+     * microseconds; more than 2^31 (36 minutes) means 2^31.
      */
     uint32_t delay;
     /**
@@ -2566,7 +2566,8 @@ uint8_t mbm_client_setBaudRate(struct mbm_client *client, uint32_t baud);
  * mbm_client_setBaudRate sets it back. Without effect on TCP.
  *
  * @param client        the object
- * @param microseconds  counted from the last byte seen or sent
+ * @param microseconds  counted from the last byte seen or sent; more than 2^31
+ *                      (36 minutes) means 2^31
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setGap(struct mbm_client *client, uint32_t microseconds);
@@ -2582,11 +2583,12 @@ uint8_t mbm_client_setGap(struct mbm_client *client, uint32_t microseconds);
 uint8_t mbm_client_setTurnaroundDelay(struct mbm_client *client, uint16_t milliseconds);
 
 /**
- * Sets how long a serial line is left alone after a request that got no right
- * reply; see mbm_master_setQuietTime.
+ * Sets the quiet time of a serial line, which keeps a late reply from being taken
+ * for the answer to a later request; see mbm_master_setQuietTime. Without effect on
+ * TCP, where responses have a number.
  *
  * @param client        the object
- * @param milliseconds  0 to 65535; 100 at first
+ * @param milliseconds  0 to 65535; 100 at first; 0 holds no reply
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setQuietTime(struct mbm_client *client, uint16_t milliseconds);
@@ -2886,7 +2888,8 @@ uint8_t mbm_master_poll(struct mbm_master *master);
 
 /**
  * How long mbm_master_poll will find nothing to do unless a byte arrives, so
- * that a program or an idle hook may sleep until then.
+ * that a program or an idle hook may sleep until then. A wait that has just begun
+ * counts from this call, so sleeping lengthens no timeout.
  *
  * @param master  the object
  * @return microseconds; 0 means poll now, 0xFFFFFFFF that there is no request
@@ -3155,7 +3158,8 @@ uint8_t mbm_master_setBaudRate(struct mbm_master *master, uint32_t baud);
  * A later mbm_master_setBaudRate sets it back to t3.5.
  *
  * @param master        the object
- * @param microseconds  counted from the last byte seen or sent
+ * @param microseconds  counted from the last byte seen or sent; more than 2^31
+ *                      (36 minutes) means 2^31
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_setGap(struct mbm_master *master, uint32_t microseconds);
@@ -3171,17 +3175,22 @@ uint8_t mbm_master_setGap(struct mbm_master *master, uint32_t microseconds);
 uint8_t mbm_master_setTurnaroundDelay(struct mbm_master *master, uint16_t milliseconds);
 
 /**
- * Sets how long the line is left alone after a request that got no right
- * reply, so that a late one is not taken for the next. What arrives meanwhile
- * is dropped.
+ * Sets the quiet time, which keeps a late reply from being taken for the answer
+ * to a later request. RTU itself cannot tell them apart if unit, function and
+ * length are the same, or if the late reply is an exception to the same function.
  *
- * RTU cannot tell a late reply of the same unit, function and length, nor a
- * late exception to the same function, from the one that is waited for; this
- * time is what makes that rare. A slave that may answer after the response
- * timeout plus this time needs a longer timeout.
+ * After a request without a right reply, two things happen. The line is left alone
+ * for this time before the next request, and bytes that arrive are dropped. Then the
+ * next reply of that unit is held until nothing has arrived for this time. A second
+ * reply takes the place of the held one, for a device answers in order; if the
+ * second one is damaged, the request fails. So a request after a failure takes one
+ * quiet time longer, all others take no longer.
+ *
+ * The time must be longer than the device takes for an answer. If it is shorter, the
+ * second reply may come after the held one was taken for the answer.
  *
  * @param master        the object
- * @param milliseconds  0 to 65535; 100 at first
+ * @param milliseconds  0 to 65535; 100 at first; 0 holds no reply
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_setQuietTime(struct mbm_master *master, uint16_t milliseconds);

@@ -154,12 +154,8 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         }
     }
 
-    fn delay(&self, now: u32) -> Option<u32> {
-        let delay = || match self.engine.is_to_be_stamped() {
-            // Who slept now would wait twice.
-            true => 0,
-            false => self.engine.poll_delay(now),
-        };
-        self.engine.is_pending().then(delay)
+    fn delay(&mut self, now: u32) -> Option<u32> {
+        let is_pending = self.engine.is_pending();
+        is_pending.then(|| self.engine.poll_delay(now))
     }
 }

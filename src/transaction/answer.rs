@@ -14,6 +14,8 @@ pub(super) struct Answer<Q> {
     pub(super) echo: bool,
     /// The exception code of the last response; 0 if it was none.
     pub(super) exception: u8,
+    /// Bytes of a held reply, which stand at the front of the frame buffer.
+    pub(super) held: u16,
     pub(super) request: Q,
 }
 
@@ -23,6 +25,7 @@ impl<Q: Question> Answer<Q> {
         unit: 0,
         echo: false,
         exception: 0,
+        held: 0,
         request: Q::NONE,
     };
 
@@ -73,5 +76,9 @@ impl<Q: Question> Wanted for Answer<Q> {
 
     fn ends(&mut self, ended: bool) {
         self.request.ends(ended);
+    }
+
+    fn reserve(&self) -> usize {
+        usize::from(self.held)
     }
 }

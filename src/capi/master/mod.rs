@@ -33,7 +33,7 @@ pub struct mbm_master {
     /// Not for you.
     pointers: [*mut c_void; 21],
     /// Not for you.
-    words: [u32; 18],
+    words: [u32; 19],
 }
 
 /// What lies behind an `mbm_master`.
@@ -186,7 +186,8 @@ pub unsafe extern "C" fn mbm_master_poll(master: *mut mbm_master) -> u8 {
 }
 
 /// How long mbm_master_poll will find nothing to do unless a byte arrives, so
-/// that a program or an idle hook may sleep until then.
+/// that a program or an idle hook may sleep until then. A wait that has just begun
+/// counts from this call, so sleeping lengthens no timeout.
 ///
 /// @param master  the object
 /// @return microseconds; 0 means poll now, 0xFFFFFFFF that there is no request

@@ -1,6 +1,7 @@
 //! Finding responses among what arrived.
 
-use super::{close_up, Tcp};
+use super::Tcp;
+use crate::bytes::move_to_front;
 use crate::client::job::{deliver, take, Job, Stage};
 use crate::client::shared::Shared;
 use crate::client::units::Means;
@@ -19,7 +20,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
     #[cold]
     pub(super) fn gather(&mut self) {
         let kept = self.means.frame().get_mut(..usize::from(self.end));
-        close_up(kept.unwrap_or_default(), self.start.into());
+        move_to_front(kept.unwrap_or_default(), self.start.into());
         self.end -= self.start;
         self.start = 0;
     }

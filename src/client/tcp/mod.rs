@@ -7,12 +7,12 @@ use super::job::{Job, Stage};
 use super::shared::Shared;
 use super::units::Means;
 use super::Line;
+use crate::bytes::move_to_front;
 use crate::error::Status;
 use crate::frame::tcp;
 use crate::port::Port;
 use crate::transaction::{Counter, Settings};
 use crate::FAST;
-use core::cell::Cell;
 
 /// As many requests at once as the queue holds, in TCP frames. Received bytes
 /// stand in the frame buffer, those to send in [`Means::outgoing`].
@@ -299,7 +299,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
                 continue;
             }
             if at >= usize::from(self.sent) {
-                close_up(rest, header.total);
+                move_to_front(rest, header.total);
                 self.filled -= header.total as u16;
                 if self.sent == self.filled {
                     self.sent = 0;
@@ -334,15 +334,6 @@ impl<P: Port, S: Means> Tcp<P, S> {
         self.clear();
         shared.lose();
         shared.end(0, Status::LINK_LOST, now, &mut self.means)
-    }
-}
-
-/// Moves what stands behind the first `by` bytes over them.
-#[cfg_attr(target_os = "none", inline(never))]
-fn close_up(bytes: &mut [u8], by: usize) {
-    let cells = Cell::from_mut(bytes).as_slice_of_cells();
-    for (to, from) in cells.iter().zip(cells.get(by..).unwrap_or_default()) {
-        to.set(from.get());
     }
 }
 
@@ -424,7 +415,7 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
         shared.abandon(|job| job.ticket().is_sent());
     }
 
-    fn delay(&self, _: u32) -> Option<u32> {
+    fn delay(&mut self, _: u32) -> Option<u32> {
         (self.sent < self.filled).then_some(super::FULL_PORT)
     }
 }
