@@ -664,7 +664,7 @@ typedef struct mbm_client {
     /**
      * Not for you.
      */
-    uint32_t words[18];
+    uint32_t words[20];
 } mbm_client;
 
 /**
@@ -811,7 +811,7 @@ typedef struct mbm_master {
     /**
      * Not for you.
      */
-    uint32_t words[19];
+    uint32_t words[20];
 } mbm_master;
 
 /**

@@ -44,7 +44,7 @@ pub struct mbm_client {
     /// Not for you.
     pointers: [*mut c_void; 46],
     /// Not for you.
-    words: [u32; 18],
+    words: [u32; 20],
 }
 
 /// What a client of a serial line in RTU frames, one in ASCII frames and one of

@@ -33,7 +33,7 @@ pub struct mbm_master {
     /// Not for you.
     pointers: [*mut c_void; 21],
     /// Not for you.
-    words: [u32; 19],
+    words: [u32; 20],
 }
 
 /// What lies behind an `mbm_master`.
