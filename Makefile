@@ -62,9 +62,10 @@ header: ## Write include/mbm.h anew from the source
 .PHONY: check
 check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, symbols
 	@$(CARGO) fmt --all --check
-	@for crate in fuzz bench; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml --check || exit 1; done
+	@for crate in fuzz bench model; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml --check || exit 1; done
 	@$(CARGO) clippy --quiet --workspace --all-targets -- -D warnings
 	@$(CARGO) clippy --quiet --no-default-features -- -D warnings
+	@$(CARGO) clippy --quiet --manifest-path model/Cargo.toml --target-dir $(BUILD)/model --all-targets -- -D warnings
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps
 	@$(CARGO) test --quiet -p mbm-tools >/dev/null
 	@$(CARGO) run --quiet -p mbm-tools --bin layers
@@ -89,6 +90,14 @@ venv: ## The Python environment with the peers of tests/peer, build/venv
 fuzz: ## Fuzz every decoder for FUZZ_SECONDS in all (60)
 	@scripts/need g++ libc6-dev libmodbus-dev
 	@CARGO="$(CARGO)" scripts/fuzz
+
+MODEL_SECONDS ?= 300
+MODEL := --quiet --release --manifest-path model/Cargo.toml --target-dir $(BUILD)/model
+.PHONY: model
+model: ## Try every order of events around a request for MODEL_SECONDS (300)
+	@mkdir -p $(BUILD)
+	@$(CARGO) test $(MODEL) >$(BUILD)/model.log 2>&1 || { cat $(BUILD)/model.log; exit 1; }
+	@$(CARGO) run $(MODEL) -- $(MODEL_SECONDS)
 
 .PHONY: fault-table
 fault-table: need-test ## Write docs/fault-table.md from what the test finds

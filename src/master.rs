@@ -15,6 +15,7 @@ pub type Build = fn(&mut Query, u16, u16) -> Status;
 
 /// A master on a serial line, with the port and the buffers it was given.
 // Small fields first: see `Transaction`.
+#[derive(Clone, Hash, Debug)]
 #[repr(C)]
 pub struct Master<P, S> {
     response_words: u8,
@@ -70,6 +71,12 @@ impl<P, S> Master<P, S> {
     /// Derives gap, silence and character time from the baud rate.
     pub fn set_baud_rate(&mut self, baud: u32) {
         self.settings().set_baud_rate(baud);
+    }
+
+    /// See [`Transaction::rebase`].
+    #[doc(hidden)]
+    pub fn rebase(&mut self, now: u32, longest: u32) {
+        self.transaction.rebase(now, longest);
     }
 
     /// The status of the last request; [`Status::PENDING`] while it is under way.

@@ -104,7 +104,7 @@ use by_table as update;
 use by_parity as update;
 
 /// A CRC-16 that grows as bytes arrive.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Crc16(u16);
 
 impl Crc16 {

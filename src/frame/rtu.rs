@@ -101,7 +101,7 @@ const MIN_FRAME: u8 = 4;
 
 /// A window that slides over received bytes. The buffer is the caller's and
 /// is passed to each call.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Hash, Debug)]
 pub struct Window {
     /// Where in the buffer what arrived ends; the candidate stands at its front.
     end: u16,

@@ -6,7 +6,7 @@ use core::num::NonZeroU8;
 
 /// What was seen on the way to a reply, the more telling the greater. The low
 /// digit is that of the status it becomes.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Hash, Debug)]
 pub struct Seen(u8);
 
 impl Seen {

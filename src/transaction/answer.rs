@@ -7,6 +7,7 @@ use crate::pdu::reply;
 use core::num::NonZeroU8;
 
 /// What answers a request.
+#[derive(Clone, Hash, Debug)]
 #[repr(C)]
 pub(super) struct Answer<Q> {
     pub(super) unit: u8,

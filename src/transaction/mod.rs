@@ -16,6 +16,7 @@
 //! values in use at a time, so they stay in registers, and the code is small.
 
 mod answer;
+mod clock;
 mod outcome;
 mod probation;
 mod question;
@@ -32,12 +33,12 @@ use crate::frame::Wanted as _;
 use crate::frame::{Search, Seen};
 use crate::pdu::query::Query;
 use crate::port::Port;
-use crate::time::{characters, elapsed, has_elapsed};
+use crate::time::{characters, elapsed};
 use answer::Answer;
 use probation::Probation;
 
 /// Where a transaction stands.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 enum Phase {
     /// Nothing to do.
     Idle,
@@ -58,6 +59,7 @@ enum Phase {
 /// One request and its reply, over the port and in the storage it was given.
 // In this order, small fields first: what lies far from the start of an object
 // costs a Cortex-M0 and an AVR an instruction more at each access.
+#[derive(Clone, Hash, Debug)]
 #[repr(C)]
 pub struct Transaction<P, S, Q = Query, W = Window> {
     phase: Phase,
@@ -127,59 +129,10 @@ impl<P, S, Q: Question, W: Search> Transaction<P, S, Q, W> {
         &mut self.wanted.request
     }
 
-    /// True once the phase has lasted `time`.
-    #[inline(always)]
-    fn lasts(&self, time: u32) -> bool {
-        self.has_passed(time, false)
-    }
-
-    /// True once the line has been silent for `time`.
-    #[inline(always)]
-    fn is_silent(&self, time: u32) -> bool {
-        self.has_passed(time, true)
-    }
-
-    /// True once `time` has passed since the phase began, or since the line was
-    /// last busy. (One function: 32 bits are much work for an AVR.)
-    #[cfg_attr(target_os = "none", inline(never))]
-    fn has_passed(&self, time: u32, since_last_byte: bool) -> bool {
-        let since = if since_last_byte {
-            self.last_byte
-        } else {
-            self.since
-        };
-        has_elapsed(time, self.now, since)
-    }
-
-    /// A line that is not silent, or a port that does not move, is not waited
-    /// for longer than a reply and the `time` that it may take.
-    #[cfg_attr(target_os = "none", inline(never))]
-    fn stalled(&self, time: u32) -> Status {
-        if self.lasts(self.settings.response_timeout.wrapping_add(time)) {
-            Status::LINE_BUSY
-        } else {
-            Status::PENDING
-        }
-    }
-
     /// Enters a phase whose time counts from the next look at the clock on.
     fn enter(&mut self, phase: Phase) {
         self.phase = phase;
         self.stamp = true;
-    }
-
-    /// Notes the time `now`, and starts the time of a phase that just began.
-    fn look_at_clock(&mut self, now: u32) {
-        self.now = now;
-        if self.stamp {
-            self.stamp = false;
-            self.since = now;
-            // The silence is measured from the end of our request. Before a
-            // request it is measured from the last byte received.
-            if self.phase != Phase::Gap {
-                self.last_byte = now;
-            }
-        }
     }
 
     fn wait(&mut self) -> Status {
@@ -189,11 +142,6 @@ impl<P, S, Q: Question, W: Search> Transaction<P, S, Q, W> {
 }
 
 impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
-    /// Says that the line was busy just now, so the gap counts from here.
-    pub fn line_used(&mut self) {
-        self.last_byte = self.port.micros();
-    }
-
     /// Starts the request to `unit`; `poll` does the rest.
     /// [`Status::BROADCAST_NOT_ALLOWED`], and nothing is sent, for a read from
     /// unit 0.

@@ -14,7 +14,7 @@ use crate::port::Port;
 use crate::transaction::Counter;
 
 /// Whether the next reply may be a late one.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Hash, Debug)]
 #[repr(C)]
 pub(super) struct Probation {
     /// The unit that did not answer its last request; 0 if every unit did.

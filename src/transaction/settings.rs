@@ -4,7 +4,7 @@ use crate::time::{self, millis};
 
 /// How a transaction behaves; kept from one to the next. Times are in
 /// microseconds.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[repr(C)]
 pub struct Settings {
     /// Silence before a request; set it with [`Settings::set_gap`].
