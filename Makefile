@@ -98,7 +98,7 @@ fault-table: need-test ## Write docs/fault-table.md from what the test finds
 
 .PHONY: need-check need-test
 need-check:
-	@scripts/need gcc g++ clang libc6-dev binutils doxygen
+	@scripts/need gcc g++ clang gcc-avr avr-libc libc6-dev binutils doxygen
 need-test:
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind mbpoll
 
