@@ -14,7 +14,7 @@ use super::length::Length;
 use super::limits::{MAX_FIFO, MAX_PDU};
 use super::{files, length, EXCEPTION};
 use crate::error::Status;
-use crate::FAST;
+use crate::FIRMWARE;
 use core::num::NonZeroU8;
 use form::*;
 
@@ -143,7 +143,7 @@ impl Outline {
     /// little cost. Firmware, where code is dearer, has [`Outline::emit`] alone.
     #[inline]
     pub fn two_words(&self) -> Option<&[u8; 4]> {
-        if FAST && self.head_length == 5 && self.data_length == 0 && !self.form.has(COUNTED) {
+        if !FIRMWARE && self.head_length == 5 && self.data_length == 0 && !self.form.has(COUNTED) {
             self.head.first_chunk::<5>()?.last_chunk()
         } else {
             None
