@@ -78,6 +78,7 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, sy
 	@scripts/check-functions
 	@$(MAKE) --no-print-directory check-readme
 	@scripts/check-symbols $(ARCHIVE)
+	@! grep -rn 'target_os' src | grep -v 'cfg_attr\|mbm_firmware' # else no test runs that code
 	@echo "check: formatting, lints, layers, header and symbols are in order"
 
 .PHONY: test
