@@ -3,6 +3,8 @@
 CARGO ?= cargo
 BUILD := build
 ARCHIVE := target/release/libmbm.a
+# The same, with the code that only firmware runs.
+FIRMWARE_ARCHIVE := $(BUILD)/firmware/libmbm.a
 
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wundef -Werror
 INCLUDES := -Iinclude -Iexamples/linux -Ic-tests/support -Ic-tests/shim
@@ -28,9 +30,11 @@ archive: $(ARCHIVE) ## The archive for this machine, target/release/libmbm.a
 	@echo "archive: $(ARCHIVE)"
 
 # Cargo knows best what is out of date.
-.PHONY: $(ARCHIVE)
+.PHONY: $(ARCHIVE) $(FIRMWARE_ARCHIVE)
 $(ARCHIVE):
-	@$(CARGO) rustc --quiet --release --lib --crate-type staticlib --features archive
+	@CARGO="$(CARGO)" scripts/archive-host $@
+$(FIRMWARE_ARCHIVE):
+	@CARGO="$(CARGO)" scripts/archive-host $@ --cfg mbm_firmware
 
 MCUS := $(shell scripts/archive --list)
 .PHONY: archives
@@ -63,7 +67,7 @@ header: ## Write include/mbm.h anew from the source
 check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, symbols
 	@$(CARGO) fmt --all --check
 	@for crate in fuzz bench model; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml --check || exit 1; done
-	@$(CARGO) clippy --quiet --workspace --all-targets -- -D warnings
+	@$(CARGO) clippy --quiet --workspace --all-targets --features pymodbus -- -D warnings
 	@$(CARGO) clippy --quiet --no-default-features -- -D warnings
 	@$(CARGO) clippy --quiet --manifest-path model/Cargo.toml --target-dir $(BUILD)/model --all-targets -- -D warnings
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps
@@ -75,6 +79,7 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, sy
 	@scripts/check-functions
 	@$(MAKE) --no-print-directory check-readme
 	@scripts/check-symbols $(ARCHIVE)
+	@! grep -rn 'target_os' src | grep -v 'cfg_attr\|mbm_firmware' # else no test runs that code
 	@echo "check: formatting, lints, layers, header and symbols are in order"
 
 .PHONY: test
@@ -107,7 +112,7 @@ fault-table: need-test ## Write docs/fault-table.md from what the test finds
 
 .PHONY: need-check need-test
 need-check:
-	@scripts/need gcc g++ clang libc6-dev binutils doxygen
+	@scripts/need gcc g++ clang gcc-avr avr-libc libc6-dev binutils doxygen
 need-test:
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind mbpoll
 
@@ -132,13 +137,22 @@ $(eval $(call variant,plain,gcc,g++,))
 $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS)))
 .SECONDARY:
 
+# The programs of the variant `plain`, linked with the code that firmware runs.
+FIRMWARE_TESTS := $(TESTS:%=$(BUILD)/firmware/%)
+$(FIRMWARE_TESTS): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(patsubst c-tests/%.c,$(BUILD)/plain/%.o,$(patsubst examples/%.c,$(BUILD)/plain/%.o,$(SUPPORT))) $(FIRMWARE_ARCHIVE)
+	@g++ $(filter %.o,$^) $(FIRMWARE_ARCHIVE) $(LIBS) -o $@
+$(TESTED_EXAMPLES:%=$(BUILD)/firmware/linux/%): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(BUILD)/plain/linux/mbm_tcp.o $(BUILD)/plain/linux/mbm_tty.o $(FIRMWARE_ARCHIVE)
+	@mkdir -p $(@D)
+	@gcc $(filter %.o,$^) $(FIRMWARE_ARCHIVE) -Wl,--gc-sections -o $@
+$(TESTED_EXAMPLES:%=$(BUILD)/firmware/test_%): $(BUILD)/firmware/test_%: | $(BUILD)/firmware/linux/%
+
 # What peers of another house ask.
 SERVE := $(BUILD)/plain/serve
 $(SERVE): $(patsubst %,$(BUILD)/plain/%.o,serve support/served support/pty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lpthread -o $@
 
 .PHONY: tests
-tests: $(TESTS:%=$(BUILD)/plain/%) $(TESTS:%=$(BUILD)/sanitized/%) $(SERVE)
+tests: $(TESTS:%=$(BUILD)/plain/%) $(TESTS:%=$(BUILD)/sanitized/%) $(FIRMWARE_TESTS) $(SERVE)
 
 # The same flags as the peer's package is built with.
 $(eval $(call variant,bench,gcc,g++,-O2))

@@ -2411,8 +2411,9 @@ uint8_t mbm_client_getCommEventLog(struct mbm_client *client,
 
 /**
  * Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13). `reply`
- * gets what stands behind the byte count; on TCP also what a device sends that counts
- * the id alone. On a serial line the count must be true.
+ * gets all that follows the byte count, also from a device that counts its id alone
+ * and sends more. In RTU frames the silence after it ends such a reply; one that
+ * counts right is not waited for.
  *
  * @param client   the object
  * @param request  the request
@@ -2755,6 +2756,11 @@ uint8_t mbm_frame_exception(const struct mbm_framing *framing,
 /**
  * How long the frame is that begins with these bytes.
  *
+ * A response to function 11 may be longer than it counts: some devices count the id
+ * alone. In RTU frames it is MBM_LENGTH_EXACT once a right CRC stands where the count
+ * says, MBM_LENGTH_AT_LEAST before, and if the CRC is wrong there MBM_LENGTH_SILENCE,
+ * or MBM_LENGTH_UNKNOWN in a stream.
+ *
  * Any thread or interrupt may call it. For ASCII it takes 260 bytes of stack.
  *
  * @param framing   how frames look
@@ -2791,7 +2797,8 @@ uint8_t mbm_frame_replyLength(const struct mbm_framing *framing,
 
 /**
  * Says whether bytes look like a Modbus TCP frame, request or response, and how
- * long that is. The first eight tell.
+ * long that is. Eight are needed. The length in the header must be one that a
+ * request or a response of this function may have, as far as the bytes tell.
  *
  * Any thread or interrupt may call it.
  *
@@ -3450,6 +3457,10 @@ uint8_t mbm_packet_parse(uint8_t kind,
 
 /**
  * How long the PDU is that begins with these bytes.
+ *
+ * A response to function 11 is as long as it counts. Some devices count the id alone:
+ * mbm_packet_parse takes their longer PDU too. mbm_frame_expectedLength tells these
+ * apart, by the frame's check.
  *
  * Any thread or interrupt may call it.
  *

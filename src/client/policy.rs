@@ -3,7 +3,7 @@
 use super::job::{Stage, Ticket};
 use super::units::Means;
 use crate::error::Status;
-use crate::FAST;
+use crate::FIRMWARE;
 
 /// How the wait grows from one retry to the next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -93,7 +93,7 @@ impl Policy {
         now: u32,
         means: &mut impl Means,
     ) -> bool {
-        let again = !(FAST && status == Status::OK) && means.again(self, ticket, status, now);
+        let again = (FIRMWARE || status != Status::OK) && means.again(self, ticket, status, now);
         means.note(ticket.unit, status, again, now);
         if !again {
             ticket.status = status;

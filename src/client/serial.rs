@@ -55,8 +55,8 @@ impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
         self.engine.poll(now)
     }
 
-    /// Takes what comes while requests wait to be asked again, for who waits for bytes
-    /// in select would not sleep. (An interrupt wakes a microcontroller but once.)
+    /// Takes and drops the bytes that arrive while requests wait to be sent again. A
+    /// program that sleeps until bytes are there would not sleep otherwise.
     fn drop_late<const N: usize>(&mut self, shared: &mut Shared<J, N>) {
         let heard = self.engine.port.read(self.engine.storage.frame());
         if heard < 0 {
@@ -103,7 +103,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
     ) -> Option<J> {
         let started = if !self.engine.is_pending() {
             let Some(job) = shared.take_due(now, &mut self.engine.storage) else {
-                if cfg!(not(target_os = "none")) && fresh && !shared.queue.is_empty() {
+                if fresh && !shared.queue.is_empty() {
                     self.drop_late(shared);
                 }
                 return None;

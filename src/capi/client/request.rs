@@ -135,7 +135,7 @@ impl Job for Lent {
     }
 
     // A microcontroller has the loop over bytes anyway.
-    #[cfg(not(target_os = "none"))]
+    #[cfg(not(any(target_os = "none", mbm_firmware)))]
     #[inline(always)]
     fn put_all(&mut self, bytes: &[u8]) {
         let inside = self.inside_mut();

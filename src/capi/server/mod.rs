@@ -25,6 +25,7 @@ use crate::error::Status;
 use crate::pdu::custom::Rule;
 use crate::port::Port;
 use crate::server::{Lent, Reply, Server, MOST_REQUESTS};
+use crate::FIRMWARE;
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 
@@ -52,10 +53,10 @@ pub struct mbm_server {
 struct Object {
     // Where one instruction reaches it; on a host, where the core has the address
     // of the object.
-    #[cfg(target_os = "none")]
+    #[cfg(any(target_os = "none", mbm_firmware))]
     mark: u8,
     core: Core,
-    #[cfg(not(target_os = "none"))]
+    #[cfg(not(any(target_os = "none", mbm_firmware)))]
     mark: u8,
 }
 
@@ -146,7 +147,7 @@ pub unsafe extern "C" fn mbm_server_poll(server: *mut mbm_server) -> u8 {
         }
         for _ in 0..MOST_REQUESTS {
             let core = &mut object(server).core;
-            let now = if cfg!(target_os = "none") || core.keeps_time() {
+            let now = if FIRMWARE || core.keeps_time() {
                 core.port.micros()
             } else {
                 0

@@ -4,6 +4,7 @@ use super::{custom, mbm_diagnostics};
 use crate::error::Status;
 use crate::pdu::custom::Rule;
 use crate::server::{only_writes, Concern, Heading, Reply};
+use crate::FIRMWARE;
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 
@@ -129,7 +130,7 @@ pub(super) unsafe fn serve(
     unsafe {
         // One unit alone, which takes no notice of what is others', and is asked by
         // its id: soon done.
-        if cfg!(not(target_os = "none"))
+        if !FIRMWARE
             && count == 1
             && (*units).serve.is_none()
             && (*heading).length != 0

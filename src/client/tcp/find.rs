@@ -7,7 +7,6 @@ use crate::client::shared::Shared;
 use crate::client::units::Means;
 use crate::error::Status;
 use crate::frame::tcp::{self, Header};
-use crate::pdu::diagnostics::REPORT_SERVER_ID;
 use crate::port::Port;
 use crate::transaction::Counter;
 
@@ -174,9 +173,6 @@ fn judge<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
     let outline = &job.ticket().outline;
     match outline.expected(pdu, pdu.len()) {
         Some(length) if usize::from(length.get()) == pdu.len() => {}
-        // Some devices count the id alone and send more behind it.
-        Some(length)
-            if pdu.first() == Some(&REPORT_SERVER_ID) && usize::from(length.get()) < pdu.len() => {}
         None if pdu.first().map(|code| code & 0x7F) != Some(outline.function()) => {
             return Status::INVALID_FUNCTION;
         }

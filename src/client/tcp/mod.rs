@@ -12,7 +12,7 @@ use crate::error::Status;
 use crate::frame::tcp;
 use crate::port::Port;
 use crate::transaction::{Counter, Settings};
-use crate::FAST;
+use crate::FIRMWARE;
 
 /// As many requests at once as the queue holds, in TCP frames. Received bytes
 /// stand in the frame buffer, those to send in [`Means::outgoing`].
@@ -387,7 +387,7 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
         let mut fresh = fresh && (self.flying > 0 || shared.delay(now) > 0);
         loop {
             if self.start < self.end {
-                if FAST {
+                if !FIRMWARE {
                     if let Some(job) = self.find_read(shared, now) {
                         return Some(job);
                     }

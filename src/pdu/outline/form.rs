@@ -124,8 +124,8 @@ impl Form {
         registers::WRITE_MULTIPLE_REGISTERS,
         RANGE | COUNTED | SENDS_WORDS,
     );
-    /// 11.
-    pub const REPORT_SERVER_ID: Form = Form::bare(diagnostics::REPORT_SERVER_ID, COUNTS, 1, 2);
+    /// 11. Its response may be longer than it counts.
+    pub const REPORT_SERVER_ID: Form = Form::bare(diagnostics::REPORT_SERVER_ID, OWN, 0, 2);
     /// 16, of which the OR mask is to be added.
     pub(super) const MASK_WRITE_REGISTER: Form =
         Form::new(registers::MASK_WRITE_REGISTER, BROADCAST, 7, 7, 7, 0);

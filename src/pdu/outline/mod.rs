@@ -12,9 +12,9 @@ pub use form::Form;
 use super::identification::{self, MEI_READ_DEVICE_IDENTIFICATION};
 use super::length::Length;
 use super::limits::{MAX_FIFO, MAX_PDU};
-use super::{files, length, EXCEPTION};
+use super::{diagnostics, files, length, EXCEPTION};
 use crate::error::Status;
-use crate::FAST;
+use crate::FIRMWARE;
 use core::num::NonZeroU8;
 use form::*;
 
@@ -143,7 +143,7 @@ impl Outline {
     /// little cost. Firmware, where code is dearer, has [`Outline::emit`] alone.
     #[inline]
     pub fn two_words(&self) -> Option<&[u8; 4]> {
-        if FAST && self.head_length == 5 && self.data_length == 0 && !self.form.has(COUNTED) {
+        if !FIRMWARE && self.head_length == 5 && self.data_length == 0 && !self.form.has(COUNTED) {
             self.head.first_chunk::<5>()?.last_chunk()
         } else {
             None
@@ -175,7 +175,8 @@ impl Outline {
 
     /// The length of the response that begins with the bytes of `pdu`, or the
     /// least length while they do not tell; `None` if no response to it begins
-    /// so. Where nothing but its end tells, it is `whole`.
+    /// so. Where nothing but its end tells, it is `whole`; of 11, what it counts if
+    /// that is more.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn expected(&self, pdu: &[u8], whole: usize) -> Option<NonZeroU8> {
         let length = match pdu {
@@ -205,9 +206,10 @@ impl Outline {
         }
     }
 
-    /// The length where the response's own rules tell: of 18 and 2B/0E, or of
+    /// The length where the response's own rules tell: of 11, 18 and 2B/0E, or of
     /// what only its end ends.
     fn own_length(&self, pdu: &[u8], whole: usize) -> usize {
+        let mut least = 2;
         let rule = match self.head {
             [files::READ_FIFO_QUEUE, ..] => match pdu.get(1..3) {
                 Some([0, low]) => Length::Exactly(3 + usize::from(*low)),
@@ -217,11 +219,16 @@ impl Outline {
             [identification::ENCAPSULATED_INTERFACE_TRANSPORT, MEI_READ_DEVICE_IDENTIFICATION, ..] => {
                 length::objects(pdu)
             }
+            // Some devices count the id alone and send more after it.
+            [diagnostics::REPORT_SERVER_ID, ..] => {
+                least += usize::from(pdu.get(1).copied().unwrap_or(0));
+                Length::Silence
+            }
             _ => Length::Silence,
         };
         match rule {
             Length::Exactly(length) | Length::AtLeast(length) => length,
-            _ => whole.max(2),
+            _ => whole.max(least),
         }
     }
 

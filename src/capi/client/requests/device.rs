@@ -75,8 +75,9 @@ pub unsafe extern "C" fn mbm_client_getCommEventLog(
 }
 
 /// Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13). `reply`
-/// gets what stands behind the byte count; on TCP also what a device sends that counts
-/// the id alone. On a serial line the count must be true.
+/// gets all that follows the byte count, also from a device that counts its id alone
+/// and sends more. In RTU frames the silence after it ends such a reply; one that
+/// counts right is not waited for.
 ///
 /// @param client   the object
 /// @param request  the request
