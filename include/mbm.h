@@ -2122,9 +2122,14 @@ uint8_t mbm_client_reconnect(struct mbm_client *client, const struct mbm_link *l
 /**
  * Whether the link is not known to be lost.
  *
+ * If `connect` of mbm_client_reconnect returned MBM_PENDING, this is 0 until a reply
+ * arrives. Do not reconnect again before the connection had its time: the port knows
+ * better whether it is still being made, for example mbm_tcp_isConnected.
+ *
  * @param client  the object
- * @return 0 from a request that ended with MBM_LINK_LOST on, until one succeeds
- *         or mbm_client_reconnect is called; 1 else
+ * @return 0 from a request that ended with MBM_LINK_LOST on, until a reply arrives
+ *         (an exception is one) or mbm_client_reconnect returns MBM_OK; 1 otherwise,
+ *         and also before the first request
  */
 uint8_t mbm_client_isConnected(const struct mbm_client *client);
 

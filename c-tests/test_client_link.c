@@ -1,0 +1,127 @@
+/* The client over a port in memory: whether its link is known to be lost, how its
+ * waits vary, and which transaction identifier is on the wire. */
+#include "memory_port.h"
+#include "test.h"
+
+#include <string.h>
+
+enum { UNIT = 7, SECOND = 1000000 };
+
+static memory_port m;
+static mbm_client client;
+static mbm_clientRequest request;
+static uint8_t frame[MBM_MAX_TCP_FRAME], outgoing[MBM_MAX_TCP_FRAME];
+static uint16_t words[4];
+
+static void begin(int framing)
+{
+    mbm_port port = memory_port_of(&m);
+
+    memset(&m, 0, sizeof m);
+    memset(&client, 0, sizeof client);
+    memset(&request, 0, sizeof request);
+    switch (framing) {
+    case MBM_FRAMING_RTU: OK(mbm_client_beginRtu(&client, &port, frame, sizeof frame)); break;
+    case MBM_FRAMING_ASCII: OK(mbm_client_beginAscii(&client, &port, frame, sizeof frame)); break;
+    case MBM_FRAMING_RTU_OVER_TCP:
+        OK(mbm_client_beginRtuOverTcp(&client, &port, frame, sizeof frame));
+        break;
+    default:
+        OK(mbm_client_beginTcp(&client, &port, frame, sizeof frame, outgoing, sizeof outgoing));
+        break;
+    }
+    request.unit = UNIT;
+    request.reply = words;
+    request.replyBytes = sizeof words;
+}
+
+static void ask(void)
+{
+    m.sent_count = 0;
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
+}
+
+/* The right reply to the request that was sent last. */
+static void answer(int framing)
+{
+    static const uint8_t rtu[] = {UNIT, 3, 2, 0x12, 0x34};
+    uint8_t tcp[] = {0, 0, 0, 0, 0, 5, UNIT, 3, 2, 0x12, 0x34};
+
+    if (framing == MBM_FRAMING_ASCII) {
+        memory_port_bytes(&m, (const uint8_t *)":07030212" "34AE\r\n", 15);
+    } else if (framing == MBM_FRAMING_TCP) {
+        memcpy(tcp, m.sent, 2);
+        memory_port_bytes(&m, tcp, sizeof tcp);
+    } else {
+        memory_port_rtu(&m, rtu, sizeof rtu);
+    }
+}
+
+static uint8_t connects_with;
+
+static uint8_t reconnected(void *context)
+{
+    (void)context;
+    return connects_with;
+}
+
+static const int framings[] = {MBM_FRAMING_RTU, MBM_FRAMING_ASCII, MBM_FRAMING_TCP,
+                               MBM_FRAMING_RTU_OVER_TCP};
+
+static void a_link_is_connected_once_connect_succeeds_or_a_reply_arrives(void **state)
+{
+    static const uint8_t statuses[] = {MBM_OK, MBM_PENDING, MBM_LINK_LOST, MBM_INVALID_ARGUMENT};
+    const mbm_link link = {NULL, NULL, reconnected};
+    unsigned i, k;
+
+    (void)state;
+    for (i = 0; i < COUNT(framings); i++)
+        for (k = 0; k < COUNT(statuses); k++) {
+            begin(framings[i]);
+            assert_int_equal(mbm_client_isConnected(&client), 1);
+            m.is_lost = 1;
+            ask();
+            IS(MBM_LINK_LOST, memory_port_run(&m, &client, &request, 100));
+            assert_int_equal(mbm_client_isConnected(&client), 0);
+
+            m.is_lost = 0;
+            connects_with = statuses[k];
+            IS(statuses[k], mbm_client_reconnect(&client, &link));
+            assert_int_equal(mbm_client_isConnected(&client), statuses[k] == MBM_OK);
+            /* A request without a reply does not show that there is a link. */
+            ask();
+            IS(MBM_RESPONSE_TIMED_OUT, memory_port_run(&m, &client, &request, 1000));
+            assert_int_equal(mbm_client_isConnected(&client), statuses[k] == MBM_OK);
+            ask();
+            memory_port_send(&m, &client);
+            answer(framings[i]);
+            IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
+            assert_int_equal(mbm_client_isConnected(&client), 1);
+        }
+}
+
+static void a_link_that_the_caller_made_is_connected(void **state)
+{
+    const mbm_link none = {NULL, NULL, NULL};
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(framings); i++) {
+        begin(framings[i]);
+        m.is_lost = 1;
+        ask();
+        IS(MBM_LINK_LOST, memory_port_run(&m, &client, &request, 100));
+        OK(mbm_client_reconnect(&client, i % 2 ? &none : NULL));
+        assert_int_equal(mbm_client_isConnected(&client), 1);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_link_is_connected_once_connect_succeeds_or_a_reply_arrives),
+        cmocka_unit_test(a_link_that_the_caller_made_is_connected),
+    };
+
+    return cmocka_run_group_tests_name("client link", tests, NULL, NULL);
+}
