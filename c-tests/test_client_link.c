@@ -116,11 +116,70 @@ static void a_link_that_the_caller_made_is_connected(void **state)
     }
 }
 
+static uint32_t number;
+
+/* Generators of which other bits vary. */
+static uint32_t of_32_bits(void *context)
+{
+    (void)context;
+    number = number * 1664525u + 1013904223u;
+    return number;
+}
+
+static uint32_t of_15_bits(void *context)
+{
+    return of_32_bits(context) >> 17;
+}
+
+static uint32_t of_16_bits(void *context)
+{
+    return of_32_bits(context) >> 16;
+}
+
+static uint32_t of_upper_bits(void *context)
+{
+    return of_32_bits(context) & 0xFFFF0000u;
+}
+
+static void any_generator_gives_the_whole_jitter(void **state)
+{
+    uint32_t (*const generators[])(void *) = {of_32_bits, of_15_bits, of_16_bits, of_upper_bits};
+    unsigned i, k;
+
+    (void)state;
+    for (i = 0; i < COUNT(generators); i++) {
+        uint32_t least = UINT32_MAX, most = 0, sum = 0;
+
+        begin(MBM_FRAMING_TCP);
+        OK(mbm_client_setResponseTimeout(&client, 1));
+        OK(mbm_client_setRetries(&client, 255));
+        OK(mbm_client_setBackoff(&client, MBM_BACKOFF_FIXED, 1000, 1000));
+        OK(mbm_client_setJitter(&client, 100, generators[i], NULL));
+        ask();
+        memory_port_send(&m, &client);
+        for (k = 0; k < 255; k++) {
+            uint32_t sent_at = m.now, wait;
+
+            m.sent_count = 0;
+            memory_port_send(&m, &client);
+            wait = m.now - sent_at - 1000;
+            least = wait < least ? wait : least;
+            most = wait > most ? wait : most;
+            sum += wait / 255;
+        }
+        IS(MBM_RESPONSE_TIMED_OUT, memory_port_run(&m, &client, &request, 10));
+        assert_in_range(least, 0, SECOND / 20);
+        assert_in_range(most, SECOND - SECOND / 20, SECOND);
+        assert_in_range(sum, SECOND / 2 - SECOND / 10, SECOND / 2 + SECOND / 10);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_link_is_connected_once_connect_succeeds_or_a_reply_arrives),
         cmocka_unit_test(a_link_that_the_caller_made_is_connected),
+        cmocka_unit_test(any_generator_gives_the_whole_jitter),
     };
 
     return cmocka_run_group_tests_name("client link", tests, NULL, NULL);

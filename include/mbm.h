@@ -2649,7 +2649,9 @@ uint8_t mbm_client_setBackoff(struct mbm_client *client,
  *
  * @param client   the object
  * @param percent  0 (at first) to 100: how much of the wait may be taken off
- * @param random   gives any number, another each time; it may not use the client
+ * @param random   returns another number each time, for example rand(): one of 32
+ *                 bits, of 15 bits, or whose upper bits alone vary. It may not use
+ *                 the client
  * @param context  handed to `random`
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
