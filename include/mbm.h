@@ -2546,6 +2546,36 @@ uint8_t mbm_client_custom(struct mbm_client *client,
                           const struct mbm_rule *response);
 
 /**
+ * Any request, as it arrived from another client: sends `function` and the bytes of
+ * `body`, and reads into `reply` all bytes that follow the function code of the
+ * response, as on the wire. This is what a gateway needs: `body` and `reply` are
+ * what the functions of mbm_server_serveCustom get and return.
+ *
+ * A response counts only if it answers this request, as in the functions above: its
+ * length, byte count, echoed address, value, quantity and records must be right. Of a
+ * function that the standard does not define, and of sub-functions of 08 from 0x15 on,
+ * silence ends the response on RTU. If you know its length, use mbm_client_custom.
+ *
+ * 08 with sub-function 04 gets no response: it ends with MBM_OK and `length` 0 after
+ * the turnaround delay.
+ *
+ * @param client    the object
+ * @param request   the request; if it is queued, its `data` then points into `body`
+ * @param function  1 to 127
+ * @param body      the bytes after the function code; leave them alone until the
+ *                  request has ended; may be NULL if there are none
+ * @param bytes     0 to 252
+ * @return a status; see mbm_client_readCoils. MBM_ILLEGAL_DATA_VALUE also for a body
+ *         whose length or counts are wrong, MBM_ILLEGAL_FUNCTION for function 0 or
+ *         one above 127: what a server answers to such a request
+ */
+uint8_t mbm_client_forward(struct mbm_client *client,
+                           struct mbm_clientRequest *request,
+                           uint8_t function,
+                           const uint8_t *body,
+                           uint16_t bytes);
+
+/**
  * Sets how long a response may take, from the end of the request on a serial
  * line, from its being handed to the port on TCP.
  *

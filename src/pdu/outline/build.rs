@@ -202,7 +202,7 @@ impl Outline {
     }
 
     /// So many bytes of data follow the head.
-    fn follow(&mut self, bytes: u16) -> Status {
+    pub(super) fn follow(&mut self, bytes: u16) -> Status {
         self.data_length = bytes as u8;
         value(usize::from(bytes) + usize::from(self.head_length) <= MAX_PDU)
     }
