@@ -174,12 +174,77 @@ static void any_generator_gives_the_whole_jitter(void **state)
     }
 }
 
+static void the_transaction_identifier_on_the_wire_can_be_read(void **state)
+{
+    mbm_clientRequest other = {0};
+    uint16_t first;
+
+    (void)state;
+    begin(MBM_FRAMING_TCP);
+    assert_int_equal(mbm_client_wireTransaction(&request), 0);
+    assert_int_equal(mbm_client_wireTransaction(NULL), 0);
+    /* Not the first of the client, so that the identifier is not 0. */
+    ask();
+    memory_port_send(&m, &client);
+    answer(MBM_FRAMING_TCP);
+    IS(MBM_OK, memory_port_run(&m, &client, &request, 10));
+    request.transaction = 500;
+    other.unit = UNIT;
+    other.transaction = 501;
+    ask();
+    IS(MBM_PENDING, mbm_client_readCoils(&client, &other, 0, 1));
+    memory_port_send(&m, &client);
+    assert_int_equal(m.sent_count, 24);
+    first = mbm_client_wireTransaction(&request);
+    assert_int_equal(first, m.sent[0] << 8 | m.sent[1]);
+    assert_int_equal(mbm_client_wireTransaction(&other), m.sent[12] << 8 | m.sent[13]);
+    assert_int_not_equal(first, mbm_client_wireTransaction(&other));
+    assert_int_equal(request.transaction, 500);
+    assert_int_equal(other.transaction, 501);
+    /* It stays after the end. */
+    answer(MBM_FRAMING_TCP);
+    IS(MBM_OK, memory_port_run(&m, &client, &request, 10));
+    assert_int_equal(mbm_client_wireTransaction(&request), first);
+}
+
+static void reserved_units_and_sub_functions_are_sent_as_they_are(void **state)
+{
+    static const uint8_t sent[] = {255, 8, 0, 0x15, 0xAB, 0xCD}, reply[] = {255, 8, 0, 0x15, 1, 2};
+    const uint16_t data = 0xABCD;
+
+    (void)state;
+    begin(MBM_FRAMING_RTU);
+    request.unit = 255;
+    request.data = &data;
+    IS(MBM_PENDING, mbm_client_diagnostics(&client, &request, 0x15, 1));
+    memory_port_send(&m, &client);
+    assert_int_equal(m.sent_count, sizeof sent + 2);
+    assert_memory_equal(m.sent, sent, sizeof sent);
+    memory_port_rtu(&m, reply, sizeof reply);
+    IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
+    assert_int_equal(words[0], 0x0102);
+}
+
+static void an_ascii_frame_buffer_below_17_bytes_is_refused(void **state)
+{
+    const mbm_port port = memory_port_of(&m);
+
+    (void)state;
+    memset(&client, 0, sizeof client);
+    IS(MBM_INVALID_ARGUMENT, mbm_client_beginAscii(&client, &port, frame, 16));
+    IS(MBM_NOT_INITIALISED, mbm_client_poll(&client));
+    OK(mbm_client_beginAscii(&client, &port, frame, 17));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_link_is_connected_once_connect_succeeds_or_a_reply_arrives),
         cmocka_unit_test(a_link_that_the_caller_made_is_connected),
         cmocka_unit_test(any_generator_gives_the_whole_jitter),
+        cmocka_unit_test(the_transaction_identifier_on_the_wire_can_be_read),
+        cmocka_unit_test(reserved_units_and_sub_functions_are_sent_as_they_are),
+        cmocka_unit_test(an_ascii_frame_buffer_below_17_bytes_is_refused),
     };
 
     return cmocka_run_group_tests_name("client link", tests, NULL, NULL);

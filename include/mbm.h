@@ -678,8 +678,9 @@ typedef struct mbm_client {
  */
 typedef struct mbm_clientRequest {
     /**
-     * Optional: called by mbm_client_poll when the request has ended. It may
-     * queue requests, this one too, and cancel others.
+     * Optional: called by mbm_client_poll when the request has ended, but not for one
+     * that mbm_client_cancel gave up. It may queue requests, this one too, and cancel
+     * others.
      */
     void (*done)(void *context, struct mbm_clientRequest *request);
     /**
@@ -699,13 +700,14 @@ typedef struct mbm_clientRequest {
      */
     uint16_t replyBytes;
     /**
-     * A number of yours. On TCP no two pending requests may have the same one,
-     * but for 0.
+     * A number of yours, which stays as you set it. In TCP frames no two pending
+     * requests may have the same one, except 0. It is not the transaction identifier
+     * on the wire: mbm_client_wireTransaction returns that.
      */
     uint16_t transaction;
     /**
-     * Whom it is for: 1 to 247 on a serial line, 0 is everybody there; 1 to 255
-     * on TCP.
+     * Whom it is for. On a serial line 1 to 247; 0 is broadcast; 248 to 255, which the
+     * standard reserves, are sent as they are. On TCP 1 to 255.
      */
     uint8_t unit;
     /**
@@ -729,7 +731,7 @@ typedef struct mbm_clientRequest {
 /**
  * What the firmware supplies: a byte stream, a clock, and optional hooks.
  *
- * Copied by mbm_master_begin; only `context` must stay valid. Hooks that are
+ * Copied by the begin functions; only `context` must stay valid. Hooks that are
  * NULL are not called; `read`, `write` and `micros` must be there. No hook
  * may call a function on the object that called it, except that `idle` may:
  * it is told MBM_BUSY, and getters work.
@@ -1345,8 +1347,9 @@ typedef struct mbm_unit {
      */
     struct mbm_diagnostics *diagnostics;
     /**
-     * The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers to every id. A
-     * unit that serves nothing is silent, as if it were not there.
+     * The unit id, 1 to 247 (serial line guide V1.02, 2.2); 248 to 255, which the
+     * standard reserves, are taken as they are. 0 answers to every id. A unit that
+     * serves nothing is silent, as if it were not there.
      */
     uint8_t id;
 } mbm_unit;
@@ -2009,6 +2012,16 @@ uint8_t mbm_client_pending(const struct mbm_client *client);
 uint8_t mbm_client_cancel(struct mbm_client *client, struct mbm_clientRequest *request);
 
 /**
+ * The transaction identifier on the wire: that of the TCP frame in which the request
+ * was sent last. The client chooses it, another one for each frame, also for a retry.
+ *
+ * @param request  a request, pending or ended
+ * @return the identifier; 0 in other framings, for a request that was never sent, and
+ *         for NULL. 0 is also an identifier
+ */
+uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
+
+/**
  * Makes an object a client of a serial line, in RTU frames (serial line guide
  * V1.02, 2.5.1).
  *
@@ -2379,11 +2392,13 @@ uint8_t mbm_client_readExceptionStatus(struct mbm_client *client,
 
 /**
  * Function 08: sends the words of `data`, and reads as many into `reply` (V1.1b3,
- * 6.8). Nobody responds to sub-function 04, Force Listen Only Mode.
+ * 6.8). No device responds to sub-function 04, Force Listen Only Mode.
  *
  * @param client   the object
  * @param request  the request
- * @param subFunction  0 (Return Query Data) to 0x14
+ * @param subFunction  0 (Return Query Data) to 0x14. Others, which the standard
+ *                     reserves, are sent as they are, and a response of one word is
+ *                     expected; for one of another length see mbm_client_custom
  * @param words  1; 1 to 125 for sub-function 0
  * @return a status; see mbm_client_readCoils
  */
@@ -2576,8 +2591,9 @@ uint8_t mbm_client_forward(struct mbm_client *client,
                            uint16_t bytes);
 
 /**
- * Sets how long a response may take, from the end of the request on a serial
- * line, from its being handed to the port on TCP.
+ * Sets how long a response may take. The time begins with the end of the request on a
+ * serial line and in RTU over TCP; in TCP frames when mbm_client_poll puts the request
+ * into the outgoing buffer, also if the port takes it later.
  *
  * @param client        the object
  * @param milliseconds  0 to 65535; 2000 at first
@@ -2649,8 +2665,9 @@ uint8_t mbm_client_setPostFlushHold(struct mbm_client *client, uint8_t character
 
 /**
  * Sets how often a request is repeated whose response is missing, damaged or
- * malformed. Exceptions are responses and are not repeated, nor is what a lost link
- * interrupted.
+ * malformed, or that the port did not take. Exceptions are responses and are not
+ * repeated, nor are requests that a lost link interrupted, nor those whose response is
+ * too long for a buffer.
  *
  * @param client   the object
  * @param retries  0 to 255; 0 at first
@@ -2692,8 +2709,9 @@ uint8_t mbm_client_setJitter(struct mbm_client *client,
 
 /**
  * Counts into storage of yours from now on. Read and zero it as you like, but not
- * from an interrupt. On TCP, foreign frames are those with an id that nobody waits
- * for, and resynchronisations are bytes that were no frame.
+ * from an interrupt. In TCP frames, a foreign frame is one whose transaction identifier
+ * and unit no pending request has; a resynchronisation is a run of bytes that were no
+ * frame.
  *
  * @param client    the object
  * @param counters  zeroed by you; NULL stops counting
@@ -2943,7 +2961,8 @@ uint8_t mbm_master_cancel(struct mbm_master *master);
  * The status of the last request.
  *
  * @param master  the object
- * @return MBM_PENDING while it is under way, MBM_OK if there was none
+ * @return MBM_PENDING while it is under way, MBM_OK if there was none;
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_status(const struct mbm_master *master);
 
@@ -2962,11 +2981,12 @@ uint8_t mbm_master_getExceptionCode(const struct mbm_master *master);
  *
  * This and the nine other functions behave alike. In blocking mode they return
  * when the request has ended, in non-blocking mode at once with MBM_PENDING, and
- * mbm_master_poll ends it. Whatever the outcome, they empty the queue of send
- * and set receive back to the first word. Response words change only on
- * success, transmit words never. What no device could accept (a quantity that
- * the standard forbids, addresses beyond 65535) is answered with the exception
- * that a device would send, and nothing is sent.
+ * mbm_master_poll ends it. They empty the queue of send and set receive back to the
+ * first word, unless they return MBM_BUSY, MBM_NOT_INITIALISED or
+ * MBM_INVALID_ARGUMENT. Response words change only on success. Transmit words stay;
+ * only 06 and 16 store their arguments in them. A request that no device could accept
+ * (a quantity that the standard forbids, addresses beyond 65535) is not sent: the
+ * status is the exception that a device would answer.
  *
  * @param master    the object
  * @param address   first coil, 0 to 65535, as on the wire
@@ -3141,7 +3161,8 @@ uint8_t mbm_master_readWriteQueuedRegisters(struct mbm_master *master,
  * @param address   first register, 0 to 65535
  * @param quantity  1 to 125
  * @return how many words mbm_master_receive will give; 0 if the request failed
- *         (mbm_master_status says how) or, non-blocking, is under way
+ *         (mbm_master_status says how), another one is under way or, in non-blocking
+ *         mode, this one is
  */
 uint8_t mbm_master_requestFrom(struct mbm_master *master,
                                uint16_t address,
@@ -4279,7 +4300,8 @@ uint8_t mbm_server_beginRtuOverTcp(struct mbm_server *server,
 
 /**
  * Sets the silence that ends a frame: t3.5 of RTU, the time between two
- * characters of ASCII. mbm_server_begin and its sisters set it back.
+ * characters of ASCII, and in RTU over TCP the silence after a damaged frame. Without
+ * effect in TCP frames. mbm_server_begin and its sisters set it back.
  *
  * @param server        the object
  * @param microseconds  counted from the last byte seen
@@ -4358,7 +4380,8 @@ uint8_t mbm_server_switchOff(struct mbm_unit *unit,
 uint8_t mbm_server_switchOn(struct mbm_switches *switches, uint8_t code);
 
 /**
- * Serves diagnostics: functions 08 with every sub-function, 0B and 0C. From now
+ * Serves diagnostics: functions 08, 0B and 0C. Of 08 it serves the sub-functions that
+ * the standard defines, 00 to 04, 0A to 12 and 14; others are exception 01. From now
  * on the unit counts what its lines bring, logs events, and can be forced into
  * listen only mode.
  *

@@ -24,11 +24,13 @@ pub unsafe extern "C" fn mbm_client_readExceptionStatus(
 }
 
 /// Function 08: sends the words of `data`, and reads as many into `reply` (V1.1b3,
-/// 6.8). Nobody responds to sub-function 04, Force Listen Only Mode.
+/// 6.8). No device responds to sub-function 04, Force Listen Only Mode.
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param subFunction  0 (Return Query Data) to 0x14
+/// @param subFunction  0 (Return Query Data) to 0x14. Others, which the standard
+///                     reserves, are sent as they are, and a response of one word is
+///                     expected; for one of another length see mbm_client_custom
 /// @param words  1; 1 to 125 for sub-function 0
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
