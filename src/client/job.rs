@@ -72,6 +72,12 @@ impl Ticket {
         outline: Outline::NONE,
     };
 
+    /// The transaction identifier of the TCP frame that it was sent in last; 0 if it was
+    /// not sent yet.
+    pub const fn wire(&self) -> u16 {
+        self.wire
+    }
+
     pub(super) fn is(&self, stage: Stage) -> bool {
         self.stage == stage
     }

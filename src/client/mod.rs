@@ -106,10 +106,15 @@ impl<L, J, const N: usize> Client<L, J, N> {
         (&mut self.shared.policy, &mut self.line)
     }
 
-    /// False from a lost link on, until a request succeeds or the client is told
-    /// of a new link.
+    /// False from a lost link on, until a reply arrives or
+    /// [`Client::set_connected`] or [`Client::reconnect`] says otherwise.
     pub const fn is_connected(&self) -> bool {
         self.shared.connected
+    }
+
+    /// Says whether there is a link. [`Client::reconnect`] assumes that there is.
+    pub fn set_connected(&mut self, connected: bool) {
+        self.shared.connected = connected;
     }
 
     /// Ends what [`Client::lend`] began.

@@ -130,7 +130,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         let status = self.received(&mut job, status);
         if status == Status::LINK_LOST {
             shared.lose();
-        } else {
+        } else if !status.is_failure() {
             shared.connected = true;
         }
         // There is room: it came out of the queue, and was counted as if in it.

@@ -67,8 +67,9 @@ unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> Status) -> 
     unsafe { pointers::with(client, |object| change(parts(object))) }
 }
 
-/// Sets how long a response may take, from the end of the request on a serial
-/// line, from its being handed to the port on TCP.
+/// Sets how long a response may take. The time begins with the end of the request on a
+/// serial line and in RTU over TCP; in TCP frames when mbm_client_poll puts the request
+/// into the outgoing buffer, also if the port takes it later.
 ///
 /// @param client        the object
 /// @param milliseconds  0 to 65535; 2000 at first
@@ -209,8 +210,9 @@ fn built_in(has: bool) -> Status {
 }
 
 /// Sets how often a request is repeated whose response is missing, damaged or
-/// malformed. Exceptions are responses and are not repeated, nor is what a lost link
-/// interrupted.
+/// malformed, or that the port did not take. Exceptions are responses and are not
+/// repeated, nor are requests that a lost link interrupted, nor those whose response is
+/// too long for a buffer.
 ///
 /// @param client   the object
 /// @param retries  0 to 255; 0 at first
@@ -262,7 +264,9 @@ pub unsafe extern "C" fn mbm_client_setBackoff(
 ///
 /// @param client   the object
 /// @param percent  0 (at first) to 100: how much of the wait may be taken off
-/// @param random   gives any number, another each time; it may not use the client
+/// @param random   returns another number each time, for example rand(): one of 32
+///                 bits, of 15 bits, or whose upper bits alone vary. It may not use
+///                 the client
 /// @param context  handed to `random`
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
@@ -287,8 +291,9 @@ pub unsafe extern "C" fn mbm_client_setJitter(
 }
 
 /// Counts into storage of yours from now on. Read and zero it as you like, but not
-/// from an interrupt. On TCP, foreign frames are those with an id that nobody waits
-/// for, and resynchronisations are bytes that were no frame.
+/// from an interrupt. In TCP frames, a foreign frame is one whose transaction identifier
+/// and unit no pending request has; a resynchronisation is a run of bytes that were no
+/// frame.
 ///
 /// @param client    the object
 /// @param counters  zeroed by you; NULL stops counting

@@ -216,7 +216,8 @@ pub unsafe extern "C" fn mbm_master_cancel(master: *mut mbm_master) -> u8 {
 /// The status of the last request.
 ///
 /// @param master  the object
-/// @return MBM_PENDING while it is under way, MBM_OK if there was none
+/// @return MBM_PENDING while it is under way, MBM_OK if there was none;
+///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_status(master: *const mbm_master) -> u8 {
     // SAFETY: as the header demands.

@@ -46,8 +46,9 @@ pub struct mbm_unit {
     >,
     /// Not for you.
     pub diagnostics: *mut mbm_diagnostics,
-    /// The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers to every id. A
-    /// unit that serves nothing is silent, as if it were not there.
+    /// The unit id, 1 to 247 (serial line guide V1.02, 2.2); 248 to 255, which the
+    /// standard reserves, are taken as they are. 0 answers to every id. A unit that
+    /// serves nothing is silent, as if it were not there.
     pub id: u8,
 }
 

@@ -172,12 +172,16 @@ impl<P: Port, S: Means> Tcp<P, S> {
     ) -> Option<(usize, Status)> {
         let mut least = u32::MAX;
         self.blocked = false;
-        let mut jobs = shared.queue.iter_mut();
+        let mut at = 0;
         let ended = loop {
-            let Some(job) = jobs.next() else {
+            if self.next as u8 == 0 {
+                self.skip_numbers_in_use(&shared.queue);
+            }
+            let Some(job) = shared.queue.get_mut(at) else {
                 shared.rest(now, least);
                 return None;
             };
+            at += 1;
             let ticket = job.ticket();
             let mut wait = ticket.remains(now, &mut self.means);
             if wait == 0 {
@@ -198,8 +202,20 @@ impl<P: Port, S: Means> Tcp<P, S> {
             }
             least = least.min(wait);
         };
-        let left = jobs.len();
-        Some((shared.queue.len() - 1 - left, ended))
+        Some((at - 1, ended))
+    }
+
+    /// Moves `next`, the first of 256 numbers, to the first of 256 that no pending
+    /// request has. At most 255 requests are pending, so there are such numbers, and
+    /// the other 255 need no look at the queue.
+    #[cold]
+    fn skip_numbers_in_use<J: Job>(&mut self, queue: &[J]) {
+        while queue.iter().any(|job| {
+            let ticket = job.ticket();
+            ticket.is_sent() && ticket.wire >> 8 == self.next >> 8
+        }) {
+            self.next = self.next.wrapping_add(256);
+        }
     }
 
     /// Puts a request behind those that are to be sent; [`Status::BUSY`] if it has

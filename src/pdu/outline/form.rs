@@ -91,6 +91,9 @@ impl Form {
         (self.0 >> at) as u8 & 7
     }
 
+    /// No request.
+    pub(super) const NONE: Form = Form(0);
+
     /// 01: address and quantity.
     pub const READ_COILS: Form = Form::bits(bits::READ_COILS);
     /// 02: address and quantity.

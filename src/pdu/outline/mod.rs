@@ -6,6 +6,7 @@
 
 mod build;
 mod form;
+mod forward;
 
 pub use form::Form;
 
@@ -41,7 +42,7 @@ pub struct Outline {
 impl Outline {
     /// No request.
     pub const NONE: Outline = Outline {
-        form: Form(0),
+        form: Form::NONE,
         head: [0; HEAD],
         head_length: 0,
         data_length: 0,
@@ -233,10 +234,11 @@ impl Outline {
     }
 
     /// How many bytes of data answer a read, behind function code and byte count;
-    /// `None` of other requests.
+    /// `None` of other requests, and of those whose data begin elsewhere.
     #[inline]
     pub fn data_of_read(&self) -> Option<u8> {
-        (self.form.0 & (KIND | GROUP) == READ).then_some(self.length.wrapping_sub(2))
+        let form = self.form.0 & (KIND | 7 << DATA);
+        (form == READ | 2 << DATA).then_some(self.length.wrapping_sub(2))
     }
 
     /// What a complete response of the [`Outline::expected`] length says:
