@@ -435,6 +435,11 @@
 #define MBM_REPLY_PENDING 768
 
 /**
+ * Most records that one unit serves, each handed to a mbm_server_serve function.
+ */
+#define MBM_MAX_SERVICES 16
+
+/**
  * A request.
  */
 #define MBM_EVENT_REQUEST 0
@@ -730,9 +735,12 @@ typedef struct mbm_clientRequest {
  * What the firmware supplies: a byte stream, a clock, and optional hooks.
  *
  * Copied by mbm_master_begin; only `context` must stay valid. Hooks that are
- * NULL are not called; `read`, `write` and `micros` must be there. No hook
- * may call a function on the object that called it, except that `idle` may:
- * it is told MBM_BUSY, and getters work.
+ * NULL are not called; `read`, `write` and `micros` must be there.
+ *
+ * A function that a hook calls on the object that called the hook returns
+ * MBM_BUSY and changes nothing; a getter returns what it returns for an object
+ * that was never begun. The hook `idle` is the exception: it may call every
+ * function, and one that starts a request returns MBM_BUSY.
  */
 typedef struct mbm_port {
     /**
@@ -1226,9 +1234,14 @@ typedef struct mbm_ring {
  * Storage is yours and must be zero before first use, which a static object is
  * (`static mbm_server server;`). What it serves are units, which several
  * servers may share: one on a serial line and four TCP connections, for
- * example, are five servers with the same units. Not re-entrant: use a server
- * and its units from one thread and never from an interrupt; servers that share
- * units belong to one thread.
+ * example, are five servers with the same units. Use a server and its units from
+ * one thread and never from an interrupt; servers that share units belong to one
+ * thread.
+ *
+ * Hooks and functions of yours run within mbm_server_poll. A function that they
+ * call on the server that is polled returns MBM_BUSY and changes nothing: call
+ * it when mbm_server_poll has returned. They may call functions on other servers,
+ * and the mbm_server_serve functions on units.
  */
 typedef struct mbm_server {
     /**
@@ -1242,16 +1255,12 @@ typedef struct mbm_server {
 } mbm_server;
 
 /**
- * What the functions named mbm_server_serve... hang onto a unit: one family of
- * functions. The head of each record that they take; not for you.
+ * The head of each record that a mbm_server_serve function takes. Private.
  */
 typedef struct mbm_service {
     /**
-     * The service behind it.
-     */
-    struct mbm_service *next;
-    /**
-     * Serves a request, if it is one of this family.
+     * Serves a request, if it is one of this family. NULL in a zeroed record,
+     * which serves nothing.
      */
     uint16_t (*serve)(struct mbm_service *service, uint8_t *pdu, const void *heading);
 } mbm_service;
@@ -1327,12 +1336,19 @@ typedef struct mbm_diagnostics {
 /**
  * A unit that servers answer for. Zero it, set `id`, and say what it serves with
  * mbm_server_serveCoils and its sisters.
+ *
+ * Each of those takes a record of yours, which stays valid for as long as the
+ * unit is used. A unit has places for MBM_MAX_SERVICES records; one more is
+ * refused with MBM_BUFFER_TOO_SMALL. A record may be handed over again, also
+ * after you have zeroed and refilled it, and keeps its place. A zeroed record
+ * serves nothing until it is handed over again. One record may serve any number
+ * of units.
  */
 typedef struct mbm_unit {
     /**
-     * Not for you.
+     * Private: the records, in the order in which they are asked, then NULL.
      */
-    struct mbm_service *services;
+    struct mbm_service *services[MBM_MAX_SERVICES];
     /**
      * Not for you.
      */
@@ -1678,7 +1694,9 @@ typedef struct mbm_bitTable {
  * Holding or input registers in an array of yours. Zero it, set what you need,
  * and hand it to mbm_server_serveHoldingRegisters or
  * mbm_server_serveInputRegisters. You may change words and settings at any
- * time, but not from within a hook of this table.
+ * time, but not from within a hook of this table: the request under way goes on
+ * with the words that the table had when it came. To serve it as another kind of
+ * table, zero it first.
  */
 typedef struct mbm_registerTable {
     /**
@@ -4132,14 +4150,13 @@ uint16_t mbm_ring_lost(const struct mbm_ring *ring);
  *
  * Call it as often as you like, at least once per character time of the line
  * if nothing else buffers its bytes. On a serial line a response begins with
- * the first call after the line has been silent for t3.5. What units call, hooks and
- * functions of yours, may not poll the server that called it.
+ * the first call after the line has been silent for t3.5.
  *
  * @param server  the object
  * @return MBM_OK; MBM_LINK_LOST if the port said so, which ends a connection;
  *         MBM_MALFORMED_FRAME if what came over TCP is not Modbus, so that
- *         the connection is to be closed; MBM_INVALID_ARGUMENT or
- *         MBM_NOT_INITIALISED
+ *         the connection is to be closed; MBM_BUSY from within a hook of this
+ *         server; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_server_poll(struct mbm_server *server);
 
@@ -4148,7 +4165,8 @@ uint8_t mbm_server_poll(struct mbm_server *server);
  * that a program may sleep until then.
  *
  * @param server  the object
- * @return microseconds; 0 means poll now, 0xFFFFFFFF until a byte arrives; 1000
+ * @return microseconds; 0 means poll now, and is returned within a hook of this
+ *         server; 0xFFFFFFFF until a byte arrives; 1000
  *         while a function of yours returns MBM_REPLY_PENDING or a connection does
  *         not take the response: to go on sooner, poll when that has changed. No
  *         byte is taken meanwhile, so do not wait for one
@@ -4159,8 +4177,9 @@ uint32_t mbm_server_pollDelay(const struct mbm_server *server);
  * Begins to serve units on a serial line, RTU. The rate is untold, so a frame
  * ends with 4 ms of silence: see mbm_server_setBaudRate.
  *
- * May be called again at any time; what was under way is dropped. Opens
- * nothing: the port is open already. Units are yours, may be shared between
+ * May be called again at any time but from within its hooks; what was under way
+ * is dropped. A call that is refused changes nothing. Opens nothing: the port is
+ * open already. Units are yours, may be shared between
  * servers, and stay where they are for as long as the object is used, as does
  * the buffer, which keeps nothing between requests.
  *
@@ -4171,8 +4190,8 @@ uint32_t mbm_server_pollDelay(const struct mbm_server *server);
  * @param frame   bytes of one frame, for requests and responses
  * @param bytes   at least 16; MBM_MAX_FRAME hold any frame. Longer
  *                requests are not heard, longer responses become exception 04
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or
- *         a buffer of no use
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or a
+ *         buffer that is too short; MBM_BUSY from within a hook of this server
  */
 uint8_t mbm_server_begin(struct mbm_server *server,
                          const struct mbm_port *port,
@@ -4191,7 +4210,7 @@ uint8_t mbm_server_begin(struct mbm_server *server,
  * @param count   see mbm_server_begin
  * @param frame   see mbm_server_begin
  * @param bytes   at least 32; MBM_MAX_ASCII_FRAME hold any frame
- * @return MBM_OK or MBM_INVALID_ARGUMENT
+ * @return a status; see mbm_server_begin
  */
 uint8_t mbm_server_beginAscii(struct mbm_server *server,
                               const struct mbm_port *port,
@@ -4210,7 +4229,7 @@ uint8_t mbm_server_beginAscii(struct mbm_server *server,
  * @param count   see mbm_server_begin
  * @param frame   see mbm_server_begin; one for each connection
  * @param bytes   at least MBM_MAX_TCP_FRAME
- * @return MBM_OK or MBM_INVALID_ARGUMENT
+ * @return a status; see mbm_server_begin
  */
 uint8_t mbm_server_beginTcp(struct mbm_server *server,
                             const struct mbm_port *port,
@@ -4231,7 +4250,7 @@ uint8_t mbm_server_beginTcp(struct mbm_server *server,
  * @param count   see mbm_server_begin
  * @param frame   see mbm_server_begin; one for each connection
  * @param bytes   at least 16; MBM_MAX_FRAME hold any frame
- * @return MBM_OK or MBM_INVALID_ARGUMENT
+ * @return a status; see mbm_server_begin
  */
 uint8_t mbm_server_beginRtuOverTcp(struct mbm_server *server,
                                    const struct mbm_port *port,
@@ -4246,7 +4265,7 @@ uint8_t mbm_server_beginRtuOverTcp(struct mbm_server *server,
  *
  * @param server        the object
  * @param microseconds  counted from the last byte seen
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
  */
 uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t microseconds);
 
@@ -4256,7 +4275,7 @@ uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t microseconds);
  *
  * @param server  the object
  * @param baud    bits per second; 0 goes back to untold
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
  */
 uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
 
@@ -4267,8 +4286,8 @@ uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
  *
  * @param server  the object
  * @param on      0 (at first) or 1
- * @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings, or
- *         MBM_NOT_INITIALISED
+ * @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings,
+ *         MBM_NOT_INITIALISED or MBM_BUSY
  */
 uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
 
@@ -4280,8 +4299,9 @@ uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
  * @param table  the function that reads them: 1 coils (01, 05, 0F), 2 discrete
  *               inputs (02), 3 holding registers (03, 06, 10, 16, 17), 4 input
  *               registers (04)
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, no `get`, no `set`
- *         where it is needed, or another table
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, no `get`, no `set`
+ *         where it is needed, or another table; MBM_BUSY and MBM_BUFFER_TOO_SMALL as
+ *         mbm_server_serveCoils
  */
 uint8_t mbm_server_serveCallbacks(struct mbm_unit *unit,
                                   struct mbm_cells *cells,
@@ -4292,8 +4312,9 @@ uint8_t mbm_server_serveCallbacks(struct mbm_unit *unit,
  *
  * @param unit    the unit
  * @param custom  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, no function, a code
- *         from 128 on, or a length that is no rule
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, no function, a code
+ *         from 128 on, or a length that is no rule; MBM_BUFFER_TOO_SMALL if the unit
+ *         has no place
  */
 uint8_t mbm_server_serveCustom(struct mbm_unit *unit, struct mbm_custom *custom);
 
@@ -4303,9 +4324,10 @@ uint8_t mbm_server_serveCustom(struct mbm_unit *unit, struct mbm_custom *custom)
  *
  * @param unit      the unit
  * @param switches  yours, for as long as the unit is used; zeroed before the
- *                  first call. One for each unit
+ *                  first call. Units that share one share what is switched off
  * @param code      1 to 127
- * @return MBM_OK or MBM_INVALID_ARGUMENT
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or another code;
+ *         MBM_BUFFER_TOO_SMALL if the unit has no place
  */
 uint8_t mbm_server_switchOff(struct mbm_unit *unit,
                              struct mbm_switches *switches,
@@ -4326,8 +4348,10 @@ uint8_t mbm_server_switchOn(struct mbm_switches *switches, uint8_t code);
  * listen only mode.
  *
  * @param unit         the unit
- * @param diagnostics  yours, for as long as the unit is used; one for each unit
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @param diagnostics  yours, for as long as the unit is used; one for each unit, or
+ *                     it counts for all that share it
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit has
+ *         another record of diagnostics; MBM_BUFFER_TOO_SMALL if it has no place
  */
 uint8_t mbm_server_serveDiagnostics(struct mbm_unit *unit,
                                     struct mbm_diagnostics *diagnostics);
@@ -4338,7 +4362,8 @@ uint8_t mbm_server_serveDiagnostics(struct mbm_unit *unit,
  *
  * @param unit   the unit
  * @param files  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+ *         the unit has no place
  */
 uint8_t mbm_server_serveFiles(struct mbm_unit *unit, struct mbm_files *files);
 
@@ -4347,7 +4372,8 @@ uint8_t mbm_server_serveFiles(struct mbm_unit *unit, struct mbm_files *files);
  *
  * @param unit   the unit
  * @param fifos  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+ *         the unit has no place
  */
 uint8_t mbm_server_serveFifos(struct mbm_unit *unit, struct mbm_fifos *fifos);
 
@@ -4356,7 +4382,8 @@ uint8_t mbm_server_serveFifos(struct mbm_unit *unit, struct mbm_fifos *fifos);
  *
  * @param unit    the unit
  * @param status  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+ *         the unit has no place
  */
 uint8_t mbm_server_serveExceptionStatus(struct mbm_unit *unit,
                                         struct mbm_exceptionStatus *status);
@@ -4366,7 +4393,8 @@ uint8_t mbm_server_serveExceptionStatus(struct mbm_unit *unit,
  *
  * @param unit  the unit
  * @param id    yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+ *         the unit has no place
  */
 uint8_t mbm_server_serveServerId(struct mbm_unit *unit, struct mbm_serverId *id);
 
@@ -4377,7 +4405,8 @@ uint8_t mbm_server_serveServerId(struct mbm_unit *unit, struct mbm_serverId *id)
  *
  * @param unit            the unit
  * @param identification  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+ *         the unit has no place
  */
 uint8_t mbm_server_serveIdentification(struct mbm_unit *unit,
                                        struct mbm_identification *identification);
@@ -4394,8 +4423,9 @@ uint8_t mbm_server_serveIdentification(struct mbm_unit *unit,
  * @param length     bytes of the request
  * @param capacity   bytes of the buffer: 256 hold any response in RTU, 513 in
  *                   ASCII, 260 over TCP; a longer response becomes exception 04
- * @param response   bytes of the response; 0 where there is none: for a damaged
- *                   frame, another unit, or a broadcast
+ * @param response   receives the bytes of the response; 0 where there is none: for a
+ *                   damaged frame, another unit, a broadcast, and with any status
+ *                   but MBM_OK
  * @return MBM_OK; MBM_PENDING, with the buffer to be filled anew, if a function
  *         of yours is not done; MBM_INVALID_ARGUMENT
  */
@@ -4412,7 +4442,8 @@ uint8_t mbm_server_respond(uint8_t framing,
  *
  * @param unit   the unit
  * @param table  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY for a table that
+ *         is served as another kind; MBM_BUFFER_TOO_SMALL if the unit has no place
  */
 uint8_t mbm_server_serveCoils(struct mbm_unit *unit, struct mbm_bitTable *table);
 
@@ -4421,7 +4452,7 @@ uint8_t mbm_server_serveCoils(struct mbm_unit *unit, struct mbm_bitTable *table)
  *
  * @param unit   the unit
  * @param table  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return a status; see mbm_server_serveCoils
  */
 uint8_t mbm_server_serveDiscreteInputs(struct mbm_unit *unit, struct mbm_bitTable *table);
 
@@ -4431,7 +4462,7 @@ uint8_t mbm_server_serveDiscreteInputs(struct mbm_unit *unit, struct mbm_bitTabl
  *
  * @param unit   the unit
  * @param table  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return a status; see mbm_server_serveCoils
  */
 uint8_t mbm_server_serveHoldingRegisters(struct mbm_unit *unit,
                                          struct mbm_registerTable *table);
@@ -4441,14 +4472,15 @@ uint8_t mbm_server_serveHoldingRegisters(struct mbm_unit *unit,
  *
  * @param unit   the unit
  * @param table  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return a status; see mbm_server_serveCoils
  */
 uint8_t mbm_server_serveInputRegisters(struct mbm_unit *unit,
                                        struct mbm_registerTable *table);
 
 /**
- * Serves functions 16 and 17 beside 03, 06 and 10: a call of its own, so that
- * firmware without it is smaller.
+ * Serves functions 16 and 17 beside 03, 06 and 10, on each unit that has the
+ * table: a call of its own, so that firmware without it is smaller. After a table
+ * was zeroed it is to be called again.
  *
  * @param table  holding registers that mbm_server_serveHoldingRegisters took
  * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL and other tables

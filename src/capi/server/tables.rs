@@ -2,6 +2,7 @@
 
 use super::units::{add, is_unheard, request};
 use super::{mbm_service, mbm_unit};
+use crate::error::Status;
 use crate::server::table::{self, Access, Cells, Kind, Role, Way};
 use crate::server::Reply;
 use core::ffi::c_void;
@@ -10,7 +11,9 @@ use core::slice::from_raw_parts_mut;
 /// Holding or input registers in an array of yours. Zero it, set what you need,
 /// and hand it to mbm_server_serveHoldingRegisters or
 /// mbm_server_serveInputRegisters. You may change words and settings at any
-/// time, but not from within a hook of this table.
+/// time, but not from within a hook of this table: the request under way goes on
+/// with the words that the table had when it came. To serve it as another kind of
+/// table, zero it first.
 #[repr(C)]
 pub struct mbm_registerTable {
     /// Not for you.
@@ -74,8 +77,15 @@ pub struct mbm_bitTable {
     pub kind: u8,
 }
 
-/// A table of C, whose hooks may look at it: no reference to it is kept.
-struct Table(*mut mbm_registerTable);
+/// A table of C, whose hooks may look at it: no reference to it is kept. What says
+/// where its cells are is taken once a request, for a hook may zero the record or
+/// set it up anew.
+struct Table {
+    record: *mut mbm_registerTable,
+    cells: *mut u8,
+    base: u16,
+    kind: Kind,
+}
 
 // The two tables are one record, but for what `words` points to.
 const _: () = {
@@ -98,9 +108,23 @@ unsafe fn bit(map: *const u8, index: u16) -> bool {
 // is, as the header demands, with arrays of `size` cells behind its pointers; a
 // cell that is `covered` lies in them.
 impl Table {
+    /// # Safety
+    /// `record` is a table.
+    #[inline(always)]
+    unsafe fn new(record: *mut mbm_registerTable, kind: Kind) -> Table {
+        // SAFETY: as the caller promises.
+        unsafe {
+            Table {
+                record,
+                cells: (*record).words.cast(),
+                base: (*record).base,
+                kind,
+            }
+        }
+    }
+
     fn index(&self, address: u16) -> u16 {
-        // SAFETY: see above.
-        unsafe { address.wrapping_sub((*self.0).base) }
+        address.wrapping_sub(self.base)
     }
 }
 
@@ -110,10 +134,10 @@ impl Cells for Table {
         // SAFETY: see above.
         unsafe {
             let end = first.checked_add(quantity);
-            if (*self.0).words.is_null() || end.is_none_or(|end| end > (*self.0).size) {
+            if self.cells.is_null() || end.is_none_or(|end| end > (*self.record).size) {
                 return false;
             }
-            let valid = (*self.0).valid;
+            let valid = (*self.record).valid;
             valid.is_null() || (first..first + quantity).all(|index| bit(valid, index))
         }
     }
@@ -125,8 +149,8 @@ impl Cells for Table {
         let write = way == Way::Write;
         // SAFETY: see above; data have room for so many cells.
         unsafe {
-            let cells = (*self.0).words.cast::<u8>();
-            let bits = Kind::from_code((*self.0).kind).is_bits();
+            let cells = self.cells;
+            let bits = self.kind.is_bits();
             // A host has room for code that takes many cells at a time.
             if cfg!(not(target_os = "none")) {
                 if bits && write && quantity == 1 {
@@ -183,14 +207,14 @@ impl Cells for Table {
 
     fn has_hooks(&self) -> bool {
         // SAFETY: see above.
-        unsafe { (*self.0).before.is_some() || (*self.0).after.is_some() }
+        unsafe { (*self.record).before.is_some() || (*self.record).after.is_some() }
     }
 
     fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
         // SAFETY: see above.
         unsafe {
-            match (*self.0).before {
-                Some(hook) => hook((*self.0).context, address, quantity, data.as_ptr()),
+            match (*self.record).before {
+                Some(hook) => hook((*self.record).context, address, quantity, data.as_ptr()),
                 None => 0,
             }
         }
@@ -199,8 +223,8 @@ impl Cells for Table {
     fn after(&mut self, address: u16, quantity: u16) {
         // SAFETY: see above.
         unsafe {
-            if let Some(hook) = (*self.0).after {
-                hook((*self.0).context, address, quantity);
+            if let Some(hook) = (*self.record).after {
+                hook((*self.record).context, address, quantity);
             }
         }
     }
@@ -321,7 +345,7 @@ unsafe fn serve_as(
     unsafe {
         let (pdu, length) = request(pdu, heading);
         let kind = Kind::from_code((*table).kind);
-        let cells = &mut Table(table);
+        let cells = &mut Table::new(table, kind);
         if cfg!(target_os = "none") || kind.is_bits() {
             table::serve_as(role, kind, cells, pdu, length).code()
         } else {
@@ -371,7 +395,7 @@ unsafe fn serve_more(table: *mut mbm_registerTable, pdu: *mut u8, heading: *cons
     // SAFETY: as the caller promises.
     unsafe {
         let (pdu, length) = request(pdu, heading);
-        let mut cells = Table(table);
+        let mut cells = Table::new(table, Kind::HOLDING_REGISTERS);
         if cfg!(target_os = "none") {
             let cells: &mut dyn Access = &mut cells;
             return table::serve_more(cells, pdu, length).code();
@@ -401,7 +425,7 @@ unsafe extern "C" fn serve_all(
     }
 }
 
-/// Hangs a table onto a unit.
+/// Adds a table to a unit.
 ///
 /// # Safety
 /// As for [`add`].
@@ -409,18 +433,29 @@ unsafe extern "C" fn serve_all(
 unsafe fn add_table(unit: *mut mbm_unit, table: *mut mbm_registerTable, kind: Kind) -> u8 {
     // SAFETY: as the caller promises.
     unsafe {
-        if !table.is_null() {
+        if !table.is_null() && is_other((*table).kind, kind.code()) {
+            return Status::BUSY.code();
+        }
+        let status = add(unit, table.cast(), serve);
+        if status == Status::OK.code() {
             (*table).kind = kind.code();
         }
-        add(unit, table.cast(), serve)
+        status
     }
+}
+
+/// True if a record, whose kind is 0 while it is zeroed, is served as another
+/// kind already: it would answer other functions on each unit that has it.
+pub(super) const fn is_other(served: u8, kind: u8) -> bool {
+    served != 0 && served != kind
 }
 
 /// Serves coils: functions 01, 05 and 0F.
 ///
 /// @param unit   the unit
 /// @param table  yours, for as long as the unit is used
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY for a table that
+///         is served as another kind; MBM_BUFFER_TOO_SMALL if the unit has no place
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_serveCoils(
     unit: *mut mbm_unit,
@@ -434,7 +469,7 @@ pub unsafe extern "C" fn mbm_server_serveCoils(
 ///
 /// @param unit   the unit
 /// @param table  yours, for as long as the unit is used
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+/// @return a status; see mbm_server_serveCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_serveDiscreteInputs(
     unit: *mut mbm_unit,
@@ -449,7 +484,7 @@ pub unsafe extern "C" fn mbm_server_serveDiscreteInputs(
 ///
 /// @param unit   the unit
 /// @param table  yours, for as long as the unit is used
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+/// @return a status; see mbm_server_serveCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_serveHoldingRegisters(
     unit: *mut mbm_unit,
@@ -463,7 +498,7 @@ pub unsafe extern "C" fn mbm_server_serveHoldingRegisters(
 ///
 /// @param unit   the unit
 /// @param table  yours, for as long as the unit is used
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+/// @return a status; see mbm_server_serveCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_serveInputRegisters(
     unit: *mut mbm_unit,
@@ -473,8 +508,9 @@ pub unsafe extern "C" fn mbm_server_serveInputRegisters(
     unsafe { add_table(unit, table, Kind::INPUT_REGISTERS) }
 }
 
-/// Serves functions 16 and 17 beside 03, 06 and 10: a call of its own, so that
-/// firmware without it is smaller.
+/// Serves functions 16 and 17 beside 03, 06 and 10, on each unit that has the
+/// table: a call of its own, so that firmware without it is smaller. After a table
+/// was zeroed it is to be called again.
 ///
 /// @param table  holding registers that mbm_server_serveHoldingRegisters took
 /// @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL and other tables
@@ -483,9 +519,9 @@ pub unsafe extern "C" fn mbm_server_serveMaskAndReadWrite(table: *mut mbm_regist
     // SAFETY: as the header demands.
     unsafe {
         if table.is_null() || (*table).kind != Kind::HOLDING_REGISTERS.code() {
-            return crate::error::Status::INVALID_ARGUMENT.code();
+            return Status::INVALID_ARGUMENT.code();
         }
         (*table).service.serve = Some(serve_all);
     }
-    crate::error::Status::OK.code()
+    Status::OK.code()
 }
