@@ -161,12 +161,12 @@ public:
      * @param id      1 to 247
      * @param stream  must outlive its use here
      * @param baud    bits per second, for t3.5; 0: untold, 4 ms
-     * @return MBM_OK
+     * @return MBM_OK; MBM_BUSY, with nothing changed, from within a hook or function
+     *         of this server
      */
     uint8_t begin(uint8_t id, Stream &stream, uint32_t baud = 0)
     {
-        setUnitID(id);
-        return beginRtu(*this, 1, stream, baud);
+        return named(id, beginRtu(*this, 1, stream, baud));
     }
 
     /** As begin, for all units of an array, which answer in place of this one. */
@@ -179,8 +179,7 @@ public:
     /** As begin, with ASCII in place of RTU; a frame needs twice the bytes and 1. */
     uint8_t beginAscii(uint8_t id, Stream &stream)
     {
-        setUnitID(id);
-        return listen(mbm_server_beginAscii, *this, 1, stream);
+        return named(id, listen(mbm_server_beginAscii, *this, 1, stream));
     }
 
     /** As beginAscii, for all units of an array. */
@@ -195,7 +194,8 @@ public:
      * whole, sends the response. While a response leaves, the Stream is waited
      * for: until it has taken and flushed all bytes.
      *
-     * @return MBM_OK; MBM_NOT_INITIALISED before begin
+     * @return MBM_OK; MBM_NOT_INITIALISED before begin; MBM_BUSY from within a hook
+     *         or function of this server
      */
     uint8_t poll() { return mbm_server_poll(&state.server); }
 
@@ -235,8 +235,8 @@ public:
      */
     void setSilence(uint32_t us)
     {
-        state.silence = us;
-        mbm_server_setSilence(&state.server, us / 2);
+        if (mbm_server_setSilence(&state.server, us / 2) != MBM_BUSY)
+            state.silence = us;
     }
 
     /** Drops the response itself where the receiver hears the driver; of RTU, after begin. */
@@ -275,9 +275,6 @@ private:
                    ModbusUnit &first, uint8_t count, Stream &stream)
     {
         mbm_port port;
-        state.stream = &stream;
-        state.silence = 0;
-        state.ready = false;
         port.context = &state;
         port.read = readHook;
         port.write = writeHook;
@@ -286,13 +283,26 @@ private:
         port.preTransmission = preHook;
         port.postTransmission = postHook;
         port.idle = nullptr;
-        return how(&state.server, &port, &first.unit, count, state.frame,
-                   MODBUSSERVER_FRAME_BYTES);
+        uint8_t status = how(&state.server, &port, &first.unit, count, state.frame,
+                             MODBUSSERVER_FRAME_BYTES);
+        if (status == MBM_OK) {
+            state.stream = &stream;
+            state.silence = 0;
+            state.ready = false;
+        }
+        return status;
     }
     uint8_t beginRtu(ModbusUnit &first, uint8_t count, Stream &stream, uint32_t baud)
     {
         uint8_t status = listen(mbm_server_begin, first, count, stream);
-        setBaudRate(baud);
+        if (status == MBM_OK)
+            setBaudRate(baud);
+        return status;
+    }
+    uint8_t named(uint8_t id, uint8_t status)
+    {
+        if (status == MBM_OK)
+            setUnitID(id);
         return status;
     }
 

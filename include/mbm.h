@@ -657,9 +657,15 @@
  * mbm_client_poll moves them on, and nothing ever waits.
  *
  * Storage is yours and must be zero before first use, which a static object is.
- * One of the mbm_client_begin functions comes first. Not re-entrant: use one
- * object from one thread and never from an interrupt; several objects are
- * independent of each other.
+ * One of the mbm_client_begin functions comes first. Use one object from one
+ * thread and never from an interrupt; several objects are independent of each
+ * other.
+ *
+ * A `done` function may call every function on the client that calls it, but
+ * mbm_client_poll, which returns MBM_BUSY. A hook of the port, and the `random`
+ * function of mbm_client_setJitter, may call none: each returns MBM_BUSY and
+ * changes nothing, and a getter returns what it returns for an object that was
+ * never begun.
  */
 typedef struct mbm_client {
     /**
@@ -807,9 +813,12 @@ typedef struct mbm_link {
  *
  * Storage is yours and must be zero before first use, which a static object
  * is (`static mbm_master node;`). Settings and words want mbm_master_begin or
- * mbm_master_setBuffers before them, requests want both. Not re-entrant: use
- * one object from one thread and never from an interrupt; several objects are
- * independent of each other.
+ * mbm_master_setBuffers before them, requests want both. Use one object from one
+ * thread and never from an interrupt; several objects are independent of each
+ * other. Which functions the hooks of its port may call: see mbm_port.
+ *
+ * A call that is refused changes nothing, but for what the functions that make a
+ * request say of themselves, and mbm_master_send32.
  */
 typedef struct mbm_master {
     /**
@@ -2000,7 +2009,8 @@ uint8_t mbm_client_poll(struct mbm_client *client);
  * only while a request is pending: with none, wait for something else.
  *
  * @param client  the object
- * @return microseconds; 0 means poll now, 0xFFFFFFFF that there is no request; 1000
+ * @return microseconds; 0 means poll now, and is returned within a hook of the port;
+ *         0xFFFFFFFF that there is no request; 1000
  *         while a TCP port does not take what is to be sent: to poll sooner, wait
  *         for that too, as mbm_tcp_wait does
  */
@@ -2034,8 +2044,8 @@ uint8_t mbm_client_cancel(struct mbm_client *client, struct mbm_clientRequest *r
  * @param port        copied; read, write and micros must be there
  * @param frame       bytes of one frame, valid for as long as the client is used
  * @param frameBytes  at least 8; 256 hold any frame
- * @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
- *         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+ * @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
+ *         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_client_beginRtu(struct mbm_client *client,
                             const struct mbm_port *port,
@@ -2051,8 +2061,8 @@ uint8_t mbm_client_beginRtu(struct mbm_client *client,
  * @param port        copied; read, write and micros must be there
  * @param frame       bytes of one frame, valid for as long as the client is used
  * @param frameBytes  at least 17; 513 hold any frame
- * @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
- *         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+ * @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
+ *         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_client_beginAscii(struct mbm_client *client,
                               const struct mbm_port *port,
@@ -2080,8 +2090,8 @@ uint8_t mbm_client_setDelimiter(struct mbm_client *client, uint8_t character);
  * @param port        copied; read, write and micros must be there
  * @param frame       bytes of one frame, valid for as long as the client is used
  * @param frameBytes  at least 8; 256 hold any frame
- * @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
- *         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+ * @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
+ *         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
                                    const struct mbm_port *port,
@@ -2101,8 +2111,8 @@ uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
  * @param outgoing       bytes to send, valid for as long as the client is used
  * @param outgoingBytes  at least 12; 260 hold any frame, more gather more
  *                       requests for one write
- * @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
- *         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+ * @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
+ *         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_client_beginTcp(struct mbm_client *client,
                             const struct mbm_port *port,
@@ -2154,8 +2164,8 @@ uint8_t mbm_client_isConnected(const struct mbm_client *client);
  * @param client  the object; for a facade, of RTU frames on a line or over TCP
  * @param master  a facade with buffers, which gets the client's port; NULL if
  *                you use the line in another way
- * @return MBM_OK; MBM_BUSY if a request is under way or the line is lent already;
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_OK; MBM_BUSY, with both unchanged, if a request is under way or the line
+ *         is lent already; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_lend(struct mbm_client *client, struct mbm_master *master);
 
@@ -2190,7 +2200,8 @@ uint8_t mbm_client_takeBack(struct mbm_client *client, struct mbm_master *master
  *         MBM_DUPLICATE_TRANSACTION, MBM_BUFFER_TOO_SMALL if `reply` has no room
  *         for the data, MBM_INVALID_ARGUMENT for `data` that are NULL,
  *         MBM_NOT_INITIALISED; MBM_BUSY, with the request unchanged, if it is
- *         pending already
+ *         pending already, and from within a hook of the port. A request that
+ *         is refused with another of these has it in `status`
  */
 uint8_t mbm_client_readCoils(struct mbm_client *client,
                              struct mbm_clientRequest *request,
@@ -2662,7 +2673,8 @@ uint8_t mbm_client_setBackoff(struct mbm_client *client,
  *
  * @param client   the object
  * @param percent  0 (at first) to 100: how much of the wait may be taken off
- * @param random   gives any number, another each time; it may not use the client
+ * @param random   gives any number, another each time; what it calls on the client
+ *                 returns MBM_BUSY
  * @param context  handed to `random`
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
@@ -2859,7 +2871,8 @@ uint8_t mbm_frame_lrc(const uint8_t *bytes, uint16_t length);
  * @param slave   unit id, 1 to 247; 248 to 255 are sent as they are, 0 is
  *                broadcast (serial line guide V1.02, 2.2)
  * @param port    copied; read, write and micros must be there
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer or a missing hook
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a missing hook; MBM_BUSY
+ *         from within a hook of this object's port but `idle`
  */
 uint8_t mbm_master_begin(struct mbm_master *master,
                          uint8_t slave,
@@ -2907,7 +2920,8 @@ uint8_t mbm_master_poll(struct mbm_master *master);
  * that a program or an idle hook may sleep until then.
  *
  * @param master  the object
- * @return microseconds; 0 means poll now, 0xFFFFFFFF that there is no request
+ * @return microseconds; 0 means poll now, and is returned within a hook of the port
+ *         but `idle`; 0xFFFFFFFF that there is no request
  */
 uint32_t mbm_master_pollDelay(const struct mbm_master *master);
 

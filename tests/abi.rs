@@ -46,7 +46,7 @@ fn probes() -> Vec<(String, u64)> {
             mbm_object { data length id }
             mbm_framing { functions functionCount kind end }
             mbm_registers { data first count kind order }
-            mbm_service { next serve }
+            mbm_service { serve }
             mbm_unit { services serve diagnostics id }
             mbm_registerTable { service words valid before after context base size kind }
             mbm_bitTable { service bits valid before after context base size kind }

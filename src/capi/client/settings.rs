@@ -172,8 +172,9 @@ pub unsafe extern "C" fn mbm_client_setEchoDiscard(client: *mut mbm_client, on: 
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.settings.echo_discard = on != 0;
-            built_in(cfg!(feature = "echo") || on == 0)
+            built_in(cfg!(feature = "echo") || on == 0, || {
+                parts.settings.echo_discard = on != 0;
+            })
         })
     }
 }
@@ -193,15 +194,18 @@ pub unsafe extern "C" fn mbm_client_setPostFlushHold(
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.settings.post_flush_hold = characters;
-            built_in(cfg!(feature = "hold") || characters == 0)
+            built_in(cfg!(feature = "hold") || characters == 0, || {
+                parts.settings.post_flush_hold = characters;
+            })
         })
     }
 }
 
-/// What a setting is answered with that an archive may lack.
-fn built_in(has: bool) -> Status {
+/// Makes a change that an archive may lack the code for: then it is refused.
+#[inline(always)]
+fn built_in(has: bool, change: impl FnOnce()) -> Status {
     if has {
+        change();
         Status::OK
     } else {
         Status::INVALID_ARGUMENT
@@ -221,8 +225,8 @@ pub unsafe extern "C" fn mbm_client_setRetries(client: *mut mbm_client, retries:
     unsafe {
         set(client, |parts| {
             parts.policy.retries = retries;
-            parts.means.again = Some(|means, policy, ticket, status, now| {
-                again(policy, ticket, status, now, || means.random())
+            parts.means.again = Some(|means, policy, retries, status| {
+                again(policy, retries, status, || means.random())
             });
             Status::OK
         })
@@ -262,7 +266,8 @@ pub unsafe extern "C" fn mbm_client_setBackoff(
 ///
 /// @param client   the object
 /// @param percent  0 (at first) to 100: how much of the wait may be taken off
-/// @param random   gives any number, another each time; it may not use the client
+/// @param random   gives any number, another each time; what it calls on the client
+///                 returns MBM_BUSY
 /// @param context  handed to `random`
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
@@ -301,8 +306,9 @@ pub unsafe extern "C" fn mbm_client_setCounters(
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.means.counters = counters;
-            built_in(cfg!(feature = "counters") || counters.is_null())
+            built_in(cfg!(feature = "counters") || counters.is_null(), || {
+                parts.means.counters = counters;
+            })
         })
     }
 }

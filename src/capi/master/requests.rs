@@ -265,7 +265,9 @@ pub unsafe extern "C" fn mbm_master_requestFrom(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        mbm_master_readHoldingRegisters(master, address, quantity);
-        super::mbm_master_available(master)
+        match mbm_master_readHoldingRegisters(master, address, quantity) {
+            0 => super::mbm_master_available(master),
+            _ => 0,
+        }
     }
 }
