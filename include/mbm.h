@@ -574,7 +574,10 @@
 #define MBM_INVALID_CRC 227
 
 /**
- * A NULL pointer, a port without read, write or micros, a buffer of no use.
+ * An argument that the function cannot take: NULL, a number out of range, a port
+ * without read, write or micros, a buffer that is too short, or an object of
+ * another framing or kind. The comment of the function says which. Nothing was
+ * changed.
  */
 #define MBM_INVALID_ARGUMENT 228
 
@@ -590,7 +593,9 @@
 #define MBM_LINK_LOST 230
 
 /**
- * The object has a request under way; nothing was changed.
+ * The object is in use: it has a request under way, it called the hook that this
+ * call came from, or it is a record that is served in another way. Nothing was
+ * changed.
  */
 #define MBM_BUSY 231
 
@@ -601,7 +606,8 @@
 
 /**
  * The frame buffer cannot hold the request (nothing was sent), or frame or
- * response buffer cannot hold the reply (the response words are unchanged).
+ * response buffer cannot hold the reply (the response words are unchanged), or a
+ * unit has no place for another record.
  */
 #define MBM_BUFFER_TOO_SMALL 233
 
@@ -2718,7 +2724,7 @@ uint8_t mbm_client_setUnits(struct mbm_client *client,
  * @param frame     receives the frame; may not overlap the packet's data
  * @param capacity  bytes of `frame`; MBM_MAX_FRAME do for RTU,
  *                  MBM_MAX_TCP_FRAME for TCP, MBM_MAX_ASCII_FRAME for all
- * @param length    receives the frame's length, if the status is MBM_OK
+ * @param length    receives the frame's length; 0 if the status is not MBM_OK
  * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
  *         that mbm_frame_parse finds in such a frame
  */
@@ -2744,7 +2750,8 @@ uint8_t mbm_frame_build(const struct mbm_framing *framing,
  * @param frameLength  its bytes
  * @param packet       receives what it says. If the frame is sound, but not
  *                     what it carries: kind, unit, transaction and function
- *                     alone; if the frame is not sound: kind alone
+ *                     alone; if the frame is not sound: kind alone; unchanged
+ *                     for MBM_INVALID_ARGUMENT
  * @return MBM_OK, also for an exception; of the frame MBM_INCOMPLETE_FRAME,
  *         MBM_MALFORMED_FRAME, or MBM_INVALID_CRC, also for a wrong LRC; what
  *         mbm_packet_parse says of what it carries; MBM_INVALID_ARGUMENT
@@ -2767,7 +2774,7 @@ uint8_t mbm_frame_parse(const struct mbm_framing *framing,
  * @param code      1 to 127, MBM_ILLEGAL_FUNCTION for example
  * @param frame     receives the frame; it may be that of the request
  * @param capacity  bytes of `frame`; 11 always do
- * @param length    receives the frame's length, if the status is MBM_OK
+ * @param length    receives the frame's length; 0 if the status is not MBM_OK
  * @return MBM_OK; MBM_BROADCAST_NOT_ALLOWED: on a serial line nobody answers
  *         unit 0; MBM_ILLEGAL_FUNCTION for a function from 0x80, which no
  *         exception can name; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also
@@ -2790,7 +2797,8 @@ uint8_t mbm_frame_exception(const struct mbm_framing *framing,
  *                  exceptions
  * @param bytes     the frame's first bytes; more may follow
  * @param have      how many; may be 0
- * @param expected  receives the length
+ * @param expected  receives the length; MBM_LENGTH_UNKNOWN and 0 if the status is
+ *                  not MBM_OK
  * @return MBM_OK; MBM_MALFORMED_FRAME if no frame begins like that, or none is
  *         so long; MBM_INVALID_ARGUMENT
  */
@@ -2809,7 +2817,8 @@ uint8_t mbm_frame_expectedLength(const struct mbm_framing *framing,
  * @param framing   how frames look
  * @param request   the request, as for mbm_frame_build
  * @param expected  receives the length; MBM_LENGTH_EXACT and 0 if nothing ever
- *                  answers it: a broadcast, 08 with sub-function 04
+ *                  answers it: a broadcast, 08 with sub-function 04;
+ *                  MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
  * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a packet that is no request;
  *         else why such a request is never built
  */
@@ -2827,7 +2836,8 @@ uint8_t mbm_frame_replyLength(const struct mbm_framing *framing,
  * @param have          how many
  * @param allowUnknown  0: only with a function code of the standard, or one
  *                      that it leaves to users; else: with any but 0
- * @param expected      receives the bytes of the frame, if the status is MBM_OK
+ * @param expected      receives the bytes of the frame; 0 if the status is not
+ *                      MBM_OK
  * @return MBM_OK; MBM_INCOMPLETE_FRAME if more bytes must tell;
  *         MBM_MALFORMED_FRAME if this is something else; MBM_INVALID_ARGUMENT
  */
@@ -3299,7 +3309,7 @@ uint8_t mbm_master_setWordOrder(struct mbm_master *master, uint8_t order);
  * @param master     the object; its buffers stay as they are while the view is used
  * @param first      the device's address of word 0: that of the read, or 0 to
  *                   count from word 0
- * @param registers  the view to fill in
+ * @param registers  the view to fill in; unchanged if the status is not MBM_OK
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_getResponseRegisters(const struct mbm_master *master,
@@ -3313,7 +3323,7 @@ uint8_t mbm_master_getResponseRegisters(const struct mbm_master *master,
  * @param master     the object; its buffers stay as they are while the view is used
  * @param first      the device's address of word 0: that of the write, or 0 to
  *                   count from word 0
- * @param registers  the view to fill in
+ * @param registers  the view to fill in; unchanged if the status is not MBM_OK
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_getTransmitRegisters(const struct mbm_master *master,
@@ -3434,7 +3444,7 @@ uint16_t mbm_master_receive(struct mbm_master *master);
  * @param functionCount  how many
  * @param pdu            receives it; may not overlap the packet's data
  * @param capacity       bytes of `pdu`; MBM_MAX_PDU always do
- * @param length         receives the PDU's length, if the status is MBM_OK
+ * @param length         receives the PDU's length; 0 if the status is not MBM_OK
  * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
  *         that mbm_packet_parse finds in such a PDU
  */
@@ -3457,7 +3467,7 @@ uint8_t mbm_packet_build(const struct mbm_packet *packet,
  * @param functions      functions of your own; may be NULL if there are none
  * @param functionCount  how many
  * @param packet         receives what it says; if the PDU is refused, its kind
- *                       and function alone
+ *                       and function alone; unchanged for MBM_INVALID_ARGUMENT
  * @return MBM_OK, also for an exception; MBM_INVALID_ARGUMENT. Of a request
  *         else the exception that answers it: MBM_ILLEGAL_FUNCTION,
  *         MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE. Of a response
@@ -3482,7 +3492,8 @@ uint8_t mbm_packet_parse(uint8_t kind,
  * @param have           how many; may be 0
  * @param functions      functions of your own; may be NULL if there are none
  * @param functionCount  how many
- * @param expected       receives the length
+ * @param expected       receives the length; MBM_LENGTH_UNKNOWN and 0 if the status
+ *                       is not MBM_OK
  * @return MBM_OK; MBM_MALFORMED_FRAME for a length that no PDU has;
  *         MBM_INVALID_ARGUMENT
  */
@@ -3503,7 +3514,8 @@ uint8_t mbm_packet_expectedLength(uint8_t kind,
  * @param functions      functions of your own; may be NULL if there are none
  * @param functionCount  how many
  * @param expected       receives the length; MBM_LENGTH_EXACT and 0 if nothing
- *                       ever answers it (08 with sub-function 04)
+ *                       ever answers it (08 with sub-function 04);
+ *                       MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
  * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a packet that is no request;
  *         else why such a request is never built
  */
@@ -3521,7 +3533,7 @@ uint8_t mbm_packet_replyLength(const struct mbm_packet *request,
  * @param packet  a request or response of 14 or 15, as parsed or built
  * @param cursor  where it goes on; yours, 0 to begin
  * @param record  receives the record, whose data point into the packet's
- * @return 1; 0 if there is none left, or for NULL
+ * @return 1; 0, with cursor and record unchanged, if there is none left, or for NULL
  */
 uint8_t mbm_packet_nextRecord(const struct mbm_packet *packet,
                               uint16_t *cursor,
@@ -3536,7 +3548,7 @@ uint8_t mbm_packet_nextRecord(const struct mbm_packet *packet,
  * @param packet  a response of 2B/0E, as parsed or built
  * @param cursor  where it goes on; yours, 0 to begin
  * @param object  receives the object, whose data point into the packet's
- * @return 1; 0 if there is none left, or for NULL
+ * @return 1; 0, with cursor and object unchanged, if there is none left, or for NULL
  */
 uint8_t mbm_packet_nextObject(const struct mbm_packet *packet,
                               uint16_t *cursor,
@@ -4584,8 +4596,8 @@ uint16_t mbm_sniffer_feed(struct mbm_sniffer *sniffer,
  * @param now      the time, in microseconds
  * @param event    receives what happened; valid until the next call with this
  *                 sniffer
- * @return 1 if there is an event, 0 if nothing more is known yet, or the sniffer
- *         was never begun
+ * @return 1 if there is an event; 0, with `event` unchanged, if nothing more is known
+ *         yet, or the sniffer was never begun
  */
 uint8_t mbm_sniffer_next(struct mbm_sniffer *sniffer,
                          uint32_t now,

@@ -72,7 +72,7 @@ pub(super) unsafe fn put<T>(place: *mut T, value: T) -> u8 {
     Status::OK.code()
 }
 
-/// As [`put`], of a length or the status that says why there is none.
+/// As [`put`], of a length, or of 0 and the status that says why there is none.
 ///
 /// # Safety
 /// As for [`put`].
@@ -80,7 +80,11 @@ pub(super) unsafe fn put_length(place: *mut u16, length: Result<usize, Status>) 
     match length {
         // SAFETY: as the caller promises.
         Ok(length) => unsafe { put(place, length as u16) },
-        Err(refused) => refused.code(),
+        Err(refused) => {
+            // SAFETY: as the caller promises.
+            unsafe { put(place, 0) };
+            refused.code()
+        }
     }
 }
 

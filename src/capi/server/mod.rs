@@ -213,7 +213,10 @@ pub unsafe extern "C" fn mbm_server_pollDelay(server: *const mbm_server) -> u32 
         match check(server) {
             Status::OK => {
                 let core = core_of(server);
+                let mark = &raw mut (*server.cast::<Object>().cast_mut()).mark;
+                mark.write(POLLING);
                 let now = port::now(&raw const (*core).port);
+                mark.write(BEGUN);
                 (*core).poll_delay(now)
             }
             Status::BUSY => 0,
