@@ -52,9 +52,10 @@
  * ModbusServer is one itself; only several units on one line take objects of
  * this class.
  *
- * Each member that serves something returns MBM_OK, and may be called before
- * begin or after it. What is served is not copied: it must outlive the unit,
- * and belongs to this unit alone.
+ * Each member that serves something returns MBM_OK, or MBM_BUFFER_TOO_SMALL for
+ * more than MBM_MAX_SERVICES (16) of them, and may be called before begin or after
+ * it. What is served is not copied: it must outlive the unit. Several units may
+ * serve the same object; MBM_BUSY for a table that is served as another kind.
  */
 class ModbusUnit {
 public:
