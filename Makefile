@@ -3,6 +3,8 @@
 CARGO ?= cargo
 BUILD := build
 ARCHIVE := target/release/libmbm.a
+# The same, with the code that only firmware runs.
+FIRMWARE_ARCHIVE := $(BUILD)/firmware/libmbm.a
 
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wundef -Werror
 INCLUDES := -Iinclude -Iexamples/linux -Ic-tests/support -Ic-tests/shim
@@ -28,9 +30,11 @@ archive: $(ARCHIVE) ## The archive for this machine, target/release/libmbm.a
 	@echo "archive: $(ARCHIVE)"
 
 # Cargo knows best what is out of date.
-.PHONY: $(ARCHIVE)
+.PHONY: $(ARCHIVE) $(FIRMWARE_ARCHIVE)
 $(ARCHIVE):
-	@$(CARGO) rustc --quiet --release --lib --crate-type staticlib --features archive
+	@CARGO="$(CARGO)" scripts/archive-host $@
+$(FIRMWARE_ARCHIVE):
+	@CARGO="$(CARGO)" scripts/archive-host $@ --cfg mbm_firmware
 
 MCUS := $(shell scripts/archive --list)
 .PHONY: archives
@@ -62,9 +66,10 @@ header: ## Write include/mbm.h anew from the source
 .PHONY: check
 check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, symbols
 	@$(CARGO) fmt --all --check
-	@for crate in fuzz bench; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml --check || exit 1; done
-	@$(CARGO) clippy --quiet --workspace --all-targets -- -D warnings
+	@for crate in fuzz bench model; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml --check || exit 1; done
+	@$(CARGO) clippy --quiet --workspace --all-targets --features pymodbus -- -D warnings
 	@$(CARGO) clippy --quiet --no-default-features -- -D warnings
+	@$(CARGO) clippy --quiet --manifest-path model/Cargo.toml --target-dir $(BUILD)/model --all-targets -- -D warnings
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps
 	@$(CARGO) test --quiet -p mbm-tools >/dev/null
 	@$(CARGO) run --quiet -p mbm-tools --bin layers
@@ -74,6 +79,7 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, sy
 	@scripts/check-functions
 	@$(MAKE) --no-print-directory check-readme
 	@scripts/check-symbols $(ARCHIVE)
+	@! grep -rn 'target_os' src | grep -v 'cfg_attr\|mbm_firmware' # else no test runs that code
 	@echo "check: formatting, lints, layers, header and symbols are in order"
 
 .PHONY: test
@@ -95,6 +101,14 @@ fuzz: ## Fuzz every decoder for FUZZ_SECONDS in all (60)
 	@scripts/need g++ libc6-dev libmodbus-dev
 	@CARGO="$(CARGO)" scripts/fuzz
 
+MODEL_SECONDS ?= 300
+MODEL := --quiet --release --manifest-path model/Cargo.toml --target-dir $(BUILD)/model
+.PHONY: model
+model: ## Try every order of events around a request for MODEL_SECONDS (300)
+	@mkdir -p $(BUILD)
+	@$(CARGO) test $(MODEL) >$(BUILD)/model.log 2>&1 || { cat $(BUILD)/model.log; exit 1; }
+	@$(CARGO) run $(MODEL) -- $(MODEL_SECONDS)
+
 .PHONY: fault-table
 fault-table: need-test ## Write docs/fault-table.md from what the test finds
 	@$(MAKE) --no-print-directory $(BUILD)/plain/test_bad_wire
@@ -103,7 +117,7 @@ fault-table: need-test ## Write docs/fault-table.md from what the test finds
 
 .PHONY: need-check need-test
 need-check:
-	@scripts/need gcc g++ clang libc6-dev binutils doxygen
+	@scripts/need gcc g++ clang gcc-avr avr-libc libc6-dev binutils doxygen
 need-test:
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind mbpoll
 
@@ -123,10 +137,20 @@ $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(pa
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tty.o $(ARCHIVE)
 	@$(2) $(4) $$(filter %.o,$$^) $(ARCHIVE) -Wl,--gc-sections -o $$@
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)/linux/%
+$(BUILD)/$(1)/test_gateway_replies: | $(BUILD)/$(1)/linux/gateway
 endef
 $(eval $(call variant,plain,gcc,g++,))
 $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS)))
 .SECONDARY:
+
+# The programs of the variant `plain`, linked with the code that firmware runs.
+FIRMWARE_TESTS := $(TESTS:%=$(BUILD)/firmware/%)
+$(FIRMWARE_TESTS): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(patsubst c-tests/%.c,$(BUILD)/plain/%.o,$(patsubst examples/%.c,$(BUILD)/plain/%.o,$(SUPPORT))) $(FIRMWARE_ARCHIVE)
+	@g++ $(filter %.o,$^) $(FIRMWARE_ARCHIVE) $(LIBS) -o $@
+$(TESTED_EXAMPLES:%=$(BUILD)/firmware/linux/%): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(BUILD)/plain/linux/mbm_tcp.o $(BUILD)/plain/linux/mbm_tty.o $(FIRMWARE_ARCHIVE)
+	@mkdir -p $(@D)
+	@gcc $(filter %.o,$^) $(FIRMWARE_ARCHIVE) -Wl,--gc-sections -o $@
+$(TESTED_EXAMPLES:%=$(BUILD)/firmware/test_%): $(BUILD)/firmware/test_%: | $(BUILD)/firmware/linux/%
 
 # What peers of another house ask.
 SERVE := $(BUILD)/plain/serve
@@ -134,7 +158,7 @@ $(SERVE): $(patsubst %,$(BUILD)/plain/%.o,serve support/served support/pty) $(AR
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lpthread -o $@
 
 .PHONY: tests
-tests: $(TESTS:%=$(BUILD)/plain/%) $(TESTS:%=$(BUILD)/sanitized/%) $(SERVE)
+tests: $(TESTS:%=$(BUILD)/plain/%) $(TESTS:%=$(BUILD)/sanitized/%) $(FIRMWARE_TESTS) $(SERVE)
 
 # The same flags as the peer's package is built with.
 $(eval $(call variant,bench,gcc,g++,-O2))

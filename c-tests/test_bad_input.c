@@ -238,6 +238,22 @@ static void ranges_beyond_65535_are_answered_2_with_nothing_sent(void **state)
     assert_int_equal(s->sent, 0);
 }
 
+static void request_from_gives_0_for_what_is_refused_after_a_read(void **state)
+{
+    NODE;
+
+    sim_answer(s, 1, 500, "11 03 02 00 07 +");
+    assert_int_equal(mbm_master_requestFrom(n, 0, 1), 1);
+    assert_int_equal(mbm_master_requestFrom(n, 0, 0), 0);
+    IS(3, mbm_master_status(n));
+    assert_int_equal(mbm_master_requestFrom(n, 65535, 2), 0);
+    IS(2, mbm_master_status(n));
+    OK(mbm_master_setBlocking(n, 0));
+    IS(MBM_PENDING, mbm_master_writeSingleRegister(n, 0, 1));
+    assert_int_equal(mbm_master_requestFrom(n, 0, 1), 0);
+    IS(MBM_PENDING, mbm_master_status(n));
+}
+
 static void the_last_address_is_in_reach(void **state)
 {
     NODE;
@@ -444,6 +460,7 @@ int main(void)
         SIM_TEST(a_port_without_its_three_hooks_is_refused),
         SIM_TEST(forbidden_quantities_are_answered_3_with_nothing_sent),
         SIM_TEST(ranges_beyond_65535_are_answered_2_with_nothing_sent),
+        SIM_TEST(request_from_gives_0_for_what_is_refused_after_a_read),
         SIM_TEST(the_last_address_is_in_reach),
         SIM_TEST(a_frame_buffer_below_8_bytes_is_refused),
         SIM_TEST(a_request_is_sent_whole_or_not_at_all),

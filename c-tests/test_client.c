@@ -160,7 +160,9 @@ static void a_lost_connection_is_told_and_made_anew(void **state)
     assert_int_equal(waiting.status, MBM_LINK_LOST);
     assert_false(mbm_client_isConnected(&a.client));
     IS(MBM_PENDING, mbm_client_reconnect(&a.client, &a.link));
+    assert_false(mbm_client_isConnected(&a.client));
     ends(MBM_OK, &r, mbm_client_readHoldingRegisters(&a.client, &r, 0, 1));
+    assert_true(mbm_client_isConnected(&a.client));
     mbm_tcp_close(&a.tcp);
     tcp_server_stop(&s);
 }

@@ -20,6 +20,9 @@ static struct {
 static mbm_clientUnit units[3];
 static mbm_counters counters;
 static uint16_t data[WORDS];
+/* Requests as they arrive: short ones, and one with many numbers and counts. */
+static const uint8_t bodies[4][WORDS] = {{0, 1, 0, 2}, {0, 0, 0, 0, 2, 0x12, 0x34}, {14, 1, 0},
+                                         {7, 6, 0, 1, 0, 0, 0, 1}};
 static uint8_t incoming[1100], outgoing[1100];
 static unsigned long ended;
 
@@ -162,7 +165,7 @@ static uint8_t ask(mbm_clientRequest *r)
 {
     const mbm_rule rule = {.kind = byte(5), .bytes = byte(8)};
 
-    switch (chance(16)) {
+    switch (chance(17)) {
     case 0: return mbm_client_readCoils(&client, r, any(65536), any(2100));
     case 1: return mbm_client_readHoldingRegisters(&client, r, any(65536), any(130));
     case 2: return mbm_client_writeSingleCoil(&client, r, any(65536), byte(2));
@@ -180,7 +183,13 @@ static uint8_t ask(mbm_clientRequest *r)
         return mbm_client_readWriteMultipleRegisters(&client, r, any(100), any(127), any(100),
                                                      any(123));
     case 14: return mbm_client_readFileRecord(&client, r, any(3), any(10001), any(130));
-    default: return mbm_client_writeFileRecord(&client, r, any(3), any(10001), any(125));
+    case 15: return mbm_client_writeFileRecord(&client, r, any(3), any(10001), any(125));
+    default: {
+        const uint8_t function = byte(0x2D);
+
+        return mbm_client_forward(&client, r, function, chance(20) ? bodies[function % 4] : NULL,
+                                  chance(2) ? 4 : any(sizeof bodies[0] + 1));
+    }
     }
 }
 
@@ -288,7 +297,10 @@ static void begin(unsigned seed)
     wire.is_tcp = seed % 4 == 3;
     switch (seed % 4) {
     case 0: OK(mbm_client_beginRtu(&client, &port, incoming, received)); break;
-    case 1: OK(mbm_client_beginAscii(&client, &port, incoming, received)); break;
+    case 1:
+        received = received < 17 ? 17 : received;
+        OK(mbm_client_beginAscii(&client, &port, incoming, received));
+        break;
     case 2: OK(mbm_client_beginRtuOverTcp(&client, &port, incoming, received)); break;
     default: OK(mbm_client_beginTcp(&client, &port, incoming, received, outgoing, sent)); break;
     }

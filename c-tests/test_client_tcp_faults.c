@@ -61,7 +61,7 @@ static void finish(void)
 {
     while (mbm_client_poll(&a.client) == MBM_PENDING)
         asker_rest(&a);
-    if (!mbm_client_isConnected(&a.client))
+    if (!mbm_client_isConnected(&a.client) && mbm_tcp_isConnected(&a.tcp) < 0)
         IS(MBM_PENDING, mbm_client_reconnect(&a.client, &a.link));
 }
 

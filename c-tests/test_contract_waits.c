@@ -93,14 +93,16 @@ static void the_line_is_left_alone_after_a_timeout(void **state)
     failed = s->now;
     sim_reads(s, 500);
     sim_assert_time(s->frames[1].begin - failed, 100000);
-    /* Only then: not after a success. */
+    /* The reply to it was held, see test_late_replies.c. After that reply the
+     * line is not left alone. */
     sim_reads(s, 500);
-    sim_assert_time(s->frames[2].silence, 4000);
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[3].silence, 4000);
     OK(mbm_master_setQuietTime(n, 250));
     assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
     failed = s->now;
     sim_reads(s, 500);
-    sim_assert_time(s->frames[4].begin - failed, 250000);
+    sim_assert_time(s->frames[5].begin - failed, 250000);
 }
 
 static void a_reply_in_the_quiet_time_is_dropped(void **state)
@@ -257,6 +259,99 @@ static void a_gap_longer_than_the_timeout_is_waited_for(void **state)
     gap_after_reply(s, 4000);
 }
 
+/* Polls a non-blocking request to its end, and sleeps for exactly as long as
+ * pollDelay says. */
+static uint8_t poll_as_rarely_as_allowed(sim *s)
+{
+    uint8_t status;
+    unsigned polls = 0;
+
+    while ((status = mbm_master_poll(&s->master)) == MBM_PENDING) {
+        s->now += mbm_master_pollDelay(&s->master);
+        assert_true(polls++ < 1000);
+    }
+    return status;
+}
+
+static void sleeping_as_poll_delay_says_lengthens_no_timeout(void **state)
+{
+    uint64_t begin;
+    NODE;
+
+    OK(mbm_master_setBlocking(n, 0));
+    OK(mbm_master_setResponseTimeout(n, 500));
+    assert_int_equal(sim_read_one(s), MBM_PENDING);
+    assert_int_equal(poll_as_rarely_as_allowed(s), MBM_RESPONSE_TIMED_OUT);
+    sim_assert_time(s->now - s->frames[0].end, 500000);
+
+    /* Each repetition waits for the quiet time and for a reply of its own. */
+    OK(mbm_master_setRetries(n, 2));
+    begin = s->now;
+    assert_int_equal(sim_read_one(s), MBM_PENDING);
+    assert_int_equal(poll_as_rarely_as_allowed(s), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(s->sent, 4);
+    assert_in_range(s->now - begin, 1800000, 1800000 + 40 * s->character);
+}
+
+static void sleeping_as_poll_delay_says_lengthens_no_turnaround_delay(void **state)
+{
+    NODE;
+
+    OK(mbm_master_setBlocking(n, 0));
+    OK(mbm_master_setSlaveID(n, 0));
+    OK(mbm_master_setTurnaroundDelay(n, 200));
+    assert_int_equal(mbm_master_writeSingleRegister(n, 0, 1), MBM_PENDING);
+    assert_int_equal(poll_as_rarely_as_allowed(s), MBM_OK);
+    sim_assert_time(s->now - s->frames[0].end, 200000);
+}
+
+static void sleeping_as_poll_delay_says_lengthens_no_hold_of_a_reply(void **state)
+{
+    NODE;
+
+    OK(mbm_master_setBlocking(n, 0));
+    OK(mbm_master_setResponseTimeout(n, 500));
+    assert_int_equal(sim_read_one(s), MBM_PENDING);
+    assert_int_equal(poll_as_rarely_as_allowed(s), MBM_RESPONSE_TIMED_OUT);
+    sim_answer(s, 1, 500, "11 03 02 00 2A +");
+    assert_int_equal(sim_read_one(s), MBM_PENDING);
+    while (s->sent < 2 || s->now < s->frames[1].end + 2000) {
+        assert_int_equal(mbm_master_poll(n), MBM_PENDING);
+        s->now += s->idle_step;
+    }
+    OK(poll_as_rarely_as_allowed(s));
+    assert_in_range(s->now - s->last_byte, 100000, 100100);
+}
+
+/* Longer than the clock counts would be no gap at all. */
+static void the_longest_gap_is_2_to_the_31_microseconds(void **state)
+{
+    static const uint32_t gaps[] = {0x80000000, 0x80000001, 0xFFFF0000, 0xFFFFFFFE, 0xFFFFFFFF};
+    unsigned i;
+    NODE;
+
+    s->limit = UINT64_MAX;
+    OK(mbm_master_setBlocking(n, 0));
+    for (i = 0; i < COUNT(gaps); i++) {
+        uint64_t begin = s->now;
+
+        OK(mbm_master_setGap(n, gaps[i]));
+        OK(mbm_master_lineUsed(n));
+        assert_int_equal(sim_read_one(s), MBM_PENDING);
+        while (s->now < begin + 0x7FFF0000) {
+            assert_int_equal(mbm_master_poll(n), MBM_PENDING);
+            assert_int_equal(s->sent, i);
+            s->now += 1000000;
+        }
+        while (s->sent == i) {
+            assert_int_equal(mbm_master_poll(n), MBM_PENDING);
+            s->now += 1000;
+            assert_true(s->now < begin + 0x80100000);
+        }
+        OK(mbm_master_cancel(n));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -278,6 +373,10 @@ int main(void)
         SIM_TEST(a_request_that_takes_longer_than_the_reply_may_is_sent),
         SIM_TEST(a_port_that_takes_a_byte_now_and_then_is_not_busy),
         SIM_TEST(a_gap_longer_than_the_timeout_is_waited_for),
+        SIM_TEST(sleeping_as_poll_delay_says_lengthens_no_timeout),
+        SIM_TEST(sleeping_as_poll_delay_says_lengthens_no_turnaround_delay),
+        SIM_TEST(sleeping_as_poll_delay_says_lengthens_no_hold_of_a_reply),
+        SIM_TEST(the_longest_gap_is_2_to_the_31_microseconds),
     };
 
     return cmocka_run_group_tests_name("contract: waits", tests, NULL, NULL);

@@ -147,11 +147,9 @@ static void the_first_bytes_tell_how_long_a_frame_is(void **state)
     for (f = 0; f < COUNT(framings); f++) {
         for (i = 0; i < example_count; i++) {
             uint8_t side = example_side(&examples[i]), last = MBM_LENGTH_UNKNOWN;
-            /* A device that counts its id only hides the rest, but not in TCP. */
-            int hidden = examples[i].packet.byteCount && f != 2;
 
             length = framed(i, &framings[f], pdu, &packet, frame);
-            for (have = 0; have <= length && !hidden; have++) {
+            for (have = 0; have <= length; have++) {
                 OK(mbm_frame_expectedLength(&framings[f], side, frame, have, &expected));
                 last = expected.kind;
                 if (last == MBM_LENGTH_EXACT)
@@ -162,7 +160,7 @@ static void the_first_bytes_tell_how_long_a_frame_is(void **state)
                     assert_int_equal(expected.bytes, 0);
             }
             /* TCP has a length, ASCII an end. */
-            if (!hidden && (&framings[f] == tcp || &framings[f] == ascii))
+            if (&framings[f] == tcp || &framings[f] == ascii)
                 assert_int_equal(last, MBM_LENGTH_EXACT);
         }
     }
@@ -203,18 +201,95 @@ static void bytes_look_like_tcp_with_or_without_unknown_functions(void **state)
         assert_int_equal(length, 12);
     }
     for (function = 0; function < 256; function++) {
+        uint8_t fits = 0, any = 0;
+
         frame[7] = (uint8_t)function;
-        known += mbm_frame_looksLikeTcp(frame, 8, 0, &length) == MBM_OK;
-        IS(function & 0x7F ? MBM_OK : MBM_MALFORMED_FRAME,
-           mbm_frame_looksLikeTcp(frame, 8, 1, &length));
+        for (frame[5] = 2; frame[5] < 255; frame[5]++) {
+            fits |= mbm_frame_looksLikeTcp(frame, 8, 0, &length) == MBM_OK;
+            any |= mbm_frame_looksLikeTcp(frame, 8, 1, &length) == MBM_OK;
+        }
+        known += fits;
+        assert_int_equal(any, (function & 0x7F) != 0);
     }
     /* 19 of the standard and 19 left to users, and their exceptions. */
     assert_int_equal(known, 2 * (19 + 19));
+    frame[5] = 6;
     frame[7] = 3;
     frame[3] = 1;
     IS(MBM_MALFORMED_FRAME, mbm_frame_looksLikeTcp(frame, 4, 1, &length));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_looksLikeTcp(NULL, 8, 1, &length));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_looksLikeTcp(frame, 8, 1, NULL));
+}
+
+/* Whether a header with this length and these bytes after it look like TCP. */
+static int looks(uint8_t length, const char *pdu)
+{
+    uint8_t frame[64] = {0, 1, 0, 0, 0, length, 0x11};
+    uint16_t total = 0, have = (uint16_t)(7 + hex_bytes(frame + 7, pdu));
+    uint8_t status = mbm_frame_looksLikeTcp(frame, have, 1, &total);
+
+    if (status == MBM_OK)
+        assert_int_equal(total, 6 + length);
+    else
+        IS(MBM_MALFORMED_FRAME, status);
+    return status == MBM_OK;
+}
+
+static void a_header_whose_length_the_function_has_not_does_not_look_like_tcp(void **state)
+{
+    unsigned length;
+
+    (void)state;
+    /* A request has 5 bytes, a response as many as it counts, at least 2. */
+    assert_false(looks(2, "01"));
+    assert_true(looks(3, "01"));
+    assert_true(looks(6, "01 0000 0001"));
+    assert_false(looks(7, "01 0000 0001"));
+    assert_true(looks(7, "01 04 0000"));
+    assert_false(looks(8, "01 04 0000"));
+    /* As much as has arrived is judged; what comes after the frame is not. */
+    assert_true(looks(7, "01 04 0000 0000 0005"));
+    assert_false(looks(4, "01 04 00"));
+    /* Fixed lengths. */
+    assert_true(looks(2, "07"));
+    assert_true(looks(3, "07 2A"));
+    assert_false(looks(4, "07 2A 00"));
+    assert_true(looks(8, "16"));
+    assert_false(looks(7, "16"));
+    for (length = 2; length < 255; length++) {
+        /* An exception has 2 bytes, whatever its function. */
+        assert_int_equal(looks((uint8_t)length, "81"), length == 3);
+        assert_int_equal(looks((uint8_t)length, "D5 01"), length == 3);
+        /* Of what no length is known, any will do. */
+        assert_true(looks((uint8_t)length, "55"));
+        assert_int_equal(looks((uint8_t)length, "08 0000"), length >= 4);
+        assert_int_equal(looks((uint8_t)length, "2B 0D"), length >= 3);
+        /* A device may count its id alone. A request has one byte. */
+        assert_int_equal(looks((uint8_t)length, "11 02"), length == 2 || length >= 5);
+    }
+}
+
+static void a_server_id_is_as_long_as_its_check_says(void **state)
+{
+    static const char whole[] = "10 11 02 01FF 00EF", more[] = "10 11 02 0102 00 0102 0000";
+    uint8_t bytes[16];
+    mbm_length expected;
+    uint16_t have, length = hex_bytes(bytes, whole);
+    mbm_packet packet;
+
+    (void)state;
+    OK(mbm_frame_parse(rtu, MBM_PACKET_RESPONSE, bytes, length, &packet));
+    for (have = 3; have <= length; have++) {
+        OK(mbm_frame_expectedLength(rtu, MBM_PACKET_RESPONSE, bytes, have, &expected));
+        assert_int_equal(expected.kind, have < 7 ? MBM_LENGTH_AT_LEAST : MBM_LENGTH_EXACT);
+        assert_int_equal(expected.bytes, 7);
+    }
+    /* Where it counts the id alone, the end of the frame must tell. */
+    length = hex_bytes(bytes, more);
+    OK(mbm_frame_expectedLength(rtu, MBM_PACKET_RESPONSE, bytes, length, &expected));
+    assert_int_equal(expected.kind, MBM_LENGTH_SILENCE);
+    OK(mbm_frame_expectedLength(&framings[3], MBM_PACKET_RESPONSE, bytes, length, &expected));
+    assert_int_equal(expected.kind, MBM_LENGTH_UNKNOWN);
 }
 
 static void a_refused_request_is_answered_with_its_exception(void **state)
@@ -339,6 +414,8 @@ int main(void)
         cmocka_unit_test(the_first_bytes_tell_how_long_a_frame_is),
         cmocka_unit_test(a_request_tells_how_long_its_reply_frame_is),
         cmocka_unit_test(bytes_look_like_tcp_with_or_without_unknown_functions),
+        cmocka_unit_test(a_header_whose_length_the_function_has_not_does_not_look_like_tcp),
+        cmocka_unit_test(a_server_id_is_as_long_as_its_check_says),
         cmocka_unit_test(a_refused_request_is_answered_with_its_exception),
         cmocka_unit_test(nobody_answers_a_broadcast_or_a_frame_that_is_none),
         cmocka_unit_test(checksums_are_those_of_the_guide),

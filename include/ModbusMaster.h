@@ -217,10 +217,10 @@ public:
     /** @copydoc send(int) */
     uint8_t send(unsigned int value)
     {
-        return sizeof value > 2 ? sendWords(value) : sendWord(static_cast<uint16_t>(value));
+        return sizeof value > 2 ? sendWords(value) : sendWord(value & 0xFFFFu);
     }
     /** @copydoc send(int) */
-    uint8_t send(unsigned long value) { return sendWords(static_cast<uint32_t>(value)); }
+    uint8_t send(unsigned long value) { return sendWords(value & 0xFFFFFFFFu); }
     /** @copydoc send(int) */
     uint8_t send(long value) { return sendWords(static_cast<uint32_t>(value)); }
 
@@ -466,16 +466,16 @@ private:
     static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)
     {
         Stream &stream = *of(context).stream;
-        uint8_t *next = bytes;
-        for (; capacity > 0 && stream.available() > 0; capacity--)
-            *next++ = static_cast<uint8_t>(stream.read());
-        return static_cast<int16_t>(next - bytes);
+        uint16_t room = capacity;
+        for (; room > 0 && stream.available() > 0; room--)
+            *bytes++ = static_cast<uint8_t>(stream.read());
+        return static_cast<int16_t>(capacity - room);
     }
     static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
     {
         return static_cast<int16_t>(of(context).stream->write(bytes, length));
     }
-    static uint32_t clockHook(void *) { return static_cast<uint32_t>(micros()); }
+    static uint32_t clockHook(void *) { return micros() & 0xFFFFFFFFu; }
     static uint8_t flushHook(void *context)
     {
         of(context).stream->flush();

@@ -126,7 +126,7 @@ public:
     /** As above; NAN past the end of the buffer. */
     float getResponseFloat(uint8_t index, WordOrder order = orderDefault) const
     {
-        float value = static_cast<float>(NAN);
+        float value = NAN;
         getResponseFloat(index, value, order);
         return value;
     }
@@ -139,7 +139,8 @@ public:
     /** As above; NAN past the end of the buffer. */
     double getResponseDouble(uint8_t index, WordOrder order = orderDefault) const
     {
-        double value = static_cast<double>(NAN);
+        const float none = NAN;
+        double value = static_cast<double>(none);
         getResponseDouble(index, value, order);
         return value;
     }

@@ -327,12 +327,12 @@ private:
     static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)
     {
         Stream &stream = *of(context).stream;
-        uint8_t *next = bytes;
-        for (; capacity > 0 && stream.available() > 0; capacity--)
-            *next++ = static_cast<uint8_t>(stream.read());
-        if (next != bytes)
+        uint16_t room = capacity;
+        for (; room > 0 && stream.available() > 0; room--)
+            *bytes++ = static_cast<uint8_t>(stream.read());
+        if (room != capacity)
             of(context).heard = clockHook(context);
-        return static_cast<int16_t>(next - bytes);
+        return static_cast<int16_t>(capacity - room);
     }
     static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
     {
@@ -348,7 +348,7 @@ private:
         }
         return static_cast<int16_t>(state.stream->write(bytes, length));
     }
-    static uint32_t clockHook(void *) { return static_cast<uint32_t>(micros()); }
+    static uint32_t clockHook(void *) { return micros() & 0xFFFFFFFFu; }
     static uint8_t flushHook(void *context)
     {
         of(context).stream->flush();

@@ -681,7 +681,7 @@ typedef struct mbm_client {
     /**
      * Not for you.
      */
-    uint32_t words[18];
+    uint32_t words[20];
 } mbm_client;
 
 /**
@@ -695,8 +695,9 @@ typedef struct mbm_client {
  */
 typedef struct mbm_clientRequest {
     /**
-     * Optional: called by mbm_client_poll when the request has ended. It may
-     * queue requests, this one too, and cancel others.
+     * Optional: called by mbm_client_poll when the request has ended, but not for one
+     * that mbm_client_cancel gave up. It may queue requests, this one too, and cancel
+     * others.
      */
     void (*done)(void *context, struct mbm_clientRequest *request);
     /**
@@ -716,13 +717,14 @@ typedef struct mbm_clientRequest {
      */
     uint16_t replyBytes;
     /**
-     * A number of yours. On TCP no two pending requests may have the same one,
-     * but for 0.
+     * A number of yours, which stays as you set it. In TCP frames no two pending
+     * requests may have the same one, except 0. It is not the transaction identifier
+     * on the wire: mbm_client_wireTransaction returns that.
      */
     uint16_t transaction;
     /**
-     * Whom it is for: 1 to 247 on a serial line, 0 is everybody there; 1 to 255
-     * on TCP.
+     * Whom it is for. On a serial line 1 to 247; 0 is broadcast; 248 to 255, which the
+     * standard reserves, are sent as they are. On TCP 1 to 255.
      */
     uint8_t unit;
     /**
@@ -746,7 +748,7 @@ typedef struct mbm_clientRequest {
 /**
  * What the firmware supplies: a byte stream, a clock, and optional hooks.
  *
- * Copied by mbm_master_begin; only `context` must stay valid. Hooks that are
+ * Copied by the begin functions; only `context` must stay valid. Hooks that are
  * NULL are not called; `read`, `write` and `micros` must be there.
  *
  * A function that a hook calls on the object that called the hook returns
@@ -834,7 +836,7 @@ typedef struct mbm_master {
     /**
      * Not for you.
      */
-    uint32_t words[18];
+    uint32_t words[20];
 } mbm_master;
 
 /**
@@ -923,7 +925,7 @@ typedef struct mbm_clientUnit {
     uint32_t retries;
     /**
      * Set by you: rest for this unit from the end of a request to the next, in
-     * microseconds.
+     * microseconds; more than 2^31 (36 minutes) means 2^31.
      */
     uint32_t delay;
     /**
@@ -1376,8 +1378,9 @@ typedef struct mbm_unit {
      */
     struct mbm_diagnostics *diagnostics;
     /**
-     * The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers to every id. A
-     * unit that serves nothing is silent, as if it were not there.
+     * The unit id, 1 to 247 (serial line guide V1.02, 2.2); 248 to 255, which the
+     * standard reserves, are taken as they are. 0 answers to every id. A unit that
+     * serves nothing is silent, as if it were not there.
      */
     uint8_t id;
 } mbm_unit;
@@ -2043,6 +2046,16 @@ uint8_t mbm_client_pending(const struct mbm_client *client);
 uint8_t mbm_client_cancel(struct mbm_client *client, struct mbm_clientRequest *request);
 
 /**
+ * The transaction identifier on the wire: that of the TCP frame in which the request
+ * was sent last. The client chooses it, another one for each frame, also for a retry.
+ *
+ * @param request  a request, pending or ended
+ * @return the identifier; 0 in other framings, for a request that was never sent, and
+ *         for NULL. 0 is also an identifier
+ */
+uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
+
+/**
  * Makes an object a client of a serial line, in RTU frames (serial line guide
  * V1.02, 2.5.1).
  *
@@ -2156,9 +2169,14 @@ uint8_t mbm_client_reconnect(struct mbm_client *client, const struct mbm_link *l
 /**
  * Whether the link is not known to be lost.
  *
+ * If `connect` of mbm_client_reconnect returned MBM_PENDING, this is 0 until a reply
+ * arrives. Do not reconnect again before the connection had its time: the port knows
+ * better whether it is still being made, for example mbm_tcp_isConnected.
+ *
  * @param client  the object
- * @return 0 from a request that ended with MBM_LINK_LOST on, until one succeeds
- *         or mbm_client_reconnect is called; 1 else
+ * @return 0 from a request that ended with MBM_LINK_LOST on, until a reply arrives
+ *         (an exception is one) or mbm_client_reconnect returns MBM_OK; 1 otherwise,
+ *         and also before the first request
  */
 uint8_t mbm_client_isConnected(const struct mbm_client *client);
 
@@ -2409,11 +2427,13 @@ uint8_t mbm_client_readExceptionStatus(struct mbm_client *client,
 
 /**
  * Function 08: sends the words of `data`, and reads as many into `reply` (V1.1b3,
- * 6.8). Nobody responds to sub-function 04, Force Listen Only Mode.
+ * 6.8). No device responds to sub-function 04, Force Listen Only Mode.
  *
  * @param client   the object
  * @param request  the request
- * @param subFunction  0 (Return Query Data) to 0x14
+ * @param subFunction  0 (Return Query Data) to 0x14. Others, which the standard
+ *                     reserves, are sent as they are, and a response of one word is
+ *                     expected; for one of another length see mbm_client_custom
  * @param words  1; 1 to 125 for sub-function 0
  * @return a status; see mbm_client_readCoils
  */
@@ -2446,8 +2466,9 @@ uint8_t mbm_client_getCommEventLog(struct mbm_client *client,
 
 /**
  * Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13). `reply`
- * gets what stands behind the byte count; on TCP also what a device sends that counts
- * the id alone. On a serial line the count must be true.
+ * gets all that follows the byte count, also from a device that counts its id alone
+ * and sends more. In RTU frames the silence after it ends such a reply; one that
+ * counts right is not waited for.
  *
  * @param client   the object
  * @param request  the request
@@ -2576,8 +2597,39 @@ uint8_t mbm_client_custom(struct mbm_client *client,
                           const struct mbm_rule *response);
 
 /**
- * Sets how long a response may take, from the end of the request on a serial
- * line, from its being handed to the port on TCP.
+ * Any request, as it arrived from another client: sends `function` and the bytes of
+ * `body`, and reads into `reply` all bytes that follow the function code of the
+ * response, as on the wire. This is what a gateway needs: `body` and `reply` are
+ * what the functions of mbm_server_serveCustom get and return.
+ *
+ * A response counts only if it answers this request, as in the functions above: its
+ * length, byte count, echoed address, value, quantity and records must be right. Of a
+ * function that the standard does not define, and of sub-functions of 08 from 0x15 on,
+ * silence ends the response on RTU. If you know its length, use mbm_client_custom.
+ *
+ * 08 with sub-function 04 gets no response: it ends with MBM_OK and `length` 0 after
+ * the turnaround delay.
+ *
+ * @param client    the object
+ * @param request   the request; if it is queued, its `data` then points into `body`
+ * @param function  1 to 127
+ * @param body      the bytes after the function code; leave them alone until the
+ *                  request has ended; may be NULL if there are none
+ * @param bytes     0 to 252
+ * @return a status; see mbm_client_readCoils. MBM_ILLEGAL_DATA_VALUE also for a body
+ *         whose length or counts are wrong, MBM_ILLEGAL_FUNCTION for function 0 or
+ *         one above 127: what a server answers to such a request
+ */
+uint8_t mbm_client_forward(struct mbm_client *client,
+                           struct mbm_clientRequest *request,
+                           uint8_t function,
+                           const uint8_t *body,
+                           uint16_t bytes);
+
+/**
+ * Sets how long a response may take. The time begins with the end of the request on a
+ * serial line and in RTU over TCP; in TCP frames when mbm_client_poll puts the request
+ * into the outgoing buffer, also if the port takes it later.
  *
  * @param client        the object
  * @param milliseconds  0 to 65535; 2000 at first
@@ -2601,7 +2653,8 @@ uint8_t mbm_client_setBaudRate(struct mbm_client *client, uint32_t baud);
  * mbm_client_setBaudRate sets it back. Without effect on TCP.
  *
  * @param client        the object
- * @param microseconds  counted from the last byte seen or sent
+ * @param microseconds  counted from the last byte seen or sent; more than 2^31
+ *                      (36 minutes) means 2^31
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setGap(struct mbm_client *client, uint32_t microseconds);
@@ -2617,11 +2670,12 @@ uint8_t mbm_client_setGap(struct mbm_client *client, uint32_t microseconds);
 uint8_t mbm_client_setTurnaroundDelay(struct mbm_client *client, uint16_t milliseconds);
 
 /**
- * Sets how long a serial line is left alone after a request that got no right
- * reply; see mbm_master_setQuietTime.
+ * Sets the quiet time of a serial line, which keeps a late reply from being taken
+ * for the answer to a later request; see mbm_master_setQuietTime. Without effect on
+ * TCP, where responses have a number.
  *
  * @param client        the object
- * @param milliseconds  0 to 65535; 100 at first
+ * @param milliseconds  0 to 65535; 100 at first; 0 holds no reply
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setQuietTime(struct mbm_client *client, uint16_t milliseconds);
@@ -2649,8 +2703,9 @@ uint8_t mbm_client_setPostFlushHold(struct mbm_client *client, uint8_t character
 
 /**
  * Sets how often a request is repeated whose response is missing, damaged or
- * malformed. Exceptions are responses and are not repeated, nor is what a lost link
- * interrupted.
+ * malformed, or that the port did not take. Exceptions are responses and are not
+ * repeated, nor are requests that a lost link interrupted, nor those whose response is
+ * too long for a buffer.
  *
  * @param client   the object
  * @param retries  0 to 255; 0 at first
@@ -2679,8 +2734,9 @@ uint8_t mbm_client_setBackoff(struct mbm_client *client,
  *
  * @param client   the object
  * @param percent  0 (at first) to 100: how much of the wait may be taken off
- * @param random   gives any number, another each time; what it calls on the client
- *                 returns MBM_BUSY
+ * @param random   returns another number each time, for example rand(): one of 32
+ *                 bits, of 15 bits, or whose upper bits alone vary. What it
+ *                 calls on the client returns MBM_BUSY
  * @param context  handed to `random`
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
@@ -2691,8 +2747,9 @@ uint8_t mbm_client_setJitter(struct mbm_client *client,
 
 /**
  * Counts into storage of yours from now on. Read and zero it as you like, but not
- * from an interrupt. On TCP, foreign frames are those with an id that nobody waits
- * for, and resynchronisations are bytes that were no frame.
+ * from an interrupt. In TCP frames, a foreign frame is one whose transaction identifier
+ * and unit no pending request has; a resynchronisation is a run of bytes that were no
+ * frame.
  *
  * @param client    the object
  * @param counters  zeroed by you; NULL stops counting
@@ -2790,6 +2847,11 @@ uint8_t mbm_frame_exception(const struct mbm_framing *framing,
 /**
  * How long the frame is that begins with these bytes.
  *
+ * A response to function 11 may be longer than it counts: some devices count the id
+ * alone. In RTU frames it is MBM_LENGTH_EXACT once a right CRC stands where the count
+ * says, MBM_LENGTH_AT_LEAST before, and if the CRC is wrong there MBM_LENGTH_SILENCE,
+ * or MBM_LENGTH_UNKNOWN in a stream.
+ *
  * Any thread or interrupt may call it. For ASCII it takes 260 bytes of stack.
  *
  * @param framing   how frames look
@@ -2828,7 +2890,8 @@ uint8_t mbm_frame_replyLength(const struct mbm_framing *framing,
 
 /**
  * Says whether bytes look like a Modbus TCP frame, request or response, and how
- * long that is. The first eight tell.
+ * long that is. Eight are needed. The length in the header must be one that a
+ * request or a response of this function may have, as far as the bytes tell.
  *
  * Any thread or interrupt may call it.
  *
@@ -2927,7 +2990,8 @@ uint8_t mbm_master_poll(struct mbm_master *master);
 
 /**
  * How long mbm_master_poll will find nothing to do unless a byte arrives, so
- * that a program or an idle hook may sleep until then.
+ * that a program or an idle hook may sleep until then. A wait that has just begun
+ * counts from this call, so sleeping lengthens no timeout.
  *
  * @param master  the object
  * @return microseconds; 0 means poll now, and is returned within a hook of the port
@@ -2948,7 +3012,8 @@ uint8_t mbm_master_cancel(struct mbm_master *master);
  * The status of the last request.
  *
  * @param master  the object
- * @return MBM_PENDING while it is under way, MBM_OK if there was none
+ * @return MBM_PENDING while it is under way, MBM_OK if there was none;
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_status(const struct mbm_master *master);
 
@@ -2967,11 +3032,12 @@ uint8_t mbm_master_getExceptionCode(const struct mbm_master *master);
  *
  * This and the nine other functions behave alike. In blocking mode they return
  * when the request has ended, in non-blocking mode at once with MBM_PENDING, and
- * mbm_master_poll ends it. Whatever the outcome, they empty the queue of send
- * and set receive back to the first word. Response words change only on
- * success, transmit words never. What no device could accept (a quantity that
- * the standard forbids, addresses beyond 65535) is answered with the exception
- * that a device would send, and nothing is sent.
+ * mbm_master_poll ends it. They empty the queue of send and set receive back to the
+ * first word, unless they return MBM_BUSY, MBM_NOT_INITIALISED or
+ * MBM_INVALID_ARGUMENT. Response words change only on success. Transmit words stay;
+ * only 06 and 16 store their arguments in them. A request that no device could accept
+ * (a quantity that the standard forbids, addresses beyond 65535) is not sent: the
+ * status is the exception that a device would answer.
  *
  * @param master    the object
  * @param address   first coil, 0 to 65535, as on the wire
@@ -3146,7 +3212,8 @@ uint8_t mbm_master_readWriteQueuedRegisters(struct mbm_master *master,
  * @param address   first register, 0 to 65535
  * @param quantity  1 to 125
  * @return how many words mbm_master_receive will give; 0 if the request failed
- *         (mbm_master_status says how) or, non-blocking, is under way
+ *         (mbm_master_status says how), another one is under way or, in non-blocking
+ *         mode, this one is
  */
 uint8_t mbm_master_requestFrom(struct mbm_master *master,
                                uint16_t address,
@@ -3197,7 +3264,8 @@ uint8_t mbm_master_setBaudRate(struct mbm_master *master, uint32_t baud);
  * A later mbm_master_setBaudRate sets it back to t3.5.
  *
  * @param master        the object
- * @param microseconds  counted from the last byte seen or sent
+ * @param microseconds  counted from the last byte seen or sent; more than 2^31
+ *                      (36 minutes) means 2^31
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_setGap(struct mbm_master *master, uint32_t microseconds);
@@ -3213,17 +3281,22 @@ uint8_t mbm_master_setGap(struct mbm_master *master, uint32_t microseconds);
 uint8_t mbm_master_setTurnaroundDelay(struct mbm_master *master, uint16_t milliseconds);
 
 /**
- * Sets how long the line is left alone after a request that got no right
- * reply, so that a late one is not taken for the next. What arrives meanwhile
- * is dropped.
+ * Sets the quiet time, which keeps a late reply from being taken for the answer
+ * to a later request. RTU itself cannot tell them apart if unit, function and
+ * length are the same, or if the late reply is an exception to the same function.
  *
- * RTU cannot tell a late reply of the same unit, function and length, nor a
- * late exception to the same function, from the one that is waited for; this
- * time is what makes that rare. A slave that may answer after the response
- * timeout plus this time needs a longer timeout.
+ * After a request without a right reply, two things happen. The line is left alone
+ * for this time before the next request, and bytes that arrive are dropped. Then the
+ * next reply of that unit is held until nothing has arrived for this time. A second
+ * reply takes the place of the held one, for a device answers in order; if the
+ * second one is damaged, the request fails. So a request after a failure takes one
+ * quiet time longer, all others take no longer.
+ *
+ * The time must be longer than the device takes for an answer. If it is shorter, the
+ * second reply may come after the held one was taken for the answer.
  *
  * @param master        the object
- * @param milliseconds  0 to 65535; 100 at first
+ * @param milliseconds  0 to 65535; 100 at first; 0 holds no reply
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_setQuietTime(struct mbm_master *master, uint16_t milliseconds);
@@ -3483,6 +3556,10 @@ uint8_t mbm_packet_parse(uint8_t kind,
 
 /**
  * How long the PDU is that begins with these bytes.
+ *
+ * A response to function 11 is as long as it counts. Some devices count the id alone:
+ * mbm_packet_parse takes their longer PDU too. mbm_frame_expectedLength tells these
+ * apart, by the frame's check.
  *
  * Any thread or interrupt may call it.
  *
@@ -4287,7 +4364,8 @@ uint8_t mbm_server_beginRtuOverTcp(struct mbm_server *server,
 
 /**
  * Sets the silence that ends a frame: t3.5 of RTU, the time between two
- * characters of ASCII. mbm_server_begin and its sisters set it back.
+ * characters of ASCII, and in RTU over TCP the silence after a damaged frame. Without
+ * effect in TCP frames. mbm_server_begin and its sisters set it back.
  *
  * @param server        the object
  * @param microseconds  counted from the last byte seen
@@ -4369,7 +4447,8 @@ uint8_t mbm_server_switchOff(struct mbm_unit *unit,
 uint8_t mbm_server_switchOn(struct mbm_switches *switches, uint8_t code);
 
 /**
- * Serves diagnostics: functions 08 with every sub-function, 0B and 0C. From now
+ * Serves diagnostics: functions 08, 0B and 0C. Of 08 it serves the sub-functions that
+ * the standard defines, 00 to 04, 0A to 12 and 14; others are exception 01. From now
  * on the unit counts what its lines bring, logs events, and can be forced into
  * listen only mode.
  *

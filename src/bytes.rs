@@ -1,6 +1,16 @@
 //! Bounds-checked big-endian reading and writing. Nothing here can panic.
 
 use crate::error::Status;
+use core::cell::Cell;
+
+/// Moves the bytes from `from` on to the front of `bytes`.
+#[cfg_attr(target_os = "none", inline(never))]
+pub fn move_to_front(bytes: &mut [u8], from: usize) {
+    let cells = Cell::from_mut(bytes).as_slice_of_cells();
+    for (to, from) in cells.iter().zip(cells.get(from..).unwrap_or_default()) {
+        to.set(from.get());
+    }
+}
 
 /// Reads from the front of a byte slice.
 #[derive(Clone, Copy)]

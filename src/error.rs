@@ -3,7 +3,7 @@
 /// The outcome of a call: success, the exception code that the remote device
 /// sent, or what went wrong on the way.
 #[repr(transparent)]
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Status(u8);
 
 impl Status {

@@ -56,5 +56,10 @@ pub mod server;
 #[allow(unsafe_code)]
 pub mod capi;
 
-/// Hosts have room for a second, shorter way to do what is done most.
-const FAST: bool = !cfg!(target_os = "none");
+/// True where the code for firmware runs, which is shorter and slower. Everywhere
+/// else, this is false: hosts have room for a second way to do what is done most.
+///
+/// Every branch on the target reads this constant, or has the same condition as a
+/// `cfg` attribute. `--cfg mbm_firmware` selects the code for firmware on a host,
+/// so that tests run it there.
+const FIRMWARE: bool = cfg!(any(target_os = "none", mbm_firmware));

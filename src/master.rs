@@ -5,7 +5,6 @@ use crate::error::Status;
 use crate::pdu::query::Query;
 use crate::pdu::{bits, registers};
 use crate::port::Port;
-use crate::time;
 use crate::transaction::{Settings, Storage, Transaction};
 
 /// What is read where there is no word.
@@ -16,6 +15,7 @@ pub type Build = fn(&mut Query, u16, u16) -> Status;
 
 /// A master on a serial line, with the port and the buffers it was given.
 // Small fields first: see `Transaction`.
+#[derive(Clone, Hash, Debug)]
 #[repr(C)]
 pub struct Master<P, S> {
     response_words: u8,
@@ -70,10 +70,13 @@ impl<P, S> Master<P, S> {
 
     /// Derives gap, silence and character time from the baud rate.
     pub fn set_baud_rate(&mut self, baud: u32) {
-        let settings = self.settings();
-        settings.silence = time::silence(baud);
-        settings.gap = settings.silence;
-        settings.character = time::character(baud);
+        self.settings().set_baud_rate(baud);
+    }
+
+    /// See [`Transaction::rebase`].
+    #[doc(hidden)]
+    pub fn rebase(&mut self, now: u32, longest: u32) {
+        self.transaction.rebase(now, longest);
     }
 
     /// The status of the last request; [`Status::PENDING`] while it is under way.

@@ -7,8 +7,9 @@
 /// a counter read beside its interrupt: in microseconds.
 const STEP_BACK: u32 = 0x1_0000;
 
-/// The longest time that may be waited for.
-pub const LONGEST: u32 = u32::MAX - STEP_BACK;
+/// The longest time that is waited for, about 36 minutes. Two such times and the
+/// step back are less than the clock's 2^32.
+pub const LONGEST: u32 = 1 << 31;
 
 /// 3.5 characters at 9600 baud, rounded up: the silence kept while nobody has
 /// told the baud rate.
@@ -37,6 +38,15 @@ pub const fn elapsed(now: u32, since: u32) -> u32 {
 #[inline(always)]
 pub const fn has_elapsed(time: u32, now: u32, since: u32) -> bool {
     now.wrapping_sub(since).wrapping_add(STEP_BACK) >= time.wrapping_add(STEP_BACK)
+}
+
+/// A duration that the caller chose, as it is waited for: at most [`LONGEST`].
+pub const fn clamped(microseconds: u32) -> u32 {
+    if microseconds > LONGEST {
+        LONGEST
+    } else {
+        microseconds
+    }
 }
 
 /// Milliseconds as microseconds.
@@ -125,6 +135,16 @@ mod tests {
     #[test]
     fn elapsed_survives_the_wrap() {
         assert_eq!(elapsed(5, u32::MAX - 4), 10);
+    }
+
+    #[test]
+    fn the_longest_time_elapses_though_the_clock_steps_back_a_little() {
+        assert_eq!(clamped(u32::MAX), LONGEST);
+        assert_eq!(clamped(LONGEST - 1), LONGEST - 1);
+        let twice = LONGEST.wrapping_add(millis(u16::MAX));
+        assert!(!has_elapsed(twice, twice - 1, 0));
+        assert!(has_elapsed(twice, twice, 0));
+        assert!(!has_elapsed(twice, 1_000, 2_000));
     }
 
     #[test]

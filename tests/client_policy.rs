@@ -85,7 +85,7 @@ fn a_serial_line_waits_as_well() {
 #[test]
 fn jitter_takes_off_a_part_of_the_wait() {
     let lent = Lent {
-        random: 0x8000,
+        random: 1 << 31,
         ..Lent::default()
     };
     let (end, mut client) = tcp(lent);

@@ -315,3 +315,37 @@ fn a_reply_too_long_for_the_job_is_told_and_not_cut() {
     assert_eq!(task.ticket.status, Status::BUFFER_TOO_SMALL);
     assert_eq!((task.ticket.length, task.reply[0]), (0, 0xEE));
 }
+
+/// A device that answers in order, but later than the timeout: its late reply
+/// looks like the answer to the next request.
+fn a_late_reply_is_passed_over<W: Search>(encode: fn(u8, &[u8]) -> Vec<u8>) {
+    let (end, mut client) = client::<W>();
+    client.line.transaction().settings.response_timeout = 500_000;
+    let reply = |value: u8| encode(17, &[3, 2, 0, value]);
+    assert!(client.queue(read(17, 1)).is_ok());
+    assert_eq!(
+        run(&end, &mut client).ticket.status,
+        Status::RESPONSE_TIMED_OUT
+    );
+    for value in 1..5 {
+        assert!(client.queue(read(17, 1)).is_ok());
+        sent(&end, &mut client);
+        if value == 1 {
+            end.deliver(150_000, &reply(0));
+        }
+        end.deliver(30_000, &reply(value));
+        let task = run(&end, &mut client);
+        assert_eq!(task.ticket.status, Status::OK);
+        assert_eq!(task.received(), [0, value]);
+    }
+}
+
+#[test]
+fn a_late_reply_in_rtu_frames_is_not_the_answer_to_a_later_request() {
+    a_late_reply_is_passed_over::<rtu::Window>(frame);
+}
+
+#[test]
+fn a_late_reply_in_ascii_frames_is_not_the_answer_to_a_later_request() {
+    a_late_reply_is_passed_over::<ascii_window::Window>(characters);
+}

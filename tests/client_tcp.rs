@@ -185,6 +185,44 @@ fn two_pending_requests_do_not_share_a_number() {
     assert_eq!(requests(&end.sent()).len(), 3);
 }
 
+/// The transaction identifier on the wire has 16 bits, and a client that runs for days
+/// uses each of them again.
+#[test]
+fn a_number_on_the_wire_is_not_used_again_while_its_request_is_pending() {
+    for others in [1, 15] {
+        let (end, mut client) = client();
+        for number in 1..=(16 - others) {
+            assert!(client.queue(read(9, number)).is_ok());
+        }
+        assert!(poll(&end, &mut client).is_empty());
+        let pending = requests(&end.sent());
+        let mut used = std::collections::HashSet::new();
+        let mut count = 0u32;
+        while count < 65_536 + 600 {
+            for number in 0..others {
+                assert!(client.queue(read(1, 100 + number)).is_ok());
+            }
+            assert!(poll(&end, &mut client).is_empty());
+            for request in requests(&end.sent()) {
+                assert!(pending.iter().all(|held| held.0 != request.0));
+                used.insert(request.0);
+                end.deliver(0, &response(request));
+                count += 1;
+            }
+            let mut ended = Vec::new();
+            while ended.len() < usize::from(others) {
+                ended.extend(poll(&end, &mut client));
+            }
+            ended.iter().for_each(assert_right);
+        }
+        assert!(used.len() > 60_000);
+        for request in pending {
+            end.deliver(0, &response(request));
+            assert_right(&poll(&end, &mut client)[0]);
+        }
+    }
+}
+
 #[test]
 fn nothing_is_broadcast_over_tcp() {
     let (_, mut client) = client();

@@ -215,13 +215,19 @@ static void echo_of_another_address(responder *r, const uint8_t *request)
     responder_send(r, frame, seal(frame, 6));
 }
 
+static size_t exception_of(uint8_t *frame, const uint8_t *request, uint8_t code)
+{
+    frame[0] = UNIT;
+    frame[1] = request[1] | 0x80;
+    frame[2] = code;
+    return seal(frame, 3);
+}
+
 static void exception_with_bad_crc(responder *r, const uint8_t *request)
 {
-    uint8_t frame[5] = {UNIT, 0, 2};
-    size_t length;
+    uint8_t frame[5];
+    size_t length = exception_of(frame, request, 0x02);
 
-    frame[1] = request[1] | 0x80;
-    length = seal(frame, 3);
     frame[4] ^= 0x10;
     responder_send(r, frame, length);
 }
@@ -230,6 +236,36 @@ static void no_reply(responder *r, const uint8_t *request)
 {
     (void)r;
     (void)request;
+}
+
+/* The device takes until the master has given up and has sent its next request.
+ * That one waits meanwhile, and is answered after this one. */
+static void later_than_the_timeout(responder *r, const uint8_t *request)
+{
+    responder_pause_until_request(r);
+    right(r, request);
+}
+
+static void send_exception(responder *r, const uint8_t *request, uint8_t code)
+{
+    uint8_t frame[5];
+
+    responder_send(r, frame, exception_of(frame, request, code));
+}
+
+static void acknowledge(responder *r, const uint8_t *request)
+{
+    send_exception(r, request, 0x05);
+}
+
+static void device_busy(responder *r, const uint8_t *request)
+{
+    send_exception(r, request, 0x06);
+}
+
+static void no_response_of_the_target(responder *r, const uint8_t *request)
+{
+    send_exception(r, request, 0x0B);
 }
 
 static void link_dies_inside(responder *r, const uint8_t *request)
@@ -274,6 +310,14 @@ const fault faults[] = {
      "....."},
     {"echo of a write with a wrong address", echo_of_another_address, 6, 0, "F....",
      MBM_MALFORMED_REPLY, "....."},
+    {"a reply later than the timeout, from a device that answers in order", later_than_the_timeout,
+     3, 0, "F....", MBM_RESPONSE_TIMED_OUT, "....."},
+    {"the same after a write", later_than_the_timeout, 6, 0, "F....", MBM_RESPONSE_TIMED_OUT,
+     "....."},
+    {"exception 05 (acknowledge)", acknowledge, 3, 0, "F....", 0x05, "F...."},
+    {"exception 06 (device busy)", device_busy, 3, 0, "F....", 0x06, "F...."},
+    {"exception 0B (gateway target gave no response)", no_response_of_the_target, 3, 0, "F....",
+     0x0B, "F...."},
     {"exception with bad CRC", exception_with_bad_crc, 3, 0, "F....", MBM_INVALID_CRC, "....."},
     {"the link dies inside the reply", link_dies_inside, 3, 0, "F....", MBM_LINK_LOST, "F...."},
 };

@@ -30,6 +30,18 @@ void responder_pause(responder *r, unsigned milliseconds)
     usleep(milliseconds * 1000);
 }
 
+void responder_pause_until_request(responder *r)
+{
+    struct pollfd wait = {r->line.theirs, POLLIN, 0};
+    unsigned pauses = 0;
+
+    do {
+        if (pauses++ == 2000)
+            abort();
+        held_clock_pass(&r->clock, 50000);
+    } while (poll(&wait, 1, 10) == 0);
+}
+
 static void *respond(void *argument)
 {
     responder *r = (responder *)argument;

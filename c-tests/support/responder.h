@@ -30,4 +30,7 @@ void responder_stop(responder *r);
 void responder_send(responder *r, const uint8_t *bytes, size_t length);
 void responder_pause(responder *r, unsigned milliseconds);
 
+/* For scripts: lets time pass until the master has sent another request. */
+void responder_pause_until_request(responder *r);
+
 #endif

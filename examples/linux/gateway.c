@@ -1,6 +1,6 @@
 /* A gateway: Modbus TCP comes in, RTU goes out to the devices of serial lines.
  *
- *     gateway PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...
+ *     gateway [-q QUIET] PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...
  *     gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,32-40
  *
  * The unit id says which line a request is for; a device has so many milliseconds
@@ -10,7 +10,13 @@
  *
  * Where there is no response to hand on, the gateway answers itself (V1.1b3, 7):
  * 0A for a unit of no line, a line that cannot be opened, is lost, or has as many
- * requests as it holds; 0B for a device that does not respond, or only with damage.
+ * requests as it holds; 0B for a device that does not respond, or whose reply is
+ * damaged or does not answer the request; 02 and 03 for a request that the standard
+ * does not allow. Functions that it does not know pass through as they are.
+ *
+ * A device may reply after its time is over. QUIET is how long a line is left alone
+ * after a request without a right reply, so that such a reply comes before the next
+ * request. Make it longer for devices that are later than that.
  *
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
@@ -24,6 +30,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 enum {
     CONNECTIONS = 16, /* no more than a client holds requests */
@@ -64,6 +71,7 @@ static connection connections[CONNECTIONS];
 static mbm_tcp tcps[CONNECTIONS];
 static uint8_t is_used[CONNECTIONS];
 static mbm_tcp_listener listener;
+static uint16_t quiet = 100; /* milliseconds; as the client has it at first */
 static volatile sig_atomic_t is_over;
 static sigset_t awake; /* the signals that come while it works wait for its sleep */
 
@@ -165,7 +173,8 @@ static int add_line(char *text, uint16_t timeout)
         perror(text);
     if (mbm_client_beginRtu(&l->client, &port, l->frame, sizeof l->frame) != MBM_OK ||
         mbm_client_setBaudRate(&l->client, baud) != MBM_OK ||
-        mbm_client_setResponseTimeout(&l->client, timeout) != MBM_OK)
+        mbm_client_setResponseTimeout(&l->client, timeout) != MBM_OK ||
+        mbm_client_setQuietTime(&l->client, quiet) != MBM_OK)
         return -1;
     for (unit = first; unit <= last; unit++)
         route[unit] = l;
@@ -174,33 +183,11 @@ static int add_line(char *text, uint16_t timeout)
 
 /* --- requests --- */
 
-/* How long the response is; of other functions, silence tells. */
-static mbm_rule length_of(uint8_t function)
+/* True for 08 with sub-function 04, Force Listen Only Mode: no device responds to it. */
+static int is_unanswered(const mbm_request *request)
 {
-    mbm_rule rule = {0};
-
-    switch (function) {
-    case 0x01: case 0x02: case 0x03: case 0x04:
-    case 0x0C: case 0x11: case 0x14: case 0x15: case 0x17:
-        rule.kind = MBM_RULE_COUNTED;
-        rule.bytes = 1;
-        break;
-    case 0x05: case 0x06: case 0x0B: case 0x0F: case 0x10:
-        rule.kind = MBM_RULE_FIXED;
-        rule.bytes = 5;
-        break;
-    case 0x07:
-        rule.kind = MBM_RULE_FIXED;
-        rule.bytes = 2;
-        break;
-    case 0x16:
-        rule.kind = MBM_RULE_FIXED;
-        rule.bytes = 7;
-        break;
-    default:
-        break;
-    }
-    return rule;
+    return request->function == MBM_FC_DIAGNOSTICS && request->length >= 2 &&
+           request->data[0] == 0 && request->data[1] == MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY;
 }
 
 /* What became of a request that a device had. */
@@ -225,26 +212,33 @@ static uint16_t forward(void *context, const mbm_request *request, uint8_t *resp
                         uint16_t capacity)
 {
     connection *c = (connection *)context;
-    const mbm_rule rule = length_of(request->function);
     line *l = route[request->unit];
+    uint8_t status;
 
     if (c->asked) {
         if (c->request.status == MBM_PENDING)
             return MBM_REPLY_PENDING;
         c->asked = NULL;
+        if (c->request.status == MBM_OK && is_unanswered(request))
+            return MBM_REPLY_NONE;
         return outcome(c, response, capacity);
     }
     if (!l || !is_there(l))
         return PATH_UNAVAILABLE;
     memset(&c->request, 0, sizeof c->request);
     c->request.unit = request->unit;
-    /* It stays where it is until it is answered. */
-    c->request.data = request->data;
     c->request.reply = c->reply;
     c->request.replyBytes = sizeof c->reply;
-    switch (mbm_client_custom(&l->client, &c->request, request->function, request->length, &rule)) {
+    /* The request's data stay where they are until it is answered. A reply that does
+     * not answer this request, for example a late one to another client, is not taken. */
+    status = mbm_client_forward(&l->client, &c->request, request->function, request->data,
+                                request->length);
+    switch (status) {
     case MBM_PENDING: c->asked = l; return MBM_REPLY_PENDING;
     case MBM_QUEUE_FULL: return PATH_UNAVAILABLE;
+    case MBM_ILLEGAL_FUNCTION:
+    case MBM_ILLEGAL_DATA_ADDRESS:
+    case MBM_ILLEGAL_DATA_VALUE: return (uint16_t)(MBM_REPLY_EXCEPTION | status);
     default: return MBM_REPLY_EXCEPTION | MBM_SLAVE_DEVICE_FAILURE;
     }
 }
@@ -326,21 +320,56 @@ static void wait_for_work(void)
             drop_connection(i);
 }
 
+/* Reads a number of milliseconds; 0 if it is none, or too large. */
+static int read_milliseconds(const char *text, uint16_t *milliseconds)
+{
+    char *end;
+    unsigned long number = strtoul(text, &end, 10);
+
+    if (*text < '0' || *text > '9' || *end || number > UINT16_MAX)
+        return 0;
+    *milliseconds = (uint16_t)number;
+    return 1;
+}
+
+/* Takes the options, which come first; how many arguments they are, or -1. */
+static int take_options(int argc, char **argv)
+{
+    int option;
+
+    while ((option = getopt(argc, argv, "+:q:")) >= 0) {
+        switch (option) {
+        case 'q':
+            if (!read_milliseconds(optarg, &quiet))
+                return -1;
+            break;
+        default: return -1;
+        }
+    }
+    return optind - 1;
+}
+
 int main(int argc, char **argv)
 {
     struct sigaction action = {0};
     sigset_t ends;
-    char *behind = "";
-    unsigned long timeout = argc > 3 ? strtoul(argv[2], &behind, 10) : 0;
     const int is_asked = argc == 2 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0);
-    int i;
+    const int options = take_options(argc, argv);
+    uint16_t timeout = 0;
+    int i = 3;
 
-    for (i = 3; timeout > 0 && timeout <= UINT16_MAX && i < argc; i++)
-        if (add_line(argv[i], (uint16_t)timeout) != 0)
-            break;
-    if (i < 4 || i < argc || *behind) {
+    if (options > 0) {
+        argv += options;
+        argc -= options;
+    }
+    if (options >= 0 && argc > 3 && read_milliseconds(argv[2], &timeout) && timeout > 0)
+        while (i < argc && add_line(argv[i], timeout) == 0)
+            i++;
+    if (i < 4 || i < argc) {
         fprintf(is_asked ? stdout : stderr,
-                "usage: gateway PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...\n"
+                "usage: gateway [-q QUIET] PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...\n"
+                "  -q QUIET             milliseconds that a line is left alone after a request\n"
+                "                       without a right reply, 0 to 65535; 100 if not given\n"
                 "  PORT                 where it listens, 0 for one that is free\n"
                 "  MILLISECONDS         that a device has to respond, up to 65535\n"
                 "  PATH,BAUD,...        up to 4 serial lines, the parity N, E or O, 1 or 2 stop bits,\n"

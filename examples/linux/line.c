@@ -123,11 +123,14 @@ static uint8_t open_tty_again(void *context)
 /* An idle client takes no bytes, so it does not see that a server hangs up. */
 static int is_lost(line *l)
 {
-    if (!mbm_client_isConnected(&l->client))
-        return 1;
-    if (mbm_client_pending(&l->client) > 0)
+    int is_connected = mbm_client_isConnected(&l->client);
+
+    if (is_connected && mbm_client_pending(&l->client) > 0)
         return 0;
-    return l->is_tcp ? mbm_tcp_isConnected(&l->tcp) < 0 : l->tty.fd < 0;
+    /* A connection that is being made is not lost. */
+    if (l->is_tcp)
+        return mbm_tcp_isConnected(&l->tcp) < 0;
+    return !is_connected || l->tty.fd < 0;
 }
 
 void line_poll(line *l)

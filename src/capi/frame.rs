@@ -221,6 +221,11 @@ pub unsafe extern "C" fn mbm_frame_exception(
 
 /// How long the frame is that begins with these bytes.
 ///
+/// A response to function 11 may be longer than it counts: some devices count the id
+/// alone. In RTU frames it is MBM_LENGTH_EXACT once a right CRC stands where the count
+/// says, MBM_LENGTH_AT_LEAST before, and if the CRC is wrong there MBM_LENGTH_SILENCE,
+/// or MBM_LENGTH_UNKNOWN in a stream.
+///
 /// Any thread or interrupt may call it. For ASCII it takes 260 bytes of stack.
 ///
 /// @param framing   how frames look
@@ -285,7 +290,8 @@ pub unsafe extern "C" fn mbm_frame_replyLength(
 }
 
 /// Says whether bytes look like a Modbus TCP frame, request or response, and how
-/// long that is. The first eight tell.
+/// long that is. Eight are needed. The length in the header must be one that a
+/// request or a response of this function may have, as far as the bytes tell.
 ///
 /// Any thread or interrupt may call it.
 ///

@@ -5,7 +5,7 @@ use core::ffi::c_void;
 
 /// What the firmware supplies: a byte stream, a clock, and optional hooks.
 ///
-/// Copied by mbm_master_begin; only `context` must stay valid. Hooks that are
+/// Copied by the begin functions; only `context` must stay valid. Hooks that are
 /// NULL are not called; `read`, `write` and `micros` must be there.
 ///
 /// A function that a hook calls on the object that called the hook returns

@@ -3,6 +3,8 @@
 
 use super::units::Means;
 use crate::error::Status;
+use crate::frame::checksum::crc16;
+use crate::pdu::diagnostics::REPORT_SERVER_ID;
 use crate::pdu::limits::MAX_PDU;
 use crate::pdu::outline::Outline;
 use crate::time::elapsed;
@@ -69,6 +71,12 @@ impl Ticket {
         wait: 0,
         outline: Outline::NONE,
     };
+
+    /// The transaction identifier of the TCP frame that it was sent in last; 0 if it was
+    /// not sent yet.
+    pub const fn wire(&self) -> u16 {
+        self.wire
+    }
 
     pub(super) fn is(&self, stage: Stage) -> bool {
         self.stage == stage
@@ -179,6 +187,15 @@ impl<J: Job> Asked<J> {
         }
     }
 
+    /// True if a right CRC follows the first `length` bytes of `pdu`, as in RTU.
+    fn ends_with_crc(&self, pdu: &[u8], length: NonZeroU8) -> bool {
+        let (Some(job), Some(checked)) = (&self.job, pdu.get(..usize::from(length.get()) + 2))
+        else {
+            return false;
+        };
+        crc16(&[job.ticket().unit]).with(checked).is_residue()
+    }
+
     /// What gives the bytes to send. (One type, so one function for all who ask.)
     fn bytes(&self) -> impl Fn(usize) -> u8 + '_ {
         |index| self.job.as_ref().map_or(0, |job| job.byte(index))
@@ -219,6 +236,13 @@ impl<J: Job> Question for Asked<J> {
     }
 
     fn expected(&self, pdu: &[u8]) -> Option<NonZeroU8> {
+        if !self.ended && self.function() == REPORT_SERVER_ID {
+            // Complete as it is counted if the check says so. More may come if not.
+            let counted = self.outline().expected(pdu, 0)?;
+            if self.ends_with_crc(pdu, counted) {
+                return Some(counted);
+            }
+        }
         let whole = if self.ended {
             // What arrived last is the check.
             pdu.len().saturating_sub(2)

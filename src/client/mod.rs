@@ -72,7 +72,7 @@ pub trait Line<J> {
     fn interrupt<const N: usize>(&mut self, shared: &mut Shared<J, N>);
 
     /// How long there is nothing to do; `None` if that depends on the queue.
-    fn delay(&self, now: u32) -> Option<u32>;
+    fn delay(&mut self, now: u32) -> Option<u32>;
 }
 
 /// A client of a [`Line`] for up to `N` requests, waiting or under way.
@@ -109,10 +109,15 @@ impl<L, J, const N: usize> Client<L, J, N> {
         (&mut self.shared.policy, &mut self.line)
     }
 
-    /// False from a lost link on, until a request succeeds or the client is told
-    /// of a new link.
+    /// False from a lost link on, until a reply arrives or
+    /// [`Client::set_connected`] or [`Client::reconnect`] says otherwise.
     pub const fn is_connected(&self) -> bool {
         self.shared.connected
+    }
+
+    /// Says whether there is a link. [`Client::reconnect`] assumes that there is.
+    pub fn set_connected(&mut self, connected: bool) {
+        self.shared.connected = connected;
     }
 
     /// Ends what [`Client::lend`] began.
@@ -247,7 +252,7 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// How long, in microseconds from `now`, poll will find nothing to do unless
     /// a byte arrives; the greatest value if there is no request, and then no byte is
     /// taken either. While a TCP port does not take what is to be sent, 1000.
-    pub fn poll_delay(&self, now: u32) -> u32 {
+    pub fn poll_delay(&mut self, now: u32) -> u32 {
         match self.line.delay(now) {
             _ if self.lent => u32::MAX,
             Some(delay) => delay,

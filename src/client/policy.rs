@@ -3,7 +3,7 @@
 use super::job::{Job, Stage};
 use super::units::Means;
 use crate::error::Status;
-use crate::FAST;
+use crate::FIRMWARE;
 
 /// How the wait grows from one retry to the next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -95,7 +95,7 @@ impl Policy {
     ) -> bool {
         let (unit, retries) = (job.ticket().unit, job.ticket().retries);
         // No reference to the ticket lives while `means` may call a hook.
-        let again = if FAST && status == Status::OK {
+        let again = if !FIRMWARE && status == Status::OK {
             None
         } else {
             means.again(self, retries, status)
@@ -123,7 +123,7 @@ impl Policy {
             }
             wait = step.saturating_add(wait).min(self.most);
         }
-        wait - share(share(wait, u16::from(self.jitter) << 8), random as u16)
+        wait - share(share(wait, u16::from(self.jitter) << 8), mixed(random))
     }
 }
 
@@ -139,6 +139,13 @@ pub fn again(
         return None;
     }
     Some(policy.wait(retries + 1, random))
+}
+
+/// Sixteen bits of which each depends on all bits of `random` below it, so that
+/// they vary over their whole range whichever bits of `random` vary. (The factor is
+/// 2^32 divided by the golden ratio, which spreads numbers in a row evenly.)
+fn mixed(random: u32) -> u16 {
+    (random.wrapping_mul(0x9E37_79B1) >> 16) as u16
 }
 
 /// So many 65536ths of a time. (In steps, which need no wide multiplication.)
@@ -165,13 +172,50 @@ mod tests {
         assert_eq!(waits(Backoff::Exponential), [1000, 2000, 3500, 3500, 3500]);
     }
 
+    /// The share of each tenth of the jitter, in per mille of the numbers.
+    fn tenths(numbers: impl Iterator<Item = u32>) -> [u32; 10] {
+        let mut policy = Policy::DEFAULT;
+        policy.set_backoff(Backoff::Fixed, 1_000_000, 1_000_000);
+        policy.jitter = 128;
+        let (mut counts, mut all) = ([0; 10], 0);
+        for number in numbers {
+            let off = 1_000_000 - policy.wait(1, || number);
+            counts[(off / 50_000) as usize] += 1000;
+            all += 1;
+        }
+        counts.map(|count| count / all)
+    }
+
+    fn assert_even(tenths: [u32; 10]) {
+        assert!(
+            tenths.iter().all(|tenth| (80..=120).contains(tenth)),
+            "{tenths:?}"
+        );
+    }
+
     #[test]
     fn jitter_takes_off_up_to_its_share() {
         let mut policy = Policy::DEFAULT;
         policy.set_backoff(Backoff::Fixed, 1000, 1000);
         policy.jitter = 77;
         assert_eq!(policy.wait(1, || 0), 1000);
-        assert_eq!(policy.wait(1, || 1 << 15), 850);
-        assert_eq!(policy.wait(1, || u32::MAX), 701);
+        assert_eq!(policy.wait(1, || 1 << 31), 850);
+        let least = (0..0x8000).map(|number| policy.wait(1, || number)).min();
+        assert_eq!(least, Some(701));
+    }
+
+    #[test]
+    fn jitter_is_even_whichever_bits_of_the_random_number_vary() {
+        let numbers = |bits: u32, shift: u32| (0..1 << bits).map(move |number| number << shift);
+        assert_even(tenths(numbers(15, 0)));
+        assert_even(tenths(numbers(16, 0)));
+        assert_even(tenths(numbers(16, 16)));
+        assert_even(tenths(numbers(15, 16)));
+        assert_even(tenths(numbers(10, 0)));
+        assert_even(tenths(numbers(10, 22)));
+        assert_even(tenths(numbers(8, 24)));
+        // A generator of 32 bits: every 65521st of its numbers, and both halves alike.
+        assert_even(tenths((0..65_000).map(|number| number * 65_521)));
+        assert_even(tenths((0..65_536).map(|number| number * 0x1_0001)));
     }
 }

@@ -55,8 +55,8 @@ impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
         self.engine.poll(now)
     }
 
-    /// Takes what comes while requests wait to be asked again, for who waits for bytes
-    /// in select would not sleep. (An interrupt wakes a microcontroller but once.)
+    /// Takes and drops the bytes that arrive while requests wait to be sent again. A
+    /// program that sleeps until bytes are there would not sleep otherwise.
     fn drop_late<const N: usize>(&mut self, shared: &mut Shared<J, N>) {
         let heard = self.engine.port.read(self.engine.storage.frame());
         if heard < 0 {
@@ -107,7 +107,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
     ) -> Option<J> {
         let started = if !self.engine.is_pending() {
             let Some(job) = shared.take_due(now, &mut self.engine.storage) else {
-                if cfg!(not(target_os = "none")) && fresh && !shared.queue.is_empty() {
+                if fresh && !shared.queue.is_empty() {
                     self.drop_late(shared);
                 }
                 return None;
@@ -134,7 +134,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         let status = self.received(&mut job, status);
         if status == Status::LINK_LOST {
             shared.lose();
-        } else {
+        } else if !status.is_failure() {
             shared.connected = true;
         }
         // There is room: it came out of the queue, and was counted as if in it.
@@ -158,12 +158,8 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         }
     }
 
-    fn delay(&self, now: u32) -> Option<u32> {
-        let delay = || match self.engine.is_to_be_stamped() {
-            // Who slept now would wait twice.
-            true => 0,
-            false => self.engine.poll_delay(now),
-        };
-        self.engine.is_pending().then(delay)
+    fn delay(&mut self, now: u32) -> Option<u32> {
+        let is_pending = self.engine.is_pending();
+        is_pending.then(|| self.engine.poll_delay(now))
     }
 }

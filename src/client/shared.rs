@@ -6,7 +6,7 @@ use super::policy::Policy;
 use super::units::Means;
 use crate::error::Status;
 use crate::time::elapsed;
-use crate::FAST;
+use crate::FIRMWARE;
 use heapless::Vec;
 
 /// The requests of a client and its policy.
@@ -51,7 +51,7 @@ impl<J: Job, const N: usize> Shared<J, N> {
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn remove(&mut self, at: usize) -> Option<J> {
         let moved = self.queue.pop()?;
-        if FAST && at == self.queue.len() {
+        if !FIRMWARE && at == self.queue.len() {
             return Some(moved);
         }
         self.close_up(at, moved)

@@ -2,7 +2,7 @@
 
 use super::policy::{again, Policy};
 use crate::error::Status;
-use crate::time::elapsed;
+use crate::time::{clamped, elapsed};
 use crate::transaction::Storage;
 
 /// One unit: how it is to be treated, and how it behaves. The counts wrap at
@@ -49,7 +49,7 @@ impl Unit {
 
     /// How much longer the unit rests.
     fn rest(&mut self, now: u32) -> u32 {
-        let rest = self.delay.saturating_sub(elapsed(now, self.last));
+        let rest = clamped(self.delay).saturating_sub(elapsed(now, self.last));
         self.tired &= rest > 0;
         if self.tired {
             rest
@@ -126,5 +126,20 @@ pub trait Means: Storage {
     /// Any number, another each time; for jitter.
     fn random(&mut self) -> u32 {
         0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::LONGEST;
+
+    #[test]
+    fn a_delay_that_the_clock_cannot_count_ends_after_the_longest_time() {
+        let mut unit = Unit::new(1, u32::MAX);
+        unit.note(Status::OK, false, 7);
+        assert_eq!(unit.rest(7), LONGEST);
+        assert_eq!(unit.rest(7 + LONGEST - 1), 1);
+        assert_eq!(unit.rest(7 + LONGEST), 0);
     }
 }

@@ -1,9 +1,9 @@
 //! Finds the ASCII frame that answers: a colon begins one, whatever was before.
 
 use super::ascii::{self, END, RETURN, START};
-use super::search::{Search, Seen, Verdict, Wanted};
+use super::search::{Found, Search, Seen, Verdict, Wanted};
+use crate::bytes::move_to_front;
 use crate::error::Status;
-use core::cell::Cell;
 
 /// Over the characters that arrived; the buffer is the caller's and is passed
 /// to each call.
@@ -12,6 +12,8 @@ pub struct Window {
     /// Where what was not looked at starts, and where what arrived ends.
     start: u16,
     end: u16,
+    /// Characters of the frame that was found.
+    found: u16,
     seen: Seen,
     foreign: u8,
     noise: bool,
@@ -78,6 +80,7 @@ impl Search for Window {
     const EMPTY: Window = Window {
         start: 0,
         end: 0,
+        found: 0,
         seen: Seen::NOTHING,
         foreign: 0,
         noise: false,
@@ -112,11 +115,7 @@ impl Search for Window {
 
     fn room<'a>(&mut self, buffer: &'a mut [u8]) -> Option<&'a mut [u8]> {
         if self.start > 0 {
-            let cells = Cell::from_mut(&mut *buffer).as_slice_of_cells();
-            let kept = cells.get(usize::from(self.start)..)?;
-            for (to, from) in cells.iter().zip(kept) {
-                to.set(from.get());
-            }
+            move_to_front(buffer, usize::from(self.start));
             self.end -= self.start;
             self.start = 0;
         }
@@ -172,6 +171,29 @@ impl Search for Window {
         self.noise
     }
 
+    fn fills(&self, length: usize) -> bool {
+        usize::from(self.end - self.start) >= length
+    }
+
+    fn has_begun(&self) -> bool {
+        // The last search left nothing in front of a colon.
+        self.end > self.start
+    }
+
+    fn keep(&mut self) -> Found {
+        let found = Found {
+            start: self.start,
+            // The colon, CR and LF carry no byte. One byte more than unit, PDU and
+            // LRC belongs to the content.
+            content: (self.found - 1) / 2,
+            length: self.found,
+        };
+        self.end -= self.start + self.found;
+        self.start = 0;
+        self.seen = Seen::NOTHING;
+        found
+    }
+
     fn search(&mut self, buffer: &mut [u8], wanted: &mut impl Wanted) -> bool {
         loop {
             let range = usize::from(self.start)..usize::from(self.end);
@@ -203,6 +225,7 @@ impl Search for Window {
             if let Some(frame) = rest.get_mut(first..end) {
                 if !frame.is_empty() && self.judge(frame, wanted) {
                     self.pass(first);
+                    self.found = (end - first) as u16;
                     return true;
                 }
             }

@@ -1,18 +1,17 @@
 //! The CRC-16 of an RTU frame and the LRC of an ASCII frame (serial line guide
 //! V1.02, 6.2.2 and 6.2.1).
 
+use crate::FIRMWARE;
+
 /// For each byte value, what it has done to the CRC once so many bytes have
 /// followed.
-#[cfg(any(test, not(target_os = "none")))]
 type Table = [u16; 256];
 
 /// The tables for 0 to 15 bytes that follow, in fours: 8 KB, which a host has
 /// room for.
-#[cfg(any(test, not(target_os = "none")))]
 static TABLES: [[Table; 4]; 4] = tables();
 
 /// Made by the compiler, so no index is wrong at run time.
-#[cfg(any(test, not(target_os = "none")))]
 #[allow(clippy::indexing_slicing)]
 const fn tables() -> [[Table; 4]; 4] {
     let mut tables = [[[0; 256]; 4]; 4];
@@ -36,7 +35,6 @@ const fn tables() -> [[Table; 4]; 4] {
 
 /// Takes `bytes` in by table: sixteen at once as long as there are so many, for
 /// none of them waits for another, then four, then one.
-#[cfg(any(test, not(target_os = "none")))]
 fn by_table(crc: u16, bytes: &[u8]) -> u16 {
     let [last, third, second, first] = &TABLES;
     let [single, ..] = last;
@@ -55,20 +53,17 @@ fn by_table(crc: u16, bytes: &[u8]) -> u16 {
 }
 
 /// Four bytes with the CRC of what was before them.
-#[cfg(any(test, not(target_os = "none")))]
 fn with(crc: u16, bytes: &[u8; 4]) -> [u8; 4] {
     (u32::from_le_bytes(*bytes) ^ u32::from(crc)).to_le_bytes()
 }
 
 /// What four bytes do to the CRC.
-#[cfg(any(test, not(target_os = "none")))]
 fn of_four(tables: &[Table; 4], bytes: [u8; 4]) -> u16 {
     let [last, third, second, first] = tables;
     let [a, b, c, d] = bytes;
     of(first, a) ^ of(second, b) ^ of(third, c) ^ of(last, d)
 }
 
-#[cfg(any(test, not(target_os = "none")))]
 fn of(table: &Table, byte: u8) -> u16 {
     match table.get(usize::from(byte)) {
         Some(crc) => *crc,
@@ -80,7 +75,6 @@ fn of(table: &Table, byte: u8) -> u16 {
 /// kilobyte of flash elsewhere, and without the crate's loop over bits, which
 /// took a third of the time between a reply and the next request on an AVR:
 /// eight steps at once, which come down to the parity of the byte and two shifts.
-#[cfg(any(test, target_os = "none"))]
 fn by_parity(crc: u16, bytes: &[u8]) -> u16 {
     bytes.iter().fold(crc, |crc, byte| {
         let low = crc as u8 ^ byte;
@@ -97,14 +91,18 @@ fn by_parity(crc: u16, bytes: &[u8]) -> u16 {
     })
 }
 
-#[cfg(not(target_os = "none"))]
-use by_table as update;
-
-#[cfg(target_os = "none")]
-use by_parity as update;
+/// The CRC with `bytes` taken in.
+#[inline(always)]
+fn update(crc: u16, bytes: &[u8]) -> u16 {
+    if FIRMWARE {
+        by_parity(crc, bytes)
+    } else {
+        by_table(crc, bytes)
+    }
+}
 
 /// A CRC-16 that grows as bytes arrive.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Crc16(u16);
 
 impl Crc16 {

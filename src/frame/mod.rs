@@ -7,7 +7,7 @@ pub mod rtu;
 mod search;
 pub mod tcp;
 
-pub use search::{Search, Seen, Verdict, Wanted};
+pub use search::{Found, Search, Seen, Verdict, Wanted};
 
 use crate::error::Status;
 

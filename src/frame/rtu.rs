@@ -5,7 +5,7 @@
 //! has arrived, and what turns out not to be the frame costs one byte.
 
 use super::checksum::{crc16, Crc16};
-pub use super::search::{Seen, Verdict, Wanted};
+pub use super::search::{Found, Seen, Verdict, Wanted};
 use super::{Adu, Search};
 use crate::error::Status;
 use core::cell::Cell;
@@ -101,7 +101,7 @@ const MIN_FRAME: u8 = 4;
 
 /// A window that slides over received bytes. The buffer is the caller's and
 /// is passed to each call.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Hash, Debug)]
 pub struct Window {
     /// Where in the buffer what arrived ends; the candidate stands at its front.
     end: u16,
@@ -261,6 +261,7 @@ impl Window {
                         self.checked(frame)
                     };
                     if crc.is_residue() {
+                        self.checked = total as u16;
                         kept = rest.len();
                         match wanted.judge(frame) {
                             Verdict::Right => {
@@ -279,7 +280,7 @@ impl Window {
                     if !self.skim {
                         self.see(Seen::BAD_CRC);
                     }
-                } else if total > buffer.len() {
+                } else if total > buffer.len() + wanted.reserve() {
                     self.see(Seen::TOO_LONG);
                 } else if !self.skim {
                     self.checked(rest);
@@ -411,6 +412,28 @@ impl Search for Window {
 
     fn has_passed_noise(&self) -> bool {
         self.has_passed_noise()
+    }
+
+    fn fills(&self, length: usize) -> bool {
+        usize::from(self.end) >= length
+    }
+
+    fn has_begun(&self) -> bool {
+        // One byte may be anything.
+        self.end > 1
+    }
+
+    fn keep(&mut self) -> Found {
+        let length = self.checked;
+        self.end -= length;
+        self.begin();
+        self.passed = 0;
+        self.seen = Seen::NOTHING;
+        Found {
+            start: 0,
+            content: length,
+            length,
+        }
     }
 
     fn search(&mut self, buffer: &mut [u8], wanted: &mut impl Wanted) -> bool {

@@ -6,7 +6,7 @@ use core::num::NonZeroU8;
 
 /// What was seen on the way to a reply, the more telling the greater. The low
 /// digit is that of the status it becomes.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Hash, Debug)]
 pub struct Seen(u8);
 
 impl Seen {
@@ -58,6 +58,23 @@ pub trait Wanted {
     /// Says that more arrived, or, by silence or by the framing, that nothing
     /// more belongs to the frame.
     fn ends(&mut self, _ended: bool) {}
+
+    /// Bytes in front of the buffer that can be freed for a frame that the buffer
+    /// is too small for.
+    fn reserve(&self) -> usize {
+        0
+    }
+}
+
+/// Where the frame stands that was found.
+#[derive(Clone, Copy)]
+pub struct Found {
+    /// Where its content starts: unit, PDU and two bytes more.
+    pub start: u16,
+    /// Bytes of the content.
+    pub content: u16,
+    /// Bytes of the frame on the wire, from the start of the content on.
+    pub length: u16,
 }
 
 /// What a frame is that looked like the one that is wanted.
@@ -125,6 +142,17 @@ pub trait Search: Sized {
 
     /// True if bytes were passed over that were no frame.
     fn has_passed_noise(&self) -> bool;
+
+    /// True if the bytes that arrived fill a buffer of `length` bytes.
+    fn fills(&self, length: usize) -> bool;
+
+    /// True if the bytes at the end begin a frame that is not complete.
+    fn has_begun(&self) -> bool;
+
+    /// Says where the frame stands that was found, and stands over the bytes that
+    /// arrived after it, with nothing seen so far. The caller moves them to the
+    /// front of the buffer.
+    fn keep(&mut self) -> Found;
 
     /// Looks for a frame with a right check that is what is `wanted`.
     fn search(&mut self, buffer: &mut [u8], wanted: &mut impl Wanted) -> bool;

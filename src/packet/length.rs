@@ -3,6 +3,7 @@
 
 use super::Side;
 use crate::error::Status;
+use crate::frame::checksum::crc16;
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::custom::{is_user_defined, Function};
 use crate::pdu::diagnostics::REPORT_SERVER_ID;
@@ -33,6 +34,12 @@ fn of_frame(framing: Framing, pdu: Length) -> Length {
     }
 }
 
+/// True of a response to Report Server ID: some devices count the id alone and send
+/// more after it.
+fn may_be_longer(side: Side, pdu: &[u8]) -> bool {
+    side == Side::Response && pdu.first() == Some(&REPORT_SERVER_ID)
+}
+
 /// The length of the whole frame that begins with these bytes. What silence
 /// tells in RTU, in ASCII the end character tells.
 ///
@@ -55,7 +62,14 @@ pub fn expected(
         Framing::Ascii => of_characters(side, bytes, end, functions)?,
         Framing::Rtu | Framing::RtuOverTcp => {
             let pdu = bytes.get(rtu::PDU..).unwrap_or_default();
-            of_frame(framing, side.length(pdu, functions))
+            match of_frame(framing, side.length(pdu, functions)) {
+                Length::Exactly(length) if may_be_longer(side, pdu) => match bytes.get(..length) {
+                    None => Length::AtLeast(length),
+                    Some(frame) if crc16(frame).is_residue() => Length::Exactly(length),
+                    Some(_) => of_frame(framing, Length::Silence),
+                },
+                length => length,
+            }
         }
     };
     match length {
@@ -112,14 +126,13 @@ fn of_characters(
     }
     let pdu = content.get(1..count).unwrap_or_default();
     match of_frame(framing, side.length(pdu, functions)) {
-        // So long already, and no end is there.
-        Length::Exactly(length) if bytes.len() >= length => {
-            // Some devices count the id alone and send more behind it.
-            match (side, pdu) {
-                (Side::Response, [REPORT_SERVER_ID, ..]) => Ok(Length::Silence),
-                _ => Err(Status::MALFORMED_FRAME),
-            }
-        }
+        Length::Exactly(length) => match (bytes.len() < length, may_be_longer(side, pdu)) {
+            (true, false) => Ok(Length::Exactly(length)),
+            (true, true) => Ok(Length::AtLeast(length)),
+            // So long already, and no end is there.
+            (false, false) => Err(Status::MALFORMED_FRAME),
+            (false, true) => Ok(Length::Silence),
+        },
         length => Ok(length),
     }
 }
@@ -138,9 +151,10 @@ pub fn of_reply(framing: Framing, unit: u8, request: &Request, functions: &[Func
 }
 
 /// The length of the Modbus TCP frame that begins with these bytes, request or
-/// response, if that is what they look like. Without `allow_unknown` only with a
-/// function of the standard, one that the standard leaves to users, or one
-/// that is declared; 0 is a function of nobody.
+/// response, if that is what they look like: a request or a response of this function
+/// may be as long as the header says. Without `allow_unknown` only with a function of
+/// the standard, one that the standard leaves to users, or one that is declared; 0 is
+/// a function of nobody.
 ///
 /// # Errors
 /// [`Status::INCOMPLETE_FRAME`] for less than header and function code,
@@ -151,10 +165,21 @@ pub fn looks_like_tcp(
     functions: &[Function],
 ) -> Result<usize, Status> {
     let header = tcp::header(bytes)?;
-    let function = bytes.get(tcp::PDU).ok_or(Status::INCOMPLETE_FRAME)? & !EXCEPTION;
+    let code = *bytes.get(tcp::PDU).ok_or(Status::INCOMPLETE_FRAME)?;
+    let function = code & !EXCEPTION;
     let known =
         is_user_defined(function) || response_length(&[function], functions) != Length::Unknown;
-    if function != 0 && (known || allow_unknown) {
+    let end = header.total.min(bytes.len());
+    let pdu = bytes.get(tcp::PDU..end).unwrap_or_default();
+    let whole = header.total - tcp::PDU;
+    let fits = |side: Side| match side.length(pdu, functions) {
+        Length::Exactly(length) if may_be_longer(side, pdu) => length <= whole,
+        Length::Exactly(length) => length == whole,
+        Length::AtLeast(length) => length <= whole,
+        Length::Silence | Length::Unknown => true,
+    };
+    let right = fits(Side::Response) || (code == function && fits(Side::Request));
+    if function != 0 && (known || allow_unknown) && right {
         Ok(header.total)
     } else {
         Err(Status::MALFORMED_FRAME)
@@ -217,7 +242,7 @@ mod tests {
             let wanted = match have {
                 0..=4 => Length::AtLeast(9),
                 5..=6 => Length::AtLeast(11),
-                7..=14 => Length::Exactly(15),
+                7..=14 => Length::AtLeast(15),
                 15..=20 => Length::Silence,
                 _ => Length::Exactly(21),
             };
@@ -275,11 +300,18 @@ mod tests {
             assert_eq!(length, Err(Status::INCOMPLETE_FRAME));
         }
         assert_eq!(looks_like_tcp(&bytes[..8], false, &[]), Ok(12));
-        for (function, known) in [(0x83, true), (65, true), (9, false), (0xD5, false)] {
+        for (function, length, known) in [
+            (0x83, 3, true),
+            (65, 6, true),
+            (9, 6, false),
+            (0xD5, 3, false),
+        ] {
+            bytes[5] = length;
             bytes[7] = function;
-            let length = looks_like_tcp(&bytes, false, &[]);
-            assert_eq!(length.is_ok(), known, "{function}");
-            assert_eq!(looks_like_tcp(&bytes, true, &[]), Ok(12));
+            let found = looks_like_tcp(&bytes, false, &[]);
+            assert_eq!(found.is_ok(), known, "{function}");
+            let total = tcp::HEADER + usize::from(length);
+            assert_eq!(looks_like_tcp(&bytes, true, &[]), Ok(total));
         }
         for function in [0, 0x80] {
             bytes[7] = function;

@@ -81,7 +81,8 @@ pub fn request(pdu: &[u8], functions: &[Function]) -> Length {
 }
 
 /// The length of the response PDU that begins with these bytes. That of Report
-/// Server ID is the standard's, though some devices send more than they count.
+/// Server ID is what it counts, the least that it may be: some devices count the id
+/// alone and send more after it.
 pub fn response(pdu: &[u8], functions: &[Function]) -> Length {
     let Some(&code) = pdu.first() else {
         return Length::AtLeast(1);

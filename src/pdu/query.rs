@@ -12,7 +12,7 @@ const HEAD: usize = 9;
 ///
 /// How words travel is known by pointers to the family's functions, so that
 /// firmware carries those of the functions it calls.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Hash, Debug)]
 pub struct Query {
     pub(super) head: [u8; HEAD],
     pub(super) head_length: u8,

@@ -11,6 +11,7 @@ use super::limits::{
 use super::{bits, custom, diagnostics, files, identification, registers};
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
+use crate::FIRMWARE;
 use core::mem::discriminant;
 
 /// A request PDU. Register data are as on the wire, high bytes first; bit data
@@ -194,7 +195,7 @@ impl<'a> Request<'a> {
         let length = writer.finish()?;
         let written = pdu.get(..length).unwrap_or_default();
         // Firmware is small before it is fast.
-        if cfg!(not(target_os = "none")) && self.is_in_order() {
+        if !FIRMWARE && self.is_in_order() {
             debug_assert!(Request::parse(written).is_ok());
             return Ok(length);
         }

@@ -8,6 +8,7 @@ use super::limits::{MAX_PDU, MAX_WRITE_BITS, MAX_WRITE_REGISTERS};
 use super::{bits, custom, diagnostics, files, identification, registers, EXCEPTION};
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
+use crate::FIRMWARE;
 use core::mem::discriminant;
 
 /// A response PDU. Register data are as on the wire, high bytes first; bit data
@@ -223,7 +224,7 @@ impl<'a> Response<'a> {
         let length = writer.finish()?;
         let written = pdu.get(..length).unwrap_or_default();
         // Firmware is small before it is fast.
-        if cfg!(not(target_os = "none")) && self.is_in_order() {
+        if !FIRMWARE && self.is_in_order() {
             debug_assert!(Response::parse(written).is_ok());
             return Ok(length);
         }

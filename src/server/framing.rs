@@ -8,6 +8,7 @@ use crate::pdu::custom::Function;
 use crate::pdu::length::{self, Length};
 use crate::port::Port;
 use crate::time;
+use crate::FIRMWARE;
 use core::cell::Cell;
 
 /// Bytes that are given up at once where the buffer is full.
@@ -28,11 +29,7 @@ const LEAST_TCP: usize = tcp::PDU + 1;
 
 /// What is taken of a TCP stream before its header is known: what most requests
 /// have, so that a host asks once. [`Server::keep_ahead`] puts aside 4 bytes.
-const AT_ONCE: usize = if cfg!(target_os = "none") {
-    LEAST_TCP
-} else {
-    LEAST_TCP + 4
-};
+const AT_ONCE: usize = if FIRMWARE { LEAST_TCP } else { LEAST_TCP + 4 };
 
 /// What a PDU may take of a buffer for RTU. More than a PDU is room for the
 /// response of a user's function beside its request.
@@ -108,7 +105,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// is followed by another is no longer waited for.
     fn receive_rtu(&mut self) -> Status {
         self.make_room();
-        if cfg!(target_os = "none") {
+        if FIRMWARE {
             let heard = self.hear(usize::MAX);
             return if heard > 0 {
                 Status::OK
@@ -203,7 +200,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn last_frame(&mut self) -> Status {
         let end = usize::from(self.end);
-        if cfg!(not(target_os = "none")) && self.crc.is_residue() && !self.request.overrun {
+        if !FIRMWARE && self.crc.is_residue() && !self.request.overrun {
             return self.found(end.saturating_sub(rtu::OVERHEAD));
         }
         let Some(frame) = self.lent.frame().get_mut(..end) else {
@@ -335,7 +332,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// Never more than one frame is taken from the stream, so that its response
     /// has the whole buffer; but for a few bytes behind a very short one.
     fn receive_tcp(&mut self) -> Status {
-        if cfg!(not(target_os = "none")) && self.end == 0 {
+        if !FIRMWARE && self.end == 0 {
             // What most requests have.
             if let Some(front) = self.lent.frame().first_chunk_mut::<AT_ONCE>() {
                 let heard = self.port.read(front);
@@ -395,7 +392,7 @@ impl<P: Port, B: Lent> Server<P, B> {
             if end >= until {
                 return self.found_in_stream(until);
             }
-            let heard = if cfg!(target_os = "none") {
+            let heard = if FIRMWARE {
                 self.hear(until)
             } else {
                 self.take(until)

@@ -13,6 +13,7 @@ use crate::pdu::custom::Rule;
 use crate::pdu::limits::MAX_PDU;
 use crate::port::Port;
 use crate::time::{self, elapsed};
+use crate::FIRMWARE;
 
 /// How soon to look again at what only the port or a service can bring on.
 const NOT_BY_ITSELF: u32 = time::millis(1);
@@ -153,7 +154,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// Sets the silence that ends a frame, in microseconds: t3.5 for RTU, the
     /// inter-character timeout for ASCII.
     pub fn set_silence(&mut self, microseconds: u32) {
-        self.silence = microseconds.min(time::LONGEST);
+        self.silence = time::clamped(microseconds);
     }
 
     /// Waits for the next request.
@@ -165,7 +166,7 @@ impl<P: Port, B: Lent> Server<P, B> {
         self.request.overrun = false;
         self.astray = false;
         self.crc = Crc16::START;
-        if cfg!(not(target_os = "none")) && self.ahead != 0 {
+        if !FIRMWARE && self.ahead != 0 {
             self.take_ahead();
         }
     }
@@ -224,7 +225,7 @@ impl<P: Port, B: Lent> Server<P, B> {
         if heard > 0 {
             // A microcontroller takes the CRC of bytes that need none, too: that is
             // less code, and one framing is all it has.
-            if cfg!(target_os = "none") || usize::from(self.request.head) == rtu::PDU {
+            if FIRMWARE || usize::from(self.request.head) == rtu::PDU {
                 if let Some(news) = room.get(..heard as usize) {
                     self.crc = self.crc.with(news);
                 }
@@ -356,7 +357,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// on: it sends, or looks for the next request.
     #[inline(always)]
     pub(crate) fn conclude(&mut self, reply: Reply) -> Option<Status> {
-        if !cfg!(target_os = "none") {
+        if !FIRMWARE {
             return self.answer_at_once(reply);
         }
         if self.answer(reply) {
@@ -452,7 +453,7 @@ impl<P: Port, B: Lent> Server<P, B> {
         }
         if self.port.flush() {
             // An echo, where one is waited for, comes from here on.
-            if cfg!(target_os = "none") || self.keeps_time() {
+            if FIRMWARE || self.keeps_time() {
                 self.last_byte = self.now;
             }
             self.end_transmission();

@@ -12,6 +12,7 @@ use crate::pdu::limits::{
     MAX_WRITE_REGISTERS,
 };
 use crate::pdu::registers::{MASK_WRITE_REGISTER, READ_WRITE_MULTIPLE_REGISTERS};
+use crate::FIRMWARE;
 
 /// Which table, by the function that reads it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -113,17 +114,17 @@ impl<T: Cells> Access for T {
     fn access(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) -> u8 {
         let writes = way == Way::Write;
         // A host keeps what hooks need out of the way of what needs none.
-        if cfg!(not(target_os = "none")) && writes && self.has_hooks() {
+        if !FIRMWARE && writes && self.has_hooks() {
             return write_with_hooks(self, address, quantity, data);
         }
-        if cfg!(target_os = "none") && writes {
+        if FIRMWARE && writes {
             let refused = self.before(address, quantity, data);
             if refused != 0 {
                 return refused;
             }
         }
         self.transfer(way, address, quantity, data);
-        if cfg!(target_os = "none") && writes {
+        if FIRMWARE && writes {
             self.after(address, quantity);
         }
         0

@@ -7,6 +7,7 @@ use crate::pdu::reply;
 use core::num::NonZeroU8;
 
 /// What answers a request.
+#[derive(Clone, Hash, Debug)]
 #[repr(C)]
 pub(super) struct Answer<Q> {
     pub(super) unit: u8,
@@ -14,6 +15,8 @@ pub(super) struct Answer<Q> {
     pub(super) echo: bool,
     /// The exception code of the last response; 0 if it was none.
     pub(super) exception: u8,
+    /// Bytes of a held reply, which stand at the front of the frame buffer.
+    pub(super) held: u16,
     pub(super) request: Q,
 }
 
@@ -23,6 +26,7 @@ impl<Q: Question> Answer<Q> {
         unit: 0,
         echo: false,
         exception: 0,
+        held: 0,
         request: Q::NONE,
     };
 
@@ -73,5 +77,9 @@ impl<Q: Question> Wanted for Answer<Q> {
 
     fn ends(&mut self, ended: bool) {
         self.request.ends(ended);
+    }
+
+    fn reserve(&self) -> usize {
+        usize::from(self.held)
     }
 }

@@ -6,14 +6,19 @@
 //!
 //! What RTU cannot tell apart: a late reply of the same unit, function and
 //! length to an earlier request, or a late exception to the same function,
-//! looks like the reply. After a request that got no right reply the line is
-//! therefore given a quiet time before the next request.
+//! looks like the reply. Two rules keep such a reply from being delivered. After
+//! a request without a right reply, the line is left alone for the quiet time
+//! before the next request. And the next reply of that unit is on probation: it
+//! is held until nothing has arrived for the quiet time, and a second reply that
+//! arrives meanwhile takes its place, for a device answers in order.
 //!
 //! A microcontroller's compiler is kept from inlining the steps: each has few
 //! values in use at a time, so they stay in registers, and the code is small.
 
 mod answer;
+mod clock;
 mod outcome;
+mod probation;
 mod question;
 mod settings;
 mod storage;
@@ -28,11 +33,12 @@ use crate::frame::Wanted as _;
 use crate::frame::{Search, Seen};
 use crate::pdu::query::Query;
 use crate::port::Port;
-use crate::time::{characters, elapsed, has_elapsed};
+use crate::time::{characters, elapsed};
 use answer::Answer;
+use probation::Probation;
 
 /// Where a transaction stands.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 enum Phase {
     /// Nothing to do.
     Idle,
@@ -53,6 +59,7 @@ enum Phase {
 /// One request and its reply, over the port and in the storage it was given.
 // In this order, small fields first: what lies far from the start of an object
 // costs a Cortex-M0 and an AVR an instruction more at each access.
+#[derive(Clone, Hash, Debug)]
 #[repr(C)]
 pub struct Transaction<P, S, Q = Query, W = Window> {
     phase: Phase,
@@ -63,6 +70,8 @@ pub struct Transaction<P, S, Q = Query, W = Window> {
     waiting: bool,
     /// The last request went without a right reply, which may still come.
     late: bool,
+    /// Whether the next reply may be a late one.
+    probation: Probation,
     /// Over what is to be sent, then over what arrives.
     window: W,
     /// When the phase began.
@@ -95,6 +104,7 @@ impl<P, S, Q: Question, W: Search> Transaction<P, S, Q, W> {
             stamp: false,
             waiting: false,
             late: false,
+            probation: Probation::NONE,
             window: W::EMPTY,
             wanted: Answer::NONE,
             settings: Settings::DEFAULT,
@@ -114,52 +124,12 @@ impl<P, S, Q: Question, W: Search> Transaction<P, S, Q, W> {
         self.waiting
     }
 
-    /// True if the next poll is what the time of a phase counts from.
-    pub const fn is_to_be_stamped(&self) -> bool {
-        self.stamp
-    }
-
     /// The request, which [`Transaction::start`] sends.
     pub fn request(&mut self) -> &mut Q {
         &mut self.wanted.request
     }
 
-    /// True once the phase has lasted `time`.
-    #[inline(always)]
-    fn lasts(&self, time: u32) -> bool {
-        self.has_passed(time, false)
-    }
-
-    /// True once the line has been silent for `time`.
-    #[inline(always)]
-    fn is_silent(&self, time: u32) -> bool {
-        self.has_passed(time, true)
-    }
-
-    /// True once `time` has passed since the phase began, or since the line was
-    /// last busy. (One function: 32 bits are much work for an AVR.)
-    #[cfg_attr(target_os = "none", inline(never))]
-    fn has_passed(&self, time: u32, since_last_byte: bool) -> bool {
-        let since = if since_last_byte {
-            self.last_byte
-        } else {
-            self.since
-        };
-        has_elapsed(time, self.now, since)
-    }
-
-    /// A line that is not silent, or a port that does not move, is not waited
-    /// for longer than a reply and the `time` that it may take.
-    #[cfg_attr(target_os = "none", inline(never))]
-    fn stalled(&self, time: u32) -> Status {
-        if self.lasts(self.settings.response_timeout.wrapping_add(time)) {
-            Status::LINE_BUSY
-        } else {
-            Status::PENDING
-        }
-    }
-
-    /// Enters a phase whose time counts from the next poll on.
+    /// Enters a phase whose time counts from the next look at the clock on.
     fn enter(&mut self, phase: Phase) {
         self.phase = phase;
         self.stamp = true;
@@ -172,11 +142,6 @@ impl<P, S, Q: Question, W: Search> Transaction<P, S, Q, W> {
 }
 
 impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
-    /// Says that the line was busy just now, so the gap counts from here.
-    pub fn line_used(&mut self) {
-        self.last_byte = self.port.micros();
-    }
-
     /// Starts the request to `unit`; `poll` does the rest.
     /// [`Status::BROADCAST_NOT_ALLOWED`], and nothing is sent, for a read from
     /// unit 0.
@@ -193,6 +158,7 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
 
     /// Waits for silence, then sends; from the next poll on.
     fn listen_anew(&mut self) -> Status {
+        self.wanted.held = 0;
         self.window.hold(0);
         if !self.write_frame() {
             return Status::BUFFER_TOO_SMALL;
@@ -206,7 +172,9 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
     pub fn cancel(&mut self) {
         if !matches!(self.phase, Phase::Idle | Phase::Gap) {
             self.line_used();
-            self.late = self.phase != Phase::Send;
+            if self.phase != Phase::Send {
+                self.expect_late_reply();
+            }
         }
         self.end();
     }
@@ -221,23 +189,22 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
     }
 
     /// How long, in microseconds from `now`, poll will find nothing to do unless
-    /// a byte arrives; the greatest value if there is no request.
-    pub fn poll_delay(&self, now: u32) -> u32 {
+    /// a byte arrives; the greatest value if there is no request. A phase that just
+    /// began counts its time from this call, so the caller may sleep that long.
+    pub fn poll_delay(&mut self, now: u32) -> u32 {
+        self.look_at_clock(now);
         let (time, since) = match self.phase {
             Phase::Idle => return u32::MAX,
             Phase::Send | Phase::Flush | Phase::Hold => return 0,
             Phase::Gap => (self.silence_to_keep(), self.last_byte),
             Phase::Turnaround => (self.settings.turnaround_delay, self.since),
+            Phase::Reply if self.probation.has_held => (self.settings.quiet_time, self.last_byte),
             Phase::Reply if self.window.is_skimmed() => {
                 (self.settings.response_timeout, self.since)
             }
             Phase::Reply => (self.settings.silence, self.last_byte),
         };
-        if self.stamp && self.phase != Phase::Gap {
-            time
-        } else {
-            time.saturating_sub(elapsed(now, since))
-        }
+        time.saturating_sub(elapsed(now, since))
     }
 
     /// The silence that the next request waits for.
@@ -254,15 +221,7 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
     /// [`Status::PENDING`] until it has ended, then how.
     pub fn poll(&mut self, now: u32) -> Status {
         self.waiting = false;
-        self.now = now;
-        if self.stamp {
-            self.stamp = false;
-            self.since = now;
-            // Behind a request of ours; of what was before it, that is known.
-            if self.phase != Phase::Gap {
-                self.last_byte = now;
-            }
-        }
+        self.look_at_clock(now);
         let status = match self.phase {
             Phase::Idle => return Status::OK,
             Phase::Gap => self.listen(),
@@ -285,7 +244,10 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
     /// is lost.
     #[cfg_attr(target_os = "none", inline(never))]
     fn hear(&mut self) -> i16 {
-        let Some(room) = self.window.room(self.storage.frame()) else {
+        self.make_space();
+        let held = usize::from(self.wanted.held);
+        let buffer = self.storage.frame().get_mut(held..).unwrap_or_default();
+        let Some(room) = self.window.room(buffer) else {
             return 0;
         };
         let heard = self.port.read(room);
@@ -384,6 +346,7 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn release(&mut self) {
         self.window.clear();
+        self.begin_reply();
         self.port.post_transmission();
         if cfg!(feature = "echo") {
             self.wanted.echo = self.settings.echo_discard;
@@ -407,7 +370,7 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
 
     #[cfg_attr(target_os = "none", inline(never))]
     fn receive(&mut self) -> Status {
-        let over = self.stalled(0) != Status::PENDING;
+        let mut over = self.stalled(0) != Status::PENDING;
         // As the deadline passes, all that has arrived is looked at, even if
         // the port hands it over byte by byte.
         let mut reads = if over { u8::MAX } else { 1 };
@@ -422,10 +385,16 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
                 self.wanted.ends(false);
             } else {
                 self.waiting = reads > 0;
+                if self.probation.has_held {
+                    over = self.is_hold_over();
+                }
                 if !over && !self.is_silent(self.settings.silence) {
                     return Status::PENDING;
                 }
                 if self.window.is_skimmed() {
+                    if over && self.take_held() {
+                        return self.found();
+                    }
                     // Without diagnosis it is not known whether it was a reply.
                     let damaged = self.window.seen() >= Seen::BAD_CRC;
                     return if over || (cfg!(feature = "diagnosis") && damaged) {
@@ -437,29 +406,13 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
                 self.window.skim();
                 self.wanted.ends(true);
             }
-            if self.window.search(self.storage.frame(), &mut self.wanted) {
-                return self.found();
+            while self.finds_reply() {
+                if !self.is_on_probation() {
+                    return self.found();
+                }
+                self.hold_reply();
             }
         }
-    }
-
-    /// The reply is there: counts it and returns what it says.
-    fn found(&mut self) -> Status {
-        let status = Status::from_code(self.wanted.exception);
-        self.storage.count(Counter::Replies, 1);
-        if status != Status::OK {
-            self.storage.count(Counter::Exceptions, 1);
-        }
-        if self.window.has_passed_noise() {
-            self.storage.count(Counter::Resynchronisations, 1);
-        }
-        self.count_foreign();
-        status
-    }
-
-    fn count_foreign(&mut self) {
-        let frames = u16::from(self.window.foreign_frames());
-        self.storage.count(Counter::ForeignFrames, frames);
     }
 
     /// No reply came: asks again, or says why with the most telling status.
@@ -481,7 +434,7 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
         }
         self.retries -= 1;
         // What was taken for a damaged reply may have been noise.
-        self.late = true;
+        self.expect_late_reply();
         self.last_byte = self.now;
         self.listen_anew()
     }

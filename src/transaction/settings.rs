@@ -4,10 +4,10 @@ use crate::time::{self, millis};
 
 /// How a transaction behaves; kept from one to the next. Times are in
 /// microseconds.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[repr(C)]
 pub struct Settings {
-    /// Silence before a request.
+    /// Silence before a request; set it with [`Settings::set_gap`].
     pub gap: u32,
     /// The silence t3.5 that ends a frame.
     pub silence: u32,
@@ -41,6 +41,19 @@ impl Settings {
         echo_discard: false,
     };
 
+    /// Sets the silence before a request, in microseconds.
+    pub const fn set_gap(&mut self, microseconds: u32) {
+        self.gap = time::clamped(microseconds);
+    }
+
+    /// Derives gap, silence and character time from the baud rate; 0 stands for an
+    /// unknown one.
+    pub const fn set_baud_rate(&mut self, baud: u32) {
+        self.silence = time::silence(baud);
+        self.gap = self.silence;
+        self.character = time::character(baud);
+    }
+
     /// Turns zeroed settings into the default. (Assigned as a whole, that would
     /// be copied from a constant, which takes flash, and RAM on an AVR.)
     #[cfg_attr(target_os = "none", inline(never))]
@@ -57,6 +70,15 @@ impl Settings {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_gap_is_at_most_the_longest_time() {
+        let mut settings = Settings::DEFAULT;
+        settings.set_gap(u32::MAX);
+        assert_eq!(settings.gap, time::LONGEST);
+        settings.set_gap(7);
+        assert_eq!(settings.gap, 7);
+    }
 
     #[test]
     fn zeroed_settings_become_the_default() {

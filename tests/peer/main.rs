@@ -1,15 +1,29 @@
 //! Requests and responses held against pymodbus, in both directions and over
 //! every framing: what libmodbus lacks, and the rest too.
 //!
-//! `make test` makes the Python environment and our server first; alone,
-//! `make venv build/plain/serve` does.
+//! `make test` makes the Python environment and our server first, and switches on
+//! the feature `pymodbus`. Alone: `make venv build/plain/serve`, then
+//! `cargo test --features pymodbus`.
+#![cfg_attr(not(feature = "pymodbus"), allow(dead_code))]
 
+#[cfg(feature = "pymodbus")]
 mod asking;
+#[cfg(feature = "pymodbus")]
 mod client;
+#[cfg(feature = "pymodbus")]
 mod process;
+#[cfg(feature = "pymodbus")]
 mod requests;
+#[cfg(feature = "pymodbus")]
 mod responses;
+#[cfg(feature = "pymodbus")]
 mod served;
+
+/// Says in the output of `cargo test` that the tests of this folder did not run.
+#[cfg(not(feature = "pymodbus"))]
+#[test]
+#[ignore = "run `make test`, or `make venv build/plain/serve` and `cargo test --features pymodbus`"]
+fn the_tests_against_pymodbus_are_off() {}
 
 use mbm::error::Status;
 use mbm::frame::{ascii, Adu, Framing};

@@ -8,6 +8,10 @@ use crate::client::{Line, Serial, Tcp, ASCII_SILENCE, STREAM_SILENCE};
 use crate::error::Status;
 use crate::frame::{ascii, ascii_window, rtu, Search};
 
+/// The least that a frame buffer may have for ASCII: the shortest request and response,
+/// a function code and two words.
+const LEAST_ASCII: u16 = 17;
+
 /// Makes a client of a kind of line out of storage.
 ///
 /// # Safety
@@ -115,6 +119,9 @@ pub unsafe extern "C" fn mbm_client_beginAscii(
     frameBytes: u16,
 ) -> u8 {
     let silence = Some(ASCII_SILENCE);
+    if frameBytes < LEAST_ASCII {
+        return Status::INVALID_ARGUMENT.code();
+    }
     // SAFETY: as the header demands.
     unsafe {
         let status =

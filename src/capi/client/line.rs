@@ -49,18 +49,27 @@ pub unsafe extern "C" fn mbm_client_reconnect(
         if let Some(disconnect) = (*link).disconnect {
             disconnect((*link).context);
         }
-        match (*link).connect {
-            Some(connect) => connect((*link).context),
-            None => status,
+        let Some(connect) = (*link).connect else {
+            return status;
+        };
+        let status = connect((*link).context);
+        if status != Status::OK.code() {
+            common(pointers::object(client)).set_connected(false);
         }
+        status
     }
 }
 
 /// Whether the link is not known to be lost.
 ///
+/// If `connect` of mbm_client_reconnect returned MBM_PENDING, this is 0 until a reply
+/// arrives. Do not reconnect again before the connection had its time: the port knows
+/// better whether it is still being made, for example mbm_tcp_isConnected.
+///
 /// @param client  the object
-/// @return 0 from a request that ended with MBM_LINK_LOST on, until one succeeds
-///         or mbm_client_reconnect is called; 1 else
+/// @return 0 from a request that ended with MBM_LINK_LOST on, until a reply arrives
+///         (an exception is one) or mbm_client_reconnect returns MBM_OK; 1 otherwise,
+///         and also before the first request
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8 {
     // SAFETY: as the header demands.

@@ -46,7 +46,7 @@ pub struct mbm_client {
     /// Not for you.
     pointers: [*mut c_void; 46],
     /// Not for you.
-    words: [u32; 18],
+    words: [u32; 20],
 }
 
 /// What a client of a serial line in RTU frames, one in ASCII frames and one of
@@ -506,4 +506,16 @@ pub unsafe extern "C" fn mbm_client_cancel(
             }
         })
     }
+}
+
+/// The transaction identifier on the wire: that of the TCP frame in which the request
+/// was sent last. The client chooses it, another one for each frame, also for a retry.
+///
+/// @param request  a request, pending or ended
+/// @return the identifier; 0 in other framings, for a request that was never sent, and
+///         for NULL. 0 is also an identifier
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_wireTransaction(request: *const mbm_clientRequest) -> u16 {
+    // SAFETY: as the header demands: NULL, or a request that is zeroed or was used.
+    unsafe { Lent::new(request.cast_mut()).map_or(0, |request| request.ticket().wire()) }
 }

@@ -14,8 +14,9 @@ use core::ptr::NonNull;
 /// coils or bytes, they are bytes as on the wire, of coils the lowest bit first.
 #[repr(C)]
 pub struct mbm_clientRequest {
-    /// Optional: called by mbm_client_poll when the request has ended. It may
-    /// queue requests, this one too, and cancel others.
+    /// Optional: called by mbm_client_poll when the request has ended, but not for one
+    /// that mbm_client_cancel gave up. It may queue requests, this one too, and cancel
+    /// others.
     pub done: Option<unsafe extern "C" fn(context: *mut c_void, request: *mut mbm_clientRequest)>,
     /// Handed to `done`. Yours, may be NULL.
     pub context: *mut c_void,
@@ -25,11 +26,12 @@ pub struct mbm_clientRequest {
     pub reply: *mut c_void,
     /// Bytes that `reply` has room for.
     pub replyBytes: u16,
-    /// A number of yours. On TCP no two pending requests may have the same one,
-    /// but for 0.
+    /// A number of yours, which stays as you set it. In TCP frames no two pending
+    /// requests may have the same one, except 0. It is not the transaction identifier
+    /// on the wire: mbm_client_wireTransaction returns that.
     pub transaction: u16,
-    /// Whom it is for: 1 to 247 on a serial line, 0 is everybody there; 1 to 255
-    /// on TCP.
+    /// Whom it is for. On a serial line 1 to 247; 0 is broadcast; 248 to 255, which the
+    /// standard reserves, are sent as they are. On TCP 1 to 255.
     pub unit: u8,
     /// MBM_PENDING from being queued to its end, then how it ended.
     pub status: u8,
@@ -135,7 +137,7 @@ impl Job for Lent {
     }
 
     // A microcontroller has the loop over bytes anyway.
-    #[cfg(not(target_os = "none"))]
+    #[cfg(not(any(target_os = "none", mbm_firmware)))]
     #[inline(always)]
     fn put_all(&mut self, bytes: &[u8]) {
         let inside = self.inside_mut();

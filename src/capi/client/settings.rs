@@ -4,7 +4,7 @@ use super::{mbm_client, parts, pointers, Parts, Treatment};
 use crate::capi::storage::mbm_counters;
 use crate::client::{again, note, rest, Backoff, Means as _, Unit};
 use crate::error::Status;
-use crate::time::{self, millis};
+use crate::time::millis;
 use core::ffi::c_void;
 
 /// mbm_client_setBackoff: a request is asked again at once.
@@ -36,7 +36,7 @@ pub struct mbm_clientUnit {
     /// Requests that were asked again.
     pub retries: u32,
     /// Set by you: rest for this unit from the end of a request to the next, in
-    /// microseconds.
+    /// microseconds; more than 2^31 (36 minutes) means 2^31.
     pub delay: u32,
     /// Not for you.
     last: u32,
@@ -67,8 +67,9 @@ unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> Status) -> 
     unsafe { pointers::with(client, |object| change(parts(object))) }
 }
 
-/// Sets how long a response may take, from the end of the request on a serial
-/// line, from its being handed to the port on TCP.
+/// Sets how long a response may take. The time begins with the end of the request on a
+/// serial line and in RTU over TCP; in TCP frames when mbm_client_poll puts the request
+/// into the outgoing buffer, also if the port takes it later.
 ///
 /// @param client        the object
 /// @param milliseconds  0 to 65535; 2000 at first
@@ -99,9 +100,7 @@ pub unsafe extern "C" fn mbm_client_setBaudRate(client: *mut mbm_client, baud: u
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.settings.silence = time::silence(baud);
-            parts.settings.gap = parts.settings.silence;
-            parts.settings.character = time::character(baud);
+            parts.settings.set_baud_rate(baud);
             Status::OK
         })
     }
@@ -111,14 +110,15 @@ pub unsafe extern "C" fn mbm_client_setBaudRate(client: *mut mbm_client, baud: u
 /// mbm_client_setBaudRate sets it back. Without effect on TCP.
 ///
 /// @param client        the object
-/// @param microseconds  counted from the last byte seen or sent
+/// @param microseconds  counted from the last byte seen or sent; more than 2^31
+///                      (36 minutes) means 2^31
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setGap(client: *mut mbm_client, microseconds: u32) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.settings.gap = microseconds;
+            parts.settings.set_gap(microseconds);
             Status::OK
         })
     }
@@ -144,11 +144,12 @@ pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
     }
 }
 
-/// Sets how long a serial line is left alone after a request that got no right
-/// reply; see mbm_master_setQuietTime.
+/// Sets the quiet time of a serial line, which keeps a late reply from being taken
+/// for the answer to a later request; see mbm_master_setQuietTime. Without effect on
+/// TCP, where responses have a number.
 ///
 /// @param client        the object
-/// @param milliseconds  0 to 65535; 100 at first
+/// @param milliseconds  0 to 65535; 100 at first; 0 holds no reply
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setQuietTime(client: *mut mbm_client, milliseconds: u16) -> u8 {
@@ -213,8 +214,9 @@ fn built_in(has: bool, change: impl FnOnce()) -> Status {
 }
 
 /// Sets how often a request is repeated whose response is missing, damaged or
-/// malformed. Exceptions are responses and are not repeated, nor is what a lost link
-/// interrupted.
+/// malformed, or that the port did not take. Exceptions are responses and are not
+/// repeated, nor are requests that a lost link interrupted, nor those whose response is
+/// too long for a buffer.
 ///
 /// @param client   the object
 /// @param retries  0 to 255; 0 at first
@@ -266,8 +268,9 @@ pub unsafe extern "C" fn mbm_client_setBackoff(
 ///
 /// @param client   the object
 /// @param percent  0 (at first) to 100: how much of the wait may be taken off
-/// @param random   gives any number, another each time; what it calls on the client
-///                 returns MBM_BUSY
+/// @param random   returns another number each time, for example rand(): one of 32
+///                 bits, of 15 bits, or whose upper bits alone vary. What it
+///                 calls on the client returns MBM_BUSY
 /// @param context  handed to `random`
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
@@ -292,8 +295,9 @@ pub unsafe extern "C" fn mbm_client_setJitter(
 }
 
 /// Counts into storage of yours from now on. Read and zero it as you like, but not
-/// from an interrupt. On TCP, foreign frames are those with an id that nobody waits
-/// for, and resynchronisations are bytes that were no frame.
+/// from an interrupt. In TCP frames, a foreign frame is one whose transaction identifier
+/// and unit no pending request has; a resynchronisation is a run of bytes that were no
+/// frame.
 ///
 /// @param client    the object
 /// @param counters  zeroed by you; NULL stops counting

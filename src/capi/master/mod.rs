@@ -33,7 +33,7 @@ pub struct mbm_master {
     /// Not for you.
     pointers: [*mut c_void; 21],
     /// Not for you.
-    words: [u32; 18],
+    words: [u32; 20],
 }
 
 /// What lies behind an `mbm_master`.
@@ -210,7 +210,8 @@ pub unsafe extern "C" fn mbm_master_poll(master: *mut mbm_master) -> u8 {
 }
 
 /// How long mbm_master_poll will find nothing to do unless a byte arrives, so
-/// that a program or an idle hook may sleep until then.
+/// that a program or an idle hook may sleep until then. A wait that has just begun
+/// counts from this call, so sleeping lengthens no timeout.
 ///
 /// @param master  the object
 /// @return microseconds; 0 means poll now, and is returned within a hook of the port
@@ -247,7 +248,8 @@ pub unsafe extern "C" fn mbm_master_cancel(master: *mut mbm_master) -> u8 {
 /// The status of the last request.
 ///
 /// @param master  the object
-/// @return MBM_PENDING while it is under way, MBM_OK if there was none
+/// @return MBM_PENDING while it is under way, MBM_OK if there was none;
+///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_status(master: *const mbm_master) -> u8 {
     // SAFETY: as the header demands.

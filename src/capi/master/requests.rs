@@ -1,6 +1,7 @@
 //! The ten functions, and their forms without arguments.
 
 use super::{call, mbm_master, request};
+use crate::error::Status;
 use crate::pdu::{bits, registers};
 
 /// Function 01: reads coils into the response words, 16 to a word, lowest bit
@@ -8,11 +9,12 @@ use crate::pdu::{bits, registers};
 ///
 /// This and the nine other functions behave alike. In blocking mode they return
 /// when the request has ended, in non-blocking mode at once with MBM_PENDING, and
-/// mbm_master_poll ends it. Whatever the outcome, they empty the queue of send
-/// and set receive back to the first word. Response words change only on
-/// success, transmit words never. What no device could accept (a quantity that
-/// the standard forbids, addresses beyond 65535) is answered with the exception
-/// that a device would send, and nothing is sent.
+/// mbm_master_poll ends it. They empty the queue of send and set receive back to the
+/// first word, unless they return MBM_BUSY, MBM_NOT_INITIALISED or
+/// MBM_INVALID_ARGUMENT. Response words change only on success. Transmit words stay;
+/// only 06 and 16 store their arguments in them. A request that no device could accept
+/// (a quantity that the standard forbids, addresses beyond 65535) is not sent: the
+/// status is the exception that a device would answer.
 ///
 /// @param master    the object
 /// @param address   first coil, 0 to 65535, as on the wire
@@ -256,7 +258,8 @@ pub unsafe extern "C" fn mbm_master_readWriteQueuedRegisters(
 /// @param address   first register, 0 to 65535
 /// @param quantity  1 to 125
 /// @return how many words mbm_master_receive will give; 0 if the request failed
-///         (mbm_master_status says how) or, non-blocking, is under way
+///         (mbm_master_status says how), another one is under way or, in non-blocking
+///         mode, this one is
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_requestFrom(
     master: *mut mbm_master,
@@ -265,9 +268,9 @@ pub unsafe extern "C" fn mbm_master_requestFrom(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        match mbm_master_readHoldingRegisters(master, address, quantity) {
-            0 => super::mbm_master_available(master),
-            _ => 0,
+        if mbm_master_readHoldingRegisters(master, address, quantity) != Status::OK.code() {
+            return 0;
         }
+        super::mbm_master_available(master)
     }
 }

@@ -87,14 +87,15 @@ pub unsafe extern "C" fn mbm_master_setBaudRate(master: *mut mbm_master, baud: u
 /// A later mbm_master_setBaudRate sets it back to t3.5.
 ///
 /// @param master        the object
-/// @param microseconds  counted from the last byte seen or sent
+/// @param microseconds  counted from the last byte seen or sent; more than 2^31
+///                      (36 minutes) means 2^31
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setGap(master: *mut mbm_master, microseconds: u32) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            master.core.settings().gap = microseconds;
+            master.core.settings().set_gap(microseconds);
             Status::OK
         })
     }
@@ -120,17 +121,22 @@ pub unsafe extern "C" fn mbm_master_setTurnaroundDelay(
     }
 }
 
-/// Sets how long the line is left alone after a request that got no right
-/// reply, so that a late one is not taken for the next. What arrives meanwhile
-/// is dropped.
+/// Sets the quiet time, which keeps a late reply from being taken for the answer
+/// to a later request. RTU itself cannot tell them apart if unit, function and
+/// length are the same, or if the late reply is an exception to the same function.
 ///
-/// RTU cannot tell a late reply of the same unit, function and length, nor a
-/// late exception to the same function, from the one that is waited for; this
-/// time is what makes that rare. A slave that may answer after the response
-/// timeout plus this time needs a longer timeout.
+/// After a request without a right reply, two things happen. The line is left alone
+/// for this time before the next request, and bytes that arrive are dropped. Then the
+/// next reply of that unit is held until nothing has arrived for this time. A second
+/// reply takes the place of the held one, for a device answers in order; if the
+/// second one is damaged, the request fails. So a request after a failure takes one
+/// quiet time longer, all others take no longer.
+///
+/// The time must be longer than the device takes for an answer. If it is shorter, the
+/// second reply may come after the held one was taken for the answer.
 ///
 /// @param master        the object
-/// @param milliseconds  0 to 65535; 100 at first
+/// @param milliseconds  0 to 65535; 100 at first; 0 holds no reply
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setQuietTime(master: *mut mbm_master, milliseconds: u16) -> u8 {

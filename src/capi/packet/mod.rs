@@ -301,6 +301,10 @@ pub unsafe extern "C" fn mbm_packet_parse(
 
 /// How long the PDU is that begins with these bytes.
 ///
+/// A response to function 11 is as long as it counts. Some devices count the id alone:
+/// mbm_packet_parse takes their longer PDU too. mbm_frame_expectedLength tells these
+/// apart, by the frame's check.
+///
 /// Any thread or interrupt may call it.
 ///
 /// @param kind           MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for

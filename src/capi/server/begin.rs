@@ -181,7 +181,8 @@ pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
 }
 
 /// Sets the silence that ends a frame: t3.5 of RTU, the time between two
-/// characters of ASCII. mbm_server_begin and its sisters set it back.
+/// characters of ASCII, and in RTU over TCP the silence after a damaged frame. Without
+/// effect in TCP frames. mbm_server_begin and its sisters set it back.
 ///
 /// @param server        the object
 /// @param microseconds  counted from the last byte seen

@@ -116,7 +116,8 @@ unsafe extern "C" fn monitor(
     }
 }
 
-/// Serves diagnostics: functions 08 with every sub-function, 0B and 0C. From now
+/// Serves diagnostics: functions 08, 0B and 0C. Of 08 it serves the sub-functions that
+/// the standard defines, 00 to 04, 0A to 12 and 14; others are exception 01. From now
 /// on the unit counts what its lines bring, logs events, and can be forced into
 /// listen only mode.
 ///

@@ -24,6 +24,7 @@ use super::port::{self, mbm_port};
 use crate::error::Status;
 use crate::pdu::custom::Rule;
 use crate::server::{Lent, Reply, Server, MOST_REQUESTS};
+use crate::FIRMWARE;
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 
@@ -60,10 +61,10 @@ pub struct mbm_server {
 struct Object {
     // Where one instruction reaches it; on a host, where the core has the address
     // of the object.
-    #[cfg(target_os = "none")]
+    #[cfg(any(target_os = "none", mbm_firmware))]
     mark: u8,
     core: Core,
-    #[cfg(not(target_os = "none"))]
+    #[cfg(not(any(target_os = "none", mbm_firmware)))]
     mark: u8,
 }
 
@@ -173,7 +174,7 @@ unsafe fn serve(core: *mut Core, mark: *const u8) -> Status {
     // are served, or while the clock is read: both are the caller's code.
     unsafe {
         for _ in 0..MOST_REQUESTS {
-            let now = if cfg!(target_os = "none") || (*core).keeps_time() {
+            let now = if FIRMWARE || (*core).keeps_time() {
                 port::now(&raw const (*core).port)
             } else {
                 0

@@ -5,6 +5,7 @@ use super::{mbm_service, mbm_unit};
 use crate::error::Status;
 use crate::server::table::{self, Access, Cells, Kind, Role, Way};
 use crate::server::Reply;
+use crate::FIRMWARE;
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 
@@ -152,7 +153,7 @@ impl Cells for Table {
             let cells = self.cells;
             let bits = self.kind.is_bits();
             // A host has room for code that takes many cells at a time.
-            if cfg!(not(target_os = "none")) {
+            if !FIRMWARE {
                 if bits && write && quantity == 1 {
                     let cell = cells.add(usize::from(first >> 3));
                     let on = data.first().is_some_and(|data| data & 1 != 0);
@@ -320,7 +321,7 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, heading: *co
         let table = service.cast::<mbm_registerTable>();
         let kind = Kind::from_code((*table).kind);
         match table::role(kind, *pdu) {
-            role if cfg!(target_os = "none") => serve_as(role, table, pdu, heading),
+            role if FIRMWARE => serve_as(role, table, pdu, heading),
             // A host takes a way of its own for each.
             Role::READ => serve_read(table, pdu, heading),
             Role::WRITE_ONE => serve_write_one(table, pdu, heading),
@@ -346,7 +347,7 @@ unsafe fn serve_as(
         let (pdu, length) = request(pdu, heading);
         let kind = Kind::from_code((*table).kind);
         let cells = &mut Table::new(table, kind);
-        if cfg!(target_os = "none") || kind.is_bits() {
+        if FIRMWARE || kind.is_bits() {
             table::serve_as(role, kind, cells, pdu, length).code()
         } else {
             table::serve_as(role, Kind::HOLDING_REGISTERS, cells, pdu, length).code()
@@ -396,7 +397,7 @@ unsafe fn serve_more(table: *mut mbm_registerTable, pdu: *mut u8, heading: *cons
     unsafe {
         let (pdu, length) = request(pdu, heading);
         let mut cells = Table::new(table, Kind::HOLDING_REGISTERS);
-        if cfg!(target_os = "none") {
+        if FIRMWARE {
             let cells: &mut dyn Access = &mut cells;
             return table::serve_more(cells, pdu, length).code();
         }

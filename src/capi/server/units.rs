@@ -4,6 +4,7 @@ use super::{custom, mbm_diagnostics};
 use crate::error::Status;
 use crate::pdu::custom::Rule;
 use crate::server::{only_writes, Concern, Heading, Reply};
+use crate::FIRMWARE;
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 
@@ -53,8 +54,9 @@ pub struct mbm_unit {
     >,
     /// Not for you.
     pub diagnostics: *mut mbm_diagnostics,
-    /// The unit id, 1 to 247 (serial line guide V1.02, 2.2). 0 answers to every id. A
-    /// unit that serves nothing is silent, as if it were not there.
+    /// The unit id, 1 to 247 (serial line guide V1.02, 2.2); 248 to 255, which the
+    /// standard reserves, are taken as they are. 0 answers to every id. A unit that
+    /// serves nothing is silent, as if it were not there.
     pub id: u8,
 }
 
@@ -188,7 +190,7 @@ pub(super) unsafe fn serve(
     unsafe {
         // One unit alone, which takes no notice of what is others', and is asked by
         // its id: soon done.
-        if cfg!(not(target_os = "none"))
+        if !FIRMWARE
             && count == 1
             && (*units).serve.is_none()
             && (*heading).length != 0

@@ -1,12 +1,12 @@
 //! Finding responses among what arrived.
 
-use super::{close_up, Tcp};
+use super::Tcp;
+use crate::bytes::move_to_front;
 use crate::client::job::{deliver, take, Job, Stage};
 use crate::client::shared::Shared;
 use crate::client::units::Means;
 use crate::error::Status;
 use crate::frame::tcp::{self, Header};
-use crate::pdu::diagnostics::REPORT_SERVER_ID;
 use crate::port::Port;
 use crate::transaction::Counter;
 
@@ -19,7 +19,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
     #[cold]
     pub(super) fn gather(&mut self) {
         let kept = self.means.frame().get_mut(..usize::from(self.end));
-        close_up(kept.unwrap_or_default(), self.start.into());
+        move_to_front(kept.unwrap_or_default(), self.start.into());
         self.end -= self.start;
         self.start = 0;
     }
@@ -173,9 +173,6 @@ fn judge<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
     let outline = &job.ticket().outline;
     match outline.expected(pdu, pdu.len()) {
         Some(length) if usize::from(length.get()) == pdu.len() => {}
-        // Some devices count the id alone and send more behind it.
-        Some(length)
-            if pdu.first() == Some(&REPORT_SERVER_ID) && usize::from(length.get()) < pdu.len() => {}
         None if pdu.first().map(|code| code & 0x7F) != Some(outline.function()) => {
             return Status::INVALID_FUNCTION;
         }

@@ -7,12 +7,12 @@ use super::job::{Job, Stage};
 use super::shared::Shared;
 use super::units::Means;
 use super::Line;
+use crate::bytes::move_to_front;
 use crate::error::Status;
 use crate::frame::tcp;
 use crate::port::Port;
 use crate::transaction::{Counter, Settings};
-use crate::FAST;
-use core::cell::Cell;
+use crate::FIRMWARE;
 
 /// As many requests at once as the queue holds, in TCP frames. Received bytes
 /// stand in the frame buffer, those to send in [`Means::outgoing`].
@@ -172,12 +172,16 @@ impl<P: Port, S: Means> Tcp<P, S> {
     ) -> Option<(usize, Status)> {
         let mut least = u32::MAX;
         self.blocked = false;
-        let mut jobs = shared.queue.iter_mut();
+        let mut at = 0;
         let ended = loop {
-            let Some(job) = jobs.next() else {
+            if self.next as u8 == 0 {
+                self.skip_numbers_in_use(&shared.queue);
+            }
+            let Some(job) = shared.queue.get_mut(at) else {
                 shared.rest(now, least);
                 return None;
             };
+            at += 1;
             let ticket = job.ticket();
             let mut wait = ticket.remains(now, &mut self.means);
             if wait == 0 {
@@ -198,8 +202,20 @@ impl<P: Port, S: Means> Tcp<P, S> {
             }
             least = least.min(wait);
         };
-        let left = jobs.len();
-        Some((shared.queue.len() - 1 - left, ended))
+        Some((at - 1, ended))
+    }
+
+    /// Moves `next`, the first of 256 numbers, to the first of 256 that no pending
+    /// request has. At most 255 requests are pending, so there are such numbers, and
+    /// the other 255 need no look at the queue.
+    #[cold]
+    fn skip_numbers_in_use<J: Job>(&mut self, queue: &[J]) {
+        while queue.iter().any(|job| {
+            let ticket = job.ticket();
+            ticket.is_sent() && ticket.wire >> 8 == self.next >> 8
+        }) {
+            self.next = self.next.wrapping_add(256);
+        }
     }
 
     /// Puts a request behind those that are to be sent; [`Status::BUSY`] if it has
@@ -299,7 +315,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
                 continue;
             }
             if at >= usize::from(self.sent) {
-                close_up(rest, header.total);
+                move_to_front(rest, header.total);
                 self.filled -= header.total as u16;
                 if self.sent == self.filled {
                     self.sent = 0;
@@ -334,15 +350,6 @@ impl<P: Port, S: Means> Tcp<P, S> {
         self.clear();
         shared.lose();
         shared.end(0, Status::LINK_LOST, now, &mut self.means)
-    }
-}
-
-/// Moves what stands behind the first `by` bytes over them.
-#[cfg_attr(target_os = "none", inline(never))]
-fn close_up(bytes: &mut [u8], by: usize) {
-    let cells = Cell::from_mut(bytes).as_slice_of_cells();
-    for (to, from) in cells.iter().zip(cells.get(by..).unwrap_or_default()) {
-        to.set(from.get());
     }
 }
 
@@ -400,7 +407,7 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
         let mut fresh = fresh && (self.flying > 0 || shared.delay(now) > 0);
         loop {
             if self.start < self.end {
-                if FAST {
+                if !FIRMWARE {
                     if let Some(job) = self.find_read(shared, now) {
                         return Some(job);
                     }
@@ -428,7 +435,7 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
         shared.abandon(|job| job.ticket().is_sent());
     }
 
-    fn delay(&self, _: u32) -> Option<u32> {
+    fn delay(&mut self, _: u32) -> Option<u32> {
         (self.sent < self.filled).then_some(super::FULL_PORT)
     }
 }

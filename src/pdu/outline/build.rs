@@ -13,6 +13,9 @@ use super::form::*;
 use super::{Outline, HEAD};
 use crate::error::Status;
 
+// Each is a part of the one function of C that calls it, and again of the one that
+// forwards: so firmware that forwards nothing pays nothing ("client: RTU, every
+// function" in docs/size.md).
 impl Outline {
     /// Becomes a request of two words, as far as its form has them.
     /// [`Status::OK`]; [`Status::ILLEGAL_DATA_VALUE`] for a quantity that the
@@ -53,6 +56,7 @@ impl Outline {
     }
 
     /// 16: the register becomes `(register & and) | (or & !and)`.
+    #[cfg_attr(target_os = "none", inline(always))]
     pub fn mask_write_register(&mut self, address: u16, and_mask: u16, or_mask: u16) -> Status {
         self.set(Form::MASK_WRITE_REGISTER, address, and_mask);
         self.put(5, or_mask);
@@ -61,6 +65,7 @@ impl Outline {
 
     /// 17: 1 to 121 registers are written, then 1 to 125 read; else as
     /// [`Outline::set`].
+    #[cfg_attr(target_os = "none", inline(always))]
     pub fn read_write_registers(
         &mut self,
         read_address: u16,
@@ -83,6 +88,7 @@ impl Outline {
 
     /// 08: a sub-function and `words` words of data; all but Return Query Data
     /// take one. [`Status::ILLEGAL_DATA_VALUE`] for another number of them.
+    #[cfg_attr(target_os = "none", inline(always))]
     pub fn diagnostics(&mut self, sub_function: u16, words: u16) -> Status {
         self.set(Form::DIAGNOSTICS, sub_function, 0);
         self.data_length = (words << 1) as u8;
@@ -162,6 +168,7 @@ impl Outline {
     }
 
     /// 2B/0E: read device id code 1 to 4 and the object to begin with.
+    #[cfg_attr(target_os = "none", inline(always))]
     pub fn read_device_identification(&mut self, code: u8, object: u8) -> Status {
         self.encapsulated(MEI_READ_DEVICE_IDENTIFICATION, 0);
         // Its data begin behind the code.
@@ -182,6 +189,7 @@ impl Outline {
 
     /// A function of the user's with so many `bytes` of data, whose response is
     /// as long as `rule` says.
+    #[cfg_attr(target_os = "none", inline(always))]
     pub fn custom(&mut self, function: u8, bytes: u16, rule: Rule) -> Status {
         self.set(Form::new(function, OWN, 1, 0, 0, 1), 0, 0);
         let (kind, length, more) = match rule {
@@ -202,7 +210,7 @@ impl Outline {
     }
 
     /// So many bytes of data follow the head.
-    fn follow(&mut self, bytes: u16) -> Status {
+    pub(super) fn follow(&mut self, bytes: u16) -> Status {
         self.data_length = bytes as u8;
         value(usize::from(bytes) + usize::from(self.head_length) <= MAX_PDU)
     }

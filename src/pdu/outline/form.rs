@@ -91,6 +91,9 @@ impl Form {
         (self.0 >> at) as u8 & 7
     }
 
+    /// No request.
+    pub(super) const NONE: Form = Form(0);
+
     /// 01: address and quantity.
     pub const READ_COILS: Form = Form::bits(bits::READ_COILS);
     /// 02: address and quantity.
@@ -124,8 +127,8 @@ impl Form {
         registers::WRITE_MULTIPLE_REGISTERS,
         RANGE | COUNTED | SENDS_WORDS,
     );
-    /// 11.
-    pub const REPORT_SERVER_ID: Form = Form::bare(diagnostics::REPORT_SERVER_ID, COUNTS, 1, 2);
+    /// 11. Its response may be longer than it counts.
+    pub const REPORT_SERVER_ID: Form = Form::bare(diagnostics::REPORT_SERVER_ID, OWN, 0, 2);
     /// 16, of which the OR mask is to be added.
     pub(super) const MASK_WRITE_REGISTER: Form =
         Form::new(registers::MASK_WRITE_REGISTER, BROADCAST, 7, 7, 7, 0);

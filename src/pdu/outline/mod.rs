@@ -6,15 +6,16 @@
 
 mod build;
 mod form;
+mod forward;
 
 pub use form::Form;
 
 use super::identification::{self, MEI_READ_DEVICE_IDENTIFICATION};
 use super::length::Length;
 use super::limits::{MAX_FIFO, MAX_PDU};
-use super::{files, length, EXCEPTION};
+use super::{diagnostics, files, length, EXCEPTION};
 use crate::error::Status;
-use crate::FAST;
+use crate::FIRMWARE;
 use core::num::NonZeroU8;
 use form::*;
 
@@ -41,7 +42,7 @@ pub struct Outline {
 impl Outline {
     /// No request.
     pub const NONE: Outline = Outline {
-        form: Form(0),
+        form: Form::NONE,
         head: [0; HEAD],
         head_length: 0,
         data_length: 0,
@@ -143,7 +144,7 @@ impl Outline {
     /// little cost. Firmware, where code is dearer, has [`Outline::emit`] alone.
     #[inline]
     pub fn two_words(&self) -> Option<&[u8; 4]> {
-        if FAST && self.head_length == 5 && self.data_length == 0 && !self.form.has(COUNTED) {
+        if !FIRMWARE && self.head_length == 5 && self.data_length == 0 && !self.form.has(COUNTED) {
             self.head.first_chunk::<5>()?.last_chunk()
         } else {
             None
@@ -175,7 +176,8 @@ impl Outline {
 
     /// The length of the response that begins with the bytes of `pdu`, or the
     /// least length while they do not tell; `None` if no response to it begins
-    /// so. Where nothing but its end tells, it is `whole`.
+    /// so. Where nothing but its end tells, it is `whole`; of 11, what it counts if
+    /// that is more.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn expected(&self, pdu: &[u8], whole: usize) -> Option<NonZeroU8> {
         let length = match pdu {
@@ -205,9 +207,10 @@ impl Outline {
         }
     }
 
-    /// The length where the response's own rules tell: of 18 and 2B/0E, or of
+    /// The length where the response's own rules tell: of 11, 18 and 2B/0E, or of
     /// what only its end ends.
     fn own_length(&self, pdu: &[u8], whole: usize) -> usize {
+        let mut least = 2;
         let rule = match self.head {
             [files::READ_FIFO_QUEUE, ..] => match pdu.get(1..3) {
                 Some([0, low]) => Length::Exactly(3 + usize::from(*low)),
@@ -217,19 +220,25 @@ impl Outline {
             [identification::ENCAPSULATED_INTERFACE_TRANSPORT, MEI_READ_DEVICE_IDENTIFICATION, ..] => {
                 length::objects(pdu)
             }
+            // Some devices count the id alone and send more after it.
+            [diagnostics::REPORT_SERVER_ID, ..] => {
+                least += usize::from(pdu.get(1).copied().unwrap_or(0));
+                Length::Silence
+            }
             _ => Length::Silence,
         };
         match rule {
             Length::Exactly(length) | Length::AtLeast(length) => length,
-            _ => whole.max(2),
+            _ => whole.max(least),
         }
     }
 
     /// How many bytes of data answer a read, behind function code and byte count;
-    /// `None` of other requests.
+    /// `None` of other requests, and of those whose data begin elsewhere.
     #[inline]
     pub fn data_of_read(&self) -> Option<u8> {
-        (self.form.0 & (KIND | GROUP) == READ).then_some(self.length.wrapping_sub(2))
+        let form = self.form.0 & (KIND | 7 << DATA);
+        (form == READ | 2 << DATA).then_some(self.length.wrapping_sub(2))
     }
 
     /// What a complete response of the [`Outline::expected`] length says:

@@ -1,9 +1,11 @@
 //! Requests for what a device tells of itself, its files, and functions of the
 //! user's.
 
-use super::{bare, plain, queue};
+use super::{bare, plain, prepare, queue, submit};
+use crate::capi::client::request::Inside;
 use crate::capi::client::{mbm_client, mbm_clientRequest};
 use crate::capi::functions::{mbm_rule, rule};
+use crate::capi::pointers::lent_or_none;
 use crate::error::Status;
 use crate::pdu::outline::Form;
 
@@ -22,11 +24,13 @@ pub unsafe extern "C" fn mbm_client_readExceptionStatus(
 }
 
 /// Function 08: sends the words of `data`, and reads as many into `reply` (V1.1b3,
-/// 6.8). Nobody responds to sub-function 04, Force Listen Only Mode.
+/// 6.8). No device responds to sub-function 04, Force Listen Only Mode.
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param subFunction  0 (Return Query Data) to 0x14
+/// @param subFunction  0 (Return Query Data) to 0x14. Others, which the standard
+///                     reserves, are sent as they are, and a response of one word is
+///                     expected; for one of another length see mbm_client_custom
 /// @param words  1; 1 to 125 for sub-function 0
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
@@ -75,8 +79,9 @@ pub unsafe extern "C" fn mbm_client_getCommEventLog(
 }
 
 /// Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13). `reply`
-/// gets what stands behind the byte count; on TCP also what a device sends that counts
-/// the id alone. On a serial line the count must be true.
+/// gets all that follows the byte count, also from a device that counts its id alone
+/// and sends more. In RTU frames the silence after it ends such a reply; one that
+/// counts right is not waited for.
 ///
 /// @param client   the object
 /// @param request  the request
@@ -261,5 +266,59 @@ pub unsafe extern "C" fn mbm_client_custom(
                 None => Status::INVALID_ARGUMENT,
             }
         })
+    }
+}
+
+/// Any request, as it arrived from another client: sends `function` and the bytes of
+/// `body`, and reads into `reply` all bytes that follow the function code of the
+/// response, as on the wire. This is what a gateway needs: `body` and `reply` are
+/// what the functions of mbm_server_serveCustom get and return.
+///
+/// A response counts only if it answers this request, as in the functions above: its
+/// length, byte count, echoed address, value, quantity and records must be right. Of a
+/// function that the standard does not define, and of sub-functions of 08 from 0x15 on,
+/// silence ends the response on RTU. If you know its length, use mbm_client_custom.
+///
+/// 08 with sub-function 04 gets no response: it ends with MBM_OK and `length` 0 after
+/// the turnaround delay.
+///
+/// @param client    the object
+/// @param request   the request; if it is queued, its `data` then points into `body`
+/// @param function  1 to 127
+/// @param body      the bytes after the function code; leave them alone until the
+///                  request has ended; may be NULL if there are none
+/// @param bytes     0 to 252
+/// @return a status; see mbm_client_readCoils. MBM_ILLEGAL_DATA_VALUE also for a body
+///         whose length or counts are wrong, MBM_ILLEGAL_FUNCTION for function 0 or
+///         one above 127: what a server answers to such a request
+#[no_mangle]
+pub unsafe extern "C" fn mbm_client_forward(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+    function: u8,
+    body: *const u8,
+    bytes: u16,
+) -> u8 {
+    // SAFETY: as the header demands. The data are the last bytes of the body.
+    unsafe {
+        let status = prepare(client, request);
+        if status != Status::OK {
+            return status.code();
+        }
+        let inside = &mut *request.cast::<Inside>();
+        let before = inside.data;
+        let built = match lent_or_none(body, bytes.into()) {
+            Some(whole) => inside.ticket.outline.forward(function, whole),
+            None => Status::INVALID_ARGUMENT,
+        };
+        if built == Status::OK {
+            let head = bytes - u16::from(inside.ticket.outline.data_length());
+            inside.data = body.wrapping_add(head.into());
+        }
+        let status = submit(client, request, built);
+        if status != Status::PENDING {
+            (*request.cast::<Inside>()).data = before;
+        }
+        status.code()
     }
 }

@@ -1,0 +1,203 @@
+/* Requests that the client sends as they arrived, and the replies that it takes for
+ * them, over a port in memory. */
+#include "memory_port.h"
+#include "test.h"
+
+#include <string.h>
+
+enum { UNIT = 7, REPLY = 252 };
+
+typedef struct exchange {
+    const char *request, *response;
+    uint8_t bytes, response_bytes;
+} exchange;
+
+#define EXCHANGE(request, response) {request, response, sizeof request - 1, sizeof response - 1}
+
+static const exchange exchanges[] = {
+    EXCHANGE("\x01\x00\x13\x00\x0D", "\x01\x02\xCD\xFF"), /* the padding too is as it came */
+    EXCHANGE("\x02\x00\xC4\x00\x16", "\x02\x03\xAC\xDB\x35"),
+    EXCHANGE("\x03\x00\x6B\x00\x03", "\x03\x06\x02\x2B\x00\x00\x00\x64"),
+    EXCHANGE("\x04\x00\x08\x00\x01", "\x04\x02\x00\x0A"),
+    EXCHANGE("\x05\x00\xAC\xFF\x00", "\x05\x00\xAC\xFF\x00"),
+    EXCHANGE("\x06\x00\x01\x12\x34", "\x06\x00\x01\x12\x34"),
+    EXCHANGE("\x07", "\x07\x6D"),
+    EXCHANGE("\x08\x00\x00\x12\x34\x56\x78", "\x08\x00\x00\x12\x34\x56\x78"),
+    EXCHANGE("\x08\x00\x0B\x00\x00", "\x08\x00\x0B\x12\x34"),
+    EXCHANGE("\x0B", "\x0B\xFF\xFF\x01\x08"),
+    EXCHANGE("\x0C", "\x0C\x08\x00\x00\x01\x08\x01\x21\x20\x00"),
+    EXCHANGE("\x0F\x00\x13\x00\x0A\x02\xCD\xFF", "\x0F\x00\x13\x00\x0A"),
+    EXCHANGE("\x10\x00\x01\x00\x02\x04\x00\x0A\x01\x02", "\x10\x00\x01\x00\x02"),
+    EXCHANGE("\x11", "\x11\x03" "abc"),
+    EXCHANGE("\x14\x0E\x06\x00\x04\x00\x01\x00\x02\x06\x00\x03\x00\x09\x00\x02",
+             "\x14\x0C\x05\x06\x0D\xFE\x00\x20\x05\x06\x33\xCD\x00\x40"),
+    EXCHANGE("\x15\x0D\x06\x00\x04\x00\x07\x00\x03\x06\xAF\x04\xBE\x10\x0D",
+             "\x15\x0D\x06\x00\x04\x00\x07\x00\x03\x06\xAF\x04\xBE\x10\x0D"),
+    EXCHANGE("\x16\x00\x04\x00\xF2\x00\x25", "\x16\x00\x04\x00\xF2\x00\x25"),
+    EXCHANGE("\x17\x00\x03\x00\x02\x00\x0E\x00\x01\x02\x00\xFF", "\x17\x04\x00\xFE\x0A\xCD"),
+    EXCHANGE("\x18\x04\xDE", "\x18\x00\x06\x00\x02\x01\xB8\x12\x84"),
+    EXCHANGE("\x2B\x0E\x01\x00", "\x2B\x0E\x01\x01\x00\x00\x01\x00\x02" "ab"),
+    EXCHANGE("\x2B\x0D\x01\x02", "\x2B\x0D\x03\x04\x05"),
+    EXCHANGE("\x41" "own", "\x41" "any data"),
+};
+
+static const int framings[] = {MBM_FRAMING_RTU, MBM_FRAMING_TCP, MBM_FRAMING_RTU_OVER_TCP};
+
+static memory_port m;
+static mbm_client client;
+static mbm_clientRequest request;
+static uint8_t frame[MBM_MAX_TCP_FRAME], outgoing[MBM_MAX_TCP_FRAME], reply[REPLY];
+
+static void begin(int framing)
+{
+    mbm_port port = memory_port_of(&m);
+
+    memset(&m, 0, sizeof m);
+    memset(&client, 0, sizeof client);
+    memset(&request, 0, sizeof request);
+    memset(reply, 0xEE, sizeof reply);
+    if (framing == MBM_FRAMING_RTU)
+        OK(mbm_client_beginRtu(&client, &port, frame, sizeof frame));
+    else if (framing == MBM_FRAMING_RTU_OVER_TCP)
+        OK(mbm_client_beginRtuOverTcp(&client, &port, frame, sizeof frame));
+    else
+        OK(mbm_client_beginTcp(&client, &port, frame, sizeof frame, outgoing, sizeof outgoing));
+    request.unit = UNIT;
+    request.reply = reply;
+    request.replyBytes = sizeof reply;
+}
+
+static uint8_t forward(const char *pdu, uint16_t bytes)
+{
+    const uint8_t *body = (const uint8_t *)pdu + 1;
+
+    return mbm_client_forward(&client, &request, (uint8_t)pdu[0], body, (uint16_t)(bytes - 1));
+}
+
+/* Sends the request, lets the response arrive, and gives the status. */
+static uint8_t exchange_once(int framing, const exchange *e, const uint8_t *response, uint8_t bytes)
+{
+    uint8_t adu[300] = {0, 0, 0, 0, 0, (uint8_t)(bytes + 1), UNIT};
+
+    begin(framing);
+    IS(MBM_PENDING, forward(e->request, e->bytes));
+    memory_port_send(&m, &client);
+    memcpy(adu + 7, response, bytes);
+    if (framing == MBM_FRAMING_TCP) {
+        assert_int_equal(m.sent_count, 7 + e->bytes);
+        assert_memory_equal(m.sent + 7, e->request, e->bytes);
+        memcpy(adu, m.sent, 2);
+        memory_port_bytes(&m, adu, 7u + bytes);
+    } else {
+        assert_int_equal(m.sent_count, 1 + e->bytes + 2);
+        assert_memory_equal(m.sent + 1, e->request, e->bytes);
+        memory_port_rtu(&m, adu + 6, 1u + bytes);
+    }
+    return memory_port_run(&m, &client, &request, 1000);
+}
+
+static void every_function_is_sent_and_its_response_taken_as_on_the_wire(void **state)
+{
+    unsigned i, k;
+
+    (void)state;
+    for (i = 0; i < COUNT(framings); i++)
+        for (k = 0; k < COUNT(exchanges); k++) {
+            const exchange *e = &exchanges[k];
+            uint8_t exception[] = {(uint8_t)(e->request[0] | 0x80), 4};
+
+            IS(MBM_OK, exchange_once(framings[i], e, (const uint8_t *)e->response,
+                                     e->response_bytes));
+            assert_int_equal(request.length, e->response_bytes - 1);
+            assert_memory_equal(reply, e->response + 1, request.length);
+            assert_int_equal(reply[request.length], 0xEE);
+            IS(4, exchange_once(framings[i], e, exception, sizeof exception));
+            assert_int_equal(request.exception, 4);
+        }
+}
+
+/* Functions whose response the standard ties to the request, byte by byte. */
+static void a_response_whose_repeated_bytes_differ_is_not_taken(void **state)
+{
+    static const struct {
+        uint8_t function, first, last;
+    } repeated[] = {{1, 1, 1}, {2, 1, 1}, {3, 1, 1}, {4, 1, 1}, {5, 1, 4}, {6, 1, 4},
+                    {0x0F, 1, 4}, {0x10, 1, 4}, {0x14, 1, 3}, {0x15, 1, 14}, {0x16, 1, 6},
+                    {0x17, 1, 1}, {0x2B, 1, 2}};
+    unsigned i, k, r, at;
+
+    (void)state;
+    for (i = 0; i < COUNT(framings); i++)
+        for (k = 0; k < COUNT(exchanges) - 2; k++)
+            for (r = 0; r < COUNT(repeated); r++) {
+                const exchange *e = &exchanges[k];
+
+                if ((uint8_t)e->request[0] != repeated[r].function)
+                    continue;
+                for (at = repeated[r].first; at <= repeated[r].last; at++) {
+                    uint8_t other[64];
+
+                    memcpy(other, e->response, e->response_bytes);
+                    other[at] ^= 1;
+                    assert_true(exchange_once(framings[i], e, other, e->response_bytes) >= 0xE0);
+                    assert_int_equal(reply[0], 0xEE);
+                }
+            }
+}
+
+static void force_listen_only_mode_ends_without_a_response(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(framings); i++) {
+        begin(framings[i]);
+        IS(MBM_PENDING, forward("\x08\x00\x04\x00\x00", 5));
+        IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
+        assert_int_equal(request.length, 0);
+    }
+}
+
+static void a_request_that_is_not_forwarded_is_not_queued(void **state)
+{
+    static const uint8_t body[253] = {0};
+    const void *before = &body[9];
+
+    (void)state;
+    begin(MBM_FRAMING_RTU);
+    request.data = before;
+    IS(MBM_ILLEGAL_DATA_VALUE, forward("\x03\x00\x00\x00\x00", 5));
+    IS(MBM_ILLEGAL_DATA_VALUE, forward("\x03\x00\x00\x00\x01\x00", 6));
+    IS(MBM_ILLEGAL_DATA_ADDRESS, forward("\x03\xFF\xFF\x00\x02", 5));
+    IS(MBM_ILLEGAL_DATA_VALUE, forward("\x10\x00\x00\x00\x01\x03\x00\x00", 8));
+    IS(MBM_ILLEGAL_FUNCTION, mbm_client_forward(&client, &request, 0, body, 4));
+    IS(MBM_ILLEGAL_FUNCTION, mbm_client_forward(&client, &request, 0x83, body, 4));
+    IS(MBM_ILLEGAL_DATA_VALUE, mbm_client_forward(&client, &request, 0x41, body, 253));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_forward(&client, &request, 0x41, NULL, 1));
+    request.replyBytes = 6;
+    IS(MBM_BUFFER_TOO_SMALL, forward("\x03\x00\x00\x00\x03", 5));
+    request.unit = 0;
+    request.replyBytes = sizeof reply;
+    IS(MBM_BROADCAST_NOT_ALLOWED, forward("\x03\x00\x00\x00\x03", 5));
+    assert_ptr_equal(request.data, before);
+    assert_int_equal(mbm_client_pending(&client), 0);
+    request.unit = UNIT;
+    IS(MBM_PENDING, mbm_client_forward(&client, &request, 0x41, NULL, 0));
+    IS(MBM_BUSY, mbm_client_forward(&client, &request, 0x41, NULL, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_forward(&client, NULL, 0x41, NULL, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_forward(NULL, &request, 0x41, NULL, 0));
+    memset(&client, 0, sizeof client);
+    IS(MBM_NOT_INITIALISED, mbm_client_forward(&client, &request, 0x41, NULL, 0));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_function_is_sent_and_its_response_taken_as_on_the_wire),
+        cmocka_unit_test(a_response_whose_repeated_bytes_differ_is_not_taken),
+        cmocka_unit_test(force_listen_only_mode_ends_without_a_response),
+        cmocka_unit_test(a_request_that_is_not_forwarded_is_not_queued),
+    };
+
+    return cmocka_run_group_tests_name("client forward", tests, NULL, NULL);
+}

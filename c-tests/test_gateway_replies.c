@@ -1,0 +1,346 @@
+/* Which replies of a device the gateway example passes on: the device is the test. */
+#define _GNU_SOURCE
+#include "asked.h"
+#include "await.h"
+#include "clock.h"
+#include "crc.h"
+#include "program.h"
+#include "tcp_server.h"
+#include "test.h"
+
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { UNIT = 5 };
+
+static program gateway;
+static pty line;
+static uint16_t port;
+static served ours;
+
+/* Starts a gateway whose one line is at `path`, with the options before its port. */
+static void start_gateway(const char *path, const char *timeout, const char *const *options)
+{
+    char text[64], argument[128];
+    const char *arguments[8];
+    unsigned number, count = 0;
+
+    snprintf(argument, sizeof argument, "%s,115200,N1,1-30", path);
+    while (options && *options)
+        arguments[count++] = *options++;
+    arguments[count++] = "0";
+    arguments[count++] = timeout;
+    arguments[count++] = argument;
+    arguments[count] = NULL;
+    program_start(&gateway, "gateway", arguments);
+    program_line(&gateway, text, sizeof text);
+    assert_int_equal(sscanf(text, "ready %u", &number), 1);
+    port = (uint16_t)number;
+}
+
+static void stop_gateway(void)
+{
+    kill(gateway.pid, SIGTERM);
+    assert_int_equal(program_end(&gateway), 0);
+}
+
+/* Sends a request PDU as a TCP client. */
+static void ask(int fd, const uint8_t *pdu, size_t length)
+{
+    uint8_t frame[MBM_MAX_TCP_FRAME] = {0x12, 0x34, 0, 0, 0, (uint8_t)(length + 1), UNIT};
+
+    memcpy(frame + 7, pdu, length);
+    assert_int_equal(write(fd, frame, length + 7), length + 7);
+}
+
+/* Reads so many bytes, and no more than those. */
+static void get(int fd, uint8_t *bytes, size_t count)
+{
+    struct pollfd readable = {fd, POLLIN, 0};
+
+    while (count > 0) {
+        ssize_t got;
+
+        assert_int_equal(poll(&readable, 1, PATIENCE_MS), 1);
+        got = read(fd, bytes, count);
+        assert_true(got > 0);
+        bytes += got;
+        count -= (size_t)got;
+    }
+}
+
+/* Expects the next response that a TCP client gets. */
+static void expect(int fd, const uint8_t *pdu, size_t length)
+{
+    const uint8_t head[] = {0x12, 0x34, 0, 0, 0, (uint8_t)(length + 1), UNIT};
+    uint8_t frame[MBM_MAX_TCP_FRAME];
+
+    get(fd, frame, 9);
+    assert_memory_equal(frame, head, sizeof head);
+    get(fd, frame + 9, length - 2);
+    assert_memory_equal(frame + 7, pdu, length);
+}
+
+/* As the device, expects a request on the line. */
+static void expect_request(const uint8_t *pdu, size_t length)
+{
+    uint8_t wanted[MBM_MAX_FRAME] = {UNIT}, frame[MBM_MAX_FRAME];
+
+    memcpy(wanted + 1, pdu, length);
+    length = seal(wanted, length + 1);
+    get(line.ours, frame, length);
+    assert_memory_equal(frame, wanted, length);
+}
+
+/* As the device, replies. */
+static void reply(const uint8_t *pdu, size_t length)
+{
+    uint8_t frame[MBM_MAX_FRAME] = {UNIT};
+
+    memcpy(frame + 1, pdu, length);
+    length = seal(frame, length + 1);
+    assert_int_equal(write(line.ours, frame, length), length);
+}
+
+#define ASK(fd, pdu) ask(fd, (const uint8_t *)(pdu), sizeof(pdu) - 1)
+#define EXPECT(fd, pdu) expect(fd, (const uint8_t *)(pdu), sizeof(pdu) - 1)
+#define REQUEST(pdu) expect_request((const uint8_t *)(pdu), sizeof(pdu) - 1)
+#define REPLY(pdu) reply((const uint8_t *)(pdu), sizeof(pdu) - 1)
+
+/* One client's request gets no reply in time; that comes after the request of
+ * another client, before its reply. The PDUs end with their last byte. */
+typedef struct late {
+    const char *request, *late_reply, *other, *other_reply;
+    size_t lengths[4];
+} late;
+
+#define LATE(request, reply, other, other_reply)                                                   \
+    {request, reply, other, other_reply, {sizeof request - 1, sizeof reply - 1, sizeof other - 1,  \
+                                          sizeof other_reply - 1}}
+
+static void a_late_reply_to_one_client_does_not_reach_another(void **state)
+{
+    static const late cases[] = {
+        LATE("\x03\x00\x00\x00\x03", "\x03\x06\x00\x01\x00\x02\x00\x03", /* other lengths */
+             "\x03\x00\x10\x00\x01", "\x03\x02\xAB\xCD"),
+        LATE("\x01\x00\x00\x00\x10", "\x01\x02\xFF\xFF", "\x01\x00\x20\x00\x08", "\x01\x01\x55"),
+        LATE("\x06\x00\x05\x00\x07", "\x06\x00\x05\x00\x07", /* other echoes */
+             "\x06\x00\x06\x00\x08", "\x06\x00\x06\x00\x08"),
+        LATE("\x10\x00\x05\x00\x01\x02\x11\x11", "\x10\x00\x05\x00\x01",
+             "\x10\x00\x09\x00\x01\x02\x22\x22", "\x10\x00\x09\x00\x01"),
+        LATE("\x08\x00\x00\x11\x11", "\x08\x00\x00\x11\x11", "\x08\x00\x00\x22\x22",
+             "\x08\x00\x00\x22\x22"),
+        LATE("\x14\x07\x06\x00\x01\x00\x00\x00\x02", "\x14\x06\x05\x06\x00\x01\x00\x02",
+             "\x14\x07\x06\x00\x01\x00\x00\x00\x01", "\x14\x04\x03\x06\xAB\xCD"),
+        LATE("\x2B\x0E\x01\x00", "\x2B\x0E\x01\x01\x00\x00\x01\x00\x01\x41", "\x2B\x0E\x04\x02",
+             "\x2B\x0E\x04\x81\x00\x00\x01\x02\x01\x42"),
+    };
+    unsigned i;
+
+    (void)state;
+    pty_open(&line);
+    start_gateway(line.path, "1000", NULL);
+    for (i = 0; i < COUNT(cases); i++) {
+        const late *c = &cases[i];
+        const uint8_t no_response[] = {(uint8_t)(c->request[0] | 0x80), 0x0B};
+        int first = tcp_connect(port), second = tcp_connect(port);
+
+        ask(first, (const uint8_t *)c->request, c->lengths[0]);
+        expect_request((const uint8_t *)c->request, c->lengths[0]);
+        expect(first, no_response, sizeof no_response);
+        ask(second, (const uint8_t *)c->other, c->lengths[2]);
+        expect_request((const uint8_t *)c->other, c->lengths[2]);
+        reply((const uint8_t *)c->late_reply, c->lengths[1]);
+        reply((const uint8_t *)c->other_reply, c->lengths[3]);
+        expect(second, (const uint8_t *)c->other_reply, c->lengths[3]);
+        close(first);
+        close(second);
+    }
+    stop_gateway();
+    pty_close(&line);
+}
+
+static void a_reply_that_does_not_answer_the_request_is_0b(void **state)
+{
+    static const char *const no_answers[][2] = {
+        {"\x03\x00\x64\x00\x03", "\x03\x02\x12\x34"},             /* one register of three */
+        {"\x03\x00\x64\x00\x01", "\x03\x06\x11\x11\x22\x22\x33\x33"}, /* three for one */
+        {"\x01\x00\x64\x00\x09", "\x01\x01\xFF"},                 /* nine coils in one byte */
+        {"\x05\x00\x64\xFF\x00", "\x05\x00\x64\x00\x00"},         /* another value */
+        {"\x06\x00\x64\x12\x34", "\x06\x00\x65\x12\x34"},         /* another address */
+    };
+    static const uint8_t lengths[][2] = {{5, 4}, {5, 8}, {5, 3}, {5, 5}, {5, 5}};
+    unsigned i;
+    int fd;
+
+    (void)state;
+    pty_open(&line);
+    start_gateway(line.path, "500", NULL);
+    fd = tcp_connect(port);
+    for (i = 0; i < COUNT(no_answers); i++) {
+        const uint8_t *request = (const uint8_t *)no_answers[i][0];
+        const uint8_t no_response[] = {request[0] | 0x80, 0x0B};
+
+        ask(fd, request, lengths[i][0]);
+        expect_request(request, lengths[i][0]);
+        reply((const uint8_t *)no_answers[i][1], lengths[i][1]);
+        expect(fd, no_response, sizeof no_response);
+    }
+    close(fd);
+    stop_gateway();
+    pty_close(&line);
+}
+
+static void a_request_that_no_device_may_carry_out_does_not_reach_the_line(void **state)
+{
+    struct pollfd asked = {0, POLLIN, 0};
+    int fd;
+
+    (void)state;
+    pty_open(&line);
+    start_gateway(line.path, "3000", NULL);
+    fd = tcp_connect(port);
+    ASK(fd, "\x03\x00\x64\x00\x00");
+    EXPECT(fd, "\x83\x03");
+    ASK(fd, "\x03\xFF\xFF\x00\x02");
+    EXPECT(fd, "\x83\x02");
+    ASK(fd, "\x10\x00\x64\x00\x02\x02\x12\x34");
+    EXPECT(fd, "\x90\x03");
+    asked.fd = line.ours;
+    assert_int_equal(poll(&asked, 1, 0), 0);
+    close(fd);
+    stop_gateway();
+    pty_close(&line);
+}
+
+static void force_listen_only_mode_is_passed_on_and_gets_no_response(void **state)
+{
+    int fd;
+
+    (void)state;
+    pty_open(&line);
+    start_gateway(line.path, "20000", NULL);
+    fd = tcp_connect(port);
+    ASK(fd, "\x08\x00\x04\x00\x00");
+    REQUEST("\x08\x00\x04\x00\x00");
+    ASK(fd, "\x07");
+    REQUEST("\x07");
+    REPLY("\x07\x6D");
+    EXPECT(fd, "\x07\x6D");
+    close(fd);
+    stop_gateway();
+    pty_close(&line);
+}
+
+static void functions_that_it_does_not_know_pass_through(void **state)
+{
+    int fd;
+
+    (void)state;
+    pty_open(&line);
+    start_gateway(line.path, "20000", NULL);
+    fd = tcp_connect(port);
+    ASK(fd, "\x64 any data");
+    REQUEST("\x64 any data");
+    REPLY("\x64 of any length at all");
+    EXPECT(fd, "\x64 of any length at all");
+    /* A sub-function of diagnostics that the standard reserves. */
+    ASK(fd, "\x08\x00\x15\x00\x03\x00\x00");
+    REQUEST("\x08\x00\x15\x00\x03\x00\x00");
+    REPLY("\x08\x00\x15\x00\x04\x12\x34\x56\x78");
+    EXPECT(fd, "\x08\x00\x15\x00\x04\x12\x34\x56\x78");
+    /* CANopen. */
+    ASK(fd, "\x2B\x0D\x01\x02\x03");
+    REQUEST("\x2B\x0D\x01\x02\x03");
+    REPLY("\x2B\x0D\x04\x05");
+    EXPECT(fd, "\x2B\x0D\x04\x05");
+    close(fd);
+    stop_gateway();
+    pty_close(&line);
+}
+
+static void every_function_of_our_server_passes_through(void **state)
+{
+    modbus_t *client;
+    int fd;
+
+    (void)state;
+    served_prepare(&ours);
+    served_on_line(&ours, MBM_FRAMING_RTU);
+    start_gateway(ours.line.path, "20000", NULL);
+    fd = tcp_connect(port);
+    asked_functions(fd, MBM_FRAMING_TCP, &ours);
+    close(fd);
+    fd = tcp_connect(port);
+    asked_lies(fd, MBM_FRAMING_TCP, &ours);
+    close(fd);
+    client = modbus_new_tcp("127.0.0.1", port);
+    assert_non_null(client);
+    assert_int_equal(modbus_connect(client), 0);
+    modbus_set_response_timeout(client, PATIENCE_MS / 1000, 0);
+    modbus_set_slave(client, SERVED_UNIT);
+    asked_reads(client);
+    asked_writes(client, &ours);
+    asked_edges(client);
+    asked_refusals(client, &ours);
+    modbus_close(client);
+    modbus_free(client);
+    stop_gateway();
+    served_stop(&ours);
+}
+
+/* The times are the least that can be: a busy machine makes them longer. */
+static void the_quiet_time_is_an_option(void **state)
+{
+    static const char *const options[] = {"-q", "1000", NULL};
+    static const char *const bad[][7] = {
+        {"-q", "65536", "0", "300", "/dev/null,19200,E1,1-9"},
+        {"-q", "-1", "0", "300", "/dev/null,19200,E1,1-9"},
+        {"-q", "1x", "0", "300", "/dev/null,19200,E1,1-9"},
+        {"-q", "", "0", "300", "/dev/null,19200,E1,1-9"},
+        {"-x", "1", "0", "300", "/dev/null,19200,E1,1-9"},
+    };
+    double before;
+    unsigned i;
+    int fd;
+
+    (void)state;
+    pty_open(&line);
+    start_gateway(line.path, "200", options);
+    fd = tcp_connect(port);
+    before = seconds();
+    ASK(fd, "\x03\x00\x00\x00\x03");
+    REQUEST("\x03\x00\x00\x00\x03");
+    EXPECT(fd, "\x83\x0B");
+    ASK(fd, "\x03\x00\x00\x00\x03");
+    REQUEST("\x03\x00\x00\x00\x03");
+    assert_true(seconds() - before >= 1.2);
+    close(fd);
+    stop_gateway();
+    pty_close(&line);
+    for (i = 0; i < COUNT(bad); i++) {
+        char text[64];
+
+        program_start(&gateway, "gateway", bad[i]);
+        assert_int_equal(program_rest(&gateway, text, sizeof text), 0);
+        assert_int_equal(program_end(&gateway), 2);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_late_reply_to_one_client_does_not_reach_another),
+        cmocka_unit_test(a_reply_that_does_not_answer_the_request_is_0b),
+        cmocka_unit_test(a_request_that_no_device_may_carry_out_does_not_reach_the_line),
+        cmocka_unit_test(force_listen_only_mode_is_passed_on_and_gets_no_response),
+        cmocka_unit_test(functions_that_it_does_not_know_pass_through),
+        cmocka_unit_test(every_function_of_our_server_passes_through),
+        cmocka_unit_test(the_quiet_time_is_an_option),
+    };
+
+    return cmocka_run_group_tests_name("gateway replies", tests, NULL, NULL);
+}

@@ -1,0 +1,379 @@
+/* A device that answers in order, but later than the response timeout. Its late
+ * reply looks like the answer to the next request: RTU has no number that tells
+ * them apart. No late reply may become the data of a later request. On the
+ * simulated clock; unit 17 is 11 on the wire. */
+#include "crc.h"
+#include "sim.h"
+#include "test.h"
+
+#include <string.h>
+
+enum {
+    TIMEOUT_MS = 500,
+    LATE = 750000,   /* microseconds that the device takes for a late reply */
+    PROMPT = 3000,   /* and for all others */
+    QUIET = 100000,  /* the quiet time at first */
+    REGISTERS = 125  /* the most that a reply carries */
+};
+
+/* The device: what it takes for the requests still to come, then PROMPT. */
+typedef struct in_order {
+    uint32_t takes[8];
+    unsigned requests;
+    uint64_t free;       /* when its last reply has left */
+    uint8_t exception;   /* the exception it answers the first request with */
+    unsigned cut;        /* the reply that loses its second half, from 1 on */
+    unsigned damaged;    /* the reply that arrives damaged, from 1 on */
+    unsigned trailing;   /* bytes 0x00 that its driver adds to each reply */
+} in_order;
+
+static uint16_t value(unsigned address)
+{
+    return (uint16_t)(address * 7919u + 1u);
+}
+
+static size_t reply_to(uint8_t *frame, const uint8_t *request)
+{
+    unsigned address = (unsigned)request[2] << 8 | request[3];
+    unsigned quantity = (unsigned)request[4] << 8 | request[5];
+    unsigned i;
+
+    memcpy(frame, request, 6);
+    if (request[1] == 6)
+        return seal(frame, 6);
+    frame[2] = (uint8_t)(2 * quantity);
+    for (i = 0; i < quantity; i++) {
+        frame[3 + 2 * i] = (uint8_t)(value(address + i) >> 8);
+        frame[4 + 2 * i] = (uint8_t)value(address + i);
+    }
+    return seal(frame, 3 + 2 * quantity);
+}
+
+static void answer_in_order(sim *s, const sim_frame *request)
+{
+    in_order *d = (in_order *)s->context;
+    unsigned number = d->requests + 1;
+    uint32_t takes = number <= 8 && d->takes[number - 1] ? d->takes[number - 1] : PROMPT;
+    uint64_t at = (d->free > request->end ? d->free : request->end) + takes;
+    uint8_t frame[300] = {0};
+    size_t length = reply_to(frame, request->bytes);
+
+    if (request->bytes[0] != 17) { /* another device, never late */
+        sim_deliver(s, request->end + PROMPT, frame, length);
+        return;
+    }
+    d->requests = number;
+    if (number == 1 && d->exception) {
+        frame[1] |= 0x80;
+        frame[2] = d->exception;
+        length = seal(frame, 3);
+    }
+    if (number == d->damaged)
+        frame[length - 1] ^= 0x40;
+    if (number == d->cut)
+        length /= 2;
+    memset(frame + length, 0, d->trailing);
+    length += d->trailing;
+    sim_deliver(s, at, frame, length);
+    d->free = at + length * s->character;
+}
+
+/* The simulation with such a device, whose first reply is late. */
+#define DEVICE                                                                          \
+    in_order device = {.takes = {LATE}};                                                \
+    NODE;                                                                               \
+                                                                                        \
+    s->limit = 2000000000;                                                              \
+    s->device = answer_in_order;                                                        \
+    s->context = &device;                                                               \
+    OK(mbm_master_setResponseTimeout(n, TIMEOUT_MS))
+
+static void assert_reads(sim *s, uint16_t address, uint16_t quantity)
+{
+    uint16_t i;
+
+    OK(mbm_master_readHoldingRegisters(&s->master, address, quantity));
+    for (i = 0; i < quantity; i++)
+        assert_int_equal(mbm_master_getResponseBuffer(&s->master, (uint8_t)i), value(address + i));
+}
+
+static uint8_t read_at(sim *s, uint16_t address)
+{
+    return mbm_master_readHoldingRegisters(&s->master, address, 1);
+}
+
+static void one_late_reply_does_not_shift_the_answers_of_later_requests(void **state)
+{
+    uint16_t i;
+    DEVICE;
+
+    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    for (i = 1; i < 100; i++)
+        assert_reads(s, i, 1);
+    assert_int_equal(s->counters.foreignFrames, 1);
+}
+
+static void a_late_reply_does_not_shift_the_answers_after_a_retry(void **state)
+{
+    uint16_t i;
+    DEVICE;
+
+    device.takes[1] = 50000; /* longer than the gap before the next request */
+    OK(mbm_master_setRetries(n, 1));
+    for (i = 0; i < 100; i++)
+        assert_reads(s, i, 1);
+}
+
+/* The frame buffer holds one reply of that size, not two. */
+static void a_late_reply_of_the_greatest_length_does_not_shift_later_answers(void **state)
+{
+    uint16_t i;
+    DEVICE;
+
+    assert_int_equal(mbm_master_readHoldingRegisters(n, 0, REGISTERS), MBM_RESPONSE_TIMED_OUT);
+    for (i = 1; i < 10; i++)
+        assert_reads(s, (uint16_t)(i * REGISTERS), REGISTERS);
+}
+
+static void a_late_reply_to_a_write_of_the_same_value_costs_one_request(void **state)
+{
+    unsigned i;
+    DEVICE;
+
+    assert_int_equal(mbm_master_writeSingleRegister(n, 1, 5), MBM_RESPONSE_TIMED_OUT);
+    for (i = 0; i < 10; i++)
+        OK(mbm_master_writeSingleRegister(n, 1, 5));
+    assert_reads(s, 9, 1);
+}
+
+static void several_late_replies_in_a_row_are_all_passed_over(void **state)
+{
+    uint16_t i;
+    DEVICE;
+
+    device.takes[0] = 1700000; /* later than two more requests */
+    for (i = 0; i < 3; i++)
+        assert_int_equal(read_at(s, i), i < 2 ? MBM_RESPONSE_TIMED_OUT : MBM_OK);
+    assert_int_equal(mbm_master_getResponseBuffer(n, 0), value(2));
+    for (; i < 50; i++)
+        assert_reads(s, i, 1);
+}
+
+/* The hold lasts beyond the response timeout. */
+static void a_late_reply_just_before_the_deadline_of_the_next_request_is_no_answer(void **state)
+{
+    uint16_t i;
+    DEVICE;
+
+    device.takes[0] = 1000 * (TIMEOUT_MS + TIMEOUT_MS) + QUIET - 1000;
+    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    for (i = 1; i < 50; i++)
+        assert_reads(s, i, 1);
+}
+
+static void a_late_exception_is_not_the_answer_to_a_later_request(void **state)
+{
+    static const uint8_t codes[] = {2, 5, 6, 0x0B};
+    unsigned i;
+    DEVICE;
+
+    for (i = 0; i < COUNT(codes); i++) {
+        memset(&device, 0, sizeof device);
+        device.takes[0] = LATE;
+        device.exception = codes[i];
+        assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+        assert_reads(s, 1, 1);
+        assert_int_equal(mbm_master_getExceptionCode(n), 0);
+        assert_reads(s, 2, 1);
+    }
+}
+
+static void an_exception_in_time_is_an_answer_on_probation_too(void **state)
+{
+    DEVICE;
+
+    device.takes[0] = 0;
+    device.exception = 5;
+    assert_int_equal(read_at(s, 0), 5);
+    assert_reads(s, 1, 1);
+    /* An exception is an answer: nothing is late, nothing is held. */
+    sim_assert_time(s->frames[1].silence, 4000);
+}
+
+/* The reply that was held first is most likely the late one. */
+static void a_held_reply_is_no_answer_if_the_next_one_is_damaged(void **state)
+{
+    DEVICE;
+
+    device.damaged = 2;
+    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(read_at(s, 1), MBM_INVALID_CRC);
+    assert_int_equal(mbm_master_getResponseBuffer(n, 0), 0);
+    assert_reads(s, 2, 1);
+    assert_reads(s, 3, 1);
+}
+
+static void a_held_reply_is_no_answer_if_the_next_one_is_cut_off(void **state)
+{
+    DEVICE;
+
+    device.cut = 2;
+    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(read_at(s, 1), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(mbm_master_getResponseBuffer(n, 0), 0);
+    assert_reads(s, 2, 1);
+    assert_reads(s, 3, 1);
+}
+
+/* As when an RS-485 driver lets go of the line. */
+static void a_byte_of_noise_after_a_held_reply_does_not_spoil_it(void **state)
+{
+    uint16_t i;
+    DEVICE;
+
+    device.trailing = 1;
+    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    for (i = 1; i < 10; i++)
+        assert_reads(s, i, 1);
+    device.requests = 0;
+    assert_int_equal(mbm_master_readHoldingRegisters(n, 0, REGISTERS), MBM_RESPONSE_TIMED_OUT);
+    for (i = 1; i < 10; i++)
+        assert_reads(s, (uint16_t)(i * REGISTERS), REGISTERS);
+}
+
+static void probation_costs_one_quiet_time_after_a_failure_and_nothing_else(void **state)
+{
+    uint64_t begin;
+    DEVICE;
+
+    device.takes[0] = 0xFFFFFFFF; /* never */
+    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    memset(&device, 0, sizeof device);
+    assert_reads(s, 1, 1);
+    assert_in_range(s->now - s->last_byte, QUIET, QUIET + SIM_SLACK);
+    begin = s->now;
+    assert_reads(s, 2, 1);
+    assert_in_range(s->now - begin, 0, PROMPT + 20 * s->character + SIM_SLACK);
+    assert_in_range(s->now - s->last_byte, 0, SIM_SLACK);
+}
+
+static void without_a_quiet_time_no_reply_is_held(void **state)
+{
+    DEVICE;
+
+    OK(mbm_master_setQuietTime(n, 0));
+    device.takes[0] = 0xFFFFFFFF;
+    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    memset(&device, 0, sizeof device);
+    assert_reads(s, 1, 1);
+    assert_in_range(s->now - s->last_byte, 0, SIM_SLACK);
+}
+
+/* Unit 18 answers between the failed request to unit 17 and the late reply. */
+static void the_reply_of_another_unit_ends_no_probation(void **state)
+{
+    DEVICE;
+
+    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    OK(mbm_master_setSlaveID(n, 18));
+    assert_reads(s, 5, 1);
+    sim_assert_time(s->now - s->last_byte, 0);
+    OK(mbm_master_setSlaveID(n, 17));
+    assert_reads(s, 1, 1);
+    assert_reads(s, 2, 1);
+}
+
+static uint8_t run(sim *s, mbm_client *client, const mbm_clientRequest *request)
+{
+    while (mbm_client_poll(client) == MBM_PENDING && request->status == MBM_PENDING)
+        s->now += s->idle_step;
+    return request->status;
+}
+
+static void client_reads(sim *s, mbm_client *client, uint16_t address, uint8_t status)
+{
+    mbm_clientRequest request = {0};
+    uint16_t word = 0;
+
+    request.unit = 17;
+    request.reply = &word;
+    request.replyBytes = sizeof word;
+    assert_int_equal(mbm_client_readHoldingRegisters(client, &request, address, 1), MBM_PENDING);
+    assert_int_equal(run(s, client, &request), status);
+    if (status == MBM_OK)
+        assert_int_equal(word, value(address));
+}
+
+static void one_late_reply_does_not_shift_the_clients_answers(void **state)
+{
+    static mbm_client client;
+    uint16_t i;
+    DEVICE;
+
+    memset(&client, 0, sizeof client);
+    OK(mbm_client_beginRtu(&client, &s->port, s->buffer, sizeof s->buffer));
+    OK(mbm_client_setResponseTimeout(&client, TIMEOUT_MS));
+    client_reads(s, &client, 0, MBM_RESPONSE_TIMED_OUT);
+    for (i = 1; i < 100; i++)
+        client_reads(s, &client, i, MBM_OK);
+}
+
+static void a_late_reply_does_not_shift_the_clients_answers_after_a_retry(void **state)
+{
+    static mbm_client client;
+    uint16_t i;
+    DEVICE;
+
+    memset(&client, 0, sizeof client);
+    OK(mbm_client_beginRtu(&client, &s->port, s->buffer, sizeof s->buffer));
+    OK(mbm_client_setResponseTimeout(&client, TIMEOUT_MS));
+    OK(mbm_client_setRetries(&client, 1));
+    device.takes[1] = 50000;
+    for (i = 0; i < 100; i++)
+        client_reads(s, &client, i, MBM_OK);
+}
+
+/* However many right replies arrive, a request has an end. */
+static void a_device_that_never_stops_answering_does_not_hold_a_request_for_ever(void **state)
+{
+    uint8_t frame[16];
+    const uint8_t request[6] = {17, 3, 0, 7, 0, 1};
+    size_t length = reply_to(frame, request);
+    uint64_t at;
+    DEVICE;
+
+    device.takes[0] = 0xFFFFFFFF;
+    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    s->device = NULL;
+    /* One reply every 10 ms, from the end of the next request on. */
+    for (at = s->now + QUIET + 10000; at < s->now + 4000000; at += 10000)
+        sim_deliver(s, at, frame, length);
+    at = s->now;
+    assert_int_equal(read_at(s, 7), MBM_RESPONSE_TIMED_OUT);
+    assert_in_range(s->now - at, 1000000, 1500000);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        SIM_TEST(one_late_reply_does_not_shift_the_answers_of_later_requests),
+        SIM_TEST(a_late_reply_does_not_shift_the_answers_after_a_retry),
+        SIM_TEST(a_late_reply_of_the_greatest_length_does_not_shift_later_answers),
+        SIM_TEST(a_late_reply_to_a_write_of_the_same_value_costs_one_request),
+        SIM_TEST(several_late_replies_in_a_row_are_all_passed_over),
+        SIM_TEST(a_late_reply_just_before_the_deadline_of_the_next_request_is_no_answer),
+        SIM_TEST(a_late_exception_is_not_the_answer_to_a_later_request),
+        SIM_TEST(an_exception_in_time_is_an_answer_on_probation_too),
+        SIM_TEST(a_held_reply_is_no_answer_if_the_next_one_is_damaged),
+        SIM_TEST(a_held_reply_is_no_answer_if_the_next_one_is_cut_off),
+        SIM_TEST(a_byte_of_noise_after_a_held_reply_does_not_spoil_it),
+        SIM_TEST(probation_costs_one_quiet_time_after_a_failure_and_nothing_else),
+        SIM_TEST(without_a_quiet_time_no_reply_is_held),
+        SIM_TEST(the_reply_of_another_unit_ends_no_probation),
+        SIM_TEST(one_late_reply_does_not_shift_the_clients_answers),
+        SIM_TEST(a_late_reply_does_not_shift_the_clients_answers_after_a_retry),
+        SIM_TEST(a_device_that_never_stops_answering_does_not_hold_a_request_for_ever),
+    };
+
+    return cmocka_run_group_tests_name("late replies", tests, NULL, NULL);
+}

@@ -1,0 +1,154 @@
+//! Explores what may happen around the requests of a real master: an adversary
+//! chooses at each step what arrives and how the clock moves. Every order of events
+//! is tried, breadth first, for as many seconds as the argument says.
+
+mod line;
+mod wire;
+
+use line::{Event, State};
+use stateright::{Checker, HasDiscoveries, Model, Path, Property};
+use std::time::Duration;
+
+/// A master, and what the adversary may do to it.
+#[derive(Clone, Copy, Debug)]
+struct Line {
+    /// Bytes of the frame buffer.
+    buffer: usize,
+    retries: u8,
+    /// The quiet time that the master is set to.
+    quiet_time: u32,
+    /// Whether there is noise on the line, beside late, damaged and lost replies.
+    noise: bool,
+}
+
+impl Model for Line {
+    type State = State;
+    type Action = Event;
+
+    fn init_states(&self) -> Vec<State> {
+        vec![State::new(self.buffer, self.retries, self.quiet_time)]
+    }
+
+    fn actions(&self, state: &State, events: &mut Vec<Event>) {
+        state.events(self.noise, events);
+    }
+
+    fn next_state(&self, state: &State, event: Event) -> Option<State> {
+        Some(state.after(event))
+    }
+
+    fn properties(&self) -> Vec<Property<Self>> {
+        vec![
+            Property::always(
+                "every request ends, once, in time",
+                |line: &Line, state: &State| {
+                    state.ends_in_time(line.retries) && state.wrong != Some(line::TWICE)
+                },
+            ),
+            Property::always(
+                "only the reply to a request is its answer",
+                |_, state: &State| state.wrong.is_none(),
+            ),
+            Property::always(
+                "a clean line gives right data within two requests",
+                |_, state: &State| state.recovers(),
+            ),
+        ]
+    }
+}
+
+/// What an exploration came to.
+struct Explored {
+    /// States that differ.
+    states: usize,
+    /// Every order of so many events was tried.
+    events: usize,
+    /// The properties that do not hold, and what leads there.
+    broken: Vec<(&'static str, Path<State, Event>)>,
+}
+
+/// Explores for so long, or until a property is broken.
+fn explore(line: Line, time: Duration) -> Explored {
+    let checker = line
+        .checker()
+        .threads(2)
+        .timeout(time)
+        .finish_when(HasDiscoveries::Any)
+        .spawn_bfs()
+        .join();
+    Explored {
+        states: checker.unique_state_count(),
+        // The first state has depth 1, and the last depth may not be complete.
+        events: checker.max_depth().saturating_sub(2),
+        broken: checker.discoveries().into_iter().collect(),
+    }
+}
+
+fn main() {
+    let seconds = std::env::args()
+        .nth(1)
+        .and_then(|seconds| seconds.parse().ok());
+    let seconds: u64 = seconds.unwrap_or(300);
+    let mut lines = Vec::new();
+    for noise in [false, true] {
+        for retries in [0, 1] {
+            // The second buffer holds no second reply beside the first.
+            for buffer in [20, 12] {
+                let quiet_time = line::QUIET;
+                lines.push(Line {
+                    buffer,
+                    retries,
+                    quiet_time,
+                    noise,
+                });
+            }
+        }
+    }
+    let time = Duration::from_secs((seconds / lines.len() as u64).max(1));
+    let (mut passed, mut failed) = (0, 0);
+    for line in lines {
+        let Explored {
+            states,
+            events,
+            broken,
+        } = explore(line, time);
+        println!(
+            "model: {} noise, {} retries, a frame buffer of {} bytes: every order of {events} events, {states} states",
+            if line.noise { "with" } else { "no" },
+            line.retries,
+            line.buffer,
+        );
+        for (property, path) in &broken {
+            println!("model: broken: {property}: {:?}", path.last_state().wrong);
+            for event in path.clone().into_actions() {
+                println!("    {event:?}");
+            }
+        }
+        failed += broken.len();
+        passed += line.properties().len() - broken.len();
+    }
+    println!("{passed} passed, {failed} failed");
+    if failed > 0 {
+        std::process::exit(1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Without a quiet time the master holds no reply, and takes a late one.
+    #[test]
+    fn a_late_reply_that_is_taken_for_the_answer_is_found() {
+        let line = Line {
+            buffer: 20,
+            retries: 0,
+            quiet_time: 0,
+            noise: false,
+        };
+        let broken = explore(line, Duration::from_secs(60)).broken;
+        assert!(broken
+            .iter()
+            .any(|(property, _)| property.starts_with("only the reply")));
+    }
+}

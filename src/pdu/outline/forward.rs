@@ -1,0 +1,89 @@
+//! A request that arrived as bytes, and is sent as it is to another device.
+
+use super::super::custom::Rule;
+use super::super::{bits, diagnostics, files, identification, registers};
+use super::form::*;
+use super::Outline;
+use crate::error::Status;
+
+/// The last sub-function of 08 that the standard defines or keeps free within its
+/// own range; how long the responses of later ones are, it does not say.
+const LAST_SUB_FUNCTION: u16 = 0x14;
+
+impl Outline {
+    /// Becomes the request of `function` with the bytes of `body` after the function
+    /// code. Its data to send are the last [`Outline::data_length`] bytes of `body`.
+    /// The data of its response are all bytes after the function code, as on the wire.
+    /// The response is judged as that of the same request in another form; of a
+    /// function that the standard does not define, only its end tells its length.
+    ///
+    /// [`Status::OK`], or the exception that answers such a request:
+    /// [`Status::ILLEGAL_FUNCTION`] for a function code that there cannot be,
+    /// [`Status::ILLEGAL_DATA_VALUE`] or [`Status::ILLEGAL_DATA_ADDRESS`] for a
+    /// length, count, quantity or range that the standard does not allow.
+    pub fn forward(&mut self, function: u8, body: &[u8]) -> Status {
+        let length = body.len() as u16;
+        let word = |index: usize| match body.as_chunks().0.get(index) {
+            Some(word) => u16::from_be_bytes(*word),
+            None => 0,
+        };
+        let (first, second) = (word(0), word(1));
+        let form = match function {
+            bits::READ_COILS => Form::READ_COILS,
+            bits::READ_DISCRETE_INPUTS => Form::READ_DISCRETE_INPUTS,
+            registers::READ_HOLDING_REGISTERS => Form::READ_HOLDING_REGISTERS,
+            registers::READ_INPUT_REGISTERS => Form::READ_INPUT_REGISTERS,
+            bits::WRITE_SINGLE_COIL => Form::WRITE_SINGLE_COIL,
+            registers::WRITE_SINGLE_REGISTER => Form::WRITE_SINGLE_REGISTER,
+            diagnostics::READ_EXCEPTION_STATUS => Form::READ_EXCEPTION_STATUS,
+            diagnostics::GET_COMM_EVENT_COUNTER => Form::GET_COMM_EVENT_COUNTER,
+            diagnostics::GET_COMM_EVENT_LOG => Form::GET_COMM_EVENT_LOG,
+            bits::WRITE_MULTIPLE_COILS => Form::WRITE_MULTIPLE_COILS,
+            registers::WRITE_MULTIPLE_REGISTERS => Form::WRITE_MULTIPLE_REGISTERS,
+            diagnostics::REPORT_SERVER_ID => Form::REPORT_SERVER_ID,
+            files::READ_FIFO_QUEUE => Form::READ_FIFO_QUEUE,
+            _ => Form::NONE,
+        };
+        let built = match function {
+            _ if form != Form::NONE => self.set(form, first, second),
+            diagnostics::DIAGNOSTICS if first > LAST_SUB_FUNCTION => {
+                self.set(Form::DIAGNOSTICS, first, 0);
+                self.form.0 |= OWN;
+                self.follow(length.saturating_sub(2))
+            }
+            diagnostics::DIAGNOSTICS => self.diagnostics(first, length.saturating_sub(2) / 2),
+            files::READ_FILE_RECORD => self.read_file_records(length.saturating_sub(1)),
+            files::WRITE_FILE_RECORD => self.write_file_records(length.saturating_sub(1)),
+            registers::MASK_WRITE_REGISTER => self.mask_write_register(first, second, word(2)),
+            registers::READ_WRITE_MULTIPLE_REGISTERS => {
+                self.read_write_registers(first, second, word(2), word(3))
+            }
+            identification::ENCAPSULATED_INTERFACE_TRANSPORT => match *body {
+                [identification::MEI_READ_DEVICE_IDENTIFICATION, code, object] => {
+                    self.read_device_identification(code, object)
+                }
+                [] | [identification::MEI_READ_DEVICE_IDENTIFICATION, ..] => {
+                    Status::ILLEGAL_DATA_VALUE
+                }
+                [mei_type, ..] => self.encapsulated(mei_type, length - 1),
+            },
+            _ => self.custom(function, length, Rule::Silence),
+        };
+        if built != Status::OK {
+            return built;
+        }
+        self.form.0 &= !(SENDS_WORDS | TAKES_WORDS | BITS | 7 << DATA);
+        self.form.0 |= 1 << DATA;
+        let data = body.len().checked_sub(usize::from(self.data_length));
+        let data = data.and_then(|at| body.get(at..)).unwrap_or_default();
+        let byte = |index: usize| data.get(index).copied().unwrap_or_default();
+        // The counts in the body are the right ones, and nothing follows.
+        if usize::from(self.request_length()) == 1 + body.len()
+            && (1..).zip(body).all(|(at, own)| self.at(at, &byte) == *own)
+        {
+            Status::OK
+        } else {
+            Status::ILLEGAL_DATA_VALUE
+        }
+    }
+}

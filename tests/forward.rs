@@ -1,0 +1,149 @@
+//! Requests that arrive as bytes and are sent on as they are.
+
+#[path = "common/vectors.rs"]
+mod vectors;
+
+use mbm::error::Status;
+use mbm::pdu::outline::Outline;
+use mbm::pdu::request::Request;
+use proptest::prelude::*;
+use std::sync::LazyLock;
+use vectors::{all, right_pdus, Direction};
+
+/// The request as the outline sends it; or why it is refused.
+fn forward(pdu: &[u8]) -> Result<(Outline, Vec<u8>), Status> {
+    let mut outline = Outline::NONE;
+    match outline.forward(pdu[0], &pdu[1..]) {
+        Status::OK => {}
+        refused => return Err(refused),
+    }
+    let data = &pdu[pdu.len() - usize::from(outline.data_length())..];
+    let mut sent = vec![0; usize::from(outline.request_length())];
+    outline.emit(&mut sent, |index| data[index]);
+    Ok((outline, sent))
+}
+
+/// The PDU of every right request of the table.
+static REQUESTS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
+    let right = right_pdus().into_iter();
+    right
+        .filter(|vector| vector.direction == Direction::Request)
+        .map(|vector| vector.bytes)
+        .collect()
+});
+
+#[test]
+fn every_right_request_is_sent_as_it_arrived() {
+    assert!(REQUESTS.len() > 60);
+    for pdu in REQUESTS.iter() {
+        let (outline, sent) = forward(pdu).unwrap_or_else(|status| panic!("{pdu:02X?} {status:?}"));
+        assert_eq!(sent, *pdu);
+        assert!(!outline.sends_words() && !outline.takes_words());
+        assert_eq!((outline.data_at(), outline.mask()), (1, 0xFF));
+    }
+}
+
+#[test]
+fn the_answers_of_the_standard_are_right() {
+    let all = all();
+    let mut count = 0;
+    for answer in &all {
+        // The client takes no response that is a function code alone.
+        let name = answer.name.strip_suffix("-answer");
+        let Some(name) = name.filter(|_| answer.bytes.len() > 1) else {
+            continue;
+        };
+        let right =
+            |vector: &&vectors::Vector| vector.framing.is_none() && vector.status == Status::OK;
+        let request = all.iter().filter(right).find(|vector| vector.name == name);
+        let (Some(request), true) = (request, right(&answer)) else {
+            continue;
+        };
+        let (outline, _) = forward(&request.bytes).unwrap();
+        let data = &request.bytes[request.bytes.len() - usize::from(outline.data_length())..];
+        let pdu = &answer.bytes;
+        let length = outline.expected(pdu, pdu.len()).unwrap();
+        assert_eq!(usize::from(length.get()), pdu.len(), "{name}");
+        let status = match *pdu.as_slice() {
+            [function, code] if function & 0x80 != 0 => Status::exception(code),
+            _ => Status::OK,
+        };
+        assert_eq!(outline.judge(pdu, |index| data[index]), status, "{name}");
+        count += 1;
+    }
+    assert!(count >= 18);
+}
+
+#[test]
+fn what_no_server_carries_out_is_refused_with_its_exception() {
+    for (pdu, status) in [
+        (&[0][..], Status::ILLEGAL_FUNCTION),
+        (&[0x80, 1], Status::ILLEGAL_FUNCTION),
+        (&[3, 0, 0, 0, 0], Status::ILLEGAL_DATA_VALUE),
+        (&[3, 0, 0, 0, 126], Status::ILLEGAL_DATA_VALUE),
+        (&[3, 0xFF, 0xFF, 0, 2], Status::ILLEGAL_DATA_ADDRESS),
+        (&[3, 0, 0, 0], Status::ILLEGAL_DATA_VALUE),
+        (&[3, 0, 0, 0, 1, 0], Status::ILLEGAL_DATA_VALUE),
+        (&[3], Status::ILLEGAL_DATA_VALUE),
+        (&[6, 0, 0, 0], Status::ILLEGAL_DATA_VALUE),
+        (&[7, 0], Status::ILLEGAL_DATA_VALUE),
+        (&[8], Status::ILLEGAL_DATA_VALUE),
+        (&[8, 0, 1, 0], Status::ILLEGAL_DATA_VALUE),
+        (&[8, 0, 1, 0, 0, 0, 0], Status::ILLEGAL_DATA_VALUE),
+        (&[0x0F, 0, 0, 0, 9, 1, 0xFF], Status::ILLEGAL_DATA_VALUE),
+        (&[0x10, 0, 0, 0, 1, 3, 0, 0, 0], Status::ILLEGAL_DATA_VALUE),
+        (&[0x10, 0, 0, 0, 1, 2, 0], Status::ILLEGAL_DATA_VALUE),
+        (&[0x14, 8, 6, 0, 1, 0, 0, 0, 1], Status::ILLEGAL_DATA_VALUE),
+        (&[0x14, 0], Status::ILLEGAL_DATA_VALUE),
+        (
+            &[0x15, 8, 6, 0, 1, 0, 0, 0, 1, 0, 0],
+            Status::ILLEGAL_DATA_VALUE,
+        ),
+        (
+            &[0x17, 0, 0, 0, 1, 0, 0, 0, 1, 2, 0],
+            Status::ILLEGAL_DATA_VALUE,
+        ),
+        (
+            &[0x17, 0, 0, 0, 1, 0, 0, 0xFF, 0xFF, 0xFE],
+            Status::ILLEGAL_DATA_VALUE,
+        ),
+        (&[0x2B], Status::ILLEGAL_DATA_VALUE),
+        (&[0x2B, 0x0E], Status::ILLEGAL_DATA_VALUE),
+        (&[0x2B, 0x0E, 5, 0], Status::ILLEGAL_DATA_VALUE),
+        (&[0x2B, 0x0E, 1, 0, 0], Status::ILLEGAL_DATA_VALUE),
+    ] {
+        assert_eq!(forward(pdu).err(), Some(status), "{pdu:02X?}");
+    }
+    for function in 0..=255 {
+        assert!(forward(&[&[function][..], &[1; 253]].concat()).is_err());
+        assert!(forward(&[&[function][..], &[0xFF; 3000]].concat()).is_err());
+    }
+}
+
+fn any_pdu() -> impl Strategy<Value = Vec<u8>> {
+    let changed = (
+        any::<prop::sample::Index>(),
+        any::<prop::sample::Index>(),
+        any::<u8>(),
+    );
+    let changed = changed.prop_map(|(which, place, value)| {
+        let mut pdu = which.get(&REQUESTS).clone();
+        let place = place.index(pdu.len());
+        pdu[place] = value;
+        pdu
+    });
+    prop_oneof![changed, prop::collection::vec(any::<u8>(), 1..300)]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 3000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// What a server can read is sent, and what is sent is what arrived.
+    #[test]
+    fn what_the_standard_allows_is_sent_unchanged(pdu in any_pdu()) {
+        match forward(&pdu) {
+            Ok((_, sent)) => prop_assert_eq!(sent, pdu),
+            Err(_) => prop_assert!(Request::parse(&pdu).is_err()),
+        }
+    }
+}
