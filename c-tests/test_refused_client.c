@@ -88,7 +88,7 @@ static void all_settings_out_of_range_are_refused(int framing)
 
 static void a_client_goes_on_when_calls_were_refused(void **state)
 {
-    static uint8_t small[16];
+    static uint8_t small[20];
     static const mbm_master zero;
     static uint16_t reply[125];
     mbm_clientRequest request, other;
@@ -113,7 +113,7 @@ static void a_client_goes_on_when_calls_were_refused(void **state)
             IS(MBM_PENDING, mbm_client_poll(&client));
         assert_true(wire.length > 0);
 
-        all_client_begins_are(MBM_BUSY, &port, small, 16);
+        all_client_begins_are(MBM_BUSY, &port, small, sizeof small);
         all_settings_out_of_range_are_refused(framing);
         if (framing == 1)
             REFUSED(MBM_BUSY, client, mbm_client_setDelimiter(&client, '!'));
