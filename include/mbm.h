@@ -685,67 +685,6 @@ typedef struct mbm_client {
 } mbm_client;
 
 /**
- * A request to a device, and what comes of it. Yours, and zero before you set
- * the fields that you need; it may be used again and again.
- *
- * From the call that queues it until it has ended, which `done` or `status`
- * tells, leave it alone, and what it points to. Data and reply are words in the
- * machine's byte order where a function transfers registers; where it transfers
- * coils or bytes, they are bytes as on the wire, of coils the lowest bit first.
- */
-typedef struct mbm_clientRequest {
-    /**
-     * Optional: called by mbm_client_poll when the request has ended, but not for one
-     * that mbm_client_cancel gave up. It may queue requests, this one too, and cancel
-     * others.
-     */
-    void (*done)(void *context, struct mbm_clientRequest *request);
-    /**
-     * Handed to `done`. Yours, may be NULL.
-     */
-    void *context;
-    /**
-     * What functions that write send.
-     */
-    const void *data;
-    /**
-     * What functions that read fill; NULL if only the status is wanted.
-     */
-    void *reply;
-    /**
-     * Bytes that `reply` has room for.
-     */
-    uint16_t replyBytes;
-    /**
-     * A number of yours, which stays as you set it. In TCP frames no two pending
-     * requests may have the same one, except 0. It is not the transaction identifier
-     * on the wire: mbm_client_wireTransaction returns that.
-     */
-    uint16_t transaction;
-    /**
-     * Whom it is for. On a serial line 1 to 247; 0 is broadcast; 248 to 255, which the
-     * standard reserves, are sent as they are. On TCP 1 to 255.
-     */
-    uint8_t unit;
-    /**
-     * MBM_PENDING from being queued to its end, then how it ended.
-     */
-    uint8_t status;
-    /**
-     * The raw exception code of the response; 0 if it was none.
-     */
-    uint8_t exception;
-    /**
-     * Bytes received in `reply`.
-     */
-    uint8_t length;
-    /**
-     * Not for you.
-     */
-    uint32_t words[8];
-} mbm_clientRequest;
-
-/**
  * What the firmware supplies: a byte stream, a clock, and optional hooks.
  *
  * Copied by the begin functions; only `context` must stay valid. Hooks that are
@@ -838,6 +777,67 @@ typedef struct mbm_master {
      */
     uint32_t words[20];
 } mbm_master;
+
+/**
+ * A request to a device, and what comes of it. Yours, and zero before you set
+ * the fields that you need; it may be used again and again.
+ *
+ * From the call that queues it until it has ended, which `done` or `status`
+ * tells, leave it alone, and what it points to. Data and reply are words in the
+ * machine's byte order where a function transfers registers; where it transfers
+ * coils or bytes, they are bytes as on the wire, of coils the lowest bit first.
+ */
+typedef struct mbm_clientRequest {
+    /**
+     * Optional: called by mbm_client_poll when the request has ended, but not for one
+     * that mbm_client_cancel gave up. It may queue requests, this one too, and cancel
+     * others.
+     */
+    void (*done)(void *context, struct mbm_clientRequest *request);
+    /**
+     * Handed to `done`. Yours, may be NULL.
+     */
+    void *context;
+    /**
+     * What functions that write send.
+     */
+    const void *data;
+    /**
+     * What functions that read fill; NULL if only the status is wanted.
+     */
+    void *reply;
+    /**
+     * Bytes that `reply` has room for.
+     */
+    uint16_t replyBytes;
+    /**
+     * A number of yours, which stays as you set it. In TCP frames no two pending
+     * requests may have the same one, except 0. It is not the transaction identifier
+     * on the wire: mbm_client_wireTransaction returns that.
+     */
+    uint16_t transaction;
+    /**
+     * Whom it is for. On a serial line 1 to 247; 0 is broadcast; 248 to 255, which the
+     * standard reserves, are sent as they are. On TCP 1 to 255.
+     */
+    uint8_t unit;
+    /**
+     * MBM_PENDING from being queued to its end, then how it ended.
+     */
+    uint8_t status;
+    /**
+     * The raw exception code of the response; 0 if it was none.
+     */
+    uint8_t exception;
+    /**
+     * Bytes received in `reply`.
+     */
+    uint8_t length;
+    /**
+     * Not for you.
+     */
+    uint32_t words[8];
+} mbm_clientRequest;
 
 /**
  * How long the PDU of a function of your own is, function code included.
@@ -1999,63 +1999,6 @@ uint8_t mbm_bits_setInWords(uint16_t *words,
                             uint8_t on);
 
 /**
- * Moves all requests on, without waiting, and calls `done` of those that have
- * ended, of at most 17 in one call.
- *
- * Call it as often as you like; mbm_client_pollDelay tells when the next call
- * is due.
- *
- * @param client  the object
- * @return MBM_PENDING while requests wait or are under way, MBM_OK if there are
- *         none, MBM_BUSY from within `done` and while the line is lent;
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_poll(struct mbm_client *client);
-
-/**
- * How long mbm_client_poll will find nothing to do unless a byte arrives, so
- * that a program may wait for one in select, or sleep, until then. Bytes are taken
- * only while a request is pending: with none, wait for something else.
- *
- * @param client  the object
- * @return microseconds; 0 means poll now, and is returned within a hook of the port;
- *         0xFFFFFFFF that there is no request; 1000
- *         while a TCP port does not take what is to be sent: to poll sooner, wait
- *         for that too, as mbm_tcp_wait does
- */
-uint32_t mbm_client_pollDelay(const struct mbm_client *client);
-
-/**
- * How many requests wait or are under way.
- *
- * @param client  the object
- * @return 0 to 16
- */
-uint8_t mbm_client_pending(const struct mbm_client *client);
-
-/**
- * Gives a request up. It is yours again at once, with the status MBM_CANCELLED;
- * `done` is not called. It may have reached the device, and may still be answered.
- *
- * @param client   the object
- * @param request  a request that this client was given
- * @return MBM_OK; MBM_NOT_PENDING, with nothing changed, for a request that has
- *         ended already or was never queued here; MBM_INVALID_ARGUMENT or
- *         MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_cancel(struct mbm_client *client, struct mbm_clientRequest *request);
-
-/**
- * The transaction identifier on the wire: that of the TCP frame in which the request
- * was sent last. The client chooses it, another one for each frame, also for a retry.
- *
- * @param request  a request, pending or ended
- * @return the identifier; 0 in other framings, for a request that was never sent, and
- *         for NULL. 0 is also an identifier
- */
-uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
-
-/**
  * Makes an object a client of a serial line, in RTU frames (serial line guide
  * V1.02, 2.5.1).
  *
@@ -2203,6 +2146,63 @@ uint8_t mbm_client_lend(struct mbm_client *client, struct mbm_master *master);
  *         MBM_INVALID_ARGUMENT if the line was not lent, MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_takeBack(struct mbm_client *client, struct mbm_master *master);
+
+/**
+ * Moves all requests on, without waiting, and calls `done` of those that have
+ * ended, of at most 17 in one call.
+ *
+ * Call it as often as you like; mbm_client_pollDelay tells when the next call
+ * is due.
+ *
+ * @param client  the object
+ * @return MBM_PENDING while requests wait or are under way, MBM_OK if there are
+ *         none, MBM_BUSY from within `done` and while the line is lent;
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_poll(struct mbm_client *client);
+
+/**
+ * How long mbm_client_poll will find nothing to do unless a byte arrives, so
+ * that a program may wait for one in select, or sleep, until then. Bytes are taken
+ * only while a request is pending: with none, wait for something else.
+ *
+ * @param client  the object
+ * @return microseconds; 0 means poll now, and is returned within a hook of the port;
+ *         0xFFFFFFFF that there is no request; 1000
+ *         while a TCP port does not take what is to be sent: to poll sooner, wait
+ *         for that too, as mbm_tcp_wait does
+ */
+uint32_t mbm_client_pollDelay(const struct mbm_client *client);
+
+/**
+ * How many requests wait or are under way.
+ *
+ * @param client  the object
+ * @return 0 to 16
+ */
+uint8_t mbm_client_pending(const struct mbm_client *client);
+
+/**
+ * Gives a request up. It is yours again at once, with the status MBM_CANCELLED;
+ * `done` is not called. It may have reached the device, and may still be answered.
+ *
+ * @param client   the object
+ * @param request  a request that this client was given
+ * @return MBM_OK; MBM_NOT_PENDING, with nothing changed, for a request that has
+ *         ended already or was never queued here; MBM_INVALID_ARGUMENT or
+ *         MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_cancel(struct mbm_client *client, struct mbm_clientRequest *request);
+
+/**
+ * The transaction identifier on the wire: that of the TCP frame in which the request
+ * was sent last. The client chooses it, another one for each frame, also for a retry.
+ *
+ * @param request  a request, pending or ended
+ * @return the identifier; 0 in other framings, for a request that was never sent, and
+ *         for NULL. 0 is also an identifier
+ */
+uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
 
 /**
  * Function 01: reads coils into `reply`, eight to a byte, the lowest bit first, the

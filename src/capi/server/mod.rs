@@ -2,6 +2,7 @@
 
 mod begin;
 mod callbacks;
+mod cells;
 mod custom;
 mod diagnostics;
 mod files;
