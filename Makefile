@@ -91,6 +91,11 @@ test: need-test ## Every test: Rust, C and C++; sanitizers and valgrind
 venv: ## The Python environment with the peers of tests/peer, build/venv
 	@scripts/venv
 
+.PHONY: miri
+miri: ## Hold the hooks against Rust's rules of aliasing, with Miri of the nightly toolchain
+	@$(CARGO) +nightly miri test --quiet --test reentry
+	@MIRIFLAGS=-Zmiri-tree-borrows $(CARGO) +nightly miri test --quiet --test reentry
+
 .PHONY: fuzz
 fuzz: ## Fuzz every decoder for FUZZ_SECONDS in all (60)
 	@scripts/need g++ libc6-dev libmodbus-dev

@@ -78,8 +78,10 @@
  * A Modbus RTU master: one line, one request at a time.
  *
  * Any number of objects may share a Stream, one request after the other. Use
- * an object from one thread, never from an interrupt. Idle callbacks may call
- * other objects; on their own object requests are answered with ku8MBBusy.
+ * an object from one thread, never from an interrupt. Callbacks may call other
+ * objects. On its own object an idle callback may call everything; requests are
+ * answered with ku8MBBusy. In preTransmission and postTransmission everything is
+ * answered with ku8MBBusy, and changes nothing.
  */
 class ModbusMaster : public ModbusMasterStatics<void>, public ModbusMasterValues<ModbusMaster> {
 public:
@@ -98,15 +100,19 @@ public:
     /**
      * A copy has buffers of its own, with the same words, settings, callbacks
      * and Stream. Its queue of send is empty, and a request under way stays
-     * with the original; copy between requests, for the driver's sake.
+     * with the original; copy between requests, for the driver's sake. A copy made
+     * within preTransmission or postTransmission answers everything with ku8MBBusy.
      */
     ModbusMaster(const ModbusMaster &other) : state(other.state) { settle(); }
 
-    /** As the copy; a request of this object that is under way is given up. */
+    /**
+     * As the copy; a request of this object that is under way is given up. Within
+     * preTransmission and postTransmission of either object it changes nothing.
+     */
     ModbusMaster &operator=(const ModbusMaster &other)
     {
-        if (this != &other) {
-            cancel();
+        if (this != &other && mbm_master_status(&other.state.master) != MBM_BUSY &&
+            mbm_master_cancel(&state.master) != MBM_BUSY) {
             state = other.state;
             settle();
         }
@@ -116,15 +122,16 @@ public:
     /**
      * Talks to a slave over a Stream that is open already. Cheap, and may be
      * called again and again. Callbacks, settings and words stay; what send
-     * queued is dropped, a request under way is given up.
+     * queued is dropped, a request under way is given up. Within preTransmission and
+     * postTransmission of this object it changes nothing.
      *
      * @param slave   1 to 247; 248 to 255 are sent as they are, 0 is broadcast
      * @param stream  must outlive its use here
      */
     void begin(uint8_t slave, Stream &stream)
     {
-        state.stream = &stream;
-        attach(slave);
+        if (attach(slave) == MBM_OK)
+            state.stream = &stream;
     }
 
 #if defined(MODBUSMASTER_SERIAL0)
@@ -395,7 +402,8 @@ private:
                               transmitWords, frame, frameBytes);
     }
 
-    void attach(uint8_t slave)
+    // Touches the clock and the driver, not the Stream.
+    uint8_t attach(uint8_t slave)
     {
         mbm_port port;
         port.context = &state;
@@ -406,7 +414,7 @@ private:
         port.preTransmission = preHook;
         port.postTransmission = postHook;
         port.idle = idleHook;
-        mbm_master_begin(&state.master, slave, &port);
+        return mbm_master_begin(&state.master, slave, &port);
     }
 
     // After a copy: our own buffers and our own context, no request under way.

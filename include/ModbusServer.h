@@ -52,9 +52,10 @@
  * ModbusServer is one itself; only several units on one line take objects of
  * this class.
  *
- * Each member that serves something returns MBM_OK, and may be called before
- * begin or after it. What is served is not copied: it must outlive the unit,
- * and belongs to this unit alone.
+ * Each member that serves something returns MBM_OK, or MBM_BUFFER_TOO_SMALL for
+ * more than MBM_MAX_SERVICES (16) of them, and may be called before begin or after
+ * it. What is served is not copied: it must outlive the unit. Several units may
+ * serve the same object; MBM_BUSY for a table that is served as another kind.
  */
 class ModbusUnit {
 public:
@@ -161,12 +162,12 @@ public:
      * @param id      1 to 247
      * @param stream  must outlive its use here
      * @param baud    bits per second, for t3.5; 0: untold, 4 ms
-     * @return MBM_OK
+     * @return MBM_OK; MBM_BUSY, with nothing changed, from within a hook or function
+     *         of this server
      */
     uint8_t begin(uint8_t id, Stream &stream, uint32_t baud = 0)
     {
-        setUnitID(id);
-        return beginRtu(*this, 1, stream, baud);
+        return named(id, beginRtu(*this, 1, stream, baud));
     }
 
     /** As begin, for all units of an array, which answer in place of this one. */
@@ -179,8 +180,7 @@ public:
     /** As begin, with ASCII in place of RTU; a frame needs twice the bytes and 1. */
     uint8_t beginAscii(uint8_t id, Stream &stream)
     {
-        setUnitID(id);
-        return listen(mbm_server_beginAscii, *this, 1, stream);
+        return named(id, listen(mbm_server_beginAscii, *this, 1, stream));
     }
 
     /** As beginAscii, for all units of an array. */
@@ -195,7 +195,8 @@ public:
      * whole, sends the response. While a response leaves, the Stream is waited
      * for: until it has taken and flushed all bytes.
      *
-     * @return MBM_OK; MBM_NOT_INITIALISED before begin
+     * @return MBM_OK; MBM_NOT_INITIALISED before begin; MBM_BUSY from within a hook
+     *         or function of this server
      */
     uint8_t poll() { return mbm_server_poll(&state.server); }
 
@@ -235,8 +236,8 @@ public:
      */
     void setSilence(uint32_t us)
     {
-        state.silence = us;
-        mbm_server_setSilence(&state.server, us / 2);
+        if (mbm_server_setSilence(&state.server, us / 2) != MBM_BUSY)
+            state.silence = us;
     }
 
     /** Drops the response itself where the receiver hears the driver; of RTU, after begin. */
@@ -275,9 +276,6 @@ private:
                    ModbusUnit &first, uint8_t count, Stream &stream)
     {
         mbm_port port;
-        state.stream = &stream;
-        state.silence = 0;
-        state.ready = false;
         port.context = &state;
         port.read = readHook;
         port.write = writeHook;
@@ -286,13 +284,26 @@ private:
         port.preTransmission = preHook;
         port.postTransmission = postHook;
         port.idle = nullptr;
-        return how(&state.server, &port, &first.unit, count, state.frame,
-                   MODBUSSERVER_FRAME_BYTES);
+        uint8_t status = how(&state.server, &port, &first.unit, count, state.frame,
+                             MODBUSSERVER_FRAME_BYTES);
+        if (status == MBM_OK) {
+            state.stream = &stream;
+            state.silence = 0;
+            state.ready = false;
+        }
+        return status;
     }
     uint8_t beginRtu(ModbusUnit &first, uint8_t count, Stream &stream, uint32_t baud)
     {
         uint8_t status = listen(mbm_server_begin, first, count, stream);
-        setBaudRate(baud);
+        if (status == MBM_OK)
+            setBaudRate(baud);
+        return status;
+    }
+    uint8_t named(uint8_t id, uint8_t status)
+    {
+        if (status == MBM_OK)
+            setUnitID(id);
         return status;
     }
 

@@ -52,13 +52,13 @@ inline const __FlashStringHelper *modbusStatusText(uint8_t status)
     case MBM_INVALID_CRC:
         return F("the reply arrived damaged (CRC)");
     case MBM_INVALID_ARGUMENT:
-        return F("invalid argument: a NULL pointer or a missing hook");
+        return F("invalid argument: NULL, out of range, or of another kind");
     case MBM_MALFORMED_REPLY:
         return F("the reply does not answer the request");
     case MBM_LINK_LOST:
         return F("the port reported a lost link");
     case MBM_BUSY:
-        return F("a request is under way already");
+        return F("in use: a request is under way, or a hook of the object called");
     case MBM_BROADCAST_NOT_ALLOWED:
         return F("a read cannot be broadcast");
     case MBM_BUFFER_TOO_SMALL:

@@ -435,6 +435,11 @@
 #define MBM_REPLY_PENDING 768
 
 /**
+ * Most records that one unit serves, each handed to a mbm_server_serve function.
+ */
+#define MBM_MAX_SERVICES 16
+
+/**
  * A request.
  */
 #define MBM_EVENT_REQUEST 0
@@ -569,7 +574,10 @@
 #define MBM_INVALID_CRC 227
 
 /**
- * A NULL pointer, a port without read, write or micros, a buffer of no use.
+ * An argument that the function cannot take: NULL, a number out of range, a port
+ * without read, write or micros, a buffer that is too short, or an object of
+ * another framing or kind. The comment of the function says which. Nothing was
+ * changed.
  */
 #define MBM_INVALID_ARGUMENT 228
 
@@ -585,7 +593,9 @@
 #define MBM_LINK_LOST 230
 
 /**
- * The object has a request under way; nothing was changed.
+ * The object is in use: it has a request under way, it called the hook that this
+ * call came from, or it is a record that is served in another way. Nothing was
+ * changed.
  */
 #define MBM_BUSY 231
 
@@ -596,7 +606,8 @@
 
 /**
  * The frame buffer cannot hold the request (nothing was sent), or frame or
- * response buffer cannot hold the reply (the response words are unchanged).
+ * response buffer cannot hold the reply (the response words are unchanged), or a
+ * unit has no place for another record.
  */
 #define MBM_BUFFER_TOO_SMALL 233
 
@@ -652,9 +663,15 @@
  * mbm_client_poll moves them on, and nothing ever waits.
  *
  * Storage is yours and must be zero before first use, which a static object is.
- * One of the mbm_client_begin functions comes first. Not re-entrant: use one
- * object from one thread and never from an interrupt; several objects are
- * independent of each other.
+ * One of the mbm_client_begin functions comes first. Use one object from one
+ * thread and never from an interrupt; several objects are independent of each
+ * other.
+ *
+ * A `done` function may call every function on the client that calls it, but
+ * mbm_client_poll, which returns MBM_BUSY. A hook of the port, and the `random`
+ * function of mbm_client_setJitter, may call none: each returns MBM_BUSY and
+ * changes nothing, and a getter returns what it returns for an object that was
+ * never begun.
  */
 typedef struct mbm_client {
     /**
@@ -668,73 +685,15 @@ typedef struct mbm_client {
 } mbm_client;
 
 /**
- * A request to a device, and what comes of it. Yours, and zero before you set
- * the fields that you need; it may be used again and again.
- *
- * From the call that queues it until it has ended, which `done` or `status`
- * tells, leave it alone, and what it points to. Data and reply are words in the
- * machine's byte order where a function transfers registers; where it transfers
- * coils or bytes, they are bytes as on the wire, of coils the lowest bit first.
- */
-typedef struct mbm_clientRequest {
-    /**
-     * Optional: called by mbm_client_poll when the request has ended, but not for one
-     * that mbm_client_cancel gave up. It may queue requests, this one too, and cancel
-     * others.
-     */
-    void (*done)(void *context, struct mbm_clientRequest *request);
-    /**
-     * Handed to `done`. Yours, may be NULL.
-     */
-    void *context;
-    /**
-     * What functions that write send.
-     */
-    const void *data;
-    /**
-     * What functions that read fill; NULL if only the status is wanted.
-     */
-    void *reply;
-    /**
-     * Bytes that `reply` has room for.
-     */
-    uint16_t replyBytes;
-    /**
-     * A number of yours, which stays as you set it. In TCP frames no two pending
-     * requests may have the same one, except 0. It is not the transaction identifier
-     * on the wire: mbm_client_wireTransaction returns that.
-     */
-    uint16_t transaction;
-    /**
-     * Whom it is for. On a serial line 1 to 247; 0 is broadcast; 248 to 255, which the
-     * standard reserves, are sent as they are. On TCP 1 to 255.
-     */
-    uint8_t unit;
-    /**
-     * MBM_PENDING from being queued to its end, then how it ended.
-     */
-    uint8_t status;
-    /**
-     * The raw exception code of the response; 0 if it was none.
-     */
-    uint8_t exception;
-    /**
-     * Bytes received in `reply`.
-     */
-    uint8_t length;
-    /**
-     * Not for you.
-     */
-    uint32_t words[8];
-} mbm_clientRequest;
-
-/**
  * What the firmware supplies: a byte stream, a clock, and optional hooks.
  *
  * Copied by the begin functions; only `context` must stay valid. Hooks that are
- * NULL are not called; `read`, `write` and `micros` must be there. No hook
- * may call a function on the object that called it, except that `idle` may:
- * it is told MBM_BUSY, and getters work.
+ * NULL are not called; `read`, `write` and `micros` must be there.
+ *
+ * A function that a hook calls on the object that called the hook returns
+ * MBM_BUSY and changes nothing; a getter returns what it returns for an object
+ * that was never begun. The hook `idle` is the exception: it may call every
+ * function, and one that starts a request returns MBM_BUSY.
  */
 typedef struct mbm_port {
     /**
@@ -801,9 +760,12 @@ typedef struct mbm_link {
  *
  * Storage is yours and must be zero before first use, which a static object
  * is (`static mbm_master node;`). Settings and words want mbm_master_begin or
- * mbm_master_setBuffers before them, requests want both. Not re-entrant: use
- * one object from one thread and never from an interrupt; several objects are
- * independent of each other.
+ * mbm_master_setBuffers before them, requests want both. Use one object from one
+ * thread and never from an interrupt; several objects are independent of each
+ * other. Which functions the hooks of its port may call: see mbm_port.
+ *
+ * A call that is refused changes nothing, but for what the functions that make a
+ * request say of themselves, and mbm_master_send32.
  */
 typedef struct mbm_master {
     /**
@@ -815,6 +777,67 @@ typedef struct mbm_master {
      */
     uint32_t words[20];
 } mbm_master;
+
+/**
+ * A request to a device, and what comes of it. Yours, and zero before you set
+ * the fields that you need; it may be used again and again.
+ *
+ * From the call that queues it until it has ended, which `done` or `status`
+ * tells, leave it alone, and what it points to. Data and reply are words in the
+ * machine's byte order where a function transfers registers; where it transfers
+ * coils or bytes, they are bytes as on the wire, of coils the lowest bit first.
+ */
+typedef struct mbm_clientRequest {
+    /**
+     * Optional: called by mbm_client_poll when the request has ended, but not for one
+     * that mbm_client_cancel gave up. It may queue requests, this one too, and cancel
+     * others.
+     */
+    void (*done)(void *context, struct mbm_clientRequest *request);
+    /**
+     * Handed to `done`. Yours, may be NULL.
+     */
+    void *context;
+    /**
+     * What functions that write send.
+     */
+    const void *data;
+    /**
+     * What functions that read fill; NULL if only the status is wanted.
+     */
+    void *reply;
+    /**
+     * Bytes that `reply` has room for.
+     */
+    uint16_t replyBytes;
+    /**
+     * A number of yours, which stays as you set it. In TCP frames no two pending
+     * requests may have the same one, except 0. It is not the transaction identifier
+     * on the wire: mbm_client_wireTransaction returns that.
+     */
+    uint16_t transaction;
+    /**
+     * Whom it is for. On a serial line 1 to 247; 0 is broadcast; 248 to 255, which the
+     * standard reserves, are sent as they are. On TCP 1 to 255.
+     */
+    uint8_t unit;
+    /**
+     * MBM_PENDING from being queued to its end, then how it ended.
+     */
+    uint8_t status;
+    /**
+     * The raw exception code of the response; 0 if it was none.
+     */
+    uint8_t exception;
+    /**
+     * Bytes received in `reply`.
+     */
+    uint8_t length;
+    /**
+     * Not for you.
+     */
+    uint32_t words[8];
+} mbm_clientRequest;
 
 /**
  * How long the PDU of a function of your own is, function code included.
@@ -1228,9 +1251,14 @@ typedef struct mbm_ring {
  * Storage is yours and must be zero before first use, which a static object is
  * (`static mbm_server server;`). What it serves are units, which several
  * servers may share: one on a serial line and four TCP connections, for
- * example, are five servers with the same units. Not re-entrant: use a server
- * and its units from one thread and never from an interrupt; servers that share
- * units belong to one thread.
+ * example, are five servers with the same units. Use a server and its units from
+ * one thread and never from an interrupt; servers that share units belong to one
+ * thread.
+ *
+ * Hooks and functions of yours run within mbm_server_poll. A function that they
+ * call on the server that is polled returns MBM_BUSY and changes nothing: call
+ * it when mbm_server_poll has returned. They may call functions on other servers,
+ * and the mbm_server_serve functions on units.
  */
 typedef struct mbm_server {
     /**
@@ -1244,16 +1272,12 @@ typedef struct mbm_server {
 } mbm_server;
 
 /**
- * What the functions named mbm_server_serve... hang onto a unit: one family of
- * functions. The head of each record that they take; not for you.
+ * The head of each record that a mbm_server_serve function takes. Private.
  */
 typedef struct mbm_service {
     /**
-     * The service behind it.
-     */
-    struct mbm_service *next;
-    /**
-     * Serves a request, if it is one of this family.
+     * Serves a request, if it is one of this family. NULL in a zeroed record,
+     * which serves nothing.
      */
     uint16_t (*serve)(struct mbm_service *service, uint8_t *pdu, const void *heading);
 } mbm_service;
@@ -1329,12 +1353,19 @@ typedef struct mbm_diagnostics {
 /**
  * A unit that servers answer for. Zero it, set `id`, and say what it serves with
  * mbm_server_serveCoils and its sisters.
+ *
+ * Each of those takes a record of yours, which stays valid for as long as the
+ * unit is used. A unit has places for MBM_MAX_SERVICES records; one more is
+ * refused with MBM_BUFFER_TOO_SMALL. A record may be handed over again, also
+ * after you have zeroed and refilled it, and keeps its place. A zeroed record
+ * serves nothing until it is handed over again. One record may serve any number
+ * of units.
  */
 typedef struct mbm_unit {
     /**
-     * Not for you.
+     * Private: the records, in the order in which they are asked, then NULL.
      */
-    struct mbm_service *services;
+    struct mbm_service *services[MBM_MAX_SERVICES];
     /**
      * Not for you.
      */
@@ -1681,7 +1712,9 @@ typedef struct mbm_bitTable {
  * Holding or input registers in an array of yours. Zero it, set what you need,
  * and hand it to mbm_server_serveHoldingRegisters or
  * mbm_server_serveInputRegisters. You may change words and settings at any
- * time, but not from within a hook of this table.
+ * time, but not from within a hook of this table: the request under way goes on
+ * with the words that the table had when it came. To serve it as another kind of
+ * table, zero it first.
  */
 typedef struct mbm_registerTable {
     /**
@@ -1966,62 +1999,6 @@ uint8_t mbm_bits_setInWords(uint16_t *words,
                             uint8_t on);
 
 /**
- * Moves all requests on, without waiting, and calls `done` of those that have
- * ended, of at most 17 in one call.
- *
- * Call it as often as you like; mbm_client_pollDelay tells when the next call
- * is due.
- *
- * @param client  the object
- * @return MBM_PENDING while requests wait or are under way, MBM_OK if there are
- *         none, MBM_BUSY from within `done` and while the line is lent;
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_poll(struct mbm_client *client);
-
-/**
- * How long mbm_client_poll will find nothing to do unless a byte arrives, so
- * that a program may wait for one in select, or sleep, until then. Bytes are taken
- * only while a request is pending: with none, wait for something else.
- *
- * @param client  the object
- * @return microseconds; 0 means poll now, 0xFFFFFFFF that there is no request; 1000
- *         while a TCP port does not take what is to be sent: to poll sooner, wait
- *         for that too, as mbm_tcp_wait does
- */
-uint32_t mbm_client_pollDelay(const struct mbm_client *client);
-
-/**
- * How many requests wait or are under way.
- *
- * @param client  the object
- * @return 0 to 16
- */
-uint8_t mbm_client_pending(const struct mbm_client *client);
-
-/**
- * Gives a request up. It is yours again at once, with the status MBM_CANCELLED;
- * `done` is not called. It may have reached the device, and may still be answered.
- *
- * @param client   the object
- * @param request  a request that this client was given
- * @return MBM_OK; MBM_NOT_PENDING, with nothing changed, for a request that has
- *         ended already or was never queued here; MBM_INVALID_ARGUMENT or
- *         MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_cancel(struct mbm_client *client, struct mbm_clientRequest *request);
-
-/**
- * The transaction identifier on the wire: that of the TCP frame in which the request
- * was sent last. The client chooses it, another one for each frame, also for a retry.
- *
- * @param request  a request, pending or ended
- * @return the identifier; 0 in other framings, for a request that was never sent, and
- *         for NULL. 0 is also an identifier
- */
-uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
-
-/**
  * Makes an object a client of a serial line, in RTU frames (serial line guide
  * V1.02, 2.5.1).
  *
@@ -2029,8 +2006,8 @@ uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
  * @param port        copied; read, write and micros must be there
  * @param frame       bytes of one frame, valid for as long as the client is used
  * @param frameBytes  at least 8; 256 hold any frame
- * @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
- *         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+ * @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
+ *         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_client_beginRtu(struct mbm_client *client,
                             const struct mbm_port *port,
@@ -2046,8 +2023,8 @@ uint8_t mbm_client_beginRtu(struct mbm_client *client,
  * @param port        copied; read, write and micros must be there
  * @param frame       bytes of one frame, valid for as long as the client is used
  * @param frameBytes  at least 17; 513 hold any frame
- * @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
- *         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+ * @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
+ *         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_client_beginAscii(struct mbm_client *client,
                               const struct mbm_port *port,
@@ -2075,8 +2052,8 @@ uint8_t mbm_client_setDelimiter(struct mbm_client *client, uint8_t character);
  * @param port        copied; read, write and micros must be there
  * @param frame       bytes of one frame, valid for as long as the client is used
  * @param frameBytes  at least 8; 256 hold any frame
- * @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
- *         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+ * @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
+ *         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
                                    const struct mbm_port *port,
@@ -2096,8 +2073,8 @@ uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
  * @param outgoing       bytes to send, valid for as long as the client is used
  * @param outgoingBytes  at least 12; 260 hold any frame, more gather more
  *                       requests for one write
- * @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
- *         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+ * @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
+ *         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_client_beginTcp(struct mbm_client *client,
                             const struct mbm_port *port,
@@ -2154,8 +2131,8 @@ uint8_t mbm_client_isConnected(const struct mbm_client *client);
  * @param client  the object; for a facade, of RTU frames on a line or over TCP
  * @param master  a facade with buffers, which gets the client's port; NULL if
  *                you use the line in another way
- * @return MBM_OK; MBM_BUSY if a request is under way or the line is lent already;
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_OK; MBM_BUSY, with both unchanged, if a request is under way or the line
+ *         is lent already; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_lend(struct mbm_client *client, struct mbm_master *master);
 
@@ -2169,6 +2146,63 @@ uint8_t mbm_client_lend(struct mbm_client *client, struct mbm_master *master);
  *         MBM_INVALID_ARGUMENT if the line was not lent, MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_takeBack(struct mbm_client *client, struct mbm_master *master);
+
+/**
+ * Moves all requests on, without waiting, and calls `done` of those that have
+ * ended, of at most 17 in one call.
+ *
+ * Call it as often as you like; mbm_client_pollDelay tells when the next call
+ * is due.
+ *
+ * @param client  the object
+ * @return MBM_PENDING while requests wait or are under way, MBM_OK if there are
+ *         none, MBM_BUSY from within `done` and while the line is lent;
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_poll(struct mbm_client *client);
+
+/**
+ * How long mbm_client_poll will find nothing to do unless a byte arrives, so
+ * that a program may wait for one in select, or sleep, until then. Bytes are taken
+ * only while a request is pending: with none, wait for something else.
+ *
+ * @param client  the object
+ * @return microseconds; 0 means poll now, and is returned within a hook of the port;
+ *         0xFFFFFFFF that there is no request; 1000
+ *         while a TCP port does not take what is to be sent: to poll sooner, wait
+ *         for that too, as mbm_tcp_wait does
+ */
+uint32_t mbm_client_pollDelay(const struct mbm_client *client);
+
+/**
+ * How many requests wait or are under way.
+ *
+ * @param client  the object
+ * @return 0 to 16
+ */
+uint8_t mbm_client_pending(const struct mbm_client *client);
+
+/**
+ * Gives a request up. It is yours again at once, with the status MBM_CANCELLED;
+ * `done` is not called. It may have reached the device, and may still be answered.
+ *
+ * @param client   the object
+ * @param request  a request that this client was given
+ * @return MBM_OK; MBM_NOT_PENDING, with nothing changed, for a request that has
+ *         ended already or was never queued here; MBM_INVALID_ARGUMENT or
+ *         MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_cancel(struct mbm_client *client, struct mbm_clientRequest *request);
+
+/**
+ * The transaction identifier on the wire: that of the TCP frame in which the request
+ * was sent last. The client chooses it, another one for each frame, also for a retry.
+ *
+ * @param request  a request, pending or ended
+ * @return the identifier; 0 in other framings, for a request that was never sent, and
+ *         for NULL. 0 is also an identifier
+ */
+uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
 
 /**
  * Function 01: reads coils into `reply`, eight to a byte, the lowest bit first, the
@@ -2190,7 +2224,8 @@ uint8_t mbm_client_takeBack(struct mbm_client *client, struct mbm_master *master
  *         MBM_DUPLICATE_TRANSACTION, MBM_BUFFER_TOO_SMALL if `reply` has no room
  *         for the data, MBM_INVALID_ARGUMENT for `data` that are NULL,
  *         MBM_NOT_INITIALISED; MBM_BUSY, with the request unchanged, if it is
- *         pending already
+ *         pending already, and from within a hook of the port. A request that
+ *         is refused with another of these has it in `status`
  */
 uint8_t mbm_client_readCoils(struct mbm_client *client,
                              struct mbm_clientRequest *request,
@@ -2700,8 +2735,8 @@ uint8_t mbm_client_setBackoff(struct mbm_client *client,
  * @param client   the object
  * @param percent  0 (at first) to 100: how much of the wait may be taken off
  * @param random   returns another number each time, for example rand(): one of 32
- *                 bits, of 15 bits, or whose upper bits alone vary. It may not use
- *                 the client
+ *                 bits, of 15 bits, or whose upper bits alone vary. What it
+ *                 calls on the client returns MBM_BUSY
  * @param context  handed to `random`
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
@@ -2746,7 +2781,7 @@ uint8_t mbm_client_setUnits(struct mbm_client *client,
  * @param frame     receives the frame; may not overlap the packet's data
  * @param capacity  bytes of `frame`; MBM_MAX_FRAME do for RTU,
  *                  MBM_MAX_TCP_FRAME for TCP, MBM_MAX_ASCII_FRAME for all
- * @param length    receives the frame's length, if the status is MBM_OK
+ * @param length    receives the frame's length; 0 if the status is not MBM_OK
  * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
  *         that mbm_frame_parse finds in such a frame
  */
@@ -2772,7 +2807,8 @@ uint8_t mbm_frame_build(const struct mbm_framing *framing,
  * @param frameLength  its bytes
  * @param packet       receives what it says. If the frame is sound, but not
  *                     what it carries: kind, unit, transaction and function
- *                     alone; if the frame is not sound: kind alone
+ *                     alone; if the frame is not sound: kind alone; unchanged
+ *                     for MBM_INVALID_ARGUMENT
  * @return MBM_OK, also for an exception; of the frame MBM_INCOMPLETE_FRAME,
  *         MBM_MALFORMED_FRAME, or MBM_INVALID_CRC, also for a wrong LRC; what
  *         mbm_packet_parse says of what it carries; MBM_INVALID_ARGUMENT
@@ -2795,7 +2831,7 @@ uint8_t mbm_frame_parse(const struct mbm_framing *framing,
  * @param code      1 to 127, MBM_ILLEGAL_FUNCTION for example
  * @param frame     receives the frame; it may be that of the request
  * @param capacity  bytes of `frame`; 11 always do
- * @param length    receives the frame's length, if the status is MBM_OK
+ * @param length    receives the frame's length; 0 if the status is not MBM_OK
  * @return MBM_OK; MBM_BROADCAST_NOT_ALLOWED: on a serial line nobody answers
  *         unit 0; MBM_ILLEGAL_FUNCTION for a function from 0x80, which no
  *         exception can name; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also
@@ -2823,7 +2859,8 @@ uint8_t mbm_frame_exception(const struct mbm_framing *framing,
  *                  exceptions
  * @param bytes     the frame's first bytes; more may follow
  * @param have      how many; may be 0
- * @param expected  receives the length
+ * @param expected  receives the length; MBM_LENGTH_UNKNOWN and 0 if the status is
+ *                  not MBM_OK
  * @return MBM_OK; MBM_MALFORMED_FRAME if no frame begins like that, or none is
  *         so long; MBM_INVALID_ARGUMENT
  */
@@ -2842,7 +2879,8 @@ uint8_t mbm_frame_expectedLength(const struct mbm_framing *framing,
  * @param framing   how frames look
  * @param request   the request, as for mbm_frame_build
  * @param expected  receives the length; MBM_LENGTH_EXACT and 0 if nothing ever
- *                  answers it: a broadcast, 08 with sub-function 04
+ *                  answers it: a broadcast, 08 with sub-function 04;
+ *                  MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
  * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a packet that is no request;
  *         else why such a request is never built
  */
@@ -2861,7 +2899,8 @@ uint8_t mbm_frame_replyLength(const struct mbm_framing *framing,
  * @param have          how many
  * @param allowUnknown  0: only with a function code of the standard, or one
  *                      that it leaves to users; else: with any but 0
- * @param expected      receives the bytes of the frame, if the status is MBM_OK
+ * @param expected      receives the bytes of the frame; 0 if the status is not
+ *                      MBM_OK
  * @return MBM_OK; MBM_INCOMPLETE_FRAME if more bytes must tell;
  *         MBM_MALFORMED_FRAME if this is something else; MBM_INVALID_ARGUMENT
  */
@@ -2905,7 +2944,8 @@ uint8_t mbm_frame_lrc(const uint8_t *bytes, uint16_t length);
  * @param slave   unit id, 1 to 247; 248 to 255 are sent as they are, 0 is
  *                broadcast (serial line guide V1.02, 2.2)
  * @param port    copied; read, write and micros must be there
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer or a missing hook
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a missing hook; MBM_BUSY
+ *         from within a hook of this object's port but `idle`
  */
 uint8_t mbm_master_begin(struct mbm_master *master,
                          uint8_t slave,
@@ -2954,7 +2994,8 @@ uint8_t mbm_master_poll(struct mbm_master *master);
  * counts from this call, so sleeping lengthens no timeout.
  *
  * @param master  the object
- * @return microseconds; 0 means poll now, 0xFFFFFFFF that there is no request
+ * @return microseconds; 0 means poll now, and is returned within a hook of the port
+ *         but `idle`; 0xFFFFFFFF that there is no request
  */
 uint32_t mbm_master_pollDelay(const struct mbm_master *master);
 
@@ -3341,7 +3382,7 @@ uint8_t mbm_master_setWordOrder(struct mbm_master *master, uint8_t order);
  * @param master     the object; its buffers stay as they are while the view is used
  * @param first      the device's address of word 0: that of the read, or 0 to
  *                   count from word 0
- * @param registers  the view to fill in
+ * @param registers  the view to fill in; unchanged if the status is not MBM_OK
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_getResponseRegisters(const struct mbm_master *master,
@@ -3355,7 +3396,7 @@ uint8_t mbm_master_getResponseRegisters(const struct mbm_master *master,
  * @param master     the object; its buffers stay as they are while the view is used
  * @param first      the device's address of word 0: that of the write, or 0 to
  *                   count from word 0
- * @param registers  the view to fill in
+ * @param registers  the view to fill in; unchanged if the status is not MBM_OK
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_getTransmitRegisters(const struct mbm_master *master,
@@ -3476,7 +3517,7 @@ uint16_t mbm_master_receive(struct mbm_master *master);
  * @param functionCount  how many
  * @param pdu            receives it; may not overlap the packet's data
  * @param capacity       bytes of `pdu`; MBM_MAX_PDU always do
- * @param length         receives the PDU's length, if the status is MBM_OK
+ * @param length         receives the PDU's length; 0 if the status is not MBM_OK
  * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
  *         that mbm_packet_parse finds in such a PDU
  */
@@ -3499,7 +3540,7 @@ uint8_t mbm_packet_build(const struct mbm_packet *packet,
  * @param functions      functions of your own; may be NULL if there are none
  * @param functionCount  how many
  * @param packet         receives what it says; if the PDU is refused, its kind
- *                       and function alone
+ *                       and function alone; unchanged for MBM_INVALID_ARGUMENT
  * @return MBM_OK, also for an exception; MBM_INVALID_ARGUMENT. Of a request
  *         else the exception that answers it: MBM_ILLEGAL_FUNCTION,
  *         MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE. Of a response
@@ -3528,7 +3569,8 @@ uint8_t mbm_packet_parse(uint8_t kind,
  * @param have           how many; may be 0
  * @param functions      functions of your own; may be NULL if there are none
  * @param functionCount  how many
- * @param expected       receives the length
+ * @param expected       receives the length; MBM_LENGTH_UNKNOWN and 0 if the status
+ *                       is not MBM_OK
  * @return MBM_OK; MBM_MALFORMED_FRAME for a length that no PDU has;
  *         MBM_INVALID_ARGUMENT
  */
@@ -3549,7 +3591,8 @@ uint8_t mbm_packet_expectedLength(uint8_t kind,
  * @param functions      functions of your own; may be NULL if there are none
  * @param functionCount  how many
  * @param expected       receives the length; MBM_LENGTH_EXACT and 0 if nothing
- *                       ever answers it (08 with sub-function 04)
+ *                       ever answers it (08 with sub-function 04);
+ *                       MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
  * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a packet that is no request;
  *         else why such a request is never built
  */
@@ -3567,7 +3610,7 @@ uint8_t mbm_packet_replyLength(const struct mbm_packet *request,
  * @param packet  a request or response of 14 or 15, as parsed or built
  * @param cursor  where it goes on; yours, 0 to begin
  * @param record  receives the record, whose data point into the packet's
- * @return 1; 0 if there is none left, or for NULL
+ * @return 1; 0, with cursor and record unchanged, if there is none left, or for NULL
  */
 uint8_t mbm_packet_nextRecord(const struct mbm_packet *packet,
                               uint16_t *cursor,
@@ -3582,7 +3625,7 @@ uint8_t mbm_packet_nextRecord(const struct mbm_packet *packet,
  * @param packet  a response of 2B/0E, as parsed or built
  * @param cursor  where it goes on; yours, 0 to begin
  * @param object  receives the object, whose data point into the packet's
- * @return 1; 0 if there is none left, or for NULL
+ * @return 1; 0, with cursor and object unchanged, if there is none left, or for NULL
  */
 uint8_t mbm_packet_nextObject(const struct mbm_packet *packet,
                               uint16_t *cursor,
@@ -4210,14 +4253,13 @@ uint16_t mbm_ring_lost(const struct mbm_ring *ring);
  *
  * Call it as often as you like, at least once per character time of the line
  * if nothing else buffers its bytes. On a serial line a response begins with
- * the first call after the line has been silent for t3.5. What units call, hooks and
- * functions of yours, may not poll the server that called it.
+ * the first call after the line has been silent for t3.5.
  *
  * @param server  the object
  * @return MBM_OK; MBM_LINK_LOST if the port said so, which ends a connection;
  *         MBM_MALFORMED_FRAME if what came over TCP is not Modbus, so that
- *         the connection is to be closed; MBM_INVALID_ARGUMENT or
- *         MBM_NOT_INITIALISED
+ *         the connection is to be closed; MBM_BUSY from within a hook of this
+ *         server; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_server_poll(struct mbm_server *server);
 
@@ -4226,7 +4268,8 @@ uint8_t mbm_server_poll(struct mbm_server *server);
  * that a program may sleep until then.
  *
  * @param server  the object
- * @return microseconds; 0 means poll now, 0xFFFFFFFF until a byte arrives; 1000
+ * @return microseconds; 0 means poll now, and is returned within a hook of this
+ *         server; 0xFFFFFFFF until a byte arrives; 1000
  *         while a function of yours returns MBM_REPLY_PENDING or a connection does
  *         not take the response: to go on sooner, poll when that has changed. No
  *         byte is taken meanwhile, so do not wait for one
@@ -4237,8 +4280,9 @@ uint32_t mbm_server_pollDelay(const struct mbm_server *server);
  * Begins to serve units on a serial line, RTU. The rate is untold, so a frame
  * ends with 4 ms of silence: see mbm_server_setBaudRate.
  *
- * May be called again at any time; what was under way is dropped. Opens
- * nothing: the port is open already. Units are yours, may be shared between
+ * May be called again at any time but from within its hooks; what was under way
+ * is dropped. A call that is refused changes nothing. Opens nothing: the port is
+ * open already. Units are yours, may be shared between
  * servers, and stay where they are for as long as the object is used, as does
  * the buffer, which keeps nothing between requests.
  *
@@ -4249,8 +4293,8 @@ uint32_t mbm_server_pollDelay(const struct mbm_server *server);
  * @param frame   bytes of one frame, for requests and responses
  * @param bytes   at least 16; MBM_MAX_FRAME hold any frame. Longer
  *                requests are not heard, longer responses become exception 04
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or
- *         a buffer of no use
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or a
+ *         buffer that is too short; MBM_BUSY from within a hook of this server
  */
 uint8_t mbm_server_begin(struct mbm_server *server,
                          const struct mbm_port *port,
@@ -4269,7 +4313,7 @@ uint8_t mbm_server_begin(struct mbm_server *server,
  * @param count   see mbm_server_begin
  * @param frame   see mbm_server_begin
  * @param bytes   at least 32; MBM_MAX_ASCII_FRAME hold any frame
- * @return MBM_OK or MBM_INVALID_ARGUMENT
+ * @return a status; see mbm_server_begin
  */
 uint8_t mbm_server_beginAscii(struct mbm_server *server,
                               const struct mbm_port *port,
@@ -4288,7 +4332,7 @@ uint8_t mbm_server_beginAscii(struct mbm_server *server,
  * @param count   see mbm_server_begin
  * @param frame   see mbm_server_begin; one for each connection
  * @param bytes   at least MBM_MAX_TCP_FRAME
- * @return MBM_OK or MBM_INVALID_ARGUMENT
+ * @return a status; see mbm_server_begin
  */
 uint8_t mbm_server_beginTcp(struct mbm_server *server,
                             const struct mbm_port *port,
@@ -4309,7 +4353,7 @@ uint8_t mbm_server_beginTcp(struct mbm_server *server,
  * @param count   see mbm_server_begin
  * @param frame   see mbm_server_begin; one for each connection
  * @param bytes   at least 16; MBM_MAX_FRAME hold any frame
- * @return MBM_OK or MBM_INVALID_ARGUMENT
+ * @return a status; see mbm_server_begin
  */
 uint8_t mbm_server_beginRtuOverTcp(struct mbm_server *server,
                                    const struct mbm_port *port,
@@ -4325,7 +4369,7 @@ uint8_t mbm_server_beginRtuOverTcp(struct mbm_server *server,
  *
  * @param server        the object
  * @param microseconds  counted from the last byte seen
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
  */
 uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t microseconds);
 
@@ -4335,7 +4379,7 @@ uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t microseconds);
  *
  * @param server  the object
  * @param baud    bits per second; 0 goes back to untold
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
  */
 uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
 
@@ -4346,8 +4390,8 @@ uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
  *
  * @param server  the object
  * @param on      0 (at first) or 1
- * @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings, or
- *         MBM_NOT_INITIALISED
+ * @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings,
+ *         MBM_NOT_INITIALISED or MBM_BUSY
  */
 uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
 
@@ -4359,8 +4403,9 @@ uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
  * @param table  the function that reads them: 1 coils (01, 05, 0F), 2 discrete
  *               inputs (02), 3 holding registers (03, 06, 10, 16, 17), 4 input
  *               registers (04)
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, no `get`, no `set`
- *         where it is needed, or another table
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, no `get`, no `set`
+ *         where it is needed, or another table; MBM_BUSY and MBM_BUFFER_TOO_SMALL as
+ *         mbm_server_serveCoils
  */
 uint8_t mbm_server_serveCallbacks(struct mbm_unit *unit,
                                   struct mbm_cells *cells,
@@ -4371,8 +4416,9 @@ uint8_t mbm_server_serveCallbacks(struct mbm_unit *unit,
  *
  * @param unit    the unit
  * @param custom  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, no function, a code
- *         from 128 on, or a length that is no rule
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, no function, a code
+ *         from 128 on, or a length that is no rule; MBM_BUFFER_TOO_SMALL if the unit
+ *         has no place
  */
 uint8_t mbm_server_serveCustom(struct mbm_unit *unit, struct mbm_custom *custom);
 
@@ -4382,9 +4428,10 @@ uint8_t mbm_server_serveCustom(struct mbm_unit *unit, struct mbm_custom *custom)
  *
  * @param unit      the unit
  * @param switches  yours, for as long as the unit is used; zeroed before the
- *                  first call. One for each unit
+ *                  first call. Units that share one share what is switched off
  * @param code      1 to 127
- * @return MBM_OK or MBM_INVALID_ARGUMENT
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or another code;
+ *         MBM_BUFFER_TOO_SMALL if the unit has no place
  */
 uint8_t mbm_server_switchOff(struct mbm_unit *unit,
                              struct mbm_switches *switches,
@@ -4406,8 +4453,10 @@ uint8_t mbm_server_switchOn(struct mbm_switches *switches, uint8_t code);
  * listen only mode.
  *
  * @param unit         the unit
- * @param diagnostics  yours, for as long as the unit is used; one for each unit
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @param diagnostics  yours, for as long as the unit is used; one for each unit, or
+ *                     it counts for all that share it
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit has
+ *         another record of diagnostics; MBM_BUFFER_TOO_SMALL if it has no place
  */
 uint8_t mbm_server_serveDiagnostics(struct mbm_unit *unit,
                                     struct mbm_diagnostics *diagnostics);
@@ -4418,7 +4467,8 @@ uint8_t mbm_server_serveDiagnostics(struct mbm_unit *unit,
  *
  * @param unit   the unit
  * @param files  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+ *         the unit has no place
  */
 uint8_t mbm_server_serveFiles(struct mbm_unit *unit, struct mbm_files *files);
 
@@ -4427,7 +4477,8 @@ uint8_t mbm_server_serveFiles(struct mbm_unit *unit, struct mbm_files *files);
  *
  * @param unit   the unit
  * @param fifos  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+ *         the unit has no place
  */
 uint8_t mbm_server_serveFifos(struct mbm_unit *unit, struct mbm_fifos *fifos);
 
@@ -4436,7 +4487,8 @@ uint8_t mbm_server_serveFifos(struct mbm_unit *unit, struct mbm_fifos *fifos);
  *
  * @param unit    the unit
  * @param status  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+ *         the unit has no place
  */
 uint8_t mbm_server_serveExceptionStatus(struct mbm_unit *unit,
                                         struct mbm_exceptionStatus *status);
@@ -4446,7 +4498,8 @@ uint8_t mbm_server_serveExceptionStatus(struct mbm_unit *unit,
  *
  * @param unit  the unit
  * @param id    yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+ *         the unit has no place
  */
 uint8_t mbm_server_serveServerId(struct mbm_unit *unit, struct mbm_serverId *id);
 
@@ -4457,7 +4510,8 @@ uint8_t mbm_server_serveServerId(struct mbm_unit *unit, struct mbm_serverId *id)
  *
  * @param unit            the unit
  * @param identification  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+ *         the unit has no place
  */
 uint8_t mbm_server_serveIdentification(struct mbm_unit *unit,
                                        struct mbm_identification *identification);
@@ -4474,8 +4528,9 @@ uint8_t mbm_server_serveIdentification(struct mbm_unit *unit,
  * @param length     bytes of the request
  * @param capacity   bytes of the buffer: 256 hold any response in RTU, 513 in
  *                   ASCII, 260 over TCP; a longer response becomes exception 04
- * @param response   bytes of the response; 0 where there is none: for a damaged
- *                   frame, another unit, or a broadcast
+ * @param response   receives the bytes of the response; 0 where there is none: for a
+ *                   damaged frame, another unit, a broadcast, and with any status
+ *                   but MBM_OK
  * @return MBM_OK; MBM_PENDING, with the buffer to be filled anew, if a function
  *         of yours is not done; MBM_INVALID_ARGUMENT
  */
@@ -4492,7 +4547,8 @@ uint8_t mbm_server_respond(uint8_t framing,
  *
  * @param unit   the unit
  * @param table  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY for a table that
+ *         is served as another kind; MBM_BUFFER_TOO_SMALL if the unit has no place
  */
 uint8_t mbm_server_serveCoils(struct mbm_unit *unit, struct mbm_bitTable *table);
 
@@ -4501,7 +4557,7 @@ uint8_t mbm_server_serveCoils(struct mbm_unit *unit, struct mbm_bitTable *table)
  *
  * @param unit   the unit
  * @param table  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return a status; see mbm_server_serveCoils
  */
 uint8_t mbm_server_serveDiscreteInputs(struct mbm_unit *unit, struct mbm_bitTable *table);
 
@@ -4511,7 +4567,7 @@ uint8_t mbm_server_serveDiscreteInputs(struct mbm_unit *unit, struct mbm_bitTabl
  *
  * @param unit   the unit
  * @param table  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return a status; see mbm_server_serveCoils
  */
 uint8_t mbm_server_serveHoldingRegisters(struct mbm_unit *unit,
                                          struct mbm_registerTable *table);
@@ -4521,14 +4577,15 @@ uint8_t mbm_server_serveHoldingRegisters(struct mbm_unit *unit,
  *
  * @param unit   the unit
  * @param table  yours, for as long as the unit is used
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+ * @return a status; see mbm_server_serveCoils
  */
 uint8_t mbm_server_serveInputRegisters(struct mbm_unit *unit,
                                        struct mbm_registerTable *table);
 
 /**
- * Serves functions 16 and 17 beside 03, 06 and 10: a call of its own, so that
- * firmware without it is smaller.
+ * Serves functions 16 and 17 beside 03, 06 and 10, on each unit that has the
+ * table: a call of its own, so that firmware without it is smaller. After a table
+ * was zeroed it is to be called again.
  *
  * @param table  holding registers that mbm_server_serveHoldingRegisters took
  * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL and other tables
@@ -4618,8 +4675,8 @@ uint16_t mbm_sniffer_feed(struct mbm_sniffer *sniffer,
  * @param now      the time, in microseconds
  * @param event    receives what happened; valid until the next call with this
  *                 sniffer
- * @return 1 if there is an event, 0 if nothing more is known yet, or the sniffer
- *         was never begun
+ * @return 1 if there is an event; 0, with `event` unchanged, if nothing more is known
+ *         yet, or the sniffer was never begun
  */
 uint8_t mbm_sniffer_next(struct mbm_sniffer *sniffer,
                          uint32_t now,

@@ -29,7 +29,8 @@ impl Status {
     /// The reply arrived damaged.
     pub const INVALID_CRC: Status = Status(0xE3);
 
-    /// An argument that no call accepts: a null pointer, a missing hook.
+    /// An argument that the call cannot take: a null pointer, a number out of range,
+    /// a missing hook.
     pub const INVALID_ARGUMENT: Status = Status(0xE4);
     /// A frame of our unit and function with a right CRC that does not answer
     /// the request.

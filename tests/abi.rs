@@ -46,7 +46,7 @@ fn probes() -> Vec<(String, u64)> {
             mbm_object { data length id }
             mbm_framing { functions functionCount kind end }
             mbm_registers { data first count kind order }
-            mbm_service { next serve }
+            mbm_service { serve }
             mbm_unit { services serve diagnostics id }
             mbm_registerTable { service words valid before after context base size kind }
             mbm_bitTable { service bits valid before after context base size kind }
@@ -105,7 +105,8 @@ fn probes() -> Vec<(String, u64)> {
             MBM_REGISTERS_OF_BYTES MBM_REGISTERS_INTO_WORDS MBM_REGISTERS_INTO_BYTES
             MBM_REPLY_EXCEPTION MBM_REPLY_NONE MBM_REPLY_PENDING MBM_EVENT_REQUEST MBM_EVENT_REPLY MBM_EVENT_EXCEPTION
             MBM_EVENT_UNPAIRED MBM_EVENT_TIMEOUT MBM_EVENT_BAD_CRC MBM_EVENT_NOISE MBM_TAP_BOTH
-            MBM_TAP_CLIENT MBM_TAP_SERVER MBM_MIN_SNIFFER_BUFFER MBM_MAX_SNIFFER_FUNCTIONS;
+            MBM_TAP_CLIENT MBM_TAP_SERVER MBM_MIN_SNIFFER_BUFFER MBM_MAX_SNIFFER_FUNCTIONS
+            MBM_MAX_SERVICES;
     }
 }
 

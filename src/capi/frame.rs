@@ -88,7 +88,7 @@ unsafe fn look(
 /// @param frame     receives the frame; may not overlap the packet's data
 /// @param capacity  bytes of `frame`; MBM_MAX_FRAME do for RTU,
 ///                  MBM_MAX_TCP_FRAME for TCP, MBM_MAX_ASCII_FRAME for all
-/// @param length    receives the frame's length, if the status is MBM_OK
+/// @param length    receives the frame's length; 0 if the status is not MBM_OK
 /// @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
 ///         that mbm_frame_parse finds in such a frame
 #[no_mangle]
@@ -136,7 +136,8 @@ pub unsafe extern "C" fn mbm_frame_build(
 /// @param frameLength  its bytes
 /// @param packet       receives what it says. If the frame is sound, but not
 ///                     what it carries: kind, unit, transaction and function
-///                     alone; if the frame is not sound: kind alone
+///                     alone; if the frame is not sound: kind alone; unchanged
+///                     for MBM_INVALID_ARGUMENT
 /// @return MBM_OK, also for an exception; of the frame MBM_INCOMPLETE_FRAME,
 ///         MBM_MALFORMED_FRAME, or MBM_INVALID_CRC, also for a wrong LRC; what
 ///         mbm_packet_parse says of what it carries; MBM_INVALID_ARGUMENT
@@ -188,7 +189,7 @@ pub unsafe extern "C" fn mbm_frame_parse(
 /// @param code      1 to 127, MBM_ILLEGAL_FUNCTION for example
 /// @param frame     receives the frame; it may be that of the request
 /// @param capacity  bytes of `frame`; 11 always do
-/// @param length    receives the frame's length, if the status is MBM_OK
+/// @param length    receives the frame's length; 0 if the status is not MBM_OK
 /// @return MBM_OK; MBM_BROADCAST_NOT_ALLOWED: on a serial line nobody answers
 ///         unit 0; MBM_ILLEGAL_FUNCTION for a function from 0x80, which no
 ///         exception can name; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also
@@ -232,7 +233,8 @@ pub unsafe extern "C" fn mbm_frame_exception(
 ///                  exceptions
 /// @param bytes     the frame's first bytes; more may follow
 /// @param have      how many; may be 0
-/// @param expected  receives the length
+/// @param expected  receives the length; MBM_LENGTH_UNKNOWN and 0 if the status is
+///                  not MBM_OK
 /// @return MBM_OK; MBM_MALFORMED_FRAME if no frame begins like that, or none is
 ///         so long; MBM_INVALID_ARGUMENT
 #[no_mangle]
@@ -263,7 +265,8 @@ pub unsafe extern "C" fn mbm_frame_expectedLength(
 /// @param framing   how frames look
 /// @param request   the request, as for mbm_frame_build
 /// @param expected  receives the length; MBM_LENGTH_EXACT and 0 if nothing ever
-///                  answers it: a broadcast, 08 with sub-function 04
+///                  answers it: a broadcast, 08 with sub-function 04;
+///                  MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
 /// @return MBM_OK; MBM_INVALID_ARGUMENT, also for a packet that is no request;
 ///         else why such a request is never built
 #[no_mangle]
@@ -296,7 +299,8 @@ pub unsafe extern "C" fn mbm_frame_replyLength(
 /// @param have          how many
 /// @param allowUnknown  0: only with a function code of the standard, or one
 ///                      that it leaves to users; else: with any but 0
-/// @param expected      receives the bytes of the frame, if the status is MBM_OK
+/// @param expected      receives the bytes of the frame; 0 if the status is not
+///                      MBM_OK
 /// @return MBM_OK; MBM_INCOMPLETE_FRAME if more bytes must tell;
 ///         MBM_MALFORMED_FRAME if this is something else; MBM_INVALID_ARGUMENT
 #[no_mangle]

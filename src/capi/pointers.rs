@@ -1,6 +1,6 @@
 //! The only place where a pointer from C becomes a reference.
 
-use super::master::{mbm_master, Object};
+use super::master::{mbm_master, Core, Object};
 use crate::error::Status;
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 
@@ -72,7 +72,7 @@ pub(super) unsafe fn put<T>(place: *mut T, value: T) -> u8 {
     Status::OK.code()
 }
 
-/// As [`put`], of a length or the status that says why there is none.
+/// As [`put`], of a length, or of 0 and the status that says why there is none.
 ///
 /// # Safety
 /// As for [`put`].
@@ -80,13 +80,17 @@ pub(super) unsafe fn put_length(place: *mut u16, length: Result<usize, Status>) 
     match length {
         // SAFETY: as the caller promises.
         Ok(length) => unsafe { put(place, length as u16) },
-        Err(refused) => refused.code(),
+        Err(refused) => {
+            // SAFETY: as the caller promises.
+            unsafe { put(place, 0) };
+            refused.code()
+        }
     }
 }
 
 /// Whether there is a master behind a pointer from C: [`Status::OK`],
 /// [`Status::INVALID_ARGUMENT`] for NULL, [`Status::NOT_INITIALISED`] for an
-/// object that was never begun.
+/// object that was never begun, [`Status::BUSY`] from within a hook of its port.
 ///
 /// # Safety
 /// `master` is NULL or points to an `mbm_master`, zeroed or begun.
@@ -95,10 +99,10 @@ pub(super) unsafe fn check(master: *const mbm_master) -> Status {
         return Status::INVALID_ARGUMENT;
     }
     // SAFETY: not NULL, so storage of an object, which has room for it.
-    if unsafe { Object::is_begun(master.cast()) } {
-        Status::OK
-    } else {
-        Status::NOT_INITIALISED
+    match unsafe { Object::mark(master).read() } {
+        Object::BEGUN => Status::OK,
+        Object::CALLING => Status::BUSY,
+        _ => Status::NOT_INITIALISED,
     }
 }
 
@@ -131,7 +135,27 @@ pub(super) unsafe fn prepare(master: *mut mbm_master) -> Status {
     }
 }
 
-/// Runs `action` on a master, or returns the status that says why not.
+/// Runs `action` on the core of a master, which may call hooks of its port. A call
+/// on the same object from within them is refused by [`check`], which looks at the
+/// mark alone; the reference to the core does not cover that.
+///
+/// # Safety
+/// [`check`] found a master, and no reference to it lives.
+#[inline(always)]
+pub(super) unsafe fn calling<T>(master: *mut mbm_master, action: impl FnOnce(&mut Core) -> T) -> T {
+    // SAFETY: begun, so every field is valid; exclusive, for no other function
+    // makes a reference while the mark says so.
+    unsafe {
+        let mark = Object::mark(master);
+        mark.write(Object::CALLING);
+        let result = action(&mut *Object::core_of(master));
+        mark.write(Object::BEGUN);
+        result
+    }
+}
+
+/// Runs `action` on a master, or returns the status that says why not. It calls no
+/// hook: for that there is [`calling`].
 ///
 /// # Safety
 /// As for [`check`]; nothing else uses the object meanwhile.
@@ -167,7 +191,8 @@ pub(super) unsafe fn with_new(
     status.code()
 }
 
-/// Asks a master something; `otherwise` where there is none.
+/// Asks a master something; `otherwise` where there is none, and from within a hook
+/// of its port.
 ///
 /// # Safety
 /// As for [`with`].

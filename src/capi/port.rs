@@ -6,9 +6,12 @@ use core::ffi::c_void;
 /// What the firmware supplies: a byte stream, a clock, and optional hooks.
 ///
 /// Copied by the begin functions; only `context` must stay valid. Hooks that are
-/// NULL are not called; `read`, `write` and `micros` must be there. No hook
-/// may call a function on the object that called it, except that `idle` may:
-/// it is told MBM_BUSY, and getters work.
+/// NULL are not called; `read`, `write` and `micros` must be there.
+///
+/// A function that a hook calls on the object that called the hook returns
+/// MBM_BUSY and changes nothing; a getter returns what it returns for an object
+/// that was never begun. The hook `idle` is the exception: it may call every
+/// function, and one that starts a request returns MBM_BUSY.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_port {
@@ -59,6 +62,20 @@ impl mbm_port {
         self.preTransmission = from.preTransmission;
         self.postTransmission = from.postTransmission;
         self.idle = from.idle;
+    }
+}
+
+/// Reads the clock of a port. No reference to the port, nor to the object that
+/// holds it, lives while the hook runs.
+///
+/// # Safety
+/// `port` points to a complete port.
+#[inline(always)]
+pub(super) unsafe fn now(port: *const mbm_port) -> u32 {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let (micros, context) = ((*port).micros, (*port).context);
+        micros.unwrap_unchecked()(context)
     }
 }
 

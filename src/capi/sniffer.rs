@@ -427,8 +427,8 @@ pub unsafe extern "C" fn mbm_sniffer_feed(
 /// @param now      the time, in microseconds
 /// @param event    receives what happened; valid until the next call with this
 ///                 sniffer
-/// @return 1 if there is an event, 0 if nothing more is known yet, or the sniffer
-///         was never begun
+/// @return 1 if there is an event; 0, with `event` unchanged, if nothing more is known
+///         yet, or the sniffer was never begun
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_next(
     sniffer: *mut mbm_sniffer,

@@ -52,19 +52,25 @@ pub const MBM_RESPONSE_TIMED_OUT: u8 = 0xE2;
 /// The reply arrived damaged: its CRC is wrong.
 pub const MBM_INVALID_CRC: u8 = 0xE3;
 
-/// A NULL pointer, a port without read, write or micros, a buffer of no use.
+/// An argument that the function cannot take: NULL, a number out of range, a port
+/// without read, write or micros, a buffer that is too short, or an object of
+/// another framing or kind. The comment of the function says which. Nothing was
+/// changed.
 pub const MBM_INVALID_ARGUMENT: u8 = 0xE4;
 /// The unit answered the function with a right CRC, but not this request:
 /// wrong byte count, wrong echo, or an exception code of 0 or from 0x80.
 pub const MBM_MALFORMED_REPLY: u8 = 0xE5;
 /// The port's read or write reported that the link is lost.
 pub const MBM_LINK_LOST: u8 = 0xE6;
-/// The object has a request under way; nothing was changed.
+/// The object is in use: it has a request under way, it called the hook that this
+/// call came from, or it is a record that is served in another way. Nothing was
+/// changed.
 pub const MBM_BUSY: u8 = 0xE7;
 /// A function that reads cannot be broadcast; nothing was sent.
 pub const MBM_BROADCAST_NOT_ALLOWED: u8 = 0xE8;
 /// The frame buffer cannot hold the request (nothing was sent), or frame or
-/// response buffer cannot hold the reply (the response words are unchanged).
+/// response buffer cannot hold the reply (the response words are unchanged), or a
+/// unit has no place for another record.
 pub const MBM_BUFFER_TOO_SMALL: u8 = 0xE9;
 /// The object was never begun, or has no buffers.
 pub const MBM_NOT_INITIALISED: u8 = 0xEA;
@@ -102,10 +108,10 @@ statuses! {
     MBM_INVALID_FUNCTION = Status::INVALID_FUNCTION, c"the unit answered another function";
     MBM_RESPONSE_TIMED_OUT = Status::RESPONSE_TIMED_OUT, c"no complete reply in time";
     MBM_INVALID_CRC = Status::INVALID_CRC, c"the reply arrived damaged (CRC)";
-    MBM_INVALID_ARGUMENT = Status::INVALID_ARGUMENT, c"invalid argument: a NULL pointer or a missing hook";
+    MBM_INVALID_ARGUMENT = Status::INVALID_ARGUMENT, c"invalid argument: NULL, out of range, or of another kind";
     MBM_MALFORMED_REPLY = Status::MALFORMED_REPLY, c"the reply does not answer the request";
     MBM_LINK_LOST = Status::LINK_LOST, c"the port reported a lost link";
-    MBM_BUSY = Status::BUSY, c"a request is under way already";
+    MBM_BUSY = Status::BUSY, c"in use: a request is under way, or a hook of the object called";
     MBM_BROADCAST_NOT_ALLOWED = Status::BROADCAST_NOT_ALLOWED, c"a read cannot be broadcast";
     MBM_BUFFER_TOO_SMALL = Status::BUFFER_TOO_SMALL, c"a buffer is too small for request or reply";
     MBM_NOT_INITIALISED = Status::NOT_INITIALISED, c"the object was never begun or has no buffers";

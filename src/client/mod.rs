@@ -53,6 +53,9 @@ pub trait Line<J> {
     /// Says that a job was taken out of the queue.
     fn released(&mut self, _job: &J) {}
 
+    /// True if it holds a job outside of the queue that `is` the one.
+    fn holds(&mut self, is: impl FnOnce(&J) -> bool) -> bool;
+
     /// Moves on to the time `now`; gives a job back that ended. `fresh` at the
     /// first of the calls that one poll makes, when there may be something new.
     fn advance<const N: usize>(
@@ -188,6 +191,11 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// How many requests wait or are under way.
     pub fn pending(&self) -> usize {
         self.shared.queue.len() + self.line.held()
+    }
+
+    /// True if a job that `is` the one waits or is under way.
+    pub fn holds(&mut self, is: impl Fn(&J) -> bool) -> bool {
+        self.shared.queue.iter().any(&is) || self.line.holds(is)
     }
 
     /// Has a job done; it is given back by [`Client::poll`].

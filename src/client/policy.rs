@@ -1,6 +1,6 @@
 //! When a request is asked again that was not answered.
 
-use super::job::{Stage, Ticket};
+use super::job::{Job, Stage};
 use super::units::Means;
 use crate::error::Status;
 use crate::FIRMWARE;
@@ -88,17 +88,27 @@ impl Policy {
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn ends(
         &self,
-        ticket: &mut Ticket,
+        job: &mut impl Job,
         status: Status,
         now: u32,
         means: &mut impl Means,
     ) -> bool {
-        let again = (FIRMWARE || status != Status::OK) && means.again(self, ticket, status, now);
-        means.note(ticket.unit, status, again, now);
-        if !again {
+        let (unit, retries) = (job.ticket().unit, job.ticket().retries);
+        // No reference to the ticket lives while `means` may call a hook.
+        let again = if !FIRMWARE && status == Status::OK {
+            None
+        } else {
+            means.again(self, retries, status)
+        };
+        means.note(unit, status, again.is_some(), now);
+        let ticket = job.ticket_mut();
+        let Some(wait) = again else {
             ticket.status = status;
-        }
-        !again
+            return true;
+        };
+        ticket.retries = retries + 1;
+        ticket.enter(Stage::Queued, now, wait);
+        false
     }
 
     fn grown(&self, retry: u8, random: u32) -> u32 {
@@ -117,22 +127,18 @@ impl Policy {
     }
 }
 
-/// True if a request that ended with `status` is asked again; then it waits for
-/// that. `random` gives any number.
+/// How long a request that ended with `status` waits to be asked again; `None` if it
+/// is not. It was asked again `retries` times; `random` gives any number.
 pub fn again(
     policy: &Policy,
-    ticket: &mut Ticket,
+    retries: u8,
     status: Status,
-    now: u32,
     random: impl FnOnce() -> u32,
-) -> bool {
-    if ticket.retries >= policy.retries || !status.may_be_repeated() {
-        return false;
+) -> Option<u32> {
+    if retries >= policy.retries || !status.may_be_repeated() {
+        return None;
     }
-    ticket.retries += 1;
-    let wait = policy.wait(ticket.retries, random);
-    ticket.enter(Stage::Queued, now, wait);
-    true
+    Some(policy.wait(retries + 1, random))
 }
 
 /// Sixteen bits of which each depends on all bits of `random` below it, so that

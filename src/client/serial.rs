@@ -95,6 +95,10 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         !self.engine.is_pending()
     }
 
+    fn holds(&mut self, is: impl FnOnce(&J) -> bool) -> bool {
+        self.engine.request().job.as_ref().is_some_and(is)
+    }
+
     fn advance<const N: usize>(
         &mut self,
         shared: &mut Shared<J, N>,
@@ -138,7 +142,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
     }
 
     fn withdraw(&mut self, is: impl FnOnce(&J) -> bool) -> Option<J> {
-        if !self.engine.request().job.as_ref().is_some_and(is) {
+        if !self.holds(is) {
             return None;
         }
         self.engine.cancel();

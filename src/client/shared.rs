@@ -115,8 +115,8 @@ impl<J: Job, const N: usize> Shared<J, N> {
         means: &mut impl Means,
     ) -> Option<J> {
         self.look = true;
-        let ticket = self.queue.get_mut(at)?.ticket_mut();
-        if self.policy.ends(ticket, status, now, means) {
+        let job = self.queue.get_mut(at)?;
+        if self.policy.ends(job, status, now, means) {
             return self.remove(at);
         }
         None
@@ -132,7 +132,7 @@ impl<J: Job, const N: usize> Shared<J, N> {
         means: &mut impl Means,
     ) -> Option<J> {
         self.look = true;
-        if self.policy.ends(job.ticket_mut(), status, now, means) {
+        if self.policy.ends(&mut job, status, now, means) {
             return Some(job);
         }
         self.put_first(job);

@@ -1,6 +1,5 @@
 //! What is kept for each unit, in storage that the caller lends.
 
-use super::job::Ticket;
 use super::policy::{again, Policy};
 use crate::error::Status;
 use crate::time::{clamped, elapsed};
@@ -118,9 +117,10 @@ pub trait Means: Storage {
         note(self.units(), unit, status, again, now);
     }
 
-    /// True if a request that ended with `status` is asked again.
-    fn again(&mut self, policy: &Policy, ticket: &mut Ticket, status: Status, now: u32) -> bool {
-        again(policy, ticket, status, now, || self.random())
+    /// How long a request that ended with `status`, and was asked again `retries`
+    /// times, waits to be asked again; `None` if it is not.
+    fn again(&mut self, policy: &Policy, retries: u8, status: Status) -> Option<u32> {
+        again(policy, retries, status, || self.random())
     }
 
     /// Any number, another each time; for jitter.

@@ -1,10 +1,10 @@
 //! A client of each kind of line.
 
-use super::{client, mbm_client, pointers, Kind, Lent, LentByC, Object, BEGUN};
+use super::{client, mbm_client, pointers, Kind, Lent, LentByC, Object};
 use super::{Ascii, Rtu, TcpIp};
 use crate::capi::frame::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
 use crate::capi::port::{countable, mbm_port};
-use crate::client::{Client, Line, Serial, Tcp, ASCII_SILENCE, STREAM_SILENCE};
+use crate::client::{Line, Serial, Tcp, ASCII_SILENCE, STREAM_SILENCE};
 use crate::error::Status;
 use crate::frame::{ascii, ascii_window, rtu, Search};
 
@@ -32,19 +32,21 @@ unsafe fn begin<L: Kind>(
     }
     // SAFETY: not NULL, so storage of an object, zeroed or begun; zero is a value
     // of every field but for the calls, which no one uses before they are set.
-    let object = unsafe { &mut *pointer.cast::<Object>() };
-    if object.mark == BEGUN {
-        return Status::BUSY;
+    unsafe {
+        if pointers::check(pointer) != Status::NOT_INITIALISED {
+            return Status::BUSY;
+        }
+        let object = pointers::object(pointer);
+        (*object).calls = &L::CALLS;
+        let client = client::<L>(object);
+        client.preset();
+        let (settings, means, place) = client.line.parts();
+        settings.preset();
+        place.copy(port);
+        means.frame = frame;
+        means.frame_bytes = countable(frame_bytes);
+        Object::mark(pointer).write(Object::BEGUN);
     }
-    object.mark = BEGUN;
-    object.calls = &L::CALLS;
-    let client: &mut Client<L, _, _> = client(object);
-    client.preset();
-    let (settings, means, place) = client.line.parts();
-    settings.preset();
-    place.copy(port);
-    means.frame = frame;
-    means.frame_bytes = countable(frame_bytes);
     Status::OK
 }
 
@@ -74,7 +76,7 @@ where
             engine.settings.gap = 0;
             engine.settings.silence = silence;
         }
-        engine.line_used();
+        pointers::calling(pointer, || engine.line_used());
         Status::OK.code()
     }
 }
@@ -86,8 +88,8 @@ where
 /// @param port        copied; read, write and micros must be there
 /// @param frame       bytes of one frame, valid for as long as the client is used
 /// @param frameBytes  at least 8; 256 hold any frame
-/// @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
-///         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+/// @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
+///         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_beginRtu(
     client: *mut mbm_client,
@@ -107,8 +109,8 @@ pub unsafe extern "C" fn mbm_client_beginRtu(
 /// @param port        copied; read, write and micros must be there
 /// @param frame       bytes of one frame, valid for as long as the client is used
 /// @param frameBytes  at least 17; 513 hold any frame
-/// @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
-///         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+/// @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
+///         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_beginAscii(
     client: *mut mbm_client,
@@ -126,7 +128,7 @@ pub unsafe extern "C" fn mbm_client_beginAscii(
             begin_serial::<ascii_window::Window>(client, port, frame, frameBytes, true, silence);
         if status == Status::OK.code() {
             let object = pointers::object(client);
-            object.framing = MBM_FRAMING_ASCII;
+            (*object).framing = MBM_FRAMING_ASCII;
             *delimiter(object) = ascii::END;
         }
         status
@@ -134,8 +136,12 @@ pub unsafe extern "C" fn mbm_client_beginAscii(
 }
 
 /// What ends the frames of an ASCII client.
-fn delimiter(object: &mut Object) -> &mut u8 {
-    let ascii: &mut Ascii = client(object);
+///
+/// # Safety
+/// As for [`client`].
+unsafe fn delimiter<'a>(object: *mut Object) -> &'a mut u8 {
+    // SAFETY: as the caller promises.
+    let ascii: &mut Ascii = unsafe { client(object) };
     &mut ascii.line.transaction().search().delimiter
 }
 
@@ -154,7 +160,7 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
     // SAFETY: as the header demands.
     unsafe {
         pointers::with(client, |object| {
-            if object.framing != MBM_FRAMING_ASCII
+            if (*object).framing != MBM_FRAMING_ASCII
                 || !(1..=127).contains(&character)
                 || part_of_a_frame
             {
@@ -177,8 +183,8 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
 /// @param port        copied; read, write and micros must be there
 /// @param frame       bytes of one frame, valid for as long as the client is used
 /// @param frameBytes  at least 8; 256 hold any frame
-/// @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
-///         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+/// @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
+///         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_beginRtuOverTcp(
     client: *mut mbm_client,
@@ -203,8 +209,8 @@ pub unsafe extern "C" fn mbm_client_beginRtuOverTcp(
 /// @param outgoing       bytes to send, valid for as long as the client is used
 /// @param outgoingBytes  at least 12; 260 hold any frame, more gather more
 ///                       requests for one write
-/// @return MBM_OK, MBM_BUSY if it was begun already (to begin anew,
-///         zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+/// @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
+///         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_beginTcp(
     client: *mut mbm_client,
@@ -222,7 +228,7 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
         let status = begin::<Tcp<mbm_port, LentByC>>(client, port, incoming, incomingBytes);
         if status == Status::OK {
             let object = pointers::object(client);
-            object.framing = MBM_FRAMING_TCP;
+            (*object).framing = MBM_FRAMING_TCP;
             let tcp: &mut TcpIp = super::client(object);
             tcp.line.limit(super::MBM_CLIENT_DEPTH);
             tcp.line.means.outgoing = outgoing;
@@ -244,7 +250,7 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
 pub unsafe extern "C" fn mbm_client_setInFlight(client: *mut mbm_client, most: u8) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        pointers::with(client, |object| match (object.framing, most) {
+        pointers::with(client, |object| match ((*object).framing, most) {
             (MBM_FRAMING_TCP, 1..=super::MBM_CLIENT_DEPTH) => {
                 let tcp: &mut TcpIp = super::client(object);
                 tcp.line.limit(most);

@@ -2,7 +2,7 @@
 
 use super::{client, common, mbm_client, on_line, parts, pointers, Ascii, Line, Rtu, TcpIp};
 use crate::capi::frame::MBM_FRAMING_RTU;
-use crate::capi::master::mbm_master;
+use crate::capi::master::{mbm_master, Core};
 use crate::capi::pointers as masters;
 use crate::error::Status;
 use core::ffi::c_void;
@@ -33,13 +33,14 @@ pub unsafe extern "C" fn mbm_client_reconnect(
     client: *mut mbm_client,
     link: *const mbm_link,
 ) -> u8 {
-    // SAFETY: as the header demands; the hooks do not use the client.
+    // SAFETY: as the header demands. No reference to the client lives while the
+    // hooks of the link are called.
     unsafe {
         let status = pointers::with(client, |object| {
             if common(object).is_lent() {
                 return Status::BUSY;
             }
-            on_line!(object, client => client.reconnect());
+            pointers::calling(client, || on_line!(object, client => client.reconnect()));
             Status::OK
         });
         if status != Status::OK.code() || link.is_null() {
@@ -82,21 +83,23 @@ pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8
 /// @param client  the object; for a facade, of RTU frames on a line or over TCP
 /// @param master  a facade with buffers, which gets the client's port; NULL if
 ///                you use the line in another way
-/// @return MBM_OK; MBM_BUSY if a request is under way or the line is lent already;
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return MBM_OK; MBM_BUSY, with both unchanged, if a request is under way or the line
+///         is lent already; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_lend(client: *mut mbm_client, master: *mut mbm_master) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        pointers::with(client, |object| {
+        let status = pointers::with(client, |object| {
             if !master.is_null() {
-                match masters::prepare(master) {
+                if (*object).framing != MBM_FRAMING_RTU {
                     // A facade speaks RTU.
-                    _ if object.framing != MBM_FRAMING_RTU => return Status::INVALID_ARGUMENT,
+                    return Status::INVALID_ARGUMENT;
+                }
+                match masters::check(master) {
                     Status::OK if masters::object(master).core().is_pending() => {
                         return Status::BUSY;
                     }
-                    Status::OK => {}
+                    Status::OK | Status::NOT_INITIALISED => {}
                     refused => return refused,
                 }
             }
@@ -104,12 +107,15 @@ pub unsafe extern "C" fn mbm_client_lend(client: *mut mbm_client, master: *mut m
                 return Status::BUSY;
             }
             if !master.is_null() {
-                let core = masters::object(master).core();
-                *core.port() = *parts(object).port;
-                core.line_used();
+                masters::prepare(master);
+                *masters::object(master).core().port() = *parts(object).port;
             }
             Status::OK
-        })
+        });
+        if status == Status::OK.code() && !master.is_null() {
+            masters::calling(master, Core::line_used);
+        }
+        status
     }
 }
 
@@ -131,12 +137,17 @@ pub unsafe extern "C" fn mbm_client_takeBack(
             if !common(object).is_lent() {
                 return Status::INVALID_ARGUMENT;
             }
-            if masters::check(master) == Status::OK {
-                let core = masters::object(master).core();
-                if core.is_pending() {
-                    return Status::BUSY;
+            match masters::check(master) {
+                Status::OK => {
+                    let core = masters::object(master).core();
+                    if core.is_pending() {
+                        return Status::BUSY;
+                    }
+                    core.port().read = None;
                 }
-                core.port().read = None;
+                Status::BUSY => return Status::BUSY,
+                // None, or none that has the port.
+                _ => {}
             }
             common(object).take_back();
             Status::OK

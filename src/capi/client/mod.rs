@@ -2,23 +2,24 @@
 
 mod begin;
 mod line;
+mod poll;
 mod request;
 mod requests;
 mod settings;
 
 pub use begin::*;
 pub use line::*;
+pub use poll::*;
 pub use request::mbm_clientRequest;
 pub use requests::*;
 pub use settings::*;
 
 use super::client_pointers as pointers;
-use super::port::mbm_port;
+use super::port::{self, mbm_port};
 use super::storage::mbm_counters;
-use crate::client::{self as core_client, Client, Job, Means, Policy, Serial, Tcp, Ticket, Unit};
+use crate::client::{self as core_client, Client, Job, Means, Policy, Serial, Tcp, Unit};
 use crate::error::Status;
 use crate::frame::{ascii_window, rtu, Search};
-use crate::port::Port;
 use crate::transaction::{Counter, Settings, Storage};
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
@@ -29,16 +30,19 @@ pub const MBM_CLIENT_DEPTH: u8 = 16;
 
 const DEPTH: usize = MBM_CLIENT_DEPTH as usize;
 
-/// Marks an object that was begun; zeroed storage does not carry it.
-const BEGUN: u8 = 0x43;
-
 /// A client of one serial line or one TCP stream: up to 16 requests are queued,
 /// mbm_client_poll moves them on, and nothing ever waits.
 ///
 /// Storage is yours and must be zero before first use, which a static object is.
-/// One of the mbm_client_begin functions comes first. Not re-entrant: use one
-/// object from one thread and never from an interrupt; several objects are
-/// independent of each other.
+/// One of the mbm_client_begin functions comes first. Use one object from one
+/// thread and never from an interrupt; several objects are independent of each
+/// other.
+///
+/// A `done` function may call every function on the client that calls it, but
+/// mbm_client_poll, which returns MBM_BUSY. A hook of the port, and the `random`
+/// function of mbm_client_setJitter, may call none: each returns MBM_BUSY and
+/// changes nothing, and a getter returns what it returns for an object that was
+/// never begun.
 #[repr(C)]
 pub struct mbm_client {
     /// Not for you.
@@ -49,9 +53,12 @@ pub struct mbm_client {
 
 /// What a client of a serial line in RTU frames, one in ASCII frames and one of
 /// a TCP stream are.
-type Rtu = Client<Serial<mbm_port, LentByC, Lent, rtu::Window>, Lent, DEPTH>;
-type Ascii = Client<Serial<mbm_port, LentByC, Lent, ascii_window::Window>, Lent, DEPTH>;
-type TcpIp = Client<Tcp<mbm_port, LentByC>, Lent, DEPTH>;
+type Rtu = Client<RtuLine, Lent, DEPTH>;
+type Ascii = Client<AsciiLine, Lent, DEPTH>;
+type TcpIp = Client<TcpLine, Lent, DEPTH>;
+type RtuLine = Serial<mbm_port, LentByC, Lent, rtu::Window>;
+type AsciiLine = Serial<mbm_port, LentByC, Lent, ascii_window::Window>;
+type TcpLine = Tcp<mbm_port, LentByC>;
 
 /// What lies behind an `mbm_client`.
 #[repr(C)]
@@ -80,19 +87,28 @@ const _: () = {
 };
 
 impl Object {
-    /// Says whether this object was begun, without looking at anything else.
+    /// Marks an object that was begun; zeroed storage does not carry it.
+    pub(super) const BEGUN: u8 = 0x43;
+    /// Marks an object while hooks may be called that may not use it.
+    pub(super) const CALLING: u8 = 0x44;
+
+    /// The mark in storage of an object.
     ///
     /// # Safety
-    /// `object` points to storage of an object, zeroed or begun.
-    pub(super) unsafe fn is_begun(object: *const Object) -> bool {
-        // SAFETY: the storage is zeroed or written, so readable.
-        unsafe { (&raw const (*object).mark).read() == BEGUN }
+    /// `client` points to storage of an object, zeroed or begun.
+    pub(super) unsafe fn mark(client: *const mbm_client) -> *mut u8 {
+        // SAFETY: as the caller promises; every object is writable storage.
+        unsafe { &raw mut (*client.cast::<Object>().cast_mut()).mark }
     }
+}
 
-    fn calls(&self) -> &'static Calls {
-        // SAFETY: an object that is begun has them, from constants.
-        unsafe { &*self.calls }
-    }
+/// The calls of an object.
+///
+/// # Safety
+/// `object` is one that is begun.
+unsafe fn calls(object: *const Object) -> &'static Calls {
+    // SAFETY: an object that is begun has them, from constants.
+    unsafe { &*(*object).calls }
 }
 
 /// What differs from one kind of line to the next; firmware carries what its
@@ -100,8 +116,9 @@ impl Object {
 /// is carried only by who calls it: see [`on_line`].
 struct Calls {
     kind: Line,
-    poll: unsafe fn(*mut Object) -> Status,
-    queue: fn(&mut Object, Lent) -> Status,
+    poll: unsafe fn(*mut mbm_client) -> Status,
+    queue: unsafe fn(*mut Object, Lent) -> Status,
+    holds: unsafe fn(*mut Object, Lent) -> bool,
 }
 
 /// The kinds of line that C has.
@@ -129,16 +146,16 @@ trait Kind: core_client::Line<Lent> + Sized + 'static {
     fn parts(&mut self) -> LineParts<'_>;
 }
 
-impl Kind for Serial<mbm_port, LentByC, Lent, rtu::Window> {
-    const CALLS: Calls = calls::<Self>(Line::Rtu);
+impl Kind for RtuLine {
+    const CALLS: Calls = calls_of::<Self>(Line::Rtu);
 
     fn parts(&mut self) -> LineParts<'_> {
         parts_of(self)
     }
 }
 
-impl Kind for Serial<mbm_port, LentByC, Lent, ascii_window::Window> {
-    const CALLS: Calls = calls::<Self>(Line::Ascii);
+impl Kind for AsciiLine {
+    const CALLS: Calls = calls_of::<Self>(Line::Ascii);
 
     fn parts(&mut self) -> LineParts<'_> {
         parts_of(self)
@@ -150,38 +167,47 @@ fn parts_of<W: Search>(line: &mut Serial<mbm_port, LentByC, Lent, W>) -> LinePar
     (&mut engine.settings, &mut engine.storage, &mut engine.port)
 }
 
-impl Kind for Tcp<mbm_port, LentByC> {
-    const CALLS: Calls = calls::<Self>(Line::Tcp);
+impl Kind for TcpLine {
+    const CALLS: Calls = calls_of::<Self>(Line::Tcp);
 
     fn parts(&mut self) -> LineParts<'_> {
         (&mut self.settings, &mut self.means, &mut self.port)
     }
 }
 
-const fn calls<L: Kind>(kind: Line) -> Calls {
+const fn calls_of<L: Kind>(kind: Line) -> Calls {
     Calls {
         kind,
         poll: poll::<L>,
         queue: queue::<L>,
+        holds: holds::<L>,
     }
 }
 
-/// The client in an object, whose calls are those of `L`.
-fn client<L>(object: &mut Object) -> &mut Client<L, Lent, DEPTH> {
-    // SAFETY: a begun object has the client in it that its calls are for.
-    unsafe { &mut *(&raw mut object.client).cast() }
+/// The client in an object. The mark stands outside of it.
+///
+/// # Safety
+/// `object` is begun, with the calls of `L`, and nothing else uses its client while
+/// the reference lives.
+unsafe fn client<'a, L>(object: *mut Object) -> &'a mut Client<L, Lent, DEPTH> {
+    // SAFETY: as the caller promises.
+    unsafe { &mut *(&raw mut (*object).client).cast() }
 }
 
 /// What clients of every line have in common.
-fn common(object: &mut Object) -> &mut Client<(), Lent, DEPTH> {
+///
+/// # Safety
+/// As for [`client`], of any `L`.
+unsafe fn common<'a>(object: *mut Object) -> &'a mut Client<(), Lent, DEPTH> {
     // SAFETY: as `client`; the line is the last of its fields, whose order is C's.
-    unsafe { &mut *(&raw mut object.client).cast() }
+    unsafe { &mut *(&raw mut (*object).client).cast() }
 }
 
-/// Does something with the client in an object, whatever its line.
+/// Does something with the client in an object, whatever its line. Unsafe as
+/// [`client`] is.
 macro_rules! on_line {
     ($object:expr, $client:ident => $action:expr) => {
-        match $object.calls().kind {
+        match $crate::capi::client::calls($object).kind {
             Line::Rtu => {
                 let $client: &mut Rtu = client($object);
                 $action
@@ -199,61 +225,93 @@ macro_rules! on_line {
 }
 use on_line;
 
+/// The time on the clock of a client's port.
+///
+/// # Safety
+/// As for [`client`]; no reference into the object lives, as the clock is a hook.
+unsafe fn now<L: Kind>(object: *mut Object) -> u32 {
+    // SAFETY: as the caller promises; the reference ends before the hook runs.
+    unsafe {
+        let port: *const mbm_port = client::<L>(object).line.parts().2;
+        port::now(port)
+    }
+}
+
 /// Polls, and calls `done` of those that ended.
 ///
 /// # Safety
-/// `pointer` is an object that is begun, as a client of `L`; nothing else uses it,
-/// but for what `done` calls.
-unsafe fn poll<L: Kind>(pointer: *mut Object) -> Status {
+/// `pointer` is an object that is begun, as a client of `L`; no reference into it
+/// lives.
+unsafe fn poll<L: Kind>(pointer: *mut mbm_client) -> Status {
+    let object = pointers::object(pointer);
     // SAFETY: begun; no reference lives while `done` is called, for that may use
-    // the object.
+    // the object. If it zeroed it, and perhaps began it anew, polling is over.
     unsafe {
-        let object = &mut *pointer;
-        let client = client::<L>(object);
-        if client.is_lent() {
+        if client::<L>(object).is_lent() {
             return Status::BUSY;
         }
-        let now = client.line.parts().2.micros();
-        object.polling = true;
+        let now = pointers::calling(pointer, || now::<L>(object));
+        (*object).polling = true;
         for turn in 0..MBM_CLIENT_DEPTH + 1 {
-            match self::client::<L>(&mut *pointer).poll(now, turn == 0) {
+            let poll = || client::<L>(object).poll(now, turn == 0);
+            match pointers::calling(pointer, poll) {
                 Some(request) => request.call(),
                 None => break,
             }
+            if !(*object).polling {
+                return Status::OK;
+            }
         }
-        let object = &mut *pointer;
-        object.polling = false;
-        match self::client::<L>(object).pending() {
+        (*object).polling = false;
+        match client::<L>(object).pending() {
             0 => Status::OK,
             _ => Status::PENDING,
         }
     }
 }
 
-fn queue<L: Kind>(object: &mut Object, request: Lent) -> Status {
-    match client::<L>(object).queue(request) {
+/// # Safety
+/// As for [`client`].
+unsafe fn queue<L: Kind>(object: *mut Object, request: Lent) -> Status {
+    // SAFETY: as the caller promises.
+    match unsafe { client::<L>(object) }.queue(request) {
         Ok(()) => Status::PENDING,
         Err(refused) => refused.ticket().status,
     }
 }
 
-/// The parts of the client in an object.
-#[cfg_attr(target_os = "none", inline(never))]
-fn parts(object: &mut Object) -> Parts<'_> {
-    on_line!(object, client => {
-        let (policy, line) = client.parts();
-        let (settings, means, port) = Kind::parts(line);
-        Parts {
-            settings,
-            means,
-            port,
-            policy,
-        }
-    })
+/// True if the client has this request already, whatever the request says of itself.
+///
+/// # Safety
+/// As for [`client`].
+unsafe fn holds<L: Kind>(object: *mut Object, request: Lent) -> bool {
+    // SAFETY: as the caller promises.
+    unsafe { client::<L>(object) }.holds(|held| *held == request)
 }
 
-/// Says whether a request is asked again. (A pointer, as [`Treatment`].)
-type Again = fn(&mut LentByC, &Policy, &mut Ticket, Status, now: u32) -> bool;
+/// The parts of the client in an object.
+///
+/// # Safety
+/// As for [`client`].
+#[cfg_attr(target_os = "none", inline(never))]
+unsafe fn parts<'a>(object: *mut Object) -> Parts<'a> {
+    // SAFETY: as the caller promises.
+    unsafe {
+        on_line!(object, client => {
+            let (policy, line) = client.parts();
+            let (settings, means, port) = Kind::parts(line);
+            Parts {
+                settings,
+                means,
+                port,
+                policy,
+            }
+        })
+    }
+}
+
+/// How long a request waits to be asked again, if it is. (A pointer, as [`Treatment`].)
+type Again = fn(&mut LentByC, &Policy, retries: u8, Status) -> Option<u32>;
 
 /// How a unit is treated as its record says. (Behind a pointer, so that firmware
 /// without records carries none of it.)
@@ -333,11 +391,9 @@ impl Means for LentByC {
         }
     }
 
-    fn again(&mut self, policy: &Policy, ticket: &mut Ticket, status: Status, now: u32) -> bool {
-        match self.again {
-            Some(again) => again(self, policy, ticket, status, now),
-            None => false,
-        }
+    fn again(&mut self, policy: &Policy, retries: u8, status: Status) -> Option<u32> {
+        self.again
+            .and_then(|again| again(self, policy, retries, status))
     }
 
     fn random(&mut self) -> u32 {
@@ -347,112 +403,4 @@ impl Means for LentByC {
             None => 0,
         }
     }
-}
-
-/// Moves all requests on, without waiting, and calls `done` of those that have
-/// ended, of at most 17 in one call.
-///
-/// Call it as often as you like; mbm_client_pollDelay tells when the next call
-/// is due.
-///
-/// @param client  the object
-/// @return MBM_PENDING while requests wait or are under way, MBM_OK if there are
-///         none, MBM_BUSY from within `done` and while the line is lent;
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_poll(client: *mut mbm_client) -> u8 {
-    // SAFETY: as the header demands. No reference lives while `done` is called,
-    // for it may use the object.
-    unsafe {
-        let status = pointers::check(client);
-        if status != Status::OK {
-            return status.code();
-        }
-        let object = pointers::object(client);
-        if object.polling {
-            return Status::BUSY.code();
-        }
-        let poll = object.calls().poll;
-        poll(object).code()
-    }
-}
-
-#[cfg_attr(not(target_os = "none"), inline(never))]
-fn poll_delay<L: Kind>(client: &mut Client<L, Lent, DEPTH>) -> u32 {
-    let now = client.line.parts().2.micros();
-    client.poll_delay(now)
-}
-
-/// How long mbm_client_poll will find nothing to do unless a byte arrives, so
-/// that a program may wait for one in select, or sleep, until then. Bytes are taken
-/// only while a request is pending: with none, wait for something else.
-///
-/// @param client  the object
-/// @return microseconds; 0 means poll now, 0xFFFFFFFF that there is no request; 1000
-///         while a TCP port does not take what is to be sent: to poll sooner, wait
-///         for that too, as mbm_tcp_wait does
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_pollDelay(client: *const mbm_client) -> u32 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::ask(
-            client,
-            u32::MAX,
-            |object| on_line!(object, client => poll_delay(client)),
-        )
-    }
-}
-
-/// How many requests wait or are under way.
-///
-/// @param client  the object
-/// @return 0 to 16
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_pending(client: *const mbm_client) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::ask(
-            client,
-            0,
-            |object| on_line!(object, client => client.pending() as u8),
-        )
-    }
-}
-
-/// Gives a request up. It is yours again at once, with the status MBM_CANCELLED;
-/// `done` is not called. It may have reached the device, and may still be answered.
-///
-/// @param client   the object
-/// @param request  a request that this client was given
-/// @return MBM_OK; MBM_NOT_PENDING, with nothing changed, for a request that has
-///         ended already or was never queued here; MBM_INVALID_ARGUMENT or
-///         MBM_NOT_INITIALISED
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_cancel(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        pointers::with(client, |object| match Lent::new(request) {
-            None => Status::INVALID_ARGUMENT,
-            Some(request) => match on_line!(object, client => client.cancel(|job| *job == request))
-            {
-                None => Status::NOT_PENDING,
-                Some(_) => Status::OK,
-            },
-        })
-    }
-}
-
-/// The transaction identifier on the wire: that of the TCP frame in which the request
-/// was sent last. The client chooses it, another one for each frame, also for a retry.
-///
-/// @param request  a request, pending or ended
-/// @return the identifier; 0 in other framings, for a request that was never sent, and
-///         for NULL. 0 is also an identifier
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_wireTransaction(request: *const mbm_clientRequest) -> u16 {
-    // SAFETY: as the header demands: NULL, or a request that is zeroed or was used.
-    unsafe { Lent::new(request.cast_mut()).map_or(0, |request| request.ticket().wire()) }
 }

@@ -173,8 +173,9 @@ pub unsafe extern "C" fn mbm_client_setEchoDiscard(client: *mut mbm_client, on: 
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.settings.echo_discard = on != 0;
-            built_in(cfg!(feature = "echo") || on == 0)
+            built_in(cfg!(feature = "echo") || on == 0, || {
+                parts.settings.echo_discard = on != 0;
+            })
         })
     }
 }
@@ -194,15 +195,18 @@ pub unsafe extern "C" fn mbm_client_setPostFlushHold(
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.settings.post_flush_hold = characters;
-            built_in(cfg!(feature = "hold") || characters == 0)
+            built_in(cfg!(feature = "hold") || characters == 0, || {
+                parts.settings.post_flush_hold = characters;
+            })
         })
     }
 }
 
-/// What a setting is answered with that an archive may lack.
-fn built_in(has: bool) -> Status {
+/// Makes a change that an archive may lack the code for: then it is refused.
+#[inline(always)]
+fn built_in(has: bool, change: impl FnOnce()) -> Status {
     if has {
+        change();
         Status::OK
     } else {
         Status::INVALID_ARGUMENT
@@ -223,8 +227,8 @@ pub unsafe extern "C" fn mbm_client_setRetries(client: *mut mbm_client, retries:
     unsafe {
         set(client, |parts| {
             parts.policy.retries = retries;
-            parts.means.again = Some(|means, policy, ticket, status, now| {
-                again(policy, ticket, status, now, || means.random())
+            parts.means.again = Some(|means, policy, retries, status| {
+                again(policy, retries, status, || means.random())
             });
             Status::OK
         })
@@ -265,8 +269,8 @@ pub unsafe extern "C" fn mbm_client_setBackoff(
 /// @param client   the object
 /// @param percent  0 (at first) to 100: how much of the wait may be taken off
 /// @param random   returns another number each time, for example rand(): one of 32
-///                 bits, of 15 bits, or whose upper bits alone vary. It may not use
-///                 the client
+///                 bits, of 15 bits, or whose upper bits alone vary. What it
+///                 calls on the client returns MBM_BUSY
 /// @param context  handed to `random`
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
@@ -306,8 +310,9 @@ pub unsafe extern "C" fn mbm_client_setCounters(
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.means.counters = counters;
-            built_in(cfg!(feature = "counters") || counters.is_null())
+            built_in(cfg!(feature = "counters") || counters.is_null(), || {
+                parts.means.counters = counters;
+            })
         })
     }
 }

@@ -18,16 +18,16 @@ use crate::error::Status;
 use crate::master::{Build, Master};
 use core::ffi::c_void;
 
-/// Marks an object that was begun; zeroed storage does not carry it.
-const BEGUN: u8 = 0x4D;
-
 /// A Modbus RTU master: one line, one request at a time.
 ///
 /// Storage is yours and must be zero before first use, which a static object
 /// is (`static mbm_master node;`). Settings and words want mbm_master_begin or
-/// mbm_master_setBuffers before them, requests want both. Not re-entrant: use
-/// one object from one thread and never from an interrupt; several objects are
-/// independent of each other.
+/// mbm_master_setBuffers before them, requests want both. Use one object from one
+/// thread and never from an interrupt; several objects are independent of each
+/// other. Which functions the hooks of its port may call: see mbm_port.
+///
+/// A call that is refused changes nothing, but for what the functions that make a
+/// request say of themselves, and mbm_master_send32.
 #[repr(C)]
 pub struct mbm_master {
     /// Not for you.
@@ -58,13 +58,27 @@ const _: () = {
 };
 
 impl Object {
-    /// Says whether this object was begun, without looking at anything else.
+    /// Marks an object that was begun; zeroed storage does not carry it.
+    pub(in crate::capi) const BEGUN: u8 = 0x4D;
+    /// Marks an object whose port's hooks may be at work.
+    pub(in crate::capi) const CALLING: u8 = 0x4E;
+
+    /// The mark in storage of an object.
     ///
     /// # Safety
-    /// `object` points to storage of an object, zeroed or begun.
-    pub(super) unsafe fn is_begun(object: *const Object) -> bool {
-        // SAFETY: the storage is zeroed or written, so readable.
-        unsafe { (&raw const (*object).mark).read() == BEGUN }
+    /// `master` points to storage of an object, zeroed or begun.
+    pub(in crate::capi) unsafe fn mark(master: *const mbm_master) -> *mut u8 {
+        // SAFETY: as the caller promises; every object is writable storage.
+        unsafe { &raw mut (*master.cast::<Object>().cast_mut()).mark }
+    }
+
+    /// The core in storage of an object.
+    ///
+    /// # Safety
+    /// As for [`Object::mark`].
+    pub(in crate::capi) unsafe fn core_of(master: *mut mbm_master) -> *mut Core {
+        // SAFETY: as the caller promises.
+        unsafe { &raw mut (*master.cast::<Object>()).core }
     }
 
     /// The facade itself.
@@ -76,7 +90,7 @@ impl Object {
     pub(super) fn preset(&mut self) {
         self.core.preset();
         self.core.storage().preset();
-        self.mark = BEGUN;
+        self.mark = Object::BEGUN;
     }
 }
 
@@ -91,7 +105,8 @@ impl Object {
 /// @param slave   unit id, 1 to 247; 248 to 255 are sent as they are, 0 is
 ///                broadcast (serial line guide V1.02, 2.2)
 /// @param port    copied; read, write and micros must be there
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer or a missing hook
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a missing hook; MBM_BUSY
+///         from within a hook of this object's port but `idle`
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_begin(
     master: *mut mbm_master,
@@ -108,10 +123,13 @@ pub unsafe extern "C" fn mbm_master_begin(
     }
     // SAFETY: as the header demands.
     unsafe {
-        pointers::with_new(master, |master| {
-            master.core.begin(slave, |place| place.copy(port));
-            Status::OK
-        })
+        let status = pointers::prepare(master);
+        if status == Status::OK {
+            pointers::calling(master, |core| {
+                core.begin(slave, |place| place.copy(port));
+            });
+        }
+        status.code()
     }
 }
 
@@ -182,7 +200,13 @@ pub unsafe extern "C" fn mbm_master_setBuffers(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_poll(master: *mut mbm_master) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { pointers::with(master, |master| master.core.poll()) }
+    unsafe {
+        match pointers::check(master) {
+            Status::OK => pointers::calling(master, Core::poll),
+            refused => refused,
+        }
+        .code()
+    }
 }
 
 /// How long mbm_master_poll will find nothing to do unless a byte arrives, so
@@ -190,11 +214,18 @@ pub unsafe extern "C" fn mbm_master_poll(master: *mut mbm_master) -> u8 {
 /// counts from this call, so sleeping lengthens no timeout.
 ///
 /// @param master  the object
-/// @return microseconds; 0 means poll now, 0xFFFFFFFF that there is no request
+/// @return microseconds; 0 means poll now, and is returned within a hook of the port
+///         but `idle`; 0xFFFFFFFF that there is no request
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_pollDelay(master: *const mbm_master) -> u32 {
-    // SAFETY: as the header demands.
-    unsafe { pointers::ask(master, u32::MAX, |master| master.core.poll_delay()) }
+    // SAFETY: as the header demands; every object is writable storage.
+    unsafe {
+        match pointers::check(master) {
+            Status::OK => pointers::calling(master.cast_mut(), Core::poll_delay),
+            Status::BUSY => 0,
+            _ => u32::MAX,
+        }
+    }
 }
 
 /// Gives up the request under way, with the driver switched off; its status
@@ -206,10 +237,11 @@ pub unsafe extern "C" fn mbm_master_pollDelay(master: *const mbm_master) -> u32 
 pub unsafe extern "C" fn mbm_master_cancel(master: *mut mbm_master) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        pointers::with(master, |master| {
-            master.core.cancel();
-            Status::OK
-        })
+        let status = pointers::check(master);
+        if status == Status::OK {
+            pointers::calling(master, Core::cancel);
+        }
+        status.code()
     }
 }
 
@@ -267,16 +299,17 @@ unsafe fn finish(pointer: *mut mbm_master, mut status: u8) -> u8 {
         return status;
     }
     // SAFETY: pending, so begun. No reference lives while the hook is called,
-    // for the hook may use the object.
+    // for the hook may use the object, which mbm_master_poll looks at anew.
     unsafe {
-        let blocking = !pointers::object(pointer).non_blocking;
+        let blocking = !(*pointer.cast::<Object>()).non_blocking;
         while blocking && status == Status::PENDING.code() {
-            let core = &mut pointers::object(pointer).core;
-            status = core.poll().code();
-            if core.is_waiting() {
-                let port = core.port();
-                if let Some(idle) = port.idle {
-                    idle(port.context);
+            status = mbm_master_poll(pointer);
+            let core = Object::core_of(pointer);
+            if (*core).is_waiting() {
+                let port = (*core).port();
+                let (idle, context) = (port.idle, port.context);
+                if let Some(idle) = idle {
+                    idle(context);
                 }
             }
         }

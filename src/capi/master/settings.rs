@@ -1,14 +1,16 @@
 //! How a master behaves.
 
-use super::mbm_master;
-use crate::capi::pointers::{ask, with};
+use super::{mbm_master, Core};
+use crate::capi::pointers::{ask, calling, check, with};
 use crate::capi::storage::mbm_counters;
 use crate::error::Status;
 use crate::time::millis;
 
-/// What a setting is answered with that an archive may lack.
-fn built_in(has: bool) -> Status {
+/// Makes a change that an archive may lack the code for: then it is refused.
+#[inline(always)]
+fn built_in(has: bool, change: impl FnOnce()) -> Status {
     if has {
+        change();
         Status::OK
     } else {
         Status::INVALID_ARGUMENT
@@ -158,8 +160,9 @@ pub unsafe extern "C" fn mbm_master_setRetries(master: *mut mbm_master, retries:
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            master.core.settings().retries = retries;
-            built_in(cfg!(feature = "retries") || retries == 0)
+            built_in(cfg!(feature = "retries") || retries == 0, || {
+                master.core.settings().retries = retries;
+            })
         })
     }
 }
@@ -175,8 +178,9 @@ pub unsafe extern "C" fn mbm_master_setEchoDiscard(master: *mut mbm_master, on: 
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            master.core.settings().echo_discard = on != 0;
-            built_in(cfg!(feature = "echo") || on == 0)
+            built_in(cfg!(feature = "echo") || on == 0, || {
+                master.core.settings().echo_discard = on != 0;
+            })
         })
     }
 }
@@ -196,8 +200,9 @@ pub unsafe extern "C" fn mbm_master_setPostFlushHold(
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            master.core.settings().post_flush_hold = characters;
-            built_in(cfg!(feature = "hold") || characters == 0)
+            built_in(cfg!(feature = "hold") || characters == 0, || {
+                master.core.settings().post_flush_hold = characters;
+            })
         })
     }
 }
@@ -233,8 +238,9 @@ pub unsafe extern "C" fn mbm_master_setCounters(
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            master.core.storage().counters = counters;
-            built_in(cfg!(feature = "counters") || counters.is_null())
+            built_in(cfg!(feature = "counters") || counters.is_null(), || {
+                master.core.storage().counters = counters;
+            })
         })
     }
 }
@@ -248,9 +254,10 @@ pub unsafe extern "C" fn mbm_master_setCounters(
 pub unsafe extern "C" fn mbm_master_lineUsed(master: *mut mbm_master) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        with(master, |master| {
-            master.core.line_used();
-            Status::OK
-        })
+        let status = check(master);
+        if status == Status::OK {
+            calling(master, Core::line_used);
+        }
+        status.code()
     }
 }

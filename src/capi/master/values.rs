@@ -63,7 +63,7 @@ fn view(
 /// @param master     the object; its buffers stay as they are while the view is used
 /// @param first      the device's address of word 0: that of the read, or 0 to
 ///                   count from word 0
-/// @param registers  the view to fill in
+/// @param registers  the view to fill in; unchanged if the status is not MBM_OK
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_getResponseRegisters(
@@ -91,7 +91,7 @@ pub unsafe extern "C" fn mbm_master_getResponseRegisters(
 /// @param master     the object; its buffers stay as they are while the view is used
 /// @param first      the device's address of word 0: that of the write, or 0 to
 ///                   count from word 0
-/// @param registers  the view to fill in
+/// @param registers  the view to fill in; unchanged if the status is not MBM_OK
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_getTransmitRegisters(

@@ -50,11 +50,12 @@ unsafe fn next<T>(
     // SAFETY: as the caller promises.
     unsafe {
         let found = || {
-            let (packet, at) = (get(packet)?, get(cursor)?);
+            let (packet, at) = (get(packet).filter(|_| !group.is_null())?, get(cursor)?);
             let rest = packet.data().ok()?.get(at.into()..)?;
             let (found, length) = first(&packet, rest)?;
             put(cursor, at.saturating_add(length as u16));
-            (put(group, found) == Status::OK.code()).then_some(())
+            put(group, found);
+            Some(())
         };
         found().is_some().into()
     }
@@ -68,7 +69,7 @@ unsafe fn next<T>(
 /// @param packet  a request or response of 14 or 15, as parsed or built
 /// @param cursor  where it goes on; yours, 0 to begin
 /// @param record  receives the record, whose data point into the packet's
-/// @return 1; 0 if there is none left, or for NULL
+/// @return 1; 0, with cursor and record unchanged, if there is none left, or for NULL
 #[no_mangle]
 pub unsafe extern "C" fn mbm_packet_nextRecord(
     packet: *const mbm_packet,
@@ -102,7 +103,7 @@ pub unsafe extern "C" fn mbm_packet_nextRecord(
 /// @param packet  a response of 2B/0E, as parsed or built
 /// @param cursor  where it goes on; yours, 0 to begin
 /// @param object  receives the object, whose data point into the packet's
-/// @return 1; 0 if there is none left, or for NULL
+/// @return 1; 0, with cursor and object unchanged, if there is none left, or for NULL
 #[no_mangle]
 pub unsafe extern "C" fn mbm_packet_nextObject(
     packet: *const mbm_packet,

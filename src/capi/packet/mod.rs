@@ -227,7 +227,7 @@ pub(super) unsafe fn own(
 /// @param functionCount  how many
 /// @param pdu            receives it; may not overlap the packet's data
 /// @param capacity       bytes of `pdu`; MBM_MAX_PDU always do
-/// @param length         receives the PDU's length, if the status is MBM_OK
+/// @param length         receives the PDU's length; 0 if the status is not MBM_OK
 /// @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
 ///         that mbm_packet_parse finds in such a PDU
 #[no_mangle]
@@ -264,7 +264,7 @@ pub unsafe extern "C" fn mbm_packet_build(
 /// @param functions      functions of your own; may be NULL if there are none
 /// @param functionCount  how many
 /// @param packet         receives what it says; if the PDU is refused, its kind
-///                       and function alone
+///                       and function alone; unchanged for MBM_INVALID_ARGUMENT
 /// @return MBM_OK, also for an exception; MBM_INVALID_ARGUMENT. Of a request
 ///         else the exception that answers it: MBM_ILLEGAL_FUNCTION,
 ///         MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE. Of a response
@@ -313,7 +313,8 @@ pub unsafe extern "C" fn mbm_packet_parse(
 /// @param have           how many; may be 0
 /// @param functions      functions of your own; may be NULL if there are none
 /// @param functionCount  how many
-/// @param expected       receives the length
+/// @param expected       receives the length; MBM_LENGTH_UNKNOWN and 0 if the status
+///                       is not MBM_OK
 /// @return MBM_OK; MBM_MALFORMED_FRAME for a length that no PDU has;
 ///         MBM_INVALID_ARGUMENT
 #[no_mangle]
@@ -351,7 +352,8 @@ pub unsafe extern "C" fn mbm_packet_expectedLength(
 /// @param functions      functions of your own; may be NULL if there are none
 /// @param functionCount  how many
 /// @param expected       receives the length; MBM_LENGTH_EXACT and 0 if nothing
-///                       ever answers it (08 with sub-function 04)
+///                       ever answers it (08 with sub-function 04);
+///                       MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
 /// @return MBM_OK; MBM_INVALID_ARGUMENT, also for a packet that is no request;
 ///         else why such a request is never built
 #[no_mangle]
@@ -392,15 +394,20 @@ pub(super) unsafe fn reply_length(
     Ok(measure(&request))
 }
 
-/// Hands a length to C.
+/// Hands a length to C; MBM_LENGTH_UNKNOWN with the status that says why there is
+/// none.
 ///
 /// # Safety
 /// As for [`put`].
 pub(super) unsafe fn put_expected(place: *mut mbm_length, length: Result<Length, Status>) -> u8 {
+    let told = match length {
+        Ok(length) => length,
+        Err(_) => Length::Unknown,
+    };
+    // SAFETY: as the caller promises.
+    let status = unsafe { put(place, told.into()) };
     match length {
-        // SAFETY: as the caller promises.
-        Ok(length) => unsafe { put(place, length.into()) },
-        Err(_) if place.is_null() => Status::INVALID_ARGUMENT.code(),
-        Err(refused) => refused.code(),
+        Err(refused) if status == Status::OK.code() => refused.code(),
+        _ => status,
     }
 }

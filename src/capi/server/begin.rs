@@ -1,6 +1,6 @@
 //! Beginning a server, and how it behaves.
 
-use super::{check, mbm_server, mbm_unit, object, Core, Object, BEGUN};
+use super::{check, core_of, mbm_server, mbm_unit, Object, BEGUN};
 use crate::capi::frame::MBM_MAX_TCP_FRAME;
 use crate::capi::port::{countable, mbm_port};
 use crate::error::Status;
@@ -9,8 +9,8 @@ use crate::time;
 /// The least that a frame buffer may have for RTU.
 const LEAST: u16 = 16;
 
-/// Begins a server: port, units and buffer are checked and kept; `framing` does
-/// the rest.
+/// Begins a server: port, units and a buffer of `least` bytes or more are all
+/// checked, then all kept; `framing` does the rest.
 ///
 /// # Safety
 /// As the header demands of each argument.
@@ -22,40 +22,44 @@ unsafe fn begin(
     count: u8,
     frame: *mut u8,
     bytes: u16,
-) -> Option<&'static mut Core> {
-    if server.is_null() || port.is_null() || units.is_null() || frame.is_null() || bytes < LEAST {
-        return None;
+    least: u16,
+) -> Status {
+    if server.is_null() || port.is_null() || units.is_null() || frame.is_null() || bytes < least {
+        return Status::INVALID_ARGUMENT;
     }
     // SAFETY: not NULL, so a port, and an object of which zero is a value of
     // every field.
     unsafe {
         if !(*port).is_complete() {
-            return None;
+            return Status::INVALID_ARGUMENT;
         }
-        let object: &mut Object = &mut *server.cast();
-        object.mark = BEGUN;
-        let core = &mut object.core;
+        if check(server) == Status::BUSY {
+            return Status::BUSY;
+        }
+        (*server.cast::<Object>()).mark = BEGUN;
+        let core = core_of(server);
         // Field by field, which needs no memory function.
-        core.port.context = (*port).context;
-        core.port.read = (*port).read;
-        core.port.write = (*port).write;
-        core.port.micros = (*port).micros;
-        core.port.flush = (*port).flush;
-        core.port.preTransmission = (*port).preTransmission;
-        core.port.postTransmission = (*port).postTransmission;
-        core.lent.frame = frame;
-        core.lent.units = units;
-        core.lent.bytes = countable(bytes);
-        core.lent.count = count;
-        Some(core)
+        (*core).port.context = (*port).context;
+        (*core).port.read = (*port).read;
+        (*core).port.write = (*port).write;
+        (*core).port.micros = (*port).micros;
+        (*core).port.flush = (*port).flush;
+        (*core).port.preTransmission = (*port).preTransmission;
+        (*core).port.postTransmission = (*port).postTransmission;
+        (*core).lent.frame = frame;
+        (*core).lent.units = units;
+        (*core).lent.bytes = countable(bytes);
+        (*core).lent.count = count;
     }
+    Status::OK
 }
 
 /// Begins to serve units on a serial line, RTU. The rate is untold, so a frame
 /// ends with 4 ms of silence: see mbm_server_setBaudRate.
 ///
-/// May be called again at any time; what was under way is dropped. Opens
-/// nothing: the port is open already. Units are yours, may be shared between
+/// May be called again at any time but from within its hooks; what was under way
+/// is dropped. A call that is refused changes nothing. Opens nothing: the port is
+/// open already. Units are yours, may be shared between
 /// servers, and stay where they are for as long as the object is used, as does
 /// the buffer, which keeps nothing between requests.
 ///
@@ -66,8 +70,8 @@ unsafe fn begin(
 /// @param frame   bytes of one frame, for requests and responses
 /// @param bytes   at least 16; MBM_MAX_FRAME hold any frame. Longer
 ///                requests are not heard, longer responses become exception 04
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or
-///         a buffer of no use
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or a
+///         buffer that is too short; MBM_BUSY from within a hook of this server
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_begin(
     server: *mut mbm_server,
@@ -79,13 +83,11 @@ pub unsafe extern "C" fn mbm_server_begin(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        match begin(server, port, units, count, frame, bytes) {
-            Some(core) => {
-                core.begin_rtu();
-                Status::OK.code()
-            }
-            None => Status::INVALID_ARGUMENT.code(),
+        let status = begin(server, port, units, count, frame, bytes, LEAST);
+        if status == Status::OK {
+            (*core_of(server)).begin_rtu();
         }
+        status.code()
     }
 }
 
@@ -98,7 +100,7 @@ pub unsafe extern "C" fn mbm_server_begin(
 /// @param count   see mbm_server_begin
 /// @param frame   see mbm_server_begin
 /// @param bytes   at least 32; MBM_MAX_ASCII_FRAME hold any frame
-/// @return MBM_OK or MBM_INVALID_ARGUMENT
+/// @return a status; see mbm_server_begin
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginAscii(
     server: *mut mbm_server,
@@ -110,13 +112,11 @@ pub unsafe extern "C" fn mbm_server_beginAscii(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        match begin(server, port, units, count, frame, bytes) {
-            Some(core) if bytes >= 2 * LEAST => {
-                core.begin_ascii();
-                Status::OK.code()
-            }
-            _ => Status::INVALID_ARGUMENT.code(),
+        let status = begin(server, port, units, count, frame, bytes, 2 * LEAST);
+        if status == Status::OK {
+            (*core_of(server)).begin_ascii();
         }
+        status.code()
     }
 }
 
@@ -129,7 +129,7 @@ pub unsafe extern "C" fn mbm_server_beginAscii(
 /// @param count   see mbm_server_begin
 /// @param frame   see mbm_server_begin; one for each connection
 /// @param bytes   at least MBM_MAX_TCP_FRAME
-/// @return MBM_OK or MBM_INVALID_ARGUMENT
+/// @return a status; see mbm_server_begin
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginTcp(
     server: *mut mbm_server,
@@ -141,13 +141,11 @@ pub unsafe extern "C" fn mbm_server_beginTcp(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        match begin(server, port, units, count, frame, bytes) {
-            Some(core) if bytes >= MBM_MAX_TCP_FRAME => {
-                core.begin_tcp();
-                Status::OK.code()
-            }
-            _ => Status::INVALID_ARGUMENT.code(),
+        let status = begin(server, port, units, count, frame, bytes, MBM_MAX_TCP_FRAME);
+        if status == Status::OK {
+            (*core_of(server)).begin_tcp();
         }
+        status.code()
     }
 }
 
@@ -162,7 +160,7 @@ pub unsafe extern "C" fn mbm_server_beginTcp(
 /// @param count   see mbm_server_begin
 /// @param frame   see mbm_server_begin; one for each connection
 /// @param bytes   at least 16; MBM_MAX_FRAME hold any frame
-/// @return MBM_OK or MBM_INVALID_ARGUMENT
+/// @return a status; see mbm_server_begin
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
     server: *mut mbm_server,
@@ -174,13 +172,11 @@ pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        match begin(server, port, units, count, frame, bytes) {
-            Some(core) => {
-                core.begin_rtu_over_tcp();
-                Status::OK.code()
-            }
-            None => Status::INVALID_ARGUMENT.code(),
+        let status = begin(server, port, units, count, frame, bytes, LEAST);
+        if status == Status::OK {
+            (*core_of(server)).begin_rtu_over_tcp();
         }
+        status.code()
     }
 }
 
@@ -190,14 +186,14 @@ pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
 ///
 /// @param server        the object
 /// @param microseconds  counted from the last byte seen
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, microseconds: u32) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         let status = check(server);
         if status == Status::OK {
-            object(server).core.set_silence(microseconds);
+            (*core_of(server)).set_silence(microseconds);
         }
         status.code()
     }
@@ -208,7 +204,7 @@ pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, microsec
 ///
 /// @param server  the object
 /// @param baud    bits per second; 0 goes back to untold
-/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u32) -> u8 {
     // SAFETY: as the header demands.
@@ -221,14 +217,14 @@ pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u
 ///
 /// @param server  the object
 /// @param on      0 (at first) or 1
-/// @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings, or
-///         MBM_NOT_INITIALISED
+/// @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings,
+///         MBM_NOT_INITIALISED or MBM_BUSY
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setEchoDiscard(server: *mut mbm_server, on: u8) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         match check(server) {
-            Status::OK if object(server).core.set_echo_discard(on != 0) => Status::OK.code(),
+            Status::OK if (*core_of(server)).set_echo_discard(on != 0) => Status::OK.code(),
             Status::OK => Status::INVALID_ARGUMENT.code(),
             refused => refused.code(),
         }

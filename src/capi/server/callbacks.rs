@@ -1,5 +1,6 @@
 //! The four tables, cell by cell, where the caller's callbacks hold them.
 
+use super::tables::is_other;
 use super::units::{add, is_unheard, request};
 use super::{mbm_service, mbm_unit};
 use crate::error::Status;
@@ -162,8 +163,9 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, heading: *co
 /// @param table  the function that reads them: 1 coils (01, 05, 0F), 2 discrete
 ///               inputs (02), 3 holding registers (03, 06, 10, 16, 17), 4 input
 ///               registers (04)
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, no `get`, no `set`
-///         where it is needed, or another table
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, no `get`, no `set`
+///         where it is needed, or another table; MBM_BUSY and MBM_BUFFER_TOO_SMALL as
+///         mbm_server_serveCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_serveCallbacks(
     unit: *mut mbm_unit,
@@ -177,7 +179,13 @@ pub unsafe extern "C" fn mbm_server_serveCallbacks(
         if useless || !(1..=4).contains(&table) {
             return Status::INVALID_ARGUMENT.code();
         }
-        (*cells).kind = table;
-        add(unit, cells.cast(), serve)
+        if is_other((*cells).kind, table) {
+            return Status::BUSY.code();
+        }
+        let status = add(unit, cells.cast(), serve);
+        if status == Status::OK.code() {
+            (*cells).kind = table;
+        }
+        status
     }
 }

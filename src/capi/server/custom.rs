@@ -135,8 +135,9 @@ pub(super) unsafe fn rule(service: *const mbm_service, function: u8) -> Option<R
 ///
 /// @param unit    the unit
 /// @param custom  yours, for as long as the unit is used
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer, no function, a code
-///         from 128 on, or a length that is no rule
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, no function, a code
+///         from 128 on, or a length that is no rule; MBM_BUFFER_TOO_SMALL if the unit
+///         has no place
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_serveCustom(
     unit: *mut mbm_unit,
@@ -169,14 +170,28 @@ unsafe extern "C" fn gate(service: *mut mbm_service, pdu: *mut u8, _heading: *co
     }
 }
 
+/// The byte that has the switch of a function.
+///
+/// # Safety
+/// `switches` is a record of them, and `code` 127 at most.
+unsafe fn switch(switches: *mut mbm_switches, code: u8) -> *mut u8 {
+    // SAFETY: as the caller promises; a sixteenth byte has code 127.
+    unsafe {
+        (&raw mut (*switches).off)
+            .cast::<u8>()
+            .add((code / 8).into())
+    }
+}
+
 /// Switches a function of a unit off: it is answered with exception 01 from now
 /// on, whatever serves it.
 ///
 /// @param unit      the unit
 /// @param switches  yours, for as long as the unit is used; zeroed before the
-///                  first call. One for each unit
+///                  first call. Units that share one share what is switched off
 /// @param code      1 to 127
-/// @return MBM_OK or MBM_INVALID_ARGUMENT
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or another code;
+///         MBM_BUFFER_TOO_SMALL if the unit has no place
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_switchOff(
     unit: *mut mbm_unit,
@@ -188,13 +203,11 @@ pub unsafe extern "C" fn mbm_server_switchOff(
         if switches.is_null() || code == 0 || code > 127 {
             return Status::INVALID_ARGUMENT.code();
         }
-        if let Some(byte) = (&raw mut (*switches).off)
-            .as_mut()
-            .and_then(|off| off.get_mut(usize::from(code / 8)))
-        {
-            *byte |= 1 << (code % 8);
+        let status = add_first(unit, switches.cast(), gate);
+        if status == Status::OK.code() {
+            *switch(switches, code) |= 1 << (code % 8);
         }
-        add_first(unit, switches.cast(), gate)
+        status
     }
 }
 
@@ -210,12 +223,7 @@ pub unsafe extern "C" fn mbm_server_switchOn(switches: *mut mbm_switches, code: 
         if switches.is_null() || code == 0 || code > 127 {
             return Status::INVALID_ARGUMENT.code();
         }
-        if let Some(byte) = (&raw mut (*switches).off)
-            .as_mut()
-            .and_then(|off| off.get_mut(usize::from(code / 8)))
-        {
-            *byte &= !(1 << (code % 8));
-        }
+        *switch(switches, code) &= !(1 << (code % 8));
     }
     Status::OK.code()
 }

@@ -122,8 +122,10 @@ unsafe extern "C" fn monitor(
 /// listen only mode.
 ///
 /// @param unit         the unit
-/// @param diagnostics  yours, for as long as the unit is used; one for each unit
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+/// @param diagnostics  yours, for as long as the unit is used; one for each unit, or
+///                     it counts for all that share it
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit has
+///         another record of diagnostics; MBM_BUFFER_TOO_SMALL if it has no place
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_serveDiagnostics(
     unit: *mut mbm_unit,
@@ -131,6 +133,12 @@ pub unsafe extern "C" fn mbm_server_serveDiagnostics(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
+        if !unit.is_null() {
+            let has = (*unit).diagnostics;
+            if !has.is_null() && has != diagnostics {
+                return Status::BUSY.code();
+            }
+        }
         let status = add(unit, diagnostics.cast(), serve);
         if status == Status::OK.code() {
             (*unit).diagnostics = diagnostics;

@@ -2,7 +2,6 @@
 
 use super::units::{add, request};
 use super::{mbm_service, mbm_unit};
-use crate::error::Status;
 use crate::pdu::files::Record;
 use crate::server::files::{self, Fifos, Files};
 use core::ffi::c_void;
@@ -230,30 +229,22 @@ unsafe extern "C" fn serve_fifos(
 ///
 /// @param unit   the unit
 /// @param files  yours, for as long as the unit is used
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+///         the unit has no place
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_serveFiles(unit: *mut mbm_unit, files: *mut mbm_files) -> u8 {
     // SAFETY: as the header demands.
-    unsafe {
-        if files.is_null() {
-            return Status::INVALID_ARGUMENT.code();
-        }
-        add(unit, files.cast(), serve_files)
-    }
+    unsafe { add(unit, files.cast(), serve_files) }
 }
 
 /// Serves FIFO queues: function 18.
 ///
 /// @param unit   the unit
 /// @param fifos  yours, for as long as the unit is used
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+///         the unit has no place
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_serveFifos(unit: *mut mbm_unit, fifos: *mut mbm_fifos) -> u8 {
     // SAFETY: as the header demands.
-    unsafe {
-        if fifos.is_null() {
-            return Status::INVALID_ARGUMENT.code();
-        }
-        add(unit, fifos.cast(), serve_fifos)
-    }
+    unsafe { add(unit, fifos.cast(), serve_fifos) }
 }

@@ -131,7 +131,8 @@ unsafe extern "C" fn serve_identification(
 ///
 /// @param unit    the unit
 /// @param status  yours, for as long as the unit is used
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+///         the unit has no place
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_serveExceptionStatus(
     unit: *mut mbm_unit,
@@ -145,7 +146,8 @@ pub unsafe extern "C" fn mbm_server_serveExceptionStatus(
 ///
 /// @param unit  the unit
 /// @param id    yours, for as long as the unit is used
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+///         the unit has no place
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_serveServerId(
     unit: *mut mbm_unit,
@@ -161,7 +163,8 @@ pub unsafe extern "C" fn mbm_server_serveServerId(
 ///
 /// @param unit            the unit
 /// @param identification  yours, for as long as the unit is used
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+///         the unit has no place
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_serveIdentification(
     unit: *mut mbm_unit,

@@ -2,6 +2,7 @@
 
 mod begin;
 mod callbacks;
+mod cells;
 mod custom;
 mod diagnostics;
 mod files;
@@ -20,10 +21,9 @@ pub use respond::*;
 pub use tables::*;
 pub use units::*;
 
-use super::port::mbm_port;
+use super::port::{self, mbm_port};
 use crate::error::Status;
 use crate::pdu::custom::Rule;
-use crate::port::Port;
 use crate::server::{Lent, Reply, Server, MOST_REQUESTS};
 use crate::FIRMWARE;
 use core::ffi::c_void;
@@ -32,14 +32,23 @@ use core::slice::from_raw_parts_mut;
 /// Marks an object that was begun; zeroed storage does not carry it.
 const BEGUN: u8 = 0x53;
 
+/// Marks an object whose poll is at work. What a hook calls on it is refused
+/// before any reference to it is made.
+const POLLING: u8 = 0x54;
+
 /// A Modbus server on one line or one connection.
 ///
 /// Storage is yours and must be zero before first use, which a static object is
 /// (`static mbm_server server;`). What it serves are units, which several
 /// servers may share: one on a serial line and four TCP connections, for
-/// example, are five servers with the same units. Not re-entrant: use a server
-/// and its units from one thread and never from an interrupt; servers that share
-/// units belong to one thread.
+/// example, are five servers with the same units. Use a server and its units from
+/// one thread and never from an interrupt; servers that share units belong to one
+/// thread.
+///
+/// Hooks and functions of yours run within mbm_server_poll. A function that they
+/// call on the server that is polled returns MBM_BUSY and changes nothing: call
+/// it when mbm_server_poll has returned. They may call functions on other servers,
+/// and the mbm_server_serve functions on units.
 #[repr(C)]
 pub struct mbm_server {
     /// Not for you.
@@ -98,7 +107,7 @@ impl Lent for LentByC {
 
 /// Whether there is a server behind a pointer from C: [`Status::OK`],
 /// [`Status::INVALID_ARGUMENT`] for NULL, [`Status::NOT_INITIALISED`] for an
-/// object that was never begun.
+/// object that was never begun, [`Status::BUSY`] for one whose poll is at work.
 ///
 /// # Safety
 /// `server` is NULL or points to an `mbm_server`, zeroed or begun.
@@ -107,20 +116,21 @@ unsafe fn check(server: *const mbm_server) -> Status {
         return Status::INVALID_ARGUMENT;
     }
     // SAFETY: not NULL, so storage of an object, zeroed or written.
-    if unsafe { (&raw const (*server.cast::<Object>()).mark).read() } == BEGUN {
-        Status::OK
-    } else {
-        Status::NOT_INITIALISED
+    match unsafe { (&raw const (*server.cast::<Object>()).mark).read() } {
+        BEGUN => Status::OK,
+        POLLING => Status::BUSY,
+        _ => Status::NOT_INITIALISED,
     }
 }
 
-/// The server behind a pointer.
+/// The core of a server, which leaves the mark out: that is read while the core
+/// is in use.
 ///
 /// # Safety
-/// [`check`] found one, and nothing else uses it while the reference lives.
-unsafe fn object<'a>(server: *mut mbm_server) -> &'a mut Object {
-    // SAFETY: begun, so every field is valid; exclusive as the caller promises.
-    unsafe { &mut *server.cast() }
+/// `server` points to an `mbm_server`.
+unsafe fn core_of(server: *const mbm_server) -> *mut Core {
+    // SAFETY: as the caller promises; every object is writable storage.
+    unsafe { &raw mut (*server.cast::<Object>().cast_mut()).core }
 }
 
 /// Moves the server on, without waiting: takes bytes in, carries a request out
@@ -128,63 +138,91 @@ unsafe fn object<'a>(server: *mut mbm_server) -> &'a mut Object {
 ///
 /// Call it as often as you like, at least once per character time of the line
 /// if nothing else buffers its bytes. On a serial line a response begins with
-/// the first call after the line has been silent for t3.5. What units call, hooks and
-/// functions of yours, may not poll the server that called it.
+/// the first call after the line has been silent for t3.5.
 ///
 /// @param server  the object
 /// @return MBM_OK; MBM_LINK_LOST if the port said so, which ends a connection;
 ///         MBM_MALFORMED_FRAME if what came over TCP is not Modbus, so that
-///         the connection is to be closed; MBM_INVALID_ARGUMENT or
-///         MBM_NOT_INITIALISED
+///         the connection is to be closed; MBM_BUSY from within a hook of this
+///         server; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_poll(server: *mut mbm_server) -> u8 {
-    // SAFETY: as the header demands. No reference to the object lives while
-    // units are served, whose hooks are the caller's.
+    // SAFETY: as the header demands.
     unsafe {
         let status = check(server);
         if status != Status::OK {
             return status.code();
         }
+        let mark = &raw mut (*server.cast::<Object>()).mark;
+        mark.write(POLLING);
+        let status = serve(core_of(server), mark);
+        // An object that a hook zeroed stays zero.
+        if mark.read() == POLLING {
+            mark.write(BEGUN);
+        }
+        status.code()
+    }
+}
+
+/// Takes bytes in, and answers requests.
+///
+/// # Safety
+/// The core is that of an object that is begun and whose mark says that it polls,
+/// so that no function of this file uses it meanwhile.
+#[inline(always)]
+unsafe fn serve(core: *mut Core, mark: *const u8) -> Status {
+    // SAFETY: as the caller promises. No reference to the core lives while units
+    // are served, or while the clock is read: both are the caller's code.
+    unsafe {
         for _ in 0..MOST_REQUESTS {
-            let core = &mut object(server).core;
-            let now = if FIRMWARE || core.keeps_time() {
-                core.port.micros()
+            let now = if FIRMWARE || (*core).keeps_time() {
+                port::now(&raw const (*core).port)
             } else {
                 0
             };
-            let status = core.poll(now);
+            let status = (*core).poll(now);
             if status != Status::PENDING {
-                return status.code();
+                return status;
             }
-            let heading = &raw const core.request;
-            let pdu = core.lent.frame.add((*heading).head.into());
-            let reply = units::serve(core.lent.units, core.lent.count, heading, pdu);
-            let reply = Reply::from_number(reply);
-            if let Some(status) = object(server).core.conclude(reply) {
-                return status.code();
+            let heading = &raw const (*core).request;
+            let lent = &raw const (*core).lent;
+            let pdu = (*lent).frame.add((*heading).head.into());
+            let reply = units::serve((*lent).units, (*lent).count, heading, pdu);
+            if mark.read() != POLLING {
+                return Status::OK;
+            }
+            if let Some(status) = (*core).conclude(Reply::from_number(reply)) {
+                return status;
             }
         }
     }
-    Status::OK.code()
+    Status::OK
 }
 
 /// How long mbm_server_poll will find nothing to do unless a byte arrives, so
 /// that a program may sleep until then.
 ///
 /// @param server  the object
-/// @return microseconds; 0 means poll now, 0xFFFFFFFF until a byte arrives; 1000
+/// @return microseconds; 0 means poll now, and is returned within a hook of this
+///         server; 0xFFFFFFFF until a byte arrives; 1000
 ///         while a function of yours returns MBM_REPLY_PENDING or a connection does
 ///         not take the response: to go on sooner, poll when that has changed. No
 ///         byte is taken meanwhile, so do not wait for one
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_pollDelay(server: *const mbm_server) -> u32 {
-    // SAFETY: as the header demands; every object is writable storage.
+    // SAFETY: as the header demands; no reference lives while the clock is read.
     unsafe {
-        if check(server) != Status::OK {
-            return u32::MAX;
+        match check(server) {
+            Status::OK => {
+                let core = core_of(server);
+                let mark = &raw mut (*server.cast::<Object>().cast_mut()).mark;
+                mark.write(POLLING);
+                let now = port::now(&raw const (*core).port);
+                mark.write(BEGUN);
+                (*core).poll_delay(now)
+            }
+            Status::BUSY => 0,
+            _ => u32::MAX,
         }
-        let core = &mut object(server.cast_mut()).core;
-        let now = core.port.micros();
-        core.poll_delay(now)
     }
 }

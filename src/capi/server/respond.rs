@@ -30,8 +30,9 @@ impl Units for ByC {
 /// @param length     bytes of the request
 /// @param capacity   bytes of the buffer: 256 hold any response in RTU, 513 in
 ///                   ASCII, 260 over TCP; a longer response becomes exception 04
-/// @param response   bytes of the response; 0 where there is none: for a damaged
-///                   frame, another unit, or a broadcast
+/// @param response   receives the bytes of the response; 0 where there is none: for a
+///                   damaged frame, another unit, a broadcast, and with any status
+///                   but MBM_OK
 /// @return MBM_OK; MBM_PENDING, with the buffer to be filled anew, if a function
 ///         of yours is not done; MBM_INVALID_ARGUMENT
 #[no_mangle]
@@ -44,6 +45,10 @@ pub unsafe extern "C" fn mbm_server_respond(
     capacity: u16,
     response: *mut u16,
 ) -> u8 {
+    if !response.is_null() {
+        // SAFETY: not NULL, so room for a length.
+        unsafe { response.write(0) }
+    }
     let framing = match Framing::from_code(framing) {
         Some(framing) if !units.is_null() && !frame.is_null() && !response.is_null() => framing,
         _ => return Status::INVALID_ARGUMENT.code(),
@@ -66,10 +71,7 @@ pub unsafe extern "C" fn mbm_server_respond(
                 response.write(length as u16);
                 Status::OK.code()
             }
-            Err(status) => {
-                response.write(0);
-                status.code()
-            }
+            Err(status) => status.code(),
         }
     }
 }

@@ -1,17 +1,20 @@
 //! The four tables, in arrays of the caller.
 
+use super::cells::{transfer_bits, transfer_words};
 use super::units::{add, is_unheard, request};
 use super::{mbm_service, mbm_unit};
+use crate::error::Status;
 use crate::server::table::{self, Access, Cells, Kind, Role, Way};
 use crate::server::Reply;
 use crate::FIRMWARE;
 use core::ffi::c_void;
-use core::slice::from_raw_parts_mut;
 
 /// Holding or input registers in an array of yours. Zero it, set what you need,
 /// and hand it to mbm_server_serveHoldingRegisters or
 /// mbm_server_serveInputRegisters. You may change words and settings at any
-/// time, but not from within a hook of this table.
+/// time, but not from within a hook of this table: the request under way goes on
+/// with the words that the table had when it came. To serve it as another kind of
+/// table, zero it first.
 #[repr(C)]
 pub struct mbm_registerTable {
     /// Not for you.
@@ -75,8 +78,15 @@ pub struct mbm_bitTable {
     pub kind: u8,
 }
 
-/// A table of C, whose hooks may look at it: no reference to it is kept.
-struct Table(*mut mbm_registerTable);
+/// A table of C, whose hooks may look at it: no reference to it is kept. What says
+/// where its cells are is taken once a request, for a hook may zero the record or
+/// set it up anew.
+struct Table {
+    record: *mut mbm_registerTable,
+    cells: *mut u8,
+    base: u16,
+    kind: Kind,
+}
 
 // The two tables are one record, but for what `words` points to.
 const _: () = {
@@ -99,9 +109,23 @@ unsafe fn bit(map: *const u8, index: u16) -> bool {
 // is, as the header demands, with arrays of `size` cells behind its pointers; a
 // cell that is `covered` lies in them.
 impl Table {
+    /// # Safety
+    /// `record` is a table.
+    #[inline(always)]
+    unsafe fn new(record: *mut mbm_registerTable, kind: Kind) -> Table {
+        // SAFETY: as the caller promises.
+        unsafe {
+            Table {
+                record,
+                cells: (*record).words.cast(),
+                base: (*record).base,
+                kind,
+            }
+        }
+    }
+
     fn index(&self, address: u16) -> u16 {
-        // SAFETY: see above.
-        unsafe { address.wrapping_sub((*self.0).base) }
+        address.wrapping_sub(self.base)
     }
 }
 
@@ -111,10 +135,10 @@ impl Cells for Table {
         // SAFETY: see above.
         unsafe {
             let end = first.checked_add(quantity);
-            if (*self.0).words.is_null() || end.is_none_or(|end| end > (*self.0).size) {
+            if self.cells.is_null() || end.is_none_or(|end| end > (*self.record).size) {
                 return false;
             }
-            let valid = (*self.0).valid;
+            let valid = (*self.record).valid;
             valid.is_null() || (first..first + quantity).all(|index| bit(valid, index))
         }
     }
@@ -126,8 +150,8 @@ impl Cells for Table {
         let write = way == Way::Write;
         // SAFETY: see above; data have room for so many cells.
         unsafe {
-            let cells = (*self.0).words.cast::<u8>();
-            let bits = Kind::from_code((*self.0).kind).is_bits();
+            let cells = self.cells;
+            let bits = self.kind.is_bits();
             // A host has room for code that takes many cells at a time.
             if !FIRMWARE {
                 if bits && write && quantity == 1 {
@@ -184,14 +208,14 @@ impl Cells for Table {
 
     fn has_hooks(&self) -> bool {
         // SAFETY: see above.
-        unsafe { (*self.0).before.is_some() || (*self.0).after.is_some() }
+        unsafe { (*self.record).before.is_some() || (*self.record).after.is_some() }
     }
 
     fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
         // SAFETY: see above.
         unsafe {
-            match (*self.0).before {
-                Some(hook) => hook((*self.0).context, address, quantity, data.as_ptr()),
+            match (*self.record).before {
+                Some(hook) => hook((*self.record).context, address, quantity, data.as_ptr()),
                 None => 0,
             }
         }
@@ -200,90 +224,10 @@ impl Cells for Table {
     fn after(&mut self, address: u16, quantity: u16) {
         // SAFETY: see above.
         unsafe {
-            if let Some(hook) = (*self.0).after {
-                hook((*self.0).context, address, quantity);
+            if let Some(hook) = (*self.record).after {
+                hook((*self.record).context, address, quantity);
             }
         }
-    }
-}
-
-/// Moves registers from `first` on, from or into data.
-///
-/// # Safety
-/// Behind `words` are all of them, and nothing else uses them meanwhile; data have
-/// room for them.
-#[inline(always)]
-unsafe fn transfer_words(words: *mut u16, write: bool, first: u16, quantity: u16, data: &mut [u8]) {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let words = words.add(first.into()).cast::<u8>();
-        let data = data.as_mut_ptr();
-        let (from, to) = if write {
-            (data.cast_const(), words)
-        } else {
-            (words.cast_const(), data)
-        };
-        let end = 2 * usize::from(quantity);
-        let Some(last) = end.checked_sub(16) else {
-            for at in (0..end).step_by(2) {
-                turn::<1>(from.add(at), to.add(at));
-            }
-            return;
-        };
-        // Eight at a time; the last eight overlap those before.
-        let mut at = 0;
-        while at < last {
-            turn::<8>(from.add(at), to.add(at));
-            at += 16;
-        }
-        turn::<8>(from.add(last), to.add(last));
-    }
-}
-
-/// Moves so many registers to or from the order of the wire.
-///
-/// # Safety
-/// There are so many at both pointers, which need not be aligned.
-#[inline(always)]
-unsafe fn turn<const N: usize>(from: *const u8, to: *mut u8) {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let words = from.cast::<[u16; N]>().read_unaligned();
-        to.cast::<[u16; N]>().write_unaligned(words.map(u16::to_be));
-    }
-}
-
-/// Moves bits from `first` on, from or into data, eight at a time.
-///
-/// # Safety
-/// Behind `cells` are all bytes that have some of them, and nothing else uses
-/// them meanwhile.
-#[inline(never)]
-unsafe fn transfer_bits(cells: *mut u8, write: bool, first: u16, quantity: u16, data: &mut [u8]) {
-    let shift = first & 7;
-    let count = usize::from((shift + quantity).div_ceil(8));
-    // SAFETY: as the caller promises.
-    let cells = unsafe { from_raw_parts_mut(cells.add(usize::from(first >> 3)), count) };
-    let mut left = quantity;
-    for (index, byte) in data.iter_mut().enumerate() {
-        // What of this byte is meant, and where it stands in two of the cells.
-        let mask = if left < 8 { (1u16 << left) - 1 } else { 0xFF };
-        let behind = cells.get(index + 1).copied().unwrap_or(0);
-        let Some(cell) = cells.get_mut(index) else {
-            return;
-        };
-        let both = u16::from_le_bytes([*cell, behind]);
-        if write {
-            let value = (both & !(mask << shift)) | ((u16::from(*byte) & mask) << shift);
-            let [low, high] = value.to_le_bytes();
-            *cell = low;
-            if let Some(next) = cells.get_mut(index + 1) {
-                *next = high;
-            }
-        } else {
-            *byte = (both >> shift & mask) as u8;
-        }
-        left = left.saturating_sub(8);
     }
 }
 
@@ -322,7 +266,7 @@ unsafe fn serve_as(
     unsafe {
         let (pdu, length) = request(pdu, heading);
         let kind = Kind::from_code((*table).kind);
-        let cells = &mut Table(table);
+        let cells = &mut Table::new(table, kind);
         if FIRMWARE || kind.is_bits() {
             table::serve_as(role, kind, cells, pdu, length).code()
         } else {
@@ -372,7 +316,7 @@ unsafe fn serve_more(table: *mut mbm_registerTable, pdu: *mut u8, heading: *cons
     // SAFETY: as the caller promises.
     unsafe {
         let (pdu, length) = request(pdu, heading);
-        let mut cells = Table(table);
+        let mut cells = Table::new(table, Kind::HOLDING_REGISTERS);
         if FIRMWARE {
             let cells: &mut dyn Access = &mut cells;
             return table::serve_more(cells, pdu, length).code();
@@ -402,7 +346,7 @@ unsafe extern "C" fn serve_all(
     }
 }
 
-/// Hangs a table onto a unit.
+/// Adds a table to a unit.
 ///
 /// # Safety
 /// As for [`add`].
@@ -410,18 +354,29 @@ unsafe extern "C" fn serve_all(
 unsafe fn add_table(unit: *mut mbm_unit, table: *mut mbm_registerTable, kind: Kind) -> u8 {
     // SAFETY: as the caller promises.
     unsafe {
-        if !table.is_null() {
+        if !table.is_null() && is_other((*table).kind, kind.code()) {
+            return Status::BUSY.code();
+        }
+        let status = add(unit, table.cast(), serve);
+        if status == Status::OK.code() {
             (*table).kind = kind.code();
         }
-        add(unit, table.cast(), serve)
+        status
     }
+}
+
+/// True if a record, whose kind is 0 while it is zeroed, is served as another
+/// kind already: it would answer other functions on each unit that has it.
+pub(super) const fn is_other(served: u8, kind: u8) -> bool {
+    served != 0 && served != kind
 }
 
 /// Serves coils: functions 01, 05 and 0F.
 ///
 /// @param unit   the unit
 /// @param table  yours, for as long as the unit is used
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY for a table that
+///         is served as another kind; MBM_BUFFER_TOO_SMALL if the unit has no place
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_serveCoils(
     unit: *mut mbm_unit,
@@ -435,7 +390,7 @@ pub unsafe extern "C" fn mbm_server_serveCoils(
 ///
 /// @param unit   the unit
 /// @param table  yours, for as long as the unit is used
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+/// @return a status; see mbm_server_serveCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_serveDiscreteInputs(
     unit: *mut mbm_unit,
@@ -450,7 +405,7 @@ pub unsafe extern "C" fn mbm_server_serveDiscreteInputs(
 ///
 /// @param unit   the unit
 /// @param table  yours, for as long as the unit is used
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+/// @return a status; see mbm_server_serveCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_serveHoldingRegisters(
     unit: *mut mbm_unit,
@@ -464,7 +419,7 @@ pub unsafe extern "C" fn mbm_server_serveHoldingRegisters(
 ///
 /// @param unit   the unit
 /// @param table  yours, for as long as the unit is used
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for a NULL pointer
+/// @return a status; see mbm_server_serveCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_serveInputRegisters(
     unit: *mut mbm_unit,
@@ -474,8 +429,9 @@ pub unsafe extern "C" fn mbm_server_serveInputRegisters(
     unsafe { add_table(unit, table, Kind::INPUT_REGISTERS) }
 }
 
-/// Serves functions 16 and 17 beside 03, 06 and 10: a call of its own, so that
-/// firmware without it is smaller.
+/// Serves functions 16 and 17 beside 03, 06 and 10, on each unit that has the
+/// table: a call of its own, so that firmware without it is smaller. After a table
+/// was zeroed it is to be called again.
 ///
 /// @param table  holding registers that mbm_server_serveHoldingRegisters took
 /// @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL and other tables
@@ -484,9 +440,9 @@ pub unsafe extern "C" fn mbm_server_serveMaskAndReadWrite(table: *mut mbm_regist
     // SAFETY: as the header demands.
     unsafe {
         if table.is_null() || (*table).kind != Kind::HOLDING_REGISTERS.code() {
-            return crate::error::Status::INVALID_ARGUMENT.code();
+            return Status::INVALID_ARGUMENT.code();
         }
         (*table).service.serve = Some(serve_all);
     }
-    crate::error::Status::OK.code()
+    Status::OK.code()
 }

@@ -8,13 +8,14 @@ use crate::FIRMWARE;
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 
-/// What the functions named mbm_server_serve... hang onto a unit: one family of
-/// functions. The head of each record that they take; not for you.
+/// Most records that one unit serves, each handed to a mbm_server_serve function.
+pub const MBM_MAX_SERVICES: u8 = 16;
+
+/// The head of each record that a mbm_server_serve function takes. Private.
 #[repr(C)]
 pub struct mbm_service {
-    /// The service behind it.
-    pub next: *mut mbm_service,
-    /// Serves a request, if it is one of this family.
+    /// Serves a request, if it is one of this family. NULL in a zeroed record,
+    /// which serves nothing.
     pub serve: Option<
         unsafe extern "C" fn(
             service: *mut mbm_service,
@@ -31,10 +32,17 @@ pub(super) type Serve =
 
 /// A unit that servers answer for. Zero it, set `id`, and say what it serves with
 /// mbm_server_serveCoils and its sisters.
+///
+/// Each of those takes a record of yours, which stays valid for as long as the
+/// unit is used. A unit has places for MBM_MAX_SERVICES records; one more is
+/// refused with MBM_BUFFER_TOO_SMALL. A record may be handed over again, also
+/// after you have zeroed and refilled it, and keeps its place. A zeroed record
+/// serves nothing until it is handed over again. One record may serve any number
+/// of units.
 #[repr(C)]
 pub struct mbm_unit {
-    /// Not for you.
-    pub services: *mut mbm_service,
+    /// Private: the records, in the order in which they are asked, then NULL.
+    pub services: [*mut mbm_service; MBM_MAX_SERVICES as usize],
     /// Not for you.
     pub serve: Option<
         unsafe extern "C" fn(
@@ -52,30 +60,82 @@ pub struct mbm_unit {
     pub id: u8,
 }
 
-/// Hangs a service behind those that a unit has; once, however often it is asked.
+/// Puts a service into the first free place of a unit, unless it has one there
+/// already. A record that is not zeroed keeps its function: another unit may have
+/// it, with functions 16 and 17.
 ///
 /// # Safety
 /// Each pointer is NULL or points to what it says, and `service` is the head of
-/// a record that `serve` serves.
+/// a record, zeroed or served by `serve`.
 #[cfg_attr(target_os = "none", inline(never))]
 pub(super) unsafe fn add(unit: *mut mbm_unit, service: *mut mbm_service, serve: Serve) -> u8 {
     if unit.is_null() || service.is_null() {
         return Status::INVALID_ARGUMENT.code();
     }
-    // SAFETY: not NULL; services hang together as this function hung them.
+    // SAFETY: not NULL, and the place is one of the unit's.
     unsafe {
-        let mut place = &raw mut (*unit).services;
-        while *place != service {
-            if (*place).is_null() {
-                *place = service;
-                (*service).next = core::ptr::null_mut();
-                (*service).serve = Some(serve);
-            } else {
-                place = &raw mut (**place).next;
+        let mut place = (&raw mut (*unit).services).cast::<*mut mbm_service>();
+        let end = place.add(MBM_MAX_SERVICES.into());
+        while !(*place).is_null() && *place != service {
+            place = place.add(1);
+            if place == end {
+                return Status::BUFFER_TOO_SMALL.code();
             }
+        }
+        *place = service;
+        if (*service).serve.is_none() {
+            (*service).serve = Some(serve);
         }
     }
     Status::OK.code()
+}
+
+/// The places of a unit, one after the other, up to the first that is free. What
+/// is called for one may fill others.
+struct Places {
+    place: *const *mut mbm_service,
+    end: *const *mut mbm_service,
+}
+
+impl Places {
+    /// # Safety
+    /// `unit` is one, and stays so while its places are looked at.
+    #[inline(always)]
+    unsafe fn new(unit: *const mbm_unit) -> Places {
+        // SAFETY: as the caller promises.
+        unsafe {
+            let place = (&raw const (*unit).services).cast::<*mut mbm_service>();
+            let end = place.add(MBM_MAX_SERVICES.into());
+            Places { place, end }
+        }
+    }
+}
+
+impl Iterator for Places {
+    type Item = *mut mbm_service;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<*mut mbm_service> {
+        if self.place == self.end {
+            return None;
+        }
+        // SAFETY: not the end, so one of the places.
+        unsafe {
+            let service = *self.place;
+            self.place = self.place.add(1);
+            (!service.is_null()).then_some(service)
+        }
+    }
+}
+
+/// True for a unit without a record: it is silent.
+///
+/// # Safety
+/// `unit` is one.
+#[inline(always)]
+unsafe fn serves_nothing(unit: *const mbm_unit) -> bool {
+    // SAFETY: as the caller promises.
+    unsafe { Places::new(unit).next().is_none() }
 }
 
 /// The PDU of a request with the room behind it, and its length.
@@ -100,15 +160,14 @@ pub(super) unsafe fn request<'a>(pdu: *mut u8, heading: *const c_void) -> (&'a m
 pub(super) unsafe fn walk(unit: *mut mbm_unit, pdu: *mut u8, heading: *const Heading) -> u16 {
     // SAFETY: as the caller promises.
     unsafe {
-        let mut service = (*unit).services;
-        while !service.is_null() {
-            // A service that hangs there has its function.
-            let serve = (*service).serve.unwrap_unchecked();
-            let reply = serve(service, pdu, heading.cast());
-            if reply != Reply::NOT_MINE.code() {
-                return reply;
+        for service in Places::new(unit) {
+            // A record that was zeroed has no function.
+            if let Some(serve) = (*service).serve {
+                let reply = serve(service, pdu, heading.cast());
+                if reply != Reply::NOT_MINE.code() {
+                    return reply;
+                }
             }
-            service = (*service).next;
         }
     }
     Reply::ILLEGAL_FUNCTION.code()
@@ -137,7 +196,7 @@ pub(super) unsafe fn serve(
             && (*heading).length != 0
             && (*heading).to == (*units).id
             && (*heading).to != 0
-            && !(*units).services.is_null()
+            && !serves_nothing(units)
         {
             return walk(units, pdu, heading);
         }
@@ -172,7 +231,7 @@ unsafe fn serve_each(
             let mut reply = Reply::SILENT.code();
             if let Some(monitor) = (*unit).serve {
                 reply = monitor(unit, heading.cast(), concern as u8, pdu);
-            } else if (*unit).services.is_null() {
+            } else if serves_nothing(unit) {
                 concern = Concern::Foreign;
             } else if concern != Concern::Foreign {
                 reply = walk(unit, pdu, heading);
@@ -197,22 +256,25 @@ pub(super) unsafe fn is_unheard(heading: *const c_void, function: u8) -> bool {
     unsafe { (*heading.cast::<Heading>()).is_broadcast() && !only_writes(function) }
 }
 
-/// Hangs a service before all that a unit has.
+/// As [`add`], and moves the service before all others of the unit.
 ///
 /// # Safety
 /// As for [`add`].
-pub(super) unsafe fn add_first(unit: *mut mbm_unit, service: *mut mbm_service, serve: Serve) -> u8 {
-    // SAFETY: as the caller promises. Its place among the others is left first.
+pub(super) unsafe fn add_first(unit: *mut mbm_unit, new: *mut mbm_service, serve: Serve) -> u8 {
+    // SAFETY: as the caller promises.
     unsafe {
-        let status = add(unit, service, serve);
+        let status = add(unit, new, serve);
         if status == Status::OK.code() {
-            let mut place = &raw mut (*unit).services;
-            while *place != service {
-                place = &raw mut (**place).next;
+            let mut moved = new;
+            let mut place = (&raw mut (*unit).services).cast::<*mut mbm_service>();
+            // The one that stands in the place of `new` moves no further.
+            loop {
+                core::ptr::swap(place, &raw mut moved);
+                if moved == new {
+                    break;
+                }
+                place = place.add(1);
             }
-            *place = (*service).next;
-            (*service).next = (*unit).services;
-            (*unit).services = service;
         }
         status
     }
@@ -226,12 +288,10 @@ pub(super) unsafe fn rule(units: *const mbm_unit, count: u8, function: u8) -> Op
     // SAFETY: as the caller promises.
     unsafe {
         for index in 0..count {
-            let mut service = (*units.add(index.into())).services.cast_const();
-            while !service.is_null() {
+            for service in Places::new(units.add(index.into())) {
                 if let Some(rule) = custom::rule(service, function) {
                     return Some(rule);
                 }
-                service = (*service).next;
             }
         }
     }

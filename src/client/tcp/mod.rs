@@ -378,6 +378,10 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
         0
     }
 
+    fn holds(&mut self, _: impl FnOnce(&J) -> bool) -> bool {
+        false
+    }
+
     fn is_idle(&self) -> bool {
         self.flying == 0 && self.filled == 0
     }

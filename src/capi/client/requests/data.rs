@@ -23,7 +23,8 @@ use crate::pdu::outline::Form;
 ///         MBM_DUPLICATE_TRANSACTION, MBM_BUFFER_TOO_SMALL if `reply` has no room
 ///         for the data, MBM_INVALID_ARGUMENT for `data` that are NULL,
 ///         MBM_NOT_INITIALISED; MBM_BUSY, with the request unchanged, if it is
-///         pending already
+///         pending already, and from within a hook of the port. A request that
+///         is refused with another of these has it in `status`
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readCoils(
     client: *mut mbm_client,

@@ -7,7 +7,7 @@ pub use data::*;
 pub use device::*;
 
 use super::request::Inside;
-use super::{mbm_client, mbm_clientRequest, pointers, Lent};
+use super::{calls, mbm_client, mbm_clientRequest, pointers, Lent};
 use crate::error::Status;
 use crate::pdu::outline::{Form, Outline};
 
@@ -22,6 +22,14 @@ unsafe fn prepare(client: *const mbm_client, request: *mut mbm_clientRequest) ->
         match pointers::check(client) {
             Status::OK if request.is_null() => Status::INVALID_ARGUMENT,
             Status::OK if (*request).status == Status::PENDING.code() => Status::BUSY,
+            Status::OK => {
+                // One that is pending may have been zeroed.
+                let object = pointers::object(client);
+                match Lent::new(request) {
+                    Some(held) if (calls(object).holds)(object, held) => Status::BUSY,
+                    _ => Status::OK,
+                }
+            }
             other => other,
         }
     }
@@ -53,7 +61,7 @@ unsafe fn submit(
             match Lent::new(request) {
                 Some(request) => {
                     let object = pointers::object(client);
-                    (object.calls().queue)(object, request)
+                    (calls(object).queue)(object, request)
                 }
                 None => Status::INVALID_ARGUMENT,
             }

@@ -1,0 +1,30 @@
+/* A port of the test's own: bytes that arrive, bytes that were sent, a clock, and a
+ * function that every hook calls first. */
+#ifndef HOOKED_PORT_H
+#define HOOKED_PORT_H
+
+#include "mbm.h"
+
+#include <stddef.h>
+
+enum { HOOK_READ, HOOK_WRITE, HOOK_MICROS, HOOK_FLUSH, HOOK_PRE, HOOK_POST, HOOK_IDLE, HOOKS };
+
+typedef struct hooked_port {
+    uint8_t arriving[600], sent[600];
+    size_t first, last, length;
+    uint32_t now, step;     /* each look at the clock takes `step` microseconds */
+    uint8_t lost;           /* the link is lost */
+    void (*within)(int hook);
+    unsigned called[HOOKS];
+} hooked_port;
+
+/* All hooks of a port over `p`, which stays where it is. */
+mbm_port hooked_port_of(hooked_port *p);
+
+/* Replaces what is still to arrive. */
+void hooked_port_arrive(hooked_port *p, const void *bytes, size_t length);
+
+/* As hooked_port_arrive, with unit and CRC around a PDU. */
+void hooked_port_arrive_rtu(hooked_port *p, uint8_t unit, const void *pdu, size_t length);
+
+#endif

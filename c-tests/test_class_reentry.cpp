@@ -1,0 +1,86 @@
+/* The classes, called from within their own callbacks: refused, and nothing changes. */
+#include "serving.h"
+
+#include "ModbusMaster.h"
+
+static ModbusMaster *calling;
+static ModbusServer *polled;
+static unsigned entered;
+static HardwareSerial elsewhere;
+
+static void begin_elsewhere()
+{
+    ModbusMaster fresh;
+    entered++;
+    calling->begin(2, elsewhere);
+    *calling = fresh;
+    fresh = *calling;
+    assert_int_equal(calling->readCoils(0, 1), ModbusMaster::ku8MBBusy);
+    assert_int_equal(calling->status(), ModbusMaster::ku8MBBusy);
+}
+
+static void callbacks_around_a_request_cannot_begin_or_assign_their_master(void **)
+{
+    ModbusMaster node;
+    calling = &node;
+    entered = 0;
+    node.begin(1, Serial);
+    node.setResponseTimeout(20);
+    node.preTransmission(begin_elsewhere);
+    node.postTransmission(begin_elsewhere);
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_int_equal(node.getResponseBuffer(0), 7);
+    assert_int_equal(node.getSlaveID(), 1);
+    assert_int_equal(entered, 2);
+}
+
+static uint8_t begin_other(uint16_t, uint16_t, const uint8_t *)
+{
+    entered++;
+    assert_int_equal(polled->begin(9, elsewhere, 9600), MBM_BUSY);
+    assert_int_equal(polled->beginAscii(9, elsewhere), MBM_BUSY);
+    assert_int_equal(polled->poll(), MBM_BUSY);
+    assert_int_equal(polled->getUnitID(), 17);
+    polled->setBaudRate(300);
+    return 0;
+}
+
+static void hooks_cannot_begin_their_server(void **)
+{
+    ModbusRegisterArray<2> registers;
+    ModbusServer server;
+    polled = &server;
+    entered = 0;
+    registers.beforeWrite(begin_other);
+    assert_int_equal(server.holdingRegisters(registers), MBM_OK);
+    assert_int_equal(server.begin(17, Serial, 19200), MBM_OK);
+    answers(server, {17, 6, 0, 1, 0, 5}, {17, 6, 0, 1, 0, 5});
+    answers(server, {17, 6, 0, 1, 0, 6}, {17, 6, 0, 1, 0, 6});
+    assert_int_equal(entered, 2);
+    assert_int_equal(registers[1], 6);
+}
+
+static void several_units_may_serve_one_array(void **)
+{
+    ModbusRegisterArray<2> registers;
+    ModbusUnit units[] = {{17}, {18}};
+    ModbusServer server;
+    assert_int_equal(units[0].holdingRegisters(registers), MBM_OK);
+    assert_int_equal(units[1].holdingRegisters(registers), MBM_OK);
+    assert_int_equal(units[1].inputRegisters(registers), MBM_BUSY);
+    assert_int_equal(server.begin(units, Serial, 19200), MBM_OK);
+    answers(server, {17, 6, 0, 1, 0, 5}, {17, 6, 0, 1, 0, 5});
+    answers(server, {18, 3, 0, 1, 0, 1}, {18, 3, 2, 0, 5});
+}
+
+int main()
+{
+    const struct CMUnitTest tests[] = {
+        TEST(callbacks_around_a_request_cannot_begin_or_assign_their_master),
+        TEST(hooks_cannot_begin_their_server),
+        TEST(several_units_may_serve_one_array),
+    };
+
+    return cmocka_run_group_tests_name("classes within callbacks", tests, nullptr, nullptr);
+}

@@ -1,0 +1,432 @@
+/* Every function of a master or server, called on it from within each of its hooks:
+ * where no call is allowed it returns MBM_BUSY and changes nothing, where calls are
+ * allowed they work. */
+#include "hooked_port.h"
+#include "test.h"
+
+#include <string.h>
+
+static hooked_port wire;
+static mbm_port port;
+static uint8_t small_frame[MBM_MAX_TCP_FRAME], other_frame[MBM_MAX_TCP_FRAME];
+static uint16_t words[8];
+
+static mbm_master master;
+static mbm_server server;
+static mbm_unit unit;
+
+/* How often each kind of hook was entered with calls of its own. */
+static unsigned entered;
+
+static int reset(void **state)
+{
+    (void)state;
+    memset(&wire, 0, sizeof wire);
+    memset(&master, 0, sizeof master);
+    memset(&server, 0, sizeof server);
+    memset(&unit, 0, sizeof unit);
+    memset(words, 0, sizeof words);
+    wire.step = 500;
+    port = hooked_port_of(&wire);
+    entered = 0;
+    return 0;
+}
+
+/* Looks at the object before and after what is called. */
+#define UNCHANGED_BY(object, calls)                                                               \
+    do {                                                                                          \
+        static uint8_t before[sizeof(object)];                                                    \
+        memcpy(before, &(object), sizeof(object));                                                \
+        calls;                                                                                    \
+        assert_memory_equal(before, &(object), sizeof(object));                                   \
+        entered++;                                                                                \
+    } while (0)
+
+/* --- master --- */
+
+static void every_function_of_the_master_is_busy(void)
+{
+    mbm_master *m = &master;
+    mbm_counters counters;
+    mbm_registers view;
+
+    IS(MBM_BUSY, mbm_master_begin(m, 1, &port));
+    IS(MBM_BUSY, mbm_master_setBuffers(m, words, 1, words, 1, other_frame, 8));
+    IS(MBM_BUSY, mbm_master_poll(m));
+    assert_int_equal(mbm_master_pollDelay(m), 0);
+    IS(MBM_BUSY, mbm_master_cancel(m));
+    IS(MBM_BUSY, mbm_master_status(m));
+    IS(MBM_BUSY, mbm_master_setSlaveID(m, 1));
+    IS(MBM_BUSY, mbm_master_setResponseTimeout(m, 1));
+    IS(MBM_BUSY, mbm_master_setBaudRate(m, 1));
+    IS(MBM_BUSY, mbm_master_setGap(m, 1));
+    IS(MBM_BUSY, mbm_master_setTurnaroundDelay(m, 1));
+    IS(MBM_BUSY, mbm_master_setQuietTime(m, 1));
+    IS(MBM_BUSY, mbm_master_setRetries(m, 1));
+    IS(MBM_BUSY, mbm_master_setEchoDiscard(m, 1));
+    IS(MBM_BUSY, mbm_master_setPostFlushHold(m, 1));
+    IS(MBM_BUSY, mbm_master_setBlocking(m, 0));
+    IS(MBM_BUSY, mbm_master_setCounters(m, &counters));
+    IS(MBM_BUSY, mbm_master_setWordOrder(m, 2));
+    IS(MBM_BUSY, mbm_master_lineUsed(m));
+    IS(MBM_BUSY, mbm_master_clearResponseBuffer(m));
+    IS(MBM_BUSY, mbm_master_setTransmitBuffer(m, 0, 1));
+    IS(MBM_BUSY, mbm_master_clearTransmitBuffer(m));
+    IS(MBM_BUSY, mbm_master_beginTransmission(m, 1));
+    IS(MBM_BUSY, mbm_master_send(m, 1));
+    IS(MBM_BUSY, mbm_master_send8(m, 1));
+    IS(MBM_BUSY, mbm_master_send32(m, 1));
+    IS(MBM_BUSY, mbm_master_sendBit(m, 1));
+    IS(MBM_BUSY, mbm_master_getResponseRegisters(m, 0, &view));
+    IS(MBM_BUSY, mbm_master_getTransmitRegisters(m, 0, &view));
+    IS(MBM_BUSY, mbm_master_readCoils(m, 0, 1));
+    IS(MBM_BUSY, mbm_master_readDiscreteInputs(m, 0, 1));
+    IS(MBM_BUSY, mbm_master_readHoldingRegisters(m, 0, 1));
+    IS(MBM_BUSY, mbm_master_readInputRegisters(m, 0, 1));
+    IS(MBM_BUSY, mbm_master_writeSingleCoil(m, 0, 1));
+    IS(MBM_BUSY, mbm_master_writeSingleRegister(m, 0, 1));
+    IS(MBM_BUSY, mbm_master_writeMultipleCoils(m, 0, 1));
+    IS(MBM_BUSY, mbm_master_writeQueuedCoils(m));
+    IS(MBM_BUSY, mbm_master_writeMultipleRegisters(m, 0, 1));
+    IS(MBM_BUSY, mbm_master_writeQueuedRegisters(m));
+    IS(MBM_BUSY, mbm_master_maskWriteRegister(m, 0, 1, 2));
+    IS(MBM_BUSY, mbm_master_readWriteMultipleRegisters(m, 0, 1, 0, 1));
+    IS(MBM_BUSY, mbm_master_readWriteQueuedRegisters(m, 0, 1));
+    assert_int_equal(mbm_master_requestFrom(m, 0, 1), 0);
+    assert_int_equal(mbm_master_getSlaveID(m), 0);
+    assert_int_equal(mbm_master_getExceptionCode(m), 0);
+    assert_int_equal(mbm_master_getResponseBuffer(m, 0), 0xFFFF);
+    assert_int_equal(mbm_master_available(m), 0);
+    assert_int_equal(mbm_master_receive(m), 0xFFFF);
+}
+
+static void within_master(int hook)
+{
+    if (hook != HOOK_IDLE)
+        UNCHANGED_BY(master, every_function_of_the_master_is_busy());
+    if (hook == HOOK_POST)
+        hooked_port_arrive_rtu(&wire, 17, "\3\2\x12\x34", 4);
+}
+
+static void begin_master(void)
+{
+    OK(mbm_master_setBuffers(&master, words, 4, words + 4, 4, small_frame, 64));
+    OK(mbm_master_begin(&master, 17, &port));
+    wire.within = within_master;
+}
+
+static void no_hook_of_a_masters_port_may_call_the_master(void **state)
+{
+    int i;
+
+    (void)state;
+    begin_master();
+    OK(mbm_master_readHoldingRegisters(&master, 0, 1));
+    assert_int_equal(mbm_master_receive(&master), 0x1234);
+    for (i = 0; i < HOOKS; i++)
+        assert_true(wire.called[i] > 0);
+    /* Outside of a request, too. */
+    entered = 0;
+    OK(mbm_master_lineUsed(&master));
+    OK(mbm_master_begin(&master, 17, &port));
+    OK(mbm_master_setBlocking(&master, 0));
+    IS(MBM_PENDING, mbm_master_readHoldingRegisters(&master, 0, 1));
+    assert_true(mbm_master_pollDelay(&master) < 0xFFFFFFFFu);
+    assert_true(entered >= 3);
+    /* A cancel switches the driver off. */
+    entered = 0;
+    wire.called[HOOK_POST] = 0;
+    while (wire.called[HOOK_WRITE] < 2)
+        IS(MBM_PENDING, mbm_master_poll(&master));
+    OK(mbm_master_cancel(&master));
+    assert_true(entered > 0);
+    OK(mbm_master_getSlaveID(&master) == 17 ? MBM_OK : MBM_BUSY);
+}
+
+/* What idle hooks do: each entry is tried in one request of its own. */
+static int idle_does;
+
+static void within_idle(int hook)
+{
+    mbm_master fresh;
+
+    if (hook == HOOK_POST && idle_does != 2)
+        hooked_port_arrive_rtu(&wire, 17, "\3\2\x12\x34", 4);
+    if (hook != HOOK_IDLE)
+        return;
+    entered++;
+    switch (idle_does) {
+    case 0:
+        IS(MBM_BUSY, mbm_master_readCoils(&master, 0, 1));
+        IS(MBM_BUSY, mbm_master_setBuffers(&master, words, 1, words, 1, small_frame, 8));
+        IS(MBM_PENDING, mbm_master_status(&master));
+        assert_int_equal(mbm_master_getSlaveID(&master), 17);
+        assert_true(mbm_master_pollDelay(&master) < 0xFFFFFFFFu);
+        OK(mbm_master_setQuietTime(&master, 1));
+        break;
+    case 1: mbm_master_poll(&master); break;
+    case 2: OK(mbm_master_cancel(&master)); break;
+    case 3: OK(mbm_master_begin(&master, 17, &port)); break;
+    default:
+        memset(&fresh, 0, sizeof fresh);
+        memcpy(&master, &fresh, sizeof master);
+    }
+}
+
+static void an_idle_hook_may_call_its_master(void **state)
+{
+    static const uint8_t ends[] = {MBM_OK, MBM_OK, MBM_CANCELLED, MBM_CANCELLED,
+                                   MBM_NOT_INITIALISED};
+
+    (void)state;
+    for (idle_does = 0; idle_does < (int)sizeof ends; idle_does++) {
+        begin_master();
+        entered = 0;
+        wire.within = within_idle;
+        IS(ends[idle_does], mbm_master_readHoldingRegisters(&master, 0, 1));
+        assert_true(entered > 0);
+        wire.within = NULL;
+    }
+}
+
+/* --- server --- */
+
+static void every_function_of_the_server_is_busy(void)
+{
+    IS(MBM_BUSY, mbm_server_begin(&server, &port, &unit, 1, other_frame, 260));
+    IS(MBM_BUSY, mbm_server_beginAscii(&server, &port, &unit, 1, other_frame, 260));
+    IS(MBM_BUSY, mbm_server_beginTcp(&server, &port, &unit, 1, other_frame, 260));
+    IS(MBM_BUSY, mbm_server_beginRtuOverTcp(&server, &port, &unit, 1, other_frame, 260));
+    IS(MBM_BUSY, mbm_server_setSilence(&server, 1));
+    IS(MBM_BUSY, mbm_server_setBaudRate(&server, 9600));
+    IS(MBM_BUSY, mbm_server_setEchoDiscard(&server, 1));
+    IS(MBM_BUSY, mbm_server_poll(&server));
+    assert_int_equal(mbm_server_pollDelay(&server), 0);
+}
+
+static void within_server(int hook)
+{
+    (void)hook;
+    UNCHANGED_BY(server, every_function_of_the_server_is_busy());
+}
+
+static mbm_registerTable table, late_table;
+static mbm_cells cells;
+static mbm_custom custom;
+static mbm_diagnostics diagnostics;
+static mbm_files files;
+static const mbm_file file = {words, 8, 1};
+static unsigned hooks_called;
+
+/* What a unit serves may change while it serves. */
+static void within_unit(void)
+{
+    hooks_called++;
+    within_server(0);
+    OK(mbm_server_serveInputRegisters(&unit, &late_table));
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_server_serveCallbacks(&unit, &cells, 1));
+    OK(mbm_server_serveCustom(&unit, &custom));
+    OK(mbm_server_serveFiles(&unit, &files));
+    OK(mbm_server_serveDiagnostics(&unit, &diagnostics));
+}
+
+static uint8_t before_write(void *context, uint16_t address, uint16_t quantity,
+                            const uint8_t *data)
+{
+    (void)context;
+    (void)address;
+    (void)quantity;
+    (void)data;
+    within_unit();
+    return 0;
+}
+
+static void after_write(void *context, uint16_t address, uint16_t quantity)
+{
+    before_write(context, address, quantity, NULL);
+}
+
+static uint8_t cell_is_valid(void *context, uint16_t address)
+{
+    return (uint8_t)!before_write(context, address, 1, NULL);
+}
+
+static uint16_t cell_get(void *context, uint16_t address)
+{
+    return before_write(context, address, 1, NULL);
+}
+
+static void cell_set(void *context, uint16_t address, uint16_t value)
+{
+    before_write(context, address, value, NULL);
+}
+
+static uint16_t carry_out(void *context, const mbm_request *asked, uint8_t *response,
+                          uint16_t capacity)
+{
+    static mbm_switches switches;
+
+    (void)context;
+    (void)capacity;
+    (void)asked;
+    within_unit();
+    OK(mbm_server_switchOff(&unit, &switches, 7));
+    response[0] = 1;
+    return 1;
+}
+
+static uint8_t before_record(void *context, uint16_t number, uint16_t record, uint16_t length,
+                             const uint8_t *data)
+{
+    (void)number;
+    return before_write(context, record, length, data);
+}
+
+static void after_record(void *context, uint16_t number, uint16_t record, uint16_t length)
+{
+    (void)number;
+    before_write(context, record, length, NULL);
+}
+
+static void restarted(void *context, uint8_t clears)
+{
+    before_write(context, clears, 1, NULL);
+}
+
+static void serve_all(void)
+{
+    memset(&table, 0, sizeof table);
+    memset(&late_table, 0, sizeof late_table);
+    memset(&cells, 0, sizeof cells);
+    memset(&custom, 0, sizeof custom);
+    memset(&diagnostics, 0, sizeof diagnostics);
+    memset(&files, 0, sizeof files);
+    unit.id = 17;
+    table.words = late_table.words = words;
+    table.size = late_table.size = 8;
+    table.before = before_write;
+    table.after = after_write;
+    cells.isValid = cell_is_valid;
+    cells.get = cell_get;
+    cells.set = cell_set;
+    cells.before = before_write;
+    cells.after = after_write;
+    custom.serve = carry_out;
+    custom.code = 65;
+    diagnostics.restart = restarted;
+    files.files = &file;
+    files.count = 1;
+    files.before = before_record;
+    files.after = after_record;
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_server_serveMaskAndReadWrite(&table));
+    OK(mbm_server_serveCallbacks(&unit, &cells, 1));
+    OK(mbm_server_serveCustom(&unit, &custom));
+    OK(mbm_server_serveDiagnostics(&unit, &diagnostics));
+    OK(mbm_server_serveFiles(&unit, &files));
+}
+
+static size_t ask(const char *pdu, size_t length)
+{
+    unsigned i;
+
+    wire.length = 0;
+    hooked_port_arrive_rtu(&wire, 17, pdu, length);
+    for (i = 0; i < 100; i++)
+        OK(mbm_server_poll(&server));
+    return wire.length;
+}
+
+#define ASK(pdu) ask(pdu, sizeof pdu - 1)
+
+static void no_hook_of_a_server_may_call_the_server(void **state)
+{
+    static const struct {
+        const char *pdu;
+        size_t length, answer;
+        unsigned hooks;
+    } requests[] = {
+        {"\x06\0\0\0\1", 5, 8, 2},
+        {"\x17\0\0\0\1\0\0\0\1\2\0\1", 12, 7, 2},
+        {"\x01\0\0\0\2", 5, 6, 4},
+        {"\x05\0\0\xFF\0", 5, 8, 4},
+        {"\x41", 1, 5, 1},
+        {"\x08\0\1\0\0", 5, 8, 1},
+        {"\x15\x09\6\0\1\0\0\0\1\0\2", 11, 14, 2},
+    };
+    unsigned i;
+
+    (void)state;
+    serve_all();
+    OK(mbm_server_begin(&server, &port, &unit, 1, small_frame, 256));
+    wire.within = within_server;
+    for (i = 0; i < COUNT(requests); i++) {
+        hooks_called = 0;
+        assert_int_equal(ask(requests[i].pdu, requests[i].length), requests[i].answer);
+        assert_true(hooks_called >= requests[i].hooks);
+    }
+    assert_int_equal(ASK("\x04\0\0\0\1"), 7); /* what a hook served first */
+    for (i = 0; i < HOOK_IDLE; i++)
+        assert_true(wire.called[i] > 0);
+    assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFFu);
+    OK(mbm_server_setSilence(&server, 1000));
+}
+
+/* A restart that zeroes the server, or begins it anew in another place. */
+static int begins_anew;
+
+static void start_over(void *context, uint8_t clears)
+{
+    (void)context;
+    (void)clears;
+    hooks_called++;
+    memset(&server, 0, sizeof server);
+    if (begins_anew)
+        OK(mbm_server_beginTcp(&server, &port, &unit, 1, other_frame, 260));
+}
+
+static void a_server_that_its_hook_zeroes_is_touched_no_more(void **state)
+{
+    static const mbm_server zero;
+
+    (void)state;
+    for (begins_anew = 0; begins_anew < 2; begins_anew++) {
+        unsigned i;
+
+        serve_all();
+        diagnostics.restart = start_over;
+        OK(mbm_server_begin(&server, &port, &unit, 1, small_frame, 256));
+        hooked_port_arrive_rtu(&wire, 17, "\x08\0\1\0\0", 5);
+        hooks_called = 0;
+        wire.length = 0;
+        for (i = 0; i < 100 && hooks_called == 0; i++)
+            OK(mbm_server_poll(&server));
+        assert_int_equal(hooks_called, 1);
+        assert_int_equal(wire.length, 0);
+        if (begins_anew) {
+            hooked_port_arrive(&wire, "\0\1\0\0\0\6\x11\x03\0\0\0\1", 12);
+            OK(mbm_server_poll(&server));
+            OK(mbm_server_poll(&server));
+            assert_int_equal(wire.length, 11);
+        } else {
+            assert_memory_equal(&server, &zero, sizeof zero);
+            IS(MBM_NOT_INITIALISED, mbm_server_poll(&server));
+        }
+        memset(&server, 0, sizeof server);
+    }
+}
+
+#define TEST(test) cmocka_unit_test_setup(test, reset)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(no_hook_of_a_masters_port_may_call_the_master),
+        TEST(an_idle_hook_may_call_its_master),
+        TEST(no_hook_of_a_server_may_call_the_server),
+        TEST(a_server_that_its_hook_zeroes_is_touched_no_more),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,307 @@
+/* Every function of a client, called on it from within each of its hooks: where no call
+ * is allowed it returns MBM_BUSY and changes nothing, from `done` calls work. */
+#include "hooked_port.h"
+#include "test.h"
+
+#include <string.h>
+
+static hooked_port wire;
+static mbm_port port;
+static uint8_t small_frame[MBM_MAX_TCP_FRAME], other_frame[MBM_MAX_TCP_FRAME];
+static uint16_t words[8];
+
+static mbm_client client;
+static mbm_clientRequest request, another;
+
+/* How often each kind of hook was entered with calls of its own. */
+static unsigned entered;
+
+static int reset(void **state)
+{
+    (void)state;
+    memset(&wire, 0, sizeof wire);
+    memset(&client, 0, sizeof client);
+    memset(&request, 0, sizeof request);
+    memset(&another, 0, sizeof another);
+    memset(words, 0, sizeof words);
+    wire.step = 500;
+    port = hooked_port_of(&wire);
+    entered = 0;
+    return 0;
+}
+
+/* Looks at the object before and after what is called. */
+#define UNCHANGED_BY(object, calls)                                                               \
+    do {                                                                                          \
+        static uint8_t before[sizeof(object)];                                                    \
+        memcpy(before, &(object), sizeof(object));                                                \
+        calls;                                                                                    \
+        assert_memory_equal(before, &(object), sizeof(object));                                   \
+        entered++;                                                                                \
+    } while (0)
+
+static uint32_t random_number(void *context)
+{
+    (void)context;
+    return 7;
+}
+
+static void every_setting_of_the_client_answers(uint8_t status)
+{
+    static mbm_clientUnit units[1];
+
+    IS(status, mbm_client_setResponseTimeout(&client, 5));
+    IS(status, mbm_client_setBaudRate(&client, 19200));
+    IS(status, mbm_client_setGap(&client, 1));
+    IS(status, mbm_client_setTurnaroundDelay(&client, 1));
+    IS(status, mbm_client_setQuietTime(&client, 1));
+    IS(status, mbm_client_setEchoDiscard(&client, 0));
+    IS(status, mbm_client_setPostFlushHold(&client, 0));
+    IS(status, mbm_client_setRetries(&client, 0));
+    IS(status, mbm_client_setBackoff(&client, 0, 1, 1));
+    IS(status, mbm_client_setJitter(&client, 1, random_number, NULL));
+    IS(status, mbm_client_setCounters(&client, NULL));
+    IS(status, mbm_client_setUnits(&client, units, 0));
+    IS(status, mbm_client_setInFlight(&client, 1));
+}
+
+static void every_request_of_the_client_answers(uint8_t status, mbm_clientRequest *r)
+{
+    const mbm_rule rule = {.kind = MBM_RULE_SILENCE};
+
+#define ASKED(call)                                                                               \
+    do {                                                                                          \
+        IS(status, call);                                                                         \
+        if (status == MBM_PENDING)                                                                \
+            OK(mbm_client_cancel(&client, r));                                                    \
+    } while (0)
+    ASKED(mbm_client_readCoils(&client, r, 0, 1));
+    ASKED(mbm_client_readSingleCoil(&client, r, 0));
+    ASKED(mbm_client_readDiscreteInputs(&client, r, 0, 1));
+    ASKED(mbm_client_readSingleDiscreteInput(&client, r, 0));
+    ASKED(mbm_client_readHoldingRegisters(&client, r, 0, 1));
+    ASKED(mbm_client_readSingleHoldingRegister(&client, r, 0));
+    ASKED(mbm_client_readInputRegisters(&client, r, 0, 1));
+    ASKED(mbm_client_readSingleInputRegister(&client, r, 0));
+    ASKED(mbm_client_writeSingleCoil(&client, r, 0, 1));
+    ASKED(mbm_client_writeSingleRegister(&client, r, 0, 1));
+    ASKED(mbm_client_writeMultipleCoils(&client, r, 0, 1));
+    ASKED(mbm_client_writeMultipleRegisters(&client, r, 0, 1));
+    ASKED(mbm_client_maskWriteRegister(&client, r, 0, 1, 1));
+    ASKED(mbm_client_readWriteMultipleRegisters(&client, r, 0, 1, 0, 1));
+    ASKED(mbm_client_readExceptionStatus(&client, r));
+    ASKED(mbm_client_diagnostics(&client, r, 0, 1));
+    ASKED(mbm_client_getCommEventCounter(&client, r));
+    ASKED(mbm_client_getCommEventLog(&client, r));
+    ASKED(mbm_client_reportServerId(&client, r));
+    ASKED(mbm_client_readFileRecord(&client, r, 1, 0, 1));
+    ASKED(mbm_client_writeFileRecord(&client, r, 1, 0, 1));
+    ASKED(mbm_client_readFifoQueue(&client, r, 0));
+    ASKED(mbm_client_readDeviceIdentification(&client, r, 1, 0));
+    ASKED(mbm_client_encapsulatedInterfaceTransport(&client, r, 14, 1));
+    ASKED(mbm_client_custom(&client, r, 65, 1, &rule));
+}
+
+static void every_function_of_the_client_is_busy(void)
+{
+    static mbm_master facade;
+    static const mbm_master zero;
+    static const mbm_link link = {.context = NULL};
+    static uint8_t asked[sizeof another];
+
+    IS(MBM_BUSY, mbm_client_beginRtu(&client, &port, other_frame, 260));
+    IS(MBM_BUSY, mbm_client_beginAscii(&client, &port, other_frame, 260));
+    IS(MBM_BUSY, mbm_client_beginRtuOverTcp(&client, &port, other_frame, 260));
+    IS(MBM_BUSY, mbm_client_beginTcp(&client, &port, other_frame, 260, other_frame, 260));
+    every_setting_of_the_client_answers(MBM_BUSY);
+    another.data = words;
+    memcpy(asked, &another, sizeof another);
+    every_request_of_the_client_answers(MBM_BUSY, &another);
+    assert_memory_equal(asked, &another, sizeof another);
+    memcpy(asked, &request, sizeof request);
+    every_request_of_the_client_answers(MBM_BUSY, &request);
+    IS(MBM_BUSY, mbm_client_cancel(&client, &request));
+    assert_memory_equal(asked, &request, sizeof request);
+    IS(MBM_BUSY, mbm_client_setDelimiter(&client, '!'));
+    IS(MBM_BUSY, mbm_client_reconnect(&client, &link));
+    IS(MBM_BUSY, mbm_client_lend(&client, NULL));
+    IS(MBM_BUSY, mbm_client_lend(&client, &facade));
+    IS(MBM_BUSY, mbm_client_takeBack(&client, &facade));
+    assert_memory_equal(&facade, &zero, sizeof zero);
+    IS(MBM_BUSY, mbm_client_poll(&client));
+    assert_int_equal(mbm_client_pollDelay(&client), 0);
+    assert_int_equal(mbm_client_pending(&client), 0);
+    assert_int_equal(mbm_client_isConnected(&client), 0);
+}
+
+static void within_client(int hook)
+{
+    (void)hook;
+    UNCHANGED_BY(client, every_function_of_the_client_is_busy());
+}
+
+static unsigned drawn;
+
+static uint32_t reentrant_random(void *context)
+{
+    (void)context;
+    drawn++;
+    UNCHANGED_BY(client, every_function_of_the_client_is_busy());
+    return 7;
+}
+
+/* In framing 0 to 3. */
+static void begin_client(int framing)
+{
+    memset(&client, 0, sizeof client);
+    switch (framing) {
+    case 0: OK(mbm_client_beginRtu(&client, &port, small_frame, 256)); break;
+    case 1: OK(mbm_client_beginAscii(&client, &port, small_frame, 256)); break;
+    case 2:
+        OK(mbm_client_beginTcp(&client, &port, small_frame, 260, other_frame, 260));
+        break;
+    default: OK(mbm_client_beginRtuOverTcp(&client, &port, small_frame, 256));
+    }
+    OK(mbm_client_setResponseTimeout(&client, 20));
+    OK(mbm_client_setQuietTime(&client, 1));
+}
+
+static void poll_until_all_have_ended(void)
+{
+    unsigned i;
+
+    for (i = 0; i < 3000 && mbm_client_poll(&client) == MBM_PENDING; i++) {
+    }
+    assert_int_equal(mbm_client_pending(&client), 0);
+}
+
+static void no_hook_of_a_clients_port_nor_its_random_function_may_call_the_client(void **state)
+{
+    int framing;
+
+    (void)state;
+    for (framing = 0; framing < 4; framing++) {
+        wire.within = framing == 2 ? NULL : within_client; /* TCP's begin calls no hook */
+        begin_client(framing);
+        wire.within = within_client;
+        OK(mbm_client_setRetries(&client, 2));
+        OK(mbm_client_setBackoff(&client, MBM_BACKOFF_FIXED, 1, 1));
+        OK(mbm_client_setJitter(&client, 100, reentrant_random, NULL));
+        memset(&request, 0, sizeof request);
+        request.unit = 17;
+        entered = drawn = 0;
+        IS(MBM_PENDING, mbm_client_readCoils(&client, &request, 0, 1));
+        assert_true(mbm_client_pollDelay(&client) < 0xFFFFFFFFu);
+        poll_until_all_have_ended();
+        IS(MBM_RESPONSE_TIMED_OUT, request.status);
+        assert_int_equal(drawn, 2);
+        assert_true(entered > drawn);
+        /* Cancelling and connecting anew call hooks where the driver is on. */
+        IS(MBM_PENDING, mbm_client_readCoils(&client, &request, 0, 1));
+        IS(MBM_PENDING, mbm_client_poll(&client));
+        OK(mbm_client_reconnect(&client, NULL));
+        poll_until_all_have_ended();
+        IS(MBM_LINK_LOST, request.status);
+        IS(MBM_PENDING, mbm_client_readCoils(&client, &request, 0, 1));
+        IS(MBM_PENDING, mbm_client_poll(&client));
+        OK(mbm_client_cancel(&client, &request));
+    }
+    for (framing = 0; framing < HOOK_IDLE; framing++)
+        assert_true(wire.called[framing] > 0);
+}
+
+static int done_does, framing_of_done;
+
+static void connect_anew(void *context)
+{
+    (void)context;
+    entered++;
+    /* No poll is at work but the one that called `done`. */
+    IS(MBM_BUSY, mbm_client_poll(&client));
+    assert_int_equal(mbm_client_isConnected(&client), 1);
+}
+
+static void done(void *context, mbm_clientRequest *ended)
+{
+    const mbm_link link = {.disconnect = connect_anew};
+    static mbm_master facade;
+
+    (void)context;
+    entered++;
+    IS(MBM_BUSY, mbm_client_poll(&client));
+    switch (done_does) {
+    case 0:
+        every_setting_of_the_client_answers(MBM_OK);
+        another.unit = ended->unit = 17;
+        another.data = ended->data = words;
+        every_request_of_the_client_answers(MBM_PENDING, &another);
+        every_request_of_the_client_answers(MBM_PENDING, ended);
+        IS(MBM_BUSY, mbm_client_beginRtu(&client, &port, small_frame, 256));
+        assert_true(mbm_client_pollDelay(&client) == 0xFFFFFFFFu);
+        assert_int_equal(mbm_client_pending(&client), 0);
+        IS(framing_of_done == 1 ? MBM_OK : MBM_INVALID_ARGUMENT,
+           mbm_client_setDelimiter(&client, '!'));
+        break;
+    case 1: OK(mbm_client_reconnect(&client, &link)); break;
+    case 2:
+        OK(mbm_client_lend(&client, NULL));
+        IS(MBM_BUSY, mbm_client_lend(&client, NULL));
+        OK(mbm_client_takeBack(&client, NULL));
+        memset(&facade, 0, sizeof facade);
+        OK(mbm_master_setBuffers(&facade, words, 1, words, 1, other_frame, 8));
+        if (framing_of_done % 3 == 0) {
+            OK(mbm_client_lend(&client, &facade));
+            OK(mbm_client_takeBack(&client, &facade));
+        }
+        break;
+    case 3:
+        /* The object is gone; what else it had is given up. */
+        memset(&client, 0, sizeof client);
+        break;
+    default:
+        /* One of another framing stands in its place. */
+        begin_client((framing_of_done + 1) % 4);
+        OK(mbm_client_poll(&client));
+    }
+}
+
+static void a_done_function_may_call_its_client(void **state)
+{
+    (void)state;
+    for (framing_of_done = 0; framing_of_done < 4; framing_of_done++) {
+        for (done_does = 0; done_does < 5; done_does++) {
+            static mbm_clientRequest waits;
+
+            begin_client(framing_of_done);
+            memset(&request, 0, sizeof request);
+            memset(&another, 0, sizeof another);
+            memset(&waits, 0, sizeof waits);
+            request.unit = waits.unit = 17;
+            request.done = done;
+            entered = 0;
+            wire.lost = 1;
+            IS(MBM_PENDING, mbm_client_readCoils(&client, &request, 0, 1));
+            if (done_does >= 3)
+                IS(MBM_PENDING, mbm_client_readCoils(&client, &waits, 0, 1));
+            poll_until_all_have_ended();
+            assert_true(entered > 0);
+            wire.lost = 0;
+            if (done_does == 3)
+                IS(MBM_NOT_INITIALISED, mbm_client_poll(&client));
+            else
+                OK(mbm_client_poll(&client));
+        }
+    }
+}
+
+#define TEST(test) cmocka_unit_test_setup(test, reset)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(no_hook_of_a_clients_port_nor_its_random_function_may_call_the_client),
+        TEST(a_done_function_may_call_its_client),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,327 @@
+/* A call that is refused changes nothing: each object is compared byte for byte with
+ * what it was, and what was pending goes on within buffers of their exact size. */
+#include "hooked_port.h"
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "refused.h"
+
+static hooked_port wire;
+static mbm_port port;
+
+static int reset(void **state)
+{
+    (void)state;
+    memset(&wire, 0, sizeof wire);
+    wire.step = 100;
+    port = hooked_port_of(&wire);
+    return 0;
+}
+
+/* --- server --- */
+
+static mbm_server server;
+static mbm_unit unit;
+static mbm_registerTable table;
+static uint16_t words[MBM_MAX_READ_REGISTERS];
+static unsigned not_yet;
+
+static uint16_t later(void *context, const mbm_request *request, uint8_t *response,
+                      uint16_t capacity)
+{
+    (void)context;
+    (void)request;
+    if (not_yet > 0) {
+        not_yet--;
+        return MBM_REPLY_PENDING;
+    }
+    assert_true(capacity >= 250);
+    memset(response, 0x5A, 250);
+    return 250;
+}
+
+static void all_begins_are_refused(uint8_t *frame)
+{
+    mbm_port deaf = port;
+    mbm_unit other;
+
+    deaf.read = NULL;
+    memset(&other, 0, sizeof other);
+    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_begin(&server, &deaf, &other, 1, frame, 20));
+    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_begin(&server, NULL, &other, 1, frame, 20));
+    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_begin(&server, &port, NULL, 1, frame, 20));
+    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_begin(&server, &port, &other, 1, NULL, 20));
+    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_begin(&server, &port, &other, 1, frame, 15));
+    REFUSED(MBM_INVALID_ARGUMENT, server,
+            mbm_server_beginAscii(&server, &port, &other, 1, frame, 20));
+    REFUSED(MBM_INVALID_ARGUMENT, server,
+            mbm_server_beginTcp(&server, &port, &other, 1, frame, 20));
+    REFUSED(MBM_INVALID_ARGUMENT, server,
+            mbm_server_beginRtuOverTcp(&server, &port, &other, 1, frame, 15));
+}
+
+static void poll_for_a_while(void)
+{
+    unsigned i;
+
+    for (i = 0; i < 200; i++)
+        OK(mbm_server_poll(&server));
+}
+
+static void a_server_goes_on_when_a_begin_was_refused(void **state)
+{
+    uint8_t *frame = (uint8_t *)malloc(MBM_MAX_FRAME), *small = (uint8_t *)malloc(20);
+    mbm_custom custom = {.serve = later, .code = 65};
+
+    (void)state;
+    memset(&server, 0, sizeof server);
+    memset(&unit, 0, sizeof unit);
+    memset(&table, 0, sizeof table);
+    unit.id = 17;
+    table.words = words;
+    table.size = MBM_MAX_READ_REGISTERS;
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_server_serveCustom(&unit, &custom));
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, MBM_MAX_FRAME));
+    all_begins_are_refused(small);
+    /* The next request. */
+    hooked_port_arrive_rtu(&wire, 17, "\x03\0\0\0\x7D", 5);
+    poll_for_a_while();
+    assert_int_equal(wire.length, 5 + 250);
+    /* One that has half arrived. */
+    wire.length = 0;
+    hooked_port_arrive_rtu(&wire, 17, "\x03\0\0\0\x7D", 5);
+    wire.last -= 4;
+    OK(mbm_server_poll(&server));
+    all_begins_are_refused(small);
+    wire.last += 4;
+    poll_for_a_while();
+    assert_int_equal(wire.length, 5 + 250);
+    /* One that is carried out. */
+    wire.length = 0;
+    not_yet = 150;
+    hooked_port_arrive_rtu(&wire, 17, "\x41\1", 2);
+    while (not_yet > 20)
+        OK(mbm_server_poll(&server));
+    all_begins_are_refused(small);
+    poll_for_a_while();
+    assert_int_equal(wire.length, 4 + 250);
+    free(frame);
+    free(small);
+}
+
+static void a_zeroed_server_stays_zero_when_a_begin_is_refused(void **state)
+{
+    uint8_t *small = (uint8_t *)malloc(20);
+    static const mbm_server zero;
+
+    (void)state;
+    memset(&server, 0, sizeof server);
+    all_begins_are_refused(small);
+    assert_memory_equal(&server, &zero, sizeof server);
+    free(small);
+}
+
+static void settings_of_a_server_that_are_refused_change_nothing(void **state)
+{
+    static uint8_t frame[MBM_MAX_TCP_FRAME];
+
+    (void)state;
+    memset(&server, 0, sizeof server);
+    REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setSilence(&server, 1));
+    REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setBaudRate(&server, 9600));
+    REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setEchoDiscard(&server, 1));
+    OK(mbm_server_beginTcp(&server, &port, &unit, 1, frame, sizeof frame));
+    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_setEchoDiscard(&server, 1));
+}
+
+/* Records that are refused, and the units that refuse them. */
+static void records_that_are_refused_are_as_they_were(void **state)
+{
+    mbm_registerTable fresh;
+    mbm_cells cells;
+    mbm_custom custom;
+    mbm_switches switches;
+
+    (void)state;
+    memset(&unit, 0, sizeof unit);
+    memset(&fresh, 0, sizeof fresh);
+    memset(&cells, 0, sizeof cells);
+    memset(&custom, 0, sizeof custom);
+    memset(&switches, 0, sizeof switches);
+    REFUSED(MBM_INVALID_ARGUMENT, fresh, mbm_server_serveHoldingRegisters(NULL, &fresh));
+    REFUSED(MBM_INVALID_ARGUMENT, fresh, mbm_server_serveMaskAndReadWrite(&fresh));
+    REFUSED(MBM_INVALID_ARGUMENT, cells, mbm_server_serveCallbacks(&unit, &cells, 3));
+    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_server_serveCallbacks(&unit, &cells, 3));
+    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_server_serveCustom(&unit, &custom));
+    custom.serve = later;
+    custom.code = 128;
+    REFUSED(MBM_INVALID_ARGUMENT, custom, mbm_server_serveCustom(&unit, &custom));
+    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_server_serveCustom(&unit, &custom));
+    custom.code = 65;
+    custom.length.kind = 9;
+    REFUSED(MBM_INVALID_ARGUMENT, custom, mbm_server_serveCustom(&unit, &custom));
+    REFUSED(MBM_INVALID_ARGUMENT, switches, mbm_server_switchOff(NULL, &switches, 3));
+    REFUSED(MBM_INVALID_ARGUMENT, switches, mbm_server_switchOff(&unit, &switches, 128));
+    REFUSED(MBM_INVALID_ARGUMENT, switches, mbm_server_switchOn(&switches, 0));
+    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_server_switchOff(&unit, &switches, 0));
+    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_server_serveFiles(&unit, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_server_serveFifos(&unit, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_server_serveDiagnostics(&unit, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_server_serveIdentification(&unit, NULL));
+}
+
+/* --- master --- */
+
+static void a_master_goes_on_when_calls_were_refused(void **state)
+{
+    static mbm_master m;
+    uint8_t *frame = (uint8_t *)malloc(MBM_MAX_FRAME), *small = (uint8_t *)malloc(8);
+    uint16_t *response = (uint16_t *)malloc(250), *transmit = (uint16_t *)malloc(4), one[1];
+    uint8_t answer[252] = {3, 250};
+    mbm_registers view;
+    mbm_port mute = port;
+    unsigned i;
+
+    (void)state;
+    memset(&m, 0, sizeof m);
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_begin(&m, 1, NULL));
+    mute.write = NULL;
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_begin(&m, 1, &mute));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setBuffers(&m, one, 1, one, 1, small, 7));
+    OK(mbm_master_begin(&m, 17, &port));
+    OK(mbm_master_setBuffers(&m, response, 125, transmit, 2, frame, MBM_MAX_FRAME));
+    OK(mbm_master_setBlocking(&m, 0));
+    transmit[0] = transmit[1] = 0x1234;
+    IS(MBM_PENDING, mbm_master_readHoldingRegisters(&m, 0, 125));
+
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_begin(&m, 1, &mute));
+    REFUSED(MBM_BUSY, m, mbm_master_setBuffers(&m, one, 1, one, 1, small, 8));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setBuffers(&m, one, 256, one, 1, small, 8));
+    REFUSED(MBM_BUSY, m, mbm_master_readCoils(&m, 0, 1));
+    REFUSED(MBM_BUSY, m, mbm_master_writeSingleRegister(&m, 1, 2));
+    REFUSED(MBM_BUSY, m, mbm_master_writeMultipleRegisters(&m, 1, 2));
+    REFUSED(MBM_BUSY, m, mbm_master_writeQueuedRegisters(&m));
+    REFUSED(MBM_BUSY, m, mbm_master_maskWriteRegister(&m, 1, 2, 3));
+    REFUSED(MBM_BUSY, m, mbm_master_readWriteMultipleRegisters(&m, 1, 2, 3, 2));
+    REFUSED(0, m, mbm_master_requestFrom(&m, 1, 2));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setWordOrder(&m, 5));
+    REFUSED(MBM_ILLEGAL_DATA_ADDRESS, m, mbm_master_setTransmitBuffer(&m, 2, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_getResponseRegisters(&m, 0, NULL));
+    assert_int_equal(transmit[0], 0x1234);
+    assert_int_equal(transmit[1], 0x1234);
+    memset(&view, 0x33, sizeof view);
+    REFUSED(MBM_INVALID_ARGUMENT, view, mbm_master_getResponseRegisters(NULL, 0, &view));
+
+    for (i = 0; i < 300 && wire.length == 0; i++)
+        IS(MBM_PENDING, mbm_master_poll(&m));
+    hooked_port_arrive_rtu(&wire, 17, answer, sizeof answer);
+    for (i = 0; i < 300 && mbm_master_poll(&m) == MBM_PENDING; i++) {
+    }
+    OK(mbm_master_status(&m));
+    /* A full queue of send. */
+    OK(mbm_master_send(&m, 1));
+    OK(mbm_master_send(&m, 2));
+    REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_master_send(&m, 3));
+    REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_master_send8(&m, 3));
+    REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_master_send32(&m, 3));
+    REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_master_sendBit(&m, 1));
+    free(frame);
+    free(small);
+    free(response);
+    free(transmit);
+}
+
+static void request_from_gives_0_whenever_it_is_refused(void **state)
+{
+    static mbm_master m;
+    static uint16_t response[4], transmit[4];
+    static uint8_t frame[MBM_FRAME_BYTES(4)];
+    unsigned i;
+
+    (void)state;
+    memset(&m, 0, sizeof m);
+    OK(mbm_master_begin(&m, 17, &port));
+    OK(mbm_master_setBuffers(&m, response, 4, transmit, 4, frame, sizeof frame));
+    OK(mbm_master_setBlocking(&m, 0));
+    IS(MBM_PENDING, mbm_master_readHoldingRegisters(&m, 0, 2));
+    for (i = 0; i < 300 && wire.length == 0; i++)
+        IS(MBM_PENDING, mbm_master_poll(&m));
+    hooked_port_arrive_rtu(&wire, 17, "\3\4\0\1\0\2", 6);
+    for (i = 0; i < 300 && mbm_master_poll(&m) == MBM_PENDING; i++) {
+    }
+    assert_int_equal(mbm_master_available(&m), 2);
+    assert_int_equal(mbm_master_requestFrom(&m, 0, 126), 0);
+    IS(MBM_PENDING, mbm_master_writeSingleRegister(&m, 0, 2));
+    assert_int_equal(mbm_master_requestFrom(&m, 0, 1), 0);
+}
+
+/* --- sniffer and ring --- */
+
+static void a_sniffer_goes_on_when_calls_were_refused(void **state)
+{
+    static mbm_sniffer sniffer;
+    const mbm_framing rtu = {.kind = MBM_FRAMING_RTU}, none = {.kind = 9};
+    uint8_t *buffer = (uint8_t *)malloc(MBM_MAX_FRAME), *small = (uint8_t *)malloc(31);
+    mbm_event event;
+
+    (void)state;
+    memset(&sniffer, 0, sizeof sniffer);
+    REFUSED(MBM_BUFFER_TOO_SMALL, sniffer, mbm_sniffer_begin(&sniffer, &rtu, small, 31));
+    OK(mbm_sniffer_begin(&sniffer, &rtu, buffer, MBM_MAX_FRAME));
+    hooked_port_arrive_rtu(&wire, 17, "\3\0\0\0\1", 5);
+    assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, wire.arriving, 4, 0), 4);
+    REFUSED(MBM_BUFFER_TOO_SMALL, sniffer, mbm_sniffer_begin(&sniffer, &rtu, small, 31));
+    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_begin(&sniffer, &none, buffer, 256));
+    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_begin(&sniffer, NULL, buffer, 256));
+    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_begin(&sniffer, &rtu, NULL, 256));
+    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_setTimeout(&sniffer, 0));
+    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_setPatience(&sniffer, 0));
+    REFUSED(0, sniffer, mbm_sniffer_feed(&sniffer, 3, wire.arriving, 4, 0));
+    REFUSED(0, sniffer, mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, NULL, 4, 0));
+    REFUSED(0, sniffer, mbm_sniffer_next(&sniffer, 0, NULL));
+    assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, wire.arriving + 4, 4, 0), 4);
+    assert_int_equal(mbm_sniffer_next(&sniffer, 100000, &event), 1);
+    assert_int_equal(event.kind, MBM_EVENT_REQUEST);
+    free(buffer);
+    free(small);
+}
+
+static void a_ring_keeps_its_bytes_when_a_begin_is_refused(void **state)
+{
+    mbm_ring ring = {0};
+    uint8_t *bytes = (uint8_t *)malloc(8), *one = (uint8_t *)malloc(1), got[8];
+
+    (void)state;
+    REFUSED(MBM_INVALID_ARGUMENT, ring, mbm_ring_begin(&ring, one, 1));
+    OK(mbm_ring_begin(&ring, bytes, 8));
+    assert_int_equal(mbm_ring_write(&ring, (const uint8_t *)"abcd", 4), 4);
+    REFUSED(MBM_INVALID_ARGUMENT, ring, mbm_ring_begin(&ring, one, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, ring, mbm_ring_begin(&ring, NULL, 8));
+    REFUSED(0, ring, mbm_ring_write(&ring, NULL, 4));
+    REFUSED(0, ring, mbm_ring_read(&ring, NULL, 4));
+    assert_int_equal(mbm_ring_read(&ring, got, 8), 4);
+    assert_memory_equal(got, "abcd", 4);
+    free(bytes);
+    free(one);
+}
+
+#define TEST(test) cmocka_unit_test_setup(test, reset)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(a_server_goes_on_when_a_begin_was_refused),
+        TEST(a_zeroed_server_stays_zero_when_a_begin_is_refused),
+        TEST(settings_of_a_server_that_are_refused_change_nothing),
+        TEST(records_that_are_refused_are_as_they_were),
+        TEST(a_master_goes_on_when_calls_were_refused),
+        TEST(request_from_gives_0_whenever_it_is_refused),
+        TEST(a_sniffer_goes_on_when_calls_were_refused),
+        TEST(a_ring_keeps_its_bytes_when_a_begin_is_refused),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,446 @@
+/* Records that are handed to a mbm_server_serve function a second time: for the
+ * same unit, zeroed before or not, and for another unit. */
+#include "crc.h"
+#include "mbm.h"
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { FAMILIES = 11 };
+
+/* One record of every family, each with what it needs. */
+typedef struct {
+    mbm_bitTable coils, discrete;
+    mbm_registerTable holding, inputs;
+    mbm_exceptionStatus status;
+    mbm_diagnostics diagnostics;
+    mbm_serverId id;
+    mbm_files files;
+    mbm_fifos fifos;
+    mbm_identification identification;
+    mbm_custom custom;
+    mbm_cells cells;
+    mbm_switches switches;
+} records;
+
+static records first;
+static mbm_unit units[2];
+
+static uint8_t bits[2] = {0x55, 0x55};
+static uint16_t words[4] = {0x1234, 2, 3, 4};
+static const mbm_file files[] = {{words, 4, 1}};
+static const mbm_fifo fifos[] = {{words, 0, 2}};
+static const mbm_object objects[] = {{(const uint8_t *)"a", 1, 0}};
+
+static uint16_t echo(void *context, const mbm_request *request, uint8_t *response,
+                     uint16_t capacity)
+{
+    (void)context;
+    (void)capacity;
+    memcpy(response, request->data, request->length);
+    return request->length;
+}
+
+static uint16_t get(void *context, uint16_t address)
+{
+    (void)context;
+    return address;
+}
+
+/* Serves one family, with its record filled anew. */
+static uint8_t serve(mbm_unit *unit, records *r, int family)
+{
+    switch (family) {
+    case 0:
+        r->coils.bits = bits;
+        r->coils.size = 16;
+        return mbm_server_serveCoils(unit, &r->coils);
+    case 1:
+        r->discrete.bits = bits;
+        r->discrete.size = 16;
+        return mbm_server_serveDiscreteInputs(unit, &r->discrete);
+    case 2:
+        r->holding.words = words;
+        r->holding.size = 4;
+        return mbm_server_serveHoldingRegisters(unit, &r->holding);
+    case 3:
+        r->cells.get = get;
+        return mbm_server_serveCallbacks(unit, &r->cells, 4);
+    case 4: return mbm_server_serveExceptionStatus(unit, &r->status);
+    case 5: return mbm_server_serveDiagnostics(unit, &r->diagnostics);
+    case 6:
+        r->id.id = (const uint8_t *)"x";
+        r->id.idLength = 1;
+        return mbm_server_serveServerId(unit, &r->id);
+    case 7:
+        r->files.files = files;
+        r->files.count = 1;
+        return mbm_server_serveFiles(unit, &r->files);
+    case 8:
+        r->fifos.fifos = fifos;
+        r->fifos.count = 1;
+        return mbm_server_serveFifos(unit, &r->fifos);
+    case 9:
+        r->identification.objects = objects;
+        r->identification.count = 1;
+        return mbm_server_serveIdentification(unit, &r->identification);
+    default:
+        r->custom.serve = echo;
+        r->custom.code = 65;
+        return mbm_server_serveCustom(unit, &r->custom);
+    }
+}
+
+static void zero(records *r, int family)
+{
+    void *record[FAMILIES] = {&r->coils,  &r->discrete,    &r->holding, &r->cells,
+                              &r->status, &r->diagnostics, &r->id,      &r->files,
+                              &r->fifos,  &r->identification, &r->custom};
+    const size_t size[FAMILIES] = {sizeof r->coils,  sizeof r->discrete,    sizeof r->holding,
+                                   sizeof r->cells,  sizeof r->status,      sizeof r->diagnostics,
+                                   sizeof r->id,     sizeof r->files,       sizeof r->fifos,
+                                   sizeof r->identification, sizeof r->custom};
+
+    memset(record[family], 0, size[family]);
+}
+
+/* A request of each family, which is answered without an exception. */
+static const struct {
+    const char *pdu;
+    size_t length;
+} requests[FAMILIES] = {
+    {"\x01\0\0\0\1", 5}, {"\x02\0\0\0\1", 5}, {"\x03\0\0\0\1", 5},
+    {"\x04\0\0\0\1", 5}, {"\x07", 1},         {"\x08\0\0\1\2", 5},
+    {"\x11", 1},         {"\x14\7\6\0\1\0\0\0\1", 9}, {"\x18\0\0", 3},
+    {"\x2B\x0E\1\0", 4}, {"\x41\1", 2},
+};
+
+/* The function code that answers a request to `unit`; 0 for none. */
+static unsigned answer(mbm_unit *unit, uint8_t id, const char *pdu, size_t length)
+{
+    uint8_t frame[MBM_MAX_FRAME];
+    uint16_t response = 0xFFFF;
+
+    frame[0] = id;
+    memcpy(frame + 1, pdu, length);
+    length = seal(frame, length + 1);
+    OK(mbm_server_respond(MBM_FRAMING_RTU, unit, 1, frame, (uint16_t)length, sizeof frame,
+                          &response));
+    assert_int_not_equal(response, 0xFFFF);
+    return response == 0 ? 0 : frame[1];
+}
+
+static unsigned answered(mbm_unit *unit, int family)
+{
+    return answer(unit, unit->id, requests[family].pdu, requests[family].length);
+}
+
+static unsigned function(int family)
+{
+    return (uint8_t)requests[family].pdu[0];
+}
+
+static void all_are_answered(mbm_unit *unit)
+{
+    int i;
+
+    for (i = 0; i < FAMILIES; i++)
+        assert_int_equal(answered(unit, i), function(i));
+}
+
+static int reset(void **state)
+{
+    int i;
+
+    (void)state;
+    memset(&first, 0, sizeof first);
+    memset(units, 0, sizeof units);
+    units[0].id = 17;
+    units[1].id = 18;
+    words[0] = 0x1234;
+    for (i = 0; i < FAMILIES; i++)
+        OK(serve(&units[0], &first, i));
+    all_are_answered(&units[0]);
+    return 0;
+}
+
+static void a_record_that_is_served_again_leaves_the_others_served(void **state)
+{
+    int i;
+
+    (void)state;
+    for (i = 0; i < FAMILIES; i++) {
+        OK(serve(&units[0], &first, i));
+        all_are_answered(&units[0]);
+    }
+}
+
+static void a_record_that_is_zeroed_and_served_again_leaves_the_others_served(void **state)
+{
+    int i;
+
+    (void)state;
+    for (i = 0; i < FAMILIES; i++) {
+        zero(&first, i);
+        OK(serve(&units[0], &first, i));
+        all_are_answered(&units[0]);
+    }
+}
+
+static void a_record_that_is_zeroed_serves_nothing_and_the_others_go_on(void **state)
+{
+    int i, other;
+
+    (void)state;
+    for (i = 0; i < FAMILIES; i++) {
+        zero(&first, i);
+        for (other = 0; other < FAMILIES; other++)
+            assert_int_equal(answered(&units[0], other),
+                             other == i ? function(i) | 0x80 : function(other));
+        OK(serve(&units[0], &first, i));
+    }
+}
+
+static void all_records_may_be_zeroed_and_served_again(void **state)
+{
+    int i;
+
+    (void)state;
+    for (i = 0; i < FAMILIES; i++)
+        zero(&first, i);
+    for (i = 0; i < FAMILIES; i++)
+        assert_int_equal(answered(&units[0], i), function(i) | 0x80);
+    for (i = FAMILIES; i-- > 0;)
+        OK(serve(&units[0], &first, i));
+    all_are_answered(&units[0]);
+}
+
+static void one_record_serves_two_units(void **state)
+{
+    static records own;
+    int i;
+
+    (void)state;
+    memset(&own, 0, sizeof own);
+    /* The second unit has a record of its own first, then those of the other. */
+    OK(serve(&units[1], &own, 10));
+    for (i = 0; i < FAMILIES - 1; i++) {
+        OK(serve(&units[1], &first, i));
+        all_are_answered(&units[0]);
+        assert_int_equal(answered(&units[1], i), function(i));
+        assert_int_equal(answered(&units[1], 10), function(10));
+    }
+    all_are_answered(&units[1]);
+    /* What one of them writes, both have. */
+    assert_int_equal(answer(&units[1], 18, "\x06\0\0\x56\x78", 5), 6);
+    assert_int_equal(words[0], 0x5678);
+    zero(&first, 2);
+    OK(serve(&units[0], &first, 2));
+    all_are_answered(&units[0]);
+    all_are_answered(&units[1]);
+}
+
+static void functions_16_and_17_stay_when_another_unit_is_given_the_table(void **state)
+{
+    (void)state;
+    OK(mbm_server_serveMaskAndReadWrite(&first.holding));
+    OK(serve(&units[1], &first, 2));
+    assert_int_equal(answer(&units[0], 17, "\x16\0\0\xFF\xFF\0\0", 7), 0x16);
+    assert_int_equal(answer(&units[1], 18, "\x16\0\0\xFF\xFF\0\0", 7), 0x16);
+}
+
+/* As a table of another kind it would answer other functions, on every unit that has it. */
+static void a_table_that_is_served_as_one_kind_is_refused_as_another(void **state)
+{
+    records before;
+
+    (void)state;
+    memcpy(&before, &first, sizeof first);
+    IS(MBM_BUSY, mbm_server_serveInputRegisters(&units[0], &first.holding));
+    IS(MBM_BUSY, mbm_server_serveInputRegisters(&units[1], &first.holding));
+    IS(MBM_BUSY, mbm_server_serveDiscreteInputs(&units[1], &first.coils));
+    IS(MBM_BUSY, mbm_server_serveCoils(&units[1], &first.discrete));
+    IS(MBM_BUSY, mbm_server_serveCallbacks(&units[1], &first.cells, 2));
+    assert_memory_equal(&before, &first, sizeof first);
+    all_are_answered(&units[0]);
+    assert_int_equal(answered(&units[1], 3), 0);
+    /* Zeroed, it is a new one. */
+    zero(&first, 2);
+    first.holding.words = words;
+    first.holding.size = 4;
+    OK(mbm_server_serveInputRegisters(&units[1], &first.holding));
+    assert_int_equal(answered(&units[1], 3), 4);
+}
+
+static void a_second_record_of_diagnostics_is_refused(void **state)
+{
+    static mbm_diagnostics second;
+    mbm_unit before = units[0];
+
+    (void)state;
+    IS(MBM_BUSY, mbm_server_serveDiagnostics(&units[0], &second));
+    assert_memory_equal(&before, &units[0], sizeof before);
+    all_are_answered(&units[0]);
+}
+
+static void what_a_unit_has_no_place_for_is_refused(void **state)
+{
+    static mbm_custom more[MBM_MAX_SERVICES];
+    mbm_unit before;
+    int i, served = FAMILIES;
+
+    (void)state;
+    memset(more, 0, sizeof more);
+    for (i = 0; i < MBM_MAX_SERVICES; i++) {
+        more[i].serve = echo;
+        more[i].code = (uint8_t)(66 + i);
+    }
+    for (i = 0; served < MBM_MAX_SERVICES; i++, served++)
+        OK(mbm_server_serveCustom(&units[0], &more[i]));
+    memcpy(&before, &units[0], sizeof before);
+    IS(MBM_BUFFER_TOO_SMALL, mbm_server_serveCustom(&units[0], &more[i]));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_server_switchOff(&units[0], &first.switches, 3));
+    assert_int_equal(first.switches.off[0], 0);
+    assert_memory_equal(&before, &units[0], sizeof before);
+    assert_int_equal(answer(&units[0], 17, "\x50", 1), 0x50 | 0x80);
+    /* Those that it has are taken again all the same. */
+    for (i = 0; i < FAMILIES; i++) {
+        zero(&first, i);
+        OK(serve(&units[0], &first, i));
+    }
+    all_are_answered(&units[0]);
+}
+
+static void switches_are_set_up_again_like_any_record(void **state)
+{
+    (void)state;
+    OK(mbm_server_switchOff(&units[0], &first.switches, 3));
+    assert_int_equal(answered(&units[0], 2), 0x83);
+    memset(&first.switches, 0, sizeof first.switches);
+    all_are_answered(&units[0]);
+    OK(mbm_server_switchOff(&units[0], &first.switches, 4));
+    assert_int_equal(answered(&units[0], 2), 3);
+    assert_int_equal(answered(&units[0], 3), 0x84);
+    /* Two units may share them. */
+    OK(serve(&units[1], &first, 2));
+    OK(mbm_server_switchOff(&units[1], &first.switches, 3));
+    assert_int_equal(answered(&units[0], 2), 0x83);
+    assert_int_equal(answered(&units[1], 2), 0x83);
+    OK(mbm_server_switchOn(&first.switches, 3));
+    OK(mbm_server_switchOn(&first.switches, 4));
+    all_are_answered(&units[0]);
+}
+
+/* A hook that sets its own table up anew while a request is carried out, which goes on
+ * with what the table was. */
+static mbm_registerTable *hooked;
+static uint16_t fewer[1];
+
+static uint8_t zero_before(void *context, uint16_t address, uint16_t quantity, const uint8_t *data)
+{
+    (void)context;
+    (void)address;
+    (void)quantity;
+    (void)data;
+    memset(hooked, 0, sizeof *hooked);
+    return 0;
+}
+
+static uint8_t shrink_before(void *context, uint16_t address, uint16_t quantity,
+                             const uint8_t *data)
+{
+    zero_before(context, address, quantity, data);
+    hooked->words = fewer;
+    hooked->size = 1;
+    OK(mbm_server_serveHoldingRegisters(&units[0], hooked));
+    return 0;
+}
+
+static void shrink_after(void *context, uint16_t address, uint16_t quantity)
+{
+    shrink_before(context, address, quantity, NULL);
+}
+
+static uint8_t become_bits(void *context, uint16_t address, uint16_t quantity, const uint8_t *data)
+{
+    static uint8_t bit[1];
+    mbm_bitTable *table = (mbm_bitTable *)(void *)hooked;
+
+    zero_before(context, address, quantity, data);
+    table->bits = bit;
+    table->size = 8;
+    OK(mbm_server_serveCoils(&units[0], table));
+    return 0;
+}
+
+/* Gives the exception that answers a write of four registers, or 0. */
+static unsigned written(void)
+{
+    static const char pdu[] = "\x10\0\0\0\4\x08\0\1\0\2\0\3\0\4";
+    uint8_t frame[MBM_MAX_FRAME];
+    uint16_t response;
+    size_t length;
+
+    frame[0] = 17;
+    memcpy(frame + 1, pdu, sizeof pdu - 1);
+    length = seal(frame, sizeof pdu);
+    OK(mbm_server_respond(MBM_FRAMING_RTU, units, 1, frame, (uint16_t)length, sizeof frame,
+                          &response));
+    return frame[1] & 0x80 ? frame[2] : 0;
+}
+
+static void a_request_goes_on_with_the_table_that_its_hook_sets_up_anew(void **state)
+{
+    mbm_registerTable *table = (mbm_registerTable *)malloc(sizeof *table);
+    int i;
+
+    (void)state;
+    memset(units, 0, sizeof units);
+    units[0].id = 17;
+    hooked = table;
+    for (i = 0; i < 3; i++) {
+        memset(table, 0, sizeof *table);
+        table->words = words;
+        table->size = 4;
+        table->before = i == 0 ? zero_before : i == 1 ? shrink_before : become_bits;
+        OK(mbm_server_serveHoldingRegisters(units, table));
+        words[3] = 0x7777;
+        assert_int_equal(written(), 0);
+        assert_int_equal(words[3], 4);
+        assert_int_equal(fewer[0], 0);
+        memset(units, 0, sizeof units);
+        units[0].id = 17;
+    }
+    /* Function 17 reads behind the hook that tells of what it wrote. */
+    memset(table, 0, sizeof *table);
+    table->words = words;
+    table->size = 4;
+    table->after = shrink_after;
+    OK(mbm_server_serveHoldingRegisters(units, table));
+    OK(mbm_server_serveMaskAndReadWrite(table));
+    assert_int_equal(answer(units, 17, "\x17\0\0\0\4\0\0\0\1\2\0\1", 12), 0x17);
+    free(table);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(a_record_that_is_served_again_leaves_the_others_served, reset),
+        cmocka_unit_test_setup(a_record_that_is_zeroed_and_served_again_leaves_the_others_served,
+                               reset),
+        cmocka_unit_test_setup(a_record_that_is_zeroed_serves_nothing_and_the_others_go_on, reset),
+        cmocka_unit_test_setup(all_records_may_be_zeroed_and_served_again, reset),
+        cmocka_unit_test_setup(one_record_serves_two_units, reset),
+        cmocka_unit_test_setup(functions_16_and_17_stay_when_another_unit_is_given_the_table,
+                               reset),
+        cmocka_unit_test_setup(a_table_that_is_served_as_one_kind_is_refused_as_another, reset),
+        cmocka_unit_test_setup(a_second_record_of_diagnostics_is_refused, reset),
+        cmocka_unit_test_setup(what_a_unit_has_no_place_for_is_refused, reset),
+        cmocka_unit_test_setup(switches_are_set_up_again_like_any_record, reset),
+        cmocka_unit_test_setup(a_request_goes_on_with_the_table_that_its_hook_sets_up_anew,
+                               reset),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
