@@ -727,6 +727,26 @@ typedef struct mbm_clientRequest {
 } mbm_clientRequest;
 
 /**
+ * A Modbus RTU master: one line, one request at a time.
+ *
+ * Storage is yours and must be zero before first use, which a static object
+ * is (`static mbm_master node;`). Settings and words want mbm_master_begin or
+ * mbm_master_setBuffers before them, requests want both. Not re-entrant: use
+ * one object from one thread and never from an interrupt; several objects are
+ * independent of each other.
+ */
+typedef struct mbm_master {
+    /**
+     * Not for you.
+     */
+    void *pointers[21];
+    /**
+     * Not for you.
+     */
+    uint32_t words[18];
+} mbm_master;
+
+/**
  * What the firmware supplies: a byte stream, a clock, and optional hooks.
  *
  * Copied by mbm_master_begin; only `context` must stay valid. Hooks that are
@@ -768,11 +788,12 @@ typedef struct mbm_port {
      */
     void (*postTransmission)(void *context);
     /**
-     * Optional: called again and again while a blocking call waits, never
-     * between preTransmission and postTransmission. It may take its time, and
-     * ask mbm_master_pollDelay how much of it there is.
+     * Optional: called again and again while a blocking call of `master` waits,
+     * never between preTransmission and postTransmission. It may sleep until a
+     * byte arrives, for at most the time that mbm_master_pollDelay(master)
+     * returns.
      */
-    void (*idle)(void *context);
+    void (*idle)(void *context, struct mbm_master *master);
 } mbm_port;
 
 /**
@@ -793,26 +814,6 @@ typedef struct mbm_link {
      */
     uint8_t (*connect)(void *context);
 } mbm_link;
-
-/**
- * A Modbus RTU master: one line, one request at a time.
- *
- * Storage is yours and must be zero before first use, which a static object
- * is (`static mbm_master node;`). Settings and words want mbm_master_begin or
- * mbm_master_setBuffers before them, requests want both. Not re-entrant: use
- * one object from one thread and never from an interrupt; several objects are
- * independent of each other.
- */
-typedef struct mbm_master {
-    /**
-     * Not for you.
-     */
-    void *pointers[21];
-    /**
-     * Not for you.
-     */
-    uint32_t words[18];
-} mbm_master;
 
 /**
  * How long the PDU of a function of your own is, function code included.

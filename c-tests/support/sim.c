@@ -160,11 +160,12 @@ static void post(void *context)
         s->post_before_last_bit++;
 }
 
-static void idle(void *context)
+static void idle(void *context, mbm_master *master)
 {
     sim *s = (sim *)context;
     uint64_t next = s->now + s->idle_step;
 
+    assert_ptr_equal(master, &s->master);
     note(s, 'I');
     s->idles++;
     if (s->driver_on)

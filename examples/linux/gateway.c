@@ -1,12 +1,16 @@
 /* A gateway: Modbus TCP comes in, RTU goes out to the devices of serial lines.
  *
- *     gateway PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...
+ *     gateway [-i SECONDS] PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...
  *     gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,32-40
  *
  * The unit id says which line a request is for; a device has so many milliseconds
  * to respond. Nothing waits: while one line waits for a device, the others and all
  * connections go on. A connection has one request under way; what it sends behind
  * that waits in its socket. Prints `ready PORT` once it listens.
+ *
+ * It has 16 places for connections, or as many as the system gives it descriptors for.
+ * Where a new client finds none, the connection that has been idle for longest is closed,
+ * if that is at least SECONDS (60). One whose device has not answered yet is not idle.
  *
  * Where there is no response to hand on, the gateway answers itself (V1.1b3, 7):
  * 0A for a unit of no line, a line that cannot be opened, is lost, or has as many
@@ -18,18 +22,23 @@
 #include "mbm_tty.h"
 
 #include <errno.h>
+#include <fcntl.h>
+#include <netdb.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 enum {
     CONNECTIONS = 16, /* no more than a client holds requests */
     LINES = 4,
     DATA = 252,
     REOPEN_MICROS = 1000000,
+    NAP_MICROS = 10000, /* where the system refuses to poll */
+    IDLE_SECONDS = 60,
     PATH_UNAVAILABLE = MBM_REPLY_EXCEPTION | 0x0A,
     NO_RESPONSE = MBM_REPLY_EXCEPTION | 0x0B
 };
@@ -37,6 +46,8 @@ enum {
 /* A serial line and the client that asks its devices. */
 typedef struct line {
     mbm_tty tty;
+    int failure; /* errno of the last attempt to open it */
+    int reserve; /* a descriptor that is kept for the line while it is not open; 0: none */
     mbm_tty_options options;
     mbm_client client;
     const char *path;
@@ -62,7 +73,6 @@ static unsigned line_count;
 static line *route[256];
 static connection connections[CONNECTIONS];
 static mbm_tcp tcps[CONNECTIONS];
-static uint8_t is_used[CONNECTIONS];
 static mbm_tcp_listener listener;
 static volatile sig_atomic_t is_over;
 static sigset_t awake; /* the signals that come while it works wait for its sleep */
@@ -83,12 +93,30 @@ static uint32_t micros(void)
 
 /* --- lines --- */
 
+/* Where descriptors are short, a connection that waits would take that of a line which
+ * is lost, and the line could not be opened again. */
+static void keep_reserve(line *l)
+{
+    int fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
+
+    l->reserve = fd > 0 ? fd : 0;
+}
+
+static void free_reserve(line *l)
+{
+    if (l->reserve)
+        close(l->reserve);
+    l->reserve = 0;
+}
+
 static void close_line(void *context)
 {
     line *l = (line *)context;
 
-    if (l->is_open)
+    if (l->is_open) {
         mbm_tty_close(&l->tty);
+        keep_reserve(l);
+    }
     l->is_open = 0;
 }
 
@@ -97,7 +125,11 @@ static uint8_t open_line(void *context)
     line *l = (line *)context;
 
     l->tried = micros();
+    free_reserve(l);
     l->is_open = mbm_tty_openWith(&l->tty, l->path, &l->options) == 0;
+    l->failure = errno;
+    if (!l->is_open)
+        keep_reserve(l);
     return l->is_open ? MBM_OK : MBM_LINK_LOST;
 }
 
@@ -160,9 +192,9 @@ static int add_line(char *text, uint16_t timeout)
         if (route[unit])
             return -1;
     line_count++;
-    port = mbm_tty_port(&l->tty, NULL);
+    port = mbm_tty_port(&l->tty);
     if (open_line(l) != MBM_OK)
-        perror(text);
+        fprintf(stderr, "%s: %s\n", text, strerror(l->failure));
     if (mbm_client_beginRtu(&l->client, &port, l->frame, sizeof l->frame) != MBM_OK ||
         mbm_client_setBaudRate(&l->client, baud) != MBM_OK ||
         mbm_client_setResponseTimeout(&l->client, timeout) != MBM_OK)
@@ -219,6 +251,14 @@ static uint16_t outcome(const connection *c, uint8_t *response, uint16_t capacit
     return NO_RESPONSE;
 }
 
+/* Its request goes to a line, or NULL: none is under way. The connection is not idle
+ * meanwhile, however long its device takes. */
+static void become_busy(connection *c, line *l)
+{
+    c->asked = l;
+    tcps[c - connections].isBusy = l != NULL;
+}
+
 /* Serves every function of every unit: asks the device, and is asked again until
  * that has answered. */
 static uint16_t forward(void *context, const mbm_request *request, uint8_t *response,
@@ -231,7 +271,7 @@ static uint16_t forward(void *context, const mbm_request *request, uint8_t *resp
     if (c->asked) {
         if (c->request.status == MBM_PENDING)
             return MBM_REPLY_PENDING;
-        c->asked = NULL;
+        become_busy(c, NULL);
         return outcome(c, response, capacity);
     }
     if (!l || !is_there(l))
@@ -243,7 +283,7 @@ static uint16_t forward(void *context, const mbm_request *request, uint8_t *resp
     c->request.reply = c->reply;
     c->request.replyBytes = sizeof c->reply;
     switch (mbm_client_custom(&l->client, &c->request, request->function, request->length, &rule)) {
-    case MBM_PENDING: c->asked = l; return MBM_REPLY_PENDING;
+    case MBM_PENDING: become_busy(c, l); return MBM_REPLY_PENDING;
     case MBM_QUEUE_FULL: return PATH_UNAVAILABLE;
     default: return MBM_REPLY_EXCEPTION | MBM_SLAVE_DEVICE_FAILURE;
     }
@@ -257,15 +297,14 @@ static void take_connections(void)
 
     while ((place = mbm_tcp_accept(&listener, tcps, CONNECTIONS)) >= 0) {
         connection *c = &connections[place];
-        mbm_port port = mbm_tcp_port(&tcps[place], NULL);
+        mbm_port port = mbm_tcp_port(&tcps[place]);
 
         memset(c, 0, sizeof *c);
         c->every.serve = forward;
         c->every.context = c;
-        is_used[place] = mbm_server_serveCustom(&c->unit, &c->every) == MBM_OK &&
-                         mbm_server_beginTcp(&c->server, &port, &c->unit, 1, c->frame,
-                                             sizeof c->frame) == MBM_OK;
-        if (!is_used[place])
+        if (mbm_server_serveCustom(&c->unit, &c->every) != MBM_OK ||
+            mbm_server_beginTcp(&c->server, &port, &c->unit, 1, c->frame, sizeof c->frame) !=
+                MBM_OK)
             mbm_tcp_close(&tcps[place]);
     }
 }
@@ -278,78 +317,133 @@ static void drop_connection(unsigned place)
     if (c->asked)
         mbm_client_cancel(&c->asked->client, &c->request);
     mbm_tcp_close(&tcps[place]);
-    is_used[place] = 0;
+}
+
+/* What to poll a connection for. */
+static short events_of(unsigned place)
+{
+    const connection *c = &connections[place];
+
+    /* Its next request may wait. */
+    if (c->asked)
+        return c->request.status == MBM_PENDING ? 0 : POLLOUT;
+    /* The socket was full. */
+    return tcps[place].awaits & POLLOUT ? POLLOUT : POLLIN;
 }
 
 /* --- all of it --- */
 
+/* What one sleep polls: only descriptors that there are, since the system refuses a list
+ * that is longer than the limit of descriptors. */
+static struct {
+    struct pollfd polls[1 + LINES + CONNECTIONS];
+    uint8_t owner[1 + LINES + CONNECTIONS]; /* a line, or LINES and on: a connection */
+    nfds_t count;
+} waits;
+
+static void wait_on(int fd, short events, unsigned owner)
+{
+    waits.owner[waits.count] = (uint8_t)owner;
+    waits.polls[waits.count++] = (struct pollfd){fd, events, 0};
+}
+
+static int sleep_for(uint32_t micros)
+{
+    const struct timespec time = {(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
+
+    return ppoll(waits.polls, waits.count, micros == UINT32_MAX ? NULL : &time, &awake);
+}
+
 /* Sleeps until there is something to do. */
 static void wait_for_work(void)
 {
-    struct pollfd waits[1 + LINES + CONNECTIONS];
     uint32_t delay = UINT32_MAX;
-    struct timespec time;
     unsigned i;
+    nfds_t n;
 
-    waits[0] = (struct pollfd){listener.fd, POLLIN, 0};
-    for (i = 0; i < LINES; i++) {
+    waits.count = 0;
+    for (i = 0; i < line_count; i++) {
         const mbm_client *client = &lines[i].client;
-        uint32_t own = i < line_count ? mbm_client_pollDelay(client) : UINT32_MAX;
-        int is_busy = i < line_count && lines[i].is_open && mbm_client_pending(client) != 0;
+        uint32_t own = mbm_client_pollDelay(client);
 
-        /* An idle client takes no bytes; that its line hangs up is always told. */
-        waits[1 + i] = (struct pollfd){lines[i].is_open ? lines[i].tty.fd : -1,
-                                       is_busy ? POLLIN : 0, 0};
+        /* An idle client takes no bytes; a line that hangs up ends the sleep all the same. */
+        if (lines[i].is_open)
+            wait_on(lines[i].tty.fd, mbm_client_pending(client) != 0 ? POLLIN : 0, i);
         delay = own < delay ? own : delay;
     }
-    for (i = 0; i < CONNECTIONS; i++) {
-        struct pollfd *one = &waits[1 + LINES + i];
-
-        *one = (struct pollfd){is_used[i] ? tcps[i].fd : -1, POLLIN, 0};
-        /* Its next request may wait. */
-        if (is_used[i] && connections[i].asked)
-            one->events = connections[i].request.status == MBM_PENDING ? 0 : POLLOUT;
-        /* The socket was full. */
-        else if (is_used[i] && (tcps[i].awaits & POLLOUT))
-            one->events = POLLOUT;
-    }
-    time = (struct timespec){(time_t)(delay / 1000000u), (long)(delay % 1000000u) * 1000};
-    if (ppoll(waits, 1 + LINES + CONNECTIONS, delay == UINT32_MAX ? NULL : &time,
-              &awake) <= 0)
-        return;
-    for (i = 0; i < line_count; i++)
-        if (!waits[1 + i].events && waits[1 + i].revents)
-            hang_up(&lines[i]);
     for (i = 0; i < CONNECTIONS; i++)
-        if (is_used[i] && connections[i].asked &&
-            (waits[1 + LINES + i].revents & (POLLERR | POLLHUP | POLLNVAL)))
-            drop_connection(i);
+        if (mbm_tcp_isInUse(&tcps[i]))
+            wait_on(tcps[i].fd, events_of(i), LINES + i);
+    if (listener.awaits)
+        wait_on(listener.fd, POLLIN, UINT8_MAX);
+    else if (delay > MBM_TCP_RETRY)
+        delay = MBM_TCP_RETRY;
+    if (sleep_for(delay) < 0 && errno != EINTR) {
+        /* The system refuses to poll: it has no memory, or its limit was lowered. */
+        waits.count = 0;
+        (void)sleep_for(NAP_MICROS);
+    }
+    for (n = 0; n < waits.count; n++) {
+        const struct pollfd *one = &waits.polls[n];
+        const unsigned owner = waits.owner[n];
+
+        if (owner < LINES && !one->events && one->revents)
+            hang_up(&lines[owner]);
+        else if (owner >= LINES && owner < LINES + CONNECTIONS &&
+                 connections[owner - LINES].asked &&
+                 (one->revents & (POLLERR | POLLHUP | POLLNVAL)))
+            drop_connection(owner - LINES);
+    }
+}
+
+static int usage(int wrong)
+{
+    fprintf(wrong ? stderr : stdout,
+            "usage: gateway [-i SECONDS] PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...\n"
+            "  -i SECONDS           that a connection is idle before it may be closed for a new\n"
+            "                       client, 60 if left out, 0 for never\n"
+            "  PORT                 where it listens, 0 for one that is free\n"
+            "  MILLISECONDS         that a device has to respond, up to 65535\n"
+            "  PATH,BAUD,...        up to 4 serial lines, the parity N, E or O, 1 or 2 stop bits,\n"
+            "                       and the units on it, 1 to 247, each on one line\n"
+            "for example: gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,32-40\n");
+    return wrong ? 2 : 0;
+}
+
+/* A number from `least` to `most`, or -1. */
+static long number(const char *text, long least, long most)
+{
+    char *behind;
+    long value = strtol(text, &behind, 10);
+
+    return behind != text && !*behind && value >= least && value <= most ? value : -1;
 }
 
 int main(int argc, char **argv)
 {
     struct sigaction action = {0};
+    long idle = IDLE_SECONDS, timeout;
     sigset_t ends;
-    char *behind = "";
-    unsigned long timeout = argc > 3 ? strtoul(argv[2], &behind, 10) : 0;
-    const int is_asked = argc == 2 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0);
-    int i;
+    int i, option;
 
-    for (i = 3; timeout > 0 && timeout <= UINT16_MAX && i < argc; i++)
+    if (argc == 2 && strcmp(argv[1], "--help") == 0)
+        return usage(0);
+    while ((option = getopt(argc, argv, "hi:")) != -1) {
+        if (option != 'i' || (idle = number(optarg, 0, 1000000)) < 0)
+            return usage(option != 'h');
+    }
+    argc -= optind;
+    argv += optind;
+    timeout = argc > 2 ? number(argv[1], 1, UINT16_MAX) : -1;
+    for (i = 2; timeout > 0 && i < argc; i++)
         if (add_line(argv[i], (uint16_t)timeout) != 0)
             break;
-    if (i < 4 || i < argc || *behind) {
-        fprintf(is_asked ? stdout : stderr,
-                "usage: gateway PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...\n"
-                "  PORT                 where it listens, 0 for one that is free\n"
-                "  MILLISECONDS         that a device has to respond, up to 65535\n"
-                "  PATH,BAUD,...        up to 4 serial lines, the parity N, E or O, 1 or 2 stop bits,\n"
-                "                       and the units on it, 1 to 247, each on one line\n"
-                "for example: gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,32-40\n");
-        return is_asked ? 0 : 2;
-    }
-    if (mbm_tcp_listen(&listener, NULL, argv[1]) != 0) {
-        perror(argv[1]);
+    if (i < 3 || i < argc)
+        return usage(1);
+    listener.idleTime = (uint32_t)idle * 1000u;
+    if (mbm_tcp_listen(&listener, NULL, argv[0]) != 0) {
+        fprintf(stderr, "%s: %s\n", argv[0],
+                listener.lookup ? gai_strerror(listener.lookup) : strerror(errno));
         return 1;
     }
     sigemptyset(&ends);
@@ -368,15 +462,18 @@ int main(int argc, char **argv)
         for (place = 0; place < line_count; place++)
             poll_line(&lines[place]);
         for (place = 0; place < CONNECTIONS; place++)
-            if (is_used[place] && mbm_server_poll(&connections[place].server) != MBM_OK)
+            if (mbm_tcp_isInUse(&tcps[place]) &&
+                mbm_server_poll(&connections[place].server) != MBM_OK)
                 drop_connection(place);
         wait_for_work();
     }
     for (i = 0; i < CONNECTIONS; i++)
-        if (is_used[i])
+        if (mbm_tcp_isInUse(&tcps[i]))
             drop_connection((unsigned)i);
-    for (i = 0; i < (int)line_count; i++)
+    for (i = 0; i < (int)line_count; i++) {
         close_line(&lines[i]);
+        free_reserve(&lines[i]);
+    }
     mbm_tcp_closeListener(&listener);
     return 0;
 }

@@ -47,7 +47,7 @@ static int open_tty(line *l, char *path, int ascii)
     strcpy(l->path, path);
     if (mbm_tty_openWith(&l->tty, path, &l->options) != 0)
         return -1;
-    port = mbm_tty_port(&l->tty, NULL);
+    port = mbm_tty_port(&l->tty);
     if (ascii)
         return mbm_client_beginAscii(&l->client, &port, l->incoming, sizeof l->incoming);
     mbm_client_beginRtu(&l->client, &port, l->incoming, sizeof l->incoming);
@@ -65,7 +65,7 @@ static int open_tcp(line *l, char *host, int rtu)
         return -1;
     l->is_tcp = 1;
     l->connected = line_milliseconds();
-    port = mbm_tcp_port(&l->tcp, NULL);
+    port = mbm_tcp_port(&l->tcp);
     if (rtu)
         return mbm_client_beginRtuOverTcp(&l->client, &port, l->incoming, sizeof l->incoming);
     return mbm_client_beginTcp(&l->client, &port, l->incoming, sizeof l->incoming, l->outgoing,

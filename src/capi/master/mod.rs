@@ -274,7 +274,7 @@ unsafe fn finish(pointer: *mut mbm_master, mut status: u8) -> u8 {
             if core.is_waiting() {
                 let port = core.port();
                 if let Some(idle) = port.idle {
-                    idle(port.context);
+                    idle(port.context, pointer);
                 }
             }
         }
