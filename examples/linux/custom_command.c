@@ -14,6 +14,7 @@
  * Licence: MIT OR Apache-2.0. */
 #include "mbm_tcp.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -124,7 +125,7 @@ static int begin(void)
                             sizeof outgoing) != MBM_OK)
         return -1;
     while (mbm_tcp_accept(&listener, server_end, 1) < 0)
-        if (mbm_tcp_wait(NULL, 0, &listener, -1, MBM_TCP_FOREVER) < 0)
+        if (errno != EAGAIN || mbm_tcp_wait(NULL, 0, &listener, -1, MBM_TCP_FOREVER) < 0)
             return -1;
     port = mbm_tcp_port(server_end);
     return mbm_server_beginTcp(&server, &port, &unit, 1, frame, sizeof frame) == MBM_OK ? 0 : -1;
