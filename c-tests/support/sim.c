@@ -165,8 +165,8 @@ static void idle(void *context, mbm_master *master)
     sim *s = (sim *)context;
     uint64_t next = s->now + s->idle_step;
 
-    assert_ptr_equal(master, &s->master);
     note(s, 'I');
+    s->waits = master;
     s->idles++;
     if (s->driver_on)
         s->idle_while_driving++;
