@@ -134,10 +134,10 @@ $(BUILD)/$(1)/%.o: examples/%.c $(HEADERS)
 	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(ARCHIVE)
 	@$(3) $(4) $$(filter %.o,$$^) $(ARCHIVE) $(LIBS) -o $$@
-$(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tty.o $(ARCHIVE)
+$(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(ARCHIVE)
 	@$(2) $(4) $$(filter %.o,$$^) $(ARCHIVE) -Wl,--gc-sections -o $$@
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)/linux/%
-$(BUILD)/$(1)/test_gateway_replies: | $(BUILD)/$(1)/linux/gateway
+$(BUILD)/$(1)/test_gateway_replies $(BUILD)/$(1)/test_gateway_shortage: | $(BUILD)/$(1)/linux/gateway
 endef
 $(eval $(call variant,plain,gcc,g++,))
 $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS)))
@@ -147,10 +147,11 @@ $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS)))
 FIRMWARE_TESTS := $(TESTS:%=$(BUILD)/firmware/%)
 $(FIRMWARE_TESTS): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(patsubst c-tests/%.c,$(BUILD)/plain/%.o,$(patsubst examples/%.c,$(BUILD)/plain/%.o,$(SUPPORT))) $(FIRMWARE_ARCHIVE)
 	@g++ $(filter %.o,$^) $(FIRMWARE_ARCHIVE) $(LIBS) -o $@
-$(TESTED_EXAMPLES:%=$(BUILD)/firmware/linux/%): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(BUILD)/plain/linux/mbm_tcp.o $(BUILD)/plain/linux/mbm_tty.o $(FIRMWARE_ARCHIVE)
+$(TESTED_EXAMPLES:%=$(BUILD)/firmware/linux/%): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(BUILD)/plain/linux/mbm_tcp.o $(BUILD)/plain/linux/mbm_tcp_listener.o $(BUILD)/plain/linux/mbm_tty.o $(FIRMWARE_ARCHIVE)
 	@mkdir -p $(@D)
 	@gcc $(filter %.o,$^) $(FIRMWARE_ARCHIVE) -Wl,--gc-sections -o $@
 $(TESTED_EXAMPLES:%=$(BUILD)/firmware/test_%): $(BUILD)/firmware/test_%: | $(BUILD)/firmware/linux/%
+$(BUILD)/firmware/test_gateway_replies $(BUILD)/firmware/test_gateway_shortage: | $(BUILD)/firmware/linux/gateway
 
 # What peers of another house ask.
 SERVE := $(BUILD)/plain/serve
@@ -169,7 +170,7 @@ BENCH_CLIENT := $(BUILD)/bench/bench_client
 $(BENCH_CLIENT): $(patsubst %,$(BUILD)/bench/%.o,bench_client support/pty support/server linux/mbm_tty linux/mbm_tcp) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
 BENCH_SERVER := $(BUILD)/bench/bench_server
-$(BENCH_SERVER): $(patsubst %,$(BUILD)/bench/%.o,bench_server linux/mbm_tcp linux/mbm_tty) $(ARCHIVE)
+$(BENCH_SERVER): $(patsubst %,$(BUILD)/bench/%.o,bench_server linux/mbm_tcp linux/mbm_tcp_listener linux/mbm_tty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -o $@
 
 .PHONY: bench

@@ -57,7 +57,7 @@ static void begin_clients(int fd)
         expected[i] = server_pattern(ADDRESS + i);
     if (mbm_tty_attach(&tty, fd) != 0)
         fail("tty");
-    port = mbm_tty_port(&tty, &node);
+    port = mbm_tty_port(&tty);
     /* libmodbus keeps no gap before a request, so mbm keeps none either. */
     if (mbm_master_begin(&node, UNIT, &port) != MBM_OK ||
         mbm_master_setBuffers(&node, response, QUANTITY, transmit, 1, frame, sizeof frame) !=

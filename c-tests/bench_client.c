@@ -404,7 +404,7 @@ static int begin_stream(void)
     /* Both clients use the same descriptor; the address only makes the object. */
     if (mbm_tcp_attach(&stream.tcp, stream.fd) != 0)
         fail("tcp");
-    port = mbm_tcp_port(&stream.tcp, NULL);
+    port = mbm_tcp_port(&stream.tcp);
     stream.peer = modbus_new_tcp("127.0.0.1", 502);
     begin(&stream, &port);
     return far;
@@ -417,7 +417,7 @@ static void begin_line(int fd)
     line.fd = fd;
     if (mbm_tty_attach(&line.tty, fd) != 0)
         fail("tty");
-    port = mbm_tty_port(&line.tty, NULL);
+    port = mbm_tty_port(&line.tty);
     line.peer = modbus_new_rtu("/dev/null", 115200, 'N', 8, 1);
     begin(&line, &port);
 }

@@ -160,7 +160,7 @@ static void begin(int is_rtu)
         /* A frame ends where nothing more is there: libmodbus keeps no silence. */
         if (mbm_tty_attach(&tty, ends[0]) != 0)
             fail("tty");
-        port = mbm_tty_port(&tty, NULL);
+        port = mbm_tty_port(&tty);
         if (mbm_server_begin(&server, &port, &unit, 1, buffer, sizeof buffer) ||
             mbm_server_setSilence(&server, 0))
             fail("mbm");
@@ -168,7 +168,7 @@ static void begin(int is_rtu)
     } else {
         if (mbm_tcp_attach(&tcp, ends[0]) != 0)
             fail("tcp");
-        port = mbm_tcp_port(&tcp, NULL);
+        port = mbm_tcp_port(&tcp);
         if (mbm_server_beginTcp(&server, &port, &unit, 1, buffer, sizeof buffer))
             fail("mbm");
         peer = modbus_new_tcp("127.0.0.1", 1502);
@@ -240,7 +240,7 @@ static void loop_of_mbm(mbm_tcp_listener *listener)
     for (;;) {
         poll(waits, CLIENTS + 1, -1);
         if (waits[CLIENTS].revents && (i = mbm_tcp_accept(listener, places, CLIENTS)) >= 0) {
-            mbm_port port = mbm_tcp_port(&places[i], NULL);
+            mbm_port port = mbm_tcp_port(&places[i]);
 
             if (mbm_server_beginTcp(&servers[i], &port, &unit, 1, buffers[i], MBM_MAX_TCP_FRAME))
                 fail("begin");

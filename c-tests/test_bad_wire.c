@@ -38,7 +38,7 @@ static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRAN
 
     fault_start(&device, f);
     node_begin(&n, device.line.ours, FAULT_UNIT);
-    port = mbm_tty_port(&n.tty, &n.master);
+    port = mbm_tty_port(&n.tty);
     port = fault_port(&device, &port);
     mbm_master_begin(&n.master, FAULT_UNIT, &port);
     mbm_master_setResponseTimeout(&n.master, 400);

@@ -251,7 +251,7 @@ static void a_facade_gets_no_line_that_carries_other_frames(void **state)
     pty_open(&line);
     memset(&a, 0, sizeof a);
     assert_int_equal(mbm_tty_attach(&a.tty, line.ours), 0);
-    a.port = mbm_tty_port(&a.tty, NULL);
+    a.port = mbm_tty_port(&a.tty);
     OK(mbm_master_setBuffers(&node, words, 2, words, 2, frame, sizeof frame));
     OK(mbm_master_begin(&node, UNIT, &a.port));
     OK(mbm_client_beginTcp(&tcp, &a.port, a.incoming, 260, a.outgoing, 260));

@@ -43,7 +43,7 @@ static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRAN
     fault_start(&device, f);
     memset(&a, 0, sizeof a);
     assert_int_equal(mbm_tty_attach(&a.tty, device.line.ours), 0);
-    a.port = mbm_tty_port(&a.tty, NULL);
+    a.port = mbm_tty_port(&a.tty);
     a.port = fault_port(&device, &a.port);
     OK(mbm_client_beginRtu(&a.client, &a.port, a.incoming, 256));
     OK(mbm_client_setBaudRate(&a.client, 115200));

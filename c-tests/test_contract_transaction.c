@@ -226,6 +226,22 @@ static void many_objects_share_a_stream(void **state)
     sim_reads(s, 500);
 }
 
+static void the_idle_hook_is_given_the_master_that_waits(void **state)
+{
+    static mbm_master other;
+    uint16_t words[4];
+    uint8_t frame[MBM_FRAME_BYTES(4)];
+    NODE;
+
+    OK(mbm_master_setBuffers(&other, words, 4, NULL, 0, frame, sizeof frame));
+    OK(mbm_master_begin(&other, 3, &s->port));
+    sim_reads(s, 500);
+    assert_ptr_equal(s->waits, n);
+    sim_answer(s, 1, 500, "03 04 02 00 07 +");
+    OK(mbm_master_readInputRegisters(&other, 0, 1));
+    assert_ptr_equal(s->waits, &other);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -247,6 +263,7 @@ int main(void)
         SIM_TEST(line_used_makes_the_gap_count_from_now),
         SIM_TEST(idle_is_not_called_while_bytes_wait),
         SIM_TEST(many_objects_share_a_stream),
+        SIM_TEST(the_idle_hook_is_given_the_master_that_waits),
     };
 
     return cmocka_run_group_tests_name("contract: one transaction", tests, NULL, NULL);

@@ -38,7 +38,7 @@ static int begin(void **state)
     peer = tcp_peer_new();
     snprintf(service, sizeof service, "%u", tcp_peer_start(peer, 0));
     memset(&tcp, 0, sizeof tcp);
-    port = mbm_tcp_port(&tcp, NULL);
+    port = mbm_tcp_port(&tcp);
     return 0;
 }
 
@@ -347,7 +347,7 @@ static void a_connection_without_a_place_is_ended_politely(void **state)
 
     /* One that is lost keeps its place, since an object still uses it. */
     close(clients[0]);
-    line = mbm_tcp_port(&places[0], NULL);
+    line = mbm_tcp_port(&places[0]);
     AWAIT(line.read(line.context, (uint8_t *)&byte, 1) == 1);
     AWAIT(line.read(line.context, (uint8_t *)&byte, 1) < 0);
     clients[0] = tcp_connect(listener.port);
@@ -395,7 +395,7 @@ static void *device(void *argument)
     mbm_tcp_listener *listener = (mbm_tcp_listener *)argument;
     static model memory;
     mbm_tcp place = {0};
-    mbm_port line = mbm_tcp_port(&place, NULL);
+    mbm_port line = mbm_tcp_port(&place);
     uint8_t frame[MBM_MAX_FRAME], reply[MBM_MAX_FRAME];
     size_t have = 0;
     int16_t count = 0;
@@ -434,7 +434,7 @@ static void a_master_reads_rtu_through_a_stream(void **state)
     assert_int_equal(pthread_create(&thread, NULL, device, &listener), 0);
     snprintf(service, sizeof service, "%u", listener.port);
     assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
-    port = mbm_tcp_port(&tcp, &node);
+    port = mbm_tcp_port(&tcp);
     OK(mbm_master_setBuffers(&node, response, 100, NULL, 0, frame, sizeof frame));
     OK(mbm_master_begin(&node, MODEL_FIRST_UNIT, &port));
     OK(mbm_master_setGap(&node, 0));

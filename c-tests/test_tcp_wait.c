@@ -23,7 +23,7 @@ static int begin(void **state)
     peer = tcp_peer_new();
     snprintf(service, sizeof service, "%u", tcp_peer_start(peer, 0));
     memset(&tcp, 0, sizeof tcp);
-    port = mbm_tcp_port(&tcp, NULL);
+    port = mbm_tcp_port(&tcp);
     return 0;
 }
 

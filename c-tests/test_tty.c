@@ -1,7 +1,6 @@
 /* The port over a terminal. A pty shows what the system does with it; what a
  * pty has not, a driver that knows RS-485, is played by the test's own ioctl. */
 #define _GNU_SOURCE
-#include "clock.h"
 #include "mbm_tty.h"
 #include "pty.h"
 #include "test.h"
@@ -9,8 +8,6 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/serial.h>
-#include <pthread.h>
-#include <signal.h>
 #include <string.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
@@ -323,61 +320,6 @@ static void an_rs485_delay_that_the_driver_cuts_short_is_refused(void **state)
     assert_int_equal(driver.state.flags, 0);
 }
 
-static void wait_ends_with_a_byte_with_the_time_or_with_the_line(void **state)
-{
-    mbm_tty tty;
-    double start;
-
-    (void)state;
-    assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
-    assert_int_equal(mbm_tty_wait(&tty, 0), 0);
-    start = seconds();
-    assert_int_equal(mbm_tty_wait(&tty, 30500), 0);
-    assert_true(seconds() - start >= 0.0305);
-    assert_int_equal(write(line.ours, "x", 1), 1);
-    assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), 1);
-    close(line.ours);
-    line.ours = -1;
-    assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), 1);
-    mbm_tty_close(&tty);
-}
-
-static void nothing(int signal_number)
-{
-    (void)signal_number;
-}
-
-static volatile int waited;
-
-/* A signal before the wait is lost on it: so one after the other. */
-static void *interrupt(void *thread)
-{
-    while (!waited) {
-        usleep(10000);
-        pthread_kill(*(pthread_t *)thread, SIGUSR1);
-    }
-    return NULL;
-}
-
-static void a_signal_ends_the_wait(void **state)
-{
-    struct sigaction action = {0};
-    pthread_t self = pthread_self(), other;
-    double start = seconds();
-    mbm_tty tty;
-
-    (void)state;
-    action.sa_handler = nothing;
-    sigaction(SIGUSR1, &action, NULL);
-    assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
-    assert_int_equal(pthread_create(&other, NULL, interrupt, &self), 0);
-    assert_int_equal(mbm_tty_wait(&tty, 60000000), 0);
-    waited = 1;
-    pthread_join(other, NULL);
-    assert_true(seconds() - start < 50);
-    mbm_tty_close(&tty);
-}
-
 static void a_lost_line_is_told_with_its_errno(void **state)
 {
     uint8_t byte;
@@ -386,8 +328,7 @@ static void a_lost_line_is_told_with_its_errno(void **state)
 
     (void)state;
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
-    port = mbm_tty_port(&tty, NULL);
-    assert_null(port.idle);
+    port = mbm_tty_port(&tty);
     assert_int_equal(port.read(port.context, &byte, 1), 0);
     assert_int_equal(port.write(port.context, (const uint8_t *)"ab", 2), 2);
     assert_int_equal(read(line.ours, &byte, 1), 1);
@@ -412,7 +353,7 @@ static void a_full_line_takes_no_more_and_is_not_lost(void **state)
 
     (void)state;
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
-    port = mbm_tty_port(&tty, NULL);
+    port = mbm_tty_port(&tty);
     while ((taken = port.write(port.context, much, sizeof much)) > 0)
         assert_true(++rounds < 1000);
     assert_int_equal(taken, 0);
@@ -430,8 +371,9 @@ static void a_socket_can_be_attached(void **state)
     (void)state;
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, pair), 0);
     assert_int_equal(mbm_tty_attach(&tty, pair[0]), 0);
-    port = mbm_tty_port(&tty, NULL);
-    assert_null(port.flush);
+    port = mbm_tty_port(&tty);
+    /* No transmitter is there to wait for. */
+    assert_int_equal(port.flush(port.context), 1);
     assert_int_equal(port.read(port.context, &byte, 1), 0);
     close(pair[1]);
     assert_int_equal(port.read(port.context, &byte, 1), -1);
@@ -454,8 +396,6 @@ int main(void)
         TEST(rs485_where_the_driver_knows_none_is_refused_and_nothing_is_changed),
         TEST(rs485_tells_the_driver_and_close_takes_it_back),
         TEST(an_rs485_delay_that_the_driver_cuts_short_is_refused),
-        TEST(wait_ends_with_a_byte_with_the_time_or_with_the_line),
-        TEST(a_signal_ends_the_wait),
         TEST(a_lost_line_is_told_with_its_errno),
         TEST(a_full_line_takes_no_more_and_is_not_lost),
         TEST(a_socket_can_be_attached),

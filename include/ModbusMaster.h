@@ -487,7 +487,7 @@ private:
         of(context).sent = true;
         call(of(context).onPost);
     }
-    static void idleHook(void *context)
+    static void idleHook(void *context, mbm_master *)
     {
         State &state = of(context);
         if (state.sent) {

@@ -685,6 +685,29 @@ typedef struct mbm_client {
 } mbm_client;
 
 /**
+ * A Modbus RTU master: one line, one request at a time.
+ *
+ * Storage is yours and must be zero before first use, which a static object
+ * is (`static mbm_master node;`). Settings and words want mbm_master_begin or
+ * mbm_master_setBuffers before them, requests want both. Use one object from one
+ * thread and never from an interrupt; several objects are independent of each
+ * other. Which functions the hooks of its port may call: see mbm_port.
+ *
+ * A call that is refused changes nothing, but for what the functions that make a
+ * request say of themselves, and mbm_master_send32.
+ */
+typedef struct mbm_master {
+    /**
+     * Not for you.
+     */
+    void *pointers[21];
+    /**
+     * Not for you.
+     */
+    uint32_t words[20];
+} mbm_master;
+
+/**
  * What the firmware supplies: a byte stream, a clock, and optional hooks.
  *
  * Copied by the begin functions; only `context` must stay valid. Hooks that are
@@ -729,11 +752,12 @@ typedef struct mbm_port {
      */
     void (*postTransmission)(void *context);
     /**
-     * Optional: called again and again while a blocking call waits, never
-     * between preTransmission and postTransmission. It may take its time, and
-     * ask mbm_master_pollDelay how much of it there is.
+     * Optional: called again and again while a blocking call of `master` waits,
+     * never between preTransmission and postTransmission. It may sleep until a
+     * byte arrives, for at most the time that mbm_master_pollDelay(master)
+     * returns.
      */
-    void (*idle)(void *context);
+    void (*idle)(void *context, struct mbm_master *master);
 } mbm_port;
 
 /**
@@ -754,29 +778,6 @@ typedef struct mbm_link {
      */
     uint8_t (*connect)(void *context);
 } mbm_link;
-
-/**
- * A Modbus RTU master: one line, one request at a time.
- *
- * Storage is yours and must be zero before first use, which a static object
- * is (`static mbm_master node;`). Settings and words want mbm_master_begin or
- * mbm_master_setBuffers before them, requests want both. Use one object from one
- * thread and never from an interrupt; several objects are independent of each
- * other. Which functions the hooks of its port may call: see mbm_port.
- *
- * A call that is refused changes nothing, but for what the functions that make a
- * request say of themselves, and mbm_master_send32.
- */
-typedef struct mbm_master {
-    /**
-     * Not for you.
-     */
-    void *pointers[21];
-    /**
-     * Not for you.
-     */
-    uint32_t words[20];
-} mbm_master;
 
 /**
  * A request to a device, and what comes of it. Yours, and zero before you set
@@ -2172,7 +2173,7 @@ uint8_t mbm_client_poll(struct mbm_client *client);
  *         while a TCP port does not take what is to be sent: to poll sooner, wait
  *         for that too, as mbm_tcp_wait does
  */
-uint32_t mbm_client_pollDelay(const struct mbm_client *client);
+uint32_t mbm_client_pollDelay(struct mbm_client *client);
 
 /**
  * How many requests wait or are under way.
@@ -2997,7 +2998,7 @@ uint8_t mbm_master_poll(struct mbm_master *master);
  * @return microseconds; 0 means poll now, and is returned within a hook of the port
  *         but `idle`; 0xFFFFFFFF that there is no request
  */
-uint32_t mbm_master_pollDelay(const struct mbm_master *master);
+uint32_t mbm_master_pollDelay(struct mbm_master *master);
 
 /**
  * Gives up the request under way, with the driver switched off; its status

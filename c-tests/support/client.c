@@ -11,7 +11,7 @@ static void begin_tty(asker *a, int fd)
 {
     memset(a, 0, sizeof *a);
     assert_int_equal(mbm_tty_attach(&a->tty, fd), 0);
-    a->port = mbm_tty_port(&a->tty, NULL);
+    a->port = mbm_tty_port(&a->tty);
 }
 
 static uint8_t connect_anew(void *context)
@@ -33,7 +33,7 @@ static void begin_tcp(asker *a, uint16_t port)
     memset(a, 0, sizeof *a);
     snprintf(a->service, sizeof a->service, "%u", port);
     assert_int_equal(mbm_tcp_open(&a->tcp, "127.0.0.1", a->service), 0);
-    a->port = mbm_tcp_port(&a->tcp, NULL);
+    a->port = mbm_tcp_port(&a->tcp);
     a->link.context = a;
     a->link.connect = connect_anew;
     a->link.disconnect = disconnect;

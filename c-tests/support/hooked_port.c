@@ -64,8 +64,9 @@ static void hooked_post(void *context)
     call(context, HOOK_POST);
 }
 
-static void hooked_idle(void *context)
+static void hooked_idle(void *context, mbm_master *master)
 {
+    (void)master;
     call(context, HOOK_IDLE);
 }
 

@@ -10,7 +10,7 @@ void node_begin(node *n, int fd, uint8_t slave)
 
     memset(n, 0, sizeof *n);
     assert_int_equal(mbm_tty_attach(&n->tty, fd), 0);
-    port = mbm_tty_port(&n->tty, &n->master);
+    port = mbm_tty_port(&n->tty);
     assert_int_equal(mbm_master_setBuffers(&n->master, n->response, MBM_MAX_READ_REGISTERS,
                                            n->transmit, MBM_MAX_WRITE_REGISTERS, n->frame,
                                            MBM_MAX_FRAME),

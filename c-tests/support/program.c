@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -20,6 +21,13 @@ static void must(int ok, const char *what)
 
 void program_start(program *p, const char *name, const char *const *arguments)
 {
+    program_start_limited(p, name, arguments, 0);
+}
+
+void program_start_limited(program *p, const char *name, const char *const *arguments,
+                           unsigned descriptors)
+{
+    const struct rlimit limit = {descriptors, descriptors};
     const char *argv[16] = {name};
     char path[4096];
     ssize_t length = readlink("/proc/self/exe", path, sizeof path - 64);
@@ -44,6 +52,8 @@ void program_start(program *p, const char *name, const char *const *arguments)
         dup2(out[1], STDOUT_FILENO);
         /* Lines and sockets of the test are to hang up when the test lets go. */
         close_range(3, ~0u, 0);
+        if (descriptors)
+            must(setrlimit(RLIMIT_NOFILE, &limit) == 0, "setrlimit");
         execv(path, (char *const *)(size_t)argv);
         perror(path);
         _exit(127);
@@ -74,6 +84,35 @@ size_t program_rest(const program *p, char *text, size_t room)
         length += (size_t)count;
     text[length] = 0;
     return length;
+}
+
+/* The state follows the name, which stands in brackets. */
+static int is_asleep(const program *p)
+{
+    char path[64], text[512], *name;
+    size_t length;
+    FILE *file;
+
+    snprintf(path, sizeof path, "/proc/%d/stat", (int)p->pid);
+    file = fopen(path, "r");
+    must(file != NULL, path);
+    length = fread(text, 1, sizeof text - 1, file);
+    fclose(file);
+    text[length] = 0;
+    name = strrchr(text, ')');
+    return name && name[1] == ' ' && name[2] == 'S';
+}
+
+int program_sleeps(const program *p)
+{
+    int looks;
+
+    for (looks = 0; looks < 50; looks++) {
+        if (!is_asleep(p))
+            return 0;
+        usleep(1000);
+    }
+    return 1;
 }
 
 int program_end(program *p)

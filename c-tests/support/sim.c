@@ -160,12 +160,13 @@ static void post(void *context)
         s->post_before_last_bit++;
 }
 
-static void idle(void *context)
+static void idle(void *context, mbm_master *master)
 {
     sim *s = (sim *)context;
     uint64_t next = s->now + s->idle_step;
 
     note(s, 'I');
+    s->waits = master;
     s->idles++;
     if (s->driver_on)
         s->idle_while_driving++;

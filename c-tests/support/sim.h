@@ -33,6 +33,7 @@ struct sim {
     uint64_t limit;       /* the test fails beyond: a hang */
     uint32_t clock_start; /* what the clock showed when `now` was 0 */
     uint32_t step;        /* each look at the clock takes so long */
+    mbm_master *waits;    /* the master that the idle hook was called for last */
     uint32_t idle_step;   /* an idle hook takes so long, less if a byte comes */
 
     /* the wire and its faults; 0 is none */

@@ -39,7 +39,7 @@ int main(int argc, char **argv)
         perror(argv[1]);
         return 1;
     }
-    port = mbm_tty_port(&tty, &node);
+    port = mbm_tty_port(&tty);
     mbm_master_setBuffers(&node, response, READ_WORDS, transmit, WRITE_WORDS, frame, sizeof frame);
     mbm_master_begin(&node, (uint8_t)strtoul(argv[3], NULL, 10), &port);
     mbm_master_setBaudRate(&node, baud);

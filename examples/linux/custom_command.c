@@ -14,6 +14,7 @@
  * Licence: MIT OR Apache-2.0. */
 #include "mbm_tcp.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -119,14 +120,14 @@ static int begin(void)
     snprintf(service, sizeof service, "%u", listener.port);
     if (mbm_tcp_open(client_end, "127.0.0.1", service) != 0)
         return -1;
-    port = mbm_tcp_port(client_end, NULL);
+    port = mbm_tcp_port(client_end);
     if (mbm_client_beginTcp(&client, &port, incoming, sizeof incoming, outgoing,
                             sizeof outgoing) != MBM_OK)
         return -1;
     while (mbm_tcp_accept(&listener, server_end, 1) < 0)
-        if (mbm_tcp_wait(NULL, 0, &listener, -1, MBM_TCP_FOREVER) < 0)
+        if (errno != EAGAIN || mbm_tcp_wait(NULL, 0, &listener, -1, MBM_TCP_FOREVER) < 0)
             return -1;
-    port = mbm_tcp_port(server_end, NULL);
+    port = mbm_tcp_port(server_end);
     return mbm_server_beginTcp(&server, &port, &unit, 1, frame, sizeof frame) == MBM_OK ? 0 : -1;
 }
 

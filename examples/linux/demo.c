@@ -109,7 +109,7 @@ static void begin(void)
 
     server_start(&device, UNIT);
     expect(mbm_tty_attach(&tty, device.line.ours) == 0, "a terminal");
-    over_tty = mbm_tty_port(&tty, &node);
+    over_tty = mbm_tty_port(&tty);
     port = recorder_port(&wire, &over_tty);
     expect(mbm_master_begin(&node, UNIT, &port) == MBM_OK, "begin");
     expect(mbm_master_setBuffers(&node, response, WORDS, transmit, WORDS, frame, sizeof frame) ==

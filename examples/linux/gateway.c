@@ -1,6 +1,6 @@
 /* A gateway: Modbus TCP comes in, RTU goes out to the devices of serial lines.
  *
- *     gateway [-q QUIET] PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...
+ *     gateway [-i SECONDS] [-q QUIET] PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...
  *     gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,32-40
  *
  * The unit id says which line a request is for; a device has so many milliseconds
@@ -8,15 +8,19 @@
  * connections go on. A connection has one request under way; what it sends behind
  * that waits in its socket. Prints `ready PORT` once it listens.
  *
+ * It has 16 places for connections, or as many as the system gives it descriptors for.
+ * Where a new client finds none, the connection that has been idle for longest is closed,
+ * if that is at least SECONDS (60). One whose device has not answered yet is not idle.
+ *
  * Where there is no response to hand on, the gateway answers itself (V1.1b3, 7):
  * 0A for a unit of no line, a line that cannot be opened, is lost, or has as many
  * requests as it holds; 0B for a device that does not respond, or whose reply is
  * damaged or does not answer the request; 02 and 03 for a request that the standard
  * does not allow. Functions that it does not know pass through as they are.
  *
- * A device may reply after its time is over. QUIET is how long a line is left alone
- * after a request without a right reply, so that such a reply comes before the next
- * request. Make it longer for devices that are later than that.
+ * A device may reply after its time is over. QUIET (100) is the quiet time that keeps
+ * such a reply from being taken for the answer to the next request, in milliseconds. Make
+ * it longer than a device takes for an answer.
  *
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
@@ -24,6 +28,8 @@
 #include "mbm_tty.h"
 
 #include <errno.h>
+#include <fcntl.h>
+#include <netdb.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
@@ -37,6 +43,8 @@ enum {
     LINES = 4,
     DATA = 252,
     REOPEN_MICROS = 1000000,
+    NAP_MICROS = 10000, /* where the system refuses to poll */
+    IDLE_SECONDS = 60,
     PATH_UNAVAILABLE = MBM_REPLY_EXCEPTION | 0x0A,
     NO_RESPONSE = MBM_REPLY_EXCEPTION | 0x0B
 };
@@ -44,6 +52,8 @@ enum {
 /* A serial line and the client that asks its devices. */
 typedef struct line {
     mbm_tty tty;
+    int failure; /* errno of the last attempt to open it */
+    int reserve; /* a descriptor that is kept for the line while it is not open; 0: none */
     mbm_tty_options options;
     mbm_client client;
     const char *path;
@@ -69,9 +79,8 @@ static unsigned line_count;
 static line *route[256];
 static connection connections[CONNECTIONS];
 static mbm_tcp tcps[CONNECTIONS];
-static uint8_t is_used[CONNECTIONS];
 static mbm_tcp_listener listener;
-static uint16_t quiet = 100; /* milliseconds; as the client has it at first */
+static long quiet = 100; /* milliseconds; as the client has it at first */
 static volatile sig_atomic_t is_over;
 static sigset_t awake; /* the signals that come while it works wait for its sleep */
 
@@ -91,12 +100,30 @@ static uint32_t micros(void)
 
 /* --- lines --- */
 
+/* Where descriptors are short, a connection that waits would take that of a line which
+ * is lost, and the line could not be opened again. */
+static void keep_reserve(line *l)
+{
+    int fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
+
+    l->reserve = fd > 0 ? fd : 0;
+}
+
+static void free_reserve(line *l)
+{
+    if (l->reserve)
+        close(l->reserve);
+    l->reserve = 0;
+}
+
 static void close_line(void *context)
 {
     line *l = (line *)context;
 
-    if (l->is_open)
+    if (l->is_open) {
         mbm_tty_close(&l->tty);
+        keep_reserve(l);
+    }
     l->is_open = 0;
 }
 
@@ -105,7 +132,11 @@ static uint8_t open_line(void *context)
     line *l = (line *)context;
 
     l->tried = micros();
+    free_reserve(l);
     l->is_open = mbm_tty_openWith(&l->tty, l->path, &l->options) == 0;
+    l->failure = errno;
+    if (!l->is_open)
+        keep_reserve(l);
     return l->is_open ? MBM_OK : MBM_LINK_LOST;
 }
 
@@ -168,13 +199,13 @@ static int add_line(char *text, uint16_t timeout)
         if (route[unit])
             return -1;
     line_count++;
-    port = mbm_tty_port(&l->tty, NULL);
+    port = mbm_tty_port(&l->tty);
     if (open_line(l) != MBM_OK)
-        perror(text);
+        fprintf(stderr, "%s: %s\n", text, strerror(l->failure));
     if (mbm_client_beginRtu(&l->client, &port, l->frame, sizeof l->frame) != MBM_OK ||
         mbm_client_setBaudRate(&l->client, baud) != MBM_OK ||
         mbm_client_setResponseTimeout(&l->client, timeout) != MBM_OK ||
-        mbm_client_setQuietTime(&l->client, quiet) != MBM_OK)
+        mbm_client_setQuietTime(&l->client, (uint16_t)quiet) != MBM_OK)
         return -1;
     for (unit = first; unit <= last; unit++)
         route[unit] = l;
@@ -206,6 +237,14 @@ static uint16_t outcome(const connection *c, uint8_t *response, uint16_t capacit
     return NO_RESPONSE;
 }
 
+/* Its request goes to a line, or NULL: none is under way. The connection is not idle
+ * meanwhile, however long its device takes. */
+static void become_busy(connection *c, line *l)
+{
+    c->asked = l;
+    tcps[c - connections].isBusy = l != NULL;
+}
+
 /* Serves every function of every unit: asks the device, and is asked again until
  * that has answered. */
 static uint16_t forward(void *context, const mbm_request *request, uint8_t *response,
@@ -218,7 +257,7 @@ static uint16_t forward(void *context, const mbm_request *request, uint8_t *resp
     if (c->asked) {
         if (c->request.status == MBM_PENDING)
             return MBM_REPLY_PENDING;
-        c->asked = NULL;
+        become_busy(c, NULL);
         if (c->request.status == MBM_OK && is_unanswered(request))
             return MBM_REPLY_NONE;
         return outcome(c, response, capacity);
@@ -234,7 +273,7 @@ static uint16_t forward(void *context, const mbm_request *request, uint8_t *resp
     status = mbm_client_forward(&l->client, &c->request, request->function, request->data,
                                 request->length);
     switch (status) {
-    case MBM_PENDING: c->asked = l; return MBM_REPLY_PENDING;
+    case MBM_PENDING: become_busy(c, l); return MBM_REPLY_PENDING;
     case MBM_QUEUE_FULL: return PATH_UNAVAILABLE;
     case MBM_ILLEGAL_FUNCTION:
     case MBM_ILLEGAL_DATA_ADDRESS:
@@ -251,15 +290,14 @@ static void take_connections(void)
 
     while ((place = mbm_tcp_accept(&listener, tcps, CONNECTIONS)) >= 0) {
         connection *c = &connections[place];
-        mbm_port port = mbm_tcp_port(&tcps[place], NULL);
+        mbm_port port = mbm_tcp_port(&tcps[place]);
 
         memset(c, 0, sizeof *c);
         c->every.serve = forward;
         c->every.context = c;
-        is_used[place] = mbm_server_serveCustom(&c->unit, &c->every) == MBM_OK &&
-                         mbm_server_beginTcp(&c->server, &port, &c->unit, 1, c->frame,
-                                             sizeof c->frame) == MBM_OK;
-        if (!is_used[place])
+        if (mbm_server_serveCustom(&c->unit, &c->every) != MBM_OK ||
+            mbm_server_beginTcp(&c->server, &port, &c->unit, 1, c->frame, sizeof c->frame) !=
+                MBM_OK)
             mbm_tcp_close(&tcps[place]);
     }
 }
@@ -272,113 +310,142 @@ static void drop_connection(unsigned place)
     if (c->asked)
         mbm_client_cancel(&c->asked->client, &c->request);
     mbm_tcp_close(&tcps[place]);
-    is_used[place] = 0;
+}
+
+/* What to poll a connection for. */
+static short events_of(unsigned place)
+{
+    const connection *c = &connections[place];
+
+    /* Its next request may wait. */
+    if (c->asked)
+        return c->request.status == MBM_PENDING ? 0 : POLLOUT;
+    /* The socket was full. */
+    return tcps[place].awaits & POLLOUT ? POLLOUT : POLLIN;
 }
 
 /* --- all of it --- */
 
+/* What one sleep polls: only descriptors that there are, since the system refuses a list
+ * that is longer than the limit of descriptors. */
+static struct {
+    struct pollfd polls[1 + LINES + CONNECTIONS];
+    uint8_t owner[1 + LINES + CONNECTIONS]; /* a line, or LINES and on: a connection */
+    nfds_t count;
+} waits;
+
+static void wait_on(int fd, short events, unsigned owner)
+{
+    waits.owner[waits.count] = (uint8_t)owner;
+    waits.polls[waits.count++] = (struct pollfd){fd, events, 0};
+}
+
+static int sleep_for(uint32_t micros)
+{
+    const struct timespec time = {(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
+
+    return ppoll(waits.polls, waits.count, micros == UINT32_MAX ? NULL : &time, &awake);
+}
+
 /* Sleeps until there is something to do. */
 static void wait_for_work(void)
 {
-    struct pollfd waits[1 + LINES + CONNECTIONS];
     uint32_t delay = UINT32_MAX;
-    struct timespec time;
     unsigned i;
+    nfds_t n;
 
-    waits[0] = (struct pollfd){listener.fd, POLLIN, 0};
-    for (i = 0; i < LINES; i++) {
-        const mbm_client *client = &lines[i].client;
-        uint32_t own = i < line_count ? mbm_client_pollDelay(client) : UINT32_MAX;
-        int is_busy = i < line_count && lines[i].is_open && mbm_client_pending(client) != 0;
+    waits.count = 0;
+    for (i = 0; i < line_count; i++) {
+        mbm_client *client = &lines[i].client;
+        uint32_t own = mbm_client_pollDelay(client);
 
-        /* An idle client takes no bytes; that its line hangs up is always told. */
-        waits[1 + i] = (struct pollfd){lines[i].is_open ? lines[i].tty.fd : -1,
-                                       is_busy ? POLLIN : 0, 0};
+        /* An idle client takes no bytes; a line that hangs up ends the sleep all the same. */
+        if (lines[i].is_open)
+            wait_on(lines[i].tty.fd, mbm_client_pending(client) != 0 ? POLLIN : 0, i);
         delay = own < delay ? own : delay;
     }
-    for (i = 0; i < CONNECTIONS; i++) {
-        struct pollfd *one = &waits[1 + LINES + i];
-
-        *one = (struct pollfd){is_used[i] ? tcps[i].fd : -1, POLLIN, 0};
-        /* Its next request may wait. */
-        if (is_used[i] && connections[i].asked)
-            one->events = connections[i].request.status == MBM_PENDING ? 0 : POLLOUT;
-        /* The socket was full. */
-        else if (is_used[i] && (tcps[i].awaits & POLLOUT))
-            one->events = POLLOUT;
-    }
-    time = (struct timespec){(time_t)(delay / 1000000u), (long)(delay % 1000000u) * 1000};
-    if (ppoll(waits, 1 + LINES + CONNECTIONS, delay == UINT32_MAX ? NULL : &time,
-              &awake) <= 0)
-        return;
-    for (i = 0; i < line_count; i++)
-        if (!waits[1 + i].events && waits[1 + i].revents)
-            hang_up(&lines[i]);
     for (i = 0; i < CONNECTIONS; i++)
-        if (is_used[i] && connections[i].asked &&
-            (waits[1 + LINES + i].revents & (POLLERR | POLLHUP | POLLNVAL)))
-            drop_connection(i);
-}
-
-/* Reads a number of milliseconds; 0 if it is none, or too large. */
-static int read_milliseconds(const char *text, uint16_t *milliseconds)
-{
-    char *end;
-    unsigned long number = strtoul(text, &end, 10);
-
-    if (*text < '0' || *text > '9' || *end || number > UINT16_MAX)
-        return 0;
-    *milliseconds = (uint16_t)number;
-    return 1;
-}
-
-/* Takes the options, which come first; how many arguments they are, or -1. */
-static int take_options(int argc, char **argv)
-{
-    int option;
-
-    while ((option = getopt(argc, argv, "+:q:")) >= 0) {
-        switch (option) {
-        case 'q':
-            if (!read_milliseconds(optarg, &quiet))
-                return -1;
-            break;
-        default: return -1;
-        }
+        if (mbm_tcp_isInUse(&tcps[i]))
+            wait_on(tcps[i].fd, events_of(i), LINES + i);
+    if (listener.awaits)
+        wait_on(listener.fd, POLLIN, UINT8_MAX);
+    else if (delay > MBM_TCP_RETRY)
+        delay = MBM_TCP_RETRY;
+    if (sleep_for(delay) < 0 && errno != EINTR) {
+        /* The system refuses to poll: it has no memory, or its limit was lowered. */
+        waits.count = 0;
+        (void)sleep_for(NAP_MICROS);
     }
-    return optind - 1;
+    for (n = 0; n < waits.count; n++) {
+        const struct pollfd *one = &waits.polls[n];
+        const unsigned owner = waits.owner[n];
+
+        if (owner < LINES && !one->events && one->revents)
+            hang_up(&lines[owner]);
+        else if (owner >= LINES && owner < LINES + CONNECTIONS &&
+                 connections[owner - LINES].asked &&
+                 (one->revents & (POLLERR | POLLHUP | POLLNVAL)))
+            drop_connection(owner - LINES);
+    }
+}
+
+static int usage(int wrong)
+{
+    fprintf(wrong ? stderr : stdout,
+            "usage: gateway [-i SECONDS] [-q QUIET] PORT MILLISECONDS\n"
+            "               PATH,BAUD,PARITY+STOP,FIRST-LAST...\n"
+            "  -i SECONDS           that a connection is idle before it may be closed for a new\n"
+            "                       client, 60 if left out, 0 for never\n"
+            "  -q QUIET             milliseconds that a line is left alone after a request without\n"
+            "                       a right reply, 0 to 65535, 100 if left out\n"
+            "  PORT                 where it listens, 0 for one that is free\n"
+            "  MILLISECONDS         that a device has to respond, up to 65535\n"
+            "  PATH,BAUD,...        up to 4 serial lines, the parity N, E or O, 1 or 2 stop bits,\n"
+            "                       and the units on it, 1 to 247, each on one line\n"
+            "for example: gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,32-40\n");
+    return wrong ? 2 : 0;
+}
+
+/* A number from `least` to `most`, or -1. */
+static long number(const char *text, long least, long most)
+{
+    char *behind;
+    long value = strtol(text, &behind, 10);
+
+    return behind != text && !*behind && value >= least && value <= most ? value : -1;
 }
 
 int main(int argc, char **argv)
 {
     struct sigaction action = {0};
+    long idle = IDLE_SECONDS, timeout;
     sigset_t ends;
-    const int is_asked = argc == 2 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0);
-    const int options = take_options(argc, argv);
-    uint16_t timeout = 0;
-    int i = 3;
+    int i, option;
 
-    if (options > 0) {
-        argv += options;
-        argc -= options;
+    if (argc == 2 && strcmp(argv[1], "--help") == 0)
+        return usage(0);
+    while ((option = getopt(argc, argv, "hi:q:")) != -1) {
+        if (option == 'i')
+            idle = number(optarg, 0, 1000000);
+        else if (option == 'q')
+            quiet = number(optarg, 0, UINT16_MAX);
+        else
+            return usage(option != 'h');
+        if (idle < 0 || quiet < 0)
+            return usage(1);
     }
-    if (options >= 0 && argc > 3 && read_milliseconds(argv[2], &timeout) && timeout > 0)
-        while (i < argc && add_line(argv[i], timeout) == 0)
-            i++;
-    if (i < 4 || i < argc) {
-        fprintf(is_asked ? stdout : stderr,
-                "usage: gateway [-q QUIET] PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...\n"
-                "  -q QUIET             milliseconds that a line is left alone after a request\n"
-                "                       without a right reply, 0 to 65535; 100 if not given\n"
-                "  PORT                 where it listens, 0 for one that is free\n"
-                "  MILLISECONDS         that a device has to respond, up to 65535\n"
-                "  PATH,BAUD,...        up to 4 serial lines, the parity N, E or O, 1 or 2 stop bits,\n"
-                "                       and the units on it, 1 to 247, each on one line\n"
-                "for example: gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,32-40\n");
-        return is_asked ? 0 : 2;
-    }
-    if (mbm_tcp_listen(&listener, NULL, argv[1]) != 0) {
-        perror(argv[1]);
+    argc -= optind;
+    argv += optind;
+    timeout = argc > 2 ? number(argv[1], 1, UINT16_MAX) : -1;
+    for (i = 2; timeout > 0 && i < argc; i++)
+        if (add_line(argv[i], (uint16_t)timeout) != 0)
+            break;
+    if (i < 3 || i < argc)
+        return usage(1);
+    listener.idleTime = (uint32_t)idle * 1000u;
+    if (mbm_tcp_listen(&listener, NULL, argv[0]) != 0) {
+        fprintf(stderr, "%s: %s\n", argv[0],
+                listener.lookup ? gai_strerror(listener.lookup) : strerror(errno));
         return 1;
     }
     sigemptyset(&ends);
@@ -397,15 +464,18 @@ int main(int argc, char **argv)
         for (place = 0; place < line_count; place++)
             poll_line(&lines[place]);
         for (place = 0; place < CONNECTIONS; place++)
-            if (is_used[place] && mbm_server_poll(&connections[place].server) != MBM_OK)
+            if (mbm_tcp_isInUse(&tcps[place]) &&
+                mbm_server_poll(&connections[place].server) != MBM_OK)
                 drop_connection(place);
         wait_for_work();
     }
     for (i = 0; i < CONNECTIONS; i++)
-        if (is_used[i])
+        if (mbm_tcp_isInUse(&tcps[i]))
             drop_connection((unsigned)i);
-    for (i = 0; i < (int)line_count; i++)
+    for (i = 0; i < (int)line_count; i++) {
         close_line(&lines[i]);
+        free_reserve(&lines[i]);
+    }
     mbm_tcp_closeListener(&listener);
     return 0;
 }

@@ -2,6 +2,7 @@
 #include "line.h"
 
 #include <errno.h>
+#include <netdb.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -47,7 +48,7 @@ static int open_tty(line *l, char *path, int ascii)
     strcpy(l->path, path);
     if (mbm_tty_openWith(&l->tty, path, &l->options) != 0)
         return -1;
-    port = mbm_tty_port(&l->tty, NULL);
+    port = mbm_tty_port(&l->tty);
     if (ascii)
         return mbm_client_beginAscii(&l->client, &port, l->incoming, sizeof l->incoming);
     mbm_client_beginRtu(&l->client, &port, l->incoming, sizeof l->incoming);
@@ -65,7 +66,7 @@ static int open_tcp(line *l, char *host, int rtu)
         return -1;
     l->is_tcp = 1;
     l->connected = line_milliseconds();
-    port = mbm_tcp_port(&l->tcp, NULL);
+    port = mbm_tcp_port(&l->tcp);
     if (rtu)
         return mbm_client_beginRtuOverTcp(&l->client, &port, l->incoming, sizeof l->incoming);
     return mbm_client_beginTcp(&l->client, &port, l->incoming, sizeof l->incoming, l->outgoing,
@@ -90,7 +91,11 @@ int line_open(line *l, const char *place)
             failed = open_tcp(l, rest, copy[0] == 'r');
     }
     if (failed) {
-        fprintf(stderr, "%s: %s\n%s", place, strerror(errno), errno == EINVAL ? LINE_HELP : "");
+        const int error = errno;
+
+        fprintf(stderr, "%s: %s\n%s", place,
+                l->tcp.lookup ? gai_strerror(l->tcp.lookup) : strerror(error),
+                error == EINVAL ? LINE_HELP : "");
         return -1;
     }
     mbm_client_setCounters(&l->client, &l->counters);
@@ -117,7 +122,10 @@ static uint8_t open_tty_again(void *context)
 {
     line *l = (line *)context;
 
-    return mbm_tty_openWith(&l->tty, l->path, &l->options) == 0 ? MBM_OK : MBM_LINK_LOST;
+    if (mbm_tty_openWith(&l->tty, l->path, &l->options) == 0)
+        return MBM_OK;
+    l->lost_by = errno;
+    return MBM_LINK_LOST;
 }
 
 /* An idle client takes no bytes, so it does not see that a server hangs up. */
@@ -133,12 +141,22 @@ static int is_lost(line *l)
     return !is_connected || l->tty.fd < 0;
 }
 
+/* Opening the link again forgets why it was lost. */
+static void keep_reason(line *l)
+{
+    const int error = l->is_tcp ? l->tcp.error : l->tty.error;
+
+    if (error != 0)
+        l->lost_by = error;
+}
+
 void line_poll(line *l)
 {
     const mbm_link socket = {&l->tcp, mbm_tcp_disconnect, mbm_tcp_connect};
     const mbm_link terminal = {l, close_tty, open_tty_again};
 
     (void)mbm_client_poll(&l->client);
+    keep_reason(l);
     if (line_milliseconds() - l->connected >= 1000 && is_lost(l)) {
         l->connected = line_milliseconds();
         (void)mbm_client_reconnect(&l->client, l->is_tcp ? &socket : &terminal);
@@ -151,6 +169,7 @@ int line_connect(line *l)
 
     while (l->is_tcp && !line_ended && (there = mbm_tcp_isConnected(&l->tcp)) == 0)
         (void)mbm_tcp_wait(&l->tcp, 1, NULL, -1, 1000000);
+    keep_reason(l);
     if (there < 0)
         fprintf(stderr, "%s\n", line_reason(l));
     return there < 0 ? -1 : 0;
@@ -158,7 +177,17 @@ int line_connect(line *l)
 
 const char *line_reason(const line *l)
 {
-    return strerror(l->is_tcp ? l->tcp.error : l->tty.error);
+    return strerror(l->lost_by);
+}
+
+const char *line_status(line *l, const mbm_clientRequest *request)
+{
+    const char *text = mbm_statusText(request->status);
+
+    if (request->status != MBM_LINK_LOST || l->lost_by == 0)
+        return text;
+    snprintf(l->status, sizeof l->status, "%s: %s", text, line_reason(l));
+    return l->status;
 }
 
 void line_rest(line *l, uint32_t milliseconds)
@@ -239,4 +268,12 @@ long line_number(const char *text, long least, long most)
         exit(2);
     }
     return number;
+}
+
+int line_addresses(long address, long quantity)
+{
+    if (address + quantity <= 65536)
+        return 1;
+    fprintf(stderr, "%ld from address %ld on: addresses end at 65535\n", quantity, address);
+    return 0;
 }

@@ -33,6 +33,8 @@ typedef struct line {
     mbm_tty_options options;
     char path[256];
     uint8_t is_tcp;
+    int lost_by;        /* errno of what lost the link last */
+    char status[128];   /* of line_status */
     uint32_t connected; /* when it was last tried, in milliseconds */
     uint8_t incoming[1024], outgoing[1024];
 } line;
@@ -48,8 +50,11 @@ void line_poll(line *l);
 /* Waits until a connection is there; 0, or -1 with the reason on stderr. */
 int line_connect(line *l);
 
-/* Why the link is lost. */
+/* Why the link was lost last. */
 const char *line_reason(const line *l);
+
+/* The status of a request that has ended, in words; with the reason where the link is lost. */
+const char *line_status(line *l, const mbm_clientRequest *request);
 
 /* Sleeps until the client has something to do, for `milliseconds` or a second at most. */
 void line_rest(line *l, uint32_t milliseconds);
@@ -79,5 +84,8 @@ uint16_t line_value(const mbm_clientRequest *request, long function, unsigned in
 
 /* A number of the command line from `least` to `most`; else ends the program. */
 long line_number(const char *text, long least, long most);
+
+/* Whether `quantity` registers or bits from `address` on end at 65535; else says so to stderr. */
+int line_addresses(long address, long quantity);
 
 #endif

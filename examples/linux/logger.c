@@ -55,7 +55,7 @@ static void write_sample(const struct timespec *when)
     gmtime_r(&when->tv_sec, &utc);
     strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &utc);
     fprintf(csv, "%s.%03ldZ,%ld,%s", text, when->tv_nsec / 1000000, unit,
-            mbm_statusText(request.status));
+            line_status(&at, &request));
     for (i = 0; i < quantity; i++) {
         fputc(',', csv);
         if (request.status == MBM_OK)
@@ -130,6 +130,8 @@ int main(int argc, char **argv)
         return line_usage(1, USAGE);
     address = (uint16_t)line_number(argv[optind + 1], 0, 65535);
     quantity = (uint16_t)line_number(argv[optind + 2], 1, MOST);
+    if (!line_addresses(address, quantity))
+        return line_usage(1, USAGE);
     if (line_open(&at, argv[optind]) != 0)
         return 1;
     csv = path ? fopen(path, "w") : stdout;

@@ -19,6 +19,9 @@ enum { FREE, CONNECTING, CONNECTED, LOST };
  * peer that is gone while nothing is sent. While something is, milliseconds. */
 enum { QUIET_S = 15, PROBE_S = 5, PROBES = 3, UNANSWERED_MS = 30000 };
 
+/* Microseconds of sleep where the system refuses to poll. */
+enum { BLIND_NAP = 10000 };
+
 /* Kept out of the way of what is done for every request. */
 #define SELDOM __attribute__((cold, noinline))
 
@@ -52,6 +55,20 @@ static void lose(mbm_tcp *tcp, int error)
     tcp->fd = -1;
     tcp->error = error;
     enter(tcp, LOST);
+}
+
+/* The cheapest clock that there is: it is read with every request. */
+static int64_t milliseconds(void)
+{
+#ifdef CLOCK_MONOTONIC_COARSE
+    const clockid_t id = CLOCK_MONOTONIC_COARSE;
+#else
+    const clockid_t id = CLOCK_MONOTONIC;
+#endif
+    struct timespec now;
+
+    clock_gettime(id, &now);
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
 }
 
 static void set(int fd, int level, int option, int value)
@@ -112,15 +129,17 @@ static int try_next(mbm_tcp *tcp, int error)
     return -1;
 }
 
-static int look_up(const char *host, const char *service, int flags, struct addrinfo **found)
+int mbm_tcp_lookUp(const char *host, const char *service, int flags, struct addrinfo **found,
+                   int *why)
 {
     struct addrinfo hints = {0};
 
     hints.ai_socktype = SOCK_STREAM;
     hints.ai_flags = flags;
-    switch (getaddrinfo(host, service, &hints, found)) {
+    *why = getaddrinfo(host, service, &hints, found);
+    switch (*why) {
     case 0: return 0;
-    case EAI_SYSTEM: return -1;
+    case EAI_SYSTEM: *why = 0; return -1;
     case EAI_AGAIN: return refuse(EAGAIN);
     case EAI_MEMORY: return refuse(ENOMEM);
     default: return refuse(EADDRNOTAVAIL);
@@ -133,7 +152,7 @@ int mbm_tcp_open(mbm_tcp *tcp, const char *host, const char *service)
 
     if (tcp->state != FREE)
         return refuse(EBUSY);
-    if (look_up(host, service, 0, &found) < 0)
+    if (mbm_tcp_lookUp(host, service, 0, &found, &tcp->lookup) < 0)
         return -1;
     memset(tcp, 0, sizeof *tcp);
     for (one = found; one && tcp->count < MBM_TCP_ADDRESSES; one = one->ai_next) {
@@ -158,8 +177,19 @@ int mbm_tcp_attach(mbm_tcp *tcp, int fd)
         return -1;
     memset(tcp, 0, sizeof *tcp);
     tcp->fd = fd;
+    tcp->lastMoved = milliseconds();
     enter(tcp, CONNECTED);
     return 0;
+}
+
+int mbm_tcp_isInUse(const mbm_tcp *tcp)
+{
+    return tcp->state != FREE;
+}
+
+int64_t mbm_tcp_idleFor(const mbm_tcp *tcp)
+{
+    return tcp->state == CONNECTED ? milliseconds() - tcp->lastMoved : -1;
 }
 
 void mbm_tcp_close(mbm_tcp *tcp)
@@ -263,7 +293,10 @@ static int16_t tcp_read(void *context, uint8_t *bytes, uint16_t capacity)
     /* Who reads is not stuck with what is to be sent. */
     tcp->awaits = POLLIN;
     count = recv(tcp->fd, bytes, capacity, 0);
-    return count > 0 ? (int16_t)count : nothing(tcp, count);
+    if (count <= 0)
+        return nothing(tcp, count);
+    tcp->lastMoved = milliseconds();
+    return (int16_t)count;
 }
 
 SELDOM static int16_t write_slowly(mbm_tcp *tcp, const uint8_t *bytes, uint16_t length)
@@ -292,7 +325,10 @@ static int16_t tcp_write(void *context, const uint8_t *bytes, uint16_t length)
         return write_slowly(tcp, bytes, length);
     count = send(tcp->fd, bytes, length, MSG_NOSIGNAL);
     tcp->awaits = count == length ? POLLIN : (uint8_t)(tcp->awaits | POLLOUT);
-    return count > 0 ? (int16_t)count : nothing(tcp, count);
+    if (count <= 0)
+        return nothing(tcp, count);
+    tcp->lastMoved = milliseconds();
+    return (int16_t)count;
 }
 
 static uint32_t tcp_micros(void *context)
@@ -304,148 +340,59 @@ static uint32_t tcp_micros(void *context)
     return (uint32_t)now.tv_sec * 1000000u + (uint32_t)now.tv_nsec / 1000u;
 }
 
-static void tcp_idle(void *context)
+static void tcp_idle(void *context, mbm_master *master)
 {
-    mbm_tcp *tcp = (mbm_tcp *)context;
-
-    mbm_tcp_wait(tcp, 1, NULL, -1, mbm_master_pollDelay(tcp->master));
+    mbm_tcp_wait((mbm_tcp *)context, 1, NULL, -1, mbm_master_pollDelay(master));
 }
 
-mbm_port mbm_tcp_port(mbm_tcp *tcp, const mbm_master *master)
+mbm_port mbm_tcp_port(mbm_tcp *tcp)
 {
     mbm_port port = {0};
 
-    tcp->master = master;
     port.context = tcp;
     port.read = tcp_read;
     port.write = tcp_write;
     port.micros = tcp_micros;
-    port.idle = master ? tcp_idle : NULL;
+    port.idle = tcp_idle;
     return port;
 }
 
-static uint16_t port_of(int fd)
+/* The system refuses to poll: it has no memory, or the limit of descriptors was lowered
+ * below those in use. Whoever waits looks for itself, and does not spin. */
+SELDOM static int nap(uint32_t micros)
 {
-    struct sockaddr_storage address;
-    socklen_t size = sizeof address;
+    const struct timespec time = {0, (micros < BLIND_NAP ? (long)micros : BLIND_NAP) * 1000};
 
-    memset(&address, 0, sizeof address);
-    if (getsockname(fd, (struct sockaddr *)&address, &size) < 0)
-        return 0;
-    if (address.ss_family == AF_INET6)
-        return ntohs(((struct sockaddr_in6 *)&address)->sin6_port);
-    return ntohs(((struct sockaddr_in *)&address)->sin_port);
-}
-
-static int listen_at(const struct addrinfo *address)
-{
-    int fd = socket(address->ai_family, SOCK_STREAM, 0), error;
-
-    if (fd < 0)
-        return -1;
-    /* A server that restarts is not kept from its port by what it left. */
-    set(fd, SOL_SOCKET, SO_REUSEADDR, 1);
-    if (fcntl(fd, F_SETFL, O_NONBLOCK) == 0 && fcntl(fd, F_SETFD, FD_CLOEXEC) == 0 &&
-        bind(fd, address->ai_addr, address->ai_addrlen) == 0 && listen(fd, SOMAXCONN) == 0)
-        return fd;
-    error = errno;
-    close(fd);
-    return refuse(error);
-}
-
-int mbm_tcp_listen(mbm_tcp_listener *listener, const char *host, const char *service)
-{
-    struct addrinfo *found, *one;
-    int fd = -1, error;
-
-    if (listener->port != 0)
-        return refuse(EBUSY);
-    if (look_up(host, service, AI_PASSIVE, &found) < 0)
-        return -1;
-    errno = EADDRNOTAVAIL;
-    for (one = found; one && fd < 0; one = one->ai_next)
-        fd = listen_at(one);
-    error = errno;
-    freeaddrinfo(found);
-    if (fd < 0)
-        return refuse(error);
-    listener->fd = fd;
-    listener->port = port_of(fd);
-    listener->refused = 0;
-    return 0;
-}
-
-/* The end of the stream and no reset, also if a request came with the client. */
-static void turn_away(int fd)
-{
-    uint8_t unread[512];
-    int rounds = 0;
-
-    shutdown(fd, SHUT_WR);
-    while (rounds++ < 8 && recv(fd, unread, sizeof unread, MSG_DONTWAIT) > 0)
-        ;
-    close(fd);
-}
-
-int mbm_tcp_accept(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
-{
-    size_t place = 0;
-    int fd;
-
-    if (listener->port == 0)
-        return refuse(EBADF);
-    while (place < count && tcps[place].state != FREE)
-        place++;
-    for (;;) {
-        fd = accept(listener->fd, NULL, NULL);
-        if (fd < 0 && (errno == EINTR || errno == ECONNABORTED))
-            continue;
-        if (fd < 0)
-            return errno == EWOULDBLOCK ? refuse(EAGAIN) : -1;
-        if (place < count)
-            break;
-        listener->refused++;
-        turn_away(fd);
-    }
-    if (mbm_tcp_attach(&tcps[place], fd) < 0) {
-        int error = errno;
-
-        close(fd);
-        return refuse(error);
-    }
-    return (int)place;
-}
-
-void mbm_tcp_closeListener(mbm_tcp_listener *listener)
-{
-    if (listener->port != 0)
-        close(listener->fd);
-    listener->fd = -1;
-    listener->port = 0;
+    nanosleep(&time, NULL);
+    return 1;
 }
 
 int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, int fd,
                  uint32_t micros)
 {
-    struct timespec time = {(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
+    const int is_listening = listener && listener->port != 0;
     struct pollfd waits[MBM_TCP_WAITS];
+    struct timespec time;
     nfds_t used = 0;
     size_t i;
     int ready;
 
     if (count > MBM_TCP_WAITS - 2)
         return refuse(EINVAL);
+    if (is_listening && listener->awaits == 0 && micros > MBM_TCP_RETRY)
+        micros = MBM_TCP_RETRY;
     /* Of who awaits nothing a hang-up would end the wait too. */
     for (i = 0; i < count; i++)
         if (tcps[i].awaits != 0)
             waits[used++] = (struct pollfd){tcps[i].fd, tcps[i].awaits, 0};
-    if (listener && listener->port != 0)
+    if (is_listening && listener->awaits != 0)
         waits[used++] = (struct pollfd){listener->fd, POLLIN, 0};
     if (fd >= 0)
         waits[used++] = (struct pollfd){fd, POLLIN, 0};
+    time = (struct timespec){(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
     ready = ppoll(waits, used, micros == MBM_TCP_FOREVER ? NULL : &time, NULL);
     if (ready < 0)
-        return errno == EINTR ? 0 : -1;
+        return errno == EINTR ? 0 : nap(micros);
     used = 0;
     for (i = 0; i < count; i++) {
         const short told = tcps[i].awaits != 0 ? waits[used++].revents : 0;

@@ -2,6 +2,8 @@
  * @file mbm_tcp.h
  * @brief An mbm_port over a TCP socket, for clients and for servers.
  *
+ * mbm_tcp.c is the port; a server compiles mbm_tcp_listener.c too.
+ *
  * Nothing waits but mbm_tcp_wait, and the lookup of a name that is no numeric
  * address. Functions that return int return -1 with errno set when they fail.
  * None is re-entrant on one mbm_tcp; any number may be used side by side.
@@ -35,24 +37,36 @@ extern "C" {
 /** Most sockets that one mbm_tcp_wait looks at. */
 #define MBM_TCP_WAITS 256
 
+/** Microseconds after which to call mbm_tcp_accept again where it found no descriptor. */
+#define MBM_TCP_RETRY 100000u
+
 /** A socket in use as a port; zero before first use. */
 typedef struct mbm_tcp {
-    int fd;                   /**< the socket, while it is there */
-    int error;                /**< errno of what lost the link, EPIPE if the peer closed it; else 0 */
-    const mbm_master *master; /**< who uses it; says how long to sleep */
-    uint8_t state;            /**< not for you */
-    uint8_t awaits;           /**< what to poll it for: POLLIN, and POLLOUT while it takes no more */
-    uint8_t count;            /**< not for you */
-    uint8_t next;             /**< not for you */
+    int fd;           /**< the socket, while it is there */
+    int error;        /**< errno of what lost the link, EPIPE if the peer closed it, ETIMEDOUT if
+                           mbm_tcp_accept closed it as idle; else 0 */
+    int lookup;       /**< why mbm_tcp_open found no address, for gai_strerror; else 0 */
+    uint8_t isBusy;   /**< yours: 1 while a response to the peer is to come, so that the connection
+                           is not idle; only for requests that may take longer than the idle time */
+    uint8_t state;    /**< not for you */
+    uint8_t awaits;   /**< what to poll it for: POLLIN, and POLLOUT while it takes no more */
+    uint8_t count;    /**< not for you */
+    uint8_t next;     /**< not for you */
+    int64_t lastMoved; /**< not for you */
     socklen_t lengths[MBM_TCP_ADDRESSES];               /**< not for you */
     struct sockaddr_storage addresses[MBM_TCP_ADDRESSES]; /**< not for you */
 } mbm_tcp;
 
 /** A socket that connections come to; zero before first use. */
 typedef struct mbm_tcp_listener {
-    int fd;           /**< the socket, while `port` is not 0 */
-    uint16_t port;    /**< where it listens */
-    uint32_t refused; /**< connections that found no free place */
+    int fd;            /**< the socket, while `port` is not 0 */
+    int lookup;        /**< why mbm_tcp_listen found no address, for gai_strerror; else 0 */
+    uint16_t port;     /**< where it listens */
+    uint8_t awaits;    /**< what to poll it for: POLLIN, or 0 while connections can only wait */
+    uint32_t idleTime; /**< yours: milliseconds without a byte read or written after which a
+                            connection may be closed to make room for another; 0: never */
+    uint32_t refused;  /**< connections that were turned away without a place */
+    uint32_t idle;     /**< connections that were closed because they were idle */
 } mbm_tcp_listener;
 
 /**
@@ -66,7 +80,7 @@ typedef struct mbm_tcp_listener {
  * @param service  a port number, for example MBM_TCP_SERVICE
  * @return 0, or -1 with errno set: EBUSY if it is in use, EADDRNOTAVAIL for a name
  *         or service that is unknown, EAGAIN if the lookup may go well later, or as
- *         of socket and connect
+ *         of socket and connect. Where it is the lookup that failed, `lookup` says why
  */
 int mbm_tcp_open(mbm_tcp *tcp, const char *host, const char *service);
 
@@ -86,6 +100,23 @@ int mbm_tcp_attach(mbm_tcp *tcp, int fd);
  * @param tcp  the socket
  */
 void mbm_tcp_close(mbm_tcp *tcp);
+
+/**
+ * Whether a place is in use: from mbm_tcp_open, mbm_tcp_attach or mbm_tcp_accept until
+ * mbm_tcp_close, also while the connection is being made and after it was lost.
+ *
+ * @param tcp  the place
+ * @return 1 if it is in use, 0 if it is free; a zeroed one is free
+ */
+int mbm_tcp_isInUse(const mbm_tcp *tcp);
+
+/**
+ * How long a connection has been idle: since the port last read or wrote a byte.
+ *
+ * @param tcp  the socket
+ * @return milliseconds, or -1 if there is no connection
+ */
+int64_t mbm_tcp_idleFor(const mbm_tcp *tcp);
 
 /**
  * Whether there is a connection, as far as it is known without asking the peer. An
@@ -115,15 +146,15 @@ uint8_t mbm_tcp_connect(void *tcp);
 void mbm_tcp_disconnect(void *tcp);
 
 /**
- * The port to give to the begin functions. While a blocking call of `master`
- * waits, it sleeps until bytes arrive or `master` has something else to do.
+ * The port to give to the begin functions. It may be made before the socket is open,
+ * stays valid when it is closed and opened again, and may be given to several objects.
+ * While a blocking call of a master waits, the port sleeps until bytes arrive, at most
+ * as long as mbm_master_pollDelay of that master says.
  *
- * @param tcp     must outlive the port
- * @param master  the object that the port is for; NULL for an object that never
- *                waits by itself, and there is no idle hook
+ * @param tcp  must outlive the port
  * @return the port; its read and write keep errno in `error` when the link is lost
  */
-mbm_port mbm_tcp_port(mbm_tcp *tcp, const mbm_master *master);
+mbm_port mbm_tcp_port(mbm_tcp *tcp);
 
 /**
  * Begins to listen for connections.
@@ -137,14 +168,24 @@ mbm_port mbm_tcp_port(mbm_tcp *tcp, const mbm_master *master);
 int mbm_tcp_listen(mbm_tcp_listener *listener, const char *host, const char *service);
 
 /**
- * Takes a connection that waits. When every place is in use, those that wait are
- * closed in order, so that their clients know at once.
+ * Takes a connection that waits. Call it in every round of the program's loop.
  *
- * @param listener  where they come to
+ * Where every place is in use and a connection waits, the connection that has been idle
+ * for longest is closed, if it has been idle for the listener's `idleTime`. Its link is
+ * lost: its server's next poll returns MBM_LINK_LOST, the program frees the place, and
+ * the next call takes the new connection. Where none is idle, the connections that wait
+ * are closed, so that their clients know at once.
+ *
+ * Where the system has no descriptor or no memory for a connection, the one that has
+ * been idle for longest makes room in the same way. Where none is idle, connections wait
+ * in the system's queue; mbm_tcp_wait then sleeps for at most MBM_TCP_RETRY.
+ *
+ * @param listener  where connections arrive
  * @param tcps      the places for connections
  * @param count     how many; each is free if zeroed or closed
- * @return the index of the place, or -1 with errno set: EAGAIN if none waits (or
- *         none is left that was not refused), or as of accept
+ * @return the index of the place, or -1 with errno set: EAGAIN if there is nothing to
+ *         take now, EMFILE, ENFILE, ENOBUFS or ENOMEM if connections can only wait, or
+ *         as of accept
  */
 int mbm_tcp_accept(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count);
 
@@ -167,12 +208,19 @@ void mbm_tcp_closeListener(mbm_tcp_listener *listener);
  * @param listener  waits for connections too; may be NULL
  * @param fd        waits for bytes of another descriptor too, for example that of
  *                  an mbm_tty; -1 for none
- * @param micros    at most so long, in microseconds, or MBM_TCP_FOREVER
- * @return 1 if there is something; 0 if the time is over or a signal came; -1 with
- *         errno set, EINVAL for too many
+ * @param micros    at most so long, in microseconds, or MBM_TCP_FOREVER; less while the
+ *                  listener's connections can only wait
+ * @return 1 if there is something, or if the system refused to poll, after a sleep of at
+ *         most 10 ms; 0 if the time is over or a signal came; -1 with errno EINVAL for
+ *         too many
  */
 int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, int fd,
                  uint32_t micros);
+
+/* Shared by the sources of this port; not for programs. */
+struct addrinfo;
+int mbm_tcp_lookUp(const char *host, const char *service, int flags, struct addrinfo **found,
+                   int *why);
 
 #ifdef __cplusplus
 }

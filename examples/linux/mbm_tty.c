@@ -255,6 +255,8 @@ static int take(mbm_tty *tty)
         tty->has_before = 1;
     }
     tty->has_uart = ioctl(tty->fd, TIOCMGET, &lines) == 0;
+    tty->isOpen = 1;
+    tty->awaits = POLLIN;
     return 0;
 }
 
@@ -269,10 +271,9 @@ int mbm_tty_attach(mbm_tty *tty, int fd)
     return 0;
 }
 
-void mbm_tty_detach(mbm_tty *tty)
+/* Leaves the descriptor as it was found, also where it was not opened to the end. */
+static void release(mbm_tty *tty)
 {
-    if (tty->fd < 0)
-        return;
     if (tty->has_before)
         tcsetattr(tty->fd, TCSADRAIN, &tty->before);
     if (tty->is_rs485)
@@ -283,15 +284,22 @@ void mbm_tty_detach(mbm_tty *tty)
     }
     fcntl(tty->fd, F_SETFL, tty->flags_before);
     tty->fd = -1;
+    tty->isOpen = 0;
+}
+
+void mbm_tty_detach(mbm_tty *tty)
+{
+    if (tty->isOpen)
+        release(tty);
 }
 
 void mbm_tty_close(mbm_tty *tty)
 {
     int fd = tty->fd;
 
-    if (fd < 0)
+    if (!tty->isOpen)
         return;
-    mbm_tty_detach(tty);
+    release(tty);
     close(fd);
 }
 
@@ -327,21 +335,23 @@ static int set(const mbm_tty *tty, const mbm_tty_options *options)
 int mbm_tty_openWith(mbm_tty *tty, const char *path, const mbm_tty_options *options)
 {
     struct termios unused = {0};
-    int error;
+    int fd, error;
 
     memset(tty, 0, sizeof *tty);
     tty->fd = -1;
     if (mbm_tty_settings(&unused, options) < 0)
         return -1;
-    tty->fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    if (tty->fd < 0)
+    fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    if (fd < 0)
         return -1;
+    tty->fd = fd;
     tty->flags_before = O_RDWR;
     /* Locked first, so that a terminal of another is left as it is. */
     if ((options->exclusive && lock(tty) < 0) || take(tty) < 0 || set(tty, options) < 0 ||
         (options->rs485 && begin_rs485(tty, options) < 0)) {
         error = errno;
-        mbm_tty_close(tty);
+        release(tty);
+        close(fd);
         return refuse(error);
     }
     return 0;
@@ -367,6 +377,12 @@ static int16_t nothing(mbm_tty *tty, ssize_t count)
     return -1;
 }
 
+static int16_t not_open(mbm_tty *tty)
+{
+    tty->error = EBADF;
+    return -1;
+}
+
 static size_t at_most(uint16_t length)
 {
     return length > INT16_MAX ? INT16_MAX : length;
@@ -377,8 +393,11 @@ static int16_t tty_read(void *context, uint8_t *bytes, uint16_t capacity)
     mbm_tty *tty = (mbm_tty *)context;
     ssize_t count;
 
+    if (!tty->isOpen)
+        return not_open(tty);
     if (capacity == 0)
         return 0;
+    tty->awaits = POLLIN;
     count = read(tty->fd, bytes, at_most(capacity));
     return count > 0 ? (int16_t)count : nothing(tty, count);
 }
@@ -388,6 +407,8 @@ static int16_t tty_write(void *context, const uint8_t *bytes, uint16_t length)
     mbm_tty *tty = (mbm_tty *)context;
     ssize_t count;
 
+    if (!tty->isOpen)
+        return not_open(tty);
     if (length == 0)
         return 0;
     count = write(tty->fd, bytes, at_most(length));
@@ -408,42 +429,42 @@ static uint8_t tty_flush(void *context)
     const mbm_tty *tty = (const mbm_tty *)context;
     int left = 0;
 
-    return ioctl(tty->fd, TIOCOUTQ, &left) < 0 || left == 0;
+    /* A pty has no transmitter that could drain. */
+    return !tty->isOpen || !tty->has_uart || ioctl(tty->fd, TIOCOUTQ, &left) < 0 || left == 0;
 }
 
-int mbm_tty_wait(const mbm_tty *tty, uint32_t micros)
+int mbm_tty_wait(mbm_tty *tty, uint32_t micros)
 {
     struct timespec time = {(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
     struct pollfd line = {tty->fd, POLLIN, 0};
     int ready;
 
-    if (tty->fd < 0)
+    if (!tty->isOpen)
         return refuse(EBADF);
-    ready = ppoll(&line, 1, micros == MBM_TTY_FOREVER ? NULL : &time, NULL);
+    /* A descriptor in the list would end the wait at a hang-up, whatever it awaits. */
+    ready = ppoll(&line, tty->awaits != 0, micros == MBM_TTY_FOREVER ? NULL : &time, NULL);
     if (ready < 0)
         return errno == EINTR ? 0 : -1;
+    if (ready > 0)
+        tty->awaits = 0;
     return ready > 0;
 }
 
 /* Sleeps until bytes arrive or the master has something else to do. */
-static void tty_idle(void *context)
+static void tty_idle(void *context, mbm_master *master)
 {
-    const mbm_tty *tty = (const mbm_tty *)context;
-
-    mbm_tty_wait(tty, mbm_master_pollDelay(tty->master));
+    mbm_tty_wait((mbm_tty *)context, mbm_master_pollDelay(master));
 }
 
-mbm_port mbm_tty_port(mbm_tty *tty, const mbm_master *master)
+mbm_port mbm_tty_port(mbm_tty *tty)
 {
     mbm_port port = {0};
 
-    tty->master = master;
     port.context = tty;
     port.read = tty_read;
     port.write = tty_write;
     port.micros = tty_micros;
-    /* A pty has no transmitter that could drain. */
-    port.flush = tty->has_uart ? tty_flush : NULL;
-    port.idle = master ? tty_idle : NULL;
+    port.flush = tty_flush;
+    port.idle = tty_idle;
     return port;
 }

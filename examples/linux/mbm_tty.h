@@ -37,12 +37,13 @@ typedef struct mbm_tty_options {
     uint16_t rtsDelayAfter;  /**< with rs485: from the last bit to RTS, milliseconds */
 } mbm_tty_options;
 
-/** A terminal in use as a port. */
+/** A terminal in use as a port; zeroed, open or closed. */
 typedef struct mbm_tty {
-    int fd;                   /**< the terminal; -1 once closed */
+    int fd;                   /**< the terminal, while isOpen is 1; -1 once closed */
     int error;                /**< errno of what lost the link; 0 while it is there */
-    const mbm_master *master; /**< who uses it; says how long to sleep */
+    uint8_t isOpen;           /**< 1 from open or attach to close or detach; a zeroed one is closed */
     uint8_t has_uart;         /**< whether there is a transmitter to wait for */
+    uint8_t awaits;           /**< what mbm_tty_wait polls it for: POLLIN, or 0; see there */
     uint8_t has_before;       /**< not for you */
     uint8_t is_exclusive;     /**< not for you */
     uint8_t is_rs485;         /**< not for you */
@@ -112,27 +113,30 @@ void mbm_tty_close(mbm_tty *tty);
 void mbm_tty_detach(mbm_tty *tty);
 
 /**
- * Sleeps until there is something to read or a time is over. With the time that
- * a pollDelay function told, a program sleeps for exactly as long as it may.
+ * Sleeps until there is something to read or a time is over. Pass the value that a
+ * pollDelay function returned.
+ *
+ * Bytes or a hang-up end one wait. They end the next one only after the port was read:
+ * a server whose function is pending reads nothing, and its program sleeps.
  *
  * @param tty     the terminal
- * @param micros  at most so long, in microseconds, or MBM_TTY_FOREVER
- * @return 1 if bytes are there or the link is lost, which the next read tells;
+ * @param micros  the longest time to sleep, in microseconds, or MBM_TTY_FOREVER
+ * @return 1 if bytes have arrived or the link is lost, which the next read reports;
  *         0 if the time is over or a signal came; -1 with errno set
  */
-int mbm_tty_wait(const mbm_tty *tty, uint32_t micros);
+int mbm_tty_wait(mbm_tty *tty, uint32_t micros);
 
 /**
- * The port to give to mbm_master_begin and its like. While a blocking call of
- * `master` waits, it sleeps until bytes arrive or `master` has something else to
- * do.
+ * The port to give to the begin functions. It may be made before the terminal is open,
+ * stays valid when it is closed and opened again, and may be given to several objects.
+ * While a blocking call of a master waits, the port sleeps until bytes arrive, at most
+ * as long as mbm_master_pollDelay of that master says.
  *
- * @param tty     must outlive the port
- * @param master  the object that the port is for; NULL for an object that never
- *                waits by itself, and there is no idle hook
- * @return the port; its read and write keep errno in `error` when the link is lost
+ * @param tty  must outlive the port
+ * @return the port; its read and write keep errno in `error` when the link is lost,
+ *         EBADF while the terminal is not open
  */
-mbm_port mbm_tty_port(mbm_tty *tty, const mbm_master *master);
+mbm_port mbm_tty_port(mbm_tty *tty);
 
 #ifdef __cplusplus
 }

@@ -36,7 +36,7 @@ static void show_range(range *r)
     unsigned i;
 
     if (r->request.status != MBM_OK) {
-        printf("  %7u    %s\n", r->address, mbm_statusText(r->request.status));
+        printf("  %7u    %s\n", r->address, line_status(&at, &r->request));
         return;
     }
     for (i = 0; i < r->quantity; i++) {
@@ -109,6 +109,8 @@ int main(int argc, char **argv)
     for (i = (unsigned)optind + 1; i < (unsigned)argc; i += 2, count++) {
         ranges[count].address = (uint16_t)line_number(argv[i], 0, 65535);
         ranges[count].quantity = (uint16_t)line_number(argv[i + 1], 1, MOST);
+        if (!line_addresses(ranges[count].address, ranges[count].quantity))
+            return line_usage(1, USAGE);
     }
     if (line_open(&at, argv[optind]) != 0)
         return 1;

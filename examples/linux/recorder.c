@@ -41,11 +41,11 @@ static uint8_t pass_flush(void *context)
     return wire->behind.flush(wire->behind.context);
 }
 
-static void pass_idle(void *context)
+static void pass_idle(void *context, mbm_master *master)
 {
     recorder *wire = (recorder *)context;
 
-    wire->behind.idle(wire->behind.context);
+    wire->behind.idle(wire->behind.context, master);
 }
 
 void recorder_clear(recorder *wire)

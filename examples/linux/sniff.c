@@ -91,17 +91,17 @@ static void hear(const uint8_t *bytes, uint16_t length)
     }
 }
 
-static int watch(const char *path, uint32_t baud, char parity, uint8_t data)
+/* 0 once it has watched, 1 if the line was lost, -1 if it could not be opened. */
+static int watch(const char *path, const mbm_tty_options *options)
 {
-    mbm_tty_options options = {.baud = baud, .parity = parity, .stop = 1, .data = data};
     mbm_tty tty;
     uint8_t bytes[256];
     ssize_t length;
     int failed = 0;
 
-    if (mbm_tty_openWith(&tty, path, &options) != 0) {
+    if (mbm_tty_openWith(&tty, path, options) != 0) {
         perror(path);
-        return 1;
+        return -1;
     }
     first = micros();
     while (!ended) {
@@ -188,18 +188,42 @@ static int replay(void)
 static int usage(int wrong)
 {
     fprintf(wrong ? stderr : stdout,
-            "usage: sniff [-a] path baud [N|E|O]   or   sniff [-a|-t] -\n"
+            "usage: sniff [-a] path baud [N|E|O]   or   sniff [-a|-t] - [baud]\n"
             "  -a  ASCII frames, -t TCP frames; else RTU\n"
             "  -   a recording from stdin\n");
     return wrong ? 2 : 0;
 }
 
+/* A rate; 0 for what is no number, and for one that is too great. */
+static uint32_t rate_of(const char *text)
+{
+    char *rest;
+    unsigned long baud = strtoul(text, &rest, 10);
+
+    return isdigit((unsigned char)text[0]) && !*rest && baud <= UINT32_MAX ? (uint32_t)baud : 0;
+}
+
+/* Reads PATH BAUD [PARITY], or - [BAUD] of a recording; whether a line can be set so. */
+static int read_line(int argc, char **argv, mbm_tty_options *options)
+{
+    struct termios unused = {0};
+
+    options->baud = argc > 1 ? rate_of(argv[1]) : 0;
+    if (argc == 1 || options->baud == 0)
+        return argc == 1 && strcmp(argv[0], "-") == 0;
+    if (argc > 2)
+        options->parity = argv[2][0] && !argv[2][1] ? argv[2][0] : '?';
+    if (strcmp(argv[0], "-") == 0)
+        return argc == 2;
+    return argc <= 3 && mbm_tty_settings(&unused, options) == 0;
+}
+
 int main(int argc, char **argv)
 {
+    mbm_tty_options options = {.parity = 'N', .stop = 1};
     struct sigaction action = {0};
     mbm_framing framing = {0};
     int option, failed;
-    uint32_t baud = 0;
 
     if (argc > 1 && strcmp(argv[1], "--help") == 0)
         return usage(0);
@@ -210,20 +234,20 @@ int main(int argc, char **argv)
     }
     argc -= optind;
     argv += optind;
-    if (argc < 1 || (argc < 2 && strcmp(argv[0], "-") != 0))
+    options.data = framing.kind == MBM_FRAMING_ASCII ? 7 : 8;
+    if (argc < 1 || !read_line(argc, argv, &options))
         return usage(1);
-    if (argc > 1)
-        baud = (uint32_t)strtoul(argv[1], NULL, 10);
     action.sa_handler = end;
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
     mbm_sniffer_begin(&sniffer, &framing, buffer, sizeof buffer);
-    mbm_sniffer_setBaudRate(&sniffer, baud);
+    mbm_sniffer_setBaudRate(&sniffer, options.baud);
     if (strcmp(argv[0], "-") == 0)
         failed = replay();
     else
-        failed = watch(argv[0], baud, argc > 2 ? argv[2][0] : 'N',
-                       framing.kind == MBM_FRAMING_ASCII ? 7 : 8);
+        failed = watch(argv[0], &options);
+    if (failed < 0)
+        return 1;
     printf("%lu requests, %lu replies, %lu exceptions, %lu unpaired, %lu timeouts, %lu bad CRCs, "
            "noise %lu times; slowest reply %.1f ms\n",
            totals[MBM_EVENT_REQUEST], totals[MBM_EVENT_REPLY], totals[MBM_EVENT_EXCEPTION],

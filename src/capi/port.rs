@@ -1,5 +1,6 @@
 //! The port that C supplies.
 
+use super::master::mbm_master;
 use crate::port::Port;
 use core::ffi::c_void;
 
@@ -35,10 +36,11 @@ pub struct mbm_port {
     pub preTransmission: Option<unsafe extern "C" fn(context: *mut c_void)>,
     /// Optional: called after the last bit of a request (RS-485 driver off).
     pub postTransmission: Option<unsafe extern "C" fn(context: *mut c_void)>,
-    /// Optional: called again and again while a blocking call waits, never
-    /// between preTransmission and postTransmission. It may take its time, and
-    /// ask mbm_master_pollDelay how much of it there is.
-    pub idle: Option<unsafe extern "C" fn(context: *mut c_void)>,
+    /// Optional: called again and again while a blocking call of `master` waits,
+    /// never between preTransmission and postTransmission. It may sleep until a
+    /// byte arrives, for at most the time that mbm_master_pollDelay(master)
+    /// returns.
+    pub idle: Option<unsafe extern "C" fn(context: *mut c_void, master: *mut mbm_master)>,
 }
 
 impl mbm_port {

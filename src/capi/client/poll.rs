@@ -49,7 +49,7 @@ unsafe fn poll_delay<L: Kind>(object: *mut Object) -> u32 {
 ///         while a TCP port does not take what is to be sent: to poll sooner, wait
 ///         for that too, as mbm_tcp_wait does
 #[no_mangle]
-pub unsafe extern "C" fn mbm_client_pollDelay(client: *const mbm_client) -> u32 {
+pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
     // SAFETY: as the header demands.
     unsafe {
         match pointers::check(client) {

@@ -217,11 +217,11 @@ pub unsafe extern "C" fn mbm_master_poll(master: *mut mbm_master) -> u8 {
 /// @return microseconds; 0 means poll now, and is returned within a hook of the port
 ///         but `idle`; 0xFFFFFFFF that there is no request
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_pollDelay(master: *const mbm_master) -> u32 {
-    // SAFETY: as the header demands; every object is writable storage.
+pub unsafe extern "C" fn mbm_master_pollDelay(master: *mut mbm_master) -> u32 {
+    // SAFETY: as the header demands.
     unsafe {
         match pointers::check(master) {
-            Status::OK => pointers::calling(master.cast_mut(), Core::poll_delay),
+            Status::OK => pointers::calling(master, Core::poll_delay),
             Status::BUSY => 0,
             _ => u32::MAX,
         }
@@ -309,7 +309,7 @@ unsafe fn finish(pointer: *mut mbm_master, mut status: u8) -> u8 {
                 let port = (*core).port();
                 let (idle, context) = (port.idle, port.context);
                 if let Some(idle) = idle {
-                    idle(context);
+                    idle(context, pointer);
                 }
             }
         }

@@ -1,0 +1,238 @@
+/* The gateway example where descriptors or places are short: it serves whom it serves,
+ * sleeps, takes connections again when there is room, and ends by SIGTERM. */
+#define _GNU_SOURCE
+#include "asked.h"
+#include "await.h"
+#include "descriptors.h"
+#include "program.h"
+#include "pty.h"
+#include "tcp_server.h"
+#include "test.h"
+
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+/* Of the gateway's descriptors 3 are the terminal's, 1 listens and 1 is the line's. */
+enum { OWN = 5, NO_LINE = 200, ABSENT = 6, PLACES = 16, MANY = 40, TIMEOUT_MS = 3000 };
+
+static program gateway;
+static uint16_t port;
+static pty line;
+static char name[64];
+static int fds[MANY];
+
+static int begin(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < MANY; i++)
+        fds[i] = -1;
+    alarm(6 * PATIENCE_MS / 1000);
+    pty_open(&line);
+    snprintf(name, sizeof name, "/tmp/mbm-shortage-%d", (int)getpid());
+    unlink(name);
+    return symlink(line.path, name);
+}
+
+static int end(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < MANY; i++)
+        if (fds[i] >= 0)
+            close(fds[i]);
+    unlink(name);
+    pty_close(&line);
+    alarm(0);
+    return 0;
+}
+
+static void start(unsigned descriptors, const char *idle)
+{
+    char text[64], path[128];
+    const char *arguments[] = {"-i", idle, "0", "3000", path, NULL};
+    int number;
+
+    snprintf(path, sizeof path, "%s,115200,N1,1-10", name);
+    program_start_limited(&gateway, "gateway", arguments, descriptors);
+    program_line(&gateway, text, sizeof text);
+    assert_int_equal(sscanf(text, "ready %d", &number), 1);
+    port = (uint16_t)number;
+}
+
+static void stop(void)
+{
+    kill(gateway.pid, SIGTERM);
+    assert_int_equal(program_end(&gateway), 0);
+}
+
+static void connect_to(unsigned first, unsigned last)
+{
+    for (; first < last; first++)
+        fds[first] = tcp_connect(port);
+}
+
+static int is_served(int fd)
+{
+    return asked_is_served(fd, NO_LINE, 0x0A);
+}
+
+static void drop(unsigned first, unsigned last)
+{
+    for (; first < last; first++) {
+        close(fds[first]);
+        fds[first] = -1;
+    }
+}
+
+static void with_few_descriptors_it_serves_and_sleeps_and_ends(void **state)
+{
+    static const unsigned limits[] = {OWN + 1, OWN + 3, 20, 21, 22};
+    unsigned i, k;
+
+    (void)state;
+    SKIP_WITHOUT_LIMITS();
+    for (i = 0; i < COUNT(limits); i++) {
+        const unsigned most = limits[i] - OWN < PLACES ? limits[i] - OWN : PLACES;
+
+        start(limits[i], "60");
+        connect_to(0, most);
+        for (k = 0; k < most; k++)
+            assert_int_equal(is_served(fds[k]), 1);
+        AWAIT(program_sleeps(&gateway));
+        stop();
+        drop(0, most);
+    }
+}
+
+static void connections_beyond_its_descriptors_wait_and_are_served_later(void **state)
+{
+    enum { SERVED = 4, ALL = 10 };
+    unsigned i;
+
+    (void)state;
+    SKIP_WITHOUT_LIMITS();
+    start(OWN + SERVED, "60");
+    connect_to(0, ALL);
+    for (i = 0; i < SERVED; i++)
+        assert_int_equal(is_served(fds[i]), 1);
+    AWAIT(program_sleeps(&gateway));
+    for (i = 0; i < SERVED; i++)
+        assert_int_equal(is_served(fds[i]), 1);
+    drop(0, SERVED);
+    for (; i < 2 * SERVED; i++)
+        assert_int_equal(is_served(fds[i]), 1);
+    drop(SERVED, 2 * SERVED);
+    for (; i < ALL; i++)
+        assert_int_equal(is_served(fds[i]), 1);
+    stop();
+}
+
+static void a_new_client_gets_the_place_of_an_idle_one(void **state)
+{
+    char byte;
+
+    (void)state;
+    start(0, "1");
+    connect_to(0, PLACES);
+    /* They are silent for a second, at least. */
+    AWAIT((fds[PLACES] = tcp_connect(port), is_served(fds[PLACES])) ||
+          (close(fds[PLACES]), 0));
+    /* The first came first. */
+    assert_int_equal(recv(fds[0], &byte, 1, 0), 0);
+    assert_int_equal(is_served(fds[PLACES]), 1);
+    stop();
+}
+
+static void a_new_client_gets_the_descriptor_of_an_idle_one(void **state)
+{
+    enum { SERVED = 4 };
+
+    (void)state;
+    SKIP_WITHOUT_LIMITS();
+    start(OWN + SERVED, "1");
+    connect_to(0, SERVED + 2);
+    assert_int_equal(is_served(fds[SERVED]), 1);
+    assert_int_equal(is_served(fds[SERVED + 1]), 1);
+    stop();
+}
+
+static void an_idle_time_of_0_closes_none(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    start(0, "0");
+    connect_to(0, PLACES + 1);
+    assert_int_equal(is_served(fds[PLACES]), 0);
+    for (i = 0; i < PLACES; i++)
+        assert_int_equal(is_served(fds[i]), 1);
+    stop();
+}
+
+static void a_connection_that_waits_for_its_device_is_not_idle(void **state)
+{
+    static const uint8_t request[] = {0, 1, 0, 0, 0, 6, ABSENT, 3, 0, 0, 0, 1};
+    uint8_t answer[9];
+
+    (void)state;
+    start(0, "1");
+    connect_to(0, 1);
+    assert_int_equal(write(fds[0], request, sizeof request), sizeof request);
+    /* The request is on its line before the others come. */
+    assert_int_equal(read(line.ours, answer, 1), 1);
+    connect_to(1, PLACES);
+    AWAIT((fds[PLACES] = tcp_connect(port), is_served(fds[PLACES])) ||
+          (close(fds[PLACES]), 0));
+    assert_int_equal(recv(fds[0], answer, sizeof answer, MSG_WAITALL), sizeof answer);
+    assert_int_equal(answer[8], 0x0B);
+    stop();
+}
+
+static void a_lost_line_keeps_its_descriptor(void **state)
+{
+    enum { SERVED = 4 };
+    static const uint8_t request[] = {0, 1, 0, 0, 0, 6, ABSENT, 3, 0, 0, 0, 1};
+    struct pollfd heard;
+    unsigned i;
+
+    (void)state;
+    SKIP_WITHOUT_LIMITS();
+    start(OWN + SERVED, "60");
+    connect_to(0, SERVED + 2);
+    for (i = 0; i < SERVED; i++)
+        assert_int_equal(is_served(fds[i]), 1);
+    pty_close(&line);
+    assert_int_equal(asked_is_served(fds[0], ABSENT, 0x0A), 1);
+    AWAIT(program_sleeps(&gateway));
+    pty_open(&line);
+    assert_int_equal(unlink(name), 0);
+    assert_int_equal(symlink(line.path, name), 0);
+    /* It opens the line again for a request, at most once a second. */
+    heard = (struct pollfd){line.ours, POLLIN, 0};
+    AWAIT((send(fds[0], request, sizeof request, MSG_NOSIGNAL), poll(&heard, 1, 100) == 1));
+    stop();
+}
+
+#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(with_few_descriptors_it_serves_and_sleeps_and_ends),
+        TEST(connections_beyond_its_descriptors_wait_and_are_served_later),
+        TEST(a_new_client_gets_the_place_of_an_idle_one),
+        TEST(a_new_client_gets_the_descriptor_of_an_idle_one),
+        TEST(an_idle_time_of_0_closes_none),
+        TEST(a_connection_that_waits_for_its_device_is_not_idle),
+        TEST(a_lost_line_keeps_its_descriptor),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

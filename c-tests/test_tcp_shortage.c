@@ -1,0 +1,384 @@
+/* Connections where places or descriptors are short: those that are served stay served,
+ * the program sleeps, and connections are taken again when there is room. */
+#define _GNU_SOURCE
+#include "await.h"
+#include "descriptors.h"
+#include "mbm_tcp.h"
+#include "tcp_server.h"
+#include "test.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <netdb.h>
+#include <netinet/tcp.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { PLACES = 3, MINUTE_MS = 60000, FLOOD = 70, TURNED_AWAY = 64 };
+
+static mbm_tcp_listener listener;
+static mbm_tcp places[PLACES];
+static int clients[FLOOD + PLACES];
+static unsigned client_count;
+static struct rlimit found;
+static time_t ahead; /* seconds that the clock of the port is fast */
+
+/* The program's own comes before that of libc. */
+int clock_gettime(clockid_t id, struct timespec *time)
+{
+    const int result = (int)syscall(SYS_clock_gettime, id, time);
+
+    if (result == 0)
+        time->tv_sec += ahead;
+    return result;
+}
+
+static void limit_descriptors(rlim_t most)
+{
+    const struct rlimit limit = {most, found.rlim_max};
+
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &limit), 0);
+}
+
+/* The next descriptor would be one too many. */
+static void leave_no_descriptor(void)
+{
+    const int next = dup(0);
+
+    assert_true(next >= 0);
+    close(next);
+    limit_descriptors((rlim_t)next);
+}
+
+static int begin(void **state)
+{
+    (void)state;
+    alarm(2 * PATIENCE_MS / 1000);
+    ahead = 0;
+    client_count = 0;
+    memset(&listener, 0, sizeof listener);
+    memset(places, 0, sizeof places);
+    assert_int_equal(getrlimit(RLIMIT_NOFILE, &found), 0);
+    assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
+    return 0;
+}
+
+static int end(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    limit_descriptors(found.rlim_cur);
+    for (i = 0; i < client_count; i++)
+        close(clients[i]);
+    for (i = 0; i < PLACES; i++)
+        mbm_tcp_close(&places[i]);
+    mbm_tcp_closeListener(&listener);
+    alarm(0);
+    return 0;
+}
+
+/* How many connections wait to be accepted. */
+static unsigned waiting(void)
+{
+    struct tcp_info info = {0};
+    socklen_t size = sizeof info;
+
+    assert_int_equal(getsockopt(listener.fd, IPPROTO_TCP, TCP_INFO, &info, &size), 0);
+    return info.tcpi_unacked;
+}
+
+static void connect_some(unsigned count)
+{
+    const unsigned before = waiting();
+    unsigned i;
+
+    for (i = 0; i < count; i++)
+        clients[client_count++] = tcp_connect(listener.port);
+    AWAIT(waiting() == before + count);
+}
+
+static int take(void)
+{
+    return mbm_tcp_accept(&listener, places, PLACES);
+}
+
+static void expect_none(int error)
+{
+    assert_int_equal(take(), -1);
+    assert_int_equal(errno, error);
+}
+
+static void fill(void)
+{
+    int i;
+
+    connect_some(PLACES);
+    for (i = 0; i < PLACES; i++)
+        assert_int_equal(take(), i);
+}
+
+/* The peer of a place sends a byte, which the program reads. */
+static void ask(unsigned place)
+{
+    const mbm_port port = mbm_tcp_port(&places[place]);
+    uint8_t byte;
+
+    assert_int_equal(write(clients[place], "x", 1), 1);
+    AWAIT(port.read(port.context, &byte, 1) == 1);
+}
+
+static int is_lost(unsigned place)
+{
+    const mbm_port port = mbm_tcp_port(&places[place]);
+    uint8_t byte;
+
+    return port.read(port.context, &byte, 1) < 0;
+}
+
+static int wait_for(uint32_t micros)
+{
+    return mbm_tcp_wait(places, PLACES, &listener, -1, micros);
+}
+
+static void a_place_is_in_use_until_it_is_closed(void **state)
+{
+    mbm_tcp place;
+
+    (void)state;
+    memset(&place, 0, sizeof place);
+    assert_int_equal(mbm_tcp_isInUse(&place), 0);
+    assert_int_equal(mbm_tcp_idleFor(&place), -1);
+    mbm_tcp_disconnect(&place);
+    assert_int_equal(mbm_tcp_isInUse(&place), 0);
+    connect_some(1);
+    assert_int_equal(mbm_tcp_accept(&listener, &place, 1), 0);
+    assert_int_equal(mbm_tcp_isInUse(&place), 1);
+    assert_true(mbm_tcp_idleFor(&place) >= 0);
+    mbm_tcp_disconnect(&place);
+    assert_int_equal(mbm_tcp_isConnected(&place), -1);
+    assert_int_equal(mbm_tcp_isInUse(&place), 1);
+    assert_int_equal(mbm_tcp_idleFor(&place), -1);
+    mbm_tcp_close(&place);
+    assert_int_equal(mbm_tcp_isInUse(&place), 0);
+    assert_int_equal(mbm_tcp_open(&place, "127.0.0.1", "no-such-service"), -1);
+    assert_int_equal(mbm_tcp_isInUse(&place), 0);
+}
+
+static void a_listener_without_a_descriptor_lets_the_program_sleep(void **state)
+{
+    (void)state;
+    SKIP_WITHOUT_LIMITS();
+    connect_some(1);
+    assert_int_equal(take(), 0);
+    connect_some(2);
+    leave_no_descriptor();
+    expect_none(EMFILE);
+    assert_int_equal(wait_for(1000), 0);
+    /* It tries again by itself, and still serves those that it has. */
+    assert_int_equal(wait_for(MBM_TCP_FOREVER), 0);
+    expect_none(EMFILE);
+    assert_int_equal(write(clients[0], "x", 1), 1);
+    assert_int_equal(wait_for(MBM_TCP_FOREVER), 1);
+    assert_int_equal(listener.refused, 0);
+}
+
+static void a_connection_that_waited_is_taken_once_a_descriptor_is_free(void **state)
+{
+    (void)state;
+    SKIP_WITHOUT_LIMITS();
+    connect_some(1);
+    assert_int_equal(take(), 0);
+    connect_some(2);
+    leave_no_descriptor();
+    expect_none(EMFILE);
+    mbm_tcp_close(&places[0]);
+    assert_int_equal(take(), 0);
+    expect_none(EMFILE);
+    limit_descriptors(found.rlim_cur);
+    assert_int_equal(take(), 1);
+    expect_none(EAGAIN);
+    /* The listener ends the wait as before. */
+    connect_some(1);
+    assert_int_equal(wait_for(MBM_TCP_FOREVER), 1);
+    assert_int_equal(take(), 2);
+}
+
+static void an_idle_connection_gives_its_descriptor_to_a_new_one(void **state)
+{
+    (void)state;
+    SKIP_WITHOUT_LIMITS();
+    listener.idleTime = MINUTE_MS;
+    connect_some(2);
+    assert_int_equal(take(), 0);
+    assert_int_equal(take(), 1);
+    connect_some(1);
+    leave_no_descriptor();
+    expect_none(EMFILE);
+    ahead = 61;
+    ask(0);
+    assert_int_equal(take(), 2);
+    assert_int_equal(is_lost(1), 1);
+    assert_int_equal(is_lost(0), 0);
+    assert_int_equal(listener.idle, 1);
+}
+
+static void without_a_descriptor_nothing_is_closed_while_no_connection_waits(void **state)
+{
+    (void)state;
+    SKIP_WITHOUT_LIMITS();
+    listener.idleTime = MINUTE_MS;
+    connect_some(1);
+    assert_int_equal(take(), 0);
+    leave_no_descriptor();
+    ahead = 3600;
+    expect_none(EAGAIN);
+    assert_int_equal(is_lost(0), 0);
+    assert_int_equal(listener.idle, 0);
+}
+
+static void where_the_system_refuses_to_poll_the_wait_sleeps_and_looks(void **state)
+{
+    (void)state;
+    SKIP_WITHOUT_LIMITS();
+    fill();
+    assert_int_equal(write(clients[0], "x", 1), 1);
+    limit_descriptors(1);
+    assert_int_equal(wait_for(MBM_TCP_FOREVER), 1);
+    ask(1);
+    assert_int_equal(wait_for(0), 1);
+    ask(0);
+}
+
+static void the_oldest_idle_connection_gives_its_place_to_a_new_one(void **state)
+{
+    (void)state;
+    listener.idleTime = MINUTE_MS;
+    fill();
+    ahead = 30;
+    ask(1);
+    ahead = 59;
+    ask(0);
+    ahead = 91;
+    connect_some(2);
+    /* Of places 1 and 2, which are idle, 2 has been so for longer. */
+    expect_none(EAGAIN);
+    assert_int_equal(is_lost(0), 0);
+    assert_int_equal(is_lost(1), 0);
+    assert_int_equal(is_lost(2), 1);
+    assert_int_equal(places[2].error, ETIMEDOUT);
+    mbm_tcp_close(&places[2]);
+    assert_int_equal(wait_for(MBM_TCP_FOREVER), 1);
+    assert_int_equal(take(), 2);
+    expect_none(EAGAIN);
+    assert_int_equal(is_lost(1), 1);
+    mbm_tcp_close(&places[1]);
+    assert_int_equal(take(), 1);
+    expect_none(EAGAIN);
+    assert_int_equal(listener.idle, 2);
+    assert_int_equal(listener.refused, 0);
+}
+
+static void an_idle_connection_stays_while_no_other_wants_its_place(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    listener.idleTime = MINUTE_MS;
+    fill();
+    ahead = 3600;
+    expect_none(EAGAIN);
+    for (i = 0; i < PLACES; i++)
+        assert_int_equal(is_lost(i), 0);
+}
+
+/* Its place is not the new one's; the client learns so at once. */
+static void expect_turned_away(uint32_t refused)
+{
+    char byte;
+    unsigned i;
+
+    connect_some(1);
+    expect_none(EAGAIN);
+    assert_int_equal(listener.refused, refused);
+    assert_int_equal(listener.idle, 0);
+    assert_int_equal(read(clients[client_count - 1], &byte, 1), 0);
+    for (i = 0; i < PLACES; i++)
+        assert_int_equal(is_lost(i), 0);
+}
+
+static void connections_that_are_not_idle_keep_their_places(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    fill();
+    ahead = 3600;
+    /* Nothing was said of an idle time. */
+    expect_turned_away(1);
+    listener.idleTime = MINUTE_MS;
+    for (i = 0; i < PLACES; i++) {
+        places[i].isBusy = i != 0;
+        if (i == 0)
+            ask(i);
+    }
+    expect_turned_away(2);
+    /* One that takes a place anew is not busy. */
+    mbm_tcp_close(&places[2]);
+    connect_some(1);
+    assert_int_equal(take(), 2);
+    assert_int_equal(places[2].isBusy, 0);
+}
+
+static void a_flood_of_connections_is_turned_away_in_parts(void **state)
+{
+    (void)state;
+    fill();
+    connect_some(FLOOD);
+    expect_none(EAGAIN);
+    assert_int_equal(listener.refused, TURNED_AWAY);
+    assert_int_equal(wait_for(MBM_TCP_FOREVER), 1);
+    expect_none(EAGAIN);
+    assert_int_equal(listener.refused, FLOOD);
+    assert_int_equal(wait_for(1000), 0);
+}
+
+static void a_failed_lookup_leaves_its_reason(void **state)
+{
+    mbm_tcp_listener other = {0};
+    mbm_tcp place;
+
+    (void)state;
+    memset(&place, 0, sizeof place);
+    assert_int_equal(mbm_tcp_open(&place, "no such host", "502"), -1);
+    assert_int_not_equal(place.lookup, 0);
+    assert_int_equal(mbm_tcp_listen(&other, NULL, "no-such-service"), -1);
+    assert_int_equal(other.lookup, EAI_SERVICE);
+    assert_int_equal(mbm_tcp_listen(&other, "127.0.0.1", "0"), 0);
+    assert_int_equal(other.lookup, 0);
+    mbm_tcp_closeListener(&other);
+}
+
+#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(a_place_is_in_use_until_it_is_closed),
+        TEST(a_listener_without_a_descriptor_lets_the_program_sleep),
+        TEST(a_connection_that_waited_is_taken_once_a_descriptor_is_free),
+        TEST(an_idle_connection_gives_its_descriptor_to_a_new_one),
+        TEST(without_a_descriptor_nothing_is_closed_while_no_connection_waits),
+        TEST(where_the_system_refuses_to_poll_the_wait_sleeps_and_looks),
+        TEST(the_oldest_idle_connection_gives_its_place_to_a_new_one),
+        TEST(an_idle_connection_stays_while_no_other_wants_its_place),
+        TEST(connections_that_are_not_idle_keep_their_places),
+        TEST(a_flood_of_connections_is_turned_away_in_parts),
+        TEST(a_failed_lookup_leaves_its_reason),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

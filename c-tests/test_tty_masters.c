@@ -1,0 +1,199 @@
+/* Blocking masters over a terminal and over a TCP socket, on which nothing answers:
+ * each request ends with its status, however the port was made and whoever shares it.
+ * The watchdog ends the program where one does not. */
+#define _GNU_SOURCE
+#include "await.h"
+#include "mbm_tcp.h"
+#include "mbm_tty.h"
+#include "pty.h"
+#include "test.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { TIMEOUT_MS = 20 };
+
+typedef struct node {
+    mbm_master master;
+    uint16_t words[2];
+    uint8_t frame[MBM_FRAME_BYTES(2)];
+} node;
+
+static const mbm_tty_options OPTIONS = {.baud = 115200, .parity = 'N', .stop = 1};
+static pty line;
+static mbm_tty tty;
+static mbm_tcp tcp;
+static mbm_tcp_listener listener;
+static node first, second;
+static char service[8];
+
+static int begin(void **state)
+{
+    (void)state;
+    alarm(PATIENCE_MS / 1000);
+    memset(&tty, 0, sizeof tty);
+    memset(&tcp, 0, sizeof tcp);
+    memset(&first, 0, sizeof first);
+    memset(&second, 0, sizeof second);
+    pty_open(&line);
+    assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
+    snprintf(service, sizeof service, "%u", listener.port);
+    return 0;
+}
+
+static int end(void **state)
+{
+    (void)state;
+    mbm_tty_close(&tty);
+    mbm_tcp_close(&tcp);
+    mbm_tcp_closeListener(&listener);
+    pty_close(&line);
+    alarm(0);
+    return 0;
+}
+
+static void begin_node(node *n, uint8_t unit, const mbm_port *port)
+{
+    OK(mbm_master_setBuffers(&n->master, n->words, 2, n->words, 2, n->frame, sizeof n->frame));
+    OK(mbm_master_begin(&n->master, unit, port));
+    OK(mbm_master_setResponseTimeout(&n->master, TIMEOUT_MS));
+    OK(mbm_master_setQuietTime(&n->master, 0));
+}
+
+static void times_out(node *n)
+{
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_master_readHoldingRegisters(&n->master, 0, 1));
+}
+
+static void a_tty_closed_and_opened_again_keeps_its_port(void **state)
+{
+    mbm_port port;
+
+    (void)state;
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &OPTIONS), 0);
+    port = mbm_tty_port(&tty);
+    begin_node(&first, 1, &port);
+    times_out(&first);
+    mbm_tty_close(&tty);
+    IS(MBM_LINK_LOST, mbm_master_readHoldingRegisters(&first.master, 0, 1));
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &OPTIONS), 0);
+    times_out(&first);
+}
+
+static void a_port_made_before_the_tty_is_open_works_once_it_is(void **state)
+{
+    mbm_port port = mbm_tty_port(&tty);
+
+    (void)state;
+    begin_node(&first, 1, &port);
+    /* The descriptor of a zeroed tty is that of the program's input. */
+    IS(MBM_LINK_LOST, mbm_master_readHoldingRegisters(&first.master, 0, 1));
+    assert_int_equal(tty.error, EBADF);
+    assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), -1);
+    mbm_tty_close(&tty);
+    mbm_tty_detach(&tty);
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &OPTIONS), 0);
+    times_out(&first);
+}
+
+static void two_masters_on_one_tty_each_end_in_time(void **state)
+{
+    mbm_port port;
+
+    (void)state;
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &OPTIONS), 0);
+    port = mbm_tty_port(&tty);
+    begin_node(&first, 1, &port);
+    port = mbm_tty_port(&tty);
+    begin_node(&second, 2, &port);
+    times_out(&first);
+    times_out(&second);
+    times_out(&first);
+}
+
+static void two_masters_with_one_port_struct_each_end_in_time(void **state)
+{
+    mbm_port port;
+
+    (void)state;
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &OPTIONS), 0);
+    port = mbm_tty_port(&tty);
+    begin_node(&first, 1, &port);
+    begin_node(&second, 2, &port);
+    times_out(&first);
+    times_out(&second);
+    times_out(&first);
+}
+
+/* Bytes that are no reply arrive, and more of them are there whenever it looks. */
+static void noise_does_not_keep_a_master_from_its_end(void **state)
+{
+    mbm_port port;
+
+    (void)state;
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &OPTIONS), 0);
+    port = mbm_tty_port(&tty);
+    begin_node(&first, 1, &port);
+    assert_int_equal(write(line.ours, "\x07\x03\x02", 3), 3);
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_master_readHoldingRegisters(&first.master, 0, 1));
+}
+
+static void a_socket_closed_and_opened_again_keeps_its_port(void **state)
+{
+    mbm_port port;
+
+    (void)state;
+    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    port = mbm_tcp_port(&tcp);
+    begin_node(&first, 1, &port);
+    times_out(&first);
+    mbm_tcp_close(&tcp);
+    IS(MBM_LINK_LOST, mbm_master_readHoldingRegisters(&first.master, 0, 1));
+    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    times_out(&first);
+}
+
+static void a_port_made_before_the_socket_is_open_works_once_it_is(void **state)
+{
+    mbm_port port = mbm_tcp_port(&tcp);
+
+    (void)state;
+    begin_node(&first, 1, &port);
+    IS(MBM_LINK_LOST, mbm_master_readHoldingRegisters(&first.master, 0, 1));
+    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    times_out(&first);
+}
+
+static void two_masters_on_one_socket_each_end_in_time(void **state)
+{
+    mbm_port port;
+
+    (void)state;
+    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    port = mbm_tcp_port(&tcp);
+    begin_node(&first, 1, &port);
+    begin_node(&second, 2, &port);
+    times_out(&first);
+    times_out(&second);
+    times_out(&first);
+}
+
+#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(a_tty_closed_and_opened_again_keeps_its_port),
+        TEST(a_port_made_before_the_tty_is_open_works_once_it_is),
+        TEST(two_masters_on_one_tty_each_end_in_time),
+        TEST(two_masters_with_one_port_struct_each_end_in_time),
+        TEST(noise_does_not_keep_a_master_from_its_end),
+        TEST(a_socket_closed_and_opened_again_keeps_its_port),
+        TEST(a_port_made_before_the_socket_is_open_works_once_it_is),
+        TEST(two_masters_on_one_socket_each_end_in_time),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

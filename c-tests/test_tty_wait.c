@@ -1,0 +1,166 @@
+/* What ends mbm_tty_wait, and what does not. */
+#define _GNU_SOURCE
+#include "await.h"
+#include "clock.h"
+#include "mbm_tty.h"
+#include "pty.h"
+#include "test.h"
+
+#include <pthread.h>
+#include <signal.h>
+#include <unistd.h>
+
+static pty line;
+static const mbm_tty_options PLAIN = {.baud = 19200, .parity = 'E', .stop = 1};
+
+static int begin(void **state)
+{
+    (void)state;
+    alarm(2 * PATIENCE_MS / 1000);
+    pty_open(&line);
+    return 0;
+}
+
+static int end(void **state)
+{
+    (void)state;
+    pty_close(&line);
+    alarm(0);
+    return 0;
+}
+
+static void wait_ends_with_a_byte_with_the_time_or_with_the_line(void **state)
+{
+    mbm_port port;
+    uint8_t byte;
+    mbm_tty tty;
+    double start;
+
+    (void)state;
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
+    port = mbm_tty_port(&tty);
+    assert_int_equal(mbm_tty_wait(&tty, 0), 0);
+    start = seconds();
+    assert_int_equal(mbm_tty_wait(&tty, 30500), 0);
+    assert_true(seconds() - start >= 0.0305);
+    assert_int_equal(write(line.ours, "x", 1), 1);
+    assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), 1);
+    assert_int_equal(port.read(port.context, &byte, 1), 1);
+    close(line.ours);
+    line.ours = -1;
+    assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), 1);
+    mbm_tty_close(&tty);
+}
+
+/* A server whose function is pending reads nothing: its program sleeps. */
+static void bytes_that_are_not_read_do_not_end_the_next_wait(void **state)
+{
+    mbm_port port;
+    uint8_t byte;
+    mbm_tty tty;
+
+    (void)state;
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
+    port = mbm_tty_port(&tty);
+    assert_int_equal(write(line.ours, "ab", 2), 2);
+    assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), 1);
+    assert_int_equal(mbm_tty_wait(&tty, 1000), 0);
+    assert_int_equal(port.write(port.context, &byte, 0), 0);
+    assert_int_equal(mbm_tty_wait(&tty, 1000), 0);
+    /* Once the port was read, they do. */
+    assert_int_equal(port.read(port.context, &byte, 1), 1);
+    assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), 1);
+    mbm_tty_close(&tty);
+}
+
+static uint16_t pending(void *context, const mbm_request *request, uint8_t *response,
+                        uint16_t capacity)
+{
+    (void)context;
+    (void)request;
+    (void)response;
+    (void)capacity;
+    return MBM_REPLY_PENDING;
+}
+
+/* The program's loop of the server, from when its function is pending: each round
+ * sleeps for the time that pollDelay says, though the next request has arrived. */
+static void a_server_with_a_pending_function_sleeps_between_polls(void **state)
+{
+    static const uint8_t request[] = {0x11, 0x41, 0xCD, 0xD0};
+    static mbm_server server;
+    static mbm_unit unit;
+    static mbm_custom custom;
+    uint8_t frame[MBM_MAX_FRAME];
+    mbm_port port;
+    mbm_tty tty;
+    unsigned i;
+
+    (void)state;
+    unit.id = 0x11;
+    custom.code = 0x41;
+    custom.serve = pending;
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
+    port = mbm_tty_port(&tty);
+    OK(mbm_server_serveCustom(&unit, &custom));
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    assert_int_equal(write(line.ours, request, sizeof request), sizeof request);
+    AWAIT((OK(mbm_server_poll(&server)), mbm_server_pollDelay(&server) == 1000));
+    assert_int_equal(write(line.ours, request, sizeof request), sizeof request);
+    assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), 1);
+    for (i = 0; i < 10; i++) {
+        OK(mbm_server_poll(&server));
+        assert_int_equal(mbm_tty_wait(&tty, mbm_server_pollDelay(&server)), 0);
+    }
+    mbm_tty_close(&tty);
+}
+
+static void nothing(int signal_number)
+{
+    (void)signal_number;
+}
+
+static volatile int waited;
+
+/* A signal before the wait is lost on it: so one after the other. */
+static void *interrupt(void *thread)
+{
+    while (!waited) {
+        usleep(10000);
+        pthread_kill(*(pthread_t *)thread, SIGUSR1);
+    }
+    return NULL;
+}
+
+static void a_signal_ends_the_wait(void **state)
+{
+    struct sigaction action = {0};
+    pthread_t self = pthread_self(), other;
+    double start = seconds();
+    mbm_tty tty;
+
+    (void)state;
+    action.sa_handler = nothing;
+    sigaction(SIGUSR1, &action, NULL);
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
+    assert_int_equal(pthread_create(&other, NULL, interrupt, &self), 0);
+    assert_int_equal(mbm_tty_wait(&tty, 60000000), 0);
+    waited = 1;
+    pthread_join(other, NULL);
+    assert_true(seconds() - start < 50);
+    mbm_tty_close(&tty);
+}
+
+#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(wait_ends_with_a_byte_with_the_time_or_with_the_line),
+        TEST(bytes_that_are_not_read_do_not_end_the_next_wait),
+        TEST(a_server_with_a_pending_function_sleeps_between_polls),
+        TEST(a_signal_ends_the_wait),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

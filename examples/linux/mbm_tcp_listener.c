@@ -1,0 +1,191 @@
+/* The listener of mbm_tcp.h. Licence: MIT OR Apache-2.0. */
+#define _GNU_SOURCE
+#include "mbm_tcp.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <string.h>
+#include <unistd.h>
+
+/* Connections that one mbm_tcp_accept turns away at most, so that a flood of them does
+ * not keep a program from those that it serves. */
+enum { TURNED_AWAY = 64 };
+
+static int refuse(int error)
+{
+    errno = error;
+    return -1;
+}
+
+static uint16_t port_of(int fd)
+{
+    struct sockaddr_storage address;
+    socklen_t size = sizeof address;
+
+    memset(&address, 0, sizeof address);
+    if (getsockname(fd, (struct sockaddr *)&address, &size) < 0)
+        return 0;
+    if (address.ss_family == AF_INET6)
+        return ntohs(((struct sockaddr_in6 *)&address)->sin6_port);
+    return ntohs(((struct sockaddr_in *)&address)->sin_port);
+}
+
+static int listen_at(const struct addrinfo *address)
+{
+    int fd = socket(address->ai_family, SOCK_STREAM, 0), one = 1, error;
+
+    if (fd < 0)
+        return -1;
+    /* A server that restarts is not kept from its port by what it left. */
+    (void)setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
+    if (fcntl(fd, F_SETFL, O_NONBLOCK) == 0 && fcntl(fd, F_SETFD, FD_CLOEXEC) == 0 &&
+        bind(fd, address->ai_addr, address->ai_addrlen) == 0 && listen(fd, SOMAXCONN) == 0)
+        return fd;
+    error = errno;
+    close(fd);
+    return refuse(error);
+}
+
+int mbm_tcp_listen(mbm_tcp_listener *listener, const char *host, const char *service)
+{
+    struct addrinfo *found, *one;
+    int fd = -1, error;
+
+    if (listener->port != 0)
+        return refuse(EBUSY);
+    if (mbm_tcp_lookUp(host, service, AI_PASSIVE, &found, &listener->lookup) < 0)
+        return -1;
+    errno = EADDRNOTAVAIL;
+    for (one = found; one && fd < 0; one = one->ai_next)
+        fd = listen_at(one);
+    error = errno;
+    freeaddrinfo(found);
+    if (fd < 0)
+        return refuse(error);
+    listener->fd = fd;
+    listener->port = port_of(fd);
+    listener->awaits = POLLIN;
+    listener->refused = 0;
+    listener->idle = 0;
+    return 0;
+}
+
+/* The end of the stream and no reset, also if a request came with the client. */
+static void turn_away(int fd)
+{
+    uint8_t unread[512];
+    int rounds = 0;
+
+    shutdown(fd, SHUT_WR);
+    while (rounds++ < 8 && recv(fd, unread, sizeof unread, MSG_DONTWAIT) > 0)
+        ;
+    close(fd);
+}
+
+/* Ends the connection that has been idle for longest; whether there was one. */
+static int close_oldest(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
+{
+    int64_t longest = (int64_t)listener->idleTime - 1;
+    mbm_tcp *oldest = NULL;
+    size_t i;
+
+    if (listener->idleTime == 0)
+        return 0;
+    for (i = 0; i < count; i++) {
+        const int64_t idle = tcps[i].isBusy ? -1 : mbm_tcp_idleFor(&tcps[i]);
+
+        if (idle > longest) {
+            longest = idle;
+            oldest = &tcps[i];
+        }
+    }
+    if (!oldest)
+        return 0;
+    mbm_tcp_disconnect(oldest);
+    oldest->error = ETIMEDOUT;
+    listener->idle++;
+    return 1;
+}
+
+static int is_connection_waiting(const mbm_tcp_listener *listener)
+{
+    struct pollfd wait = {listener->fd, POLLIN, 0};
+
+    return poll(&wait, 1, 0) > 0;
+}
+
+static int is_shortage(int error)
+{
+    return error == EMFILE || error == ENFILE || error == ENOBUFS || error == ENOMEM;
+}
+
+/* The descriptor of the next connection. */
+static int take_next(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
+{
+    int fd;
+
+    for (;;) {
+        fd = accept(listener->fd, NULL, NULL);
+        if (fd >= 0)
+            return fd;
+        if (errno == EWOULDBLOCK)
+            return refuse(EAGAIN);
+        if (errno == EINTR || errno == ECONNABORTED)
+            continue;
+        if (is_shortage(errno)) {
+            const int error = errno;
+
+            /* Without a descriptor accept fails also where nothing waits. */
+            if (!is_connection_waiting(listener))
+                return refuse(EAGAIN);
+            if (close_oldest(listener, tcps, count))
+                continue;
+            errno = error;
+        }
+        /* The connection still waits, and would end every wait at once. */
+        listener->awaits = 0;
+        return -1;
+    }
+}
+
+int mbm_tcp_accept(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
+{
+    size_t place = 0;
+    int fd, rounds;
+
+    if (listener->port == 0)
+        return refuse(EBADF);
+    while (place < count && mbm_tcp_isInUse(&tcps[place]))
+        place++;
+    listener->awaits = POLLIN;
+    if (place == count && is_connection_waiting(listener) && close_oldest(listener, tcps, count))
+        return refuse(EAGAIN);
+    for (rounds = 0; rounds < TURNED_AWAY; rounds++) {
+        fd = take_next(listener, tcps, count);
+        if (fd < 0)
+            return -1;
+        if (place < count) {
+            int error;
+
+            if (mbm_tcp_attach(&tcps[place], fd) == 0)
+                return (int)place;
+            error = errno;
+            close(fd);
+            return refuse(error);
+        }
+        listener->refused++;
+        turn_away(fd);
+    }
+    return refuse(EAGAIN);
+}
+
+void mbm_tcp_closeListener(mbm_tcp_listener *listener)
+{
+    if (listener->port != 0)
+        close(listener->fd);
+    listener->fd = -1;
+    listener->port = 0;
+}
