@@ -1,6 +1,6 @@
 //! How each framing finds a request in what arrives, and seals a response.
 
-use super::line::{Lent, Receive, Server};
+use super::line::{Lent, Receive, Seal, Server};
 use crate::error::Status;
 use crate::frame::checksum::crc16;
 use crate::frame::{ascii, rtu, tcp};
@@ -134,6 +134,13 @@ impl<P: Port, B: Lent> Server<P, B> {
         self.last_frame()
     }
 
+    /// True for RTU frames on a serial line, which t3.5 ends.
+    pub fn is_rtu_line(&self) -> bool {
+        let rtu: Seal<P, B> = Self::seal_rtu;
+        let is_rtu = |seal| core::ptr::fn_addr_eq(seal, rtu);
+        self.request.serial && self.seal.is_some_and(is_rtu)
+    }
+
     /// True if what is sent comes back.
     #[inline(always)]
     pub(super) fn drops_echo(&self) -> bool {
@@ -148,9 +155,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     pub fn set_echo_discard(&mut self, on: bool) -> bool {
         let plain: Receive<P, B> = Self::receive_rtu;
         let echoing: Receive<P, B> = Self::receive_behind_echo;
-        let is_rtu = self.receive.is_some_and(|receive| {
-            core::ptr::fn_addr_eq(receive, plain) || core::ptr::fn_addr_eq(receive, echoing)
-        });
+        let is_rtu = self.is_rtu_line();
         if is_rtu {
             self.receive = Some(if on { echoing } else { plain });
             self.sent = 0;

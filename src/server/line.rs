@@ -92,7 +92,7 @@ pub struct Server<P, B> {
     /// The silence that ends a frame.
     silence: u32,
     pub(super) receive: Option<Receive<P, B>>,
-    seal: Option<Seal<P, B>>,
+    pub(super) seal: Option<Seal<P, B>>,
     /// What the caller lends.
     pub lent: B,
     /// The byte stream.
@@ -149,6 +149,15 @@ impl<P: Port, B: Lent> Server<P, B> {
         self.seal = Some(seal);
         self.ahead = 0;
         self.listen();
+    }
+
+    /// Switches the driver off where a response is leaving: what begins a server anew
+    /// calls this first, with the port that the response went to.
+    pub fn stop_sending(&mut self) {
+        if self.phase == Phase::Send {
+            self.phase = Phase::Listen;
+            self.port.post_transmission();
+        }
     }
 
     /// Sets the silence that ends a frame, in microseconds: t3.5 for RTU, the
