@@ -216,6 +216,62 @@ static void a_poll_ends_though_a_peer_floods(void **state)
     assert_int_equal(wire.length, 0);
 }
 
+/* Noise that does not end before 20000 bytes of it were taken. */
+static int16_t noisy_read(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    unsigned *taken = context;
+
+    if (*taken > 20000)
+        return 0;
+    memset(bytes, 0x41, capacity);
+    *taken += capacity;
+    return (int16_t)capacity;
+}
+
+static void a_poll_takes_no_more_than_some_hundred_bytes_of_noise(void **state)
+{
+    uint8_t (*const begins[])(mbm_server *, const mbm_port *, mbm_unit *, uint8_t, uint8_t *,
+                              uint16_t) = {mbm_server_begin, mbm_server_beginAscii,
+                                           mbm_server_beginRtuOverTcp};
+    unsigned taken, i, polls;
+    mbm_port noisy = port;
+
+    (void)state;
+    noisy.read = noisy_read;
+    noisy.context = &taken;
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    for (i = 0; i < COUNT(begins); i++) {
+        OK(begins[i](&server, &noisy, &unit, 1, frame, 64));
+        for (polls = 0; polls < 10; polls++) {
+            taken = 0;
+            OK(mbm_server_poll(&server));
+            assert_in_range(taken, 1, 1200);
+        }
+    }
+}
+
+static void a_frame_that_fills_the_buffer_behind_noise_is_answered(void **state)
+{
+    static const uint8_t write[] = {17, 16, 0, 0, 0, 2, 4, 1, 2, 3, 4, 0, 0};
+    unsigned noise, i;
+
+    (void)state;
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, 16));
+    for (noise = 0; noise < 100; noise++) {
+        memset(wire.arriving, 0x5A, noise);
+        memcpy(wire.arriving + noise, write, sizeof write);
+        (void)seal(wire.arriving + noise, 11);
+        wire.first = wire.length = 0;
+        wire.last = noise + 13;
+        words[1] = 0;
+        for (i = 0; i < 100; i++)
+            OK(mbm_server_poll(&server));
+        assert_int_equal(wire.length, 8);
+        assert_int_equal(words[1], 0x0304);
+    }
+}
+
 static void tables_without_storage_have_no_cells(void **state)
 {
     (void)state;
@@ -561,6 +617,8 @@ int main(void)
         TEST(what_a_unit_does_not_serve_is_exception_01),
         TEST(a_unit_without_services_is_none),
         TEST(a_poll_ends_though_a_peer_floods),
+        TEST(a_poll_takes_no_more_than_some_hundred_bytes_of_noise),
+        TEST(a_frame_that_fills_the_buffer_behind_noise_is_answered),
         TEST(tables_without_storage_have_no_cells),
         TEST(serving_twice_is_serving_once),
         TEST(mask_and_read_write_want_holding_registers),

@@ -119,18 +119,24 @@ impl Crc16 {
         Crc16(update(self.0, bytes))
     }
 
-    /// The CRC before `byte` was taken in, from the CRC with it.
+    /// The CRC before `byte` was taken in, from the CRC with it: [`by_parity`] the
+    /// other way round, eight steps at once.
+    #[inline(always)]
     #[must_use]
     pub fn before(self, byte: u8) -> Crc16 {
-        let mut crc = self.0;
-        for _ in 0..8 {
-            let odd = crc & 0x8000 != 0;
-            crc <<= 1;
-            if odd {
-                crc ^= 0x4003;
-            }
-        }
-        Crc16(crc ^ u16::from(byte))
+        let [low, high] = self.0.to_le_bytes();
+        // The upper half is the Gray code of the byte that was shifted out, less that
+        // byte's last bit; its top bit, the parity of all eight, turned two bits over.
+        let odd = high >> 7;
+        let gray = if odd != 0 { high ^ 0xC0 } else { high };
+        let pairs = gray & 0x55;
+        let pairs = pairs ^ pairs >> 4;
+        let last = (pairs ^ pairs >> 2 ^ odd) & 1;
+        let out = gray ^ gray >> 1;
+        let out = out ^ out >> 2;
+        let out = (out ^ out >> 4) << 1 | last;
+        let low = low ^ odd ^ out << 6 ^ out << 7;
+        Crc16(u16::from_le_bytes([out ^ byte, low]))
     }
 
     /// The two bytes as sent, low byte first.

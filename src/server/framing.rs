@@ -11,12 +11,12 @@ use crate::time;
 use crate::FIRMWARE;
 use core::cell::Cell;
 
-/// Bytes that are given up at once where the buffer is full.
-const SLIDE: usize = 16;
+/// Bytes that are given up at once where the buffer is full: fewer cost more time, more
+/// cost a request that takes all of the buffer but a few bytes.
+const SLIDE: usize = 4;
 
-/// Reads of one poll at most, where a peer floods with what is no frame. As many as a
-/// frame has bytes, and more.
-const MOST_READS: u16 = 512;
+/// Bytes that one poll takes at most, where a peer floods with what is no frame.
+const MOST_BYTES: u16 = 512;
 
 /// The inter-character timeout of ASCII (serial line guide V1.02, 2.5.2.1).
 const ASCII_TIMEOUT: u32 = time::millis(1000);
@@ -104,18 +104,8 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// nobody saw, for poll came late, the last frame counts: one of ours that
     /// is followed by another is no longer waited for.
     fn receive_rtu(&mut self) -> Status {
-        self.make_room();
-        if FIRMWARE {
-            let heard = self.hear(usize::MAX);
-            return if heard > 0 {
-                Status::OK
-            } else {
-                self.receive_no_more(heard)
-            };
-        }
-        let heard = self.take(usize::MAX);
+        let heard = self.hear(usize::MAX);
         if heard > 0 {
-            self.note(heard as u16);
             return Status::OK;
         }
         self.receive_no_more(heard)
@@ -182,23 +172,23 @@ impl<P: Port, B: Lent> Server<P, B> {
         Status::OK
     }
 
-    /// Gives up the oldest bytes of a full buffer, unless it ends with a frame.
-    #[inline(always)]
-    fn make_room(&mut self) {
-        if usize::from(self.end) == self.lent.frame().len() {
-            self.slide();
-        }
-    }
-
-    #[cfg_attr(target_os = "none", inline(always))]
-    #[cfg_attr(not(target_os = "none"), cold)]
-    fn slide(&mut self) {
-        let frame = self.lent.frame();
-        if rtu::last(frame) == frame.len() {
+    /// Takes one byte more into a full buffer, and gives up the oldest for it. A buffer
+    /// that is full and silent may hold a frame.
+    pub(super) fn hear_beyond(&mut self) -> i16 {
+        let heard = self.hear_at(0, 1);
+        if heard > 0 {
+            let capacity = self.lent.capacity();
+            let frame = self.lent.part(0, capacity);
+            let newest = frame.first().copied().unwrap_or(0);
             shift(frame, SLIDE);
-            self.end -= SLIDE as u16;
+            // One of those that were given up has come back.
+            self.end = (capacity - SLIDE) as u16 + 1;
+            if let [place, ..] = self.lent.part(capacity - SLIDE, capacity) {
+                *place = newest;
+            }
             self.request.overrun = true;
         }
+        heard
     }
 
     /// Moves the last frame of what arrived to the front.
@@ -223,7 +213,8 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// Frames that tell their length are taken one by one; for others, and to
     /// find the way back, there is silence.
     fn receive_by_length(&mut self) -> Status {
-        for _ in 0..MOST_READS {
+        let mut taken = 0;
+        while taken < MOST_BYTES {
             let end = usize::from(self.end);
             let frame = self.lent.frame();
             let capacity = frame.len();
@@ -250,17 +241,11 @@ impl<P: Port, B: Lent> Server<P, B> {
                 Some((total, _)) if !self.astray => total,
                 _ => usize::MAX,
             };
-            self.make_room();
             let heard = self.hear(until);
-            if heard < 0 {
-                return Status::LINK_LOST;
+            if heard <= 0 {
+                return self.receive_no_more(heard);
             }
-            if heard == 0 {
-                if self.end == 0 || !self.is_silent() {
-                    return Status::OK;
-                }
-                return self.last_frame();
-            }
+            taken += heard as u16;
         }
         Status::OK
     }
@@ -290,9 +275,9 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// Byte by byte, for a colon begins a frame wherever it stands, and what
     /// follows a frame belongs to the next.
     fn receive_ascii(&mut self) -> Status {
-        loop {
+        for _ in 0..MOST_BYTES {
             let end = usize::from(self.end);
-            let heard = self.hear(end + 1);
+            let heard = self.hear_at(end, end + 1);
             if heard < 0 {
                 return Status::LINK_LOST;
             }
@@ -320,6 +305,7 @@ impl<P: Port, B: Lent> Server<P, B> {
                 _ => {}
             }
         }
+        Status::OK
     }
 
     fn seal_ascii(&mut self, length: usize) -> usize {
@@ -398,7 +384,7 @@ impl<P: Port, B: Lent> Server<P, B> {
                 return self.found_in_stream(until);
             }
             let heard = if FIRMWARE {
-                self.hear(until)
+                self.hear_at(end, until)
             } else {
                 self.take(until)
             };

@@ -27,6 +27,17 @@ pub trait Lent {
     /// The storage of one frame: a request first, then its response.
     fn frame(&mut self) -> &mut [u8];
 
+    /// How many bytes that storage has.
+    fn capacity(&mut self) -> usize {
+        self.frame().len()
+    }
+
+    /// The bytes of that storage from `start` to `end`, both of which lie in it, the first
+    /// not behind the second.
+    fn part(&mut self, start: usize, end: usize) -> &mut [u8] {
+        self.frame().get_mut(start..end).unwrap_or_default()
+    }
+
     /// How long the requests of a user's function are, for framings without
     /// silence.
     fn rule(&self, function: u8) -> Option<Rule> {
@@ -151,13 +162,10 @@ impl<P: Port, B: Lent> Server<P, B> {
         self.listen();
     }
 
-    /// Switches the driver off where a response is leaving: what begins a server anew
-    /// calls this first, with the port that the response went to.
-    pub fn stop_sending(&mut self) {
-        if self.phase == Phase::Send {
-            self.phase = Phase::Listen;
-            self.port.post_transmission();
-        }
+    /// True while a response is leaving, with the driver on.
+    #[inline(always)]
+    pub fn is_sending(&self) -> bool {
+        self.phase == Phase::Send
     }
 
     /// Sets the silence that ends a frame, in microseconds: t3.5 for RTU, the
@@ -218,18 +226,27 @@ impl<P: Port, B: Lent> Server<P, B> {
         Status::MALFORMED_FRAME
     }
 
-    /// Receives up to the place `until` of the buffer, into the CRC too: how many bytes, negative
-    /// if the link is lost.
-    #[cfg_attr(target_os = "none", inline(never))]
+    /// As [`Server::hear_at`], to the end of what has arrived; a full buffer gives up its
+    /// oldest bytes.
+    #[inline(always)]
     pub(super) fn hear(&mut self, until: usize) -> i16 {
-        let frame = self.lent.frame();
-        let until = until.min(frame.len());
-        let Some(room) = frame.get_mut(usize::from(self.end)..until) else {
-            return 0;
-        };
-        if room.is_empty() {
+        let end = usize::from(self.end);
+        if end == self.lent.capacity() {
+            self.hear_beyond()
+        } else {
+            self.hear_at(end, until)
+        }
+    }
+
+    /// Receives from one place of the buffer up to another, or to its end, into the CRC
+    /// too: how many bytes, negative if the link is lost.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn hear_at(&mut self, start: usize, until: usize) -> i16 {
+        let until = until.min(self.lent.capacity());
+        if start >= until {
             return 0;
         }
+        let room = self.lent.part(start, until);
         let heard = self.port.read(room);
         if heard > 0 {
             // A microcontroller takes the CRC of bytes that need none, too: that is
@@ -243,17 +260,6 @@ impl<P: Port, B: Lent> Server<P, B> {
             self.last_byte = self.now;
         }
         heard
-    }
-
-    /// So many bytes have arrived of an RTU frame, up to the end of what has: what
-    /// [`Server::hear`] does behind [`Server::take`].
-    #[inline(never)]
-    pub(super) fn note(&mut self, heard: u16) {
-        self.last_byte = self.now;
-        let frame = self.lent.frame();
-        if let Some(news) = frame.get(usize::from(self.end - heard)..usize::from(self.end)) {
-            self.crc = self.crc.with(news);
-        }
     }
 
     /// As [`Server::hear`], without CRC and time.
@@ -446,28 +452,27 @@ impl<P: Port, B: Lent> Server<P, B> {
 
     #[cfg_attr(target_os = "none", inline(never))]
     fn send(&mut self) -> Status {
-        let frame = self.lent.frame();
-        let rest = frame.get(usize::from(self.sent)..usize::from(self.end));
-        let rest = rest.unwrap_or_default();
+        let mut status = Status::OK;
+        let rest = self.lent.part(self.sent.into(), self.end.into());
         if !rest.is_empty() {
             let sent = self.port.write(rest);
             if sent < 0 {
-                self.end_transmission();
-                return Status::LINK_LOST;
-            }
-            self.sent += sent as u16;
-            if self.sent < self.end {
-                return Status::OK;
+                status = Status::LINK_LOST;
+            } else {
+                self.sent += sent as u16;
+                if self.sent < self.end {
+                    return status;
+                }
             }
         }
-        if self.port.flush() {
+        if status == Status::LINK_LOST || self.port.flush() {
             // An echo, where one is waited for, comes from here on.
             if FIRMWARE || self.keeps_time() {
                 self.last_byte = self.now;
             }
             self.end_transmission();
         }
-        Status::OK
+        status
     }
 
     #[cfg_attr(not(target_os = "none"), inline(always))]

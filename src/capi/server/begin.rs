@@ -4,6 +4,7 @@ use super::{check, core_of, mbm_server, mbm_unit, Object, BEGUN, POLLING};
 use crate::capi::frame::MBM_MAX_TCP_FRAME;
 use crate::capi::port::{countable, mbm_port};
 use crate::error::Status;
+use crate::port::Port;
 use crate::time;
 
 /// The least that a frame buffer may have for RTU.
@@ -38,22 +39,19 @@ unsafe fn begin(
         }
         let core = core_of(server);
         let mark = &raw mut (*server.cast::<Object>()).mark;
-        // The driver of the port that is given up is not left on.
-        mark.write(POLLING);
-        (*core).stop_sending();
         mark.write(BEGUN);
-        // Field by field, which needs no memory function.
-        (*core).port.context = (*port).context;
-        (*core).port.read = (*port).read;
-        (*core).port.write = (*port).write;
-        (*core).port.micros = (*port).micros;
-        (*core).port.flush = (*port).flush;
-        (*core).port.preTransmission = (*port).preTransmission;
-        (*core).port.postTransmission = (*port).postTransmission;
+        let given_up = (*core).is_sending().then_some((*core).port);
+        (*core).port.copy(&*port);
         (*core).lent.frame = frame;
         (*core).lent.units = units;
         (*core).lent.bytes = countable(bytes);
         (*core).lent.count = count;
+        // The driver of the port that the object had is not left on.
+        if let Some(mut port) = given_up {
+            mark.write(POLLING);
+            port.post_transmission();
+            mark.write(BEGUN);
+        }
     }
     Status::OK
 }

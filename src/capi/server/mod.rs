@@ -99,6 +99,18 @@ impl Lent for LentByC {
         }
     }
 
+    fn capacity(&mut self) -> usize {
+        self.bytes.into()
+    }
+
+    fn part(&mut self, start: usize, end: usize) -> &mut [u8] {
+        debug_assert!(start <= end && end <= self.bytes.into());
+        // SAFETY: begin demands a buffer of so many bytes for as long as the object is
+        // used, and the core keeps to the contract of `part`: places come from what a
+        // port took or gave, of which more than there was room for does not count.
+        unsafe { from_raw_parts_mut(self.frame.add(start), end - start) }
+    }
+
     fn rule(&self, function: u8) -> Option<Rule> {
         // SAFETY: begin demands so many units for as long as the object is used.
         unsafe { units::rule(self.units, self.count, function) }
