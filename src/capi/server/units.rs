@@ -4,7 +4,6 @@ use super::{custom, mbm_diagnostics};
 use crate::error::Status;
 use crate::pdu::custom::Rule;
 use crate::server::{only_writes, Concern, Heading, Reply};
-use crate::FIRMWARE;
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 
@@ -43,7 +42,7 @@ pub(super) type Serve =
 pub struct mbm_unit {
     /// Private: the records, in the order in which they are asked, then NULL.
     pub services: [*mut mbm_service; MBM_MAX_SERVICES as usize],
-    /// Not for you.
+    /// Private: NULL in a unit that serves nothing.
     pub serve: Option<
         unsafe extern "C" fn(
             unit: *mut mbm_unit,
@@ -85,6 +84,9 @@ pub(super) unsafe fn add(unit: *mut mbm_unit, service: *mut mbm_service, serve: 
         *place = service;
         if (*service).serve.is_none() {
             (*service).serve = Some(serve);
+        }
+        if (*unit).serve.is_none() {
+            (*unit).serve = Some(walk_if_meant);
         }
     }
     Status::OK.code()
@@ -128,16 +130,6 @@ impl Iterator for Places {
     }
 }
 
-/// True for a unit without a record: it is silent.
-///
-/// # Safety
-/// `unit` is one.
-#[inline(always)]
-unsafe fn serves_nothing(unit: *const mbm_unit) -> bool {
-    // SAFETY: as the caller promises.
-    unsafe { Places::new(unit).next().is_none() }
-}
-
 /// The PDU of a request with the room behind it, and its length.
 ///
 /// # Safety
@@ -155,7 +147,6 @@ pub(super) unsafe fn request<'a>(pdu: *mut u8, heading: *const c_void) -> (&'a m
 ///
 /// # Safety
 /// `unit` is one, and `pdu` has the bytes and the room that `heading` says.
-#[cfg_attr(target_os = "none", inline(never))]
 #[cfg_attr(not(target_os = "none"), inline(always))]
 pub(super) unsafe fn walk(unit: *mut mbm_unit, pdu: *mut u8, heading: *const Heading) -> u16 {
     // SAFETY: as the caller promises.
@@ -173,43 +164,30 @@ pub(super) unsafe fn walk(unit: *mut mbm_unit, pdu: *mut u8, heading: *const Hea
     Reply::ILLEGAL_FUNCTION.code()
 }
 
+/// What a unit has as its function that takes no notice of frames for others.
+///
+/// # Safety
+/// As for [`walk`].
+unsafe extern "C" fn walk_if_meant(
+    unit: *mut mbm_unit,
+    heading: *const c_void,
+    concern: u8,
+    pdu: *mut u8,
+) -> u16 {
+    if concern == Concern::Foreign as u8 {
+        return Reply::SILENT.code();
+    }
+    // SAFETY: as the caller promises.
+    unsafe { walk(unit, pdu, heading.cast()) }
+}
+
 /// Has each unit look at a frame; the first that it is for answers.
 ///
 /// # Safety
 /// `units` points to `count` units, and `pdu` has the bytes and the room that
 /// `heading` says.
 #[cfg_attr(target_os = "none", inline(never))]
-#[cfg_attr(not(target_os = "none"), inline(always))]
 pub(super) unsafe fn serve(
-    units: *mut mbm_unit,
-    count: u8,
-    heading: *const Heading,
-    pdu: *mut u8,
-) -> u16 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        // One unit alone, which takes no notice of what is others', and is asked by
-        // its id: soon done.
-        if !FIRMWARE
-            && count == 1
-            && (*units).serve.is_none()
-            && (*heading).length != 0
-            && (*heading).to == (*units).id
-            && (*heading).to != 0
-            && !serves_nothing(units)
-        {
-            return walk(units, pdu, heading);
-        }
-        serve_each(units, count, heading, pdu)
-    }
-}
-
-/// [`serve`], whatever the units.
-///
-/// # Safety
-/// As for [`serve`].
-#[cfg_attr(not(target_os = "none"), inline(never))]
-unsafe fn serve_each(
     units: *mut mbm_unit,
     count: u8,
     heading: *const Heading,
@@ -219,26 +197,19 @@ unsafe fn serve_each(
     // SAFETY: as the caller promises.
     unsafe {
         let mut unit = units;
-        let end = units.add(count.into());
         let mut all = (*heading).concern_of_all();
-        while unit != end {
-            let mut concern = all;
-            if concern == Concern::Own && !(*heading).is_for((*unit).id) {
-                concern = Concern::Foreign;
-            }
-            // Only who takes notice of all frames has a function for that, and a
-            // unit without any service is none.
-            let mut reply = Reply::SILENT.code();
-            if let Some(monitor) = (*unit).serve {
-                reply = monitor(unit, heading.cast(), concern as u8, pdu);
-            } else if serves_nothing(unit) {
-                concern = Concern::Foreign;
-            } else if concern != Concern::Foreign {
-                reply = walk(unit, pdu, heading);
-            }
-            if concern == Concern::Own {
-                answer = reply;
-                all = Concern::Foreign;
+        for _ in 0..count {
+            // A unit that serves nothing has no function, and is as if it were not there.
+            if let Some(serve) = (*unit).serve {
+                let mut concern = all;
+                if concern == Concern::Own && !(*heading).is_for((*unit).id) {
+                    concern = Concern::Foreign;
+                }
+                let reply = serve(unit, heading.cast(), concern as u8, pdu);
+                if concern == Concern::Own {
+                    answer = reply;
+                    all = Concern::Foreign;
+                }
             }
             unit = unit.add(1);
         }
