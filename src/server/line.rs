@@ -351,10 +351,8 @@ impl<P: Port, B: Lent> Server<P, B> {
             self.request.again = true;
             return false;
         }
-        let head = usize::from(self.request.head);
-        let Some(pdu) = self.lent.frame().get_mut(head..) else {
-            return true;
-        };
+        let capacity = self.lent.capacity();
+        let pdu = self.lent.part(self.request.head.into(), capacity);
         let length = reply.settle(pdu);
         match self.seal {
             Some(seal) if length != 0 => {
@@ -366,6 +364,15 @@ impl<P: Port, B: Lent> Server<P, B> {
             _ => self.listen(),
         }
         true
+    }
+
+    /// As [`Server::answer`], and sends what it can of a response.
+    #[inline(always)]
+    pub(crate) fn answer_and_send(&mut self, reply: Reply) -> Status {
+        if !self.answer(reply) || self.phase != Phase::Send {
+            return Status::OK;
+        }
+        self.send()
     }
 
     /// As [`Server::answer`], and what to return, unless [`Server::poll`] is to go

@@ -4,7 +4,6 @@ use super::{check, core_of, mbm_server, mbm_unit, Object, BEGUN, POLLING};
 use crate::capi::frame::MBM_MAX_TCP_FRAME;
 use crate::capi::port::{countable, mbm_port};
 use crate::error::Status;
-use crate::port::Port;
 use crate::time;
 
 /// The least that a frame buffer may have for RTU.
@@ -40,16 +39,16 @@ unsafe fn begin(
         let core = core_of(server);
         let mark = &raw mut (*server.cast::<Object>()).mark;
         mark.write(BEGUN);
-        let given_up = (*core).is_sending().then_some((*core).port);
+        let driver = ((*core).port.postTransmission, (*core).port.context);
         (*core).port.copy(&*port);
         (*core).lent.frame = frame;
         (*core).lent.units = units;
         (*core).lent.bytes = countable(bytes);
         (*core).lent.count = count;
         // The driver of the port that the object had is not left on.
-        if let Some(mut port) = given_up {
+        if let ((Some(post), context), true) = (driver, (*core).is_sending()) {
             mark.write(POLLING);
-            port.post_transmission();
+            post(context);
             mark.write(BEGUN);
         }
     }

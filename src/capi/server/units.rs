@@ -86,7 +86,7 @@ pub(super) unsafe fn add(unit: *mut mbm_unit, service: *mut mbm_service, serve: 
             (*service).serve = Some(serve);
         }
         if (*unit).serve.is_none() {
-            (*unit).serve = Some(walk_if_meant);
+            (*unit).serve = Some(walk);
         }
     }
     Status::OK.code()
@@ -143,32 +143,12 @@ pub(super) unsafe fn request<'a>(pdu: *mut u8, heading: *const c_void) -> (&'a m
     }
 }
 
-/// Has the services of a unit look at a request, one after the other.
+/// Has the services of a unit look at a request, one after the other, unless it is for
+/// others: the function of a unit that takes no notice of those.
 ///
 /// # Safety
 /// `unit` is one, and `pdu` has the bytes and the room that `heading` says.
-#[cfg_attr(not(target_os = "none"), inline(always))]
-pub(super) unsafe fn walk(unit: *mut mbm_unit, pdu: *mut u8, heading: *const Heading) -> u16 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        for service in Places::new(unit) {
-            // A record that was zeroed has no function.
-            if let Some(serve) = (*service).serve {
-                let reply = serve(service, pdu, heading.cast());
-                if reply != Reply::NOT_MINE.code() {
-                    return reply;
-                }
-            }
-        }
-    }
-    Reply::ILLEGAL_FUNCTION.code()
-}
-
-/// What a unit has as its function that takes no notice of frames for others.
-///
-/// # Safety
-/// As for [`walk`].
-unsafe extern "C" fn walk_if_meant(
+pub(super) unsafe extern "C" fn walk(
     unit: *mut mbm_unit,
     heading: *const c_void,
     concern: u8,
@@ -178,7 +158,18 @@ unsafe extern "C" fn walk_if_meant(
         return Reply::SILENT.code();
     }
     // SAFETY: as the caller promises.
-    unsafe { walk(unit, pdu, heading.cast()) }
+    unsafe {
+        for service in Places::new(unit) {
+            // A record that was zeroed has no function.
+            if let Some(serve) = (*service).serve {
+                let reply = serve(service, pdu, heading);
+                if reply != Reply::NOT_MINE.code() {
+                    return reply;
+                }
+            }
+        }
+    }
+    Reply::ILLEGAL_FUNCTION.code()
 }
 
 /// Has each unit look at a frame; the first that it is for answers.
