@@ -172,35 +172,30 @@ impl<P: Port, B: Lent> Server<P, B> {
         Status::OK
     }
 
-    /// Takes one byte more into a full buffer, and gives up the oldest for it. A buffer
-    /// that is full and silent may hold a frame.
-    pub(super) fn hear_beyond(&mut self) -> i16 {
-        let heard = self.hear_at(0, 1);
-        if heard > 0 {
-            let capacity = self.lent.capacity();
-            let frame = self.lent.part(0, capacity);
-            let newest = frame.first().copied().unwrap_or(0);
-            shift(frame, SLIDE);
-            // One of those that were given up has come back.
-            self.end = (capacity - SLIDE) as u16 + 1;
-            if let [place, ..] = self.lent.part(capacity - SLIDE, capacity) {
-                *place = newest;
-            }
-            self.request.overrun = true;
+    /// Gives up the oldest bytes of a full buffer, whose first is the newest: where that
+    /// stands from now on.
+    #[cfg_attr(target_os = "none", inline(always))]
+    #[cfg_attr(not(target_os = "none"), cold)]
+    pub(super) fn slide(&mut self) -> usize {
+        self.request.overrun = true;
+        let capacity = self.lent.capacity();
+        let place = capacity.saturating_sub(SLIDE);
+        let frame = self.lent.part(0, capacity);
+        let newest = frame.first().copied().unwrap_or(0);
+        shift(frame, SLIDE);
+        if let [last, ..] = self.lent.part(place, capacity) {
+            *last = newest;
         }
-        heard
+        place
     }
 
     /// Moves the last frame of what arrived to the front.
-    #[cfg_attr(target_os = "none", inline(never))]
     fn last_frame(&mut self) -> Status {
         let end = usize::from(self.end);
         if !FIRMWARE && self.crc.is_residue() && !self.request.overrun {
             return self.found(end.saturating_sub(rtu::OVERHEAD));
         }
-        let Some(frame) = self.lent.frame().get_mut(..end) else {
-            return Status::OK;
-        };
+        let frame = self.lent.part(0, end);
         let start = if self.crc.is_residue() && !self.request.overrun {
             0
         } else {
@@ -264,12 +259,11 @@ impl<P: Port, B: Lent> Server<P, B> {
 
     fn seal_rtu(&mut self, length: usize) -> usize {
         let end = rtu::PDU + length;
-        if let Some((content, behind)) = self.lent.frame().split_at_mut_checked(end) {
-            if let Some(crc) = behind.first_chunk_mut() {
-                *crc = crc16(content).to_bytes();
-            }
+        let crc = crc16(self.lent.part(0, end)).to_bytes();
+        if let [low, high] = self.lent.part(end, end + 2) {
+            [*low, *high] = crc;
         }
-        length + rtu::OVERHEAD
+        end + 2
     }
 
     /// Byte by byte, for a colon begins a frame wherever it stands, and what
@@ -277,16 +271,18 @@ impl<P: Port, B: Lent> Server<P, B> {
     fn receive_ascii(&mut self) -> Status {
         for _ in 0..MOST_BYTES {
             let end = usize::from(self.end);
-            let heard = self.hear_at(end, end + 1);
+            if end == self.lent.capacity() {
+                self.request.overrun = true;
+                return self.found(0);
+            }
+            let heard = self.hear(end + 1);
             if heard < 0 {
                 return Status::LINK_LOST;
             }
             if heard == 0 {
-                let full = end == self.lent.frame().len();
-                if end == 0 || !(full || self.is_silent()) {
+                if end == 0 || !self.is_silent() {
                     return Status::OK;
                 }
-                self.request.overrun = full;
                 return self.found(0);
             }
             let delimiter = self.delimiter;
@@ -384,7 +380,7 @@ impl<P: Port, B: Lent> Server<P, B> {
                 return self.found_in_stream(until);
             }
             let heard = if FIRMWARE {
-                self.hear_at(end, until)
+                self.hear(until)
             } else {
                 self.take(until)
             };

@@ -226,38 +226,32 @@ impl<P: Port, B: Lent> Server<P, B> {
         Status::MALFORMED_FRAME
     }
 
-    /// As [`Server::hear_at`], to the end of what has arrived; a full buffer gives up its
-    /// oldest bytes.
-    #[inline(always)]
-    pub(super) fn hear(&mut self, until: usize) -> i16 {
-        let end = usize::from(self.end);
-        if end == self.lent.capacity() {
-            self.hear_beyond()
-        } else {
-            self.hear_at(end, until)
-        }
-    }
-
-    /// Receives from one place of the buffer up to another, or to its end, into the CRC
-    /// too: how many bytes, negative if the link is lost.
+    /// Receives behind what has arrived, up to the place `until` of the buffer or to its
+    /// end, into the CRC too: how many bytes, negative if the link is lost. A full buffer
+    /// takes one byte and gives up its oldest for it, once there is one: one that is full
+    /// and silent may hold a frame.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn hear_at(&mut self, start: usize, until: usize) -> i16 {
-        let until = until.min(self.lent.capacity());
-        if start >= until {
-            return 0;
+    pub(super) fn hear(&mut self, until: usize) -> i16 {
+        let capacity = self.lent.capacity();
+        let mut start = usize::from(self.end);
+        let is_full = start == capacity;
+        let mut until = until.min(capacity);
+        if is_full {
+            (start, until) = (0, 1);
         }
-        let room = self.lent.part(start, until);
-        let heard = self.port.read(room);
+        let heard = self.port.read(self.lent.part(start, until));
         if heard > 0 {
+            self.last_byte = self.now;
+            if is_full {
+                start = self.slide();
+            }
+            let end = start + heard as usize;
+            self.end = end as u16;
             // A microcontroller takes the CRC of bytes that need none, too: that is
             // less code, and one framing is all it has.
             if FIRMWARE || usize::from(self.request.head) == rtu::PDU {
-                if let Some(news) = room.get(..heard as usize) {
-                    self.crc = self.crc.with(news);
-                }
+                self.crc = self.crc.with(self.lent.part(start, end));
             }
-            self.end += heard as u16;
-            self.last_byte = self.now;
         }
         heard
     }
@@ -281,7 +275,6 @@ impl<P: Port, B: Lent> Server<P, B> {
     }
 
     /// True once the line has been silent for as long as ends a frame.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn is_silent(&self) -> bool {
         time::has_elapsed(self.silence, self.now, self.last_byte)
     }
@@ -303,7 +296,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// that arrived damaged.
     pub(super) fn found(&mut self, length: usize) -> Status {
         let head = usize::from(self.request.head);
-        let unit = self.lent.frame().get(head - 1);
+        let unit = self.lent.part(head - 1, head).first();
         let unit = unit.copied().unwrap_or(0);
         self.found_for(unit, if length > MAX_PDU { 0 } else { length as u16 })
     }
@@ -457,7 +450,6 @@ impl<P: Port, B: Lent> Server<P, B> {
         reply.settle(self.pdu())
     }
 
-    #[cfg_attr(target_os = "none", inline(never))]
     fn send(&mut self) -> Status {
         let mut status = Status::OK;
         let rest = self.lent.part(self.sent.into(), self.end.into());

@@ -181,11 +181,11 @@ pub fn serve_as(
     if role == Role::NONE {
         return Reply::NOT_MINE;
     }
-    let Some(&[_, a, b, c, d, count]) = pdu.first_chunk() else {
+    let [_, a, b, c, d, count, ..] = &*pdu else {
         return Reply::NOT_MINE;
     };
-    let address = u16::from_be_bytes([a, b]);
-    let mut quantity = u16::from_be_bytes([c, d]);
+    let (address, count) = (u16::from_be_bytes([*a, *b]), *count);
+    let mut quantity = u16::from_be_bytes([*c, *d]);
     let mut most = MAX_READ_REGISTERS;
     if role == Role::WRITE_SEVERAL {
         most = MAX_WRITE_REGISTERS;

@@ -102,7 +102,7 @@ impl Access for Table {
             // What says where the cells are is taken once, for a hook may zero the
             // record or set it up anew.
             let cells = (*table).words.cast::<u8>();
-            let bits = Kind::from_code((*table).kind).is_bits();
+            let kind = Kind::from_code((*table).kind);
             let first = address.wrapping_sub((*table).base);
             if cells.is_null() || !covers(table, first, quantity) {
                 return Reply::ILLEGAL_DATA_ADDRESS.exception_code();
@@ -116,9 +116,7 @@ impl Access for Table {
                     }
                 }
             }
-            if way != Way::Check {
-                transfer(cells, bits, writes, first, quantity, data);
-            }
+            transfer(cells, kind, way, first, quantity, data);
             if writes {
                 if let Some(hook) = (*table).after {
                     hook((*table).context, address, quantity);
@@ -174,12 +172,16 @@ unsafe fn are_all_on(map: *const u8, mut first: u16, quantity: u16) -> bool {
 #[cfg_attr(not(target_os = "none"), inline(always))]
 unsafe fn transfer(
     cells: *mut u8,
-    bits: bool,
-    write: bool,
+    kind: Kind,
+    way: Way,
     first: u16,
     quantity: u16,
     data: &mut [u8],
 ) {
+    let (bits, write) = (kind.is_bits(), way == Way::Write);
+    if way == Way::Check {
+        return;
+    }
     // SAFETY: as the caller promises.
     unsafe {
         // A host has room for code that takes many cells at a time.
