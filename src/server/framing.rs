@@ -174,17 +174,16 @@ impl<P: Port, B: Lent> Server<P, B> {
 
     /// Gives up the oldest bytes of a full buffer, whose first is the newest: where that
     /// stands from now on.
-    #[cfg_attr(target_os = "none", inline(always))]
-    #[cfg_attr(not(target_os = "none"), cold)]
+    #[inline(never)]
     pub(super) fn slide(&mut self) -> usize {
         self.request.overrun = true;
         let capacity = self.lent.capacity();
-        let place = capacity.saturating_sub(SLIDE);
         let frame = self.lent.part(0, capacity);
         let newest = frame.first().copied().unwrap_or(0);
         shift(frame, SLIDE);
-        if let [last, ..] = self.lent.part(place, capacity) {
-            *last = newest;
+        let place = capacity.saturating_sub(SLIDE);
+        if let Some(first) = self.lent.part(place, capacity).first_mut() {
+            *first = newest;
         }
         place
     }

@@ -233,16 +233,16 @@ impl<P: Port, B: Lent> Server<P, B> {
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn hear(&mut self, until: usize) -> i16 {
         let capacity = self.lent.capacity();
-        let mut start = usize::from(self.end);
-        let is_full = start == capacity;
+        let end = usize::from(self.end);
+        let mut start = end;
         let mut until = until.min(capacity);
-        if is_full {
+        if start == capacity {
             (start, until) = (0, 1);
         }
         let heard = self.port.read(self.lent.part(start, until));
         if heard > 0 {
             self.last_byte = self.now;
-            if is_full {
+            if start != end {
                 start = self.slide();
             }
             let end = start + heard as usize;
