@@ -1368,7 +1368,7 @@ typedef struct mbm_unit {
      */
     struct mbm_service *services[MBM_MAX_SERVICES];
     /**
-     * Not for you.
+     * Private: NULL in a unit that serves nothing.
      */
     uint16_t (*serve)(struct mbm_unit *unit,
                       const void *heading,

@@ -3,9 +3,10 @@
 use super::{custom, mbm_diagnostics};
 use crate::error::Status;
 use crate::pdu::custom::Rule;
-use crate::server::{only_writes, Concern, Heading, Reply};
+use crate::server::{only_writes, Concern, Heading, Reply, ANY};
+use crate::FIRMWARE;
 use core::ffi::c_void;
-use core::slice::from_raw_parts_mut;
+use core::slice::{from_raw_parts, from_raw_parts_mut};
 
 /// Most records that one unit serves, each handed to a mbm_server_serve function.
 pub const MBM_MAX_SERVICES: u8 = 16;
@@ -143,8 +144,8 @@ pub(super) unsafe fn request<'a>(pdu: *mut u8, heading: *const c_void) -> (&'a m
     }
 }
 
-/// Has the services of a unit look at a request, one after the other, unless it is for
-/// others: the function of a unit that takes no notice of those.
+/// Has the services of a unit look at a request, one after the other: the function of a
+/// unit that takes no notice of frames for others.
 ///
 /// # Safety
 /// `unit` is one, and `pdu` has the bytes and the room that `heading` says.
@@ -157,9 +158,14 @@ pub(super) unsafe extern "C" fn walk(
     if concern == Concern::Foreign as u8 {
         return Reply::SILENT.code();
     }
-    // SAFETY: as the caller promises.
+    // SAFETY: as the caller promises; a PDU has a byte at least.
     unsafe {
+        let function = *pdu;
         for service in Places::new(unit) {
+            // A host does not call what answers another function alone.
+            if !FIRMWARE && custom::is_of_another(service, function) {
+                continue;
+            }
             // A record that was zeroed has no function.
             if let Some(serve) = (*service).serve {
                 let reply = serve(service, pdu, heading);
@@ -188,8 +194,17 @@ pub(super) unsafe fn serve(
     // SAFETY: as the caller promises.
     unsafe {
         let mut unit = units;
+        let mut left = count;
         let mut all = (*heading).concern_of_all();
-        for _ in 0..count {
+        loop {
+            if !FIRMWARE && all != Concern::Broadcast {
+                let passed = foreign(unit, left, heading, all);
+                left -= passed;
+                unit = unit.add(passed.into());
+            }
+            if left == 0 {
+                return answer;
+            }
             // A unit that serves nothing has no function, and is as if it were not there.
             if let Some(serve) = (*unit).serve {
                 let mut concern = all;
@@ -203,9 +218,39 @@ pub(super) unsafe fn serve(
                 }
             }
             unit = unit.add(1);
+            left -= 1;
         }
     }
-    answer
+}
+
+/// How many of these units, up to the first other, neither answer a frame nor take
+/// notice of it, where it is no broadcast: a host calls none of them.
+///
+/// # Safety
+/// `units` points to `count` units.
+#[inline(always)]
+unsafe fn foreign(units: *const mbm_unit, count: u8, heading: *const Heading, all: Concern) -> u8 {
+    // SAFETY: as the caller promises; no function of theirs runs meanwhile.
+    let (heading, units) = unsafe { (&*heading, from_raw_parts(units, count.into())) };
+    let takes_notice = |unit: &mbm_unit| !unit.diagnostics.is_null();
+    let answers = |unit: &mbm_unit| unit.id == heading.to || unit.id == ANY;
+    if all == Concern::Foreign {
+        before(units, takes_notice)
+    } else if heading.is_for_any() {
+        0
+    } else {
+        before(units, |unit| answers(unit) || takes_notice(unit))
+    }
+}
+
+/// How many units come before the first of which this is true; four at a time.
+#[inline(always)]
+fn before(units: &[mbm_unit], is_it: impl Fn(&mbm_unit) -> bool) -> u8 {
+    let (fours, _) = units.as_chunks::<4>();
+    let is_in = |four: &[mbm_unit; 4]| four.iter().any(&is_it);
+    let passed = 4 * fours.iter().position(is_in).unwrap_or(fours.len());
+    let mut rest = units.iter().skip(passed);
+    (passed + rest.position(&is_it).unwrap_or(units.len() - passed)) as u8
 }
 
 /// True for a broadcast of a function that is not carried out then.
