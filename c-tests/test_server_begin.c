@@ -1,0 +1,177 @@
+/* A server that is begun anew, at what rate, and what it does with noise. */
+#include "crc.h"
+#include "hooked_port.h"
+#include "mbm.h"
+#include "test.h"
+
+#include <string.h>
+
+typedef uint8_t (*begin)(mbm_server *, const mbm_port *, mbm_unit *, uint8_t, uint8_t *, uint16_t);
+
+static mbm_server server;
+static mbm_unit unit;
+static mbm_registerTable table;
+static uint16_t words[10];
+static uint8_t frame[MBM_MAX_ASCII_FRAME];
+static hooked_port wire;
+static mbm_port port;
+
+static int reset(void **state)
+{
+    (void)state;
+    memset(&server, 0, sizeof server);
+    memset(&unit, 0, sizeof unit);
+    memset(&table, 0, sizeof table);
+    memset(&wire, 0, sizeof wire);
+    memset(words, 0, sizeof words);
+    wire.step = 100;
+    port = hooked_port_of(&wire);
+    unit.id = 17;
+    table.words = words;
+    table.size = 10;
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    return 0;
+}
+
+/* Polls until a request that has arrived is answered; gives what was sent. */
+static size_t answer(void)
+{
+    unsigned i;
+
+    wire.length = 0;
+    for (i = 0; i < 100; i++)
+        OK(mbm_server_poll(&server));
+    return wire.length;
+}
+
+static uint8_t never_drained(void *context)
+{
+    (void)context;
+    return 0;
+}
+
+static void calls_within_the_driver_hook(int hook)
+{
+    if (hook == HOOK_POST) {
+        IS(MBM_BUSY, mbm_server_poll(&server));
+        IS(MBM_BUSY, mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    }
+}
+
+static void a_begin_while_a_response_leaves_switches_the_driver_off(void **state)
+{
+    static const begin begins[] = {mbm_server_begin, mbm_server_beginAscii, mbm_server_beginTcp,
+                                   mbm_server_beginRtuOverTcp};
+    mbm_port stuck = port, other = port;
+    unsigned i;
+
+    (void)state;
+    stuck.flush = never_drained;
+    other.postTransmission = NULL;
+    wire.within = calls_within_the_driver_hook;
+    for (i = 0; i < COUNT(begins); i++) {
+        memset(wire.called, 0, sizeof wire.called);
+        OK(mbm_server_begin(&server, &stuck, &unit, 1, frame, sizeof frame));
+        hooked_port_arrive_rtu(&wire, 17, "\x03\0\0\0\1", 5);
+        assert_int_equal(answer(), 7);
+        assert_int_equal(wire.called[HOOK_PRE], 1);
+        /* A begin that is refused changes nothing. */
+        IS(MBM_INVALID_ARGUMENT, begins[i](&server, &port, &unit, 1, frame, 1));
+        assert_int_equal(wire.called[HOOK_POST], 0);
+        OK(begins[i](&server, &other, &unit, 1, frame, sizeof frame));
+        assert_int_equal(wire.called[HOOK_POST], 1);
+        OK(begins[i](&server, &port, &unit, 1, frame, sizeof frame));
+        assert_int_equal(wire.called[HOOK_POST], 1);
+    }
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    hooked_port_arrive_rtu(&wire, 17, "\x03\0\0\0\1", 5);
+    assert_int_equal(answer(), 7);
+}
+
+static void a_baud_rate_is_refused_where_no_rtu_line_is_served(void **state)
+{
+    static const char request[] = ":110300000001EB\r\n", response[] = ":1103020000EA\r\n";
+    unsigned i;
+
+    (void)state;
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_server_setBaudRate(&server, 115200));
+    OK(mbm_server_setEchoDiscard(&server, 1));
+    OK(mbm_server_setBaudRate(&server, 9600));
+    OK(mbm_server_beginTcp(&server, &port, &unit, 1, frame, sizeof frame));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_setBaudRate(&server, 9600));
+    OK(mbm_server_beginRtuOverTcp(&server, &port, &unit, 1, frame, sizeof frame));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_setBaudRate(&server, 9600));
+    OK(mbm_server_beginAscii(&server, &port, &unit, 1, frame, sizeof frame));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_setBaudRate(&server, 115200));
+    /* Half a second between two characters is no end of an ASCII frame. */
+    for (i = 0; request[i] != '\0'; i++) {
+        hooked_port_arrive(&wire, request + i, 1);
+        OK(mbm_server_poll(&server));
+        wire.now += 500000;
+    }
+    OK(mbm_server_poll(&server));
+    assert_int_equal(wire.length, sizeof response - 1);
+    assert_memory_equal(wire.sent, response, sizeof response - 1);
+}
+
+/* Noise that does not end before 20000 bytes of it were taken. */
+static int16_t noisy_read(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    hooked_port *p = context;
+
+    if (p->first > 20000)
+        return 0;
+    memset(bytes, 0x41, capacity);
+    p->first += capacity;
+    return (int16_t)capacity;
+}
+
+static void a_poll_takes_no_more_than_some_hundred_bytes_of_noise(void **state)
+{
+    static const begin begins[] = {mbm_server_begin, mbm_server_beginAscii, mbm_server_beginRtuOverTcp};
+    mbm_port noisy = port;
+    unsigned i, polls;
+
+    (void)state;
+    noisy.read = noisy_read;
+    for (i = 0; i < COUNT(begins); i++) {
+        OK(begins[i](&server, &noisy, &unit, 1, frame, 64));
+        for (polls = 0; polls < 10; polls++) {
+            wire.first = 0;
+            OK(mbm_server_poll(&server));
+            assert_in_range(wire.first, 1, 1200);
+        }
+    }
+}
+
+static void a_frame_that_fills_the_buffer_behind_noise_is_answered(void **state)
+{
+    uint8_t bytes[120] = {0};
+    unsigned noise;
+
+    (void)state;
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, 16));
+    for (noise = 0; noise < 100; noise++) {
+        memset(bytes, 0x5A, noise);
+        memcpy(bytes + noise, "\x11\x10\0\0\0\2\4\1\2\3\4", 11);
+        hooked_port_arrive(&wire, bytes, noise + seal(bytes + noise, 11));
+        words[1] = 0;
+        assert_int_equal(answer(), 8);
+        assert_int_equal(words[1], 0x0304);
+    }
+}
+
+#define TEST(test) cmocka_unit_test_setup(test, reset)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(a_begin_while_a_response_leaves_switches_the_driver_off),
+        TEST(a_baud_rate_is_refused_where_no_rtu_line_is_served),
+        TEST(a_poll_takes_no_more_than_some_hundred_bytes_of_noise),
+        TEST(a_frame_that_fills_the_buffer_behind_noise_is_answered),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
