@@ -34,31 +34,8 @@ static int refuse(int error)
     return -1;
 }
 
-static void enter(mbm_tcp *tcp, uint8_t state)
-{
-    static const uint8_t awaited[] = {
-        [FREE] = 0, [CONNECTING] = POLLOUT, [CONNECTED] = POLLIN, [LOST] = 0};
-
-    tcp->state = state;
-    tcp->awaits = awaited[state];
-}
-
-static int has_socket(const mbm_tcp *tcp)
-{
-    return tcp->state == CONNECTING || tcp->state == CONNECTED;
-}
-
-static void lose(mbm_tcp *tcp, int error)
-{
-    if (has_socket(tcp))
-        close(tcp->fd);
-    tcp->fd = -1;
-    tcp->error = error;
-    enter(tcp, LOST);
-}
-
 /* The cheapest clock that there is: it is read with every request. */
-static int64_t milliseconds(void)
+SELDOM int64_t mbm_tcp_milliseconds(void)
 {
 #ifdef CLOCK_MONOTONIC_COARSE
     const clockid_t id = CLOCK_MONOTONIC_COARSE;
@@ -69,6 +46,89 @@ static int64_t milliseconds(void)
 
     clock_gettime(id, &now);
     return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+static int has_socket(const mbm_tcp *tcp)
+{
+    return tcp->state == CONNECTING || tcp->state == CONNECTED;
+}
+
+/* Has the socket's set tell of it. */
+void mbm_tcp_tell(mbm_tcp *tcp)
+{
+    if (!tcp->set || tcp->told & MBM_TCP_LISTED)
+        return;
+    tcp->told |= MBM_TCP_LISTED;
+    tcp->next = NULL;
+    *tcp->set->end = tcp;
+    tcp->set->end = &tcp->next;
+}
+
+/* The set tells of the socket no more. */
+static void untell(mbm_tcp *tcp)
+{
+    mbm_tcp **one;
+
+    if (tcp->told & MBM_TCP_LISTED) {
+        for (one = &tcp->set->first; *one != tcp; one = &(*one)->next)
+            ;
+        *one = tcp->next;
+        if (!tcp->next)
+            tcp->set->end = one;
+    }
+    tcp->told = 0;
+}
+
+/* Enters a state without a socket. */
+static void drop(mbm_tcp *tcp, uint8_t state, int error)
+{
+    const int fd = has_socket(tcp) ? tcp->fd : -1;
+
+    mbm_tcp_await(tcp, 0);
+    tcp->state = state;
+    tcp->error = error;
+    tcp->fd = -1;
+    if (fd >= 0)
+        close(fd);
+}
+
+/* What a socket is polled for from now on, also by its set. */
+SELDOM static void await_in_set(mbm_tcp *tcp, uint8_t before)
+{
+    if (tcp->set->watch(tcp->set, tcp->fd, tcp, before, tcp->awaits) == 0)
+        return;
+    /* Nobody would learn what happens to it. */
+    tcp->awaits = 0;
+    drop(tcp, LOST, errno);
+    mbm_tcp_tell(tcp);
+}
+
+void mbm_tcp_await(mbm_tcp *tcp, uint8_t awaits)
+{
+    const uint8_t before = tcp->awaits;
+
+    tcp->awaits = awaits;
+    if (before != awaits && tcp->set)
+        await_in_set(tcp, before);
+}
+
+static void enter(mbm_tcp *tcp, uint8_t state)
+{
+    tcp->state = state;
+    tcp->told &= (uint8_t)~MBM_TCP_TOLD;
+    mbm_tcp_await(tcp, state == CONNECTING ? POLLOUT : POLLIN);
+}
+
+/* Bytes were moved. In a set the time of its last wait is near enough. */
+static inline void moved(mbm_tcp *tcp)
+{
+    tcp->lastMoved = tcp->set ? tcp->set->now : mbm_tcp_milliseconds();
+}
+
+/* The program used the port, so that waits tell of bytes again. */
+static inline void used(mbm_tcp *tcp)
+{
+    tcp->told &= (uint8_t)~MBM_TCP_TOLD;
 }
 
 static void set(int fd, int level, int option, int value)
@@ -100,32 +160,28 @@ static int prepare(int fd)
 /* Begins with the next address; lost with `error` if there is none. */
 static int try_next(mbm_tcp *tcp, int error)
 {
-    if (has_socket(tcp))
-        close(tcp->fd);
-    enter(tcp, LOST);
-    while (tcp->next < tcp->count) {
-        const struct sockaddr_storage *address = &tcp->addresses[tcp->next];
-        socklen_t length = tcp->lengths[tcp->next++];
+    mbm_tcp_addresses *all = tcp->addresses;
 
-        tcp->fd = socket(address->ss_family, SOCK_STREAM, 0);
-        if (tcp->fd < 0) {
-            error = errno;
-            continue;
-        }
-        enter(tcp, CONNECTING);
-        if (prepare(tcp->fd) == 0) {
-            if (connect(tcp->fd, (const struct sockaddr *)address, length) == 0) {
-                enter(tcp, CONNECTED);
-                return 0;
+    drop(tcp, LOST, error);
+    while (all && all->next < all->count) {
+        const struct sockaddr_storage *address = &all->list[all->next];
+        socklen_t length = all->lengths[all->next++];
+        const int fd = socket(address->ss_family, SOCK_STREAM, 0);
+
+        if (fd >= 0 && prepare(fd) == 0) {
+            const int failed = connect(fd, (const struct sockaddr *)address, length);
+
+            if (!failed || errno == EINPROGRESS || errno == EINTR) {
+                tcp->fd = fd;
+                tcp->error = 0;
+                enter(tcp, failed ? CONNECTING : CONNECTED);
+                return has_socket(tcp) ? 0 : -1;
             }
-            if (errno == EINPROGRESS || errno == EINTR)
-                return 0;
         }
-        error = errno;
-        close(tcp->fd);
-        enter(tcp, LOST);
+        tcp->error = errno;
+        if (fd >= 0)
+            close(fd);
     }
-    lose(tcp, error);
     return -1;
 }
 
@@ -146,7 +202,8 @@ int mbm_tcp_lookUp(const char *host, const char *service, int flags, struct addr
     }
 }
 
-int mbm_tcp_open(mbm_tcp *tcp, const char *host, const char *service)
+int mbm_tcp_open(mbm_tcp *tcp, mbm_tcp_addresses *addresses, const char *host,
+                 const char *service)
 {
     struct addrinfo *found, *one;
 
@@ -155,15 +212,17 @@ int mbm_tcp_open(mbm_tcp *tcp, const char *host, const char *service)
     if (mbm_tcp_lookUp(host, service, 0, &found, &tcp->lookup) < 0)
         return -1;
     memset(tcp, 0, sizeof *tcp);
-    for (one = found; one && tcp->count < MBM_TCP_ADDRESSES; one = one->ai_next) {
-        if (one->ai_addrlen > sizeof tcp->addresses[0])
+    tcp->addresses = addresses;
+    addresses->next = addresses->count = 0;
+    for (one = found; one && addresses->count < MBM_TCP_ADDRESSES; one = one->ai_next) {
+        if (one->ai_addrlen > sizeof addresses->list[0])
             continue;
-        memcpy(&tcp->addresses[tcp->count], one->ai_addr, one->ai_addrlen);
-        tcp->lengths[tcp->count++] = one->ai_addrlen;
+        memcpy(&addresses->list[addresses->count], one->ai_addr, one->ai_addrlen);
+        addresses->lengths[addresses->count++] = one->ai_addrlen;
     }
     freeaddrinfo(found);
     if (try_next(tcp, EADDRNOTAVAIL) < 0) {
-        enter(tcp, FREE);
+        drop(tcp, FREE, tcp->error);
         return refuse(tcp->error);
     }
     return 0;
@@ -177,8 +236,20 @@ int mbm_tcp_attach(mbm_tcp *tcp, int fd)
         return -1;
     memset(tcp, 0, sizeof *tcp);
     tcp->fd = fd;
-    tcp->lastMoved = milliseconds();
+    tcp->lastMoved = mbm_tcp_milliseconds();
     enter(tcp, CONNECTED);
+    return 0;
+}
+
+int mbm_tcp_add(mbm_tcp_set *set, mbm_tcp *tcp)
+{
+    if (!set->isOpen || tcp->state == FREE)
+        return refuse(EBADF);
+    if (tcp->set)
+        return refuse(EBUSY);
+    if (tcp->awaits != 0 && set->watch(set, tcp->fd, tcp, 0, tcp->awaits) < 0)
+        return -1;
+    tcp->set = set;
     return 0;
 }
 
@@ -189,19 +260,21 @@ int mbm_tcp_isInUse(const mbm_tcp *tcp)
 
 int64_t mbm_tcp_idleFor(const mbm_tcp *tcp)
 {
-    return tcp->state == CONNECTED ? milliseconds() - tcp->lastMoved : -1;
+    return tcp->state == CONNECTED ? mbm_tcp_milliseconds() - tcp->lastMoved : -1;
 }
 
 void mbm_tcp_close(mbm_tcp *tcp)
 {
-    if (has_socket(tcp))
-        close(tcp->fd);
-    tcp->fd = -1;
-    enter(tcp, FREE);
+    drop(tcp, FREE, tcp->error);
+    untell(tcp);
+    /* Its descriptor may be what a connection waits for. */
+    if (tcp->set && tcp->set->listener)
+        tcp->set->listener->retryAt = 0;
+    tcp->set = NULL;
 }
 
 /* 1 once connected, 0 before, -1 if there is no link. */
-static int progress_slowly(mbm_tcp *tcp)
+static int progress(mbm_tcp *tcp)
 {
     struct pollfd wait = {tcp->fd, POLLOUT, 0};
     socklen_t size = sizeof(int);
@@ -221,17 +294,12 @@ static int progress_slowly(mbm_tcp *tcp)
     return tcp->state == CONNECTED ? 1 : -1;
 }
 
-static int progress(mbm_tcp *tcp)
-{
-    return tcp->state == CONNECTED ? 1 : progress_slowly(tcp);
-}
-
 uint8_t mbm_tcp_connect(void *context)
 {
     mbm_tcp *tcp = (mbm_tcp *)context;
 
-    tcp->next = 0;
-    tcp->error = 0;
+    if (tcp->addresses)
+        tcp->addresses->next = 0;
     if (try_next(tcp, ENOTCONN) < 0)
         return MBM_LINK_LOST;
     return tcp->state == CONNECTED ? MBM_OK : MBM_PENDING;
@@ -242,15 +310,17 @@ void mbm_tcp_disconnect(void *context)
     mbm_tcp *tcp = (mbm_tcp *)context;
 
     if (tcp->state != FREE)
-        lose(tcp, ENOTCONN);
+        drop(tcp, LOST, ENOTCONN);
 }
 
 /* Nothing was moved, for a signal or for now; or else the link is gone. */
 SELDOM static int16_t nothing(mbm_tcp *tcp, ssize_t count)
 {
+    if (tcp->state == LOST)
+        return -1;
     if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR))
         return 0;
-    lose(tcp, count < 0 ? errno : EPIPE);
+    drop(tcp, LOST, count < 0 ? errno : EPIPE);
     return -1;
 }
 
@@ -268,10 +338,10 @@ int mbm_tcp_isConnected(mbm_tcp *tcp)
     return there;
 }
 
-/* 1 if so many bytes may be moved at once. */
-static int is_ready(const mbm_tcp *tcp, uint16_t length)
+/* 1 if so many bytes may be moved at once: only what is connected awaits bytes alone. */
+static inline int is_ready(const mbm_tcp *tcp, uint16_t length)
 {
-    return tcp->state == CONNECTED && (int16_t)length > 0;
+    return tcp->awaits == POLLIN && (int16_t)length > 0;
 }
 
 SELDOM static int16_t read_slowly(mbm_tcp *tcp, uint8_t *bytes, uint16_t capacity)
@@ -280,6 +350,8 @@ SELDOM static int16_t read_slowly(mbm_tcp *tcp, uint8_t *bytes, uint16_t capacit
 
     if (there <= 0 || capacity == 0)
         return (int16_t)(there < 0 ? -1 : 0);
+    /* Who reads is not stuck with what is to be sent. */
+    mbm_tcp_await(tcp, POLLIN);
     return tcp_read(tcp, bytes, capacity > INT16_MAX ? INT16_MAX : capacity);
 }
 
@@ -290,44 +362,52 @@ static int16_t tcp_read(void *context, uint8_t *bytes, uint16_t capacity)
 
     if (!is_ready(tcp, capacity))
         return read_slowly(tcp, bytes, capacity);
-    /* Who reads is not stuck with what is to be sent. */
-    tcp->awaits = POLLIN;
-    count = recv(tcp->fd, bytes, capacity, 0);
+    count = read(tcp->fd, bytes, capacity);
+    used(tcp);
     if (count <= 0)
         return nothing(tcp, count);
-    tcp->lastMoved = milliseconds();
+    moved(tcp);
+    return (int16_t)count;
+}
+
+/* So many of the bytes were taken, perhaps not all. */
+SELDOM static int16_t wrote(mbm_tcp *tcp, ssize_t length, ssize_t count)
+{
+    if (count <= 0 && nothing(tcp, count) < 0)
+        return -1;
+    if (count == length)
+        used(tcp);
+    mbm_tcp_await(tcp, count == length ? POLLIN : tcp->awaits | POLLOUT);
+    if (count <= 0)
+        return 0;
+    moved(tcp);
     return (int16_t)count;
 }
 
 SELDOM static int16_t write_slowly(mbm_tcp *tcp, const uint8_t *bytes, uint16_t length)
 {
+    /* Of more than can be said to be taken it is never all. */
+    const uint16_t most = length > INT16_MAX ? INT16_MAX : length;
     int there = progress(tcp);
-    const uint8_t awaits = tcp->awaits;
-    int16_t taken;
 
     if (there <= 0 || length == 0)
         return (int16_t)(there < 0 ? -1 : 0);
-    if (length <= INT16_MAX)
-        return tcp_write(tcp, bytes, length);
-    /* More than can be said to be taken, so it is never all. */
-    taken = tcp_write(tcp, bytes, INT16_MAX);
-    if (taken >= 0)
-        tcp->awaits = (uint8_t)(awaits | POLLOUT);
-    return taken;
+    return wrote(tcp, length, send(tcp->fd, bytes, most, MSG_NOSIGNAL));
 }
 
 static int16_t tcp_write(void *context, const uint8_t *bytes, uint16_t length)
 {
     mbm_tcp *tcp = (mbm_tcp *)context;
+    const ssize_t all = length;
     ssize_t count;
 
     if (!is_ready(tcp, length))
         return write_slowly(tcp, bytes, length);
-    count = send(tcp->fd, bytes, length, MSG_NOSIGNAL);
-    tcp->awaits = count == length ? POLLIN : (uint8_t)(tcp->awaits | POLLOUT);
-    if (count <= 0)
-        return nothing(tcp, count);
-    tcp->lastMoved = milliseconds();
+    count = send(tcp->fd, bytes, (size_t)all, MSG_NOSIGNAL);
+    if (count != all)
+        return wrote(tcp, all, count);
+    used(tcp);
+    moved(tcp);
     return (int16_t)count;
 }
 
@@ -367,6 +447,22 @@ SELDOM static int nap(uint32_t micros)
     return 1;
 }
 
+/* What to poll a socket for: bytes that it told of do not end the wait again. */
+static short events_of(const mbm_tcp *tcp)
+{
+    return tcp->told & MBM_TCP_TOLD ? tcp->awaits & POLLOUT : tcp->awaits;
+}
+
+/* Takes note of what poll tells of a socket. */
+static void note(mbm_tcp *tcp, short events)
+{
+    if (tcp->state == CONNECTING && events)
+        /* Known from now on, though nobody may use the port yet. */
+        progress(tcp);
+    else if (events & ~POLLOUT)
+        tcp->told |= MBM_TCP_TOLD;
+}
+
 int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, int fd,
                  uint32_t micros)
 {
@@ -383,8 +479,8 @@ int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, 
         micros = MBM_TCP_RETRY;
     /* Of who awaits nothing a hang-up would end the wait too. */
     for (i = 0; i < count; i++)
-        if (tcps[i].awaits != 0)
-            waits[used++] = (struct pollfd){tcps[i].fd, tcps[i].awaits, 0};
+        if (events_of(&tcps[i]) != 0)
+            waits[used++] = (struct pollfd){tcps[i].fd, events_of(&tcps[i]), 0};
     if (is_listening && listener->awaits != 0)
         waits[used++] = (struct pollfd){listener->fd, POLLIN, 0};
     if (fd >= 0)
@@ -394,14 +490,8 @@ int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, 
     if (ready < 0)
         return errno == EINTR ? 0 : nap(micros);
     used = 0;
-    for (i = 0; i < count; i++) {
-        const short told = tcps[i].awaits != 0 ? waits[used++].revents : 0;
-
-        /* Known from now on, though nobody may use the port yet. */
-        if (tcps[i].state == CONNECTING && told)
-            progress_slowly(&tcps[i]);
-        else if (told & ~POLLOUT)
-            tcps[i].awaits &= POLLOUT;
-    }
+    for (i = 0; i < count; i++)
+        if (events_of(&tcps[i]) != 0)
+            note(&tcps[i], waits[used++].revents);
     return ready > 0;
 }
