@@ -19,14 +19,13 @@ enum { FREE, CONNECTING, CONNECTED, LOST };
  * peer that is gone while nothing is sent. While something is, milliseconds. */
 enum { QUIET_S = 15, PROBE_S = 5, PROBES = 3, UNANSWERED_MS = 30000 };
 
-/* Microseconds of sleep where the system refuses to poll. */
-enum { BLIND_NAP = 10000 };
+/* Microseconds: of sleep where the system refuses to poll, and of a wait that is long. */
+enum { BLIND_NAP = 10000, LONG_WAIT = 100000 };
 
 /* Kept out of the way of what is done for every request. */
 #define SELDOM __attribute__((cold, noinline))
 
 static int16_t tcp_read(void *context, uint8_t *bytes, uint16_t capacity);
-static int16_t tcp_write(void *context, const uint8_t *bytes, uint16_t length);
 
 static int refuse(int error)
 {
@@ -37,14 +36,13 @@ static int refuse(int error)
 /* The cheapest clock that there is: it is read with every request. */
 SELDOM int64_t mbm_tcp_milliseconds(void)
 {
-#ifdef CLOCK_MONOTONIC_COARSE
-    const clockid_t id = CLOCK_MONOTONIC_COARSE;
-#else
-    const clockid_t id = CLOCK_MONOTONIC;
-#endif
     struct timespec now;
 
-    clock_gettime(id, &now);
+#ifdef CLOCK_MONOTONIC_COARSE
+    clock_gettime(CLOCK_MONOTONIC_COARSE, &now);
+#else
+    clock_gettime(CLOCK_MONOTONIC, &now);
+#endif
     return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
 }
 
@@ -119,16 +117,16 @@ static void enter(mbm_tcp *tcp, uint8_t state)
     mbm_tcp_await(tcp, state == CONNECTING ? POLLOUT : POLLIN);
 }
 
-/* Bytes were moved. In a set the time of its last wait is near enough. */
-static inline void moved(mbm_tcp *tcp)
-{
-    tcp->lastMoved = tcp->set ? tcp->set->now : mbm_tcp_milliseconds();
-}
-
 /* The program used the port, so that waits tell of bytes again. */
 static inline void used(mbm_tcp *tcp)
 {
     tcp->told &= (uint8_t)~MBM_TCP_TOLD;
+}
+
+/* Bytes were moved. In a set the time of its last wait is near enough. */
+static inline void moved(mbm_tcp *tcp)
+{
+    tcp->lastMoved = tcp->set ? tcp->set->now : mbm_tcp_milliseconds();
 }
 
 static void set(int fd, int level, int option, int value)
@@ -139,10 +137,7 @@ static void set(int fd, int level, int option, int value)
 
 static int prepare(int fd)
 {
-    int flags = fcntl(fd, F_GETFL);
-
-    if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) < 0 ||
-        fcntl(fd, F_SETFD, FD_CLOEXEC) < 0)
+    if (fcntl(fd, F_SETFL, O_NONBLOCK) < 0 || fcntl(fd, F_SETFD, FD_CLOEXEC) < 0)
         return -1;
     set(fd, IPPROTO_TCP, TCP_NODELAY, 1);
     set(fd, SOL_SOCKET, SO_KEEPALIVE, 1);
@@ -165,7 +160,7 @@ static int try_next(mbm_tcp *tcp, int error)
     drop(tcp, LOST, error);
     while (all && all->next < all->count) {
         const struct sockaddr_storage *address = &all->list[all->next];
-        socklen_t length = all->lengths[all->next++];
+        const socklen_t length = all->lengths[all->next++];
         const int fd = socket(address->ss_family, SOCK_STREAM, 0);
 
         if (fd >= 0 && prepare(fd) == 0) {
@@ -238,18 +233,6 @@ int mbm_tcp_attach(mbm_tcp *tcp, int fd)
     tcp->fd = fd;
     tcp->lastMoved = mbm_tcp_milliseconds();
     enter(tcp, CONNECTED);
-    return 0;
-}
-
-int mbm_tcp_add(mbm_tcp_set *set, mbm_tcp *tcp)
-{
-    if (!set->isOpen || tcp->state == FREE)
-        return refuse(EBADF);
-    if (tcp->set)
-        return refuse(EBUSY);
-    if (tcp->awaits != 0 && set->watch(set, tcp->fd, tcp, 0, tcp->awaits) < 0)
-        return -1;
-    tcp->set = set;
     return 0;
 }
 
@@ -327,13 +310,13 @@ SELDOM static int16_t nothing(mbm_tcp *tcp, ssize_t count)
 int mbm_tcp_isConnected(mbm_tcp *tcp)
 {
     int there = progress(tcp);
-    ssize_t count;
     char byte;
 
     if (there == 1) {
-        count = recv(tcp->fd, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
-        if (count <= 0 && nothing(tcp, count) < 0)
-            there = -1;
+        const ssize_t count = recv(tcp->fd, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
+
+        if (count <= 0)
+            return nothing(tcp, count) < 0 ? -1 : 1;
     }
     return there;
 }
@@ -427,48 +410,50 @@ static void tcp_idle(void *context, mbm_master *master)
 
 mbm_port mbm_tcp_port(mbm_tcp *tcp)
 {
-    mbm_port port = {0};
-
-    port.context = tcp;
-    port.read = tcp_read;
-    port.write = tcp_write;
-    port.micros = tcp_micros;
-    port.idle = tcp_idle;
-    return port;
+    return (mbm_port){.context = tcp, .read = tcp_read, .write = tcp_write, .micros = tcp_micros,
+                      .idle = tcp_idle};
 }
 
-/* The system refuses to poll: it has no memory, or the limit of descriptors was lowered
- * below those in use. Whoever waits looks for itself, and does not spin. */
+/* Poll failed: for a signal, or for lack of memory or of descriptors, whose limit may have
+ * been lowered. Then whoever waits looks for itself, and does not spin. */
 SELDOM static int nap(uint32_t micros)
 {
-    const struct timespec time = {0, (micros < BLIND_NAP ? (long)micros : BLIND_NAP) * 1000};
-
-    nanosleep(&time, NULL);
+    if (errno == EINTR)
+        return 0;
+    usleep(micros < BLIND_NAP ? micros : BLIND_NAP);
     return 1;
 }
 
-/* What to poll a socket for: bytes that it told of do not end the wait again. */
-static short events_of(const mbm_tcp *tcp)
+/* What to poll a socket for: bytes that it told of do not end the wait again. Of who
+ * awaits nothing a hang-up would end it too. */
+static inline short events_of(const mbm_tcp *tcp)
 {
     return tcp->told & MBM_TCP_TOLD ? tcp->awaits & POLLOUT : tcp->awaits;
 }
 
 /* Takes note of what poll tells of a socket. */
-static void note(mbm_tcp *tcp, short events)
+static inline void note(mbm_tcp *tcp, short events)
 {
-    if (tcp->state == CONNECTING && events)
-        /* Known from now on, though nobody may use the port yet. */
-        progress(tcp);
+    if (tcp->awaits == POLLOUT && events)
+        /* If it is being connected, that is known from now on. */
+        (void)progress(tcp);
     else if (events & ~POLLOUT)
         tcp->told |= MBM_TCP_TOLD;
 }
 
-int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, int fd,
-                 uint32_t micros)
+/* Of a long time a millisecond does not matter, and poll asks for less than ppoll. */
+static inline int sleep_on(struct pollfd *waits, nfds_t count, uint32_t micros)
+{
+    if (micros >= LONG_WAIT)
+        return poll(waits, count, micros == MBM_TCP_FOREVER ? -1 : (int)(micros / 1000 + 1));
+    return ppoll(waits, count, &(struct timespec){0, (long)micros * 1000}, NULL);
+}
+
+SELDOM static int wait_for_many(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener,
+                                int fd, uint32_t micros)
 {
     const int is_listening = listener && listener->port != 0;
     struct pollfd waits[MBM_TCP_WAITS];
-    struct timespec time;
     nfds_t used = 0;
     size_t i;
     int ready;
@@ -477,7 +462,6 @@ int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, 
         return refuse(EINVAL);
     if (is_listening && listener->awaits == 0 && micros > MBM_TCP_RETRY)
         micros = MBM_TCP_RETRY;
-    /* Of who awaits nothing a hang-up would end the wait too. */
     for (i = 0; i < count; i++)
         if (events_of(&tcps[i]) != 0)
             waits[used++] = (struct pollfd){tcps[i].fd, events_of(&tcps[i]), 0};
@@ -485,13 +469,30 @@ int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, 
         waits[used++] = (struct pollfd){listener->fd, POLLIN, 0};
     if (fd >= 0)
         waits[used++] = (struct pollfd){fd, POLLIN, 0};
-    time = (struct timespec){(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
-    ready = ppoll(waits, used, micros == MBM_TCP_FOREVER ? NULL : &time, NULL);
+    ready = sleep_on(waits, used, micros);
     if (ready < 0)
-        return errno == EINTR ? 0 : nap(micros);
+        return nap(micros);
     used = 0;
     for (i = 0; i < count; i++)
         if (events_of(&tcps[i]) != 0)
             note(&tcps[i], waits[used++].revents);
     return ready > 0;
+}
+
+int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, int fd,
+                 uint32_t micros)
+{
+    struct pollfd wait;
+    int ready;
+
+    /* What a client waits for with every request. */
+    if (count != 1 || listener || fd >= 0 || tcps->told || tcps->awaits != POLLIN)
+        return wait_for_many(tcps, count, listener, fd, micros);
+    wait = (struct pollfd){tcps->fd, POLLIN, 0};
+    ready = sleep_on(&wait, 1, micros);
+    if (ready < 0)
+        return nap(micros);
+    if (ready > 0)
+        tcps->told = MBM_TCP_TOLD;
+    return ready;
 }

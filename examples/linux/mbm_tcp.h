@@ -95,7 +95,8 @@ typedef struct mbm_tcp_set {
     mbm_tcp **end;              /**< not for you */
     mbm_tcp_listener *listener; /**< not for you */
     int (*watch)(struct mbm_tcp_set *set, int fd, void *who, uint8_t before,
-                 uint8_t awaits); /**< not for you */
+                 uint8_t awaits);                              /**< not for you */
+    int (*add)(struct mbm_tcp_set *set, mbm_tcp *tcp);         /**< not for you */
 } mbm_tcp_set;
 
 /**
@@ -241,8 +242,9 @@ void mbm_tcp_closeListener(mbm_tcp_listener *listener);
  * @param listener  waits for connections too; may be NULL
  * @param fd        waits for bytes of another descriptor too, for example that of
  *                  an mbm_tty; -1 for none
- * @param micros    at most so long, in microseconds, or MBM_TCP_FOREVER; less while the
- *                  listener's connections can only wait
+ * @param micros    at most so long, in microseconds, from 100000 on to the next
+ *                  millisecond, or MBM_TCP_FOREVER; less while the listener's connections
+ *                  can only wait
  * @return 1 if there is something, or if the system refused to poll, after a sleep of at
  *         most 10 ms; 0 if the time is over or a signal came; -1 with errno EINVAL for
  *         too many

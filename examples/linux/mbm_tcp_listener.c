@@ -172,7 +172,7 @@ static int put(const mbm_tcp_listener *listener, mbm_tcp *tcp, int fd)
         close(fd);
         return refuse(error);
     }
-    if (listener->set && mbm_tcp_add(listener->set, tcp) < 0) {
+    if (listener->set && listener->set->add(listener->set, tcp) < 0) {
         error = errno;
         mbm_tcp_close(tcp);
         return refuse(error);

@@ -30,6 +30,18 @@ static int watch(mbm_tcp_set *set, int fd, void *who, uint8_t before, uint8_t aw
     return 0;
 }
 
+int mbm_tcp_add(mbm_tcp_set *set, mbm_tcp *tcp)
+{
+    if (!set->isOpen || !mbm_tcp_isInUse(tcp))
+        return refuse(EBADF);
+    if (tcp->set)
+        return refuse(EBUSY);
+    if (tcp->awaits != 0 && watch(set, tcp->fd, tcp, 0, tcp->awaits) < 0)
+        return -1;
+    tcp->set = set;
+    return 0;
+}
+
 int mbm_tcp_openSet(mbm_tcp_set *set)
 {
     if (set->isOpen)
@@ -43,6 +55,7 @@ int mbm_tcp_openSet(mbm_tcp_set *set)
     set->end = &set->first;
     set->listener = NULL;
     set->watch = watch;
+    set->add = mbm_tcp_add;
     return 0;
 }
 

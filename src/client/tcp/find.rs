@@ -36,8 +36,11 @@ impl<P: Port, S: Means> Tcp<P, S> {
         let ticket = job.ticket();
         let asked = ticket.outline.data_of_read()?;
         let total = READ_DATA + usize::from(asked);
-        let arrived = usize::from(self.start)..usize::from(self.end);
-        let frame = self.means.frame().get(arrived)?.get(..total)?;
+        let begin = usize::from(self.start);
+        if usize::from(self.end) - begin < total {
+            return None;
+        }
+        let frame = self.means.frame().get(begin..begin + total)?;
         let (start, rest) = frame.split_first_chunk()?;
         let (count, data) = rest.split_first()?;
         let function = ticket.outline.function();

@@ -144,7 +144,8 @@ impl Outline {
     /// little cost. Firmware, where code is dearer, has [`Outline::emit`] alone.
     #[inline]
     pub fn two_words(&self) -> Option<&[u8; 4]> {
-        if !FIRMWARE && self.head_length == 5 && self.data_length == 0 && !self.form.has(COUNTED) {
+        let lengths = u16::from_ne_bytes([self.head_length, self.data_length]);
+        if !FIRMWARE && lengths == u16::from_ne_bytes([5, 0]) && !self.form.has(COUNTED) {
             self.head.first_chunk::<5>()?.last_chunk()
         } else {
             None
