@@ -97,9 +97,15 @@ miri: ## Hold the hooks against Rust's rules of aliasing, with Miri of the night
 	@MIRIFLAGS=-Zmiri-tree-borrows $(CARGO) +nightly miri test --quiet --test reentry
 
 .PHONY: fuzz
-fuzz: ## Fuzz every decoder for FUZZ_SECONDS in all (60)
+fuzz: ## Fuzz every decoder and the C API for FUZZ_SECONDS in all (60)
 	@scripts/need g++ libc6-dev libmodbus-dev
 	@CARGO="$(CARGO)" scripts/fuzz
+
+CALLS ?= 10000000
+.PHONY: fuzz-api
+fuzz-api: ## Fuzz sequences of C API calls until there were CALLS of them (10000000)
+	@scripts/need g++ libc6-dev libmodbus-dev
+	@CARGO="$(CARGO)" MBM_API_CALLS=$(CALLS) scripts/fuzz c_api
 
 MODEL_SECONDS ?= 300
 MODEL := --quiet --release --manifest-path model/Cargo.toml --target-dir $(BUILD)/model
