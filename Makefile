@@ -178,14 +178,18 @@ $(BENCH_CLIENT): $(patsubst %,$(BUILD)/bench/%.o,bench_client support/pty suppor
 BENCH_SERVER := $(BUILD)/bench/bench_server
 $(BENCH_SERVER): $(patsubst %,$(BUILD)/bench/%.o,bench_server linux/mbm_tcp linux/mbm_tcp_listener linux/mbm_tty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -o $@
+BENCH_SNIFFER := $(BUILD)/bench/bench_sniffer
+$(BENCH_SNIFFER): $(BUILD)/bench/bench_sniffer.o $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
 .PHONY: bench
 bench: ## Speed and instructions beside libmodbus and rmodbus; writes docs/*speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
-	@$(MAKE) --no-print-directory $(BENCH) $(BENCH_SERVER) $(BENCH_CLIENT)
+	@$(MAKE) --no-print-directory $(BENCH) $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_SNIFFER)
 	@scripts/bench $(BENCH)
 	@scripts/bench-server $(BENCH_SERVER)
 	@scripts/bench-client $(BENCH_CLIENT)
+	@scripts/bench-sniffer $(BENCH_SNIFFER)
 	@CARGO="$(CARGO)" scripts/bench-frames
 
 DEMO := $(BUILD)/plain/linux/demo
