@@ -206,6 +206,22 @@ static void a_silent_line_is_not_waited_for_again(void **)
     assert_in_range(Serial.startedAt - asked, 0, 200);
 }
 
+/* A device that answers in order, but the first time later than the timeout. */
+static void a_late_reply_does_not_shift_the_answers_of_later_requests(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setResponseTimeout(50);
+    assert_int_equal(node.readHoldingRegisters(0, 1), node.ku8MBResponseTimedOut);
+    Serial.reply(joined(adu({1, 3, 2, 0, 0}), adu({1, 3, 2, 0, 1})));
+    for (int value = 1; value < 5; value++) {
+        if (value > 1)
+            Serial.reply(adu({1, 3, 2, 0, value}));
+        assert_int_equal(node.readHoldingRegisters(static_cast<uint16_t>(value), 1), 0);
+        assert_int_equal(node.getResponseBuffer(0), value);
+    }
+}
+
 static void the_response_timeout_can_be_set(void **)
 {
     ModbusMaster node;
@@ -378,6 +394,7 @@ int main()
         TEST(a_silence_is_kept_before_each_request),
         TEST(the_silence_counts_from_another_objects_last_use),
         TEST(a_silent_line_is_not_waited_for_again),
+        TEST(a_late_reply_does_not_shift_the_answers_of_later_requests),
         TEST(the_response_timeout_can_be_set),
         TEST(the_slave_can_be_changed),
         TEST(a_broadcast_succeeds_after_the_turnaround_delay),

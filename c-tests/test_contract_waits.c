@@ -3,6 +3,8 @@
 #include "sim.h"
 #include "test.h"
 
+#include <string.h>
+
 static void gap_after_reply(sim *s, uint32_t wanted)
 {
     sim_reads(s, 500);
@@ -352,6 +354,32 @@ static void the_longest_gap_is_2_to_the_31_microseconds(void **state)
     }
 }
 
+static void the_longest_gap_of_a_client_is_2_to_the_31_microseconds(void **state)
+{
+    static mbm_client client;
+    mbm_clientRequest request = {0};
+    NODE;
+
+    (void)n;
+    s->limit = UINT64_MAX;
+    memset(&client, 0, sizeof client);
+    OK(mbm_client_beginRtu(&client, &s->port, s->buffer, sizeof s->buffer));
+    OK(mbm_client_setGap(&client, 0xFFFFFFFF));
+    request.unit = 17;
+    assert_int_equal(mbm_client_writeSingleRegister(&client, &request, 0, 1), MBM_PENDING);
+    while (s->now < 0x7FFF0000) {
+        assert_int_equal(mbm_client_poll(&client), MBM_PENDING);
+        assert_int_equal(s->sent, 0);
+        s->now += 1000000;
+    }
+    while (s->sent == 0) {
+        assert_int_equal(mbm_client_poll(&client), MBM_PENDING);
+        s->now += 1000;
+        assert_true(s->now < 0x80100000);
+    }
+    OK(mbm_client_cancel(&client, &request));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -377,6 +405,7 @@ int main(void)
         SIM_TEST(sleeping_as_poll_delay_says_lengthens_no_turnaround_delay),
         SIM_TEST(sleeping_as_poll_delay_says_lengthens_no_hold_of_a_reply),
         SIM_TEST(the_longest_gap_is_2_to_the_31_microseconds),
+        SIM_TEST(the_longest_gap_of_a_client_is_2_to_the_31_microseconds),
     };
 
     return cmocka_run_group_tests_name("contract: waits", tests, NULL, NULL);

@@ -94,7 +94,7 @@ unsafe extern "C" fn driver(context: *mut c_void) {
     unsafe { disturb(context) }
 }
 
-unsafe extern "C" fn idle(context: *mut c_void) {
+unsafe extern "C" fn idle(context: *mut c_void, _master: *mut mbm_master) {
     unsafe {
         let master = world(context).master;
         assert_eq!(mbm_master_readCoils(master, 0, 1), BUSY);

@@ -49,6 +49,15 @@ pub fn header(bytes: &[u8]) -> Result<Header, Status> {
     })
 }
 
+/// How many bytes it takes to judge more of a header than its first `have` allow.
+pub const fn next_part(have: usize) -> usize {
+    match have {
+        0..4 => 4,
+        4..HEADER => HEADER,
+        _ => PDU,
+    }
+}
+
 /// The first eight bytes of a frame, the header and a function code, as one
 /// number; `length` is that of the PDU.
 #[inline]

@@ -283,9 +283,10 @@ impl<P: Port, B: Lent> Server<P, B> {
     }
 
     /// Byte by byte, for a colon begins a frame wherever it stands, and what
-    /// follows a frame belongs to the next.
+    /// follows a frame belongs to the next. One poll takes as many bytes as the
+    /// longest frame has, so that it ends while a peer floods.
     fn receive_ascii(&mut self) -> Status {
-        loop {
+        for _ in 0..ascii::MAX_FRAME {
             let end = usize::from(self.end);
             let heard = self.hear(end + 1);
             if heard < 0 {
@@ -315,6 +316,7 @@ impl<P: Port, B: Lent> Server<P, B> {
                 _ => {}
             }
         }
+        Status::OK
     }
 
     fn seal_ascii(&mut self, length: usize) -> usize {
