@@ -70,8 +70,8 @@ macro_rules! function {
             Box::new(move || {
                 let adu = open(framing, black_box(&frame)).expect("a frame");
                 let request = Request::parse(adu.pdu);
-                black_box(&request);
                 assert!(request.is_ok());
+                black_box(&request);
             }),
             ask.map(|_| theirs::parse_request(proto, request.clone())),
             $served.then(|| libmodbus::serve(over_tcp, request.clone(), false)),
