@@ -171,6 +171,29 @@ static void ascii_is_served(void **)
     assert_bytes(Serial.sent[0], answer);
 }
 
+static void a_baud_rate_does_not_shorten_what_ascii_waits_for(void **)
+{
+    ModbusRegisterArray<1> registers;
+    ModbusServer server;
+    static const char request[] = ":110300000001EB\r\n";
+    Bytes asked(request, request + sizeof request - 1);
+    server.holdingRegisters(registers);
+    assert_int_equal(server.beginAscii(17, Serial), MBM_OK);
+    server.setBaudRate(19200);
+    Serial.arrive(asked, bench().now + 100, 3000);
+    for (int i = 0; i < 4; i++)
+        loops(server);
+    assert_int_equal(Serial.sent.size(), 1);
+    Serial.sent.clear();
+    server.begin(17, Serial, 19200);
+    server.beginAscii(17, Serial);
+    server.setBaudRate(19200);
+    Serial.arrive(asked, bench().now + 100, 3000);
+    for (int i = 0; i < 4; i++)
+        loops(server);
+    assert_int_equal(Serial.sent.size(), 1);
+}
+
 static void begin_may_be_called_again(void **)
 {
     ModbusRegisterArray<1> registers;
@@ -200,6 +223,7 @@ int main()
         TEST(a_write_taken_in_pieces_is_one_response),
         TEST(damaged_and_foreign_frames_are_not_answered),
         TEST(ascii_is_served),
+        TEST(a_baud_rate_does_not_shorten_what_ascii_waits_for),
         TEST(begin_may_be_called_again),
     };
 

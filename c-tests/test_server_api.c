@@ -216,6 +216,62 @@ static void a_poll_ends_though_a_peer_floods(void **state)
     assert_int_equal(wire.length, 0);
 }
 
+/* Noise that does not end before 20000 bytes of it were taken. */
+static int16_t noisy_read(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    unsigned *taken = context;
+
+    if (*taken > 20000)
+        return 0;
+    memset(bytes, 0x41, capacity);
+    *taken += capacity;
+    return (int16_t)capacity;
+}
+
+static void a_poll_takes_no_more_than_some_hundred_bytes_of_noise(void **state)
+{
+    uint8_t (*const begins[])(mbm_server *, const mbm_port *, mbm_unit *, uint8_t, uint8_t *,
+                              uint16_t) = {mbm_server_begin, mbm_server_beginAscii,
+                                           mbm_server_beginRtuOverTcp};
+    unsigned taken, i, polls;
+    mbm_port noisy = port;
+
+    (void)state;
+    noisy.read = noisy_read;
+    noisy.context = &taken;
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    for (i = 0; i < COUNT(begins); i++) {
+        OK(begins[i](&server, &noisy, &unit, 1, frame, 64));
+        for (polls = 0; polls < 10; polls++) {
+            taken = 0;
+            OK(mbm_server_poll(&server));
+            assert_in_range(taken, 1, 1200);
+        }
+    }
+}
+
+static void a_frame_that_fills_the_buffer_behind_noise_is_answered(void **state)
+{
+    static const uint8_t write[] = {17, 16, 0, 0, 0, 2, 4, 1, 2, 3, 4, 0, 0};
+    unsigned noise, i;
+
+    (void)state;
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, 16));
+    for (noise = 0; noise < 100; noise++) {
+        memset(wire.arriving, 0x5A, noise);
+        memcpy(wire.arriving + noise, write, sizeof write);
+        (void)seal(wire.arriving + noise, 11);
+        wire.first = wire.length = 0;
+        wire.last = noise + 13;
+        words[1] = 0;
+        for (i = 0; i < 100; i++)
+            OK(mbm_server_poll(&server));
+        assert_int_equal(wire.length, 8);
+        assert_int_equal(words[1], 0x0304);
+    }
+}
+
 static void tables_without_storage_have_no_cells(void **state)
 {
     (void)state;
@@ -472,6 +528,85 @@ static void a_lost_link_is_told_and_the_delay_is_that_of_the_line(void **state)
     IS(MBM_LINK_LOST, mbm_server_poll(&server));
 }
 
+/* The RS-485 driver: how often it was switched on and off. */
+static unsigned driver_on, driver_off;
+
+static void driver_pre(void *context)
+{
+    (void)context;
+    driver_on++;
+}
+
+static void driver_post(void *context)
+{
+    (void)context;
+    driver_off++;
+    IS(MBM_BUSY, mbm_server_poll(&server));
+    IS(MBM_BUSY, mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+}
+
+static void a_begin_while_a_response_leaves_switches_the_driver_off(void **state)
+{
+    uint8_t (*const begins[])(mbm_server *, const mbm_port *, mbm_unit *, uint8_t, uint8_t *,
+                              uint16_t) = {mbm_server_begin, mbm_server_beginAscii,
+                                           mbm_server_beginTcp, mbm_server_beginRtuOverTcp};
+    mbm_port with_driver = port;
+    unsigned i;
+
+    (void)state;
+    with_driver.preTransmission = driver_pre;
+    with_driver.postTransmission = driver_post;
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    for (i = 0; i < COUNT(begins); i++) {
+        driver_on = driver_off = 0;
+        OK(mbm_server_begin(&server, &with_driver, &unit, 1, frame, sizeof frame));
+        assert_int_equal(driver_off, 0);
+        wire.drains = 1000;
+        assert_int_equal(ASK("\x03\0\0\0\1"), 7);
+        assert_int_equal(driver_on * 10 + driver_off, 10);
+        /* A begin that is refused changes nothing. */
+        IS(MBM_INVALID_ARGUMENT, begins[i](&server, &with_driver, &unit, 1, frame, 1));
+        assert_int_equal(driver_off, 0);
+        OK(begins[i](&server, &port, &unit, 1, frame, sizeof frame));
+        assert_int_equal(driver_off, 1);
+        OK(begins[i](&server, &with_driver, &unit, 1, frame, sizeof frame));
+        assert_int_equal(driver_off, 1);
+    }
+    wire.drains = 0;
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    assert_int_equal(ASK("\x03\0\0\0\1"), 7);
+}
+
+static void a_baud_rate_is_refused_where_no_rtu_line_is_served(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_server_setBaudRate(&server, 115200));
+    OK(mbm_server_setEchoDiscard(&server, 1));
+    OK(mbm_server_setBaudRate(&server, 9600));
+    OK(mbm_server_beginTcp(&server, &port, &unit, 1, frame, sizeof frame));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_setBaudRate(&server, 9600));
+    OK(mbm_server_beginRtuOverTcp(&server, &port, &unit, 1, frame, sizeof frame));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_setBaudRate(&server, 9600));
+    OK(mbm_server_beginAscii(&server, &port, &unit, 1, frame, sizeof frame));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_setBaudRate(&server, 115200));
+    /* Half a second between two characters is no end of an ASCII frame. */
+    memcpy(wire.arriving, ":110300000001EB\r\n", 17);
+    wire.length = 0;
+    for (i = 0; i < 17; i++) {
+        wire.first = i;
+        wire.last = i + 1;
+        OK(mbm_server_poll(&server));
+        wire.now += 500000;
+    }
+    OK(mbm_server_poll(&server));
+    assert_int_equal(wire.length, 15);
+    assert_memory_equal(wire.sent, ":1103020000EA\r\n", 15);
+}
+
 #define TEST(test) cmocka_unit_test_setup(test, reset)
 
 int main(void)
@@ -482,6 +617,8 @@ int main(void)
         TEST(what_a_unit_does_not_serve_is_exception_01),
         TEST(a_unit_without_services_is_none),
         TEST(a_poll_ends_though_a_peer_floods),
+        TEST(a_poll_takes_no_more_than_some_hundred_bytes_of_noise),
+        TEST(a_frame_that_fills_the_buffer_behind_noise_is_answered),
         TEST(tables_without_storage_have_no_cells),
         TEST(serving_twice_is_serving_once),
         TEST(mask_and_read_write_want_holding_registers),
@@ -493,6 +630,8 @@ int main(void)
         TEST(the_length_of_ours_frames_rtu_over_tcp),
         TEST(a_restart_is_told),
         TEST(a_lost_link_is_told_and_the_delay_is_that_of_the_line),
+        TEST(a_begin_while_a_response_leaves_switches_the_driver_off),
+        TEST(a_baud_rate_is_refused_where_no_rtu_line_is_served),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

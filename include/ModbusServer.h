@@ -223,9 +223,14 @@ public:
         set(state.onPost, callback, context);
     }
 
-    /** Tells bits per second, for t3.5; 0: untold, 4 ms. Sets nothing on the Stream. */
+    /**
+     * Tells bits per second, for t3.5; 0: untold, 4 ms. Sets nothing on the Stream.
+     * Without effect before begin and after beginAscii, where t3.5 ends no frame.
+     */
     void setBaudRate(uint32_t baud)
     {
+        if (!state.rtu)
+            return;
         setSilence(baud == 0 ? 4000 : baud > 19200 ? 1750 : 38500000 / baud + 1);
     }
     /**
@@ -263,6 +268,7 @@ private:
         uint32_t heard; // when the last byte was seen
         uint32_t silence;
         bool ready; // a response waits for the silence to end
+        bool rtu;
         mbm_server server;
         uint8_t frame[MODBUSSERVER_FRAME_BYTES];
     };
@@ -290,14 +296,17 @@ private:
             state.stream = &stream;
             state.silence = 0;
             state.ready = false;
+            state.rtu = false;
         }
         return status;
     }
     uint8_t beginRtu(ModbusUnit &first, uint8_t count, Stream &stream, uint32_t baud)
     {
         uint8_t status = listen(mbm_server_begin, first, count, stream);
-        if (status == MBM_OK)
+        if (status == MBM_OK) {
+            state.rtu = true;
             setBaudRate(baud);
+        }
         return status;
     }
     uint8_t named(uint8_t id, uint8_t status)

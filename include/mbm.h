@@ -1368,7 +1368,7 @@ typedef struct mbm_unit {
      */
     struct mbm_service *services[MBM_MAX_SERVICES];
     /**
-     * Not for you.
+     * Private: NULL in a unit that serves nothing.
      */
     uint16_t (*serve)(struct mbm_unit *unit,
                       const void *heading,
@@ -4282,7 +4282,8 @@ uint32_t mbm_server_pollDelay(const struct mbm_server *server);
  * ends with 4 ms of silence: see mbm_server_setBaudRate.
  *
  * May be called again at any time but from within its hooks; what was under way
- * is dropped. A call that is refused changes nothing. Opens nothing: the port is
+ * is dropped; where a response was leaving, the port that the object had is called
+ * to switch its driver off. A call that is refused changes nothing. Opens nothing: the port is
  * open already. Units are yours, may be shared between
  * servers, and stay where they are for as long as the object is used, as does
  * the buffer, which keeps nothing between requests.
@@ -4376,11 +4377,13 @@ uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t microseconds);
 
 /**
  * Tells the baud rate of an RTU line, from which t3.5 follows (serial line guide
- * V1.02, 2.5.1.1). It sets nothing on the line.
+ * V1.02, 2.5.1.1). It sets nothing on the line. Other framings do not end with t3.5:
+ * for the time that those wait there is mbm_server_setSilence.
  *
  * @param server  the object
  * @param baud    bits per second; 0 goes back to untold
- * @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
+ * @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings,
+ *         MBM_NOT_INITIALISED or MBM_BUSY
  */
 uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
 

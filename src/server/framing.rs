@@ -1,6 +1,6 @@
 //! How each framing finds a request in what arrives, and seals a response.
 
-use super::line::{Lent, Receive, Server};
+use super::line::{Lent, Receive, Seal, Server};
 use crate::error::Status;
 use crate::frame::checksum::crc16;
 use crate::frame::{ascii, rtu, tcp};
@@ -11,12 +11,12 @@ use crate::time;
 use crate::FIRMWARE;
 use core::cell::Cell;
 
-/// Bytes that are given up at once where the buffer is full.
-const SLIDE: usize = 16;
+/// Bytes that are given up at once where the buffer is full: fewer cost more time, more
+/// cost a request that takes all of the buffer but a few bytes.
+const SLIDE: usize = 4;
 
-/// Reads of one poll at most, where a peer floods with what is no frame. As many as a
-/// frame has bytes, and more.
-const MOST_READS: u16 = 512;
+/// Bytes that one poll takes at most, where a peer floods with what is no frame.
+const MOST_BYTES: u16 = 512;
 
 /// The inter-character timeout of ASCII (serial line guide V1.02, 2.5.2.1).
 const ASCII_TIMEOUT: u32 = time::millis(1000);
@@ -104,18 +104,8 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// nobody saw, for poll came late, the last frame counts: one of ours that
     /// is followed by another is no longer waited for.
     fn receive_rtu(&mut self) -> Status {
-        self.make_room();
-        if FIRMWARE {
-            let heard = self.hear(usize::MAX);
-            return if heard > 0 {
-                Status::OK
-            } else {
-                self.receive_no_more(heard)
-            };
-        }
-        let heard = self.take(usize::MAX);
+        let heard = self.hear(usize::MAX);
         if heard > 0 {
-            self.note(heard as u16);
             return Status::OK;
         }
         self.receive_no_more(heard)
@@ -134,6 +124,13 @@ impl<P: Port, B: Lent> Server<P, B> {
         self.last_frame()
     }
 
+    /// True for RTU frames on a serial line, which t3.5 ends.
+    pub fn is_rtu_line(&self) -> bool {
+        let rtu: Seal<P, B> = Self::seal_rtu;
+        let is_rtu = |seal| core::ptr::fn_addr_eq(seal, rtu);
+        self.request.serial && self.seal.is_some_and(is_rtu)
+    }
+
     /// True if what is sent comes back.
     #[inline(always)]
     pub(super) fn drops_echo(&self) -> bool {
@@ -148,9 +145,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     pub fn set_echo_discard(&mut self, on: bool) -> bool {
         let plain: Receive<P, B> = Self::receive_rtu;
         let echoing: Receive<P, B> = Self::receive_behind_echo;
-        let is_rtu = self.receive.is_some_and(|receive| {
-            core::ptr::fn_addr_eq(receive, plain) || core::ptr::fn_addr_eq(receive, echoing)
-        });
+        let is_rtu = self.is_rtu_line();
         if is_rtu {
             self.receive = Some(if on { echoing } else { plain });
             self.sent = 0;
@@ -177,35 +172,29 @@ impl<P: Port, B: Lent> Server<P, B> {
         Status::OK
     }
 
-    /// Gives up the oldest bytes of a full buffer, unless it ends with a frame.
-    #[inline(always)]
-    fn make_room(&mut self) {
-        if usize::from(self.end) == self.lent.frame().len() {
-            self.slide();
+    /// Gives up the oldest bytes of a full buffer, whose first is the newest: where that
+    /// stands from now on.
+    #[inline(never)]
+    pub(super) fn slide(&mut self) -> usize {
+        self.request.overrun = true;
+        let capacity = self.lent.capacity();
+        let frame = self.lent.part(0, capacity);
+        let newest = frame.first().copied().unwrap_or(0);
+        shift(frame, SLIDE);
+        let place = capacity.saturating_sub(SLIDE);
+        if let Some(first) = self.lent.part(place, capacity).first_mut() {
+            *first = newest;
         }
-    }
-
-    #[cfg_attr(target_os = "none", inline(always))]
-    #[cfg_attr(not(target_os = "none"), cold)]
-    fn slide(&mut self) {
-        let frame = self.lent.frame();
-        if rtu::last(frame) == frame.len() {
-            shift(frame, SLIDE);
-            self.end -= SLIDE as u16;
-            self.request.overrun = true;
-        }
+        place
     }
 
     /// Moves the last frame of what arrived to the front.
-    #[cfg_attr(target_os = "none", inline(never))]
     fn last_frame(&mut self) -> Status {
         let end = usize::from(self.end);
         if !FIRMWARE && self.crc.is_residue() && !self.request.overrun {
             return self.found(end.saturating_sub(rtu::OVERHEAD));
         }
-        let Some(frame) = self.lent.frame().get_mut(..end) else {
-            return Status::OK;
-        };
+        let frame = self.lent.part(0, end);
         let start = if self.crc.is_residue() && !self.request.overrun {
             0
         } else {
@@ -218,7 +207,8 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// Frames that tell their length are taken one by one; for others, and to
     /// find the way back, there is silence.
     fn receive_by_length(&mut self) -> Status {
-        for _ in 0..MOST_READS {
+        let mut taken = 0;
+        while taken < MOST_BYTES {
             let end = usize::from(self.end);
             let frame = self.lent.frame();
             let capacity = frame.len();
@@ -245,17 +235,11 @@ impl<P: Port, B: Lent> Server<P, B> {
                 Some((total, _)) if !self.astray => total,
                 _ => usize::MAX,
             };
-            self.make_room();
             let heard = self.hear(until);
-            if heard < 0 {
-                return Status::LINK_LOST;
+            if heard <= 0 {
+                return self.receive_no_more(heard);
             }
-            if heard == 0 {
-                if self.end == 0 || !self.is_silent() {
-                    return Status::OK;
-                }
-                return self.last_frame();
-            }
+            taken += heard as u16;
         }
         Status::OK
     }
@@ -274,30 +258,30 @@ impl<P: Port, B: Lent> Server<P, B> {
 
     fn seal_rtu(&mut self, length: usize) -> usize {
         let end = rtu::PDU + length;
-        if let Some((content, behind)) = self.lent.frame().split_at_mut_checked(end) {
-            if let Some(crc) = behind.first_chunk_mut() {
-                *crc = crc16(content).to_bytes();
-            }
+        let crc = crc16(self.lent.part(0, end)).to_bytes();
+        if let [low, high] = self.lent.part(end, end + 2) {
+            [*low, *high] = crc;
         }
-        length + rtu::OVERHEAD
+        end + 2
     }
 
     /// Byte by byte, for a colon begins a frame wherever it stands, and what
-    /// follows a frame belongs to the next. One poll takes as many bytes as the
-    /// longest frame has, so that it ends while a peer floods.
+    /// follows a frame belongs to the next.
     fn receive_ascii(&mut self) -> Status {
-        for _ in 0..ascii::MAX_FRAME {
+        for _ in 0..MOST_BYTES {
             let end = usize::from(self.end);
+            if end == self.lent.capacity() {
+                self.request.overrun = true;
+                return self.found(0);
+            }
             let heard = self.hear(end + 1);
             if heard < 0 {
                 return Status::LINK_LOST;
             }
             if heard == 0 {
-                let full = end == self.lent.frame().len();
-                if end == 0 || !(full || self.is_silent()) {
+                if end == 0 || !self.is_silent() {
                     return Status::OK;
                 }
-                self.request.overrun = full;
                 return self.found(0);
             }
             let delimiter = self.delimiter;

@@ -27,6 +27,17 @@ pub trait Lent {
     /// The storage of one frame: a request first, then its response.
     fn frame(&mut self) -> &mut [u8];
 
+    /// How many bytes that storage has.
+    fn capacity(&mut self) -> usize {
+        self.frame().len()
+    }
+
+    /// The bytes of that storage from `start` to `end`, both of which lie in it, the first
+    /// not behind the second.
+    fn part(&mut self, start: usize, end: usize) -> &mut [u8] {
+        self.frame().get_mut(start..end).unwrap_or_default()
+    }
+
     /// How long the requests of a user's function are, for framings without
     /// silence.
     fn rule(&self, function: u8) -> Option<Rule> {
@@ -92,7 +103,7 @@ pub struct Server<P, B> {
     /// The silence that ends a frame.
     silence: u32,
     pub(super) receive: Option<Receive<P, B>>,
-    seal: Option<Seal<P, B>>,
+    pub(super) seal: Option<Seal<P, B>>,
     /// What the caller lends.
     pub lent: B,
     /// The byte stream.
@@ -149,6 +160,12 @@ impl<P: Port, B: Lent> Server<P, B> {
         self.seal = Some(seal);
         self.ahead = 0;
         self.listen();
+    }
+
+    /// True while a response is leaving, with the driver on.
+    #[inline(always)]
+    pub fn is_sending(&self) -> bool {
+        self.phase == Phase::Send
     }
 
     /// Sets the silence that ends a frame, in microseconds: t3.5 for RTU, the
@@ -209,42 +226,34 @@ impl<P: Port, B: Lent> Server<P, B> {
         Status::MALFORMED_FRAME
     }
 
-    /// Receives up to the place `until` of the buffer, into the CRC too: how many bytes, negative
-    /// if the link is lost.
+    /// Receives behind what has arrived, up to the place `until` of the buffer or to its
+    /// end, into the CRC too: how many bytes, negative if the link is lost. A full buffer
+    /// takes one byte and gives up its oldest for it, once there is one: one that is full
+    /// and silent may hold a frame.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn hear(&mut self, until: usize) -> i16 {
-        let frame = self.lent.frame();
-        let until = until.min(frame.len());
-        let Some(room) = frame.get_mut(usize::from(self.end)..until) else {
-            return 0;
-        };
-        if room.is_empty() {
-            return 0;
+        let capacity = self.lent.capacity();
+        let end = usize::from(self.end);
+        let mut start = end;
+        let mut until = until.min(capacity);
+        if start == capacity {
+            (start, until) = (0, 1);
         }
-        let heard = self.port.read(room);
+        let heard = self.port.read(self.lent.part(start, until));
         if heard > 0 {
+            self.last_byte = self.now;
+            if start != end {
+                start = self.slide();
+            }
+            let end = start + heard as usize;
+            self.end = end as u16;
             // A microcontroller takes the CRC of bytes that need none, too: that is
             // less code, and one framing is all it has.
             if FIRMWARE || usize::from(self.request.head) == rtu::PDU {
-                if let Some(news) = room.get(..heard as usize) {
-                    self.crc = self.crc.with(news);
-                }
+                self.crc = self.crc.with(self.lent.part(start, end));
             }
-            self.end += heard as u16;
-            self.last_byte = self.now;
         }
         heard
-    }
-
-    /// So many bytes have arrived of an RTU frame, up to the end of what has: what
-    /// [`Server::hear`] does behind [`Server::take`].
-    #[inline(never)]
-    pub(super) fn note(&mut self, heard: u16) {
-        self.last_byte = self.now;
-        let frame = self.lent.frame();
-        if let Some(news) = frame.get(usize::from(self.end - heard)..usize::from(self.end)) {
-            self.crc = self.crc.with(news);
-        }
     }
 
     /// As [`Server::hear`], without CRC and time.
@@ -266,7 +275,6 @@ impl<P: Port, B: Lent> Server<P, B> {
     }
 
     /// True once the line has been silent for as long as ends a frame.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn is_silent(&self) -> bool {
         time::has_elapsed(self.silence, self.now, self.last_byte)
     }
@@ -288,7 +296,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// that arrived damaged.
     pub(super) fn found(&mut self, length: usize) -> Status {
         let head = usize::from(self.request.head);
-        let unit = self.lent.frame().get(head - 1);
+        let unit = self.lent.part(head - 1, head).first();
         let unit = unit.copied().unwrap_or(0);
         self.found_for(unit, if length > MAX_PDU { 0 } else { length as u16 })
     }
@@ -336,10 +344,8 @@ impl<P: Port, B: Lent> Server<P, B> {
             self.request.again = true;
             return false;
         }
-        let head = usize::from(self.request.head);
-        let Some(pdu) = self.lent.frame().get_mut(head..) else {
-            return true;
-        };
+        let capacity = self.lent.capacity();
+        let pdu = self.lent.part(self.request.head.into(), capacity);
         let length = reply.settle(pdu);
         match self.seal {
             Some(seal) if length != 0 => {
@@ -351,6 +357,15 @@ impl<P: Port, B: Lent> Server<P, B> {
             _ => self.listen(),
         }
         true
+    }
+
+    /// As [`Server::answer`], and sends what it can of a response.
+    #[inline(always)]
+    pub(crate) fn answer_and_send(&mut self, reply: Reply) -> Status {
+        if !self.answer(reply) || self.phase != Phase::Send {
+            return Status::OK;
+        }
+        self.send()
     }
 
     /// As [`Server::answer`], and what to return, unless [`Server::poll`] is to go
@@ -435,30 +450,28 @@ impl<P: Port, B: Lent> Server<P, B> {
         reply.settle(self.pdu())
     }
 
-    #[cfg_attr(target_os = "none", inline(never))]
     fn send(&mut self) -> Status {
-        let frame = self.lent.frame();
-        let rest = frame.get(usize::from(self.sent)..usize::from(self.end));
-        let rest = rest.unwrap_or_default();
+        let mut status = Status::OK;
+        let rest = self.lent.part(self.sent.into(), self.end.into());
         if !rest.is_empty() {
             let sent = self.port.write(rest);
             if sent < 0 {
-                self.end_transmission();
-                return Status::LINK_LOST;
-            }
-            self.sent += sent as u16;
-            if self.sent < self.end {
-                return Status::OK;
+                status = Status::LINK_LOST;
+            } else {
+                self.sent += sent as u16;
+                if self.sent < self.end {
+                    return status;
+                }
             }
         }
-        if self.port.flush() {
+        if status == Status::LINK_LOST || self.port.flush() {
             // An echo, where one is waited for, comes from here on.
             if FIRMWARE || self.keeps_time() {
                 self.last_byte = self.now;
             }
             self.end_transmission();
         }
-        Status::OK
+        status
     }
 
     #[cfg_attr(not(target_os = "none"), inline(always))]

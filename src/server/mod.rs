@@ -26,4 +26,4 @@ mod units;
 
 pub use line::{Lent, Server, MOST_REQUESTS};
 pub use reply::Reply;
-pub use units::{only_writes, Concern, Heading, Service, Unit, Units};
+pub use units::{only_writes, Concern, Heading, Service, Unit, Units, ANY};

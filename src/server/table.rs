@@ -12,7 +12,6 @@ use crate::pdu::limits::{
     MAX_WRITE_REGISTERS,
 };
 use crate::pdu::registers::{MASK_WRITE_REGISTER, READ_WRITE_MULTIPLE_REGISTERS};
-use crate::FIRMWARE;
 
 /// Which table, by the function that reads it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -55,9 +54,11 @@ impl Kind {
     }
 }
 
-/// Which way cells travel.
+/// What is done with cells.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Way {
+    /// Nothing: whether they are there is all that is wanted.
+    Check,
     /// From the cells into the data.
     Read,
     /// From the data into the cells.
@@ -73,11 +74,6 @@ pub trait Cells {
     /// Moves cells that are there from or into data as on the wire: registers
     /// high byte first, bits lowest first, unused bits 0.
     fn transfer(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]);
-
-    /// False if nobody is asked before cells are written, nor told.
-    fn has_hooks(&self) -> bool {
-        true
-    }
 
     /// Asked before cells are written, with the data as on the wire; an
     /// exception code refuses, 0 allows.
@@ -95,51 +91,37 @@ pub trait Cells {
 /// What serving a request needs of [`Cells`]; an object, so that firmware carries
 /// what serves less common functions once for all kinds of them.
 pub trait Access {
-    /// As [`Cells::covers`].
-    fn has(&self, address: u16, quantity: u16) -> bool;
-
-    /// Moves cells that are there, hooks around it where they are written: the
-    /// exception code of a hook that refuses, or 0.
+    /// Moves cells, hooks around it where they are written: exception code 2 where one
+    /// of them is not there, that of a hook that refuses, or 0.
     fn access(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) -> u8;
 }
 
 impl<T: Cells> Access for T {
-    #[inline(always)]
-    fn has(&self, address: u16, quantity: u16) -> bool {
-        self.covers(address, quantity)
-    }
-
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
     fn access(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) -> u8 {
-        let writes = way == Way::Write;
-        // A host keeps what hooks need out of the way of what needs none.
-        if !FIRMWARE && writes && self.has_hooks() {
-            return write_with_hooks(self, address, quantity, data);
+        if !self.covers(address, quantity) {
+            return NOT_THERE;
         }
-        if FIRMWARE && writes {
+        let writes = way == Way::Write;
+        if writes {
             let refused = self.before(address, quantity, data);
             if refused != 0 {
                 return refused;
             }
         }
-        self.transfer(way, address, quantity, data);
-        if FIRMWARE && writes {
+        if way != Way::Check {
+            self.transfer(way, address, quantity, data);
+        }
+        if writes {
             self.after(address, quantity);
         }
         0
     }
 }
 
-#[inline(never)]
-fn write_with_hooks(cells: &mut impl Cells, address: u16, quantity: u16, data: &mut [u8]) -> u8 {
-    let refused = cells.before(address, quantity, data);
-    if refused == 0 {
-        cells.transfer(Way::Write, address, quantity, data);
-        cells.after(address, quantity);
-    }
-    refused
-}
+/// Exception 02.
+const NOT_THERE: u8 = Reply::ILLEGAL_DATA_ADDRESS.exception_code();
 
 /// What a request does to a table: where in its PDU, or in that of its response,
 /// the data of cells stand.
@@ -158,12 +140,9 @@ impl Role {
     pub const WRITE_SEVERAL: Role = Role(6);
 }
 
-/// Data bytes of the most cells that are read, and that are written: as many of
-/// bits as of registers.
-const MAX_READ: usize = 2 * MAX_READ_REGISTERS as usize;
-const MAX_WRITTEN: usize = 2 * MAX_WRITE_REGISTERS as usize;
-const _: () = assert!(MAX_READ * 8 == MAX_READ_BITS as usize);
-const _: () = assert!(MAX_WRITTEN * 8 == MAX_WRITE_BITS as usize);
+// As many bytes of bits as of registers.
+const _: () = assert!(MAX_READ_REGISTERS * 16 == MAX_READ_BITS);
+const _: () = assert!(MAX_WRITE_REGISTERS * 16 == MAX_WRITE_BITS);
 
 /// What a function does to a table of this kind.
 #[inline(always)]
@@ -202,45 +181,59 @@ pub fn serve_as(
     if role == Role::NONE {
         return Reply::NOT_MINE;
     }
-    let Some(&[_, a, b, c, d, count]) = pdu.first_chunk() else {
+    let [_, a, b, c, d, count, ..] = &*pdu else {
         return Reply::NOT_MINE;
     };
-    let address = u16::from_be_bytes([a, b]);
-    let mut quantity = u16::from_be_bytes([c, d]);
+    let (address, count) = (u16::from_be_bytes([*a, *b]), *count);
+    let mut quantity = u16::from_be_bytes([*c, *d]);
+    let mut most = MAX_READ_REGISTERS;
+    if role == Role::WRITE_SEVERAL {
+        most = MAX_WRITE_REGISTERS;
+    }
     if role == Role::WRITE_ONE {
         // A coil is on with FF00, and off with 0000.
         let is_right = !kind.is_bits() || quantity == 0 || quantity == 0xFF00;
         quantity = is_right.into();
     }
-    // So that the bytes are not more than can be counted.
-    if quantity > MAX_READ_BITS {
+    if kind.is_bits() {
+        most <<= 4;
+    }
+    if quantity.wrapping_sub(1) >= most {
         return Reply::ILLEGAL_DATA_VALUE;
     }
     let bytes = kind.bytes(quantity);
-    let (mut end, mut most) = (5, MAX_READ);
+    let mut end = 5;
     if role == Role::WRITE_SEVERAL {
-        (end, most) = (6 + usize::from(count), MAX_WRITTEN);
+        end = 6 + bytes;
         if bytes != usize::from(count) {
             return Reply::ILLEGAL_DATA_VALUE;
         }
     }
-    if length != end || bytes.wrapping_sub(1) >= most {
+    if length != end {
         return Reply::ILLEGAL_DATA_VALUE;
     }
-    if !cells.has(address, quantity) {
-        return Reply::ILLEGAL_DATA_ADDRESS;
-    }
     let at = usize::from(role.0);
-    let Some(data) = pdu.get_mut(at..at + bytes) else {
-        return Reply::SERVER_DEVICE_FAILURE;
-    };
+    let (mut way, mut failure) = (Way::Write, 0);
     if role == Role::READ {
-        cells.access(Way::Read, address, quantity, data);
-        return counted(pdu, bytes);
+        way = Way::Read;
     }
-    match cells.access(Way::Write, address, quantity, data) {
-        0 => Reply::length(5),
-        refused => Reply::exception(refused),
+    let data = match pdu.get_mut(at..at + bytes) {
+        Some(data) => data,
+        None => {
+            (way, failure) = (Way::Check, Reply::SERVER_DEVICE_FAILURE.exception_code());
+            &mut []
+        }
+    };
+    let mut refused = cells.access(way, address, quantity, data);
+    if refused == 0 {
+        refused = failure;
+    }
+    if refused != 0 {
+        Reply::exception(refused)
+    } else if role == Role::READ {
+        counted(pdu, bytes)
+    } else {
+        Reply::length(5)
     }
 }
 
@@ -278,10 +271,9 @@ fn mask_write(cells: &mut (impl Access + ?Sized), pdu: &mut [u8], length: usize)
     };
     let address = u16::from_be_bytes([a, b]);
     let mut value = [0; 2];
-    if !cells.has(address, 1) {
+    if cells.access(Way::Read, address, 1, &mut value) != 0 {
         return Reply::ILLEGAL_DATA_ADDRESS;
     }
-    cells.access(Way::Read, address, 1, &mut value);
     // The AND mask, and the OR mask.
     let [high, low] = &mut value;
     *high = (*high & c) | (e & !c);
@@ -307,7 +299,8 @@ fn read_write(cells: &mut (impl Access + ?Sized), pdu: &mut [u8], length: usize)
     {
         return Reply::ILLEGAL_DATA_VALUE;
     }
-    if !cells.has(address, quantity) || !cells.has(write_address, written) {
+    let mut has = |address, quantity| cells.access(Way::Check, address, quantity, &mut []) == 0;
+    if !has(address, quantity) || !has(write_address, written) {
         return Reply::ILLEGAL_DATA_ADDRESS;
     }
     // Nothing is written that could not be answered.

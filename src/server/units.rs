@@ -78,7 +78,12 @@ impl Heading {
     /// True if a unit of this id is meant. In a stream, the ids 0 and 255 mean
     /// the server itself (messaging on TCP/IP guide V1.0b, 4.4.1.2).
     pub const fn is_for(&self, id: u8) -> bool {
-        self.to == id || id == ANY || (!self.serial && self.to.wrapping_add(1) <= 1)
+        self.to == id || id == ANY || self.is_for_any()
+    }
+
+    /// True if the server itself is meant.
+    pub const fn is_for_any(&self) -> bool {
+        !self.serial && self.to.wrapping_add(1) <= 1
     }
 }
 

@@ -1,6 +1,6 @@
 //! Beginning a server, and how it behaves.
 
-use super::{check, core_of, mbm_server, mbm_unit, Object, BEGUN};
+use super::{check, core_of, mbm_server, mbm_unit, Object, BEGUN, POLLING};
 use crate::capi::frame::MBM_MAX_TCP_FRAME;
 use crate::capi::port::{countable, mbm_port};
 use crate::error::Status;
@@ -36,20 +36,21 @@ unsafe fn begin(
         if check(server) == Status::BUSY {
             return Status::BUSY;
         }
-        (*server.cast::<Object>()).mark = BEGUN;
         let core = core_of(server);
-        // Field by field, which needs no memory function.
-        (*core).port.context = (*port).context;
-        (*core).port.read = (*port).read;
-        (*core).port.write = (*port).write;
-        (*core).port.micros = (*port).micros;
-        (*core).port.flush = (*port).flush;
-        (*core).port.preTransmission = (*port).preTransmission;
-        (*core).port.postTransmission = (*port).postTransmission;
+        let mark = &raw mut (*server.cast::<Object>()).mark;
+        mark.write(BEGUN);
+        let driver = ((*core).port.postTransmission, (*core).port.context);
+        (*core).port.copy(&*port);
         (*core).lent.frame = frame;
         (*core).lent.units = units;
         (*core).lent.bytes = countable(bytes);
         (*core).lent.count = count;
+        // The driver of the port that the object had is not left on.
+        if let ((Some(post), context), true) = (driver, (*core).is_sending()) {
+            mark.write(POLLING);
+            post(context);
+            mark.write(BEGUN);
+        }
     }
     Status::OK
 }
@@ -58,7 +59,8 @@ unsafe fn begin(
 /// ends with 4 ms of silence: see mbm_server_setBaudRate.
 ///
 /// May be called again at any time but from within its hooks; what was under way
-/// is dropped. A call that is refused changes nothing. Opens nothing: the port is
+/// is dropped; where a response was leaving, the port that the object had is called
+/// to switch its driver off. A call that is refused changes nothing. Opens nothing: the port is
 /// open already. Units are yours, may be shared between
 /// servers, and stay where they are for as long as the object is used, as does
 /// the buffer, which keeps nothing between requests.
@@ -200,15 +202,26 @@ pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, microsec
 }
 
 /// Tells the baud rate of an RTU line, from which t3.5 follows (serial line guide
-/// V1.02, 2.5.1.1). It sets nothing on the line.
+/// V1.02, 2.5.1.1). It sets nothing on the line. Other framings do not end with t3.5:
+/// for the time that those wait there is mbm_server_setSilence.
 ///
 /// @param server  the object
 /// @param baud    bits per second; 0 goes back to untold
-/// @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
+/// @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings,
+///         MBM_NOT_INITIALISED or MBM_BUSY
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u32) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { mbm_server_setSilence(server, time::silence(baud)) }
+    unsafe {
+        match check(server) {
+            Status::OK if (*core_of(server)).is_rtu_line() => {
+                (*core_of(server)).set_silence(time::silence(baud));
+                Status::OK.code()
+            }
+            Status::OK => Status::INVALID_ARGUMENT.code(),
+            refused => refused.code(),
+        }
+    }
 }
 
 /// Tells that the receiver of an RTU line hears what the driver sends, so that as

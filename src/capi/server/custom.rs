@@ -109,6 +109,33 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, heading: *co
     }
 }
 
+/// True for a record that serves one function of a user, which is not this.
+///
+/// # Safety
+/// `service` is the head of a record of any kind.
+#[inline(always)]
+pub(super) unsafe fn is_of_another(service: *const mbm_service, function: u8) -> bool {
+    // SAFETY: as the caller promises; a record that this file serves is a
+    // function of C.
+    unsafe {
+        is_custom(service) && {
+            let code = (*service.cast::<mbm_custom>()).code;
+            code != function && code != 0
+        }
+    }
+}
+
+/// True for a record that this file serves.
+///
+/// # Safety
+/// `service` is the head of a record of any kind.
+#[inline(always)]
+unsafe fn is_custom(service: *const mbm_service) -> bool {
+    // SAFETY: as the caller promises.
+    let other = unsafe { (*service).serve };
+    other.is_some_and(|other| core::ptr::fn_addr_eq(other, serve as super::units::Serve))
+}
+
 /// The length rule of a function, if the record with this head is that function.
 ///
 /// # Safety
@@ -117,10 +144,7 @@ pub(super) unsafe fn rule(service: *const mbm_service, function: u8) -> Option<R
     // SAFETY: as the caller promises; a record that this file serves is a
     // function of C.
     unsafe {
-        if !(*service)
-            .serve
-            .is_some_and(|other| core::ptr::fn_addr_eq(other, serve as super::units::Serve))
-        {
+        if !is_custom(service) {
             return None;
         }
         let record = service.cast::<mbm_custom>();

@@ -108,7 +108,7 @@ unsafe extern "C" fn monitor(
         if !line(record).hear(&*heading, concern, request) {
             return Reply::SILENT.code();
         }
-        let reply = walk(unit, pdu, heading);
+        let reply = walk(unit, heading.cast(), Concern::Own as u8, pdu);
         if reply != Reply::PENDING.code() {
             line(record).done(concern, function, Reply::from_number(reply));
         }

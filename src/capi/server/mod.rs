@@ -99,6 +99,18 @@ impl Lent for LentByC {
         }
     }
 
+    fn capacity(&mut self) -> usize {
+        self.bytes.into()
+    }
+
+    fn part(&mut self, start: usize, end: usize) -> &mut [u8] {
+        debug_assert!(start <= end && end <= self.bytes.into());
+        // SAFETY: begin demands a buffer of so many bytes for as long as the object is
+        // used, and the core keeps to the contract of `part`: places come from what a
+        // port took or gave, of which more than there was room for does not count.
+        unsafe { from_raw_parts_mut(self.frame.add(start), end - start) }
+    }
+
     fn rule(&self, function: u8) -> Option<Rule> {
         // SAFETY: begin demands so many units for as long as the object is used.
         unsafe { units::rule(self.units, self.count, function) }
@@ -174,8 +186,23 @@ unsafe fn serve(core: *mut Core, mark: *const u8) -> Status {
     // SAFETY: as the caller promises. No reference to the core lives while units
     // are served, or while the clock is read: both are the caller's code.
     unsafe {
+        // One request a poll is as much as a line brings.
+        if FIRMWARE {
+            let status = (*core).poll(port::now(&raw const (*core).port));
+            if status != Status::PENDING {
+                return status;
+            }
+            let heading = &raw const (*core).request;
+            let lent = &raw const (*core).lent;
+            let pdu = (*lent).frame.add((*heading).head.into());
+            let reply = units::serve((*lent).units, (*lent).count, heading, pdu);
+            if mark.read() != POLLING {
+                return Status::OK;
+            }
+            return (*core).answer_and_send(Reply::from_number(reply));
+        }
         for _ in 0..MOST_REQUESTS {
-            let now = if FIRMWARE || (*core).keeps_time() {
+            let now = if (*core).keeps_time() {
                 port::now(&raw const (*core).port)
             } else {
                 0

@@ -4,7 +4,7 @@ use super::cells::{transfer_bits, transfer_words};
 use super::units::{add, is_unheard, request};
 use super::{mbm_service, mbm_unit};
 use crate::error::Status;
-use crate::server::table::{self, Access, Cells, Kind, Role, Way};
+use crate::server::table::{self, Access, Kind, Role, Way};
 use crate::server::Reply;
 use crate::FIRMWARE;
 use core::ffi::c_void;
@@ -78,15 +78,8 @@ pub struct mbm_bitTable {
     pub kind: u8,
 }
 
-/// A table of C, whose hooks may look at it: no reference to it is kept. What says
-/// where its cells are is taken once a request, for a hook may zero the record or
-/// set it up anew.
-struct Table {
-    record: *mut mbm_registerTable,
-    cells: *mut u8,
-    base: u16,
-    kind: Kind,
-}
+/// A table of C, whose hooks may look at it: no reference to it is kept.
+struct Table(*mut mbm_registerTable);
 
 // The two tables are one record, but for what `words` points to.
 const _: () = {
@@ -96,138 +89,177 @@ const _: () = {
     assert!(offset_of!(mbm_registerTable, kind) == offset_of!(mbm_bitTable, kind));
 };
 
-/// The bit of a place in a bitmap.
-///
-/// # Safety
-/// The bitmap has it.
-unsafe fn bit(map: *const u8, index: u16) -> bool {
-    // SAFETY: as the caller promises.
-    unsafe { *map.add(usize::from(index >> 3)) >> (index & 7) & 1 != 0 }
-}
-
 // SAFETY, of all functions here: the record is the caller's and stays where it
 // is, as the header demands, with arrays of `size` cells behind its pointers; a
-// cell that is `covered` lies in them.
-impl Table {
-    /// # Safety
-    /// `record` is a table.
-    #[inline(always)]
-    unsafe fn new(record: *mut mbm_registerTable, kind: Kind) -> Table {
-        // SAFETY: as the caller promises.
+// cell that is looked at lies in them.
+impl Access for Table {
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
+    fn access(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) -> u8 {
+        let table = self.0;
+        // SAFETY: see above; data have room for so many cells.
         unsafe {
-            Table {
-                record,
-                cells: (*record).words.cast(),
-                base: (*record).base,
-                kind,
+            // What says where the cells are is taken once, for a hook may zero the
+            // record or set it up anew.
+            let cells = (*table).words.cast::<u8>();
+            let kind = Kind::from_code((*table).kind);
+            let first = address.wrapping_sub((*table).base);
+            if cells.is_null() || !covers(table, first, quantity) {
+                return Reply::ILLEGAL_DATA_ADDRESS.exception_code();
+            }
+            let writes = way == Way::Write;
+            if writes {
+                if let Some(hook) = (*table).before {
+                    let refused = hook((*table).context, address, quantity, data.as_ptr());
+                    if refused != 0 {
+                        return refused;
+                    }
+                }
+            }
+            transfer(cells, kind, way, first, quantity, data);
+            if writes {
+                if let Some(hook) = (*table).after {
+                    hook((*table).context, address, quantity);
+                }
             }
         }
-    }
-
-    fn index(&self, address: u16) -> u16 {
-        address.wrapping_sub(self.base)
+        0
     }
 }
 
-impl Cells for Table {
-    fn covers(&self, address: u16, quantity: u16) -> bool {
-        let first = self.index(address);
-        // SAFETY: see above.
-        unsafe {
-            let end = first.checked_add(quantity);
-            if self.cells.is_null() || end.is_none_or(|end| end > (*self.record).size) {
-                return false;
-            }
-            let valid = (*self.record).valid;
-            valid.is_null() || (first..first + quantity).all(|index| bit(valid, index))
+/// True if a table has so many cells from the one with this index on.
+///
+/// # Safety
+/// `table` is one, with `size` bits behind `valid`.
+#[inline(always)]
+unsafe fn covers(table: *const mbm_registerTable, first: u16, quantity: u16) -> bool {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let size = (*table).size;
+        if first >= size || quantity > size - first {
+            return false;
+        }
+        let valid = (*table).valid;
+        valid.is_null() || are_all_on(valid, first, quantity)
+    }
+}
+
+/// True if so many bits of a bitmap are 1.
+///
+/// # Safety
+/// The bitmap has them, and there is one at least.
+#[cfg_attr(target_arch = "avr", inline(never))]
+#[cfg_attr(not(target_arch = "avr"), inline(always))]
+unsafe fn are_all_on(map: *const u8, mut first: u16, quantity: u16) -> bool {
+    let end = first + quantity;
+    loop {
+        // SAFETY: as the caller promises.
+        if unsafe { *map.add(usize::from(first >> 3)) } >> (first & 7) & 1 == 0 {
+            return false;
+        }
+        first += 1;
+        if first == end {
+            return true;
         }
     }
+}
 
-    #[cfg_attr(target_os = "none", inline(never))]
-    #[cfg_attr(not(target_os = "none"), inline(always))]
-    fn transfer(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) {
-        let first = self.index(address);
-        let write = way == Way::Write;
-        // SAFETY: see above; data have room for so many cells.
-        unsafe {
-            let cells = self.cells;
-            let bits = self.kind.is_bits();
-            // A host has room for code that takes many cells at a time.
-            if !FIRMWARE {
-                if bits && write && quantity == 1 {
-                    let cell = cells.add(usize::from(first >> 3));
-                    let on = data.first().is_some_and(|data| data & 1 != 0);
-                    let rest = *cell & !(1 << (first & 7));
-                    *cell = rest | u8::from(on) << (first & 7);
-                } else if bits {
-                    transfer_bits(cells, write, first, quantity, data);
-                } else {
-                    transfer_words(cells.cast(), write, first, quantity, data);
-                }
-                return;
-            }
-            if !bits {
-                let mut words = cells.add(2 * usize::from(first));
-                let mut data = data.as_mut_ptr();
-                if write {
-                    core::mem::swap(&mut words, &mut data);
-                }
-                // From one order of bytes to the other, whichever is which.
-                let high = usize::from(cfg!(target_endian = "little"));
-                for _ in 0..quantity {
-                    *data = *words.add(high);
-                    *data.add(1) = *words.add(1 - high);
-                    words = words.add(2);
-                    data = data.add(2);
-                }
-                return;
-            }
-            let (mut from, mut from_bit) = (cells.add(usize::from(first >> 3)), 1u8 << (first & 7));
-            let (mut to, mut to_bit) = (data.as_mut_ptr(), 1u8);
-            if !write {
-                // There are bits without a cell.
-                *to.add(usize::from((quantity - 1) >> 3)) = 0;
+/// Moves cells from or into data.
+///
+/// # Safety
+/// There are so many at both; nothing else uses them meanwhile.
+#[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline(always))]
+unsafe fn transfer(
+    cells: *mut u8,
+    kind: Kind,
+    way: Way,
+    first: u16,
+    quantity: u16,
+    data: &mut [u8],
+) {
+    let (bits, write) = (kind.is_bits(), way == Way::Write);
+    if way == Way::Check {
+        return;
+    }
+    // SAFETY: as the caller promises.
+    unsafe {
+        // A host has room for code that takes many cells at a time.
+        if !FIRMWARE {
+            if bits && write && quantity == 1 {
+                let cell = cells.add(usize::from(first >> 3));
+                let on = data.first().is_some_and(|data| data & 1 != 0);
+                let rest = *cell & !(1 << (first & 7));
+                *cell = rest | u8::from(on) << (first & 7);
+            } else if bits {
+                transfer_bits(cells, write, first, quantity, data);
             } else {
-                core::mem::swap(&mut from, &mut to);
-                core::mem::swap(&mut from_bit, &mut to_bit);
+                transfer_words(cells.cast(), write, first, quantity, data);
             }
-            for _ in 0..quantity {
-                let rest = *to & !to_bit;
-                *to = if *from & from_bit != 0 {
-                    rest | to_bit
-                } else {
-                    rest
-                };
-                from_bit = from_bit.rotate_left(1);
-                from = from.add(usize::from(from_bit & 1));
-                to_bit = to_bit.rotate_left(1);
-                to = to.add(usize::from(to_bit & 1));
+            return;
+        }
+        if !bits {
+            let mut words = cells.add(2 * usize::from(first));
+            let mut data = data.as_mut_ptr();
+            if write {
+                core::mem::swap(&mut words, &mut data);
+            }
+            // From one order of bytes to the other, whichever is which.
+            let high = usize::from(cfg!(target_endian = "little"));
+            let mut left = quantity as u8;
+            loop {
+                *data = *words.add(high);
+                *data.add(1) = *words.add(1 - high);
+                words = words.add(2);
+                data = data.add(2);
+                left -= 1;
+                if left == 0 {
+                    return;
+                }
+            }
+        }
+        let (mut from, mut from_bit) = (cells.add(usize::from(first >> 3)), 1u8 << (first & 7));
+        let (mut to, mut to_bit) = (data.as_mut_ptr(), 1u8);
+        if !write {
+            // There are bits without a cell.
+            *to.add(usize::from((quantity - 1) >> 3)) = 0;
+        } else {
+            core::mem::swap(&mut from, &mut to);
+            core::mem::swap(&mut from_bit, &mut to_bit);
+        }
+        let mut left = quantity;
+        loop {
+            let rest = *to & !to_bit;
+            *to = if *from & from_bit != 0 {
+                rest | to_bit
+            } else {
+                rest
+            };
+            from_bit = from_bit.rotate_left(1);
+            from = from.add(usize::from(from_bit & 1));
+            to_bit = to_bit.rotate_left(1);
+            to = to.add(usize::from(to_bit & 1));
+            left -= 1;
+            if left == 0 {
+                return;
             }
         }
     }
+}
 
-    fn has_hooks(&self) -> bool {
-        // SAFETY: see above.
-        unsafe { (*self.record).before.is_some() || (*self.record).after.is_some() }
-    }
+/// As [`Table`], for function 17: what it reads once its hooks were called is where it
+/// was when the request came.
+struct TableAsItWas(Table, mbm_registerTable);
 
-    fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
-        // SAFETY: see above.
-        unsafe {
-            match (*self.record).before {
-                Some(hook) => hook((*self.record).context, address, quantity, data.as_ptr()),
-                None => 0,
-            }
-        }
-    }
-
-    fn after(&mut self, address: u16, quantity: u16) {
-        // SAFETY: see above.
-        unsafe {
-            if let Some(hook) = (*self.record).after {
-                hook((*self.record).context, address, quantity);
-            }
-        }
+impl Access for TableAsItWas {
+    fn access(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) -> u8 {
+        let mut was = Table(&raw mut self.1);
+        let table = if way == Way::Read {
+            &mut was
+        } else {
+            &mut self.0
+        };
+        table.access(way, address, quantity, data)
     }
 }
 
@@ -266,7 +298,7 @@ unsafe fn serve_as(
     unsafe {
         let (pdu, length) = request(pdu, heading);
         let kind = Kind::from_code((*table).kind);
-        let cells = &mut Table::new(table, kind);
+        let cells = &mut Table(table);
         if FIRMWARE || kind.is_bits() {
             table::serve_as(role, kind, cells, pdu, length).code()
         } else {
@@ -316,7 +348,7 @@ unsafe fn serve_more(table: *mut mbm_registerTable, pdu: *mut u8, heading: *cons
     // SAFETY: as the caller promises.
     unsafe {
         let (pdu, length) = request(pdu, heading);
-        let mut cells = Table::new(table, Kind::HOLDING_REGISTERS);
+        let mut cells = TableAsItWas(Table(table), table.read());
         if FIRMWARE {
             let cells: &mut dyn Access = &mut cells;
             return table::serve_more(cells, pdu, length).code();

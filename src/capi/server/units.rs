@@ -3,10 +3,10 @@
 use super::{custom, mbm_diagnostics};
 use crate::error::Status;
 use crate::pdu::custom::Rule;
-use crate::server::{only_writes, Concern, Heading, Reply};
+use crate::server::{only_writes, Concern, Heading, Reply, ANY};
 use crate::FIRMWARE;
 use core::ffi::c_void;
-use core::slice::from_raw_parts_mut;
+use core::slice::{from_raw_parts, from_raw_parts_mut};
 
 /// Most records that one unit serves, each handed to a mbm_server_serve function.
 pub const MBM_MAX_SERVICES: u8 = 16;
@@ -43,7 +43,7 @@ pub(super) type Serve =
 pub struct mbm_unit {
     /// Private: the records, in the order in which they are asked, then NULL.
     pub services: [*mut mbm_service; MBM_MAX_SERVICES as usize],
-    /// Not for you.
+    /// Private: NULL in a unit that serves nothing.
     pub serve: Option<
         unsafe extern "C" fn(
             unit: *mut mbm_unit,
@@ -85,6 +85,9 @@ pub(super) unsafe fn add(unit: *mut mbm_unit, service: *mut mbm_service, serve: 
         *place = service;
         if (*service).serve.is_none() {
             (*service).serve = Some(serve);
+        }
+        if (*unit).serve.is_none() {
+            (*unit).serve = Some(walk);
         }
     }
     Status::OK.code()
@@ -128,16 +131,6 @@ impl Iterator for Places {
     }
 }
 
-/// True for a unit without a record: it is silent.
-///
-/// # Safety
-/// `unit` is one.
-#[inline(always)]
-unsafe fn serves_nothing(unit: *const mbm_unit) -> bool {
-    // SAFETY: as the caller promises.
-    unsafe { Places::new(unit).next().is_none() }
-}
-
 /// The PDU of a request with the room behind it, and its length.
 ///
 /// # Safety
@@ -151,19 +144,31 @@ pub(super) unsafe fn request<'a>(pdu: *mut u8, heading: *const c_void) -> (&'a m
     }
 }
 
-/// Has the services of a unit look at a request, one after the other.
+/// Has the services of a unit look at a request, one after the other: the function of a
+/// unit that takes no notice of frames for others.
 ///
 /// # Safety
 /// `unit` is one, and `pdu` has the bytes and the room that `heading` says.
-#[cfg_attr(target_os = "none", inline(never))]
-#[cfg_attr(not(target_os = "none"), inline(always))]
-pub(super) unsafe fn walk(unit: *mut mbm_unit, pdu: *mut u8, heading: *const Heading) -> u16 {
-    // SAFETY: as the caller promises.
+pub(super) unsafe extern "C" fn walk(
+    unit: *mut mbm_unit,
+    heading: *const c_void,
+    concern: u8,
+    pdu: *mut u8,
+) -> u16 {
+    if concern == Concern::Foreign as u8 {
+        return Reply::SILENT.code();
+    }
+    // SAFETY: as the caller promises; a PDU has a byte at least.
     unsafe {
+        let function = *pdu;
         for service in Places::new(unit) {
+            // A host does not call what answers another function alone.
+            if !FIRMWARE && custom::is_of_another(service, function) {
+                continue;
+            }
             // A record that was zeroed has no function.
             if let Some(serve) = (*service).serve {
-                let reply = serve(service, pdu, heading.cast());
+                let reply = serve(service, pdu, heading);
                 if reply != Reply::NOT_MINE.code() {
                     return reply;
                 }
@@ -179,37 +184,7 @@ pub(super) unsafe fn walk(unit: *mut mbm_unit, pdu: *mut u8, heading: *const Hea
 /// `units` points to `count` units, and `pdu` has the bytes and the room that
 /// `heading` says.
 #[cfg_attr(target_os = "none", inline(never))]
-#[cfg_attr(not(target_os = "none"), inline(always))]
 pub(super) unsafe fn serve(
-    units: *mut mbm_unit,
-    count: u8,
-    heading: *const Heading,
-    pdu: *mut u8,
-) -> u16 {
-    // SAFETY: as the caller promises.
-    unsafe {
-        // One unit alone, which takes no notice of what is others', and is asked by
-        // its id: soon done.
-        if !FIRMWARE
-            && count == 1
-            && (*units).serve.is_none()
-            && (*heading).length != 0
-            && (*heading).to == (*units).id
-            && (*heading).to != 0
-            && !serves_nothing(units)
-        {
-            return walk(units, pdu, heading);
-        }
-        serve_each(units, count, heading, pdu)
-    }
-}
-
-/// [`serve`], whatever the units.
-///
-/// # Safety
-/// As for [`serve`].
-#[cfg_attr(not(target_os = "none"), inline(never))]
-unsafe fn serve_each(
     units: *mut mbm_unit,
     count: u8,
     heading: *const Heading,
@@ -219,31 +194,63 @@ unsafe fn serve_each(
     // SAFETY: as the caller promises.
     unsafe {
         let mut unit = units;
-        let end = units.add(count.into());
+        let mut left = count;
         let mut all = (*heading).concern_of_all();
-        while unit != end {
-            let mut concern = all;
-            if concern == Concern::Own && !(*heading).is_for((*unit).id) {
-                concern = Concern::Foreign;
+        loop {
+            if !FIRMWARE && all != Concern::Broadcast {
+                let passed = foreign(unit, left, heading, all);
+                left -= passed;
+                unit = unit.add(passed.into());
             }
-            // Only who takes notice of all frames has a function for that, and a
-            // unit without any service is none.
-            let mut reply = Reply::SILENT.code();
-            if let Some(monitor) = (*unit).serve {
-                reply = monitor(unit, heading.cast(), concern as u8, pdu);
-            } else if serves_nothing(unit) {
-                concern = Concern::Foreign;
-            } else if concern != Concern::Foreign {
-                reply = walk(unit, pdu, heading);
+            if left == 0 {
+                return answer;
             }
-            if concern == Concern::Own {
-                answer = reply;
-                all = Concern::Foreign;
+            // A unit that serves nothing has no function, and is as if it were not there.
+            if let Some(serve) = (*unit).serve {
+                let mut concern = all;
+                if concern == Concern::Own && !(*heading).is_for((*unit).id) {
+                    concern = Concern::Foreign;
+                }
+                let reply = serve(unit, heading.cast(), concern as u8, pdu);
+                if concern == Concern::Own {
+                    answer = reply;
+                    all = Concern::Foreign;
+                }
             }
             unit = unit.add(1);
+            left -= 1;
         }
     }
-    answer
+}
+
+/// How many of these units, up to the first other, neither answer a frame nor take
+/// notice of it, where it is no broadcast: a host calls none of them.
+///
+/// # Safety
+/// `units` points to `count` units.
+#[inline(always)]
+unsafe fn foreign(units: *const mbm_unit, count: u8, heading: *const Heading, all: Concern) -> u8 {
+    // SAFETY: as the caller promises; no function of theirs runs meanwhile.
+    let (heading, units) = unsafe { (&*heading, from_raw_parts(units, count.into())) };
+    let takes_notice = |unit: &mbm_unit| !unit.diagnostics.is_null();
+    let answers = |unit: &mbm_unit| unit.id == heading.to || unit.id == ANY;
+    if all == Concern::Foreign {
+        before(units, takes_notice)
+    } else if heading.is_for_any() {
+        0
+    } else {
+        before(units, |unit| answers(unit) || takes_notice(unit))
+    }
+}
+
+/// How many units come before the first of which this is true; four at a time.
+#[inline(always)]
+fn before(units: &[mbm_unit], is_it: impl Fn(&mbm_unit) -> bool) -> u8 {
+    let (fours, _) = units.as_chunks::<4>();
+    let is_in = |four: &[mbm_unit; 4]| four.iter().any(&is_it);
+    let passed = 4 * fours.iter().position(is_in).unwrap_or(fours.len());
+    let mut rest = units.iter().skip(passed);
+    (passed + rest.position(&is_it).unwrap_or(units.len() - passed)) as u8
 }
 
 /// True for a broadcast of a function that is not carried out then.
