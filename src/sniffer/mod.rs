@@ -19,6 +19,7 @@ use crate::error::Status;
 use crate::frame::{ascii, Framing};
 use crate::pdu::custom::Function;
 use crate::time::{character, silence, DEFAULT_SILENCE};
+use crate::FIRMWARE;
 use find::{Context, Verdict};
 use lane::{Lane, Timing};
 use pairing::Requests;
@@ -174,7 +175,7 @@ impl Sniffer {
             lane.look_again();
         }
         match bytes {
-            [byte] if lane.feed_next(part, *byte, now, &self.timing) => 1,
+            [byte] if !FIRMWARE && lane.feed_next(part, *byte, now, &self.timing) => 1,
             _ => lane.feed(part, bytes, now, &self.timing),
         }
     }
@@ -254,7 +255,8 @@ impl Sniffer {
     }
 
     /// True if no request is overdue and no lane holds more than the beginning of a
-    /// frame: what [`Sniffer::look`] finds then, at less cost.
+    /// frame: what [`Sniffer::look`] finds then, at less cost. Firmware, where code is
+    /// dearer, looks.
     #[cfg_attr(not(target_os = "none"), inline(never))]
     pub(crate) fn only_waits(
         &mut self,
@@ -262,6 +264,9 @@ impl Sniffer {
         functions: &[Function],
         now: u32,
     ) -> bool {
+        if FIRMWARE {
+            return false;
+        }
         let only_bytes = self.is_early(now);
         if !only_bytes {
             self.calm_from = now;
