@@ -74,14 +74,30 @@ pub struct mbm_switches {
 /// `service` is the head of a function of C; `pdu` has the bytes and room of
 /// `heading`.
 unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, heading: *const c_void) -> u16 {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let code = (*service.cast::<mbm_custom>()).code;
+        if code != 0 && code != *pdu {
+            return Reply::NOT_MINE.code();
+        }
+        serve_mine(service.cast(), pdu, heading)
+    }
+}
+
+/// [`serve`], of the function that the record serves: apart, for a request of another is
+/// to cost little.
+///
+/// # Safety
+/// As for [`serve`].
+#[cfg_attr(not(target_os = "none"), inline(never))]
+unsafe fn serve_mine(record: *mut mbm_custom, pdu: *mut u8, heading: *const c_void) -> u16 {
     // SAFETY: as the caller promises; no reference to the record is kept while
     // its function runs.
     unsafe {
-        let record = service.cast::<mbm_custom>();
         let to = (*heading.cast::<Heading>()).to;
         let (pdu, length) = request(pdu, heading);
         let function = pdu.first().copied().unwrap_or(0);
-        if (*record).code != 0 && (*record).code != function || is_unheard(heading, function) {
+        if is_unheard(heading, function) {
             return Reply::NOT_MINE.code();
         }
         let Some(handler) = (*record).serve else {
@@ -109,33 +125,6 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, heading: *co
     }
 }
 
-/// True for a record that serves one function of a user, which is not this.
-///
-/// # Safety
-/// `service` is the head of a record of any kind.
-#[inline(always)]
-pub(super) unsafe fn is_of_another(service: *const mbm_service, function: u8) -> bool {
-    // SAFETY: as the caller promises; a record that this file serves is a
-    // function of C.
-    unsafe {
-        is_custom(service) && {
-            let code = (*service.cast::<mbm_custom>()).code;
-            code != function && code != 0
-        }
-    }
-}
-
-/// True for a record that this file serves.
-///
-/// # Safety
-/// `service` is the head of a record of any kind.
-#[inline(always)]
-unsafe fn is_custom(service: *const mbm_service) -> bool {
-    // SAFETY: as the caller promises.
-    let other = unsafe { (*service).serve };
-    other.is_some_and(|other| core::ptr::fn_addr_eq(other, serve as super::units::Serve))
-}
-
 /// The length rule of a function, if the record with this head is that function.
 ///
 /// # Safety
@@ -144,7 +133,10 @@ pub(super) unsafe fn rule(service: *const mbm_service, function: u8) -> Option<R
     // SAFETY: as the caller promises; a record that this file serves is a
     // function of C.
     unsafe {
-        if !is_custom(service) {
+        if !(*service)
+            .serve
+            .is_some_and(|other| core::ptr::fn_addr_eq(other, serve as super::units::Serve))
+        {
             return None;
         }
         let record = service.cast::<mbm_custom>();

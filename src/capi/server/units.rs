@@ -158,14 +158,19 @@ pub(super) unsafe extern "C" fn walk(
     if concern == Concern::Foreign as u8 {
         return Reply::SILENT.code();
     }
+    // SAFETY: as the caller promises.
+    unsafe { serve_with(unit, heading, pdu) }
+}
+
+/// [`walk`], of a request that is for the unit.
+///
+/// # Safety
+/// As for [`walk`].
+#[inline(always)]
+unsafe fn serve_with(unit: *mut mbm_unit, heading: *const c_void, pdu: *mut u8) -> u16 {
     // SAFETY: as the caller promises; a PDU has a byte at least.
     unsafe {
-        let function = *pdu;
         for service in Places::new(unit) {
-            // A host does not call what answers another function alone.
-            if !FIRMWARE && custom::is_of_another(service, function) {
-                continue;
-            }
             // A record that was zeroed has no function.
             if let Some(serve) = (*service).serve {
                 let reply = serve(service, pdu, heading);
@@ -183,8 +188,37 @@ pub(super) unsafe extern "C" fn walk(
 /// # Safety
 /// `units` points to `count` units, and `pdu` has the bytes and the room that
 /// `heading` says.
-#[cfg_attr(target_os = "none", inline(never))]
+#[inline(always)]
 pub(super) unsafe fn serve(
+    units: *mut mbm_unit,
+    count: u8,
+    heading: *const Heading,
+    pdu: *mut u8,
+) -> u16 {
+    // SAFETY: as the caller promises.
+    unsafe {
+        // One unit alone, which takes no notice of what is others', and is asked by
+        // its id: soon done.
+        if !FIRMWARE
+            && count == 1
+            && (*units).diagnostics.is_null()
+            && (*heading).length != 0
+            && (*heading).to == (*units).id
+            && (*heading).to != ANY
+            && (*units).serve.is_some()
+        {
+            return serve_with(units, heading.cast(), pdu);
+        }
+        serve_each(units, count, heading, pdu)
+    }
+}
+
+/// [`serve`], whatever the units.
+///
+/// # Safety
+/// As for [`serve`].
+#[inline(never)]
+unsafe fn serve_each(
     units: *mut mbm_unit,
     count: u8,
     heading: *const Heading,
