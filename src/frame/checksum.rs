@@ -156,7 +156,7 @@ impl Crc16 {
     #[inline(always)]
     #[must_use]
     pub fn before(self, byte: u8) -> Crc16 {
-        if FIRMWARE && cfg!(target_os = "none") && !cfg!(target_arch = "avr") {
+        if FIRMWARE && !cfg!(target_arch = "avr") {
             Crc16(back_by_bits(self.0, byte))
         } else {
             Crc16(back_by_parity(self.0, byte))
