@@ -19,7 +19,7 @@ TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
 # Examples that a test named after each drives.
 TESTED_EXAMPLES := custom_command gateway
-HEADERS := $(wildcard include/*.h c-tests/support/*.h c-tests/shim/* examples/linux/*.h)
+HEADERS := $(wildcard include/*.h c-tests/*.h c-tests/support/*.h c-tests/shim/* examples/linux/*.h)
 
 .PHONY: help
 help: ## What there is
@@ -97,9 +97,15 @@ miri: ## Hold the hooks against Rust's rules of aliasing, with Miri of the night
 	@MIRIFLAGS=-Zmiri-tree-borrows $(CARGO) +nightly miri test --quiet --test reentry
 
 .PHONY: fuzz
-fuzz: ## Fuzz every decoder for FUZZ_SECONDS in all (60)
+fuzz: ## Fuzz every decoder and the C API for FUZZ_SECONDS in all (60)
 	@scripts/need g++ libc6-dev libmodbus-dev
 	@CARGO="$(CARGO)" scripts/fuzz
+
+CALLS ?= 10000000
+.PHONY: fuzz-api
+fuzz-api: ## Fuzz sequences of C API calls until there were CALLS of them (10000000)
+	@scripts/need g++ libc6-dev libmodbus-dev
+	@CARGO="$(CARGO)" MBM_API_CALLS=$(CALLS) scripts/fuzz c_api
 
 MODEL_SECONDS ?= 300
 MODEL := --quiet --release --manifest-path model/Cargo.toml --target-dir $(BUILD)/model
@@ -170,16 +176,20 @@ BENCH_CLIENT := $(BUILD)/bench/bench_client
 $(BENCH_CLIENT): $(patsubst %,$(BUILD)/bench/%.o,bench_client support/pty support/server linux/mbm_tty linux/mbm_tcp) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
 BENCH_SERVER := $(BUILD)/bench/bench_server
-$(BENCH_SERVER): $(patsubst %,$(BUILD)/bench/%.o,bench_server linux/mbm_tcp linux/mbm_tcp_listener linux/mbm_tty) $(ARCHIVE)
+$(BENCH_SERVER): $(patsubst %,$(BUILD)/bench/%.o,bench_server bench_loops linux/mbm_tcp linux/mbm_tcp_listener linux/mbm_tcp_set linux/mbm_tty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -o $@
+BENCH_SNIFFER := $(BUILD)/bench/bench_sniffer
+$(BENCH_SNIFFER): $(BUILD)/bench/bench_sniffer.o $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
 .PHONY: bench
 bench: ## Speed and instructions beside libmodbus and rmodbus; writes docs/*speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
-	@$(MAKE) --no-print-directory $(BENCH) $(BENCH_SERVER) $(BENCH_CLIENT)
+	@$(MAKE) --no-print-directory $(BENCH) $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_SNIFFER)
 	@scripts/bench $(BENCH)
 	@scripts/bench-server $(BENCH_SERVER)
 	@scripts/bench-client $(BENCH_CLIENT)
+	@scripts/bench-sniffer $(BENCH_SNIFFER)
 	@CARGO="$(CARGO)" scripts/bench-frames
 
 DEMO := $(BUILD)/plain/linux/demo

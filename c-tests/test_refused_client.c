@@ -223,6 +223,13 @@ static void a_request_that_is_zeroed_while_it_is_pending_is_not_queued_twice(voi
                 IS(MBM_BUSY, mbm_client_readCoils(&client, request, 0, 1)); /* under way */
         }
         assert_int_equal(mbm_client_pending(&client), 0);
+        /* The same of one that ended before. */
+        IS(MBM_PENDING, mbm_client_readCoils(&client, request, 0, 1));
+        request->status = MBM_OK;
+        IS(MBM_BUSY, mbm_client_readCoils(&client, request, 0, 1));
+        memset(request, 0, sizeof *request);
+        IS(MBM_BUSY, mbm_client_readCoils(&client, request, 0, 1));
+        OK(mbm_client_cancel(&client, request));
     }
     free(request);
     for (i = 0; i < 100; i++)

@@ -23,6 +23,7 @@ enum { SECOND = 1000000, PATIENCE = 1000 * PATIENCE_MS };
 
 static tcp_peer *peer;
 static mbm_tcp tcp;
+static mbm_tcp_addresses addresses;
 static mbm_port port;
 static char service[8];
 
@@ -97,7 +98,7 @@ static void a_client_asks_and_reads_the_reply(void **state)
     double begun, took;
 
     (void)state;
-    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     assert_int_equal(ask(), 11);
     assert_int_equal(ask(), 11);
     assert_int_equal(tcp.error, 0);
@@ -121,7 +122,7 @@ static int option(int level, int name)
 static void a_socket_sends_at_once_and_finds_a_dead_peer(void **state)
 {
     (void)state;
-    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     assert_true(option(IPPROTO_TCP, TCP_NODELAY));
     assert_true(option(SOL_SOCKET, SO_KEEPALIVE));
     assert_in_range(option(IPPROTO_TCP, TCP_KEEPIDLE) +
@@ -149,7 +150,7 @@ static void until_connected_nothing_is_read_and_nothing_taken(void **state)
     first = tcp_connect(ntohs(address.sin_port));
     snprintf(service, sizeof service, "%u", ntohs(address.sin_port));
 
-    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     assert_int_equal(mbm_tcp_isConnected(&tcp), 0);
     assert_int_equal(port.read(port.context, &byte, 1), 0);
     assert_int_equal(port.write(port.context, &byte, 1), 0);
@@ -173,7 +174,7 @@ static void a_refused_connection_is_a_lost_link(void **state)
 
     (void)state;
     tcp_peer_halt(peer);
-    if (mbm_tcp_open(&tcp, "127.0.0.1", service) == 0) {
+    if (mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service) == 0) {
         await_connection();
         assert_int_equal(port.read(port.context, &byte, 1), -1);
         assert_int_equal(port.write(port.context, &byte, 1), -1);
@@ -185,20 +186,20 @@ static void a_refused_connection_is_a_lost_link(void **state)
 static void of_several_addresses_the_one_that_answers_is_taken(void **state)
 {
     (void)state;
-    assert_int_equal(mbm_tcp_open(&tcp, NULL, service), 0);
+    assert_int_equal(mbm_tcp_open(&tcp, &addresses, NULL, service), 0);
     assert_int_equal(ask(), 11);
 }
 
 static void what_cannot_be_opened_says_why(void **state)
 {
     (void)state;
-    assert_fails(EADDRNOTAVAIL, mbm_tcp_open(&tcp, "127.0.0.1", "no-such-service"));
+    assert_fails(EADDRNOTAVAIL, mbm_tcp_open(&tcp, &addresses, "127.0.0.1", "no-such-service"));
     assert_fails(EBADF, mbm_tcp_attach(&tcp, -1));
     assert_int_equal(mbm_tcp_connect(&tcp), MBM_LINK_LOST);
     assert_int_equal(tcp.error, ENOTCONN);
     mbm_tcp_close(&tcp);
-    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
-    assert_fails(EBUSY, mbm_tcp_open(&tcp, "127.0.0.1", service));
+    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
+    assert_fails(EBUSY, mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service));
     assert_fails(EBUSY, mbm_tcp_attach(&tcp, 0));
 }
 
@@ -209,7 +210,7 @@ static void a_peer_that_ends_the_stream_is_told_from_one_that_resets_it(void **s
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_CLOSE, 0);
     tcp_peer_fault(peer, 2, FAULT_RESET, 0);
-    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     assert_int_equal(ask(), -1);
     assert_int_equal(tcp.error, EPIPE);
     assert_int_equal(port.read(port.context, &byte, 1), -1);
@@ -231,7 +232,7 @@ static void what_came_before_the_end_is_still_read(void **state)
 
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_HALF, 4);
-    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     await_connection();
     assert_int_equal(port.write(port.context,
                                 (const uint8_t[12]){0, 1, 0, 0, 0, 6, 7, 3, 0, 5, 0, 1}, 12),
@@ -246,7 +247,7 @@ static void a_disconnected_link_is_lost_until_it_is_connected(void **state)
 
     (void)state;
     mbm_tcp_disconnect(&tcp);
-    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     assert_int_equal(ask(), 11);
     mbm_tcp_disconnect(&tcp);
     assert_int_equal(port.write(port.context, &byte, 1), -1);
@@ -433,7 +434,7 @@ static void a_master_reads_rtu_through_a_stream(void **state)
     assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
     assert_int_equal(pthread_create(&thread, NULL, device, &listener), 0);
     snprintf(service, sizeof service, "%u", listener.port);
-    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     port = mbm_tcp_port(&tcp);
     OK(mbm_master_setBuffers(&node, response, 100, NULL, 0, frame, sizeof frame));
     OK(mbm_master_begin(&node, MODEL_FIRST_UNIT, &port));

@@ -146,6 +146,7 @@ static int wait_for(uint32_t micros)
 
 static void a_place_is_in_use_until_it_is_closed(void **state)
 {
+    mbm_tcp_addresses addresses;
     mbm_tcp place;
 
     (void)state;
@@ -164,7 +165,7 @@ static void a_place_is_in_use_until_it_is_closed(void **state)
     assert_int_equal(mbm_tcp_idleFor(&place), -1);
     mbm_tcp_close(&place);
     assert_int_equal(mbm_tcp_isInUse(&place), 0);
-    assert_int_equal(mbm_tcp_open(&place, "127.0.0.1", "no-such-service"), -1);
+    assert_int_equal(mbm_tcp_open(&place, &addresses, "127.0.0.1", "no-such-service"), -1);
     assert_int_equal(mbm_tcp_isInUse(&place), 0);
 }
 
@@ -349,11 +350,12 @@ static void a_flood_of_connections_is_turned_away_in_parts(void **state)
 static void a_failed_lookup_leaves_its_reason(void **state)
 {
     mbm_tcp_listener other = {0};
+    mbm_tcp_addresses addresses;
     mbm_tcp place;
 
     (void)state;
     memset(&place, 0, sizeof place);
-    assert_int_equal(mbm_tcp_open(&place, "no such host", "502"), -1);
+    assert_int_equal(mbm_tcp_open(&place, &addresses, "no such host", "502"), -1);
     assert_int_not_equal(place.lookup, 0);
     assert_int_equal(mbm_tcp_listen(&other, NULL, "no-such-service"), -1);
     assert_int_equal(other.lookup, EAI_SERVICE);

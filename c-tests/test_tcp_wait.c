@@ -14,6 +14,7 @@ enum { SECOND = 1000000 };
 
 static tcp_peer *peer;
 static mbm_tcp tcp;
+static mbm_tcp_addresses addresses;
 static mbm_port port;
 static char service[8];
 
@@ -38,7 +39,7 @@ static int end(void **state)
 static void a_connection_that_comes_to_be_ends_the_wait_once(void **state)
 {
     (void)state;
-    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 5 * SECOND), 1);
     assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
 }

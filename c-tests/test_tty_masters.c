@@ -25,6 +25,7 @@ static const mbm_tty_options OPTIONS = {.baud = 115200, .parity = 'N', .stop = 1
 static pty line;
 static mbm_tty tty;
 static mbm_tcp tcp;
+static mbm_tcp_addresses addresses;
 static mbm_tcp_listener listener;
 static node first, second;
 static char service[8];
@@ -145,13 +146,13 @@ static void a_socket_closed_and_opened_again_keeps_its_port(void **state)
     mbm_port port;
 
     (void)state;
-    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     port = mbm_tcp_port(&tcp);
     begin_node(&first, 1, &port);
     times_out(&first);
     mbm_tcp_close(&tcp);
     IS(MBM_LINK_LOST, mbm_master_readHoldingRegisters(&first.master, 0, 1));
-    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     times_out(&first);
 }
 
@@ -162,7 +163,7 @@ static void a_port_made_before_the_socket_is_open_works_once_it_is(void **state)
     (void)state;
     begin_node(&first, 1, &port);
     IS(MBM_LINK_LOST, mbm_master_readHoldingRegisters(&first.master, 0, 1));
-    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     times_out(&first);
 }
 
@@ -171,7 +172,7 @@ static void two_masters_on_one_socket_each_end_in_time(void **state)
     mbm_port port;
 
     (void)state;
-    assert_int_equal(mbm_tcp_open(&tcp, "127.0.0.1", service), 0);
+    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     port = mbm_tcp_port(&tcp);
     begin_node(&first, 1, &port);
     begin_node(&second, 2, &port);

@@ -1778,7 +1778,7 @@ typedef struct mbm_sniffer {
     /**
      * Not for you.
      */
-    uint32_t words[164];
+    uint32_t words[171];
 } mbm_sniffer;
 
 /**

@@ -6,7 +6,7 @@
 //! bytes -> frame -> pdu -> packet -> explain -> {sniffer, transaction} -> {master, client, server} -> capi
 //! ```
 //!
-//! `error`, `time`, `port`, `ring` and `data` stand beside that line and may be used
+//! `atomic`, `error`, `time`, `port`, `ring` and `data` stand beside that line and may be used
 //! anywhere on it. `make check` holds every module to this rule.
 //!
 //! The core allocates nothing, keeps no globals, never blocks and does not
@@ -20,6 +20,8 @@
 #[cfg(test)]
 extern crate std;
 
+/// cbindgen:ignore
+mod atomic;
 /// cbindgen:ignore
 pub mod error;
 /// cbindgen:ignore

@@ -95,7 +95,7 @@ fn nanoseconds(works: &mut [&mut Work]) -> Vec<f64> {
         (works[0])();
         calls += 1;
     }
-    for _ in 0..15 {
+    for _ in 0..60 {
         for (work, best) in works.iter_mut().zip(&mut best) {
             let start = Instant::now();
             for _ in 0..calls {

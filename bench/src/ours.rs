@@ -3,8 +3,7 @@
 use mbm::data::{bits, registers};
 use mbm::error::Status;
 use mbm::frame::{ascii, rtu, tcp, Adu, Framing};
-use mbm::pdu::query::Query;
-use mbm::pdu::reply;
+use mbm::pdu::outline::Outline;
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
 use std::hint::black_box;
@@ -16,6 +15,8 @@ pub const TRANSACTION: u16 = 1;
 pub struct Model {
     pub words: [u16; 512],
     pub coils: [u16; 128],
+    /// Where the data of a response are put together.
+    pub place: [u8; 256],
 }
 
 impl Model {
@@ -23,6 +24,7 @@ impl Model {
         Model {
             words: std::array::from_fn(|index| (index as u16).wrapping_mul(40503)),
             coils: std::array::from_fn(|index| (index as u16).wrapping_mul(25717)),
+            place: [0; 256],
         }
     }
 }
@@ -57,7 +59,6 @@ pub fn answer(
     model: &mut Model,
 ) -> Result<usize, Status> {
     let request = Request::parse(open(framing, frame)?.pdu)?;
-    let mut place = [0; 256];
     let response = match request {
         // From addresses that begin a word, as the peers' tables do a byte.
         Request::ReadBits {
@@ -66,7 +67,7 @@ pub fn answer(
             quantity,
         } => {
             let words = model.coils.get(usize::from(address / 16)..);
-            let data = &mut place[..usize::from(quantity).div_ceil(8)];
+            let data = &mut model.place[..usize::from(quantity).div_ceil(8)];
             bits::send(
                 data,
                 words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?,
@@ -81,7 +82,7 @@ pub fn answer(
         } => {
             let from = usize::from(address);
             let words = model.words.get(from..from + usize::from(quantity));
-            let data = &mut place[..2 * usize::from(quantity)];
+            let data = &mut model.place[..2 * usize::from(quantity)];
             registers::send(data, words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?, 0);
             Response::ReadRegisters { function, data }
         }
@@ -159,7 +160,7 @@ pub fn answer(
             registers::take(words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?, data, 0);
             let from = usize::from(read_address);
             let words = model.words.get(from..from + usize::from(read_quantity));
-            let data = &mut place[..2 * usize::from(read_quantity)];
+            let data = &mut model.place[..2 * usize::from(read_quantity)];
             registers::send(data, words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?, 0);
             Response::ReadRegisters {
                 function: 0x17,
@@ -171,23 +172,44 @@ pub fn answer(
     emit(framing, buffer, |pdu| response.emit(pdu))
 }
 
-/// Parses a response and takes the registers out of it; bits stay where they are.
+/// Parses a response of which nothing is taken out: bits stay where they are.
+#[inline(always)]
+pub fn receive_bits(framing: Framing, frame: &[u8]) {
+    let adu = open(framing, frame).expect("a frame");
+    let response = Response::parse(adu.pdu);
+    assert!(response.is_ok());
+    black_box(&response);
+}
+
+/// Parses a response and takes the registers out of it.
 #[inline(always)]
 pub fn receive(framing: Framing, frame: &[u8], words: &mut [u16]) {
     let adu = open(framing, frame).expect("a frame");
     let response = Response::parse(adu.pdu);
+    assert!(response.is_ok());
     if let Ok(Response::ReadRegisters { data, .. }) = response {
         registers::take(words, data, 0);
     }
     black_box(&response);
-    assert!(response.is_ok());
 }
 
-/// Finds that a frame is the response to a write, and repeats what was written.
+/// Finds that a frame is the response to a write, and repeats what was written, as
+/// the client does.
 #[inline(always)]
-pub fn judge(framing: Framing, query: &Query, frame: &[u8]) {
-    let adu = open(framing, frame).expect("a frame");
-    let length = reply::expected(query, adu.pdu).map(|length| usize::from(length.get()));
-    let whole = adu.unit == UNIT && length == Some(adu.pdu.len());
-    assert!(whole && reply::judge(query, adu.pdu) == Status::OK);
+pub fn judge(framing: Framing, asked: &Outline, frame: &[u8]) {
+    let (adu, transaction) = match framing {
+        Framing::Rtu => (rtu::parse(frame), 0),
+        _ => (tcp::parse(frame), TRANSACTION),
+    };
+    let adu = adu.expect("a frame");
+    assert!(adu.unit == UNIT && adu.transaction == transaction);
+    assert!(asked.is_repeated_by(adu.pdu) || says_ok(asked, adu.pdu));
+}
+
+/// What the client does where a response is not just the request's beginning.
+#[cold]
+fn says_ok(asked: &Outline, pdu: &[u8]) -> bool {
+    let length = asked.expected(pdu, pdu.len());
+    let is_whole = length.is_some_and(|length| usize::from(length.get()) == pdu.len());
+    is_whole && asked.judge(pdu, |_| 0) == Status::OK
 }

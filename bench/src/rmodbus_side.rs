@@ -3,8 +3,7 @@
 use crate::ours::UNIT;
 use crate::Work;
 use mbm::error::Status;
-use mbm::pdu::query::Query;
-use mbm::pdu::{bits, registers};
+use mbm::pdu::outline::{Form, Outline};
 use rmodbus::client::ModbusRequest;
 use rmodbus::server::context::ModbusContext;
 use rmodbus::server::storage::ModbusStorageSmall;
@@ -26,17 +25,21 @@ pub enum Ask {
 }
 
 /// The request as mbm's client keeps it, of one that writes.
-pub fn written(ask: Ask) -> Option<Query> {
-    let build = |query: &mut Query| match ask {
-        Ask::SetCoil(address) => bits::write_single(query, address, 1),
-        Ask::SetHolding(address, value) => registers::write_single(query, address, value),
-        Ask::SetCoils(address, values) => bits::write_multiple(query, address, values.len() as u16),
-        Ask::SetHoldings(address, values) => {
-            registers::write_multiple(query, address, values.len() as u16)
+pub fn written(ask: Ask) -> Option<Outline> {
+    let (form, first, second) = match ask {
+        Ask::SetCoil(address) => (Form::WRITE_SINGLE_COIL, address, 0xFF00),
+        Ask::SetHolding(address, value) => (Form::WRITE_SINGLE_REGISTER, address, value),
+        Ask::SetCoils(address, values) => {
+            (Form::WRITE_MULTIPLE_COILS, address, values.len() as u16)
         }
-        _ => Status::INVALID_ARGUMENT,
+        Ask::SetHoldings(address, values) => {
+            (Form::WRITE_MULTIPLE_REGISTERS, address, values.len() as u16)
+        }
+        _ => return None,
     };
-    Query::build(build).ok()
+    let mut outline = Outline::NONE;
+    assert!(outline.set(form, first, second) == Status::OK);
+    Some(outline)
 }
 
 pub fn emit_request(proto: ModbusProto, ask: Ask) -> Work {

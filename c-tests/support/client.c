@@ -32,7 +32,7 @@ static void begin_tcp(asker *a, uint16_t port)
 {
     memset(a, 0, sizeof *a);
     snprintf(a->service, sizeof a->service, "%u", port);
-    assert_int_equal(mbm_tcp_open(&a->tcp, "127.0.0.1", a->service), 0);
+    assert_int_equal(mbm_tcp_open(&a->tcp, &a->addresses, "127.0.0.1", a->service), 0);
     a->port = mbm_tcp_port(&a->tcp);
     a->link.context = a;
     a->link.connect = connect_anew;

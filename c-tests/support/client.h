@@ -11,6 +11,7 @@ typedef struct asker {
     mbm_port port;
     mbm_tty tty;
     mbm_tcp tcp;
+    mbm_tcp_addresses addresses;
     mbm_link link;
     held_clock *clock; /* NULL is the machine's */
     mbm_counters counters;

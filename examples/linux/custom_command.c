@@ -98,6 +98,7 @@ static uint8_t data[DATA], reply[DATA];
 
 /* Both ends of the connection, for one wait. */
 static mbm_tcp ends[2];
+static mbm_tcp_addresses addresses;
 static mbm_tcp *const client_end = &ends[0], *const server_end = &ends[1];
 
 static uint8_t incoming[MBM_MAX_TCP_FRAME], outgoing[MBM_MAX_TCP_FRAME], frame[MBM_MAX_TCP_FRAME];
@@ -118,7 +119,7 @@ static int begin(void)
     if (mbm_tcp_listen(&listener, "127.0.0.1", "0") != 0)
         return -1;
     snprintf(service, sizeof service, "%u", listener.port);
-    if (mbm_tcp_open(client_end, "127.0.0.1", service) != 0)
+    if (mbm_tcp_open(client_end, &addresses, "127.0.0.1", service) != 0)
         return -1;
     port = mbm_tcp_port(client_end);
     if (mbm_client_beginTcp(&client, &port, incoming, sizeof incoming, outgoing,

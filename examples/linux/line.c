@@ -62,7 +62,7 @@ static int open_tcp(line *l, char *host, int rtu)
 
     if (service)
         *service++ = '\0';
-    if (mbm_tcp_open(&l->tcp, host, service ? service : MBM_TCP_SERVICE) != 0)
+    if (mbm_tcp_open(&l->tcp, &l->addresses, host, service ? service : MBM_TCP_SERVICE) != 0)
         return -1;
     l->is_tcp = 1;
     l->connected = line_milliseconds();

@@ -30,6 +30,7 @@ typedef struct line {
     mbm_counters counters;
     mbm_tty tty;
     mbm_tcp tcp;
+    mbm_tcp_addresses addresses;
     mbm_tty_options options;
     char path[256];
     uint8_t is_tcp;

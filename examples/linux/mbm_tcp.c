@@ -9,6 +9,7 @@
 #include <netinet/tcp.h>
 #include <poll.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -19,14 +20,13 @@ enum { FREE, CONNECTING, CONNECTED, LOST };
  * peer that is gone while nothing is sent. While something is, milliseconds. */
 enum { QUIET_S = 15, PROBE_S = 5, PROBES = 3, UNANSWERED_MS = 30000 };
 
-/* Microseconds of sleep where the system refuses to poll. */
-enum { BLIND_NAP = 10000 };
+/* Microseconds: of sleep where the system refuses to poll, and of a wait that is long. */
+enum { BLIND_NAP = 10000, LONG_WAIT = 100000 };
 
 /* Kept out of the way of what is done for every request. */
 #define SELDOM __attribute__((cold, noinline))
 
 static int16_t tcp_read(void *context, uint8_t *bytes, uint16_t capacity);
-static int16_t tcp_write(void *context, const uint8_t *bytes, uint16_t length);
 
 static int refuse(int error)
 {
@@ -34,13 +34,17 @@ static int refuse(int error)
     return -1;
 }
 
-static void enter(mbm_tcp *tcp, uint8_t state)
+/* The cheapest clock that there is: it is read with every request. */
+SELDOM int64_t mbm_tcp_milliseconds(void)
 {
-    static const uint8_t awaited[] = {
-        [FREE] = 0, [CONNECTING] = POLLOUT, [CONNECTED] = POLLIN, [LOST] = 0};
+    struct timespec now;
 
-    tcp->state = state;
-    tcp->awaits = awaited[state];
+#ifdef CLOCK_MONOTONIC_COARSE
+    clock_gettime(CLOCK_MONOTONIC_COARSE, &now);
+#else
+    clock_gettime(CLOCK_MONOTONIC, &now);
+#endif
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
 }
 
 static int has_socket(const mbm_tcp *tcp)
@@ -48,27 +52,82 @@ static int has_socket(const mbm_tcp *tcp)
     return tcp->state == CONNECTING || tcp->state == CONNECTED;
 }
 
-static void lose(mbm_tcp *tcp, int error)
+/* Has the socket's set tell of it. */
+void mbm_tcp_tell(mbm_tcp *tcp)
 {
-    if (has_socket(tcp))
-        close(tcp->fd);
-    tcp->fd = -1;
-    tcp->error = error;
-    enter(tcp, LOST);
+    if (!tcp->set || tcp->told & MBM_TCP_LISTED)
+        return;
+    tcp->told |= MBM_TCP_LISTED;
+    tcp->next = NULL;
+    *tcp->set->end = tcp;
+    tcp->set->end = &tcp->next;
 }
 
-/* The cheapest clock that there is: it is read with every request. */
-static int64_t milliseconds(void)
+/* The set tells of the socket no more. */
+static void untell(mbm_tcp *tcp)
 {
-#ifdef CLOCK_MONOTONIC_COARSE
-    const clockid_t id = CLOCK_MONOTONIC_COARSE;
-#else
-    const clockid_t id = CLOCK_MONOTONIC;
-#endif
-    struct timespec now;
+    mbm_tcp **one;
 
-    clock_gettime(id, &now);
-    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+    if (tcp->told & MBM_TCP_LISTED) {
+        for (one = &tcp->set->first; *one != tcp; one = &(*one)->next)
+            ;
+        *one = tcp->next;
+        if (!tcp->next)
+            tcp->set->end = one;
+    }
+    tcp->told = 0;
+}
+
+/* Enters a state without a socket. */
+static void drop(mbm_tcp *tcp, uint8_t state, int error)
+{
+    const int fd = has_socket(tcp) ? tcp->fd : -1;
+
+    mbm_tcp_await(tcp, 0);
+    tcp->state = state;
+    tcp->error = error;
+    tcp->fd = -1;
+    if (fd >= 0)
+        close(fd);
+}
+
+/* What a socket is polled for from now on, also by its set. */
+SELDOM static void await_in_set(mbm_tcp *tcp, uint8_t before)
+{
+    if (tcp->set->watch(tcp->set, tcp->fd, tcp, before, tcp->awaits) == 0)
+        return;
+    /* Nobody would learn what happens to it. */
+    tcp->awaits = 0;
+    drop(tcp, LOST, errno);
+    mbm_tcp_tell(tcp);
+}
+
+void mbm_tcp_await(mbm_tcp *tcp, uint8_t awaits)
+{
+    const uint8_t before = tcp->awaits;
+
+    tcp->awaits = awaits;
+    if (before != awaits && tcp->set)
+        await_in_set(tcp, before);
+}
+
+static void enter(mbm_tcp *tcp, uint8_t state)
+{
+    tcp->state = state;
+    tcp->told &= (uint8_t)~MBM_TCP_TOLD;
+    mbm_tcp_await(tcp, state == CONNECTING ? POLLOUT : POLLIN);
+}
+
+/* The program used the port, so that waits tell of bytes again. */
+static inline void used(mbm_tcp *tcp)
+{
+    tcp->told &= (uint8_t)~MBM_TCP_TOLD;
+}
+
+/* Bytes were moved. In a set the time of its last wait is near enough. */
+static inline void moved(mbm_tcp *tcp)
+{
+    tcp->lastMoved = tcp->set ? tcp->set->now : mbm_tcp_milliseconds();
 }
 
 static void set(int fd, int level, int option, int value)
@@ -79,10 +138,7 @@ static void set(int fd, int level, int option, int value)
 
 static int prepare(int fd)
 {
-    int flags = fcntl(fd, F_GETFL);
-
-    if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) < 0 ||
-        fcntl(fd, F_SETFD, FD_CLOEXEC) < 0)
+    if (ioctl(fd, FIONBIO, &(int){1}) < 0 || fcntl(fd, F_SETFD, FD_CLOEXEC) < 0)
         return -1;
     set(fd, IPPROTO_TCP, TCP_NODELAY, 1);
     set(fd, SOL_SOCKET, SO_KEEPALIVE, 1);
@@ -100,32 +156,28 @@ static int prepare(int fd)
 /* Begins with the next address; lost with `error` if there is none. */
 static int try_next(mbm_tcp *tcp, int error)
 {
-    if (has_socket(tcp))
-        close(tcp->fd);
-    enter(tcp, LOST);
-    while (tcp->next < tcp->count) {
-        const struct sockaddr_storage *address = &tcp->addresses[tcp->next];
-        socklen_t length = tcp->lengths[tcp->next++];
+    mbm_tcp_addresses *all = tcp->addresses;
 
-        tcp->fd = socket(address->ss_family, SOCK_STREAM, 0);
-        if (tcp->fd < 0) {
-            error = errno;
-            continue;
-        }
-        enter(tcp, CONNECTING);
-        if (prepare(tcp->fd) == 0) {
-            if (connect(tcp->fd, (const struct sockaddr *)address, length) == 0) {
-                enter(tcp, CONNECTED);
-                return 0;
+    drop(tcp, LOST, error);
+    while (all && all->next < all->count) {
+        const struct sockaddr_storage *address = &all->list[all->next];
+        const socklen_t length = all->lengths[all->next++];
+        const int fd = socket(address->ss_family, SOCK_STREAM, 0);
+
+        if (fd >= 0 && prepare(fd) == 0) {
+            const int failed = connect(fd, (const struct sockaddr *)address, length);
+
+            if (!failed || errno == EINPROGRESS || errno == EINTR) {
+                tcp->fd = fd;
+                tcp->error = 0;
+                enter(tcp, failed ? CONNECTING : CONNECTED);
+                return has_socket(tcp) ? 0 : -1;
             }
-            if (errno == EINPROGRESS || errno == EINTR)
-                return 0;
         }
-        error = errno;
-        close(tcp->fd);
-        enter(tcp, LOST);
+        tcp->error = errno;
+        if (fd >= 0)
+            close(fd);
     }
-    lose(tcp, error);
     return -1;
 }
 
@@ -146,7 +198,8 @@ int mbm_tcp_lookUp(const char *host, const char *service, int flags, struct addr
     }
 }
 
-int mbm_tcp_open(mbm_tcp *tcp, const char *host, const char *service)
+int mbm_tcp_open(mbm_tcp *tcp, mbm_tcp_addresses *addresses, const char *host,
+                 const char *service)
 {
     struct addrinfo *found, *one;
 
@@ -155,15 +208,17 @@ int mbm_tcp_open(mbm_tcp *tcp, const char *host, const char *service)
     if (mbm_tcp_lookUp(host, service, 0, &found, &tcp->lookup) < 0)
         return -1;
     memset(tcp, 0, sizeof *tcp);
-    for (one = found; one && tcp->count < MBM_TCP_ADDRESSES; one = one->ai_next) {
-        if (one->ai_addrlen > sizeof tcp->addresses[0])
+    tcp->addresses = addresses;
+    addresses->next = addresses->count = 0;
+    for (one = found; one && addresses->count < MBM_TCP_ADDRESSES; one = one->ai_next) {
+        if (one->ai_addrlen > sizeof addresses->list[0])
             continue;
-        memcpy(&tcp->addresses[tcp->count], one->ai_addr, one->ai_addrlen);
-        tcp->lengths[tcp->count++] = one->ai_addrlen;
+        memcpy(&addresses->list[addresses->count], one->ai_addr, one->ai_addrlen);
+        addresses->lengths[addresses->count++] = one->ai_addrlen;
     }
     freeaddrinfo(found);
     if (try_next(tcp, EADDRNOTAVAIL) < 0) {
-        enter(tcp, FREE);
+        drop(tcp, FREE, tcp->error);
         return refuse(tcp->error);
     }
     return 0;
@@ -177,7 +232,7 @@ int mbm_tcp_attach(mbm_tcp *tcp, int fd)
         return -1;
     memset(tcp, 0, sizeof *tcp);
     tcp->fd = fd;
-    tcp->lastMoved = milliseconds();
+    tcp->lastMoved = mbm_tcp_milliseconds();
     enter(tcp, CONNECTED);
     return 0;
 }
@@ -189,19 +244,21 @@ int mbm_tcp_isInUse(const mbm_tcp *tcp)
 
 int64_t mbm_tcp_idleFor(const mbm_tcp *tcp)
 {
-    return tcp->state == CONNECTED ? milliseconds() - tcp->lastMoved : -1;
+    return tcp->state == CONNECTED ? mbm_tcp_milliseconds() - tcp->lastMoved : -1;
 }
 
 void mbm_tcp_close(mbm_tcp *tcp)
 {
-    if (has_socket(tcp))
-        close(tcp->fd);
-    tcp->fd = -1;
-    enter(tcp, FREE);
+    drop(tcp, FREE, tcp->error);
+    untell(tcp);
+    /* Its descriptor may be what a connection waits for. */
+    if (tcp->set && tcp->set->listener)
+        tcp->set->listener->retryAt = 0;
+    tcp->set = NULL;
 }
 
 /* 1 once connected, 0 before, -1 if there is no link. */
-static int progress_slowly(mbm_tcp *tcp)
+static int progress(mbm_tcp *tcp)
 {
     struct pollfd wait = {tcp->fd, POLLOUT, 0};
     socklen_t size = sizeof(int);
@@ -221,17 +278,12 @@ static int progress_slowly(mbm_tcp *tcp)
     return tcp->state == CONNECTED ? 1 : -1;
 }
 
-static int progress(mbm_tcp *tcp)
-{
-    return tcp->state == CONNECTED ? 1 : progress_slowly(tcp);
-}
-
 uint8_t mbm_tcp_connect(void *context)
 {
     mbm_tcp *tcp = (mbm_tcp *)context;
 
-    tcp->next = 0;
-    tcp->error = 0;
+    if (tcp->addresses)
+        tcp->addresses->next = 0;
     if (try_next(tcp, ENOTCONN) < 0)
         return MBM_LINK_LOST;
     return tcp->state == CONNECTED ? MBM_OK : MBM_PENDING;
@@ -242,36 +294,38 @@ void mbm_tcp_disconnect(void *context)
     mbm_tcp *tcp = (mbm_tcp *)context;
 
     if (tcp->state != FREE)
-        lose(tcp, ENOTCONN);
+        drop(tcp, LOST, ENOTCONN);
 }
 
 /* Nothing was moved, for a signal or for now; or else the link is gone. */
 SELDOM static int16_t nothing(mbm_tcp *tcp, ssize_t count)
 {
+    if (tcp->state == LOST)
+        return -1;
     if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR))
         return 0;
-    lose(tcp, count < 0 ? errno : EPIPE);
+    drop(tcp, LOST, count < 0 ? errno : EPIPE);
     return -1;
 }
 
 int mbm_tcp_isConnected(mbm_tcp *tcp)
 {
     int there = progress(tcp);
-    ssize_t count;
     char byte;
 
     if (there == 1) {
-        count = recv(tcp->fd, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
-        if (count <= 0 && nothing(tcp, count) < 0)
-            there = -1;
+        const ssize_t count = recv(tcp->fd, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
+
+        if (count <= 0)
+            return nothing(tcp, count) < 0 ? -1 : 1;
     }
     return there;
 }
 
-/* 1 if so many bytes may be moved at once. */
-static int is_ready(const mbm_tcp *tcp, uint16_t length)
+/* 1 if so many bytes may be moved at once: only what is connected awaits bytes alone. */
+static inline int is_ready(const mbm_tcp *tcp, uint16_t length)
 {
-    return tcp->state == CONNECTED && (int16_t)length > 0;
+    return tcp->awaits == POLLIN && (int16_t)length > 0;
 }
 
 SELDOM static int16_t read_slowly(mbm_tcp *tcp, uint8_t *bytes, uint16_t capacity)
@@ -280,6 +334,8 @@ SELDOM static int16_t read_slowly(mbm_tcp *tcp, uint8_t *bytes, uint16_t capacit
 
     if (there <= 0 || capacity == 0)
         return (int16_t)(there < 0 ? -1 : 0);
+    /* Who reads is not stuck with what is to be sent. */
+    mbm_tcp_await(tcp, POLLIN);
     return tcp_read(tcp, bytes, capacity > INT16_MAX ? INT16_MAX : capacity);
 }
 
@@ -290,44 +346,52 @@ static int16_t tcp_read(void *context, uint8_t *bytes, uint16_t capacity)
 
     if (!is_ready(tcp, capacity))
         return read_slowly(tcp, bytes, capacity);
-    /* Who reads is not stuck with what is to be sent. */
-    tcp->awaits = POLLIN;
-    count = recv(tcp->fd, bytes, capacity, 0);
+    count = read(tcp->fd, bytes, capacity);
+    used(tcp);
     if (count <= 0)
         return nothing(tcp, count);
-    tcp->lastMoved = milliseconds();
+    moved(tcp);
+    return (int16_t)count;
+}
+
+/* So many of the bytes were taken, perhaps not all. */
+SELDOM static int16_t wrote(mbm_tcp *tcp, ssize_t length, ssize_t count)
+{
+    if (count <= 0 && nothing(tcp, count) < 0)
+        return -1;
+    if (count == length)
+        used(tcp);
+    mbm_tcp_await(tcp, count == length ? POLLIN : tcp->awaits | POLLOUT);
+    if (count <= 0)
+        return 0;
+    moved(tcp);
     return (int16_t)count;
 }
 
 SELDOM static int16_t write_slowly(mbm_tcp *tcp, const uint8_t *bytes, uint16_t length)
 {
+    /* Of more than can be said to be taken it is never all. */
+    const uint16_t most = length > INT16_MAX ? INT16_MAX : length;
     int there = progress(tcp);
-    const uint8_t awaits = tcp->awaits;
-    int16_t taken;
 
     if (there <= 0 || length == 0)
         return (int16_t)(there < 0 ? -1 : 0);
-    if (length <= INT16_MAX)
-        return tcp_write(tcp, bytes, length);
-    /* More than can be said to be taken, so it is never all. */
-    taken = tcp_write(tcp, bytes, INT16_MAX);
-    if (taken >= 0)
-        tcp->awaits = (uint8_t)(awaits | POLLOUT);
-    return taken;
+    return wrote(tcp, length, send(tcp->fd, bytes, most, MSG_NOSIGNAL));
 }
 
 static int16_t tcp_write(void *context, const uint8_t *bytes, uint16_t length)
 {
     mbm_tcp *tcp = (mbm_tcp *)context;
+    const ssize_t all = length;
     ssize_t count;
 
     if (!is_ready(tcp, length))
         return write_slowly(tcp, bytes, length);
-    count = send(tcp->fd, bytes, length, MSG_NOSIGNAL);
-    tcp->awaits = count == length ? POLLIN : (uint8_t)(tcp->awaits | POLLOUT);
-    if (count <= 0)
-        return nothing(tcp, count);
-    tcp->lastMoved = milliseconds();
+    count = send(tcp->fd, bytes, (size_t)all, MSG_NOSIGNAL);
+    if (count != all)
+        return wrote(tcp, all, count);
+    used(tcp);
+    moved(tcp);
     return (int16_t)count;
 }
 
@@ -347,32 +411,50 @@ static void tcp_idle(void *context, mbm_master *master)
 
 mbm_port mbm_tcp_port(mbm_tcp *tcp)
 {
-    mbm_port port = {0};
-
-    port.context = tcp;
-    port.read = tcp_read;
-    port.write = tcp_write;
-    port.micros = tcp_micros;
-    port.idle = tcp_idle;
-    return port;
+    return (mbm_port){.context = tcp, .read = tcp_read, .write = tcp_write, .micros = tcp_micros,
+                      .idle = tcp_idle};
 }
 
-/* The system refuses to poll: it has no memory, or the limit of descriptors was lowered
- * below those in use. Whoever waits looks for itself, and does not spin. */
+/* Poll failed: for a signal, or for lack of memory or of descriptors, whose limit may have
+ * been lowered. Then whoever waits looks for itself, and does not spin. */
 SELDOM static int nap(uint32_t micros)
 {
-    const struct timespec time = {0, (micros < BLIND_NAP ? (long)micros : BLIND_NAP) * 1000};
-
-    nanosleep(&time, NULL);
+    if (errno == EINTR)
+        return 0;
+    usleep(micros < BLIND_NAP ? micros : BLIND_NAP);
     return 1;
 }
 
-int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, int fd,
-                 uint32_t micros)
+/* What to poll a socket for: bytes that it told of do not end the wait again. Of who
+ * awaits nothing a hang-up would end it too. */
+static inline short events_of(const mbm_tcp *tcp)
+{
+    return tcp->told & MBM_TCP_TOLD ? tcp->awaits & POLLOUT : tcp->awaits;
+}
+
+/* Takes note of what poll tells of a socket. */
+static inline void note(mbm_tcp *tcp, short events)
+{
+    if (tcp->awaits == POLLOUT && events)
+        /* If it is being connected, that is known from now on. */
+        (void)progress(tcp);
+    else if (events & ~POLLOUT)
+        tcp->told |= MBM_TCP_TOLD;
+}
+
+/* Of a long time a millisecond does not matter, and poll asks for less than ppoll. */
+static inline int sleep_on(struct pollfd *waits, nfds_t count, uint32_t micros)
+{
+    if (micros >= LONG_WAIT)
+        return poll(waits, count, micros == MBM_TCP_FOREVER ? -1 : (int)(micros / 1000 + 1));
+    return ppoll(waits, count, &(struct timespec){0, (long)micros * 1000}, NULL);
+}
+
+SELDOM static int wait_for_many(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener,
+                                int fd, uint32_t micros)
 {
     const int is_listening = listener && listener->port != 0;
     struct pollfd waits[MBM_TCP_WAITS];
-    struct timespec time;
     nfds_t used = 0;
     size_t i;
     int ready;
@@ -381,27 +463,37 @@ int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, 
         return refuse(EINVAL);
     if (is_listening && listener->awaits == 0 && micros > MBM_TCP_RETRY)
         micros = MBM_TCP_RETRY;
-    /* Of who awaits nothing a hang-up would end the wait too. */
     for (i = 0; i < count; i++)
-        if (tcps[i].awaits != 0)
-            waits[used++] = (struct pollfd){tcps[i].fd, tcps[i].awaits, 0};
+        if (events_of(&tcps[i]) != 0)
+            waits[used++] = (struct pollfd){tcps[i].fd, events_of(&tcps[i]), 0};
     if (is_listening && listener->awaits != 0)
         waits[used++] = (struct pollfd){listener->fd, POLLIN, 0};
     if (fd >= 0)
         waits[used++] = (struct pollfd){fd, POLLIN, 0};
-    time = (struct timespec){(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
-    ready = ppoll(waits, used, micros == MBM_TCP_FOREVER ? NULL : &time, NULL);
+    ready = sleep_on(waits, used, micros);
     if (ready < 0)
-        return errno == EINTR ? 0 : nap(micros);
+        return nap(micros);
     used = 0;
-    for (i = 0; i < count; i++) {
-        const short told = tcps[i].awaits != 0 ? waits[used++].revents : 0;
-
-        /* Known from now on, though nobody may use the port yet. */
-        if (tcps[i].state == CONNECTING && told)
-            progress_slowly(&tcps[i]);
-        else if (told & ~POLLOUT)
-            tcps[i].awaits &= POLLOUT;
-    }
+    for (i = 0; i < count; i++)
+        if (events_of(&tcps[i]) != 0)
+            note(&tcps[i], waits[used++].revents);
     return ready > 0;
+}
+
+int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, int fd,
+                 uint32_t micros)
+{
+    struct pollfd wait;
+    int ready;
+
+    /* What a client waits for with every request. */
+    if (count != 1 || listener || fd >= 0 || tcps->told || tcps->awaits != POLLIN)
+        return wait_for_many(tcps, count, listener, fd, micros);
+    wait = (struct pollfd){tcps->fd, POLLIN, 0};
+    ready = sleep_on(&wait, 1, micros);
+    if (ready < 0)
+        return nap(micros);
+    if (ready > 0)
+        tcps->told = MBM_TCP_TOLD;
+    return ready;
 }

@@ -2,9 +2,10 @@
  * @file mbm_tcp.h
  * @brief An mbm_port over a TCP socket, for clients and for servers.
  *
- * mbm_tcp.c is the port; a server compiles mbm_tcp_listener.c too.
+ * mbm_tcp.c is the port. A server compiles mbm_tcp_listener.c too, and one with many
+ * connections, on Linux, mbm_tcp_set.c.
  *
- * Nothing waits but mbm_tcp_wait, and the lookup of a name that is no numeric
+ * Nothing waits but mbm_tcp_wait, mbm_tcp_waitSet, and the lookup of a name that is no numeric
  * address. Functions that return int return -1 with errno set when they fail.
  * None is re-entrant on one mbm_tcp; any number may be used side by side.
  *
@@ -37,8 +38,20 @@ extern "C" {
 /** Most sockets that one mbm_tcp_wait looks at. */
 #define MBM_TCP_WAITS 256
 
+/** Most sockets of a set that one mbm_tcp_waitSet tells of; the others come next. */
+#define MBM_TCP_READY 64
+
 /** Microseconds after which to call mbm_tcp_accept again where it found no descriptor. */
 #define MBM_TCP_RETRY 100000u
+
+/** The addresses of a server, for a client that connects to it. Yours, and set by
+ *  mbm_tcp_open. */
+typedef struct mbm_tcp_addresses {
+    uint8_t count;                                   /**< not for you */
+    uint8_t next;                                    /**< not for you */
+    socklen_t lengths[MBM_TCP_ADDRESSES];            /**< not for you */
+    struct sockaddr_storage list[MBM_TCP_ADDRESSES]; /**< not for you */
+} mbm_tcp_addresses;
 
 /** A socket in use as a port; zero before first use. */
 typedef struct mbm_tcp {
@@ -50,11 +63,11 @@ typedef struct mbm_tcp {
                            is not idle; only for requests that may take longer than the idle time */
     uint8_t state;    /**< not for you */
     uint8_t awaits;   /**< what to poll it for: POLLIN, and POLLOUT while it takes no more */
-    uint8_t count;    /**< not for you */
-    uint8_t next;     /**< not for you */
-    int64_t lastMoved; /**< not for you */
-    socklen_t lengths[MBM_TCP_ADDRESSES];               /**< not for you */
-    struct sockaddr_storage addresses[MBM_TCP_ADDRESSES]; /**< not for you */
+    uint8_t told;     /**< not for you */
+    int64_t lastMoved;            /**< not for you */
+    mbm_tcp_addresses *addresses; /**< not for you */
+    struct mbm_tcp_set *set;      /**< not for you */
+    struct mbm_tcp *next;         /**< not for you */
 } mbm_tcp;
 
 /** A socket that connections come to; zero before first use. */
@@ -63,26 +76,45 @@ typedef struct mbm_tcp_listener {
     int lookup;        /**< why mbm_tcp_listen found no address, for gai_strerror; else 0 */
     uint16_t port;     /**< where it listens */
     uint8_t awaits;    /**< what to poll it for: POLLIN, or 0 while connections can only wait */
+    uint8_t isQuiet;   /**< not for you */
     uint32_t idleTime; /**< yours: milliseconds without a byte read or written after which a
                             connection may be closed to make room for another; 0: never */
     uint32_t refused;  /**< connections that were turned away without a place */
     uint32_t idle;     /**< connections that were closed because they were idle */
+    int64_t retryAt;   /**< not for you */
+    struct mbm_tcp_set *set; /**< not for you */
 } mbm_tcp_listener;
+
+/** Any number of sockets, of which one wait says which are ready; zero before first use. */
+typedef struct mbm_tcp_set {
+    int fd;                     /**< the descriptor of epoll: a program that polls other descriptors
+                                     too polls it for POLLIN, and then calls mbm_tcp_waitSet */
+    uint8_t isOpen;             /**< not for you */
+    int64_t now;                /**< not for you */
+    mbm_tcp *first;             /**< not for you */
+    mbm_tcp **end;              /**< not for you */
+    mbm_tcp_listener *listener; /**< not for you */
+    int (*watch)(struct mbm_tcp_set *set, int fd, void *who, uint8_t before,
+                 uint8_t awaits);                              /**< not for you */
+    int (*add)(struct mbm_tcp_set *set, mbm_tcp *tcp);         /**< not for you */
+} mbm_tcp_set;
 
 /**
  * Begins to connect to a server, and does not wait for it. Until it is there the
  * port reads and takes nothing; if it does not come to be, the link is lost.
  *
- * @param tcp      zeroed, or closed before
- * @param host     a name or a numeric address; a name may take the time of a lookup.
- *                 NULL is this machine. Of several addresses the first that
- *                 answers is taken
- * @param service  a port number, for example MBM_TCP_SERVICE
+ * @param tcp        zeroed, or closed before
+ * @param addresses  filled here; must stay until `tcp` is closed, and serves one `tcp`
+ * @param host       a name or a numeric address; a name may take the time of a lookup.
+ *                   NULL is this machine. Of several addresses the first that
+ *                   answers is taken
+ * @param service    a port number, for example MBM_TCP_SERVICE
  * @return 0, or -1 with errno set: EBUSY if it is in use, EADDRNOTAVAIL for a name
  *         or service that is unknown, EAGAIN if the lookup may go well later, or as
  *         of socket and connect. Where it is the lookup that failed, `lookup` says why
  */
-int mbm_tcp_open(mbm_tcp *tcp, const char *host, const char *service);
+int mbm_tcp_open(mbm_tcp *tcp, mbm_tcp_addresses *addresses, const char *host,
+                 const char *service);
 
 /**
  * Uses a stream socket that is connected already; makes it non-blocking.
@@ -168,7 +200,9 @@ mbm_port mbm_tcp_port(mbm_tcp *tcp);
 int mbm_tcp_listen(mbm_tcp_listener *listener, const char *host, const char *service);
 
 /**
- * Takes a connection that waits. Call it in every round of the program's loop.
+ * Takes a connection that waits. Call it in every round of the program's loop, until it
+ * returns -1. Where the listener is in a set, the connection joins that set, and a call
+ * costs next to nothing while the set knows of no connection that waits.
  *
  * Where every place is in use and a connection waits, the connection that has been idle
  * for longest is closed, if it has been idle for the listener's `idleTime`. Its link is
@@ -197,7 +231,7 @@ int mbm_tcp_accept(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count);
 void mbm_tcp_closeListener(mbm_tcp_listener *listener);
 
 /**
- * Sleeps until one of several sockets has something to do, or a time is over:
+ * Sleeps until one of a few sockets has something to do, or a time is over:
  * bytes or a connection arrived, a connection came to be or is lost, or there is
  * room again for bytes that a full socket did not take. Bytes and an end that it told
  * of do not end it again before the port was used, for a client without requests and
@@ -208,8 +242,9 @@ void mbm_tcp_closeListener(mbm_tcp_listener *listener);
  * @param listener  waits for connections too; may be NULL
  * @param fd        waits for bytes of another descriptor too, for example that of
  *                  an mbm_tty; -1 for none
- * @param micros    at most so long, in microseconds, or MBM_TCP_FOREVER; less while the
- *                  listener's connections can only wait
+ * @param micros    at most so long, in microseconds, from 100000 on to the next
+ *                  millisecond, or MBM_TCP_FOREVER; less while the listener's connections
+ *                  can only wait
  * @return 1 if there is something, or if the system refused to poll, after a sleep of at
  *         most 10 ms; 0 if the time is over or a signal came; -1 with errno EINVAL for
  *         too many
@@ -217,10 +252,77 @@ void mbm_tcp_closeListener(mbm_tcp_listener *listener);
 int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, int fd,
                  uint32_t micros);
 
+/**
+ * Begins a set without sockets. It takes one descriptor.
+ *
+ * @param set  zeroed, or closed before
+ * @return 0, or -1 with errno set: EBUSY if it is open, or as of epoll_create1
+ */
+int mbm_tcp_openSet(mbm_tcp_set *set);
+
+/**
+ * Puts a socket into a set. It stays there, also when it connects anew, until
+ * mbm_tcp_close.
+ *
+ * @param set  an open set
+ * @param tcp  a socket in use, in no set yet
+ * @return 0, or -1 with errno set: EBADF for a set that is not open or a socket that is
+ *         free, EBUSY for one that is in a set, or as of epoll_ctl
+ */
+int mbm_tcp_add(mbm_tcp_set *set, mbm_tcp *tcp);
+
+/**
+ * Puts a listener into a set, and with it each connection that mbm_tcp_accept will take.
+ * It stays there until mbm_tcp_closeListener.
+ *
+ * @param set       an open set, without a listener
+ * @param listener  one that listens, in no set
+ * @return 0, or -1 with errno set, as mbm_tcp_add
+ */
+int mbm_tcp_addListener(mbm_tcp_set *set, mbm_tcp_listener *listener);
+
+/**
+ * Sleeps until a socket of the set has something to do, as mbm_tcp_wait does, or a
+ * connection can be taken, or a time is over. What it does grows with the sockets that
+ * are ready, not with those that are there.
+ *
+ * @param set     an open set
+ * @param micros  at most so long, in microseconds, rounded up to milliseconds, or
+ *                MBM_TCP_FOREVER; less while the listener's connections can only wait
+ * @return 1 if there is something: see mbm_tcp_nextReady and mbm_tcp_accept; 0 if the
+ *         time is over or a signal came; -1 with errno EBADF for a set that is not open
+ */
+int mbm_tcp_waitSet(mbm_tcp_set *set, uint32_t micros);
+
+/**
+ * Takes the next of the sockets that mbm_tcp_waitSet found ready: poll its client or
+ * server. A connection that mbm_tcp_accept closed as idle is among them. One that was
+ * closed meanwhile is not.
+ *
+ * @param set  an open set
+ * @return the socket; NULL if there is none
+ */
+mbm_tcp *mbm_tcp_nextReady(mbm_tcp_set *set);
+
+/**
+ * Ends a set. Close its sockets and its listener before. Nothing happens if it is not
+ * open.
+ *
+ * @param set  the set
+ */
+void mbm_tcp_closeSet(mbm_tcp_set *set);
+
 /* Shared by the sources of this port; not for programs. */
+enum {
+    MBM_TCP_TOLD = 1,  /* of mbm_tcp.told: a wait told of it, and the port was not used since */
+    MBM_TCP_LISTED = 2 /* mbm_tcp_nextReady has not returned it yet */
+};
 struct addrinfo;
 int mbm_tcp_lookUp(const char *host, const char *service, int flags, struct addrinfo **found,
                    int *why);
+int64_t mbm_tcp_milliseconds(void);
+void mbm_tcp_tell(mbm_tcp *tcp);
+void mbm_tcp_await(mbm_tcp *tcp, uint8_t awaits);
 
 #ifdef __cplusplus
 }

@@ -20,6 +20,17 @@ static int refuse(int error)
     return -1;
 }
 
+/* What the listener is polled for, also by its set: where that refuses, another try. */
+static void await(mbm_tcp_listener *listener, uint8_t awaits)
+{
+    mbm_tcp_set *set = listener->set;
+    const uint8_t before = listener->awaits;
+
+    listener->awaits = awaits;
+    if (set && before != awaits && set->watch(set, listener->fd, listener, before, awaits) < 0)
+        listener->awaits = 0;
+}
+
 static uint16_t port_of(int fd)
 {
     struct sockaddr_storage address;
@@ -68,6 +79,7 @@ int mbm_tcp_listen(mbm_tcp_listener *listener, const char *host, const char *ser
     listener->fd = fd;
     listener->port = port_of(fd);
     listener->awaits = POLLIN;
+    listener->isQuiet = 0;
     listener->refused = 0;
     listener->idle = 0;
     return 0;
@@ -106,6 +118,7 @@ static int close_oldest(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
         return 0;
     mbm_tcp_disconnect(oldest);
     oldest->error = ETIMEDOUT;
+    mbm_tcp_tell(oldest);
     listener->idle++;
     return 1;
 }
@@ -145,47 +158,79 @@ static int take_next(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
                 continue;
             errno = error;
         }
-        /* The connection still waits, and would end every wait at once. */
-        listener->awaits = 0;
         return -1;
     }
 }
 
-int mbm_tcp_accept(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
+/* A connection is to be a port in a place, or is closed. */
+static int put(const mbm_tcp_listener *listener, mbm_tcp *tcp, int fd)
+{
+    int error;
+
+    if (mbm_tcp_attach(tcp, fd) < 0) {
+        error = errno;
+        close(fd);
+        return refuse(error);
+    }
+    if (listener->set && listener->set->add(listener->set, tcp) < 0) {
+        error = errno;
+        mbm_tcp_close(tcp);
+        return refuse(error);
+    }
+    return 0;
+}
+
+static int take(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
 {
     size_t place = 0;
     int fd, rounds;
 
-    if (listener->port == 0)
-        return refuse(EBADF);
     while (place < count && mbm_tcp_isInUse(&tcps[place]))
         place++;
-    listener->awaits = POLLIN;
     if (place == count && is_connection_waiting(listener) && close_oldest(listener, tcps, count))
         return refuse(EAGAIN);
     for (rounds = 0; rounds < TURNED_AWAY; rounds++) {
         fd = take_next(listener, tcps, count);
         if (fd < 0)
             return -1;
-        if (place < count) {
-            int error;
-
-            if (mbm_tcp_attach(&tcps[place], fd) == 0)
-                return (int)place;
-            error = errno;
-            close(fd);
-            return refuse(error);
-        }
+        if (place < count)
+            return put(listener, &tcps[place], fd) < 0 ? -1 : (int)place;
         listener->refused++;
         turn_away(fd);
     }
     return refuse(EAGAIN);
 }
 
+int mbm_tcp_accept(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
+{
+    int place, error;
+
+    if (listener->port == 0)
+        return refuse(EBADF);
+    if (listener->isQuiet)
+        return refuse(EAGAIN);
+    place = take(listener, tcps, count);
+    error = errno;
+    /* A connection that can only wait would end every wait at once. */
+    await(listener, place >= 0 || error == EAGAIN ? POLLIN : 0);
+    if (place < 0 && listener->set) {
+        listener->isQuiet = 1;
+        listener->retryAt = mbm_tcp_milliseconds() + MBM_TCP_RETRY / 1000;
+    }
+    errno = error;
+    return place;
+}
+
 void mbm_tcp_closeListener(mbm_tcp_listener *listener)
 {
-    if (listener->port != 0)
+    if (listener->port != 0) {
+        await(listener, 0);
         close(listener->fd);
+    }
+    if (listener->set)
+        listener->set->listener = NULL;
+    listener->set = NULL;
+    listener->isQuiet = 0;
     listener->fd = -1;
     listener->port = 0;
 }

@@ -153,12 +153,12 @@ static void dead_times(void)
         exit(1);
     }
     row("dead time, FC03 of 10 registers, 115200 baud, no gap", "cycles", o.dead[0].least,
-        o.dead[0].most, 8563 / 2);
+        o.dead[0].most, 3463);
     o = observe("TimeBasicNoGap", 0, NULL);
     row("dead time, Basic, 19200 baud, no gap: before FC10", "cycles", o.dead[1].least,
-        o.dead[1].most, 21619 / 2);
+        o.dead[1].most, 3075);
     row("dead time, Basic, 19200 baud, no gap: before FC03", "cycles", o.dead[0].least,
-        o.dead[0].most, 21619 / 2);
+        o.dead[0].most, 3075);
     o = observe("TimeBasicGap", 0, NULL);
     row("dead time, Basic, 19200 baud, t3.5 = 32096 cycles: before FC10", "cycles",
         o.dead[1].least, o.dead[1].most, gap + gap / 20);

@@ -1,6 +1,7 @@
 //! What the fuzz targets share: an input that is taken apart, naive versions of
 //! what they test, requests and the bytes that may come back.
 
+pub mod api;
 pub mod asked;
 pub mod lengths;
 pub mod naive;

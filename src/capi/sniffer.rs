@@ -65,7 +65,7 @@ pub struct mbm_sniffer {
     /// Not for you.
     pointers: [*mut c_void; 1],
     /// Not for you.
-    words: [u32; 164],
+    words: [u32; 171],
 }
 
 /// What lies behind an `mbm_sniffer`.
@@ -443,12 +443,42 @@ pub unsafe extern "C" fn mbm_sniffer_next(
         let Ok(object) = object(sniffer) else {
             return 0;
         };
+        if object.core.is_calm(now) || only_waits(object, now) {
+            return 0;
+        }
+        next(object, now, event)
+    }
+}
+
+/// True if there is nothing to tell of, and nothing more to look for: see
+/// [`Sniffer::only_waits`].
+///
+/// # Safety
+/// The object was begun with a buffer that is valid.
+unsafe fn only_waits(object: &mut Object, now: u32) -> bool {
+    // SAFETY: as the caller promises.
+    let buffer = unsafe { buffer(object.buffer, object.size) };
+    let functions = object.functions.get(..object.count.into());
+    let core = &mut object.core;
+    buffer.is_none_or(|buffer| core.only_waits(buffer, functions.unwrap_or_default(), now))
+}
+
+/// As [`mbm_sniffer_next`], where the sniffer has to look. On its own, for a call
+/// that has nothing to tell is not to pay for the registers and the stack of one that
+/// has.
+///
+/// # Safety
+/// The object was begun with a buffer that is valid, `event` points to room for one.
+#[inline(never)]
+unsafe fn next(object: &mut Object, now: u32, event: *mut mbm_event) -> u8 {
+    // SAFETY: as the caller promises.
+    unsafe {
         let Some(buffer) = buffer(object.buffer, object.size) else {
             return 0;
         };
         let functions = object.functions.get(..object.count.into());
         let functions = functions.unwrap_or_default();
-        match object.core.next(buffer, functions, now) {
+        match object.core.look(buffer, functions, now) {
             Some(told) => {
                 put(event, mbm_event::of(&told, functions));
                 1

@@ -9,6 +9,7 @@ use crate::pdu::limits::MAX_PDU;
 use crate::pdu::outline::Outline;
 use crate::time::elapsed;
 use crate::transaction::Question;
+use crate::FIRMWARE;
 use core::num::NonZeroU8;
 
 /// Where a request stands.
@@ -23,6 +24,8 @@ pub(super) enum Stage {
     Lost,
     /// Waits for its response; another unit answered in its place.
     Strayed,
+    /// Was given back.
+    Ended,
 }
 
 /// What the client keeps of a request. The public fields are the caller's: those
@@ -78,6 +81,17 @@ impl Ticket {
         self.wire
     }
 
+    /// True if a client gave it back and none took it since. False does not tell.
+    pub fn has_ended(&self) -> bool {
+        self.is(Stage::Ended)
+    }
+
+    /// Gives it back.
+    pub(super) fn end(&mut self, status: Status) {
+        self.stage = Stage::Ended;
+        self.status = status;
+    }
+
     pub(super) fn is(&self, stage: Stage) -> bool {
         self.stage == stage
     }
@@ -90,7 +104,10 @@ impl Ticket {
     /// How long it is not due yet.
     #[inline(always)]
     pub(super) fn remains(&self, now: u32, means: &mut impl Means) -> u32 {
-        let wait = self.wait.saturating_sub(elapsed(now, self.since));
+        let wait = match self.wait {
+            0 => 0,
+            wait => wait.saturating_sub(elapsed(now, self.since)),
+        };
         if self.is(Stage::Queued) {
             wait.max(means.rest(self.unit, now))
         } else {
@@ -159,7 +176,11 @@ pub(super) fn take<J: Job>(job: &mut J, data: &[u8]) -> Status {
         return Status::BUFFER_TOO_SMALL;
     }
     ticket.length = data.len() as u8;
+    let words = ticket.outline.takes_words();
     job.put_all(data);
+    if !FIRMWARE && words {
+        return Status::OK;
+    }
     let mask = job.ticket().outline.mask();
     if mask != 0xFF {
         // The bits behind the last one are zero.

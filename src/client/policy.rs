@@ -103,7 +103,7 @@ impl Policy {
         means.note(unit, status, again.is_some(), now);
         let ticket = job.ticket_mut();
         let Some(wait) = again else {
-            ticket.status = status;
+            ticket.end(status);
             return true;
         };
         ticket.retries = retries + 1;

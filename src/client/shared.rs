@@ -50,19 +50,23 @@ impl<J: Job, const N: usize> Shared<J, N> {
     /// Takes a job out of its place in the queue.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn remove(&mut self, at: usize) -> Option<J> {
-        let moved = self.queue.pop()?;
-        if !FIRMWARE && at == self.queue.len() {
-            return Some(moved);
+        if !FIRMWARE && at == 0 && self.queue.len() > 1 {
+            return self.remove_first();
         }
-        self.close_up(at, moved)
-    }
-
-    #[cfg_attr(not(target_os = "none"), inline(never))]
-    fn close_up(&mut self, at: usize, mut moved: J) -> Option<J> {
+        let mut moved = self.queue.pop()?;
         for place in self.queue.get_mut(at..)?.iter_mut().rev() {
             core::mem::swap(place, &mut moved);
         }
         Some(moved)
+    }
+
+    /// Takes the first of several jobs out of the queue, which a host moves up at once.
+    #[inline(never)]
+    fn remove_first(&mut self) -> Option<J> {
+        match self.queue.is_empty() {
+            true => None,
+            false => Some(self.queue.remove(0)),
+        }
     }
 
     /// Puts a job before all others; there is room for it.

@@ -34,7 +34,8 @@ const fn tables() -> [[Table; 4]; 4] {
 }
 
 /// Takes `bytes` in by table: sixteen at once as long as there are so many, for
-/// none of them waits for another, then four, then one.
+/// none of them waits for another, then four, then one. CONTRIBUTING.md says why this
+/// is not the crate's table.
 fn by_table(crc: u16, bytes: &[u8]) -> u16 {
     let [last, third, second, first] = &TABLES;
     let [single, ..] = last;

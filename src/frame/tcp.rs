@@ -2,7 +2,6 @@
 
 use super::Adu;
 use crate::error::Status;
-use core::cmp::Ordering;
 use core::ops::RangeInclusive;
 
 /// Bytes of a frame before its PDU: transaction, protocol, length, unit.
@@ -49,6 +48,15 @@ pub fn header(bytes: &[u8]) -> Result<Header, Status> {
     })
 }
 
+/// How many bytes it takes to judge more of a header than its first `have` allow.
+pub const fn next_part(have: usize) -> usize {
+    match have {
+        0..4 => 4,
+        4..HEADER => HEADER,
+        _ => PDU,
+    }
+}
+
 /// The first eight bytes of a frame, the header and a function code, as one
 /// number; `length` is that of the PDU.
 #[inline]
@@ -91,15 +99,29 @@ fn begun(bytes: &[u8]) -> Status {
 /// # Errors
 /// As [`header`]; [`Status::MALFORMED_FRAME`] also for bytes behind the frame.
 pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Status> {
-    let header = header(bytes)?;
-    match (bytes.len().cmp(&header.total), bytes.get(PDU..)) {
-        (Ordering::Equal, Some(pdu)) => Ok(Adu {
-            transaction: header.transaction,
-            unit: header.unit,
-            pdu,
-        }),
-        (Ordering::Greater, _) => Err(Status::MALFORMED_FRAME),
-        _ => Err(Status::INCOMPLETE_FRAME),
+    let Some(([a, b, protocol_and_length @ .., unit], pdu)) = bytes.split_first_chunk::<PDU>()
+    else {
+        return Err(refused(bytes));
+    };
+    // The protocol identifier is zero: so the four bytes are the length.
+    let length = u32::from_be_bytes(*protocol_and_length);
+    if pdu.is_empty() || pdu.len() > MAX_FRAME - PDU || length != pdu.len() as u32 + 1 {
+        return Err(refused(bytes));
+    }
+    Ok(Adu {
+        transaction: u16::from_be_bytes([*a, *b]),
+        unit: *unit,
+        pdu,
+    })
+}
+
+/// Why bytes are no whole frame.
+#[cold]
+fn refused(bytes: &[u8]) -> Status {
+    match header(bytes) {
+        Ok(header) if bytes.len() > header.total => Status::MALFORMED_FRAME,
+        Ok(_) => Status::INCOMPLETE_FRAME,
+        Err(refused) => refused,
     }
 }
 

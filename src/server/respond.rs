@@ -53,9 +53,13 @@ pub fn respond(
     if reply == Reply::PENDING {
         return Err(Status::PENDING);
     }
-    let written = reply.settle(place);
+    let mut written = reply.settle(place);
     if written == 0 {
         return Ok(0);
+    }
+    // Services rely on the room that a server's smallest buffer has.
+    if written > place.len() {
+        written = Reply::SERVER_DEVICE_FAILURE.settle(place);
     }
     let unit = heading.to;
     framing.emit(buffer, transaction, unit, delimiter, |_| Ok(written))

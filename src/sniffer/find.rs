@@ -4,7 +4,7 @@ use super::lane::{Lane, Timing};
 use super::pairing::Requests;
 use crate::error::Status;
 use crate::frame::checksum::{crc16, Crc16};
-use crate::frame::{ascii, rtu, tcp};
+use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::packet::Side;
 use crate::pdu::custom::Function;
 use crate::pdu::diagnostics::{DIAGNOSTICS, REPORT_SERVER_ID};
@@ -20,8 +20,9 @@ pub(super) enum Verdict {
     Damaged(usize),
     /// A frame of so many bytes, which the buffer cannot hold.
     TooLong(usize),
-    /// What may become a frame.
-    Wait,
+    /// What may become a frame, of which nothing more is known before so many bytes
+    /// are there or the line is silent.
+    Wait(usize),
     /// No frame.
     Wrong,
 }
@@ -99,15 +100,30 @@ impl Context<'_> {
         self.lengths(frame).contains(&Some(Length::Exactly(total)))
     }
 
-    /// An RTU frame whose length its own bytes tell.
-    fn by_length(&self, bytes: &[u8]) -> [Option<usize>; 2] {
-        self.lengths(bytes).map(|length| match length {
+    /// An RTU frame of one of these lengths.
+    fn by_length(lengths: [Option<Length>; 2], bytes: &[u8]) -> [Option<usize>; 2] {
+        lengths.map(|length| match length {
             Some(Length::Exactly(total)) => {
                 let frame = bytes.get(..total)?;
                 crc16(frame).is_residue().then_some(total)
             }
             _ => None,
         })
+    }
+
+    /// How many bytes must be there before more is known of an RTU frame of these
+    /// lengths; none if nothing is waited for.
+    fn need(lengths: [Option<Length>; 2], have: usize, capacity: usize) -> Option<usize> {
+        let of = |length: Option<Length>| match length {
+            Some(Length::Exactly(total)) if total > have && total <= capacity => total,
+            // The CRC tells nothing about the length.
+            Some(Length::AtLeast(total)) => (total - 2).max(have + 1),
+            Some(Length::Silence | Length::Unknown) if have < rtu::MAX_FRAME => rtu::MAX_FRAME,
+            _ => usize::MAX,
+        };
+        let [request, response] = lengths;
+        let need = of(request).min(of(response));
+        (need < usize::MAX).then_some(need)
     }
 
     /// An RTU frame that silence ends.
@@ -147,7 +163,8 @@ impl Context<'_> {
 
     /// What stands in RTU bytes.
     pub fn rtu(&self, lane: &Lane, bytes: &[u8], capacity: usize) -> Verdict {
-        let [request, response] = self.by_length(bytes);
+        let lengths = self.lengths(bytes);
+        let [request, response] = Self::by_length(lengths, bytes);
         match (request, response) {
             (Some(total), other) if other.is_none_or(|other| other == total) => {
                 return Verdict::Right(total, true, other.is_some());
@@ -160,40 +177,98 @@ impl Context<'_> {
             (None, Some(total)) => return Verdict::Right(total, false, true),
             (None, None) => (),
         }
-        let lengths = self.lengths(bytes);
         let open =
             |length: &Option<Length>| matches!(length, Some(Length::Silence | Length::Unknown));
         let [as_request, as_response] = lengths.map(|length| open(&length));
         let is_open = as_request || as_response;
         let is_aligned = lane.at == lane.start;
-        if is_open || is_aligned {
+        let has_silence = lane.has_silence(self.now, &self.timing);
+        if has_silence && (is_open || is_aligned) {
             // Between two silences the CRC alone decides: some devices miscount.
             if let Some(total) = self.by_silence(lane, bytes) {
                 let [as_request, as_response] = lengths.map(|length| length.is_some());
                 return Verdict::Right(total, as_request, as_response);
             }
         }
-        if is_open && is_aligned {
+        if is_open && is_aligned && (has_silence || bytes.len() >= rtu::MAX_FRAME) {
             if let Some(total) = self.by_crc(lane, bytes) {
                 return Verdict::Right(total, as_request, as_response);
             }
         }
-        let mut wait = false;
-        let mut too_long = 0;
-        for length in lengths.into_iter().flatten() {
-            match length {
-                Length::Exactly(total) if total > capacity => too_long = total,
-                Length::Exactly(total) => wait |= total > bytes.len(),
-                Length::AtLeast(_) => wait = true,
-                Length::Silence | Length::Unknown => wait |= bytes.len() < rtu::MAX_FRAME,
+        let need = Self::need(lengths, bytes.len(), capacity);
+        if let Some(need) = need.filter(|_| !self.is_over(lane)) {
+            // Each byte more may make a CRC right; see by_crc.
+            let is_by_crc = is_open && is_aligned && lane.silences(lane.at).next().is_some();
+            let need = if is_by_crc { bytes.len() + 1 } else { need };
+            if let Some(other) = self.overtaken(lane, bytes, capacity) {
+                return Verdict::Wait(need.min(other));
             }
         }
-        if wait && !self.is_over(lane) && !self.is_overtaken(lane, bytes) {
-            Verdict::Wait
-        } else if too_long > 0 {
-            Verdict::TooLong(too_long)
-        } else {
-            Verdict::Wrong
+        let too_long = |length: &Length| match length {
+            Length::Exactly(total) if *total > capacity => Some(*total),
+            _ => None,
+        };
+        match lengths.iter().flatten().filter_map(too_long).next_back() {
+            Some(total) => Verdict::TooLong(total),
+            None => Verdict::Wrong,
+        }
+    }
+
+    /// How many bytes it takes to find anything in an empty lane.
+    pub fn least(&self, framing: Framing) -> usize {
+        match framing {
+            // A unit that nobody answers for is enough to see that there is no reply.
+            Framing::Rtu | Framing::RtuOverTcp => 1 + usize::from(self.request),
+            Framing::Tcp => tcp::next_part(0),
+            Framing::Ascii => 1,
+        }
+    }
+
+    /// How many bytes it takes to look again, if what a lane holds is the beginning of
+    /// an RTU frame and the line was not silent since: what [`Context::rtu`] finds
+    /// then, at less cost.
+    pub fn begun(&self, framing: Framing, lane: &Lane, part: &[u8]) -> Option<usize> {
+        let capacity = part.len();
+        let is_rtu = matches!(framing, Framing::Rtu | Framing::RtuOverTcp);
+        let is_quiet = lane.has_silence(self.now, &self.timing) || self.is_over(lane);
+        if !is_rtu || lane.at != lane.start || is_quiet || lane.is_full(capacity) {
+            return None;
+        }
+        let bytes = part.get(lane.at.into()..lane.end.into())?;
+        let [unit, code, ..] = *bytes else {
+            return None;
+        };
+        // Of these two the length depends on what was asked.
+        if matches!(code, 0 | EXCEPTION | DIAGNOSTICS | REPORT_SERVER_ID)
+            || bytes.len() >= rtu::MAX_FRAME
+        {
+            return None;
+        }
+        let pdu = bytes.get(rtu::PDU..)?;
+        let mut need = usize::MAX;
+        if self.request && code & EXCEPTION == 0 {
+            need = Self::rest(Side::Request.length(pdu, self.functions), bytes, capacity)?;
+        }
+        if self.response && unit != 0 {
+            let length = Side::Response.length(pdu, self.functions);
+            need = need.min(Self::rest(length, bytes, capacity)?);
+        }
+        (need < usize::MAX).then_some(need)
+    }
+
+    /// As [`Context::need`], of a PDU of this length; none of a frame that is whole or
+    /// too long.
+    fn rest(length: Length, bytes: &[u8], capacity: usize) -> Option<usize> {
+        match length {
+            Length::Exactly(length) => match length + rtu::OVERHEAD {
+                total if total > capacity.min(rtu::MAX_FRAME) || total < MIN_RTU => None,
+                total if total > bytes.len() => Some(total),
+                total if crc16(bytes.get(..total)?).is_residue() => None,
+                _ => Some(usize::MAX),
+            },
+            Length::AtLeast(length) if length + rtu::OVERHEAD > rtu::MAX_FRAME => None,
+            Length::AtLeast(length) => Some((length + rtu::PDU).max(bytes.len() + 1)),
+            Length::Silence | Length::Unknown => Some(rtu::MAX_FRAME),
         }
     }
 
@@ -209,20 +284,26 @@ impl Context<'_> {
         lane.quiet(self.now) >= self.timing.patience
     }
 
-    /// True if a whole frame stands behind the next silence: what was not
-    /// complete before it never will be.
-    fn is_overtaken(&self, lane: &Lane, bytes: &[u8]) -> bool {
+    /// None if a whole frame stands after the next silence: what was not complete
+    /// before it never will be. Else how many bytes it takes to see one.
+    fn overtaken(&self, lane: &Lane, bytes: &[u8], capacity: usize) -> Option<usize> {
         let Some(end) = lane.silences(lane.at).next() else {
-            return false;
+            return Some(usize::MAX);
         };
-        let next = bytes.get(usize::from(end - lane.at)..).unwrap_or_default();
-        self.by_length(next).iter().any(Option::is_some)
+        let before = usize::from(end - lane.at);
+        let next = bytes.get(before..).unwrap_or_default();
+        let lengths = self.lengths(next);
+        let is_whole = Self::by_length(lengths, next).iter().any(Option::is_some);
+        let need = Self::need(lengths, next.len(), capacity).unwrap_or(usize::MAX);
+        (!is_whole).then_some(before.saturating_add(need))
     }
 
     /// What stands in TCP bytes.
     pub fn tcp(&self, lane: &Lane, bytes: &[u8], capacity: usize) -> Verdict {
         let header = match tcp::header(bytes) {
-            Err(Status::INCOMPLETE_FRAME) if !self.is_over(lane) => return Verdict::Wait,
+            Err(Status::INCOMPLETE_FRAME) if !self.is_over(lane) => {
+                return Verdict::Wait(tcp::next_part(bytes.len()));
+            }
             Err(_) => return Verdict::Wrong,
             Ok(header) => header,
         };
@@ -249,7 +330,7 @@ impl Context<'_> {
                 )
             }
             None if self.is_over(lane) => Verdict::Wrong,
-            None => Verdict::Wait,
+            None => Verdict::Wait(header.total),
         }
     }
 
@@ -258,8 +339,10 @@ impl Context<'_> {
         let Some((&ascii::START, characters)) = bytes.split_first() else {
             return Verdict::Wrong;
         };
-        let mut before = 0;
-        for (index, character) in characters.iter().enumerate() {
+        // What was searched before has no end in it.
+        let known = usize::from(lane.searched).saturating_sub(1);
+        let mut before = bytes.get(known).copied().unwrap_or_default();
+        for (index, character) in characters.iter().enumerate().skip(known) {
             if *character == self.end && before == ascii::RETURN {
                 let digits = characters.get(..index - 1).unwrap_or_default();
                 return Self::ascii_content(digits);
@@ -274,7 +357,8 @@ impl Context<'_> {
         } else if self.is_over(lane) {
             Verdict::Wrong
         } else {
-            Verdict::Wait
+            // Or another colon or end character: [`super::Sniffer::feed`] sees those.
+            Verdict::Wait(ascii::MAX_FRAME + 1)
         }
     }
 

@@ -19,6 +19,7 @@ use crate::error::Status;
 use crate::frame::{ascii, Framing};
 use crate::pdu::custom::Function;
 use crate::time::{character, silence, DEFAULT_SILENCE};
+use crate::FIRMWARE;
 use find::{Context, Verdict};
 use lane::{Lane, Timing};
 use pairing::Requests;
@@ -63,6 +64,9 @@ pub struct Sniffer {
     timing: Timing,
     lanes: [Lane; 2],
     requests: Requests,
+    /// For so long from then on, time alone brings nothing to tell of.
+    calm_from: u32,
+    calm_for: u32,
 }
 
 /// What there is to tell of, as places in the buffer.
@@ -99,12 +103,15 @@ impl Sniffer {
             },
             lanes: [Lane::EMPTY; 2],
             requests: Requests::NONE,
+            calm_from: 0,
+            calm_for: 0,
         }
     }
 
     /// Sets the rate, from which the silence between frames follows, and when
     /// each of several bytes that are fed at once arrived; 0 is untold.
     pub const fn set_baud_rate(&mut self, baud: u32) {
+        self.calm_for = 0;
         self.timing.silence = silence(baud);
         self.timing.character = if baud == 0 { 0 } else { character(baud) as u32 };
     }
@@ -112,17 +119,23 @@ impl Sniffer {
     /// Sets how long a request may stay unanswered, in microseconds. For ten times
     /// as long, a late reply is still known to answer it.
     pub const fn set_timeout(&mut self, timeout: u32) {
+        self.calm_for = 0;
         self.timeout = timeout;
     }
 
     /// Sets how long the rest of a frame is waited for, in microseconds: how
     /// coarse the time stamps are.
     pub const fn set_patience(&mut self, patience: u32) {
+        self.calm_for = 0;
         self.timing.patience = patience;
     }
 
     /// Sets the last character of ASCII frames.
     pub const fn set_end(&mut self, end: u8) {
+        self.calm_for = 0;
+        let [first, second] = &mut self.lanes;
+        first.searched = 0;
+        second.searched = 0;
         self.end = end;
     }
 
@@ -154,53 +167,160 @@ impl Sniffer {
         }
         let index = usize::from(tap == Tap::Server);
         let part = self.part(buffer, index);
-        let timing = self.timing;
-        match self.lanes.get_mut(index) {
-            Some(lane) => lane.feed(part, bytes, now, &timing),
-            None => 0,
+        let is_ascii = self.framing == Framing::Ascii;
+        let [first, second] = &mut self.lanes;
+        let lane = if index == 0 { first } else { second };
+        let may_decide = |byte: &u8| *byte == ascii::START || *byte == self.end;
+        if is_ascii && bytes.iter().any(may_decide) {
+            lane.look_again();
+        }
+        match bytes {
+            [byte] if !FIRMWARE && lane.feed_next(part, *byte, now, &self.timing) => 1,
+            _ => lane.feed(part, bytes, now, &self.timing),
         }
     }
 
     /// What happened next, up to now; none if nothing more is known yet. It
     /// borrows from the buffer. To be called after each feed until there is none,
-    /// and now and then while nothing arrives.
+    /// and now and then while nothing arrives; with the same functions each time.
     pub fn next<'b>(
         &mut self,
         buffer: &'b mut [u8],
         functions: &[Function],
         now: u32,
     ) -> Option<Event<'b>> {
+        if self.only_waits(buffer, functions, now) {
+            return None;
+        }
+        self.look(buffer, functions, now)
+    }
+
+    /// As [`Sniffer::next`], of what is more than the beginning of a frame.
+    #[cfg_attr(not(target_os = "none"), inline(never))]
+    pub(crate) fn look<'b>(
+        &mut self,
+        buffer: &'b mut [u8],
+        functions: &[Function],
+        now: u32,
+    ) -> Option<Event<'b>> {
         // What was heard first is told first.
-        let timing = self.timing;
-        let [first, second] = self.lanes.each_ref().map(|lane| lane.waited(now, &timing));
-        let order = if second > first { [1, 0] } else { [0, 1] };
+        let is_later = self.is_apart && self.waited(1, now) > self.waited(0, now);
+        let order = if is_later { [1, 0] } else { [0, 1] };
+        // Else requests have come or gone, and what a lane holds may mean something else.
+        let only_bytes = self.is_early(now);
         for index in order {
+            if only_bytes && self.lanes.get(index)?.is_settled(now) {
+                continue;
+            }
             if let Some(step) = self.step(buffer, functions, index, now) {
                 return Some(self.tell(buffer, functions, index, step, now));
             }
         }
+        if only_bytes {
+            return None;
+        }
         // Bytes that are not understood yet may hold the reply.
-        let known = now.wrapping_sub(first.max(second));
-        let overdue = self.overdue(known)?;
-        Some(self.give_up(overdue, now))
+        let known = now.wrapping_sub(self.waited(0, now).max(self.waited(1, now)));
+        if let Some(overdue) = self.overdue(known) {
+            return Some(self.give_up(overdue, now));
+        }
+        self.calm_from = now;
+        self.calm_for = self.requests.calm(now, self.timeout, self.late());
+        None
+    }
+
+    /// True if [`Sniffer::next`] has nothing to tell of and need not look: so it is
+    /// after most bytes that are fed one by one.
+    #[inline]
+    pub(crate) fn is_calm(&self, now: u32) -> bool {
+        let [first, second] = &self.lanes;
+        self.is_early(now) && first.is_settled(now) && (!self.is_apart || second.is_settled(now))
+    }
+
+    /// True if no request came or went since the last look, and none is overdue.
+    #[inline(always)]
+    const fn is_early(&self, now: u32) -> bool {
+        now.wrapping_sub(self.calm_from) < self.calm_for
+    }
+
+    /// How long a lane has held bytes that were not told of.
+    fn waited(&self, index: usize, now: u32) -> u32 {
+        let lane = self.lanes.get(index);
+        lane.map_or(0, |lane| lane.waited(now, &self.timing))
+    }
+
+    /// How long the reply to a request that was given up is known as such.
+    const fn late(&self) -> u32 {
+        self.timeout.saturating_mul(LATE)
+    }
+
+    /// True if no request is overdue and no lane holds more than the beginning of a
+    /// frame: what [`Sniffer::look`] finds then, at less cost. Firmware, where code is
+    /// dearer, looks.
+    #[cfg_attr(not(target_os = "none"), inline(never))]
+    pub(crate) fn only_waits(
+        &mut self,
+        buffer: &mut [u8],
+        functions: &[Function],
+        now: u32,
+    ) -> bool {
+        if FIRMWARE {
+            return false;
+        }
+        let only_bytes = self.is_early(now);
+        if !only_bytes {
+            self.calm_from = now;
+            self.calm_for = self.requests.calm(now, self.timeout, self.late());
+            if self.calm_for == 0 {
+                return false;
+            }
+        }
+        let framing = self.framing;
+        for index in 0..=usize::from(self.is_apart) {
+            let part = self.part(buffer, index);
+            let (context, lane) = self.split(functions, index, now);
+            if only_bytes && lane.is_settled(now) {
+                continue;
+            }
+            let need = if lane.is_empty() {
+                Some(context.least(framing))
+            } else {
+                context.begun(framing, lane, part)
+            };
+            let Some(need) = need else {
+                // The other lane may not have been looked into since requests changed.
+                self.calm_for = if only_bytes { self.calm_for } else { 0 };
+                return false;
+            };
+            lane.settle(need, part.len(), now, &context.timing);
+        }
+        true
     }
 
     /// A request that is to be given up by now; those given up long ago go.
     fn overdue(&mut self, now: u32) -> Option<usize> {
-        self.requests.forget(now, self.timeout.saturating_mul(LATE));
+        self.requests.forget(now, self.late());
         self.requests.overdue(now, self.timeout)
     }
 
-    fn context<'c>(&'c self, functions: &'c [Function], lane: usize, now: u32) -> Context<'c> {
-        Context {
+    /// What a finder needs to know, and the lane that it looks into.
+    fn split<'c>(
+        &'c mut self,
+        functions: &'c [Function],
+        index: usize,
+        now: u32,
+    ) -> (Context<'c>, &'c mut Lane) {
+        let context = Context {
             requests: &self.requests,
             functions,
             timing: self.timing,
-            request: !self.is_apart || lane == 0,
-            response: !self.is_apart || lane == 1,
+            request: !self.is_apart || index == 0,
+            response: !self.is_apart || index == 1,
             end: self.end,
             now,
-        }
+        };
+        let [first, second] = &mut self.lanes;
+        (context, if index == 0 { first } else { second })
     }
 
     /// Looks for what there is to tell of in a lane.
@@ -213,10 +333,11 @@ impl Sniffer {
     ) -> Option<Step> {
         let part = self.part(buffer, index);
         let capacity = part.len();
-        let mut lane = *self.lanes.get(index)?;
-        let context = self.context(functions, index, now);
+        let framing = self.framing;
+        let (context, lane) = self.split(functions, index, now);
         let step = loop {
             if lane.is_empty() {
+                lane.settle(context.least(framing), capacity, now, &context.timing);
                 break None;
             }
             let junk = |until: u16| {
@@ -247,16 +368,20 @@ impl Sniffer {
             let verdict = if lane.decoded > 0 {
                 Verdict::Right(lane.decoded.into(), true, true)
             } else {
-                match self.framing {
-                    Framing::Rtu | Framing::RtuOverTcp => context.rtu(&lane, bytes, capacity),
-                    Framing::Tcp => context.tcp(&lane, bytes, capacity),
-                    Framing::Ascii => context.ascii(&lane, bytes, capacity),
+                match framing {
+                    Framing::Rtu | Framing::RtuOverTcp => context.rtu(lane, bytes, capacity),
+                    Framing::Tcp => context.tcp(lane, bytes, capacity),
+                    Framing::Ascii => context.ascii(lane, bytes, capacity),
                 }
             };
             let is_behind_junk = lane.at > lane.start;
             match verdict {
-                Verdict::Wait if !lane.is_full(capacity) => break None,
-                Verdict::Right(..) | Verdict::Damaged(_) | Verdict::Wait if is_behind_junk => {
+                Verdict::Wait(need) if !lane.is_full(capacity) => {
+                    lane.searched = bytes.len() as u16;
+                    lane.settle(need, capacity, now, &context.timing);
+                    break None;
+                }
+                Verdict::Right(..) | Verdict::Damaged(_) | Verdict::Wait(_) if is_behind_junk => {
                     break junk(lane.at);
                 }
                 Verdict::Right(total, request, response) => {
@@ -274,7 +399,7 @@ impl Sniffer {
                     });
                 }
                 // A header is trusted; elsewhere it may be noise.
-                Verdict::TooLong(total) if self.framing == Framing::Tcp => {
+                Verdict::TooLong(total) if framing == Framing::Tcp => {
                     if is_behind_junk {
                         break junk(lane.at);
                     }
@@ -285,14 +410,14 @@ impl Sniffer {
                         more: total - length,
                     });
                 }
-                Verdict::TooLong(_) | Verdict::Wait | Verdict::Wrong => {
+                Verdict::TooLong(_) | Verdict::Wait(_) | Verdict::Wrong => {
                     lane.cut |= matches!(verdict, Verdict::TooLong(_));
-                    lane.at += 1;
+                    lane.pass();
                 }
             }
         };
-        let step = match step {
-            Some(Step::Frame { total, right, .. }) if self.framing == Framing::Ascii => {
+        match step {
+            Some(Step::Frame { total, right, .. }) if framing == Framing::Ascii => {
                 let at = usize::from(lane.at);
                 let content = match part.get_mut(at..at + total) {
                     Some(frame) if lane.decoded == 0 => find::decode(frame),
@@ -306,10 +431,6 @@ impl Sniffer {
                 })
             }
             other => other,
-        };
-        if let Some(place) = self.lanes.get_mut(index) {
-            *place = lane;
         }
-        step
     }
 }

@@ -179,12 +179,32 @@ pub(super) const SLOTS: usize = 16;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Requests {
     slots: [Slot; SLOTS],
+    /// How many of them were used since all were free.
+    used: u8,
 }
 
 impl Requests {
     pub const NONE: Requests = Requests {
         slots: [Slot::FREE; SLOTS],
+        used: 0,
     };
+
+    fn used(&self) -> &[Slot] {
+        self.slots.get(..self.used.into()).unwrap_or_default()
+    }
+
+    fn used_mut(&mut self) -> &mut [Slot] {
+        self.slots.get_mut(..self.used.into()).unwrap_or_default()
+    }
+
+    /// Leaves free slots at the end out of all searches.
+    fn trim(&mut self) {
+        let last = self
+            .used()
+            .iter()
+            .rposition(|slot| slot.state != State::Free);
+        self.used = last.map_or(0, |index| index as u8 + 1);
+    }
 
     pub fn get(&self, index: usize) -> Slot {
         self.slots.get(index).copied().unwrap_or(Slot::FREE)
@@ -194,18 +214,32 @@ impl Requests {
         if let Some(slot) = self.slots.get_mut(index) {
             slot.state = state;
         }
+        self.trim();
     }
 
     /// The earliest request in a state for which `wanted` holds.
     fn earliest(&self, now: u32, state: State, wanted: impl Fn(&Slot) -> bool) -> Option<usize> {
         let mut found: Option<(usize, u32)> = None;
-        for (index, slot) in self.slots.iter().enumerate() {
+        for (index, slot) in self.used().iter().enumerate() {
+            if slot.state != state || !wanted(slot) {
+                continue;
+            }
             let age = age(now, slot.time);
-            if slot.state == state && wanted(slot) && found.is_none_or(|(_, most)| age > most) {
+            if found.is_none_or(|(_, most)| age > most) {
                 found = Some((index, age));
             }
         }
         found.map(|(index, _)| index)
+    }
+
+    /// For how long from now on nothing is overdue or to be forgotten.
+    pub fn calm(&self, now: u32, timeout: u32, old: u32) -> u32 {
+        let ends = self.used().iter().map(|slot| match slot.state {
+            State::Free => u32::MAX / 2,
+            State::Open => timeout.saturating_sub(age(now, slot.time)),
+            State::Late => old.saturating_sub(age(now, slot.time)),
+        });
+        ends.min().unwrap_or(u32::MAX / 2)
     }
 
     /// A request that is open for `timeout` or longer.
@@ -215,16 +249,17 @@ impl Requests {
 
     /// Forgets what was asked `old` ago or longer and was given up.
     pub fn forget(&mut self, now: u32, old: u32) {
-        for slot in &mut self.slots {
+        for slot in self.used_mut() {
             if slot.state == State::Late && age(now, slot.time) >= old {
                 slot.state = State::Free;
             }
         }
+        self.trim();
     }
 
     /// The data of 08/00 are as many as were sent.
     pub fn reply_length(&self, unit: u8, pdu: &[u8]) -> Option<usize> {
-        let slot = self.slots.iter().find(|slot| {
+        let slot = self.used().iter().find(|slot| {
             slot.state == State::Open
                 && slot.is_of(unit, slot.transaction, pdu)
                 && slot.asked.function() == diagnostics::DIAGNOSTICS
@@ -236,7 +271,7 @@ impl Requests {
 
     /// True if this answers an open request.
     pub fn is_waiting(&self, unit: u8, pdu: &[u8]) -> bool {
-        self.slots
+        self.used()
             .iter()
             .any(|slot| slot.state == State::Open && slot.is_of(unit, slot.transaction, pdu))
     }
@@ -267,7 +302,7 @@ impl Requests {
             Role::Request
         } else {
             Role::Unpaired(
-                self.slots
+                self.used()
                     .iter()
                     .any(|slot| slot.state == State::Open && of(slot)),
             )
@@ -299,7 +334,7 @@ impl Requests {
             ..
         } = *seen;
         let function = pdu.first().copied().unwrap_or_default();
-        for slot in &mut self.slots {
+        for slot in self.used_mut() {
             let same = slot.unit == unit && slot.asked.function() == function;
             if slot.state == State::Late && same && slot.transaction == transaction {
                 slot.state = State::Free;
@@ -320,7 +355,11 @@ impl Requests {
         };
         let free = self.slots.iter().position(|slot| slot.state == State::Free);
         let place = free.or_else(|| self.earliest(time, State::Late, |_| true));
-        if let Some(slot) = place.and_then(|index| self.slots.get_mut(index)) {
+        let Some(index) = place else {
+            return;
+        };
+        self.used = self.used.max(index as u8 + 1);
+        if let Some(slot) = self.slots.get_mut(index) {
             *slot = Slot {
                 state: State::Open,
                 unit,

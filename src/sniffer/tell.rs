@@ -2,7 +2,6 @@
 
 use super::event::{Event, Kind};
 use super::find::{Context, MIN_RTU};
-use super::lane::Lane;
 use super::pairing::{age, Role, Seen, State};
 use super::{Sniffer, Step};
 use crate::error::Status;
@@ -17,6 +16,7 @@ impl Sniffer {
     pub(super) fn give_up<'b>(&mut self, index: usize, now: u32) -> Event<'b> {
         let slot = self.requests.get(index);
         self.requests.set_state(index, State::Late);
+        self.calm_for = 0;
         Event {
             kind: Kind::Timeout,
             status: Status::RESPONSE_TIMED_OUT,
@@ -41,9 +41,13 @@ impl Sniffer {
         step: Step,
         now: u32,
     ) -> Event<'b> {
+        let is_early = self.is_early(now);
+        self.calm_for = 0;
         let part: &'b [u8] = self.part(buffer, index);
-        let mut lane = self.lanes.get(index).copied().unwrap_or(Lane::EMPTY);
-        let event = match step {
+        let timing = self.timing;
+        let framing = self.framing;
+        let (context, lane) = self.split(functions, index, now);
+        match step {
             Step::Junk {
                 length,
                 status,
@@ -53,10 +57,9 @@ impl Sniffer {
                 let bytes = bytes.get(..length).unwrap_or_default();
                 let end = lane.start + length as u16;
                 let is_ended = lane.silences(lane.start).any(|at| at == end)
-                    || (end == lane.end && lane.quiet(now) >= self.timing.silence);
-                let time = lane.time(end, &self.timing);
-                let context = self.context(functions, index, now);
-                let event = junk(self.framing, &context, bytes, status, is_ended);
+                    || (end == lane.end && lane.quiet(now) >= timing.silence);
+                let time = lane.time(end, &timing);
+                let event = junk(framing, &context, bytes, status, is_ended);
                 // The rest of what is too long is so too.
                 let cut = lane.cut && !is_ended;
                 lane.consume(end);
@@ -74,25 +77,21 @@ impl Sniffer {
                 right,
             } => {
                 let end = lane.at + total as u16;
-                let time = lane.time(end, &self.timing);
+                let time = lane.time(end, &timing);
                 let bytes = part.get(lane.at.into()..).unwrap_or_default();
                 let bytes = bytes.get(..content).unwrap_or_default();
-                let told = self.frame(functions, bytes, right, time);
+                let told = self.frame(functions, bytes, right, time, is_early);
                 if told.kind == Kind::Timeout {
                     // The frame itself comes next.
                     return told;
                 }
-                lane.consume(end);
+                self.split(functions, index, now).1.consume(end);
                 Event {
                     length: total,
                     ..told
                 }
             }
-        };
-        if let Some(place) = self.lanes.get_mut(index) {
-            *place = lane;
         }
-        event
     }
 
     /// Tells of a frame, or of a request that was given up before it.
@@ -102,6 +101,7 @@ impl Sniffer {
         frame: &'b [u8],
         right: Option<(bool, bool)>,
         time: u32,
+        is_early: bool,
     ) -> Event<'b> {
         let (transaction, unit, pdu) = content(self.framing, frame);
         let code = pdu.first().copied().unwrap_or_default();
@@ -122,7 +122,8 @@ impl Sniffer {
             return event;
         };
         let request = request && code & EXCEPTION == 0;
-        if let Some(overdue) = self.overdue(time) {
+        let overdue = if is_early { None } else { self.overdue(time) };
+        if let Some(overdue) = overdue {
             return self.give_up(overdue, time);
         }
         let seen = Seen {

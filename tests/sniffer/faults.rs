@@ -55,6 +55,29 @@ fn a_request_that_a_server_refuses_is_told_with_the_fault() {
 }
 
 #[test]
+fn a_byte_that_begins_no_reply_is_told_before_a_second_one_comes() {
+    let mut bench = Bench::new(Framing::Rtu);
+    // Nobody answers as unit 0.
+    bench.feed_at(Tap::Server, &[0]);
+    assert_eq!(bench.kinds(), [Kind::Noise]);
+}
+
+#[test]
+fn a_frame_of_unknown_length_with_a_pause_in_it_is_told_with_its_last_byte() {
+    let mut bench = Bench::new(Framing::Rtu);
+    let bytes = rtu(17, &[8, 0, 0, 1, 2, 3, 4]);
+    let (first, rest) = bytes.split_at(5);
+    bench.feed(first);
+    bench.now += 10_000;
+    for byte in rest {
+        assert_eq!(bench.kinds(), []);
+        bench.feed(&[*byte]);
+        bench.now += 200;
+    }
+    assert_eq!(bench.kinds(), [Kind::Request]);
+}
+
+#[test]
 fn a_damaged_request_or_reply_is_told_and_the_next_frame_is_found() {
     for damaged in 0..3 {
         let mut frames = [

@@ -135,6 +135,46 @@ proptest! {
     }
 
     #[test]
+    fn a_sniffer_that_waits_for_more_tells_the_same_as_one_that_looks_after_each_byte(
+        framing in 0u8..4,
+        pieces in prop::collection::vec(
+            (0..EXCHANGES.len(), any::<bool>(), prop::collection::vec(any::<u8>(), 0..4), 0u32..3),
+            1..12,
+        ),
+        piece in 1usize..20,
+        is_apart: bool,
+    ) {
+        let framing = Framing::from_code(framing).unwrap();
+        let mut waits = Bench::new(framing);
+        let mut looks = Bench::new(framing);
+        for (which, is_reply, noise, silence) in pieces {
+            let (request, reply, ..) = EXCHANGES[which];
+            let pdu = if is_reply { reply } else { request };
+            let tap = match (is_apart, is_reply) {
+                (false, _) => Tap::Both,
+                (true, false) => Tap::Client,
+                (true, true) => Tap::Server,
+            };
+            let bytes = [frame(framing, 1, 17, pdu), noise].concat();
+            for some in bytes.chunks(piece) {
+                for bench in [&mut waits, &mut looks] {
+                    bench.now += 200;
+                    bench.feed_at(tap, some);
+                }
+                // A setting makes it look again, however little has come.
+                looks.sniffer.set_timeout(1_000_000);
+                looks.listen();
+            }
+            for bench in [&mut waits, &mut looks] {
+                bench.wait([0, 3_000, 60_000][silence as usize]);
+            }
+        }
+        waits.wait(10_000_000);
+        looks.wait(10_000_000);
+        prop_assert_eq!(waits.told, looks.told);
+    }
+
+    #[test]
     fn ascii_and_tcp_frames_are_found_in_order_in_pieces_of_any_length(
         which in prop::collection::vec((0..EXCHANGES.len(), "[ -9;-~]{0,9}"), 1..8),
         piece in 1usize..300,

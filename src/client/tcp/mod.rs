@@ -174,9 +174,6 @@ impl<P: Port, S: Means> Tcp<P, S> {
         self.blocked = false;
         let mut at = 0;
         let ended = loop {
-            if self.next as u8 == 0 {
-                self.skip_numbers_in_use(&shared.queue);
-            }
             let Some(job) = shared.queue.get_mut(at) else {
                 shared.rest(now, least);
                 return None;
@@ -192,7 +189,12 @@ impl<P: Port, S: Means> Tcp<P, S> {
                     break Status::LINK_LOST;
                 }
                 match self.encode(job, now, stuck) {
-                    Status::OK => wait = job.ticket().wait,
+                    Status::OK => {
+                        wait = job.ticket().wait;
+                        if self.next as u8 == 0 {
+                            self.skip_numbers_in_use(&shared.queue);
+                        }
+                    }
                     Status::BUSY => {
                         self.blocked = true;
                         continue;

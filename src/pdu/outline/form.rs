@@ -73,6 +73,14 @@ impl Form {
         Form::new(function, RANGE | READ | TAKES_WORDS, 5, 0, 0, 2)
     }
 
+    /// True of a request whose response repeats its function code and two words, and
+    /// nothing else.
+    #[inline]
+    pub(super) const fn repeats_two_words(self) -> bool {
+        let fields = 7 << HEAD_LENGTH | 7 << LENGTH | 7 << REPEATED | KIND | REPEATS_DATA;
+        self.0 & fields == 5 << HEAD_LENGTH | 5 << LENGTH | 5 << REPEATED
+    }
+
     /// What the response repeats whole.
     pub(super) const fn echoed(function: u8, flags: u32) -> Form {
         Form::new(function, flags | BROADCAST, 5, 5, 5, 0)

@@ -144,7 +144,8 @@ impl Outline {
     /// little cost. Firmware, where code is dearer, has [`Outline::emit`] alone.
     #[inline]
     pub fn two_words(&self) -> Option<&[u8; 4]> {
-        if !FIRMWARE && self.head_length == 5 && self.data_length == 0 && !self.form.has(COUNTED) {
+        let lengths = u16::from_ne_bytes([self.head_length, self.data_length]);
+        if !FIRMWARE && lengths == u16::from_ne_bytes([5, 0]) && !self.form.has(COUNTED) {
             self.head.first_chunk::<5>()?.last_chunk()
         } else {
             None
@@ -172,6 +173,19 @@ impl Outline {
         self.head()
             .iter()
             .all(|ours| theirs.next().is_none_or(|theirs| theirs == ours))
+    }
+
+    /// True if `pdu` is the whole response to a write of one or many coils or
+    /// registers, at little cost: it repeats function code, address and value or
+    /// quantity. Firmware, where code is dearer, has [`Outline::judge`] alone.
+    #[inline]
+    pub fn is_repeated_by(&self, pdu: &[u8]) -> bool {
+        let Some([function, words @ ..]) = self.head.first_chunk::<5>() else {
+            return false;
+        };
+        !FIRMWARE
+            && self.form.repeats_two_words()
+            && matches!(pdu, [code, a, b, c, d] if code == function && [*a, *b, *c, *d] == *words)
     }
 
     /// The length of the response that begins with the bytes of `pdu`, or the
@@ -300,5 +314,40 @@ impl Outline {
             at += 7;
         }
         theirs.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_response_that_repeats_two_words_is_right_by_the_long_way_too() {
+        let forms = [
+            Form::WRITE_SINGLE_COIL,
+            Form::WRITE_SINGLE_REGISTER,
+            Form::WRITE_MULTIPLE_COILS,
+            Form::WRITE_MULTIPLE_REGISTERS,
+            Form::READ_COILS,
+            Form::READ_HOLDING_REGISTERS,
+            Form::READ_FIFO_QUEUE,
+        ];
+        for (index, form) in forms.into_iter().enumerate() {
+            let mut outline = Outline::NONE;
+            assert_eq!(outline.set(form, 0x0107, 9), Status::OK);
+            let head = [outline.function(), 1, 7, 0, 9];
+            assert_eq!(outline.is_repeated_by(&head), !FIRMWARE && index < 4);
+            assert!(!outline.is_repeated_by(&head[..4]));
+            assert!(!outline.is_repeated_by(&[head.as_slice(), &[0]].concat()));
+            for at in 0..head.len() {
+                let mut other = head;
+                other[at] ^= 0x80;
+                assert!(!outline.is_repeated_by(&other), "{other:?}");
+            }
+            if index < 4 {
+                assert_eq!(outline.expected(&head, 5).map(NonZeroU8::get), Some(5));
+                assert_eq!(outline.judge(&head, |_| 0), Status::OK);
+            }
+        }
     }
 }

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 
 /// The layers from left to right; modules of one string stand side by side.
 const LAYERS: [&[&str]; 10] = [
-    &["error", "time"],
+    &["atomic", "error", "time"],
     &["port", "ring", "data"],
     &["bytes"],
     &["frame"],

@@ -10,6 +10,7 @@ use super::request::Inside;
 use super::{calls, mbm_client, mbm_clientRequest, pointers, Lent};
 use crate::error::Status;
 use crate::pdu::outline::{Form, Outline};
+use crate::FIRMWARE;
 
 /// Whether the request behind a pointer may be queued.
 ///
@@ -71,7 +72,24 @@ unsafe fn submit(
     status
 }
 
-/// Queues the request that `build` outlines.
+/// True if a client gave the request back, and nothing happened to it since: so no
+/// client has it.
+///
+/// # Safety
+/// As the header demands.
+#[inline(always)]
+unsafe fn is_free(client: *const mbm_client, request: *const mbm_clientRequest) -> bool {
+    // SAFETY: as the caller promises.
+    unsafe {
+        pointers::check(client) == Status::OK
+            && !request.is_null()
+            && (*request).status != Status::PENDING.code()
+            && (*request.cast::<Inside>()).ticket.has_ended()
+    }
+}
+
+/// Queues the request that `build` outlines. (A host looks first whether it is one that
+/// was used before, as most are.)
 ///
 /// # Safety
 /// As the header demands.
@@ -81,15 +99,52 @@ unsafe fn queue(
     request: *mut mbm_clientRequest,
     build: impl FnOnce(&mut Outline) -> Status,
 ) -> u8 {
+    // SAFETY: as the caller promises; no client has it, or it is prepared.
+    unsafe {
+        if !FIRMWARE && is_free(client, request) {
+            build_and_submit(client, request, build).code()
+        } else {
+            queue_unknown(client, request, build)
+        }
+    }
+}
+
+/// As [`queue`], of a request that may be pending.
+///
+/// # Safety
+/// As the header demands.
+#[cfg_attr(target_os = "none", inline(always))]
+#[cfg_attr(not(target_os = "none"), cold, inline(never))]
+unsafe fn queue_unknown(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+    build: impl FnOnce(&mut Outline) -> Status,
+) -> u8 {
+    // SAFETY: as the caller promises; built once it is prepared.
+    unsafe {
+        let status = match prepare(client, request) {
+            Status::OK => build_and_submit(client, request, build),
+            refused => refused,
+        };
+        status.code()
+    }
+}
+
+/// Queues the request that `build` outlines.
+///
+/// # Safety
+/// As for [`submit`].
+#[inline(always)]
+unsafe fn build_and_submit(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+    build: impl FnOnce(&mut Outline) -> Status,
+) -> Status {
     // SAFETY: as the caller promises.
     unsafe {
-        let mut status = prepare(client, request);
-        if status == Status::OK {
-            let inside = &mut *request.cast::<Inside>();
-            let built = build(&mut inside.ticket.outline);
-            status = submit(client, request, built);
-        }
-        status.code()
+        let inside = &mut *request.cast::<Inside>();
+        let built = build(&mut inside.ticket.outline);
+        submit(client, request, built)
     }
 }
 
@@ -98,6 +153,7 @@ unsafe fn queue(
 /// # Safety
 /// As the header demands.
 #[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline(always))]
 unsafe fn plain(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,

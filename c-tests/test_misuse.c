@@ -1,0 +1,94 @@
+/* What the fuzzer of call sequences found: fuzz/fuzz_targets/c_api.rs. */
+#include "mbm.h"
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static uint32_t clock_now;
+static uint32_t reads;
+static uint8_t flood;
+
+static uint32_t port_micros(void *context)
+{
+    (void)context;
+    return clock_now;
+}
+
+static int16_t port_write(void *context, const uint8_t *bytes, uint16_t length)
+{
+    (void)context;
+    (void)bytes;
+    return (int16_t)length;
+}
+
+/* A peer that sends the same byte for ever. */
+static int16_t flooded_read(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    (void)context;
+    assert_true(++reads < 10000);
+    memset(bytes, flood, capacity);
+    return (int16_t)capacity;
+}
+
+static const mbm_port flooded = {
+    NULL, flooded_read, port_write, port_micros, NULL, NULL, NULL, NULL};
+
+static void a_poll_of_an_ascii_server_ends_though_a_peer_floods(void **state)
+{
+    static mbm_server server;
+    static mbm_unit unit;
+    static uint8_t frame[MBM_MAX_ASCII_FRAME];
+    static const uint8_t floods[] = {'x', ':', '0', '\r', '\n'};
+    size_t i;
+
+    (void)state;
+    OK(mbm_server_beginAscii(&server, &flooded, &unit, 1, frame, sizeof frame));
+    for (i = 0; i < sizeof floods; i++) {
+        flood = floods[i];
+        reads = 0;
+        OK(mbm_server_poll(&server));
+    }
+}
+
+/* A request of `length` bytes in a buffer of `capacity`: the response ends in it. */
+static void answers_with_exception_04(uint8_t framing, mbm_unit *unit, const char *request,
+                                      uint16_t length, uint16_t capacity)
+{
+    uint8_t *frame = malloc(capacity);
+    uint16_t response = 0xFFFF;
+    const uint16_t pdu = framing == MBM_FRAMING_TCP ? 7 : 1;
+
+    assert_non_null(frame);
+    memcpy(frame, request, length);
+    OK(mbm_server_respond(framing, unit, 1, frame, length, capacity, &response));
+    assert_true(response <= capacity);
+    assert_int_equal(response, framing == MBM_FRAMING_TCP ? 9 : 5);
+    assert_int_equal(frame[pdu], (uint8_t)request[pdu] | 0x80);
+    assert_int_equal(frame[pdu + 1], MBM_SLAVE_DEVICE_FAILURE);
+    free(frame);
+}
+
+static void a_response_longer_than_its_buffer_is_exception_04(void **state)
+{
+    static mbm_unit unit;
+    static mbm_identification identification;
+    static mbm_diagnostics diagnostics;
+
+    (void)state;
+    OK(mbm_server_serveIdentification(&unit, &identification));
+    OK(mbm_server_serveDiagnostics(&unit, &diagnostics));
+    answers_with_exception_04(MBM_FRAMING_TCP, &unit, "\0\1\0\0\0\5\x11\x2B\x0E\1\0", 11, 12);
+    answers_with_exception_04(MBM_FRAMING_TCP, &unit, "\0\1\0\0\0\2\x11\x0B", 8, 11);
+    answers_with_exception_04(MBM_FRAMING_RTU, &unit, "\x11\x0B\x4C\x27", 4, 6);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_poll_of_an_ascii_server_ends_though_a_peer_floods),
+        cmocka_unit_test(a_response_longer_than_its_buffer_is_exception_04),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,463 @@
+/* A set of sockets: one wait for any number of them, which says who is ready. */
+#define _GNU_SOURCE
+#include "await.h"
+#include "descriptors.h"
+#include "mbm_tcp.h"
+#include "tcp_peer.h"
+#include "tcp_server.h"
+#include "test.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { MANY = 300, PLACES = 3, MINUTE_MS = 60000 };
+
+static mbm_tcp_set set;
+static mbm_tcp_listener listener;
+static mbm_tcp tcps[MANY];
+static int peers[MANY];
+static unsigned peer_count;
+static struct rlimit found;
+static time_t ahead; /* seconds that the clock of the port is fast */
+
+/* The program's own comes before that of libc. */
+int clock_gettime(clockid_t id, struct timespec *time)
+{
+    const int result = (int)syscall(SYS_clock_gettime, id, time);
+
+    if (result == 0)
+        time->tv_sec += ahead;
+    return result;
+}
+
+static void assert_fails(int error, int result)
+{
+    assert_int_equal(result, -1);
+    assert_int_equal(errno, error);
+}
+
+static int begin(void **state)
+{
+    (void)state;
+    alarm(3 * PATIENCE_MS / 1000);
+    ahead = 0;
+    peer_count = 0;
+    memset(&set, 0, sizeof set);
+    memset(&listener, 0, sizeof listener);
+    memset(tcps, 0, sizeof tcps);
+    assert_int_equal(getrlimit(RLIMIT_NOFILE, &found), 0);
+    assert_int_equal(mbm_tcp_openSet(&set), 0);
+    return 0;
+}
+
+static int end(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &found), 0);
+    for (i = 0; i < MANY; i++)
+        mbm_tcp_close(&tcps[i]);
+    for (i = 0; i < peer_count; i++)
+        close(peers[i]);
+    mbm_tcp_closeListener(&listener);
+    mbm_tcp_closeSet(&set);
+    mbm_tcp_closeSet(&set);
+    alarm(0);
+    return 0;
+}
+
+/* Puts so many sockets into the set, each connected with a peer. */
+static void fill(unsigned count)
+{
+    int pair[2];
+
+    while (count-- > 0) {
+        assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair), 0);
+        assert_int_equal(mbm_tcp_attach(&tcps[peer_count], pair[0]), 0);
+        assert_int_equal(mbm_tcp_add(&set, &tcps[peer_count]), 0);
+        peers[peer_count++] = pair[1];
+    }
+}
+
+static void tell(unsigned place, const char *text)
+{
+    assert_int_equal(write(peers[place], text, strlen(text)), strlen(text));
+}
+
+static int16_t take(unsigned place, uint16_t most)
+{
+    const mbm_port port = mbm_tcp_port(&tcps[place]);
+    uint8_t bytes[16];
+
+    return port.read(port.context, bytes, most);
+}
+
+static int is_lost(unsigned place)
+{
+    return take(place, 1) < 0;
+}
+
+/* The wait tells of this one and of no other. */
+static void expect_ready(const mbm_tcp *tcp)
+{
+    assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 1);
+    assert_ptr_equal(mbm_tcp_nextReady(&set), tcp);
+    assert_null(mbm_tcp_nextReady(&set));
+}
+
+static void expect_silence(void)
+{
+    assert_int_equal(mbm_tcp_waitSet(&set, 1000), 0);
+    assert_null(mbm_tcp_nextReady(&set));
+}
+
+static void a_connection_takes_little_memory(void **state)
+{
+    (void)state;
+    assert_true(sizeof(mbm_tcp) <= 64);
+}
+
+static void the_wait_says_which_of_many_sockets_are_ready(void **state)
+{
+    uint8_t seen[MANY] = {0};
+    unsigned i, count = 0;
+    mbm_tcp *tcp;
+
+    (void)state;
+    fill(MANY);
+    expect_silence();
+    tell(7, "x");
+    expect_ready(&tcps[7]);
+    assert_int_equal(take(7, 16), 1);
+    expect_silence();
+    /* More than one wait tells of. */
+    for (i = 0; i < MANY; i += 2)
+        tell(i, "x");
+    while (count < MANY / 2) {
+        assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 1);
+        while ((tcp = mbm_tcp_nextReady(&set))) {
+            i = (unsigned)(tcp - tcps);
+            assert_int_equal(i % 2, 0);
+            assert_int_equal(seen[i]++, 0);
+            assert_int_equal(take(i, 16), 1);
+            count++;
+        }
+    }
+    expect_silence();
+}
+
+static void one_that_was_not_looked_at_is_not_forgotten(void **state)
+{
+    (void)state;
+    fill(2);
+    tell(0, "x");
+    assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 1);
+    tell(1, "y");
+    assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 1);
+    assert_ptr_equal(mbm_tcp_nextReady(&set), &tcps[0]);
+    assert_ptr_equal(mbm_tcp_nextReady(&set), &tcps[1]);
+    assert_null(mbm_tcp_nextReady(&set));
+}
+
+static void bytes_that_nobody_reads_do_not_end_the_wait_again(void **state)
+{
+    (void)state;
+    fill(2);
+    tell(0, "abcd");
+    expect_ready(&tcps[0]);
+    expect_silence();
+    tell(0, "e");
+    expect_silence();
+    /* The others are told of as before. */
+    tell(1, "x");
+    expect_ready(&tcps[1]);
+    assert_int_equal(take(1, 16), 1);
+    /* Once the port was used, what is left is told of. */
+    assert_int_equal(take(0, 2), 2);
+    expect_ready(&tcps[0]);
+    assert_int_equal(take(0, 16), 3);
+    expect_silence();
+    /* Nor does the end of the stream end it again. */
+    close(peers[0]);
+    peers[0] = peers[--peer_count];
+    expect_ready(&tcps[0]);
+    expect_silence();
+    assert_int_equal(is_lost(0), 1);
+    expect_silence();
+}
+
+static void a_full_socket_is_ready_once_there_is_room(void **state)
+{
+    static uint8_t much[60000];
+    mbm_port port;
+
+    (void)state;
+    fill(1);
+    port = mbm_tcp_port(&tcps[0]);
+    tell(0, "x");
+    expect_ready(&tcps[0]);
+    while (port.write(port.context, much, sizeof much) > 0)
+        ;
+    expect_silence();
+    while (read(peers[0], much, sizeof much) > 0)
+        ;
+    expect_ready(&tcps[0]);
+    /* Who has written all waits for bytes again, and these are still there. */
+    assert_int_equal(port.write(port.context, much, 10), 10);
+    expect_ready(&tcps[0]);
+    assert_int_equal(take(0, 16), 1);
+    expect_silence();
+}
+
+static void a_socket_that_is_closed_is_told_of_no_more(void **state)
+{
+    unsigned i;
+    int other;
+
+    (void)state;
+    fill(4);
+    for (i = 0; i < 4; i++)
+        tell(i, "x");
+    assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 1);
+    mbm_tcp_close(&tcps[1]);
+    mbm_tcp_close(&tcps[3]);
+    assert_ptr_equal(mbm_tcp_nextReady(&set), &tcps[0]);
+    mbm_tcp_close(&tcps[2]);
+    assert_null(mbm_tcp_nextReady(&set));
+    assert_int_equal(take(0, 16), 1);
+    expect_silence();
+    /* Also while another descriptor keeps its socket open, as in a child process. */
+    other = dup(tcps[0].fd);
+    mbm_tcp_close(&tcps[0]);
+    tell(0, "x");
+    expect_silence();
+    close(other);
+}
+
+static void a_connection_is_told_of_when_it_is_made_and_made_anew(void **state)
+{
+    tcp_peer *peer = tcp_peer_new();
+    mbm_tcp_addresses addresses;
+    char service[8];
+    unsigned round;
+
+    (void)state;
+    snprintf(service, sizeof service, "%u", tcp_peer_start(peer, 0));
+    assert_int_equal(mbm_tcp_open(&tcps[0], &addresses, "127.0.0.1", service), 0);
+    assert_int_equal(mbm_tcp_add(&set, &tcps[0]), 0);
+    for (round = 0; round < 2; round++) {
+        const uint8_t read_one[12] = {0, 1, 0, 0, 0, 6, 7, 3, 0, 5, 0, 1};
+        const mbm_port port = mbm_tcp_port(&tcps[0]);
+
+        while (mbm_tcp_isConnected(&tcps[0]) == 0)
+            expect_ready(&tcps[0]);
+        assert_int_equal(mbm_tcp_isConnected(&tcps[0]), 1);
+        assert_int_equal(port.write(port.context, read_one, 12), 12);
+        expect_ready(&tcps[0]);
+        assert_int_equal(take(0, 16), 11);
+        mbm_tcp_disconnect(&tcps[0]);
+        expect_silence();
+        assert_in_set(mbm_tcp_connect(&tcps[0]), ((const unsigned long[]){MBM_OK, MBM_PENDING}), 2);
+    }
+    mbm_tcp_close(&tcps[0]);
+    tcp_peer_stop(peer);
+}
+
+static void what_cannot_be_put_into_a_set_says_why(void **state)
+{
+    mbm_tcp_set closed = {0};
+
+    (void)state;
+    assert_fails(EBUSY, mbm_tcp_openSet(&set));
+    assert_fails(EBADF, mbm_tcp_waitSet(&closed, 0));
+    assert_fails(EBADF, mbm_tcp_add(&set, &tcps[0]));
+    fill(1);
+    assert_fails(EBADF, mbm_tcp_add(&closed, &tcps[0]));
+    assert_fails(EBUSY, mbm_tcp_add(&set, &tcps[0]));
+    assert_fails(EBADF, mbm_tcp_addListener(&set, &listener));
+    assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
+    assert_int_equal(mbm_tcp_addListener(&set, &listener), 0);
+    assert_fails(EBUSY, mbm_tcp_addListener(&set, &listener));
+}
+
+/* --- with a listener --- */
+
+static void begin_to_listen(void)
+{
+    assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
+    assert_int_equal(mbm_tcp_addListener(&set, &listener), 0);
+}
+
+/* How many connections wait to be accepted. */
+static unsigned waiting(void)
+{
+    struct tcp_info info = {0};
+    socklen_t size = sizeof info;
+
+    assert_int_equal(getsockopt(listener.fd, IPPROTO_TCP, TCP_INFO, &info, &size), 0);
+    return info.tcpi_unacked;
+}
+
+static void connect_some(unsigned count)
+{
+    const unsigned before = waiting();
+    unsigned i;
+
+    for (i = 0; i < count; i++)
+        peers[peer_count++] = tcp_connect(listener.port);
+    AWAIT(waiting() == before + count);
+}
+
+static int accept_one(void)
+{
+    return mbm_tcp_accept(&listener, tcps, PLACES);
+}
+
+static void wait_for_connection(void)
+{
+    assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 1);
+    assert_null(mbm_tcp_nextReady(&set));
+}
+
+static void take_all_places(void)
+{
+    int i;
+
+    connect_some(PLACES);
+    wait_for_connection();
+    for (i = 0; i < PLACES; i++)
+        assert_int_equal(accept_one(), i);
+    assert_fails(EAGAIN, accept_one());
+}
+
+static void a_connection_that_is_taken_is_in_the_set_of_its_listener(void **state)
+{
+    (void)state;
+    begin_to_listen();
+    assert_fails(EAGAIN, accept_one());
+    connect_some(1);
+    wait_for_connection();
+    assert_int_equal(accept_one(), 0);
+    assert_fails(EAGAIN, accept_one());
+    tell(0, "x");
+    expect_ready(&tcps[0]);
+    assert_int_equal(take(0, 16), 1);
+    expect_silence();
+    mbm_tcp_closeListener(&listener);
+    tell(0, "x");
+    expect_ready(&tcps[0]);
+}
+
+static void accept_looks_only_once_the_set_knows_of_a_connection(void **state)
+{
+    (void)state;
+    begin_to_listen();
+    assert_fails(EAGAIN, accept_one());
+    connect_some(1);
+    assert_fails(EAGAIN, accept_one());
+    wait_for_connection();
+    wait_for_connection();
+    assert_int_equal(accept_one(), 0);
+}
+
+static void a_connection_that_is_closed_as_idle_is_ready(void **state)
+{
+    (void)state;
+    begin_to_listen();
+    listener.idleTime = MINUTE_MS;
+    take_all_places();
+    ahead = 61;
+    tell(0, "x");
+    expect_ready(&tcps[0]);
+    assert_int_equal(take(0, 16), 1);
+    connect_some(1);
+    wait_for_connection();
+    assert_fails(EAGAIN, accept_one());
+    assert_int_equal(listener.idle, 1);
+    /* Its program frees the place, and takes the new one. */
+    assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 1);
+    assert_ptr_equal(mbm_tcp_nextReady(&set), &tcps[1]);
+    assert_null(mbm_tcp_nextReady(&set));
+    assert_int_equal(is_lost(1), 1);
+    assert_int_equal(tcps[1].error, ETIMEDOUT);
+    mbm_tcp_close(&tcps[1]);
+    assert_int_equal(accept_one(), 1);
+    assert_fails(EAGAIN, accept_one());
+    assert_int_equal(is_lost(0), 0);
+    assert_int_equal(listener.refused, 0);
+}
+
+/* The next descriptor would be one too many. */
+static void leave_no_descriptor(void)
+{
+    const int next = dup(0);
+    const struct rlimit limit = {(rlim_t)next, found.rlim_max};
+
+    assert_true(next >= 0);
+    close(next);
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &limit), 0);
+}
+
+static void without_a_descriptor_the_set_sleeps_and_tries_again(void **state)
+{
+    (void)state;
+    SKIP_WITHOUT_LIMITS();
+    begin_to_listen();
+    connect_some(1);
+    wait_for_connection();
+    assert_int_equal(accept_one(), 0);
+    connect_some(2);
+    leave_no_descriptor();
+    assert_fails(EMFILE, accept_one());
+    expect_silence();
+    assert_fails(EAGAIN, accept_one());
+    /* The time to the next try is over; those that it has are served meanwhile. */
+    assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 0);
+    while (accept_one() < 0 && errno == EAGAIN)
+        assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 0);
+    assert_int_equal(errno, EMFILE);
+    tell(0, "x");
+    expect_ready(&tcps[0]);
+    assert_int_equal(listener.refused, 0);
+    /* A place that is closed makes room, and is taken without waiting for that time. */
+    ahead = -3600;
+    mbm_tcp_close(&tcps[0]);
+    assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 0);
+    assert_int_equal(accept_one(), 0);
+    assert_fails(EMFILE, accept_one());
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &found), 0);
+    ahead = 0;
+    (void)mbm_tcp_waitSet(&set, MBM_TCP_FOREVER);
+    assert_int_equal(accept_one(), 1);
+}
+
+#define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(a_connection_takes_little_memory),
+        TEST(the_wait_says_which_of_many_sockets_are_ready),
+        TEST(one_that_was_not_looked_at_is_not_forgotten),
+        TEST(bytes_that_nobody_reads_do_not_end_the_wait_again),
+        TEST(a_full_socket_is_ready_once_there_is_room),
+        TEST(a_socket_that_is_closed_is_told_of_no_more),
+        TEST(a_connection_is_told_of_when_it_is_made_and_made_anew),
+        TEST(what_cannot_be_put_into_a_set_says_why),
+        TEST(a_connection_that_is_taken_is_in_the_set_of_its_listener),
+        TEST(accept_looks_only_once_the_set_knows_of_a_connection),
+        TEST(a_connection_that_is_closed_as_idle_is_ready),
+        TEST(without_a_descriptor_the_set_sleeps_and_tries_again),
+    };
+
+    return cmocka_run_group_tests_name("a set of sockets", tests, NULL, NULL);
+}

@@ -1,0 +1,180 @@
+/* The set of mbm_tcp.h: one wait for any number of sockets, by epoll of Linux.
+ * Licence: MIT OR Apache-2.0. */
+#define _GNU_SOURCE
+#include "mbm_tcp.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <sys/epoll.h>
+#include <unistd.h>
+
+_Static_assert(EPOLLIN == POLLIN && EPOLLOUT == POLLOUT, "what a port awaits is said in both");
+
+static int refuse(int error)
+{
+    errno = error;
+    return -1;
+}
+
+/* Has epoll tell of what `who` awaits from now on. One that awaits nothing is taken out,
+ * since a hang-up would end each wait otherwise. */
+static int watch(mbm_tcp_set *set, int fd, void *who, uint8_t before, uint8_t awaits)
+{
+    struct epoll_event event = {.events = awaits, .data = {.ptr = who}};
+
+    if (before == 0)
+        return epoll_ctl(set->fd, EPOLL_CTL_ADD, fd, &event);
+    if (awaits != 0)
+        return epoll_ctl(set->fd, EPOLL_CTL_MOD, fd, &event);
+    (void)epoll_ctl(set->fd, EPOLL_CTL_DEL, fd, &event);
+    return 0;
+}
+
+int mbm_tcp_add(mbm_tcp_set *set, mbm_tcp *tcp)
+{
+    if (!set->isOpen || !mbm_tcp_isInUse(tcp))
+        return refuse(EBADF);
+    if (tcp->set)
+        return refuse(EBUSY);
+    if (tcp->awaits != 0 && watch(set, tcp->fd, tcp, 0, tcp->awaits) < 0)
+        return -1;
+    tcp->set = set;
+    return 0;
+}
+
+int mbm_tcp_openSet(mbm_tcp_set *set)
+{
+    if (set->isOpen)
+        return refuse(EBUSY);
+    set->fd = epoll_create1(EPOLL_CLOEXEC);
+    if (set->fd < 0)
+        return -1;
+    set->isOpen = 1;
+    set->now = mbm_tcp_milliseconds();
+    set->first = NULL;
+    set->end = &set->first;
+    set->listener = NULL;
+    set->watch = watch;
+    set->add = mbm_tcp_add;
+    return 0;
+}
+
+void mbm_tcp_closeSet(mbm_tcp_set *set)
+{
+    if (set->isOpen)
+        close(set->fd);
+    set->fd = -1;
+    set->isOpen = 0;
+}
+
+int mbm_tcp_addListener(mbm_tcp_set *set, mbm_tcp_listener *listener)
+{
+    if (!set->isOpen || listener->port == 0)
+        return refuse(EBADF);
+    if (listener->set || set->listener)
+        return refuse(EBUSY);
+    if (listener->awaits != 0 && watch(set, listener->fd, listener, 0, listener->awaits) < 0)
+        return -1;
+    listener->set = set;
+    set->listener = listener;
+    return 0;
+}
+
+/* Takes note of what epoll tells of a socket, but bytes of one that told of none. */
+__attribute__((cold, noinline)) static void note(mbm_tcp *tcp, uint32_t events)
+{
+    if (events & ~(uint32_t)EPOLLOUT) {
+        if ((tcp->told & MBM_TCP_TOLD) && !(tcp->told & MBM_TCP_LISTED)) {
+            /* Nobody used the port: epoll is not asked for bytes until somebody does. */
+            mbm_tcp_await(tcp, tcp->awaits & POLLOUT);
+            if (!(events & EPOLLOUT))
+                return;
+        }
+        tcp->told |= MBM_TCP_TOLD;
+    }
+    if (tcp->awaits == POLLOUT)
+        /* If it is being connected, that is known from now on. */
+        (void)mbm_tcp_isConnected(tcp);
+    mbm_tcp_tell(tcp);
+}
+
+/* How long connections can only wait, in milliseconds, or -1. Where that is over,
+ * mbm_tcp_accept looks again. */
+static int64_t until_retry(mbm_tcp_set *set)
+{
+    mbm_tcp_listener *listener = set->listener;
+    int64_t left;
+
+    if (!listener || listener->awaits != 0)
+        return -1;
+    left = listener->retryAt - set->now;
+    if (left > 0)
+        return left;
+    listener->isQuiet = 0;
+    return 0;
+}
+
+/* Waits once, for so many milliseconds or for ever if negative, and notes what it learns:
+ * of how many descriptors. */
+static int wait_once(mbm_tcp_set *set, int64_t time)
+{
+    const int64_t retry = until_retry(set);
+    struct epoll_event events[MBM_TCP_READY];
+    int count, i;
+
+    if (set->first)
+        time = 0;
+    else if (retry >= 0 && (time < 0 || time > retry))
+        time = retry;
+    count = epoll_wait(set->fd, events, MBM_TCP_READY, (int)time);
+    set->now = mbm_tcp_milliseconds();
+    for (i = 0; i < count; i++) {
+        mbm_tcp *tcp = (mbm_tcp *)events[i].data.ptr;
+
+        if (events[i].data.ptr == set->listener) {
+            set->listener->isQuiet = 0;
+        } else if (events[i].events == EPOLLIN && tcp->told == 0) {
+            tcp->told = MBM_TCP_TOLD | MBM_TCP_LISTED;
+            tcp->next = NULL;
+            *set->end = tcp;
+            set->end = &tcp->next;
+        } else {
+            note(tcp, events[i].events);
+        }
+    }
+    (void)until_retry(set);
+    return count;
+}
+
+int mbm_tcp_waitSet(mbm_tcp_set *set, uint32_t micros)
+{
+    const int64_t time = micros == MBM_TCP_FOREVER ? -1 : ((int64_t)micros + 999) / 1000;
+    int count;
+
+    if (!set->isOpen)
+        return refuse(EBADF);
+    do {
+        count = wait_once(set, time);
+        if (set->first)
+            return 1;
+        if (count < 0)
+            return errno == EINTR ? 0 : -1;
+        if (count == 0)
+            return 0;
+        /* What nobody uses ended the wait, right after it began, and does so no more. */
+    } while (!set->listener || set->listener->isQuiet);
+    return 1;
+}
+
+mbm_tcp *mbm_tcp_nextReady(mbm_tcp_set *set)
+{
+    mbm_tcp *tcp = set->first;
+
+    if (tcp) {
+        set->first = tcp->next;
+        if (!set->first)
+            set->end = &set->first;
+        tcp->told &= (uint8_t)~MBM_TCP_LISTED;
+    }
+    return tcp;
+}

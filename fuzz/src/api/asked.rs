@@ -1,0 +1,198 @@
+//! Requests of the client, with data and reply of exactly the bytes they need.
+
+use super::check::{call, is_status, refused_changes_nothing, span, PENDING};
+use super::records::rule;
+use super::traffic;
+use super::world::{Grant, World};
+use mbm::capi::*;
+use std::ffi::c_void;
+use std::ptr::{null, null_mut};
+
+unsafe extern "C" fn done(_: *mut c_void, request: *mut mbm_clientRequest) {
+    let w = World::current();
+    // SAFETY: the client's word for it.
+    let status = unsafe { (*request).status };
+    assert!(status != PENDING, "done of a request that is pending");
+    w.hook(Grant::All, 4);
+}
+
+/// Sets the fields of a request for so many bytes of data.
+fn fill(w: &World, request: *mut mbm_clientRequest, bytes: usize) {
+    let room = match w.byte() {
+        0..0xA0 => 256,
+        _ => w.word(),
+    };
+    // SAFETY: not pending, so the user's.
+    unsafe {
+        (*request).done = (w.byte() & 3 != 0).then_some(done);
+        (*request).data = if w.rarely(64) {
+            null()
+        } else {
+            w.noise(bytes).cast()
+        };
+        (*request).reply = if w.rarely(8) {
+            null_mut()
+        } else {
+            w.noise(room.into()).cast()
+        };
+        (*request).replyBytes = room;
+        (*request).transaction = if w.rarely(8) { w.word() } else { 0 };
+        (*request).unit = traffic::unit(w);
+    }
+}
+
+/// Queues a request of any function.
+pub fn request(w: &World, client: *mut mbm_client) {
+    let request = w.requests.pick(w);
+    let choice = w.byte() % 29;
+    let (a, b, c, d, byte) = (w.word(), w.word(), w.word(), w.word(), w.byte());
+    // What the header says that `data` have.
+    let words = |count: u16| 2 * usize::from(count);
+    let bytes = match choice {
+        10 => usize::from(b).div_ceil(8),
+        11 | 21 | 24 => words(if choice == 11 { b } else { c }),
+        13 => words(d),
+        15 => words(b),
+        22 | 23 => a.into(),
+        25 | 26 => b.into(),
+        _ => 0,
+    };
+    let rule: *const mbm_rule = if w.rarely(16) { null() } else { w.put(rule(w)) };
+    let pdu = traffic::pdu(w);
+    let (function, length) = (pdu[0], pdu.len() as u16 - 1);
+    let body = if w.rarely(32) {
+        null_mut()
+    } else {
+        w.array(&pdu[1..])
+    };
+    // A request that is pending is the client's.
+    // SAFETY: not NULL.
+    let free = !request.is_null() && unsafe { (*request).status } != PENDING;
+    let was = super::check::bytes(span(request));
+    if free {
+        fill(w, request, bytes);
+    }
+    let spans: &[_] = if free {
+        &[span(client)]
+    } else {
+        &[span(client), span(request)]
+    };
+    let status = refused_changes_nothing(w, spans, "a request", || match choice {
+        0 => call!(w, client, mbm_client_readCoils(client, request, a, b)),
+        1 => call!(w, client, mbm_client_readSingleCoil(client, request, a)),
+        2 => call!(
+            w,
+            client,
+            mbm_client_readDiscreteInputs(client, request, a, b)
+        ),
+        3 => call!(
+            w,
+            client,
+            mbm_client_readSingleDiscreteInput(client, request, a)
+        ),
+        4 => call!(
+            w,
+            client,
+            mbm_client_readHoldingRegisters(client, request, a, b)
+        ),
+        5 => call!(
+            w,
+            client,
+            mbm_client_readSingleHoldingRegister(client, request, a)
+        ),
+        6 => call!(
+            w,
+            client,
+            mbm_client_readInputRegisters(client, request, a, b)
+        ),
+        7 => call!(
+            w,
+            client,
+            mbm_client_readSingleInputRegister(client, request, a)
+        ),
+        8 => call!(
+            w,
+            client,
+            mbm_client_writeSingleCoil(client, request, a, byte)
+        ),
+        9 => call!(
+            w,
+            client,
+            mbm_client_writeSingleRegister(client, request, a, b)
+        ),
+        10 => call!(
+            w,
+            client,
+            mbm_client_writeMultipleCoils(client, request, a, b)
+        ),
+        11 => call!(
+            w,
+            client,
+            mbm_client_writeMultipleRegisters(client, request, a, b)
+        ),
+        12 => call!(
+            w,
+            client,
+            mbm_client_maskWriteRegister(client, request, a, b, c)
+        ),
+        13 => {
+            call!(
+                w,
+                client,
+                mbm_client_readWriteMultipleRegisters(client, request, a, b, c, d)
+            )
+        }
+        14 => call!(w, client, mbm_client_readExceptionStatus(client, request)),
+        15 => call!(
+            w,
+            client,
+            mbm_client_diagnostics(client, request, a % 24, b)
+        ),
+        16 => call!(w, client, mbm_client_getCommEventCounter(client, request)),
+        17 => call!(w, client, mbm_client_getCommEventLog(client, request)),
+        18 => call!(w, client, mbm_client_reportServerId(client, request)),
+        19 => call!(w, client, mbm_client_readFifoQueue(client, request, a)),
+        20 => call!(
+            w,
+            client,
+            mbm_client_readFileRecord(client, request, a, b, c)
+        ),
+        21 => call!(
+            w,
+            client,
+            mbm_client_writeFileRecord(client, request, a, b, c)
+        ),
+        22 => call!(w, client, mbm_client_readFileRecords(client, request, a)),
+        23 => call!(w, client, mbm_client_writeFileRecords(client, request, a)),
+        24 => {
+            let (code, object) = (byte % 8, d as u8);
+            call!(
+                w,
+                client,
+                mbm_client_readDeviceIdentification(client, request, code, object)
+            )
+        }
+        25 => {
+            call!(
+                w,
+                client,
+                mbm_client_encapsulatedInterfaceTransport(client, request, byte, b)
+            )
+        }
+        26 => call!(w, client, mbm_client_custom(client, request, byte, b, rule)),
+        _ => call!(
+            w,
+            client,
+            mbm_client_forward(client, request, function, body, length)
+        ),
+    });
+    is_status("a request", status);
+    if free && status != PENDING {
+        // A copy of a client may still have it: its fields belong together.
+        let (done, context) = unsafe { ((*request).done, (*request).context) };
+        // SAFETY: as many bytes as there were.
+        unsafe { std::ptr::copy_nonoverlapping(was.as_ptr(), request.cast(), was.len()) };
+        // SAFETY: a request.
+        unsafe { ((*request).done, (*request).context) = (done, context) };
+    }
+}

@@ -1,0 +1,73 @@
+//! Bits, packed and not.
+
+use super::check::{call, refused_changes_nothing, span};
+use super::world::World;
+use std::ptr::null_mut;
+
+/// Does something with bits.
+pub fn step(w: &World) {
+    let (quantity, length, first, at) = (w.word(), w.word(), w.word(), w.word());
+    let coils = if w.rarely(32) {
+        null_mut()
+    } else {
+        w.unset_bytes(quantity.into())
+    };
+    let null = w.rarely(32);
+    // Of words, exactly as many as there are; of bytes too.
+    let bytes = if null {
+        null_mut()
+    } else {
+        w.unset_bytes(length.into())
+    };
+    let words: *mut u16 = if null {
+        null_mut()
+    } else {
+        w.unset_bytes(2 * usize::from(length)).cast()
+    };
+    let held = usize::from(quantity).div_ceil(8);
+    let bits = if null {
+        null_mut()
+    } else {
+        w.unset_bytes(held)
+    };
+    let more: *mut u16 = if null {
+        null_mut()
+    } else {
+        w.unset_bytes(2 * usize::from(quantity).div_ceil(16)).cast()
+    };
+    let on = if w.rarely(32) {
+        null_mut()
+    } else {
+        w.unset::<u8>()
+    };
+    let choice = w.byte() % 8;
+    let size = |null: bool, size: usize| if null { 0 } else { size };
+    let spans = [
+        (coils.cast_const(), size(coils.is_null(), quantity.into())),
+        (bytes.cast_const(), size(null, length.into())),
+        (
+            words.cast_const().cast(),
+            size(null, 2 * usize::from(length)),
+        ),
+        (bits.cast_const(), size(null, held)),
+        span(on),
+    ];
+    refused_changes_nothing(w, &spans, "bits", || match choice {
+        0 => call!(w, bytes, mbm_bits_pack(coils, quantity, bytes, length)),
+        1 => call!(w, bytes, mbm_bits_unpack(bytes, length, coils, quantity)),
+        2 => call!(w, bits, mbm_bits_isSet(bits, first, quantity, at, on)),
+        3 => call!(w, bits, mbm_bits_set(bits, first, quantity, at, 1)),
+        4 => call!(w, words, mbm_bits_packWords(coils, quantity, words, length)),
+        5 => call!(
+            w,
+            words,
+            mbm_bits_unpackWords(words, length, coils, quantity)
+        ),
+        6 => call!(
+            w,
+            more,
+            mbm_bits_isSetInWords(more, first, quantity, at, on)
+        ),
+        _ => call!(w, more, mbm_bits_setInWords(more, first, quantity, at, 0)),
+    });
+}

@@ -1,0 +1,182 @@
+//! The client.
+
+use super::check::{call, ends, refused_changes_nothing, span, PENDING};
+use super::world::{Grant, World};
+use super::{asked, ports};
+use mbm::capi::*;
+use std::ffi::c_void;
+use std::ptr::{null, null_mut};
+
+fn begin(w: &World, client: *mut mbm_client) {
+    let framing = w.byte() % 4;
+    let port = ports::port(w, framing);
+    let size = |w: &World| match w.byte() {
+        0..0x80 => 260,
+        0x80..0xA0 => 513,
+        0xA0..0xC0 => w.byte().into(),
+        _ => w.word(),
+    };
+    let (bytes, more) = (size(w), size(w));
+    let (frame, outgoing) = (w.buffer(bytes.into()), w.buffer(more.into()));
+    refused_changes_nothing(w, &[span(client)], "mbm_client_begin", || match framing {
+        MBM_FRAMING_RTU => call!(w, client, mbm_client_beginRtu(client, port, frame, bytes)),
+        MBM_FRAMING_ASCII => call!(w, client, mbm_client_beginAscii(client, port, frame, bytes)),
+        MBM_FRAMING_TCP => {
+            call!(
+                w,
+                client,
+                mbm_client_beginTcp(client, port, frame, bytes, outgoing, more)
+            )
+        }
+        _ => call!(
+            w,
+            client,
+            mbm_client_beginRtuOverTcp(client, port, frame, bytes)
+        ),
+    });
+}
+
+unsafe extern "C" fn random(_: *mut c_void) -> u32 {
+    let w = World::current();
+    w.hook(Grant::Nothing, 16);
+    w.random()
+}
+
+fn set(w: &World, client: *mut mbm_client) {
+    let (byte, word, more, long) = (w.byte(), w.word(), w.word(), w.long());
+    let choice = w.byte() % 15;
+    let counters: *mut mbm_counters = if byte & 1 == 0 {
+        null_mut()
+    } else {
+        w.zeroed()
+    };
+    let chance: Option<unsafe extern "C" fn(*mut c_void) -> u32> = (!w.rarely(8)).then_some(random);
+    let context: *mut c_void = null_mut();
+    let records: Vec<u8> = (0..byte % 8).collect();
+    let units: *mut mbm_clientUnit = w
+        .block(
+            records.len() * size_of::<mbm_clientUnit>(),
+            align_of::<mbm_clientUnit>(),
+        )
+        .cast();
+    for (at, unit) in records.iter().enumerate() {
+        // SAFETY: below the count.
+        unsafe { ((*units.add(at)).unit, (*units.add(at)).delay) = (*unit, more.into()) };
+    }
+    let none: *mut mbm_clientUnit = null_mut();
+    let units = if w.rarely(8) { null_mut() } else { units };
+    refused_changes_nothing(w, &[span(client)], "mbm_client_set", || match choice {
+        0 => call!(w, client, mbm_client_setDelimiter(client, byte)),
+        1 => call!(w, client, mbm_client_setInFlight(client, byte % 20)),
+        2 => call!(w, client, mbm_client_setResponseTimeout(client, word)),
+        3 => call!(w, client, mbm_client_setBaudRate(client, long)),
+        4 => call!(w, client, mbm_client_setGap(client, long)),
+        5 => call!(w, client, mbm_client_setTurnaroundDelay(client, word)),
+        6 => call!(w, client, mbm_client_setQuietTime(client, word)),
+        7 => call!(w, client, mbm_client_setEchoDiscard(client, byte & 3)),
+        8 => call!(w, client, mbm_client_setPostFlushHold(client, byte)),
+        9 => call!(w, client, mbm_client_setRetries(client, byte)),
+        10 => call!(
+            w,
+            client,
+            mbm_client_setBackoff(client, byte % 6, word, more)
+        ),
+        11 => call!(
+            w,
+            client,
+            mbm_client_setJitter(client, byte % 128, chance, context)
+        ),
+        12 => call!(w, client, mbm_client_setCounters(client, counters)),
+        13 => call!(w, client, mbm_client_setUnits(client, units, byte % 8)),
+        _ => call!(w, client, mbm_client_setUnits(client, none, byte)),
+    });
+}
+
+fn poll(w: &World, client: *mut mbm_client) {
+    for _ in 0..1 + w.byte() % 12 {
+        let status = ends(w, span(client), "mbm_client_poll", || {
+            call!(w, client, mbm_client_poll(client))
+        });
+        if status != PENDING {
+            break;
+        }
+        let count = call!(w, client, mbm_client_pending(client));
+        assert!(count <= MBM_CLIENT_DEPTH, "{count} requests");
+        if w.byte() < 0x40 {
+            w.clock
+                .set(w.clock.get().wrapping_add(1 << (w.byte() % 22)));
+        }
+    }
+}
+
+unsafe extern "C" fn disconnect(_: *mut c_void) {
+    World::current().hook(Grant::All, 8);
+}
+
+unsafe extern "C" fn connect(_: *mut c_void) -> u8 {
+    let w = World::current();
+    w.hook(Grant::All, 8);
+    [0, PENDING, 230, w.random() as u8][(w.random() % 4) as usize]
+}
+
+/// Links, and lines that are lent.
+fn line(w: &World, client: *mut mbm_client) {
+    match w.byte() % 4 {
+        0 => {
+            let hooks = w.byte();
+            let link = if hooks >= 0xE0 {
+                null()
+            } else {
+                w.put(mbm_link {
+                    context: null_mut(),
+                    disconnect: (hooks & 1 != 0).then_some(disconnect),
+                    connect: (hooks & 2 != 0).then_some(connect),
+                })
+            };
+            call!(w, client, mbm_client_reconnect(client, link));
+        }
+        1 => {
+            let connected = call!(w, client, mbm_client_isConnected(client));
+            assert!(connected <= 1);
+        }
+        choice => {
+            let master = w.masters.pick(w);
+            let spans = [span(client), span(master)];
+            refused_changes_nothing(w, &spans, "a line lent", || match choice {
+                2 => call!(w, client, mbm_client_lend(client, master)),
+                _ => call!(w, client, mbm_client_takeBack(client, master)),
+            });
+        }
+    }
+}
+
+/// Does something with a client.
+pub fn step(w: &World) {
+    let client = w.clients.pick(w);
+    match w.byte() % 16 {
+        0 | 1 => begin(w, client),
+        2 | 3 => set(w, client),
+        4..=8 => asked::request(w, client),
+        9..=11 => poll(w, client),
+        12 => drop(call!(w, client, mbm_client_pollDelay(client))),
+        13 => {
+            let request = w.requests.pick(w);
+            call!(w, request, mbm_client_wireTransaction(request));
+            let spans = [span(client), span(request)];
+            refused_changes_nothing(w, &spans, "mbm_client_cancel", || {
+                call!(w, client, mbm_client_cancel(client, request))
+            });
+        }
+        14 => line(w, client),
+        _ => {
+            // The user may zero a client that has nothing to do.
+            // SAFETY: NULL or an object.
+            let pending = unsafe { mbm_client_pending(client) };
+            if !client.is_null() && !w.is_inside() && (pending == 0 || w.wild) {
+                w.note(|| format!("memset({client:?}, 0, client)"));
+                // SAFETY: nothing uses it now.
+                unsafe { client.cast::<u8>().write_bytes(0, size_of::<mbm_client>()) };
+            }
+        }
+    }
+}

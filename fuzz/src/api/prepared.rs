@@ -1,0 +1,108 @@
+//! Objects in good order to begin with, so that not every input must find its way
+//! to the first reply by itself.
+
+use super::check::call;
+use super::ports;
+use super::records;
+use super::world::World;
+use mbm::capi::*;
+
+/// Sets up what the first bytes of the input say.
+pub fn prepare(w: &World) {
+    let what = w.byte();
+    if what & 1 == 0 {
+        master(w);
+    }
+    if what & 2 == 0 {
+        client(w, what >> 4);
+    }
+    if what & 4 == 0 {
+        server(w, what >> 6);
+    }
+    if what & 8 == 0 {
+        let sniffer = w.sniffers.make(w);
+        let framing = w.put(mbm_framing {
+            functions: std::ptr::null(),
+            functionCount: 0,
+            kind: what >> 4 & 3,
+            end: 0,
+        });
+        let buffer = w.buffer(300);
+        call!(w, sniffer, mbm_sniffer_begin(sniffer, framing, buffer, 300));
+    }
+}
+
+fn master(w: &World) {
+    let master = w.masters.make(w);
+    let port = ports::good(w, 0, MBM_FRAMING_RTU);
+    let (response, transmit) = (w.noise(250).cast(), w.noise(246).cast());
+    let frame = w.noise(256);
+    call!(w, master, mbm_master_begin(master, 1, port));
+    call!(
+        w,
+        master,
+        mbm_master_setBuffers(master, response, 125, transmit, 123, frame, 256)
+    );
+}
+
+fn client(w: &World, framing: u8) {
+    let client = w.clients.make(w);
+    let port = ports::good(w, 1, framing % 4);
+    let (frame, more) = (w.noise(513), w.noise(600));
+    match framing % 4 {
+        MBM_FRAMING_RTU => call!(w, client, mbm_client_beginRtu(client, port, frame, 513)),
+        MBM_FRAMING_ASCII => call!(w, client, mbm_client_beginAscii(client, port, frame, 513)),
+        MBM_FRAMING_TCP => {
+            call!(
+                w,
+                client,
+                mbm_client_beginTcp(client, port, frame, 513, more, 600)
+            )
+        }
+        _ => call!(
+            w,
+            client,
+            mbm_client_beginRtuOverTcp(client, port, frame, 513)
+        ),
+    };
+}
+
+fn server(w: &World, framing: u8) {
+    let server = w.servers.make(w);
+    let port = ports::good(w, 2, framing % 4);
+    for _ in 0..4 {
+        records::serve(w);
+    }
+    let (units, count) = records::array(w);
+    let frame = w.noise(513);
+    match framing % 4 {
+        MBM_FRAMING_RTU => {
+            call!(
+                w,
+                server,
+                mbm_server_begin(server, port, units, count, frame, 513)
+            )
+        }
+        MBM_FRAMING_ASCII => {
+            call!(
+                w,
+                server,
+                mbm_server_beginAscii(server, port, units, count, frame, 513)
+            )
+        }
+        MBM_FRAMING_TCP => {
+            call!(
+                w,
+                server,
+                mbm_server_beginTcp(server, port, units, count, frame, 513)
+            )
+        }
+        _ => {
+            call!(
+                w,
+                server,
+                mbm_server_beginRtuOverTcp(server, port, units, count, frame, 513)
+            )
+        }
+    };
+}

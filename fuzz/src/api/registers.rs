@@ -1,0 +1,246 @@
+//! Views of registers.
+
+use super::check::{call, refused_changes_nothing, span};
+use super::world::World;
+use mbm::capi::*;
+use std::ptr::{null, null_mut};
+
+/// Fills a view in, over a block of exactly its registers.
+fn fill(w: &World, view: *mut mbm_registers) {
+    let (count, first) = (w.word(), w.word());
+    let odd = w.rarely(16);
+    let length = (count % 0x4000) * 2 + u16::from(odd);
+    let words: *mut u16 = if w.rarely(64) {
+        null_mut()
+    } else {
+        w.noise(2 * usize::from(count)).cast()
+    };
+    let bytes = w.noise(length.into());
+    match w.byte() % 5 {
+        0 => drop(call!(
+            w,
+            view,
+            mbm_registers_ofWords(view, words, count, first)
+        )),
+        1 => drop(call!(
+            w,
+            view,
+            mbm_registers_ofBytes(view, bytes, length, first)
+        )),
+        2 => drop(call!(
+            w,
+            view,
+            mbm_registers_intoWords(view, words, count, first)
+        )),
+        3 => drop(call!(
+            w,
+            view,
+            mbm_registers_intoBytes(view, bytes, length, first)
+        )),
+        _ if view.is_null() => {}
+        _ => {
+            // By hand: what lies behind `first` and `count` is there in any case.
+            let (kind, order) = (w.byte() % 6, w.byte() % 6);
+            let data = words.cast_const().cast();
+            // SAFETY: not NULL.
+            unsafe {
+                view.write(mbm_registers {
+                    data,
+                    first,
+                    count,
+                    kind,
+                    order,
+                })
+            };
+        }
+    }
+}
+
+/// A value gets what a call gives, and stays as it is if that refuses.
+fn get<T>(w: &World, name: &str, call: impl FnOnce(*mut T) -> u8) {
+    let value = if w.rarely(32) {
+        null_mut()
+    } else {
+        w.unset::<T>()
+    };
+    refused_changes_nothing(w, &[span(value)], name, || call(value));
+}
+
+fn read(w: &World, view: *const mbm_registers) {
+    let (at, order, byte) = (w.word(), w.byte() % 6, w.byte());
+    macro_rules! get {
+        ($name:ident, $with:expr) => {
+            get(w, stringify!($name), |value| {
+                call!(w, view, $name(view, at, $with, value))
+            })
+        };
+    }
+    let length = w.word();
+    match w.byte() % 15 {
+        0 => get!(mbm_registers_getBit, byte % 20),
+        1 => get!(mbm_registers_getUint8, byte & 1),
+        2 => get!(mbm_registers_getInt8, byte & 1),
+        3 => get!(mbm_registers_getUint16, order),
+        4 => get!(mbm_registers_getInt16, order),
+        5 => get!(mbm_registers_getUint32, order),
+        6 => get!(mbm_registers_getInt32, order),
+        7 => get!(mbm_registers_getUint64, order),
+        8 => get!(mbm_registers_getInt64, order),
+        9 => get!(mbm_registers_getFloat, order),
+        10 => get!(mbm_registers_getDouble, order),
+        11 => {
+            let capacity = w.word();
+            let place = w.unset_bytes(capacity.into());
+            let text = if w.rarely(32) {
+                null_mut()
+            } else {
+                place.cast()
+            };
+            let spans = [(place.cast_const(), capacity.into())];
+            refused_changes_nothing(w, &spans, "mbm_registers_getString", || {
+                call!(
+                    w,
+                    view,
+                    mbm_registers_getString(view, at, length, order, text, capacity)
+                )
+            });
+        }
+        choice => {
+            let place = w.unset_bytes(length.into());
+            let bytes = if w.rarely(32) { null_mut() } else { place };
+            let spans = [(place.cast_const(), length.into())];
+            refused_changes_nothing(w, &spans, "mbm_registers_getBytes", || match choice {
+                12 => call!(w, view, mbm_registers_getBytes(view, at, bytes, length)),
+                13 => {
+                    call!(
+                        w,
+                        view,
+                        mbm_registers_getBytesInOrder(view, at, order, bytes, length)
+                    )
+                }
+                _ => {
+                    let equal = w.unset::<u8>();
+                    call!(
+                        w,
+                        view,
+                        mbm_registers_isEqual(view, at, bytes, length, equal)
+                    )
+                }
+            });
+        }
+    }
+}
+
+/// The memory that a view sees.
+fn seen(view: *const mbm_registers) -> (*const u8, usize) {
+    if view.is_null() {
+        return (null(), 0);
+    }
+    // SAFETY: a view, zeroed or filled in.
+    let view = unsafe { *view };
+    (view.data.cast(), 2 * usize::from(view.count))
+}
+
+fn write(w: &World, view: *const mbm_registers) {
+    let (at, order, byte, word, long) = (w.word(), w.byte() % 6, w.byte(), w.word(), w.long());
+    let length = w.word();
+    let null = w.rarely(32);
+    macro_rules! value {
+        ($value:expr) => {
+            if null { null_mut() } else { w.put($value) }.cast_const()
+        };
+    }
+    let wide = u64::from(long) << 20;
+    let text = |length: u16| {
+        let length = usize::from(length);
+        let text = w.noise(length + 1);
+        for at in 0..length {
+            // SAFETY: before the NUL.
+            unsafe { *text.add(at) |= 1 };
+        }
+        // SAFETY: the last byte.
+        unsafe { *text.add(length) = 0 };
+        if null {
+            null_mut()
+        } else {
+            text
+        }
+    };
+    let choice = w.byte() % 14;
+    refused_changes_nothing(w, &[seen(view)], "a value set", || match choice {
+        0 => call!(w, view, mbm_registers_setBit(view, at, byte % 20, byte & 1)),
+        1 => call!(w, view, mbm_registers_setUint8(view, at, byte & 1, byte)),
+        2 => call!(
+            w,
+            view,
+            mbm_registers_setInt8(view, at, byte & 1, byte as i8)
+        ),
+        3 => call!(w, view, mbm_registers_setUint16(view, at, order, word)),
+        4 => call!(
+            w,
+            view,
+            mbm_registers_setInt16(view, at, order, word as i16)
+        ),
+        5 => call!(w, view, mbm_registers_setUint32(view, at, order, long)),
+        6 => call!(
+            w,
+            view,
+            mbm_registers_setInt32(view, at, order, long as i32)
+        ),
+        7 => call!(
+            w,
+            view,
+            mbm_registers_setUint64(view, at, order, value!(wide))
+        ),
+        8 => call!(
+            w,
+            view,
+            mbm_registers_setInt64(view, at, order, value!(wide as i64))
+        ),
+        9 => call!(
+            w,
+            view,
+            mbm_registers_setFloat(view, at, order, value!(long as f32))
+        ),
+        10 => call!(
+            w,
+            view,
+            mbm_registers_setDouble(view, at, order, value!(wide as f64))
+        ),
+        11 => {
+            let text = text(w.word()).cast_const().cast();
+            call!(
+                w,
+                view,
+                mbm_registers_setString(view, at, length, order, text)
+            )
+        }
+        choice => {
+            let bytes = if null {
+                null_mut()
+            } else {
+                w.noise(length.into())
+            }
+            .cast_const();
+            if choice == 12 {
+                call!(w, view, mbm_registers_setBytes(view, at, bytes, length))
+            } else {
+                call!(
+                    w,
+                    view,
+                    mbm_registers_setBytesInOrder(view, at, order, bytes, length)
+                )
+            }
+        }
+    });
+}
+
+/// Does something with a view.
+pub fn step(w: &World) {
+    let view = w.views.pick(w);
+    match w.byte() % 4 {
+        0 => fill(w, view),
+        1 | 2 => read(w, view),
+        _ => write(w, view),
+    }
+}

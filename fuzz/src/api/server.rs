@@ -1,0 +1,163 @@
+//! Servers, and the responder without one.
+
+use super::check::{call, ends, is_status, refused_changes_nothing, span, OK};
+use super::world::World;
+use super::{ports, records, traffic};
+use mbm::capi::*;
+
+/// Begins a server, of any framing, with a buffer of any size.
+fn begin(w: &World) {
+    let server = w.servers.pick(w);
+    let framing = w.byte() % 4;
+    let port = ports::port(w, framing);
+    let (units, count) = records::array(w);
+    let count = if w.rarely(8) { count / 2 } else { count };
+    let size = match w.byte() {
+        0..0x80 => 260,
+        byte @ 0x80..0xC0 => u16::from(byte) % 48,
+        0xC0..0xE0 => 513,
+        _ => w.word(),
+    };
+    let frame = w.buffer(size.into());
+    let spans = [span(server)];
+    refused_changes_nothing(w, &spans, "mbm_server_begin", || match framing {
+        MBM_FRAMING_RTU => {
+            call!(
+                w,
+                server,
+                mbm_server_begin(server, port, units, count, frame, size)
+            )
+        }
+        MBM_FRAMING_ASCII => {
+            call!(
+                w,
+                server,
+                mbm_server_beginAscii(server, port, units, count, frame, size)
+            )
+        }
+        MBM_FRAMING_TCP => {
+            call!(
+                w,
+                server,
+                mbm_server_beginTcp(server, port, units, count, frame, size)
+            )
+        }
+        _ => {
+            call!(
+                w,
+                server,
+                mbm_server_beginRtuOverTcp(server, port, units, count, frame, size)
+            )
+        }
+    });
+}
+
+/// Polls a server, more than once, while time goes on.
+fn poll(w: &World) {
+    let server = w.servers.pick(w);
+    for _ in 0..1 + w.byte() % 4 {
+        ends(w, span(server), "mbm_server_poll", || {
+            call!(w, server, mbm_server_poll(server))
+        });
+        w.clock
+            .set(w.clock.get().wrapping_add(1 << (w.byte() % 20)));
+    }
+}
+
+fn set(w: &World) {
+    let server = w.servers.pick(w);
+    let spans = [span(server)];
+    refused_changes_nothing(w, &spans, "mbm_server_set", || match w.byte() % 3 {
+        0 => {
+            let time = w.long();
+            call!(w, server, mbm_server_setSilence(server, time))
+        }
+        1 => {
+            let baud = w.long();
+            call!(w, server, mbm_server_setBaudRate(server, baud))
+        }
+        _ => {
+            let on = w.byte() & 3;
+            call!(w, server, mbm_server_setEchoDiscard(server, on))
+        }
+    });
+}
+
+/// Answers one frame without a server. `response` is written in any case.
+fn respond(w: &World) {
+    let framing = if w.rarely(16) { w.byte() } else { w.byte() % 4 };
+    let (units, count) = records::array(w);
+    let request = traffic::request(w, framing);
+    let room = w.word();
+    let capacity = if w.rarely(4) { room } else { 513 };
+    let length = request.len().min(capacity.into());
+    let frame = w.noise(capacity.into());
+    for (at, byte) in request[..length].iter().enumerate() {
+        // SAFETY: below the capacity.
+        unsafe { *frame.add(at) = *byte };
+    }
+    let length = match w.byte() {
+        0xF0.. => w.word(),
+        _ => length as u16,
+    };
+    let frame = if w.rarely(64) {
+        std::ptr::null_mut()
+    } else {
+        frame
+    };
+    let response = if w.rarely(64) {
+        std::ptr::null_mut()
+    } else {
+        w.unset::<u16>()
+    };
+    let status = call!(
+        w,
+        std::ptr::null::<mbm_unit>(),
+        mbm_server_respond(framing, units, count, frame, length, capacity, response)
+    );
+    is_status("mbm_server_respond", status);
+    if !response.is_null() {
+        // SAFETY: not NULL.
+        let response = unsafe { response.read() };
+        assert!(
+            response <= capacity,
+            "mbm_server_respond left {response} of {capacity}"
+        );
+        assert!(
+            status == OK || response == 0,
+            "a response of what was refused"
+        );
+    }
+}
+
+/// What the user may do with units between calls.
+fn unit(w: &World) {
+    let unit = records::unit(w);
+    if unit.is_null() || w.is_inside() {
+        return;
+    }
+    // SAFETY: a unit of an array.
+    unsafe {
+        if w.rarely(16) {
+            w.note(|| format!("memset({unit:?}, 0, unit)"));
+            unit.write(std::mem::zeroed());
+        }
+        (*unit).id = traffic::unit(w);
+    }
+}
+
+/// Does something with a server.
+pub fn step(w: &World) {
+    match w.byte() % 16 {
+        0 | 1 => begin(w),
+        2..=6 => poll(w),
+        7 => {
+            let server = w.servers.pick(w);
+            call!(w, server, mbm_server_pollDelay(server));
+        }
+        8 => set(w),
+        9 | 10 => respond(w),
+        11 => unit(w),
+        _ => records::serve(w),
+    }
+}

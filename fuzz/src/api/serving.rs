@@ -1,0 +1,110 @@
+//! What units call: hooks around writes, cells, functions of the user.
+
+use super::world::{Grant, World};
+use mbm::capi::*;
+use std::ffi::c_void;
+
+/// A hook of a unit may use everything but the server that called it.
+fn enter<'a>() -> &'a World {
+    let w = World::current();
+    w.hook(Grant::Nothing, 24);
+    w
+}
+
+/// Looks at every byte that a hook was handed.
+fn look(data: *const u8, length: usize) -> u8 {
+    assert!(!data.is_null() || length == 0);
+    if length == 0 {
+        return 0;
+    }
+    // SAFETY: the header says that so many are there.
+    let bytes = unsafe { std::slice::from_raw_parts(data, length) };
+    bytes.iter().fold(0, |all, byte| all ^ byte)
+}
+
+/// A refusal once in a while; the code may be none.
+fn refusal(w: &World) -> u8 {
+    match w.random() % 16 {
+        0 => w.random() as u8,
+        1 => 4,
+        _ => 0,
+    }
+}
+
+pub unsafe extern "C" fn before_words(_: *mut c_void, _: u16, count: u16, data: *const u8) -> u8 {
+    look(data, 2 * usize::from(count));
+    let w = enter();
+    look(data, 2 * usize::from(count));
+    refusal(w)
+}
+
+pub unsafe extern "C" fn before_bits(_: *mut c_void, _: u16, count: u16, data: *const u8) -> u8 {
+    look(data, usize::from(count).div_ceil(8));
+    let w = enter();
+    look(data, usize::from(count).div_ceil(8));
+    refusal(w)
+}
+
+pub unsafe extern "C" fn before_records(
+    _: *mut c_void,
+    _: u16,
+    _: u16,
+    length: u16,
+    data: *const u8,
+) -> u8 {
+    look(data, 2 * usize::from(length));
+    refusal(enter())
+}
+
+pub unsafe extern "C" fn after(_: *mut c_void, _: u16, _: u16) {
+    enter();
+}
+
+pub unsafe extern "C" fn after_records(_: *mut c_void, _: u16, _: u16, _: u16) {
+    enter();
+}
+
+pub unsafe extern "C" fn is_valid(_: *mut c_void, address: u16) -> u8 {
+    enter();
+    u8::from(address % 64 != 63)
+}
+
+pub unsafe extern "C" fn get(_: *mut c_void, address: u16) -> u16 {
+    enter();
+    address
+}
+
+pub unsafe extern "C" fn set(_: *mut c_void, _: u16, _: u16) {
+    enter();
+}
+
+pub unsafe extern "C" fn restart(_: *mut c_void, _: u8) {
+    enter();
+}
+
+/// A function of the user: data, an exception, nothing, later, or a claim that
+/// cannot be.
+pub unsafe extern "C" fn custom(
+    _: *mut c_void,
+    request: *const mbm_request,
+    response: *mut u8,
+    capacity: u16,
+) -> u16 {
+    let w = enter();
+    // SAFETY: the header says that these are there.
+    unsafe {
+        look((*request).data, (*request).length.into());
+        if capacity > 0 {
+            std::slice::from_raw_parts_mut(response, capacity.into()).fill(0x77);
+        }
+    }
+    match w.random() % 16 {
+        0 => MBM_REPLY_NONE,
+        1 | 2 => MBM_REPLY_PENDING,
+        3 => MBM_REPLY_EXCEPTION | (w.random() % 256) as u16,
+        4 => w.random() as u16,
+        5 => 255,
+        6 => capacity.min(252),
+        _ => capacity.min((w.random() % 32) as u16),
+    }
+}

@@ -1,0 +1,141 @@
+//! Sniffers and what they tell of, in words too.
+
+use super::check::{call, is_status, refused_changes_nothing, span};
+use super::world::World;
+use super::{frame, traffic};
+use mbm::capi::*;
+use std::ptr::null;
+
+fn begin(w: &World, sniffer: *mut mbm_sniffer) {
+    let framing = frame::framing(w);
+    let size = match w.byte() {
+        0..0x80 => 260,
+        byte @ 0x80..0xC0 => u16::from(byte) % 64,
+        _ => w.word(),
+    };
+    let buffer = w.buffer(size.into());
+    refused_changes_nothing(w, &[span(sniffer)], "mbm_sniffer_begin", || {
+        call!(
+            w,
+            sniffer,
+            mbm_sniffer_begin(sniffer, framing, buffer, size)
+        )
+    });
+}
+
+fn set(w: &World, sniffer: *mut mbm_sniffer) {
+    let (word, long) = (w.word(), w.long());
+    let choice = w.byte() % 3;
+    refused_changes_nothing(w, &[span(sniffer)], "mbm_sniffer_set", || match choice {
+        0 => call!(w, sniffer, mbm_sniffer_setBaudRate(sniffer, long)),
+        1 => call!(w, sniffer, mbm_sniffer_setTimeout(sniffer, word)),
+        _ => call!(w, sniffer, mbm_sniffer_setPatience(sniffer, word)),
+    });
+}
+
+fn next(w: &World, sniffer: *mut mbm_sniffer) {
+    let now = w.clock.get();
+    for _ in 0..8 {
+        let event = if w.rarely(64) {
+            std::ptr::null_mut()
+        } else {
+            w.unset::<mbm_event>()
+        };
+        let found = call!(w, sniffer, mbm_sniffer_next(sniffer, now, event));
+        assert!(found <= 1, "mbm_sniffer_next returned {found}");
+        if found == 0 || event.is_null() {
+            return;
+        }
+        // SAFETY: an event, whose frame and PDU lie in the sniffer's buffer.
+        let told = unsafe { *event };
+        assert!(told.kind <= MBM_EVENT_NOISE && told.packet.kind <= MBM_PACKET_EXCEPTION);
+        assert!(usize::from(told.askedLength) <= told.asked.len());
+        is_status("an event", told.status);
+        super::check::bytes((told.frame, told.frameLength.into()));
+        super::check::bytes((told.pdu, told.pduLength.into()));
+        super::check::bytes((told.packet.data, told.packet.dataLength.into()));
+        text(w, event);
+        w.events.keep(event);
+    }
+}
+
+fn feed(w: &World, sniffer: *mut mbm_sniffer) {
+    let tap = if w.rarely(16) { w.byte() } else { w.byte() % 3 };
+    let mut heard = traffic::request(w, w.byte() % 4);
+    if w.rarely(2) {
+        let answer = traffic::answer(w, w.byte() % 4, &heard);
+        heard.extend(answer);
+    }
+    let bytes = w.array(&heard);
+    let bytes = if w.rarely(64) {
+        null()
+    } else {
+        bytes.cast_const()
+    };
+    let (length, now) = (heard.len() as u16, w.clock.get());
+    let taken = call!(
+        w,
+        sniffer,
+        mbm_sniffer_feed(sniffer, tap, bytes, length, now)
+    );
+    assert!(taken <= length, "{taken} bytes of {length}");
+}
+
+/// Words for an event, into a text of any size.
+fn text(w: &World, event: *const mbm_event) {
+    let size = w.word();
+    let place = if w.rarely(64) {
+        std::ptr::null_mut()
+    } else {
+        w.unset_bytes(size.into())
+    };
+    let line: *mut std::ffi::c_char = place.cast();
+    let status = call!(w, event, mbm_event_text(event, line, size));
+    super::text::ends(w, "mbm_event_text", status, place, size);
+}
+
+/// An event that no sniffer told of, with memory of its own.
+fn invented(w: &World) {
+    let (frame, pdu) = (w.word(), w.word());
+    let told = mbm_event {
+        frame: w.noise(frame.into()),
+        pdu: w.noise(pdu.into()),
+        // SAFETY: a packet, which may be of any content.
+        packet: unsafe { *super::packet::any(w) },
+        time: w.long(),
+        responseTime: w.long(),
+        frameLength: frame,
+        pduLength: pdu,
+        length: w.word(),
+        address: w.word(),
+        quantity: w.word(),
+        kind: w.byte() % 9,
+        status: w.byte(),
+        unit: w.byte(),
+        function: w.byte(),
+        asked: std::array::from_fn(|_| w.byte()),
+        askedLength: w.byte() % 12,
+    };
+    text(w, w.put(told));
+}
+
+/// Does something with a sniffer.
+pub fn step(w: &World) {
+    let sniffer = w.sniffers.pick(w);
+    match w.byte() % 16 {
+        0 | 1 => begin(w, sniffer),
+        2 => set(w, sniffer),
+        3..=8 => {
+            feed(w, sniffer);
+            next(w, sniffer);
+        }
+        9 => invented(w),
+        // One that is long past, or NULL: its memory is still there.
+        10 => text(w, w.events.any()),
+        _ => {
+            w.clock
+                .set(w.clock.get().wrapping_add(1 << (w.byte() % 24)));
+            next(w, sniffer);
+        }
+    }
+}

@@ -1,0 +1,35 @@
+//! Words for statuses, frames and events.
+
+use super::check::{call, is_status};
+use super::world::World;
+
+/// A text that a call wrote has a NUL within its size, and none of what lies
+/// behind that changed.
+pub fn ends(w: &World, name: &str, status: u8, text: *const u8, size: u16) {
+    is_status(name, status);
+    if text.is_null() || size == 0 {
+        return;
+    }
+    let written = super::check::bytes((text, size.into()));
+    let ended = written.contains(&0) || written.iter().all(|byte| *byte == 0xA5);
+    assert!(
+        ended,
+        "{name} returned {status} and left a text without an end"
+    );
+    w.note(|| {
+        format!(
+            "   {}",
+            String::from_utf8_lossy(written.split(|b| *b == 0).next().unwrap_or(&[]))
+        )
+    });
+}
+
+/// Does something with texts.
+pub fn step(w: &World) {
+    let status = w.byte();
+    let text = call!(w, std::ptr::null::<u8>(), mbm_statusText(status));
+    assert!(!text.is_null());
+    // SAFETY: a constant string.
+    let text = unsafe { std::ffi::CStr::from_ptr(text.cast()) };
+    assert!(!text.is_empty() && text.to_bytes().is_ascii());
+}
