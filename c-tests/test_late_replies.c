@@ -3,6 +3,7 @@
  * them apart. No late reply may become the data of a later request. On the
  * simulated clock; unit 17 is 11 on the wire. */
 #include "crc.h"
+#include "faults.h"
 #include "sim.h"
 #include "test.h"
 
@@ -27,28 +28,6 @@ typedef struct in_order {
     unsigned trailing;   /* bytes 0x00 that its driver adds to each reply */
 } in_order;
 
-static uint16_t value(unsigned address)
-{
-    return (uint16_t)(address * 7919u + 1u);
-}
-
-static size_t reply_to(uint8_t *frame, const uint8_t *request)
-{
-    unsigned address = (unsigned)request[2] << 8 | request[3];
-    unsigned quantity = (unsigned)request[4] << 8 | request[5];
-    unsigned i;
-
-    memcpy(frame, request, 6);
-    if (request[1] == 6)
-        return seal(frame, 6);
-    frame[2] = (uint8_t)(2 * quantity);
-    for (i = 0; i < quantity; i++) {
-        frame[3 + 2 * i] = (uint8_t)(value(address + i) >> 8);
-        frame[4 + 2 * i] = (uint8_t)value(address + i);
-    }
-    return seal(frame, 3 + 2 * quantity);
-}
-
 static void answer_in_order(sim *s, const sim_frame *request)
 {
     in_order *d = (in_order *)s->context;
@@ -56,7 +35,7 @@ static void answer_in_order(sim *s, const sim_frame *request)
     uint32_t takes = number <= 8 && d->takes[number - 1] ? d->takes[number - 1] : PROMPT;
     uint64_t at = (d->free > request->end ? d->free : request->end) + takes;
     uint8_t frame[300] = {0};
-    size_t length = reply_to(frame, request->bytes);
+    size_t length = fault_right_reply(frame, request->bytes);
 
     if (request->bytes[0] != 17) { /* another device, never late */
         sim_deliver(s, request->end + PROMPT, frame, length);
@@ -94,7 +73,8 @@ static void assert_reads(sim *s, uint16_t address, uint16_t quantity)
 
     OK(mbm_master_readHoldingRegisters(&s->master, address, quantity));
     for (i = 0; i < quantity; i++)
-        assert_int_equal(mbm_master_getResponseBuffer(&s->master, (uint8_t)i), value(address + i));
+        assert_int_equal(mbm_master_getResponseBuffer(&s->master, (uint8_t)i),
+                         fault_value(address + i));
 }
 
 static uint8_t read_at(sim *s, uint16_t address)
@@ -154,7 +134,7 @@ static void several_late_replies_in_a_row_are_all_passed_over(void **state)
     device.takes[0] = 1700000; /* later than two more requests */
     for (i = 0; i < 3; i++)
         assert_int_equal(read_at(s, i), i < 2 ? MBM_RESPONSE_TIMED_OUT : MBM_OK);
-    assert_int_equal(mbm_master_getResponseBuffer(n, 0), value(2));
+    assert_int_equal(mbm_master_getResponseBuffer(n, 0), fault_value(2));
     for (; i < 50; i++)
         assert_reads(s, i, 1);
 }
@@ -301,7 +281,7 @@ static void client_reads(sim *s, mbm_client *client, uint16_t address, uint8_t s
     assert_int_equal(mbm_client_readHoldingRegisters(client, &request, address, 1), MBM_PENDING);
     assert_int_equal(run(s, client, &request), status);
     if (status == MBM_OK)
-        assert_int_equal(word, value(address));
+        assert_int_equal(word, fault_value(address));
 }
 
 static void one_late_reply_does_not_shift_the_clients_answers(void **state)
@@ -338,7 +318,7 @@ static void a_device_that_never_stops_answering_does_not_hold_a_request_for_ever
 {
     uint8_t frame[16];
     const uint8_t request[6] = {17, 3, 0, 7, 0, 1};
-    size_t length = reply_to(frame, request);
+    size_t length = fault_right_reply(frame, request);
     uint64_t at;
     DEVICE;
 

@@ -5,6 +5,8 @@
 
 #include <string.h>
 
+#include "unchanged.h"
+
 static hooked_port wire;
 static mbm_port port;
 static uint8_t small_frame[MBM_MAX_TCP_FRAME], other_frame[MBM_MAX_TCP_FRAME];
@@ -12,9 +14,6 @@ static uint16_t words[8];
 
 static mbm_client client;
 static mbm_clientRequest request, another;
-
-/* How often each kind of hook was entered with calls of its own. */
-static unsigned entered;
 
 static int reset(void **state)
 {
@@ -29,16 +28,6 @@ static int reset(void **state)
     entered = 0;
     return 0;
 }
-
-/* Looks at the object before and after what is called. */
-#define UNCHANGED_BY(object, calls)                                                               \
-    do {                                                                                          \
-        static uint8_t before[sizeof(object)];                                                    \
-        memcpy(before, &(object), sizeof(object));                                                \
-        calls;                                                                                    \
-        assert_memory_equal(before, &(object), sizeof(object));                                   \
-        entered++;                                                                                \
-    } while (0)
 
 static uint32_t random_number(void *context)
 {

@@ -122,8 +122,7 @@ public:
     /**
      * Talks to a slave over a Stream that is open already. Cheap, and may be
      * called again and again. Callbacks, settings and words stay; what send
-     * queued is dropped, a request under way is given up. Within preTransmission and
-     * postTransmission of this object it changes nothing.
+     * queued is dropped, a request under way is given up.
      *
      * @param slave   1 to 247; 248 to 255 are sent as they are, 0 is broadcast
      * @param stream  must outlive its use here

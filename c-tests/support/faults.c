@@ -17,7 +17,7 @@ uint16_t fault_value(unsigned address)
 }
 
 /* The right reply to a request, with its CRC. */
-static size_t right_reply(uint8_t *frame, const uint8_t *request)
+size_t fault_right_reply(uint8_t *frame, const uint8_t *request)
 {
     unsigned address = (unsigned)request[2] << 8 | request[3];
     unsigned quantity = (unsigned)request[4] << 8 | request[5];
@@ -40,7 +40,7 @@ static void reply_behind(responder *r, const uint8_t *request, const void *bytes
     uint8_t all[2 * MOST];
 
     memcpy(all, bytes, length);
-    responder_send(r, all, length + right_reply(all + length, request));
+    responder_send(r, all, length + fault_right_reply(all + length, request));
 }
 
 static void right(responder *r, const uint8_t *request)
@@ -72,7 +72,7 @@ static void reply_behind_reply_to(responder *r, const uint8_t *request, uint8_t 
     const uint8_t other[] = {unit, function, 3, 0x21, (uint8_t)(quantity >> 8), (uint8_t)quantity};
     uint8_t frame[MOST];
 
-    reply_behind(r, request, frame, right_reply(frame, other));
+    reply_behind(r, request, frame, fault_right_reply(frame, other));
 }
 
 static void foreign_reply(responder *r, const uint8_t *request)
@@ -110,7 +110,7 @@ static void late_exception_of_another_function(responder *r, const uint8_t *requ
 static void a_byte_every_5_ms(responder *r, const uint8_t *request)
 {
     uint8_t frame[MOST];
-    size_t length = right_reply(frame, request);
+    size_t length = fault_right_reply(frame, request);
     size_t i;
 
     for (i = 0; i < length; i++) {
@@ -122,7 +122,7 @@ static void a_byte_every_5_ms(responder *r, const uint8_t *request)
 static void a_pause_inside(responder *r, const uint8_t *request)
 {
     uint8_t frame[MOST];
-    size_t length = right_reply(frame, request);
+    size_t length = fault_right_reply(frame, request);
 
     responder_send(r, frame, length / 2);
     responder_pause(r, 30);
@@ -133,13 +133,13 @@ static void two_replies_glued(responder *r, const uint8_t *request)
 {
     uint8_t frame[MOST];
 
-    reply_behind(r, request, frame, right_reply(frame, request));
+    reply_behind(r, request, frame, fault_right_reply(frame, request));
 }
 
 static void one_byte_too_long(responder *r, const uint8_t *request)
 {
     uint8_t frame[MOST];
-    size_t length = right_reply(frame, request);
+    size_t length = fault_right_reply(frame, request);
 
     frame[length] = 0x7E;
     responder_send(r, frame, length + 1);
@@ -175,7 +175,7 @@ static void only_300_bytes_of_noise(responder *r, const uint8_t *request)
 static void bad_crc(responder *r, const uint8_t *request)
 {
     uint8_t frame[MOST];
-    size_t length = right_reply(frame, request);
+    size_t length = fault_right_reply(frame, request);
 
     frame[length - 1] ^= 0x40;
     responder_send(r, frame, length);
@@ -185,13 +185,13 @@ static void truncated(responder *r, const uint8_t *request)
 {
     uint8_t frame[MOST];
 
-    responder_send(r, frame, right_reply(frame, request) - 7);
+    responder_send(r, frame, fault_right_reply(frame, request) - 7);
 }
 
 static void one_byte_lost(responder *r, const uint8_t *request)
 {
     uint8_t frame[MOST];
-    size_t length = right_reply(frame, request);
+    size_t length = fault_right_reply(frame, request);
 
     memmove(frame + 8, frame + 9, length - 9);
     responder_send(r, frame, length - 1);
@@ -203,14 +203,14 @@ static void wrong_byte_count(responder *r, const uint8_t *request)
 
     memcpy(shorter, request, 6);
     shorter[5] = 1;
-    responder_send(r, frame, right_reply(frame, shorter));
+    responder_send(r, frame, fault_right_reply(frame, shorter));
 }
 
 static void echo_of_another_address(responder *r, const uint8_t *request)
 {
     uint8_t frame[MOST];
 
-    right_reply(frame, request);
+    fault_right_reply(frame, request);
     frame[3] ^= 1;
     responder_send(r, frame, seal(frame, 6));
 }
@@ -272,7 +272,7 @@ static void link_dies_inside(responder *r, const uint8_t *request)
 {
     uint8_t frame[MOST];
 
-    right_reply(frame, request);
+    fault_right_reply(frame, request);
     responder_send(r, frame, 9);
     responder_pause(r, 20);
     link_dies = 1;

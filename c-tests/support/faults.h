@@ -24,6 +24,10 @@ extern const unsigned fault_count;
 /* Every register's value tells its address, so that stale data shows. */
 uint16_t fault_value(unsigned address);
 
+/* Writes the right reply to a request of function 03 or 06, with its CRC, and returns
+ * how long it is. */
+size_t fault_right_reply(uint8_t *frame, const uint8_t *request);
+
 /* Starts a device that plays the fault at the first request. */
 void fault_start(responder *device, const fault *f);
 

@@ -110,7 +110,7 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
         }
     }
 
-    /// A held reply that another one replaced was late: nobody gets it.
+    /// Counts a held reply that is given up: it answers no request.
     fn count_superseded(&mut self) {
         if self.wanted.held > 0 {
             self.storage.count(Counter::ForeignFrames, 1);
