@@ -17,6 +17,7 @@
 #ifndef MBM_H
 #define MBM_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 /** Version of this header and of the archive it belongs to. */
@@ -1280,7 +1281,11 @@ typedef struct mbm_service {
      * Serves a request, if it is one of this family. NULL in a zeroed record,
      * which serves nothing.
      */
-    uint16_t (*serve)(struct mbm_service *service, uint8_t *pdu, const void *heading);
+    size_t (*serve)(struct mbm_service *service, uint8_t *pdu, const void *heading);
+    /**
+     * What kind of record of its family it is served as, from 1 on; 0 in a zeroed one.
+     */
+    uint8_t kind;
 } mbm_service;
 
 /**
@@ -1368,9 +1373,9 @@ typedef struct mbm_unit {
      */
     struct mbm_service *services[MBM_MAX_SERVICES];
     /**
-     * Private: NULL in a unit that serves nothing.
+     * Private: NULL in a unit without diagnostics.
      */
-    uint16_t (*serve)(struct mbm_unit *unit,
+    size_t (*monitor)(struct mbm_unit *unit,
                       const void *heading,
                       uint8_t concern,
                       uint8_t *pdu);
@@ -1423,10 +1428,6 @@ typedef struct mbm_cells {
      * As in mbm_registerTable.
      */
     void (*after)(void *context, uint16_t address, uint16_t quantity);
-    /**
-     * Not for you.
-     */
-    uint8_t kind;
 } mbm_cells;
 
 /**
@@ -1703,10 +1704,6 @@ typedef struct mbm_bitTable {
      * How many bits there are.
      */
     uint16_t size;
-    /**
-     * Not for you.
-     */
-    uint8_t kind;
 } mbm_bitTable;
 
 /**
@@ -1756,10 +1753,6 @@ typedef struct mbm_registerTable {
      * How many registers there are.
      */
     uint16_t size;
-    /**
-     * Not for you.
-     */
-    uint8_t kind;
 } mbm_registerTable;
 
 /**

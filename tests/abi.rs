@@ -46,11 +46,11 @@ fn probes() -> Vec<(String, u64)> {
             mbm_object { data length id }
             mbm_framing { functions functionCount kind end }
             mbm_registers { data first count kind order }
-            mbm_service { serve }
-            mbm_unit { services serve diagnostics id }
-            mbm_registerTable { service words valid before after context base size kind }
-            mbm_bitTable { service bits valid before after context base size kind }
-            mbm_cells { service context isValid get set before after kind }
+            mbm_service { serve kind }
+            mbm_unit { services monitor diagnostics id }
+            mbm_registerTable { service words valid before after context base size }
+            mbm_bitTable { service bits valid before after context base size }
+            mbm_cells { service context isValid get set before after }
             mbm_file { records size number }
             mbm_files { service files count before after context }
             mbm_fifo { words address count }

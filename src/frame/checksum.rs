@@ -109,17 +109,16 @@ fn back_by_bits(mut crc: u16, byte: u8) -> u16 {
 #[inline(always)]
 fn back_by_parity(crc: u16, byte: u8) -> u16 {
     let [low, high] = crc.to_le_bytes();
-    // The upper half is the Gray code of the byte that was shifted out, less that
-    // byte's last bit; its top bit, the parity of all eight, turned two bits over.
-    let odd = high >> 7;
-    let gray = if odd != 0 { high ^ 0xC0 } else { high };
-    let pairs = gray & 0x55;
-    let pairs = pairs ^ pairs >> 4;
-    let last = (pairs ^ pairs >> 2 ^ odd) & 1;
-    let out = gray ^ gray >> 1;
+    // The upper half is the Gray code of the byte that was shifted out, of its parity and
+    // its upper seven bits. Its last bit is the parity of what that decodes to.
+    let out = high ^ high >> 1;
     let out = out ^ out >> 2;
-    let out = (out ^ out >> 4) << 1 | last;
-    let low = low ^ odd ^ out << 6 ^ out << 7;
+    let out = out ^ out >> 4;
+    let pairs = high ^ high.rotate_left(4);
+    let pairs = pairs ^ pairs >> 2;
+    let out = out << 1 | (pairs & 1);
+    let twice = out ^ out << 1;
+    let low = low ^ high >> 7 ^ twice << 6;
     u16::from_le_bytes([out ^ byte, low])
 }
 

@@ -62,15 +62,18 @@ pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Status> {
 
 /// Where the last frame of `bytes` begins, which ends where they end; their
 /// length if there is none. What stands before it does not matter: the CRC is
-/// taken back byte by byte until it is that of no bytes.
+/// taken back byte by byte until it is that of no bytes. Two or three bytes may be a frame
+/// here, one without a PDU.
 #[cfg_attr(target_os = "none", inline(never))]
 pub fn last(bytes: &[u8]) -> usize {
     let mut crc = Crc16::RESIDUE;
     let mut start = bytes.len();
-    for (index, byte) in bytes.iter().enumerate().rev() {
+    let mut rest = bytes;
+    while let [before @ .., byte] = rest {
         crc = crc.before(*byte);
-        if crc == Crc16::START && bytes.len() - index >= usize::from(MIN_FRAME) {
-            start = index;
+        rest = before;
+        if crc == Crc16::START {
+            start = rest.len();
         }
     }
     start

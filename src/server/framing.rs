@@ -1,15 +1,16 @@
 //! How each framing finds a request in what arrives, and seals a response.
 
 use super::line::{Lent, Receive, Seal, Server};
+use super::units::SERIAL;
 use crate::error::Status;
-use crate::frame::checksum::crc16;
+use crate::frame::checksum::Crc16;
 use crate::frame::{ascii, rtu, tcp};
 use crate::pdu::custom::Function;
 use crate::pdu::length::{self, Length};
+use crate::pdu::limits::MAX_PDU;
 use crate::port::Port;
 use crate::time;
 use crate::FIRMWARE;
-use core::cell::Cell;
 
 /// Bytes that are given up at once where the buffer is full: fewer cost more time, more
 /// cost a request that takes all of the buffer but a few bytes.
@@ -48,15 +49,6 @@ pub(super) const fn tcp_room(buffer: usize) -> usize {
     buffer.saturating_sub(tcp::PDU)
 }
 
-/// Moves bytes to the front, over the first `by`.
-#[cfg_attr(target_os = "none", inline(never))]
-fn shift(bytes: &mut [u8], by: usize) {
-    let cells = Cell::from_mut(bytes).as_slice_of_cells();
-    for (to, from) in cells.iter().zip(cells.get(by..).unwrap_or_default()) {
-        to.set(from.get());
-    }
-}
-
 /// The status of a port that gave no byte.
 #[inline(always)]
 fn nothing_heard(heard: i16) -> Status {
@@ -70,10 +62,11 @@ fn nothing_heard(heard: i16) -> Status {
 impl<P: Port, B: Lent> Server<P, B> {
     /// Listens for RTU frames, which silence ends, at an untold baud rate.
     pub fn begin_rtu(&mut self) {
-        let room = rtu_room(self.lent.frame().len());
+        // A buffer too short for any frame has no room: a slice of so much is empty.
+        let room = self.lent.capacity().wrapping_sub(rtu::OVERHEAD);
         self.begin(1, room, Self::receive_rtu, Self::seal_rtu);
         self.set_silence(time::DEFAULT_SILENCE);
-        self.request.serial = true;
+        self.request.own = SERIAL;
     }
 
     /// Listens for RTU frames in a stream, where silence tells nothing.
@@ -89,7 +82,7 @@ impl<P: Port, B: Lent> Server<P, B> {
         self.begin(1, room, Self::receive_ascii, Self::seal_ascii);
         self.delimiter = ascii::END;
         self.set_silence(ASCII_TIMEOUT);
-        self.request.serial = true;
+        self.request.own = SERIAL;
     }
 
     /// Listens for TCP frames.
@@ -128,15 +121,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     pub fn is_rtu_line(&self) -> bool {
         let rtu: Seal<P, B> = Self::seal_rtu;
         let is_rtu = |seal| core::ptr::fn_addr_eq(seal, rtu);
-        self.request.serial && self.seal.is_some_and(is_rtu)
-    }
-
-    /// True if what is sent comes back.
-    #[inline(always)]
-    pub(super) fn drops_echo(&self) -> bool {
-        let echoing: Receive<P, B> = Self::receive_behind_echo;
-        self.receive
-            .is_some_and(|receive| core::ptr::fn_addr_eq(receive, echoing))
+        self.request.is_serial() && self.seal.is_some_and(is_rtu)
     }
 
     /// Says whether the receiver hears what the driver sends, so that as many
@@ -159,6 +144,11 @@ impl<P: Port, B: Lent> Server<P, B> {
         if self.sent == 0 {
             return self.receive_rtu();
         }
+        // It comes from here on.
+        if !self.astray {
+            self.astray = true;
+            self.last_byte = self.now;
+        }
         let heard = self.hear(usize::from(self.sent));
         if heard < 0 {
             return Status::LINK_LOST;
@@ -173,35 +163,36 @@ impl<P: Port, B: Lent> Server<P, B> {
     }
 
     /// Gives up the oldest bytes of a full buffer, whose first is the newest: where that
-    /// stands from now on.
-    #[inline(never)]
+    /// stands from now on. A buffer has more bytes than are given up.
+    #[cfg_attr(target_os = "none", inline(always))]
+    #[cfg_attr(not(target_os = "none"), inline(never))]
     pub(super) fn slide(&mut self) -> usize {
         self.request.overrun = true;
         let capacity = self.lent.capacity();
-        let frame = self.lent.part(0, capacity);
-        let newest = frame.first().copied().unwrap_or(0);
-        shift(frame, SLIDE);
-        let place = capacity.saturating_sub(SLIDE);
-        if let Some(first) = self.lent.part(place, capacity).first_mut() {
-            *first = newest;
+        let newest = self.lent.byte(0);
+        self.lent.keep(SLIDE, capacity);
+        let place = capacity.wrapping_sub(SLIDE);
+        if let [byte] = self.lent.part(place, place + 1) {
+            *byte = newest;
         }
         place
     }
 
     /// Moves the last frame of what arrived to the front.
     fn last_frame(&mut self) -> Status {
-        let end = usize::from(self.end);
-        if !FIRMWARE && self.crc.is_residue() && !self.request.overrun {
-            return self.found(end.saturating_sub(rtu::OVERHEAD));
+        let mut length = usize::from(self.end);
+        if !self.crc.is_residue() || self.request.overrun {
+            let start = rtu::last(self.lent.part(0, length));
+            self.lent.keep(start, length);
+            length -= start;
         }
-        let frame = self.lent.part(0, end);
-        let start = if self.crc.is_residue() && !self.request.overrun {
-            0
-        } else {
-            rtu::last(frame)
-        };
-        shift(frame, start);
-        self.found((end - start).saturating_sub(rtu::OVERHEAD))
+        // Where there is no frame, nothing is left of what arrived.
+        length = length.wrapping_sub(rtu::OVERHEAD);
+        if length > MAX_PDU {
+            length = 0;
+        }
+        let unit = self.lent.byte(0);
+        self.found_for(unit, length as u16)
     }
 
     /// Frames that tell their length are taken one by one; for others, and to
@@ -258,7 +249,7 @@ impl<P: Port, B: Lent> Server<P, B> {
 
     fn seal_rtu(&mut self, length: usize) -> usize {
         let end = rtu::PDU + length;
-        let crc = crc16(self.lent.part(0, end)).to_bytes();
+        let crc = Crc16::START.with(self.lent.part(0, end)).to_bytes();
         if let [low, high] = self.lent.part(end, end + 2) {
             [*low, *high] = crc;
         }

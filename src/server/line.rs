@@ -5,7 +5,9 @@
 //! request is carried out. A framing is two functions kept in the object, so
 //! that firmware carries those it begins with.
 
+use super::units::STREAM;
 use super::{Heading, Reply, Units};
+use crate::bytes::move_to_front;
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::frame::{ascii, rtu, tcp, Framing};
@@ -36,6 +38,17 @@ pub trait Lent {
     /// not behind the second.
     fn part(&mut self, start: usize, end: usize) -> &mut [u8] {
         self.frame().get_mut(start..end).unwrap_or_default()
+    }
+
+    /// The byte at a place of that storage.
+    fn byte(&mut self, place: usize) -> u8 {
+        self.part(place, place + 1).first().copied().unwrap_or(0)
+    }
+
+    /// Moves the bytes of that storage from `start` to `end` to its front; the places are
+    /// as for [`Lent::part`].
+    fn keep(&mut self, start: usize, end: usize) {
+        move_to_front(self.part(0, end), start);
     }
 
     /// How long the requests of a user's function are, for framings without
@@ -83,7 +96,7 @@ pub(super) type Seal<P, B> = fn(&mut Server<P, B>, usize) -> usize;
 #[repr(C)]
 pub struct Server<P, B> {
     phase: Phase,
-    /// What arrives is no frame that tells its length.
+    /// What arrives is no frame that tells its length; of an echo, that it is waited for.
     pub(super) astray: bool,
     /// Ends an ASCII frame.
     pub(super) delimiter: u8,
@@ -99,7 +112,7 @@ pub struct Server<P, B> {
     pub request: Heading,
     /// When the last byte arrived; see [`Server::keeps_time`].
     pub(super) last_byte: u32,
-    now: u32,
+    pub(super) now: u32,
     /// The silence that ends a frame.
     silence: u32,
     pub(super) receive: Option<Receive<P, B>>,
@@ -154,7 +167,7 @@ impl<P: Port, B: Lent> Server<P, B> {
         seal: Seal<P, B>,
     ) {
         self.request.head = head;
-        self.request.serial = false;
+        self.request.own = STREAM;
         self.request.room = room as u16;
         self.receive = Some(receive);
         self.seal = Some(seal);
@@ -188,6 +201,12 @@ impl<P: Port, B: Lent> Server<P, B> {
         }
     }
 
+    /// True once it was begun.
+    #[inline(always)]
+    pub(crate) fn has_framing(&self) -> bool {
+        self.receive.is_some() && self.seal.is_some()
+    }
+
     /// False if [`Server::poll`] may be told any time: over TCP nothing hangs on it.
     #[inline(always)]
     pub(crate) fn keeps_time(&self) -> bool {
@@ -200,23 +219,33 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// of Modbus TCP, else [`Status::OK`].
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn poll(&mut self, now: u32) -> Status {
-        self.now = now;
-        if self.phase != Phase::Listen {
-            return self.poll_on();
-        }
-        match self.receive {
-            Some(receive) => receive(self),
-            None => Status::NOT_INITIALISED,
+        match self.look(now) {
+            Status::OK => self.go_on(),
+            status => status,
         }
     }
 
-    /// [`Server::poll`] of a server that does not listen.
-    #[cfg_attr(not(target_os = "none"), inline(never))]
-    fn poll_on(&mut self) -> Status {
+    /// The first half of [`Server::poll`], which looks for a request.
+    #[inline(always)]
+    pub(crate) fn look(&mut self, now: u32) -> Status {
+        self.now = now;
         match self.phase {
-            Phase::Listen => Status::OK,
+            Phase::Listen => match self.receive {
+                Some(receive) => receive(self),
+                None => Status::NOT_INITIALISED,
+            },
             Phase::Request => Status::PENDING,
-            Phase::Send => self.send(),
+            Phase::Send => Status::OK,
+        }
+    }
+
+    /// The second half of [`Server::poll`], which sends what there is.
+    #[inline(always)]
+    pub(crate) fn go_on(&mut self) -> Status {
+        if self.phase == Phase::Send {
+            self.send()
+        } else {
+            Status::OK
         }
     }
 
@@ -233,10 +262,9 @@ impl<P: Port, B: Lent> Server<P, B> {
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn hear(&mut self, until: usize) -> i16 {
         let capacity = self.lent.capacity();
-        let end = usize::from(self.end);
-        let mut start = end;
-        let mut until = until.min(capacity);
-        if start == capacity {
+        let mut end = usize::from(self.end);
+        let (mut start, mut until) = (end, until.min(capacity));
+        if end == capacity {
             (start, until) = (0, 1);
         }
         let heard = self.port.read(self.lent.part(start, until));
@@ -245,7 +273,7 @@ impl<P: Port, B: Lent> Server<P, B> {
             if start != end {
                 start = self.slide();
             }
-            let end = start + heard as usize;
+            end = start + heard as usize;
             self.end = end as u16;
             // A microcontroller takes the CRC of bytes that need none, too: that is
             // less code, and one framing is all it has.
@@ -287,7 +315,7 @@ impl<P: Port, B: Lent> Server<P, B> {
             Phase::Listen if self.end == 0 || !self.keeps_time() => u32::MAX,
             Phase::Listen => self.silence.saturating_sub(elapsed(now, self.last_byte)),
             // On a line no byte and no driver may be late.
-            Phase::Send if self.request.serial => 0,
+            Phase::Send if self.request.is_serial() => 0,
             _ => NOT_BY_ITSELF,
         }
     }
@@ -295,9 +323,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// Says that a request was found whose PDU has so many bytes; 0 for a frame
     /// that arrived damaged.
     pub(super) fn found(&mut self, length: usize) -> Status {
-        let head = usize::from(self.request.head);
-        let unit = self.lent.part(head - 1, head).first();
-        let unit = unit.copied().unwrap_or(0);
+        let unit = self.lent.byte(usize::from(self.request.head) - 1);
         self.found_for(unit, if length > MAX_PDU { 0 } else { length as u16 })
     }
 
@@ -340,13 +366,18 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// Takes the reply to the request: a response stands where its PDU stood.
     /// False, with the request kept, for [`Reply::PENDING`].
     pub fn answer(&mut self, reply: Reply) -> bool {
+        self.answer_served(reply.or_illegal())
+    }
+
+    /// As [`Server::answer`], to a request that was served.
+    #[cfg_attr(target_os = "none", inline(always))]
+    pub(crate) fn answer_served(&mut self, reply: Reply) -> bool {
         if reply == Reply::PENDING {
             self.request.again = true;
             return false;
         }
-        let capacity = self.lent.capacity();
-        let pdu = self.lent.part(self.request.head.into(), capacity);
-        let length = reply.settle(pdu);
+        let head = usize::from(self.request.head);
+        let length = reply.settle_served(self.lent.part(head, head + 2));
         match self.seal {
             Some(seal) if length != 0 => {
                 self.end = seal(self, length) as u16;
@@ -357,15 +388,6 @@ impl<P: Port, B: Lent> Server<P, B> {
             _ => self.listen(),
         }
         true
-    }
-
-    /// As [`Server::answer`], and sends what it can of a response.
-    #[inline(always)]
-    pub(crate) fn answer_and_send(&mut self, reply: Reply) -> Status {
-        if !self.answer(reply) || self.phase != Phase::Send {
-            return Status::OK;
-        }
-        self.send()
     }
 
     /// As [`Server::answer`], and what to return, unless [`Server::poll`] is to go
@@ -397,7 +419,7 @@ impl<P: Port, B: Lent> Server<P, B> {
         let end = match self.seal {
             Some(seal) if self.keeps_time() => {
                 let end = seal(self, length);
-                self.expect_echo(end as u16);
+                self.sent = end as u16;
                 end
             }
             _ => self.seal_tcp(length),
@@ -412,15 +434,6 @@ impl<P: Port, B: Lent> Server<P, B> {
         }
         self.end_transmission();
         Some(Status::OK)
-    }
-
-    /// Where what is sent comes back, it comes from here on.
-    #[inline(never)]
-    fn expect_echo(&mut self, bytes: u16) {
-        if self.drops_echo() {
-            self.last_byte = self.port.micros();
-            self.sent = bytes;
-        }
     }
 
     /// The port took so many of the bytes of a response at once, or is lost.
@@ -450,6 +463,7 @@ impl<P: Port, B: Lent> Server<P, B> {
         reply.settle(self.pdu())
     }
 
+    #[cfg_attr(not(target_os = "none"), inline(never))]
     fn send(&mut self) -> Status {
         let mut status = Status::OK;
         let rest = self.lent.part(self.sent.into(), self.end.into());
@@ -465,10 +479,6 @@ impl<P: Port, B: Lent> Server<P, B> {
             }
         }
         if status == Status::LINK_LOST || self.port.flush() {
-            // An echo, where one is waited for, comes from here on.
-            if FIRMWARE || self.keeps_time() {
-                self.last_byte = self.now;
-            }
             self.end_transmission();
         }
         status

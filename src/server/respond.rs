@@ -1,6 +1,7 @@
 //! The responder: a frame in, a frame out, and no state between.
 
 use super::framing::{ascii_room, rtu_room, tcp_room};
+use super::units::{SERIAL, STREAM};
 use super::{Heading, Reply, Units};
 use crate::error::Status;
 use crate::frame::{ascii, rtu, tcp, Framing};
@@ -29,7 +30,7 @@ pub fn respond(
         heading.to = adu.unit;
         (adu.transaction, adu.pdu.len())
     });
-    heading.serial = framing.is_serial();
+    heading.own = if framing.is_serial() { SERIAL } else { STREAM };
     heading.length = pdu as u16;
     let room = match framing {
         Framing::Rtu | Framing::RtuOverTcp => rtu_room(room),

@@ -43,13 +43,16 @@ impl Kind {
         self.0 <= Kind::DISCRETE_INPUTS.0
     }
 
-    /// Data bytes of so many cells, if those are no more than a request has.
-    const fn bytes(self, quantity: u16) -> usize {
-        let quantity = quantity as usize;
+    /// Data bytes of so many cells; 0 where they are more than an address counts, which
+    /// is more than a request has.
+    const fn bytes(self, quantity: usize) -> usize {
         if self.is_bits() {
             quantity.wrapping_add(7) >> 3
         } else {
-            quantity << 1
+            match quantity.checked_mul(2) {
+                Some(bytes) => bytes,
+                None => 0,
+            }
         }
     }
 }
@@ -57,8 +60,6 @@ impl Kind {
 /// What is done with cells.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Way {
-    /// Nothing: whether they are there is all that is wanted.
-    Check,
     /// From the cells into the data.
     Read,
     /// From the data into the cells.
@@ -91,43 +92,61 @@ pub trait Cells {
 /// What serving a request needs of [`Cells`]; an object, so that firmware carries
 /// what serves less common functions once for all kinds of them.
 pub trait Access {
-    /// Moves cells, hooks around it where they are written: exception code 2 where one
-    /// of them is not there, that of a hook that refuses, or 0.
-    fn access(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) -> u8;
+    /// Carries out what a request does to `quantity` cells, which are `bytes` bytes of
+    /// data: their address stands behind the first byte of `pdu`, their data where `role`
+    /// says. The reply; [`Reply::ILLEGAL_DATA_ADDRESS`] where a cell is not there. To read
+    /// 0 bytes, for which there is room anywhere, is [`Reply::SERVER_DEVICE_FAILURE`] where
+    /// all are there.
+    fn access(&mut self, role: Role, quantity: usize, bytes: usize, pdu: &mut [u8]) -> Reply;
 }
 
 impl<T: Cells> Access for T {
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    fn access(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) -> u8 {
+    fn access(&mut self, role: Role, quantity: usize, bytes: usize, pdu: &mut [u8]) -> Reply {
+        let &mut [_, high, low, ..] = pdu else {
+            return Reply::SERVER_DEVICE_FAILURE;
+        };
+        let (address, quantity) = (word(high, low) as u16, quantity as u16);
         if !self.covers(address, quantity) {
-            return NOT_THERE;
+            return Reply::ILLEGAL_DATA_ADDRESS;
         }
-        let writes = way == Way::Write;
-        if writes {
-            let refused = self.before(address, quantity, data);
-            if refused != 0 {
-                return refused;
+        let at = role.data();
+        let Some(data) = pdu.get_mut(at..at + bytes) else {
+            return Reply::SERVER_DEVICE_FAILURE;
+        };
+        if role == Role::READ {
+            if bytes == 0 {
+                return Reply::SERVER_DEVICE_FAILURE;
             }
+            self.transfer(Way::Read, address, quantity, data);
+            return counted(pdu, bytes);
         }
-        if way != Way::Check {
-            self.transfer(way, address, quantity, data);
+        let refused = self.before(address, quantity, data);
+        if refused != 0 {
+            return Reply::exception(refused);
         }
-        if writes {
-            self.after(address, quantity);
-        }
-        0
+        self.transfer(Way::Write, address, quantity, data);
+        self.after(address, quantity);
+        WRITTEN
     }
 }
 
-/// Exception 02.
-const NOT_THERE: u8 = Reply::ILLEGAL_DATA_ADDRESS.exception_code();
+/// The response of a write repeats the head of the request.
+pub(crate) const WRITTEN: Reply = Reply::length(5);
 
 /// What a request does to a table: where in its PDU, or in that of its response,
 /// the data of cells stand.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
-pub struct Role(u8);
+pub struct Role(Small);
+
+/// A number below 256 that is passed in a register of its own.
+#[cfg(target_arch = "avr")]
+pub(crate) type Small = u8;
+/// A number below 256 that is passed in a register of its own.
+#[cfg(not(target_arch = "avr"))]
+pub(crate) type Small = usize;
 
 impl Role {
     /// Nothing.
@@ -138,6 +157,13 @@ impl Role {
     pub const WRITE_ONE: Role = Role(3);
     /// Writes any number.
     pub const WRITE_SEVERAL: Role = Role(6);
+
+    /// Where in the PDU the data of the cells stand.
+    #[inline(always)]
+    #[allow(clippy::unnecessary_cast)] // It is needed on an AVR.
+    pub(crate) const fn data(self) -> usize {
+        self.0 as usize
+    }
 }
 
 // As many bytes of bits as of registers.
@@ -181,60 +207,47 @@ pub fn serve_as(
     if role == Role::NONE {
         return Reply::NOT_MINE;
     }
-    let [_, a, b, c, d, count, ..] = &*pdu else {
-        return Reply::NOT_MINE;
+    let request = pdu.get(..length).unwrap_or_default();
+    let [_, _, _, c, d, rest @ ..] = request else {
+        return Reply::ILLEGAL_DATA_VALUE;
     };
-    let (address, count) = (u16::from_be_bytes([*a, *b]), *count);
-    let mut quantity = u16::from_be_bytes([*c, *d]);
-    let mut most = MAX_READ_REGISTERS;
-    if role == Role::WRITE_SEVERAL {
-        most = MAX_WRITE_REGISTERS;
-    }
+    let mut quantity = word(*c, *d);
     if role == Role::WRITE_ONE {
         // A coil is on with FF00, and off with 0000.
-        let is_right = !kind.is_bits() || quantity == 0 || quantity == 0xFF00;
-        quantity = is_right.into();
-    }
-    if kind.is_bits() {
-        most <<= 4;
-    }
-    if quantity.wrapping_sub(1) >= most {
-        return Reply::ILLEGAL_DATA_VALUE;
-    }
-    let bytes = kind.bytes(quantity);
-    let mut end = 5;
-    if role == Role::WRITE_SEVERAL {
-        end = 6 + bytes;
-        if bytes != usize::from(count) {
+        if kind.is_bits() && (*d != 0 || c.wrapping_add(1) > 1) {
             return Reply::ILLEGAL_DATA_VALUE;
         }
+        quantity = 1;
     }
-    if length != end {
-        return Reply::ILLEGAL_DATA_VALUE;
-    }
-    let at = usize::from(role.0);
-    let (mut way, mut failure) = (Way::Write, 0);
-    if role == Role::READ {
-        way = Way::Read;
-    }
-    let data = match pdu.get_mut(at..at + bytes) {
-        Some(data) => data,
-        None => {
-            (way, failure) = (Way::Check, Reply::SERVER_DEVICE_FAILURE.exception_code());
-            &mut []
+    let mut bytes = kind.bytes(quantity);
+    let is_right = match rest {
+        [] => role != Role::WRITE_SEVERAL,
+        [count, data @ ..] => {
+            role == Role::WRITE_SEVERAL
+                && usize::from(*count) == bytes
+                && data.len() == bytes
+                && bytes <= MOST_WRITTEN
         }
     };
-    let mut refused = cells.access(way, address, quantity, data);
-    if refused == 0 {
-        refused = failure;
+    if !is_right || bytes.wrapping_sub(1) >= MOST_READ {
+        return Reply::ILLEGAL_DATA_VALUE;
     }
-    if refused != 0 {
-        Reply::exception(refused)
-    } else if role == Role::READ {
-        counted(pdu, bytes)
-    } else {
-        Reply::length(5)
+    // A response that does not fit fails once its cells have turned out to be there.
+    if role == Role::READ && pdu.len() < 2 + bytes {
+        bytes = 0;
     }
+    cells.access(role, quantity, bytes, pdu)
+}
+
+/// Most bytes of cells that one request reads, be they bits or registers.
+const MOST_READ: usize = 2 * MAX_READ_REGISTERS as usize;
+/// Most bytes of cells that one request writes.
+const MOST_WRITTEN: usize = 2 * MAX_WRITE_REGISTERS as usize;
+
+/// A word of the wire, high byte first.
+#[inline(always)]
+const fn word(high: u8, low: u8) -> usize {
+    (high as usize) << 8 | low as usize
 }
 
 /// The response of a read whose data are there.
@@ -269,51 +282,50 @@ fn mask_write(cells: &mut (impl Access + ?Sized), pdu: &mut [u8], length: usize)
     let Some(&[_, a, b, c, d, e, f]) = pdu.first_chunk().filter(|_| length == 7) else {
         return Reply::ILLEGAL_DATA_VALUE;
     };
-    let address = u16::from_be_bytes([a, b]);
-    let mut value = [0; 2];
-    if cells.access(Way::Read, address, 1, &mut value) != 0 {
+    let mut cell = [0, a, b, 0, 0];
+    if cells.access(Role::READ, 1, 2, &mut cell) == Reply::ILLEGAL_DATA_ADDRESS {
         return Reply::ILLEGAL_DATA_ADDRESS;
     }
+    let [_, _, high, low, _] = cell;
     // The AND mask, and the OR mask.
-    let [high, low] = &mut value;
-    *high = (*high & c) | (e & !c);
-    *low = (*low & d) | (f & !d);
-    match cells.access(Way::Write, address, 1, &mut value) {
-        0 => Reply::length(7),
-        refused => Reply::exception(refused),
+    let (high, low) = ((high & c) | (e & !c), (low & d) | (f & !d));
+    match cells.access(Role::WRITE_ONE, 1, 2, &mut [0, a, b, high, low]) {
+        WRITTEN => Reply::length(7),
+        refused => refused,
     }
 }
 
 fn read_write(cells: &mut (impl Access + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
     let kind = Kind::HOLDING_REGISTERS;
-    let Some(&[_, a, b, c, d, e, f, g, h, count]) = pdu.first_chunk() else {
+    let Some(&[_, _, _, c, d, _, _, g, h, count]) = pdu.first_chunk() else {
         return Reply::SERVER_DEVICE_FAILURE;
     };
-    let (address, quantity) = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
-    let (write_address, written) = (u16::from_be_bytes([e, f]), u16::from_be_bytes([g, h]));
-    let bytes = usize::from(count);
-    if quantity.wrapping_sub(1) >= MAX_READ_REGISTERS
-        || written.wrapping_sub(1) >= MAX_READ_WRITE_REGISTERS
-        || bytes != kind.bytes(written)
-        || length != 10 + bytes
+    let (quantity, written) = (word(c, d), word(g, h));
+    let (bytes, data) = (kind.bytes(quantity), usize::from(count));
+    if quantity.wrapping_sub(1) >= MAX_READ_REGISTERS.into()
+        || written.wrapping_sub(1) >= MAX_READ_WRITE_REGISTERS.into()
+        || data != kind.bytes(written)
+        || length != 10 + data
     {
         return Reply::ILLEGAL_DATA_VALUE;
     }
-    let mut has = |address, quantity| cells.access(Way::Check, address, quantity, &mut []) == 0;
-    if !has(address, quantity) || !has(write_address, written) {
+    let mut has = |start: usize, quantity| {
+        let head = pdu.get_mut(start..).unwrap_or_default();
+        cells.access(Role::READ, quantity, 0, head) != Reply::ILLEGAL_DATA_ADDRESS
+    };
+    if !has(0, quantity) || !has(WRITES, written) {
         return Reply::ILLEGAL_DATA_ADDRESS;
     }
     // Nothing is written that could not be answered.
-    let bytes = kind.bytes(quantity);
     if pdu.len() < 2 + bytes {
         return Reply::SERVER_DEVICE_FAILURE;
     }
-    let data = pdu.get_mut(10..length).unwrap_or_default();
-    let refused = cells.access(Way::Write, write_address, written, data);
-    if refused != 0 {
-        return Reply::exception(refused);
+    let write = pdu.get_mut(WRITES..).unwrap_or_default();
+    match cells.access(Role::WRITE_SEVERAL, written, data, write) {
+        WRITTEN => cells.access(Role::READ, quantity, bytes, pdu),
+        refused => refused,
     }
-    let data = pdu.get_mut(2..2 + bytes).unwrap_or_default();
-    cells.access(Way::Read, address, quantity, data);
-    counted(pdu, bytes)
 }
+
+/// Where in a request of function 17 a request to write begins, but for its function.
+const WRITES: usize = 4;

@@ -10,8 +10,9 @@ use crate::pdu::{bits, files, registers};
 pub struct Heading {
     /// The unit that it is for.
     pub to: u8,
-    /// On a serial line: unit 0 is broadcast.
-    pub serial: bool,
+    /// The id that means the server itself: 255 in a stream; on a serial line 0, which
+    /// is broadcast there.
+    pub own: u8,
     /// Bytes are missing at its front: the buffer could not hold them.
     pub overrun: bool,
     /// Where its PDU stands.
@@ -26,7 +27,8 @@ pub struct Heading {
 
 /// What a frame is to a unit.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[repr(u8)]
+#[cfg_attr(target_arch = "avr", repr(u8))]
+#[cfg_attr(not(target_arch = "avr"), repr(usize))]
 pub enum Concern {
     /// Another unit's, or damaged.
     Foreign,
@@ -43,7 +45,7 @@ impl Heading {
     /// No frame yet.
     pub const NONE: Heading = Heading {
         to: 0,
-        serial: false,
+        own: STREAM,
         overrun: false,
         head: 1,
         again: false,
@@ -72,20 +74,30 @@ impl Heading {
 
     /// True if everybody is meant.
     pub const fn is_broadcast(&self) -> bool {
-        self.serial && self.to == 0
+        self.is_serial() && self.to == 0
     }
 
-    /// True if a unit of this id is meant. In a stream, the ids 0 and 255 mean
-    /// the server itself (messaging on TCP/IP guide V1.0b, 4.4.1.2).
+    /// True on a serial line.
+    pub const fn is_serial(&self) -> bool {
+        self.own == SERIAL
+    }
+
+    /// True if a unit of this id is meant, by what is no broadcast.
     pub const fn is_for(&self, id: u8) -> bool {
         self.to == id || id == ANY || self.is_for_any()
     }
 
-    /// True if the server itself is meant.
+    /// True if the server itself is meant, by what is no broadcast. In a stream, the ids 0
+    /// and 255 mean it (messaging on TCP/IP guide V1.0b, 4.4.1.2).
     pub const fn is_for_any(&self) -> bool {
-        !self.serial && self.to.wrapping_add(1) <= 1
+        self.to == 0 || self.to == self.own
     }
 }
+
+/// [`Heading::own`] on a serial line.
+pub const SERIAL: u8 = 0;
+/// [`Heading::own`] in a stream.
+pub const STREAM: u8 = 255;
 
 /// True for functions that only write, and those that users define: others are
 /// not carried out when they are broadcast (serial line guide V1.02, 2.1).

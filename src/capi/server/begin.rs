@@ -1,6 +1,6 @@
 //! Beginning a server, and how it behaves.
 
-use super::{check, core_of, mbm_server, mbm_unit, Object, BEGUN, POLLING};
+use super::{check, core_of, mbm_server, mbm_unit, Core, Object, BEGUN, POLLING};
 use crate::capi::frame::MBM_MAX_TCP_FRAME;
 use crate::capi::port::{countable, mbm_port};
 use crate::error::Status;
@@ -9,8 +9,8 @@ use crate::time;
 /// The least that a frame buffer may have for RTU.
 const LEAST: u16 = 16;
 
-/// Begins a server: port, units and a buffer of `least` bytes or more are all
-/// checked, then all kept; `framing` does the rest.
+/// Begins a server: port, units and a buffer are all checked, then all kept; `framing`
+/// does the rest.
 ///
 /// # Safety
 /// As the header demands of each argument.
@@ -22,9 +22,9 @@ unsafe fn begin(
     count: u8,
     frame: *mut u8,
     bytes: u16,
-    least: u16,
+    framing: fn(&mut Core),
 ) -> Status {
-    if server.is_null() || port.is_null() || units.is_null() || frame.is_null() || bytes < least {
+    if server.is_null() || port.is_null() || units.is_null() || frame.is_null() || bytes < LEAST {
         return Status::INVALID_ARGUMENT;
     }
     // SAFETY: not NULL, so a port, and an object of which zero is a value of
@@ -33,24 +33,25 @@ unsafe fn begin(
         if !(*port).is_complete() {
             return Status::INVALID_ARGUMENT;
         }
-        if check(server) == Status::BUSY {
+        let mark = &raw mut (*server.cast::<Object>()).mark;
+        if mark.read() == POLLING {
             return Status::BUSY;
         }
         let core = core_of(server);
-        let mark = &raw mut (*server.cast::<Object>()).mark;
-        mark.write(BEGUN);
-        let driver = ((*core).port.postTransmission, (*core).port.context);
+        mark.write(POLLING);
+        // The driver of the port that the object had is not left on.
+        if (*core).is_sending() {
+            if let Some(post) = (*core).port.postTransmission {
+                post((*core).port.context);
+            }
+        }
         (*core).port.copy(&*port);
         (*core).lent.frame = frame;
         (*core).lent.units = units;
         (*core).lent.bytes = countable(bytes);
         (*core).lent.count = count;
-        // The driver of the port that the object had is not left on.
-        if let ((Some(post), context), true) = (driver, (*core).is_sending()) {
-            mark.write(POLLING);
-            post(context);
-            mark.write(BEGUN);
-        }
+        framing(&mut *core);
+        mark.write(BEGUN);
     }
     Status::OK
 }
@@ -84,13 +85,7 @@ pub unsafe extern "C" fn mbm_server_begin(
     bytes: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe {
-        let status = begin(server, port, units, count, frame, bytes, LEAST);
-        if status == Status::OK {
-            (*core_of(server)).begin_rtu();
-        }
-        status.code()
-    }
+    unsafe { begin(server, port, units, count, frame, bytes, Core::begin_rtu) }.code()
 }
 
 /// Begins to serve units on a serial line, ASCII (serial line guide V1.02,
@@ -112,14 +107,11 @@ pub unsafe extern "C" fn mbm_server_beginAscii(
     frame: *mut u8,
     bytes: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let status = begin(server, port, units, count, frame, bytes, 2 * LEAST);
-        if status == Status::OK {
-            (*core_of(server)).begin_ascii();
-        }
-        status.code()
+    if bytes < 2 * LEAST {
+        return Status::INVALID_ARGUMENT.code();
     }
+    // SAFETY: as the header demands.
+    unsafe { begin(server, port, units, count, frame, bytes, Core::begin_ascii) }.code()
 }
 
 /// Begins to serve units on a TCP connection that was accepted. Requests that
@@ -141,14 +133,11 @@ pub unsafe extern "C" fn mbm_server_beginTcp(
     frame: *mut u8,
     bytes: u16,
 ) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let status = begin(server, port, units, count, frame, bytes, MBM_MAX_TCP_FRAME);
-        if status == Status::OK {
-            (*core_of(server)).begin_tcp();
-        }
-        status.code()
+    if bytes < MBM_MAX_TCP_FRAME {
+        return Status::INVALID_ARGUMENT.code();
     }
+    // SAFETY: as the header demands.
+    unsafe { begin(server, port, units, count, frame, bytes, Core::begin_tcp) }.code()
 }
 
 /// Begins to serve units over a stream of RTU frames, in which silence tells
@@ -174,12 +163,17 @@ pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        let status = begin(server, port, units, count, frame, bytes, LEAST);
-        if status == Status::OK {
-            (*core_of(server)).begin_rtu_over_tcp();
-        }
-        status.code()
+        begin(
+            server,
+            port,
+            units,
+            count,
+            frame,
+            bytes,
+            Core::begin_rtu_over_tcp,
+        )
     }
+    .code()
 }
 
 /// Sets the silence that ends a frame: t3.5 of RTU, the time between two

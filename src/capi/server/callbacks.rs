@@ -1,7 +1,6 @@
 //! The four tables, cell by cell, where the caller's callbacks hold them.
 
-use super::tables::is_other;
-use super::units::{add, is_unheard, request};
+use super::units::{add_as, is_unheard, request};
 use super::{mbm_service, mbm_unit};
 use crate::error::Status;
 use crate::server::table::{self, Access, Cells, Kind, Way};
@@ -34,8 +33,6 @@ pub struct mbm_cells {
     >,
     /// As in mbm_registerTable.
     pub after: Option<unsafe extern "C" fn(context: *mut c_void, address: u16, quantity: u16)>,
-    /// Not for you.
-    pub kind: u8,
 }
 
 /// Cells of C, which its functions may look at: no reference to them is kept.
@@ -78,7 +75,7 @@ impl Cells for ByC {
 
     fn transfer(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) {
         // SAFETY: see above.
-        let bits = Kind::from_code(unsafe { (*self.0).kind }).is_bits();
+        let bits = Kind::from_code(unsafe { (*self.0).service.kind }).is_bits();
         for index in 0..quantity {
             let cell = address.wrapping_add(index);
             if bits {
@@ -135,11 +132,15 @@ impl Cells for ByC {
 /// # Safety
 /// `service` is the head of a record of them; `pdu` has the bytes and room of
 /// `heading`.
-unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, heading: *const c_void) -> u16 {
+unsafe extern "C" fn serve(
+    service: *mut mbm_service,
+    pdu: *mut u8,
+    heading: *const c_void,
+) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         let record = service.cast::<mbm_cells>();
-        let kind = Kind::from_code((*record).kind);
+        let kind = Kind::from_code((*record).service.kind);
         if is_unheard(heading, *pdu) {
             return Reply::NOT_MINE.code();
         }
@@ -179,13 +180,6 @@ pub unsafe extern "C" fn mbm_server_serveCallbacks(
         if useless || !(1..=4).contains(&table) {
             return Status::INVALID_ARGUMENT.code();
         }
-        if is_other((*cells).kind, table) {
-            return Status::BUSY.code();
-        }
-        let status = add(unit, cells.cast(), serve);
-        if status == Status::OK.code() {
-            (*cells).kind = table;
-        }
-        status
+        add_as(unit, cells.cast(), table, serve).code()
     }
 }

@@ -1,24 +1,45 @@
 //! Cells of a table moved many at a time, as a host does.
 
+use crate::server::table::Kind;
 use core::slice::from_raw_parts_mut;
+
+/// Moves cells from `first` on, from or into data.
+///
+/// # Safety
+/// Behind `cells` and `data` are all of them, and nothing else uses them meanwhile.
+#[inline(always)]
+pub(super) unsafe fn transfer_many(
+    cells: *mut u8,
+    kind: Kind,
+    write: bool,
+    first: u16,
+    quantity: u16,
+    data: *mut u8,
+) {
+    // SAFETY: as the caller promises.
+    unsafe {
+        if !kind.is_bits() {
+            transfer_words(cells.cast(), write, first, quantity, data);
+        } else if write && quantity == 1 {
+            let cell = cells.add(usize::from(first >> 3));
+            let rest = *cell & !(1 << (first & 7));
+            *cell = rest | (*data & 1) << (first & 7);
+        } else {
+            let data = from_raw_parts_mut(data, usize::from(quantity.div_ceil(8)));
+            transfer_bits(cells, write, first, quantity, data);
+        }
+    }
+}
 
 /// Moves registers from `first` on, from or into data.
 ///
 /// # Safety
-/// Behind `words` are all of them, and nothing else uses them meanwhile; data have
-/// room for them.
+/// Behind `words` and `data` are all of them, and nothing else uses them meanwhile.
 #[inline(always)]
-pub(super) unsafe fn transfer_words(
-    words: *mut u16,
-    write: bool,
-    first: u16,
-    quantity: u16,
-    data: &mut [u8],
-) {
+unsafe fn transfer_words(words: *mut u16, write: bool, first: u16, quantity: u16, data: *mut u8) {
     // SAFETY: as the caller promises.
     unsafe {
         let words = words.add(first.into()).cast::<u8>();
-        let data = data.as_mut_ptr();
         let (from, to) = if write {
             (data.cast_const(), words)
         } else {
@@ -60,13 +81,7 @@ unsafe fn turn<const N: usize>(from: *const u8, to: *mut u8) {
 /// Behind `cells` are all bytes that have some of them, and nothing else uses
 /// them meanwhile.
 #[inline(never)]
-pub(super) unsafe fn transfer_bits(
-    cells: *mut u8,
-    write: bool,
-    first: u16,
-    quantity: u16,
-    data: &mut [u8],
-) {
+unsafe fn transfer_bits(cells: *mut u8, write: bool, first: u16, quantity: u16, data: &mut [u8]) {
     let shift = first & 7;
     let count = usize::from((shift + quantity).div_ceil(8));
     // SAFETY: as the caller promises.

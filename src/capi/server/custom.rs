@@ -73,7 +73,11 @@ pub struct mbm_switches {
 /// # Safety
 /// `service` is the head of a function of C; `pdu` has the bytes and room of
 /// `heading`.
-unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, heading: *const c_void) -> u16 {
+unsafe extern "C" fn serve(
+    service: *mut mbm_service,
+    pdu: *mut u8,
+    heading: *const c_void,
+) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         let code = (*service.cast::<mbm_custom>()).code;
@@ -90,7 +94,7 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, heading: *co
 /// # Safety
 /// As for [`serve`].
 #[cfg_attr(not(target_os = "none"), inline(never))]
-unsafe fn serve_mine(record: *mut mbm_custom, pdu: *mut u8, heading: *const c_void) -> u16 {
+unsafe fn serve_mine(record: *mut mbm_custom, pdu: *mut u8, heading: *const c_void) -> usize {
     // SAFETY: as the caller promises; no reference to the record is kept while
     // its function runs.
     unsafe {
@@ -174,7 +178,11 @@ pub unsafe extern "C" fn mbm_server_serveCustom(
 
 /// # Safety
 /// `service` is the head of switches; `pdu` points to a function code.
-unsafe extern "C" fn gate(service: *mut mbm_service, pdu: *mut u8, _heading: *const c_void) -> u16 {
+unsafe extern "C" fn gate(
+    service: *mut mbm_service,
+    pdu: *mut u8,
+    _heading: *const c_void,
+) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         let off = custom::SwitchedOff((*service.cast::<mbm_switches>()).off);

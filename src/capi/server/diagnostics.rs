@@ -69,7 +69,11 @@ unsafe fn line<'a>(record: *mut mbm_diagnostics) -> &'a mut Diagnostics {
 ///
 /// # Safety
 /// `service` is the head of a record; `pdu` has the bytes and room of `heading`.
-unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, heading: *const c_void) -> u16 {
+unsafe extern "C" fn serve(
+    service: *mut mbm_service,
+    pdu: *mut u8,
+    heading: *const c_void,
+) -> usize {
     // SAFETY: as the caller promises; no reference lives while the hook runs.
     unsafe {
         let record = service.cast::<mbm_diagnostics>();
@@ -91,7 +95,7 @@ unsafe extern "C" fn monitor(
     heading: *const c_void,
     concern: u8,
     pdu: *mut u8,
-) -> u16 {
+) -> usize {
     // SAFETY: as the caller promises; no reference to the record lives while
     // services are at work.
     unsafe {
@@ -108,7 +112,7 @@ unsafe extern "C" fn monitor(
         if !line(record).hear(&*heading, concern, request) {
             return Reply::SILENT.code();
         }
-        let reply = walk(unit, heading.cast(), Concern::Own as u8, pdu);
+        let reply = walk(unit, heading.cast(), pdu);
         if reply != Reply::PENDING.code() {
             line(record).done(concern, function, Reply::from_number(reply));
         }
@@ -142,7 +146,7 @@ pub unsafe extern "C" fn mbm_server_serveDiagnostics(
         let status = add(unit, diagnostics.cast(), serve);
         if status == Status::OK.code() {
             (*unit).diagnostics = diagnostics;
-            (*unit).serve = Some(monitor);
+            (*unit).monitor = Some(monitor);
         }
         status
     }

@@ -206,7 +206,7 @@ unsafe extern "C" fn serve_files(
     service: *mut mbm_service,
     pdu: *mut u8,
     heading: *const c_void,
-) -> u16 {
+) -> usize {
     // SAFETY: as the caller promises.
     let (pdu, length) = unsafe { request(pdu, heading) };
     files::serve(&mut FilesByC(service.cast()), pdu, length).code()
@@ -218,7 +218,7 @@ unsafe extern "C" fn serve_fifos(
     service: *mut mbm_service,
     pdu: *mut u8,
     heading: *const c_void,
-) -> u16 {
+) -> usize {
     // SAFETY: as the caller promises.
     let (pdu, length) = unsafe { request(pdu, heading) };
     files::serve_fifos(&FifosByC(service.cast()), pdu, length).code()

@@ -57,7 +57,7 @@ unsafe extern "C" fn serve_exception_status(
     service: *mut mbm_service,
     pdu: *mut u8,
     heading: *const c_void,
-) -> u16 {
+) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         let outputs = (*service.cast::<mbm_exceptionStatus>()).outputs;
@@ -82,7 +82,7 @@ unsafe extern "C" fn serve_server_id(
     service: *mut mbm_service,
     pdu: *mut u8,
     heading: *const c_void,
-) -> u16 {
+) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         let record = service.cast::<mbm_serverId>();
@@ -121,7 +121,7 @@ unsafe extern "C" fn serve_identification(
     service: *mut mbm_service,
     pdu: *mut u8,
     heading: *const c_void,
-) -> u16 {
+) -> usize {
     // SAFETY: as the caller promises.
     let (pdu, length) = unsafe { request(pdu, heading) };
     identity::serve_identification(&ObjectsByC(service.cast()), pdu, length).code()

@@ -30,11 +30,12 @@ use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 
 /// Marks an object that was begun; zeroed storage does not carry it.
-const BEGUN: u8 = 0x53;
+const BEGUN: u8 = POLLING & !1;
 
 /// Marks an object whose poll is at work. What a hook calls on it is refused
 /// before any reference to it is made.
-const POLLING: u8 = 0x54;
+const POLLING: u8 = Status::BUSY.code();
+const _: () = assert!(POLLING & 1 != 0);
 
 /// A Modbus server on one line or one connection.
 ///
@@ -111,6 +112,20 @@ impl Lent for LentByC {
         unsafe { from_raw_parts_mut(self.frame.add(start), end - start) }
     }
 
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn keep(&mut self, start: usize, end: usize) {
+        // SAFETY: as for `part`.
+        unsafe {
+            let mut to = self.frame;
+            let mut left = end - start;
+            while left != 0 {
+                *to = *to.add(start);
+                to = to.add(1);
+                left -= 1;
+            }
+        }
+    }
+
     fn rule(&self, function: u8) -> Option<Rule> {
         // SAFETY: begin demands so many units for as long as the object is used.
         unsafe { units::rule(self.units, self.count, function) }
@@ -169,9 +184,7 @@ pub unsafe extern "C" fn mbm_server_poll(server: *mut mbm_server) -> u8 {
         mark.write(POLLING);
         let status = serve(core_of(server), mark);
         // An object that a hook zeroed stays zero.
-        if mark.read() == POLLING {
-            mark.write(BEGUN);
-        }
+        mark.write(mark.read() & BEGUN);
         status.code()
     }
 }
@@ -188,18 +201,21 @@ unsafe fn serve(core: *mut Core, mark: *const u8) -> Status {
     unsafe {
         // One request a poll is as much as a line brings.
         if FIRMWARE {
-            let status = (*core).poll(port::now(&raw const (*core).port));
-            if status != Status::PENDING {
+            let now = port::now(&raw const (*core).port);
+            core::hint::assert_unchecked((*core).has_framing());
+            let status = (*core).look(now);
+            if status == Status::PENDING {
+                let heading = &raw const (*core).request;
+                let lent = &raw const (*core).lent;
+                let pdu = (*lent).frame.add((*heading).head.into());
+                let reply = units::serve((*lent).units, (*lent).count, heading, pdu);
+                if mark.read() != POLLING || !(*core).answer_served(Reply::from_number(reply)) {
+                    return Status::OK;
+                }
+            } else if status != Status::OK {
                 return status;
             }
-            let heading = &raw const (*core).request;
-            let lent = &raw const (*core).lent;
-            let pdu = (*lent).frame.add((*heading).head.into());
-            let reply = units::serve((*lent).units, (*lent).count, heading, pdu);
-            if mark.read() != POLLING {
-                return Status::OK;
-            }
-            return (*core).answer_and_send(Reply::from_number(reply));
+            return (*core).go_on();
         }
         for _ in 0..MOST_REQUESTS {
             let now = if (*core).keeps_time() {

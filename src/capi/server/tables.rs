@@ -1,10 +1,10 @@
 //! The four tables, in arrays of the caller.
 
-use super::cells::{transfer_bits, transfer_words};
-use super::units::{add, is_unheard, request};
+use super::cells::transfer_many;
+use super::units::{add_as, is_unheard, request};
 use super::{mbm_service, mbm_unit};
 use crate::error::Status;
-use crate::server::table::{self, Access, Kind, Role, Way};
+use crate::server::table::{self, Access, Kind, Role, Small};
 use crate::server::Reply;
 use crate::FIRMWARE;
 use core::ffi::c_void;
@@ -43,8 +43,6 @@ pub struct mbm_registerTable {
     pub base: u16,
     /// How many registers there are.
     pub size: u16,
-    /// Not for you.
-    pub kind: u8,
 }
 
 /// Coils or discrete inputs in an array of yours, eight to a byte, lowest bit
@@ -74,8 +72,6 @@ pub struct mbm_bitTable {
     pub base: u16,
     /// How many bits there are.
     pub size: u16,
-    /// Not for you.
-    pub kind: u8,
 }
 
 /// A table of C, whose hooks may look at it: no reference to it is kept.
@@ -86,7 +82,6 @@ const _: () = {
     use core::mem::offset_of;
     assert!(offset_of!(mbm_registerTable, words) == offset_of!(mbm_bitTable, bits));
     assert!(offset_of!(mbm_registerTable, size) == offset_of!(mbm_bitTable, size));
-    assert!(offset_of!(mbm_registerTable, kind) == offset_of!(mbm_bitTable, kind));
 };
 
 // SAFETY, of all functions here: the record is the caller's and stays where it
@@ -95,35 +90,55 @@ const _: () = {
 impl Access for Table {
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    fn access(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) -> u8 {
+    fn access(&mut self, role: Role, quantity: usize, bytes: usize, pdu: &mut [u8]) -> Reply {
         let table = self.0;
-        // SAFETY: see above; data have room for so many cells.
+        let pdu = pdu.as_mut_ptr();
+        // SAFETY: see above; a PDU has a function and an address, a request that writes has
+        // its data, and there is room for so many bytes of a response.
         unsafe {
             // What says where the cells are is taken once, for a hook may zero the
             // record or set it up anew.
             let cells = (*table).words.cast::<u8>();
-            let kind = Kind::from_code((*table).kind);
-            let first = address.wrapping_sub((*table).base);
+            let address = usize::from(*pdu.add(1)) << 8 | usize::from(*pdu.add(2));
+            let first = address.wrapping_sub((*table).base.into());
             if cells.is_null() || !covers(table, first, quantity) {
-                return Reply::ILLEGAL_DATA_ADDRESS.exception_code();
+                return Reply::ILLEGAL_DATA_ADDRESS;
             }
-            let writes = way == Way::Write;
-            if writes {
+            let kind = Kind::from_code((*table).service.kind);
+            let place = Place::of_cells(cells, kind, first);
+            let data = Place::of_data(pdu.add(role.data()), kind);
+            let (mut from, mut to, mut reply, mut after) = (data, place, table::WRITTEN, None);
+            if role == Role::READ {
+                if bytes == 0 {
+                    return Reply::SERVER_DEVICE_FAILURE;
+                }
+                *pdu.add(1) = bytes as u8;
+                // There are bits without a cell.
+                *pdu.add(1 + bytes) = 0;
+                reply = Reply::length(2 + bytes);
+                (from, to) = (place, data);
+            } else {
                 if let Some(hook) = (*table).before {
-                    let refused = hook((*table).context, address, quantity, data.as_ptr());
+                    let refused =
+                        hook((*table).context, address as u16, quantity as u16, data.byte);
                     if refused != 0 {
-                        return refused;
+                        return Reply::exception(refused);
                     }
                 }
+                after = (*table).after;
             }
-            transfer(cells, kind, way, first, quantity, data);
-            if writes {
-                if let Some(hook) = (*table).after {
-                    hook((*table).context, address, quantity);
-                }
+            // A host has room for code that takes many cells at a time.
+            if FIRMWARE {
+                transfer(from, to, quantity);
+            } else {
+                let write = role != Role::READ;
+                transfer_many(cells, kind, write, first as u16, quantity as u16, data.byte);
             }
+            if let Some(hook) = after {
+                hook((*table).context, address as u16, quantity as u16);
+            }
+            reply
         }
-        0
     }
 }
 
@@ -132,10 +147,10 @@ impl Access for Table {
 /// # Safety
 /// `table` is one, with `size` bits behind `valid`.
 #[inline(always)]
-unsafe fn covers(table: *const mbm_registerTable, first: u16, quantity: u16) -> bool {
+unsafe fn covers(table: *const mbm_registerTable, first: usize, quantity: usize) -> bool {
     // SAFETY: as the caller promises.
     unsafe {
-        let size = (*table).size;
+        let size = usize::from((*table).size);
         if first >= size || quantity > size - first {
             return false;
         }
@@ -148,97 +163,93 @@ unsafe fn covers(table: *const mbm_registerTable, first: u16, quantity: u16) -> 
 ///
 /// # Safety
 /// The bitmap has them, and there is one at least.
-#[cfg_attr(target_arch = "avr", inline(never))]
-#[cfg_attr(not(target_arch = "avr"), inline(always))]
-unsafe fn are_all_on(map: *const u8, mut first: u16, quantity: u16) -> bool {
-    let end = first + quantity;
-    loop {
-        // SAFETY: as the caller promises.
-        if unsafe { *map.add(usize::from(first >> 3)) } >> (first & 7) & 1 == 0 {
-            return false;
-        }
-        first += 1;
-        if first == end {
-            return true;
+#[inline(always)]
+unsafe fn are_all_on(map: *const u8, first: usize, quantity: usize) -> bool {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let mut bit = Place::of_cells(map.cast_mut(), Kind::COILS, first);
+        let mut left = quantity;
+        loop {
+            if Small::from(*bit.byte) & bit.mask == 0 {
+                return false;
+            }
+            bit.step();
+            left -= 1;
+            if left == 0 {
+                return true;
+            }
         }
     }
 }
 
-/// Moves cells from or into data.
+/// Where a bit stands, or with an empty mask a register.
+#[derive(Clone, Copy)]
+struct Place {
+    byte: *mut u8,
+    mask: Small,
+}
+
+impl Place {
+    /// The cell with this index.
+    ///
+    /// # Safety
+    /// There is one.
+    #[inline(always)]
+    unsafe fn of_cells(cells: *mut u8, kind: Kind, index: usize) -> Place {
+        // SAFETY: as the caller promises.
+        unsafe {
+            if kind.is_bits() {
+                let (byte, mask) = (cells.add(index >> 3), 1 << (index & 7));
+                Place { byte, mask }
+            } else {
+                let byte = cells.add(2 * index);
+                Place { byte, mask: 0 }
+            }
+        }
+    }
+
+    /// The first of data.
+    #[inline(always)]
+    fn of_data(byte: *mut u8, kind: Kind) -> Place {
+        let mask = kind.is_bits().into();
+        Place { byte, mask }
+    }
+
+    /// Becomes the next bit.
+    #[inline(always)]
+    #[allow(clippy::unnecessary_cast)] // It is needed on an AVR.
+    fn step(&mut self) {
+        let next = self.mask >> 7;
+        self.mask = (self.mask << 1 | next) & 0xFF;
+        self.byte = self.byte.wrapping_add(next as usize);
+    }
+}
+
+/// Moves so many cells.
 ///
 /// # Safety
 /// There are so many at both; nothing else uses them meanwhile.
 #[cfg_attr(target_os = "none", inline(never))]
-#[cfg_attr(not(target_os = "none"), inline(always))]
-unsafe fn transfer(
-    cells: *mut u8,
-    kind: Kind,
-    way: Way,
-    first: u16,
-    quantity: u16,
-    data: &mut [u8],
-) {
-    let (bits, write) = (kind.is_bits(), way == Way::Write);
-    if way == Way::Check {
-        return;
-    }
+unsafe fn transfer(mut from: Place, mut to: Place, mut left: usize) {
     // SAFETY: as the caller promises.
     unsafe {
-        // A host has room for code that takes many cells at a time.
-        if !FIRMWARE {
-            if bits && write && quantity == 1 {
-                let cell = cells.add(usize::from(first >> 3));
-                let on = data.first().is_some_and(|data| data & 1 != 0);
-                let rest = *cell & !(1 << (first & 7));
-                *cell = rest | u8::from(on) << (first & 7);
-            } else if bits {
-                transfer_bits(cells, write, first, quantity, data);
-            } else {
-                transfer_words(cells.cast(), write, first, quantity, data);
-            }
-            return;
-        }
-        if !bits {
-            let mut words = cells.add(2 * usize::from(first));
-            let mut data = data.as_mut_ptr();
-            if write {
-                core::mem::swap(&mut words, &mut data);
-            }
-            // From one order of bytes to the other, whichever is which.
-            let high = usize::from(cfg!(target_endian = "little"));
-            let mut left = quantity as u8;
-            loop {
-                *data = *words.add(high);
-                *data.add(1) = *words.add(1 - high);
-                words = words.add(2);
-                data = data.add(2);
-                left -= 1;
-                if left == 0 {
-                    return;
-                }
-            }
-        }
-        let (mut from, mut from_bit) = (cells.add(usize::from(first >> 3)), 1u8 << (first & 7));
-        let (mut to, mut to_bit) = (data.as_mut_ptr(), 1u8);
-        if !write {
-            // There are bits without a cell.
-            *to.add(usize::from((quantity - 1) >> 3)) = 0;
-        } else {
-            core::mem::swap(&mut from, &mut to);
-            core::mem::swap(&mut from_bit, &mut to_bit);
-        }
-        let mut left = quantity;
         loop {
-            let rest = *to & !to_bit;
-            *to = if *from & from_bit != 0 {
-                rest | to_bit
+            if from.mask == 0 {
+                // From one order of bytes to the other, whichever is which.
+                let high = usize::from(cfg!(target_endian = "little"));
+                *to.byte = *from.byte.add(high);
+                *to.byte.add(1) = *from.byte.add(1 - high);
+                from.byte = from.byte.add(2);
+                to.byte = to.byte.add(2);
             } else {
-                rest
-            };
-            from_bit = from_bit.rotate_left(1);
-            from = from.add(usize::from(from_bit & 1));
-            to_bit = to_bit.rotate_left(1);
-            to = to.add(usize::from(to_bit & 1));
+                let mut byte = Small::from(*to.byte) & !to.mask;
+                if Small::from(*from.byte) & from.mask != 0 {
+                    byte |= to.mask;
+                }
+                *to.byte = byte as u8;
+                from.step();
+                to.step();
+            }
             left -= 1;
             if left == 0 {
                 return;
@@ -252,14 +263,15 @@ unsafe fn transfer(
 struct TableAsItWas(Table, mbm_registerTable);
 
 impl Access for TableAsItWas {
-    fn access(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) -> u8 {
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn access(&mut self, role: Role, quantity: usize, bytes: usize, pdu: &mut [u8]) -> Reply {
         let mut was = Table(&raw mut self.1);
-        let table = if way == Way::Read {
+        let table = if role == Role::READ {
             &mut was
         } else {
             &mut self.0
         };
-        table.access(way, address, quantity, data)
+        table.access(role, quantity, bytes, pdu)
     }
 }
 
@@ -267,11 +279,15 @@ impl Access for TableAsItWas {
 ///
 /// # Safety
 /// `service` is the head of one; `pdu` has the bytes and room of `heading`.
-unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, heading: *const c_void) -> u16 {
+unsafe extern "C" fn serve(
+    service: *mut mbm_service,
+    pdu: *mut u8,
+    heading: *const c_void,
+) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         let table = service.cast::<mbm_registerTable>();
-        let kind = Kind::from_code((*table).kind);
+        let kind = Kind::from_code((*table).service.kind);
         match table::role(kind, *pdu) {
             role if FIRMWARE => serve_as(role, table, pdu, heading),
             // A host takes a way of its own for each.
@@ -293,11 +309,11 @@ unsafe fn serve_as(
     table: *mut mbm_registerTable,
     pdu: *mut u8,
     heading: *const c_void,
-) -> u16 {
+) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         let (pdu, length) = request(pdu, heading);
-        let kind = Kind::from_code((*table).kind);
+        let kind = Kind::from_code((*table).service.kind);
         let cells = &mut Table(table);
         if FIRMWARE || kind.is_bits() {
             table::serve_as(role, kind, cells, pdu, length).code()
@@ -310,7 +326,7 @@ unsafe fn serve_as(
 /// # Safety
 /// As for [`serve`].
 #[inline(never)]
-unsafe fn serve_read(table: *mut mbm_registerTable, pdu: *mut u8, heading: *const c_void) -> u16 {
+unsafe fn serve_read(table: *mut mbm_registerTable, pdu: *mut u8, heading: *const c_void) -> usize {
     // SAFETY: as the caller promises.
     unsafe { serve_as(Role::READ, table, pdu, heading) }
 }
@@ -322,7 +338,7 @@ unsafe fn serve_write_one(
     table: *mut mbm_registerTable,
     pdu: *mut u8,
     heading: *const c_void,
-) -> u16 {
+) -> usize {
     // SAFETY: as the caller promises.
     unsafe { serve_as(Role::WRITE_ONE, table, pdu, heading) }
 }
@@ -334,7 +350,7 @@ unsafe fn serve_write_several(
     table: *mut mbm_registerTable,
     pdu: *mut u8,
     heading: *const c_void,
-) -> u16 {
+) -> usize {
     // SAFETY: as the caller promises.
     unsafe { serve_as(Role::WRITE_SEVERAL, table, pdu, heading) }
 }
@@ -344,7 +360,7 @@ unsafe fn serve_write_several(
 /// # Safety
 /// As for [`serve`].
 #[cfg_attr(not(target_os = "none"), inline(never))]
-unsafe fn serve_more(table: *mut mbm_registerTable, pdu: *mut u8, heading: *const c_void) -> u16 {
+unsafe fn serve_more(table: *mut mbm_registerTable, pdu: *mut u8, heading: *const c_void) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         let (pdu, length) = request(pdu, heading);
@@ -365,7 +381,7 @@ unsafe extern "C" fn serve_all(
     service: *mut mbm_service,
     pdu: *mut u8,
     heading: *const c_void,
-) -> u16 {
+) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         if !table::is_more(*pdu) {
@@ -381,26 +397,15 @@ unsafe extern "C" fn serve_all(
 /// Adds a table to a unit.
 ///
 /// # Safety
-/// As for [`add`].
+/// As for [`add_as`].
 #[cfg_attr(target_os = "none", inline(never))]
-unsafe fn add_table(unit: *mut mbm_unit, table: *mut mbm_registerTable, kind: Kind) -> u8 {
+unsafe extern "C" fn add_table(
+    unit: *mut mbm_unit,
+    table: *mut mbm_registerTable,
+    kind: Kind,
+) -> u8 {
     // SAFETY: as the caller promises.
-    unsafe {
-        if !table.is_null() && is_other((*table).kind, kind.code()) {
-            return Status::BUSY.code();
-        }
-        let status = add(unit, table.cast(), serve);
-        if status == Status::OK.code() {
-            (*table).kind = kind.code();
-        }
-        status
-    }
-}
-
-/// True if a record, whose kind is 0 while it is zeroed, is served as another
-/// kind already: it would answer other functions on each unit that has it.
-pub(super) const fn is_other(served: u8, kind: u8) -> bool {
-    served != 0 && served != kind
+    unsafe { add_as(unit, table.cast(), kind.code(), serve) }.code()
 }
 
 /// Serves coils: functions 01, 05 and 0F.
@@ -471,7 +476,7 @@ pub unsafe extern "C" fn mbm_server_serveInputRegisters(
 pub unsafe extern "C" fn mbm_server_serveMaskAndReadWrite(table: *mut mbm_registerTable) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        if table.is_null() || (*table).kind != Kind::HOLDING_REGISTERS.code() {
+        if table.is_null() || (*table).service.kind != Kind::HOLDING_REGISTERS.code() {
             return Status::INVALID_ARGUMENT.code();
         }
         (*table).service.serve = Some(serve_all);

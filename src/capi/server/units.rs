@@ -21,14 +21,16 @@ pub struct mbm_service {
             service: *mut mbm_service,
             pdu: *mut u8,
             heading: *const c_void,
-        ) -> u16,
+        ) -> usize,
     >,
+    /// What kind of record of its family it is served as, from 1 on; 0 in a zeroed one.
+    pub kind: u8,
 }
 
 /// The function of a service. `pdu` points to the PDU of a request that `heading`
 /// tells of, and returns a [`Reply`].
 pub(super) type Serve =
-    unsafe extern "C" fn(service: *mut mbm_service, pdu: *mut u8, heading: *const c_void) -> u16;
+    unsafe extern "C" fn(service: *mut mbm_service, pdu: *mut u8, heading: *const c_void) -> usize;
 
 /// A unit that servers answer for. Zero it, set `id`, and say what it serves with
 /// mbm_server_serveCoils and its sisters.
@@ -43,14 +45,14 @@ pub(super) type Serve =
 pub struct mbm_unit {
     /// Private: the records, in the order in which they are asked, then NULL.
     pub services: [*mut mbm_service; MBM_MAX_SERVICES as usize],
-    /// Private: NULL in a unit that serves nothing.
-    pub serve: Option<
+    /// Private: NULL in a unit without diagnostics.
+    pub monitor: Option<
         unsafe extern "C" fn(
             unit: *mut mbm_unit,
             heading: *const c_void,
             concern: u8,
             pdu: *mut u8,
-        ) -> u16,
+        ) -> usize,
     >,
     /// Not for you.
     pub diagnostics: *mut mbm_diagnostics,
@@ -62,35 +64,52 @@ pub struct mbm_unit {
 
 /// Puts a service into the first free place of a unit, unless it has one there
 /// already. A record that is not zeroed keeps its function: another unit may have
-/// it, with functions 16 and 17.
+/// it, with functions 16 and 17. One that is served as another kind, for it would answer
+/// other functions on each unit that has it, is [`Status::BUSY`].
 ///
 /// # Safety
 /// Each pointer is NULL or points to what it says, and `service` is the head of
 /// a record, zeroed or served by `serve`.
 #[cfg_attr(target_os = "none", inline(never))]
-pub(super) unsafe fn add(unit: *mut mbm_unit, service: *mut mbm_service, serve: Serve) -> u8 {
+pub(super) unsafe fn add_as(
+    unit: *mut mbm_unit,
+    service: *mut mbm_service,
+    kind: u8,
+    serve: Serve,
+) -> Status {
     if unit.is_null() || service.is_null() {
-        return Status::INVALID_ARGUMENT.code();
+        return Status::INVALID_ARGUMENT;
     }
     // SAFETY: not NULL, and the place is one of the unit's.
     unsafe {
+        let known = (*service).kind;
+        if known != 0 && known != kind {
+            return Status::BUSY;
+        }
         let mut place = (&raw mut (*unit).services).cast::<*mut mbm_service>();
         let end = place.add(MBM_MAX_SERVICES.into());
         while !(*place).is_null() && *place != service {
             place = place.add(1);
             if place == end {
-                return Status::BUFFER_TOO_SMALL.code();
+                return Status::BUFFER_TOO_SMALL;
             }
         }
         *place = service;
+        (*service).kind = kind;
         if (*service).serve.is_none() {
             (*service).serve = Some(serve);
         }
-        if (*unit).serve.is_none() {
-            (*unit).serve = Some(walk);
-        }
     }
-    Status::OK.code()
+    Status::OK
+}
+
+/// As [`add_as`], of a family with one kind of records.
+///
+/// # Safety
+/// As for [`add_as`].
+pub(super) unsafe fn add(unit: *mut mbm_unit, service: *mut mbm_service, serve: Serve) -> u8 {
+    // SAFETY: as the caller promises.
+    unsafe { add_as(unit, service, 1, serve) }.code()
 }
 
 /// The places of a unit, one after the other, up to the first that is free. What
@@ -139,35 +158,18 @@ pub(super) unsafe fn request<'a>(pdu: *mut u8, heading: *const c_void) -> (&'a m
     // SAFETY: as the caller promises.
     unsafe {
         let heading = heading.cast::<Heading>();
-        let room = usize::from((*heading).room);
-        (from_raw_parts_mut(pdu, room), (*heading).length.into())
+        let (room, length) = ((*heading).room.into(), (*heading).length.into());
+        core::hint::assert_unchecked(length <= room);
+        (from_raw_parts_mut(pdu, room), length)
     }
 }
 
-/// Has the services of a unit look at a request, one after the other: the function of a
-/// unit that takes no notice of frames for others.
+/// Has the services of a unit look at a request, one after the other.
 ///
 /// # Safety
 /// `unit` is one, and `pdu` has the bytes and the room that `heading` says.
-pub(super) unsafe extern "C" fn walk(
-    unit: *mut mbm_unit,
-    heading: *const c_void,
-    concern: u8,
-    pdu: *mut u8,
-) -> u16 {
-    if concern == Concern::Foreign as u8 {
-        return Reply::SILENT.code();
-    }
-    // SAFETY: as the caller promises.
-    unsafe { serve_with(unit, heading, pdu) }
-}
-
-/// [`walk`], of a request that is for the unit.
-///
-/// # Safety
-/// As for [`walk`].
 #[inline(always)]
-unsafe fn serve_with(unit: *mut mbm_unit, heading: *const c_void, pdu: *mut u8) -> u16 {
+pub(super) unsafe fn walk(unit: *mut mbm_unit, heading: *const c_void, pdu: *mut u8) -> usize {
     // SAFETY: as the caller promises; a PDU has a byte at least.
     unsafe {
         for service in Places::new(unit) {
@@ -183,6 +185,19 @@ unsafe fn serve_with(unit: *mut mbm_unit, heading: *const c_void, pdu: *mut u8) 
     Reply::ILLEGAL_FUNCTION.code()
 }
 
+/// True if a unit serves something.
+///
+/// # Safety
+/// `unit` is one.
+#[inline(always)]
+unsafe fn serves(unit: *const mbm_unit) -> bool {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let first = (&raw const (*unit).services).cast::<*mut mbm_service>();
+        !(*first).is_null()
+    }
+}
+
 /// Has each unit look at a frame; the first that it is for answers.
 ///
 /// # Safety
@@ -194,20 +209,20 @@ pub(super) unsafe fn serve(
     count: u8,
     heading: *const Heading,
     pdu: *mut u8,
-) -> u16 {
+) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         // One unit alone, which takes no notice of what is others', and is asked by
         // its id: soon done.
         if !FIRMWARE
             && count == 1
-            && (*units).diagnostics.is_null()
+            && (*units).monitor.is_none()
             && (*heading).length != 0
             && (*heading).to == (*units).id
             && (*heading).to != ANY
-            && (*units).serve.is_some()
+            && serves(units)
         {
-            return serve_with(units, heading.cast(), pdu);
+            return walk(units, heading.cast(), pdu);
         }
         serve_each(units, count, heading, pdu)
     }
@@ -223,7 +238,7 @@ unsafe fn serve_each(
     count: u8,
     heading: *const Heading,
     pdu: *mut u8,
-) -> u16 {
+) -> usize {
     let mut answer = Reply::SILENT.code();
     // SAFETY: as the caller promises.
     unsafe {
@@ -239,20 +254,26 @@ unsafe fn serve_each(
             if left == 0 {
                 return answer;
             }
-            // A unit that serves nothing has no function, and is as if it were not there.
-            if let Some(serve) = (*unit).serve {
-                let mut concern = all;
-                if concern == Concern::Own && !(*heading).is_for((*unit).id) {
-                    concern = Concern::Foreign;
-                }
-                let reply = serve(unit, heading.cast(), concern as u8, pdu);
-                if concern == Concern::Own {
-                    answer = reply;
-                    all = Concern::Foreign;
-                }
-            }
+            let looked_at = unit;
             unit = unit.add(1);
             left -= 1;
+            // A unit that serves nothing is as if it were not there.
+            if !serves(looked_at) {
+                continue;
+            }
+            let mut concern = all;
+            if all == Concern::Own && !(*heading).is_for((*looked_at).id) {
+                concern = Concern::Foreign;
+            }
+            let reply = match (*looked_at).monitor {
+                Some(monitor) => monitor(looked_at, heading.cast(), concern as u8, pdu),
+                None if concern == Concern::Foreign => continue,
+                None => walk(looked_at, heading.cast(), pdu),
+            };
+            if concern == Concern::Own {
+                answer = reply;
+                all = Concern::Foreign;
+            }
         }
     }
 }
@@ -266,7 +287,7 @@ unsafe fn serve_each(
 unsafe fn foreign(units: *const mbm_unit, count: u8, heading: *const Heading, all: Concern) -> u8 {
     // SAFETY: as the caller promises; no function of theirs runs meanwhile.
     let (heading, units) = unsafe { (&*heading, from_raw_parts(units, count.into())) };
-    let takes_notice = |unit: &mbm_unit| !unit.diagnostics.is_null();
+    let takes_notice = |unit: &mbm_unit| unit.monitor.is_some();
     let answers = |unit: &mbm_unit| unit.id == heading.to || unit.id == ANY;
     if all == Concern::Foreign {
         before(units, takes_notice)
