@@ -117,6 +117,22 @@ impl<P: Port, B: Lent> Server<P, B> {
         self.last_frame()
     }
 
+    /// As [`Server::receive_no_more`], for all framings but the most common.
+    fn receive_no_more_apart(&mut self, heard: i16) -> Status {
+        if heard < 0 {
+            return Status::LINK_LOST;
+        }
+        if self.end == 0 || !self.is_silent() {
+            return Status::OK;
+        }
+        self.last_frame_apart()
+    }
+
+    #[inline(never)]
+    fn last_frame_apart(&mut self) -> Status {
+        self.last_frame()
+    }
+
     /// True for RTU frames on a serial line, which t3.5 ends.
     pub fn is_rtu_line(&self) -> bool {
         let rtu: Seal<P, B> = Self::seal_rtu;
@@ -149,7 +165,7 @@ impl<P: Port, B: Lent> Server<P, B> {
             self.astray = true;
             self.last_byte = self.now;
         }
-        let heard = self.hear(usize::from(self.sent));
+        let heard = self.hear_apart(self.sent.into());
         if heard < 0 {
             return Status::LINK_LOST;
         }
@@ -179,6 +195,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     }
 
     /// Moves the last frame of what arrived to the front.
+    #[inline(always)]
     fn last_frame(&mut self) -> Status {
         let mut length = usize::from(self.end);
         if !self.crc.is_residue() || self.request.overrun {
@@ -217,7 +234,7 @@ impl<P: Port, B: Lent> Server<P, B> {
                 None => end > rtu::OVERHEAD,
             };
             if whole && self.crc.is_residue() {
-                return self.last_frame();
+                return self.last_frame_apart();
             }
             if whole {
                 self.astray = true;
@@ -226,9 +243,9 @@ impl<P: Port, B: Lent> Server<P, B> {
                 Some((total, _)) if !self.astray => total,
                 _ => usize::MAX,
             };
-            let heard = self.hear(until);
+            let heard = self.hear_apart(until);
             if heard <= 0 {
-                return self.receive_no_more(heard);
+                return self.receive_no_more_apart(heard);
             }
             taken += heard as u16;
         }
@@ -265,7 +282,7 @@ impl<P: Port, B: Lent> Server<P, B> {
                 self.request.overrun = true;
                 return self.found(0);
             }
-            let heard = self.hear(end + 1);
+            let heard = self.hear_apart(end + 1);
             if heard < 0 {
                 return Status::LINK_LOST;
             }
@@ -370,7 +387,7 @@ impl<P: Port, B: Lent> Server<P, B> {
                 return self.found_in_stream(until);
             }
             let heard = if FIRMWARE {
-                self.hear(until)
+                self.hear_apart(until)
             } else {
                 self.take(until)
             };

@@ -112,13 +112,13 @@ pub struct Server<P, B> {
     pub request: Heading,
     /// When the last byte arrived; see [`Server::keeps_time`].
     pub(super) last_byte: u32,
+    /// What the caller lends.
+    pub lent: B,
     pub(super) now: u32,
     /// The silence that ends a frame.
     silence: u32,
     pub(super) receive: Option<Receive<P, B>>,
     pub(super) seal: Option<Seal<P, B>>,
-    /// What the caller lends.
-    pub lent: B,
     /// The byte stream.
     pub port: P,
 }
@@ -171,7 +171,9 @@ impl<P: Port, B: Lent> Server<P, B> {
         self.request.room = room as u16;
         self.receive = Some(receive);
         self.seal = Some(seal);
-        self.ahead = 0;
+        if !FIRMWARE {
+            self.ahead = 0;
+        }
         self.listen();
     }
 
@@ -259,7 +261,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// end, into the CRC too: how many bytes, negative if the link is lost. A full buffer
     /// takes one byte and gives up its oldest for it, once there is one: one that is full
     /// and silent may hold a frame.
-    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(target_os = "none", inline(always))]
     pub(super) fn hear(&mut self, until: usize) -> i16 {
         let capacity = self.lent.capacity();
         let mut end = usize::from(self.end);
@@ -282,6 +284,12 @@ impl<P: Port, B: Lent> Server<P, B> {
             }
         }
         heard
+    }
+
+    /// As [`Server::hear`], for all framings but the most common, which has it in line.
+    #[inline(never)]
+    pub(super) fn hear_apart(&mut self, until: usize) -> i16 {
+        self.hear(until)
     }
 
     /// As [`Server::hear`], without CRC and time.

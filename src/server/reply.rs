@@ -31,7 +31,7 @@ impl Reply {
         Reply(bytes as u8 as usize)
     }
 
-    /// An exception response.
+    /// An exception response, of a code from 1 on.
     pub const fn exception(code: u8) -> Reply {
         Reply(0x0100 | code as usize)
     }
@@ -92,13 +92,12 @@ impl Reply {
     /// As [`Reply::settle`], of a request that was served.
     #[inline(always)]
     pub(super) fn settle_served(self, pdu: &mut [u8]) -> usize {
-        let code = self.exception_code();
-        if code == 0 {
+        if self.0 & 0x0100 == 0 {
             return usize::from(self.0 as u8);
         }
         if let [function, data, ..] = pdu {
             *function |= EXCEPTION;
-            *data = code;
+            *data = self.0 as u8;
         }
         2
     }

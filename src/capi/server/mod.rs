@@ -84,10 +84,10 @@ const _: () = {
 /// What mbm_server_begin and its sisters were given.
 #[repr(C)]
 struct LentByC {
-    frame: *mut u8,
-    units: *mut mbm_unit,
     bytes: u16,
     count: u8,
+    frame: *mut u8,
+    units: *mut mbm_unit,
 }
 
 impl Lent for LentByC {
@@ -209,6 +209,7 @@ unsafe fn serve(core: *mut Core, mark: *const u8) -> Status {
                 let lent = &raw const (*core).lent;
                 let pdu = (*lent).frame.add((*heading).head.into());
                 let reply = units::serve((*lent).units, (*lent).count, heading, pdu);
+                core::hint::assert_unchecked(mark.read() != POLLING || (*core).has_framing());
                 if mark.read() != POLLING || !(*core).answer_served(Reply::from_number(reply)) {
                     return Status::OK;
                 }

@@ -88,8 +88,8 @@ const _: () = {
 // is, as the header demands, with arrays of `size` cells behind its pointers; a
 // cell that is looked at lies in them.
 impl Access for Table {
-    #[cfg_attr(target_os = "none", inline(never))]
-    #[cfg_attr(not(target_os = "none"), inline(always))]
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    #[cfg_attr(not(target_arch = "avr"), inline(always))]
     fn access(&mut self, role: Role, quantity: usize, bytes: usize, pdu: &mut [u8]) -> Reply {
         let table = self.0;
         let pdu = pdu.as_mut_ptr();

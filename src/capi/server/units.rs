@@ -3,6 +3,7 @@
 use super::{custom, mbm_diagnostics};
 use crate::error::Status;
 use crate::pdu::custom::Rule;
+use crate::server::table::Small;
 use crate::server::{only_writes, Concern, Heading, Reply, ANY};
 use crate::FIRMWARE;
 use core::ffi::c_void;
@@ -232,7 +233,8 @@ pub(super) unsafe fn serve(
 ///
 /// # Safety
 /// As for [`serve`].
-#[inline(never)]
+#[cfg_attr(target_arch = "avr", inline(always))]
+#[cfg_attr(not(target_arch = "avr"), inline(never))]
 unsafe fn serve_each(
     units: *mut mbm_unit,
     count: u8,
@@ -244,9 +246,9 @@ unsafe fn serve_each(
     unsafe {
         let mut unit = units;
         let mut left = count;
-        let mut all = (*heading).concern_of_all();
+        let mut all = (*heading).concern_of_all() as Small;
         loop {
-            if !FIRMWARE && all != Concern::Broadcast {
+            if !FIRMWARE && all != BROADCAST {
                 let passed = foreign(unit, left, heading, all);
                 left -= passed;
                 unit = unit.add(passed.into());
@@ -261,22 +263,29 @@ unsafe fn serve_each(
             if !serves(looked_at) {
                 continue;
             }
-            let mut concern = all;
-            if all == Concern::Own && !(*heading).is_for((*looked_at).id) {
-                concern = Concern::Foreign;
+            let mut concern = all & BROADCAST;
+            if (*heading).is_for((*looked_at).id) {
+                concern = all;
             }
             let reply = match (*looked_at).monitor {
                 Some(monitor) => monitor(looked_at, heading.cast(), concern as u8, pdu),
-                None if concern == Concern::Foreign => continue,
+                None if concern == FOREIGN => continue,
                 None => walk(looked_at, heading.cast(), pdu),
             };
-            if concern == Concern::Own {
+            if concern == OWN {
                 answer = reply;
-                all = Concern::Foreign;
+                all = FOREIGN;
             }
         }
     }
 }
+
+// What a frame is to a unit: bits, so that a unit that it is not for sees the broadcasts
+// that are left of all.
+const FOREIGN: Small = Concern::Foreign as Small;
+const OWN: Small = Concern::Own as Small;
+const BROADCAST: Small = Concern::Broadcast as Small;
+const _: () = assert!(FOREIGN == 0 && OWN == 1 && BROADCAST == 2);
 
 /// How many of these units, up to the first other, neither answer a frame nor take
 /// notice of it, where it is no broadcast: a host calls none of them.
@@ -284,12 +293,12 @@ unsafe fn serve_each(
 /// # Safety
 /// `units` points to `count` units.
 #[inline(always)]
-unsafe fn foreign(units: *const mbm_unit, count: u8, heading: *const Heading, all: Concern) -> u8 {
+unsafe fn foreign(units: *const mbm_unit, count: u8, heading: *const Heading, all: Small) -> u8 {
     // SAFETY: as the caller promises; no function of theirs runs meanwhile.
     let (heading, units) = unsafe { (&*heading, from_raw_parts(units, count.into())) };
     let takes_notice = |unit: &mbm_unit| unit.monitor.is_some();
     let answers = |unit: &mbm_unit| unit.id == heading.to || unit.id == ANY;
-    if all == Concern::Foreign {
+    if all == FOREIGN {
         before(units, takes_notice)
     } else if heading.is_for_any() {
         0
