@@ -312,6 +312,49 @@ static void what_a_unit_has_no_place_for_is_refused(void **state)
     all_are_answered(&units[0]);
 }
 
+static mbm_diagnostics late;
+
+static uint16_t give_diagnostics(void *context, const mbm_request *request, uint8_t *response,
+                                 uint16_t capacity)
+{
+    (void)request;
+    (void)response;
+    (void)capacity;
+    OK(mbm_server_serveDiagnostics((mbm_unit *)context, &late));
+    return 0;
+}
+
+static void a_unit_whose_places_are_all_taken_knows_what_it_does_not_serve(void **state)
+{
+    static mbm_custom all[MBM_MAX_SERVICES];
+    static mbm_unit full;
+    int i;
+
+    (void)state;
+    memset(all, 0, sizeof all);
+    memset(&full, 0, sizeof full);
+    memset(&late, 0, sizeof late);
+    full.id = 17;
+    for (i = 0; i < MBM_MAX_SERVICES; i++) {
+        all[i].serve = echo;
+        all[i].code = (uint8_t)(66 + i);
+    }
+    for (i = 0; i < MBM_MAX_SERVICES - 1; i++)
+        OK(mbm_server_serveCustom(&full, &all[i]));
+    /* The last place is taken by a hook, with what hears of every frame. */
+    all[0].serve = give_diagnostics;
+    all[0].context = &full;
+    assert_int_equal(answer(&full, 17, "\x42", 1), 0x42);
+    assert_int_equal(answer(&full, 17, "\x03\0\0\0\1", 5), 0x83);
+    /* And without that. */
+    memset(&full, 0, sizeof full);
+    full.id = 17;
+    for (i = 0; i < MBM_MAX_SERVICES; i++)
+        OK(mbm_server_serveCustom(&full, &all[i]));
+    assert_int_equal(answer(&full, 17, "\x51", 1), 0x51);
+    assert_int_equal(answer(&full, 17, "\x03\0\0\0\1", 5), 0x83);
+}
+
 static void switches_are_set_up_again_like_any_record(void **state)
 {
     (void)state;
@@ -436,6 +479,8 @@ int main(void)
                                reset),
         cmocka_unit_test_setup(a_table_that_is_served_as_one_kind_is_refused_as_another, reset),
         cmocka_unit_test_setup(a_second_record_of_diagnostics_is_refused, reset),
+        cmocka_unit_test_setup(a_unit_whose_places_are_all_taken_knows_what_it_does_not_serve,
+                               reset),
         cmocka_unit_test_setup(what_a_unit_has_no_place_for_is_refused, reset),
         cmocka_unit_test_setup(switches_are_set_up_again_like_any_record, reset),
         cmocka_unit_test_setup(a_request_goes_on_with_the_table_that_its_hook_sets_up_anew,

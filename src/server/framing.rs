@@ -435,11 +435,9 @@ impl<P: Port, B: Lent> Server<P, B> {
 
     #[inline(always)]
     pub(super) fn seal_tcp(&mut self, length: usize) -> usize {
-        let [_, _, _, _, high, low] = match self.lent.frame().first_chunk_mut() {
-            Some(header) => header,
-            None => return 0,
-        };
-        [*high, *low] = (length as u16 + 1).to_be_bytes();
+        if let [high, low] = self.lent.part(4, 6) {
+            [*high, *low] = (length as u16 + 1).to_be_bytes();
+        }
         tcp::PDU + length
     }
 }

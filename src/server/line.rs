@@ -425,18 +425,15 @@ impl<P: Port, B: Lent> Server<P, B> {
         }
         self.port.pre_transmission();
         let end = match self.seal {
-            Some(seal) if self.keeps_time() => {
+            _ if !self.keeps_time() => self.seal_tcp(length),
+            Some(seal) => {
                 let end = seal(self, length);
                 self.sent = end as u16;
                 end
             }
-            _ => self.seal_tcp(length),
+            None => 0,
         };
-        let Some(frame) = self.lent.frame().get(..end) else {
-            self.end_transmission();
-            return None;
-        };
-        let sent = self.port.write(frame);
+        let sent = self.port.write(self.lent.part(0, end));
         if usize::from(sent as u16) != end || !self.port.flush() {
             return Some(self.sent_some(end, sent));
         }

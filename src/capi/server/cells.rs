@@ -1,7 +1,107 @@
-//! Cells of a table moved many at a time, as a host does.
+//! Cells of a table: moved one by one, and many at a time, as a host does.
 
-use crate::server::table::Kind;
+use crate::server::table::{Kind, Small};
 use core::slice::from_raw_parts_mut;
+
+/// True if so many bits of a bitmap are 1.
+///
+/// # Safety
+/// The bitmap has them, and there is one at least.
+#[cfg_attr(target_os = "none", inline(always))]
+#[cfg_attr(not(target_os = "none"), inline(never))]
+pub(super) unsafe fn are_all_on(map: *const u8, first: usize, quantity: usize) -> bool {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let mut bit = Place::of_cells(map.cast_mut(), Kind::COILS, first);
+        let mut left = quantity;
+        loop {
+            if Small::from(*bit.byte) & bit.mask == 0 {
+                return false;
+            }
+            bit.step();
+            left -= 1;
+            if left == 0 {
+                return true;
+            }
+        }
+    }
+}
+
+/// Where a bit stands, or with an empty mask a register.
+#[derive(Clone, Copy)]
+pub(super) struct Place {
+    pub(super) byte: *mut u8,
+    mask: Small,
+}
+
+impl Place {
+    /// The cell with this index.
+    ///
+    /// # Safety
+    /// There is one.
+    #[inline(always)]
+    pub(super) unsafe fn of_cells(cells: *mut u8, kind: Kind, index: usize) -> Place {
+        // SAFETY: as the caller promises.
+        unsafe {
+            if kind.is_bits() {
+                let (byte, mask) = (cells.add(index >> 3), 1 << (index & 7));
+                Place { byte, mask }
+            } else {
+                let byte = cells.add(2 * index);
+                Place { byte, mask: 0 }
+            }
+        }
+    }
+
+    /// The first of data.
+    #[inline(always)]
+    pub(super) fn of_data(byte: *mut u8, kind: Kind) -> Place {
+        let mask = kind.is_bits().into();
+        Place { byte, mask }
+    }
+
+    /// Becomes the next bit.
+    #[inline(always)]
+    #[allow(clippy::unnecessary_cast)] // It is needed on an AVR.
+    fn step(&mut self) {
+        let next = self.mask >> 7;
+        self.mask = (self.mask << 1 | next) & 0xFF;
+        self.byte = self.byte.wrapping_add(next as usize);
+    }
+}
+
+/// Moves so many cells.
+///
+/// # Safety
+/// There are so many at both; nothing else uses them meanwhile.
+#[cfg_attr(target_os = "none", inline(never))]
+pub(super) unsafe fn transfer(mut from: Place, mut to: Place, mut left: usize) {
+    // SAFETY: as the caller promises.
+    unsafe {
+        loop {
+            if from.mask == 0 {
+                // From one order of bytes to the other, whichever is which.
+                let high = usize::from(cfg!(target_endian = "little"));
+                *to.byte = *from.byte.add(high);
+                *to.byte.add(1) = *from.byte.add(1 - high);
+                from.byte = from.byte.add(2);
+                to.byte = to.byte.add(2);
+            } else {
+                let mut byte = Small::from(*to.byte) & !to.mask;
+                if Small::from(*from.byte) & from.mask != 0 {
+                    byte |= to.mask;
+                }
+                *to.byte = byte as u8;
+                from.step();
+                to.step();
+            }
+            left -= 1;
+            if left == 0 {
+                return;
+            }
+        }
+    }
+}
 
 /// Moves cells from `first` on, from or into data.
 ///

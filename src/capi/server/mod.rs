@@ -224,8 +224,12 @@ unsafe fn serve(core: *mut Core, mark: *const u8) -> Status {
             } else {
                 0
             };
-            let status = (*core).poll(now);
+            core::hint::assert_unchecked((*core).has_framing());
+            let status = (*core).look(now);
             if status != Status::PENDING {
+                if status == Status::OK {
+                    return (*core).go_on();
+                }
                 return status;
             }
             let heading = &raw const (*core).request;

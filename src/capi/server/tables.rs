@@ -1,13 +1,14 @@
 //! The four tables, in arrays of the caller.
 
-use super::cells::transfer_many;
+use super::cells::{are_all_on, transfer, transfer_many, Place};
 use super::units::{add_as, is_unheard, request};
 use super::{mbm_service, mbm_unit};
 use crate::error::Status;
-use crate::server::table::{self, Access, Kind, Role, Small};
+use crate::server::table::{self, Access, Kind, Role};
 use crate::server::Reply;
 use crate::FIRMWARE;
 use core::ffi::c_void;
+use core::hint::assert_unchecked;
 
 /// Holding or input registers in an array of yours. Zero it, set what you need,
 /// and hand it to mbm_server_serveHoldingRegisters or
@@ -159,105 +160,6 @@ unsafe fn covers(table: *const mbm_registerTable, first: usize, quantity: usize)
     }
 }
 
-/// True if so many bits of a bitmap are 1.
-///
-/// # Safety
-/// The bitmap has them, and there is one at least.
-#[inline(always)]
-unsafe fn are_all_on(map: *const u8, first: usize, quantity: usize) -> bool {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let mut bit = Place::of_cells(map.cast_mut(), Kind::COILS, first);
-        let mut left = quantity;
-        loop {
-            if Small::from(*bit.byte) & bit.mask == 0 {
-                return false;
-            }
-            bit.step();
-            left -= 1;
-            if left == 0 {
-                return true;
-            }
-        }
-    }
-}
-
-/// Where a bit stands, or with an empty mask a register.
-#[derive(Clone, Copy)]
-struct Place {
-    byte: *mut u8,
-    mask: Small,
-}
-
-impl Place {
-    /// The cell with this index.
-    ///
-    /// # Safety
-    /// There is one.
-    #[inline(always)]
-    unsafe fn of_cells(cells: *mut u8, kind: Kind, index: usize) -> Place {
-        // SAFETY: as the caller promises.
-        unsafe {
-            if kind.is_bits() {
-                let (byte, mask) = (cells.add(index >> 3), 1 << (index & 7));
-                Place { byte, mask }
-            } else {
-                let byte = cells.add(2 * index);
-                Place { byte, mask: 0 }
-            }
-        }
-    }
-
-    /// The first of data.
-    #[inline(always)]
-    fn of_data(byte: *mut u8, kind: Kind) -> Place {
-        let mask = kind.is_bits().into();
-        Place { byte, mask }
-    }
-
-    /// Becomes the next bit.
-    #[inline(always)]
-    #[allow(clippy::unnecessary_cast)] // It is needed on an AVR.
-    fn step(&mut self) {
-        let next = self.mask >> 7;
-        self.mask = (self.mask << 1 | next) & 0xFF;
-        self.byte = self.byte.wrapping_add(next as usize);
-    }
-}
-
-/// Moves so many cells.
-///
-/// # Safety
-/// There are so many at both; nothing else uses them meanwhile.
-#[cfg_attr(target_os = "none", inline(never))]
-unsafe fn transfer(mut from: Place, mut to: Place, mut left: usize) {
-    // SAFETY: as the caller promises.
-    unsafe {
-        loop {
-            if from.mask == 0 {
-                // From one order of bytes to the other, whichever is which.
-                let high = usize::from(cfg!(target_endian = "little"));
-                *to.byte = *from.byte.add(high);
-                *to.byte.add(1) = *from.byte.add(1 - high);
-                from.byte = from.byte.add(2);
-                to.byte = to.byte.add(2);
-            } else {
-                let mut byte = Small::from(*to.byte) & !to.mask;
-                if Small::from(*from.byte) & from.mask != 0 {
-                    byte |= to.mask;
-                }
-                *to.byte = byte as u8;
-                from.step();
-                to.step();
-            }
-            left -= 1;
-            if left == 0 {
-                return;
-            }
-        }
-    }
-}
-
 /// As [`Table`], for function 17: what it reads once its hooks were called is where it
 /// was when the request came.
 struct TableAsItWas(Table, mbm_registerTable);
@@ -291,6 +193,9 @@ unsafe extern "C" fn serve(
         match table::role(kind, *pdu) {
             role if FIRMWARE => serve_as(role, table, pdu, heading),
             // A host takes a way of its own for each.
+            Role::READ if !kind.is_bits() && (*table).valid.is_null() => {
+                serve_read_words(table, pdu, heading)
+            }
             Role::READ => serve_read(table, pdu, heading),
             Role::WRITE_ONE => serve_write_one(table, pdu, heading),
             Role::WRITE_SEVERAL => serve_write_several(table, pdu, heading),
@@ -320,6 +225,24 @@ unsafe fn serve_as(
         } else {
             table::serve_as(role, Kind::HOLDING_REGISTERS, cells, pdu, length).code()
         }
+    }
+}
+
+/// [`serve_read`], of registers that are all there.
+///
+/// # Safety
+/// As for [`serve`].
+#[inline(never)]
+unsafe fn serve_read_words(
+    table: *mut mbm_registerTable,
+    pdu: *mut u8,
+    heading: *const c_void,
+) -> usize {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let is_bits = Kind::from_code((*table).service.kind).is_bits();
+        assert_unchecked(!is_bits && (*table).valid.is_null());
+        serve_as(Role::READ, table, pdu, heading)
     }
 }
 

@@ -7,6 +7,7 @@ use crate::server::table::Small;
 use crate::server::{only_writes, Concern, Heading, Reply, ANY};
 use crate::FIRMWARE;
 use core::ffi::c_void;
+use core::mem::offset_of;
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 
 /// Most records that one unit serves, each handed to a mbm_server_serve function.
@@ -169,21 +170,62 @@ pub(super) unsafe fn request<'a>(pdu: *mut u8, heading: *const c_void) -> (&'a m
 ///
 /// # Safety
 /// `unit` is one, and `pdu` has the bytes and the room that `heading` says.
-#[inline(always)]
 pub(super) unsafe fn walk(unit: *mut mbm_unit, heading: *const c_void, pdu: *mut u8) -> usize {
     // SAFETY: as the caller promises; a PDU has a byte at least.
     unsafe {
         for service in Places::new(unit) {
-            // A record that was zeroed has no function.
-            if let Some(serve) = (*service).serve {
-                let reply = serve(service, pdu, heading);
-                if reply != Reply::NOT_MINE.code() {
-                    return reply;
-                }
+            let reply = ask(service, heading, pdu);
+            if reply != Reply::NOT_MINE.code() {
+                return reply;
             }
         }
     }
     Reply::ILLEGAL_FUNCTION.code()
+}
+
+/// As [`walk`], of a unit without diagnostics, which ends where all places are taken too:
+/// behind the last of them stands the pointer to what diagnostics need, which is NULL.
+///
+/// # Safety
+/// As for [`walk`]; the unit has no `monitor`.
+#[inline(always)]
+unsafe fn walk_alone(unit: *mut mbm_unit, heading: *const c_void, pdu: *mut u8) -> usize {
+    // SAFETY: as the caller promises; what is read stands in the unit, for the places end
+    // with NULL. A hook that gives the unit diagnostics meanwhile is called by a service
+    // that serves the request, which ends the walk.
+    unsafe {
+        let mut place = unit
+            .byte_add(offset_of!(mbm_unit, services))
+            .cast::<*mut mbm_service>();
+        while !(*place).is_null() {
+            let reply = ask(*place, heading, pdu);
+            if reply != Reply::NOT_MINE.code() {
+                return reply;
+            }
+            place = place.add(1);
+        }
+    }
+    Reply::ILLEGAL_FUNCTION.code()
+}
+
+const _: () = {
+    let end = offset_of!(mbm_unit, services) + MBM_MAX_SERVICES as usize * size_of::<usize>();
+    assert!(offset_of!(mbm_unit, monitor) == end);
+};
+
+/// Has a service look at a request. A record that was zeroed has no function.
+///
+/// # Safety
+/// As for [`Serve`].
+#[inline(always)]
+unsafe fn ask(service: *mut mbm_service, heading: *const c_void, pdu: *mut u8) -> usize {
+    // SAFETY: as the caller promises.
+    unsafe {
+        match (*service).serve {
+            Some(serve) => serve(service, pdu, heading),
+            None => Reply::NOT_MINE.code(),
+        }
+    }
 }
 
 /// True if a unit serves something.
@@ -223,7 +265,7 @@ pub(super) unsafe fn serve(
             && (*heading).to != ANY
             && serves(units)
         {
-            return walk(units, heading.cast(), pdu);
+            return walk_alone(units, heading.cast(), pdu);
         }
         serve_each(units, count, heading, pdu)
     }
@@ -270,7 +312,7 @@ unsafe fn serve_each(
             let reply = match (*looked_at).monitor {
                 Some(monitor) => monitor(looked_at, heading.cast(), concern as u8, pdu),
                 None if concern == FOREIGN => continue,
-                None => walk(looked_at, heading.cast(), pdu),
+                None => walk_alone(looked_at, heading.cast(), pdu),
             };
             if concern == OWN {
                 answer = reply;
