@@ -159,7 +159,10 @@ fn renew<T>(
     }
 }
 
-const SERVICE: mbm_service = mbm_service { serve: None };
+const SERVICE: mbm_service = mbm_service {
+    serve: None,
+    kind: 0,
+};
 
 fn bitmap(w: &World, bits: u16) -> *const u8 {
     if w.rarely(4) {
@@ -188,7 +191,6 @@ fn register_table(w: &World) -> mbm_registerTable {
         context: null_mut(),
         base: w.word() & 0xFFFC,
         size,
-        kind: 0,
     }
 }
 
@@ -208,7 +210,6 @@ fn bit_table(w: &World) -> mbm_bitTable {
         context: null_mut(),
         base: w.word() & 0xFFFC,
         size,
-        kind: 0,
     }
 }
 
@@ -226,7 +227,6 @@ fn cells(w: &World, bits: bool) -> mbm_cells {
             hooks::before_words
         }),
         after: (hooks & 4 != 0).then_some(hooks::after),
-        kind: 0,
     }
 }
 
