@@ -97,7 +97,7 @@ impl Ticket {
     }
 
     /// True if its response is waited for.
-    pub(super) fn is_sent(&self) -> bool {
+    pub(crate) fn is_sent(&self) -> bool {
         matches!(self.stage, Stage::Sent | Stage::Strayed)
     }
 
@@ -216,11 +216,11 @@ impl<J: Job> Asked<J> {
         };
         crc16(&[job.ticket().unit]).with(checked).is_residue()
     }
+}
 
-    /// What gives the bytes to send. (One type, so one function for all who ask.)
-    fn bytes(&self) -> impl Fn(usize) -> u8 + '_ {
-        |index| self.job.as_ref().map_or(0, |job| job.byte(index))
-    }
+/// What gives the bytes of a job to send. (One type, so one function for all who ask.)
+pub(super) fn bytes<J: Job>(job: &J) -> impl Fn(usize) -> u8 + '_ {
+    |index| job.byte(index)
 }
 
 impl<J: Job> Question for Asked<J> {
@@ -241,7 +241,9 @@ impl<J: Job> Question for Asked<J> {
     }
 
     fn emit(&self, pdu: &mut [u8], _: &[u16]) {
-        self.outline().emit(pdu, self.bytes());
+        if let Some(job) = &self.job {
+            job.ticket().outline.emit(pdu, bytes(job));
+        }
     }
 
     fn may_be_broadcast(&self) -> bool {
@@ -277,7 +279,10 @@ impl<J: Job> Question for Asked<J> {
     fn judge(&mut self, pdu: &[u8]) -> Status {
         let pdu = pdu.get(..pdu.len().saturating_sub(2)).unwrap_or_default();
         self.length = pdu.len() as u8;
-        self.outline().judge(pdu, self.bytes())
+        match &self.job {
+            Some(job) => job.ticket().outline.judge(pdu, bytes(job)),
+            None => Status::MALFORMED_REPLY,
+        }
     }
 
     fn ends(&mut self, ended: bool) {

@@ -2,7 +2,7 @@
 
 use super::Tcp;
 use crate::bytes::move_to_front;
-use crate::client::job::{deliver, take, Job, Stage};
+use crate::client::job::{bytes, deliver, take, Job, Stage};
 use crate::client::shared::Shared;
 use crate::client::units::Means;
 use crate::error::Status;
@@ -184,7 +184,7 @@ fn judge<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
         }
         _ => return Status::MALFORMED_REPLY,
     }
-    let status = outline.judge(pdu, |index| job.byte(index));
+    let status = outline.judge(pdu, bytes(job));
     if let [function, code, ..] = *pdu {
         if function & 0x80 != 0 {
             job.ticket_mut().exception = code;

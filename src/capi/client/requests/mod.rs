@@ -7,7 +7,8 @@ pub use data::*;
 pub use device::*;
 
 use super::request::Inside;
-use super::{calls, mbm_client, mbm_clientRequest, pointers, Lent};
+use super::{mbm_client, mbm_clientRequest, pointers, shared, Lent};
+use crate::client::Job as _;
 use crate::error::Status;
 use crate::pdu::outline::{Form, Outline};
 use crate::FIRMWARE;
@@ -27,7 +28,7 @@ unsafe fn prepare(client: *const mbm_client, request: *mut mbm_clientRequest) ->
                 // One that is pending may have been zeroed.
                 let object = pointers::object(client);
                 match Lent::new(request) {
-                    Some(held) if (calls(object).holds)(object, held) => Status::BUSY,
+                    Some(request) if shared(object).holds(|held| *held == request) => Status::BUSY,
                     _ => Status::OK,
                 }
             }
@@ -41,6 +42,7 @@ unsafe fn prepare(client: *const mbm_client, request: *mut mbm_clientRequest) ->
 /// # Safety
 /// As the header demands; the request is [`prepare`]d.
 #[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline(always))]
 unsafe fn submit(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
@@ -60,10 +62,10 @@ unsafe fn submit(
         // SAFETY: as the caller promises.
         return unsafe {
             match Lent::new(request) {
-                Some(request) => {
-                    let object = pointers::object(client);
-                    (calls(object).queue)(object, request)
-                }
+                Some(request) => match shared(pointers::object(client)).enqueue(request) {
+                    Ok(()) => Status::PENDING,
+                    Err(refused) => refused.ticket().status,
+                },
                 None => Status::INVALID_ARGUMENT,
             }
         };
