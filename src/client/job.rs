@@ -102,7 +102,8 @@ impl Ticket {
     }
 
     /// How long it is not due yet.
-    #[inline(always)]
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn remains(&self, now: u32, means: &mut impl Means) -> u32 {
         let wait = match self.wait {
             0 => 0,
@@ -156,6 +157,11 @@ pub trait Job {
     }
 }
 
+/// True if a request that ended so was answered, with data or an exception.
+pub(super) fn is_answer(ended: Status) -> bool {
+    ended.code() < 0x80
+}
+
 /// Hands the data of `pdu`, a complete response, to the job.
 pub(super) fn deliver<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
     let at = usize::from(job.ticket().outline.data_at());
@@ -177,13 +183,21 @@ pub(super) fn take<J: Job>(job: &mut J, data: &[u8]) -> Status {
     }
     ticket.length = data.len() as u8;
     let words = ticket.outline.takes_words();
-    job.put_all(data);
-    if !FIRMWARE && words {
+    // The bits behind the last one are zero.
+    let mask = if !FIRMWARE && words {
+        0xFF
+    } else {
+        ticket.outline.mask()
+    };
+    if FIRMWARE {
+        for (index, byte) in data.iter().enumerate() {
+            let is_last = index + 1 == data.len();
+            job.put(index, if is_last { *byte & mask } else { *byte });
+        }
         return Status::OK;
     }
-    let mask = job.ticket().outline.mask();
+    job.put_all(data);
     if mask != 0xFF {
-        // The bits behind the last one are zero.
         if let Some((last, before)) = data.split_last() {
             job.put(before.len(), *last & mask);
         }

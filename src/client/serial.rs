@@ -1,7 +1,7 @@
 //! A client's serial line, or a stream that carries the frames of one: one
 //! request at a time.
 
-use super::job::{deliver, Asked, Job, Stage};
+use super::job::{deliver, is_answer, Asked, Job, Stage};
 use super::shared::Shared;
 use super::units::Means;
 use super::{Client, Line};
@@ -121,7 +121,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         let status = self.received(&mut job, status);
         if status == Status::LINK_LOST {
             shared.lose();
-        } else if !status.is_failure() {
+        } else if is_answer(status) {
             shared.connected = true;
         }
         // There is room: it came out of the queue, and was counted as if in it.

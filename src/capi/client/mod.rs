@@ -156,6 +156,16 @@ impl Means for LentByC {
         unsafe { from_raw_parts_mut(self.outgoing, self.outgoing_bytes.into()) }
     }
 
+    fn received(&mut self, from: u16, to: u16) -> &mut [u8] {
+        // SAFETY: see above; the client keeps its places within the buffer.
+        unsafe { from_raw_parts_mut(self.frame.add(from.into()), (to - from).into()) }
+    }
+
+    fn to_send(&mut self, from: u16, to: u16) -> &mut [u8] {
+        // SAFETY: as for `received`.
+        unsafe { from_raw_parts_mut(self.outgoing.add(from.into()), (to - from).into()) }
+    }
+
     fn units(&mut self) -> &mut [Unit] {
         if self.units.is_null() {
             return &mut [];

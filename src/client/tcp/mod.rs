@@ -90,8 +90,8 @@ impl<P: Port, S: Means> Tcp<P, S> {
         } else if self.start > 0 {
             self.gather();
         }
-        let room = self.means.frame().get_mut(usize::from(self.end)..);
-        let room = room.unwrap_or_default();
+        let length = self.means.frame().len() as u16;
+        let room = self.means.received(self.end, length);
         if room.is_empty() {
             return true;
         }
@@ -267,10 +267,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
         if self.sent >= self.filled {
             return true;
         }
-        let range = usize::from(self.sent)..usize::from(self.filled);
-        let Some(bytes) = self.means.outgoing().get(range) else {
-            return true;
-        };
+        let bytes = self.means.to_send(self.sent, self.filled);
         let sent = self.port.write(bytes);
         if sent < 0 {
             return false;
@@ -305,9 +302,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
     /// it was not, or only half.
     #[cold]
     fn unsend(&mut self, wire: u16) -> bool {
-        let filled = usize::from(self.filled);
-        let bytes = self.means.outgoing().get_mut(..filled);
-        let (bytes, mut at) = (bytes.unwrap_or_default(), 0);
+        let (bytes, mut at) = (self.means.to_send(0, self.filled), 0);
         while let Some(rest) = bytes.get_mut(at..) {
             let Ok(header) = tcp::header(rest) else {
                 break;

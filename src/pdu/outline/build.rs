@@ -31,7 +31,8 @@ impl Outline {
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(crate) fn set_all(&mut self, form: Form, words: &[usize; 4]) -> Status {
-        let [first, second, ..] = words.map(|word| word as u16);
+        // No map, which would be a loop.
+        let (first, second) = (words[0] as u16, words[1] as u16);
         self.form = form;
         self.head[0] = form.0 as u8;
         for (place, word) in self.head[1..].as_chunks_mut().0.iter_mut().zip(words) {

@@ -273,9 +273,8 @@ impl Outline {
             usize::from(self.repeated)
         };
         // No response is shorter than what it repeats, nor than where its data begin.
-        let mut theirs = pdu.iter().take(repeated).enumerate();
         if pdu.len() >= repeated.max(self.data_at().into())
-            && theirs.all(|(index, theirs)| *theirs == self.at(index, &byte))
+            && self.begins(pdu, repeated, &byte)
             && match *pdu {
                 _ if self.form.has(GROUPS) => self.answers_groups(pdu, byte),
                 [files::READ_FIFO_QUEUE, _, bytes, high, words, ..] => {
@@ -288,6 +287,17 @@ impl Outline {
         } else {
             Status::MALFORMED_REPLY
         }
+    }
+
+    /// True if the first bytes of a `pdu` that has so many are those of the request.
+    #[inline(always)]
+    fn begins(&self, pdu: &[u8], count: usize, byte: &impl Fn(usize) -> u8) -> bool {
+        for (index, theirs) in pdu.get(..count).unwrap_or_default().iter().enumerate() {
+            if *theirs != self.at(index, byte) {
+                return false;
+            }
+        }
+        true
     }
 
     /// True if a response to 14 has the groups that were asked for, each as long.

@@ -394,6 +394,7 @@ pub unsafe extern "C" fn mbm_client_forward(
 /// # Safety
 /// None is needed; this is a [`More`](super::More).
 unsafe fn add_group(inside: &mut Inside, words: &[usize; 4], _: Status) -> Status {
-    let [_, file, record, quantity] = words.map(|word| word as u16);
-    inside.ticket.outline.add_group(file, record, quantity)
+    let [_, file, record, quantity] = *words;
+    let outline = &mut inside.ticket.outline;
+    outline.add_group(file as u16, record as u16, quantity as u16)
 }
