@@ -184,12 +184,8 @@ pub(super) fn take<J: Job>(job: &mut J, data: &[u8]) -> Status {
     ticket.length = data.len() as u8;
     let words = ticket.outline.takes_words();
     // The bits behind the last one are zero.
-    let mask = if !FIRMWARE && words {
-        0xFF
-    } else {
-        ticket.outline.mask()
-    };
     if FIRMWARE {
+        let mask = ticket.outline.mask();
         for (index, byte) in data.iter().enumerate() {
             let is_last = index + 1 == data.len();
             job.put(index, if is_last { *byte & mask } else { *byte });
@@ -197,6 +193,10 @@ pub(super) fn take<J: Job>(job: &mut J, data: &[u8]) -> Status {
         return Status::OK;
     }
     job.put_all(data);
+    if words {
+        return Status::OK;
+    }
+    let mask = job.ticket().outline.mask();
     if mask != 0xFF {
         if let Some((last, before)) = data.split_last() {
             job.put(before.len(), *last & mask);
