@@ -48,6 +48,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
     /// Takes and drops the bytes that arrive while requests wait to be sent again. A
     /// program that sleeps until bytes are there would not sleep otherwise.
     #[cold]
+    #[inline(never)]
     fn drop_late<const N: usize>(&mut self, shared: &mut Shared<J, N>) {
         let heard = self.engine.port.read(self.engine.storage.frame());
         if heard < 0 {

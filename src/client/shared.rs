@@ -79,7 +79,9 @@ impl<J: Job, const N: usize> Shared<J, N> {
         ticket.retries = 0;
         ticket.enter(Stage::Queued, 0, 0);
         self.look = true;
-        self.queue.push(job)
+        // There is room, so nothing comes back.
+        let _ = self.queue.push(job);
+        Ok(())
     }
 
     /// [`Status::PENDING`] if a job may be queued, else why not.

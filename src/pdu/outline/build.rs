@@ -206,24 +206,28 @@ impl Outline {
     /// as long as `rule` says.
     pub fn custom(&mut self, function: u8, bytes: u16, rule: Rule) -> Status {
         self.set(Form::CUSTOM, 0, 0);
-        self.add_rule(function, bytes, rule)
+        match rule {
+            Rule::Fixed(0) | Rule::Counted(0, _) => Status::INVALID_ARGUMENT,
+            Rule::Fixed(length) => self.add_rule(function, bytes, FIXED, [length, 0]),
+            Rule::Counted(offset, more) => self.add_rule(function, bytes, COUNTS, [offset, more]),
+            Rule::Silence => self.add_rule(function, bytes, OWN, [0, 0]),
+        }
     }
 
-    /// The function of the user's, behind the form that [`Outline::set`] set.
-    #[inline(always)]
-    pub(crate) fn add_rule(&mut self, function: u8, bytes: u16, rule: Rule) -> Status {
-        let (kind, length, more) = match rule {
-            Rule::Fixed(length) => (FIXED, length, 0),
-            Rule::Counted(offset, more) => (COUNTS, offset, more),
-            Rule::Silence => (OWN, 1, 0),
-        };
+    /// The function of the user's, behind the form that [`Outline::set`] set: how the
+    /// length of its response is known, with the numbers that this takes.
+    #[cfg_attr(target_os = "none", inline(always))]
+    pub(crate) fn add_rule(
+        &mut self,
+        function: u8,
+        bytes: u16,
+        kind: u32,
+        [length, more]: [u8; 2],
+    ) -> Status {
         self.form.0 |= kind | u32::from(function);
         self.head[0] = function;
         self.length = length;
         self.more = more;
-        if length == 0 {
-            return Status::INVALID_ARGUMENT;
-        }
         if function == 0 || function & EXCEPTION != 0 {
             return Status::ILLEGAL_FUNCTION;
         }

@@ -27,13 +27,13 @@ pub(super) const RANGE: u32 = 1 << 15;
 pub(super) const BITS: u32 = 1 << 16;
 
 /// How the length of the response is known, two bits: it is so long,
-pub(super) const FIXED: u32 = 0;
+pub(crate) const FIXED: u32 = 0;
 /// so long, and its second byte counts,
 pub(super) const READ: u32 = 1 << 17;
 /// the byte at an offset counts,
-pub(super) const COUNTS: u32 = 2 << 17;
+pub(crate) const COUNTS: u32 = 2 << 17;
 /// its own rules say, or nothing but its end.
-pub(super) const OWN: u32 = 3 << 17;
+pub(crate) const OWN: u32 = 3 << 17;
 pub(super) const KIND: u32 = 3 << 17;
 
 /// From this bit on, three bits each: length of the head and of the response,

@@ -10,6 +10,7 @@ mod forward;
 
 pub(crate) use build::GROUP;
 pub use form::Form;
+pub(crate) use form::{COUNTS, FIXED, OWN};
 
 use super::identification::{self, MEI_READ_DEVICE_IDENTIFICATION};
 use super::length::Length;
@@ -115,6 +116,7 @@ impl Outline {
     }
 
     /// The bits of the last byte of data that are used.
+    #[cfg_attr(target_os = "none", inline(never))]
     pub fn mask(&self) -> u8 {
         if !self.form.has(BITS) {
             return 0xFF;

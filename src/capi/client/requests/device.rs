@@ -4,10 +4,11 @@
 use super::{bare, plain, special};
 use crate::capi::client::request::Inside;
 use crate::capi::client::{mbm_client, mbm_clientRequest};
-use crate::capi::functions::{mbm_rule, rule};
+use crate::capi::functions::{mbm_rule, MBM_RULE_COUNTED, MBM_RULE_FIXED, MBM_RULE_SILENCE};
 use crate::capi::pointers::lent_or_none;
 use crate::error::Status;
-use crate::pdu::outline::{Form, Outline, GROUP};
+use crate::pdu::limits::MAX_PDU;
+use crate::pdu::outline::{Form, Outline, COUNTS, FIXED, GROUP, OWN};
 
 /// Function 07: reads eight outputs into a byte (V1.1b3, 6.7).
 ///
@@ -313,14 +314,22 @@ pub unsafe extern "C" fn mbm_client_custom(
             words,
             Some(|inside, words, _| {
                 let response: *const mbm_rule = core::ptr::with_exposed_provenance(words[2]);
-                match response.as_ref().and_then(|response| rule(*response)) {
-                    Some(rule) => {
-                        let outline = &mut inside.ticket.outline;
-                        outline.add_rule(words[0] as u8, words[1] as u16, rule)
-                    }
-                    None => Status::INVALID_ARGUMENT,
-                }
-            }),
+                let Some(response) = response.as_ref() else {
+                return Status::INVALID_ARGUMENT;
+            };
+            let (kind, most) = match response.kind {
+                MBM_RULE_SILENCE => (OWN, u8::MAX),
+                MBM_RULE_FIXED => (FIXED, MAX_PDU as u8),
+                MBM_RULE_COUNTED => (COUNTS, MAX_PDU as u8 - 1),
+                _ => return Status::INVALID_ARGUMENT,
+            };
+            if kind != OWN && !(1..=most).contains(&response.bytes) {
+                return Status::INVALID_ARGUMENT;
+            }
+            let numbers = [response.bytes, response.more];
+            let outline = &mut inside.ticket.outline;
+            outline.add_rule(words[0] as u8, words[1] as u16, kind, numbers)
+        }),
         )
     }
 }
