@@ -215,20 +215,14 @@ pub struct Asked<J> {
 }
 
 impl<J: Job> Asked<J> {
-    fn outline(&self) -> &Outline {
-        match &self.job {
-            Some(job) => &job.ticket().outline,
-            None => &Outline::NONE,
-        }
+    fn outline(&self) -> Option<&Outline> {
+        self.job.as_ref().map(|job| &job.ticket().outline)
     }
 
     /// True if a right CRC follows the first `length` bytes of `pdu`, as in RTU.
-    fn ends_with_crc(&self, pdu: &[u8], length: NonZeroU8) -> bool {
-        let (Some(job), Some(checked)) = (&self.job, pdu.get(..usize::from(length.get()) + 2))
-        else {
-            return false;
-        };
-        crc16(&[job.ticket().unit]).with(checked).is_residue()
+    fn ends_with_crc(job: &J, pdu: &[u8], length: NonZeroU8) -> bool {
+        let checked = pdu.get(..usize::from(length.get()) + 2);
+        checked.is_some_and(|checked| crc16(&[job.ticket().unit]).with(checked).is_residue())
     }
 }
 
@@ -247,11 +241,11 @@ impl<J: Job> Question for Asked<J> {
     const REPEATS: bool = false;
 
     fn function(&self) -> u8 {
-        self.outline().function()
+        self.outline().map_or(0, Outline::function)
     }
 
     fn length(&self) -> u8 {
-        self.outline().request_length()
+        self.outline().map_or(0, Outline::request_length)
     }
 
     fn emit(&self, pdu: &mut [u8], _: &[u16]) {
@@ -261,22 +255,24 @@ impl<J: Job> Question for Asked<J> {
     }
 
     fn may_be_broadcast(&self) -> bool {
-        self.outline().may_be_broadcast()
+        self.outline().is_some_and(Outline::may_be_broadcast)
     }
 
     fn is_answered(&self) -> bool {
-        self.outline().is_answered()
+        self.outline().is_some_and(Outline::is_answered)
     }
 
     fn agrees(&self, pdu: &[u8]) -> bool {
-        self.outline().agrees(pdu)
+        self.outline().is_some_and(|outline| outline.agrees(pdu))
     }
 
     fn expected(&self, pdu: &[u8]) -> Option<NonZeroU8> {
-        if !self.ended && self.function() == REPORT_SERVER_ID {
+        let job = self.job.as_ref()?;
+        let outline = &job.ticket().outline;
+        if !self.ended && outline.function() == REPORT_SERVER_ID {
             // Complete as it is counted if the check says so. More may come if not.
-            let counted = self.outline().expected(pdu, 0)?;
-            if self.ends_with_crc(pdu, counted) {
+            let counted = outline.expected(pdu, 0)?;
+            if Self::ends_with_crc(job, pdu, counted) {
                 return Some(counted);
             }
         }
@@ -287,7 +283,7 @@ impl<J: Job> Question for Asked<J> {
             // While more may come, it is never complete, but for the longest.
             pdu.len().min(MAX_PDU)
         };
-        self.outline().expected(pdu, whole)
+        outline.expected(pdu, whole)
     }
 
     fn judge(&mut self, pdu: &[u8]) -> Status {

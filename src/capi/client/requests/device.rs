@@ -315,21 +315,21 @@ pub unsafe extern "C" fn mbm_client_custom(
             Some(|inside, words, _| {
                 let response: *const mbm_rule = core::ptr::with_exposed_provenance(words[2]);
                 let Some(response) = response.as_ref() else {
-                return Status::INVALID_ARGUMENT;
-            };
-            let (kind, most) = match response.kind {
-                MBM_RULE_SILENCE => (OWN, u8::MAX),
-                MBM_RULE_FIXED => (FIXED, MAX_PDU as u8),
-                MBM_RULE_COUNTED => (COUNTS, MAX_PDU as u8 - 1),
-                _ => return Status::INVALID_ARGUMENT,
-            };
-            if kind != OWN && !(1..=most).contains(&response.bytes) {
-                return Status::INVALID_ARGUMENT;
-            }
-            let numbers = [response.bytes, response.more];
-            let outline = &mut inside.ticket.outline;
-            outline.add_rule(words[0] as u8, words[1] as u16, kind, numbers)
-        }),
+                    return Status::INVALID_ARGUMENT;
+                };
+                let (kind, most) = match response.kind {
+                    MBM_RULE_SILENCE => (OWN, u8::MAX),
+                    MBM_RULE_FIXED => (FIXED, MAX_PDU as u8),
+                    MBM_RULE_COUNTED => (COUNTS, MAX_PDU as u8 - 1),
+                    _ => return Status::INVALID_ARGUMENT,
+                };
+                if kind != OWN && !(1..=most).contains(&response.bytes) {
+                    return Status::INVALID_ARGUMENT;
+                }
+                let numbers = [response.bytes, response.more];
+                let outline = &mut inside.ticket.outline;
+                outline.add_rule(words[0] as u8, words[1] as u16, kind, numbers)
+            }),
         )
     }
 }
