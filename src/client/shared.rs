@@ -182,6 +182,7 @@ impl<J: Job, const N: usize> Shared<J, N> {
     }
 
     /// Puts a job before all others; there is room for it.
+    #[cfg_attr(target_os = "none", inline(always))]
     pub(super) fn put_first(&mut self, mut job: J) {
         for place in self.queue.iter_mut() {
             core::mem::swap(place, &mut job);
@@ -192,7 +193,8 @@ impl<J: Job, const N: usize> Shared<J, N> {
     /// Takes the first job that is due out of the queue; if there is none, notes when
     /// somebody will be.
     pub(super) fn take_due(&mut self, now: u32, means: &mut impl Means) -> Option<J> {
-        if self.delay(now) > 0 {
+        // Firmware without mbm_client_pollDelay has no other use for the delay.
+        if !FIRMWARE && self.delay(now) > 0 {
             return None;
         }
         let mut least = u32::MAX;

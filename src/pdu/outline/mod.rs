@@ -173,10 +173,12 @@ impl Outline {
 
     /// True if `pdu`, complete or not, agrees with the head of this request.
     pub fn agrees(&self, pdu: &[u8]) -> bool {
-        let mut theirs = pdu.iter();
-        self.head()
-            .iter()
-            .all(|ours| theirs.next().is_none_or(|theirs| theirs == ours))
+        for (ours, theirs) in self.head().iter().zip(pdu) {
+            if ours != theirs {
+                return false;
+            }
+        }
+        true
     }
 
     /// True if `pdu` is the whole response to a write of one or many coils or
