@@ -1,4 +1,6 @@
-/* The client takes parts of its buffers without a check. Buffers of the heap, no byte
+/* Storage of the program's that is not as the client expects it.
+ *
+ * The client takes parts of its buffers without a check. Buffers of the heap, no byte
  * longer than they are told, of many sizes: the port's hooks fill and read every byte
  * that they are offered, so that AddressSanitizer sees one that is outside. */
 #include "mbm.h"
@@ -173,10 +175,89 @@ static void no_byte_outside_of_the_buffers_is_touched(void **state)
     assert_true(sum > 0);
 }
 
+static int driver;
+
+static int16_t take_one(void *context, const uint8_t *bytes, uint16_t length)
+{
+    (void)context;
+    (void)bytes;
+    return length > 0;
+}
+
+static int16_t offer_nothing(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    (void)context;
+    (void)bytes;
+    (void)capacity;
+    return 0;
+}
+
+static void switch_on(void *context)
+{
+    (void)context;
+    driver++;
+}
+
+static void switch_off(void *context)
+{
+    (void)context;
+    driver--;
+}
+
+/* A client that is in the middle of sending a request, which is then zeroed. */
+static void zero_while_sent(line *l)
+{
+    mbm_port port;
+    static uint8_t frame[256];
+
+    memset(l, 0, sizeof *l);
+    memset(&port, 0, sizeof port);
+    port.context = l;
+    port.read = offer_nothing;
+    port.write = take_one;
+    port.micros = clock_of;
+    port.preTransmission = switch_on;
+    port.postTransmission = switch_off;
+    driver = 0;
+    OK(mbm_client_beginRtu(&l->client, &port, frame, sizeof frame));
+    l->requests[0].unit = 1;
+    IS(MBM_PENDING, mbm_client_writeSingleCoil(&l->client, &l->requests[0], 1, 1));
+    while (driver == 0) {
+        l->now += 1000;
+        IS(MBM_PENDING, mbm_client_poll(&l->client));
+    }
+    memset(&l->requests[0], 0, sizeof l->requests[0]);
+}
+
+static void a_request_zeroed_while_it_is_sent_is_cancelled_with_the_driver_off(void **state)
+{
+    static line l;
+
+    (void)state;
+    zero_while_sent(&l);
+    OK(mbm_client_cancel(&l.client, &l.requests[0]));
+    assert_int_equal(driver, 0);
+    assert_int_equal(mbm_client_pending(&l.client), 0);
+}
+
+static void a_request_zeroed_while_it_is_sent_is_lost_with_its_link(void **state)
+{
+    static line l;
+
+    (void)state;
+    zero_while_sent(&l);
+    OK(mbm_client_reconnect(&l.client, NULL));
+    assert_int_equal(driver, 0);
+    OK(mbm_client_poll(&l.client));
+    assert_int_equal(l.requests[0].status, MBM_LINK_LOST);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_byte_outside_of_the_buffers_is_touched),
+        cmocka_unit_test(a_request_zeroed_while_it_is_sent_is_cancelled_with_the_driver_off),
+        cmocka_unit_test(a_request_zeroed_while_it_is_sent_is_lost_with_its_link),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -61,10 +61,8 @@ impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
     }
 
     /// Hands the engine a job, and starts its request.
-    fn start(&mut self, mut job: J) -> Status {
-        let ticket = job.ticket_mut();
-        ticket.enter(Stage::Sent, 0, 0);
-        let unit = ticket.unit;
+    fn start(&mut self, job: J) -> Status {
+        let unit = job.ticket().unit;
         self.engine.forget();
         let request = self.engine.request();
         request.job = Some(job);

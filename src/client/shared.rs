@@ -105,10 +105,17 @@ impl<J: Job, const N: usize> Shared<J, N> {
         queue.any(|job| job.ticket().transaction == transaction)
     }
 
+    /// Takes the job that is under way, marked as such whatever became of its ticket.
+    fn take_active(&mut self) -> Option<J> {
+        let mut job = self.active.take()?;
+        job.ticket_mut().enter(Stage::Sent, 0, 0);
+        Some(job)
+    }
+
     /// Takes out the job that `is` the one, which was given up.
     pub(crate) fn withdraw(&mut self, is: impl Fn(&J) -> bool) -> Option<J> {
         let mut job = if self.active.as_ref().is_some_and(&is) {
-            self.active.take()?
+            self.take_active()?
         } else {
             let at = self.queue.iter().position(is)?;
             self.remove(at)?
@@ -120,7 +127,7 @@ impl<J: Job, const N: usize> Shared<J, N> {
 
     /// What was under way ends as lost, by the next polls; the link is a new one.
     pub(crate) fn interrupt(&mut self) {
-        if let Some(job) = self.active.take() {
+        if let Some(job) = self.take_active() {
             self.put_first(job);
         }
         self.abandon(|job| job.ticket().is_sent());
