@@ -111,7 +111,7 @@ unsafe fn is_free(client: *const mbm_client, request: *const mbm_clientRequest) 
 /// As the header demands.
 #[cfg_attr(target_os = "none", inline(never))]
 #[cfg_attr(not(target_os = "none"), inline(always))]
-#[allow(improper_ctypes_definitions)] // C calls it not.
+#[allow(improper_ctypes_definitions)] // C does not call it.
 unsafe extern "C" fn queue(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
@@ -134,7 +134,7 @@ unsafe extern "C" fn queue(
 /// As the header demands.
 #[cfg_attr(target_os = "none", inline(always))]
 #[cfg_attr(not(target_os = "none"), cold, inline(never))]
-#[allow(improper_ctypes_definitions)] // C calls it not.
+#[allow(improper_ctypes_definitions)] // C does not call it.
 unsafe extern "C" fn queue_unknown(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
