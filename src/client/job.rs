@@ -97,12 +97,13 @@ impl Ticket {
     }
 
     /// True if its response is waited for.
-    pub(super) fn is_sent(&self) -> bool {
+    pub(crate) fn is_sent(&self) -> bool {
         matches!(self.stage, Stage::Sent | Stage::Strayed)
     }
 
     /// How long it is not due yet.
-    #[inline(always)]
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn remains(&self, now: u32, means: &mut impl Means) -> u32 {
         let wait = match self.wait {
             0 => 0,
@@ -156,6 +157,11 @@ pub trait Job {
     }
 }
 
+/// True if a request that ended so was answered, with data or an exception.
+pub(super) fn is_answer(ended: Status) -> bool {
+    ended.code() < 0x80
+}
+
 /// Hands the data of `pdu`, a complete response, to the job.
 pub(super) fn deliver<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
     let at = usize::from(job.ticket().outline.data_at());
@@ -177,13 +183,21 @@ pub(super) fn take<J: Job>(job: &mut J, data: &[u8]) -> Status {
     }
     ticket.length = data.len() as u8;
     let words = ticket.outline.takes_words();
+    // The bits behind the last one are zero.
+    if FIRMWARE {
+        let mask = ticket.outline.mask();
+        for (index, byte) in data.iter().enumerate() {
+            let is_last = index + 1 == data.len();
+            job.put(index, if is_last { *byte & mask } else { *byte });
+        }
+        return Status::OK;
+    }
     job.put_all(data);
-    if !FIRMWARE && words {
+    if words {
         return Status::OK;
     }
     let mask = job.ticket().outline.mask();
     if mask != 0xFF {
-        // The bits behind the last one are zero.
         if let Some((last, before)) = data.split_last() {
             job.put(before.len(), *last & mask);
         }
@@ -201,26 +215,20 @@ pub struct Asked<J> {
 }
 
 impl<J: Job> Asked<J> {
-    fn outline(&self) -> &Outline {
-        match &self.job {
-            Some(job) => &job.ticket().outline,
-            None => &Outline::NONE,
-        }
+    fn outline(&self) -> Option<&Outline> {
+        self.job.as_ref().map(|job| &job.ticket().outline)
     }
 
     /// True if a right CRC follows the first `length` bytes of `pdu`, as in RTU.
-    fn ends_with_crc(&self, pdu: &[u8], length: NonZeroU8) -> bool {
-        let (Some(job), Some(checked)) = (&self.job, pdu.get(..usize::from(length.get()) + 2))
-        else {
-            return false;
-        };
-        crc16(&[job.ticket().unit]).with(checked).is_residue()
+    fn ends_with_crc(job: &J, pdu: &[u8], length: NonZeroU8) -> bool {
+        let checked = pdu.get(..usize::from(length.get()) + 2);
+        checked.is_some_and(|checked| crc16(&[job.ticket().unit]).with(checked).is_residue())
     }
+}
 
-    /// What gives the bytes to send. (One type, so one function for all who ask.)
-    fn bytes(&self) -> impl Fn(usize) -> u8 + '_ {
-        |index| self.job.as_ref().map_or(0, |job| job.byte(index))
-    }
+/// What gives the bytes of a job to send. (One type, so one function for all who ask.)
+pub(super) fn bytes<J: Job>(job: &J) -> impl Fn(usize) -> u8 + '_ {
+    |index| job.byte(index)
 }
 
 impl<J: Job> Question for Asked<J> {
@@ -233,34 +241,38 @@ impl<J: Job> Question for Asked<J> {
     const REPEATS: bool = false;
 
     fn function(&self) -> u8 {
-        self.outline().function()
+        self.outline().map_or(0, Outline::function)
     }
 
     fn length(&self) -> u8 {
-        self.outline().request_length()
+        self.outline().map_or(0, Outline::request_length)
     }
 
     fn emit(&self, pdu: &mut [u8], _: &[u16]) {
-        self.outline().emit(pdu, self.bytes());
+        if let Some(job) = &self.job {
+            job.ticket().outline.emit(pdu, bytes(job));
+        }
     }
 
     fn may_be_broadcast(&self) -> bool {
-        self.outline().may_be_broadcast()
+        self.outline().is_some_and(Outline::may_be_broadcast)
     }
 
     fn is_answered(&self) -> bool {
-        self.outline().is_answered()
+        self.outline().is_some_and(Outline::is_answered)
     }
 
     fn agrees(&self, pdu: &[u8]) -> bool {
-        self.outline().agrees(pdu)
+        self.outline().is_some_and(|outline| outline.agrees(pdu))
     }
 
     fn expected(&self, pdu: &[u8]) -> Option<NonZeroU8> {
-        if !self.ended && self.function() == REPORT_SERVER_ID {
+        let job = self.job.as_ref()?;
+        let outline = &job.ticket().outline;
+        if !self.ended && outline.function() == REPORT_SERVER_ID {
             // Complete as it is counted if the check says so. More may come if not.
-            let counted = self.outline().expected(pdu, 0)?;
-            if self.ends_with_crc(pdu, counted) {
+            let counted = outline.expected(pdu, 0)?;
+            if Self::ends_with_crc(job, pdu, counted) {
                 return Some(counted);
             }
         }
@@ -271,13 +283,16 @@ impl<J: Job> Question for Asked<J> {
             // While more may come, it is never complete, but for the longest.
             pdu.len().min(MAX_PDU)
         };
-        self.outline().expected(pdu, whole)
+        outline.expected(pdu, whole)
     }
 
     fn judge(&mut self, pdu: &[u8]) -> Status {
         let pdu = pdu.get(..pdu.len().saturating_sub(2)).unwrap_or_default();
         self.length = pdu.len() as u8;
-        self.outline().judge(pdu, self.bytes())
+        match &self.job {
+            Some(job) => job.ticket().outline.judge(pdu, bytes(job)),
+            None => Status::MALFORMED_REPLY,
+        }
     }
 
     fn ends(&mut self, ended: bool) {

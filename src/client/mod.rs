@@ -19,10 +19,9 @@ pub use shared::Shared;
 pub use tcp::Tcp;
 pub use units::{note, rest, Means, Unit};
 
+#[cfg(doc)]
 use crate::error::Status;
 use crate::time::millis;
-use crate::transaction::BROADCAST;
-use job::Stage;
 
 /// What is a pause in a TCP stream that carries the frames of a serial line.
 pub const STREAM_SILENCE: u32 = millis(20);
@@ -38,23 +37,11 @@ pub trait Line<J> {
     /// The most requests under way at once.
     const MOST: usize;
 
+    /// Whether unit 0 is everybody.
+    const BROADCASTS: bool;
+
     /// Whether a caller's number must tell one request from another.
     const HAS_IDS: bool;
-
-    /// True if unit 0 is everybody.
-    fn broadcasts(&self) -> bool;
-
-    /// How many requests it holds outside of the queue.
-    fn held(&self) -> usize;
-
-    /// True if nothing is under way.
-    fn is_idle(&self) -> bool;
-
-    /// Says that a job was taken out of the queue.
-    fn released(&mut self, _job: &J) {}
-
-    /// True if it holds a job outside of the queue that `is` the one.
-    fn holds(&mut self, is: impl FnOnce(&J) -> bool) -> bool;
 
     /// Moves on to the time `now`; gives a job back that ended. `fresh` at the
     /// first of the calls that one poll makes, when there may be something new.
@@ -65,11 +52,14 @@ pub trait Line<J> {
         fresh: bool,
     ) -> Option<J>;
 
-    /// Gives up the job that `is` the one, if the line holds it.
-    fn withdraw(&mut self, is: impl FnOnce(&J) -> bool) -> Option<J>;
+    /// Forgets a job that was under way, or with `None` all, with what is half
+    /// received or half sent.
+    fn release(&mut self, job: Option<&J>);
 
-    /// Forgets what is half received or half sent; what is under way is lost.
-    fn interrupt<const N: usize>(&mut self, shared: &mut Shared<J, N>);
+    /// True if nothing is left to be sent of requests that were given up.
+    fn is_idle(&self) -> bool {
+        true
+    }
 
     /// How long there is nothing to do; `None` if that depends on the queue.
     fn delay(&mut self, now: u32) -> Option<u32>;
@@ -79,34 +69,14 @@ pub trait Line<J> {
 #[repr(C)]
 pub struct Client<L, J, const N: usize> {
     shared: Shared<J, N>,
-    lent: bool,
     /// How requests travel.
     pub line: L,
 }
 
 impl<L, J, const N: usize> Client<L, J, N> {
-    /// A client without requests.
-    pub const fn new(line: L) -> Self {
-        Client {
-            shared: Shared::new(),
-            line,
-            lent: false,
-        }
-    }
-
-    /// Turns zeroed storage into a client without requests, but for the line.
-    pub fn preset(&mut self) {
-        self.shared.connected = true;
-    }
-
     /// When requests are asked again.
     pub fn policy(&mut self) -> &mut Policy {
         &mut self.shared.policy
-    }
-
-    /// Policy and line at once.
-    pub fn parts(&mut self) -> (&mut Policy, &mut L) {
-        (&mut self.shared.policy, &mut self.line)
     }
 
     /// False from a lost link on, until a reply arrives or
@@ -122,16 +92,29 @@ impl<L, J, const N: usize> Client<L, J, N> {
 
     /// Ends what [`Client::lend`] began.
     pub fn take_back(&mut self) {
-        self.lent = false;
+        self.shared.lent = false;
     }
 
     /// True while somebody else uses the line.
     pub const fn is_lent(&self) -> bool {
-        self.lent
+        self.shared.lent
+    }
+
+    /// How many requests wait or are under way.
+    pub fn pending(&self) -> usize {
+        self.shared.pending()
     }
 }
 
 impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
+    /// A client without requests.
+    pub fn new(line: L) -> Self {
+        let mut shared = Shared::new();
+        shared.broadcasts = L::BROADCASTS;
+        shared.has_ids = L::HAS_IDS;
+        Client { shared, line }
+    }
+
     /// Holds at compile time that the line carries `M` requests at once and the
     /// queue has room for them: 1 on a serial line, which is half duplex.
     ///
@@ -188,16 +171,6 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
         self
     }
 
-    /// How many requests wait or are under way.
-    pub fn pending(&self) -> usize {
-        self.shared.queue.len() + self.line.held()
-    }
-
-    /// True if a job that `is` the one waits or is under way.
-    pub fn holds(&mut self, is: impl Fn(&J) -> bool) -> bool {
-        self.shared.queue.iter().any(&is) || self.line.holds(is)
-    }
-
     /// Has a job done; it is given back by [`Client::poll`].
     ///
     /// # Errors
@@ -205,45 +178,14 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// [`Status::BROADCAST_NOT_ALLOWED`], or on TCP
     /// [`Status::DUPLICATE_TRANSACTION`] for a number other than 0 that another
     /// pending request has.
-    pub fn queue(&mut self, mut job: J) -> Result<(), J> {
-        let status = self.readiness(&job);
-        let ticket = job.ticket_mut();
-        ticket.status = status;
-        if status != Status::PENDING {
-            return Err(job);
-        }
-        ticket.exception = 0;
-        ticket.length = 0;
-        ticket.retries = 0;
-        ticket.enter(Stage::Queued, 0, 0);
-        self.shared.look = true;
-        self.shared.queue.push(job)
-    }
-
-    /// [`Status::PENDING`] if a job may be queued, else why not.
-    fn readiness(&self, job: &J) -> Status {
-        let ticket = job.ticket();
-        let everybody = ticket.unit == BROADCAST;
-        if self.pending() >= N {
-            Status::QUEUE_FULL
-        } else if everybody && !(self.line.broadcasts() && ticket.outline.may_be_broadcast()) {
-            Status::BROADCAST_NOT_ALLOWED
-        } else if L::HAS_IDS && ticket.transaction != 0 && self.has(ticket.transaction) {
-            Status::DUPLICATE_TRANSACTION
-        } else {
-            Status::PENDING
-        }
-    }
-
-    fn has(&self, transaction: u16) -> bool {
-        let mut queue = self.shared.queue.iter();
-        queue.any(|job| job.ticket().transaction == transaction)
+    pub fn queue(&mut self, job: J) -> Result<(), J> {
+        self.shared.enqueue(job)
     }
 
     /// Moves on to the time `now`, without waiting; gives a job back that has
     /// ended. Call it until there is none, `fresh` at first.
     pub fn poll(&mut self, now: u32, fresh: bool) -> Option<J> {
-        if self.lent {
+        if self.shared.lent {
             return None;
         }
         self.line.advance(&mut self.shared, now, fresh)
@@ -253,27 +195,16 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// a byte arrives; the greatest value if there is no request, and then no byte is
     /// taken either. While a TCP port does not take what is to be sent, 1000.
     pub fn poll_delay(&mut self, now: u32) -> u32 {
-        match self.line.delay(now) {
-            _ if self.lent => u32::MAX,
-            Some(delay) => delay,
-            None => self.shared.delay(now),
-        }
+        self.shared.poll_delay(&mut self.line, now)
     }
 
     /// Gives up the job that `is` the one, and gives it back; `None` if it is not
     /// pending.
     pub fn cancel(&mut self, is: impl Fn(&J) -> bool) -> Option<J> {
-        let held = self.line.withdraw(&is);
-        let mut job = match held {
-            Some(job) => job,
-            None => {
-                let at = self.shared.place(|job| is(job))?;
-                self.shared.remove(at)?
-            }
-        };
-        self.line.released(&job);
-        self.shared.look = true;
-        job.ticket_mut().status = Status::CANCELLED;
+        let job = self.shared.withdraw(is)?;
+        if job.ticket().is_sent() {
+            self.line.release(Some(&job));
+        }
         Some(job)
     }
 
@@ -281,15 +212,13 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// what was under way is given back as lost by the next polls. What still
     /// waited goes over the new link.
     pub fn reconnect(&mut self) {
-        self.line.interrupt(&mut self.shared);
-        self.shared.connected = true;
+        self.line.release(None);
+        self.shared.interrupt();
     }
 
     /// Lets somebody else use the line until [`Client::take_back`]; false if a
     /// request is under way or the line is lent already.
     pub fn lend(&mut self) -> bool {
-        let free = !self.lent && self.line.is_idle();
-        self.lent |= free;
-        free
+        self.shared.lend(&self.line)
     }
 }

@@ -1,10 +1,10 @@
 //! A client's serial line, or a stream that carries the frames of one: one
 //! request at a time.
 
-use super::job::{deliver, Asked, Job, Stage};
+use super::job::{deliver, is_answer, Asked, Job, Stage};
 use super::shared::Shared;
 use super::units::Means;
-use super::Line;
+use super::{Client, Line};
 use crate::error::Status;
 use crate::frame::rtu::Window;
 use crate::frame::Search;
@@ -15,48 +15,40 @@ use crate::transaction::{Counter, Transaction};
 /// in ASCII frames.
 #[repr(C)]
 pub struct Serial<P, S, J, W = Window> {
-    broadcasts: bool,
-    engine: Transaction<P, S, Asked<J>, W>,
+    pub(crate) engine: Transaction<P, S, Asked<J>, W>,
 }
 
 impl<P, S, J: Job, W: Search> Serial<P, S, J, W> {
-    /// A serial line, where unit 0 is everybody.
+    /// A serial line.
     pub const fn new(port: P, means: S) -> Self {
         Serial {
-            broadcasts: true,
             engine: Transaction::new(port, means),
         }
-    }
-
-    /// The frames of a serial line in a TCP stream: no gap between them, and
-    /// nobody to broadcast to.
-    pub const fn over_tcp(port: P, means: S) -> Self {
-        let mut line = Self::new(port, means);
-        line.broadcasts = false;
-        line.engine.settings.gap = 0;
-        line.engine.settings.silence = super::STREAM_SILENCE;
-        line
-    }
-}
-
-impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
-    /// Says whether unit 0 is everybody.
-    pub fn set_broadcasts(&mut self, on: bool) {
-        self.broadcasts = on;
     }
 
     /// The transactions under it.
     pub fn transaction(&mut self) -> &mut Transaction<P, S, Asked<J>, W> {
         &mut self.engine
     }
+}
 
-    /// Moves the request under way on.
-    fn step(&mut self, now: u32) -> Status {
-        self.engine.poll(now)
+impl<P: Port, S: Means, J: Job, W: Search, const N: usize> Client<Serial<P, S, J, W>, J, N> {
+    /// A client that sends the frames of a serial line through a TCP stream: no gap
+    /// between them, and nobody to broadcast to.
+    pub fn over_tcp(port: P, means: S) -> Self {
+        let mut client = Client::new(Serial::new(port, means));
+        client.shared.broadcasts = false;
+        client.line.engine.settings.gap = 0;
+        client.line.engine.settings.silence = super::STREAM_SILENCE;
+        client
     }
+}
 
+impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
     /// Takes and drops the bytes that arrive while requests wait to be sent again. A
     /// program that sleeps until bytes are there would not sleep otherwise.
+    #[cold]
+    #[inline(never)]
     fn drop_late<const N: usize>(&mut self, shared: &mut Shared<J, N>) {
         let heard = self.engine.port.read(self.engine.storage.frame());
         if heard < 0 {
@@ -68,6 +60,17 @@ impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
         }
     }
 
+    /// Hands the engine a job, and starts its request.
+    fn start(&mut self, job: J) -> Status {
+        let unit = job.ticket().unit;
+        self.engine.forget();
+        let request = self.engine.request();
+        request.job = Some(job);
+        request.length = 0;
+        self.engine.start(unit)
+    }
+
+    /// How the request ended: its response is taken.
     fn received(&mut self, job: &mut J, status: Status) -> Status {
         job.ticket_mut().exception = self.engine.exception_code();
         // 0 if nothing answered: the request was a broadcast, or of that kind.
@@ -81,23 +84,8 @@ impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
 
 impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
     const MOST: usize = 1;
+    const BROADCASTS: bool = true;
     const HAS_IDS: bool = false;
-
-    fn broadcasts(&self) -> bool {
-        self.broadcasts
-    }
-
-    fn held(&self) -> usize {
-        usize::from(self.engine.is_pending())
-    }
-
-    fn is_idle(&self) -> bool {
-        !self.engine.is_pending()
-    }
-
-    fn holds(&mut self, is: impl FnOnce(&J) -> bool) -> bool {
-        self.engine.request().job.as_ref().is_some_and(is)
-    }
 
     fn advance<const N: usize>(
         &mut self,
@@ -105,7 +93,11 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         now: u32,
         fresh: bool,
     ) -> Option<J> {
-        let started = if !self.engine.is_pending() {
+        // The engine has the job while it works, no longer.
+        let mut status = Status::PENDING;
+        if let Some(job) = shared.active.take() {
+            self.engine.request().job = Some(job);
+        } else {
             let Some(job) = shared.take_due(now, &mut self.engine.storage) else {
                 if fresh && !shared.queue.is_empty() {
                     self.drop_late(shared);
@@ -115,47 +107,28 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
             if job.ticket().is(Stage::Lost) {
                 return shared.conclude(job, Status::LINK_LOST, now, &mut self.engine.storage);
             }
-            let unit = job.ticket().unit;
-            self.engine.forget();
-            self.engine.request().job = Some(job);
-            self.engine.request().length = 0;
-            self.engine.start(unit)
-        } else {
-            Status::PENDING
-        };
-        let status = match started {
-            Status::PENDING => self.step(now),
-            refused => refused,
-        };
+            status = self.start(job);
+        }
         if status == Status::PENDING {
-            return None;
+            status = self.engine.poll(now);
         }
         let mut job = self.engine.request().job.take()?;
+        if status == Status::PENDING {
+            shared.active = Some(job);
+            return None;
+        }
         let status = self.received(&mut job, status);
         if status == Status::LINK_LOST {
             shared.lose();
-        } else if !status.is_failure() {
+        } else if is_answer(status) {
             shared.connected = true;
         }
         // There is room: it came out of the queue, and was counted as if in it.
         shared.conclude(job, status, now, &mut self.engine.storage)
     }
 
-    fn withdraw(&mut self, is: impl FnOnce(&J) -> bool) -> Option<J> {
-        if !self.holds(is) {
-            return None;
-        }
+    fn release(&mut self, _: Option<&J>) {
         self.engine.cancel();
-        self.engine.request().job.take()
-    }
-
-    fn interrupt<const N: usize>(&mut self, shared: &mut Shared<J, N>) {
-        self.engine.cancel();
-        if let Some(mut job) = self.engine.request().job.take() {
-            job.ticket_mut().enter(Stage::Lost, 0, 0);
-            shared.put_first(job);
-            shared.look = true;
-        }
     }
 
     fn delay(&mut self, now: u32) -> Option<u32> {

@@ -1,11 +1,13 @@
-//! What clients of every line have in common: requests that wait, and what
-//! becomes of one that ended.
+//! What clients of every line have in common: the requests, and what becomes of
+//! one that ended. It is compiled once, whatever lines a program has.
 
 use super::job::{Job, Stage};
 use super::policy::Policy;
 use super::units::Means;
+use super::Line;
 use crate::error::Status;
 use crate::time::elapsed;
+use crate::transaction::BROADCAST;
 use crate::FIRMWARE;
 use heapless::Vec;
 
@@ -14,11 +16,20 @@ use heapless::Vec;
 pub struct Shared<J, const N: usize> {
     /// Something may be due whatever `since` and `wait` say.
     pub(super) look: bool,
-    pub(super) connected: bool,
+    pub(crate) connected: bool,
+    /// Somebody else uses the line.
+    pub(crate) lent: bool,
+    /// Unit 0 is everybody.
+    pub(crate) broadcasts: bool,
+    /// No two requests may have the same number of the caller's, but 0.
+    pub(crate) has_ids: bool,
     /// Nobody is due before `wait` has passed since `since`.
     since: u32,
     wait: u32,
-    pub(super) policy: Policy,
+    pub(crate) policy: Policy,
+    /// The request under way on a line that carries one at a time. It is in the
+    /// queue no longer, but has its place there.
+    pub(super) active: Option<J>,
     pub(super) queue: Vec<J, N>,
 }
 
@@ -27,17 +38,125 @@ impl<J, const N: usize> Shared<J, N> {
         Shared {
             look: false,
             connected: true,
+            lent: false,
+            broadcasts: false,
+            has_ids: false,
             since: 0,
             wait: u32::MAX,
             policy: Policy::DEFAULT,
+            active: None,
             queue: Vec::new(),
         }
+    }
+
+    /// True if nothing waits and nothing is under way.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.queue.is_empty() && self.active.is_none()
+    }
+
+    /// How many requests wait or are under way.
+    pub(crate) fn pending(&self) -> usize {
+        self.queue.len() + usize::from(self.active.is_some())
+    }
+
+    /// True if a job that `is` the one waits or is under way.
+    pub(crate) fn holds(&self, is: impl Fn(&J) -> bool) -> bool {
+        self.active.as_ref().is_some_and(&is) || self.queue.iter().any(&is)
     }
 }
 
 impl<J: Job, const N: usize> Shared<J, N> {
+    /// See [`Client::queue`](super::Client::queue).
+    pub(crate) fn enqueue(&mut self, mut job: J) -> Result<(), J> {
+        let status = self.readiness(&job);
+        let ticket = job.ticket_mut();
+        ticket.status = status;
+        if status != Status::PENDING {
+            return Err(job);
+        }
+        ticket.exception = 0;
+        ticket.length = 0;
+        ticket.retries = 0;
+        ticket.enter(Stage::Queued, 0, 0);
+        self.look = true;
+        // There is room, so nothing comes back.
+        let _ = self.queue.push(job);
+        Ok(())
+    }
+
+    /// [`Status::PENDING`] if a job may be queued, else why not.
+    fn readiness(&self, job: &J) -> Status {
+        let ticket = job.ticket();
+        if self.pending() >= N {
+            Status::QUEUE_FULL
+        } else if ticket.unit == BROADCAST
+            && !(self.broadcasts && ticket.outline.may_be_broadcast())
+        {
+            Status::BROADCAST_NOT_ALLOWED
+        } else if self.has_ids && ticket.transaction != 0 && self.has(ticket.transaction) {
+            Status::DUPLICATE_TRANSACTION
+        } else {
+            Status::PENDING
+        }
+    }
+
+    fn has(&self, transaction: u16) -> bool {
+        let mut queue = self.queue.iter();
+        queue.any(|job| job.ticket().transaction == transaction)
+    }
+
+    /// Takes the job that is under way, marked as such whatever became of its ticket.
+    fn take_active(&mut self) -> Option<J> {
+        let mut job = self.active.take()?;
+        job.ticket_mut().enter(Stage::Sent, 0, 0);
+        Some(job)
+    }
+
+    /// Takes out the job that `is` the one, which was given up.
+    pub(crate) fn withdraw(&mut self, is: impl Fn(&J) -> bool) -> Option<J> {
+        let mut job = if self.active.as_ref().is_some_and(&is) {
+            self.take_active()?
+        } else {
+            let at = self.queue.iter().position(is)?;
+            self.remove(at)?
+        };
+        self.look = true;
+        job.ticket_mut().status = Status::CANCELLED;
+        Some(job)
+    }
+
+    /// What was under way ends as lost, by the next polls; the link is a new one.
+    pub(crate) fn interrupt(&mut self) {
+        if let Some(job) = self.take_active() {
+            self.put_first(job);
+        }
+        self.abandon(|job| job.ticket().is_sent());
+        self.connected = true;
+    }
+
+    /// True if nothing is under way.
+    pub(crate) fn is_idle(&self) -> bool {
+        self.active.is_none() && !self.queue.iter().any(|job| job.ticket().is_sent())
+    }
+
+    /// See [`Client::lend`](super::Client::lend).
+    pub(crate) fn lend(&mut self, line: &impl Line<J>) -> bool {
+        let free = !self.lent && self.is_idle() && line.is_idle();
+        self.lent |= free;
+        free
+    }
+
+    /// See [`Client::poll_delay`](super::Client::poll_delay).
+    pub(crate) fn poll_delay(&self, line: &mut impl Line<J>, now: u32) -> u32 {
+        match line.delay(now) {
+            _ if self.lent => u32::MAX,
+            Some(delay) => delay,
+            None => self.delay(now),
+        }
+    }
+
     /// How long nobody is due.
-    pub(super) fn delay(&self, now: u32) -> u32 {
+    pub(crate) fn delay(&self, now: u32) -> u32 {
         if self.queue.is_empty() {
             u32::MAX
         } else if self.look {
@@ -70,6 +189,7 @@ impl<J: Job, const N: usize> Shared<J, N> {
     }
 
     /// Puts a job before all others; there is room for it.
+    #[cfg_attr(target_os = "none", inline(always))]
     pub(super) fn put_first(&mut self, mut job: J) {
         for place in self.queue.iter_mut() {
             core::mem::swap(place, &mut job);
@@ -77,15 +197,11 @@ impl<J: Job, const N: usize> Shared<J, N> {
         let _ = self.queue.push(job);
     }
 
-    /// The place of the first job that `is` the one.
-    pub(super) fn place(&self, is: impl FnMut(&J) -> bool) -> Option<usize> {
-        self.queue.iter().position(is)
-    }
-
     /// Takes the first job that is due out of the queue; if there is none, notes when
     /// somebody will be.
     pub(super) fn take_due(&mut self, now: u32, means: &mut impl Means) -> Option<J> {
-        if self.delay(now) > 0 {
+        // Firmware without mbm_client_pollDelay has no other use for the delay.
+        if !FIRMWARE && self.delay(now) > 0 {
             return None;
         }
         let mut least = u32::MAX;

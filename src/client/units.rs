@@ -97,6 +97,19 @@ pub fn note(units: &mut [Unit], unit: u8, status: Status, again: bool, now: u32)
 
 /// What the caller lends to a client, besides the frame buffer.
 pub trait Means: Storage {
+    /// The bytes of the frame buffer between two places, of which the first is not
+    /// behind the second and the second not behind the end.
+    fn received(&mut self, from: u16, to: u16) -> &mut [u8] {
+        let bytes = self.frame().get_mut(from.into()..to.into());
+        bytes.unwrap_or_default()
+    }
+
+    /// As [`Means::received`], of [`Means::outgoing`].
+    fn to_send(&mut self, from: u16, to: u16) -> &mut [u8] {
+        let bytes = self.outgoing().get_mut(from.into()..to.into());
+        bytes.unwrap_or_default()
+    }
+
     /// What TCP requests are gathered in; unused on a serial line.
     fn outgoing(&mut self) -> &mut [u8] {
         &mut []

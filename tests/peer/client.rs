@@ -66,8 +66,12 @@ struct Asker<L> {
 
 impl<L: Line<Task>> Asker<L> {
     fn new(line: L) -> Self {
+        Self::with(Client::new(line))
+    }
+
+    fn with(client: Client<L, Task, 4>) -> Self {
         Asker {
-            client: Client::new(line),
+            client,
             begun: Instant::now(),
         }
     }
@@ -238,7 +242,8 @@ fn the_client_asks_pymodbus_for_every_function_over_tcp() {
 #[test]
 fn the_client_asks_pymodbus_for_every_function_over_rtu_in_tcp() {
     let wire = Wire::new(Framing::RtuOverTcp);
-    let mut line: Serial<Wire, Lent, Task> = Serial::over_tcp(wire, Lent::default());
-    line.transaction().settings.response_timeout = TIMEOUT;
-    Asker::new(line).every_function();
+    let mut client: Client<Serial<Wire, Lent, Task>, Task, 4> =
+        Client::over_tcp(wire, Lent::default());
+    client.line.transaction().settings.response_timeout = TIMEOUT;
+    Asker::with(client).every_function();
 }

@@ -1,84 +1,54 @@
 //! A client of each kind of line.
 
-use super::{client, mbm_client, pointers, Kind, Lent, LentByC, Object};
-use super::{Ascii, Rtu, TcpIp};
+use super::kind::{self, line, AsciiLine, Kind, TcpLine};
+use super::{mbm_client, pointers};
 use crate::capi::frame::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
 use crate::capi::port::{countable, mbm_port};
-use crate::client::{Line, Serial, Tcp, ASCII_SILENCE, STREAM_SILENCE};
 use crate::error::Status;
-use crate::frame::{ascii, ascii_window, rtu, Search};
-
-/// The least that a frame buffer may have for ASCII: the shortest request and response,
-/// a function code and two words.
-const LEAST_ASCII: u16 = 17;
 
 /// Makes a client of a kind of line out of storage.
 ///
 /// # Safety
 /// As the header demands of the begin functions.
-unsafe fn begin<L: Kind>(
+#[cfg_attr(target_os = "none", inline(never))]
+unsafe fn begin(
     pointer: *mut mbm_client,
     port: *const mbm_port,
     frame: *mut u8,
     frame_bytes: u16,
-) -> Status {
-    if pointer.is_null() || port.is_null() || frame.is_null() || frame_bytes < 8 {
-        return Status::INVALID_ARGUMENT;
-    }
-    // SAFETY: not NULL, so a port.
-    let port = unsafe { &*port };
-    if !port.is_complete() {
-        return Status::INVALID_ARGUMENT;
-    }
-    // SAFETY: not NULL, so storage of an object, zeroed or begun; zero is a value
-    // of every field but for the calls, which no one uses before they are set.
-    unsafe {
-        if pointers::check(pointer) != Status::NOT_INITIALISED {
-            return Status::BUSY;
+    kind: &'static Kind,
+) -> u8 {
+    // SAFETY: as the header demands: each is NULL or what it says, and the object is
+    // storage, zeroed or begun; zero is a value of every field but for the kind, which
+    // no one uses before it is set.
+    let status = unsafe {
+        match port.as_ref() {
+            Some(port)
+                if !frame.is_null()
+                    && frame_bytes >= u16::from(kind.least)
+                    && port.is_complete() =>
+            {
+                match pointers::check(pointer) {
+                    Status::NOT_INITIALISED => {
+                        let object = pointers::object(pointer);
+                        (*object).kind = kind;
+                        (*object).shared.connected = true;
+                        kind.settings(object).preset();
+                        (*kind.port(object)).copy(port);
+                        let means = kind.means(object);
+                        means.frame = frame;
+                        means.frame_bytes = countable(frame_bytes);
+                        pointers::calling(pointer, || (kind.start)(object));
+                        Status::OK
+                    }
+                    Status::INVALID_ARGUMENT => Status::INVALID_ARGUMENT,
+                    _ => Status::BUSY,
+                }
+            }
+            _ => Status::INVALID_ARGUMENT,
         }
-        let object = pointers::object(pointer);
-        (*object).calls = &L::CALLS;
-        let client = client::<L>(object);
-        client.preset();
-        let (settings, means, place) = client.line.parts();
-        settings.preset();
-        place.copy(port);
-        means.frame = frame;
-        means.frame_bytes = countable(frame_bytes);
-        Object::mark(pointer).write(Object::BEGUN);
-    }
-    Status::OK
-}
-
-/// As [`begin`], for the lines of [`Serial`].
-unsafe fn begin_serial<W: Search + 'static>(
-    pointer: *mut mbm_client,
-    port: *const mbm_port,
-    frame: *mut u8,
-    frame_bytes: u16,
-    broadcasts: bool,
-    silence: Option<u32>,
-) -> u8
-where
-    Serial<mbm_port, LentByC, Lent, W>: Kind,
-{
-    // SAFETY: as the header demands.
-    unsafe {
-        let status = begin::<Serial<mbm_port, LentByC, Lent, W>>(pointer, port, frame, frame_bytes);
-        if status != Status::OK {
-            return status.code();
-        }
-        let object = pointers::object(pointer);
-        let line = &mut client::<Serial<mbm_port, LentByC, Lent, W>>(object).line;
-        line.set_broadcasts(broadcasts);
-        let engine = line.transaction();
-        if let Some(silence) = silence {
-            engine.settings.gap = 0;
-            engine.settings.silence = silence;
-        }
-        pointers::calling(pointer, || engine.line_used());
-        Status::OK.code()
-    }
+    };
+    status.code()
 }
 
 /// Makes an object a client of a serial line, in RTU frames (serial line guide
@@ -98,7 +68,7 @@ pub unsafe extern "C" fn mbm_client_beginRtu(
     frameBytes: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { begin_serial::<rtu::Window>(client, port, frame, frameBytes, true, None) }
+    unsafe { begin(client, port, frame, frameBytes, &kind::RTU) }
 }
 
 /// Makes an object a client of a serial line, in ASCII frames (serial line guide
@@ -118,31 +88,8 @@ pub unsafe extern "C" fn mbm_client_beginAscii(
     frame: *mut u8,
     frameBytes: u16,
 ) -> u8 {
-    let silence = Some(ASCII_SILENCE);
-    if frameBytes < LEAST_ASCII {
-        return Status::INVALID_ARGUMENT.code();
-    }
     // SAFETY: as the header demands.
-    unsafe {
-        let status =
-            begin_serial::<ascii_window::Window>(client, port, frame, frameBytes, true, silence);
-        if status == Status::OK.code() {
-            let object = pointers::object(client);
-            (*object).framing = MBM_FRAMING_ASCII;
-            *delimiter(object) = ascii::END;
-        }
-        status
-    }
-}
-
-/// What ends the frames of an ASCII client.
-///
-/// # Safety
-/// As for [`client`].
-unsafe fn delimiter<'a>(object: *mut Object) -> &'a mut u8 {
-    // SAFETY: as the caller promises.
-    let ascii: &mut Ascii = unsafe { client(object) };
-    &mut ascii.line.transaction().search().delimiter
+    unsafe { begin(client, port, frame, frameBytes, &kind::ASCII) }
 }
 
 /// Sets the character that ends ASCII frames behind CR, in place of LF, in both
@@ -160,17 +107,17 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
     // SAFETY: as the header demands.
     unsafe {
         pointers::with(client, |object| {
-            if (*object).framing != MBM_FRAMING_ASCII
+            if (*(*object).kind).framing != MBM_FRAMING_ASCII
                 || !(1..=127).contains(&character)
                 || part_of_a_frame
             {
                 return Status::INVALID_ARGUMENT;
             }
-            let ascii: &mut Ascii = super::client(object);
-            if !ascii.line.is_idle() {
+            if !super::shared(object).is_idle() {
                 return Status::BUSY;
             }
-            *delimiter(object) = character;
+            let engine = line::<AsciiLine>(object).transaction();
+            engine.search().delimiter = character;
             Status::OK
         })
     }
@@ -192,9 +139,8 @@ pub unsafe extern "C" fn mbm_client_beginRtuOverTcp(
     frame: *mut u8,
     frameBytes: u16,
 ) -> u8 {
-    let silence = Some(STREAM_SILENCE);
     // SAFETY: as the header demands.
-    unsafe { begin_serial::<rtu::Window>(client, port, frame, frameBytes, false, silence) }
+    unsafe { begin(client, port, frame, frameBytes, &kind::RTU_OVER_TCP) }
 }
 
 /// Makes an object a client of a TCP stream, in frames with the MBAP header
@@ -220,21 +166,18 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
     outgoing: *mut u8,
     outgoingBytes: u16,
 ) -> u8 {
-    if incomingBytes < 9 || outgoing.is_null() || outgoingBytes < 12 {
+    if outgoing.is_null() || outgoingBytes < 12 {
         return Status::INVALID_ARGUMENT.code();
     }
     // SAFETY: as the header demands.
     unsafe {
-        let status = begin::<Tcp<mbm_port, LentByC>>(client, port, incoming, incomingBytes);
-        if status == Status::OK {
-            let object = pointers::object(client);
-            (*object).framing = MBM_FRAMING_TCP;
-            let tcp: &mut TcpIp = super::client(object);
-            tcp.line.limit(super::MBM_CLIENT_DEPTH);
-            tcp.line.means.outgoing = outgoing;
-            tcp.line.means.outgoing_bytes = countable(outgoingBytes);
+        let status = begin(client, port, incoming, incomingBytes, &kind::TCP);
+        if status == Status::OK.code() {
+            let means = &mut line::<TcpLine>(pointers::object(client)).means;
+            means.outgoing = outgoing;
+            means.outgoing_bytes = countable(outgoingBytes);
         }
-        status.code()
+        status
     }
 }
 
@@ -250,10 +193,9 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
 pub unsafe extern "C" fn mbm_client_setInFlight(client: *mut mbm_client, most: u8) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        pointers::with(client, |object| match ((*object).framing, most) {
+        pointers::with(client, |object| match ((*(*object).kind).framing, most) {
             (MBM_FRAMING_TCP, 1..=super::MBM_CLIENT_DEPTH) => {
-                let tcp: &mut TcpIp = super::client(object);
-                tcp.line.limit(most);
+                line::<TcpLine>(object).limit(most);
                 Status::OK
             }
             (MBM_FRAMING_RTU | MBM_FRAMING_ASCII, 1) => Status::OK,
@@ -261,5 +203,3 @@ pub unsafe extern "C" fn mbm_client_setInFlight(client: *mut mbm_client, most: u
         })
     }
 }
-
-const _: () = assert!(size_of::<Rtu>() <= size_of::<super::Either>());

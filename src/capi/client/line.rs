@@ -1,6 +1,7 @@
 //! The line under a client: lost and found, lent and taken back.
 
-use super::{client, common, mbm_client, on_line, parts, pointers, Ascii, Line, Rtu, TcpIp};
+use super::kind::{on_line, AsciiLine, RtuLine, TcpLine};
+use super::{mbm_client, pointers, shared};
 use crate::capi::frame::MBM_FRAMING_RTU;
 use crate::capi::master::{mbm_master, Core};
 use crate::capi::pointers as masters;
@@ -37,10 +38,12 @@ pub unsafe extern "C" fn mbm_client_reconnect(
     // hooks of the link are called.
     unsafe {
         let status = pointers::with(client, |object| {
-            if common(object).is_lent() {
+            if shared(object).lent {
                 return Status::BUSY;
             }
-            pointers::calling(client, || on_line!(object, client => client.reconnect()));
+            let release = (*(*object).kind).release;
+            pointers::calling(client, || release(object, None));
+            shared(object).interrupt();
             Status::OK
         });
         if status != Status::OK.code() || link.is_null() {
@@ -54,7 +57,7 @@ pub unsafe extern "C" fn mbm_client_reconnect(
         };
         let status = connect((*link).context);
         if status != Status::OK.code() {
-            common(pointers::object(client)).set_connected(false);
+            shared(pointers::object(client)).connected = false;
         }
         status
     }
@@ -73,7 +76,7 @@ pub unsafe extern "C" fn mbm_client_reconnect(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { pointers::ask(client, 0, |object| common(object).is_connected().into()) }
+    unsafe { pointers::ask(client, 0, |object| shared(object).connected.into()) }
 }
 
 /// Lends the line to a facade, whose functions then use the client's port; the
@@ -91,7 +94,7 @@ pub unsafe extern "C" fn mbm_client_lend(client: *mut mbm_client, master: *mut m
     unsafe {
         let status = pointers::with(client, |object| {
             if !master.is_null() {
-                if (*object).framing != MBM_FRAMING_RTU {
+                if (*(*object).kind).framing != MBM_FRAMING_RTU {
                     // A facade speaks RTU.
                     return Status::INVALID_ARGUMENT;
                 }
@@ -103,12 +106,12 @@ pub unsafe extern "C" fn mbm_client_lend(client: *mut mbm_client, master: *mut m
                     refused => return refused,
                 }
             }
-            if !on_line!(object, client => client.lend()) {
+            if !on_line!(object, line => (*object).shared.lend(line)) {
                 return Status::BUSY;
             }
             if !master.is_null() {
                 masters::prepare(master);
-                *masters::object(master).core().port() = *parts(object).port;
+                *masters::object(master).core().port() = *(*(*object).kind).port(object);
             }
             Status::OK
         });
@@ -134,7 +137,7 @@ pub unsafe extern "C" fn mbm_client_takeBack(
     // SAFETY: as the header demands.
     unsafe {
         pointers::with(client, |object| {
-            if !common(object).is_lent() {
+            if !shared(object).lent {
                 return Status::INVALID_ARGUMENT;
             }
             match masters::check(master) {
@@ -149,7 +152,7 @@ pub unsafe extern "C" fn mbm_client_takeBack(
                 // None, or none that has the port.
                 _ => {}
             }
-            common(object).take_back();
+            shared(object).lent = false;
             Status::OK
         })
     }

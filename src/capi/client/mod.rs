@@ -1,6 +1,7 @@
 //! `mbm_client_*`: the client that never waits, for C.
 
 mod begin;
+mod kind;
 mod line;
 mod poll;
 mod request;
@@ -15,14 +16,14 @@ pub use requests::*;
 pub use settings::*;
 
 use super::client_pointers as pointers;
-use super::port::{self, mbm_port};
+use super::port;
 use super::storage::mbm_counters;
-use crate::client::{self as core_client, Client, Job, Means, Policy, Serial, Tcp, Unit};
+use crate::client::{Means, Policy, Shared, Unit};
 use crate::error::Status;
-use crate::frame::{ascii_window, rtu, Search};
-use crate::transaction::{Counter, Settings, Storage};
+use crate::transaction::{Counter, Storage};
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
+use kind::{Kind, Lines};
 use request::Lent;
 
 /// The most requests that wait or are under way in one client.
@@ -51,30 +52,14 @@ pub struct mbm_client {
     words: [u32; 20],
 }
 
-/// What a client of a serial line in RTU frames, one in ASCII frames and one of
-/// a TCP stream are.
-type Rtu = Client<RtuLine, Lent, DEPTH>;
-type Ascii = Client<AsciiLine, Lent, DEPTH>;
-type TcpIp = Client<TcpLine, Lent, DEPTH>;
-type RtuLine = Serial<mbm_port, LentByC, Lent, rtu::Window>;
-type AsciiLine = Serial<mbm_port, LentByC, Lent, ascii_window::Window>;
-type TcpLine = Tcp<mbm_port, LentByC>;
-
 /// What lies behind an `mbm_client`.
 #[repr(C)]
 pub(super) struct Object {
     mark: u8,
     polling: bool,
-    framing: u8,
-    calls: *const Calls,
-    client: Either,
-}
-
-#[repr(C)]
-union Either {
-    rtu: core::mem::ManuallyDrop<Rtu>,
-    ascii: core::mem::ManuallyDrop<Ascii>,
-    tcp: core::mem::ManuallyDrop<TcpIp>,
+    kind: *const Kind,
+    shared: Shared<Lent, DEPTH>,
+    line: Lines,
 }
 
 const _: () = {
@@ -102,212 +87,13 @@ impl Object {
     }
 }
 
-/// The calls of an object.
+/// What clients of every line have in common. The mark stands outside of it.
 ///
 /// # Safety
-/// `object` is one that is begun.
-unsafe fn calls(object: *const Object) -> &'static Calls {
-    // SAFETY: an object that is begun has them, from constants.
-    unsafe { &*(*object).calls }
-}
-
-/// What differs from one kind of line to the next; firmware carries what its
-/// mbm_client_begin function names. What is called seldom is not here, so that it
-/// is carried only by who calls it: see [`on_line`].
-struct Calls {
-    kind: Line,
-    poll: unsafe fn(*mut mbm_client) -> Status,
-    queue: unsafe fn(*mut Object, Lent) -> Status,
-    holds: unsafe fn(*mut Object, Lent) -> bool,
-}
-
-/// The kinds of line that C has.
-#[derive(Clone, Copy)]
-enum Line {
-    Rtu,
-    Ascii,
-    Tcp,
-}
-
-/// The parts of a client that settings reach.
-struct Parts<'a> {
-    settings: &'a mut Settings,
-    means: &'a mut LentByC,
-    port: &'a mut mbm_port,
-    policy: &'a mut Policy,
-}
-
-type LineParts<'a> = (&'a mut Settings, &'a mut LentByC, &'a mut mbm_port);
-
-/// A kind of line that C has.
-trait Kind: core_client::Line<Lent> + Sized + 'static {
-    const CALLS: Calls;
-
-    fn parts(&mut self) -> LineParts<'_>;
-}
-
-impl Kind for RtuLine {
-    const CALLS: Calls = calls_of::<Self>(Line::Rtu);
-
-    fn parts(&mut self) -> LineParts<'_> {
-        parts_of(self)
-    }
-}
-
-impl Kind for AsciiLine {
-    const CALLS: Calls = calls_of::<Self>(Line::Ascii);
-
-    fn parts(&mut self) -> LineParts<'_> {
-        parts_of(self)
-    }
-}
-
-fn parts_of<W: Search>(line: &mut Serial<mbm_port, LentByC, Lent, W>) -> LineParts<'_> {
-    let engine = line.transaction();
-    (&mut engine.settings, &mut engine.storage, &mut engine.port)
-}
-
-impl Kind for TcpLine {
-    const CALLS: Calls = calls_of::<Self>(Line::Tcp);
-
-    fn parts(&mut self) -> LineParts<'_> {
-        (&mut self.settings, &mut self.means, &mut self.port)
-    }
-}
-
-const fn calls_of<L: Kind>(kind: Line) -> Calls {
-    Calls {
-        kind,
-        poll: poll::<L>,
-        queue: queue::<L>,
-        holds: holds::<L>,
-    }
-}
-
-/// The client in an object. The mark stands outside of it.
-///
-/// # Safety
-/// `object` is begun, with the calls of `L`, and nothing else uses its client while
-/// the reference lives.
-unsafe fn client<'a, L>(object: *mut Object) -> &'a mut Client<L, Lent, DEPTH> {
+/// `object` is begun, and nothing else uses its client while the reference lives.
+unsafe fn shared<'a>(object: *mut Object) -> &'a mut Shared<Lent, DEPTH> {
     // SAFETY: as the caller promises.
-    unsafe { &mut *(&raw mut (*object).client).cast() }
-}
-
-/// What clients of every line have in common.
-///
-/// # Safety
-/// As for [`client`], of any `L`.
-unsafe fn common<'a>(object: *mut Object) -> &'a mut Client<(), Lent, DEPTH> {
-    // SAFETY: as `client`; the line is the last of its fields, whose order is C's.
-    unsafe { &mut *(&raw mut (*object).client).cast() }
-}
-
-/// Does something with the client in an object, whatever its line. Unsafe as
-/// [`client`] is.
-macro_rules! on_line {
-    ($object:expr, $client:ident => $action:expr) => {
-        match $crate::capi::client::calls($object).kind {
-            Line::Rtu => {
-                let $client: &mut Rtu = client($object);
-                $action
-            }
-            Line::Ascii => {
-                let $client: &mut Ascii = client($object);
-                $action
-            }
-            Line::Tcp => {
-                let $client: &mut TcpIp = client($object);
-                $action
-            }
-        }
-    };
-}
-use on_line;
-
-/// The time on the clock of a client's port.
-///
-/// # Safety
-/// As for [`client`]; no reference into the object lives, as the clock is a hook.
-unsafe fn now<L: Kind>(object: *mut Object) -> u32 {
-    // SAFETY: as the caller promises; the reference ends before the hook runs.
-    unsafe {
-        let port: *const mbm_port = client::<L>(object).line.parts().2;
-        port::now(port)
-    }
-}
-
-/// Polls, and calls `done` of those that ended.
-///
-/// # Safety
-/// `pointer` is an object that is begun, as a client of `L`; no reference into it
-/// lives.
-unsafe fn poll<L: Kind>(pointer: *mut mbm_client) -> Status {
-    let object = pointers::object(pointer);
-    // SAFETY: begun; no reference lives while `done` is called, for that may use
-    // the object. If it zeroed it, and perhaps began it anew, polling is over.
-    unsafe {
-        if client::<L>(object).is_lent() {
-            return Status::BUSY;
-        }
-        let now = pointers::calling(pointer, || now::<L>(object));
-        (*object).polling = true;
-        for turn in 0..MBM_CLIENT_DEPTH + 1 {
-            let poll = || client::<L>(object).poll(now, turn == 0);
-            match pointers::calling(pointer, poll) {
-                Some(request) => request.call(),
-                None => break,
-            }
-            if !(*object).polling {
-                return Status::OK;
-            }
-        }
-        (*object).polling = false;
-        match client::<L>(object).pending() {
-            0 => Status::OK,
-            _ => Status::PENDING,
-        }
-    }
-}
-
-/// # Safety
-/// As for [`client`].
-unsafe fn queue<L: Kind>(object: *mut Object, request: Lent) -> Status {
-    // SAFETY: as the caller promises.
-    match unsafe { client::<L>(object) }.queue(request) {
-        Ok(()) => Status::PENDING,
-        Err(refused) => refused.ticket().status,
-    }
-}
-
-/// True if the client has this request already, whatever the request says of itself.
-///
-/// # Safety
-/// As for [`client`].
-unsafe fn holds<L: Kind>(object: *mut Object, request: Lent) -> bool {
-    // SAFETY: as the caller promises.
-    unsafe { client::<L>(object) }.holds(|held| *held == request)
-}
-
-/// The parts of the client in an object.
-///
-/// # Safety
-/// As for [`client`].
-#[cfg_attr(target_os = "none", inline(never))]
-unsafe fn parts<'a>(object: *mut Object) -> Parts<'a> {
-    // SAFETY: as the caller promises.
-    unsafe {
-        on_line!(object, client => {
-            let (policy, line) = client.parts();
-            let (settings, means, port) = Kind::parts(line);
-            Parts {
-                settings,
-                means,
-                port,
-                policy,
-            }
-        })
-    }
+    unsafe { &mut (*object).shared }
 }
 
 /// How long a request waits to be asked again, if it is. (A pointer, as [`Treatment`].)
@@ -368,6 +154,16 @@ impl Means for LentByC {
     fn outgoing(&mut self) -> &mut [u8] {
         // SAFETY: see above; a TCP client is begun with one, no other asks for it.
         unsafe { from_raw_parts_mut(self.outgoing, self.outgoing_bytes.into()) }
+    }
+
+    fn received(&mut self, from: u16, to: u16) -> &mut [u8] {
+        // SAFETY: see above; the client keeps its places within the buffer.
+        unsafe { from_raw_parts_mut(self.frame.add(from.into()), (to - from).into()) }
+    }
+
+    fn to_send(&mut self, from: u16, to: u16) -> &mut [u8] {
+        // SAFETY: as for `received`.
+        unsafe { from_raw_parts_mut(self.outgoing.add(from.into()), (to - from).into()) }
     }
 
     fn units(&mut self) -> &mut [Unit] {

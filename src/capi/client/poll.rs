@@ -1,11 +1,20 @@
 //! Moving a client's requests on, and giving them up.
 
+use super::kind::{on_line, Advance, AsciiLine, RtuLine, TcpLine};
 use super::{
-    calls, client, mbm_client, mbm_clientRequest, now, on_line, pointers, Ascii, AsciiLine, Kind,
-    Lent, Line, Object, Rtu, RtuLine, TcpIp, TcpLine,
+    mbm_client, mbm_clientRequest, pointers, port, shared, Lent, Object, MBM_CLIENT_DEPTH,
 };
 use crate::client::Job as _;
 use crate::error::Status;
+
+/// The time on the clock of a client's port.
+///
+/// # Safety
+/// `object` is begun; no reference into it lives, as the clock is a hook.
+unsafe fn now(object: *mut Object) -> u32 {
+    // SAFETY: as the caller promises.
+    unsafe { port::now((*(*object).kind).port(object)) }
+}
 
 /// Moves all requests on, without waiting, and calls `done` of those that have
 /// ended, of at most 17 in one call.
@@ -21,21 +30,51 @@ use crate::error::Status;
 pub unsafe extern "C" fn mbm_client_poll(client: *mut mbm_client) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        pointers::with(client, |object| match (*object).polling {
-            true => Status::BUSY,
-            false => (calls(object).poll)(client),
+        pointers::with(client, |object| {
+            if (*object).polling || (*object).shared.lent {
+                return Status::BUSY;
+            }
+            let kind = (*object).kind;
+            #[cfg(not(any(target_os = "none", mbm_firmware)))]
+            return ((*kind).poll)(client);
+            #[cfg(any(target_os = "none", mbm_firmware))]
+            turns(client, (*kind).advance)
         })
     }
 }
 
+/// Polls, and calls `done` of the requests that ended. One function for all kinds of
+/// line, but a part of each kind's own on a host, with `advance` in it.
+///
 /// # Safety
-/// As for [`now`].
-#[cfg_attr(not(target_os = "none"), inline(never))]
-unsafe fn poll_delay<L: Kind>(object: *mut Object) -> u32 {
-    // SAFETY: as the caller promises.
+/// `client` is begun, with a line that `advance` is for; no reference into it lives.
+#[cfg_attr(not(any(target_os = "none", mbm_firmware)), inline(always))]
+pub(super) unsafe fn turns(client: *mut mbm_client, advance: Advance) -> Status {
+    let object = pointers::object(client);
+    // SAFETY: as the caller promises. No reference lives while `done` is called, for
+    // that may use the object. If it zeroed it, and perhaps began it anew, polling is
+    // over.
     unsafe {
-        let now = now::<L>(object);
-        client::<L>(object).poll_delay(now)
+        let now = pointers::calling(client, || now(object));
+        (*object).polling = true;
+        let mut turns = MBM_CLIENT_DEPTH + 1;
+        while turns > 0 {
+            let fresh = turns > MBM_CLIENT_DEPTH;
+            match pointers::calling(client, || advance(object, now, fresh)) {
+                Some(request) => request.call(),
+                None => break,
+            }
+            if !(*object).polling {
+                return Status::OK;
+            }
+            turns -= 1;
+        }
+        (*object).polling = false;
+        if (*object).shared.is_empty() {
+            Status::OK
+        } else {
+            Status::PENDING
+        }
     }
 }
 
@@ -55,11 +94,8 @@ pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
         match pointers::check(client) {
             Status::OK => pointers::calling(client, || {
                 let object = pointers::object(client);
-                match calls(object).kind {
-                    Line::Rtu => poll_delay::<RtuLine>(object),
-                    Line::Ascii => poll_delay::<AsciiLine>(object),
-                    Line::Tcp => poll_delay::<TcpLine>(object),
-                }
+                let now = now(object);
+                on_line!(object, line => (*object).shared.poll_delay(line, now))
             }),
             Status::BUSY => 0,
             _ => u32::MAX,
@@ -74,13 +110,7 @@ pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_pending(client: *const mbm_client) -> u8 {
     // SAFETY: as the header demands.
-    unsafe {
-        pointers::ask(
-            client,
-            0,
-            |object| on_line!(object, client => client.pending() as u8),
-        )
-    }
+    unsafe { pointers::ask(client, 0, |object| shared(object).pending() as u8) }
 }
 
 /// Gives a request up. It is yours again at once, with the status MBM_CANCELLED;
@@ -100,14 +130,16 @@ pub unsafe extern "C" fn mbm_client_cancel(
     unsafe {
         pointers::with(client, |object| match Lent::new(request) {
             None => Status::INVALID_ARGUMENT,
-            Some(request) => {
-                let cancel =
-                    || on_line!(object, client => client.cancel(|job| *job == request)).is_none();
-                match pointers::calling(client, cancel) {
-                    true => Status::NOT_PENDING,
-                    false => Status::OK,
+            Some(request) => match shared(object).withdraw(|job| *job == request) {
+                Some(job) => {
+                    if job.ticket().is_sent() {
+                        let release = (*(*object).kind).release;
+                        pointers::calling(client, || release(object, Some(&job)));
+                    }
+                    Status::OK
                 }
-            }
+                None => Status::NOT_PENDING,
+            },
         })
     }
 }

@@ -1,10 +1,11 @@
 //! How a client behaves.
 
-use super::{mbm_client, parts, pointers, Parts, Treatment};
+use super::{mbm_client, pointers, LentByC, Treatment};
 use crate::capi::storage::mbm_counters;
-use crate::client::{again, note, rest, Backoff, Means as _, Unit};
+use crate::client::{again, note, rest, Backoff, Means as _, Policy, Unit};
 use crate::error::Status;
 use crate::time::millis;
+use crate::transaction::Settings;
 use core::ffi::c_void;
 
 /// mbm_client_setBackoff: a request is asked again at once.
@@ -57,6 +58,13 @@ const _: () = {
     assert!(offset_of!(mbm_clientUnit, status) == offset_of!(Unit, status));
 };
 
+/// The parts of a client that settings reach.
+struct Parts<'a> {
+    settings: &'a mut Settings,
+    means: &'a mut LentByC,
+    policy: &'a mut Policy,
+}
+
 /// Changes a setting.
 ///
 /// # Safety
@@ -64,7 +72,16 @@ const _: () = {
 #[cfg_attr(target_os = "none", inline(always))]
 unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> Status) -> u8 {
     // SAFETY: as the caller promises.
-    unsafe { pointers::with(client, |object| change(parts(object))) }
+    unsafe {
+        pointers::with(client, |object| {
+            let kind = &*(*object).kind;
+            change(Parts {
+                settings: kind.settings(object),
+                means: kind.means(object),
+                policy: &mut (*object).shared.policy,
+            })
+        })
+    }
 }
 
 /// Sets how long a response may take. The time begins with the end of the request on a

@@ -2,7 +2,7 @@
 
 use super::Tcp;
 use crate::bytes::move_to_front;
-use crate::client::job::{deliver, take, Job, Stage};
+use crate::client::job::{bytes, deliver, is_answer, take, Job, Stage};
 use crate::client::shared::Shared;
 use crate::client::units::Means;
 use crate::error::Status;
@@ -18,8 +18,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
     /// Moves what was not looked at yet to the start of the buffer.
     #[cold]
     pub(super) fn gather(&mut self) {
-        let kept = self.means.frame().get_mut(..usize::from(self.end));
-        move_to_front(kept.unwrap_or_default(), self.start.into());
+        move_to_front(self.means.received(0, self.end), self.start.into());
         self.end -= self.start;
         self.start = 0;
     }
@@ -68,7 +67,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
         self.astray = false;
         self.flying = self.flying.wrapping_sub(1);
         shared.connected = true;
-        if !status.is_failure() {
+        if is_answer(status) {
             self.means.count(Counter::Replies, 1);
             if status != Status::OK {
                 self.means.count(Counter::Exceptions, 1);
@@ -88,9 +87,8 @@ impl<P: Port, S: Means> Tcp<P, S> {
             if self.skip > 0 {
                 self.pass();
             }
-            let frame = self.means.frame();
-            let room = frame.len();
-            let rest = frame.get(usize::from(self.start)..usize::from(self.end))?;
+            let room = self.means.frame().len();
+            let rest = self.means.received(self.start, self.end);
             let header = match tcp::header(rest) {
                 Ok(header) => header,
                 Err(Status::INCOMPLETE_FRAME) => return None,
@@ -105,30 +103,26 @@ impl<P: Port, S: Means> Tcp<P, S> {
                 self.start += 1;
                 continue;
             }
-            let pdu = rest.get(tcp::PDU..header.total);
-            if pdu.is_none() && header.total <= room {
+            let is_whole = header.total <= rest.len();
+            if !is_whole && header.total <= room {
                 return None;
             }
-            let total = header.total as u16;
             let Some((at, job)) = asked else {
-                self.skip = total;
+                self.skip = header.total as u16;
                 self.note(shared, &header);
                 continue;
             };
-            let status = match pdu {
-                Some(pdu) => judge(job, pdu),
-                None => Status::BUFFER_TOO_SMALL,
-            };
-            if self.astray && status.is_failure() && status != Status::BUFFER_TOO_SMALL {
-                // It only looked like that.
-                self.start += 1;
-                continue;
+            let mut status = Status::BUFFER_TOO_SMALL;
+            if is_whole {
+                status = judge(job, rest.get(tcp::PDU..header.total).unwrap_or_default());
+                if self.astray && !is_answer(status) && status != Status::BUFFER_TOO_SMALL {
+                    // It only looked like that.
+                    self.start += 1;
+                    continue;
+                }
             }
-            match pdu {
-                Some(_) => self.start += total,
-                // What does not fit is passed over as it arrives.
-                None => self.skip = total,
-            }
+            // What does not fit is passed over as it arrives.
+            self.skip = header.total as u16;
             if let Some(job) = self.answered(shared, at, status, now) {
                 return Some(job);
             }
@@ -177,14 +171,17 @@ fn judge<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
     if outline.is_repeated_by(pdu) {
         return deliver(job, pdu);
     }
-    match outline.expected(pdu, pdu.len()) {
-        Some(length) if usize::from(length.get()) == pdu.len() => {}
-        None if pdu.first().map(|code| code & 0x7F) != Some(outline.function()) => {
-            return Status::INVALID_FUNCTION;
-        }
-        _ => return Status::MALFORMED_REPLY,
+    let [function, ..] = *pdu else {
+        return Status::MALFORMED_REPLY;
+    };
+    if function & 0x7F != outline.function() {
+        return Status::INVALID_FUNCTION;
     }
-    let status = outline.judge(pdu, |index| job.byte(index));
+    let expected = outline.expected(pdu, pdu.len());
+    if expected.map(|length| length.get().into()) != Some(pdu.len()) {
+        return Status::MALFORMED_REPLY;
+    }
+    let status = outline.judge(pdu, bytes(job));
     if let [function, code, ..] = *pdu {
         if function & 0x80 != 0 {
             job.ticket_mut().exception = code;

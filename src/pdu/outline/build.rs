@@ -8,24 +8,36 @@ use super::super::limits::{
     MAX_RECORD, MAX_WRITE_BITS, MAX_WRITE_REGISTERS, READ_FILE_BYTES, WRITE_FILE_BYTES,
 };
 use super::super::query::check_range;
-use super::super::{files, registers, EXCEPTION};
+use super::super::{files, EXCEPTION};
 use super::form::*;
 use super::{Outline, HEAD};
 use crate::error::Status;
 
-// Each is a part of the one function of C that calls it, and again of the one that
-// forwards: so firmware that forwards nothing pays nothing ("client: RTU, every
-// function" in docs/size.md).
+/// The first word of one group: its reference type behind the byte count.
+pub(crate) const GROUP: usize = files::REFERENCE_TYPE as usize;
+
+// What is behind [`Outline::set`] stands apart, for the functions of C call that first,
+// at one place for all.
 impl Outline {
     /// Becomes a request of two words, as far as its form has them.
     /// [`Status::OK`]; [`Status::ILLEGAL_DATA_VALUE`] for a quantity that the
     /// standard does not allow, [`Status::ILLEGAL_DATA_ADDRESS`] if the range
     /// passes 65535.
-    #[cfg_attr(target_os = "none", inline(never))]
     pub fn set(&mut self, form: Form, first: u16, second: u16) -> Status {
-        let ([a, b], [c, d]) = (first.to_be_bytes(), second.to_be_bytes());
+        self.set_all(form, &[first.into(), second.into(), 0, 0])
+    }
+
+    /// As [`Outline::set`], with as many words in the head as the function has.
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
+    pub(crate) fn set_all(&mut self, form: Form, words: &[usize; 4]) -> Status {
+        // No map, which would be a loop.
+        let (first, second) = (words[0] as u16, words[1] as u16);
         self.form = form;
-        self.head = [form.0 as u8, a, b, c, d, 0, 0, 0, 0];
+        self.head[0] = form.0 as u8;
+        for (place, word) in self.head[1..].as_chunks_mut().0.iter_mut().zip(words) {
+            *place = (*word as u16).to_be_bytes();
+        }
         self.head_length = form.number(HEAD_LENGTH);
         self.length = form.number(LENGTH);
         self.repeated = form.number(REPEATED);
@@ -39,33 +51,24 @@ impl Outline {
         } else {
             (second << 1, MAX_READ_REGISTERS, MAX_WRITE_REGISTERS)
         };
-        let most = if form.has(COUNTED) {
-            self.data_length = bytes as u8;
-            write
-        } else {
+        let most = if form.has(READ) {
             self.length = (bytes as u8).wrapping_add(2);
             read
+        } else {
+            self.data_length = bytes as u8;
+            write
         };
         check_range(first, second, most)
     }
 
-    fn put(&mut self, at: usize, word: u16) {
-        if let Some(place) = self.head.get_mut(at..at + 2) {
-            place.copy_from_slice(&word.to_be_bytes());
-        }
-    }
-
     /// 16: the register becomes `(register & and) | (or & !and)`.
-    #[cfg_attr(target_os = "none", inline(always))]
     pub fn mask_write_register(&mut self, address: u16, and_mask: u16, or_mask: u16) -> Status {
-        self.set(Form::MASK_WRITE_REGISTER, address, and_mask);
-        self.put(5, or_mask);
-        Status::OK
+        let words = [address.into(), and_mask.into(), or_mask.into(), 0];
+        self.set_all(Form::MASK_WRITE_REGISTER, &words)
     }
 
     /// 17: 1 to 121 registers are written, then 1 to 125 read; else as
     /// [`Outline::set`].
-    #[cfg_attr(target_os = "none", inline(always))]
     pub fn read_write_registers(
         &mut self,
         read_address: u16,
@@ -73,55 +76,54 @@ impl Outline {
         write_address: u16,
         write_quantity: u16,
     ) -> Status {
-        const FORM: Form = Form::registers(registers::READ_WRITE_MULTIPLE_REGISTERS);
-        let readable = self.set(FORM, read_address, read_quantity);
-        self.form.0 |= COUNTED | SENDS_WORDS;
-        self.put(5, write_address);
-        self.put(7, write_quantity);
-        self.head_length = HEAD as u8;
-        self.data_length = (write_quantity << 1) as u8;
-        match check_range(write_address, write_quantity, MAX_READ_WRITE_REGISTERS) {
+        let words = [read_address, read_quantity, write_address, write_quantity];
+        let words = words.map(usize::from);
+        let readable = self.set_all(Form::READ_WRITE_REGISTERS, &words);
+        match self.add_write(write_address, write_quantity) {
             Status::OK => readable,
             refused => refused,
         }
     }
 
+    /// What 17 writes, behind the head that [`Outline::set_all`] set.
+    #[inline(always)]
+    pub(crate) fn add_write(&mut self, address: u16, quantity: u16) -> Status {
+        self.head_length = HEAD as u8;
+        self.data_length = (quantity << 1) as u8;
+        check_range(address, quantity, MAX_READ_WRITE_REGISTERS)
+    }
+
     /// 08: a sub-function and `words` words of data; all but Return Query Data
     /// take one. [`Status::ILLEGAL_DATA_VALUE`] for another number of them.
-    #[cfg_attr(target_os = "none", inline(always))]
     pub fn diagnostics(&mut self, sub_function: u16, words: u16) -> Status {
         self.set(Form::DIAGNOSTICS, sub_function, 0);
+        self.add_words(sub_function, words)
+    }
+
+    /// How many words of data 08 has, behind what [`Outline::set`] set.
+    #[inline(always)]
+    pub(crate) fn add_words(&mut self, sub_function: u16, words: u16) -> Status {
         self.data_length = (words << 1) as u8;
         self.length = self.data_length.wrapping_add(3);
-        let most = match sub_function {
-            sub_function::RETURN_QUERY_DATA => {
-                self.form.0 |= REPEATS_DATA;
-                (MAX_PDU as u16 - 3) / 2
-            }
-            _ => 1,
-        };
-        self.form.0 |= match sub_function {
-            sub_function::FORCE_LISTEN_ONLY => BROADCAST | UNANSWERED,
+        let (more, most) = match sub_function {
+            sub_function::RETURN_QUERY_DATA => (REPEATS_DATA, (MAX_PDU as u16 - 3) / 2),
+            sub_function::FORCE_LISTEN_ONLY => (BROADCAST | UNANSWERED, 1),
             sub_function::RESTART_COMMUNICATIONS
             | sub_function::CLEAR_COUNTERS
-            | sub_function::CLEAR_OVERRUN_COUNTER => BROADCAST,
-            _ => 0,
+            | sub_function::CLEAR_OVERRUN_COUNTER => (BROADCAST, 1),
+            _ => (0, 1),
         };
+        self.form.0 |= more;
         value(words >= 1 && words <= most)
     }
 
-    /// 14 or 15 of one group of records.
-    fn group(&mut self, form: Form, file: u16, record: u16, length: u16) -> Status {
+    /// One group of records, of 14 or 15, whose head [`Outline::set_all`] set, but for
+    /// its byte count.
+    pub(crate) fn add_group(&mut self, file: u16, record: u16, length: u16) -> Status {
         let bytes = (length << 1) as u8;
-        self.set(form, 0, 0);
-        self.head[2] = files::REFERENCE_TYPE;
-        self.put(3, file);
-        self.put(5, record);
-        self.put(7, length);
         self.head_length = HEAD as u8;
-        let (count, most) = if form.has(REPEATS_DATA) {
+        let (count, most) = if self.form.has(REPEATS_DATA) {
             self.data_length = bytes;
-            self.repeated = HEAD as u8;
             self.length = bytes.wrapping_add(HEAD as u8);
             (bytes.wrapping_add(7), (WRITE_FILE_BYTES.1 - 7) / 2)
         } else {
@@ -136,6 +138,12 @@ impl Outline {
         } else {
             Status::OK
         }
+    }
+
+    fn group(&mut self, form: Form, file: u16, record: u16, length: u16) -> Status {
+        let words = [GROUP, file.into(), record.into(), length.into()];
+        self.set_all(form, &words);
+        self.add_group(file, record, length)
     }
 
     /// 14 of 1 to 121 records in a row. [`Status::ILLEGAL_DATA_VALUE`] for
@@ -168,15 +176,22 @@ impl Outline {
     }
 
     /// 2B/0E: read device id code 1 to 4 and the object to begin with.
-    #[cfg_attr(target_os = "none", inline(always))]
     pub fn read_device_identification(&mut self, code: u8, object: u8) -> Status {
-        self.encapsulated(MEI_READ_DEVICE_IDENTIFICATION, 0);
-        // Its data begin behind the code.
-        self.form.0 += 1 << DATA;
-        self.head[2] = code;
-        self.head[3] = object;
-        self.head_length = 4;
-        self.repeated = 3;
+        let [first, second] = Outline::identification(code, object);
+        self.set(Form::READ_DEVICE_IDENTIFICATION, first, second);
+        Outline::check_code(code)
+    }
+
+    /// The two words of 2B/0E.
+    #[inline(always)]
+    pub(crate) fn identification(code: u8, object: u8) -> [u16; 2] {
+        let mei_type = MEI_READ_DEVICE_IDENTIFICATION;
+        [u16::from_be_bytes([mei_type, code]), u16::from(object) << 8]
+    }
+
+    /// [`Status::OK`] for a read device id code.
+    #[inline(always)]
+    pub(crate) fn check_code(code: u8) -> Status {
         value(matches!(code, 1..=4))
     }
 
@@ -189,20 +204,30 @@ impl Outline {
 
     /// A function of the user's with so many `bytes` of data, whose response is
     /// as long as `rule` says.
-    #[cfg_attr(target_os = "none", inline(always))]
     pub fn custom(&mut self, function: u8, bytes: u16, rule: Rule) -> Status {
-        self.set(Form::new(function, OWN, 1, 0, 0, 1), 0, 0);
-        let (kind, length, more) = match rule {
-            Rule::Fixed(length) => (FIXED, length, 0),
-            Rule::Counted(offset, more) => (COUNTS, offset, more),
-            Rule::Silence => (OWN, 1, 0),
-        };
-        self.form.0 -= OWN - kind;
+        self.set(Form::CUSTOM, 0, 0);
+        match rule {
+            Rule::Fixed(0) | Rule::Counted(0, _) => Status::INVALID_ARGUMENT,
+            Rule::Fixed(length) => self.add_rule(function, bytes, FIXED, [length, 0]),
+            Rule::Counted(offset, more) => self.add_rule(function, bytes, COUNTS, [offset, more]),
+            Rule::Silence => self.add_rule(function, bytes, OWN, [0, 0]),
+        }
+    }
+
+    /// The function of the user's, behind the form that [`Outline::set`] set: how the
+    /// length of its response is known, with the numbers that this takes.
+    #[cfg_attr(target_os = "none", inline(always))]
+    pub(crate) fn add_rule(
+        &mut self,
+        function: u8,
+        bytes: u16,
+        kind: u32,
+        [length, more]: [u8; 2],
+    ) -> Status {
+        self.form.0 |= kind | u32::from(function);
+        self.head[0] = function;
         self.length = length;
         self.more = more;
-        if length == 0 {
-            return Status::INVALID_ARGUMENT;
-        }
         if function == 0 || function & EXCEPTION != 0 {
             return Status::ILLEGAL_FUNCTION;
         }
@@ -210,7 +235,7 @@ impl Outline {
     }
 
     /// So many bytes of data follow the head.
-    pub(super) fn follow(&mut self, bytes: u16) -> Status {
+    pub(crate) fn follow(&mut self, bytes: u16) -> Status {
         self.data_length = bytes as u8;
         value(usize::from(bytes) + usize::from(self.head_length) <= MAX_PDU)
     }

@@ -17,8 +17,8 @@ pub(super) const TAKES_WORDS: u32 = 1 << 10;
 pub(super) const REPEATS_DATA: u32 = 1 << 11;
 /// Every unit may be told at once.
 pub(super) const BROADCAST: u32 = 1 << 12;
-/// The data of the response are one group of a file.
-pub(super) const GROUP: u32 = 1 << 13;
+/// The data of the response are groups of files.
+pub(super) const GROUPS: u32 = 1 << 13;
 /// Nothing responds.
 pub(super) const UNANSWERED: u32 = 1 << 14;
 /// The second word is a quantity.
@@ -27,13 +27,13 @@ pub(super) const RANGE: u32 = 1 << 15;
 pub(super) const BITS: u32 = 1 << 16;
 
 /// How the length of the response is known, two bits: it is so long,
-pub(super) const FIXED: u32 = 0;
+pub(crate) const FIXED: u32 = 0;
 /// so long, and its second byte counts,
 pub(super) const READ: u32 = 1 << 17;
 /// the byte at an offset counts,
-pub(super) const COUNTS: u32 = 2 << 17;
+pub(crate) const COUNTS: u32 = 2 << 17;
 /// its own rules say, or nothing but its end.
-pub(super) const OWN: u32 = 3 << 17;
+pub(crate) const OWN: u32 = 3 << 17;
 pub(super) const KIND: u32 = 3 << 17;
 
 /// From this bit on, three bits each: length of the head and of the response,
@@ -138,13 +138,18 @@ impl Form {
     /// 11. Its response may be longer than it counts.
     pub const REPORT_SERVER_ID: Form = Form::bare(diagnostics::REPORT_SERVER_ID, OWN, 0, 2);
     /// 16, of which the OR mask is to be added.
-    pub(super) const MASK_WRITE_REGISTER: Form =
+    pub(crate) const MASK_WRITE_REGISTER: Form =
         Form::new(registers::MASK_WRITE_REGISTER, BROADCAST, 7, 7, 7, 0);
     /// 18: address.
     pub const READ_FIFO_QUEUE: Form =
         Form::new(files::READ_FIFO_QUEUE, OWN | TAKES_WORDS, 3, 0, 0, 5);
 
-    pub(super) const DIAGNOSTICS: Form = Form::new(
+    /// 17, of which what it writes is to be added.
+    pub(crate) const READ_WRITE_REGISTERS: Form =
+        Form(Form::registers(registers::READ_WRITE_MULTIPLE_REGISTERS).0 | COUNTED | SENDS_WORDS);
+
+    /// 08: a sub-function; the data are to be added.
+    pub(crate) const DIAGNOSTICS: Form = Form::new(
         diagnostics::DIAGNOSTICS,
         FIXED | SENDS_WORDS | TAKES_WORDS,
         3,
@@ -152,15 +157,17 @@ impl Form {
         3,
         3,
     );
-    pub(super) const READ_FILE_RECORD: Form = Form::new(
+    /// 14, of which one group is to be added.
+    pub(crate) const READ_FILE_RECORD: Form = Form::new(
         files::READ_FILE_RECORD,
-        READ | GROUP | TAKES_WORDS,
+        READ | GROUPS | TAKES_WORDS,
         0,
         0,
         0,
         4,
     );
-    pub(super) const WRITE_FILE_RECORD: Form = Form::new(
+    /// 15, of which one group is to be added.
+    pub(crate) const WRITE_FILE_RECORD: Form = Form::new(
         files::WRITE_FILE_RECORD,
         FIXED | SENDS_WORDS | REPEATS_DATA | BROADCAST,
         0,
@@ -168,9 +175,17 @@ impl Form {
         0,
         0,
     );
-    pub(super) const READ_FILE_RECORDS: Form =
-        Form::new(files::READ_FILE_RECORD, COUNTS | COUNTED, 1, 1, 0, 2);
-    pub(super) const WRITE_FILE_RECORDS: Form = Form::new(
+    /// 14 of groups that the caller built.
+    pub(crate) const READ_FILE_RECORDS: Form = Form::new(
+        files::READ_FILE_RECORD,
+        COUNTS | GROUPS | COUNTED,
+        1,
+        1,
+        0,
+        2,
+    );
+    /// 15 of groups that the caller built.
+    pub(crate) const WRITE_FILE_RECORDS: Form = Form::new(
         files::WRITE_FILE_RECORD,
         FIXED | COUNTED | REPEATS_DATA | BROADCAST,
         1,
@@ -178,7 +193,8 @@ impl Form {
         1,
         0,
     );
-    pub(super) const ENCAPSULATED: Form = Form::new(
+    /// 2B: the MEI type; the data are to be added.
+    pub(crate) const ENCAPSULATED: Form = Form::new(
         identification::ENCAPSULATED_INTERFACE_TRANSPORT,
         OWN,
         2,
@@ -186,4 +202,15 @@ impl Form {
         2,
         2,
     );
+    /// 2B/0E: code and object behind the MEI type. Its data begin behind the code.
+    pub(crate) const READ_DEVICE_IDENTIFICATION: Form = Form::new(
+        identification::ENCAPSULATED_INTERFACE_TRANSPORT,
+        OWN,
+        4,
+        0,
+        3,
+        3,
+    );
+    /// A user's function, of which the code and the rule are to be added.
+    pub(crate) const CUSTOM: Form = Form::new(0, 0, 1, 0, 0, 1);
 }

@@ -8,7 +8,9 @@ mod build;
 mod form;
 mod forward;
 
+pub(crate) use build::GROUP;
 pub use form::Form;
+pub(crate) use form::{COUNTS, FIXED, OWN};
 
 use super::identification::{self, MEI_READ_DEVICE_IDENTIFICATION};
 use super::length::Length;
@@ -114,6 +116,7 @@ impl Outline {
     }
 
     /// The bits of the last byte of data that are used.
+    #[cfg_attr(target_os = "none", inline(never))]
     pub fn mask(&self) -> u8 {
         if !self.form.has(BITS) {
             return 0xFF;
@@ -127,10 +130,11 @@ impl Outline {
     /// The byte of the request PDU at `index`; `byte` gives those of the data.
     #[cfg_attr(target_os = "none", inline(never))]
     fn at(&self, index: usize, byte: &impl Fn(usize) -> u8) -> u8 {
-        if let Some(byte) = self.head().get(index) {
-            return *byte;
-        }
         let mut behind = index.wrapping_sub(usize::from(self.head_length));
+        match self.head.get(index) {
+            Some(byte) if index < usize::from(self.head_length) => return *byte,
+            _ => {}
+        }
         if self.form.has(COUNTED) {
             if behind == 0 {
                 return self.data_length;
@@ -169,10 +173,12 @@ impl Outline {
 
     /// True if `pdu`, complete or not, agrees with the head of this request.
     pub fn agrees(&self, pdu: &[u8]) -> bool {
-        let mut theirs = pdu.iter();
-        self.head()
-            .iter()
-            .all(|ours| theirs.next().is_none_or(|theirs| theirs == ours))
+        for (ours, theirs) in self.head().iter().zip(pdu) {
+            if ours != theirs {
+                return false;
+            }
+        }
+        true
     }
 
     /// True if `pdu` is the whole response to a write of one or many coils or
@@ -265,55 +271,56 @@ impl Outline {
                 return Status::exception(*code);
             }
         }
-        let repeated = usize::from(self.repeated);
-        let echoed = if self.form.has(REPEATS_DATA) {
-            let mut theirs = pdu.iter().enumerate();
-            theirs.all(|(index, theirs)| *theirs == self.at(index, &byte))
+        let repeated = if self.form.has(REPEATS_DATA) {
+            pdu.len()
         } else {
-            pdu.get(..repeated).is_some_and(|echo| self.agrees(echo))
+            usize::from(self.repeated)
         };
-        let right = match *pdu {
-            _ if !echoed => false,
-            [_, count, group, reference, ..] if self.form.has(GROUP) => {
-                group == count.wrapping_sub(1) && reference == files::REFERENCE_TYPE
+        // No response is shorter than what it repeats, nor than where its data begin.
+        if pdu.len() >= repeated.max(self.data_at().into())
+            && self.begins(pdu, repeated, &byte)
+            && match *pdu {
+                _ if self.form.has(GROUPS) => self.answers_groups(pdu, byte),
+                [files::READ_FIFO_QUEUE, _, bytes, high, words, ..] => {
+                    high == 0 && u16::from(words) <= MAX_FIFO && bytes == 2 * words + 2
+                }
+                _ => true,
             }
-            [files::READ_FILE_RECORD, ..] if self.form.has(COUNTED) => {
-                self.answers_groups(pdu, byte)
-            }
-            [files::READ_FIFO_QUEUE, _, bytes, high, words, ..] => {
-                high == 0 && u16::from(words) <= MAX_FIFO && bytes == 2 * words + 2
-            }
-            _ => pdu.len() >= usize::from(self.data_at()),
-        };
-        if right {
+        {
             Status::OK
         } else {
             Status::MALFORMED_REPLY
         }
     }
 
+    /// True if the first bytes of a `pdu` that has so many are those of the request.
+    #[inline(always)]
+    fn begins(&self, pdu: &[u8], count: usize, byte: &impl Fn(usize) -> u8) -> bool {
+        for (index, theirs) in pdu.get(..count).unwrap_or_default().iter().enumerate() {
+            if *theirs != self.at(index, byte) {
+                return false;
+            }
+        }
+        true
+    }
+
     /// True if a response to 14 has the groups that were asked for, each as long.
     fn answers_groups(&self, pdu: &[u8], byte: impl Fn(usize) -> u8) -> bool {
-        let Some(mut theirs) = pdu.get(2..) else {
-            return false;
-        };
-        // In steps, for step_by divides, which a Cortex-M0 has no instruction for.
-        let mut at = 5;
-        while at < usize::from(self.data_length) {
-            let records = u16::from_be_bytes([byte(at), byte(at + 1)]);
-            let bytes = usize::from(records) << 1;
-            match theirs {
-                [count, files::REFERENCE_TYPE, rest @ ..] if usize::from(*count) == bytes + 1 => {
-                    match rest.get(bytes..) {
-                        Some(more) => theirs = more,
-                        None => return false,
-                    }
-                }
+        // Where the low byte of a group's length stands in the request.
+        let mut asked = 8;
+        let mut at = 2;
+        while asked < usize::from(self.request_length()) {
+            // In steps, for step_by divides, which a Cortex-M0 has no instruction for.
+            let records = [self.at(asked - 1, &byte), self.at(asked, &byte)];
+            let bytes = usize::from(u16::from_be_bytes(records)) << 1 | 1;
+            match pdu.get(at..) {
+                Some([count, files::REFERENCE_TYPE, ..]) if usize::from(*count) == bytes => {}
                 _ => return false,
             }
-            at += 7;
+            at += bytes + 1;
+            asked += 7;
         }
-        theirs.is_empty()
+        at == pdu.len()
     }
 }
 

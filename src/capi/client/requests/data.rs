@@ -1,7 +1,8 @@
 //! Requests for coils, discrete inputs and registers.
 
-use super::{plain, queue};
+use super::{plain, special};
 use crate::capi::client::{mbm_client, mbm_clientRequest};
+use crate::error::Status;
 use crate::pdu::outline::Form;
 
 /// Function 01: reads coils into `reply`, eight to a byte, the lowest bit first, the
@@ -294,9 +295,13 @@ pub unsafe extern "C" fn mbm_client_maskWriteRegister(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        queue(client, request, |outline| {
-            outline.mask_write_register(address, andMask, orMask)
-        })
+        special(
+            client,
+            request,
+            Form::MASK_WRITE_REGISTER,
+            [address.into(), andMask.into(), orMask.into(), 0],
+            None,
+        )
     }
 }
 
@@ -321,8 +326,23 @@ pub unsafe extern "C" fn mbm_client_readWriteMultipleRegisters(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        queue(client, request, |outline| {
-            outline.read_write_registers(readAddress, readQuantity, writeAddress, writeQuantity)
-        })
+        special(
+            client,
+            request,
+            Form::READ_WRITE_REGISTERS,
+            [
+                readAddress.into(),
+                readQuantity.into(),
+                writeAddress.into(),
+                writeQuantity.into(),
+            ],
+            Some(|inside, words, readable| {
+                let outline = &mut inside.ticket.outline;
+                match outline.add_write(words[2] as u16, words[3] as u16) {
+                    Status::OK => readable,
+                    refused => refused,
+                }
+            }),
+        )
     }
 }

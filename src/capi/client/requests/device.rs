@@ -1,13 +1,14 @@
 //! Requests for what a device tells of itself, its files, and functions of the
 //! user's.
 
-use super::{bare, plain, prepare, queue, submit};
+use super::{bare, plain, special};
 use crate::capi::client::request::Inside;
 use crate::capi::client::{mbm_client, mbm_clientRequest};
-use crate::capi::functions::{mbm_rule, rule};
+use crate::capi::functions::{mbm_rule, MBM_RULE_COUNTED, MBM_RULE_FIXED, MBM_RULE_SILENCE};
 use crate::capi::pointers::lent_or_none;
 use crate::error::Status;
-use crate::pdu::outline::Form;
+use crate::pdu::limits::MAX_PDU;
+use crate::pdu::outline::{Form, Outline, COUNTS, FIXED, GROUP, OWN};
 
 /// Function 07: reads eight outputs into a byte (V1.1b3, 6.7).
 ///
@@ -42,9 +43,16 @@ pub unsafe extern "C" fn mbm_client_diagnostics(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        queue(client, request, |outline| {
-            outline.diagnostics(subFunction, words)
-        })
+        special(
+            client,
+            request,
+            Form::DIAGNOSTICS,
+            [subFunction.into(), words.into(), 0, 0],
+            Some(|inside, words, _| {
+                let outline = &mut inside.ticket.outline;
+                outline.add_words(words[0] as u16, words[1] as u16)
+            }),
+        )
     }
 }
 
@@ -113,9 +121,13 @@ pub unsafe extern "C" fn mbm_client_readFileRecord(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        queue(client, request, |outline| {
-            outline.read_file_record(file, record, quantity)
-        })
+        special(
+            client,
+            request,
+            Form::READ_FILE_RECORD,
+            [GROUP, file.into(), record.into(), quantity.into()],
+            Some(add_group),
+        )
     }
 }
 
@@ -138,9 +150,13 @@ pub unsafe extern "C" fn mbm_client_writeFileRecord(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        queue(client, request, |outline| {
-            outline.write_file_record(file, record, quantity)
-        })
+        special(
+            client,
+            request,
+            Form::WRITE_FILE_RECORD,
+            [GROUP, file.into(), record.into(), quantity.into()],
+            Some(add_group),
+        )
     }
 }
 
@@ -158,7 +174,15 @@ pub unsafe extern "C" fn mbm_client_readFileRecords(
     bytes: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { queue(client, request, |outline| outline.read_file_records(bytes)) }
+    unsafe {
+        special(
+            client,
+            request,
+            Form::READ_FILE_RECORDS,
+            [bytes.into(), 0, 0, 0],
+            Some(|inside, words, _| inside.ticket.outline.read_file_records(words[0] as u16)),
+        )
+    }
 }
 
 /// Function 15 of several groups: `data` are the sub-requests as on the wire (V1.1b3,
@@ -175,7 +199,15 @@ pub unsafe extern "C" fn mbm_client_writeFileRecords(
     bytes: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { queue(client, request, |outline| outline.write_file_records(bytes)) }
+    unsafe {
+        special(
+            client,
+            request,
+            Form::WRITE_FILE_RECORDS,
+            [bytes.into(), 0, 0, 0],
+            Some(|inside, words, _| inside.ticket.outline.write_file_records(words[0] as u16)),
+        )
+    }
 }
 
 /// Function 18: reads up to 31 registers of a queue into words (V1.1b3, 6.18).
@@ -212,9 +244,14 @@ pub unsafe extern "C" fn mbm_client_readDeviceIdentification(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        queue(client, request, |outline| {
-            outline.read_device_identification(code, object)
-        })
+        let [first, second] = Outline::identification(code, object);
+        special(
+            client,
+            request,
+            Form::READ_DEVICE_IDENTIFICATION,
+            [first.into(), second.into(), code.into(), 0],
+            Some(|_, words, _| Outline::check_code(words[2] as u8)),
+        )
     }
 }
 
@@ -235,9 +272,13 @@ pub unsafe extern "C" fn mbm_client_encapsulatedInterfaceTransport(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        queue(client, request, |outline| {
-            outline.encapsulated(meiType, bytes)
-        })
+        special(
+            client,
+            request,
+            Form::ENCAPSULATED,
+            [usize::from(meiType) << 8, bytes.into(), 0, 0],
+            Some(|inside, words, _| inside.ticket.outline.follow(words[1] as u16)),
+        )
     }
 }
 
@@ -260,12 +301,36 @@ pub unsafe extern "C" fn mbm_client_custom(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        queue(client, request, |outline| {
-            match response.as_ref().and_then(|response| rule(*response)) {
-                Some(rule) => outline.custom(function, bytes, rule),
-                None => Status::INVALID_ARGUMENT,
-            }
-        })
+        let words = [
+            function.into(),
+            bytes.into(),
+            response.expose_provenance(),
+            0,
+        ];
+        special(
+            client,
+            request,
+            Form::CUSTOM,
+            words,
+            Some(|inside, words, _| {
+                let response: *const mbm_rule = core::ptr::with_exposed_provenance(words[2]);
+                let Some(response) = response.as_ref() else {
+                    return Status::INVALID_ARGUMENT;
+                };
+                let (kind, most) = match response.kind {
+                    MBM_RULE_SILENCE => (OWN, u8::MAX),
+                    MBM_RULE_FIXED => (FIXED, MAX_PDU as u8),
+                    MBM_RULE_COUNTED => (COUNTS, MAX_PDU as u8 - 1),
+                    _ => return Status::INVALID_ARGUMENT,
+                };
+                if kind != OWN && !(1..=most).contains(&response.bytes) {
+                    return Status::INVALID_ARGUMENT;
+                }
+                let numbers = [response.bytes, response.more];
+                let outline = &mut inside.ticket.outline;
+                outline.add_rule(words[0] as u8, words[1] as u16, kind, numbers)
+            }),
+        )
     }
 }
 
@@ -301,24 +366,44 @@ pub unsafe extern "C" fn mbm_client_forward(
 ) -> u8 {
     // SAFETY: as the header demands. The data are the last bytes of the body.
     unsafe {
-        let status = prepare(client, request);
-        if status != Status::OK {
-            return status.code();
-        }
-        let inside = &mut *request.cast::<Inside>();
-        let before = inside.data;
-        let built = match lent_or_none(body, bytes.into()) {
-            Some(whole) => inside.ticket.outline.forward(function, whole),
-            None => Status::INVALID_ARGUMENT,
+        let inside = request.cast::<Inside>();
+        let before = match inside.as_ref() {
+            Some(inside) => inside.data,
+            None => body,
         };
-        if built == Status::OK {
-            let head = bytes - u16::from(inside.ticket.outline.data_length());
-            inside.data = body.wrapping_add(head.into());
+        let words = [function.into(), bytes.into(), body.expose_provenance(), 0];
+        let status = special(
+            client,
+            request,
+            Form::CUSTOM,
+            words,
+            Some(|inside, words, _| {
+                let body = core::ptr::with_exposed_provenance(words[2]);
+                let outline = &mut inside.ticket.outline;
+                let Some(whole) = lent_or_none(body, words[1]) else {
+                    return Status::INVALID_ARGUMENT;
+                };
+                let built = outline.forward(words[0] as u8, whole);
+                if built == Status::OK {
+                    let head = words[1] - usize::from(outline.data_length());
+                    inside.data = body.wrapping_add(head);
+                }
+                built
+            }),
+        );
+        if status != Status::PENDING.code() && !inside.is_null() {
+            (*inside).data = before;
         }
-        let status = submit(client, request, built);
-        if status != Status::PENDING {
-            (*request.cast::<Inside>()).data = before;
-        }
-        status.code()
+        status
     }
+}
+
+/// The group of file records that a request reads or writes.
+///
+/// # Safety
+/// None is needed; this is a [`More`](super::More).
+unsafe fn add_group(inside: &mut Inside, words: &[usize; 4], _: Status) -> Status {
+    let [_, file, record, quantity] = *words;
+    let outline = &mut inside.ticket.outline;
+    outline.add_group(file as u16, record as u16, quantity as u16)
 }

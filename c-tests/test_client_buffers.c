@@ -1,0 +1,263 @@
+/* Storage of the program's that is not as the client expects it.
+ *
+ * The client takes parts of its buffers without a check. Buffers of the heap, no byte
+ * longer than they are told, of many sizes: the port's hooks fill and read every byte
+ * that they are offered, so that AddressSanitizer sees one that is outside. */
+#include "mbm.h"
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { ROUNDS = 120, STEPS = 400, REQUESTS = 20, REPLY = 256 };
+
+typedef struct line {
+    mbm_client client;
+    mbm_clientRequest requests[REQUESTS];
+    uint8_t *incoming, *outgoing;
+    uint16_t incoming_bytes, outgoing_bytes;
+    uint8_t sent[600];                /* what is to be answered */
+    size_t sent_bytes;
+    uint32_t now;
+    int is_tcp;
+} line;
+
+static uint32_t state_of_chance;
+static unsigned long sum;
+static uint16_t data[130];
+static uint8_t reply[REPLY];
+
+static uint32_t chance(uint32_t below)
+{
+    state_of_chance = state_of_chance * 1664525 + 1013904223;
+    return (state_of_chance >> 8) % below;
+}
+
+/* Some bytes: noise, or of what was sent with a part of it changed, which on TCP looks
+ * like responses of any length. */
+static int16_t offer(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    line *l = context;
+    uint16_t count = (uint16_t)chance(capacity + 1u), i;
+
+    for (i = 0; i < capacity; i++)
+        bytes[i] = (uint8_t)chance(256);
+    if (chance(300) == 0)
+        return -1;
+    if (l->sent_bytes > 0 && chance(4) > 0) {
+        for (i = 0; i < count && i < l->sent_bytes; i++)
+            bytes[i] = l->sent[i];
+        count = i;
+        if (l->is_tcp && count > 5) {
+            bytes[4] = 0;
+            bytes[5] = (uint8_t)(2 + chance(chance(2) ? 10 : 253));
+        }
+        l->sent_bytes = 0;
+    }
+    return (int16_t)count;
+}
+
+static int16_t take(void *context, const uint8_t *bytes, uint16_t length)
+{
+    line *l = context;
+    uint16_t count = (uint16_t)chance(length + 1u), i;
+
+    for (i = 0; i < length; i++)
+        sum += bytes[i];
+    if (chance(300) == 0)
+        return -1;
+    for (i = 0; i < count && l->sent_bytes < sizeof l->sent; i++)
+        l->sent[l->sent_bytes++] = bytes[i];
+    return (int16_t)count;
+}
+
+static uint32_t clock_of(void *context)
+{
+    return ((line *)context)->now;
+}
+
+static void begin(line *l, unsigned framing)
+{
+    mbm_port port;
+
+    memset(l, 0, sizeof *l);
+    memset(&port, 0, sizeof port);
+    port.context = l;
+    port.read = offer;
+    port.write = take;
+    port.micros = clock_of;
+    l->is_tcp = framing == 3;
+    l->incoming_bytes = (uint16_t)(17 + chance(chance(2) ? 8 : 600));
+    l->outgoing_bytes = (uint16_t)(12 + chance(chance(2) ? 8 : 600));
+    l->incoming = malloc(l->incoming_bytes);
+    l->outgoing = malloc(l->outgoing_bytes);
+    assert_non_null(l->incoming);
+    assert_non_null(l->outgoing);
+    switch (framing) {
+    case 0:
+        OK(mbm_client_beginRtu(&l->client, &port, l->incoming, l->incoming_bytes));
+        break;
+    case 1:
+        OK(mbm_client_beginAscii(&l->client, &port, l->incoming, l->incoming_bytes));
+        break;
+    case 2:
+        OK(mbm_client_beginRtuOverTcp(&l->client, &port, l->incoming, l->incoming_bytes));
+        break;
+    default:
+        OK(mbm_client_beginTcp(&l->client, &port, l->incoming, l->incoming_bytes, l->outgoing,
+                               l->outgoing_bytes));
+    }
+    OK(mbm_client_setResponseTimeout(&l->client, 50));
+    OK(mbm_client_setRetries(&l->client, (uint8_t)chance(3)));
+}
+
+static void ask(line *l, mbm_clientRequest *request)
+{
+    if (request->status == MBM_PENDING)
+        return;
+    request->unit = (uint8_t)(1 + chance(2));
+    request->data = data;
+    request->reply = reply;
+    request->replyBytes = (uint16_t)chance(REPLY);
+    switch (chance(4)) {
+    case 0:
+        (void)mbm_client_readHoldingRegisters(&l->client, request, 1, (uint16_t)(1 + chance(125)));
+        break;
+    case 1:
+        (void)mbm_client_writeMultipleRegisters(&l->client, request, 1,
+                                                (uint16_t)(1 + chance(123)));
+        break;
+    case 2:
+        (void)mbm_client_reportServerId(&l->client, request);
+        break;
+    default:
+        (void)mbm_client_readCoils(&l->client, request, 1, (uint16_t)(1 + chance(2000)));
+    }
+}
+
+static void no_byte_outside_of_the_buffers_is_touched(void **state)
+{
+    static line l;
+    unsigned round, step, i;
+
+    (void)state;
+    state_of_chance = 7;
+    for (round = 0; round < ROUNDS; round++) {
+        begin(&l, round % 4);
+        for (step = 0; step < STEPS; step++) {
+            mbm_clientRequest *request = &l.requests[chance(REQUESTS)];
+
+            l.now += chance(chance(8) ? 3000 : 60000);
+            switch (chance(12)) {
+            case 0:
+                (void)mbm_client_cancel(&l.client, request);
+                break;
+            case 1:
+                if (chance(20) == 0)
+                    OK(mbm_client_reconnect(&l.client, NULL));
+                break;
+            case 2:
+            case 3:
+            case 4:
+                ask(&l, request);
+                break;
+            default:
+                (void)mbm_client_poll(&l.client);
+            }
+        }
+        for (i = 0; i < REQUESTS; i++)
+            if (l.requests[i].status == MBM_PENDING)
+                OK(mbm_client_cancel(&l.client, &l.requests[i]));
+        assert_int_equal(mbm_client_pending(&l.client), 0);
+        free(l.incoming);
+        free(l.outgoing);
+    }
+    assert_true(sum > 0);
+}
+
+static int driver;
+
+static int16_t take_one(void *context, const uint8_t *bytes, uint16_t length)
+{
+    (void)context;
+    (void)bytes;
+    return length > 0;
+}
+
+static int16_t offer_nothing(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    (void)context;
+    (void)bytes;
+    (void)capacity;
+    return 0;
+}
+
+static void switch_on(void *context)
+{
+    (void)context;
+    driver++;
+}
+
+static void switch_off(void *context)
+{
+    (void)context;
+    driver--;
+}
+
+/* A client that is in the middle of sending a request, which is then zeroed. */
+static void zero_while_sent(line *l)
+{
+    mbm_port port;
+    static uint8_t frame[256];
+
+    memset(l, 0, sizeof *l);
+    memset(&port, 0, sizeof port);
+    port.context = l;
+    port.read = offer_nothing;
+    port.write = take_one;
+    port.micros = clock_of;
+    port.preTransmission = switch_on;
+    port.postTransmission = switch_off;
+    driver = 0;
+    OK(mbm_client_beginRtu(&l->client, &port, frame, sizeof frame));
+    l->requests[0].unit = 1;
+    IS(MBM_PENDING, mbm_client_writeSingleCoil(&l->client, &l->requests[0], 1, 1));
+    while (driver == 0) {
+        l->now += 1000;
+        IS(MBM_PENDING, mbm_client_poll(&l->client));
+    }
+    memset(&l->requests[0], 0, sizeof l->requests[0]);
+}
+
+static void a_request_zeroed_while_it_is_sent_is_cancelled_with_the_driver_off(void **state)
+{
+    static line l;
+
+    (void)state;
+    zero_while_sent(&l);
+    OK(mbm_client_cancel(&l.client, &l.requests[0]));
+    assert_int_equal(driver, 0);
+    assert_int_equal(mbm_client_pending(&l.client), 0);
+}
+
+static void a_request_zeroed_while_it_is_sent_is_lost_with_its_link(void **state)
+{
+    static line l;
+
+    (void)state;
+    zero_while_sent(&l);
+    OK(mbm_client_reconnect(&l.client, NULL));
+    assert_int_equal(driver, 0);
+    OK(mbm_client_poll(&l.client));
+    assert_int_equal(l.requests[0].status, MBM_LINK_LOST);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(no_byte_outside_of_the_buffers_is_touched),
+        cmocka_unit_test(a_request_zeroed_while_it_is_sent_is_cancelled_with_the_driver_off),
+        cmocka_unit_test(a_request_zeroed_while_it_is_sent_is_lost_with_its_link),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
