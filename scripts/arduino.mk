@@ -32,6 +32,11 @@ AVR_ELFS := $(EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(EXAMPLES:%=$(AVR_OUT)/mega/%.el
 # What it takes with the small library.
 MINIMAL_ELFS := $(patsubst %,$(AVR_OUT)/uno-minimal/%.elf,SizeFC03 Basic PhoenixContact Probe \
                 ServeSensorAndRelay)
+# What waits for 125 registers.
+WIDE_ELFS := $(AVR_OUT)/uno-125/TimeWait.elf
+# With MODBUSMASTER, the folder of that library: what it is measured with.
+PEER_ELFS := $(if $(MODBUSMASTER),$(patsubst %,$(AVR_OUT)/uno-peer/%.elf,TimeRead TimeBasicNoGap SizeFC03 \
+                Basic PhoenixContact))
 # The library as it was when a sketch was last compiled against it.
 DIST_STAMP := $(BUILD)/avr/library
 
@@ -39,7 +44,7 @@ DIST_STAMP := $(BUILD)/avr/library
 avr-sketches: arduino
 	@mkdir -p $(AVR_OUT)
 	@cat dist/*.zip dist/minimal/*.zip | cmp -s - $(DIST_STAMP) || cat dist/*.zip dist/minimal/*.zip >$(DIST_STAMP)
-	@$(MAKE) -s --no-print-directory $(AVR_ELFS) $(MINIMAL_ELFS)
+	@$(MAKE) -s --no-print-directory $(AVR_ELFS) $(MINIMAL_ELFS) $(WIDE_ELFS) $(PEER_ELFS)
 
 # The examples are part of the library, from where they are compiled.
 SKETCH_SOURCES := scripts/sketch $(wildcard firmware-tests/avr/sketches/*/*.ino)
@@ -54,6 +59,9 @@ $(eval $(call sketches,mega))
 # Compiled only: the simulator has no USB for its Serial.
 $(eval $(call sketches,leonardo))
 $(eval $(call sketches,uno-minimal))
+$(eval $(call sketches,uno-125))
+$(eval $(call sketches,uno-peer))
+$(PEER_ELFS): $(wildcard $(MODBUSMASTER)/src/*)
 
 # --- the programs that run them
 
@@ -68,7 +76,11 @@ $(BUILD)/avr-tests/%.o: firmware-tests/avr/%.c $(AVR_HEADERS)
 $(BUILD)/avr-tests/%.o: c-tests/support/%.c $(AVR_HEADERS)
 	@mkdir -p $(@D)
 	@gcc $(AVR_FLAGS) -c $< -o $@
-$(AVR_TESTS) $(BUILD)/avr-tests/timing: %: %.o $(AVR_SUPPORT)
+TIMING := $(BUILD)/avr-tests/timing
+TIMING_PARTS := $(patsubst firmware-tests/avr/%.c,$(BUILD)/avr-tests/%.o,$(wildcard firmware-tests/avr/timing_*.c)) \
+                $(BUILD)/avr-tests/rows.o
+$(TIMING): $(TIMING_PARTS)
+$(AVR_TESTS) $(TIMING): %: %.o $(AVR_SUPPORT)
 	@gcc $^ -lsimavr -lelf -lmodbus -lcmocka -lpthread -o $@
 
 .PHONY: avr-tests
@@ -83,10 +95,10 @@ firmware-test-avr: need-avr
 
 .PHONY: timing
 timing: need-avr ## Bus timing, RAM and flash on a simulated Uno, into docs/timing.md
-	@$(MAKE) -s --no-print-directory avr-sketches $(BUILD)/avr-tests/timing
+	@$(MAKE) -s --no-print-directory avr-sketches $(TIMING)
 	@scripts/timing
 
 .PHONY: check-timing
 check-timing: need-avr ## Bus timing on a simulated Uno against docs/timing.md
-	@$(MAKE) -s --no-print-directory avr-sketches $(BUILD)/avr-tests/timing
+	@$(MAKE) -s --no-print-directory avr-sketches $(TIMING)
 	@scripts/timing --check

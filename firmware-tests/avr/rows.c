@@ -1,0 +1,95 @@
+#include "rows.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+static unsigned above;
+
+void note(span *s, uint64_t value)
+{
+    if (s->count++ == 0 || value < s->least)
+        s->least = value;
+    if (value > s->most)
+        s->most = value;
+    s->sum += value;
+}
+
+unsigned long mean(const span *s)
+{
+    return s->count ? (unsigned long)(s->sum / s->count) : 0;
+}
+
+span joined(const span *one, const span *other)
+{
+    span both = *one;
+
+    if (other->count && (both.count == 0 || other->least < both.least))
+        both.least = other->least;
+    if (other->most > both.most)
+        both.most = other->most;
+    both.sum += other->sum;
+    both.count += other->count;
+    return both;
+}
+
+void row(const char *what, const char *unit, unsigned long least, unsigned long most,
+         unsigned long limit)
+{
+    char range[50], bound[40] = "";
+
+    if (least == most)
+        snprintf(range, sizeof range, "%lu", most);
+    else
+        snprintf(range, sizeof range, "%lu to %lu", least, most);
+    if (limit) {
+        snprintf(bound, sizeof bound, "%lu", limit);
+        above += most > limit;
+    }
+    printf("| %s | %s | %s | %s | %s |\n", what, unit, range, bound,
+           !limit ? "" : most > limit ? "**no**" : "yes");
+}
+
+void row_cycles(const char *what, const span *s, unsigned long limit)
+{
+    if (s->count == 0)
+        give_up(what);
+    row(what, "cycles", s->least, s->most, limit);
+}
+
+static void spanned(const span *s)
+{
+    if (s->count == 0)
+        give_up("a row of the comparison has no value");
+    printf(" %lu to %lu, mean %lu |", (unsigned long)s->least, (unsigned long)s->most, mean(s));
+}
+
+void row_beside(const char *what, const span *ours, const span *theirs)
+{
+    printf("= | %s | cycles |", what);
+    spanned(ours);
+    if (theirs)
+        spanned(theirs);
+    else
+        printf(" |");
+    printf("\n");
+}
+
+void row_beside_bytes(const char *what, unsigned long ours, const unsigned long *theirs)
+{
+    printf("= | %s | bytes | %lu |", what, ours);
+    if (theirs)
+        printf(" %lu |\n", *theirs);
+    else
+        printf(" |\n");
+}
+
+unsigned rows_above(void)
+{
+    return above;
+}
+
+_Noreturn void give_up(const char *why)
+{
+    fprintf(stderr, "timing: %s\n", why);
+    exit(1);
+}

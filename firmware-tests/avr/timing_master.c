@@ -1,0 +1,216 @@
+/* A master that is answered at once: its dead time, its stack, its polls. */
+#include "peer.h"
+#include "rows.h"
+#include "timing.h"
+
+#include <string.h>
+
+typedef struct observer {
+    board *on;
+    wire *bus;
+    uint64_t late;      /* the last byte of a reply comes so much later */
+    span dead[2];       /* before a request of 8 bytes, and of more */
+    span back;          /* from the last byte of a reply to the end of the call */
+    /* poll by poll */
+    span without, with;
+    uint64_t rose;
+    unsigned bytes_before, bytes_due, bytes_polled;
+    int waiting, painted;
+} observer;
+
+static void answer(wire *w, const uint8_t *frame, size_t length)
+{
+    observer *o = w->context;
+    uint8_t reply[FRAME];
+    size_t have = peer_right_reply(reply, frame);
+
+    if (w->frames > SKIP)
+        note(&o->dead[length > 8], w->first_started - w->heard);
+    o->bytes_due = (unsigned)have;
+    w->bytes_heard = 0;
+    o->bytes_before = 0;
+    o->waiting = 1;
+    wire_play(w, MS, reply, have - 1);
+    wire_play(w, o->late, reply + have - 1, 1);
+}
+
+static void call_begins_or_ends(void *context, int level, uint64_t cycle)
+{
+    observer *o = context;
+    wire *w = o->bus;
+
+    if (level && !o->painted) {
+        o->painted = 1;
+        board_paint(o->on);
+    }
+    if (!level && w->frames > SKIP)
+        note(&o->back, cycle - w->heard);
+}
+
+static void poll_begins_or_ends(void *context, int level, uint64_t cycle)
+{
+    observer *o = context;
+    wire *w = o->bus;
+
+    if (level) {
+        o->rose = cycle;
+        return;
+    }
+    /* After the request has left: first a wait of a millisecond, then bytes. */
+    if (w->frames > SKIP && o->waiting) {
+        unsigned fresh = w->bytes_heard - o->bytes_before;
+
+        if (w->bytes_heard == 0)
+            note(&o->without, cycle - o->rose);
+        else if (w->bytes_heard == o->bytes_due)
+            o->waiting = 0;
+        else if (fresh) {
+            note(&o->with, cycle - o->rose);
+            o->bytes_polled += fresh;
+        }
+    }
+    o->bytes_before = w->bytes_heard;
+}
+
+static observer observe(const char *folder, const char *name, uint64_t late, pin_changed changed)
+{
+    static observer o;
+
+    if (o.on)
+        board_free(o.on);
+    memset(&o, 0, sizeof o);
+    o.late = late;
+    o.on = timed_board(folder, name);
+    o.bus = board_uart(o.on, '0', answer, &o);
+    board_paint(o.on);
+    if (changed)
+        board_watch_pin(o.on, 'B', 0, changed, &o);
+    while (o.bus->frames < SKIP + COUNTED)
+        if (!board_run(o.on, MS))
+            give_up("a sketch crashed");
+    return o;
+}
+
+static void dead_times(void)
+{
+    observer o = observe("uno", "TimeRead", 0, NULL), again = observe("uno", "TimeRead", 0, NULL);
+    unsigned long gap = 32096; /* 3.5 characters of 11 bits at 19200 baud: 2006 us */
+
+    if (memcmp(&o.dead, &again.dead, sizeof o.dead) != 0)
+        give_up("two runs differ");
+    row_cycles("dead time, FC03 of 10 registers, 115200 baud, no gap", &o.dead[0], 3463);
+    o = observe("uno", "TimeBasicNoGap", 0, NULL);
+    row_cycles("dead time, Basic, 19200 baud, no gap: before FC10", &o.dead[1], 3075);
+    row_cycles("dead time, Basic, 19200 baud, no gap: before FC03", &o.dead[0], 3075);
+    o = observe("uno", "TimeBasicGap", 0, NULL);
+    row_cycles("dead time, Basic, 19200 baud, t3.5 = 32096 cycles: before FC10", &o.dead[1],
+               gap + gap / 20);
+    row_cycles("dead time, Basic, 19200 baud, t3.5 = 32096 cycles: before FC03", &o.dead[0],
+               gap + gap / 20);
+}
+
+static unsigned long ram_added(const char *folder)
+{
+    board *plain = timed_board("uno", "SizeSerial"), *reading = timed_board(folder, "SizeFC03");
+    /* The sketch has two bytes of its own. */
+    unsigned long ram = board_symbol(reading, "_end") - board_symbol(plain, "_end") - 2u;
+
+    board_free(plain);
+    board_free(reading);
+    return ram;
+}
+
+static void returns(void)
+{
+    observer o = observe("uno", "TimeRead", 0, call_begins_or_ends);
+    unsigned long ram = ram_added("uno"), stack = board_stack_depth(o.on);
+    board *plain = timed_board("uno", "SizeSerial"), *reading = timed_board("uno", "SizeFC03");
+
+    row_cycles("last byte of a reply to the end of the call", &o.back, 0);
+    row("static RAM added, default buffers", "bytes", ram, ram, 0);
+    row("stack of a transaction, interrupts included", "bytes", stack, stack, 0);
+    row("static RAM and stack together", "bytes", ram + stack, ram + stack, 557);
+    board_paint(reading);
+    board_paint(plain);
+    if (!board_run(plain, MS) || !board_run(reading, 100 * MS))
+        give_up("a sketch crashed");
+    stack = board_stack_depth(reading) - board_stack_depth(plain);
+    row("stack from reset on, constructor and begin included, above a serial-only sketch", "bytes",
+        stack, stack, 0);
+    board_free(plain);
+    board_free(reading);
+    o = observe("uno", "TimeRead", 100 * MS, call_begins_or_ends);
+    row_cycles("a last byte that comes 100 ms late, to the end of the call", &o.back, 0);
+}
+
+static void polls(void)
+{
+    observer o = observe("uno", "TimePoll", 0, poll_begins_or_ends);
+    unsigned long per_byte;
+
+    row_cycles("poll while nothing arrives", &o.without, 0);
+    row_cycles("poll with new bytes, 115200 baud", &o.with, 0);
+    /* All that a byte costs, the core's interrupt included, above waiting. */
+    per_byte = (unsigned long)((o.with.sum - o.with.count * mean(&o.without)) / o.bytes_polled);
+    row("a received byte, above waiting (one lasts 1388 at 115200 baud)", "cycles", per_byte,
+        per_byte, 0);
+}
+
+/* From reset on: how much deeper the stack grows than that of a serial-only sketch. */
+static unsigned long stack_added(const observer *o)
+{
+    board *plain = timed_board("uno", "SizeSerial");
+    unsigned depth;
+
+    board_paint(plain);
+    if (!board_run(plain, MS))
+        give_up("a sketch crashed");
+    depth = board_stack_depth(plain);
+    board_free(plain);
+    return board_stack_depth(o->on) - depth;
+}
+
+/* The same sketches, compiled with either library, on the same board. */
+static void beside(const char *peer)
+{
+    static const struct {
+        const char *sketch, *what;
+        unsigned longer; /* the request has more than 8 bytes */
+    } rows[] = {
+        {"TimeRead", "dead time, FC03 of 10 registers, 115200 baud", 0},
+        {"TimeBasicNoGap", "dead time, Basic, 19200 baud: before FC10", 1},
+        {"TimeBasicNoGap", "dead time, Basic, 19200 baud: before FC03", 0},
+    };
+    observer ours, theirs = {0};
+    unsigned long ram[2] = {0}, stack[2] = {0};
+    span both[2];
+    unsigned i;
+
+    for (i = 0; i < sizeof rows / sizeof *rows; i++) {
+        ours = observe("uno", rows[i].sketch, 0, NULL);
+        if (i == 0)
+            stack[0] = stack_added(&ours);
+        if (peer)
+            theirs = observe(peer, rows[i].sketch, 0, NULL);
+        if (peer && i == 0)
+            stack[1] = stack_added(&theirs);
+        row_beside(rows[i].what, &ours.dead[rows[i].longer],
+                   peer ? &theirs.dead[rows[i].longer] : NULL);
+    }
+    /* Those of Basic, which came last. */
+    both[0] = joined(&ours.dead[0], &ours.dead[1]);
+    both[1] = joined(&theirs.dead[0], &theirs.dead[1]);
+    row_beside("dead time, Basic, 19200 baud: before both", &both[0], peer ? &both[1] : NULL);
+    ram[0] = ram_added("uno");
+    ram[1] = peer ? ram_added(peer) : 0;
+    row_beside_bytes("static RAM", ram[0], peer ? &ram[1] : NULL);
+    row_beside_bytes("stack, from reset on", stack[0], peer ? &stack[1] : NULL);
+}
+
+void time_master(const char *peer)
+{
+    dead_times();
+    returns();
+    polls();
+    beside(peer);
+}
