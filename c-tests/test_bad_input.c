@@ -46,6 +46,7 @@ static void all_others_answer(mbm_master *m, uint8_t status)
     IS(status, mbm_master_setCounters(m, &counters));
     IS(status, mbm_master_setCounters(m, NULL));
     IS(status, mbm_master_lineUsed(m));
+    IS(status, mbm_master_lineUsedAt(m, 0));
     IS(status, mbm_master_clearResponseBuffer(m));
     IS(status, mbm_master_setTransmitBuffer(m, 0, 1));
     IS(status, mbm_master_clearTransmitBuffer(m));
@@ -152,6 +153,7 @@ static void an_object_with_buffers_but_never_begun_makes_no_request(void **state
     all_requests_answer(&m, MBM_NOT_INITIALISED);
     IS(MBM_NOT_INITIALISED, mbm_master_poll(&m));
     mbm_master_lineUsed(&m);
+    mbm_master_lineUsedAt(&m, 1);
     mbm_master_cancel(&m);
 }
 

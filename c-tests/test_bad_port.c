@@ -151,6 +151,7 @@ static void the_clock_may_wrap_at_any_time_of_a_transaction(void **state)
         mbm_master_setPostFlushHold(&s->master, 1);
         mbm_master_setResponseTimeout(&s->master, 5);
         sim_begin(s, 17);
+        OK(mbm_master_lineUsed(&s->master));
         sim_answer(s, 1, 3000, "11 03 02 00 2A +");
         OK(sim_read_one(s));
         assert_in_range(s->frames[0].silence, 4000, 4100);

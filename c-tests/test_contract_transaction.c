@@ -206,6 +206,50 @@ static void idle_is_not_called_while_bytes_wait(void **state)
     sim_assert_order(s, "IRO", "IOIR");
 }
 
+static void no_gap_is_waited_for_after_begin_on_a_silent_line(void **state)
+{
+    uint64_t asked;
+    NODE;
+
+    s->now += 10000;
+    OK(mbm_master_begin(n, 17, &s->port));
+    asked = s->now;
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[0].begin - asked, 0);
+    /* But after a request on that line. */
+    OK(mbm_master_begin(n, 17, &s->port));
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[1].silence, 4000);
+}
+
+static void bytes_that_arrive_after_begin_begin_the_gap(void **state)
+{
+    NODE;
+
+    s->now += 10000;
+    OK(mbm_master_begin(n, 17, &s->port));
+    sim_deliver_text(s, s->now - 100, "05 03 02");
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[0].silence, 4000);
+}
+
+static void the_gap_counts_from_the_use_of_the_line_that_was_told(void **state)
+{
+    uint64_t asked;
+    NODE;
+
+    sim_reads(s, 500);
+    s->now += 10000;
+    asked = s->now;
+    OK(mbm_master_lineUsedAt(n, (uint32_t)s->now - 3000));
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[1].begin - asked, 1000);
+    /* Its own last byte is later than that. */
+    OK(mbm_master_lineUsedAt(n, (uint32_t)asked - 3000));
+    sim_reads(s, 500);
+    sim_assert_time(s->frames[2].silence, 4000);
+}
+
 static void many_objects_share_a_stream(void **state)
 {
     static mbm_master other;
@@ -262,6 +306,9 @@ int main(void)
         SIM_TEST(no_gap_is_waited_for_that_has_passed_already),
         SIM_TEST(line_used_makes_the_gap_count_from_now),
         SIM_TEST(idle_is_not_called_while_bytes_wait),
+        SIM_TEST(no_gap_is_waited_for_after_begin_on_a_silent_line),
+        SIM_TEST(bytes_that_arrive_after_begin_begin_the_gap),
+        SIM_TEST(the_gap_counts_from_the_use_of_the_line_that_was_told),
         SIM_TEST(many_objects_share_a_stream),
         SIM_TEST(the_idle_hook_is_given_the_master_that_waits),
     };

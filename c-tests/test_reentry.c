@@ -58,6 +58,7 @@ static void every_function_of_the_master_is_busy(void)
     IS(MBM_BUSY, mbm_master_setCounters(m, &counters));
     IS(MBM_BUSY, mbm_master_setWordOrder(m, 2));
     IS(MBM_BUSY, mbm_master_lineUsed(m));
+    IS(MBM_BUSY, mbm_master_lineUsedAt(m, 0));
     IS(MBM_BUSY, mbm_master_clearResponseBuffer(m));
     IS(MBM_BUSY, mbm_master_setTransmitBuffer(m, 0, 1));
     IS(MBM_BUSY, mbm_master_clearTransmitBuffer(m));
@@ -121,7 +122,7 @@ static void no_hook_of_a_masters_port_may_call_the_master(void **state)
     OK(mbm_master_setBlocking(&master, 0));
     IS(MBM_PENDING, mbm_master_readHoldingRegisters(&master, 0, 1));
     assert_true(mbm_master_pollDelay(&master) < 0xFFFFFFFFu);
-    assert_true(entered >= 3);
+    assert_true(entered >= 2);
     /* A cancel switches the driver off. */
     entered = 0;
     wire.called[HOOK_POST] = 0;

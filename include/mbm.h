@@ -701,11 +701,11 @@ typedef struct mbm_master {
     /**
      * Not for you.
      */
-    void *pointers[21];
+    void *pointers[18];
     /**
      * Not for you.
      */
-    uint32_t words[20];
+    uint32_t words[21];
 } mbm_master;
 
 /**
@@ -2932,7 +2932,8 @@ uint8_t mbm_frame_lrc(const uint8_t *bytes, uint16_t length);
  * May be called again at any time, which is cheap: to talk to another slave,
  * or over another port. Settings, buffers and the words in them stay; what
  * was queued by send is dropped, and a request under way is given up. Opens
- * nothing: the port is open already.
+ * nothing: the port is open already. The first request waits for no gap, unless
+ * bytes arrive or mbm_master_lineUsed was called.
  *
  * @param master  the object; zeroed before the first call
  * @param slave   unit id, 1 to 247; 248 to 255 are sent as they are, 0 is
@@ -3347,8 +3348,19 @@ uint8_t mbm_master_setBlocking(struct mbm_master *master, uint8_t on);
 uint8_t mbm_master_setCounters(struct mbm_master *master, struct mbm_counters *counters);
 
 /**
- * Says that somebody else has just used the line, another object for example:
- * the gap before the next request counts from now.
+ * Says when somebody else used the line, another object for example: the gap before
+ * the next request counts from then. A time before the last use that the object knows
+ * of changes nothing.
+ *
+ * @param master        the object
+ * @param microseconds  by the clock of its port, at most 2^31 ago
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_master_lineUsedAt(struct mbm_master *master, uint32_t microseconds);
+
+/**
+ * Says that somebody else has just used the line, as mbm_master_lineUsedAt with the
+ * time of now.
  *
  * @param master  the object
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED

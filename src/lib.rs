@@ -3,7 +3,7 @@
 //! Data flows one way, and a module uses only what stands to its left:
 //!
 //! ```text
-//! bytes -> frame -> pdu -> packet -> explain -> {sniffer, transaction} -> {master, client, server} -> capi
+//! bytes -> frame -> pdu -> packet -> explain -> {sniffer, transaction} -> engine -> {master, client, server} -> capi
 //! ```
 //!
 //! `atomic`, `error`, `time`, `port`, `ring` and `data` stand beside that line and may be used
@@ -35,6 +35,8 @@ pub mod time;
 pub mod bytes;
 /// cbindgen:ignore
 pub mod data;
+/// cbindgen:ignore
+pub mod engine;
 /// cbindgen:ignore
 pub mod explain;
 /// cbindgen:ignore

@@ -1,20 +1,18 @@
 //! The ModbusMaster-shaped facade: words to send, ten functions, words
 //! received. Each function starts a transaction; `poll` ends it.
 
+use crate::engine::{Engine, Storage};
 use crate::error::Status;
-use crate::pdu::query::Query;
+use crate::pdu::query::{Form, Query};
 use crate::pdu::{bits, registers};
 use crate::port::Port;
-use crate::transaction::{Settings, Storage, Transaction};
+use crate::transaction::Settings;
 
 /// What is read where there is no word.
 pub const NO_WORD: u16 = 0xFFFF;
 
-/// What builds the request of a function that is an address and a word.
-pub type Build = fn(&mut Query, u16, u16) -> Status;
-
 /// A master on a serial line, with the port and the buffers it was given.
-// Small fields first: see `Transaction`.
+// Small fields first: see `Engine`.
 #[derive(Clone, Hash, Debug)]
 #[repr(C)]
 pub struct Master<P, S> {
@@ -26,14 +24,14 @@ pub struct Master<P, S> {
     write_address: u16,
     /// Bits queued in the transmit buffer; 16 to a word.
     transmit_bits: u16,
-    transaction: Transaction<P, S>,
+    engine: Engine<P, S>,
 }
 
 impl<P, S> Master<P, S> {
     /// A master that talks to `slave` over `port`.
     pub const fn new(slave: u8, port: P, storage: S) -> Self {
         Master {
-            transaction: Transaction::new(port, storage),
+            engine: Engine::new(port, storage),
             write_address: 0,
             transmit_bits: 0,
             response_words: 0,
@@ -45,17 +43,17 @@ impl<P, S> Master<P, S> {
 
     /// The port.
     pub fn port(&mut self) -> &mut P {
-        &mut self.transaction.port
+        &mut self.engine.port
     }
 
     /// What the caller lent.
     pub fn storage(&mut self) -> &mut S {
-        &mut self.transaction.storage
+        &mut self.engine.storage
     }
 
     /// How transactions behave.
     pub fn settings(&mut self) -> &mut Settings {
-        &mut self.transaction.settings
+        &mut self.engine.settings
     }
 
     /// Sets the unit that later requests go to; 0 is broadcast.
@@ -73,10 +71,10 @@ impl<P, S> Master<P, S> {
         self.settings().set_baud_rate(baud);
     }
 
-    /// See [`Transaction::rebase`].
+    /// See [`Engine::rebase`].
     #[doc(hidden)]
     pub fn rebase(&mut self, now: u32, longest: u32) {
-        self.transaction.rebase(now, longest);
+        self.engine.rebase(now, longest);
     }
 
     /// The status of the last request; [`Status::PENDING`] while it is under way.
@@ -86,17 +84,17 @@ impl<P, S> Master<P, S> {
 
     /// The raw exception code of the last reply; 0 if it was no exception.
     pub fn exception_code(&self) -> u8 {
-        self.transaction.exception_code()
+        self.engine.exception_code()
     }
 
     /// True if the last poll found nothing to do and the driver is off.
     pub fn is_waiting(&self) -> bool {
-        self.transaction.is_waiting()
+        self.engine.is_waiting()
     }
 
     /// True while a request is under way.
     pub fn is_pending(&self) -> bool {
-        self.transaction.is_pending()
+        self.engine.is_pending()
     }
 }
 
@@ -106,39 +104,43 @@ impl<P: Port, S: Storage> Master<P, S> {
     pub fn begin(&mut self, slave: u8, port: impl FnOnce(&mut P)) {
         self.cancel();
         self.slave = slave;
-        port(&mut self.transaction.port);
+        port(&mut self.engine.port);
         self.transmit_bits = 0;
-        self.transaction.line_used();
     }
 
     /// Turns zeroed storage into a master without port and buffers.
     pub fn preset(&mut self) {
         self.slave = 1;
-        self.transaction.settings.preset();
+        self.engine.settings.preset();
     }
 
     /// Gives up the request under way, if there is one.
     pub fn cancel(&mut self) {
-        if self.transaction.is_pending() {
-            self.transaction.cancel();
+        if self.engine.is_pending() {
+            self.engine.cancel();
             self.status = Status::CANCELLED;
         }
     }
 
     /// Says that somebody else has just used the line.
     pub fn line_used(&mut self) {
-        if self.transaction.port.is_ready() {
-            self.transaction.line_used();
+        if self.engine.port.is_ready() {
+            self.engine.line_used();
         }
+    }
+
+    /// Says when somebody else used the line, by the clock of the port.
+    pub fn line_used_at(&mut self, time: u32) {
+        self.engine.line_used_at(time);
     }
 
     /// Moves the request under way on, without waiting; returns
     /// [`Status::PENDING`] until it has ended, then how it ended.
     pub fn poll(&mut self) -> Status {
-        if self.transaction.is_pending() {
-            let now = self.transaction.port.micros();
-            self.status = match self.transaction.poll(now) {
-                Status::OK if self.transaction.request().is_read() => self.take_words(),
+        if self.engine.is_pending() {
+            let now = self.engine.port.micros();
+            self.status = match self.engine.poll(now) {
+                Status::OK if self.engine.request().is_read() => self.take_words(),
                 status => status,
             };
         }
@@ -151,16 +153,16 @@ impl<P: Port, S: Storage> Master<P, S> {
         if !self.is_pending() {
             return u32::MAX;
         }
-        let now = self.transaction.port.micros();
-        self.transaction.poll_delay(now)
+        let now = self.engine.port.micros();
+        self.engine.poll_delay(now)
     }
 
     /// Decodes a successful reply into the response words.
     fn take_words(&mut self) -> Status {
-        if !self.transaction.take_words() {
+        if !self.engine.take_words() {
             return Status::BUFFER_TOO_SMALL;
         }
-        self.response_words = self.transaction.request().response_words();
+        self.response_words = self.engine.response_words();
         Status::OK
     }
 
@@ -170,27 +172,37 @@ impl<P: Port, S: Storage> Master<P, S> {
         if self.is_pending() {
             return Status::BUSY;
         }
-        if self.transaction.port.is_ready() && !self.storage().frame().is_empty() {
+        if self.engine.port.is_ready() && self.storage().room() > 0 {
             return Status::OK;
         }
         self.status = Status::NOT_INITIALISED;
         self.status
     }
 
-    /// Sends the request of an address and a word that `build` builds, or
-    /// refuses it with nothing sent. What is written to becomes the write
-    /// address.
+    /// Sends the request of a form, of an address and a quantity or value, or refuses it
+    /// with nothing sent. What is written to becomes the write address.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn request(&mut self, address: u16, word: u16, build: Build) -> Status {
+    pub fn request(&mut self, address: u16, word: u16, form: Form) -> Status {
         let ready = self.readiness();
         if ready != Status::OK {
             return ready;
         }
-        let request = self.transaction.request();
-        let built = build(request, address, word);
+        let request = self.engine.request();
+        let built = request.set(form, address, word);
         if !request.is_read() {
             self.write_address = address;
         }
+        self.start(built)
+    }
+
+    /// As [`Master::request`], of what `build` builds; it writes to an address.
+    fn write(&mut self, address: u16, build: impl FnOnce(&mut Query) -> Status) -> Status {
+        let ready = self.readiness();
+        if ready != Status::OK {
+            return ready;
+        }
+        self.write_address = address;
+        let built = build(self.engine.request());
         self.start(built)
     }
 
@@ -199,18 +211,18 @@ impl<P: Port, S: Storage> Master<P, S> {
     fn start(&mut self, built: Status) -> Status {
         self.transmit_bits = 0;
         self.response_index = 0;
-        self.transaction.forget();
+        self.engine.forget();
         self.status = built;
         if built == Status::OK {
-            let request = self.transaction.request();
+            let request = self.engine.request();
             if request.is_read() {
                 self.response_words = 0;
             }
-            let words = usize::from(request.words());
-            self.status = if words > self.transaction.storage.transmit().len() {
+            let words = request.sends().div_ceil(2);
+            self.status = if words > self.engine.storage.transmit_words() {
                 Status::ILLEGAL_DATA_VALUE
             } else {
-                self.transaction.start(self.slave)
+                self.engine.start(self.slave)
             };
         }
         self.status
@@ -218,27 +230,28 @@ impl<P: Port, S: Storage> Master<P, S> {
 
     /// 01: reads 1 to 2000 coils into the response words.
     pub fn read_coils(&mut self, address: u16, quantity: u16) -> Status {
-        self.request(address, quantity, bits::read_coils)
+        self.request(address, quantity, bits::form::READ_COILS)
     }
 
     /// 02: reads 1 to 2000 discrete inputs into the response words.
     pub fn read_discrete_inputs(&mut self, address: u16, quantity: u16) -> Status {
-        self.request(address, quantity, bits::read_discrete_inputs)
+        self.request(address, quantity, bits::form::READ_INPUTS)
     }
 
     /// 03: reads 1 to 125 holding registers into the response words.
     pub fn read_holding_registers(&mut self, address: u16, quantity: u16) -> Status {
-        self.request(address, quantity, registers::read_holding)
+        self.request(address, quantity, registers::form::READ_HOLDING)
     }
 
     /// 04: reads 1 to 125 input registers into the response words.
     pub fn read_input_registers(&mut self, address: u16, quantity: u16) -> Status {
-        self.request(address, quantity, registers::read_input)
+        self.request(address, quantity, registers::form::READ_INPUT)
     }
 
     /// 05: switches one coil; 0 is off.
     pub fn write_single_coil(&mut self, address: u16, on: u16) -> Status {
-        self.request(address, on, bits::write_single)
+        let value = if on == 0 { 0 } else { bits::ON };
+        self.request(address, value, bits::form::WRITE_SINGLE)
     }
 
     /// 06: writes one register. The value also becomes transmit word 0.
@@ -246,12 +259,12 @@ impl<P: Port, S: Storage> Master<P, S> {
         if self.readiness() == Status::OK {
             self.set_transmit_word(0, value);
         }
-        self.request(address, value, registers::write_single)
+        self.request(address, value, registers::form::WRITE_SINGLE)
     }
 
     /// 0F: writes 1 to 1968 coils from the transmit words, lowest bit first.
     pub fn write_multiple_coils(&mut self, address: u16, quantity: u16) -> Status {
-        self.request(address, quantity, bits::write_multiple)
+        self.request(address, quantity, bits::form::WRITE_MULTIPLE)
     }
 
     /// 0F: writes the queued bits to the last write address.
@@ -261,7 +274,7 @@ impl<P: Port, S: Storage> Master<P, S> {
 
     /// 10: writes 1 to 123 registers from the transmit words.
     pub fn write_multiple_registers(&mut self, address: u16, quantity: u16) -> Status {
-        self.request(address, quantity, registers::write_multiple)
+        self.request(address, quantity, registers::form::WRITE_MULTIPLE)
     }
 
     /// 10: writes the queued complete words to the last write address.
@@ -272,16 +285,13 @@ impl<P: Port, S: Storage> Master<P, S> {
     /// 16: sets a register to `(register & and_mask) | (or_mask & !and_mask)`.
     /// The masks also become transmit words 0 and 1.
     pub fn mask_write_register(&mut self, address: u16, and_mask: u16, or_mask: u16) -> Status {
-        let ready = self.readiness();
-        if ready != Status::OK {
-            return ready;
+        if self.readiness() == Status::OK {
+            self.set_transmit_word(0, and_mask);
+            self.set_transmit_word(1, or_mask);
         }
-        self.write_address = address;
-        self.set_transmit_word(0, and_mask);
-        self.set_transmit_word(1, or_mask);
-        let request = self.transaction.request();
-        let built = registers::mask_write(request, address, and_mask, or_mask);
-        self.start(built)
+        self.write(address, |request| {
+            registers::mask_write(request, address, and_mask, or_mask)
+        })
     }
 
     /// 17: writes 1 to 121 registers from the transmit words, then reads 1 to
@@ -293,19 +303,15 @@ impl<P: Port, S: Storage> Master<P, S> {
         write_address: u16,
         write_quantity: u16,
     ) -> Status {
-        let ready = self.readiness();
-        if ready != Status::OK {
-            return ready;
-        }
-        self.write_address = write_address;
-        let built = registers::read_write(
-            self.transaction.request(),
-            read_address,
-            read_quantity,
-            write_address,
-            write_quantity,
-        );
-        self.start(built)
+        self.write(write_address, |request| {
+            registers::read_write(
+                request,
+                read_address,
+                read_quantity,
+                write_address,
+                write_quantity,
+            )
+        })
     }
 
     /// 17: writes the queued complete words to the last write address.
@@ -320,18 +326,18 @@ impl<P: Port, S: Storage> Master<P, S> {
 
     /// A response word; 0xFFFF past the end of the buffer.
     pub fn response_word(&mut self, index: usize) -> u16 {
-        let words = self.transaction.storage.response();
+        let words = self.engine.storage.response();
         words.get(index).copied().unwrap_or(NO_WORD)
     }
 
     /// Zeroes the response words.
     pub fn clear_response(&mut self) {
-        self.transaction.storage.response().fill(0);
+        self.engine.storage.response().fill(0);
     }
 
     /// Sets a transmit word; false past the end of the buffer.
     pub fn set_transmit_word(&mut self, index: usize, value: u16) -> bool {
-        match self.transaction.storage.transmit().get_mut(index) {
+        match self.engine.storage.transmit().get_mut(index) {
             Some(word) => {
                 *word = value;
                 true
@@ -342,7 +348,7 @@ impl<P: Port, S: Storage> Master<P, S> {
 
     /// Zeroes the transmit words.
     pub fn clear_transmit(&mut self) {
-        self.transaction.storage.transmit().fill(0);
+        self.engine.storage.transmit().fill(0);
     }
 
     /// Sets the write address and empties the queue; the words stay.
@@ -367,7 +373,7 @@ impl<P: Port, S: Storage> Master<P, S> {
     pub fn send_bit(&mut self, on: bool) -> bool {
         let index = usize::from(self.transmit_bits >> 4);
         let mask = 1 << (self.transmit_bits & 15);
-        let Some(word) = self.transaction.storage.transmit().get_mut(index) else {
+        let Some(word) = self.engine.storage.transmit().get_mut(index) else {
             return false;
         };
         if mask == 1 {

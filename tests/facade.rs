@@ -1,10 +1,11 @@
 //! The facade from Rust, with a port that needs no C.
 
+use mbm::engine::Buffers;
 use mbm::error::Status;
 use mbm::frame::checksum::crc16;
 use mbm::master::Master;
 use mbm::port::Port;
-use mbm::transaction::{Counter, Storage, COUNTERS};
+use mbm::transaction::Counter;
 
 /// A wire that answers every request with the same bytes.
 #[derive(Default)]
@@ -36,44 +37,7 @@ impl Port for Wire {
     }
 }
 
-struct Buffers {
-    frame: [u8; 256],
-    transmit: [u16; 123],
-    response: [u16; 125],
-    counters: [usize; COUNTERS],
-}
-
-impl Default for Buffers {
-    fn default() -> Self {
-        Buffers {
-            frame: [0; 256],
-            transmit: [0; 123],
-            response: [0; 125],
-            counters: [0; COUNTERS],
-        }
-    }
-}
-
-impl Storage for Buffers {
-    fn frame(&mut self) -> &mut [u8] {
-        &mut self.frame
-    }
-    fn transmit(&mut self) -> &mut [u16] {
-        &mut self.transmit
-    }
-    fn response(&mut self) -> &mut [u16] {
-        &mut self.response
-    }
-    fn frame_and_transmit(&mut self) -> (&mut [u8], &[u16]) {
-        (&mut self.frame, &self.transmit)
-    }
-    fn frame_and_response(&mut self) -> (&[u8], &mut [u16]) {
-        (&self.frame, &mut self.response)
-    }
-    fn count(&mut self, counter: Counter, more: u16) {
-        self.counters[counter as usize] += usize::from(more);
-    }
-}
+type Lent = Buffers<[u8; 256], [u16; 125], [u16; 123]>;
 
 fn sealed(bytes: &[u8]) -> Vec<u8> {
     let mut frame = bytes.to_vec();
@@ -81,15 +45,15 @@ fn sealed(bytes: &[u8]) -> Vec<u8> {
     frame
 }
 
-fn master(reply: &[u8]) -> Master<Wire, Buffers> {
+fn master(reply: &[u8]) -> Master<Wire, Lent> {
     let wire = Wire {
         reply: reply.to_vec(),
         ..Wire::default()
     };
-    Master::new(7, wire, Buffers::default())
+    Master::new(7, wire, Buffers::new([0; 256], [0; 125], [0; 123]))
 }
 
-fn finish(master: &mut Master<Wire, Buffers>) -> Status {
+fn finish(master: &mut Master<Wire, Lent>) -> Status {
     for _ in 0..1_000_000 {
         match master.poll() {
             Status::PENDING => {}
@@ -156,4 +120,29 @@ fn a_request_that_is_answered_on_the_second_try_succeeds_with_a_retry() {
     master.port().reply = sealed(&[7, 5, 0, 5, 0xFF, 0]);
     assert_eq!(finish(&mut master), Status::OK);
     assert_eq!(master.storage().counters[Counter::Requests as usize], 2);
+}
+
+#[test]
+fn a_reply_at_the_end_of_the_buffer_is_no_echo() {
+    // The request's frame of 15 bytes just fits, and is longer than the reply.
+    for registers in [1, 2] {
+        let data = &[0, 1, 0, 2][..2 * registers];
+        let reply = sealed(&[&[7, 0x17, data.len() as u8], data].concat());
+        let mut bytes = vec![0; 15 - reply.len()];
+        bytes.extend(reply);
+        let wire = Wire {
+            reply: bytes,
+            ..Wire::default()
+        };
+        let buffers = Buffers::new([0; 15], [0; 125], [0; 123]);
+        let mut master = Master::new(7, wire, buffers);
+        // An echo that does not come.
+        master.settings().echo_discard = true;
+        let read = registers as u16;
+        let started = master.read_write_multiple_registers(0x6B, read, 1, 1);
+        assert_eq!(started, Status::PENDING);
+        while master.poll() == Status::PENDING {}
+        assert_eq!(master.status(), Status::OK);
+        assert_eq!(master.receive(), 1);
+    }
 }

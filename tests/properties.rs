@@ -2,75 +2,83 @@
 
 mod common;
 
-use common::{frame, Wanting};
+use common::master::{frame, sealed, Asker, Call};
 use mbm::error::Status;
 use mbm::frame::checksum::crc16;
-use mbm::frame::rtu::Window;
-use mbm::pdu::query::Query;
 use mbm::pdu::request::Request;
-use mbm::pdu::{bits, registers, reply};
 use proptest::prelude::*;
 
-fn build(build: impl FnOnce(&mut Query) -> Status) -> Option<Query> {
-    Query::build(build).ok()
-}
-
 /// Any request that the ten functions build.
-fn any_request() -> impl Strategy<Value = Query> {
-    prop_oneof![
-        (any::<u16>(), 0u16..2002).prop_map(|(a, q)| build(|r| bits::read_coils(r, a, q))),
-        (any::<u16>(), 0u16..2002)
-            .prop_map(|(a, q)| build(|r| bits::read_discrete_inputs(r, a, q))),
-        (any::<u16>(), 0u16..127).prop_map(|(a, q)| build(|r| registers::read_holding(r, a, q))),
-        (any::<u16>(), 0u16..127).prop_map(|(a, q)| build(|r| registers::read_input(r, a, q))),
-        any::<(u16, u16)>().prop_map(|(a, on)| build(|r| bits::write_single(r, a, on))),
-        any::<(u16, u16)>().prop_map(|(a, v)| build(|r| registers::write_single(r, a, v))),
-        (any::<u16>(), 0u16..1970).prop_map(|(a, q)| build(|r| bits::write_multiple(r, a, q))),
-        (any::<u16>(), 0u16..125).prop_map(|(a, q)| build(|r| registers::write_multiple(r, a, q))),
-        any::<(u16, u16, u16)>().prop_map(|(a, b, c)| build(|r| registers::mask_write(r, a, b, c))),
-        (any::<u16>(), 0u16..127, any::<u16>(), 0u16..123)
-            .prop_map(|(ra, rq, wa, wq)| build(|r| registers::read_write(r, ra, rq, wa, wq))),
-    ]
-    .prop_filter_map("within the standard", |request| request)
-}
-
-/// A right reply to `request`, with data bytes from `seed`.
-fn right_reply(unit: u8, request: &Query, seed: u8) -> Vec<u8> {
-    let sent = frame(unit, request, &[]);
-    let mut frame = if request.is_read() {
-        let count = request.response_length() - 2;
-        let mut frame = vec![unit, request.function(), count];
-        frame.extend((0..count).map(|i| seed.wrapping_mul(31).wrapping_add(i)));
-        frame
-    } else {
-        sent[..1 + usize::from(request.response_length())].to_vec()
+fn any_request() -> impl Strategy<Value = Call> {
+    let ranged = |function: u8, most: u16| {
+        (any::<u16>(), 0..most + 2).prop_map(move |(a, q)| Call::new(function, &[a, q]))
     };
-    frame.extend(crc16(&frame).to_bytes());
-    frame
+    prop_oneof![
+        ranged(0x01, 2000),
+        ranged(0x02, 2000),
+        ranged(0x03, 125),
+        ranged(0x04, 125),
+        any::<[u16; 2]>().prop_map(|words| Call::new(0x05, &words)),
+        any::<[u16; 2]>().prop_map(|words| Call::new(0x06, &words)),
+        ranged(0x0F, 1968),
+        ranged(0x10, 123),
+        any::<[u16; 3]>().prop_map(|words| Call::new(0x16, &words)),
+        (any::<u16>(), 0u16..127, any::<u16>(), 0u16..123)
+            .prop_map(|(ra, rq, wa, wq)| Call::new(0x17, &[ra, rq, wa, wq])),
+    ]
+    .prop_filter("within the standard", |call| call.query().is_ok())
 }
 
-/// Feeds `bytes` in pieces and returns the first frame's PDU.
-fn find(unit: u8, request: &Query, bytes: &[u8], piece: usize, size: usize) -> Option<Vec<u8>> {
-    let mut buffer = vec![0; size];
-    let mut window = Window::EMPTY;
-    let mut rest = bytes;
-    loop {
-        let found = window.search(&mut buffer, &mut Wanting(unit, request));
-        if found {
-            let pdu = &window.bytes(&buffer)?[1..];
-            let length = reply::expected(request, pdu).map(|length| usize::from(length.get()));
-            return Some(pdu[..length?].to_vec());
-        }
-        if rest.is_empty() {
-            return None;
-        }
-        let room = window.room(&mut buffer).expect("room");
-        let count = rest.len().min(piece).min(room.len());
-        assert!(count > 0, "a full window asks for more");
-        room[..count].copy_from_slice(&rest[..count]);
-        window.arrived(count as u16);
-        rest = &rest[count..];
+/// The bytes of data in the right reply to `call` that `seed` makes.
+fn data(call: Call, seed: u8) -> Vec<u8> {
+    let count = call.query().unwrap().reads();
+    (0..count)
+        .map(|i| seed.wrapping_mul(31).wrapping_add(i))
+        .collect()
+}
+
+/// A right reply to `call`, with data bytes from `seed`.
+fn right_reply(unit: u8, call: Call, seed: u8) -> Vec<u8> {
+    let query = call.query().unwrap();
+    if query.is_read() {
+        let head = [unit, call.function, query.reads()];
+        return sealed(&[&head, &data(call, seed)[..]].concat());
     }
+    sealed(&frame(unit, call, &[])[..1 + usize::from(query.response_length())])
+}
+
+/// The words that a right reply to `call` fills.
+fn right_words(call: Call, seed: u8) -> Vec<u16> {
+    let mut data = data(call, seed);
+    if call.function > 2 {
+        let pairs = data.chunks(2);
+        return pairs
+            .map(|pair| u16::from_be_bytes([pair[0], pair[1]]))
+            .collect();
+    }
+    // The bits beyond those asked for are zero.
+    data.push(0);
+    let quantity = usize::from(call.words[1]);
+    let bit = |bit: usize| u16::from(data[bit / 8]) >> (bit % 8) & 1;
+    let word = |word: usize| {
+        let bits = 16 * word..quantity.min(16 * word + 16);
+        bits.fold(0, |bits, at| bits | bit(at) << (at % 16))
+    };
+    (0..quantity.div_ceil(16)).map(word).collect()
+}
+
+/// True if a frame that begins as the reply to `call` does, or as an exception to it,
+/// begins before the last `reply` bytes, and its CRC is right by chance.
+fn is_answered_before(unit: u8, call: Call, bytes: &[u8], reply: usize) -> bool {
+    let right = |at: usize, length: usize| {
+        let frame = bytes.get(at..at + length);
+        frame.is_some_and(|frame| crc16(frame).is_residue())
+    };
+    (0..bytes.len() - reply).any(|at| match bytes[at..] {
+        [first, function, ..] if first == unit && function == call.function => right(at, reply),
+        [first, function, ..] if first == unit && function == call.function | 0x80 => right(at, 5),
+        _ => false,
+    })
 }
 
 proptest! {
@@ -79,7 +87,7 @@ proptest! {
         request in any_request(),
         words in prop::collection::vec(any::<u16>(), 123),
     ) {
-        let frame = frame(9, &request, &words);
+        let frame = frame(9, request, &words);
         prop_assert!(crc16(&frame).is_residue());
         let pdu = &frame[1..frame.len() - 2];
         let received = Request::parse(pdu).expect("a request of ours is in order");
@@ -123,12 +131,21 @@ proptest! {
         request in any_request(),
         bytes in prop::collection::vec(any::<u8>(), 0..600),
         piece in 1usize..40,
+        step in 50u32..3000,
         size in 8usize..256,
+        echo: bool,
     ) {
         let _ = Request::parse(&bytes);
-        let _ = reply::judge(&request, &bytes);
-        let _ = request.take(&mut [0; 125], &bytes);
-        let _ = find(bytes.first().copied().unwrap_or(1), &request, &bytes, piece, size);
+        let unit = bytes.first().copied().unwrap_or(1).max(1);
+        let request_length = usize::from(request.query().unwrap().length()) + 3;
+        let mut asker = Asker::new(unit, size.max(request_length));
+        asker.0.settings().echo_discard = echo;
+        asker.ask(request, &bytes, piece, step);
+        // As the PDU of a frame, then to a request whose reply is on probation.
+        let pdu = &bytes[..bytes.len().min(253)];
+        asker.ask(request, &sealed(&[&[unit], pdu].concat()), piece, step);
+        asker.send(request, &[]);
+        asker.ask(request, &bytes, piece, step);
     }
 
     #[test]
@@ -137,29 +154,59 @@ proptest! {
         noise in prop::collection::vec(2u8..=255, 0..300),
         seed: u8,
         piece in 1usize..300,
+        step in 50u32..3000,
     ) {
-        let reply = right_reply(1, &request, seed);
-        let bytes: Vec<u8> = noise.iter().chain(&reply).copied().collect();
-        let pdu = find(1, &request, &bytes, piece, 256);
-        prop_assert_eq!(pdu.as_deref(), Some(&reply[1..reply.len() - 2]));
+        let reply = right_reply(1, request, seed);
+        let bytes = [noise, reply].concat();
+        let mut asker = Asker::new(1, 256);
+        prop_assert_eq!(asker.ask(request, &bytes, piece, step), Status::OK);
+        prop_assert_eq!(asker.words(), right_words(request, seed));
+    }
+
+    #[test]
+    fn a_right_reply_is_found_behind_heads_that_look_like_its_own(
+        request in any_request(),
+        noise in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..20), 1..60),
+        seed: u8,
+        piece in 1usize..300,
+        room in 0usize..20,
+    ) {
+        let reply = right_reply(17, request, seed);
+        let query = request.query().unwrap();
+        let head = &reply[..if query.is_read() { 3 } else { 2 }];
+        let false_heads = noise.iter().flat_map(|noise| [head, noise]);
+        let bytes: Vec<u8> = false_heads.flatten().chain(&reply).copied().collect();
+        prop_assume!(!is_answered_before(17, request, &bytes, reply.len()));
+        let least = reply.len().max(usize::from(query.length()) + 3);
+        let mut asker = Asker::new(17, least + room);
+        // Less than the silence that ends a frame.
+        prop_assert_eq!(asker.ask(request, &bytes, piece, 100), Status::OK);
+        prop_assert_eq!(asker.words(), right_words(request, seed));
     }
 
     #[test]
     fn a_reply_with_one_flipped_bit_is_not_a_reply(
         request in any_request(),
         seed: u8,
+        piece in 1usize..300,
         bit: prop::sample::Index,
     ) {
-        let mut reply = right_reply(1, &request, seed);
+        let mut reply = right_reply(1, request, seed);
         let bit = bit.index(8 * reply.len());
         reply[bit / 8] ^= 1 << (bit % 8);
-        prop_assert_eq!(find(1, &request, &reply, 300, 256), None);
+        let mut asker = Asker::new(1, 256);
+        let status = asker.ask(request, &reply, piece, 100);
+        prop_assert!(status.is_failure(), "{:?}", status);
+        prop_assert_eq!(asker.words(), []);
     }
 
     #[test]
     fn a_right_reply_is_judged_a_success(request in any_request(), seed: u8) {
-        let reply = right_reply(1, &request, seed);
-        prop_assert_eq!(reply::judge(&request, &reply[1..reply.len() - 2]), Status::OK);
+        let reply = right_reply(1, request, seed);
+        let mut asker = Asker::new(1, 256);
+        prop_assert_eq!(asker.ask(request, &reply, 300, 100), Status::OK);
+        prop_assert_eq!(asker.0.exception_code(), 0);
+        prop_assert_eq!(asker.words(), right_words(request, seed));
     }
 }
 

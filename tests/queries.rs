@@ -5,29 +5,20 @@ mod common;
 #[path = "common/vectors.rs"]
 mod vectors;
 
-use common::{frame, Wanting};
+use common::master::{frame, sealed, Asker, Call};
 use mbm::error::Status;
-use mbm::frame::rtu::{self, Window};
+use mbm::frame::rtu;
 use mbm::pdu::length::Length;
-use mbm::pdu::query::Query;
+use mbm::pdu::reply;
 use mbm::pdu::request::Request;
-use mbm::pdu::{bits, registers, reply};
+use mbm::transaction::Counter;
 use vectors::{right_pdus, Direction};
 
-fn build(build: impl FnOnce(&mut Query) -> Status) -> Query {
-    Query::build(build).unwrap()
-}
-
-/// The status and the data bytes of a reply frame to a request.
-fn reply(unit: u8, request: &Query, frame: &[u8]) -> (Status, Vec<u8>) {
-    let mut buffer = frame.to_vec();
-    let mut window = Window::EMPTY;
-    window.arrived(frame.len() as u16);
-    assert!(window.search(&mut buffer, &mut Wanting(unit, request)));
-    let pdu = &buffer[rtu::PDU..buffer.len() - 2];
-    let status = reply::judge(request, pdu);
-    let read = status == Status::OK && request.is_read();
-    (status, if read { pdu[2..].to_vec() } else { vec![] })
+/// The status and the words of a reply frame to a call.
+fn reply(unit: u8, function: u8, words: &[u16], frame: &[u8]) -> (Status, Vec<u16>) {
+    let mut asker = Asker::new(unit, 256);
+    let status = asker.ask(Call::new(function, words), frame, 256, 100);
+    (status, asker.words())
 }
 
 /// The words that travel as these bytes.
@@ -38,71 +29,43 @@ fn words(data: &[u8], of: impl Fn([u8; 2]) -> u16) -> Vec<u16> {
     pairs.map(of).collect()
 }
 
-/// The same request as the facade builds it, with its words; `None` if the
-/// facade has no such function.
-fn query(request: &Request) -> Option<(Result<Query, Status>, Vec<u16>)> {
-    let none = vec![];
-    Some(match *request {
+/// The call that sends the same request, and the words to send; `None` if the facade
+/// has no such function.
+fn call(request: &Request) -> Option<(Call, Vec<u16>)> {
+    let (function, arguments, sent) = match *request {
         Request::ReadBits {
             function,
             address,
             quantity,
-        } => match function {
-            1 => (
-                Query::build(|r| bits::read_coils(r, address, quantity)),
-                none,
-            ),
-            _ => {
-                let build = |r: &mut _| bits::read_discrete_inputs(r, address, quantity);
-                (Query::build(build), none)
-            }
-        },
-        Request::ReadRegisters {
+        }
+        | Request::ReadRegisters {
             function,
             address,
             quantity,
-        } => match function {
-            3 => {
-                let build = |r: &mut _| registers::read_holding(r, address, quantity);
-                (Query::build(build), none)
-            }
-            _ => {
-                let build = |r: &mut _| registers::read_input(r, address, quantity);
-                (Query::build(build), none)
-            }
-        },
-        Request::WriteSingleCoil { address, on } => {
-            let build = |r: &mut _| bits::write_single(r, address, u16::from(on));
-            (Query::build(build), none)
-        }
-        Request::WriteSingleRegister { address, value } => {
-            let build = |r: &mut _| registers::write_single(r, address, value);
-            (Query::build(build), none)
-        }
+        } => (function, vec![address, quantity], vec![]),
+        Request::WriteSingleCoil { address, on } => (5, vec![address, u16::from(on)], vec![]),
+        Request::WriteSingleRegister { address, value } => (6, vec![address, value], vec![]),
         Request::WriteMultipleCoils {
             address,
             quantity,
             data,
         } => {
-            let build = |r: &mut _| bits::write_multiple(r, address, quantity);
-            (Query::build(build), words(data, u16::from_le_bytes))
+            let sent = words(data, u16::from_le_bytes);
+            (0x0F, vec![address, quantity], sent)
         }
         Request::WriteMultipleRegisters {
             address,
             quantity,
             data,
         } => {
-            let build = |r: &mut _| registers::write_multiple(r, address, quantity);
-            (Query::build(build), words(data, u16::from_be_bytes))
+            let sent = words(data, u16::from_be_bytes);
+            (0x10, vec![address, quantity], sent)
         }
         Request::MaskWriteRegister {
             address,
             and_mask,
             or_mask,
-        } => {
-            let build = |r: &mut _| registers::mask_write(r, address, and_mask, or_mask);
-            (Query::build(build), none)
-        }
+        } => (0x16, vec![address, and_mask, or_mask], vec![]),
         Request::ReadWriteMultipleRegisters {
             read_address,
             read_quantity,
@@ -110,13 +73,22 @@ fn query(request: &Request) -> Option<(Result<Query, Status>, Vec<u16>)> {
             write_quantity,
             data,
         } => {
-            let read = (read_address, read_quantity);
-            let written = (write_address, write_quantity);
-            let build = |r: &mut _| registers::read_write(r, read.0, read.1, written.0, written.1);
-            (Query::build(build), words(data, u16::from_be_bytes))
+            let arguments = vec![read_address, read_quantity, write_address, write_quantity];
+            (0x17, arguments, words(data, u16::from_be_bytes))
         }
         _ => return None,
-    })
+    };
+    Some((Call::new(function, &arguments), sent))
+}
+
+/// Whether a request is built, or with what status it is refused. The master says the
+/// same.
+fn built(call: Call) -> Result<(), Status> {
+    let built = call.query().map(drop);
+    let mut asker = Asker::new(17, 256);
+    let told = asker.start(call, &[]);
+    assert_eq!(told, built.err().unwrap_or(Status::PENDING), "{call:?}");
+    built
 }
 
 #[test]
@@ -125,10 +97,10 @@ fn the_facade_sends_what_its_request_says_byte_for_byte() {
     for vector in right_pdus() {
         if vector.direction == Direction::Request {
             let request = Request::parse(&vector.bytes).unwrap();
-            let Some((built, words)) = query(&request) else {
+            let Some((call, words)) = call(&request) else {
                 continue;
             };
-            let sent = frame(17, &built.unwrap(), &words);
+            let sent = frame(17, call, &words);
             let mut buffer = [0; 256];
             let length = rtu::emit(&mut buffer, 17, |pdu| request.emit(pdu));
             assert_eq!(sent, buffer[..length.unwrap()], "{}", vector.name);
@@ -144,8 +116,8 @@ fn the_facade_expects_the_response_that_its_request_says() {
     for vector in right_pdus() {
         if vector.direction == Direction::Request {
             let request = Request::parse(&vector.bytes).unwrap();
-            if let Some((Ok(built), _)) = query(&request) {
-                let length = usize::from(built.response_length());
+            if let Some((call, _)) = call(&request) {
+                let length = usize::from(call.query().unwrap().response_length());
                 assert_eq!(request.response_length(&[]), Length::Exactly(length));
             }
         }
@@ -164,9 +136,9 @@ fn the_facade_refuses_what_its_request_refuses_with_the_same_status() {
         addresses.into_iter().flat_map(of)
     };
     let same = |request: Request| {
-        let (built, _) = query(&request).unwrap();
+        let (call, _) = call(&request).unwrap();
         let emitted = request.emit(&mut [0; 300]);
-        assert_eq!(built.map(drop), emitted.map(drop), "{request:?}");
+        assert_eq!(built(call), emitted.map(drop), "{request:?}");
     };
     for (address, quantity) in places() {
         let bytes = 2 * usize::from(quantity);
@@ -208,8 +180,8 @@ fn of_two_faults_the_facade_names_that_of_the_write() {
             write_quantity: write.1,
             data,
         };
-        let built = query(&request).unwrap().0.map(drop);
-        (built, request.emit(&mut [0; 600]).map(drop))
+        let (call, _) = call(&request).unwrap();
+        (built(call), request.emit(&mut [0; 600]).map(drop))
     };
     let address = Err(Status::ILLEGAL_DATA_ADDRESS);
     let value = Err(Status::ILLEGAL_DATA_VALUE);
@@ -227,57 +199,55 @@ fn of_two_faults_the_facade_names_that_of_the_write() {
 
 #[test]
 fn reply_frames_with_their_crc() {
-    let holding = build(|r| registers::read_holding(r, 0x6B, 1));
-    let read = reply(1, &holding, &[1, 3, 2, 0xCD, 0x6B, 0xAD, 0x3B]);
-    assert_eq!(read, (Status::OK, vec![0xCD, 0x6B]));
-    let input = build(|r| registers::read_input(r, 0x6B, 1));
-    let read = reply(1, &input, &[1, 4, 2, 0xCD, 0x6B, 0xAC, 0x4F]);
-    assert_eq!(read, (Status::OK, vec![0xCD, 0x6B]));
-    let coils = build(|r| bits::read_coils(r, 0, 16));
-    let read = reply(3, &coils, &[3, 1, 2, 0xCD, 0x6B, 0xD5, 0x43]);
-    assert_eq!(read, (Status::OK, vec![0xCD, 0x6B]));
-    let inputs = build(|r| bits::read_discrete_inputs(r, 0, 16));
-    let read = reply(3, &inputs, &[3, 2, 2, 0xCD, 0x6B, 0xD5, 0x07]);
-    assert_eq!(read, (Status::OK, vec![0xCD, 0x6B]));
-    let both = build(|r| registers::read_write(r, 0x0410, 1, 0x0112, 2));
-    let read = reply(0x11, &both, &[0x11, 0x17, 2, 0xCD, 0x6B, 0x69, 0x08]);
-    assert_eq!(read, (Status::OK, vec![0xCD, 0x6B]));
-    let coils = build(|r| bits::write_multiple(r, 0x0410, 3));
-    let wrote = reply(0x11, &coils, &[0x11, 0x0F, 4, 0x10, 0, 3, 0x17, 0xAF]);
+    let read = reply(1, 3, &[0x6B, 1], &[1, 3, 2, 0xCD, 0x6B, 0xAD, 0x3B]);
+    assert_eq!(read, (Status::OK, vec![0xCD6B]));
+    let read = reply(1, 4, &[0x6B, 1], &[1, 4, 2, 0xCD, 0x6B, 0xAC, 0x4F]);
+    assert_eq!(read, (Status::OK, vec![0xCD6B]));
+    let read = reply(3, 1, &[0, 16], &[3, 1, 2, 0xCD, 0x6B, 0xD5, 0x43]);
+    assert_eq!(read, (Status::OK, vec![0x6BCD]));
+    let read = reply(3, 2, &[0, 16], &[3, 2, 2, 0xCD, 0x6B, 0xD5, 0x07]);
+    assert_eq!(read, (Status::OK, vec![0x6BCD]));
+    let both = [0x0410, 1, 0x0112, 2];
+    let read = reply(0x11, 0x17, &both, &[0x11, 0x17, 2, 0xCD, 0x6B, 0x69, 0x08]);
+    assert_eq!(read, (Status::OK, vec![0xCD6B]));
+    let coils = [0x11, 0x0F, 4, 0x10, 0, 3, 0x17, 0xAF];
+    let wrote = reply(0x11, 0x0F, &[0x0410, 3], &coils);
     assert_eq!(wrote, (Status::OK, vec![]));
-    let words = build(|r| registers::write_multiple(r, 0x0410, 3));
-    let wrote = reply(0x11, &words, &[0x11, 0x10, 4, 0x10, 0, 3, 0x82, 0x6D]);
+    let words = [0x11, 0x10, 4, 0x10, 0, 3, 0x82, 0x6D];
+    let wrote = reply(0x11, 0x10, &[0x0410, 3], &words);
     assert_eq!(wrote, (Status::OK, vec![]));
-    let coil = build(|r| bits::write_single(r, 2, 1));
-    let wrote = reply(3, &coil, &[3, 5, 0, 2, 0xFF, 0, 0x2C, 0x18]);
+    let wrote = reply(3, 5, &[2, 1], &[3, 5, 0, 2, 0xFF, 0, 0x2C, 0x18]);
     assert_eq!(wrote, (Status::OK, vec![]));
-    let refused = reply(
-        0x0A,
-        &build(|r| bits::read_coils(r, 0, 8)),
-        &[0x0A, 0x81, 2, 0xB0, 0x53],
-    );
+    let refused = reply(0x0A, 1, &[0, 8], &[0x0A, 0x81, 2, 0xB0, 0x53]);
     assert_eq!(refused, (Status::ILLEGAL_DATA_ADDRESS, vec![]));
 }
 
 #[test]
 fn a_write_reply_with_another_address_or_value_is_malformed() {
-    let request = build(|r| registers::write_single(r, 0x6B, 0x0101));
     for (at, wrong) in [(1, 1), (2, 0x6C), (3, 0), (4, 0)] {
         let mut pdu = [6, 0, 0x6B, 1, 1];
         pdu[at] = wrong;
-        assert_eq!(reply::judge(&request, &pdu), Status::MALFORMED_REPLY);
+        let frame = sealed(&[&[9], &pdu[..]].concat());
+        let mut asker = Asker::new(9, 256);
+        let status = asker.ask(Call::new(6, &[0x6B, 0x0101]), &frame, 256, 100);
+        assert_eq!(status, Status::MALFORMED_REPLY);
+        let foreign = asker.0.storage().counters[Counter::ForeignFrames as usize];
+        assert_eq!(foreign, 1);
     }
 }
 
 #[test]
 fn exception_codes_of_0_and_from_80_are_malformed() {
-    let request = build(|r| registers::write_single(r, 1, 2));
     for code in 0..=255 {
         let expected = match code {
             1..=0x7F => Status::from_code(code),
             _ => Status::MALFORMED_REPLY,
         };
-        assert_eq!(reply::judge(&request, &[0x86, code]), expected);
+        let mut asker = Asker::new(9, 256);
+        let frame = sealed(&[9, 0x86, code]);
+        let status = asker.ask(Call::new(6, &[1, 2]), &frame, 256, 100);
+        assert_eq!(status, expected);
+        assert_eq!(asker.0.exception_code(), code);
         assert_eq!(reply::exception_code(&[0x86, code]), Some(code));
     }
 }
@@ -287,24 +257,26 @@ fn quantities_and_addresses_are_held_to_the_standard() {
     use Status as S;
     let value = Err(S::ILLEGAL_DATA_VALUE);
     let address = Err(S::ILLEGAL_DATA_ADDRESS);
-    let build = |build: fn(&mut Query, u16, u16) -> Status, a, q| {
-        Query::build(|request| build(request, a, q)).map(|_| ())
-    };
-    for (most, function) in [
-        (2000, bits::read_coils as fn(&mut Query, u16, u16) -> Status),
-        (125, registers::read_holding),
-        (1968, bits::write_multiple),
-        (123, registers::write_multiple),
-        (121, |r, a, q| registers::read_write(r, 0, 1, a, q)),
-        (125, |r, a, q| registers::read_write(r, a, q, 0, 1)),
-    ] {
-        assert_eq!(build(function, 0, 0), value);
-        assert_eq!(build(function, 0, 1), Ok(()));
-        assert_eq!(build(function, 0, most), Ok(()));
-        assert_eq!(build(function, 0, most + 1), value);
-        assert_eq!(build(function, 0, 0xFFFF), value);
-        assert_eq!(build(function, 0xFFFF, 1), Ok(()));
-        assert_eq!(build(function, 0xFFFF, 2), address);
-        assert_eq!(build(function, 0u16.wrapping_sub(most), most), Ok(()));
+    type Of = fn(u16, u16) -> Call;
+    let calls: [(u16, Of); 8] = [
+        (2000, |a, q| Call::new(0x01, &[a, q])),
+        (2000, |a, q| Call::new(0x02, &[a, q])),
+        (125, |a, q| Call::new(0x03, &[a, q])),
+        (125, |a, q| Call::new(0x04, &[a, q])),
+        (1968, |a, q| Call::new(0x0F, &[a, q])),
+        (123, |a, q| Call::new(0x10, &[a, q])),
+        (121, |a, q| Call::new(0x17, &[0, 1, a, q])),
+        (125, |a, q| Call::new(0x17, &[a, q, 0, 1])),
+    ];
+    for (most, call) in calls {
+        let build = |a, q| built(call(a, q));
+        assert_eq!(build(0, 0), value);
+        assert_eq!(build(0, 1), Ok(()));
+        assert_eq!(build(0, most), Ok(()));
+        assert_eq!(build(0, most + 1), value);
+        assert_eq!(build(0, 0xFFFF), value);
+        assert_eq!(build(0xFFFF, 1), Ok(()));
+        assert_eq!(build(0xFFFF, 2), address);
+        assert_eq!(build(0u16.wrapping_sub(most), most), Ok(()));
     }
 }

@@ -3,12 +3,12 @@
 mod common;
 
 use common::device::Device;
+use mbm::engine::Buffers;
 use mbm::error::Status;
 use mbm::frame::Framing;
 use mbm::master::Master;
 use mbm::port::Port;
 use mbm::server::Server;
-use mbm::transaction::Storage;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
@@ -80,29 +80,11 @@ impl Port for End {
     }
 }
 
-struct Buffers([u8; 256], [u16; 123], [u16; 125]);
-
-impl Storage for Buffers {
-    fn frame(&mut self) -> &mut [u8] {
-        &mut self.0
-    }
-    fn transmit(&mut self) -> &mut [u16] {
-        &mut self.1
-    }
-    fn response(&mut self) -> &mut [u16] {
-        &mut self.2
-    }
-    fn frame_and_transmit(&mut self) -> (&mut [u8], &[u16]) {
-        (&mut self.0, &self.1)
-    }
-    fn frame_and_response(&mut self) -> (&[u8], &mut [u16]) {
-        (&self.0, &mut self.2)
-    }
-}
+type Lent = Buffers<[u8; 256], [u16; 125], [u16; 123]>;
 
 struct Loop {
     wire: Rc<RefCell<Wire>>,
-    master: Master<End, Buffers>,
+    master: Master<End, Lent>,
     server: Server<End, [u8; 256]>,
     device: Device,
 }
@@ -110,7 +92,7 @@ struct Loop {
 impl Loop {
     fn new() -> Self {
         let wire = Rc::new(RefCell::new(Wire::default()));
-        let buffers = Buffers([0; 256], [0; 123], [0; 125]);
+        let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
         let mut master = Master::new(17, End(wire.clone(), 0), buffers);
         master.set_baud_rate(115_200);
         master.settings().response_timeout = 100_000;

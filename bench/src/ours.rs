@@ -83,7 +83,7 @@ pub fn answer(
             let from = usize::from(address);
             let words = model.words.get(from..from + usize::from(quantity));
             let data = &mut model.place[..2 * usize::from(quantity)];
-            registers::send(data, words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?, 0);
+            registers::send(data, words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?);
             Response::ReadRegisters { function, data }
         }
         Request::WriteSingleCoil { address, on } => {
@@ -125,7 +125,7 @@ pub fn answer(
         } => {
             let from = usize::from(address);
             let words = model.words.get_mut(from..from + usize::from(quantity));
-            registers::take(words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?, data, 0);
+            registers::take(words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?, data);
             Response::WriteMultiple {
                 function: 16,
                 address,
@@ -157,11 +157,11 @@ pub fn answer(
             let words = model
                 .words
                 .get_mut(from..from + usize::from(write_quantity));
-            registers::take(words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?, data, 0);
+            registers::take(words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?, data);
             let from = usize::from(read_address);
             let words = model.words.get(from..from + usize::from(read_quantity));
             let data = &mut model.place[..2 * usize::from(read_quantity)];
-            registers::send(data, words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?, 0);
+            registers::send(data, words.ok_or(Status::ILLEGAL_DATA_ADDRESS)?);
             Response::ReadRegisters {
                 function: 0x17,
                 data,
@@ -188,7 +188,7 @@ pub fn receive(framing: Framing, frame: &[u8], words: &mut [u16]) {
     let response = Response::parse(adu.pdu);
     assert!(response.is_ok());
     if let Ok(Response::ReadRegisters { data, .. }) = response {
-        registers::take(words, data, 0);
+        registers::take(words, data);
     }
     black_box(&response);
 }

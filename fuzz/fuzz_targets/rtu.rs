@@ -5,8 +5,8 @@
 use libfuzzer_sys::fuzz_target;
 use mbm::error::Status;
 use mbm::frame::rtu::{self, Verdict, Wanted, Window};
-use mbm::pdu::reply;
 use mbm_fuzz::asked::Asked;
+use mbm_fuzz::search::Search;
 use mbm_fuzz::stream::{event, Event};
 use mbm_fuzz::{naive, Input};
 use std::num::NonZeroU8;
@@ -36,7 +36,7 @@ fn whole(frame: &[u8]) {
     }
 }
 
-/// What the search is for, by mbm's own rules.
+/// What the search is for, by the rules of the naive one.
 struct Ours<'a>(&'a Asked);
 
 impl Wanted for Ours<'_> {
@@ -47,55 +47,15 @@ impl Wanted for Ours<'_> {
         self.0.function()
     }
     fn length(&self, frame: &[u8]) -> Option<NonZeroU8> {
-        match frame {
-            [unit, pdu @ ..] if *unit == self.0.unit => reply::expected(&self.0.query, pdu),
-            _ => None,
-        }
+        let length = self.0.frame_length(frame)? - rtu::OVERHEAD;
+        NonZeroU8::new(length as u8)
     }
     fn judge(&mut self, frame: &[u8]) -> Verdict {
-        match reply::judge(&self.0.query, &frame[rtu::PDU..frame.len() - 2]) {
-            Status::MALFORMED_REPLY => Verdict::Wrong,
-            _ => Verdict::Right,
+        if self.0.is_answered_by(frame) {
+            Verdict::Right
+        } else {
+            Verdict::Wrong
         }
-    }
-}
-
-/// All that ever arrived, looked through from a position on.
-struct Naive<'a> {
-    asked: &'a Asked,
-    room: usize,
-    bytes: Vec<u8>,
-    at: usize,
-}
-
-impl Naive<'_> {
-    /// The frame that answers; looks behind what is not complete if `skim`.
-    fn search(&mut self, skim: bool) -> Option<Vec<u8>> {
-        let mut at = self.at;
-        while at < self.bytes.len() {
-            let rest = &self.bytes[at..];
-            let length = self.asked.frame_length(rest);
-            match length.and_then(|length| rest.get(..length)) {
-                Some(frame) if naive::has_crc(frame) => {
-                    let (right, found) = (self.asked.is_answered_by(frame), frame.to_vec());
-                    at += found.len();
-                    self.at = at;
-                    if right {
-                        return Some(found);
-                    }
-                    continue;
-                }
-                Some(_) => {}
-                // What the buffer cannot hold is passed over.
-                None if length.is_some_and(|length| length <= self.room) && !skim => break,
-                None => {}
-            }
-            at += 1;
-        }
-        if !skim {
-            self.at = at;
-        }
-        None
     }
 }
 
@@ -107,13 +67,13 @@ fn search(mut input: Input) {
     let piece = 1 + usize::from(input.u8());
     let mut buffer = vec![0; room];
     let mut window = Window::EMPTY;
-    let mut naive = Naive {
+    let mut naive = Search {
         asked: &asked,
         room,
         bytes: Vec::new(),
         at: 0,
     };
-    let check = |window: &mut Window, naive: &mut Naive, buffer: &mut [u8], skim| {
+    let check = |window: &mut Window, naive: &mut Search, buffer: &mut [u8], skim| {
         let found = window
             .search(buffer, &mut Ours(&asked))
             .then(|| window.bytes(buffer).expect("within the buffer"));

@@ -2,8 +2,7 @@
 //! looks, and what answers it.
 
 use crate::{be, naive, Input};
-use mbm::error::Status;
-use mbm::pdu::query::Query;
+use mbm::pdu::query::{Form, Query};
 use mbm::pdu::{bits, registers};
 
 /// A request and its PDU.
@@ -24,8 +23,6 @@ pub fn words() -> Vec<u16> {
         .collect()
 }
 
-type Build = fn(&mut Query, u16, u16) -> Status;
-
 impl Asked {
     /// The request that an input describes, if it is one within the standard.
     pub fn new(input: &mut Input) -> Option<Asked> {
@@ -33,45 +30,45 @@ impl Asked {
         let (a, b, c, d) = (input.u16(), input.u16(), input.u16(), input.u16());
         let words = words();
         let read = |function, most| {
-            let build: Build = match function {
-                1 => bits::read_coils,
-                2 => bits::read_discrete_inputs,
-                3 => registers::read_holding,
-                _ => registers::read_input,
+            let form: Form = match function {
+                1 => bits::form::READ_COILS,
+                2 => bits::form::READ_INPUTS,
+                3 => registers::form::READ_HOLDING,
+                _ => registers::form::READ_INPUT,
             };
-            (function, build, 1 + b % most)
+            (function, form, 1 + b % most)
         };
         let head = |function: u8, words: &[u16]| [vec![function], be(words)].concat();
         let counted = |head: Vec<u8>, data: Vec<u8>| [head, vec![data.len() as u8], data].concat();
         let (built, pdu, data) = match kind {
             0..=3 => {
-                let (function, build, quantity) = read(kind + 1, if kind < 2 { 2000 } else { 125 });
+                let (function, form, quantity) = read(kind + 1, if kind < 2 { 2000 } else { 125 });
                 let data = match kind {
                     0 | 1 => usize::from(quantity).div_ceil(8),
                     _ => 2 * usize::from(quantity),
                 };
                 let pdu = head(function, &[a, quantity]);
-                (Query::build(|q| build(q, a, quantity)), pdu, Some(data))
+                (Query::build(|q| q.set(form, a, quantity)), pdu, Some(data))
             }
             4 => {
                 let value = if b == 0 { 0 } else { 0xFF00 };
-                let built = Query::build(|q| bits::write_single(q, a, b));
+                let built = Query::build(|q| q.set(bits::form::WRITE_SINGLE, a, value));
                 (built, head(5, &[a, value]), None)
             }
             5 => {
-                let built = Query::build(|q| registers::write_single(q, a, b));
+                let built = Query::build(|q| q.set(registers::form::WRITE_SINGLE, a, b));
                 (built, head(6, &[a, b]), None)
             }
             6 => {
                 let quantity = 1 + b % 1968;
                 let pdu = counted(head(15, &[a, quantity]), naive::coils(&words, quantity));
-                let built = Query::build(|q| bits::write_multiple(q, a, quantity));
+                let built = Query::build(|q| q.set(bits::form::WRITE_MULTIPLE, a, quantity));
                 (built, pdu, None)
             }
             7 => {
                 let quantity = 1 + b % 123;
                 let data = be(&words[..quantity.into()]);
-                let built = Query::build(|q| registers::write_multiple(q, a, quantity));
+                let built = Query::build(|q| q.set(registers::form::WRITE_MULTIPLE, a, quantity));
                 (built, counted(head(16, &[a, quantity]), data), None)
             }
             8 => {

@@ -5,6 +5,7 @@ pub mod api;
 pub mod asked;
 pub mod lengths;
 pub mod naive;
+pub mod search;
 pub mod stream;
 
 /// A fuzz input, taken from its front; zeros once it is used up.

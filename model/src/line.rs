@@ -1,6 +1,6 @@
 //! A master, a device that answers in order, and an adversary between them.
 
-use crate::wire::{Buffers, Wire};
+use crate::wire::{self, Lent, Wire};
 use mbm::error::Status;
 use mbm::frame::rtu;
 use mbm::master::Master;
@@ -50,7 +50,7 @@ pub enum Event {
 /// Everything that decides about the future, and what the properties look at.
 #[derive(Clone, Debug)]
 pub struct State {
-    master: Master<Wire, Buffers>,
+    master: Master<Wire, Lent>,
     /// Requests that the device has not answered, in order.
     owed: Vec<u8>,
     /// The number of the last request, which is the value that it reads.
@@ -109,7 +109,7 @@ fn reply(unit: u8, number: u8) -> Vec<u8> {
 impl State {
     /// A master whose first request was just started.
     pub fn new(buffer: usize, retries: u8, quiet_time: u32) -> Self {
-        let mut master = Master::new(UNIT, Wire::default(), Buffers::new(buffer));
+        let mut master = Master::new(UNIT, Wire::default(), wire::lent(buffer));
         let settings = master.settings();
         settings.gap = SILENCE;
         settings.silence = SILENCE;
@@ -207,7 +207,7 @@ impl State {
     }
 
     fn start(&mut self) {
-        self.master.storage().clear();
+        wire::clear(self.master.storage());
         self.number = (self.number + 1) % 16;
         self.lasts = 0;
         self.own_damaged = false;
@@ -236,6 +236,8 @@ impl State {
             }
         }
         self.master.rebase(time, LONGEST);
+        // Nothing depends on what was counted.
+        self.master.storage().counters.fill(0);
         self.master.port().now = 0;
     }
 

@@ -1,7 +1,7 @@
 //! The line under the master, and the storage that the master works in.
 
+use mbm::engine::{Buffers, Storage};
 use mbm::port::Port;
-use mbm::transaction::Storage;
 
 /// The master's end of the line.
 #[derive(Clone, Hash, Debug, Default)]
@@ -34,38 +34,16 @@ impl Port for Wire {
 }
 
 /// What the master works in.
-#[derive(Clone, Hash, Debug)]
-pub struct Buffers {
-    frame: Vec<u8>,
-    response: [u16; 1],
+pub type Lent = Buffers<Vec<u8>, [u16; 1], [u16; 0]>;
+
+/// A frame buffer of `bytes`, and a word to read.
+pub fn lent(bytes: usize) -> Lent {
+    Buffers::new(vec![0; bytes], [0], [])
 }
 
-impl Buffers {
-    /// A frame buffer of `bytes`.
-    pub fn new(bytes: usize) -> Self {
-        Buffers {
-            frame: vec![0; bytes],
-            response: [0],
-        }
-    }
-
-    /// Zeroes them, for the master keeps nothing in them between two requests.
-    pub fn clear(&mut self) {
-        self.frame.fill(0);
-        self.response = [0];
-    }
-}
-
-impl Storage for Buffers {
-    fn frame(&mut self) -> &mut [u8] {
-        &mut self.frame
-    }
-
-    fn response(&mut self) -> &mut [u16] {
-        &mut self.response
-    }
-
-    fn frame_and_response(&mut self) -> (&[u8], &mut [u16]) {
-        (&self.frame, &mut self.response)
-    }
+/// Zeroes buffer and word, for the master keeps nothing in them between two requests.
+pub fn clear(lent: &mut Lent) {
+    let room = lent.room();
+    lent.bytes(0, room).fill(0);
+    lent.response().fill(0);
 }

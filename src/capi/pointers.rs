@@ -94,6 +94,7 @@ pub(super) unsafe fn put_length(place: *mut u16, length: Result<usize, Status>) 
 ///
 /// # Safety
 /// `master` is NULL or points to an `mbm_master`, zeroed or begun.
+#[cfg_attr(target_os = "none", inline(never))]
 pub(super) unsafe fn check(master: *const mbm_master) -> Status {
     if master.is_null() {
         return Status::INVALID_ARGUMENT;

@@ -237,8 +237,6 @@ impl<J: Job> Question for Asked<J> {
         ended: false,
         length: 0,
     };
-    // The client asks again, after the backoff.
-    const REPEATS: bool = false;
 
     fn function(&self) -> u8 {
         self.outline().map_or(0, Outline::function)
@@ -248,7 +246,7 @@ impl<J: Job> Question for Asked<J> {
         self.outline().map_or(0, Outline::request_length)
     }
 
-    fn emit(&self, pdu: &mut [u8], _: &[u16]) {
+    fn emit(&self, pdu: &mut [u8]) {
         if let Some(job) = &self.job {
             job.ticket().outline.emit(pdu, bytes(job));
         }

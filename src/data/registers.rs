@@ -1,14 +1,14 @@
 //! Registers: 16-bit words that travel high byte first.
 
 /// Writes `words` as data bytes; bytes for which there is no word stay.
-pub fn send(bytes: &mut [u8], words: &[u16], _quantity: u8) {
+pub fn send(bytes: &mut [u8], words: &[u16]) {
     for (pair, word) in bytes.as_chunks_mut().0.iter_mut().zip(words) {
         *pair = word.to_be_bytes();
     }
 }
 
 /// Fills `words` from data bytes.
-pub fn take(words: &mut [u16], bytes: &[u8], _quantity: u8) {
+pub fn take(words: &mut [u16], bytes: &[u8]) {
     for (word, pair) in words.iter_mut().zip(bytes.as_chunks().0) {
         *word = u16::from_be_bytes(*pair);
     }
@@ -22,10 +22,10 @@ mod tests {
     fn registers_travel_high_byte_first() {
         let words = [0x0102, 0x0304];
         let mut sent = [0; 4];
-        send(&mut sent, &words, 2);
+        send(&mut sent, &words);
         assert_eq!(sent, [1, 2, 3, 4]);
         let mut back = [0; 2];
-        take(&mut back, &sent, 2);
+        take(&mut back, &sent);
         assert_eq!(back, words);
     }
 }

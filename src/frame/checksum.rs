@@ -162,6 +162,41 @@ impl Crc16 {
         }
     }
 
+    /// How a CRC weighs behind so many bytes: see [`Crc16::since_start`].
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[must_use]
+    pub fn weight(bytes: u8) -> Crc16 {
+        let first = Crc16(0x8000);
+        (0..u16::from(bytes) * 8).fold(first, |weight, _| weight.shifted())
+    }
+
+    /// What a run of bytes that began with this CRC ends with, if the last of them
+    /// are a frame with a right CRC; `weight` is that of the frame's length. (The CRC
+    /// is linear: what came before is a difference, multiplied by the weight.)
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[must_use]
+    pub fn since_start(self, mut weight: Crc16) -> Crc16 {
+        let mut difference = self.0 ^ Crc16::START.0;
+        let mut product = 0;
+        while difference != 0 {
+            if difference & 0x8000 != 0 {
+                product ^= weight.0;
+            }
+            difference <<= 1;
+            weight = weight.shifted();
+        }
+        Crc16(product)
+    }
+
+    /// The CRC one bit later, the bit being 0.
+    const fn shifted(self) -> Crc16 {
+        Crc16(if self.0 & 1 != 0 {
+            self.0 >> 1 ^ 0xA001
+        } else {
+            self.0 >> 1
+        })
+    }
+
     /// The two bytes as sent, low byte first.
     pub const fn to_bytes(self) -> [u8; 2] {
         self.0.to_le_bytes()
@@ -233,6 +268,15 @@ mod tests {
             prop_assert_eq!(after.before(byte), Crc16(crc));
             prop_assert_eq!(back_by_bits(after.0, byte), crc);
             prop_assert_eq!(back_by_parity(after.0, byte), crc);
+        }
+
+        #[test]
+        fn a_frame_is_known_by_the_crc_of_what_came_before(noise: std::vec::Vec<u8>, frame: std::vec::Vec<u8>) {
+            let frame = frame.get(..250).unwrap_or(&frame);
+            let before = crc16(&noise);
+            let right = before.with(frame).with(&crc16(frame).to_bytes());
+            let weight = Crc16::weight(frame.len() as u8 + 2);
+            prop_assert_eq!(right, before.since_start(weight));
         }
 
         #[test]

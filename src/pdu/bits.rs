@@ -2,11 +2,10 @@
 
 use super::fields::{counted, in_range, word};
 use super::limits::{MAX_READ_BITS, MAX_WRITE_BITS};
-use super::query::Query;
+use super::query::Form;
 use super::request::Request;
 use super::response::Response;
 use crate::bytes::{Reader, Writer};
-use crate::data::bits;
 use crate::error::Status;
 
 /// Read Coils (clause 6.1).
@@ -19,44 +18,27 @@ pub const WRITE_SINGLE_COIL: u8 = 0x05;
 pub const WRITE_MULTIPLE_COILS: u8 = 0x0F;
 
 /// The value of a single coil that is on; off is 0.
-const ON: u16 = 0xFF00;
+pub const ON: u16 = 0xFF00;
 
 const fn byte_count(quantity: u16) -> u8 {
     quantity.div_ceil(8) as u8
 }
 
-/// Builds 01: [`Status::OK`], [`Status::ILLEGAL_DATA_VALUE`] unless `quantity`
-/// is 1 to 2000, or [`Status::ILLEGAL_DATA_ADDRESS`] if the range passes 65535.
-pub fn read_coils(request: &mut Query, address: u16, quantity: u16) -> Status {
-    read(request, READ_COILS, address, quantity)
-}
+/// The requests, for [`Query::set`](super::query::Query::set).
+pub mod form {
+    use super::{
+        Form, MAX_READ_BITS, MAX_WRITE_BITS, READ_COILS as COILS, READ_DISCRETE_INPUTS,
+        WRITE_MULTIPLE_COILS, WRITE_SINGLE_COIL,
+    };
 
-/// Builds 02, as [`read_coils`].
-pub fn read_discrete_inputs(request: &mut Query, address: u16, quantity: u16) -> Status {
-    read(request, READ_DISCRETE_INPUTS, address, quantity)
-}
-
-fn read(request: &mut Query, function: u8, address: u16, quantity: u16) -> Status {
-    let status = request.set_range(function, address, quantity, MAX_READ_BITS);
-    request.response_length = byte_count(quantity).wrapping_add(2);
-    request.take = Some(bits::take);
-    status
-}
-
-/// Builds 05; a `value` of 0 is off, any other is on.
-pub fn write_single(request: &mut Query, address: u16, value: u16) -> Status {
-    let value = if value == 0 { 0 } else { ON };
-    request.set(WRITE_SINGLE_COIL, address, value);
-    Status::OK
-}
-
-/// Builds 0F; the coils are the sender's words, least significant bit first.
-/// [`Status::OK`], [`Status::ILLEGAL_DATA_VALUE`] unless `quantity` is 1 to 1968,
-/// or [`Status::ILLEGAL_DATA_ADDRESS`] if the range passes 65535.
-pub fn write_multiple(request: &mut Query, address: u16, quantity: u16) -> Status {
-    let status = request.set_range(WRITE_MULTIPLE_COILS, address, quantity, MAX_WRITE_BITS);
-    request.append(byte_count(quantity), bits::send);
-    status
+    /// 01: an address and 1 to 2000 coils.
+    pub const READ_COILS: Form = Form::reads_bits(COILS, MAX_READ_BITS);
+    /// 02: an address and 1 to 2000 inputs.
+    pub const READ_INPUTS: Form = Form::reads_bits(READ_DISCRETE_INPUTS, MAX_READ_BITS);
+    /// 05: an address and [`ON`](super::ON) or 0.
+    pub const WRITE_SINGLE: Form = Form::single(WRITE_SINGLE_COIL);
+    /// 0F: an address and 1 to 1968 coils.
+    pub const WRITE_MULTIPLE: Form = Form::writes_bits(WRITE_MULTIPLE_COILS, MAX_WRITE_BITS);
 }
 
 pub(super) fn parse_read<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Status> {

@@ -1,40 +1,86 @@
 //! A request as the facade keeps it: built head first, sent with the caller's
 //! words behind it.
 
-use crate::data::{Send, Take};
 use crate::error::Status;
 
 /// Function code, and at most four words of address and quantity.
 const HEAD: usize = 9;
 
+/// How the request of a function is built, and what answers it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+// One number, which a call passes in registers: a microcontroller would copy a
+// constant of several fields to RAM.
+pub struct Form(u32);
+
+impl Form {
+    /// The response brings data behind a byte count; else it repeats the head.
+    const READS: u8 = 1;
+    /// Data follow the head behind a byte count.
+    const SENDS: u8 = 2;
+    /// The data are registers, not bits.
+    const REGISTERS: u8 = 4;
+
+    const fn new(function: u8, traits: u8, most: u16) -> Form {
+        let [low, high] = most.to_le_bytes();
+        Form(u32::from_le_bytes([function, traits, low, high]))
+    }
+
+    /// An address and a value, which the response repeats.
+    pub(super) const fn single(function: u8) -> Form {
+        Form::new(function, 0, 0)
+    }
+
+    /// Reads at `most` so many bits.
+    pub(super) const fn reads_bits(function: u8, most: u16) -> Form {
+        Form::new(function, Form::READS, most)
+    }
+
+    /// Reads at `most` so many registers.
+    pub(super) const fn reads_registers(function: u8, most: u16) -> Form {
+        Form::new(function, Form::READS | Form::REGISTERS, most)
+    }
+
+    /// Writes at `most` so many bits.
+    pub(super) const fn writes_bits(function: u8, most: u16) -> Form {
+        Form::new(function, Form::SENDS, most)
+    }
+
+    /// Writes at `most` so many registers.
+    pub(super) const fn writes_registers(function: u8, most: u16) -> Form {
+        Form::new(function, Form::SENDS | Form::REGISTERS, most)
+    }
+}
+
 /// A request as its sender keeps it until the response is there: the fixed head,
-/// and how much of the caller's words to send behind it.
-///
-/// How words travel is known by pointers to the family's functions, so that
-/// firmware carries those of the functions it calls.
+/// and how many bytes of the caller's words to send behind it.
+// Lengths first: see `Engine`.
 #[derive(Clone, Copy, Hash, Debug)]
+#[repr(C)]
 pub struct Query {
-    pub(super) head: [u8; HEAD],
-    pub(super) head_length: u8,
-    /// Length of the PDU: of head, byte count and data.
-    pub(super) length: u8,
+    head_length: u8,
     /// Length of the response PDU if the request succeeds.
-    pub(super) response_length: u8,
-    /// `None`: neither byte count nor data follow the head.
-    pub(super) send: Option<Send>,
-    /// `None`: the response repeats the head.
-    pub(super) take: Option<Take>,
+    response_length: u8,
+    /// Bytes of data that follow the head behind their count; 0: neither do.
+    sends: u8,
+    /// Bytes of data in the response; 0: it repeats the head.
+    reads: u8,
+    /// The bits used of the last byte of data.
+    mask: u8,
+    /// The data are registers, which travel high byte first.
+    registers: bool,
+    head: [u8; HEAD],
 }
 
 impl Query {
     /// No request.
     pub const NONE: Query = Query {
-        head: [0; HEAD],
         head_length: 0,
-        length: 0,
         response_length: 0,
-        send: None,
-        take: None,
+        sends: 0,
+        reads: 0,
+        mask: 0,
+        registers: false,
+        head: [0; HEAD],
     };
 
     /// The request that `build` writes.
@@ -49,36 +95,54 @@ impl Query {
         }
     }
 
-    /// Becomes `function` and two words, which the response repeats.
+    /// Becomes the request of a form, of an address and a quantity or value; says
+    /// whether every device would accept that.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn set(&mut self, function: u8, first: u16, second: u16) {
-        let ([a, b], [c, d]) = (first.to_be_bytes(), second.to_be_bytes());
-        self.head = [function, a, b, c, d, 0, 0, 0, 0];
+    pub fn set(&mut self, form: Form, address: u16, word: u16) -> Status {
+        let [function, traits, low, high] = form.0.to_le_bytes();
+        let ([a, b], [c, d]) = (address.to_be_bytes(), word.to_be_bytes());
+        let [at_0, at_1, at_2, at_3, at_4, ..] = &mut self.head;
+        (*at_0, *at_1, *at_2, *at_3, *at_4) = (function, a, b, c, d);
         self.head_length = 5;
-        self.length = 5;
         self.response_length = 5;
-        self.send = None;
-        self.take = None;
+        self.registers = traits & Form::REGISTERS != 0;
+        self.mask = 0xFF;
+        // Too many are refused below, so what is cut off here does no harm.
+        let mut bytes = (word << 1) as u8;
+        if !self.registers {
+            bytes = (word.wrapping_add(7) >> 3) as u8;
+            self.mask >>= word.wrapping_neg() & 7;
+        }
+        self.sends = bytes;
+        self.reads = 0;
+        if traits & Form::READS != 0 {
+            self.reads = bytes;
+            self.response_length = bytes.wrapping_add(2);
+        }
+        if traits & Form::SENDS == 0 {
+            self.sends = 0;
+        }
+        match u16::from_le_bytes([low, high]) {
+            0 => Status::OK,
+            most => check_range(address, word, most),
+        }
     }
 
-    /// As [`Query::set`], for a range of addresses; says whether every device
-    /// would accept that.
-    #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn set_range(
-        &mut self,
-        function: u8,
-        address: u16,
-        quantity: u16,
-        most: u16,
-    ) -> Status {
-        self.set(function, address, quantity);
-        check_range(address, quantity, most)
+    /// Has a word follow the head.
+    pub(super) fn append_word(&mut self, word: u16) {
+        let at = usize::from(self.head_length);
+        if let Some(place) = self.head.get_mut(at..at + 2) {
+            place.copy_from_slice(&word.to_be_bytes());
+        }
+        self.head_length += 2;
+        if self.reads == 0 {
+            self.response_length = self.head_length;
+        }
     }
 
     /// Has `bytes` of the caller's words follow the head.
-    pub(super) fn append(&mut self, bytes: u8, send: Send) {
-        self.length = bytes.wrapping_add(self.head_length + 1);
-        self.send = Some(send);
+    pub(super) fn append_data(&mut self, bytes: u8) {
+        self.sends = bytes;
     }
 
     /// The function code.
@@ -86,9 +150,20 @@ impl Query {
         self.head[0]
     }
 
-    /// The head as sent.
-    fn head(&self) -> impl Iterator<Item = &u8> {
-        self.head.iter().take(usize::from(self.head_length))
+    /// The head, and what follows it in memory.
+    pub const fn head(&self) -> &[u8] {
+        &self.head
+    }
+
+    /// Bytes of the head, with which the response to a write agrees.
+    pub const fn head_length(&self) -> u8 {
+        self.head_length
+    }
+
+    /// True if the data are registers, which travel high byte first; false if they
+    /// are bits, of which the low byte of 16 travels first.
+    pub const fn has_registers(&self) -> bool {
+        self.registers
     }
 
     /// Length of the response PDU if the request succeeds.
@@ -99,54 +174,31 @@ impl Query {
     /// True if the response carries data behind a byte count, false if it
     /// repeats the request's head.
     pub const fn is_read(&self) -> bool {
-        self.take.is_some()
+        self.reads > 0
     }
 
-    /// How many of the caller's words are sent.
-    pub const fn words(&self) -> u8 {
-        (self.length - self.head_length) >> 1
+    /// Bytes of data in a successful response.
+    pub const fn reads(&self) -> u8 {
+        self.reads
+    }
+
+    /// Bytes of the caller's words that are sent.
+    pub const fn sends(&self) -> u8 {
+        self.sends
+    }
+
+    /// The bits used of the last byte of data.
+    pub const fn mask(&self) -> u8 {
+        self.mask
     }
 
     /// Length of the PDU.
     pub const fn length(&self) -> u8 {
-        self.length
-    }
-
-    /// Writes the PDU into `pdu`, which has [`Query::length`] bytes. Words
-    /// that `source` lacks are zero; the sender checks [`Query::words`].
-    #[cfg_attr(target_os = "none", inline(never))]
-    pub fn emit(&self, pdu: &mut [u8], source: &[u16]) {
-        let mut bytes = pdu.iter_mut();
-        for (byte, place) in self.head().zip(bytes.by_ref()) {
-            *place = *byte;
+        if self.sends == 0 {
+            self.head_length
+        } else {
+            self.sends.wrapping_add(self.head_length).wrapping_add(1)
         }
-        if let (Some(send), Some(count)) = (self.send, bytes.next()) {
-            *count = self.length - self.head_length - 1;
-            send(bytes.into_slice(), source, self.head[4]);
-        }
-    }
-
-    /// Fills words from the data of a successful response, which start `data`;
-    /// returns false, with nothing filled, if they are too few.
-    pub fn take(&self, words: &mut [u16], data: &[u8]) -> bool {
-        let Some(take) = self.take else {
-            return true;
-        };
-        let Some(words) = words.get_mut(..usize::from(self.response_words())) else {
-            return false;
-        };
-        take(words, data, self.head[4]);
-        true
-    }
-
-    /// How many words the data of a successful response fill.
-    pub const fn response_words(&self) -> u8 {
-        (self.response_length - 1) >> 1
-    }
-
-    /// True if `pdu`, complete or not, agrees with the head of this request.
-    pub fn agrees(&self, pdu: &[u8]) -> bool {
-        self.head().zip(pdu).all(|(ours, theirs)| ours == theirs)
     }
 }
 

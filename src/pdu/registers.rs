@@ -2,11 +2,10 @@
 
 use super::fields::{counted, in_range, within, word};
 use super::limits::{MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_REGISTERS};
-use super::query::{check_range, Query};
+use super::query::{check_range, Form, Query};
 use super::request::Request;
 use super::response::Response;
 use crate::bytes::{Reader, Writer};
-use crate::data::registers;
 use crate::error::Status;
 
 /// Read Holding Registers (clause 6.3).
@@ -22,56 +21,30 @@ pub const MASK_WRITE_REGISTER: u8 = 0x16;
 /// Read/Write Multiple Registers (clause 6.17).
 pub const READ_WRITE_MULTIPLE_REGISTERS: u8 = 0x17;
 
-const fn byte_count(quantity: u16) -> u8 {
-    (quantity << 1) as u8
-}
+/// The requests, for [`Query::set`].
+pub mod form {
+    use super::{
+        Form, MAX_READ_REGISTERS, MAX_WRITE_REGISTERS, READ_HOLDING_REGISTERS,
+        READ_INPUT_REGISTERS, WRITE_MULTIPLE_REGISTERS, WRITE_SINGLE_REGISTER,
+    };
 
-/// Builds 03: [`Status::OK`], [`Status::ILLEGAL_DATA_VALUE`] unless `quantity`
-/// is 1 to 125, or [`Status::ILLEGAL_DATA_ADDRESS`] if the range passes 65535.
-pub fn read_holding(request: &mut Query, address: u16, quantity: u16) -> Status {
-    read(request, READ_HOLDING_REGISTERS, address, quantity)
-}
-
-/// Builds 04, as [`read_holding`].
-pub fn read_input(request: &mut Query, address: u16, quantity: u16) -> Status {
-    read(request, READ_INPUT_REGISTERS, address, quantity)
-}
-
-fn read(request: &mut Query, function: u8, address: u16, quantity: u16) -> Status {
-    let status = request.set_range(function, address, quantity, MAX_READ_REGISTERS);
-    request.response_length = byte_count(quantity).wrapping_add(2);
-    request.take = Some(registers::take);
-    status
-}
-
-/// Builds 06.
-pub fn write_single(request: &mut Query, address: u16, value: u16) -> Status {
-    request.set(WRITE_SINGLE_REGISTER, address, value);
-    Status::OK
-}
-
-/// Builds 10; the values are the sender's words. [`Status::OK`],
-/// [`Status::ILLEGAL_DATA_VALUE`] unless `quantity` is 1 to 123, or
-/// [`Status::ILLEGAL_DATA_ADDRESS`] if the range passes 65535.
-pub fn write_multiple(request: &mut Query, address: u16, quantity: u16) -> Status {
-    let status = request.set_range(
-        WRITE_MULTIPLE_REGISTERS,
-        address,
-        quantity,
-        MAX_WRITE_REGISTERS,
-    );
-    request.append(byte_count(quantity), registers::send);
-    status
+    /// 03: an address and 1 to 125 registers.
+    pub const READ_HOLDING: Form =
+        Form::reads_registers(READ_HOLDING_REGISTERS, MAX_READ_REGISTERS);
+    /// 04: an address and 1 to 125 registers.
+    pub const READ_INPUT: Form = Form::reads_registers(READ_INPUT_REGISTERS, MAX_READ_REGISTERS);
+    /// 06: an address and a value.
+    pub const WRITE_SINGLE: Form = Form::single(WRITE_SINGLE_REGISTER);
+    /// 10: an address and 1 to 123 registers.
+    pub const WRITE_MULTIPLE: Form =
+        Form::writes_registers(WRITE_MULTIPLE_REGISTERS, MAX_WRITE_REGISTERS);
 }
 
 /// Builds 16: the register becomes `(register & and) | (or & !and)`.
 pub fn mask_write(request: &mut Query, address: u16, and_mask: u16, or_mask: u16) -> Status {
-    request.set(MASK_WRITE_REGISTER, address, and_mask);
-    [request.head[5], request.head[6]] = or_mask.to_be_bytes();
-    request.head_length = 7;
-    request.length = 7;
-    request.response_length = 7;
-    Status::OK
+    let status = request.set(Form::single(MASK_WRITE_REGISTER), address, and_mask);
+    request.append_word(or_mask);
+    status
 }
 
 /// Builds 17; the values to write are the sender's words. [`Status::OK`],
@@ -84,16 +57,11 @@ pub fn read_write(
     write_address: u16,
     write_quantity: u16,
 ) -> Status {
-    let readable = read(
-        request,
-        READ_WRITE_MULTIPLE_REGISTERS,
-        read_address,
-        read_quantity,
-    );
-    [request.head[5], request.head[6]] = write_address.to_be_bytes();
-    [request.head[7], request.head[8]] = write_quantity.to_be_bytes();
-    request.head_length = 9;
-    request.append(byte_count(write_quantity), registers::send);
+    let form = Form::reads_registers(READ_WRITE_MULTIPLE_REGISTERS, MAX_READ_REGISTERS);
+    let readable = request.set(form, read_address, read_quantity);
+    request.append_word(write_address);
+    request.append_word(write_quantity);
+    request.append_data((write_quantity << 1) as u8);
     match check_range(write_address, write_quantity, MAX_READ_WRITE_REGISTERS) {
         Status::OK => readable,
         refused => refused,

@@ -1,8 +1,8 @@
-//! One request and its reply over a byte stream, moved on by `poll`.
+//! One request of a client and its reply over a serial line, moved on by `poll`.
+//! The master has an engine of its own, `engine`.
 //!
-//! This is the only receive state machine of the client side. A reply is
-//! found, not assumed: noise, frames of other units, late replies and a local
-//! echo in front of it cost nothing but their own time.
+//! A reply is found, not assumed: noise, frames of other units, late replies and a
+//! local echo in front of it cost nothing but their own time.
 //!
 //! What RTU cannot tell apart: a late reply of the same unit, function and
 //! length to an earlier request, or a late exception to the same function,
@@ -31,7 +31,6 @@ use crate::error::Status;
 use crate::frame::rtu::Window;
 use crate::frame::Wanted as _;
 use crate::frame::{Search, Seen};
-use crate::pdu::query::Query;
 use crate::port::Port;
 use crate::time::{characters, elapsed};
 use answer::Answer;
@@ -61,9 +60,8 @@ enum Phase {
 // costs a Cortex-M0 and an AVR an instruction more at each access.
 #[derive(Clone, Hash, Debug)]
 #[repr(C)]
-pub struct Transaction<P, S, Q = Query, W = Window> {
+pub struct Transaction<P, S, Q, W = Window> {
     phase: Phase,
-    retries: u8,
     /// The phase began with the last poll; its time is that of the next.
     stamp: bool,
     /// The last poll found nothing to do.
@@ -100,7 +98,6 @@ impl<P, S, Q: Question, W: Search> Transaction<P, S, Q, W> {
             last_byte: 0,
             now: 0,
             phase: Phase::Idle,
-            retries: 0,
             stamp: false,
             waiting: false,
             late: false,
@@ -150,14 +147,6 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
             return Status::BROADCAST_NOT_ALLOWED;
         }
         self.wanted.unit = unit;
-        if cfg!(feature = "retries") && Q::REPEATS {
-            self.retries = self.settings.retries;
-        }
-        self.listen_anew()
-    }
-
-    /// Waits for silence, then sends; from the next poll on.
-    fn listen_anew(&mut self) -> Status {
         self.wanted.held = 0;
         self.window.hold(0);
         if !self.write_frame() {
@@ -291,10 +280,9 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
     fn write_frame(&mut self) -> bool {
         let request = &self.wanted.request;
         let length = usize::from(request.length());
-        let (frame, words) = self.storage.frame_and_transmit();
-        self.window.write(frame, self.wanted.unit, length, |pdu| {
-            request.emit(pdu, words);
-        })
+        let frame = self.storage.frame();
+        self.window
+            .write(frame, self.wanted.unit, length, |pdu| request.emit(pdu))
     }
 
     #[cfg_attr(target_os = "none", inline(never))]
@@ -415,7 +403,7 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
         }
     }
 
-    /// No reply came: asks again, or says why with the most telling status.
+    /// No reply came: says why, with the most telling status.
     #[cfg_attr(target_os = "none", inline(never))]
     fn fail(&mut self) -> Status {
         self.count_foreign();
@@ -429,13 +417,6 @@ impl<P: Port, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
             Counter::Timeouts
         };
         self.storage.count(counter, 1);
-        if !cfg!(feature = "retries") || !Q::REPEATS || self.retries == 0 {
-            return status;
-        }
-        self.retries -= 1;
-        // What was taken for a damaged reply may have been noise.
-        self.expect_late_reply();
-        self.last_byte = self.now;
-        self.listen_anew()
+        status
     }
 }

@@ -3,7 +3,6 @@
 use super::{Counter, Question, Storage, Transaction};
 use crate::error::Status;
 use crate::frame::{rtu, Search};
-use crate::pdu::reply;
 
 impl<P, S, Q: Question, W: Search> Transaction<P, S, Q, W> {
     /// How frames are found.
@@ -50,17 +49,5 @@ impl<P, S: Storage, Q: Question, W: Search> Transaction<P, S, Q, W> {
         window
             .behind(self.storage.frame(), rtu::PDU)
             .unwrap_or_default()
-    }
-}
-
-impl<P, S: Storage> Transaction<P, S> {
-    /// Fills the response words from the reply that ended the last transaction;
-    /// false, with nothing filled, if they are too few.
-    pub fn take_words(&mut self) -> bool {
-        let (frame, words) = self.storage.frame_and_response();
-        match self.window.behind(frame, rtu::PDU + reply::DATA) {
-            Some(data) => self.wanted.request.take(words, data),
-            None => false,
-        }
     }
 }

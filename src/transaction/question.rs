@@ -1,8 +1,6 @@
 //! What a transaction asks: a request, and how its response is known.
 
 use crate::error::Status;
-use crate::pdu::query::Query;
-use crate::pdu::reply;
 use core::num::NonZeroU8;
 
 /// A request that is put to a unit, and what answers it.
@@ -10,18 +8,14 @@ pub trait Question {
     /// What is asked before anybody asks.
     const NONE: Self;
 
-    /// Whether the transaction itself may ask again.
-    const REPEATS: bool;
-
     /// The function code.
     fn function(&self) -> u8;
 
     /// Length of the request PDU.
     fn length(&self) -> u8;
 
-    /// Writes the request PDU into `pdu`, which has [`Question::length`] bytes;
-    /// `words` are the caller's.
-    fn emit(&self, pdu: &mut [u8], words: &[u16]);
+    /// Writes the request PDU into `pdu`, which has [`Question::length`] bytes.
+    fn emit(&self, pdu: &mut [u8]);
 
     /// Whether it may be sent to all units at once.
     fn may_be_broadcast(&self) -> bool;
@@ -45,37 +39,4 @@ pub trait Question {
 
     /// See [`crate::frame::Wanted::ends`].
     fn ends(&mut self, _ended: bool) {}
-}
-
-impl Question for Query {
-    const NONE: Query = Query::NONE;
-    const REPEATS: bool = true;
-
-    fn function(&self) -> u8 {
-        self.function()
-    }
-
-    fn length(&self) -> u8 {
-        self.length()
-    }
-
-    fn emit(&self, pdu: &mut [u8], words: &[u16]) {
-        self.emit(pdu, words);
-    }
-
-    fn may_be_broadcast(&self) -> bool {
-        !self.is_read()
-    }
-
-    fn agrees(&self, pdu: &[u8]) -> bool {
-        self.agrees(pdu)
-    }
-
-    fn expected(&self, pdu: &[u8]) -> Option<NonZeroU8> {
-        reply::expected(self, pdu)
-    }
-
-    fn judge(&mut self, pdu: &[u8]) -> Status {
-        reply::judge(self, pdu)
-    }
 }

@@ -47,7 +47,7 @@ fn buffers(w: &World, master: *mut mbm_master) {
 
 fn set(w: &World, master: *mut mbm_master) {
     let (byte, word, long) = (w.byte(), w.word(), w.long());
-    let choice = w.byte() % 13;
+    let choice = w.byte() % 14;
     let counters: *mut mbm_counters = if byte & 1 == 0 {
         null_mut()
     } else {
@@ -66,6 +66,7 @@ fn set(w: &World, master: *mut mbm_master) {
         9 => call!(w, master, mbm_master_setBlocking(master, byte & 1)),
         10 => call!(w, master, mbm_master_setCounters(master, counters)),
         11 => call!(w, master, mbm_master_lineUsed(master)),
+        12 => call!(w, master, mbm_master_lineUsedAt(master, long)),
         _ => call!(w, master, mbm_master_setWordOrder(master, byte % 8)),
     });
 }

@@ -10,12 +10,12 @@ pub use settings::*;
 pub use values::*;
 pub use words::*;
 
-use super::limits::MBM_MAX_FRAME;
 use super::pointers;
 use super::port::mbm_port;
 use super::storage::LentByC;
 use crate::error::Status;
-use crate::master::{Build, Master};
+use crate::master::Master;
+use crate::pdu::query::Form;
 use core::ffi::c_void;
 
 /// A Modbus RTU master: one line, one request at a time.
@@ -31,9 +31,9 @@ use core::ffi::c_void;
 #[repr(C)]
 pub struct mbm_master {
     /// Not for you.
-    pointers: [*mut c_void; 21],
+    pointers: [*mut c_void; 18],
     /// Not for you.
-    words: [u32; 20],
+    words: [u32; 21],
 }
 
 /// What lies behind an `mbm_master`.
@@ -89,7 +89,6 @@ impl Object {
     /// Turns a zeroed object into one that is begun, without port and buffers.
     pub(super) fn preset(&mut self) {
         self.core.preset();
-        self.core.storage().preset();
         self.mark = Object::BEGUN;
     }
 }
@@ -99,7 +98,8 @@ impl Object {
 /// May be called again at any time, which is cheap: to talk to another slave,
 /// or over another port. Settings, buffers and the words in them stay; what
 /// was queued by send is dropped, and a request under way is given up. Opens
-/// nothing: the port is open already.
+/// nothing: the port is open already. The first request waits for no gap, unless
+/// bytes arrive or mbm_master_lineUsed was called.
 ///
 /// @param master  the object; zeroed before the first call
 /// @param slave   unit id, 1 to 247; 248 to 255 are sent as they are, 0 is
@@ -183,7 +183,7 @@ pub unsafe extern "C" fn mbm_master_setBuffers(
             storage.frame = frame;
             storage.response_words = responseWords as u8;
             storage.transmit_words = transmitWords as u8;
-            storage.frame_bytes = frameBytes.min(MBM_MAX_FRAME).into();
+            storage.frame_bytes = frameBytes.min(255) as u8;
             Status::OK
         })
     }
@@ -267,14 +267,13 @@ pub unsafe extern "C" fn mbm_master_getExceptionCode(master: *const mbm_master) 
     unsafe { pointers::ask(master, 0, |master| master.core.exception_code()) }
 }
 
-/// Requests what `build` builds of an address and a word and, in blocking mode,
-/// sees it through.
+/// Requests a form of an address and a word and, in blocking mode, sees it through.
 ///
 /// # Safety
 /// As for [`pointers::with`].
-unsafe fn call(pointer: *mut mbm_master, address: u16, word: u16, build: Build) -> u8 {
+unsafe fn call(pointer: *mut mbm_master, address: u16, word: u16, form: Form) -> u8 {
     // SAFETY: as the caller promises.
-    unsafe { request(pointer, |master| master.request(address, word, build)) }
+    unsafe { request(pointer, |master| master.request(address, word, form)) }
 }
 
 /// Starts a request and, in blocking mode, sees it through.

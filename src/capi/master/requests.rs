@@ -32,7 +32,7 @@ pub unsafe extern "C" fn mbm_master_readCoils(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { call(master, address, quantity, bits::read_coils) }
+    unsafe { call(master, address, quantity, bits::form::READ_COILS) }
 }
 
 /// Function 02: reads discrete inputs into the response words, 16 to a word,
@@ -49,7 +49,7 @@ pub unsafe extern "C" fn mbm_master_readDiscreteInputs(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { call(master, address, quantity, bits::read_discrete_inputs) }
+    unsafe { call(master, address, quantity, bits::form::READ_INPUTS) }
 }
 
 /// Function 03: reads holding registers into the response words (V1.1b3, 6.3).
@@ -65,7 +65,7 @@ pub unsafe extern "C" fn mbm_master_readHoldingRegisters(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { call(master, address, quantity, registers::read_holding) }
+    unsafe { call(master, address, quantity, registers::form::READ_HOLDING) }
 }
 
 /// Function 04: reads input registers into the response words (V1.1b3, 6.4).
@@ -81,7 +81,7 @@ pub unsafe extern "C" fn mbm_master_readInputRegisters(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { call(master, address, quantity, registers::read_input) }
+    unsafe { call(master, address, quantity, registers::form::READ_INPUT) }
 }
 
 /// Function 05: switches one coil (V1.1b3, 6.5). Unit 0 broadcasts.
@@ -97,7 +97,11 @@ pub unsafe extern "C" fn mbm_master_writeSingleCoil(
     state: u8,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { call(master, address, state.into(), bits::write_single) }
+    unsafe {
+        request(master, |master| {
+            master.write_single_coil(address, state.into())
+        })
+    }
 }
 
 /// Function 06: writes one register (V1.1b3, 6.6). Unit 0 broadcasts.
@@ -134,7 +138,7 @@ pub unsafe extern "C" fn mbm_master_writeMultipleCoils(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { call(master, address, quantity, bits::write_multiple) }
+    unsafe { call(master, address, quantity, bits::form::WRITE_MULTIPLE) }
 }
 
 /// Function 0F: writes the queued bits to the last write address
@@ -162,7 +166,7 @@ pub unsafe extern "C" fn mbm_master_writeMultipleRegisters(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { call(master, address, quantity, registers::write_multiple) }
+    unsafe { call(master, address, quantity, registers::form::WRITE_MULTIPLE) }
 }
 
 /// Function 10: writes the queued complete words to the last write address

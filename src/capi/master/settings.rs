@@ -245,8 +245,26 @@ pub unsafe extern "C" fn mbm_master_setCounters(
     }
 }
 
-/// Says that somebody else has just used the line, another object for example:
-/// the gap before the next request counts from now.
+/// Says when somebody else used the line, another object for example: the gap before
+/// the next request counts from then. A time before the last use that the object knows
+/// of changes nothing.
+///
+/// @param master        the object
+/// @param microseconds  by the clock of its port, at most 2^31 ago
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_lineUsedAt(master: *mut mbm_master, microseconds: u32) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(master, |master| {
+            master.core.line_used_at(microseconds);
+            Status::OK
+        })
+    }
+}
+
+/// Says that somebody else has just used the line, as mbm_master_lineUsedAt with the
+/// time of now.
 ///
 /// @param master  the object
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED

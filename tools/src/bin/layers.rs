@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// The layers from left to right; modules of one string stand side by side.
-const LAYERS: [&[&str]; 10] = [
+const LAYERS: [&[&str]; 11] = [
     &["atomic", "error", "time"],
     &["port", "ring", "data"],
     &["bytes"],
@@ -17,6 +17,7 @@ const LAYERS: [&[&str]; 10] = [
     &["packet"],
     &["explain"],
     &["sniffer", "transaction"],
+    &["engine"],
     &["master", "client", "server"],
     &["capi"],
 ];

@@ -1,13 +1,15 @@
-//! Transactions over a port that brings anything at any time. A transaction may
-//! succeed only if a right reply to its request was among the bytes; it always
-//! ends, with the request sent byte for byte and the driver off.
+//! Requests of the master over a port that brings anything at any time. A request may
+//! succeed only if a right reply to it was among the bytes, and fail only if none was;
+//! it always ends, sent byte for byte, and with the driver off.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
+use mbm::engine::{Buffers, Engine, Storage, BROADCAST};
 use mbm::error::Status;
 use mbm::port::Port;
-use mbm::transaction::{Settings, Storage, Transaction, BROADCAST};
+use mbm::transaction::{Counter, Settings};
 use mbm_fuzz::asked::{words, Asked};
+use mbm_fuzz::search::Search;
 use mbm_fuzz::stream::{event, Event};
 use mbm_fuzz::Input;
 use std::collections::VecDeque;
@@ -100,29 +102,7 @@ impl Port for Line {
     }
 }
 
-struct Buffers {
-    frame: Vec<u8>,
-    transmit: Vec<u16>,
-    response: Vec<u16>,
-}
-
-impl Storage for Buffers {
-    fn frame(&mut self) -> &mut [u8] {
-        &mut self.frame
-    }
-    fn transmit(&mut self) -> &mut [u16] {
-        &mut self.transmit
-    }
-    fn response(&mut self) -> &mut [u16] {
-        &mut self.response
-    }
-    fn frame_and_transmit(&mut self) -> (&mut [u8], &[u16]) {
-        (&mut self.frame, &self.transmit)
-    }
-    fn frame_and_response(&mut self) -> (&[u8], &mut [u16]) {
-        (&self.frame, &mut self.response)
-    }
-}
+type Lent = Buffers<Vec<u8>, Vec<u16>, Vec<u16>>;
 
 fuzz_target!(|data: &[u8]| {
     let mut input = Input(data);
@@ -140,14 +120,12 @@ fuzz_target!(|data: &[u8]| {
         heard: Vec::new(),
         lost: false,
     };
-    let buffers = Buffers {
-        frame: vec![0; 4 + usize::from(input.u8()) % 253],
-        transmit: words(),
-        response: vec![0; 125],
-    };
-    let mut transaction = Transaction::new(line, buffers);
+    let frame = vec![0; 4 + usize::from(input.u8()) % 253];
+    let room = frame.len().min(255);
+    let buffers = Buffers::new(frame, vec![0; 125], words());
+    let mut engine = Engine::new(line, buffers);
     let time = |input: &mut Input| u32::from(input.u8()) * 64;
-    transaction.settings = Settings {
+    engine.settings = Settings {
         gap: time(input),
         silence: time(input),
         response_timeout: 1000 + 4 * time(input),
@@ -162,7 +140,7 @@ fuzz_target!(|data: &[u8]| {
         let Some(asked) = Asked::new(input) else {
             return;
         };
-        let port = &mut transaction.port;
+        let port = &mut engine.port;
         port.since = port.now;
         for _ in 0..input.u8() % 16 {
             let delay = u32::from(input.u8()).pow(2) / 2;
@@ -174,17 +152,19 @@ fuzz_target!(|data: &[u8]| {
             port.script.push_back((delay, next));
         }
         let step = 20 + u32::from(input.u8()) * 8;
-        run(&mut transaction, &asked, step);
+        run(&mut engine, &asked, room, step);
+        // The whole frame buffer is there for the next request.
+        assert_eq!(usize::from(engine.storage.room()), room);
     }
 });
 
-fn run(transaction: &mut Transaction<Line, Buffers>, asked: &Asked, step: u32) {
-    transaction.forget();
-    *transaction.request() = asked.query;
-    transaction.port.requests.clear();
-    transaction.port.heard.clear();
-    let started = transaction.start(asked.unit);
-    let fits = asked.frame().len() <= transaction.storage.frame.len();
+fn run(engine: &mut Engine<Line, Lent>, asked: &Asked, room: usize, step: u32) {
+    engine.forget();
+    *engine.request() = asked.query;
+    engine.port.requests.clear();
+    engine.port.heard.clear();
+    let started = engine.start(asked.unit);
+    let fits = asked.frame().len() <= room;
     if started != Status::PENDING {
         let broadcast_read = asked.unit == BROADCAST && asked.data.is_some();
         assert!(match started {
@@ -197,30 +177,61 @@ fn run(transaction: &mut Transaction<Line, Buffers>, asked: &Asked, step: u32) {
     assert!(fits);
     let mut polls = 0;
     let status = loop {
-        let now = transaction.port.now;
-        let status = transaction.poll(now);
+        let now = engine.port.now;
+        let status = engine.poll(now);
         if status != Status::PENDING {
             break status;
         }
         // As a program would that does other work, and sleeps for as long as it
         // may.
-        let time = match transaction.poll_delay(now) {
+        let time = match engine.poll_delay(now) {
             0 => step,
             delay => delay.min(step),
         };
-        transaction.port.now = now.wrapping_add(time);
+        engine.port.now = now.wrapping_add(time);
         polls += 1;
         assert!(polls < 100_000, "it never ends");
     };
-    judge(transaction, asked, status);
+    judge(engine, asked, status);
+    if status.is_failure() {
+        overlooks_nothing(engine, asked, room, status);
+    }
 }
 
-fn judge(transaction: &mut Transaction<Line, Buffers>, asked: &Asked, status: Status) {
-    let port = &transaction.port;
-    assert!(!port.driver && !transaction.is_pending());
+/// Where nothing but the bytes decides, no reply stands in those of a request that
+/// failed.
+fn overlooks_nothing(engine: &mut Engine<Line, Lent>, asked: &Asked, room: usize, status: Status) {
+    let other = matches!(
+        status,
+        Status::LINE_BUSY | Status::LINK_LOST | Status::BUFFER_TOO_SMALL
+    );
+    let settings = engine.settings;
+    // An earlier request without a right reply lets a later reply be held.
+    let attempts = engine.storage.counters[Counter::Requests as usize];
+    let held = settings.quiet_time > 0 && attempts > 1;
+    if other || held || settings.echo_discard {
+        return;
+    }
+    let mut search = Search {
+        asked,
+        room,
+        bytes: engine.port.heard.clone(),
+        at: 0,
+    };
+    assert_eq!(search.search(false), None, "a reply is overlooked");
+    assert_eq!(
+        search.search(true),
+        None,
+        "a reply behind noise is overlooked"
+    );
+}
+
+fn judge(engine: &mut Engine<Line, Lent>, asked: &Asked, status: Status) {
+    let port = &engine.port;
+    assert!(!port.driver && !engine.is_pending());
     let frame = asked.frame();
     let whole = |sent: &Vec<u8>| *sent == frame;
-    let settings = transaction.settings;
+    let settings = engine.settings;
     assert!(port.requests.len() <= 1 + usize::from(settings.retries));
     let cut_off = matches!(status, Status::LINE_BUSY | Status::LINK_LOST);
     match port.requests.split_last() {
@@ -258,14 +269,14 @@ fn judge(transaction: &mut Transaction<Line, Buffers>, asked: &Asked, status: St
         .collect();
     assert!(!right.is_empty(), "a success that nobody sent");
     if asked.data.is_some() {
-        assert!(transaction.take_words());
-        let words = &transaction.storage.response;
+        assert!(engine.take_words());
+        let words = engine.storage.response().to_vec();
         let brought = |reply: &Vec<u8>| {
             let data = &reply[3..reply.len() - 2];
             match asked.bits {
                 None => data
                     .chunks(2)
-                    .zip(words)
+                    .zip(&words)
                     .all(|(bytes, word)| *bytes == word.to_be_bytes()),
                 // The bits beyond those asked for are zero, to the end of the word.
                 Some(quantity) => (0..usize::from(quantity).next_multiple_of(16)).all(|bit| {

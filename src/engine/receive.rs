@@ -1,0 +1,247 @@
+//! Waits for the reply, and keeps a late reply from being delivered as the answer
+//! to a later request.
+//!
+//! A device that answers in order, but later than the timeout, sends two replies
+//! after the next request: first the late one, then the right one. So after a
+//! request without a right reply, the next reply of that unit is held: the storage
+//! sets it aside until the line has been silent for the quiet time. A second right
+//! reply takes the place of the first. A second one that is damaged makes the
+//! request fail, because the held reply is then most likely the late one.
+
+use super::search::Seen;
+use super::{Counter, Engine, Storage, AROUND_PDU, CRC};
+use crate::error::Status;
+use crate::port::Port;
+
+/// Whether the reply to the request under way may be a late one.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[repr(u8)]
+pub(super) enum Probation {
+    /// It may not.
+    Off,
+    /// It may.
+    On,
+    /// It may, and one was held.
+    Held,
+}
+
+impl<P: Port, S: Storage> Engine<P, S> {
+    /// Notes that the reply to the request under way may come late.
+    pub(super) fn expect_late_reply(&mut self) {
+        self.late = true;
+        self.late_unit = self.unit;
+    }
+
+    /// Begins the wait for the reply to a request that was just sent.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn begin_reply(&mut self) {
+        self.end = 0;
+        self.begin_frame(0);
+        self.length = self.query.response_length() + AROUND_PDU;
+        if self.length > self.storage.room() {
+            self.length = 0;
+        }
+        self.weight = crate::frame::checksum::Crc16::RESIDUE;
+        self.seen = Seen::NOTHING;
+        self.foreign = 0;
+        self.skimmed = true;
+        if cfg!(feature = "echo") {
+            self.echo = self.settings.echo_discard;
+        }
+        self.probation = if self.late_unit == self.unit && self.settings.quiet_time > 0 {
+            Probation::On
+        } else {
+            Probation::Off
+        };
+    }
+
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn receive(&mut self) -> Status {
+        let mut over = self.is_over();
+        // As the deadline passes, all that has arrived is looked at, even if
+        // the port hands it over byte by byte; but not more than a buffer of it.
+        let mut budget = u8::MAX;
+        loop {
+            if self.end == self.storage.room() {
+                self.give_up_held();
+            }
+            let heard = self.hear(self.end);
+            if heard < 0 {
+                return Status::LINK_LOST;
+            }
+            let heard = heard as u8;
+            if heard == 0 {
+                self.waiting = true;
+                break;
+            }
+            self.end += heard;
+            self.skimmed = false;
+            let found = self.search();
+            if self.is_answered(found) {
+                return self.found();
+            }
+            if !over {
+                return Status::PENDING;
+            }
+            if budget < heard {
+                break;
+            }
+            budget -= heard;
+        }
+        if !self.skimmed && (over || self.is_silent(self.settings.silence)) {
+            self.skimmed = true;
+            let found = self.skim();
+            if self.is_answered(found) {
+                return self.found();
+            }
+        }
+        if self.probation == Probation::Held {
+            over = self.is_silent(self.settings.quiet_time) || self.is_over();
+        }
+        if over {
+            if self.take_held() {
+                return self.found();
+            }
+            return self.fail();
+        }
+        // Without diagnosis it is not known whether it was a reply.
+        if cfg!(feature = "diagnosis") && self.skimmed && self.seen >= Seen::BAD_CRC {
+            return self.fail();
+        }
+        Status::PENDING
+    }
+
+    /// True if a reply that was `found` is the answer. One on probation is held, and
+    /// what arrived behind it is searched.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn is_answered(&mut self, mut found: bool) -> bool {
+        while found {
+            if self.probation == Probation::Off {
+                return true;
+            }
+            self.hold();
+            found = self.search();
+        }
+        false
+    }
+
+    /// The reply is there: counts it and returns what it says.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn found(&mut self) -> Status {
+        if self.late_unit == self.unit {
+            self.late_unit = 0;
+        }
+        self.storage.count(Counter::Replies, 1);
+        if self.exception != 0 {
+            self.storage.count(Counter::Exceptions, 1);
+        }
+        if self.passed > 0 {
+            self.storage.count(Counter::Resynchronisations, 1);
+        }
+        self.storage
+            .count(Counter::ForeignFrames, self.foreign.into());
+        Status::from_code(self.exception)
+    }
+
+    /// No reply came: asks again, or says why with the most telling status.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn fail(&mut self) -> Status {
+        self.storage
+            .count(Counter::ForeignFrames, self.foreign.into());
+        let status = self.seen.status();
+        if status == Status::BUFFER_TOO_SMALL {
+            return status;
+        }
+        let counter = if status == Status::INVALID_CRC {
+            Counter::BadCrc
+        } else {
+            Counter::Timeouts
+        };
+        self.storage.count(counter, 1);
+        if !cfg!(feature = "retries") || self.retries == 0 {
+            return status;
+        }
+        self.retries -= 1;
+        // What was taken for a damaged reply may have been noise.
+        self.expect_late_reply();
+        self.last_byte = self.now;
+        self.listen_anew()
+    }
+
+    /// Holds the reply at the front of the frame buffer, in the place of one that was
+    /// held before.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn hold(&mut self) {
+        self.give_up_held();
+        // Without the CRC, so that there is room for the next byte in any case.
+        self.held = self.found_length() - CRC;
+        self.storage.set_aside(self.held);
+        self.end -= self.held;
+        self.drop_front(CRC);
+        self.begin_frame(0);
+        self.seen = Seen::NOTHING;
+        self.probation = Probation::Held;
+        // A line that is never silent ends the wait for a second one too.
+        let timeout = self.settings.response_timeout;
+        self.wait = timeout
+            .wrapping_add(timeout)
+            .wrapping_add(self.settings.quiet_time);
+    }
+
+    /// Has the frame buffer begin with the held reply again.
+    pub(super) fn take_back(&mut self) {
+        self.storage.take_back(self.held);
+        self.held = 0;
+    }
+
+    /// Gives up the held reply, which answers no request.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn give_up_held(&mut self) {
+        let held = self.held;
+        if held > 0 {
+            self.storage.count(Counter::ForeignFrames, 1);
+            self.take_back();
+            self.storage.move_down(held, self.end);
+        }
+    }
+
+    /// Takes the held reply as the answer; false if there is none, or if what
+    /// arrived after it may have been the answer.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn take_held(&mut self) -> bool {
+        // One byte may be anything; more begin a reply.
+        if self.held == 0
+            || self.seen >= Seen::BAD_CRC
+            || self.end > 1
+            || !self.is_silent(self.settings.quiet_time)
+        {
+            return false;
+        }
+        self.take_back();
+        // A damaged second reply may have overwritten what the first one said.
+        self.judge(0);
+        true
+    }
+
+    /// Fills the response words from the reply that ended the last request; false,
+    /// with nothing filled, if they are too few.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub fn take_words(&mut self) -> bool {
+        let count = self.query.reads();
+        if self.response_words() > self.storage.response_words() {
+            return false;
+        }
+        // Behind unit, function and byte count.
+        let last = 2 + count;
+        let byte = self.storage.byte(last) & self.query.mask();
+        self.storage.set_byte(last, byte);
+        self.storage
+            .take_words(3, count, self.query.has_registers());
+        true
+    }
+
+    /// How many words the data of a successful reply fill.
+    pub fn response_words(&self) -> u8 {
+        self.query.reads().div_ceil(2)
+    }
+}

@@ -1,0 +1,185 @@
+//! A real master, on a line that brings what a test says.
+
+use mbm::engine::{Buffers, Storage};
+use mbm::error::Status;
+use mbm::frame::checksum::crc16;
+use mbm::master::Master;
+use mbm::pdu::query::Query;
+use mbm::pdu::{bits, registers};
+use mbm::port::Port;
+use std::collections::VecDeque;
+
+/// Microseconds that pass from one poll to the next once the line brings nothing more.
+const LONG: u32 = 50_000;
+
+/// What the master sends, and what comes back to it.
+#[derive(Default)]
+pub struct Line {
+    now: u32,
+    /// Microseconds that pass from one poll to the next while bytes are to come.
+    step: u32,
+    /// What one read brings.
+    pieces: VecDeque<Vec<u8>>,
+    /// The pieces that come once a request was sent.
+    reply: VecDeque<Vec<u8>>,
+    pub sent: Vec<u8>,
+}
+
+impl Line {
+    /// Has `bytes` come once the next request was sent, in pieces of `piece`, with
+    /// `step` microseconds from one poll to the next.
+    pub fn bring(&mut self, bytes: &[u8], piece: usize, step: u32) {
+        self.step = step;
+        self.sent.clear();
+        self.reply = bytes.chunks(piece).map(<[u8]>::to_vec).collect();
+    }
+}
+
+impl Port for Line {
+    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+        let Some(piece) = self.pieces.front_mut() else {
+            return 0;
+        };
+        let count = piece.len().min(bytes.len());
+        for (place, byte) in bytes.iter_mut().zip(piece.drain(..count)) {
+            *place = byte;
+        }
+        if piece.is_empty() {
+            self.pieces.pop_front();
+        }
+        count as i16
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> i16 {
+        self.sent.extend_from_slice(bytes);
+        self.pieces = std::mem::take(&mut self.reply);
+        bytes.len() as i16
+    }
+
+    fn micros(&mut self) -> u32 {
+        let is_over = self.pieces.is_empty() && self.reply.is_empty();
+        self.now = self
+            .now
+            .wrapping_add(if is_over { LONG } else { self.step });
+        self.now
+    }
+}
+
+/// A call of one of the ten functions.
+#[derive(Clone, Copy, Debug)]
+pub struct Call {
+    pub function: u8,
+    /// The arguments; what the function does not take does not matter.
+    pub words: [u16; 4],
+}
+
+impl Call {
+    pub fn new(function: u8, words: &[u16]) -> Call {
+        let mut call = Call {
+            function,
+            words: [0; 4],
+        };
+        call.words[..words.len()].copy_from_slice(words);
+        call
+    }
+
+    /// The request.
+    pub fn query(&self) -> Result<Query, Status> {
+        let [a, b, c, d] = self.words;
+        Query::build(|query| match self.function {
+            0x01 => query.set(bits::form::READ_COILS, a, b),
+            0x02 => query.set(bits::form::READ_INPUTS, a, b),
+            0x03 => query.set(registers::form::READ_HOLDING, a, b),
+            0x04 => query.set(registers::form::READ_INPUT, a, b),
+            0x05 => query.set(
+                bits::form::WRITE_SINGLE,
+                a,
+                if b == 0 { 0 } else { bits::ON },
+            ),
+            0x06 => query.set(registers::form::WRITE_SINGLE, a, b),
+            0x0F => query.set(bits::form::WRITE_MULTIPLE, a, b),
+            0x10 => query.set(registers::form::WRITE_MULTIPLE, a, b),
+            0x16 => registers::mask_write(query, a, b, c),
+            0x17 => registers::read_write(query, a, b, c, d),
+            other => panic!("the facade has no function {other:#x}"),
+        })
+    }
+
+    pub fn start<P: Port, S: Storage>(&self, master: &mut Master<P, S>) -> Status {
+        let [a, b, c, d] = self.words;
+        match self.function {
+            0x01 => master.read_coils(a, b),
+            0x02 => master.read_discrete_inputs(a, b),
+            0x03 => master.read_holding_registers(a, b),
+            0x04 => master.read_input_registers(a, b),
+            0x05 => master.write_single_coil(a, b),
+            0x06 => master.write_single_register(a, b),
+            0x0F => master.write_multiple_coils(a, b),
+            0x10 => master.write_multiple_registers(a, b),
+            0x16 => master.mask_write_register(a, b, c),
+            0x17 => master.read_write_multiple_registers(a, b, c, d),
+            other => panic!("the facade has no function {other:#x}"),
+        }
+    }
+}
+
+type Lent = Buffers<Vec<u8>, [u16; 125], [u16; 125]>;
+
+/// A master that is asked for one request after the other.
+pub struct Asker(pub Master<Line, Lent>);
+
+impl Asker {
+    /// Over a frame buffer of `size` bytes.
+    pub fn new(unit: u8, size: usize) -> Asker {
+        let buffers = Buffers::new(vec![0; size], [0; 125], [0; 125]);
+        Asker(Master::new(unit, Line::default(), buffers))
+    }
+
+    /// Sends a request to which the line brings nothing: what was sent.
+    pub fn send(&mut self, call: Call, words: &[u16]) -> Vec<u8> {
+        assert_eq!(self.start(call, words), Status::PENDING);
+        assert!(self.end().is_failure());
+        std::mem::take(&mut self.0.port().sent)
+    }
+
+    /// Starts a request with words to send.
+    pub fn start(&mut self, call: Call, words: &[u16]) -> Status {
+        for (index, word) in words.iter().enumerate() {
+            self.0.set_transmit_word(index, *word);
+        }
+        call.start(&mut self.0)
+    }
+
+    /// How the request under way ends.
+    pub fn end(&mut self) -> Status {
+        for _ in 0..100_000 {
+            match self.0.poll() {
+                Status::PENDING => {}
+                status => return status,
+            }
+        }
+        panic!("the request does not end");
+    }
+
+    /// Asks, and has the line bring `bytes`, see [`Line::bring`]: how the request ends.
+    pub fn ask(&mut self, call: Call, bytes: &[u8], piece: usize, step: u32) -> Status {
+        assert_eq!(call.start(&mut self.0), Status::PENDING);
+        self.0.port().bring(bytes, piece, step);
+        self.end()
+    }
+
+    /// The words that the last request read.
+    pub fn words(&mut self) -> Vec<u16> {
+        (0..self.0.available()).map(|_| self.0.receive()).collect()
+    }
+}
+
+/// The frame of a request to `unit`, with `words` to send.
+pub fn frame(unit: u8, call: Call, words: &[u16]) -> Vec<u8> {
+    Asker::new(unit, 256).send(call, words)
+}
+
+/// Bytes with their CRC behind them.
+pub fn sealed(bytes: &[u8]) -> Vec<u8> {
+    [bytes, &crc16(bytes).to_bytes()].concat()
+}
