@@ -206,6 +206,23 @@ static void a_silent_line_is_not_waited_for_again(void **)
     assert_in_range(Serial.startedAt - asked, 0, 200);
 }
 
+static void a_pause_between_two_objects_is_not_waited_for_again(void **)
+{
+    ModbusMaster first, second;
+    first.begin(1, Serial);
+    second.begin(1, Serial);
+    bench().now += 100000000; /* later than the clock of any test before */
+    uint32_t asked = bench().now;
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(first.readHoldingRegisters(0, 1), 0);
+    assert_in_range(Serial.startedAt - asked, 0, 200);
+    bench().now += 1000000;
+    asked = bench().now;
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(second.readHoldingRegisters(0, 1), 0);
+    assert_in_range(Serial.startedAt - asked, 0, 200);
+}
+
 /* A device that answers in order, but the first time later than the timeout. */
 static void a_late_reply_does_not_shift_the_answers_of_later_requests(void **)
 {
@@ -394,6 +411,7 @@ int main()
         TEST(a_silence_is_kept_before_each_request),
         TEST(the_silence_counts_from_another_objects_last_use),
         TEST(a_silent_line_is_not_waited_for_again),
+        TEST(a_pause_between_two_objects_is_not_waited_for_again),
         TEST(a_late_reply_does_not_shift_the_answers_of_later_requests),
         TEST(the_response_timeout_can_be_set),
         TEST(the_slave_can_be_changed),

@@ -39,6 +39,59 @@ static void objects_may_share_the_frame_buffer(void **)
     }
 }
 
+static void a_request_beside_that_of_another_object_is_refused(void **)
+{
+    ModbusMaster first, second;
+    first.begin(1, Serial);
+    second.begin(2, Serial);
+    first.setBlocking(false);
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(first.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);
+    assert_int_equal(second.readHoldingRegisters(0, 1), ModbusMaster::ku8MBBusy);
+    assert_int_equal(second.requestFrom(0, 1), 0);
+    assert_int_equal(second.status(), 0);
+    while (first.poll() == ModbusMaster::ku8MBPending)
+        bench().now += 100;
+    assert_int_equal(first.status(), 0);
+    assert_int_equal(first.getResponseBuffer(0), 7);
+    Serial.reply(adu({2, 3, 2, 0, 8}));
+    assert_int_equal(second.readHoldingRegisters(0, 1), 0);
+    assert_int_equal(second.getResponseBuffer(0), 8);
+}
+
+static ModbusMaster *other;
+static uint8_t answers[3];
+
+static void a_request_from_a_callback_of_another_object_is_refused(void **)
+{
+    ModbusMaster first, second;
+    first.begin(1, Serial);
+    second.begin(2, Serial);
+    other = &second;
+    first.preTransmission([] { answers[0] = other->readHoldingRegisters(0, 1); });
+    first.postTransmission([] { answers[1] = other->readHoldingRegisters(0, 1); });
+    first.idle([] { answers[2] = other->readHoldingRegisters(0, 1); });
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(first.readHoldingRegisters(0, 1), 0);
+    assert_int_equal(first.getResponseBuffer(0), 7);
+    for (uint8_t answer : answers)
+        assert_int_equal(answer, ModbusMaster::ku8MBBusy);
+}
+
+static void an_object_that_is_gone_keeps_no_other_from_asking(void **)
+{
+    ModbusMaster second;
+    second.begin(2, Serial);
+    {
+        ModbusMaster first;
+        first.begin(1, Serial);
+        first.setBlocking(false);
+        assert_int_equal(first.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);
+    }
+    Serial.reply(adu({2, 3, 2, 0, 8}));
+    assert_int_equal(second.readHoldingRegisters(0, 1), 0);
+}
+
 static void the_buffer_ends_after_64_words(void **)
 {
     ModbusMaster node;
@@ -101,6 +154,9 @@ int main()
         TEST(a_uart_that_the_board_lacks_falls_back_to_the_first),
         TEST(objects_are_small),
         TEST(objects_may_share_the_frame_buffer),
+        TEST(a_request_beside_that_of_another_object_is_refused),
+        TEST(a_request_from_a_callback_of_another_object_is_refused),
+        TEST(an_object_that_is_gone_keeps_no_other_from_asking),
         TEST(the_buffer_ends_after_64_words),
         TEST(transfers_of_64_registers_fit),
         TEST(reads_of_65_registers_are_the_devices_to_judge),

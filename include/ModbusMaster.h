@@ -15,8 +15,11 @@
  *   else 125. A longer reply is answered with ku8MBBufferTooSmall.
  * - MODBUSMASTER_TRANSMIT_WORDS  words that a write sends, 2 to 123; 64 on AVR,
  *   else 123. A longer write is answered with ku8MBIllegalDataValue.
- * - MODBUSMASTER_SHARE_FRAME  one frame buffer for all objects, which saves RAM
- *   where no two of them ever have a request under way at the same time.
+ * - MODBUSMASTER_SHARE_FRAME  one frame buffer for all objects, as on AVR boards of
+ *   at most 2.5 KB of RAM anyway. A request beside that of another object is answered
+ *   with ku8MBBusy. Not for objects of several threads.
+ * - MODBUSMASTER_OWN_FRAMES  a frame buffer for each object on those boards too, so
+ *   that several objects may have a request under way at the same time.
  * - MODBUSMASTER_SERIAL0 to MODBUSMASTER_SERIAL3  what begin(baud) opens, where
  *   the core does not say which UARTs the board has.
  * - MODBUSMASTER_YIELD()  what a wait runs; yield() where the core has it.
@@ -49,6 +52,12 @@
 #else
 #define MODBUSMASTER_TRANSMIT_WORDS 123
 #endif
+#endif
+
+// The Uno has 2 KB of RAM, the Leonardo 2.5.
+#if defined(RAMEND) && RAMEND < 0x0B00 && !defined(MODBUSMASTER_OWN_FRAMES)
+#undef MODBUSMASTER_SHARE_FRAME
+#define MODBUSMASTER_SHARE_FRAME
 #endif
 
 // Cores with NO_GLOBAL_* leave it to the sketch to make the ports.
@@ -118,6 +127,15 @@ public:
         }
         return *this;
     }
+
+#if defined(MODBUSMASTER_SHARE_FRAME)
+    /** A request under way is forgotten; cancel it before, for the driver's sake. */
+    ~ModbusMaster()
+    {
+        if (lastUser == &state.master)
+            lastUser = nullptr;
+    }
+#endif
 
     /**
      * Talks to a slave over a Stream that is open already. Cheap, and may be
@@ -234,7 +252,7 @@ public:
      */
     uint8_t requestFrom(uint16_t address, uint16_t quantity)
     {
-        return mbm_master_requestFrom(use(), address, quantity);
+        return mayRequest() ? mbm_master_requestFrom(&state.master, address, quantity) : 0;
     }
     /** How many words of the last successful read receive has yet to give. */
     uint8_t available() const { return mbm_master_available(&state.master); }
@@ -253,63 +271,80 @@ public:
      */
     uint8_t readCoils(uint16_t address, uint16_t quantity)
     {
-        return mbm_master_readCoils(use(), address, quantity);
+        return mayRequest() ? mbm_master_readCoils(&state.master, address, quantity) : busy();
     }
     /** Function 02: as readCoils, of 1 to 2000 discrete inputs. */
     uint8_t readDiscreteInputs(uint16_t address, uint16_t quantity)
     {
-        return mbm_master_readDiscreteInputs(use(), address, quantity);
+        return mayRequest() ? mbm_master_readDiscreteInputs(&state.master, address, quantity)
+                            : busy();
     }
     /** Function 03: reads 1 to 125 holding registers; see readCoils. */
     uint8_t readHoldingRegisters(uint16_t address, uint16_t quantity)
     {
-        return mbm_master_readHoldingRegisters(use(), address, quantity);
+        return mayRequest() ? mbm_master_readHoldingRegisters(&state.master, address, quantity)
+                            : busy();
     }
     /** Function 04: reads 1 to 125 input registers; see readCoils. */
     uint8_t readInputRegisters(uint16_t address, uint16_t quantity)
     {
-        return mbm_master_readInputRegisters(use(), address, quantity);
+        return mayRequest() ? mbm_master_readInputRegisters(&state.master, address, quantity)
+                            : busy();
     }
     /** Function 05: switches a coil; any `on` but 0 is on. See readCoils. */
     uint8_t writeSingleCoil(uint16_t address, uint8_t on)
     {
-        return mbm_master_writeSingleCoil(use(), address, on);
+        return mayRequest() ? mbm_master_writeSingleCoil(&state.master, address, on) : busy();
     }
     /** Function 06: writes a register, by way of word 0. See readCoils. */
     uint8_t writeSingleRegister(uint16_t address, uint16_t value)
     {
-        return mbm_master_writeSingleRegister(use(), address, value);
+        return mayRequest() ? mbm_master_writeSingleRegister(&state.master, address, value)
+                            : busy();
     }
     /** Function 0F: writes coils from word 0 on, lowest bit first. See readCoils. */
     uint8_t writeMultipleCoils(uint16_t address, uint16_t quantity)
     {
-        return mbm_master_writeMultipleCoils(use(), address, quantity);
+        return mayRequest() ? mbm_master_writeMultipleCoils(&state.master, address, quantity)
+                            : busy();
     }
     /** Function 0F: writes the queued bits to the last write address. */
-    uint8_t writeMultipleCoils() { return mbm_master_writeQueuedCoils(use()); }
+    uint8_t writeMultipleCoils()
+    {
+        return mayRequest() ? mbm_master_writeQueuedCoils(&state.master) : busy();
+    }
     /** Function 10: writes 1 to 123 registers from word 0 on. See readCoils. */
     uint8_t writeMultipleRegisters(uint16_t address, uint16_t quantity)
     {
-        return mbm_master_writeMultipleRegisters(use(), address, quantity);
+        return mayRequest() ? mbm_master_writeMultipleRegisters(&state.master, address, quantity)
+                            : busy();
     }
     /** Function 10: writes the queued complete words to the last write address. */
-    uint8_t writeMultipleRegisters() { return mbm_master_writeQueuedRegisters(use()); }
+    uint8_t writeMultipleRegisters()
+    {
+        return mayRequest() ? mbm_master_writeQueuedRegisters(&state.master) : busy();
+    }
     /** Function 16: (register & andMask) | (orMask & ~andMask), by way of words 0 and 1. */
     uint8_t maskWriteRegister(uint16_t address, uint16_t andMask, uint16_t orMask)
     {
-        return mbm_master_maskWriteRegister(use(), address, andMask, orMask);
+        return mayRequest() ? mbm_master_maskWriteRegister(&state.master, address, andMask, orMask)
+                            : busy();
     }
     /** Function 17: writes 1 to 121 registers from word 0 on, then reads 1 to 125. */
     uint8_t readWriteMultipleRegisters(uint16_t readAddress, uint16_t readQuantity,
                                        uint16_t writeAddress, uint16_t writeQuantity)
     {
-        return mbm_master_readWriteMultipleRegisters(use(), readAddress, readQuantity,
-                                                     writeAddress, writeQuantity);
+        return mayRequest()
+                   ? mbm_master_readWriteMultipleRegisters(&state.master, readAddress, readQuantity,
+                                                           writeAddress, writeQuantity)
+                   : busy();
     }
     /** Function 17: writes the queued words to the last write address, then reads. */
     uint8_t readWriteMultipleRegisters(uint16_t readAddress, uint16_t readQuantity)
     {
-        return mbm_master_readWriteQueuedRegisters(use(), readAddress, readQuantity);
+        return mayRequest() ? mbm_master_readWriteQueuedRegisters(&state.master, readAddress,
+                                                                  readQuantity)
+                            : busy();
     }
 
     /** Milliseconds from the end of a request to the end of its reply; 2000 at first. */
@@ -432,15 +467,24 @@ private:
     }
 
     // Every request passes here: its gap counts from another object's last use.
-    mbm_master *use()
+    // False while another object has a request under way in the frame that all share.
+    bool mayRequest()
     {
-        if (lastUser != this) {
-            lastUser = this;
-            mbm_master_lineUsed(&state.master);
+        if (lastUser != &state.master) {
+#if defined(MODBUSMASTER_SHARE_FRAME)
+            // From within a hook of that object, its status is MBM_BUSY.
+            const uint8_t other = lastUser != nullptr ? mbm_master_status(lastUser) : MBM_OK;
+            if (other == MBM_PENDING || other == MBM_BUSY)
+                return false;
+#endif
+            lastUser = &state.master;
+            mbm_master_lineUsedAt(&state.master, lastUse);
         }
         state.sent = false;
-        return &state.master;
+        return true;
     }
+
+    static uint8_t busy() { return MBM_BUSY; }
 
     uint8_t sendWord(uint16_t word) { return mbm_master_send(&state.master, word); }
     uint8_t sendWords(uint32_t words) { return mbm_master_send32(&state.master, words); }
@@ -468,6 +512,8 @@ private:
         uint16_t room = capacity;
         for (; room > 0 && stream.available() > 0; room--)
             *bytes++ = static_cast<uint8_t>(stream.read());
+        if (room < capacity)
+            lastUse = clockHook(context);
         return static_cast<int16_t>(capacity - room);
     }
     static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
@@ -484,6 +530,7 @@ private:
     static void postHook(void *context)
     {
         of(context).sent = true;
+        lastUse = clockHook(context);
         call(of(context).onPost);
     }
     static void idleHook(void *context, mbm_master *)

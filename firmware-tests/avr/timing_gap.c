@@ -54,7 +54,7 @@ void time_default_gap(void)
         give_up("TimeFirst has not sent its requests");
     if (t.silence[OTHER_AT_ONCE] < GAP - CLOCK_STEP)
         give_up("another object's request does not keep the gap");
-    row_of("baud rate untold: the first request after begin, from the call to its first byte",
+    row_of("baud rate untold: the first request after begin on a line that was silent for 50 ms, from the call to its first byte",
            t.waited[AFTER_BEGIN], 3463);
     row_of("baud rate untold: another object's request after 50 ms of silence, from the call to its "
            "first byte",

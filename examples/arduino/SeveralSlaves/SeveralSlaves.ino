@@ -1,8 +1,6 @@
 // Three slaves on one bus. Each has an object of its own, which keeps its own
-// words; all share the port, and with MODBUSMASTER_SHARE_FRAME one frame
-// buffer, since no two of them ever have a request under way together. Smaller
-// buffers leave RAM for the rest of the sketch.
-#define MODBUSMASTER_SHARE_FRAME
+// words; all share the port, and on a small board one frame buffer. Smaller buffers
+// leave RAM for the rest of the sketch.
 #define MODBUSMASTER_RESPONSE_WORDS 16
 #define MODBUSMASTER_TRANSMIT_WORDS 8
 #include <ModbusMaster.h>

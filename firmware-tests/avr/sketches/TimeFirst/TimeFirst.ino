@@ -13,9 +13,10 @@ void read(ModbusMaster &node) {
 void setup() {
   DDRB |= 1;
   Serial.begin(115200);
+  delay(50);
   first.begin(1, Serial);
   second.begin(2, Serial);
-  read(first); // the line was not used so far
+  read(first); // the line has been silent for 50 ms
   delay(50);
   read(second); // the line was silent for 50 ms
   read(first); // at once: here the gap is kept
