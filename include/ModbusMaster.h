@@ -271,80 +271,63 @@ public:
      */
     uint8_t readCoils(uint16_t address, uint16_t quantity)
     {
-        return mayRequest() ? mbm_master_readCoils(&state.master, address, quantity) : busy();
+        return request(mbm_master_readCoils, address, quantity);
     }
     /** Function 02: as readCoils, of 1 to 2000 discrete inputs. */
     uint8_t readDiscreteInputs(uint16_t address, uint16_t quantity)
     {
-        return mayRequest() ? mbm_master_readDiscreteInputs(&state.master, address, quantity)
-                            : busy();
+        return request(mbm_master_readDiscreteInputs, address, quantity);
     }
     /** Function 03: reads 1 to 125 holding registers; see readCoils. */
     uint8_t readHoldingRegisters(uint16_t address, uint16_t quantity)
     {
-        return mayRequest() ? mbm_master_readHoldingRegisters(&state.master, address, quantity)
-                            : busy();
+        return request(mbm_master_readHoldingRegisters, address, quantity);
     }
     /** Function 04: reads 1 to 125 input registers; see readCoils. */
     uint8_t readInputRegisters(uint16_t address, uint16_t quantity)
     {
-        return mayRequest() ? mbm_master_readInputRegisters(&state.master, address, quantity)
-                            : busy();
+        return request(mbm_master_readInputRegisters, address, quantity);
     }
     /** Function 05: switches a coil; any `on` but 0 is on. See readCoils. */
     uint8_t writeSingleCoil(uint16_t address, uint8_t on)
     {
-        return mayRequest() ? mbm_master_writeSingleCoil(&state.master, address, on) : busy();
+        return request(mbm_master_writeSingleCoil, address, on);
     }
     /** Function 06: writes a register, by way of word 0. See readCoils. */
     uint8_t writeSingleRegister(uint16_t address, uint16_t value)
     {
-        return mayRequest() ? mbm_master_writeSingleRegister(&state.master, address, value)
-                            : busy();
+        return request(mbm_master_writeSingleRegister, address, value);
     }
     /** Function 0F: writes coils from word 0 on, lowest bit first. See readCoils. */
     uint8_t writeMultipleCoils(uint16_t address, uint16_t quantity)
     {
-        return mayRequest() ? mbm_master_writeMultipleCoils(&state.master, address, quantity)
-                            : busy();
+        return request(mbm_master_writeMultipleCoils, address, quantity);
     }
     /** Function 0F: writes the queued bits to the last write address. */
-    uint8_t writeMultipleCoils()
-    {
-        return mayRequest() ? mbm_master_writeQueuedCoils(&state.master) : busy();
-    }
+    uint8_t writeMultipleCoils() { return request(mbm_master_writeQueuedCoils); }
     /** Function 10: writes 1 to 123 registers from word 0 on. See readCoils. */
     uint8_t writeMultipleRegisters(uint16_t address, uint16_t quantity)
     {
-        return mayRequest() ? mbm_master_writeMultipleRegisters(&state.master, address, quantity)
-                            : busy();
+        return request(mbm_master_writeMultipleRegisters, address, quantity);
     }
     /** Function 10: writes the queued complete words to the last write address. */
-    uint8_t writeMultipleRegisters()
-    {
-        return mayRequest() ? mbm_master_writeQueuedRegisters(&state.master) : busy();
-    }
+    uint8_t writeMultipleRegisters() { return request(mbm_master_writeQueuedRegisters); }
     /** Function 16: (register & andMask) | (orMask & ~andMask), by way of words 0 and 1. */
     uint8_t maskWriteRegister(uint16_t address, uint16_t andMask, uint16_t orMask)
     {
-        return mayRequest() ? mbm_master_maskWriteRegister(&state.master, address, andMask, orMask)
-                            : busy();
+        return request(mbm_master_maskWriteRegister, address, andMask, orMask);
     }
     /** Function 17: writes 1 to 121 registers from word 0 on, then reads 1 to 125. */
     uint8_t readWriteMultipleRegisters(uint16_t readAddress, uint16_t readQuantity,
                                        uint16_t writeAddress, uint16_t writeQuantity)
     {
-        return mayRequest()
-                   ? mbm_master_readWriteMultipleRegisters(&state.master, readAddress, readQuantity,
-                                                           writeAddress, writeQuantity)
-                   : busy();
+        return request(mbm_master_readWriteMultipleRegisters, readAddress, readQuantity,
+                       writeAddress, writeQuantity);
     }
     /** Function 17: writes the queued words to the last write address, then reads. */
     uint8_t readWriteMultipleRegisters(uint16_t readAddress, uint16_t readQuantity)
     {
-        return mayRequest() ? mbm_master_readWriteQueuedRegisters(&state.master, readAddress,
-                                                                  readQuantity)
-                            : busy();
+        return request(mbm_master_readWriteQueuedRegisters, readAddress, readQuantity);
     }
 
     /** Milliseconds from the end of a request to the end of its reply; 2000 at first. */
@@ -484,7 +467,11 @@ private:
         return true;
     }
 
-    static uint8_t busy() { return MBM_BUSY; }
+    template <typename... Parameters>
+    uint8_t request(uint8_t (*function)(mbm_master *, Parameters...), Parameters... arguments)
+    {
+        return mayRequest() ? function(&state.master, arguments...) : ku8MBBusy;
+    }
 
     uint8_t sendWord(uint16_t word) { return mbm_master_send(&state.master, word); }
     uint8_t sendWords(uint32_t words) { return mbm_master_send32(&state.master, words); }

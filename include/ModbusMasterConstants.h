@@ -54,7 +54,11 @@ public:
     static const uint8_t ku8MBCancelled = MBM_CANCELLED;
 
 protected:
-    /** The object that used a line last. */
+    /**
+     * The object that used a line last; looked into only where all objects share a
+     * frame. Threads that race for it, each with a line of its own, cost a needless
+     * gap at most.
+     */
     static const mbm_master *lastUser;
     /** When a line was used last: micros() of a byte read, or of the end of a request. */
     static uint32_t lastUse;

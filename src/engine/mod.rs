@@ -22,12 +22,13 @@ pub use storage::{Buffers, Storage};
 
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
+use crate::frame::{rtu, Seen};
 use crate::pdu::query::Query;
 use crate::port::Port;
 use crate::time::{elapsed, has_elapsed, LONGEST};
+pub use crate::transaction::BROADCAST;
 use crate::transaction::{Counter, Settings};
 use receive::Probation;
-use search::Seen;
 
 /// Where a request stands, in this order.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Hash, Debug)]
@@ -49,14 +50,8 @@ enum Phase {
     Turnaround,
 }
 
-/// The unit that every slave listens to (serial line guide 2.2).
-pub const BROADCAST: u8 = 0;
-
-/// The unit, and the CRC behind the PDU.
-const AROUND_PDU: u8 = 1 + CRC;
-
-/// Bytes of the CRC.
-const CRC: u8 = 2;
+/// Bytes of a frame around its PDU.
+const AROUND_PDU: u8 = rtu::OVERHEAD as u8;
 
 /// One request and its reply, over the port and in the storage it was given.
 // In this order, small fields first: what lies far from the start of an object
@@ -99,7 +94,7 @@ pub struct Engine<P, S> {
     seen: Seen,
     /// Frames with a right CRC that were passed over.
     foreign: u8,
-    /// Bytes passed over since a frame ended, at most `LEAST_FRAME`.
+    /// Bytes passed over since a frame ended, at most `MIN_FRAME`.
     passed: u8,
     /// What they are if they turn out to be a frame.
     passed_as: Seen,

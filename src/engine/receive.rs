@@ -8,10 +8,14 @@
 //! reply takes the place of the first. A second one that is damaged makes the
 //! request fail, because the held reply is then most likely the late one.
 
-use super::search::Seen;
-use super::{Counter, Engine, Storage, AROUND_PDU, CRC};
+use super::{Counter, Engine, Storage, AROUND_PDU};
 use crate::error::Status;
+use crate::frame::checksum::Crc16;
+use crate::frame::Seen;
 use crate::port::Port;
+
+/// Bytes of the CRC, which a held reply needs no longer.
+const CRC: u8 = 2;
 
 /// Whether the reply to the request under way may be a late one.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -41,7 +45,7 @@ impl<P: Port, S: Storage> Engine<P, S> {
         if self.length > self.storage.room() {
             self.length = 0;
         }
-        self.weight = crate::frame::checksum::Crc16::RESIDUE;
+        self.weight = Crc16::RESIDUE;
         self.seen = Seen::NOTHING;
         self.foreign = 0;
         self.skimmed = true;
@@ -173,7 +177,7 @@ impl<P: Port, S: Storage> Engine<P, S> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn hold(&mut self) {
         self.give_up_held();
-        // Without the CRC, so that there is room for the next byte in any case.
+        // So there is room for the next byte in any case.
         self.held = self.found_length() - CRC;
         self.storage.set_aside(self.held);
         self.end -= self.held;

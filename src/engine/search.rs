@@ -14,48 +14,12 @@
 use super::{Engine, Storage, AROUND_PDU};
 use crate::error::Status;
 use crate::frame::checksum::{crc16, Crc16};
+use crate::frame::rtu::MIN_FRAME;
+use crate::frame::Seen;
 use crate::pdu::EXCEPTION;
-
-/// The least bytes of a frame: unit, function, CRC.
-const LEAST_FRAME: u8 = 4;
 
 /// Bytes of an exception's frame: unit, function, code, CRC.
 const EXCEPTION_FRAME: u8 = 5;
-
-/// What was seen on the way to a reply, the more telling the greater. The low
-/// digit is that of the status it becomes.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Hash, Debug)]
-#[repr(transparent)]
-pub(super) struct Seen(u8);
-
-impl Seen {
-    /// No frame.
-    pub(super) const NOTHING: Seen = Seen(0x02);
-    /// A frame of another unit.
-    const OTHER_UNIT: Seen = Seen(0x10);
-    /// A frame of our unit with another function.
-    const OTHER_FUNCTION: Seen = Seen(0x21);
-    /// A frame of our unit and function that is not the reply.
-    const MALFORMED: Seen = Seen(0x35);
-    /// A complete frame of our unit and function with a wrong CRC.
-    pub(super) const BAD_CRC: Seen = Seen(0x43);
-    /// The reply has begun, but the buffer cannot hold it.
-    const TOO_LONG: Seen = Seen(0x59);
-
-    /// The status of a request for which nothing better was seen.
-    pub(super) const fn status(self) -> Status {
-        Status::from_code(0xE0 | (self.0 & 0x0F))
-    }
-}
-
-const _: () = {
-    assert!(Seen::NOTHING.status().code() == Status::RESPONSE_TIMED_OUT.code());
-    assert!(Seen::OTHER_UNIT.status().code() == Status::INVALID_SLAVE_ID.code());
-    assert!(Seen::OTHER_FUNCTION.status().code() == Status::INVALID_FUNCTION.code());
-    assert!(Seen::MALFORMED.status().code() == Status::MALFORMED_REPLY.code());
-    assert!(Seen::BAD_CRC.status().code() == Status::INVALID_CRC.code());
-    assert!(Seen::TOO_LONG.status().code() == Status::BUFFER_TOO_SMALL.code());
-};
 
 /// What a frame is that begins as the reply does.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -267,11 +231,10 @@ impl<P, S: Storage> Engine<P, S> {
             self.done = front + 1;
             self.crc = self.crc_passed;
         }
-        if self.passed < LEAST_FRAME {
+        if self.passed < MIN_FRAME {
             self.passed += 1;
         }
-        if cfg!(feature = "diagnosis") && self.passed == LEAST_FRAME && self.crc_passed.is_residue()
-        {
+        if cfg!(feature = "diagnosis") && self.passed == MIN_FRAME && self.crc_passed.is_residue() {
             if self.seen == Seen::BAD_CRC {
                 self.seen = Seen::NOTHING;
             }

@@ -100,7 +100,7 @@ pub fn emit(
 }
 
 /// The least bytes of a frame: unit, function, CRC.
-const MIN_FRAME: u8 = 4;
+pub const MIN_FRAME: u8 = 4;
 
 /// A window that slides over received bytes. The buffer is the caller's and
 /// is passed to each call.

@@ -122,8 +122,9 @@ pub(super) unsafe fn line<'a, L>(object: *mut Object) -> &'a mut L {
     unsafe { &mut *(&raw mut (*object).line).cast() }
 }
 
-/// Does something with the line of an object, whatever its kind. For what is called
-/// seldom, so that it is carried only by who calls it. Unsafe as [`line`] is.
+/// Does something with the line of an object, whatever its kind. Only functions that
+/// programs seldom call use it: an image that calls none of them does not carry it.
+/// Unsafe as [`line`] is.
 macro_rules! on_line {
     ($object:expr, $line:ident => $action:expr) => {
         match (*(*$object).kind).framing {

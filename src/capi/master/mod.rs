@@ -183,7 +183,8 @@ pub unsafe extern "C" fn mbm_master_setBuffers(
             storage.frame = frame;
             storage.response_words = responseWords as u8;
             storage.transmit_words = transmitWords as u8;
-            storage.frame_bytes = frameBytes.min(255) as u8;
+            // No frame of a master is longer.
+            storage.frame_bytes = frameBytes.min(u8::MAX.into()) as u8;
             Status::OK
         })
     }
