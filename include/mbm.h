@@ -682,7 +682,7 @@ typedef struct mbm_client {
     /**
      * Not for you.
      */
-    uint32_t words[20];
+    uint32_t words[24];
 } mbm_client;
 
 /**

@@ -47,8 +47,6 @@ pub mod packet;
 pub mod pdu;
 /// cbindgen:ignore
 pub mod sniffer;
-/// cbindgen:ignore
-pub mod transaction;
 
 /// cbindgen:ignore
 pub mod client;

@@ -1,12 +1,11 @@
 //! The ModbusMaster-shaped facade: words to send, ten functions, words
 //! received. Each function starts a transaction; `poll` ends it.
 
-use crate::engine::{Engine, Storage};
+use crate::engine::{Engine, Settings, Words};
 use crate::error::Status;
 use crate::pdu::query::{Form, Query};
 use crate::pdu::{bits, registers};
 use crate::port::Port;
-use crate::transaction::Settings;
 
 /// What is read where there is no word.
 pub const NO_WORD: u16 = 0xFFFF;
@@ -15,7 +14,7 @@ pub const NO_WORD: u16 = 0xFFFF;
 // Small fields first: see `Engine`.
 #[derive(Clone, Hash, Debug)]
 #[repr(C)]
-pub struct Master<P, S> {
+pub struct Master<P, S: Words> {
     response_words: u8,
     response_index: u8,
     slave: u8,
@@ -24,10 +23,10 @@ pub struct Master<P, S> {
     write_address: u16,
     /// Bits queued in the transmit buffer; 16 to a word.
     transmit_bits: u16,
-    engine: Engine<P, S>,
+    engine: Engine<P, S, Query>,
 }
 
-impl<P, S> Master<P, S> {
+impl<P, S: Words> Master<P, S> {
     /// A master that talks to `slave` over `port`.
     pub const fn new(slave: u8, port: P, storage: S) -> Self {
         Master {
@@ -98,7 +97,7 @@ impl<P, S> Master<P, S> {
     }
 }
 
-impl<P: Port, S: Storage> Master<P, S> {
+impl<P: Port, S: Words> Master<P, S> {
     /// Talks to `slave` from now on, over what `port` makes of the port. Settings,
     /// buffers and their words stay; a request under way is given up.
     pub fn begin(&mut self, slave: u8, port: impl FnOnce(&mut P)) {

@@ -7,21 +7,30 @@ mod wire;
 
 use exchanges::CASES;
 use mbm::client::{Client, Serial};
+use mbm::engine::Frame;
 use mbm::error::Status;
-use mbm::frame::{ascii, ascii_window, rtu, Search};
+use mbm::frame::{ascii, rtu};
 use mbm::pdu::custom::Rule;
 use mbm::pdu::outline::{Form, Outline};
 use wire::{End, Lent, Task};
 
-type Rtu<W = rtu::Window> = Client<Serial<End, Lent, Task, W>, Task, 4>;
+type Line = Client<Serial<End, Lent, Task>, Task, 4>;
 
-fn client<W: Search>() -> (End, Rtu<W>) {
+fn rtu_client() -> (End, Line) {
     let end = End::default();
     (end.clone(), Client::new(Serial::new(end, Lent::default())))
 }
 
+fn ascii_client() -> (End, Line) {
+    let end = End::default();
+    (
+        end.clone(),
+        Client::new(Serial::ascii(end, Lent::default())),
+    )
+}
+
 /// Polls every 100 us until a task ends, for at most ten seconds.
-fn run<W: Search>(end: &End, client: &mut Rtu<W>) -> Task {
+fn run(end: &End, client: &mut Line) -> Task {
     for _ in 0..100_000 {
         if let Some(task) = client.poll(end.now(), true) {
             return task;
@@ -32,7 +41,7 @@ fn run<W: Search>(end: &End, client: &mut Rtu<W>) -> Task {
 }
 
 /// Polls until something was sent.
-fn sent<W: Search>(end: &End, client: &mut Rtu<W>) -> Vec<u8> {
+fn sent(end: &End, client: &mut Line) -> Vec<u8> {
     for _ in 0..3_000 {
         assert!(client.poll(end.now(), true).is_none());
         let bytes = end.sent();
@@ -65,7 +74,7 @@ fn characters(unit: u8, pdu: &[u8]) -> Vec<u8> {
 #[test]
 fn every_function_is_sent_and_answered_in_rtu() {
     for (build, data, request, response, received) in CASES {
-        let (end, mut client) = client::<rtu::Window>();
+        let (end, mut client) = rtu_client();
         assert!(client.queue(Task::new(17, 1, data, build)).is_ok());
         assert_eq!(sent(&end, &mut client), frame(17, request));
         // In two pieces, with a pause that is longer than t3.5 between them.
@@ -81,7 +90,7 @@ fn every_function_is_sent_and_answered_in_rtu() {
 #[test]
 fn a_response_of_unknown_length_may_be_as_long_as_a_frame() {
     for length in 250..=253 {
-        let (end, mut client) = client::<rtu::Window>();
+        let (end, mut client) = rtu_client();
         let build: fn(&mut Outline) -> Status = |o| o.custom(0x43, 0, Rule::Silence);
         assert!(client.queue(Task::new(17, 1, &[], build)).is_ok());
         sent(&end, &mut client);
@@ -99,7 +108,7 @@ fn a_response_of_unknown_length_may_be_as_long_as_a_frame() {
 #[test]
 fn every_function_is_sent_and_answered_in_ascii() {
     for (build, data, request, response, received) in CASES {
-        let (end, mut client) = client::<ascii_window::Window>();
+        let (end, mut client) = ascii_client();
         assert!(client.queue(Task::new(17, 1, data, build)).is_ok());
         assert_eq!(sent(&end, &mut client), characters(17, request));
         end.deliver(1_000, b"\xFF:11");
@@ -114,7 +123,7 @@ fn every_function_is_sent_and_answered_in_ascii() {
 #[test]
 fn an_exception_of_every_function_is_told() {
     for (build, data, request, ..) in CASES {
-        let (end, mut client) = client::<rtu::Window>();
+        let (end, mut client) = rtu_client();
         assert!(client.queue(Task::new(17, 1, data, build)).is_ok());
         sent(&end, &mut client);
         end.deliver(1_000, &frame(17, &[request[0] | 0x80, 6]));
@@ -129,7 +138,7 @@ fn an_exception_of_every_function_is_told() {
 fn a_response_that_does_not_answer_is_malformed() {
     for (build, data, request, response, _) in CASES {
         for at in 1..response.len() {
-            let (end, mut client) = client::<rtu::Window>();
+            let (end, mut client) = rtu_client();
             assert!(client.queue(Task::new(17, 1, data, build)).is_ok());
             sent(&end, &mut client);
             let mut wrong = response.to_vec();
@@ -163,7 +172,7 @@ fn read(unit: u8, transaction: u16) -> Task {
 
 #[test]
 fn requests_are_sent_one_after_the_other_and_in_order() {
-    let (end, mut client) = client::<rtu::Window>();
+    let (end, mut client) = rtu_client();
     for number in 1..=4 {
         assert!(client.queue(read(number as u8, number)).is_ok());
     }
@@ -189,7 +198,7 @@ fn requests_are_sent_one_after_the_other_and_in_order() {
 
 #[test]
 fn a_broadcast_is_a_write_and_takes_the_turnaround_delay() {
-    let (end, mut client) = client::<rtu::Window>();
+    let (end, mut client) = rtu_client();
     for (build, data, request, ..) in CASES {
         let broadcast = matches!(request[0], 5 | 6 | 0x0F | 0x10 | 0x15 | 0x16);
         match client.queue(Task::new(0, 0, data, build)) {
@@ -220,7 +229,7 @@ fn a_broadcast_is_a_write_and_takes_the_turnaround_delay() {
 
 #[test]
 fn nobody_responds_to_force_listen_only_mode() {
-    let (end, mut client) = client::<rtu::Window>();
+    let (end, mut client) = rtu_client();
     let task = Task::new(17, 0, &[0, 0], |outline| outline.diagnostics(4, 1));
     assert!(client.queue(task).is_ok());
     assert_eq!(run(&end, &mut client).ticket.status, Status::OK);
@@ -229,7 +238,7 @@ fn nobody_responds_to_force_listen_only_mode() {
 
 #[test]
 fn a_dead_link_ends_the_request_under_way_and_those_that_wait() {
-    let (end, mut client) = client::<rtu::Window>();
+    let (end, mut client) = rtu_client();
     for number in 1..=3 {
         assert!(client.queue(read(number as u8, number)).is_ok());
     }
@@ -250,7 +259,7 @@ fn a_dead_link_ends_the_request_under_way_and_those_that_wait() {
 
 #[test]
 fn a_reconnect_ends_only_what_was_under_way() {
-    let (end, mut client) = client::<rtu::Window>();
+    let (end, mut client) = rtu_client();
     for number in 1..=2 {
         assert!(client.queue(read(number as u8, number)).is_ok());
     }
@@ -268,7 +277,7 @@ fn a_reconnect_ends_only_what_was_under_way() {
 
 #[test]
 fn a_request_is_cancelled_wherever_it_is() {
-    let (end, mut client) = client::<rtu::Window>();
+    let (end, mut client) = rtu_client();
     for number in 1..=3 {
         assert!(client.queue(read(number as u8, number)).is_ok());
     }
@@ -288,7 +297,7 @@ fn a_request_is_cancelled_wherever_it_is() {
 
 #[test]
 fn a_lent_line_is_left_alone() {
-    let (end, mut client) = client::<rtu::Window>();
+    let (end, mut client) = rtu_client();
     assert!(client.lend());
     assert!(!client.lend());
     assert!(client.queue(read(1, 1)).is_ok());
@@ -303,7 +312,7 @@ fn a_lent_line_is_left_alone() {
 
 #[test]
 fn a_reply_too_long_for_the_job_is_told_and_not_cut() {
-    let (end, mut client) = client::<rtu::Window>();
+    let (end, mut client) = rtu_client();
     let mut task = Task::new(1, 1, &[], |outline| {
         outline.set(Form::REPORT_SERVER_ID, 0, 0)
     });
@@ -318,9 +327,9 @@ fn a_reply_too_long_for_the_job_is_told_and_not_cut() {
 
 /// A device that answers in order, but later than the timeout: its late reply
 /// looks like the answer to the next request.
-fn a_late_reply_is_passed_over<W: Search>(encode: fn(u8, &[u8]) -> Vec<u8>) {
-    let (end, mut client) = client::<W>();
-    client.line.transaction().settings.response_timeout = 500_000;
+fn a_late_reply_is_passed_over(line: (End, Line), encode: fn(u8, &[u8]) -> Vec<u8>) {
+    let (end, mut client) = line;
+    client.line.engine().settings.response_timeout = 500_000;
     let reply = |value: u8| encode(17, &[3, 2, 0, value]);
     assert!(client.queue(read(17, 1)).is_ok());
     assert_eq!(
@@ -342,10 +351,52 @@ fn a_late_reply_is_passed_over<W: Search>(encode: fn(u8, &[u8]) -> Vec<u8>) {
 
 #[test]
 fn a_late_reply_in_rtu_frames_is_not_the_answer_to_a_later_request() {
-    a_late_reply_is_passed_over::<rtu::Window>(frame);
+    a_late_reply_is_passed_over(rtu_client(), frame);
 }
 
 #[test]
 fn a_late_reply_in_ascii_frames_is_not_the_answer_to_a_later_request() {
-    a_late_reply_is_passed_over::<ascii_window::Window>(characters);
+    a_late_reply_is_passed_over(ascii_client(), characters);
+}
+
+/// How a request for the exception status of unit 2 ends if an ASCII line brings this.
+fn ended_in_ascii(line: &[u8]) -> Task {
+    let (end, mut client) = ascii_client();
+    client.line.engine().storage.frame = Frame::new(vec![0; 40]);
+    let build: fn(&mut Outline) -> Status = |o| o.set(Form::READ_EXCEPTION_STATUS, 0, 0);
+    assert!(client.queue(Task::new(2, 1, &[], build)).is_ok());
+    sent(&end, &mut client);
+    // Character by character.
+    for (index, character) in line.iter().enumerate() {
+        end.deliver(1_000 * index as u32, &[*character]);
+    }
+    run(&end, &mut client)
+}
+
+#[test]
+fn an_ascii_frame_is_found_behind_noise_and_behind_a_frame_that_was_cut_off() {
+    for line in [&b":02075A9D\r\n"[..], b"\xFF12\r\n:0207:02075A9D\r\n"] {
+        let task = ended_in_ascii(line);
+        assert_eq!(
+            (task.ticket.status, task.received()),
+            (Status::OK, &[0x5A][..])
+        );
+    }
+}
+
+#[test]
+fn the_most_telling_thing_that_was_seen_on_an_ascii_line_is_the_status() {
+    for (line, status) in [
+        (&b":03075A9C\r\n"[..], Status::INVALID_SLAVE_ID),
+        (b":02085A9C\r\n", Status::INVALID_FUNCTION),
+        (b":0207005A9D\r\n", Status::MALFORMED_REPLY),
+        (b":02075A9E\r\n", Status::INVALID_CRC),
+        (&[b':'; 50], Status::RESPONSE_TIMED_OUT),
+        (
+            b":02070000000000000000000000000000000000000000000000",
+            Status::BUFFER_TOO_SMALL,
+        ),
+    ] {
+        assert_eq!(ended_in_ascii(line).ticket.status, status, "{line:?}");
+    }
 }

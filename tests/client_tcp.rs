@@ -4,10 +4,10 @@
 #[path = "common/stream.rs"]
 mod stream;
 
+use mbm::engine::{Counter, Frame};
 use mbm::error::Status;
 use mbm::frame::tcp;
 use mbm::pdu::outline::{Form, Outline};
-use mbm::transaction::Counter;
 use proptest::prelude::*;
 use stream::{client, poll, read, requests, response, wire::Task};
 
@@ -260,7 +260,7 @@ fn no_more_requests_fly_than_the_limit_says() {
 fn a_small_buffer_gathers_what_it_holds() {
     let (end, mut client) = client();
     client.line.means.outgoing = vec![0; 30];
-    client.line.means.frame = vec![0; 12];
+    client.line.means.frame = Frame::new(vec![0; 12]);
     for number in 1..=5 {
         assert!(client.queue(read(1, number)).is_ok());
     }
@@ -282,7 +282,7 @@ fn a_small_buffer_gathers_what_it_holds() {
 fn a_late_poll_takes_all_that_has_arrived_before_a_deadline_counts() {
     let (end, mut client) = client();
     let counters = client.line.means.counters.clone();
-    client.line.means.frame = vec![0; 16];
+    client.line.means.frame = Frame::new(vec![0; 16]);
     for number in 1..=5 {
         assert!(client.queue(read(1, number)).is_ok());
     }
@@ -336,7 +336,7 @@ fn a_request_that_waits_for_room_follows_one_that_left_in_pieces() {
 #[test]
 fn a_response_longer_than_the_buffer_is_passed_over_and_told() {
     let (end, mut client) = client();
-    client.line.means.frame = vec![0; 12];
+    client.line.means.frame = Frame::new(vec![0; 12]);
     assert!(client.queue(read(1, 7)).is_ok());
     let long = Task::new(1, 8, &[], |outline| {
         outline.set(Form::READ_HOLDING_REGISTERS, 8, 20)
@@ -360,7 +360,7 @@ fn a_response_longer_than_the_buffer_is_passed_over_and_told() {
 #[test]
 fn what_looks_like_the_response_inside_a_frame_that_is_passed_over_is_none() {
     let (end, mut client) = client();
-    client.line.means.frame = vec![0; 24];
+    client.line.means.frame = Frame::new(vec![0; 24]);
     assert!(client.queue(read(1, 7)).is_ok());
     poll(&end, &mut client);
     let (wire, unit, address) = requests(&end.sent())[0];

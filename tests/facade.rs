@@ -1,11 +1,11 @@
 //! The facade from Rust, with a port that needs no C.
 
 use mbm::engine::Buffers;
+use mbm::engine::Counter;
 use mbm::error::Status;
 use mbm::frame::checksum::crc16;
 use mbm::master::Master;
 use mbm::port::Port;
-use mbm::transaction::Counter;
 
 /// A wire that answers every request with the same bytes.
 #[derive(Default)]

@@ -6,12 +6,12 @@ mod common;
 mod vectors;
 
 use common::master::{frame, sealed, Asker, Call};
+use mbm::engine::Counter;
 use mbm::error::Status;
 use mbm::frame::rtu;
 use mbm::pdu::length::Length;
 use mbm::pdu::reply;
 use mbm::pdu::request::Request;
-use mbm::transaction::Counter;
 use vectors::{right_pdus, Direction};
 
 /// The status and the words of a reply frame to a call.

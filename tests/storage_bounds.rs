@@ -3,10 +3,9 @@
 mod common;
 
 use common::master::{sealed, Call, Line};
-use mbm::engine::{Buffers, Storage};
+use mbm::engine::{Buffers, Counter, Storage, Words};
 use mbm::error::Status;
 use mbm::master::Master;
-use mbm::transaction::Counter;
 use proptest::prelude::*;
 
 /// Storage that panics at an index that is out of range.
@@ -24,6 +23,8 @@ impl Strict {
 }
 
 impl Storage for Strict {
+    type Count = u8;
+
     fn room(&self) -> u8 {
         self.lent.room()
     }
@@ -52,6 +53,16 @@ impl Storage for Strict {
         self.aside = self.aside.checked_sub(count).expect("was set aside");
         self.lent.take_back(count);
     }
+    fn move_down(&mut self, from: u8, count: u8) {
+        self.within(from, count);
+        self.lent.move_down(from, count);
+    }
+    fn count(&mut self, counter: Counter, more: u16) {
+        self.lent.count(counter, more);
+    }
+}
+
+impl Words for Strict {
     fn transmit(&mut self) -> &mut [u16] {
         self.lent.transmit()
     }
@@ -80,13 +91,6 @@ impl Storage for Strict {
             "{count} bytes to fill"
         );
         self.lent.take_words(from, count, high_first);
-    }
-    fn move_down(&mut self, from: u8, count: u8) {
-        self.within(from, count);
-        self.lent.move_down(from, count);
-    }
-    fn count(&mut self, counter: Counter, more: u16) {
-        self.lent.count(counter, more);
     }
 }
 

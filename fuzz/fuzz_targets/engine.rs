@@ -4,10 +4,10 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use mbm::engine::{Buffers, Engine, Storage, BROADCAST};
+use mbm::engine::{Buffers, Counter, Engine, Settings, Storage as _, Words as _, BROADCAST};
 use mbm::error::Status;
+use mbm::pdu::query::Query;
 use mbm::port::Port;
-use mbm::transaction::{Counter, Settings};
 use mbm_fuzz::asked::{words, Asked};
 use mbm_fuzz::search::Search;
 use mbm_fuzz::stream::{event, Event};
@@ -103,6 +103,7 @@ impl Port for Line {
 }
 
 type Lent = Buffers<Vec<u8>, Vec<u16>, Vec<u16>>;
+type MasterEngine = Engine<Line, Lent, Query>;
 
 fuzz_target!(|data: &[u8]| {
     let mut input = Input(data);
@@ -158,7 +159,7 @@ fuzz_target!(|data: &[u8]| {
     }
 });
 
-fn run(engine: &mut Engine<Line, Lent>, asked: &Asked, room: usize, step: u32) {
+fn run(engine: &mut MasterEngine, asked: &Asked, room: usize, step: u32) {
     engine.forget();
     *engine.request() = asked.query;
     engine.port.requests.clear();
@@ -200,7 +201,7 @@ fn run(engine: &mut Engine<Line, Lent>, asked: &Asked, room: usize, step: u32) {
 
 /// Where nothing but the bytes decides, no reply stands in those of a request that
 /// failed.
-fn overlooks_nothing(engine: &mut Engine<Line, Lent>, asked: &Asked, room: usize, status: Status) {
+fn overlooks_nothing(engine: &mut MasterEngine, asked: &Asked, room: usize, status: Status) {
     let other = matches!(
         status,
         Status::LINE_BUSY | Status::LINK_LOST | Status::BUFFER_TOO_SMALL
@@ -226,7 +227,7 @@ fn overlooks_nothing(engine: &mut Engine<Line, Lent>, asked: &Asked, room: usize
     );
 }
 
-fn judge(engine: &mut Engine<Line, Lent>, asked: &Asked, status: Status) {
+fn judge(engine: &mut MasterEngine, asked: &Asked, status: Status) {
     let port = &engine.port;
     assert!(!port.driver && !engine.is_pending());
     let frame = asked.frame();

@@ -1,6 +1,6 @@
 //! The line under the master, and the storage that the master works in.
 
-use mbm::engine::{Buffers, Storage};
+use mbm::engine::{Buffers, Storage as _, Words as _};
 use mbm::port::Port;
 
 /// The master's end of the line.

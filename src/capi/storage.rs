@@ -1,7 +1,6 @@
 //! The buffers and counters that C lends.
 
-use crate::engine::Storage;
-use crate::transaction::{Counter, COUNTERS};
+use crate::engine::{Counter, Storage, Words, COUNTERS};
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 
 /// What happened on the line, since the caller zeroed it. Each wraps at 2^32.
@@ -61,6 +60,8 @@ unsafe fn words<'a>(first: *mut u16, count: u8) -> &'a mut [u16] {
 // The engine keeps every index below `room`, and below the words that it asks for;
 // `tests/storage_bounds.rs` holds it to that. Without buffers nothing is requested.
 impl Storage for LentByC {
+    type Count = u8;
+
     fn room(&self) -> u8 {
         self.frame_bytes
     }
@@ -116,6 +117,22 @@ impl Storage for LentByC {
         self.frame_bytes += count;
     }
 
+    // On a microcontroller once, not at every call: flash.
+    #[cfg_attr(all(feature = "counters", target_os = "none"), inline(never))]
+    fn count(&mut self, counter: Counter, more: u16) {
+        if !cfg!(feature = "counters") || self.counters.is_null() {
+            return;
+        }
+        // SAFETY: the caller's counters are COUNTERS integers in a row, and
+        // `counter` is less than that.
+        unsafe {
+            let counter = self.counters.cast::<u32>().add(counter as usize);
+            *counter = (*counter).wrapping_add(more.into());
+        }
+    }
+}
+
+impl Words for LentByC {
     fn transmit(&mut self) -> &mut [u16] {
         // SAFETY: see above.
         unsafe { words(self.transmit, self.transmit_words) }
@@ -165,20 +182,6 @@ impl Storage for LentByC {
                 // The CRC stands there.
                 *word.sub(2).add(flip ^ 1) = 0;
             }
-        }
-    }
-
-    // On a microcontroller once, not at every call: flash.
-    #[cfg_attr(all(feature = "counters", target_os = "none"), inline(never))]
-    fn count(&mut self, counter: Counter, more: u16) {
-        if !cfg!(feature = "counters") || self.counters.is_null() {
-            return;
-        }
-        // SAFETY: the caller's counters are COUNTERS integers in a row, and
-        // `counter` is less than that.
-        unsafe {
-            let counter = self.counters.cast::<u32>().add(counter as usize);
-            *counter = (*counter).wrapping_add(more.into());
         }
     }
 }

@@ -3,14 +3,9 @@
 
 use super::units::Means;
 use crate::error::Status;
-use crate::frame::checksum::crc16;
-use crate::pdu::diagnostics::REPORT_SERVER_ID;
-use crate::pdu::limits::MAX_PDU;
 use crate::pdu::outline::Outline;
 use crate::time::elapsed;
-use crate::transaction::Question;
 use crate::FIRMWARE;
-use core::num::NonZeroU8;
 
 /// Where a request stands.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -205,95 +200,7 @@ pub(super) fn take<J: Job>(job: &mut J, data: &[u8]) -> Status {
     Status::OK
 }
 
-/// The job that a transaction is about.
-pub struct Asked<J> {
-    pub(super) job: Option<J>,
-    /// Nothing more belongs to the frame that arrives.
-    ended: bool,
-    /// Length of the response PDU.
-    pub(super) length: u8,
-}
-
-impl<J: Job> Asked<J> {
-    fn outline(&self) -> Option<&Outline> {
-        self.job.as_ref().map(|job| &job.ticket().outline)
-    }
-
-    /// True if a right CRC follows the first `length` bytes of `pdu`, as in RTU.
-    fn ends_with_crc(job: &J, pdu: &[u8], length: NonZeroU8) -> bool {
-        let checked = pdu.get(..usize::from(length.get()) + 2);
-        checked.is_some_and(|checked| crc16(&[job.ticket().unit]).with(checked).is_residue())
-    }
-}
-
 /// What gives the bytes of a job to send. (One type, so one function for all who ask.)
 pub(super) fn bytes<J: Job>(job: &J) -> impl Fn(usize) -> u8 + '_ {
     |index| job.byte(index)
-}
-
-impl<J: Job> Question for Asked<J> {
-    const NONE: Self = Asked {
-        job: None,
-        ended: false,
-        length: 0,
-    };
-
-    fn function(&self) -> u8 {
-        self.outline().map_or(0, Outline::function)
-    }
-
-    fn length(&self) -> u8 {
-        self.outline().map_or(0, Outline::request_length)
-    }
-
-    fn emit(&self, pdu: &mut [u8]) {
-        if let Some(job) = &self.job {
-            job.ticket().outline.emit(pdu, bytes(job));
-        }
-    }
-
-    fn may_be_broadcast(&self) -> bool {
-        self.outline().is_some_and(Outline::may_be_broadcast)
-    }
-
-    fn is_answered(&self) -> bool {
-        self.outline().is_some_and(Outline::is_answered)
-    }
-
-    fn agrees(&self, pdu: &[u8]) -> bool {
-        self.outline().is_some_and(|outline| outline.agrees(pdu))
-    }
-
-    fn expected(&self, pdu: &[u8]) -> Option<NonZeroU8> {
-        let job = self.job.as_ref()?;
-        let outline = &job.ticket().outline;
-        if !self.ended && outline.function() == REPORT_SERVER_ID {
-            // Complete as it is counted if the check says so. More may come if not.
-            let counted = outline.expected(pdu, 0)?;
-            if Self::ends_with_crc(job, pdu, counted) {
-                return Some(counted);
-            }
-        }
-        let whole = if self.ended {
-            // What arrived last is the check.
-            pdu.len().saturating_sub(2)
-        } else {
-            // While more may come, it is never complete, but for the longest.
-            pdu.len().min(MAX_PDU)
-        };
-        outline.expected(pdu, whole)
-    }
-
-    fn judge(&mut self, pdu: &[u8]) -> Status {
-        let pdu = pdu.get(..pdu.len().saturating_sub(2)).unwrap_or_default();
-        self.length = pdu.len() as u8;
-        match &self.job {
-            Some(job) => job.ticket().outline.judge(pdu, bytes(job)),
-            None => Status::MALFORMED_REPLY,
-        }
-    }
-
-    fn ends(&mut self, ended: bool) {
-        self.ended = ended;
-    }
 }

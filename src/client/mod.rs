@@ -5,6 +5,7 @@
 //! queue holds. What a request is, with its data, is a [`Job`](crate::client::Job) of the caller's;
 //! nothing is copied until it goes to the wire, or comes from it.
 
+mod active;
 mod job;
 mod policy;
 mod serial;
@@ -12,7 +13,8 @@ mod shared;
 mod tcp;
 mod units;
 
-pub use job::{Asked, Job, Ticket};
+pub use active::{ActiveRequest, ClientEngine};
+pub use job::{Job, Ticket};
 pub use policy::{again, Backoff, Policy};
 pub use serial::Serial;
 pub use shared::Shared;
@@ -135,8 +137,15 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// #     fn put(&mut self, _: usize, _: u8) {}
     /// # }
     /// # struct S; impl Means for S {}
-    /// # impl mbm::transaction::Storage for S {
-    /// #     fn frame(&mut self) -> &mut [u8] { &mut [] }
+    /// # impl mbm::engine::Storage for S {
+    /// #     type Count = u16;
+    /// #     fn room(&self) -> u16 { 0 }
+    /// #     fn byte(&self, _: u16) -> u8 { 0 }
+    /// #     fn set_byte(&mut self, _: u16, _: u8) {}
+    /// #     fn slice(&self, _: u16, _: u16) -> &[u8] { &[] }
+    /// #     fn bytes(&mut self, _: u16, _: u16) -> &mut [u8] { &mut [] }
+    /// #     fn set_aside(&mut self, _: u16) {}
+    /// #     fn take_back(&mut self, _: u16) {}
     /// # }
     /// # fn main() { one_at_a_time::<J, P, S>(Client::new(Serial::new(P, S))); }
     /// ```
@@ -160,8 +169,15 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// #     fn put(&mut self, _: usize, _: u8) {}
     /// # }
     /// # struct S; impl Means for S {}
-    /// # impl mbm::transaction::Storage for S {
-    /// #     fn frame(&mut self) -> &mut [u8] { &mut [] }
+    /// # impl mbm::engine::Storage for S {
+    /// #     type Count = u16;
+    /// #     fn room(&self) -> u16 { 0 }
+    /// #     fn byte(&self, _: u16) -> u8 { 0 }
+    /// #     fn set_byte(&mut self, _: u16, _: u8) {}
+    /// #     fn slice(&self, _: u16, _: u16) -> &[u8] { &[] }
+    /// #     fn bytes(&mut self, _: u16, _: u16) -> &mut [u8] { &mut [] }
+    /// #     fn set_aside(&mut self, _: u16) {}
+    /// #     fn take_back(&mut self, _: u16) {}
     /// # }
     /// # fn main() { two_at_once::<J, P, S>(Client::new(Serial::new(P, S))); }
     /// ```

@@ -1,62 +1,76 @@
 //! A client's serial line, or a stream that carries the frames of one: one
 //! request at a time.
 
-use super::job::{deliver, is_answer, Asked, Job, Stage};
+use super::active::ClientEngine;
+use super::job::{deliver, is_answer, Job, Stage};
 use super::shared::Shared;
 use super::units::Means;
-use super::{Client, Line};
+use super::{Client, Line, ASCII_SILENCE, STREAM_SILENCE};
+use crate::engine::Engine;
 use crate::error::Status;
-use crate::frame::rtu::Window;
-use crate::frame::Search;
+use crate::frame::{ascii, rtu};
 use crate::port::Port;
-use crate::transaction::{Counter, Transaction};
 
-/// One request at a time, in RTU frames, or with [`crate::frame::ascii_window`]
-/// in ASCII frames.
+/// One request at a time, in RTU or ASCII frames.
 #[repr(C)]
-pub struct Serial<P, S, J, W = Window> {
-    pub(crate) engine: Transaction<P, S, Asked<J>, W>,
+pub struct Serial<P, S: Means, J> {
+    pub(crate) engine: ClientEngine<P, S, J>,
 }
 
-impl<P, S, J: Job, W: Search> Serial<P, S, J, W> {
-    /// A serial line.
+impl<P, S: Means, J: Job> Serial<P, S, J> {
+    /// A serial line, in RTU frames.
     pub const fn new(port: P, means: S) -> Self {
         Serial {
-            engine: Transaction::new(port, means),
+            engine: Engine::new(port, means),
         }
     }
 
-    /// The transactions under it.
-    pub fn transaction(&mut self) -> &mut Transaction<P, S, Asked<J>, W> {
+    /// A serial line, in ASCII frames.
+    pub fn ascii(port: P, means: S) -> Self {
+        let mut line = Serial::new(port, means);
+        line.set_ascii();
+        line
+    }
+
+    /// Has requests travel in ASCII frames: without a gap, and a second without a
+    /// character ends a frame that is not whole.
+    pub fn set_ascii(&mut self) {
+        self.engine.request().set_ascii(ascii::END);
+        self.engine.settings.gap = 0;
+        self.engine.settings.silence = ASCII_SILENCE;
+    }
+
+    /// Has requests travel through a TCP stream: without a gap.
+    pub fn set_stream(&mut self) {
+        self.engine.settings.gap = 0;
+        self.engine.settings.silence = STREAM_SILENCE;
+    }
+
+    /// The engine under it.
+    pub fn engine(&mut self) -> &mut ClientEngine<P, S, J> {
         &mut self.engine
     }
 }
 
-impl<P: Port, S: Means, J: Job, W: Search, const N: usize> Client<Serial<P, S, J, W>, J, N> {
+impl<P: Port, S: Means, J: Job, const N: usize> Client<Serial<P, S, J>, J, N> {
     /// A client that sends the frames of a serial line through a TCP stream: no gap
     /// between them, and nobody to broadcast to.
     pub fn over_tcp(port: P, means: S) -> Self {
         let mut client = Client::new(Serial::new(port, means));
         client.shared.broadcasts = false;
-        client.line.engine.settings.gap = 0;
-        client.line.engine.settings.silence = super::STREAM_SILENCE;
+        client.line.set_stream();
         client
     }
 }
 
-impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
+impl<P: Port, S: Means, J: Job> Serial<P, S, J> {
     /// Takes and drops the bytes that arrive while requests wait to be sent again. A
     /// program that sleeps until bytes are there would not sleep otherwise.
     #[cold]
     #[inline(never)]
-    fn drop_late<const N: usize>(&mut self, shared: &mut Shared<J, N>) {
-        let heard = self.engine.port.read(self.engine.storage.frame());
-        if heard < 0 {
+    fn drop_late<const N: usize>(&mut self, shared: &mut Shared<J, N>, now: u32) {
+        if self.engine.drop_received(now) < 0 {
             shared.lose();
-        } else if heard > 0 {
-            let counter = Counter::BytesReceived;
-            self.engine.storage.count(counter, heard as u16);
-            self.engine.line_used();
         }
     }
 
@@ -64,9 +78,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
     fn start(&mut self, job: J) -> Status {
         let unit = job.ticket().unit;
         self.engine.forget();
-        let request = self.engine.request();
-        request.job = Some(job);
-        request.length = 0;
+        self.engine.request().begin(job);
         self.engine.start(unit)
     }
 
@@ -74,15 +86,18 @@ impl<P: Port, S: Means, J: Job, W: Search> Serial<P, S, J, W> {
     fn received(&mut self, job: &mut J, status: Status) -> Status {
         job.ticket_mut().exception = self.engine.exception_code();
         // 0 if nothing answered: the request was a broadcast, or of that kind.
-        let length = usize::from(self.engine.request().length);
-        match self.engine.reply().get(..length) {
-            Some(pdu) if status == Status::OK && length > 0 => deliver(job, pdu),
-            _ => status,
+        let length = self.engine.request.length;
+        if status != Status::OK || length == 0 {
+            return status;
         }
+        deliver(
+            job,
+            self.engine.storage.slice(rtu::PDU as u16, length.into()),
+        )
     }
 }
 
-impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
+impl<P: Port, S: Means, J: Job> Line<J> for Serial<P, S, J> {
     const MOST: usize = 1;
     const BROADCASTS: bool = true;
     const HAS_IDS: bool = false;
@@ -100,7 +115,7 @@ impl<P: Port, S: Means, J: Job, W: Search> Line<J> for Serial<P, S, J, W> {
         } else {
             let Some(job) = shared.take_due(now, &mut self.engine.storage) else {
                 if fresh && !shared.queue.is_empty() {
-                    self.drop_late(shared);
+                    self.drop_late(shared, now);
                 }
                 return None;
             };

@@ -5,9 +5,9 @@ use super::job::{Job, Stage};
 use super::policy::Policy;
 use super::units::Means;
 use super::Line;
+use crate::engine::BROADCAST;
 use crate::error::Status;
 use crate::time::elapsed;
-use crate::transaction::BROADCAST;
 use crate::FIRMWARE;
 use heapless::Vec;
 

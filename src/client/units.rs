@@ -1,9 +1,9 @@
 //! What is kept for each unit, in storage that the caller lends.
 
 use super::policy::{again, Policy};
+use crate::engine::Storage;
 use crate::error::Status;
 use crate::time::{clamped, elapsed};
-use crate::transaction::Storage;
 
 /// One unit: how it is to be treated, and how it behaves. The counts wrap at
 /// 2^32.
@@ -96,15 +96,9 @@ pub fn note(units: &mut [Unit], unit: u8, status: Status, again: bool, now: u32)
 }
 
 /// What the caller lends to a client, besides the frame buffer.
-pub trait Means: Storage {
-    /// The bytes of the frame buffer between two places, of which the first is not
+pub trait Means: Storage<Count = u16> {
+    /// The bytes between two places of [`Means::outgoing`], of which the first is not
     /// behind the second and the second not behind the end.
-    fn received(&mut self, from: u16, to: u16) -> &mut [u8] {
-        let bytes = self.frame().get_mut(from.into()..to.into());
-        bytes.unwrap_or_default()
-    }
-
-    /// As [`Means::received`], of [`Means::outgoing`].
     fn to_send(&mut self, from: u16, to: u16) -> &mut [u8] {
         let bytes = self.outgoing().get_mut(from.into()..to.into());
         bytes.unwrap_or_default()

@@ -1,4 +1,5 @@
-//! One request and its reply on an RTU line, moved on by `poll`.
+//! One request and its reply on a serial line, moved on by `poll`: of the master, and of
+//! the client, whose requests bring their framing along (see `request`).
 //!
 //! A reply is found, not assumed: noise, frames of other units, late replies and a
 //! local echo in front of it cost nothing but their own time (see `search`).
@@ -13,22 +14,30 @@
 //! A microcontroller's compiler is kept from inlining the steps: each has few
 //! values in use at a time, so they stay in registers, and the code is small.
 
+pub mod ascii;
+mod plain;
 mod receive;
+mod request;
 mod search;
+mod seen;
 mod send;
+mod settings;
 mod storage;
 
-pub use storage::{Buffers, Storage};
+pub use request::{Request, Verdict};
+pub use seen::Seen;
+pub use settings::Settings;
+pub use storage::{Buffers, Count, Counter, Frame, Storage, Words, COUNTERS};
 
 use crate::error::Status;
-use crate::frame::checksum::Crc16;
-use crate::frame::{rtu, Seen};
-use crate::pdu::query::Query;
+use crate::frame::checksum::{crc16, Crc16};
+use crate::frame::rtu;
 use crate::port::Port;
 use crate::time::{elapsed, has_elapsed, LONGEST};
-pub use crate::transaction::BROADCAST;
-use crate::transaction::{Counter, Settings};
 use receive::Probation;
+
+/// The unit that every slave listens to (serial line guide 2.2).
+pub const BROADCAST: u8 = 0;
 
 /// Where a request stands, in this order.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Hash, Debug)]
@@ -50,36 +59,33 @@ enum Phase {
     Turnaround,
 }
 
-/// Bytes of a frame around its PDU.
-const AROUND_PDU: u8 = rtu::OVERHEAD as u8;
-
 /// One request and its reply, over the port and in the storage it was given.
 // In this order, small fields first: what lies far from the start of an object
 // costs a Cortex-M0 and an AVR an instruction more at each access.
 #[derive(Clone, Hash, Debug)]
 #[repr(C)]
-pub struct Engine<P, S> {
+pub struct Engine<P, S: Storage, Q> {
     phase: Phase,
     /// The phase began with the last poll; its time is that of the next.
     stamp: bool,
     /// The last poll found nothing to do.
     waiting: bool,
     /// Whom the request is for.
-    unit: u8,
+    pub(crate) unit: u8,
     retries: u8,
     /// The exception code of the last reply; 0 if it was none.
-    exception: u8,
-    /// Bytes of the frame of a reply that is no exception; 0 if it is too long for the
-    /// frame buffer.
-    length: u8,
+    pub(crate) exception: u8,
+    /// See [`Request::reply_length`].
+    length: S::Count,
     /// Bytes in the frame buffer.
-    end: u8,
+    end: S::Count,
     /// How many of these were sent, or taken into the CRC.
-    done: u8,
-    /// How many bytes the candidate at the front of the buffer needs at least.
-    least: u8,
+    done: S::Count,
+    /// How many bytes the candidate at the front of the buffer needs at least; of a reply
+    /// that was found, the length of its frame.
+    least: S::Count,
     /// Bytes of a held reply, which the storage has set aside.
-    held: u8,
+    pub(crate) held: S::Count,
     /// Whether the next reply may be a late one.
     probation: Probation,
     /// The unit that did not answer its last request; 0 if every unit did.
@@ -87,7 +93,7 @@ pub struct Engine<P, S> {
     /// The last request went without a right reply, which may still come.
     late: bool,
     /// The request itself is expected to come back first.
-    echo: bool,
+    pub(crate) echo: bool,
     /// Nothing has arrived since the bytes were last looked through.
     skimmed: bool,
     /// The most telling thing that was passed over.
@@ -116,12 +122,12 @@ pub struct Engine<P, S> {
     weight: Crc16,
     /// The byte stream.
     pub port: P,
-    query: Query,
+    pub(crate) request: Q,
     /// How requests behave.
     pub settings: Settings,
 }
 
-impl<P, S> Engine<P, S> {
+impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// No request yet.
     pub const fn new(port: P, storage: S) -> Self {
         Engine {
@@ -131,11 +137,11 @@ impl<P, S> Engine<P, S> {
             unit: 0,
             retries: 0,
             exception: 0,
-            length: 0,
-            end: 0,
-            done: 0,
-            least: 0,
-            held: 0,
+            length: S::Count::ZERO,
+            end: S::Count::ZERO,
+            done: S::Count::ZERO,
+            least: S::Count::ZERO,
+            held: S::Count::ZERO,
             probation: Probation::Off,
             late_unit: 0,
             late: false,
@@ -148,7 +154,7 @@ impl<P, S> Engine<P, S> {
             crc_passed: Crc16::START,
             crc: Crc16::START,
             weight: Crc16::RESIDUE,
-            query: Query::NONE,
+            request: Q::NONE,
             since: 0,
             wait: 0,
             last_byte: 0,
@@ -171,8 +177,8 @@ impl<P, S> Engine<P, S> {
     }
 
     /// The request, which [`Engine::start`] sends.
-    pub fn request(&mut self) -> &mut Query {
-        &mut self.query
+    pub fn request(&mut self) -> &mut Q {
+        &mut self.request
     }
 
     /// The raw exception code of the last reply; 0 if it was none.
@@ -193,6 +199,23 @@ impl<P, S> Engine<P, S> {
         for time in [&mut self.since, &mut self.last_byte, &mut self.now] {
             *time = 0u32.wrapping_sub(elapsed(now, *time).min(longest));
         }
+    }
+
+    /// Completes a frame to be sent, of which `length` bytes are in the frame buffer, with
+    /// its CRC.
+    #[inline(always)]
+    pub(crate) fn append_crc(&mut self, length: S::Count) {
+        let [low, high] = crc16(self.storage.bytes(S::Count::ZERO, length)).to_bytes();
+        self.storage.set_byte(length, low);
+        self.storage.set_byte(length + 1u8.into(), high);
+        self.set_frame_length(length + rtu::CRC.into());
+    }
+
+    /// Sets how many bytes of the frame buffer are to be sent.
+    #[inline(always)]
+    pub(crate) fn set_frame_length(&mut self, length: S::Count) {
+        self.end = length;
+        self.done = S::Count::ZERO;
     }
 
     /// Enters a phase that lasts `wait`, from the next look at the clock on.
@@ -257,7 +280,7 @@ impl<P, S> Engine<P, S> {
     }
 }
 
-impl<P: Port, S: Storage> Engine<P, S> {
+impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// Says that the line was busy just now, so the gap counts from here.
     pub fn line_used(&mut self) {
         self.last_byte = self.port.micros();

@@ -8,14 +8,11 @@
 //! reply takes the place of the first. A second one that is damaged makes the
 //! request fail, because the held reply is then most likely the late one.
 
-use super::{Counter, Engine, Storage, AROUND_PDU};
+use super::{Count, Counter, Engine, Request, Seen, Storage, Words};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
-use crate::frame::Seen;
+use crate::pdu::query::Query;
 use crate::port::Port;
-
-/// Bytes of the CRC, which a held reply needs no longer.
-const CRC: u8 = 2;
 
 /// Whether the reply to the request under way may be a late one.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -29,7 +26,7 @@ pub(super) enum Probation {
     Held,
 }
 
-impl<P: Port, S: Storage> Engine<P, S> {
+impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// Notes that the reply to the request under way may come late.
     pub(super) fn expect_late_reply(&mut self) {
         self.late = true;
@@ -39,12 +36,9 @@ impl<P: Port, S: Storage> Engine<P, S> {
     /// Begins the wait for the reply to a request that was just sent.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn begin_reply(&mut self) {
-        self.end = 0;
-        self.begin_frame(0);
-        self.length = self.query.response_length() + AROUND_PDU;
-        if self.length > self.storage.room() {
-            self.length = 0;
-        }
+        self.end = S::Count::ZERO;
+        self.begin_frame(S::Count::ZERO);
+        self.length = self.request.reply_length(self.storage.room());
         self.weight = Crc16::RESIDUE;
         self.seen = Seen::NOTHING;
         self.foreign = 0;
@@ -64,7 +58,7 @@ impl<P: Port, S: Storage> Engine<P, S> {
         let mut over = self.is_over();
         // As the deadline passes, all that has arrived is looked at, even if
         // the port hands it over byte by byte; but not more than a buffer of it.
-        let mut budget = u8::MAX;
+        let mut budget = S::Count::MAX;
         loop {
             if self.end == self.storage.room() {
                 self.give_up_held();
@@ -73,14 +67,14 @@ impl<P: Port, S: Storage> Engine<P, S> {
             if heard < 0 {
                 return Status::LINK_LOST;
             }
-            let heard = heard as u8;
-            if heard == 0 {
+            let heard = S::Count::of(heard as usize);
+            if heard == S::Count::ZERO {
                 self.waiting = true;
                 break;
             }
             self.end += heard;
             self.skimmed = false;
-            let found = self.search();
+            let found = Q::search(self);
             if self.is_answered(found) {
                 return self.found();
             }
@@ -94,7 +88,7 @@ impl<P: Port, S: Storage> Engine<P, S> {
         }
         if !self.skimmed && (over || self.is_silent(self.settings.silence)) {
             self.skimmed = true;
-            let found = self.skim();
+            let found = Q::search_silent(self);
             if self.is_answered(found) {
                 return self.found();
             }
@@ -124,7 +118,7 @@ impl<P: Port, S: Storage> Engine<P, S> {
                 return true;
             }
             self.hold();
-            found = self.search();
+            found = Q::search(self);
         }
         false
     }
@@ -162,7 +156,7 @@ impl<P: Port, S: Storage> Engine<P, S> {
             Counter::Timeouts
         };
         self.storage.count(counter, 1);
-        if !cfg!(feature = "retries") || self.retries == 0 {
+        if !cfg!(feature = "retries") || !Q::IS_PLAIN || self.retries == 0 {
             return status;
         }
         self.retries -= 1;
@@ -178,11 +172,11 @@ impl<P: Port, S: Storage> Engine<P, S> {
     fn hold(&mut self) {
         self.give_up_held();
         // So there is room for the next byte in any case.
-        self.held = self.found_length() - CRC;
+        self.held = self.request.content(self.least);
         self.storage.set_aside(self.held);
         self.end -= self.held;
-        self.drop_front(CRC);
-        self.begin_frame(0);
+        self.drop_front(self.least - self.held);
+        self.begin_frame(S::Count::ZERO);
         self.seen = Seen::NOTHING;
         self.probation = Probation::Held;
         // A line that is never silent ends the wait for a second one too.
@@ -195,14 +189,14 @@ impl<P: Port, S: Storage> Engine<P, S> {
     /// Has the frame buffer begin with the held reply again.
     pub(super) fn take_back(&mut self) {
         self.storage.take_back(self.held);
-        self.held = 0;
+        self.held = S::Count::ZERO;
     }
 
     /// Gives up the held reply, which answers no request.
     #[cfg_attr(target_os = "none", inline(never))]
     fn give_up_held(&mut self) {
         let held = self.held;
-        if held > 0 {
+        if held > S::Count::ZERO {
             self.storage.count(Counter::ForeignFrames, 1);
             self.take_back();
             self.storage.move_down(held, self.end);
@@ -213,39 +207,42 @@ impl<P: Port, S: Storage> Engine<P, S> {
     /// arrived after it may have been the answer.
     #[cfg_attr(target_os = "none", inline(never))]
     fn take_held(&mut self) -> bool {
+        let held = self.held;
         // One byte may be anything; more begin a reply.
-        if self.held == 0
+        if held == S::Count::ZERO
             || self.seen >= Seen::BAD_CRC
-            || self.end > 1
+            || self.end > 1u8.into()
             || !self.is_silent(self.settings.quiet_time)
         {
             return false;
         }
         self.take_back();
         // A damaged second reply may have overwritten what the first one said.
-        self.judge(0);
+        Q::judge(self, S::Count::ZERO, held);
         true
     }
+}
 
+impl<P: Port, S: Words> Engine<P, S, Query> {
     /// Fills the response words from the reply that ended the last request; false,
     /// with nothing filled, if they are too few.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn take_words(&mut self) -> bool {
-        let count = self.query.reads();
+        let count = self.request.reads();
         if self.response_words() > self.storage.response_words() {
             return false;
         }
         // Behind unit, function and byte count.
         let last = 2 + count;
-        let byte = self.storage.byte(last) & self.query.mask();
+        let byte = self.storage.byte(last) & self.request.mask();
         self.storage.set_byte(last, byte);
         self.storage
-            .take_words(3, count, self.query.has_registers());
+            .take_words(3, count, self.request.has_registers());
         true
     }
 
     /// How many words the data of a successful reply fill.
     pub fn response_words(&self) -> u8 {
-        self.query.reads().div_ceil(2)
+        self.request.reads().div_ceil(2)
     }
 }

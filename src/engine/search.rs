@@ -11,98 +11,39 @@
 //! right, however many candidates were taken for it before: its bytes are taken in
 //! twice at most.
 
-use super::{Engine, Storage, AROUND_PDU};
-use crate::error::Status;
+use super::{Count, Engine, Request, Seen, Storage, Verdict};
 use crate::frame::checksum::{crc16, Crc16};
-use crate::frame::rtu::MIN_FRAME;
-use crate::frame::Seen;
+use crate::frame::rtu::{self, MIN_FRAME};
 use crate::pdu::EXCEPTION;
 
 /// Bytes of an exception's frame: unit, function, code, CRC.
-const EXCEPTION_FRAME: u8 = 5;
+pub(super) const EXCEPTION_FRAME: u8 = rtu::OVERHEAD as u8 + 2;
 
-/// What a frame is that begins as the reply does.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Verdict {
-    /// The reply.
-    Right,
-    /// The request itself.
-    Echo,
-    /// Neither.
-    Wrong,
-}
-
-impl<P, S: Storage> Engine<P, S> {
-    /// Bytes of the frame of the reply that was found.
-    pub(super) fn found_length(&self) -> u8 {
-        if self.exception == 0 {
-            self.length
-        } else {
-            EXCEPTION_FRAME
-        }
-    }
-
-    /// True if the `count` bytes behind the unit at `front` are the request's.
+impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
+    /// As [`Request::wanted`], of any bytes.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn agrees(&self, front: u8, count: u8) -> bool {
-        let bytes = self.storage.slice(front + 1, count);
-        self.query
-            .head()
-            .iter()
-            .zip(bytes)
-            .all(|(ours, theirs)| ours == theirs)
-    }
-
-    /// The length of the frame that begins with the `have` bytes at `front`, or the
-    /// least length while they do not tell; 0 if no frame that is waited for begins so.
-    #[cfg_attr(target_os = "none", inline(never))]
-    fn wanted(&mut self, front: u8, have: u8) -> u8 {
-        if have == 0 {
-            return 1;
+    fn wanted(&mut self, front: S::Count, have: S::Count) -> S::Count {
+        if have == S::Count::ZERO {
+            return 1u8.into();
         }
         if self.storage.byte(front) != self.unit {
-            return 0;
+            return S::Count::ZERO;
         }
-        if have == 1 {
-            return 2;
+        if have == 1u8.into() {
+            return 2u8.into();
         }
-        let function = self.storage.byte(front + 1) ^ self.query.function();
-        if function == EXCEPTION {
-            return EXCEPTION_FRAME;
-        }
-        if function != 0 {
-            return 0;
-        }
-        if cfg!(feature = "echo") && self.echo {
-            let known = (have - 1).min(self.query.head_length());
-            if self.agrees(front, known) {
-                // It may yet turn out to be the reply.
-                return (self.query.length() + AROUND_PDU).min(have + 1);
-            }
-        }
-        if self.query.is_read() {
-            if have == 2 {
-                return 3;
-            }
-            if self.storage.byte(front + 2) != self.query.reads() {
-                return 0;
-            }
-        }
-        if self.length == 0 {
-            self.see(Seen::TOO_LONG);
-        }
-        self.length
+        Q::wanted(self, front, have)
     }
 
-    /// Looks for the reply among what has arrived, and moves it to the front; false
-    /// if it is not there yet. Stops at a candidate that is not complete.
+    /// Looks for the reply among what has arrived, in RTU frames, and moves it to the
+    /// front; false if it is not there yet. Stops at a candidate that is not complete.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn search(&mut self) -> bool {
+    pub fn search_rtu(&mut self) -> bool {
         if self.least > self.end {
             self.take_in(self.end);
             return false;
         }
-        let mut front = 0;
+        let mut front = S::Count::ZERO;
         let found = loop {
             let have = self.end - front;
             let length = self.wanted(front, have);
@@ -111,10 +52,13 @@ impl<P, S: Storage> Engine<P, S> {
                 self.take_in(self.end);
                 break false;
             }
-            if length > 0 {
+            if length > S::Count::ZERO {
                 if self.is_right(front, length) {
-                    match self.judge(front) {
-                        Verdict::Right => break true,
+                    match Q::judge(self, front, length - rtu::CRC.into()) {
+                        Verdict::Right => {
+                            self.least = length;
+                            break true;
+                        }
                         Verdict::Echo => {}
                         Verdict::Wrong => self.see_foreign(Seen::MALFORMED),
                     }
@@ -125,30 +69,42 @@ impl<P, S: Storage> Engine<P, S> {
                 self.see(Seen::BAD_CRC);
             }
             self.pass(front);
-            front += 1;
+            front += 1u8.into();
         };
-        if front > 0 {
+        if front > S::Count::ZERO {
             self.drop_front(front);
         }
         found
     }
 
-    /// Looks for an exception behind a candidate that is not complete, which may be
-    /// noise; moves it to the front. If there is none, all is left as it was, for
+    /// Looks for the reply from `front` on, behind a candidate that is not complete, which
+    /// may be noise; moves it to the front. If there is none, all is left as it was, for
     /// the rest of the candidate may still come.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn skim(&mut self) -> bool {
-        let mut front = 1;
-        while front + EXCEPTION_FRAME <= self.end {
-            if self.wanted(front, EXCEPTION_FRAME) == EXCEPTION_FRAME
-                && self.is_right(front, EXCEPTION_FRAME)
-                && self.judge(front) == Verdict::Right
+    pub fn skim(&mut self, mut front: S::Count) -> bool {
+        while front + EXCEPTION_FRAME.into() <= self.end {
+            let have = if Q::IS_PLAIN {
+                // Only an exception is shorter than a candidate that is not complete.
+                EXCEPTION_FRAME.into()
+            } else {
+                self.end - front
+            };
+            let length = self.wanted(front, have);
+            let is_whole = if Q::IS_PLAIN {
+                length == have
+            } else {
+                length > S::Count::ZERO && length <= have
+            };
+            if is_whole
+                && self.is_right(front, length)
+                && Q::judge(self, front, length - rtu::CRC.into()) == Verdict::Right
             {
-                self.passed = 1;
+                self.least = length;
                 self.drop_front(front);
+                self.passed = 1;
                 return true;
             }
-            front += 1;
+            front += 1u8.into();
         }
         false
     }
@@ -156,16 +112,17 @@ impl<P, S: Storage> Engine<P, S> {
     /// Takes the bytes up to `end` into the CRC, as they arrive, so that little is left
     /// to do for the last one.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn take_in(&mut self, end: u8) {
+    fn take_in(&mut self, end: S::Count) {
         let news = self.storage.bytes(self.done, end - self.done);
         self.crc = self.crc.with(news);
         self.done = end;
     }
 
     /// A frame begins at `front`, or whatever comes next.
-    pub(super) fn begin_frame(&mut self, front: u8) {
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn begin_frame(&mut self, front: S::Count) {
         self.done = front;
-        self.least = 1;
+        self.least = 1u8.into();
         self.passed = 0;
         self.crc_passed = Crc16::START;
         self.crc = Crc16::START;
@@ -173,62 +130,44 @@ impl<P, S: Storage> Engine<P, S> {
 
     /// True if the CRC of the frame at `front` is right.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn is_right(&mut self, front: u8, length: u8) -> bool {
+    pub(crate) fn is_right(&mut self, front: S::Count, length: S::Count) -> bool {
         let end = front + length;
-        if length == self.length && self.done <= end {
+        let is_first = self.crc_passed == Crc16::START;
+        let is_known = if Q::IS_PLAIN {
+            length == self.length
+        } else {
+            is_first && !self.skimmed
+        };
+        if is_known && self.done <= end {
             self.take_in(end);
-            if self.crc_passed == Crc16::START {
+            if is_first || !Q::IS_PLAIN {
                 return self.crc.is_residue();
             }
             if self.weight.is_residue() {
-                self.weight = Crc16::weight(length);
+                self.weight = Crc16::weight(length.into());
             }
             return self.crc == self.crc_passed.since_start(self.weight);
         }
         crc16(self.storage.bytes(front, length)).is_residue()
     }
 
-    /// Says what the frame at `front` is, whose CRC is right.
-    #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn judge(&mut self, front: u8) -> Verdict {
-        self.exception = 0;
-        if self.storage.byte(front + 1) & EXCEPTION != 0 {
-            self.exception = self.storage.byte(front + 2);
-            return match Status::exception(self.exception) {
-                Status::MALFORMED_REPLY => Verdict::Wrong,
-                _ => Verdict::Right,
-            };
-        }
-        // A reply may be shorter than the head, and stand at the end of the buffer.
-        let head = self.query.head_length();
-        let agrees = self.end - front > head && self.agrees(front, head);
-        if cfg!(feature = "echo") && self.echo && agrees {
-            self.echo = false;
-            return Verdict::Echo;
-        }
-        if agrees || self.query.is_read() {
-            Verdict::Right
-        } else {
-            Verdict::Wrong
-        }
-    }
-
     /// Passes over the byte at `front`. Where such bytes make up a frame, a damaged
     /// reply seen in it was none.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn pass(&mut self, front: u8) {
+    fn pass(&mut self, front: S::Count) {
         if cfg!(feature = "diagnosis") && self.passed == 0 {
             self.passed_as = if self.storage.byte(front) != self.unit {
                 Seen::OTHER_UNIT
-            } else if self.storage.byte(front + 1) & !EXCEPTION != self.query.function() {
+            } else if self.storage.byte(front + 1u8.into()) & !EXCEPTION != self.request.function()
+            {
                 Seen::OTHER_FUNCTION
             } else {
                 Seen::MALFORMED
             };
         }
-        self.crc_passed = self.crc_passed.with(self.storage.bytes(front, 1));
+        self.crc_passed = self.crc_passed.with(self.storage.bytes(front, 1u8.into()));
         if self.done == front {
-            self.done = front + 1;
+            self.done = front + 1u8.into();
             self.crc = self.crc_passed;
         }
         if self.passed < MIN_FRAME {
@@ -239,13 +178,13 @@ impl<P, S: Storage> Engine<P, S> {
                 self.seen = Seen::NOTHING;
             }
             self.see_foreign(self.passed_as);
-            self.begin_frame(front + 1);
+            self.begin_frame(front + 1u8.into());
         }
     }
 
     /// Notes a frame with a right CRC that is not the reply.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn see_foreign(&mut self, what: Seen) {
+    pub(super) fn see_foreign(&mut self, what: Seen) {
         if cfg!(feature = "counters") {
             self.foreign = self.foreign.saturating_add(1);
         }
@@ -253,7 +192,7 @@ impl<P, S: Storage> Engine<P, S> {
     }
 
     #[cfg_attr(target_os = "none", inline(never))]
-    fn see(&mut self, what: Seen) {
+    pub(crate) fn see(&mut self, what: Seen) {
         if self.seen < what {
             self.seen = what;
         }
@@ -261,7 +200,7 @@ impl<P, S: Storage> Engine<P, S> {
 
     /// Drops what stands before `front`.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn drop_front(&mut self, front: u8) {
+    pub(super) fn drop_front(&mut self, front: S::Count) {
         self.end -= front;
         self.done = self.done.saturating_sub(front);
         self.storage.move_down(front, self.end);

@@ -1,24 +1,23 @@
 //! From a request to its last bit on the wire.
 
-use super::{Counter, Engine, Phase, Storage, AROUND_PDU, BROADCAST};
+use super::{Count, Counter, Engine, Phase, Request, Storage, BROADCAST};
 use crate::error::Status;
-use crate::frame::checksum::crc16;
 use crate::port::Port;
 use crate::time::characters;
 
-impl<P: Port, S: Storage> Engine<P, S> {
+impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// Starts the request to `unit`; `poll` does the rest.
-    /// [`Status::BROADCAST_NOT_ALLOWED`], and nothing is sent, for a read from
-    /// unit 0; [`Status::BUFFER_TOO_SMALL`] if the frame buffer cannot hold it.
+    /// [`Status::BROADCAST_NOT_ALLOWED`], and nothing is sent, for a request
+    /// to unit 0 that may not be broadcast; [`Status::BUFFER_TOO_SMALL`] if the frame buffer cannot hold it.
     pub fn start(&mut self, unit: u8) -> Status {
-        if unit == BROADCAST && self.query.is_read() {
+        if unit == BROADCAST && !self.request.may_be_broadcast() {
             return Status::BROADCAST_NOT_ALLOWED;
         }
-        if self.query.length() > self.storage.room().wrapping_sub(AROUND_PDU) {
+        if !self.request.fits(self.storage.room()) {
             return Status::BUFFER_TOO_SMALL;
         }
         self.unit = unit;
-        if cfg!(feature = "retries") {
+        if cfg!(feature = "retries") && Q::IS_PLAIN {
             self.retries = self.settings.retries;
         }
         self.listen_anew()
@@ -28,7 +27,7 @@ impl<P: Port, S: Storage> Engine<P, S> {
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn listen_anew(&mut self) -> Status {
         self.take_back();
-        self.write_frame();
+        Q::write(self);
         let wait = self.settings.response_timeout;
         self.enter(Phase::Gap, wait.wrapping_add(self.silence_to_keep()));
         Status::PENDING
@@ -44,45 +43,18 @@ impl<P: Port, S: Storage> Engine<P, S> {
         }
     }
 
-    /// Writes the frame of the request into the frame buffer: before the silence, so
-    /// that this lasts no longer than it must.
-    #[cfg_attr(target_os = "none", inline(never))]
-    fn write_frame(&mut self) {
-        let mut end = self.query.head_length() + 1;
-        self.storage.set_byte(0, self.unit);
-        let head = self.storage.bytes(1, self.query.head_length());
-        for (place, byte) in head.iter_mut().zip(self.query.head()) {
-            *place = *byte;
-        }
-        let sends = self.query.sends();
-        if sends > 0 {
-            self.storage.set_byte(end, sends);
-            self.storage
-                .send_words(end + 1, sends, self.query.has_registers());
-            end += sends;
-            let last = self.storage.byte(end) & self.query.mask();
-            self.storage.set_byte(end, last);
-            end += 1;
-        }
-        let [low, high] = crc16(self.storage.bytes(0, end)).to_bytes();
-        self.storage.set_byte(end, low);
-        self.storage.set_byte(end + 1, high);
-        self.end = end + 2;
-        self.done = 0;
-    }
-
     /// Listens until the line has been silent, then sends. What arrives here
     /// belongs to no request of ours. A line that is not silent is not waited for
     /// longer than a reply and that silence may take.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn listen(&mut self) -> Status {
-        let heard = self.hear(0);
+        let heard = self.hear(S::Count::ZERO);
         if heard < 0 {
             return Status::LINK_LOST;
         }
         if heard > 0 {
             // It stands where the request stood.
-            self.write_frame();
+            Q::write(self);
             return self.stalled();
         }
         if !self.is_silent(self.silence_to_keep()) {
@@ -97,9 +69,15 @@ impl<P: Port, S: Storage> Engine<P, S> {
         self.send()
     }
 
+    /// Takes what has arrived by the time `now` and drops it: negative if the link is lost.
+    pub fn drop_received(&mut self, now: u32) -> i16 {
+        self.look_at_clock(now);
+        self.hear(S::Count::ZERO)
+    }
+
     /// Receives from `index` on: how many bytes, negative if the link is lost.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn hear(&mut self, index: u8) -> i16 {
+    pub(super) fn hear(&mut self, index: S::Count) -> i16 {
         let room = self.storage.room() - index;
         let heard = self.port.read(self.storage.bytes(index, room));
         if heard > 0 {
@@ -122,8 +100,8 @@ impl<P: Port, S: Storage> Engine<P, S> {
             if sent == 0 {
                 return self.stalled();
             }
-            let sent = sent as u8;
-            self.storage.count(Counter::BytesSent, sent.into());
+            self.storage.count(Counter::BytesSent, sent as u16);
+            let sent = S::Count::of(sent as usize);
             self.done += sent;
             self.since = self.now;
             if sent < left {
@@ -152,7 +130,7 @@ impl<P: Port, S: Storage> Engine<P, S> {
         // The request is on the wire: the driver goes off, the wait begins.
         self.begin_reply();
         self.port.post_transmission();
-        if self.unit == BROADCAST {
+        if self.unit == BROADCAST || !self.request.is_answered() {
             self.enter(Phase::Turnaround, self.settings.turnaround_delay);
         } else {
             self.enter(Phase::Reply, self.settings.response_timeout);

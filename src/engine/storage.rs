@@ -1,43 +1,133 @@
 //! What the caller lends: a frame buffer, words to send and words to fill, and
 //! counters to count in.
 
-use crate::transaction::{Counter, COUNTERS};
+use crate::bytes::move_to_front;
+use core::fmt::Debug;
+use core::hash::Hash;
+use core::ops::{Add, AddAssign, Sub, SubAssign};
 
-/// What the caller lends to an engine.
+/// What is counted, in the order of the counters' storage.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum Counter {
+    /// Requests sent, retries included.
+    Requests,
+    /// Replies that answered a request, exceptions included.
+    Replies,
+    /// Replies that were exceptions.
+    Exceptions,
+    /// Complete replies with a wrong CRC.
+    BadCrc,
+    /// Requests that were not answered in time.
+    Timeouts,
+    /// Frames with a right CRC that were not for us or no answer.
+    ForeignFrames,
+    /// Replies that were found behind bytes that were no frame.
+    Resynchronisations,
+    /// Bytes sent.
+    BytesSent,
+    /// Bytes received.
+    BytesReceived,
+}
+
+/// How many kinds of [`Counter`] there are.
+pub const COUNTERS: usize = 9;
+
+/// A number of bytes in a frame buffer: [`u8`] of at most 255, which costs an AVR half
+/// as much as [`u16`].
+pub trait Count:
+    Copy
+    + Ord
+    + Hash
+    + Debug
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + AddAssign
+    + SubAssign
+    + From<u8>
+    + Into<u16>
+    + Into<usize>
+{
+    /// No byte.
+    const ZERO: Self;
+
+    /// The greatest number.
+    const MAX: Self;
+
+    /// So many bytes of a frame buffer.
+    fn of(bytes: usize) -> Self;
+
+    /// What is left; 0 if that would be less.
+    fn saturating_sub(self, other: Self) -> Self;
+}
+
+impl Count for u8 {
+    const ZERO: Self = 0;
+    const MAX: Self = u8::MAX;
+
+    fn of(bytes: usize) -> Self {
+        bytes as u8
+    }
+
+    fn saturating_sub(self, other: Self) -> Self {
+        self.saturating_sub(other)
+    }
+}
+
+impl Count for u16 {
+    const ZERO: Self = 0;
+    const MAX: Self = u16::MAX;
+
+    fn of(bytes: usize) -> Self {
+        bytes as u16
+    }
+
+    fn saturating_sub(self, other: Self) -> Self {
+        self.saturating_sub(other)
+    }
+}
+
+/// What the caller lends to an engine: a frame buffer, and counters to count in.
 ///
-/// The engine keeps every index and count within what [`Storage::room`] says, or
-/// within the words that [`Storage::transmit_words`] and [`Storage::response_words`]
-/// say, so storage need not check them.
+/// The engine keeps every index and count within what [`Storage::room`] says, so storage
+/// need not check them.
 pub trait Storage {
-    /// Bytes of the frame buffer behind what was set aside, at most 255.
-    fn room(&self) -> u8;
+    /// What counts the bytes of the frame buffer.
+    type Count: Count;
+
+    /// Bytes of the frame buffer behind what was set aside.
+    fn room(&self) -> Self::Count;
 
     /// A byte of the frame buffer.
-    fn byte(&self, index: u8) -> u8;
+    fn byte(&self, index: Self::Count) -> u8;
 
     /// Sets a byte of the frame buffer.
-    fn set_byte(&mut self, index: u8, byte: u8);
+    fn set_byte(&mut self, index: Self::Count, byte: u8);
 
     /// `count` bytes of the frame buffer from `index` on, to look at.
-    fn slice(&self, index: u8, count: u8) -> &[u8];
+    fn slice(&self, index: Self::Count, count: Self::Count) -> &[u8];
 
     /// `count` bytes of the frame buffer from `index` on.
-    fn bytes(&mut self, index: u8, count: u8) -> &mut [u8];
+    fn bytes(&mut self, index: Self::Count, count: Self::Count) -> &mut [u8];
 
     /// Moves `count` bytes of the frame buffer from `from` on to its front.
-    fn move_down(&mut self, from: u8, count: u8) {
-        for index in 0..count {
-            let byte = self.byte(from + index);
-            self.set_byte(index, byte);
-        }
+    fn move_down(&mut self, from: Self::Count, count: Self::Count) {
+        move_to_front(self.bytes(Self::Count::ZERO, from + count), from.into());
     }
 
     /// Sets the first `count` bytes of the frame buffer aside: it begins behind them.
-    fn set_aside(&mut self, count: u8);
+    fn set_aside(&mut self, count: Self::Count);
 
     /// Has the frame buffer begin with the `count` bytes again that were set aside.
-    fn take_back(&mut self, count: u8);
+    fn take_back(&mut self, count: Self::Count);
 
+    /// Adds to a counter, if there is storage for counters.
+    fn count(&mut self, _counter: Counter, _more: u16) {}
+}
+
+/// What the caller lends to a master besides: words to send and words to fill. The engine
+/// keeps within what [`Words::transmit_words`] and [`Words::response_words`] say.
+pub trait Words: Storage<Count = u8> {
     /// The words that writing requests send, at most 255.
     fn transmit(&mut self) -> &mut [u16];
 
@@ -58,18 +148,78 @@ pub trait Storage {
     /// the low byte first, or the high one if `high_first`. Of an odd count the last
     /// high byte is 0.
     fn take_words(&mut self, from: u8, count: u8, high_first: bool);
-
-    /// Adds to a counter, if there is storage for counters.
-    fn count(&mut self, counter: Counter, more: u16);
 }
 
-/// Storage in Rust: arrays, slices or whatever else holds bytes and words. An index
-/// that is out of range reads 0 and writes nothing.
+/// A frame buffer in Rust: an array, a slice or whatever else holds bytes. An index that
+/// is out of range reads 0 and writes nothing.
+#[derive(Clone, Hash, Debug, Default)]
+pub struct Frame<F> {
+    bytes: F,
+    /// Bytes at the front that are set aside.
+    aside: usize,
+}
+
+impl<F> Frame<F> {
+    /// A frame buffer.
+    pub const fn new(bytes: F) -> Self {
+        Frame { bytes, aside: 0 }
+    }
+}
+
+impl<F: AsRef<[u8]> + AsMut<[u8]>> Frame<F> {
+    fn behind(&self) -> &[u8] {
+        self.bytes.as_ref().get(self.aside..).unwrap_or_default()
+    }
+
+    fn behind_mut(&mut self) -> &mut [u8] {
+        let behind = self.bytes.as_mut().get_mut(self.aside..);
+        behind.unwrap_or_default()
+    }
+
+    /// See [`Storage::room`].
+    pub fn room(&self) -> usize {
+        self.behind().len()
+    }
+
+    /// See [`Storage::byte`].
+    pub fn byte(&self, index: usize) -> u8 {
+        self.behind().get(index).copied().unwrap_or(0)
+    }
+
+    /// See [`Storage::set_byte`].
+    pub fn set_byte(&mut self, index: usize, byte: u8) {
+        if let Some(place) = self.behind_mut().get_mut(index) {
+            *place = byte;
+        }
+    }
+
+    /// See [`Storage::slice`].
+    pub fn slice(&self, index: usize, count: usize) -> &[u8] {
+        self.behind().get(index..index + count).unwrap_or_default()
+    }
+
+    /// See [`Storage::bytes`].
+    pub fn bytes(&mut self, index: usize, count: usize) -> &mut [u8] {
+        let bytes = self.behind_mut().get_mut(index..index + count);
+        bytes.unwrap_or_default()
+    }
+
+    /// See [`Storage::set_aside`].
+    pub fn set_aside(&mut self, count: usize) {
+        self.aside += count;
+    }
+
+    /// See [`Storage::take_back`].
+    pub fn take_back(&mut self, count: usize) {
+        self.aside -= count;
+    }
+}
+
+/// A master's storage in Rust. A word that is out of range is not filled, and is sent
+/// as 0.
 #[derive(Clone, Hash, Debug, Default)]
 pub struct Buffers<F, R, T> {
-    frame: F,
-    /// Bytes at the front of the frame buffer that are set aside.
-    aside: u8,
+    frame: Frame<F>,
     response: R,
     transmit: T,
     /// What happened on the line, by [`Counter`]; each wraps at 2^32.
@@ -81,8 +231,7 @@ impl<F, R, T> Buffers<F, R, T> {
     /// replies, and words to send.
     pub const fn new(frame: F, response: R, transmit: T) -> Self {
         Buffers {
-            frame,
-            aside: 0,
+            frame: Frame::new(frame),
             response,
             transmit,
             counters: [0; COUNTERS],
@@ -98,49 +247,52 @@ fn count(items: usize) -> u8 {
 impl<F, R, T> Storage for Buffers<F, R, T>
 where
     F: AsRef<[u8]> + AsMut<[u8]>,
-    R: AsRef<[u16]> + AsMut<[u16]>,
-    T: AsRef<[u16]> + AsMut<[u16]>,
 {
+    type Count = u8;
+
     fn room(&self) -> u8 {
-        count(self.frame.as_ref().len()).saturating_sub(self.aside)
+        // What is set aside counts too.
+        let room = count(self.frame.bytes.as_ref().len());
+        room.saturating_sub(self.frame.aside as u8)
     }
 
     fn byte(&self, index: u8) -> u8 {
-        let place = usize::from(self.aside) + usize::from(index);
-        self.frame.as_ref().get(place).copied().unwrap_or(0)
+        self.frame.byte(index.into())
     }
 
     fn set_byte(&mut self, index: u8, byte: u8) {
-        let place = usize::from(self.aside) + usize::from(index);
-        if let Some(place) = self.frame.as_mut().get_mut(place) {
-            *place = byte;
-        }
+        self.frame.set_byte(index.into(), byte);
     }
 
     fn slice(&self, index: u8, count: u8) -> &[u8] {
-        let first = usize::from(self.aside) + usize::from(index);
-        let bytes = self.frame.as_ref();
-        bytes
-            .get(first..first + usize::from(count))
-            .unwrap_or_default()
+        self.frame.slice(index.into(), count.into())
     }
 
     fn bytes(&mut self, index: u8, count: u8) -> &mut [u8] {
-        let first = usize::from(self.aside) + usize::from(index);
-        let bytes = self.frame.as_mut();
-        bytes
-            .get_mut(first..first + usize::from(count))
-            .unwrap_or_default()
+        self.frame.bytes(index.into(), count.into())
     }
 
     fn set_aside(&mut self, count: u8) {
-        self.aside += count;
+        self.frame.set_aside(count.into());
     }
 
     fn take_back(&mut self, count: u8) {
-        self.aside -= count;
+        self.frame.take_back(count.into());
     }
 
+    fn count(&mut self, counter: Counter, more: u16) {
+        if let Some(count) = self.counters.get_mut(counter as usize) {
+            *count = count.wrapping_add(more.into());
+        }
+    }
+}
+
+impl<F, R, T> Words for Buffers<F, R, T>
+where
+    F: AsRef<[u8]> + AsMut<[u8]>,
+    R: AsRef<[u16]> + AsMut<[u16]>,
+    T: AsRef<[u16]> + AsMut<[u16]>,
+{
     fn transmit(&mut self) -> &mut [u16] {
         self.transmit.as_mut()
     }
@@ -183,12 +335,6 @@ where
                     false => u16::from_le_bytes([first, second]),
                 };
             }
-        }
-    }
-
-    fn count(&mut self, counter: Counter, more: u16) {
-        if let Some(count) = self.counters.get_mut(counter as usize) {
-            *count = count.wrapping_add(more.into());
         }
     }
 }

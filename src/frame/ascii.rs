@@ -50,6 +50,23 @@ pub const fn byte(pair: &[u8]) -> Option<u8> {
     }
 }
 
+/// Where the first frame that is whole begins among `characters`, and where it ends if
+/// its end has arrived; `end` is the character that ends it. The last colon counts, for a
+/// frame without an end was cut off. Characters before it are noise.
+pub fn find(characters: &[u8], end: u8) -> (usize, Option<usize>) {
+    let mut begin = None;
+    let mut before = 0;
+    for (index, character) in characters.iter().enumerate() {
+        if *character == START {
+            begin = Some(index);
+        } else if *character == end && before == RETURN {
+            return (begin.unwrap_or(index + 1), Some(index + 1));
+        }
+        before = *character;
+    }
+    (begin.unwrap_or(characters.len()), None)
+}
+
 /// The frame that is the whole of `bytes`, decoded where it stands. Lower case
 /// digits are taken too.
 ///
@@ -108,6 +125,16 @@ pub fn emit(
     };
     *first = unit;
     let content = 1 + pdu(place)?;
+    encode(buffer, content, end)
+}
+
+/// Turns the first `content` bytes of a buffer, unit and PDU, into their frame; returns
+/// its length.
+///
+/// # Errors
+/// [`Status::BUFFER_TOO_SMALL`], with nothing changed.
+#[cfg_attr(target_os = "none", inline(never))]
+pub fn encode(buffer: &mut [u8], content: usize, end: u8) -> Result<usize, Status> {
     let total = 2 * (content + 1) + AROUND;
     let Some(frame) = buffer.get_mut(..total) else {
         return Err(Status::BUFFER_TOO_SMALL);

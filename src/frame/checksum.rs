@@ -165,9 +165,9 @@ impl Crc16 {
     /// How a CRC weighs behind so many bytes: see [`Crc16::since_start`].
     #[cfg_attr(target_os = "none", inline(never))]
     #[must_use]
-    pub fn weight(bytes: u8) -> Crc16 {
+    pub fn weight(bytes: u16) -> Crc16 {
         let first = Crc16(0x8000);
-        (0..u16::from(bytes) * 8).fold(first, |weight, _| weight.shifted())
+        (0..bytes * 8).fold(first, |weight, _| weight.shifted())
     }
 
     /// What a run of bytes that began with this CRC ends with, if the last of them
@@ -275,7 +275,7 @@ mod tests {
             let frame = frame.get(..250).unwrap_or(&frame);
             let before = crc16(&noise);
             let right = before.with(frame).with(&crc16(frame).to_bytes());
-            let weight = Crc16::weight(frame.len() as u8 + 2);
+            let weight = Crc16::weight(frame.len() as u16 + 2);
             prop_assert_eq!(right, before.since_start(weight));
         }
 

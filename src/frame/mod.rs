@@ -1,13 +1,9 @@
 //! Application data units: how a PDU and its unit travel on a line.
 
 pub mod ascii;
-pub mod ascii_window;
 pub mod checksum;
 pub mod rtu;
-mod search;
 pub mod tcp;
-
-pub use search::{Found, Search, Seen, Verdict, Wanted};
 
 use crate::error::Status;
 

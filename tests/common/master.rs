@@ -1,6 +1,6 @@
 //! A real master, on a line that brings what a test says.
 
-use mbm::engine::{Buffers, Storage};
+use mbm::engine::{Buffers, Words};
 use mbm::error::Status;
 use mbm::frame::checksum::crc16;
 use mbm::master::Master;
@@ -105,7 +105,7 @@ impl Call {
         })
     }
 
-    pub fn start<P: Port, S: Storage>(&self, master: &mut Master<P, S>) -> Status {
+    pub fn start<P: Port, S: Words>(&self, master: &mut Master<P, S>) -> Status {
         let [a, b, c, d] = self.words;
         match self.function {
             0x01 => master.read_coils(a, b),

@@ -1,15 +1,16 @@
 //! A job that owns its data, and what a client is lent.
 
 use mbm::client::{Job, Means, Ticket, Unit};
+use mbm::engine::{Counter, Frame, Storage, COUNTERS};
 use mbm::error::Status;
 use mbm::pdu::outline::Outline;
-use mbm::transaction::{Counter, Storage, COUNTERS};
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// Buffers of full size, counters and records of units.
+/// Buffers of full size, counters and records of units. Panics at an index that is out of
+/// range, which the pointers of C would not notice.
 pub struct Lent {
-    pub frame: Vec<u8>,
+    pub frame: Frame<Vec<u8>>,
     pub outgoing: Vec<u8>,
     pub counters: Rc<RefCell<[u32; COUNTERS]>>,
     pub units: Vec<Unit>,
@@ -19,7 +20,7 @@ pub struct Lent {
 impl Default for Lent {
     fn default() -> Self {
         Lent {
-            frame: vec![0; 513],
+            frame: Frame::new(vec![0; 513]),
             outgoing: vec![0; 520],
             counters: Rc::default(),
             units: Vec::new(),
@@ -28,9 +29,47 @@ impl Default for Lent {
     }
 }
 
+impl Lent {
+    fn within(&self, index: u16, count: u16) {
+        let (end, room) = (u32::from(index) + u32::from(count), self.room());
+        assert!(end <= room.into(), "{count} bytes from {index} of {room}");
+    }
+}
+
 impl Storage for Lent {
-    fn frame(&mut self) -> &mut [u8] {
-        &mut self.frame
+    type Count = u16;
+
+    fn room(&self) -> u16 {
+        self.frame.room() as u16
+    }
+
+    fn byte(&self, index: u16) -> u8 {
+        self.within(index, 1);
+        self.frame.byte(index.into())
+    }
+
+    fn set_byte(&mut self, index: u16, byte: u8) {
+        self.within(index, 1);
+        self.frame.set_byte(index.into(), byte);
+    }
+
+    fn slice(&self, index: u16, count: u16) -> &[u8] {
+        self.within(index, count);
+        self.frame.slice(index.into(), count.into())
+    }
+
+    fn bytes(&mut self, index: u16, count: u16) -> &mut [u8] {
+        self.within(index, count);
+        self.frame.bytes(index.into(), count.into())
+    }
+
+    fn set_aside(&mut self, count: u16) {
+        self.within(0, count);
+        self.frame.set_aside(count.into());
+    }
+
+    fn take_back(&mut self, count: u16) {
+        self.frame.take_back(count.into());
     }
 
     fn count(&mut self, counter: Counter, more: u16) {

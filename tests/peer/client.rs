@@ -8,7 +8,7 @@ use crate::served::{pattern, Served, PATIENCE};
 use crate::UNIT;
 use mbm::client::{Client, Line, Serial, Tcp};
 use mbm::error::Status;
-use mbm::frame::{ascii_window, rtu, Framing, Search};
+use mbm::frame::Framing;
 use mbm::pdu::custom::Rule;
 use mbm::pdu::outline::{Form, Outline};
 use mbm::port::Port;
@@ -211,25 +211,19 @@ impl<L: Line<Task>> Asker<L> {
     }
 }
 
-fn serial<W: Search>(framing: Framing) -> Asker<Serial<Wire, Lent, Task, W>> {
-    let mut asker = Asker::new(Serial::new(Wire::new(framing), Lent::default()));
-    asker.client.line.transaction().settings.response_timeout = TIMEOUT;
-    if framing == Framing::Ascii {
-        let settings = &mut asker.client.line.transaction().settings;
-        settings.gap = 0;
-        settings.silence = mbm::client::ASCII_SILENCE;
-    }
-    asker
+fn serial(mut line: Serial<Wire, Lent, Task>) -> Asker<Serial<Wire, Lent, Task>> {
+    line.engine().settings.response_timeout = TIMEOUT;
+    Asker::new(line)
 }
 
 #[test]
 fn the_client_asks_pymodbus_for_every_function_over_rtu() {
-    serial::<rtu::Window>(Framing::Rtu).every_function();
+    serial(Serial::new(Wire::new(Framing::Rtu), Lent::default())).every_function();
 }
 
 #[test]
 fn the_client_asks_pymodbus_for_every_function_over_ascii() {
-    serial::<ascii_window::Window>(Framing::Ascii).every_function();
+    serial(Serial::ascii(Wire::new(Framing::Ascii), Lent::default())).every_function();
 }
 
 #[test]
@@ -244,6 +238,6 @@ fn the_client_asks_pymodbus_for_every_function_over_rtu_in_tcp() {
     let wire = Wire::new(Framing::RtuOverTcp);
     let mut client: Client<Serial<Wire, Lent, Task>, Task, 4> =
         Client::over_tcp(wire, Lent::default());
-    client.line.transaction().settings.response_timeout = TIMEOUT;
+    client.line.engine().settings.response_timeout = TIMEOUT;
     Asker::with(client).every_function();
 }

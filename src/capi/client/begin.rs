@@ -1,6 +1,6 @@
 //! A client of each kind of line.
 
-use super::kind::{self, line, AsciiLine, Kind, TcpLine};
+use super::kind::{self, line, Kind, SerialLine, TcpLine};
 use super::{mbm_client, pointers};
 use crate::capi::frame::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
 use crate::capi::port::{countable, mbm_port};
@@ -116,8 +116,8 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
             if !super::shared(object).is_idle() {
                 return Status::BUSY;
             }
-            let engine = line::<AsciiLine>(object).transaction();
-            engine.search().delimiter = character;
+            let engine = line::<SerialLine>(object).engine();
+            engine.request().set_ascii(character);
             Status::OK
         })
     }

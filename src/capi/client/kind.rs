@@ -6,22 +6,19 @@ use super::mbm_client;
 use super::{Lent, LentByC, Object};
 use crate::capi::frame::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
 use crate::capi::port::mbm_port;
-use crate::client::{Line, Serial, Tcp, ASCII_SILENCE, STREAM_SILENCE};
+use crate::client::{ClientEngine, Line, Serial, Tcp};
+use crate::engine::Settings;
 #[cfg(not(any(target_os = "none", mbm_firmware)))]
 use crate::error::Status;
-use crate::frame::{ascii, ascii_window, rtu, Search};
-use crate::transaction::{Settings, Transaction};
 use core::mem::{offset_of, ManuallyDrop};
 
-pub(super) type RtuLine = Serial<mbm_port, LentByC, Lent, rtu::Window>;
-pub(super) type AsciiLine = Serial<mbm_port, LentByC, Lent, ascii_window::Window>;
+pub(super) type SerialLine = Serial<mbm_port, LentByC, Lent>;
 pub(super) type TcpLine = Tcp<mbm_port, LentByC>;
 
 /// Room for the line of any kind.
 #[repr(C)]
 pub(super) union Lines {
-    rtu: ManuallyDrop<RtuLine>,
-    ascii: ManuallyDrop<AsciiLine>,
+    serial: ManuallyDrop<SerialLine>,
     tcp: ManuallyDrop<TcpLine>,
 }
 
@@ -50,31 +47,28 @@ pub(super) struct Kind {
 
 const LINE: usize = offset_of!(Object, line);
 
-const fn serial<W: Search>(start: unsafe fn(*mut Object), framing: u8, least: u8) -> Kind
-where
-    Serial<mbm_port, LentByC, Lent, W>: Line<Lent>,
-{
-    type Engine<W> = Transaction<mbm_port, LentByC, crate::client::Asked<Lent>, W>;
-    let engine = LINE + offset_of!(Serial<mbm_port, LentByC, Lent, W>, engine);
+const fn serial(start: unsafe fn(*mut Object), framing: u8, least: u8) -> Kind {
+    type Engine = ClientEngine<mbm_port, LentByC, Lent>;
+    let engine = LINE + offset_of!(SerialLine, engine);
     Kind {
         #[cfg(any(target_os = "none", mbm_firmware))]
-        advance: advance::<Serial<mbm_port, LentByC, Lent, W>>,
+        advance: advance::<SerialLine>,
         #[cfg(not(any(target_os = "none", mbm_firmware)))]
-        poll: poll::<Serial<mbm_port, LentByC, Lent, W>>,
-        release: release::<Serial<mbm_port, LentByC, Lent, W>>,
+        poll: poll::<SerialLine>,
+        release: release::<SerialLine>,
         start,
-        port: (engine + offset_of!(Engine<W>, port)) as u16,
-        settings: (engine + offset_of!(Engine<W>, settings)) as u16,
-        means: (engine + offset_of!(Engine<W>, storage)) as u16,
+        port: (engine + offset_of!(Engine, port)) as u16,
+        settings: (engine + offset_of!(Engine, settings)) as u16,
+        means: (engine + offset_of!(Engine, storage)) as u16,
         least,
         framing,
     }
 }
 
-pub(super) static RTU: Kind = serial::<rtu::Window>(start_rtu, MBM_FRAMING_RTU, 8);
-pub(super) static RTU_OVER_TCP: Kind = serial::<rtu::Window>(start_stream, MBM_FRAMING_RTU, 8);
+pub(super) static RTU: Kind = serial(start_rtu, MBM_FRAMING_RTU, 8);
+pub(super) static RTU_OVER_TCP: Kind = serial(start_stream, MBM_FRAMING_RTU, 8);
 /// The shortest request and response, a function code and two words, are 17 characters.
-pub(super) static ASCII: Kind = serial::<ascii_window::Window>(start_ascii, MBM_FRAMING_ASCII, 17);
+pub(super) static ASCII: Kind = serial(start_ascii, MBM_FRAMING_ASCII, 17);
 pub(super) static TCP: Kind = Kind {
     #[cfg(any(target_os = "none", mbm_firmware))]
     advance: advance::<TcpLine>,
@@ -132,12 +126,8 @@ macro_rules! on_line {
                 let $line = $crate::capi::client::kind::line::<TcpLine>($object);
                 $action
             }
-            $crate::capi::frame::MBM_FRAMING_ASCII => {
-                let $line = $crate::capi::client::kind::line::<AsciiLine>($object);
-                $action
-            }
             _ => {
-                let $line = $crate::capi::client::kind::line::<RtuLine>($object);
+                let $line = $crate::capi::client::kind::line::<SerialLine>($object);
                 $action
             }
         }
@@ -173,7 +163,7 @@ unsafe fn start_rtu(object: *mut Object) {
     // SAFETY: as the caller promises.
     unsafe {
         (*object).shared.broadcasts = true;
-        line::<RtuLine>(object).transaction().line_used();
+        line::<SerialLine>(object).engine().line_used();
     }
 }
 
@@ -182,10 +172,9 @@ unsafe fn start_rtu(object: *mut Object) {
 unsafe fn start_stream(object: *mut Object) {
     // SAFETY: as the caller promises.
     unsafe {
-        let engine = line::<RtuLine>(object).transaction();
-        engine.settings.gap = 0;
-        engine.settings.silence = STREAM_SILENCE;
-        engine.line_used();
+        let line = line::<SerialLine>(object);
+        line.set_stream();
+        line.engine().line_used();
     }
 }
 
@@ -194,12 +183,8 @@ unsafe fn start_stream(object: *mut Object) {
 unsafe fn start_ascii(object: *mut Object) {
     // SAFETY: as the caller promises.
     unsafe {
-        (*object).shared.broadcasts = true;
-        let engine = line::<AsciiLine>(object).transaction();
-        engine.settings.gap = 0;
-        engine.settings.silence = ASCII_SILENCE;
-        engine.search().delimiter = ascii::END;
-        engine.line_used();
+        start_rtu(object);
+        line::<SerialLine>(object).set_ascii();
     }
 }
 

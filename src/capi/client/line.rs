@@ -1,6 +1,6 @@
 //! The line under a client: lost and found, lent and taken back.
 
-use super::kind::{on_line, AsciiLine, RtuLine, TcpLine};
+use super::kind::{on_line, SerialLine, TcpLine};
 use super::{mbm_client, pointers, shared};
 use crate::capi::frame::MBM_FRAMING_RTU;
 use crate::capi::master::{mbm_master, Core};

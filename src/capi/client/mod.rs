@@ -19,10 +19,10 @@ use super::client_pointers as pointers;
 use super::port;
 use super::storage::mbm_counters;
 use crate::client::{Means, Policy, Shared, Unit};
+use crate::engine::{Counter, Storage};
 use crate::error::Status;
-use crate::transaction::{Counter, Storage};
 use core::ffi::c_void;
-use core::slice::from_raw_parts_mut;
+use core::slice::{from_raw_parts, from_raw_parts_mut};
 use kind::{Kind, Lines};
 use request::Lent;
 
@@ -49,7 +49,7 @@ pub struct mbm_client {
     /// Not for you.
     pointers: [*mut c_void; 46],
     /// Not for you.
-    words: [u32; 20],
+    words: [u32; 24],
 }
 
 /// What lies behind an `mbm_client`.
@@ -131,10 +131,50 @@ struct LentByC {
 // SAFETY, of all functions here: each pointer is NULL, or what the function of
 // the header that set it demands, valid for as long as the object is used; what
 // is NULL has no length, and each is lent for as long as `self` is borrowed.
+//
+// Nothing is checked here, for its bytes: engine and TCP line keep every index within
+// `room`. `c-tests/test_client_buffers.c` holds them to that under AddressSanitizer.
 impl Storage for LentByC {
-    fn frame(&mut self) -> &mut [u8] {
-        // SAFETY: see above; a client is begun with a frame buffer only.
-        unsafe { from_raw_parts_mut(self.frame, self.frame_bytes.into()) }
+    type Count = u16;
+
+    fn room(&self) -> u16 {
+        self.frame_bytes
+    }
+
+    #[inline(always)]
+    fn byte(&self, index: u16) -> u8 {
+        // SAFETY: below `frame_bytes`, see above.
+        unsafe { *self.frame.add(index.into()) }
+    }
+
+    #[inline(always)]
+    fn set_byte(&mut self, index: u16, byte: u8) {
+        // SAFETY: below `frame_bytes`, see above.
+        unsafe { *self.frame.add(index.into()) = byte }
+    }
+
+    #[inline(always)]
+    fn slice(&self, index: u16, count: u16) -> &[u8] {
+        // SAFETY: up to `frame_bytes`, see above.
+        unsafe { from_raw_parts(self.frame.add(index.into()), count.into()) }
+    }
+
+    #[inline(always)]
+    fn bytes(&mut self, index: u16, count: u16) -> &mut [u8] {
+        // SAFETY: up to `frame_bytes`, see above.
+        unsafe { from_raw_parts_mut(self.frame.add(index.into()), count.into()) }
+    }
+
+    fn set_aside(&mut self, count: u16) {
+        // SAFETY: up to `frame_bytes`, see above.
+        self.frame = unsafe { self.frame.add(count.into()) };
+        self.frame_bytes -= count;
+    }
+
+    fn take_back(&mut self, count: u16) {
+        // SAFETY: as many as were set aside.
+        self.frame = unsafe { self.frame.sub(count.into()) };
+        self.frame_bytes += count;
     }
 
     #[cfg_attr(all(feature = "counters", target_os = "none"), inline(never))]
@@ -156,13 +196,8 @@ impl Means for LentByC {
         unsafe { from_raw_parts_mut(self.outgoing, self.outgoing_bytes.into()) }
     }
 
-    fn received(&mut self, from: u16, to: u16) -> &mut [u8] {
-        // SAFETY: see above; the client keeps its places within the buffer.
-        unsafe { from_raw_parts_mut(self.frame.add(from.into()), (to - from).into()) }
-    }
-
     fn to_send(&mut self, from: u16, to: u16) -> &mut [u8] {
-        // SAFETY: as for `received`.
+        // SAFETY: see above; the client keeps its places within the buffer.
         unsafe { from_raw_parts_mut(self.outgoing.add(from.into()), (to - from).into()) }
     }
 

@@ -1,6 +1,6 @@
 //! Moving a client's requests on, and giving them up.
 
-use super::kind::{on_line, Advance, AsciiLine, RtuLine, TcpLine};
+use super::kind::{on_line, Advance, SerialLine, TcpLine};
 use super::{
     mbm_client, mbm_clientRequest, pointers, port, shared, Lent, Object, MBM_CLIENT_DEPTH,
 };

@@ -3,9 +3,9 @@
 use super::{mbm_client, pointers, LentByC, Treatment};
 use crate::capi::storage::mbm_counters;
 use crate::client::{again, note, rest, Backoff, Means as _, Policy, Unit};
+use crate::engine::Settings;
 use crate::error::Status;
 use crate::time::millis;
-use crate::transaction::Settings;
 use core::ffi::c_void;
 
 /// mbm_client_setBackoff: a request is asked again at once.

@@ -5,10 +5,10 @@ use crate::bytes::move_to_front;
 use crate::client::job::{bytes, deliver, is_answer, take, Job, Stage};
 use crate::client::shared::Shared;
 use crate::client::units::Means;
+use crate::engine::Counter;
 use crate::error::Status;
 use crate::frame::tcp::{self, Header};
 use crate::port::Port;
-use crate::transaction::Counter;
 
 /// Where the data stand in a frame that answers a read: behind function code and
 /// byte count.
@@ -18,7 +18,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
     /// Moves what was not looked at yet to the start of the buffer.
     #[cold]
     pub(super) fn gather(&mut self) {
-        move_to_front(self.means.received(0, self.end), self.start.into());
+        move_to_front(self.means.bytes(0, self.end), self.start.into());
         self.end -= self.start;
         self.start = 0;
     }
@@ -39,7 +39,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
         if usize::from(self.end) - begin < total {
             return None;
         }
-        let frame = self.means.frame().get(begin..begin + total)?;
+        let frame = self.means.slice(self.start, total as u16);
         let (start, rest) = frame.split_first_chunk()?;
         let (count, data) = rest.split_first()?;
         let function = ticket.outline.function();
@@ -87,8 +87,8 @@ impl<P: Port, S: Means> Tcp<P, S> {
             if self.skip > 0 {
                 self.pass();
             }
-            let room = self.means.frame().len();
-            let rest = self.means.received(self.start, self.end);
+            let room = usize::from(self.means.room());
+            let rest = self.means.bytes(self.start, self.end - self.start);
             let header = match tcp::header(rest) {
                 Ok(header) => header,
                 Err(Status::INCOMPLETE_FRAME) => return None,

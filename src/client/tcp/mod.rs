@@ -8,10 +8,10 @@ use super::shared::Shared;
 use super::units::Means;
 use super::Line;
 use crate::bytes::move_to_front;
+use crate::engine::{Counter, Settings};
 use crate::error::Status;
 use crate::frame::tcp;
 use crate::port::Port;
-use crate::transaction::{Counter, Settings};
 use crate::FIRMWARE;
 
 /// As many requests at once as the queue holds, in TCP frames. Received bytes
@@ -90,8 +90,8 @@ impl<P: Port, S: Means> Tcp<P, S> {
         } else if self.start > 0 {
             self.gather();
         }
-        let length = self.means.frame().len() as u16;
-        let room = self.means.received(self.end, length);
+        let length = self.means.room() - self.end;
+        let room = self.means.bytes(self.end, length);
         if room.is_empty() {
             return true;
         }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// The layers from left to right; modules of one string stand side by side.
-const LAYERS: [&[&str]; 11] = [
+const LAYERS: [&[&str]; 10] = [
     &["atomic", "error", "time"],
     &["port", "ring", "data"],
     &["bytes"],
@@ -16,8 +16,7 @@ const LAYERS: [&[&str]; 11] = [
     &["pdu"],
     &["packet"],
     &["explain"],
-    &["sniffer", "transaction"],
-    &["engine"],
+    &["sniffer", "engine"],
     &["master", "client", "server"],
     &["capi"],
 ];
@@ -281,12 +280,9 @@ mod tests {
 
     #[test]
     fn using_a_layer_to_the_right_is_a_violation() {
-        let text = "\nuse crate::transaction::Transaction;\n";
+        let text = "\nuse crate::engine::Engine;\n";
         let found = violations(Path::new("frame/rtu.rs"), text);
-        assert_eq!(
-            found,
-            ["src/frame/rtu.rs:2: `frame` may not use `transaction`"]
-        );
+        assert_eq!(found, ["src/frame/rtu.rs:2: `frame` may not use `engine`"]);
     }
 
     /// What is found in `src/frame/rtu.rs` if `text` is all of it.
@@ -303,42 +299,42 @@ mod tests {
     #[test]
     fn a_path_by_super_is_a_violation_in_a_use_and_in_code() {
         for text in [
-            "use super::super::transaction::Transaction;",
-            "use super::super::{error, transaction};",
-            "use super::super::{error::Status, transaction::{self, Transaction}};",
-            "fn f() { super::super::transaction::f() }",
-            "fn f(t: &super::super::transaction::Transaction) {}",
-            "use super::{search, super::transaction};",
-            "pub(in super::super::transaction) fn f() {}",
-            "use super :: super ::\n transaction;",
+            "use super::super::engine::Transaction;",
+            "use super::super::{error, engine};",
+            "use super::super::{error::Status, engine::{self, Engine}};",
+            "fn f() { super::super::engine::f() }",
+            "fn f(t: &super::super::engine::Engine) {}",
+            "use super::{search, super::engine};",
+            "pub(in super::super::engine) fn f() {}",
+            "use super :: super ::\n engine;",
         ] {
             let found = in_rtu(text);
             assert_eq!(found.len(), 1, "{text}: {found:?}");
-            assert!(found[0].contains("may not use `transaction`"), "{found:?}");
+            assert!(found[0].contains("may not use `engine`"), "{found:?}");
         }
-        let found = violations(Path::new("frame/mod.rs"), "use super::transaction;");
+        let found = violations(Path::new("frame/mod.rs"), "use super::engine;");
         assert_eq!(found.len(), 1);
-        let found = violations(Path::new("bytes.rs"), "use super::transaction as t;");
+        let found = violations(Path::new("bytes.rs"), "use super::engine as t;");
         assert_eq!(found.len(), 1);
     }
 
     #[test]
     fn a_path_by_self_is_a_violation_where_it_leads_out() {
-        let text = "use self::super::super::transaction::Transaction;";
+        let text = "use self::super::super::engine::Engine;";
         assert_eq!(in_rtu(text).len(), 1);
-        assert!(in_rtu("use self::transaction::Transaction;").is_empty());
+        assert!(in_rtu("use self::engine::Engine;").is_empty());
     }
 
     #[test]
     fn a_path_in_an_inner_module_begins_there() {
-        let inner = "mod tests {\n use super::super::super::transaction;\n}";
+        let inner = "mod tests {\n use super::super::super::engine;\n}";
         assert_eq!(in_rtu(inner).len(), 1);
         assert!(in_rtu("mod tests { use super::*; use super::super::pdu; }").is_empty());
         // Behind it, a path begins outside again.
-        let behind = "mod tests { fn f() {} }\nuse super::super::transaction;";
+        let behind = "mod tests { fn f() {} }\nuse super::super::engine;";
         assert_eq!(
             in_rtu(behind),
-            ["src/frame/rtu.rs:2: `frame` may not use `transaction`"]
+            ["src/frame/rtu.rs:2: `frame` may not use `engine`"]
         );
     }
 

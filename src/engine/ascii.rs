@@ -1,0 +1,98 @@
+//! Finds the reply among the characters of an ASCII line. Every frame begins with a
+//! colon, so what stands in front of one is noise.
+
+use super::{Count, Engine, Request, Seen, Storage, Verdict};
+use crate::error::Status;
+use crate::frame::ascii::{self, find};
+use crate::frame::rtu;
+use crate::pdu::EXCEPTION;
+
+/// Characters of a frame around its unit and PDU: colon, LRC, and the two that end it.
+const AROUND: u8 = 5;
+
+/// Characters of the frame of a PDU of `length` bytes.
+pub fn frame_length(length: u8) -> u16 {
+    2 * (u16::from(length) + 1) + u16::from(AROUND)
+}
+
+/// Bytes of unit and PDU in a frame of so many characters.
+pub fn content(characters: u16) -> u16 {
+    (characters - u16::from(AROUND)) / 2
+}
+
+impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
+    /// Looks for the reply among what has arrived, in ASCII frames that `delimiter` ends.
+    /// Leaves it at the front, decoded: unit and PDU, then as many characters as its frame
+    /// has more.
+    pub fn search_ascii(&mut self, delimiter: u8) -> bool {
+        let mut front = S::Count::ZERO;
+        let found = loop {
+            let rest = self.storage.slice(front, self.end - front);
+            let (begin, end) = find(rest, delimiter);
+            let Some(end) = end else {
+                self.pass_characters(begin);
+                front += S::Count::of(begin);
+                break false;
+            };
+            self.pass_characters(begin);
+            let begins = front + S::Count::of(begin);
+            front += S::Count::of(end);
+            if begins < front && self.is_reply(begins, front - begins, delimiter) {
+                self.least = front - begins;
+                front = begins;
+                break true;
+            }
+        };
+        self.drop_front(front);
+        if !found && self.end == self.storage.room() && self.held == S::Count::ZERO {
+            // A frame has begun that the buffer cannot hold.
+            self.see(Seen::TOO_LONG);
+            self.end = S::Count::ZERO;
+        }
+        found
+    }
+
+    /// Notes characters that are no frame.
+    fn pass_characters(&mut self, count: usize) {
+        if count > 0 {
+            self.passed = 1;
+        }
+    }
+
+    /// Decodes the frame of `length` characters at `front`; true if it is the reply.
+    fn is_reply(&mut self, front: S::Count, length: S::Count, delimiter: u8) -> bool {
+        let frame = self.storage.bytes(front, length);
+        let content = match ascii::parse(frame, delimiter) {
+            Ok(adu) => S::Count::of(adu.pdu.len() + rtu::PDU),
+            Err(Status::INVALID_CRC) => {
+                // The unit stands decoded in front.
+                if self.storage.byte(front) == self.unit {
+                    self.see(Seen::BAD_CRC);
+                }
+                return false;
+            }
+            Err(_) => {
+                self.passed = 1;
+                return false;
+            }
+        };
+        let function = self.storage.byte(front + 1u8.into()) & !EXCEPTION;
+        // As many bytes as an RTU frame has: LRC, and one character.
+        let whole = content + rtu::CRC.into();
+        let what = if self.storage.byte(front) != self.unit {
+            Seen::OTHER_UNIT
+        } else if function != self.request.function() {
+            Seen::OTHER_FUNCTION
+        } else if Q::wanted(self, front, whole) != whole {
+            Seen::MALFORMED
+        } else {
+            match Q::judge(self, front, content) {
+                Verdict::Right => return true,
+                Verdict::Echo => return false,
+                Verdict::Wrong => Seen::MALFORMED,
+            }
+        };
+        self.see_foreign(what);
+        false
+    }
+}

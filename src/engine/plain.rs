@@ -1,0 +1,130 @@
+//! The master's requests: one of ten functions, in RTU frames. The length of the reply
+//! is known as soon as the request is sent.
+
+use super::search::EXCEPTION_FRAME;
+use super::{Engine, Request, Seen, Verdict, Words};
+use crate::error::Status;
+use crate::frame::rtu;
+use crate::pdu::query::Query;
+use crate::pdu::EXCEPTION;
+
+/// Bytes of a frame around its PDU.
+const AROUND_PDU: u8 = rtu::OVERHEAD as u8;
+
+impl<P, S: Words> Request<P, S> for Query {
+    const NONE: Self = Query::NONE;
+    const IS_PLAIN: bool = true;
+
+    #[inline(always)]
+    fn function(&self) -> u8 {
+        Query::function(self)
+    }
+
+    #[inline(always)]
+    fn may_be_broadcast(&self) -> bool {
+        !self.is_read()
+    }
+
+    #[inline(always)]
+    fn fits(&self, room: u8) -> bool {
+        self.length() <= room.wrapping_sub(AROUND_PDU)
+    }
+
+    #[inline(always)]
+    fn reply_length(&self, room: u8) -> u8 {
+        let length = self.response_length() + AROUND_PDU;
+        if length > room {
+            0
+        } else {
+            length
+        }
+    }
+
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn write(engine: &mut Engine<P, S, Self>) {
+        let mut end = engine.request.head_length() + 1;
+        engine.storage.set_byte(0, engine.unit);
+        let head = engine.storage.bytes(1, engine.request.head_length());
+        for (place, byte) in head.iter_mut().zip(engine.request.head()) {
+            *place = *byte;
+        }
+        let sends = engine.request.sends();
+        if sends > 0 {
+            engine.storage.set_byte(end, sends);
+            engine
+                .storage
+                .send_words(end + 1, sends, engine.request.has_registers());
+            end += sends;
+            let last = engine.storage.byte(end) & engine.request.mask();
+            engine.storage.set_byte(end, last);
+            end += 1;
+        }
+        engine.append_crc(end);
+    }
+
+    #[inline(always)]
+    fn wanted(engine: &mut Engine<P, S, Self>, front: u8, have: u8) -> u8 {
+        let function = engine.storage.byte(front + 1) ^ engine.request.function();
+        if function == EXCEPTION {
+            return EXCEPTION_FRAME;
+        }
+        if function != 0 {
+            return 0;
+        }
+        if cfg!(feature = "echo") && engine.echo {
+            let known = (have - 1).min(engine.request.head_length());
+            if agrees(engine, front, known) {
+                // It may yet turn out to be the reply.
+                return (engine.request.length() + AROUND_PDU).min(have + 1);
+            }
+        }
+        if engine.request.is_read() {
+            if have == 2 {
+                return 3;
+            }
+            if engine.storage.byte(front + 2) != engine.request.reads() {
+                return 0;
+            }
+        }
+        if engine.length == 0 {
+            engine.see(Seen::TOO_LONG);
+        }
+        engine.length
+    }
+
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn judge(engine: &mut Engine<P, S, Self>, front: u8, _content: u8) -> Verdict {
+        engine.exception = 0;
+        if engine.storage.byte(front + 1) & EXCEPTION != 0 {
+            engine.exception = engine.storage.byte(front + 2);
+            return match Status::exception(engine.exception) {
+                Status::MALFORMED_REPLY => Verdict::Wrong,
+                _ => Verdict::Right,
+            };
+        }
+        // A reply may be shorter than the head, and stand at the end of the buffer.
+        let head = engine.request.head_length();
+        let agrees = engine.end - front > head && agrees(engine, front, head);
+        if cfg!(feature = "echo") && engine.echo && agrees {
+            engine.echo = false;
+            return Verdict::Echo;
+        }
+        if agrees || engine.request.is_read() {
+            Verdict::Right
+        } else {
+            Verdict::Wrong
+        }
+    }
+}
+
+/// True if the `count` bytes behind the unit at `front` are the request's.
+#[cfg_attr(target_os = "none", inline(never))]
+fn agrees<P, S: Words>(engine: &Engine<P, S, Query>, front: u8, count: u8) -> bool {
+    let bytes = engine.storage.slice(front + 1, count);
+    engine
+        .request
+        .head()
+        .iter()
+        .zip(bytes)
+        .all(|(ours, theirs)| ours == theirs)
+}

@@ -1,0 +1,37 @@
+//! What is seen on the way to a reply.
+
+use crate::error::Status;
+
+/// What was seen on the way to a reply, the more telling the greater. The low
+/// digit is that of the status it becomes.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Hash, Debug)]
+pub struct Seen(u8);
+
+impl Seen {
+    /// No frame.
+    pub const NOTHING: Seen = Seen(0x02);
+    /// A frame of another unit.
+    pub const OTHER_UNIT: Seen = Seen(0x10);
+    /// A frame of our unit with another function.
+    pub const OTHER_FUNCTION: Seen = Seen(0x21);
+    /// A frame of our unit and function that is not the reply.
+    pub const MALFORMED: Seen = Seen(0x35);
+    /// A complete frame of our unit and function with a wrong CRC.
+    pub const BAD_CRC: Seen = Seen(0x43);
+    /// The reply has begun, but the buffer cannot hold it.
+    pub const TOO_LONG: Seen = Seen(0x59);
+
+    /// The status of a request for which nothing better was seen.
+    pub const fn status(self) -> Status {
+        Status::from_code(0xE0 | (self.0 & 0x0F))
+    }
+}
+
+const _: () = {
+    assert!(Seen::NOTHING.status().code() == Status::RESPONSE_TIMED_OUT.code());
+    assert!(Seen::OTHER_UNIT.status().code() == Status::INVALID_SLAVE_ID.code());
+    assert!(Seen::OTHER_FUNCTION.status().code() == Status::INVALID_FUNCTION.code());
+    assert!(Seen::MALFORMED.status().code() == Status::MALFORMED_REPLY.code());
+    assert!(Seen::BAD_CRC.status().code() == Status::INVALID_CRC.code());
+    assert!(Seen::TOO_LONG.status().code() == Status::BUFFER_TOO_SMALL.code());
+};

@@ -1,0 +1,111 @@
+//! The engine of a client keeps every index within its frame buffer, as the pointers of C
+//! need it: what the tests lend panics at any other.
+
+#[path = "common/exchanges.rs"]
+mod exchanges;
+#[path = "common/wire.rs"]
+mod wire;
+
+use exchanges::{Case, CASES};
+use mbm::client::{Client, Serial};
+use mbm::engine::Frame;
+use mbm::error::Status;
+use mbm::frame::{ascii, Framing};
+use proptest::prelude::*;
+use wire::{End, Lent, Task};
+
+/// The frame of a PDU.
+fn encoded(framing: Framing, unit: u8, pdu: &[u8]) -> Vec<u8> {
+    let mut buffer = vec![0; framing.max_frame()];
+    let length = framing.emit(&mut buffer, 0, unit, ascii::END, |place| {
+        place[..pdu.len()].copy_from_slice(pdu);
+        Ok(pdu.len())
+    });
+    buffer[..length.unwrap()].to_vec()
+}
+
+/// What the line brings: bytes, or frames that the engine looks at more closely.
+fn any_bytes(framing: Framing, case: Case) -> impl Strategy<Value = Vec<u8>> {
+    let (_, _, request, response, _) = case;
+    let reply = encoded(framing, 17, response);
+    let echo = encoded(framing, 17, request);
+    let whole = reply.clone();
+    let part = prop_oneof![
+        3 => prop::collection::vec(any::<u8>(), 0..20),
+        1 => prop::collection::vec(any::<u8>(), 0..600),
+        1 => prop::collection::vec(prop::sample::select(&b":\r\n01"[..]), 0..40),
+        3 => Just(reply.clone()),
+        1 => Just(echo),
+        2 => any::<prop::sample::Index>().prop_map(move |end| {
+            reply[..end.index(reply.len())].to_vec()
+        }),
+        2 => (0u8..130).prop_map(move |code| encoded(framing, 17, &[request[0] | 0x80, code])),
+        1 => (1u8..255).prop_map(move |count| encoded(framing, 17, &[request[0], count, 0])),
+        1 => Just(vec![17, request[0]]),
+    ];
+    prop_oneof![
+        Just(whole),
+        prop::collection::vec(part, 0..8).prop_map(|parts| parts.concat()),
+    ]
+}
+
+fn any_lines() -> impl Strategy<Value = (Framing, Case, Vec<Vec<u8>>)> {
+    let framing = prop::sample::select(&[Framing::Rtu, Framing::Ascii][..]);
+    (framing, prop::sample::select(CASES)).prop_flat_map(|(framing, case)| {
+        let lines = prop::collection::vec(any_bytes(framing, case), 1..6);
+        (Just(framing), Just(case), lines)
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1000))]
+
+    #[test]
+    fn no_index_passes_the_frame_buffer(
+        (framing, case, lines) in any_lines(),
+        room in 8usize..600,
+        piece in 1usize..300,
+        pause in 1u32..20_000,
+        echo: bool,
+    ) {
+        let (build, data, request, response, received) = case;
+        // At least as often as not, just what the request or the reply needs.
+        let needs = [request, response].map(|pdu| encoded(framing, 17, pdu).len());
+        for room in [room, needs[0], needs[0].max(needs[1])] {
+            let end = End::default();
+            let frame = Frame::new(vec![0; room.max(17)]);
+            let lent = Lent { frame, ..Lent::default() };
+            let mut line = match framing {
+                Framing::Ascii => Serial::ascii(end.clone(), lent),
+                _ => Serial::new(end.clone(), lent),
+            };
+            let settings = &mut line.engine().settings;
+            settings.echo_discard = echo;
+            settings.response_timeout = 200_000;
+            let mut client: Client<_, _, 4> = Client::new(line);
+            for bytes in &lines {
+                prop_assert!(client.queue(Task::new(17, 1, data, build)).is_ok());
+                let mut brought = false;
+                let task = loop {
+                    if let Some(task) = client.poll(end.now(), true) {
+                        break task;
+                    }
+                    if !brought && !end.sent().is_empty() {
+                        brought = true;
+                        for (index, piece) in bytes.chunks(piece).enumerate() {
+                            end.deliver(index as u32 * pause, piece);
+                        }
+                    }
+                    end.pass(1_000);
+                };
+                prop_assert!(task.ticket.has_ended());
+                if task.ticket.status == Status::OK && *bytes == encoded(framing, 17, response) {
+                    prop_assert_eq!(task.received(), received);
+                }
+                // A reply that was held stands in the frame buffer no longer.
+                let whole = Frame::room(&client.line.engine().storage.frame);
+                prop_assert_eq!(whole, room.max(17));
+            }
+        }
+    }
+}
