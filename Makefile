@@ -79,7 +79,7 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, sy
 	@scripts/check-functions
 	@$(MAKE) --no-print-directory check-readme
 	@scripts/check-symbols $(ARCHIVE)
-	@! grep -rn 'target_os' src | grep -v 'cfg_attr\|mbm_firmware' # else no test runs that code
+	@! grep -rn 'target_os' src capi | grep -v 'cfg_attr\|mbm_firmware' # else no test runs that code
 	@echo "check: formatting, lints, layers, header and symbols are in order"
 
 .PHONY: test
@@ -93,8 +93,8 @@ venv: ## The Python environment with the peers of tests/peer, build/venv
 
 .PHONY: miri
 miri: ## Hold the hooks against Rust's rules of aliasing, with Miri of the nightly toolchain
-	@$(CARGO) +nightly miri test --quiet --test reentry
-	@MIRIFLAGS=-Zmiri-tree-borrows $(CARGO) +nightly miri test --quiet --test reentry
+	@$(CARGO) +nightly miri test --quiet --package mbm-c --test reentry
+	@MIRIFLAGS=-Zmiri-tree-borrows $(CARGO) +nightly miri test --quiet --package mbm-c --test reentry
 
 .PHONY: fuzz
 fuzz: ## Fuzz every decoder and the C API for FUZZ_SECONDS in all (60)

@@ -2,7 +2,7 @@
 //! gives each back when it has ended.
 //!
 //! A serial line carries one request at a time, a TCP stream as many as the
-//! queue holds. What a request is, with its data, is a [`Job`](crate::client::Job) of the caller's;
+//! queue holds. What a request is, with its data, is a [`Job`] of the caller's;
 //! nothing is copied until it goes to the wire, or comes from it.
 
 mod job;

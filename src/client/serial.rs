@@ -15,7 +15,8 @@ use crate::transaction::{Counter, Transaction};
 /// in ASCII frames.
 #[repr(C)]
 pub struct Serial<P, S, J, W = Window> {
-    pub(crate) engine: Transaction<P, S, Asked<J>, W>,
+    /// The request under way.
+    pub engine: Transaction<P, S, Asked<J>, W>,
 }
 
 impl<P, S, J: Job, W: Search> Serial<P, S, J, W> {

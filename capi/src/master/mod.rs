@@ -1,0 +1,318 @@
+//! `mbm_master_*`: the facade for C.
+
+mod requests;
+mod settings;
+mod values;
+mod words;
+
+pub use requests::*;
+pub use settings::*;
+pub use values::*;
+pub use words::*;
+
+use super::pointers;
+use super::port::mbm_port;
+use super::storage::LentByC;
+use core::ffi::c_void;
+use mbm::error::Status;
+use mbm::master::Master;
+use mbm::pdu::query::Form;
+
+/// A Modbus RTU master: one line, one request at a time.
+///
+/// Storage is yours and must be zero before first use, which a static object
+/// is (`static mbm_master node;`). Settings and words want mbm_master_begin or
+/// mbm_master_setBuffers before them, requests want both. Use one object from one
+/// thread and never from an interrupt; several objects are independent of each
+/// other. Which functions the hooks of its port may call: see mbm_port.
+///
+/// A call that is refused changes nothing, but for what the functions that make a
+/// request say of themselves, and mbm_master_send32.
+#[repr(C)]
+pub struct mbm_master {
+    /// Not for you.
+    pointers: [*mut c_void; 18],
+    /// Not for you.
+    words: [u32; 21],
+}
+
+/// What lies behind an `mbm_master`.
+#[repr(C)]
+pub(super) struct Object {
+    mark: u8,
+    non_blocking: bool,
+    core: Core,
+    /// Of values in the words, as C counts it; last, as it is seldom wanted.
+    order: u8,
+}
+
+pub(super) type Core = Master<mbm_port, LentByC>;
+
+const _: () = {
+    let room = size_of::<mbm_master>();
+    let used = size_of::<Object>();
+    assert!(align_of::<mbm_master>() >= align_of::<Object>());
+    assert!(used <= room);
+    // Hiding the fields may waste 5 % where RAM is scarce.
+    assert!(size_of::<usize>() > 4 || (room - used) * 20 <= room);
+};
+
+impl Object {
+    /// Marks an object that was begun; zeroed storage does not carry it.
+    pub(crate) const BEGUN: u8 = 0x4D;
+    /// Marks an object whose port's hooks may be at work.
+    pub(crate) const CALLING: u8 = 0x4E;
+
+    /// The mark in storage of an object.
+    ///
+    /// # Safety
+    /// `master` points to storage of an object, zeroed or begun.
+    pub(crate) unsafe fn mark(master: *const mbm_master) -> *mut u8 {
+        // SAFETY: as the caller promises; every object is writable storage.
+        unsafe { &raw mut (*master.cast::<Object>().cast_mut()).mark }
+    }
+
+    /// The core in storage of an object.
+    ///
+    /// # Safety
+    /// As for [`Object::mark`].
+    pub(crate) unsafe fn core_of(master: *mut mbm_master) -> *mut Core {
+        // SAFETY: as the caller promises.
+        unsafe { &raw mut (*master.cast::<Object>()).core }
+    }
+
+    /// The facade itself.
+    pub(super) fn core(&mut self) -> &mut Core {
+        &mut self.core
+    }
+
+    /// Turns a zeroed object into one that is begun, without port and buffers.
+    pub(super) fn preset(&mut self) {
+        self.core.preset();
+        self.mark = Object::BEGUN;
+    }
+}
+
+/// Begins to talk to a slave over a port.
+///
+/// May be called again at any time, which is cheap: to talk to another slave,
+/// or over another port. Settings, buffers and the words in them stay; what
+/// was queued by send is dropped, and a request under way is given up. Opens
+/// nothing: the port is open already. The first request waits for no gap, unless
+/// bytes arrive or mbm_master_lineUsed was called.
+///
+/// @param master  the object; zeroed before the first call
+/// @param slave   unit id, 1 to 247; 248 to 255 are sent as they are, 0 is
+///                broadcast (serial line guide V1.02, 2.2)
+/// @param port    copied; read, write and micros must be there
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a missing hook; MBM_BUSY
+///         from within a hook of this object's port but `idle`
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_begin(
+    master: *mut mbm_master,
+    slave: u8,
+    port: *const mbm_port,
+) -> u8 {
+    if port.is_null() {
+        return Status::INVALID_ARGUMENT.code();
+    }
+    // SAFETY: not NULL, so a port.
+    let port = unsafe { &*port };
+    if !port.is_complete() {
+        return Status::INVALID_ARGUMENT.code();
+    }
+    // SAFETY: as the header demands.
+    unsafe {
+        let status = pointers::prepare(master);
+        if status == Status::OK {
+            pointers::calling(master, |core| {
+                core.begin(slave, |place| place.copy(port));
+            });
+        }
+        status.code()
+    }
+}
+
+/// Lends the buffers that requests and replies need, before or after begin.
+///
+/// They must not overlap, and stay valid for as long as the object is used.
+/// MBM_FRAME_BYTES(words) bytes of frame serve any request and reply of so
+/// many words. What does not fit into a smaller buffer is answered with a
+/// status, never cut short.
+///
+/// @param master         the object; zeroed before the first call
+/// @param response       words that reads fill; NULL only with 0 words
+/// @param responseWords  0 to 255; 125 hold any reply
+/// @param transmit       words that writes send; NULL only with 0 words
+/// @param transmitWords  0 to 255; 123 hold any request
+/// @param frame          bytes of one frame; keeps nothing between requests
+/// @param frameBytes     at least 8; 256 hold any frame
+/// @return MBM_OK, MBM_INVALID_ARGUMENT, or MBM_BUSY while a request is under way
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_setBuffers(
+    master: *mut mbm_master,
+    response: *mut u16,
+    responseWords: u16,
+    transmit: *mut u16,
+    transmitWords: u16,
+    frame: *mut u8,
+    frameBytes: u16,
+) -> u8 {
+    let useless = (response.is_null() && responseWords > 0)
+        || (transmit.is_null() && transmitWords > 0)
+        || (responseWords | transmitWords) > 255
+        || frame.is_null()
+        || frameBytes < 8;
+    if useless {
+        return Status::INVALID_ARGUMENT.code();
+    }
+    // SAFETY: as the header demands.
+    unsafe {
+        pointers::with_new(master, |master| {
+            if master.core.is_pending() {
+                return Status::BUSY;
+            }
+            let storage = master.core.storage();
+            // No words start where words were before, but not at NULL.
+            if !response.is_null() {
+                storage.response = response;
+            }
+            if !transmit.is_null() {
+                storage.transmit = transmit;
+            }
+            storage.frame = frame;
+            storage.response_words = responseWords as u8;
+            storage.transmit_words = transmitWords as u8;
+            // No frame of a master is longer.
+            storage.frame_bytes = frameBytes.min(u8::MAX.into()) as u8;
+            Status::OK
+        })
+    }
+}
+
+/// Moves a non-blocking request on, without waiting.
+///
+/// Call it as often as you like, at least once per character time of the line
+/// if nothing else buffers its bytes.
+///
+/// @param master  the object
+/// @return MBM_PENDING until the request has ended, then its status, again at
+///         every call; MBM_OK if there was no request yet
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_poll(master: *mut mbm_master) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        match pointers::check(master) {
+            Status::OK => pointers::calling(master, Core::poll),
+            refused => refused,
+        }
+        .code()
+    }
+}
+
+/// How long mbm_master_poll will find nothing to do unless a byte arrives, so
+/// that a program or an idle hook may sleep until then. A wait that has just begun
+/// counts from this call, so sleeping lengthens no timeout.
+///
+/// @param master  the object
+/// @return microseconds; 0 means poll now, and is returned within a hook of the port
+///         but `idle`; 0xFFFFFFFF that there is no request
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_pollDelay(master: *mut mbm_master) -> u32 {
+    // SAFETY: as the header demands.
+    unsafe {
+        match pointers::check(master) {
+            Status::OK => pointers::calling(master, Core::poll_delay),
+            Status::BUSY => 0,
+            _ => u32::MAX,
+        }
+    }
+}
+
+/// Gives up the request under way, with the driver switched off; its status
+/// becomes MBM_CANCELLED. Without a request it does nothing.
+///
+/// @param master  the object
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_cancel(master: *mut mbm_master) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        let status = pointers::check(master);
+        if status == Status::OK {
+            pointers::calling(master, Core::cancel);
+        }
+        status.code()
+    }
+}
+
+/// The status of the last request.
+///
+/// @param master  the object
+/// @return MBM_PENDING while it is under way, MBM_OK if there was none;
+///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_status(master: *const mbm_master) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { pointers::with(master.cast_mut(), |master| master.core.status()) }
+}
+
+/// The raw exception code of the last reply, also where it is none that the
+/// standard allows (V1.1b3, 7).
+///
+/// @param master  the object
+/// @return the code; 0 if the last request ended without an exception frame
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_getExceptionCode(master: *const mbm_master) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { pointers::ask(master, 0, |master| master.core.exception_code()) }
+}
+
+/// Requests a form of an address and a word and, in blocking mode, sees it through.
+///
+/// # Safety
+/// As for [`pointers::with`].
+unsafe fn call(pointer: *mut mbm_master, address: u16, word: u16, form: Form) -> u8 {
+    // SAFETY: as the caller promises.
+    unsafe { request(pointer, |master| master.request(address, word, form)) }
+}
+
+/// Starts a request and, in blocking mode, sees it through.
+///
+/// # Safety
+/// As for [`pointers::with`].
+unsafe fn request(pointer: *mut mbm_master, start: impl FnOnce(&mut Core) -> Status) -> u8 {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let status = pointers::with(pointer, |master| start(&mut master.core));
+        finish(pointer, status)
+    }
+}
+
+/// In blocking mode, polls a request until it has ended; calls the idle hook
+/// where there is nothing to do.
+///
+/// # Safety
+/// As for [`pointers::with`]; the status is what that master said last.
+unsafe fn finish(pointer: *mut mbm_master, mut status: u8) -> u8 {
+    if status != Status::PENDING.code() {
+        return status;
+    }
+    // SAFETY: pending, so begun. No reference lives while the hook is called,
+    // for the hook may use the object, which mbm_master_poll looks at anew.
+    unsafe {
+        let blocking = !(*pointer.cast::<Object>()).non_blocking;
+        while blocking && status == Status::PENDING.code() {
+            status = mbm_master_poll(pointer);
+            let core = Object::core_of(pointer);
+            if (*core).is_waiting() {
+                let port = (*core).port();
+                let (idle, context) = (port.idle, port.context);
+                if let Some(idle) = idle {
+                    idle(context, pointer);
+                }
+            }
+        }
+    }
+    status
+}
