@@ -54,6 +54,7 @@ impl Heading {
     };
 
     /// What the frame is, to a unit that it is for if it is for one.
+    #[inline]
     pub const fn concern(&self, function: u8) -> Concern {
         match self.concern_of_all() {
             Concern::Broadcast if !only_writes(function) => Concern::Foreign,
@@ -62,6 +63,7 @@ impl Heading {
     }
 
     /// As [`Heading::concern`], of any function.
+    #[inline(always)]
     pub const fn concern_of_all(&self) -> Concern {
         if self.length == 0 {
             Concern::Foreign
@@ -73,22 +75,26 @@ impl Heading {
     }
 
     /// True if everybody is meant.
+    #[inline]
     pub const fn is_broadcast(&self) -> bool {
         self.is_serial() && self.to == 0
     }
 
     /// True on a serial line.
+    #[inline]
     pub const fn is_serial(&self) -> bool {
         self.own == SERIAL
     }
 
     /// True if a unit of this id is meant, by what is no broadcast.
+    #[inline]
     pub const fn is_for(&self, id: u8) -> bool {
         self.to == id || id == ANY || self.is_for_any()
     }
 
     /// True if the server itself is meant, by what is no broadcast. In a stream, the ids 0
     /// and 255 mean it (messaging on TCP/IP guide V1.0b, 4.4.1.2).
+    #[inline]
     pub const fn is_for_any(&self) -> bool {
         self.to == 0 || self.to == self.own
     }
@@ -101,6 +107,7 @@ pub const STREAM: u8 = 255;
 
 /// True for functions that only write, and those that users define: others are
 /// not carried out when they are broadcast (serial line guide V1.02, 2.1).
+#[inline]
 pub const fn only_writes(function: u8) -> bool {
     matches!(
         function,
