@@ -18,7 +18,6 @@
 
 mod bits;
 mod client;
-mod client_pointers;
 mod frame;
 mod functions;
 mod limits;

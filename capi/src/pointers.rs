@@ -1,6 +1,6 @@
-//! The only place where a pointer from C becomes a reference.
+//! Where pointers from C become references: to arrays and values, and to the objects
+//! that C programs begin.
 
-use super::master::{mbm_master, Core, Object};
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 use mbm::error::Status;
 
@@ -9,7 +9,7 @@ use mbm::error::Status;
 ///
 /// # Safety
 /// `first` is NULL or points to so many, which nothing changes meanwhile.
-pub(super) unsafe fn lent<'a, T>(first: *const T, count: usize) -> Option<&'a [T]> {
+pub(crate) unsafe fn lent<'a, T>(first: *const T, count: usize) -> Option<&'a [T]> {
     if first.is_null() || count > isize::MAX as usize / size_of::<T>() {
         return None;
     }
@@ -21,7 +21,7 @@ pub(super) unsafe fn lent<'a, T>(first: *const T, count: usize) -> Option<&'a [T
 ///
 /// # Safety
 /// As for [`lent`].
-pub(super) unsafe fn lent_or_none<'a, T>(first: *const T, count: usize) -> Option<&'a [T]> {
+pub(crate) unsafe fn lent_or_none<'a, T>(first: *const T, count: usize) -> Option<&'a [T]> {
     if count == 0 {
         return Some(&[]);
     }
@@ -34,7 +34,7 @@ pub(super) unsafe fn lent_or_none<'a, T>(first: *const T, count: usize) -> Optio
 /// # Safety
 /// `first` is NULL or points to so many bytes, which nothing else uses
 /// meanwhile: see [`overlap`].
-pub(super) unsafe fn buffer<'a>(first: *mut u8, capacity: u16) -> Option<&'a mut [u8]> {
+pub(crate) unsafe fn buffer<'a>(first: *mut u8, capacity: u16) -> Option<&'a mut [u8]> {
     let capacity = usize::from(capacity);
     if first.is_null() || capacity > isize::MAX as usize {
         return None;
@@ -44,7 +44,7 @@ pub(super) unsafe fn buffer<'a>(first: *mut u8, capacity: u16) -> Option<&'a mut
 }
 
 /// True if two stretches of bytes have one in common.
-pub(super) fn overlap(one: *const u8, bytes: u16, other: *const u8, more: u16) -> bool {
+pub(crate) fn overlap(one: *const u8, bytes: u16, other: *const u8, more: u16) -> bool {
     let (one, other) = (one as usize, other as usize);
     one < other.saturating_add(usize::from(more)) && other < one.saturating_add(usize::from(bytes))
 }
@@ -53,7 +53,7 @@ pub(super) fn overlap(one: *const u8, bytes: u16, other: *const u8, more: u16) -
 ///
 /// # Safety
 /// `place` is NULL or points to a value.
-pub(super) unsafe fn get<T: Copy>(place: *const T) -> Option<T> {
+pub(crate) unsafe fn get<T: Copy>(place: *const T) -> Option<T> {
     // SAFETY: as the caller promises.
     (!place.is_null()).then(|| unsafe { place.read() })
 }
@@ -63,7 +63,7 @@ pub(super) unsafe fn get<T: Copy>(place: *const T) -> Option<T> {
 ///
 /// # Safety
 /// `place` is NULL or points to room for a value.
-pub(super) unsafe fn put<T>(place: *mut T, value: T) -> u8 {
+pub(crate) unsafe fn put<T>(place: *mut T, value: T) -> u8 {
     if place.is_null() {
         return Status::INVALID_ARGUMENT.code();
     }
@@ -76,7 +76,7 @@ pub(super) unsafe fn put<T>(place: *mut T, value: T) -> u8 {
 ///
 /// # Safety
 /// As for [`put`].
-pub(super) unsafe fn put_length(place: *mut u16, length: Result<usize, Status>) -> u8 {
+pub(crate) unsafe fn put_length(place: *mut u16, length: Result<usize, Status>) -> u8 {
     match length {
         // SAFETY: as the caller promises.
         Ok(length) => unsafe { put(place, length as u16) },
@@ -88,125 +88,127 @@ pub(super) unsafe fn put_length(place: *mut u16, length: Result<usize, Status>) 
     }
 }
 
-/// Whether there is a master behind a pointer from C: [`Status::OK`],
-/// [`Status::INVALID_ARGUMENT`] for NULL, [`Status::NOT_INITIALISED`] for an
-/// object that was never begun, [`Status::BUSY`] from within a hook of its port.
+/// An object of C: storage of its caller's, zeroed before first use, which a begin
+/// function makes an object of.
 ///
 /// # Safety
-/// `master` is NULL or points to an `mbm_master`, zeroed or begun.
-#[cfg_attr(target_os = "none", inline(never))]
-pub(super) unsafe fn check(master: *const mbm_master) -> Status {
-    if master.is_null() {
+/// `mark` gives a byte of the storage that zeroed storage has zero, and to which only
+/// what begins an object, and [`calling`], write.
+pub(crate) unsafe trait CObject: Sized {
+    /// How the functions on it reach what lies behind it: by a reference, or by a
+    /// pointer where hooks that run meanwhile may hand the object to this library.
+    type Access<'a>;
+
+    /// The mark of an object, which is read before any reference to it is made.
+    ///
+    /// # Safety
+    /// `object` points to storage of one, zeroed or begun.
+    unsafe fn mark(object: *const Self) -> *mut u8;
+
+    /// What lies behind an object.
+    ///
+    /// # Safety
+    /// [`check`] found one, and nothing else uses it while a reference lives.
+    unsafe fn access<'a>(object: *mut Self) -> Self::Access<'a>;
+}
+
+/// Marks an object that was begun; zeroed storage does not carry it.
+pub(crate) const BEGUN: u8 = CALLING & !1;
+
+/// Marks an object while hooks may be called that may not use it.
+pub(crate) const CALLING: u8 = Status::BUSY.code();
+const _: () = assert!(CALLING & 1 != 0);
+
+/// Whether there is an object behind a pointer from C: [`Status::OK`],
+/// [`Status::INVALID_ARGUMENT`] for NULL, [`Status::NOT_INITIALISED`] for one that was
+/// never begun, [`Status::BUSY`] from within a hook that may not use it.
+///
+/// # Safety
+/// `object` is NULL or points to storage of one, zeroed or begun.
+#[cfg_attr(all(target_os = "none", not(target_arch = "avr")), inline(never))]
+pub(crate) unsafe fn check<O: CObject>(object: *const O) -> Status {
+    // SAFETY: as the caller promises.
+    unsafe { check_once(object) }
+}
+
+/// [`check`], for a function that most images have no other with of its noun.
+///
+/// # Safety
+/// As for [`check`].
+#[inline(always)]
+pub(crate) unsafe fn check_once<O: CObject>(object: *const O) -> Status {
+    if object.is_null() {
         return Status::INVALID_ARGUMENT;
     }
-    // SAFETY: not NULL, so storage of an object, which has room for it.
-    match unsafe { Object::mark(master).read() } {
-        Object::BEGUN => Status::OK,
-        Object::CALLING => Status::BUSY,
+    // SAFETY: not NULL, so storage of an object.
+    match unsafe { O::mark(object).read() } {
+        BEGUN => Status::OK,
+        CALLING => Status::BUSY,
         _ => Status::NOT_INITIALISED,
     }
 }
 
-/// The master behind a pointer.
+/// What lies behind a pointer to an object.
 ///
 /// # Safety
-/// [`check`] found one, and nothing else uses it while the reference lives.
-pub(super) unsafe fn object<'a>(master: *mut mbm_master) -> &'a mut Object {
-    // SAFETY: begun, so every field is valid; exclusive as the caller promises.
-    unsafe { &mut *master.cast() }
+/// As for [`CObject::access`]; every object is writable storage.
+pub(crate) unsafe fn object<'a, O: CObject>(object: *const O) -> O::Access<'a> {
+    // SAFETY: as the caller promises.
+    unsafe { O::access(object.cast_mut()) }
 }
 
-/// As [`check`], but what nobody has touched yet becomes a master, with
-/// defaults and without port and buffers.
+/// Runs `action`, which may call hooks of an object. A call on the same object from
+/// within them is refused by [`check`], which looks at the mark alone: a reference that
+/// `action` makes does not cover that.
 ///
 /// # Safety
-/// As for [`with`].
-#[cfg_attr(target_os = "none", inline(never))]
-pub(super) unsafe fn prepare(master: *mut mbm_master) -> Status {
-    // SAFETY: as the caller promises; what is not begun is zeroed, and zero is
-    // a value of every field.
-    unsafe {
-        match check(master) {
-            Status::NOT_INITIALISED => {
-                object(master).preset();
-                Status::OK
-            }
-            other => other,
-        }
-    }
-}
-
-/// Runs `action` on the core of a master, which may call hooks of its port. A call
-/// on the same object from within them is refused by [`check`], which looks at the
-/// mark alone; the reference to the core does not cover that.
-///
-/// # Safety
-/// [`check`] found a master, and no reference to it lives.
+/// [`check`] found an object, or one is being begun, and no reference to it lives.
 #[inline(always)]
-pub(super) unsafe fn calling<T>(master: *mut mbm_master, action: impl FnOnce(&mut Core) -> T) -> T {
-    // SAFETY: begun, so every field is valid; exclusive, for no other function
-    // makes a reference while the mark says so.
+pub(crate) unsafe fn calling<O: CObject, T>(object: *const O, action: impl FnOnce() -> T) -> T {
+    // SAFETY: as the caller promises; every object is writable storage.
     unsafe {
-        let mark = Object::mark(master);
-        mark.write(Object::CALLING);
-        let result = action(&mut *Object::core_of(master));
-        mark.write(Object::BEGUN);
+        let mark = O::mark(object);
+        mark.write(CALLING);
+        let result = action();
+        mark.write(BEGUN);
         result
     }
 }
 
-/// Runs `action` on a master, or returns the status that says why not. It calls no
-/// hook: for that there is [`calling`].
+/// Runs `action` on an object, or returns the status that says why not. It calls no
+/// hook but within [`calling`].
 ///
 /// # Safety
 /// As for [`check`]; nothing else uses the object meanwhile.
-pub(super) unsafe fn with(
-    master: *mut mbm_master,
-    action: impl FnOnce(&mut Object) -> Status,
+pub(crate) unsafe fn with<'a, O: CObject>(
+    object: *mut O,
+    action: impl FnOnce(O::Access<'a>) -> Status,
 ) -> u8 {
     // SAFETY: checked; exclusive as the caller promises.
     let status = unsafe {
-        match check(master) {
-            Status::OK => action(object(master)),
+        match check(object) {
+            Status::OK => action(O::access(object)),
             refused => refused,
         }
     };
     status.code()
 }
 
-/// As [`with`], for what [`prepare`] makes a master of.
+/// Asks an object something; `otherwise` where there is none, and from within a hook
+/// that may not use it.
 ///
 /// # Safety
 /// As for [`with`].
-pub(super) unsafe fn with_new(
-    master: *mut mbm_master,
-    action: impl FnOnce(&mut Object) -> Status,
-) -> u8 {
-    // SAFETY: prepared; exclusive as the caller promises.
-    let status = unsafe {
-        match prepare(master) {
-            Status::OK => action(object(master)),
-            refused => refused,
-        }
-    };
-    status.code()
-}
-
-/// Asks a master something; `otherwise` where there is none, and from within a hook
-/// of its port.
-///
-/// # Safety
-/// As for [`with`].
-pub(super) unsafe fn ask<T>(
-    master: *const mbm_master,
+pub(crate) unsafe fn ask<'a, O: CObject, T>(
+    object: *const O,
     otherwise: T,
-    question: impl FnOnce(&mut Object) -> T,
+    question: impl FnOnce(O::Access<'a>) -> T,
 ) -> T {
     // SAFETY: checked; exclusive as the caller promises, and every object is
     // writable storage.
     unsafe {
-        match check(master) {
-            Status::OK => question(object(master.cast_mut())),
+        match check(object) {
+            Status::OK => question(O::access(object.cast_mut())),
             _ => otherwise,
         }
     }
@@ -216,7 +218,7 @@ pub(super) unsafe fn ask<T>(
 ///
 /// # Safety
 /// `place` is NULL or points to a `T`.
-pub(super) unsafe fn put_found<T>(
+pub(crate) unsafe fn put_found<T>(
     place: *mut T,
     find: impl FnOnce() -> Result<T, Status>,
 ) -> Result<(), Status> {
@@ -233,7 +235,7 @@ pub(super) unsafe fn put_found<T>(
 ///
 /// # Safety
 /// `items` is NULL or points to `count` items that nobody writes meanwhile.
-pub(super) unsafe fn slice<'a, T>(items: *const T, count: usize) -> Result<&'a [T], Status> {
+pub(crate) unsafe fn slice<'a, T>(items: *const T, count: usize) -> Result<&'a [T], Status> {
     match (items.is_null(), count) {
         (_, 0) => Ok(&[]),
         (true, _) => Err(Status::INVALID_ARGUMENT),
@@ -246,7 +248,7 @@ pub(super) unsafe fn slice<'a, T>(items: *const T, count: usize) -> Result<&'a [
 ///
 /// # Safety
 /// As for [`slice`], and nobody else reads them meanwhile.
-pub(super) unsafe fn slice_mut<'a, T>(items: *mut T, count: usize) -> Result<&'a mut [T], Status> {
+pub(crate) unsafe fn slice_mut<'a, T>(items: *mut T, count: usize) -> Result<&'a mut [T], Status> {
     match (items.is_null(), count) {
         (_, 0) => Ok(&mut []),
         (true, _) => Err(Status::INVALID_ARGUMENT),
@@ -261,7 +263,7 @@ pub(super) unsafe fn slice_mut<'a, T>(items: *mut T, count: usize) -> Result<&'a
 ///
 /// # Safety
 /// `text` is NULL or points to characters that a NUL ends.
-pub(super) unsafe fn text<'a>(text: *const u8, most: usize) -> Result<&'a [u8], Status> {
+pub(crate) unsafe fn text<'a>(text: *const u8, most: usize) -> Result<&'a [u8], Status> {
     if text.is_null() {
         return Err(Status::INVALID_ARGUMENT);
     }

@@ -3,7 +3,7 @@
 use super::frame::mbm_framing;
 use super::functions::{declared, mbm_function};
 use super::packet::{mbm_packet, MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
-use super::pointers::{buffer, get, lent_or_none, put};
+use super::pointers::{self, ask, buffer, get, lent_or_none, put, CObject, BEGUN};
 use core::ffi::c_void;
 use mbm::error::Status;
 use mbm::explain::HEAD;
@@ -70,7 +70,7 @@ pub struct mbm_sniffer {
 
 /// What lies behind an `mbm_sniffer`.
 #[repr(C)]
-struct Object {
+pub(super) struct Object {
     buffer: *mut u8,
     size: u16,
     mark: u8,
@@ -78,9 +78,6 @@ struct Object {
     functions: [Function; FUNCTIONS],
     core: Sniffer,
 }
-
-/// Marks an object that was begun; zeroed storage does not carry it.
-const BEGUN: u8 = 0x53;
 
 const _: () = {
     let room = size_of::<mbm_sniffer>();
@@ -220,39 +217,32 @@ impl mbm_event {
     }
 }
 
-/// The sniffer behind a pointer.
-///
-/// # Safety
-/// `sniffer` is NULL or points to an `mbm_sniffer`, zeroed or begun, which
-/// nothing else uses while the reference lives.
-unsafe fn object<'a>(sniffer: *mut mbm_sniffer) -> Result<&'a mut Object, Status> {
-    if sniffer.is_null() {
-        return Err(Status::INVALID_ARGUMENT);
+// SAFETY: the mark is a field of its own.
+unsafe impl CObject for mbm_sniffer {
+    type Access<'a> = &'a mut Object;
+
+    unsafe fn mark(sniffer: *const mbm_sniffer) -> *mut u8 {
+        // SAFETY: as the caller promises; every object is writable storage.
+        unsafe { &raw mut (*sniffer.cast::<Object>().cast_mut()).mark }
     }
-    let object: *mut Object = sniffer.cast();
-    // SAFETY: not NULL, so storage with room for it, zeroed or written; once it
-    // carries the mark every field is valid.
-    unsafe {
-        if (&raw const (*object).mark).read() == BEGUN {
-            Ok(&mut *object)
-        } else {
-            Err(Status::NOT_INITIALISED)
-        }
+
+    unsafe fn access<'a>(sniffer: *mut mbm_sniffer) -> &'a mut Object {
+        // SAFETY: begun, so every field is valid; exclusive as the caller promises.
+        unsafe { &mut *sniffer.cast() }
     }
 }
 
 /// Changes a sniffer, or says why not.
 ///
 /// # Safety
-/// As for [`object`].
+/// As for [`pointers::with`].
 unsafe fn with(sniffer: *mut mbm_sniffer, change: impl FnOnce(&mut Sniffer)) -> u8 {
     // SAFETY: as the caller promises.
-    match unsafe { object(sniffer) } {
-        Ok(object) => {
+    unsafe {
+        pointers::with(sniffer, |object| {
             change(&mut object.core);
-            Status::OK.code()
-        }
-        Err(refused) => refused.code(),
+            Status::OK
+        })
     }
 }
 
@@ -409,13 +399,13 @@ pub unsafe extern "C" fn mbm_sniffer_feed(
     // SAFETY: as the header demands; begin demands that the buffer is valid.
     unsafe {
         let bytes = lent_or_none(bytes, length.into());
-        match (object(sniffer), bytes) {
-            (Ok(object), Some(bytes)) => match buffer(object.buffer, object.size) {
+        let Some(bytes) = bytes else { return 0 };
+        ask(sniffer, 0, |object| {
+            match buffer(object.buffer, object.size) {
                 Some(buffer) => object.core.feed(buffer, tap, bytes, now) as u16,
                 None => 0,
-            },
-            _ => 0,
-        }
+            }
+        })
     }
 }
 
@@ -440,13 +430,12 @@ pub unsafe extern "C" fn mbm_sniffer_next(
     }
     // SAFETY: as the header demands; begin demands that the buffer is valid.
     unsafe {
-        let Ok(object) = object(sniffer) else {
-            return 0;
-        };
-        if object.core.is_calm(now) || only_waits(object, now) {
-            return 0;
-        }
-        next(object, now, event)
+        ask(sniffer, 0, |object| {
+            if object.core.is_calm(now) || only_waits(object, now) {
+                return 0;
+            }
+            next(object, now, event)
+        })
     }
 }
 

@@ -3,8 +3,7 @@
 use super::kind::{on_line, AsciiLine, RtuLine, TcpLine};
 use super::{mbm_client, pointers, shared};
 use crate::frame::MBM_FRAMING_RTU;
-use crate::master::{mbm_master, Core};
-use crate::pointers as masters;
+use crate::master::{self, mbm_master, Core};
 use core::ffi::c_void;
 use mbm::error::Status;
 
@@ -98,8 +97,8 @@ pub unsafe extern "C" fn mbm_client_lend(client: *mut mbm_client, master: *mut m
                     // A facade speaks RTU.
                     return Status::INVALID_ARGUMENT;
                 }
-                match masters::check(master) {
-                    Status::OK if masters::object(master).core().is_pending() => {
+                match pointers::check(master) {
+                    Status::OK if pointers::object(master).core().is_pending() => {
                         return Status::BUSY;
                     }
                     Status::OK | Status::NOT_INITIALISED => {}
@@ -110,13 +109,13 @@ pub unsafe extern "C" fn mbm_client_lend(client: *mut mbm_client, master: *mut m
                 return Status::BUSY;
             }
             if !master.is_null() {
-                masters::prepare(master);
-                *masters::object(master).core().port() = *(*(*object).kind).port(object);
+                master::prepare(master);
+                *pointers::object(master).core().port() = *(*(*object).kind).port(object);
             }
             Status::OK
         });
         if status == Status::OK.code() && !master.is_null() {
-            masters::calling(master, Core::line_used);
+            master::calling(master, Core::line_used);
         }
         status
     }
@@ -140,9 +139,9 @@ pub unsafe extern "C" fn mbm_client_takeBack(
             if !shared(object).lent {
                 return Status::INVALID_ARGUMENT;
             }
-            match masters::check(master) {
+            match pointers::check(master) {
                 Status::OK => {
-                    let core = masters::object(master).core();
+                    let core = pointers::object(master).core();
                     if core.is_pending() {
                         return Status::BUSY;
                     }

@@ -15,7 +15,7 @@ pub use request::mbm_clientRequest;
 pub use requests::*;
 pub use settings::*;
 
-use super::client_pointers as pointers;
+use super::pointers::{self, CObject};
 use super::port;
 use super::storage::mbm_counters;
 use core::ffi::c_void;
@@ -71,19 +71,19 @@ const _: () = {
     assert!(size_of::<usize>() > 4 || (room - used) * 20 <= room);
 };
 
-impl Object {
-    /// Marks an object that was begun; zeroed storage does not carry it.
-    pub(super) const BEGUN: u8 = 0x43;
-    /// Marks an object while hooks may be called that may not use it.
-    pub(super) const CALLING: u8 = 0x44;
+// SAFETY: the mark is a field of its own.
+unsafe impl CObject for mbm_client {
+    // Hooks run while the client is in use, and may hand it to functions of this
+    // library, which then look at the mark: no reference covers that.
+    type Access<'a> = *mut Object;
 
-    /// The mark in storage of an object.
-    ///
-    /// # Safety
-    /// `client` points to storage of an object, zeroed or begun.
-    pub(super) unsafe fn mark(client: *const mbm_client) -> *mut u8 {
+    unsafe fn mark(client: *const mbm_client) -> *mut u8 {
         // SAFETY: as the caller promises; every object is writable storage.
         unsafe { &raw mut (*client.cast::<Object>().cast_mut()).mark }
+    }
+
+    unsafe fn access<'a>(client: *mut mbm_client) -> Self::Access<'a> {
+        client.cast()
     }
 }
 

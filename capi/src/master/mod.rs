@@ -10,7 +10,7 @@ pub use settings::*;
 pub use values::*;
 pub use words::*;
 
-use super::pointers;
+use super::pointers::{self, CObject};
 use super::port::mbm_port;
 use super::storage::LentByC;
 use core::ffi::c_void;
@@ -57,26 +57,28 @@ const _: () = {
     assert!(size_of::<usize>() > 4 || (room - used) * 20 <= room);
 };
 
-impl Object {
-    /// Marks an object that was begun; zeroed storage does not carry it.
-    pub(crate) const BEGUN: u8 = 0x4D;
-    /// Marks an object whose port's hooks may be at work.
-    pub(crate) const CALLING: u8 = 0x4E;
+// SAFETY: the mark is a field of its own.
+unsafe impl CObject for mbm_master {
+    type Access<'a> = &'a mut Object;
 
-    /// The mark in storage of an object.
-    ///
-    /// # Safety
-    /// `master` points to storage of an object, zeroed or begun.
-    pub(crate) unsafe fn mark(master: *const mbm_master) -> *mut u8 {
+    unsafe fn mark(master: *const mbm_master) -> *mut u8 {
         // SAFETY: as the caller promises; every object is writable storage.
         unsafe { &raw mut (*master.cast::<Object>().cast_mut()).mark }
     }
 
-    /// The core in storage of an object.
+    unsafe fn access<'a>(master: *mut mbm_master) -> &'a mut Object {
+        // SAFETY: begun, so every field is valid; exclusive as the caller promises.
+        unsafe { &mut *master.cast() }
+    }
+}
+
+impl Object {
+    /// The core in storage of an object, which leaves the mark out: that is read while
+    /// the core is in use.
     ///
     /// # Safety
-    /// As for [`Object::mark`].
-    pub(crate) unsafe fn core_of(master: *mut mbm_master) -> *mut Core {
+    /// `master` points to storage of an object, zeroed or begun.
+    pub(super) unsafe fn core_of(master: *mut mbm_master) -> *mut Core {
         // SAFETY: as the caller promises.
         unsafe { &raw mut (*master.cast::<Object>()).core }
     }
@@ -85,12 +87,39 @@ impl Object {
     pub(super) fn core(&mut self) -> &mut Core {
         &mut self.core
     }
+}
 
-    /// Turns a zeroed object into one that is begun, without port and buffers.
-    pub(super) fn preset(&mut self) {
-        self.core.preset();
-        self.mark = Object::BEGUN;
+/// As [`pointers::check`], but what nobody has touched yet becomes a master, with
+/// defaults and without port and buffers.
+///
+/// # Safety
+/// As for [`pointers::with`].
+#[cfg_attr(target_os = "none", inline(never))]
+pub(super) unsafe fn prepare(master: *mut mbm_master) -> Status {
+    // SAFETY: as the caller promises; what is not begun is zeroed, and zero is
+    // a value of every field.
+    unsafe {
+        match pointers::check(master) {
+            Status::NOT_INITIALISED => {
+                let object = mbm_master::access(master);
+                object.core.preset();
+                object.mark = pointers::BEGUN;
+                Status::OK
+            }
+            other => other,
+        }
     }
+}
+
+/// Runs `action`, which may call hooks, on the core of a master.
+///
+/// # Safety
+/// As for [`pointers::calling`].
+#[inline(always)]
+pub(super) unsafe fn calling<T>(master: *mut mbm_master, action: impl FnOnce(&mut Core) -> T) -> T {
+    // SAFETY: begun, so every field is valid; exclusive, for no other function
+    // makes a reference while the mark says so.
+    unsafe { pointers::calling(master, || action(&mut *Object::core_of(master))) }
 }
 
 /// Begins to talk to a slave over a port.
@@ -123,9 +152,9 @@ pub unsafe extern "C" fn mbm_master_begin(
     }
     // SAFETY: as the header demands.
     unsafe {
-        let status = pointers::prepare(master);
+        let status = prepare(master);
         if status == Status::OK {
-            pointers::calling(master, |core| {
+            calling(master, |core| {
                 core.begin(slave, |place| place.copy(port));
             });
         }
@@ -168,25 +197,28 @@ pub unsafe extern "C" fn mbm_master_setBuffers(
     }
     // SAFETY: as the header demands.
     unsafe {
-        pointers::with_new(master, |master| {
-            if master.core.is_pending() {
-                return Status::BUSY;
-            }
-            let storage = master.core.storage();
-            // No words start where words were before, but not at NULL.
-            if !response.is_null() {
-                storage.response = response;
-            }
-            if !transmit.is_null() {
-                storage.transmit = transmit;
-            }
-            storage.frame = frame;
-            storage.response_words = responseWords as u8;
-            storage.transmit_words = transmitWords as u8;
-            // No frame of a master is longer.
-            storage.frame_bytes = frameBytes.min(u8::MAX.into()) as u8;
-            Status::OK
-        })
+        let status = prepare(master);
+        if status != Status::OK {
+            return status.code();
+        }
+        let master = pointers::object(master);
+        if master.core.is_pending() {
+            return Status::BUSY.code();
+        }
+        let storage = master.core.storage();
+        // No words start where words were before, but not at NULL.
+        if !response.is_null() {
+            storage.response = response;
+        }
+        if !transmit.is_null() {
+            storage.transmit = transmit;
+        }
+        storage.frame = frame;
+        storage.response_words = responseWords as u8;
+        storage.transmit_words = transmitWords as u8;
+        // No frame of a master is longer.
+        storage.frame_bytes = frameBytes.min(u8::MAX.into()) as u8;
+        Status::OK.code()
     }
 }
 
@@ -203,7 +235,7 @@ pub unsafe extern "C" fn mbm_master_poll(master: *mut mbm_master) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         match pointers::check(master) {
-            Status::OK => pointers::calling(master, Core::poll),
+            Status::OK => calling(master, Core::poll),
             refused => refused,
         }
         .code()
@@ -222,7 +254,7 @@ pub unsafe extern "C" fn mbm_master_pollDelay(master: *mut mbm_master) -> u32 {
     // SAFETY: as the header demands.
     unsafe {
         match pointers::check(master) {
-            Status::OK => pointers::calling(master, Core::poll_delay),
+            Status::OK => calling(master, Core::poll_delay),
             Status::BUSY => 0,
             _ => u32::MAX,
         }
@@ -240,7 +272,7 @@ pub unsafe extern "C" fn mbm_master_cancel(master: *mut mbm_master) -> u8 {
     unsafe {
         let status = pointers::check(master);
         if status == Status::OK {
-            pointers::calling(master, Core::cancel);
+            calling(master, Core::cancel);
         }
         status.code()
     }

@@ -1,7 +1,8 @@
 //! How a master behaves.
 
+use super::calling;
 use super::{mbm_master, Core};
-use crate::pointers::{ask, calling, check, with};
+use crate::pointers::{ask, check, with};
 use crate::storage::mbm_counters;
 use mbm::error::Status;
 use mbm::time::millis;

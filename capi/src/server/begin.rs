@@ -1,7 +1,8 @@
 //! Beginning a server, and how it behaves.
 
-use super::{check, core_of, mbm_server, mbm_unit, Core, Object, BEGUN, POLLING};
+use super::{mbm_server, mbm_unit, Core};
 use crate::frame::MBM_MAX_TCP_FRAME;
+use crate::pointers::{calling, check, object, CObject, CALLING};
 use crate::port::{countable, mbm_port};
 use mbm::error::Status;
 use mbm::time;
@@ -33,25 +34,24 @@ unsafe fn begin(
         if !(*port).is_complete() {
             return Status::INVALID_ARGUMENT;
         }
-        let mark = &raw mut (*server.cast::<Object>()).mark;
-        if mark.read() == POLLING {
+        if mbm_server::mark(server).read() == CALLING {
             return Status::BUSY;
         }
-        let core = core_of(server);
-        mark.write(POLLING);
-        // The driver of the port that the object had is not left on.
-        if (*core).is_sending() {
-            if let Some(post) = (*core).port.postTransmission {
-                post((*core).port.context);
+        let core = object(server);
+        calling(server, || {
+            // The driver of the port that the object had is not left on.
+            if (*core).is_sending() {
+                if let Some(post) = (*core).port.postTransmission {
+                    post((*core).port.context);
+                }
             }
-        }
-        (*core).port.copy(&*port);
-        (*core).lent.frame = frame;
-        (*core).lent.units = units;
-        (*core).lent.bytes = countable(bytes);
-        (*core).lent.count = count;
-        framing(&mut *core);
-        mark.write(BEGUN);
+            (*core).port.copy(&*port);
+            (*core).lent.frame = frame;
+            (*core).lent.units = units;
+            (*core).lent.bytes = countable(bytes);
+            (*core).lent.count = count;
+            framing(&mut *core);
+        });
     }
     Status::OK
 }
@@ -189,7 +189,7 @@ pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, microsec
     unsafe {
         let status = check(server);
         if status == Status::OK {
-            (*core_of(server)).set_silence(microseconds);
+            (*object(server)).set_silence(microseconds);
         }
         status.code()
     }
@@ -208,8 +208,8 @@ pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u
     // SAFETY: as the header demands.
     unsafe {
         match check(server) {
-            Status::OK if (*core_of(server)).is_rtu_line() => {
-                (*core_of(server)).set_silence(time::silence(baud));
+            Status::OK if (*object(server)).is_rtu_line() => {
+                (*object(server)).set_silence(time::silence(baud));
                 Status::OK.code()
             }
             Status::OK => Status::INVALID_ARGUMENT.code(),
@@ -231,7 +231,7 @@ pub unsafe extern "C" fn mbm_server_setEchoDiscard(server: *mut mbm_server, on: 
     // SAFETY: as the header demands.
     unsafe {
         match check(server) {
-            Status::OK if (*core_of(server)).set_echo_discard(on != 0) => Status::OK.code(),
+            Status::OK if (*object(server)).set_echo_discard(on != 0) => Status::OK.code(),
             Status::OK => Status::INVALID_ARGUMENT.code(),
             refused => refused.code(),
         }

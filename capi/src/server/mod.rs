@@ -21,6 +21,7 @@ pub use respond::*;
 pub use tables::*;
 pub use units::*;
 
+use super::pointers::{calling, check, check_once, object, CObject, BEGUN, CALLING};
 use super::port::{self, mbm_port};
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
@@ -28,14 +29,6 @@ use mbm::error::Status;
 use mbm::pdu::custom::Rule;
 use mbm::server::{Lent, Reply, Server, MOST_REQUESTS};
 use mbm::FIRMWARE;
-
-/// Marks an object that was begun; zeroed storage does not carry it.
-const BEGUN: u8 = POLLING & !1;
-
-/// Marks an object whose poll is at work. What a hook calls on it is refused
-/// before any reference to it is made.
-const POLLING: u8 = Status::BUSY.code();
-const _: () = assert!(POLLING & 1 != 0);
 
 /// A Modbus server on one line or one connection.
 ///
@@ -70,7 +63,7 @@ struct Object {
     mark: u8,
 }
 
-type Core = Server<mbm_port, LentByC>;
+pub(super) type Core = Server<mbm_port, LentByC>;
 
 const _: () = {
     let room = size_of::<mbm_server>();
@@ -83,7 +76,7 @@ const _: () = {
 
 /// What mbm_server_begin and its sisters were given.
 #[repr(C)]
-struct LentByC {
+pub(super) struct LentByC {
     bytes: u16,
     count: u8,
     frame: *mut u8,
@@ -132,32 +125,21 @@ impl Lent for LentByC {
     }
 }
 
-/// Whether there is a server behind a pointer from C: [`Status::OK`],
-/// [`Status::INVALID_ARGUMENT`] for NULL, [`Status::NOT_INITIALISED`] for an
-/// object that was never begun, [`Status::BUSY`] for one whose poll is at work.
-///
-/// # Safety
-/// `server` is NULL or points to an `mbm_server`, zeroed or begun.
-unsafe fn check(server: *const mbm_server) -> Status {
-    if server.is_null() {
-        return Status::INVALID_ARGUMENT;
-    }
-    // SAFETY: not NULL, so storage of an object, zeroed or written.
-    match unsafe { (&raw const (*server.cast::<Object>()).mark).read() } {
-        BEGUN => Status::OK,
-        POLLING => Status::BUSY,
-        _ => Status::NOT_INITIALISED,
-    }
-}
+// SAFETY: the mark is a field of its own.
+unsafe impl CObject for mbm_server {
+    // A pointer, for while a poll is at work hooks may hand the server to functions of
+    // this library. The core leaves the mark out, which those look at.
+    type Access<'a> = *mut Core;
 
-/// The core of a server, which leaves the mark out: that is read while the core
-/// is in use.
-///
-/// # Safety
-/// `server` points to an `mbm_server`.
-unsafe fn core_of(server: *const mbm_server) -> *mut Core {
-    // SAFETY: as the caller promises; every object is writable storage.
-    unsafe { &raw mut (*server.cast::<Object>().cast_mut()).core }
+    unsafe fn mark(server: *const mbm_server) -> *mut u8 {
+        // SAFETY: as the caller promises; every object is writable storage.
+        unsafe { &raw mut (*server.cast::<Object>().cast_mut()).mark }
+    }
+
+    unsafe fn access<'a>(server: *mut mbm_server) -> Self::Access<'a> {
+        // SAFETY: as the caller promises.
+        unsafe { &raw mut (*server.cast::<Object>()).core }
+    }
 }
 
 /// Moves the server on, without waiting: takes bytes in, carries a request out
@@ -176,13 +158,13 @@ unsafe fn core_of(server: *const mbm_server) -> *mut Core {
 pub unsafe extern "C" fn mbm_server_poll(server: *mut mbm_server) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        let status = check(server);
+        let status = check_once(server);
         if status != Status::OK {
             return status.code();
         }
-        let mark = &raw mut (*server.cast::<Object>()).mark;
-        mark.write(POLLING);
-        let status = serve(core_of(server), mark);
+        let mark = mbm_server::mark(server);
+        mark.write(CALLING);
+        let status = serve(object(server), mark);
         // An object that a hook zeroed stays zero.
         mark.write(mark.read() & BEGUN);
         status.code()
@@ -209,8 +191,8 @@ unsafe fn serve(core: *mut Core, mark: *const u8) -> Status {
                 let lent = &raw const (*core).lent;
                 let pdu = (*lent).frame.add((*heading).head.into());
                 let reply = units::serve((*lent).units, (*lent).count, heading, pdu);
-                core::hint::assert_unchecked(mark.read() != POLLING || (*core).has_framing());
-                if mark.read() != POLLING || !(*core).answer_served(Reply::from_number(reply)) {
+                core::hint::assert_unchecked(mark.read() != CALLING || (*core).has_framing());
+                if mark.read() != CALLING || !(*core).answer_served(Reply::from_number(reply)) {
                     return Status::OK;
                 }
             } else if status != Status::OK {
@@ -236,7 +218,7 @@ unsafe fn serve(core: *mut Core, mark: *const u8) -> Status {
             let lent = &raw const (*core).lent;
             let pdu = (*lent).frame.add((*heading).head.into());
             let reply = units::serve((*lent).units, (*lent).count, heading, pdu);
-            if mark.read() != POLLING {
+            if mark.read() != CALLING {
                 return Status::OK;
             }
             if let Some(status) = (*core).conclude(Reply::from_number(reply)) {
@@ -262,11 +244,8 @@ pub unsafe extern "C" fn mbm_server_pollDelay(server: *const mbm_server) -> u32 
     unsafe {
         match check(server) {
             Status::OK => {
-                let core = core_of(server);
-                let mark = &raw mut (*server.cast::<Object>().cast_mut()).mark;
-                mark.write(POLLING);
-                let now = port::now(&raw const (*core).port);
-                mark.write(BEGUN);
+                let core = object(server);
+                let now = calling(server, || port::now(&raw const (*core).port));
                 (*core).poll_delay(now)
             }
             Status::BUSY => 0,
