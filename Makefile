@@ -64,7 +64,7 @@ header: ## Write include/mbm.h anew from the source
 	@$(CARGO) run --quiet -p mbm-tools --bin header
 
 .PHONY: check
-check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, symbols
+check: need-check $(ARCHIVE) ## Formatting, lints, layers, circles, header, functions, symbols
 	@$(CARGO) fmt --all --check
 	@for crate in fuzz bench model; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml --check || exit 1; done
 	@$(CARGO) clippy --quiet --workspace --all-targets --features pymodbus -- -D warnings
@@ -73,6 +73,7 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, sy
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps
 	@$(CARGO) test --quiet -p mbm-tools >/dev/null
 	@$(CARGO) run --quiet -p mbm-tools --bin layers
+	@$(CARGO) run --quiet -p mbm-tools --bin circles
 	@$(CARGO) run --quiet -p mbm-tools --bin header -- --check
 	@scripts/check-header
 	@scripts/check-docs

@@ -1,5 +1,6 @@
 //! Application data units: how a PDU and its unit travel on a line.
 
+mod adu;
 pub mod ascii;
 pub mod ascii_window;
 pub mod checksum;
@@ -7,20 +8,10 @@ pub mod rtu;
 mod search;
 pub mod tcp;
 
+pub use adu::Adu;
 pub use search::{Found, Search, Seen, Verdict, Wanted};
 
 use crate::error::Status;
-
-/// What a frame carries.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Adu<'a> {
-    /// The transaction identifier of a TCP frame; 0 in others.
-    pub transaction: u16,
-    /// The unit that a request is for, or a response comes from.
-    pub unit: u8,
-    /// Function code and data.
-    pub pdu: &'a [u8],
-}
 
 /// How frames are told apart.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -5,7 +5,7 @@
 //! request is carried out. A framing is two functions kept in the object, so
 //! that firmware carries those it begins with.
 
-use super::units::STREAM;
+use super::heading::STREAM;
 use super::{Heading, Reply, Units};
 use crate::bytes::move_to_front;
 use crate::error::Status;

@@ -1,6 +1,7 @@
 //! Functions that the caller defines, and functions switched off.
 
-use super::units::{add, add_first, is_unheard, request};
+use super::records::Serve;
+use super::units::{add, add_first, is_unheard, request, Places};
 use super::{mbm_service, mbm_unit};
 use crate::functions::{self, mbm_rule};
 use core::ffi::c_void;
@@ -133,13 +134,13 @@ unsafe fn serve_mine(record: *mut mbm_custom, pdu: *mut u8, heading: *const c_vo
 ///
 /// # Safety
 /// `service` is the head of a record of any kind.
-pub(super) unsafe fn rule(service: *const mbm_service, function: u8) -> Option<Rule> {
+unsafe fn declared(service: *const mbm_service, function: u8) -> Option<Rule> {
     // SAFETY: as the caller promises; a record that this file serves is a
     // function of C.
     unsafe {
         if !(*service)
             .serve
-            .is_some_and(|other| core::ptr::fn_addr_eq(other, serve as super::units::Serve))
+            .is_some_and(|other| core::ptr::fn_addr_eq(other, serve as Serve))
         {
             return None;
         }
@@ -149,6 +150,24 @@ pub(super) unsafe fn rule(service: *const mbm_service, function: u8) -> Option<R
         }
         functions::rule((*record).length)
     }
+}
+
+/// The length rule that a unit has for a user's function.
+///
+/// # Safety
+/// `units` points to `count` units.
+pub(super) unsafe fn rule(units: *const mbm_unit, count: u8, function: u8) -> Option<Rule> {
+    // SAFETY: as the caller promises.
+    unsafe {
+        for index in 0..count {
+            for service in Places::new(units.add(index.into())) {
+                if let Some(rule) = declared(service, function) {
+                    return Some(rule);
+                }
+            }
+        }
+    }
+    None
 }
 
 /// Serves a function of yours, on every framing.

@@ -1,59 +1,11 @@
 //! Counters of a line, listen only mode and event log.
 
 use super::units::{add, is_unheard, request, walk};
-use super::{mbm_service, mbm_unit};
+use super::{mbm_diagnostics, mbm_service, mbm_unit};
 use core::ffi::c_void;
 use mbm::error::Status;
 use mbm::server::diagnostics::{Diagnostics, Restart};
 use mbm::server::{Concern, Heading, Reply};
-
-/// What a unit knows of its line. Zero it, and hand it to
-/// mbm_server_serveDiagnostics. Counters wrap at 2^16; read them as you like.
-#[repr(C)]
-pub struct mbm_diagnostics {
-    /// Not for you.
-    pub service: mbm_service,
-    /// Optional: told that the client restarted the line with sub-function 01 of
-    /// 08; `clearLog` is 1 if it cleared the event log too.
-    pub restart: Option<unsafe extern "C" fn(context: *mut c_void, clearLog: u8)>,
-    /// Handed to `restart`. Yours, may be NULL.
-    pub context: *mut c_void,
-    /// What sub-function 02 of 08 returns: yours.
-    pub diagnosticRegister: u16,
-    /// Sub-function 0B: frames with a right CRC, for whichever unit.
-    pub busMessages: u16,
-    /// Sub-function 0C: frames that arrived damaged.
-    pub busCommunicationErrors: u16,
-    /// Sub-function 0D: exceptions, those of broadcasts too.
-    pub exceptionErrors: u16,
-    /// Sub-function 0E: requests for this unit, and broadcasts.
-    pub serverMessages: u16,
-    /// Sub-function 0F: requests that were not answered.
-    pub noResponses: u16,
-    /// Sub-function 10: exceptions 07.
-    pub naks: u16,
-    /// Sub-function 11: exceptions 06.
-    pub busy: u16,
-    /// Sub-function 12: frames that the buffer could not hold.
-    pub characterOverruns: u16,
-    /// What 0B returns: requests that were carried out.
-    pub events: u16,
-    /// 1 in listen only mode.
-    pub listenOnly: u8,
-    /// Not for you.
-    pub hidden: [u8; 67],
-}
-
-const _: () = {
-    use core::mem::offset_of;
-    let start = offset_of!(mbm_diagnostics, diagnosticRegister);
-    assert!(offset_of!(mbm_diagnostics, events) - start == offset_of!(Diagnostics, events));
-    assert!(
-        offset_of!(mbm_diagnostics, listenOnly) - start == offset_of!(Diagnostics, listen_only)
-    );
-    let end = offset_of!(mbm_diagnostics, hidden) + 67;
-    assert!(end - start == size_of::<Diagnostics>());
-};
 
 /// What the core keeps in a record.
 ///

@@ -7,6 +7,7 @@ mod custom;
 mod diagnostics;
 mod files;
 mod identity;
+mod records;
 mod respond;
 mod tables;
 mod units;
@@ -17,6 +18,7 @@ pub use custom::*;
 pub use diagnostics::*;
 pub use files::*;
 pub use identity::*;
+pub use records::*;
 pub use respond::*;
 pub use tables::*;
 pub use units::*;
@@ -121,7 +123,7 @@ impl Lent for LentByC {
 
     fn rule(&self, function: u8) -> Option<Rule> {
         // SAFETY: begin demands so many units for as long as the object is used.
-        unsafe { units::rule(self.units, self.count, function) }
+        unsafe { custom::rule(self.units, self.count, function) }
     }
 }
 

@@ -1,38 +1,16 @@
 //! Units and their services.
 
-use super::{custom, mbm_diagnostics};
+use super::records::{mbm_diagnostics, mbm_service, Serve};
 use core::ffi::c_void;
 use core::mem::offset_of;
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 use mbm::error::Status;
-use mbm::pdu::custom::Rule;
 use mbm::server::table::Small;
 use mbm::server::{only_writes, Concern, Heading, Reply, ANY};
 use mbm::FIRMWARE;
 
 /// Most records that one unit serves, each handed to a mbm_server_serve function.
 pub const MBM_MAX_SERVICES: u8 = 16;
-
-/// The head of each record that a mbm_server_serve function takes. Private.
-#[repr(C)]
-pub struct mbm_service {
-    /// Serves a request, if it is one of this family. NULL in a zeroed record,
-    /// which serves nothing.
-    pub serve: Option<
-        unsafe extern "C" fn(
-            service: *mut mbm_service,
-            pdu: *mut u8,
-            heading: *const c_void,
-        ) -> usize,
-    >,
-    /// What kind of record of its family it is served as, from 1 on; 0 in a zeroed one.
-    pub kind: u8,
-}
-
-/// The function of a service. `pdu` points to the PDU of a request that `heading`
-/// tells of, and returns a [`Reply`].
-pub(super) type Serve =
-    unsafe extern "C" fn(service: *mut mbm_service, pdu: *mut u8, heading: *const c_void) -> usize;
 
 /// A unit that servers answer for. Zero it, set `id`, and say what it serves with
 /// mbm_server_serveCoils and its sisters.
@@ -116,7 +94,7 @@ pub(super) unsafe fn add(unit: *mut mbm_unit, service: *mut mbm_service, serve: 
 
 /// The places of a unit, one after the other, up to the first that is free. What
 /// is called for one may fill others.
-struct Places {
+pub(super) struct Places {
     place: *const *mut mbm_service,
     end: *const *mut mbm_service,
 }
@@ -125,7 +103,7 @@ impl Places {
     /// # Safety
     /// `unit` is one, and stays so while its places are looked at.
     #[inline(always)]
-    unsafe fn new(unit: *const mbm_unit) -> Places {
+    pub(super) unsafe fn new(unit: *const mbm_unit) -> Places {
         // SAFETY: as the caller promises.
         unsafe {
             let place = (&raw const (*unit).services).cast::<*mut mbm_service>();
@@ -391,22 +369,4 @@ pub(super) unsafe fn add_first(unit: *mut mbm_unit, new: *mut mbm_service, serve
         }
         status
     }
-}
-
-/// The length rule that a unit has for a user's function.
-///
-/// # Safety
-/// `units` points to `count` units.
-pub(super) unsafe fn rule(units: *const mbm_unit, count: u8, function: u8) -> Option<Rule> {
-    // SAFETY: as the caller promises.
-    unsafe {
-        for index in 0..count {
-            for service in Places::new(units.add(index.into())) {
-                if let Some(rule) = custom::rule(service, function) {
-                    return Some(rule);
-                }
-            }
-        }
-    }
-    None
 }
