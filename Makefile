@@ -64,7 +64,7 @@ header: ## Write include/mbm.h anew from the source
 	@$(CARGO) run --quiet -p mbm-tools --bin header
 
 .PHONY: check
-check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, symbols
+check: need-check $(ARCHIVE) ## Formatting, lints, layers, circles, header, functions, symbols
 	@$(CARGO) fmt --all --check
 	@for crate in fuzz bench model; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml --check || exit 1; done
 	@$(CARGO) clippy --quiet --workspace --all-targets --features pymodbus -- -D warnings
@@ -73,13 +73,14 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, sy
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps
 	@$(CARGO) test --quiet -p mbm-tools >/dev/null
 	@$(CARGO) run --quiet -p mbm-tools --bin layers
+	@$(CARGO) run --quiet -p mbm-tools --bin circles
 	@$(CARGO) run --quiet -p mbm-tools --bin header -- --check
 	@scripts/check-header
 	@scripts/check-docs
 	@scripts/check-functions
 	@$(MAKE) --no-print-directory check-readme
 	@scripts/check-symbols $(ARCHIVE)
-	@! grep -rn 'target_os' src | grep -v 'cfg_attr\|mbm_firmware' # else no test runs that code
+	@! grep -rn 'target_os' src capi | grep -v 'cfg_attr\|mbm_firmware' # else no test runs that code
 	@echo "check: formatting, lints, layers, header and symbols are in order"
 
 .PHONY: test
@@ -93,8 +94,8 @@ venv: ## The Python environment with the peers of tests/peer, build/venv
 
 .PHONY: miri
 miri: ## Hold the hooks against Rust's rules of aliasing, with Miri of the nightly toolchain
-	@$(CARGO) +nightly miri test --quiet --test reentry
-	@MIRIFLAGS=-Zmiri-tree-borrows $(CARGO) +nightly miri test --quiet --test reentry
+	@$(CARGO) +nightly miri test --quiet --package mbm-c --test reentry
+	@MIRIFLAGS=-Zmiri-tree-borrows $(CARGO) +nightly miri test --quiet --package mbm-c --test reentry
 
 .PHONY: fuzz
 fuzz: ## Fuzz every decoder and the C API for FUZZ_SECONDS in all (60)

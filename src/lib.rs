@@ -1,62 +1,254 @@
-//! mbm: a Modbus stack for firmware.
+//! mbm: Modbus for firmware. A master, a client, a server and a sniffer, on serial lines (RTU
+//! and ASCII) and on TCP, without a heap, without waiting and without a panic.
 //!
-//! Data flows one way, and a module uses only what stands to its left:
+//! Everything is moved on by a `poll` that never waits. Time comes from a clock of
+//! microseconds, which may wrap; bytes come and go through a [`port::Port`], which your
+//! firmware implements for its UART or socket:
+//!
+//! ```
+//! use mbm::port::Port;
+//!
+//! struct Uart { /* ... */ }
+//!
+//! impl Port for Uart {
+//!     fn read(&mut self, bytes: &mut [u8]) -> i16 {
+//!         0 // How many bytes of those that arrived are in `bytes` now.
+//!     }
+//!     fn write(&mut self, bytes: &[u8]) -> i16 {
+//!         bytes.len() as i16 // How many bytes of these will be sent.
+//!     }
+//!     fn micros(&mut self) -> u32 {
+//!         0 // The clock.
+//!     }
+//! }
+//! ```
+//!
+//! The examples below have a `Uart` on whose line somebody answers.
+//!
+//! # A master
+//!
+//! [`master::Master`] has one request under way on an RTU line. This one reads two registers of
+//! unit 17:
+//!
+//! ```
+//! # use mbm::port::Port;
+//! # struct Uart { sends: &'static [u8], now: u32, arriving: &'static [u8], sent: usize }
+//! # impl Port for Uart {
+//! #     fn read(&mut self, bytes: &mut [u8]) -> i16 {
+//! #         let count = bytes.len().min(self.arriving.len());
+//! #         let (now, later) = self.arriving.split_at(count);
+//! #         bytes[..count].copy_from_slice(now);
+//! #         self.arriving = later;
+//! #         count as i16
+//! #     }
+//! #     fn write(&mut self, bytes: &[u8]) -> i16 {
+//! #         self.sent += bytes.len();
+//! #         self.arriving = self.sends;
+//! #         bytes.len() as i16
+//! #     }
+//! #     fn micros(&mut self) -> u32 { self.now += 100; self.now }
+//! # }
+//! use mbm::engine::Buffers;
+//! use mbm::error::Status;
+//! use mbm::master::Master;
+//!
+//! # let sends = &[17, 3, 4, 0x02, 0x2B, 0x00, 0x64, 0x9B, 0xA9];
+//! # let uart = Uart { sends, now: 0, arriving: &[], sent: 0 };
+//! // Bytes of a frame, words that are read, words that are written.
+//! let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
+//! let mut master = Master::new(17, uart, buffers);
+//! master.set_baud_rate(9600);
+//!
+//! assert_eq!(master.read_holding_registers(107, 2), Status::PENDING);
+//! while master.poll() == Status::PENDING {
+//!     // Here the firmware does something else.
+//! }
+//! assert_eq!(master.status(), Status::OK);
+//! assert_eq!([master.response_word(0), master.response_word(1)], [555, 100]);
+//! ```
+//!
+//! # A client
+//!
+//! [`client::Client`] queues requests of every function, repeats them as its policy says,
+//! and has many under way at once on TCP. A request is a [`client::Job`] of yours, which
+//! holds what is sent and takes what is received:
+//!
+//! ```
+//! # use mbm::port::Port;
+//! # struct Uart { sends: &'static [u8], now: u32, arriving: &'static [u8], sent: usize }
+//! # impl Port for Uart {
+//! #     fn read(&mut self, bytes: &mut [u8]) -> i16 {
+//! #         let count = bytes.len().min(self.arriving.len());
+//! #         let (now, later) = self.arriving.split_at(count);
+//! #         bytes[..count].copy_from_slice(now);
+//! #         self.arriving = later;
+//! #         count as i16
+//! #     }
+//! #     fn write(&mut self, bytes: &[u8]) -> i16 {
+//! #         self.sent += bytes.len();
+//! #         self.arriving = self.sends;
+//! #         bytes.len() as i16
+//! #     }
+//! #     fn micros(&mut self) -> u32 { self.now += 100; self.now }
+//! # }
+//! use mbm::client::{Client, Job, Serial, Ticket};
+//! use mbm::engine::Frame;
+//! use mbm::error::Status;
+//! use mbm::pdu::outline::Form;
+//!
+//! struct Read {
+//!     ticket: Ticket,
+//!     received: [u8; 4],
+//! }
+//!
+//! impl Job for Read {
+//!     fn ticket(&self) -> &Ticket {
+//!         &self.ticket
+//!     }
+//!     fn ticket_mut(&mut self) -> &mut Ticket {
+//!         &mut self.ticket
+//!     }
+//!     fn byte(&self, _: usize) -> u8 {
+//!         0 // It sends no data.
+//!     }
+//!     fn put(&mut self, index: usize, byte: u8) {
+//!         self.received[index] = byte;
+//!     }
+//! }
+//!
+//! let mut ticket = Ticket::NONE;
+//! ticket.unit = 17;
+//! ticket.capacity = 4;
+//! let status = ticket.outline.set(Form::READ_HOLDING_REGISTERS, 107, 2);
+//! assert_eq!(status, Status::OK);
+//!
+//! # let sends = &[17, 3, 4, 0x02, 0x2B, 0x00, 0x64, 0x9B, 0xA9];
+//! # let uart = Uart { sends, now: 0, arriving: &[], sent: 0 };
+//! let line = Serial::new(uart, Frame::new([0; 256]));
+//! // Up to four requests wait or are under way.
+//! let mut client: Client<_, Read, 4> = Client::new(line);
+//! assert!(client.queue(Read { ticket, received: [0; 4] }).is_ok());
+//!
+//! let mut now = 0;
+//! let read = loop {
+//!     now += 100; // The clock of the port.
+//!     if let Some(read) = client.poll(now, true) {
+//!         break read;
+//!     }
+//! };
+//! assert_eq!(read.ticket.status, Status::OK);
+//! assert_eq!(read.received, [0x02, 0x2B, 0x00, 0x64]);
+//! ```
+//!
+//! # A server
+//!
+//! [`server::Server`] finds requests on a line or connection. Units say what they serve:
+//!
+//! ```
+//! # use mbm::port::Port;
+//! # struct Uart { sends: &'static [u8], now: u32, arriving: &'static [u8], sent: usize }
+//! # impl Port for Uart {
+//! #     fn read(&mut self, bytes: &mut [u8]) -> i16 {
+//! #         let count = bytes.len().min(self.arriving.len());
+//! #         let (now, later) = self.arriving.split_at(count);
+//! #         bytes[..count].copy_from_slice(now);
+//! #         self.arriving = later;
+//! #         count as i16
+//! #     }
+//! #     fn write(&mut self, bytes: &[u8]) -> i16 {
+//! #         self.sent += bytes.len();
+//! #         self.arriving = self.sends;
+//! #         bytes.len() as i16
+//! #     }
+//! #     fn micros(&mut self) -> u32 { self.now += 100; self.now }
+//! # }
+//! use mbm::error::Status;
+//! use mbm::frame::Framing;
+//! use mbm::server::storage::{HoldingRegisters, Words};
+//! use mbm::server::{Server, Unit};
+//!
+//! let mut words = [555, 100, 0];
+//! # {
+//! # let arriving = &[17, 6, 0x00, 0x6D, 0x03, 0x78, 0x1A, 0x55];
+//! # let uart = Uart { sends: &[], now: 0, arriving, sent: 0 };
+//! let mut server = Server::with_framing(Framing::Rtu, uart, [0; 256]);
+//! let mut registers = HoldingRegisters(Words::new(107, &mut words));
+//! let mut units = [Unit {
+//!     id: 17,
+//!     services: &mut [&mut registers],
+//!     diagnostics: None,
+//! }];
+//!
+//! # for now in (0..100_000).step_by(100) {
+//! // In the main loop, with the time of the clock:
+//! let status = server.serve(now, &mut units[..]);
+//! assert_eq!(status, Status::OK);
+//! # }
+//! # }
+//! // Somebody wrote 888 to register 109 meanwhile.
+//! assert_eq!(words, [555, 100, 888]);
+//! ```
+//!
+//! # Packets
+//!
+//! Frames and PDUs can be read and written by themselves: [`frame::Framing`] takes a frame
+//! apart, [`pdu::request::Request`] and [`pdu::response::Response`] say what is in it, and
+//! [`packet`] knows the functions that users define.
+//!
+//! ```
+//! use mbm::frame::{ascii, Framing};
+//! use mbm::pdu::request::Request;
+//!
+//! let request = Request::WriteSingleRegister { address: 109, value: 888 };
+//! let mut buffer = [0; 256];
+//! let length = Framing::Rtu.emit(&mut buffer, 0, 17, ascii::END, |pdu| request.emit(pdu))?;
+//! assert_eq!(buffer[..length], [17, 6, 0x00, 0x6D, 0x03, 0x78, 0x1A, 0x55]);
+//!
+//! let frame = Framing::Rtu.parse(&mut buffer[..length], ascii::END)?;
+//! assert_eq!(frame.unit, 17);
+//! assert_eq!(Request::parse(frame.pdu)?, request);
+//! # Ok::<(), mbm::error::Status>(())
+//! ```
+//!
+//! # What uses what
+//!
+//! A module uses only what stands to its left:
 //!
 //! ```text
-//! bytes -> frame -> pdu -> packet -> explain -> {sniffer, transaction} -> engine -> {master, client, server} -> capi
+//! bytes -> frame -> pdu -> packet -> explain -> {sniffer, engine} -> {master, client, server}
 //! ```
 //!
 //! `atomic`, `error`, `time`, `port`, `ring` and `data` stand beside that line and may be used
 //! anywhere on it. `make check` holds every module to this rule.
 //!
-//! The core allocates nothing, keeps no globals, never blocks and does not
-//! panic. Time is an argument; input and output are a [`port::Port`].
+//! Nothing here allocates, keeps globals, waits or panics. The C ABI is the crate `mbm-c`.
 
 #![no_std]
-#![deny(unsafe_code)]
+#![forbid(unsafe_code)]
 #![warn(missing_docs, clippy::indexing_slicing, clippy::unwrap_used)]
 #![cfg_attr(test, allow(clippy::indexing_slicing, clippy::unwrap_used))]
 
 #[cfg(test)]
 extern crate std;
 
-/// cbindgen:ignore
 mod atomic;
-/// cbindgen:ignore
 pub mod error;
-/// cbindgen:ignore
 pub mod port;
-/// cbindgen:ignore
 pub mod ring;
-/// cbindgen:ignore
 pub mod time;
 
-/// cbindgen:ignore
 pub mod bytes;
-/// cbindgen:ignore
 pub mod data;
-/// cbindgen:ignore
 pub mod engine;
-/// cbindgen:ignore
 pub mod explain;
-/// cbindgen:ignore
 pub mod frame;
-/// cbindgen:ignore
 pub mod packet;
-/// cbindgen:ignore
 pub mod pdu;
-/// cbindgen:ignore
 pub mod sniffer;
 
-/// cbindgen:ignore
 pub mod client;
-/// cbindgen:ignore
 pub mod master;
-/// cbindgen:ignore
 pub mod server;
-
-#[allow(unsafe_code)]
-pub mod capi;
 
 /// True where the code for firmware runs, which is shorter and slower. Everywhere
 /// else, this is false: hosts have room for a second way to do what is done most.
@@ -64,4 +256,4 @@ pub mod capi;
 /// Every branch on the target reads this constant, or has the same condition as a
 /// `cfg` attribute. `--cfg mbm_firmware` selects the code for firmware on a host,
 /// so that tests run it there.
-const FIRMWARE: bool = cfg!(any(target_os = "none", mbm_firmware));
+pub const FIRMWARE: bool = cfg!(any(target_os = "none", mbm_firmware));

@@ -8,7 +8,7 @@ mod wire;
 
 use exchanges::{Case, CASES};
 use mbm::client::{Client, Serial};
-use mbm::engine::Frame;
+use mbm::engine::{Frame, Storage as _};
 use mbm::error::Status;
 use mbm::frame::{ascii, Framing};
 use proptest::prelude::*;
@@ -83,7 +83,7 @@ proptest! {
             settings.echo_discard = echo;
             settings.response_timeout = 200_000;
             let mut client: Client<_, _, 4> = Client::new(line);
-            for bytes in &lines {
+            for (number, bytes) in lines.iter().enumerate() {
                 prop_assert!(client.queue(Task::new(17, 1, data, build)).is_ok());
                 let mut brought = false;
                 let task = loop {
@@ -99,11 +99,13 @@ proptest! {
                     end.pass(1_000);
                 };
                 prop_assert!(task.ticket.has_ended());
-                if task.ticket.status == Status::OK && *bytes == encoded(framing, 17, response) {
+                // Later ones may be answered by what came late.
+                let is_reply = number == 0 && *bytes == encoded(framing, 17, response);
+                if is_reply && task.ticket.status == Status::OK {
                     prop_assert_eq!(task.received(), received);
                 }
                 // A reply that was held stands in the frame buffer no longer.
-                let whole = Frame::room(&client.line.engine().storage.frame);
+                let whole = usize::from(client.line.engine().storage.frame.room());
                 prop_assert_eq!(whole, room.max(17));
             }
         }

@@ -92,7 +92,7 @@ impl Ticket {
     }
 
     /// True if its response is waited for.
-    pub(crate) fn is_sent(&self) -> bool {
+    pub fn is_sent(&self) -> bool {
         matches!(self.stage, Stage::Sent | Stage::Strayed)
     }
 

@@ -2,7 +2,7 @@
 //! gives each back when it has ended.
 //!
 //! A serial line carries one request at a time, a TCP stream as many as the
-//! queue holds. What a request is, with its data, is a [`Job`](crate::client::Job) of the caller's;
+//! queue holds. What a request is, with its data, is a [`Job`] of the caller's;
 //! nothing is copied until it goes to the wire, or comes from it.
 
 mod active;
@@ -136,18 +136,7 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// #     fn byte(&self, _: usize) -> u8 { 0 }
     /// #     fn put(&mut self, _: usize, _: u8) {}
     /// # }
-    /// # struct S; impl Means for S {}
-    /// # impl mbm::engine::Storage for S {
-    /// #     type Count = u16;
-    /// #     fn room(&self) -> u16 { 0 }
-    /// #     fn byte(&self, _: u16) -> u8 { 0 }
-    /// #     fn set_byte(&mut self, _: u16, _: u8) {}
-    /// #     fn slice(&self, _: u16, _: u16) -> &[u8] { &[] }
-    /// #     fn bytes(&mut self, _: u16, _: u16) -> &mut [u8] { &mut [] }
-    /// #     fn set_aside(&mut self, _: u16) {}
-    /// #     fn take_back(&mut self, _: u16) {}
-    /// # }
-    /// # fn main() { one_at_a_time::<J, P, S>(Client::new(Serial::new(P, S))); }
+    /// # fn main() { one_at_a_time::<J, P, _>(Client::new(Serial::new(P, mbm::engine::Frame::new([0; 8])))); }
     /// ```
     ///
     /// Two do not compile:
@@ -168,18 +157,7 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// #     fn byte(&self, _: usize) -> u8 { 0 }
     /// #     fn put(&mut self, _: usize, _: u8) {}
     /// # }
-    /// # struct S; impl Means for S {}
-    /// # impl mbm::engine::Storage for S {
-    /// #     type Count = u16;
-    /// #     fn room(&self) -> u16 { 0 }
-    /// #     fn byte(&self, _: u16) -> u8 { 0 }
-    /// #     fn set_byte(&mut self, _: u16, _: u8) {}
-    /// #     fn slice(&self, _: u16, _: u16) -> &[u8] { &[] }
-    /// #     fn bytes(&mut self, _: u16, _: u16) -> &mut [u8] { &mut [] }
-    /// #     fn set_aside(&mut self, _: u16) {}
-    /// #     fn take_back(&mut self, _: u16) {}
-    /// # }
-    /// # fn main() { two_at_once::<J, P, S>(Client::new(Serial::new(P, S))); }
+    /// # fn main() { two_at_once::<J, P, _>(Client::new(Serial::new(P, mbm::engine::Frame::new([0; 8])))); }
     /// ```
     #[must_use]
     pub fn in_flight<const M: usize>(self) -> Self {

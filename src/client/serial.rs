@@ -14,7 +14,8 @@ use crate::port::Port;
 /// One request at a time, in RTU or ASCII frames.
 #[repr(C)]
 pub struct Serial<P, S: Means, J> {
-    pub(crate) engine: ClientEngine<P, S, J>,
+    /// The request under way.
+    pub engine: ClientEngine<P, S, J>,
 }
 
 impl<P, S: Means, J: Job> Serial<P, S, J> {

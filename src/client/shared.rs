@@ -16,17 +16,19 @@ use heapless::Vec;
 pub struct Shared<J, const N: usize> {
     /// Something may be due whatever `since` and `wait` say.
     pub(super) look: bool,
-    pub(crate) connected: bool,
+    /// The link is there.
+    pub connected: bool,
     /// Somebody else uses the line.
-    pub(crate) lent: bool,
+    pub lent: bool,
     /// Unit 0 is everybody.
-    pub(crate) broadcasts: bool,
+    pub broadcasts: bool,
     /// No two requests may have the same number of the caller's, but 0.
-    pub(crate) has_ids: bool,
+    pub has_ids: bool,
     /// Nobody is due before `wait` has passed since `since`.
     since: u32,
     wait: u32,
-    pub(crate) policy: Policy,
+    /// When requests are asked again.
+    pub policy: Policy,
     /// The request under way on a line that carries one at a time. It is in the
     /// queue no longer, but has its place there.
     pub(super) active: Option<J>,
@@ -50,24 +52,24 @@ impl<J, const N: usize> Shared<J, N> {
     }
 
     /// True if nothing waits and nothing is under way.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.queue.is_empty() && self.active.is_none()
     }
 
     /// How many requests wait or are under way.
-    pub(crate) fn pending(&self) -> usize {
+    pub fn pending(&self) -> usize {
         self.queue.len() + usize::from(self.active.is_some())
     }
 
     /// True if a job that `is` the one waits or is under way.
-    pub(crate) fn holds(&self, is: impl Fn(&J) -> bool) -> bool {
+    pub fn holds(&self, is: impl Fn(&J) -> bool) -> bool {
         self.active.as_ref().is_some_and(&is) || self.queue.iter().any(&is)
     }
 }
 
 impl<J: Job, const N: usize> Shared<J, N> {
     /// See [`Client::queue`](super::Client::queue).
-    pub(crate) fn enqueue(&mut self, mut job: J) -> Result<(), J> {
+    pub fn enqueue(&mut self, mut job: J) -> Result<(), J> {
         let status = self.readiness(&job);
         let ticket = job.ticket_mut();
         ticket.status = status;
@@ -113,7 +115,7 @@ impl<J: Job, const N: usize> Shared<J, N> {
     }
 
     /// Takes out the job that `is` the one, which was given up.
-    pub(crate) fn withdraw(&mut self, is: impl Fn(&J) -> bool) -> Option<J> {
+    pub fn withdraw(&mut self, is: impl Fn(&J) -> bool) -> Option<J> {
         let mut job = if self.active.as_ref().is_some_and(&is) {
             self.take_active()?
         } else {
@@ -126,7 +128,7 @@ impl<J: Job, const N: usize> Shared<J, N> {
     }
 
     /// What was under way ends as lost, by the next polls; the link is a new one.
-    pub(crate) fn interrupt(&mut self) {
+    pub fn interrupt(&mut self) {
         if let Some(job) = self.take_active() {
             self.put_first(job);
         }
@@ -135,19 +137,19 @@ impl<J: Job, const N: usize> Shared<J, N> {
     }
 
     /// True if nothing is under way.
-    pub(crate) fn is_idle(&self) -> bool {
+    pub fn is_idle(&self) -> bool {
         self.active.is_none() && !self.queue.iter().any(|job| job.ticket().is_sent())
     }
 
     /// See [`Client::lend`](super::Client::lend).
-    pub(crate) fn lend(&mut self, line: &impl Line<J>) -> bool {
+    pub fn lend(&mut self, line: &impl Line<J>) -> bool {
         let free = !self.lent && self.is_idle() && line.is_idle();
         self.lent |= free;
         free
     }
 
     /// See [`Client::poll_delay`](super::Client::poll_delay).
-    pub(crate) fn poll_delay(&self, line: &mut impl Line<J>, now: u32) -> u32 {
+    pub fn poll_delay(&self, line: &mut impl Line<J>, now: u32) -> u32 {
         match line.delay(now) {
             _ if self.lent => u32::MAX,
             Some(delay) => delay,

@@ -1,7 +1,7 @@
 //! What is kept for each unit, in storage that the caller lends.
 
 use super::policy::{again, Policy};
-use crate::engine::Storage;
+use crate::engine::{Frame, Storage};
 use crate::error::Status;
 use crate::time::{clamped, elapsed};
 
@@ -135,6 +135,9 @@ pub trait Means: Storage<Count = u16> {
         0
     }
 }
+
+/// A client's frame buffer alone; on TCP, which has an outgoing buffer, it sends nothing.
+impl<F: AsRef<[u8]> + AsMut<[u8]>> Means for Frame<F> {}
 
 #[cfg(test)]
 mod tests {

@@ -156,7 +156,7 @@ pub trait Words: Storage<Count = u8> {
 pub struct Frame<F> {
     bytes: F,
     /// Bytes at the front that are set aside.
-    aside: usize,
+    aside: u16,
 }
 
 impl<F> Frame<F> {
@@ -166,51 +166,42 @@ impl<F> Frame<F> {
     }
 }
 
-impl<F: AsRef<[u8]> + AsMut<[u8]>> Frame<F> {
-    fn behind(&self) -> &[u8] {
-        self.bytes.as_ref().get(self.aside..).unwrap_or_default()
+impl<F: AsRef<[u8]> + AsMut<[u8]>> Storage for Frame<F> {
+    type Count = u16;
+
+    fn room(&self) -> u16 {
+        let room = self.bytes.as_ref().len().min(u16::MAX.into()) as u16;
+        room.saturating_sub(self.aside)
     }
 
-    fn behind_mut(&mut self) -> &mut [u8] {
-        let behind = self.bytes.as_mut().get_mut(self.aside..);
-        behind.unwrap_or_default()
+    fn byte(&self, index: u16) -> u8 {
+        self.slice(index, 1).first().copied().unwrap_or(0)
     }
 
-    /// See [`Storage::room`].
-    pub fn room(&self) -> usize {
-        self.behind().len()
+    fn set_byte(&mut self, index: u16, byte: u8) {
+        self.bytes(index, 1).fill(byte);
     }
 
-    /// See [`Storage::byte`].
-    pub fn byte(&self, index: usize) -> u8 {
-        self.behind().get(index).copied().unwrap_or(0)
-    }
-
-    /// See [`Storage::set_byte`].
-    pub fn set_byte(&mut self, index: usize, byte: u8) {
-        if let Some(place) = self.behind_mut().get_mut(index) {
-            *place = byte;
-        }
-    }
-
-    /// See [`Storage::slice`].
-    pub fn slice(&self, index: usize, count: usize) -> &[u8] {
-        self.behind().get(index..index + count).unwrap_or_default()
-    }
-
-    /// See [`Storage::bytes`].
-    pub fn bytes(&mut self, index: usize, count: usize) -> &mut [u8] {
-        let bytes = self.behind_mut().get_mut(index..index + count);
+    fn slice(&self, index: u16, count: u16) -> &[u8] {
+        let first = usize::from(self.aside) + usize::from(index);
+        let bytes = self.bytes.as_ref().get(first..first + usize::from(count));
         bytes.unwrap_or_default()
     }
 
-    /// See [`Storage::set_aside`].
-    pub fn set_aside(&mut self, count: usize) {
+    fn bytes(&mut self, index: u16, count: u16) -> &mut [u8] {
+        let first = usize::from(self.aside) + usize::from(index);
+        let bytes = self
+            .bytes
+            .as_mut()
+            .get_mut(first..first + usize::from(count));
+        bytes.unwrap_or_default()
+    }
+
+    fn set_aside(&mut self, count: u16) {
         self.aside += count;
     }
 
-    /// See [`Storage::take_back`].
-    pub fn take_back(&mut self, count: usize) {
+    fn take_back(&mut self, count: u16) {
         self.aside -= count;
     }
 }
@@ -252,8 +243,7 @@ where
 
     fn room(&self) -> u8 {
         // What is set aside counts too.
-        let room = count(self.frame.bytes.as_ref().len());
-        room.saturating_sub(self.frame.aside as u8)
+        count(self.frame.bytes.as_ref().len()).saturating_sub(self.frame.aside as u8)
     }
 
     fn byte(&self, index: u8) -> u8 {

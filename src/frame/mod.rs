@@ -1,22 +1,14 @@
 //! Application data units: how a PDU and its unit travel on a line.
 
+mod adu;
 pub mod ascii;
 pub mod checksum;
 pub mod rtu;
 pub mod tcp;
 
-use crate::error::Status;
+pub use adu::Adu;
 
-/// What a frame carries.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Adu<'a> {
-    /// The transaction identifier of a TCP frame; 0 in others.
-    pub transaction: u16,
-    /// The unit that a request is for, or a response comes from.
-    pub unit: u8,
-    /// Function code and data.
-    pub pdu: &'a [u8],
-}
+use crate::error::Status;
 
 /// How frames are told apart.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

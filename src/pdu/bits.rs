@@ -2,9 +2,8 @@
 
 use super::fields::{counted, in_range, word};
 use super::limits::{MAX_READ_BITS, MAX_WRITE_BITS};
+use super::message::{Request, Response};
 use super::query::Form;
-use super::request::Request;
-use super::response::Response;
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
 

@@ -1,8 +1,6 @@
 //! Functions that a user defines, whose lengths only the user knows.
 
-use super::length::{by_rule, Length};
 use super::{is_public, EXCEPTION};
-use crate::error::Status;
 
 /// How long a PDU of a user's function is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -38,25 +36,6 @@ pub const fn is_user_defined(function: u8) -> bool {
 /// the standard has.
 pub(super) const fn is_free(function: u8) -> bool {
     function != 0 && function & EXCEPTION == 0 && !is_public(function)
-}
-
-/// Says whether the length of a user's PDU agrees with its rule; a function
-/// that nobody declared may only be of the user's codes, and has any length.
-pub(super) fn check(pdu: &[u8], function: u8, rule: Option<Rule>) -> Result<(), Status> {
-    if !is_free(function) {
-        return Err(Status::ILLEGAL_FUNCTION);
-    }
-    let agrees = match rule.map(|rule| by_rule(pdu, rule)) {
-        None if !is_user_defined(function) => return Err(Status::ILLEGAL_FUNCTION),
-        None | Some(Length::Silence) => true,
-        Some(Length::Exactly(length)) => length == pdu.len(),
-        Some(_) => false,
-    };
-    if agrees {
-        Ok(())
-    } else {
-        Err(Status::ILLEGAL_DATA_VALUE)
-    }
 }
 
 /// What a user said of a function code.

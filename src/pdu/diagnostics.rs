@@ -2,8 +2,7 @@
 
 use super::fields::{byte, counted, word};
 use super::limits::MAX_EVENTS;
-use super::request::Request;
-use super::response::Response;
+use super::message::{Request, Response};
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
 

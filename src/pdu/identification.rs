@@ -1,9 +1,9 @@
 //! Encapsulated interface transport, and the device identification in it:
 //! function 2B.
 
-use super::fields::{byte, counted};
-use super::request::Request;
-use super::response::Response;
+use super::fields::byte;
+use super::message::{Request, Response};
+pub use super::objects::Objects;
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
 
@@ -26,53 +26,6 @@ pub const INDIVIDUAL: u8 = 4;
 
 /// More follows, in a response.
 const MORE: u8 = 0xFF;
-
-/// The objects of a response, each an id and a value.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Objects<'a> {
-    pub(super) count: u8,
-    pub(super) bytes: &'a [u8],
-}
-
-/// The next object.
-fn object<'a>(reader: &mut Reader<'a>) -> Result<(u8, &'a [u8]), Status> {
-    let id = byte(reader)?;
-    Ok((id, counted(reader)?))
-}
-
-impl<'a> Objects<'a> {
-    /// The `count` objects that these bytes are.
-    ///
-    /// # Errors
-    /// [`Status::ILLEGAL_DATA_VALUE`] if they are not just so many.
-    pub fn new(count: u8, bytes: &'a [u8]) -> Result<Self, Status> {
-        let mut reader = Reader::new(bytes);
-        for _ in 0..count {
-            object(&mut reader)?;
-        }
-        if reader.is_empty() {
-            Ok(Objects { count, bytes })
-        } else {
-            Err(Status::ILLEGAL_DATA_VALUE)
-        }
-    }
-
-    /// How many objects there are.
-    pub const fn count(&self) -> u8 {
-        self.count
-    }
-
-    /// The objects as sent: id, length and value of each.
-    pub const fn bytes(&self) -> &'a [u8] {
-        self.bytes
-    }
-
-    /// Id and value of each object.
-    pub fn iter(&self) -> impl Iterator<Item = (u8, &'a [u8])> + 'a {
-        let mut reader = Reader::new(self.bytes);
-        core::iter::from_fn(move || object(&mut reader).ok())
-    }
-}
 
 pub(super) fn parse<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
     let mei_type = byte(reader)?;

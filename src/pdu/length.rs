@@ -1,9 +1,10 @@
 //! How long a PDU is, as its first bytes tell.
 
-use super::custom::{find, Function, Rule};
+use super::custom::{find, is_free, is_user_defined, Function, Rule};
 use super::diagnostics::sub_function::RETURN_QUERY_DATA;
 use super::identification::MEI_READ_DEVICE_IDENTIFICATION;
 use super::{bits, diagnostics, files, identification, registers, EXCEPTION};
+use crate::error::Status;
 
 /// How long a PDU is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -138,4 +139,23 @@ pub(super) fn objects(pdu: &[u8]) -> Length {
         }
     }
     Length::Exactly(end)
+}
+
+/// Says whether the length of a user's PDU agrees with its rule; a function
+/// that nobody declared may only be of the user's codes, and has any length.
+pub(super) fn check(pdu: &[u8], function: u8, rule: Option<Rule>) -> Result<(), Status> {
+    if !is_free(function) {
+        return Err(Status::ILLEGAL_FUNCTION);
+    }
+    let agrees = match rule.map(|rule| by_rule(pdu, rule)) {
+        None if !is_user_defined(function) => return Err(Status::ILLEGAL_FUNCTION),
+        None | Some(Length::Silence) => true,
+        Some(Length::Exactly(length)) => length == pdu.len(),
+        Some(_) => false,
+    };
+    if agrees {
+        Ok(())
+    } else {
+        Err(Status::ILLEGAL_DATA_VALUE)
+    }
 }

@@ -2,9 +2,8 @@
 
 use super::fields::{counted, in_range, within, word};
 use super::limits::{MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_REGISTERS};
+use super::message::{Request, Response};
 use super::query::{check_range, Form, Query};
-use super::request::Request;
-use super::response::Response;
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
 

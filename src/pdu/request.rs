@@ -3,92 +3,17 @@
 
 use super::fields::is_range;
 use super::files::{Reads, Writes};
-use super::length::Length;
+use super::length::{self, Length};
 use super::limits::{
     MAX_PDU, MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_BITS,
     MAX_WRITE_REGISTERS,
 };
+pub use super::message::Request;
 use super::{bits, custom, diagnostics, files, identification, registers};
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
 use crate::FIRMWARE;
 use core::mem::discriminant;
-
-/// A request PDU. Register data are as on the wire, high bytes first; bit data
-/// begin with the lowest bit of the first byte.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs)]
-pub enum Request<'a> {
-    /// 01 or 02.
-    ReadBits {
-        function: u8,
-        address: u16,
-        quantity: u16,
-    },
-    /// 03 or 04.
-    ReadRegisters {
-        function: u8,
-        address: u16,
-        quantity: u16,
-    },
-    WriteSingleCoil {
-        address: u16,
-        on: bool,
-    },
-    WriteSingleRegister {
-        address: u16,
-        value: u16,
-    },
-    ReadExceptionStatus,
-    Diagnostics {
-        sub_function: u16,
-        data: &'a [u8],
-    },
-    GetCommEventCounter,
-    GetCommEventLog,
-    WriteMultipleCoils {
-        address: u16,
-        quantity: u16,
-        data: &'a [u8],
-    },
-    WriteMultipleRegisters {
-        address: u16,
-        quantity: u16,
-        data: &'a [u8],
-    },
-    ReportServerId,
-    ReadFileRecord(Reads<'a>),
-    WriteFileRecord(Writes<'a>),
-    MaskWriteRegister {
-        address: u16,
-        and_mask: u16,
-        or_mask: u16,
-    },
-    ReadWriteMultipleRegisters {
-        read_address: u16,
-        read_quantity: u16,
-        write_address: u16,
-        write_quantity: u16,
-        data: &'a [u8],
-    },
-    ReadFifoQueue {
-        address: u16,
-    },
-    ReadDeviceIdentification {
-        code: u8,
-        object: u8,
-    },
-    /// 2B with any other MEI type.
-    EncapsulatedInterface {
-        mei_type: u8,
-        data: &'a [u8],
-    },
-    /// A function that a user defined.
-    Custom {
-        function: u8,
-        data: &'a [u8],
-    },
-}
 
 impl<'a> Request<'a> {
     /// Reads a request PDU; functions from 65 to 72 and 100 to 110 are the
@@ -146,7 +71,7 @@ impl<'a> Request<'a> {
             identification::ENCAPSULATED_INTERFACE_TRANSPORT => identification::parse(reader),
             function => {
                 let declared = custom::find(functions, function);
-                custom::check(pdu, function, declared.map(|it| it.request))?;
+                length::check(pdu, function, declared.map(|it| it.request))?;
                 let data = reader.rest();
                 Ok(Request::Custom { function, data })
             }
@@ -383,9 +308,9 @@ impl<'a> Request<'a> {
             Request::Diagnostics { data, .. } => Length::Exactly(3 + data.len()),
             Request::ReadDeviceIdentification { .. } => Length::AtLeast(7),
             Request::EncapsulatedInterface { mei_type, .. } => {
-                super::length::response(&[self.function(), mei_type], functions)
+                length::response(&[self.function(), mei_type], functions)
             }
-            _ => super::length::response(&[self.function()], functions),
+            _ => length::response(&[self.function()], functions),
         }
     }
 }

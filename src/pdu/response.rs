@@ -3,103 +3,13 @@
 
 use super::fields::is_range;
 use super::files::{Records, Writes};
-use super::identification::Objects;
 use super::limits::{MAX_PDU, MAX_WRITE_BITS, MAX_WRITE_REGISTERS};
-use super::{bits, custom, diagnostics, files, identification, registers, EXCEPTION};
+pub use super::message::Response;
+use super::{bits, custom, diagnostics, files, identification, length, registers, EXCEPTION};
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
 use crate::FIRMWARE;
 use core::mem::discriminant;
-
-/// A response PDU. Register data are as on the wire, high bytes first; bit data
-/// begin with the lowest bit of the first byte.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[allow(missing_docs)]
-pub enum Response<'a> {
-    /// 01 or 02.
-    ReadBits {
-        function: u8,
-        data: &'a [u8],
-    },
-    /// 03, 04 or 17.
-    ReadRegisters {
-        function: u8,
-        data: &'a [u8],
-    },
-    WriteSingleCoil {
-        address: u16,
-        on: bool,
-    },
-    WriteSingleRegister {
-        address: u16,
-        value: u16,
-    },
-    /// 07.
-    ExceptionStatus {
-        outputs: u8,
-    },
-    Diagnostics {
-        sub_function: u16,
-        data: &'a [u8],
-    },
-    /// 0B. The status word is FFFF while a program command is carried out.
-    CommEventCounter {
-        status: u16,
-        events: u16,
-    },
-    /// 0C. The latest event comes first.
-    CommEventLog {
-        status: u16,
-        events: u16,
-        messages: u16,
-        log: &'a [u8],
-    },
-    /// 0F or 10.
-    WriteMultiple {
-        function: u8,
-        address: u16,
-        quantity: u16,
-    },
-    /// 11. The byte count, which some devices let end before the data do.
-    ServerId {
-        count: u8,
-        data: &'a [u8],
-    },
-    ReadFileRecord(Records<'a>),
-    WriteFileRecord(Writes<'a>),
-    MaskWriteRegister {
-        address: u16,
-        and_mask: u16,
-        or_mask: u16,
-    },
-    /// 18.
-    FifoQueue {
-        data: &'a [u8],
-    },
-    /// 2B/0E.
-    DeviceIdentification {
-        code: u8,
-        conformity: u8,
-        more_follows: bool,
-        next_object: u8,
-        objects: Objects<'a>,
-    },
-    /// 2B with any other MEI type.
-    EncapsulatedInterface {
-        mei_type: u8,
-        data: &'a [u8],
-    },
-    /// The function of the request, without the highest bit, and the code.
-    Exception {
-        function: u8,
-        code: u8,
-    },
-    /// A function that a user defined.
-    Custom {
-        function: u8,
-        data: &'a [u8],
-    },
-}
 
 impl<'a> Response<'a> {
     /// Reads a response PDU; functions from 65 to 72 and 100 to 110 are the
@@ -172,7 +82,7 @@ impl<'a> Response<'a> {
             function if function & EXCEPTION != 0 => parse_exception(function, reader),
             function => {
                 let declared = custom::find(functions, function);
-                match custom::check(pdu, function, declared.map(|it| it.response)) {
+                match length::check(pdu, function, declared.map(|it| it.response)) {
                     Err(Status::ILLEGAL_FUNCTION) => Err(Status::INVALID_FUNCTION),
                     checked => checked.map(|()| {
                         let data = reader.rest();

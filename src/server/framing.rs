@@ -1,7 +1,7 @@
 //! How each framing finds a request in what arrives, and seals a response.
 
+use super::heading::SERIAL;
 use super::line::{Lent, Receive, Seal, Server};
-use super::units::SERIAL;
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::frame::{ascii, rtu, tcp};

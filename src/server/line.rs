@@ -5,7 +5,7 @@
 //! request is carried out. A framing is two functions kept in the object, so
 //! that firmware carries those it begins with.
 
-use super::units::STREAM;
+use super::heading::STREAM;
 use super::{Heading, Reply, Units};
 use crate::bytes::move_to_front;
 use crate::error::Status;
@@ -205,13 +205,13 @@ impl<P: Port, B: Lent> Server<P, B> {
 
     /// True once it was begun.
     #[inline(always)]
-    pub(crate) fn has_framing(&self) -> bool {
+    pub fn has_framing(&self) -> bool {
         self.receive.is_some() && self.seal.is_some()
     }
 
     /// False if [`Server::poll`] may be told any time: over TCP nothing hangs on it.
     #[inline(always)]
-    pub(crate) fn keeps_time(&self) -> bool {
+    pub fn keeps_time(&self) -> bool {
         usize::from(self.request.head) != tcp::PDU
     }
 
@@ -229,7 +229,7 @@ impl<P: Port, B: Lent> Server<P, B> {
 
     /// The first half of [`Server::poll`], which looks for a request.
     #[inline(always)]
-    pub(crate) fn look(&mut self, now: u32) -> Status {
+    pub fn look(&mut self, now: u32) -> Status {
         self.now = now;
         match self.phase {
             Phase::Listen => match self.receive {
@@ -243,7 +243,7 @@ impl<P: Port, B: Lent> Server<P, B> {
 
     /// The second half of [`Server::poll`], which sends what there is.
     #[inline(always)]
-    pub(crate) fn go_on(&mut self) -> Status {
+    pub fn go_on(&mut self) -> Status {
         if self.phase == Phase::Send {
             self.send()
         } else {
@@ -379,7 +379,7 @@ impl<P: Port, B: Lent> Server<P, B> {
 
     /// As [`Server::answer`], to a request that was served.
     #[cfg_attr(target_os = "none", inline(always))]
-    pub(crate) fn answer_served(&mut self, reply: Reply) -> bool {
+    pub fn answer_served(&mut self, reply: Reply) -> bool {
         if reply == Reply::PENDING {
             self.request.again = true;
             return false;
@@ -401,7 +401,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// As [`Server::answer`], and what to return, unless [`Server::poll`] is to go
     /// on: it sends, or looks for the next request.
     #[inline(always)]
-    pub(crate) fn conclude(&mut self, reply: Reply) -> Option<Status> {
+    pub fn conclude(&mut self, reply: Reply) -> Option<Status> {
         if !FIRMWARE {
             return self.answer_at_once(reply);
         }

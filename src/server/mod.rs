@@ -16,6 +16,7 @@ pub mod custom;
 pub mod diagnostics;
 pub mod files;
 mod framing;
+mod heading;
 pub mod identity;
 mod line;
 mod reply;
@@ -24,6 +25,7 @@ pub mod storage;
 pub mod table;
 mod units;
 
+pub use heading::{only_writes, Concern, Heading, ANY};
 pub use line::{Lent, Server, MOST_REQUESTS};
 pub use reply::Reply;
-pub use units::{only_writes, Concern, Heading, Service, Unit, Units, ANY};
+pub use units::{Service, Unit, Units};

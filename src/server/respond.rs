@@ -1,7 +1,7 @@
 //! The responder: a frame in, a frame out, and no state between.
 
 use super::framing::{ascii_room, rtu_room, tcp_room};
-use super::units::{SERIAL, STREAM};
+use super::heading::{SERIAL, STREAM};
 use super::{Heading, Reply, Units};
 use crate::error::Status;
 use crate::frame::{ascii, rtu, tcp, Framing};

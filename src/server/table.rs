@@ -133,7 +133,7 @@ impl<T: Cells> Access for T {
 }
 
 /// The response of a write repeats the head of the request.
-pub(crate) const WRITTEN: Reply = Reply::length(5);
+pub const WRITTEN: Reply = Reply::length(5);
 
 /// What a request does to a table: where in its PDU, or in that of its response,
 /// the data of cells stand.
@@ -143,10 +143,10 @@ pub struct Role(Small);
 
 /// A number below 256 that is passed in a register of its own.
 #[cfg(target_arch = "avr")]
-pub(crate) type Small = u8;
+pub type Small = u8;
 /// A number below 256 that is passed in a register of its own.
 #[cfg(not(target_arch = "avr"))]
-pub(crate) type Small = usize;
+pub type Small = usize;
 
 impl Role {
     /// Nothing.
@@ -161,7 +161,7 @@ impl Role {
     /// Where in the PDU the data of the cells stand.
     #[inline(always)]
     #[allow(clippy::unnecessary_cast)] // It is needed on an AVR.
-    pub(crate) const fn data(self) -> usize {
+    pub const fn data(self) -> usize {
         self.0 as usize
     }
 }
@@ -172,7 +172,7 @@ const _: () = assert!(MAX_WRITE_REGISTERS * 16 == MAX_WRITE_BITS);
 
 /// What a function does to a table of this kind.
 #[inline(always)]
-pub(crate) const fn role(kind: Kind, function: u8) -> Role {
+pub const fn role(kind: Kind, function: u8) -> Role {
     if function == kind.0 {
         return Role::READ;
     }
@@ -261,7 +261,7 @@ fn counted(pdu: &mut [u8], bytes: usize) -> Reply {
 
 /// True for functions that [`serve_more`] serves.
 #[inline(always)]
-pub(crate) const fn is_more(function: u8) -> bool {
+pub const fn is_more(function: u8) -> bool {
     matches!(
         function,
         MASK_WRITE_REGISTER | READ_WRITE_MULTIPLE_REGISTERS

@@ -197,7 +197,7 @@ impl Sniffer {
 
     /// As [`Sniffer::next`], of what is more than the beginning of a frame.
     #[cfg_attr(not(target_os = "none"), inline(never))]
-    pub(crate) fn look<'b>(
+    pub fn look<'b>(
         &mut self,
         buffer: &'b mut [u8],
         functions: &[Function],
@@ -232,7 +232,7 @@ impl Sniffer {
     /// True if [`Sniffer::next`] has nothing to tell of and need not look: so it is
     /// after most bytes that are fed one by one.
     #[inline]
-    pub(crate) fn is_calm(&self, now: u32) -> bool {
+    pub fn is_calm(&self, now: u32) -> bool {
         let [first, second] = &self.lanes;
         self.is_early(now) && first.is_settled(now) && (!self.is_apart || second.is_settled(now))
     }
@@ -258,12 +258,7 @@ impl Sniffer {
     /// frame: what [`Sniffer::look`] finds then, at less cost. Firmware, where code is
     /// dearer, looks.
     #[cfg_attr(not(target_os = "none"), inline(never))]
-    pub(crate) fn only_waits(
-        &mut self,
-        buffer: &mut [u8],
-        functions: &[Function],
-        now: u32,
-    ) -> bool {
+    pub fn only_waits(&mut self, buffer: &mut [u8], functions: &[Function], now: u32) -> bool {
         if FIRMWARE {
             return false;
         }

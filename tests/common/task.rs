@@ -40,36 +40,36 @@ impl Storage for Lent {
     type Count = u16;
 
     fn room(&self) -> u16 {
-        self.frame.room() as u16
+        self.frame.room()
     }
 
     fn byte(&self, index: u16) -> u8 {
         self.within(index, 1);
-        self.frame.byte(index.into())
+        self.frame.byte(index)
     }
 
     fn set_byte(&mut self, index: u16, byte: u8) {
         self.within(index, 1);
-        self.frame.set_byte(index.into(), byte);
+        self.frame.set_byte(index, byte);
     }
 
     fn slice(&self, index: u16, count: u16) -> &[u8] {
         self.within(index, count);
-        self.frame.slice(index.into(), count.into())
+        self.frame.slice(index, count)
     }
 
     fn bytes(&mut self, index: u16, count: u16) -> &mut [u8] {
         self.within(index, count);
-        self.frame.bytes(index.into(), count.into())
+        self.frame.bytes(index, count)
     }
 
     fn set_aside(&mut self, count: u16) {
         self.within(0, count);
-        self.frame.set_aside(count.into());
+        self.frame.set_aside(count);
     }
 
     fn take_back(&mut self, count: u16) {
-        self.frame.take_back(count.into());
+        self.frame.take_back(count);
     }
 
     fn count(&mut self, counter: Counter, more: u16) {

@@ -4,7 +4,7 @@ use super::check::{call, is_status, refused_changes_nothing, span, PENDING};
 use super::records::rule;
 use super::traffic;
 use super::world::{Grant, World};
-use mbm::capi::*;
+use mbm_c::*;
 use std::ffi::c_void;
 use std::ptr::{null, null_mut};
 

@@ -18,7 +18,7 @@ macro_rules! call {
         w.before($object);
         // SAFETY: every pointer is NULL or valid for what the header says.
         #[allow(unused_unsafe)]
-        let returned = unsafe { mbm::capi::$name($($argument),*) };
+        let returned = unsafe { mbm_c::$name($($argument),*) };
         w.after();
         w.note(|| format!("-> {returned:?}"));
         returned

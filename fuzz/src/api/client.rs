@@ -3,7 +3,7 @@
 use super::check::{call, ends, refused_changes_nothing, span, PENDING};
 use super::world::{Grant, World};
 use super::{asked, ports};
-use mbm::capi::*;
+use mbm_c::*;
 use std::ffi::c_void;
 use std::ptr::{null, null_mut};
 

@@ -4,7 +4,7 @@ use super::check::{call, is_length, is_status, OK};
 use super::packet::{any_or_null, functions, is_expected, is_packet, kind};
 use super::traffic;
 use super::world::World;
-use mbm::capi::*;
+use mbm_c::*;
 use std::ptr::{null, null_mut};
 
 /// How frames look, most often as one of the four.

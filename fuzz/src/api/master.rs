@@ -3,7 +3,7 @@
 use super::check::{call, ends, is_status, refused_changes_nothing, span, PENDING};
 use super::ports;
 use super::world::World;
-use mbm::capi::*;
+use mbm_c::*;
 use std::ptr::null_mut;
 
 fn begin(w: &World, master: *mut mbm_master) {

@@ -4,7 +4,7 @@ use super::check::{bytes, call, is_length, is_status, refused_changes_nothing, s
 use super::records::rule;
 use super::traffic;
 use super::world::World;
-use mbm::capi::*;
+use mbm_c::*;
 use std::ptr::null_mut;
 
 /// Functions of the user, and how many; their array is as long.

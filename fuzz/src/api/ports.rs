@@ -3,7 +3,7 @@
 use super::check::call;
 use super::traffic;
 use super::world::{Grant, World};
-use mbm::capi::{mbm_master, mbm_port};
+use mbm_c::{mbm_master, mbm_port};
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::ffi::c_void;

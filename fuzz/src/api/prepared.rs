@@ -5,7 +5,7 @@ use super::check::call;
 use super::ports;
 use super::records;
 use super::world::World;
-use mbm::capi::*;
+use mbm_c::*;
 
 /// Sets up what the first bytes of the input say.
 pub fn prepare(w: &World) {

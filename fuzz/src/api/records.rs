@@ -4,7 +4,7 @@
 use super::check::{call, refused_changes_nothing, span, OK};
 use super::serving as hooks;
 use super::world::{Pool, World};
-use mbm::capi::*;
+use mbm_c::*;
 use std::collections::HashMap;
 use std::ptr::{null, null_mut};
 

@@ -2,7 +2,7 @@
 
 use super::check::{call, refused_changes_nothing, span};
 use super::world::World;
-use mbm::capi::*;
+use mbm_c::*;
 use std::ptr::{null, null_mut};
 
 /// Fills a view in, over a block of exactly its registers.

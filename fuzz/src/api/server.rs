@@ -3,7 +3,7 @@
 use super::check::{call, ends, is_status, refused_changes_nothing, span, OK};
 use super::world::World;
 use super::{ports, records, traffic};
-use mbm::capi::*;
+use mbm_c::*;
 
 /// Begins a server, of any framing, with a buffer of any size.
 fn begin(w: &World) {

@@ -1,7 +1,7 @@
 //! What units call: hooks around writes, cells, functions of the user.
 
 use super::world::{Grant, World};
-use mbm::capi::*;
+use mbm_c::*;
 use std::ffi::c_void;
 
 /// A hook of a unit may use everything but the server that called it.

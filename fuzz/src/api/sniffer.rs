@@ -3,7 +3,7 @@
 use super::check::{call, is_status, refused_changes_nothing, span};
 use super::world::World;
 use super::{frame, traffic};
-use mbm::capi::*;
+use mbm_c::*;
 use std::ptr::null;
 
 fn begin(w: &World, sniffer: *mut mbm_sniffer) {

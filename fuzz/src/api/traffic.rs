@@ -2,8 +2,8 @@
 
 use super::records;
 use super::world::{Grant, World};
-use mbm::capi::*;
 use mbm::frame::{ascii, Framing};
+use mbm_c::*;
 
 /// A PDU in a frame; the framing is one of MBM_FRAMING_.
 pub fn framed(framing: u8, transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {

@@ -2,7 +2,7 @@
 //! are under way.
 
 use super::ports::Port;
-use mbm::capi::*;
+use mbm_c::*;
 use std::alloc::{alloc_zeroed, dealloc, Layout};
 use std::cell::{Cell, RefCell};
 use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU64, Ordering};

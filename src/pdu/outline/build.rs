@@ -14,7 +14,7 @@ use super::{Outline, HEAD};
 use crate::error::Status;
 
 /// The first word of one group: its reference type behind the byte count.
-pub(crate) const GROUP: usize = files::REFERENCE_TYPE as usize;
+pub const GROUP: usize = files::REFERENCE_TYPE as usize;
 
 // What is behind [`Outline::set`] stands apart, for the functions of C call that first,
 // at one place for all.
@@ -30,7 +30,7 @@ impl Outline {
     /// As [`Outline::set`], with as many words in the head as the function has.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    pub(crate) fn set_all(&mut self, form: Form, words: &[usize; 4]) -> Status {
+    pub fn set_all(&mut self, form: Form, words: &[usize; 4]) -> Status {
         // No map, which would be a loop.
         let (first, second) = (words[0] as u16, words[1] as u16);
         self.form = form;
@@ -87,7 +87,7 @@ impl Outline {
 
     /// What 17 writes, behind the head that [`Outline::set_all`] set.
     #[inline(always)]
-    pub(crate) fn add_write(&mut self, address: u16, quantity: u16) -> Status {
+    pub fn add_write(&mut self, address: u16, quantity: u16) -> Status {
         self.head_length = HEAD as u8;
         self.data_length = (quantity << 1) as u8;
         check_range(address, quantity, MAX_READ_WRITE_REGISTERS)
@@ -102,7 +102,7 @@ impl Outline {
 
     /// How many words of data 08 has, behind what [`Outline::set`] set.
     #[inline(always)]
-    pub(crate) fn add_words(&mut self, sub_function: u16, words: u16) -> Status {
+    pub fn add_words(&mut self, sub_function: u16, words: u16) -> Status {
         self.data_length = (words << 1) as u8;
         self.length = self.data_length.wrapping_add(3);
         let (more, most) = match sub_function {
@@ -119,7 +119,7 @@ impl Outline {
 
     /// One group of records, of 14 or 15, whose head [`Outline::set_all`] set, but for
     /// its byte count.
-    pub(crate) fn add_group(&mut self, file: u16, record: u16, length: u16) -> Status {
+    pub fn add_group(&mut self, file: u16, record: u16, length: u16) -> Status {
         let bytes = (length << 1) as u8;
         self.head_length = HEAD as u8;
         let (count, most) = if self.form.has(REPEATS_DATA) {
@@ -184,14 +184,14 @@ impl Outline {
 
     /// The two words of 2B/0E.
     #[inline(always)]
-    pub(crate) fn identification(code: u8, object: u8) -> [u16; 2] {
+    pub fn identification(code: u8, object: u8) -> [u16; 2] {
         let mei_type = MEI_READ_DEVICE_IDENTIFICATION;
         [u16::from_be_bytes([mei_type, code]), u16::from(object) << 8]
     }
 
     /// [`Status::OK`] for a read device id code.
     #[inline(always)]
-    pub(crate) fn check_code(code: u8) -> Status {
+    pub fn check_code(code: u8) -> Status {
         value(matches!(code, 1..=4))
     }
 
@@ -217,7 +217,7 @@ impl Outline {
     /// The function of the user's, behind the form that [`Outline::set`] set: how the
     /// length of its response is known, with the numbers that this takes.
     #[cfg_attr(target_os = "none", inline(always))]
-    pub(crate) fn add_rule(
+    pub fn add_rule(
         &mut self,
         function: u8,
         bytes: u16,
@@ -235,7 +235,7 @@ impl Outline {
     }
 
     /// So many bytes of data follow the head.
-    pub(crate) fn follow(&mut self, bytes: u16) -> Status {
+    pub fn follow(&mut self, bytes: u16) -> Status {
         self.data_length = bytes as u8;
         value(usize::from(bytes) + usize::from(self.head_length) <= MAX_PDU)
     }

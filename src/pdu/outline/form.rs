@@ -27,13 +27,13 @@ pub(super) const RANGE: u32 = 1 << 15;
 pub(super) const BITS: u32 = 1 << 16;
 
 /// How the length of the response is known, two bits: it is so long,
-pub(crate) const FIXED: u32 = 0;
+pub const FIXED: u32 = 0;
 /// so long, and its second byte counts,
 pub(super) const READ: u32 = 1 << 17;
 /// the byte at an offset counts,
-pub(crate) const COUNTS: u32 = 2 << 17;
+pub const COUNTS: u32 = 2 << 17;
 /// its own rules say, or nothing but its end.
-pub(crate) const OWN: u32 = 3 << 17;
+pub const OWN: u32 = 3 << 17;
 pub(super) const KIND: u32 = 3 << 17;
 
 /// From this bit on, three bits each: length of the head and of the response,
@@ -138,18 +138,18 @@ impl Form {
     /// 11. Its response may be longer than it counts.
     pub const REPORT_SERVER_ID: Form = Form::bare(diagnostics::REPORT_SERVER_ID, OWN, 0, 2);
     /// 16, of which the OR mask is to be added.
-    pub(crate) const MASK_WRITE_REGISTER: Form =
+    pub const MASK_WRITE_REGISTER: Form =
         Form::new(registers::MASK_WRITE_REGISTER, BROADCAST, 7, 7, 7, 0);
     /// 18: address.
     pub const READ_FIFO_QUEUE: Form =
         Form::new(files::READ_FIFO_QUEUE, OWN | TAKES_WORDS, 3, 0, 0, 5);
 
     /// 17, of which what it writes is to be added.
-    pub(crate) const READ_WRITE_REGISTERS: Form =
+    pub const READ_WRITE_REGISTERS: Form =
         Form(Form::registers(registers::READ_WRITE_MULTIPLE_REGISTERS).0 | COUNTED | SENDS_WORDS);
 
     /// 08: a sub-function; the data are to be added.
-    pub(crate) const DIAGNOSTICS: Form = Form::new(
+    pub const DIAGNOSTICS: Form = Form::new(
         diagnostics::DIAGNOSTICS,
         FIXED | SENDS_WORDS | TAKES_WORDS,
         3,
@@ -158,7 +158,7 @@ impl Form {
         3,
     );
     /// 14, of which one group is to be added.
-    pub(crate) const READ_FILE_RECORD: Form = Form::new(
+    pub const READ_FILE_RECORD: Form = Form::new(
         files::READ_FILE_RECORD,
         READ | GROUPS | TAKES_WORDS,
         0,
@@ -167,7 +167,7 @@ impl Form {
         4,
     );
     /// 15, of which one group is to be added.
-    pub(crate) const WRITE_FILE_RECORD: Form = Form::new(
+    pub const WRITE_FILE_RECORD: Form = Form::new(
         files::WRITE_FILE_RECORD,
         FIXED | SENDS_WORDS | REPEATS_DATA | BROADCAST,
         0,
@@ -176,7 +176,7 @@ impl Form {
         0,
     );
     /// 14 of groups that the caller built.
-    pub(crate) const READ_FILE_RECORDS: Form = Form::new(
+    pub const READ_FILE_RECORDS: Form = Form::new(
         files::READ_FILE_RECORD,
         COUNTS | GROUPS | COUNTED,
         1,
@@ -185,7 +185,7 @@ impl Form {
         2,
     );
     /// 15 of groups that the caller built.
-    pub(crate) const WRITE_FILE_RECORDS: Form = Form::new(
+    pub const WRITE_FILE_RECORDS: Form = Form::new(
         files::WRITE_FILE_RECORD,
         FIXED | COUNTED | REPEATS_DATA | BROADCAST,
         1,
@@ -194,7 +194,7 @@ impl Form {
         0,
     );
     /// 2B: the MEI type; the data are to be added.
-    pub(crate) const ENCAPSULATED: Form = Form::new(
+    pub const ENCAPSULATED: Form = Form::new(
         identification::ENCAPSULATED_INTERFACE_TRANSPORT,
         OWN,
         2,
@@ -203,7 +203,7 @@ impl Form {
         2,
     );
     /// 2B/0E: code and object behind the MEI type. Its data begin behind the code.
-    pub(crate) const READ_DEVICE_IDENTIFICATION: Form = Form::new(
+    pub const READ_DEVICE_IDENTIFICATION: Form = Form::new(
         identification::ENCAPSULATED_INTERFACE_TRANSPORT,
         OWN,
         4,
@@ -212,5 +212,5 @@ impl Form {
         3,
     );
     /// A user's function, of which the code and the rule are to be added.
-    pub(crate) const CUSTOM: Form = Form::new(0, 0, 1, 0, 0, 1);
+    pub const CUSTOM: Form = Form::new(0, 0, 1, 0, 0, 1);
 }

@@ -8,9 +8,9 @@ mod build;
 mod form;
 mod forward;
 
-pub(crate) use build::GROUP;
+pub use build::GROUP;
 pub use form::Form;
-pub(crate) use form::{COUNTS, FIXED, OWN};
+pub use form::{COUNTS, FIXED, OWN};
 
 use super::identification::{self, MEI_READ_DEVICE_IDENTIFICATION};
 use super::length::Length;

@@ -12,7 +12,7 @@ fn main() -> ExitCode {
     };
     let bindings = match cbindgen::Builder::new()
         .with_config(config)
-        .with_crate(&root)
+        .with_crate(root.join("capi"))
         .generate()
     {
         Ok(bindings) => bindings,

@@ -1,0 +1,207 @@
+//! Function codes, and the functions that a user declares.
+
+use mbm::error::Status;
+use mbm::pdu::custom::{Function, Rule};
+use mbm::pdu::limits::MAX_PDU;
+use mbm::pdu::{bits, diagnostics, files, identification, registers};
+
+/// Read Coils (V1.1b3, 6.1).
+pub const MBM_FC_READ_COILS: u8 = 0x01;
+/// Read Discrete Inputs (V1.1b3, 6.2).
+pub const MBM_FC_READ_DISCRETE_INPUTS: u8 = 0x02;
+/// Read Holding Registers (V1.1b3, 6.3).
+pub const MBM_FC_READ_HOLDING_REGISTERS: u8 = 0x03;
+/// Read Input Registers (V1.1b3, 6.4).
+pub const MBM_FC_READ_INPUT_REGISTERS: u8 = 0x04;
+/// Write Single Coil (V1.1b3, 6.5).
+pub const MBM_FC_WRITE_SINGLE_COIL: u8 = 0x05;
+/// Write Single Register (V1.1b3, 6.6).
+pub const MBM_FC_WRITE_SINGLE_REGISTER: u8 = 0x06;
+/// Read Exception Status (V1.1b3, 6.7).
+pub const MBM_FC_READ_EXCEPTION_STATUS: u8 = 0x07;
+/// Diagnostics (V1.1b3, 6.8).
+pub const MBM_FC_DIAGNOSTICS: u8 = 0x08;
+/// Get Comm Event Counter (V1.1b3, 6.9).
+pub const MBM_FC_GET_COMM_EVENT_COUNTER: u8 = 0x0B;
+/// Get Comm Event Log (V1.1b3, 6.10).
+pub const MBM_FC_GET_COMM_EVENT_LOG: u8 = 0x0C;
+/// Write Multiple Coils (V1.1b3, 6.11).
+pub const MBM_FC_WRITE_MULTIPLE_COILS: u8 = 0x0F;
+/// Write Multiple Registers (V1.1b3, 6.12).
+pub const MBM_FC_WRITE_MULTIPLE_REGISTERS: u8 = 0x10;
+/// Report Server ID (V1.1b3, 6.13).
+pub const MBM_FC_REPORT_SERVER_ID: u8 = 0x11;
+/// Read File Record (V1.1b3, 6.14).
+pub const MBM_FC_READ_FILE_RECORD: u8 = 0x14;
+/// Write File Record (V1.1b3, 6.15).
+pub const MBM_FC_WRITE_FILE_RECORD: u8 = 0x15;
+/// Mask Write Register (V1.1b3, 6.16).
+pub const MBM_FC_MASK_WRITE_REGISTER: u8 = 0x16;
+/// Read/Write Multiple Registers (V1.1b3, 6.17).
+pub const MBM_FC_READ_WRITE_MULTIPLE_REGISTERS: u8 = 0x17;
+/// Read FIFO Queue (V1.1b3, 6.18).
+pub const MBM_FC_READ_FIFO_QUEUE: u8 = 0x18;
+/// Encapsulated Interface Transport (V1.1b3, 6.19).
+pub const MBM_FC_ENCAPSULATED_INTERFACE: u8 = 0x2B;
+
+/// Sub-function of 08: the data come back; any number of words (V1.1b3, 6.8.1).
+pub const MBM_DIAGNOSTICS_RETURN_QUERY_DATA: u16 = 0x00;
+/// Sub-function of 08; data FF 00 also clear the event log.
+pub const MBM_DIAGNOSTICS_RESTART_COMMUNICATIONS: u16 = 0x01;
+/// Sub-function of 08.
+pub const MBM_DIAGNOSTICS_RETURN_DIAGNOSTIC_REGISTER: u16 = 0x02;
+/// Sub-function of 08; the first byte of the data is the character.
+pub const MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER: u16 = 0x03;
+/// Sub-function of 08, which nothing answers.
+pub const MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY: u16 = 0x04;
+/// Sub-function of 08; clears the diagnostic register too.
+pub const MBM_DIAGNOSTICS_CLEAR_COUNTERS: u16 = 0x0A;
+/// Sub-function of 08: messages seen on the bus.
+pub const MBM_DIAGNOSTICS_BUS_MESSAGE_COUNT: u16 = 0x0B;
+/// Sub-function of 08: messages with a wrong CRC.
+pub const MBM_DIAGNOSTICS_BUS_COMMUNICATION_ERROR_COUNT: u16 = 0x0C;
+/// Sub-function of 08: exceptions answered.
+pub const MBM_DIAGNOSTICS_BUS_EXCEPTION_ERROR_COUNT: u16 = 0x0D;
+/// Sub-function of 08: messages for this device.
+pub const MBM_DIAGNOSTICS_SERVER_MESSAGE_COUNT: u16 = 0x0E;
+/// Sub-function of 08: messages that were not answered.
+pub const MBM_DIAGNOSTICS_SERVER_NO_RESPONSE_COUNT: u16 = 0x0F;
+/// Sub-function of 08: messages answered with a NAK.
+pub const MBM_DIAGNOSTICS_SERVER_NAK_COUNT: u16 = 0x10;
+/// Sub-function of 08: messages answered with busy.
+pub const MBM_DIAGNOSTICS_SERVER_BUSY_COUNT: u16 = 0x11;
+/// Sub-function of 08: messages lost to character overruns.
+pub const MBM_DIAGNOSTICS_BUS_CHARACTER_OVERRUN_COUNT: u16 = 0x12;
+/// Sub-function of 08.
+pub const MBM_DIAGNOSTICS_CLEAR_OVERRUN_COUNTER: u16 = 0x14;
+
+/// MEI type of 2B: CANopen General Reference (V1.1b3, 6.20).
+pub const MBM_MEI_CANOPEN: u8 = 0x0D;
+/// MEI type of 2B: Read Device Identification (V1.1b3, 6.21).
+pub const MBM_MEI_READ_DEVICE_IDENTIFICATION: u8 = 0x0E;
+/// Read device id code: the basic objects, 00 to 02.
+pub const MBM_DEVICE_ID_BASIC: u8 = 1;
+/// Read device id code: the regular objects, 00 to 7F.
+pub const MBM_DEVICE_ID_REGULAR: u8 = 2;
+/// Read device id code: all objects, 00 to FF.
+pub const MBM_DEVICE_ID_EXTENDED: u8 = 3;
+/// Read device id code: one object.
+pub const MBM_DEVICE_ID_INDIVIDUAL: u8 = 4;
+
+/// Length rule: only silence on the line, or what frames the PDU, ends it.
+pub const MBM_RULE_SILENCE: u8 = 0;
+/// Length rule: always so many bytes.
+pub const MBM_RULE_FIXED: u8 = 1;
+/// Length rule: a byte counts the bytes behind it.
+pub const MBM_RULE_COUNTED: u8 = 2;
+
+const _: () = {
+    assert!(MBM_FC_READ_COILS == bits::READ_COILS);
+    assert!(MBM_FC_READ_DISCRETE_INPUTS == bits::READ_DISCRETE_INPUTS);
+    assert!(MBM_FC_READ_HOLDING_REGISTERS == registers::READ_HOLDING_REGISTERS);
+    assert!(MBM_FC_READ_INPUT_REGISTERS == registers::READ_INPUT_REGISTERS);
+    assert!(MBM_FC_WRITE_SINGLE_COIL == bits::WRITE_SINGLE_COIL);
+    assert!(MBM_FC_WRITE_SINGLE_REGISTER == registers::WRITE_SINGLE_REGISTER);
+    assert!(MBM_FC_READ_EXCEPTION_STATUS == diagnostics::READ_EXCEPTION_STATUS);
+    assert!(MBM_FC_DIAGNOSTICS == diagnostics::DIAGNOSTICS);
+    assert!(MBM_FC_GET_COMM_EVENT_COUNTER == diagnostics::GET_COMM_EVENT_COUNTER);
+    assert!(MBM_FC_GET_COMM_EVENT_LOG == diagnostics::GET_COMM_EVENT_LOG);
+    assert!(MBM_FC_WRITE_MULTIPLE_COILS == bits::WRITE_MULTIPLE_COILS);
+    assert!(MBM_FC_WRITE_MULTIPLE_REGISTERS == registers::WRITE_MULTIPLE_REGISTERS);
+    assert!(MBM_FC_REPORT_SERVER_ID == diagnostics::REPORT_SERVER_ID);
+    assert!(MBM_FC_READ_FILE_RECORD == files::READ_FILE_RECORD);
+    assert!(MBM_FC_WRITE_FILE_RECORD == files::WRITE_FILE_RECORD);
+    assert!(MBM_FC_MASK_WRITE_REGISTER == registers::MASK_WRITE_REGISTER);
+    assert!(MBM_FC_READ_WRITE_MULTIPLE_REGISTERS == registers::READ_WRITE_MULTIPLE_REGISTERS);
+    assert!(MBM_FC_READ_FIFO_QUEUE == files::READ_FIFO_QUEUE);
+    assert!(MBM_FC_ENCAPSULATED_INTERFACE == identification::ENCAPSULATED_INTERFACE_TRANSPORT);
+    use diagnostics::sub_function::*;
+    assert!(MBM_DIAGNOSTICS_RETURN_QUERY_DATA == RETURN_QUERY_DATA);
+    assert!(MBM_DIAGNOSTICS_RESTART_COMMUNICATIONS == RESTART_COMMUNICATIONS);
+    assert!(MBM_DIAGNOSTICS_RETURN_DIAGNOSTIC_REGISTER == RETURN_DIAGNOSTIC_REGISTER);
+    assert!(MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER == CHANGE_ASCII_INPUT_DELIMITER);
+    assert!(MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY == FORCE_LISTEN_ONLY);
+    assert!(MBM_DIAGNOSTICS_CLEAR_COUNTERS == CLEAR_COUNTERS);
+    assert!(MBM_DIAGNOSTICS_BUS_MESSAGE_COUNT == BUS_MESSAGE_COUNT);
+    assert!(MBM_DIAGNOSTICS_BUS_COMMUNICATION_ERROR_COUNT == BUS_COMMUNICATION_ERROR_COUNT);
+    assert!(MBM_DIAGNOSTICS_BUS_EXCEPTION_ERROR_COUNT == BUS_EXCEPTION_ERROR_COUNT);
+    assert!(MBM_DIAGNOSTICS_SERVER_MESSAGE_COUNT == SERVER_MESSAGE_COUNT);
+    assert!(MBM_DIAGNOSTICS_SERVER_NO_RESPONSE_COUNT == SERVER_NO_RESPONSE_COUNT);
+    assert!(MBM_DIAGNOSTICS_SERVER_NAK_COUNT == SERVER_NAK_COUNT);
+    assert!(MBM_DIAGNOSTICS_SERVER_BUSY_COUNT == SERVER_BUSY_COUNT);
+    assert!(MBM_DIAGNOSTICS_BUS_CHARACTER_OVERRUN_COUNT == BUS_CHARACTER_OVERRUN_COUNT);
+    assert!(MBM_DIAGNOSTICS_CLEAR_OVERRUN_COUNTER == CLEAR_OVERRUN_COUNTER);
+    assert!(MBM_MEI_CANOPEN == identification::MEI_CANOPEN);
+    assert!(MBM_MEI_READ_DEVICE_IDENTIFICATION == identification::MEI_READ_DEVICE_IDENTIFICATION);
+    assert!(MBM_DEVICE_ID_BASIC == identification::BASIC);
+    assert!(MBM_DEVICE_ID_REGULAR == identification::REGULAR);
+    assert!(MBM_DEVICE_ID_EXTENDED == identification::EXTENDED);
+    assert!(MBM_DEVICE_ID_INDIVIDUAL == identification::INDIVIDUAL);
+};
+
+/// How long the PDU of a function of your own is, function code included.
+/// Zeroed: as long as its frame.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct mbm_rule {
+    /// MBM_RULE_SILENCE, MBM_RULE_FIXED or MBM_RULE_COUNTED.
+    pub kind: u8,
+    /// FIXED: bytes of the PDU, 1 to 253. COUNTED: where the counting byte
+    /// stands, 1 to 252 bytes behind the function code.
+    pub bytes: u8,
+    /// COUNTED: bytes that follow those that are counted.
+    pub more: u8,
+}
+
+/// A function of your own. Codes 65 to 72 and 100 to 110 are left to users, of
+/// any length unless you declare them; another code that the standard does not
+/// define works once it is declared. A code of the standard keeps its meaning.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct mbm_function {
+    /// 1 to 127.
+    pub code: u8,
+    /// Its requests.
+    pub request: mbm_rule,
+    /// Its responses.
+    pub response: mbm_rule,
+}
+
+/// The core's word for a rule; none if it is no rule. (Inlined: to pack and unpack
+/// what it returns takes more than what it does.)
+#[inline(always)]
+pub(super) fn rule(rule: mbm_rule) -> Option<Rule> {
+    let fits = |most| rule.bytes > 0 && rule.bytes <= most;
+    match rule.kind {
+        MBM_RULE_SILENCE => Some(Rule::Silence),
+        MBM_RULE_FIXED if fits(MAX_PDU as u8) => Some(Rule::Fixed(rule.bytes)),
+        MBM_RULE_COUNTED if fits(MAX_PDU as u8 - 1) => Some(Rule::Counted(rule.bytes, rule.more)),
+        _ => None,
+    }
+}
+
+/// The declaration of a function code, if there is one.
+///
+/// # Errors
+/// [`Status::INVALID_ARGUMENT`] if one of these can be no declaration.
+pub(super) fn declared(
+    functions: &[mbm_function],
+    code: Option<u8>,
+) -> Result<Option<Function>, Status> {
+    let mut found = None;
+    for function in functions {
+        let rules = rule(function.request).zip(rule(function.response));
+        let (request, response) = match rules {
+            Some(rules) if (1..=127).contains(&function.code) => rules,
+            _ => return Err(Status::INVALID_ARGUMENT),
+        };
+        if found.is_none() && Some(function.code) == code {
+            found = Some(Function {
+                code: function.code,
+                request,
+                response,
+            });
+        }
+    }
+    Ok(found)
+}

@@ -1,0 +1,172 @@
+//! Words to send and words received.
+
+use super::mbm_master;
+use crate::pointers::{ask, with};
+use mbm::error::Status;
+use mbm::master::NO_WORD;
+
+/// A word of the last successful read.
+///
+/// @param master  the object
+/// @param index   0 to 255
+/// @return the word; 0xFFFF past the end of the response buffer
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_getResponseBuffer(master: *const mbm_master, index: u8) -> u16 {
+    // SAFETY: as the header demands.
+    unsafe {
+        ask(master, NO_WORD, |master| {
+            master.core.response_word(usize::from(index))
+        })
+    }
+}
+
+/// Zeroes the response words; receive goes on where it was.
+///
+/// @param master  the object
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_clearResponseBuffer(master: *mut mbm_master) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(master, |master| {
+            master.core.clear_response();
+            Status::OK
+        })
+    }
+}
+
+/// Sets a word for the functions that write. Does not move the queue of send.
+///
+/// @param master  the object
+/// @param index   0 to the transmit buffer's words - 1
+/// @param value   the word
+/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS past the end of the buffer,
+///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_setTransmitBuffer(
+    master: *mut mbm_master,
+    index: u8,
+    value: u16,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(master, |master| {
+            if master.core.set_transmit_word(usize::from(index), value) {
+                Status::OK
+            } else {
+                Status::ILLEGAL_DATA_ADDRESS
+            }
+        })
+    }
+}
+
+/// Zeroes the transmit words; the queue of send stays.
+///
+/// @param master  the object
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_clearTransmitBuffer(master: *mut mbm_master) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(master, |master| {
+            master.core.clear_transmit();
+            Status::OK
+        })
+    }
+}
+
+/// Sets the write address and empties the queue of send; the words stay.
+///
+/// @param master   the object
+/// @param address  0 to 65535, for the functions ending in Queued
+/// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_beginTransmission(master: *mut mbm_master, address: u16) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(master, |master| {
+            master.core.begin_transmission(address);
+            Status::OK
+        })
+    }
+}
+
+fn queued(fits: bool) -> Status {
+    if fits {
+        Status::OK
+    } else {
+        Status::BUFFER_TOO_SMALL
+    }
+}
+
+/// Queues a word behind those queued. Bits queued before keep their word.
+///
+/// @param master  the object
+/// @param word    the word
+/// @return MBM_OK, MBM_BUFFER_TOO_SMALL with nothing queued past the end of the
+///         transmit buffer, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_send(master: *mut mbm_master, word: u16) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { with(master, |master| queued(master.core.send(word))) }
+}
+
+/// Queues a byte as one word.
+///
+/// @param master  the object
+/// @param byte    the low byte of the word; the high byte is 0
+/// @return MBM_OK, MBM_BUFFER_TOO_SMALL with nothing queued past the end of the
+///         transmit buffer, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_send8(master: *mut mbm_master, byte: u8) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { with(master, |master| queued(master.core.send(u16::from(byte)))) }
+}
+
+/// Queues two words, the low one first; the low one alone if only that fits.
+///
+/// @param master  the object
+/// @param value   both words
+/// @return MBM_OK, MBM_BUFFER_TOO_SMALL if a word did not fit,
+///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_send32(master: *mut mbm_master, value: u32) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        with(master, |master| {
+            queued(master.core.send(value as u16) && master.core.send((value >> 16) as u16))
+        })
+    }
+}
+
+/// Queues a bit behind those queued, lowest bit of a word first.
+///
+/// @param master  the object
+/// @param on      0 is off, anything else is on
+/// @return MBM_OK, MBM_BUFFER_TOO_SMALL with nothing queued past the end of the
+///         transmit buffer, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_sendBit(master: *mut mbm_master, on: u8) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { with(master, |master| queued(master.core.send_bit(on != 0))) }
+}
+
+/// How many words of the last successful read mbm_master_receive has yet to give.
+///
+/// @param master  the object
+/// @return 0 to 125
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_available(master: *const mbm_master) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { ask(master, 0, |master| master.core.available()) }
+}
+
+/// The next word of the last successful read.
+///
+/// @param master  the object
+/// @return the word; 0xFFFF when none is left
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_receive(master: *mut mbm_master) -> u16 {
+    // SAFETY: as the header demands.
+    unsafe { ask(master, NO_WORD, |master| master.core.receive()) }
+}

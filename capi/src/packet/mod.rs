@@ -1,0 +1,413 @@
+//! Requests and responses as flat structs: built, parsed, measured.
+
+mod fields;
+mod groups;
+
+pub use groups::*;
+
+use super::functions::{declared, mbm_function};
+use super::pointers::{buffer, get, lent, lent_or_none, overlap, put, put_length};
+use mbm::error::Status;
+use mbm::packet::{self, Side};
+use mbm::pdu::custom::Function;
+use mbm::pdu::length::Length;
+use mbm::pdu::limits::MAX_PDU;
+use mbm::pdu::request::Request;
+use mbm::pdu::response::Response;
+
+/// A request: what a client sends.
+pub const MBM_PACKET_REQUEST: u8 = 0;
+/// A response: what a server sends if the request succeeds.
+pub const MBM_PACKET_RESPONSE: u8 = 1;
+/// An exception: what a server sends if the request fails (V1.1b3, clause 7).
+pub const MBM_PACKET_EXCEPTION: u8 = 2;
+
+/// Most bytes of a PDU: function code and data (V1.1b3, 4.1).
+pub const MBM_MAX_PDU: u16 = 253;
+
+const _: () = assert!(MBM_MAX_PDU as usize == MAX_PDU);
+
+/// `bytes` is the length.
+pub const MBM_LENGTH_EXACT: u8 = 0;
+/// It has `bytes` at least. Once so many are there, ask again.
+pub const MBM_LENGTH_AT_LEAST: u8 = 1;
+/// Silence on the line tells, in ASCII the end character. `bytes` is 0.
+pub const MBM_LENGTH_SILENCE: u8 = 2;
+/// Nobody knows this function: declare it. Also what silence ends, in RTU over TCP,
+/// where there is none. `bytes` is 0.
+pub const MBM_LENGTH_UNKNOWN: u8 = 3;
+
+/// How long something is.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct mbm_length {
+    /// All of it, from its first byte, as `kind` says.
+    pub bytes: u16,
+    /// MBM_LENGTH_EXACT, _AT_LEAST, _SILENCE or _UNKNOWN.
+    pub kind: u8,
+}
+
+impl From<Length> for mbm_length {
+    fn from(length: Length) -> Self {
+        let (kind, bytes) = match length {
+            Length::Exactly(bytes) => (MBM_LENGTH_EXACT, bytes),
+            Length::AtLeast(bytes) => (MBM_LENGTH_AT_LEAST, bytes),
+            Length::Silence => (MBM_LENGTH_SILENCE, 0),
+            Length::Unknown => (MBM_LENGTH_UNKNOWN, 0),
+        };
+        let bytes = bytes as u16;
+        mbm_length { bytes, kind }
+    }
+}
+
+/// A request, response or exception of any function. Parsing zeroes it first,
+/// and sets what the function has; building reads that and ignores the rest:
+///
+/// function | request | response
+/// ---------|---------|---------
+/// 01, 02, 03, 04 | address, quantity | data
+/// 05 | address, value | address, value
+/// 06 | address, value | address, value
+/// 07 | | exceptionStatus
+/// 08 | subFunction, data | subFunction, data
+/// 0B | | commStatus, eventCount
+/// 0C | | commStatus, eventCount, messageCount, data (events, the latest first)
+/// 0F, 10 | address, quantity, data | address, quantity
+/// 11 | | byteCount, data
+/// 14 | data (records) | data (records)
+/// 15 | data (records) | data (records)
+/// 16 | address, andMask, orMask | address, andMask, orMask
+/// 17 | address, quantity, writeAddress, writeQuantity, data | data
+/// 18 | address | data (registers)
+/// 2B, MEI type 0E | meiType, readDeviceIdCode, objectId | meiType, readDeviceIdCode, conformity, moreFollows, nextObjectId, objectCount, data (objects)
+/// 2B, others | meiType, data | meiType, data
+/// your own | data | data
+///
+/// An exception has exceptionCode, and the function of the request. Register
+/// data are as on the wire, high bytes first; bits begin with the lowest of the
+/// first byte. Records and objects: mbm_packet_nextRecord, mbm_packet_addRecord
+/// and their likes for objects.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct mbm_packet {
+    /// The data, without the byte count in front of them. After parsing they
+    /// lie within the bytes that were parsed; to build, they are yours. May be
+    /// NULL if dataLength is 0.
+    pub data: *const u8,
+    /// Bytes of data.
+    pub dataLength: u16,
+    /// Transaction identifier of a TCP frame; 0 in other framings.
+    pub transaction: u16,
+    /// First coil, input or register, counted from 0; 17: that is read.
+    pub address: u16,
+    /// Coils, inputs or registers; 17: that are read.
+    pub quantity: u16,
+    /// 17: first register that is written.
+    pub writeAddress: u16,
+    /// 17: registers that are written.
+    pub writeQuantity: u16,
+    /// 05: 0 is off, anything else is on (parsed: 1). 06: the register.
+    pub value: u16,
+    /// 16: bits that are kept.
+    pub andMask: u16,
+    /// 16: bits that replace those that are not kept.
+    pub orMask: u16,
+    /// 08: one of MBM_DIAGNOSTICS_.
+    pub subFunction: u16,
+    /// 0B, 0C: FFFF while a command is carried out, else 0.
+    pub commStatus: u16,
+    /// 0B, 0C: successful messages.
+    pub eventCount: u16,
+    /// 0C: messages.
+    pub messageCount: u16,
+    /// MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE or MBM_PACKET_EXCEPTION.
+    pub kind: u8,
+    /// The unit that is asked, or that answers. Of frames only.
+    pub unit: u8,
+    /// Function code, 1 to 127; of an exception that of the request.
+    pub function: u8,
+    /// Exception: 1 to 127, the same numbers as MBM_ILLEGAL_FUNCTION and others.
+    pub exceptionCode: u8,
+    /// 07: eight outputs.
+    pub exceptionStatus: u8,
+    /// 11: the byte count. It is dataLength, or less: some devices count the id
+    /// only and send more behind it.
+    pub byteCount: u8,
+    /// 2B: MBM_MEI_READ_DEVICE_IDENTIFICATION or another.
+    pub meiType: u8,
+    /// 2B/0E: one of MBM_DEVICE_ID_.
+    pub readDeviceIdCode: u8,
+    /// 2B/0E: the first object, or the only one.
+    pub objectId: u8,
+    /// 2B/0E: 01 to 03 or 81 to 83 by the standard; not checked.
+    pub conformity: u8,
+    /// 2B/0E: 1 if another request is needed for the rest, else 0.
+    pub moreFollows: u8,
+    /// 2B/0E: the object to ask for next; if none follows, 0 by the standard, and
+    /// not checked.
+    pub nextObjectId: u8,
+    /// 2B/0E: how many objects the data are.
+    pub objectCount: u8,
+}
+
+/// The side that C names.
+pub(super) fn side(kind: u8) -> Result<Side, Status> {
+    match kind {
+        MBM_PACKET_REQUEST => Ok(Side::Request),
+        MBM_PACKET_RESPONSE => Ok(Side::Response),
+        _ => Err(Status::INVALID_ARGUMENT),
+    }
+}
+
+impl mbm_packet {
+    /// Its data; an error for a NULL pointer.
+    ///
+    /// # Safety
+    /// `data` is NULL or points to `dataLength` bytes.
+    pub(super) unsafe fn data<'a>(&self) -> Result<&'a [u8], Status> {
+        // SAFETY: as the caller promises.
+        let data = unsafe { lent_or_none(self.data, self.dataLength.into()) };
+        data.ok_or(Status::INVALID_ARGUMENT)
+    }
+
+    /// True if its data lie in a buffer that is to be written.
+    pub(super) fn lies_in(&self, buffer: *const u8, capacity: u16) -> bool {
+        overlap(self.data, self.dataLength, buffer, capacity)
+    }
+
+    /// Writes the PDU with these data.
+    pub(super) fn emit(
+        &self,
+        data: &[u8],
+        functions: &[Function],
+        place: &mut [u8],
+    ) -> Result<usize, Status> {
+        match self.kind {
+            MBM_PACKET_REQUEST => packet::emit_request(&self.request(data)?, functions, place),
+            _ => packet::emit_response(&self.response(data)?, functions, place),
+        }
+    }
+
+    /// Takes over the PDU from one side.
+    pub(super) fn take(
+        &mut self,
+        side: Side,
+        pdu: &[u8],
+        functions: &[Function],
+    ) -> Result<(), Status> {
+        match side {
+            Side::Request => self.take_request(&Request::parse_with(pdu, functions)?),
+            Side::Response => self.take_response(&Response::parse_with(pdu, functions)?),
+        }
+        Ok(())
+    }
+}
+
+/// The declaration of a function code among what C declares.
+///
+/// # Safety
+/// `functions` is NULL or points to `count` declarations.
+pub(super) unsafe fn own(
+    functions: *const mbm_function,
+    count: u8,
+    code: Option<u8>,
+) -> Result<Option<Function>, Status> {
+    // SAFETY: as the caller promises.
+    let functions = unsafe { lent_or_none(functions, count.into()) };
+    declared(functions.ok_or(Status::INVALID_ARGUMENT)?, code)
+}
+
+/// Writes the PDU of a packet: what goes into a frame. Nothing is written
+/// behind it, and nothing malformed is ever built.
+///
+/// Any thread or interrupt may call it.
+///
+/// @param packet         what to build; unit and transaction are not in a PDU
+/// @param functions      functions of your own; may be NULL if there are none
+/// @param functionCount  how many
+/// @param pdu            receives it; may not overlap the packet's data
+/// @param capacity       bytes of `pdu`; MBM_MAX_PDU always do
+/// @param length         receives the PDU's length; 0 if the status is not MBM_OK
+/// @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
+///         that mbm_packet_parse finds in such a PDU
+#[no_mangle]
+pub unsafe extern "C" fn mbm_packet_build(
+    packet: *const mbm_packet,
+    functions: *const mbm_function,
+    functionCount: u8,
+    pdu: *mut u8,
+    capacity: u16,
+    length: *mut u16,
+) -> u8 {
+    // SAFETY: as the header demands; data and buffer do not overlap.
+    unsafe {
+        let build = || {
+            let packet = get(packet).filter(|packet| !packet.lies_in(pdu, capacity));
+            let packet = packet.ok_or(Status::INVALID_ARGUMENT)?;
+            let own = own(functions, functionCount, Some(packet.function))?;
+            let place = buffer(pdu, capacity).filter(|_| !length.is_null());
+            let place = place.ok_or(Status::INVALID_ARGUMENT)?;
+            packet.emit(packet.data()?, own.as_slice(), place)
+        };
+        put_length(length, build())
+    }
+}
+
+/// Reads a PDU: what stands in a frame. The packet's data point into it.
+///
+/// Any thread or interrupt may call it.
+///
+/// @param kind           MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for
+///                       responses and exceptions
+/// @param pdu            the PDU
+/// @param pduLength      its bytes
+/// @param functions      functions of your own; may be NULL if there are none
+/// @param functionCount  how many
+/// @param packet         receives what it says; if the PDU is refused, its kind
+///                       and function alone; unchanged for MBM_INVALID_ARGUMENT
+/// @return MBM_OK, also for an exception; MBM_INVALID_ARGUMENT. Of a request
+///         else the exception that answers it: MBM_ILLEGAL_FUNCTION,
+///         MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE. Of a response
+///         else MBM_INVALID_FUNCTION for one that nobody knows, or
+///         MBM_MALFORMED_REPLY
+#[no_mangle]
+pub unsafe extern "C" fn mbm_packet_parse(
+    kind: u8,
+    pdu: *const u8,
+    pduLength: u16,
+    functions: *const mbm_function,
+    functionCount: u8,
+    packet: *mut mbm_packet,
+) -> u8 {
+    // SAFETY: as the header demands.
+    let arguments = unsafe {
+        side(kind).and_then(|side| {
+            let pdu = lent(pdu, pduLength.into()).filter(|_| !packet.is_null());
+            let pdu = pdu.ok_or(Status::INVALID_ARGUMENT)?;
+            let own = own(functions, functionCount, pdu.first().copied())?;
+            Ok((side, pdu, own))
+        })
+    };
+    let (side, pdu, own) = match arguments {
+        Ok(arguments) => arguments,
+        Err(refused) => return refused.code(),
+    };
+    let mut found = mbm_packet::of(kind, pdu);
+    let taken = found.take(side, pdu, own.as_slice());
+    // SAFETY: as the header demands.
+    unsafe { put(packet, found) };
+    taken.err().unwrap_or(Status::OK).code()
+}
+
+/// How long the PDU is that begins with these bytes.
+///
+/// A response to function 11 is as long as it counts. Some devices count the id alone:
+/// mbm_packet_parse takes their longer PDU too. mbm_frame_expectedLength tells these
+/// apart, by the frame's check.
+///
+/// Any thread or interrupt may call it.
+///
+/// @param kind           MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for
+///                       responses and exceptions
+/// @param pdu            its first bytes; more may follow
+/// @param have           how many; may be 0
+/// @param functions      functions of your own; may be NULL if there are none
+/// @param functionCount  how many
+/// @param expected       receives the length; MBM_LENGTH_UNKNOWN and 0 if the status
+///                       is not MBM_OK
+/// @return MBM_OK; MBM_MALFORMED_FRAME for a length that no PDU has;
+///         MBM_INVALID_ARGUMENT
+#[no_mangle]
+pub unsafe extern "C" fn mbm_packet_expectedLength(
+    kind: u8,
+    pdu: *const u8,
+    have: u16,
+    functions: *const mbm_function,
+    functionCount: u8,
+    expected: *mut mbm_length,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        let measure = || {
+            let side = side(kind)?;
+            let pdu = lent(pdu, have.into()).ok_or(Status::INVALID_ARGUMENT)?;
+            let own = own(functions, functionCount, pdu.first().copied())?;
+            match side.length(pdu, own.as_slice()) {
+                Length::Exactly(bytes) | Length::AtLeast(bytes) if bytes > MAX_PDU => {
+                    Err(Status::MALFORMED_FRAME)
+                }
+                length => Ok(length),
+            }
+        };
+        put_expected(expected, measure())
+    }
+}
+
+/// How long the PDU will be that answers a request, if that succeeds. Else it is
+/// an exception of two bytes.
+///
+/// Any thread or interrupt may call it.
+///
+/// @param request        the request, as for mbm_packet_build
+/// @param functions      functions of your own; may be NULL if there are none
+/// @param functionCount  how many
+/// @param expected       receives the length; MBM_LENGTH_EXACT and 0 if nothing
+///                       ever answers it (08 with sub-function 04);
+///                       MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
+/// @return MBM_OK; MBM_INVALID_ARGUMENT, also for a packet that is no request;
+///         else why such a request is never built
+#[no_mangle]
+pub unsafe extern "C" fn mbm_packet_replyLength(
+    request: *const mbm_packet,
+    functions: *const mbm_function,
+    functionCount: u8,
+    expected: *mut mbm_length,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        let measure = || {
+            let packet = get(request).ok_or(Status::INVALID_ARGUMENT)?;
+            let own = own(functions, functionCount, Some(packet.function))?;
+            reply_length(&packet, own.as_slice(), |request| {
+                request.response_length(own.as_slice())
+            })
+        };
+        put_expected(expected, measure())
+    }
+}
+
+/// Measures the reply to a request, which must be one that can be built.
+///
+/// # Safety
+/// As for [`mbm_packet::data`].
+pub(super) unsafe fn reply_length(
+    packet: &mbm_packet,
+    functions: &[Function],
+    measure: impl FnOnce(&Request) -> Length,
+) -> Result<Length, Status> {
+    if packet.kind != MBM_PACKET_REQUEST {
+        return Err(Status::INVALID_ARGUMENT);
+    }
+    // SAFETY: as the caller promises.
+    let request = packet.request(unsafe { packet.data() }?)?;
+    packet::emit_request(&request, functions, &mut [0; MAX_PDU])?;
+    Ok(measure(&request))
+}
+
+/// Hands a length to C; MBM_LENGTH_UNKNOWN with the status that says why there is
+/// none.
+///
+/// # Safety
+/// As for [`put`].
+pub(super) unsafe fn put_expected(place: *mut mbm_length, length: Result<Length, Status>) -> u8 {
+    let told = match length {
+        Ok(length) => length,
+        Err(_) => Length::Unknown,
+    };
+    // SAFETY: as the caller promises.
+    let status = unsafe { put(place, told.into()) };
+    match length {
+        Err(refused) if status == Status::OK.code() => refused.code(),
+        _ => status,
+    }
+}

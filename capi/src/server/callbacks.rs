@@ -1,0 +1,185 @@
+//! The four tables, cell by cell, where the caller's callbacks hold them.
+
+use super::units::{add_as, is_unheard, request};
+use super::{mbm_service, mbm_unit};
+use core::ffi::c_void;
+use mbm::error::Status;
+use mbm::server::table::{self, Access, Cells, Kind, Way};
+use mbm::server::Reply;
+
+/// Cells that your functions hold, one by one, in place of an array. Zero it, set
+/// what you need, and hand it to mbm_server_serveCallbacks.
+#[repr(C)]
+pub struct mbm_cells {
+    /// Not for you.
+    pub service: mbm_service,
+    /// Handed to each function. Yours, may be NULL.
+    pub context: *mut c_void,
+    /// Optional, NULL if every address is there: 1 if this one is. What is not
+    /// there is answered with exception 02.
+    pub isValid: Option<unsafe extern "C" fn(context: *mut c_void, address: u16) -> u8>,
+    /// A cell that is there; of a bit, 0 or anything else.
+    pub get: Option<unsafe extern "C" fn(context: *mut c_void, address: u16) -> u16>,
+    /// Sets a cell that is there; a bit to 0 or 1. Not needed for what is only read.
+    pub set: Option<unsafe extern "C" fn(context: *mut c_void, address: u16, value: u16)>,
+    /// As in mbm_registerTable.
+    pub before: Option<
+        unsafe extern "C" fn(
+            context: *mut c_void,
+            address: u16,
+            quantity: u16,
+            data: *const u8,
+        ) -> u8,
+    >,
+    /// As in mbm_registerTable.
+    pub after: Option<unsafe extern "C" fn(context: *mut c_void, address: u16, quantity: u16)>,
+}
+
+/// Cells of C, which its functions may look at: no reference to them is kept.
+#[derive(Clone, Copy)]
+struct ByC(*mut mbm_cells);
+
+// SAFETY, of all functions here: the record is the caller's and stays where it
+// is, as the header demands; its functions keep the contract of their comments.
+impl ByC {
+    fn is_valid(self, address: u16) -> bool {
+        // SAFETY: see above.
+        unsafe {
+            let check = (*self.0).isValid;
+            check.is_none_or(|check| check((*self.0).context, address) != 0)
+        }
+    }
+    fn get(self, address: u16) -> u16 {
+        // SAFETY: see above.
+        unsafe {
+            (*self.0)
+                .get
+                .map_or(0, |get| get((*self.0).context, address))
+        }
+    }
+    fn set(self, address: u16, value: u16) {
+        // SAFETY: see above.
+        unsafe {
+            if let Some(set) = (*self.0).set {
+                set((*self.0).context, address, value);
+            }
+        }
+    }
+}
+
+impl Cells for ByC {
+    fn covers(&self, address: u16, quantity: u16) -> bool {
+        let last = address.checked_add(quantity.wrapping_sub(1));
+        last.is_some_and(|last| (address..=last).all(|cell| self.is_valid(cell)))
+    }
+
+    fn transfer(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) {
+        // SAFETY: see above.
+        let bits = Kind::from_code(unsafe { (*self.0).service.kind }).is_bits();
+        for index in 0..quantity {
+            let cell = address.wrapping_add(index);
+            if bits {
+                let Some(byte) = data.get_mut(usize::from(index / 8)) else {
+                    return;
+                };
+                let bit = 1 << (index % 8);
+                if way == Way::Write {
+                    self.set(cell, u16::from(*byte & bit != 0));
+                } else {
+                    if bit == 1 {
+                        *byte = 0;
+                    }
+                    if self.get(cell) != 0 {
+                        *byte |= bit;
+                    }
+                }
+            } else {
+                let at = 2 * usize::from(index);
+                let Some([high, low]) = data.get_mut(at..at + 2) else {
+                    return;
+                };
+                if way == Way::Write {
+                    self.set(cell, u16::from_be_bytes([*high, *low]));
+                } else {
+                    [*high, *low] = self.get(cell).to_be_bytes();
+                }
+            }
+        }
+    }
+
+    fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
+        // SAFETY: see above.
+        unsafe {
+            let hook = (*self.0).before;
+            hook.map_or(0, |hook| {
+                hook((*self.0).context, address, quantity, data.as_ptr())
+            })
+        }
+    }
+
+    fn after(&mut self, address: u16, quantity: u16) {
+        // SAFETY: see above.
+        unsafe {
+            if let Some(hook) = (*self.0).after {
+                hook((*self.0).context, address, quantity);
+            }
+        }
+    }
+}
+
+/// Serves cells.
+///
+/// # Safety
+/// `service` is the head of a record of them; `pdu` has the bytes and room of
+/// `heading`.
+unsafe extern "C" fn serve(
+    service: *mut mbm_service,
+    pdu: *mut u8,
+    heading: *const c_void,
+) -> usize {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let record = service.cast::<mbm_cells>();
+        let kind = Kind::from_code((*record).service.kind);
+        if is_unheard(heading, *pdu) {
+            return Reply::NOT_MINE.code();
+        }
+        let is_more = kind == Kind::HOLDING_REGISTERS && table::is_more(*pdu);
+        let (pdu, length) = request(pdu, heading);
+        let mut cells = ByC(record);
+        let reply = if is_more {
+            let cells: &mut dyn Access = &mut cells;
+            table::serve_more(cells, pdu, length)
+        } else {
+            table::serve(kind, &mut cells, pdu, length)
+        };
+        reply.code()
+    }
+}
+
+/// Serves cells that your functions hold.
+///
+/// @param unit   the unit
+/// @param cells  yours, for as long as the unit is used
+/// @param table  the function that reads them: 1 coils (01, 05, 0F), 2 discrete
+///               inputs (02), 3 holding registers (03, 06, 10, 16, 17), 4 input
+///               registers (04)
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, no `get`, no `set`
+///         where it is needed, or another table; MBM_BUSY and MBM_BUFFER_TOO_SMALL as
+///         mbm_server_serveCoils
+#[no_mangle]
+pub unsafe extern "C" fn mbm_server_serveCallbacks(
+    unit: *mut mbm_unit,
+    cells: *mut mbm_cells,
+    table: u8,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        let useless =
+            cells.is_null() || (*cells).get.is_none() || (table & 1 != 0 && (*cells).set.is_none());
+        if useless || !(1..=4).contains(&table) {
+            return Status::INVALID_ARGUMENT.code();
+        }
+        add_as(unit, cells.cast(), table, serve).code()
+    }
+}

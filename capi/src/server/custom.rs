@@ -1,0 +1,272 @@
+//! Functions that the caller defines, and functions switched off.
+
+use super::records::Serve;
+use super::units::{add, add_first, is_unheard, request, Places};
+use super::{mbm_service, mbm_unit};
+use crate::functions::{self, mbm_rule};
+use core::ffi::c_void;
+use mbm::error::Status;
+use mbm::pdu::custom::Rule;
+use mbm::server::custom::{self, Outcome};
+use mbm::server::{Heading, Reply};
+
+/// What a function of yours returns for an exception: this, or-ed with the code.
+pub const MBM_REPLY_EXCEPTION: u16 = 0x0100;
+/// What a function of yours returns for no response at all.
+pub const MBM_REPLY_NONE: u16 = 0x0200;
+/// What a function of yours returns to be asked again at the next poll, with the
+/// same request. The server hears nothing meanwhile.
+pub const MBM_REPLY_PENDING: u16 = 0x0300;
+
+/// A request for a function of yours.
+#[repr(C)]
+pub struct mbm_request {
+    /// What stands behind the function code.
+    pub data: *const u8,
+    /// Bytes of it, 0 to 252.
+    pub length: u16,
+    /// The unit that it was sent to; on a serial line 0 is broadcast, whose
+    /// response nobody will see.
+    pub unit: u8,
+    /// The function code.
+    pub function: u8,
+}
+
+/// A function of yours. Zero it, set what you need, and hand it to
+/// mbm_server_serveCustom.
+#[repr(C)]
+pub struct mbm_custom {
+    /// Not for you.
+    pub service: mbm_service,
+    /// Carries out a request and writes the data of the response, which stand
+    /// behind the function code, to `response`. `capacity` is what the frame
+    /// buffer has left behind the request, at most 252 of it are used. Returns
+    /// how many bytes it wrote, or MBM_REPLY_EXCEPTION | code, MBM_REPLY_NONE or
+    /// MBM_REPLY_PENDING.
+    pub serve: Option<
+        unsafe extern "C" fn(
+            context: *mut c_void,
+            request: *const mbm_request,
+            response: *mut u8,
+            capacity: u16,
+        ) -> u16,
+    >,
+    /// Handed to `serve`. Yours, may be NULL.
+    pub context: *mut c_void,
+    /// The function code, 1 to 127; 0 is every function that nothing before it
+    /// serves. 65 to 72 and 100 to 110 are left to users (V1.1b3, 5).
+    pub code: u8,
+    /// How long its request PDUs are, which RTU over TCP asks. Zeroed, a request is
+    /// whole once its CRC is right.
+    pub length: mbm_rule,
+}
+
+/// Functions that a unit answers with exception 01, though it could serve them:
+/// see mbm_server_switchOff.
+#[repr(C)]
+pub struct mbm_switches {
+    /// Not for you.
+    pub service: mbm_service,
+    /// Not for you.
+    pub off: [u8; 16],
+}
+
+/// # Safety
+/// `service` is the head of a function of C; `pdu` has the bytes and room of
+/// `heading`.
+unsafe extern "C" fn serve(
+    service: *mut mbm_service,
+    pdu: *mut u8,
+    heading: *const c_void,
+) -> usize {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let code = (*service.cast::<mbm_custom>()).code;
+        if code != 0 && code != *pdu {
+            return Reply::NOT_MINE.code();
+        }
+        serve_mine(service.cast(), pdu, heading)
+    }
+}
+
+/// [`serve`], of the function that the record serves: apart, for a request of another is
+/// to cost little.
+///
+/// # Safety
+/// As for [`serve`].
+#[cfg_attr(not(target_os = "none"), inline(never))]
+unsafe fn serve_mine(record: *mut mbm_custom, pdu: *mut u8, heading: *const c_void) -> usize {
+    // SAFETY: as the caller promises; no reference to the record is kept while
+    // its function runs.
+    unsafe {
+        let to = (*heading.cast::<Heading>()).to;
+        let (pdu, length) = request(pdu, heading);
+        let function = pdu.first().copied().unwrap_or(0);
+        if is_unheard(heading, function) {
+            return Reply::NOT_MINE.code();
+        }
+        let Some(handler) = (*record).serve else {
+            return Reply::NOT_MINE.code();
+        };
+        let context = (*record).context;
+        custom::serve(pdu, length, |data, room| {
+            let request = mbm_request {
+                data: data.as_ptr(),
+                length: data.len() as u16,
+                unit: to,
+                function,
+            };
+            let capacity = room.len() as u16;
+            let said = handler(context, &raw const request, room.as_mut_ptr(), capacity);
+            match (said & 0xFF00, said as u8) {
+                (0, bytes) => Outcome::Data(bytes.into()),
+                (MBM_REPLY_EXCEPTION, code @ 1..=0x7F) => Outcome::Exception(code),
+                (MBM_REPLY_NONE, 0) => Outcome::Silent,
+                (MBM_REPLY_PENDING, 0) => Outcome::Pending,
+                _ => Outcome::Exception(Reply::SERVER_DEVICE_FAILURE.exception_code()),
+            }
+        })
+        .code()
+    }
+}
+
+/// The length rule of a function, if the record with this head is that function.
+///
+/// # Safety
+/// `service` is the head of a record of any kind.
+unsafe fn declared(service: *const mbm_service, function: u8) -> Option<Rule> {
+    // SAFETY: as the caller promises; a record that this file serves is a
+    // function of C.
+    unsafe {
+        if !(*service)
+            .serve
+            .is_some_and(|other| core::ptr::fn_addr_eq(other, serve as Serve))
+        {
+            return None;
+        }
+        let record = service.cast::<mbm_custom>();
+        if (*record).code != function {
+            return None;
+        }
+        functions::rule((*record).length)
+    }
+}
+
+/// The length rule that a unit has for a user's function.
+///
+/// # Safety
+/// `units` points to `count` units.
+pub(super) unsafe fn rule(units: *const mbm_unit, count: u8, function: u8) -> Option<Rule> {
+    // SAFETY: as the caller promises.
+    unsafe {
+        for index in 0..count {
+            for service in Places::new(units.add(index.into())) {
+                if let Some(rule) = declared(service, function) {
+                    return Some(rule);
+                }
+            }
+        }
+    }
+    None
+}
+
+/// Serves a function of yours, on every framing.
+///
+/// @param unit    the unit
+/// @param custom  yours, for as long as the unit is used
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, no function, a code
+///         from 128 on, or a length that is no rule; MBM_BUFFER_TOO_SMALL if the unit
+///         has no place
+#[no_mangle]
+pub unsafe extern "C" fn mbm_server_serveCustom(
+    unit: *mut mbm_unit,
+    custom: *mut mbm_custom,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        if custom.is_null()
+            || (*custom).serve.is_none()
+            || (*custom).code > 127
+            || functions::rule((*custom).length).is_none()
+        {
+            return Status::INVALID_ARGUMENT.code();
+        }
+        add(unit, custom.cast(), serve)
+    }
+}
+
+/// # Safety
+/// `service` is the head of switches; `pdu` points to a function code.
+unsafe extern "C" fn gate(
+    service: *mut mbm_service,
+    pdu: *mut u8,
+    _heading: *const c_void,
+) -> usize {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let off = custom::SwitchedOff((*service.cast::<mbm_switches>()).off);
+        if off.is_off(*pdu) {
+            Reply::ILLEGAL_FUNCTION.code()
+        } else {
+            Reply::NOT_MINE.code()
+        }
+    }
+}
+
+/// The byte that has the switch of a function.
+///
+/// # Safety
+/// `switches` is a record of them, and `code` 127 at most.
+unsafe fn switch(switches: *mut mbm_switches, code: u8) -> *mut u8 {
+    // SAFETY: as the caller promises; a sixteenth byte has code 127.
+    unsafe {
+        (&raw mut (*switches).off)
+            .cast::<u8>()
+            .add((code / 8).into())
+    }
+}
+
+/// Switches a function of a unit off: it is answered with exception 01 from now
+/// on, whatever serves it.
+///
+/// @param unit      the unit
+/// @param switches  yours, for as long as the unit is used; zeroed before the
+///                  first call. Units that share one share what is switched off
+/// @param code      1 to 127
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or another code;
+///         MBM_BUFFER_TOO_SMALL if the unit has no place
+#[no_mangle]
+pub unsafe extern "C" fn mbm_server_switchOff(
+    unit: *mut mbm_unit,
+    switches: *mut mbm_switches,
+    code: u8,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        if switches.is_null() || code == 0 || code > 127 {
+            return Status::INVALID_ARGUMENT.code();
+        }
+        let status = add_first(unit, switches.cast(), gate);
+        if status == Status::OK.code() {
+            *switch(switches, code) |= 1 << (code % 8);
+        }
+        status
+    }
+}
+
+/// Switches a function on again.
+///
+/// @param switches  what mbm_server_switchOff was given
+/// @param code      1 to 127
+/// @return MBM_OK or MBM_INVALID_ARGUMENT
+#[no_mangle]
+pub unsafe extern "C" fn mbm_server_switchOn(switches: *mut mbm_switches, code: u8) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        if switches.is_null() || code == 0 || code > 127 {
+            return Status::INVALID_ARGUMENT.code();
+        }
+        *switch(switches, code) &= !(1 << (code % 8));
+    }
+    Status::OK.code()
+}

@@ -1,0 +1,75 @@
+//! The records that a unit knows: the head of every one, and that of diagnostics.
+
+use core::ffi::c_void;
+use mbm::server::diagnostics::Diagnostics;
+#[cfg(doc)]
+use mbm::server::Reply;
+
+/// The head of each record that a mbm_server_serve function takes. Private.
+#[repr(C)]
+pub struct mbm_service {
+    /// Serves a request, if it is one of this family. NULL in a zeroed record,
+    /// which serves nothing.
+    pub serve: Option<
+        unsafe extern "C" fn(
+            service: *mut mbm_service,
+            pdu: *mut u8,
+            heading: *const c_void,
+        ) -> usize,
+    >,
+    /// What kind of record of its family it is served as, from 1 on; 0 in a zeroed one.
+    pub kind: u8,
+}
+
+/// The function of a service. `pdu` points to the PDU of a request that `heading`
+/// tells of, and returns a [`Reply`].
+pub(super) type Serve =
+    unsafe extern "C" fn(service: *mut mbm_service, pdu: *mut u8, heading: *const c_void) -> usize;
+
+/// What a unit knows of its line. Zero it, and hand it to
+/// mbm_server_serveDiagnostics. Counters wrap at 2^16; read them as you like.
+#[repr(C)]
+pub struct mbm_diagnostics {
+    /// Not for you.
+    pub service: mbm_service,
+    /// Optional: told that the client restarted the line with sub-function 01 of
+    /// 08; `clearLog` is 1 if it cleared the event log too.
+    pub restart: Option<unsafe extern "C" fn(context: *mut c_void, clearLog: u8)>,
+    /// Handed to `restart`. Yours, may be NULL.
+    pub context: *mut c_void,
+    /// What sub-function 02 of 08 returns: yours.
+    pub diagnosticRegister: u16,
+    /// Sub-function 0B: frames with a right CRC, for whichever unit.
+    pub busMessages: u16,
+    /// Sub-function 0C: frames that arrived damaged.
+    pub busCommunicationErrors: u16,
+    /// Sub-function 0D: exceptions, those of broadcasts too.
+    pub exceptionErrors: u16,
+    /// Sub-function 0E: requests for this unit, and broadcasts.
+    pub serverMessages: u16,
+    /// Sub-function 0F: requests that were not answered.
+    pub noResponses: u16,
+    /// Sub-function 10: exceptions 07.
+    pub naks: u16,
+    /// Sub-function 11: exceptions 06.
+    pub busy: u16,
+    /// Sub-function 12: frames that the buffer could not hold.
+    pub characterOverruns: u16,
+    /// What 0B returns: requests that were carried out.
+    pub events: u16,
+    /// 1 in listen only mode.
+    pub listenOnly: u8,
+    /// Not for you.
+    pub hidden: [u8; 67],
+}
+
+const _: () = {
+    use core::mem::offset_of;
+    let start = offset_of!(mbm_diagnostics, diagnosticRegister);
+    assert!(offset_of!(mbm_diagnostics, events) - start == offset_of!(Diagnostics, events));
+    assert!(
+        offset_of!(mbm_diagnostics, listenOnly) - start == offset_of!(Diagnostics, listen_only)
+    );
+    let end = offset_of!(mbm_diagnostics, hidden) + 67;
+    assert!(end - start == size_of::<Diagnostics>());
+};

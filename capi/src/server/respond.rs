@@ -1,0 +1,77 @@
+//! The responder: a frame in, a frame out.
+
+use super::mbm_unit;
+use super::units;
+use core::slice::from_raw_parts_mut;
+use mbm::error::Status;
+use mbm::frame::Framing;
+use mbm::server::respond::{respond, DELIMITER};
+use mbm::server::{Heading, Reply, Units};
+
+/// Units of C.
+struct ByC(*mut mbm_unit, u8);
+
+impl Units for ByC {
+    fn serve(&mut self, heading: &Heading, pdu: &mut [u8]) -> Reply {
+        // SAFETY: mbm_server_respond demands so many units.
+        let reply = unsafe { units::serve(self.0, self.1, heading, pdu.as_mut_ptr()) };
+        Reply::from_number(reply)
+    }
+}
+
+/// Answers one request, without a server: takes a frame from a buffer and writes
+/// the response frame over it.
+///
+/// @param framing    0 RTU, 1 ASCII with LF as its delimiter, 2 TCP, 3 RTU over
+///                   TCP
+/// @param units      what is served: one unit, or an array of them
+/// @param count      how many units
+/// @param frame      the whole request, and room for the response
+/// @param length     bytes of the request
+/// @param capacity   bytes of the buffer: 256 hold any response in RTU, 513 in
+///                   ASCII, 260 over TCP; a longer response becomes exception 04
+/// @param response   receives the bytes of the response; 0 where there is none: for a
+///                   damaged frame, another unit, a broadcast, and with any status
+///                   but MBM_OK
+/// @return MBM_OK; MBM_PENDING, with the buffer to be filled anew, if a function
+///         of yours is not done; MBM_INVALID_ARGUMENT
+#[no_mangle]
+pub unsafe extern "C" fn mbm_server_respond(
+    framing: u8,
+    units: *mut mbm_unit,
+    count: u8,
+    frame: *mut u8,
+    length: u16,
+    capacity: u16,
+    response: *mut u16,
+) -> u8 {
+    if !response.is_null() {
+        // SAFETY: not NULL, so room for a length.
+        unsafe { response.write(0) }
+    }
+    let framing = match Framing::from_code(framing) {
+        Some(framing) if !units.is_null() && !frame.is_null() && !response.is_null() => framing,
+        _ => return Status::INVALID_ARGUMENT.code(),
+    };
+    if length > capacity {
+        return Status::INVALID_ARGUMENT.code();
+    }
+    // SAFETY: not NULL; the rest as the header demands.
+    unsafe {
+        let buffer = from_raw_parts_mut(frame, capacity.into());
+        let answer = respond(
+            framing,
+            DELIMITER,
+            buffer,
+            length.into(),
+            &mut ByC(units, count),
+        );
+        match answer {
+            Ok(length) => {
+                response.write(length as u16);
+                Status::OK.code()
+            }
+            Err(status) => status.code(),
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! Status numbers and their explanation.
+
+use core::ffi::{c_char, CStr};
+use mbm::error::Status;
+
+/// Declares the constants of C, holds each against the core's number, and
+/// knows their words.
+macro_rules! statuses {
+    ($($constant:ident = $core:expr, $text:literal;)*) => {
+        $(const _: () = assert!($constant == $core.code());)*
+
+        const fn text(status: u8) -> &'static CStr {
+            match status {
+                $($constant => $text,)*
+                0x01..=0x7F => c"the device sent an exception code that the standard does not name",
+                _ => c"not a status",
+            }
+        }
+    };
+}
+
+/// The call succeeded.
+pub const MBM_OK: u8 = 0x00;
+/// Exception of the device: it does not know the function.
+pub const MBM_ILLEGAL_FUNCTION: u8 = 0x01;
+/// Exception of the device: it has no such address. Also, with nothing sent,
+/// for a range that passes address 65535.
+pub const MBM_ILLEGAL_DATA_ADDRESS: u8 = 0x02;
+/// Exception of the device: it refuses the quantity or value. Also, with
+/// nothing sent, for a quantity that the standard forbids, and for writes of
+/// more than the transmit buffer holds.
+pub const MBM_ILLEGAL_DATA_VALUE: u8 = 0x03;
+/// Exception of the device: it failed while it carried the request out.
+pub const MBM_SLAVE_DEVICE_FAILURE: u8 = 0x04;
+/// Exception of the device: accepted, but it takes long.
+pub const MBM_ACKNOWLEDGE: u8 = 0x05;
+/// Exception of the device: busy, ask again later.
+pub const MBM_SLAVE_DEVICE_BUSY: u8 = 0x06;
+/// Exception of the device: a file's memory is inconsistent.
+pub const MBM_MEMORY_PARITY_ERROR: u8 = 0x08;
+/// Exception of a gateway: no path to the device.
+pub const MBM_GATEWAY_PATH_UNAVAILABLE: u8 = 0x0A;
+/// Exception of a gateway: the device behind it did not answer.
+pub const MBM_GATEWAY_TARGET_FAILED_TO_RESPOND: u8 = 0x0B;
+
+/// Within the response timeout only frames of other units arrived.
+pub const MBM_INVALID_SLAVE_ID: u8 = 0xE0;
+/// Within the response timeout the unit answered, but to another function.
+pub const MBM_INVALID_FUNCTION: u8 = 0xE1;
+/// No complete reply within the response timeout.
+pub const MBM_RESPONSE_TIMED_OUT: u8 = 0xE2;
+/// The reply arrived damaged: its CRC is wrong.
+pub const MBM_INVALID_CRC: u8 = 0xE3;
+
+/// An argument that the function cannot take: NULL, a number out of range, a port
+/// without read, write or micros, a buffer that is too short, or an object of
+/// another framing or kind. The comment of the function says which. Nothing was
+/// changed.
+pub const MBM_INVALID_ARGUMENT: u8 = 0xE4;
+/// The unit answered the function with a right CRC, but not this request:
+/// wrong byte count, wrong echo, or an exception code of 0 or from 0x80.
+pub const MBM_MALFORMED_REPLY: u8 = 0xE5;
+/// The port's read or write reported that the link is lost.
+pub const MBM_LINK_LOST: u8 = 0xE6;
+/// The object is in use: it has a request under way, it called the hook that this
+/// call came from, or it is a record that is served in another way. Nothing was
+/// changed.
+pub const MBM_BUSY: u8 = 0xE7;
+/// A function that reads cannot be broadcast; nothing was sent.
+pub const MBM_BROADCAST_NOT_ALLOWED: u8 = 0xE8;
+/// The frame buffer cannot hold the request (nothing was sent), or frame or
+/// response buffer cannot hold the reply (the response words are unchanged), or a
+/// unit has no place for another record.
+pub const MBM_BUFFER_TOO_SMALL: u8 = 0xE9;
+/// The object was never begun, or has no buffers.
+pub const MBM_NOT_INITIALISED: u8 = 0xEA;
+/// The request is under way: call mbm_master_poll again.
+pub const MBM_PENDING: u8 = 0xEB;
+/// For as long as the response timeout the line never fell silent, or the
+/// port took no bytes.
+pub const MBM_LINE_BUSY: u8 = 0xEC;
+/// The request was given up by mbm_master_cancel or mbm_master_begin.
+pub const MBM_CANCELLED: u8 = 0xED;
+/// A frame that is not whole yet: more bytes are to come.
+pub const MBM_INCOMPLETE_FRAME: u8 = 0xEE;
+/// No frame of this framing begins like that, or has such a length.
+pub const MBM_MALFORMED_FRAME: u8 = 0xEF;
+/// The client has 16 requests already; nothing was queued.
+pub const MBM_QUEUE_FULL: u8 = 0xF0;
+/// Another pending request of the client has this transaction id; nothing was
+/// queued.
+pub const MBM_DUPLICATE_TRANSACTION: u8 = 0xF1;
+/// The request has ended already, or was never queued.
+pub const MBM_NOT_PENDING: u8 = 0xF2;
+
+statuses! {
+    MBM_OK = Status::OK, c"success";
+    MBM_ILLEGAL_FUNCTION = Status::ILLEGAL_FUNCTION, c"exception 01: illegal function";
+    MBM_ILLEGAL_DATA_ADDRESS = Status::ILLEGAL_DATA_ADDRESS, c"exception 02: illegal data address";
+    MBM_ILLEGAL_DATA_VALUE = Status::ILLEGAL_DATA_VALUE, c"exception 03: illegal data value";
+    MBM_SLAVE_DEVICE_FAILURE = Status::SLAVE_DEVICE_FAILURE, c"exception 04: slave device failure";
+    MBM_ACKNOWLEDGE = Status::exception(5), c"exception 05: acknowledge, the request takes long";
+    MBM_SLAVE_DEVICE_BUSY = Status::exception(6), c"exception 06: slave device busy";
+    MBM_MEMORY_PARITY_ERROR = Status::exception(8), c"exception 08: memory parity error";
+    MBM_GATEWAY_PATH_UNAVAILABLE = Status::exception(0x0A), c"exception 0A: gateway path unavailable";
+    MBM_GATEWAY_TARGET_FAILED_TO_RESPOND = Status::exception(0x0B), c"exception 0B: gateway target device failed to respond";
+    MBM_INVALID_SLAVE_ID = Status::INVALID_SLAVE_ID, c"only other units answered";
+    MBM_INVALID_FUNCTION = Status::INVALID_FUNCTION, c"the unit answered another function";
+    MBM_RESPONSE_TIMED_OUT = Status::RESPONSE_TIMED_OUT, c"no complete reply in time";
+    MBM_INVALID_CRC = Status::INVALID_CRC, c"the reply arrived damaged (CRC)";
+    MBM_INVALID_ARGUMENT = Status::INVALID_ARGUMENT, c"invalid argument: NULL, out of range, or of another kind";
+    MBM_MALFORMED_REPLY = Status::MALFORMED_REPLY, c"the reply does not answer the request";
+    MBM_LINK_LOST = Status::LINK_LOST, c"the port reported a lost link";
+    MBM_BUSY = Status::BUSY, c"in use: a request is under way, or a hook of the object called";
+    MBM_BROADCAST_NOT_ALLOWED = Status::BROADCAST_NOT_ALLOWED, c"a read cannot be broadcast";
+    MBM_BUFFER_TOO_SMALL = Status::BUFFER_TOO_SMALL, c"a buffer is too small for request or reply";
+    MBM_NOT_INITIALISED = Status::NOT_INITIALISED, c"the object was never begun or has no buffers";
+    MBM_PENDING = Status::PENDING, c"under way, poll again";
+    MBM_LINE_BUSY = Status::LINE_BUSY, c"the line never fell silent or the port took no bytes";
+    MBM_CANCELLED = Status::CANCELLED, c"cancelled";
+    MBM_INCOMPLETE_FRAME = Status::INCOMPLETE_FRAME, c"the frame is not whole yet";
+    MBM_MALFORMED_FRAME = Status::MALFORMED_FRAME, c"no frame of this framing begins like that";
+    MBM_QUEUE_FULL = Status::QUEUE_FULL, c"the queue is full";
+    MBM_DUPLICATE_TRANSACTION = Status::DUPLICATE_TRANSACTION, c"another pending request has this transaction id";
+    MBM_NOT_PENDING = Status::NOT_PENDING, c"the request is not pending";
+}
+
+/// Explains a status in a few words of English. On an AVR, where constants lie in
+/// RAM, a program that calls it has about 1100 bytes less of that: show the number,
+/// or in a sketch modbusStatusText of ModbusStatusText.h, whose words stay in flash.
+///
+/// Any thread or interrupt may call it.
+///
+/// @param status  any number
+/// @return a constant string, never NULL
+#[no_mangle]
+pub extern "C" fn mbm_statusText(status: u8) -> *const c_char {
+    text(status).as_ptr()
+}

@@ -1,0 +1,197 @@
+//! What C sees of `mbm.h` is what Rust means: sizes, offsets, constants. A
+//! probe is compiled by the C compiler, run, and held against Rust.
+
+use mbm_c::*;
+use std::fs;
+use std::mem::{align_of, offset_of, size_of};
+use std::path::Path;
+use std::process::Command;
+
+/// A C expression and the value that Rust has for it.
+macro_rules! probes {
+    (sizes: $($type:ident)*; offsets: $($owner:ident { $($field:ident)* })*; constants: $($constant:ident)*;) => {
+        vec![
+            $((format!("sizeof({})", stringify!($type)), size_of::<$type>() as u64),
+              (format!("alignof({})", stringify!($type)), align_of::<$type>() as u64),)*
+            $($((format!("offsetof({}, {})", stringify!($owner), stringify!($field)),
+                 offset_of!($owner, $field) as u64),)*)*
+            $((stringify!($constant).to_owned(), u64::from($constant)),)*
+        ]
+    };
+}
+
+fn probes() -> Vec<(String, u64)> {
+    probes! {
+        sizes: mbm_port mbm_counters mbm_master mbm_registers mbm_ring mbm_rule mbm_function
+            mbm_length mbm_packet mbm_record mbm_object mbm_framing mbm_server mbm_unit
+            mbm_service mbm_registerTable mbm_bitTable mbm_cells mbm_file mbm_files mbm_fifo
+            mbm_fifos mbm_exceptionStatus mbm_serverId mbm_identification mbm_request mbm_custom
+            mbm_switches mbm_diagnostics mbm_sniffer mbm_event mbm_client mbm_clientRequest mbm_clientUnit mbm_link;
+        offsets:
+            mbm_port { context read write micros flush preTransmission postTransmission idle }
+            mbm_counters { requests replies exceptions badCrc timeouts foreignFrames
+                resynchronisations bytesSent bytesReceived }
+            mbm_clientRequest { done context data reply replyBytes transaction unit status exception
+                length }
+            mbm_clientUnit { requests replies exceptions retries delay unit status }
+            mbm_link { context disconnect connect }
+            mbm_rule { kind bytes more }
+            mbm_function { code request response }
+            mbm_length { bytes kind }
+            mbm_packet { data dataLength transaction address quantity writeAddress writeQuantity
+                value andMask orMask subFunction commStatus eventCount messageCount kind unit
+                function exceptionCode exceptionStatus byteCount meiType readDeviceIdCode objectId
+                conformity moreFollows nextObjectId objectCount }
+            mbm_record { data file record length }
+            mbm_object { data length id }
+            mbm_framing { functions functionCount kind end }
+            mbm_registers { data first count kind order }
+            mbm_service { serve kind }
+            mbm_unit { services monitor diagnostics id }
+            mbm_registerTable { service words valid before after context base size }
+            mbm_bitTable { service bits valid before after context base size }
+            mbm_cells { service context isValid get set before after }
+            mbm_file { records size number }
+            mbm_files { service files count before after context }
+            mbm_fifo { words address count }
+            mbm_fifos { service fifos count }
+            mbm_exceptionStatus { service outputs }
+            mbm_serverId { service id additional idLength additionalLength running }
+            mbm_identification { service objects count }
+            mbm_request { data length unit function }
+            mbm_custom { service serve context code length }
+            mbm_switches { service off }
+            mbm_diagnostics { service restart context diagnosticRegister busMessages
+                busCommunicationErrors exceptionErrors serverMessages noResponses naks busy
+                characterOverruns events listenOnly hidden }
+            mbm_event { frame pdu packet time responseTime frameLength pduLength length address
+                quantity kind status unit function asked askedLength };
+        constants:
+            MBM_OK MBM_ILLEGAL_FUNCTION MBM_ILLEGAL_DATA_ADDRESS MBM_ILLEGAL_DATA_VALUE
+            MBM_SLAVE_DEVICE_FAILURE MBM_ACKNOWLEDGE MBM_SLAVE_DEVICE_BUSY
+            MBM_MEMORY_PARITY_ERROR MBM_GATEWAY_PATH_UNAVAILABLE
+            MBM_GATEWAY_TARGET_FAILED_TO_RESPOND MBM_INVALID_SLAVE_ID MBM_INVALID_FUNCTION
+            MBM_RESPONSE_TIMED_OUT MBM_INVALID_CRC MBM_INVALID_ARGUMENT MBM_MALFORMED_REPLY
+            MBM_LINK_LOST MBM_BUSY MBM_BROADCAST_NOT_ALLOWED MBM_BUFFER_TOO_SMALL
+            MBM_NOT_INITIALISED MBM_PENDING MBM_LINE_BUSY MBM_CANCELLED
+            MBM_INCOMPLETE_FRAME MBM_MALFORMED_FRAME MBM_QUEUE_FULL
+            MBM_DUPLICATE_TRANSACTION MBM_NOT_PENDING MBM_CLIENT_DEPTH
+            MBM_BACKOFF_NONE MBM_BACKOFF_FIXED MBM_BACKOFF_LINEAR MBM_BACKOFF_EXPONENTIAL
+            MBM_MAX_READ_REGISTERS MBM_MAX_WRITE_REGISTERS MBM_MAX_READ_WRITE_REGISTERS
+            MBM_MAX_READ_BITS MBM_MAX_WRITE_BITS MBM_MAX_FRAME
+            MBM_FC_READ_COILS MBM_FC_READ_DISCRETE_INPUTS MBM_FC_READ_HOLDING_REGISTERS
+            MBM_FC_READ_INPUT_REGISTERS MBM_FC_WRITE_SINGLE_COIL MBM_FC_WRITE_SINGLE_REGISTER
+            MBM_FC_READ_EXCEPTION_STATUS MBM_FC_DIAGNOSTICS MBM_FC_GET_COMM_EVENT_COUNTER
+            MBM_FC_GET_COMM_EVENT_LOG MBM_FC_WRITE_MULTIPLE_COILS
+            MBM_FC_WRITE_MULTIPLE_REGISTERS MBM_FC_REPORT_SERVER_ID MBM_FC_READ_FILE_RECORD
+            MBM_FC_WRITE_FILE_RECORD MBM_FC_MASK_WRITE_REGISTER
+            MBM_FC_READ_WRITE_MULTIPLE_REGISTERS MBM_FC_READ_FIFO_QUEUE
+            MBM_FC_ENCAPSULATED_INTERFACE MBM_DIAGNOSTICS_RETURN_QUERY_DATA
+            MBM_DIAGNOSTICS_RESTART_COMMUNICATIONS MBM_DIAGNOSTICS_RETURN_DIAGNOSTIC_REGISTER
+            MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY
+            MBM_DIAGNOSTICS_CLEAR_COUNTERS MBM_DIAGNOSTICS_BUS_MESSAGE_COUNT
+            MBM_DIAGNOSTICS_BUS_COMMUNICATION_ERROR_COUNT
+            MBM_DIAGNOSTICS_BUS_EXCEPTION_ERROR_COUNT MBM_DIAGNOSTICS_SERVER_MESSAGE_COUNT
+            MBM_DIAGNOSTICS_SERVER_NO_RESPONSE_COUNT MBM_DIAGNOSTICS_SERVER_NAK_COUNT
+            MBM_DIAGNOSTICS_SERVER_BUSY_COUNT MBM_DIAGNOSTICS_BUS_CHARACTER_OVERRUN_COUNT
+            MBM_DIAGNOSTICS_CLEAR_OVERRUN_COUNTER MBM_MEI_CANOPEN
+            MBM_MEI_READ_DEVICE_IDENTIFICATION MBM_DEVICE_ID_BASIC MBM_DEVICE_ID_REGULAR
+            MBM_DEVICE_ID_EXTENDED MBM_DEVICE_ID_INDIVIDUAL MBM_RULE_SILENCE MBM_RULE_FIXED
+            MBM_RULE_COUNTED MBM_PACKET_REQUEST MBM_PACKET_RESPONSE MBM_PACKET_EXCEPTION
+            MBM_MAX_PDU MBM_LENGTH_EXACT MBM_LENGTH_AT_LEAST MBM_LENGTH_SILENCE
+            MBM_LENGTH_UNKNOWN MBM_FRAMING_RTU MBM_FRAMING_ASCII MBM_FRAMING_TCP
+            MBM_FRAMING_RTU_OVER_TCP MBM_MAX_TCP_FRAME MBM_MAX_ASCII_FRAME MBM_ORDER_DEFAULT
+            MBM_ORDER_ABCD MBM_ORDER_CDAB MBM_ORDER_BADC MBM_ORDER_DCBA MBM_REGISTERS_OF_WORDS
+            MBM_REGISTERS_OF_BYTES MBM_REGISTERS_INTO_WORDS MBM_REGISTERS_INTO_BYTES
+            MBM_REPLY_EXCEPTION MBM_REPLY_NONE MBM_REPLY_PENDING MBM_EVENT_REQUEST MBM_EVENT_REPLY MBM_EVENT_EXCEPTION
+            MBM_EVENT_UNPAIRED MBM_EVENT_TIMEOUT MBM_EVENT_BAD_CRC MBM_EVENT_NOISE MBM_TAP_BOTH
+            MBM_TAP_CLIENT MBM_TAP_SERVER MBM_MIN_SNIFFER_BUFFER MBM_MAX_SNIFFER_FUNCTIONS
+            MBM_MAX_SERVICES;
+    }
+}
+
+/// Compiles and runs a C program that prints each expression's value.
+fn values_in_c(compiler: &mut Command, expressions: &[String], folder: &Path) -> Vec<u64> {
+    let mut source = String::from(
+        "#include <stdalign.h>\n#include <stddef.h>\n#include <stdio.h>\n#include \"mbm.h\"\nint main(void)\n{\n",
+    );
+    for expression in expressions {
+        source += &format!("    printf(\"%llu\\n\", (unsigned long long)({expression}));\n");
+    }
+    source += "    return 0;\n}\n";
+    let file = folder.join("probe.c");
+    let program = folder.join("probe");
+    fs::write(&file, source).expect("the probe is written");
+    let compiled = compiler
+        .args(["-std=c11", "-Wall", "-Wextra", "-Werror"])
+        .arg("-I")
+        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("../include"))
+        .arg(&file)
+        .arg("-o")
+        .arg(&program)
+        .status()
+        .expect("the C compiler runs");
+    assert!(compiled.success());
+    let output = Command::new(&program).output().expect("the probe runs");
+    String::from_utf8_lossy(&output.stdout)
+        .lines()
+        .map(|line| line.parse().expect("a number"))
+        .collect()
+}
+
+#[test]
+fn sizes_offsets_and_constants_agree_with_c() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let host = &format!("{}-unknown-linux-gnu", std::env::consts::ARCH);
+    let probes = probes();
+    let expressions: Vec<String> = probes.iter().map(|(name, _)| name.clone()).collect();
+    let mut compiler = cc::Build::new()
+        .target(host)
+        .host(host)
+        .opt_level(0)
+        .get_compiler()
+        .to_command();
+    let found = values_in_c(&mut compiler, &expressions, folder);
+    assert_eq!(found.len(), probes.len());
+    for ((name, rust), c) in probes.iter().zip(found) {
+        assert_eq!(*rust, c, "{name}");
+    }
+}
+
+#[test]
+fn the_probe_counts_every_constant_of_the_header() {
+    let header = include_str!("../../include/mbm.h");
+    let defined = header
+        .lines()
+        .filter_map(|line| line.strip_prefix("#define MBM_"))
+        .filter(|rest| {
+            rest.split_whitespace()
+                .nth(1)
+                .is_some_and(|value| value.parse::<u64>().is_ok())
+        })
+        .count();
+    let probed = probes()
+        .iter()
+        .filter(|(name, _)| name.starts_with("MBM_"))
+        .count();
+    assert_eq!(defined, probed);
+}
+
+#[test]
+fn every_status_constant_is_explained_and_no_two_alike() {
+    let text = |status| {
+        // SAFETY is the callee's: it returns a constant string.
+        let pointer = mbm_statusText(status);
+        unsafe { std::ffi::CStr::from_ptr(pointer) }
+            .to_str()
+            .unwrap()
+            .to_owned()
+    };
+    let statuses: Vec<u8> = (0..=0x0B).chain(0xE0..=0xF2).collect();
+    let mut texts: Vec<String> = statuses.iter().map(|status| text(*status)).collect();
+    texts.sort();
+    texts.dedup();
+    // 07 and 09 are exception codes that the standard does not name.
+    assert_eq!(texts.len(), statuses.len() - 1);
+    assert_eq!(text(0xFF), "not a status");
+}

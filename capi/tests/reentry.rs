@@ -1,0 +1,354 @@
+//! The C functions as C calls them, with hooks that use the object that called them:
+//! small enough for Miri, which checks what a sanitizer cannot, that no reference is
+//! used again behind a call into C: `cargo +nightly miri test -p mbm-c --test reentry`.
+
+use mbm_c::*;
+use std::ffi::c_void;
+use std::mem::zeroed;
+use std::ptr::{null, null_mut};
+
+const BUSY: u8 = MBM_BUSY;
+
+/// What all hooks share, behind raw pointers as in C.
+struct World {
+    client: *mut mbm_client,
+    master: *mut mbm_master,
+    server: *mut mbm_server,
+    unit: *mut mbm_unit,
+    switches: *mut mbm_switches,
+    request: *mut mbm_clientRequest,
+    again: *mut mbm_clientRequest,
+    arriving: Vec<u8>,
+    now: u32,
+    calls: u32,
+    done: u32,
+}
+
+unsafe fn world<'a>(context: *mut c_void) -> &'a mut World {
+    unsafe { &mut *context.cast::<World>() }
+}
+
+/// Uses each object there is.
+unsafe fn disturb(context: *mut c_void) {
+    unsafe {
+        let (client, master, server) = {
+            let world = world(context);
+            world.calls += 1;
+            (world.client, world.master, world.server)
+        };
+        if !client.is_null() {
+            assert_eq!(mbm_client_poll(client), BUSY);
+            assert_eq!(mbm_client_setRetries(client, 9), BUSY);
+            assert_eq!(mbm_client_reconnect(client, null()), BUSY);
+            mbm_client_pollDelay(client);
+        }
+        if !master.is_null() {
+            assert_eq!(mbm_master_poll(master), BUSY);
+            assert_eq!(mbm_master_setSlaveID(master, 9), BUSY);
+            assert_eq!(mbm_master_cancel(master), BUSY);
+            mbm_master_pollDelay(master);
+        }
+        if !server.is_null() {
+            assert_eq!(mbm_server_poll(server), BUSY);
+            assert_eq!(mbm_server_setSilence(server, 9), BUSY);
+            mbm_server_pollDelay(server);
+        }
+    }
+}
+
+unsafe extern "C" fn read(context: *mut c_void, bytes: *mut u8, capacity: u16) -> i16 {
+    unsafe {
+        disturb(context);
+        let arriving = &mut world(context).arriving;
+        let count = arriving.len().min(capacity.into());
+        for (index, byte) in arriving.drain(..count).enumerate() {
+            bytes.add(index).write(byte);
+        }
+        count as i16
+    }
+}
+
+unsafe extern "C" fn write(context: *mut c_void, bytes: *const u8, length: u16) -> i16 {
+    unsafe {
+        disturb(context);
+        bytes.add(usize::from(length) - 1).read();
+        length as i16
+    }
+}
+
+unsafe extern "C" fn micros(context: *mut c_void) -> u32 {
+    unsafe {
+        disturb(context);
+        let world = world(context);
+        world.now += 2500;
+        world.now
+    }
+}
+
+unsafe extern "C" fn flush(context: *mut c_void) -> u8 {
+    unsafe { disturb(context) };
+    1
+}
+
+unsafe extern "C" fn driver(context: *mut c_void) {
+    unsafe { disturb(context) }
+}
+
+unsafe extern "C" fn idle(context: *mut c_void, _master: *mut mbm_master) {
+    unsafe {
+        let master = world(context).master;
+        assert_eq!(mbm_master_readCoils(master, 0, 1), BUSY);
+        assert_eq!(mbm_master_setQuietTime(master, 1), MBM_OK);
+        mbm_master_poll(master);
+    }
+}
+
+unsafe extern "C" fn random(context: *mut c_void) -> u32 {
+    unsafe {
+        disturb(context);
+        // Another client looks at the request that this one has.
+        let mut other: mbm_client = zeroed();
+        let (mut incoming, mut outgoing) = ([0; 16], [0; 16]);
+        let (first, second) = (incoming.as_mut_ptr(), outgoing.as_mut_ptr());
+        let status = mbm_client_beginTcp(&mut other, &port(null_mut()), first, 16, second, 16);
+        assert_eq!(status, MBM_OK);
+        let request = world(context).request;
+        assert_eq!(mbm_client_readCoils(&mut other, request, 0, 1), BUSY);
+        assert_eq!((*request).status, MBM_PENDING);
+    }
+    7
+}
+
+unsafe extern "C" fn done(context: *mut c_void, request: *mut mbm_clientRequest) {
+    unsafe {
+        let (client, again) = {
+            let world = world(context);
+            world.done += 1;
+            (world.client, world.again)
+        };
+        assert_eq!(mbm_client_poll(client), BUSY);
+        assert_eq!(mbm_client_setRetries(client, 0), MBM_OK);
+        mbm_client_pollDelay(client);
+        if world(context).done < 3 {
+            assert_eq!(mbm_client_readCoils(client, request, 1, 2), MBM_PENDING);
+        }
+        if (*again).status != MBM_PENDING {
+            assert_eq!(mbm_client_readCoils(client, again, 1, 2), MBM_PENDING);
+        }
+        assert_eq!(mbm_client_cancel(client, again), MBM_OK);
+    }
+}
+
+fn port(context: *mut c_void) -> mbm_port {
+    mbm_port {
+        context,
+        read: Some(read),
+        write: Some(write),
+        micros: Some(micros),
+        flush: Some(flush),
+        preTransmission: Some(driver),
+        postTransmission: Some(driver),
+        idle: Some(idle),
+    }
+}
+
+fn new_world() -> *mut World {
+    Box::into_raw(Box::new(World {
+        client: null_mut(),
+        master: null_mut(),
+        server: null_mut(),
+        unit: null_mut(),
+        switches: null_mut(),
+        request: null_mut(),
+        again: null_mut(),
+        arriving: Vec::new(),
+        now: 0,
+        calls: 0,
+        done: 0,
+    }))
+}
+
+fn boxed<T>() -> *mut T {
+    // The objects of C are zero before first use.
+    Box::into_raw(Box::new(unsafe { zeroed() }))
+}
+
+#[test]
+fn hooks_and_done_use_the_client_that_called_them() {
+    for framing in 0..4 {
+        unsafe {
+            let world = new_world();
+            let (client, request) = (boxed::<mbm_client>(), boxed::<mbm_clientRequest>());
+            let (one, two) = (boxed::<[u8; 300]>(), boxed::<[u8; 300]>());
+            (*world).again = boxed();
+            (*(*world).again).unit = 17;
+            let port = port(world.cast());
+            let (first, second) = (one.cast::<u8>(), two.cast::<u8>());
+            let status = match framing {
+                0 => mbm_client_beginRtu(client, &port, first, 300),
+                1 => mbm_client_beginAscii(client, &port, first, 300),
+                2 => mbm_client_beginTcp(client, &port, first, 300, second, 300),
+                _ => mbm_client_beginRtuOverTcp(client, &port, first, 300),
+            };
+            assert_eq!(status, MBM_OK);
+            (*world).client = client;
+            assert_eq!(mbm_client_setResponseTimeout(client, 20), MBM_OK);
+            assert_eq!(mbm_client_setRetries(client, 1), MBM_OK);
+            assert_eq!(
+                mbm_client_setBackoff(client, MBM_BACKOFF_FIXED, 1, 1),
+                MBM_OK
+            );
+            assert_eq!(
+                mbm_client_setJitter(client, 50, Some(random), world.cast()),
+                MBM_OK
+            );
+            (*world).request = request;
+            (*request).unit = 17;
+            (*request).done = Some(done);
+            (*request).context = world.cast();
+            assert_eq!(mbm_client_readCoils(client, request, 0, 1), MBM_PENDING);
+            for _ in 0..500 {
+                if mbm_client_poll(client) != MBM_PENDING {
+                    break;
+                }
+            }
+            assert_eq!(mbm_client_pending(client), 0);
+            assert_eq!((*world).done, 3);
+            assert!((*world).calls > 10);
+            drop(Box::from_raw((*world).again));
+            drop(Box::from_raw(world));
+            drop((Box::from_raw(client), Box::from_raw(request)));
+            drop((Box::from_raw(one), Box::from_raw(two)));
+        }
+    }
+}
+
+#[test]
+fn hooks_and_idle_use_the_master_that_called_them() {
+    unsafe {
+        let (world, master) = (new_world(), boxed::<mbm_master>());
+        let (words, frame) = (boxed::<[u16; 8]>(), boxed::<[u8; 64]>());
+        (*world).master = master;
+        let (first, bytes) = (words.cast::<u16>(), frame.cast::<u8>());
+        let status = mbm_master_setBuffers(master, first, 4, first.add(4), 4, bytes, 64);
+        assert_eq!(status, MBM_OK);
+        assert_eq!(mbm_master_begin(master, 17, &port(world.cast())), MBM_OK);
+        assert_eq!(mbm_master_setResponseTimeout(master, 20), MBM_OK);
+        assert_eq!(
+            mbm_master_readHoldingRegisters(master, 0, 1),
+            MBM_RESPONSE_TIMED_OUT
+        );
+        assert_eq!(mbm_master_setBlocking(master, 0), MBM_OK);
+        assert_eq!(mbm_master_writeSingleRegister(master, 0, 1), MBM_PENDING);
+        assert_eq!(mbm_master_poll(master), MBM_PENDING);
+        assert_eq!(mbm_master_cancel(master), MBM_OK);
+        assert!((*world).calls > 10);
+        drop((Box::from_raw(world), Box::from_raw(master)));
+        drop((Box::from_raw(words), Box::from_raw(frame)));
+    }
+}
+
+unsafe extern "C" fn before(context: *mut c_void, _: u16, _: u16, data: *const u8) -> u8 {
+    unsafe {
+        disturb(context);
+        data.read();
+        // The unit may be given more meanwhile.
+        let (unit, switches) = {
+            let world = world(context);
+            (world.unit, world.switches)
+        };
+        assert_eq!(mbm_server_switchOff(unit, switches, 100), MBM_OK);
+    }
+    0
+}
+
+unsafe extern "C" fn after(context: *mut c_void, _: u16, _: u16) {
+    unsafe { disturb(context) }
+}
+
+unsafe extern "C" fn carry_out(
+    context: *mut c_void,
+    request: *const mbm_request,
+    response: *mut u8,
+    capacity: u16,
+) -> u16 {
+    unsafe {
+        disturb(context);
+        assert!(capacity > 4);
+        response.write(*(*request).data);
+    }
+    1
+}
+
+unsafe extern "C" fn restart(context: *mut c_void, _: u8) {
+    unsafe { disturb(context) }
+}
+
+#[test]
+fn hooks_use_the_server_that_called_them() {
+    const REQUESTS: [&[u8]; 5] = [
+        &[17, 6, 0, 0, 0, 1],
+        &[17, 16, 0, 0, 0, 2, 4, 0, 1, 0, 2],
+        &[17, 3, 0, 0, 0, 2],
+        &[17, 65, 9],
+        &[17, 8, 0, 1, 0, 0],
+    ];
+    for tcp in [false, true] {
+        unsafe {
+            let (world, server, unit) = (new_world(), boxed::<mbm_server>(), boxed::<mbm_unit>());
+            let (words, frame) = (boxed::<[u16; 8]>(), boxed::<[u8; 260]>());
+            let (table, custom) = (boxed::<mbm_registerTable>(), boxed::<mbm_custom>());
+            let line = boxed::<mbm_diagnostics>();
+            (*unit).id = 17;
+            (*table).words = words.cast();
+            (*table).size = 8;
+            (*table).before = Some(before);
+            (*table).after = Some(after);
+            (*table).context = world.cast();
+            (*custom).serve = Some(carry_out);
+            (*custom).code = 65;
+            (*custom).context = world.cast();
+            (*line).restart = Some(restart);
+            (*line).context = world.cast();
+            assert_eq!(mbm_server_serveHoldingRegisters(unit, table), MBM_OK);
+            assert_eq!(mbm_server_serveCustom(unit, custom), MBM_OK);
+            assert_eq!(mbm_server_serveDiagnostics(unit, line), MBM_OK);
+            let (port, bytes) = (port(world.cast()), frame.cast::<u8>());
+            let status = if tcp {
+                mbm_server_beginTcp(server, &port, unit, 1, bytes, 260)
+            } else {
+                mbm_server_begin(server, &port, unit, 1, bytes, 256)
+            };
+            assert_eq!(status, MBM_OK);
+            (*world).server = server;
+            (*world).unit = unit;
+            (*world).switches = boxed();
+            for request in REQUESTS {
+                let calls = (*world).calls;
+                (*world).arriving = if tcp {
+                    [&[0, 1, 0, 0, 0, request.len() as u8][..], request].concat()
+                } else {
+                    let crc = mbm_frame_crc16(request.as_ptr(), request.len() as u16);
+                    [request, &crc.to_le_bytes()].concat()
+                };
+                for _ in 0..8 {
+                    assert_eq!(mbm_server_poll(server), MBM_OK);
+                }
+                assert!((*world).calls > calls + 2);
+            }
+            assert_eq!(*words.cast::<u16>().add(1), 2);
+            drop(Box::from_raw((*world).switches));
+            drop((
+                Box::from_raw(world),
+                Box::from_raw(server),
+                Box::from_raw(unit),
+            ));
+            drop((
+                Box::from_raw(words),
+                Box::from_raw(frame),
+                Box::from_raw(table),
+            ));
+            drop((Box::from_raw(custom), Box::from_raw(line)));
+        }
+    }
+}

@@ -1,0 +1,4 @@
+//! What the checks of the makefile share.
+
+pub mod circles;
+pub mod paths;
