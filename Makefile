@@ -56,7 +56,7 @@ check-install: $(ARCHIVE) ## Installs, builds and runs the README's program; pac
 	@scripts/check-install
 
 .PHONY: size
-size: ## Flash and RAM that the library adds, and what changed since docs/size.md
+size: ## Flash and RAM that the library adds, and what changed since docs/reports/size.md
 	@scripts/size
 
 .PHONY: header
@@ -116,7 +116,7 @@ model: ## Try every order of events around a request for MODEL_SECONDS (300)
 	@$(CARGO) run $(MODEL) -- $(MODEL_SECONDS)
 
 .PHONY: fault-table
-fault-table: need-test ## Write docs/fault-table.md from what the test finds
+fault-table: need-test ## Write docs/reports/fault-table.md from what the test finds
 	@$(MAKE) --no-print-directory $(BUILD)/plain/test_bad_wire
 	@MBM_FAULT_TABLE=$(BUILD)/fault-table.rows scripts/run-c-tests "" $(BUILD)/plain/test_bad_wire
 	@scripts/fault-table
@@ -183,7 +183,7 @@ $(BENCH_SNIFFER): $(BUILD)/bench/bench_sniffer.o $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
 .PHONY: bench
-bench: ## Speed and instructions beside libmodbus and rmodbus; writes docs/*speed.md
+bench: ## Speed and instructions beside libmodbus and rmodbus; writes docs/reports/*speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
 	@$(MAKE) --no-print-directory $(BENCH) $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_SNIFFER)
 	@scripts/bench $(BENCH)
