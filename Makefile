@@ -77,7 +77,7 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, sy
 	@scripts/check-header
 	@scripts/check-docs
 	@scripts/check-functions
-	@$(MAKE) --no-print-directory check-readme
+	@$(MAKE) --no-print-directory check-pages
 	@scripts/check-symbols $(ARCHIVE)
 	@! grep -rn 'target_os' src | grep -v 'cfg_attr\|mbm_firmware' # else no test runs that code
 	@echo "check: formatting, lints, layers, header and symbols are in order"
@@ -228,14 +228,13 @@ demo: ## Every function at work against a libmodbus server, frame by frame
 	@$(MAKE) --no-print-directory $(DEMO) $(BUILD)/plain/linux/basic
 	@$(DEMO)
 
-# The C of the README compiles as it stands.
-.PHONY: check-readme
-check-readme:
-	@mkdir -p $(BUILD)
-	@sed -n '/^```c$$/,/^```$$/p' README.md | sed '/^```/d' >$(BUILD)/readme.c
-	@test -s $(BUILD)/readme.c
-	@gcc -std=c11 $(WARNINGS) -Iinclude -c $(BUILD)/readme.c -o $(BUILD)/readme.o
-	@echo "check-readme: the README's C compiles"
+# What the commands of the pages run.
+PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway) $(SNIFF) $(CLIENTS) $(SERVE)
+.PHONY: check-pages
+check-pages: $(ARCHIVE) ## Compile and run what README and docs show, and follow their links; PAGES=--all leaves nothing out
+	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev gcc-avr avr-libc arduino-core-avr
+	@$(MAKE) --no-print-directory $(PAGE_PROGRAMS)
+	@scripts/check-pages $(PAGES)
 
 # Everything for Arduino and the AVR simulator.
 include scripts/arduino.mk
