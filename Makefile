@@ -56,7 +56,7 @@ check-install: $(ARCHIVE) ## Installs, builds and runs the README's program; pac
 	@scripts/check-install
 
 .PHONY: size
-size: ## Flash and RAM that the library adds, and what changed since docs/size.md
+size: ## Flash and RAM that the library adds, and what changed since docs/reports/size.md
 	@scripts/size
 
 .PHONY: header
@@ -78,7 +78,7 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, circles, header, func
 	@scripts/check-header
 	@scripts/check-docs
 	@scripts/check-functions
-	@$(MAKE) --no-print-directory check-readme
+	@$(MAKE) --no-print-directory check-pages
 	@scripts/check-symbols $(ARCHIVE)
 	@! grep -rn 'target_os' src capi | grep -v 'cfg_attr\|mbm_firmware' # else no test runs that code
 	@echo "check: formatting, lints, layers, header and symbols are in order"
@@ -117,7 +117,7 @@ model: ## Try every order of events around a request for MODEL_SECONDS (300)
 	@$(CARGO) run $(MODEL) -- $(MODEL_SECONDS)
 
 .PHONY: fault-table
-fault-table: need-test ## Write docs/fault-table.md from what the test finds
+fault-table: need-test ## Write docs/reports/fault-table.md from what the test finds
 	@$(MAKE) --no-print-directory $(BUILD)/plain/test_bad_wire
 	@MBM_FAULT_TABLE=$(BUILD)/fault-table.rows scripts/run-c-tests "" $(BUILD)/plain/test_bad_wire
 	@scripts/fault-table
@@ -184,7 +184,7 @@ $(BENCH_SNIFFER): $(BUILD)/bench/bench_sniffer.o $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
 .PHONY: bench
-bench: ## Speed and instructions beside libmodbus and rmodbus; writes docs/*speed.md
+bench: ## Speed and instructions beside libmodbus and rmodbus; writes docs/reports/*speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
 	@$(MAKE) --no-print-directory $(BENCH) $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_SNIFFER)
 	@scripts/bench $(BENCH)
@@ -229,14 +229,15 @@ demo: ## Every function at work against a libmodbus server, frame by frame
 	@$(MAKE) --no-print-directory $(DEMO) $(BUILD)/plain/linux/basic
 	@$(DEMO)
 
-# The C of the README compiles as it stands.
-.PHONY: check-readme
-check-readme:
-	@mkdir -p $(BUILD)
-	@sed -n '/^```c$$/,/^```$$/p' README.md | sed '/^```/d' >$(BUILD)/readme.c
-	@test -s $(BUILD)/readme.c
-	@gcc -std=c11 $(WARNINGS) -Iinclude -c $(BUILD)/readme.c -o $(BUILD)/readme.o
-	@echo "check-readme: the README's C compiles"
+# What the commands of the pages run.
+PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway) $(SNIFF) $(CLIENTS) $(SERVE)
+.PHONY: check-pages
+check-pages: $(ARCHIVE) ## Compile and run what README and docs show, and follow their links; PAGES=--all leaves nothing out
+	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev gcc-avr avr-libc arduino-core-avr \
+		$(if $(filter --all,$(PAGES)),gcc-arm-none-eabi libnewlib-arm-none-eabi) \
+		$(if $(shell command -v arm-none-eabi-gcc),libnewlib-arm-none-eabi)
+	@$(MAKE) --no-print-directory $(PAGE_PROGRAMS)
+	@scripts/check-pages $(PAGES)
 
 # Everything for Arduino and the AVR simulator.
 include scripts/arduino.mk

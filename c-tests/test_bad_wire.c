@@ -1,5 +1,5 @@
 /* What becomes of five transactions of the facade when the first meets a fault.
- * The device is a script on a pty. Prints the table of docs/fault-table.md, and
+ * The device is a script on a pty. Prints the table of docs/reports/fault-table.md, and
  * fails if a row is worse than it was. */
 #include "faults.h"
 #include "node.h"

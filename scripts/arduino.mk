@@ -94,11 +94,11 @@ firmware-test-avr: need-avr
 
 
 .PHONY: timing
-timing: need-avr ## Bus timing, RAM and flash on a simulated Uno, into docs/timing.md
+timing: need-avr ## Bus timing, RAM and flash on a simulated Uno, into docs/reports/timing.md
 	@$(MAKE) -s --no-print-directory avr-sketches $(TIMING)
 	@scripts/timing
 
 .PHONY: check-timing
-check-timing: need-avr ## Bus timing on a simulated Uno against docs/timing.md
+check-timing: need-avr ## Bus timing on a simulated Uno against docs/reports/timing.md
 	@$(MAKE) -s --no-print-directory avr-sketches $(TIMING)
 	@scripts/timing --check

@@ -10,7 +10,6 @@ int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity);
 int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length);
 uint32_t clock_micros(void *context);
 void show(uint16_t value);
-void complain(const char *text);
 void setup(void);
 void loop(void);
 
@@ -59,11 +58,6 @@ void show(uint16_t value)
 {
     shown = value == 0x1234;
     printf("register 2: 0x%04X\n", value);
-}
-
-void complain(const char *text)
-{
-    printf("%s\n", text);
 }
 
 int main(void)

@@ -1,4 +1,4 @@
-/* The rows of the tables in docs/timing.md. */
+/* The rows of the tables in docs/reports/timing.md. */
 #ifndef ROWS_H
 #define ROWS_H
 

@@ -1,6 +1,6 @@
 /* How fast a sketch on an Uno is, and how much RAM it takes, in cycles and
  * bytes that repeat exactly: the far end is part of the simulation. Prints the
- * rows of docs/timing.md; those of the comparison with ModbusMaster begin with "=".
+ * rows of docs/reports/timing.md; those of the comparison with ModbusMaster begin with "=".
  *
  *   timing [FOLDER]   FOLDER below build/avr has the sketches with ModbusMaster */
 #include "timing.h"

@@ -1,5 +1,5 @@
 /* What the program `timing` measures, one function for each file. Each prints its
- * rows of docs/timing.md. */
+ * rows of docs/reports/timing.md. */
 #ifndef TIMING_H
 #define TIMING_H
 
