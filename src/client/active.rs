@@ -1,7 +1,7 @@
 //! The request that is under way on a serial line, as the engine knows it.
 
 use super::job::{bytes, Job};
-use super::units::Means;
+use super::means::Means;
 use crate::engine::{ascii, Engine, Request, Seen, Verdict};
 use crate::error::Status;
 use crate::frame::{ascii as characters, rtu};

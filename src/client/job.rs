@@ -1,7 +1,7 @@
 //! What a client is asked to do: a request, its data, and where the response's
 //! data go.
 
-use super::units::Means;
+use super::means::Means;
 use crate::error::Status;
 use crate::pdu::outline::Outline;
 use crate::time::elapsed;

@@ -7,6 +7,8 @@
 
 mod active;
 mod job;
+mod line;
+mod means;
 mod policy;
 mod serial;
 mod shared;
@@ -15,11 +17,13 @@ mod units;
 
 pub use active::{ActiveRequest, ClientEngine};
 pub use job::{Job, Ticket};
+pub use line::Line;
+pub use means::Means;
 pub use policy::{again, Backoff, Policy};
 pub use serial::Serial;
 pub use shared::Shared;
 pub use tcp::Tcp;
-pub use units::{note, rest, Means, Unit};
+pub use units::{note, rest, Unit};
 
 #[cfg(doc)]
 use crate::error::Status;
@@ -33,39 +37,6 @@ pub const ASCII_SILENCE: u32 = millis(1000);
 
 /// How soon to look again whether a port takes bytes that it did not take.
 const FULL_PORT: u32 = millis(1);
-
-/// How requests travel.
-pub trait Line<J> {
-    /// The most requests under way at once.
-    const MOST: usize;
-
-    /// Whether unit 0 is everybody.
-    const BROADCASTS: bool;
-
-    /// Whether a caller's number must tell one request from another.
-    const HAS_IDS: bool;
-
-    /// Moves on to the time `now`; gives a job back that ended. `fresh` at the
-    /// first of the calls that one poll makes, when there may be something new.
-    fn advance<const N: usize>(
-        &mut self,
-        shared: &mut Shared<J, N>,
-        now: u32,
-        fresh: bool,
-    ) -> Option<J>;
-
-    /// Forgets a job that was under way, or with `None` all, with what is half
-    /// received or half sent.
-    fn release(&mut self, job: Option<&J>);
-
-    /// True if nothing is left to be sent of requests that were given up.
-    fn is_idle(&self) -> bool {
-        true
-    }
-
-    /// How long there is nothing to do; `None` if that depends on the queue.
-    fn delay(&mut self, now: u32) -> Option<u32>;
-}
 
 /// A client of a [`Line`] for up to `N` requests, waiting or under way.
 #[repr(C)]
@@ -189,7 +160,7 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// a byte arrives; the greatest value if there is no request, and then no byte is
     /// taken either. While a TCP port does not take what is to be sent, 1000.
     pub fn poll_delay(&mut self, now: u32) -> u32 {
-        self.shared.poll_delay(&mut self.line, now)
+        self.line.poll_delay(&self.shared, now)
     }
 
     /// Gives up the job that `is` the one, and gives it back; `None` if it is not
@@ -213,6 +184,6 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// Lets somebody else use the line until [`Client::take_back`]; false if a
     /// request is under way or the line is lent already.
     pub fn lend(&mut self) -> bool {
-        self.shared.lend(&self.line)
+        self.line.lend(&mut self.shared)
     }
 }

@@ -1,9 +1,6 @@
 //! When a request is asked again that was not answered.
 
-use super::job::{Job, Stage};
-use super::units::Means;
 use crate::error::Status;
-use crate::FIRMWARE;
 
 /// How the wait grows from one retry to the next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -81,34 +78,6 @@ impl Policy {
             Some(grow) => grow(self, retry, random()),
             None => 0,
         }
-    }
-
-    /// What becomes of a request that ended with `status`: true if it has ended for
-    /// good, false if it waits to be asked again.
-    #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn ends(
-        &self,
-        job: &mut impl Job,
-        status: Status,
-        now: u32,
-        means: &mut impl Means,
-    ) -> bool {
-        let (unit, retries) = (job.ticket().unit, job.ticket().retries);
-        // No reference to the ticket lives while `means` may call a hook.
-        let again = if !FIRMWARE && status == Status::OK {
-            None
-        } else {
-            means.again(self, retries, status)
-        };
-        means.note(unit, status, again.is_some(), now);
-        let ticket = job.ticket_mut();
-        let Some(wait) = again else {
-            ticket.end(status);
-            return true;
-        };
-        ticket.retries = retries + 1;
-        ticket.enter(Stage::Queued, now, wait);
-        false
     }
 
     fn grown(&self, retry: u8, random: u32) -> u32 {

@@ -3,9 +3,10 @@
 
 use super::active::ClientEngine;
 use super::job::{deliver, is_answer, Job, Stage};
+use super::line::Line;
+use super::means::Means;
 use super::shared::Shared;
-use super::units::Means;
-use super::{Client, Line, ASCII_SILENCE, STREAM_SILENCE};
+use super::{Client, ASCII_SILENCE, STREAM_SILENCE};
 use crate::engine::Engine;
 use crate::error::Status;
 use crate::frame::{ascii, rtu};

@@ -2,9 +2,8 @@
 //! one that ended. It is compiled once, whatever lines a program has.
 
 use super::job::{Job, Stage};
+use super::means::Means;
 use super::policy::Policy;
-use super::units::Means;
-use super::Line;
 use crate::engine::BROADCAST;
 use crate::error::Status;
 use crate::time::elapsed;
@@ -141,22 +140,6 @@ impl<J: Job, const N: usize> Shared<J, N> {
         self.active.is_none() && !self.queue.iter().any(|job| job.ticket().is_sent())
     }
 
-    /// See [`Client::lend`](super::Client::lend).
-    pub fn lend(&mut self, line: &impl Line<J>) -> bool {
-        let free = !self.lent && self.is_idle() && line.is_idle();
-        self.lent |= free;
-        free
-    }
-
-    /// See [`Client::poll_delay`](super::Client::poll_delay).
-    pub fn poll_delay(&self, line: &mut impl Line<J>, now: u32) -> u32 {
-        match line.delay(now) {
-            _ if self.lent => u32::MAX,
-            Some(delay) => delay,
-            None => self.delay(now),
-        }
-    }
-
     /// How long nobody is due.
     pub(crate) fn delay(&self, now: u32) -> u32 {
         if self.queue.is_empty() {
@@ -238,7 +221,7 @@ impl<J: Job, const N: usize> Shared<J, N> {
     ) -> Option<J> {
         self.look = true;
         let job = self.queue.get_mut(at)?;
-        if self.policy.ends(job, status, now, means) {
+        if ends(&self.policy, job, status, now, means) {
             return self.remove(at);
         }
         None
@@ -254,7 +237,7 @@ impl<J: Job, const N: usize> Shared<J, N> {
         means: &mut impl Means,
     ) -> Option<J> {
         self.look = true;
-        if self.policy.ends(&mut job, status, now, means) {
+        if ends(&self.policy, &mut job, status, now, means) {
             return Some(job);
         }
         self.put_first(job);
@@ -276,4 +259,32 @@ impl<J: Job, const N: usize> Shared<J, N> {
         }
         self.look = true;
     }
+}
+
+/// What becomes of a request that ended with `status`: true if it has ended for
+/// good, false if it waits to be asked again.
+#[cfg_attr(target_os = "none", inline(never))]
+fn ends(
+    policy: &Policy,
+    job: &mut impl Job,
+    status: Status,
+    now: u32,
+    means: &mut impl Means,
+) -> bool {
+    let (unit, retries) = (job.ticket().unit, job.ticket().retries);
+    // No reference to the ticket lives while `means` may call a hook.
+    let again = if !FIRMWARE && status == Status::OK {
+        None
+    } else {
+        means.again(policy, retries, status)
+    };
+    means.note(unit, status, again.is_some(), now);
+    let ticket = job.ticket_mut();
+    let Some(wait) = again else {
+        ticket.end(status);
+        return true;
+    };
+    ticket.retries = retries + 1;
+    ticket.enter(Stage::Queued, now, wait);
+    false
 }

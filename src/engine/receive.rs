@@ -8,23 +8,11 @@
 //! reply takes the place of the first. A second one that is damaged makes the
 //! request fail, because the held reply is then most likely the late one.
 
-use super::{Count, Counter, Engine, Request, Seen, Storage, Words};
+use super::{Count, Counter, Engine, Probation, Request, Seen, Storage, Words};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::pdu::query::Query;
 use crate::port::Port;
-
-/// Whether the reply to the request under way may be a late one.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-#[repr(u8)]
-pub(super) enum Probation {
-    /// It may not.
-    Off,
-    /// It may.
-    On,
-    /// It may, and one was held.
-    Held,
-}
 
 impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// Notes that the reply to the request under way may come late.

@@ -1,8 +1,9 @@
 //! A client of each kind of line.
 
-use super::kind::{self, line, Kind, SerialLine, TcpLine};
-use super::{mbm_client, pointers};
+use super::kind;
+use super::object::{line, mbm_client, shared, Kind, SerialLine, TcpLine};
 use crate::frame::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
+use crate::pointers;
 use crate::port::{countable, mbm_port};
 use mbm::error::Status;
 
@@ -113,7 +114,7 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
             {
                 return Status::INVALID_ARGUMENT;
             }
-            if !super::shared(object).is_idle() {
+            if !shared(object).is_idle() {
                 return Status::BUSY;
             }
             let engine = line::<SerialLine>(object).engine();

@@ -2,48 +2,16 @@
 //! mbm_client_begin function it calls, for nothing else names their tables.
 
 #[cfg(not(any(target_os = "none", mbm_firmware)))]
-use super::mbm_client;
-use super::{Lent, LentByC, Object};
+use super::object::mbm_client;
+use super::object::{line, Kind, Object, SerialLine, TcpLine};
+use super::request::Lent;
+use super::storage::LentByC;
 use crate::frame::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
 use crate::port::mbm_port;
-use core::mem::{offset_of, ManuallyDrop};
-use mbm::client::{ClientEngine, Line, Serial, Tcp};
-use mbm::engine::Settings;
+use core::mem::offset_of;
+use mbm::client::{ClientEngine, Line};
 #[cfg(not(any(target_os = "none", mbm_firmware)))]
 use mbm::error::Status;
-
-pub(super) type SerialLine = Serial<mbm_port, LentByC, Lent>;
-pub(super) type TcpLine = Tcp<mbm_port, LentByC>;
-
-/// Room for the line of any kind.
-#[repr(C)]
-pub(super) union Lines {
-    serial: ManuallyDrop<SerialLine>,
-    tcp: ManuallyDrop<TcpLine>,
-}
-
-/// As [`Line::advance`].
-pub(super) type Advance = unsafe fn(*mut Object, now: u32, fresh: bool) -> Option<Lent>;
-
-/// What differs from one kind of line to the next.
-pub(super) struct Kind {
-    #[cfg(any(target_os = "none", mbm_firmware))]
-    pub(super) advance: Advance,
-    /// As [`turns`](super::poll::turns).
-    #[cfg(not(any(target_os = "none", mbm_firmware)))]
-    pub(super) poll: unsafe fn(*mut mbm_client) -> Status,
-    /// As [`Line::release`].
-    pub(super) release: unsafe fn(*mut Object, Option<&Lent>),
-    /// Completes a client that was just begun.
-    pub(super) start: unsafe fn(*mut Object),
-    /// Where in an object its port, its settings and what is lent to it stand.
-    port: u16,
-    settings: u16,
-    means: u16,
-    /// The least that the frame buffer has.
-    pub(super) least: u8,
-    pub(super) framing: u8,
-}
 
 const LINE: usize = offset_of!(Object, line);
 
@@ -82,58 +50,6 @@ pub(super) static TCP: Kind = Kind {
     least: 9,
     framing: MBM_FRAMING_TCP,
 };
-
-impl Kind {
-    /// # Safety
-    /// As for [`line`], of this kind.
-    pub(super) unsafe fn port(&self, object: *mut Object) -> *mut mbm_port {
-        // SAFETY: as the caller promises.
-        unsafe { object.byte_add(self.port.into()).cast() }
-    }
-
-    /// # Safety
-    /// As for [`line`], of this kind.
-    pub(super) unsafe fn settings<'a>(&self, object: *mut Object) -> &'a mut Settings {
-        // SAFETY: as the caller promises; every kind has settings there.
-        unsafe { &mut *object.byte_add(self.settings.into()).cast() }
-    }
-
-    /// # Safety
-    /// As for [`line`], of this kind.
-    pub(super) unsafe fn means<'a>(&self, object: *mut Object) -> &'a mut LentByC {
-        // SAFETY: as the caller promises; every kind has it there.
-        unsafe { &mut *object.byte_add(self.means.into()).cast() }
-    }
-}
-
-/// The line of an object.
-///
-/// # Safety
-/// `object` is a client of the kind `L`, and nothing else uses its line while the
-/// reference lives.
-pub(super) unsafe fn line<'a, L>(object: *mut Object) -> &'a mut L {
-    // SAFETY: as the caller promises.
-    unsafe { &mut *(&raw mut (*object).line).cast() }
-}
-
-/// Does something with the line of an object, whatever its kind. Only functions that
-/// programs seldom call use it: an image that calls none of them does not carry it.
-/// Unsafe as [`line`] is.
-macro_rules! on_line {
-    ($object:expr, $line:ident => $action:expr) => {
-        match (*(*$object).kind).framing {
-            $crate::frame::MBM_FRAMING_TCP => {
-                let $line = $crate::client::kind::line::<TcpLine>($object);
-                $action
-            }
-            _ => {
-                let $line = $crate::client::kind::line::<SerialLine>($object);
-                $action
-            }
-        }
-    };
-}
-pub(super) use on_line;
 
 /// # Safety
 /// As for [`turns`](super::poll::turns), with a client of the kind `L`.

@@ -1,10 +1,11 @@
 //! The line under a client: lost and found, lent and taken back.
 
-use super::kind::{on_line, SerialLine, TcpLine};
-use super::{mbm_client, pointers, shared};
+use super::object::{mbm_client, on_line, shared, SerialLine, TcpLine};
 use crate::frame::MBM_FRAMING_RTU;
 use crate::master::{self, mbm_master, Core};
+use crate::pointers;
 use core::ffi::c_void;
+use mbm::client::Line as _;
 use mbm::error::Status;
 
 /// What closes a link and opens it anew, for mbm_client_reconnect.
@@ -105,7 +106,7 @@ pub unsafe extern "C" fn mbm_client_lend(client: *mut mbm_client, master: *mut m
                     refused => return refused,
                 }
             }
-            if !on_line!(object, line => (*object).shared.lend(line)) {
+            if !on_line!(object, line => line.lend(&mut (*object).shared)) {
                 return Status::BUSY;
             }
             if !master.is_null() {

@@ -1,10 +1,10 @@
 //! Moving a client's requests on, and giving them up.
 
-use super::kind::{on_line, Advance, SerialLine, TcpLine};
-use super::{
-    mbm_client, mbm_clientRequest, pointers, port, shared, Lent, Object, MBM_CLIENT_DEPTH,
-};
-use mbm::client::Job as _;
+use super::object::{mbm_client, on_line, shared, Advance, Object, SerialLine, TcpLine};
+use super::request::{mbm_clientRequest, Lent};
+use super::MBM_CLIENT_DEPTH;
+use crate::{pointers, port};
+use mbm::client::{Job as _, Line as _};
 use mbm::error::Status;
 
 /// The time on the clock of a client's port.
@@ -95,7 +95,7 @@ pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
             Status::OK => pointers::calling(client, || {
                 let object = pointers::object(client);
                 let now = now(object);
-                on_line!(object, line => (*object).shared.poll_delay(line, now))
+                on_line!(object, line => line.poll_delay(&(*object).shared, now))
             }),
             Status::BUSY => 0,
             _ => u32::MAX,

@@ -1,6 +1,8 @@
 //! How a client behaves.
 
-use super::{mbm_client, pointers, LentByC, Treatment};
+use super::object::mbm_client;
+use super::storage::{LentByC, Treatment};
+use crate::pointers;
 use crate::storage::mbm_counters;
 use core::ffi::c_void;
 use mbm::client::{again, note, rest, Backoff, Means as _, Policy, Unit};

@@ -3,8 +3,8 @@
 use super::Tcp;
 use crate::bytes::move_to_front;
 use crate::client::job::{bytes, deliver, is_answer, take, Job, Stage};
+use crate::client::means::Means;
 use crate::client::shared::Shared;
-use crate::client::units::Means;
 use crate::engine::Counter;
 use crate::error::Status;
 use crate::frame::tcp::{self, Header};

@@ -4,9 +4,9 @@
 mod find;
 
 use super::job::{bytes, Job, Stage};
+use super::line::Line;
+use super::means::Means;
 use super::shared::Shared;
-use super::units::Means;
-use super::Line;
 use crate::bytes::move_to_front;
 use crate::engine::{Counter, Settings};
 use crate::error::Status;

@@ -6,8 +6,9 @@ mod device;
 pub use data::*;
 pub use device::*;
 
-use super::request::Inside;
-use super::{mbm_client, mbm_clientRequest, pointers, shared, Lent};
+use super::object::{mbm_client, shared};
+use super::request::{mbm_clientRequest, Inside, Lent};
+use crate::pointers;
 use mbm::client::Job as _;
 use mbm::error::Status;
 use mbm::pdu::outline::Form;
