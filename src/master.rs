@@ -20,11 +20,11 @@ pub struct Master<P, S> {
     response_index: u8,
     slave: u8,
     status: Status,
+    engine: Engine<P, S>,
     /// Where the writing functions without arguments write.
     write_address: u16,
     /// Bits queued in the transmit buffer; 16 to a word.
     transmit_bits: u16,
-    engine: Engine<P, S>,
 }
 
 impl<P, S> Master<P, S> {
@@ -132,6 +132,11 @@ impl<P: Port, S: Storage> Master<P, S> {
     /// Says when somebody else used the line, by the clock of the port.
     pub fn line_used_at(&mut self, time: u32) {
         self.engine.line_used_at(time);
+    }
+
+    /// When the line was last seen in use, by the clock of the port.
+    pub fn last_use(&self) -> u32 {
+        self.engine.last_use()
     }
 
     /// Moves the request under way on, without waiting; returns
