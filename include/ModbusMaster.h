@@ -439,7 +439,7 @@ private:
         }
         if (bytes != first)
             Turn::used();
-        return static_cast<int16_t>(bytes - first);
+        return static_cast<int16_t>(static_cast<uint16_t>(bytes - first));
     }
     static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
     {
