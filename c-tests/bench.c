@@ -50,7 +50,7 @@ static int by_libmodbus(void)
 
 static void begin_clients(int fd)
 {
-    mbm_port port;
+    static mbm_port port;
     unsigned i;
 
     for (i = 0; i < QUANTITY; i++)

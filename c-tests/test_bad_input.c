@@ -28,6 +28,7 @@ static void all_requests_answer(mbm_master *m, uint8_t status)
 /* All others but begin, setBuffers and statusText. */
 static void all_others_answer(mbm_master *m, uint8_t status)
 {
+    mbm_turn turn = {0};
     mbm_counters counters;
 
     IS(status, mbm_master_poll(m));
@@ -47,6 +48,8 @@ static void all_others_answer(mbm_master *m, uint8_t status)
     IS(status, mbm_master_setCounters(m, NULL));
     IS(status, mbm_master_lineUsed(m));
     IS(status, mbm_master_lineUsedAt(m, 0));
+    IS(status, mbm_master_takeTurn(m, &turn));
+    IS(status, mbm_master_endTurn(m, &turn));
     IS(status, mbm_master_clearResponseBuffer(m));
     IS(status, mbm_master_setTransmitBuffer(m, 0, 1));
     IS(status, mbm_master_clearTransmitBuffer(m));
@@ -74,6 +77,7 @@ static void null_is_an_invalid_argument_everywhere(void **state)
     all_others_answer(NULL, MBM_INVALID_ARGUMENT);
     IS(MBM_INVALID_ARGUMENT, mbm_master_begin(NULL, 1, &s->port));
     IS(MBM_INVALID_ARGUMENT, mbm_master_begin(NULL, 1, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_beginWith(NULL, 1, &s->port, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_master_setBuffers(NULL, words, 2, words, 2, frame, 16));
     memset(&m, 0, sizeof m);
     IS(MBM_INVALID_ARGUMENT, mbm_master_begin(&m, 1, NULL));

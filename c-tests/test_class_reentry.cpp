@@ -35,6 +35,35 @@ static void callbacks_around_a_request_cannot_begin_or_assign_their_master(void 
     assert_int_equal(entered, 2);
 }
 
+static void use_words()
+{
+    entered++;
+    assert_int_equal(calling->getResponseBuffer(0), 7);
+    assert_int_equal(calling->setTransmitBuffer(1, 8), 0);
+    calling->clearResponseBuffer();
+}
+
+static void callbacks_around_a_request_may_use_the_words(void **)
+{
+    ModbusMaster node;
+    calling = &node;
+    entered = 0;
+    node.begin(1, Serial);
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    node.preTransmission(use_words);
+    Serial.reply(adu({1, 3, 2, 0, 9}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_int_equal(entered, 1);
+    assert_int_equal(node.getResponseBuffer(0), 9);
+    node.preTransmission(nullptr);
+    node.setTransmitBuffer(0, 6);
+    Serial.sent.clear();
+    Serial.reply(adu({1, 16, 0, 0, 0, 2}));
+    assert_int_equal(node.writeMultipleRegisters(0, 2), 0);
+    assert_sent(Serial, {1, 16, 0, 0, 0, 2, 4, 0, 6, 0, 8});
+}
+
 static uint8_t begin_other(uint16_t, uint16_t, const uint8_t *)
 {
     entered++;
@@ -78,6 +107,7 @@ int main()
 {
     const struct CMUnitTest tests[] = {
         TEST(callbacks_around_a_request_cannot_begin_or_assign_their_master),
+        TEST(callbacks_around_a_request_may_use_the_words),
         TEST(hooks_cannot_begin_their_server),
         TEST(several_units_may_serve_one_array),
     };

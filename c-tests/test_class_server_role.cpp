@@ -252,6 +252,8 @@ public:
     int available() override { return static_cast<int>(arrived.size()); }
     int read() override
     {
+        if (arrived.empty())
+            return -1;
         uint8_t value = arrived.front();
         arrived.pop_front();
         return value;

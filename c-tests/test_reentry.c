@@ -38,6 +38,7 @@ static void every_function_of_the_master_is_busy(void)
     mbm_master *m = &master;
     mbm_counters counters;
     mbm_registers view;
+    mbm_turn turn = {0};
 
     IS(MBM_BUSY, mbm_master_begin(m, 1, &port));
     IS(MBM_BUSY, mbm_master_setBuffers(m, words, 1, words, 1, other_frame, 8));
@@ -59,6 +60,10 @@ static void every_function_of_the_master_is_busy(void)
     IS(MBM_BUSY, mbm_master_setWordOrder(m, 2));
     IS(MBM_BUSY, mbm_master_lineUsed(m));
     IS(MBM_BUSY, mbm_master_lineUsedAt(m, 0));
+    IS(MBM_BUSY, mbm_master_beginWith(m, 1, &port, NULL));
+    IS(MBM_BUSY, mbm_master_takeTurn(m, &turn));
+    IS(MBM_BUSY, mbm_master_endTurn(m, &turn));
+    assert_null(turn.master);
     IS(MBM_BUSY, mbm_master_clearResponseBuffer(m));
     IS(MBM_BUSY, mbm_master_setTransmitBuffer(m, 0, 1));
     IS(MBM_BUSY, mbm_master_clearTransmitBuffer(m));

@@ -9,20 +9,7 @@
  * better: a reply is found behind noise and foreign frames, checked against
  * its request, and a silence of t3.5 is kept before each request.
  *
- * Macros that may be defined before this file is included, alike in every
- * file of a program:
- * - MODBUSMASTER_RESPONSE_WORDS  words that a read fills, 1 to 125; 64 on AVR,
- *   else 125. A longer reply is answered with ku8MBBufferTooSmall.
- * - MODBUSMASTER_TRANSMIT_WORDS  words that a write sends, 2 to 123; 64 on AVR,
- *   else 123. A longer write is answered with ku8MBIllegalDataValue.
- * - MODBUSMASTER_SHARE_FRAME  one frame buffer for all objects, as on AVR boards of
- *   at most 2.5 KB of RAM anyway. A request beside that of another object is answered
- *   with ku8MBBusy. Not for objects of several threads.
- * - MODBUSMASTER_OWN_FRAMES  a frame buffer for each object on those boards too, so
- *   that several objects may have a request under way at the same time.
- * - MODBUSMASTER_SERIAL0 to MODBUSMASTER_SERIAL3  what begin(baud) opens, where
- *   the core does not say which UARTs the board has.
- * - MODBUSMASTER_YIELD()  what a wait runs; yield() where the core has it.
+ * The macros that size the buffers and choose ports are in ModbusMasterOptions.h.
  */
 
 #ifndef MODBUSMASTER_H
@@ -30,58 +17,15 @@
 
 #include <Arduino.h>
 #include <stdint.h>
+#include <string.h>
 
 #include "ModbusMasterBoards.h"
 #include "ModbusMasterConstants.h"
+#include "ModbusMasterOptions.h"
+#include "ModbusMasterTurn.h"
 #include "ModbusMasterValues.h"
 #include "ModbusStatusText.h"
 #include "mbm.h"
-
-/** @cond the macros are explained at the head of the file */
-#if !defined(MODBUSMASTER_RESPONSE_WORDS)
-#if defined(__AVR__)
-#define MODBUSMASTER_RESPONSE_WORDS 64
-#else
-#define MODBUSMASTER_RESPONSE_WORDS 125
-#endif
-#endif
-
-#if !defined(MODBUSMASTER_TRANSMIT_WORDS)
-#if defined(__AVR__)
-#define MODBUSMASTER_TRANSMIT_WORDS 64
-#else
-#define MODBUSMASTER_TRANSMIT_WORDS 123
-#endif
-#endif
-
-// The Uno has 2 KB of RAM, the Leonardo 2.5.
-#if defined(RAMEND) && RAMEND < 0x0B00 && !defined(MODBUSMASTER_OWN_FRAMES)
-#undef MODBUSMASTER_SHARE_FRAME
-#define MODBUSMASTER_SHARE_FRAME
-#endif
-
-// Cores with NO_GLOBAL_* leave it to the sketch to make the ports.
-#if !defined(MODBUSMASTER_SERIAL0) && !defined(NO_GLOBAL_INSTANCES) && !defined(NO_GLOBAL_SERIAL)
-#define MODBUSMASTER_SERIAL0 Serial
-#endif
-#if !defined(MODBUSMASTER_SERIAL1) && (defined(HAVE_HWSERIAL1) || defined(UBRR1H))
-#define MODBUSMASTER_SERIAL1 Serial1
-#endif
-#if !defined(MODBUSMASTER_SERIAL2) && (defined(HAVE_HWSERIAL2) || defined(UBRR2H))
-#define MODBUSMASTER_SERIAL2 Serial2
-#endif
-#if !defined(MODBUSMASTER_SERIAL3) && (defined(HAVE_HWSERIAL3) || defined(UBRR3H))
-#define MODBUSMASTER_SERIAL3 Serial3
-#endif
-
-#if !defined(MODBUSMASTER_YIELD)
-#if defined(ESP8266) || defined(ESP32) || (defined(ARDUINO) && ARDUINO >= 10600)
-#define MODBUSMASTER_YIELD() yield()
-#else
-#define MODBUSMASTER_YIELD() static_cast<void>(0)
-#endif
-#endif
-/** @endcond */
 
 /**
  * A Modbus RTU master: one line, one request at a time.
@@ -90,7 +34,7 @@
  * an object from one thread, never from an interrupt. Callbacks may call other
  * objects. On its own object an idle callback may call everything; requests are
  * answered with ku8MBBusy. In preTransmission and postTransmission everything is
- * answered with ku8MBBusy, and changes nothing.
+ * answered with ku8MBBusy, and changes nothing; but words may be read, set and cleared.
  */
 class ModbusMaster : public ModbusMasterStatics<void>, public ModbusMasterValues<ModbusMaster> {
 public:
@@ -132,8 +76,7 @@ public:
     /** A request under way is forgotten; cancel it before, for the driver's sake. */
     ~ModbusMaster()
     {
-        if (lastUser == &state.master)
-            lastUser = nullptr;
+        Turn::end(state.master);
     }
 #endif
 
@@ -143,7 +86,8 @@ public:
      * queued is dropped, a request under way is given up.
      *
      * @param slave   1 to 247; 248 to 255 are sent as they are, 0 is broadcast
-     * @param stream  must outlive its use here
+     * @param stream  must outlive its use here; its read() returns -1 where nothing has
+     *                arrived, as Arduino says
      */
     void begin(uint8_t slave, Stream &stream)
     {
@@ -201,17 +145,20 @@ public:
     /** A word of the last successful read; 0xFFFF past the end of the buffer. */
     uint16_t getResponseBuffer(uint8_t index) const
     {
-        return mbm_master_getResponseBuffer(&state.master, index);
+        return index < responseWords ? state.response[index] : 0xFFFF;
     }
     /** Zeroes the response words; receive goes on where it was. */
-    void clearResponseBuffer() { mbm_master_clearResponseBuffer(&state.master); }
+    void clearResponseBuffer() { memset(state.response, 0, sizeof state.response); }
     /** Sets a word to write: ku8MBSuccess, or 0x02 past the end of the buffer. */
     uint8_t setTransmitBuffer(uint8_t index, uint16_t value)
     {
-        return mbm_master_setTransmitBuffer(&state.master, index, value);
+        if (index >= transmitWords)
+            return ku8MBIllegalDataAddress;
+        state.transmit[index] = value;
+        return ku8MBSuccess;
     }
     /** Zeroes the words to write; the queue of send stays. */
-    void clearTransmitBuffer() { mbm_master_clearTransmitBuffer(&state.master); }
+    void clearTransmitBuffer() { memset(state.transmit, 0, sizeof state.transmit); }
 
     /** Sets the address of later writes without one; empties the queue of send. */
     void beginTransmission(uint16_t address)
@@ -381,6 +328,8 @@ private:
         frameBytes = frameNeed < MBM_MAX_FRAME ? +frameNeed : MBM_MAX_FRAME
     };
 
+    typedef ModbusMasterTurn<void> Turn;
+
     struct Callback {
         void (*function)(void *);
         void *context;
@@ -422,16 +371,9 @@ private:
     // Touches the clock and the driver, not the Stream.
     uint8_t attach(uint8_t slave)
     {
-        mbm_port port;
-        port.context = &state;
-        port.read = readHook;
-        port.write = writeHook;
-        port.micros = clockHook;
-        port.flush = flushHook;
-        port.preTransmission = preHook;
-        port.postTransmission = postHook;
-        port.idle = idleHook;
-        return mbm_master_begin(&state.master, slave, &port);
+        static const mbm_port hooks = {nullptr,   readHook, writeHook, clockHook,
+                                       flushHook, preHook,  postHook,  idleHook};
+        return mbm_master_beginWith(&state.master, slave, &hooks, &state);
     }
 
     // After a copy: our own buffers and our own context, no request under way.
@@ -449,20 +391,12 @@ private:
         begin(getSlaveID(), port);
     }
 
-    // Every request passes here: its gap counts from another object's last use.
-    // False while another object has a request under way in the frame that all share.
+    // Every request passes here. False while another object has a request under way in
+    // the frame that all share.
     bool mayRequest()
     {
-        if (lastUser != &state.master) {
-#if defined(MODBUSMASTER_SHARE_FRAME)
-            // From within a hook of that object, its status is MBM_BUSY.
-            const uint8_t other = lastUser != nullptr ? mbm_master_status(lastUser) : MBM_OK;
-            if (other == MBM_PENDING || other == MBM_BUSY)
-                return false;
-#endif
-            lastUser = &state.master;
-            mbm_master_lineUsedAt(&state.master, lastUse);
-        }
+        if (!Turn::take(state.master))
+            return false;
         state.sent = false;
         return true;
     }
@@ -496,12 +430,16 @@ private:
     static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)
     {
         Stream &stream = *of(context).stream;
-        uint16_t room = capacity;
-        for (; room > 0 && stream.available() > 0; room--)
-            *bytes++ = static_cast<uint8_t>(stream.read());
-        if (room < capacity)
-            lastUse = clockHook(context);
-        return static_cast<int16_t>(capacity - room);
+        const uint8_t *const first = bytes, *const end = bytes + capacity;
+        while (bytes != end) {
+            const int byte = stream.read();
+            if (byte < 0)
+                break;
+            *bytes++ = static_cast<uint8_t>(byte);
+        }
+        if (bytes != first)
+            Turn::used();
+        return static_cast<int16_t>(static_cast<uint16_t>(bytes - first));
     }
     static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
     {
@@ -517,7 +455,7 @@ private:
     static void postHook(void *context)
     {
         of(context).sent = true;
-        lastUse = clockHook(context);
+        Turn::used();
         call(of(context).onPost);
     }
     static void idleHook(void *context, mbm_master *)

@@ -52,21 +52,9 @@ public:
     static const uint8_t ku8MBLineBusy = MBM_LINE_BUSY;
     /** The request was given up by cancel or begin. */
     static const uint8_t ku8MBCancelled = MBM_CANCELLED;
-
-protected:
-    /**
-     * The object that used a line last; looked into only where all objects share a
-     * frame. Threads that race for it, each with a line of its own, cost a needless
-     * gap at most.
-     */
-    static const mbm_master *lastUser;
-    /** When a line was used last: micros() of a byte read, or of the end of a request. */
-    static uint32_t lastUse;
 };
 
 /** @cond the homes of what is declared above */
-template <typename Unused> const mbm_master *ModbusMasterStatics<Unused>::lastUser = nullptr;
-template <typename Unused> uint32_t ModbusMasterStatics<Unused>::lastUse = 0;
 #define MODBUSMASTER_HOME(name) \
     template <typename Unused> const uint8_t ModbusMasterStatics<Unused>::name
 MODBUSMASTER_HOME(ku8MBIllegalFunction);

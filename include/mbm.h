@@ -701,7 +701,7 @@ typedef struct mbm_master {
     /**
      * Not for you.
      */
-    void *pointers[18];
+    void *pointers[12];
     /**
      * Not for you.
      */
@@ -711,8 +711,9 @@ typedef struct mbm_master {
 /**
  * What the firmware supplies: a byte stream, a clock, and optional hooks.
  *
- * Copied by the begin functions; only `context` must stay valid. Hooks that are
- * NULL are not called; `read`, `write` and `micros` must be there.
+ * A master refers to its port, which must stay valid and unchanged for as long as the
+ * master is used; it may be a constant. A client and a server copy theirs. Hooks that
+ * are NULL are not called; `read`, `write` and `micros` must be there.
  *
  * A function that a hook calls on the object that called the hook returns
  * MBM_BUSY and changes nothing; a getter returns what it returns for an object
@@ -1149,6 +1150,24 @@ typedef struct mbm_length {
      */
     uint8_t kind;
 } mbm_length;
+
+/**
+ * What masters know of each other that take turns on one line, or in one frame
+ * buffer. Storage is yours and must be zero before first use.
+ *
+ * All objects of one turn are used from one thread. Before the storage of an object
+ * goes, call mbm_master_endTurn.
+ */
+typedef struct mbm_turn {
+    /**
+     * The object that has the turn; NULL if none has.
+     */
+    struct mbm_master *master;
+    /**
+     * When objects that had the turn before used the line last.
+     */
+    uint32_t lastUse;
+} mbm_turn;
 
 /**
  * Registers in a row, seen as values by the addresses that the device gives
@@ -2120,7 +2139,7 @@ uint8_t mbm_client_isConnected(const struct mbm_client *client);
 /**
  * Lends the line to a facade, whose functions then use the client's port; the
  * client's requests wait until mbm_client_takeBack. One of the two has the line
- * at any time.
+ * at any time. Until then the client's storage must stay: do not zero it.
  *
  * @param client  the object; for a facade, of RTU frames on a line or over TCP
  * @param master  a facade with buffers, which gets the client's port; NULL if
@@ -2938,13 +2957,29 @@ uint8_t mbm_frame_lrc(const uint8_t *bytes, uint16_t length);
  * @param master  the object; zeroed before the first call
  * @param slave   unit id, 1 to 247; 248 to 255 are sent as they are, 0 is
  *                broadcast (serial line guide V1.02, 2.2)
- * @param port    copied; read, write and micros must be there
+ * @param port    not copied: it must stay valid and unchanged for as long as the
+ *                object is used; read, write and micros must be there
  * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a missing hook; MBM_BUSY
  *         from within a hook of this object's port but `idle`
  */
 uint8_t mbm_master_begin(struct mbm_master *master,
                          uint8_t slave,
                          const struct mbm_port *port);
+
+/**
+ * As mbm_master_begin, for several objects that share one port, which may be a
+ * constant: each object has a context of its own.
+ *
+ * @param master   the object; zeroed before the first call
+ * @param slave    as for mbm_master_begin
+ * @param port     as for mbm_master_begin; its `context` is not used
+ * @param context  handed to every hook. Yours, may be NULL
+ * @return as mbm_master_begin
+ */
+uint8_t mbm_master_beginWith(struct mbm_master *master,
+                             uint8_t slave,
+                             const struct mbm_port *port,
+                             void *context);
 
 /**
  * Lends the buffers that requests and replies need, before or after begin.
@@ -3366,6 +3401,28 @@ uint8_t mbm_master_lineUsedAt(struct mbm_master *master, uint32_t microseconds);
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_lineUsed(struct mbm_master *master);
+
+/**
+ * Takes the turn, before a request. The gap before that request counts from the last
+ * use of the line by any object that had the turn before.
+ *
+ * @param master  the object, with buffers or begun
+ * @param turn    the turn of all objects that share a line or a frame buffer
+ * @return MBM_OK; MBM_BUSY, with nothing changed, while another object has the turn
+ *         and a request under way; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_master_takeTurn(struct mbm_master *master, struct mbm_turn *turn);
+
+/**
+ * Gives the turn back, before the storage of the object goes; does nothing if the object
+ * has not got the turn. A request under way is forgotten: cancel it before, so that the
+ * driver is off.
+ *
+ * @param master  the object
+ * @param turn    as for mbm_master_takeTurn
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_master_endTurn(struct mbm_master *master, struct mbm_turn *turn);
 
 /**
  * Sets the order of values in the views that mbm_master_getResponseRegisters

@@ -19,11 +19,11 @@ pub struct Master<P, S: Words> {
     response_index: u8,
     slave: u8,
     status: Status,
+    engine: Engine<P, S, Query>,
     /// Where the writing functions without arguments write.
     write_address: u16,
     /// Bits queued in the transmit buffer; 16 to a word.
     transmit_bits: u16,
-    engine: Engine<P, S, Query>,
 }
 
 impl<P, S: Words> Master<P, S> {
@@ -131,6 +131,11 @@ impl<P: Port, S: Words> Master<P, S> {
     /// Says when somebody else used the line, by the clock of the port.
     pub fn line_used_at(&mut self, time: u32) {
         self.engine.line_used_at(time);
+    }
+
+    /// When the line was last seen in use, by the clock of the port.
+    pub fn last_use(&self) -> u32 {
+        self.engine.last_use()
     }
 
     /// Moves the request under way on, without waiting; returns

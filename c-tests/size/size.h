@@ -56,11 +56,9 @@ static mbm_master node;
 
 static inline void begin(void)
 {
-    mbm_port port = {0};
+    static const mbm_port port = {
+        .read = port_read, .write = port_write, .micros = port_micros};
 
-    port.read = port_read;
-    port.write = port_write;
-    port.micros = port_micros;
     USED(&port);
     USED(response);
     USED(transmit);

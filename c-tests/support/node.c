@@ -6,16 +6,14 @@
 
 void node_begin(node *n, int fd, uint8_t slave)
 {
-    mbm_port port;
-
     memset(n, 0, sizeof *n);
     assert_int_equal(mbm_tty_attach(&n->tty, fd), 0);
-    port = mbm_tty_port(&n->tty);
+    n->port = mbm_tty_port(&n->tty);
     assert_int_equal(mbm_master_setBuffers(&n->master, n->response, MBM_MAX_READ_REGISTERS,
                                            n->transmit, MBM_MAX_WRITE_REGISTERS, n->frame,
                                            MBM_MAX_FRAME),
                      MBM_OK);
-    assert_int_equal(mbm_master_begin(&n->master, slave, &port), MBM_OK);
+    assert_int_equal(mbm_master_begin(&n->master, slave, &n->port), MBM_OK);
     assert_int_equal(mbm_master_setCounters(&n->master, &n->counters), MBM_OK);
     assert_int_equal(mbm_master_setBaudRate(&n->master, 115200), MBM_OK);
     assert_int_equal(mbm_master_setResponseTimeout(&n->master, PATIENCE_MS), MBM_OK);

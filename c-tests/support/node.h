@@ -7,6 +7,7 @@
 typedef struct node {
     mbm_master master;
     mbm_tty tty;
+    mbm_port port;
     mbm_counters counters;
     uint16_t response[MBM_MAX_READ_REGISTERS];
     uint16_t transmit[MBM_MAX_WRITE_REGISTERS];

@@ -2,12 +2,14 @@
 
 use super::master::mbm_master;
 use core::ffi::c_void;
+use core::ptr::null;
 use mbm::port::Port;
 
 /// What the firmware supplies: a byte stream, a clock, and optional hooks.
 ///
-/// Copied by the begin functions; only `context` must stay valid. Hooks that are
-/// NULL are not called; `read`, `write` and `micros` must be there.
+/// A master refers to its port, which must stay valid and unchanged for as long as the
+/// master is used; it may be a constant. A client and a server copy theirs. Hooks that
+/// are NULL are not called; `read`, `write` and `micros` must be there.
 ///
 /// A function that a hook calls on the object that called the hook returns
 /// MBM_BUSY and changes nothing; a getter returns what it returns for an object
@@ -141,6 +143,104 @@ impl Port for mbm_port {
         if let Some(hook) = self.postTransmission {
             // SAFETY: see above.
             unsafe { hook(self.context) }
+        }
+    }
+}
+
+/// A port that stays where it is, and what its hooks are handed.
+#[repr(C)]
+pub(super) struct PortRef {
+    port: *const mbm_port,
+    context: *mut c_void,
+}
+
+impl PortRef {
+    /// Refers to a port.
+    ///
+    /// # Safety
+    /// The port is complete, and stays as it is for as long as this refers to it.
+    #[inline(always)]
+    pub(super) unsafe fn set(&mut self, port: *const mbm_port, context: *mut c_void) {
+        self.port = port;
+        self.context = context;
+    }
+
+    /// Refers to no port.
+    pub(super) fn clear(&mut self) {
+        self.port = null();
+    }
+
+    /// Calls the hook `idle`.
+    ///
+    /// # Safety
+    /// `this` refers to a port. No reference to what holds it lives, for the hook may
+    /// use that.
+    #[inline(always)]
+    pub(super) unsafe fn idle(this: *const PortRef, master: *mut mbm_master) {
+        // SAFETY: as the caller promises.
+        unsafe {
+            if let Some(idle) = (*(*this).port).idle {
+                idle((*this).context, master);
+            }
+        }
+    }
+}
+
+// The port is complete, as PortRef::set demands; the engine calls nothing of a master
+// that is not ready.
+impl Port for PortRef {
+    fn is_ready(&self) -> bool {
+        !self.port.is_null()
+    }
+
+    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+        // SAFETY: see above.
+        let count = unsafe {
+            let read = (*self.port).read.unwrap_unchecked();
+            read(self.context, bytes.as_mut_ptr(), bytes.len() as u16)
+        };
+        count.min(bytes.len() as i16)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> i16 {
+        // SAFETY: see above.
+        let count = unsafe {
+            let write = (*self.port).write.unwrap_unchecked();
+            write(self.context, bytes.as_ptr(), bytes.len() as u16)
+        };
+        count.min(bytes.len() as i16)
+    }
+
+    fn micros(&mut self) -> u32 {
+        // SAFETY: see above.
+        unsafe { (*self.port).micros.unwrap_unchecked()(self.context) }
+    }
+
+    fn flush(&mut self) -> bool {
+        // SAFETY: see above.
+        unsafe {
+            match (*self.port).flush {
+                Some(flush) => flush(self.context) != 0,
+                None => true,
+            }
+        }
+    }
+
+    fn pre_transmission(&mut self) {
+        // SAFETY: see above.
+        unsafe {
+            if let Some(hook) = (*self.port).preTransmission {
+                hook(self.context)
+            }
+        }
+    }
+
+    fn post_transmission(&mut self) {
+        // SAFETY: see above.
+        unsafe {
+            if let Some(hook) = (*self.port).postTransmission {
+                hook(self.context)
+            }
         }
     }
 }

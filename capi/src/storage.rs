@@ -169,18 +169,19 @@ impl Words for LentByC {
     fn take_words(&mut self, from: u8, count: u8, high_first: bool) {
         // SAFETY: below `frame_bytes`, and of `response_words`, see above.
         unsafe {
-            let flip: usize = flip(high_first).into();
-            let mut word = self.response.cast::<u8>();
+            let mut word = self.response;
             let mut byte = self.frame.add(from.into());
+            // The CRC stands there, and is in no word.
+            *byte.add(count.into()) = 0;
             for _ in 0..count.div_ceil(2) {
-                *word.add(flip) = *byte;
-                *word.add(flip ^ 1) = *byte.add(1);
-                word = word.add(2);
+                let bytes = [*byte, *byte.add(1)];
+                *word = if high_first {
+                    u16::from_be_bytes(bytes)
+                } else {
+                    u16::from_le_bytes(bytes)
+                };
+                word = word.add(1);
                 byte = byte.add(2);
-            }
-            if count & 1 != 0 {
-                // The CRC stands there.
-                *word.sub(2).add(flip ^ 1) = 0;
             }
         }
     }

@@ -26,7 +26,8 @@ fn probes() -> Vec<(String, u64)> {
             mbm_length mbm_packet mbm_record mbm_object mbm_framing mbm_server mbm_unit
             mbm_service mbm_registerTable mbm_bitTable mbm_cells mbm_file mbm_files mbm_fifo
             mbm_fifos mbm_exceptionStatus mbm_serverId mbm_identification mbm_request mbm_custom
-            mbm_switches mbm_diagnostics mbm_sniffer mbm_event mbm_client mbm_clientRequest mbm_clientUnit mbm_link;
+            mbm_switches mbm_diagnostics mbm_sniffer mbm_event mbm_client mbm_clientRequest mbm_clientUnit mbm_link
+            mbm_turn;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
             mbm_counters { requests replies exceptions badCrc timeouts foreignFrames
@@ -35,6 +36,7 @@ fn probes() -> Vec<(String, u64)> {
                 length }
             mbm_clientUnit { requests replies exceptions retries delay unit status }
             mbm_link { context disconnect connect }
+            mbm_turn { master lastUse }
             mbm_rule { kind bytes more }
             mbm_function { code request response }
             mbm_length { bytes kind }

@@ -232,7 +232,8 @@ fn hooks_and_idle_use_the_master_that_called_them() {
         let (first, bytes) = (words.cast::<u16>(), frame.cast::<u8>());
         let status = mbm_master_setBuffers(master, first, 4, first.add(4), 4, bytes, 64);
         assert_eq!(status, MBM_OK);
-        assert_eq!(mbm_master_begin(master, 17, &port(world.cast())), MBM_OK);
+        let port = port(world.cast());
+        assert_eq!(mbm_master_begin(master, 17, &port), MBM_OK);
         assert_eq!(mbm_master_setResponseTimeout(master, 20), MBM_OK);
         assert_eq!(
             mbm_master_readHoldingRegisters(master, 0, 1),

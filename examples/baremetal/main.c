@@ -122,15 +122,12 @@ static uint8_t send_report(void)
 
 int main(void)
 {
-    mbm_port port = {0};
+    static const mbm_port port = {
+        .read = uart_read, .write = uart_write, .micros = clock_micros, .flush = uart_flush};
 
     uart_start();
     clock_start();
 
-    port.read = uart_read;
-    port.write = uart_write;
-    port.micros = clock_micros;
-    port.flush = uart_flush;
     mbm_master_setBuffers(&node, response, MBM_MAX_READ_REGISTERS, transmit, REPORT_SIZE, frame,
                           sizeof frame);
     mbm_master_begin(&node, UNIT, &port);

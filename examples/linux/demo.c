@@ -105,7 +105,8 @@ static int read_bits(const uint8_t *there, unsigned count)
 static void begin(void)
 {
     static mbm_tty tty;
-    mbm_port over_tty, port;
+    static mbm_port port;
+    mbm_port over_tty;
 
     server_start(&device, UNIT);
     expect(mbm_tty_attach(&tty, device.line.ours) == 0, "a terminal");

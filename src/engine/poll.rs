@@ -174,6 +174,11 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         }
     }
 
+    /// When the line was last seen in use, by the clock of the port.
+    pub fn last_use(&self) -> u32 {
+        self.last_byte
+    }
+
     /// Moves the request on to the time `now`, without waiting:
     /// [`Status::PENDING`] until it has ended, then how.
     pub fn poll(&mut self, now: u32) -> Status {

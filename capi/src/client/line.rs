@@ -81,7 +81,7 @@ pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8
 
 /// Lends the line to a facade, whose functions then use the client's port; the
 /// client's requests wait until mbm_client_takeBack. One of the two has the line
-/// at any time.
+/// at any time. Until then the client's storage must stay: do not zero it.
 ///
 /// @param client  the object; for a facade, of RTU frames on a line or over TCP
 /// @param master  a facade with buffers, which gets the client's port; NULL if
@@ -111,7 +111,11 @@ pub unsafe extern "C" fn mbm_client_lend(client: *mut mbm_client, master: *mut m
             }
             if !master.is_null() {
                 master::prepare(master);
-                *pointers::object(master).core().port() = *(*(*object).kind).port(object);
+                let port = (*(*object).kind).port(object);
+                pointers::object(master)
+                    .core()
+                    .port()
+                    .set(port, (*port).context);
             }
             Status::OK
         });
@@ -146,7 +150,7 @@ pub unsafe extern "C" fn mbm_client_takeBack(
                     if core.is_pending() {
                         return Status::BUSY;
                     }
-                    core.port().read = None;
+                    core.port().clear();
                 }
                 Status::BUSY => return Status::BUSY,
                 // None, or none that has the port.

@@ -3,18 +3,21 @@
 mod object;
 mod requests;
 mod settings;
+mod turn;
 mod values;
 mod words;
 
 pub use object::*;
 pub use requests::*;
 pub use settings::*;
+pub use turn::*;
 pub use values::*;
 pub use words::*;
 
 use super::pointers::{self, CObject};
-use super::port::mbm_port;
+use super::port::{mbm_port, PortRef};
 use super::storage::LentByC;
+use core::ffi::c_void;
 use mbm::error::Status;
 use mbm::master::Master;
 use mbm::pdu::query::Form;
@@ -29,7 +32,7 @@ pub(super) struct Object {
     order: u8,
 }
 
-pub(super) type Core = Master<mbm_port, LentByC>;
+pub(super) type Core = Master<PortRef, LentByC>;
 
 const _: () = {
     let room = size_of::<mbm_master>();
@@ -116,7 +119,8 @@ pub(super) unsafe fn calling<T>(master: *mut mbm_master, action: impl FnOnce(&mu
 /// @param master  the object; zeroed before the first call
 /// @param slave   unit id, 1 to 247; 248 to 255 are sent as they are, 0 is
 ///                broadcast (serial line guide V1.02, 2.2)
-/// @param port    copied; read, write and micros must be there
+/// @param port    not copied: it must stay valid and unchanged for as long as the
+///                object is used; read, write and micros must be there
 /// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a missing hook; MBM_BUSY
 ///         from within a hook of this object's port but `idle`
 #[no_mangle]
@@ -128,17 +132,34 @@ pub unsafe extern "C" fn mbm_master_begin(
     if port.is_null() {
         return Status::INVALID_ARGUMENT.code();
     }
-    // SAFETY: not NULL, so a port.
-    let port = unsafe { &*port };
-    if !port.is_complete() {
-        return Status::INVALID_ARGUMENT.code();
-    }
+    // SAFETY: not NULL, so a port; the rest as the header demands.
+    unsafe { mbm_master_beginWith(master, slave, port, (*port).context) }
+}
+
+/// As mbm_master_begin, for several objects that share one port, which may be a
+/// constant: each object has a context of its own.
+///
+/// @param master   the object; zeroed before the first call
+/// @param slave    as for mbm_master_begin
+/// @param port     as for mbm_master_begin; its `context` is not used
+/// @param context  handed to every hook. Yours, may be NULL
+/// @return as mbm_master_begin
+#[no_mangle]
+pub unsafe extern "C" fn mbm_master_beginWith(
+    master: *mut mbm_master,
+    slave: u8,
+    port: *const mbm_port,
+    context: *mut c_void,
+) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
+        if port.is_null() || !(*port).is_complete() {
+            return Status::INVALID_ARGUMENT.code();
+        }
         let status = prepare(master);
         if status == Status::OK {
             calling(master, |core| {
-                core.begin(slave, |place| place.copy(port));
+                core.begin(slave, |place| place.set(port, context));
             });
         }
         status.code()
@@ -321,11 +342,7 @@ unsafe fn finish(pointer: *mut mbm_master, mut status: u8) -> u8 {
             status = mbm_master_poll(pointer);
             let core = Object::core_of(pointer);
             if (*core).is_waiting() {
-                let port = (*core).port();
-                let (idle, context) = (port.idle, port.context);
-                if let Some(idle) = idle {
-                    idle(context, pointer);
-                }
+                PortRef::idle((*core).port(), pointer);
             }
         }
     }

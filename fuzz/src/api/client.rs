@@ -143,7 +143,10 @@ fn line(w: &World, client: *mut mbm_client) {
             let master = w.masters.pick(w);
             let spans = [span(client), span(master)];
             refused_changes_nothing(w, &spans, "a line lent", || match choice {
-                2 => call!(w, client, mbm_client_lend(client, master)),
+                2 => {
+                    w.lenders.borrow_mut().push(client);
+                    call!(w, client, mbm_client_lend(client, master))
+                }
                 _ => call!(w, client, mbm_client_takeBack(client, master)),
             });
         }
@@ -169,10 +172,11 @@ pub fn step(w: &World) {
         }
         14 => line(w, client),
         _ => {
-            // The user may zero a client that has nothing to do.
+            // The user may zero a client that has nothing to do and has not lent its line.
             // SAFETY: NULL or an object.
             let pending = unsafe { mbm_client_pending(client) };
-            if !client.is_null() && !w.is_inside() && (pending == 0 || w.wild) {
+            let lender = w.lenders.borrow().contains(&client);
+            if !client.is_null() && !lender && !w.is_inside() && (pending == 0 || w.wild) {
                 w.note(|| format!("memset({client:?}, 0, client)"));
                 // SAFETY: nothing uses it now.
                 unsafe { client.cast::<u8>().write_bytes(0, size_of::<mbm_client>()) };

@@ -4,13 +4,24 @@ use super::check::{call, ends, is_status, refused_changes_nothing, span, PENDING
 use super::ports;
 use super::world::World;
 use mbm_c::*;
+use std::ffi::c_void;
 use std::ptr::null_mut;
 
 fn begin(w: &World, master: *mut mbm_master) {
     let slave = super::traffic::unit(w);
     let port = ports::port(w, MBM_FRAMING_RTU);
+    // Of any of the ports.
+    let context = usize::from(slave % 4) as *mut c_void;
     refused_changes_nothing(w, &[span(master)], "mbm_master_begin", || {
-        call!(w, master, mbm_master_begin(master, slave, port))
+        if slave & 4 == 0 {
+            call!(w, master, mbm_master_begin(master, slave, port))
+        } else {
+            call!(
+                w,
+                master,
+                mbm_master_beginWith(master, slave, port, context)
+            )
+        }
     });
 }
 
@@ -47,7 +58,7 @@ fn buffers(w: &World, master: *mut mbm_master) {
 
 fn set(w: &World, master: *mut mbm_master) {
     let (byte, word, long) = (w.byte(), w.word(), w.long());
-    let choice = w.byte() % 14;
+    let choice = w.byte() % 16;
     let counters: *mut mbm_counters = if byte & 1 == 0 {
         null_mut()
     } else {
@@ -67,6 +78,8 @@ fn set(w: &World, master: *mut mbm_master) {
         10 => call!(w, master, mbm_master_setCounters(master, counters)),
         11 => call!(w, master, mbm_master_lineUsed(master)),
         12 => call!(w, master, mbm_master_lineUsedAt(master, long)),
+        14 => call!(w, master, mbm_master_takeTurn(master, w.turn(byte))),
+        15 => call!(w, master, mbm_master_endTurn(master, w.turn(byte))),
         _ => call!(w, master, mbm_master_setWordOrder(master, byte % 8)),
     });
 }

@@ -116,7 +116,10 @@ pub struct World {
     frames: RefCell<Vec<Frame>>,
     pub ports: [Port; 4],
     pub masters: Pool<mbm_master>,
+    turn: Cell<*mut mbm_turn>,
     pub clients: Pool<mbm_client>,
+    /// Clients whose port a master has, or had when it was copied.
+    pub lenders: RefCell<Vec<*mut mbm_client>>,
     pub requests: Pool<mbm_clientRequest>,
     pub servers: Pool<mbm_server>,
     pub sniffers: Pool<mbm_sniffer>,
@@ -160,7 +163,9 @@ impl World {
             frames: RefCell::default(),
             ports: std::array::from_fn(Port::new),
             masters: Pool::new(),
+            turn: Cell::new(std::ptr::null_mut()),
             clients: Pool::new(),
+            lenders: RefCell::default(),
             requests: Pool::new(),
             servers: Pool::new(),
             sniffers: Pool::new(),
@@ -258,6 +263,17 @@ impl World {
             3 => self.random(),
             _ => self.word().into(),
         }
+    }
+
+    /// What masters share that take turns; sometimes NULL.
+    pub fn turn(&self, byte: u8) -> *mut mbm_turn {
+        if byte >= 0xF0 {
+            return std::ptr::null_mut();
+        }
+        if self.turn.get().is_null() {
+            self.turn.set(self.zeroed());
+        }
+        self.turn.get()
     }
 
     /// A block of the heap of exactly this size, zeroed; of size 0 the end of one.

@@ -1,0 +1,72 @@
+/**
+ * @file ModbusMasterOptions.h
+ * @brief What a sketch may choose of ModbusMaster, and what holds if it does not.
+ *
+ * Licence: MIT OR Apache-2.0. Included by ModbusMaster.h.
+ *
+ * Macros that may be defined before ModbusMaster.h is included, alike in every
+ * file of a program:
+ * - MODBUSMASTER_RESPONSE_WORDS  words that a read fills, 1 to 125; 64 on AVR,
+ *   else 125. A longer reply is answered with ku8MBBufferTooSmall.
+ * - MODBUSMASTER_TRANSMIT_WORDS  words that a write sends, 2 to 123; 64 on AVR,
+ *   else 123. A longer write is answered with ku8MBIllegalDataValue.
+ * - MODBUSMASTER_SHARE_FRAME  one frame buffer for all objects, as on AVR boards of
+ *   at most 2.5 KB of RAM anyway. A request beside that of another object is answered
+ *   with ku8MBBusy. Not for objects of several threads.
+ * - MODBUSMASTER_OWN_FRAMES  a frame buffer for each object on those boards too, so
+ *   that several objects may have a request under way at the same time.
+ * - MODBUSMASTER_SERIAL0 to MODBUSMASTER_SERIAL3  what begin(baud) opens, where
+ *   the core does not say which UARTs the board has.
+ * - MODBUSMASTER_YIELD()  what a wait runs; yield() where the core has it.
+ */
+
+#ifndef MODBUSMASTER_OPTIONS_H
+#define MODBUSMASTER_OPTIONS_H
+
+/** @cond explained above */
+#if !defined(MODBUSMASTER_RESPONSE_WORDS)
+#if defined(__AVR__)
+#define MODBUSMASTER_RESPONSE_WORDS 64
+#else
+#define MODBUSMASTER_RESPONSE_WORDS 125
+#endif
+#endif
+
+#if !defined(MODBUSMASTER_TRANSMIT_WORDS)
+#if defined(__AVR__)
+#define MODBUSMASTER_TRANSMIT_WORDS 64
+#else
+#define MODBUSMASTER_TRANSMIT_WORDS 123
+#endif
+#endif
+
+// The Uno has 2 KB of RAM, the Leonardo 2.5.
+#if defined(RAMEND) && RAMEND < 0x0B00 && !defined(MODBUSMASTER_OWN_FRAMES)
+#undef MODBUSMASTER_SHARE_FRAME
+#define MODBUSMASTER_SHARE_FRAME
+#endif
+
+// Cores with NO_GLOBAL_* leave it to the sketch to make the ports.
+#if !defined(MODBUSMASTER_SERIAL0) && !defined(NO_GLOBAL_INSTANCES) && !defined(NO_GLOBAL_SERIAL)
+#define MODBUSMASTER_SERIAL0 Serial
+#endif
+#if !defined(MODBUSMASTER_SERIAL1) && (defined(HAVE_HWSERIAL1) || defined(UBRR1H))
+#define MODBUSMASTER_SERIAL1 Serial1
+#endif
+#if !defined(MODBUSMASTER_SERIAL2) && (defined(HAVE_HWSERIAL2) || defined(UBRR2H))
+#define MODBUSMASTER_SERIAL2 Serial2
+#endif
+#if !defined(MODBUSMASTER_SERIAL3) && (defined(HAVE_HWSERIAL3) || defined(UBRR3H))
+#define MODBUSMASTER_SERIAL3 Serial3
+#endif
+
+#if !defined(MODBUSMASTER_YIELD)
+#if defined(ESP8266) || defined(ESP32) || (defined(ARDUINO) && ARDUINO >= 10600)
+#define MODBUSMASTER_YIELD() yield()
+#else
+#define MODBUSMASTER_YIELD() static_cast<void>(0)
+#endif
+#endif
+/** @endcond */
+
+#endif
