@@ -1,6 +1,6 @@
 //! Functions that the caller defines, and functions switched off.
 
-use super::units::{add, add_first, is_unheard, request};
+use super::units::{add_as, add_first, is_unheard, request};
 use super::{mbm_service, mbm_unit};
 use crate::capi::functions::{self, mbm_rule};
 use crate::error::Status;
@@ -129,18 +129,43 @@ unsafe fn serve_mine(record: *mut mbm_custom, pdu: *mut u8, heading: *const c_vo
     }
 }
 
-/// The length rule of a function, if the record with this head is that function.
+/// The kind of a function of C, which no other record has.
+const KIND: u8 = 0x80;
+
+/// True if the record with this head is a function of C.
 ///
 /// # Safety
 /// `service` is the head of a record of any kind.
-pub(super) unsafe fn rule(service: *const mbm_service, function: u8) -> Option<Rule> {
-    // SAFETY: as the caller promises; a record that this file serves is a
-    // function of C.
+#[inline(always)]
+pub(super) unsafe fn is_custom(service: *const mbm_service) -> bool {
+    // SAFETY: as the caller promises.
+    unsafe { (*service).kind == KIND }
+}
+
+/// True if the record with this head is a function of C that has another code than
+/// `function`.
+///
+/// # Safety
+/// As for [`is_custom`].
+#[inline(always)]
+pub(super) unsafe fn is_of_another(service: *const mbm_service, function: u8) -> bool {
+    // SAFETY: as the caller promises; what this file serves is a function of C.
     unsafe {
-        if !(*service)
-            .serve
-            .is_some_and(|other| core::ptr::fn_addr_eq(other, serve as super::units::Serve))
-        {
+        is_custom(service) && {
+            let code = (*service.cast::<mbm_custom>()).code;
+            code != function && code != 0
+        }
+    }
+}
+
+/// The length rule of a function, if the record with this head is that function.
+///
+/// # Safety
+/// As for [`is_custom`].
+pub(super) unsafe fn rule(service: *const mbm_service, function: u8) -> Option<Rule> {
+    // SAFETY: as the caller promises; what this file serves is a function of C.
+    unsafe {
+        if !is_custom(service) {
             return None;
         }
         let record = service.cast::<mbm_custom>();
@@ -172,7 +197,7 @@ pub unsafe extern "C" fn mbm_server_serveCustom(
         {
             return Status::INVALID_ARGUMENT.code();
         }
-        add(unit, custom.cast(), serve)
+        add_as(unit, custom.cast(), KIND, serve).code()
     }
 }
 
