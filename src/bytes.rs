@@ -12,6 +12,31 @@ pub fn move_to_front(bytes: &mut [u8], from: usize) {
     }
 }
 
+/// Copies words, of which one side has the high byte first and the other is in the
+/// machine's order: eight at a time, of which the last may overlap those before. For
+/// hosts.
+#[inline(always)]
+pub fn copy_words(to: &mut [u8], from: &[u8]) {
+    let (words, places) = (from.as_chunks().0, to.as_chunks_mut().0);
+    let turned = |word| u16::from_be_bytes(word).to_ne_bytes();
+    for (place, eight) in places
+        .as_chunks_mut::<8>()
+        .0
+        .iter_mut()
+        .zip(words.as_chunks().0)
+    {
+        *place = eight.map(turned);
+    }
+    match (places.last_chunk_mut(), words.last_chunk::<8>()) {
+        (Some(place), Some(eight)) => *place = eight.map(turned),
+        _ => {
+            for (place, word) in places.iter_mut().zip(words) {
+                *place = turned(*word);
+            }
+        }
+    }
+}
+
 /// Reads from the front of a byte slice.
 #[derive(Clone, Copy)]
 pub struct Reader<'a> {
@@ -129,6 +154,28 @@ mod tests {
         assert_eq!(reader.rest(), [5]);
         assert!(reader.is_empty());
         assert_eq!(reader.u8(), None);
+    }
+
+    #[test]
+    fn words_are_copied_whatever_their_number() {
+        let bytes: [u8; 54] = core::array::from_fn(|index| index as u8);
+        for count in 0..=27 {
+            let mut words = [0u16; 27];
+            let mut copy = [0xEE; 54];
+            copy_words(&mut copy[..2 * count], &bytes[..2 * count]);
+            for (word, bytes) in words.iter_mut().zip(copy.as_chunks().0) {
+                *word = u16::from_ne_bytes(*bytes);
+            }
+            for (index, word) in words.iter().enumerate() {
+                let [high, low] = [2 * index as u16, 2 * index as u16 + 1];
+                let expected = if index < count {
+                    high << 8 | low
+                } else {
+                    0xEEEE
+                };
+                assert_eq!(*word, expected, "{count} words, word {index}");
+            }
+        }
     }
 
     #[test]

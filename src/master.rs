@@ -140,6 +140,7 @@ impl<P: Port, S: Words> Master<P, S> {
 
     /// Moves the request under way on, without waiting; returns
     /// [`Status::PENDING`] until it has ended, then how it ended.
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn poll(&mut self) -> Status {
         if self.engine.is_pending() {
             let now = self.engine.port.micros();
@@ -162,6 +163,7 @@ impl<P: Port, S: Words> Master<P, S> {
     }
 
     /// Decodes a successful reply into the response words.
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn take_words(&mut self) -> Status {
         if !self.engine.take_words() {
             return Status::BUFFER_TOO_SMALL;

@@ -1,7 +1,9 @@
 //! The buffers and counters that C lends.
 
 use core::slice::{from_raw_parts, from_raw_parts_mut};
+use mbm::bytes::copy_words;
 use mbm::engine::{Counter, Storage, Words, COUNTERS};
+use mbm::FIRMWARE;
 
 /// What happened on the line, since the caller zeroed it. Each wraps at 2^32.
 #[repr(C)]
@@ -146,6 +148,10 @@ impl Words for LentByC {
     fn send_words(&mut self, to: u8, count: u8, high_first: bool) {
         // SAFETY: of `transmit_words`, and below `frame_bytes`, see above.
         unsafe {
+            if !FIRMWARE && high_first {
+                let words = from_raw_parts(self.transmit.cast(), count.into());
+                return copy_words(self.bytes(to, count), words);
+            }
             let flip = flip(high_first);
             let words = self.transmit.cast::<u8>();
             let mut place = self.frame.add(to.into());
@@ -169,6 +175,10 @@ impl Words for LentByC {
     fn take_words(&mut self, from: u8, count: u8, high_first: bool) {
         // SAFETY: below `frame_bytes`, and of `response_words`, see above.
         unsafe {
+            if !FIRMWARE && high_first {
+                let words = from_raw_parts_mut(self.response.cast(), count.into());
+                return copy_words(words, self.slice(from, count));
+            }
             let mut word = self.response;
             let mut byte = self.frame.add(from.into());
             // The CRC stands there, and is in no word.

@@ -433,16 +433,26 @@ static uint8_t tty_flush(void *context)
     return !tty->isOpen || !tty->has_uart || ioctl(tty->fd, TIOCOUTQ, &left) < 0 || left == 0;
 }
 
+/* Microseconds of a wait that is long. */
+enum { LONG_WAIT = 100000 };
+
+/* Of a long time a millisecond does not matter, and poll asks for less than ppoll. */
+static inline int sleep_on(struct pollfd *line, nfds_t count, uint32_t micros)
+{
+    if (micros >= LONG_WAIT)
+        return poll(line, count, micros == MBM_TTY_FOREVER ? -1 : (int)(micros / 1000 + 1));
+    return ppoll(line, count, &(struct timespec){0, (long)micros * 1000}, NULL);
+}
+
 int mbm_tty_wait(mbm_tty *tty, uint32_t micros)
 {
-    struct timespec time = {(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
     struct pollfd line = {tty->fd, POLLIN, 0};
     int ready;
 
     if (!tty->isOpen)
         return refuse(EBADF);
     /* A descriptor in the list would end the wait at a hang-up, whatever it awaits. */
-    ready = ppoll(&line, tty->awaits != 0, micros == MBM_TTY_FOREVER ? NULL : &time, NULL);
+    ready = sleep_on(&line, tty->awaits != 0, micros);
     if (ready < 0)
         return errno == EINTR ? 0 : -1;
     if (ready > 0)

@@ -120,7 +120,8 @@ void mbm_tty_detach(mbm_tty *tty);
  * a server whose function is pending reads nothing, and its program sleeps.
  *
  * @param tty     the terminal
- * @param micros  the longest time to sleep, in microseconds, or MBM_TTY_FOREVER
+ * @param micros  the longest time to sleep, in microseconds, from 100000 on rounded up to the next
+ *                millisecond, or MBM_TTY_FOREVER
  * @return 1 if bytes have arrived or the link is lost, which the next read reports;
  *         0 if the time is over or a signal came; -1 with errno set
  */

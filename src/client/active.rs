@@ -9,6 +9,7 @@ use crate::pdu::diagnostics::REPORT_SERVER_ID;
 use crate::pdu::limits::MAX_PDU;
 use crate::pdu::outline::Outline;
 use crate::pdu::reply;
+use crate::FIRMWARE;
 use core::num::NonZeroU8;
 
 /// The engine of a client.
@@ -99,15 +100,13 @@ impl<P, S: Means, J: Job> Request<P, S> for ActiveRequest<P, S, J> {
         frame <= room
     }
 
-    #[cfg_attr(target_os = "none", inline(never))]
+    #[inline(always)]
     fn write(engine: &mut ClientEngine<P, S, J>) {
-        let length = u16::from(engine.request.outline().request_length());
-        engine.storage.set_byte(0, engine.unit);
-        engine.request.emit(engine.storage.bytes(1, length));
-        let content = length + 1;
-        match &engine.request.ascii {
-            Some(ascii) => (ascii.encode)(engine, content),
-            None => engine.append_crc(content),
+        match engine.request.outline().two_words() {
+            Some(words) if !FIRMWARE && engine.request.ascii.is_none() => {
+                engine.write_short(*words);
+            }
+            _ => write_any(engine),
         }
     }
 
@@ -168,11 +167,20 @@ impl<P, S: Means, J: Job> Request<P, S> for ActiveRequest<P, S, J> {
         }
     }
 
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn search(engine: &mut ClientEngine<P, S, J>) -> bool {
         if let Some(ascii) = &engine.request.ascii {
             return (ascii.search)(engine);
         }
         engine.request.ended = false;
+        if !FIRMWARE {
+            if let Some(data) = engine.request.outline().data_of_read() {
+                if engine.has_read(data) {
+                    engine.request.length = data + 2;
+                    return true;
+                }
+            }
+        }
         engine.search_rtu()
     }
 
@@ -210,6 +218,19 @@ impl<P, S: Means, J: Job> ClientEngine<P, S, J> {
             return 0;
         }
         u16::from(length) + rtu::OVERHEAD as u16
+    }
+}
+
+/// Writes the frame of the request, whatever it is.
+#[inline(never)]
+fn write_any<P, S: Means, J: Job>(engine: &mut ClientEngine<P, S, J>) {
+    let length = u16::from(engine.request.outline().request_length());
+    engine.storage.set_byte(0, engine.unit);
+    engine.request.emit(engine.storage.bytes(1, length));
+    let content = length + 1;
+    match &engine.request.ascii {
+        Some(ascii) => (ascii.encode)(engine, content),
+        None => engine.append_crc(content),
     }
 }
 

@@ -158,6 +158,7 @@ pub(super) fn is_answer(ended: Status) -> bool {
 }
 
 /// Hands the data of `pdu`, a complete response, to the job.
+#[cfg_attr(not(target_os = "none"), inline(always))]
 pub(super) fn deliver<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
     let at = usize::from(job.ticket().outline.data_at());
     match pdu.get(at..) {

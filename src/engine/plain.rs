@@ -7,6 +7,7 @@ use crate::error::Status;
 use crate::frame::rtu;
 use crate::pdu::query::Query;
 use crate::pdu::EXCEPTION;
+use crate::FIRMWARE;
 
 /// Bytes of a frame around its PDU.
 const AROUND_PDU: u8 = rtu::OVERHEAD as u8;
@@ -40,26 +41,18 @@ impl<P, S: Words> Request<P, S> for Query {
         }
     }
 
-    #[cfg_attr(target_os = "none", inline(never))]
+    #[inline(always)]
     fn write(engine: &mut Engine<P, S, Self>) {
-        let mut end = engine.request.head_length() + 1;
-        engine.storage.set_byte(0, engine.unit);
-        let head = engine.storage.bytes(1, engine.request.head_length());
-        for (place, byte) in head.iter_mut().zip(engine.request.head()) {
-            *place = *byte;
+        match engine.request.two_words() {
+            Some(words) if !FIRMWARE => engine.write_short(words),
+            _ => write_any(engine),
         }
-        let sends = engine.request.sends();
-        if sends > 0 {
-            engine.storage.set_byte(end, sends);
-            engine
-                .storage
-                .send_words(end + 1, sends, engine.request.has_registers());
-            end += sends;
-            let last = engine.storage.byte(end) & engine.request.mask();
-            engine.storage.set_byte(end, last);
-            end += 1;
-        }
-        engine.append_crc(end);
+    }
+
+    #[inline(always)]
+    fn search(engine: &mut Engine<P, S, Self>) -> bool {
+        let data = engine.request.reads();
+        !FIRMWARE && data > 0 && engine.has_read(data) || engine.search_rtu()
     }
 
     #[inline(always)]
@@ -119,6 +112,29 @@ impl<P, S: Words> Request<P, S> for Query {
             Verdict::Wrong
         }
     }
+}
+
+/// Writes the frame of the request, whatever it is.
+#[inline(never)]
+fn write_any<P, S: Words>(engine: &mut Engine<P, S, Query>) {
+    let mut end = engine.request.head_length() + 1;
+    engine.storage.set_byte(0, engine.unit);
+    let head = engine.storage.bytes(1, engine.request.head_length());
+    for (place, byte) in head.iter_mut().zip(engine.request.head()) {
+        *place = *byte;
+    }
+    let sends = engine.request.sends();
+    if sends > 0 {
+        engine.storage.set_byte(end, sends);
+        engine
+            .storage
+            .send_words(end + 1, sends, engine.request.has_registers());
+        end += sends;
+        let last = engine.storage.byte(end) & engine.request.mask();
+        engine.storage.set_byte(end, last);
+        end += 1;
+    }
+    engine.append_crc(end);
 }
 
 /// True if the `count` bytes behind the unit at `front` are the request's.

@@ -13,6 +13,7 @@ use crate::error::Status;
 use crate::frame::checksum::Crc16;
 use crate::pdu::query::Query;
 use crate::port::Port;
+use crate::FIRMWARE;
 
 impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// Notes that the reply to the request under way may come late.
@@ -42,6 +43,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     }
 
     #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn receive(&mut self) -> Status {
         let mut over = self.is_over();
         // As the deadline passes, all that has arrived is looked at, even if
@@ -99,8 +101,16 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
 
     /// True if a reply that was `found` is the answer. One on probation is held, and
     /// what arrived behind it is searched.
-    #[cfg_attr(target_os = "none", inline(never))]
-    fn is_answered(&mut self, mut found: bool) -> bool {
+    #[inline(always)]
+    fn is_answered(&mut self, found: bool) -> bool {
+        if !FIRMWARE && self.probation == Probation::Off {
+            return found;
+        }
+        self.is_answered_behind_held(found)
+    }
+
+    #[inline(never)]
+    fn is_answered_behind_held(&mut self, mut found: bool) -> bool {
         while found {
             if self.probation == Probation::Off {
                 return true;
@@ -215,6 +225,7 @@ impl<P: Port, S: Words> Engine<P, S, Query> {
     /// Fills the response words from the reply that ended the last request; false,
     /// with nothing filled, if they are too few.
     #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn take_words(&mut self) -> bool {
         let count = self.request.reads();
         if self.response_words() > self.storage.response_words() {

@@ -19,6 +19,10 @@ use crate::pdu::EXCEPTION;
 /// Bytes of an exception's frame: unit, function, code, CRC.
 pub(super) const EXCEPTION_FRAME: u8 = rtu::OVERHEAD as u8 + 2;
 
+/// Bytes of the frame of a response to a read around its data: unit, function, byte count,
+/// CRC.
+const READ_OVERHEAD: u8 = rtu::OVERHEAD as u8 + 2;
+
 impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// As [`Request::wanted`], of any bytes.
     #[cfg_attr(target_os = "none", inline(never))]
@@ -33,6 +37,24 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             return 2u8.into();
         }
         Q::wanted(self, front, have)
+    }
+
+    /// As [`Engine::search_rtu`], of what is there most often: the whole and right reply
+    /// to a read of so many bytes of data, and nothing else.
+    #[inline(always)]
+    pub(crate) fn has_read(&mut self, data: u8) -> bool {
+        let length = S::Count::from(data) + READ_OVERHEAD.into();
+        if self.end != length || self.done > S::Count::ZERO || self.passed > 0 || self.echo {
+            return false;
+        }
+        let frame = self.storage.slice(S::Count::ZERO, length);
+        let start = [self.unit, self.request.function(), data];
+        if !frame.starts_with(&start) || !crc16(frame).is_residue() {
+            return false;
+        }
+        self.exception = 0;
+        self.least = length;
+        true
     }
 
     /// Looks for the reply among what has arrived, in RTU frames, and moves it to the

@@ -25,6 +25,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
 
     /// Waits for silence, then sends; from the next poll on.
     #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn listen_anew(&mut self) -> Status {
         self.take_back();
         Q::write(self);
@@ -47,6 +48,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// belongs to no request of ours. A line that is not silent is not waited for
     /// longer than a reply and that silence may take.
     #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn listen(&mut self) -> Status {
         let heard = self.hear(S::Count::ZERO);
         if heard < 0 {
@@ -90,6 +92,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// Hands the frame to the port, waits until that has drained, and holds the driver
     /// on. A port that does not move is not waited for longer than a reply may take.
     #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn send(&mut self) -> Status {
         if self.phase == Phase::Send {
             let left = self.end - self.done;

@@ -192,6 +192,12 @@ impl Query {
         self.mask
     }
 
+    /// The words of a request that is a function code and two words, as sent.
+    pub fn two_words(&self) -> Option<[u8; 4]> {
+        let [_, a, b, c, d, ..] = self.head;
+        (self.head_length == 5 && self.sends == 0).then_some([a, b, c, d])
+    }
+
     /// Length of the PDU.
     pub const fn length(&self) -> u8 {
         if self.sends == 0 {

@@ -326,24 +326,29 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// Never more than one frame is taken from the stream, so that its response
     /// has the whole buffer; but for a few bytes behind a very short one.
     fn receive_tcp(&mut self) -> Status {
-        if !FIRMWARE && self.end == 0 {
-            // What most requests have.
-            if let Some(front) = self.lent.frame().first_chunk_mut::<AT_ONCE>() {
-                let heard = self.port.read(front);
-                if heard != AT_ONCE as i16 {
-                    return self.heard_less(heard);
-                }
-                self.end = AT_ONCE as u16;
-                let &mut [_, _, a, b, c, d, unit, ..] = front;
-                // Protocol identifier and length, judged below where they are rare.
-                let total = (u32::from_be_bytes([a, b, c, d]) as usize).wrapping_add(tcp::HEADER);
-                if total == AT_ONCE {
-                    return self.found_for(unit, (AT_ONCE - tcp::PDU) as u16);
-                }
-                if total > AT_ONCE && total <= tcp::MAX_FRAME {
-                    return self.receive_rest(total, unit);
-                }
-            }
+        self.receive_on()
+    }
+
+    /// As [`Server::receive_tcp`], where nothing has arrived yet: takes at once what most
+    /// requests have. For hosts.
+    #[inline(always)]
+    pub(super) fn receive_at_once(&mut self) -> Status {
+        let Some(front) = self.lent.frame().first_chunk_mut::<AT_ONCE>() else {
+            return self.receive_on();
+        };
+        let heard = self.port.read(front);
+        if heard != AT_ONCE as i16 {
+            return self.heard_less(heard);
+        }
+        self.end = AT_ONCE as u16;
+        let &mut [_, _, a, b, c, d, unit, ..] = front;
+        // Protocol identifier and length, judged below where they are rare.
+        let total = (u32::from_be_bytes([a, b, c, d]) as usize).wrapping_add(tcp::HEADER);
+        if total == AT_ONCE {
+            return self.found_for(unit, (AT_ONCE - tcp::PDU) as u16);
+        }
+        if total > AT_ONCE && total <= tcp::MAX_FRAME {
+            return self.receive_rest(total, unit);
         }
         self.receive_on()
     }

@@ -232,6 +232,10 @@ impl<P: Port, B: Lent> Server<P, B> {
     pub fn look(&mut self, now: u32) -> Status {
         self.now = now;
         match self.phase {
+            // A stream that was given up has bytes left.
+            Phase::Listen if !FIRMWARE && !self.keeps_time() && self.end == 0 => {
+                self.receive_at_once()
+            }
             Phase::Listen => match self.receive {
                 Some(receive) => receive(self),
                 None => Status::NOT_INITIALISED,

@@ -3,6 +3,8 @@
 use core::ffi::c_void;
 use core::mem::offset_of;
 use core::ptr::NonNull;
+#[cfg(not(any(target_os = "none", mbm_firmware)))]
+use mbm::bytes::copy_words;
 use mbm::client::{Job, Ticket};
 
 /// A request to a device, and what comes of it. Yours, and zero before you set
@@ -144,28 +146,10 @@ impl Job for Lent {
         // SAFETY: the reply is not NULL and has room for `capacity` bytes, of which
         // there are no more than that; nothing else uses it.
         let reply = unsafe { core::slice::from_raw_parts_mut(inside.reply, bytes.len()) };
-        if cfg!(target_endian = "big") || !inside.ticket.outline.takes_words() {
+        if inside.ticket.outline.takes_words() {
+            copy_words(reply, bytes);
+        } else {
             reply.copy_from_slice(bytes);
-            return;
-        }
-        let (words, places) = (bytes.as_chunks().0, reply.as_chunks_mut().0);
-        let native = |word| u16::from_be_bytes(word).to_ne_bytes();
-        // Eight at a time; the last eight may overlap the ones before.
-        for (place, eight) in places
-            .as_chunks_mut::<8>()
-            .0
-            .iter_mut()
-            .zip(words.as_chunks().0)
-        {
-            *place = eight.map(native);
-        }
-        match (places.last_chunk_mut(), words.last_chunk::<8>()) {
-            (Some(place), Some(eight)) => *place = eight.map(native),
-            _ => {
-                for (place, word) in places.iter_mut().zip(words) {
-                    *place = native(*word);
-                }
-            }
         }
     }
 

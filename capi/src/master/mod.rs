@@ -237,6 +237,16 @@ pub unsafe extern "C" fn mbm_master_setBuffers(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_poll(master: *mut mbm_master) -> u8 {
     // SAFETY: as the header demands.
+    unsafe { poll(master) }
+}
+
+/// As [`mbm_master_poll`].
+///
+/// # Safety
+/// As for [`pointers::with`].
+#[cfg_attr(not(target_os = "none"), inline(always))]
+unsafe extern "C" fn poll(master: *mut mbm_master) -> u8 {
+    // SAFETY: as the caller promises.
     unsafe {
         match pointers::check(master) {
             Status::OK => calling(master, Core::poll),
@@ -330,16 +340,17 @@ unsafe fn request(pointer: *mut mbm_master, start: impl FnOnce(&mut Core) -> Sta
 ///
 /// # Safety
 /// As for [`pointers::with`]; the status is what that master said last.
+#[inline(never)]
 unsafe fn finish(pointer: *mut mbm_master, mut status: u8) -> u8 {
     if status != Status::PENDING.code() {
         return status;
     }
     // SAFETY: pending, so begun. No reference lives while the hook is called,
-    // for the hook may use the object, which mbm_master_poll looks at anew.
+    // for the hook may use the object, which `poll` looks at anew.
     unsafe {
         let blocking = !(*pointer.cast::<Object>()).non_blocking;
         while blocking && status == Status::PENDING.code() {
-            status = mbm_master_poll(pointer);
+            status = poll(pointer);
             let core = Object::core_of(pointer);
             if (*core).is_waiting() {
                 PortRef::idle((*core).port(), pointer);

@@ -1,9 +1,9 @@
 //! Functions that the caller defines, and functions switched off.
 
-use super::records::Serve;
-use super::units::{add, add_first, is_unheard, request, Places};
+use super::records::{is_custom, mbm_custom, mbm_request, CUSTOM};
+use super::units::{add_as, add_first, is_unheard, request, Places};
 use super::{mbm_service, mbm_unit};
-use crate::functions::{self, mbm_rule};
+use crate::functions;
 use core::ffi::c_void;
 use mbm::error::Status;
 use mbm::pdu::custom::Rule;
@@ -17,49 +17,6 @@ pub const MBM_REPLY_NONE: u16 = 0x0200;
 /// What a function of yours returns to be asked again at the next poll, with the
 /// same request. The server hears nothing meanwhile.
 pub const MBM_REPLY_PENDING: u16 = 0x0300;
-
-/// A request for a function of yours.
-#[repr(C)]
-pub struct mbm_request {
-    /// What stands behind the function code.
-    pub data: *const u8,
-    /// Bytes of it, 0 to 252.
-    pub length: u16,
-    /// The unit that it was sent to; on a serial line 0 is broadcast, whose
-    /// response nobody will see.
-    pub unit: u8,
-    /// The function code.
-    pub function: u8,
-}
-
-/// A function of yours. Zero it, set what you need, and hand it to
-/// mbm_server_serveCustom.
-#[repr(C)]
-pub struct mbm_custom {
-    /// Not for you.
-    pub service: mbm_service,
-    /// Carries out a request and writes the data of the response, which stand
-    /// behind the function code, to `response`. `capacity` is what the frame
-    /// buffer has left behind the request, at most 252 of it are used. Returns
-    /// how many bytes it wrote, or MBM_REPLY_EXCEPTION | code, MBM_REPLY_NONE or
-    /// MBM_REPLY_PENDING.
-    pub serve: Option<
-        unsafe extern "C" fn(
-            context: *mut c_void,
-            request: *const mbm_request,
-            response: *mut u8,
-            capacity: u16,
-        ) -> u16,
-    >,
-    /// Handed to `serve`. Yours, may be NULL.
-    pub context: *mut c_void,
-    /// The function code, 1 to 127; 0 is every function that nothing before it
-    /// serves. 65 to 72 and 100 to 110 are left to users (V1.1b3, 5).
-    pub code: u8,
-    /// How long its request PDUs are, which RTU over TCP asks. Zeroed, a request is
-    /// whole once its CRC is right.
-    pub length: mbm_rule,
-}
 
 /// Functions that a unit answers with exception 01, though it could serve them:
 /// see mbm_server_switchOff.
@@ -135,13 +92,9 @@ unsafe fn serve_mine(record: *mut mbm_custom, pdu: *mut u8, heading: *const c_vo
 /// # Safety
 /// `service` is the head of a record of any kind.
 unsafe fn declared(service: *const mbm_service, function: u8) -> Option<Rule> {
-    // SAFETY: as the caller promises; a record that this file serves is a
-    // function of C.
+    // SAFETY: as the caller promises; what this file serves is a function of C.
     unsafe {
-        if !(*service)
-            .serve
-            .is_some_and(|other| core::ptr::fn_addr_eq(other, serve as Serve))
-        {
+        if !is_custom(service) {
             return None;
         }
         let record = service.cast::<mbm_custom>();
@@ -191,7 +144,7 @@ pub unsafe extern "C" fn mbm_server_serveCustom(
         {
             return Status::INVALID_ARGUMENT.code();
         }
-        add(unit, custom.cast(), serve)
+        add_as(unit, custom.cast(), CUSTOM, serve).code()
     }
 }
 

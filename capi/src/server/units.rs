@@ -1,6 +1,6 @@
 //! Units and their services.
 
-use super::records::{mbm_diagnostics, mbm_service, Serve};
+use super::records::{is_custom, is_of_another, mbm_diagnostics, mbm_service, Serve};
 use core::ffi::c_void;
 use core::mem::offset_of;
 use core::slice::{from_raw_parts, from_raw_parts_mut};
@@ -176,14 +176,51 @@ unsafe fn walk_alone(unit: *mut mbm_unit, heading: *const c_void, pdu: *mut u8) 
             .byte_add(offset_of!(mbm_unit, services))
             .cast::<*mut mbm_service>();
         while !(*place).is_null() {
-            let reply = ask(*place, heading, pdu);
+            let service = *place;
+            let reply = ask(service, heading, pdu);
             if reply != Reply::NOT_MINE.code() {
                 return reply;
             }
             place = place.add(1);
+            // Where one function of the user's stands, there are often more.
+            if !FIRMWARE && is_custom(service) {
+                place = pass(unit, place, *pdu);
+            }
         }
     }
     Reply::ILLEGAL_FUNCTION.code()
+}
+
+/// The first place from this one on that has no function of the user's of another code.
+/// A host calls none of these, and looks at four at a time.
+///
+/// # Safety
+/// `place` is one of the unit's, or the end of them, behind which is NULL.
+#[inline(never)]
+unsafe fn pass(
+    unit: *const mbm_unit,
+    mut place: *mut *mut mbm_service,
+    function: u8,
+) -> *mut *mut mbm_service {
+    // SAFETY: as the caller promises; where the fourth place from here on has a record, so
+    // have those before it.
+    unsafe {
+        let is_passed = |place: *mut *mut mbm_service| is_of_another(*place, function);
+        let last = unit
+            .byte_add(offset_of!(mbm_unit, services))
+            .cast::<*mut mbm_service>()
+            .add(MBM_MAX_SERVICES as usize - 4);
+        while place.cast_const() <= last
+            && !(*place.add(3)).is_null()
+            && (0..4).all(|index| is_passed(place.add(index)))
+        {
+            place = place.add(4);
+        }
+        while !(*place).is_null() && is_passed(place) {
+            place = place.add(1);
+        }
+    }
+    place
 }
 
 const _: () = {

@@ -18,6 +18,7 @@ use mbm::FIRMWARE;
 
 /// What a function of C is called with: the form of its request, and its arguments
 /// behind client and request, which are the words in the head of its PDU.
+#[derive(Clone, Copy)]
 struct Arguments {
     form: Form,
     words: [usize; 4],
@@ -121,11 +122,14 @@ unsafe extern "C" fn queue(
 ) -> u8 {
     // SAFETY: as the caller promises; no client has it, or it is prepared.
     unsafe {
-        if !FIRMWARE && is_free(client, request) {
-            submit(client, request, arguments, more).code()
-        } else {
-            queue_unknown(client, request, arguments, more)
+        if FIRMWARE {
+            return queue_unknown(client, request, arguments, more);
         }
+        if is_free(client, request) {
+            return submit(client, request, arguments, more).code();
+        }
+        // A copy, which only this way has in memory.
+        queue_unknown(client, request, &{ *arguments }, more)
     }
 }
 
