@@ -82,10 +82,35 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, sy
 	@! grep -rn 'target_os' src | grep -v 'cfg_attr\|mbm_firmware' # else no test runs that code
 	@echo "check: formatting, lints, layers, header and symbols are in order"
 
+# --- tests. What compiles and what only waits run side by side.
+
+# One more than there are processors: the tests in Rust wait for peers.
+JOBS ?= $(shell echo $$(($$(nproc) + 1)))
+BUILDS := plain sanitized firmware valgrind
+# Valgrind's first, which take the longest.
+PROGRAMS = $(foreach build,$(filter valgrind,$(BUILDS)) $(filter-out valgrind,$(BUILDS)),$(TESTS:%=$(BUILD)/$(build)/%))
+
 .PHONY: test
 test: need-test ## Every test: Rust, C and C++; sanitizers and valgrind
-	@$(MAKE) --no-print-directory venv tests
-	@CARGO="$(CARGO)" scripts/test $(TESTS)
+	@rm -rf $(BUILD)/tests
+	@$(MAKE) --no-print-directory --keep-going -j$(JOBS) build-rust test-rust test-rust-firmware run-c-tests; scripts/test-totals
+
+.PHONY: test-c
+test-c: need-test ## C and C++ alone: TESTS="test_ring test_bits" BUILDS="plain valgrind" TEST=one_test
+	@$(MAKE) --no-print-directory -j$(JOBS) run-c-tests
+
+.PHONY: build-rust test-rust test-rust-firmware run-c-tests
+build-rust:
+	+@CARGO="$(CARGO)" scripts/test-rust --build
+test-rust: build-rust $(BUILD)/plain/serve venv ## Rust alone; `cargo test NAME` runs the tests of that name
+	+@CARGO="$(CARGO)" scripts/test-rust rust
+test-rust-firmware: build-rust $(BUILD)/plain/serve venv ## Rust alone, the code that only firmware runs
+	+@CARGO="$(CARGO)" scripts/test-rust rust-firmware
+# What the tests find of a bad wire is the committed table.
+run-c-tests: $(PROGRAMS)
+	@mkdir -p $(BUILD)/tests
+	@MBM_TEST="$(TEST)" scripts/run-c-tests $(PROGRAMS) >$(BUILD)/tests/c.txt; code=$$?; cat $(BUILD)/tests/c.txt; \
+	tail -n 1 $(BUILD)/tests/c.txt >$(BUILD)/tests/c.total; exit $$code
 
 .PHONY: venv
 venv: ## The Python environment with the peers of tests/peer, build/venv
@@ -118,14 +143,15 @@ model: ## Try every order of events around a request for MODEL_SECONDS (300)
 .PHONY: fault-table
 fault-table: need-test ## Write docs/fault-table.md from what the test finds
 	@$(MAKE) --no-print-directory $(BUILD)/plain/test_bad_wire
-	@MBM_FAULT_TABLE=$(BUILD)/fault-table.rows scripts/run-c-tests "" $(BUILD)/plain/test_bad_wire
+	@scripts/run-c-tests $(BUILD)/plain/test_bad_wire
 	@scripts/fault-table
 
 .PHONY: need-check need-test
 need-check:
 	@scripts/need gcc g++ clang gcc-avr avr-libc libc6-dev binutils doxygen
 need-test:
-	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind mbpoll
+	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev \
+		perl valgrind mbpoll
 
 # The test programs, one folder a variant: $(1) name, $(2) C, $(3) C++, $(4) flags
 define variant
@@ -164,8 +190,10 @@ SERVE := $(BUILD)/plain/serve
 $(SERVE): $(patsubst %,$(BUILD)/plain/%.o,serve support/served support/pty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lpthread -o $@
 
-.PHONY: tests
-tests: $(TESTS:%=$(BUILD)/plain/%) $(TESTS:%=$(BUILD)/sanitized/%) $(FIRMWARE_TESTS) $(SERVE)
+# The programs of the variant `plain` again, which scripts/run-test runs in valgrind.
+$(TESTS:%=$(BUILD)/valgrind/%): $(BUILD)/valgrind/%: $(BUILD)/plain/%
+	@mkdir -p $(@D)
+	@ln -sfn ../plain/$* $@
 
 # The same flags as the peer's package is built with.
 $(eval $(call variant,bench,gcc,g++,-O2))
