@@ -1,6 +1,7 @@
 # mbm: `make help` lists what there is.
 
 CARGO ?= cargo
+comma := ,
 BUILD := build
 ARCHIVE := target/release/libmbm.a
 # The same, with the code that only firmware runs.
@@ -19,6 +20,8 @@ TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
 # Examples that a test named after each drives.
 TESTED_EXAMPLES := custom_command gateway
+# What clang-format formats. The headers in include/ are documentation too, laid out by hand.
+C_SOURCES = $(shell git ls-files 'c-tests/*.[ch]' 'c-tests/*.cpp' 'examples/*.[ch]' 'firmware-tests/*.[ch]')
 HEADERS := $(wildcard include/*.h c-tests/*.h c-tests/support/*.h c-tests/shim/* examples/linux/*.h)
 
 .PHONY: help
@@ -59,9 +62,13 @@ check-install: $(ARCHIVE) ## Installs, builds and runs the README's program; pac
 size: ## Flash and RAM that the library adds, and what changed since docs/size.md
 	@scripts/size
 
+# The crate with the C functions.
+CAPI := $(firstword $(wildcard capi) .)
+CBINDGEN = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen 0.29.4) && \
+           "$$tool" --quiet --config cbindgen.toml --output include/mbm.h $(CAPI)
 .PHONY: header
 header: ## Write include/mbm.h anew from the source
-	@$(CARGO) run --quiet -p mbm-tools --bin header
+	@$(CBINDGEN) && echo "include/mbm.h is that of the source"
 
 .PHONY: check
 check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, symbols
@@ -73,10 +80,13 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, header, functions, sy
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps
 	@$(CARGO) test --quiet -p mbm-tools >/dev/null
 	@$(CARGO) run --quiet -p mbm-tools --bin layers
-	@$(CARGO) run --quiet -p mbm-tools --bin header -- --check
+	@$(CBINDGEN) --verify || { echo "check: run \`make header\` and commit include/mbm.h" >&2; exit 1; }
+	@scripts/abi --check
+	@clang-format --dry-run --Werror $(C_SOURCES)
 	@scripts/check-header
 	@scripts/check-docs
 	@scripts/check-functions
+	@scripts/check-packages
 	@$(MAKE) --no-print-directory check-readme
 	@scripts/check-symbols $(ARCHIVE)
 	@! grep -rn 'target_os' src | grep -v 'cfg_attr\|mbm_firmware' # else no test runs that code
@@ -89,6 +99,37 @@ JOBS ?= $(shell echo $$(($$(nproc) + 1)))
 BUILDS := plain sanitized firmware valgrind
 # Valgrind's first, which take the longest.
 PROGRAMS = $(foreach build,$(filter valgrind,$(BUILDS)) $(filter-out valgrind,$(BUILDS)),$(TESTS:%=$(BUILD)/$(build)/%))
+
+.PHONY: format
+format: ## Format Rust, C and C++ as `make check` wants it
+	@scripts/need clang-format
+	@$(CARGO) fmt --all
+	@for crate in fuzz bench model; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml || exit 1; done
+	@clang-format -i $(C_SOURCES)
+
+.PHONY: abi
+abi: ## Write packaging/mbm.abi anew, the interface that `make check` compares
+	@scripts/need gcc libc6-dev abigail-tools
+	@scripts/abi
+
+.PHONY: compile-commands
+compile-commands: ## Write compile_commands.json, for editors and clang-tidy
+	@scripts/need gcc g++ libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind
+	@$(MAKE) --no-print-directory --dry-run --always-make $(TESTS:%=$(BUILD)/plain/%) $(SERVE) $(PEERS) \
+		$(TESTED_EXAMPLES:%=$(BUILD)/plain/linux/%) $(CLIENTS) $(DEMO) $(SNIFF) $(BUILD)/plain/linux/basic | scripts/compile-commands
+
+.PHONY: tidy
+tidy: compile-commands ## What clang-tidy finds in C and C++; the checks are in .clang-tidy
+	@scripts/need clang-tidy
+	@sed -n 's/.*"file": "\([^"]*\)".*/\1/p' compile_commands.json | \
+		xargs -P "$$(nproc)" -n 1 clang-tidy --quiet 2>/dev/null || { echo "tidy: see above" >&2; exit 1; }
+	@echo "tidy: nothing found"
+
+DENY = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cargo-deny 0.20.2 --no-default-features)
+.PHONY: deny
+deny: ## Licences and origin of all crates, by cargo-deny; the rules are in deny.toml
+	@$(DENY) && for lock in . fuzz bench model; do \
+		"$$tool" --workspace --manifest-path $$lock/Cargo.toml check --hide-inclusion-graph licenses bans sources || exit 1; done
 
 .PHONY: test
 test: need-test ## Every test: Rust, C and C++; sanitizers and valgrind
@@ -111,6 +152,15 @@ run-c-tests: $(PROGRAMS)
 	@mkdir -p $(BUILD)/tests
 	@MBM_TEST="$(TEST)" scripts/run-c-tests $(PROGRAMS) >$(BUILD)/tests/c.txt; code=$$?; cat $(BUILD)/tests/c.txt; \
 	tail -n 1 $(BUILD)/tests/c.txt >$(BUILD)/tests/c.total; exit $$code
+
+.PHONY: coverage
+coverage: need-test ## Which lines the tests run, Rust and C, into docs/reports/coverage.md
+	@scripts/need llvm-22
+	@$(MAKE) --no-print-directory venv $(BUILD)/plain/serve
+	@CARGO="$(CARGO)" JOBS="$(JOBS)" scripts/coverage
+.PHONY: coverage-tests
+coverage-tests: $(TESTS:%=$(BUILD)/coverage/%)
+	@scripts/run-c-tests $^
 
 .PHONY: venv
 venv: ## The Python environment with the peers of tests/peer, build/venv
@@ -148,12 +198,12 @@ fault-table: need-test ## Write docs/fault-table.md from what the test finds
 
 .PHONY: need-check need-test
 need-check:
-	@scripts/need gcc g++ clang gcc-avr avr-libc libc6-dev binutils doxygen
+	@scripts/need gcc g++ clang gcc-avr avr-libc libc6-dev binutils doxygen clang-format abigail-tools
 need-test:
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev \
 		perl valgrind mbpoll
 
-# The test programs, one folder a variant: $(1) name, $(2) C, $(3) C++, $(4) flags
+# The test programs, one folder a variant: $(1) name, $(2) C, $(3) C++, $(4) flags, $(5) archive
 define variant
 $(BUILD)/$(1)/%.o: c-tests/%.c $(HEADERS)
 	@mkdir -p $$(@D)
@@ -164,15 +214,17 @@ $(BUILD)/$(1)/%.o: c-tests/%.cpp $(HEADERS)
 $(BUILD)/$(1)/%.o: examples/%.c $(HEADERS)
 	@mkdir -p $$(@D)
 	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
-$(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(ARCHIVE)
-	@$(3) $(4) $$(filter %.o,$$^) $(ARCHIVE) $(LIBS) -o $$@
-$(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(ARCHIVE)
-	@$(2) $(4) $$(filter %.o,$$^) $(ARCHIVE) -Wl,--gc-sections -o $$@
+$(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(or $(5),$(ARCHIVE))
+	@$(3) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $(LIBS) -o $$@
+$(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(or $(5),$(ARCHIVE))
+	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)/linux/%
 $(BUILD)/$(1)/test_gateway_replies $(BUILD)/$(1)/test_gateway_shortage: | $(BUILD)/$(1)/linux/gateway
 endef
 $(eval $(call variant,plain,gcc,g++,))
 $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS)))
+# scripts/coverage makes the archive first, with counters in it.
+$(eval $(call variant,coverage,gcc,g++,--coverage -Wl$(comma)-u$(comma)__llvm_profile_runtime,$(BUILD)/coverage/libmbm.a))
 .SECONDARY:
 
 # The programs of the variant `plain`, linked with the code that firmware runs.
