@@ -223,8 +223,10 @@ $(BUILD)/$(1)/test_gateway_replies $(BUILD)/$(1)/test_gateway_shortage: | $(BUIL
 endef
 $(eval $(call variant,plain,gcc,g++,))
 $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS)))
-# scripts/coverage makes the archive first, with counters in it.
-$(eval $(call variant,coverage,gcc,g++,--coverage -Wl$(comma)-u$(comma)__llvm_profile_runtime,$(BUILD)/coverage/libmbm.a))
+# scripts/coverage makes the archive first, with counters in it. It is not trimmed: nothing calls
+# the name that its unwind tables want.
+COUNTERS := --coverage -Wl$(comma)-u$(comma)__llvm_profile_runtime -Wl$(comma)--defsym$(comma)rust_eh_personality=0
+$(eval $(call variant,coverage,gcc,g++,$(COUNTERS),$(BUILD)/coverage/libmbm.a))
 .SECONDARY:
 
 # The programs of the variant `plain`, linked with the code that firmware runs.
