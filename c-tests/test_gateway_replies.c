@@ -137,8 +137,12 @@ typedef struct late {
 } late;
 
 #define LATE(request, reply, other, other_reply)                                                   \
-    {request, reply, other, other_reply, {sizeof request - 1, sizeof reply - 1, sizeof other - 1,  \
-                                          sizeof other_reply - 1}}
+    {                                                                                              \
+        request, reply, other, other_reply,                                                        \
+        {                                                                                          \
+            sizeof request - 1, sizeof reply - 1, sizeof other - 1, sizeof other_reply - 1         \
+        }                                                                                          \
+    }
 
 static void a_late_reply_to_one_client_does_not_reach_another(void **state)
 {
@@ -191,11 +195,11 @@ static void a_late_reply_to_one_client_does_not_reach_another(void **state)
 static void a_reply_that_does_not_answer_the_request_is_0b(void **state)
 {
     static const char *const no_answers[][2] = {
-        {"\x03\x00\x64\x00\x03", "\x03\x02\x12\x34"},             /* one register of three */
+        {"\x03\x00\x64\x00\x03", "\x03\x02\x12\x34"},                 /* one register of three */
         {"\x03\x00\x64\x00\x01", "\x03\x06\x11\x11\x22\x22\x33\x33"}, /* three for one */
-        {"\x01\x00\x64\x00\x09", "\x01\x01\xFF"},                 /* nine coils in one byte */
-        {"\x05\x00\x64\xFF\x00", "\x05\x00\x64\x00\x00"},         /* another value */
-        {"\x06\x00\x64\x12\x34", "\x06\x00\x65\x12\x34"},         /* another address */
+        {"\x01\x00\x64\x00\x09", "\x01\x01\xFF"},                     /* nine coils in one byte */
+        {"\x05\x00\x64\xFF\x00", "\x05\x00\x64\x00\x00"},             /* another value */
+        {"\x06\x00\x64\x12\x34", "\x06\x00\x65\x12\x34"},             /* another address */
     };
     static const uint8_t lengths[][2] = {{5, 4}, {5, 8}, {5, 3}, {5, 5}, {5, 5}};
     gateway g;
