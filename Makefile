@@ -141,7 +141,7 @@ test-c: need-test ## C and C++ alone: TESTS="test_ring test_bits" BUILDS="plain 
 	@$(MAKE) --no-print-directory -j$(JOBS) run-c-tests
 
 .PHONY: build-rust test-rust test-rust-firmware run-c-tests
-build-rust:
+build-rust: need-test
 	+@CARGO="$(CARGO)" scripts/test-rust --build
 test-rust: build-rust $(BUILD)/plain/serve venv ## Rust alone; `cargo test NAME` runs the tests of that name
 	+@CARGO="$(CARGO)" scripts/test-rust rust
