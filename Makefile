@@ -1,6 +1,7 @@
 # mbm: `make help` lists what there is.
 
 CARGO ?= cargo
+comma := ,
 BUILD := build
 ARCHIVE := target/release/libmbm.a
 # The same, with the code that only firmware runs.
@@ -19,6 +20,8 @@ TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
 # Examples that a test named after each drives.
 TESTED_EXAMPLES := custom_command gateway
+# What clang-format formats. The headers in include/ are documentation too, laid out by hand.
+C_SOURCES = $(shell git ls-files 'c-tests/*.[ch]' 'c-tests/*.cpp' 'examples/*.[ch]' 'firmware-tests/*.[ch]')
 HEADERS := $(wildcard include/*.h c-tests/*.h c-tests/support/*.h c-tests/shim/* examples/linux/*.h)
 
 .PHONY: help
@@ -59,9 +62,13 @@ check-install: $(ARCHIVE) ## Installs, builds and runs the README's program; pac
 size: ## Flash and RAM that the library adds, and what changed since docs/reports/size.md
 	@scripts/size
 
+# The crate with the C functions.
+CAPI := $(firstword $(wildcard capi) .)
+CBINDGEN = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen 0.29.4) && \
+           "$$tool" --quiet --config cbindgen.toml --output include/mbm.h $(CAPI)
 .PHONY: header
 header: ## Write include/mbm.h anew from the source
-	@$(CARGO) run --quiet -p mbm-tools --bin header
+	@$(CBINDGEN) && echo "include/mbm.h is that of the source"
 
 .PHONY: check
 check: need-check $(ARCHIVE) ## Formatting, lints, layers, circles, header, functions, symbols
@@ -74,19 +81,87 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, circles, header, func
 	@$(CARGO) test --quiet -p mbm-tools >/dev/null
 	@$(CARGO) run --quiet -p mbm-tools --bin layers
 	@$(CARGO) run --quiet -p mbm-tools --bin circles
-	@$(CARGO) run --quiet -p mbm-tools --bin header -- --check
+	@$(CBINDGEN) --verify || { echo "check: run \`make header\` and commit include/mbm.h" >&2; exit 1; }
+	@scripts/abi --check
+	@clang-format --dry-run --Werror $(C_SOURCES)
 	@scripts/check-header
 	@scripts/check-docs
 	@scripts/check-functions
+	@scripts/check-packages
 	@$(MAKE) --no-print-directory check-pages
 	@scripts/check-symbols $(ARCHIVE)
 	@! grep -rn 'target_os' src capi | grep -v 'cfg_attr\|mbm_firmware' # else no test runs that code
 	@echo "check: formatting, lints, layers, header and symbols are in order"
 
+# --- tests. What compiles and what only waits run side by side.
+
+# One more than there are processors: the tests in Rust wait for peers.
+JOBS ?= $(shell echo $$(($$(nproc) + 1)))
+BUILDS := plain sanitized firmware valgrind
+# Valgrind's first, which take the longest.
+PROGRAMS = $(foreach build,$(filter valgrind,$(BUILDS)) $(filter-out valgrind,$(BUILDS)),$(TESTS:%=$(BUILD)/$(build)/%))
+
+.PHONY: format
+format: ## Format Rust, C and C++ as `make check` wants it
+	@scripts/need clang-format
+	@$(CARGO) fmt --all
+	@for crate in fuzz bench model; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml || exit 1; done
+	@clang-format -i $(C_SOURCES)
+
+.PHONY: abi
+abi: ## Write packaging/mbm.abi anew, the interface that `make check` compares
+	@scripts/need gcc libc6-dev abigail-tools
+	@scripts/abi
+
+.PHONY: compile-commands
+compile-commands: ## Write compile_commands.json, for editors and clang-tidy
+	@scripts/need gcc g++ libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind
+	@$(MAKE) --no-print-directory --dry-run --always-make $(TESTS:%=$(BUILD)/plain/%) $(SERVE) $(PEERS) \
+		$(TESTED_EXAMPLES:%=$(BUILD)/plain/linux/%) $(CLIENTS) $(DEMO) $(SNIFF) $(BUILD)/plain/linux/basic | scripts/compile-commands
+
+.PHONY: tidy
+tidy: compile-commands ## What clang-tidy finds in C and C++; the checks are in .clang-tidy
+	@scripts/need clang-tidy
+	@sed -n 's/.*"file": "\([^"]*\)".*/\1/p' compile_commands.json | \
+		xargs -P "$$(nproc)" -n 1 clang-tidy --quiet 2>/dev/null || { echo "tidy: see above" >&2; exit 1; }
+	@echo "tidy: nothing found"
+
+DENY = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cargo-deny 0.20.2 --no-default-features)
+.PHONY: deny
+deny: ## Licences and origin of all crates, by cargo-deny; the rules are in deny.toml
+	@$(DENY) && for lock in . fuzz bench model; do \
+		"$$tool" --workspace --manifest-path $$lock/Cargo.toml check --hide-inclusion-graph licenses bans sources || exit 1; done
+
 .PHONY: test
 test: need-test ## Every test: Rust, C and C++; sanitizers and valgrind
-	@$(MAKE) --no-print-directory venv tests
-	@CARGO="$(CARGO)" scripts/test $(TESTS)
+	@rm -rf $(BUILD)/tests
+	@$(MAKE) --no-print-directory --keep-going -j$(JOBS) build-rust test-rust test-rust-firmware run-c-tests; scripts/test-totals
+
+.PHONY: test-c
+test-c: need-test ## C and C++ alone: TESTS="test_ring test_bits" BUILDS="plain valgrind" TEST=one_test
+	@$(MAKE) --no-print-directory -j$(JOBS) run-c-tests
+
+.PHONY: build-rust test-rust test-rust-firmware run-c-tests
+build-rust: need-test
+	+@CARGO="$(CARGO)" scripts/test-rust --build
+test-rust: build-rust $(BUILD)/plain/serve venv ## Rust alone; `cargo test NAME` runs the tests of that name
+	+@CARGO="$(CARGO)" scripts/test-rust rust
+test-rust-firmware: build-rust $(BUILD)/plain/serve venv ## Rust alone, the code that only firmware runs
+	+@CARGO="$(CARGO)" scripts/test-rust rust-firmware
+# What the tests find of a bad wire is the committed table.
+run-c-tests: $(PROGRAMS)
+	@mkdir -p $(BUILD)/tests
+	@MBM_TEST="$(TEST)" scripts/run-c-tests $(PROGRAMS) >$(BUILD)/tests/c.txt; code=$$?; cat $(BUILD)/tests/c.txt; \
+	tail -n 1 $(BUILD)/tests/c.txt >$(BUILD)/tests/c.total; exit $$code
+
+.PHONY: coverage
+coverage: need-test ## Which lines the tests run, Rust and C, into docs/reports/coverage.md
+	@scripts/need llvm-22
+	@$(MAKE) --no-print-directory venv $(BUILD)/plain/serve
+	@CARGO="$(CARGO)" JOBS="$(JOBS)" scripts/coverage
+.PHONY: coverage-tests
+coverage-tests: $(TESTS:%=$(BUILD)/coverage/%)
+	@scripts/run-c-tests $^
 
 .PHONY: venv
 venv: ## The Python environment with the peers of tests/peer, build/venv
@@ -119,16 +194,17 @@ model: ## Try every order of events around a request for MODEL_SECONDS (300)
 .PHONY: fault-table
 fault-table: need-test ## Write docs/reports/fault-table.md from what the test finds
 	@$(MAKE) --no-print-directory $(BUILD)/plain/test_bad_wire
-	@MBM_FAULT_TABLE=$(BUILD)/fault-table.rows scripts/run-c-tests "" $(BUILD)/plain/test_bad_wire
+	@scripts/run-c-tests $(BUILD)/plain/test_bad_wire
 	@scripts/fault-table
 
 .PHONY: need-check need-test
 need-check:
-	@scripts/need gcc g++ clang gcc-avr avr-libc libc6-dev binutils doxygen
+	@scripts/need gcc g++ clang gcc-avr avr-libc libc6-dev binutils doxygen clang-format abigail-tools
 need-test:
-	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind mbpoll
+	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev \
+		perl valgrind mbpoll
 
-# The test programs, one folder a variant: $(1) name, $(2) C, $(3) C++, $(4) flags
+# The test programs, one folder a variant: $(1) name, $(2) C, $(3) C++, $(4) flags, $(5) archive
 define variant
 $(BUILD)/$(1)/%.o: c-tests/%.c $(HEADERS)
 	@mkdir -p $$(@D)
@@ -139,15 +215,19 @@ $(BUILD)/$(1)/%.o: c-tests/%.cpp $(HEADERS)
 $(BUILD)/$(1)/%.o: examples/%.c $(HEADERS)
 	@mkdir -p $$(@D)
 	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
-$(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(ARCHIVE)
-	@$(3) $(4) $$(filter %.o,$$^) $(ARCHIVE) $(LIBS) -o $$@
-$(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(ARCHIVE)
-	@$(2) $(4) $$(filter %.o,$$^) $(ARCHIVE) -Wl,--gc-sections -o $$@
+$(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(or $(5),$(ARCHIVE))
+	@$(3) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $(LIBS) -o $$@
+$(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(or $(5),$(ARCHIVE))
+	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)/linux/%
 $(BUILD)/$(1)/test_gateway_replies $(BUILD)/$(1)/test_gateway_shortage: | $(BUILD)/$(1)/linux/gateway
 endef
 $(eval $(call variant,plain,gcc,g++,))
 $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS)))
+# scripts/coverage makes the archive first, with counters in it. It is not trimmed: nothing calls
+# the name that its unwind tables want.
+COUNTERS := --coverage -Wl$(comma)-u$(comma)__llvm_profile_runtime -Wl$(comma)--defsym$(comma)rust_eh_personality=0
+$(eval $(call variant,coverage,gcc,g++,$(COUNTERS),$(BUILD)/coverage/libmbm.a))
 .SECONDARY:
 
 # The programs of the variant `plain`, linked with the code that firmware runs.
@@ -165,8 +245,10 @@ SERVE := $(BUILD)/plain/serve
 $(SERVE): $(patsubst %,$(BUILD)/plain/%.o,serve support/served support/pty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lpthread -o $@
 
-.PHONY: tests
-tests: $(TESTS:%=$(BUILD)/plain/%) $(TESTS:%=$(BUILD)/sanitized/%) $(FIRMWARE_TESTS) $(SERVE)
+# The programs of the variant `plain` again, which scripts/run-test runs in valgrind.
+$(TESTS:%=$(BUILD)/valgrind/%): $(BUILD)/valgrind/%: $(BUILD)/plain/%
+	@mkdir -p $(@D)
+	@ln -sfn ../plain/$* $@
 
 # The same flags as the peer's package is built with.
 $(eval $(call variant,bench,gcc,g++,-O2))

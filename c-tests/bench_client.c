@@ -132,7 +132,7 @@ typedef struct bench {
     mbm_tcp tcp;
     mbm_tty tty;
     modbus_t *peer;
-    int fd;                           /* of the pty */
+    int fd; /* of the pty */
     unsigned flight;
     unsigned long to_queue, to_end, wrong;
 } bench;

@@ -129,9 +129,8 @@ static int sockets[MANY];
 
 static int connect_to(uint16_t port)
 {
-    struct sockaddr_in address = {.sin_family = AF_INET,
-                                  .sin_addr = {htonl(INADDR_LOOPBACK)},
-                                  .sin_port = htons(port)};
+    struct sockaddr_in address = {
+        .sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}, .sin_port = htons(port)};
     int fd = socket(AF_INET, SOCK_STREAM, 0);
 
     if (fd < 0 || connect(fd, (struct sockaddr *)&address, sizeof address) != 0)
@@ -170,8 +169,7 @@ static void count_rounds(const char *name, int is_mbm, int connections, int aski
     }
     for (round = 0; round < COUNTED; round++) {
         for (i = 0; i < asking; i++)
-            if (write(sockets[i * connections / asking], request, sizeof request) !=
-                sizeof request)
+            if (write(sockets[i * connections / asking], request, sizeof request) != sizeof request)
                 fail("write");
         CALLGRIND_TOGGLE_COLLECT;
         if (is_mbm)

@@ -165,8 +165,9 @@ static void count(const char *name, const char *how, uint8_t kind, size_t piece,
         (wanted && (seen.of_kind[MBM_EVENT_REQUEST] != wanted ||
                     seen.of_kind[MBM_EVENT_REPLY] + seen.of_kind[MBM_EVENT_BAD_CRC] != wanted ||
                     seen.of_kind[MBM_EVENT_BAD_CRC] != damaged))) {
-        fprintf(stderr, "bench_sniffer: %s: %u requests, %u replies, %u damaged, %zu of %zu bytes\n",
-                title, seen.of_kind[MBM_EVENT_REQUEST], seen.of_kind[MBM_EVENT_REPLY],
+        fprintf(stderr,
+                "bench_sniffer: %s: %u requests, %u replies, %u damaged, %zu of %zu bytes\n", title,
+                seen.of_kind[MBM_EVENT_REQUEST], seen.of_kind[MBM_EVENT_REPLY],
                 seen.of_kind[MBM_EVENT_BAD_CRC], seen.told, bus.length);
         exit(1);
     }

@@ -29,7 +29,8 @@ int main(void)
     printf("ready %s %u\n", line.path, tcp.port);
     fflush(stdout);
     for (;;) {
-        struct pollfd waits[] = {{0, POLLIN, 0}, {line.ours, POLLIN, 0}, {rtu.line.ours, POLLIN, 0}};
+        struct pollfd waits[] = {
+            {0, POLLIN, 0}, {line.ours, POLLIN, 0}, {rtu.line.ours, POLLIN, 0}};
 
         poll(waits, 3, -1);
         if (waits[0].revents)

@@ -18,7 +18,8 @@ static char transact(node *n, const fault *f, unsigned number, uint8_t *status)
         *status = mbm_master_writeSingleRegister(&n->master, (uint16_t)number, (uint16_t)~number);
         return *status == MBM_OK ? '.' : 'F';
     }
-    *status = mbm_master_readHoldingRegisters(&n->master, (uint16_t)(100 * number), FAULT_REGISTERS);
+    *status =
+        mbm_master_readHoldingRegisters(&n->master, (uint16_t)(100 * number), FAULT_REGISTERS);
     if (*status != MBM_OK)
         return 'F';
     for (i = 0; i < FAULT_REGISTERS; i++)
@@ -73,7 +74,8 @@ static void no_row_of_the_fault_table_gets_worse(void **state)
         if (table)
             fprintf(table, "| %s | `%s` | `%s` | %s |\n", f->name, plain, retried,
                     status == MBM_OK ? "" : mbm_statusText(status));
-        if (!fault_as_good(plain, f->expected) || !fault_as_good(retried, f->retried) || status != f->status) {
+        if (!fault_as_good(plain, f->expected) || !fault_as_good(retried, f->retried) ||
+            status != f->status) {
             printf("    worse: expected %s %s %s\n", f->expected, f->retried,
                    mbm_statusText(f->status));
             worse++;

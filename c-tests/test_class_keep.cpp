@@ -301,7 +301,8 @@ static void a_copy_leaves_a_request_under_way_to_the_original(void **)
         assert_int_equal(node.poll(), ModbusMaster::ku8MBPending);
     ModbusMaster copy(node);
     assert_int_equal(copy.status(), ModbusMaster::ku8MBCancelled);
-    while (node.poll() == ModbusMaster::ku8MBPending) {}
+    while (node.poll() == ModbusMaster::ku8MBPending) {
+    }
     assert_int_equal(node.status(), 0);
     assert_int_equal(node.getResponseBuffer(0), 7);
     assert_int_equal(copy.getResponseBuffer(0), 0);

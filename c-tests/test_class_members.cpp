@@ -318,7 +318,10 @@ static void write_single_register_overwrites_word_0(void **)
     assert_sent(Serial, {1, 16, 0, 1, 0, 1, 2, 0x99, 0x88});
 }
 
-static uint8_t by_reference(const uint8_t &constant) { return constant; }
+static uint8_t by_reference(const uint8_t &constant)
+{
+    return constant;
+}
 
 static void constants_serve_as_values_labels_and_references(void **)
 {

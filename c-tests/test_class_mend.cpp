@@ -112,8 +112,13 @@ static void exceptions_are_checked(void **)
 
 static void noise_and_foreign_frames_before_the_reply_are_passed_over(void **)
 {
-    const Bytes strays[] = {raw({0}), raw({0xFF}), raw({1}), raw({1, 3}), adu({9, 3, 2, 1, 1}),
-                            adu({1, 4, 2, 1, 1}), raw({1, 0x83, 2, 9, 9})};
+    const Bytes strays[] = {raw({0}),
+                            raw({0xFF}),
+                            raw({1}),
+                            raw({1, 3}),
+                            adu({9, 3, 2, 1, 1}),
+                            adu({1, 4, 2, 1, 1}),
+                            raw({1, 0x83, 2, 9, 9})};
     ModbusMaster node;
     node.begin(1, Serial);
     node.setResponseTimeout(100);
@@ -387,7 +392,8 @@ static void a_request_may_be_polled_or_cancelled(void **)
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);
     assert_int_equal(node.status(), ModbusMaster::ku8MBPending);
-    while (node.poll() == ModbusMaster::ku8MBPending) {}
+    while (node.poll() == ModbusMaster::ku8MBPending) {
+    }
     assert_int_equal(node.status(), 0);
     assert_int_equal(node.receive(), 7);
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);

@@ -90,7 +90,10 @@ static void the_driver_is_on_while_a_response_leaves(void **)
     assert_string_equal(bench().log.c_str(), "read write flush ");
 }
 
-static void counts(void *context) { ++*static_cast<int *>(context); }
+static void counts(void *context)
+{
+    ++*static_cast<int *>(context);
+}
 
 static void callbacks_are_handed_their_context(void **)
 {

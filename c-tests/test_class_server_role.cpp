@@ -195,7 +195,10 @@ static void a_function_can_be_switched_off_and_on(void **)
     answers(server, {17, 6, 0, 0, 0, 9}, {17, 6, 0, 0, 0, 9});
 }
 
-static uint16_t address_itself(void *, uint16_t address) { return address; }
+static uint16_t address_itself(void *, uint16_t address)
+{
+    return address;
+}
 
 static void the_other_functions_are_served_from_their_records(void **)
 {

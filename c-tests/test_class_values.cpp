@@ -120,14 +120,14 @@ static void each_type_is_written(void **)
     assert_int_equal(node.setTransmitInt32(6, -1371449774, ModbusMaster::orderDCBA), 0);
     assert_int_equal(node.setTransmitUInt16(8, 0x1234), 0);
     assert_int_equal(node.setTransmitInt16(9, -2), 0);
-    assert_writes(node, {0x43, 0x66, 0x80, 0, 0,    0,    0xC0, 0,    0x41, 0xAE,
+    assert_writes(node, {0x43, 0x66, 0x80, 0,    0,    0,    0xC0, 0,    0x41, 0xAE,
                          0x52, 0x56, 0x52, 0x56, 0x41, 0xAE, 0x12, 0x34, 0xFF, 0xFE});
     node.setWordOrder(ModbusMaster::orderCDAB);
     assert_int_equal(node.setTransmitDouble(0, 1.0), 0);
     assert_int_equal(node.setTransmitUInt64(4, 0x0102030405060708u), 0);
     assert_int_equal(node.setTransmitInt64(8, -2, ModbusMaster::orderABCD), 0);
-    assert_writes(node, {0, 0, 0, 0, 0, 0, 0x3F, 0xF0, 7, 8, 5, 6, 3, 4, 1, 2,
-                         0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFE});
+    assert_writes(node, {0, 0, 0, 0, 0,    0,    0x3F, 0xF0, 7,    8,    5,    6,
+                         3, 4, 1, 2, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFE});
 }
 
 static void what_passes_the_words_to_write_is_refused_with_02(void **)

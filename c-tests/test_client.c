@@ -125,8 +125,8 @@ static void sixteen_requests_are_pipelined(void **state)
         for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
             requests[i] = asker_request(UNIT, words[i], sizeof words[i], NULL);
             requests[i].transaction = (uint16_t)(i + 1);
-            IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &requests[i],
-                                                            (uint16_t)(10 * i), 10));
+            IS(MBM_PENDING,
+               mbm_client_readHoldingRegisters(&a.client, &requests[i], (uint16_t)(10 * i), 10));
         }
         requests[i] = asker_request(UNIT, NULL, 0, NULL);
         IS(MBM_QUEUE_FULL, mbm_client_readHoldingRegisters(&a.client, &requests[i], 0, 1));

@@ -21,8 +21,8 @@ static mbm_clientUnit units[3];
 static mbm_counters counters;
 static uint16_t data[WORDS];
 /* Requests as they arrive: short ones, and one with many numbers and counts. */
-static const uint8_t bodies[4][WORDS] = {{0, 1, 0, 2}, {0, 0, 0, 0, 2, 0x12, 0x34}, {14, 1, 0},
-                                         {7, 6, 0, 1, 0, 0, 0, 1}};
+static const uint8_t bodies[4][WORDS] = {
+    {0, 1, 0, 2}, {0, 0, 0, 0, 2, 0x12, 0x34}, {14, 1, 0}, {7, 6, 0, 1, 0, 0, 0, 1}};
 static uint8_t incoming[1100], outgoing[1100];
 static unsigned long ended;
 

@@ -21,8 +21,8 @@ static char transact(asker *a, const fault *f, unsigned number, uint8_t *status)
         IS(MBM_PENDING, mbm_client_writeSingleRegister(&a->client, &request, (uint16_t)number,
                                                        (uint16_t)~number));
     else
-        IS(MBM_PENDING, mbm_client_readHoldingRegisters(
-                            &a->client, &request, (uint16_t)(100 * number), FAULT_REGISTERS));
+        IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a->client, &request,
+                                                        (uint16_t)(100 * number), FAULT_REGISTERS));
     *status = asker_wait(a, &request);
     if (*status != MBM_OK)
         return 'F';

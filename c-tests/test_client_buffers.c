@@ -16,7 +16,7 @@ typedef struct line {
     mbm_clientRequest requests[REQUESTS];
     uint8_t *incoming, *outgoing;
     uint16_t incoming_bytes, outgoing_bytes;
-    uint8_t sent[600];                /* what is to be answered */
+    uint8_t sent[600]; /* what is to be answered */
     size_t sent_bytes;
     uint32_t now;
     int is_tcp;
@@ -94,12 +94,8 @@ static void begin(line *l, unsigned framing)
     assert_non_null(l->incoming);
     assert_non_null(l->outgoing);
     switch (framing) {
-    case 0:
-        OK(mbm_client_beginRtu(&l->client, &port, l->incoming, l->incoming_bytes));
-        break;
-    case 1:
-        OK(mbm_client_beginAscii(&l->client, &port, l->incoming, l->incoming_bytes));
-        break;
+    case 0: OK(mbm_client_beginRtu(&l->client, &port, l->incoming, l->incoming_bytes)); break;
+    case 1: OK(mbm_client_beginAscii(&l->client, &port, l->incoming, l->incoming_bytes)); break;
     case 2:
         OK(mbm_client_beginRtuOverTcp(&l->client, &port, l->incoming, l->incoming_bytes));
         break;
@@ -127,11 +123,8 @@ static void ask(line *l, mbm_clientRequest *request)
         (void)mbm_client_writeMultipleRegisters(&l->client, request, 1,
                                                 (uint16_t)(1 + chance(123)));
         break;
-    case 2:
-        (void)mbm_client_reportServerId(&l->client, request);
-        break;
-    default:
-        (void)mbm_client_readCoils(&l->client, request, 1, (uint16_t)(1 + chance(2000)));
+    case 2: (void)mbm_client_reportServerId(&l->client, request); break;
+    default: (void)mbm_client_readCoils(&l->client, request, 1, (uint16_t)(1 + chance(2000)));
     }
 }
 
@@ -149,20 +142,15 @@ static void no_byte_outside_of_the_buffers_is_touched(void **state)
 
             l.now += chance(chance(8) ? 3000 : 60000);
             switch (chance(12)) {
-            case 0:
-                (void)mbm_client_cancel(&l.client, request);
-                break;
+            case 0: (void)mbm_client_cancel(&l.client, request); break;
             case 1:
                 if (chance(20) == 0)
                     OK(mbm_client_reconnect(&l.client, NULL));
                 break;
             case 2:
             case 3:
-            case 4:
-                ask(&l, request);
-                break;
-            default:
-                (void)mbm_client_poll(&l.client);
+            case 4: ask(&l, request); break;
+            default: (void)mbm_client_poll(&l.client);
             }
         }
         for (i = 0; i < REQUESTS; i++)

@@ -24,7 +24,11 @@ typedef struct device {
     volatile int stop;
     unsigned random;
     held_clock clock;
-    struct { uint8_t bytes[64]; size_t length; int64_t at; } held[HELD];
+    struct {
+        uint8_t bytes[64];
+        size_t length;
+        int64_t at;
+    } held[HELD];
     unsigned count;
     pthread_t thread;
 } device;
@@ -71,15 +75,10 @@ static int mistreat(device *d, const uint8_t *request)
 
     switch (chance(&d->random, 2000)) {
     case 0: /* never */
-    case 1:
-        return 1;
-    case 2: /* after the timeout */
-        hold(d, frame, length, 2 * TIMEOUT);
-        return 1;
+    case 1: return 1;
+    case 2: /* after the timeout */ hold(d, frame, length, 2 * TIMEOUT); return 1;
     case 3: /* twice */
-    case 4:
-        hold(d, frame, length, 0);
-        break;
+    case 4: hold(d, frame, length, 0); break;
     case 5: /* with another id, too */
     case 6:
         frame[0] ^= 0x80;
@@ -98,10 +97,8 @@ static int mistreat(device *d, const uint8_t *request)
         frame[8] = 6;
         length = 9;
         break;
-    case 9:
-        return chance(&d->random, 4) != 0;
-    default:
-        break;
+    case 9: return chance(&d->random, 4) != 0;
+    default: break;
     }
     hold(d, frame, length, chance(&d->random, 500) == 0 ? 3 : 0);
     return 1;
@@ -252,8 +249,8 @@ static void ask(job *j)
     j->request.transaction = (uint16_t)(1 + queued % 60000);
     j->pending = 1;
     queued++;
-    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &j->request,
-                                                    j->request.transaction, QUANTITY));
+    IS(MBM_PENDING,
+       mbm_client_readHoldingRegisters(&a.client, &j->request, j->request.transaction, QUANTITY));
 }
 
 static void every_request_ends_once_and_with_its_own_data(void **state)

@@ -12,7 +12,10 @@ typedef struct exchange {
     uint8_t bytes, response_bytes;
 } exchange;
 
-#define EXCHANGE(request, response) {request, response, sizeof request - 1, sizeof response - 1}
+#define EXCHANGE(request, response)                                                                \
+    {                                                                                              \
+        request, response, sizeof request - 1, sizeof response - 1                                 \
+    }
 
 static const exchange exchanges[] = {
     EXCHANGE("\x01\x00\x13\x00\x0D", "\x01\x02\xCD\xFF"), /* the padding too is as it came */
@@ -28,7 +31,8 @@ static const exchange exchanges[] = {
     EXCHANGE("\x0C", "\x0C\x08\x00\x00\x01\x08\x01\x21\x20\x00"),
     EXCHANGE("\x0F\x00\x13\x00\x0A\x02\xCD\xFF", "\x0F\x00\x13\x00\x0A"),
     EXCHANGE("\x10\x00\x01\x00\x02\x04\x00\x0A\x01\x02", "\x10\x00\x01\x00\x02"),
-    EXCHANGE("\x11", "\x11\x03" "abc"),
+    EXCHANGE("\x11", "\x11\x03"
+                     "abc"),
     EXCHANGE("\x14\x0E\x06\x00\x04\x00\x01\x00\x02\x06\x00\x03\x00\x09\x00\x02",
              "\x14\x0C\x05\x06\x0D\xFE\x00\x20\x05\x06\x33\xCD\x00\x40"),
     EXCHANGE("\x15\x0D\x06\x00\x04\x00\x07\x00\x03\x06\xAF\x04\xBE\x10\x0D",
@@ -36,9 +40,13 @@ static const exchange exchanges[] = {
     EXCHANGE("\x16\x00\x04\x00\xF2\x00\x25", "\x16\x00\x04\x00\xF2\x00\x25"),
     EXCHANGE("\x17\x00\x03\x00\x02\x00\x0E\x00\x01\x02\x00\xFF", "\x17\x04\x00\xFE\x0A\xCD"),
     EXCHANGE("\x18\x04\xDE", "\x18\x00\x06\x00\x02\x01\xB8\x12\x84"),
-    EXCHANGE("\x2B\x0E\x01\x00", "\x2B\x0E\x01\x01\x00\x00\x01\x00\x02" "ab"),
+    EXCHANGE("\x2B\x0E\x01\x00", "\x2B\x0E\x01\x01\x00\x00\x01\x00\x02"
+                                 "ab"),
     EXCHANGE("\x2B\x0D\x01\x02", "\x2B\x0D\x03\x04\x05"),
-    EXCHANGE("\x41" "own", "\x41" "any data"),
+    EXCHANGE("\x41"
+             "own",
+             "\x41"
+             "any data"),
 };
 
 static const int framings[] = {MBM_FRAMING_RTU, MBM_FRAMING_TCP, MBM_FRAMING_RTU_OVER_TCP};
@@ -106,8 +114,8 @@ static void every_function_is_sent_and_its_response_taken_as_on_the_wire(void **
             const exchange *e = &exchanges[k];
             uint8_t exception[] = {(uint8_t)(e->request[0] | 0x80), 4};
 
-            IS(MBM_OK, exchange_once(framings[i], e, (const uint8_t *)e->response,
-                                     e->response_bytes));
+            IS(MBM_OK,
+               exchange_once(framings[i], e, (const uint8_t *)e->response, e->response_bytes));
             assert_int_equal(request.length, e->response_bytes - 1);
             assert_memory_equal(reply, e->response + 1, request.length);
             assert_int_equal(reply[request.length], 0xEE);
@@ -121,9 +129,9 @@ static void a_response_whose_repeated_bytes_differ_is_not_taken(void **state)
 {
     static const struct {
         uint8_t function, first, last;
-    } repeated[] = {{1, 1, 1}, {2, 1, 1}, {3, 1, 1}, {4, 1, 1}, {5, 1, 4}, {6, 1, 4},
-                    {0x0F, 1, 4}, {0x10, 1, 4}, {0x14, 1, 3}, {0x15, 1, 14}, {0x16, 1, 6},
-                    {0x17, 1, 1}, {0x2B, 1, 2}};
+    } repeated[] = {{1, 1, 1},    {2, 1, 1},    {3, 1, 1},    {4, 1, 1},    {5, 1, 4},
+                    {6, 1, 4},    {0x0F, 1, 4}, {0x10, 1, 4}, {0x14, 1, 3}, {0x15, 1, 14},
+                    {0x16, 1, 6}, {0x17, 1, 1}, {0x2B, 1, 2}};
     unsigned i, k, r, at;
 
     (void)state;

@@ -86,8 +86,8 @@ static void reads_and_writes(void)
     assert_memory_equal(s.words + 10, values, 6);
     ends(MBM_OK, &r, mbm_client_maskWriteRegister(c, &r, SERVED_BASE + 3, 0xFF00, 0x0025));
     assert_int_equal(s.words[3], 0xA525);
-    ends(MBM_OK, &r, mbm_client_readWriteMultipleRegisters(c, &r, SERVED_BASE + 9, 4,
-                                                           SERVED_BASE + 10, 2));
+    ends(MBM_OK, &r,
+         mbm_client_readWriteMultipleRegisters(c, &r, SERVED_BASE + 9, 4, SERVED_BASE + 10, 2));
     brought(&r, s.words + 9, 8);
     ends(MBM_ILLEGAL_DATA_ADDRESS, &r, mbm_client_readHoldingRegisters(c, &r, 0, 1));
 }
@@ -223,8 +223,8 @@ static void the_ascii_delimiter_follows_the_devices(void **state)
     r.done = change;
     r.context = &a.client;
     set_in_done = MBM_PENDING;
-    ends(MBM_OK, &r, mbm_client_diagnostics(&a.client, &r,
-                                            MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER, 1));
+    ends(MBM_OK, &r,
+         mbm_client_diagnostics(&a.client, &r, MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER, 1));
     assert_int_equal(set_in_done, MBM_OK);
     r = asker_request(SERVED_UNIT, words, sizeof words, NULL);
     ends(MBM_OK, &r, mbm_client_readHoldingRegisters(&a.client, &r, SERVED_BASE, 2));
@@ -232,7 +232,8 @@ static void the_ascii_delimiter_follows_the_devices(void **state)
     /* A device that still wants LF is not answered by one that wants another. */
     OK(mbm_client_setDelimiter(&a.client, '\n'));
     OK(mbm_client_setResponseTimeout(&a.client, 50));
-    ends(MBM_RESPONSE_TIMED_OUT, &r, mbm_client_readHoldingRegisters(&a.client, &r, SERVED_BASE, 2));
+    ends(MBM_RESPONSE_TIMED_OUT, &r,
+         mbm_client_readHoldingRegisters(&a.client, &r, SERVED_BASE, 2));
     end();
 }
 

@@ -48,7 +48,10 @@ static void answer(int framing)
     uint8_t tcp[] = {0, 0, 0, 0, 0, 5, UNIT, 3, 2, 0x12, 0x34};
 
     if (framing == MBM_FRAMING_ASCII) {
-        memory_port_bytes(&m, (const uint8_t *)":07030212" "34AE\r\n", 15);
+        memory_port_bytes(&m,
+                          (const uint8_t *)":07030212"
+                                           "34AE\r\n",
+                          15);
     } else if (framing == MBM_FRAMING_TCP) {
         memcpy(tcp, m.sent, 2);
         memory_port_bytes(&m, tcp, sizeof tcp);

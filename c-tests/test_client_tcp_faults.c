@@ -43,8 +43,8 @@ static void ask(unsigned i)
     requests[i].reply = words[i];
     requests[i].replyBytes = sizeof words[i];
     requests[i].transaction = (uint16_t)(i + 1);
-    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &requests[i], (uint16_t)(20 * i),
-                                                    WORDS));
+    IS(MBM_PENDING,
+       mbm_client_readHoldingRegisters(&a.client, &requests[i], (uint16_t)(20 * i), WORDS));
 }
 
 static void is_right(unsigned i)

@@ -79,8 +79,13 @@ static void an_exception_with_a_bad_crc_is_none(void **state)
 static void response_words_survive_a_failure(void **state)
 {
     static const char *const replies[] = {
-        "11 83 02 +", "11 03 04 AA AA BB BB 00 00", "11 03 02 AA AA +", "11 04 04 AA AA BB BB +",
-        "12 03 04 AA AA BB BB +", "11 03 04 AA", "",
+        "11 83 02 +",
+        "11 03 04 AA AA BB BB 00 00",
+        "11 03 02 AA AA +",
+        "11 04 04 AA AA BB BB +",
+        "12 03 04 AA AA BB BB +",
+        "11 03 04 AA",
+        "",
     };
     size_t i;
     NODE;

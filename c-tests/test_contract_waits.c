@@ -240,7 +240,6 @@ static void a_request_that_takes_longer_than_the_reply_may_is_sent(void **state)
     OK(mbm_master_writeMultipleRegisters(n, 0, 100));
 }
 
-
 static void a_port_that_takes_a_byte_now_and_then_is_not_busy(void **state)
 {
     NODE;

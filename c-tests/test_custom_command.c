@@ -38,7 +38,8 @@ static void all_ten_registers_are_there(void **state)
 {
     (void)state;
     assert_int_equal(run("write 0 10 11 12 13 14 15 16 17 18 19\nread 9 1\nread 0 10\n"), 0);
-    assert_non_null(strstr(output, "wrote 10 from register 0 on\nregister 9: 19\nregister 0: 10\n"));
+    assert_non_null(
+        strstr(output, "wrote 10 from register 0 on\nregister 9: 19\nregister 0: 10\n"));
 }
 
 static void what_is_out_of_range_is_02_to_read_and_04_to_write(void **state)

@@ -12,7 +12,7 @@ static const mbm_framing framings[] = {
     {.kind = MBM_FRAMING_RTU_OVER_TCP},
 };
 static const mbm_framing *const rtu = &framings[0], *const ascii = &framings[1],
-                         *const tcp = &framings[2];
+                                *const tcp = &framings[2];
 
 /* The tests' own way to put a frame around a PDU. */
 static uint16_t wrap(const mbm_framing *f, const mbm_packet *p, const uint8_t *pdu, uint16_t length,
@@ -23,8 +23,13 @@ static uint16_t wrap(const mbm_framing *f, const mbm_packet *p, const uint8_t *p
     uint16_t i;
 
     if (f->kind == MBM_FRAMING_TCP) {
-        const uint8_t header[] = {(uint8_t)(p->transaction >> 8), (uint8_t)p->transaction, 0, 0, 0,
-                                  (uint8_t)(length + 1), p->unit};
+        const uint8_t header[] = {(uint8_t)(p->transaction >> 8),
+                                  (uint8_t)p->transaction,
+                                  0,
+                                  0,
+                                  0,
+                                  (uint8_t)(length + 1),
+                                  p->unit};
 
         memcpy(frame, header, 7);
         memcpy(frame + 7, pdu, length);

@@ -195,8 +195,7 @@ static void ascii_is_taken_in_lower_case_and_in_pairs_only(void **state)
     for (i = 0; i < COUNT(frames); i++) {
         length = (uint16_t)strlen(frames[i].text);
         memcpy(text, frames[i].text, length);
-        IS(frames[i].status,
-           mbm_frame_parse(&ascii, MBM_PACKET_REQUEST, text, length, &packet));
+        IS(frames[i].status, mbm_frame_parse(&ascii, MBM_PACKET_REQUEST, text, length, &packet));
     }
     memcpy(text, ":0207F7\r!", 9);
     IS(MBM_INCOMPLETE_FRAME, parsed(&ascii, MBM_PACKET_REQUEST, text, 9));

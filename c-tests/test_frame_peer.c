@@ -77,8 +77,13 @@ static const mbm_packet sent[CALLS] = {
     {.function = 0x0F, .address = 0x13, .quantity = 10, .data = wire_bits, .dataLength = 2},
     {.function = 0x10, .address = 1, .quantity = 3, .data = wire_words, .dataLength = 6},
     {.function = 0x16, .address = 4, .andMask = 0xF2, .orMask = 0x25},
-    {.function = 0x17, .address = 3, .quantity = 6, .writeAddress = 14, .writeQuantity = 3,
-     .data = wire_words, .dataLength = 6},
+    {.function = 0x17,
+     .address = 3,
+     .quantity = 6,
+     .writeAddress = 14,
+     .writeQuantity = 3,
+     .data = wire_words,
+     .dataLength = 6},
     {.function = 0x11},
 };
 

@@ -239,19 +239,29 @@ static void requests_of_many_connections_wait_for_their_turn(void **state)
         fds[i] = tcp_connect((uint16_t)port);
     for (round = 0; round < 5; round++) {
         for (i = 0; i < MANY; i++) {
-            uint8_t request[] = {(uint8_t)round, (uint8_t)i, 0, 0, 0, 6,
-                                 i % 2 ? PEER_UNIT : SERVED_UNIT, 3, 0, (uint8_t)(160 + i), 0, 1};
+            uint8_t request[] = {
+                (uint8_t)round,     (uint8_t)i, 0, 0, 0, 6, i % 2 ? PEER_UNIT : SERVED_UNIT, 3, 0,
+                (uint8_t)(160 + i), 0,          1};
 
             assert_int_equal(write(fds[i], request, sizeof request), sizeof request);
         }
         for (i = 0; i < MANY; i++) {
             uint8_t answer[600];
             uint16_t word = i % 2 ? mapping->tab_registers[160 + i] : ours.words[60 + i];
-            const uint8_t expected[] = {(uint8_t)round, (uint8_t)i, 0, 0, 0, 5,
-                                        i % 2 ? PEER_UNIT : SERVED_UNIT, 3, 2,
-                                        (uint8_t)(word >> 8), (uint8_t)word};
+            const uint8_t expected[] = {(uint8_t)round,
+                                        (uint8_t)i,
+                                        0,
+                                        0,
+                                        0,
+                                        5,
+                                        i % 2 ? PEER_UNIT : SERVED_UNIT,
+                                        3,
+                                        2,
+                                        (uint8_t)(word >> 8),
+                                        (uint8_t)word};
 
-            assert_int_equal(asked_bytes(fds[i], expected, 0, answer, sizeof expected), sizeof expected);
+            assert_int_equal(asked_bytes(fds[i], expected, 0, answer, sizeof expected),
+                             sizeof expected);
             assert_memory_equal(answer, expected, sizeof expected);
         }
     }
@@ -350,7 +360,7 @@ static void a_line_that_is_lost_is_0a_until_it_is_back(void **state)
     start = seconds();
     modbus_set_slave(client, PEER_UNIT);
     while (modbus_read_registers(client, 0, 1, &word) != 1)
-        assert_true(seconds() - start < PATIENCE_MS / 1000);
+        assert_true(seconds() - start < PATIENCE_MS * 1e-3);
 }
 
 static void a_line_that_was_lost_while_nobody_asked_costs_no_request(void **state)

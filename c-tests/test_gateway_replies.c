@@ -16,13 +16,20 @@
 
 enum { UNIT = 5 };
 
-static program gateway;
-static pty line;
-static uint16_t port;
-static served ours;
+/* How long a gateway waits for its device, in milliseconds: longer than a busy machine
+ * takes to run the device, and far shorter than PATIENCE_MS, for which a test waits for
+ * the gateway. */
+#define TIMEOUT "4000"
 
-/* Starts a gateway whose one line is at `path`, with the options before its port. */
-static void start_gateway(const char *path, const char *timeout, const char *const *options)
+/* A gateway and its one line, at whose other end the test is the device. */
+typedef struct gateway {
+    program program;
+    pty line;
+    uint16_t port;
+} gateway;
+
+/* Starts a gateway whose line is at `path`, with the options before its port. */
+static void start_at(gateway *g, const char *path, const char *timeout, const char *const *options)
 {
     char text[64], argument[128];
     const char *arguments[8];
@@ -35,16 +42,28 @@ static void start_gateway(const char *path, const char *timeout, const char *con
     arguments[count++] = timeout;
     arguments[count++] = argument;
     arguments[count] = NULL;
-    program_start(&gateway, "gateway", arguments);
-    program_line(&gateway, text, sizeof text);
+    program_start(&g->program, "gateway", arguments);
+    program_line(&g->program, text, sizeof text);
     assert_int_equal(sscanf(text, "ready %u", &number), 1);
-    port = (uint16_t)number;
+    g->port = (uint16_t)number;
 }
 
-static void stop_gateway(void)
+static void start(gateway *g, const char *timeout, const char *const *options)
 {
-    kill(gateway.pid, SIGTERM);
-    assert_int_equal(program_end(&gateway), 0);
+    pty_open(&g->line);
+    start_at(g, g->line.path, timeout, options);
+}
+
+static void end(gateway *g)
+{
+    kill(g->program.pid, SIGTERM);
+    assert_int_equal(program_end(&g->program), 0);
+}
+
+static void stop(gateway *g)
+{
+    end(g);
+    pty_close(&g->line);
 }
 
 /* Sends a request PDU as a TCP client. */
@@ -85,30 +104,30 @@ static void expect(int fd, const uint8_t *pdu, size_t length)
 }
 
 /* As the device, expects a request on the line. */
-static void expect_request(const uint8_t *pdu, size_t length)
+static void expect_request(const gateway *g, const uint8_t *pdu, size_t length)
 {
     uint8_t wanted[MBM_MAX_FRAME] = {UNIT}, frame[MBM_MAX_FRAME];
 
     memcpy(wanted + 1, pdu, length);
     length = seal(wanted, length + 1);
-    get(line.ours, frame, length);
+    get(g->line.ours, frame, length);
     assert_memory_equal(frame, wanted, length);
 }
 
 /* As the device, replies. */
-static void reply(const uint8_t *pdu, size_t length)
+static void reply(const gateway *g, const uint8_t *pdu, size_t length)
 {
     uint8_t frame[MBM_MAX_FRAME] = {UNIT};
 
     memcpy(frame + 1, pdu, length);
     length = seal(frame, length + 1);
-    assert_int_equal(write(line.ours, frame, length), length);
+    assert_int_equal(write(g->line.ours, frame, length), length);
 }
 
 #define ASK(fd, pdu) ask(fd, (const uint8_t *)(pdu), sizeof(pdu) - 1)
 #define EXPECT(fd, pdu) expect(fd, (const uint8_t *)(pdu), sizeof(pdu) - 1)
-#define REQUEST(pdu) expect_request((const uint8_t *)(pdu), sizeof(pdu) - 1)
-#define REPLY(pdu) reply((const uint8_t *)(pdu), sizeof(pdu) - 1)
+#define REQUEST(g, pdu) expect_request(g, (const uint8_t *)(pdu), sizeof(pdu) - 1)
+#define REPLY(g, pdu) reply(g, (const uint8_t *)(pdu), sizeof(pdu) - 1)
 
 /* One client's request gets no reply in time; that comes after the request of
  * another client, before its reply. The PDUs end with their last byte. */
@@ -118,8 +137,12 @@ typedef struct late {
 } late;
 
 #define LATE(request, reply, other, other_reply)                                                   \
-    {request, reply, other, other_reply, {sizeof request - 1, sizeof reply - 1, sizeof other - 1,  \
-                                          sizeof other_reply - 1}}
+    {                                                                                              \
+        request, reply, other, other_reply,                                                        \
+        {                                                                                          \
+            sizeof request - 1, sizeof reply - 1, sizeof other - 1, sizeof other_reply - 1         \
+        }                                                                                          \
+    }
 
 static void a_late_reply_to_one_client_does_not_reach_another(void **state)
 {
@@ -138,146 +161,150 @@ static void a_late_reply_to_one_client_does_not_reach_another(void **state)
         LATE("\x2B\x0E\x01\x00", "\x2B\x0E\x01\x01\x00\x00\x01\x00\x01\x41", "\x2B\x0E\x04\x02",
              "\x2B\x0E\x04\x81\x00\x00\x01\x02\x01\x42"),
     };
+    /* A gateway for each case: all of them wait for the timeout at the same time. */
+    gateway gateways[COUNT(cases)];
+    int first[COUNT(cases)], second;
     unsigned i;
 
     (void)state;
-    pty_open(&line);
-    start_gateway(line.path, "1000", NULL);
+    for (i = 0; i < COUNT(cases); i++) {
+        const late *c = &cases[i];
+
+        start(&gateways[i], TIMEOUT, NULL);
+        first[i] = tcp_connect(gateways[i].port);
+        ask(first[i], (const uint8_t *)c->request, c->lengths[0]);
+        expect_request(&gateways[i], (const uint8_t *)c->request, c->lengths[0]);
+    }
     for (i = 0; i < COUNT(cases); i++) {
         const late *c = &cases[i];
         const uint8_t no_response[] = {(uint8_t)(c->request[0] | 0x80), 0x0B};
-        int first = tcp_connect(port), second = tcp_connect(port);
 
-        ask(first, (const uint8_t *)c->request, c->lengths[0]);
-        expect_request((const uint8_t *)c->request, c->lengths[0]);
-        expect(first, no_response, sizeof no_response);
+        expect(first[i], no_response, sizeof no_response);
+        second = tcp_connect(gateways[i].port);
         ask(second, (const uint8_t *)c->other, c->lengths[2]);
-        expect_request((const uint8_t *)c->other, c->lengths[2]);
-        reply((const uint8_t *)c->late_reply, c->lengths[1]);
-        reply((const uint8_t *)c->other_reply, c->lengths[3]);
+        expect_request(&gateways[i], (const uint8_t *)c->other, c->lengths[2]);
+        reply(&gateways[i], (const uint8_t *)c->late_reply, c->lengths[1]);
+        reply(&gateways[i], (const uint8_t *)c->other_reply, c->lengths[3]);
         expect(second, (const uint8_t *)c->other_reply, c->lengths[3]);
-        close(first);
+        close(first[i]);
         close(second);
+        stop(&gateways[i]);
     }
-    stop_gateway();
-    pty_close(&line);
 }
 
 static void a_reply_that_does_not_answer_the_request_is_0b(void **state)
 {
     static const char *const no_answers[][2] = {
-        {"\x03\x00\x64\x00\x03", "\x03\x02\x12\x34"},             /* one register of three */
+        {"\x03\x00\x64\x00\x03", "\x03\x02\x12\x34"},                 /* one register of three */
         {"\x03\x00\x64\x00\x01", "\x03\x06\x11\x11\x22\x22\x33\x33"}, /* three for one */
-        {"\x01\x00\x64\x00\x09", "\x01\x01\xFF"},                 /* nine coils in one byte */
-        {"\x05\x00\x64\xFF\x00", "\x05\x00\x64\x00\x00"},         /* another value */
-        {"\x06\x00\x64\x12\x34", "\x06\x00\x65\x12\x34"},         /* another address */
+        {"\x01\x00\x64\x00\x09", "\x01\x01\xFF"},                     /* nine coils in one byte */
+        {"\x05\x00\x64\xFF\x00", "\x05\x00\x64\x00\x00"},             /* another value */
+        {"\x06\x00\x64\x12\x34", "\x06\x00\x65\x12\x34"},             /* another address */
     };
     static const uint8_t lengths[][2] = {{5, 4}, {5, 8}, {5, 3}, {5, 5}, {5, 5}};
+    gateway g;
     unsigned i;
     int fd;
 
     (void)state;
-    pty_open(&line);
-    start_gateway(line.path, "500", NULL);
-    fd = tcp_connect(port);
+    start(&g, "500", NULL);
+    fd = tcp_connect(g.port);
     for (i = 0; i < COUNT(no_answers); i++) {
         const uint8_t *request = (const uint8_t *)no_answers[i][0];
         const uint8_t no_response[] = {request[0] | 0x80, 0x0B};
 
         ask(fd, request, lengths[i][0]);
-        expect_request(request, lengths[i][0]);
-        reply((const uint8_t *)no_answers[i][1], lengths[i][1]);
+        expect_request(&g, request, lengths[i][0]);
+        reply(&g, (const uint8_t *)no_answers[i][1], lengths[i][1]);
         expect(fd, no_response, sizeof no_response);
     }
     close(fd);
-    stop_gateway();
-    pty_close(&line);
+    stop(&g);
 }
 
 static void a_request_that_no_device_may_carry_out_does_not_reach_the_line(void **state)
 {
+    gateway g;
     struct pollfd asked = {0, POLLIN, 0};
     int fd;
 
     (void)state;
-    pty_open(&line);
-    start_gateway(line.path, "3000", NULL);
-    fd = tcp_connect(port);
+    start(&g, TIMEOUT, NULL);
+    fd = tcp_connect(g.port);
     ASK(fd, "\x03\x00\x64\x00\x00");
     EXPECT(fd, "\x83\x03");
     ASK(fd, "\x03\xFF\xFF\x00\x02");
     EXPECT(fd, "\x83\x02");
     ASK(fd, "\x10\x00\x64\x00\x02\x02\x12\x34");
     EXPECT(fd, "\x90\x03");
-    asked.fd = line.ours;
+    asked.fd = g.line.ours;
     assert_int_equal(poll(&asked, 1, 0), 0);
     close(fd);
-    stop_gateway();
-    pty_close(&line);
+    stop(&g);
 }
 
 static void force_listen_only_mode_is_passed_on_and_gets_no_response(void **state)
 {
+    gateway g;
     int fd;
 
     (void)state;
-    pty_open(&line);
-    start_gateway(line.path, "20000", NULL);
-    fd = tcp_connect(port);
+    start(&g, TIMEOUT, NULL);
+    fd = tcp_connect(g.port);
     ASK(fd, "\x08\x00\x04\x00\x00");
-    REQUEST("\x08\x00\x04\x00\x00");
+    REQUEST(&g, "\x08\x00\x04\x00\x00");
     ASK(fd, "\x07");
-    REQUEST("\x07");
-    REPLY("\x07\x6D");
+    REQUEST(&g, "\x07");
+    REPLY(&g, "\x07\x6D");
     EXPECT(fd, "\x07\x6D");
     close(fd);
-    stop_gateway();
-    pty_close(&line);
+    stop(&g);
 }
 
 static void functions_that_it_does_not_know_pass_through(void **state)
 {
+    gateway g;
     int fd;
 
     (void)state;
-    pty_open(&line);
-    start_gateway(line.path, "20000", NULL);
-    fd = tcp_connect(port);
+    start(&g, TIMEOUT, NULL);
+    fd = tcp_connect(g.port);
     ASK(fd, "\x64 any data");
-    REQUEST("\x64 any data");
-    REPLY("\x64 of any length at all");
+    REQUEST(&g, "\x64 any data");
+    REPLY(&g, "\x64 of any length at all");
     EXPECT(fd, "\x64 of any length at all");
     /* A sub-function of diagnostics that the standard reserves. */
     ASK(fd, "\x08\x00\x15\x00\x03\x00\x00");
-    REQUEST("\x08\x00\x15\x00\x03\x00\x00");
-    REPLY("\x08\x00\x15\x00\x04\x12\x34\x56\x78");
+    REQUEST(&g, "\x08\x00\x15\x00\x03\x00\x00");
+    REPLY(&g, "\x08\x00\x15\x00\x04\x12\x34\x56\x78");
     EXPECT(fd, "\x08\x00\x15\x00\x04\x12\x34\x56\x78");
     /* CANopen. */
     ASK(fd, "\x2B\x0D\x01\x02\x03");
-    REQUEST("\x2B\x0D\x01\x02\x03");
-    REPLY("\x2B\x0D\x04\x05");
+    REQUEST(&g, "\x2B\x0D\x01\x02\x03");
+    REPLY(&g, "\x2B\x0D\x04\x05");
     EXPECT(fd, "\x2B\x0D\x04\x05");
     close(fd);
-    stop_gateway();
-    pty_close(&line);
+    stop(&g);
 }
 
 static void every_function_of_our_server_passes_through(void **state)
 {
+    gateway g;
+    static served ours;
     modbus_t *client;
     int fd;
 
     (void)state;
     served_prepare(&ours);
     served_on_line(&ours, MBM_FRAMING_RTU);
-    start_gateway(ours.line.path, "20000", NULL);
-    fd = tcp_connect(port);
+    start_at(&g, ours.line.path, TIMEOUT, NULL);
+    fd = tcp_connect(g.port);
     asked_functions(fd, MBM_FRAMING_TCP, &ours);
     close(fd);
-    fd = tcp_connect(port);
+    fd = tcp_connect(g.port);
     asked_lies(fd, MBM_FRAMING_TCP, &ours);
     close(fd);
-    client = modbus_new_tcp("127.0.0.1", port);
+    client = modbus_new_tcp("127.0.0.1", g.port);
     assert_non_null(client);
     assert_int_equal(modbus_connect(client), 0);
     modbus_set_response_timeout(client, PATIENCE_MS / 1000, 0);
@@ -288,7 +315,7 @@ static void every_function_of_our_server_passes_through(void **state)
     asked_refusals(client, &ours);
     modbus_close(client);
     modbus_free(client);
-    stop_gateway();
+    end(&g);
     served_stop(&ours);
 }
 
@@ -304,29 +331,28 @@ static void the_quiet_time_is_an_option(void **state)
         {"-x", "1", "0", "300", "/dev/null,19200,E1,1-9"},
     };
     double before;
+    gateway g;
     unsigned i;
     int fd;
 
     (void)state;
-    pty_open(&line);
-    start_gateway(line.path, "200", options);
-    fd = tcp_connect(port);
+    start(&g, "200", options);
+    fd = tcp_connect(g.port);
     before = seconds();
     ASK(fd, "\x03\x00\x00\x00\x03");
-    REQUEST("\x03\x00\x00\x00\x03");
+    REQUEST(&g, "\x03\x00\x00\x00\x03");
     EXPECT(fd, "\x83\x0B");
     ASK(fd, "\x03\x00\x00\x00\x03");
-    REQUEST("\x03\x00\x00\x00\x03");
+    REQUEST(&g, "\x03\x00\x00\x00\x03");
     assert_true(seconds() - before >= 1.2);
     close(fd);
-    stop_gateway();
-    pty_close(&line);
+    stop(&g);
     for (i = 0; i < COUNT(bad); i++) {
         char text[64];
 
-        program_start(&gateway, "gateway", bad[i]);
-        assert_int_equal(program_rest(&gateway, text, sizeof text), 0);
-        assert_int_equal(program_end(&gateway), 2);
+        program_start(&g.program, "gateway", bad[i]);
+        assert_int_equal(program_rest(&g.program, text, sizeof text), 0);
+        assert_int_equal(program_end(&g.program), 2);
     }
 }
 

@@ -142,8 +142,7 @@ static void a_new_client_gets_the_place_of_an_idle_one(void **state)
     start(0, "1");
     connect_to(0, PLACES);
     /* They are silent for a second, at least. */
-    AWAIT((fds[PLACES] = tcp_connect(port), is_served(fds[PLACES])) ||
-          (close(fds[PLACES]), 0));
+    AWAIT((fds[PLACES] = tcp_connect(port), is_served(fds[PLACES])) || (close(fds[PLACES]), 0));
     /* The first came first. */
     assert_int_equal(recv(fds[0], &byte, 1, 0), 0);
     assert_int_equal(is_served(fds[PLACES]), 1);
@@ -188,8 +187,7 @@ static void a_connection_that_waits_for_its_device_is_not_idle(void **state)
     /* The request is on its line before the others come. */
     assert_int_equal(read(line.ours, answer, 1), 1);
     connect_to(1, PLACES);
-    AWAIT((fds[PLACES] = tcp_connect(port), is_served(fds[PLACES])) ||
-          (close(fds[PLACES]), 0));
+    AWAIT((fds[PLACES] = tcp_connect(port), is_served(fds[PLACES])) || (close(fds[PLACES]), 0));
     assert_int_equal(recv(fds[0], answer, sizeof answer, MSG_WAITALL), sizeof answer);
     assert_int_equal(answer[8], 0x0B);
     stop();

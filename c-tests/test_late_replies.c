@@ -11,21 +11,21 @@
 
 enum {
     TIMEOUT_MS = 500,
-    LATE = 750000,   /* microseconds that the device takes for a late reply */
-    PROMPT = 3000,   /* and for all others */
-    QUIET = 100000,  /* the quiet time at first */
-    REGISTERS = 125  /* the most that a reply carries */
+    LATE = 750000,  /* microseconds that the device takes for a late reply */
+    PROMPT = 3000,  /* and for all others */
+    QUIET = 100000, /* the quiet time at first */
+    REGISTERS = 125 /* the most that a reply carries */
 };
 
 /* The device: what it takes for the requests still to come, then PROMPT. */
 typedef struct in_order {
     uint32_t takes[8];
     unsigned requests;
-    uint64_t free;       /* when its last reply has left */
-    uint8_t exception;   /* the exception it answers the first request with */
-    unsigned cut;        /* the reply that loses its second half, from 1 on */
-    unsigned damaged;    /* the reply that arrives damaged, from 1 on */
-    unsigned trailing;   /* bytes 0x00 that its driver adds to each reply */
+    uint64_t free;     /* when its last reply has left */
+    uint8_t exception; /* the exception it answers the first request with */
+    unsigned cut;      /* the reply that loses its second half, from 1 on */
+    unsigned damaged;  /* the reply that arrives damaged, from 1 on */
+    unsigned trailing; /* bytes 0x00 that its driver adds to each reply */
 } in_order;
 
 static void answer_in_order(sim *s, const sim_frame *request)
@@ -58,13 +58,13 @@ static void answer_in_order(sim *s, const sim_frame *request)
 }
 
 /* The simulation with such a device, whose first reply is late. */
-#define DEVICE                                                                          \
-    in_order device = {.takes = {LATE}};                                                \
-    NODE;                                                                               \
-                                                                                        \
-    s->limit = 2000000000;                                                              \
-    s->device = answer_in_order;                                                        \
-    s->context = &device;                                                               \
+#define DEVICE                                                                                     \
+    in_order device = {.takes = {LATE}};                                                           \
+    NODE;                                                                                          \
+                                                                                                   \
+    s->limit = 2000000000;                                                                         \
+    s->device = answer_in_order;                                                                   \
+    s->context = &device;                                                                          \
     OK(mbm_master_setResponseTimeout(n, TIMEOUT_MS))
 
 static void assert_reads(sim *s, uint16_t address, uint16_t quantity)

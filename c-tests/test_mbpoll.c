@@ -152,8 +152,8 @@ static void it_reads_the_server_id(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(it_reads_every_table),          cmocka_unit_test(it_writes_one_and_several),
-        cmocka_unit_test(it_is_told_exceptions),         cmocka_unit_test(it_reads_two_units_of_one_line),
+        cmocka_unit_test(it_reads_every_table),   cmocka_unit_test(it_writes_one_and_several),
+        cmocka_unit_test(it_is_told_exceptions),  cmocka_unit_test(it_reads_two_units_of_one_line),
         cmocka_unit_test(it_reads_the_server_id),
     };
 

@@ -31,8 +31,8 @@ static int16_t flooded_read(void *context, uint8_t *bytes, uint16_t capacity)
     return (int16_t)capacity;
 }
 
-static const mbm_port flooded = {
-    NULL, flooded_read, port_write, port_micros, NULL, NULL, NULL, NULL};
+static const mbm_port flooded = {NULL, flooded_read, port_write, port_micros,
+                                 NULL, NULL,         NULL,       NULL};
 
 static void a_poll_of_an_ascii_server_ends_though_a_peer_floods(void **state)
 {

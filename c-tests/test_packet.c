@@ -195,14 +195,17 @@ static void a_packet_that_cannot_be_is_not_built(void **state)
         {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_RESPONSE, .function = 0x14, .dataLength = 4}},
         {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_RESPONSE, .function = 0x15, .dataLength = 9}},
         {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_RESPONSE, .function = 0x18, .dataLength = 64}},
-        {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_RESPONSE, .function = 0x2B, .meiType = 0x0E,
-                               .readDeviceIdCode = 1, .objectCount = 1}},
+        {MBM_MALFORMED_REPLY,
+         {.kind = MBM_PACKET_RESPONSE,
+          .function = 0x2B,
+          .meiType = 0x0E,
+          .readDeviceIdCode = 1,
+          .objectCount = 1}},
         {MBM_INVALID_FUNCTION, {.kind = MBM_PACKET_RESPONSE, .function = 0x09}},
-        {MBM_INVALID_FUNCTION, {.kind = MBM_PACKET_EXCEPTION, .function = 0x81,
-                                .exceptionCode = 1}},
+        {MBM_INVALID_FUNCTION,
+         {.kind = MBM_PACKET_EXCEPTION, .function = 0x81, .exceptionCode = 1}},
         {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_EXCEPTION, .function = 0x01}},
-        {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_EXCEPTION, .function = 1,
-                               .exceptionCode = 0x80}},
+        {MBM_MALFORMED_REPLY, {.kind = MBM_PACKET_EXCEPTION, .function = 1, .exceptionCode = 0x80}},
         {MBM_INVALID_ARGUMENT, {.kind = 3, .function = 0x03, .quantity = 1}},
         {MBM_INVALID_ARGUMENT, {.kind = 255, .function = 0x03, .quantity = 1}},
     };
@@ -254,9 +257,9 @@ static void the_first_bytes_tell_how_long_a_pdu_is(void **state)
     }
     OK(mbm_packet_expectedLength(MBM_PACKET_RESPONSE, (const uint8_t *)"\x03\xFB", 2, NULL, 0,
                                  &expected));
-    IS(MBM_MALFORMED_FRAME, mbm_packet_expectedLength(MBM_PACKET_RESPONSE,
-                                                      (const uint8_t *)"\x03\xFC", 2, NULL, 0,
-                                                      &expected));
+    IS(MBM_MALFORMED_FRAME,
+       mbm_packet_expectedLength(MBM_PACKET_RESPONSE, (const uint8_t *)"\x03\xFC", 2, NULL, 0,
+                                 &expected));
 }
 
 static void a_request_tells_how_long_its_response_is(void **state)
@@ -290,8 +293,8 @@ static void a_request_tells_how_long_its_response_is(void **state)
     assert_int_equal(exact, 18);
     request = (mbm_packet){.function = 0x03, .quantity = 126};
     IS(MBM_ILLEGAL_DATA_VALUE, mbm_packet_replyLength(&request, NULL, 0, &expected));
-    request = (mbm_packet){.function = 0x08, .subFunction = 4, .dataLength = 2,
-                           .data = (const uint8_t *)"\0"};
+    request = (mbm_packet){
+        .function = 0x08, .subFunction = 4, .dataLength = 2, .data = (const uint8_t *)"\0"};
     OK(mbm_packet_replyLength(&request, NULL, 0, &expected));
     assert_int_equal(expected.kind, MBM_LENGTH_EXACT);
     assert_int_equal(expected.bytes, 0);

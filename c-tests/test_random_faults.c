@@ -46,13 +46,13 @@ typedef struct frame {
 typedef struct run {
     uint32_t random;
     model device;
-    request asked;          /* the request that the device heard last */
-    frame reply;            /* and what it answered, undamaged */
-    int carried_out;        /* in this transaction */
-    unsigned faults;        /* of this attempt */
-    frame ledger[LEDGER];   /* undamaged replies of the past */
+    request asked;        /* the request that the device heard last */
+    frame reply;          /* and what it answered, undamaged */
+    int carried_out;      /* in this transaction */
+    unsigned faults;      /* of this attempt */
+    frame ledger[LEDGER]; /* undamaged replies of the past */
     unsigned written;
-    uint8_t heard[4096];    /* what the master read for this request */
+    uint8_t heard[4096]; /* what the master read for this request */
     size_t heard_length;
     unsigned right, failed, intact, late, blind, wrong, exceptions;
     uint64_t longest;
@@ -201,24 +201,15 @@ static uint8_t ask(sim *s, run *r)
     s->read_piece = (uint16_t)(draw(r, 3) ? 0 : 1 + draw(r, 5));
     s->write_piece = (uint16_t)(draw(r, 3) ? 0 : 8 + draw(r, 5));
     switch (draw(r, 10)) {
-    case 0:
-        return mbm_master_readCoils(n, address, quantity(r, 2000));
-    case 1:
-        return mbm_master_readDiscreteInputs(n, address, quantity(r, 2000));
-    case 2:
-        return mbm_master_readHoldingRegisters(n, address, quantity(r, 125));
-    case 3:
-        return mbm_master_readInputRegisters(n, address, quantity(r, 125));
-    case 4:
-        return mbm_master_writeSingleCoil(n, address, (uint8_t)draw(r, 2));
-    case 5:
-        return mbm_master_writeSingleRegister(n, address, other);
-    case 6:
-        return mbm_master_writeMultipleCoils(n, address, quantity(r, 1968));
-    case 7:
-        return mbm_master_writeMultipleRegisters(n, address, quantity(r, 123));
-    case 8:
-        return mbm_master_maskWriteRegister(n, address, other, (uint16_t)draw(r, 65536));
+    case 0: return mbm_master_readCoils(n, address, quantity(r, 2000));
+    case 1: return mbm_master_readDiscreteInputs(n, address, quantity(r, 2000));
+    case 2: return mbm_master_readHoldingRegisters(n, address, quantity(r, 125));
+    case 3: return mbm_master_readInputRegisters(n, address, quantity(r, 125));
+    case 4: return mbm_master_writeSingleCoil(n, address, (uint8_t)draw(r, 2));
+    case 5: return mbm_master_writeSingleRegister(n, address, other);
+    case 6: return mbm_master_writeMultipleCoils(n, address, quantity(r, 1968));
+    case 7: return mbm_master_writeMultipleRegisters(n, address, quantity(r, 123));
+    case 8: return mbm_master_maskWriteRegister(n, address, other, (uint16_t)draw(r, 65536));
     default:
         return mbm_master_readWriteMultipleRegisters(n, address, quantity(r, 125), other,
                                                      quantity(r, 121));

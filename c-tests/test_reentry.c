@@ -162,9 +162,7 @@ static void within_idle(int hook)
     case 1: mbm_master_poll(&master); break;
     case 2: OK(mbm_master_cancel(&master)); break;
     case 3: OK(mbm_master_begin(&master, 17, &port)); break;
-    default:
-        memset(&fresh, 0, sizeof fresh);
-        memcpy(&master, &fresh, sizeof master);
+    default: memset(&fresh, 0, sizeof fresh); memcpy(&master, &fresh, sizeof master);
     }
 }
 
@@ -226,8 +224,7 @@ static void within_unit(void)
     OK(mbm_server_serveDiagnostics(&unit, &diagnostics));
 }
 
-static uint8_t before_write(void *context, uint16_t address, uint16_t quantity,
-                            const uint8_t *data)
+static uint8_t before_write(void *context, uint16_t address, uint16_t quantity, const uint8_t *data)
 {
     (void)context;
     (void)address;

@@ -58,11 +58,11 @@ static void every_request_of_the_client_answers(uint8_t status, mbm_clientReques
 {
     const mbm_rule rule = {.kind = MBM_RULE_SILENCE};
 
-#define ASKED(call)                                                                               \
-    do {                                                                                          \
-        IS(status, call);                                                                         \
-        if (status == MBM_PENDING)                                                                \
-            OK(mbm_client_cancel(&client, r));                                                    \
+#define ASKED(call)                                                                                \
+    do {                                                                                           \
+        IS(status, call);                                                                          \
+        if (status == MBM_PENDING)                                                                 \
+            OK(mbm_client_cancel(&client, r));                                                     \
     } while (0)
     ASKED(mbm_client_readCoils(&client, r, 0, 1));
     ASKED(mbm_client_readSingleCoil(&client, r, 0));
@@ -146,9 +146,7 @@ static void begin_client(int framing)
     switch (framing) {
     case 0: OK(mbm_client_beginRtu(&client, &port, small_frame, 256)); break;
     case 1: OK(mbm_client_beginAscii(&client, &port, small_frame, 256)); break;
-    case 2:
-        OK(mbm_client_beginTcp(&client, &port, small_frame, 260, other_frame, 260));
-        break;
+    case 2: OK(mbm_client_beginTcp(&client, &port, small_frame, 260, other_frame, 260)); break;
     default: OK(mbm_client_beginRtuOverTcp(&client, &port, small_frame, 256));
     }
     OK(mbm_client_setResponseTimeout(&client, 20));

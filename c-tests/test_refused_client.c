@@ -41,8 +41,7 @@ static uint8_t begin_client(int framing, uint16_t in, uint16_t out)
     }
 }
 
-static void all_client_begins_are(uint8_t status, const mbm_port *p, uint8_t *frame,
-                                  uint16_t bytes)
+static void all_client_begins_are(uint8_t status, const mbm_port *p, uint8_t *frame, uint16_t bytes)
 {
     REFUSED(status, client, mbm_client_beginRtu(&client, p, frame, bytes));
     REFUSED(status, client, mbm_client_beginAscii(&client, p, frame, bytes));
@@ -62,12 +61,10 @@ static void a_zeroed_client_stays_zero_when_a_begin_is_refused(void **state)
     all_client_begins_are(MBM_INVALID_ARGUMENT, NULL, small, 16);
     all_client_begins_are(MBM_INVALID_ARGUMENT, &port, NULL, 16);
     all_client_begins_are(MBM_INVALID_ARGUMENT, &port, small, 7);
-    REFUSED(MBM_INVALID_ARGUMENT, client,
-            mbm_client_beginTcp(&client, &port, small, 8, small, 12));
+    REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_beginTcp(&client, &port, small, 8, small, 12));
     REFUSED(MBM_INVALID_ARGUMENT, client,
             mbm_client_beginTcp(&client, &port, small, 16, small, 11));
-    REFUSED(MBM_INVALID_ARGUMENT, client,
-            mbm_client_beginTcp(&client, &port, small, 16, NULL, 12));
+    REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_beginTcp(&client, &port, small, 16, NULL, 12));
     assert_int_equal(mbm_client_pending(&client), 0);
     REFUSED(MBM_NOT_INITIALISED, client, mbm_client_setRetries(&client, 1));
 }
@@ -137,8 +134,7 @@ static void a_client_goes_on_when_calls_were_refused(void **state)
                 mbm_client_writeMultipleRegisters(&client, &other, 0, 1));
         IS(MBM_INVALID_ARGUMENT, other.status);
         if (framing == 2)
-            REFUSED(MBM_DUPLICATE_TRANSACTION, client,
-                    mbm_client_readCoils(&client, &other, 0, 1));
+            REFUSED(MBM_DUPLICATE_TRANSACTION, client, mbm_client_readCoils(&client, &other, 0, 1));
         other.unit = 0;
         REFUSED(MBM_BROADCAST_NOT_ALLOWED, client, mbm_client_readCoils(&client, &other, 0, 1));
         IS(MBM_BROADCAST_NOT_ALLOWED, other.status);

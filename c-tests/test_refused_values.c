@@ -24,11 +24,11 @@ static void values_that_are_refused_are_as_they_were(void **state)
     memset(bytes, 0x22, 2);
     memset(coils, 1, sizeof coils);
     OK(mbm_registers_intoWords(&r, two, 2, 100));
-#define KEPT(status, call)                                                                        \
-    do {                                                                                          \
-        IS(status, call);                                                                         \
-        assert_true(two[0] == 0x1111 && two[1] == 0x1111);                                        \
-        assert_true(bytes[0] == 0x22 && bytes[1] == 0x22);                                        \
+#define KEPT(status, call)                                                                         \
+    do {                                                                                           \
+        IS(status, call);                                                                          \
+        assert_true(two[0] == 0x1111 && two[1] == 0x1111);                                         \
+        assert_true(bytes[0] == 0x22 && bytes[1] == 0x22);                                         \
     } while (0)
     KEPT(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_setBit(&r, 102, 0, 1));
     KEPT(MBM_INVALID_ARGUMENT, mbm_registers_setBit(&r, 100, 16, 1));
@@ -67,18 +67,18 @@ static void lengths_are_0_whenever_there_is_none(void **state)
     mbm_unit unit;
 
     (void)state;
-#define NO_LENGTH(status, call)                                                                   \
-    do {                                                                                          \
-        length = 0x7777;                                                                          \
-        IS(status, call);                                                                         \
-        assert_int_equal(length, 0);                                                              \
+#define NO_LENGTH(status, call)                                                                    \
+    do {                                                                                           \
+        length = 0x7777;                                                                           \
+        IS(status, call);                                                                          \
+        assert_int_equal(length, 0);                                                               \
     } while (0)
-#define UNKNOWN(status, call)                                                                     \
-    do {                                                                                          \
-        memset(&expected, 0x77, sizeof expected);                                                 \
-        IS(status, call);                                                                         \
-        assert_int_equal(expected.bytes, 0);                                                      \
-        assert_int_equal(expected.kind, MBM_LENGTH_UNKNOWN);                                      \
+#define UNKNOWN(status, call)                                                                      \
+    do {                                                                                           \
+        memset(&expected, 0x77, sizeof expected);                                                  \
+        IS(status, call);                                                                          \
+        assert_int_equal(expected.bytes, 0);                                                       \
+        assert_int_equal(expected.kind, MBM_LENGTH_UNKNOWN);                                       \
     } while (0)
     memset(&unit, 0, sizeof unit);
     NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_server_respond(4, &unit, 1, frame, 8, 16, &length));
@@ -95,8 +95,8 @@ static void lengths_are_0_whenever_there_is_none(void **state)
     NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_frame_exception(&rtu, &packet, 0, frame, 16, &length));
     NO_LENGTH(MBM_BUFFER_TOO_SMALL, mbm_frame_exception(&rtu, &packet, 1, frame, 4, &length));
     NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_frame_looksLikeTcp(NULL, 8, 0, &length));
-    NO_LENGTH(MBM_INCOMPLETE_FRAME, mbm_frame_looksLikeTcp((const uint8_t *)"\0\1\0\0", 4, 0,
-                                                           &length));
+    NO_LENGTH(MBM_INCOMPLETE_FRAME,
+              mbm_frame_looksLikeTcp((const uint8_t *)"\0\1\0\0", 4, 0, &length));
     UNKNOWN(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(&rtu, 9, frame, 2, &expected));
     UNKNOWN(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(NULL, 0, frame, 2, &expected));
     UNKNOWN(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(&rtu, NULL, &expected));

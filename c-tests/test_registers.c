@@ -29,7 +29,10 @@ static void to_words(uint16_t *words, const uint8_t *bytes, unsigned count)
         *words++ = (uint16_t)(bytes[0] << 8 | bytes[1]);
 }
 
-static int same(const void *a, const void *b, size_t size) { return memcmp(a, b, size) == 0; }
+static int same(const void *a, const void *b, size_t size)
+{
+    return memcmp(a, b, size) == 0;
+}
 
 static void a_double_word_is_read_in_four_orders(void **state)
 {
@@ -77,8 +80,8 @@ static void floats_are_those_of_ieee_754(void **state)
         float value;
         uint16_t high, low;
     } cases[] = {
-        {1.0f, 0x3F80, 0x0000},   {-2.0f, 0xC000, 0x0000}, {230.5f, 0x4366, 0x8000},
-        {0.1f, 0x3DCC, 0xCCCD},   {0.0f, 0x0000, 0x0000},  {INFINITY, 0x7F80, 0x0000},
+        {1.0f, 0x3F80, 0x0000},         {-2.0f, 0xC000, 0x0000}, {230.5f, 0x4366, 0x8000},
+        {0.1f, 0x3DCC, 0xCCCD},         {0.0f, 0x0000, 0x0000},  {INFINITY, 0x7F80, 0x0000},
         {-123456.789f, 0xC7F1, 0x2065},
     };
     uint16_t words[2];
@@ -301,8 +304,7 @@ static void bytes_of_a_device_that_swaps_them_are_put_in_order(void **state)
         assert_int_equal(back[5], i < 2 ? 9 : 6);
     }
     memset(bytes, 7, 5);
-    IS(MBM_ILLEGAL_DATA_ADDRESS,
-       mbm_registers_getBytesInOrder(&r, 41, MBM_ORDER_BADC, bytes, 5));
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_getBytesInOrder(&r, 41, MBM_ORDER_BADC, bytes, 5));
     IS(MBM_ILLEGAL_DATA_ADDRESS,
        mbm_registers_setBytesInOrder(&r, 41, MBM_ORDER_BADC, straight, 5));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_getBytesInOrder(&r, 40, 5, bytes, 2));

@@ -64,9 +64,7 @@ static uint8_t serve(mbm_unit *unit, records *r, int family)
         r->holding.words = words;
         r->holding.size = 4;
         return mbm_server_serveHoldingRegisters(unit, &r->holding);
-    case 3:
-        r->cells.get = get;
-        return mbm_server_serveCallbacks(unit, &r->cells, 4);
+    case 3: r->cells.get = get; return mbm_server_serveCallbacks(unit, &r->cells, 4);
     case 4: return mbm_server_serveExceptionStatus(unit, &r->status);
     case 5: return mbm_server_serveDiagnostics(unit, &r->diagnostics);
     case 6:
@@ -94,13 +92,13 @@ static uint8_t serve(mbm_unit *unit, records *r, int family)
 
 static void zero(records *r, int family)
 {
-    void *record[FAMILIES] = {&r->coils,  &r->discrete,    &r->holding, &r->cells,
-                              &r->status, &r->diagnostics, &r->id,      &r->files,
+    void *record[FAMILIES] = {&r->coils,  &r->discrete,       &r->holding, &r->cells,
+                              &r->status, &r->diagnostics,    &r->id,      &r->files,
                               &r->fifos,  &r->identification, &r->custom};
-    const size_t size[FAMILIES] = {sizeof r->coils,  sizeof r->discrete,    sizeof r->holding,
-                                   sizeof r->cells,  sizeof r->status,      sizeof r->diagnostics,
-                                   sizeof r->id,     sizeof r->files,       sizeof r->fifos,
-                                   sizeof r->identification, sizeof r->custom};
+    const size_t size[FAMILIES] = {
+        sizeof r->coils,  sizeof r->discrete,       sizeof r->holding, sizeof r->cells,
+        sizeof r->status, sizeof r->diagnostics,    sizeof r->id,      sizeof r->files,
+        sizeof r->fifos,  sizeof r->identification, sizeof r->custom};
 
     memset(record[family], 0, size[family]);
 }
@@ -110,10 +108,9 @@ static const struct {
     const char *pdu;
     size_t length;
 } requests[FAMILIES] = {
-    {"\x01\0\0\0\1", 5}, {"\x02\0\0\0\1", 5}, {"\x03\0\0\0\1", 5},
-    {"\x04\0\0\0\1", 5}, {"\x07", 1},         {"\x08\0\0\1\2", 5},
-    {"\x11", 1},         {"\x14\7\6\0\1\0\0\0\1", 9}, {"\x18\0\0", 3},
-    {"\x2B\x0E\1\0", 4}, {"\x41\1", 2},
+    {"\x01\0\0\0\1", 5}, {"\x02\0\0\0\1", 5}, {"\x03\0\0\0\1", 5}, {"\x04\0\0\0\1", 5},
+    {"\x07", 1},         {"\x08\0\0\1\2", 5}, {"\x11", 1},         {"\x14\7\6\0\1\0\0\0\1", 9},
+    {"\x18\0\0", 3},     {"\x2B\x0E\1\0", 4}, {"\x41\1", 2},
 };
 
 /* The function code that answers a request to `unit`; 0 for none. */
@@ -483,8 +480,7 @@ int main(void)
                                reset),
         cmocka_unit_test_setup(what_a_unit_has_no_place_for_is_refused, reset),
         cmocka_unit_test_setup(switches_are_set_up_again_like_any_record, reset),
-        cmocka_unit_test_setup(a_request_goes_on_with_the_table_that_its_hook_sets_up_anew,
-                               reset),
+        cmocka_unit_test_setup(a_request_goes_on_with_the_table_that_its_hook_sets_up_anew, reset),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

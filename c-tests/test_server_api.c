@@ -289,7 +289,7 @@ static void a_function_of_ours_says_what_is_answered(void **state)
     OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
     OK(mbm_server_serveCustom(&unit, &custom));
     said = 2;
-    assert_int_equal(ASK("\x64" "abc"), 6);
+    assert_int_equal(ASK("\144abc"), 6); /* in octal, which ends after three digits */
     assert_memory_equal(wire.sent, "\x11\x64\x5A\x5A", 4);
     assert_int_equal(seen.length, 3);
     assert_int_equal(seen.unit, 17);
@@ -401,8 +401,8 @@ static void a_response_that_the_port_takes_in_pieces_arrives_whole(void **state)
 
 static void the_length_of_ours_frames_rtu_over_tcp(void **state)
 {
-    const mbm_rule rules[] = {{MBM_RULE_FIXED, 4, 0}, {MBM_RULE_COUNTED, 1, 1}, {MBM_RULE_SILENCE, 0, 0}};
-    const char *pdus[] = {"\x64" "abc", "\x64\1x!", "\x64" "12345"};
+    mbm_rule rules[] = {{MBM_RULE_FIXED, 4, 0}, {MBM_RULE_COUNTED, 1, 1}, {MBM_RULE_SILENCE, 0, 0}};
+    const char *pdus[] = {"\144abc", "\144\1x!", "\14412345"};
     const size_t lengths[] = {4, 4, 6};
     unsigned i;
 

@@ -129,7 +129,8 @@ static int16_t noisy_read(void *context, uint8_t *bytes, uint16_t capacity)
 
 static void a_poll_takes_no_more_than_some_hundred_bytes_of_noise(void **state)
 {
-    static const begin begins[] = {mbm_server_begin, mbm_server_beginAscii, mbm_server_beginRtuOverTcp};
+    static const begin begins[] = {mbm_server_begin, mbm_server_beginAscii,
+                                   mbm_server_beginRtuOverTcp};
     mbm_port noisy = port;
     unsigned i, polls;
 

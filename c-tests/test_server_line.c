@@ -89,8 +89,8 @@ static void ascii_serves_every_function_too(void **state)
 static void a_broadcast_is_carried_out_and_not_answered(void **state)
 {
     (void)state;
-    asked_frames(modbus_get_socket(client), MBM_FRAMING_RTU, 0, (const uint8_t *)"\x06\0\x64\x33\x44", 5,
-                 NULL, 0);
+    asked_frames(modbus_get_socket(client), MBM_FRAMING_RTU, 0,
+                 (const uint8_t *)"\x06\0\x64\x33\x44", 5, NULL, 0);
     AWAIT(rtu.words[0] == 0x3344);
     assert_int_equal(modbus_write_register(client, SERVED_BASE, 1), 1);
 }

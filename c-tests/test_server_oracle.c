@@ -146,8 +146,7 @@ static size_t by_the_book(const uint8_t *pdu, size_t length, uint8_t *out)
         for (i = 0; i < written; i++)
             model.words[0][to - BASE + i] = (uint16_t)word(pdu + 10 + 2 * i);
         return words_of(out, function, &model.words[0][address - BASE], quantity);
-    default:
-        return refuse(out, function, 1);
+    default: return refuse(out, function, 1);
     }
 }
 
@@ -168,18 +167,16 @@ static unsigned some_quantity(void)
     static const unsigned edges[] = {0, 1, 121, 122, 123, 124, 125, 126, 1968, 1969, 2000, 2001};
 
     switch (below(8)) {
-    case 0:
-        return below(0x10000);
-    case 1:
-        return edges[below(COUNT(edges))];
-    default:
-        return below(20);
+    case 0: return below(0x10000);
+    case 1: return edges[below(COUNT(edges))];
+    default: return below(20);
     }
 }
 
 static size_t some_request(uint8_t *pdu)
 {
-    static const uint8_t functions[] = {1, 2, 3, 4, 5, 6, 0x0F, 0x10, 0x16, 0x17, 0x18, 0x41, 0, 0x83};
+    static const uint8_t functions[] = {1,    2,    3,    4,    5,    6, 0x0F,
+                                        0x10, 0x16, 0x17, 0x18, 0x41, 0, 0x83};
     static const unsigned values[] = {0, 0xFF00, 0x100, 0xFF01};
     size_t n = 1;
     unsigned quantity, bytes;
@@ -187,9 +184,7 @@ static size_t some_request(uint8_t *pdu)
     pdu[0] = functions[below(COUNT(functions))];
     n += put(pdu + n, some_address());
     switch (pdu[0]) {
-    case 5:
-        n += put(pdu + n, values[below(COUNT(values))]);
-        break;
+    case 5: n += put(pdu + n, values[below(COUNT(values))]); break;
     case 0x16:
         n += put(pdu + n, below(0x10000));
         n += put(pdu + n, below(0x10000));
@@ -209,20 +204,13 @@ static size_t some_request(uint8_t *pdu)
         while (bytes--)
             pdu[n++] = (uint8_t)below(256);
         break;
-    default:
-        n += put(pdu + n, pdu[0] == 6 ? below(0x10000) : some_quantity());
+    default: n += put(pdu + n, pdu[0] == 6 ? below(0x10000) : some_quantity());
     }
     switch (below(24)) {
-    case 0:
-        return 1 + below((unsigned)n);
-    case 1:
-        pdu[n] = (uint8_t)below(256);
-        return n < 253 ? n + 1 : n;
-    case 2:
-        pdu[below((unsigned)n)] = (uint8_t)below(256);
-        return n;
-    default:
-        return n;
+    case 0: return 1 + below((unsigned)n);
+    case 1: pdu[n] = (uint8_t)below(256); return n < 253 ? n + 1 : n;
+    case 2: pdu[below((unsigned)n)] = (uint8_t)below(256); return n;
+    default: return n;
     }
 }
 
@@ -235,8 +223,8 @@ static int prepare(void **state)
     memset(memory.coils, 0, sizeof memory.coils);
     memset(memory.discrete, 0, sizeof memory.discrete);
     memset(valid, 0xFF, sizeof valid);
-    valid[20 / 8] &= (uint8_t)~(1u << 20 % 8);
-    valid[33 / 8] &= (uint8_t)~(1u << 33 % 8);
+    valid[20 / 8] &= (uint8_t) ~(1u << 20 % 8);
+    valid[33 / 8] &= (uint8_t) ~(1u << 33 % 8);
     for (i = 0; i < CELLS; i++) {
         model.words[0][i] = memory.holding[i] = (uint16_t)below(0x10000);
         model.words[1][i] = memory.inputs[i] = (uint16_t)below(0x10000);
@@ -253,8 +241,9 @@ static int prepare(void **state)
     holding.base = inputs.base = coils.base = discrete.base = BASE;
     holding.size = inputs.size = coils.size = discrete.size = CELLS;
     holding.valid = inputs.valid = coils.valid = discrete.valid = valid;
-    return mbm_server_serveHoldingRegisters(&unit, &holding) | mbm_server_serveInputRegisters(&unit, &inputs) |
-           mbm_server_serveCoils(&unit, &coils) | mbm_server_serveDiscreteInputs(&unit, &discrete) |
+    return mbm_server_serveHoldingRegisters(&unit, &holding) |
+           mbm_server_serveInputRegisters(&unit, &inputs) | mbm_server_serveCoils(&unit, &coils) |
+           mbm_server_serveDiscreteInputs(&unit, &discrete) |
            mbm_server_serveMaskAndReadWrite(&holding);
 }
 
@@ -274,14 +263,10 @@ static uint16_t get(void *context, uint16_t address)
 
     assert_true(there(address, 1));
     switch ((int)((mbm_cells *)context - callbacks) + 1) {
-    case 1:
-        return memory.coils[i / 8] >> i % 8 & 1;
-    case 2:
-        return memory.discrete[i / 8] >> i % 8 & 1 ? 0x100 : 0;
-    case 3:
-        return memory.holding[i];
-    default:
-        return memory.inputs[i];
+    case 1: return memory.coils[i / 8] >> i % 8 & 1;
+    case 2: return memory.discrete[i / 8] >> i % 8 & 1 ? 0x100 : 0;
+    case 3: return memory.holding[i];
+    default: return memory.inputs[i];
     }
 }
 
@@ -295,7 +280,7 @@ static void set(void *context, uint16_t address, uint16_t value)
         return;
     }
     assert_true(context == &callbacks[0] && value <= 1);
-    memory.coils[i / 8] &= (uint8_t)~(1u << i % 8);
+    memory.coils[i / 8] &= (uint8_t) ~(1u << i % 8);
     memory.coils[i / 8] |= (uint8_t)(value << i % 8);
 }
 
@@ -310,7 +295,8 @@ static int prepare_callbacks(void **state)
         callbacks[i].get = get;
         callbacks[i].context = &callbacks[i];
         if (i % 2 == 0) {
-            IS(MBM_INVALID_ARGUMENT, mbm_server_serveCallbacks(&called, &callbacks[i], (uint8_t)(i + 1)));
+            IS(MBM_INVALID_ARGUMENT,
+               mbm_server_serveCallbacks(&called, &callbacks[i], (uint8_t)(i + 1)));
             callbacks[i].set = set;
         }
         status |= mbm_server_serveCallbacks(&called, &callbacks[i], (uint8_t)(i + 1));
@@ -347,7 +333,8 @@ static void ask(mbm_unit *asked)
         seal(frame, length + 1);
         if (damaged)
             frame[below((unsigned)length + 3)] ^= (uint8_t)(1u << below(8));
-        OK(mbm_server_respond(MBM_FRAMING_RTU, asked, 1, frame, (uint16_t)(length + 3), sizeof frame, &answered));
+        OK(mbm_server_respond(MBM_FRAMING_RTU, asked, 1, frame, (uint16_t)(length + 3),
+                              sizeof frame, &answered));
         if (damaged) {
             assert_int_equal(answered, 0);
         } else {

@@ -87,7 +87,8 @@ static uint32_t port_micros(void *context)
 }
 
 /* Takes all the room that there is, and more than the request's data. */
-static uint16_t fill(void *context, const mbm_request *request, uint8_t *response, uint16_t capacity)
+static uint16_t fill(void *context, const mbm_request *request, uint8_t *response,
+                     uint16_t capacity)
 {
     uint8_t sum = 0;
     uint16_t i;
@@ -229,8 +230,8 @@ static void noise(unsigned count, unsigned seed)
 static void flood(begin_function *how, unsigned size)
 {
     static const uint8_t read[] = {3, 0, 0, 0, 2};
-    const unsigned counts[] = {1,        2,        3,        4,        size - 5, size - 4,
-                               size - 3, size - 2, size - 1, size,     size + 1, size + 3,
+    const unsigned counts[] = {1,        2,        3,        4,           size - 5, size - 4,
+                               size - 3, size - 2, size - 1, size,        size + 1, size + 3,
                                size + 4, size + 5, 2 * size, 2 * size + 3};
     uint8_t frame[2 * MOST];
     unsigned i, pieces;

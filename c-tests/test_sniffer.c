@@ -119,14 +119,15 @@ static void every_example_is_found_as_a_frame(void **state)
             packet.unit = 17;
             OK(mbm_frame_build(&framing, &packet, frame, sizeof frame, &size));
             /* Only the direction tells an unasked reply from a request. */
-            assert_int_equal(mbm_sniffer_feed(&sniffer, side == MBM_PACKET_REQUEST
-                                                            ? MBM_TAP_CLIENT
-                                                            : MBM_TAP_SERVER, frame, size, now),
-                             size);
+            assert_int_equal(
+                mbm_sniffer_feed(&sniffer,
+                                 side == MBM_PACKET_REQUEST ? MBM_TAP_CLIENT : MBM_TAP_SERVER,
+                                 frame, size, now),
+                size);
             now += 10000;
             assert_int_equal(mbm_sniffer_next(&sniffer, now, &event), 1);
-            assert_int_equal(event.kind, side == MBM_PACKET_REQUEST ? MBM_EVENT_REQUEST
-                                                                    : MBM_EVENT_UNPAIRED);
+            assert_int_equal(event.kind,
+                             side == MBM_PACKET_REQUEST ? MBM_EVENT_REQUEST : MBM_EVENT_UNPAIRED);
             assert_int_equal(event.pduLength, length);
             assert_memory_equal(event.pdu, pdu, length);
         }
@@ -181,8 +182,8 @@ static void more_than_the_buffer_holds_is_fed_in_parts(void **state)
     }
     OK(mbm_sniffer_begin(&sniffer, &framing, small, sizeof small));
     while (fed < length) {
-        uint16_t taken = mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, traffic + fed,
-                                          (uint16_t)(length - fed), 0);
+        uint16_t taken =
+            mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, traffic + fed, (uint16_t)(length - fed), 0);
 
         assert_true(taken > 0);
         fed = (uint16_t)(fed + taken);
@@ -302,7 +303,8 @@ static void a_text_that_does_not_fit_is_cut_and_ends_all_the_same(void **state)
        mbm_frame_text(&framing, MBM_PACKET_RESPONSE, frame, length, text, 15));
     assert_string_equal(text, "unit 17  reply");
     assert_int_equal(text[15], 'x');
-    IS(MBM_BUFFER_TOO_SMALL, mbm_frame_text(&framing, MBM_PACKET_RESPONSE, frame, length, text, 56));
+    IS(MBM_BUFFER_TOO_SMALL,
+       mbm_frame_text(&framing, MBM_PACKET_RESPONSE, frame, length, text, 56));
     OK(mbm_frame_text(&framing, MBM_PACKET_RESPONSE, frame, length, text, 57));
     IS(MBM_BUFFER_TOO_SMALL, mbm_frame_text(&framing, MBM_PACKET_RESPONSE, frame, length, text, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_text(&framing, 2, frame, length, text, 57));

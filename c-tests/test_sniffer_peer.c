@@ -150,8 +150,9 @@ static void assert_told(const modbus_mapping_t *mapping)
     unsigned i;
 
     for (i = 0; i < line.count; i++) {
-        uint8_t kind = i % 2 == 0 ? MBM_EVENT_REQUEST
-                                  : i == 2 * CALLS - 1 ? MBM_EVENT_EXCEPTION : MBM_EVENT_REPLY;
+        uint8_t kind = i % 2 == 0           ? MBM_EVENT_REQUEST
+                       : i == 2 * CALLS - 1 ? MBM_EVENT_EXCEPTION
+                                            : MBM_EVENT_REPLY;
 
         if (t[i].event.kind != kind || t[i].event.function != functions[i / 2])
             fail_msg("event %u: %s", i, t[i].text);

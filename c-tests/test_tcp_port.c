@@ -234,9 +234,8 @@ static void what_came_before_the_end_is_still_read(void **state)
     tcp_peer_fault(peer, 1, FAULT_HALF, 4);
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     await_connection();
-    assert_int_equal(port.write(port.context,
-                                (const uint8_t[12]){0, 1, 0, 0, 0, 6, 7, 3, 0, 5, 0, 1}, 12),
-                     12);
+    assert_int_equal(
+        port.write(port.context, (const uint8_t[12]){0, 1, 0, 0, 0, 6, 7, 3, 0, 5, 0, 1}, 12), 12);
     assert_int_equal(take(bytes, 4), 4);
     assert_int_equal(take(bytes, 1), -1);
 }

@@ -26,7 +26,9 @@ static mbm_tcp tcps[MANY];
 static int peers[MANY];
 static unsigned peer_count;
 static struct rlimit found;
-static time_t ahead; /* seconds that the clock of the port is fast */
+static time_t ahead;            /* seconds that the clock of the port is fast */
+static struct timespec stopped; /* where it stands, or 0: it goes on */
+static long look_ms;            /* that a look at a clock which stands takes */
 
 /* The program's own comes before that of libc. */
 int clock_gettime(clockid_t id, struct timespec *time)
@@ -35,6 +37,10 @@ int clock_gettime(clockid_t id, struct timespec *time)
 
     if (result == 0)
         time->tv_sec += ahead;
+    if (result == 0 && stopped.tv_sec) {
+        stopped.tv_nsec += look_ms * 1000000;
+        *time = stopped;
+    }
     return result;
 }
 
@@ -49,6 +55,8 @@ static int begin(void **state)
     (void)state;
     alarm(3 * PATIENCE_MS / 1000);
     ahead = 0;
+    stopped = (struct timespec){0};
+    look_ms = 0;
     peer_count = 0;
     memset(&set, 0, sizeof set);
     memset(&listener, 0, sizeof listener);
@@ -396,6 +404,24 @@ static void a_connection_that_is_closed_as_idle_is_ready(void **state)
     assert_int_equal(listener.refused, 0);
 }
 
+/* On a slow machine the clock goes on while the connections are looked at. */
+static void of_connections_that_are_idle_as_long_the_first_is_closed(void **state)
+{
+    (void)state;
+    begin_to_listen();
+    listener.idleTime = MINUTE_MS;
+    stopped.tv_sec = 1000;
+    take_all_places();
+    stopped.tv_sec += 61;
+    look_ms = 1;
+    connect_some(1);
+    wait_for_connection();
+    assert_fails(EAGAIN, accept_one());
+    assert_int_equal(listener.idle, 1);
+    assert_int_equal(is_lost(0), 1);
+    assert_int_equal(is_lost(1), 0);
+}
+
 /* The next descriptor would be one too many. */
 static void leave_no_descriptor(void)
 {
@@ -456,6 +482,7 @@ int main(void)
         TEST(a_connection_that_is_taken_is_in_the_set_of_its_listener),
         TEST(accept_looks_only_once_the_set_knows_of_a_connection),
         TEST(a_connection_that_is_closed_as_idle_is_ready),
+        TEST(of_connections_that_are_idle_as_long_the_first_is_closed),
         TEST(without_a_descriptor_the_set_sleeps_and_tries_again),
     };
 

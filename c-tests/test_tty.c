@@ -99,9 +99,9 @@ static void every_rate_of_termios_can_be_set(void **state)
     static const struct {
         uint32_t baud;
         speed_t speed;
-    } rows[] = {{50, B50},         {134, B134},         {1200, B1200},       {38400, B38400},
-                {57600, B57600},   {115200, B115200},   {230400, B230400},   {460800, B460800},
-                {500000, B500000}, {921600, B921600},   {1000000, B1000000}, {1500000, B1500000},
+    } rows[] = {{50, B50},           {134, B134},        {1200, B1200},       {38400, B38400},
+                {57600, B57600},     {115200, B115200},  {230400, B230400},   {460800, B460800},
+                {500000, B500000},   {921600, B921600},  {1000000, B1000000}, {1500000, B1500000},
                 {3000000, B3000000}, {4000000, B4000000}};
     size_t i;
 
@@ -162,10 +162,14 @@ static void any_rate_is_set_where_it_is_asked_for(void **state)
 static void options_that_no_terminal_has_are_refused_with_einval(void **state)
 {
     static const mbm_tty_options bad[] = {
-        {.baud = 0, .parity = 'N', .stop = 1},     {.baud = 19201, .parity = 'N', .stop = 1},
-        {.baud = 9600, .parity = 0, .stop = 1},    {.baud = 9600, .parity = 'n', .stop = 1},
-        {.baud = 9600, .parity = 'M', .stop = 1},  {.baud = 9600, .parity = 'N', .stop = 0},
-        {.baud = 9600, .parity = 'N', .stop = 3},  {.baud = 9600, .parity = 'N', .stop = 1, .data = 6},
+        {.baud = 0, .parity = 'N', .stop = 1},
+        {.baud = 19201, .parity = 'N', .stop = 1},
+        {.baud = 9600, .parity = 0, .stop = 1},
+        {.baud = 9600, .parity = 'n', .stop = 1},
+        {.baud = 9600, .parity = 'M', .stop = 1},
+        {.baud = 9600, .parity = 'N', .stop = 0},
+        {.baud = 9600, .parity = 'N', .stop = 3},
+        {.baud = 9600, .parity = 'N', .stop = 1, .data = 6},
         {.baud = 9600, .parity = 'N', .stop = 1, .data = 9},
     };
     struct termios settings = settings_of(line.theirs);

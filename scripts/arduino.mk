@@ -90,7 +90,7 @@ avr-tests: $(AVR_TESTS)
 firmware-test-avr: need-avr
 	@$(MAKE) -s --no-print-directory avr-sketches avr-tests
 	@scripts/check-boards
-	@scripts/run-c-tests "" $(AVR_TESTS)
+	@MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/run-c-tests $(AVR_TESTS)
 
 
 .PHONY: timing

@@ -20,9 +20,18 @@
 class __FlashStringHelper;
 #define F(text) (reinterpret_cast<const __FlashStringHelper *>(text))
 
-inline unsigned long micros() { return bench().micros(); }
-inline unsigned long millis() { return bench().micros() / 1000; }
-inline void yield() { bench().yields++; }
+inline unsigned long micros()
+{
+    return bench().micros();
+}
+inline unsigned long millis()
+{
+    return bench().micros() / 1000;
+}
+inline void yield()
+{
+    bench().yields++;
+}
 
 class Stream {
 public:
@@ -46,13 +55,13 @@ class HardwareSerial : public Stream {
 public:
     typedef std::vector<uint8_t> Bytes;
 
-    unsigned long baud = 0;     /* 0: not open */
-    std::vector<Bytes> sent;    /* what went out between two flushes */
-    uint32_t sentAt = 0;        /* when the last byte had left */
-    uint32_t startedAt = 0;     /* when the first byte was handed over */
-    uint32_t delay = 1000;      /* from a flush to the reply, microseconds */
-    uint32_t character = 573;   /* between two bytes of a reply */
-    size_t room = SIZE_MAX;     /* bytes that one write takes */
+    unsigned long baud = 0;   /* 0: not open */
+    std::vector<Bytes> sent;  /* what went out between two flushes */
+    uint32_t sentAt = 0;      /* when the last byte had left */
+    uint32_t startedAt = 0;   /* when the first byte was handed over */
+    uint32_t delay = 1000;    /* from a flush to the reply, microseconds */
+    uint32_t character = 573; /* between two bytes of a reply */
+    size_t room = SIZE_MAX;   /* bytes that one write takes */
 
     void begin(unsigned long rate) { baud = rate; }
 

@@ -31,7 +31,10 @@ inline Bytes sealed(Bytes bytes)
 }
 
 /* A frame: the values and their CRC. */
-inline Bytes adu(std::initializer_list<int> values) { return sealed(raw(values)); }
+inline Bytes adu(std::initializer_list<int> values)
+{
+    return sealed(raw(values));
+}
 
 inline Bytes joined(Bytes first, const Bytes &second)
 {

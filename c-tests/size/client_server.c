@@ -15,8 +15,8 @@ int main(void)
         uart = CALL(mbm_client_beginRtu(&client, &port, frame, sizeof frame));
         uart = CALL(mbm_client_beginAscii(&client, &port, frame, sizeof frame));
         uart = CALL(mbm_client_beginRtuOverTcp(&client, &port, frame, sizeof frame));
-        uart = CALL(mbm_client_beginTcp(&client, &port, frame, sizeof frame, outgoing,
-                                        sizeof outgoing));
+        uart = CALL(
+            mbm_client_beginTcp(&client, &port, frame, sizeof frame, outgoing, sizeof outgoing));
         every_function();
     }
 }

@@ -65,8 +65,9 @@ void asked_writes(modbus_t *client, served *s)
 
     for (i = 0; i < MODBUS_MAX_WRITE_REGISTERS; i++)
         words[i] = (uint16_t)(i * 257);
-    assert_int_equal(modbus_write_registers(client, SERVED_BASE + 20, MODBUS_MAX_WRITE_REGISTERS, words),
-                     MODBUS_MAX_WRITE_REGISTERS);
+    assert_int_equal(
+        modbus_write_registers(client, SERVED_BASE + 20, MODBUS_MAX_WRITE_REGISTERS, words),
+        MODBUS_MAX_WRITE_REGISTERS);
     assert_memory_equal(&s->words[20], words, 2 * MODBUS_MAX_WRITE_REGISTERS);
     for (i = 0; i < MODBUS_MAX_WRITE_BITS; i++)
         cells[i] = i % 3 == 0;
@@ -82,10 +83,10 @@ void asked_writes(modbus_t *client, served *s)
     assert_int_equal(s->words[1], 0x0017);
     for (i = 0; i < MODBUS_MAX_WR_WRITE_REGISTERS; i++)
         words[i] = (uint16_t)(i + 7);
-    assert_int_equal(modbus_write_and_read_registers(client, SERVED_BASE + 2,
-                                                     MODBUS_MAX_WR_WRITE_REGISTERS, words,
-                                                     SERVED_BASE + 1, MODBUS_MAX_WR_READ_REGISTERS, back),
-                     MODBUS_MAX_WR_READ_REGISTERS);
+    assert_int_equal(
+        modbus_write_and_read_registers(client, SERVED_BASE + 2, MODBUS_MAX_WR_WRITE_REGISTERS,
+                                        words, SERVED_BASE + 1, MODBUS_MAX_WR_READ_REGISTERS, back),
+        MODBUS_MAX_WR_READ_REGISTERS);
     assert_int_equal(back[0], 0x0017);
     assert_memory_equal(&back[1], words, 2 * MODBUS_MAX_WR_WRITE_REGISTERS);
 }
@@ -123,8 +124,8 @@ void asked_refusals(modbus_t *client, served *s)
 
     EXCEPTION(3, modbus_write_register(client, SERVED_REFUSED, 0xBEEF));
     EXCEPTION(3, modbus_write_registers(client, SERVED_REFUSED - 1, 3, words));
-    EXCEPTION(3, modbus_write_and_read_registers(client, SERVED_REFUSED - 1, 3, words, SERVED_BASE, 1,
-                                                 back));
+    EXCEPTION(3, modbus_write_and_read_registers(client, SERVED_REFUSED - 1, 3, words, SERVED_BASE,
+                                                 1, back));
     assert_memory_equal(&s->words[159], before, sizeof before);
     assert_int_equal(modbus_write_register(client, SERVED_REFUSED, 0xBEEE), 1);
 }
@@ -256,7 +257,8 @@ void asked_functions(int fd, int framing, served *s)
     }
     asked_frames(fd, framing, SERVED_UNIT, group, sizeof group, records, sizeof records);
     ANSWERS("\x14\x07\x06\x00\x04\x00\x13\x00\x02", "\x94\x02");
-    ANSWERS("\x2B\x0E\x01\x00", "\x2B\x0E\x01\x83\x00\x00\x03\x00\x05Maker\x01\x05Thing\x02\x04V1.0");
+    ANSWERS("\x2B\x0E\x01\x00",
+            "\x2B\x0E\x01\x83\x00\x00\x03\x00\x05Maker\x01\x05Thing\x02\x04V1.0");
     ANSWERS("\x2B\x0E\x04\x80", "\x2B\x0E\x04\x83\x00\x00\x01\x80\x03own");
     ANSWERS("\x2B\x0E\x04\x44", "\xAB\x02");
     ANSWERS("\x41own data", "\x41own data");

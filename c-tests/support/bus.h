@@ -9,7 +9,7 @@ enum {
     BUS_BAUD = 19200,
     BUS_CHARACTER = 573, /* microseconds of 11 bits */
     BUS_TAPS = 8,
-    BUS_BYTES = 200000   /* in one test */
+    BUS_BYTES = 200000 /* in one test */
 };
 
 typedef struct bus bus;
@@ -22,12 +22,16 @@ typedef struct bus_tap {
 } bus_tap;
 
 struct bus {
-    uint64_t now; /* in microseconds */
+    uint64_t now;        /* in microseconds */
     unsigned collisions; /* bytes garbled */
     bus_tap taps[BUS_TAPS];
     unsigned tap_count;
     unsigned count;
-    struct { uint64_t end; bus_tap *from; uint8_t byte, garbled; } bytes[BUS_BYTES];
+    struct {
+        uint64_t end;
+        bus_tap *from;
+        uint8_t byte, garbled;
+    } bytes[BUS_BYTES];
 };
 
 /* Empties the bus and its taps. */

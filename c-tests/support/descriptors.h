@@ -7,10 +7,10 @@
 
 #include <valgrind/valgrind.h>
 
-#define SKIP_WITHOUT_LIMITS()   \
-    do {                        \
-        if (RUNNING_ON_VALGRIND) \
-            skip();             \
+#define SKIP_WITHOUT_LIMITS()                                                                      \
+    do {                                                                                           \
+        if (RUNNING_ON_VALGRIND)                                                                   \
+            skip();                                                                                \
     } while (0)
 
 #endif

@@ -11,11 +11,11 @@ enum { FAULT_UNIT = 1, FAULT_TRANSACTIONS = 5, FAULT_REGISTERS = 10 };
 typedef struct fault {
     const char *name;
     void (*play)(responder *r, const uint8_t *request);
-    uint8_t function;      /* of the five requests, 03 or 06 */
-    uint8_t echo;          /* the master is told to expect its echo */
-    const char *expected;  /* without a retry */
-    uint8_t status;        /* of the first transaction */
-    const char *retried;   /* with one retry */
+    uint8_t function;     /* of the five requests, 03 or 06 */
+    uint8_t echo;         /* the master is told to expect its echo */
+    const char *expected; /* without a retry */
+    uint8_t status;       /* of the first transaction */
+    const char *retried;  /* with one retry */
 } fault;
 
 extern const fault faults[];

@@ -153,7 +153,8 @@ static void clock_idle(void *context, mbm_master *master)
 
 mbm_port held_clock_port(held_clock *c, const mbm_port *line)
 {
-    mbm_port port = {.context = c, .read = clock_read, .write = clock_write, .micros = clock_micros};
+    mbm_port port = {
+        .context = c, .read = clock_read, .write = clock_write, .micros = clock_micros};
 
     c->port = *line;
     port.flush = line->flush ? clock_flush : NULL;

@@ -15,13 +15,13 @@
 
 typedef struct held_clock {
     pthread_mutex_t lock;
-    int64_t behind;   /* the machine's clock, by so many microseconds */
-    int64_t stopped;  /* what it shows while it stands still */
-    int64_t told;     /* what the master was told last */
-    int64_t due;      /* what it does not go beyond */
-    uint32_t bytes;   /* written, and not done with */
-    unsigned link;    /* connections that were forgotten */
-    mbm_port port;    /* of the line */
+    int64_t behind;  /* the machine's clock, by so many microseconds */
+    int64_t stopped; /* what it shows while it stands still */
+    int64_t told;    /* what the master was told last */
+    int64_t due;     /* what it does not go beyond */
+    uint32_t bytes;  /* written, and not done with */
+    unsigned link;   /* connections that were forgotten */
+    mbm_port port;   /* of the line */
 } held_clock;
 
 void held_clock_start(held_clock *c);

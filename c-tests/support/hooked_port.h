@@ -12,8 +12,8 @@ enum { HOOK_READ, HOOK_WRITE, HOOK_MICROS, HOOK_FLUSH, HOOK_PRE, HOOK_POST, HOOK
 typedef struct hooked_port {
     uint8_t arriving[600], sent[600];
     size_t first, last, length;
-    uint32_t now, step;     /* each look at the clock takes `step` microseconds */
-    uint8_t lost;           /* the link is lost */
+    uint32_t now, step; /* each look at the clock takes `step` microseconds */
+    uint8_t lost;       /* the link is lost */
     void (*within)(int hook);
     unsigned called[HOOKS];
 } hooked_port;

@@ -76,18 +76,10 @@ size_t model_answer(model *m, const request *r, uint8_t *reply)
     }
     cell = &m->holding[unit][to];
     switch (r->function) {
-    case 0x01:
-        length = pack(reply, &m->coils[unit][at], r->quantity);
-        break;
-    case 0x02:
-        length = pack(reply, &m->inputs[unit][at], r->quantity);
-        break;
-    case 0x03:
-        length = copy(reply, &m->holding[unit][at], r->quantity);
-        break;
-    case 0x04:
-        length = copy(reply, &m->readings[unit][at], r->quantity);
-        break;
+    case 0x01: length = pack(reply, &m->coils[unit][at], r->quantity); break;
+    case 0x02: length = pack(reply, &m->inputs[unit][at], r->quantity); break;
+    case 0x03: length = copy(reply, &m->holding[unit][at], r->quantity); break;
+    case 0x04: length = copy(reply, &m->readings[unit][at], r->quantity); break;
     case 0x05:
         m->coils[unit][to] = r->value != 0;
         length = repeat(reply, r);
@@ -115,8 +107,7 @@ size_t model_answer(model *m, const request *r, uint8_t *reply)
         store(cell, r->data, r->written);
         length = copy(reply, &m->holding[unit][at], r->quantity);
         break;
-    default:
-        break;
+    default: break;
     }
     return seal(reply, length);
 }

@@ -54,7 +54,7 @@ void program_start_limited(program *p, const char *name, const char *const *argu
         close_range(3, ~0u, 0);
         if (descriptors)
             must(setrlimit(RLIMIT_NOFILE, &limit) == 0, "setrlimit");
-        execv(path, (char *const *)(size_t)argv);
+        execv(path, (char *const *)argv);
         perror(path);
         _exit(127);
     }

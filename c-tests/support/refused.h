@@ -7,12 +7,12 @@
 /* Holds that a call returns a status and leaves an object as it was. Bytes between the
  * fields of an object may never have been written; valgrind would report that they are
  * compared. */
-#define REFUSED(status, object, call)                                                             \
-    do {                                                                                          \
-        (void)VALGRIND_MAKE_MEM_DEFINED(&(object), sizeof(object));                               \
-        memcpy(before, &(object), sizeof(object));                                                \
-        IS(status, call);                                                                         \
-        assert_memory_equal(before, &(object), sizeof(object));                                   \
+#define REFUSED(status, object, call)                                                              \
+    do {                                                                                           \
+        (void)VALGRIND_MAKE_MEM_DEFINED(&(object), sizeof(object));                                \
+        memcpy(before, &(object), sizeof(object));                                                 \
+        IS(status, call);                                                                          \
+        assert_memory_equal(before, &(object), sizeof(object));                                    \
     } while (0)
 
 static uint8_t before[8192];

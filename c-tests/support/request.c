@@ -10,18 +10,17 @@ int request_size(const uint8_t *frame, size_t have)
     if (have < 2)
         return 0;
     switch (frame[1]) {
-    case 0x01: case 0x02: case 0x03: case 0x04: case 0x05: case 0x06:
-        return 8;
-    case 0x16:
-        return 10;
-    case 0x0F: case 0x10:
-        count_at = 6;
-        break;
-    case 0x17:
-        count_at = 10;
-        break;
-    default:
-        return -1;
+    case 0x01:
+    case 0x02:
+    case 0x03:
+    case 0x04:
+    case 0x05:
+    case 0x06: return 8;
+    case 0x16: return 10;
+    case 0x0F:
+    case 0x10: count_at = 6; break;
+    case 0x17: count_at = 10; break;
+    default: return -1;
     }
     return have > count_at ? (int)(count_at + 1 + frame[count_at] + 2) : 0;
 }
@@ -50,16 +49,12 @@ int request_parse(request *r, const uint8_t *frame, size_t length)
     r->quantity = r->value = be16(frame + 4);
     r->data = frame + 7;
     switch (r->function) {
-    case 0x01: case 0x02:
-        return range(r->address, r->quantity, 2000);
-    case 0x03: case 0x04:
-        return range(r->address, r->quantity, 125);
-    case 0x05:
-        r->written = 1;
-        return r->value == 0 || r->value == 0xFF00;
-    case 0x06:
-        r->written = 1;
-        return 1;
+    case 0x01:
+    case 0x02: return range(r->address, r->quantity, 2000);
+    case 0x03:
+    case 0x04: return range(r->address, r->quantity, 125);
+    case 0x05: r->written = 1; return r->value == 0 || r->value == 0xFF00;
+    case 0x06: r->written = 1; return 1;
     case 0x0F:
         r->written = r->quantity;
         return range(r->address, r->quantity, 1968) && frame[6] == (r->quantity + 7) / 8 &&

@@ -49,7 +49,8 @@ static void after(void *context, uint16_t address, uint16_t quantity)
     ((served *)context)->written++;
 }
 
-static uint16_t echo(void *context, const mbm_request *request, uint8_t *response, uint16_t capacity)
+static uint16_t echo(void *context, const mbm_request *request, uint8_t *response,
+                     uint16_t capacity)
 {
     (void)context;
     if (request->length == 0)
@@ -63,8 +64,8 @@ static uint16_t echo(void *context, const mbm_request *request, uint8_t *respons
 void served_prepare(served *s)
 {
     static const mbm_object objects[] = {
-        {(const uint8_t *)"Maker", 5, 0}, {(const uint8_t *)"Thing", 5, 1},
-        {(const uint8_t *)"V1.0", 4, 2},  {(const uint8_t *)"http://example.org", 18, 3},
+        {(const uint8_t *)"Maker", 5, 0},  {(const uint8_t *)"Thing", 5, 1},
+        {(const uint8_t *)"V1.0", 4, 2},   {(const uint8_t *)"http://example.org", 18, 3},
         {(const uint8_t *)"own", 3, 0x80},
     };
     unsigned i;
@@ -80,7 +81,7 @@ void served_prepare(served *s)
     }
     memset(s->valid, 0xFF, sizeof s->valid);
     i = SERVED_HOLE - SERVED_BASE;
-    s->valid[i / 8] &= (uint8_t)~(1u << i % 8);
+    s->valid[i / 8] &= (uint8_t) ~(1u << i % 8);
 
     s->units[0].id = SERVED_UNIT;
     s->units[1].id = SERVED_UNIT + 1;
@@ -185,8 +186,7 @@ static uint8_t begin(served *s, int index)
         return mbm_server_beginAscii(server, &port, s->units, 2, frame, MBM_MAX_ASCII_FRAME);
     case MBM_FRAMING_TCP:
         return mbm_server_beginTcp(server, &port, s->units, 2, frame, MBM_MAX_TCP_FRAME);
-    default:
-        return mbm_server_beginRtuOverTcp(server, &port, s->units, 2, frame, MBM_MAX_FRAME);
+    default: return mbm_server_beginRtuOverTcp(server, &port, s->units, 2, frame, MBM_MAX_FRAME);
     }
 }
 

@@ -10,13 +10,13 @@
 
 enum {
     SERVED_UNIT = 17,
-    SERVED_BASE = 100,      /* the address of the first cell of each table */
+    SERVED_BASE = 100, /* the address of the first cell of each table */
     SERVED_REGISTERS = 300,
     SERVED_BITS = 2400,
-    SERVED_HOLE = 250,      /* no holding register is there */
-    SERVED_REFUSED = 260,   /* no holding register may be written with BEEF */
+    SERVED_HOLE = 250,    /* no holding register is there */
+    SERVED_REFUSED = 260, /* no holding register may be written with BEEF */
     SERVED_CONNECTIONS = 4,
-    SERVED_ECHO = 0x41      /* a function that sends its data back */
+    SERVED_ECHO = 0x41 /* a function that sends its data back */
 };
 
 typedef struct served {

@@ -17,7 +17,7 @@ typedef struct sim_frame {
     uint64_t begin, end; /* first byte handed over; last bit gone */
     uint64_t silence;    /* from the last byte seen or sent to `begin` */
     uint16_t length;
-    uint8_t whole;       /* a request that the standard allows, right CRC */
+    uint8_t whole; /* a request that the standard allows, right CRC */
     uint8_t bytes[256];
 } sim_frame;
 
@@ -48,25 +48,32 @@ struct sim {
     /* what the test may hook in */
     void (*device)(sim *s, const sim_frame *frame); /* heard a whole request */
     void (*on_idle)(sim *s);
-    void (*tap)(sim *s, uint8_t byte);                  /* the master read a byte */
+    void (*tap)(sim *s, uint8_t byte); /* the master read a byte */
     void *context;
 
     /* what happened */
     sim_frame frames[SIM_FRAMES];
-    unsigned sent;                 /* frames begun, the last at sent - 1 */
-    char order[SIM_ORDER];         /* P W F O I R, runs collapsed */
+    unsigned sent;         /* frames begun, the last at sent - 1 */
+    char order[SIM_ORDER]; /* P W F O I R, runs collapsed */
     uint64_t order_at[SIM_ORDER];
     size_t order_length;
     unsigned idles, driver_on;
     unsigned idle_while_driving, write_without_driver, post_before_last_bit;
-    unsigned cut_allowed;          /* frames that the test itself cut short */
+    unsigned cut_allowed; /* frames that the test itself cut short */
     uint64_t last_byte, transmitted;
 
     /* what is still to arrive */
-    struct { uint64_t at; uint8_t byte; } incoming[SIM_BYTES];
+    struct {
+        uint64_t at;
+        uint8_t byte;
+    } incoming[SIM_BYTES];
     unsigned first, last;
-    struct { unsigned request; uint32_t delay; uint16_t length; uint8_t bytes[512]; }
-        answers[SIM_ANSWERS];
+    struct {
+        unsigned request;
+        uint32_t delay;
+        uint16_t length;
+        uint8_t bytes[512];
+    } answers[SIM_ANSWERS];
     unsigned answered;
     uint16_t busy;
 };
@@ -113,7 +120,9 @@ uint8_t sim_read_one(sim *s);
 void sim_reads(sim *s, uint32_t delay);
 
 /* The simulation and its master in a test. */
-#define NODE sim *s = (sim *)*state; mbm_master *n = &s->master
+#define NODE                                                                                       \
+    sim *s = (sim *)*state;                                                                        \
+    mbm_master *n = &s->master
 
 #define SIM_TEST(test) cmocka_unit_test_setup_teardown(test, sim_setup, sim_teardown)
 

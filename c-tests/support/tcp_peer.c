@@ -27,7 +27,7 @@ struct tcp_peer {
     modbus_t *replier;
     modbus_mapping_t *memory;
     pthread_t thread;
-    pthread_mutex_t lock;      /* of all below */
+    pthread_mutex_t lock; /* of all below */
     scripted script[TCP_PEER_SCRIPT];
     size_t scripts;
     tcp_fault kinds[FAULTS];
@@ -155,55 +155,32 @@ static int play(tcp_peer *p, stream *c, tcp_fault fault, unsigned argument, repl
     reply wrong = *r;
 
     switch (fault) {
-    case FAULT_DELAY:
-        stream_hold(c, r, now_ms(p) + argument, 0);
-        return 1;
-    case FAULT_HOLD:
-        stream_hold(c, r, now_ms(p) + PATIENCE_MS, argument);
-        return 1;
-    case FAULT_JOIN:
-        stream_join(c, r, now_ms(p) + PATIENCE_MS, argument);
-        return 1;
+    case FAULT_DELAY: stream_hold(c, r, now_ms(p) + argument, 0); return 1;
+    case FAULT_HOLD: stream_hold(c, r, now_ms(p) + PATIENCE_MS, argument); return 1;
+    case FAULT_JOIN: stream_join(c, r, now_ms(p) + PATIENCE_MS, argument); return 1;
     case FAULT_TWICE:
         stream_send_whole(c, r);
         stream_send_whole(c, r);
         return 1;
-    case FAULT_SPLIT:
-        stream_split(c, r, argument);
-        return 1;
+    case FAULT_SPLIT: stream_split(c, r, argument); return 1;
     case FAULT_OTHER_ID:
-    case FAULT_ALSO_OTHER_ID:
-        add16(wrong.bytes, argument);
-        break;
-    case FAULT_WRONG_PROTOCOL:
-        add16(wrong.bytes + 2, argument);
-        break;
-    case FAULT_WRONG_UNIT:
-        wrong.bytes[6] = (uint8_t)(wrong.bytes[6] + argument);
-        break;
-    case FAULT_WRONG_FUNCTION:
-        wrong.bytes[7] = (uint8_t)argument;
-        break;
+    case FAULT_ALSO_OTHER_ID: add16(wrong.bytes, argument); break;
+    case FAULT_WRONG_PROTOCOL: add16(wrong.bytes + 2, argument); break;
+    case FAULT_WRONG_UNIT: wrong.bytes[6] = (uint8_t)(wrong.bytes[6] + argument); break;
+    case FAULT_WRONG_FUNCTION: wrong.bytes[7] = (uint8_t)argument; break;
     case FAULT_GARBAGE:
         memset(garbage, 0xA5, sizeof garbage);
         stream_send_raw(c, garbage, argument < sizeof garbage ? argument : sizeof garbage);
         stream_send_whole(c, r);
         return 1;
-    case FAULT_SHORT_LENGTH:
-        add16(wrong.bytes + 4, 0u - argument);
-        break;
+    case FAULT_SHORT_LENGTH: add16(wrong.bytes + 4, 0u - argument); break;
     case FAULT_HALF:
         stream_send_raw(c, r->bytes, argument < r->length ? argument : r->length - 1);
         stream_end(c);
         return 0;
-    case FAULT_CLOSE:
-        stream_end(c);
-        return 0;
-    case FAULT_RESET:
-        stream_reset(c);
-        return 0;
-    default:
-        return 0;
+    case FAULT_CLOSE: stream_end(c); return 0;
+    case FAULT_RESET: stream_reset(c); return 0;
+    default: return 0;
     }
     stream_send_raw(c, wrong.bytes, wrong.length);
     if (fault == FAULT_ALSO_OTHER_ID)

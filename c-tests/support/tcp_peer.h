@@ -21,32 +21,32 @@
 #include <stdint.h>
 
 enum {
-    TCP_PEER_CELLS = 500,       /* of each of the four tables, from address 0 on */
-    TCP_PEER_CONNECTIONS = 8,   /* at once; more are closed at once */
-    TCP_PEER_SCRIPT = 4096,     /* faults to come */
-    TCP_PEER_FRAME = 260        /* bytes of the longest frame */
+    TCP_PEER_CELLS = 500,     /* of each of the four tables, from address 0 on */
+    TCP_PEER_CONNECTIONS = 8, /* at once; more are closed at once */
+    TCP_PEER_SCRIPT = 4096,   /* faults to come */
+    TCP_PEER_FRAME = 260      /* bytes of the longest frame */
 };
 
 /* What happens to the reply of a request; `argument` as said. */
 typedef enum tcp_fault {
-    FAULT_NONE,        /* the right reply, at once */
-    FAULT_DELAY,       /* the right reply, `argument` ms late; those behind it are not held up */
-    FAULT_HOLD,        /* the right reply, behind the next `argument` replies, or 250 ms late */
-    FAULT_JOIN,        /* in one send with the next `argument` replies, or 250 ms late */
-    FAULT_DROP,        /* carried out, and no reply */
-    FAULT_TWICE,       /* the right reply twice */
-    FAULT_SPLIT,       /* byte by byte, `argument` ms between */
-    FAULT_OTHER_ID,    /* a reply with the transaction id plus `argument`, and no right one */
-    FAULT_ALSO_OTHER_ID,   /* the same, and the right reply behind it */
-    FAULT_WRONG_PROTOCOL,  /* a reply of protocol `argument`, and no right one */
-    FAULT_WRONG_UNIT,      /* a reply of unit plus `argument`, and no right one */
-    FAULT_WRONG_FUNCTION,  /* a reply of function `argument`, and no right one */
-    FAULT_EXCEPTION,       /* exception `argument`; the request is not carried out */
-    FAULT_GARBAGE,         /* `argument` bytes that begin no header, then the right reply */
-    FAULT_SHORT_LENGTH,    /* the right reply, its length field `argument` too small */
-    FAULT_HALF,            /* the first `argument` bytes of the reply, then the end of the stream */
-    FAULT_CLOSE,           /* the end of the stream instead of a reply */
-    FAULT_RESET,           /* a reset (RST) of the connection instead of a reply */
+    FAULT_NONE,           /* the right reply, at once */
+    FAULT_DELAY,          /* the right reply, `argument` ms late; those behind it are not held up */
+    FAULT_HOLD,           /* the right reply, behind the next `argument` replies, or 250 ms late */
+    FAULT_JOIN,           /* in one send with the next `argument` replies, or 250 ms late */
+    FAULT_DROP,           /* carried out, and no reply */
+    FAULT_TWICE,          /* the right reply twice */
+    FAULT_SPLIT,          /* byte by byte, `argument` ms between */
+    FAULT_OTHER_ID,       /* a reply with the transaction id plus `argument`, and no right one */
+    FAULT_ALSO_OTHER_ID,  /* the same, and the right reply behind it */
+    FAULT_WRONG_PROTOCOL, /* a reply of protocol `argument`, and no right one */
+    FAULT_WRONG_UNIT,     /* a reply of unit plus `argument`, and no right one */
+    FAULT_WRONG_FUNCTION, /* a reply of function `argument`, and no right one */
+    FAULT_EXCEPTION,      /* exception `argument`; the request is not carried out */
+    FAULT_GARBAGE,        /* `argument` bytes that begin no header, then the right reply */
+    FAULT_SHORT_LENGTH,   /* the right reply, its length field `argument` too small */
+    FAULT_HALF,           /* the first `argument` bytes of the reply, then the end of the stream */
+    FAULT_CLOSE,          /* the end of the stream instead of a reply */
+    FAULT_RESET,          /* a reset (RST) of the connection instead of a reply */
     FAULTS
 } tcp_fault;
 
@@ -55,9 +55,9 @@ typedef struct tcp_peer tcp_peer;
 /* What the peer has seen, as counts since its start. */
 typedef struct tcp_peer_counts {
     unsigned connections, refused;
-    unsigned requests, replies;   /* whole requests; right replies sent, doubled ones once */
-    unsigned malformed;           /* what came that is no request: the connection is closed */
-    unsigned faults[FAULTS];  /* played */
+    unsigned requests, replies; /* whole requests; right replies sent, doubled ones once */
+    unsigned malformed;         /* what came that is no request: the connection is closed */
+    unsigned faults[FAULTS];    /* played */
 } tcp_peer_counts;
 
 tcp_peer *tcp_peer_new(void);

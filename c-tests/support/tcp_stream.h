@@ -20,16 +20,16 @@ typedef struct waiting {
 } waiting;
 
 typedef struct stream {
-    int fd;                /* -1 if the place is free */
-    unsigned link;         /* as the clock counts them */
-    int ended;             /* our end of the stream is closed; what comes is dropped */
+    int fd;        /* -1 if the place is free */
+    unsigned link; /* as the clock counts them */
+    int ended;     /* our end of the stream is closed; what comes is dropped */
     uint8_t input[STREAM_INPUT];
     size_t have;
     waiting held[STREAM_HELD];
     size_t holds;
     uint8_t joined[STREAM_JOINED];
-    size_t joins;          /* bytes that wait for one send */
-    unsigned join_more;    /* replies that are still to join */
+    size_t joins;       /* bytes that wait for one send */
+    unsigned join_more; /* replies that are still to join */
     int64_t join_due;
 } stream;
 

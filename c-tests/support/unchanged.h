@@ -6,13 +6,13 @@
 static unsigned entered;
 
 /* Looks at the object before and after what is called. */
-#define UNCHANGED_BY(object, calls)                                                               \
-    do {                                                                                          \
-        static uint8_t before[sizeof(object)];                                                    \
-        memcpy(before, &(object), sizeof(object));                                                \
-        calls;                                                                                    \
-        assert_memory_equal(before, &(object), sizeof(object));                                   \
-        entered++;                                                                                \
+#define UNCHANGED_BY(object, calls)                                                                \
+    do {                                                                                           \
+        static uint8_t before[sizeof(object)];                                                     \
+        memcpy(before, &(object), sizeof(object));                                                 \
+        calls;                                                                                     \
+        assert_memory_equal(before, &(object), sizeof(object));                                    \
+        entered++;                                                                                 \
     } while (0)
 
 #endif

@@ -54,10 +54,10 @@ static void write(void)
 
 static void read(void)
 {
-    note(READ_HOLDING, "read holding registers",
-         mbm_master_readHoldingRegisters(&node, 20, 10), MBM_OK);
-    note(READ_INPUT_REGISTERS, "read input registers",
-         mbm_master_readInputRegisters(&node, 30, 10), MBM_OK);
+    note(READ_HOLDING, "read holding registers", mbm_master_readHoldingRegisters(&node, 20, 10),
+         MBM_OK);
+    note(READ_INPUT_REGISTERS, "read input registers", mbm_master_readInputRegisters(&node, 30, 10),
+         MBM_OK);
     note(READ_COILS, "read 37 coils", mbm_master_readCoils(&node, 45, 37), MBM_OK);
     note(READ_INPUTS, "read 21 discrete inputs", mbm_master_readDiscreteInputs(&node, 70, 21),
          MBM_OK);

@@ -38,9 +38,9 @@ enum {
     REPORT_TIMEOUTS,
     REPORT_FOREIGN_FRAMES,
     REPORT_RESYNCHRONISATIONS,
-    REPORT_POLLS,             /* of the application that sleeps, else 0: how often it polled, */
-    REPORT_SLEEPS,            /* and slept; */
-    REPORT_LOST_BYTES,        /* what its ring had no room for */
+    REPORT_POLLS,      /* of the application that sleeps, else 0: how often it polled, */
+    REPORT_SLEEPS,     /* and slept; */
+    REPORT_LOST_BYTES, /* what its ring had no room for */
     REPORT_HEAD
 };
 

@@ -122,8 +122,8 @@ static int begin(void)
     if (mbm_tcp_open(client_end, &addresses, "127.0.0.1", service) != 0)
         return -1;
     port = mbm_tcp_port(client_end);
-    if (mbm_client_beginTcp(&client, &port, incoming, sizeof incoming, outgoing,
-                            sizeof outgoing) != MBM_OK)
+    if (mbm_client_beginTcp(&client, &port, incoming, sizeof incoming, outgoing, sizeof outgoing) !=
+        MBM_OK)
         return -1;
     while (mbm_tcp_accept(&listener, server_end, 1) < 0)
         if (errno != EAGAIN || mbm_tcp_wait(NULL, 0, &listener, -1, MBM_TCP_FOREVER) < 0)

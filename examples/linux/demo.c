@@ -77,11 +77,11 @@ static void show(uint8_t status, uint8_t expected_status)
 }
 
 /* Makes a call after it has printed it as a user would write it. */
-#define REQUEST(call, expected_status) \
-    do {                               \
-        recorder_clear(&wire);         \
-        printf("%s\n", #call);         \
-        show(call, expected_status);   \
+#define REQUEST(call, expected_status)                                                             \
+    do {                                                                                           \
+        recorder_clear(&wire);                                                                     \
+        printf("%s\n", #call);                                                                     \
+        show(call, expected_status);                                                               \
     } while (0)
 
 /* Whether the words read are `there`, which the server holds. */

@@ -57,7 +57,7 @@ typedef struct line {
     mbm_tty_options options;
     mbm_client client;
     const char *path;
-    uint32_t tried;  /* when it was opened last, if it is not open */
+    uint32_t tried; /* when it was opened last, if it is not open */
     uint8_t is_open;
     uint8_t frame[MBM_MAX_FRAME];
 } line;
@@ -391,18 +391,19 @@ static void wait_for_work(void)
 
 static int usage(int wrong)
 {
-    fprintf(wrong ? stderr : stdout,
-            "usage: gateway [-i SECONDS] [-q QUIET] PORT MILLISECONDS\n"
-            "               PATH,BAUD,PARITY+STOP,FIRST-LAST...\n"
-            "  -i SECONDS           that a connection is idle before it may be closed for a new\n"
-            "                       client, 60 if left out, 0 for never\n"
-            "  -q QUIET             milliseconds that a line is left alone after a request without\n"
-            "                       a right reply, 0 to 65535, 100 if left out\n"
-            "  PORT                 where it listens, 0 for one that is free\n"
-            "  MILLISECONDS         that a device has to respond, up to 65535\n"
-            "  PATH,BAUD,...        up to 4 serial lines, the parity N, E or O, 1 or 2 stop bits,\n"
-            "                       and the units on it, 1 to 247, each on one line\n"
-            "for example: gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,32-40\n");
+    fprintf(
+        wrong ? stderr : stdout,
+        "usage: gateway [-i SECONDS] [-q QUIET] PORT MILLISECONDS\n"
+        "               PATH,BAUD,PARITY+STOP,FIRST-LAST...\n"
+        "  -i SECONDS           that a connection is idle before it may be closed for a new\n"
+        "                       client, 60 if left out, 0 for never\n"
+        "  -q QUIET             milliseconds that a line is left alone after a request without\n"
+        "                       a right reply, 0 to 65535, 100 if left out\n"
+        "  PORT                 where it listens, 0 for one that is free\n"
+        "  MILLISECONDS         that a device has to respond, up to 65535\n"
+        "  PATH,BAUD,...        up to 4 serial lines, the parity N, E or O, 1 or 2 stop bits,\n"
+        "                       and the units on it, 1 to 247, each on one line\n"
+        "for example: gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,32-40\n");
     return wrong ? 2 : 0;
 }
 

@@ -240,14 +240,10 @@ uint8_t line_read(line *l, mbm_clientRequest *request, long function, uint16_t a
                   uint16_t quantity)
 {
     switch (function) {
-    case 1:
-        return mbm_client_readCoils(&l->client, request, address, quantity);
-    case 2:
-        return mbm_client_readDiscreteInputs(&l->client, request, address, quantity);
-    case 3:
-        return mbm_client_readHoldingRegisters(&l->client, request, address, quantity);
-    default:
-        return mbm_client_readInputRegisters(&l->client, request, address, quantity);
+    case 1: return mbm_client_readCoils(&l->client, request, address, quantity);
+    case 2: return mbm_client_readDiscreteInputs(&l->client, request, address, quantity);
+    case 3: return mbm_client_readHoldingRegisters(&l->client, request, address, quantity);
+    default: return mbm_client_readInputRegisters(&l->client, request, address, quantity);
     }
 }
 

@@ -15,14 +15,13 @@
 
 #include <signal.h>
 
-
 /* What it says of places, for a usage. */
-#define LINE_HELP                                                                        \
-    "places:\n"                                                                          \
-    "  rtu:PATH[,BAUD[,N|E|O]]     a serial line, 19200 and N if left out\n"             \
-    "  ascii:PATH[,BAUD[,N|E|O]]   the same in ASCII frames and seven bits\n"            \
-    "  tcp:HOST[,PORT]             Modbus TCP, port 502 if left out\n"                   \
-    "  rtuovertcp:HOST[,PORT]      RTU frames in a TCP stream\n"                         \
+#define LINE_HELP                                                                                  \
+    "places:\n"                                                                                    \
+    "  rtu:PATH[,BAUD[,N|E|O]]     a serial line, 19200 and N if left out\n"                       \
+    "  ascii:PATH[,BAUD[,N|E|O]]   the same in ASCII frames and seven bits\n"                      \
+    "  tcp:HOST[,PORT]             Modbus TCP, port 502 if left out\n"                             \
+    "  rtuovertcp:HOST[,PORT]      RTU frames in a TCP stream\n"                                   \
     "Numbers are decimal, or hexadecimal behind 0x.\n"
 
 typedef struct line {

@@ -198,8 +198,7 @@ int mbm_tcp_lookUp(const char *host, const char *service, int flags, struct addr
     }
 }
 
-int mbm_tcp_open(mbm_tcp *tcp, mbm_tcp_addresses *addresses, const char *host,
-                 const char *service)
+int mbm_tcp_open(mbm_tcp *tcp, mbm_tcp_addresses *addresses, const char *host, const char *service)
 {
     struct addrinfo *found, *one;
 
@@ -411,8 +410,9 @@ static void tcp_idle(void *context, mbm_master *master)
 
 mbm_port mbm_tcp_port(mbm_tcp *tcp)
 {
-    return (mbm_port){.context = tcp, .read = tcp_read, .write = tcp_write, .micros = tcp_micros,
-                      .idle = tcp_idle};
+    mbm_port port = {.context = tcp, .read = tcp_read, .write = tcp_write, .micros = tcp_micros};
+    port.idle = tcp_idle;
+    return port;
 }
 
 /* Poll failed: for a signal, or for lack of memory or of descriptors, whose limit may have

@@ -55,16 +55,16 @@ typedef struct mbm_tcp_addresses {
 
 /** A socket in use as a port; zero before first use. */
 typedef struct mbm_tcp {
-    int fd;           /**< the socket, while it is there */
-    int error;        /**< errno of what lost the link, EPIPE if the peer closed it, ETIMEDOUT if
-                           mbm_tcp_accept closed it as idle; else 0 */
-    int lookup;       /**< why mbm_tcp_open found no address, for gai_strerror; else 0 */
-    uint8_t isBusy;   /**< yours: 1 while a response to the peer is to come, so that the connection
-                           is not idle; only for requests that may take longer than the idle time */
-    uint8_t state;    /**< not for you */
-    uint8_t awaits;   /**< what to poll it for: POLLIN, and POLLOUT while it takes no more */
-    uint8_t told;     /**< not for you */
-    int64_t lastMoved;            /**< not for you */
+    int fd;            /**< the socket, while it is there */
+    int error;         /**< errno of what lost the link, EPIPE if the peer closed it, ETIMEDOUT if
+                            mbm_tcp_accept closed it as idle; else 0 */
+    int lookup;        /**< why mbm_tcp_open found no address, for gai_strerror; else 0 */
+    uint8_t isBusy;    /**< yours: 1 while a response to the peer is to come, so that the connection
+                            is not idle; only for requests that may take longer than the idle time */
+    uint8_t state;     /**< not for you */
+    uint8_t awaits;    /**< what to poll it for: POLLIN, and POLLOUT while it takes no more */
+    uint8_t told;      /**< not for you */
+    int64_t lastMoved; /**< not for you */
     mbm_tcp_addresses *addresses; /**< not for you */
     struct mbm_tcp_set *set;      /**< not for you */
     struct mbm_tcp *next;         /**< not for you */
@@ -95,8 +95,8 @@ typedef struct mbm_tcp_set {
     mbm_tcp **end;              /**< not for you */
     mbm_tcp_listener *listener; /**< not for you */
     int (*watch)(struct mbm_tcp_set *set, int fd, void *who, uint8_t before,
-                 uint8_t awaits);                              /**< not for you */
-    int (*add)(struct mbm_tcp_set *set, mbm_tcp *tcp);         /**< not for you */
+                 uint8_t awaits);                      /**< not for you */
+    int (*add)(struct mbm_tcp_set *set, mbm_tcp *tcp); /**< not for you */
 } mbm_tcp_set;
 
 /**
@@ -113,8 +113,7 @@ typedef struct mbm_tcp_set {
  *         or service that is unknown, EAGAIN if the lookup may go well later, or as
  *         of socket and connect. Where it is the lookup that failed, `lookup` says why
  */
-int mbm_tcp_open(mbm_tcp *tcp, mbm_tcp_addresses *addresses, const char *host,
-                 const char *service);
+int mbm_tcp_open(mbm_tcp *tcp, mbm_tcp_addresses *addresses, const char *host, const char *service);
 
 /**
  * Uses a stream socket that is connected already; makes it non-blocking.

@@ -100,19 +100,16 @@ static void turn_away(int fd)
 /* Ends the connection that has been idle for longest; whether there was one. */
 static int close_oldest(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
 {
-    int64_t longest = (int64_t)listener->idleTime - 1;
     mbm_tcp *oldest = NULL;
     size_t i;
 
     if (listener->idleTime == 0)
         return 0;
     for (i = 0; i < count; i++) {
-        const int64_t idle = tcps[i].isBusy ? -1 : mbm_tcp_idleFor(&tcps[i]);
-
-        if (idle > longest) {
-            longest = idle;
+        /* The times themselves are compared: the clock goes on from one look to the next. */
+        if (!tcps[i].isBusy && mbm_tcp_idleFor(&tcps[i]) >= (int64_t)listener->idleTime &&
+            (!oldest || tcps[i].lastMoved < oldest->lastMoved))
             oldest = &tcps[i];
-        }
     }
     if (!oldest)
         return 0;

@@ -24,30 +24,30 @@ extern "C" {
 
 /** How a serial line is set; what is 0 is as said. */
 typedef struct mbm_tty_options {
-    uint32_t baud;     /**< bits per second: any rate of which termios has a constant */
-    uint8_t anyRate;   /**< 1: others too, where the system has them, as Linux; to 2 % */
-    char parity;       /**< 'N', 'E' or 'O' */
-    uint8_t stop;      /**< stop bits, 1 or 2 */
-    uint8_t data;      /**< data bits: 8, which 0 means too, or 7 for ASCII */
-    uint8_t exclusive; /**< 1: nobody else may open the terminal meanwhile */
-    uint8_t rs485;     /**< 1: the driver of the system switches RTS for RS-485 */
-    uint8_t rtsLow;    /**< with rs485, 1: RTS is low while sending, else high */
-    uint8_t hearSelf;  /**< with rs485, 1: what is sent is received too */
+    uint32_t baud;           /**< bits per second: any rate of which termios has a constant */
+    uint8_t anyRate;         /**< 1: others too, where the system has them, as Linux; to 2 % */
+    char parity;             /**< 'N', 'E' or 'O' */
+    uint8_t stop;            /**< stop bits, 1 or 2 */
+    uint8_t data;            /**< data bits: 8, which 0 means too, or 7 for ASCII */
+    uint8_t exclusive;       /**< 1: nobody else may open the terminal meanwhile */
+    uint8_t rs485;           /**< 1: the driver of the system switches RTS for RS-485 */
+    uint8_t rtsLow;          /**< with rs485, 1: RTS is low while sending, else high */
+    uint8_t hearSelf;        /**< with rs485, 1: what is sent is received too */
     uint16_t rtsDelayBefore; /**< with rs485: from RTS to the first bit, milliseconds */
     uint16_t rtsDelayAfter;  /**< with rs485: from the last bit to RTS, milliseconds */
 } mbm_tty_options;
 
 /** A terminal in use as a port; zeroed, open or closed. */
 typedef struct mbm_tty {
-    int fd;                   /**< the terminal, while isOpen is 1; -1 once closed */
-    int error;                /**< errno of what lost the link; 0 while it is there */
-    uint8_t isOpen;           /**< 1 from open or attach to close or detach; a zeroed one is closed */
-    uint8_t has_uart;         /**< whether there is a transmitter to wait for */
-    uint8_t awaits;           /**< what mbm_tty_wait polls it for: POLLIN, or 0; see there */
-    uint8_t has_before;       /**< not for you */
-    uint8_t is_exclusive;     /**< not for you */
-    uint8_t is_rs485;         /**< not for you */
-    int flags_before;         /**< not for you */
+    int fd;               /**< the terminal, while isOpen is 1; -1 once closed */
+    int error;            /**< errno of what lost the link; 0 while it is there */
+    uint8_t isOpen;       /**< 1 from open or attach to close or detach; a zeroed one is closed */
+    uint8_t has_uart;     /**< whether there is a transmitter to wait for */
+    uint8_t awaits;       /**< what mbm_tty_wait polls it for: POLLIN, or 0; see there */
+    uint8_t has_before;   /**< not for you */
+    uint8_t is_exclusive; /**< not for you */
+    uint8_t is_rs485;     /**< not for you */
+    int flags_before;     /**< not for you */
     uint32_t rs485_before[8]; /**< not for you */
     struct termios before;    /**< not for you */
 } mbm_tty;

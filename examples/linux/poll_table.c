@@ -103,8 +103,7 @@ int main(int argc, char **argv)
         default: return line_usage(1, USAGE);
         }
     }
-    if (argc - optind < 3 || (argc - optind) % 2 == 0 ||
-        argc - optind > 1 + 2 * MBM_CLIENT_DEPTH)
+    if (argc - optind < 3 || (argc - optind) % 2 == 0 || argc - optind > 1 + 2 * MBM_CLIENT_DEPTH)
         return line_usage(1, USAGE);
     for (i = (unsigned)optind + 1; i < (unsigned)argc; i += 2, count++) {
         ranges[count].address = (uint16_t)line_number(argv[i], 0, 65535);

@@ -28,13 +28,10 @@ static void tell(const mbm_clientRequest *request)
     unsigned unit = request->unit;
 
     switch (request->status) {
-    case MBM_OK:
-        printf("unit %3u: holding register 0 is %u\n", unit, words[unit]);
-        break;
+    case MBM_OK: printf("unit %3u: holding register 0 is %u\n", unit, words[unit]); break;
     case MBM_RESPONSE_TIMED_OUT:
     case MBM_GATEWAY_PATH_UNAVAILABLE:
-    case MBM_GATEWAY_TARGET_FAILED_TO_RESPOND:
-        return;
+    case MBM_GATEWAY_TARGET_FAILED_TO_RESPOND: return;
     case MBM_INVALID_CRC:
     case MBM_MALFORMED_REPLY:
         printf("unit %3u: %s; two with one address?\n", unit, mbm_statusText(request->status));

@@ -196,9 +196,8 @@ wire *board_uart(board *b, char number, wire_device device, void *context)
     avr_ioctl(b->avr, (uint32_t)AVR_IOCTL_UART_SET_FLAGS(number), &flags);
     w->end->in = avr_io_getirq(b->avr, UART_IRQ(number), UART_IRQ_INPUT);
     avr_irq_register_notify(avr_io_getirq(b->avr, UART_IRQ(number), UART_IRQ_OUTPUT), byte_out, w);
-    avr_irq_register_notify(avr_get_interrupt_irq(b->avr, w->end->uart->rxc.vector) +
-                                AVR_INT_IRQ_PENDING,
-                            received, w);
+    avr_irq_register_notify(
+        avr_get_interrupt_irq(b->avr, w->end->uart->rxc.vector) + AVR_INT_IRQ_PENDING, received, w);
     return w;
 }
 
@@ -277,9 +276,9 @@ void wire_play(wire *w, uint64_t delay, const uint8_t *bytes, size_t length)
 {
     avr_t *avr = w->on->avr;
     int idle = w->head == w->tail;
-    uint64_t due = (idle || w->last_due + 10 * w->bit < avr->cycle ? avr->cycle
-                                                                   : w->last_due + 10 * w->bit) +
-                   delay;
+    uint64_t due =
+        (idle || w->last_due + 10 * w->bit < avr->cycle ? avr->cycle : w->last_due + 10 * w->bit) +
+        delay;
     avr_cycle_timer_t next = w->end->uart ? next_byte : next_bit;
 
     while (length-- > 0) {

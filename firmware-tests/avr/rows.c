@@ -46,7 +46,9 @@ void row(const char *what, const char *unit, unsigned long least, unsigned long 
         above += most > limit;
     }
     printf("| %s | %s | %s | %s | %s |\n", what, unit, range, bound,
-           !limit ? "" : most > limit ? "**no**" : "yes");
+           !limit         ? ""
+           : most > limit ? "**no**"
+                          : "yes");
 }
 
 void row_cycles(const char *what, const span *s, unsigned long limit)

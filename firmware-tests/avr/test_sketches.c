@@ -364,11 +364,11 @@ static void phoenix_contact(const kind *k)
         assert_int_equal(c.quantities[i], quantities[i]);
     }
     assert_int_equal(c.statuses[0], 0);
-    assert_int_equal(c.statuses[1], 2);  /* register 2006 is not there */
+    assert_int_equal(c.statuses[1], 2); /* register 2006 is not there */
     assert_int_equal(c.statuses[5], 0);
-    assert_int_equal(c.statuses[6], 2);  /* of 66 */
-    assert_int_equal(c.statuses[7], 0);  /* of 64 */
-    assert_int_equal(c.statuses[9], 2);  /* 8 to 71 */
+    assert_int_equal(c.statuses[6], 2); /* of 66 */
+    assert_int_equal(c.statuses[7], 0); /* of 64 */
+    assert_int_equal(c.statuses[9], 2); /* 8 to 71 */
     assert_int_equal(c.peer.mapping->tab_registers[4], server_pattern(8));
     assert_int_equal(c.peer.mapping->tab_registers[5], server_pattern(9));
     server_stop(&c.peer);

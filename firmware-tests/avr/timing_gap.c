@@ -54,15 +54,19 @@ void time_default_gap(void)
         give_up("TimeFirst has not sent its requests");
     if (t.silence[OTHER_AT_ONCE] < GAP - CLOCK_STEP)
         give_up("another object's request does not keep the gap");
-    row_of("baud rate untold: the first request after begin on a line that was silent for 50 ms, from the call to its first byte",
-           t.waited[AFTER_BEGIN], 3463);
-    row_of("baud rate untold: another object's request after 50 ms of silence, from the call to its "
-           "first byte",
-           t.waited[OTHER_AFTER_PAUSE], 3463);
-    row_of("baud rate untold: the same object's request after 50 ms of silence, from the call to its "
-           "first byte",
-           t.waited[SAME_AFTER_PAUSE], 3463);
-    row_of("baud rate untold: another object's request at once, dead time with the gap of 64000 cycles",
-           t.silence[OTHER_AT_ONCE], GAP + GAP / 20);
+    row_of(
+        "baud rate untold: the first request after begin on a line that was silent for 50 ms, from the call to its first byte",
+        t.waited[AFTER_BEGIN], 3463);
+    row_of(
+        "baud rate untold: another object's request after 50 ms of silence, from the call to its "
+        "first byte",
+        t.waited[OTHER_AFTER_PAUSE], 3463);
+    row_of(
+        "baud rate untold: the same object's request after 50 ms of silence, from the call to its "
+        "first byte",
+        t.waited[SAME_AFTER_PAUSE], 3463);
+    row_of(
+        "baud rate untold: another object's request at once, dead time with the gap of 64000 cycles",
+        t.silence[OTHER_AT_ONCE], GAP + GAP / 20);
     board_free(b);
 }

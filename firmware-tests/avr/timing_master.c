@@ -8,9 +8,9 @@
 typedef struct observer {
     board *on;
     wire *bus;
-    uint64_t late;      /* the last byte of a reply comes so much later */
-    span dead[2];       /* before a request of 8 bytes, and of more */
-    span back;          /* from the last byte of a reply to the end of the call */
+    uint64_t late; /* the last byte of a reply comes so much later */
+    span dead[2];  /* before a request of 8 bytes, and of more */
+    span back;     /* from the last byte of a reply to the end of the call */
     /* poll by poll */
     span without, with;
     uint64_t rose;

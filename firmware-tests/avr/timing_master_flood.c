@@ -208,7 +208,8 @@ void time_master_flood(void)
            per_byte("uno", begins_64), 1388);
     for (i = 0; i < sizeof noise / sizeof *noise; i++)
         note(&byte, per_byte("uno", noise[i]));
-    row_cycles("a master that waits for 64 registers, default buffers: a byte of noise", &byte, 1388);
+    row_cycles("a master that waits for 64 registers, default buffers: a byte of noise", &byte,
+               1388);
     row_of("a master that waits for 125 registers: the longest poll up to its deadline, `11 03 FA` "
            "repeated at 115200 baud",
            longest("uno-125", begins_125), 30 * MS);

@@ -17,7 +17,8 @@ typedef struct asker {
 /* In turn reads ten registers, writes them and reads 64, at ever new moments. */
 static void ask(asker *a)
 {
-    static const uint8_t requests[3][7] = {{1, 3, 0, 0, 0, 10}, {1, 16, 0, 0, 0, 10, 20}, {1, 3, 0, 0, 0, 64}};
+    static const uint8_t requests[3][7] = {
+        {1, 3, 0, 0, 0, 10}, {1, 16, 0, 0, 0, 10, 20}, {1, 3, 0, 0, 0, 64}};
     uint8_t frame[FRAME] = {0};
     unsigned n = a->bus->frames;
 

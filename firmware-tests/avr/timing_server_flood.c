@@ -7,12 +7,16 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { FULL = 141, NOISE = 1000, KINDS = 4 }; /* its buffer, what comes once that is full, and of how many kinds */
+enum {
+    FULL = 141,
+    NOISE = 1000,
+    KINDS = 4
+}; /* its buffer, what comes once that is full, and of how many kinds */
 
 typedef struct flood {
     board *on;
     wire *bus;
-    uint64_t rose, busy;           /* of polls with bytes to take */
+    uint64_t rose, busy;            /* of polls with bytes to take */
     uint64_t began, longest, ready; /* of all polls */
     unsigned answers;
 } flood;
@@ -54,14 +58,10 @@ static uint8_t noise(unsigned kind, unsigned i)
 
     random = random * 1664525 + 1013904223;
     switch (kind) {
-    case 0:
-        return (uint8_t)(random >> 24);
-    case 1:
-        return 0;
-    case 2:
-        return request[i % 8]; /* requests without silence between them */
-    default:
-        return beginning[i % 7];
+    case 0: return (uint8_t)(random >> 24);
+    case 1: return 0;
+    case 2: return request[i % 8]; /* requests without silence between them */
+    default: return beginning[i % 7];
     }
 }
 
@@ -104,8 +104,8 @@ void time_server_flood(void)
         if (!board_run(f.on, 30 * MS))
             give_up("a sketch crashed");
         if (board_word(f.on, taken) != sizeof bytes + 8 || f.answers != 1)
-            fprintf(stderr, "timing: after noise %u, %u bytes were taken, %u requests answered\n", kind,
-                    board_word(f.on, taken), f.answers);
+            fprintf(stderr, "timing: after noise %u, %u bytes were taken, %u requests answered\n",
+                    kind, board_word(f.on, taken), f.answers);
         board_free(f.on);
     }
     row_cycles("a server: a byte of noise without silence (one lasts 1388 at 115200 baud)", &byte,

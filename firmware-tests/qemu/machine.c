@@ -14,7 +14,10 @@
 /* A run takes one second; the machine under the test may be busy. */
 enum { PATIENCE = 120 /* s */ };
 
-#define ARM(board) {"qemu-system-arm", "-M", board, "-kernel", NULL}
+#define ARM(board)                                                                                 \
+    {                                                                                              \
+        "qemu-system-arm", "-M", board, "-kernel", NULL                                            \
+    }
 
 const machine machines[] = {
     {"lm3s6965evb", ARM("lm3s6965evb")},

@@ -24,5 +24,5 @@ firmware-test-qemu: ## Bare metal firmware on seven machines in QEMU: Arm, RISC-
 	done
 	@set -e; for variant in $(VARIANTS); do $(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$variant; done
 	@$(MAKE) -s --no-print-directory $(QEMU_TESTS)
-	@scripts/run-c-tests "" $(QEMU_TESTS)
+	@MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/run-c-tests $(QEMU_TESTS)
 	@echo "firmware-test-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against libmodbus, server and client, and a bad wire"

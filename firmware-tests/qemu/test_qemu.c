@@ -325,7 +325,10 @@ static void meets(void **state)
     assert_int_equal(head(registers, REPORT_FOREIGN_FRAMES), f->foreign);
 }
 
-#define TEST(test) {#test, test}
+#define TEST(test)                                                                                 \
+    {                                                                                              \
+#test, test                                                                                \
+    }
 
 static const struct {
     const char *name;

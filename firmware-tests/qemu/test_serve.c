@@ -44,8 +44,7 @@ static int start(void **state)
         return -1;
     client = modbus_new_rtu(line.path, 115200, 'N', 8, 1);
     if (!client || modbus_set_slave(client, SERVE_UNIT) || modbus_connect(client) ||
-        modbus_set_response_timeout(client, 60, 0) ||
-        modbus_set_byte_timeout(client, 60, 0))
+        modbus_set_response_timeout(client, 60, 0) || modbus_set_byte_timeout(client, 60, 0))
         return -1;
     return 0;
 }

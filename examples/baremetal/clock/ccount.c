@@ -1,9 +1,7 @@
 /* Xtensa's cycle counter. Licence: MIT OR Apache-2.0. */
 #include "counter.h"
 
-void counter_start(void)
-{
-}
+void counter_start(void) {}
 
 uint32_t counter_read(void)
 {

@@ -3,9 +3,7 @@
 #include "counter.h"
 #include "machine.h"
 
-void counter_start(void)
-{
-}
+void counter_start(void) {}
 
 uint32_t counter_read(void)
 {

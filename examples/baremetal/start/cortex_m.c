@@ -18,9 +18,7 @@ void fault_handler(void)
 }
 
 /* Where clocks and pins are right after reset, as QEMU's mostly are. */
-__attribute__((weak)) void machine_start(void)
-{
-}
+__attribute__((weak)) void machine_start(void) {}
 
 void reset_handler(void)
 {
@@ -50,7 +48,20 @@ struct vectors {
 __attribute__((section(".vectors"), used)) static const struct vectors vectors = {
     stack_top,
     {
-        reset_handler, fault_handler, fault_handler, fault_handler, fault_handler, fault_handler,
-        NULL, NULL, NULL, NULL, fault_handler, fault_handler, NULL, fault_handler, fault_handler,
+        reset_handler,
+        fault_handler,
+        fault_handler,
+        fault_handler,
+        fault_handler,
+        fault_handler,
+        NULL,
+        NULL,
+        NULL,
+        NULL,
+        fault_handler,
+        fault_handler,
+        NULL,
+        fault_handler,
+        fault_handler,
     },
 };

@@ -4,9 +4,7 @@
 #include "board.h"
 #include "simcall.h"
 
-void uart_start(void)
-{
-}
+void uart_start(void) {}
 
 int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity)
 {

@@ -73,6 +73,6 @@ void fault_handler(void);
 #define NONE fault_handler
 __attribute__((section(".vectors.machine"), used)) static void (*const vectors[])(void) = {
     NONE, NONE, NONE, NONE, NONE, uart_interrupt, NONE, NONE, NONE, NONE,
-    NONE, NONE, NONE, NONE, NONE, NONE, NONE, NONE, NONE, sleep_interrupt,
+    NONE, NONE, NONE, NONE, NONE, NONE,           NONE, NONE, NONE, sleep_interrupt,
 };
 _Static_assert(sizeof vectors / sizeof vectors[0] == TIMER_INTERRUPT + 1, "a vector an interrupt");

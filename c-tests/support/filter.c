@@ -1,0 +1,13 @@
+/* MBM_TEST runs the tests of that name alone; `*` and `?` stand for any characters.
+ * `make test-c TEST=NAME` sets it. */
+#include "test.h"
+
+#include <stdlib.h>
+
+__attribute__((constructor)) static void filter_tests(void)
+{
+    const char *name = getenv("MBM_TEST");
+
+    if (name && *name)
+        cmocka_set_test_filter(name);
+}
