@@ -13,6 +13,9 @@ $(QEMU_TESTS): $(BUILD)/firmware/%: firmware-tests/qemu/%.c $(QEMU_SOURCES) $(wi
 	@gcc $(CFLAGS) $(WARNINGS) -Iinclude -Ic-tests/support -Iexamples/baremetal $(MODBUS) $< $(QEMU_SOURCES) \
 		-lmodbus -lcmocka -lpthread -o $@
 
+# The same, with the library as assembler source.
+FROM_SOURCE := $(BUILD)/baremetal-source
+
 .PHONY: firmware-test-qemu
 firmware-test-qemu: ## Bare metal firmware on seven machines in QEMU: Arm, RISC-V, Xtensa
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev libcmocka-dev qemu-system-arm qemu-system-misc \
@@ -23,6 +26,15 @@ firmware-test-qemu: ## Bare metal firmware on seven machines in QEMU: Arm, RISC-
 		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$machine PROGRAM=serve; \
 	done
 	@set -e; for variant in $(VARIANTS); do $(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$variant; done
+	@$(MAKE) -s --no-print-directory assembler
+	@set -e; \
+	build() { \
+		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$1 PROGRAM=$$2 \
+			OUT=$(FROM_SOURCE)/$$1 SOURCE=$(BUILD)/assembler; \
+	}; \
+	for machine in $(MACHINES); do build $$machine main; build $$machine serve; done; \
+	for variant in $(VARIANTS); do build $$variant main; done
 	@$(MAKE) -s --no-print-directory $(QEMU_TESTS)
 	@scripts/run-c-tests "" $(QEMU_TESTS)
-	@echo "firmware-test-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against libmodbus, server and client, and a bad wire"
+	@MBM_FIRMWARE=$(FROM_SOURCE) scripts/run-c-tests "" $(QEMU_TESTS)
+	@echo "firmware-test-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against libmodbus, server and client, and a bad wire; from archives, and from assembler source"
