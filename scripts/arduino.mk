@@ -45,7 +45,7 @@ DIST_STAMP := $(BUILD)/avr/library
 avr-sketches: arduino
 	@mkdir -p $(AVR_OUT)
 	@cat dist/*.zip dist/minimal/*.zip | cmp -s - $(DIST_STAMP) || cat dist/*.zip dist/minimal/*.zip >$(DIST_STAMP)
-	@$(MAKE) -s --no-print-directory $(AVR_ELFS) $(MINIMAL_ELFS) $(CHIP_ELFS) $(WIDE_ELFS) $(PEER_ELFS)
+	@$(MAKE) -s --no-print-directory $(BARE) $(AVR_ELFS) $(MINIMAL_ELFS) $(CHIP_ELFS) $(WIDE_ELFS) $(PEER_ELFS)
 
 # The examples are part of the library, from where they are compiled.
 SKETCH_SOURCES := scripts/sketch $(wildcard firmware-tests/avr/sketches/*/*.ino)
@@ -64,6 +64,13 @@ $(eval $(call sketches,uno-minimal))
 $(eval $(call sketches,uno-125))
 $(eval $(call sketches,uno-peer))
 $(PEER_ELFS): $(wildcard $(MODBUSMASTER)/src/*)
+
+# The code for avrxmega3 in a program for another chip: no simulator has one of its own.
+BARE := $(AVR_OUT)/avrxmega3/Bare.elf
+$(BARE): firmware-tests/avr/bare/bare.c $(BUILD)/assembler/mbm_avrxmega3.S include/mbm.h
+	@mkdir -p $(@D)
+	@avr-gcc -mmcu=atmega1284p -U__AVR_ARCH__ -D__AVR_ARCH__=103 -c $(BUILD)/assembler/mbm_avrxmega3.S -o $(@D)/mbm.o
+	@avr-gcc -mmcu=atmega1284p -std=c11 -Os $(WARNINGS) -Iinclude -Wl,--gc-sections $< $(@D)/mbm.o -o $@
 
 # --- the programs that run them
 
