@@ -5,9 +5,12 @@ assembler: ## The library as assembler source, a file an instruction set, build/
 	@scripts/assembler
 	@scripts/assembler minimal
 
-.PHONY: arduino
-arduino: assembler ## The Arduino libraries: dist/mbm, dist/minimal/mbm-minimal, a zip of each
+.PHONY: library
+library: assembler
 	@scripts/arduino
+
+.PHONY: arduino
+arduino: library ## The Arduino libraries: dist/mbm, dist/minimal/mbm-minimal, a zip of each
 	@scripts/check-arduino
 	@scripts/check-assembler
 
@@ -42,7 +45,7 @@ PEER_ELFS := $(if $(MODBUSMASTER),$(patsubst %,$(AVR_OUT)/uno-peer/%.elf,TimeRea
 DIST_STAMP := $(BUILD)/avr/library
 
 .PHONY: avr-sketches
-avr-sketches: arduino
+avr-sketches: library
 	@mkdir -p $(AVR_OUT)
 	@cat dist/*.zip dist/minimal/*.zip | cmp -s - $(DIST_STAMP) || cat dist/*.zip dist/minimal/*.zip >$(DIST_STAMP)
 	@$(MAKE) -s --no-print-directory $(BARE) $(AVR_ELFS) $(MINIMAL_ELFS) $(CHIP_ELFS) $(WIDE_ELFS) $(PEER_ELFS)
