@@ -63,7 +63,7 @@ size: ## Flash and RAM that the library adds, and what changed since docs/report
 	@scripts/size
 
 # The crate with the C functions.
-CAPI := $(firstword $(wildcard capi) .)
+CAPI := capi
 CBINDGEN = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen 0.29.4) && \
            "$$tool" --quiet --config cbindgen.toml --output include/mbm.h $(CAPI)
 .PHONY: header

@@ -4,5 +4,5 @@
  *
  * Licence: MIT OR Apache-2.0. Included by ModbusMaster.h and ModbusServer.h.
  * In the Arduino library, `make arduino` puts a file in this one's place that
- * stops the build on boards for which the library carries no archive.
+ * stops the build on boards for which the library has no code.
  */

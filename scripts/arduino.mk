@@ -1,21 +1,22 @@
 # The Arduino library, and sketches on simulated AVR boards.
 
-AVR_MCUS := atmega328p atmega168 atmega32u4 atmega2560
+.PHONY: assembler
+assembler: ## The library as assembler source, a file an instruction set, build/assembler
+	@scripts/assembler
+	@scripts/assembler minimal
 
-.PHONY: avr-archives
-avr-archives:
-	@for mcu in $(AVR_MCUS); do scripts/archive $$mcu && scripts/archive $$mcu minimal || exit 1; done
-
-# The library carries every archive that stands under build/archives, the small
-# one those under build/minimal: run `make archives` first for all boards.
-.PHONY: arduino
-arduino: avr-archives ## The Arduino libraries: dist/mbm, dist/minimal/mbm-minimal, a zip of each
+.PHONY: library
+library: assembler
 	@scripts/arduino
+
+.PHONY: arduino
+arduino: library ## The Arduino libraries: dist/mbm, dist/minimal/mbm-minimal, a zip of each
 	@scripts/check-arduino
+	@scripts/check-assembler
 
 .PHONY: need-avr
 need-avr:
-	@scripts/need gcc clang libc6-dev arduino-builder arduino-core-avr arduino-ctags gcc-avr avr-libc binutils-avr \
+	@scripts/need gcc libc6-dev arduino-builder arduino-core-avr arduino-ctags gcc-avr avr-libc binutils-avr \
 	    libsimavr-dev libelf-dev pkg-config libmodbus-dev libcmocka-dev
 
 # --- sketches, each for the boards that a test runs it on
@@ -32,6 +33,9 @@ AVR_ELFS := $(EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(EXAMPLES:%=$(AVR_OUT)/mega/%.el
 # What it takes with the small library.
 MINIMAL_ELFS := $(patsubst %,$(AVR_OUT)/uno-minimal/%.elf,SizeFC03 Basic PhoenixContact Probe \
                 ServeSensorAndRelay)
+# Other chips of the set avr5 that the simulator knows.
+CHIPS := mega1280 atmega644p atmega1284p
+CHIP_ELFS := $(foreach chip,$(CHIPS),$(patsubst %,$(AVR_OUT)/$(chip)/%.elf,FirstRead WriteAndReadBack))
 # What waits for 125 registers.
 WIDE_ELFS := $(AVR_OUT)/uno-125/TimeWait.elf
 # With MODBUSMASTER, the folder of that library: what it is measured with.
@@ -41,10 +45,10 @@ PEER_ELFS := $(if $(MODBUSMASTER),$(patsubst %,$(AVR_OUT)/uno-peer/%.elf,TimeRea
 DIST_STAMP := $(BUILD)/avr/library
 
 .PHONY: avr-sketches
-avr-sketches: arduino
+avr-sketches: library
 	@mkdir -p $(AVR_OUT)
 	@cat dist/*.zip dist/minimal/*.zip | cmp -s - $(DIST_STAMP) || cat dist/*.zip dist/minimal/*.zip >$(DIST_STAMP)
-	@$(MAKE) -s --no-print-directory $(AVR_ELFS) $(MINIMAL_ELFS) $(WIDE_ELFS) $(PEER_ELFS)
+	@$(MAKE) -s --no-print-directory $(BARE) $(AVR_ELFS) $(MINIMAL_ELFS) $(CHIP_ELFS) $(WIDE_ELFS) $(PEER_ELFS)
 
 # The examples are part of the library, from where they are compiled.
 SKETCH_SOURCES := scripts/sketch $(wildcard firmware-tests/avr/sketches/*/*.ino)
@@ -58,10 +62,18 @@ $(eval $(call sketches,uno))
 $(eval $(call sketches,mega))
 # Compiled only: the simulator has no USB for its Serial.
 $(eval $(call sketches,leonardo))
+$(foreach chip,$(CHIPS),$(eval $(call sketches,$(chip))))
 $(eval $(call sketches,uno-minimal))
 $(eval $(call sketches,uno-125))
 $(eval $(call sketches,uno-peer))
 $(PEER_ELFS): $(wildcard $(MODBUSMASTER)/src/*)
+
+# The code for avrxmega3 in a program for another chip: no simulator has one of its own.
+BARE := $(AVR_OUT)/avrxmega3/Bare.elf
+$(BARE): firmware-tests/avr/bare/bare.c $(BUILD)/assembler/mbm_avrxmega3.S include/mbm.h
+	@mkdir -p $(@D)
+	@avr-gcc -mmcu=atmega1284p -U__AVR_ARCH__ -D__AVR_ARCH__=103 -c $(BUILD)/assembler/mbm_avrxmega3.S -o $(@D)/mbm.o
+	@avr-gcc -mmcu=atmega1284p -std=c11 -Os $(WARNINGS) -Iinclude -Wl,--gc-sections $< $(@D)/mbm.o -o $@
 
 # --- the programs that run them
 
@@ -89,7 +101,6 @@ avr-tests: $(AVR_TESTS)
 .PHONY: firmware-test-avr
 firmware-test-avr: need-avr
 	@$(MAKE) -s --no-print-directory avr-sketches avr-tests
-	@scripts/check-boards
 	@MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/run-c-tests $(AVR_TESTS)
 
 

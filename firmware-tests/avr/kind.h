@@ -16,7 +16,7 @@ typedef struct kind {
     pin led, pin2, pin4;
 } kind;
 
-extern const kind uno, minimal, mega;
+extern const kind uno, minimal, mega, older_mega, atmega644p, atmega1284p;
 
 /* A board of this kind that runs a sketch. */
 board *kind_start(const kind *k, const char *sketch);

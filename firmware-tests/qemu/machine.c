@@ -26,6 +26,7 @@ const machine machines[] = {
     {"virt", {"qemu-system-riscv32", "-M", "virt", "-bios", "none", "-kernel", NULL}},
     {"netduinoplus2", ARM("netduinoplus2")},
     {"mps2-an500", ARM("mps2-an500")},
+    {"mps2-an505", ARM("mps2-an505")},
     /* With -kernel these would not start at the image's entry. */
     {"lx106", {"qemu-system-xtensa", "-M", "sim", "-cpu", "lx106", "-device", NULL}},
     {"dc233c", {"qemu-system-xtensa", "-M", "sim", "-cpu", "dc233c", "-device", NULL}},

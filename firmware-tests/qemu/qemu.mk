@@ -13,8 +13,11 @@ $(QEMU_TESTS): $(BUILD)/firmware/%: firmware-tests/qemu/%.c $(QEMU_SOURCES) $(wi
 	@gcc $(CFLAGS) $(WARNINGS) -Iinclude -Ic-tests/support -Iexamples/baremetal $(MODBUS) $< $(QEMU_SOURCES) \
 		-lmodbus -lcmocka -lpthread -o $@
 
+# The same, with the library as assembler source.
+FROM_SOURCE := $(BUILD)/baremetal-source
+
 .PHONY: firmware-test-qemu
-firmware-test-qemu: ## Bare metal firmware on seven machines in QEMU: Arm, RISC-V, Xtensa
+firmware-test-qemu: ## Bare metal firmware on eight machines in QEMU: Arm, RISC-V, Xtensa
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev libcmocka-dev qemu-system-arm qemu-system-misc \
 		gcc-arm-none-eabi gcc-riscv64-unknown-elf gcc-xtensa-lx106 clang-22 llvm-22
 	@set -e; for machine in $(MACHINES); do \
@@ -23,6 +26,15 @@ firmware-test-qemu: ## Bare metal firmware on seven machines in QEMU: Arm, RISC-
 		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$machine PROGRAM=serve; \
 	done
 	@set -e; for variant in $(VARIANTS); do $(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$variant; done
+	@$(MAKE) -s --no-print-directory assembler
+	@set -e; \
+	build() { \
+		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$1 PROGRAM=$$2 \
+			OUT=$(FROM_SOURCE)/$$1 SOURCE=$(BUILD)/assembler; \
+	}; \
+	for machine in $(MACHINES); do build $$machine main; build $$machine serve; done; \
+	for variant in $(VARIANTS); do build $$variant main; done
 	@$(MAKE) -s --no-print-directory $(QEMU_TESTS)
 	@MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/run-c-tests $(QEMU_TESTS)
-	@echo "firmware-test-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against libmodbus, server and client, and a bad wire"
+	@MBM_FIRMWARE=$(FROM_SOURCE) MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/run-c-tests $(QEMU_TESTS)
+	@echo "firmware-test-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against libmodbus, server and client, and a bad wire; from archives, and from assembler source"
