@@ -313,11 +313,12 @@ demo: ## Every function at work against a libmodbus server, frame by frame
 
 # What the commands of the pages run.
 PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway) $(SNIFF) $(CLIENTS) $(SERVE)
+ARM_LIBC := $(if $(shell command -v arm-none-eabi-gcc),libnewlib-arm-none-eabi)
 .PHONY: check-pages
 check-pages: $(ARCHIVE) ## Compile and run what README and docs show, and follow their links; PAGES=--all leaves nothing out
 	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev gcc-avr avr-libc arduino-core-avr \
 		$(if $(filter --all,$(PAGES)),gcc-arm-none-eabi libnewlib-arm-none-eabi) \
-		$(if $(shell command -v arm-none-eabi-gcc),libnewlib-arm-none-eabi)
+		$(ARM_LIBC)
 	@$(MAKE) --no-print-directory $(PAGE_PROGRAMS)
 	@scripts/check-pages $(PAGES)
 

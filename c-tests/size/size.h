@@ -56,8 +56,7 @@ static mbm_master node;
 
 static inline void begin(void)
 {
-    static const mbm_port port = {
-        .read = port_read, .write = port_write, .micros = port_micros};
+    static const mbm_port port = {.read = port_read, .write = port_write, .micros = port_micros};
 
     USED(&port);
     USED(response);

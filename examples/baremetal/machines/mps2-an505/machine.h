@@ -1,4 +1,5 @@
-/* Arm MPS2 with the AN505 image: Cortex-M33 at 20 MHz, in its secure state. Licence: MIT OR Apache-2.0. */
+/* Arm MPS2 with the AN505 image: Cortex-M33 at 20 MHz, in its secure state. Licence: MIT OR
+ * Apache-2.0. */
 #ifndef MACHINE_H
 #define MACHINE_H
 
