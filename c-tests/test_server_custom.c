@@ -8,7 +8,8 @@ enum { UNIT = 17, HEAD = 7, FIRST_CODE = 65 };
 
 static struct {
     uint8_t request[12], sent[MBM_MAX_TCP_FRAME];
-    int is_there;
+    /* Bytes of the request that are still to be read. */
+    size_t left;
     size_t length;
 } wire;
 
@@ -22,11 +23,10 @@ static uint8_t frame[MBM_MAX_TCP_FRAME];
 static int16_t wire_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     (void)context;
-    if (!wire.is_there || capacity < sizeof wire.request)
-        return 0;
-    wire.is_there = 0;
-    memcpy(bytes, wire.request, sizeof wire.request);
-    return sizeof wire.request;
+    size_t count = wire.left < capacity ? wire.left : capacity;
+    memcpy(bytes, wire.request + sizeof wire.request - wire.left, count);
+    wire.left -= count;
+    return (int16_t)count;
 }
 
 static int16_t wire_write(void *context, const uint8_t *bytes, uint16_t length)
@@ -83,7 +83,7 @@ static int answers(uint8_t function)
     const uint8_t request[] = {0, 1, 0, 0, 0, 6, UNIT, function, 0, 0, 0, 1};
 
     memcpy(wire.request, request, sizeof request);
-    wire.is_there = 1;
+    wire.left = sizeof wire.request;
     wire.length = 0;
     OK(mbm_server_poll(&server));
     assert_true(wire.length > HEAD + 1);

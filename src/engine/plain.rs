@@ -67,8 +67,9 @@ impl<P, S: Words> Request<P, S> for Query {
         if cfg!(feature = "echo") && engine.echo {
             let known = (have - 1).min(engine.request.head_length());
             if agrees(engine, front, known) {
-                // It may yet turn out to be the reply.
-                return (engine.request.length() + AROUND_PDU).min(have + 1);
+                let length = engine.request.length() + AROUND_PDU;
+                // Until it is whole, it may yet turn out to be the reply.
+                return if length > have { have + 1 } else { length };
             }
         }
         if engine.request.is_read() {
