@@ -1,8 +1,7 @@
 //! A server on one line or connection, moved on by `poll`.
 //!
-//! It knows nothing of units and services: it finds a request, hands its PDU
-//! out, takes the reply and sends it. So no reference to it need live while a
-//! request is carried out. A framing is two functions kept in the object, so
+//! It finds a request, hands its PDU out, takes the reply and sends it. So no reference to it
+//! need live while a request is carried out. A framing is two functions kept in the object, so
 //! that firmware carries those it begins with.
 
 use super::heading::STREAM;
@@ -232,7 +231,6 @@ impl<P: Port, B: Lent> Server<P, B> {
     pub fn look(&mut self, now: u32) -> Status {
         self.now = now;
         match self.phase {
-            // A stream that was given up has bytes left.
             Phase::Listen if !FIRMWARE && !self.keeps_time() && self.end == 0 => {
                 self.receive_at_once()
             }
