@@ -16,6 +16,24 @@ use crate::port::Port;
 use crate::FIRMWARE;
 
 impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
+    /// Takes what has arrived by the time `now` and drops it: negative if the link is lost.
+    pub fn drop_received(&mut self, now: u32) -> i16 {
+        self.look_at_clock(now);
+        self.hear(S::Count::ZERO)
+    }
+
+    /// Receives from `index` on: how many bytes, negative if the link is lost.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn hear(&mut self, index: S::Count) -> i16 {
+        let room = self.storage.room() - index;
+        let heard = self.port.read(self.storage.bytes(index, room));
+        if heard > 0 {
+            self.storage.count(Counter::BytesReceived, heard as u16);
+            self.last_byte = self.now;
+        }
+        heard
+    }
+
     /// Notes that the reply to the request under way may come late.
     pub(super) fn expect_late_reply(&mut self) {
         self.late = true;

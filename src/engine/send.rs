@@ -71,24 +71,6 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         self.send()
     }
 
-    /// Takes what has arrived by the time `now` and drops it: negative if the link is lost.
-    pub fn drop_received(&mut self, now: u32) -> i16 {
-        self.look_at_clock(now);
-        self.hear(S::Count::ZERO)
-    }
-
-    /// Receives from `index` on: how many bytes, negative if the link is lost.
-    #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn hear(&mut self, index: S::Count) -> i16 {
-        let room = self.storage.room() - index;
-        let heard = self.port.read(self.storage.bytes(index, room));
-        if heard > 0 {
-            self.storage.count(Counter::BytesReceived, heard as u16);
-            self.last_byte = self.now;
-        }
-        heard
-    }
-
     /// Hands the frame to the port, waits until that has drained, and holds the driver
     /// on. A port that does not move is not waited for longer than a reply may take.
     #[cfg_attr(target_os = "none", inline(never))]
