@@ -2,7 +2,7 @@
 
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 use mbm::bytes::copy_words;
-use mbm::engine::{Counter, Storage, Words, COUNTERS};
+use mbm::engine::{Storage, Words, COUNTERS};
 use mbm::FIRMWARE;
 
 /// What happened on the line, since the caller zeroed it. Each wraps at 2^32.
@@ -57,40 +57,78 @@ unsafe fn words<'a>(first: *mut u16, count: u8) -> &'a mut [u16] {
     unsafe { from_raw_parts_mut(first, count.into()) }
 }
 
-// Nothing is checked here, for its bytes: mbm_master_setBuffers demands three buffers
-// that do not overlap, of these lengths, valid for as long as the object is used.
-// The engine keeps every index below `room`, and below the words that it asks for;
-// `tests/storage_bounds.rs` holds it to that. Without buffers nothing is requested.
+/// The functions of [`Storage`] over the fields `frame`, `frame_bytes` and `counters` of a
+/// struct: a frame buffer that C lends, whose lengths are of the type `$count`.
+///
+/// Nothing is checked here, for its bytes. The function of the header that sets the fields
+/// demands a buffer of that length, and counters or NULL, valid for as long as the object is
+/// used. The engine, and a client's TCP line, keep every index below `room`:
+/// `tests/storage_bounds.rs`, `tests/client_bounds.rs` and `c-tests/test_client_buffers.c`
+/// hold them to that.
+macro_rules! lent_frame {
+    ($count:ty) => {
+        type Count = $count;
+
+        fn room(&self) -> $count {
+            self.frame_bytes
+        }
+
+        #[inline(always)]
+        fn byte(&self, index: $count) -> u8 {
+            // SAFETY: below `frame_bytes`, see above.
+            unsafe { *self.frame.add(index.into()) }
+        }
+
+        #[inline(always)]
+        fn set_byte(&mut self, index: $count, byte: u8) {
+            // SAFETY: below `frame_bytes`, see above.
+            unsafe { *self.frame.add(index.into()) = byte }
+        }
+
+        #[inline(always)]
+        fn slice(&self, index: $count, count: $count) -> &[u8] {
+            // SAFETY: up to `frame_bytes`, see above.
+            unsafe { core::slice::from_raw_parts(self.frame.add(index.into()), count.into()) }
+        }
+
+        #[inline(always)]
+        fn bytes(&mut self, index: $count, count: $count) -> &mut [u8] {
+            // SAFETY: up to `frame_bytes`, see above.
+            unsafe { core::slice::from_raw_parts_mut(self.frame.add(index.into()), count.into()) }
+        }
+
+        fn set_aside(&mut self, count: $count) {
+            // SAFETY: up to `frame_bytes`, see above.
+            self.frame = unsafe { self.frame.add(count.into()) };
+            self.frame_bytes -= count;
+        }
+
+        fn take_back(&mut self, count: $count) {
+            // SAFETY: as many as were set aside.
+            self.frame = unsafe { self.frame.sub(count.into()) };
+            self.frame_bytes += count;
+        }
+
+        // On a microcontroller once, not at every call: flash.
+        #[cfg_attr(all(feature = "counters", target_os = "none"), inline(never))]
+        fn count(&mut self, counter: mbm::engine::Counter, more: u16) {
+            if !cfg!(feature = "counters") || self.counters.is_null() {
+                return;
+            }
+            // SAFETY: the caller's counters are COUNTERS integers in a row, and
+            // `counter` is less than that.
+            unsafe {
+                let counter = self.counters.cast::<u32>().add(counter as usize);
+                *counter = (*counter).wrapping_add(more.into());
+            }
+        }
+    };
+}
+pub(crate) use lent_frame;
+
+// Without buffers nothing is requested.
 impl Storage for LentByC {
-    type Count = u8;
-
-    fn room(&self) -> u8 {
-        self.frame_bytes
-    }
-
-    #[inline(always)]
-    fn byte(&self, index: u8) -> u8 {
-        // SAFETY: below `frame_bytes`, see above.
-        unsafe { *self.frame.add(index.into()) }
-    }
-
-    #[inline(always)]
-    fn set_byte(&mut self, index: u8, byte: u8) {
-        // SAFETY: below `frame_bytes`, see above.
-        unsafe { *self.frame.add(index.into()) = byte }
-    }
-
-    #[inline(always)]
-    fn slice(&self, index: u8, count: u8) -> &[u8] {
-        // SAFETY: up to `frame_bytes`, see above.
-        unsafe { from_raw_parts(self.frame.add(index.into()), count.into()) }
-    }
-
-    #[inline(always)]
-    fn bytes(&mut self, index: u8, count: u8) -> &mut [u8] {
-        // SAFETY: up to `frame_bytes`, see above.
-        unsafe { from_raw_parts_mut(self.frame.add(index.into()), count.into()) }
-    }
+    lent_frame!(u8);
 
     // Volatile, or LLVM would call memmove of libc.
     #[cfg_attr(target_os = "none", inline(never))]
@@ -106,34 +144,9 @@ impl Storage for LentByC {
             }
         }
     }
-
-    fn set_aside(&mut self, count: u8) {
-        // SAFETY: up to `frame_bytes`, see above.
-        self.frame = unsafe { self.frame.add(count.into()) };
-        self.frame_bytes -= count;
-    }
-
-    fn take_back(&mut self, count: u8) {
-        // SAFETY: as many as were set aside.
-        self.frame = unsafe { self.frame.sub(count.into()) };
-        self.frame_bytes += count;
-    }
-
-    // On a microcontroller once, not at every call: flash.
-    #[cfg_attr(all(feature = "counters", target_os = "none"), inline(never))]
-    fn count(&mut self, counter: Counter, more: u16) {
-        if !cfg!(feature = "counters") || self.counters.is_null() {
-            return;
-        }
-        // SAFETY: the caller's counters are COUNTERS integers in a row, and
-        // `counter` is less than that.
-        unsafe {
-            let counter = self.counters.cast::<u32>().add(counter as usize);
-            *counter = (*counter).wrapping_add(more.into());
-        }
-    }
 }
 
+// The engine keeps every index below the words that it asks for, too.
 impl Words for LentByC {
     fn transmit(&mut self) -> &mut [u16] {
         // SAFETY: see above.

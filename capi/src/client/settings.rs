@@ -362,5 +362,5 @@ pub unsafe extern "C" fn mbm_client_setUnits(
 
 const TREATMENT: Treatment = Treatment {
     rest: |means, unit, now| rest(means.units(), unit, now),
-    note: |means, unit, told, now| note(means.units(), unit, told.status, told.again, now),
+    note: |means, unit, ended, now| note(means.units(), unit, ended.status, ended.again, now),
 };
