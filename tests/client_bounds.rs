@@ -79,7 +79,7 @@ proptest! {
                 Framing::Ascii => Serial::ascii(end.clone(), lent),
                 _ => Serial::new(end.clone(), lent),
             };
-            let settings = &mut line.engine().settings;
+            let settings = &mut line.engine.settings;
             settings.echo_discard = echo;
             settings.response_timeout = 200_000;
             let mut client: Client<_, _, 4> = Client::new(line);
@@ -108,7 +108,7 @@ proptest! {
                     prop_assert_eq!(task.received(), received);
                 }
                 // A reply that was held stands in the frame buffer no longer.
-                let whole = usize::from(client.line.engine().storage.frame.room());
+                let whole = usize::from(client.line.engine.storage.frame.room());
                 prop_assert_eq!(whole, room.max(17));
             }
         }

@@ -329,7 +329,7 @@ fn a_reply_too_long_for_the_job_is_told_and_not_cut() {
 /// looks like the answer to the next request.
 fn a_late_reply_is_passed_over(line: (End, Line), encode: fn(u8, &[u8]) -> Vec<u8>) {
     let (end, mut client) = line;
-    client.line.engine().settings.response_timeout = 500_000;
+    client.line.engine.settings.response_timeout = 500_000;
     let reply = |value: u8| encode(17, &[3, 2, 0, value]);
     assert!(client.queue(read(17, 1)).is_ok());
     assert_eq!(
@@ -362,7 +362,7 @@ fn a_late_reply_in_ascii_frames_is_not_the_answer_to_a_later_request() {
 /// How a request for the exception status of unit 2 ends if an ASCII line brings this.
 fn ended_in_ascii(line: &[u8]) -> Task {
     let (end, mut client) = ascii_client();
-    client.line.engine().storage.frame = Frame::new(vec![0; 40]);
+    client.line.engine.storage.frame = Frame::new(vec![0; 40]);
     let build: fn(&mut Outline) -> Status = |o| o.set(Form::READ_EXCEPTION_STATUS, 0, 0);
     assert!(client.queue(Task::new(2, 1, &[], build)).is_ok());
     sent(&end, &mut client);

@@ -1,6 +1,6 @@
 //! The port that C supplies.
 
-use super::master::mbm_master;
+use super::master::object::mbm_master;
 use core::ffi::c_void;
 use core::ptr::null;
 use mbm::port::Port;

@@ -15,7 +15,7 @@ use crate::port::Port;
 /// One request at a time, in RTU or ASCII frames.
 #[repr(C)]
 pub struct Serial<P, S: Means, J> {
-    /// The request under way.
+    /// The engine under it.
     pub engine: ClientEngine<P, S, J>,
 }
 
@@ -46,11 +46,6 @@ impl<P, S: Means, J: Job> Serial<P, S, J> {
     pub fn set_stream(&mut self) {
         self.engine.settings.gap = 0;
         self.engine.settings.silence = STREAM_SILENCE;
-    }
-
-    /// The engine under it.
-    pub fn engine(&mut self) -> &mut ClientEngine<P, S, J> {
-        &mut self.engine
     }
 }
 

@@ -212,7 +212,7 @@ impl<L: Line<Task>> Asker<L> {
 }
 
 fn serial(mut line: Serial<Wire, Lent, Task>) -> Asker<Serial<Wire, Lent, Task>> {
-    line.engine().settings.response_timeout = TIMEOUT;
+    line.engine.settings.response_timeout = TIMEOUT;
     Asker::new(line)
 }
 
@@ -238,6 +238,6 @@ fn the_client_asks_pymodbus_for_every_function_over_rtu_in_tcp() {
     let wire = Wire::new(Framing::RtuOverTcp);
     let mut client: Client<Serial<Wire, Lent, Task>, Task, 4> =
         Client::over_tcp(wire, Lent::default());
-    client.line.engine().settings.response_timeout = TIMEOUT;
+    client.line.engine.settings.response_timeout = TIMEOUT;
     Asker::with(client).every_function();
 }

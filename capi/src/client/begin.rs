@@ -117,7 +117,7 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
             if !shared(object).is_idle() {
                 return Status::BUSY;
             }
-            let engine = line::<SerialLine>(object).engine();
+            let engine = &mut line::<SerialLine>(object).engine;
             engine.request().set_ascii(character);
             Status::OK
         })

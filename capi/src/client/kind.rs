@@ -79,7 +79,7 @@ unsafe fn start_rtu(object: *mut Object) {
     // SAFETY: as the caller promises.
     unsafe {
         (*object).shared.broadcasts = true;
-        line::<SerialLine>(object).engine().line_used();
+        line::<SerialLine>(object).engine.line_used();
     }
 }
 
@@ -90,7 +90,7 @@ unsafe fn start_stream(object: *mut Object) {
     unsafe {
         let line = line::<SerialLine>(object);
         line.set_stream();
-        line.engine().line_used();
+        line.engine.line_used();
     }
 }
 

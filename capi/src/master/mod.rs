@@ -1,6 +1,6 @@
 //! `mbm_master_*`: the facade for C.
 
-mod object;
+pub(crate) mod object;
 mod requests;
 mod settings;
 mod turn;
@@ -75,7 +75,7 @@ impl Object {
     }
 }
 
-/// As [`pointers::check`], but what nobody has touched yet becomes a master, with
+/// As [`pointers::check`], but zeroed storage becomes a master, with
 /// defaults and without port and buffers.
 ///
 /// # Safety
