@@ -1317,7 +1317,7 @@ typedef struct mbm_diagnostics {
      */
     struct mbm_service service;
     /**
-     * Optional: told that the client restarted the line with sub-function 01 of
+     * Optional: called when the client restarts the line with sub-function 01 of
      * 08; `clearLog` is 1 if it cleared the event log too.
      */
     void (*restart)(void *context, uint8_t clearLog);
@@ -1462,8 +1462,8 @@ typedef struct mbm_request {
      */
     uint16_t length;
     /**
-     * The unit that it was sent to; on a serial line 0 is broadcast, whose
-     * response nobody will see.
+     * The unit that it was sent to. On a serial line 0 is broadcast: no response is
+     * sent.
      */
     uint8_t unit;
     /**

@@ -12,7 +12,7 @@ typedef struct fault {
     const char *name;
     void (*play)(responder *r, const uint8_t *request);
     uint8_t function;     /* of the five requests, 03 or 06 */
-    uint8_t echo;         /* the master is told to expect its echo */
+    uint8_t echo;         /* the master has its echo discard on */
     const char *expected; /* without a retry */
     uint8_t status;       /* of the first transaction */
     const char *retried;  /* with one retry */

@@ -15,9 +15,9 @@
 
 typedef struct held_clock {
     pthread_mutex_t lock;
-    int64_t behind;  /* the machine's clock, by so many microseconds */
+    int64_t behind;  /* microseconds that the master's clock is behind the machine's */
     int64_t stopped; /* what it shows while it stands still */
-    int64_t told;    /* what the master was told last */
+    int64_t told;    /* the time that the master read last */
     int64_t due;     /* what it does not go beyond */
     uint32_t bytes;  /* written, and not done with */
     unsigned link;   /* connections that were forgotten */

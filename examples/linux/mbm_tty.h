@@ -29,7 +29,7 @@ typedef struct mbm_tty_options {
     char parity;             /**< 'N', 'E' or 'O' */
     uint8_t stop;            /**< stop bits, 1 or 2 */
     uint8_t data;            /**< data bits: 8, which 0 means too, or 7 for ASCII */
-    uint8_t exclusive;       /**< 1: nobody else may open the terminal meanwhile */
+    uint8_t exclusive;       /**< 1: no other program may open the terminal meanwhile */
     uint8_t rs485;           /**< 1: the driver of the system switches RTS for RS-485 */
     uint8_t rtsLow;          /**< with rs485, 1: RTS is low while sending, else high */
     uint8_t hearSelf;        /**< with rs485, 1: what is sent is received too */

@@ -145,8 +145,8 @@ pub(super) unsafe fn line<'a, L>(object: *mut Object) -> &'a mut L {
     unsafe { &mut *(&raw mut (*object).line).cast() }
 }
 
-/// Does something with the line of an object, whatever its kind. Only functions that
-/// programs seldom call use it: an image that calls none of them does not carry it.
+/// Does something with the line of an object, whatever its kind. Only functions that few
+/// programs call use it, so most images carry the code of one kind of line.
 /// Unsafe as [`line`] is.
 macro_rules! on_line {
     ($object:expr, $line:ident => $action:expr) => {

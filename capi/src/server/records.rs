@@ -35,8 +35,8 @@ pub struct mbm_request {
     pub data: *const u8,
     /// Bytes of it, 0 to 252.
     pub length: u16,
-    /// The unit that it was sent to; on a serial line 0 is broadcast, whose
-    /// response nobody will see.
+    /// The unit that it was sent to. On a serial line 0 is broadcast: no response is
+    /// sent.
     pub unit: u8,
     /// The function code.
     pub function: u8,
@@ -106,7 +106,7 @@ pub(super) unsafe fn is_of_another(service: *const mbm_service, function: u8) ->
 pub struct mbm_diagnostics {
     /// Not for you.
     pub service: mbm_service,
-    /// Optional: told that the client restarted the line with sub-function 01 of
+    /// Optional: called when the client restarts the line with sub-function 01 of
     /// 08; `clearLog` is 1 if it cleared the event log too.
     pub restart: Option<unsafe extern "C" fn(context: *mut c_void, clearLog: u8)>,
     /// Handed to `restart`. Yours, may be NULL.
