@@ -1,6 +1,6 @@
-//! The request that is under way on a serial line, as the engine knows it.
+//! The request in flight on a serial line, in the form that the engine needs.
 
-use super::job::{bytes, Job};
+use super::job::{data_of, Job};
 use super::means::Means;
 use crate::engine::{ascii, Engine, Request, Seen, Verdict};
 use crate::error::Status;
@@ -12,32 +12,32 @@ use crate::pdu::reply;
 use crate::FIRMWARE;
 use core::num::NonZeroU8;
 
-/// The engine of a client.
+/// The engine of a client on a serial line.
 pub type ClientEngine<P, S, J> = Engine<P, S, ActiveRequest<P, S, J>>;
 
-/// How the frames of an ASCII line are written and found. (Pointers, so that firmware
-/// without such a line carries none of it.)
+/// The functions that write and find ASCII frames. (Pointers, so that firmware without an
+/// ASCII line does not contain them.)
 struct Ascii<P, S: Means, J> {
     encode: fn(&mut ClientEngine<P, S, J>, content: u16),
     search: fn(&mut ClientEngine<P, S, J>) -> bool,
 }
 
-/// The request under way.
+/// The request in flight.
 pub struct ActiveRequest<P, S: Means, J> {
     pub(super) job: Option<J>,
-    /// How it travels if that is not in RTU frames.
+    /// `None` on an RTU line.
     ascii: Option<Ascii<P, S, J>>,
-    /// The character that ends ASCII frames (08, sub-function 03).
+    /// The character that ends ASCII frames (function 08, sub-function 03).
     delimiter: u8,
     function: u8,
-    /// Nothing more belongs to the frame that arrives.
-    ended: bool,
-    /// Length of the response PDU; 0 if there is none.
+    /// The received frame is over: the line is silent, or its end character arrived.
+    frame_ended: bool,
+    /// Length of the response PDU in bytes; 0 if there is no response.
     pub(super) length: u8,
 }
 
 impl<P, S: Means, J: Job> ActiveRequest<P, S, J> {
-    /// Has requests travel in ASCII frames that `delimiter` ends.
+    /// Sends requests in ASCII frames, which end with the character `delimiter`.
     pub fn set_ascii(&mut self, delimiter: u8) {
         self.delimiter = delimiter;
         self.ascii = Some(Ascii {
@@ -46,7 +46,7 @@ impl<P, S: Means, J: Job> ActiveRequest<P, S, J> {
         });
     }
 
-    /// Takes a request to be started.
+    /// Stores the request to be sent next.
     pub(super) fn begin(&mut self, job: J) {
         self.function = job.ticket().outline.function();
         self.job = Some(job);
@@ -63,7 +63,7 @@ impl<P, S: Means, J: Job> ActiveRequest<P, S, J> {
     /// Writes the request PDU.
     fn emit(&self, pdu: &mut [u8]) {
         if let Some(job) = &self.job {
-            job.ticket().outline.emit(pdu, bytes(job));
+            job.ticket().outline.emit(pdu, data_of(job));
         }
     }
 }
@@ -74,7 +74,7 @@ impl<P, S: Means, J: Job> Request<P, S> for ActiveRequest<P, S, J> {
         ascii: None,
         delimiter: 0,
         function: 0,
-        ended: false,
+        frame_ended: false,
         length: 0,
     };
     const IS_PLAIN: bool = false;
@@ -116,9 +116,10 @@ impl<P, S: Means, J: Job> Request<P, S> for ActiveRequest<P, S, J> {
 
     #[cfg_attr(target_os = "none", inline(never))]
     fn wanted(engine: &mut ClientEngine<P, S, J>, front: u16, have: u16) -> u16 {
-        let ended = engine.request.ended;
-        if !ended && engine.request.function == REPORT_SERVER_ID {
-            // Complete as it is counted if the CRC says so. More may come if not.
+        let frame_ended = engine.request.frame_ended;
+        if !frame_ended && engine.request.function == REPORT_SERVER_ID {
+            // If the CRC is right, the reply is as long as its byte count says. If not,
+            // more bytes may belong to it.
             let counted = engine.reply_frame(front, have, 0);
             if counted > 0 && counted <= have && engine.is_right(front, counted) {
                 return counted;
@@ -128,11 +129,11 @@ impl<P, S: Means, J: Job> Request<P, S> for ActiveRequest<P, S, J> {
         let length = engine.reply_frame(
             front,
             have,
-            if ended {
-                // What arrived last is the CRC.
+            if frame_ended {
+                // The last two bytes are the CRC.
                 pdu.saturating_sub(rtu::CRC.into())
             } else {
-                // While more may come, it is never complete, but for the longest.
+                // While more bytes may arrive, only a PDU of the greatest length is complete.
                 pdu.min(MAX_PDU)
             },
         );
@@ -140,7 +141,7 @@ impl<P, S: Means, J: Job> Request<P, S> for ActiveRequest<P, S, J> {
             engine.see(Seen::TOO_LONG);
             return 0;
         }
-        // The next byte may tell more.
+        // The next byte may determine the length.
         length.min(have + 1)
     }
 
@@ -161,7 +162,7 @@ impl<P, S: Means, J: Job> Request<P, S> for ActiveRequest<P, S, J> {
             return Verdict::Echo;
         }
         engine.exception = reply::exception_code(pdu).unwrap_or(0);
-        match outline.judge(pdu, bytes(job)) {
+        match outline.judge(pdu, data_of(job)) {
             Status::MALFORMED_REPLY => Verdict::Wrong,
             _ => Verdict::Right,
         }
@@ -172,7 +173,7 @@ impl<P, S: Means, J: Job> Request<P, S> for ActiveRequest<P, S, J> {
         if let Some(ascii) = &engine.request.ascii {
             return (ascii.search)(engine);
         }
-        engine.request.ended = false;
+        engine.request.frame_ended = false;
         if !FIRMWARE {
             if let Some(data) = engine.request.outline().data_of_read() {
                 if engine.has_read(data) {
@@ -188,7 +189,7 @@ impl<P, S: Means, J: Job> Request<P, S> for ActiveRequest<P, S, J> {
         if engine.request.ascii.is_some() {
             return false;
         }
-        engine.request.ended = true;
+        engine.request.frame_ended = true;
         engine.skim(0)
     }
 
@@ -201,9 +202,10 @@ impl<P, S: Means, J: Job> Request<P, S> for ActiveRequest<P, S, J> {
 }
 
 impl<P, S: Means, J: Job> ClientEngine<P, S, J> {
-    /// The length of the frame that the reply has which begins with the `have` bytes at
-    /// `front`, or the least length while they do not tell; 0 if no reply begins so. Where
-    /// nothing but its end tells, the PDU has `whole` bytes.
+    /// The length of the reply's frame, which begins with the `have` bytes at `front`. While
+    /// these bytes do not determine the length, the least possible length; 0 if no reply
+    /// begins with them. For a reply whose length only its end shows, `whole` is the length
+    /// of its PDU.
     fn reply_frame(&self, front: u16, have: u16, whole: usize) -> u16 {
         let pdu = self
             .storage
@@ -221,7 +223,7 @@ impl<P, S: Means, J: Job> ClientEngine<P, S, J> {
     }
 }
 
-/// Writes the frame of the request, whatever it is.
+/// Writes the frame of any request.
 #[inline(never)]
 fn write_any<P, S: Means, J: Job>(engine: &mut ClientEngine<P, S, J>) {
     let length = u16::from(engine.request.outline().request_length());
@@ -234,16 +236,16 @@ fn write_any<P, S: Means, J: Job>(engine: &mut ClientEngine<P, S, J>) {
     }
 }
 
-/// Turns unit and PDU at the front of the frame buffer into an ASCII frame.
+/// Converts unit and PDU at the front of the frame buffer into an ASCII frame.
 fn encode<P, S: Means, J: Job>(engine: &mut ClientEngine<P, S, J>, content: u16) {
     let room = engine.storage.room();
     let frame = engine.storage.bytes(0, room);
-    // It fits, or the request had not been started.
+    // The frame fits: `fits` was checked when the request was started.
     let written = characters::encode(frame, content.into(), engine.request.delimiter);
     engine.set_frame_length(written.unwrap_or_default() as u16);
 }
 
 fn search_ascii<P, S: Means, J: Job>(engine: &mut ClientEngine<P, S, J>) -> bool {
-    engine.request.ended = true;
+    engine.request.frame_ended = true;
     engine.search_ascii(engine.request.delimiter)
 }

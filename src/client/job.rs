@@ -1,5 +1,5 @@
-//! What a client is asked to do: a request, its data, and where the response's
-//! data go.
+//! A request of a client: its state, the data to send, and the place for the data of the
+//! response.
 
 use super::means::Means;
 use crate::error::Status;
@@ -7,7 +7,7 @@ use crate::pdu::outline::Outline;
 use crate::time::elapsed;
 use crate::FIRMWARE;
 
-/// Where a request stands.
+/// The stage of a request.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub(super) enum Stage {
@@ -15,46 +15,46 @@ pub(super) enum Stage {
     Queued,
     /// Waits for its response.
     Sent,
-    /// Was on its way when the link was lost.
+    /// The link was lost; the next poll ends the request with [`Status::LINK_LOST`].
     Lost,
-    /// Waits for its response; another unit answered in its place.
-    Strayed,
-    /// Was given back.
+    /// Waits for its response; another unit sent a response with its number.
+    OtherUnit,
+    /// The client returned it to the caller.
     Ended,
 }
 
-/// What the client keeps of a request. The public fields are the caller's: those
-/// above `length` are set before the request is queued, the others are read when
-/// it has ended.
+/// The state of a request. The caller sets `capacity`, `transaction`, `unit` and `outline`
+/// before it queues the request, and reads `status`, `exception` and `length` when the
+/// request has ended.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct Ticket {
-    /// Bytes that the response's data may have.
+    /// Greatest number of data bytes that the caller takes from the response.
     pub capacity: u16,
-    /// The caller's own number for it.
+    /// A number that the caller chooses for the request; 0 for none.
     pub transaction: u16,
-    /// Whom it is for.
+    /// The unit that the request is for.
     pub unit: u8,
-    /// [`Status::PENDING`] from being queued to its end, then how it ended.
+    /// [`Status::PENDING`] while the request is queued or in flight, then its result.
     pub status: Status,
-    /// The raw exception code of the response; 0 if it was none.
+    /// The exception code of the response as received; 0 if it was no exception.
     pub exception: u8,
-    /// Bytes of data received.
+    /// Number of data bytes received.
     pub length: u8,
     stage: Stage,
-    /// How often it was asked again.
+    /// Number of retries so far.
     pub(super) retries: u8,
-    /// Its number on the wire, for TCP.
+    /// The transaction identifier of its TCP frame.
     pub(super) wire: u16,
-    /// It is due when `wait` has passed since `since`.
+    /// The request is due when `wait` microseconds have passed since `since`.
     pub(super) since: u32,
     pub(super) wait: u32,
-    /// What is asked.
+    /// The function and its arguments.
     pub outline: Outline,
 }
 
 impl Ticket {
-    /// Nothing asked of nobody.
+    /// No request.
     pub const NONE: Ticket = Ticket {
         capacity: 0,
         transaction: 0,
@@ -70,18 +70,19 @@ impl Ticket {
         outline: Outline::NONE,
     };
 
-    /// The transaction identifier of the TCP frame that it was sent in last; 0 if it was
-    /// not sent yet.
+    /// The transaction identifier of the TCP frame in which the request was last sent; 0 if
+    /// it was not sent yet.
     pub const fn wire(&self) -> u16 {
         self.wire
     }
 
-    /// True if a client gave it back and none took it since. False does not tell.
+    /// True if a client returned the request and it was not queued since. False says
+    /// nothing: the caller may have written a new state.
     pub fn has_ended(&self) -> bool {
         self.is(Stage::Ended)
     }
 
-    /// Gives it back.
+    /// Ends the request with `status`.
     pub(super) fn end(&mut self, status: Status) {
         self.stage = Stage::Ended;
         self.status = status;
@@ -91,15 +92,15 @@ impl Ticket {
         self.stage == stage
     }
 
-    /// True if its response is waited for.
+    /// True if the request waits for its response.
     pub fn is_sent(&self) -> bool {
-        matches!(self.stage, Stage::Sent | Stage::Strayed)
+        matches!(self.stage, Stage::Sent | Stage::OtherUnit)
     }
 
-    /// How long it is not due yet.
+    /// Microseconds until the request is due.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    pub(super) fn remains(&self, now: u32, means: &mut impl Means) -> u32 {
+    pub(super) fn time_until_due(&self, now: u32, means: &mut impl Means) -> u32 {
         let wait = match self.wait {
             0 => 0,
             wait => wait.saturating_sub(elapsed(now, self.since)),
@@ -111,12 +112,12 @@ impl Ticket {
         }
     }
 
-    /// Notes that another unit answered in its place.
-    pub(super) fn stray(&mut self) {
-        self.stage = Stage::Strayed;
+    /// Records that another unit sent a response with the number of this request.
+    pub(super) fn note_other_unit(&mut self) {
+        self.stage = Stage::OtherUnit;
     }
 
-    /// Enters a stage at the time `now`, to be looked at again after `wait`.
+    /// Enters a stage at the time `now`. The request is due again `wait` microseconds later.
     pub(super) fn enter(&mut self, stage: Stage, now: u32, wait: u32) {
         self.stage = stage;
         self.since = now;
@@ -124,52 +125,52 @@ impl Ticket {
     }
 }
 
-/// A request that a client is given and gives back when it has ended.
+/// A request that the caller queues, and that the client returns when it has ended.
 pub trait Job {
-    /// What the client keeps of it.
+    /// The state of the request.
     fn ticket(&self) -> &Ticket;
 
     /// As [`Job::ticket`].
     fn ticket_mut(&mut self) -> &mut Ticket;
 
-    /// A byte of the data to send, as on the wire.
+    /// Returns byte `index` of the data to send, in the order of the wire.
     fn byte(&self, index: usize) -> u8;
 
-    /// Takes a byte of the response's data, as on the wire. Called for the
-    /// indices below [`Ticket::capacity`] only.
+    /// Stores byte `index` of the response's data, in the order of the wire. `index` is
+    /// less than [`Ticket::capacity`].
     fn put(&mut self, index: usize, byte: u8);
 
-    /// Takes all of the response's data, from the first byte on.
+    /// Stores all of the response's data.
     fn put_all(&mut self, bytes: &[u8]) {
         for (index, byte) in bytes.iter().enumerate() {
             self.put(index, *byte);
         }
     }
 
-    /// True if the response's data are wanted at all.
+    /// False if the caller has no use for the response's data.
     fn wants_data(&self) -> bool {
         true
     }
 }
 
-/// True if a request that ended so was answered, with data or an exception.
+/// True if `ended` is the status of a request that was answered, with data or an exception.
 pub(super) fn is_answer(ended: Status) -> bool {
     ended.code() < 0x80
 }
 
-/// Hands the data of `pdu`, a complete response, to the job.
+/// Stores the data of the complete response `pdu` in the request.
 #[cfg_attr(not(target_os = "none"), inline(always))]
 pub(super) fn deliver<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
     let at = usize::from(job.ticket().outline.data_at());
     match pdu.get(at..) {
-        Some(data) if at > 0 => take(job, data),
+        Some(data) if at > 0 => store_data(job, data),
         _ => Status::OK,
     }
 }
 
-/// Hands the data of a response to the job.
+/// Stores the data of a response in the request.
 #[cfg_attr(not(target_os = "none"), inline(always))]
-pub(super) fn take<J: Job>(job: &mut J, data: &[u8]) -> Status {
+pub(super) fn store_data<J: Job>(job: &mut J, data: &[u8]) -> Status {
     if !job.wants_data() {
         return Status::OK;
     }
@@ -179,7 +180,7 @@ pub(super) fn take<J: Job>(job: &mut J, data: &[u8]) -> Status {
     }
     ticket.length = data.len() as u8;
     let words = ticket.outline.takes_words();
-    // The bits behind the last one are zero.
+    // The mask clears the unused bits of the last byte.
     if FIRMWARE {
         let mask = ticket.outline.mask();
         for (index, byte) in data.iter().enumerate() {
@@ -201,7 +202,8 @@ pub(super) fn take<J: Job>(job: &mut J, data: &[u8]) -> Status {
     Status::OK
 }
 
-/// What gives the bytes of a job to send. (One type, so one function for all who ask.)
-pub(super) fn bytes<J: Job>(job: &J) -> impl Fn(usize) -> u8 + '_ {
+/// Returns a function that reads the data of a request. (All callers share one closure
+/// type, so generic functions are compiled once.)
+pub(super) fn data_of<J: Job>(job: &J) -> impl Fn(usize) -> u8 + '_ {
     |index| job.byte(index)
 }

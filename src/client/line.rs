@@ -1,21 +1,21 @@
-//! How a client's requests travel.
+//! The interface between a client and its serial line or TCP stream.
 
 use super::job::Job;
 use super::shared::Shared;
 
 /// A serial line, or a TCP stream.
 pub trait Line<J> {
-    /// The most requests under way at once.
-    const MOST: usize;
+    /// Greatest number of requests in flight at the same time.
+    const MAX_IN_FLIGHT: usize;
 
-    /// Whether unit 0 is everybody.
+    /// True if unit 0 addresses all units (broadcast).
     const BROADCASTS: bool;
 
-    /// Whether a caller's number must tell one request from another.
+    /// True if the transaction numbers of pending requests must differ.
     const HAS_IDS: bool;
 
-    /// Moves on to the time `now`; gives a job back that ended. `fresh` at the
-    /// first of the calls that one poll makes, when there may be something new.
+    /// Advances the requests to the time `now`, and returns one that has ended. `fresh` is
+    /// true in the first call of each poll; only that call reads new bytes.
     fn advance<const N: usize>(
         &mut self,
         shared: &mut Shared<J, N>,
@@ -23,16 +23,16 @@ pub trait Line<J> {
         fresh: bool,
     ) -> Option<J>;
 
-    /// Forgets a job that was under way, or with `None` all, with what is half
-    /// received or half sent.
+    /// Discards the state of one request in flight; with `None`, of all requests and of
+    /// all partly received or partly sent frames.
     fn release(&mut self, job: Option<&J>);
 
-    /// True if nothing is left to be sent of requests that were given up.
+    /// True if no bytes of cancelled requests wait to be sent.
     fn is_idle(&self) -> bool {
         true
     }
 
-    /// How long there is nothing to do; `None` if that depends on the queue.
+    /// Microseconds until the line has something to do; `None` if the queue decides.
     fn delay(&mut self, now: u32) -> Option<u32>;
 
     /// See [`Client::lend`](super::Client::lend).

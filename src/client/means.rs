@@ -1,50 +1,52 @@
-//! What the caller lends to a client.
+//! The buffers, records and random numbers that a caller supplies to a client.
 
 use super::policy::{again, Policy};
 use super::units::{note, rest, Unit};
 use crate::engine::{Frame, Storage};
 use crate::error::Status;
 
-/// What the caller lends to a client, besides the frame buffer.
+/// The storage of a client: the frame buffer of [`Storage`], and more that is optional.
 pub trait Means: Storage<Count = u16> {
-    /// The bytes between two places of [`Means::outgoing`], of which the first is not
-    /// behind the second and the second not behind the end.
+    /// The bytes of [`Means::outgoing`] from index `from` to before index `to`. The client
+    /// ensures that `from` <= `to` <= length of the buffer.
     fn to_send(&mut self, from: u16, to: u16) -> &mut [u8] {
         let bytes = self.outgoing().get_mut(from.into()..to.into());
         bytes.unwrap_or_default()
     }
 
-    /// What TCP requests are gathered in; unused on a serial line.
+    /// The transmit buffer of a TCP client; a serial line does not use it.
     fn outgoing(&mut self) -> &mut [u8] {
         &mut []
     }
 
-    /// A record for each unit that is to be treated in its own way.
+    /// Records of units that need their own delay or counts.
     fn units(&mut self) -> &mut [Unit] {
         &mut []
     }
 
-    /// How much longer a unit rests, in microseconds.
+    /// Microseconds until the unit may get its next request.
     fn rest(&mut self, unit: u8, now: u32) -> u32 {
         rest(self.units(), unit, now)
     }
 
-    /// Takes note of a request to a unit that ended, or is to be asked `again`.
+    /// Records that a request to a unit ended with `status`. `again` is true if the
+    /// client will retry it.
     fn note(&mut self, unit: u8, status: Status, again: bool, now: u32) {
         note(self.units(), unit, status, again, now);
     }
 
-    /// How long a request that ended with `status`, and was asked again `retries`
-    /// times, waits to be asked again; `None` if it is not.
+    /// Microseconds to wait before the next retry of a request that ended with `status`
+    /// and has had `retries` retries; `None` if the request is not retried.
     fn again(&mut self, policy: &Policy, retries: u8, status: Status) -> Option<u32> {
         again(policy, retries, status, || self.random())
     }
 
-    /// Any number, another each time; for jitter.
+    /// A random number for the jitter, a different one at each call.
     fn random(&mut self) -> u32 {
         0
     }
 }
 
-/// A client's frame buffer alone; on TCP, which has an outgoing buffer, it sends nothing.
+/// Only a frame buffer, enough for a client on a serial line. A TCP client needs
+/// [`Means::outgoing`] too and sends nothing without it.
 impl<F: AsRef<[u8]> + AsMut<[u8]>> Means for Frame<F> {}

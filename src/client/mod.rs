@@ -1,9 +1,9 @@
-//! A client that never waits: requests are queued, `poll` moves them on and
-//! gives each back when it has ended.
+//! A client that never waits. The caller queues requests; `poll` advances them and
+//! returns each request that has ended.
 //!
 //! A serial line carries one request at a time, a TCP stream as many as the
-//! queue holds. What a request is, with its data, is a [`Job`] of the caller's;
-//! nothing is copied until it goes to the wire, or comes from it.
+//! queue holds. The caller implements [`Job`], which is a request with its data.
+//! The client copies data only between a request and a frame buffer.
 
 mod active;
 mod job;
@@ -29,51 +29,53 @@ pub use units::{note, rest, Unit};
 use crate::error::Status;
 use crate::time::millis;
 
-/// What is a pause in a TCP stream that carries the frames of a serial line.
+/// The pause, in microseconds, that ends a frame of a serial line in a TCP stream.
 pub const STREAM_SILENCE: u32 = millis(20);
 
-/// The pause within an ASCII frame that ends it (serial line guide V1.02, 2.5.2.1).
+/// The pause between two characters, in microseconds, that ends an incomplete ASCII
+/// frame (serial line guide V1.02, 2.5.2.1).
 pub const ASCII_SILENCE: u32 = millis(1000);
 
-/// How soon to look again whether a port takes bytes that it did not take.
+/// Time until the next attempt to write, in microseconds, after a port did not accept
+/// all bytes.
 const FULL_PORT: u32 = millis(1);
 
-/// A client of a [`Line`] for up to `N` requests, waiting or under way.
+/// A client on a [`Line`], for up to `N` requests that are queued or in flight.
 #[repr(C)]
 pub struct Client<L, J, const N: usize> {
     shared: Shared<J, N>,
-    /// How requests travel.
+    /// The serial line or TCP stream.
     pub line: L,
 }
 
 impl<L, J, const N: usize> Client<L, J, N> {
-    /// When requests are asked again.
+    /// The policy for retries.
     pub fn policy(&mut self) -> &mut Policy {
         &mut self.shared.policy
     }
 
-    /// False from a lost link on, until a reply arrives or
-    /// [`Client::set_connected`] or [`Client::reconnect`] says otherwise.
+    /// False after the link was lost, until a reply arrives, or until the caller calls
+    /// [`Client::set_connected`] with true or [`Client::reconnect`].
     pub const fn is_connected(&self) -> bool {
         self.shared.connected
     }
 
-    /// Says whether there is a link. [`Client::reconnect`] assumes that there is.
+    /// Sets whether the link is up. [`Client::reconnect`] sets it to true.
     pub fn set_connected(&mut self, connected: bool) {
         self.shared.connected = connected;
     }
 
-    /// Ends what [`Client::lend`] began.
+    /// Takes the line back after [`Client::lend`].
     pub fn take_back(&mut self) {
         self.shared.lent = false;
     }
 
-    /// True while somebody else uses the line.
+    /// True from [`Client::lend`] to [`Client::take_back`].
     pub const fn is_lent(&self) -> bool {
         self.shared.lent
     }
 
-    /// How many requests wait or are under way.
+    /// Number of requests that are queued or in flight.
     pub fn pending(&self) -> usize {
         self.shared.pending()
     }
@@ -88,8 +90,8 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
         Client { shared, line }
     }
 
-    /// Holds at compile time that the line carries `M` requests at once and the
-    /// queue has room for them: 1 on a serial line, which is half duplex.
+    /// Fails to compile unless the line can carry `M` requests at once and the queue
+    /// can hold them. A serial line is half duplex and carries 1.
     ///
     /// ```
     /// # use mbm::client::*;
@@ -132,23 +134,23 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// ```
     #[must_use]
     pub fn in_flight<const M: usize>(self) -> Self {
-        const { assert!(M >= 1 && M <= L::MOST && M <= N) }
+        const { assert!(M >= 1 && M <= L::MAX_IN_FLIGHT && M <= N) }
         self
     }
 
-    /// Has a job done; it is given back by [`Client::poll`].
+    /// Queues a request. [`Client::poll`] returns it when it has ended.
     ///
     /// # Errors
-    /// The job, its status [`Status::QUEUE_FULL`],
-    /// [`Status::BROADCAST_NOT_ALLOWED`], or on TCP
-    /// [`Status::DUPLICATE_TRANSACTION`] for a number other than 0 that another
-    /// pending request has.
+    /// Returns the request, with one of these as its status: [`Status::QUEUE_FULL`];
+    /// [`Status::BROADCAST_NOT_ALLOWED`]; on TCP [`Status::DUPLICATE_TRANSACTION`] if its
+    /// transaction number is not 0 and another pending request has the same number.
     pub fn queue(&mut self, job: J) -> Result<(), J> {
         self.shared.enqueue(job)
     }
 
-    /// Moves on to the time `now`, without waiting; gives a job back that has
-    /// ended. Call it until there is none, `fresh` at first.
+    /// Advances all requests to the time `now`, without waiting, and returns one request
+    /// that has ended. Call it with `fresh` true first, so that it reads from the port;
+    /// then with `fresh` false until it returns `None`.
     pub fn poll(&mut self, now: u32, fresh: bool) -> Option<J> {
         if self.shared.lent {
             return None;
@@ -156,15 +158,15 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
         self.line.advance(&mut self.shared, now, fresh)
     }
 
-    /// How long, in microseconds from `now`, poll will find nothing to do unless
-    /// a byte arrives; the greatest value if there is no request, and then no byte is
-    /// taken either. While a TCP port does not take what is to be sent, 1000.
+    /// Time in microseconds from `now` until poll has something to do, if no byte arrives
+    /// before. Returns `u32::MAX` if no request is pending; poll does not read bytes then.
+    /// Returns 1000 while a TCP port does not accept the bytes to send.
     pub fn poll_delay(&mut self, now: u32) -> u32 {
         self.line.poll_delay(&self.shared, now)
     }
 
-    /// Gives up the job that `is` the one, and gives it back; `None` if it is not
-    /// pending.
+    /// Cancels the first pending request for which `is` returns true, and returns the
+    /// request; `None` if there is no such request.
     pub fn cancel(&mut self, is: impl Fn(&J) -> bool) -> Option<J> {
         let job = self.shared.withdraw(is)?;
         if job.ticket().is_sent() {
@@ -173,16 +175,16 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
         Some(job)
     }
 
-    /// Says that the link is a new one: what was half received is forgotten, and
-    /// what was under way is given back as lost by the next polls. What still
-    /// waited goes over the new link.
+    /// Call this after the link was opened anew. The client discards partly received and
+    /// partly sent frames. The next polls return the requests in flight with
+    /// [`Status::LINK_LOST`]. Queued requests are sent over the new link.
     pub fn reconnect(&mut self) {
         self.line.release(None);
         self.shared.interrupt();
     }
 
-    /// Lets somebody else use the line until [`Client::take_back`]; false if a
-    /// request is under way or the line is lent already.
+    /// Leaves the line to another user of the port until [`Client::take_back`]. Returns
+    /// false, and changes nothing, if a request is in flight or the line is lent already.
     pub fn lend(&mut self) -> bool {
         self.line.lend(&mut self.shared)
     }

@@ -1,23 +1,24 @@
-//! When a request is asked again that was not answered.
+//! Which failed requests a client retries, and when.
 
 use crate::error::Status;
 
-/// How the wait grows from one retry to the next.
+/// How the wait before a retry grows from one retry to the next. `wait` and `most` are
+/// the arguments of [`Policy::set_backoff`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Backoff {
-    /// Asked again at once.
+    /// No wait.
     None,
-    /// Always the same wait, or the most if that is less.
+    /// Always `wait`, at most `most`.
     Fixed,
-    /// Once, twice, three times the wait, up to the most.
+    /// `wait` times 1, 2, 3 and so on, at most `most`.
     Linear,
-    /// Once, twice, four times the wait, up to the most.
+    /// `wait` times 1, 2, 4 and so on, at most `most`.
     Exponential,
 }
 
 impl Backoff {
-    /// The backoff of a number that C hands in.
+    /// The backoff for a number from C; `None` if the number is not 0 to 3.
     pub const fn from_code(code: u8) -> Option<Backoff> {
         match code {
             0 => Some(Backoff::None),
@@ -29,25 +30,27 @@ impl Backoff {
     }
 }
 
-/// The wait before a retry of a number, given any number for the jitter.
+/// Computes the wait before a retry. The arguments are the policy, the number of the
+/// retry (from 1 on), and a random number for the jitter.
 type Grow = fn(&Policy, u8, u32) -> u32;
 
-/// How long to wait before a retry. Times are in microseconds.
+/// How many retries a request gets, and how long the client waits before each. Times are
+/// in microseconds.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct Policy {
     /// The wait before the first retry.
     wait: u32,
     /// The longest wait.
-    most: u32,
-    /// How the wait grows: `None` for not at all. (A pointer, so that firmware
-    /// without a backoff carries none.)
+    max_wait: u32,
+    /// Computes the wait; `None` if there is no wait. (A pointer, so that firmware
+    /// without a backoff does not contain its code.)
     grow: Option<Grow>,
-    /// How the wait grows, for that.
+    /// How the wait grows; `grow` uses it.
     backoff: Backoff,
-    /// How much of the wait is left to chance, in parts of 256.
+    /// Up to this part of the wait, in 256ths, is subtracted at random.
     pub jitter: u8,
-    /// How often a request is repeated that was not answered.
+    /// Greatest number of retries of one request, 0 to 255.
     pub retries: u8,
 }
 
@@ -55,23 +58,23 @@ impl Policy {
     /// No retries.
     pub const DEFAULT: Policy = Policy {
         wait: 0,
-        most: 0,
+        max_wait: 0,
         grow: None,
         backoff: Backoff::None,
         jitter: 0,
         retries: 0,
     };
 
-    /// Sets how the wait grows.
+    /// Sets the wait before the first retry, how it grows, and the longest wait `most`.
     pub fn set_backoff(&mut self, backoff: Backoff, wait: u32, most: u32) {
-        self.grow = Some(Policy::grown);
+        self.grow = Some(Policy::grown_wait);
         self.backoff = backoff;
         self.wait = wait;
-        self.most = most;
+        self.max_wait = most;
     }
 
-    /// The wait before retry number `retry`, from 1 on; `random` gives any number,
-    /// which decides how much of the jitter is taken off.
+    /// The wait before retry number `retry`, counted from 1. `random` returns a random
+    /// number, which decides how much jitter is subtracted.
     #[inline]
     pub fn wait(&self, retry: u8, random: impl FnOnce() -> u32) -> u32 {
         match self.grow {
@@ -80,8 +83,8 @@ impl Policy {
         }
     }
 
-    fn grown(&self, retry: u8, random: u32) -> u32 {
-        // Added up, for a product would be a wide one.
+    fn grown_wait(&self, retry: u8, random: u32) -> u32 {
+        // A sum, because a product would need a 64-bit multiplication.
         let (mut wait, mut step) = (0, self.wait);
         for count in 0..retry {
             if self.backoff == Backoff::None || (self.backoff == Backoff::Fixed && count > 0) {
@@ -90,14 +93,18 @@ impl Policy {
             if self.backoff == Backoff::Exponential && count > 0 {
                 step = wait;
             }
-            wait = step.saturating_add(wait).min(self.most);
+            wait = step.saturating_add(wait).min(self.max_wait);
         }
-        wait - share(share(wait, u16::from(self.jitter) << 8), mixed(random))
+        wait - fraction(
+            fraction(wait, u16::from(self.jitter) << 8),
+            mix_bits(random),
+        )
     }
 }
 
-/// How long a request that ended with `status` waits to be asked again; `None` if it
-/// is not. It was asked again `retries` times; `random` gives any number.
+/// Microseconds to wait before the next retry of a request that ended with `status` and
+/// has had `retries` retries; `None` if the request is not retried. `random` returns a
+/// random number for the jitter.
 pub fn again(
     policy: &Policy,
     retries: u8,
@@ -110,15 +117,15 @@ pub fn again(
     Some(policy.wait(retries + 1, random))
 }
 
-/// Sixteen bits of which each depends on all bits of `random` below it, so that
-/// they vary over their whole range whichever bits of `random` vary. (The factor is
-/// 2^32 divided by the golden ratio, which spreads numbers in a row evenly.)
-fn mixed(random: u32) -> u16 {
+/// Mixes `random` into 16 bits, each of which depends on all lower bits of `random`. So
+/// the result covers its whole range, whichever bits of `random` vary. (The factor is 2^32
+/// divided by the golden ratio, which spreads consecutive numbers evenly.)
+fn mix_bits(random: u32) -> u16 {
     (random.wrapping_mul(0x9E37_79B1) >> 16) as u16
 }
 
-/// So many 65536ths of a time. (In steps, which need no wide multiplication.)
-fn share(time: u32, part: u16) -> u32 {
+/// `part` 65536ths of a time. (Computed in two steps, without a 64-bit multiplication.)
+fn fraction(time: u32, part: u16) -> u32 {
     let part = u32::from(part);
     (time >> 16) * part + (((time & 0xFFFF) * part) >> 16)
 }
@@ -134,14 +141,15 @@ mod tests {
     }
 
     #[test]
-    fn waits_grow_as_the_backoff_says_and_not_beyond_the_most() {
+    fn waits_grow_as_the_backoff_says_up_to_the_longest_wait() {
         assert_eq!(waits(Backoff::None), [0; 5]);
         assert_eq!(waits(Backoff::Fixed), [1000; 5]);
         assert_eq!(waits(Backoff::Linear), [1000, 2000, 3000, 3500, 3500]);
         assert_eq!(waits(Backoff::Exponential), [1000, 2000, 3500, 3500, 3500]);
     }
 
-    /// The share of each tenth of the jitter, in per mille of the numbers.
+    /// Divides the range of the jitter into ten equal parts, and counts the numbers that
+    /// fall into each part, in per mille.
     fn tenths(numbers: impl Iterator<Item = u32>) -> [u32; 10] {
         let mut policy = Policy::DEFAULT;
         policy.set_backoff(Backoff::Fixed, 1_000_000, 1_000_000);
@@ -163,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn jitter_takes_off_up_to_its_share() {
+    fn jitter_subtracts_at_most_its_part() {
         let mut policy = Policy::DEFAULT;
         policy.set_backoff(Backoff::Fixed, 1000, 1000);
         policy.jitter = 77;
@@ -174,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn jitter_is_even_whichever_bits_of_the_random_number_vary() {
+    fn jitter_is_spread_evenly_whichever_bits_of_the_random_number_vary() {
         let numbers = |bits: u32, shift: u32| (0..1 << bits).map(move |number| number << shift);
         assert_even(tenths(numbers(15, 0)));
         assert_even(tenths(numbers(16, 0)));
@@ -183,7 +191,7 @@ mod tests {
         assert_even(tenths(numbers(10, 0)));
         assert_even(tenths(numbers(10, 22)));
         assert_even(tenths(numbers(8, 24)));
-        // A generator of 32 bits: every 65521st of its numbers, and both halves alike.
+        // A 32-bit generator: multiples of 65521, and numbers whose two halves are equal.
         assert_even(tenths((0..65_000).map(|number| number * 65_521)));
         assert_even(tenths((0..65_536).map(|number| number * 0x1_0001)));
     }

@@ -1,5 +1,5 @@
-//! A client's serial line, or a stream that carries the frames of one: one
-//! request at a time.
+//! A client's serial line, or a TCP stream that carries the frames of a serial line. One
+//! request is in flight at a time.
 
 use super::active::ClientEngine;
 use super::job::{deliver, is_answer, Job, Stage};
@@ -15,34 +15,35 @@ use crate::port::Port;
 /// One request at a time, in RTU or ASCII frames.
 #[repr(C)]
 pub struct Serial<P, S: Means, J> {
-    /// The engine under it.
+    /// The engine that sends the request and finds the reply.
     pub engine: ClientEngine<P, S, J>,
 }
 
 impl<P, S: Means, J: Job> Serial<P, S, J> {
-    /// A serial line, in RTU frames.
+    /// A serial line with RTU frames.
     pub const fn new(port: P, means: S) -> Self {
         Serial {
             engine: Engine::new(port, means),
         }
     }
 
-    /// A serial line, in ASCII frames.
+    /// A serial line with ASCII frames.
     pub fn ascii(port: P, means: S) -> Self {
         let mut line = Serial::new(port, means);
         line.set_ascii();
         line
     }
 
-    /// Has requests travel in ASCII frames: without a gap, and a second without a
-    /// character ends a frame that is not whole.
+    /// Changes the line to ASCII frames: no silence before a request, and one second
+    /// without a character ends an incomplete frame.
     pub fn set_ascii(&mut self) {
         self.engine.request().set_ascii(ascii::END);
         self.engine.settings.gap = 0;
         self.engine.settings.silence = ASCII_SILENCE;
     }
 
-    /// Has requests travel through a TCP stream: without a gap.
+    /// Changes the line to a TCP stream: no silence before a request, and
+    /// [`STREAM_SILENCE`] ends a frame.
     pub fn set_stream(&mut self) {
         self.engine.settings.gap = 0;
         self.engine.settings.silence = STREAM_SILENCE;
@@ -50,8 +51,8 @@ impl<P, S: Means, J: Job> Serial<P, S, J> {
 }
 
 impl<P: Port, S: Means, J: Job, const N: usize> Client<Serial<P, S, J>, J, N> {
-    /// A client that sends the frames of a serial line through a TCP stream: no gap
-    /// between them, and nobody to broadcast to.
+    /// A client that sends RTU frames through a TCP stream, without a silence between
+    /// frames and without broadcasts.
     pub fn over_tcp(port: P, means: S) -> Self {
         let mut client = Client::new(Serial::new(port, means));
         client.shared.broadcasts = false;
@@ -61,17 +62,17 @@ impl<P: Port, S: Means, J: Job, const N: usize> Client<Serial<P, S, J>, J, N> {
 }
 
 impl<P: Port, S: Means, J: Job> Serial<P, S, J> {
-    /// Takes and drops the bytes that arrive while requests wait to be sent again. A
-    /// program that sleeps until bytes are there would not sleep otherwise.
+    /// Reads and discards bytes that arrive while requests wait for a retry. Without this, a
+    /// program that sleeps until bytes arrive would wake up at once.
     #[cold]
     #[inline(never)]
-    fn drop_late<const N: usize>(&mut self, shared: &mut Shared<J, N>, now: u32) {
+    fn drop_late_bytes<const N: usize>(&mut self, shared: &mut Shared<J, N>, now: u32) {
         if self.engine.drop_received(now) < 0 {
-            shared.lose();
+            shared.disconnect();
         }
     }
 
-    /// Hands the engine a job, and starts its request.
+    /// Passes a request to the engine and starts it.
     fn start(&mut self, job: J) -> Status {
         let unit = job.ticket().unit;
         self.engine.forget();
@@ -79,10 +80,10 @@ impl<P: Port, S: Means, J: Job> Serial<P, S, J> {
         self.engine.start(unit)
     }
 
-    /// How the request ended: its response is taken.
+    /// Stores the response in the request, and returns the status of the request.
     fn received(&mut self, job: &mut J, status: Status) -> Status {
         job.ticket_mut().exception = self.engine.exception_code();
-        // 0 if nothing answered: the request was a broadcast, or of that kind.
+        // The length is 0 after a broadcast or another request that has no response.
         let length = self.engine.request.length;
         if status != Status::OK || length == 0 {
             return status;
@@ -95,7 +96,7 @@ impl<P: Port, S: Means, J: Job> Serial<P, S, J> {
 }
 
 impl<P: Port, S: Means, J: Job> Line<J> for Serial<P, S, J> {
-    const MOST: usize = 1;
+    const MAX_IN_FLIGHT: usize = 1;
     const BROADCASTS: bool = true;
     const HAS_IDS: bool = false;
 
@@ -105,14 +106,14 @@ impl<P: Port, S: Means, J: Job> Line<J> for Serial<P, S, J> {
         now: u32,
         fresh: bool,
     ) -> Option<J> {
-        // The engine has the job while it works, no longer.
+        // The engine has the request only during this call.
         let mut status = Status::PENDING;
         if let Some(job) = shared.active.take() {
             self.engine.request().job = Some(job);
         } else {
             let Some(job) = shared.take_due(now, &mut self.engine.storage) else {
                 if fresh && !shared.queue.is_empty() {
-                    self.drop_late(shared, now);
+                    self.drop_late_bytes(shared, now);
                 }
                 return None;
             };
@@ -131,11 +132,11 @@ impl<P: Port, S: Means, J: Job> Line<J> for Serial<P, S, J> {
         }
         let status = self.received(&mut job, status);
         if status == Status::LINK_LOST {
-            shared.lose();
+            shared.disconnect();
         } else if is_answer(status) {
             shared.connected = true;
         }
-        // There is room: it came out of the queue, and was counted as if in it.
+        // The queue has space: the active request has always counted as part of it.
         shared.conclude(job, status, now, &mut self.engine.storage)
     }
 

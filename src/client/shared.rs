@@ -1,5 +1,5 @@
-//! What clients of every line have in common: the requests, and what becomes of
-//! one that ended. It is compiled once, whatever lines a program has.
+//! The queue of a client, and what follows when a request ends. Serial lines and TCP
+//! streams use the same queue, so a program contains its code once.
 
 use super::job::{Job, Stage};
 use super::means::Means;
@@ -10,26 +10,26 @@ use crate::time::elapsed;
 use crate::FIRMWARE;
 use heapless::Vec;
 
-/// The requests of a client and its policy.
+/// The requests and the policy of a client.
 #[repr(C)]
 pub struct Shared<J, const N: usize> {
-    /// Something may be due whatever `since` and `wait` say.
-    pub(super) look: bool,
-    /// The link is there.
+    /// The queue has changed: `since` and `wait` do not hold, a request may be due now.
+    pub(super) changed: bool,
+    /// The link is up.
     pub connected: bool,
-    /// Somebody else uses the line.
+    /// Another user of the port has the line, see [`Client::lend`](super::Client::lend).
     pub lent: bool,
-    /// Unit 0 is everybody.
+    /// Unit 0 addresses all units (broadcast).
     pub broadcasts: bool,
-    /// No two requests may have the same number of the caller's, but 0.
+    /// Transaction numbers of pending requests must differ, except 0.
     pub has_ids: bool,
-    /// Nobody is due before `wait` has passed since `since`.
+    /// No request is due until `wait` microseconds have passed since `since`.
     since: u32,
     wait: u32,
-    /// When requests are asked again.
+    /// The policy for retries.
     pub policy: Policy,
-    /// The request under way on a line that carries one at a time. It is in the
-    /// queue no longer, but has its place there.
+    /// The request in flight on a serial line. It is not in `queue`, but still counts, so
+    /// that `queue` has space to take it back.
     pub(super) active: Option<J>,
     pub(super) queue: Vec<J, N>,
 }
@@ -37,7 +37,7 @@ pub struct Shared<J, const N: usize> {
 impl<J, const N: usize> Shared<J, N> {
     pub(super) const fn new() -> Self {
         Shared {
-            look: false,
+            changed: false,
             connected: true,
             lent: false,
             broadcasts: false,
@@ -50,17 +50,17 @@ impl<J, const N: usize> Shared<J, N> {
         }
     }
 
-    /// True if nothing waits and nothing is under way.
+    /// True if no request is queued or in flight.
     pub fn is_empty(&self) -> bool {
         self.queue.is_empty() && self.active.is_none()
     }
 
-    /// How many requests wait or are under way.
+    /// Number of requests that are queued or in flight.
     pub fn pending(&self) -> usize {
         self.queue.len() + usize::from(self.active.is_some())
     }
 
-    /// True if a job that `is` the one waits or is under way.
+    /// True if `is` returns true for a request that is queued or in flight.
     pub fn holds(&self, is: impl Fn(&J) -> bool) -> bool {
         self.active.as_ref().is_some_and(&is) || self.queue.iter().any(&is)
     }
@@ -79,13 +79,13 @@ impl<J: Job, const N: usize> Shared<J, N> {
         ticket.length = 0;
         ticket.retries = 0;
         ticket.enter(Stage::Queued, 0, 0);
-        self.look = true;
-        // There is room, so nothing comes back.
+        self.changed = true;
+        // `readiness` has checked that the queue is not full.
         let _ = self.queue.push(job);
         Ok(())
     }
 
-    /// [`Status::PENDING`] if a job may be queued, else why not.
+    /// [`Status::PENDING`] if the request may be queued, otherwise the error.
     fn readiness(&self, job: &J) -> Status {
         let ticket = job.ticket();
         if self.pending() >= N {
@@ -106,14 +106,16 @@ impl<J: Job, const N: usize> Shared<J, N> {
         queue.any(|job| job.ticket().transaction == transaction)
     }
 
-    /// Takes the job that is under way, marked as such whatever became of its ticket.
+    /// Takes the active request and marks it as sent, because the caller may have
+    /// overwritten its state.
     fn take_active(&mut self) -> Option<J> {
         let mut job = self.active.take()?;
         job.ticket_mut().enter(Stage::Sent, 0, 0);
         Some(job)
     }
 
-    /// Takes out the job that `is` the one, which was given up.
+    /// Removes the first request for which `is` returns true, with the status
+    /// [`Status::CANCELLED`].
     pub fn withdraw(&mut self, is: impl Fn(&J) -> bool) -> Option<J> {
         let mut job = if self.active.as_ref().is_some_and(&is) {
             self.take_active()?
@@ -121,37 +123,38 @@ impl<J: Job, const N: usize> Shared<J, N> {
             let at = self.queue.iter().position(is)?;
             self.remove(at)?
         };
-        self.look = true;
+        self.changed = true;
         job.ticket_mut().status = Status::CANCELLED;
         Some(job)
     }
 
-    /// What was under way ends as lost, by the next polls; the link is a new one.
+    /// Notes that the link was opened anew. The next polls end the requests in flight with
+    /// [`Status::LINK_LOST`].
     pub fn interrupt(&mut self) {
         if let Some(job) = self.take_active() {
             self.put_first(job);
         }
-        self.abandon(|job| job.ticket().is_sent());
+        self.mark_lost(|job| job.ticket().is_sent());
         self.connected = true;
     }
 
-    /// True if nothing is under way.
+    /// True if no request is in flight.
     pub fn is_idle(&self) -> bool {
         self.active.is_none() && !self.queue.iter().any(|job| job.ticket().is_sent())
     }
 
-    /// How long nobody is due.
+    /// Microseconds until a request is due.
     pub(crate) fn delay(&self, now: u32) -> u32 {
         if self.queue.is_empty() {
             u32::MAX
-        } else if self.look {
+        } else if self.changed {
             0
         } else {
             self.wait.saturating_sub(elapsed(now, self.since))
         }
     }
 
-    /// Takes a job out of its place in the queue.
+    /// Removes the request at the index `at` from the queue.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn remove(&mut self, at: usize) -> Option<J> {
         if !FIRMWARE && at == 0 && self.queue.len() > 1 {
@@ -164,7 +167,8 @@ impl<J: Job, const N: usize> Shared<J, N> {
         Some(moved)
     }
 
-    /// Takes the first of several jobs out of the queue, which a host moves up at once.
+    /// Removes the first request from the queue. (Faster on a host than [`Shared::remove`]:
+    /// all others move with one copy.)
     #[inline(never)]
     fn remove_first(&mut self) -> Option<J> {
         match self.queue.is_empty() {
@@ -173,7 +177,7 @@ impl<J: Job, const N: usize> Shared<J, N> {
         }
     }
 
-    /// Puts a job before all others; there is room for it.
+    /// Inserts a request at the front of the queue, which has space for it.
     #[cfg_attr(target_os = "none", inline(always))]
     pub(super) fn put_first(&mut self, mut job: J) {
         for place in self.queue.iter_mut() {
@@ -182,8 +186,8 @@ impl<J: Job, const N: usize> Shared<J, N> {
         let _ = self.queue.push(job);
     }
 
-    /// Takes the first job that is due out of the queue; if there is none, notes when
-    /// somebody will be.
+    /// Removes the first request that is due from the queue. If there is none, records when
+    /// the next request is due.
     pub(super) fn take_due(&mut self, now: u32, means: &mut impl Means) -> Option<J> {
         // Firmware without mbm_client_pollDelay has no other use for the delay.
         if !FIRMWARE && self.delay(now) > 0 {
@@ -191,26 +195,26 @@ impl<J: Job, const N: usize> Shared<J, N> {
         }
         let mut least = u32::MAX;
         let found = self.queue.iter().position(|job| {
-            let wait = job.ticket().remains(now, means);
+            let wait = job.ticket().time_until_due(now, means);
             least = least.min(wait);
             wait == 0
         });
         let Some(at) = found else {
-            self.rest(now, least);
+            self.set_next_due(now, least);
             return None;
         };
         self.remove(at)
     }
 
-    /// Notes that nobody is due for so long.
-    pub(super) fn rest(&mut self, now: u32, wait: u32) {
-        self.look = false;
+    /// Records that no request is due until `wait` microseconds after `now`.
+    pub(super) fn set_next_due(&mut self, now: u32, wait: u32) {
+        self.changed = false;
         self.since = now;
         self.wait = wait;
     }
 
-    /// What becomes of the job in a place, whose request ended with `status`: it
-    /// waits there to be asked again, or is given back.
+    /// Ends the request at the index `at` with `status`: returns it, or leaves it there for
+    /// a retry.
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn end(
         &mut self,
@@ -219,16 +223,16 @@ impl<J: Job, const N: usize> Shared<J, N> {
         now: u32,
         means: &mut impl Means,
     ) -> Option<J> {
-        self.look = true;
+        self.changed = true;
         let job = self.queue.get_mut(at)?;
-        if ends(&self.policy, job, status, now, means) {
+        if end_or_retry(&self.policy, job, status, now, means) {
             return self.remove(at);
         }
         None
     }
 
-    /// As [`Shared::end`], of a job that was taken out of the queue; there is room
-    /// for it.
+    /// Ends a request that was removed from the queue: returns it, or puts it at the front
+    /// of the queue for a retry.
     pub(super) fn conclude(
         &mut self,
         mut job: J,
@@ -236,35 +240,37 @@ impl<J: Job, const N: usize> Shared<J, N> {
         now: u32,
         means: &mut impl Means,
     ) -> Option<J> {
-        self.look = true;
-        if ends(&self.policy, &mut job, status, now, means) {
+        self.changed = true;
+        if end_or_retry(&self.policy, &mut job, status, now, means) {
             return Some(job);
         }
         self.put_first(job);
         None
     }
 
-    /// The link is gone, and with it all that was to be asked over it.
-    pub(super) fn lose(&mut self) {
+    /// Notes that the link is lost. The next polls end all requests with
+    /// [`Status::LINK_LOST`].
+    pub(super) fn disconnect(&mut self) {
         self.connected = false;
-        self.abandon(|_| true);
+        self.mark_lost(|_| true);
     }
 
-    /// Has jobs ended as lost, by the next looks at the queue.
-    pub(super) fn abandon(&mut self, mut which: impl FnMut(&J) -> bool) {
+    /// Marks the requests for which `which` returns true as lost. The next polls end them
+    /// with [`Status::LINK_LOST`].
+    pub(super) fn mark_lost(&mut self, mut which: impl FnMut(&J) -> bool) {
         for job in self.queue.iter_mut() {
             if which(job) {
                 job.ticket_mut().enter(Stage::Lost, 0, 0);
             }
         }
-        self.look = true;
+        self.changed = true;
     }
 }
 
-/// What becomes of a request that ended with `status`: true if it has ended for
-/// good, false if it waits to be asked again.
+/// Ends a request with `status`, or prepares its retry. Returns true if it has ended,
+/// false if it waits for a retry.
 #[cfg_attr(target_os = "none", inline(never))]
-fn ends(
+fn end_or_retry(
     policy: &Policy,
     job: &mut impl Job,
     status: Status,
@@ -272,7 +278,7 @@ fn ends(
     means: &mut impl Means,
 ) -> bool {
     let (unit, retries) = (job.ticket().unit, job.ticket().retries);
-    // No reference to the ticket lives while `means` may call a hook.
+    // No reference to the request's state exists while `means` may call a hook.
     let again = if !FIRMWARE && status == Status::OK {
         None
     } else {

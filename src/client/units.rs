@@ -1,36 +1,34 @@
-//! What is kept for each unit, in storage that the caller lends.
+//! Records of units, in storage that the caller supplies.
 
 use crate::error::Status;
 use crate::time::{clamped, elapsed};
 
-/// One unit: how it is to be treated, and how it behaves. The counts wrap at
-/// 2^32.
+/// The settings and counts of one unit. The counts wrap at 2^32.
 #[repr(C)]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Unit {
-    /// Requests that ended, retries apart.
+    /// Requests that ended. A request counts once, however many retries it had.
     pub requests: u32,
-    /// Of these, those that were answered, exceptions included.
+    /// Requests that were answered, exceptions included.
     pub replies: u32,
-    /// Of the answers, those that were exceptions.
+    /// Requests that were answered with an exception.
     pub exceptions: u32,
-    /// Requests that were asked again.
+    /// Retries of all requests.
     pub retries: u32,
-    /// Rest for this unit between the end of a request and the next, in
-    /// microseconds.
+    /// Microseconds from the end of one request to this unit to the start of the next.
     pub delay: u32,
-    /// When the last request to it ended.
+    /// Time at which the last request to this unit ended.
     last: u32,
-    /// Which unit this is.
+    /// The unit id.
     pub unit: u8,
-    /// How the last request ended.
+    /// Status code of the last request that ended.
     pub status: u8,
-    /// It may still need its rest.
+    /// False once `delay` is known to have passed since `last`.
     tired: bool,
 }
 
 impl Unit {
-    /// A unit that was not asked yet, with a rest of so many microseconds.
+    /// The record of a unit that has had no request yet; `delay` is in microseconds.
     pub const fn new(unit: u8, delay: u32) -> Unit {
         Unit {
             requests: 0,
@@ -45,7 +43,7 @@ impl Unit {
         }
     }
 
-    /// How much longer the unit rests.
+    /// Microseconds until the unit may get its next request.
     fn rest(&mut self, now: u32) -> u32 {
         let rest = clamped(self.delay).saturating_sub(elapsed(now, self.last));
         self.tired &= rest > 0;
@@ -56,7 +54,8 @@ impl Unit {
         }
     }
 
-    /// Takes note of a request that ended, or is to be asked again.
+    /// Records that a request ended with `status`. `again` is true if the client will
+    /// retry it.
     fn note(&mut self, status: Status, again: bool, now: u32) {
         self.last = now;
         self.tired = true;
@@ -75,18 +74,19 @@ impl Unit {
     }
 }
 
-/// The record of a unit, if the caller lent one.
+/// The record of a unit, if there is one.
 fn find(units: &mut [Unit], unit: u8) -> Option<&mut Unit> {
     units.iter_mut().find(|record| record.unit == unit)
 }
 
-/// How much longer a unit rests, by its record among `units`.
+/// Microseconds until a unit may get its next request, by its record in `units`; 0 if it
+/// has no record.
 pub fn rest(units: &mut [Unit], unit: u8, now: u32) -> u32 {
     find(units, unit).map_or(0, |unit| unit.rest(now))
 }
 
-/// Takes note, in the record of a unit among `units`, of a request to it that
-/// ended, or is to be asked `again`.
+/// Records in `units`, if the unit has a record there, that a request to it ended with
+/// `status`. `again` is true if the client will retry the request.
 pub fn note(units: &mut [Unit], unit: u8, status: Status, again: bool, now: u32) {
     if let Some(unit) = find(units, unit) {
         unit.note(status, again, now);

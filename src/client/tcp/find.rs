@@ -1,8 +1,8 @@
-//! Finding responses among what arrived.
+//! Finds responses in the received bytes of a TCP stream.
 
 use super::Tcp;
 use crate::bytes::move_to_front;
-use crate::client::job::{bytes, deliver, is_answer, take, Job, Stage};
+use crate::client::job::{data_of, deliver, is_answer, store_data, Job, Stage};
 use crate::client::means::Means;
 use crate::client::shared::Shared;
 use crate::engine::Counter;
@@ -10,21 +10,20 @@ use crate::error::Status;
 use crate::frame::tcp::{self, Header};
 use crate::port::Port;
 
-/// Where the data stand in a frame that answers a read: behind function code and
-/// byte count.
+/// Index of the data in the response frame of a read, after function code and byte count.
 const READ_DATA: usize = tcp::PDU + 2;
 
 impl<P: Port, S: Means> Tcp<P, S> {
-    /// Moves what was not looked at yet to the start of the buffer.
+    /// Moves the bytes that were not searched yet to the start of the buffer.
     #[cold]
-    pub(super) fn gather(&mut self) {
+    pub(super) fn compact(&mut self) {
         move_to_front(self.means.bytes(0, self.end), self.start.into());
         self.end -= self.start;
         self.start = 0;
     }
 
-    /// As [`Tcp::find`], of what is there most often: the whole and right response
-    /// to a read, which is the first request.
+    /// As [`Tcp::find`], but finds only the most frequent case: a complete, right response to
+    /// the first request in the queue, which is a read.
     #[inline]
     pub(super) fn find_read<J: Job, const N: usize>(
         &mut self,
@@ -47,7 +46,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
             || *count != asked
             || self.skip > 0
             || !ticket.is(Stage::Sent)
-            || take(job, data) != Status::OK
+            || store_data(job, data) != Status::OK
         {
             return None;
         }
@@ -55,7 +54,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
         self.answered(shared, 0, Status::OK, now)
     }
 
-    /// A request was answered: what becomes of it.
+    /// Ends the request at the index `at`, which was answered, with `status`.
     #[cfg_attr(not(target_os = "none"), inline(always))]
     fn answered<J: Job, const N: usize>(
         &mut self,
@@ -76,7 +75,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
         shared.end(at, status, now, &mut self.means)
     }
 
-    /// Finds the next response among what arrived; gives back a job that ended.
+    /// Finds the next response in the received bytes. Returns a request that has ended.
     #[cold]
     pub(super) fn find<J: Job, const N: usize>(
         &mut self,
@@ -85,7 +84,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
     ) -> Option<J> {
         loop {
             if self.skip > 0 {
-                self.pass();
+                self.skip_frame();
             }
             let room = usize::from(self.means.room());
             let rest = self.means.bytes(self.start, self.end - self.start);
@@ -93,12 +92,12 @@ impl<P: Port, S: Means> Tcp<P, S> {
                 Ok(header) => header,
                 Err(Status::INCOMPLETE_FRAME) => return None,
                 Err(_) => {
-                    self.stray();
+                    self.skip_byte();
                     continue;
                 }
             };
             let mut jobs = shared.queue.iter_mut().enumerate();
-            let asked = jobs.find(|(_, job)| answers(*job, &header));
+            let asked = jobs.find(|(_, job)| is_answered_by(*job, &header));
             if asked.is_none() && self.astray {
                 self.start += 1;
                 continue;
@@ -109,19 +108,19 @@ impl<P: Port, S: Means> Tcp<P, S> {
             }
             let Some((at, job)) = asked else {
                 self.skip = header.total as u16;
-                self.note(shared, &header);
+                self.note_foreign_frame(shared, &header);
                 continue;
             };
             let mut status = Status::BUFFER_TOO_SMALL;
             if is_whole {
                 status = judge(job, rest.get(tcp::PDU..header.total).unwrap_or_default());
                 if self.astray && !is_answer(status) && status != Status::BUFFER_TOO_SMALL {
-                    // It only looked like that.
+                    // These bytes only look like a header.
                     self.start += 1;
                     continue;
                 }
             }
-            // What does not fit is passed over as it arrives.
+            // Bytes of the frame that did not fit are skipped as they arrive.
             self.skip = header.total as u16;
             if let Some(job) = self.answered(shared, at, status, now) {
                 return Some(job);
@@ -129,17 +128,18 @@ impl<P: Port, S: Means> Tcp<P, S> {
         }
     }
 
-    /// Passes over what is left of a frame that is known already.
+    /// Skips the received bytes of a frame that is finished with.
     #[cold]
-    fn pass(&mut self) {
+    fn skip_frame(&mut self) {
         let skipped = self.skip.min(self.end - self.start);
         self.start += skipped;
         self.skip -= skipped;
     }
 
-    /// Passes over a byte that begins no frame.
+    /// Skips one byte that does not begin a frame, and notes that the frame boundaries are
+    /// lost.
     #[cold]
-    pub(super) fn stray(&mut self) {
+    pub(super) fn skip_byte(&mut self) {
         self.start += 1;
         if !self.astray {
             self.astray = true;
@@ -147,25 +147,32 @@ impl<P: Port, S: Means> Tcp<P, S> {
         }
     }
 
-    /// Notes that nobody, or another unit, answered a request of ours.
+    /// Counts a frame that answers no request. If it has the number of a request, records
+    /// there that another unit answered.
     #[cold]
-    fn note<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>, header: &Header) {
+    fn note_foreign_frame<J: Job, const N: usize>(
+        &mut self,
+        shared: &mut Shared<J, N>,
+        header: &Header,
+    ) {
         self.means.count(Counter::ForeignFrames, 1);
         for job in shared.queue.iter_mut() {
             let ticket = job.ticket_mut();
             if ticket.is_sent() && ticket.wire == header.transaction {
-                ticket.stray();
+                ticket.note_other_unit();
             }
         }
     }
 }
 
-fn answers<J: Job>(job: &J, header: &Header) -> bool {
+/// True if a response with this header answers the request.
+fn is_answered_by<J: Job>(job: &J, header: &Header) -> bool {
     let ticket = job.ticket();
     ticket.is_sent() && ticket.wire == header.transaction && ticket.unit == header.unit
 }
 
-/// What the response `pdu` says to the job, which takes its data.
+/// Checks the response `pdu` and stores its data in the request. Returns the status of the
+/// request.
 fn judge<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
     let outline = &job.ticket().outline;
     if outline.is_repeated_by(pdu) {
@@ -181,7 +188,7 @@ fn judge<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
     if expected.map(|length| length.get().into()) != Some(pdu.len()) {
         return Status::MALFORMED_REPLY;
     }
-    let status = outline.judge(pdu, bytes(job));
+    let status = outline.judge(pdu, data_of(job));
     if let [function, code, ..] = *pdu {
         if function & 0x80 != 0 {
             job.ticket_mut().exception = code;

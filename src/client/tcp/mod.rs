@@ -1,9 +1,9 @@
-//! A client's TCP stream: many requests at once, told apart by the number in
-//! their header.
+//! A client's TCP stream. Many requests are in flight at the same time; the transaction
+//! identifier in the header shows which request a response answers.
 
 mod find;
 
-use super::job::{bytes, Job, Stage};
+use super::job::{data_of, Job, Stage};
 use super::line::Line;
 use super::means::Means;
 use super::shared::Shared;
@@ -14,38 +14,42 @@ use crate::frame::tcp;
 use crate::port::Port;
 use crate::FIRMWARE;
 
-/// As many requests at once as the queue holds, in TCP frames. Received bytes
-/// stand in the frame buffer, those to send in [`Means::outgoing`].
+/// A TCP stream with as many requests in flight as the queue holds. Received bytes are in
+/// the frame buffer, bytes to send in [`Means::outgoing`].
 #[repr(C)]
 pub struct Tcp<P, S> {
-    /// Requests under way, and the most of them.
+    /// Number of requests in flight, and its limit.
     flying: u8,
-    most: u8,
-    /// What arrived and was not looked at yet.
+    max_in_flight: u8,
+    /// The received bytes that were not searched yet: the indices of the first, and after
+    /// the last, in the frame buffer.
     start: u16,
     end: u16,
-    /// The number of the next request. (Amid what [`Tcp::clear`] zeroes, which would be
-    /// a call of memset else: 200 bytes of libc on a Cortex-M0+.)
+    /// The transaction identifier of the next request. (It is between the fields that
+    /// [`Tcp::clear`] zeroes. If they were contiguous, the compiler would call memset, 200
+    /// bytes of libc on a Cortex-M0+.)
     next: u16,
-    /// What is to be sent, of which so much was.
+    /// Number of bytes in the transmit buffer, and how many of them were sent.
     filled: u16,
     sent: u16,
-    /// Bytes to come of a frame that the buffer cannot hold.
+    /// Bytes to skip: the rest of a frame that is finished with.
     skip: u16,
-    /// The boundaries of frames are lost: only what answers is taken for one.
+    /// The frame boundaries are lost. Until they are found, only a right response to a
+    /// request counts as a frame.
     astray: bool,
-    /// A request waits for others to end, or for room.
+    /// A queued request waits until another ends or the transmit buffer has space.
     blocked: bool,
     /// The byte stream.
     pub port: P,
-    /// What the caller lends.
+    /// The caller's buffers and records.
     pub means: S,
-    /// Only the response timeout counts here.
+    /// TCP uses only the response timeout, and the turnaround delay for requests without a
+    /// response.
     pub settings: Settings,
 }
 
 impl<P, S> Tcp<P, S> {
-    /// A stream that is open, or will be.
+    /// A stream that is open or will be opened.
     pub const fn new(port: P, means: S) -> Self {
         Tcp {
             next: 0,
@@ -55,7 +59,7 @@ impl<P, S> Tcp<P, S> {
             filled: 0,
             sent: 0,
             flying: 0,
-            most: u8::MAX,
+            max_in_flight: u8::MAX,
             astray: false,
             blocked: false,
             port,
@@ -64,9 +68,9 @@ impl<P, S> Tcp<P, S> {
         }
     }
 
-    /// Sends at most so many requests before the first is answered.
+    /// Allows at most `most` requests in flight, at least 1.
     pub fn limit(&mut self, most: u8) {
-        self.most = most.max(1);
+        self.max_in_flight = most.max(1);
     }
 
     fn clear(&mut self) {
@@ -81,14 +85,14 @@ impl<P, S> Tcp<P, S> {
 }
 
 impl<P: Port, S: Means> Tcp<P, S> {
-    /// Receives what there is; false if the link is lost.
+    /// Reads the bytes that have arrived; false if the link is lost.
     #[cfg_attr(not(target_os = "none"), inline(always))]
     fn hear(&mut self) -> bool {
         if self.start == self.end {
             self.start = 0;
             self.end = 0;
         } else if self.start > 0 {
-            self.gather();
+            self.compact();
         }
         let length = self.means.room() - self.end;
         let room = self.means.bytes(self.end, length);
@@ -105,33 +109,34 @@ impl<P: Port, S: Means> Tcp<P, S> {
         true
     }
 
-    /// Ends what is overdue, and sends what may be; gives back a job that ended.
+    /// Ends the requests whose time is over, and sends queued requests. Returns a request
+    /// that has ended.
     #[inline]
     fn send<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>, now: u32) -> Option<J> {
         let mut stuck = false;
         if self.flying == 0 && self.sent < self.filled {
-            let Some(is_stuck) = self.push_half(shared) else {
-                return self.lose(shared, now);
+            let Some(is_stuck) = self.flush_remainder(shared) else {
+                return self.end_all_lost(shared, now);
             };
             stuck = is_stuck;
         }
-        let mut reads = u8::MAX;
+        let mut reads_left = u8::MAX;
         while shared.delay(now) == 0 {
-            let Some((at, status)) = self.tend(shared, now, stuck) else {
+            let Some((at, status)) = self.advance_queue(shared, now, stuck) else {
                 break;
             };
-            if let Some(job) = self.conclude(shared, at, status, now, &mut reads) {
+            if let Some(job) = self.conclude(shared, at, status, now, &mut reads_left) {
                 return Some(job);
             }
         }
         if !self.flush(shared) {
-            return self.lose(shared, now);
+            return self.end_all_lost(shared, now);
         }
         None
     }
 
-    /// What becomes of a request that [`Tcp::tend`] found. So many `reads` are left
-    /// before it is given up.
+    /// Ends the request that [`Tcp::advance_queue`] found at the index `at`. If its time is over, the
+    /// port is read first, at most `reads_left` times.
     #[cold]
     fn conclude<J: Job, const N: usize>(
         &mut self,
@@ -139,20 +144,21 @@ impl<P: Port, S: Means> Tcp<P, S> {
         at: usize,
         mut status: Status,
         now: u32,
-        reads: &mut u8,
+        reads_left: &mut u8,
     ) -> Option<J> {
         if status == Status::PENDING {
-            // As the deadline passes, all that has arrived is looked at, even if the
-            // buffer cannot hold it at once.
-            let had = self.end - self.start;
-            if *reads > 0 && !self.hear() {
-                return self.lose(shared, now);
+            // At the deadline, all bytes that have arrived are searched, even if the
+            // buffer cannot hold them at once.
+            let before = self.end - self.start;
+            if *reads_left > 0 && !self.hear() {
+                return self.end_all_lost(shared, now);
             }
-            *reads = reads.saturating_sub(1);
+            *reads_left = reads_left.saturating_sub(1);
             if self.start < self.end {
-                if self.end - self.start == had {
-                    // What began to arrive may hide the response.
-                    self.stray();
+                if self.end - self.start == before {
+                    // No more bytes came. The incomplete frame at the front may be noise
+                    // that hides the response.
+                    self.skip_byte();
                 }
                 return self.find(shared, now);
             }
@@ -162,10 +168,11 @@ impl<P: Port, S: Means> Tcp<P, S> {
         shared.end(at, status, now, &mut self.means)
     }
 
-    /// Sends what is to be sent; gives the place of a request that has ended, and
-    /// how: [`Status::PENDING`] if its time is over. What has no room waits for it,
-    /// unless what is before it is `stuck`.
-    fn tend<J: Job, const N: usize>(
+    /// Writes the queued requests that are due into the transmit buffer. Returns the index of
+    /// a request that has ended and its status, [`Status::PENDING`] if its time is over. A
+    /// request for which the buffer has no space waits, unless the bytes before it are
+    /// `stuck`.
+    fn advance_queue<J: Job, const N: usize>(
         &mut self,
         shared: &mut Shared<J, N>,
         now: u32,
@@ -176,12 +183,12 @@ impl<P: Port, S: Means> Tcp<P, S> {
         let mut at = 0;
         let ended = loop {
             let Some(job) = shared.queue.get_mut(at) else {
-                shared.rest(now, least);
+                shared.set_next_due(now, least);
                 return None;
             };
             at += 1;
             let ticket = job.ticket();
-            let mut wait = ticket.remains(now, &mut self.means);
+            let mut wait = ticket.time_until_due(now, &mut self.means);
             if wait == 0 {
                 if ticket.is_sent() {
                     break Status::PENDING;
@@ -208,9 +215,9 @@ impl<P: Port, S: Means> Tcp<P, S> {
         Some((at - 1, ended))
     }
 
-    /// Moves `next`, the first of 256 numbers, to the first of 256 that no pending
-    /// request has. At most 255 requests are pending, so there are such numbers, and
-    /// the other 255 need no look at the queue.
+    /// Advances `next`, a multiple of 256, to the first block of 256 numbers that no request
+    /// in flight uses. At most 255 requests are in flight, so there is such a block. The
+    /// other 255 numbers of the block then need no search of the queue.
     #[cold]
     fn skip_numbers_in_use<J: Job>(&mut self, queue: &[J]) {
         while queue.iter().any(|job| {
@@ -221,11 +228,11 @@ impl<P: Port, S: Means> Tcp<P, S> {
         }
     }
 
-    /// Puts a request behind those that are to be sent; [`Status::BUSY`] if it has
-    /// to wait for others, [`Status::LINE_BUSY`] if those are `stuck`,
-    /// [`Status::BUFFER_TOO_SMALL`] if it never fits.
+    /// Appends the frame of a request to the transmit buffer. Returns [`Status::BUSY`] if
+    /// the request has to wait for others, [`Status::LINE_BUSY`] if the bytes before it are
+    /// `stuck`, [`Status::BUFFER_TOO_SMALL`] if the buffer can never hold it.
     fn encode<J: Job>(&mut self, job: &mut J, now: u32, stuck: bool) -> Status {
-        if self.flying >= self.most {
+        if self.flying >= self.max_in_flight {
             return Status::BUSY;
         }
         let ticket = job.ticket();
@@ -240,7 +247,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
                 *frame = tcp::short(start, *words);
                 frame.len()
             }
-            _ => match emit(job, room, self.next) {
+            _ => match write_frame(job, room, self.next) {
                 Ok(length) => length,
                 Err(refused) if begin == 0 => return refused,
                 Err(_) if stuck => return Status::LINE_BUSY,
@@ -262,7 +269,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
         Status::OK
     }
 
-    /// Hands over what is to be sent; false if the link is lost.
+    /// Writes the transmit buffer to the port; false if the link is lost.
     fn flush<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>) -> bool {
         if self.sent >= self.filled {
             return true;
@@ -278,30 +285,33 @@ impl<P: Port, S: Means> Tcp<P, S> {
         if self.sent == self.filled {
             self.sent = 0;
             self.filled = 0;
-            shared.look |= self.blocked;
+            shared.changed |= self.blocked;
             self.blocked = false;
         }
         true
     }
 
-    /// Half of a request that was given up is all that is left to be sent: if it does
-    /// not go, which is so for true, what waits for its room would wait for ever.
-    /// `None` if the link is lost.
+    /// Sends the rest of a request that has ended, the only bytes in the transmit buffer.
+    /// Returns true if the port accepts none of them: requests that wait for their space
+    /// would wait for ever. `None` if the link is lost.
     #[cold]
-    fn push_half<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>) -> Option<bool> {
-        let half = self.sent;
+    fn flush_remainder<J: Job, const N: usize>(
+        &mut self,
+        shared: &mut Shared<J, N>,
+    ) -> Option<bool> {
+        let before = self.sent;
         if !self.flush(shared) {
             return None;
         }
-        let stuck = half == self.sent;
-        shared.look |= stuck && self.blocked;
+        let stuck = before == self.sent;
+        shared.changed |= stuck && self.blocked;
         Some(stuck)
     }
 
-    /// Takes a request back that was not sent, so that it is not sent later. True if
-    /// it was not, or only half.
+    /// Removes the frame with the transaction identifier `wire` from the transmit buffer, if
+    /// none of its bytes were sent. True if the frame was not sent, or only partly.
     #[cold]
-    fn unsend(&mut self, wire: u16) -> bool {
+    fn remove_unsent(&mut self, wire: u16) -> bool {
         let (bytes, mut at) = (self.means.to_send(0, self.filled), 0);
         while let Some(rest) = bytes.get_mut(at..) {
             let Ok(header) = tcp::header(rest) else {
@@ -325,7 +335,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
         false
     }
 
-    /// The request was not answered in time: what that means.
+    /// Returns the status of a request whose time is over.
     #[cold]
     fn overdue<J: Job>(&mut self, job: &J) -> Status {
         let ticket = job.ticket();
@@ -333,39 +343,43 @@ impl<P: Port, S: Means> Tcp<P, S> {
             return Status::OK;
         }
         self.means.count(Counter::Timeouts, 1);
-        if self.unsend(ticket.wire) {
+        if self.remove_unsent(ticket.wire) {
             Status::LINE_BUSY
-        } else if ticket.is(Stage::Strayed) {
+        } else if ticket.is(Stage::OtherUnit) {
             Status::INVALID_SLAVE_ID
         } else {
             Status::RESPONSE_TIMED_OUT
         }
     }
 
-    /// The link is lost, and with it all that waits for it.
+    /// Ends all requests, because the link is lost. Returns the first of them.
     #[cold]
-    fn lose<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>, now: u32) -> Option<J> {
+    fn end_all_lost<J: Job, const N: usize>(
+        &mut self,
+        shared: &mut Shared<J, N>,
+        now: u32,
+    ) -> Option<J> {
         self.clear();
-        shared.lose();
+        shared.disconnect();
         shared.end(0, Status::LINK_LOST, now, &mut self.means)
     }
 }
 
-/// Writes the frame of a request, whatever it is.
+/// Writes the frame of any request to the start of `place`, and returns its length.
 #[cold]
-fn emit<J: Job>(job: &J, place: &mut [u8], wire: u16) -> Result<usize, Status> {
+fn write_frame<J: Job>(job: &J, place: &mut [u8], wire: u16) -> Result<usize, Status> {
     let ticket = job.ticket();
     let outline = &ticket.outline;
     tcp::emit(place, wire, ticket.unit, |pdu| {
         let length = usize::from(outline.request_length());
         let pdu = pdu.get_mut(..length).ok_or(Status::BUFFER_TOO_SMALL)?;
-        outline.emit(pdu, bytes(job));
+        outline.emit(pdu, data_of(job));
         Ok(length)
     })
 }
 
 impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
-    const MOST: usize = u8::MAX as usize;
+    const MAX_IN_FLIGHT: usize = u8::MAX as usize;
     const BROADCASTS: bool = false;
     const HAS_IDS: bool = true;
 
@@ -378,7 +392,8 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
         if shared.queue.is_empty() {
             return None;
         }
-        // What comes late is taken too, for who waits in select would not sleep.
+        // Bytes are read also while requests only wait. Otherwise a program that waits for
+        // bytes in select would wake up at once.
         let mut fresh = fresh && (self.flying > 0 || shared.delay(now) > 0);
         loop {
             if self.start < self.end {
@@ -395,7 +410,7 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
                 return self.send(shared, now);
             }
             if !self.hear() {
-                return self.lose(shared, now);
+                return self.end_all_lost(shared, now);
             }
             fresh = false;
         }
@@ -406,7 +421,7 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
             return self.clear();
         };
         self.flying = self.flying.wrapping_sub(1);
-        self.unsend(job.ticket().wire);
+        self.remove_unsent(job.ticket().wire);
     }
 
     fn is_idle(&self) -> bool {
