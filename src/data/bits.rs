@@ -1,10 +1,10 @@
-//! Coils and discrete inputs: packed, least significant bit first, so 16 of
-//! them fill a word low byte first.
+//! Coils and discrete inputs. They are packed with the least significant bit first, so 16
+//! of them fill a word with its low byte first.
 
 use crate::error::Status;
 
-/// Writes the bits of `words` as data bytes, the unused ones of the last byte
-/// zero; bytes for which there is no word stay.
+/// Writes the bits of `words` as data bytes, and sets the unused bits of the last byte to
+/// zero. Bytes beyond the last word do not change.
 pub fn send(bytes: &mut [u8], words: &[u16], quantity: u8) {
     for (pair, word) in bytes.chunks_mut(2).zip(words) {
         for (byte, half) in pair.iter_mut().zip(word.to_le_bytes()) {
@@ -16,7 +16,7 @@ pub fn send(bytes: &mut [u8], words: &[u16], quantity: u8) {
     }
 }
 
-/// Fills `words` from data bytes, the unused bits of the last word zero.
+/// Fills `words` from data bytes, and sets the unused bits of the last word to zero.
 pub fn take(words: &mut [u16], bytes: &[u8], quantity: u8) {
     for (word, pair) in words.iter_mut().zip(bytes.chunks(2)) {
         *word = pair
@@ -28,7 +28,7 @@ pub fn take(words: &mut [u16], bytes: &[u8], quantity: u8) {
     }
 }
 
-/// Keeps the bits used of the last item; 0 used bits are all of them.
+/// A mask of the `used` lowest bits, for the last byte or word; all bits if `used` is 0.
 const fn mask(used: u8) -> u16 {
     match used {
         0 => 0xFFFF,
@@ -36,17 +36,17 @@ const fn mask(used: u8) -> u16 {
     }
 }
 
-/// What holds packed bits: a data byte, or a word as the facade keeps them.
+/// A unit that holds packed bits: a data byte, or a word as the master stores them.
 pub trait Packed: Copy {
-    /// How many bits it holds.
+    /// Number of bits in it.
     const BITS: usize;
-    /// None of them set.
+    /// All bits clear.
     const ZERO: Self;
 
-    /// Whether one is set, 0 the least significant.
+    /// True if bit `bit` is set; bit 0 is the least significant.
     fn bit(self, bit: usize) -> bool;
 
-    /// The same with one of them as told.
+    /// A copy with bit `bit` set or cleared.
     fn with_bit(self, bit: usize, on: bool) -> Self;
 }
 
@@ -74,11 +74,11 @@ macro_rules! packed {
 
 packed!(u8 u16);
 
-/// Packs bits from the front of `units` on, the unused ones of the last unit
-/// zero. Units behind that stay.
+/// Packs `bits` into `units` from the first on, and sets the unused bits of the last
+/// unit to zero. Units after it do not change.
 ///
 /// # Errors
-/// [`Status::BUFFER_TOO_SMALL`], with nothing packed.
+/// [`Status::BUFFER_TOO_SMALL`] if `units` cannot hold all bits; nothing is packed then.
 pub fn pack<T: Packed>(
     units: &mut [T],
     bits: impl ExactSizeIterator<Item = bool>,
@@ -96,10 +96,10 @@ pub fn pack<T: Packed>(
     Ok(())
 }
 
-/// The first `quantity` bits.
+/// The first `quantity` bits of `units`.
 ///
 /// # Errors
-/// [`Status::ILLEGAL_DATA_ADDRESS`] if there are not so many.
+/// [`Status::ILLEGAL_DATA_ADDRESS`] if `units` holds fewer bits.
 pub fn unpack<T: Packed>(
     units: &[T],
     quantity: usize,
@@ -113,19 +113,19 @@ pub fn unpack<T: Packed>(
         .take(quantity))
 }
 
-/// Where a coil lies among `quantity` from `first` on.
+/// The index of the coil `address` among `quantity` coils that begin at `first`.
 fn place(first: u16, quantity: u16, address: u16) -> Result<usize, Status> {
     match address.checked_sub(first) {
-        // Addresses end at 65535, so the range may not pass them.
+        // The last address is 65535; the coils must not go beyond it.
         Some(place) if place < quantity && quantity - 1 <= u16::MAX - first => Ok(place.into()),
         _ => Err(Status::ILLEGAL_DATA_ADDRESS),
     }
 }
 
-/// Whether the coil `address` is set among `quantity` from the coil `first` on.
+/// True if the coil `address` is set. `units` holds `quantity` coils that begin at `first`.
 ///
 /// # Errors
-/// [`Status::ILLEGAL_DATA_ADDRESS`]
+/// [`Status::ILLEGAL_DATA_ADDRESS`] if the coil is not one of these.
 pub fn is_set<T: Packed>(
     units: &[T],
     first: u16,
@@ -137,10 +137,12 @@ pub fn is_set<T: Packed>(
     Ok(unit.ok_or(Status::ILLEGAL_DATA_ADDRESS)?.bit(place))
 }
 
-/// Sets the coil `address` among `quantity` from the coil `first` on.
+/// Switches the coil `address` on or off. `units` holds `quantity` coils that begin at
+/// `first`.
 ///
 /// # Errors
-/// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing set.
+/// [`Status::ILLEGAL_DATA_ADDRESS`] if the coil is not one of these; nothing is changed
+/// then.
 pub fn set<T: Packed>(
     units: &mut [T],
     first: u16,
@@ -179,7 +181,7 @@ mod tests {
         assert_eq!(mask(17 & 15), 0x01);
     }
 
-    // The example of V1.1b3, 6.1: coils 20 to 38.
+    // The example of V1.1b3, 6.1: coils 20 to 38, which have the addresses 19 to 37.
     const COILS: [u8; 3] = [0xCD, 0x6B, 0x05];
 
     #[test]
@@ -203,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn a_coil_outside_has_no_state() {
+    fn a_coil_outside_the_range_is_an_illegal_data_address() {
         let none = Err(Status::ILLEGAL_DATA_ADDRESS);
         for address in [0, 18, 38, 39, 65535] {
             assert_eq!(is_set(&COILS, 19, 19, address), none);
@@ -212,7 +214,7 @@ mod tests {
                 none.map(|_| ())
             );
         }
-        // More than the bytes hold, more than there are addresses, none at all.
+        // A quantity beyond the bytes, a quantity beyond address 65535, a quantity of 0.
         assert_eq!(is_set(&COILS, 0, 25, 24), none);
         assert_eq!(is_set(&COILS, 65535, 2, 65535), none);
         assert_eq!(is_set(&COILS, 65535, 1, 65535), Ok(true));
@@ -220,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn setting_a_coil_leaves_the_others() {
+    fn setting_a_coil_does_not_change_the_others() {
         let mut coils = COILS;
         assert_eq!(set(&mut coils, 19, 19, 20, true), Ok(()));
         assert_eq!(set(&mut coils, 19, 19, 37, false), Ok(()));
@@ -228,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn packed_bits_begin_with_the_lowest_and_end_with_zeros() {
+    fn bits_are_packed_lowest_first_and_unused_bits_are_zero() {
         let coils = [1, 0, 1, 1, 0, 0, 1, 1, 1, 0].map(|coil| coil == 1);
         let mut bytes = [0xFF_u8; 3];
         assert_eq!(pack(&mut bytes, coils.into_iter()), Ok(()));

@@ -1,4 +1,4 @@
-//! Words and bits as the caller holds them, bytes as the wire carries them.
+//! Conversion between words and bits in the caller's memory and data bytes on the wire.
 
 pub mod bits;
 pub mod order;

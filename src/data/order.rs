@@ -1,13 +1,14 @@
-//! How the bytes of a value lie in registers.
+//! The order of a value's bytes in registers.
 
-/// How a device lays out a value of two registers whose bytes are A (the most
-/// significant), B, C and D; wider values likewise.
+/// The order in which a device sends the bytes of a value of two registers: A is the most
+/// significant byte, D the least significant. A value of four registers is ordered in the
+/// same way.
 ///
-/// The standard knows registers alone, high byte first. A value of several
-/// has no order in it, so that each is in use somewhere.
+/// The standard defines the byte order of one register, high byte first. It defines no
+/// order for values of several registers, so devices use each of these.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Order {
-    /// High word first, high byte first: what most devices do.
+    /// High word first, high byte first. Most devices use this order.
     #[default]
     Abcd,
     /// Low word first, high byte first.
@@ -19,7 +20,7 @@ pub enum Order {
 }
 
 impl Order {
-    /// The four.
+    /// All four orders.
     pub const ALL: [Order; 4] = [Order::Abcd, Order::Cdab, Order::Badc, Order::Dcba];
 
     /// True if the low byte of each register comes first.
@@ -32,9 +33,9 @@ impl Order {
         matches!(self, Order::Cdab | Order::Dcba)
     }
 
-    /// What the places of the bytes of a value of `size` bytes (2, 4 or 8) differ
-    /// by: the byte that is `place` after the most significant one travels
-    /// `place ^ mask` after the first.
+    /// The mask that converts byte positions of a value of `size` bytes (2, 4 or 8). The
+    /// byte at position `n` of the value, counted from the most significant byte, is byte
+    /// `n ^ mask` on the wire.
     pub const fn mask(self, size: usize) -> usize {
         let word = if self.low_word_first() {
             size.saturating_sub(2)
@@ -54,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn each_order_is_named_after_what_it_does() {
+    fn the_name_of_each_order_is_the_order_of_the_bytes() {
         assert_eq!(laid_out(*b"ABCD"), [*b"ABCD", *b"CDAB", *b"BADC", *b"DCBA"]);
     }
 
@@ -65,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn one_register_has_a_byte_order_alone() {
+    fn a_value_of_one_register_has_only_a_byte_order() {
         assert_eq!(laid_out(*b"AB"), [*b"AB", *b"AB", *b"BA", *b"BA"]);
     }
 

@@ -1,6 +1,6 @@
-//! Registers: 16-bit words that travel high byte first.
+//! Registers: 16-bit words, sent with the high byte first.
 
-/// Writes `words` as data bytes; bytes for which there is no word stay.
+/// Writes `words` as data bytes. Bytes beyond the last word do not change.
 pub fn send(bytes: &mut [u8], words: &[u16]) {
     for (pair, word) in bytes.as_chunks_mut().0.iter_mut().zip(words) {
         *pair = word.to_be_bytes();
@@ -19,7 +19,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn registers_travel_high_byte_first() {
+    fn registers_are_sent_high_byte_first() {
         let words = [0x0102, 0x0304];
         let mut sent = [0; 4];
         send(&mut sent, &words);

@@ -1,11 +1,11 @@
-//! The numbers that registers hold. Of floats only the bits are moved.
+//! Numbers of one, two or four registers. Floats are copied as bits, without arithmetic.
 
 /// A number of one, two or four registers.
 pub trait Value: Copy {
-    /// Its bytes, the most significant first.
+    /// An array of its bytes, the most significant first.
     type Bytes: Copy + Default + AsRef<[u8]> + AsMut<[u8]>;
 
-    /// The number of these bytes.
+    /// The number that has these bytes.
     fn from_bytes(bytes: Self::Bytes) -> Self;
 
     /// The bytes of this number.
@@ -30,8 +30,8 @@ macro_rules! values {
 
 values!(u16 i16 u32 i32 u64 i64 f32 f64);
 
-/// A number of four registers, an IEEE 754 binary64, where the machine has
-/// only a binary32 for it: what C calls `double` on an AVR.
+/// An IEEE 754 binary64 in four registers, which the machine holds as a binary32. On an
+/// AVR, `double` in C is such a number.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug)]
 pub struct ShortDouble(pub f32);
@@ -53,42 +53,42 @@ impl Value for ShortDouble {
     }
 }
 
-/// What the exponents of the two formats differ by.
+/// Difference of the exponents of binary64 and binary32.
 const BIAS: u32 = 1023 - 127;
-/// The exponent of infinity and of what is not a number.
-const WIDE_MOST: u32 = 0x7FF;
-const SHORT_MOST: u32 = 0xFF;
-/// The bit in front of a binary32's fraction, which is not stored.
+/// The exponent of infinity and NaN in binary64, and in binary32.
+const WIDE_MAX: u32 = 0x7FF;
+const SHORT_MAX: u32 = 0xFF;
+/// The highest bit of a binary32's significand. It is not stored.
 const HIDDEN: u32 = 1 << 23;
 
-/// The binary32 that is nearest to a binary64, ties to even, in bits.
+/// Rounds a binary64 to the nearest binary32, ties to even. Both are given as bits.
 fn narrow(high: u32, low: u32) -> u32 {
     let sign = high & 0x8000_0000;
-    let exponent = high >> 20 & WIDE_MOST;
+    let exponent = high >> 20 & WIDE_MAX;
     // 23 bits of the fraction, and the 29 below them.
     let fraction = (high & 0x000F_FFFF) << 3 | low >> 29;
     let below = low << 3;
-    if exponent == WIDE_MOST {
+    if exponent == WIDE_MAX {
         let is_number = fraction == 0 && below == 0;
         let quiet = if is_number { 0 } else { HIDDEN >> 1 };
-        return sign | SHORT_MOST << 23 | fraction | quiet;
+        return sign | SHORT_MAX << 23 | fraction | quiet;
     }
     let mut kept = fraction;
     let mut lost = below;
     if exponent > BIAS {
-        if exponent >= BIAS + SHORT_MOST {
-            return sign | SHORT_MOST << 23;
+        if exponent >= BIAS + SHORT_MAX {
+            return sign | SHORT_MAX << 23;
         }
         kept |= (exponent - BIAS) << 23;
     } else {
-        // Too small for an exponent: the hidden bit moves into the fraction.
+        // The result is subnormal: the hidden bit moves into the fraction.
         kept |= HIDDEN;
         let mut more = BIAS + 1 - exponent;
         if more > 25 {
             return sign;
         }
         while more > 0 {
-            // What was lost before only counts as more than nothing.
+            // The lowest bit of `lost` stays set once any bit below it was set.
             lost = (kept & 1) << 31 | lost >> 1 | u32::from(lost & 1 != 0);
             kept >>= 1;
             more -= 1;
@@ -96,16 +96,16 @@ fn narrow(high: u32, low: u32) -> u32 {
     }
     let half = 0x8000_0000;
     let up = lost > half || lost == half && kept & 1 == 1;
-    // A carry out of the fraction is the next exponent, infinity at last.
+    // A carry out of the fraction increases the exponent, up to infinity.
     sign | (kept + u32::from(up))
 }
 
-/// The binary64 that a binary32 equals, in two words of bits.
+/// The binary64 that equals a binary32, as bits in two words, the high word first.
 fn widen(bits: u32) -> (u32, u32) {
     let sign = bits & 0x8000_0000;
     let mut fraction = bits & (HIDDEN - 1);
-    let exponent = match bits >> 23 & SHORT_MOST {
-        SHORT_MOST => WIDE_MOST,
+    let exponent = match bits >> 23 & SHORT_MAX {
+        SHORT_MAX => WIDE_MAX,
         0 if fraction == 0 => 0,
         0 => {
             let mut exponent = BIAS + 1;
@@ -145,13 +145,14 @@ mod tests {
             f64::INFINITY,
             f64::NEG_INFINITY,
             f64::from(f32::MIN_POSITIVE),
-            // The least fraction, its half, a little more, three halves of it.
+            // The smallest binary32, half of it, a little more than half, three halves, a
+            // quarter.
             next(0x36A0_0000_0000_0000),
             next(0x3690_0000_0000_0000),
             next(0x3690_0000_0000_0001),
             next(0x36A8_0000_0000_0000),
             next(0x3680_0000_0000_0000),
-            // A tie to even, down and up, and all bits set.
+            // A tie that rounds down, one that rounds up, and a fraction with all bits set.
             next(0x3FF0_0000_1000_0000),
             next(0x3FF0_0000_3000_0000),
             next(0x3FFF_FFFF_FFFF_FFFF),
@@ -163,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn a_double_that_is_no_number_stays_one() {
+    fn a_double_that_is_nan_becomes_a_float_that_is_nan() {
         for bits in [0x7FF0_0000_0000_0001, 0x7FF8_0000_0000_0000, u64::MAX] {
             assert!(f32::from_bits(narrowed(f64::from_bits(bits))).is_nan());
         }

@@ -1,24 +1,24 @@
-//! Registers seen as values, by the addresses that the device gives them:
-//! over data bytes as they travel, or over words as the facade keeps them.
+//! Typed values in registers, accessed by register address. The registers are data bytes
+//! in the order of the wire, or words as the master stores them.
 //!
-//! What lies outside is [`Status::ILLEGAL_DATA_ADDRESS`]; nothing panics.
+//! An access beyond the registers returns [`Status::ILLEGAL_DATA_ADDRESS`]; nothing panics.
 
 use super::order::Order;
 use super::value::Value;
 use crate::error::Status;
 
-/// Registers in a row, as bytes in the order in which they travel.
+/// Consecutive registers, accessed as bytes in the order of the wire.
 pub trait Cells {
-    /// How many bytes there are, two a register.
+    /// Number of bytes, two for each register.
     fn length(&self) -> usize;
 
-    /// One of them.
+    /// The byte at the index `place`; `None` past the end.
     fn byte(&self, place: usize) -> Option<u8>;
 }
 
-/// Registers that can be written too.
+/// Registers that can also be written.
 pub trait CellsMut: Cells {
-    /// Sets a byte; past the end, none.
+    /// Sets the byte at the index `place`; does nothing past the end.
     fn set_byte(&mut self, place: usize, value: u8);
 }
 
@@ -84,21 +84,22 @@ impl CellsMut for &mut [u16] {
     }
 }
 
-/// Registers to read, and to write where the cells are.
+/// Typed access to registers: for reading if `C` is [`Cells`], also for writing if it is
+/// [`CellsMut`].
 #[derive(Clone, Copy)]
 pub struct Registers<C> {
     cells: C,
     first: u16,
-    /// How the device lays its values out, for calls that do not say.
+    /// The order of values for the calls that have no argument for it.
     pub order: Order,
 }
 
 impl<C: Cells> Registers<C> {
-    /// Over words or data bytes, the first of them the register `first`.
+    /// Registers in `cells`; the first has the address `first`.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`] if they pass address 65535,
-    /// [`Status::INVALID_ARGUMENT`] if a byte of the last is missing.
+    /// [`Status::ILLEGAL_DATA_ADDRESS`] if they go beyond address 65535;
+    /// [`Status::INVALID_ARGUMENT`] if the number of bytes is odd.
     pub fn new(cells: C, first: u16, order: Order) -> Result<Self, Status> {
         let length = cells.length();
         if !length.is_multiple_of(2) {
@@ -114,12 +115,13 @@ impl<C: Cells> Registers<C> {
         })
     }
 
-    /// Where so many bytes from the high byte of `address` on begin.
-    fn find(&self, address: u16, length: usize) -> Result<usize, Status> {
+    /// The index of the high byte of the register `address`, if `length` bytes from there
+    /// exist.
+    fn byte_index(&self, address: u16, length: usize) -> Result<usize, Status> {
         let Some(before) = address.checked_sub(self.first) else {
             return Err(Status::ILLEGAL_DATA_ADDRESS);
         };
-        // In registers, so that nothing overflows where `usize` is 16 bits.
+        // Counted in registers, so that a `usize` of 16 bits does not overflow.
         let whole = self.cells.length() / 2;
         let wanted = length.div_ceil(2);
         match whole.checked_sub(before.into()) {
@@ -128,21 +130,21 @@ impl<C: Cells> Registers<C> {
         }
     }
 
-    /// Fills `bytes` from the high byte of `address` on, the byte that travels
-    /// at `place` into that at `place ^ mask`; see [`Order::mask`].
+    /// Fills `bytes` from the registers that begin at `address`. Byte `n` of the registers
+    /// becomes `bytes[n ^ mask]`, see [`Order::mask`].
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing filled.
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is copied then.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn load(&self, address: u16, mask: usize, bytes: &mut [u8]) -> Result<(), Status> {
-        let start = self.find(address, bytes.len())?;
+        let start = self.byte_index(address, bytes.len())?;
         for (place, byte) in bytes.iter_mut().enumerate() {
             *byte = self.cells.byte(start + (place ^ mask)).unwrap_or(0);
         }
         Ok(())
     }
 
-    /// The number that begins at `address`, in the order of these registers.
+    /// The number that begins at the register `address`, in the order [`Registers::order`].
     ///
     /// # Errors
     /// [`Status::ILLEGAL_DATA_ADDRESS`]
@@ -161,29 +163,30 @@ impl<C: Cells> Registers<C> {
         Ok(T::from_bytes(bytes))
     }
 
-    /// Raw bytes as they travel, from the high byte of `address` on.
+    /// Copies raw bytes in the order of the wire, from the high byte of `address` on.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing copied.
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is copied then.
     pub fn bytes(&self, address: u16, bytes: &mut [u8]) -> Result<(), Status> {
         self.load(address, 0, bytes)
     }
 
-    /// As [`Registers::bytes`], the low byte of each register first in an order
-    /// that swaps them. Registers follow each other in every order.
+    /// As [`Registers::bytes`], but with the low byte of each register first if `order`
+    /// swaps bytes. The registers themselves are copied in ascending order of address in
+    /// every `order`.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing copied.
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is copied then.
     pub fn bytes_in(&self, order: Order, address: u16, bytes: &mut [u8]) -> Result<(), Status> {
         self.load(address, order.swaps_bytes().into(), bytes)
     }
 
-    /// The high or the low byte of a register as it travels.
+    /// The high or the low byte of a register.
     ///
     /// # Errors
     /// [`Status::ILLEGAL_DATA_ADDRESS`]
     pub fn u8(&self, address: u16, high: bool) -> Result<u8, Status> {
-        let place = self.find(address, 2)? + usize::from(!high);
+        let place = self.byte_index(address, 2)? + usize::from(!high);
         Ok(self.cells.byte(place).unwrap_or(0))
     }
 
@@ -195,23 +198,23 @@ impl<C: Cells> Registers<C> {
         self.u8(address, high).map(u8::cast_signed)
     }
 
-    /// Bit `bit` of a register as it travels, 0 the least significant.
+    /// Bit `bit` of a register; bit 0 is the least significant.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]; [`Status::INVALID_ARGUMENT`] for a bit
-    /// beyond 15.
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]; [`Status::INVALID_ARGUMENT`] if `bit` is greater
+    /// than 15.
     pub fn bit(&self, address: u16, bit: u8) -> Result<bool, Status> {
-        let (high, mask) = half(bit)?;
+        let (high, mask) = byte_of_bit(bit)?;
         Ok(self.u8(address, high)? & mask != 0)
     }
 
-    /// Copies a text out of a field of `length` bytes, up to its first NUL and
-    /// without it. Its registers follow each other in every order; in one that
-    /// swaps bytes, the first of two characters is the low byte.
+    /// Copies a text from a field of `length` bytes, up to its first NUL and without it.
+    /// The registers are read in ascending order of address. In an order that swaps bytes,
+    /// the first of the two characters of a register is its low byte.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`], or [`Status::BUFFER_TOO_SMALL`] with
-    /// nothing copied.
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]; [`Status::BUFFER_TOO_SMALL`] if `buffer` cannot
+    /// hold the text. Nothing is copied then.
     pub fn text<'b>(
         &self,
         address: u16,
@@ -232,7 +235,7 @@ impl<C: Cells> Registers<C> {
         length: usize,
         buffer: &'b mut [u8],
     ) -> Result<&'b mut [u8], Status> {
-        let start = self.find(address, length)?;
+        let start = self.byte_index(address, length)?;
         let mask = usize::from(order.swaps_bytes());
         let character = |place| self.cells.byte(start + (place ^ mask)).unwrap_or(0);
         let mut count = 0;
@@ -246,36 +249,37 @@ impl<C: Cells> Registers<C> {
         Ok(text)
     }
 
-    /// Whether these are the raw bytes from the high byte of `address` on.
+    /// True if `bytes` equals the raw bytes from the high byte of `address` on.
     ///
     /// # Errors
     /// [`Status::ILLEGAL_DATA_ADDRESS`]
     pub fn is_equal(&self, address: u16, bytes: &[u8]) -> Result<bool, Status> {
-        let start = self.find(address, bytes.len())?;
+        let start = self.byte_index(address, bytes.len())?;
         let mut held = bytes.iter().enumerate();
         Ok(held.all(|(place, byte)| self.cells.byte(start + place) == Some(*byte)))
     }
 }
 
 impl<C: CellsMut> Registers<C> {
-    /// Sets `bytes` from the high byte of `address` on, as [`Registers::load`]
-    /// reads them.
+    /// Sets the registers that begin at `address` from `bytes`, in the order in which
+    /// [`Registers::load`] reads them.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing set.
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn store(&mut self, address: u16, mask: usize, bytes: &[u8]) -> Result<(), Status> {
-        let start = self.find(address, bytes.len())?;
+        let start = self.byte_index(address, bytes.len())?;
         for (place, byte) in bytes.iter().enumerate() {
             self.cells.set_byte(start + (place ^ mask), *byte);
         }
         Ok(())
     }
 
-    /// Sets the number that begins at `address`, in the order of these registers.
+    /// Sets the number that begins at the register `address`, in the order
+    /// [`Registers::order`].
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing set.
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
     pub fn set<T: Value>(&mut self, address: u16, value: T) -> Result<(), Status> {
         self.set_in(self.order, address, value)
     }
@@ -283,37 +287,36 @@ impl<C: CellsMut> Registers<C> {
     /// As [`Registers::set`], in another order.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing set.
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
     pub fn set_in<T: Value>(&mut self, order: Order, address: u16, value: T) -> Result<(), Status> {
         let bytes = value.to_bytes();
         let mask = order.mask(bytes.as_ref().len());
         self.store(address, mask, bytes.as_ref())
     }
 
-    /// Sets raw bytes as they travel, from the high byte of `address` on. Of an
-    /// odd number the last is a high byte, and the low one beside it stays.
+    /// Sets raw bytes in the order of the wire, from the high byte of `address` on. If the
+    /// number of bytes is odd, the low byte of the last register does not change.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing set.
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
     pub fn set_bytes(&mut self, address: u16, bytes: &[u8]) -> Result<(), Status> {
         self.store(address, 0, bytes)
     }
 
-    /// As [`Registers::set_bytes`], laid out as [`Registers::bytes_in`] reads them.
+    /// As [`Registers::set_bytes`], in the order in which [`Registers::bytes_in`] reads them.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`], with nothing set.
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
     pub fn set_bytes_in(&mut self, order: Order, address: u16, bytes: &[u8]) -> Result<(), Status> {
         self.store(address, order.swaps_bytes().into(), bytes)
     }
 
-    /// Sets the high or the low byte of a register as it travels; the other
-    /// stays.
+    /// Sets the high or the low byte of a register; the other byte does not change.
     ///
     /// # Errors
     /// [`Status::ILLEGAL_DATA_ADDRESS`]
     pub fn set_u8(&mut self, address: u16, high: bool, value: u8) -> Result<(), Status> {
-        let place = self.find(address, 2)? + usize::from(!high);
+        let place = self.byte_index(address, 2)? + usize::from(!high);
         self.cells.set_byte(place, value);
         Ok(())
     }
@@ -326,25 +329,25 @@ impl<C: CellsMut> Registers<C> {
         self.set_u8(address, high, value.cast_unsigned())
     }
 
-    /// Sets bit `bit` of a register as it travels, 0 the least significant; the
-    /// others stay.
+    /// Sets or clears bit `bit` of a register; bit 0 is the least significant. The other
+    /// bits do not change.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`]; [`Status::INVALID_ARGUMENT`] for a bit
-    /// beyond 15.
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]; [`Status::INVALID_ARGUMENT`] if `bit` is greater
+    /// than 15.
     pub fn set_bit(&mut self, address: u16, bit: u8, on: bool) -> Result<(), Status> {
-        let (high, mask) = half(bit)?;
+        let (high, mask) = byte_of_bit(bit)?;
         let others = self.u8(address, high)? & !mask;
         self.set_u8(address, high, if on { others | mask } else { others })
     }
 
-    /// Fills a field of `length` bytes with a text and NULs behind it, laid out
-    /// as [`Registers::text`] reads it. If `length` is odd, the byte behind the
-    /// field becomes 0 too.
+    /// Fills a field of `length` bytes with a text, followed by NULs, in the order in which
+    /// [`Registers::text`] reads it. If `length` is odd, the byte after the field becomes 0
+    /// too.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_ADDRESS`], or [`Status::BUFFER_TOO_SMALL`] for a
-    /// text that is longer than the field, with nothing set.
+    /// [`Status::ILLEGAL_DATA_ADDRESS`]; [`Status::BUFFER_TOO_SMALL`] if the text is longer
+    /// than the field. Nothing is set then.
     pub fn set_text(&mut self, address: u16, length: usize, text: &[u8]) -> Result<(), Status> {
         self.set_text_in(self.order, address, length, text)
     }
@@ -360,7 +363,7 @@ impl<C: CellsMut> Registers<C> {
         length: usize,
         text: &[u8],
     ) -> Result<(), Status> {
-        let start = self.find(address, length)?;
+        let start = self.byte_index(address, length)?;
         if text.len() > length {
             return Err(Status::BUFFER_TOO_SMALL);
         }
@@ -373,9 +376,9 @@ impl<C: CellsMut> Registers<C> {
     }
 }
 
-/// The half of a register that a bit is in, true for the high one, and the bit
-/// in that byte.
-fn half(bit: u8) -> Result<(bool, u8), Status> {
+/// The byte of a register that contains bit `bit`, true for the high byte, and the mask of
+/// the bit in that byte.
+fn byte_of_bit(bit: u8) -> Result<(bool, u8), Status> {
     if bit < 16 {
         Ok((bit >= 8, 1 << (bit % 8)))
     } else {
