@@ -1,5 +1,5 @@
-//! The atomics of the ring. `tests/ring_orders.rs` compiles `ring.rs` with others of
-//! these names, which try every order in which the two sides may run.
+//! The atomic types of the ring. `tests/ring_orders.rs` compiles `ring.rs` with loom's types
+//! of the same names, to try every order in which writer and reader may run.
 
 #[cfg(not(target_pointer_width = "16"))]
 pub use core::sync::atomic::AtomicU16 as AtomicPlace;

@@ -1,9 +1,9 @@
-//! Bounds-checked big-endian reading and writing. Nothing here can panic.
+//! Reading and writing of big-endian numbers with bounds checks. Nothing here can panic.
 
 use crate::error::Status;
 use core::cell::Cell;
 
-/// Moves the bytes from `from` on to the front of `bytes`.
+/// Moves the bytes from the index `from` to the end to the front of `bytes`.
 #[cfg_attr(target_os = "none", inline(never))]
 pub fn move_to_front(bytes: &mut [u8], from: usize) {
     let cells = Cell::from_mut(bytes).as_slice_of_cells();
@@ -12,9 +12,9 @@ pub fn move_to_front(bytes: &mut [u8], from: usize) {
     }
 }
 
-/// Copies words, of which one side has the high byte first and the other is in the
-/// machine's order: eight at a time, of which the last may overlap those before. For
-/// hosts.
+/// Copies words and converts them from big-endian to the machine's byte order, or back. It
+/// copies eight words at a time; the last eight may overlap the ones before. Only hosts
+/// use it.
 #[inline(always)]
 pub fn copy_words(to: &mut [u8], from: &[u8]) {
     let (words, places) = (from.as_chunks().0, to.as_chunks_mut().0);
@@ -37,14 +37,14 @@ pub fn copy_words(to: &mut [u8], from: &[u8]) {
     }
 }
 
-/// Reads from the front of a byte slice.
+/// Reads a byte slice from its front.
 #[derive(Clone, Copy)]
 pub struct Reader<'a> {
     rest: &'a [u8],
 }
 
 impl<'a> Reader<'a> {
-    /// Reads `bytes` from its front.
+    /// A reader of `bytes`.
     pub const fn new(bytes: &'a [u8]) -> Self {
         Reader { rest: bytes }
     }
@@ -70,26 +70,26 @@ impl<'a> Reader<'a> {
         Some(first)
     }
 
-    /// All that is left, which leaves nothing.
+    /// All remaining bytes. The reader is empty afterwards.
     pub fn rest(&mut self) -> &'a [u8] {
         core::mem::take(&mut self.rest)
     }
 
-    /// True when nothing is left.
+    /// True if no bytes remain.
     pub const fn is_empty(&self) -> bool {
         self.rest.is_empty()
     }
 }
 
-/// Writes to the front of a byte slice. What does not fit is noted, and said by
-/// [`Writer::finish`].
+/// Writes to a byte slice from its front. If something does not fit, [`Writer::finish`]
+/// returns an error.
 pub struct Writer<'a> {
     bytes: &'a mut [u8],
     length: usize,
 }
 
 impl<'a> Writer<'a> {
-    /// Writes into `bytes` from its front.
+    /// A writer to `bytes`.
     pub const fn new(bytes: &'a mut [u8]) -> Self {
         Writer { bytes, length: 0 }
     }
@@ -115,21 +115,21 @@ impl<'a> Writer<'a> {
         self.put(&word.to_be_bytes());
     }
 
-    /// Writes a byte count and the bytes that it counts.
+    /// Writes the number of bytes as one byte, then the bytes.
     pub fn counted(&mut self, bytes: &[u8]) {
         self.u8(bytes.len() as u8);
         self.put(bytes);
     }
 
-    /// How many bytes were written, whether they fit or not.
+    /// Number of bytes written so far, including those that did not fit.
     pub const fn length(&self) -> usize {
         self.length
     }
 
-    /// How many bytes were written.
+    /// Returns the number of bytes written.
     ///
     /// # Errors
-    /// [`Status::BUFFER_TOO_SMALL`] if they did not fit.
+    /// [`Status::BUFFER_TOO_SMALL`] if they did not all fit.
     pub fn finish(self) -> Result<usize, Status> {
         if self.length <= self.bytes.len() {
             Ok(self.length)
@@ -144,7 +144,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn reader_takes_big_endian_and_ends_with_none() {
+    fn reader_reads_big_endian_and_returns_none_at_the_end() {
         let mut reader = Reader::new(&[1, 2, 3, 4, 5]);
         assert_eq!(reader.u16(), Some(0x0102));
         assert_eq!(reader.u8(), Some(3));
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn writer_says_what_does_not_fit() {
+    fn writer_reports_that_bytes_did_not_fit() {
         let mut bytes = [0; 3];
         let mut writer = Writer::new(&mut bytes);
         writer.u16(0x0102);

@@ -1,74 +1,75 @@
-//! One number space for every outcome; a number is never reused.
+//! Status codes: one range of numbers for all outcomes. A number is never reused.
 
-/// The outcome of a call: success, the exception code that the remote device
-/// sent, or what went wrong on the way.
+/// The outcome of a call: success, an exception code of the remote device, or an error of
+/// the library, the line or the caller.
 #[repr(transparent)]
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Status(u8);
 
 impl Status {
-    /// The transaction succeeded.
+    /// The call or request succeeded.
     pub const OK: Status = Status(0x00);
     /// Exception 01 of the remote device.
     pub const ILLEGAL_FUNCTION: Status = Status(0x01);
-    /// Exception 02 of the remote device, or what every device would answer
-    /// to addresses beyond 65535.
+    /// Exception 02 of the remote device. Also returned without sending for addresses
+    /// beyond 65535, to which every device would answer this exception.
     pub const ILLEGAL_DATA_ADDRESS: Status = Status(0x02);
-    /// Exception 03 of the remote device, or what every device would answer
-    /// to a quantity that the standard does not allow.
+    /// Exception 03 of the remote device. Also returned without sending for a quantity that
+    /// the standard does not allow, to which every device would answer this exception.
     pub const ILLEGAL_DATA_VALUE: Status = Status(0x03);
     /// Exception 04 of the remote device.
     pub const SLAVE_DEVICE_FAILURE: Status = Status(0x04);
 
-    /// Only frames of other units arrived.
+    /// No reply: only frames of other units arrived.
     pub const INVALID_SLAVE_ID: Status = Status(0xE0);
-    /// Our unit answered with another function only.
+    /// No reply: the unit sent only frames with another function code.
     pub const INVALID_FUNCTION: Status = Status(0xE1);
-    /// No complete reply arrived in time.
+    /// No complete reply arrived within the response timeout.
     pub const RESPONSE_TIMED_OUT: Status = Status(0xE2);
-    /// The reply arrived damaged.
+    /// The reply arrived with a wrong CRC or LRC.
     pub const INVALID_CRC: Status = Status(0xE3);
 
-    /// An argument that the call cannot take: a null pointer, a number out of range,
-    /// a missing hook.
+    /// An argument is not allowed: a null pointer, a number out of range, a missing hook.
     pub const INVALID_ARGUMENT: Status = Status(0xE4);
-    /// A frame of our unit and function with a right CRC that does not answer
-    /// the request.
+    /// A frame of the unit and function arrived with a right CRC, but it does not answer the
+    /// request.
     pub const MALFORMED_REPLY: Status = Status(0xE5);
-    /// The port reported that the link is gone.
+    /// The port reported that the link is lost.
     pub const LINK_LOST: Status = Status(0xE6);
-    /// The object has a transaction under way.
+    /// The object is in use: a request is in progress, or the call came from one of its
+    /// hooks.
     pub const BUSY: Status = Status(0xE7);
-    /// A read cannot be broadcast.
+    /// The request cannot be broadcast: a read, for example, or any request on TCP.
     pub const BROADCAST_NOT_ALLOWED: Status = Status(0xE8);
     /// The caller's buffers cannot hold the request or the reply.
     pub const BUFFER_TOO_SMALL: Status = Status(0xE9);
-    /// The object was never begun.
+    /// The begin function of the object was not called.
     pub const NOT_INITIALISED: Status = Status(0xEA);
-    /// The transaction is under way: poll on.
+    /// The request is in progress. Call poll again.
     pub const PENDING: Status = Status(0xEB);
-    /// The line never fell silent, or the port took no bytes, for as long as
-    /// the response timeout.
+    /// The request was not sent: for as long as the response timeout, the line was not silent
+    /// or the port accepted no bytes.
     pub const LINE_BUSY: Status = Status(0xEC);
-    /// The caller cancelled the transaction.
+    /// The caller cancelled the request.
     pub const CANCELLED: Status = Status(0xED);
 
-    /// The frame is not whole yet.
+    /// The frame is not complete yet.
     pub const INCOMPLETE_FRAME: Status = Status(0xEE);
-    /// No frame of this framing begins like that.
+    /// No frame of this framing begins with these bytes.
     pub const MALFORMED_FRAME: Status = Status(0xEF);
 
-    /// The client's queue holds no more.
+    /// The client's queue is full.
     pub const QUEUE_FULL: Status = Status(0xF0);
     /// Another pending request has this transaction id.
     pub const DUPLICATE_TRANSACTION: Status = Status(0xF1);
     /// The request is not pending: it has ended, or was never queued.
     pub const NOT_PENDING: Status = Status(0xF2);
 
-    /// The status that an exception code of the remote device becomes.
+    /// The status for an exception code of the remote device.
     ///
-    /// Code 0 and codes from 0x80 are no exception codes (they would collide
-    /// with success and with our own numbers): a malformed reply.
+    /// Code 0 and codes from 0x80 on become [`Status::MALFORMED_REPLY`]: the standard has no
+    /// such exceptions, and they would be confused with success and with errors of this
+    /// library.
     pub const fn exception(code: u8) -> Status {
         if code == 0 || code >= 0x80 {
             Status::MALFORMED_REPLY
@@ -82,17 +83,17 @@ impl Status {
         self.0
     }
 
-    /// The status of a number that C handed back.
+    /// The status with the number `code`.
     pub const fn from_code(code: u8) -> Status {
         Status(code)
     }
 
-    /// True if a request ended without an answer of the remote device.
+    /// True if the request ended without an answer of the remote device.
     pub const fn is_failure(self) -> bool {
         self.0 >= 0x80 && self.0 != Status::PENDING.0
     }
 
-    /// True if the same request may well succeed the next time.
+    /// True if a retry of the request may succeed.
     pub const fn may_be_repeated(self) -> bool {
         self.is_failure()
             && self.0 != Status::LINK_LOST.0

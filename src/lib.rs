@@ -1,9 +1,9 @@
 //! mbm: Modbus for firmware. A master, a client, a server and a sniffer, on serial lines (RTU
-//! and ASCII) and on TCP, without a heap, without waiting and without a panic.
+//! and ASCII) and on TCP. The crate does not use a heap, never waits and never panics.
 //!
-//! Everything is moved on by a `poll` that never waits. Time comes from a clock of
-//! microseconds, which may wrap; bytes come and go through a [`port::Port`], which your
-//! firmware implements for its UART or socket:
+//! You call `poll` often; each call does what can be done without waiting. Time is a clock in
+//! microseconds, which may wrap. Your firmware implements [`port::Port`] for its UART or
+//! socket, to read and write bytes:
 //!
 //! ```
 //! use mbm::port::Port;
@@ -12,23 +12,23 @@
 //!
 //! impl Port for Uart {
 //!     fn read(&mut self, bytes: &mut [u8]) -> i16 {
-//!         0 // How many bytes of those that arrived are in `bytes` now.
+//!         0 // The number of received bytes that were copied to `bytes`.
 //!     }
 //!     fn write(&mut self, bytes: &[u8]) -> i16 {
-//!         bytes.len() as i16 // How many bytes of these will be sent.
+//!         bytes.len() as i16 // The number of these bytes that will be sent.
 //!     }
 //!     fn micros(&mut self) -> u32 {
-//!         0 // The clock.
+//!         0 // The time in microseconds.
 //!     }
 //! }
 //! ```
 //!
-//! The examples below have a `Uart` on whose line somebody answers.
+//! The examples below use a `Uart` with a simulated device on its line.
 //!
 //! # A master
 //!
-//! [`master::Master`] has one request under way on an RTU line. This one reads two registers of
-//! unit 17:
+//! [`master::Master`] sends one request at a time on an RTU line. This example reads two
+//! registers of unit 17:
 //!
 //! ```
 //! # use mbm::port::Port;
@@ -54,14 +54,14 @@
 //!
 //! # let sends = &[17, 3, 4, 0x02, 0x2B, 0x00, 0x64, 0x9B, 0xA9];
 //! # let uart = Uart { sends, now: 0, arriving: &[], sent: 0 };
-//! // Bytes of a frame, words that are read, words that are written.
+//! // The frame buffer, the words to be read, the words to be written.
 //! let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
 //! let mut master = Master::new(17, uart, buffers);
 //! master.set_baud_rate(9600);
 //!
 //! assert_eq!(master.read_holding_registers(107, 2), Status::PENDING);
 //! while master.poll() == Status::PENDING {
-//!     // Here the firmware does something else.
+//!     // The firmware does its other work here.
 //! }
 //! assert_eq!(master.status(), Status::OK);
 //! assert_eq!([master.response_word(0), master.response_word(1)], [555, 100]);
@@ -69,9 +69,9 @@
 //!
 //! # A client
 //!
-//! [`client::Client`] queues requests of every function, repeats them as its policy says,
-//! and has many under way at once on TCP. A request is a [`client::Job`] of yours, which
-//! holds what is sent and takes what is received:
+//! [`client::Client`] queues requests of every function, and retries them as its policy says.
+//! On TCP it has many requests in flight at the same time. You implement [`client::Job`] for
+//! your request, which holds the data to send and the data received:
 //!
 //! ```
 //! # use mbm::port::Port;
@@ -109,7 +109,7 @@
 //!         &mut self.ticket
 //!     }
 //!     fn byte(&self, _: usize) -> u8 {
-//!         0 // It sends no data.
+//!         0 // A read sends no data.
 //!     }
 //!     fn put(&mut self, index: usize, byte: u8) {
 //!         self.received[index] = byte;
@@ -125,7 +125,7 @@
 //! # let sends = &[17, 3, 4, 0x02, 0x2B, 0x00, 0x64, 0x9B, 0xA9];
 //! # let uart = Uart { sends, now: 0, arriving: &[], sent: 0 };
 //! let line = Serial::new(uart, Frame::new([0; 256]));
-//! // Up to four requests wait or are under way.
+//! // Up to four requests are queued or in flight.
 //! let mut client: Client<_, Read, 4> = Client::new(line);
 //! assert!(client.queue(Read { ticket, received: [0; 4] }).is_ok());
 //!
@@ -142,7 +142,8 @@
 //!
 //! # A server
 //!
-//! [`server::Server`] finds requests on a line or connection. Units say what they serve:
+//! [`server::Server`] finds requests on a line or connection. Each unit has a list of
+//! services, which answer them:
 //!
 //! ```
 //! # use mbm::port::Port;
@@ -185,15 +186,15 @@
 //! assert_eq!(status, Status::OK);
 //! # }
 //! # }
-//! // Somebody wrote 888 to register 109 meanwhile.
+//! // A master wrote 888 to register 109.
 //! assert_eq!(words, [555, 100, 888]);
 //! ```
 //!
 //! # Packets
 //!
-//! Frames and PDUs can be read and written by themselves: [`frame::Framing`] takes a frame
-//! apart, [`pdu::request::Request`] and [`pdu::response::Response`] say what is in it, and
-//! [`packet`] knows the functions that users define.
+//! You can also decode and encode frames and PDUs by themselves. [`frame::Framing`] decodes
+//! and encodes frames, [`pdu::request::Request`] and [`pdu::response::Response`] decode and
+//! encode PDUs, and [`packet`] handles user-defined functions.
 //!
 //! ```
 //! use mbm::frame::{ascii, Framing};
@@ -210,18 +211,19 @@
 //! # Ok::<(), mbm::error::Status>(())
 //! ```
 //!
-//! # What uses what
+//! # Layers
 //!
-//! A module uses only what stands to its left:
+//! A module uses only modules to its left:
 //!
 //! ```text
 //! bytes -> frame -> pdu -> packet -> explain -> {sniffer, engine} -> {master, client, server}
 //! ```
 //!
-//! `atomic`, `error`, `time`, `port`, `ring` and `data` stand beside that line and may be used
-//! anywhere on it. `make check` holds every module to this rule.
+//! Each of them may use `atomic`, `error`, `time`, `port`, `ring` and `data`. `make check`
+//! enforces this rule.
 //!
-//! Nothing here allocates, keeps globals, waits or panics. The C ABI is the crate `mbm-c`.
+//! No module allocates memory, has global variables, waits or panics. The C ABI is the crate
+//! `mbm-c`.
 
 #![no_std]
 #![forbid(unsafe_code)]
@@ -250,10 +252,10 @@ pub mod client;
 pub mod master;
 pub mod server;
 
-/// True where the code for firmware runs, which is shorter and slower. Everywhere
-/// else, this is false: hosts have room for a second way to do what is done most.
+/// True if the crate is compiled for firmware. Some functions have a longer, faster branch
+/// for hosts, and firmware runs the shorter, slower one.
 ///
 /// Every branch on the target reads this constant, or has the same condition as a
-/// `cfg` attribute. `--cfg mbm_firmware` selects the code for firmware on a host,
-/// so that tests run it there.
+/// `cfg` attribute. `--cfg mbm_firmware` selects the firmware's code on a host, so that
+/// tests run it there.
 pub const FIRMWARE: bool = cfg!(any(target_os = "none", mbm_firmware));

@@ -1,21 +1,21 @@
-//! The byte stream that the firmware supplies.
+//! The interface to the UART or socket and to the clock, which the firmware implements.
 
-/// What an object needs of the outside world. Nothing here may block.
+/// A byte stream and a clock. No function may block.
 pub trait Port {
-    /// True if there is a stream behind this; the rest is called only then.
+    /// True if the port can be used. Otherwise no other function is called.
     fn is_ready(&self) -> bool {
         true
     }
 
-    /// Takes up to `bytes.len()` received bytes, in order; returns how many
-    /// there were, 0 if none has arrived yet, less if none will ever come.
+    /// Copies up to `bytes.len()` received bytes to `bytes`, in the order of arrival. Returns
+    /// their number: 0 if none has arrived yet, a negative number if the link is lost.
     fn read(&mut self, bytes: &mut [u8]) -> i16;
 
-    /// Hands over bytes to send; returns how many were accepted, 0 if none
-    /// just now, less if none will ever be sent.
+    /// Accepts bytes to send. Returns the number of bytes accepted: 0 if the port cannot
+    /// accept any now, a negative number if the link is lost.
     fn write(&mut self, bytes: &[u8]) -> i16;
 
-    /// A clock in microseconds that wraps at 2^32.
+    /// The time in microseconds, which wraps at 2^32.
     fn micros(&mut self) -> u32;
 
     /// True once the last accepted byte has left the transmitter.
@@ -23,9 +23,9 @@ pub trait Port {
         true
     }
 
-    /// Called before the first byte of a request: RS-485 driver on.
+    /// Called before the first byte of a request or response: switches the RS-485 driver on.
     fn pre_transmission(&mut self) {}
 
-    /// Called after the last bit of a request: RS-485 driver off.
+    /// Called after the last bit of a request or response: switches the RS-485 driver off.
     fn post_transmission(&mut self) {}
 }

@@ -1,32 +1,32 @@
-//! A receive ring: an interrupt handler puts bytes in, the main loop takes them
-//! out. One side each, without locks.
+//! A receive ring without locks. One writer, usually an interrupt handler, puts bytes in; one
+//! reader, the main loop, takes them out.
 //!
-//! Only the side that puts moves the head, and only the side that takes moves
-//! the tail. A byte is written before the head passes it, and read before the
-//! tail does, so neither side ever touches what the other is at. One place
-//! stays free, which tells a full ring from an empty one.
+//! Only the writer moves the head, and only the reader moves the tail. The writer writes a
+//! byte before it moves the head past the byte, and the reader reads a byte before it moves
+//! the tail past the byte. So the two never access the same byte at the same time. One byte
+//! of the storage always stays free, so that a full ring differs from an empty one.
 
 use crate::atomic::{AtomicPlace, AtomicU8, Ordering};
 
-/// A place in the storage. An 8-bit processor moves only 8 bits at once.
+/// An index into the storage. (An 8-bit processor loads and stores only 8 bits at once.)
 #[cfg(not(target_pointer_width = "16"))]
 pub type Place = u16;
-/// A place in the storage. An 8-bit processor moves only 8 bits at once.
+/// An index into the storage. (An 8-bit processor loads and stores only 8 bits at once.)
 #[cfg(target_pointer_width = "16")]
 pub type Place = u8;
 
-/// The most bytes of storage.
+/// Greatest size of the storage in bytes.
 pub const MAX_STORAGE: usize = Place::MAX as usize + if size_of::<Place>() == 1 { 1 } else { 0 };
 
-/// Where the two sides are.
+/// The positions of writer and reader.
 #[derive(Debug, Default)]
 #[repr(C)]
 pub struct Positions {
-    /// Where the next byte is put.
+    /// Index at which the writer puts the next byte.
     head: AtomicPlace,
-    /// Where the next byte is taken.
+    /// Index from which the reader takes the next byte.
     tail: AtomicPlace,
-    /// Bytes that found no room; wraps.
+    /// Number of bytes that were lost because the ring was full; wraps.
     lost: AtomicPlace,
 }
 
@@ -41,7 +41,7 @@ impl Positions {
     }
 }
 
-/// A ring over storage of the caller's, of at most [`MAX_STORAGE`] bytes.
+/// A ring in storage of the caller, of at most [`MAX_STORAGE`] bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct Ring<'a> {
     bytes: &'a [AtomicU8],
@@ -49,12 +49,12 @@ pub struct Ring<'a> {
 }
 
 impl<'a> Ring<'a> {
-    /// The ring over these bytes, of which one always stays free.
+    /// A ring in `bytes`. It holds one byte less than `bytes` has.
     pub const fn new(bytes: &'a [AtomicU8], positions: &'a Positions) -> Self {
         Ring { bytes, positions }
     }
 
-    /// The place behind `place`.
+    /// The index after `place`, which is 0 at the end of the storage.
     fn after(&self, place: Place) -> Place {
         let next = place.wrapping_add(1);
         if usize::from(next) >= self.bytes.len() {
@@ -64,12 +64,12 @@ impl<'a> Ring<'a> {
         }
     }
 
-    /// Puts a byte in; false, and the byte counts as lost, if there is no room.
-    /// For the one side that puts.
+    /// Puts a byte in. Returns false and counts the byte as lost if the ring is full. Only
+    /// the writer may call this.
     pub fn put(&self, byte: u8) -> bool {
         let head = self.positions.head.load(Ordering::Relaxed);
         let next = self.after(head);
-        // Acquired, so that the place is written only after it was read.
+        // `Acquire`: the reader has read the byte at `head` before it is overwritten.
         if next != self.positions.tail.load(Ordering::Acquire) {
             if let Some(place) = self.bytes.get(usize::from(head)) {
                 place.store(byte, Ordering::Relaxed);
@@ -77,7 +77,8 @@ impl<'a> Ring<'a> {
                 return true;
             }
         }
-        // Not an addition in memory, which a small core lacks; only this side counts.
+        // Load and store, because a small core has no atomic addition. Only the writer
+        // changes this count.
         let lost = self.positions.lost.load(Ordering::Relaxed);
         self.positions
             .lost
@@ -85,15 +86,15 @@ impl<'a> Ring<'a> {
         false
     }
 
-    /// Puts bytes in, in order; returns how many found room. For the one side
-    /// that puts.
+    /// Puts bytes in, in order. Returns how many fit; the others count as lost. Only the
+    /// writer may call this.
     pub fn write(&self, bytes: &[u8]) -> u16 {
         let put = bytes.iter().filter(|byte| self.put(**byte)).count();
         put as u16
     }
 
-    /// Takes bytes out, in order; returns how many there were. For the one side
-    /// that takes.
+    /// Takes bytes out, in order, at most `bytes.len()`. Returns their number. Only the
+    /// reader may call this.
     pub fn read(&self, bytes: &mut [u8]) -> u16 {
         let head = self.positions.head.load(Ordering::Acquire);
         let mut tail = self.positions.tail.load(Ordering::Relaxed);
@@ -113,7 +114,7 @@ impl<'a> Ring<'a> {
         count
     }
 
-    /// How many bytes there are to take. For the one side that takes.
+    /// Number of bytes in the ring. Only the reader may call this.
     pub fn available(&self) -> u16 {
         let head = self.positions.head.load(Ordering::Acquire);
         let tail = self.positions.tail.load(Ordering::Relaxed);
@@ -125,14 +126,14 @@ impl<'a> Ring<'a> {
         used as u16
     }
 
-    /// Forgets what there is to take. For the one side that takes.
+    /// Discards all bytes in the ring. Only the reader may call this.
     pub fn clear(&self) {
         let head = self.positions.head.load(Ordering::Acquire);
         self.positions.tail.store(head, Ordering::Release);
     }
 
-    /// How many bytes found no room; wraps, at 256 on an 8-bit processor. For
-    /// both sides.
+    /// Number of bytes that were lost because the ring was full. It wraps at 65536, on an
+    /// 8-bit processor at 256. Writer and reader may call this.
     pub fn lost(&self) -> u16 {
         usize::from(self.positions.lost.load(Ordering::Relaxed)) as u16
     }

@@ -1,28 +1,30 @@
-//! Time: wrapping microseconds, and the silences of the serial line guide.
+//! Time in microseconds on a clock that wraps, and the silences of the serial line guide.
 //!
-//! Only differences are ever taken, so a clock that wraps is no concern; one
-//! wait may last 71 minutes at most.
+//! All functions use only differences of two times, so the wrap of the clock at 2^32 does
+//! not matter. Two times that are compared must be less than 71 minutes apart.
 
-/// How far a clock may step back, as one does that adds a millisecond tick and
-/// a counter read beside its interrupt: in microseconds.
+/// How far the clock may step back, in microseconds. A clock that adds a hardware counter to
+/// millisecond ticks steps back if it is read after the counter has wrapped and before the
+/// interrupt has counted the tick.
 const STEP_BACK: u32 = 0x1_0000;
 
-/// The longest time that is waited for, about 36 minutes. Two such times and the
-/// step back are less than the clock's 2^32.
+/// The longest wait in microseconds, about 36 minutes. A poll at most 35 minutes after the
+/// end of the wait sees that it is over.
 pub const LONGEST: u32 = 1 << 31;
 
-/// 3.5 characters at 9600 baud, rounded up: the silence kept while nobody has
-/// told the baud rate.
+/// The silence in microseconds while the baud rate is unknown: about 3.5 characters of 11
+/// bits at 9600 baud.
 pub const DEFAULT_SILENCE: u32 = 4_000;
 
-/// One character of 11 bits at 9600 baud.
+/// The length of a character in microseconds while the baud rate is unknown: 11 bits at 9600
+/// baud.
 pub const DEFAULT_CHARACTER: u16 = 1_146;
 
-/// The fixed silence above 19200 baud (serial line guide V1.02, 2.5.1.1).
+/// The fixed silence above 19200 baud, in microseconds (serial line guide V1.02, 2.5.1.1).
 const FAST_SILENCE: u32 = 1_750;
 
-/// The time from `since` to `now`, in microseconds; none where the clock stepped
-/// back a little.
+/// Microseconds from `since` to `now`; 0 if the clock stepped back a little, so that `now`
+/// is before `since`.
 #[inline(always)]
 pub const fn elapsed(now: u32, since: u32) -> u32 {
     let time = now.wrapping_sub(since);
@@ -33,14 +35,15 @@ pub const fn elapsed(now: u32, since: u32) -> u32 {
     }
 }
 
-/// True once `time` has [`elapsed`] from `since` to `now`; not before where the
-/// clock stepped back a little. (One comparison: 32 bits are much work for an AVR.)
+/// True if at least `time` microseconds have [`elapsed`] from `since` to `now`; false if the
+/// clock stepped back a little. (One comparison, because 32-bit comparisons cost much on an
+/// AVR.)
 #[inline(always)]
 pub const fn has_elapsed(time: u32, now: u32, since: u32) -> bool {
     now.wrapping_sub(since).wrapping_add(STEP_BACK) >= time.wrapping_add(STEP_BACK)
 }
 
-/// A duration that the caller chose, as it is waited for: at most [`LONGEST`].
+/// Limits a duration that the caller chose to [`LONGEST`].
 pub const fn clamped(microseconds: u32) -> u32 {
     if microseconds > LONGEST {
         LONGEST
@@ -49,13 +52,14 @@ pub const fn clamped(microseconds: u32) -> u32 {
     }
 }
 
-/// Milliseconds as microseconds.
+/// Converts milliseconds to microseconds.
 #[inline(always)]
 pub const fn millis(milliseconds: u16) -> u32 {
     milliseconds as u32 * 1000
 }
 
-/// One character of 11 bits, in microseconds, rounded up; at most 65535.
+/// The length of a character of 11 bits, in microseconds, rounded up, at most 65535.
+/// [`DEFAULT_CHARACTER`] if `baud` is 0.
 pub const fn character(baud: u32) -> u16 {
     let time = match 11_000_000u32.checked_div(baud) {
         Some(time) => time,
@@ -68,11 +72,12 @@ pub const fn character(baud: u32) -> u16 {
     }
 }
 
-/// `count` characters that last `character` each.
+/// The length of `count` characters, if one lasts `character` microseconds.
 #[inline(always)]
 pub const fn characters(character: u16, count: u8) -> u32 {
     if cfg!(any(test, target_arch = "avr")) {
-        // Bytes it multiplies itself; 32 bits are 84 bytes of libgcc.
+        // An AVR multiplies bytes in hardware. A 32-bit product would need 84 bytes of
+        // libgcc.
         let [low, high] = character.to_le_bytes();
         let (low, high) = (low as u16 * count as u16, high as u16 * count as u16);
         ((high as u32) << 8) + low as u32
@@ -81,7 +86,8 @@ pub const fn characters(character: u16, count: u8) -> u32 {
     }
 }
 
-/// The silence t3.5 that separates two frames, in microseconds.
+/// The silence t3.5 that separates two frames, in microseconds. [`DEFAULT_SILENCE`] if
+/// `baud` is 0.
 pub const fn silence(baud: u32) -> u32 {
     if baud > 19_200 {
         FAST_SILENCE
@@ -111,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn an_untold_rate_means_the_defaults() {
+    fn an_unknown_baud_rate_gives_the_defaults() {
         assert_eq!(silence(0), DEFAULT_SILENCE);
         assert_eq!(character(0), DEFAULT_CHARACTER);
     }
@@ -123,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn characters_take_as_long_as_all_of_them() {
+    fn characters_last_their_number_times_one_character() {
         for character in [0, 1, 255, 256, 1_146, 0xFF00, 0xFFFF] {
             for count in 0..=255 {
                 let time = u32::from(character) * u32::from(count);
