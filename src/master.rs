@@ -1,5 +1,5 @@
-//! The ModbusMaster-shaped facade: words to send, ten functions, words
-//! received. Each function starts a transaction; `poll` ends it.
+//! A master with the interface of the Arduino library ModbusMaster: transmit words, ten
+//! functions, response words. Each function starts a request; `poll` advances it to its end.
 
 use crate::engine::{Engine, Settings, Words};
 use crate::error::Status;
@@ -7,10 +7,10 @@ use crate::pdu::query::{Form, Query};
 use crate::pdu::{bits, registers};
 use crate::port::Port;
 
-/// What is read where there is no word.
+/// The value returned for a word that does not exist.
 pub const NO_WORD: u16 = 0xFFFF;
 
-/// A master on a serial line, with the port and the buffers it was given.
+/// A master on a serial line, with its port and its buffers.
 // Small fields first: see `Engine`.
 #[derive(Clone, Hash, Debug)]
 #[repr(C)]
@@ -20,14 +20,14 @@ pub struct Master<P, S: Words> {
     slave: u8,
     status: Status,
     engine: Engine<P, S, Query>,
-    /// Where the writing functions without arguments write.
+    /// The address to which the write functions without an address argument write.
     write_address: u16,
-    /// Bits queued in the transmit buffer; 16 to a word.
+    /// Number of bits queued in the transmit words; a queued word counts as 16.
     transmit_bits: u16,
 }
 
 impl<P, S: Words> Master<P, S> {
-    /// A master that talks to `slave` over `port`.
+    /// A master that sends requests to the unit `slave` through `port`.
     pub const fn new(slave: u8, port: P, storage: S) -> Self {
         Master {
             engine: Engine::new(port, storage),
@@ -45,22 +45,22 @@ impl<P, S: Words> Master<P, S> {
         &mut self.engine.port
     }
 
-    /// What the caller lent.
+    /// The buffers.
     pub fn storage(&mut self) -> &mut S {
         &mut self.engine.storage
     }
 
-    /// How transactions behave.
+    /// Timeouts, retries and other settings of requests.
     pub fn settings(&mut self) -> &mut Settings {
         &mut self.engine.settings
     }
 
-    /// Sets the unit that later requests go to; 0 is broadcast.
+    /// Sets the unit for later requests; 0 means broadcast.
     pub fn set_slave(&mut self, slave: u8) {
         self.slave = slave;
     }
 
-    /// The unit that requests go to.
+    /// The unit for requests.
     pub fn slave(&self) -> u8 {
         self.slave
     }
@@ -76,12 +76,12 @@ impl<P, S: Words> Master<P, S> {
         self.engine.rebase(now, longest);
     }
 
-    /// The status of the last request; [`Status::PENDING`] while it is under way.
+    /// The status of the last request; [`Status::PENDING`] while it is in progress.
     pub fn status(&self) -> Status {
         self.status
     }
 
-    /// The raw exception code of the last reply; 0 if it was no exception.
+    /// The exception code of the last reply as received; 0 if it was no exception.
     pub fn exception_code(&self) -> u8 {
         self.engine.exception_code()
     }
@@ -91,15 +91,16 @@ impl<P, S: Words> Master<P, S> {
         self.engine.is_waiting()
     }
 
-    /// True while a request is under way.
+    /// True while a request is in progress.
     pub fn is_pending(&self) -> bool {
         self.engine.is_pending()
     }
 }
 
 impl<P: Port, S: Words> Master<P, S> {
-    /// Talks to `slave` from now on, over what `port` makes of the port. Settings,
-    /// buffers and their words stay; a request under way is given up.
+    /// Changes to the unit `slave`, and to the port that the function `port` sets up. Settings,
+    /// buffers and their words do not change. A request in progress is cancelled, as by
+    /// [`Master::cancel`].
     pub fn begin(&mut self, slave: u8, port: impl FnOnce(&mut P)) {
         self.cancel();
         self.slave = slave;
@@ -107,13 +108,14 @@ impl<P: Port, S: Words> Master<P, S> {
         self.transmit_bits = 0;
     }
 
-    /// Turns zeroed storage into a master without port and buffers.
+    /// Sets the defaults in a zeroed master, which has no port and no buffers yet.
     pub fn preset(&mut self) {
         self.slave = 1;
         self.engine.settings.preset();
     }
 
-    /// Gives up the request under way, if there is one.
+    /// Cancels the request in progress, if there is one. Its status becomes
+    /// [`Status::CANCELLED`].
     pub fn cancel(&mut self) {
         if self.engine.is_pending() {
             self.engine.cancel();
@@ -121,25 +123,27 @@ impl<P: Port, S: Words> Master<P, S> {
         }
     }
 
-    /// Says that somebody else has just used the line.
+    /// Reports that another device has just used the line. The silence before the next
+    /// request is measured from now.
     pub fn line_used(&mut self) {
         if self.engine.port.is_ready() {
             self.engine.line_used();
         }
     }
 
-    /// Says when somebody else used the line, by the clock of the port.
+    /// Reports that another device used the line at `time`, in microseconds of the port's
+    /// clock.
     pub fn line_used_at(&mut self, time: u32) {
         self.engine.line_used_at(time);
     }
 
-    /// When the line was last seen in use, by the clock of the port.
+    /// Time of the last known use of the line, in microseconds of the port's clock.
     pub fn last_use(&self) -> u32 {
         self.engine.last_use()
     }
 
-    /// Moves the request under way on, without waiting; returns
-    /// [`Status::PENDING`] until it has ended, then how it ended.
+    /// Advances the request in progress, without waiting. Returns [`Status::PENDING`] until
+    /// the request has ended, then its status.
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn poll(&mut self) -> Status {
         if self.engine.is_pending() {
@@ -152,8 +156,8 @@ impl<P: Port, S: Words> Master<P, S> {
         self.status
     }
 
-    /// How long, in microseconds, poll will find nothing to do unless a byte
-    /// arrives; the greatest value if there is no request.
+    /// Time in microseconds until poll has something to do, if no byte arrives before;
+    /// `u32::MAX` if there is no request.
     pub fn poll_delay(&mut self) -> u32 {
         if !self.is_pending() {
             return u32::MAX;
@@ -162,7 +166,7 @@ impl<P: Port, S: Words> Master<P, S> {
         self.engine.poll_delay(now)
     }
 
-    /// Decodes a successful reply into the response words.
+    /// Copies the data of a successful reply to the response words.
     #[cfg_attr(not(target_os = "none"), inline(always))]
     fn take_words(&mut self) -> Status {
         if !self.engine.take_words() {
@@ -172,7 +176,7 @@ impl<P: Port, S: Words> Master<P, S> {
         Status::OK
     }
 
-    /// [`Status::OK`] if a request may be built, else why not.
+    /// [`Status::OK`] if a request may be built, otherwise the error.
     #[cfg_attr(target_os = "none", inline(never))]
     fn readiness(&mut self) -> Status {
         if self.is_pending() {
@@ -185,8 +189,9 @@ impl<P: Port, S: Words> Master<P, S> {
         self.status
     }
 
-    /// Sends the request of a form, of an address and a quantity or value, or refuses it
-    /// with nothing sent. What is written to becomes the write address.
+    /// Starts the request of the function `form`, with an address and a quantity or value
+    /// `word`. If it returns an error, nothing is sent. The address of a write becomes the
+    /// write address.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn request(&mut self, address: u16, word: u16, form: Form) -> Status {
         let ready = self.readiness();
@@ -201,7 +206,8 @@ impl<P: Port, S: Words> Master<P, S> {
         self.start(built)
     }
 
-    /// As [`Master::request`], of what `build` builds; it writes to an address.
+    /// As [`Master::request`], for a request that `build` builds, and that writes to
+    /// `address`.
     fn write(&mut self, address: u16, build: impl FnOnce(&mut Query) -> Status) -> Status {
         let ready = self.readiness();
         if ready != Status::OK {
@@ -212,7 +218,8 @@ impl<P: Port, S: Words> Master<P, S> {
         self.start(built)
     }
 
-    /// Starts what was built, unless that was refused.
+    /// Starts the request that was built. `built` is the status of building it; if it is an
+    /// error, nothing is sent.
     #[cfg_attr(target_os = "none", inline(never))]
     fn start(&mut self, built: Status) -> Status {
         self.transmit_bits = 0;
@@ -254,7 +261,7 @@ impl<P: Port, S: Words> Master<P, S> {
         self.request(address, quantity, registers::form::READ_INPUT)
     }
 
-    /// 05: switches one coil; 0 is off.
+    /// 05: switches one coil off if `on` is 0, otherwise on.
     pub fn write_single_coil(&mut self, address: u16, on: u16) -> Status {
         let value = if on == 0 { 0 } else { bits::ON };
         self.request(address, value, bits::form::WRITE_SINGLE)
@@ -283,7 +290,8 @@ impl<P: Port, S: Words> Master<P, S> {
         self.request(address, quantity, registers::form::WRITE_MULTIPLE)
     }
 
-    /// 10: writes the queued complete words to the last write address.
+    /// 10: writes the queued words to the last write address. A word begun by
+    /// [`Master::send_bit`] and not complete is not written.
     pub fn write_queued_registers(&mut self) -> Status {
         self.write_multiple_registers(self.write_address, self.transmit_bits >> 4)
     }
@@ -320,7 +328,9 @@ impl<P: Port, S: Words> Master<P, S> {
         })
     }
 
-    /// 17: writes the queued complete words to the last write address.
+    /// 17: writes the queued words to the last write address, then reads 1 to 125 registers
+    /// into the response words. A word begun by [`Master::send_bit`] and not complete is not
+    /// written.
     pub fn read_write_queued_registers(&mut self, read_address: u16, read_quantity: u16) -> Status {
         self.read_write_multiple_registers(
             read_address,
@@ -330,7 +340,7 @@ impl<P: Port, S: Words> Master<P, S> {
         )
     }
 
-    /// A response word; 0xFFFF past the end of the buffer.
+    /// The response word at `index`; 0xFFFF past the end of the buffer.
     pub fn response_word(&mut self, index: usize) -> u16 {
         let words = self.engine.storage.response();
         words.get(index).copied().unwrap_or(NO_WORD)
@@ -341,7 +351,7 @@ impl<P: Port, S: Words> Master<P, S> {
         self.engine.storage.response().fill(0);
     }
 
-    /// Sets a transmit word; false past the end of the buffer.
+    /// Sets the transmit word at `index`. Returns false past the end of the buffer.
     pub fn set_transmit_word(&mut self, index: usize, value: u16) -> bool {
         match self.engine.storage.transmit().get_mut(index) {
             Some(word) => {
@@ -357,14 +367,14 @@ impl<P: Port, S: Words> Master<P, S> {
         self.engine.storage.transmit().fill(0);
     }
 
-    /// Sets the write address and empties the queue; the words stay.
+    /// Sets the write address and empties the queue. The transmit words do not change.
     pub fn begin_transmission(&mut self, address: u16) {
         self.write_address = address;
         self.transmit_bits = 0;
     }
 
-    /// Queues a word; a word begun by [`Master::send_bit`] is left as it is.
-    /// False, and nothing queued, past the end of the buffer.
+    /// Queues a word, after a word that [`Master::send_bit`] has begun. Returns false, and
+    /// queues nothing, if the buffer is full.
     pub fn send(&mut self, word: u16) -> bool {
         let index = self.transmit_bits.div_ceil(16);
         let fits = self.set_transmit_word(usize::from(index), word);
@@ -374,8 +384,8 @@ impl<P: Port, S: Words> Master<P, S> {
         fits
     }
 
-    /// Queues a bit behind those queued, lowest first. False, and nothing
-    /// queued, past the end of the buffer.
+    /// Queues a bit. The first bit of a word is the least significant. Returns false, and
+    /// queues nothing, if the buffer is full.
     pub fn send_bit(&mut self, on: bool) -> bool {
         let index = usize::from(self.transmit_bits >> 4);
         let mask = 1 << (self.transmit_bits & 15);
@@ -392,12 +402,13 @@ impl<P: Port, S: Words> Master<P, S> {
         true
     }
 
-    /// Words of the last successful read that [`Master::receive`] has not given.
+    /// Number of words of the last successful read that [`Master::receive`] has not returned
+    /// yet.
     pub fn available(&self) -> u8 {
         self.response_words.saturating_sub(self.response_index)
     }
 
-    /// The next word of the last successful read; 0xFFFF at the end.
+    /// Returns the next word of the last successful read; 0xFFFF after the last word.
     pub fn receive(&mut self) -> u16 {
         if self.available() == 0 {
             return NO_WORD;

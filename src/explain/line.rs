@@ -1,10 +1,10 @@
-//! A line of text that grows in a buffer of the caller's. The formatting of
-//! `core` would be kilobytes in an image.
+//! Writes a line of text into a buffer of the caller. `core::fmt` would add kilobytes to a
+//! firmware image.
 
 use crate::error::Status;
 
-/// A line of ASCII text. What does not fit is left out, and said by
-/// [`Line::finish`]; a zero byte always ends the text.
+/// A line of ASCII text in a buffer. If the buffer is too small, the rest of the text is cut
+/// off and [`Line::finish`] returns an error. A zero byte ends the text, also if it was cut.
 pub struct Line<'a> {
     text: &'a mut [u8],
     length: usize,
@@ -12,7 +12,8 @@ pub struct Line<'a> {
 }
 
 impl<'a> Line<'a> {
-    /// An empty line in `text`, which needs a byte more than its characters.
+    /// An empty line in the buffer `text`, which needs one byte more than the text has
+    /// characters.
     pub const fn new(text: &'a mut [u8]) -> Self {
         Line {
             text,
@@ -32,14 +33,14 @@ impl<'a> Line<'a> {
         }
     }
 
-    /// Adds words.
+    /// Adds a string.
     pub fn put(&mut self, words: &str) {
         for byte in words.bytes() {
             self.byte(byte);
         }
     }
 
-    /// Adds a word and blanks behind it, up to a width.
+    /// Adds a word, and spaces after it up to `width` characters.
     pub fn padded(&mut self, word: &str, width: usize) {
         self.put(word);
         for _ in word.len()..width {
@@ -81,12 +82,12 @@ impl<'a> Line<'a> {
 
     /// Adds four hexadecimal digits.
     pub fn hex_word(&mut self, word: u16) {
-        // Without an iterator: the facade's would no longer be inlined.
+        // With an iterator here, the compiler would no longer inline the master's iterator.
         self.hex((word >> 8) as u8);
         self.hex(word as u8);
     }
 
-    /// Adds bytes in hexadecimal, a blank before each.
+    /// Adds bytes in hexadecimal, with a space before each.
     pub fn bytes(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.byte(b' ');
@@ -94,7 +95,7 @@ impl<'a> Line<'a> {
         }
     }
 
-    /// Adds registers in decimal, a blank before each.
+    /// Adds registers in decimal, with a space before each.
     pub fn registers(&mut self, data: &[u8]) {
         for pair in data.as_chunks().0 {
             self.byte(b' ');
@@ -102,7 +103,7 @@ impl<'a> Line<'a> {
         }
     }
 
-    /// Adds the first `count` bits, a blank before every eight.
+    /// Adds the first `count` bits of `data` as 0 and 1, with a space before every eight.
     pub fn bits(&mut self, data: &[u8], count: usize) {
         let mut left = count;
         for byte in data {
@@ -117,7 +118,8 @@ impl<'a> Line<'a> {
         }
     }
 
-    /// Adds what others call text, in quotes; what is no ASCII as a point.
+    /// Adds a text of another device, in double quotes. A double quote in it becomes a single
+    /// quote, and a byte that is no printable ASCII character becomes a full stop.
     pub fn quoted(&mut self, text: &[u8]) {
         self.byte(b'"');
         for byte in text {
@@ -130,10 +132,10 @@ impl<'a> Line<'a> {
         self.byte(b'"');
     }
 
-    /// Ends the text; how many characters it has.
+    /// Ends the text and returns its number of characters.
     ///
     /// # Errors
-    /// [`Status::BUFFER_TOO_SMALL`] if something was left out.
+    /// [`Status::BUFFER_TOO_SMALL`] if the text was cut off.
     pub fn finish(self) -> Result<usize, Status> {
         if let Some(end) = self.text.get_mut(self.length) {
             *end = 0;
@@ -176,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn bits_come_in_eights_and_no_more_than_there_are() {
+    fn bits_are_written_in_groups_of_eight_up_to_the_end_of_the_data() {
         let (_, words) = text(64, |line| line.bits(&[0xCD, 0x01], 10));
         assert_eq!(words, " 10110011 10");
         let (_, words) = text(64, |line| line.bits(&[0xFF], 100));
@@ -184,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_cut_and_the_text_still_ends() {
+    fn text_that_does_not_fit_is_cut_and_still_ends_with_zero() {
         assert_eq!(text(4, |line| line.put("abc")), (Ok(3), "abc".into()));
         let short = Err(Status::BUFFER_TOO_SMALL);
         assert_eq!(text(3, |line| line.put("abc")), (short, "ab".into()));
@@ -193,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn quoted_text_holds_no_control_characters() {
+    fn quoted_text_contains_only_printable_characters() {
         let (_, words) = text(64, |line| line.quoted(b"a\"b\n\xFF"));
         assert_eq!(words, "\"a'b..\"");
     }

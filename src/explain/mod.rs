@@ -1,4 +1,4 @@
-//! Requests and responses in words, one line each.
+//! Describes requests and responses in words, one line each.
 
 mod line;
 pub mod names;
@@ -16,10 +16,10 @@ use crate::pdu::request::Request;
 use crate::pdu::response::Response;
 use crate::pdu::{bits, files, registers, EXCEPTION};
 
-/// Bytes of a request PDU that say what its reply means.
+/// Number of bytes at the start of a request PDU that are needed to describe its reply.
 pub const HEAD: usize = 9;
 
-/// Writes the unit, and a word that says what this is.
+/// Writes the unit, then the word `what`, in columns of fixed width.
 pub fn start(line: &mut Line, unit: u8, what: &str) {
     line.put("unit ");
     line.number(unit.into());
@@ -33,7 +33,7 @@ pub fn start(line: &mut Line, unit: u8, what: &str) {
     line.padded(what, 11);
 }
 
-/// Writes how many bytes there are of something that is no frame.
+/// Writes `what` and a number of bytes, for bytes that are no valid frame.
 pub fn bytes(line: &mut Line, what: &str, count: usize) {
     line.put(what);
     line.put(", ");
@@ -41,8 +41,8 @@ pub fn bytes(line: &mut Line, what: &str, count: usize) {
     line.put(if count == 1 { " byte" } else { " bytes" });
 }
 
-/// Writes what a frame carries, or what is wrong with it. `end` is the last
-/// character of an ASCII frame.
+/// Describes the content of a frame, or its error. `end` is the last character of an ASCII
+/// frame.
 pub fn frame(line: &mut Line, framing: Framing, side: Side, frame: &[u8], end: u8) {
     let parsed = match framing {
         Framing::Rtu | Framing::RtuOverTcp => rtu::parse(frame),
@@ -52,7 +52,7 @@ pub fn frame(line: &mut Line, framing: Framing, side: Side, frame: &[u8], end: u
     adu(line, side, parsed, frame.len());
 }
 
-/// As [`frame`], of an ASCII frame, which is decoded in a place of its own.
+/// As [`frame`], for an ASCII frame, which is decoded in a copy on the stack.
 #[inline(never)]
 fn characters(line: &mut Line, side: Side, frame: &[u8], end: u8) {
     let mut copy = [0; ascii::MAX_FRAME];
@@ -68,6 +68,7 @@ fn characters(line: &mut Line, side: Side, frame: &[u8], end: u8) {
     adu(line, side, parsed, frame.len());
 }
 
+/// Describes a decoded frame, or the error of a frame of `length` bytes.
 fn adu(line: &mut Line, side: Side, parsed: Result<Adu, Status>, length: usize) {
     match parsed {
         Ok(adu) if side == Side::Request => {
@@ -89,15 +90,15 @@ fn adu(line: &mut Line, side: Side, parsed: Result<Adu, Status>, length: usize) 
     }
 }
 
-/// Writes a function's code and name.
+/// Writes the code and the name of a function.
 fn function(line: &mut Line, code: u8) {
     line.hex(code);
     line.byte(b' ');
     line.put(names::function(code));
 }
 
-/// Writes the addresses of so many items; they may pass 65535, for a request
-/// may be wrong.
+/// Writes the first and the last of `quantity` addresses. The last may be greater than 65535,
+/// because the request may be wrong.
 fn range(line: &mut Line, address: u16, quantity: u16) {
     line.number(address.into());
     if quantity != 1 {
@@ -163,7 +164,7 @@ fn diagnostics(line: &mut Line, code: u16, data: &[u8], is_response: bool) {
     }
 }
 
-/// What cannot be parsed, as it is.
+/// Writes a PDU that cannot be decoded, as bytes.
 fn malformed(line: &mut Line, pdu: &[u8]) {
     if let Some((code, data)) = pdu.split_first() {
         function(line, *code);
@@ -174,7 +175,7 @@ fn malformed(line: &mut Line, pdu: &[u8]) {
     }
 }
 
-/// Data of which nothing is known.
+/// Writes data of unknown meaning, as bytes.
 fn raw(line: &mut Line, data: &[u8]) {
     if !data.is_empty() {
         line.byte(b':');
@@ -182,7 +183,8 @@ fn raw(line: &mut Line, data: &[u8]) {
     }
 }
 
-/// A function that nobody defined but its user.
+/// Writes a PDU with an unknown function code. Returns false, and writes nothing, if the
+/// function is known.
 fn unknown(line: &mut Line, pdu: &[u8]) -> bool {
     match pdu.split_first() {
         Some((code, data)) if names::function(*code) == names::function(0) => {
@@ -194,7 +196,7 @@ fn unknown(line: &mut Line, pdu: &[u8]) -> bool {
     }
 }
 
-/// Writes what a request PDU asks for.
+/// Describes a request PDU.
 pub fn request(line: &mut Line, pdu: &[u8]) {
     if unknown(line, pdu) {
         return;
@@ -305,8 +307,8 @@ fn single_register(line: &mut Line, address: u16, value: u16) {
     line.number(value.into());
 }
 
-/// What a request asked for, as its first bytes tell, as far as a reply does
-/// not repeat it.
+/// The arguments of a request that its reply does not repeat, read from the first bytes of
+/// the request.
 #[derive(Clone, Copy)]
 enum Asked {
     Nothing,
@@ -315,8 +317,8 @@ enum Asked {
     Record(Record),
 }
 
-/// What the head of a request PDU asked for.
-fn meaning(head: &[u8]) -> Asked {
+/// Reads the arguments from the head of a request PDU.
+fn arguments(head: &[u8]) -> Asked {
     let mut reader = Reader::new(head);
     match reader.u8() {
         Some(
@@ -333,7 +335,8 @@ fn meaning(head: &[u8]) -> Asked {
         },
         Some(files::READ_FIFO_QUEUE) => reader.u16().map_or(Asked::Nothing, Asked::Queue),
         Some(files::READ_FILE_RECORD) => {
-            // The head holds the first sub-request; of others only the data are told.
+            // The head contains only the first sub-request. Of the records of others, only
+            // the data are written.
             let _ = reader.u8();
             let first = Reads::new(reader.rest()).ok();
             let record = first.and_then(|reads| reads.iter().next());
@@ -343,12 +346,12 @@ fn meaning(head: &[u8]) -> Asked {
     }
 }
 
-/// Writes what was asked for, as far as the head of a request PDU tells.
+/// Describes a request PDU of which only the head is known.
 pub fn head(line: &mut Line, head: &[u8]) {
     let Some(code) = head.first() else {
         return;
     };
-    match meaning(head) {
+    match arguments(head) {
         _ if Request::parse(head).is_ok() => request(line, head),
         Asked::Range(address, quantity) => {
             function(line, *code);
@@ -359,8 +362,8 @@ pub fn head(line: &mut Line, head: &[u8]) {
     }
 }
 
-/// Writes what a response PDU brings; the head of its request, if that is
-/// known, says where the values are from.
+/// Describes a response PDU. `head` is the head of its request, from which the addresses of
+/// the values are taken; it is empty if the request is unknown.
 pub fn response(line: &mut Line, pdu: &[u8], head: &[u8]) {
     let is_exception = pdu.first().is_some_and(|code| code & EXCEPTION != 0);
     if !is_exception && unknown(line, pdu) {
@@ -370,7 +373,7 @@ pub fn response(line: &mut Line, pdu: &[u8], head: &[u8]) {
         return malformed(line, pdu);
     };
     function(line, response.function());
-    let asked = meaning(head);
+    let asked = arguments(head);
     if let (
         Asked::Range(address, quantity),
         Response::ReadBits { .. } | Response::ReadRegisters { .. },

@@ -1,4 +1,4 @@
-//! What the standard calls things.
+//! Names from the standard for function codes and other codes.
 
 use crate::pdu::diagnostics::sub_function as sub;
 use crate::pdu::{bits, diagnostics, files, identification, registers};
@@ -30,7 +30,7 @@ pub const fn function(code: u8) -> &'static str {
     }
 }
 
-/// The name of a sub-function of 08.
+/// The name of a sub-function of function 08, diagnostics.
 pub const fn sub_function(code: u16) -> &'static str {
     match code {
         sub::RETURN_QUERY_DATA => "return query data",
@@ -52,7 +52,7 @@ pub const fn sub_function(code: u16) -> &'static str {
     }
 }
 
-/// The name of an exception code (clause 7).
+/// The name of an exception code (V1.1b3, 7).
 pub const fn exception(code: u8) -> &'static str {
     match code {
         0x01 => "illegal function",
@@ -68,7 +68,7 @@ pub const fn exception(code: u8) -> &'static str {
     }
 }
 
-/// The name of a read device id code.
+/// The name of a read device id code (V1.1b3, 6.21).
 pub const fn device_id(code: u8) -> &'static str {
     match code {
         identification::BASIC => "basic",

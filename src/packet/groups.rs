@@ -1,5 +1,5 @@
-//! The groups that the data of some functions consist of, one at a time: file
-//! records of 14 and 15, objects of a device identification.
+//! The data of some functions consist of groups: file records (functions 14 and 15, hex), and
+//! objects of a device identification. This module reads and writes one group at a time.
 
 use super::Side;
 use crate::bytes::{Reader, Writer};
@@ -7,15 +7,16 @@ use crate::error::Status;
 use crate::pdu::files::WRITE_FILE_RECORD;
 use crate::pdu::files::{Reads, Record, Records, Writes, READ_FILE_RECORD, REFERENCE_TYPE};
 
-/// Names no record: the responses of 14 carry data only.
+/// No record number: the responses of 14 contain only data.
 const NOWHERE: Record = Record {
     file: 0,
     record: 0,
     length: 0,
 };
 
-/// The first record in the data of 14 or 15, its data, and its bytes in all.
-/// The requests of 14 carry none of the data, and the responses nothing else.
+/// Reads the first record in the data of function 14 or 15. Returns the record, its data, and
+/// the length of the group in bytes. The data are empty in a request of 14. In a response of
+/// 14 only the length of the record is known.
 pub fn record(side: Side, function: u8, groups: &[u8]) -> Option<(Record, &[u8], usize)> {
     match (function, side) {
         (READ_FILE_RECORD, Side::Request) => {
@@ -35,11 +36,13 @@ pub fn record(side: Side, function: u8, groups: &[u8]) -> Option<(Record, &[u8],
     }
 }
 
-/// Writes a record as [`record`] reads it; returns its bytes in all.
+/// Writes one record in the format that [`record`] reads. Returns the length of the group in
+/// bytes.
 ///
 /// # Errors
-/// [`Status::ILLEGAL_FUNCTION`] for other functions; what a request or response
-/// of this record alone would be refused with; [`Status::BUFFER_TOO_SMALL`].
+/// [`Status::ILLEGAL_FUNCTION`] for functions other than 14 and 15;
+/// [`Status::BUFFER_TOO_SMALL`]; the error of a request or response that contains only this
+/// record.
 pub fn put_record(
     side: Side,
     function: u8,
@@ -53,7 +56,7 @@ pub fn put_record(
         return Err(Status::ILLEGAL_FUNCTION);
     }
     if is_read && side == Side::Response {
-        // What does not fit a byte is no group, as is found below.
+        // A count that does not fit a byte is refused below, when the group is read.
         writer.u8(data.len().saturating_add(1).min(0xFF) as u8);
         writer.u8(REFERENCE_TYPE);
     } else {
@@ -73,17 +76,19 @@ pub fn put_record(
     Ok(length)
 }
 
-/// The first object in a device identification: id, value, and its bytes in all.
+/// Reads the first object in a device identification. Returns its id, its value, and the
+/// length of the group in bytes.
 pub fn object(groups: &[u8]) -> Option<(u8, &[u8], usize)> {
     let mut reader = Reader::new(groups);
     let (id, length) = (reader.u8()?, usize::from(reader.u8()?));
     Some((id, reader.take(length)?, 2 + length))
 }
 
-/// Writes an object as [`object`] reads it; returns its bytes in all.
+/// Writes one object in the format that [`object`] reads. Returns the length of the group in
+/// bytes.
 ///
 /// # Errors
-/// [`Status::ILLEGAL_DATA_VALUE`] for more than 255 bytes;
+/// [`Status::ILLEGAL_DATA_VALUE`] if the value is longer than 255 bytes;
 /// [`Status::BUFFER_TOO_SMALL`].
 pub fn put_object(id: u8, value: &[u8], place: &mut [u8]) -> Result<usize, Status> {
     if value.len() > 0xFF {
@@ -131,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn a_record_that_cannot_be_is_not_written() {
+    fn an_invalid_record_is_not_written() {
         let mut bytes = [0; 600];
         let head = |file, length| Record {
             file,

@@ -1,5 +1,5 @@
-//! How long a frame is, as its first bytes tell, and how long a reply will be,
-//! as its request tells.
+//! The length of a frame, derived from its first bytes, and the length of a reply, derived
+//! from its request.
 
 use super::Side;
 use crate::error::Status;
@@ -12,40 +12,41 @@ use crate::pdu::limits::MAX_PDU;
 use crate::pdu::request::Request;
 use crate::pdu::EXCEPTION;
 
-/// Bytes of a frame around a PDU of so many bytes, and the PDU.
-const fn around(framing: Framing, pdu: usize) -> usize {
+/// The length of a frame whose PDU has `pdu` bytes.
+const fn frame_bytes(framing: Framing, pdu: usize) -> usize {
     match framing {
         Framing::Rtu | Framing::RtuOverTcp => pdu + rtu::OVERHEAD,
         Framing::Tcp => pdu + tcp::PDU,
-        // Colon, unit, PDU and LRC in two characters each, two that end it.
+        // A colon; unit, PDU and LRC with two characters for each byte; two characters that
+        // end the frame.
         Framing::Ascii => 1 + 2 * (1 + pdu + 1) + 2,
     }
 }
 
-/// The length of the frame around a PDU of this length.
-fn of_frame(framing: Framing, pdu: Length) -> Length {
+/// Converts the length of a PDU to the length of its frame.
+fn frame_length(framing: Framing, pdu: Length) -> Length {
     match pdu {
-        Length::Exactly(length) => Length::Exactly(around(framing, length)),
-        Length::AtLeast(length) => Length::AtLeast(around(framing, length)),
-        // In a stream silence tells nothing; an ASCII frame has an end.
+        Length::Exactly(length) => Length::Exactly(frame_bytes(framing, length)),
+        Length::AtLeast(length) => Length::AtLeast(frame_bytes(framing, length)),
+        // In a stream, silence does not end a frame. An ASCII frame has an end character.
         Length::Silence if framing == Framing::RtuOverTcp => Length::Unknown,
         Length::Unknown if framing == Framing::Ascii => Length::Silence,
         other => other,
     }
 }
 
-/// True of a response to Report Server ID: some devices count the id alone and send
-/// more after it.
+/// True for a response of Report Server ID. In some devices its byte count covers only the
+/// id, and more bytes follow.
 fn may_be_longer(side: Side, pdu: &[u8]) -> bool {
     side == Side::Response && pdu.first() == Some(&REPORT_SERVER_ID)
 }
 
-/// The length of the whole frame that begins with these bytes. What silence
-/// tells in RTU, in ASCII the end character tells.
+/// The length of the frame that begins with `bytes`. [`Length::Silence`] of an ASCII frame
+/// means that its end character ends it. `end` is the last character of an ASCII frame.
 ///
 /// # Errors
-/// [`Status::MALFORMED_FRAME`] if no frame of this framing begins like that,
-/// or none is so long.
+/// [`Status::MALFORMED_FRAME`] if no frame of this framing begins with these bytes, or if the
+/// frame would be too long for this framing.
 pub fn expected(
     framing: Framing,
     side: Side,
@@ -56,17 +57,17 @@ pub fn expected(
     let length = match framing {
         Framing::Tcp => match tcp::header(bytes) {
             Ok(header) => Length::Exactly(header.total),
-            Err(Status::INCOMPLETE_FRAME) => Length::AtLeast(around(framing, 1)),
+            Err(Status::INCOMPLETE_FRAME) => Length::AtLeast(frame_bytes(framing, 1)),
             Err(refused) => return Err(refused),
         },
-        Framing::Ascii => of_characters(side, bytes, end, functions)?,
+        Framing::Ascii => expected_ascii(side, bytes, end, functions)?,
         Framing::Rtu | Framing::RtuOverTcp => {
             let pdu = bytes.get(rtu::PDU..).unwrap_or_default();
-            match of_frame(framing, side.length(pdu, functions)) {
+            match frame_length(framing, side.length(pdu, functions)) {
                 Length::Exactly(length) if may_be_longer(side, pdu) => match bytes.get(..length) {
                     None => Length::AtLeast(length),
                     Some(frame) if crc16(frame).is_residue() => Length::Exactly(length),
-                    Some(_) => of_frame(framing, Length::Silence),
+                    Some(_) => frame_length(framing, Length::Silence),
                 },
                 length => length,
             }
@@ -80,20 +81,20 @@ pub fn expected(
     }
 }
 
-/// The function code of the frame that begins with these bytes, as soon as it
-/// is there.
+/// The function code of the frame that begins with these bytes; `None` if they do not contain
+/// it yet.
 pub fn function(framing: Framing, bytes: &[u8]) -> Option<u8> {
     match framing {
         Framing::Rtu | Framing::RtuOverTcp => bytes.get(rtu::PDU).copied(),
         Framing::Tcp => bytes.get(tcp::PDU).copied(),
-        // Behind the colon and the two digits of the unit.
+        // After the colon and the two digits of the unit.
         Framing::Ascii => bytes.get(3..5).and_then(ascii::byte),
     }
 }
 
-/// As [`expected`], of an ASCII frame.
+/// As [`expected`], for an ASCII frame.
 #[inline(never)]
-fn of_characters(
+fn expected_ascii(
     side: Side,
     bytes: &[u8],
     end: u8,
@@ -101,7 +102,7 @@ fn of_characters(
 ) -> Result<Length, Status> {
     let framing = Framing::Ascii;
     let Some((first, characters)) = bytes.split_first() else {
-        return Ok(Length::AtLeast(around(framing, 1)));
+        return Ok(Length::AtLeast(frame_bytes(framing, 1)));
     };
     if *first != ascii::START {
         return Err(Status::MALFORMED_FRAME);
@@ -110,7 +111,7 @@ fn of_characters(
     if let Some(at) = characters.windows(2).position(is_end) {
         return Ok(Length::Exactly(1 + at + 2));
     }
-    // The end may have begun.
+    // The last character may be the carriage return before the end character.
     let digits = characters.strip_suffix(&[ascii::RETURN]);
     let digits = digits.unwrap_or(characters);
     let mut content = [0; 1 + MAX_PDU + 1];
@@ -125,11 +126,11 @@ fn of_characters(
         return Err(Status::MALFORMED_FRAME);
     }
     let pdu = content.get(1..count).unwrap_or_default();
-    match of_frame(framing, side.length(pdu, functions)) {
+    match frame_length(framing, side.length(pdu, functions)) {
         Length::Exactly(length) => match (bytes.len() < length, may_be_longer(side, pdu)) {
             (true, false) => Ok(Length::Exactly(length)),
             (true, true) => Ok(Length::AtLeast(length)),
-            // So long already, and no end is there.
+            // The frame has its full length, but no end characters.
             (false, false) => Err(Status::MALFORMED_FRAME),
             (false, true) => Ok(Length::Silence),
         },
@@ -137,28 +138,27 @@ fn of_characters(
     }
 }
 
-/// The length of the frame that answers a request, if it succeeds; an exception
-/// may answer it instead, in a PDU of two bytes. `Exactly(0)` if nothing ever
-/// answers it: a broadcast, or Force Listen Only Mode.
+/// The length of the frame that answers a request, if the request succeeds. (The answer may
+/// be an exception instead, whose PDU has two bytes.) [`Length::Exactly`] of 0 if a request
+/// is never answered: a broadcast, or Force Listen Only Mode.
 pub fn of_reply(framing: Framing, unit: u8, request: &Request, functions: &[Function]) -> Length {
     if framing.is_serial() && unit == 0 {
         return Length::Exactly(0);
     }
     match request.response_length(functions) {
         Length::Exactly(0) => Length::Exactly(0),
-        length => of_frame(framing, length),
+        length => frame_length(framing, length),
     }
 }
 
-/// The length of the Modbus TCP frame that begins with these bytes, request or
-/// response, if that is what they look like: a request or a response of this function
-/// may be as long as the header says. Without `allow_unknown` only with a function of
-/// the standard, one that the standard leaves to users, or one that is declared; 0 is
-/// a function of nobody.
+/// The length of the Modbus TCP frame, request or response, that seems to begin with these
+/// bytes: a request or a response of their function can have the length in the header.
+/// Without `allow_unknown`, the function must be one of the standard, one that the standard
+/// leaves to users, or one in `functions`. Function 0 is always refused.
 ///
 /// # Errors
-/// [`Status::INCOMPLETE_FRAME`] for less than header and function code,
-/// [`Status::MALFORMED_FRAME`] if this is something else.
+/// [`Status::INCOMPLETE_FRAME`] if header and function code are not complete;
+/// [`Status::MALFORMED_FRAME`] if no such frame begins with these bytes.
 pub fn looks_like_tcp(
     bytes: &[u8],
     allow_unknown: bool,
@@ -190,29 +190,29 @@ pub fn looks_like_tcp(
 mod tests {
     use super::*;
 
-    /// What is expected of a frame of which nothing is declared.
-    fn of(framing: Framing, side: Side, bytes: &[u8]) -> Result<Length, Status> {
+    /// [`expected`] without declared functions.
+    fn expected_length(framing: Framing, side: Side, bytes: &[u8]) -> Result<Length, Status> {
         expected(framing, side, bytes, ascii::END, &[])
     }
 
     #[test]
-    fn each_first_byte_of_an_rtu_reply_tells_as_much_as_it_can() {
+    fn the_first_bytes_of_an_rtu_reply_narrow_its_length() {
         let bytes = [0x11, 3, 4, 0, 1, 0, 2, 0xAA, 0xBB];
         for (have, wanted) in [(0, 4), (1, 4), (2, 5)] {
-            let length = of(Framing::Rtu, Side::Response, &bytes[..have]);
+            let length = expected_length(Framing::Rtu, Side::Response, &bytes[..have]);
             assert_eq!(length, Ok(Length::AtLeast(wanted)), "{have}");
         }
         for have in 3..=bytes.len() {
-            let length = of(Framing::Rtu, Side::Response, &bytes[..have]);
+            let length = expected_length(Framing::Rtu, Side::Response, &bytes[..have]);
             assert_eq!(length, Ok(Length::Exactly(9)), "{have}");
         }
     }
 
     #[test]
-    fn an_ascii_frame_is_predicted_and_its_end_decides() {
+    fn the_end_of_an_ascii_frame_overrides_its_predicted_length() {
         let frame = b":110306AE415652434049\r\n";
         for have in 0..frame.len() {
-            let length = of(Framing::Ascii, Side::Response, &frame[..have]);
+            let length = expected_length(Framing::Ascii, Side::Response, &frame[..have]);
             let wanted = match have {
                 0..=2 => Length::AtLeast(9),
                 3..=4 => Length::AtLeast(9),
@@ -221,24 +221,24 @@ mod tests {
             };
             assert_eq!(length, Ok(wanted), "{have}");
         }
-        let length = of(Framing::Ascii, Side::Response, frame);
+        let length = expected_length(Framing::Ascii, Side::Response, frame);
         assert_eq!(length, Ok(Length::Exactly(23)));
-        let early = of(Framing::Ascii, Side::Response, b":1103\r\n06AE");
+        let early = expected_length(Framing::Ascii, Side::Response, b":1103\r\n06AE");
         assert_eq!(early, Ok(Length::Exactly(7)));
-        let unknown = of(Framing::Ascii, Side::Request, b":1155");
+        let unknown = expected_length(Framing::Ascii, Side::Request, b":1155");
         assert_eq!(unknown, Ok(Length::Silence));
         for bad in [&b"x"[..], b":1G", b":\r1", b":0207F777", b":0207F7\rX"] {
-            let length = of(Framing::Ascii, Side::Request, bad);
+            let length = expected_length(Framing::Ascii, Side::Request, bad);
             assert_eq!(length, Err(Status::MALFORMED_FRAME));
         }
     }
 
     #[test]
-    fn the_end_decides_where_a_device_sends_more_than_it_counts() {
-        // It counts its id alone: two bytes of five.
+    fn the_end_decides_if_a_device_sends_more_than_its_byte_count() {
+        // The byte count covers only the id: two bytes of five.
         let frame = b":10110201020001023F\r\n";
         for have in 0..=frame.len() {
-            let length = of(Framing::Ascii, Side::Response, &frame[..have]);
+            let length = expected_length(Framing::Ascii, Side::Response, &frame[..have]);
             let wanted = match have {
                 0..=4 => Length::AtLeast(9),
                 5..=6 => Length::AtLeast(11),
@@ -252,25 +252,25 @@ mod tests {
 
     #[test]
     fn lengths_that_no_frame_has_are_malformed() {
-        let length = of(Framing::Rtu, Side::Response, &[1, 3, 252]);
+        let length = expected_length(Framing::Rtu, Side::Response, &[1, 3, 252]);
         assert_eq!(length, Err(Status::MALFORMED_FRAME));
-        let length = of(Framing::Tcp, Side::Request, &[0, 1, 0, 0, 255, 255]);
+        let length = expected_length(Framing::Tcp, Side::Request, &[0, 1, 0, 0, 255, 255]);
         assert_eq!(length, Err(Status::MALFORMED_FRAME));
-        let length = of(Framing::Ascii, Side::Response, b":0103FF");
+        let length = expected_length(Framing::Ascii, Side::Response, b":0103FF");
         assert_eq!(length, Err(Status::MALFORMED_FRAME));
     }
 
     #[test]
-    fn silence_tells_on_a_line_only() {
+    fn silence_ends_a_frame_only_on_a_serial_line() {
         let bytes = [1, 8, 0, 0];
-        let on_a_line = of(Framing::Rtu, Side::Request, &bytes);
+        let on_a_line = expected_length(Framing::Rtu, Side::Request, &bytes);
         assert_eq!(on_a_line, Ok(Length::Silence));
-        let in_a_stream = of(Framing::RtuOverTcp, Side::Request, &bytes);
+        let in_a_stream = expected_length(Framing::RtuOverTcp, Side::Request, &bytes);
         assert_eq!(in_a_stream, Ok(Length::Unknown));
     }
 
     #[test]
-    fn the_reply_to_a_request_is_as_long_as_its_framing_makes_it() {
+    fn the_length_of_a_reply_depends_on_the_framing() {
         let request = Request::parse(&[3, 0, 0x6B, 0, 3]).unwrap();
         for (framing, length) in [
             (Framing::Rtu, 11),
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_answers_a_broadcast_or_a_device_told_to_listen_only() {
+    fn a_broadcast_and_force_listen_only_have_no_reply() {
         let write = Request::parse(&[6, 0, 1, 0, 3]).unwrap();
         assert_eq!(of_reply(Framing::Rtu, 0, &write, &[]), Length::Exactly(0));
         assert_eq!(of_reply(Framing::Tcp, 0, &write, &[]), Length::Exactly(12));

@@ -1,6 +1,6 @@
-//! A frame and the PDU in it, together: requests and responses with the
-//! functions that a user declares, how long frames are, and what answers a
-//! request that is refused. Nothing here keeps anything.
+//! Frames together with their PDUs: requests and responses with user-defined functions,
+//! lengths of frames, and the exception that answers a refused request. The functions keep
+//! no state.
 
 pub mod groups;
 pub mod length;
@@ -12,17 +12,17 @@ use crate::pdu::length::{self as pdu_length, Length};
 use crate::pdu::request::Request;
 use crate::pdu::response::Response;
 
-/// Who sends a PDU.
+/// The kind of a PDU.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Side {
-    /// The client.
+    /// Sent by a master or client.
     Request,
-    /// The server; exceptions are responses.
+    /// Sent by a server. Exceptions are responses.
     Response,
 }
 
 impl Side {
-    /// How long the PDU is that begins with these bytes.
+    /// The length of the PDU that begins with these bytes.
     pub fn length(self, pdu: &[u8], functions: &[Function]) -> Length {
         match self {
             Side::Request => pdu_length::request(pdu, functions),
@@ -31,11 +31,11 @@ impl Side {
     }
 }
 
-/// What [`Request::emit`] writes, if [`Request::parse_with`] takes it: a user's
-/// PDU is as long as was declared.
+/// Writes a request PDU with [`Request::emit`], and checks that the PDU of a user-defined
+/// function has the declared length. Returns the length of the PDU.
 ///
 /// # Errors
-/// As both say.
+/// Those of [`Request::emit`] and [`Request::parse_with`].
 pub fn emit_request(
     request: &Request,
     functions: &[Function],
@@ -48,10 +48,11 @@ pub fn emit_request(
     Ok(length)
 }
 
-/// What [`Response::emit`] writes, if [`Response::parse_with`] takes it.
+/// Writes a response PDU with [`Response::emit`], and checks that the PDU of a user-defined
+/// function has the declared length. Returns the length of the PDU.
 ///
 /// # Errors
-/// As both say.
+/// Those of [`Response::emit`] and [`Response::parse_with`].
 pub fn emit_response(
     response: &Response,
     functions: &[Function],
@@ -70,7 +71,7 @@ mod tests {
     use crate::pdu::custom::Rule;
 
     #[test]
-    fn a_users_pdu_that_is_not_as_declared_is_not_built() {
+    fn a_user_defined_pdu_without_its_declared_length_is_not_built() {
         let own = [Function {
             code: 0x55,
             request: Rule::Fixed(3),
@@ -80,14 +81,14 @@ mod tests {
         for (data, taken) in [(&[1, 2][..], true), (&[1], false), (&[1, 2, 3], false)] {
             let request = Request::Custom { function, data };
             assert_eq!(emit_request(&request, &own, &mut place).is_ok(), taken);
-            let nobodys = emit_request(&request, &[], &mut place);
-            assert_eq!(nobodys, Err(Status::ILLEGAL_FUNCTION));
+            let undeclared = emit_request(&request, &[], &mut place);
+            assert_eq!(undeclared, Err(Status::ILLEGAL_FUNCTION));
         }
         for (data, taken) in [(&[1, 2][..], true), (&[2, 2], false), (&[], false)] {
             let response = Response::Custom { function, data };
             assert_eq!(emit_response(&response, &own, &mut place).is_ok(), taken);
-            let nobodys = emit_response(&response, &[], &mut place);
-            assert_eq!(nobodys, Err(Status::INVALID_FUNCTION));
+            let undeclared = emit_response(&response, &[], &mut place);
+            assert_eq!(undeclared, Err(Status::INVALID_FUNCTION));
         }
     }
 }

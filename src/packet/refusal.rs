@@ -1,5 +1,5 @@
-//! A request frame, or why it is refused and the exception that says so to its
-//! sender.
+//! Decodes a request frame. For a request that is refused, builds the exception that answers
+//! it.
 
 use crate::error::Status;
 use crate::frame::Framing;
@@ -8,12 +8,12 @@ use crate::pdu::request::Request;
 use crate::pdu::response::Response;
 use crate::pdu::EXCEPTION;
 
-/// From whom to whom a PDU goes.
+/// The head of a request.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Head {
-    /// The transaction identifier of a TCP frame; 0 in others.
+    /// The transaction identifier of a TCP frame; 0 in other frames.
     pub transaction: u16,
-    /// The unit.
+    /// The unit id.
     pub unit: u8,
     /// The function code.
     pub function: u8,
@@ -30,10 +30,10 @@ impl Exception {
     /// The exception that answers a request with this head.
     ///
     /// # Errors
-    /// [`Status::BROADCAST_NOT_ALLOWED`]: nobody answers a broadcast;
-    /// [`Status::INVALID_ARGUMENT`] for a status that is no exception code;
-    /// [`Status::ILLEGAL_FUNCTION`] for a function from 0x80, which no
-    /// exception can name.
+    /// [`Status::BROADCAST_NOT_ALLOWED`] for a broadcast, which is never answered;
+    /// [`Status::INVALID_ARGUMENT`] if `status` is no exception code;
+    /// [`Status::ILLEGAL_FUNCTION`] for a function code from 0x80 on, which an exception
+    /// cannot contain.
     pub const fn new(framing: Framing, head: Head, status: Status) -> Result<Self, Status> {
         if !status.is_exception() {
             Err(Status::INVALID_ARGUMENT)
@@ -49,7 +49,8 @@ impl Exception {
         }
     }
 
-    /// Writes the frame; returns its length.
+    /// Writes the frame and returns its length in bytes. `end` is the last character of an
+    /// ASCII frame.
     ///
     /// # Errors
     /// [`Status::BUFFER_TOO_SMALL`].
@@ -65,23 +66,23 @@ impl Exception {
     }
 }
 
-/// Why a request frame is refused.
+/// A request frame that is refused.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Refusal {
-    /// The fault: of the frame, or the exception that answers the request.
+    /// The error of the frame, or the exception code for the request.
     pub status: Status,
-    /// Who asked for what, as soon as the frame is sound.
+    /// The head of the request; `None` if the frame has an error.
     pub head: Option<Head>,
-    /// What answers it; nothing answers a broadcast, or a frame that is not
-    /// sound.
+    /// The exception that answers the request; `None` for a broadcast, or if the frame has an
+    /// error.
     pub exception: Option<Exception>,
 }
 
-/// The request in a frame that is the whole of `bytes`, as
-/// [`Framing::parse`] and [`Request::parse_with`] find it.
+/// Decodes the request in the frame `bytes`, with [`Framing::parse`] and
+/// [`Request::parse_with`]. `end` is the last character of an ASCII frame.
 ///
 /// # Errors
-/// The fault, and the exception that answers it if one can.
+/// The error, with the exception that answers the request if there is one.
 pub fn request<'a>(
     framing: Framing,
     bytes: &'a mut [u8],
@@ -142,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_is_not_sound_has_no_answer() {
+    fn a_frame_with_an_error_is_not_answered() {
         let found = answer(Framing::Tcp, &[0, 1, 0, 0, 0, 6, 1]);
         assert_eq!(found, (Status::INCOMPLETE_FRAME, None));
         let found = answer(Framing::Rtu, &[1, 9, 0, 0]);
@@ -152,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_answers_a_broadcast_or_a_function_that_is_an_exceptions() {
+    fn a_broadcast_and_a_function_code_from_80_on_are_not_answered() {
         let found = answer(Framing::Ascii, b":0009F7\r\n");
         assert_eq!(found, (Status::ILLEGAL_FUNCTION, None));
         let found = answer(Framing::Tcp, &[0, 1, 0, 0, 0, 2, 0, 9]);
