@@ -100,7 +100,7 @@ impl Ticket {
     /// Microseconds until the request is due.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    pub(super) fn time_until_due(&self, now: u32, means: &mut impl Means) -> u32 {
+    pub(super) fn remaining_wait(&self, now: u32, means: &mut impl Means) -> u32 {
         let wait = match self.wait {
             0 => 0,
             wait => wait.saturating_sub(elapsed(now, self.since)),

@@ -195,7 +195,7 @@ impl<J: Job, const N: usize> Shared<J, N> {
         }
         let mut least = u32::MAX;
         let found = self.queue.iter().position(|job| {
-            let wait = job.ticket().time_until_due(now, means);
+            let wait = job.ticket().remaining_wait(now, means);
             least = least.min(wait);
             wait == 0
         });

@@ -188,7 +188,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
             };
             at += 1;
             let ticket = job.ticket();
-            let mut wait = ticket.time_until_due(now, &mut self.means);
+            let mut wait = ticket.remaining_wait(now, &mut self.means);
             if wait == 0 {
                 if ticket.is_sent() {
                     break Status::PENDING;
