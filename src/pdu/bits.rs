@@ -1,6 +1,6 @@
 //! Coils and discrete inputs: functions 01, 02, 05 and 0F.
 
-use super::fields::{counted, in_range, word};
+use super::fields::{check_end_and_range, counted, word};
 use super::limits::{MAX_READ_BITS, MAX_WRITE_BITS};
 use super::message::{Request, Response};
 use super::query::Form;
@@ -16,14 +16,14 @@ pub const WRITE_SINGLE_COIL: u8 = 0x05;
 /// Write Multiple Coils (clause 6.11).
 pub const WRITE_MULTIPLE_COILS: u8 = 0x0F;
 
-/// The value of a single coil that is on; off is 0.
+/// The value that switches a single coil on in a write; 0 switches it off.
 pub const ON: u16 = 0xFF00;
 
 const fn byte_count(quantity: u16) -> u8 {
     quantity.div_ceil(8) as u8
 }
 
-/// The requests, for [`Query::set`](super::query::Query::set).
+/// The forms of these requests, for [`Query::set`](super::query::Query::set).
 pub mod form {
     use super::{
         Form, MAX_READ_BITS, MAX_WRITE_BITS, READ_COILS as COILS, READ_DISCRETE_INPUTS,
@@ -42,7 +42,7 @@ pub mod form {
 
 pub(super) fn parse_read<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Status> {
     let (address, quantity) = (word(reader)?, word(reader)?);
-    in_range(reader, address, quantity, MAX_READ_BITS)?;
+    check_end_and_range(reader, address, quantity, MAX_READ_BITS)?;
     Ok(Request::ReadBits {
         function,
         address,
@@ -62,7 +62,7 @@ pub(super) fn parse_write_multiple<'a>(reader: &mut Reader<'a>) -> Result<Reques
     if data.len() != usize::from(byte_count(quantity)) {
         return Err(Status::ILLEGAL_DATA_VALUE);
     }
-    in_range(reader, address, quantity, MAX_WRITE_BITS)?;
+    check_end_and_range(reader, address, quantity, MAX_WRITE_BITS)?;
     Ok(Request::WriteMultipleCoils {
         address,
         quantity,
@@ -87,7 +87,7 @@ pub(super) fn parse_read_response<'a>(
     Ok(Response::ReadBits { function, data })
 }
 
-/// True for as many bytes as a read can bring.
+/// True if the response to a read can have this number of data bytes.
 pub(super) fn is_response_data(data: &[u8]) -> bool {
     !data.is_empty() && data.len() <= usize::from(byte_count(MAX_READ_BITS))
 }

@@ -1,44 +1,43 @@
-//! Functions that a user defines, whose lengths only the user knows.
+//! User-defined functions. The user declares the lengths of their PDUs.
 
 use super::{is_public, EXCEPTION};
 
-/// How long a PDU of a user's function is.
+/// The length of a PDU of a user-defined function.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Rule {
-    /// So many bytes, with the function code.
+    /// This number of bytes, including the function code.
     Fixed(u8),
-    /// The byte at this offset from the function code counts the bytes behind
-    /// it, after which `Counted::1` more follow.
+    /// The byte at offset `.0` from the function code is a byte count. After the bytes that
+    /// it counts, `.1` more bytes follow.
     Counted(u8, u8),
-    /// Until the line is silent; only framings that carry a length, or keep
-    /// time, can end it.
+    /// Up to the end of the frame: a silence in RTU, the end character in ASCII, the length in
+    /// the header in TCP.
     Silence,
 }
 
-/// A function that a user defines: its code and the lengths of its PDUs.
+/// A user-defined function: its code and the lengths of its PDUs.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Function {
-    /// The function code, 1 to 127; what the standard says of its own functions
-    /// stands.
+    /// The function code, 1 to 127. A code of the standard keeps the meaning of the standard.
     pub code: u8,
-    /// The request.
+    /// Length of the request.
     pub request: Rule,
-    /// The response.
+    /// Length of the response.
     pub response: Rule,
 }
 
-/// True for the codes that the standard leaves to users (clause 5).
+/// True for the function codes that the standard leaves to users (clause 5).
 pub const fn is_user_defined(function: u8) -> bool {
     matches!(function, 65..=72 | 100..=110)
 }
 
-/// True for a code that a user may give a meaning to: any that no function of
-/// the standard has.
+/// True for a function code that a user may define: 1 to 127, except the codes of the
+/// standard.
 pub(super) const fn is_free(function: u8) -> bool {
     function != 0 && function & EXCEPTION == 0 && !is_public(function)
 }
 
-/// What a user said of a function code.
+/// The declaration of a function code.
 pub(super) fn find(functions: &[Function], code: u8) -> Option<&Function> {
     functions.iter().find(|function| function.code == code)
 }

@@ -1,4 +1,4 @@
-//! What a serial line device tells of itself: functions 07, 08, 0B, 0C and 11.
+//! Status and diagnostics of a device on a serial line: functions 07, 08, 0B, 0C and 11.
 
 use super::fields::{byte, counted, word};
 use super::limits::MAX_EVENTS;
@@ -19,7 +19,7 @@ pub const REPORT_SERVER_ID: u8 = 0x11;
 
 /// The sub-functions of 08 (clause 6.8.1).
 pub mod sub_function {
-    /// Return Query Data: the data come back; any number of words.
+    /// Return Query Data: the response repeats the data, any number of words.
     pub const RETURN_QUERY_DATA: u16 = 0x00;
     /// Restart Communications Option; data FF00 also clears the event log.
     pub const RESTART_COMMUNICATIONS: u16 = 0x01;
@@ -51,7 +51,7 @@ pub mod sub_function {
     pub const CLEAR_OVERRUN_COUNTER: u16 = 0x14;
 }
 
-/// The data of a restart that also clears the event log.
+/// The data of Restart Communications Option that also clear the event log.
 pub const CLEAR_LOG: u16 = 0xFF00;
 
 /// True for a sub-function of the standard.
@@ -74,8 +74,7 @@ pub(super) fn parse_diagnostics<'a>(reader: &mut Reader<'a>) -> Result<Request<'
     }
 }
 
-/// A sub-function and whole words of data, of which all but Return Query Data
-/// have one.
+/// Reads a sub-function and its data: one word, or any number of words for Return Query Data.
 fn sub_function_and_data<'a>(reader: &mut Reader<'a>) -> Result<(u16, &'a [u8]), Status> {
     let sub_function = word(reader)?;
     if !is_known(sub_function) {
@@ -142,8 +141,8 @@ pub(super) fn emit_event_log(writer: &mut Writer, words: [u16; 3], log: &[u8]) {
     writer.put(log);
 }
 
-/// Some devices count only the id itself and send more behind it, so the count
-/// is kept beside all that follows.
+/// In some devices the byte count covers only the id, and more bytes follow. So the result
+/// contains the count and all bytes after it.
 pub(super) fn parse_server_id<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>, Status> {
     let count = byte(reader)?;
     let data = reader.rest();

@@ -1,6 +1,6 @@
 //! File records and FIFO queues: functions 14, 15 and 18.
 
-use super::fields::{counted, end, word};
+use super::fields::{counted, expect_end, word};
 use super::limits::MAX_FIFO;
 use super::message::{Request, Response};
 pub use super::records::{Reads, Record, Records, Writes, REFERENCE_TYPE};
@@ -16,13 +16,13 @@ pub const READ_FIFO_QUEUE: u8 = 0x18;
 
 pub(super) fn parse_read<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
     let bytes = counted(reader)?;
-    end(reader)?;
+    expect_end(reader)?;
     Ok(Request::ReadFileRecord(Reads::new(bytes)?))
 }
 
 pub(super) fn parse_write<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
     let bytes = counted(reader)?;
-    end(reader)?;
+    expect_end(reader)?;
     Ok(Request::WriteFileRecord(Writes::new(bytes)?))
 }
 

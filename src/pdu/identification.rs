@@ -1,5 +1,5 @@
-//! Encapsulated interface transport, and the device identification in it:
-//! function 2B.
+//! Encapsulated interface transport, and device identification, which it contains: function
+//! 2B.
 
 use super::fields::byte;
 use super::message::{Request, Response};
@@ -24,7 +24,7 @@ pub const EXTENDED: u8 = 3;
 /// Read device id code: one object.
 pub const INDIVIDUAL: u8 = 4;
 
-/// More follows, in a response.
+/// The value of the field "more follows" in a response if more objects follow; else it is 0.
 const MORE: u8 = 0xFF;
 
 pub(super) fn parse<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
@@ -44,7 +44,7 @@ pub(super) fn emit_identification(writer: &mut Writer, code: u8, object: u8) {
     emit(writer, MEI_READ_DEVICE_IDENTIFICATION, &[code, object]);
 }
 
-/// Emits a request or response of any MEI type.
+/// Writes a request or response of any MEI type.
 pub(super) fn emit(writer: &mut Writer, mei_type: u8, data: &[u8]) {
     writer.u8(ENCAPSULATED_INTERFACE_TRANSPORT);
     writer.u8(mei_type);
@@ -59,8 +59,8 @@ pub(super) fn parse_response<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>
     }
     let (code, conformity) = (byte(reader)?, byte(reader)?);
     let (more, next_object, count) = (byte(reader)?, byte(reader)?, byte(reader)?);
-    // Devices take the level, and the next object where none follows, lightly;
-    // nothing depends on them.
+    // The conformity level is not checked, nor the next object if none follows: some devices
+    // send wrong values there, and nothing depends on them.
     let is_right = match (code, more) {
         (BASIC..=EXTENDED, 0 | MORE) => true,
         (INDIVIDUAL, 0) => count == 1,

@@ -1,4 +1,4 @@
-//! How long a PDU is, as its first bytes tell.
+//! The length of a PDU, derived from its first bytes.
 
 use super::custom::{find, is_free, is_user_defined, Function, Rule};
 use super::diagnostics::sub_function::RETURN_QUERY_DATA;
@@ -6,39 +6,40 @@ use super::identification::MEI_READ_DEVICE_IDENTIFICATION;
 use super::{bits, diagnostics, files, identification, registers, EXCEPTION};
 use crate::error::Status;
 
-/// How long a PDU is.
+/// The length of a PDU or frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Length {
-    /// So many bytes. There is no PDU of more than
-    /// [`MAX_PDU`](super::limits::MAX_PDU), whatever its first bytes claim.
+    /// This number of bytes. It may be greater than [`MAX_PDU`](super::limits::MAX_PDU) if the
+    /// first bytes are wrong; there is no such PDU.
     Exactly(usize),
-    /// So many bytes at least, which will tell more.
+    /// At least this number of bytes. When that many have arrived, more may be known.
     AtLeast(usize),
-    /// Only the end of the frame tells: silence, or the framing's own length.
+    /// Only the end of the frame determines the length: a silence, an end character, or the
+    /// length in a header.
     Silence,
-    /// Nobody knows this function.
+    /// The function is unknown.
     Unknown,
 }
 
-/// A length that the byte at `offset` counts, with `more` bytes behind what it
-/// counts.
-fn counted(pdu: &[u8], offset: usize, more: usize) -> Length {
+/// The length of a PDU whose byte at `offset` is a byte count, with `more` bytes after the
+/// counted ones.
+fn counted_length(pdu: &[u8], offset: usize, more: usize) -> Length {
     match pdu.get(offset) {
         Some(count) => Length::Exactly(offset + 1 + usize::from(*count) + more),
         None => Length::AtLeast(offset + 1),
     }
 }
 
-/// The length of a PDU of a user's function.
+/// The length of a PDU of a user-defined function.
 pub(super) fn by_rule(pdu: &[u8], rule: Rule) -> Length {
     match rule {
         Rule::Fixed(length) => Length::Exactly(usize::from(length)),
-        Rule::Counted(offset, more) => counted(pdu, usize::from(offset), usize::from(more)),
+        Rule::Counted(offset, more) => counted_length(pdu, usize::from(offset), usize::from(more)),
         Rule::Silence => Length::Silence,
     }
 }
 
-/// The sub-functions of 08 carry one word, but for one.
+/// The length of a PDU of 08: one word of data, except for Return Query Data.
 fn diagnostics(pdu: &[u8]) -> Length {
     match pdu.get(1..3) {
         None => Length::AtLeast(3),
@@ -59,15 +60,17 @@ pub fn request(pdu: &[u8], functions: &[Function]) -> Length {
         | registers::READ_HOLDING_REGISTERS
         | registers::READ_INPUT_REGISTERS
         | registers::WRITE_SINGLE_REGISTER => Length::Exactly(5),
-        bits::WRITE_MULTIPLE_COILS | registers::WRITE_MULTIPLE_REGISTERS => counted(pdu, 5, 0),
+        bits::WRITE_MULTIPLE_COILS | registers::WRITE_MULTIPLE_REGISTERS => {
+            counted_length(pdu, 5, 0)
+        }
         registers::MASK_WRITE_REGISTER => Length::Exactly(7),
-        registers::READ_WRITE_MULTIPLE_REGISTERS => counted(pdu, 9, 0),
+        registers::READ_WRITE_MULTIPLE_REGISTERS => counted_length(pdu, 9, 0),
         diagnostics::READ_EXCEPTION_STATUS
         | diagnostics::GET_COMM_EVENT_COUNTER
         | diagnostics::GET_COMM_EVENT_LOG
         | diagnostics::REPORT_SERVER_ID => Length::Exactly(1),
         diagnostics::DIAGNOSTICS => diagnostics(pdu),
-        files::READ_FILE_RECORD | files::WRITE_FILE_RECORD => counted(pdu, 1, 0),
+        files::READ_FILE_RECORD | files::WRITE_FILE_RECORD => counted_length(pdu, 1, 0),
         files::READ_FIFO_QUEUE => Length::Exactly(3),
         identification::ENCAPSULATED_INTERFACE_TRANSPORT => match pdu.get(1) {
             None => Length::AtLeast(2),
@@ -81,9 +84,9 @@ pub fn request(pdu: &[u8], functions: &[Function]) -> Length {
     }
 }
 
-/// The length of the response PDU that begins with these bytes. That of Report
-/// Server ID is what it counts, the least that it may be: some devices count the id
-/// alone and send more after it.
+/// The length of the response PDU that begins with these bytes. For Report Server ID, it is
+/// the length by its byte count. The PDU may be longer, because in some devices the byte count
+/// covers only the id, and more bytes follow.
 pub fn response(pdu: &[u8], functions: &[Function]) -> Length {
     let Some(&code) = pdu.first() else {
         return Length::AtLeast(1);
@@ -97,7 +100,7 @@ pub fn response(pdu: &[u8], functions: &[Function]) -> Length {
         | diagnostics::GET_COMM_EVENT_LOG
         | diagnostics::REPORT_SERVER_ID
         | files::READ_FILE_RECORD
-        | files::WRITE_FILE_RECORD => counted(pdu, 1, 0),
+        | files::WRITE_FILE_RECORD => counted_length(pdu, 1, 0),
         bits::WRITE_SINGLE_COIL
         | bits::WRITE_MULTIPLE_COILS
         | registers::WRITE_SINGLE_REGISTER
@@ -126,7 +129,7 @@ pub fn response(pdu: &[u8], functions: &[Function]) -> Length {
     }
 }
 
-/// Device identification carries its length object by object.
+/// The length of a device identification, in which each object has its own length.
 pub(super) fn objects(pdu: &[u8]) -> Length {
     let mut end = 7;
     let Some(count) = pdu.get(6) else {
@@ -141,8 +144,8 @@ pub(super) fn objects(pdu: &[u8]) -> Length {
     Length::Exactly(end)
 }
 
-/// Says whether the length of a user's PDU agrees with its rule; a function
-/// that nobody declared may only be of the user's codes, and has any length.
+/// Checks the length of a PDU of a user-defined function. Without a `rule`, the function code
+/// must be one that the standard leaves to users, and any length is right.
 pub(super) fn check(pdu: &[u8], function: u8, rule: Option<Rule>) -> Result<(), Status> {
     if !is_free(function) {
         return Err(Status::ILLEGAL_FUNCTION);

@@ -1,27 +1,27 @@
 //! The limits of the standard (application protocol V1.1b3, clauses 4.1 and 6).
 
-/// The longest PDU (clause 4.1).
+/// Greatest length of a PDU in bytes (clause 4.1).
 pub const MAX_PDU: usize = 253;
 
-/// Most bits that 01 and 02 read (6.1, 6.2).
+/// Greatest number of bits that 01 and 02 read (6.1, 6.2).
 pub const MAX_READ_BITS: u16 = 2000;
-/// Most coils that 0F writes (6.11).
+/// Greatest number of coils that 0F writes (6.11).
 pub const MAX_WRITE_BITS: u16 = 1968;
-/// Most registers that 03, 04 and 17 read (6.3, 6.4, 6.17).
+/// Greatest number of registers that 03, 04 and 17 read (6.3, 6.4, 6.17).
 pub const MAX_READ_REGISTERS: u16 = 125;
-/// Most registers that 10 writes (6.12).
+/// Greatest number of registers that 10 writes (6.12).
 pub const MAX_WRITE_REGISTERS: u16 = 123;
-/// Most registers that 17 writes (6.17).
+/// Greatest number of registers that 17 writes (6.17).
 pub const MAX_READ_WRITE_REGISTERS: u16 = 121;
-/// Most events that 0C returns (6.10).
+/// Greatest number of events that 0C returns (6.10).
 pub const MAX_EVENTS: usize = 64;
-/// Most registers that 18 returns (6.18).
+/// Greatest number of registers that 18 returns (6.18).
 pub const MAX_FIFO: u16 = 31;
 /// The last record number of a file (6.14).
 pub const MAX_RECORD: u16 = 9999;
-/// Byte count of a request of 14, least and most (6.14).
+/// Least and greatest byte count of a request of 14 (6.14).
 pub const READ_FILE_BYTES: (usize, usize) = (0x07, 0xF5);
-/// Byte count of a response of 14, least and most (6.14).
+/// Least and greatest byte count of a response of 14 (6.14).
 pub const FILE_DATA_BYTES: (usize, usize) = (0x07, 0xF5);
-/// Byte count of 15, least and most (6.15).
+/// Least and greatest byte count of 15 (6.15).
 pub const WRITE_FILE_BYTES: (usize, usize) = (0x09, 0xFB);

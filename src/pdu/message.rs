@@ -1,11 +1,11 @@
-//! What request and response PDUs say. [`super::request`] and [`super::response`] read and
-//! write them, each family of functions by a file of its own.
+//! The content of request and response PDUs. [`super::request`] and [`super::response`] parse
+//! and write them, with one file for each family of functions.
 
 use super::objects::Objects;
 use super::records::{Reads, Records, Writes};
 
-/// A request PDU. Register data are as on the wire, high bytes first; bit data
-/// begin with the lowest bit of the first byte.
+/// A request PDU. Register data are in the order of the wire, high byte first. The first bit
+/// of bit data is the lowest bit of the first byte.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
 pub enum Request<'a> {
@@ -73,15 +73,15 @@ pub enum Request<'a> {
         mei_type: u8,
         data: &'a [u8],
     },
-    /// A function that a user defined.
+    /// A user-defined function.
     Custom {
         function: u8,
         data: &'a [u8],
     },
 }
 
-/// A response PDU. Register data are as on the wire, high bytes first; bit data
-/// begin with the lowest bit of the first byte.
+/// A response PDU. Register data are in the order of the wire, high byte first. The first bit
+/// of bit data is the lowest bit of the first byte.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
 pub enum Response<'a> {
@@ -111,12 +111,12 @@ pub enum Response<'a> {
         sub_function: u16,
         data: &'a [u8],
     },
-    /// 0B. The status word is FFFF while a program command is carried out.
+    /// 0B. The status word is FFFF while the device executes a program command.
     CommEventCounter {
         status: u16,
         events: u16,
     },
-    /// 0C. The latest event comes first.
+    /// 0C. The latest event is the first in `log`.
     CommEventLog {
         status: u16,
         events: u16,
@@ -129,7 +129,7 @@ pub enum Response<'a> {
         address: u16,
         quantity: u16,
     },
-    /// 11. The byte count, which some devices let end before the data do.
+    /// 11. In some devices, the byte count `count` covers only the front of `data`.
     ServerId {
         count: u8,
         data: &'a [u8],
@@ -158,12 +158,12 @@ pub enum Response<'a> {
         mei_type: u8,
         data: &'a [u8],
     },
-    /// The function of the request, without the highest bit, and the code.
+    /// The function code of the request, without the highest bit, and the exception code.
     Exception {
         function: u8,
         code: u8,
     },
-    /// A function that a user defined.
+    /// A user-defined function.
     Custom {
         function: u8,
         data: &'a [u8],

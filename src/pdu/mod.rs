@@ -1,8 +1,8 @@
-//! Protocol data units: a function code and its data, free of any framing
-//! (application protocol V1.1b3, clause 6).
+//! Protocol data units (PDUs): a function code and its data, without framing (application
+//! protocol V1.1b3, clause 6).
 //!
-//! One family of functions is one file. A request is built by one small
-//! function per function code, so that firmware carries what it calls.
+//! Each family of functions has its own file. Each function code has its own small function
+//! that builds the request, so that firmware contains only the ones that it calls.
 
 pub mod bits;
 pub mod custom;
@@ -22,10 +22,10 @@ pub mod reply;
 pub mod request;
 pub mod response;
 
-/// True for the functions of the standard that this module knows (clause 6).
+/// True for the function codes that the standard defines (clause 6).
 pub const fn is_public(function: u8) -> bool {
     matches!(function, 0x01..=0x08 | 0x0B | 0x0C | 0x0F..=0x11 | 0x14..=0x18 | 0x2B)
 }
 
-/// Set in the function code of an exception response (clause 7).
+/// The bit that is set in the function code of an exception response (clause 7).
 pub const EXCEPTION: u8 = 0x80;

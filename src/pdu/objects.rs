@@ -1,4 +1,4 @@
-//! The objects of a device identification as its PDU carries them (clause 6.21).
+//! The objects in the PDU of a device identification (clause 6.21).
 
 use super::fields::{byte, counted};
 use crate::bytes::Reader;
@@ -11,17 +11,17 @@ pub struct Objects<'a> {
     pub(super) bytes: &'a [u8],
 }
 
-/// The next object.
+/// Reads the id and the value of the next object.
 fn object<'a>(reader: &mut Reader<'a>) -> Result<(u8, &'a [u8]), Status> {
     let id = byte(reader)?;
     Ok((id, counted(reader)?))
 }
 
 impl<'a> Objects<'a> {
-    /// The `count` objects that these bytes are.
+    /// The `count` objects in `bytes`.
     ///
     /// # Errors
-    /// [`Status::ILLEGAL_DATA_VALUE`] if they are not just so many.
+    /// [`Status::ILLEGAL_DATA_VALUE`] unless `bytes` are exactly `count` objects.
     pub fn new(count: u8, bytes: &'a [u8]) -> Result<Self, Status> {
         let mut reader = Reader::new(bytes);
         for _ in 0..count {
@@ -34,12 +34,12 @@ impl<'a> Objects<'a> {
         }
     }
 
-    /// How many objects there are.
+    /// Number of objects.
     pub const fn count(&self) -> u8 {
         self.count
     }
 
-    /// The objects as sent: id, length and value of each.
+    /// The objects as bytes on the wire: id, length and value of each.
     pub const fn bytes(&self) -> &'a [u8] {
         self.bytes
     }

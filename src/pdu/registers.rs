@@ -1,6 +1,6 @@
 //! Holding and input registers: functions 03, 04, 06, 10, 16 and 17.
 
-use super::fields::{counted, in_range, within, word};
+use super::fields::{check_end_and_range, check_within, counted, word};
 use super::limits::{MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_REGISTERS};
 use super::message::{Request, Response};
 use super::query::{check_range, Form, Query};
@@ -20,7 +20,7 @@ pub const MASK_WRITE_REGISTER: u8 = 0x16;
 /// Read/Write Multiple Registers (clause 6.17).
 pub const READ_WRITE_MULTIPLE_REGISTERS: u8 = 0x17;
 
-/// The requests, for [`Query::set`].
+/// The forms of these requests, for [`Query::set`].
 pub mod form {
     use super::{
         Form, MAX_READ_REGISTERS, MAX_WRITE_REGISTERS, READ_HOLDING_REGISTERS,
@@ -39,16 +39,18 @@ pub mod form {
         Form::writes_registers(WRITE_MULTIPLE_REGISTERS, MAX_WRITE_REGISTERS);
 }
 
-/// Builds 16: the register becomes `(register & and) | (or & !and)`.
+/// Builds a request of 16: the register becomes
+/// `(register & and_mask) | (or_mask & !and_mask)`.
 pub fn mask_write(request: &mut Query, address: u16, and_mask: u16, or_mask: u16) -> Status {
     let status = request.set(Form::single(MASK_WRITE_REGISTER), address, and_mask);
     request.append_word(or_mask);
     status
 }
 
-/// Builds 17; the values to write are the sender's words. [`Status::OK`],
-/// [`Status::ILLEGAL_DATA_VALUE`] unless 1 to 125 registers are read and 1 to
-/// 121 written, or [`Status::ILLEGAL_DATA_ADDRESS`] if a range passes 65535.
+/// Builds a request of 17. The values to write are the sender's transmit words. Returns
+/// [`Status::ILLEGAL_DATA_VALUE`] unless 1 to 125 registers are read and 1 to 121 written,
+/// [`Status::ILLEGAL_DATA_ADDRESS`] if a range goes beyond address 65535, otherwise
+/// [`Status::OK`].
 pub fn read_write(
     request: &mut Query,
     read_address: u16,
@@ -69,7 +71,7 @@ pub fn read_write(
 
 pub(super) fn parse_read<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Status> {
     let (address, quantity) = (word(reader)?, word(reader)?);
-    in_range(reader, address, quantity, MAX_READ_REGISTERS)?;
+    check_end_and_range(reader, address, quantity, MAX_READ_REGISTERS)?;
     Ok(Request::ReadRegisters {
         function,
         address,
@@ -87,7 +89,7 @@ pub(super) fn parse_write_single<'a>(reader: &mut Reader) -> Result<Request<'a>,
 pub(super) fn parse_write_multiple<'a>(reader: &mut Reader<'a>) -> Result<Request<'a>, Status> {
     let (address, quantity) = (word(reader)?, word(reader)?);
     let data = values(reader, quantity)?;
-    in_range(reader, address, quantity, MAX_WRITE_REGISTERS)?;
+    check_end_and_range(reader, address, quantity, MAX_WRITE_REGISTERS)?;
     Ok(Request::WriteMultipleRegisters {
         address,
         quantity,
@@ -107,11 +109,11 @@ pub(super) fn parse_read_write<'a>(reader: &mut Reader<'a>) -> Result<Request<'a
     let (read_address, read_quantity) = (word(reader)?, word(reader)?);
     let (write_address, write_quantity) = (word(reader)?, word(reader)?);
     let data = values(reader, write_quantity)?;
-    // Both quantities before either range of addresses.
+    // Both quantities are checked before both ranges of addresses.
     let most = usize::from(MAX_READ_WRITE_REGISTERS);
-    within(usize::from(write_quantity), (1, most))?;
-    in_range(reader, read_address, read_quantity, MAX_READ_REGISTERS)?;
-    in_range(
+    check_within(usize::from(write_quantity), (1, most))?;
+    check_end_and_range(reader, read_address, read_quantity, MAX_READ_REGISTERS)?;
+    check_end_and_range(
         reader,
         write_address,
         write_quantity,
@@ -126,7 +128,7 @@ pub(super) fn parse_read_write<'a>(reader: &mut Reader<'a>) -> Result<Request<'a
     })
 }
 
-/// The counted data of `quantity` registers.
+/// Reads a byte count and the data of `quantity` registers.
 fn values<'a>(reader: &mut Reader<'a>, quantity: u16) -> Result<&'a [u8], Status> {
     let data = counted(reader)?;
     if data.len().is_multiple_of(2) && data.len() / 2 == usize::from(quantity) {
@@ -154,7 +156,7 @@ pub(super) fn parse_read_response<'a>(
     Ok(Response::ReadRegisters { function, data })
 }
 
-/// True for as many bytes as a read can bring.
+/// True if the response to a read can have this number of data bytes.
 pub(super) fn is_response_data(data: &[u8]) -> bool {
     let most = 2 * usize::from(MAX_READ_REGISTERS);
     !data.is_empty() && data.len() <= most && data.len().is_multiple_of(2)
@@ -167,14 +169,14 @@ pub(super) fn parse_write_single_response<'a>(reader: &mut Reader) -> Result<Res
     })
 }
 
-/// The response of 0F or 10, which writes at `most` so many.
+/// Parses a response of 0F or 10, which writes at most `most` coils or registers.
 pub(super) fn parse_write_multiple_response<'a>(
     function: u8,
     most: u16,
     reader: &mut Reader,
 ) -> Result<Response<'a>, Status> {
     let (address, quantity) = (word(reader)?, word(reader)?);
-    in_range(reader, address, quantity, most)?;
+    check_end_and_range(reader, address, quantity, most)?;
     Ok(Response::WriteMultiple {
         function,
         address,

@@ -1,5 +1,5 @@
-//! Request PDUs, whole: read by whoever receives one, written by whoever sends
-//! one. Data borrow from the bytes.
+//! Parses and writes complete request PDUs. The data of a parsed request borrow from its
+//! bytes.
 
 use super::fields::is_range;
 use super::files::{Reads, Writes};
@@ -16,26 +16,25 @@ use crate::FIRMWARE;
 use core::mem::discriminant;
 
 impl<'a> Request<'a> {
-    /// Reads a request PDU; functions from 65 to 72 and 100 to 110 are the
-    /// user's.
+    /// Parses a request PDU. The functions 65 to 72 and 100 to 110 are user-defined.
     ///
     /// # Errors
     /// The exception that a server answers: [`Status::ILLEGAL_FUNCTION`] for
     /// an unknown function or sub-function, [`Status::ILLEGAL_DATA_VALUE`] for
-    /// a length, quantity or value out of order,
-    /// [`Status::ILLEGAL_DATA_ADDRESS`] for addresses beyond 65535.
+    /// a wrong length, quantity or value, [`Status::ILLEGAL_DATA_ADDRESS`] for addresses beyond
+    /// 65535.
     pub fn parse(pdu: &'a [u8]) -> Result<Self, Status> {
         Request::parse_with(pdu, &[])
     }
 
-    /// As [`Request::parse`], with functions that a user declared; their
-    /// lengths are held to what was declared.
+    /// As [`Request::parse`], with declared user-defined functions, whose PDUs must have the
+    /// declared length.
     ///
     /// # Errors
     /// As [`Request::parse`].
     pub fn parse_with(pdu: &'a [u8], functions: &[custom::Function]) -> Result<Self, Status> {
         let mut reader = Reader::new(pdu);
-        // Changed where it stands, for moving it would take as long as reading.
+        // The variable is changed in place: moving it would cost as much time as parsing.
         let mut request = Request::read(pdu, &mut reader, functions);
         if (request.is_ok() && !reader.is_empty()) || pdu.len() > MAX_PDU {
             request = Err(Status::ILLEGAL_DATA_VALUE);
@@ -104,12 +103,12 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// Writes the PDU to the front of `pdu`; returns its length.
+    /// Writes the PDU to the front of `pdu` and returns its length in bytes.
     ///
     /// # Errors
-    /// What [`Request::parse`] says of such a request, so that nothing malformed
-    /// is ever sent; [`Status::BUFFER_TOO_SMALL`] if it does not fit.
-    // On a host, where it is called, so that of a known variant little is left.
+    /// The error that [`Request::parse`] returns for such a request, so that no malformed
+    /// request is sent; [`Status::BUFFER_TOO_SMALL`] if it does not fit.
+    // Inlined on a host, where the compiler then drops all variants but the one written.
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn emit(&self, pdu: &mut [u8]) -> Result<usize, Status> {
         let mut writer = Writer::new(pdu);
@@ -119,15 +118,15 @@ impl<'a> Request<'a> {
         }
         let length = writer.finish()?;
         let written = pdu.get(..length).unwrap_or_default();
-        // Firmware is small before it is fast.
-        if !FIRMWARE && self.is_in_order() {
+        // Not in firmware, where size matters more than speed.
+        if !FIRMWARE && self.is_known_valid() {
             debug_assert!(Request::parse(written).is_ok());
             return Ok(length);
         }
         let same = match self {
-            // A code beyond the user's ranges is the user's own will.
+            // The caller chose the function code, also outside the user-defined ranges.
             Request::Custom { function, .. } => custom::is_free(*function),
-            // No variant says what belongs to another.
+            // The content of the variant must not be that of another variant.
             _ => discriminant(&Request::parse(written)?) == discriminant(self),
         };
         if same {
@@ -137,10 +136,10 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// True for a common request that is seen at once to be as the standard has
-    /// it; of others, what is written is read back.
+    /// A quick check: true for a frequent request that is valid by the standard. Other
+    /// requests are checked by parsing the written PDU.
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    fn is_in_order(&self) -> bool {
+    fn is_known_valid(&self) -> bool {
         match *self {
             Request::ReadBits {
                 function,
@@ -286,8 +285,8 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// The length of the response PDU if the request succeeds, as far as the
-    /// request tells; 0 if there is no response.
+    /// The length of the response PDU if the request succeeds, as far as the request determines
+    /// it; [`Length::Exactly`] of 0 if there is no response.
     pub fn response_length(&self, functions: &[custom::Function]) -> Length {
         match *self {
             Request::ReadBits { quantity, .. } => {

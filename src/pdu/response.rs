@@ -1,5 +1,5 @@
-//! Response PDUs, whole: read by whoever receives one, written by whoever sends
-//! one. Data borrow from the bytes.
+//! Parses and writes complete response PDUs. The data of a parsed response borrow from its
+//! bytes.
 
 use super::fields::is_range;
 use super::files::{Records, Writes};
@@ -12,26 +12,25 @@ use crate::FIRMWARE;
 use core::mem::discriminant;
 
 impl<'a> Response<'a> {
-    /// Reads a response PDU; functions from 65 to 72 and 100 to 110 are the
-    /// user's.
+    /// Parses a response PDU. The functions 65 to 72 and 100 to 110 are user-defined.
     ///
     /// # Errors
-    /// [`Status::INVALID_FUNCTION`] for an unknown function,
-    /// [`Status::MALFORMED_REPLY`] for whatever else is out of order.
+    /// [`Status::INVALID_FUNCTION`] for an unknown function, [`Status::MALFORMED_REPLY`] for
+    /// all other errors.
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn parse(pdu: &'a [u8]) -> Result<Self, Status> {
         Response::parse_with(pdu, &[])
     }
 
-    /// As [`Response::parse`], with functions that a user declared; their
-    /// lengths are held to what was declared.
+    /// As [`Response::parse`], with declared user-defined functions, whose PDUs must have the
+    /// declared length.
     ///
     /// # Errors
     /// As [`Response::parse`].
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn parse_with(pdu: &'a [u8], functions: &[custom::Function]) -> Result<Self, Status> {
         let mut reader = Reader::new(pdu);
-        // Changed where it stands, for moving it would take as long as reading.
+        // The variable is changed in place: moving it would cost as much time as parsing.
         let mut response = Response::read(pdu, &mut reader, functions);
         let in_order = match response {
             Ok(_) => reader.is_empty() && pdu.len() <= MAX_PDU,
@@ -93,7 +92,7 @@ impl<'a> Response<'a> {
         }
     }
 
-    /// The function code, of an exception that of the request.
+    /// The function code; for an exception, that of the request.
     pub const fn function(&self) -> u8 {
         match *self {
             Response::ReadBits { function, .. }
@@ -118,12 +117,12 @@ impl<'a> Response<'a> {
         }
     }
 
-    /// Writes the PDU to the front of `pdu`; returns its length.
+    /// Writes the PDU to the front of `pdu` and returns its length in bytes.
     ///
     /// # Errors
-    /// What [`Response::parse`] says of such a response, so that nothing
-    /// malformed is ever sent; [`Status::BUFFER_TOO_SMALL`] if it does not fit.
-    // On a host, where it is called, so that of a known variant little is left.
+    /// The error that [`Response::parse`] returns for such a response, so that no malformed
+    /// response is sent; [`Status::BUFFER_TOO_SMALL`] if it does not fit.
+    // Inlined on a host, where the compiler then drops all variants but the one written.
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn emit(&self, pdu: &mut [u8]) -> Result<usize, Status> {
         let mut writer = Writer::new(pdu);
@@ -133,16 +132,16 @@ impl<'a> Response<'a> {
         }
         let length = writer.finish()?;
         let written = pdu.get(..length).unwrap_or_default();
-        // Firmware is small before it is fast.
-        if !FIRMWARE && self.is_in_order() {
+        // Not in firmware, where size matters more than speed.
+        if !FIRMWARE && self.is_known_valid() {
             debug_assert!(Response::parse(written).is_ok());
             return Ok(length);
         }
         let same = match self {
-            // A code beyond the user's ranges is the user's own will.
+            // The caller chose the function code, also outside the user-defined ranges.
             Response::Custom { function, .. } => custom::is_free(*function),
             Response::Exception { function, .. } if function & EXCEPTION != 0 => false,
-            // No variant says what belongs to another.
+            // The content of the variant must not be that of another variant.
             _ => discriminant(&Response::parse(written)?) == discriminant(self),
         };
         if same {
@@ -152,10 +151,10 @@ impl<'a> Response<'a> {
         }
     }
 
-    /// True for a common response that is seen at once to be as the standard has
-    /// it; of others, what is written is read back.
+    /// A quick check: true for a frequent response that is valid by the standard. Other
+    /// responses are checked by parsing the written PDU.
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    fn is_in_order(&self) -> bool {
+    fn is_known_valid(&self) -> bool {
         match *self {
             Response::ReadBits { function, data } => {
                 matches!(function, bits::READ_COILS | bits::READ_DISCRETE_INPUTS)
