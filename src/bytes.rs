@@ -18,20 +18,20 @@ pub fn move_to_front(bytes: &mut [u8], from: usize) {
 #[inline(always)]
 pub fn copy_words(to: &mut [u8], from: &[u8]) {
     let (words, places) = (from.as_chunks().0, to.as_chunks_mut().0);
-    let turned = |word| u16::from_be_bytes(word).to_ne_bytes();
+    let from_big_endian = |word| u16::from_be_bytes(word).to_ne_bytes();
     for (place, eight) in places
         .as_chunks_mut::<8>()
         .0
         .iter_mut()
         .zip(words.as_chunks().0)
     {
-        *place = eight.map(turned);
+        *place = eight.map(from_big_endian);
     }
     match (places.last_chunk_mut(), words.last_chunk::<8>()) {
-        (Some(place), Some(eight)) => *place = eight.map(turned),
+        (Some(place), Some(eight)) => *place = eight.map(from_big_endian),
         _ => {
             for (place, word) in places.iter_mut().zip(words) {
-                *place = turned(*word);
+                *place = from_big_endian(*word);
             }
         }
     }

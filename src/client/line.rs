@@ -15,7 +15,7 @@ pub trait Line<J> {
     const HAS_IDS: bool;
 
     /// Advances the requests to the time `now`, and returns one that has ended. `fresh` is
-    /// true in the first call of each poll; only that call reads new bytes.
+    /// true in the first call of each poll, when new bytes may have arrived.
     fn advance<const N: usize>(
         &mut self,
         shared: &mut Shared<J, N>,

@@ -149,7 +149,7 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     }
 
     /// Advances all requests to the time `now`, without waiting, and returns one request
-    /// that has ended. Call it with `fresh` true first, so that it reads from the port;
+    /// that has ended. Call it with `fresh` true first, because new bytes may have arrived;
     /// then with `fresh` false until it returns `None`.
     pub fn poll(&mut self, now: u32, fresh: bool) -> Option<J> {
         if self.shared.lent {
@@ -165,10 +165,10 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
         self.line.poll_delay(&self.shared, now)
     }
 
-    /// Cancels the first pending request for which `is` returns true, and returns the
+    /// Cancels the first pending request for which `matches` returns true, and returns the
     /// request; `None` if there is no such request.
-    pub fn cancel(&mut self, is: impl Fn(&J) -> bool) -> Option<J> {
-        let job = self.shared.withdraw(is)?;
+    pub fn cancel(&mut self, matches: impl Fn(&J) -> bool) -> Option<J> {
+        let job = self.shared.withdraw(matches)?;
         if job.ticket().is_sent() {
             self.line.release(Some(&job));
         }
@@ -184,7 +184,7 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     }
 
     /// Leaves the line to another user of the port until [`Client::take_back`]. Returns
-    /// false, and changes nothing, if a request is in flight or the line is lent already.
+    /// false, and changes nothing, if a request is in flight or another user has the line.
     pub fn lend(&mut self) -> bool {
         self.line.lend(&mut self.shared)
     }

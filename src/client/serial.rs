@@ -62,8 +62,8 @@ impl<P: Port, S: Means, J: Job, const N: usize> Client<Serial<P, S, J>, J, N> {
 }
 
 impl<P: Port, S: Means, J: Job> Serial<P, S, J> {
-    /// Reads and discards bytes that arrive while requests wait for a retry. Without this, a
-    /// program that sleeps until bytes arrive would wake up at once.
+    /// Reads and discards bytes that arrive while all requests only wait. If they stayed in
+    /// the port, a program that sleeps until bytes arrive would wake up at once.
     #[cold]
     #[inline(never)]
     fn drop_late_bytes<const N: usize>(&mut self, shared: &mut Shared<J, N>, now: u32) {

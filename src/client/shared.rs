@@ -60,9 +60,9 @@ impl<J, const N: usize> Shared<J, N> {
         self.queue.len() + usize::from(self.active.is_some())
     }
 
-    /// True if `is` returns true for a request that is queued or in flight.
-    pub fn holds(&self, is: impl Fn(&J) -> bool) -> bool {
-        self.active.as_ref().is_some_and(&is) || self.queue.iter().any(&is)
+    /// True if `matches` returns true for a request that is queued or in flight.
+    pub fn holds(&self, matches: impl Fn(&J) -> bool) -> bool {
+        self.active.as_ref().is_some_and(&matches) || self.queue.iter().any(&matches)
     }
 }
 
@@ -94,14 +94,17 @@ impl<J: Job, const N: usize> Shared<J, N> {
             && !(self.broadcasts && ticket.outline.may_be_broadcast())
         {
             Status::BROADCAST_NOT_ALLOWED
-        } else if self.has_ids && ticket.transaction != 0 && self.has(ticket.transaction) {
+        } else if self.has_ids
+            && ticket.transaction != 0
+            && self.has_transaction(ticket.transaction)
+        {
             Status::DUPLICATE_TRANSACTION
         } else {
             Status::PENDING
         }
     }
 
-    fn has(&self, transaction: u16) -> bool {
+    fn has_transaction(&self, transaction: u16) -> bool {
         let mut queue = self.queue.iter();
         queue.any(|job| job.ticket().transaction == transaction)
     }
@@ -114,13 +117,13 @@ impl<J: Job, const N: usize> Shared<J, N> {
         Some(job)
     }
 
-    /// Removes the first request for which `is` returns true, with the status
+    /// Removes the first request for which `matches` returns true, with the status
     /// [`Status::CANCELLED`].
-    pub fn withdraw(&mut self, is: impl Fn(&J) -> bool) -> Option<J> {
-        let mut job = if self.active.as_ref().is_some_and(&is) {
+    pub fn withdraw(&mut self, matches: impl Fn(&J) -> bool) -> Option<J> {
+        let mut job = if self.active.as_ref().is_some_and(&matches) {
             self.take_active()?
         } else {
-            let at = self.queue.iter().position(is)?;
+            let at = self.queue.iter().position(matches)?;
             self.remove(at)?
         };
         self.changed = true;

@@ -23,7 +23,7 @@ pub struct Unit {
     pub unit: u8,
     /// Status code of the last request that ended.
     pub status: u8,
-    /// False once `delay` is known to have passed since `last`.
+    /// `delay` may not have passed since `last` yet.
     tired: bool,
 }
 

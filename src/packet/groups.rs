@@ -8,7 +8,7 @@ use crate::pdu::files::WRITE_FILE_RECORD;
 use crate::pdu::files::{Reads, Record, Records, Writes, READ_FILE_RECORD, REFERENCE_TYPE};
 
 /// No record number: the responses of 14 contain only data.
-const NOWHERE: Record = Record {
+const NO_RECORD: Record = Record {
     file: 0,
     record: 0,
     length: 0,
@@ -26,7 +26,14 @@ pub fn record(side: Side, function: u8, groups: &[u8]) -> Option<(Record, &[u8],
         (READ_FILE_RECORD, Side::Response) => {
             let data = Records::new(groups).ok()?.iter().next()?;
             let length = (data.len() / 2) as u16;
-            Some((Record { length, ..NOWHERE }, data, 2 + data.len()))
+            Some((
+                Record {
+                    length,
+                    ..NO_RECORD
+                },
+                data,
+                2 + data.len(),
+            ))
         }
         (WRITE_FILE_RECORD, _) => {
             let (record, data) = Writes::new(groups).ok()?.iter().next()?;
@@ -119,7 +126,7 @@ mod tests {
                 0x14,
                 Record {
                     length: 2,
-                    ..NOWHERE
+                    ..NO_RECORD
                 },
                 &data,
             ),
@@ -172,11 +179,17 @@ mod tests {
                 500,
                 Status::ILLEGAL_DATA_VALUE,
             ),
-            (Side::Response, 0x14, NOWHERE, 3, Status::ILLEGAL_DATA_VALUE),
             (
                 Side::Response,
                 0x14,
-                NOWHERE,
+                NO_RECORD,
+                3,
+                Status::ILLEGAL_DATA_VALUE,
+            ),
+            (
+                Side::Response,
+                0x14,
+                NO_RECORD,
                 510,
                 Status::ILLEGAL_DATA_VALUE,
             ),

@@ -22,8 +22,8 @@ impl<P: Port, S: Means> Tcp<P, S> {
         self.start = 0;
     }
 
-    /// As [`Tcp::find`], but finds only the most frequent case: a complete, right response to
-    /// the first request in the queue, which is a read.
+    /// As [`Tcp::find`], but finds only the most frequent response: a complete, right one to
+    /// the first request in the queue, if that request is a read.
     #[inline]
     pub(super) fn find_read<J: Job, const N: usize>(
         &mut self,

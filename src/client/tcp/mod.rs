@@ -135,8 +135,8 @@ impl<P: Port, S: Means> Tcp<P, S> {
         None
     }
 
-    /// Ends the request that [`Tcp::advance_queue`] found at the index `at`. If its time is over, the
-    /// port is read first, at most `reads_left` times.
+    /// Ends the request that [`Tcp::advance_queue`] found at the index `at`. If the time of
+    /// the request is over, reads the port first, as long as `reads_left` is not 0.
     #[cold]
     fn conclude<J: Job, const N: usize>(
         &mut self,
@@ -392,8 +392,8 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
         if shared.queue.is_empty() {
             return None;
         }
-        // Bytes are read also while requests only wait. Otherwise a program that waits for
-        // bytes in select would wake up at once.
+        // Bytes are read also while all requests only wait. If they stayed in the port, a
+        // program that waits for bytes in select would wake up at once.
         let mut fresh = fresh && (self.flying > 0 || shared.delay(now) > 0);
         loop {
             if self.start < self.end {
