@@ -47,8 +47,8 @@ impl Status {
     pub const NOT_INITIALISED: Status = Status(0xEA);
     /// The request is in progress. Call poll again.
     pub const PENDING: Status = Status(0xEB);
-    /// The request was not sent: for as long as the response timeout, the line was not silent
-    /// or the port accepted no bytes.
+    /// The request was not sent, or only partly: for as long as the response timeout, the line
+    /// was not silent, or the port did not accept or did not flush the bytes.
     pub const LINE_BUSY: Status = Status(0xEC);
     /// The caller cancelled the request.
     pub const CANCELLED: Status = Status(0xED);

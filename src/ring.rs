@@ -54,9 +54,9 @@ impl<'a> Ring<'a> {
         Ring { bytes, positions }
     }
 
-    /// The index after `place`, which is 0 at the end of the storage.
-    fn after(&self, place: Place) -> Place {
-        let next = place.wrapping_add(1);
+    /// The index after `index`, which is 0 at the end of the storage.
+    fn next_index(&self, index: Place) -> Place {
+        let next = index.wrapping_add(1);
         if usize::from(next) >= self.bytes.len() {
             0
         } else {
@@ -68,7 +68,7 @@ impl<'a> Ring<'a> {
     /// the writer may call this.
     pub fn put(&self, byte: u8) -> bool {
         let head = self.positions.head.load(Ordering::Relaxed);
-        let next = self.after(head);
+        let next = self.next_index(head);
         // `Acquire`: the reader has read the byte at `head` before it is overwritten.
         if next != self.positions.tail.load(Ordering::Acquire) {
             if let Some(place) = self.bytes.get(usize::from(head)) {
@@ -107,7 +107,7 @@ impl<'a> Ring<'a> {
                 break;
             };
             *place = byte.load(Ordering::Relaxed);
-            tail = self.after(tail);
+            tail = self.next_index(tail);
             count += 1;
         }
         self.positions.tail.store(tail, Ordering::Release);

@@ -38,7 +38,7 @@ pub const ASCII_SILENCE: u32 = millis(1000);
 
 /// Time until the next attempt to write, in microseconds, after a port did not accept
 /// all bytes.
-const FULL_PORT: u32 = millis(1);
+const WRITE_RETRY_DELAY: u32 = millis(1);
 
 /// A client on a [`Line`], for up to `N` requests that are queued or in flight.
 #[repr(C)]

@@ -73,7 +73,7 @@ impl<'a> Reads<'a> {
         let mut exist = true;
         while !reader.is_empty() {
             let (record, exists) = next_record(&mut reader)?;
-            let answer = answer_length(record.length);
+            let answer = sub_response_length(record.length);
             room = room.checked_sub(answer).ok_or(Status::ILLEGAL_DATA_VALUE)?;
             exist &= exists;
         }
@@ -94,13 +94,13 @@ impl<'a> Reads<'a> {
 
     /// Length of the response PDU in bytes.
     pub fn response_length(&self) -> usize {
-        let answers = self.iter().map(|record| answer_length(record.length));
+        let answers = self.iter().map(|record| sub_response_length(record.length));
         2 + answers.sum::<usize>()
     }
 }
 
 /// Length in bytes of a sub-response with `records` records.
-fn answer_length(records: u16) -> usize {
+fn sub_response_length(records: u16) -> usize {
     usize::from(records).saturating_mul(2).saturating_add(2)
 }
 

@@ -429,6 +429,6 @@ impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
     }
 
     fn delay(&mut self, _: u32) -> Option<u32> {
-        (self.sent < self.filled).then_some(super::FULL_PORT)
+        (self.sent < self.filled).then_some(super::WRITE_RETRY_DELAY)
     }
 }
