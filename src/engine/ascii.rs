@@ -1,5 +1,5 @@
-//! Finds the reply among the characters of an ASCII line. Every frame begins with a
-//! colon, so what stands in front of one is noise.
+//! Finds the reply among the received characters of an ASCII line. Every frame begins with a
+//! colon; characters before a colon are noise.
 
 use super::{Count, Engine, Request, Seen, Storage, Verdict};
 use crate::error::Status;
@@ -7,23 +7,23 @@ use crate::frame::ascii::{self, find};
 use crate::frame::rtu;
 use crate::pdu::EXCEPTION;
 
-/// Characters of a frame around its unit and PDU: colon, LRC, and the two that end it.
+/// Characters around unit and PDU: colon, two of the LRC, CR and the delimiter.
 const AROUND: u8 = 5;
 
-/// Characters of the frame of a PDU of `length` bytes.
+/// How many characters the frame of a PDU of `length` bytes has.
 pub fn frame_length(length: u8) -> u16 {
     2 * (u16::from(length) + 1) + u16::from(AROUND)
 }
 
-/// Bytes of unit and PDU in a frame of so many characters.
+/// How many bytes of unit and PDU a frame of so many characters carries.
 pub fn content(characters: u16) -> u16 {
     (characters - u16::from(AROUND)) / 2
 }
 
 impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
-    /// Looks for the reply among what has arrived, in ASCII frames that `delimiter` ends.
-    /// Leaves it at the front, decoded: unit and PDU, then as many characters as its frame
-    /// has more.
+    /// Searches the received characters for the reply in an ASCII frame that ends with
+    /// `delimiter`. Leaves the reply decoded at the front of the buffer: unit and PDU, followed
+    /// by the remaining characters of its frame.
     pub fn search_ascii(&mut self, delimiter: u8) -> bool {
         let mut front = S::Count::ZERO;
         let found = loop {
@@ -45,14 +45,14 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         };
         self.drop_front(front);
         if !found && self.end == self.storage.room() && self.held == S::Count::ZERO {
-            // A frame has begun that the buffer cannot hold.
+            // The frame is too long for the buffer.
             self.see(Seen::TOO_LONG);
             self.end = S::Count::ZERO;
         }
         found
     }
 
-    /// Notes characters that are no frame.
+    /// Notes that characters outside of a frame were skipped.
     fn pass_characters(&mut self, count: usize) {
         if count > 0 {
             self.passed = 1;
@@ -65,7 +65,7 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         let content = match ascii::parse(frame, delimiter) {
             Ok(adu) => S::Count::of(adu.pdu.len() + rtu::PDU),
             Err(Status::INVALID_CRC) => {
-                // The unit stands decoded in front.
+                // The unit has been decoded to the front of the frame.
                 if self.storage.byte(front) == self.unit {
                     self.see(Seen::BAD_CRC);
                 }
@@ -77,7 +77,8 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             }
         };
         let function = self.storage.byte(front + 1u8.into()) & !EXCEPTION;
-        // As many bytes as an RTU frame has: LRC, and one character.
+        // The length of an RTU frame of this content: the LRC and one character stand for
+        // the CRC.
         let whole = content + rtu::CRC.into();
         let what = if self.storage.byte(front) != self.unit {
             Seen::OTHER_UNIT

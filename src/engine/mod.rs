@@ -1,18 +1,20 @@
-//! One request and its reply on a serial line, moved on by `poll`: of the master, and of
-//! the client, whose requests bring their framing along (see `request`).
+//! Sends one request on a serial line and finds its reply. `poll` moves the request on.
 //!
-//! A reply is found, not assumed: noise, frames of other units, late replies and a
-//! local echo in front of it cost nothing but their own time (see `search`).
+//! The master and the client's serial lines use this engine. The client's requests choose
+//! their framing, RTU or ASCII (see `spec`).
 //!
-//! What RTU cannot tell apart: a late reply of the same unit, function and
-//! length to an earlier request, or a late exception to the same function,
-//! looks like the reply. Two rules keep such a reply from being delivered. After
-//! a request without a right reply, the line is left alone for the quiet time
-//! before the next request. And the next reply of that unit is on probation (see
-//! `receive`).
+//! The engine searches the received bytes for the reply (see `rtu`, `ascii`). Noise, frames
+//! of other units, late replies and a local echo before the reply do no harm.
 //!
-//! A microcontroller's compiler is kept from inlining the steps: each has few
-//! values in use at a time, so they stay in registers, and the code is small.
+//! RTU frames carry no transaction number. A late reply to an earlier request looks like the
+//! reply if unit, function and length are the same, and a late exception looks like the reply
+//! if the function is the same. Two rules keep late replies from being delivered:
+//! - After a request without a right reply, the engine waits for the quiet time before it
+//!   sends the next request.
+//! - The next reply of that unit is on probation (see `receive`).
+//!
+//! `inline(never)` keeps the steps apart in firmware. Each step then needs few values at a
+//! time, which fit into the registers, and the code is small.
 
 pub mod ascii;
 mod plain;
@@ -32,105 +34,106 @@ pub use storage::{Buffers, Count, Counter, Frame, Storage, Words, COUNTERS};
 
 use crate::frame::checksum::Crc16;
 
-/// The unit that every slave listens to (serial line guide 2.2).
+/// The unit address of a broadcast (serial line guide V1.02, 2.2).
 pub const BROADCAST: u8 = 0;
 
-/// Where a request stands, in this order.
+/// The phase of a request. The phases follow each other in this order.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Hash, Debug)]
 #[repr(u8)]
 enum Phase {
-    /// There is none.
+    /// No request is pending.
     Idle,
-    /// Waits for the line to be silent.
+    /// Waits until the line is silent.
     Gap,
-    /// Is handed to the port; the driver is on.
+    /// Writes the frame to the port. The driver is on.
     Send,
-    /// Waits for the port to drain; the driver is on.
+    /// Waits until the port has sent the last bit. The driver is on.
     Flush,
-    /// The driver is held on a little longer.
+    /// Keeps the driver on for the post-flush hold.
     Hold,
     /// Waits for the reply.
     Reply,
-    /// The slaves carry out a broadcast.
+    /// Gives the slaves time to carry out a broadcast.
     Turnaround,
 }
 
-/// Whether the reply to the request under way may be a late one.
+/// Whether the reply to the pending request may be a late reply.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[repr(u8)]
 enum Probation {
-    /// It may not.
+    /// No late reply is expected.
     Off,
-    /// It may.
+    /// The next reply may be late.
     On,
-    /// It may, and one was held.
+    /// The next reply may be late, and one reply is or was held.
     Held,
 }
 
-/// One request and its reply, over the port and in the storage it was given.
-// In this order, small fields first: what lies far from the start of an object
-// costs a Cortex-M0 and an AVR an instruction more at each access.
+/// One request and its reply, over a port and in the caller's storage.
+// Small fields come first: a Cortex-M0 and an AVR need one more instruction to reach a field
+// far from the start of an object.
 #[derive(Clone, Hash, Debug)]
 #[repr(C)]
 pub struct Engine<P, S: Storage, Q> {
     phase: Phase,
-    /// The phase began with the last poll; its time is that of the next.
+    /// The phase began in the last poll. Its time starts with the next look at the clock.
     stamp: bool,
     /// The last poll found nothing to do.
     waiting: bool,
-    /// Whom the request is for.
+    /// The unit that the request is sent to.
     pub(crate) unit: u8,
     retries: u8,
-    /// The exception code of the last reply; 0 if it was none.
+    /// The exception code of the last reply; 0 if the reply was no exception.
     pub(crate) exception: u8,
     /// See [`Request::reply_length`].
     length: S::Count,
-    /// Bytes in the frame buffer.
+    /// How many bytes the frame buffer holds.
     end: S::Count,
-    /// How many of these were sent, or taken into the CRC.
+    /// How many of these bytes were sent, or are part of `crc`.
     done: S::Count,
-    /// How many bytes the candidate at the front of the buffer needs at least; of a reply
-    /// that was found, the length of its frame.
+    /// The least length of the candidate at the front of the buffer. Once the reply is
+    /// found: the length of its frame.
     least: S::Count,
-    /// Bytes of a held reply, which the storage has set aside.
+    /// Length of the held reply, which the storage has set aside; 0 if none is held.
     pub(crate) held: S::Count,
-    /// Whether the next reply may be a late one.
+    /// Whether the next reply may be a late reply.
     probation: Probation,
-    /// The unit that did not answer its last request; 0 if every unit did.
+    /// The unit that did not answer its last request; 0 if there is none.
     late_unit: u8,
-    /// The last request went without a right reply, which may still come.
+    /// The last request got no right reply. Its reply may still come.
     late: bool,
-    /// The request itself is expected to come back first.
+    /// The echo of the request is expected before the reply.
     pub(crate) echo: bool,
-    /// Nothing has arrived since the bytes were last looked through.
+    /// No byte has arrived since the received bytes were last searched for a reply after an
+    /// incomplete candidate.
     skimmed: bool,
-    /// The most telling thing that was passed over.
+    /// The most severe fault among the skipped bytes.
     seen: Seen,
-    /// Frames with a right CRC that were passed over.
+    /// How many skipped frames had a right CRC.
     foreign: u8,
-    /// Bytes passed over since a frame ended, at most `MIN_FRAME`.
+    /// How many bytes were skipped since the last frame ended, at most `MIN_FRAME`.
     passed: u8,
-    /// What they are if they turn out to be a frame.
+    /// The fault to note if the skipped bytes turn out to be a frame.
     passed_as: Seen,
-    /// What the caller lends.
+    /// The caller's frame buffer, words and counters.
     pub storage: S,
-    /// When the phase began.
+    /// Time at which the phase began.
     since: u32,
-    /// How long it may last.
+    /// How long the phase may last.
     wait: u32,
-    /// When the line was last seen busy.
+    /// Time at which the line was last in use.
     last_byte: u32,
-    /// The time that the poll under way was told.
+    /// The time of the current poll.
     now: u32,
-    /// The CRC of the bytes since a frame ended: of those passed over, and of these
-    /// and the first `done` of the buffer.
+    /// CRC of the bytes skipped since the last frame ended. `crc` continues it over the first
+    /// `done` bytes of the buffer.
     crc_passed: Crc16,
     crc: Crc16,
-    /// How the CRC of what was passed over weighs behind a reply; 0 if not reckoned.
+    /// Factor that carries `crc_passed` over the length of a reply; `RESIDUE` until computed.
     weight: Crc16,
     /// The byte stream.
     pub port: P,
     pub(crate) request: Q,
-    /// How requests behave.
+    /// Times and options of the requests.
     pub settings: Settings,
 }

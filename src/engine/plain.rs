@@ -1,5 +1,5 @@
-//! The master's requests: one of ten functions, in RTU frames. The length of the reply
-//! is known as soon as the request is sent.
+//! The master's requests: one of ten functions, in RTU frames. The request determines the
+//! length of its reply.
 
 use super::search::EXCEPTION_FRAME;
 use super::{Engine, Request, Seen, Verdict, Words};
@@ -9,7 +9,7 @@ use crate::pdu::query::Query;
 use crate::pdu::EXCEPTION;
 use crate::FIRMWARE;
 
-/// Bytes of a frame around its PDU.
+/// Bytes of a frame around its PDU: unit and CRC.
 const AROUND_PDU: u8 = rtu::OVERHEAD as u8;
 
 impl<P, S: Words> Request<P, S> for Query {
@@ -68,7 +68,7 @@ impl<P, S: Words> Request<P, S> for Query {
             let known = (have - 1).min(engine.request.head_length());
             if agrees(engine, front, known) {
                 let length = engine.request.length() + AROUND_PDU;
-                // Until it is whole, it may yet turn out to be the reply.
+                // Until the echo is complete, the bytes may still turn out to be the reply.
                 return if length > have { have + 1 } else { length };
             }
         }
@@ -98,8 +98,9 @@ impl<P, S: Words> Request<P, S> for Query {
         }
         let is_echo = cfg!(feature = "echo") && engine.echo;
         let is_read = engine.request.is_read();
-        // A read's head need not be compared, which takes an AVR 100 cycles. A reply may be
-        // shorter than the head, and stand at the end of the buffer.
+        // A read's reply repeats nothing of the request, so it is not compared, which would
+        // take an AVR 100 cycles. A reply at the end of the buffer may be shorter than the
+        // head.
         let head = engine.request.head_length();
         let agrees =
             (is_echo || !is_read) && engine.end - front > head && agrees(engine, front, head);
@@ -115,7 +116,7 @@ impl<P, S: Words> Request<P, S> for Query {
     }
 }
 
-/// Writes the frame of the request, whatever it is.
+/// Writes the frame of any request.
 #[inline(never)]
 fn write_any<P, S: Words>(engine: &mut Engine<P, S, Query>) {
     let mut end = engine.request.head_length() + 1;
@@ -138,7 +139,7 @@ fn write_any<P, S: Words>(engine: &mut Engine<P, S, Query>) {
     engine.append_crc(end);
 }
 
-/// True if the `count` bytes behind the unit at `front` are the request's.
+/// True if the `count` bytes after the unit at `front` are equal to the request's.
 #[cfg_attr(target_os = "none", inline(never))]
 fn agrees<P, S: Words>(engine: &Engine<P, S, Query>, front: u8, count: u8) -> bool {
     let bytes = engine.storage.slice(front + 1, count);

@@ -8,7 +8,7 @@ use crate::port::Port;
 use crate::time::{elapsed, has_elapsed, LONGEST};
 
 impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
-    /// No request yet.
+    /// An engine without a request.
     pub const fn new(port: P, storage: S) -> Self {
         Engine {
             phase: Phase::Idle,
@@ -45,35 +45,34 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         }
     }
 
-    /// True while a request is under way.
+    /// True while a request is pending.
     pub fn is_pending(&self) -> bool {
         self.phase != Phase::Idle
     }
 
-    /// True if the last poll found nothing to do and the driver is off, so
-    /// that the caller may do something else for a while.
+    /// True if the last poll found nothing to do and the driver is off. The caller may do
+    /// something else for a while.
     pub const fn is_waiting(&self) -> bool {
         self.waiting
     }
 
-    /// The request, which [`Engine::start`] sends.
+    /// The request that [`Engine::start`] sends.
     pub fn request(&mut self) -> &mut Q {
         &mut self.request
     }
 
-    /// The raw exception code of the last reply; 0 if it was none.
+    /// The raw exception code of the last reply; 0 if the reply was no exception.
     pub const fn exception_code(&self) -> u8 {
         self.exception
     }
 
-    /// Forgets the outcome of the last request.
+    /// Clears the outcome of the last request.
     pub fn forget(&mut self) {
         self.exception = 0;
     }
 
-    /// Moves the clock's zero to `now`; what is longer ago than `longest` counts as
-    /// that long ago. For model checkers, to which two objects are equal if they
-    /// will behave alike.
+    /// Makes `now` the zero of the clock. Times before `now - longest` become `now - longest`.
+    /// For model checkers: two engines that will behave alike become equal.
     #[doc(hidden)]
     pub fn rebase(&mut self, now: u32, longest: u32) {
         for time in [&mut self.since, &mut self.last_byte, &mut self.now] {
@@ -81,8 +80,8 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         }
     }
 
-    /// Completes a frame to be sent, of which `length` bytes are in the frame buffer, with
-    /// its CRC.
+    /// Appends the CRC to the `length` bytes in the frame buffer, and makes them the frame to
+    /// send.
     #[inline(always)]
     pub(crate) fn append_crc(&mut self, length: S::Count) {
         let [low, high] = crc16(self.storage.bytes(S::Count::ZERO, length)).to_bytes();
@@ -91,8 +90,8 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         self.set_frame_length(length + rtu::CRC.into());
     }
 
-    /// Writes the frame of the request if that is a function code and two words. For hosts:
-    /// such requests are most, and this costs half.
+    /// Writes the frame of a request whose PDU is a function code and two words. On hosts
+    /// only: most requests are of this form, and this function takes half the time.
     #[inline(always)]
     pub(crate) fn write_short(&mut self, words: [u8; 4]) {
         let frame = rtu::short(self.unit, self.request.function(), words);
@@ -110,7 +109,7 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         self.done = S::Count::ZERO;
     }
 
-    /// Enters a phase that lasts `wait`, from the next look at the clock on.
+    /// Enters a phase that may last `wait` microseconds from the next look at the clock on.
     pub(super) fn enter(&mut self, phase: Phase, wait: u32) {
         self.phase = phase;
         self.wait = wait;
@@ -122,34 +121,34 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         Status::PENDING
     }
 
-    /// Notes the time `now`, and starts the time of a phase that just began.
+    /// Stores the time `now`, and starts the time of a phase that has just begun.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn look_at_clock(&mut self, now: u32) {
         self.now = now;
         if self.stamp {
             self.stamp = false;
             self.since = now;
-            // The silence is measured from the end of our request. Before a
-            // request it is measured from the last byte received.
+            // The silence is measured from the end of our request; before a request, from the
+            // last received byte.
             if self.phase != Phase::Gap {
                 self.last_byte = now;
             }
         }
     }
 
-    /// True once the phase has lasted as long as it may.
+    /// True once the time of the phase has expired.
     pub(super) fn is_over(&self) -> bool {
         self.has_passed(self.wait, false)
     }
 
-    /// True once the line has been silent for `time`.
+    /// True once the line has been silent for `time` microseconds.
     #[inline(always)]
     pub(super) fn is_silent(&self, time: u32) -> bool {
         self.has_passed(time, true)
     }
 
-    /// True once `time` has passed since the line was last busy, or since the phase
-    /// began. (One function: 32 bits are much work for an AVR.)
+    /// True once `time` microseconds have passed since the line was last in use, or since the
+    /// phase began. One function does both, because 32-bit arithmetic is large on an AVR.
     #[cfg_attr(target_os = "none", inline(never))]
     fn has_passed(&self, time: u32, since_last_byte: bool) -> bool {
         let since = if since_last_byte {
@@ -160,8 +159,8 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         has_elapsed(time, self.now, since)
     }
 
-    /// What a line that is not silent, or a port that does not move, makes of a
-    /// request.
+    /// The status of a request that cannot go on, because the line is not silent or the port
+    /// accepts nothing: `PENDING`, or `LINE_BUSY` once the phase has expired.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn stalled(&self) -> Status {
         if self.is_over() {
@@ -173,26 +172,26 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
 }
 
 impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
-    /// Says that the line was busy just now, so the gap counts from here.
+    /// Notes that the line is in use now. The gap counts from now.
     pub fn line_used(&mut self) {
         self.last_byte = self.port.micros();
     }
 
-    /// Says that the line was used at that time, by the clock of the port. The gap
-    /// counts from then, unless the line was used later.
+    /// Notes that the line was in use at `time`, by the clock of the port. The gap counts from
+    /// `time`, unless the line was in use later.
     pub fn line_used_at(&mut self, time: u32) {
         if time.wrapping_sub(self.last_byte) < LONGEST {
             self.last_byte = time;
         }
     }
 
-    /// When the line was last seen in use, by the clock of the port.
+    /// The time at which the line was last in use, by the clock of the port.
     pub fn last_use(&self) -> u32 {
         self.last_byte
     }
 
-    /// Moves the request on to the time `now`, without waiting:
-    /// [`Status::PENDING`] until it has ended, then how.
+    /// Does what the request has to do at the time `now`, without waiting. Returns
+    /// [`Status::PENDING`] until the request has ended, then its status.
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn poll(&mut self, now: u32) -> Status {
         self.waiting = false;
@@ -213,8 +212,8 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         status
     }
 
-    /// Gives the request up, with the driver off. Bytes of it may be on the
-    /// wire, and a whole one may be answered late.
+    /// Cancels the request and switches the driver off. If the request was sent completely,
+    /// its reply may still come.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn cancel(&mut self) {
         if self.phase > Phase::Gap {
@@ -226,7 +225,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         self.end();
     }
 
-    /// Ends the request, with the driver off.
+    /// Ends the request and switches the driver off.
     #[cfg_attr(target_os = "none", inline(never))]
     fn end(&mut self) {
         self.take_back();
@@ -237,9 +236,9 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         self.waiting = false;
     }
 
-    /// How long, in microseconds from `now`, poll will find nothing to do unless
-    /// a byte arrives; the greatest value if there is no request. A phase that just
-    /// began counts its time from this call, so the caller may sleep that long.
+    /// Microseconds from `now` for which poll will find nothing to do unless a byte arrives;
+    /// `u32::MAX` if no request is pending. A phase that has just begun counts its time from
+    /// this call, so the caller may sleep for the returned time.
     pub fn poll_delay(&mut self, now: u32) -> u32 {
         self.look_at_clock(now);
         let settings = &self.settings;

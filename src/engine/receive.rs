@@ -1,12 +1,11 @@
-//! Waits for the reply, and keeps a late reply from being delivered as the answer
-//! to a later request.
+//! Waits for the reply, and keeps a late reply from being delivered as the answer to a later
+//! request.
 //!
-//! A device that answers in order, but later than the timeout, sends two replies
-//! after the next request: first the late one, then the right one. So after a
-//! request without a right reply, the next reply of that unit is held: the storage
-//! sets it aside until the line has been silent for the quiet time. A second right
-//! reply takes the place of the first. A second one that is damaged makes the
-//! request fail, because the held reply is then most likely the late one.
+//! A device that answers in order, but later than the timeout, sends two replies after the
+//! next request: first the late reply, then the right one. So after a request without a right
+//! reply, the engine holds the next reply of that unit until the line has been silent for the
+//! quiet time. A second right reply replaces the held one. If a second reply arrives damaged,
+//! the request fails, because the held reply is then most likely the late one.
 
 use super::{Count, Counter, Engine, Probation, Request, Seen, Storage, Words};
 use crate::error::Status;
@@ -16,13 +15,14 @@ use crate::port::Port;
 use crate::FIRMWARE;
 
 impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
-    /// Takes what has arrived by the time `now` and drops it: negative if the link is lost.
+    /// Reads the received bytes at the time `now` and drops them. Negative if the link is lost.
     pub fn drop_received(&mut self, now: u32) -> i16 {
         self.look_at_clock(now);
         self.hear(S::Count::ZERO)
     }
 
-    /// Receives from `index` on: how many bytes, negative if the link is lost.
+    /// Reads received bytes into the frame buffer from `index` on. Returns how many; negative
+    /// if the link is lost.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn hear(&mut self, index: S::Count) -> i16 {
         let room = self.storage.room() - index;
@@ -34,13 +34,13 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         heard
     }
 
-    /// Notes that the reply to the request under way may come late.
+    /// Notes that the reply to the pending request may come late.
     pub(super) fn expect_late_reply(&mut self) {
         self.late = true;
         self.late_unit = self.unit;
     }
 
-    /// Begins the wait for the reply to a request that was just sent.
+    /// Prepares the search for the reply to the request that has just been sent.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn begin_reply(&mut self) {
         self.end = S::Count::ZERO;
@@ -64,8 +64,8 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn receive(&mut self) -> Status {
         let mut over = self.is_over();
-        // As the deadline passes, all that has arrived is looked at, even if
-        // the port hands it over byte by byte; but not more than a buffer of it.
+        // At the deadline all received bytes are searched, also if the port returns them one
+        // by one, but at most as many as a frame buffer holds.
         let mut budget = S::Count::MAX;
         loop {
             if self.end == self.storage.room() {
@@ -110,15 +110,15 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             }
             return self.fail();
         }
-        // Without diagnosis it is not known whether it was a reply.
+        // Without diagnosis the engine does not know whether the damaged bytes were a reply.
         if cfg!(feature = "diagnosis") && self.skimmed && self.seen >= Seen::BAD_CRC {
             return self.fail();
         }
         Status::PENDING
     }
 
-    /// True if a reply that was `found` is the answer. One on probation is held, and
-    /// what arrived behind it is searched.
+    /// True if the reply that was `found` is the answer. A reply on probation is held, and the
+    /// bytes after it are searched.
     #[inline(always)]
     fn is_answered(&mut self, found: bool) -> bool {
         if !FIRMWARE && self.probation == Probation::Off {
@@ -139,7 +139,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         false
     }
 
-    /// The reply is there: counts it and returns what it says.
+    /// Counts the reply that was found, and returns its status.
     #[cfg_attr(target_os = "none", inline(never))]
     fn found(&mut self) -> Status {
         if self.late_unit == self.unit {
@@ -157,7 +157,8 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         Status::from_code(self.exception)
     }
 
-    /// No reply came: asks again, or says why with the most telling status.
+    /// Ends a request without a reply: repeats it, or returns the status of the most severe
+    /// fault.
     #[cfg_attr(target_os = "none", inline(never))]
     fn fail(&mut self) -> Status {
         self.storage
@@ -176,18 +177,18 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             return status;
         }
         self.retries -= 1;
-        // What was taken for a damaged reply may have been noise.
+        // The damaged reply may have been noise, so the right reply may still come.
         self.expect_late_reply();
         self.last_byte = self.now;
         self.listen_anew()
     }
 
-    /// Holds the reply at the front of the frame buffer, in the place of one that was
-    /// held before.
+    /// Holds the reply at the front of the frame buffer. It replaces a reply that was held
+    /// before.
     #[cfg_attr(target_os = "none", inline(never))]
     fn hold(&mut self) {
         self.give_up_held();
-        // So there is room for the next byte in any case.
+        // Only unit and PDU are kept, so at least one byte is free for the next byte.
         self.held = self.request.content(self.least);
         self.storage.set_aside(self.held);
         self.end -= self.held;
@@ -195,20 +196,20 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         self.begin_frame(S::Count::ZERO);
         self.seen = Seen::NOTHING;
         self.probation = Probation::Held;
-        // A line that is never silent ends the wait for a second one too.
+        // If the line is never silent, the wait for a second reply ends at this time.
         let timeout = self.settings.response_timeout;
         self.wait = timeout
             .wrapping_add(timeout)
             .wrapping_add(self.settings.quiet_time);
     }
 
-    /// Has the frame buffer begin with the held reply again.
+    /// Makes the held reply the front of the frame buffer again.
     pub(super) fn take_back(&mut self) {
         self.storage.take_back(self.held);
         self.held = S::Count::ZERO;
     }
 
-    /// Gives up the held reply, which answers no request.
+    /// Drops the held reply and counts it as a foreign frame.
     #[cfg_attr(target_os = "none", inline(never))]
     fn give_up_held(&mut self) {
         let held = self.held;
@@ -219,12 +220,12 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         }
     }
 
-    /// Takes the held reply as the answer; false if there is none, or if what
-    /// arrived after it may have been the answer.
+    /// Accepts the held reply as the answer. False if no reply is held, or if the bytes after
+    /// it may have been the answer.
     #[cfg_attr(target_os = "none", inline(never))]
     fn take_held(&mut self) -> bool {
         let held = self.held;
-        // One byte may be anything; more begin a reply.
+        // A single byte may be noise; more bytes may be the beginning of a reply.
         if held == S::Count::ZERO
             || self.seen >= Seen::BAD_CRC
             || self.end > 1u8.into()
@@ -233,15 +234,15 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             return false;
         }
         self.take_back();
-        // A damaged second reply may have overwritten what the first one said.
+        // A damaged second reply may have overwritten the exception code of the first.
         Q::judge(self, S::Count::ZERO, held);
         true
     }
 }
 
 impl<P: Port, S: Words> Engine<P, S, Query> {
-    /// Fills the response words from the reply that ended the last request; false,
-    /// with nothing filled, if they are too few.
+    /// Copies the data of the reply into the response words. False, with nothing copied, if
+    /// there are too few words.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn take_words(&mut self) -> bool {
@@ -249,7 +250,7 @@ impl<P: Port, S: Words> Engine<P, S, Query> {
         if self.response_words() > self.storage.response_words() {
             return false;
         }
-        // Behind unit, function and byte count.
+        // The data follow unit, function and byte count.
         let last = 2 + count;
         let byte = self.storage.byte(last) & self.request.mask();
         self.storage.set_byte(last, byte);
@@ -258,7 +259,7 @@ impl<P: Port, S: Words> Engine<P, S, Query> {
         true
     }
 
-    /// How many words the data of a successful reply fill.
+    /// How many response words the data of a successful reply fill.
     pub fn response_words(&self) -> u8 {
         self.request.reads().div_ceil(2)
     }

@@ -1,36 +1,36 @@
-//! What the engine needs to know of a request and its reply.
+//! What the engine needs to know about a request and its reply.
 
 use super::{Engine, Storage};
 use crate::frame::rtu;
 
-/// What a frame is that begins as the reply does.
+/// What a received frame is to the pending request.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Verdict {
-    /// The reply.
+    /// The frame is the reply.
     Right,
-    /// The request itself.
+    /// The frame is the echo of the request.
     Echo,
-    /// Neither.
+    /// The frame is neither.
     Wrong,
 }
 
-/// A request, how it travels, and how its reply is known. The functions that take an
-/// engine take the one that the request is in.
+/// A request: how its frame is written, and how its reply is recognised. The functions with
+/// an `engine` argument take the engine that holds the request.
 pub trait Request<P, S: Storage>: Sized {
     /// No request.
     const NONE: Self;
 
-    /// The length of the reply is known as soon as the request is sent, and the engine
-    /// repeats the request as its settings say.
+    /// True if the request determines the length of its reply, and the engine repeats the
+    /// request as its settings say.
     const IS_PLAIN: bool;
 
     /// The function code.
     fn function(&self) -> u8;
 
-    /// True if the request may be sent to all units at once.
+    /// True if the request may be broadcast.
     fn may_be_broadcast(&self) -> bool;
 
-    /// False if no unit responds to the request.
+    /// False if units do not respond to the request.
     fn is_answered(&self) -> bool {
         true
     }
@@ -41,34 +41,34 @@ pub trait Request<P, S: Storage>: Sized {
     /// Writes the frame of the request into the frame buffer.
     fn write(engine: &mut Engine<P, S, Self>);
 
-    /// Bytes of the frame of a reply that is no exception; 0 if that is not known yet, or
-    /// more than the frame buffer holds.
+    /// Length of the frame of a reply that is no exception; 0 if it is not known yet, or
+    /// greater than the frame buffer.
     fn reply_length(&self, room: S::Count) -> S::Count;
 
-    /// The length of the frame that begins with the `have` bytes at `front`, at least the
-    /// unit of the request and one byte more; or the least length while they do not tell;
-    /// 0 if no frame that is waited for begins so.
+    /// The length of the frame that begins with the `have` bytes at `front`. These are at least
+    /// the unit of the request and one more byte. While they do not determine the length, the
+    /// least possible length; 0 if no expected frame begins with them.
     fn wanted(engine: &mut Engine<P, S, Self>, front: S::Count, have: S::Count) -> S::Count;
 
-    /// Says what the frame at `front` is, whose CRC is right, and whose unit and PDU have
-    /// `content` bytes. Keeps the exception code.
+    /// Compares the frame at `front`, whose CRC is right, with the request. Its unit and PDU
+    /// have `content` bytes. Stores the exception code.
     fn judge(engine: &mut Engine<P, S, Self>, front: S::Count, content: S::Count) -> Verdict;
 
-    /// Looks for the reply among what has arrived, and moves it to the front; false
-    /// if it is not there yet.
+    /// Searches the received bytes for the reply, and moves it to the front of the buffer.
+    /// False if it has not arrived yet.
     #[inline(always)]
     fn search(engine: &mut Engine<P, S, Self>) -> bool {
         engine.search_rtu()
     }
 
-    /// As [`Request::search`], once the line is silent: also behind a frame that has begun
-    /// and is not complete.
+    /// As [`Request::search`], once the line is silent: also searches after an incomplete
+    /// candidate.
     #[inline(always)]
     fn search_silent(engine: &mut Engine<P, S, Self>) -> bool {
         engine.skim(1u8.into())
     }
 
-    /// Bytes of unit and PDU in a frame of `length` bytes on the wire.
+    /// How many bytes of unit and PDU a frame of `length` bytes on the wire carries.
     #[inline(always)]
     fn content(&self, length: S::Count) -> S::Count {
         length - rtu::CRC.into()

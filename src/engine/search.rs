@@ -1,30 +1,28 @@
-//! Finds the reply among the bytes that arrive.
+//! Finds the reply among the received bytes of an RTU line.
 //!
-//! At the front of the frame buffer stands a candidate: bytes that begin as the
-//! reply does, as an exception to the request, or as the request itself where an
-//! echo is expected. What turns out to be no frame is passed over byte by byte, up
-//! to the next candidate.
+//! The front of the frame buffer holds a candidate: bytes that begin like the reply, like an
+//! exception to the request, or, if an echo is expected, like the request itself. If the
+//! candidate turns out to be no frame, the engine skips it byte by byte up to the next
+//! candidate.
 //!
-//! Two CRCs are kept: of the bytes passed over, and of these and what is looked at
-//! since. Where the first one ends with the residue, what was passed over was a
-//! frame of somebody else. The two together tell whether the CRC of a reply is
-//! right, however many candidates were taken for it before: its bytes are taken in
-//! twice at most.
+//! The engine keeps two CRCs: one of the skipped bytes, and one that continues it over the
+//! candidate. If the first becomes the residue, the skipped bytes were a frame of another
+//! unit. Both together give the CRC of the candidate, so each byte is processed at most
+//! twice, however many candidates there were.
 
 use super::{Count, Engine, Request, Seen, Storage, Verdict};
 use crate::frame::checksum::{crc16, Crc16};
 use crate::frame::rtu::{self, MIN_FRAME};
 use crate::pdu::EXCEPTION;
 
-/// Bytes of an exception's frame: unit, function, code, CRC.
+/// Length of the frame of an exception: unit, function, code, CRC.
 pub(super) const EXCEPTION_FRAME: u8 = rtu::OVERHEAD as u8 + 2;
 
-/// Bytes of the frame of a response to a read around its data: unit, function, byte count,
-/// CRC.
+/// Bytes around the data of a read's response frame: unit, function, byte count, CRC.
 const READ_OVERHEAD: u8 = rtu::OVERHEAD as u8 + 2;
 
 impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
-    /// As [`Request::wanted`], of any bytes.
+    /// As [`Request::wanted`], for any number of bytes.
     #[cfg_attr(target_os = "none", inline(never))]
     fn wanted(&mut self, front: S::Count, have: S::Count) -> S::Count {
         if have == S::Count::ZERO {
@@ -39,8 +37,8 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         Q::wanted(self, front, have)
     }
 
-    /// As [`Engine::search_rtu`], of what is there most often: the whole and right reply
-    /// to a read of so many bytes of data, and nothing else.
+    /// True if the received bytes are exactly the right reply to a read of `data` bytes. This
+    /// is the most frequent case of [`Engine::search_rtu`].
     #[inline(always)]
     pub(crate) fn has_read(&mut self, data: u8) -> bool {
         let length = S::Count::from(data) + READ_OVERHEAD.into();
@@ -57,8 +55,9 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         true
     }
 
-    /// Looks for the reply among what has arrived, in RTU frames, and moves it to the
-    /// front; false if it is not there yet. Stops at a candidate that is not complete.
+    /// Searches the received bytes for the reply in an RTU frame, and moves it to the front of
+    /// the buffer. False if it has not arrived yet. The search stops at an incomplete
+    /// candidate.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn search_rtu(&mut self) -> bool {
         if self.least > self.end {
@@ -99,14 +98,14 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         found
     }
 
-    /// Looks for the reply from `front` on, behind a candidate that is not complete, which
-    /// may be noise; moves it to the front. If there is none, all is left as it was, for
-    /// the rest of the candidate may still come.
+    /// Searches for the reply from `front` on, after an incomplete candidate that may be noise,
+    /// and moves it to the front of the buffer. If no reply is found, nothing changes, because
+    /// the rest of the candidate may still arrive.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn skim(&mut self, mut front: S::Count) -> bool {
         while front + EXCEPTION_FRAME.into() <= self.end {
             let have = if Q::IS_PLAIN {
-                // Only an exception is shorter than a candidate that is not complete.
+                // Only an exception is shorter than an incomplete candidate.
                 EXCEPTION_FRAME.into()
             } else {
                 self.end - front
@@ -131,8 +130,8 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         false
     }
 
-    /// Takes the bytes up to `end` into the CRC, as they arrive, so that little is left
-    /// to do for the last one.
+    /// Updates the CRC with the bytes up to `end`. Done as bytes arrive, so that little work
+    /// is left when the last byte arrives.
     #[cfg_attr(target_os = "none", inline(never))]
     fn take_in(&mut self, end: S::Count) {
         let news = self.storage.bytes(self.done, end - self.done);
@@ -140,7 +139,7 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         self.done = end;
     }
 
-    /// A frame begins at `front`, or whatever comes next.
+    /// Starts a new candidate at `front`.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn begin_frame(&mut self, front: S::Count) {
         self.done = front;
@@ -173,8 +172,8 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         crc16(self.storage.bytes(front, length)).is_residue()
     }
 
-    /// Passes over the byte at `front`. Where such bytes make up a frame, a damaged
-    /// reply seen in it was none.
+    /// Skips the byte at `front`. If the skipped bytes turn out to be a frame, a bad CRC noted
+    /// within them is withdrawn.
     #[cfg_attr(target_os = "none", inline(never))]
     fn pass(&mut self, front: S::Count) {
         if cfg!(feature = "diagnosis") && self.passed == 0 {
@@ -204,7 +203,7 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         }
     }
 
-    /// Notes a frame with a right CRC that is not the reply.
+    /// Notes a fault, and counts a frame with a right CRC that is not the reply.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn see_foreign(&mut self, what: Seen) {
         if cfg!(feature = "counters") {
@@ -213,6 +212,7 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         self.see(what);
     }
 
+    /// Notes a fault if it is more severe than the noted one.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(crate) fn see(&mut self, what: Seen) {
         if self.seen < what {
@@ -220,7 +220,7 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         }
     }
 
-    /// Drops what stands before `front`.
+    /// Drops the bytes before `front`.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn drop_front(&mut self, front: S::Count) {
         self.end -= front;

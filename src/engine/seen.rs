@@ -1,14 +1,14 @@
-//! What is seen on the way to a reply.
+//! The faults that the engine finds while it searches for a reply.
 
 use crate::error::Status;
 
-/// What was seen on the way to a reply, the more telling the greater. The low
-/// digit is that of the status it becomes.
+/// A fault in the received bytes. The more severe fault is the greater one. The low
+/// hexadecimal digit is the low digit of its status.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Hash, Debug)]
 pub struct Seen(u8);
 
 impl Seen {
-    /// No frame.
+    /// No frame arrived.
     pub const NOTHING: Seen = Seen(0x02);
     /// A frame of another unit.
     pub const OTHER_UNIT: Seen = Seen(0x10);
@@ -21,7 +21,7 @@ impl Seen {
     /// The reply has begun, but the buffer cannot hold it.
     pub const TOO_LONG: Seen = Seen(0x59);
 
-    /// The status of a request for which nothing better was seen.
+    /// The status of a request that ends with this fault.
     pub const fn status(self) -> Status {
         Status::from_code(0xE0 | (self.0 & 0x0F))
     }

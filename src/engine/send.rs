@@ -1,4 +1,4 @@
-//! From a request to its last bit on the wire.
+//! Sends a request: waits for silence, writes the frame, waits until its last bit has left.
 
 use super::{Count, Counter, Engine, Phase, Request, Storage, BROADCAST};
 use crate::error::Status;
@@ -6,9 +6,9 @@ use crate::port::Port;
 use crate::time::characters;
 
 impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
-    /// Starts the request to `unit`; `poll` does the rest.
-    /// [`Status::BROADCAST_NOT_ALLOWED`], and nothing is sent, for a request
-    /// to unit 0 that may not be broadcast; [`Status::BUFFER_TOO_SMALL`] if the frame buffer cannot hold it.
+    /// Starts the request to `unit`; the calls of `poll` send it. A refused request sends
+    /// nothing: [`Status::BROADCAST_NOT_ALLOWED`] for a request to unit 0 that may not be
+    /// broadcast, [`Status::BUFFER_TOO_SMALL`] if the frame buffer cannot hold the request.
     pub fn start(&mut self, unit: u8) -> Status {
         if unit == BROADCAST && !self.request.may_be_broadcast() {
             return Status::BROADCAST_NOT_ALLOWED;
@@ -23,7 +23,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         self.listen_anew()
     }
 
-    /// Waits for silence, then sends; from the next poll on.
+    /// Writes the frame of the request and enters the phase that waits for silence.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn listen_anew(&mut self) -> Status {
@@ -34,7 +34,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         Status::PENDING
     }
 
-    /// The silence that the next request waits for.
+    /// The silence, in microseconds, that the next request waits for.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn silence_to_keep(&self) -> u32 {
         if self.late {
@@ -44,9 +44,9 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         }
     }
 
-    /// Listens until the line has been silent, then sends. What arrives here
-    /// belongs to no request of ours. A line that is not silent is not waited for
-    /// longer than a reply and that silence may take.
+    /// Waits until the line has been silent for the gap, then sends. Bytes that arrive here
+    /// answer no request and are dropped. If the line is never silent, the wait ends after
+    /// the response timeout plus the gap.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn listen(&mut self) -> Status {
@@ -55,7 +55,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             return Status::LINK_LOST;
         }
         if heard > 0 {
-            // It stands where the request stood.
+            // The received bytes have overwritten the request.
             Q::write(self);
             return self.stalled();
         }
@@ -71,8 +71,9 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         self.send()
     }
 
-    /// Hands the frame to the port, waits until that has drained, and holds the driver
-    /// on. A port that does not move is not waited for longer than a reply may take.
+    /// Writes the frame to the port, waits until the port has sent it, and keeps the driver on
+    /// for the post-flush hold. If the port accepts nothing, the wait ends after the response
+    /// timeout.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn send(&mut self) -> Status {
@@ -93,7 +94,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
                 return Status::PENDING;
             }
             self.phase = Phase::Flush;
-            // No request takes longer than a frame of 256 characters.
+            // The longest frame takes 256 characters.
             self.wait = self
                 .wait
                 .wrapping_add(u32::from(self.settings.character) << 8);
@@ -112,7 +113,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
                 return Status::PENDING;
             }
         }
-        // The request is on the wire: the driver goes off, the wait begins.
+        // The request has been sent: the driver goes off, and the wait for the reply begins.
         self.begin_reply();
         self.port.post_transmission();
         if self.unit == BROADCAST || !self.request.is_answered() {

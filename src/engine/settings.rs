@@ -1,34 +1,35 @@
-//! How transactions behave.
+//! Times and options of requests.
 
 use crate::time::{self, millis};
 
-/// How a transaction behaves; kept from one to the next. Times are in
+/// Times and options of requests, which hold until they are changed. Times are in
 /// microseconds.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[repr(C)]
 pub struct Settings {
-    /// Silence before a request; set it with [`Settings::set_gap`].
+    /// Silence before a request. Set it with [`Settings::set_gap`].
     pub gap: u32,
-    /// The silence t3.5 that ends a frame.
+    /// The silence t3.5 that ends a frame (serial line guide V1.02, 2.5.1.1).
     pub silence: u32,
-    /// From the end of the request to the end of the reply.
+    /// Response timeout: from the end of the request to the end of the reply.
     pub response_timeout: u32,
-    /// What slaves are given to carry out a broadcast.
+    /// Turnaround delay: the time that slaves get to carry out a broadcast.
     pub turnaround_delay: u32,
-    /// What a late reply is given after a request that got none.
+    /// Quiet time: the silence before the next request after a request without a reply, so
+    /// that a late reply can pass.
     pub quiet_time: u32,
-    /// One character.
+    /// Time of one character.
     pub character: u16,
-    /// How often a request is repeated that was not answered.
+    /// How often an unanswered request is repeated.
     pub retries: u8,
-    /// How long the driver is held on after the flush, in characters.
+    /// How long the driver stays on after the flush, in characters.
     pub post_flush_hold: u8,
-    /// Whether each request comes back before its reply.
+    /// True if the line echoes each request before its reply.
     pub echo_discard: bool,
 }
 
 impl Settings {
-    /// What holds until somebody says otherwise.
+    /// The settings of a new master or client.
     pub const DEFAULT: Settings = Settings {
         gap: time::DEFAULT_SILENCE,
         silence: time::DEFAULT_SILENCE,
@@ -46,16 +47,16 @@ impl Settings {
         self.gap = time::clamped(microseconds);
     }
 
-    /// Derives gap, silence and character time from the baud rate; 0 stands for an
-    /// unknown one.
+    /// Derives gap, silence and character time from the baud rate; 0 means that the rate is
+    /// unknown.
     pub const fn set_baud_rate(&mut self, baud: u32) {
         self.silence = time::silence(baud);
         self.gap = self.silence;
         self.character = time::character(baud);
     }
 
-    /// Turns zeroed settings into the default. (Assigned as a whole, that would
-    /// be copied from a constant, which takes flash, and RAM on an AVR.)
+    /// Turns zeroed settings into the default settings. Field by field, because a constant
+    /// of the whole struct would take flash, and RAM on an AVR.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn preset(&mut self) {
         self.gap = Settings::DEFAULT.gap;

@@ -1,12 +1,11 @@
-//! What the caller lends: a frame buffer, words to send and words to fill, and
-//! counters to count in.
+//! The caller's memory: a frame buffer, transmit words, response words and counters.
 
 use crate::bytes::move_to_front;
 use core::fmt::Debug;
 use core::hash::Hash;
 use core::ops::{Add, AddAssign, Sub, SubAssign};
 
-/// What is counted, in the order of the counters' storage.
+/// The counters, in the order in which they are stored.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Counter {
@@ -18,11 +17,11 @@ pub enum Counter {
     Exceptions,
     /// Complete replies with a wrong CRC.
     BadCrc,
-    /// Requests that were not answered in time.
+    /// Requests without a reply in time.
     Timeouts,
-    /// Frames with a right CRC that were not for us or no answer.
+    /// Frames with a right CRC that did not answer the request.
     ForeignFrames,
-    /// Replies that were found behind bytes that were no frame.
+    /// Replies that were found after bytes that were no frame.
     Resynchronisations,
     /// Bytes sent.
     BytesSent,
@@ -30,11 +29,11 @@ pub enum Counter {
     BytesReceived,
 }
 
-/// How many kinds of [`Counter`] there are.
+/// How many counters there are.
 pub const COUNTERS: usize = 9;
 
-/// A number of bytes in a frame buffer: [`u8`] of at most 255, which costs an AVR half
-/// as much as [`u16`].
+/// A number of bytes in a frame buffer: [`u8`] for buffers of at most 255 bytes, which costs
+/// an AVR half as much as [`u16`].
 pub trait Count:
     Copy
     + Ord
@@ -54,10 +53,10 @@ pub trait Count:
     /// The greatest number.
     const MAX: Self;
 
-    /// So many bytes of a frame buffer.
+    /// This number of bytes of a frame buffer.
     fn of(bytes: usize) -> Self;
 
-    /// What is left; 0 if that would be less.
+    /// The difference; 0 if `other` is greater.
     fn saturating_sub(self, other: Self) -> Self;
 }
 
@@ -87,15 +86,15 @@ impl Count for u16 {
     }
 }
 
-/// What the caller lends to an engine: a frame buffer, and counters to count in.
+/// The memory of an engine: a frame buffer, and counters.
 ///
-/// The engine keeps every index and count within what [`Storage::room`] says, so storage
-/// need not check them.
+/// The engine keeps every index and count within [`Storage::room`], so an implementation need
+/// not check them.
 pub trait Storage {
-    /// What counts the bytes of the frame buffer.
+    /// The type of lengths and indexes.
     type Count: Count;
 
-    /// Bytes of the frame buffer behind what was set aside.
+    /// Bytes of the frame buffer, without those that are set aside.
     fn room(&self) -> Self::Count;
 
     /// A byte of the frame buffer.
@@ -104,10 +103,10 @@ pub trait Storage {
     /// Sets a byte of the frame buffer.
     fn set_byte(&mut self, index: Self::Count, byte: u8);
 
-    /// `count` bytes of the frame buffer from `index` on, to look at.
+    /// `count` bytes of the frame buffer from `index` on, to read.
     fn slice(&self, index: Self::Count, count: Self::Count) -> &[u8];
 
-    /// `count` bytes of the frame buffer from `index` on.
+    /// `count` bytes of the frame buffer from `index` on, to read and write.
     fn bytes(&mut self, index: Self::Count, count: Self::Count) -> &mut [u8];
 
     /// Moves `count` bytes of the frame buffer from `from` on to its front.
@@ -115,47 +114,47 @@ pub trait Storage {
         move_to_front(self.bytes(Self::Count::ZERO, from + count), from.into());
     }
 
-    /// Sets the first `count` bytes of the frame buffer aside: it begins behind them.
+    /// Sets the first `count` bytes aside. The frame buffer then begins after them.
     fn set_aside(&mut self, count: Self::Count);
 
-    /// Has the frame buffer begin with the `count` bytes again that were set aside.
+    /// Puts the `count` bytes that were set aside back at the front of the frame buffer.
     fn take_back(&mut self, count: Self::Count);
 
-    /// Adds to a counter, if there is storage for counters.
+    /// Adds `more` to a counter, if there is memory for counters.
     fn count(&mut self, _counter: Counter, _more: u16) {}
 }
 
-/// What the caller lends to a master besides: words to send and words to fill. The engine
-/// keeps within what [`Words::transmit_words`] and [`Words::response_words`] say.
+/// The memory of a master: transmit and response words beside the frame buffer. The engine
+/// uses at most [`Words::transmit_words`] and [`Words::response_words`] words.
 pub trait Words: Storage<Count = u8> {
-    /// The words that writing requests send, at most 255.
+    /// The transmit words, at most 255: write requests send them.
     fn transmit(&mut self) -> &mut [u16];
 
-    /// How many words there are to send.
+    /// How many transmit words there are.
     fn transmit_words(&self) -> u8;
 
-    /// Writes `count` bytes of the words to send into the frame buffer from `to` on; of
-    /// each word the low byte first, or the high one if `high_first`.
+    /// Copies `count` bytes of the transmit words into the frame buffer from `to` on: the high
+    /// byte of each word first if `high_first`, otherwise the low byte.
     fn send_words(&mut self, to: u8, count: u8, high_first: bool);
 
-    /// The words that a successful read fills, at most 255.
+    /// The response words, at most 255: a successful read fills them.
     fn response(&mut self) -> &mut [u16];
 
-    /// How many words there are to fill.
+    /// How many response words there are.
     fn response_words(&self) -> u8;
 
-    /// Fills words from `count` bytes of the frame buffer from `from` on; of each word
-    /// the low byte first, or the high one if `high_first`. Of an odd count the last
-    /// high byte is 0.
+    /// Fills the response words with `count` bytes of the frame buffer from `from` on: the high
+    /// byte of each word first if `high_first`, otherwise the low byte. If `count` is odd, the
+    /// missing byte of the last word is 0.
     fn take_words(&mut self, from: u8, count: u8, high_first: bool);
 }
 
-/// A frame buffer in Rust: an array, a slice or whatever else holds bytes. An index that
-/// is out of range reads 0 and writes nothing.
+/// A frame buffer in Rust: an array, a slice or another container of bytes. An index out of
+/// range reads 0 and writes nothing.
 #[derive(Clone, Hash, Debug, Default)]
 pub struct Frame<F> {
     bytes: F,
-    /// Bytes at the front that are set aside.
+    /// How many bytes at the front are set aside.
     aside: u16,
 }
 
@@ -206,20 +205,19 @@ impl<F: AsRef<[u8]> + AsMut<[u8]>> Storage for Frame<F> {
     }
 }
 
-/// A master's storage in Rust. A word that is out of range is not filled, and is sent
-/// as 0.
+/// The memory of a master in Rust. A word out of range is not filled, and is sent as 0.
 #[derive(Clone, Hash, Debug, Default)]
 pub struct Buffers<F, R, T> {
     frame: Frame<F>,
     response: R,
     transmit: T,
-    /// What happened on the line, by [`Counter`]; each wraps at 2^32.
+    /// The counters, in the order of [`Counter`]. Each wraps at 2^32.
     pub counters: [u32; COUNTERS],
 }
 
 impl<F, R, T> Buffers<F, R, T> {
-    /// A frame buffer of at least 8 bytes, of which at most 255 are used, words for
-    /// replies, and words to send.
+    /// Takes a frame buffer of at least 8 bytes, of which at most 255 are used, response words,
+    /// and transmit words.
     pub const fn new(frame: F, response: R, transmit: T) -> Self {
         Buffers {
             frame: Frame::new(frame),
@@ -230,7 +228,7 @@ impl<F, R, T> Buffers<F, R, T> {
     }
 }
 
-/// At most as many as an index counts.
+/// A number of items, limited to 255.
 fn count(items: usize) -> u8 {
     items.min(usize::from(u8::MAX)) as u8
 }
@@ -242,7 +240,7 @@ where
     type Count = u8;
 
     fn room(&self) -> u8 {
-        // What is set aside counts too.
+        // Bytes that are set aside count for the limit of 255 too.
         count(self.frame.bytes.as_ref().len()).saturating_sub(self.frame.aside as u8)
     }
 

@@ -1,13 +1,12 @@
-//! Functions that a user defines.
+//! User-defined functions.
 
 use super::{Reply, Service};
 use crate::pdu::limits::MAX_PDU;
 use core::cell::Cell;
 
-/// Serves a request of a user's function. Its data are the front `length` bytes
-/// of `pdu` less the function code; `handler` sees them, writes the data of the
-/// response into the room behind them, and says how many bytes those are, or
-/// [`Reply`]'s word for anything else.
+/// Serves a request of a user-defined function. The request PDU is the first `length` bytes of
+/// `pdu`. `handler` gets the data after the function code, and the free bytes after the
+/// request, into which it writes the data of the response.
 pub fn serve(
     pdu: &mut [u8],
     length: usize,
@@ -24,7 +23,7 @@ pub fn serve(
         Outcome::Silent => return Reply::SILENT,
         Outcome::Pending => return Reply::PENDING,
     };
-    // The data move to right behind the function code.
+    // Move the response's data to directly after the function code.
     let cells = Cell::from_mut(pdu).as_slice_of_cells();
     let behind = cells.get(length..length + bytes).unwrap_or_default();
     for (to, from) in cells.get(1..).unwrap_or_default().iter().zip(behind) {
@@ -33,24 +32,24 @@ pub fn serve(
     Reply::length(1 + bytes)
 }
 
-/// What a user's function makes of a request.
+/// What the handler of a user-defined function did with a request.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Outcome {
-    /// A response with so many bytes of data.
+    /// A response with this number of data bytes.
     Data(usize),
-    /// An exception.
+    /// An exception with this code.
     Exception(u8),
     /// No response.
     Silent,
-    /// Not yet: ask again.
+    /// Not finished: the server calls the handler again.
     Pending,
 }
 
-/// Serves one function code with a closure, as [`serve`].
+/// Serves one function code with a closure: see [`serve`].
 pub struct Custom<F> {
-    /// The function code; 0 is all that no service before serves.
+    /// The function code; 0 stands for every code that no earlier service serves.
     pub function: u8,
-    /// Sees the request's data, and writes the response's.
+    /// Gets the request's data and writes the response's data.
     pub handler: F,
 }
 
@@ -67,12 +66,12 @@ impl<F: FnMut(u8, &[u8], &mut [u8]) -> Outcome> Service for Custom<F> {
     }
 }
 
-/// Answers exception 01 to functions that are switched off; stands before the
-/// services that would serve them.
+/// Responds with exception 01 to disabled functions. It comes before the services that would
+/// serve them. One bit for each function code; 1 disables the function.
 pub struct SwitchedOff(pub [u8; 16]);
 
 impl SwitchedOff {
-    /// Says whether a function is switched off.
+    /// True if the function is disabled.
     pub fn is_off(&self, function: u8) -> bool {
         let byte = self.0.get(usize::from(function / 8));
         byte.is_some_and(|byte| byte >> (function % 8) & 1 != 0)

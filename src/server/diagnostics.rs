@@ -1,55 +1,54 @@
-//! Functions 08, 0B and 0C: counters of a line, listen only mode, event log.
+//! Functions 08, 0B and 0C: counters of a line, listen only mode and event log.
 
 use super::{Concern, Heading, Reply};
 use crate::pdu::diagnostics::sub_function as sub;
 use crate::pdu::diagnostics::{CLEAR_LOG, DIAGNOSTICS, GET_COMM_EVENT_COUNTER, GET_COMM_EVENT_LOG};
 use crate::pdu::limits::MAX_EVENTS;
 
-/// What a unit knows of its line. All zero at first.
+/// The diagnostics of a unit's line. All fields are zero at first. Counters wrap at 65536.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(C)]
 pub struct Diagnostics {
-    /// What 02 of 08 returns: the program's own.
+    /// The diagnostic register, which sub-function 02 returns. The program sets it.
     pub diagnostic_register: u16,
-    /// Frames with a right CRC, for whichever unit.
+    /// Frames with a right CRC, for any unit.
     pub bus_messages: u16,
-    /// Frames that arrived damaged.
+    /// Damaged frames.
     pub bus_communication_errors: u16,
-    /// Exceptions, those of broadcasts too.
+    /// Exceptions, including those that broadcasts caused.
     pub exception_errors: u16,
-    /// Requests for this unit and broadcasts.
+    /// Requests to this unit, and broadcasts.
     pub server_messages: u16,
-    /// Requests that were not answered.
+    /// Requests without a response.
     pub no_responses: u16,
-    /// Exceptions 07.
+    /// Exceptions with code 07.
     pub naks: u16,
-    /// Exceptions 06.
+    /// Exceptions with code 06.
     pub busy: u16,
-    /// Frames that the buffer could not hold.
+    /// Frames that were too long for the buffer.
     pub character_overruns: u16,
-    /// What 0B returns: requests that were carried out.
+    /// The event count, which function 0B returns: requests that were carried out.
     pub events: u16,
     /// 1 in listen only mode.
     pub listen_only: u8,
-    /// Events in the log, and where the next one goes.
+    /// How many events the log holds.
     pub logged: u8,
-    /// Where in the log the next event goes.
+    /// Index in the log of the next event.
     pub next: u8,
-    /// The request cleared the counters, and is not counted itself.
+    /// 1 if the current request has cleared the counters. Such a request is not counted.
     pub cleared: u8,
-    /// The events of 0C, a ring.
+    /// The event log, which function 0C returns, as a ring.
     pub log: [u8; MAX_EVENTS],
 }
 
-/// What a request is about that changes the line, which the server may have to
-/// hear of.
+/// Whether a request restarts the communications of the line (sub-function 01).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Restart {
-    /// Nothing.
+    /// The request is no restart.
     None,
-    /// The line is to be restarted; the log stays.
+    /// Restart; the event log is kept.
     KeepLog,
-    /// The line is to be restarted; the log was cleared.
+    /// Restart; the event log was cleared.
     ClearLog,
 }
 
@@ -71,7 +70,7 @@ fn count(counter: &mut u16) {
 }
 
 impl Diagnostics {
-    /// Nothing has happened yet.
+    /// Diagnostics of a line without any traffic yet.
     pub const NEW: Diagnostics = Diagnostics {
         diagnostic_register: 0,
         bus_messages: 0,
@@ -90,6 +89,7 @@ impl Diagnostics {
         log: [0; MAX_EVENTS],
     };
 
+    /// Adds an event to the log.
     fn note(&mut self, event: u8) {
         let next = usize::from(self.next) % MAX_EVENTS;
         if let Some(place) = self.log.get_mut(next) {
@@ -99,8 +99,8 @@ impl Diagnostics {
         self.logged = (self.logged + 1).min(MAX_EVENTS as u8);
     }
 
-    /// Takes notice of a frame, before it is served. False if it is not to be:
-    /// in listen only mode, all but a restart.
+    /// Counts a frame before it is served. False if the unit must not serve it: a damaged
+    /// frame, a frame for another unit, and in listen only mode any request but a restart.
     pub fn hear(&mut self, heading: &Heading, concern: Concern, pdu: &[u8]) -> bool {
         if heading.again {
             return true;
@@ -144,7 +144,7 @@ impl Diagnostics {
         served
     }
 
-    /// Takes notice of what became of a request for which `hear` was true.
+    /// Counts the outcome of a request for which `hear` returned true.
     pub fn done(&mut self, concern: Concern, function: u8, reply: Reply) {
         let code = reply.exception_code();
         if self.cleared != 0 {
@@ -187,8 +187,8 @@ impl Diagnostics {
         self.cleared = 1;
     }
 
-    /// Serves 08, 0B and 0C: the request PDU is the front `length` bytes of
-    /// `pdu`, which the response overwrites. Says too whether to restart.
+    /// Serves functions 08, 0B and 0C. The request PDU is the first `length` bytes of `pdu`;
+    /// the response overwrites it. Also returns whether the line is to be restarted.
     pub fn serve(&mut self, pdu: &mut [u8], length: usize) -> (Reply, Restart) {
         let reply = match pdu.first() {
             Some(&DIAGNOSTICS) => return self.diagnose(pdu, length),
@@ -219,7 +219,7 @@ impl Diagnostics {
         [*a, *b] = [0, 0];
         [*c, *d] = self.events.to_be_bytes();
         [*e, *f] = self.bus_messages.to_be_bytes();
-        // The latest first.
+        // The latest event comes first.
         for (back, place) in (1..).zip(log) {
             let index = (usize::from(self.next) + MAX_EVENTS - back) % MAX_EVENTS;
             *place = self.log.get(index).copied().unwrap_or(0);
@@ -275,14 +275,15 @@ impl Diagnostics {
             sub::SERVER_NAK_COUNT => self.naks,
             sub::SERVER_BUSY_COUNT => self.busy,
             sub::BUS_CHARACTER_OVERRUN_COUNT => self.character_overruns,
-            // The delimiter: the server takes it from the response.
+            // The new ASCII delimiter. The server reads it from the response.
             _ => data,
         };
         [*c, *d] = value.to_be_bytes();
         (Reply::length(5), Restart::None)
     }
 
-    /// Ends listen only mode; a restart in it is not answered.
+    /// Restarts the communications and ends listen only mode. In listen only mode there is no
+    /// response (clause 6.8.1).
     fn restart(&mut self, clear_log: bool) -> (Reply, Restart) {
         let reply = if self.listen_only != 0 {
             Reply::SILENT

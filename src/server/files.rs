@@ -7,25 +7,25 @@ use crate::pdu::files::{
 };
 use crate::pdu::limits::{MAX_FIFO, READ_FILE_BYTES};
 
-/// The records of files, each a register.
+/// The records of files. Each record is one register.
 pub trait Files {
-    /// True if all these records are there.
+    /// True if all of these records exist.
     fn covers(&self, record: Record) -> bool;
 
-    /// Fills `data`, high bytes first, from records that are there.
+    /// Reads existing records into `data`, high byte first.
     fn load(&self, record: Record, data: &mut [u8]);
 
-    /// Sets records that are there from `data`, high bytes first.
+    /// Writes `data`, high byte first, to existing records.
     fn store(&mut self, record: Record, data: &[u8]);
 
-    /// Asked before records are written; an exception code refuses the whole
-    /// request, 0 allows.
+    /// Called before records are written. An exception code refuses the whole request; 0
+    /// allows it.
     fn before(&mut self, record: Record, data: &[u8]) -> u8 {
         let _ = (record, data);
         0
     }
 
-    /// Told what was written.
+    /// Called after records were written.
     fn after(&mut self, record: Record) {
         let _ = record;
     }
@@ -33,10 +33,10 @@ pub trait Files {
 
 /// FIFO queues of registers.
 pub trait Fifos {
-    /// How many registers the queue at this address holds, if there is one.
+    /// How many registers the queue at this address holds; `None` if there is no queue.
     fn count(&self, address: u16) -> Option<u16>;
 
-    /// Fills `data`, high bytes first, from the front of the queue.
+    /// Copies registers from the front of the queue into `data`, high byte first.
     fn load(&self, address: u16, data: &mut [u8]);
 }
 
@@ -44,8 +44,8 @@ fn refusal(status: Status) -> Reply {
     Reply::exception(status.code())
 }
 
-/// Serves 14 and 15: the request PDU is the front `length` bytes of `pdu`, which
-/// the response overwrites.
+/// Serves functions 14 and 15. The request PDU is the first `length` bytes of `pdu`; the
+/// response overwrites it.
 pub fn serve(files: &mut impl Files, pdu: &mut [u8], length: usize) -> Reply {
     let (function, count) = match pdu.get(..length) {
         Some([function @ (READ_FILE_RECORD | WRITE_FILE_RECORD), count, ..]) => (*function, *count),
@@ -63,7 +63,7 @@ pub fn serve(files: &mut impl Files, pdu: &mut [u8], length: usize) -> Reply {
 }
 
 fn read(files: &impl Files, pdu: &mut [u8], length: usize) -> Reply {
-    // The response may overtake the request, which is therefore put aside.
+    // The response may overwrite parts of the request that are still needed: work on a copy.
     let mut aside = [0; READ_FILE_BYTES.1];
     let request = pdu.get(2..length).unwrap_or_default();
     let Some(kept) = aside.get_mut(..request.len()) else {
@@ -123,7 +123,7 @@ fn write(files: &mut impl Files, request: &[u8], length: usize) -> Reply {
     Reply::length(length)
 }
 
-/// Serves 18, as [`serve`].
+/// Serves function 18, with arguments as of [`serve`].
 pub fn serve_fifos(fifos: &impl Fifos, pdu: &mut [u8], length: usize) -> Reply {
     if pdu.first() != Some(&READ_FIFO_QUEUE) {
         return Reply::NOT_MINE;

@@ -1,46 +1,46 @@
-//! Whom a frame is for.
+//! Which unit a received frame is addressed to.
 
 use crate::pdu::{bits, files, registers};
 
-/// A frame that was found.
+/// The address and the position of a received frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(C)]
 pub struct Heading {
-    /// The unit that it is for.
+    /// The unit id in the frame.
     pub to: u8,
-    /// The id that means the server itself: 255 in a stream; on a serial line 0, which
-    /// is broadcast there.
+    /// A second id that addresses the server itself: 255 in a stream. On a serial line 0,
+    /// which is the broadcast address there.
     pub own: u8,
-    /// Bytes are missing at its front: the buffer could not hold them.
+    /// The frame was longer than the buffer, so its first bytes are missing.
     pub overrun: bool,
-    /// Where its PDU stands.
+    /// Index of the PDU in the buffer.
     pub head: u8,
-    /// It was handed out before, and a service was not done.
+    /// The frame was served before, and the service returned that it is not finished.
     pub again: bool,
-    /// The length of its PDU; 0 if the frame arrived damaged.
+    /// Length of the PDU; 0 if the frame is damaged.
     pub length: u16,
-    /// What the response PDU may take.
+    /// Greatest length of the response PDU.
     pub room: u16,
 }
 
-/// What a frame is to a unit.
+/// How a frame addresses a unit.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(target_arch = "avr", repr(u8))]
 #[cfg_attr(not(target_arch = "avr"), repr(usize))]
 pub enum Concern {
-    /// Another unit's, or damaged.
+    /// The frame is for another unit, or damaged.
     Foreign,
-    /// Its own.
+    /// The frame is for this unit.
     Own,
-    /// Everybody's, which nobody answers.
+    /// The frame is a broadcast: each unit carries it out, no unit responds.
     Broadcast,
 }
 
-/// The id of a unit that answers to any.
+/// The id of a unit that responds to every id.
 pub const ANY: u8 = 0;
 
 impl Heading {
-    /// No frame yet.
+    /// No frame has been received yet.
     pub const NONE: Heading = Heading {
         to: 0,
         own: STREAM,
@@ -51,7 +51,7 @@ impl Heading {
         room: 0,
     };
 
-    /// What the frame is, to a unit that it is for if it is for one.
+    /// How the frame, with this function code, addresses the unit that its id names.
     #[inline]
     pub const fn concern(&self, function: u8) -> Concern {
         match self.concern_of_all() {
@@ -60,7 +60,7 @@ impl Heading {
         }
     }
 
-    /// As [`Heading::concern`], of any function.
+    /// As [`Heading::concern`], whatever the function code.
     #[inline(always)]
     pub const fn concern_of_all(&self) -> Concern {
         if self.length == 0 {
@@ -72,7 +72,7 @@ impl Heading {
         }
     }
 
-    /// True if everybody is meant.
+    /// True if the frame is a broadcast.
     #[inline]
     pub const fn is_broadcast(&self) -> bool {
         self.is_serial() && self.to == 0
@@ -84,14 +84,14 @@ impl Heading {
         self.own == SERIAL
     }
 
-    /// True if a unit of this id is meant, by what is no broadcast.
+    /// True if a frame that is no broadcast addresses a unit with this id.
     #[inline]
     pub const fn is_for(&self, id: u8) -> bool {
         self.to == id || id == ANY || self.is_for_any()
     }
 
-    /// True if the server itself is meant, by what is no broadcast. In a stream, the ids 0
-    /// and 255 mean it (messaging on TCP/IP guide V1.0b, 4.4.1.2).
+    /// True if a frame that is no broadcast addresses the server itself. In a stream the ids 0
+    /// and 255 do (messaging on TCP/IP guide V1.0b, 4.4.1.2).
     #[inline]
     pub const fn is_for_any(&self) -> bool {
         self.to == 0 || self.to == self.own
@@ -103,8 +103,8 @@ pub const SERIAL: u8 = 0;
 /// [`Heading::own`] in a stream.
 pub const STREAM: u8 = 255;
 
-/// True for functions that only write, and those that users define: others are
-/// not carried out when they are broadcast (serial line guide V1.02, 2.1).
+/// True for functions that only write and for user-defined functions. Other functions are
+/// not carried out if they are broadcast (serial line guide V1.02, 2.1).
 #[inline]
 pub const fn only_writes(function: u8) -> bool {
     matches!(

@@ -1,4 +1,4 @@
-//! What a device tells of itself: functions 07, 11 and 2B/0E.
+//! Functions 07, 11 and 2B/0E: exception status, server id, device identification.
 
 use super::Reply;
 use crate::pdu::diagnostics::{READ_EXCEPTION_STATUS, REPORT_SERVER_ID};
@@ -8,8 +8,8 @@ use crate::pdu::identification::{
 };
 use crate::pdu::limits::MAX_PDU;
 
-/// Serves 07 with eight outputs: the request PDU is the front `length` bytes of
-/// `pdu`, which the response overwrites.
+/// Serves function 07 with eight outputs. The request PDU is the first `length` bytes of
+/// `pdu`; the response overwrites it.
 pub fn serve_exception_status(outputs: u8, pdu: &mut [u8], length: usize) -> Reply {
     match pdu {
         [READ_EXCEPTION_STATUS, ..] if length != 1 => Reply::ILLEGAL_DATA_VALUE,
@@ -21,8 +21,8 @@ pub fn serve_exception_status(outputs: u8, pdu: &mut [u8], length: usize) -> Rep
     }
 }
 
-/// Serves 11, as [`serve_exception_status`]: the server's id, whether it runs,
-/// and what else it has to say.
+/// Serves function 11, with `pdu` and `length` as of [`serve_exception_status`]. The response
+/// has the server's id, the run indicator and the additional data.
 pub fn serve_server_id(
     id: &[u8],
     running: bool,
@@ -52,17 +52,17 @@ pub fn serve_server_id(
 
 /// The objects of a device identification (clause 6.21).
 pub trait Objects {
-    /// The value of an object, if there is one of this id.
+    /// The value of the object with this id; `None` if there is no such object.
     fn object(&self, id: u8) -> Option<&[u8]>;
 }
 
-/// The last object of each category.
+/// The last object id of each category.
 const LAST: [u8; 3] = [0x02, 0x7F, 0xFF];
 
-/// Bytes of a response before its objects.
+/// Bytes of a response PDU before its objects.
 const OBJECTS: usize = 7;
 
-/// Serves 2B/0E, as [`serve_exception_status`].
+/// Serves function 2B/0E, with `pdu` and `length` as of [`serve_exception_status`].
 pub fn serve_identification(objects: &impl Objects, pdu: &mut [u8], length: usize) -> Reply {
     let (code, id) = match pdu.get(..length) {
         Some([ENCAPSULATED_INTERFACE_TRANSPORT, MEI_READ_DEVICE_IDENTIFICATION, rest @ ..]) => {
@@ -87,8 +87,9 @@ pub fn serve_identification(objects: &impl Objects, pdu: &mut [u8], length: usiz
         }
         (id, id)
     } else {
-        // A category that the device does not have is answered with what it has,
-        // an object that is not in it with the first one.
+        // If the device lacks the category, the response has the highest category that the
+        // device has. If the object is not in the category, the response starts with object 0
+        // (clause 6.21).
         let index = usize::from(code.min(level)) - 1;
         let last = LAST.get(index).copied().unwrap_or(0xFF);
         let known = id <= last && objects.object(id).is_some();
@@ -113,7 +114,7 @@ pub fn serve_identification(objects: &impl Objects, pdu: &mut [u8], length: usiz
         end += 2 + value.len();
         count += 1;
     }
-    // An object that no response holds.
+    // The object is too long for a response.
     if count == 0 && next.is_some() {
         return Reply::SERVER_DEVICE_FAILURE;
     }

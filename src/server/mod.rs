@@ -1,16 +1,14 @@
-//! The server: requests in, responses out.
+//! The server: receives requests and sends responses.
 //!
-//! A request passes through three hands. A `Server` finds it on a line or
-//! connection, or `respond` takes it from a buffer. The
-//! `Units` see whether it is for one of them. The services of that unit look
-//! at its PDU one after the other, until one serves the function, and write the
-//! response over it.
+//! A request takes three steps. First a `Server` finds it on a line or connection, or
+//! `respond` takes it from a buffer. Then the unit with the request's id is looked up. Then
+//! the services of that unit get the PDU one after the other, until one of them serves the
+//! function and writes the response over the request.
 //!
-//! A service is one family of functions. Firmware carries those that it names.
+//! A service is one family of functions. Firmware carries only the services that it names.
 //!
-//! Checks come in the standard's order (clause 7): the function, the quantity,
-//! the address, and what happens while the request is carried out. A write is
-//! carried out whole or not at all.
+//! Checks come in the order of the standard (V1.1b3, clause 7): function, quantity, address,
+//! execution. A write is carried out completely or not at all.
 
 pub mod custom;
 pub mod diagnostics;

@@ -1,20 +1,19 @@
-//! What a service makes of a request, in one word: the core of a server hands
-//! it from function to function, and a microcontroller returns it in a register. It is as
-//! wide as that register: a narrower one is widened anew wherever it arrives.
+//! The result of a service, as one machine word. A function returns it in one register. A
+//! narrower type would have to be widened after each call.
 
 use crate::pdu::EXCEPTION;
 
-/// What became of a request.
+/// What a service did with a request.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
 pub struct Reply(usize);
 
 impl Reply {
-    /// The service does not serve this function; another may.
+    /// The service does not serve this function. Another service may.
     pub const NOT_MINE: Reply = Reply(0);
-    /// Carried out, or not, but there is no response.
+    /// No response is sent, whether or not the request was carried out.
     pub const SILENT: Reply = Reply(0x0200);
-    /// Not done yet: the server is to ask again, with the same request.
+    /// Not finished: the server calls the service again with the same request.
     pub const PENDING: Reply = Reply(0xFF);
 
     /// Exception 01.
@@ -23,25 +22,25 @@ impl Reply {
     pub const ILLEGAL_DATA_ADDRESS: Reply = Reply::exception(2);
     /// Exception 03.
     pub const ILLEGAL_DATA_VALUE: Reply = Reply::exception(3);
-    /// Exception 04; also where a response does not fit into the buffer.
+    /// Exception 04; also if the response does not fit into the buffer.
     pub const SERVER_DEVICE_FAILURE: Reply = Reply::exception(4);
 
-    /// A response PDU of so many bytes, 1 to 253, stands where the request stood.
+    /// A response PDU of 1 to 253 bytes has overwritten the request.
     pub const fn length(bytes: usize) -> Reply {
         Reply(bytes as u8 as usize)
     }
 
-    /// An exception response, of a code from 1 on.
+    /// An exception response with a code of 1 to 127.
     pub const fn exception(code: u8) -> Reply {
         Reply(0x0100 | code as usize)
     }
 
-    /// The number of this reply, as C sees it.
+    /// The number of this reply in the C API.
     pub const fn code(self) -> usize {
         self.0
     }
 
-    /// The reply of a number that C hands back; what is none is exception 04.
+    /// The reply for a number from the C API. An invalid number becomes exception 04.
     pub const fn from_code(code: usize) -> Reply {
         match code {
             0..=253 | 0xFF | 0x0101..=0x017F | 0x0200 => Reply(code),
@@ -49,12 +48,12 @@ impl Reply {
         }
     }
 
-    /// The reply of a number that [`Reply::code`] gave.
+    /// The reply for a number that [`Reply::code`] returned.
     pub const fn from_number(code: usize) -> Reply {
         Reply(code)
     }
 
-    /// The exception code; 0 if this is none.
+    /// The exception code; 0 if this reply is no exception.
     pub const fn exception_code(self) -> u8 {
         if self.0 & 0x0100 != 0 {
             self.0 as u8
@@ -63,8 +62,7 @@ impl Reply {
         }
     }
 
-    /// The length of a response that stands where the request stood; 0 for any
-    /// other reply.
+    /// Length of the response that has overwritten the request; 0 for any other reply.
     #[inline(always)]
     pub(super) const fn response_length(self) -> usize {
         if self.0 < Reply::PENDING.0 {
@@ -74,7 +72,7 @@ impl Reply {
         }
     }
 
-    /// This reply; exception 01 where no service served the function.
+    /// This reply, or exception 01 if no service served the function.
     #[inline(always)]
     pub(super) const fn or_illegal(self) -> Reply {
         match self {
@@ -89,7 +87,7 @@ impl Reply {
         self.or_illegal().settle_served(pdu)
     }
 
-    /// As [`Reply::settle`], of a request that was served.
+    /// As [`Reply::settle`], for a request that a service has served.
     #[inline(always)]
     pub(super) fn settle_served(self, pdu: &mut [u8]) -> usize {
         if self.0 & 0x0100 == 0 {

@@ -1,9 +1,8 @@
-//! The four tables: functions 01 to 06, 0F and 10, and 16 and 17 beside them.
+//! The four tables of the data model: functions 01 to 06, 0F and 10, and 16 and 17.
 //!
-//! One function serves every table, registers and bits, so that firmware
-//! carries it once. Checks come in the order of the standard (clause 7): the
-//! function, the quantity, the address; then it is carried out, whole or not
-//! at all.
+//! One function serves all four tables, so firmware carries it once. Checks come in the order
+//! of the standard (V1.1b3, clause 7): function, quantity, address. Then the request is
+//! carried out completely or not at all.
 
 use super::Reply;
 use crate::pdu::bits::{WRITE_MULTIPLE_COILS, WRITE_SINGLE_COIL};
@@ -13,7 +12,7 @@ use crate::pdu::limits::{
 };
 use crate::pdu::registers::{MASK_WRITE_REGISTER, READ_WRITE_MULTIPLE_REGISTERS};
 
-/// Which table, by the function that reads it.
+/// One of the four tables, named by the function that reads it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
 pub struct Kind(u8);
@@ -28,12 +27,12 @@ impl Kind {
     /// Read by 04.
     pub const INPUT_REGISTERS: Kind = Kind(4);
 
-    /// The kind of a number that C keeps.
+    /// The table for a number that the C API stores.
     pub const fn from_code(code: u8) -> Kind {
         Kind(code)
     }
 
-    /// The number of this kind.
+    /// The number of this table.
     pub const fn code(self) -> u8 {
         self.0
     }
@@ -43,8 +42,7 @@ impl Kind {
         self.0 <= Kind::DISCRETE_INPUTS.0
     }
 
-    /// Data bytes of so many cells; 0 where they are more than an address counts, which
-    /// is more than a request has.
+    /// How many data bytes `quantity` cells have; 0 for more cells than a request can have.
     const fn bytes(self, quantity: usize) -> usize {
         if self.is_bits() {
             quantity.wrapping_add(7) >> 3
@@ -57,7 +55,7 @@ impl Kind {
     }
 }
 
-/// What is done with cells.
+/// The direction of a transfer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Way {
     /// From the cells into the data.
@@ -66,37 +64,36 @@ pub enum Way {
     Write,
 }
 
-/// The cells of a table.
+/// The cells of a table: registers or bits.
 pub trait Cells {
-    /// True if all of `quantity` cells from `address` on are there, and none
-    /// of them lies beyond 65535.
+    /// True if all of the `quantity` cells from `address` on exist. None may lie beyond
+    /// address 65535.
     fn covers(&self, address: u16, quantity: u16) -> bool;
 
-    /// Moves cells that are there from or into data as on the wire: registers
-    /// high byte first, bits lowest first, unused bits 0.
+    /// Copies existing cells to or from `data`, which is as on the wire: registers high byte
+    /// first, bits lowest first, unused bits 0.
     fn transfer(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]);
 
-    /// Asked before cells are written, with the data as on the wire; an
-    /// exception code refuses, 0 allows.
+    /// Called before cells are written, with the data as on the wire. An exception code
+    /// refuses the request; 0 allows it.
     fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
         let _ = (address, quantity, data);
         0
     }
 
-    /// Told what was written.
+    /// Called after cells were written.
     fn after(&mut self, address: u16, quantity: u16) {
         let _ = (address, quantity);
     }
 }
 
-/// What serving a request needs of [`Cells`]; an object, so that firmware carries
-/// what serves less common functions once for all kinds of them.
+/// The part of [`Cells`] that the less common functions need. They take it as a trait object,
+/// so firmware carries them once for all tables.
 pub trait Access {
-    /// Carries out what a request does to `quantity` cells, which are `bytes` bytes of
-    /// data: their address stands behind the first byte of `pdu`, their data where `role`
-    /// says. The reply; [`Reply::ILLEGAL_DATA_ADDRESS`] where a cell is not there. To read
-    /// 0 bytes, for which there is room anywhere, is [`Reply::SERVER_DEVICE_FAILURE`] where
-    /// all are there.
+    /// Reads or writes `quantity` cells, which are `bytes` bytes of data. Their address follows
+    /// the first byte of `pdu`; `role` says where in `pdu` the data are. Returns
+    /// [`Reply::ILLEGAL_DATA_ADDRESS`] if a cell does not exist. A read of 0 bytes only checks
+    /// the address: it returns [`Reply::SERVER_DEVICE_FAILURE`] if all cells exist.
     fn access(&mut self, role: Role, quantity: usize, bytes: usize, pdu: &mut [u8]) -> Reply;
 }
 
@@ -132,33 +129,33 @@ impl<T: Cells> Access for T {
     }
 }
 
-/// The response of a write repeats the head of the request.
+/// The response of a write repeats the first five bytes of the request.
 pub const WRITTEN: Reply = Reply::length(5);
 
-/// What a request does to a table: where in its PDU, or in that of its response,
-/// the data of cells stand.
+/// What a request does to a table. The number is the index of the data in the PDU, for a read
+/// in the PDU of the response.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
 pub struct Role(Small);
 
-/// A number below 256 that is passed in a register of its own.
+/// A number below 256, in the type that the machine passes in one register.
 #[cfg(target_arch = "avr")]
 pub type Small = u8;
-/// A number below 256 that is passed in a register of its own.
+/// A number below 256, in the type that the machine passes in one register.
 #[cfg(not(target_arch = "avr"))]
 pub type Small = usize;
 
 impl Role {
-    /// Nothing.
+    /// The function does nothing to the table.
     pub const NONE: Role = Role(0);
     /// Reads cells.
     pub const READ: Role = Role(2);
-    /// Writes one.
+    /// Writes one cell.
     pub const WRITE_ONE: Role = Role(3);
-    /// Writes any number.
+    /// Writes several cells.
     pub const WRITE_SEVERAL: Role = Role(6);
 
-    /// Where in the PDU the data of the cells stand.
+    /// Index of the data in the PDU.
     #[inline(always)]
     #[allow(clippy::unnecessary_cast)] // It is needed on an AVR.
     pub const fn data(self) -> usize {
@@ -166,11 +163,11 @@ impl Role {
     }
 }
 
-// As many bytes of bits as of registers.
+// The greatest requests for bits and for registers have as many data bytes.
 const _: () = assert!(MAX_READ_REGISTERS * 16 == MAX_READ_BITS);
 const _: () = assert!(MAX_WRITE_REGISTERS * 16 == MAX_WRITE_BITS);
 
-/// What a function does to a table of this kind.
+/// What a function does to this table.
 #[inline(always)]
 pub const fn role(kind: Kind, function: u8) -> Role {
     if function == kind.0 {
@@ -187,15 +184,15 @@ pub const fn role(kind: Kind, function: u8) -> Role {
     Role::NONE
 }
 
-/// Serves a request for a table, if it is one: the request PDU is the front
-/// `length` bytes of `pdu`, which the response overwrites.
+/// Serves a request to a table. The request PDU is the first `length` bytes of `pdu`; the
+/// response overwrites it. [`Reply::NOT_MINE`] if the function is not for this table.
 #[cfg_attr(target_os = "none", inline(never))]
 pub fn serve(kind: Kind, cells: &mut impl Access, pdu: &mut [u8], length: usize) -> Reply {
     let function = pdu.first().copied().unwrap_or(0);
     serve_as(role(kind, function), kind, cells, pdu, length)
 }
 
-/// As [`serve`], of a request that does this to the table.
+/// As [`serve`], once it is known what the function does to the table.
 #[inline(always)]
 pub fn serve_as(
     role: Role,
@@ -213,7 +210,7 @@ pub fn serve_as(
     };
     let mut quantity = word(*c, *d);
     if role == Role::WRITE_ONE {
-        // A coil is on with FF00, and off with 0000.
+        // FF00 switches a coil on, 0000 off.
         if kind.is_bits() && (*d != 0 || c.wrapping_add(1) > 1) {
             return Reply::ILLEGAL_DATA_VALUE;
         }
@@ -232,25 +229,25 @@ pub fn serve_as(
     if !is_right || bytes.wrapping_sub(1) >= MOST_READ {
         return Reply::ILLEGAL_DATA_VALUE;
     }
-    // A response that does not fit fails once its cells have turned out to be there.
+    // A response that does not fit is exception 04, but only after the address check.
     if role == Role::READ && pdu.len() < 2 + bytes {
         bytes = 0;
     }
     cells.access(role, quantity, bytes, pdu)
 }
 
-/// Most bytes of cells that one request reads, be they bits or registers.
+/// Most data bytes that one request reads, of bits or registers.
 const MOST_READ: usize = 2 * MAX_READ_REGISTERS as usize;
-/// Most bytes of cells that one request writes.
+/// Most data bytes that one request writes.
 const MOST_WRITTEN: usize = 2 * MAX_WRITE_REGISTERS as usize;
 
-/// A word of the wire, high byte first.
+/// A 16-bit word from the wire, high byte first.
 #[inline(always)]
 const fn word(high: u8, low: u8) -> usize {
     (high as usize) << 8 | low as usize
 }
 
-/// The response of a read whose data are there.
+/// Completes the response of a read whose data have been copied.
 #[inline(always)]
 fn counted(pdu: &mut [u8], bytes: usize) -> Reply {
     if let Some(count) = pdu.get_mut(1) {
@@ -287,7 +284,7 @@ fn mask_write(cells: &mut (impl Access + ?Sized), pdu: &mut [u8], length: usize)
         return Reply::ILLEGAL_DATA_ADDRESS;
     }
     let [_, _, high, low, _] = cell;
-    // The AND mask, and the OR mask.
+    // c and d are the AND mask, e and f the OR mask.
     let (high, low) = ((high & c) | (e & !c), (low & d) | (f & !d));
     match cells.access(Role::WRITE_ONE, 1, 2, &mut [0, a, b, high, low]) {
         WRITTEN => Reply::length(7),
@@ -316,7 +313,7 @@ fn read_write(cells: &mut (impl Access + ?Sized), pdu: &mut [u8], length: usize)
     if !has(0, quantity) || !has(WRITES, written) {
         return Reply::ILLEGAL_DATA_ADDRESS;
     }
-    // Nothing is written that could not be answered.
+    // Do not write if the response would not fit.
     if pdu.len() < 2 + bytes {
         return Reply::SERVER_DEVICE_FAILURE;
     }
@@ -327,5 +324,6 @@ fn read_write(cells: &mut (impl Access + ?Sized), pdu: &mut [u8], length: usize)
     }
 }
 
-/// Where in a request of function 17 a request to write begins, but for its function.
+/// Index in a request of function 17 at which its write part begins. That part is laid out as
+/// a write request without function code.
 const WRITES: usize = 4;

@@ -1,4 +1,4 @@
-//! What a sniffer tells of.
+//! The events that a sniffer reports.
 
 use super::pairing::Asked;
 use crate::error::Status;
@@ -7,7 +7,7 @@ use crate::pdu::custom::Function;
 use crate::pdu::request::Request;
 use crate::pdu::response::Response;
 
-/// What happened on the bus.
+/// The kind of an event.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Kind {
@@ -17,53 +17,51 @@ pub enum Kind {
     Reply,
     /// The exception that answers a request.
     Exception,
-    /// A reply or exception that answers no request that waits for one: a late
-    /// one, or one whose request was not seen, or that is malformed.
+    /// A reply or exception without an open request: it is late, its request was not seen, or
+    /// it is malformed.
     Unpaired,
-    /// A request that nobody answered.
+    /// A request without a reply.
     Timeout,
-    /// What looks like a frame, but is damaged.
+    /// A damaged frame.
     BadCrc,
-    /// Bytes that are no frame.
+    /// Bytes that are not a frame.
     Noise,
 }
 
-/// Something that happened on the bus.
+/// An event on the bus.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Event<'a> {
-    /// What happened.
+    /// The kind of event.
     pub kind: Kind,
-    /// [`Status::OK`]; of a request the fault that a server answers; the
-    /// exception's code; [`Status::MALFORMED_REPLY`] if a reply answers not what
-    /// was asked; [`Status::RESPONSE_TIMED_OUT`]; [`Status::INVALID_CRC`];
-    /// [`Status::BUFFER_TOO_SMALL`] of noise that may have been a frame longer
+    /// [`Status::OK`], or: of a request, the exception that a server would respond with; of an
+    /// exception, its code; [`Status::MALFORMED_REPLY`] of a reply that does not answer the
+    /// request; [`Status::RESPONSE_TIMED_OUT`] of a timeout; [`Status::INVALID_CRC`] of a
+    /// damaged frame; [`Status::BUFFER_TOO_SMALL`] of noise that may have been a frame longer
     /// than the buffer.
     pub status: Status,
-    /// When its last byte arrived, in microseconds; of a timeout when the request
-    /// was given up.
+    /// Time of the last byte, in microseconds; of a timeout, the time at which it expired.
     pub time: u32,
-    /// From the last byte of the request to the last byte of its reply, or until
-    /// it was given up; else 0.
+    /// Microseconds from the last byte of the request to the last byte of its reply, or to the
+    /// timeout; otherwise 0.
     pub response_time: u32,
-    /// The transaction identifier of a TCP frame, else 0.
+    /// The transaction identifier of a TCP frame; otherwise 0.
     pub transaction: u16,
-    /// Who was asked or answers; of a damaged frame what stands in its place.
+    /// The unit id. Of a damaged frame, the byte in its place.
     pub unit: u8,
-    /// The function code, without the mark of exceptions; as [`Event::unit`].
+    /// The function code without the exception bit. Of a damaged frame, the byte in its place.
     pub function: u8,
-    /// The frame. An ASCII frame is decoded, from the unit to the LRC. Empty for
-    /// a timeout.
+    /// The frame; empty for a timeout. An ASCII frame is decoded, from the unit to the LRC.
     pub frame: &'a [u8],
-    /// The PDU in it; empty if there is none.
+    /// The PDU in the frame; empty if there is none.
     pub pdu: &'a [u8],
-    /// How many bytes on the line this was.
+    /// How many bytes of the line the event covers.
     pub length: usize,
-    /// What was asked; of replies and timeouts.
+    /// The start of the request, for replies and timeouts.
     pub asked: Option<Asked>,
 }
 
 impl Kind {
-    /// The kind of a number that C hands back.
+    /// The kind for a number from the C API.
     pub const fn from_code(code: u8) -> Option<Kind> {
         match code {
             0 => Some(Kind::Request),
@@ -79,7 +77,7 @@ impl Kind {
 }
 
 impl<'a> Event<'a> {
-    /// What a request asks for, if it can be read.
+    /// The request, if the event is a request that can be parsed.
     pub fn request(&self, functions: &[Function]) -> Option<Request<'a>> {
         match self.kind {
             Kind::Request => Request::parse_with(self.pdu, functions).ok(),
@@ -87,7 +85,7 @@ impl<'a> Event<'a> {
         }
     }
 
-    /// What a reply or exception says, if it can be read.
+    /// The response, if the event is a reply or exception that can be parsed.
     pub fn response(&self, functions: &[Function]) -> Option<Response<'a>> {
         match self.kind {
             Kind::Reply | Kind::Exception | Kind::Unpaired => {
@@ -97,7 +95,7 @@ impl<'a> Event<'a> {
         }
     }
 
-    /// What this is about: its request, or what of that a reply is known to answer.
+    /// The start of the request that this event is, or that it belongs to, if known.
     pub fn subject(&self) -> Option<Asked> {
         match self.kind {
             Kind::Request => Some(Asked::new(self.pdu)),
@@ -105,7 +103,7 @@ impl<'a> Event<'a> {
         }
     }
 
-    /// Writes the event as one line of words.
+    /// Writes the event as one line of text.
     pub fn explain(&self, line: &mut Line) {
         let asked = self.asked.as_ref().map_or(&[][..], Asked::head);
         match self.kind {

@@ -1,66 +1,65 @@
-//! Bytes as they arrived, and when: one stream of a bus.
+//! One stream of a bus: its bytes, and the times at which they arrived.
 
 use crate::time::elapsed;
 use core::cell::Cell;
 
-/// When bytes arrived: those up to `end`, the last of them at `time`.
+/// The time of arrival of bytes: the last byte before `end` arrived at `time`.
 #[derive(Clone, Copy, Debug)]
 struct Mark {
     time: u32,
     end: u16,
     /// The line was silent after them.
     silent: bool,
-    /// As large on every core, for the sake of the storage that C sets aside.
+    /// Padding, so that the struct has the same size on every core. The C struct counts on it.
     _even: u8,
 }
 
 const MARKS: usize = 8;
 
-/// How time tells bytes apart, in microseconds.
+/// The times that separate frames, in microseconds.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Timing {
-    /// One character on the line; 0 if that is not known.
+    /// Time of one character; 0 if it is unknown.
     pub character: u32,
-    /// What separates two frames.
+    /// Silence between two frames.
     pub silence: u32,
-    /// How long an incomplete frame is waited for.
+    /// How long to wait for the rest of an incomplete frame.
     pub patience: u32,
 }
 
 impl Timing {
-    /// How long so many characters take on the line; 0 if that is not known.
+    /// Time of `count` characters on the line; 0 if it is unknown.
     fn on_the_line(&self, count: usize) -> u32 {
         self.character.saturating_mul(count as u32)
     }
 }
 
-/// A window over what has arrived. The buffer is the caller's and is passed to
-/// each call.
+/// The state of one stream. The caller passes the buffer to each call.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lane {
-    /// Where what was not yet told of begins, where a frame is looked for, and
-    /// where what arrived ends. No frame begins between the first two.
+    /// Index of the first byte that was not reported yet, of the byte at which a frame is looked
+    /// for, and of the end of the received bytes. No frame begins between the first two.
     pub start: u16,
     pub at: u16,
     pub end: u16,
-    /// Characters of an ASCII frame at `at` that were decoded in place.
+    /// How many characters of the ASCII frame at `at` were decoded in place.
     pub decoded: u16,
-    /// Bytes to come that belong to what was told of already.
+    /// How many of the next bytes belong to an event that was already reported.
     pub skip: u16,
-    /// Of an ASCII frame: how many bytes from `at` on were searched for its end.
+    /// How many bytes from `at` on were already searched for the end of an ASCII frame.
     pub searched: u16,
-    /// Nothing can be found before the lane has bytes up to here...
+    /// No frame can be found before the stream has bytes up to this index...
     need: u16,
-    /// A frame between `start` and `at` may have been too long for the buffer.
+    /// A frame between `start` and `at` may be too long for the buffer.
     pub cut: bool,
     heard: bool,
     count: u8,
-    /// How many marks are silent.
+    /// How many marks are followed by silence.
     silent: u8,
-    /// When the last byte arrived, and the last before the first mark.
+    /// Time of the last byte, and of the last byte before the first mark.
     last: u32,
     floor: u32,
-    /// ...or has been silent for so long.
+    /// ...or the line has been silent for this time.
     calm: u32,
     marks: [Mark; MARKS],
 }
@@ -93,7 +92,7 @@ impl Lane {
         self.start == self.end
     }
 
-    /// True if nothing more can be taken while a frame is waited for.
+    /// True if the stream can take no more bytes until a frame is consumed.
     pub fn is_full(&self, capacity: usize) -> bool {
         usize::from(self.end - self.start) >= capacity || usize::from(self.silent) == MARKS
     }
@@ -119,8 +118,8 @@ impl Lane {
         self.count = self.count.saturating_sub(1);
     }
 
-    /// Takes a byte that arrived now if it goes on with what arrived last, as most
-    /// do: all that [`Lane::feed`] does then. False if it does not.
+    /// Takes one byte that follows the previous byte without silence, the most frequent case of
+    /// [`Lane::feed`]. False, and nothing taken, in all other cases.
     #[inline(always)]
     pub fn feed_next(&mut self, buffer: &mut [u8], byte: u8, now: u32, timing: &Timing) -> bool {
         let gap = elapsed(now, self.last).saturating_sub(timing.character);
@@ -135,7 +134,7 @@ impl Lane {
         true
     }
 
-    /// Takes bytes of which the last arrived now; how many there was room for.
+    /// Takes bytes, the last of which arrived now. Returns how many fitted into the buffer.
     pub fn feed(&mut self, buffer: &mut [u8], bytes: &[u8], now: u32, timing: &Timing) -> usize {
         if bytes.is_empty() {
             return 0;
@@ -177,7 +176,7 @@ impl Lane {
         skipped.len() + count
     }
 
-    /// Ends the last mark with a silence; false if there is no place for another.
+    /// Notes that silence follows the last mark. False if there is no free mark.
     fn begin_piece(&mut self) -> bool {
         self.need = 0;
         if let Some(mark) = self.last_mark().filter(|mark| !mark.silent) {
@@ -194,7 +193,7 @@ impl Lane {
         true
     }
 
-    /// Notes that `count` bytes more stand in the buffer, and when they arrived.
+    /// Notes that the buffer holds `count` more bytes, and the time of the last one.
     #[inline(always)]
     fn mark(&mut self, count: u16, time: u32, is_new: bool, timing: &Timing) {
         self.last = time;
@@ -221,9 +220,8 @@ impl Lane {
         }
     }
 
-    /// Says that there is nothing to find before `need` bytes stand where a frame is
-    /// looked for, or the line has been silent for longer than now, or
-    /// [`Lane::look_again`].
+    /// Notes that no frame can be found before `need` bytes have arrived from `at` on, the line
+    /// has been silent for longer than now, or [`Lane::look_again`] is called.
     pub fn settle(&mut self, need: usize, capacity: usize, now: u32, timing: &Timing) {
         let need = (usize::from(self.at) + need).min(usize::from(self.start) + capacity);
         self.need = need.min(u16::MAX.into()) as u16;
@@ -237,12 +235,12 @@ impl Lane {
         self.need = 0;
     }
 
-    /// True if there is nothing to find yet: see [`Lane::settle`].
+    /// True if no frame can be found yet: see [`Lane::settle`].
     pub fn is_settled(&self, now: u32) -> bool {
         self.end < self.need && self.quiet(now) < self.calm
     }
 
-    /// Looks for a frame one byte further on.
+    /// Moves the search for a frame on by one byte.
     pub fn pass(&mut self) {
         self.at += 1;
         self.searched = 0;
@@ -284,12 +282,12 @@ impl Lane {
         elapsed(now, self.last)
     }
 
-    /// True if the line was silent after some of what arrived, or is so now.
+    /// True if silence follows some of the received bytes, or the line is silent now.
     pub fn has_silence(&self, now: u32, timing: &Timing) -> bool {
         self.silent > 0 || self.quiet(now) >= timing.silence
     }
 
-    /// Where the next silence behind `at` is, among what arrived.
+    /// The indexes after `at` at which the received bytes are followed by silence.
     pub fn silences(&self, at: u16) -> impl Iterator<Item = u16> + '_ {
         let marks = if self.silent > 0 { self.marks() } else { &[] };
         marks
@@ -298,7 +296,7 @@ impl Lane {
             .map(|mark| mark.end)
     }
 
-    /// When the byte before `offset` arrived.
+    /// The time at which the byte before `offset` arrived.
     pub fn time(&self, offset: u16, timing: &Timing) -> u32 {
         let mut floor = self.floor;
         for mark in self.marks() {
@@ -311,7 +309,7 @@ impl Lane {
         self.last
     }
 
-    /// How long the first byte that was not told of is there; 0 if there is none.
+    /// How long ago the first unreported byte arrived; 0 if there is none.
     pub fn waited(&self, now: u32, timing: &Timing) -> u32 {
         if self.is_empty() {
             0
@@ -320,7 +318,7 @@ impl Lane {
         }
     }
 
-    /// Has everything before `offset` told of.
+    /// Marks all bytes before `offset` as reported.
     pub fn consume(&mut self, offset: u16) {
         while let Some(first) = self.marks().first() {
             if first.end > offset {

@@ -1,4 +1,4 @@
-//! Requests that wait for their replies.
+//! Pairs requests with replies.
 
 use crate::packet::Side;
 use crate::pdu::custom::Function;
@@ -9,7 +9,7 @@ use crate::pdu::{bits, diagnostics, files, identification, registers, EXCEPTION}
 
 pub use crate::explain::HEAD;
 
-/// The first bytes of a request PDU, which say what its reply means.
+/// The first bytes of a request PDU. They are needed to interpret its reply.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Asked {
     head: [u8; HEAD],
@@ -32,7 +32,7 @@ impl Asked {
         asked
     }
 
-    /// What was kept of the request PDU, from its function code on.
+    /// The stored bytes of the request PDU, from the function code on.
     pub fn head(&self) -> &[u8] {
         self.head.get(..self.length.into()).unwrap_or_default()
     }
@@ -50,7 +50,8 @@ impl Asked {
         function
     }
 
-    /// The first address, of 17 that is read; 0 where there is none.
+    /// The first address, of function 17 the first address to read; 0 if the function has no
+    /// address.
     pub fn address(&self) -> u16 {
         match self.function() {
             1..=6 | 0x0F | 0x10 | 0x16..=0x18 => self.word(1),
@@ -58,7 +59,7 @@ impl Asked {
         }
     }
 
-    /// How many, of 17 that are read; 0 where that is not said.
+    /// The quantity, of function 17 the quantity to read; 0 if the function has no quantity.
     pub fn quantity(&self) -> u16 {
         match self.function() {
             1..=4 | 0x0F | 0x10 | 0x17 => self.word(3),
@@ -71,13 +72,13 @@ impl Asked {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum State {
     Free,
-    /// Waits for its reply.
+    /// The request waits for its reply.
     Open,
-    /// Was given up; its reply may still come.
+    /// The request has timed out. Its reply may still come.
     Late,
 }
 
-/// A request that was seen.
+/// A request on the bus.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slot {
     pub state: State,
@@ -85,7 +86,7 @@ pub(super) struct Slot {
     pub transaction: u16,
     pub time: u32,
     pub asked: Asked,
-    /// The whole request's and the reply's bytes; 0 if only the reply tells.
+    /// Lengths of the request PDU and of its reply PDU; 0 if only the reply shows its length.
     length: u8,
     reply: u8,
 }
@@ -101,7 +102,8 @@ impl Slot {
         reply: 0,
     };
 
-    /// True if a response with this head comes from whom was asked.
+    /// True if a response with this start comes from the unit, and has the function and the
+    /// transaction identifier, of the request.
     fn is_of(&self, unit: u8, transaction: u16, pdu: &[u8]) -> bool {
         self.unit == unit
             && self.transaction == transaction
@@ -110,7 +112,7 @@ impl Slot {
                 .is_some_and(|code| code & !EXCEPTION == self.asked.function())
     }
 
-    /// True if this PDU answers the request, its length and what it repeats.
+    /// True if this PDU has the length of the reply and repeats what the reply must repeat.
     fn is_answered_by(&self, pdu: &[u8]) -> bool {
         if pdu.first().is_some_and(|code| code & EXCEPTION != 0) {
             return pdu.len() == 2;
@@ -128,7 +130,8 @@ impl Slot {
                 Some(&identification::MEI_READ_DEVICE_IDENTIFICATION) => 3,
                 _ => 2,
             },
-            // Three bytes of coils make a reply as long as the request.
+            // A reply with three bytes of coils is as long as the request. An equal PDU is the
+            // request again.
             bits::READ_COILS | bits::READ_DISCRETE_INPUTS if pdu == head => return false,
             _ => 1,
         };
@@ -136,14 +139,14 @@ impl Slot {
         repeats && (self.reply == 0 || usize::from(self.reply) == pdu.len())
     }
 
-    /// True if this PDU is the request once more.
+    /// True if this PDU is the same request again.
     fn is_repeated_by(&self, pdu: &[u8]) -> bool {
         usize::from(self.length) == pdu.len() && pdu.starts_with(self.asked.head())
     }
 }
 
-/// How long ago something was, up to half an hour; what came behind `now`, heard
-/// in the other direction, has no age.
+/// Microseconds from `time` to `now`, up to half an hour. 0 if `time` is after `now`, which
+/// happens if the bytes of the other direction were fed later.
 pub(super) fn age(now: u32, time: u32) -> u32 {
     match now.wrapping_sub(time) {
         age if age <= u32::MAX / 2 => age,
@@ -151,35 +154,36 @@ pub(super) fn age(now: u32, time: u32) -> u32 {
     }
 }
 
-/// What a PDU is.
+/// What a PDU is to the requests on the bus.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Role {
     Request,
-    /// Answers the request in this place, which is open or was given up.
+    /// The reply to the request at this index, which is open or has timed out.
     Reply(usize),
-    /// Answers nothing; true if its unit and function were asked something else.
+    /// A response without a request; true if a request with its unit and function is open,
+    /// which it does not answer.
     Unpaired(bool),
 }
 
-/// A frame as the requests see it.
+/// A frame, as the pairing needs it.
 #[derive(Clone, Copy)]
 pub(super) struct Seen<'a> {
     pub unit: u8,
     pub transaction: u16,
     pub pdu: &'a [u8],
-    /// What its length allows it to be.
+    /// Whether its length allows it to be a request, and a response.
     pub request: bool,
     pub response: bool,
 }
 
-/// How many requests may wait at once: as many as a TCP server may have under
-/// way (messaging on TCP/IP guide V1.0b, 4.4.1.3).
+/// How many requests may be open at once: as many as a TCP server may have in progress
+/// (messaging on TCP/IP guide V1.0b, 4.4.1.3).
 pub(super) const SLOTS: usize = 16;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Requests {
     slots: [Slot; SLOTS],
-    /// How many of them were used since all were free.
+    /// All slots from this index on are free.
     used: u8,
 }
 
@@ -197,7 +201,7 @@ impl Requests {
         self.slots.get_mut(..self.used.into()).unwrap_or_default()
     }
 
-    /// Leaves free slots at the end out of all searches.
+    /// Excludes free slots at the end from all searches.
     fn trim(&mut self) {
         let last = self
             .used()
@@ -232,7 +236,7 @@ impl Requests {
         found.map(|(index, _)| index)
     }
 
-    /// For how long from now on nothing is overdue or to be forgotten.
+    /// Microseconds from now until the next request times out or is to be forgotten.
     pub fn calm(&self, now: u32, timeout: u32, old: u32) -> u32 {
         let ends = self.used().iter().map(|slot| match slot.state {
             State::Free => u32::MAX / 2,
@@ -242,12 +246,12 @@ impl Requests {
         ends.min().unwrap_or(u32::MAX / 2)
     }
 
-    /// A request that is open for `timeout` or longer.
+    /// The earliest request that has been open for `timeout` or longer.
     pub fn overdue(&self, now: u32, timeout: u32) -> Option<usize> {
         self.earliest(now, State::Open, |slot| age(now, slot.time) >= timeout)
     }
 
-    /// Forgets what was asked `old` ago or longer and was given up.
+    /// Forgets requests that have timed out and are `old` or older.
     pub fn forget(&mut self, now: u32, old: u32) {
         for slot in self.used_mut() {
             if slot.state == State::Late && age(now, slot.time) >= old {
@@ -257,7 +261,8 @@ impl Requests {
         self.trim();
     }
 
-    /// The data of 08/00 are as many as were sent.
+    /// Length of the reply to an open request of function 08, whose data repeat those of the
+    /// request.
     pub fn reply_length(&self, unit: u8, pdu: &[u8]) -> Option<usize> {
         let slot = self.used().iter().find(|slot| {
             slot.state == State::Open
@@ -269,14 +274,14 @@ impl Requests {
             .then_some(slot.reply.into())
     }
 
-    /// True if this answers an open request.
+    /// True if a request with this unit and function is open.
     pub fn is_waiting(&self, unit: u8, pdu: &[u8]) -> bool {
         self.used()
             .iter()
             .any(|slot| slot.state == State::Open && slot.is_of(unit, slot.transaction, pdu))
     }
 
-    /// What a frame is.
+    /// Decides whether a frame is a request, a reply, or a response without a request.
     pub fn role(&self, seen: &Seen, functions: &[Function], now: u32) -> Role {
         let Seen {
             unit,
@@ -290,7 +295,7 @@ impl Requests {
             if let Some(index) = self.earliest(now, State::Open, answered) {
                 return Role::Reply(index);
             }
-            // What looks like the request is the request once more.
+            // A frame that equals the request is the request again.
             let late = |slot: &Slot| answered(slot) && !(seen.request && slot.is_repeated_by(pdu));
             if let Some(index) = self.earliest(now, State::Late, late) {
                 return Role::Reply(index);
@@ -309,8 +314,8 @@ impl Requests {
         }
     }
 
-    /// An open request that a new one ends: on a serial line any, elsewhere that
-    /// of the same transaction; or the earliest, if there is no place for another.
+    /// The open request that a new request ends: on a serial line any request, on TCP the one
+    /// with the same transaction identifier. If all slots are open, the earliest request.
     pub fn ended_by(&self, seen: &Seen, one_at_a_time: bool, now: u32) -> Option<usize> {
         let same = |slot: &Slot| {
             one_at_a_time || (slot.unit == seen.unit && slot.transaction == seen.transaction)
@@ -325,7 +330,7 @@ impl Requests {
         })
     }
 
-    /// Keeps a request, if there is to be a reply to it.
+    /// Stores a request that has a reply.
     pub fn keep(&mut self, seen: &Seen, is_broadcast: bool, functions: &[Function], time: u32) {
         let Seen {
             unit,

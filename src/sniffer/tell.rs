@@ -1,4 +1,4 @@
-//! What was found becomes an event.
+//! Turns what the sniffer found into events.
 
 use super::event::{Event, Kind};
 use super::find::{Context, MIN_RTU};
@@ -12,7 +12,7 @@ use crate::pdu::response::Response;
 use crate::pdu::EXCEPTION;
 
 impl Sniffer {
-    /// Tells of a request that nobody answered.
+    /// Reports the timeout of a request.
     pub(super) fn give_up<'b>(&mut self, index: usize, now: u32) -> Event<'b> {
         let slot = self.requests.get(index);
         self.requests.set_state(index, State::Late);
@@ -32,7 +32,7 @@ impl Sniffer {
         }
     }
 
-    /// Makes an event of a step, and goes on behind it.
+    /// Turns a step into an event, and moves the stream past it.
     pub(super) fn tell<'b>(
         &mut self,
         buffer: &'b mut [u8],
@@ -60,7 +60,7 @@ impl Sniffer {
                     || (end == lane.end && lane.quiet(now) >= timing.silence);
                 let time = lane.time(end, &timing);
                 let event = junk(framing, &context, bytes, status, is_ended);
-                // The rest of what is too long is so too.
+                // The rest of a frame that is too long belongs to it.
                 let cut = lane.cut && !is_ended;
                 lane.consume(end);
                 lane.cut = cut;
@@ -82,7 +82,7 @@ impl Sniffer {
                 let bytes = bytes.get(..content).unwrap_or_default();
                 let told = self.frame(functions, bytes, right, time, is_early);
                 if told.kind == Kind::Timeout {
-                    // The frame itself comes next.
+                    // The frame itself is the next event.
                     return told;
                 }
                 self.split(functions, index, now).1.consume(end);
@@ -94,7 +94,7 @@ impl Sniffer {
         }
     }
 
-    /// Tells of a frame, or of a request that was given up before it.
+    /// Reports a frame, or first the timeout of a request that ended before the frame.
     fn frame<'b>(
         &mut self,
         functions: &[Function],
@@ -183,7 +183,7 @@ fn content(framing: Framing, frame: &[u8]) -> (u16, u8, &[u8]) {
     }
 }
 
-/// What a response says of itself.
+/// The status of a response PDU.
 fn answer(pdu: &[u8], functions: &[Function]) -> Status {
     match (Response::parse_with(pdu, functions), pdu) {
         (Err(refused), _) => refused,
@@ -192,8 +192,8 @@ fn answer(pdu: &[u8], functions: &[Function]) -> Status {
     }
 }
 
-/// Tells of bytes in which there is no frame. On a line of RTU frames they are a
-/// damaged one if they have its length, or stand alone and begin like one.
+/// Reports bytes without a frame. On an RTU line they are a damaged frame if they have the
+/// length of a frame, or if silence surrounds them and they begin like a frame.
 fn junk<'b>(
     framing: Framing,
     context: &Context,
