@@ -1,5 +1,5 @@
-//! The world in which one input runs: memory, choices, time, and the calls that
-//! are under way.
+//! The state of one run: memory, the choices of the input, time, and the calls that have not
+//! returned yet.
 
 use super::ports::Port;
 use mbm_c::*;
@@ -7,34 +7,35 @@ use std::alloc::{alloc_zeroed, dealloc, Layout};
 use std::cell::{Cell, RefCell};
 use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU64, Ordering};
 
-/// API calls of all inputs so far.
+/// The number of API calls of all inputs so far.
 pub static CALLS: AtomicU64 = AtomicU64::new(0);
-/// Whether each call is printed, with its arguments and what it returned.
+/// Whether to print each call with its arguments and its return value.
 pub static TRACE: AtomicBool = AtomicBool::new(false);
-/// The world of the input that runs, for hooks: a context may be NULL.
+/// The state of the current run. Hooks use it because their context may be NULL.
 static CURRENT: AtomicPtr<World> = AtomicPtr::new(std::ptr::null_mut());
 
-/// Calls of hooks in one call of the top level. A call that needs more never ends.
+/// The greatest number of hook calls within one call at the top level. A call that makes more
+/// is assumed never to end.
 const MOST_HOOKS: u32 = 300_000;
-/// API calls in one input, so that no input takes long.
+/// The greatest number of API calls of one input. It limits the time of a run.
 const MOST_CALLS: u32 = 4_000;
 
-/// What a hook may do with the object whose call is under way.
+/// What a hook may do with the object whose call it interrupts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Grant {
-    /// Nothing: it is refused.
+    /// Nothing: calls are refused.
     Nothing,
     /// Everything.
     All,
 }
 
-/// A call that is under way.
+/// A call that has not returned yet.
 struct Frame {
     object: *const u8,
     grant: Cell<Grant>,
 }
 
-/// Objects of one type, each a block of the heap of its own.
+/// Objects of one type, each in its own block of the heap.
 pub struct Pool<T>(RefCell<Vec<*mut T>>);
 
 impl<T> Pool<T> {
@@ -42,7 +43,7 @@ impl<T> Pool<T> {
         Pool(RefCell::new(Vec::new()))
     }
 
-    /// All of them.
+    /// All objects.
     pub fn all(&self) -> Vec<*mut T> {
         self.0.borrow().clone()
     }
@@ -60,14 +61,14 @@ impl<T> Pool<T> {
         }
     }
 
-    /// A new one, zeroed.
+    /// Adds a zeroed object.
     pub fn make(&self, w: &World) -> *mut T {
         let new = w.zeroed::<T>();
         self.0.borrow_mut().push(new);
         new
     }
 
-    /// Any of them, or NULL.
+    /// The newest object, or NULL.
     pub fn any(&self) -> *mut T {
         self.0
             .borrow()
@@ -76,7 +77,7 @@ impl<T> Pool<T> {
             .unwrap_or(std::ptr::null_mut())
     }
 
-    /// Keeps one more.
+    /// Adds an object, up to 64.
     pub fn keep(&self, other: *mut T) {
         let mut all = self.0.borrow_mut();
         if all.len() < 64 {
@@ -84,7 +85,7 @@ impl<T> Pool<T> {
         }
     }
 
-    /// A copy of one, at another place.
+    /// Adds a copy of one of the objects.
     fn copy(&self, w: &World) -> *mut T {
         let from = {
             let all = self.0.borrow();
@@ -92,25 +93,25 @@ impl<T> Pool<T> {
         };
         let new = self.make(w);
         w.note(|| format!("memcpy({new:?}, {from:?}, {})", size_of::<T>()));
-        // SAFETY: two blocks of this size.
+        // SAFETY: both blocks have this size.
         unsafe { std::ptr::copy_nonoverlapping(from, new, 1) };
         new
     }
 }
 
-/// What one input runs in.
+/// The state of one run.
 pub struct World {
     input: Cell<&'static [u8]>,
     seed: Cell<u64>,
-    /// How many random steps follow the input.
+    /// How many random steps follow after the end of the input.
     more: Cell<u32>,
     depth: Cell<u32>,
     hook_calls: Cell<u32>,
     calls: Cell<u32>,
-    /// Calls made from within hooks.
+    /// The number of API calls made by hooks.
     pub inner_calls: Cell<u32>,
     pub clock: Cell<u32>,
-    /// The user zeroes and refills what the library uses at the moment.
+    /// If set, the user also zeroes and refills objects that the library is using.
     pub wild: bool,
     blocks: RefCell<Vec<(*mut u8, Layout)>>,
     frames: RefCell<Vec<Frame>>,
@@ -118,7 +119,7 @@ pub struct World {
     pub masters: Pool<mbm_master>,
     turn: Cell<*mut mbm_turn>,
     pub clients: Pool<mbm_client>,
-    /// Clients whose port a master has, or had when it was copied.
+    /// Clients whose port a master uses, or used when it was copied.
     pub lenders: RefCell<Vec<*mut mbm_client>>,
     pub requests: Pool<mbm_clientRequest>,
     pub servers: Pool<mbm_server>,
@@ -127,19 +128,19 @@ pub struct World {
     pub events: Pool<mbm_event>,
     pub views: Pool<mbm_registers>,
     pub packets: Pool<mbm_packet>,
-    /// Arrays of units, and how many there are in each.
+    /// Arrays of units, and their lengths.
     pub units: RefCell<Vec<(*mut mbm_unit, u8)>>,
     pub records: super::records::Records,
-    /// Buffers that were lent to an object; sometimes lent to another one too.
+    /// Buffers that an object uses. Sometimes a second object gets the same one.
     pub lent: RefCell<Vec<(*mut u8, usize)>>,
-    /// Units that answer what clients ask over the ports.
+    /// The unit that answers clients' requests over the ports.
     pub device: Cell<*mut mbm_unit>,
 }
 
 impl World {
-    /// The world of an input, which must outlive it.
+    /// The state for an input, which must outlive it.
     pub fn new(data: &[u8]) -> Box<World> {
-        // SAFETY: the world is dropped before the input is; see `run`.
+        // SAFETY: `run` drops the world before the input.
         let data: &'static [u8] = unsafe { std::mem::transmute(data) };
         let (head, input) = data.split_at(data.len().min(2));
         let seed = head.iter().fold(0x9E37_79B9_7F4A_7C15, |seed: u64, byte| {
@@ -182,13 +183,13 @@ impl World {
         world
     }
 
-    /// The world that runs, as a hook sees it.
+    /// The state of the current run, for hooks.
     pub fn current<'a>() -> &'a World {
-        // SAFETY: hooks run while `run` has one.
+        // SAFETY: hooks run only while `run` holds a world.
         unsafe { &*CURRENT.load(Ordering::Relaxed) }
     }
 
-    /// Whether there is nothing more to do. Behind the input come random steps.
+    /// True if the run is over. Random steps follow after the end of the input.
     pub fn is_over(&self) -> bool {
         let over = self.input.get().is_empty();
         if over && self.more.get() > 0 {
@@ -198,8 +199,8 @@ impl World {
         over || self.calls.get() >= MOST_CALLS
     }
 
-    /// A byte of the input; a random one behind its end, and in a hook, for hooks
-    /// are called often.
+    /// The next byte of the input. After its end, and in hooks, a random byte: hooks are called
+    /// so often that they would use up the input.
     pub fn byte(&self) -> u8 {
         if self.depth.get() > 0 {
             return self.random() as u8;
@@ -213,7 +214,7 @@ impl World {
         }
     }
 
-    /// A random number that follows from the input.
+    /// A pseudo-random number; the sequence depends on the input.
     pub fn random(&self) -> u32 {
         let mut seed = self.seed.get();
         seed ^= seed << 13;
@@ -232,7 +233,7 @@ impl World {
         }
     }
 
-    /// True once in `times` (at most 256).
+    /// True with a probability of 1 in `times` (at most 256).
     pub fn rarely(&self, times: usize) -> bool {
         self.below(times) == times - 1
     }
@@ -265,7 +266,7 @@ impl World {
         }
     }
 
-    /// What masters share that take turns; sometimes NULL.
+    /// The object through which masters take turns; sometimes NULL.
     pub fn turn(&self, byte: u8) -> *mut mbm_turn {
         if byte >= 0xF0 {
             return std::ptr::null_mut();
@@ -276,7 +277,7 @@ impl World {
         self.turn.get()
     }
 
-    /// A block of the heap of exactly this size, zeroed; of size 0 the end of one.
+    /// A zeroed block of the heap of exactly this size. For size 0, the end of a block.
     pub fn block(&self, size: usize, align: usize) -> *mut u8 {
         let used = if size == 0 { align } else { size };
         let layout = Layout::from_size_align(used, align).expect("a layout");
@@ -290,20 +291,20 @@ impl World {
         }
     }
 
-    /// Zeroed storage for a thing.
+    /// A zeroed block for a `T`.
     pub fn zeroed<T>(&self) -> *mut T {
         self.block(size_of::<T>(), align_of::<T>()).cast()
     }
 
-    /// A thing in a block of its own.
+    /// A block with this value.
     pub fn put<T>(&self, value: T) -> *mut T {
         let place = self.zeroed::<T>();
-        // SAFETY: room for it.
+        // SAFETY: the block has the size of a `T`.
         unsafe { place.write(value) };
         place
     }
 
-    /// Storage for a thing, filled with a pattern: what a call leaves shows.
+    /// A block for a `T`, filled with 0xA5. The bytes that a call does not write keep it.
     pub fn unset<T>(&self) -> *mut T {
         let place = self.zeroed::<T>();
         // SAFETY: of this size.
@@ -311,7 +312,7 @@ impl World {
         place
     }
 
-    /// As `unset`, of so many bytes.
+    /// Like `unset`, for `count` bytes.
     pub fn unset_bytes(&self, count: usize) -> *mut u8 {
         let place = self.block(count, 8);
         // SAFETY: of this size.
@@ -319,19 +320,19 @@ impl World {
         place
     }
 
-    /// An array in a block of its own.
+    /// A block with these items.
     pub fn array<T>(&self, items: &[T]) -> *mut T {
         let place: *mut T = self.block(size_of_val(items), align_of::<T>()).cast();
-        // SAFETY: room for all of them; both are valid.
+        // SAFETY: the block has the size of the items; both are valid.
         unsafe { std::ptr::copy_nonoverlapping(items.as_ptr(), place, items.len()) };
         place
     }
 
-    /// Bytes of any content.
+    /// A block of `count` bytes with any content.
     pub fn noise(&self, count: usize) -> *mut u8 {
         let place = self.block(count, 2);
         let step = self.byte();
-        // SAFETY: of this size; only the first bytes are worth the time.
+        // SAFETY: the block has this size. Only the first 300 bytes are filled, to save time.
         let bytes = unsafe { std::slice::from_raw_parts_mut(place, count) };
         for (at, byte) in bytes.iter_mut().take(300).enumerate() {
             *byte = step.wrapping_mul(at as u8);
@@ -339,7 +340,7 @@ impl World {
         place
     }
 
-    /// A buffer to be lent for long: a new one, or one that was lent already.
+    /// A buffer for an object to keep: a new one, one that another object uses, or NULL.
     pub fn buffer(&self, count: usize) -> *mut u8 {
         if self.rarely(16) {
             let all = self.lent.borrow();
@@ -356,7 +357,7 @@ impl World {
         place
     }
 
-    /// Prints something of a run that is looked at.
+    /// Prints a line if the run is traced.
     pub fn note(&self, text: impl FnOnce() -> String) {
         if TRACE.load(Ordering::Relaxed) {
             let indent = "    ".repeat(self.depth.get() as usize);
@@ -364,19 +365,19 @@ impl World {
         }
     }
 
-    /// Whether a hook runs that may do nothing with an object.
+    /// True if a hook is running that may do nothing with the object.
     pub fn is_locked(&self, object: *const u8) -> bool {
         let frames = self.frames.borrow();
         let mut own = frames.iter().filter(|frame| frame.object == object);
         !object.is_null() && own.any(|frame| frame.grant.get() == Grant::Nothing)
     }
 
-    /// Whether a call is under way.
+    /// True if a hook is running.
     pub fn is_inside(&self) -> bool {
         self.depth.get() > 0
     }
 
-    /// Before each call.
+    /// Called before each API call.
     pub fn before<T>(&self, object: *const T) {
         CALLS.fetch_add(1, Ordering::Relaxed);
         self.calls.set(self.calls.get() + 1);
@@ -391,22 +392,22 @@ impl World {
         });
     }
 
-    /// After each call.
+    /// Called after each API call.
     pub fn after(&self) {
         self.frames.borrow_mut().pop();
     }
 
-    /// How often hooks were called in the call of the top level.
+    /// The number of hook calls within the current call at the top level.
     pub fn hooks(&self) -> u32 {
         self.hook_calls.get()
     }
 
-    /// What each hook does: it counts, and sometimes calls the API in its turn.
+    /// Called by each hook: counts the call, and sometimes calls the API.
     pub fn hook(&self, grant: Grant, times: u32) {
         let calls = self.hook_calls.get() + 1;
         self.hook_calls.set(calls);
         assert!(calls < MOST_HOOKS, "a call does not end");
-        // Once in `times`, and less and less often in one call.
+        // With a probability of 1 in `times`, which falls with the number of hook calls.
         let scarce = times
             .saturating_mul(1 + self.depth.get())
             .saturating_add(calls / 8);
@@ -417,7 +418,7 @@ impl World {
         self.inside(grant, || super::step(self));
     }
 
-    /// Does something as a hook does.
+    /// Runs `action` as a hook.
     pub fn inside<T>(&self, grant: Grant, action: impl FnOnce() -> T) -> T {
         let top = self.frames.borrow().len() - 1;
         let was = self.frames.borrow()[top].grant.replace(grant);
@@ -432,7 +433,7 @@ impl World {
 impl Drop for World {
     fn drop(&mut self) {
         for (block, layout) in self.blocks.borrow().iter() {
-            // SAFETY: allocated with this layout, and nothing uses it any longer.
+            // SAFETY: the block was allocated with this layout, and nothing uses it any more.
             unsafe { dealloc(*block, *layout) };
         }
     }
