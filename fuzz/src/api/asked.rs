@@ -40,7 +40,7 @@ fn fill(w: &World, request: *mut mbm_clientRequest, bytes: usize) {
         };
         (*request).replyBytes = room;
         (*request).transaction = if w.rarely(8) { w.word() } else { 0 };
-        (*request).unit = traffic::unit(w);
+        (*request).unit = w.unit_id();
     }
 }
 

@@ -8,7 +8,7 @@ use std::ffi::c_void;
 use std::ptr::null_mut;
 
 fn begin(w: &World, master: *mut mbm_master) {
-    let slave = super::traffic::unit(w);
+    let slave = w.unit_id();
     let port = ports::port(w, MBM_FRAMING_RTU);
     // The context of any of the ports.
     let context = usize::from(slave % 4) as *mut c_void;

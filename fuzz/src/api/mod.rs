@@ -11,7 +11,10 @@ mod check;
 mod client;
 mod frame;
 mod master;
+mod memory;
 mod packet;
+mod pool;
+mod port;
 mod ports;
 mod prepared;
 mod records;
@@ -68,5 +71,5 @@ pub fn calls() -> u64 {
 
 /// Prints every call from now on.
 pub fn trace() {
-    world::TRACE.store(true, Ordering::Relaxed);
+    memory::TRACE.store(true, Ordering::Relaxed);
 }

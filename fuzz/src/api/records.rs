@@ -2,44 +2,12 @@
 //! and registered again, with the same unit or another.
 
 use super::check::{call, refused_changes_nothing, span, OK};
+use super::pool::Pool;
 use super::serving as hooks;
-use super::world::{Pool, World};
+use super::world::World;
 use mbm_c::*;
 use std::collections::HashMap;
 use std::ptr::{null, null_mut};
-
-/// All records of an input.
-pub struct Records {
-    registers: Pool<mbm_registerTable>,
-    bits: Pool<mbm_bitTable>,
-    cells: Pool<mbm_cells>,
-    customs: Pool<mbm_custom>,
-    switches: Pool<mbm_switches>,
-    diagnostics: Pool<mbm_diagnostics>,
-    files: Pool<mbm_files>,
-    fifos: Pool<mbm_fifos>,
-    outputs: Pool<mbm_exceptionStatus>,
-    ids: Pool<mbm_serverId>,
-    identifications: Pool<mbm_identification>,
-}
-
-impl Default for Records {
-    fn default() -> Self {
-        Records {
-            registers: Pool::new(),
-            bits: Pool::new(),
-            cells: Pool::new(),
-            customs: Pool::new(),
-            switches: Pool::new(),
-            diagnostics: Pool::new(),
-            files: Pool::new(),
-            fifos: Pool::new(),
-            outputs: Pool::new(),
-            ids: Pool::new(),
-            identifications: Pool::new(),
-        }
-    }
-}
 
 /// One of the units, or NULL.
 pub fn unit(w: &World) -> *mut mbm_unit {
@@ -73,7 +41,7 @@ pub fn array(w: &World) -> (*mut mbm_unit, u8) {
                 .cast();
             for at in 0..count {
                 // SAFETY: the index is below the count.
-                unsafe { (*new.add(at.into())).id = super::traffic::unit(w) };
+                unsafe { (*new.add(at.into())).id = w.unit_id() };
             }
             w.units.borrow_mut().push((new, count));
         }

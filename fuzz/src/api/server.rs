@@ -142,7 +142,7 @@ fn unit(w: &World) {
             w.note(|| format!("memset({unit:?}, 0, unit)"));
             unit.write(std::mem::zeroed());
         }
-        (*unit).id = traffic::unit(w);
+        (*unit).id = w.unit_id();
     }
 }
 

@@ -17,14 +17,6 @@ pub fn framed(framing: u8, transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
     buffer[..length.expect("the frame fits")].to_vec()
 }
 
-/// A unit id, most often a small one, which a unit may have.
-pub fn unit(w: &World) -> u8 {
-    match w.byte() {
-        byte @ 0..0xE0 => byte % 4,
-        byte => byte,
-    }
-}
-
 /// The PDU of a request, most often a valid one.
 pub fn pdu(w: &World) -> Vec<u8> {
     const FUNCTIONS: [u8; 24] = [
@@ -93,7 +85,7 @@ pub fn pdu(w: &World) -> Vec<u8> {
 /// The frame of a request, sometimes damaged.
 pub fn request(w: &World, framing: u8) -> Vec<u8> {
     let pdu = pdu(w);
-    let frame = framed(framing, w.word(), unit(w), &pdu);
+    let frame = framed(framing, w.word(), w.unit_id(), &pdu);
     maybe_damaged(w, frame)
 }
 

@@ -1,16 +1,15 @@
-//! The state of one run: memory, the choices of the input, time, and the calls that have not
-//! returned yet.
+//! The state of one run: memory, objects, time, and the calls that have not returned yet.
 
-use super::ports::Port;
+use super::memory::Memory;
+use super::pool::{Pool, Records};
+use super::port::Port;
 use mbm_c::*;
-use std::alloc::{alloc_zeroed, dealloc, Layout};
 use std::cell::{Cell, RefCell};
-use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU64, Ordering};
+use std::ops::Deref;
+use std::sync::atomic::{AtomicPtr, AtomicU64, Ordering};
 
 /// The number of API calls of all inputs so far.
 pub static CALLS: AtomicU64 = AtomicU64::new(0);
-/// Whether to print each call with its arguments and its return value.
-pub static TRACE: AtomicBool = AtomicBool::new(false);
 /// The state of the current run. Hooks use it because their context may be NULL.
 static CURRENT: AtomicPtr<World> = AtomicPtr::new(std::ptr::null_mut());
 
@@ -35,77 +34,9 @@ struct Frame {
     grant: Cell<Grant>,
 }
 
-/// Objects of one type, each in its own block of the heap.
-pub struct Pool<T>(RefCell<Vec<*mut T>>);
-
-impl<T> Pool<T> {
-    pub const fn new() -> Self {
-        Pool(RefCell::new(Vec::new()))
-    }
-
-    /// All objects.
-    pub fn all(&self) -> Vec<*mut T> {
-        self.0.borrow().clone()
-    }
-
-    /// One of the objects, a new zeroed one, a copy of one, or NULL.
-    pub fn pick(&self, w: &World) -> *mut T {
-        let choice = w.byte();
-        let count = self.0.borrow().len();
-        match choice {
-            0xF8.. => std::ptr::null_mut(),
-            0xF4..0xF8 if count > 0 && count < 8 => self.copy(w),
-            0xF0..0xF4 if count < 6 => self.make(w),
-            _ if count == 0 => self.make(w),
-            _ => self.0.borrow()[usize::from(choice) % count],
-        }
-    }
-
-    /// Adds a zeroed object.
-    pub fn make(&self, w: &World) -> *mut T {
-        let new = w.zeroed::<T>();
-        self.0.borrow_mut().push(new);
-        new
-    }
-
-    /// The newest object, or NULL.
-    pub fn any(&self) -> *mut T {
-        self.0
-            .borrow()
-            .last()
-            .copied()
-            .unwrap_or(std::ptr::null_mut())
-    }
-
-    /// Adds an object, up to 64.
-    pub fn keep(&self, other: *mut T) {
-        let mut all = self.0.borrow_mut();
-        if all.len() < 64 {
-            all.push(other);
-        }
-    }
-
-    /// Adds a copy of one of the objects.
-    fn copy(&self, w: &World) -> *mut T {
-        let from = {
-            let all = self.0.borrow();
-            all[w.below(all.len())]
-        };
-        let new = self.make(w);
-        w.note(|| format!("memcpy({new:?}, {from:?}, {})", size_of::<T>()));
-        // SAFETY: both blocks have this size.
-        unsafe { std::ptr::copy_nonoverlapping(from, new, 1) };
-        new
-    }
-}
-
 /// The state of one run.
 pub struct World {
-    input: Cell<&'static [u8]>,
-    seed: Cell<u64>,
-    /// How many random steps follow after the end of the input.
-    more: Cell<u32>,
-    depth: Cell<u32>,
+    memory: Memory,
     hook_calls: Cell<u32>,
     calls: Cell<u32>,
     /// The number of API calls made by hooks.
@@ -113,7 +44,6 @@ pub struct World {
     pub clock: Cell<u32>,
     /// If set, the user also zeroes and refills objects that the library is using.
     pub wild: bool,
-    blocks: RefCell<Vec<(*mut u8, Layout)>>,
     frames: RefCell<Vec<Frame>>,
     pub ports: [Port; 4],
     pub masters: Pool<mbm_master>,
@@ -130,9 +60,7 @@ pub struct World {
     pub packets: Pool<mbm_packet>,
     /// Arrays of units, and their lengths.
     pub units: RefCell<Vec<(*mut mbm_unit, u8)>>,
-    pub records: super::records::Records,
-    /// Buffers that an object uses. Sometimes a second object gets the same one.
-    pub lent: RefCell<Vec<(*mut u8, usize)>>,
+    pub records: Records,
     /// The unit that answers clients' requests over the ports.
     pub device: Cell<*mut mbm_unit>,
 }
@@ -147,10 +75,7 @@ impl World {
             seed.rotate_left(8) ^ u64::from(*byte)
         });
         let world = Box::new(World {
-            input: Cell::new(input),
-            seed: Cell::new(seed),
-            more: Cell::new((seed as u32 >> 3 & 3) * 50),
-            depth: Cell::new(0),
+            memory: Memory::new(input, seed),
             hook_calls: Cell::new(0),
             calls: Cell::new(0),
             inner_calls: Cell::new(0),
@@ -160,7 +85,6 @@ impl World {
                 0u32.wrapping_sub(100_000)
             }),
             wild: seed & 3 == 3,
-            blocks: RefCell::default(),
             frames: RefCell::default(),
             ports: std::array::from_fn(Port::new),
             masters: Pool::new(),
@@ -176,7 +100,6 @@ impl World {
             packets: Pool::new(),
             units: RefCell::default(),
             records: Default::default(),
-            lent: RefCell::default(),
             device: Cell::new(std::ptr::null_mut()),
         });
         CURRENT.store((&raw const *world).cast_mut(), Ordering::Relaxed);
@@ -189,81 +112,9 @@ impl World {
         unsafe { &*CURRENT.load(Ordering::Relaxed) }
     }
 
-    /// True if the run is over. Random steps follow after the end of the input.
+    /// True if the run is over.
     pub fn is_over(&self) -> bool {
-        let over = self.input.get().is_empty();
-        if over && self.more.get() > 0 {
-            self.more.set(self.more.get() - 1);
-            return self.calls.get() >= MOST_CALLS;
-        }
-        over || self.calls.get() >= MOST_CALLS
-    }
-
-    /// The next byte of the input. After its end, and in hooks, a random byte: hooks are called
-    /// so often that they would use up the input.
-    pub fn byte(&self) -> u8 {
-        if self.depth.get() > 0 {
-            return self.random() as u8;
-        }
-        match self.input.get().split_first() {
-            Some((first, rest)) => {
-                self.input.set(rest);
-                *first
-            }
-            None => self.random() as u8,
-        }
-    }
-
-    /// A pseudo-random number; the sequence depends on the input.
-    pub fn random(&self) -> u32 {
-        let mut seed = self.seed.get();
-        seed ^= seed << 13;
-        seed ^= seed >> 7;
-        seed ^= seed << 17;
-        self.seed.set(seed);
-        (seed >> 24) as u32
-    }
-
-    /// A number below `count`.
-    pub fn below(&self, count: usize) -> usize {
-        if count > 256 {
-            usize::from(u16::from_be_bytes([self.byte(), self.byte()])) % count
-        } else {
-            usize::from(self.byte()) % count
-        }
-    }
-
-    /// True with a probability of 1 in `times` (at most 256).
-    pub fn rarely(&self, times: usize) -> bool {
-        self.below(times) == times - 1
-    }
-
-    /// A number of 16 bits: most often small, or near a limit.
-    pub fn word(&self) -> u16 {
-        let byte = self.byte();
-        match byte {
-            0..0xA0 => u16::from(byte) % 40,
-            0xA0..0xC0 => u16::from(self.byte()),
-            0xC0..0xE0 => u16::from_be_bytes([self.byte(), self.byte()]),
-            _ => {
-                const EDGES: [u16; 16] = [
-                    0xFFFF, 0xFFFE, 0x8000, 0x7FFF, 0x7FFE, 0x0100, 0x00FF, 253, 256, 257, 260,
-                    513, 2000, 2001, 125, 126,
-                ];
-                EDGES[usize::from(byte % 16)]
-            }
-        }
-    }
-
-    /// A number of 32 bits.
-    pub fn long(&self) -> u32 {
-        match self.byte() % 8 {
-            0 => u32::MAX,
-            1 => u32::MAX - u32::from(self.byte()),
-            2 => 1 << (self.byte() % 32),
-            3 => self.random(),
-            _ => self.word().into(),
-        }
+        self.is_used_up() || self.calls.get() >= MOST_CALLS
     }
 
     /// The object through which masters take turns; sometimes NULL.
@@ -275,94 +126,6 @@ impl World {
             self.turn.set(self.zeroed());
         }
         self.turn.get()
-    }
-
-    /// A zeroed block of the heap of exactly this size. For size 0, the end of a block.
-    pub fn block(&self, size: usize, align: usize) -> *mut u8 {
-        let used = if size == 0 { align } else { size };
-        let layout = Layout::from_size_align(used, align).expect("a layout");
-        // SAFETY: the size is not 0.
-        let block = unsafe { alloc_zeroed(layout) };
-        self.blocks.borrow_mut().push((block, layout));
-        if size == 0 {
-            block.wrapping_add(align)
-        } else {
-            block
-        }
-    }
-
-    /// A zeroed block for a `T`.
-    pub fn zeroed<T>(&self) -> *mut T {
-        self.block(size_of::<T>(), align_of::<T>()).cast()
-    }
-
-    /// A block with this value.
-    pub fn put<T>(&self, value: T) -> *mut T {
-        let place = self.zeroed::<T>();
-        // SAFETY: the block has the size of a `T`.
-        unsafe { place.write(value) };
-        place
-    }
-
-    /// A block for a `T`, filled with 0xA5. The bytes that a call does not write keep it.
-    pub fn unset<T>(&self) -> *mut T {
-        let place = self.zeroed::<T>();
-        // SAFETY: of this size.
-        unsafe { place.cast::<u8>().write_bytes(0xA5, size_of::<T>()) };
-        place
-    }
-
-    /// Like `unset`, for `count` bytes.
-    pub fn unset_bytes(&self, count: usize) -> *mut u8 {
-        let place = self.block(count, 8);
-        // SAFETY: of this size.
-        unsafe { place.write_bytes(0xA5, count) };
-        place
-    }
-
-    /// A block with these items.
-    pub fn array<T>(&self, items: &[T]) -> *mut T {
-        let place: *mut T = self.block(size_of_val(items), align_of::<T>()).cast();
-        // SAFETY: the block has the size of the items; both are valid.
-        unsafe { std::ptr::copy_nonoverlapping(items.as_ptr(), place, items.len()) };
-        place
-    }
-
-    /// A block of `count` bytes with any content.
-    pub fn noise(&self, count: usize) -> *mut u8 {
-        let place = self.block(count, 2);
-        let step = self.byte();
-        // SAFETY: the block has this size. Only the first 300 bytes are filled, to save time.
-        let bytes = unsafe { std::slice::from_raw_parts_mut(place, count) };
-        for (at, byte) in bytes.iter_mut().take(300).enumerate() {
-            *byte = step.wrapping_mul(at as u8);
-        }
-        place
-    }
-
-    /// A buffer for an object to keep: a new one, one that another object uses, or NULL.
-    pub fn buffer(&self, count: usize) -> *mut u8 {
-        if self.rarely(16) {
-            let all = self.lent.borrow();
-            let fits: Vec<_> = all.iter().filter(|(_, size)| *size >= count).collect();
-            if !fits.is_empty() {
-                return fits[self.below(fits.len())].0;
-            }
-        }
-        if self.rarely(48) {
-            return std::ptr::null_mut();
-        }
-        let place = self.noise(count);
-        self.lent.borrow_mut().push((place, count));
-        place
-    }
-
-    /// Prints a line if the run is traced.
-    pub fn note(&self, text: impl FnOnce() -> String) {
-        if TRACE.load(Ordering::Relaxed) {
-            let indent = "    ".repeat(self.depth.get() as usize);
-            eprintln!("{indent}{}", text());
-        }
     }
 
     /// True if a hook is running that may do nothing with the object.
@@ -430,11 +193,10 @@ impl World {
     }
 }
 
-impl Drop for World {
-    fn drop(&mut self) {
-        for (block, layout) in self.blocks.borrow().iter() {
-            // SAFETY: the block was allocated with this layout, and nothing uses it any more.
-            unsafe { dealloc(*block, *layout) };
-        }
+impl Deref for World {
+    type Target = Memory;
+
+    fn deref(&self) -> &Memory {
+        &self.memory
     }
 }
