@@ -259,7 +259,7 @@ BENCH_CLIENT := $(BUILD)/bench/bench_client
 $(BENCH_CLIENT): $(patsubst %,$(BUILD)/bench/%.o,bench_client support/pty support/server linux/mbm_tty linux/mbm_tcp) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
 BENCH_SERVER := $(BUILD)/bench/bench_server
-$(BENCH_SERVER): $(patsubst %,$(BUILD)/bench/%.o,bench_server bench_loops linux/mbm_tcp linux/mbm_tcp_listener linux/mbm_tcp_set linux/mbm_tty) $(ARCHIVE)
+$(BENCH_SERVER): $(patsubst %,$(BUILD)/bench/%.o,bench_server bench_tables bench_loops linux/mbm_tcp linux/mbm_tcp_listener linux/mbm_tcp_set linux/mbm_tty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -o $@
 BENCH_SNIFFER := $(BUILD)/bench/bench_sniffer
 $(BENCH_SNIFFER): $(BUILD)/bench/bench_sniffer.o $(ARCHIVE)

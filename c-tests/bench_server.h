@@ -15,6 +15,9 @@ extern modbus_mapping_t *mapping;
 uint16_t pattern(unsigned address);
 void fail(const char *what);
 
+/* Fills the tables of both servers. */
+void prepare_tables(void);
+
 /* Requests per second of two server loops with 32 connections. */
 void compare_loops(void);
 

@@ -1,19 +1,19 @@
-//! What of a response is held against the request.
+//! Which fields of a response must match the request.
 
 use mbm::error::Status;
 use mbm::pdu::outline::Outline;
 
 #[test]
-fn file_records_of_other_lengths_than_asked_for_are_malformed() {
+fn a_file_record_response_whose_lengths_differ_from_the_request_is_malformed() {
     let groups = [6, 0, 4, 0, 1, 0, 2, 6, 0, 3, 0, 9, 0, 1];
     let right = [0x14, 10, 5, 6, 1, 2, 3, 4, 3, 6, 5, 6];
     let others: [&[u8]; 6] = [
-        // The lengths the other way round, one group, three, one that is too long.
+        // The two lengths swapped; one group; three groups; a group that is too long.
         &[0x14, 10, 3, 6, 1, 2, 5, 6, 3, 4, 5, 6],
         &[0x14, 6, 5, 6, 1, 2, 3, 4],
         &[0x14, 14, 5, 6, 1, 2, 3, 4, 3, 6, 5, 6, 3, 6, 7, 8],
         &[0x14, 12, 5, 6, 1, 2, 3, 4, 5, 6, 5, 6, 7, 8],
-        // Another reference type, and a byte that is missing.
+        // Another reference type; a missing byte.
         &[0x14, 10, 5, 6, 1, 2, 3, 4, 3, 7, 5, 6],
         &[0x14, 9, 5, 6, 1, 2, 3, 4, 3, 6, 5],
     ];

@@ -1,5 +1,6 @@
-//! The engine of a client keeps every index within its frame buffer, as the pointers of C
-//! need it: what the tests lend panics at any other.
+//! The engine of a client accesses its frame buffer only within bounds. The C ABI relies on
+//! this, because it reads and writes the buffer through raw pointers. The buffers of these
+//! tests panic at an index out of range.
 
 #[path = "common/exchanges.rs"]
 mod exchanges;
@@ -14,7 +15,7 @@ use mbm::frame::{ascii, Framing};
 use proptest::prelude::*;
 use wire::{End, Lent, Task};
 
-/// The frame of a PDU.
+/// Returns the frame of a PDU.
 fn encoded(framing: Framing, unit: u8, pdu: &[u8]) -> Vec<u8> {
     let mut buffer = vec![0; framing.max_frame()];
     let length = framing.emit(&mut buffer, 0, unit, ascii::END, |place| {
@@ -24,7 +25,7 @@ fn encoded(framing: Framing, unit: u8, pdu: &[u8]) -> Vec<u8> {
     buffer[..length.unwrap()].to_vec()
 }
 
-/// What the line brings: bytes, or frames that the engine looks at more closely.
+/// Bytes to arrive: random ones, and parts that resemble the expected reply.
 fn any_bytes(framing: Framing, case: Case) -> impl Strategy<Value = Vec<u8>> {
     let (_, _, request, response, _) = case;
     let reply = encoded(framing, 17, response);
@@ -61,7 +62,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(1000))]
 
     #[test]
-    fn no_index_passes_the_frame_buffer(
+    fn every_index_stays_within_the_frame_buffer(
         (framing, case, lines) in any_lines(),
         room in 8usize..600,
         piece in 1usize..300,
@@ -69,7 +70,7 @@ proptest! {
         echo: bool,
     ) {
         let (build, data, request, response, received) = case;
-        // At least as often as not, just what the request or the reply needs.
+        // Two of the three sizes are exactly what the request or the reply needs.
         let needs = [request, response].map(|pdu| encoded(framing, 17, pdu).len());
         for room in [room, needs[0], needs[0].max(needs[1])] {
             let end = End::default();
@@ -83,7 +84,7 @@ proptest! {
             settings.echo_discard = echo;
             settings.response_timeout = 200_000;
             let mut client: Client<_, _, 4> = Client::new(line);
-            // When the last byte of an earlier line arrives, which may end a reply too.
+            // The arrival time of the last byte of the previous round. It may end a reply too.
             let mut until = None;
             for bytes in &lines {
                 let is_alone = until.is_none_or(|until| end.now() > until);
@@ -107,7 +108,7 @@ proptest! {
                 if task.ticket.status == Status::OK && is_right && is_alone {
                     prop_assert_eq!(task.received(), received);
                 }
-                // A reply that was held stands in the frame buffer no longer.
+                // No held reply takes space in the frame buffer any more.
                 let whole = usize::from(client.line.engine.storage.frame.room());
                 prop_assert_eq!(whole, room.max(17));
             }

@@ -1,4 +1,4 @@
-//! When a client asks, and asks again; what it keeps of units.
+//! When a client sends a request, when it retries, and what it records about each unit.
 
 #[path = "common/wire.rs"]
 mod wire;
@@ -14,16 +14,16 @@ fn read(unit: u8) -> Task {
     })
 }
 
-/// Follows what `poll_delay` says, and notes when what was sent; ends with the
-/// task.
-fn times<L: Line<Task>>(end: &End, client: &mut Client<L, Task, 4>) -> (Vec<u32>, Task) {
-    let mut times = Vec::new();
+/// Polls at the times that `poll_delay` returns until the task has ended. Returns when
+/// requests were sent, and the task.
+fn send_times<L: Line<Task>>(end: &End, client: &mut Client<L, Task, 4>) -> (Vec<u32>, Task) {
+    let mut send_times = Vec::new();
     for _ in 0..10_000 {
         if let Some(task) = client.poll(end.now(), true) {
-            return (times, task);
+            return (send_times, task);
         }
         if !end.sent().is_empty() {
-            times.push(end.now());
+            send_times.push(end.now());
         }
         end.pass(client.poll_delay(end.now()).clamp(1, 5_000_000));
     }
@@ -51,39 +51,42 @@ fn tcp(lent: Lent) -> (End, Client<Tcp<End, Lent>, Task, 4>) {
     (end.clone(), Client::new(Tcp::new(end, lent)))
 }
 
-/// The pauses between what was sent, less the response timeout of two seconds.
-fn pauses(times: &[u32]) -> Vec<u32> {
-    times
+/// The pauses between sent requests, less the response timeout of two seconds.
+fn pauses(send_times: &[u32]) -> Vec<u32> {
+    send_times
         .windows(2)
         .map(|pair| pair[1].wrapping_sub(pair[0]) - 2_000_000)
         .collect()
 }
 
 #[test]
-fn retries_wait_as_the_backoff_says() {
+fn each_retry_waits_for_the_backoff() {
     let (end, mut client) = tcp(Lent::default());
     *client.policy() = exponential();
     assert!(client.queue(read(1)).is_ok());
-    let (times, task) = times(&end, &mut client);
+    let (send_times, task) = send_times(&end, &mut client);
     assert_eq!(task.ticket.status, Status::RESPONSE_TIMED_OUT);
-    assert_eq!(pauses(&times), [300_000, 600_000, 1_000_000, 1_000_000]);
+    assert_eq!(
+        pauses(&send_times),
+        [300_000, 600_000, 1_000_000, 1_000_000]
+    );
 }
 
 #[test]
-fn a_serial_line_waits_as_well() {
+fn each_retry_on_a_serial_line_waits_for_the_backoff() {
     let (end, mut client) = serial(Lent::default());
     *client.policy() = exponential();
     assert!(client.queue(read(1)).is_ok());
-    let (times, task) = times(&end, &mut client);
+    let (send_times, task) = send_times(&end, &mut client);
     assert_eq!(task.ticket.status, Status::RESPONSE_TIMED_OUT);
     let expected = [300_000, 600_000, 1_000_000, 1_000_000];
-    for (pause, expected) in pauses(&times).iter().zip(expected) {
+    for (pause, expected) in pauses(&send_times).iter().zip(expected) {
         assert!(pause.abs_diff(expected) < 100, "{pause} {expected}");
     }
 }
 
 #[test]
-fn jitter_takes_off_a_part_of_the_wait() {
+fn jitter_shortens_the_backoff() {
     let lent = Lent {
         random: 1 << 31,
         ..Lent::default()
@@ -92,24 +95,24 @@ fn jitter_takes_off_a_part_of_the_wait() {
     *client.policy() = policy(Backoff::Fixed, 300_000, 4);
     client.policy().jitter = 128;
     assert!(client.queue(read(1)).is_ok());
-    let (times, _) = times(&end, &mut client);
-    assert_eq!(pauses(&times), [225_000; 4]);
+    let (send_times, _) = send_times(&end, &mut client);
+    assert_eq!(pauses(&send_times), [225_000; 4]);
 }
 
 #[test]
 fn without_retries_a_request_is_sent_once() {
     let (end, mut client) = tcp(Lent::default());
     assert!(client.queue(read(1)).is_ok());
-    let (times, task) = times(&end, &mut client);
+    let (send_times, task) = send_times(&end, &mut client);
     assert_eq!(
-        (times.len(), task.ticket.status),
+        (send_times.len(), task.ticket.status),
         (1, Status::RESPONSE_TIMED_OUT)
     );
     assert_eq!(end.now(), 2_000_000);
 }
 
 #[test]
-fn others_are_asked_while_one_waits_to_be_asked_again() {
+fn other_requests_are_sent_while_one_waits_for_its_retry() {
     let (end, mut client) = serial(Lent::default());
     *client.policy() = policy(Backoff::Fixed, 10_000_000, 1);
     assert!(client.queue(read(1)).is_ok());
@@ -127,7 +130,7 @@ fn others_are_asked_while_one_waits_to_be_asked_again() {
 }
 
 #[test]
-fn a_unit_is_given_its_rest_and_others_are_not_kept_waiting() {
+fn the_delay_between_requests_to_one_unit_does_not_delay_other_units() {
     let units = vec![Unit::new(1, 3_000_000)];
     let (end, mut client) = tcp(Lent {
         units,
@@ -145,12 +148,12 @@ fn a_unit_is_given_its_rest_and_others_are_not_kept_waiting() {
         }
         end.pass(client.poll_delay(end.now()).clamp(1, 1_000_000));
     }
-    // Nobody answers within two seconds.
+    // No unit replies, so each request ends after two seconds.
     assert_eq!(sent, [(1, 0), (2, 2_000_000), (1, 5_000_000)]);
 }
 
 #[test]
-fn what_became_of_requests_is_kept_for_each_unit() {
+fn outcomes_of_requests_are_counted_for_each_unit() {
     let units = vec![Unit::new(9, 0), Unit::new(1, 0)];
     let (end, mut client) = tcp(Lent {
         units,
@@ -158,7 +161,7 @@ fn what_became_of_requests_is_kept_for_each_unit() {
     });
     client.policy().retries = 2;
     assert!(client.queue(read(1)).is_ok());
-    times(&end, &mut client);
+    send_times(&end, &mut client);
     for pdu in [&[3, 2, 0, 7][..], &[0x83, 4]] {
         assert!(client.queue(read(1)).is_ok());
         client.poll(end.now(), true);
@@ -178,7 +181,7 @@ fn what_became_of_requests_is_kept_for_each_unit() {
 }
 
 #[test]
-fn a_clock_that_jumps_ends_the_wait_and_not_the_request_that_was_answered() {
+fn a_jump_of_the_clock_ends_a_wait_but_loses_no_reply() {
     let (end, mut client) = serial(Lent::default());
     assert!(client.queue(read(1)).is_ok());
     for _ in 0..100 {
@@ -187,14 +190,14 @@ fn a_clock_that_jumps_ends_the_wait_and_not_the_request_that_was_answered() {
     }
     assert!(!end.sent().is_empty());
     end.deliver(0, &[1, 3, 2, 0, 7, 0xF9, 0x86]);
-    // Ahead by a quarter of an hour: the answer has arrived all the same.
+    // The clock jumps ahead by 15 minutes. The reply that has arrived is still taken.
     end.pass(900_000_000);
     let task = client.poll(end.now(), true).unwrap();
     assert_eq!(
         (task.ticket.status, task.received()),
         (Status::OK, &[0, 7][..])
     );
-    // Back by a minute: nobody waits for 71 minutes.
+    // The clock jumps back by one minute. The wait ends, and does not last 71 minutes.
     assert!(client.queue(read(1)).is_ok());
     let queued = end.now();
     while end.sent().is_empty() {
@@ -209,11 +212,14 @@ fn a_clock_that_jumps_ends_the_wait_and_not_the_request_that_was_answered() {
 }
 
 #[test]
-fn the_clock_may_wrap() {
+fn the_backoff_is_right_when_the_clock_wraps() {
     let (end, mut client) = tcp(Lent::default());
     end.pass(u32::MAX - 3_000_000);
     *client.policy() = exponential();
     assert!(client.queue(read(1)).is_ok());
-    let (times, _) = times(&end, &mut client);
-    assert_eq!(pauses(&times), [300_000, 600_000, 1_000_000, 1_000_000]);
+    let (send_times, _) = send_times(&end, &mut client);
+    assert_eq!(
+        pauses(&send_times),
+        [300_000, 600_000, 1_000_000, 1_000_000]
+    );
 }

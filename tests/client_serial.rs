@@ -1,4 +1,4 @@
-//! The client on a serial line: every function, and what becomes of requests.
+//! The client on a serial line: every function, and how requests end.
 
 #[path = "common/exchanges.rs"]
 mod exchanges;
@@ -40,7 +40,7 @@ fn run(end: &End, client: &mut Line) -> Task {
     panic!("no task ended");
 }
 
-/// Polls until something was sent.
+/// Polls until the client has sent bytes, and returns them.
 fn sent(end: &End, client: &mut Line) -> Vec<u8> {
     for _ in 0..3_000 {
         assert!(client.poll(end.now(), true).is_none());
@@ -77,7 +77,7 @@ fn every_function_is_sent_and_answered_in_rtu() {
         let (end, mut client) = rtu_client();
         assert!(client.queue(Task::new(17, 1, data, build)).is_ok());
         assert_eq!(sent(&end, &mut client), frame(17, request));
-        // In two pieces, with a pause that is longer than t3.5 between them.
+        // The reply arrives in two pieces, with a pause longer than t3.5 between them.
         let reply = frame(17, response);
         end.deliver(1_000, &reply[..3]);
         end.deliver(9_000, &reply[3..]);
@@ -121,7 +121,7 @@ fn every_function_is_sent_and_answered_in_ascii() {
 }
 
 #[test]
-fn an_exception_of_every_function_is_told() {
+fn an_exception_is_reported_for_every_function() {
     for (build, data, request, ..) in CASES {
         let (end, mut client) = rtu_client();
         assert!(client.queue(Task::new(17, 1, data, build)).is_ok());
@@ -135,7 +135,7 @@ fn an_exception_of_every_function_is_told() {
 }
 
 #[test]
-fn a_response_that_does_not_answer_is_malformed() {
+fn a_response_that_does_not_match_the_request_is_malformed() {
     for (build, data, request, response, _) in CASES {
         for at in 1..response.len() {
             let (end, mut client) = rtu_client();
@@ -147,7 +147,7 @@ fn a_response_that_does_not_answer_is_malformed() {
             let task = run(&end, &mut client);
             let free = task.ticket.status == Status::OK;
             if free {
-                // Only what the device is free to say may differ.
+                // Only data that the device chooses may differ.
                 assert!(!matches!(request[0], 5 | 6 | 0x0F | 0x10 | 0x15 | 0x16));
                 assert!(at >= usize::from(task.ticket.outline.data_at()));
             } else {
@@ -197,7 +197,7 @@ fn requests_are_sent_one_after_the_other_and_in_order() {
 }
 
 #[test]
-fn a_broadcast_is_a_write_and_takes_the_turnaround_delay() {
+fn only_writes_are_broadcast_and_they_take_the_turnaround_delay() {
     let (end, mut client) = rtu_client();
     for (build, data, request, ..) in CASES {
         let broadcast = matches!(request[0], 5 | 6 | 0x0F | 0x10 | 0x15 | 0x16);
@@ -228,7 +228,7 @@ fn a_broadcast_is_a_write_and_takes_the_turnaround_delay() {
 }
 
 #[test]
-fn nobody_responds_to_force_listen_only_mode() {
+fn force_listen_only_mode_ends_without_a_response() {
     let (end, mut client) = rtu_client();
     let task = Task::new(17, 0, &[0, 0], |outline| outline.diagnostics(4, 1));
     assert!(client.queue(task).is_ok());
@@ -237,7 +237,7 @@ fn nobody_responds_to_force_listen_only_mode() {
 }
 
 #[test]
-fn a_dead_link_ends_the_request_under_way_and_those_that_wait() {
+fn a_lost_link_ends_the_active_request_and_the_queued_ones() {
     let (end, mut client) = rtu_client();
     for number in 1..=3 {
         assert!(client.queue(read(number as u8, number)).is_ok());
@@ -258,7 +258,7 @@ fn a_dead_link_ends_the_request_under_way_and_those_that_wait() {
 }
 
 #[test]
-fn a_reconnect_ends_only_what_was_under_way() {
+fn a_reconnect_ends_only_the_active_request() {
     let (end, mut client) = rtu_client();
     for number in 1..=2 {
         assert!(client.queue(read(number as u8, number)).is_ok());
@@ -276,7 +276,7 @@ fn a_reconnect_ends_only_what_was_under_way() {
 }
 
 #[test]
-fn a_request_is_cancelled_wherever_it_is() {
+fn a_request_can_be_cancelled_while_it_is_active_or_queued() {
     let (end, mut client) = rtu_client();
     for number in 1..=3 {
         assert!(client.queue(read(number as u8, number)).is_ok());
@@ -296,7 +296,7 @@ fn a_request_is_cancelled_wherever_it_is() {
 }
 
 #[test]
-fn a_lent_line_is_left_alone() {
+fn a_suspended_client_sends_nothing() {
     let (end, mut client) = rtu_client();
     assert!(client.lend());
     assert!(!client.lend());
@@ -311,7 +311,7 @@ fn a_lent_line_is_left_alone() {
 }
 
 #[test]
-fn a_reply_too_long_for_the_job_is_told_and_not_cut() {
+fn a_reply_longer_than_the_capacity_of_the_request_ends_with_buffer_too_small() {
     let (end, mut client) = rtu_client();
     let mut task = Task::new(1, 1, &[], |outline| {
         outline.set(Form::REPORT_SERVER_ID, 0, 0)
@@ -325,8 +325,8 @@ fn a_reply_too_long_for_the_job_is_told_and_not_cut() {
     assert_eq!((task.ticket.length, task.reply[0]), (0, 0xEE));
 }
 
-/// A device that answers in order, but later than the timeout: its late reply
-/// looks like the answer to the next request.
+/// The device answers in order, but its first reply arrives after the timeout. That late
+/// reply looks like the reply to the next request.
 fn a_late_reply_is_passed_over(line: (End, Line), encode: fn(u8, &[u8]) -> Vec<u8>) {
     let (end, mut client) = line;
     client.line.engine.settings.response_timeout = 500_000;
@@ -359,14 +359,15 @@ fn a_late_reply_in_ascii_frames_is_not_the_answer_to_a_later_request() {
     a_late_reply_is_passed_over(ascii_client(), characters);
 }
 
-/// How a request for the exception status of unit 2 ends if an ASCII line brings this.
+/// Reads the exception status of unit 2 while `line` arrives in ASCII framing; returns the
+/// ended task.
 fn ended_in_ascii(line: &[u8]) -> Task {
     let (end, mut client) = ascii_client();
     client.line.engine.storage.frame = Frame::new(vec![0; 40]);
     let build: fn(&mut Outline) -> Status = |o| o.set(Form::READ_EXCEPTION_STATUS, 0, 0);
     assert!(client.queue(Task::new(2, 1, &[], build)).is_ok());
     sent(&end, &mut client);
-    // Character by character.
+    // The characters arrive one by one.
     for (index, character) in line.iter().enumerate() {
         end.deliver(1_000 * index as u32, &[*character]);
     }
@@ -374,7 +375,7 @@ fn ended_in_ascii(line: &[u8]) -> Task {
 }
 
 #[test]
-fn an_ascii_frame_is_found_behind_noise_and_behind_a_frame_that_was_cut_off() {
+fn an_ascii_frame_is_found_after_noise_and_after_a_truncated_frame() {
     for line in [&b":02075A9D\r\n"[..], b"\xFF12\r\n:0207:02075A9D\r\n"] {
         let task = ended_in_ascii(line);
         assert_eq!(
@@ -385,7 +386,7 @@ fn an_ascii_frame_is_found_behind_noise_and_behind_a_frame_that_was_cut_off() {
 }
 
 #[test]
-fn the_most_telling_thing_that_was_seen_on_an_ascii_line_is_the_status() {
+fn the_most_specific_fault_on_an_ascii_line_becomes_the_status() {
     for (line, status) in [
         (&b":03075A9C\r\n"[..], Status::INVALID_SLAVE_ID),
         (b":02085A9C\r\n", Status::INVALID_FUNCTION),

@@ -1,4 +1,5 @@
-//! The client where the port takes no bytes, or brings some that nobody waits for.
+//! The client on a port that accepts no bytes, and on one that delivers bytes while no
+//! request waits for a reply.
 
 #[allow(dead_code)]
 #[path = "common/wire.rs"]
@@ -13,7 +14,7 @@ type TcpIp = Client<Tcp<End, Lent>, Task, 16>;
 type Rtu = Client<Serial<End, Lent, Task>, Task, 16>;
 
 const TIMEOUT: u32 = 2_000_000;
-/// Bytes of a request.
+/// The length of a request in bytes.
 const REQUEST: usize = 12;
 
 fn client() -> (End, TcpIp) {
@@ -27,7 +28,7 @@ fn read(transaction: u16) -> Task {
     })
 }
 
-/// Polls once as C does, and gives back who ended and how.
+/// Polls once as C does. Returns the number and the status of each request that ended.
 fn poll<L: Line<Task>>(end: &End, client: &mut Client<L, Task, 16>) -> Vec<(u16, Status)> {
     let mut ended = Vec::new();
     while let Some(task) = client.poll(end.now(), ended.is_empty()) {
@@ -36,23 +37,23 @@ fn poll<L: Line<Task>>(end: &End, client: &mut Client<L, Task, 16>) -> Vec<(u16,
     ended
 }
 
-/// The addresses that were asked for since the last call.
-fn asked(end: &End) -> Vec<u16> {
+/// The addresses in the requests that were sent since the last call.
+fn requested(end: &End) -> Vec<u16> {
     let sent = end.sent();
     assert_eq!(sent.len() % REQUEST, 0);
     let address = |frame: &[u8]| u16::from_be_bytes([frame[8], frame[9]]);
     sent.chunks(REQUEST).map(address).collect()
 }
 
-fn stick(end: &End, stuck: bool) {
+fn set_stuck(end: &End, stuck: bool) {
     end.0.borrow_mut().stuck = stuck;
 }
 
 #[test]
-fn those_that_wait_for_room_end_too_where_the_port_takes_nothing() {
+fn requests_that_wait_for_buffer_space_end_if_the_port_accepts_nothing() {
     let (end, mut client) = client();
     client.line.means.outgoing = vec![0; REQUEST];
-    stick(&end, true);
+    set_stuck(&end, true);
     for number in 1..=3 {
         assert!(client.queue(read(number)).is_ok());
     }
@@ -66,7 +67,7 @@ fn those_that_wait_for_room_end_too_where_the_port_takes_nothing() {
 }
 
 #[test]
-fn those_behind_half_a_request_end_too_where_the_port_takes_no_more() {
+fn requests_after_a_half_sent_one_end_if_the_port_accepts_no_more() {
     let (end, mut client) = client();
     client.line.means.outgoing = vec![0; REQUEST];
     end.0.borrow_mut().piece = Some(5);
@@ -74,7 +75,7 @@ fn those_behind_half_a_request_end_too_where_the_port_takes_no_more() {
         assert!(client.queue(read(number)).is_ok());
     }
     poll(&end, &mut client);
-    stick(&end, true);
+    set_stuck(&end, true);
     let mut ended = Vec::new();
     for _ in 0..10 {
         ended.extend(poll(&end, &mut client));
@@ -82,17 +83,17 @@ fn those_behind_half_a_request_end_too_where_the_port_takes_no_more() {
     }
     let busy = |number| (number, Status::LINE_BUSY);
     assert_eq!(ended, [busy(1), busy(2), busy(3)]);
-    // The rest of the half is sent, so that the next is found behind it.
-    stick(&end, false);
+    // The rest of the half-sent request goes first. The server needs it to find the next one.
+    set_stuck(&end, false);
     assert!(client.queue(read(4)).is_ok());
     for _ in 0..10 {
         assert!(poll(&end, &mut client).is_empty());
     }
-    assert_eq!(asked(&end), [1, 4]);
+    assert_eq!(requested(&end), [1, 4]);
 }
 
 #[test]
-fn those_that_wait_for_room_go_as_soon_as_there_is_some() {
+fn a_request_that_waits_for_buffer_space_is_sent_as_soon_as_there_is_some() {
     let (end, mut client) = client();
     client.line.means.outgoing = vec![0; REQUEST];
     end.0.borrow_mut().piece = Some(5);
@@ -102,48 +103,48 @@ fn those_that_wait_for_room_go_as_soon_as_there_is_some() {
     for _ in 0..10 {
         assert!(poll(&end, &mut client).is_empty());
     }
-    assert_eq!(asked(&end), [1, 2]);
+    assert_eq!(requested(&end), [1, 2]);
 }
 
 #[test]
-fn what_timed_out_unsent_is_not_sent_later() {
+fn an_attempt_that_timed_out_unsent_is_not_sent_later() {
     let (end, mut client) = client();
     client.policy().retries = 2;
-    stick(&end, true);
+    set_stuck(&end, true);
     assert!(client.queue(read(1)).is_ok());
     assert!(poll(&end, &mut client).is_empty());
     end.pass(TIMEOUT / 2);
     assert!(client.queue(read(2)).is_ok());
     assert!(poll(&end, &mut client).is_empty());
     end.pass(TIMEOUT / 2);
-    // The first is asked again, behind the second.
+    // The retry of the first request comes after the second request.
     assert!(poll(&end, &mut client).is_empty());
-    stick(&end, false);
+    set_stuck(&end, false);
     assert!(poll(&end, &mut client).is_empty());
-    assert_eq!(asked(&end), [2, 1]);
+    assert_eq!(requested(&end), [2, 1]);
 }
 
 #[test]
-fn what_was_cancelled_unsent_is_not_sent_later() {
+fn a_request_cancelled_before_it_is_sent_is_not_sent_later() {
     let (end, mut client) = client();
-    stick(&end, true);
+    set_stuck(&end, true);
     for number in 1..=3 {
         assert!(client.queue(read(number)).is_ok());
     }
     poll(&end, &mut client);
     let second = client.cancel(|task| task.ticket.transaction == 2);
     assert_eq!(second.unwrap().ticket.status, Status::CANCELLED);
-    stick(&end, false);
+    set_stuck(&end, false);
     poll(&end, &mut client);
-    assert_eq!(asked(&end), [1, 3]);
+    assert_eq!(requested(&end), [1, 3]);
 }
 
 #[test]
-fn what_was_sent_times_out_though_others_are_not() {
+fn a_sent_request_times_out_while_another_cannot_be_sent() {
     let (end, mut client) = client();
     assert!(client.queue(read(1)).is_ok());
     poll(&end, &mut client);
-    stick(&end, true);
+    set_stuck(&end, true);
     assert!(client.queue(read(2)).is_ok());
     poll(&end, &mut client);
     end.pass(TIMEOUT);
@@ -155,21 +156,21 @@ fn what_was_sent_times_out_though_others_are_not() {
 }
 
 #[test]
-fn a_full_port_is_looked_at_each_millisecond() {
+fn a_port_that_accepts_nothing_is_tried_every_millisecond() {
     let (end, mut client) = client();
-    stick(&end, true);
+    set_stuck(&end, true);
     assert!(client.queue(read(1)).is_ok());
     assert_eq!(client.poll_delay(end.now()), 0);
     poll(&end, &mut client);
     assert_eq!(client.poll_delay(end.now()), 1000);
-    stick(&end, false);
+    set_stuck(&end, false);
     poll(&end, &mut client);
     assert_eq!(client.poll_delay(end.now()), TIMEOUT);
 }
 
-/// A late response is taken while its request waits to be asked again, for a
-/// program that sleeps until bytes are there would not sleep.
-fn late_bytes_are_taken<L: Line<Task>>(end: &End, client: &mut Client<L, Task, 16>) {
+/// The client reads a late response while its request waits for the retry. If it left the
+/// bytes unread, a program that sleeps until bytes arrive would never sleep.
+fn late_bytes_are_read<L: Line<Task>>(end: &End, client: &mut Client<L, Task, 16>) {
     client.policy().retries = 1;
     client
         .policy()
@@ -186,7 +187,7 @@ fn late_bytes_are_taken<L: Line<Task>>(end: &End, client: &mut Client<L, Task, 1
     assert!(poll(end, client).is_empty());
     assert!(end.0.borrow().incoming.is_empty());
     assert!(end.sent().is_empty());
-    // What is lost meanwhile is told at once.
+    // A link lost during the wait is reported at once.
     end.0.borrow_mut().dead = true;
     let mut ended = poll(end, client);
     ended.extend(poll(end, client));
@@ -194,10 +195,10 @@ fn late_bytes_are_taken<L: Line<Task>>(end: &End, client: &mut Client<L, Task, 1
 }
 
 #[test]
-fn late_bytes_are_taken_while_a_request_waits_to_be_asked_again() {
+fn late_bytes_are_read_while_a_request_waits_for_its_retry() {
     let (end, mut client) = client();
-    late_bytes_are_taken(&end, &mut client);
+    late_bytes_are_read(&end, &mut client);
     let end = End::default();
     let mut client: Rtu = Client::new(Serial::new(end.clone(), Lent::default()));
-    late_bytes_are_taken(&end, &mut client);
+    late_bytes_are_read(&end, &mut client);
 }

@@ -1,5 +1,5 @@
-//! The client on a TCP stream: many requests at once, in a stream that does what
-//! it likes.
+//! The client on a TCP stream: many requests at once, and responses that arrive out of
+//! order, in pieces, twice, or with garbage between them.
 
 #[path = "common/stream.rs"]
 mod stream;
@@ -44,7 +44,7 @@ fn all_requests_are_under_way_at_once_and_answered_in_any_order() {
 }
 
 #[test]
-fn a_response_may_come_byte_by_byte_and_a_request_go_so() {
+fn a_response_may_arrive_and_a_request_may_leave_byte_by_byte() {
     let (end, mut client) = client();
     end.0.borrow_mut().piece = Some(1);
     assert!(client.queue(read(1, 7)).is_ok());
@@ -61,7 +61,7 @@ fn a_response_may_come_byte_by_byte_and_a_request_go_so() {
 }
 
 #[test]
-fn unknown_ids_are_dropped_and_counted() {
+fn a_response_with_an_unknown_transaction_identifier_is_dropped_and_counted() {
     let (end, mut client) = client();
     let counters = client.line.means.counters.clone();
     assert!(client.queue(read(1, 7)).is_ok());
@@ -69,7 +69,7 @@ fn unknown_ids_are_dropped_and_counted() {
     let (wire, unit, address) = requests(&end.sent())[0];
     end.deliver(0, &response((wire.wrapping_add(1), unit, address)));
     end.deliver(0, &response((wire, unit, address)));
-    // The second answer to the same request.
+    // A second response to the same request.
     end.deliver(0, &response((wire, unit, address)));
     assert!(poll(&end, &mut client).is_empty());
     assert_right(&poll(&end, &mut client)[0]);
@@ -80,7 +80,7 @@ fn unknown_ids_are_dropped_and_counted() {
 }
 
 #[test]
-fn another_unit_does_not_answer() {
+fn a_response_of_another_unit_is_not_taken() {
     let (end, mut client) = client();
     assert!(client.queue(read(1, 7)).is_ok());
     poll(&end, &mut client);
@@ -95,7 +95,7 @@ fn another_unit_does_not_answer() {
 }
 
 #[test]
-fn a_response_that_does_not_answer_fails_at_once() {
+fn a_response_that_does_not_match_the_request_fails_at_once() {
     for (pdu, status) in [
         (&[4, 2, 0, 7][..], Status::INVALID_FUNCTION),
         (&[3, 4, 0, 7, 0, 8], Status::MALFORMED_REPLY),
@@ -122,7 +122,7 @@ fn a_response_that_does_not_answer_fails_at_once() {
 }
 
 #[test]
-fn a_server_id_longer_than_it_counts_is_taken_whole() {
+fn a_server_id_longer_than_its_byte_count_is_taken_whole() {
     for (pdu, status) in [
         (&[0x11, 2, 1, 2, 0xFF, 7, 8][..], Status::OK),
         (&[0x11, 5, 1, 2, 0xFF, 7, 8], Status::OK),
@@ -146,12 +146,12 @@ fn a_server_id_longer_than_it_counts_is_taken_whole() {
 }
 
 #[test]
-fn frames_are_found_again_behind_garbage() {
+fn frames_are_found_again_after_garbage() {
     for garbage in [
         &[0xFF; 3][..],
         &[0, 1, 0, 1, 2, 3, 4, 5, 6, 7],
         &[0; 40],
-        // What looks like the header of a long frame.
+        // These bytes look like the header of a long frame.
         &[0x12, 0x34, 0, 0, 0, 0xFE, 1, 3],
     ] {
         let (end, mut client) = client();
@@ -165,7 +165,7 @@ fn frames_are_found_again_behind_garbage() {
             end.pass(100_000);
         }
         assert_right(&ended[0]);
-        // And the stream is in step again.
+        // The client finds the next frame at once.
         assert!(client.queue(read(1, 8)).is_ok());
         poll(&end, &mut client);
         end.deliver(0, &response(requests(&end.sent())[0]));
@@ -174,7 +174,7 @@ fn frames_are_found_again_behind_garbage() {
 }
 
 #[test]
-fn two_pending_requests_do_not_share_a_number() {
+fn two_pending_requests_cannot_have_the_same_number() {
     let (end, mut client) = client();
     assert!(client.queue(read(1, 7)).is_ok());
     let refused = client.queue(read(2, 7)).err().unwrap();
@@ -185,10 +185,10 @@ fn two_pending_requests_do_not_share_a_number() {
     assert_eq!(requests(&end.sent()).len(), 3);
 }
 
-/// The transaction identifier on the wire has 16 bits, and a client that runs for days
-/// uses each of them again.
+/// The transaction identifier has 16 bits. A client that runs for days uses each value
+/// again.
 #[test]
-fn a_number_on_the_wire_is_not_used_again_while_its_request_is_pending() {
+fn a_transaction_identifier_is_not_used_again_while_its_request_is_pending() {
     for others in [1, 15] {
         let (end, mut client) = client();
         for number in 1..=(16 - others) {
@@ -224,7 +224,7 @@ fn a_number_on_the_wire_is_not_used_again_while_its_request_is_pending() {
 }
 
 #[test]
-fn nothing_is_broadcast_over_tcp() {
+fn a_broadcast_over_tcp_is_refused() {
     let (_, mut client) = client();
     let task = Task::new(0, 1, &[], |outline| {
         outline.set(Form::WRITE_SINGLE_REGISTER, 1, 2)
@@ -236,7 +236,7 @@ fn nothing_is_broadcast_over_tcp() {
 }
 
 #[test]
-fn no_more_requests_fly_than_the_limit_says() {
+fn no_more_requests_are_in_flight_than_the_limit_allows() {
     let (end, mut client) = client();
     client.line.limit(2);
     for number in 1..=5 {
@@ -257,7 +257,7 @@ fn no_more_requests_fly_than_the_limit_says() {
 }
 
 #[test]
-fn a_small_buffer_gathers_what_it_holds() {
+fn requests_that_do_not_fit_into_a_small_buffer_are_sent_later() {
     let (end, mut client) = client();
     client.line.means.outgoing = vec![0; 30];
     client.line.means.frame = Frame::new(vec![0; 12]);
@@ -277,9 +277,9 @@ fn a_small_buffer_gathers_what_it_holds() {
     assert_eq!(ended, 5);
 }
 
-/// A program that was busy for long finds more than the buffer holds.
+/// More bytes than the buffer holds have arrived while the program was busy.
 #[test]
-fn a_late_poll_takes_all_that_has_arrived_before_a_deadline_counts() {
+fn a_late_poll_reads_all_bytes_that_have_arrived_before_it_checks_deadlines() {
     let (end, mut client) = client();
     let counters = client.line.means.counters.clone();
     client.line.means.frame = Frame::new(vec![0; 16]);
@@ -287,7 +287,7 @@ fn a_late_poll_takes_all_that_has_arrived_before_a_deadline_counts() {
         assert!(client.queue(read(1, number)).is_ok());
     }
     assert!(poll(&end, &mut client).is_empty());
-    // In pieces that end inside of a response.
+    // The pieces end in the middle of responses.
     let all: Vec<u8> = requests(&end.sent())
         .into_iter()
         .flat_map(response)
@@ -302,9 +302,9 @@ fn a_late_poll_takes_all_that_has_arrived_before_a_deadline_counts() {
     assert_eq!(counters.borrow()[Counter::Resynchronisations as usize], 0);
 }
 
-/// A line full of noise is not listened to for good.
+/// A poll ends although a noisy line has more bytes to read.
 #[test]
-fn noise_without_an_end_does_not_keep_a_poll_from_its_deadline() {
+fn endless_noise_does_not_keep_a_request_from_timing_out() {
     let (end, mut client) = client();
     assert!(client.queue(read(1, 1)).is_ok());
     assert!(poll(&end, &mut client).is_empty());
@@ -318,7 +318,7 @@ fn noise_without_an_end_does_not_keep_a_poll_from_its_deadline() {
 }
 
 #[test]
-fn a_request_that_waits_for_room_follows_one_that_left_in_pieces() {
+fn a_request_that_waits_for_buffer_space_follows_one_that_was_sent_in_pieces() {
     let (end, mut client) = client();
     client.line.means.outgoing = vec![0; 12];
     end.0.borrow_mut().piece = Some(6);
@@ -334,7 +334,7 @@ fn a_request_that_waits_for_room_follows_one_that_left_in_pieces() {
 }
 
 #[test]
-fn a_response_longer_than_the_buffer_is_passed_over_and_told() {
+fn a_response_longer_than_the_buffer_is_skipped_and_reported() {
     let (end, mut client) = client();
     client.line.means.frame = Frame::new(vec![0; 12]);
     assert!(client.queue(read(1, 7)).is_ok());
@@ -358,7 +358,7 @@ fn a_response_longer_than_the_buffer_is_passed_over_and_told() {
 }
 
 #[test]
-fn what_looks_like_the_response_inside_a_frame_that_is_passed_over_is_none() {
+fn bytes_of_a_skipped_frame_are_not_taken_for_the_response() {
     let (end, mut client) = client();
     client.line.means.frame = Frame::new(vec![0; 24]);
     assert!(client.queue(read(1, 7)).is_ok());
@@ -380,7 +380,7 @@ fn what_looks_like_the_response_inside_a_frame_that_is_passed_over_is_none() {
 }
 
 #[test]
-fn a_dead_link_ends_all_requests() {
+fn a_lost_link_ends_all_requests() {
     let (end, mut client) = client();
     for number in 1..=5 {
         assert!(client.queue(read(1, number)).is_ok());
@@ -396,7 +396,7 @@ fn a_dead_link_ends_all_requests() {
 }
 
 #[test]
-fn a_reconnect_forgets_what_was_half_received() {
+fn a_reconnect_discards_a_half_received_response() {
     let (end, mut client) = client();
     assert!(client.queue(read(1, 1)).is_ok());
     poll(&end, &mut client);
@@ -417,7 +417,7 @@ fn a_reconnect_forgets_what_was_half_received() {
 }
 
 #[test]
-fn a_cancelled_request_makes_room() {
+fn a_cancelled_request_frees_its_place_for_the_next() {
     let (end, mut client) = client();
     client.line.limit(1);
     assert!(client.queue(read(1, 1)).is_ok());
@@ -428,13 +428,13 @@ fn a_cancelled_request_makes_room() {
     end.deliver(0, &response(first));
     assert!(poll(&end, &mut client).is_empty());
     end.deliver(0, &response(requests(&end.sent())[0]));
-    // What answers the first is dropped.
+    // The response to the cancelled request is dropped.
     assert!(poll(&end, &mut client).is_empty());
     assert_right(&poll(&end, &mut client)[0]);
 }
 
 #[test]
-fn a_port_that_takes_nothing_is_a_busy_line() {
+fn a_request_that_the_port_never_accepts_ends_with_line_busy() {
     let (end, mut client) = client();
     end.0.borrow_mut().stuck = true;
     assert!(client.queue(read(1, 1)).is_ok());
@@ -446,8 +446,8 @@ fn a_port_that_takes_nothing_is_a_busy_line() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Responses come in any order and any pieces, some twice, some never, with
-    /// garbage between; each request ends once, right or not answered.
+    /// Responses arrive in any order and in any pieces, some twice, some never, with garbage
+    /// between them. Each request ends once: with its own data, or with a failure.
     #[test]
     fn every_request_ends_once_and_with_its_own_data(
         script in prop::collection::vec((any::<u8>(), any::<u8>(), 0u8..12), 200),

@@ -1,5 +1,5 @@
-//! The response to the first request on a TCP stream, which is told in a way of its
-//! own.
+//! The response to the first request in the queue of a TCP client. The client has a faster
+//! path for it, which must give the same result as the general one.
 
 #[path = "common/stream.rs"]
 mod stream;
@@ -7,7 +7,7 @@ mod stream;
 use stream::{client, poll, read, requests, response};
 
 #[test]
-fn a_response_means_the_same_to_the_first_request_and_to_one_behind_it() {
+fn a_response_has_the_same_result_for_the_first_request_and_for_a_later_one() {
     let right = response((0, 1, 7));
     let mut all = vec![right.clone()];
     for at in 2..right.len() {
@@ -27,7 +27,7 @@ fn a_response_means_the_same_to_the_first_request_and_to_one_behind_it() {
         all.push(other);
     }
     for answer in all {
-        let [first, behind] = [0, 1].map(|others| {
+        let [first, later] = [0, 1].map(|others| {
             let (end, mut client) = client();
             for number in 0..=others {
                 assert!(client.queue(read(1, 7 + others - number)).is_ok());
@@ -50,6 +50,6 @@ fn a_response_means_the_same_to_the_first_request_and_to_one_behind_it() {
                 task.received().to_vec(),
             )
         });
-        assert_eq!(first, behind, "{answer:?}");
+        assert_eq!(first, later, "{answer:?}");
     }
 }

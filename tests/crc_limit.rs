@@ -1,9 +1,9 @@
-//! How many damaged replies CRC-16 lets through. No receiver of RTU frames can do
-//! better: docs/reliability.md has the figure.
+//! How many damaged replies CRC-16 does not detect. No receiver of RTU frames can detect
+//! more; docs/reliability.md has the figure.
 
 use mbm::frame::rtu;
 
-/// Numbers that look random, the same ones at every run.
+/// Pseudo-random numbers, the same ones in every run.
 struct Random(u64);
 
 impl Random {
@@ -15,7 +15,7 @@ impl Random {
     }
 }
 
-/// The reply of unit 17 with ten registers.
+/// A reply of unit 17 with ten registers.
 fn reply() -> Vec<u8> {
     let mut buffer = [0; 256];
     let length = rtu::emit(&mut buffer, 17, |pdu| {
@@ -28,29 +28,30 @@ fn reply() -> Vec<u8> {
     buffer[..length.unwrap()].to_vec()
 }
 
-/// Damages the reply so often, each time in up to eight bytes anywhere; gives how
-/// often the frame still has a right CRC and the head that the request expects.
-fn passed(times: u64) -> u64 {
+/// Damages the reply `times` times, each time in up to eight bytes anywhere. Returns how many
+/// of the damaged frames still have a right CRC and the first three bytes that the request
+/// expects.
+fn count_undetected(times: u64) -> u64 {
     let right = reply();
     let mut random = Random(0x9E37_79B9_7F4A_7C15);
-    let mut passed = 0;
+    let mut undetected = 0;
     for _ in 0..times {
         let mut damaged = right.clone();
         for _ in 0..=random.below(8) {
             damaged[random.below(25)] = random.below(256) as u8;
         }
         if damaged != right && damaged[..3] == right[..3] && rtu::parse(&damaged).is_ok() {
-            passed += 1;
+            undetected += 1;
         }
     }
-    passed
+    undetected
 }
 
 #[test]
 fn few_damaged_replies_have_a_right_crc() {
     let times = std::env::var("MBM_DAMAGED_REPLIES").map_or(1_000_000, |n| n.parse().unwrap());
-    let passed = passed(times);
-    println!("{passed} of {times} damaged replies have a right head and a right CRC");
-    // As many as chance gives: a CRC that checked less would let more through.
-    assert!(passed <= times / 65_536 + 8, "{passed}");
+    let undetected = count_undetected(times);
+    println!("{undetected} of {times} damaged replies have a right head and a right CRC");
+    // One in 65 536 passes by chance. A weaker check would let more pass.
+    assert!(undetected <= times / 65_536 + 8, "{undetected}");
 }

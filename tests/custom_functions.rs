@@ -1,5 +1,5 @@
-//! Functions of users, with the lengths that they declare, and how long the
-//! response to a request is.
+//! User-defined functions with the lengths that they declare, and the length of the response
+//! to each request.
 
 #[path = "common/vectors.rs"]
 mod vectors;
@@ -19,7 +19,7 @@ const fn function(code: u8, rule: Rule) -> Function {
     }
 }
 
-/// One of each rule, in the user's ranges and out of them.
+/// Each rule, within the ranges of user-defined codes and outside of them.
 const FUNCTIONS: [Function; 4] = [
     function(0x41, Rule::Fixed(4)),
     function(0x5A, Rule::Counted(2, 1)),
@@ -74,7 +74,7 @@ fn silence_ends_a_pdu_of_any_length() {
 }
 
 #[test]
-fn declared_functions_are_read_out_of_the_users_ranges_too() {
+fn declared_functions_outside_the_user_defined_ranges_are_read_too() {
     let (function, data) = (0x5A, &COUNTED[1..]);
     assert_eq!(parse(&COUNTED), Ok(Request::Custom { function, data }));
     let response = Response::Custom { function, data };
@@ -96,7 +96,7 @@ fn a_length_that_breaks_its_rule_is_refused() {
 }
 
 #[test]
-fn what_a_user_declares_of_the_standards_functions_changes_nothing() {
+fn a_declaration_does_not_change_a_function_of_the_standard() {
     let all: Vec<_> = (0..=255)
         .map(|code| function(code, Rule::Silence))
         .collect();
@@ -123,7 +123,7 @@ fn what_a_user_declares_of_the_standards_functions_changes_nothing() {
 }
 
 #[test]
-fn the_users_ranges_are_65_to_72_and_100_to_110() {
+fn the_user_defined_ranges_are_65_to_72_and_100_to_110() {
     let codes: Vec<u8> = (0..=255).filter(|code| is_user_defined(*code)).collect();
     let expected: Vec<u8> = (65..=72).chain(100..=110).collect();
     assert_eq!(codes, expected);
@@ -134,21 +134,21 @@ fn the_users_ranges_are_65_to_72_and_100_to_110() {
     }
 }
 
-/// What the request of that name tells of its response.
-fn told(name: &str) -> Length {
+/// The response length that follows from the request of that name.
+fn response_length_of(name: &str) -> Length {
     let bytes = pdu(name);
     let request = Request::parse(&bytes).expect(name);
     request.response_length(&FUNCTIONS)
 }
 
 #[test]
-fn every_answer_of_the_table_is_as_long_as_its_request_tells() {
+fn every_response_of_the_table_is_as_long_as_its_request_says() {
     let vectors = right_pdus();
     let mut compared = 0;
     for vector in &vectors {
         let answer = format!("{}-answer", vector.name);
         let answer = vectors.iter().find(|other| other.name == answer);
-        // These show the shape and not an answer to that very request.
+        // These examples show the form of a response, but do not belong to that request.
         let examples = ["01-most", "read-coils", "read-discrete", "read-server"];
         let example = examples.iter().any(|name| vector.name.starts_with(name));
         if let (Some(answer), false) = (answer, example || vector.name == "spec-01-7") {
@@ -167,43 +167,43 @@ fn every_answer_of_the_table_is_as_long_as_its_request_tells() {
 }
 
 #[test]
-fn a_request_tells_the_length_of_its_response() {
-    assert_eq!(told("01-most"), Length::Exactly(252));
-    assert_eq!(told("spec-01-6.1"), Length::Exactly(5));
-    assert_eq!(told("03-most"), Length::Exactly(252));
-    assert_eq!(told("17-most"), Length::Exactly(252));
-    assert_eq!(told("spec-07-6.7"), Length::Exactly(2));
-    assert_eq!(told("spec-14-6.14"), Length::Exactly(14));
-    assert_eq!(told("15-longest"), Length::Exactly(253));
-    assert_eq!(told("08-00-two-words"), Length::Exactly(7));
-    assert_eq!(told("spec-16-6.16"), Length::Exactly(7));
-    assert_eq!(told("spec-0C-6.10"), Length::AtLeast(2));
-    assert_eq!(told("11-by-the-standard"), Length::AtLeast(2));
-    assert_eq!(told("spec-18-6.18"), Length::AtLeast(3));
-    assert_eq!(told("spec-2B-6.21"), Length::AtLeast(7));
-    assert_eq!(told("2B-0D-canopen"), Length::Silence);
+fn the_length_of_a_response_follows_from_its_request() {
+    assert_eq!(response_length_of("01-most"), Length::Exactly(252));
+    assert_eq!(response_length_of("spec-01-6.1"), Length::Exactly(5));
+    assert_eq!(response_length_of("03-most"), Length::Exactly(252));
+    assert_eq!(response_length_of("17-most"), Length::Exactly(252));
+    assert_eq!(response_length_of("spec-07-6.7"), Length::Exactly(2));
+    assert_eq!(response_length_of("spec-14-6.14"), Length::Exactly(14));
+    assert_eq!(response_length_of("15-longest"), Length::Exactly(253));
+    assert_eq!(response_length_of("08-00-two-words"), Length::Exactly(7));
+    assert_eq!(response_length_of("spec-16-6.16"), Length::Exactly(7));
+    assert_eq!(response_length_of("spec-0C-6.10"), Length::AtLeast(2));
+    assert_eq!(response_length_of("11-by-the-standard"), Length::AtLeast(2));
+    assert_eq!(response_length_of("spec-18-6.18"), Length::AtLeast(3));
+    assert_eq!(response_length_of("spec-2B-6.21"), Length::AtLeast(7));
+    assert_eq!(response_length_of("2B-0D-canopen"), Length::Silence);
 }
 
 #[test]
 fn force_listen_only_has_no_response() {
-    assert_eq!(told("08-04-listen-only"), Length::Exactly(0));
+    assert_eq!(response_length_of("08-04-listen-only"), Length::Exactly(0));
 }
 
 #[test]
-fn a_users_request_tells_what_its_rule_tells() {
-    let of = |code| {
+fn the_rule_of_a_user_defined_function_gives_the_length_of_its_response() {
+    let length_of = |code| {
         let data = &[];
         let function = code;
         Request::Custom { function, data }.response_length(&FUNCTIONS)
     };
-    assert_eq!(of(0x41), Length::Exactly(4));
-    assert_eq!(of(0x5A), Length::AtLeast(3));
-    assert_eq!(of(0x64), Length::Silence);
-    assert_eq!(of(0x42), Length::Unknown);
+    assert_eq!(length_of(0x41), Length::Exactly(4));
+    assert_eq!(length_of(0x5A), Length::AtLeast(3));
+    assert_eq!(length_of(0x64), Length::Silence);
+    assert_eq!(length_of(0x42), Length::Unknown);
 }
 
 #[test]
-fn the_length_of_a_response_to_no_right_request_does_not_overflow() {
+fn the_length_of_a_response_to_an_invalid_request_does_not_overflow() {
     for quantity in [0, 1, 2001, 0x7FFF, 0x8000, 0xFFFF] {
         for function in [1, 3] {
             let bits = Request::ReadBits {
@@ -217,10 +217,10 @@ fn the_length_of_a_response_to_no_right_request_does_not_overflow() {
                 quantity,
             };
             let items = usize::from(quantity);
-            let told = bits.response_length(&[]);
-            assert_eq!(told, Length::Exactly(2 + items.div_ceil(8)));
-            let told = registers.response_length(&[]);
-            assert_eq!(told, Length::Exactly(2 + 2 * items));
+            let length = bits.response_length(&[]);
+            assert_eq!(length, Length::Exactly(2 + items.div_ceil(8)));
+            let length = registers.response_length(&[]);
+            assert_eq!(length, Length::Exactly(2 + 2 * items));
         }
     }
 }

@@ -1,5 +1,5 @@
-//! Every truncation and every one-byte change of every right PDU, and the
-//! lengths that first bytes tell.
+//! Every truncation and every one-byte change of every valid PDU, and the lengths that
+//! follow from its first bytes.
 
 #[path = "common/vectors.rs"]
 mod vectors;
@@ -9,7 +9,7 @@ use mbm::pdu::custom::{Function, Rule};
 use mbm::pdu::length::{self, Length};
 use vectors::{all, parse_and_emit, right_pdus, Direction, Vector};
 
-/// The users' functions among the vectors.
+/// The user-defined functions among the vectors.
 const FUNCTIONS: [Function; 2] = [
     Function {
         code: 0x41,
@@ -30,8 +30,8 @@ fn length(direction: Direction, pdu: &[u8]) -> Length {
     }
 }
 
-/// Panics unless the PDU is read and written again as it is, or refused with a
-/// status that such a PDU can have.
+/// Panics unless the PDU is read and written again unchanged, or refused with a status that
+/// such a PDU can have.
 fn right_or_refused(direction: Direction, pdu: &[u8]) {
     let expected: &[Status] = match direction {
         Direction::Request => &[
@@ -47,19 +47,19 @@ fn right_or_refused(direction: Direction, pdu: &[u8]) {
     }
 }
 
-/// Report Server ID from a device that counts only the id, and sends more.
+/// True for a Report Server ID response whose byte count covers only the id, although more
+/// data follow.
 fn counts_too_little(vector: &Vector) -> bool {
     vector.direction == Direction::Response && vector.name.starts_with("read-server-id")
 }
 
-/// True for the PDUs whose end no byte tells: a shorter or longer one may be
-/// right too.
+/// True for PDUs that do not contain their length: a shorter or longer one may be valid too.
 fn ends_with_silence(vector: &Vector) -> bool {
     counts_too_little(vector) || length(vector.direction, &vector.bytes) == Length::Silence
 }
 
 #[test]
-fn every_truncation_is_refused_unless_no_byte_tells_the_length() {
+fn every_truncated_pdu_that_contains_its_length_is_refused() {
     for vector in right_pdus() {
         for end in 0..vector.bytes.len() {
             let part = &vector.bytes[..end];
@@ -79,7 +79,7 @@ fn every_truncation_is_refused_unless_no_byte_tells_the_length() {
 }
 
 #[test]
-fn every_longer_pdu_is_refused_unless_no_byte_tells_the_length() {
+fn every_longer_pdu_that_contains_its_length_is_refused() {
     for vector in right_pdus() {
         let mut longer = vector.bytes.clone();
         longer.push(0);
@@ -98,7 +98,7 @@ fn every_longer_pdu_is_refused_unless_no_byte_tells_the_length() {
 }
 
 #[test]
-fn every_other_value_of_every_byte_is_read_right_or_refused() {
+fn every_change_of_one_byte_is_read_correctly_or_refused() {
     for vector in all() {
         if vector.framing.is_none() {
             for at in 0..vector.bytes.len() {
@@ -113,7 +113,7 @@ fn every_other_value_of_every_byte_is_read_right_or_refused() {
 }
 
 #[test]
-fn requests_read_as_responses_and_responses_as_requests_are_right_or_refused() {
+fn requests_read_as_responses_and_responses_read_as_requests_are_read_correctly_or_refused() {
     for vector in all() {
         if vector.framing.is_none() {
             right_or_refused(Direction::Request, &vector.bytes);
@@ -143,16 +143,20 @@ fn the_length_of_every_prefix_agrees_with_the_whole() {
 }
 
 #[test]
-fn a_length_once_told_stays_whatever_follows() {
+fn a_known_length_does_not_change_with_the_bytes_that_follow() {
     for vector in right_pdus() {
-        let mut told = None;
+        let mut known = None;
         for end in 0..=vector.bytes.len() {
             match length(vector.direction, &vector.bytes[..end]) {
-                Length::AtLeast(_) => assert_eq!(told, None, "{}", vector.name),
-                length => assert_eq!(*told.get_or_insert(length), length),
+                Length::AtLeast(_) => assert_eq!(known, None, "{}", vector.name),
+                length => assert_eq!(*known.get_or_insert(length), length),
             }
         }
-        assert!(told.is_some(), "{} never tells", vector.name);
+        assert!(
+            known.is_some(),
+            "the length of {} stays unknown",
+            vector.name
+        );
     }
 }
 
@@ -161,14 +165,14 @@ fn a_server_id_whose_count_is_too_small_is_as_long_as_its_count_says() {
     let short: Vec<_> = right_pdus().into_iter().filter(counts_too_little).collect();
     assert_eq!(short.len(), 2);
     for vector in short {
-        let told = length::response(&vector.bytes, &[]);
-        assert_eq!(told, Length::Exactly(2 + usize::from(vector.bytes[1])));
+        let length = length::response(&vector.bytes, &[]);
+        assert_eq!(length, Length::Exactly(2 + usize::from(vector.bytes[1])));
         assert!(vector.bytes.len() > 4);
     }
 }
 
 #[test]
-fn a_length_that_overflows_is_longer_than_any_pdu_and_not_short() {
+fn a_byte_count_that_overflows_gives_a_length_beyond_any_pdu() {
     let fifo = length::response(&[0x18, 0xFF, 0xFF], &[]);
     assert_eq!(fifo, Length::Exactly(65535));
     let fifo = length::response(&[0x18, 0xFF, 0xFB], &[]);
@@ -182,7 +186,7 @@ fn a_length_that_overflows_is_longer_than_any_pdu_and_not_short() {
 }
 
 #[test]
-fn nobody_knows_the_length_of_functions_that_nobody_declared() {
+fn the_length_of_an_undeclared_function_is_unknown() {
     for code in 0..=255u8 {
         let public = mbm::pdu::is_public(code);
         let known = length::request(&[code], &[]) != Length::Unknown;
@@ -193,7 +197,7 @@ fn nobody_knows_the_length_of_functions_that_nobody_declared() {
 }
 
 #[test]
-fn every_exception_is_two_bytes() {
+fn every_exception_has_two_bytes() {
     for code in 0x80..=0xFF {
         for pdu in [&[code][..], &[code, 1]] {
             assert_eq!(length::response(pdu, &FUNCTIONS), Length::Exactly(2));

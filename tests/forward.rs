@@ -1,4 +1,4 @@
-//! Requests that arrive as bytes and are sent on as they are.
+//! Requests that a gateway receives as bytes and forwards unchanged.
 
 #[path = "common/vectors.rs"]
 mod vectors;
@@ -10,7 +10,8 @@ use proptest::prelude::*;
 use std::sync::LazyLock;
 use vectors::{all, right_pdus, Direction};
 
-/// The request as the outline sends it; or why it is refused.
+/// Forwards a request PDU. Returns its outline and the PDU that is sent, or the status that
+/// refuses it.
 fn forward(pdu: &[u8]) -> Result<(Outline, Vec<u8>), Status> {
     let mut outline = Outline::NONE;
     match outline.forward(pdu[0], &pdu[1..]) {
@@ -23,7 +24,7 @@ fn forward(pdu: &[u8]) -> Result<(Outline, Vec<u8>), Status> {
     Ok((outline, sent))
 }
 
-/// The PDU of every right request of the table.
+/// The PDU of every valid request of the table.
 static REQUESTS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
     let right = right_pdus().into_iter();
     right
@@ -33,7 +34,7 @@ static REQUESTS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
 });
 
 #[test]
-fn every_right_request_is_sent_as_it_arrived() {
+fn every_valid_request_is_forwarded_unchanged() {
     assert!(REQUESTS.len() > 60);
     for pdu in REQUESTS.iter() {
         let (outline, sent) = forward(pdu).unwrap_or_else(|status| panic!("{pdu:02X?} {status:?}"));
@@ -44,11 +45,11 @@ fn every_right_request_is_sent_as_it_arrived() {
 }
 
 #[test]
-fn the_answers_of_the_standard_are_right() {
+fn the_responses_printed_in_the_standard_match_their_requests() {
     let all = all();
     let mut count = 0;
     for answer in &all {
-        // The client takes no response that is a function code alone.
+        // The client accepts no response that consists of a function code alone.
         let name = answer.name.strip_suffix("-answer");
         let Some(name) = name.filter(|_| answer.bytes.len() > 1) else {
             continue;
@@ -75,7 +76,7 @@ fn the_answers_of_the_standard_are_right() {
 }
 
 #[test]
-fn what_no_server_carries_out_is_refused_with_its_exception() {
+fn a_request_that_every_server_must_refuse_is_refused_with_that_exception() {
     for (pdu, status) in [
         (&[0][..], Status::ILLEGAL_FUNCTION),
         (&[0x80, 1], Status::ILLEGAL_FUNCTION),
@@ -138,9 +139,9 @@ fn any_pdu() -> impl Strategy<Value = Vec<u8>> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 3000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// What a server can read is sent, and what is sent is what arrived.
+    /// A request that a server can read is forwarded, and a forwarded request is unchanged.
     #[test]
-    fn what_the_standard_allows_is_sent_unchanged(pdu in any_pdu()) {
+    fn a_request_that_the_standard_allows_is_forwarded_unchanged(pdu in any_pdu()) {
         match forward(&pdu) {
             Ok((_, sent)) => prop_assert_eq!(sent, pdu),
             Err(_) => prop_assert!(Request::parse(&pdu).is_err()),

@@ -1,4 +1,4 @@
-//! Every line of `tests/vectors.txt`: PDUs, and whole frames with their checks.
+//! Every line of `tests/vectors.txt`: PDUs, and whole frames with their CRC or LRC.
 
 #[path = "common/vectors.rs"]
 mod vectors;
@@ -34,7 +34,7 @@ fn every_vector_reads_as_the_table_says_and_is_written_again_byte_for_byte() {
             None => parse_and_emit(vector.direction, &vector.bytes),
             Some(framing) => frame_again(framing, &vector),
         };
-        // Digits of ours are upper case.
+        // mbm writes hexadecimal digits in upper case.
         let bytes = match vector.framing {
             Some(Framing::Ascii) => vector.bytes.to_ascii_uppercase(),
             _ => vector.bytes,
@@ -51,12 +51,16 @@ fn every_vector_reads_as_the_table_says_and_is_written_again_byte_for_byte() {
 fn names_of_vectors_are_unique() {
     let mut names = HashSet::new();
     for vector in all() {
-        assert!(names.insert(vector.name), "{} is there twice", vector.name);
+        assert!(
+            names.insert(vector.name),
+            "the table has {} twice",
+            vector.name
+        );
     }
 }
 
 #[test]
-fn a_packet_printed_with_a_wrong_crc_is_refused_though_its_pdu_is_right() {
+fn a_packet_with_a_wrong_crc_is_refused_although_its_pdu_is_valid() {
     let wrong = all().into_iter().filter(|vector| {
         vector.framing == Some(Framing::Rtu)
             && vector.status == Status::INVALID_CRC
@@ -74,7 +78,7 @@ fn a_packet_printed_with_a_wrong_crc_is_refused_though_its_pdu_is_right() {
 }
 
 #[test]
-fn every_pdu_travels_in_every_framing() {
+fn every_pdu_can_be_sent_in_every_framing() {
     let framings = [
         Framing::Rtu,
         Framing::Ascii,
@@ -97,8 +101,8 @@ fn every_pdu_travels_in_every_framing() {
     }
 }
 
-/// Every truncation, and every other value of every byte, of a frame.
-fn spoilt(frame: &[u8]) -> impl Iterator<Item = Vec<u8>> + '_ {
+/// Every truncation of a frame, and the frame with every other value of every byte.
+fn damaged(frame: &[u8]) -> impl Iterator<Item = Vec<u8>> + '_ {
     let truncated = (0..frame.len()).map(|length| frame[..length].to_vec());
     let changed = (0..frame.len()).flat_map(move |at| {
         (1..=255).map(move |difference| {
@@ -111,10 +115,10 @@ fn spoilt(frame: &[u8]) -> impl Iterator<Item = Vec<u8>> + '_ {
 }
 
 #[test]
-fn an_rtu_frame_with_a_byte_changed_or_missing_is_never_taken_for_a_frame() {
+fn an_rtu_frame_with_a_changed_or_missing_byte_is_refused() {
     for vector in all() {
         if vector.framing == Some(Framing::Rtu) && vector.status == Status::OK {
-            for mut bytes in spoilt(&vector.bytes) {
+            for mut bytes in damaged(&vector.bytes) {
                 let refused = Framing::Rtu.parse(&mut bytes, ascii::END).unwrap_err();
                 let expected = match bytes.len() {
                     0..=3 => Status::INCOMPLETE_FRAME,
@@ -127,15 +131,15 @@ fn an_rtu_frame_with_a_byte_changed_or_missing_is_never_taken_for_a_frame() {
 }
 
 #[test]
-fn an_ascii_frame_with_a_character_changed_or_missing_is_refused_unless_it_says_the_same() {
+fn an_ascii_frame_with_a_changed_or_missing_character_is_refused_unless_only_its_case_changed() {
     for vector in all() {
         if vector.framing == Some(Framing::Ascii) && vector.status == Status::OK {
             let mut right = vector.bytes.clone();
             let right = Framing::Ascii.parse(&mut right, ascii::END).unwrap();
-            for spoilt in spoilt(&vector.bytes) {
-                let mut bytes = spoilt.clone();
+            for damaged in damaged(&vector.bytes) {
+                let mut bytes = damaged.clone();
                 if let Ok(adu) = Framing::Ascii.parse(&mut bytes, ascii::END) {
-                    assert!(spoilt.eq_ignore_ascii_case(&vector.bytes));
+                    assert!(damaged.eq_ignore_ascii_case(&vector.bytes));
                     assert_eq!(adu, right);
                 }
             }
@@ -144,15 +148,15 @@ fn an_ascii_frame_with_a_character_changed_or_missing_is_refused_unless_it_says_
 }
 
 #[test]
-fn a_tcp_frame_with_a_byte_changed_or_missing_is_refused_or_says_what_it_says() {
+fn a_tcp_frame_with_a_changed_or_missing_byte_is_refused_or_written_again_unchanged() {
     for vector in all() {
         if vector.framing == Some(Framing::Tcp) && vector.status == Status::OK {
-            for spoilt in spoilt(&vector.bytes) {
-                let mut bytes = spoilt.clone();
+            for damaged in damaged(&vector.bytes) {
+                let mut bytes = damaged.clone();
                 let Ok(adu) = Framing::Tcp.parse(&mut bytes, ascii::END) else {
-                    // Only the header's protocol and length can refuse it.
-                    let whole = spoilt.len() == vector.bytes.len();
-                    assert!(!whole || spoilt[2..6] != vector.bytes[2..6]);
+                    // Only a changed protocol or length in the header makes it invalid.
+                    let whole = damaged.len() == vector.bytes.len();
+                    assert!(!whole || damaged[2..6] != vector.bytes[2..6]);
                     continue;
                 };
                 let (transaction, unit) = (adu.transaction, adu.unit);
@@ -162,7 +166,7 @@ fn a_tcp_frame_with_a_byte_changed_or_missing_is_refused_or_says_what_it_says() 
                         place.copy_from_slice(&pdu);
                         Ok(pdu.len())
                     });
-                    assert_eq!((again, bytes), (Ok(spoilt.len()), spoilt));
+                    assert_eq!((again, bytes), (Ok(damaged.len()), damaged));
                 }
             }
         }

@@ -1,5 +1,4 @@
-//! What holds for every request and response there can be, and for every
-//! string of bytes.
+//! Properties that hold for all possible requests and responses, and for any bytes.
 
 use mbm::pdu::custom::{Function, Rule};
 use mbm::pdu::files::{Reads, Records, Writes};
@@ -15,12 +14,12 @@ fn bytes(most: usize) -> impl Strategy<Value = Vec<u8>> {
     prop::collection::vec(any::<u8>(), 0..=most)
 }
 
-/// Numbers near the limits, and any.
+/// Any quantity, most often one near a limit.
 fn quantity() -> impl Strategy<Value = u16> {
     any_of![0..140u16, 1960..2010u16, any::<u16>()]
 }
 
-/// Function codes, most of them those of the standard.
+/// Any function code, most often one of the standard.
 fn function() -> impl Strategy<Value = u8> {
     let public: Vec<u8> = (0..=255)
         .filter(|code| mbm::pdu::is_public(*code))
@@ -28,7 +27,7 @@ fn function() -> impl Strategy<Value = u8> {
     any_of![4 => select(public), 1 => any::<u8>()]
 }
 
-/// Data of which some lengths agree with `quantity`.
+/// Data whose length often matches `quantity` registers or bits.
 fn data_for(quantity: u16) -> impl Strategy<Value = Vec<u8>> {
     let registers = usize::from(quantity.min(130)) * 2;
     let bits = usize::from(quantity).div_ceil(8).min(260);
@@ -36,7 +35,7 @@ fn data_for(quantity: u16) -> impl Strategy<Value = Vec<u8>> {
     length.prop_flat_map(|length| prop::collection::vec(any::<u8>(), length))
 }
 
-/// What requests and responses are made of.
+/// The values from which requests and responses are built.
 #[derive(Clone, Debug)]
 struct Parts {
     function: u8,
@@ -58,7 +57,7 @@ fn parts() -> impl Strategy<Value = Parts> {
     })
 }
 
-/// Every variant of a request that can be made of these, in order or not.
+/// Every variant of a request with these values, valid or not.
 fn requests(parts: &Parts) -> Vec<Request<'_>> {
     let (function, data) = (parts.function, &parts.data[..]);
     let [address, quantity, other_address, other_quantity] = parts.words;
@@ -131,7 +130,7 @@ fn requests(parts: &Parts) -> Vec<Request<'_>> {
     requests
 }
 
-/// As [`requests`].
+/// Every variant of a response with these values, valid or not.
 fn responses(parts: &Parts) -> Vec<Response<'_>> {
     let (function, data) = (parts.function, &parts.data[..]);
     let [address, quantity, other, last] = parts.words;
@@ -205,7 +204,8 @@ fn responses(parts: &Parts) -> Vec<Response<'_>> {
     responses
 }
 
-/// Sub-requests of 14 or 15, and sub-responses of 14, most of them in order.
+/// Sub-requests of functions 0x14 and 0x15, sub-responses of 0x14, or objects of a device
+/// identification; most of them valid.
 fn groups() -> impl Strategy<Value = Vec<u8>> {
     let record = || (any_of![0..4u16, any::<u16>()], 0..10_010u16, 0..9u16);
     let read = record().prop_map(|(file, record, length)| {
@@ -242,18 +242,18 @@ const USERS: [Function; 1] = [Function {
     response: Rule::Silence,
 }];
 
-/// Every function code with a rule that any length keeps.
+/// Declarations of every function code, with a rule that allows any length.
 fn any_function() -> Vec<Function> {
-    let of = |code| Function {
+    let declare = |code| Function {
         code,
         request: Rule::Silence,
         response: Rule::Silence,
     };
-    (0..=255).map(of).collect()
+    (0..=255).map(declare).collect()
 }
 
-/// Every request and response of these parts that is emitted reads back as it
-/// was; what is not leaves an error that is told.
+/// Checks that every request and response with these values is read back unchanged, or refused
+/// when it is written.
 fn emits_and_reads_back(parts: &Parts) -> Result<(), TestCaseError> {
     let mut buffer = [0; 600];
     let functions = any_function();
@@ -274,8 +274,8 @@ fn emits_and_reads_back(parts: &Parts) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// What parses is written again byte for byte, and is as long as its first
-/// bytes tell.
+/// Checks that a PDU that can be read is written again byte for byte, and that its length is
+/// the one that follows from its first bytes.
 fn reads_and_emits_again(pdu: &[u8]) -> Result<(), TestCaseError> {
     let mut buffer = [0; 253];
     if let Ok(request) = Request::parse_with(pdu, &USERS) {
@@ -291,10 +291,10 @@ fn reads_and_emits_again(pdu: &[u8]) -> Result<(), TestCaseError> {
         let length = response.emit(&mut buffer);
         prop_assert_eq!(length.map(|length| &buffer[..length]), Ok(pdu));
         match length::response(pdu, &USERS) {
-            // A server id may be longer than it counts.
+            // A server id may be longer than its byte count.
             Length::Exactly(length) if pdu[0] == 0x11 => prop_assert!(length <= pdu.len()),
             Length::Exactly(length) => prop_assert_eq!(length, pdu.len()),
-            Length::AtLeast(_) => prop_assert!(false, "a whole PDU tells its length"),
+            Length::AtLeast(_) => prop_assert!(false, "the length of a whole PDU must be known"),
             Length::Silence | Length::Unknown => {}
         }
     }
@@ -305,12 +305,12 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(1000))]
 
     #[test]
-    fn what_is_emitted_reads_back_as_it_was(parts in parts()) {
+    fn every_written_pdu_reads_back_unchanged(parts in parts()) {
         emits_and_reads_back(&parts)?;
     }
 
     #[test]
-    fn emitted_records_and_objects_read_back_as_they_were(
+    fn written_records_and_objects_read_back_unchanged(
         parts in parts(),
         data in groups(),
         levels in (1..=4u8, select(vec![1u8, 2, 3, 0x81, 0x82, 0x83]), 0..3u8),
@@ -321,7 +321,7 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_are_read_right_or_refused(
+    fn any_bytes_are_read_correctly_or_refused(
         function in function(),
         data in bytes(300),
     ) {
@@ -329,7 +329,7 @@ proptest! {
     }
 
     #[test]
-    fn counted_bytes_of_any_function_are_read_right_or_refused(
+    fn counted_bytes_of_any_function_are_read_correctly_or_refused(
         function in function(),
         data in groups(),
     ) {
@@ -338,7 +338,7 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_have_a_length_without_panic(pdu in bytes(300)) {
+    fn the_length_of_any_bytes_is_found_without_panic(pdu in bytes(300)) {
         for functions in [&[][..], &USERS] {
             let _ = length::request(&pdu, functions);
             let _ = length::response(&pdu, functions);
@@ -346,16 +346,16 @@ proptest! {
     }
 
     #[test]
-    fn a_length_told_by_some_bytes_is_told_by_more(pdu in bytes(260)) {
-        let mut told = [None; 2];
+    fn a_known_length_does_not_change_with_more_bytes(pdu in bytes(260)) {
+        let mut known = [None; 2];
         for end in 0..=pdu.len() {
             let part = &pdu[..end];
             let lengths = [length::request(part, &USERS), length::response(part, &USERS)];
-            for (told, length) in told.iter_mut().zip(lengths) {
-                match (*told, length) {
-                    (Some(told), length) => prop_assert_eq!(told, length),
+            for (known, length) in known.iter_mut().zip(lengths) {
+                match (*known, length) {
+                    (Some(known), length) => prop_assert_eq!(known, length),
                     (None, Length::AtLeast(least)) => prop_assert!(least > end),
-                    (None, length) => *told = Some(length),
+                    (None, length) => *known = Some(length),
                 }
             }
         }

@@ -1,14 +1,14 @@
-//! What holds for every request and for every string of bytes.
+//! Properties that hold for every request of the master and for any received bytes.
 
 mod common;
 
-use common::master::{frame, sealed, Asker, Call};
+use common::master::{frame, sealed, Call, TestMaster};
 use mbm::error::Status;
 use mbm::frame::checksum::crc16;
 use mbm::pdu::request::Request;
 use proptest::prelude::*;
 
-/// Any request that the ten functions build.
+/// Any request that the master's ten functions can build.
 fn any_request() -> impl Strategy<Value = Call> {
     let ranged = |function: u8, most: u16| {
         (any::<u16>(), 0..most + 2).prop_map(move |(a, q)| Call::new(function, &[a, q]))
@@ -29,7 +29,7 @@ fn any_request() -> impl Strategy<Value = Call> {
     .prop_filter("within the standard", |call| call.query().is_ok())
 }
 
-/// The bytes of data in the right reply to `call` that `seed` makes.
+/// The data bytes of the right reply to `call`, generated from `seed`.
 fn data(call: Call, seed: u8) -> Vec<u8> {
     let count = call.query().unwrap().reads();
     (0..count)
@@ -37,7 +37,7 @@ fn data(call: Call, seed: u8) -> Vec<u8> {
         .collect()
 }
 
-/// A right reply to `call`, with data bytes from `seed`.
+/// The right reply to `call`, with data bytes generated from `seed`.
 fn right_reply(unit: u8, call: Call, seed: u8) -> Vec<u8> {
     let query = call.query().unwrap();
     if query.is_read() {
@@ -47,7 +47,7 @@ fn right_reply(unit: u8, call: Call, seed: u8) -> Vec<u8> {
     sealed(&frame(unit, call, &[])[..1 + usize::from(query.response_length())])
 }
 
-/// The words that a right reply to `call` fills.
+/// The response words after the right reply to `call`.
 fn right_words(call: Call, seed: u8) -> Vec<u16> {
     let mut data = data(call, seed);
     if call.function > 2 {
@@ -56,7 +56,7 @@ fn right_words(call: Call, seed: u8) -> Vec<u16> {
             .map(|pair| u16::from_be_bytes([pair[0], pair[1]]))
             .collect();
     }
-    // The bits beyond those asked for are zero.
+    // The bits after the last requested one are zero.
     data.push(0);
     let quantity = usize::from(call.words[1]);
     let bit = |bit: usize| u16::from(data[bit / 8]) >> (bit % 8) & 1;
@@ -67,8 +67,8 @@ fn right_words(call: Call, seed: u8) -> Vec<u16> {
     (0..quantity.div_ceil(16)).map(word).collect()
 }
 
-/// True if a frame that begins as the reply to `call` does, or as an exception to it,
-/// begins before the last `reply` bytes, and its CRC is right by chance.
+/// True if a frame starts before the last `reply` bytes that looks like the reply to `call`
+/// or like an exception, and whose CRC is right by chance.
 fn is_answered_before(unit: u8, call: Call, bytes: &[u8], reply: usize) -> bool {
     let right = |at: usize, length: usize| {
         let frame = bytes.get(at..at + length);
@@ -90,7 +90,7 @@ proptest! {
         let frame = frame(9, request, &words);
         prop_assert!(crc16(&frame).is_residue());
         let pdu = &frame[1..frame.len() - 2];
-        let received = Request::parse(pdu).expect("a request of ours is in order");
+        let received = Request::parse(pdu).expect("the master sends valid requests");
         let data = |words: &[u16]| -> Vec<u8> {
             words.iter().flat_map(|word| word.to_be_bytes()).collect()
         };
@@ -122,7 +122,7 @@ proptest! {
             Request::ReadWriteMultipleRegisters { write_quantity, data: sent, .. } => {
                 prop_assert_eq!(sent, data(&words[..usize::from(write_quantity)]));
             }
-            other => prop_assert!(false, "{:?} is no request of the facade", other),
+            other => prop_assert!(false, "{:?} is not a request of the master", other),
         }
     }
 
@@ -138,18 +138,19 @@ proptest! {
         let _ = Request::parse(&bytes);
         let unit = bytes.first().copied().unwrap_or(1).max(1);
         let request_length = usize::from(request.query().unwrap().length()) + 3;
-        let mut asker = Asker::new(unit, size.max(request_length));
-        asker.0.settings().echo_discard = echo;
-        asker.ask(request, &bytes, piece, step);
-        // As the PDU of a frame, then to a request whose reply is on probation.
+        let mut master = TestMaster::new(unit, size.max(request_length));
+        master.0.settings().echo_discard = echo;
+        master.request(request, &bytes, piece, step);
+        // The bytes as the PDU of a frame. Then again after a timeout, when the master holds
+        // a reply for a while because it may be a late one.
         let pdu = &bytes[..bytes.len().min(253)];
-        asker.ask(request, &sealed(&[&[unit], pdu].concat()), piece, step);
-        asker.send(request, &[]);
-        asker.ask(request, &bytes, piece, step);
+        master.request(request, &sealed(&[&[unit], pdu].concat()), piece, step);
+        master.send(request, &[]);
+        master.request(request, &bytes, piece, step);
     }
 
     #[test]
-    fn a_right_reply_is_found_behind_bytes_that_are_not_our_unit(
+    fn a_right_reply_is_found_after_bytes_other_than_its_unit(
         request in any_request(),
         noise in prop::collection::vec(2u8..=255, 0..300),
         seed: u8,
@@ -158,13 +159,13 @@ proptest! {
     ) {
         let reply = right_reply(1, request, seed);
         let bytes = [noise, reply].concat();
-        let mut asker = Asker::new(1, 256);
-        prop_assert_eq!(asker.ask(request, &bytes, piece, step), Status::OK);
-        prop_assert_eq!(asker.words(), right_words(request, seed));
+        let mut master = TestMaster::new(1, 256);
+        prop_assert_eq!(master.request(request, &bytes, piece, step), Status::OK);
+        prop_assert_eq!(master.words(), right_words(request, seed));
     }
 
     #[test]
-    fn a_right_reply_is_found_behind_heads_that_look_like_its_own(
+    fn a_right_reply_is_found_after_bytes_that_look_like_its_start(
         request in any_request(),
         noise in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..20), 1..60),
         seed: u8,
@@ -178,10 +179,10 @@ proptest! {
         let bytes: Vec<u8> = false_heads.flatten().chain(&reply).copied().collect();
         prop_assume!(!is_answered_before(17, request, &bytes, reply.len()));
         let least = reply.len().max(usize::from(query.length()) + 3);
-        let mut asker = Asker::new(17, least + room);
-        // Less than the silence that ends a frame.
-        prop_assert_eq!(asker.ask(request, &bytes, piece, 100), Status::OK);
-        prop_assert_eq!(asker.words(), right_words(request, seed));
+        let mut master = TestMaster::new(17, least + room);
+        // The polls are closer together than the silence that ends a frame.
+        prop_assert_eq!(master.request(request, &bytes, piece, 100), Status::OK);
+        prop_assert_eq!(master.words(), right_words(request, seed));
     }
 
     #[test]
@@ -194,19 +195,19 @@ proptest! {
         let mut reply = right_reply(1, request, seed);
         let bit = bit.index(8 * reply.len());
         reply[bit / 8] ^= 1 << (bit % 8);
-        let mut asker = Asker::new(1, 256);
-        let status = asker.ask(request, &reply, piece, 100);
+        let mut master = TestMaster::new(1, 256);
+        let status = master.request(request, &reply, piece, 100);
         prop_assert!(status.is_failure(), "{:?}", status);
-        prop_assert_eq!(asker.words(), []);
+        prop_assert_eq!(master.words(), []);
     }
 
     #[test]
-    fn a_right_reply_is_judged_a_success(request in any_request(), seed: u8) {
+    fn a_right_reply_ends_the_request_with_ok(request in any_request(), seed: u8) {
         let reply = right_reply(1, request, seed);
-        let mut asker = Asker::new(1, 256);
-        prop_assert_eq!(asker.ask(request, &reply, 300, 100), Status::OK);
-        prop_assert_eq!(asker.0.exception_code(), 0);
-        prop_assert_eq!(asker.words(), right_words(request, seed));
+        let mut master = TestMaster::new(1, 256);
+        prop_assert_eq!(master.request(request, &reply, 300, 100), Status::OK);
+        prop_assert_eq!(master.0.exception_code(), 0);
+        prop_assert_eq!(master.words(), right_words(request, seed));
     }
 }
 

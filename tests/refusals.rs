@@ -1,4 +1,4 @@
-//! Nothing malformed is ever sent, and what does not fit is said.
+//! Malformed PDUs are never written, and a buffer that is too small is reported.
 
 #[path = "common/vectors.rs"]
 mod vectors;
@@ -10,21 +10,21 @@ use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
 use vectors::{right_pdus, Direction};
 
-/// Room for more than any PDU.
-const ROOM: usize = 1000;
+/// A buffer size beyond any PDU.
+const BUFFER_SIZE: usize = 1000;
 
 fn refused(request: Request, status: Status) {
-    let emitted = request.emit(&mut [0; ROOM]);
+    let emitted = request.emit(&mut [0; BUFFER_SIZE]);
     assert_eq!(emitted, Err(status), "{request:?}");
 }
 
 fn response_refused(response: Response, status: Status) {
-    let emitted = response.emit(&mut [0; ROOM]);
+    let emitted = response.emit(&mut [0; BUFFER_SIZE]);
     assert_eq!(emitted, Err(status), "{response:?}");
 }
 
 #[test]
-fn every_buffer_too_small_is_said_and_the_right_one_suffices() {
+fn a_pdu_fits_into_a_buffer_of_its_length_and_into_no_smaller_one() {
     for vector in right_pdus() {
         let needed = vector.bytes.len();
         for size in 0..=needed {
@@ -43,9 +43,9 @@ fn every_buffer_too_small_is_said_and_the_right_one_suffices() {
 }
 
 #[test]
-fn bytes_behind_an_emitted_pdu_stay() {
+fn bytes_after_a_written_pdu_are_unchanged() {
     for vector in right_pdus() {
-        let mut buffer = [0xA5; ROOM];
+        let mut buffer = [0xA5; BUFFER_SIZE];
         let emitted = match vector.direction {
             Direction::Request => Request::parse(&vector.bytes).unwrap().emit(&mut buffer),
             Direction::Response => Response::parse(&vector.bytes).unwrap().emit(&mut buffer),
@@ -58,7 +58,7 @@ fn bytes_behind_an_emitted_pdu_stay() {
 }
 
 #[test]
-fn reads_of_no_or_too_many_items_are_not_sent() {
+fn reads_of_zero_or_too_many_items_are_refused() {
     for (functions, most) in [([1, 2], 2000), ([3, 4], 125)] {
         for function in functions {
             for (address, quantity, status) in [
@@ -87,7 +87,7 @@ fn reads_of_no_or_too_many_items_are_not_sent() {
 }
 
 #[test]
-fn writes_whose_data_are_not_what_the_quantity_says_are_not_sent() {
+fn writes_whose_data_do_not_match_the_quantity_are_refused() {
     let data = [0; 300];
     for (quantity, length) in [(0, 0), (1, 0), (1, 1), (1, 3), (2, 2), (124, 248)] {
         let write = Request::WriteMultipleRegisters {
@@ -116,7 +116,7 @@ fn writes_whose_data_are_not_what_the_quantity_says_are_not_sent() {
 }
 
 #[test]
-fn a_variant_with_the_function_of_another_is_not_sent() {
+fn a_variant_with_the_function_code_of_another_is_refused() {
     for function in 0..=255u8 {
         let bits = Request::ReadBits {
             function,
@@ -132,7 +132,7 @@ fn a_variant_with_the_function_of_another_is_not_sent() {
             function,
             data: &[0, 0, 0, 1],
         };
-        let sent = |request: Request| request.emit(&mut [0; ROOM]).is_ok();
+        let sent = |request: Request| request.emit(&mut [0; BUFFER_SIZE]).is_ok();
         assert_eq!(sent(bits), matches!(function, 1 | 2));
         assert_eq!(sent(registers), matches!(function, 3 | 4));
         let free = (1..0x80).contains(&function) && !mbm::pdu::is_public(function);
@@ -156,7 +156,7 @@ fn a_variant_with_the_function_of_another_is_not_sent() {
             data: &[],
         };
         let exception = Response::Exception { function, code: 1 };
-        let sent = |response: Response| response.emit(&mut [0; ROOM]).is_ok();
+        let sent = |response: Response| response.emit(&mut [0; BUFFER_SIZE]).is_ok();
         assert_eq!(sent(bits), matches!(function, 1 | 2));
         assert_eq!(sent(registers), matches!(function, 3 | 4 | 0x17));
         assert_eq!(sent(wrote), matches!(function, 0x0F | 0x10));
@@ -166,10 +166,10 @@ fn a_variant_with_the_function_of_another_is_not_sent() {
 }
 
 #[test]
-fn device_identification_is_not_sent_as_an_interface_of_any_type() {
+fn device_identification_as_a_raw_encapsulated_interface_is_refused() {
     let (mei_type, data) = (0x0E, &[1, 0][..]);
-    let asked = Request::EncapsulatedInterface { mei_type, data };
-    refused(asked, Status::ILLEGAL_FUNCTION);
+    let request = Request::EncapsulatedInterface { mei_type, data };
+    refused(request, Status::ILLEGAL_FUNCTION);
     let data = &[1, 1, 0, 0, 0];
     let answer = Response::EncapsulatedInterface { mei_type, data };
     response_refused(answer, Status::INVALID_FUNCTION);
@@ -179,7 +179,7 @@ fn device_identification_is_not_sent_as_an_interface_of_any_type() {
 }
 
 #[test]
-fn reserved_sub_functions_and_values_are_not_sent() {
+fn reserved_sub_functions_and_values_are_refused() {
     for sub_function in 0..=0xFFFFu16 {
         let data = &[0, 0];
         let known = matches!(sub_function, 0..=4 | 0x0A..=0x12 | 0x14);
@@ -199,10 +199,10 @@ fn reserved_sub_functions_and_values_are_not_sent() {
 }
 
 #[test]
-fn data_longer_than_any_pdu_are_refused_whatever_the_buffer() {
+fn data_longer_than_any_pdu_are_refused_for_every_buffer_size() {
     let data = &[0; 70_000][..];
     for length in [252, 253, 255, 256, 257, 65534, 65535, 65536, 65540] {
-        // Even and odd lengths, and those that wrap a byte or a word count.
+        // Even and odd lengths, and lengths that overflow a count of 8 or 16 bits.
         let data = &data[..length];
         let long = [
             Request::Diagnostics {
@@ -264,7 +264,7 @@ fn data_longer_than_any_pdu_are_refused_whatever_the_buffer() {
 }
 
 #[test]
-fn an_event_log_of_more_than_64_events_is_not_sent() {
+fn an_event_log_of_more_than_64_events_is_refused() {
     for events in 65..=300 {
         let response = Response::CommEventLog {
             status: 0,
@@ -277,7 +277,7 @@ fn an_event_log_of_more_than_64_events_is_not_sent() {
 }
 
 #[test]
-fn a_fifo_queue_of_half_a_register_or_more_than_31_is_not_sent() {
+fn a_fifo_queue_of_half_a_register_or_more_than_31_is_refused() {
     for length in (0..=300).filter(|length| length % 2 != 0 || *length > 62) {
         let data = &vec![0; length];
         response_refused(Response::FifoQueue { data }, Status::MALFORMED_REPLY);
@@ -285,21 +285,21 @@ fn a_fifo_queue_of_half_a_register_or_more_than_31_is_not_sent() {
 }
 
 #[test]
-fn read_data_of_no_or_too_many_bytes_or_odd_registers_are_not_sent() {
+fn read_data_of_zero_or_too_many_bytes_or_half_a_register_are_refused() {
     let data = [0; 260];
     for length in 0..=251 {
         let data = &data[..length];
         let bits = Response::ReadBits { function: 1, data };
-        let sent = bits.emit(&mut [0; ROOM]).is_ok();
+        let sent = bits.emit(&mut [0; BUFFER_SIZE]).is_ok();
         assert_eq!(sent, (1..=250).contains(&length), "{length}");
         let registers = Response::ReadRegisters { function: 3, data };
-        let sent = registers.emit(&mut [0; ROOM]).is_ok();
+        let sent = registers.emit(&mut [0; BUFFER_SIZE]).is_ok();
         assert_eq!(sent, (1..=250).contains(&length) && length % 2 == 0);
     }
 }
 
 #[test]
-fn file_records_out_of_order_cannot_be_made() {
+fn malformed_file_records_cannot_be_constructed() {
     let value = Status::ILLEGAL_DATA_VALUE;
     let address = Status::ILLEGAL_DATA_ADDRESS;
     assert_eq!(Reads::new(&[]), Err(value));
@@ -326,7 +326,7 @@ fn file_records_out_of_order_cannot_be_made() {
 }
 
 #[test]
-fn objects_that_overrun_or_are_not_so_many_cannot_be_made() {
+fn objects_that_do_not_match_their_count_or_lengths_cannot_be_constructed() {
     let value = Err(Status::ILLEGAL_DATA_VALUE);
     assert_eq!(Objects::new(1, &[0, 2, 65]), value);
     assert_eq!(Objects::new(1, &[0]), value);
@@ -337,7 +337,7 @@ fn objects_that_overrun_or_are_not_so_many_cannot_be_made() {
 }
 
 #[test]
-fn device_identification_that_contradicts_itself_is_not_sent() {
+fn device_identification_that_contradicts_itself_is_refused() {
     let objects: [&[u8]; 3] = [&[], &[0, 1, 65], &[0, 1, 65, 1, 0]];
     for code in 0..=255 {
         for conformity in 0..=255 {
@@ -352,7 +352,7 @@ fn device_identification_that_contradicts_itself_is_not_sent() {
                     };
                     let one = code != 4 || (count == 1 && !more_follows);
                     let right = (1..=4).contains(&code) && one;
-                    let emitted = response.emit(&mut [0; ROOM]);
+                    let emitted = response.emit(&mut [0; BUFFER_SIZE]);
                     let expected = match right {
                         true => Ok(7 + bytes.len()),
                         false => Err(Status::MALFORMED_REPLY),

@@ -1,18 +1,18 @@
-//! The receive ring: a queue of bounded length, between two threads too. Every order
-//! of what the two sides do is tried in `ring_orders.rs`.
+//! The receive ring is a queue of bounded length, also between two threads. `ring_orders.rs`
+//! tries every order of the operations of the two sides.
 
 use mbm::ring::{Positions, Ring};
 use proptest::prelude::*;
 use std::collections::VecDeque;
 use std::sync::atomic::AtomicU8;
 
-fn places(count: usize) -> Vec<AtomicU8> {
+fn storage_of(count: usize) -> Vec<AtomicU8> {
     (0..count).map(|_| AtomicU8::new(0xEE)).collect()
 }
 
 #[test]
 fn a_ring_holds_one_byte_less_than_its_storage() {
-    let (bytes, positions) = (places(4), Positions::new());
+    let (bytes, positions) = (storage_of(4), Positions::new());
     let ring = Ring::new(&bytes, &positions);
     assert_eq!(ring.write(&[1, 2, 3, 4, 5]), 3);
     assert_eq!((ring.available(), ring.lost()), (3, 2));
@@ -25,7 +25,7 @@ fn a_ring_holds_one_byte_less_than_its_storage() {
 #[test]
 fn a_ring_without_storage_loses_what_is_put() {
     for count in 0..2 {
-        let (bytes, positions) = (places(count), Positions::new());
+        let (bytes, positions) = (storage_of(count), Positions::new());
         let ring = Ring::new(&bytes, &positions);
         assert!(!ring.put(1));
         assert_eq!((ring.lost(), ring.available()), (1, 0));
@@ -34,8 +34,8 @@ fn a_ring_without_storage_loses_what_is_put() {
 }
 
 #[test]
-fn clear_leaves_nothing_to_take_and_all_the_room() {
-    let (bytes, positions) = (places(4), Positions::new());
+fn clear_empties_the_ring() {
+    let (bytes, positions) = (storage_of(4), Positions::new());
     let ring = Ring::new(&bytes, &positions);
     ring.write(&[1, 2]);
     ring.clear();
@@ -44,9 +44,9 @@ fn clear_leaves_nothing_to_take_and_all_the_room() {
 }
 
 #[test]
-fn one_thread_puts_while_another_takes_and_no_byte_is_lost_or_doubled() {
+fn no_byte_is_lost_or_doubled_while_one_thread_writes_and_another_reads() {
     const BYTES: u32 = 300_000;
-    let (bytes, positions) = (places(17), Positions::new());
+    let (bytes, positions) = (storage_of(17), Positions::new());
     let ring = Ring::new(&bytes, &positions);
     std::thread::scope(|scope| {
         scope.spawn(move || {
@@ -76,7 +76,7 @@ proptest! {
         storage in 1usize..20,
         steps in prop::collection::vec((any::<bool>(), 0usize..25), 0..60),
     ) {
-        let (bytes, positions) = (places(storage), Positions::new());
+        let (bytes, positions) = (storage_of(storage), Positions::new());
         let ring = Ring::new(&bytes, &positions);
         let (mut model, mut next, mut lost) = (VecDeque::new(), 0u8, 0u16);
         for (put, count) in steps {

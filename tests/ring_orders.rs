@@ -1,7 +1,7 @@
-//! The receive ring in every order in which an interrupt handler and the main loop
-//! may run, and with every value that their loads may see: loom tries them all, on
-//! the source of the ring itself. No byte is lost, doubled or out of order, and what
-//! found no room is counted.
+//! The receive ring between an interrupt handler and the main loop. loom runs the source of
+//! the ring in every order of the two sides' operations, and with every value that their
+//! loads may return. No accepted byte is lost, doubled or out of order, and each byte that did
+//! not fit is counted.
 
 #[path = "../src/ring.rs"]
 #[allow(dead_code)]
@@ -11,15 +11,15 @@ use loom::sync::Arc;
 use ring::{Positions, Ring};
 use std::sync::atomic::{AtomicUsize, Ordering::SeqCst};
 
-/// What `ring.rs` finds in place of the library's atomics: loom's, made when they are
-/// first used, for those cannot be made at compile time.
+/// `ring.rs` uses this module instead of the library's atomics. It wraps loom's atomics, which
+/// cannot be created at compile time, and so creates them when they are first used.
 mod atomic {
     use loom::cell::UnsafeCell;
     use loom::sync::atomic::AtomicU16;
     pub use loom::sync::atomic::Ordering;
     use std::sync::OnceLock;
 
-    /// Where a side is.
+    /// The position of one side.
     #[derive(Debug, Default)]
     pub struct AtomicPlace(OnceLock<AtomicU16>);
 
@@ -41,8 +41,8 @@ mod atomic {
         }
     }
 
-    /// A byte of the storage. No atomic here: the places alone must keep the two
-    /// sides apart, and loom fails where they could meet at a byte.
+    /// A byte of the storage. It is not atomic here: the positions alone must keep the two
+    /// sides apart. loom fails if both sides can access one byte at the same time.
     #[derive(Debug)]
     pub struct AtomicU8(UnsafeCell<u8>);
 
@@ -55,26 +55,26 @@ mod atomic {
         }
 
         pub fn load(&self, _: Ordering) -> u8 {
-            // SAFETY: nobody writes meanwhile, or loom fails.
+            // SAFETY: loom fails if the other side writes the byte at the same time.
             self.0.with(|byte| unsafe { *byte })
         }
 
         pub fn store(&self, value: u8, _: Ordering) {
-            // SAFETY: nobody else uses it meanwhile, or loom fails.
+            // SAFETY: loom fails if the other side accesses the byte at the same time.
             self.0.with_mut(|byte| unsafe { *byte = value });
         }
     }
 }
 
-/// A ring and its storage, which both sides have.
+/// A ring and its storage, shared by both sides.
 struct Shared {
     bytes: Vec<atomic::AtomicU8>,
     positions: Positions,
 }
 
 impl Shared {
-    /// An empty ring of so many bytes, one fewer of which it holds, that was used so
-    /// often that it stands at the place `at`.
+    /// An empty ring with `storage` bytes, of which it can hold one fewer. `at` bytes have been
+    /// written and read before, so both sides are at position `at`.
     fn new(storage: usize, at: usize) -> Self {
         let bytes = (0..storage).map(|_| atomic::AtomicU8::new(0xEE)).collect();
         let shared = Shared {
@@ -85,7 +85,7 @@ impl Shared {
         for _ in 0..at {
             assert!(ring.put(0xDD) && ring.read(&mut [0]) == 1);
         }
-        // The places are made before the other side exists.
+        // This creates loom's atomics before the other side exists.
         assert_eq!((ring.available(), ring.lost()), (0, 0));
         shared
     }
@@ -95,7 +95,7 @@ impl Shared {
     }
 }
 
-/// Tries every order, and prints how many there are.
+/// Runs `model` in every order, and prints the number of orders.
 fn in_every_order(name: &str, model: impl Fn() + Send + Sync + 'static) {
     let count = std::sync::Arc::new(AtomicUsize::new(0));
     let inner = std::sync::Arc::clone(&count);
@@ -106,13 +106,13 @@ fn in_every_order(name: &str, model: impl Fn() + Send + Sync + 'static) {
     println!("ring: {} orders of {name}", count.load(SeqCst));
 }
 
-/// Puts the bytes 1, 2, 3 and so on; which of them found room.
+/// Writes the bytes 1, 2, 3 and so on, one by one; returns those that the ring accepted.
 fn put_one_by_one(shared: &Shared, count: u8) -> Vec<u8> {
     let ring = shared.ring();
     (1..=count).filter(|byte| ring.put(*byte)).collect()
 }
 
-/// Takes bytes out, several times at most `most` at once.
+/// Reads bytes `times` times, at most `most` bytes each time.
 fn take(shared: &Shared, times: usize, most: usize) -> Vec<u8> {
     let ring = shared.ring();
     let mut taken = Vec::new();
@@ -124,7 +124,8 @@ fn take(shared: &Shared, times: usize, most: usize) -> Vec<u8> {
     taken
 }
 
-/// One side puts so many bytes one by one while the other takes.
+/// One side writes `puts` bytes one by one while the other reads. `before` bytes are in the
+/// ring at the start.
 fn sides(storage: usize, at: usize, before: u8, puts: u8, times: usize, most: usize) {
     let shared = Arc::new(Shared::new(storage, at));
     let early: Vec<u8> = (0..before).map(|byte| 0xA0 + byte).collect();
@@ -134,7 +135,7 @@ fn sides(storage: usize, at: usize, before: u8, puts: u8, times: usize, most: us
         loom::thread::spawn(move || put_one_by_one(&shared, puts))
     };
     let mut taken = take(&shared, times, most);
-    let accepted = interrupt.join().expect("it put");
+    let accepted = interrupt.join().expect("the other thread wrote");
     taken.extend(take(&shared, 1, storage));
     assert_eq!(taken, [early, accepted.clone()].concat());
     let lost = usize::from(puts) - accepted.len();
@@ -148,7 +149,7 @@ fn a_ring_of_one_byte_loses_and_doubles_none() {
 }
 
 #[test]
-fn a_full_ring_takes_a_byte_once_one_was_taken_out() {
+fn a_full_ring_accepts_a_byte_after_one_was_read() {
     in_every_order("a full ring", || sides(3, 0, 2, 4, 3, 1));
 }
 
@@ -182,16 +183,16 @@ fn bytes_written_at_once_stay_in_order() {
 }
 
 #[test]
-fn what_is_available_can_be_read() {
-    in_every_order("a look at what is available", || {
+fn every_available_byte_can_be_read() {
+    in_every_order("a query of the available bytes", || {
         let shared = Arc::new(Shared::new(3, 1));
         let interrupt = {
             let shared = Arc::clone(&shared);
             loom::thread::spawn(move || put_one_by_one(&shared, 3))
         };
-        let there = usize::from(shared.ring().available());
+        let available = usize::from(shared.ring().available());
         let mut taken = take(&shared, 1, 3);
-        assert!(there <= taken.len() && taken.len() <= 2);
+        assert!(available <= taken.len() && taken.len() <= 2);
         let lost = shared.ring().lost();
         let accepted = interrupt.join().expect("it put");
         taken.extend(take(&shared, 1, 3));
@@ -201,7 +202,7 @@ fn what_is_available_can_be_read() {
 }
 
 #[test]
-fn clear_forgets_what_was_there_and_nothing_that_comes_later() {
+fn clear_discards_the_bytes_in_the_ring_and_none_that_come_later() {
     in_every_order("clear", || {
         let shared = Arc::new(Shared::new(3, 2));
         assert!(shared.ring().put(0xA0));
@@ -219,8 +220,8 @@ fn clear_forgets_what_was_there_and_nothing_that_comes_later() {
 }
 
 #[test]
-fn clear_gives_the_place_of_a_byte_back_that_was_taken_before() {
-    in_every_order("clear behind a read", || {
+fn clear_after_a_read_discards_only_the_rest() {
+    in_every_order("clear after a read", || {
         let shared = Arc::new(Shared::new(3, 0));
         assert_eq!(shared.ring().write(&[0xA0, 0xA1]), 2);
         let interrupt = {

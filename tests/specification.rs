@@ -1,5 +1,5 @@
-//! The examples of the Modbus application protocol V1.1b3, clause 6: each is
-//! read as what it says, and written again byte for byte.
+//! The examples of the Modbus application protocol V1.1b3, clause 6. Each is read with the
+//! meaning that the standard gives it, and written again byte for byte.
 
 #[path = "common/vectors.rs"]
 mod vectors;
@@ -10,7 +10,8 @@ use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
 use vectors::pdu;
 
-/// The request of that name says this, and this is written so.
+/// Checks that the vector `name` is read as `expected`, and that `expected` is written as that
+/// vector.
 fn request(name: &str, expected: Request) {
     let bytes = pdu(name);
     assert_eq!(Request::parse(&bytes), Ok(expected), "{name}");
@@ -20,7 +21,7 @@ fn request(name: &str, expected: Request) {
     assert_eq!(buffer, bytes, "{name}");
 }
 
-/// The response of that name says this, and this is written so.
+/// Like [`request`], for a response.
 fn response(name: &str, expected: Response) {
     let bytes = pdu(name);
     assert_eq!(Response::parse(&bytes), Ok(expected), "{name}");
@@ -160,15 +161,15 @@ fn get_comm_event_counter() {
 #[test]
 fn get_comm_event_log() {
     request("spec-0C-6.10", Request::GetCommEventLog);
-    let of = |status, log| Response::CommEventLog {
+    let event_log = |status, log| Response::CommEventLog {
         status,
         events: 0x0108,
         messages: 0x0121,
         log,
     };
-    response("spec-0C-6.10-answer", of(0, &[0x20, 0]));
+    response("spec-0C-6.10-answer", event_log(0, &[0x20, 0]));
     let log: Vec<u8> = (0..64).collect();
-    response("0C-full-log-answer", of(0xFFFF, &log));
+    response("0C-full-log-answer", event_log(0xFFFF, &log));
 }
 
 #[test]
@@ -212,7 +213,7 @@ fn report_server_id() {
 }
 
 #[test]
-fn report_server_id_keeps_what_a_device_sends_behind_what_it_counts() {
+fn report_server_id_keeps_data_after_the_counted_bytes() {
     let id = [0x11, 2, 1, 2, 0, 1, 2];
     let data = &[1, 2, 0, 1, 2];
     let expected = Response::ServerId { count: 2, data };
@@ -307,7 +308,7 @@ fn read_fifo_queue() {
     response("18-empty-answer", Response::FifoQueue { data: &[] });
 }
 
-/// The objects as they travel.
+/// The objects in the form in which they are sent.
 fn objects(values: &[(u8, &str)]) -> Vec<u8> {
     let bytes = values.iter().flat_map(|(id, value)| {
         let head = [*id, value.len() as u8];
@@ -316,8 +317,8 @@ fn objects(values: &[(u8, &str)]) -> Vec<u8> {
     bytes.collect()
 }
 
-/// The response of that name has this code and conformity level, says which
-/// object follows, and has these values.
+/// Checks that the response `name` has the read code and conformity level `levels`, names
+/// `next` as the next object, and has these values.
 fn identification(name: &str, levels: [u8; 2], next: Option<u8>, values: &[(u8, &str)]) {
     let bytes = objects(values);
     let objects = Objects::new(values.len() as u8, &bytes).unwrap();
@@ -377,7 +378,7 @@ fn read_device_identification_regular_extended_and_individual() {
 }
 
 #[test]
-fn read_device_identification_of_devices_that_take_its_useless_fields_lightly() {
+fn read_device_identification_with_unusual_conformity_level_or_next_object_id() {
     let objects = objects(&[(0, "A")]);
     for (name, conformity, next_object) in [
         ("2B-0E-conformity-of-nobody-answer", 0, 0),

@@ -1,4 +1,5 @@
-//! The engine keeps every index within its storage, as the pointers of C need it.
+//! The engine of the master accesses its buffers only within bounds. The C ABI relies on this,
+//! because it reads and writes the buffers through raw pointers.
 
 mod common;
 
@@ -8,7 +9,7 @@ use mbm::error::Status;
 use mbm::master::Master;
 use proptest::prelude::*;
 
-/// Storage that panics at an index that is out of range.
+/// Buffers that panic at an index out of range.
 struct Strict {
     lent: Buffers<Vec<u8>, Vec<u16>, Vec<u16>>,
     aside: u8,
@@ -84,7 +85,7 @@ impl Words for Strict {
         self.lent.response_words()
     }
     fn take_words(&mut self, from: u8, count: u8, high_first: bool) {
-        // Of an odd count, one byte more is looked at.
+        // For an odd count, one byte more is read.
         self.within(from, count.next_multiple_of(2));
         assert!(
             count.div_ceil(2) <= self.response_words(),
@@ -94,7 +95,7 @@ impl Words for Strict {
     }
 }
 
-/// What the line brings: bytes, or frames that the engine looks at more closely.
+/// Bytes to arrive: random ones, and parts that resemble the expected reply.
 fn any_bytes(unit: u8, call: Call) -> impl Strategy<Value = Vec<u8>> {
     let query = call.query().unwrap();
     let reads = query.reads();
@@ -147,7 +148,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(1000))]
 
     #[test]
-    fn no_index_passes_the_storage(
+    fn every_index_stays_within_the_buffers(
         (call, lines) in any_lines(),
         room in 8usize..257,
         words in (0usize..126, 0usize..126),
@@ -157,7 +158,7 @@ proptest! {
         echo: bool,
         at_end: bool,
     ) {
-        // At least as often as not, just what the request or the reply needs.
+        // Two of the three sizes are exactly what the request or the reply needs.
         let query = call.query().unwrap();
         let longest = query.length().max(query.response_length());
         for room in [room, usize::from(query.length()) + 3, usize::from(longest) + 3] {
@@ -169,10 +170,10 @@ proptest! {
                 if call.start(&mut master) != Status::PENDING {
                     break;
                 }
-                // Up to the end of the buffer, if there is no more.
+                // With `at_end`, noise fills the buffer so that the bytes end where it ends.
                 let noise = if at_end { room.min(255).saturating_sub(bytes.len()) } else { 0 };
                 let bytes = [&vec![0; noise], &bytes[..]].concat();
-                master.port().bring(&bytes, piece, step);
+                master.port().deliver(&bytes, piece, step);
                 while master.poll() == Status::PENDING {}
                 prop_assert_eq!(master.storage().aside, 0);
             }

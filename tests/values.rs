@@ -1,5 +1,5 @@
-//! Typed values in registers: what they are in each order, that they come back
-//! as they were written, and that nothing outside is ever read or written.
+//! Typed values in registers: their bytes in each word order, reading back what was written,
+//! and that no register outside the given range is ever read or written.
 
 use mbm::data::bits;
 use mbm::data::order::Order;
@@ -11,7 +11,7 @@ use std::fmt::Debug;
 
 const OUTSIDE: Status = Status::ILLEGAL_DATA_ADDRESS;
 
-/// Data bytes as words.
+/// Converts data bytes to words.
 fn words(bytes: &[u8]) -> Vec<u16> {
     let pairs = bytes.chunks(2);
     pairs
@@ -31,7 +31,7 @@ fn refused<C: Cells>(cells: C, first: u16) -> Option<Status> {
     Registers::new(cells, first, Order::Abcd).err()
 }
 
-/// What `bytes` hold at address 100, over bytes and over words.
+/// Reads the value at address 100 from `bytes`, and checks that the same words give the same.
 fn read<T: Value + PartialEq + Debug>(bytes: &[u8], order: Order) -> T {
     let words = words(bytes);
     let mut registers = over(&words[..], 100);
@@ -42,7 +42,7 @@ fn read<T: Value + PartialEq + Debug>(bytes: &[u8], order: Order) -> T {
     value
 }
 
-/// The bytes that `value` becomes, over bytes and over words.
+/// The bytes of `value` after writing it, and checks that writing it to words gives the same.
 fn written<T: Value>(value: T, order: Order) -> Vec<u8> {
     let size = size_of::<T::Bytes>();
     let mut bytes = vec![0xEE; size];
@@ -57,7 +57,7 @@ fn written<T: Value>(value: T, order: Order) -> Vec<u8> {
 }
 
 #[test]
-fn a_double_word_lies_in_four_ways() {
+fn a_double_word_has_four_orders() {
     for (order, bytes) in [
         (Order::Abcd, [0xAE, 0x41, 0x56, 0x52]),
         (Order::Cdab, [0x56, 0x52, 0xAE, 0x41]),
@@ -72,7 +72,7 @@ fn a_double_word_lies_in_four_ways() {
 }
 
 #[test]
-fn floats_are_those_of_ieee_754() {
+fn floats_have_the_format_of_ieee_754() {
     for (value, [a, b, c, d]) in [
         (1.0_f32, [0x3F, 0x80, 0, 0]),
         (-2.0, [0xC0, 0, 0, 0]),
@@ -94,7 +94,7 @@ fn floats_are_those_of_ieee_754() {
 }
 
 #[test]
-fn doubles_are_those_of_ieee_754() {
+fn doubles_have_the_format_of_ieee_754() {
     let [a, b, c, d, e, f, g, h] = [0x40, 0x09, 0x21, 0xFB, 0x54, 0x44, 0x2D, 0x18];
     for (order, bytes) in [
         (Order::Abcd, [a, b, c, d, e, f, g, h]),
@@ -111,7 +111,7 @@ fn doubles_are_those_of_ieee_754() {
 }
 
 #[test]
-fn one_register_has_bits_and_bytes_as_they_travel() {
+fn bits_and_bytes_of_one_register_do_not_depend_on_the_order() {
     let bytes = [0x80_u8, 0xFE];
     let registers = ordered(&bytes[..], 7, Order::Dcba);
     assert_eq!(registers.u8(7, true), Ok(0x80));
@@ -128,7 +128,7 @@ fn one_register_has_bits_and_bytes_as_they_travel() {
 }
 
 #[test]
-fn setting_a_bit_or_a_byte_leaves_its_neighbours() {
+fn setting_a_bit_or_a_byte_changes_no_other() {
     let mut words = [0xAAAA_u16; 3];
     let mut registers = over(&mut words[..], 0);
     registers.set_bit(0, 0, true).unwrap();
@@ -144,7 +144,7 @@ fn setting_a_bit_or_a_byte_leaves_its_neighbours() {
 }
 
 #[test]
-fn a_text_ends_at_its_first_nul_or_with_its_field() {
+fn a_text_ends_at_its_first_nul_or_at_the_end_of_its_field() {
     let bytes = *b"METER 7\0XY";
     let registers = over(&bytes[..], 10);
     let mut buffer = [0; 8];
@@ -161,14 +161,14 @@ fn a_text_ends_at_its_first_nul_or_with_its_field() {
 }
 
 #[test]
-fn a_text_that_does_not_fit_its_buffer_is_not_cut_short() {
+fn a_text_that_does_not_fit_into_the_buffer_is_refused() {
     let mut buffer = *b"...";
     let status = over(&b"ABCD"[..], 0).text(0, 4, &mut buffer).err();
     assert_eq!((status, &buffer), (Some(Status::BUFFER_TOO_SMALL), b"..."));
 }
 
 #[test]
-fn a_text_is_written_with_zeros_behind_it() {
+fn a_text_is_written_and_filled_up_with_zeros() {
     let mut bytes = *b"........";
     let mut registers = over(&mut bytes[..], 0);
     registers.set_text(0, 5, b"ABC").unwrap();
@@ -182,7 +182,7 @@ fn a_text_is_written_with_zeros_behind_it() {
 }
 
 #[test]
-fn raw_bytes_are_copied_and_compared_as_they_travel() {
+fn raw_bytes_are_copied_and_compared_in_the_order_of_the_wire() {
     let mut held = [0x0102_u16, 0x0304, 0x0506];
     let mut registers = ordered(&mut held[..], 40, Order::Dcba);
     let mut bytes = [0; 3];
@@ -200,7 +200,7 @@ fn raw_bytes_are_copied_and_compared_as_they_travel() {
 }
 
 #[test]
-fn bytes_of_a_device_that_swaps_them_are_put_in_order() {
+fn the_bytes_of_a_device_that_swaps_them_are_swapped_back() {
     for order in Order::ALL {
         let wanted: &[u8] = match order.swaps_bytes() {
             false => &[1, 2, 3, 4, 5],
@@ -237,7 +237,7 @@ fn registers_end_at_address_65535() {
 }
 
 #[test]
-fn odd_data_bytes_are_no_registers() {
+fn an_odd_number_of_bytes_is_refused() {
     assert_eq!(
         refused(&[1_u8, 2, 3][..], 0),
         Some(Status::INVALID_ARGUMENT)
@@ -249,7 +249,7 @@ fn any_order() -> impl Strategy<Value = Order> {
     prop::sample::select(Order::ALL.to_vec())
 }
 
-/// Writes a value, reads it back, and finds nothing changed beside it.
+/// Writes a value, reads it back, and checks that no other word has changed.
 fn round_trip<T: Value>(value: T, order: Order, address: u16, first: u16, fill: u16) {
     let size = size_of::<T::Bytes>() / 2;
     let mut words = [fill; 9];
@@ -272,7 +272,7 @@ fn round_trip<T: Value>(value: T, order: Order, address: u16, first: u16, fill: 
 
 proptest! {
     #[test]
-    fn every_value_comes_back_in_every_order_or_lies_outside(
+    fn every_value_is_read_back_in_every_order_or_refused_as_out_of_range(
         bits: u64, order in any_order(), first in 0..65528_u16, step in -3..14_i32, fill: u16,
     ) {
         let address = (i32::from(first) + step).clamp(0, 65535) as u16;
@@ -287,7 +287,7 @@ proptest! {
     }
 
     #[test]
-    fn no_address_and_no_length_is_too_much(
+    fn every_address_and_every_length_is_handled(
         bytes in prop::collection::vec(any::<u8>(), 0..40),
         first: u16, address: u16, length in 0..200_usize, near: bool, order in any_order(),
     ) {
@@ -316,7 +316,7 @@ proptest! {
     }
 
     #[test]
-    fn a_text_comes_back(text in "[ -~]{0,12}", order in any_order(), length in 12..16_usize) {
+    fn a_text_is_read_back(text in "[ -~]{0,12}", order in any_order(), length in 12..16_usize) {
         let mut words = [0xFFFF_u16; 8];
         let mut registers = ordered(&mut words[..], 0, order);
         registers.set_text(0, length, text.as_bytes()).unwrap();
@@ -325,7 +325,7 @@ proptest! {
     }
 
     #[test]
-    fn bits_come_back_packed_in_bytes_and_in_words(
+    fn packed_bits_are_read_back_from_bytes_and_from_words(
         coils in prop::collection::vec(any::<bool>(), 0..100), first in 0..65436_u16, address: u16,
     ) {
         let mut bytes = [0xAA_u8; 13];
@@ -344,8 +344,8 @@ proptest! {
     }
 
     #[test]
-    fn a_double_in_32_bits_is_the_nearest(bits: u64, exponent in 870..1160_u64, near: bool) {
-        // Most doubles are out of a float's reach: half of them are near.
+    fn a_double_is_rounded_to_the_nearest_float(bits: u64, exponent in 870..1160_u64, near: bool) {
+        // Most doubles are out of the range of a float. Half of these are moved near it.
         let bits = if near { bits & 0x800F_FFFF_FFFF_FFFF | exponent << 52 } else { bits };
         let value = f64::from_bits(bits);
         let short = ShortDouble::from_bytes(bits.to_be_bytes()).0;

@@ -1,4 +1,5 @@
-//! ASCII frames, held against the naive way; what parses is written again.
+//! ASCII frames: mbm and the simple decoder of `naive` must agree, and a frame that mbm reads
+//! must be written again unchanged.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -10,8 +11,8 @@ fuzz_target!(|data: &[u8]| {
     let Some((&end, frame)) = data.split_first() else {
         return;
     };
-    whole(frame, end);
-    // A fuzzer seldom finds a whole frame by itself.
+    check_frame(frame, end);
+    // The input is also put into a frame, because a fuzzer rarely finds a check_frame frame itself.
     let mut buffer = [0; ascii::MAX_FRAME];
     let Some((&unit, pdu)) = frame.split_first() else {
         return;
@@ -25,17 +26,17 @@ fuzz_target!(|data: &[u8]| {
     assert_eq!(written.is_ok(), fits);
     if let Ok(length) = written {
         let parsed = naive::ascii(&buffer[..length], end);
-        // Without a function code it is no frame, though it was asked for.
+        // Without a function code it is not a valid frame, although mbm has written it.
         let expected = (!pdu.is_empty()).then(|| frame.to_vec());
         assert_eq!(parsed, expected);
-        whole(&buffer[..length], end);
+        check_frame(&buffer[..length], end);
         let at = usize::from(unit) % length;
         buffer[at] ^= end;
-        whole(&buffer[..length], end);
+        check_frame(&buffer[..length], end);
     }
 });
 
-fn whole(frame: &[u8], end: u8) {
+fn check_frame(frame: &[u8], end: u8) {
     let mut bytes = frame.to_vec();
     let parsed = ascii::parse(&mut bytes, end);
     let content = parsed.map(|adu| [&[adu.unit], adu.pdu].concat());
@@ -47,7 +48,7 @@ fn whole(frame: &[u8], end: u8) {
                 pdu[..content.len() - 1].copy_from_slice(&content[1..]);
                 Ok(content.len() - 1)
             })
-            .expect("it fits");
+            .expect("the frame fits");
             let (digits, tail) = frame.split_at(frame.len() - 2);
             assert_eq!(
                 buffer[..length],

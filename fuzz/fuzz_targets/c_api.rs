@@ -1,8 +1,8 @@
-//! Sequences of calls of the C API: no byte outside what was lent is touched, no
-//! call fails to end, what is refused changes nothing.
+//! Sequences of calls of the C API. No call accesses memory that it was not given, every call
+//! returns, and a call that is refused changes nothing.
 //!
-//! With `MBM_API_CALLS=N` it ends after so many calls; with `MBM_API_TRACE=1` it
-//! prints each of them.
+//! With `MBM_API_CALLS=N` the target ends after N calls; with `MBM_API_TRACE=1` it prints each
+//! call.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -14,21 +14,21 @@ extern "C" {
     fn raise(signal: i32) -> i32;
 }
 
-/// Has libFuzzer end as if its time were over.
+/// The signal at which libFuzzer ends as if its time were over.
 const SIGUSR1: i32 = 10;
 
 extern "C" fn report() {
     eprintln!("stat::api_calls: {}", api::calls());
 }
 
-/// After how many calls to end.
+/// The number of calls after which the target ends.
 fn most() -> u64 {
     static MOST: OnceLock<u64> = OnceLock::new();
     *MOST.get_or_init(|| {
         if std::env::var_os("MBM_API_TRACE").is_some() {
             api::trace();
         }
-        // SAFETY: a function that may run at the end.
+        // SAFETY: `report` may run when the process exits.
         unsafe { atexit(report) };
         let most = std::env::var("MBM_API_CALLS").ok();
         most.and_then(|most| most.parse().ok()).unwrap_or(u64::MAX)
@@ -43,7 +43,7 @@ fuzz_target!(|data: &[u8]| {
     api::run(data);
     if api::calls() >= most {
         report();
-        // SAFETY: libFuzzer handles it.
+        // SAFETY: libFuzzer handles the signal.
         unsafe { raise(SIGUSR1) };
     }
 });

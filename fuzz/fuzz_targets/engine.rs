@@ -1,6 +1,6 @@
-//! Requests of the master over a port that brings anything at any time. A request may
-//! succeed only if a right reply to it was among the bytes, and fail only if none was;
-//! it always ends, sent byte for byte, and with the driver off.
+//! Requests of the master over a port that delivers any bytes at any time. A request may
+//! succeed only if the bytes contain a right reply, and fail only if they contain none. Every
+//! request is sent byte for byte, ends, and leaves the driver off.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -14,7 +14,7 @@ use mbm_fuzz::stream::{event, Event};
 use mbm_fuzz::Input;
 use std::collections::VecDeque;
 
-/// What the line does next, when its time has come.
+/// The next event on the line.
 enum Next {
     Bytes(VecDeque<u8>),
     LinkLost,
@@ -22,24 +22,24 @@ enum Next {
 
 struct Line {
     now: u32,
-    /// What comes, and how long after the one before.
+    /// The events, each with its delay after the previous one in microseconds.
     script: VecDeque<(u32, Next)>,
     since: u32,
-    /// Bytes that one write accepts; 0 at every other.
+    /// How many bytes a write accepts, while every other write accepts none; 0: all, always.
     accept: usize,
     writes: usize,
     flushes: u8,
     driver: bool,
     sent: Vec<u8>,
     requests: Vec<Vec<u8>>,
-    /// What came since the last request.
+    /// The bytes read since the last request.
     heard: Vec<u8>,
     lost: bool,
 }
 
 impl Port for Line {
     fn read(&mut self, bytes: &mut [u8]) -> i16 {
-        assert!(!self.driver, "it listens to itself");
+        assert!(!self.driver, "the engine reads while it sends");
         let Some((delay, next)) = self.script.front_mut() else {
             return 0;
         };
@@ -63,7 +63,7 @@ impl Port for Line {
     }
 
     fn write(&mut self, bytes: &[u8]) -> i16 {
-        assert!(self.driver, "it talks with the driver off");
+        assert!(self.driver, "the engine sends with the driver off");
         self.writes += 1;
         if self.accept > 0 && self.writes.is_multiple_of(2) {
             return 0;
@@ -154,7 +154,7 @@ fuzz_target!(|data: &[u8]| {
         }
         let step = 20 + u32::from(input.u8()) * 8;
         run(&mut engine, &asked, room, step);
-        // The whole frame buffer is there for the next request.
+        // No held reply takes space in the frame buffer any more.
         assert_eq!(usize::from(engine.storage.room()), room);
     }
 });
@@ -183,31 +183,31 @@ fn run(engine: &mut MasterEngine, asked: &Asked, room: usize, step: u32) {
         if status != Status::PENDING {
             break status;
         }
-        // As a program would that does other work, and sleeps for as long as it
-        // may.
+        // The clock moves on by `step`, or by the poll delay if that is shorter.
         let time = match engine.poll_delay(now) {
             0 => step,
             delay => delay.min(step),
         };
         engine.port.now = now.wrapping_add(time);
         polls += 1;
-        assert!(polls < 100_000, "it never ends");
+        assert!(polls < 100_000, "the request never ends");
     };
     judge(engine, asked, status);
     if status.is_failure() {
-        overlooks_nothing(engine, asked, room, status);
+        check_no_reply_missed(engine, asked, room, status);
     }
 }
 
-/// Where nothing but the bytes decides, no reply stands in those of a request that
-/// failed.
-fn overlooks_nothing(engine: &mut MasterEngine, asked: &Asked, room: usize, status: Status) {
+/// Checks that the bytes received by a failed request contain no right reply. Skips requests
+/// that may fail for other reasons.
+fn check_no_reply_missed(engine: &mut MasterEngine, asked: &Asked, room: usize, status: Status) {
     let other = matches!(
         status,
         Status::LINE_BUSY | Status::LINK_LOST | Status::BUFFER_TOO_SMALL
     );
     let settings = engine.settings;
-    // An earlier request without a right reply lets a later reply be held.
+    // After an attempt without a right reply, the master may hold the next reply, because it
+    // may be a late one.
     let attempts = engine.storage.counters[Counter::Requests as usize];
     let held = settings.quiet_time > 0 && attempts > 1;
     if other || held || settings.echo_discard {
@@ -219,11 +219,11 @@ fn overlooks_nothing(engine: &mut MasterEngine, asked: &Asked, room: usize, stat
         bytes: engine.port.heard.clone(),
         at: 0,
     };
-    assert_eq!(search.search(false), None, "a reply is overlooked");
+    assert_eq!(search.search(false), None, "the engine missed a reply");
     assert_eq!(
         search.search(true),
         None,
-        "a reply behind noise is overlooked"
+        "the engine missed a reply after noise"
     );
 }
 
@@ -260,32 +260,32 @@ fn judge(engine: &mut MasterEngine, asked: &Asked, status: Status) {
         return;
     }
     if status.is_exception() {
-        let told = |reply: &[u8]| reply[1] & 0x80 != 0 && reply[2] == status.code();
-        assert!(replies().any(told), "an exception that nobody sent");
+        let is_this = |reply: &[u8]| reply[1] & 0x80 != 0 && reply[2] == status.code();
+        assert!(replies().any(is_this), "an exception that did not arrive");
         return;
     }
     let right: Vec<Vec<u8>> = replies()
         .filter(|reply| reply[1] & 0x80 == 0)
         .map(<[u8]>::to_vec)
         .collect();
-    assert!(!right.is_empty(), "a success that nobody sent");
+    assert!(!right.is_empty(), "success without a right reply");
     if asked.data.is_some() {
         assert!(engine.take_words());
         let words = engine.storage.response().to_vec();
-        let brought = |reply: &Vec<u8>| {
+        let has_words = |reply: &Vec<u8>| {
             let data = &reply[3..reply.len() - 2];
             match asked.bits {
                 None => data
                     .chunks(2)
                     .zip(&words)
                     .all(|(bytes, word)| *bytes == word.to_be_bytes()),
-                // The bits beyond those asked for are zero, to the end of the word.
+                // The bits after the last requested one are zero, to the end of the word.
                 Some(quantity) => (0..usize::from(quantity).next_multiple_of(16)).all(|bit| {
                     let on = bit < usize::from(quantity) && data[bit / 8] >> (bit % 8) & 1 == 1;
                     (words[bit / 16] >> (bit % 16) & 1 == 1) == on
                 }),
             }
         };
-        assert!(right.iter().any(brought), "data that nobody sent");
+        assert!(right.iter().any(has_words), "data that did not arrive");
     }
 }

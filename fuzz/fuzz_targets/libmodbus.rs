@@ -1,5 +1,5 @@
-//! The same requests to a libmodbus server and to mbm: what libmodbus accepts or
-//! refuses, mbm does alike, and mbm reads what libmodbus replies.
+//! The same requests for a libmodbus server and for mbm's decoder: both must accept and refuse
+//! the same, and mbm must be able to read libmodbus's responses.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -55,20 +55,21 @@ impl Server {
             };
             let mapping = modbus_mapping_new(65536, 65536, 65536, 65536);
             assert!(!context.is_null() && !mapping.is_null());
-            // It sleeps for the response timeout where it refuses a quantity.
+            // libmodbus sleeps for the response timeout when it refuses a quantity.
             assert_eq!(modbus_set_response_timeout(context, 0, 1), 0);
             assert_eq!(modbus_set_slave(context, c_int::from(unit)), 0);
             Server { context, mapping }
         }
     }
 
-    /// The request that the server takes from these bytes, and its answer.
+    /// The request that the server reads from these bytes, and its response.
     fn serve(&self, bytes: &[u8]) -> Option<(Vec<u8>, Vec<u8>)> {
         let (mut ours, theirs) = UnixStream::pair().expect("a pair of sockets");
-        ours.write_all(bytes).expect("room for a frame");
-        ours.shutdown(Shutdown::Write).expect("the end");
+        ours.write_all(bytes).expect("the socket takes a frame");
+        ours.shutdown(Shutdown::Write)
+            .expect("the end of the input");
         let mut request = [0u8; 260];
-        // SAFETY: the request has room for the longest frame; the objects live.
+        // SAFETY: `request` holds the longest frame; the objects are alive.
         let taken = unsafe {
             modbus_set_socket(self.context, theirs.as_raw_fd());
             let length = modbus_receive(self.context, request.as_mut_ptr());
@@ -80,7 +81,7 @@ impl Server {
         };
         drop(theirs);
         let mut answer = Vec::new();
-        // What it left unread resets the line, behind the answer.
+        // If libmodbus left bytes unread, the socket is reset after the response.
         let _ = ours.read_to_end(&mut answer);
         Some((request[..taken].to_vec(), answer))
     }
@@ -88,7 +89,7 @@ impl Server {
 
 impl Drop for Server {
     fn drop(&mut self) {
-        // SAFETY: made by `new`, and freed once.
+        // SAFETY: `new` has created both, and they are freed once.
         unsafe {
             modbus_free(self.context);
             modbus_mapping_free(self.mapping);
@@ -106,7 +107,7 @@ fuzz_target!(|data: &[u8]| {
     let Some((&how, pdu)) = data.split_first() else {
         return;
     };
-    // Functions that it knows; its 07 is a fault of its own.
+    // Only functions that libmodbus has. Its implementation of 07 is wrong.
     if !matches!(pdu.first(), Some(1..=6 | 15..=17 | 22 | 23)) || pdu.len() > 253 {
         return;
     }
@@ -118,7 +119,7 @@ fuzz_target!(|data: &[u8]| {
         naive::with_crc(&[&[UNIT], pdu].concat())
     };
     if how & 2 == 2 && !over_tcp {
-        // One byte damaged, but the unit's, which it looks at before the CRC.
+        // One byte is damaged. Not the unit: libmodbus checks it before the CRC.
         let at = 1 + usize::from(how >> 2) % (frame.len() - 1);
         frame[at] ^= 0x10;
     }
@@ -136,26 +137,26 @@ fn parse(frame: &[u8], over_tcp: bool) -> Result<Adu<'_>, Status> {
 
 fn compare(frame: &[u8], served: Option<(Vec<u8>, Vec<u8>)>, over_tcp: bool) {
     let Some((taken, answer)) = served else {
-        // What it does not take is no whole frame to us, or no request.
+        // libmodbus did not accept the frame: mbm must refuse it too.
         let request = parse(frame, over_tcp).and_then(|adu| Request::parse(adu.pdu));
         assert!(request.is_err(), "{frame:02X?}: {request:?}");
         return;
     };
-    // It takes as many bytes as the PDU needs and leaves those behind.
+    // libmodbus reads as many bytes as the PDU needs, and leaves the rest.
     assert!(frame.starts_with(&taken));
     let mut request = taken.clone();
     if over_tcp {
         let length = (request.len() as u16 - 6).to_be_bytes();
         request[4..6].copy_from_slice(&length);
     }
-    let adu = parse(&request, over_tcp).expect("a frame that it took");
+    let adu = parse(&request, over_tcp).expect("mbm reads the frame that libmodbus accepted");
     let ours = Request::parse(adu.pdu);
     if answer.is_empty() {
         panic!("{frame:02X?}: no answer");
     }
-    let reply = parse(&answer, over_tcp).expect("a frame that it sent");
+    let reply = parse(&answer, over_tcp).expect("mbm reads the frame that libmodbus sent");
     assert_eq!(reply.unit, adu.unit);
-    let response = Response::parse(reply.pdu).expect("a response that it sent");
+    let response = Response::parse(reply.pdu).expect("mbm reads the response of libmodbus");
     assert_eq!(response.function(), adu.pdu[0]);
     match (ours, response) {
         (Ok(_), Response::Exception { code, .. }) => panic!("{adu:02X?}: refused with {code}"),
@@ -168,10 +169,10 @@ fn compare(frame: &[u8], served: Option<(Vec<u8>, Vec<u8>)>, over_tcp: bool) {
     }
 }
 
-/// What its server lets pass though the standard does not.
+/// True for requests that libmodbus accepts although the standard does not.
 fn is_known_leniency(pdu: &[u8]) -> bool {
     match pdu {
-        // An excess byte count of coils.
+        // A byte count of coils that is too large.
         [15, _, _, high, low, count, ..] => {
             let quantity = usize::from(*high) * 256 + usize::from(*low);
             usize::from(*count) > quantity.div_ceil(8)
@@ -180,16 +181,16 @@ fn is_known_leniency(pdu: &[u8]) -> bool {
     }
 }
 
-/// The response is the one to the request.
+/// Checks that the response matches the request.
 fn agrees(request: &Request, response: &Response) {
     let mut buffer = [0; 253];
-    let length = response.emit(&mut buffer).expect("as it came");
+    let length = response.emit(&mut buffer).expect("the response is valid");
     let expected = request.response_length(&[]);
     if !matches!(request, Request::ReportServerId) {
         assert_eq!(expected, mbm::pdu::length::Length::Exactly(length));
     }
     let mut sent = [0; 253];
-    request.emit(&mut sent).expect("as it came");
+    request.emit(&mut sent).expect("the request is valid");
     if matches!(request.function(), 5 | 6 | 15 | 16 | 22) {
         assert_eq!(buffer[..length], sent[..length]);
     }

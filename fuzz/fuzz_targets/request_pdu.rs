@@ -1,5 +1,5 @@
-//! Request PDUs: what parses is written again byte for byte and is as long as
-//! its first bytes tell; what is written parses to what was meant.
+//! Request PDUs. A PDU that mbm can read is written again byte for byte, and its length follows
+//! from its first bytes. A request that mbm can write is read again unchanged.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -11,11 +11,11 @@ use mbm::pdu::request::Request;
 use mbm_fuzz::{lengths, Input};
 
 fuzz_target!(|data: &[u8]| {
-    received(data);
-    meant(Input(data));
+    check_received(data);
+    check_constructed(Input(data));
 });
 
-fn received(pdu: &[u8]) {
+fn check_received(pdu: &[u8]) {
     match Request::parse(pdu) {
         Ok(request) => {
             assert_eq!(request.function(), pdu[0]);
@@ -27,12 +27,12 @@ fn received(pdu: &[u8]) {
             lengths::agree(pdu, |front| length::request(front, &[]));
             request.response_length(&[]);
         }
-        // What a server answers: 01, 02 or 03.
+        // The status is the exception of a server: 01, 02 or 03.
         Err(status) => assert!((1..=3).contains(&status.code())),
     }
 }
 
-fn meant(mut input: Input) {
+fn check_constructed(mut input: Input) {
     let input = &mut input;
     let kind = input.u8() % 18;
     let (a, b, c, d) = (input.u16(), input.u16(), input.u16(), input.u16());

@@ -1,5 +1,5 @@
-//! Response PDUs: what parses is written again byte for byte and is as long as
-//! its first bytes tell; what is written parses to what was meant.
+//! Response PDUs. A PDU that mbm can read is written again byte for byte, and its length
+//! follows from its first bytes. A response that mbm can write is read again unchanged.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -12,11 +12,11 @@ use mbm::pdu::response::Response;
 use mbm_fuzz::{lengths, Input};
 
 fuzz_target!(|data: &[u8]| {
-    received(data);
-    meant(Input(data));
+    check_received(data);
+    check_constructed(Input(data));
 });
 
-fn received(pdu: &[u8]) {
+fn check_received(pdu: &[u8]) {
     match Response::parse(pdu) {
         Ok(response) => {
             assert_eq!(response.function(), pdu[0] & 0x7F);
@@ -26,8 +26,8 @@ fn received(pdu: &[u8]) {
             let short = response.emit(&mut buffer[..pdu.len() - 1]);
             assert_eq!(short, Err(Status::BUFFER_TOO_SMALL));
             match response {
-                // Some devices count less than they send, which only a framing
-                // with a length of its own can carry.
+                // Some devices send more than their byte count says. Only the framing shows the
+                // length of such a response.
                 Response::ServerId { count, data } if usize::from(count) != data.len() => {}
                 _ => lengths::agree(pdu, |front| length::response(front, &[])),
             }
@@ -39,7 +39,7 @@ fn received(pdu: &[u8]) {
     }
 }
 
-fn meant(mut input: Input) {
+fn check_constructed(mut input: Input) {
     let input = &mut input;
     let kind = input.u8() % 17;
     let (a, b, c) = (input.u16(), input.u16(), input.u16());

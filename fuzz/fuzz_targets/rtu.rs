@@ -1,5 +1,5 @@
-//! RTU frames, held against the naive way. (The search for a reply is held by the target
-//! `engine`.)
+//! RTU frames: mbm and the simple decoder of `naive` must agree. (The target `engine` tests the
+//! search for a reply.)
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -8,11 +8,11 @@ use mbm::frame::rtu;
 use mbm_fuzz::naive;
 
 fuzz_target!(|data: &[u8]| {
-    whole(data);
-    whole(&naive::with_crc(data));
+    check_frame(data);
+    check_frame(&naive::with_crc(data));
 });
 
-fn whole(frame: &[u8]) {
+fn check_frame(frame: &[u8]) {
     let expected = match frame.len() {
         0..=3 => Err(Status::INCOMPLETE_FRAME),
         257.. => Err(Status::MALFORMED_FRAME),
@@ -27,6 +27,6 @@ fn whole(frame: &[u8]) {
             pdu[..adu.pdu.len()].copy_from_slice(adu.pdu);
             Ok(adu.pdu.len())
         });
-        assert_eq!(&buffer[..length.expect("it fits")], frame);
+        assert_eq!(&buffer[..length.expect("the frame fits")], frame);
     }
 }

@@ -1,5 +1,5 @@
-//! A sniffer on any bus: every byte that was fed is told of once and in order,
-//! frames are what was on the line, and a reply has a request before it.
+//! The sniffer with any bytes. Every byte belongs to one event, events are in the order of the
+//! bytes, reported frames are valid, and a reply comes after its request.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -21,7 +21,7 @@ fuzz_target!(|data: &[u8]| {
         buffer: vec![0; size],
         now: 0u32.wrapping_sub(u32::from(input.u16())),
         line: Vec::new(),
-        told: 0,
+        reported: 0,
         requests: Vec::new(),
     };
     let Some(asked) = Asked::new(&mut input) else {
@@ -31,7 +31,7 @@ fuzz_target!(|data: &[u8]| {
         let bytes = match input.u8() % 6 {
             0 => {
                 bus.now = bus.now.wrapping_add(u32::from(input.u16()) * 100);
-                bus.listen();
+                bus.take_events();
                 continue;
             }
             1 => input.counted().to_vec(),
@@ -44,20 +44,20 @@ fuzz_target!(|data: &[u8]| {
             bus.feed(some);
         }
     }
-    // Nothing is waited for any longer.
+    // All timeouts expire.
     for _ in 0..3 {
         bus.now = bus.now.wrapping_add(3_000_000);
-        bus.listen();
+        bus.take_events();
     }
-    // A TCP frame beyond the buffer is told of before the rest of it has come.
+    // A TCP frame longer than the buffer is reported before all of it has arrived.
     let ahead = framing == Framing::Tcp && size < framing.max_frame();
     assert!(
-        bus.told == bus.line.len() || ahead && bus.told > bus.line.len(),
-        "bytes that nobody told of, or twice"
+        bus.reported == bus.line.len() || ahead && bus.reported > bus.line.len(),
+        "some bytes belong to no event, or to two"
     );
 });
 
-/// A PDU in a frame.
+/// The frame of a PDU.
 fn framed(framing: Framing, unit: u8, pdu: &[u8]) -> Vec<u8> {
     let mut buffer = [0; 600];
     let pdu = &pdu[..pdu.len().min(253)];
@@ -65,7 +65,7 @@ fn framed(framing: Framing, unit: u8, pdu: &[u8]) -> Vec<u8> {
         place[..pdu.len()].copy_from_slice(pdu);
         Ok(pdu.len())
     });
-    buffer[..length.expect("there is room")].to_vec()
+    buffer[..length.expect("the frame fits")].to_vec()
 }
 
 struct Bus {
@@ -73,10 +73,11 @@ struct Bus {
     sniffer: Sniffer,
     buffer: Vec<u8>,
     now: u32,
-    /// All that was fed, and how much of it was told of.
+    /// All bytes so far.
     line: Vec<u8>,
-    told: usize,
-    /// Unit and function of every request.
+    /// How many of them events have reported.
+    reported: usize,
+    /// The unit and the function of every request.
     requests: Vec<(u8, u8)>,
 }
 
@@ -88,26 +89,26 @@ impl Bus {
             let taken = self
                 .sniffer
                 .feed(&mut self.buffer, Tap::Both, rest, self.now);
-            let before = self.told;
-            self.listen();
-            assert!(taken > 0 || self.told > before, "no progress");
+            let before = self.reported;
+            self.take_events();
+            assert!(taken > 0 || self.reported > before, "no progress");
             rest = &rest[taken..];
         }
     }
 
-    fn listen(&mut self) {
+    fn take_events(&mut self) {
         while let Some(event) = self.sniffer.next(&mut self.buffer, &[], self.now) {
             let mut text = [0; 20_000];
             let mut words = Line::new(&mut text);
             event.explain(&mut words);
-            words.finish().expect("there is room for words");
+            words.finish().expect("the text fits");
             if event.kind == Kind::Timeout {
                 assert!(self.requests.contains(&(event.unit, event.function)));
                 continue;
             }
-            assert!(event.length > 0, "nothing is told of");
-            let start = self.told;
-            self.told += event.length;
+            assert!(event.length > 0, "an event without bytes");
+            let start = self.reported;
+            self.reported += event.length;
             match event.kind {
                 Kind::Request => self.requests.push((event.unit, event.function)),
                 Kind::Reply | Kind::Exception => {
@@ -117,10 +118,10 @@ impl Bus {
                 Kind::Unpaired => {}
                 _ => continue,
             }
-            let heard = &self.line[start..self.told];
+            let heard = &self.line[start..self.reported];
             let content = match self.framing {
                 Framing::Rtu | Framing::RtuOverTcp => {
-                    assert!(naive::has_crc(heard), "no frame");
+                    assert!(naive::has_crc(heard), "not a frame");
                     heard[..heard.len() - 2].to_vec()
                 }
                 Framing::Ascii => naive::ascii(heard, ascii::END).expect("a frame"),

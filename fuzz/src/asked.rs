@@ -1,5 +1,4 @@
-//! A request of the facade, as mbm builds it and as the standard says that it
-//! looks, and what answers it.
+//! A request of the master: as mbm builds it, as the standard describes it, and its responses.
 
 use crate::{be, naive, Input};
 use mbm::pdu::query::{Form, Query};
@@ -10,13 +9,13 @@ pub struct Asked {
     pub unit: u8,
     pub query: Query,
     pub pdu: Vec<u8>,
-    /// How many bytes of data a response of a read has.
+    /// The number of data bytes in the response to a read; `None` for a write.
     pub data: Option<usize>,
-    /// How many bits a read asks for.
+    /// The number of bits that the request reads; `None` if it reads none.
     pub bits: Option<u16>,
 }
 
-/// The words that are sent; pseudo-random, as no code looks at them.
+/// The words to send. They are pseudo-random, since no code depends on their values.
 pub fn words() -> Vec<u16> {
     (0..125u16)
         .map(|index| index.wrapping_mul(0x9E37) ^ 0x5A5A)
@@ -24,7 +23,7 @@ pub fn words() -> Vec<u16> {
 }
 
 impl Asked {
-    /// The request that an input describes, if it is one within the standard.
+    /// The request that an input describes; `None` if the standard does not allow it.
     pub fn new(input: &mut Input) -> Option<Asked> {
         let (kind, unit) = (input.u8() % 10, input.u8());
         let (a, b, c, d) = (input.u16(), input.u16(), input.u16(), input.u16());
@@ -104,7 +103,7 @@ impl Asked {
         naive::with_crc(&[&[self.unit], &self.pdu[..]].concat())
     }
 
-    /// A right response PDU, with data from the input.
+    /// The PDU of a right response, with data from the input.
     pub fn response(&self, input: &mut Input) -> Vec<u8> {
         match self.data {
             Some(count) => {
@@ -117,7 +116,7 @@ impl Asked {
         }
     }
 
-    /// How many bytes of the request the response of a write repeats.
+    /// The number of bytes that the response to a write repeats from the request.
     fn repeated(&self) -> usize {
         if self.function() == 22 {
             7
@@ -126,8 +125,8 @@ impl Asked {
         }
     }
 
-    /// How long the frame of a response is that begins with these bytes, or at
-    /// least is; `None` if none begins so.
+    /// The length of a response frame that starts with these bytes, or its least length if they
+    /// do not determine it; `None` if no response starts with them.
     pub fn frame_length(&self, bytes: &[u8]) -> Option<usize> {
         if *bytes.first()? != self.unit {
             return None;
@@ -150,7 +149,7 @@ impl Asked {
         }
     }
 
-    /// True for a whole frame that answers the request.
+    /// True if the frame is a right response to the request, or an exception.
     pub fn is_answered_by(&self, frame: &[u8]) -> bool {
         if self.frame_length(frame) != Some(frame.len()) || !naive::has_crc(frame) {
             return false;

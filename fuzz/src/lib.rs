@@ -1,5 +1,5 @@
-//! What the fuzz targets share: an input that is taken apart, naive versions of
-//! what they test, requests and the bytes that may come back.
+//! Shared by the fuzz targets: a reader for inputs, simple versions of the code under test,
+//! requests, and the bytes that may arrive after them.
 
 pub mod api;
 pub mod asked;
@@ -8,7 +8,7 @@ pub mod naive;
 pub mod search;
 pub mod stream;
 
-/// A fuzz input, taken from its front; zeros once it is used up.
+/// Reads a fuzz input from its front; returns zeros after its end.
 pub struct Input<'a>(pub &'a [u8]);
 
 impl<'a> Input<'a> {
@@ -30,21 +30,21 @@ impl<'a> Input<'a> {
         u16::from_be_bytes([self.u8(), self.u8()])
     }
 
-    /// At most `count` bytes.
+    /// The next `count` bytes, or fewer at the end of the input.
     pub fn take(&mut self, count: usize) -> &'a [u8] {
         let (front, rest) = self.0.split_at(count.min(self.0.len()));
         self.0 = rest;
         front
     }
 
-    /// Bytes behind their count.
+    /// A count of 8 bits, and that many bytes.
     pub fn counted(&mut self) -> &'a [u8] {
         let count = self.u8();
         self.take(count.into())
     }
 }
 
-/// Words as they travel.
+/// The words as bytes, high byte first.
 pub fn be(words: &[u16]) -> Vec<u8> {
     words.iter().flat_map(|word| word.to_be_bytes()).collect()
 }

@@ -1,7 +1,7 @@
-//! Checks and framings written down once more, the slow and plain way, from the
-//! serial line guide and not from mbm.
+//! A second implementation of checks and framings, slow and simple, written from the serial
+//! line guide and not from mbm.
 
-/// The CRC-16, bit by bit, as sent.
+/// The CRC-16, computed bit by bit, in the order in which it is sent.
 pub fn crc(bytes: &[u8]) -> [u8; 2] {
     let mut crc = 0xFFFFu16;
     for byte in bytes {
@@ -17,17 +17,17 @@ pub fn crc(bytes: &[u8]) -> [u8; 2] {
     crc.to_le_bytes()
 }
 
-/// Bytes with their CRC behind them.
+/// The bytes followed by their CRC.
 pub fn with_crc(bytes: &[u8]) -> Vec<u8> {
     [bytes, &crc(bytes)].concat()
 }
 
-/// True for bytes that end with their CRC.
+/// True if the last two bytes are the CRC of the others.
 pub fn has_crc(frame: &[u8]) -> bool {
     frame.len() >= 2 && crc(&frame[..frame.len() - 2]) == frame[frame.len() - 2..]
 }
 
-/// Unit and PDU of an ASCII frame that ends with `end`.
+/// The unit and the PDU of an ASCII frame that ends with CR and `end`.
 pub fn ascii(frame: &[u8], end: u8) -> Option<Vec<u8>> {
     let hex = frame.strip_prefix(b":")?.strip_suffix(&[b'\r', end])?;
     if frame.len() > 513 || !hex.len().is_multiple_of(2) || hex.len() < 6 {
@@ -45,7 +45,7 @@ pub fn ascii(frame: &[u8], end: u8) -> Option<Vec<u8>> {
     sum.is_multiple_of(256).then_some(bytes)
 }
 
-/// Transaction, unit and PDU of a TCP frame.
+/// The transaction identifier, the unit and the PDU of a TCP frame.
 pub fn tcp(frame: &[u8]) -> Option<(u16, u8, &[u8])> {
     if !(8..=260).contains(&frame.len()) || frame[2..4] != [0, 0] {
         return None;
@@ -55,7 +55,7 @@ pub fn tcp(frame: &[u8]) -> Option<(u16, u8, &[u8])> {
     (counted == frame.len() - 6).then(|| (transaction, frame[6], &frame[7..]))
 }
 
-/// Bits as they travel, from words, least significant bit first.
+/// The bits of words as they are sent, least significant bit first.
 pub fn coils(words: &[u16], quantity: u16) -> Vec<u8> {
     let mut bytes = vec![0; usize::from(quantity).div_ceil(8)];
     for coil in 0..usize::from(quantity) {

@@ -1,19 +1,20 @@
-//! The search for the reply to a request, the slow and plain way.
+//! The search for the reply to a request, in a slow and simple way.
 
 use crate::asked::Asked;
 use crate::naive;
 
-/// All that ever arrived, looked through from a position on.
+/// All bytes that have arrived, searched from a position on.
 pub struct Search<'a> {
     pub asked: &'a Asked,
-    /// Bytes of the buffer.
+    /// The size of the master's frame buffer in bytes.
     pub room: usize,
     pub bytes: Vec<u8>,
     pub at: usize,
 }
 
 impl Search<'_> {
-    /// The frame that answers; looks behind what is not complete if `skim`.
+    /// Finds the frame that answers the request. If `skim`, it also searches after the start of
+    /// an incomplete frame.
     pub fn search(&mut self, skim: bool) -> Option<Vec<u8>> {
         let mut at = self.at;
         while at < self.bytes.len() {
@@ -30,7 +31,7 @@ impl Search<'_> {
                     continue;
                 }
                 Some(_) => {}
-                // What the buffer cannot hold is passed over.
+                // A frame that the buffer cannot hold is skipped.
                 None if length.is_some_and(|length| length <= self.room) && !skim => break,
                 None => {}
             }

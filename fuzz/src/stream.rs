@@ -1,17 +1,17 @@
-//! What a line may bring: noise, right and damaged replies, silence.
+//! Events on a line: noise, right and damaged replies, silence.
 
 use crate::asked::Asked;
 use crate::{naive, Input};
 
-/// What happens on the line.
+/// An event on the line.
 #[derive(Clone, Debug)]
 pub enum Event {
     Bytes(Vec<u8>),
     Silence,
 }
 
-/// The event that an input describes. A fuzzer finds no CRC by itself, so whole
-/// frames are among what it may ask for.
+/// The event that an input describes. Whole frames are among the events, because a fuzzer does
+/// not find a right CRC itself.
 pub fn event(input: &mut Input, asked: &Asked) -> Event {
     let kind = input.u8();
     let reply = |pdu: &[u8]| naive::with_crc(&[&[asked.unit], pdu].concat());

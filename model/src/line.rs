@@ -9,7 +9,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 /// The unit of the device.
 const UNIT: u8 = 17;
 
-/// Times in units of the clock. Only their order and their sums matter.
+/// Times in ticks of the model's clock. Only their order and their sums matter.
 const SILENCE: u32 = 1;
 pub const QUIET: u32 = 4;
 const TIMEOUT: u32 = 10;
@@ -17,15 +17,15 @@ const TIMEOUT: u32 = 10;
 /// The longest time that makes a difference.
 const LONGEST: u32 = 100;
 
-/// What is wrong with a request that has ended and goes on.
+/// The fault of a request that continues after its end.
 pub const TWICE: &str = "a request ended twice";
 
 /// What the adversary may do next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Event {
-    /// The device sends the reply that it owes longest.
+    /// The device sends the reply to its oldest unanswered request.
     Reply,
-    /// The device answers the request that it owes longest with an exception.
+    /// The device answers its oldest unanswered request with an exception.
     Exception,
     /// That reply arrives with a bit changed in its CRC.
     Damaged,
@@ -41,34 +41,34 @@ pub enum Event {
     LooksLikeReply,
     /// A reply of another unit arrives.
     Foreign,
-    /// The clock moves on by so much, then the master is polled.
+    /// The clock moves on by this many ticks, then the master is polled.
     Step(u8),
-    /// The user gives the request up.
+    /// The user cancels the request.
     Cancel,
 }
 
-/// Everything that decides about the future, and what the properties look at.
+/// Everything that determines later events, and everything that the properties check.
 #[derive(Clone, Debug)]
 pub struct State {
     master: Master<Wire, Lent>,
-    /// Requests that the device has not answered, in order.
+    /// The numbers of the requests that the device has not answered, in order.
     owed: Vec<u8>,
-    /// The number of the last request, which is the value that it reads.
+    /// The number of the last request. The device replies with this number as the value.
     number: u8,
-    /// How long the request under way has lasted.
+    /// How long the active request has lasted, in ticks.
     lasts: u32,
-    /// How long nothing has arrived.
+    /// How long no byte has arrived, in ticks; at most `QUIET`.
     silent: u32,
-    /// The reply to the request under way arrived in a form that shows.
+    /// The reply to the active request has arrived damaged.
     own_damaged: bool,
-    /// The reply to the request under way arrived, as an exception.
+    /// An exception has arrived as the reply to the active request.
     own_exception: bool,
-    /// A reply is owed to a request that succeeded: the device left more than the
-    /// quiet time between two replies, or a reply was lost.
+    /// The device still owes a reply to a request that succeeded: the device left more than the
+    /// quiet time between two replies, or a reply was lost. The master cannot detect this.
     beyond_bound: bool,
-    /// The request before got its own reply.
+    /// The previous request got its own reply.
     right: bool,
-    /// What went wrong; None if nothing did.
+    /// The fault that was found, if any.
     pub wrong: Option<&'static str>,
 }
 
@@ -99,7 +99,7 @@ fn frame(unit: u8, pdu: &[u8]) -> Vec<u8> {
         place[..pdu.len()].copy_from_slice(pdu);
         Ok(pdu.len())
     });
-    buffer[..length.expect("the buffer holds it")].to_vec()
+    buffer[..length.expect("the frame fits")].to_vec()
 }
 
 fn reply(unit: u8, number: u8) -> Vec<u8> {
@@ -107,7 +107,7 @@ fn reply(unit: u8, number: u8) -> Vec<u8> {
 }
 
 impl State {
-    /// A master whose first request was just started.
+    /// A master that has just started its first request.
     pub fn new(buffer: usize, retries: u8, quiet_time: u32) -> Self {
         let mut master = Master::new(UNIT, Wire::default(), wire::lent(buffer));
         let settings = master.settings();
@@ -154,7 +154,7 @@ impl State {
         }
     }
 
-    /// What follows from an event.
+    /// The state after an event.
     pub fn after(&self, event: Event) -> State {
         let mut state = self.clone();
         state.happen(event);
@@ -217,7 +217,7 @@ impl State {
         }
     }
 
-    /// Moves the clock on, and polls until the master has nothing to do.
+    /// Moves the clock on, and polls until the master waits.
     fn step(&mut self, time: u32) {
         self.master.port().now = time;
         self.lasts += time;
@@ -236,13 +236,12 @@ impl State {
             }
         }
         self.master.rebase(time, LONGEST);
-        // Nothing depends on what was counted.
+        // Nothing depends on the counters.
         self.master.storage().counters.fill(0);
         self.master.port().now = 0;
     }
 
-    /// The request has ended: holds how against what is allowed, and starts the
-    /// next one.
+    /// Checks how the request has ended, and starts the next one.
     fn ended(&mut self) {
         let status = self.master.status();
         if self.master.poll() != status || self.master.is_pending() {
@@ -254,9 +253,10 @@ impl State {
             let own = self.right || (status != Status::OK && self.own_exception);
             if !own && !self.beyond_bound {
                 if self.own_damaged {
-                    self.wrong = Some("a late reply counted though the right one arrived damaged");
+                    self.wrong =
+                        Some("a late reply was taken though the right one arrived damaged");
                 } else if self.silent < QUIET {
-                    self.wrong = Some("a late reply counted before the quiet time had passed");
+                    self.wrong = Some("a late reply was taken before the quiet time had passed");
                 }
             }
         }
@@ -265,15 +265,16 @@ impl State {
         self.start();
     }
 
-    /// True while the request has lasted no longer than any request may.
+    /// True if the request has not lasted longer than a request may.
     pub fn ends_in_time(&self, retries: u8) -> bool {
-        // Listening before each attempt, and its reply; a poll comes up to 10 late.
+        // Each attempt: the quiet time before it, and the wait for its reply. A poll may come
+        // up to 10 ticks late.
         let attempt = (TIMEOUT + QUIET) + (2 * TIMEOUT + QUIET) + 3 * 10;
         self.lasts <= attempt * (u32::from(retries) + 1)
     }
 
-    /// True if the second request from now on gets its own reply, where the device
-    /// owes nothing from before and answers at once.
+    /// True if the second request from now on gets its own reply, provided that the device owes
+    /// no earlier reply and answers at once.
     pub fn recovers(&self) -> bool {
         let mut state = self.clone();
         state.owed.clear();
@@ -285,7 +286,7 @@ impl State {
             }
             if !state.owed.is_empty() {
                 if number == first {
-                    // A repetition of the request that was under way.
+                    // A retry of the active request.
                     state.happen(Event::Lost);
                 } else {
                     state.happen(Event::Reply);

@@ -1,6 +1,6 @@
-//! Explores what may happen around the requests of a real master: an adversary
-//! chooses at each step what arrives and how the clock moves. Every order of events
-//! is tried, breadth first, for as many seconds as the argument says.
+//! Explores the requests of a real master. At each step an adversary chooses what arrives and
+//! how far the clock moves. The program tries every order of these events, breadth first. Its
+//! argument is the time in seconds, 300 without one.
 
 mod line;
 mod wire;
@@ -12,12 +12,13 @@ use std::time::Duration;
 /// A master, and what the adversary may do to it.
 #[derive(Clone, Copy, Debug)]
 struct Line {
-    /// Bytes of the frame buffer.
+    /// The size of the frame buffer in bytes.
     buffer: usize,
     retries: u8,
     /// The quiet time that the master is set to.
     quiet_time: u32,
-    /// Whether there is noise on the line, beside late, damaged and lost replies.
+    /// Whether the adversary may also send noise, exceptions and frames of other units, and
+    /// cancel requests.
     noise: bool,
 }
 
@@ -57,17 +58,17 @@ impl Model for Line {
     }
 }
 
-/// What an exploration came to.
+/// The result of an exploration.
 struct Explored {
-    /// States that differ.
+    /// The number of different states.
     states: usize,
-    /// Every order of so many events was tried.
+    /// Every order of this many events was tried.
     events: usize,
-    /// The properties that do not hold, and what leads there.
+    /// The properties that do not hold, each with the events that break it.
     broken: Vec<(&'static str, Path<State, Event>)>,
 }
 
-/// Explores for so long, or until a property is broken.
+/// Explores for the given time, or until a property is broken.
 fn explore(line: Line, time: Duration) -> Explored {
     let checker = line
         .checker()
@@ -92,7 +93,7 @@ fn main() {
     let mut lines = Vec::new();
     for noise in [false, true] {
         for retries in [0, 1] {
-            // The second buffer holds no second reply beside the first.
+            // The second buffer is too small for a second reply beside a held one.
             for buffer in [20, 12] {
                 let quiet_time = line::QUIET;
                 lines.push(Line {
@@ -137,9 +138,9 @@ fn main() {
 mod tests {
     use super::*;
 
-    /// Without a quiet time the master holds no reply, and takes a late one.
+    /// Without a quiet time the master does not hold a reply, and so takes a late one.
     #[test]
-    fn a_late_reply_that_is_taken_for_the_answer_is_found() {
+    fn the_model_finds_a_late_reply_that_is_taken_for_the_right_one() {
         let line = Line {
             buffer: 20,
             retries: 0,

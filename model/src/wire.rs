@@ -1,4 +1,4 @@
-//! The line under the master, and the storage that the master works in.
+//! The master's port, and its buffers.
 
 use mbm::engine::{Buffers, Storage as _, Words as _};
 use mbm::port::Port;
@@ -8,7 +8,7 @@ use mbm::port::Port;
 pub struct Wire {
     /// Bytes that have arrived and that the master has not read.
     pub arrived: Vec<u8>,
-    /// Bytes that the master has sent since they were last taken out.
+    /// Bytes that the master has sent since this field was last emptied.
     pub sent: Vec<u8>,
     /// The clock.
     pub now: u32,
@@ -33,15 +33,16 @@ impl Port for Wire {
     }
 }
 
-/// What the master works in.
+/// The master's buffers.
 pub type Lent = Buffers<Vec<u8>, [u16; 1], [u16; 0]>;
 
-/// A frame buffer of `bytes`, and a word to read.
+/// Creates a frame buffer of `bytes` bytes, and one response word.
 pub fn lent(bytes: usize) -> Lent {
     Buffers::new(vec![0; bytes], [0], [])
 }
 
-/// Zeroes buffer and word, for the master keeps nothing in them between two requests.
+/// Zeroes the buffers, so that states differ only where the master does. The master keeps
+/// nothing in them between two requests.
 pub fn clear(lent: &mut Lent) {
     let room = lent.room();
     lent.bytes(0, room).fill(0);

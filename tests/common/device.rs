@@ -1,4 +1,4 @@
-//! A device with everything that a server serves, for tests to ask.
+//! A device with everything that a server can serve, for tests to send requests to.
 
 use mbm::frame::checksum::crc16;
 use mbm::frame::Framing;
@@ -11,33 +11,34 @@ use mbm::server::respond::respond;
 use mbm::server::storage::{Bits, Coils, DiscreteInputs, HoldingRegisters, InputRegisters, Words};
 use mbm::server::{Reply, Service, Unit};
 
-/// Bytes with their CRC behind them.
+/// The bytes followed by their CRC.
 pub fn sealed(bytes: &[u8]) -> Vec<u8> {
     let mut frame = bytes.to_vec();
     frame.extend(crc16(bytes).to_bytes());
     frame
 }
 
-/// Unit 17: ten registers and 20 bits of each kind from address 100 on, files 3
-/// and 4 of ten records, queues of 2, 31 and 32 registers.
+/// Unit 17: ten registers and 20 bits of each kind from address 100 on, files 3 and 4 with
+/// ten records each, and FIFO queues of 2, 31 and 32 registers.
 pub struct Device {
     pub id: u8,
     pub holding: [u16; 10],
     pub inputs: [u16; 10],
     pub coils: [u8; 3],
     pub discrete: [u8; 3],
-    /// Which registers there are.
+    /// One bit for each holding register: 1 if it exists. `None`: all exist.
     pub valid: Option<[u8; 2]>,
-    /// Writes of this register are refused with this exception.
+    /// A register, and the exception code that refuses writes to it.
     pub refuse: Option<(u16, u8)>,
-    /// What the hooks were told.
+    /// The arguments of each call of the hook before an access.
     pub asked: Vec<(u16, u16, Vec<u8>)>,
+    /// The arguments of each call of the hook after a write.
     pub written: Vec<(u16, u16)>,
     pub files: [[u16; 10]; 2],
     pub objects: Vec<(u8, Vec<u8>)>,
     pub diagnostics: Diagnostics,
     pub off: [u8; 16],
-    /// What function 41 does.
+    /// Carries out function 0x42.
     pub custom: fn(&[u8], &mut [u8]) -> Outcome,
 }
 
@@ -178,7 +179,8 @@ impl Device {
     }
 }
 
-/// Asks a device over RTU; returns the response's PDU.
+/// Sends a request to the device in RTU framing; returns the PDU of the response, empty if
+/// there is none.
 pub fn ask(device: &mut Device, pdu: &[u8]) -> Vec<u8> {
     let mut buffer = [0; 256];
     let request = sealed(&[&[17], pdu].concat());

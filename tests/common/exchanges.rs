@@ -1,10 +1,11 @@
-//! What a client asks of every function, and what answers it.
+//! A request of every function, and its response.
 
 use mbm::error::Status;
 use mbm::pdu::custom::Rule;
 use mbm::pdu::outline::{Form, Outline};
 
-/// A request, its data, PDU and response PDU, and the data of the response.
+/// The builder of a request, the data to send, the PDU of the request, the PDU of the
+/// response, and the data that the client receives.
 pub type Case = (
     fn(&mut Outline) -> Status,
     &'static [u8],
@@ -13,7 +14,7 @@ pub type Case = (
     &'static [u8],
 );
 
-/// The examples of the application protocol, clause 6, and some of ours.
+/// The examples of the application protocol, clause 6, and some others.
 pub const CASES: &[Case] = &[
     (
         |o| o.set(Form::READ_COILS, 0x13, 0x13),
@@ -199,7 +200,7 @@ pub const CASES: &[Case] = &[
         &[0x43, 1, 2, 3, 4, 5],
         &[1, 2, 3, 4, 5],
     ),
-    // A function of the standard as a user's own, as a gateway hands it on.
+    // A function of the standard, sent as a user-defined one. A gateway forwards it so.
     (
         |o| o.custom(0x14, 8, Rule::Counted(1, 0)),
         &[7, 6, 0, 4, 0, 0, 0, 2],

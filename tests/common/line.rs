@@ -1,5 +1,5 @@
-//! A line with a clock of its own: bytes arrive at times, what is sent is kept
-//! with the time of its first byte.
+//! A simulated line with its own clock. Bytes arrive at set times; sent frames are recorded
+//! with the time of their first byte.
 
 use super::device::Device;
 use mbm::error::Status;
@@ -10,7 +10,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-/// A character at 19200 baud, and t3.5.
+/// The duration of a character at 19200 baud, and t3.5, in microseconds.
 pub const CHARACTER: u32 = 573;
 pub const SILENCE: u32 = 2_006;
 
@@ -21,9 +21,9 @@ pub struct Wire {
     pub sent: Vec<(u32, Vec<u8>)>,
     pub driver: bool,
     pub flushed: bool,
-    /// What is sent comes back at once.
+    /// Sent bytes are received again at once.
     pub echo: bool,
-    /// The port takes so many bytes at once; 0 is all.
+    /// How many bytes the port accepts at once; 0: all.
     pub piece: usize,
     pub lost: bool,
 }
@@ -90,7 +90,7 @@ impl Port for Tap {
     }
 }
 
-/// A server of a device on such a line.
+/// A server with a device on such a line.
 pub struct Line {
     pub wire: Rc<RefCell<Wire>>,
     pub server: Server<Tap, [u8; 600]>,
@@ -113,7 +113,8 @@ impl Line {
         }
     }
 
-    /// Lets bytes arrive `after` the last that will, one a character time.
+    /// Adds bytes that arrive one character time apart. The first arrives `after`
+    /// microseconds after the last one added so far.
     pub fn arrive(&mut self, after: u32, bytes: &[u8]) {
         let wire = &mut *self.wire.borrow_mut();
         let last = wire.arriving.back().map_or(wire.now, |last| last.0);
@@ -132,7 +133,7 @@ impl Line {
             .with_unit(|unit| server.serve(now, &mut [unit][..]))
     }
 
-    /// Polls every `step` microseconds for `time`; returns what was sent.
+    /// Polls every `step` microseconds for `time` microseconds; returns the sent frames.
     pub fn run(&mut self, time: u32, step: u32) -> Vec<(u32, Vec<u8>)> {
         let start = self.wire.borrow().now;
         while self.wire.borrow().now.wrapping_sub(start) < time {
@@ -143,7 +144,7 @@ impl Line {
         std::mem::take(&mut self.wire.borrow_mut().sent)
     }
 
-    /// As `run`, without times.
+    /// Like `run`, but returns the frames without their times.
     pub fn frames(&mut self, time: u32, step: u32) -> Vec<Vec<u8>> {
         self.run(time, step)
             .into_iter()

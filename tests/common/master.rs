@@ -1,4 +1,4 @@
-//! A real master, on a line that brings what a test says.
+//! A master on a line whose bytes the test chooses.
 
 use mbm::engine::{Buffers, Words};
 use mbm::error::Status;
@@ -9,26 +9,26 @@ use mbm::pdu::{bits, registers};
 use mbm::port::Port;
 use std::collections::VecDeque;
 
-/// Microseconds that pass from one poll to the next once the line brings nothing more.
+/// Microseconds that pass from one poll to the next once all bytes have arrived.
 const LONG: u32 = 50_000;
 
-/// What the master sends, and what comes back to it.
+/// Records what the master sends, and delivers the bytes of the reply.
 #[derive(Default)]
 pub struct Line {
     now: u32,
-    /// Microseconds that pass from one poll to the next while bytes are to come.
+    /// Microseconds that pass from one poll to the next until all bytes have arrived.
     step: u32,
-    /// What one read brings.
+    /// The bytes that have arrived; one read returns one piece at most.
     pieces: VecDeque<Vec<u8>>,
-    /// The pieces that come once a request was sent.
+    /// The pieces that arrive after the next request.
     reply: VecDeque<Vec<u8>>,
     pub sent: Vec<u8>,
 }
 
 impl Line {
-    /// Has `bytes` come once the next request was sent, in pieces of `piece`, with
+    /// Sets the bytes that arrive after the next request: in pieces of `piece` bytes, with
     /// `step` microseconds from one poll to the next.
-    pub fn bring(&mut self, bytes: &[u8], piece: usize, step: u32) {
+    pub fn deliver(&mut self, bytes: &[u8], piece: usize, step: u32) {
         self.step = step;
         self.sent.clear();
         self.reply = bytes.chunks(piece).map(<[u8]>::to_vec).collect();
@@ -65,11 +65,11 @@ impl Port for Line {
     }
 }
 
-/// A call of one of the ten functions.
+/// A call of one of the master's ten functions.
 #[derive(Clone, Copy, Debug)]
 pub struct Call {
     pub function: u8,
-    /// The arguments; what the function does not take does not matter.
+    /// The arguments. The function ignores those that it does not take.
     pub words: [u16; 4],
 }
 
@@ -83,7 +83,7 @@ impl Call {
         call
     }
 
-    /// The request.
+    /// The request that the call builds, or the status that refuses it.
     pub fn query(&self) -> Result<Query, Status> {
         let [a, b, c, d] = self.words;
         Query::build(|query| match self.function {
@@ -101,7 +101,7 @@ impl Call {
             0x10 => query.set(registers::form::WRITE_MULTIPLE, a, b),
             0x16 => registers::mask_write(query, a, b, c),
             0x17 => registers::read_write(query, a, b, c, d),
-            other => panic!("the facade has no function {other:#x}"),
+            other => panic!("the master has no function {other:#x}"),
         })
     }
 
@@ -118,31 +118,31 @@ impl Call {
             0x10 => master.write_multiple_registers(a, b),
             0x16 => master.mask_write_register(a, b, c),
             0x17 => master.read_write_multiple_registers(a, b, c, d),
-            other => panic!("the facade has no function {other:#x}"),
+            other => panic!("the master has no function {other:#x}"),
         }
     }
 }
 
 type Lent = Buffers<Vec<u8>, [u16; 125], [u16; 125]>;
 
-/// A master that is asked for one request after the other.
-pub struct Asker(pub Master<Line, Lent>);
+/// A master that sends one request after the other.
+pub struct TestMaster(pub Master<Line, Lent>);
 
-impl Asker {
-    /// Over a frame buffer of `size` bytes.
-    pub fn new(unit: u8, size: usize) -> Asker {
+impl TestMaster {
+    /// A master with a frame buffer of `size` bytes.
+    pub fn new(unit: u8, size: usize) -> TestMaster {
         let buffers = Buffers::new(vec![0; size], [0; 125], [0; 125]);
-        Asker(Master::new(unit, Line::default(), buffers))
+        TestMaster(Master::new(unit, Line::default(), buffers))
     }
 
-    /// Sends a request to which the line brings nothing: what was sent.
+    /// Sends a request that gets no reply; returns the sent bytes.
     pub fn send(&mut self, call: Call, words: &[u16]) -> Vec<u8> {
         assert_eq!(self.start(call, words), Status::PENDING);
         assert!(self.end().is_failure());
         std::mem::take(&mut self.0.port().sent)
     }
 
-    /// Starts a request with words to send.
+    /// Starts a request with `words` to send.
     pub fn start(&mut self, call: Call, words: &[u16]) -> Status {
         for (index, word) in words.iter().enumerate() {
             self.0.set_transmit_word(index, *word);
@@ -150,7 +150,7 @@ impl Asker {
         call.start(&mut self.0)
     }
 
-    /// How the request under way ends.
+    /// Polls until the active request has ended; returns its status.
     pub fn end(&mut self) -> Status {
         for _ in 0..100_000 {
             match self.0.poll() {
@@ -161,25 +161,26 @@ impl Asker {
         panic!("the request does not end");
     }
 
-    /// Asks, and has the line bring `bytes`, see [`Line::bring`]: how the request ends.
-    pub fn ask(&mut self, call: Call, bytes: &[u8], piece: usize, step: u32) -> Status {
+    /// Sends a request, delivers `bytes` as in [`Line::deliver`], and returns the status with
+    /// which the request ends.
+    pub fn request(&mut self, call: Call, bytes: &[u8], piece: usize, step: u32) -> Status {
         assert_eq!(call.start(&mut self.0), Status::PENDING);
-        self.0.port().bring(bytes, piece, step);
+        self.0.port().deliver(bytes, piece, step);
         self.end()
     }
 
-    /// The words that the last request read.
+    /// The words that the last request has read.
     pub fn words(&mut self) -> Vec<u16> {
         (0..self.0.available()).map(|_| self.0.receive()).collect()
     }
 }
 
-/// The frame of a request to `unit`, with `words` to send.
+/// The frame of a request to `unit` that sends `words`.
 pub fn frame(unit: u8, call: Call, words: &[u16]) -> Vec<u8> {
-    Asker::new(unit, 256).send(call, words)
+    TestMaster::new(unit, 256).send(call, words)
 }
 
-/// Bytes with their CRC behind them.
+/// The bytes followed by their CRC.
 pub fn sealed(bytes: &[u8]) -> Vec<u8> {
     [bytes, &crc16(bytes).to_bytes()].concat()
 }

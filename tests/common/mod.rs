@@ -1,4 +1,4 @@
-//! What several tests need: devices, and a master whose line a test writes.
+//! Helpers that several tests use: a device, a simulated line, and a master.
 
 #[allow(dead_code)]
 pub mod device;

@@ -1,5 +1,5 @@
-//! A client on a TCP stream that reads one register at a time, and a server's side
-//! of it.
+//! A client on a TCP stream that reads one register with each request, and functions that
+//! take the server's part.
 
 #[path = "wire.rs"]
 pub mod wire;
@@ -22,7 +22,7 @@ pub fn read(unit: u8, transaction: u16) -> Task {
     })
 }
 
-/// The requests that were sent: wire id, unit, address.
+/// The transaction identifier, unit and address of each request in the sent bytes.
 pub fn requests(bytes: &[u8]) -> Vec<(u16, u8, u16)> {
     let mut rest = bytes;
     let mut found = Vec::new();
@@ -40,14 +40,14 @@ pub fn requests(bytes: &[u8]) -> Vec<(u16, u8, u16)> {
     found
 }
 
-/// The response to the read of one register: its address.
+/// The response to the read of one register. The register's value is its address.
 pub fn response((wire, unit, address): (u16, u8, u16)) -> Vec<u8> {
     let [a, b] = wire.to_be_bytes();
     let [c, d] = address.to_be_bytes();
     vec![a, b, 0, 0, 0, 5, unit, 3, 2, c, d]
 }
 
-/// Polls once as C does: until nothing more has ended.
+/// Polls once as C does: until no further request has ended.
 pub fn poll(end: &End, client: &mut TcpIp) -> Vec<Task> {
     let mut ended = Vec::new();
     while let Some(task) = client.poll(end.now(), ended.is_empty()) {

@@ -1,4 +1,4 @@
-//! A job that owns its data, and what a client is lent.
+//! A request that owns its data, and the buffers and records that a client works with.
 
 use mbm::client::{Job, Means, Ticket, Unit};
 use mbm::engine::{Counter, Frame, Storage, COUNTERS};
@@ -7,8 +7,8 @@ use mbm::pdu::outline::Outline;
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// Buffers of full size, counters and records of units. Panics at an index that is out of
-/// range, which the pointers of C would not notice.
+/// Buffers of full size, counters and records of units. It panics at an index out of range;
+/// the raw pointers of the C ABI would not notice one.
 pub struct Lent {
     pub frame: Frame<Vec<u8>>,
     pub outgoing: Vec<u8>,
@@ -91,7 +91,7 @@ impl Means for Lent {
     }
 }
 
-/// A job that owns its data, as bytes on the wire.
+/// A request that owns its data, in the byte order of the wire.
 pub struct Task {
     pub ticket: Ticket,
     pub data: Vec<u8>,
@@ -99,7 +99,8 @@ pub struct Task {
 }
 
 impl Task {
-    /// What `build` outlines, for `unit`, with `data` and the caller's number.
+    /// A request to `unit` that `build` describes, with `data` and the caller's number
+    /// `transaction`.
     pub fn new(
         unit: u8,
         transaction: u16,
@@ -118,7 +119,7 @@ impl Task {
         }
     }
 
-    /// The data received.
+    /// The received data.
     pub fn received(&self) -> &[u8] {
         &self.reply[..usize::from(self.ticket.length)]
     }

@@ -1,4 +1,4 @@
-//! The table `tests/vectors.txt`, which the tests in C read too.
+//! The table `tests/vectors.txt`. The C tests read it too.
 
 // Each test uses a part of it.
 #![allow(dead_code)]
@@ -8,7 +8,7 @@ use mbm::frame::{ascii, Framing};
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
 
-/// Which way a PDU goes.
+/// Whether a PDU is a request or a response.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Direction {
     Request,
@@ -19,9 +19,9 @@ pub enum Direction {
 pub struct Vector {
     pub name: &'static str,
     pub direction: Direction,
-    /// `None`: a PDU without any framing.
+    /// `None`: a PDU without framing.
     pub framing: Option<Framing>,
-    /// What reading the whole says.
+    /// The status of reading the whole line.
     pub status: Status,
     pub bytes: Vec<u8>,
 }
@@ -31,9 +31,9 @@ pub fn all() -> Vec<Vector> {
     let lines = include_str!("../vectors.txt").lines();
     let vectors: Vec<_> = lines
         .filter(|line| !line.is_empty() && !line.starts_with('#'))
-        .map(|line| read(line).unwrap_or_else(|| panic!("no vector: {line}")))
+        .map(|line| read(line).unwrap_or_else(|| panic!("not a vector: {line}")))
         .collect();
-    assert!(vectors.len() > 300, "the table is not whole");
+    assert!(vectors.len() > 300, "the table has lines missing");
     vectors
 }
 
@@ -66,15 +66,15 @@ fn hexadecimal(digits: &str) -> Option<u8> {
     u8::from_str_radix(digits, 16).ok()
 }
 
-/// The bytes of the PDU of that name.
+/// The bytes of the PDU with that name.
 pub fn pdu(name: &str) -> Vec<u8> {
     let found = all().into_iter().find(|vector| vector.name == name);
-    let vector = found.unwrap_or_else(|| panic!("no vector is called {name}"));
-    assert_eq!(vector.framing, None, "{name} is a frame");
+    let vector = found.unwrap_or_else(|| panic!("no vector has the name {name}"));
+    assert_eq!(vector.framing, None, "{name} is a frame, not a PDU");
     vector.bytes
 }
 
-/// Every right PDU, those in frames too.
+/// Every valid PDU, including those in frames.
 pub fn right_pdus() -> Vec<Vector> {
     let right = all()
         .into_iter()
@@ -90,12 +90,13 @@ pub fn right_pdus() -> Vec<Vector> {
         .collect()
 }
 
-/// Reads a PDU and writes it again; or the status that refuses it.
+/// Reads a PDU and writes it again. Returns the written bytes, or the status that refuses
+/// the PDU.
 pub fn parse_and_emit(direction: Direction, pdu: &[u8]) -> Result<Vec<u8>, Status> {
     let mut buffer = [0; 253];
     let length = match direction {
         Direction::Request => Request::parse(pdu)?.emit(&mut buffer),
         Direction::Response => Response::parse(pdu)?.emit(&mut buffer),
     };
-    Ok(buffer[..length.expect("what parses can be emitted")].to_vec())
+    Ok(buffer[..length.expect("a PDU that was read can be written")].to_vec())
 }

@@ -1,4 +1,4 @@
-//! Two ends of a simulated wire with a clock of its own.
+//! The two ends of a simulated wire with its own clock.
 
 #[path = "task.rs"]
 mod task;
@@ -10,18 +10,19 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-/// What both ends see of the wire.
+/// The state of the wire, which both ends share.
 #[derive(Default)]
 pub struct Wire {
     pub now: u32,
-    /// What the client sent, piece by piece.
+    /// What the client has sent, one entry for each write.
     pub sent: Vec<Vec<u8>>,
-    /// What arrives at the client, and when.
+    /// The bytes that arrive at the client, and the times of their arrival.
     pub incoming: VecDeque<(u32, Vec<u8>)>,
+    /// Read and write return -1: the link is lost.
     pub dead: bool,
-    /// Write takes nothing.
+    /// Write accepts no bytes.
     pub stuck: bool,
-    /// Write and read take so many bytes at most.
+    /// Write accepts at most this many bytes at once.
     pub piece: Option<usize>,
 }
 
@@ -30,7 +31,7 @@ pub struct Wire {
 pub struct End(pub Rc<RefCell<Wire>>);
 
 impl End {
-    /// Lets bytes arrive `delay` from now.
+    /// Adds bytes that arrive `delay` microseconds from now.
     pub fn deliver(&self, delay: u32, bytes: &[u8]) {
         let mut wire = self.0.borrow_mut();
         let at = wire.now.wrapping_add(delay);
@@ -46,7 +47,7 @@ impl End {
         wire.now = wire.now.wrapping_add(time);
     }
 
-    /// What was sent since the last call.
+    /// The bytes that the client has sent since the last call.
     pub fn sent(&self) -> Vec<u8> {
         self.0.borrow_mut().sent.drain(..).flatten().collect()
     }

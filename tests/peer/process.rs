@@ -1,11 +1,11 @@
-//! The peer's processes.
+//! The processes of the peer: Python scripts, and mbm's server in C.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::{Mutex, OnceLock};
 
-/// A program that is spoken to line by line; it ends with its input.
+/// A program that reads and writes lines. It ends when its input is closed.
 pub struct Script {
     child: Child,
     input: Option<ChildStdin>,
@@ -16,13 +16,13 @@ impl Script {
     /// Starts a Python script of this folder.
     pub fn start(name: &str, arguments: &[&str]) -> Script {
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/peer");
-        let python = made("build/venv/bin/python", "venv");
+        let python = built("build/venv/bin/python", "venv");
         Script::spawn(Command::new(python).arg(script.join(name)).args(arguments))
     }
 
-    /// Starts our server in C, `c-tests/serve.c`.
+    /// Starts mbm's server in C, `c-tests/serve.c`.
     pub fn serve(framing: &str) -> Script {
-        let program = made("build/plain/serve", "build/plain/serve");
+        let program = built("build/plain/serve", "build/plain/serve");
         Script::spawn(Command::new(program).arg(framing))
     }
 
@@ -31,9 +31,9 @@ impl Script {
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
-            .expect("it starts");
+            .expect("the program starts");
         let input = child.stdin.take();
-        let output = BufReader::new(child.stdout.take().expect("its output"));
+        let output = BufReader::new(child.stdout.take().expect("the program's output"));
         Script {
             child,
             input,
@@ -41,28 +41,28 @@ impl Script {
         }
     }
 
-    /// The next line that it says.
+    /// The next line of the program's output.
     pub fn line(&mut self) -> String {
         let mut line = String::new();
-        self.output.read_line(&mut line).expect("it says something");
-        assert!(!line.is_empty(), "the peer has ended");
+        self.output.read_line(&mut line).expect("a line of output");
+        assert!(!line.is_empty(), "the program has ended");
         line.trim_end().to_owned()
     }
 
-    /// What it answers to a line.
-    pub fn ask(&mut self, line: &str) -> String {
-        let input = self.input.as_mut().expect("it listens");
-        writeln!(input, "{line}").expect("it listens");
+    /// Writes a line to the program; returns the line with which it answers.
+    pub fn query(&mut self, line: &str) -> String {
+        let input = self.input.as_mut().expect("the program's input is open");
+        writeln!(input, "{line}").expect("the program reads its input");
         self.line()
     }
 }
 
-/// What make is to have made before.
-fn made(path: &str, target: &str) -> PathBuf {
+/// The path of a file that make must have built before.
+fn built(path: &str, target: &str) -> PathBuf {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
     assert!(
         path.exists(),
-        "{} is missing: `make {target}` makes it, and `make test` does so first",
+        "{} is missing: run `make {target}`, or `make test`, which builds it first",
         path.display()
     );
     path
@@ -75,10 +75,10 @@ impl Drop for Script {
     }
 }
 
-/// Asks the one process that reads and writes frames.
-pub fn ask(line: &str) -> String {
+/// Sends a line to the one process that reads and writes frames; returns its answer.
+pub fn query(line: &str) -> String {
     static PEER: OnceLock<Mutex<Script>> = OnceLock::new();
     let peer = PEER.get_or_init(|| Mutex::new(Script::start("pymodbus_peer.py", &[])));
     let mut peer = peer.lock().unwrap_or_else(|lock| lock.into_inner());
-    peer.ask(line)
+    peer.query(line)
 }

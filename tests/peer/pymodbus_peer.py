@@ -1,13 +1,13 @@
-"""What pymodbus makes of frames, asked line by line.
+"""Reads and builds frames with pymodbus: one command a line, one line of answer.
 
     request FRAMING HEX     what its server reads in a frame
     response FRAMING HEX    what its client reads in a frame
     call FRAMING CALL       the frame that its client sends for a call
     reply FRAMING PDU       the frame that its server sends for a response
 
-FRAMING is rtu, ascii or tcp. A frame that was read is answered with the unit,
-the transaction (0 unless tcp), the name of the class and its fields; one that
-was not, with `nothing` or `error`.
+FRAMING is rtu, ascii or tcp. For a frame that pymodbus can read, the answer is the unit, the
+transaction identifier (0 unless tcp), the name of the class and its fields; for another frame
+it is `nothing` or `error`.
 """
 
 import logging
@@ -37,7 +37,7 @@ FRAMINGS = {
     "tcp": FramerType.SOCKET,
 }
 
-# The fields that tell something, by class; those of 08 are alike.
+# The fields to print, by class. All classes of function 08 have the same fields.
 FIELDS = {
     "ReadCoilsRequest": ["address", "count"],
     "ReadDiscreteInputsRequest": ["address", "count"],
@@ -94,7 +94,7 @@ FIELDS = {
 
 
 class Custom(ModbusPDU):
-    """A function of the user: one byte that counts, and what it counts."""
+    """A user-defined function: a byte count, and the bytes that it counts."""
 
     function_code = 0x41
     rtu_byte_count_pos = 2
@@ -111,7 +111,7 @@ class Custom(ModbusPDU):
 
 
 class Client(ModbusClientMixin):
-    """A client that keeps what it would send."""
+    """A client that returns a request instead of sending it."""
 
     def execute(self, no_response_expected, request):
         return request

@@ -3,11 +3,10 @@
     pymodbus_server.py --framing rtu --tty /dev/pts/3
     pymodbus_server.py --framing tcp --port 0
 
-Prints `ready PORT` once it listens (port 0 for a tty), and serves until its
-standard input ends. Each of the four tables has 2048 cells: holding register A
-is A * 40503 + 0x1234, an input register all bits of that turned around, a coil
-bit 7 of the holding register, a discrete input the opposite. A 0 for the unit
-answers for every unit.
+Prints `ready PORT` once it listens (port 0 for a tty), and serves until its standard input is
+closed. Each of the four tables has 2048 cells. Holding register A is A * 40503 + 0x1234 modulo
+65536. Input register A is its complement. Coil A is bit 7 of holding register A. Discrete input
+A is the opposite of coil A. With unit 0 it answers for every unit.
 """
 
 import argparse
@@ -30,8 +29,8 @@ FRAMINGS = {
 
 
 class Custom(ModbusPDU):
-    """A function of the user, 41: one byte that counts, and what it counts; the
-    response brings the data back in reverse."""
+    """The user-defined function 0x41: a byte count, and the bytes that it counts. The response
+    has the bytes in reverse order."""
 
     function_code = 0x41
     rtu_byte_count_pos = 2
@@ -108,7 +107,7 @@ async def main():
     await server.serve_forever(background=True)
     port = 0 if args.tty else server.transport.sockets[0].getsockname()[1]
     print(f"ready {port}", flush=True)
-    # Who started it holds the other end.
+    # The process that started this one holds the other end of its input.
     await asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
     await server.shutdown()
 

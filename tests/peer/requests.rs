@@ -1,24 +1,23 @@
-//! Requests: ours as pymodbus's server reads them, and those of its client as
-//! we read them.
+//! Requests: pymodbus's server reads those of mbm, and mbm reads those of pymodbus's client.
 
-use crate::process::ask;
-use crate::{frame, hex, open, read_as, unhex, FRAMINGS};
+use crate::process::query;
+use crate::{frame, from_hex, hex, open, read_as, FRAMINGS};
 use mbm::pdu::files::{Reads, Writes};
 use mbm::pdu::request::Request;
 
 struct Case {
-    ours: Request<'static>,
-    /// The call of its client that sends the same.
+    mbm: Request<'static>,
+    /// The call of pymodbus's client that sends the same request.
     call: &'static str,
-    /// What its server reads.
+    /// What pymodbus's server reads.
     fields: &'static str,
-    /// What its server makes of it over RTU, where that differs.
+    /// What pymodbus's server reads in RTU framing, if that differs.
     over_rtu: Option<&'static str>,
 }
 
-fn case(ours: Request<'static>, call: &'static str, fields: &'static str) -> Case {
+fn case(mbm: Request<'static>, call: &'static str, fields: &'static str) -> Case {
     Case {
-        ours,
+        mbm,
         call,
         fields,
         over_rtu: None,
@@ -27,8 +26,8 @@ fn case(ours: Request<'static>, call: &'static str, fields: &'static str) -> Cas
 
 fn is_read_by_pymodbus(case: &Case) {
     for (framing, name) in FRAMINGS {
-        let sent = frame(framing, |pdu| case.ours.emit(pdu));
-        let read = ask(&format!("request {name} {}", hex(&sent)));
+        let sent = frame(framing, |pdu| case.mbm.emit(pdu));
+        let read = query(&format!("request {name} {}", hex(&sent)));
         match case.over_rtu {
             Some(quirk) if name == "rtu" => assert_eq!(read, quirk),
             _ => assert_eq!(read, read_as(name, case.fields), "{name}"),
@@ -38,10 +37,10 @@ fn is_read_by_pymodbus(case: &Case) {
 
 fn of_pymodbus_is_read(case: &Case) {
     for (framing, name) in FRAMINGS {
-        let mut sent = unhex(&ask(&format!("call {name} {}", case.call)));
-        assert_eq!(sent, frame(framing, |pdu| case.ours.emit(pdu)), "{name}");
+        let mut sent = from_hex(&query(&format!("call {name} {}", case.call)));
+        assert_eq!(sent, frame(framing, |pdu| case.mbm.emit(pdu)), "{name}");
         let adu = open(framing, &mut sent);
-        assert_eq!(Request::parse(adu.pdu), Ok(case.ours), "{name}");
+        assert_eq!(Request::parse(adu.pdu), Ok(case.mbm), "{name}");
     }
 }
 
@@ -61,7 +60,7 @@ macro_rules! cases {
     )* };
 }
 
-/// A sub-function of 08 with its one word.
+/// A request of function 08 with one word of data.
 fn diagnostics(
     sub_function: u16,
     data: &'static [u8; 2],
@@ -114,7 +113,7 @@ cases! {
         "ReturnQueryDataRequest sub_function_code=0 message=a537",
     );
     return_query_data_of_two_words => Case {
-        // It takes every frame of 08 for one of 8 bytes.
+        // In RTU framing, pymodbus assumes that every frame of function 08 has 8 bytes.
         over_rtu: Some("nothing"),
         ..case(
             Request::Diagnostics { sub_function: 0, data: &[1, 2, 3, 4] },
@@ -213,7 +212,7 @@ cases! {
             Reads::new(&[6, 0, 4, 0, 1, 0, 2, 6, 0, 3, 0, 9, 0, 4]).expect("in order"),
         ),
         "read_file_record([FileRecord(4, 1, record_length=4), FileRecord(3, 9, record_length=8)])",
-        // What it reads as a record length it halves once more.
+        // pymodbus halves the record length that it has read.
         "ReadFileRecordRequest records=[4/1/1/,3/9/2/]",
     );
     write_file_record => case(
@@ -282,13 +281,13 @@ cases! {
 }
 
 #[test]
-fn sub_functions_that_the_standard_reserves_are_refused_though_pymodbus_has_them() {
+fn reserved_sub_functions_are_refused_though_pymodbus_has_them() {
     for call in [
         "diag_read_iop_overrun_count()",
         "diag_getclear_modbus_response(data=3)",
     ] {
         for (framing, name) in FRAMINGS {
-            let mut sent = unhex(&ask(&format!("call {name} {call}")));
+            let mut sent = from_hex(&query(&format!("call {name} {call}")));
             let adu = open(framing, &mut sent);
             let read = Request::parse(adu.pdu);
             assert_eq!(read, Err(mbm::error::Status::ILLEGAL_FUNCTION));
@@ -297,10 +296,10 @@ fn sub_functions_that_the_standard_reserves_are_refused_though_pymodbus_has_them
 }
 
 #[test]
-fn a_delimiter_that_pymodbus_puts_into_the_low_byte_is_refused() {
+fn a_delimiter_in_the_low_byte_is_refused_though_pymodbus_sends_it_there() {
     for (framing, name) in FRAMINGS {
         let call = "diag_change_ascii_input_delimeter(delimiter=0x21)";
-        let mut sent = unhex(&ask(&format!("call {name} {call}")));
+        let mut sent = from_hex(&query(&format!("call {name} {call}")));
         let adu = open(framing, &mut sent);
         let read = Request::parse(adu.pdu);
         assert_eq!(read, Err(mbm::error::Status::ILLEGAL_DATA_VALUE));

@@ -1,25 +1,24 @@
-//! Responses: ours as pymodbus's client reads them, and those of its server as
-//! we read them.
+//! Responses: pymodbus's client reads those of mbm, and mbm reads those of pymodbus's server.
 
-use crate::process::ask;
-use crate::{frame, hex, open, read_as, unhex, FRAMINGS};
+use crate::process::query;
+use crate::{frame, from_hex, hex, open, read_as, FRAMINGS};
 use mbm::pdu::files::{Records, Writes};
 use mbm::pdu::identification::Objects;
 use mbm::pdu::response::Response;
 
 struct Case {
-    ours: Response<'static>,
-    /// The response of its server that is the same.
+    mbm: Response<'static>,
+    /// The same response, built by pymodbus's server.
     reply: &'static str,
-    /// What its client reads.
+    /// What pymodbus's client reads.
     fields: &'static str,
-    /// What its client makes of it over RTU, where that differs.
+    /// What pymodbus's client reads in RTU framing, if that differs.
     over_rtu: Option<&'static str>,
 }
 
-fn case(ours: Response<'static>, reply: &'static str, fields: &'static str) -> Case {
+fn case(mbm: Response<'static>, reply: &'static str, fields: &'static str) -> Case {
     Case {
-        ours,
+        mbm,
         reply,
         fields,
         over_rtu: None,
@@ -28,8 +27,8 @@ fn case(ours: Response<'static>, reply: &'static str, fields: &'static str) -> C
 
 fn is_read_by_pymodbus(case: &Case) {
     for (framing, name) in FRAMINGS {
-        let sent = frame(framing, |pdu| case.ours.emit(pdu));
-        let read = ask(&format!("response {name} {}", hex(&sent)));
+        let sent = frame(framing, |pdu| case.mbm.emit(pdu));
+        let read = query(&format!("response {name} {}", hex(&sent)));
         match case.over_rtu {
             Some(quirk) if name == "rtu" => assert_eq!(read, quirk),
             _ => assert_eq!(read, read_as(name, case.fields), "{name}"),
@@ -39,10 +38,10 @@ fn is_read_by_pymodbus(case: &Case) {
 
 fn of_pymodbus_is_read(case: &Case) {
     for (framing, name) in FRAMINGS {
-        let mut sent = unhex(&ask(&format!("reply {name} {}", case.reply)));
-        assert_eq!(sent, frame(framing, |pdu| case.ours.emit(pdu)), "{name}");
+        let mut sent = from_hex(&query(&format!("reply {name} {}", case.reply)));
+        assert_eq!(sent, frame(framing, |pdu| case.mbm.emit(pdu)), "{name}");
         let adu = open(framing, &mut sent);
-        assert_eq!(Response::parse(adu.pdu), Ok(case.ours), "{name}");
+        assert_eq!(Response::parse(adu.pdu), Ok(case.mbm), "{name}");
     }
 }
 
@@ -62,7 +61,7 @@ macro_rules! cases {
     )* };
 }
 
-/// A sub-function of 08 with its one word.
+/// A response of function 08 with one word of data.
 fn diagnostics(
     sub_function: u16,
     data: &'static [u8; 2],
@@ -117,7 +116,7 @@ cases! {
         "ReturnQueryDataResponse sub_function_code=0 message=a537",
     );
     return_query_data_of_two_words => Case {
-        // It takes every frame of 08 for one of 8 bytes.
+        // In RTU framing, pymodbus assumes that every frame of function 08 has 8 bytes.
         over_rtu: Some("nothing"),
         ..case(
             Response::Diagnostics { sub_function: 0, data: &[1, 2, 3, 4] },
@@ -235,7 +234,7 @@ cases! {
         "ReadWriteMultipleRegistersResponse registers=[254,2765]",
     );
     fifo_queue => Case {
-        // It takes such a frame for two bytes shorter than it is.
+        // In RTU framing, pymodbus assumes that this frame is two bytes shorter.
         over_rtu: Some("nothing"),
         ..case(
             Response::FifoQueue { data: &[0x01, 0xB8, 0x12, 0x84] },
@@ -305,9 +304,11 @@ const OBJECT: [u8; 202] = {
 };
 
 #[test]
-fn an_answer_to_force_listen_only_is_none_though_pymodbus_has_one() {
+fn a_response_to_force_listen_only_is_malformed_though_pymodbus_sends_one() {
     for (framing, name) in FRAMINGS {
-        let mut sent = unhex(&ask(&format!("reply {name} ForceListenOnlyModeResponse()")));
+        let mut sent = from_hex(&query(&format!(
+            "reply {name} ForceListenOnlyModeResponse()"
+        )));
         let adu = open(framing, &mut sent);
         let read = Response::parse(adu.pdu);
         assert_eq!(read, Err(mbm::error::Status::MALFORMED_REPLY));

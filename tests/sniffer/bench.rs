@@ -1,4 +1,4 @@
-//! A sniffer with its buffer and a clock, and all that it told.
+//! A sniffer with its buffer, a clock, and a record of all its events.
 
 use mbm::error::Status;
 use mbm::explain::Line;
@@ -6,9 +6,9 @@ use mbm::frame::{ascii, Framing};
 use mbm::pdu::custom::Function;
 use mbm::sniffer::{Kind, Sniffer, Tap};
 
-/// An event, kept.
+/// A copy of an event.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Told {
+pub struct Recorded {
     pub kind: Kind,
     pub status: Status,
     pub time: u32,
@@ -23,13 +23,13 @@ pub struct Told {
     pub words: String,
 }
 
-/// A sniffer with its buffer, and all that it told.
+/// A sniffer with its buffer, a clock in microseconds, and all events so far.
 pub struct Bench {
     pub sniffer: Sniffer,
     pub buffer: Vec<u8>,
     pub functions: Vec<Function>,
     pub now: u32,
-    pub told: Vec<Told>,
+    pub events: Vec<Recorded>,
 }
 
 impl Bench {
@@ -43,11 +43,11 @@ impl Bench {
             buffer: vec![0; size],
             functions: Vec::new(),
             now: 0,
-            told: Vec::new(),
+            events: Vec::new(),
         }
     }
 
-    pub fn listen(&mut self) {
+    pub fn collect_events(&mut self) {
         while let Some(event) = self
             .sniffer
             .next(&mut self.buffer, &self.functions, self.now)
@@ -56,7 +56,7 @@ impl Bench {
             let mut line = Line::new(&mut text);
             event.explain(&mut line);
             let length = line.finish().unwrap();
-            self.told.push(Told {
+            self.events.push(Recorded {
                 kind: event.kind,
                 status: event.status,
                 time: event.time,
@@ -77,36 +77,44 @@ impl Bench {
         let mut rest = bytes;
         while !rest.is_empty() {
             let taken = self.sniffer.feed(&mut self.buffer, tap, rest, self.now);
-            let before = self.told.len();
-            self.listen();
-            assert!(taken > 0 || self.told.len() > before, "no progress");
+            let before = self.events.len();
+            self.collect_events();
+            assert!(taken > 0 || self.events.len() > before, "no progress");
             rest = &rest[taken..];
         }
     }
 
-    /// Bytes that arrive now.
+    /// Lets bytes of both directions arrive now.
     pub fn feed(&mut self, bytes: &[u8]) {
         self.feed_at(Tap::Both, bytes);
     }
 
-    /// Time without bytes.
+    /// Lets `time` microseconds pass without bytes.
     pub fn wait(&mut self, time: u32) {
         self.now = self.now.wrapping_add(time);
-        self.listen();
+        self.collect_events();
     }
 
     pub fn kinds(&self) -> Vec<Kind> {
-        self.told.iter().map(|told| told.kind).collect()
+        self.events.iter().map(|event| event.kind).collect()
     }
 
     pub fn words(&self) -> Vec<&str> {
-        self.told.iter().map(|told| told.words.as_str()).collect()
+        self.events
+            .iter()
+            .map(|event| event.words.as_str())
+            .collect()
     }
 
-    /// Requests and what answers them, without what is told of silence.
+    /// The kind and PDU of each event, without timeouts.
     pub fn frames(&self) -> Vec<(Kind, Vec<u8>)> {
-        let frames = self.told.iter().filter(|told| told.kind != Kind::Timeout);
-        frames.map(|told| (told.kind, told.pdu.clone())).collect()
+        let frames = self
+            .events
+            .iter()
+            .filter(|event| event.kind != Kind::Timeout);
+        frames
+            .map(|event| (event.kind, event.pdu.clone()))
+            .collect()
     }
 }
 

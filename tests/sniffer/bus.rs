@@ -1,4 +1,4 @@
-//! What is paired, in each framing and however bytes come.
+//! Pairing of requests and replies in each framing, for bytes that arrive in any pieces.
 
 use crate::bench::{frame, rtu, Bench};
 use crate::exchanges::{assert_exchanges, EXCHANGES, READ, READ_REPLY, WRITE};
@@ -8,7 +8,7 @@ use mbm::pdu::custom::{Function, Rule};
 use mbm::sniffer::{Kind, Tap};
 
 #[test]
-fn every_function_is_told_of_in_every_framing() {
+fn every_function_is_reported_in_every_framing() {
     for framing in [
         Framing::Rtu,
         Framing::Ascii,
@@ -24,15 +24,15 @@ fn every_function_is_told_of_in_every_framing() {
         }
         bench.wait(2_000_000);
         assert_exchanges(&bench, EXCHANGES);
-        for told in &bench.told {
-            let response_time = if told.kind == Kind::Reply { 10_000 } else { 0 };
-            assert_eq!(told.response_time, response_time);
+        for event in &bench.events {
+            let response_time = if event.kind == Kind::Reply { 10_000 } else { 0 };
+            assert_eq!(event.response_time, response_time);
         }
     }
 }
 
 #[test]
-fn bytes_may_come_one_by_one() {
+fn exchanges_are_found_when_bytes_arrive_one_by_one() {
     for framing in [Framing::Rtu, Framing::Ascii, Framing::Tcp] {
         let mut bench = Bench::new(framing);
         bench.sniffer.set_baud_rate(9_600);
@@ -51,7 +51,7 @@ fn bytes_may_come_one_by_one() {
 }
 
 #[test]
-fn all_frames_may_come_at_once() {
+fn exchanges_are_found_when_all_bytes_arrive_at_once() {
     for framing in [Framing::Rtu, Framing::Ascii, Framing::Tcp] {
         let mut bench = Bench::new(framing);
         let mut bytes = Vec::new();
@@ -66,7 +66,7 @@ fn all_frames_may_come_at_once() {
 }
 
 #[test]
-fn a_frame_in_pieces_with_pauses_is_still_a_frame() {
+fn a_frame_in_pieces_with_pauses_is_found() {
     let mut bench = Bench::new(Framing::Rtu);
     let mut bytes = rtu(17, READ);
     bytes.extend(rtu(17, READ_REPLY));
@@ -78,7 +78,7 @@ fn a_frame_in_pieces_with_pauses_is_still_a_frame() {
 }
 
 #[test]
-fn a_request_that_is_repeated_was_not_answered() {
+fn a_repeated_request_means_that_the_first_got_no_reply() {
     let mut bench = Bench::new(Framing::Rtu);
     bench.feed(&rtu(17, READ));
     bench.wait(300_000);
@@ -89,18 +89,18 @@ fn a_request_that_is_repeated_was_not_answered() {
     let kinds = [Kind::Request, Kind::Timeout, Kind::Request, Kind::Reply];
     assert_eq!(bench.kinds(), kinds);
     assert_eq!(
-        bench.told[1].words,
+        bench.events[1].words,
         "unit 17  timeout    03 read holding registers  107..109"
     );
     assert_eq!(
-        (bench.told[1].time, bench.told[1].response_time),
+        (bench.events[1].time, bench.events[1].response_time),
         (300_000, 300_000)
     );
-    assert_eq!(bench.told[3].asked, Some((107, 3)));
+    assert_eq!(bench.events[3].asked, Some((107, 3)));
 }
 
 #[test]
-fn an_echo_that_equals_its_request_is_the_reply_and_after_the_timeout_a_request() {
+fn a_frame_equal_to_the_request_is_its_reply_before_the_timeout_and_a_request_after_it() {
     for pdu in [
         WRITE,
         &[5, 0, 172, 0, 0],
@@ -127,8 +127,8 @@ fn an_echo_that_equals_its_request_is_the_reply_and_after_the_timeout_a_request(
 }
 
 #[test]
-fn a_reply_as_long_as_a_request_is_told_apart_by_what_was_asked() {
-    // 19 coils make a reply of the length of a request for coils from 0x03CD on.
+fn a_reply_as_long_as_a_request_is_recognised_by_the_pending_request() {
+    // The reply with these 19 coils has the bytes of a request for 5 coils from 0x03CD on.
     let (request, reply) = ([1, 3, 0x10, 0, 19], [1, 3, 0xCD, 0, 5]);
     let mut bench = Bench::new(Framing::Rtu);
     for _ in 0..2 {
@@ -147,7 +147,7 @@ fn a_reply_as_long_as_a_request_is_told_apart_by_what_was_asked() {
 }
 
 #[test]
-fn a_late_reply_is_unpaired_and_its_request_still_explains_it() {
+fn a_late_reply_is_unpaired_but_described_with_its_request() {
     let mut bench = Bench::new(Framing::Rtu);
     bench.sniffer.set_timeout(100_000);
     bench.feed(&rtu(17, READ));
@@ -159,7 +159,7 @@ fn a_late_reply_is_unpaired_and_its_request_still_explains_it() {
         bench.kinds(),
         [Kind::Request, Kind::Timeout, Kind::Unpaired, Kind::Unpaired]
     );
-    assert_eq!(bench.told[2].response_time, 150_000);
+    assert_eq!(bench.events[2].response_time, 150_000);
     assert_eq!(
         bench.words()[2..],
         [
@@ -170,8 +170,8 @@ fn a_late_reply_is_unpaired_and_its_request_still_explains_it() {
 }
 
 #[test]
-fn a_request_that_was_given_up_long_ago_explains_nothing_any_more() {
-    // Just too long ago, an hour, and as the clock has wrapped.
+fn a_reply_long_after_the_timeout_is_described_without_the_request() {
+    // Waits of three lengths; the longest lets the clock wrap.
     for (framing, steps) in [(Framing::Rtu, 1), (Framing::Tcp, 2), (Framing::Ascii, 4)] {
         let mut bench = Bench::new(framing);
         bench.sniffer.set_timeout(500_000);
@@ -180,20 +180,20 @@ fn a_request_that_was_given_up_long_ago_explains_nothing_any_more() {
         for _ in 0..steps {
             bench.wait(4_500_000 + (steps - 1) * 400_000_000);
         }
-        // The request for other registers was not heard.
+        // This reply belongs to a request that the sniffer has not received.
         bench.feed(&frame(framing, 1, 17, READ_REPLY));
         bench.wait(10_000);
         assert_eq!(
             bench.words()[2..],
             ["unit 17  unpaired   03 read holding registers: 555 0 100"]
         );
-        assert_eq!(bench.told[2].asked, None);
-        assert_eq!(bench.told[2].response_time, 0);
+        assert_eq!(bench.events[2].asked, None);
+        assert_eq!(bench.events[2].response_time, 0);
     }
 }
 
 #[test]
-fn a_request_that_looks_like_the_reply_to_one_long_given_up_is_a_request() {
+fn a_request_that_looks_like_the_reply_to_an_expired_one_is_a_request() {
     let (asked, request) = ([1, 3, 0x10, 0, 19], [1, 3, 0xCD, 0, 5]);
     let mut bench = Bench::new(Framing::Rtu);
     bench.feed(&rtu(17, &asked));
@@ -208,7 +208,7 @@ fn a_request_that_looks_like_the_reply_to_one_long_given_up_is_a_request() {
 }
 
 #[test]
-fn a_reply_that_comes_too_late_in_one_piece_with_others_is_late_all_the_same() {
+fn a_reply_after_the_timeout_is_late_even_if_no_call_came_between() {
     let mut bench = Bench::new(Framing::Rtu);
     bench.feed(&rtu(17, READ));
     bench.now = 1_500_000;
@@ -220,17 +220,17 @@ fn a_reply_that_comes_too_late_in_one_piece_with_others_is_late_all_the_same() {
 }
 
 #[test]
-fn a_reply_that_does_not_answer_what_was_asked_is_unpaired_and_malformed() {
+fn a_reply_that_does_not_match_its_request_is_unpaired_and_malformed() {
     let mut bench = Bench::new(Framing::Rtu);
     bench.feed(&rtu(17, READ));
     bench.feed(&rtu(17, &[3, 2, 0, 1]));
     bench.feed(&rtu(17, READ_REPLY));
     assert_eq!(bench.kinds(), [Kind::Request, Kind::Unpaired, Kind::Reply]);
-    assert_eq!(bench.told[1].status, Status::MALFORMED_REPLY);
+    assert_eq!(bench.events[1].status, Status::MALFORMED_REPLY);
 }
 
 #[test]
-fn units_in_turn_are_kept_apart() {
+fn exchanges_of_several_units_in_turn_are_paired() {
     let mut bench = Bench::new(Framing::Rtu);
     for round in 0..4 {
         for unit in [1, 2, 247] {
@@ -238,8 +238,8 @@ fn units_in_turn_are_kept_apart() {
             bench.feed(&rtu(unit, &[3, 2, unit, round]));
         }
     }
-    assert_eq!(bench.told.len(), 24);
-    for pair in bench.told.chunks(2) {
+    assert_eq!(bench.events.len(), 24);
+    for pair in bench.events.chunks(2) {
         assert_eq!((pair[0].kind, pair[1].kind), (Kind::Request, Kind::Reply));
         assert_eq!(pair[0].unit, pair[1].unit);
         let address = u16::from_be_bytes([pair[0].pdu[1], pair[0].pdu[2]]);
@@ -248,7 +248,7 @@ fn units_in_turn_are_kept_apart() {
 }
 
 #[test]
-fn a_second_master_that_cuts_in_ends_the_first_ones_wait() {
+fn a_request_of_a_second_master_ends_the_wait_for_the_first_reply() {
     let mut bench = Bench::new(Framing::Rtu);
     bench.feed(&rtu(1, READ));
     bench.feed(&rtu(2, READ));
@@ -262,13 +262,13 @@ fn a_second_master_that_cuts_in_ends_the_first_ones_wait() {
         Kind::Unpaired,
     ];
     assert_eq!(bench.kinds(), kinds);
-    let units: Vec<_> = bench.told.iter().map(|told| told.unit).collect();
+    let units: Vec<_> = bench.events.iter().map(|event| event.unit).collect();
     assert_eq!(units, [1, 1, 2, 2, 1]);
-    assert_eq!(bench.told[4].asked, Some((107, 3)));
+    assert_eq!(bench.events[4].asked, Some((107, 3)));
 }
 
 #[test]
-fn tcp_requests_wait_side_by_side() {
+fn sixteen_tcp_requests_can_be_pending() {
     let mut bench = Bench::new(Framing::Tcp);
     for transaction in 0..16 {
         bench.feed(&frame(
@@ -287,25 +287,25 @@ fn tcp_requests_wait_side_by_side() {
         ));
     }
     bench.wait(2_000_000);
-    assert_eq!(bench.told.len(), 32);
-    for told in &bench.told[16..] {
-        assert_eq!(told.kind, Kind::Reply);
-        assert_eq!(told.asked, Some((told.transaction, 1)));
+    assert_eq!(bench.events.len(), 32);
+    for event in &bench.events[16..] {
+        assert_eq!(event.kind, Kind::Reply);
+        assert_eq!(event.asked, Some((event.transaction, 1)));
     }
-    // A 17th ends the first.
+    // A 17th request ends the wait for the first reply.
     for transaction in 0..17 {
         bench.feed(&frame(Framing::Tcp, transaction, 17, READ));
     }
-    assert_eq!(bench.told[48].kind, Kind::Timeout);
-    assert_eq!(bench.told[48].transaction, 0);
-    assert_eq!(bench.told.len(), 50);
+    assert_eq!(bench.events[48].kind, Kind::Timeout);
+    assert_eq!(bench.events[48].transaction, 0);
+    assert_eq!(bench.events.len(), 50);
 }
 
 #[test]
-fn directions_may_be_heard_apart_byte_by_byte_and_mixed() {
+fn two_directions_are_paired_when_their_bytes_are_mixed() {
     for framing in [Framing::Rtu, Framing::Ascii, Framing::Tcp] {
         let mut bench = Bench::with_buffer(framing, 2 * framing.max_frame());
-        // The echo of a write is never a request here.
+        // A frame from the server is never a request.
         bench.feed_at(Tap::Server, &frame(framing, 1, 17, WRITE));
         bench.wait(10_000);
         let (request, other) = (
@@ -333,11 +333,11 @@ fn directions_may_be_heard_apart_byte_by_byte_and_mixed() {
 }
 
 #[test]
-fn what_was_heard_first_is_told_first_where_directions_are_heard_apart() {
+fn events_of_two_directions_are_reported_in_order_of_time() {
     for gap in [2_000_000, 10_000_000, 1_700_000_000] {
         let mut bench = Bench::with_buffer(Framing::Tcp, 2 * Framing::Tcp.max_frame());
         bench.now = 5_000;
-        // A header that promises more than ever comes hides a reply.
+        // The header announces more bytes than ever arrive, and so hides a reply.
         bench.feed_at(Tap::Server, &[0, 9, 0, 0, 0, 50]);
         bench.feed_at(Tap::Server, &frame(Framing::Tcp, 1, 17, READ_REPLY));
         bench.now += gap;
@@ -346,14 +346,14 @@ fn what_was_heard_first_is_told_first_where_directions_are_heard_apart() {
         bench.feed_at(Tap::Server, &frame(Framing::Tcp, 2, 17, READ_REPLY));
         let kinds = [Kind::Noise, Kind::Unpaired, Kind::Request, Kind::Reply];
         assert_eq!(bench.kinds(), kinds);
-        let times: Vec<_> = bench.told.iter().map(|told| told.time).collect();
+        let times: Vec<_> = bench.events.iter().map(|event| event.time).collect();
         assert_eq!(times, [5_000, 5_000, 5_000 + gap, 15_000 + gap]);
-        assert_eq!(bench.told[3].response_time, 10_000);
+        assert_eq!(bench.events[3].response_time, 10_000);
     }
 }
 
 #[test]
-fn a_frame_heard_before_a_request_is_no_reason_to_give_that_up() {
+fn a_frame_received_before_a_request_does_not_end_the_wait_for_its_reply() {
     let mut bench = Bench::with_buffer(Framing::Tcp, 2 * Framing::Tcp.max_frame());
     bench.sniffer.set_patience(60_000_000);
     let reply = frame(Framing::Tcp, 1, 17, READ_REPLY);
@@ -361,9 +361,9 @@ fn a_frame_heard_before_a_request_is_no_reason_to_give_that_up() {
     bench.now = 1_000_000;
     bench.feed_at(Tap::Client, &frame(Framing::Tcp, 2, 17, READ));
     bench.now = 1_500_000;
-    // Now it is no frame, and what is in it is heard of at last.
+    // Now the incomplete frame expires as noise, and the frame within it is reported.
     bench.sniffer.set_patience(1_000_000);
-    bench.listen();
+    bench.collect_events();
     let kinds = [Kind::Request, Kind::Noise, Kind::Unpaired];
     assert_eq!(bench.kinds(), kinds);
 }
@@ -395,31 +395,31 @@ fn a_broadcast_that_is_repeated_is_a_request_each_time() {
 }
 
 #[test]
-fn a_request_is_given_up_just_when_the_timeout_has_passed() {
+fn a_request_times_out_exactly_when_the_timeout_has_passed() {
     let mut bench = Bench::new(Framing::Tcp);
     bench.sniffer.set_timeout(50_000);
     bench.feed(&frame(Framing::Tcp, 1, 17, READ));
     bench.wait(49_999);
-    assert_eq!(bench.told.len(), 1);
+    assert_eq!(bench.events.len(), 1);
     bench.wait(1);
     assert_eq!(bench.kinds(), [Kind::Request, Kind::Timeout]);
 }
 
 #[test]
-fn the_rate_tells_when_each_of_several_frames_in_one_piece_ended() {
+fn the_times_of_frames_received_in_one_piece_follow_from_the_baud_rate() {
     let mut bench = Bench::new(Framing::Rtu);
     bench.sniffer.set_baud_rate(9_600);
     let mut bytes = rtu(17, READ);
     bytes.extend(rtu(17, READ_REPLY));
     bench.now = 1_000_000;
     bench.feed(&bytes);
-    assert_eq!(bench.told[1].time, 1_000_000);
-    assert_eq!(bench.told[0].time, 1_000_000 - 11 * 1_146);
-    assert_eq!(bench.told[1].response_time, 11 * 1_146);
+    assert_eq!(bench.events[1].time, 1_000_000);
+    assert_eq!(bench.events[0].time, 1_000_000 - 11 * 1_146);
+    assert_eq!(bench.events[1].response_time, 11 * 1_146);
 }
 
 #[test]
-fn a_declared_function_needs_no_silence() {
+fn a_frame_of_a_declared_function_is_found_without_silence() {
     let own = Function {
         code: 0x55,
         request: Rule::Fixed(3),
@@ -430,16 +430,16 @@ fn a_declared_function_needs_no_silence() {
     bench.feed(&rtu(17, &[0x55, 1, 2]));
     bench.feed(&rtu(17, &[0x55, 3, 7, 8, 9]));
     assert_eq!(bench.kinds(), [Kind::Request, Kind::Reply]);
-    assert_eq!(bench.told[0].status, Status::OK);
+    assert_eq!(bench.events[0].status, Status::OK);
 }
 
 #[test]
-fn a_frame_between_silences_may_be_longer_than_it_counts() {
+fn a_frame_between_silences_may_be_longer_than_its_byte_count() {
     let mut bench = Bench::new(Framing::Rtu);
     bench.feed(&rtu(17, &[0x11]));
     bench.wait(10_000);
     bench.feed(&rtu(17, &[0x11, 1, 0xFF, b'm', b'b', b'm']));
     bench.wait(10_000);
     assert_eq!(bench.kinds(), [Kind::Request, Kind::Reply]);
-    assert_eq!(bench.told[1].status, Status::OK);
+    assert_eq!(bench.events[1].status, Status::OK);
 }

@@ -7,7 +7,7 @@ pub const READ: &[u8] = &[3, 0, 107, 0, 3];
 pub const READ_REPLY: &[u8] = &[3, 6, 0x02, 0x2B, 0, 0, 0, 100];
 pub const WRITE: &[u8] = &[6, 0, 1, 0, 3];
 
-/// A request and a reply of every function and form, and their words.
+/// A request and a reply of every function and form, and the texts that describe them.
 pub const EXCHANGES: &[(&[u8], &[u8], &str, &str)] = &[
     (&[1, 0, 19, 0, 19], &[1, 3, 0xCD, 0x6B, 0x05],
      "01 read coils  19..37", "01 read coils  19..37: 10110011 11010110 101"),
@@ -98,7 +98,7 @@ pub const EXCHANGES: &[(&[u8], &[u8], &str, &str)] = &[
      "30 unknown function: 01", "30 unknown function: 09 09"),
 ];
 
-/// Whether each exchange came out as request and reply, with all that belongs to it.
+/// Checks that the events are the request and the reply of each exchange, with their texts.
 pub fn assert_exchanges(bench: &Bench, exchanges: &[(&[u8], &[u8], &str, &str)]) {
     let mut wanted = Vec::new();
     for (request, reply, asked, answered) in exchanges {
@@ -114,9 +114,9 @@ pub fn assert_exchanges(bench: &Bench, exchanges: &[(&[u8], &[u8], &str, &str)])
         ));
     }
     let found: Vec<_> = bench
-        .told
+        .events
         .iter()
-        .map(|told| (told.kind, told.pdu.clone(), told.words.clone()))
+        .map(|event| (event.kind, event.pdu.clone(), event.words.clone()))
         .collect();
     for (index, (wanted, found)) in wanted.iter().zip(&found).enumerate() {
         assert_eq!(wanted, found, "event {index}");

@@ -1,4 +1,4 @@
-//! What is damaged, refused, too long or no frame at all.
+//! Damaged frames, exceptions, frames that are too long, and noise.
 
 use crate::bench::{frame, rtu, Bench};
 use crate::exchanges::{READ, READ_REPLY};
@@ -8,7 +8,7 @@ use mbm::frame::Framing;
 use mbm::sniffer::{Kind, Tap};
 
 #[test]
-fn exceptions_are_told_in_words_with_their_code() {
+fn exceptions_are_described_with_their_code() {
     for framing in [Framing::Rtu, Framing::Ascii, Framing::Tcp] {
         for (code, words) in [
             (1, "01 illegal function"),
@@ -31,10 +31,13 @@ fn exceptions_are_told_in_words_with_their_code() {
                 [Kind::Request, Kind::Exception, Kind::Unpaired]
             );
             let wanted = format!("03 read holding registers: exception {words}");
-            assert_eq!(bench.told[1].words, format!("unit 17  exception  {wanted}"));
-            assert_eq!(bench.told[1].status.code(), code);
             assert_eq!(
-                (bench.told[2].function, bench.told[2].status.code()),
+                bench.events[1].words,
+                format!("unit 17  exception  {wanted}")
+            );
+            assert_eq!(bench.events[1].status.code(), code);
+            assert_eq!(
+                (bench.events[2].function, bench.events[2].status.code()),
                 (3, code)
             );
         }
@@ -42,28 +45,28 @@ fn exceptions_are_told_in_words_with_their_code() {
 }
 
 #[test]
-fn a_request_that_a_server_refuses_is_told_with_the_fault() {
+fn a_request_that_a_server_must_refuse_is_reported_as_malformed() {
     let mut bench = Bench::new(Framing::Rtu);
     bench.feed(&rtu(17, &[3, 0, 0, 0, 200]));
     bench.feed(&rtu(17, &[0x83, 3]));
     assert_eq!(bench.kinds(), [Kind::Request, Kind::Exception]);
-    assert_eq!(bench.told[0].status, Status::ILLEGAL_DATA_VALUE);
+    assert_eq!(bench.events[0].status, Status::ILLEGAL_DATA_VALUE);
     assert_eq!(
-        bench.told[0].words,
+        bench.events[0].words,
         "unit 17  request    03 read holding registers, malformed: 00 00 00 C8"
     );
 }
 
 #[test]
-fn a_byte_that_begins_no_reply_is_told_before_a_second_one_comes() {
+fn a_byte_that_cannot_begin_a_reply_is_reported_at_once() {
     let mut bench = Bench::new(Framing::Rtu);
-    // Nobody answers as unit 0.
+    // No reply has unit 0.
     bench.feed_at(Tap::Server, &[0]);
     assert_eq!(bench.kinds(), [Kind::Noise]);
 }
 
 #[test]
-fn a_frame_of_unknown_length_with_a_pause_in_it_is_told_with_its_last_byte() {
+fn a_frame_of_unknown_length_with_a_pause_is_reported_with_its_last_byte() {
     let mut bench = Bench::new(Framing::Rtu);
     let bytes = rtu(17, &[8, 0, 0, 1, 2, 3, 4]);
     let (first, rest) = bytes.split_at(5);
@@ -78,7 +81,7 @@ fn a_frame_of_unknown_length_with_a_pause_in_it_is_told_with_its_last_byte() {
 }
 
 #[test]
-fn a_damaged_request_or_reply_is_told_and_the_next_frame_is_found() {
+fn a_damaged_frame_is_reported_and_the_next_one_is_found() {
     for damaged in 0..3 {
         let mut frames = [
             rtu(17, READ),
@@ -102,14 +105,18 @@ fn a_damaged_request_or_reply_is_told_and_the_next_frame_is_found() {
                 _ => vec![Request, Reply, BadCrc, Unpaired],
             };
             assert_eq!(found, wanted, "{damaged} {silent}");
-            let told = bench.told.iter().find(|told| told.kind == BadCrc).unwrap();
+            let event = bench
+                .events
+                .iter()
+                .find(|event| event.kind == BadCrc)
+                .unwrap();
             assert_eq!(
-                (told.unit, told.function, told.status),
+                (event.unit, event.function, event.status),
                 (17, 3, Status::INVALID_CRC)
             );
-            assert_eq!(told.frame, frames[damaged]);
+            assert_eq!(event.frame, frames[damaged]);
             assert_eq!(
-                told.words,
+                event.words,
                 format!("bad CRC, {} bytes", frames[damaged].len())
             );
         }
@@ -124,8 +131,8 @@ fn an_ascii_frame_with_a_wrong_lrc_is_a_damaged_frame() {
     bench.feed(&frame);
     bench.feed(&self::frame(Framing::Ascii, 0, 17, READ));
     assert_eq!(bench.kinds(), [Kind::BadCrc, Kind::Request]);
-    assert_eq!((bench.told[0].unit, bench.told[0].function), (17, 4));
-    assert_eq!(bench.told[0].length, 17);
+    assert_eq!((bench.events[0].unit, bench.events[0].function), (17, 4));
+    assert_eq!(bench.events[0].length, 17);
 }
 
 #[test]
@@ -143,8 +150,8 @@ fn ascii_frames_without_an_end_or_with_other_characters_are_noise() {
         bench.feed(&good);
         bench.wait(100);
         assert_eq!(bench.kinds(), [Kind::Noise, Kind::Request], "{bad:?}");
-        assert_eq!(bench.told[0].length, bad.len());
-        assert_eq!(bench.told[0].frame, bad);
+        assert_eq!(bench.events[0].length, bad.len());
+        assert_eq!(bench.events[0].frame, bad);
     }
 }
 
@@ -159,7 +166,7 @@ fn another_end_character_of_ascii_can_be_set() {
 }
 
 #[test]
-fn noise_before_and_behind_a_frame_is_counted() {
+fn noise_before_and_after_a_frame_is_counted() {
     for silent in [0, 5_000] {
         let mut bench = Bench::new(Framing::Rtu);
         bench.feed(&[0xFF, 0xFF, 0x00]);
@@ -182,23 +189,23 @@ fn noise_before_and_behind_a_frame_is_counted() {
         assert_eq!(bench.kinds(), kinds);
         assert_eq!(bench.words()[0], "noise, 3 bytes");
         assert_eq!(bench.words()[2], "noise, 1 byte");
-        assert_eq!(bench.told[4].length, 2);
+        assert_eq!(bench.events[4].length, 2);
     }
 }
 
 #[test]
-fn a_tcp_stream_that_is_joined_in_the_middle_is_found_again() {
+fn frames_are_found_in_a_tcp_stream_that_is_joined_in_the_middle_of_a_frame() {
     let mut bench = Bench::new(Framing::Tcp);
     let tail = [0x02, 0x2B, 0x17, 0x64];
     bench.feed(&tail);
     bench.feed(&frame(Framing::Tcp, 0x1234, 17, READ));
     bench.wait(100);
     assert_eq!(bench.kinds(), [Kind::Noise, Kind::Request]);
-    assert_eq!(bench.told[0].length, 4);
+    assert_eq!(bench.events[0].length, 4);
 }
 
 #[test]
-fn the_clock_may_wrap() {
+fn times_are_right_when_the_clock_wraps() {
     let mut bench = Bench::new(Framing::Rtu);
     bench.now = u32::MAX - 5_000;
     bench.feed(&rtu(17, READ));
@@ -211,12 +218,12 @@ fn the_clock_may_wrap() {
         bench.kinds(),
         [Kind::Request, Kind::Reply, Kind::Request, Kind::Timeout]
     );
-    assert_eq!(bench.told[1].response_time, 10_000);
-    assert_eq!(bench.told[3].response_time, 1_000_000);
+    assert_eq!(bench.events[1].response_time, 10_000);
+    assert_eq!(bench.events[3].response_time, 1_000_000);
 }
 
 #[test]
-fn a_frame_longer_than_the_buffer_is_told_and_the_next_is_found() {
+fn a_frame_longer_than_the_buffer_is_reported_and_the_next_one_is_found() {
     let long: Vec<u8> = [&[3, 200][..], &[7; 200]].concat();
     for framing in [Framing::Rtu, Framing::Ascii, Framing::Tcp] {
         let mut bench = Bench::with_buffer(framing, 64);
@@ -227,7 +234,7 @@ fn a_frame_longer_than_the_buffer_is_told_and_the_next_is_found() {
         bench.feed(&frame(framing, 2, 17, READ));
         bench.feed(&frame(framing, 2, 17, READ_REPLY));
         let kinds = bench.kinds();
-        let told = &bench.told;
+        let events = &bench.events;
         let good: Vec<_> = kinds
             .iter()
             .filter(|kind| **kind != Kind::Noise && **kind != Kind::Timeout)
@@ -238,20 +245,20 @@ fn a_frame_longer_than_the_buffer_is_told_and_the_next_is_found() {
             "{framing:?} {:?}",
             bench.words()
         );
-        assert!(told
+        assert!(events
             .iter()
-            .any(|told| told.status == Status::BUFFER_TOO_SMALL));
-        let noise: usize = told
+            .any(|event| event.status == Status::BUFFER_TOO_SMALL));
+        let noise: usize = events
             .iter()
-            .filter(|told| told.kind == Kind::Noise)
-            .map(|told| told.length)
+            .filter(|event| event.kind == Kind::Noise)
+            .map(|event| event.length)
             .sum();
         assert_eq!(noise, frame(framing, 1, 17, &long).len());
     }
 }
 
 #[test]
-fn a_buffer_too_small_for_the_words_is_said() {
+fn a_buffer_too_small_for_the_text_is_reported() {
     let mut bench = Bench::new(Framing::Rtu);
     let bytes = rtu(17, READ);
     bench.sniffer.feed(&mut bench.buffer, Tap::Both, &bytes, 0);
@@ -264,13 +271,13 @@ fn a_buffer_too_small_for_the_words_is_said() {
 }
 
 #[test]
-fn an_exception_with_a_code_that_there_cannot_be_is_no_request() {
+fn an_exception_with_an_invalid_code_is_not_a_request() {
     for framing in [Framing::Rtu, Framing::Ascii, Framing::Tcp] {
         let mut bench = Bench::new(framing);
         bench.feed(&frame(framing, 1, 17, READ));
         bench.feed(&frame(framing, 2, 18, &[0x83, 0]));
         bench.wait(100);
         assert_eq!(bench.kinds(), [Kind::Request, Kind::Unpaired]);
-        assert_eq!(bench.told[1].status, Status::MALFORMED_REPLY);
+        assert_eq!(bench.events[1].status, Status::MALFORMED_REPLY);
     }
 }

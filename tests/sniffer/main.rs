@@ -1,4 +1,4 @@
-//! A sniffer on a bus that others use.
+//! The sniffer on a simulated bus.
 
 mod bench;
 mod bus;

@@ -1,4 +1,4 @@
-//! Random traffic, random noise, random bytes.
+//! The sniffer with random exchanges, random noise and random bytes.
 
 use crate::bench::{frame, rtu, Bench};
 use crate::exchanges::EXCHANGES;
@@ -7,7 +7,7 @@ use mbm::frame::Framing;
 use mbm::sniffer::{Kind, Tap};
 use proptest::prelude::*;
 
-/// Noise, an exchange, and silence behind each.
+/// For each exchange: noise before it, its index, and the silence after each frame.
 type Traffic = Vec<(Vec<u8>, usize, u32)>;
 
 fn traffic() -> impl Strategy<Value = Traffic> {
@@ -16,9 +16,8 @@ fn traffic() -> impl Strategy<Value = Traffic> {
     prop::collection::vec((noise, 0..EXCHANGES.len(), silence), 1..8)
 }
 
-/// True if noise with what follows it happens to be a frame, or noise with
-/// what follows is one's beginning that swallows: a right CRC over bytes
-/// that begin in noise.
+/// True if noise and the bytes after it form a frame by chance: their CRC is right, and the
+/// first byte is in the noise.
 fn is_accident(bytes: &[u8], noise: &[(usize, usize)]) -> bool {
     noise.iter().any(|(start, end)| {
         (*start..*end).any(|from| {
@@ -41,7 +40,7 @@ proptest! {
         let mut noise = Vec::new();
         let mut wanted = Vec::new();
         for (before, which, _) in &traffic {
-            // Frames that only silence ends are found between silences alone.
+            // Only functions whose length is known. Other frames are found only between silences.
             let (request, reply, ..) = EXCHANGES[*which % 7];
             noise.push((bytes.len(), bytes.len() + before.len()));
             bytes.extend(before);
@@ -63,8 +62,8 @@ proptest! {
             .filter(|(kind, _)| !matches!(kind, Kind::Noise | Kind::BadCrc))
             .collect();
         prop_assert_eq!(found, wanted);
-        let told: usize = bench.told.iter().map(|told| told.length).sum();
-        prop_assert_eq!(told, bytes.len());
+        let reported: usize = bench.events.iter().map(|event| event.length).sum();
+        prop_assert_eq!(reported, bytes.len());
     }
 
     #[test]
@@ -97,12 +96,12 @@ proptest! {
             .filter(|(kind, _)| !matches!(kind, Kind::Noise | Kind::BadCrc))
             .collect();
         prop_assert_eq!(found, wanted);
-        let told: usize = bench.told.iter().map(|told| told.length).sum();
-        prop_assert_eq!(told, all.len());
+        let reported: usize = bench.events.iter().map(|event| event.length).sum();
+        prop_assert_eq!(reported, all.len());
     }
 
     #[test]
-    fn any_bytes_are_all_told_of(
+    fn every_byte_belongs_to_one_event(
         pieces in prop::collection::vec(
             (prop::collection::vec(any::<u8>(), 0..100), any::<u32>(), 0u8..3), 0..20),
         framing in 0u8..4,
@@ -125,17 +124,18 @@ proptest! {
             count += bytes.len();
         }
         bench.wait(10_000_000);
-        let told: usize = bench.told.iter().map(|told| told.length).sum();
+        let reported: usize = bench.events.iter().map(|event| event.length).sum();
         if framing == Framing::Tcp {
-            // What a header promises may never come.
-            prop_assert!(told >= count);
+            // The event of a frame that is too long counts all bytes that its header
+            // announces, though they may never arrive.
+            prop_assert!(reported >= count);
         } else {
-            prop_assert_eq!(told, count);
+            prop_assert_eq!(reported, count);
         }
     }
 
     #[test]
-    fn a_sniffer_that_waits_for_more_tells_the_same_as_one_that_looks_after_each_byte(
+    fn a_sniffer_reports_the_same_events_whether_or_not_it_searches_after_each_byte(
         framing in 0u8..4,
         pieces in prop::collection::vec(
             (0..EXCHANGES.len(), any::<bool>(), prop::collection::vec(any::<u8>(), 0..4), 0u32..3),
@@ -145,8 +145,8 @@ proptest! {
         is_apart: bool,
     ) {
         let framing = Framing::from_code(framing).unwrap();
-        let mut waits = Bench::new(framing);
-        let mut looks = Bench::new(framing);
+        let mut deferred = Bench::new(framing);
+        let mut eager = Bench::new(framing);
         for (which, is_reply, noise, silence) in pieces {
             let (request, reply, ..) = EXCHANGES[which];
             let pdu = if is_reply { reply } else { request };
@@ -157,21 +157,21 @@ proptest! {
             };
             let bytes = [frame(framing, 1, 17, pdu), noise].concat();
             for some in bytes.chunks(piece) {
-                for bench in [&mut waits, &mut looks] {
+                for bench in [&mut deferred, &mut eager] {
                     bench.now += 200;
                     bench.feed_at(tap, some);
                 }
-                // A setting makes it look again, however little has come.
-                looks.sniffer.set_timeout(1_000_000);
-                looks.listen();
+                // Setting a timeout makes the sniffer search again, even after a single byte.
+                eager.sniffer.set_timeout(1_000_000);
+                eager.collect_events();
             }
-            for bench in [&mut waits, &mut looks] {
+            for bench in [&mut deferred, &mut eager] {
                 bench.wait([0, 3_000, 60_000][silence as usize]);
             }
         }
-        waits.wait(10_000_000);
-        looks.wait(10_000_000);
-        prop_assert_eq!(waits.told, looks.told);
+        deferred.wait(10_000_000);
+        eager.wait(10_000_000);
+        prop_assert_eq!(deferred.events, eager.events);
     }
 
     #[test]
@@ -203,7 +203,7 @@ proptest! {
             .filter(|(kind, _)| *kind != Kind::Noise)
             .collect();
         prop_assert_eq!(found, wanted);
-        let told: usize = bench.told.iter().map(|told| told.length).sum();
-        prop_assert_eq!(told, bytes.len());
+        let reported: usize = bench.events.iter().map(|event| event.length).sum();
+        prop_assert_eq!(reported, bytes.len());
     }
 }

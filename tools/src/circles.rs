@@ -1,4 +1,4 @@
-//! Which files of a crate use each other.
+//! Finds the files of a crate that use each other.
 
 use crate::paths::{module, resolved, tokens, Token};
 use std::collections::{BTreeMap, BTreeSet};
@@ -6,20 +6,20 @@ use std::path::PathBuf;
 
 type Names = Vec<String>;
 
-/// What is known of a source file.
+/// The names that a source file defines and uses.
 #[derive(Default)]
 struct File {
     name: String,
     module: Names,
-    /// What is defined in it, at its top.
+    /// The items that the file defines at its top level.
     items: BTreeSet<String>,
-    /// Those of them that `pub` lets out.
+    /// The public ones among them.
     public: BTreeSet<String>,
-    /// The names that `use` brings in, and where they lead.
+    /// The names that a `use` imports, and their resolved paths.
     imports: BTreeMap<String, Names>,
-    /// The modules of which `use` brings in all.
+    /// The modules of which a `use` imports everything.
     globs: Vec<Names>,
-    /// What the file itself needs: a line, and where its path leads.
+    /// The resolved paths that the file uses itself, with their lines.
     needs: Vec<(usize, Names)>,
 }
 
@@ -27,7 +27,7 @@ fn is_name(token: &str) -> bool {
     token.starts_with(|c: char| c.is_alphabetic() || c == '_')
 }
 
-/// Where the bracket that opens at `at` closes.
+/// The index of the bracket that closes the one at `at`.
 fn closing(tokens: &[Token], at: usize) -> usize {
     let mut depth = 0;
     for (index, (_, token)) in tokens.iter().enumerate().skip(at) {
@@ -43,8 +43,7 @@ fn closing(tokens: &[Token], at: usize) -> usize {
     tokens.len()
 }
 
-/// The tokens of what is compiled into the crate: without what only tests and
-/// documentation use.
+/// The tokens of a source text without items that only tests and documentation use.
 fn shipped(text: &str) -> Vec<Token<'_>> {
     let all = tokens(text);
     let mut kept = Vec::new();
@@ -71,8 +70,8 @@ fn shipped(text: &str) -> Vec<Token<'_>> {
     kept
 }
 
-/// Reads what a `use` names from `at` on: each path with the name that it gets. Returns
-/// where it ends.
+/// Reads the paths of a `use` from `at` on, each with the name that it imports. Returns the
+/// index after them.
 fn read_use<'a>(
     prefix: &[&'a str],
     tokens: &[Token<'a>],
@@ -112,7 +111,7 @@ fn read_use<'a>(
 }
 
 impl File {
-    /// Where a path that this file names leads, if it leads into the crate.
+    /// Resolves a path that this file uses; `None` if it does not lead into the crate.
     fn leads(&self, path: &[&str], modules: &BTreeSet<Names>) -> Option<Names> {
         if let Some(found) = resolved(&self.module, path) {
             return Some(found);
@@ -127,7 +126,7 @@ impl File {
         Some(place)
     }
 
-    /// Notes what the source text defines and brings in.
+    /// Records the names that the source text defines and imports.
     fn read_names(&mut self, tokens: &[Token], modules: &BTreeSet<Names>) {
         let mut depth = 0;
         let mut is_public = false;
@@ -154,7 +153,7 @@ impl File {
                     }
                 }
                 "use" => {
-                    let is_handed_on = at > 0 && matches!(tokens[at - 1].1, "pub" | ")");
+                    let is_re_exported = at > 0 && matches!(tokens[at - 1].1, "pub" | ")");
                     let mut found = Vec::new();
                     at = read_use(&[], tokens, at + 1, &mut found);
                     for (mut path, name) in found {
@@ -166,7 +165,7 @@ impl File {
                         let Some(leads) = self.leads(&path, modules) else {
                             continue;
                         };
-                        if !is_handed_on {
+                        if !is_re_exported {
                             self.needs.push((*line, leads.clone()));
                         }
                         if is_glob {
@@ -183,7 +182,7 @@ impl File {
         }
     }
 
-    /// Notes what the source text names outside of `use`.
+    /// Records the paths that the source text uses outside of `use`.
     fn read_needs(&mut self, tokens: &[Token], modules: &BTreeSet<Names>) {
         let mut at = 0;
         while let Some((line, token)) = tokens.get(at) {
@@ -205,7 +204,7 @@ impl File {
                 at += 2;
             }
             let leads = self.leads(&path, modules);
-            // A name alone may come with all of a module.
+            // A single name may come from a glob import.
             let leads = leads.or_else(|| {
                 let mut own = self.module.clone();
                 own.push(path[0].to_owned());
@@ -223,7 +222,7 @@ pub struct Crate {
 }
 
 impl Crate {
-    /// The crate of these source files: names, below its folder, and texts.
+    /// A crate with these source files: paths below its folder, and texts.
     pub fn new(folder: &str, texts: &[(PathBuf, String)]) -> Crate {
         let mut files: Vec<File> = Vec::new();
         for (name, _) in texts {
@@ -247,8 +246,8 @@ impl Crate {
         }
     }
 
-    /// The file that defines what a path leads to; `None` of a whole module. `steps`
-    /// bounds how often it is handed on.
+    /// The file that defines the item at a path; `None` if the path is a module. `steps` limits
+    /// the number of re-exports that are followed.
     fn owner(&self, path: &[String], steps: u8) -> Option<usize> {
         let steps = steps.checked_sub(1)?;
         let mut at = *self.modules.get(&[][..])?;
@@ -263,9 +262,9 @@ impl Crate {
             if file.items.contains(name) {
                 return Some(at);
             }
-            let behind = &path[index + 1..];
+            let rest = &path[index + 1..];
             if let Some(leads) = file.imports.get(name) {
-                return self.owner(&[leads, behind].concat(), steps);
+                return self.owner(&[leads, rest].concat(), steps);
             }
             for glob in &file.globs {
                 let leads = [&glob[..], &path[index..]].concat();
@@ -279,7 +278,7 @@ impl Crate {
         None
     }
 
-    /// Which file uses which, and in what line first.
+    /// The pairs of files of which the first uses the second, with the first line that does.
     fn uses(&self) -> BTreeMap<(usize, usize), usize> {
         let mut found = BTreeMap::new();
         for (index, file) in self.files.iter().enumerate() {
@@ -292,7 +291,7 @@ impl Crate {
         found
     }
 
-    /// The circles: each the files that reach each other, and what they use there.
+    /// The circles: for each, its files, and the lines in which they use each other.
     pub fn circles(&self) -> Vec<(Vec<&str>, Vec<String>)> {
         let uses = self.uses();
         let count = self.files.len();
@@ -308,15 +307,15 @@ impl Crate {
             }
         }
         let mut found = Vec::new();
-        let mut told = BTreeSet::new();
+        let mut reported = BTreeSet::new();
         for (first, reached) in reaches.iter().enumerate() {
             let circle: Vec<usize> = (first..count)
                 .filter(|other| reached[*other] && reaches[*other][first])
                 .collect();
-            if circle.is_empty() || !told.insert(circle[0]) {
+            if circle.is_empty() || !reported.insert(circle[0]) {
                 continue;
             }
-            told.extend(&circle);
+            reported.extend(&circle);
             let inside = |file: &usize| circle.contains(file);
             let steps = uses
                 .iter()

@@ -1,4 +1,4 @@
-//! What the checks of the makefile share.
+//! Shared by the checks `layers` and `circles` of `make check`.
 
 pub mod circles;
 pub mod paths;

@@ -1,9 +1,9 @@
-//! The paths that a source text of Rust names, and where they lead.
+//! Finds the paths in a Rust source text, and resolves them.
 
 use std::path::{Path, PathBuf};
 
-/// The path of the module that a source file holds, as `frame`, `rtu` of
-/// `frame/rtu.rs`; that of `lib.rs` is empty.
+/// The path of the module in a source file: `frame`, `rtu` for `frame/rtu.rs`, empty for
+/// `lib.rs`.
 pub fn module(file: &Path) -> Vec<String> {
     let file = file.with_extension("");
     let names = file.iter().map(|name| name.to_string_lossy().into_owned());
@@ -14,11 +14,11 @@ pub fn module(file: &Path) -> Vec<String> {
     path
 }
 
-/// A piece of source text and its line.
+/// A line number and a piece of source text.
 pub type Token<'a> = (usize, &'a str);
 
-/// How many bytes of `text` are its first token: a name, `::`, or one character.
-/// Comments and literals are one token, so nothing in them is taken for code.
+/// The length in bytes of the first token of `text`: a name, `::`, or one character. A comment
+/// or a literal is one token, so that nothing in it is taken for code.
 fn first_token(text: &str) -> usize {
     let is_name = |c: char| c.is_alphanumeric() || c == '_';
     let up_to = |end: &str| text.find(end).map_or(text.len(), |at| at + end.len());
@@ -49,7 +49,7 @@ fn first_token(text: &str) -> usize {
         return quoted(text, '"');
     }
     if first == '\'' {
-        // A character; else this is the mark of a lifetime.
+        // A character literal; otherwise the quote belongs to a lifetime.
         let mut after = text[1..].chars();
         let is_character = after.next() == Some('\\') || after.next() == Some('\'');
         return if is_character { quoted(text, '\'') } else { 1 };
@@ -60,7 +60,7 @@ fn first_token(text: &str) -> usize {
     first.len_utf8()
 }
 
-/// How many bytes of `text` are the literal that begins it, up to its closing `mark`.
+/// The length in bytes of the literal at the start of `text`, with its closing `mark`.
 fn quoted(text: &str, mark: char) -> usize {
     let mut escaped = false;
     for (at, c) in text.char_indices().skip(1) {
@@ -72,25 +72,25 @@ fn quoted(text: &str, mark: char) -> usize {
     text.len()
 }
 
-/// The names and signs of a source text, without comments, literals and spaces.
+/// The tokens of a source text, without comments, literals and white space.
 pub fn tokens(text: &str) -> Vec<Token<'_>> {
     let mut found = Vec::new();
     let (mut rest, mut line) = (text, 1);
     while !rest.is_empty() {
-        let (token, behind) = rest.split_at(first_token(rest));
+        let (token, after) = rest.split_at(first_token(rest));
         let is_literal = token.len() > 1 && token.contains(['"', '\'']);
         let is_comment = token.starts_with("//") || token.starts_with("/*");
         if !is_literal && !is_comment && !token.trim().is_empty() {
             found.push((line, token));
         }
         line += token.matches('\n').count();
-        rest = behind;
+        rest = after;
     }
     found
 }
 
-/// Where a path that stands in `module` leads, seen from the root of the crate; the
-/// root itself is an empty path. `None` for a path that does not say where it begins.
+/// Resolves a path that is used in `module` to a path from the root of the crate; the root
+/// itself is an empty path. `None` if it does not start with `crate`, `self` or `super`.
 pub fn resolved(module: &[String], path: &[&str]) -> Option<Vec<String>> {
     let mut from = match path.first()? {
         &"crate" => Vec::new(),
@@ -109,8 +109,8 @@ pub fn resolved(module: &[String], path: &[&str]) -> Option<Vec<String>> {
     Some(from)
 }
 
-/// Reads the path that begins with `prefix` and goes on in `tokens`; adds it to
-/// `found`, or each of those that its braces hold. Returns what it did not read.
+/// Reads the path that starts with `prefix` and continues in `tokens`. Adds it to `found`, or
+/// each path within its braces. Returns the tokens after it.
 pub fn read_path<'a, 'b>(
     prefix: &[&'a str],
     mut tokens: &'b [Token<'a>],
@@ -134,10 +134,10 @@ pub fn read_path<'a, 'b>(
         }
         path.push(*token);
         match rest {
-            [(_, "::"), behind @ ..] => tokens = behind,
-            [(_, "as"), _, behind @ ..] => {
+            [(_, "::"), after @ ..] => tokens = after,
+            [(_, "as"), _, after @ ..] => {
                 found.push((*line, path));
-                return behind;
+                return after;
             }
             _ => {
                 found.push((*line, path));
@@ -147,12 +147,12 @@ pub fn read_path<'a, 'b>(
     }
 }
 
-/// Where the paths in the source text of `module` lead, with their line numbers.
+/// The resolved paths in the source text of `module`, with their line numbers.
 pub fn named(module: &[String], text: &str) -> Vec<(usize, Vec<String>)> {
     let all = tokens(text);
     let mut tokens = &all[..];
     let mut found = Vec::new();
-    // The modules that the text opens, and how deep in braces each stands.
+    // The inner modules around the current token, each with its depth in braces.
     let mut inner: Vec<(usize, String)> = Vec::new();
     let mut depth = 0;
     while let [(_, token), rest @ ..] = tokens {
@@ -182,7 +182,7 @@ pub fn named(module: &[String], text: &str) -> Vec<(usize, Vec<String>)> {
     found
 }
 
-/// The source files below a folder.
+/// Finds the source files below a folder.
 ///
 /// # Errors
 /// If a folder cannot be read.

@@ -1,4 +1,4 @@
-//! Requests of the client, with data and reply of exactly the bytes they need.
+//! Requests of the client. The buffers for data and reply have exactly the size needed.
 
 use super::check::{call, is_status, refused_changes_nothing, span, PENDING};
 use super::records::rule;
@@ -10,19 +10,22 @@ use std::ptr::{null, null_mut};
 
 unsafe extern "C" fn done(_: *mut c_void, request: *mut mbm_clientRequest) {
     let w = World::current();
-    // SAFETY: the client's word for it.
+    // SAFETY: the client passes a valid request.
     let status = unsafe { (*request).status };
-    assert!(status != PENDING, "done of a request that is pending");
+    assert!(
+        status != PENDING,
+        "`done` is called for a request that is pending"
+    );
     w.hook(Grant::All, 4);
 }
 
-/// Sets the fields of a request for so many bytes of data.
+/// Sets the fields of a request with `bytes` bytes of data.
 fn fill(w: &World, request: *mut mbm_clientRequest, bytes: usize) {
     let room = match w.byte() {
         0..0xA0 => 256,
         _ => w.word(),
     };
-    // SAFETY: not pending, so the user's.
+    // SAFETY: the request is not pending, so the client does not use it.
     unsafe {
         (*request).done = (w.byte() & 3 != 0).then_some(done);
         (*request).data = if w.rarely(64) {
@@ -37,7 +40,7 @@ fn fill(w: &World, request: *mut mbm_clientRequest, bytes: usize) {
         };
         (*request).replyBytes = room;
         (*request).transaction = if w.rarely(8) { w.word() } else { 0 };
-        (*request).unit = traffic::unit(w);
+        (*request).unit = w.unit_id();
     }
 }
 
@@ -46,7 +49,7 @@ pub fn request(w: &World, client: *mut mbm_client) {
     let request = w.requests.pick(w);
     let choice = w.byte() % 29;
     let (a, b, c, d, byte) = (w.word(), w.word(), w.word(), w.word(), w.byte());
-    // What the header says that `data` have.
+    // The length of `data` for this function, as the header says.
     let words = |count: u16| 2 * usize::from(count);
     let bytes = match choice {
         10 => usize::from(b).div_ceil(8),
@@ -65,8 +68,8 @@ pub fn request(w: &World, client: *mut mbm_client) {
     } else {
         w.array(&pdu[1..])
     };
-    // A request that is pending is the client's.
-    // SAFETY: not NULL.
+    // A pending request belongs to the client.
+    // SAFETY: the pointer is not NULL.
     let free = !request.is_null() && unsafe { (*request).status } != PENDING;
     let was = super::check::bytes(span(request));
     if free {
@@ -188,11 +191,12 @@ pub fn request(w: &World, client: *mut mbm_client) {
     });
     is_status("a request", status);
     if free && status != PENDING {
-        // A copy of a client may still have it: its fields belong together.
+        // The request did not start, so its fields are restored. `done` and `context` stay: a
+        // copy of a client may still call them.
         let (done, context) = unsafe { ((*request).done, (*request).context) };
-        // SAFETY: as many bytes as there were.
+        // SAFETY: `was` has the size of the request.
         unsafe { std::ptr::copy_nonoverlapping(was.as_ptr(), request.cast(), was.len()) };
-        // SAFETY: a request.
+        // SAFETY: the pointer is a valid request.
         unsafe { ((*request).done, (*request).context) = (done, context) };
     }
 }

@@ -1,10 +1,10 @@
-//! Bits, packed and not.
+//! Packed and unpacked bits.
 
 use super::check::{call, refused_changes_nothing, span};
 use super::world::World;
 use std::ptr::null_mut;
 
-/// Does something with bits.
+/// Makes one call with bits.
 pub fn step(w: &World) {
     let (quantity, length, first, at) = (w.word(), w.word(), w.word(), w.word());
     let coils = if w.rarely(32) {
@@ -13,7 +13,7 @@ pub fn step(w: &World) {
         w.unset_bytes(quantity.into())
     };
     let null = w.rarely(32);
-    // Of words, exactly as many as there are; of bytes too.
+    // The buffers for bytes and for words hold exactly `length` of them.
     let bytes = if null {
         null_mut()
     } else {

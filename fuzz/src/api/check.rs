@@ -1,13 +1,13 @@
-//! What holds of every call, whatever its arguments.
+//! Checks that hold for every call with any arguments.
 
 use super::world::World;
 
 pub const OK: u8 = 0;
 pub const PENDING: u8 = 235;
-/// The greatest status there is.
+/// The greatest status.
 const LAST: u8 = 242;
 
-/// Calls a function of the C API with an object that is in use meanwhile.
+/// Calls a function of the C API. `$object` is marked as in use during the call.
 macro_rules! call {
     ($w:expr, $object:expr, $name:ident($($argument:expr),* $(,)?)) => {{
         let w: &$crate::api::world::World = $w;
@@ -16,7 +16,7 @@ macro_rules! call {
             format!("{}({})", stringify!($name), arguments.join(", "))
         });
         w.before($object);
-        // SAFETY: every pointer is NULL or valid for what the header says.
+        // SAFETY: every pointer is NULL or valid as the header requires.
         #[allow(unused_unsafe)]
         let returned = unsafe { mbm_c::$name($($argument),*) };
         w.after();
@@ -26,17 +26,17 @@ macro_rules! call {
 }
 pub(super) use call;
 
-/// A stretch of memory: where it begins, and its bytes.
+/// A memory range: its start and its length in bytes.
 pub type Span = (*const u8, usize);
 
-/// The thing that a pointer points to.
+/// The memory of the object that a pointer points to.
 pub fn span<T>(thing: *const T) -> Span {
     (thing.cast(), size_of::<T>())
 }
 
-/// Makes a call that returns a status. From within a hook of the object, it is
-/// refused.
-pub fn ends(w: &World, (object, _): Span, name: &str, call: impl FnOnce() -> u8) -> u8 {
+/// Makes a call that returns a status. Checks that it is refused if a hook of the object is
+/// running.
+pub fn checked_call(w: &World, (object, _): Span, name: &str, call: impl FnOnce() -> u8) -> u8 {
     let locked = w.is_locked(object);
     let status = is_status(name, call());
     assert!(
@@ -46,8 +46,8 @@ pub fn ends(w: &World, (object, _): Span, name: &str, call: impl FnOnce() -> u8)
     status
 }
 
-/// As `ends`. If the call is refused, the spans are as before, unless a hook called
-/// the API meanwhile. The first is the object.
+/// Makes a call like `checked_call`. If the call is refused, the memory ranges must be
+/// unchanged, unless a hook has called the API during the call. The first range is the object.
 pub fn refused_changes_nothing(
     w: &World,
     spans: &[Span],
@@ -56,8 +56,8 @@ pub fn refused_changes_nothing(
 ) -> u8 {
     let before: Vec<Vec<u8>> = spans.iter().map(|span| bytes(*span)).collect();
     let inner = w.inner_calls.get();
-    let status = ends(w, spans[0], name, call);
-    // A call from within a hook is itself one of those.
+    let status = checked_call(w, spans[0], name, call);
+    // `inner_calls` counts this call too if a hook makes it.
     let others = w.inner_calls.get() - inner - u32::from(w.is_inside());
     if status != OK && status != PENDING && others == 0 {
         for (span, before) in spans.iter().zip(&before) {
@@ -70,27 +70,27 @@ pub fn refused_changes_nothing(
     status
 }
 
-/// What stands there; nothing behind NULL.
+/// The bytes of a memory range; empty for NULL.
 pub fn bytes((start, length): Span) -> Vec<u8> {
     if start.is_null() || length == 0 {
         return Vec::new();
     }
-    // SAFETY: the caller's block, all of which is initialised.
+    // SAFETY: the range is a block of the heap, and all of it is initialised.
     unsafe { std::slice::from_raw_parts(start, length) }.to_vec()
 }
 
-/// A status, or an exception code of a device.
+/// Checks that `status` is a status or an exception code of a device, and returns it.
 pub fn is_status(name: &str, status: u8) -> u8 {
     assert!(
         status < 0x80 || (224..=LAST).contains(&status),
-        "{name} returned {status}, which is no status"
+        "{name} returned {status}, which is not a status"
     );
     status
 }
 
-/// A length that a call gave is one that fits.
+/// Checks that a length returned by a call is at most `most`, and returns it.
 pub fn is_length(name: &str, length: *const u16, most: usize) -> usize {
-    // SAFETY: not NULL where the call succeeded.
+    // SAFETY: the call has succeeded, so the pointer is not NULL.
     let length = usize::from(unsafe { length.read() });
     assert!(length <= most, "{name} gave the length {length} of {most}");
     length

@@ -1,6 +1,6 @@
 //! The client.
 
-use super::check::{call, ends, refused_changes_nothing, span, PENDING};
+use super::check::{call, checked_call, refused_changes_nothing, span, PENDING};
 use super::world::{Grant, World};
 use super::{asked, ports};
 use mbm_c::*;
@@ -60,7 +60,7 @@ fn set(w: &World, client: *mut mbm_client) {
         )
         .cast();
     for (at, unit) in records.iter().enumerate() {
-        // SAFETY: below the count.
+        // SAFETY: the index is below the count.
         unsafe { ((*units.add(at)).unit, (*units.add(at)).delay) = (*unit, more.into()) };
     }
     let none: *mut mbm_clientUnit = null_mut();
@@ -94,7 +94,7 @@ fn set(w: &World, client: *mut mbm_client) {
 
 fn poll(w: &World, client: *mut mbm_client) {
     for _ in 0..1 + w.byte() % 12 {
-        let status = ends(w, span(client), "mbm_client_poll", || {
+        let status = checked_call(w, span(client), "mbm_client_poll", || {
             call!(w, client, mbm_client_poll(client))
         });
         if status != PENDING {
@@ -119,7 +119,7 @@ unsafe extern "C" fn connect(_: *mut c_void) -> u8 {
     [0, PENDING, 230, w.random() as u8][(w.random() % 4) as usize]
 }
 
-/// Links, and lines that are lent.
+/// Calls that reconnect a link or suspend the client.
 fn line(w: &World, client: *mut mbm_client) {
     match w.byte() % 4 {
         0 => {
@@ -142,7 +142,7 @@ fn line(w: &World, client: *mut mbm_client) {
         choice => {
             let master = w.masters.pick(w);
             let spans = [span(client), span(master)];
-            refused_changes_nothing(w, &spans, "a line lent", || match choice {
+            refused_changes_nothing(w, &spans, "lend or takeBack", || match choice {
                 2 => {
                     w.lenders.borrow_mut().push(client);
                     call!(w, client, mbm_client_lend(client, master))
@@ -153,7 +153,7 @@ fn line(w: &World, client: *mut mbm_client) {
     }
 }
 
-/// Does something with a client.
+/// Makes one call with a client.
 pub fn step(w: &World) {
     let client = w.clients.pick(w);
     match w.byte() % 16 {
@@ -172,13 +172,13 @@ pub fn step(w: &World) {
         }
         14 => line(w, client),
         _ => {
-            // The user may zero a client that has nothing to do and has not lent its line.
-            // SAFETY: NULL or an object.
+            // The user may zero a client that has no pending request and is not suspended.
+            // SAFETY: the pointer is NULL or an object.
             let pending = unsafe { mbm_client_pending(client) };
             let lender = w.lenders.borrow().contains(&client);
             if !client.is_null() && !lender && !w.is_inside() && (pending == 0 || w.wild) {
                 w.note(|| format!("memset({client:?}, 0, client)"));
-                // SAFETY: nothing uses it now.
+                // SAFETY: nothing uses the client now.
                 unsafe { client.cast::<u8>().write_bytes(0, size_of::<mbm_client>()) };
             }
         }

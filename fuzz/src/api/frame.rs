@@ -1,4 +1,4 @@
-//! Frames.
+//! Functions for frames, `mbm_frame_*`.
 
 use super::check::{call, is_length, is_status, OK};
 use super::packet::{any_or_null, functions, is_expected, is_packet, kind};
@@ -7,7 +7,7 @@ use super::world::World;
 use mbm_c::*;
 use std::ptr::{null, null_mut};
 
-/// How frames look, most often as one of the four.
+/// A framing record, most often with one of the four framings.
 pub fn framing(w: &World) -> *const mbm_framing {
     if w.rarely(64) {
         return null();
@@ -21,7 +21,7 @@ pub fn framing(w: &World) -> *const mbm_framing {
     })
 }
 
-/// A frame in a block of its own; NULL once in a while.
+/// A frame in its own block of the heap; sometimes NULL.
 fn frame(w: &World) -> (*mut u8, u16) {
     let asked = traffic::request(w, w.byte() % 4);
     let frame = if w.rarely(2) {
@@ -51,7 +51,7 @@ fn parse(w: &World) {
         text,
         mbm_frame_text(framing, kind, bytes, length, line, size)
     );
-    super::text::ends(w, "mbm_frame_text", status, text, size);
+    super::text::check_text(w, "mbm_frame_text", status, text, size);
 
     let have = length / (1 + w.word() % 3);
     let expected = if w.rarely(64) {
@@ -132,8 +132,12 @@ fn build(w: &World) {
             mbm_frame_build(framing, packet, place, capacity, length)
         )
     };
-    if is_status("a frame that is built", status) == OK {
-        is_length("a frame that is built", length, capacity.into());
+    if is_status("mbm_frame_build or mbm_frame_exception", status) == OK {
+        is_length(
+            "mbm_frame_build or mbm_frame_exception",
+            length,
+            capacity.into(),
+        );
     }
     let expected = if w.rarely(64) {
         null_mut()
@@ -144,7 +148,7 @@ fn build(w: &World) {
     is_expected("mbm_frame_replyLength", status, expected);
 }
 
-/// Does something with a frame.
+/// Makes calls with a frame.
 pub fn step(w: &World) {
     if w.byte().is_multiple_of(3) {
         build(w);

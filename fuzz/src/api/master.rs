@@ -1,6 +1,6 @@
-//! The facade.
+//! The master.
 
-use super::check::{call, ends, is_status, refused_changes_nothing, span, PENDING};
+use super::check::{call, checked_call, is_status, refused_changes_nothing, span, PENDING};
 use super::ports;
 use super::world::World;
 use mbm_c::*;
@@ -8,9 +8,9 @@ use std::ffi::c_void;
 use std::ptr::null_mut;
 
 fn begin(w: &World, master: *mut mbm_master) {
-    let slave = super::traffic::unit(w);
+    let slave = w.unit_id();
     let port = ports::port(w, MBM_FRAMING_RTU);
-    // Of any of the ports.
+    // The context of any of the ports.
     let context = usize::from(slave % 4) as *mut c_void;
     refused_changes_nothing(w, &[span(master)], "mbm_master_begin", || {
         if slave & 4 == 0 {
@@ -25,7 +25,7 @@ fn begin(w: &World, master: *mut mbm_master) {
     });
 }
 
-/// Lends buffers, each of any size.
+/// Sets buffers, each of any size.
 fn buffers(w: &World, master: *mut mbm_master) {
     let words = |w: &World| match w.byte() {
         0..0x80 => 125,
@@ -84,7 +84,7 @@ fn set(w: &World, master: *mut mbm_master) {
     });
 }
 
-/// One of the requests; blocking ones end.
+/// Starts a request. A blocking one must return.
 fn request(w: &World, master: *mut mbm_master) {
     let (a, b, c, d) = (w.word(), w.word(), w.word(), w.word());
     let choice = w.byte() % 14;
@@ -93,7 +93,7 @@ fn request(w: &World, master: *mut mbm_master) {
         assert!(words <= 125, "{words} words to receive");
         return;
     }
-    ends(w, span(master), "a request", || match choice {
+    checked_call(w, span(master), "a request", || match choice {
         0 => call!(w, master, mbm_master_readCoils(master, a, b)),
         1 => call!(w, master, mbm_master_readDiscreteInputs(master, a, b)),
         2 => call!(w, master, mbm_master_readHoldingRegisters(master, a, b)),
@@ -168,7 +168,7 @@ fn words(w: &World, master: *mut mbm_master) {
     }
 }
 
-/// Does something with a master.
+/// Makes one call with a master.
 pub fn step(w: &World) {
     let master = w.masters.pick(w);
     match w.byte() % 16 {
@@ -185,7 +185,7 @@ pub fn step(w: &World) {
         }
         _ => {
             for _ in 0..1 + w.byte() % 16 {
-                let status = ends(w, span(master), "mbm_master_poll", || {
+                let status = checked_call(w, span(master), "mbm_master_poll", || {
                     call!(w, master, mbm_master_poll(master))
                 });
                 if status != PENDING {

@@ -1,9 +1,9 @@
-//! An interpreter of calls of the C API: an input says which functions are called,
-//! with which arguments, and what the hooks do, which call the API in their turn.
+//! An interpreter of calls of the C API. The input chooses the functions, their arguments, and
+//! what the hooks do. Hooks may call the API too.
 //!
-//! Every object, buffer and record is a block of the heap of exactly its size, so
-//! that the address sanitizer sees each byte beside them. Only memory that is
-//! valid is ever handed over, and it stays valid for as long as the input runs.
+//! Every object, buffer and record is a block of the heap of exactly its size, so that the
+//! address sanitizer detects an access to any byte beside it. All pointers passed are NULL or
+//! valid, and stay valid until the input has been run.
 
 mod asked;
 mod bits;
@@ -11,7 +11,10 @@ mod check;
 mod client;
 mod frame;
 mod master;
+mod memory;
 mod packet;
+mod pool;
+mod port;
 mod ports;
 mod prepared;
 mod records;
@@ -27,7 +30,7 @@ mod world;
 use std::sync::atomic::Ordering;
 use world::World;
 
-/// Does one thing: with an object of one noun, with a port, or with time.
+/// Makes one step: calls with an object of one noun, a change of a port, or time.
 fn step(w: &World) {
     match w.byte() % 32 {
         0..=4 => master::step(w),
@@ -61,12 +64,12 @@ pub fn run(data: &[u8]) {
     }
 }
 
-/// How many functions of the C API were called so far.
+/// The number of calls of the C API so far.
 pub fn calls() -> u64 {
     world::CALLS.load(Ordering::Relaxed)
 }
 
 /// Prints every call from now on.
 pub fn trace() {
-    world::TRACE.store(true, Ordering::Relaxed);
+    memory::TRACE.store(true, Ordering::Relaxed);
 }

@@ -1,4 +1,4 @@
-//! Packets without a frame.
+//! Packets without a frame, `mbm_packet_*`.
 
 use super::check::{bytes, call, is_length, is_status, refused_changes_nothing, span, OK};
 use super::records::rule;
@@ -7,7 +7,7 @@ use super::world::World;
 use mbm_c::*;
 use std::ptr::null_mut;
 
-/// Functions of the user, and how many; their array is as long.
+/// An array of user-defined functions, and its length.
 pub fn functions(w: &World) -> (*const mbm_function, u8) {
     let count = match w.byte() {
         0..0xA0 => 0,
@@ -25,7 +25,7 @@ pub fn functions(w: &World) -> (*const mbm_function, u8) {
     (if null { null_mut() } else { w.array(&all) }, count)
 }
 
-/// A kind of packet, most often one that there is.
+/// A kind of packet, most often a valid one.
 pub fn kind(w: &World) -> u8 {
     match w.byte() {
         byte @ 0..0xF8 => byte % 2,
@@ -33,8 +33,8 @@ pub fn kind(w: &World) -> u8 {
     }
 }
 
-/// A packet of any content, whose data are a block of their own.
-fn made(w: &World) -> *mut mbm_packet {
+/// A packet with any content, and its data in their own block of the heap.
+fn random_packet(w: &World) -> *mut mbm_packet {
     let count = w.word();
     let data = if w.rarely(32) {
         null_mut()
@@ -58,7 +58,7 @@ fn made(w: &World) -> *mut mbm_packet {
         eventCount: w.word(),
         messageCount: w.word(),
         kind: w.byte() % 4,
-        unit: traffic::unit(w),
+        unit: w.unit_id(),
         function: if w.rarely(16) { w.byte() } else { function },
         exceptionCode: w.byte(),
         exceptionStatus: w.byte(),
@@ -73,7 +73,7 @@ fn made(w: &World) -> *mut mbm_packet {
     })
 }
 
-/// A packet: made up, parsed before, or NULL.
+/// A packet with any content, one that was parsed before, or NULL.
 pub fn any_or_null(w: &World) -> *mut mbm_packet {
     if w.rarely(32) {
         return null_mut();
@@ -81,18 +81,18 @@ pub fn any_or_null(w: &World) -> *mut mbm_packet {
     any(w)
 }
 
-/// As `any_or_null`, but no NULL.
+/// Like `any_or_null`, but never NULL.
 pub fn any(w: &World) -> *mut mbm_packet {
     let old = w.packets.all();
     if !old.is_empty() && w.byte() < 0x80 {
         return old[w.below(old.len())];
     }
-    made(w)
+    random_packet(w)
 }
 
-/// What a parsed packet says is so.
+/// Checks the fields of a parsed packet, and that its data can be read.
 pub fn is_packet(packet: *const mbm_packet) {
-    // SAFETY: a packet, whose data lie in what was parsed.
+    // SAFETY: a packet whose data are within the parsed bytes.
     let packet = unsafe { *packet };
     assert!(
         packet.kind <= MBM_PACKET_EXCEPTION,
@@ -142,7 +142,7 @@ fn parse(w: &World) {
     is_expected("mbm_packet_expectedLength", status, expected);
 }
 
-/// A length that is there if a call succeeded.
+/// Checks the status of a call, and if it succeeded the length that it returned.
 pub fn is_expected(name: &str, status: u8, expected: *const mbm_length) {
     is_status(name, status);
     if status == OK {
@@ -179,10 +179,10 @@ fn build(w: &World) {
     is_status("mbm_packet_build", status);
     if status == OK {
         let used = is_length("mbm_packet_build", length, capacity.min(MBM_MAX_PDU).into());
-        let behind = bytes((pdu.wrapping_add(used), usize::from(capacity) - used));
+        let rest = bytes((pdu.wrapping_add(used), usize::from(capacity) - used));
         assert!(
-            behind.iter().all(|byte| *byte == 0xA5),
-            "written behind the PDU"
+            rest.iter().all(|byte| *byte == 0xA5),
+            "bytes after the PDU have changed"
         );
     }
     let expected = if w.rarely(64) {
@@ -198,14 +198,14 @@ fn build(w: &World) {
     is_expected("mbm_packet_replyLength", status, expected);
 }
 
-/// Walks over records or objects.
+/// Iterates over records or objects.
 fn walk(w: &World) {
     let packet = any_or_null(w);
     let cursor = w.put(if w.rarely(16) { w.word() } else { 0 });
     let cursor = if w.rarely(64) { null_mut() } else { cursor };
     let objects = w.rarely(2);
     for turn in 0.. {
-        assert!(turn <= 65_536, "records without end");
+        assert!(turn <= 65_536, "the iteration does not end");
         let (found, data) = if objects {
             let object = w.unset::<mbm_object>();
             let found = call!(w, packet, mbm_packet_nextObject(packet, cursor, object));
@@ -234,8 +234,8 @@ fn add(w: &World) {
         _ => w.word(),
     };
     let storage = w.noise(capacity.into());
-    let packet = made(w);
-    // SAFETY: this one is new.
+    let packet = random_packet(w);
+    // SAFETY: the packet is new, so nothing else uses it.
     unsafe {
         ((*packet).dataLength, (*packet).objectCount) = (0, 0);
         if w.rarely(8) {
@@ -282,7 +282,7 @@ fn add(w: &World) {
     w.packets.keep(packet);
 }
 
-/// Does something with a packet.
+/// Makes calls with a packet.
 pub fn step(w: &World) {
     match w.byte() % 8 {
         0..=2 => parse(w),

@@ -1,43 +1,13 @@
-//! Ports of every behaviour: what they bring, take and claim.
+//! Ports with every behaviour: bytes delivered, bytes accepted, and false return values.
 
 use super::check::call;
+use super::port::Port;
 use super::traffic;
 use super::world::{Grant, World};
 use mbm_c::{mbm_master, mbm_port};
-use std::cell::{Cell, RefCell};
-use std::collections::VecDeque;
 use std::ffi::c_void;
 
-/// A byte stream and a clock.
-#[derive(Default)]
-pub struct Port {
-    /// What has arrived.
-    pub inbox: RefCell<VecDeque<u8>>,
-    /// How reading and writing behave.
-    reads: Cell<u8>,
-    writes: Cell<u8>,
-    flushes: Cell<u8>,
-    /// Microseconds between two looks at the clock.
-    step: Cell<u32>,
-    /// Who listens: 0 nobody, 1 the next port, 2 a device, 3 all requests come by
-    /// themselves.
-    pub peer: Cell<u8>,
-    /// The framing of what comes by itself.
-    pub framing: Cell<u8>,
-}
-
-impl Port {
-    /// A port that behaves: two with a device, one where requests come by
-    /// themselves, one whose bytes the first port gets.
-    pub fn new(index: usize) -> Port {
-        let port = Port::default();
-        port.peer.set([2, 2, 3, 1][index % 4]);
-        port.step.set(100);
-        port
-    }
-}
-
-/// Has a port behave in another way from now on, most often well.
+/// Changes the behaviour of a port, most often to a good one.
 pub fn change(w: &World) {
     let port = &w.ports[w.below(w.ports.len())];
     let mode = |w: &World| match w.byte() {
@@ -105,7 +75,7 @@ unsafe extern "C" fn read(context: *mut c_void, bytes: *mut u8, capacity: u16) -
         return -1;
     }
     if mode % 16 == 14 {
-        // A peer that floods.
+        // The peer sends without pause.
         place.fill(mode);
         return capacity as i16;
     }
@@ -121,10 +91,10 @@ unsafe extern "C" fn read(context: *mut c_void, bytes: *mut u8, capacity: u16) -
         *place = byte;
     }
     match mode % 16 {
-        // Claims more than there is room for.
+        // Returns more than the capacity.
         12 => capacity.saturating_add(mode.into()).min(i16::MAX as u16) as i16,
         11 => i16::MAX,
-        // Claims less than it wrote.
+        // Returns less than it has written.
         10 => {
             place.fill(0x5A);
             (count / 2) as i16
@@ -171,7 +141,7 @@ unsafe extern "C" fn write(context: *mut c_void, bytes: *const u8, length: u16) 
 
 unsafe extern "C" fn micros(context: *mut c_void) -> u32 {
     let (w, port) = enter(context, Grant::Nothing, 256);
-    // The longer a call lasts, the faster goes the clock, so that it ends.
+    // The more hooks a call has called, the faster the clock, so that every call ends.
     let step = u64::from(port.step.get().max(1)) << (w.hooks() / 16).min(23);
     let now = w.clock.get().wrapping_add(step.min(1 << 23) as u32);
     w.clock.set(now);
@@ -193,7 +163,10 @@ unsafe extern "C" fn transmission(context: *mut c_void) {
 
 unsafe extern "C" fn idle(context: *mut c_void, master: *mut mbm_master) {
     let (w, _) = enter(context, Grant::All, 16);
-    assert!(w.masters.all().contains(&master), "idle of another master");
+    assert!(
+        w.masters.all().contains(&master),
+        "`idle` gets an unknown master"
+    );
     w.inside(Grant::All, || {
         call!(w, master, mbm_master_pollDelay(master));
     });

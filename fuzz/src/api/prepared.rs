@@ -1,5 +1,5 @@
-//! Objects in good order to begin with, so that not every input must find its way
-//! to the first reply by itself.
+//! Objects that are set up correctly before the first step. Without them, few inputs would get
+//! as far as a first reply.
 
 use super::check::call;
 use super::ports;
@@ -7,7 +7,7 @@ use super::records;
 use super::world::World;
 use mbm_c::*;
 
-/// Sets up what the first bytes of the input say.
+/// Sets up the objects that the first byte of the input selects.
 pub fn prepare(w: &World) {
     let what = w.byte();
     if what & 1 == 0 {

@@ -1,45 +1,13 @@
-//! Records of units: filled in, registered, zeroed, filled in anew and registered
-//! again, on one unit or another.
+//! Records of units. They are filled in and registered; later they may be zeroed, filled in anew
+//! and registered again, with the same unit or another.
 
 use super::check::{call, refused_changes_nothing, span, OK};
+use super::pool::Pool;
 use super::serving as hooks;
-use super::world::{Pool, World};
+use super::world::World;
 use mbm_c::*;
 use std::collections::HashMap;
 use std::ptr::{null, null_mut};
-
-/// All records there are, and where they may hang.
-pub struct Records {
-    registers: Pool<mbm_registerTable>,
-    bits: Pool<mbm_bitTable>,
-    cells: Pool<mbm_cells>,
-    customs: Pool<mbm_custom>,
-    switches: Pool<mbm_switches>,
-    diagnostics: Pool<mbm_diagnostics>,
-    files: Pool<mbm_files>,
-    fifos: Pool<mbm_fifos>,
-    outputs: Pool<mbm_exceptionStatus>,
-    ids: Pool<mbm_serverId>,
-    identifications: Pool<mbm_identification>,
-}
-
-impl Default for Records {
-    fn default() -> Self {
-        Records {
-            registers: Pool::new(),
-            bits: Pool::new(),
-            cells: Pool::new(),
-            customs: Pool::new(),
-            switches: Pool::new(),
-            diagnostics: Pool::new(),
-            files: Pool::new(),
-            fifos: Pool::new(),
-            outputs: Pool::new(),
-            ids: Pool::new(),
-            identifications: Pool::new(),
-        }
-    }
-}
 
 /// One of the units, or NULL.
 pub fn unit(w: &World) -> *mut mbm_unit {
@@ -50,7 +18,7 @@ pub fn unit(w: &World) -> *mut mbm_unit {
     units.wrapping_add(w.below(count.into()))
 }
 
-/// An array of units and how many it has; a new one, a copy of one, or NULL.
+/// An array of units and its length: an earlier array, a new one, a copy of one, or NULL.
 pub fn array(w: &World) -> (*mut mbm_unit, u8) {
     let choice = w.byte();
     let have = w.units.borrow().len();
@@ -62,7 +30,7 @@ pub fn array(w: &World) -> (*mut mbm_unit, u8) {
                 .block(size_of::<mbm_unit>() * usize::from(count), 8)
                 .cast();
             w.note(|| format!("memcpy({new:?}, {from:?}, units of {count})"));
-            // SAFETY: both have so many.
+            // SAFETY: both arrays have `count` units.
             unsafe { std::ptr::copy_nonoverlapping(from, new, count.into()) };
             w.units.borrow_mut().push((new, count));
         }
@@ -72,8 +40,8 @@ pub fn array(w: &World) -> (*mut mbm_unit, u8) {
                 .block(size_of::<mbm_unit>() * usize::from(count), 8)
                 .cast();
             for at in 0..count {
-                // SAFETY: below the count.
-                unsafe { (*new.add(at.into())).id = super::traffic::unit(w) };
+                // SAFETY: the index is below the count.
+                unsafe { (*new.add(at.into())).id = w.unit_id() };
             }
             w.units.borrow_mut().push((new, count));
         }
@@ -85,13 +53,13 @@ pub fn array(w: &World) -> (*mut mbm_unit, u8) {
 
 type Lists = HashMap<*mut mbm_unit, Vec<*mut mbm_service>>;
 
-/// What hangs on each unit.
-fn lists(w: &World) -> Lists {
+/// The services registered with each unit.
+fn services(w: &World) -> Lists {
     let mut all = Lists::new();
     for (units, count) in w.units.borrow().iter() {
         for at in 0..*count {
             let unit = units.wrapping_add(at.into());
-            // SAFETY: a unit of the array.
+            // SAFETY: the pointer is a unit of the array.
             let services = unsafe { (*unit).services };
             let found = services.iter().take_while(|service| !service.is_null());
             all.insert(unit, found.copied().collect());
@@ -100,8 +68,8 @@ fn lists(w: &World) -> Lists {
     all
 }
 
-/// Registers a record with `serve`. If that succeeds, the unit has it, and every
-/// unit has all that it had.
+/// Registers a record with `serve`. Checks that the unit has the record if the call succeeds,
+/// and that no unit has lost a record.
 fn register<T>(
     w: &World,
     name: &str,
@@ -109,10 +77,10 @@ fn register<T>(
     record: *mut T,
     serve: impl FnOnce() -> u8,
 ) -> u8 {
-    let before = lists(w);
+    let before = services(w);
     let spans = [span(unit), span(record)];
     let status = refused_changes_nothing(w, &spans, name, serve);
-    let after = lists(w);
+    let after = services(w);
     for (other, had) in &before {
         let has = &after[other];
         let lost = had.iter().filter(|service| !has.contains(service)).count();
@@ -124,7 +92,7 @@ fn register<T>(
     if status == OK && !unit.is_null() {
         let record = record.cast::<mbm_service>();
         assert!(after[&unit].contains(&record), "{name} registered nothing");
-        // SAFETY: it hangs there.
+        // SAFETY: the record is registered.
         assert!(
             unsafe { (*record).serve.is_some() },
             "{name} left no function"
@@ -133,8 +101,8 @@ fn register<T>(
     status
 }
 
-/// A record of a pool: filled in if it is new, sometimes zeroed and filled in anew;
-/// then registered.
+/// Registers a record of a pool. Fills it in first if it is new, and sometimes zeroes it and
+/// fills it in anew.
 fn renew<T>(
     w: &World,
     pool: &Pool<T>,
@@ -150,9 +118,9 @@ fn renew<T>(
     let new = was.iter().all(|byte| *byte == 0);
     if new || ((!w.is_inside() || w.wild) && w.byte() < 0x60) {
         w.note(|| format!("memset({record:?}, 0, {}), filled in", size_of::<T>()));
-        // SAFETY: the pool's.
+        // SAFETY: the record is a block of the pool.
         unsafe { record.write(value()) };
-        // One that is refused serves nothing where it was served before.
+        // If the call is refused, the units that had the record can no longer use it.
         serve(record);
     } else {
         serve(record);
@@ -359,7 +327,7 @@ fn diagnostics(w: &World) -> mbm_diagnostics {
     }
 }
 
-/// Registers something.
+/// Registers a record of any kind.
 pub fn serve(w: &World) {
     let records = &w.records;
     let unit = unit(w);
@@ -440,7 +408,7 @@ pub fn serve(w: &World) {
     }
 }
 
-/// A unit that serves whoever asks, for what clients send.
+/// A unit with services for all functions. It answers the requests of clients.
 pub fn device(w: &World) -> *mut mbm_unit {
     let unit = w.zeroed::<mbm_unit>();
     let mut words = register_table(w);
@@ -449,7 +417,7 @@ pub fn device(w: &World) -> *mut mbm_unit {
     (bits.bits, bits.valid, bits.base, bits.size) = (w.noise(300), null(), 0, 2400);
     let (holding, input) = (w.put(words), w.zeroed::<mbm_registerTable>());
     let (coils, inputs) = (w.put(bits), w.zeroed::<mbm_bitTable>());
-    // SAFETY: blocks of their own, filled in as the header says.
+    // SAFETY: each record is a block of the heap, filled in as the header says.
     unsafe {
         std::ptr::copy_nonoverlapping(holding, input, 1);
         std::ptr::copy_nonoverlapping(coils, inputs, 1);

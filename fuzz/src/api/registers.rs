@@ -1,11 +1,11 @@
-//! Views of registers.
+//! Views of registers, `mbm_registers_*`.
 
 use super::check::{call, refused_changes_nothing, span};
 use super::world::World;
 use mbm_c::*;
 use std::ptr::{null, null_mut};
 
-/// Fills a view in, over a block of exactly its registers.
+/// Fills in a view of a block that has exactly the size of its registers.
 fn fill(w: &World, view: *mut mbm_registers) {
     let (count, first) = (w.word(), w.word());
     let odd = w.rarely(16);
@@ -39,10 +39,10 @@ fn fill(w: &World, view: *mut mbm_registers) {
         )),
         _ if view.is_null() => {}
         _ => {
-            // By hand: what lies behind `first` and `count` is there in any case.
+            // Written by hand. The block has `count` registers in any case.
             let (kind, order) = (w.byte() % 6, w.byte() % 6);
             let data = words.cast_const().cast();
-            // SAFETY: not NULL.
+            // SAFETY: the pointer is not NULL.
             unsafe {
                 view.write(mbm_registers {
                     data,
@@ -56,7 +56,7 @@ fn fill(w: &World, view: *mut mbm_registers) {
     }
 }
 
-/// A value gets what a call gives, and stays as it is if that refuses.
+/// Reads a value. Checks that a refused call leaves it unchanged.
 fn get<T>(w: &World, name: &str, call: impl FnOnce(*mut T) -> u8) {
     let value = if w.rarely(32) {
         null_mut()
@@ -131,12 +131,12 @@ fn read(w: &World, view: *const mbm_registers) {
     }
 }
 
-/// The memory that a view sees.
-fn seen(view: *const mbm_registers) -> (*const u8, usize) {
+/// The memory of a view.
+fn memory_of(view: *const mbm_registers) -> (*const u8, usize) {
     if view.is_null() {
         return (null(), 0);
     }
-    // SAFETY: a view, zeroed or filled in.
+    // SAFETY: the view is zeroed or filled in.
     let view = unsafe { *view };
     (view.data.cast(), 2 * usize::from(view.count))
 }
@@ -155,10 +155,10 @@ fn write(w: &World, view: *const mbm_registers) {
         let length = usize::from(length);
         let text = w.noise(length + 1);
         for at in 0..length {
-            // SAFETY: before the NUL.
+            // SAFETY: the index is before the NUL.
             unsafe { *text.add(at) |= 1 };
         }
-        // SAFETY: the last byte.
+        // SAFETY: the index is that of the last byte.
         unsafe { *text.add(length) = 0 };
         if null {
             null_mut()
@@ -167,7 +167,7 @@ fn write(w: &World, view: *const mbm_registers) {
         }
     };
     let choice = w.byte() % 14;
-    refused_changes_nothing(w, &[seen(view)], "a value set", || match choice {
+    refused_changes_nothing(w, &[memory_of(view)], "a setter", || match choice {
         0 => call!(w, view, mbm_registers_setBit(view, at, byte % 20, byte & 1)),
         1 => call!(w, view, mbm_registers_setUint8(view, at, byte & 1, byte)),
         2 => call!(
@@ -235,7 +235,7 @@ fn write(w: &World, view: *const mbm_registers) {
     });
 }
 
-/// Does something with a view.
+/// Makes one call with a view.
 pub fn step(w: &World) {
     let view = w.views.pick(w);
     match w.byte() % 4 {

@@ -1,10 +1,10 @@
-//! Rings. Both sides are this thread: `tests/ring_orders.rs` has them interleave.
+//! Rings, `mbm_ring_*`. One thread uses both sides; `tests/ring_orders.rs` tries two threads.
 
 use super::check::{call, refused_changes_nothing, span};
 use super::world::World;
 use std::ptr::null_mut;
 
-/// Does something with a ring.
+/// Makes one call with a ring, or a few that belong together.
 pub fn step(w: &World) {
     let ring = w.rings.pick(w);
     let count = w.word();
@@ -27,9 +27,12 @@ pub fn step(w: &World) {
         2 | 3 => assert!(call!(w, ring, mbm_ring_write(ring, bytes, count)) <= count),
         4 | 5 => assert!(call!(w, ring, mbm_ring_read(ring, bytes, count)) <= count),
         6 => {
-            let there = call!(w, ring, mbm_ring_available(ring));
-            let all = w.unset_bytes(there.into());
-            assert_eq!(call!(w, ring, mbm_ring_read(ring, all, there)), there);
+            let available = call!(w, ring, mbm_ring_available(ring));
+            let all = w.unset_bytes(available.into());
+            assert_eq!(
+                call!(w, ring, mbm_ring_read(ring, all, available)),
+                available
+            );
             call!(w, ring, mbm_ring_lost(ring));
         }
         _ => {

@@ -1,11 +1,11 @@
-//! Servers, and the responder without one.
+//! Servers, and `mbm_server_respond`, which needs no server.
 
-use super::check::{call, ends, is_status, refused_changes_nothing, span, OK};
+use super::check::{call, checked_call, is_status, refused_changes_nothing, span, OK};
 use super::world::World;
 use super::{ports, records, traffic};
 use mbm_c::*;
 
-/// Begins a server, of any framing, with a buffer of any size.
+/// Begins a server with any framing and a buffer of any size.
 fn begin(w: &World) {
     let server = w.servers.pick(w);
     let framing = w.byte() % 4;
@@ -52,11 +52,11 @@ fn begin(w: &World) {
     });
 }
 
-/// Polls a server, more than once, while time goes on.
+/// Polls a server a few times while time passes.
 fn poll(w: &World) {
     let server = w.servers.pick(w);
     for _ in 0..1 + w.byte() % 4 {
-        ends(w, span(server), "mbm_server_poll", || {
+        checked_call(w, span(server), "mbm_server_poll", || {
             call!(w, server, mbm_server_poll(server))
         });
         w.clock
@@ -83,7 +83,7 @@ fn set(w: &World) {
     });
 }
 
-/// Answers one frame without a server. `response` is written in any case.
+/// Answers one frame without a server. The call sets `response` in any case.
 fn respond(w: &World) {
     let framing = if w.rarely(16) { w.byte() } else { w.byte() % 4 };
     let (units, count) = records::array(w);
@@ -93,7 +93,7 @@ fn respond(w: &World) {
     let length = request.len().min(capacity.into());
     let frame = w.noise(capacity.into());
     for (at, byte) in request[..length].iter().enumerate() {
-        // SAFETY: below the capacity.
+        // SAFETY: the index is below the capacity.
         unsafe { *frame.add(at) = *byte };
     }
     let length = match w.byte() {
@@ -117,36 +117,36 @@ fn respond(w: &World) {
     );
     is_status("mbm_server_respond", status);
     if !response.is_null() {
-        // SAFETY: not NULL.
+        // SAFETY: the pointer is not NULL.
         let response = unsafe { response.read() };
         assert!(
             response <= capacity,
-            "mbm_server_respond left {response} of {capacity}"
+            "mbm_server_respond returned the length {response}; the capacity is {capacity}"
         );
         assert!(
             status == OK || response == 0,
-            "a response of what was refused"
+            "a refused call has left a response"
         );
     }
 }
 
-/// What the user may do with units between calls.
+/// Changes a unit between two calls, as the user may.
 fn unit(w: &World) {
     let unit = records::unit(w);
     if unit.is_null() || w.is_inside() {
         return;
     }
-    // SAFETY: a unit of an array.
+    // SAFETY: the pointer is a unit of an array.
     unsafe {
         if w.rarely(16) {
             w.note(|| format!("memset({unit:?}, 0, unit)"));
             unit.write(std::mem::zeroed());
         }
-        (*unit).id = traffic::unit(w);
+        (*unit).id = w.unit_id();
     }
 }
 
-/// Does something with a server.
+/// Makes one call with a server or a unit.
 pub fn step(w: &World) {
     match w.byte() % 16 {
         0 | 1 => begin(w),

@@ -1,28 +1,28 @@
-//! What units call: hooks around writes, cells, functions of the user.
+//! The hooks of units: before and after writes, data callbacks, user-defined functions.
 
 use super::world::{Grant, World};
 use mbm_c::*;
 use std::ffi::c_void;
 
-/// A hook of a unit may use everything but the server that called it.
+/// Enters a hook of a unit. It may use every object but the server that called it.
 fn enter<'a>() -> &'a World {
     let w = World::current();
     w.hook(Grant::Nothing, 24);
     w
 }
 
-/// Looks at every byte that a hook was handed.
-fn look(data: *const u8, length: usize) -> u8 {
+/// Reads every byte that the hook was given.
+fn read_all(data: *const u8, length: usize) -> u8 {
     assert!(!data.is_null() || length == 0);
     if length == 0 {
         return 0;
     }
-    // SAFETY: the header says that so many are there.
+    // SAFETY: the header promises this many bytes.
     let bytes = unsafe { std::slice::from_raw_parts(data, length) };
     bytes.iter().fold(0, |all, byte| all ^ byte)
 }
 
-/// A refusal once in a while; the code may be none.
+/// Sometimes an exception code, which may be invalid; otherwise 0.
 fn refusal(w: &World) -> u8 {
     match w.random() % 16 {
         0 => w.random() as u8,
@@ -32,16 +32,16 @@ fn refusal(w: &World) -> u8 {
 }
 
 pub unsafe extern "C" fn before_words(_: *mut c_void, _: u16, count: u16, data: *const u8) -> u8 {
-    look(data, 2 * usize::from(count));
+    read_all(data, 2 * usize::from(count));
     let w = enter();
-    look(data, 2 * usize::from(count));
+    read_all(data, 2 * usize::from(count));
     refusal(w)
 }
 
 pub unsafe extern "C" fn before_bits(_: *mut c_void, _: u16, count: u16, data: *const u8) -> u8 {
-    look(data, usize::from(count).div_ceil(8));
+    read_all(data, usize::from(count).div_ceil(8));
     let w = enter();
-    look(data, usize::from(count).div_ceil(8));
+    read_all(data, usize::from(count).div_ceil(8));
     refusal(w)
 }
 
@@ -52,7 +52,7 @@ pub unsafe extern "C" fn before_records(
     length: u16,
     data: *const u8,
 ) -> u8 {
-    look(data, 2 * usize::from(length));
+    read_all(data, 2 * usize::from(length));
     refusal(enter())
 }
 
@@ -82,8 +82,8 @@ pub unsafe extern "C" fn restart(_: *mut c_void, _: u8) {
     enter();
 }
 
-/// A function of the user: data, an exception, nothing, later, or a claim that
-/// cannot be.
+/// A user-defined function. It returns data, an exception, no response, "pending", or an
+/// invalid value.
 pub unsafe extern "C" fn custom(
     _: *mut c_void,
     request: *const mbm_request,
@@ -91,9 +91,9 @@ pub unsafe extern "C" fn custom(
     capacity: u16,
 ) -> u16 {
     let w = enter();
-    // SAFETY: the header says that these are there.
+    // SAFETY: the header promises the request and the capacity.
     unsafe {
-        look((*request).data, (*request).length.into());
+        read_all((*request).data, (*request).length.into());
         if capacity > 0 {
             std::slice::from_raw_parts_mut(response, capacity.into()).fill(0x77);
         }

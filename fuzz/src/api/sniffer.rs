@@ -1,4 +1,4 @@
-//! Sniffers and what they tell of, in words too.
+//! Sniffers, their events, and the texts of events.
 
 use super::check::{call, is_status, refused_changes_nothing, span};
 use super::world::World;
@@ -46,7 +46,7 @@ fn next(w: &World, sniffer: *mut mbm_sniffer) {
         if found == 0 || event.is_null() {
             return;
         }
-        // SAFETY: an event, whose frame and PDU lie in the sniffer's buffer.
+        // SAFETY: an event whose frame and PDU are in the sniffer's buffer.
         let told = unsafe { *event };
         assert!(told.kind <= MBM_EVENT_NOISE && told.packet.kind <= MBM_PACKET_EXCEPTION);
         assert!(usize::from(told.askedLength) <= told.asked.len());
@@ -81,7 +81,7 @@ fn feed(w: &World, sniffer: *mut mbm_sniffer) {
     assert!(taken <= length, "{taken} bytes of {length}");
 }
 
-/// Words for an event, into a text of any size.
+/// Writes the text of an event into a buffer of any size.
 fn text(w: &World, event: *const mbm_event) {
     let size = w.word();
     let place = if w.rarely(64) {
@@ -91,16 +91,16 @@ fn text(w: &World, event: *const mbm_event) {
     };
     let line: *mut std::ffi::c_char = place.cast();
     let status = call!(w, event, mbm_event_text(event, line, size));
-    super::text::ends(w, "mbm_event_text", status, place, size);
+    super::text::check_text(w, "mbm_event_text", status, place, size);
 }
 
-/// An event that no sniffer told of, with memory of its own.
-fn invented(w: &World) {
+/// Writes the text of an event with any content, which no sniffer has reported.
+fn random_event(w: &World) {
     let (frame, pdu) = (w.word(), w.word());
     let told = mbm_event {
         frame: w.noise(frame.into()),
         pdu: w.noise(pdu.into()),
-        // SAFETY: a packet, which may be of any content.
+        // SAFETY: the pointer is a packet with any content.
         packet: unsafe { *super::packet::any(w) },
         time: w.long(),
         responseTime: w.long(),
@@ -119,7 +119,7 @@ fn invented(w: &World) {
     text(w, w.put(told));
 }
 
-/// Does something with a sniffer.
+/// Makes calls with a sniffer.
 pub fn step(w: &World) {
     let sniffer = w.sniffers.pick(w);
     match w.byte() % 16 {
@@ -129,8 +129,8 @@ pub fn step(w: &World) {
             feed(w, sniffer);
             next(w, sniffer);
         }
-        9 => invented(w),
-        // One that is long past, or NULL: its memory is still there.
+        9 => random_event(w),
+        // An earlier event or NULL. The memory of the event is still valid.
         10 => text(w, w.events.any()),
         _ => {
             w.clock

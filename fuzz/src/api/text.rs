@@ -1,11 +1,11 @@
-//! Words for statuses, frames and events.
+//! Texts for statuses, and a check of texts for frames and events.
 
 use super::check::{call, is_status};
 use super::world::World;
 
-/// A text that a call wrote has a NUL within its size, and none of what lies
-/// behind that changed.
-pub fn ends(w: &World, name: &str, status: u8, text: *const u8, size: u16) {
+/// Checks that a text written by a call has a NUL within its size, or that the call has written
+/// nothing.
+pub fn check_text(w: &World, name: &str, status: u8, text: *const u8, size: u16) {
     is_status(name, status);
     if text.is_null() || size == 0 {
         return;
@@ -14,7 +14,7 @@ pub fn ends(w: &World, name: &str, status: u8, text: *const u8, size: u16) {
     let ended = written.contains(&0) || written.iter().all(|byte| *byte == 0xA5);
     assert!(
         ended,
-        "{name} returned {status} and left a text without an end"
+        "{name} returned {status} and left a text without NUL"
     );
     w.note(|| {
         format!(
@@ -24,7 +24,7 @@ pub fn ends(w: &World, name: &str, status: u8, text: *const u8, size: u16) {
     });
 }
 
-/// Does something with texts.
+/// Reads the text of a status.
 pub fn step(w: &World) {
     let status = w.byte();
     let text = call!(w, std::ptr::null::<u8>(), mbm_statusText(status));

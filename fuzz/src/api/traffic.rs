@@ -1,11 +1,11 @@
-//! What is on a line: requests, and what a device answers.
+//! Frames on a line: requests, and the responses of a device.
 
 use super::records;
 use super::world::{Grant, World};
 use mbm::frame::{ascii, Framing};
 use mbm_c::*;
 
-/// A PDU in a frame; the framing is one of MBM_FRAMING_.
+/// The frame of a PDU; the framing is one of MBM_FRAMING_*, modulo 4.
 pub fn framed(framing: u8, transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
     let framing = Framing::from_code(framing % 4).expect("one of four");
     let pdu = &pdu[..pdu.len().min(253)];
@@ -14,18 +14,10 @@ pub fn framed(framing: u8, transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
         place[..pdu.len()].copy_from_slice(pdu);
         Ok(pdu.len())
     });
-    buffer[..length.expect("there is room")].to_vec()
+    buffer[..length.expect("the frame fits")].to_vec()
 }
 
-/// A unit that is asked: most often one that is there.
-pub fn unit(w: &World) -> u8 {
-    match w.byte() {
-        byte @ 0..0xE0 => byte % 4,
-        byte => byte,
-    }
-}
-
-/// The PDU of a request, most often a right one.
+/// The PDU of a request, most often a valid one.
 pub fn pdu(w: &World) -> Vec<u8> {
     const FUNCTIONS: [u8; 24] = [
         1, 2, 3, 4, 5, 6, 7, 8, 11, 12, 15, 16, 17, 20, 21, 22, 23, 24, 43, 65, 100, 3, 16, 0,
@@ -90,15 +82,15 @@ pub fn pdu(w: &World) -> Vec<u8> {
     [vec![function], body].concat()
 }
 
-/// A frame that asks something, or something like one.
+/// The frame of a request, sometimes damaged.
 pub fn request(w: &World, framing: u8) -> Vec<u8> {
     let pdu = pdu(w);
-    let frame = framed(framing, w.word(), unit(w), &pdu);
-    spoiled(w, frame)
+    let frame = framed(framing, w.word(), w.unit_id(), &pdu);
+    maybe_damaged(w, frame)
 }
 
-/// A frame, most often as it is.
-fn spoiled(w: &World, mut frame: Vec<u8>) -> Vec<u8> {
+/// Damages a frame; most often it leaves it unchanged.
+fn maybe_damaged(w: &World, mut frame: Vec<u8>) -> Vec<u8> {
     if frame.is_empty() {
         return frame;
     }
@@ -116,7 +108,7 @@ fn spoiled(w: &World, mut frame: Vec<u8>) -> Vec<u8> {
     frame
 }
 
-/// What a device answers to what was written.
+/// The device's responses to the requests in `written`.
 pub fn answer(w: &World, framing: u8, written: &[u8]) -> Vec<u8> {
     let mut answers = Vec::new();
     let mut rest = written;
@@ -129,12 +121,12 @@ pub fn answer(w: &World, framing: u8, written: &[u8]) -> Vec<u8> {
         };
         let (frame, others) = rest.split_at(length.min(rest.len()));
         rest = others;
-        answers.extend(spoiled(w, respond(w, framing, frame)));
+        answers.extend(maybe_damaged(w, respond(w, framing, frame)));
     }
     answers
 }
 
-/// What the device says to one frame; nothing if that is longer than any.
+/// The device's response to one frame; empty if the frame is longer than any valid one.
 fn respond(w: &World, framing: u8, frame: &[u8]) -> Vec<u8> {
     if w.device.get().is_null() {
         w.device.set(records::device(w));
@@ -146,7 +138,7 @@ fn respond(w: &World, framing: u8, frame: &[u8]) -> Vec<u8> {
     place.copy_from_slice(frame);
     let mut length = 0;
     w.before(std::ptr::null::<mbm_unit>());
-    // SAFETY: a unit, and a buffer of its length.
+    // SAFETY: a valid unit, and a buffer of the given length.
     unsafe {
         w.inside(Grant::Nothing, || {
             mbm_server_respond(

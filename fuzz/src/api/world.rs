@@ -1,124 +1,55 @@
-//! The world in which one input runs: memory, choices, time, and the calls that
-//! are under way.
+//! The state of one run: memory, objects, time, and the calls that have not returned yet.
 
-use super::ports::Port;
+use super::memory::Memory;
+use super::pool::{Pool, Records};
+use super::port::Port;
 use mbm_c::*;
-use std::alloc::{alloc_zeroed, dealloc, Layout};
 use std::cell::{Cell, RefCell};
-use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU64, Ordering};
+use std::ops::Deref;
+use std::sync::atomic::{AtomicPtr, AtomicU64, Ordering};
 
-/// API calls of all inputs so far.
+/// The number of API calls of all inputs so far.
 pub static CALLS: AtomicU64 = AtomicU64::new(0);
-/// Whether each call is printed, with its arguments and what it returned.
-pub static TRACE: AtomicBool = AtomicBool::new(false);
-/// The world of the input that runs, for hooks: a context may be NULL.
+/// The state of the current run. Hooks use it because their context may be NULL.
 static CURRENT: AtomicPtr<World> = AtomicPtr::new(std::ptr::null_mut());
 
-/// Calls of hooks in one call of the top level. A call that needs more never ends.
+/// The greatest number of hook calls within one call at the top level. A call that makes more
+/// is assumed never to end.
 const MOST_HOOKS: u32 = 300_000;
-/// API calls in one input, so that no input takes long.
+/// The greatest number of API calls of one input. It limits the time of a run.
 const MOST_CALLS: u32 = 4_000;
 
-/// What a hook may do with the object whose call is under way.
+/// What a hook may do with the object whose call it interrupts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Grant {
-    /// Nothing: it is refused.
+    /// Nothing: calls are refused.
     Nothing,
     /// Everything.
     All,
 }
 
-/// A call that is under way.
+/// A call that has not returned yet.
 struct Frame {
     object: *const u8,
     grant: Cell<Grant>,
 }
 
-/// Objects of one type, each a block of the heap of its own.
-pub struct Pool<T>(RefCell<Vec<*mut T>>);
-
-impl<T> Pool<T> {
-    pub const fn new() -> Self {
-        Pool(RefCell::new(Vec::new()))
-    }
-
-    /// All of them.
-    pub fn all(&self) -> Vec<*mut T> {
-        self.0.borrow().clone()
-    }
-
-    /// One of the objects, a new zeroed one, a copy of one, or NULL.
-    pub fn pick(&self, w: &World) -> *mut T {
-        let choice = w.byte();
-        let count = self.0.borrow().len();
-        match choice {
-            0xF8.. => std::ptr::null_mut(),
-            0xF4..0xF8 if count > 0 && count < 8 => self.copy(w),
-            0xF0..0xF4 if count < 6 => self.make(w),
-            _ if count == 0 => self.make(w),
-            _ => self.0.borrow()[usize::from(choice) % count],
-        }
-    }
-
-    /// A new one, zeroed.
-    pub fn make(&self, w: &World) -> *mut T {
-        let new = w.zeroed::<T>();
-        self.0.borrow_mut().push(new);
-        new
-    }
-
-    /// Any of them, or NULL.
-    pub fn any(&self) -> *mut T {
-        self.0
-            .borrow()
-            .last()
-            .copied()
-            .unwrap_or(std::ptr::null_mut())
-    }
-
-    /// Keeps one more.
-    pub fn keep(&self, other: *mut T) {
-        let mut all = self.0.borrow_mut();
-        if all.len() < 64 {
-            all.push(other);
-        }
-    }
-
-    /// A copy of one, at another place.
-    fn copy(&self, w: &World) -> *mut T {
-        let from = {
-            let all = self.0.borrow();
-            all[w.below(all.len())]
-        };
-        let new = self.make(w);
-        w.note(|| format!("memcpy({new:?}, {from:?}, {})", size_of::<T>()));
-        // SAFETY: two blocks of this size.
-        unsafe { std::ptr::copy_nonoverlapping(from, new, 1) };
-        new
-    }
-}
-
-/// What one input runs in.
+/// The state of one run.
 pub struct World {
-    input: Cell<&'static [u8]>,
-    seed: Cell<u64>,
-    /// How many random steps follow the input.
-    more: Cell<u32>,
-    depth: Cell<u32>,
+    memory: Memory,
     hook_calls: Cell<u32>,
     calls: Cell<u32>,
-    /// Calls made from within hooks.
+    /// The number of API calls made by hooks.
     pub inner_calls: Cell<u32>,
     pub clock: Cell<u32>,
-    /// The user zeroes and refills what the library uses at the moment.
+    /// If set, the user also zeroes and refills objects that the library is using.
     pub wild: bool,
-    blocks: RefCell<Vec<(*mut u8, Layout)>>,
     frames: RefCell<Vec<Frame>>,
     pub ports: [Port; 4],
     pub masters: Pool<mbm_master>,
     turn: Cell<*mut mbm_turn>,
     pub clients: Pool<mbm_client>,
-    /// Clients whose port a master has, or had when it was copied.
+    /// Clients whose port a master uses, or used when it was copied.
     pub lenders: RefCell<Vec<*mut mbm_client>>,
     pub requests: Pool<mbm_clientRequest>,
     pub servers: Pool<mbm_server>,
@@ -127,29 +58,24 @@ pub struct World {
     pub events: Pool<mbm_event>,
     pub views: Pool<mbm_registers>,
     pub packets: Pool<mbm_packet>,
-    /// Arrays of units, and how many there are in each.
+    /// Arrays of units, and their lengths.
     pub units: RefCell<Vec<(*mut mbm_unit, u8)>>,
-    pub records: super::records::Records,
-    /// Buffers that were lent to an object; sometimes lent to another one too.
-    pub lent: RefCell<Vec<(*mut u8, usize)>>,
-    /// Units that answer what clients ask over the ports.
+    pub records: Records,
+    /// The unit that answers clients' requests over the ports.
     pub device: Cell<*mut mbm_unit>,
 }
 
 impl World {
-    /// The world of an input, which must outlive it.
+    /// The state for an input, which must outlive it.
     pub fn new(data: &[u8]) -> Box<World> {
-        // SAFETY: the world is dropped before the input is; see `run`.
+        // SAFETY: `run` drops the world before the input.
         let data: &'static [u8] = unsafe { std::mem::transmute(data) };
         let (head, input) = data.split_at(data.len().min(2));
         let seed = head.iter().fold(0x9E37_79B9_7F4A_7C15, |seed: u64, byte| {
             seed.rotate_left(8) ^ u64::from(*byte)
         });
         let world = Box::new(World {
-            input: Cell::new(input),
-            seed: Cell::new(seed),
-            more: Cell::new((seed as u32 >> 3 & 3) * 50),
-            depth: Cell::new(0),
+            memory: Memory::new(input, seed),
             hook_calls: Cell::new(0),
             calls: Cell::new(0),
             inner_calls: Cell::new(0),
@@ -159,7 +85,6 @@ impl World {
                 0u32.wrapping_sub(100_000)
             }),
             wild: seed & 3 == 3,
-            blocks: RefCell::default(),
             frames: RefCell::default(),
             ports: std::array::from_fn(Port::new),
             masters: Pool::new(),
@@ -175,97 +100,24 @@ impl World {
             packets: Pool::new(),
             units: RefCell::default(),
             records: Default::default(),
-            lent: RefCell::default(),
             device: Cell::new(std::ptr::null_mut()),
         });
         CURRENT.store((&raw const *world).cast_mut(), Ordering::Relaxed);
         world
     }
 
-    /// The world that runs, as a hook sees it.
+    /// The state of the current run, for hooks.
     pub fn current<'a>() -> &'a World {
-        // SAFETY: hooks run while `run` has one.
+        // SAFETY: hooks run only while `run` holds a world.
         unsafe { &*CURRENT.load(Ordering::Relaxed) }
     }
 
-    /// Whether there is nothing more to do. Behind the input come random steps.
+    /// True if the run is over.
     pub fn is_over(&self) -> bool {
-        let over = self.input.get().is_empty();
-        if over && self.more.get() > 0 {
-            self.more.set(self.more.get() - 1);
-            return self.calls.get() >= MOST_CALLS;
-        }
-        over || self.calls.get() >= MOST_CALLS
+        self.is_used_up() || self.calls.get() >= MOST_CALLS
     }
 
-    /// A byte of the input; a random one behind its end, and in a hook, for hooks
-    /// are called often.
-    pub fn byte(&self) -> u8 {
-        if self.depth.get() > 0 {
-            return self.random() as u8;
-        }
-        match self.input.get().split_first() {
-            Some((first, rest)) => {
-                self.input.set(rest);
-                *first
-            }
-            None => self.random() as u8,
-        }
-    }
-
-    /// A random number that follows from the input.
-    pub fn random(&self) -> u32 {
-        let mut seed = self.seed.get();
-        seed ^= seed << 13;
-        seed ^= seed >> 7;
-        seed ^= seed << 17;
-        self.seed.set(seed);
-        (seed >> 24) as u32
-    }
-
-    /// A number below `count`.
-    pub fn below(&self, count: usize) -> usize {
-        if count > 256 {
-            usize::from(u16::from_be_bytes([self.byte(), self.byte()])) % count
-        } else {
-            usize::from(self.byte()) % count
-        }
-    }
-
-    /// True once in `times` (at most 256).
-    pub fn rarely(&self, times: usize) -> bool {
-        self.below(times) == times - 1
-    }
-
-    /// A number of 16 bits: most often small, or near a limit.
-    pub fn word(&self) -> u16 {
-        let byte = self.byte();
-        match byte {
-            0..0xA0 => u16::from(byte) % 40,
-            0xA0..0xC0 => u16::from(self.byte()),
-            0xC0..0xE0 => u16::from_be_bytes([self.byte(), self.byte()]),
-            _ => {
-                const EDGES: [u16; 16] = [
-                    0xFFFF, 0xFFFE, 0x8000, 0x7FFF, 0x7FFE, 0x0100, 0x00FF, 253, 256, 257, 260,
-                    513, 2000, 2001, 125, 126,
-                ];
-                EDGES[usize::from(byte % 16)]
-            }
-        }
-    }
-
-    /// A number of 32 bits.
-    pub fn long(&self) -> u32 {
-        match self.byte() % 8 {
-            0 => u32::MAX,
-            1 => u32::MAX - u32::from(self.byte()),
-            2 => 1 << (self.byte() % 32),
-            3 => self.random(),
-            _ => self.word().into(),
-        }
-    }
-
-    /// What masters share that take turns; sometimes NULL.
+    /// The object through which masters take turns; sometimes NULL.
     pub fn turn(&self, byte: u8) -> *mut mbm_turn {
         if byte >= 0xF0 {
             return std::ptr::null_mut();
@@ -276,107 +128,19 @@ impl World {
         self.turn.get()
     }
 
-    /// A block of the heap of exactly this size, zeroed; of size 0 the end of one.
-    pub fn block(&self, size: usize, align: usize) -> *mut u8 {
-        let used = if size == 0 { align } else { size };
-        let layout = Layout::from_size_align(used, align).expect("a layout");
-        // SAFETY: the size is not 0.
-        let block = unsafe { alloc_zeroed(layout) };
-        self.blocks.borrow_mut().push((block, layout));
-        if size == 0 {
-            block.wrapping_add(align)
-        } else {
-            block
-        }
-    }
-
-    /// Zeroed storage for a thing.
-    pub fn zeroed<T>(&self) -> *mut T {
-        self.block(size_of::<T>(), align_of::<T>()).cast()
-    }
-
-    /// A thing in a block of its own.
-    pub fn put<T>(&self, value: T) -> *mut T {
-        let place = self.zeroed::<T>();
-        // SAFETY: room for it.
-        unsafe { place.write(value) };
-        place
-    }
-
-    /// Storage for a thing, filled with a pattern: what a call leaves shows.
-    pub fn unset<T>(&self) -> *mut T {
-        let place = self.zeroed::<T>();
-        // SAFETY: of this size.
-        unsafe { place.cast::<u8>().write_bytes(0xA5, size_of::<T>()) };
-        place
-    }
-
-    /// As `unset`, of so many bytes.
-    pub fn unset_bytes(&self, count: usize) -> *mut u8 {
-        let place = self.block(count, 8);
-        // SAFETY: of this size.
-        unsafe { place.write_bytes(0xA5, count) };
-        place
-    }
-
-    /// An array in a block of its own.
-    pub fn array<T>(&self, items: &[T]) -> *mut T {
-        let place: *mut T = self.block(size_of_val(items), align_of::<T>()).cast();
-        // SAFETY: room for all of them; both are valid.
-        unsafe { std::ptr::copy_nonoverlapping(items.as_ptr(), place, items.len()) };
-        place
-    }
-
-    /// Bytes of any content.
-    pub fn noise(&self, count: usize) -> *mut u8 {
-        let place = self.block(count, 2);
-        let step = self.byte();
-        // SAFETY: of this size; only the first bytes are worth the time.
-        let bytes = unsafe { std::slice::from_raw_parts_mut(place, count) };
-        for (at, byte) in bytes.iter_mut().take(300).enumerate() {
-            *byte = step.wrapping_mul(at as u8);
-        }
-        place
-    }
-
-    /// A buffer to be lent for long: a new one, or one that was lent already.
-    pub fn buffer(&self, count: usize) -> *mut u8 {
-        if self.rarely(16) {
-            let all = self.lent.borrow();
-            let fits: Vec<_> = all.iter().filter(|(_, size)| *size >= count).collect();
-            if !fits.is_empty() {
-                return fits[self.below(fits.len())].0;
-            }
-        }
-        if self.rarely(48) {
-            return std::ptr::null_mut();
-        }
-        let place = self.noise(count);
-        self.lent.borrow_mut().push((place, count));
-        place
-    }
-
-    /// Prints something of a run that is looked at.
-    pub fn note(&self, text: impl FnOnce() -> String) {
-        if TRACE.load(Ordering::Relaxed) {
-            let indent = "    ".repeat(self.depth.get() as usize);
-            eprintln!("{indent}{}", text());
-        }
-    }
-
-    /// Whether a hook runs that may do nothing with an object.
+    /// True if a hook is running that may do nothing with the object.
     pub fn is_locked(&self, object: *const u8) -> bool {
         let frames = self.frames.borrow();
         let mut own = frames.iter().filter(|frame| frame.object == object);
         !object.is_null() && own.any(|frame| frame.grant.get() == Grant::Nothing)
     }
 
-    /// Whether a call is under way.
+    /// True if a hook is running.
     pub fn is_inside(&self) -> bool {
         self.depth.get() > 0
     }
 
-    /// Before each call.
+    /// Called before each API call.
     pub fn before<T>(&self, object: *const T) {
         CALLS.fetch_add(1, Ordering::Relaxed);
         self.calls.set(self.calls.get() + 1);
@@ -391,22 +155,22 @@ impl World {
         });
     }
 
-    /// After each call.
+    /// Called after each API call.
     pub fn after(&self) {
         self.frames.borrow_mut().pop();
     }
 
-    /// How often hooks were called in the call of the top level.
+    /// The number of hook calls within the current call at the top level.
     pub fn hooks(&self) -> u32 {
         self.hook_calls.get()
     }
 
-    /// What each hook does: it counts, and sometimes calls the API in its turn.
+    /// Called by each hook: counts the call, and sometimes calls the API.
     pub fn hook(&self, grant: Grant, times: u32) {
         let calls = self.hook_calls.get() + 1;
         self.hook_calls.set(calls);
         assert!(calls < MOST_HOOKS, "a call does not end");
-        // Once in `times`, and less and less often in one call.
+        // With a probability of 1 in `times`, which falls with the number of hook calls.
         let scarce = times
             .saturating_mul(1 + self.depth.get())
             .saturating_add(calls / 8);
@@ -417,7 +181,7 @@ impl World {
         self.inside(grant, || super::step(self));
     }
 
-    /// Does something as a hook does.
+    /// Runs `action` as a hook.
     pub fn inside<T>(&self, grant: Grant, action: impl FnOnce() -> T) -> T {
         let top = self.frames.borrow().len() - 1;
         let was = self.frames.borrow()[top].grant.replace(grant);
@@ -429,11 +193,10 @@ impl World {
     }
 }
 
-impl Drop for World {
-    fn drop(&mut self) {
-        for (block, layout) in self.blocks.borrow().iter() {
-            // SAFETY: allocated with this layout, and nothing uses it any longer.
-            unsafe { dealloc(*block, *layout) };
-        }
+impl Deref for World {
+    type Target = Memory;
+
+    fn deref(&self) -> &Memory {
+        &self.memory
     }
 }

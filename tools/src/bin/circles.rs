@@ -1,18 +1,18 @@
-//! Holds the crates to the rule that no two files use each other, be it over others.
+//! Checks that no two files of a crate use each other, directly or through other files.
 //!
-//! A file uses another if it names something that stands there, by any path or after a
-//! `use`. What a module only hands on (`pub use`) stands where it is defined. Tests within
-//! a file may use what they like. Prints each circle and fails.
+//! A file uses another if it names an item that is defined there, by any path or after a `use`.
+//! An item that a module re-exports (`pub use`) belongs to the file that defines it. Tests
+//! within a file may use any file. The program prints each circle, and fails if there is one.
 
 use mbm_tools::circles::Crate;
 use mbm_tools::paths::sources;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// The crates, seen from the root of the project.
+/// The folders of the crates, relative to the root of the project.
 const CRATES: [&str; 2] = ["src", "capi/src"];
 
-/// The source files of a crate: names, below its folder, and texts.
+/// The source files of a crate: their paths below its folder, and their texts.
 fn texts(folder: &Path) -> std::io::Result<Vec<(PathBuf, String)>> {
     let mut files = Vec::new();
     sources(folder, &mut files)?;
@@ -47,7 +47,7 @@ fn main() -> ExitCode {
     if failed || count == 0 {
         return ExitCode::FAILURE;
     }
-    println!("circles: {count} files, no other uses one that uses it");
+    println!("circles: {count} files, no two of them use each other");
     ExitCode::SUCCESS
 }
 
@@ -55,7 +55,7 @@ fn main() -> ExitCode {
 mod tests {
     use super::*;
 
-    /// The circles of a crate of these files, each as the names of its files.
+    /// The circles in a crate with these files. Each is a list of file names.
     fn circles(files: &[(&str, &str)]) -> Vec<String> {
         let texts: Vec<(PathBuf, String)> = files
             .iter()
@@ -70,7 +70,7 @@ mod tests {
     const A: &str = "pub fn f() {} pub struct S;";
 
     #[test]
-    fn two_files_that_use_each_other_are_a_circle_by_any_path() {
+    fn two_files_that_use_each_other_by_any_path_are_a_circle() {
         for text in [
             "use crate::b::g; pub fn f() {}",
             "use super::b::{self, g}; pub fn f() {}",
@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn a_circle_over_a_third_file_is_one() {
+    fn a_circle_through_a_third_file_is_found() {
         let files = [
             ROOT,
             ("a.rs", "use crate::b::g; pub fn f() {}"),
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_module_hands_on_stands_where_it_is_defined() {
+    fn a_re_exported_item_belongs_to_the_file_that_defines_it() {
         let parent = "mod one; mod two; pub use one::*; pub use two::h;";
         let one = "pub fn g() {}";
         let two = "use super::g; pub fn h() { g() }";
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_module_that_uses_what_it_hands_on_is_in_a_circle_with_a_child_that_uses_it() {
+    fn a_module_that_uses_an_item_of_its_child_is_in_a_circle_with_a_child_that_uses_the_module() {
         let child = "use super::S; pub fn g(s: S) {}";
         for parent in [
             "mod one; pub use one::*; pub struct S; fn f() { g(S) }",
@@ -135,14 +135,14 @@ mod tests {
     }
 
     #[test]
-    fn a_name_that_happens_to_be_that_of_something_private_elsewhere_is_no_use() {
+    fn a_name_that_equals_a_private_name_of_another_file_is_not_a_use() {
         let parent = "mod one; pub use one::*; pub struct S; fn f(now: u8) { g }";
         let child = "use super::S; fn now() {} fn g(s: *const u8) {} pub fn h() {}";
         assert!(circles(&[("a/mod.rs", parent), ("a/one.rs", child), ("lib.rs", "")]).is_empty());
     }
 
     #[test]
-    fn tests_comments_and_literals_are_no_use() {
+    fn tests_comments_and_literals_are_not_uses() {
         let b = "use crate::a::f; pub fn g() {}";
         for text in [
             "#[cfg(test)]\nmod tests { use crate::b::g; }",

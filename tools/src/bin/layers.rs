@@ -1,14 +1,14 @@
-//! Holds `src/` to the rule that data flows one way.
+//! Checks that a module of `src/` uses only modules of layers to its left.
 //!
-//! A module may name only modules of its own top module or of layers to its
-//! left, be it by `crate::...`, `super::...` or `self::...`, in a `use` or in
-//! code. Prints what breaks the rule and fails.
+//! A module may name only modules of its own top module or of layers to its left: by
+//! `crate::...`, `super::...` or `self::...`, in a `use` or in code. The program prints each
+//! path that breaks the rule, and fails if there is one.
 
 use mbm_tools::paths::{module, named, sources};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// The layers from left to right; modules of one string stand side by side.
+/// The layers from left to right. Modules of one layer may not use each other.
 const LAYERS: [&[&str]; 9] = [
     &["atomic", "error", "time"],
     &["port", "ring", "data"],
@@ -25,7 +25,7 @@ fn layer(module: &str) -> Option<usize> {
     LAYERS.iter().position(|layer| layer.contains(&module))
 }
 
-/// What in the source text of `file` breaks the rule.
+/// The lines of `file` that break the rule, given its source text.
 fn violations(file: &Path, text: &str) -> Vec<String> {
     let path = module(file);
     let Some(own) = path.first() else {
@@ -36,7 +36,7 @@ fn violations(file: &Path, text: &str) -> Vec<String> {
     };
     let broken = |(line, path): (usize, Vec<String>)| {
         let what = match path.first() {
-            // With another name for the root, or all that it holds, anything may follow.
+            // Another name for the root, or a glob of it, would allow any path.
             None => "the whole crate",
             Some(name) if name != own && layer(name) >= Some(own_layer) => name,
             _ => return None,
@@ -93,13 +93,13 @@ mod tests {
         assert_eq!(found, ["src/frame/rtu.rs:2: `frame` may not use `engine`"]);
     }
 
-    /// What is found in `src/frame/rtu.rs` if `text` is all of it.
+    /// The violations in `src/frame/rtu.rs` if `text` is its content.
     fn in_rtu(text: &str) -> Vec<String> {
         violations(Path::new("frame/rtu.rs"), text)
     }
 
     #[test]
-    fn a_grouped_or_inline_path_is_seen_too() {
+    fn a_grouped_or_inline_path_is_checked() {
         let text = "use crate::{error, pdu::bits};\nfn f() { crate::server::g() }\n";
         assert_eq!(violations(Path::new("bytes.rs"), text).len(), 2);
     }
@@ -127,27 +127,27 @@ mod tests {
     }
 
     #[test]
-    fn a_path_by_self_is_a_violation_where_it_leads_out() {
+    fn a_path_by_self_is_a_violation_if_it_leads_out_of_the_module() {
         let text = "use self::super::super::engine::Engine;";
         assert_eq!(in_rtu(text).len(), 1);
         assert!(in_rtu("use self::engine::Engine;").is_empty());
     }
 
     #[test]
-    fn a_path_in_an_inner_module_begins_there() {
+    fn a_path_in_an_inner_module_starts_from_that_module() {
         let inner = "mod tests {\n use super::super::super::engine;\n}";
         assert_eq!(in_rtu(inner).len(), 1);
         assert!(in_rtu("mod tests { use super::*; use super::super::pdu; }").is_empty());
-        // Behind it, a path begins outside again.
-        let behind = "mod tests { fn f() {} }\nuse super::super::engine;";
+        // After the inner module, a path starts from the outer one again.
+        let after = "mod tests { fn f() {} }\nuse super::super::engine;";
         assert_eq!(
-            in_rtu(behind),
+            in_rtu(after),
             ["src/frame/rtu.rs:2: `frame` may not use `engine`"]
         );
     }
 
     #[test]
-    fn a_path_to_the_own_module_or_to_the_left_is_allowed_by_super() {
+    fn a_path_by_super_to_the_same_module_or_to_the_left_is_allowed() {
         let text = "use super::search::{Seen, Verdict};\nuse super::super::error::Status;";
         assert!(in_rtu(text).is_empty());
         assert!(in_rtu("use super::*; use crate::FIRMWARE; fn f(&self) { self.f() }").is_empty());
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn all_of_the_crate_or_another_name_for_it_is_a_violation() {
+    fn a_glob_of_the_crate_or_another_name_for_it_is_a_violation() {
         for text in [
             "use crate::*;",
             "use super::super::*;",
@@ -177,7 +177,7 @@ mod tests {
         ] {
             assert!(in_rtu(text).is_empty(), "{text}");
         }
-        // A lifetime opens no literal.
+        // The quote of a lifetime does not start a literal.
         assert_eq!(
             in_rtu("fn f<'a>(x: &'a u8) { crate::server::f(x) }").len(),
             1
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_module_that_no_layer_knows_is_a_violation() {
+    fn a_module_that_is_in_no_layer_is_a_violation() {
         assert_eq!(violations(Path::new("stray.rs"), "").len(), 1);
     }
 }

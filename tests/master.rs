@@ -1,4 +1,4 @@
-//! The facade from Rust, with a port that needs no C.
+//! The master, used from Rust with a port that is written in Rust.
 
 use mbm::engine::Buffers;
 use mbm::engine::Counter;
@@ -7,7 +7,7 @@ use mbm::frame::checksum::crc16;
 use mbm::master::Master;
 use mbm::port::Port;
 
-/// A wire that answers every request with the same bytes.
+/// A wire that brings the same bytes after every request.
 #[derive(Default)]
 struct Wire {
     now: u32,
@@ -86,7 +86,7 @@ fn unused_bits_of_the_last_word_are_zero_whatever_the_device_sent() {
 }
 
 #[test]
-fn noise_and_a_foreign_frame_are_counted_and_passed_over() {
+fn noise_and_a_frame_of_another_unit_are_counted_and_skipped() {
     let mut bytes = sealed(&[8, 6, 0, 1, 0, 2]);
     bytes.extend([0, 0, 0]);
     bytes.extend(sealed(&[7, 6, 0, 1, 0, 3]));
@@ -101,8 +101,8 @@ fn noise_and_a_foreign_frame_are_counted_and_passed_over() {
 }
 
 #[test]
-fn a_damaged_reply_look_alike_inside_a_foreign_frame_does_not_end_the_wait() {
-    // The foreign payload holds 07 06, which looks like our reply's start.
+fn data_that_look_like_a_damaged_reply_inside_a_frame_of_another_unit_do_not_end_the_wait() {
+    // The frame of unit 8 contains 07 06, which looks like the start of the expected reply.
     let bytes = sealed(&[8, 3, 8, 7, 6, 0, 0, 0, 0, 0, 0]);
     let mut master = master(&bytes);
     assert_eq!(master.write_single_register(1, 3), Status::PENDING);
@@ -110,7 +110,7 @@ fn a_damaged_reply_look_alike_inside_a_foreign_frame_does_not_end_the_wait() {
 }
 
 #[test]
-fn a_request_that_is_answered_on_the_second_try_succeeds_with_a_retry() {
+fn a_request_that_is_answered_after_one_retry_succeeds() {
     let mut master = master(&[]);
     master.settings().retries = 1;
     assert_eq!(master.write_single_coil(5, 1), Status::PENDING);
@@ -123,8 +123,8 @@ fn a_request_that_is_answered_on_the_second_try_succeeds_with_a_retry() {
 }
 
 #[test]
-fn a_reply_at_the_end_of_the_buffer_is_no_echo() {
-    // The request's frame of 15 bytes just fits, and is longer than the reply.
+fn a_reply_at_the_end_of_the_buffer_is_not_taken_for_an_echo() {
+    // The request's frame of 15 bytes fills the buffer, and is longer than the reply.
     for registers in [1, 2] {
         let data = &[0, 1, 0, 2][..2 * registers];
         let reply = sealed(&[&[7, 0x17, data.len() as u8], data].concat());
@@ -136,7 +136,7 @@ fn a_reply_at_the_end_of_the_buffer_is_no_echo() {
         };
         let buffers = Buffers::new([0; 15], [0; 125], [0; 123]);
         let mut master = Master::new(7, wire, buffers);
-        // An echo that does not come.
+        // The master expects an echo, but none arrives.
         master.settings().echo_discard = true;
         let read = registers as u16;
         let started = master.read_write_multiple_registers(0x6B, read, 1, 1);

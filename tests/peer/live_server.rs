@@ -1,5 +1,5 @@
-//! Requests of ours, answered by a live pymodbus server: TCP, RTU over TCP, and
-//! RTU and ASCII over a pseudo-terminal.
+//! A live pymodbus server answers requests of mbm: Modbus TCP, RTU over TCP, and RTU and
+//! ASCII over a pseudo-terminal.
 
 use crate::process::Script;
 use crate::{frame, open, UNIT};
@@ -15,8 +15,8 @@ use std::os::fd::FromRawFd;
 use std::sync::mpsc;
 use std::time::Duration;
 
-/// How long a peer may take on a busy machine.
-pub const PATIENCE: Duration = Duration::from_secs(60);
+/// How long a test waits for a peer; generous, for a busy machine.
+pub const PEER_TIMEOUT: Duration = Duration::from_secs(60);
 
 extern "C" {
     fn posix_openpt(flags: c_int) -> c_int;
@@ -25,11 +25,11 @@ extern "C" {
     fn ptsname(fd: c_int) -> *const c_char;
 }
 
-/// Our end of a pseudo-terminal, and the name of the other.
+/// Our end of a pseudo-terminal, and the path of the other end.
 fn pty() -> (File, String) {
     const READ_AND_WRITE: c_int = 2;
-    // SAFETY: the calls are made in the order that POSIX wants, the descriptor
-    // has one owner, and only one test at a time asks for a name.
+    // SAFETY: the calls are made in the order that POSIX requires, the descriptor has one
+    // owner, and the lock lets only one test at a time call `ptsname`.
     static ONE: std::sync::Mutex<()> = std::sync::Mutex::new(());
     let _one = ONE.lock();
     unsafe {
@@ -40,22 +40,22 @@ fn pty() -> (File, String) {
     }
 }
 
-/// A server and the line to it.
-pub struct Served {
+/// A pymodbus server and the line to it.
+pub struct LiveServer {
     framing: Framing,
     pub out: Box<dyn Write>,
     pub arrived: mpsc::Receiver<Vec<u8>>,
     _server: Script,
 }
 
-impl Served {
-    pub fn new(framing: Framing) -> Served {
+impl LiveServer {
+    pub fn new(framing: Framing) -> LiveServer {
         let unit = UNIT.to_string();
-        let start = |name, place: [&str; 2]| {
-            let arguments = ["--framing", name, place[0], place[1], "--unit", &unit];
+        let start = |name, address: [&str; 2]| {
+            let arguments = ["--framing", name, address[0], address[1], "--unit", &unit];
             let mut server = Script::start("pymodbus_server.py", &arguments);
             let ready = server.line();
-            let port = ready.strip_prefix("ready ").expect("it is ready");
+            let port = ready.strip_prefix("ready ").expect("a ready line");
             (port.parse::<u16>().expect("a port"), server)
         };
         let serial = |name| {
@@ -70,7 +70,7 @@ impl Served {
         };
         let network = |name| {
             let (port, server) = start(name, ["--port", "0"]);
-            let ours = TcpStream::connect(("127.0.0.1", port)).expect("it listens");
+            let ours = TcpStream::connect(("127.0.0.1", port)).expect("the server listens");
             let input = ours.try_clone().expect("a second handle");
             (
                 Box::new(ours) as Box<dyn Write>,
@@ -93,7 +93,7 @@ impl Served {
                 }
             }
         });
-        Served {
+        LiveServer {
             framing,
             out,
             arrived,
@@ -101,29 +101,29 @@ impl Served {
         }
     }
 
-    /// Sends a request and hands its response over.
-    fn ask(&mut self, request: &Request, judge: impl FnOnce(Response)) {
+    /// Sends a request and passes its response to `check`.
+    fn request(&mut self, request: &Request, check: impl FnOnce(Response)) {
         let sent = frame(self.framing, |pdu| request.emit(pdu));
-        self.out.write_all(&sent).expect("it is sent");
+        self.out.write_all(&sent).expect("the bytes are sent");
         let mut reply = Vec::new();
         let mut whole = Vec::new();
         while self.framing.parse(&mut whole, ascii::END).is_err() {
-            let more = self.arrived.recv_timeout(PATIENCE);
+            let more = self.arrived.recv_timeout(PEER_TIMEOUT);
             reply
                 .extend(more.unwrap_or_else(|_| panic!("{request:?}: no reply, but {reply:02X?}")));
             whole.clone_from(&reply);
         }
         let adu = open(self.framing, &mut reply);
-        judge(Response::parse(adu.pdu).expect("a response"));
+        check(Response::parse(adu.pdu).expect("a response"));
     }
 
-    /// As [`Served::ask`], for a response that is known.
+    /// Sends a request and checks that the response is `expected`.
     fn expect(&mut self, request: Request, expected: Response) {
-        self.ask(&request, |response| assert_eq!(response, expected));
+        self.request(&request, |response| assert_eq!(response, expected));
     }
 }
 
-/// What the server's holding register holds.
+/// The value of a holding register of the server.
 pub fn pattern(address: u16) -> [u8; 2] {
     address
         .wrapping_mul(40503)
@@ -132,9 +132,9 @@ pub fn pattern(address: u16) -> [u8; 2] {
 }
 
 fn every_function_is_answered(framing: Framing) {
-    let mut served = Served::new(framing);
+    let mut served = LiveServer::new(framing);
     let s = &mut served;
-    s.ask(&Request::ReadExceptionStatus, |response| {
+    s.request(&Request::ReadExceptionStatus, |response| {
         assert!(matches!(response, Response::ExceptionStatus { .. }));
     });
     for sub_function in [
@@ -144,7 +144,7 @@ fn every_function_is_answered(framing: Framing) {
             sub_function,
             data: &[0, 0],
         };
-        s.ask(&request, |response| match response {
+        s.request(&request, |response| match response {
             Response::Diagnostics {
                 sub_function: own, ..
             } => assert_eq!(own, sub_function),
@@ -162,13 +162,13 @@ fn every_function_is_answered(framing: Framing) {
             data: &[0xA5, 0x37],
         },
     );
-    s.ask(&Request::GetCommEventCounter, |response| {
+    s.request(&Request::GetCommEventCounter, |response| {
         assert!(matches!(
             response,
             Response::CommEventCounter { status: 0, .. }
         ));
     });
-    s.ask(&Request::GetCommEventLog, |response| {
+    s.request(&Request::GetCommEventLog, |response| {
         assert!(matches!(response, Response::CommEventLog { status: 0, .. }));
     });
     let id = b"Vendor-PC-V2.11\xFF";
@@ -180,8 +180,8 @@ fn every_function_is_answered(framing: Framing) {
         },
     );
     let reads = Reads::new(&[6, 0, 4, 0, 1, 0, 2]).expect("in order");
-    s.ask(&Request::ReadFileRecord(reads), |response| match response {
-        // It has one record, however many are asked for.
+    s.request(&Request::ReadFileRecord(reads), |response| match response {
+        // The server returns one record, however many the request names.
         Response::ReadFileRecord(records) => {
             assert_eq!(
                 records.iter().collect::<Vec<_>>(),
@@ -260,11 +260,11 @@ fn every_function_is_answered(framing: Framing) {
     );
 }
 
-fn identification_is_answered(s: &mut Served) {
-    // Regular is basic and four objects more, of which it names one.
+fn identification_is_answered(s: &mut LiveServer) {
+    // The regular category is the basic one and four more objects. The server has one of them.
     for (code, names) in [(1, 3), (2, 4), (3, 4)] {
         let request = Request::ReadDeviceIdentification { code, object: 0 };
-        s.ask(&request, |response| match response {
+        s.request(&request, |response| match response {
             Response::DeviceIdentification {
                 objects,
                 more_follows: false,
@@ -278,7 +278,7 @@ fn identification_is_answered(s: &mut Served) {
         });
     }
     let request = Request::ReadDeviceIdentification { code: 4, object: 2 };
-    s.ask(&request, |response| match response {
+    s.request(&request, |response| match response {
         Response::DeviceIdentification {
             code: 4, objects, ..
         } => {

@@ -1,11 +1,11 @@
-//! The facade's requests beside the requests of `pdu::request`, and what the
-//! facade makes of a reply.
+//! The master's requests compared with those of `pdu::request`, and how the master reads
+//! replies.
 
 mod common;
 #[path = "common/vectors.rs"]
 mod vectors;
 
-use common::master::{frame, sealed, Asker, Call};
+use common::master::{frame, sealed, Call, TestMaster};
 use mbm::engine::Counter;
 use mbm::error::Status;
 use mbm::frame::rtu;
@@ -14,23 +14,24 @@ use mbm::pdu::reply;
 use mbm::pdu::request::Request;
 use vectors::{right_pdus, Direction};
 
-/// The status and the words of a reply frame to a call.
+/// Calls the master's function `function`, and delivers `frame` as the reply. Returns the
+/// status and the response words.
 fn reply(unit: u8, function: u8, words: &[u16], frame: &[u8]) -> (Status, Vec<u16>) {
-    let mut asker = Asker::new(unit, 256);
-    let status = asker.ask(Call::new(function, words), frame, 256, 100);
-    (status, asker.words())
+    let mut master = TestMaster::new(unit, 256);
+    let status = master.request(Call::new(function, words), frame, 256, 100);
+    (status, master.words())
 }
 
-/// The words that travel as these bytes.
-fn words(data: &[u8], of: impl Fn([u8; 2]) -> u16) -> Vec<u16> {
+/// The words that are sent as these bytes.
+fn words(data: &[u8], join: impl Fn([u8; 2]) -> u16) -> Vec<u16> {
     let pairs = data
         .chunks(2)
         .map(|pair| [pair[0], *pair.get(1).unwrap_or(&0)]);
-    pairs.map(of).collect()
+    pairs.map(join).collect()
 }
 
-/// The call that sends the same request, and the words to send; `None` if the facade
-/// has no such function.
+/// The call that sends the same request, and the words to send; `None` if the master has no
+/// such function.
 fn call(request: &Request) -> Option<(Call, Vec<u16>)> {
     let (function, arguments, sent) = match *request {
         Request::ReadBits {
@@ -81,18 +82,18 @@ fn call(request: &Request) -> Option<(Call, Vec<u16>)> {
     Some((Call::new(function, &arguments), sent))
 }
 
-/// Whether a request is built, or with what status it is refused. The master says the
-/// same.
+/// Builds a request. Returns the status that refuses it, if any, and checks that the master
+/// returns the same.
 fn built(call: Call) -> Result<(), Status> {
     let built = call.query().map(drop);
-    let mut asker = Asker::new(17, 256);
-    let told = asker.start(call, &[]);
-    assert_eq!(told, built.err().unwrap_or(Status::PENDING), "{call:?}");
+    let mut master = TestMaster::new(17, 256);
+    let started = master.start(call, &[]);
+    assert_eq!(started, built.err().unwrap_or(Status::PENDING), "{call:?}");
     built
 }
 
 #[test]
-fn the_facade_sends_what_its_request_says_byte_for_byte() {
+fn the_master_sends_the_same_bytes_as_the_encoder_of_requests() {
     let mut compared = 0;
     for vector in right_pdus() {
         if vector.direction == Direction::Request {
@@ -112,7 +113,7 @@ fn the_facade_sends_what_its_request_says_byte_for_byte() {
 }
 
 #[test]
-fn the_facade_expects_the_response_that_its_request_says() {
+fn the_master_expects_a_response_of_the_length_that_follows_from_the_request() {
     for vector in right_pdus() {
         if vector.direction == Direction::Request {
             let request = Request::parse(&vector.bytes).unwrap();
@@ -125,15 +126,15 @@ fn the_facade_expects_the_response_that_its_request_says() {
 }
 
 #[test]
-fn the_facade_refuses_what_its_request_refuses_with_the_same_status() {
+fn the_master_refuses_with_the_same_status_as_the_encoder_of_requests() {
     let data = [0; 300];
     let sizes = [
         0, 1, 2, 121, 122, 123, 124, 125, 126, 1968, 1969, 2000, 2001,
     ];
     let addresses = [0, 1, 63_535, 65_410, 65_534, 65_535];
     let places = || {
-        let of = move |address| sizes.map(|quantity| (address, quantity));
-        addresses.into_iter().flat_map(of)
+        let with_sizes = move |address| sizes.map(|quantity| (address, quantity));
+        addresses.into_iter().flat_map(with_sizes)
     };
     let same = |request: Request| {
         let (call, _) = call(&request).unwrap();
@@ -170,7 +171,7 @@ fn the_facade_refuses_what_its_request_refuses_with_the_same_status() {
 }
 
 #[test]
-fn of_two_faults_the_facade_names_that_of_the_write() {
+fn the_master_reports_a_fault_of_the_write_before_one_of_the_read() {
     let both = |read: (u16, u16), write: (u16, u16)| {
         let data = &[0; 500][..2 * usize::from(write.1)];
         let request = Request::ReadWriteMultipleRegisters {
@@ -193,12 +194,12 @@ fn of_two_faults_the_facade_names_that_of_the_write() {
     assert_eq!(both(many, right), (value, value));
     assert_eq!(both(right, many), (value, value));
     assert_eq!(both(past, many), (value, value));
-    // A server judges both quantities before either range.
+    // A server checks both quantities before the addresses.
     assert_eq!(both(many, past), (address, value));
 }
 
 #[test]
-fn reply_frames_with_their_crc() {
+fn a_reply_frame_with_a_right_crc_is_read() {
     let read = reply(1, 3, &[0x6B, 1], &[1, 3, 2, 0xCD, 0x6B, 0xAD, 0x3B]);
     assert_eq!(read, (Status::OK, vec![0xCD6B]));
     let read = reply(1, 4, &[0x6B, 1], &[1, 4, 2, 0xCD, 0x6B, 0xAC, 0x4F]);
@@ -228,10 +229,10 @@ fn a_write_reply_with_another_address_or_value_is_malformed() {
         let mut pdu = [6, 0, 0x6B, 1, 1];
         pdu[at] = wrong;
         let frame = sealed(&[&[9], &pdu[..]].concat());
-        let mut asker = Asker::new(9, 256);
-        let status = asker.ask(Call::new(6, &[0x6B, 0x0101]), &frame, 256, 100);
+        let mut master = TestMaster::new(9, 256);
+        let status = master.request(Call::new(6, &[0x6B, 0x0101]), &frame, 256, 100);
         assert_eq!(status, Status::MALFORMED_REPLY);
-        let foreign = asker.0.storage().counters[Counter::ForeignFrames as usize];
+        let foreign = master.0.storage().counters[Counter::ForeignFrames as usize];
         assert_eq!(foreign, 1);
     }
 }
@@ -243,22 +244,22 @@ fn exception_codes_of_0_and_from_80_are_malformed() {
             1..=0x7F => Status::from_code(code),
             _ => Status::MALFORMED_REPLY,
         };
-        let mut asker = Asker::new(9, 256);
+        let mut master = TestMaster::new(9, 256);
         let frame = sealed(&[9, 0x86, code]);
-        let status = asker.ask(Call::new(6, &[1, 2]), &frame, 256, 100);
+        let status = master.request(Call::new(6, &[1, 2]), &frame, 256, 100);
         assert_eq!(status, expected);
-        assert_eq!(asker.0.exception_code(), code);
+        assert_eq!(master.0.exception_code(), code);
         assert_eq!(reply::exception_code(&[0x86, code]), Some(code));
     }
 }
 
 #[test]
-fn quantities_and_addresses_are_held_to_the_standard() {
+fn quantities_and_addresses_outside_the_standard_are_refused() {
     use Status as S;
     let value = Err(S::ILLEGAL_DATA_VALUE);
     let address = Err(S::ILLEGAL_DATA_ADDRESS);
-    type Of = fn(u16, u16) -> Call;
-    let calls: [(u16, Of); 8] = [
+    type Build = fn(u16, u16) -> Call;
+    let calls: [(u16, Build); 8] = [
         (2000, |a, q| Call::new(0x01, &[a, q])),
         (2000, |a, q| Call::new(0x02, &[a, q])),
         (125, |a, q| Call::new(0x03, &[a, q])),
