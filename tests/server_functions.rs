@@ -10,14 +10,14 @@ use mbm::server::storage::{HoldingRegisters, Words};
 use mbm::server::Unit;
 
 /// The word that a sub-function of 08 returns.
-fn told(device: &mut Device, sub_function: u8) -> u16 {
+fn diagnostic_word(device: &mut Device, sub_function: u8) -> u16 {
     let answer = ask(device, &[8, 0, sub_function, 0, 0]);
     assert_eq!(answer[..3], [8, 0, sub_function]);
     u16::from_be_bytes([answer[3], answer[4]])
 }
 
 /// Passes a frame to the device; returns the length of the response, 0 if there is none.
-fn hear(device: &mut Device, frame: &[u8]) -> usize {
+fn deliver(device: &mut Device, frame: &[u8]) -> usize {
     let mut buffer = [0; 256];
     buffer[..frame.len()].copy_from_slice(frame);
     let length = frame.len();
@@ -54,10 +54,10 @@ fn unknown_sub_functions_and_wrong_data_are_refused() {
 #[test]
 fn counters_count_as_the_standard_requires() {
     let mut device = Device::new();
-    hear(&mut device, &sealed(&[18, 3, 0, 0, 0, 1]));
-    hear(&mut device, &[17, 3, 0, 0, 0, 1, 9, 9]);
-    hear(&mut device, &sealed(&[0, 6, 0, 100, 0, 1]));
-    hear(&mut device, &sealed(&[0, 3, 0, 100, 0, 1]));
+    deliver(&mut device, &sealed(&[18, 3, 0, 0, 0, 1]));
+    deliver(&mut device, &[17, 3, 0, 0, 0, 1, 9, 9]);
+    deliver(&mut device, &sealed(&[0, 6, 0, 100, 0, 1]));
+    deliver(&mut device, &sealed(&[0, 3, 0, 100, 0, 1]));
     ask(&mut device, &[3, 0, 100, 0, 1]);
     ask(&mut device, &[3, 0, 0, 0, 1]);
     device.refuse = Some((100, 6));
@@ -65,27 +65,27 @@ fn counters_count_as_the_standard_requires() {
     device.refuse = Some((100, 7));
     ask(&mut device, &[6, 0, 100, 0, 1]);
     // The request that reads the counter is one of the messages.
-    assert_eq!(told(&mut device, 0x0B), 8);
-    assert_eq!(told(&mut device, 0x0C), 1);
-    assert_eq!(told(&mut device, 0x0D), 3);
-    assert_eq!(told(&mut device, 0x0E), 6 + 4);
-    assert_eq!(told(&mut device, 0x0F), 2);
-    assert_eq!(told(&mut device, 0x10), 1);
-    assert_eq!(told(&mut device, 0x11), 1);
-    assert_eq!(told(&mut device, 0x12), 0);
+    assert_eq!(diagnostic_word(&mut device, 0x0B), 8);
+    assert_eq!(diagnostic_word(&mut device, 0x0C), 1);
+    assert_eq!(diagnostic_word(&mut device, 0x0D), 3);
+    assert_eq!(diagnostic_word(&mut device, 0x0E), 6 + 4);
+    assert_eq!(diagnostic_word(&mut device, 0x0F), 2);
+    assert_eq!(diagnostic_word(&mut device, 0x10), 1);
+    assert_eq!(diagnostic_word(&mut device, 0x11), 1);
+    assert_eq!(diagnostic_word(&mut device, 0x12), 0);
     device.diagnostics.character_overruns = 5;
-    assert_eq!(told(&mut device, 0x12), 5);
-    told(&mut device, 0x14);
-    assert_eq!(told(&mut device, 0x12), 0);
+    assert_eq!(diagnostic_word(&mut device, 0x12), 5);
+    diagnostic_word(&mut device, 0x14);
+    assert_eq!(diagnostic_word(&mut device, 0x12), 0);
 }
 
 #[test]
 fn clearing_the_counters_keeps_only_the_event_log() {
     let mut device = Device::new();
     device.diagnostics.diagnostic_register = 0x1234;
-    assert_eq!(told(&mut device, 0x02), 0x1234);
+    assert_eq!(diagnostic_word(&mut device, 0x02), 0x1234);
     ask(&mut device, &[3, 0, 0, 0, 1]);
-    told(&mut device, 0x0A);
+    diagnostic_word(&mut device, 0x0A);
     let line = &device.diagnostics;
     assert_eq!(
         (line.bus_messages, line.events, line.exception_errors),
@@ -93,7 +93,7 @@ fn clearing_the_counters_keeps_only_the_event_log() {
     );
     assert_eq!(line.diagnostic_register, 0);
     assert!(line.logged > 0);
-    assert_eq!(told(&mut device, 0x0B), 1);
+    assert_eq!(diagnostic_word(&mut device, 0x0B), 1);
 }
 
 #[test]
@@ -112,8 +112,8 @@ fn the_event_log_has_the_latest_event_first() {
     let mut device = Device::new();
     ask(&mut device, &[3, 0, 100, 0, 1]);
     ask(&mut device, &[3, 0, 0, 0, 1]);
-    hear(&mut device, &[17, 3, 0, 0, 0, 1, 9, 9]);
-    hear(&mut device, &sealed(&[0, 6, 0, 100, 0, 1]));
+    deliver(&mut device, &[17, 3, 0, 0, 0, 1, 9, 9]);
+    deliver(&mut device, &sealed(&[0, 6, 0, 100, 0, 1]));
     let log = ask(&mut device, &[0x0C]);
     assert_eq!(log[..8], [0x0C, 14, 0, 0, 0, 2, 0, 4]);
     // In this order: the request for the log received; the broadcast; the damaged frame; the
@@ -147,7 +147,7 @@ fn a_restart_ends_listen_only_mode_and_is_not_answered() {
         assert_eq!(ask(&mut device, request), []);
     }
     assert_eq!(device.holding, Device::new().holding);
-    hear(&mut device, &sealed(&[0, 6, 0, 100, 9, 9]));
+    deliver(&mut device, &sealed(&[0, 6, 0, 100, 9, 9]));
     assert_eq!(device.holding, Device::new().holding);
     assert_eq!(ask(&mut device, &[8, 0, 1, 0, 0]), []);
     assert_eq!(device.diagnostics.listen_only, 0);

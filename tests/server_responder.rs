@@ -325,9 +325,9 @@ fn malformed_file_requests_are_refused() {
 fn queues_are_read_and_not_emptied() {
     let mut device = Device::new();
     let request = [0x18, 0x04, 0xDE];
-    let told = [0x18, 0, 6, 0, 2, 0x01, 0xB8, 0x12, 0x84];
-    assert_eq!(ask(&mut device, &request), told);
-    assert_eq!(ask(&mut device, &request), told);
+    let response = [0x18, 0, 6, 0, 2, 0x01, 0xB8, 0x12, 0x84];
+    assert_eq!(ask(&mut device, &request), response);
+    assert_eq!(ask(&mut device, &request), response);
     assert!(refuses(&[0x18, 0, 0], 2));
     // A response may hold 31 registers at most.
     assert!(refuses(&[0x18, 0, 32], 3));
