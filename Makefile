@@ -96,7 +96,7 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 
 # --- tests. Compiling and tests that wait run side by side.
 
-# One more than there are processors: the tests in Rust wait for peers.
+# One job more than processors, because the tests in Rust often wait for peers.
 JOBS ?= $(shell echo $$(($$(nproc) + 1)))
 BUILDS := plain sanitized firmware valgrind
 # The programs in valgrind come first, because they take the longest.
