@@ -1,10 +1,10 @@
-# mbm: `make help` lists what there is.
+# mbm: `make help` lists the targets.
 
 CARGO ?= cargo
 comma := ,
 BUILD := build
 ARCHIVE := target/release/libmbm.a
-# The same, with the code that only firmware runs.
+# The same archive, with the code that only firmware runs.
 FIRMWARE_ARCHIVE := $(BUILD)/firmware/libmbm.a
 
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wundef -Werror
@@ -18,21 +18,22 @@ SANITIZERS := -fsanitize=address,undefined -fno-sanitize-recover=all
 SUPPORT := $(wildcard c-tests/support/*.c) $(wildcard examples/linux/mbm_*.c)
 TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
-# Examples that a test named after each drives.
+# Examples that the test of the same name runs.
 TESTED_EXAMPLES := custom_command gateway
-# What clang-format formats. The headers in include/ are documentation too, laid out by hand.
+# The files that clang-format formats. The headers in include/ are documentation too, and are
+# formatted by hand.
 C_SOURCES = $(shell git ls-files 'c-tests/*.[ch]' 'c-tests/*.cpp' 'examples/*.[ch]' 'firmware-tests/*.[ch]')
 HEADERS := $(wildcard include/*.h c-tests/*.h c-tests/support/*.h c-tests/shim/* examples/linux/*.h)
 
 .PHONY: help
-help: ## What there is
+help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 20
 
 .PHONY: archive
-archive: $(ARCHIVE) ## The archive for this machine, target/release/libmbm.a
+archive: $(ARCHIVE) ## Build the archive for this machine, target/release/libmbm.a
 	@echo "archive: $(ARCHIVE)"
 
-# Cargo knows best what is out of date.
+# Phony, because Cargo decides what is out of date.
 .PHONY: $(ARCHIVE) $(FIRMWARE_ARCHIVE)
 $(ARCHIVE):
 	@CARGO="$(CARGO)" scripts/archive-host $@
@@ -41,25 +42,25 @@ $(FIRMWARE_ARCHIVE):
 
 MCUS := $(shell scripts/archive --list)
 .PHONY: archives
-archives: ## The archives for microcontrollers, build/archives and build/minimal
+archives: ## Build the archives for microcontrollers, build/archives and build/minimal
 	@for mcu in $(MCUS); do scripts/archive $$mcu && scripts/archive $$mcu minimal || exit 1; done
 	@scripts/check-archive
 
 .PHONY: install
-install: $(ARCHIVE) ## Library, header, ports, pkg-config and CMake files, below PREFIX
+install: $(ARCHIVE) ## Install library, header, ports, pkg-config and CMake files below PREFIX
 	@PREFIX="$(PREFIX)" LIBDIR="$(LIBDIR)" DESTDIR="$(DESTDIR)" scripts/install
 
 .PHONY: dist
-dist: $(ARCHIVE) ## Sources and what archives stand built, dist/mbm-VERSION.tar.gz
+dist: $(ARCHIVE) ## Pack the sources and the archives built so far, dist/mbm-VERSION.tar.gz
 	@scripts/dist
 
 .PHONY: check-install
-check-install: $(ARCHIVE) ## Installs, builds and runs the README's program; packs twice
+check-install: $(ARCHIVE) ## Install, build and run the README's program; pack twice and compare
 	@scripts/need gcc libc6-dev make cmake pkg-config
 	@scripts/check-install
 
 .PHONY: size
-size: ## Flash and RAM that the library adds, and what changed since docs/reports/size.md
+size: ## Measure the flash and RAM that the library adds, and compare with docs/reports/size.md
 	@scripts/size
 
 # The crate with the C functions.
@@ -67,11 +68,11 @@ CAPI := capi
 CBINDGEN = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen 0.29.4) && \
            "$$tool" --quiet --config cbindgen.toml --output include/mbm.h $(CAPI)
 .PHONY: header
-header: ## Write include/mbm.h anew from the source
-	@$(CBINDGEN) && echo "include/mbm.h is that of the source"
+header: ## Generate include/mbm.h from the source
+	@$(CBINDGEN) && echo "header: include/mbm.h generated from the source"
 
 .PHONY: check
-check: need-check $(ARCHIVE) ## Formatting, lints, layers, circles, header, functions, symbols
+check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header, docs, functions, symbols
 	@$(CARGO) fmt --all --check
 	@for crate in fuzz bench model; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml --check || exit 1; done
 	@$(CARGO) clippy --quiet --workspace --all-targets --features pymodbus -- -D warnings
@@ -90,26 +91,26 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, circles, header, func
 	@scripts/check-packages
 	@$(MAKE) --no-print-directory check-pages
 	@scripts/check-symbols $(ARCHIVE)
-	@! grep -rn 'target_os' src capi | grep -v 'cfg_attr\|mbm_firmware' # else no test runs that code
+	@! grep -rn 'target_os' src capi | grep -v 'cfg_attr\|mbm_firmware' # no test could run such code
 	@echo "check: formatting, lints, layers, header and symbols are in order"
 
-# --- tests. What compiles and what only waits run side by side.
+# --- tests. Compiling and tests that wait run side by side.
 
-# One more than there are processors: the tests in Rust wait for peers.
+# One job more than processors, because the tests in Rust often wait for peers.
 JOBS ?= $(shell echo $$(($$(nproc) + 1)))
 BUILDS := plain sanitized firmware valgrind
-# Valgrind's first, which take the longest.
+# The programs in valgrind come first, because they take the longest.
 PROGRAMS = $(foreach build,$(filter valgrind,$(BUILDS)) $(filter-out valgrind,$(BUILDS)),$(TESTS:%=$(BUILD)/$(build)/%))
 
 .PHONY: format
-format: ## Format Rust, C and C++ as `make check` wants it
+format: ## Format Rust, C and C++ as `make check` requires
 	@scripts/need clang-format
 	@$(CARGO) fmt --all
 	@for crate in fuzz bench model; do $(CARGO) fmt --manifest-path $$crate/Cargo.toml || exit 1; done
 	@clang-format -i $(C_SOURCES)
 
 .PHONY: abi
-abi: ## Write packaging/mbm.abi anew, the interface that `make check` compares
+abi: ## Generate packaging/mbm.abi, with which `make check` compares the C interface
 	@scripts/need gcc libc6-dev abigail-tools
 	@scripts/abi
 
@@ -120,42 +121,42 @@ compile-commands: ## Write compile_commands.json, for editors and clang-tidy
 		$(TESTED_EXAMPLES:%=$(BUILD)/plain/linux/%) $(CLIENTS) $(DEMO) $(SNIFF) $(BUILD)/plain/linux/basic | scripts/compile-commands
 
 .PHONY: tidy
-tidy: compile-commands ## What clang-tidy finds in C and C++; the checks are in .clang-tidy
+tidy: compile-commands ## Run clang-tidy over C and C++, with the checks in .clang-tidy
 	@scripts/need clang-tidy
 	@sed -n 's/.*"file": "\([^"]*\)".*/\1/p' compile_commands.json | \
-		xargs -P "$$(nproc)" -n 1 clang-tidy --quiet 2>/dev/null || { echo "tidy: see above" >&2; exit 1; }
+		xargs -P "$$(nproc)" -n 1 clang-tidy --quiet 2>/dev/null || { echo "tidy: clang-tidy has findings (above)" >&2; exit 1; }
 	@echo "tidy: nothing found"
 
 DENY = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cargo-deny 0.20.2 --no-default-features)
 .PHONY: deny
-deny: ## Licences and origin of all crates, by cargo-deny; the rules are in deny.toml
+deny: ## Check licences and origin of all crates with cargo-deny; the rules are in deny.toml
 	@$(DENY) && for lock in . fuzz bench model; do \
 		"$$tool" --workspace --manifest-path $$lock/Cargo.toml check --hide-inclusion-graph licenses bans sources || exit 1; done
 
 .PHONY: test
-test: need-test ## Every test: Rust, C and C++; sanitizers and valgrind
+test: need-test ## Run every test: Rust, C and C++, also with sanitizers and in valgrind
 	@rm -rf $(BUILD)/tests
 	@$(MAKE) --no-print-directory --keep-going -j$(JOBS) build-rust test-rust test-rust-firmware run-c-tests; scripts/test-totals
 
 .PHONY: test-c
-test-c: need-test ## C and C++ alone: TESTS="test_ring test_bits" BUILDS="plain valgrind" TEST=one_test
+test-c: need-test ## Run only C and C++: TESTS="test_ring test_bits" BUILDS="plain valgrind" TEST=one_test
 	@$(MAKE) --no-print-directory -j$(JOBS) run-c-tests
 
 .PHONY: build-rust test-rust test-rust-firmware run-c-tests
 build-rust: need-test
 	+@CARGO="$(CARGO)" scripts/test-rust --build
-test-rust: build-rust $(BUILD)/plain/serve venv ## Rust alone; `cargo test NAME` runs the tests of that name
+test-rust: build-rust $(BUILD)/plain/serve venv ## Run only Rust; `cargo test NAME` runs tests with that name
 	+@CARGO="$(CARGO)" scripts/test-rust rust
-test-rust-firmware: build-rust $(BUILD)/plain/serve venv ## Rust alone, the code that only firmware runs
+test-rust-firmware: build-rust $(BUILD)/plain/serve venv ## Run only Rust, with the code that only firmware runs
 	+@CARGO="$(CARGO)" scripts/test-rust rust-firmware
-# What the tests find of a bad wire is the committed table.
+# scripts/test-totals compares the results of test_bad_wire with the committed fault table.
 run-c-tests: $(PROGRAMS)
 	@mkdir -p $(BUILD)/tests
 	@MBM_TEST="$(TEST)" scripts/run-c-tests $(PROGRAMS) >$(BUILD)/tests/c.txt; code=$$?; cat $(BUILD)/tests/c.txt; \
 	tail -n 1 $(BUILD)/tests/c.txt >$(BUILD)/tests/c.total; exit $$code
 
 .PHONY: coverage
-coverage: need-test ## Which lines the tests run, Rust and C, into docs/reports/coverage.md
+coverage: need-test ## Measure the lines that the tests run, Rust and C; writes docs/reports/coverage.md
 	@scripts/need llvm-22
 	@$(MAKE) --no-print-directory venv $(BUILD)/plain/serve
 	@CARGO="$(CARGO)" JOBS="$(JOBS)" scripts/coverage
@@ -164,22 +165,22 @@ coverage-tests: $(TESTS:%=$(BUILD)/coverage/%)
 	@scripts/run-c-tests $^
 
 .PHONY: venv
-venv: ## The Python environment with the peers of tests/peer, build/venv
+venv: ## Create the Python environment for tests/peer, build/venv
 	@scripts/venv
 
 .PHONY: miri
-miri: ## Hold the hooks against Rust's rules of aliasing, with Miri of the nightly toolchain
+miri: ## Check the hooks against Rust's aliasing rules, with Miri of the nightly toolchain
 	@$(CARGO) +nightly miri test --quiet --package mbm-c --test reentry
 	@MIRIFLAGS=-Zmiri-tree-borrows $(CARGO) +nightly miri test --quiet --package mbm-c --test reentry
 
 .PHONY: fuzz
-fuzz: ## Fuzz every decoder and the C API for FUZZ_SECONDS in all (60)
+fuzz: ## Fuzz every decoder and the C API, FUZZ_SECONDS in total (60)
 	@scripts/need g++ libc6-dev libmodbus-dev
 	@CARGO="$(CARGO)" scripts/fuzz
 
 CALLS ?= 10000000
 .PHONY: fuzz-api
-fuzz-api: ## Fuzz sequences of C API calls until there were CALLS of them (10000000)
+fuzz-api: ## Fuzz the C API with sequences of calls, CALLS in total (10000000)
 	@scripts/need g++ libc6-dev libmodbus-dev
 	@CARGO="$(CARGO)" MBM_API_CALLS=$(CALLS) scripts/fuzz c_api
 
@@ -192,7 +193,7 @@ model: ## Try every order of events around a request for MODEL_SECONDS (300)
 	@$(CARGO) run $(MODEL) -- $(MODEL_SECONDS)
 
 .PHONY: fault-table
-fault-table: need-test ## Write docs/reports/fault-table.md from what the test finds
+fault-table: need-test ## Generate docs/reports/fault-table.md from the test's results
 	@$(MAKE) --no-print-directory $(BUILD)/plain/test_bad_wire
 	@scripts/run-c-tests $(BUILD)/plain/test_bad_wire
 	@scripts/fault-table
@@ -204,7 +205,8 @@ need-test:
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev \
 		perl valgrind mbpoll
 
-# The test programs, one folder a variant: $(1) name, $(2) C, $(3) C++, $(4) flags, $(5) archive
+# The test programs, one folder for each variant: $(1) name, $(2) C compiler, $(3) C++ compiler,
+# $(4) flags, $(5) archive
 define variant
 $(BUILD)/$(1)/%.o: c-tests/%.c $(HEADERS)
 	@mkdir -p $$(@D)
@@ -224,8 +226,8 @@ $(BUILD)/$(1)/test_gateway_replies $(BUILD)/$(1)/test_gateway_shortage: | $(BUIL
 endef
 $(eval $(call variant,plain,gcc,g++,))
 $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS)))
-# scripts/coverage makes the archive first, with counters in it. It is not trimmed: nothing calls
-# the name that its unwind tables want.
+# scripts/coverage builds the archive with counters first. It is not trimmed, so its unwind tables
+# refer to rust_eh_personality, which is defined as 0 because nothing calls it.
 COUNTERS := --coverage -Wl$(comma)-u$(comma)__llvm_profile_runtime -Wl$(comma)--defsym$(comma)rust_eh_personality=0
 $(eval $(call variant,coverage,gcc,g++,$(COUNTERS),$(BUILD)/coverage/libmbm.a))
 .SECONDARY:
@@ -240,7 +242,7 @@ $(TESTED_EXAMPLES:%=$(BUILD)/firmware/linux/%): $(BUILD)/firmware/%: $(BUILD)/pl
 $(TESTED_EXAMPLES:%=$(BUILD)/firmware/test_%): $(BUILD)/firmware/test_%: | $(BUILD)/firmware/linux/%
 $(BUILD)/firmware/test_gateway_replies $(BUILD)/firmware/test_gateway_shortage: | $(BUILD)/firmware/linux/gateway
 
-# What peers of another house ask.
+# mbm's server, for the tests with pymodbus's client.
 SERVE := $(BUILD)/plain/serve
 $(SERVE): $(patsubst %,$(BUILD)/plain/%.o,serve support/served support/pty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lpthread -o $@
@@ -250,7 +252,7 @@ $(TESTS:%=$(BUILD)/valgrind/%): $(BUILD)/valgrind/%: $(BUILD)/plain/%
 	@mkdir -p $(@D)
 	@ln -sfn ../plain/$* $@
 
-# The same flags as the peer's package is built with.
+# The same optimisation as that of Debian's libmodbus.
 $(eval $(call variant,bench,gcc,g++,-O2))
 BENCH := $(BUILD)/bench/bench
 $(BENCH): $(patsubst %,$(BUILD)/bench/%.o,bench support/pty support/server linux/mbm_tty) $(ARCHIVE)
@@ -266,7 +268,7 @@ $(BENCH_SNIFFER): $(BUILD)/bench/bench_sniffer.o $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
 .PHONY: bench
-bench: ## Speed and instructions beside libmodbus and rmodbus; writes docs/reports/*speed.md
+bench: ## Compare speed and instructions with libmodbus and rmodbus; writes docs/reports/*speed.md
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev valgrind
 	@$(MAKE) --no-print-directory $(BENCH) $(BENCH_SERVER) $(BENCH_CLIENT) $(BENCH_SNIFFER)
 	@scripts/bench $(BENCH)
@@ -286,7 +288,7 @@ $(SNIFF): $(patsubst %,$(BUILD)/plain/%.o,linux/sniff linux/mbm_tty) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
 .PHONY: sniff
-sniff: ## The example that watches a bus, build/plain/linux/sniff
+sniff: ## Build and check the example that watches a bus, build/plain/linux/sniff
 	@scripts/need gcc libc6-dev
 	@$(MAKE) --no-print-directory $(SNIFF)
 	@scripts/check-sniff $(SNIFF)
@@ -299,23 +301,23 @@ $(PEERS): $(patsubst %,$(BUILD)/plain/%.o,serve_libmodbus support/server support
 	@gcc $(filter %.o,$^) -lmodbus -lpthread -o $@
 
 .PHONY: clients
-clients: ## Examples with the client, checked: poll_table, scan, logger in build/plain/linux
+clients: ## Build and check the client examples poll_table, scan and logger in build/plain/linux
 	@scripts/need python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
 	@$(MAKE) --no-print-directory venv $(CLIENTS) $(PEERS)
 	@$(BUILD)/venv/bin/python scripts/check-clients $(BUILD)/plain
 	@$(BUILD)/venv/bin/python scripts/check-clients-lost $(BUILD)/plain
 
 .PHONY: demo
-demo: ## Every function at work against a libmodbus server, frame by frame
+demo: ## Show every function against a libmodbus server, frame by frame
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev
 	@$(MAKE) --no-print-directory $(DEMO) $(BUILD)/plain/linux/basic
 	@$(DEMO)
 
-# What the commands of the pages run.
+# The programs that the commands in the pages run.
 PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway) $(SNIFF) $(CLIENTS) $(SERVE)
 ARM_LIBC := $(if $(shell command -v arm-none-eabi-gcc),libnewlib-arm-none-eabi)
 .PHONY: check-pages
-check-pages: $(ARCHIVE) ## Compile and run what README and docs show, and follow their links; PAGES=--all leaves nothing out
+check-pages: $(ARCHIVE) ## Compile and run the blocks of README and docs, and check links; PAGES=--all: skip nothing
 	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev gcc-avr avr-libc arduino-core-avr \
 		$(if $(filter --all,$(PAGES)),gcc-arm-none-eabi libnewlib-arm-none-eabi) \
 		$(ARM_LIBC)
@@ -327,7 +329,7 @@ include scripts/arduino.mk
 include firmware-tests/qemu/qemu.mk
 
 .PHONY: firmware-test
-firmware-test: ## Firmware on simulated chips against a libmodbus server
+firmware-test: ## Run firmware on simulated chips against a libmodbus server
 	@$(MAKE) --no-print-directory firmware-test-avr
 	@$(MAKE) --no-print-directory firmware-test-qemu
 	@echo "firmware-test: sketches on AVR boards and bare metal on QEMU work"

@@ -1,7 +1,7 @@
 # The Arduino library, and sketches on simulated AVR boards.
 
 .PHONY: assembler
-assembler: ## The library as assembler source, a file an instruction set, build/assembler
+assembler: ## Write the library as assembler source, one file for each instruction set, build/assembler
 	@scripts/assembler
 	@scripts/assembler minimal
 
@@ -10,7 +10,7 @@ library: assembler
 	@scripts/arduino
 
 .PHONY: arduino
-arduino: library ## The Arduino libraries: dist/mbm, dist/minimal/mbm-minimal, a zip of each
+arduino: library ## Build and check the Arduino libraries dist/mbm and dist/minimal/mbm-minimal, and their zips
 	@scripts/check-arduino
 	@scripts/check-assembler
 
@@ -105,11 +105,11 @@ firmware-test-avr: need-avr
 
 
 .PHONY: timing
-timing: need-avr ## Bus timing, RAM and flash on a simulated Uno, into docs/reports/timing.md
+timing: need-avr ## Measure bus timing, RAM and flash on a simulated Uno; writes docs/reports/timing.md
 	@$(MAKE) -s --no-print-directory avr-sketches $(TIMING)
 	@scripts/timing
 
 .PHONY: check-timing
-check-timing: need-avr ## Bus timing on a simulated Uno against docs/reports/timing.md
+check-timing: need-avr ## Compare bus timing, RAM and flash on a simulated Uno with docs/reports/timing.md
 	@$(MAKE) -s --no-print-directory avr-sketches $(TIMING)
 	@scripts/timing --check

@@ -1,9 +1,8 @@
-"""An object file of the ESP32 as text for any assembler of an Xtensa: its bytes, and a
-line for each place that the linker fills in.
+"""Converts an object file of the ESP32 to text for any Xtensa assembler: its bytes, and a line
+for each relocation.
 
-The assembler that is to be had here does not know the ESP32's register windows, so
-nothing could show that it reads LLVM's text for them as LLVM meant it. Bytes can be
-read in one way alone.
+Debian has no assembler that supports the ESP32's register windows. So no check could show that
+the user's assembler reads LLVM's text as LLVM does. Bytes have only one meaning.
 """
 
 import struct
@@ -38,7 +37,7 @@ def string(table: bytes, at: int) -> str:
 
 
 def member(archive: bytes) -> bytes:
-    """The first object of an archive, behind the table of symbols and long names."""
+    """The first object of an archive. It follows the table of symbols and the long names."""
     at = 8
     while at < len(archive):
         size = int(archive[at + 48:at + 58])
@@ -94,7 +93,7 @@ def one(section: Section, index: int, symbols: list, fills: bytes, number: dict)
     name = exported[0].name if exported else f"mbm.{number[index]}"
     if ".unlikely." in section.name:
         name = f"unlikely.{name}"
-    # Constants are not marked for merging: they are referred to by their section.
+    # Constants are not marked for merging, because relocations refer to their section.
     out = [f'\t.section\t{base}.{name},"{flags}",@progbits', f"\t.balign\t{max(section.align, 1)}",
            f".Ls{number[index]}:"]
     if exported and not function:
@@ -111,7 +110,7 @@ def one(section: Section, index: int, symbols: list, fills: bytes, number: dict)
     for at, info, addend in struct.iter_unpack("<IIi", fills):
         symbol = symbols[info >> 8]
         if info & 255 == R_32:
-            # What stands there is added.
+            # The value in the section is added to the addend.
             words[at] = place(symbol, addend + struct.unpack_from("<i", section.data, at)[0], number)
         elif info & 255 == R_SLOT0_OP:
             out.append(f"\t.reloc\t{at}, R_XTENSA_SLOT0_OP, {place(symbol, addend, number)}")

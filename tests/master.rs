@@ -7,7 +7,7 @@ use mbm::frame::checksum::crc16;
 use mbm::master::Master;
 use mbm::port::Port;
 
-/// A wire that brings the same bytes after every request.
+/// A wire on which the same bytes arrive after every request.
 #[derive(Default)]
 struct Wire {
     now: u32,
@@ -75,7 +75,7 @@ fn registers_are_read_into_the_response_words() {
 }
 
 #[test]
-fn unused_bits_of_the_last_word_are_zero_whatever_the_device_sent() {
+fn unused_bits_of_the_last_word_are_zero_even_if_the_device_sets_them() {
     let mut master = master(&sealed(&[7, 1, 3, 0xFF, 0xFF, 0xFF]));
     assert_eq!(master.read_coils(0, 17), Status::PENDING);
     assert_eq!(finish(&mut master), Status::OK);

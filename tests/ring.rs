@@ -23,7 +23,7 @@ fn a_ring_holds_one_byte_less_than_its_storage() {
 }
 
 #[test]
-fn a_ring_without_storage_loses_what_is_put() {
+fn a_ring_without_storage_loses_every_byte() {
     for count in 0..2 {
         let (bytes, positions) = (storage_of(count), Positions::new());
         let ring = Ring::new(&bytes, &positions);

@@ -1,4 +1,4 @@
-//! Diagnostics, functions of a user, functions switched off, and several units.
+//! Diagnostics, user-defined functions, disabled functions, and several units.
 
 mod common;
 
@@ -9,15 +9,15 @@ use mbm::server::respond::respond;
 use mbm::server::storage::{HoldingRegisters, Words};
 use mbm::server::Unit;
 
-/// A word that a sub-function of 08 returns.
-fn told(device: &mut Device, sub_function: u8) -> u16 {
+/// The word that a sub-function of 08 returns.
+fn diagnostic_word(device: &mut Device, sub_function: u8) -> u16 {
     let answer = ask(device, &[8, 0, sub_function, 0, 0]);
     assert_eq!(answer[..3], [8, 0, sub_function]);
     u16::from_be_bytes([answer[3], answer[4]])
 }
 
-/// Hands a frame to the device, which may not be for it.
-fn hear(device: &mut Device, frame: &[u8]) -> usize {
+/// Passes a frame to the device; returns the length of the response, 0 if there is none.
+fn deliver(device: &mut Device, frame: &[u8]) -> usize {
     let mut buffer = [0; 256];
     buffer[..frame.len()].copy_from_slice(frame);
     let length = frame.len();
@@ -27,7 +27,7 @@ fn hear(device: &mut Device, frame: &[u8]) -> usize {
 }
 
 #[test]
-fn query_data_come_back_whatever_they_are() {
+fn query_data_of_any_length_are_returned() {
     let mut device = Device::new();
     for words in 1..=125 {
         let request = [&[8, 0, 0][..], &vec![0xA5; 2 * words]].concat();
@@ -52,40 +52,40 @@ fn unknown_sub_functions_and_wrong_data_are_refused() {
 }
 
 #[test]
-fn counters_count_what_the_standard_says() {
+fn counters_count_as_the_standard_requires() {
     let mut device = Device::new();
-    hear(&mut device, &sealed(&[18, 3, 0, 0, 0, 1]));
-    hear(&mut device, &[17, 3, 0, 0, 0, 1, 9, 9]);
-    hear(&mut device, &sealed(&[0, 6, 0, 100, 0, 1]));
-    hear(&mut device, &sealed(&[0, 3, 0, 100, 0, 1]));
+    deliver(&mut device, &sealed(&[18, 3, 0, 0, 0, 1]));
+    deliver(&mut device, &[17, 3, 0, 0, 0, 1, 9, 9]);
+    deliver(&mut device, &sealed(&[0, 6, 0, 100, 0, 1]));
+    deliver(&mut device, &sealed(&[0, 3, 0, 100, 0, 1]));
     ask(&mut device, &[3, 0, 100, 0, 1]);
     ask(&mut device, &[3, 0, 0, 0, 1]);
     device.refuse = Some((100, 6));
     ask(&mut device, &[6, 0, 100, 0, 1]);
     device.refuse = Some((100, 7));
     ask(&mut device, &[6, 0, 100, 0, 1]);
-    // The request itself is one of the messages.
-    assert_eq!(told(&mut device, 0x0B), 8);
-    assert_eq!(told(&mut device, 0x0C), 1);
-    assert_eq!(told(&mut device, 0x0D), 3);
-    assert_eq!(told(&mut device, 0x0E), 6 + 4);
-    assert_eq!(told(&mut device, 0x0F), 2);
-    assert_eq!(told(&mut device, 0x10), 1);
-    assert_eq!(told(&mut device, 0x11), 1);
-    assert_eq!(told(&mut device, 0x12), 0);
+    // The request that reads the counter is one of the messages.
+    assert_eq!(diagnostic_word(&mut device, 0x0B), 8);
+    assert_eq!(diagnostic_word(&mut device, 0x0C), 1);
+    assert_eq!(diagnostic_word(&mut device, 0x0D), 3);
+    assert_eq!(diagnostic_word(&mut device, 0x0E), 6 + 4);
+    assert_eq!(diagnostic_word(&mut device, 0x0F), 2);
+    assert_eq!(diagnostic_word(&mut device, 0x10), 1);
+    assert_eq!(diagnostic_word(&mut device, 0x11), 1);
+    assert_eq!(diagnostic_word(&mut device, 0x12), 0);
     device.diagnostics.character_overruns = 5;
-    assert_eq!(told(&mut device, 0x12), 5);
-    told(&mut device, 0x14);
-    assert_eq!(told(&mut device, 0x12), 0);
+    assert_eq!(diagnostic_word(&mut device, 0x12), 5);
+    diagnostic_word(&mut device, 0x14);
+    assert_eq!(diagnostic_word(&mut device, 0x12), 0);
 }
 
 #[test]
-fn clearing_leaves_nothing_but_the_log() {
+fn clearing_the_counters_keeps_only_the_event_log() {
     let mut device = Device::new();
     device.diagnostics.diagnostic_register = 0x1234;
-    assert_eq!(told(&mut device, 0x02), 0x1234);
+    assert_eq!(diagnostic_word(&mut device, 0x02), 0x1234);
     ask(&mut device, &[3, 0, 0, 0, 1]);
-    told(&mut device, 0x0A);
+    diagnostic_word(&mut device, 0x0A);
     let line = &device.diagnostics;
     assert_eq!(
         (line.bus_messages, line.events, line.exception_errors),
@@ -93,11 +93,11 @@ fn clearing_leaves_nothing_but_the_log() {
     );
     assert_eq!(line.diagnostic_register, 0);
     assert!(line.logged > 0);
-    assert_eq!(told(&mut device, 0x0B), 1);
+    assert_eq!(diagnostic_word(&mut device, 0x0B), 1);
 }
 
 #[test]
-fn the_event_counter_counts_what_was_carried_out() {
+fn the_event_counter_counts_successful_requests() {
     let mut device = Device::new();
     assert_eq!(ask(&mut device, &[0x0B]), [0x0B, 0, 0, 0, 0]);
     ask(&mut device, &[3, 0, 100, 0, 1]);
@@ -108,15 +108,17 @@ fn the_event_counter_counts_what_was_carried_out() {
 }
 
 #[test]
-fn the_event_log_tells_the_latest_first() {
+fn the_event_log_has_the_latest_event_first() {
     let mut device = Device::new();
     ask(&mut device, &[3, 0, 100, 0, 1]);
     ask(&mut device, &[3, 0, 0, 0, 1]);
-    hear(&mut device, &[17, 3, 0, 0, 0, 1, 9, 9]);
-    hear(&mut device, &sealed(&[0, 6, 0, 100, 0, 1]));
+    deliver(&mut device, &[17, 3, 0, 0, 0, 1, 9, 9]);
+    deliver(&mut device, &sealed(&[0, 6, 0, 100, 0, 1]));
     let log = ask(&mut device, &[0x0C]);
     assert_eq!(log[..8], [0x0C, 14, 0, 0, 0, 2, 0, 4]);
-    // Received; sent and received of the broadcast; damaged; exception; read.
+    // In this order: the request for the log received; the broadcast; the damaged frame; the
+    // exception sent and its request received; the response to the read sent and its request
+    // received.
     assert_eq!(log[8..], [0x80, 0x40, 0xC0, 0x82, 0x41, 0x80, 0x40, 0x80]);
 }
 
@@ -132,7 +134,7 @@ fn the_event_log_keeps_64_events() {
 }
 
 #[test]
-fn listen_only_mode_ends_with_a_restart_that_is_not_answered() {
+fn a_restart_ends_listen_only_mode_and_is_not_answered() {
     let mut device = Device::new();
     assert_eq!(ask(&mut device, &[8, 0, 4, 0, 0]), []);
     assert_eq!(device.diagnostics.listen_only, 1);
@@ -145,7 +147,7 @@ fn listen_only_mode_ends_with_a_restart_that_is_not_answered() {
         assert_eq!(ask(&mut device, request), []);
     }
     assert_eq!(device.holding, Device::new().holding);
-    hear(&mut device, &sealed(&[0, 6, 0, 100, 9, 9]));
+    deliver(&mut device, &sealed(&[0, 6, 0, 100, 9, 9]));
     assert_eq!(device.holding, Device::new().holding);
     assert_eq!(ask(&mut device, &[8, 0, 1, 0, 0]), []);
     assert_eq!(device.diagnostics.listen_only, 0);
@@ -153,7 +155,7 @@ fn listen_only_mode_ends_with_a_restart_that_is_not_answered() {
 }
 
 #[test]
-fn a_restart_clears_counters_and_if_told_the_log() {
+fn a_restart_clears_the_counters_and_on_request_the_event_log() {
     let mut device = Device::new();
     ask(&mut device, &[3, 0, 0, 0, 1]);
     assert_eq!(ask(&mut device, &[8, 0, 1, 0, 0]), [8, 0, 1, 0, 0]);
@@ -161,13 +163,13 @@ fn a_restart_clears_counters_and_if_told_the_log() {
     let kept = device.diagnostics.logged;
     assert!(kept > 4);
     assert_eq!(ask(&mut device, &[8, 0, 1, 0xFF, 0]), [8, 0, 1, 0xFF, 0]);
-    // The restart, and that it was answered.
+    // Two events: the restart, and its response.
     assert_eq!(device.diagnostics.logged, 2);
     assert_eq!(ask(&mut device, &[0x0B]), [0x0B, 0, 0, 0, 0]);
 }
 
 #[test]
-fn a_function_of_a_user_sees_its_data_and_writes_its_own() {
+fn a_user_defined_function_gets_the_request_data_and_writes_the_response_data() {
     let mut device = Device::new();
     device.custom = |data, room| {
         for (place, byte) in room.iter_mut().zip(data) {
@@ -181,7 +183,7 @@ fn a_function_of_a_user_sees_its_data_and_writes_its_own() {
     assert_eq!(ask(&mut device, &[0x42, 1, 2]), [0xC2, 0x0B]);
     device.custom = |_, _| Outcome::Silent;
     assert_eq!(ask(&mut device, &[0x42, 1, 2]), []);
-    // More than there is room for.
+    // More data than the response can hold.
     device.custom = |_, room| Outcome::Data(room.len() + 1);
     assert_eq!(ask(&mut device, &[0x42, 1, 2]), [0xC2, 4]);
     device.custom = |_, room| Outcome::Data(room.len());
@@ -189,7 +191,7 @@ fn a_function_of_a_user_sees_its_data_and_writes_its_own() {
 }
 
 #[test]
-fn a_function_that_is_not_done_is_asked_again() {
+fn a_function_that_returns_pending_is_called_again() {
     let mut device = Device::new();
     device.custom = |_, _| Outcome::Pending;
     let mut line = common::line::Line::new(Framing::Tcp);
@@ -206,7 +208,7 @@ fn a_function_that_is_not_done_is_asked_again() {
 }
 
 #[test]
-fn what_is_switched_off_is_exception_01_and_nothing_happens() {
+fn a_disabled_function_gets_exception_01_and_changes_nothing() {
     for (function, request) in [
         (3u8, &[3, 0, 100, 0, 1][..]),
         (6, &[6, 0, 100, 9, 9]),
@@ -227,7 +229,7 @@ fn what_is_switched_off_is_exception_01_and_nothing_happens() {
 }
 
 #[test]
-fn the_unit_that_is_meant_answers_and_a_broadcast_reaches_all() {
+fn only_the_addressed_unit_answers_and_a_broadcast_reaches_all_units() {
     let (mut first, mut second) = ([0x1000], [0x2200]);
     let mut ask = |frame: &[u8]| {
         let mut buffer = [0; 256];

@@ -1,5 +1,4 @@
-//! The server on a line: how it finds requests among whatever arrives, and when
-//! it answers.
+//! The server on a line: how it finds requests in the received bytes, and when it answers.
 
 mod common;
 
@@ -12,7 +11,7 @@ use mbm::server::Server;
 const READ: [u8; 6] = [17, 3, 0, 100, 0, 1];
 const ANSWER: [u8; 5] = [17, 3, 2, 0x10, 0];
 
-/// What a server sends for these pieces, each with the silence before it.
+/// The frames that a server sends when these pieces arrive, each after the given silence.
 fn sent(framing: Framing, pieces: &[(u32, Vec<u8>)]) -> Vec<Vec<u8>> {
     let mut line = Line::new(framing);
     for (after, bytes) in pieces {
@@ -28,7 +27,7 @@ fn rtu(pieces: &[(u32, Vec<u8>)]) -> Vec<Vec<u8>> {
 }
 
 #[test]
-fn an_answer_begins_at_t35_after_the_request() {
+fn a_response_begins_t35_after_the_request() {
     let mut line = Line::new(Framing::Rtu);
     line.arrive(0, &sealed(&READ));
     let end = line.wire.borrow().arriving.back().unwrap().0;
@@ -41,13 +40,13 @@ fn an_answer_begins_at_t35_after_the_request() {
 }
 
 #[test]
-fn every_request_of_a_row_is_answered() {
+fn every_request_of_a_series_is_answered() {
     let pieces = vec![(10_000, sealed(&READ)); 5];
     assert_eq!(rtu(&pieces), vec![sealed(&ANSWER); 5]);
 }
 
 #[test]
-fn noise_before_a_request_is_passed_over() {
+fn noise_before_a_request_is_skipped() {
     for noise in 0..40 {
         let noise: Vec<u8> = (0..noise).map(|index| (index * 37 + 17) as u8).collect();
         let pieces = [(0, [&noise[..], &sealed(&READ)[..]].concat())];
@@ -56,7 +55,7 @@ fn noise_before_a_request_is_passed_over() {
 }
 
 #[test]
-fn bytes_behind_a_request_make_it_none_and_the_next_is_answered() {
+fn a_request_followed_by_bytes_is_ignored_and_the_next_is_answered() {
     for behind in [&[1][..], &[1, 2, 3]] {
         let damaged = [&sealed(&READ)[..], behind].concat();
         let pieces = [(0, damaged), (5_000, sealed(&READ))];
@@ -65,7 +64,7 @@ fn bytes_behind_a_request_make_it_none_and_the_next_is_answered() {
 }
 
 #[test]
-fn zero_values_with_data_behind_are_refused_in_time() {
+fn a_write_of_zero_values_with_data_is_refused_at_t35() {
     let mut line = Line::new(Framing::Rtu);
     line.arrive(0, &sealed(&[17, 0x10, 0, 100, 0, 0, 0, 1, 2]));
     let end = line.wire.borrow().arriving.back().unwrap().0;
@@ -96,9 +95,9 @@ fn damaged_frames_and_those_of_other_units_are_not_answered() {
 }
 
 #[test]
-fn foreign_traffic_back_to_back_never_confuses() {
+fn traffic_of_another_unit_without_silence_does_not_hide_a_request() {
     let request = sealed(&[18, 3, 0, 0, 0, 20]);
-    // Its data look like a request for us, but for the CRC.
+    // The data look like a request to this unit, except that the CRC is wrong.
     let mut content = vec![18, 3, 40];
     for _ in 0..5 {
         content.extend([17, 6, 0, 100, 0xDE, 0xAD, 0, 0]);
@@ -116,7 +115,7 @@ fn foreign_traffic_back_to_back_never_confuses() {
 }
 
 #[test]
-fn a_request_of_ours_inside_a_foreign_frame_is_not_carried_out() {
+fn a_request_inside_a_frame_of_another_unit_is_not_carried_out() {
     let mut content = vec![18, 3, 8];
     content.extend(sealed(&[17, 6, 0, 100, 0xDE, 0xAD]));
     let pieces = [(0, sealed(&content)), (5_000, sealed(&READ))];
@@ -124,7 +123,7 @@ fn a_request_of_ours_inside_a_foreign_frame_is_not_carried_out() {
 }
 
 #[test]
-fn a_poll_that_comes_late_still_finds_the_last_request() {
+fn a_late_poll_finds_the_last_request() {
     let mut line = Line::new(Framing::Rtu);
     line.arrive(0, &sealed(&[18, 3, 0, 0, 0, 1]));
     line.arrive(5_000, &sealed(&[18, 3, 2, 1, 1]));
@@ -156,11 +155,11 @@ fn the_longest_frame_fits_into_a_buffer_of_its_length() {
 }
 
 #[test]
-fn our_own_echo_is_no_request() {
+fn an_echo_of_the_response_is_not_taken_for_a_request() {
     let mut line = Line::new(Framing::Rtu);
     line.wire.borrow_mut().echo = true;
     assert!(line.server.set_echo_discard(true));
-    // An answer that is the request, and one that looks like a wrong one.
+    // A response that equals its request, and one that looks like an invalid request.
     for request in [&[17, 6, 0, 100, 1, 2][..], &READ] {
         line.arrive(0, &sealed(request));
         assert_eq!(line.frames(100_000, 50).len(), 1);
@@ -168,7 +167,7 @@ fn our_own_echo_is_no_request() {
 }
 
 #[test]
-fn an_echo_that_does_not_come_costs_nothing() {
+fn a_missing_echo_does_not_hide_the_next_request() {
     let mut line = Line::new(Framing::Rtu);
     assert!(line.server.set_echo_discard(true));
     for _ in 0..3 {
@@ -179,7 +178,7 @@ fn an_echo_that_does_not_come_costs_nothing() {
 }
 
 #[test]
-fn a_request_right_behind_the_answer_is_not_taken_for_an_echo() {
+fn a_request_right_after_the_response_is_not_taken_for_an_echo() {
     let mut line = Line::new(Framing::Rtu);
     line.arrive(0, &sealed(&READ));
     while line.wire.borrow().sent.is_empty() {
@@ -198,7 +197,7 @@ fn a_request_right_behind_the_answer_is_not_taken_for_an_echo() {
 }
 
 #[test]
-fn a_port_that_takes_little_is_given_the_rest_later() {
+fn the_rest_of_a_response_is_sent_when_the_port_accepts_it() {
     let mut line = Line::new(Framing::Rtu);
     line.wire.borrow_mut().piece = 1;
     line.arrive(0, &sealed(&READ));
@@ -206,7 +205,7 @@ fn a_port_that_takes_little_is_given_the_rest_later() {
 }
 
 #[test]
-fn a_lost_link_is_told_and_a_line_may_come_back() {
+fn a_lost_link_is_reported_and_the_server_continues_when_the_line_is_back() {
     let mut line = Line::new(Framing::Rtu);
     line.wire.borrow_mut().lost = true;
     assert_eq!(line.poll(), Status::LINK_LOST);
@@ -216,7 +215,7 @@ fn a_lost_link_is_told_and_a_line_may_come_back() {
 }
 
 #[test]
-fn the_delay_of_a_poll_is_the_silence_that_is_left() {
+fn the_poll_delay_is_the_rest_of_the_silence() {
     let mut line = Line::new(Framing::Rtu);
     assert_eq!(line.server.poll_delay(0xFFFF_0000), u32::MAX);
     line.arrive(0, &[17]);
@@ -227,7 +226,7 @@ fn the_delay_of_a_poll_is_the_silence_that_is_left() {
 }
 
 #[test]
-fn a_full_connection_is_looked_at_each_millisecond_and_a_line_at_once() {
+fn a_full_connection_is_tried_every_millisecond_and_a_serial_line_at_once() {
     for (framing, request, delay) in [
         (Framing::Tcp, tcp(1, &READ[1..]), 1000),
         (Framing::RtuOverTcp, sealed(&READ), 1000),
@@ -256,7 +255,7 @@ fn ascii(pdu: &[u8], end: u8) -> Vec<u8> {
 }
 
 #[test]
-fn an_ascii_request_is_answered_as_its_end_arrives() {
+fn an_ascii_request_is_answered_when_its_end_arrives() {
     let request = ascii(&READ[1..], b'\n');
     let answer = ascii(&ANSWER[1..], b'\n');
     for bytes in [request.clone(), [b"03\r\n:11:0", &request[..]].concat()] {
@@ -267,7 +266,7 @@ fn an_ascii_request_is_answered_as_its_end_arrives() {
 }
 
 #[test]
-fn an_ascii_frame_that_pauses_a_second_is_dropped() {
+fn an_ascii_frame_with_a_pause_of_a_second_is_dropped() {
     let request = ascii(&READ[1..], b'\n');
     let (front, back) = request.split_at(7);
     for (pause, answers) in [(900_000, 1), (1_100_000, 0)] {
@@ -277,14 +276,14 @@ fn an_ascii_frame_that_pauses_a_second_is_dropped() {
 }
 
 #[test]
-fn a_wrong_lrc_is_not_answered() {
+fn a_request_with_a_wrong_lrc_is_not_answered() {
     let mut request = ascii(&READ[1..], b'\n');
     request[5] ^= 1;
     assert!(sent(Framing::Ascii, &[(0, request)]).is_empty());
 }
 
 #[test]
-fn the_delimiter_is_changed_behind_the_answer() {
+fn the_delimiter_changes_after_the_response() {
     let change = ascii(&[8, 0, 3, b'!', 0], b'\n');
     let request = ascii(&READ[1..], b'!');
     let pieces = [(0, change.clone()), (10_000, request)];
@@ -298,8 +297,8 @@ fn tcp(transaction: u8, pdu: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn requests_in_a_stream_are_answered_in_turn() {
-    // The answer of the first is longer than its request.
+fn requests_in_a_stream_are_answered_in_order() {
+    // The first response is longer than its request.
     let stream = [
         tcp(1, &[3, 0, 100, 0, 10]),
         tcp(2, &[7]),
@@ -330,7 +329,7 @@ fn mixed() -> Vec<[Vec<u8>; 2]> {
 }
 
 #[test]
-fn requests_in_a_stream_are_answered_however_it_is_cut() {
+fn requests_in_a_stream_are_answered_when_it_arrives_in_any_two_pieces() {
     let (requests, wanted): (Vec<_>, Vec<_>) = mixed().into_iter().map(|[a, b]| (a, b)).unzip();
     let stream = requests.concat();
     for cut in 0..stream.len() {
@@ -347,7 +346,7 @@ fn requests_in_a_stream_are_answered_however_it_is_cut() {
 }
 
 #[test]
-fn a_server_that_begins_anew_forgets_the_bytes_behind_a_short_request() {
+fn a_server_that_begins_again_discards_the_bytes_after_a_short_request() {
     let mut line = Line::new(Framing::Tcp);
     let now = line.wire.borrow().now;
     let bytes = [tcp(1, &[7]), vec![1, 2, 3, 4]].concat();
@@ -368,7 +367,7 @@ fn the_longest_silence_never_ends_a_frame() {
 }
 
 #[test]
-fn one_byte_a_second_is_waited_for_over_tcp() {
+fn a_tcp_request_may_arrive_at_one_byte_a_second() {
     let mut line = Line::new(Framing::Tcp);
     for byte in tcp(9, &READ[1..]) {
         line.arrive(1_000_000, &[byte]);
@@ -377,7 +376,7 @@ fn one_byte_a_second_is_waited_for_over_tcp() {
 }
 
 #[test]
-fn a_stream_that_is_no_modbus_ends() {
+fn a_stream_other_than_modbus_ends_with_malformed_frame() {
     for bytes in [
         &b"GET / HTTP/1.1"[..],
         &[0, 1, 0, 1, 0, 6, 17, 3],
@@ -414,7 +413,7 @@ fn unknown_functions_of_rtu_over_tcp_are_refused() {
 }
 
 #[test]
-fn rtu_over_tcp_finds_its_way_back_after_damage() {
+fn rtu_over_tcp_finds_the_next_request_after_damage() {
     let mut damaged = sealed(&READ);
     damaged[3] ^= 8;
     for rubbish in [

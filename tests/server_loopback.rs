@@ -1,4 +1,4 @@
-//! Our master asks our server over one wire, good and bad.
+//! mbm's master and mbm's server on one simulated wire, with and without faults.
 
 mod common;
 
@@ -13,13 +13,14 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-/// Two ends and a clock; each byte takes a character at 115200 baud.
+/// Two ends and a clock. Each byte takes the time of a character at 115200 baud.
 #[derive(Default)]
 struct Wire {
     now: u32,
     to: [VecDeque<(u32, u8)>; 2],
-    /// One byte in so many is lost, or gets a bit changed; 0 is none.
+    /// One byte in this many is lost; 0: none.
     lost: u32,
+    /// One byte in this many gets a bit changed; 0: none.
     changed: u32,
     random: u32,
 }
@@ -106,7 +107,7 @@ impl Loop {
         }
     }
 
-    /// Sees a request through.
+    /// Polls both sides until the request has ended; returns its status.
     fn finish(&mut self, started: Status) -> Status {
         let mut status = started;
         while status == Status::PENDING {
@@ -159,7 +160,7 @@ fn every_function_of_the_master_is_answered() {
 }
 
 #[test]
-fn a_bad_wire_costs_requests_but_never_a_wrong_value() {
+fn a_bad_wire_makes_requests_fail_but_never_gives_a_wrong_value() {
     for (lost, changed) in [(40, 0), (0, 40), (80, 80)] {
         let mut line = Loop::new();
         (line.wire.borrow_mut().lost, line.wire.borrow_mut().changed) = (lost, changed);
@@ -173,7 +174,7 @@ fn a_bad_wire_costs_requests_but_never_a_wrong_value() {
             if wrote == Status::OK {
                 value[cell] = round;
             }
-            // A write whose answer was lost may have been carried out.
+            // A write whose response was lost may have been carried out.
             let held = line.device.holding[cell];
             assert!(held == value[cell] || (wrote != Status::OK && held == round));
             value[cell] = held;

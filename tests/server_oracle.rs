@@ -1,5 +1,5 @@
-//! A million requests, most of them nearly right, against a model that was
-//! written without a look at the server: every answer and every cell agree.
+//! A million requests, most of them nearly valid, to the server and to an independent model. All
+//! responses and all registers and bits must be equal.
 
 use mbm::server::storage::{Bits, Coils, DiscreteInputs, HoldingRegisters, InputRegisters, Words};
 use mbm::server::{Reply, Service};
@@ -7,7 +7,7 @@ use mbm::server::{Reply, Service};
 const BASE: u16 = 0xFFC0;
 const CELLS: usize = 48;
 
-/// xorshift, so that a failure comes back.
+/// A xorshift generator with a fixed seed, so that a failure can be repeated.
 struct Random(u64);
 
 impl Random {
@@ -30,7 +30,7 @@ struct Model {
     discrete: Vec<bool>,
 }
 
-/// Whether registers and coils are there: two are not.
+/// True for the two registers and bits that do not exist.
 fn hole(index: usize) -> bool {
     index == 20 || index == 33
 }
@@ -42,7 +42,7 @@ impl Model {
         (last <= CELLS && !(first..last).any(hole)).then_some(first..last)
     }
 
-    /// The response, by the book.
+    /// The response that the standard requires.
     fn answer(&mut self, pdu: &[u8]) -> Vec<u8> {
         let word = |at: usize| u16::from_be_bytes([pdu[at], pdu[at + 1]]);
         let function = pdu[0];
@@ -166,7 +166,7 @@ impl Model {
     }
 }
 
-/// A request, most often one that could be right.
+/// A request, most often a nearly valid one.
 fn request(random: &mut Random) -> Vec<u8> {
     let functions = [
         1, 2, 3, 4, 5, 6, 0x0F, 0x10, 0x16, 0x17, 0x18, 0x41, 0, 0x83,
@@ -209,7 +209,7 @@ fn request(random: &mut Random) -> Vec<u8> {
         0x16 => pdu.extend(random.next().to_be_bytes()),
         _ => pdu.extend((0..random.below(20)).map(|_| random.next() as u8)),
     }
-    // One in eight is damaged: shorter, longer, or a byte changed.
+    // One request in eight is damaged: shorter, longer, or with a changed byte.
     match random.below(24) {
         0 => pdu.truncate(1 + random.below(pdu.len() as u32) as usize),
         1 => pdu.extend((0..1 + random.below(4)).map(|_| random.next() as u8)),
@@ -224,7 +224,7 @@ fn request(random: &mut Random) -> Vec<u8> {
 }
 
 #[test]
-fn a_million_requests_change_what_the_model_changes_and_nothing_else() {
+fn a_million_requests_have_the_same_effects_as_on_the_model() {
     let mut random = Random(0x9E37_79B9_7F4A_7C15);
     let mut model = Model {
         holding: (0..CELLS).map(|_| random.next() as u16).collect(),

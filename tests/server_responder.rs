@@ -1,4 +1,4 @@
-//! The responder: every function at its edges, and the order of its checks.
+//! The responder: every function at its limits, and the order of its checks.
 
 mod common;
 
@@ -7,7 +7,8 @@ use mbm::frame::Framing;
 use mbm::server::respond::respond;
 use mbm::server::Service;
 
-/// Asks a device of ten registers and 20 bits of each kind, from address 100 on.
+/// The response of a new device, which has ten registers and 20 bits of each kind from address
+/// 100 on.
 fn answer(request: &[u8]) -> Vec<u8> {
     ask(&mut Device::new(), request)
 }
@@ -56,7 +57,7 @@ fn the_quantity_is_checked_before_the_address() {
 }
 
 #[test]
-fn the_edges_of_a_table_are_its_first_and_last_cell() {
+fn a_table_can_be_read_from_its_first_to_its_last_cell() {
     for function in [3, 4] {
         assert!(answer(&[function, 0, 100, 0, 10]).len() == 22);
         assert!(refuses(&[function, 0, 99, 0, 1], 2));
@@ -72,7 +73,7 @@ fn the_edges_of_a_table_are_its_first_and_last_cell() {
 }
 
 #[test]
-fn cells_that_the_mask_leaves_out_are_not_there() {
+fn cells_that_the_mask_excludes_do_not_exist() {
     let mut device = Device::new();
     device.valid = Some([0b1111_1011, 0xFF]);
     assert_eq!(ask(&mut device, &[3, 0, 100, 0, 2]).len(), 6);
@@ -100,7 +101,7 @@ fn single_writes_echo_the_request() {
 #[test]
 fn a_coil_is_on_with_ff00_and_off_with_0000_only() {
     for value in [[0, 1], [0xFF, 1], [1, 0], [0xFE, 0], [0xFF, 0xFF]] {
-        // The address is wrong too, but the value is looked at first.
+        // The address is wrong too, but the value is checked first.
         assert!(refuses(&[5, 0, 1, value[0], value[1]], 3), "{value:?}");
     }
     assert!(refuses(&[5, 0, 1, 0xFF, 0], 2));
@@ -114,12 +115,12 @@ fn several_cells_are_written() {
     assert_eq!(device.holding[8..], [0x0102, 0x0304]);
     let request = [0x0F, 0, 110, 0, 10, 2, 0b1010_1010, 0xFF];
     assert_eq!(ask(&mut device, &request), request[..5]);
-    // Bits 0 to 9 are untouched, the six unused bits of the data too.
+    // Bits 0 to 9 have not changed, and the six unused bits of the data have no effect.
     assert_eq!(device.coils, [0b0100_1001, 0b1010_1010, 0b1110]);
 }
 
 #[test]
-fn a_byte_count_that_lies_is_refused_before_the_address() {
+fn a_wrong_byte_count_is_refused_before_the_address() {
     for count in [0, 1, 2, 3, 5, 6, 255] {
         assert!(
             refuses(&[0x10, 0, 0, 0, 2, count, 1, 2, 3, 4], 3),
@@ -133,7 +134,7 @@ fn a_byte_count_that_lies_is_refused_before_the_address() {
 }
 
 #[test]
-fn zero_values_with_data_behind_are_refused() {
+fn a_write_of_zero_values_with_data_is_refused() {
     assert!(refuses(&[0x10, 0, 100, 0, 0, 0], 3));
     assert!(refuses(&[0x10, 0, 100, 0, 0, 0, 1, 2], 3));
     assert!(refuses(&[0x10, 0, 100, 0, 1, 0, 1, 2], 3));
@@ -141,7 +142,7 @@ fn zero_values_with_data_behind_are_refused() {
 }
 
 #[test]
-fn the_greatest_quantities_are_taken() {
+fn the_greatest_quantities_are_accepted() {
     let mut words = [0; 0x200];
     let mut table =
         mbm::server::storage::HoldingRegisters(mbm::server::storage::Words::new(0, &mut words));
@@ -156,7 +157,7 @@ fn the_greatest_quantities_are_taken() {
 }
 
 #[test]
-fn requests_of_another_length_are_refused() {
+fn requests_of_a_wrong_length_are_refused() {
     for request in [
         &[3][..],
         &[3, 0, 100, 0],
@@ -219,7 +220,7 @@ fn read_write_changes_nothing_if_it_cannot_read() {
 }
 
 #[test]
-fn a_refusal_of_the_hook_is_the_answer_and_nothing_is_written() {
+fn the_exception_of_a_hook_is_sent_and_nothing_is_written() {
     for request in [
         &[6, 0, 104, 0, 1][..],
         &[0x10, 0, 103, 0, 2, 4, 9, 9, 9, 9],
@@ -235,7 +236,7 @@ fn a_refusal_of_the_hook_is_the_answer_and_nothing_is_written() {
 }
 
 #[test]
-fn hooks_are_told_what_is_written_and_what_was() {
+fn hooks_get_the_written_range_and_the_new_values() {
     let mut device = Device::new();
     ask(&mut device, &[0x10, 0, 103, 0, 2, 4, 1, 2, 3, 4]);
     assert_eq!(device.asked, [(103, 2, vec![1, 2, 3, 4])]);
@@ -261,7 +262,7 @@ fn a_reply_that_does_not_fit_is_exception_04_and_nothing_is_written() {
 }
 
 #[test]
-fn exception_status_and_server_id_are_told() {
+fn exception_status_and_server_id_are_read() {
     assert_eq!(answer(&[7]), [7, 0x6D]);
     assert_eq!(
         answer(&[0x11]),
@@ -277,7 +278,7 @@ fn file_records_are_read_in_groups() {
 }
 
 #[test]
-fn a_long_response_of_records_does_not_overtake_its_request() {
+fn a_response_with_long_records_does_not_overwrite_its_request_too_early() {
     let request = [
         0x14, 21, 6, 0, 4, 0, 0, 0, 8, 6, 0, 3, 0, 1, 0, 9, 6, 0, 4, 0, 9, 0, 1,
     ];
@@ -304,7 +305,7 @@ fn file_records_are_written_all_or_none() {
 }
 
 #[test]
-fn file_requests_out_of_order_are_refused() {
+fn malformed_file_requests_are_refused() {
     for (request, code) in [
         (&[0x14, 7, 5, 0, 4, 0, 0, 0, 1][..], 2),
         (&[0x14, 7, 6, 0, 5, 0, 0, 0, 1], 2),
@@ -324,17 +325,17 @@ fn file_requests_out_of_order_are_refused() {
 fn queues_are_read_and_not_emptied() {
     let mut device = Device::new();
     let request = [0x18, 0x04, 0xDE];
-    let told = [0x18, 0, 6, 0, 2, 0x01, 0xB8, 0x12, 0x84];
-    assert_eq!(ask(&mut device, &request), told);
-    assert_eq!(ask(&mut device, &request), told);
+    let response = [0x18, 0, 6, 0, 2, 0x01, 0xB8, 0x12, 0x84];
+    assert_eq!(ask(&mut device, &request), response);
+    assert_eq!(ask(&mut device, &request), response);
     assert!(refuses(&[0x18, 0, 0], 2));
-    // 32 registers are more than a response may hold.
+    // A response may hold 31 registers at most.
     assert!(refuses(&[0x18, 0, 32], 3));
     assert_eq!(answer(&[0x18, 0, 31]).len(), 5 + 62);
 }
 
 #[test]
-fn identification_is_streamed_by_category() {
+fn identification_of_a_category_has_all_its_objects() {
     let mut device = Device::new();
     device.objects = vec![
         (0, b"Maker".to_vec()),
@@ -351,7 +352,7 @@ fn identification_is_streamed_by_category() {
     ]
     .concat();
     assert_eq!(ask(&mut device, &[0x2B, 0x0E, 1, 0]), basic);
-    // A category that it does not have is answered with what it has.
+    // For a category without objects, the response has those of the lower categories.
     let extended = ask(&mut device, &[0x2B, 0x0E, 3, 0]);
     assert_eq!(extended[3..], basic[3..]);
     device.objects.push((0x80, b"x".to_vec()));
@@ -362,7 +363,7 @@ fn identification_is_streamed_by_category() {
 }
 
 #[test]
-fn identification_goes_on_where_it_stopped() {
+fn identification_continues_at_the_next_object() {
     let mut device = Device::new();
     device.objects = (0..5).map(|id| (id, vec![b'a' + id; 100])).collect();
     let mut next = 0;
@@ -388,23 +389,23 @@ fn identification_goes_on_where_it_stopped() {
 }
 
 #[test]
-fn one_object_is_told_alone_and_an_unknown_one_refused() {
+fn an_individual_object_is_read_and_an_unknown_one_refused() {
     let mut device = Device::new();
     device.objects = vec![(0, b"M".to_vec()), (0x90, vec![1; 245])];
     let one = ask(&mut device, &[0x2B, 0x0E, 4, 0]);
     assert_eq!(one, [0x2B, 0x0E, 4, 0x83, 0, 0, 1, 0, 1, b'M']);
     assert_eq!(ask(&mut device, &[0x2B, 0x0E, 4, 1]), [0xAB, 2]);
-    // An object that no response can hold.
+    // An object that is too long for a response.
     assert_eq!(ask(&mut device, &[0x2B, 0x0E, 4, 0x90]), [0xAB, 4]);
     assert_eq!(ask(&mut device, &[0x2B, 0x0E, 5, 0]), [0xAB, 3]);
     assert_eq!(ask(&mut device, &[0x2B, 0x0E, 0, 0]), [0xAB, 3]);
-    // In a stream, an object that is not there means the first.
+    // For a category, an unknown object id means the first object.
     assert_eq!(ask(&mut device, &[0x2B, 0x0E, 1, 2])[7], 0);
     assert_eq!(ask(&mut device, &[0x2B, 0x0D, 1, 2]), [0xAB, 1]);
 }
 
 #[test]
-fn frames_for_others_damaged_ones_and_broadcasts_are_not_answered() {
+fn frames_of_other_units_damaged_frames_and_broadcasts_are_not_answered() {
     let mut device = Device::new();
     let mut buffer = [0; 256];
     for (frame, changed) in [
@@ -426,7 +427,7 @@ fn frames_for_others_damaged_ones_and_broadcasts_are_not_answered() {
 }
 
 #[test]
-fn every_framing_carries_the_same_answer() {
+fn the_response_is_the_same_in_every_framing() {
     let mut device = Device::new();
     let mut buffer = [0; 600];
     for framing in [
@@ -454,7 +455,8 @@ fn every_framing_carries_the_same_answer() {
 }
 
 #[test]
-fn over_tcp_units_0_and_255_are_the_server_itself_and_a_unit_0_is_any() {
+fn over_tcp_a_request_to_unit_0_or_255_is_for_the_server_and_a_server_with_id_0_answers_for_every_unit(
+) {
     let mut device = Device::new();
     for (id, to, answers) in [
         (17, 17, true),

@@ -42,7 +42,7 @@ fn read<T: Value + PartialEq + Debug>(bytes: &[u8], order: Order) -> T {
     value
 }
 
-/// The bytes of `value` after writing it, and checks that writing it to words gives the same.
+/// Writes `value` and returns its bytes. Checks that writing it to words gives the same bytes.
 fn written<T: Value>(value: T, order: Order) -> Vec<u8> {
     let size = size_of::<T::Bytes>();
     let mut bytes = vec![0xEE; size];

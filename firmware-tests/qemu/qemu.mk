@@ -17,7 +17,7 @@ $(QEMU_TESTS): $(BUILD)/firmware/%: firmware-tests/qemu/%.c $(QEMU_SOURCES) $(wi
 FROM_SOURCE := $(BUILD)/baremetal-source
 
 .PHONY: firmware-test-qemu
-firmware-test-qemu: ## Bare metal firmware on eight machines in QEMU: Arm, RISC-V, Xtensa
+firmware-test-qemu: ## Run bare metal firmware on eight machines in QEMU: Arm, RISC-V, Xtensa
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev libcmocka-dev qemu-system-arm qemu-system-misc \
 		gcc-arm-none-eabi gcc-riscv64-unknown-elf gcc-xtensa-lx106 clang-22 llvm-22
 	@set -e; for machine in $(MACHINES); do \

@@ -14,7 +14,7 @@ const SILENCE: u32 = 1;
 pub const QUIET: u32 = 4;
 const TIMEOUT: u32 = 10;
 
-/// The longest time that makes a difference.
+/// The longest time in ticks that affects the master. Longer times are cut to it.
 const LONGEST: u32 = 100;
 
 /// The fault of a request that continues after its end.
@@ -23,17 +23,17 @@ pub const TWICE: &str = "a request ended twice";
 /// What the adversary may do next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Event {
-    /// The device sends the reply to its oldest unanswered request.
+    /// The device sends the oldest reply that it owes, and it arrives.
     Reply,
-    /// The device answers its oldest unanswered request with an exception.
+    /// The device sends an exception instead of the oldest reply that it owes.
     Exception,
-    /// That reply arrives with a bit changed in its CRC.
+    /// The oldest owed reply arrives with one bit of its CRC changed.
     Damaged,
-    /// Only the first half of that reply arrives.
+    /// Only the first half of the oldest owed reply arrives.
     FirstHalf,
-    /// Only the second half of that reply arrives.
+    /// Only the second half of the oldest owed reply arrives.
     SecondHalf,
-    /// That reply is lost.
+    /// The oldest owed reply is lost.
     Lost,
     /// A byte 0x00 arrives.
     Zero,

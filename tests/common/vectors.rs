@@ -1,6 +1,6 @@
 //! The table `tests/vectors.txt`. The C tests read it too.
 
-// Each test uses a part of it.
+// Each test file uses only a part of this module.
 #![allow(dead_code)]
 
 use mbm::error::Status;

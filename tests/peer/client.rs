@@ -20,7 +20,7 @@ use task::{Lent, Task};
 /// The response timeout in microseconds. A malformed response is reported only after it.
 const TIMEOUT: u32 = 10_000_000;
 
-/// The server's line as a port, with a clock.
+/// A port on the line to the pymodbus server.
 struct Wire {
     server: LiveServer,
     pending: VecDeque<u8>,

@@ -24,7 +24,7 @@ fn case(mbm: Request<'static>, call: &'static str, fields: &'static str) -> Case
     }
 }
 
-fn is_read_by_pymodbus(case: &Case) {
+fn check_pymodbus_reads_mbm(case: &Case) {
     for (framing, name) in FRAMINGS {
         let sent = frame(framing, |pdu| case.mbm.emit(pdu));
         let read = query(&format!("request {name} {}", hex(&sent)));
@@ -35,7 +35,7 @@ fn is_read_by_pymodbus(case: &Case) {
     }
 }
 
-fn of_pymodbus_is_read(case: &Case) {
+fn check_mbm_reads_pymodbus(case: &Case) {
     for (framing, name) in FRAMINGS {
         let mut sent = from_hex(&query(&format!("call {name} {}", case.call)));
         assert_eq!(sent, frame(framing, |pdu| case.mbm.emit(pdu)), "{name}");
@@ -50,11 +50,11 @@ macro_rules! cases {
             use super::*;
             #[test]
             fn request_is_read_by_pymodbus() {
-                is_read_by_pymodbus(&$case);
+                check_pymodbus_reads_mbm(&$case);
             }
             #[test]
             fn request_of_pymodbus_is_read() {
-                of_pymodbus_is_read(&$case);
+                check_mbm_reads_pymodbus(&$case);
             }
         }
     )* };

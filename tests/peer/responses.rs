@@ -25,7 +25,7 @@ fn case(mbm: Response<'static>, reply: &'static str, fields: &'static str) -> Ca
     }
 }
 
-fn is_read_by_pymodbus(case: &Case) {
+fn check_pymodbus_reads_mbm(case: &Case) {
     for (framing, name) in FRAMINGS {
         let sent = frame(framing, |pdu| case.mbm.emit(pdu));
         let read = query(&format!("response {name} {}", hex(&sent)));
@@ -36,7 +36,7 @@ fn is_read_by_pymodbus(case: &Case) {
     }
 }
 
-fn of_pymodbus_is_read(case: &Case) {
+fn check_mbm_reads_pymodbus(case: &Case) {
     for (framing, name) in FRAMINGS {
         let mut sent = from_hex(&query(&format!("reply {name} {}", case.reply)));
         assert_eq!(sent, frame(framing, |pdu| case.mbm.emit(pdu)), "{name}");
@@ -51,11 +51,11 @@ macro_rules! cases {
             use super::*;
             #[test]
             fn response_is_read_by_pymodbus() {
-                is_read_by_pymodbus(&$case);
+                check_pymodbus_reads_mbm(&$case);
             }
             #[test]
             fn response_of_pymodbus_is_read() {
-                of_pymodbus_is_read(&$case);
+                check_mbm_reads_pymodbus(&$case);
             }
         }
     )* };

@@ -47,13 +47,13 @@ fn next(w: &World, sniffer: *mut mbm_sniffer) {
             return;
         }
         // SAFETY: an event whose frame and PDU are in the sniffer's buffer.
-        let told = unsafe { *event };
-        assert!(told.kind <= MBM_EVENT_NOISE && told.packet.kind <= MBM_PACKET_EXCEPTION);
-        assert!(usize::from(told.askedLength) <= told.asked.len());
-        is_status("an event", told.status);
-        super::check::bytes((told.frame, told.frameLength.into()));
-        super::check::bytes((told.pdu, told.pduLength.into()));
-        super::check::bytes((told.packet.data, told.packet.dataLength.into()));
+        let reported = unsafe { *event };
+        assert!(reported.kind <= MBM_EVENT_NOISE && reported.packet.kind <= MBM_PACKET_EXCEPTION);
+        assert!(usize::from(reported.askedLength) <= reported.asked.len());
+        is_status("an event", reported.status);
+        super::check::bytes((reported.frame, reported.frameLength.into()));
+        super::check::bytes((reported.pdu, reported.pduLength.into()));
+        super::check::bytes((reported.packet.data, reported.packet.dataLength.into()));
         text(w, event);
         w.events.keep(event);
     }
@@ -97,7 +97,7 @@ fn text(w: &World, event: *const mbm_event) {
 /// Writes the text of an event with any content, which no sniffer has reported.
 fn random_event(w: &World) {
     let (frame, pdu) = (w.word(), w.word());
-    let told = mbm_event {
+    let reported = mbm_event {
         frame: w.noise(frame.into()),
         pdu: w.noise(pdu.into()),
         // SAFETY: the pointer is a packet with any content.
@@ -116,7 +116,7 @@ fn random_event(w: &World) {
         asked: std::array::from_fn(|_| w.byte()),
         askedLength: w.byte() % 12,
     };
-    text(w, w.put(told));
+    text(w, w.put(reported));
 }
 
 /// Makes calls with a sniffer.
