@@ -2,6 +2,7 @@
 //! `core` would be kilobytes in an image.
 
 use crate::error::Status;
+use crate::frame::ascii::character;
 
 /// A line of ASCII text. What does not fit is left out, and said by
 /// [`Line::finish`]; a zero byte always ends the text.
@@ -65,18 +66,10 @@ impl<'a> Line<'a> {
         }
     }
 
-    fn digit(&mut self, digit: u8) {
-        self.byte(if digit < 10 {
-            b'0' + digit
-        } else {
-            b'A' - 10 + digit
-        });
-    }
-
     /// Adds two hexadecimal digits.
     pub fn hex(&mut self, byte: u8) {
-        self.digit(byte >> 4);
-        self.digit(byte & 0x0F);
+        self.byte(character(byte >> 4));
+        self.byte(character(byte & 0x0F));
     }
 
     /// Adds four hexadecimal digits.

@@ -22,7 +22,8 @@ const AROUND: usize = 3;
 /// The least bytes of content: unit, function, LRC.
 const MIN_CONTENT: usize = 3;
 
-const fn digit(character: u8) -> Option<u8> {
+/// The value of a hexadecimal digit; lower case is taken too.
+pub const fn digit(character: u8) -> Option<u8> {
     match character {
         b'0'..=b'9' => Some(character - b'0'),
         b'A'..=b'F' => Some(character - b'A' + 10),
@@ -31,7 +32,8 @@ const fn digit(character: u8) -> Option<u8> {
     }
 }
 
-const fn character(digit: u8) -> u8 {
+/// The hexadecimal digit of a value below 16, in upper case.
+pub const fn character(digit: u8) -> u8 {
     if digit < 10 {
         b'0' + digit
     } else {

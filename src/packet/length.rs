@@ -120,7 +120,10 @@ fn of_characters(
         *place = ascii::byte(pair).ok_or(Status::MALFORMED_FRAME)?;
         count += 1;
     }
-    let rest_is_digits = pairs.remainder().iter().all(u8::is_ascii_hexdigit);
+    let rest_is_digits = pairs
+        .remainder()
+        .iter()
+        .all(|last| ascii::digit(*last).is_some());
     if !rest_is_digits || pairs.next().is_some() {
         return Err(Status::MALFORMED_FRAME);
     }

@@ -1,6 +1,7 @@
 //! Functions that a user defines.
 
 use super::{Reply, Service};
+use crate::bytes::move_items;
 use crate::pdu::limits::MAX_PDU;
 use core::cell::Cell;
 
@@ -27,9 +28,7 @@ pub fn serve(
     // The data move to right behind the function code.
     let cells = Cell::from_mut(pdu).as_slice_of_cells();
     let behind = cells.get(length..length + bytes).unwrap_or_default();
-    for (to, from) in cells.get(1..).unwrap_or_default().iter().zip(behind) {
-        to.set(from.get());
-    }
+    move_items(cells.get(1..).unwrap_or_default(), behind);
     Reply::length(1 + bytes)
 }
 
