@@ -106,7 +106,10 @@ fn of_characters(
     if *first != ascii::START {
         return Err(Status::MALFORMED_FRAME);
     }
-    let is_end = |pair: &[u8]| matches!(pair, [ascii::RETURN, last] if *last == end);
+    let is_end = |pair: &[u8]| match pair {
+        [before, last] => ascii::mark(*before, *last, end) == ascii::Mark::End,
+        _ => false,
+    };
     if let Some(at) = characters.windows(2).position(is_end) {
         return Ok(Length::Exactly(1 + at + 2));
     }

@@ -3,6 +3,7 @@
 use super::lane::{Lane, Timing};
 use super::pairing::Requests;
 use crate::error::Status;
+use crate::frame::ascii::{Content, Mark};
 use crate::frame::checksum::{crc16, Crc16};
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::packet::Side;
@@ -335,20 +336,26 @@ impl Context<'_> {
     }
 
     /// What stands in ASCII characters.
-    pub fn ascii(&self, lane: &Lane, bytes: &[u8], capacity: usize) -> Verdict {
-        let Some((&ascii::START, characters)) = bytes.split_first() else {
+    pub fn ascii(&self, lane: &Lane, bytes: &mut [u8], capacity: usize) -> Verdict {
+        let [ascii::START, ..] = bytes else {
             return Verdict::Wrong;
         };
         // What was searched before has no end in it.
-        let known = usize::from(lane.searched).saturating_sub(1);
-        let mut before = bytes.get(known).copied().unwrap_or_default();
-        for (index, character) in characters.iter().enumerate().skip(known) {
-            if *character == self.end && before == ascii::RETURN {
-                let digits = characters.get(..index - 1).unwrap_or_default();
-                return Self::ascii_content(digits);
-            }
-            if *character == ascii::START || index + 2 > ascii::MAX_FRAME {
-                return Verdict::Wrong;
+        let known = usize::from(lane.searched).max(1);
+        let mut before = bytes.get(known - 1).copied().unwrap_or_default();
+        for (index, character) in bytes.iter().enumerate().skip(known) {
+            let total = index + 1;
+            match ascii::mark(before, *character, self.end) {
+                Mark::End => {
+                    let frame = bytes.get_mut(..total).unwrap_or_default();
+                    return match ascii::decode(frame, self.end, false) {
+                        Content::Right(_) => Verdict::Right(total, true, true),
+                        Content::Damaged(_) => Verdict::Damaged(total),
+                        Content::Malformed => Verdict::Wrong,
+                    };
+                }
+                Mark::Inside if total <= ascii::MAX_FRAME => {}
+                _ => return Verdict::Wrong,
             }
             before = *character;
         }
@@ -361,38 +368,4 @@ impl Context<'_> {
             Verdict::Wait(ascii::MAX_FRAME + 1)
         }
     }
-
-    fn ascii_content(digits: &[u8]) -> Verdict {
-        let mut sum = 0u8;
-        let (pairs, rest) = digits.as_chunks::<2>();
-        if pairs.len() < 3 || !rest.is_empty() {
-            return Verdict::Wrong;
-        }
-        for pair in pairs {
-            match ascii::byte(pair) {
-                Some(byte) => sum = sum.wrapping_add(byte),
-                None => return Verdict::Wrong,
-            }
-        }
-        let total = digits.len() + 3;
-        if sum == 0 {
-            Verdict::Right(total, true, true)
-        } else {
-            Verdict::Damaged(total)
-        }
-    }
-}
-
-/// Turns the ASCII frame in `bytes` into the bytes that it stands for, at its
-/// front; how many.
-pub(super) fn decode(bytes: &mut [u8]) -> usize {
-    let count = bytes.len().saturating_sub(3) / 2;
-    for index in 0..count {
-        let at = 1 + 2 * index;
-        let byte = bytes.get(at..at + 2).and_then(ascii::byte);
-        if let (Some(byte), Some(place)) = (byte, bytes.get_mut(index)) {
-            *place = byte;
-        }
-    }
-    count
 }
