@@ -4,7 +4,6 @@
 use super::checksum::lrc;
 use super::Adu;
 use crate::error::Status;
-use core::ops::RangeInclusive;
 
 /// What a frame begins with.
 pub const START: u8 = b':';
@@ -20,8 +19,11 @@ pub const MAX_FRAME: usize = 1 + 2 * (1 + 253 + 1) + 2;
 /// Characters of a frame that are no bytes of content.
 const AROUND: usize = 3;
 
-/// How many digits a frame has: two for each byte of unit, PDU and LRC.
-const DIGITS: RangeInclusive<usize> = 2 * 3..=MAX_FRAME - AROUND;
+/// The least digits of a frame: two for each of unit, function code and LRC.
+const LEAST_DIGITS: usize = 2 * 3;
+
+/// The most digits of a frame.
+const MAX_DIGITS: usize = MAX_FRAME - AROUND;
 
 /// The value of a hexadecimal digit; lower case is taken too.
 pub const fn digit(character: u8) -> Option<u8> {
@@ -113,7 +115,7 @@ pub fn decode(bytes: &mut [u8], end: u8, in_place: bool) -> Content {
         [START, characters @ .., RETURN, last] if *last == end => characters.len(),
         _ => return Content::Malformed,
     };
-    if length % 2 != 0 || !DIGITS.contains(&length) {
+    if length % 2 != 0 || length.wrapping_sub(LEAST_DIGITS) > MAX_DIGITS - LEAST_DIGITS {
         return Content::Malformed;
     }
     let mut sum = 0u8;

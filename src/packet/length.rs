@@ -3,7 +3,6 @@
 
 use super::Side;
 use crate::error::Status;
-use crate::frame::checksum::crc16;
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::custom::{is_user_defined, Function};
 use crate::pdu::diagnostics::REPORT_SERVER_ID;
@@ -65,7 +64,7 @@ pub fn expected(
             match of_frame(framing, side.length(pdu, functions)) {
                 Length::Exactly(length) if may_be_longer(side, pdu) => match bytes.get(..length) {
                     None => Length::AtLeast(length),
-                    Some(frame) if crc16(frame).is_residue() => Length::Exactly(length),
+                    Some(frame) if rtu::is_frame(frame) => Length::Exactly(length),
                     Some(_) => of_frame(framing, Length::Silence),
                 },
                 length => length,

@@ -346,16 +346,13 @@ impl<P: Port, B: Lent> Server<P, B> {
             return self.heard_less(heard);
         }
         self.end = AT_ONCE as u16;
-        let &mut [_, _, a, b, c, d, unit, ..] = front;
-        // Protocol identifier and length, judged below where they are rare.
-        let total = (u32::from_be_bytes([a, b, c, d]) as usize).wrapping_add(tcp::HEADER);
-        if total == AT_ONCE {
-            return self.found_for(unit, (AT_ONCE - tcp::PDU) as u16);
+        match tcp::header(front) {
+            Ok(header) if header.total == AT_ONCE => {
+                self.found_for(header.unit, (AT_ONCE - tcp::PDU) as u16)
+            }
+            Ok(header) if header.total > AT_ONCE => self.receive_rest(header.total, header.unit),
+            _ => self.receive_on(),
         }
-        if total > AT_ONCE && total <= tcp::MAX_FRAME {
-            return self.receive_rest(total, unit);
-        }
-        self.receive_on()
     }
 
     /// Less than what most requests have has arrived, or nothing.
@@ -446,7 +443,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     #[inline(always)]
     pub(super) fn seal_tcp(&mut self, length: usize) -> usize {
         if let [high, low] = self.lent.part(4, 6) {
-            [*high, *low] = (length as u16 + 1).to_be_bytes();
+            [*high, *low] = tcp::length(length);
         }
         tcp::PDU + length
     }

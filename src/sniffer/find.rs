@@ -4,7 +4,6 @@ use super::lane::{Lane, Timing};
 use super::pairing::Requests;
 use crate::error::Status;
 use crate::frame::ascii::{Content, Mark};
-use crate::frame::checksum::{crc16, Crc16};
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::packet::Side;
 use crate::pdu::custom::Function;
@@ -28,8 +27,8 @@ pub(super) enum Verdict {
     Wrong,
 }
 
-/// The least bytes of an RTU frame: unit, function, CRC.
-pub(super) const MIN_RTU: usize = 4;
+/// The least bytes of an RTU frame.
+pub(super) const MIN_RTU: usize = rtu::MIN_FRAME as usize;
 
 /// What a finder needs to know.
 #[derive(Clone, Copy)]
@@ -74,9 +73,7 @@ impl Context<'_> {
             (Length::Exactly(total), _)
                 if code == Some(REPORT_SERVER_ID)
                     && self.requests.is_waiting(*unit, pdu)
-                    && frame
-                        .get(..total)
-                        .is_some_and(|all| !crc16(all).is_residue()) =>
+                    && frame.get(..total).is_some_and(|all| !rtu::is_frame(all)) =>
             {
                 Length::Silence
             }
@@ -106,7 +103,7 @@ impl Context<'_> {
         lengths.map(|length| match length {
             Some(Length::Exactly(total)) => {
                 let frame = bytes.get(..total)?;
-                crc16(frame).is_residue().then_some(total)
+                rtu::is_frame(frame).then_some(total)
             }
             _ => None,
         })
@@ -133,8 +130,8 @@ impl Context<'_> {
         let mut ends = lane.silences(lane.at).chain(quiet.then_some(lane.end));
         ends.find_map(|end| {
             let total = usize::from(end - lane.at);
-            let is_frame = (MIN_RTU..=rtu::MAX_FRAME).contains(&total)
-                && crc16(bytes.get(..total)?).is_residue();
+            let is_frame =
+                (MIN_RTU..=rtu::MAX_FRAME).contains(&total) && rtu::is_frame(bytes.get(..total)?);
             is_frame.then_some(total)
         })
     }
@@ -150,16 +147,7 @@ impl Context<'_> {
         }
         let is_words = bytes.get(1) == Some(&DIAGNOSTICS);
         let step = if is_words { 2 } else { 1 };
-        let mut total = MIN_RTU * step;
-        let mut crc = Crc16::START.with(bytes.get(..total)?);
-        while !crc.is_residue() {
-            crc = crc.with(bytes.get(total..total + step)?);
-            total += step;
-            if total > rtu::MAX_FRAME {
-                return None;
-            }
-        }
-        Some(total)
+        rtu::first(bytes, MIN_RTU * step, step)
     }
 
     /// What stands in RTU bytes.
@@ -264,7 +252,7 @@ impl Context<'_> {
             Length::Exactly(length) => match length + rtu::OVERHEAD {
                 total if total > capacity.min(rtu::MAX_FRAME) || total < MIN_RTU => None,
                 total if total > bytes.len() => Some(total),
-                total if crc16(bytes.get(..total)?).is_residue() => None,
+                total if rtu::is_frame(bytes.get(..total)?) => None,
                 _ => Some(usize::MAX),
             },
             Length::AtLeast(length) if length + rtu::OVERHEAD > rtu::MAX_FRAME => None,
