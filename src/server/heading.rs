@@ -1,5 +1,6 @@
 //! Whom a frame is for.
 
+use super::table::Small;
 use crate::pdu::{bits, files, registers};
 
 /// A frame that was found.
@@ -25,15 +26,30 @@ pub struct Heading {
 
 /// What a frame is to a unit.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(target_arch = "avr", repr(u8))]
-#[cfg_attr(not(target_arch = "avr"), repr(usize))]
-pub enum Concern {
+#[repr(transparent)]
+pub struct Concern(Small);
+
+impl Concern {
     /// Another unit's, or damaged.
-    Foreign,
+    pub const FOREIGN: Concern = Concern(0);
     /// Its own.
-    Own,
+    pub const OWN: Concern = Concern(1);
     /// Everybody's, which nobody answers.
-    Broadcast,
+    pub const BROADCAST: Concern = Concern(2);
+
+    /// The number of this concern, as C sees it.
+    #[inline(always)]
+    #[allow(clippy::unnecessary_cast)] // It is needed on an AVR.
+    pub const fn code(self) -> u8 {
+        self.0 as u8
+    }
+
+    /// What a frame that is this to the units that it is for is to the others.
+    #[inline(always)]
+    #[must_use]
+    pub const fn to_others(self) -> Concern {
+        Concern(self.0 & Concern::BROADCAST.0)
+    }
 }
 
 /// The id of a unit that answers to any.
@@ -55,7 +71,7 @@ impl Heading {
     #[inline]
     pub const fn concern(&self, function: u8) -> Concern {
         match self.concern_of_all() {
-            Concern::Broadcast if !only_writes(function) => Concern::Foreign,
+            Concern::BROADCAST if !only_writes(function) => Concern::FOREIGN,
             concern => concern,
         }
     }
@@ -64,11 +80,11 @@ impl Heading {
     #[inline(always)]
     pub const fn concern_of_all(&self) -> Concern {
         if self.length == 0 {
-            Concern::Foreign
+            Concern::FOREIGN
         } else if self.is_broadcast() {
-            Concern::Broadcast
+            Concern::BROADCAST
         } else {
-            Concern::Own
+            Concern::OWN
         }
     }
 
