@@ -7,7 +7,14 @@ use core::cell::Cell;
 #[cfg_attr(target_os = "none", inline(never))]
 pub fn move_to_front(bytes: &mut [u8], from: usize) {
     let cells = Cell::from_mut(bytes).as_slice_of_cells();
-    for (to, from) in cells.iter().zip(cells.get(from..).unwrap_or_default()) {
+    move_items(cells, cells.get(from..).unwrap_or_default());
+}
+
+/// Moves items forward in a slice that holds both stretches. In line, which is smaller
+/// where firmware has one call.
+#[inline(always)]
+pub(crate) fn move_items<T: Copy>(to: &[Cell<T>], from: &[Cell<T>]) {
+    for (to, from) in to.iter().zip(from) {
         to.set(from.get());
     }
 }

@@ -2,8 +2,7 @@
 //! colon; characters before a colon are noise.
 
 use super::{Count, Engine, Request, Seen, Storage, Verdict};
-use crate::error::Status;
-use crate::frame::ascii::{self, find};
+use crate::frame::ascii::{self, find, Content};
 use crate::frame::rtu;
 use crate::pdu::EXCEPTION;
 
@@ -62,16 +61,16 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// Decodes the frame of `length` characters at `front`; true if it is the reply.
     fn is_reply(&mut self, front: S::Count, length: S::Count, delimiter: u8) -> bool {
         let frame = self.storage.bytes(front, length);
-        let content = match ascii::parse(frame, delimiter) {
-            Ok(adu) => S::Count::of(adu.pdu.len() + rtu::PDU),
-            Err(Status::INVALID_CRC) => {
+        let content = match ascii::decode(frame, delimiter, true) {
+            Content::Right(length) => S::Count::from(length),
+            Content::Damaged(_) => {
                 // The unit has been decoded to the front of the frame.
                 if self.storage.byte(front) == self.unit {
                     self.see(Seen::BAD_CRC);
                 }
                 return false;
             }
-            Err(_) => {
+            Content::Malformed => {
                 self.passed = 1;
                 return false;
             }

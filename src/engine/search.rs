@@ -11,7 +11,7 @@
 //! twice, however many candidates there were.
 
 use super::{Count, Engine, Request, Seen, Storage, Verdict};
-use crate::frame::checksum::{crc16, Crc16};
+use crate::frame::checksum::Crc16;
 use crate::frame::rtu::{self, MIN_FRAME};
 use crate::pdu::EXCEPTION;
 
@@ -47,7 +47,7 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         }
         let frame = self.storage.slice(S::Count::ZERO, length);
         let start = [self.unit, self.request.function(), data];
-        if !frame.starts_with(&start) || !crc16(frame).is_residue() {
+        if !frame.starts_with(&start) || !rtu::is_frame(frame) {
             return false;
         }
         self.exception = 0;
@@ -169,7 +169,7 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             }
             return self.crc == self.crc_passed.since_start(self.weight);
         }
-        crc16(self.storage.bytes(front, length)).is_residue()
+        rtu::is_frame(self.storage.bytes(front, length))
     }
 
     /// Skips the byte at `front`. If the skipped bytes turn out to be a frame, a bad CRC noted

@@ -2,6 +2,7 @@
 //! firmware image.
 
 use crate::error::Status;
+use crate::frame::ascii::character;
 
 /// A line of ASCII text in a buffer. If the buffer is too small, the rest of the text is cut
 /// off and [`Line::finish`] returns an error. A zero byte ends the text, also if it was cut.
@@ -66,18 +67,10 @@ impl<'a> Line<'a> {
         }
     }
 
-    fn digit(&mut self, digit: u8) {
-        self.byte(if digit < 10 {
-            b'0' + digit
-        } else {
-            b'A' - 10 + digit
-        });
-    }
-
     /// Adds two hexadecimal digits.
     pub fn hex(&mut self, byte: u8) {
-        self.digit(byte >> 4);
-        self.digit(byte & 0x0F);
+        self.byte(character(byte >> 4));
+        self.byte(character(byte & 0x0F));
     }
 
     /// Adds four hexadecimal digits.

@@ -19,10 +19,14 @@ pub const MAX_FRAME: usize = 1 + 2 * (1 + 253 + 1) + 2;
 /// Characters of a frame that are no bytes of content.
 const AROUND: usize = 3;
 
-/// The least bytes of content: unit, function, LRC.
-const MIN_CONTENT: usize = 3;
+/// The least digits of a frame: two for each of unit, function code and LRC.
+const LEAST_DIGITS: usize = 2 * 3;
 
-const fn digit(character: u8) -> Option<u8> {
+/// The most digits of a frame.
+const MAX_DIGITS: usize = MAX_FRAME - AROUND;
+
+/// The value of a hexadecimal digit; lower case is taken too.
+pub const fn digit(character: u8) -> Option<u8> {
     match character {
         b'0'..=b'9' => Some(character - b'0'),
         b'A'..=b'F' => Some(character - b'A' + 10),
@@ -31,7 +35,8 @@ const fn digit(character: u8) -> Option<u8> {
     }
 }
 
-const fn character(digit: u8) -> u8 {
+/// The hexadecimal digit of a value below 16, in upper case.
+pub const fn character(digit: u8) -> u8 {
     if digit < 10 {
         b'0' + digit
     } else {
@@ -50,6 +55,29 @@ pub const fn byte(pair: &[u8]) -> Option<u8> {
     }
 }
 
+/// What a character is in a frame.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Mark {
+    /// The colon that begins a frame, wherever it stands: a frame before it was cut off.
+    Start,
+    /// The end character behind a carriage return, which ends a frame.
+    End,
+    /// Any other: a digit, or noise.
+    Inside,
+}
+
+/// What `character` is behind the character `before`; `end` is the one that ends frames.
+#[inline(always)]
+pub const fn mark(before: u8, character: u8, end: u8) -> Mark {
+    if character == end && before == RETURN {
+        Mark::End
+    } else if character == START {
+        Mark::Start
+    } else {
+        Mark::Inside
+    }
+}
+
 /// Where the first frame that is whole begins among `characters`, and where it ends if
 /// its end has arrived; `end` is the character that ends it. The last colon counts, for a
 /// frame without an end was cut off. Characters before it are noise.
@@ -57,14 +85,56 @@ pub fn find(characters: &[u8], end: u8) -> (usize, Option<usize>) {
     let mut begin = None;
     let mut before = 0;
     for (index, character) in characters.iter().enumerate() {
-        if *character == START {
-            begin = Some(index);
-        } else if *character == end && before == RETURN {
-            return (begin.unwrap_or(index + 1), Some(index + 1));
+        match mark(before, *character, end) {
+            Mark::Start => begin = Some(index),
+            Mark::End => return (begin.unwrap_or(index + 1), Some(index + 1)),
+            Mark::Inside => {}
         }
         before = *character;
     }
     (begin.unwrap_or(characters.len()), None)
+}
+
+/// What a frame carries.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Content {
+    /// So many bytes of unit and PDU; the LRC behind them is right.
+    Right(u8),
+    /// As many, whose LRC is wrong.
+    Damaged(u8),
+    /// Nothing: it is no frame.
+    Malformed,
+}
+
+/// Decodes the frame that is the whole of `bytes`, unit and PDU and LRC: into its front if
+/// `in_place`, else it stays as it is. Lower case digits are taken too. Of what is
+/// malformed, some may be overwritten.
+#[cfg_attr(target_os = "none", inline(never))]
+pub fn decode(bytes: &mut [u8], end: u8, in_place: bool) -> Content {
+    let length = match bytes {
+        [START, characters @ .., RETURN, last] if *last == end => characters.len(),
+        _ => return Content::Malformed,
+    };
+    if length % 2 != 0 || length.wrapping_sub(LEAST_DIGITS) > MAX_DIGITS - LEAST_DIGITS {
+        return Content::Malformed;
+    }
+    let mut sum = 0u8;
+    for index in 0..length / 2 {
+        let at = 1 + 2 * index;
+        let Some(decoded) = bytes.get(at..at + 2).and_then(byte) else {
+            return Content::Malformed;
+        };
+        sum = sum.wrapping_add(decoded);
+        if let Some(place) = bytes.get_mut(index).filter(|_| in_place) {
+            *place = decoded;
+        }
+    }
+    let content = (length / 2 - 1) as u8;
+    if sum == 0 {
+        Content::Right(content)
+    } else {
+        Content::Damaged(content)
+    }
 }
 
 /// The frame that is the whole of `bytes`, decoded where it stands. Lower case
@@ -75,37 +145,24 @@ pub fn find(characters: &[u8], end: u8) -> (usize, Option<usize>) {
 /// without a colon, or for characters that are no pairs of digits;
 /// [`Status::INVALID_CRC`] for a wrong LRC. The bytes may then be overwritten.
 pub fn parse(bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Status> {
-    if bytes.first().is_some_and(|first| *first != START) || bytes.len() > MAX_FRAME {
-        return Err(Status::MALFORMED_FRAME);
-    }
-    let Some(characters) = bytes.len().checked_sub(AROUND) else {
+    if bytes.first().is_none_or(|first| *first == START)
+        && bytes.len() <= MAX_FRAME
+        && (bytes.len() < AROUND || !bytes.ends_with(&[RETURN, end]))
+    {
         return Err(Status::INCOMPLETE_FRAME);
+    }
+    let length = match decode(bytes, end, true) {
+        Content::Right(length) => length,
+        Content::Damaged(_) => return Err(Status::INVALID_CRC),
+        Content::Malformed => return Err(Status::MALFORMED_FRAME),
     };
-    if !bytes.ends_with(&[RETURN, end]) {
-        return Err(Status::INCOMPLETE_FRAME);
-    }
-    let length = characters / 2;
-    if characters % 2 != 0 || length < MIN_CONTENT {
-        return Err(Status::MALFORMED_FRAME);
-    }
-    for index in 0..length {
-        let at = 1 + 2 * index;
-        let pair = bytes.get(at..at + 2).and_then(byte);
-        let decoded = pair.ok_or(Status::MALFORMED_FRAME)?;
-        if let Some(place) = bytes.get_mut(index) {
-            *place = decoded;
-        }
-    }
-    match bytes.get(..length) {
-        Some([content @ .., check]) if lrc(content) == *check => match content {
-            [unit, pdu @ ..] => Ok(Adu {
-                transaction: 0,
-                unit: *unit,
-                pdu,
-            }),
-            [] => Err(Status::MALFORMED_FRAME),
-        },
-        _ => Err(Status::INVALID_CRC),
+    match bytes.get(..length.into()) {
+        Some([unit, pdu @ ..]) => Ok(Adu {
+            transaction: 0,
+            unit: *unit,
+            pdu,
+        }),
+        _ => Err(Status::MALFORMED_FRAME),
     }
 }
 
@@ -218,6 +275,20 @@ mod tests {
     fn a_wrong_lrc_is_found() {
         let mut bytes = b":0207F6\r\n".to_vec();
         assert_eq!(parse(&mut bytes, END), Err(Status::INVALID_CRC));
+    }
+
+    #[test]
+    fn a_frame_that_is_not_decoded_in_place_stays_as_it_is() {
+        for (frame, content) in [
+            (FRAME, Content::Right(2)),
+            (b":0207F6\r\n", Content::Damaged(2)),
+            (b":0207FG\r\n", Content::Malformed),
+        ] {
+            let mut bytes = frame.to_vec();
+            assert_eq!(decode(&mut bytes, END, false), content);
+            assert_eq!(bytes, frame);
+            assert_eq!(decode(&mut bytes, END, true), content);
+        }
     }
 
     #[test]

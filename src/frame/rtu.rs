@@ -7,6 +7,9 @@ use crate::error::Status;
 /// The longest frame: unit, PDU of 253 bytes, CRC.
 pub const MAX_FRAME: usize = 256;
 
+/// The least bytes of a frame: unit, function, CRC.
+pub const MIN_FRAME: u8 = 4;
+
 /// Bytes of a frame around its PDU: the unit before, the CRC behind.
 pub const OVERHEAD: usize = 3;
 
@@ -55,7 +58,7 @@ pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Status> {
         return Err(Status::MALFORMED_FRAME);
     }
     match bytes {
-        [unit, pdu @ .., _, _] if crc16(bytes).is_residue() => Ok(Adu {
+        [unit, pdu @ .., _, _] if is_frame(bytes) => Ok(Adu {
             transaction: 0,
             unit: *unit,
             pdu,
@@ -64,10 +67,31 @@ pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Status> {
     }
 }
 
+/// True if the bytes are a frame, as their CRC says. Two or three bytes may be one here, one
+/// without a PDU.
+#[inline(always)]
+pub fn is_frame(bytes: &[u8]) -> bool {
+    crc16(bytes).is_residue()
+}
+
+/// The length of the shortest frame that begins where `bytes` begin, among those of `least`
+/// bytes and each time `step` bytes more; `None` if there is none.
+pub fn first(bytes: &[u8], least: usize, step: usize) -> Option<usize> {
+    let mut total = least;
+    let mut crc = Crc16::START.with(bytes.get(..total)?);
+    while !crc.is_residue() {
+        crc = crc.with(bytes.get(total..total + step)?);
+        total += step;
+        if total > MAX_FRAME {
+            return None;
+        }
+    }
+    Some(total)
+}
+
 /// Where the last frame of `bytes` begins, which ends where they end; their
 /// length if there is none. What stands before it does not matter: the CRC is
-/// taken back byte by byte until it is that of no bytes. Two or three bytes may be a frame
-/// here, one without a PDU.
+/// taken back byte by byte until it is that of no bytes; see [`is_frame`].
 #[cfg_attr(target_os = "none", inline(never))]
 pub fn last(bytes: &[u8]) -> usize {
     let mut crc = Crc16::RESIDUE;
@@ -102,9 +126,6 @@ pub fn emit(
     write(buffer, unit, length, |_| ());
     Ok(length + OVERHEAD)
 }
-
-/// The least bytes of a frame: unit, function, CRC.
-pub const MIN_FRAME: u8 = 4;
 
 #[cfg(test)]
 mod tests {

@@ -48,6 +48,12 @@ pub fn header(bytes: &[u8]) -> Result<Header, Status> {
     })
 }
 
+/// The length in the header of a frame whose PDU has so many bytes.
+#[inline(always)]
+pub const fn length(pdu: usize) -> [u8; 2] {
+    (pdu as u16 + 1).to_be_bytes()
+}
+
 /// How many bytes it takes to judge more of a header than its first `have` allow.
 pub const fn next_part(have: usize) -> usize {
     match have {
@@ -140,7 +146,7 @@ pub fn emit(
     };
     let length = pdu(place)?;
     let [a, b] = transaction.to_be_bytes();
-    let [c, d] = (length as u16 + 1).to_be_bytes();
+    let [c, d] = self::length(length);
     *header = [a, b, 0, 0, c, d, unit];
     Ok(PDU + length)
 }

@@ -3,7 +3,6 @@
 
 use super::Side;
 use crate::error::Status;
-use crate::frame::checksum::crc16;
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::custom::{is_user_defined, Function};
 use crate::pdu::diagnostics::REPORT_SERVER_ID;
@@ -66,7 +65,7 @@ pub fn expected(
             match frame_length(framing, side.length(pdu, functions)) {
                 Length::Exactly(length) if may_be_longer(side, pdu) => match bytes.get(..length) {
                     None => Length::AtLeast(length),
-                    Some(frame) if crc16(frame).is_residue() => Length::Exactly(length),
+                    Some(frame) if rtu::is_frame(frame) => Length::Exactly(length),
                     Some(_) => frame_length(framing, Length::Silence),
                 },
                 length => length,
@@ -107,7 +106,10 @@ fn expected_ascii(
     if *first != ascii::START {
         return Err(Status::MALFORMED_FRAME);
     }
-    let is_end = |pair: &[u8]| matches!(pair, [ascii::RETURN, last] if *last == end);
+    let is_end = |pair: &[u8]| match pair {
+        [before, last] => ascii::mark(*before, *last, end) == ascii::Mark::End,
+        _ => false,
+    };
     if let Some(at) = characters.windows(2).position(is_end) {
         return Ok(Length::Exactly(1 + at + 2));
     }
@@ -121,7 +123,10 @@ fn expected_ascii(
         *place = ascii::byte(pair).ok_or(Status::MALFORMED_FRAME)?;
         count += 1;
     }
-    let rest_is_digits = pairs.remainder().iter().all(u8::is_ascii_hexdigit);
+    let rest_is_digits = pairs
+        .remainder()
+        .iter()
+        .all(|last| ascii::digit(*last).is_some());
     if !rest_is_digits || pairs.next().is_some() {
         return Err(Status::MALFORMED_FRAME);
     }

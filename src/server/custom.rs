@@ -1,6 +1,7 @@
 //! User-defined functions.
 
 use super::{Reply, Service};
+use crate::bytes::move_items;
 use crate::pdu::limits::MAX_PDU;
 use core::cell::Cell;
 
@@ -26,9 +27,7 @@ pub fn serve(
     // Move the response's data to directly after the function code.
     let cells = Cell::from_mut(pdu).as_slice_of_cells();
     let behind = cells.get(length..length + bytes).unwrap_or_default();
-    for (to, from) in cells.get(1..).unwrap_or_default().iter().zip(behind) {
-        to.set(from.get());
-    }
+    move_items(cells.get(1..).unwrap_or_default(), behind);
     Reply::length(1 + bytes)
 }
 

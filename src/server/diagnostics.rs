@@ -115,7 +115,7 @@ impl Diagnostics {
             count(&mut self.character_overruns);
         }
         let broadcast = heading.is_broadcast() && !damaged;
-        if concern == Concern::Foreign && !damaged && !broadcast {
+        if concern == Concern::FOREIGN && !damaged && !broadcast {
             return false;
         }
         let mut event = RECEIVED;
@@ -137,7 +137,7 @@ impl Diagnostics {
         }
         count(&mut self.server_messages);
         let is_restart = matches!(pdu, [DIAGNOSTICS, rest @ ..] if rest.starts_with(&RESTART));
-        let served = concern != Concern::Foreign && (self.listen_only == 0 || is_restart);
+        let served = concern != Concern::FOREIGN && (self.listen_only == 0 || is_restart);
         if !served {
             count(&mut self.no_responses);
         }
@@ -154,7 +154,7 @@ impl Diagnostics {
         } else if function != GET_COMM_EVENT_COUNTER {
             count(&mut self.events);
         }
-        if reply == Reply::SILENT || concern == Concern::Broadcast {
+        if reply == Reply::SILENT || concern == Concern::BROADCAST {
             count(&mut self.no_responses);
         }
         let bits = match code {

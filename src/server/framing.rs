@@ -3,6 +3,7 @@
 use super::heading::SERIAL;
 use super::line::{Lent, Receive, Seal, Server};
 use crate::error::Status;
+use crate::frame::ascii::{Content, Mark};
 use crate::frame::checksum::Crc16;
 use crate::frame::{ascii, rtu, tcp};
 use crate::pdu::custom::Function;
@@ -293,19 +294,23 @@ impl<P: Port, B: Lent> Server<P, B> {
                 return self.found(0);
             }
             let delimiter = self.delimiter;
-            let frame = self.lent.frame().get_mut(..=end).unwrap_or_default();
-            match frame {
-                [first, .., ascii::START] => {
-                    *first = ascii::START;
+            let last = self.lent.byte(end);
+            let before = if end == 0 { 0 } else { self.lent.byte(end - 1) };
+            match ascii::mark(before, last, delimiter) {
+                Mark::Start => {
+                    self.lent.part(0, 1).fill(last);
                     self.end = 1;
                 }
-                [ascii::START] => {}
-                [_] => self.end = 0,
-                [.., ascii::RETURN, last] if *last == delimiter => {
-                    let length = ascii::parse(frame, delimiter).map_or(0, |adu| adu.pdu.len());
-                    return self.found(length);
+                Mark::Inside if end == 0 => self.end = 0,
+                Mark::Inside => {}
+                Mark::End => {
+                    let frame = self.lent.part(0, end + 1);
+                    let length = match ascii::decode(frame, delimiter, true) {
+                        Content::Right(content) => content - 1,
+                        _ => 0,
+                    };
+                    return self.found(length.into());
                 }
-                _ => {}
             }
         }
         Status::OK
@@ -341,16 +346,13 @@ impl<P: Port, B: Lent> Server<P, B> {
             return self.heard_less(heard);
         }
         self.end = AT_ONCE as u16;
-        let &mut [_, _, a, b, c, d, unit, ..] = front;
-        // Protocol identifier and length, judged below where they are rare.
-        let total = (u32::from_be_bytes([a, b, c, d]) as usize).wrapping_add(tcp::HEADER);
-        if total == AT_ONCE {
-            return self.found_for(unit, (AT_ONCE - tcp::PDU) as u16);
+        match tcp::header(front) {
+            Ok(header) if header.total == AT_ONCE => {
+                self.found_for(header.unit, (AT_ONCE - tcp::PDU) as u16)
+            }
+            Ok(header) if header.total > AT_ONCE => self.receive_rest(header.total, header.unit),
+            _ => self.receive_on(),
         }
-        if total > AT_ONCE && total <= tcp::MAX_FRAME {
-            return self.receive_rest(total, unit);
-        }
-        self.receive_on()
     }
 
     /// Less than what most requests have has arrived, or nothing.
@@ -441,7 +443,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     #[inline(always)]
     pub(super) fn seal_tcp(&mut self, length: usize) -> usize {
         if let [high, low] = self.lent.part(4, 6) {
-            [*high, *low] = (length as u16 + 1).to_be_bytes();
+            [*high, *low] = tcp::length(length);
         }
         tcp::PDU + length
     }

@@ -1,5 +1,6 @@
 //! Which unit a received frame is addressed to.
 
+use super::table::Small;
 use crate::pdu::{bits, files, registers};
 
 /// The address and the position of a received frame.
@@ -25,15 +26,31 @@ pub struct Heading {
 
 /// How a frame addresses a unit.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(target_arch = "avr", repr(u8))]
-#[cfg_attr(not(target_arch = "avr"), repr(usize))]
-pub enum Concern {
+#[repr(transparent)]
+pub struct Concern(Small);
+
+impl Concern {
     /// The frame is for another unit, or damaged.
-    Foreign,
+    pub const FOREIGN: Concern = Concern(0);
     /// The frame is for this unit.
-    Own,
+    pub const OWN: Concern = Concern(1);
     /// The frame is a broadcast: each unit carries it out, no unit responds.
-    Broadcast,
+    pub const BROADCAST: Concern = Concern(2);
+
+    /// The number of this addressing in the C API.
+    #[inline(always)]
+    #[allow(clippy::unnecessary_cast)] // It is needed on an AVR.
+    pub const fn code(self) -> u8 {
+        self.0 as u8
+    }
+
+    /// How the frame addresses the units that it is not for: a broadcast is for them too, any other
+    /// frame is not.
+    #[inline(always)]
+    #[must_use]
+    pub const fn to_others(self) -> Concern {
+        Concern(self.0 & Concern::BROADCAST.0)
+    }
 }
 
 /// The id of a unit that responds to every id.
@@ -55,7 +72,7 @@ impl Heading {
     #[inline]
     pub const fn concern(&self, function: u8) -> Concern {
         match self.concern_of_all() {
-            Concern::Broadcast if !only_writes(function) => Concern::Foreign,
+            Concern::BROADCAST if !only_writes(function) => Concern::FOREIGN,
             concern => concern,
         }
     }
@@ -64,11 +81,11 @@ impl Heading {
     #[inline(always)]
     pub const fn concern_of_all(&self) -> Concern {
         if self.length == 0 {
-            Concern::Foreign
+            Concern::FOREIGN
         } else if self.is_broadcast() {
-            Concern::Broadcast
+            Concern::BROADCAST
         } else {
-            Concern::Own
+            Concern::OWN
         }
     }
 

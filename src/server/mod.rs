@@ -26,4 +26,4 @@ mod units;
 pub use heading::{only_writes, Concern, Heading, ANY};
 pub use line::{Lent, Server, MOST_REQUESTS};
 pub use reply::Reply;
-pub use units::{Service, Unit, Units};
+pub use units::{dispatch, first_reply, Dispatch, Service, Unit, Units};

@@ -1,81 +1,8 @@
-//! Cells one by one, as a program may hold them, and ready storage in arrays.
+//! The four tables as services, over cells of the program or over arrays.
 
 use super::table::{self, Cells, Kind, Way};
 use super::{Reply, Service};
-
-/// Registers that can be read.
-pub trait RegisterRead {
-    /// True if the register is there.
-    fn is_valid(&self, address: u16) -> bool;
-
-    /// A register that is there.
-    fn get(&self, address: u16) -> u16;
-}
-
-/// Registers that can be written too.
-pub trait RegisterWrite: RegisterRead {
-    /// Sets a register that is there.
-    fn set(&mut self, address: u16, value: u16);
-
-    /// Asked before registers are written, once a request, with the values high
-    /// byte first; an exception code refuses all of them, 0 allows.
-    fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
-        let _ = (address, quantity, data);
-        0
-    }
-
-    /// Told what was written.
-    fn after(&mut self, address: u16, quantity: u16) {
-        let _ = (address, quantity);
-    }
-}
-
-/// Bits that can be read.
-pub trait BitRead {
-    /// True if the bit is there.
-    fn is_valid(&self, address: u16) -> bool;
-
-    /// A bit that is there.
-    fn get(&self, address: u16) -> bool;
-}
-
-/// Bits that can be written too.
-pub trait BitWrite: BitRead {
-    /// Sets a bit that is there.
-    fn set(&mut self, address: u16, on: bool);
-
-    /// As [`RegisterWrite::before`], with eight bits to a byte, lowest first.
-    fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
-        let _ = (address, quantity, data);
-        0
-    }
-
-    /// Told what was written.
-    fn after(&mut self, address: u16, quantity: u16) {
-        let _ = (address, quantity);
-    }
-}
-
-/// The addresses of a range, unless it passes 65535 or one of them is not there.
-fn all(address: u16, quantity: u16, is_valid: impl Fn(u16) -> bool) -> bool {
-    let last = u32::from(address) + u32::from(quantity);
-    last <= 0x1_0000 && (0..quantity).all(|index| is_valid(address.wrapping_add(index)))
-}
-
-fn read_registers(cells: &impl RegisterRead, address: u16, data: &mut [u8]) {
-    for (cell, pair) in (address..=u16::MAX).zip(data.as_chunks_mut().0) {
-        *pair = cells.get(cell).to_be_bytes();
-    }
-}
-
-fn read_bits(cells: &impl BitRead, address: u16, quantity: u16, data: &mut [u8]) {
-    data.fill(0);
-    for (index, cell) in (0..quantity).zip(address..=u16::MAX) {
-        if let Some(byte) = data.get_mut(usize::from(index / 8)) {
-            *byte |= u8::from(cells.get(cell)) << (index % 8);
-        }
-    }
-}
+use core::ops::Range;
 
 /// Input registers: serves 04.
 pub struct InputRegisters<T>(pub T);
@@ -89,100 +16,36 @@ pub struct DiscreteInputs<T>(pub T);
 /// Coils: serves 01, 05 and 0F.
 pub struct Coils<T>(pub T);
 
-impl<T: RegisterRead> Cells for InputRegisters<T> {
-    fn covers(&self, address: u16, quantity: u16) -> bool {
-        all(address, quantity, |cell| self.0.is_valid(cell))
-    }
-    fn transfer(&mut self, way: Way, address: u16, _quantity: u16, data: &mut [u8]) {
-        if way == Way::Read {
-            read_registers(&self.0, address, data);
-        }
-    }
-}
-
-impl<T: RegisterWrite> Cells for HoldingRegisters<T> {
-    fn covers(&self, address: u16, quantity: u16) -> bool {
-        all(address, quantity, |cell| self.0.is_valid(cell))
-    }
-    fn transfer(&mut self, way: Way, address: u16, _quantity: u16, data: &mut [u8]) {
-        if way == Way::Read {
-            return read_registers(&self.0, address, data);
-        }
-        for (cell, pair) in (address..=u16::MAX).zip(data.as_chunks().0) {
-            self.0.set(cell, u16::from_be_bytes(*pair));
-        }
-    }
-    fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
-        self.0.before(address, quantity, data)
-    }
-    fn after(&mut self, address: u16, quantity: u16) {
-        self.0.after(address, quantity);
-    }
-}
-
-impl<T: BitRead> Cells for DiscreteInputs<T> {
-    fn covers(&self, address: u16, quantity: u16) -> bool {
-        all(address, quantity, |cell| self.0.is_valid(cell))
-    }
-    fn transfer(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) {
-        if way == Way::Read {
-            read_bits(&self.0, address, quantity, data);
-        }
-    }
-}
-
-impl<T: BitWrite> Cells for Coils<T> {
-    fn covers(&self, address: u16, quantity: u16) -> bool {
-        all(address, quantity, |cell| self.0.is_valid(cell))
-    }
-    fn transfer(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) {
-        if way == Way::Read {
-            return read_bits(&self.0, address, quantity, data);
-        }
-        for (index, cell) in (0..quantity).zip(address..=u16::MAX) {
-            if let Some(byte) = data.get(usize::from(index / 8)) {
-                self.0.set(cell, byte >> (index % 8) & 1 != 0);
-            }
-        }
-    }
-    fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
-        self.0.before(address, quantity, data)
-    }
-    fn after(&mut self, address: u16, quantity: u16) {
-        self.0.after(address, quantity);
-    }
-}
-
-impl<T: RegisterRead> Service for InputRegisters<T> {
+impl<T: Cells> Service for InputRegisters<T> {
     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
-        table::serve(Kind::INPUT_REGISTERS, self, pdu, length)
+        table::serve(Kind::INPUT_REGISTERS, &mut self.0, pdu, length)
     }
 }
 
-impl<T: RegisterWrite> Service for HoldingRegisters<T> {
+impl<T: Cells> Service for HoldingRegisters<T> {
     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
-        match table::serve(Kind::HOLDING_REGISTERS, self, pdu, length) {
-            Reply::NOT_MINE => table::serve_more(self, pdu, length),
+        match table::serve(Kind::HOLDING_REGISTERS, &mut self.0, pdu, length) {
+            Reply::NOT_MINE => table::serve_more(&mut self.0, pdu, length),
             reply => reply,
         }
     }
 }
 
-impl<T: BitRead> Service for DiscreteInputs<T> {
+impl<T: Cells> Service for DiscreteInputs<T> {
     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
-        table::serve(Kind::DISCRETE_INPUTS, self, pdu, length)
+        table::serve(Kind::DISCRETE_INPUTS, &mut self.0, pdu, length)
     }
 }
 
-impl<T: BitWrite> Service for Coils<T> {
+impl<T: Cells> Service for Coils<T> {
     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
-        table::serve(Kind::COILS, self, pdu, length)
+        table::serve(Kind::COILS, &mut self.0, pdu, length)
     }
 }
 
-/// Asked before a write, as [`RegisterWrite::before`].
+/// Called before a write, as [`Cells::before`].
 pub type Before<'a> = &'a mut dyn FnMut(u16, u16, &[u8]) -> u8;
-/// Told of a write, as [`RegisterWrite::after`].
+/// Called after a write, as [`Cells::after`].
 pub type After<'a> = &'a mut dyn FnMut(u16, u16);
 
 /// Registers in an array.
@@ -193,9 +56,9 @@ pub struct Words<'a> {
     pub base: u16,
     /// A bit for each, lowest first: 0 is not there. All are there without.
     pub valid: Option<&'a [u8]>,
-    /// Asked before a write.
+    /// Called before a write.
     pub before: Option<Before<'a>>,
-    /// Told of a write.
+    /// Called after a write.
     pub after: Option<After<'a>>,
 }
 
@@ -209,9 +72,9 @@ pub struct Bits<'a> {
     pub size: u16,
     /// As in [`Words`].
     pub valid: Option<&'a [u8]>,
-    /// Asked before a write.
+    /// Called before a write.
     pub before: Option<Before<'a>>,
-    /// Told of a write.
+    /// Called after a write.
     pub after: Option<After<'a>>,
 }
 
@@ -225,10 +88,6 @@ impl<'a> Words<'a> {
             before: None,
             after: None,
         }
-    }
-
-    fn index(&self, address: u16) -> usize {
-        usize::from(address.wrapping_sub(self.base))
     }
 }
 
@@ -245,10 +104,6 @@ impl<'a> Bits<'a> {
             after: None,
         }
     }
-
-    fn index(&self, address: u16) -> usize {
-        usize::from(address.wrapping_sub(self.base))
-    }
 }
 
 fn bit(map: &[u8], index: usize) -> bool {
@@ -256,27 +111,45 @@ fn bit(map: &[u8], index: usize) -> bool {
         .is_some_and(|byte| byte >> (index % 8) & 1 != 0)
 }
 
-impl RegisterRead for Words<'_> {
-    fn is_valid(&self, address: u16) -> bool {
-        let index = self.index(address);
-        index < self.words.len() && self.valid.is_none_or(|valid| bit(valid, index))
-    }
-    fn get(&self, address: u16) -> u16 {
-        self.words.get(self.index(address)).copied().unwrap_or(0)
-    }
+/// Where cells stand in an array whose first has the address `base`; `None` unless all of
+/// them are among its `size`, and `valid` says so.
+fn places(
+    base: u16,
+    size: usize,
+    valid: Option<&[u8]>,
+    address: u16,
+    quantity: u16,
+) -> Option<Range<usize>> {
+    // No address is beyond 65535.
+    address.checked_add(quantity.checked_sub(1)?)?;
+    let first = usize::from(address.checked_sub(base)?);
+    let last = first.checked_add(quantity.into())?;
+    let is_there = |cell| valid.is_none_or(|valid| bit(valid, cell));
+    (last <= size && (first..last).all(is_there)).then_some(first..last)
 }
 
-impl RegisterWrite for Words<'_> {
-    fn set(&mut self, address: u16, value: u16) {
-        let index = self.index(address);
-        if let Some(word) = self.words.get_mut(index) {
-            *word = value;
+impl Cells for Words<'_> {
+    fn covers(&self, address: u16, quantity: u16) -> bool {
+        let size = self.words.len();
+        places(self.base, size, self.valid, address, quantity).is_some()
+    }
+
+    fn transfer(&mut self, way: Way, address: u16, _quantity: u16, data: &mut [u8]) {
+        let first = usize::from(address.wrapping_sub(self.base));
+        let words = self.words.get_mut(first..).unwrap_or_default();
+        for (word, pair) in words.iter_mut().zip(data.as_chunks_mut().0) {
+            match way {
+                Way::Read => *pair = word.to_be_bytes(),
+                Way::Write => *word = u16::from_be_bytes(*pair),
+            }
         }
     }
+
     fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
         let hook = self.before.as_mut();
         hook.map_or(0, |hook| hook(address, quantity, data))
     }
+
     fn after(&mut self, address: u16, quantity: u16) {
         if let Some(hook) = &mut self.after {
             hook(address, quantity);
@@ -284,30 +157,35 @@ impl RegisterWrite for Words<'_> {
     }
 }
 
-impl BitRead for Bits<'_> {
-    fn is_valid(&self, address: u16) -> bool {
-        let index = self.index(address);
-        index < usize::from(self.size)
-            && index / 8 < self.bits.len()
-            && self.valid.is_none_or(|valid| bit(valid, index))
+impl Cells for Bits<'_> {
+    fn covers(&self, address: u16, quantity: u16) -> bool {
+        let size = usize::from(self.size).min(self.bits.len().saturating_mul(8));
+        places(self.base, size, self.valid, address, quantity).is_some()
     }
-    fn get(&self, address: u16) -> bool {
-        bit(self.bits, self.index(address))
-    }
-}
 
-impl BitWrite for Bits<'_> {
-    fn set(&mut self, address: u16, on: bool) {
-        let index = self.index(address);
-        if let Some(byte) = self.bits.get_mut(index / 8) {
-            let mask = 1 << (index % 8);
-            *byte = if on { *byte | mask } else { *byte & !mask };
+    fn transfer(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) {
+        let first = usize::from(address.wrapping_sub(self.base));
+        if way == Way::Read {
+            data.fill(0);
+        }
+        for index in 0..usize::from(quantity) {
+            let (from, to, at, place) = match way {
+                Way::Read => (&*self.bits, &mut *data, first + index, index),
+                Way::Write => (&*data, &mut *self.bits, index, first + index),
+            };
+            let on = bit(from, at);
+            if let Some(byte) = to.get_mut(place / 8) {
+                let mask = 1 << (place % 8);
+                *byte = if on { *byte | mask } else { *byte & !mask };
+            }
         }
     }
+
     fn before(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
         let hook = self.before.as_mut();
         hook.map_or(0, |hook| hook(address, quantity, data))
     }
+
     fn after(&mut self, address: u16, quantity: u16) {
         if let Some(hook) = &mut self.after {
             hook(address, quantity);

@@ -26,26 +26,78 @@ pub struct Unit<'a> {
     pub diagnostics: Option<&'a mut Diagnostics>,
 }
 
+/// The units of a server, one after the other, as [`dispatch`] asks them about one frame.
+pub trait Dispatch {
+    /// A unit.
+    type Unit;
+
+    /// The next unit; one that has no part in a frame that is this to all may be left out.
+    fn next(&mut self, all: Concern) -> Option<Self::Unit>;
+
+    /// True if a frame that is no broadcast is for this unit.
+    fn is_for(&self, unit: &Self::Unit) -> bool;
+
+    /// Has a unit serve the frame, or take notice of it, as far as it concerns the unit;
+    /// `None` if the frame is another's, and the unit takes no notice.
+    fn ask(&mut self, unit: Self::Unit, concern: Concern) -> Option<Reply>;
+}
+
+/// Asks the units about a frame that is `all` to those that it is for: the first of them
+/// answers, the others take notice. The reply of that unit, [`Reply::SILENT`] without one.
+#[inline(always)]
+pub fn dispatch(units: &mut impl Dispatch, mut all: Concern) -> Reply {
+    let mut answer = Reply::SILENT;
+    while let Some(unit) = units.next(all) {
+        let mut concern = all.to_others();
+        if units.is_for(&unit) {
+            concern = all;
+        }
+        let Some(reply) = units.ask(unit, concern) else {
+            continue;
+        };
+        if concern == Concern::OWN {
+            answer = reply;
+            all = Concern::FOREIGN;
+        }
+    }
+    answer
+}
+
+/// What services reply one after the other: the first reply of one that serves the
+/// function, [`Reply::ILLEGAL_FUNCTION`] without one.
+#[inline(always)]
+pub fn first_reply(replies: impl IntoIterator<Item = Reply>) -> Reply {
+    for reply in replies {
+        if reply != Reply::NOT_MINE {
+            return reply;
+        }
+    }
+    Reply::ILLEGAL_FUNCTION
+}
+
+impl Service for Diagnostics {
+    fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
+        self.serve(pdu, length).0
+    }
+}
+
 impl Unit<'_> {
     fn walk(&mut self, pdu: &mut [u8], length: usize) -> Reply {
-        for service in self.services.iter_mut() {
-            match service.serve(pdu, length) {
-                Reply::NOT_MINE => {}
-                reply => return reply,
-            }
-        }
-        let diagnostics = self.diagnostics.as_mut();
-        match diagnostics.map(|line| line.serve(pdu, length).0) {
-            None | Some(Reply::NOT_MINE) => Reply::ILLEGAL_FUNCTION,
-            Some(reply) => reply,
-        }
+        let services = self.services.iter_mut().map(|service| &mut **service);
+        let line = self.diagnostics.as_deref_mut();
+        let line = line.map(|line| line as &mut dyn Service);
+        first_reply(
+            services
+                .chain(line)
+                .map(|service| service.serve(pdu, length)),
+        )
     }
 
     /// Serves a frame, of which notice is taken.
     fn serve(&mut self, heading: &Heading, concern: Concern, pdu: &mut [u8]) -> Reply {
         let length = usize::from(heading.length);
         let function = pdu.first().copied().unwrap_or(0);
-        let mut served = concern != Concern::Foreign;
+        let mut served = concern != Concern::FOREIGN;
         if let Some(line) = &mut self.diagnostics {
             served = line.hear(heading, concern, pdu.get(..length).unwrap_or_default());
         }
@@ -60,21 +112,40 @@ impl Unit<'_> {
     }
 }
 
+/// Units in a slice, and the frame that they are asked about.
+struct Slice<'a, U> {
+    units: U,
+    heading: &'a Heading,
+    pdu: &'a mut [u8],
+}
+
+impl<'u, 'a: 'u, U: Iterator<Item = &'u mut Unit<'a>>> Dispatch for Slice<'_, U> {
+    type Unit = &'u mut Unit<'a>;
+
+    fn next(&mut self, _all: Concern) -> Option<Self::Unit> {
+        self.units.next()
+    }
+
+    fn is_for(&self, unit: &Self::Unit) -> bool {
+        self.heading.is_for(unit.id)
+    }
+
+    fn ask(&mut self, unit: Self::Unit, concern: Concern) -> Option<Reply> {
+        Some(unit.serve(self.heading, concern, self.pdu))
+    }
+}
+
 impl Units for [Unit<'_>] {
     fn serve(&mut self, heading: &Heading, pdu: &mut [u8]) -> Reply {
-        let mut all = heading.concern(pdu.first().copied().unwrap_or(0));
-        let mut answer = Reply::SILENT;
-        for unit in self {
-            let mut concern = all;
-            if all == Concern::Own && !heading.is_for(unit.id) {
-                concern = Concern::Foreign;
-            }
-            let reply = unit.serve(heading, concern, pdu);
-            if concern == Concern::Own {
-                answer = reply;
-                all = Concern::Foreign;
-            }
-        }
-        answer
+        let all = heading.concern(pdu.first().copied().unwrap_or(0));
+        let units = self.iter_mut();
+        dispatch(
+            &mut Slice {
+                units,
+                heading,
+                pdu,
+            },
+            all,
+        )
     }
 }

@@ -3,7 +3,7 @@
 use super::lane::{Lane, Timing};
 use super::pairing::Requests;
 use crate::error::Status;
-use crate::frame::checksum::{crc16, Crc16};
+use crate::frame::ascii::{Content, Mark};
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::packet::Side;
 use crate::pdu::custom::Function;
@@ -27,8 +27,8 @@ pub(super) enum Verdict {
     Wrong,
 }
 
-/// The least bytes of an RTU frame: unit, function, CRC.
-pub(super) const MIN_RTU: usize = 4;
+/// The least bytes of an RTU frame.
+pub(super) const MIN_RTU: usize = rtu::MIN_FRAME as usize;
 
 /// What a finder needs to know.
 #[derive(Clone, Copy)]
@@ -73,9 +73,7 @@ impl Context<'_> {
             (Length::Exactly(total), _)
                 if code == Some(REPORT_SERVER_ID)
                     && self.requests.is_waiting(*unit, pdu)
-                    && frame
-                        .get(..total)
-                        .is_some_and(|all| !crc16(all).is_residue()) =>
+                    && frame.get(..total).is_some_and(|all| !rtu::is_frame(all)) =>
             {
                 Length::Silence
             }
@@ -105,7 +103,7 @@ impl Context<'_> {
         lengths.map(|length| match length {
             Some(Length::Exactly(total)) => {
                 let frame = bytes.get(..total)?;
-                crc16(frame).is_residue().then_some(total)
+                rtu::is_frame(frame).then_some(total)
             }
             _ => None,
         })
@@ -132,8 +130,8 @@ impl Context<'_> {
         let mut ends = lane.silences(lane.at).chain(quiet.then_some(lane.end));
         ends.find_map(|end| {
             let total = usize::from(end - lane.at);
-            let is_frame = (MIN_RTU..=rtu::MAX_FRAME).contains(&total)
-                && crc16(bytes.get(..total)?).is_residue();
+            let is_frame =
+                (MIN_RTU..=rtu::MAX_FRAME).contains(&total) && rtu::is_frame(bytes.get(..total)?);
             is_frame.then_some(total)
         })
     }
@@ -149,16 +147,7 @@ impl Context<'_> {
         }
         let is_words = bytes.get(1) == Some(&DIAGNOSTICS);
         let step = if is_words { 2 } else { 1 };
-        let mut total = MIN_RTU * step;
-        let mut crc = Crc16::START.with(bytes.get(..total)?);
-        while !crc.is_residue() {
-            crc = crc.with(bytes.get(total..total + step)?);
-            total += step;
-            if total > rtu::MAX_FRAME {
-                return None;
-            }
-        }
-        Some(total)
+        rtu::first(bytes, MIN_RTU * step, step)
     }
 
     /// What stands in RTU bytes.
@@ -263,7 +252,7 @@ impl Context<'_> {
             Length::Exactly(length) => match length + rtu::OVERHEAD {
                 total if total > capacity.min(rtu::MAX_FRAME) || total < MIN_RTU => None,
                 total if total > bytes.len() => Some(total),
-                total if crc16(bytes.get(..total)?).is_residue() => None,
+                total if rtu::is_frame(bytes.get(..total)?) => None,
                 _ => Some(usize::MAX),
             },
             Length::AtLeast(length) if length + rtu::OVERHEAD > rtu::MAX_FRAME => None,
@@ -335,20 +324,26 @@ impl Context<'_> {
     }
 
     /// What stands in ASCII characters.
-    pub fn ascii(&self, lane: &Lane, bytes: &[u8], capacity: usize) -> Verdict {
-        let Some((&ascii::START, characters)) = bytes.split_first() else {
+    pub fn ascii(&self, lane: &Lane, bytes: &mut [u8], capacity: usize) -> Verdict {
+        let [ascii::START, ..] = bytes else {
             return Verdict::Wrong;
         };
         // What was searched before has no end in it.
-        let known = usize::from(lane.searched).saturating_sub(1);
-        let mut before = bytes.get(known).copied().unwrap_or_default();
-        for (index, character) in characters.iter().enumerate().skip(known) {
-            if *character == self.end && before == ascii::RETURN {
-                let digits = characters.get(..index - 1).unwrap_or_default();
-                return Self::ascii_content(digits);
-            }
-            if *character == ascii::START || index + 2 > ascii::MAX_FRAME {
-                return Verdict::Wrong;
+        let known = usize::from(lane.searched).max(1);
+        let mut before = bytes.get(known - 1).copied().unwrap_or_default();
+        for (index, character) in bytes.iter().enumerate().skip(known) {
+            let total = index + 1;
+            match ascii::mark(before, *character, self.end) {
+                Mark::End => {
+                    let frame = bytes.get_mut(..total).unwrap_or_default();
+                    return match ascii::decode(frame, self.end, false) {
+                        Content::Right(_) => Verdict::Right(total, true, true),
+                        Content::Damaged(_) => Verdict::Damaged(total),
+                        Content::Malformed => Verdict::Wrong,
+                    };
+                }
+                Mark::Inside if total <= ascii::MAX_FRAME => {}
+                _ => return Verdict::Wrong,
             }
             before = *character;
         }
@@ -361,38 +356,4 @@ impl Context<'_> {
             Verdict::Wait(ascii::MAX_FRAME + 1)
         }
     }
-
-    fn ascii_content(digits: &[u8]) -> Verdict {
-        let mut sum = 0u8;
-        let (pairs, rest) = digits.as_chunks::<2>();
-        if pairs.len() < 3 || !rest.is_empty() {
-            return Verdict::Wrong;
-        }
-        for pair in pairs {
-            match ascii::byte(pair) {
-                Some(byte) => sum = sum.wrapping_add(byte),
-                None => return Verdict::Wrong,
-            }
-        }
-        let total = digits.len() + 3;
-        if sum == 0 {
-            Verdict::Right(total, true, true)
-        } else {
-            Verdict::Damaged(total)
-        }
-    }
-}
-
-/// Turns the ASCII frame in `bytes` into the bytes that it stands for, at its
-/// front; how many.
-pub(super) fn decode(bytes: &mut [u8]) -> usize {
-    let count = bytes.len().saturating_sub(3) / 2;
-    for index in 0..count {
-        let at = 1 + 2 * index;
-        let byte = bytes.get(at..at + 2).and_then(ascii::byte);
-        if let (Some(byte), Some(place)) = (byte, bytes.get_mut(index)) {
-            *place = byte;
-        }
-    }
-    count
 }

@@ -1,5 +1,6 @@
 //! One stream of a bus: its bytes, and the times at which they arrived.
 
+use crate::bytes::move_items;
 use crate::time::elapsed;
 use core::cell::Cell;
 
@@ -109,12 +110,9 @@ impl Lane {
     fn drop_mark(&mut self, index: usize) {
         let is_silent = self.marks().get(index).is_some_and(|mark| mark.silent);
         self.silent -= u8::from(is_silent);
-        let cells = Cell::from_mut(&mut self.marks[..]).as_slice_of_cells();
-        for pair in cells.windows(2).skip(index) {
-            if let [to, from] = pair {
-                to.set(from.get());
-            }
-        }
+        let marks = Cell::from_mut(&mut self.marks[..]).as_slice_of_cells();
+        let marks = marks.get(index..).unwrap_or_default();
+        move_items(marks, marks.get(1..).unwrap_or_default());
         self.count = self.count.saturating_sub(1);
     }
 
@@ -265,9 +263,7 @@ impl Lane {
         }
         let cells = Cell::from_mut(buffer).as_slice_of_cells();
         let kept = cells.get(by.into()..self.end.into()).unwrap_or_default();
-        for (to, from) in cells.iter().zip(kept) {
-            to.set(from.get());
-        }
+        move_items(cells, kept);
         self.start = 0;
         self.at -= by;
         self.end -= by;

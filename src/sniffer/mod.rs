@@ -328,7 +328,7 @@ impl Sniffer {
     ) -> Option<Step> {
         let part = self.part(buffer, index);
         let capacity = part.len();
-        let framing = self.framing;
+        let (framing, end) = (self.framing, self.end);
         let (context, lane) = self.split(functions, index, now);
         let step = loop {
             if lane.is_empty() {
@@ -358,7 +358,7 @@ impl Sniffer {
                 break junk(lane.end);
             }
             let bytes = part
-                .get(lane.at.into()..lane.end.into())
+                .get_mut(lane.at.into()..lane.end.into())
                 .unwrap_or_default();
             let verdict = if lane.decoded > 0 {
                 Verdict::Right(lane.decoded.into(), true, true)
@@ -414,10 +414,11 @@ impl Sniffer {
         match step {
             Some(Step::Frame { total, right, .. }) if framing == Framing::Ascii => {
                 let at = usize::from(lane.at);
-                let content = match part.get_mut(at..at + total) {
-                    Some(frame) if lane.decoded == 0 => find::decode(frame),
-                    _ => total.saturating_sub(3) / 2,
-                };
+                if let Some(frame) = part.get_mut(at..at + total).filter(|_| lane.decoded == 0) {
+                    // It has a frame's form: the context looked.
+                    ascii::decode(frame, end, true);
+                }
+                let content = total.saturating_sub(3) / 2;
                 lane.decoded = if right.is_some() { total as u16 } else { 0 };
                 Some(Step::Frame {
                     total,

@@ -6,6 +6,7 @@ use crate::frame::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
 use crate::pointers;
 use crate::port::{countable, mbm_port};
 use mbm::error::Status;
+use mbm::frame::ascii;
 
 /// Makes a client of a kind of line out of storage.
 ///
@@ -104,7 +105,8 @@ pub unsafe extern "C" fn mbm_client_beginAscii(
 ///         for a client of another framing; MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, character: u8) -> u8 {
-    let part_of_a_frame = character.is_ascii_hexdigit() || matches!(character, b':' | b'\r');
+    let part_of_a_frame =
+        ascii::digit(character).is_some() || matches!(character, ascii::START | ascii::RETURN);
     // SAFETY: as the header demands.
     unsafe {
         pointers::with(client, |object| {

@@ -1,6 +1,7 @@
 //! Cells of a table: moved one by one, and many at a time, as a host does.
 
 use core::slice::from_raw_parts_mut;
+use mbm::bytes::copy_words;
 use mbm::server::table::{Kind, Small};
 
 /// True if so many bits of a bitmap are 1.
@@ -139,39 +140,14 @@ pub(super) unsafe fn transfer_many(
 unsafe fn transfer_words(words: *mut u16, write: bool, first: u16, quantity: u16, data: *mut u8) {
     // SAFETY: as the caller promises.
     unsafe {
-        let words = words.add(first.into()).cast::<u8>();
-        let (from, to) = if write {
-            (data.cast_const(), words)
+        let bytes = 2 * usize::from(quantity);
+        let words = from_raw_parts_mut(words.add(first.into()).cast(), bytes);
+        let data = from_raw_parts_mut(data, bytes);
+        if write {
+            copy_words(words, data);
         } else {
-            (words.cast_const(), data)
-        };
-        let end = 2 * usize::from(quantity);
-        let Some(last) = end.checked_sub(16) else {
-            for at in (0..end).step_by(2) {
-                turn::<1>(from.add(at), to.add(at));
-            }
-            return;
-        };
-        // Eight at a time; the last eight overlap those before.
-        let mut at = 0;
-        while at < last {
-            turn::<8>(from.add(at), to.add(at));
-            at += 16;
+            copy_words(data, words);
         }
-        turn::<8>(from.add(last), to.add(last));
-    }
-}
-
-/// Moves so many registers to or from the order of the wire.
-///
-/// # Safety
-/// There are so many at both pointers, which need not be aligned.
-#[inline(always)]
-unsafe fn turn<const N: usize>(from: *const u8, to: *mut u8) {
-    // SAFETY: as the caller promises.
-    unsafe {
-        let words = from.cast::<[u16; N]>().read_unaligned();
-        to.cast::<[u16; N]>().write_unaligned(words.map(u16::to_be));
     }
 }
 

@@ -53,9 +53,9 @@ unsafe extern "C" fn monitor(
     unsafe {
         let record = (*unit).diagnostics;
         let concern = match concern {
-            1 => Concern::Own,
-            2 if !is_unheard(heading, *pdu) => Concern::Broadcast,
-            _ => Concern::Foreign,
+            1 => Concern::OWN,
+            2 if !is_unheard(heading, *pdu) => Concern::BROADCAST,
+            _ => Concern::FOREIGN,
         };
         let (bytes, length) = request(pdu, heading);
         let function = bytes.first().copied().unwrap_or(0);

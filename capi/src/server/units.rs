@@ -5,8 +5,7 @@ use core::ffi::c_void;
 use core::mem::offset_of;
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 use mbm::error::Status;
-use mbm::server::table::Small;
-use mbm::server::{only_writes, Concern, Heading, Reply, ANY};
+use mbm::server::{dispatch, first_reply, only_writes, Concern, Dispatch, Heading, Reply, ANY};
 use mbm::FIRMWARE;
 
 /// Most records that one unit serves, each handed to a mbm_server_serve function.
@@ -151,14 +150,9 @@ pub(super) unsafe fn request<'a>(pdu: *mut u8, heading: *const c_void) -> (&'a m
 pub(super) unsafe fn walk(unit: *mut mbm_unit, heading: *const c_void, pdu: *mut u8) -> usize {
     // SAFETY: as the caller promises; a PDU has a byte at least.
     unsafe {
-        for service in Places::new(unit) {
-            let reply = ask(service, heading, pdu);
-            if reply != Reply::NOT_MINE.code() {
-                return reply;
-            }
-        }
+        let replies = Places::new(unit).map(|service| ask(service, heading, pdu));
+        first_reply(replies.map(Reply::from_number)).code()
     }
-    Reply::ILLEGAL_FUNCTION.code()
 }
 
 /// As [`walk`], of a unit without diagnostics, which ends where all places are taken too:
@@ -298,51 +292,74 @@ unsafe fn serve_each(
     heading: *const Heading,
     pdu: *mut u8,
 ) -> usize {
-    let mut answer = Reply::SILENT.code();
     // SAFETY: as the caller promises.
-    unsafe {
-        let mut unit = units;
-        let mut left = count;
-        let mut all = (*heading).concern_of_all() as Small;
-        loop {
-            if !FIRMWARE && all != BROADCAST {
-                let passed = foreign(unit, left, heading, all);
-                left -= passed;
-                unit = unit.add(passed.into());
-            }
-            if left == 0 {
-                return answer;
-            }
-            let looked_at = unit;
-            unit = unit.add(1);
-            left -= 1;
-            // A unit that serves nothing is as if it were not there.
-            if !serves(looked_at) {
-                continue;
-            }
-            let mut concern = all & BROADCAST;
-            if (*heading).is_for((*looked_at).id) {
-                concern = all;
-            }
-            let reply = match (*looked_at).monitor {
-                Some(monitor) => monitor(looked_at, heading.cast(), concern as u8, pdu),
-                None if concern == FOREIGN => continue,
-                None => walk_alone(looked_at, heading.cast(), pdu),
-            };
-            if concern == OWN {
-                answer = reply;
-                all = FOREIGN;
+    let all = unsafe { (*heading).concern_of_all() };
+    let mut frame = Frame {
+        unit: units,
+        left: count,
+        heading,
+        pdu,
+    };
+    dispatch(&mut frame, all).code()
+}
+
+/// A frame that the units are asked about, and those that are not asked yet.
+///
+/// The pointers are as for [`serve`]; no reference lives while a unit is asked.
+struct Frame {
+    unit: *mut mbm_unit,
+    left: u8,
+    heading: *const Heading,
+    pdu: *mut u8,
+}
+
+impl Dispatch for Frame {
+    type Unit = *mut mbm_unit;
+
+    #[inline(always)]
+    fn next(&mut self, all: Concern) -> Option<*mut mbm_unit> {
+        // SAFETY: as for `serve`.
+        unsafe {
+            loop {
+                if !FIRMWARE && all != Concern::BROADCAST {
+                    let passed = foreign(self.unit, self.left, self.heading, all);
+                    self.left -= passed;
+                    self.unit = self.unit.add(passed.into());
+                }
+                if self.left == 0 {
+                    return None;
+                }
+                let unit = self.unit;
+                self.unit = unit.add(1);
+                self.left -= 1;
+                // A unit that serves nothing is as if it were not there.
+                if serves(unit) {
+                    return Some(unit);
+                }
             }
         }
     }
-}
 
-// What a frame is to a unit: bits, so that a unit that it is not for sees the broadcasts
-// that are left of all.
-const FOREIGN: Small = Concern::Foreign as Small;
-const OWN: Small = Concern::Own as Small;
-const BROADCAST: Small = Concern::Broadcast as Small;
-const _: () = assert!(FOREIGN == 0 && OWN == 1 && BROADCAST == 2);
+    #[inline(always)]
+    fn is_for(&self, unit: &*mut mbm_unit) -> bool {
+        // SAFETY: as for `serve`.
+        unsafe { (*self.heading).is_for((**unit).id) }
+    }
+
+    #[inline(always)]
+    fn ask(&mut self, unit: *mut mbm_unit, concern: Concern) -> Option<Reply> {
+        // SAFETY: as for `serve`.
+        let reply = unsafe {
+            let (heading, pdu) = (self.heading.cast(), self.pdu);
+            match (*unit).monitor {
+                Some(monitor) => monitor(unit, heading, concern.code(), pdu),
+                None if concern == Concern::FOREIGN => return None,
+                None => walk_alone(unit, heading, pdu),
+            }
+        };
+        Some(Reply::from_number(reply))
+    }
+}
 
 /// How many of these units, up to the first other, neither answer a frame nor take
 /// notice of it, where it is no broadcast: a host calls none of them.
@@ -350,12 +367,12 @@ const _: () = assert!(FOREIGN == 0 && OWN == 1 && BROADCAST == 2);
 /// # Safety
 /// `units` points to `count` units.
 #[inline(always)]
-unsafe fn foreign(units: *const mbm_unit, count: u8, heading: *const Heading, all: Small) -> u8 {
+unsafe fn foreign(units: *const mbm_unit, count: u8, heading: *const Heading, all: Concern) -> u8 {
     // SAFETY: as the caller promises; no function of theirs runs meanwhile.
     let (heading, units) = unsafe { (&*heading, from_raw_parts(units, count.into())) };
     let takes_notice = |unit: &mbm_unit| unit.monitor.is_some();
     let answers = |unit: &mbm_unit| unit.id == heading.to || unit.id == ANY;
-    if all == FOREIGN {
+    if all == Concern::FOREIGN {
         before(units, takes_notice)
     } else if heading.is_for_any() {
         0
