@@ -48,8 +48,10 @@ pub trait Dispatch {
 pub fn dispatch(units: &mut impl Dispatch, mut all: Concern) -> Reply {
     let mut answer = Reply::SILENT;
     while let Some(unit) = units.next(all) {
+        // In this order: it is 12 bytes less on an AVR, in the row of a server of four tables.
+        let is_for = units.is_for(&unit);
         let mut concern = all.to_others();
-        if units.is_for(&unit) {
+        if is_for {
             concern = all;
         }
         let Some(reply) = units.ask(unit, concern) else {
