@@ -64,11 +64,10 @@ size: ## Flash and RAM that the library adds, and what changed since docs/report
 
 # The crate with the C functions.
 CAPI := capi
-CBINDGEN = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen 0.29.4) && \
-           "$$tool" --quiet --config cbindgen.toml --output include/mbm.h $(CAPI)
+HEADER = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen 0.29.4) && scripts/header "$$tool"
 .PHONY: header
 header: ## Write include/mbm.h anew from the source
-	@$(CBINDGEN) && echo "include/mbm.h is that of the source"
+	@$(HEADER)
 
 .PHONY: check
 check: need-check $(ARCHIVE) ## Formatting, lints, layers, circles, header, functions, symbols
@@ -81,7 +80,7 @@ check: need-check $(ARCHIVE) ## Formatting, lints, layers, circles, header, func
 	@$(CARGO) test --quiet -p mbm-tools >/dev/null
 	@$(CARGO) run --quiet -p mbm-tools --bin layers
 	@$(CARGO) run --quiet -p mbm-tools --bin circles
-	@$(CBINDGEN) --verify || { echo "check: run \`make header\` and commit include/mbm.h" >&2; exit 1; }
+	@$(HEADER) --check
 	@scripts/abi --check
 	@clang-format --dry-run --Werror $(C_SOURCES)
 	@scripts/check-header

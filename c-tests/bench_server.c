@@ -59,10 +59,10 @@ static void prepare(void)
     coils.bits = bits;
     discrete.bits = input_bits;
     holding.size = inputs.size = coils.size = discrete.size = CELLS;
-    if (mbm_server_serveCoils(&unit, &coils) || mbm_server_serveDiscreteInputs(&unit, &discrete) ||
-        mbm_server_serveHoldingRegisters(&unit, &holding) ||
-        mbm_server_serveMaskAndReadWrite(&holding) ||
-        mbm_server_serveInputRegisters(&unit, &inputs))
+    if (mbm_unit_serveCoils(&unit, &coils) || mbm_unit_serveDiscreteInputs(&unit, &discrete) ||
+        mbm_unit_serveHoldingRegisters(&unit, &holding) ||
+        mbm_registerTable_serveMaskAndReadWrite(&holding) ||
+        mbm_unit_serveInputRegisters(&unit, &inputs))
         fail("unit");
 }
 
@@ -148,7 +148,7 @@ static void begin(int is_rtu)
         if (mbm_tty_attach(&tty, ends[0]) != 0)
             fail("tty");
         port = mbm_tty_port(&tty);
-        if (mbm_server_begin(&server, &port, &unit, 1, buffer, sizeof buffer) ||
+        if (mbm_server_beginRtu(&server, &port, &unit, 1, buffer, sizeof buffer) ||
             mbm_server_setSilence(&server, 0))
             fail("mbm");
         peer = modbus_new_rtu("/dev/null", 115200, 'N', 8, 1);

@@ -126,6 +126,17 @@ impl<J: Job, const N: usize> Shared<J, N> {
         Some(job)
     }
 
+    /// Gives all jobs the status of those that were given up. They stay where they are: the
+    /// caller clears the queue.
+    pub fn cancel(&mut self) {
+        if let Some(job) = &mut self.active {
+            job.ticket_mut().status = Status::CANCELLED;
+        }
+        for job in self.queue.iter_mut() {
+            job.ticket_mut().status = Status::CANCELLED;
+        }
+    }
+
     /// What was under way ends as lost, by the next polls; the link is a new one.
     pub fn interrupt(&mut self) {
         if let Some(job) = self.take_active() {
