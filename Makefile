@@ -65,11 +65,10 @@ size: ## Measure the flash and RAM that the library adds, and compare with docs/
 
 # The crate with the C functions.
 CAPI := capi
-CBINDGEN = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen 0.29.4) && \
-           "$$tool" --quiet --config cbindgen.toml --output include/mbm.h $(CAPI)
+HEADER = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen 0.29.4) && scripts/header "$$tool"
 .PHONY: header
 header: ## Generate include/mbm.h from the source
-	@$(CBINDGEN) && echo "header: include/mbm.h generated from the source"
+	@$(HEADER)
 
 .PHONY: check
 check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header, docs, functions, symbols
@@ -82,7 +81,7 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@$(CARGO) test --quiet -p mbm-tools >/dev/null
 	@$(CARGO) run --quiet -p mbm-tools --bin layers
 	@$(CARGO) run --quiet -p mbm-tools --bin circles
-	@$(CBINDGEN) --verify || { echo "check: run \`make header\` and commit include/mbm.h" >&2; exit 1; }
+	@$(HEADER) --check
 	@scripts/abi --check
 	@clang-format --dry-run --Werror $(C_SOURCES)
 	@scripts/check-header

@@ -59,7 +59,7 @@ static void begin_clients(int fd)
         fail("tty");
     port = mbm_tty_port(&tty);
     /* libmodbus keeps no gap before a request, so mbm keeps none either. */
-    if (mbm_master_begin(&node, UNIT, &port) != MBM_OK ||
+    if (mbm_master_beginRtu(&node, UNIT, &port) != MBM_OK ||
         mbm_master_setBuffers(&node, response, QUANTITY, transmit, 1, frame, sizeof frame) !=
             MBM_OK ||
         mbm_master_setGap(&node, 0) != MBM_OK)

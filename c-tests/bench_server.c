@@ -103,7 +103,7 @@ static void begin(int is_rtu)
         if (mbm_tty_attach(&tty, ends[0]) != 0)
             fail("tty");
         port = mbm_tty_port(&tty);
-        if (mbm_server_begin(&server, &port, &unit, 1, buffer, sizeof buffer) ||
+        if (mbm_server_beginRtu(&server, &port, &unit, 1, buffer, sizeof buffer) ||
             mbm_server_setSilence(&server, 0))
             fail("mbm");
         peer = modbus_new_rtu("/dev/null", 115200, 'N', 8, 1);

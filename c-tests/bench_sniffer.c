@@ -119,12 +119,14 @@ static void listen(events *seen, uint32_t now)
 }
 
 /* Feeds the line in pieces of `piece` bytes; 0 is a frame at once. */
-static events hear(mbm_framing framing, size_t piece)
+static events hear(uint8_t framing, size_t piece)
 {
+    static uint8_t (*const begin[])(mbm_sniffer *, uint8_t *, uint16_t) = {
+        mbm_sniffer_beginRtu, mbm_sniffer_beginAscii, mbm_sniffer_beginTcp};
     events seen = {{0}, 0};
     size_t at = 0, count;
 
-    if (mbm_sniffer_begin(&sniffer, &framing, buffer, sizeof buffer) != MBM_OK ||
+    if (begin[framing](&sniffer, buffer, sizeof buffer) != MBM_OK ||
         mbm_sniffer_setBaudRate(&sniffer, 115200) != MBM_OK)
         exit(1);
     CALLGRIND_TOGGLE_COLLECT;
@@ -132,7 +134,7 @@ static events hear(mbm_framing framing, size_t piece)
         for (count = 1; count != piece && at + count < bus.length; count++)
             if (!piece && bus.times[at + count] - bus.times[at + count - 1] > bus.each)
                 break;
-        at += mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, bus.bytes + at, (uint16_t)count,
+        at += mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, bus.bytes + at, (uint16_t)count,
                                bus.times[at + count - 1]);
         listen(&seen, bus.times[at - 1]);
     }
@@ -153,12 +155,11 @@ static void clear(uint32_t each, uint32_t between)
 static void count(const char *name, const char *how, uint8_t kind, size_t piece, unsigned wanted,
                   unsigned damaged)
 {
-    mbm_framing framing = {.kind = kind};
     char title[200];
     events seen;
 
     CALLGRIND_ZERO_STATS;
-    seen = hear(framing, piece);
+    seen = hear(kind, piece);
     snprintf(title, sizeof title, "%s\t%s\t%zu", name, how, bus.length);
     CALLGRIND_DUMP_STATS_AT(title);
     if (seen.told != bus.length ||

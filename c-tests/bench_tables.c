@@ -44,9 +44,9 @@ void prepare_tables(void)
     coils.bits = bits;
     discrete.bits = input_bits;
     holding.size = inputs.size = coils.size = discrete.size = CELLS;
-    if (mbm_server_serveCoils(&unit, &coils) || mbm_server_serveDiscreteInputs(&unit, &discrete) ||
-        mbm_server_serveHoldingRegisters(&unit, &holding) ||
-        mbm_server_serveMaskAndReadWrite(&holding) ||
-        mbm_server_serveInputRegisters(&unit, &inputs))
+    if (mbm_unit_serveCoils(&unit, &coils) || mbm_unit_serveDiscreteInputs(&unit, &discrete) ||
+        mbm_unit_serveHoldingRegisters(&unit, &holding) ||
+        mbm_registerTable_serveMaskAndReadWrite(&holding) ||
+        mbm_unit_serveInputRegisters(&unit, &inputs))
         fail("unit");
 }

@@ -55,7 +55,7 @@ static void all_others_answer(mbm_master *m, uint8_t status)
     IS(status, mbm_master_clearTransmitBuffer(m));
     IS(status, mbm_master_beginTransmission(m, 1));
     IS(status, mbm_master_send(m, 1));
-    IS(status, mbm_master_send8(m, 1));
+    IS(status, mbm_master_send(m, 1));
     IS(status, mbm_master_send32(m, 1));
     IS(status, mbm_master_sendBit(m, 1));
     assert_int_equal(mbm_master_getExceptionCode(m), 0);
@@ -75,12 +75,12 @@ static void null_is_an_invalid_argument_everywhere(void **state)
     (void)n;
     all_requests_answer(NULL, MBM_INVALID_ARGUMENT);
     all_others_answer(NULL, MBM_INVALID_ARGUMENT);
-    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(NULL, 1, &s->port));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(NULL, 1, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_beginWith(NULL, 1, &s->port, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(NULL, 1, &s->port));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(NULL, 1, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtuWith(NULL, 1, &s->port, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_master_setBuffers(NULL, words, 2, words, 2, frame, 16));
     memset(&m, 0, sizeof m);
-    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(&m, 1, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(&m, 1, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_master_setBuffers(&m, NULL, 1, words, 2, frame, 16));
     IS(MBM_INVALID_ARGUMENT, mbm_master_setBuffers(&m, words, 2, NULL, 1, frame, 16));
     IS(MBM_INVALID_ARGUMENT, mbm_master_setBuffers(&m, words, 2, words, 2, NULL, 16));
@@ -106,10 +106,10 @@ static void every_status_has_a_text(void **state)
 
     (void)state;
     for (status = 0; status < 256; status++) {
-        assert_non_null(mbm_statusText((uint8_t)status));
-        assert_true(strlen(mbm_statusText((uint8_t)status)) > 0);
+        assert_non_null(mbm_status_text((uint8_t)status));
+        assert_true(strlen(mbm_status_text((uint8_t)status)) > 0);
     }
-    assert_string_not_equal(mbm_statusText(MBM_OK), mbm_statusText(MBM_INVALID_CRC));
+    assert_string_not_equal(mbm_status_text(MBM_OK), mbm_status_text(MBM_INVALID_CRC));
 }
 
 static void an_object_without_buffers_makes_no_request(void **state)
@@ -119,7 +119,7 @@ static void an_object_without_buffers_makes_no_request(void **state)
 
     (void)n;
     memset(&m, 0, sizeof m);
-    OK(mbm_master_begin(&m, 17, &s->port));
+    OK(mbm_master_beginRtu(&m, 17, &s->port));
     all_requests_answer(&m, MBM_NOT_INITIALISED);
     sim_assert_order(s, "PWFOIR", "");
     assert_int_equal(mbm_master_getResponseBuffer(&m, 0), 0xFFFF);
@@ -140,7 +140,7 @@ static void status_says_why_request_from_gave_nothing(void **state)
 
     (void)n;
     memset(&m, 0, sizeof m);
-    OK(mbm_master_begin(&m, 17, &s->port));
+    OK(mbm_master_beginRtu(&m, 17, &s->port));
     assert_int_equal(mbm_master_requestFrom(&m, 0, 1), 0);
     IS(MBM_NOT_INITIALISED, mbm_master_status(&m));
 }
@@ -184,13 +184,13 @@ static void a_port_without_its_three_hooks_is_refused(void **state)
     clock_less.micros = NULL;
     memset(&empty, 0, sizeof empty);
     memset(&m, 0, sizeof m);
-    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(&m, 1, &read_less));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(&m, 1, &write_less));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(&m, 1, &clock_less));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(&m, 1, &empty));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(&m, 1, &read_less));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(&m, 1, &write_less));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(&m, 1, &clock_less));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(&m, 1, &empty));
     all_requests_answer(&m, MBM_NOT_INITIALISED);
     /* One that was begun keeps what it had. */
-    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(n, 1, &empty));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(n, 1, &empty));
     assert_int_equal(mbm_master_getSlaveID(n), 17);
     sim_answer(s, 1, 500, "11 03 02 00 01 +");
     OK(mbm_master_readHoldingRegisters(n, 0, 1));

@@ -41,7 +41,7 @@ static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRAN
     node_begin(&n, device.line.ours, FAULT_UNIT);
     port = mbm_tty_port(&n.tty);
     port = fault_port(&device, &port);
-    mbm_master_begin(&n.master, FAULT_UNIT, &port);
+    mbm_master_beginRtu(&n.master, FAULT_UNIT, &port);
     mbm_master_setResponseTimeout(&n.master, 400);
     mbm_master_setEchoDiscard(&n.master, f->echo);
     mbm_master_setRetries(&n.master, retries);
@@ -70,14 +70,14 @@ static void no_row_of_the_fault_table_gets_worse(void **state)
 
         outcome(f, 1, retried);
         printf("%-46s %s  %s  %s\n", f->name, plain, retried,
-               status == MBM_OK ? "" : mbm_statusText(status));
+               status == MBM_OK ? "" : mbm_status_text(status));
         if (table)
             fprintf(table, "| %s | `%s` | `%s` | %s |\n", f->name, plain, retried,
-                    status == MBM_OK ? "" : mbm_statusText(status));
+                    status == MBM_OK ? "" : mbm_status_text(status));
         if (!fault_as_good(plain, f->expected) || !fault_as_good(retried, f->retried) ||
             status != f->status) {
             printf("    worse: expected %s %s %s\n", f->expected, f->retried,
-                   mbm_statusText(f->status));
+                   mbm_status_text(f->status));
             worse++;
         }
     }

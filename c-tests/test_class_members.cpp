@@ -351,7 +351,7 @@ static void every_status_has_the_words_that_it_has_in_c(void **)
         const uint8_t number = static_cast<uint8_t>(status);
         const __FlashStringHelper *text = modbusStatusText(number);
 
-        assert_string_equal(reinterpret_cast<const char *>(text), mbm_statusText(number));
+        assert_string_equal(reinterpret_cast<const char *>(text), mbm_status_text(number));
     }
 }
 

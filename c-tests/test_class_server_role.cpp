@@ -183,7 +183,7 @@ static void a_function_of_the_sketch_is_served(void **)
 
 static void a_function_can_be_switched_off_and_on(void **)
 {
-    mbm_switches switches = {};
+    mbm_functionMask switches = {};
     ModbusRegisterArray<1> registers;
     ModbusServer server;
     server.holdingRegisters(registers);
@@ -214,7 +214,7 @@ static void the_other_functions_are_served_from_their_records(void **)
     mbm_fifos fifos = {};
     mbm_object object = {};
     mbm_identification identification = {};
-    mbm_cells cells = {};
+    mbm_dataCallbacks cells = {};
     ModbusServer server;
     status.outputs = 0x6D;
     id.id = name;

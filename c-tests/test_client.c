@@ -39,9 +39,9 @@ static void every_function_of_libmodbus(modbus_mapping_t *memory)
     assert_int_equal(bits[1] >> 5, 0);
     for (i = 0; i < 13; i++)
         assert_int_equal(bits[i / 8] >> i % 8 & 1, memory->tab_input_bits[5 + i]);
-    ends(MBM_OK, &r, mbm_client_readSingleCoil(c, &r, 9));
+    ends(MBM_OK, &r, mbm_client_readCoils(c, &r, 9, 1));
     assert_int_equal(bits[0], memory->tab_bits[9]);
-    ends(MBM_OK, &r, mbm_client_readSingleDiscreteInput(c, &r, 9));
+    ends(MBM_OK, &r, mbm_client_readDiscreteInputs(c, &r, 9, 1));
     assert_int_equal(bits[0], memory->tab_input_bits[9]);
 
     r = asker_request(UNIT, words, sizeof words, NULL);
@@ -50,9 +50,9 @@ static void every_function_of_libmodbus(modbus_mapping_t *memory)
     assert_memory_equal(words, memory->tab_registers + 2, 250);
     ends(MBM_OK, &r, mbm_client_readInputRegisters(c, &r, 4, 3));
     assert_memory_equal(words, memory->tab_input_registers + 4, 6);
-    ends(MBM_OK, &r, mbm_client_readSingleHoldingRegister(c, &r, 6));
+    ends(MBM_OK, &r, mbm_client_readHoldingRegisters(c, &r, 6, 1));
     assert_int_equal(words[0], memory->tab_registers[6]);
-    ends(MBM_OK, &r, mbm_client_readSingleInputRegister(c, &r, 6));
+    ends(MBM_OK, &r, mbm_client_readInputRegisters(c, &r, 6, 1));
     assert_int_equal(words[0], memory->tab_input_registers[6]);
 
     r = asker_request(UNIT, NULL, 0, NULL);
@@ -216,10 +216,10 @@ static void the_facade_uses_the_line_between_the_clients_requests(void **state)
     IS(MBM_NOT_INITIALISED, mbm_master_readHoldingRegisters(&node, 0, 4));
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &r, 0, 4));
     (void)mbm_client_poll(&a.client);
-    IS(MBM_BUSY, mbm_client_lend(&a.client, &node));
+    IS(MBM_BUSY, mbm_client_suspend(&a.client, &node));
     asker_wait_all(&a);
-    OK(mbm_client_lend(&a.client, &node));
-    IS(MBM_BUSY, mbm_client_lend(&a.client, &node));
+    OK(mbm_client_suspend(&a.client, &node));
+    IS(MBM_BUSY, mbm_client_suspend(&a.client, &node));
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &r, 0, 4));
     IS(MBM_BUSY, mbm_client_poll(&a.client));
     a.port.idle = NULL;
@@ -227,12 +227,12 @@ static void the_facade_uses_the_line_between_the_clients_requests(void **state)
     OK(mbm_master_setBlocking(&node, 0));
     OK(mbm_master_setResponseTimeout(&node, PATIENCE_MS));
     IS(MBM_PENDING, mbm_master_readHoldingRegisters(&node, 0, 4));
-    IS(MBM_BUSY, mbm_client_takeBack(&a.client, &node));
+    IS(MBM_BUSY, mbm_client_resume(&a.client, &node));
     while (mbm_master_poll(&node) == MBM_PENDING)
         ;
     OK(mbm_master_status(&node));
-    OK(mbm_client_takeBack(&a.client, &node));
-    IS(MBM_INVALID_ARGUMENT, mbm_client_takeBack(&a.client, &node));
+    OK(mbm_client_resume(&a.client, &node));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_resume(&a.client, &node));
     assert_int_equal(asker_wait(&a, &r), MBM_OK);
     assert_memory_equal(words, more, sizeof words);
     IS(MBM_NOT_INITIALISED, mbm_master_readHoldingRegisters(&node, 0, 4));
@@ -253,15 +253,15 @@ static void a_facade_gets_no_line_that_carries_other_frames(void **state)
     assert_int_equal(mbm_tty_attach(&a.tty, line.ours), 0);
     a.port = mbm_tty_port(&a.tty);
     OK(mbm_master_setBuffers(&node, words, 2, words, 2, frame, sizeof frame));
-    OK(mbm_master_begin(&node, UNIT, &a.port));
+    OK(mbm_master_beginRtu(&node, UNIT, &a.port));
     OK(mbm_client_beginTcp(&tcp, &a.port, a.incoming, 260, a.outgoing, 260));
-    IS(MBM_INVALID_ARGUMENT, mbm_client_lend(&tcp, &node));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_suspend(&tcp, &node));
     OK(mbm_client_beginAscii(&ascii, &a.port, a.incoming, 513));
-    IS(MBM_INVALID_ARGUMENT, mbm_client_lend(&ascii, &node));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_suspend(&ascii, &node));
     OK(mbm_client_poll(&ascii));
     /* What the program does with it is its own. */
-    OK(mbm_client_lend(&tcp, NULL));
-    OK(mbm_client_takeBack(&tcp, NULL));
+    OK(mbm_client_suspend(&tcp, NULL));
+    OK(mbm_client_resume(&tcp, NULL));
     pty_close(&line);
 }
 
@@ -284,7 +284,7 @@ static void bad_calls_are_refused_with_a_status(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_client_beginRtu(&fresh, &nothing, a.outgoing, 256));
     IS(MBM_INVALID_ARGUMENT, mbm_client_beginRtu(&fresh, &a.port, NULL, 256));
     IS(MBM_INVALID_ARGUMENT, mbm_client_beginRtu(&fresh, NULL, a.outgoing, 256));
-    IS(MBM_BUSY, mbm_client_beginTcp(c, &a.port, a.incoming, 260, a.outgoing, 260));
+    IS(MBM_INVALID_ARGUMENT, mbm_client_beginTcp(c, &a.port, a.incoming, 260, a.outgoing, 11));
     assert_int_equal(mbm_client_pollDelay(&fresh), 0xFFFFFFFFu);
     assert_int_equal(mbm_client_pollDelay(c), 0xFFFFFFFFu);
 
@@ -334,7 +334,7 @@ static void a_broadcast_reaches_and_a_rest_is_kept(void **state)
     ends(MBM_OK, &r, mbm_client_writeSingleRegister(&a.client, &r, 5, 0x5A5A));
     AWAIT(s.mapping->tab_registers[5] == 0x5A5A);
     units[0].unit = UNIT;
-    units[0].delay = 50000;
+    units[0].delayUs = 50000;
     OK(mbm_client_setUnits(&a.client, units, 1));
     r.unit = UNIT;
     ends(MBM_OK, &r, mbm_client_readHoldingRegisters(&a.client, &r, 0, 1));

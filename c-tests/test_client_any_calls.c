@@ -261,9 +261,9 @@ static void call(int is_callback)
         if (is_callback)
             IS(MBM_BUSY, mbm_client_poll(&client));
         if (chance(4) == 0)
-            (void)mbm_client_lend(&client, NULL);
+            (void)mbm_client_suspend(&client, NULL);
         if (chance(2))
-            (void)mbm_client_takeBack(&client, NULL);
+            (void)mbm_client_resume(&client, NULL);
         break;
     case 8: wire.now += chance(2) ? chance(5000) : chance(3000000); break;
     case 9:
@@ -291,7 +291,7 @@ static void begin(unsigned seed)
     memset(units, 0, sizeof units);
     for (i = 0; i < COUNT(units); i++) {
         units[i].unit = (uint8_t)i;
-        units[i].delay = chance(500000);
+        units[i].delayUs = chance(500000);
     }
     wire.now = chance(2) ? 0 : 0xFFFF0000u;
     wire.is_tcp = seed % 4 == 3;
@@ -314,7 +314,7 @@ static void all_end(void)
 
     wire.calm = 1;
     wire.mode = chance(2) ? TAKES : TAKES_NOTHING;
-    (void)mbm_client_takeBack(&client, NULL);
+    (void)mbm_client_resume(&client, NULL);
     OK(mbm_client_setRetries(&client, 1));
     OK(mbm_client_setResponseTimeout(&client, 1000));
     while (mbm_client_poll(&client) == MBM_PENDING) {

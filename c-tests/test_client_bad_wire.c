@@ -73,11 +73,11 @@ static void the_client_fares_as_well_as_the_facade(void **state)
 
         outcome(f, 1, retried);
         printf("%-46s %s  %s  %s\n", f->name, plain, retried,
-               status == MBM_OK ? "" : mbm_statusText(status));
+               status == MBM_OK ? "" : mbm_status_text(status));
         if (!fault_as_good(plain, f->expected) || !fault_as_good(retried, f->retried) ||
             status != f->status) {
             printf("    worse: expected %s %s %s\n", f->expected, f->retried,
-                   mbm_statusText(f->status));
+                   mbm_status_text(f->status));
             worse++;
         }
     }

@@ -60,8 +60,8 @@ static int begin(void **state)
         tables[i].words = held[i];
         tables[i].size = COUNT(held[i]);
         units[i].id = (uint8_t)(i + 1);
-        OK(mbm_server_serveHoldingRegisters(&units[i], &tables[i]));
-        OK(mbm_server_begin(&servers[i], &port, &units[i], 1, frames[i], sizeof frames[i]));
+        OK(mbm_unit_serveHoldingRegisters(&units[i], &tables[i]));
+        OK(mbm_server_beginRtu(&servers[i], &port, &units[i], 1, frames[i], sizeof frames[i]));
         OK(mbm_server_setBaudRate(&servers[i], BUS_BAUD));
     }
     for (i = 0; i < CLIENTS; i++) {

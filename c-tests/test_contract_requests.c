@@ -259,7 +259,7 @@ static void send_queues_words_bytes_and_double_words_low_first(void **state)
 
     mbm_master_beginTransmission(n, 0x100);
     OK(mbm_master_send(n, 0x1234));
-    OK(mbm_master_send8(n, 0xAB));
+    OK(mbm_master_send(n, 0xAB));
     OK(mbm_master_send32(n, 0xDEADBEEF));
     sim_answer(s, 1, 100, "11 10 01 00 00 04 +");
     OK(mbm_master_writeQueuedRegisters(n));
@@ -319,7 +319,7 @@ static void what_passes_the_transmit_buffer_is_not_queued(void **state)
     assert_int_equal(mbm_master_send32(n, 0x00020003), MBM_BUFFER_TOO_SMALL);
     assert_int_equal(s->transmit[122], 3);
     assert_int_equal(mbm_master_send(n, 1), MBM_BUFFER_TOO_SMALL);
-    assert_int_equal(mbm_master_send8(n, 1), MBM_BUFFER_TOO_SMALL);
+    assert_int_equal(mbm_master_send(n, 1), MBM_BUFFER_TOO_SMALL);
     assert_int_equal(mbm_master_sendBit(n, 1), MBM_BUFFER_TOO_SMALL);
     sim_answer(s, 1, 100, "11 10 00 00 00 7B +");
     OK(mbm_master_writeQueuedRegisters(n));

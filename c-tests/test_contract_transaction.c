@@ -80,7 +80,7 @@ static void every_hook_but_three_may_be_missing(void **state)
     s->port.preTransmission = NULL;
     s->port.postTransmission = NULL;
     s->port.idle = NULL;
-    OK(mbm_master_begin(n, 17, &s->port));
+    OK(mbm_master_beginRtu(n, 17, &s->port));
     sim_reads(s, 500);
     sim_assert_order(s, "PFOI", "");
 }
@@ -212,12 +212,12 @@ static void no_gap_is_waited_for_after_begin_on_a_silent_line(void **state)
     NODE;
 
     s->now += 10000;
-    OK(mbm_master_begin(n, 17, &s->port));
+    OK(mbm_master_beginRtu(n, 17, &s->port));
     asked = s->now;
     sim_reads(s, 500);
     sim_assert_time(s->frames[0].begin - asked, 0);
     /* But after a request on that line. */
-    OK(mbm_master_begin(n, 17, &s->port));
+    OK(mbm_master_beginRtu(n, 17, &s->port));
     sim_reads(s, 500);
     sim_assert_time(s->frames[1].silence, 4000);
 }
@@ -227,7 +227,7 @@ static void bytes_that_arrive_after_begin_begin_the_gap(void **state)
     NODE;
 
     s->now += 10000;
-    OK(mbm_master_begin(n, 17, &s->port));
+    OK(mbm_master_beginRtu(n, 17, &s->port));
     sim_deliver_text(s, s->now - 100, "05 03 02");
     sim_reads(s, 500);
     sim_assert_time(s->frames[0].silence, 4000);
@@ -258,7 +258,7 @@ static void many_objects_share_a_stream(void **state)
     NODE;
 
     OK(mbm_master_setBuffers(&other, words, 4, NULL, 0, frame, sizeof frame));
-    OK(mbm_master_begin(&other, 3, &s->port));
+    OK(mbm_master_beginRtu(&other, 3, &s->port));
     sim_reads(s, 500);
     mbm_master_lineUsed(&other);
     sim_answer(s, 1, 500, "03 04 02 00 07 +");
@@ -278,7 +278,7 @@ static void the_idle_hook_is_given_the_master_that_waits(void **state)
     NODE;
 
     OK(mbm_master_setBuffers(&other, words, 4, NULL, 0, frame, sizeof frame));
-    OK(mbm_master_begin(&other, 3, &s->port));
+    OK(mbm_master_beginRtu(&other, 3, &s->port));
     sim_reads(s, 500);
     assert_ptr_equal(s->waits, n);
     sim_answer(s, 1, 500, "03 04 02 00 07 +");

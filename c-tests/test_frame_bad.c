@@ -184,7 +184,7 @@ static void ascii_is_taken_in_lower_case_and_in_pairs_only(void **state)
         {MBM_INCOMPLETE_FRAME, ":0207F7"},
         {MBM_INCOMPLETE_FRAME, ""},
     };
-    mbm_framing other = {.kind = MBM_FRAMING_ASCII, .end = '!'};
+    mbm_framing other = {.kind = MBM_FRAMING_ASCII, .delimiter = '!'};
     mbm_length expected;
     mbm_packet packet;
     uint8_t text[600];
@@ -232,7 +232,7 @@ static void the_first_bytes_of_no_frame_are_malformed(void **state)
 
 static void null_is_an_invalid_argument(void **state)
 {
-    const mbm_framing unknown = {.kind = 4}, no_list = {.functionCount = 1};
+    const mbm_framing unknown = {.kind = 5}, no_list = {.functionCount = 1};
     mbm_packet packet = {.unit = 1, .function = 0x03, .quantity = 1};
     mbm_length expected;
     uint8_t frame[16];

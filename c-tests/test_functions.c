@@ -195,7 +195,7 @@ static void writes_queued_words_and_bits(void **state)
     (void)state;
     mbm_master_beginTransmission(&n.master, 40);
     mbm_master_send(&n.master, 0x1122);
-    mbm_master_send8(&n.master, 0x33);
+    mbm_master_send(&n.master, 0x33);
     mbm_master_send32(&n.master, 0x44556677);
     assert_int_equal(mbm_master_writeQueuedRegisters(&n.master), MBM_OK);
     assert_int_equal(peer.mapping->tab_registers[40], 0x1122);

@@ -247,7 +247,7 @@ static void begin_mid_send_switches_the_driver_off_on_the_old_port(void **state)
     poll_until(s, 3);
     other = s->port;
     other.postTransmission = NULL;
-    OK(mbm_master_begin(n, 3, &other));
+    OK(mbm_master_beginRtu(n, 3, &other));
     sim_assert_order(s, "PO", "PO");
     IS(MBM_CANCELLED, mbm_master_status(n));
     IS(MBM_CANCELLED, mbm_master_poll(n));
@@ -266,8 +266,8 @@ static void a_refused_begin_leaves_the_request_under_way(void **state)
     mbm_master_setBlocking(n, 0);
     sim_answer(s, 1, 500, "11 03 02 00 2A +");
     IS(MBM_PENDING, sim_read_one(s));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(n, 3, &empty));
-    IS(MBM_INVALID_ARGUMENT, mbm_master_begin(n, 3, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(n, 3, &empty));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(n, 3, NULL));
     OK(sim_poll(s));
 }
 

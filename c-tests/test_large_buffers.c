@@ -110,7 +110,7 @@ static void serves(uint8_t (*begin)(mbm_server *, const mbm_port *, mbm_unit *, 
     unit.id = 1;
     table.words = words;
     table.size = 2;
-    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     OK(begin(&server, &port, &unit, 1, incoming, LARGE));
     arrives(request, length);
     for (i = 0; i < 10; i++)
@@ -126,7 +126,7 @@ static void a_server_does_so(void **state)
     (void)state;
     (void)seal(over_rtu, 6);
     serves(mbm_server_beginTcp, over_tcp, sizeof over_tcp, 13);
-    serves(mbm_server_begin, over_rtu, sizeof over_rtu, 9);
+    serves(mbm_server_beginRtu, over_rtu, sizeof over_rtu, 9);
     serves(mbm_server_beginRtuOverTcp, over_rtu, sizeof over_rtu, 9);
 }
 

@@ -61,7 +61,7 @@ static void answers_with_exception_04(uint8_t framing, mbm_unit *unit, const cha
 
     assert_non_null(frame);
     memcpy(frame, request, length);
-    OK(mbm_server_respond(framing, unit, 1, frame, length, capacity, &response));
+    OK(mbm_unit_respond(unit, 1, FRAMING(framing), frame, length, capacity, &response));
     assert_true(response <= capacity);
     assert_int_equal(response, framing == MBM_FRAMING_TCP ? 9 : 5);
     assert_int_equal(frame[pdu], (uint8_t)request[pdu] | 0x80);
@@ -76,8 +76,8 @@ static void a_response_longer_than_its_buffer_is_exception_04(void **state)
     static mbm_diagnostics diagnostics;
 
     (void)state;
-    OK(mbm_server_serveIdentification(&unit, &identification));
-    OK(mbm_server_serveDiagnostics(&unit, &diagnostics));
+    OK(mbm_unit_serveIdentification(&unit, &identification));
+    OK(mbm_unit_serveDiagnostics(&unit, &diagnostics));
     answers_with_exception_04(MBM_FRAMING_TCP, &unit, "\0\1\0\0\0\5\x11\x2B\x0E\1\0", 11, 12);
     answers_with_exception_04(MBM_FRAMING_TCP, &unit, "\0\1\0\0\0\2\x11\x0B", 8, 11);
     answers_with_exception_04(MBM_FRAMING_RTU, &unit, "\x11\x0B\x4C\x27", 4, 6);

@@ -17,7 +17,7 @@ static void every_example_is_parsed_to_what_it_says(void **state)
     (void)state;
     for (i = 0; i < example_count; i++) {
         length = example_load(&examples[i], pdu, &wanted);
-        OK(mbm_packet_parse(example_side(&examples[i]), pdu, length, NULL, 0, &found));
+        OK(mbm_frame_parse(PDU(NULL, 0), example_side(&examples[i]), pdu, length, &found));
         assert_same_packet(&found, &wanted);
         if (found.dataLength)
             assert_ptr_equal(found.data, wanted.data);
@@ -35,12 +35,12 @@ static void every_example_is_built_byte_for_byte(void **state)
     for (i = 0; i < example_count; i++) {
         length = example_load(&examples[i], pdu, &packet);
         memset(built, 0xEE, sizeof built);
-        OK(mbm_packet_build(&packet, NULL, 0, built, length, &found));
+        OK(mbm_frame_build(PDU(NULL, 0), &packet, built, length, &found));
         assert_int_equal(found, length);
         assert_memory_equal(built, pdu, length);
         assert_int_equal(built[length], 0xEE);
         IS(MBM_BUFFER_TOO_SMALL,
-           mbm_packet_build(&packet, NULL, 0, built, (uint16_t)(length - 1), &found));
+           mbm_frame_build(PDU(NULL, 0), &packet, built, (uint16_t)(length - 1), &found));
     }
 }
 
@@ -57,9 +57,9 @@ static void every_sub_function_of_08_is_built_and_parsed(void **state)
         uint8_t status;
 
         packet.subFunction = (uint16_t)sub_function;
-        status = mbm_packet_build(&packet, NULL, 0, pdu, sizeof pdu, &length);
+        status = mbm_frame_build(PDU(NULL, 0), &packet, pdu, sizeof pdu, &length);
         if (status == MBM_OK) {
-            OK(mbm_packet_parse(MBM_PACKET_REQUEST, pdu, length, NULL, 0, &found));
+            OK(mbm_frame_parse(PDU(NULL, 0), MBM_PACKET_REQUEST, pdu, length, &found));
             assert_same_packet(&found, &packet);
             known++;
         } else {
@@ -70,7 +70,7 @@ static void every_sub_function_of_08_is_built_and_parsed(void **state)
         IS(status == MBM_OK && sub_function != MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY
                ? MBM_OK
                : MBM_MALFORMED_REPLY,
-           mbm_packet_build(&packet, NULL, 0, pdu, sizeof pdu, &length));
+           mbm_frame_build(PDU(NULL, 0), &packet, pdu, sizeof pdu, &length));
     }
     assert_int_equal(known, 15);
 }
@@ -82,10 +82,10 @@ static unsigned parsed_right(uint8_t side, const uint8_t *pdu, uint16_t length)
     uint8_t again[MBM_MAX_PDU];
     mbm_packet packet;
     uint16_t found;
-    uint8_t status = mbm_packet_parse(side, pdu, length, NULL, 0, &packet);
+    uint8_t status = mbm_frame_parse(PDU(NULL, 0), side, (uint8_t *)pdu, length, &packet);
 
     if (status == MBM_OK) {
-        OK(mbm_packet_build(&packet, NULL, 0, again, sizeof again, &found));
+        OK(mbm_frame_build(PDU(NULL, 0), &packet, again, sizeof again, &found));
         assert_int_equal(found, length);
         assert_memory_equal(again, pdu, length);
         return 1;
@@ -218,8 +218,8 @@ static void a_packet_that_cannot_be_is_not_built(void **state)
         mbm_packet packet = refused[i].packet;
 
         packet.data = data;
-        IS(refused[i].status, mbm_packet_build(&packet, NULL, 0, built, sizeof built, &length));
-        IS(refused[i].status, mbm_packet_build(&packet, NULL, 0, built, MBM_MAX_PDU, &length));
+        IS(refused[i].status, mbm_frame_build(PDU(NULL, 0), &packet, built, sizeof built, &length));
+        IS(refused[i].status, mbm_frame_build(PDU(NULL, 0), &packet, built, MBM_MAX_PDU, &length));
         assert_int_equal(length, 0);
     }
 }
@@ -239,7 +239,7 @@ static void the_first_bytes_tell_how_long_a_pdu_is(void **state)
 
         length = example_load(&examples[i], pdu, &packet);
         for (have = 0; have <= length; have++) {
-            OK(mbm_packet_expectedLength(side, pdu, have, NULL, 0, &expected));
+            OK(mbm_frame_expectedLength(PDU(NULL, 0), side, pdu, have, &expected));
             kind = expected.kind;
             if (kind == MBM_LENGTH_EXACT)
                 assert_int_equal(expected.bytes, id_goes_on ? id_goes_on + 2 : length);
@@ -255,11 +255,10 @@ static void the_first_bytes_tell_how_long_a_pdu_is(void **state)
         else
             assert_int_equal(kind, MBM_LENGTH_EXACT);
     }
-    OK(mbm_packet_expectedLength(MBM_PACKET_RESPONSE, (const uint8_t *)"\x03\xFB", 2, NULL, 0,
-                                 &expected));
-    IS(MBM_MALFORMED_FRAME,
-       mbm_packet_expectedLength(MBM_PACKET_RESPONSE, (const uint8_t *)"\x03\xFC", 2, NULL, 0,
-                                 &expected));
+    OK(mbm_frame_expectedLength(PDU(NULL, 0), MBM_PACKET_RESPONSE, (const uint8_t *)"\x03\xFB", 2,
+                                &expected));
+    IS(MBM_MALFORMED_FRAME, mbm_frame_expectedLength(PDU(NULL, 0), MBM_PACKET_RESPONSE,
+                                                     (const uint8_t *)"\x03\xFC", 2, &expected));
 }
 
 static void a_request_tells_how_long_its_response_is(void **state)
@@ -276,11 +275,11 @@ static void a_request_tells_how_long_its_response_is(void **state)
 
         example_load(&examples[i], pdu, &request);
         if (request.kind != MBM_PACKET_REQUEST) {
-            IS(MBM_INVALID_ARGUMENT, mbm_packet_replyLength(&request, NULL, 0, &expected));
+            IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(PDU(NULL, 0), &request, &expected));
             continue;
         }
         length = example_load(&examples[i + 1], reply, &response);
-        OK(mbm_packet_replyLength(&request, NULL, 0, &expected));
+        OK(mbm_frame_replyLength(PDU(NULL, 0), &request, &expected));
         if (request.function == 0x03)
             assert_int_equal(expected.bytes, 2 + 2 * request.quantity);
         if (expected.kind == MBM_LENGTH_EXACT) {
@@ -292,10 +291,10 @@ static void a_request_tells_how_long_its_response_is(void **state)
     }
     assert_int_equal(exact, 18);
     request = (mbm_packet){.function = 0x03, .quantity = 126};
-    IS(MBM_ILLEGAL_DATA_VALUE, mbm_packet_replyLength(&request, NULL, 0, &expected));
+    IS(MBM_ILLEGAL_DATA_VALUE, mbm_frame_replyLength(PDU(NULL, 0), &request, &expected));
     request = (mbm_packet){
         .function = 0x08, .subFunction = 4, .dataLength = 2, .data = (const uint8_t *)"\0"};
-    OK(mbm_packet_replyLength(&request, NULL, 0, &expected));
+    OK(mbm_frame_replyLength(PDU(NULL, 0), &request, &expected));
     assert_int_equal(expected.kind, MBM_LENGTH_EXACT);
     assert_int_equal(expected.bytes, 0);
 }
@@ -314,23 +313,26 @@ static void a_declared_function_keeps_its_length(void **state)
     uint16_t length;
 
     (void)state;
-    OK(mbm_packet_parse(MBM_PACKET_REQUEST, request, 3, own, 2, &packet));
-    OK(mbm_packet_build(&packet, own, 2, built, sizeof built, &length));
+    OK(mbm_frame_parse(PDU(own, 2), MBM_PACKET_REQUEST, (uint8_t *)request, 3, &packet));
+    OK(mbm_frame_build(PDU(own, 2), &packet, built, sizeof built, &length));
     assert_int_equal(length, 3);
-    OK(mbm_packet_replyLength(&packet, own, 2, &expected));
+    OK(mbm_frame_replyLength(PDU(own, 2), &packet, &expected));
     assert_int_equal(expected.kind, MBM_LENGTH_AT_LEAST);
     packet.dataLength = 1;
-    IS(MBM_ILLEGAL_DATA_VALUE, mbm_packet_build(&packet, own, 2, built, sizeof built, &length));
-    IS(MBM_ILLEGAL_DATA_VALUE, mbm_packet_parse(MBM_PACKET_REQUEST, request, 2, own, 2, &packet));
-    OK(mbm_packet_parse(MBM_PACKET_RESPONSE, response, 5, own, 2, &packet));
-    IS(MBM_MALFORMED_REPLY, mbm_packet_parse(MBM_PACKET_RESPONSE, response, 4, own, 2, &packet));
-    OK(mbm_packet_expectedLength(MBM_PACKET_RESPONSE, response, 2, own, 2, &expected));
+    IS(MBM_ILLEGAL_DATA_VALUE, mbm_frame_build(PDU(own, 2), &packet, built, sizeof built, &length));
+    IS(MBM_ILLEGAL_DATA_VALUE,
+       mbm_frame_parse(PDU(own, 2), MBM_PACKET_REQUEST, (uint8_t *)request, 2, &packet));
+    OK(mbm_frame_parse(PDU(own, 2), MBM_PACKET_RESPONSE, (uint8_t *)response, 5, &packet));
+    IS(MBM_MALFORMED_REPLY,
+       mbm_frame_parse(PDU(own, 2), MBM_PACKET_RESPONSE, (uint8_t *)response, 4, &packet));
+    OK(mbm_frame_expectedLength(PDU(own, 2), MBM_PACKET_RESPONSE, response, 2, &expected));
     assert_int_equal(expected.bytes, 5);
 
-    IS(MBM_ILLEGAL_FUNCTION, mbm_packet_parse(MBM_PACKET_REQUEST, beyond, 3, NULL, 0, &packet));
-    OK(mbm_packet_parse(MBM_PACKET_REQUEST, beyond, 3, own, 2, &packet));
-    OK(mbm_packet_build(&packet, own, 2, built, sizeof built, &length));
-    IS(MBM_ILLEGAL_FUNCTION, mbm_packet_build(&packet, own, 1, built, sizeof built, &length));
+    IS(MBM_ILLEGAL_FUNCTION,
+       mbm_frame_parse(PDU(NULL, 0), MBM_PACKET_REQUEST, (uint8_t *)beyond, 3, &packet));
+    OK(mbm_frame_parse(PDU(own, 2), MBM_PACKET_REQUEST, (uint8_t *)beyond, 3, &packet));
+    OK(mbm_frame_build(PDU(own, 2), &packet, built, sizeof built, &length));
+    IS(MBM_ILLEGAL_FUNCTION, mbm_frame_build(PDU(own, 1), &packet, built, sizeof built, &length));
 }
 
 static void a_declaration_that_cannot_be_is_an_invalid_argument(void **state)
@@ -352,9 +354,9 @@ static void a_declaration_that_cannot_be_is_an_invalid_argument(void **state)
     (void)state;
     for (i = 0; i < COUNT(wrong); i++) {
         IS(MBM_INVALID_ARGUMENT,
-           mbm_packet_parse(MBM_PACKET_REQUEST, pdu, 3, &wrong[i], 1, &packet));
+           mbm_frame_parse(PDU(&wrong[i], 1), MBM_PACKET_REQUEST, (uint8_t *)pdu, 3, &packet));
         IS(MBM_INVALID_ARGUMENT,
-           mbm_packet_expectedLength(MBM_PACKET_REQUEST, pdu, 3, &wrong[i], 1, &expected));
+           mbm_frame_expectedLength(PDU(&wrong[i], 1), MBM_PACKET_REQUEST, pdu, 3, &expected));
     }
 }
 
@@ -366,24 +368,24 @@ static void null_is_an_invalid_argument(void **state)
     uint16_t length;
 
     (void)state;
-    OK(mbm_packet_parse(MBM_PACKET_REQUEST, pdu, 5, NULL, 0, &packet));
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_parse(MBM_PACKET_REQUEST, NULL, 5, NULL, 0, &packet));
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_parse(MBM_PACKET_REQUEST, pdu, 5, NULL, 1, &packet));
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_parse(MBM_PACKET_REQUEST, pdu, 5, NULL, 0, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_parse(MBM_PACKET_EXCEPTION, pdu, 5, NULL, 0, &packet));
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_build(NULL, NULL, 0, pdu, 8, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_build(&packet, NULL, 1, pdu, 8, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_build(&packet, NULL, 0, NULL, 8, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_build(&packet, NULL, 0, pdu, 8, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_expectedLength(3, pdu, 1, NULL, 0, &expected));
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_expectedLength(0, NULL, 1, NULL, 0, &expected));
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_expectedLength(0, pdu, 1, NULL, 0, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_replyLength(NULL, NULL, 0, &expected));
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_replyLength(&packet, NULL, 0, NULL));
+    OK(mbm_frame_parse(PDU(NULL, 0), MBM_PACKET_REQUEST, pdu, 5, &packet));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_parse(PDU(NULL, 0), MBM_PACKET_REQUEST, NULL, 5, &packet));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_parse(PDU(NULL, 1), MBM_PACKET_REQUEST, pdu, 5, &packet));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_parse(PDU(NULL, 0), MBM_PACKET_REQUEST, pdu, 5, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_parse(PDU(NULL, 0), MBM_PACKET_EXCEPTION, pdu, 5, &packet));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(PDU(NULL, 0), NULL, pdu, 8, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(PDU(NULL, 1), &packet, pdu, 8, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(PDU(NULL, 0), &packet, NULL, 8, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(PDU(NULL, 0), &packet, pdu, 8, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(PDU(NULL, 0), 3, pdu, 1, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(PDU(NULL, 0), 0, NULL, 1, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(PDU(NULL, 0), 0, pdu, 1, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(PDU(NULL, 0), NULL, &expected));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(PDU(NULL, 0), &packet, NULL));
     packet.function = 0x41;
     packet.dataLength = 1;
     packet.data = NULL;
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_build(&packet, NULL, 0, pdu, 8, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(PDU(NULL, 0), &packet, pdu, 8, &length));
 }
 
 static void data_that_lie_in_the_buffer_to_be_written_are_an_invalid_argument(void **state)
@@ -393,10 +395,10 @@ static void data_that_lie_in_the_buffer_to_be_written_are_an_invalid_argument(vo
     uint16_t length;
 
     (void)state;
-    OK(mbm_packet_parse(MBM_PACKET_REQUEST, pdu, 3, NULL, 0, &packet));
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_build(&packet, NULL, 0, pdu, 8, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_build(&packet, NULL, 0, pdu + 2, 6, &length));
-    OK(mbm_packet_build(&packet, NULL, 0, pdu + 3, 5, &length));
+    OK(mbm_frame_parse(PDU(NULL, 0), MBM_PACKET_REQUEST, pdu, 3, &packet));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(PDU(NULL, 0), &packet, pdu, 8, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_build(PDU(NULL, 0), &packet, pdu + 2, 6, &length));
+    OK(mbm_frame_build(PDU(NULL, 0), &packet, pdu + 3, 5, &length));
 }
 
 int main(void)

@@ -16,11 +16,11 @@ static void a_request_of_14_is_made_of_records(void **state)
     (void)state;
     OK(mbm_packet_addRecord(&packet, storage, sizeof storage, &records[0]));
     OK(mbm_packet_addRecord(&packet, storage, sizeof storage, &records[1]));
-    OK(mbm_packet_build(&packet, NULL, 0, pdu, sizeof pdu, &length));
+    OK(mbm_frame_build(PDU(NULL, 0), &packet, pdu, sizeof pdu, &length));
     assert_int_equal(length, hex_bytes(wanted, "14 0E 06 0004 0001 0002 06 0003 0009 0002"));
     assert_memory_equal(pdu, wanted, length);
 
-    OK(mbm_packet_parse(MBM_PACKET_REQUEST, pdu, length, NULL, 0, &packet));
+    OK(mbm_frame_parse(PDU(NULL, 0), MBM_PACKET_REQUEST, pdu, length, &packet));
     for (; mbm_packet_nextRecord(&packet, &cursor, &record); i++) {
         assert_int_equal(record.file, records[i].file);
         assert_int_equal(record.record, records[i].record);
@@ -44,10 +44,10 @@ static void carries_data(uint8_t kind, uint8_t function, const char *hex, int is
     packet.function = function;
     OK(mbm_packet_addRecord(&packet, storage, sizeof storage, &records[0]));
     OK(mbm_packet_addRecord(&packet, storage, sizeof storage, &records[1]));
-    OK(mbm_packet_build(&packet, NULL, 0, pdu, sizeof pdu, &length));
+    OK(mbm_frame_build(PDU(NULL, 0), &packet, pdu, sizeof pdu, &length));
     assert_int_equal(length, hex_bytes(wanted, hex));
     assert_memory_equal(pdu, wanted, length);
-    OK(mbm_packet_parse(kind, pdu, length, NULL, 0, &packet));
+    OK(mbm_frame_parse(PDU(NULL, 0), kind, pdu, length, &packet));
     for (; mbm_packet_nextRecord(&packet, &cursor, &record); i++) {
         assert_int_equal(record.file, is_named ? records[i].file : 0);
         assert_int_equal(record.record, is_named ? records[i].record : 0);
@@ -141,12 +141,12 @@ static void a_device_identification_is_made_of_objects(void **state)
         OK(mbm_packet_addObject(&packet, storage, sizeof storage, &objects[i]));
     IS(MBM_BUFFER_TOO_SMALL, mbm_packet_addObject(&packet, storage, sizeof storage, &objects[1]));
     assert_int_equal(packet.objectCount, 3);
-    OK(mbm_packet_build(&packet, NULL, 0, pdu, sizeof pdu, &length));
+    OK(mbm_frame_build(PDU(NULL, 0), &packet, pdu, sizeof pdu, &length));
     assert_int_equal(length,
                      hex_bytes(wanted, "2B 0E 01 01 00 00 03 00 03 6D626D 01 00 02 05 56322E3131"));
     assert_memory_equal(pdu, wanted, length);
 
-    OK(mbm_packet_parse(MBM_PACKET_RESPONSE, pdu, length, NULL, 0, &packet));
+    OK(mbm_frame_parse(PDU(NULL, 0), MBM_PACKET_RESPONSE, pdu, length, &packet));
     for (i = 0; mbm_packet_nextObject(&packet, &cursor, &object); i++) {
         assert_int_equal(object.id, i);
         assert_int_equal(object.length, objects[i].length);
@@ -155,7 +155,7 @@ static void a_device_identification_is_made_of_objects(void **state)
     }
     assert_int_equal(i, 3);
     packet.objectCount = 2;
-    IS(MBM_MALFORMED_REPLY, mbm_packet_build(&packet, NULL, 0, wanted, sizeof wanted, &length));
+    IS(MBM_MALFORMED_REPLY, mbm_frame_build(PDU(NULL, 0), &packet, wanted, sizeof wanted, &length));
     packet.meiType = MBM_MEI_CANOPEN;
     IS(MBM_ILLEGAL_FUNCTION, mbm_packet_addObject(&packet, pdu + 7, 14, &objects[0]));
 }
@@ -190,7 +190,7 @@ static void null_gives_nothing_and_adds_nothing(void **state)
 
     (void)state;
     length = hex_bytes(pdu, "14 07 06 0004 0001 0002");
-    OK(mbm_packet_parse(MBM_PACKET_REQUEST, pdu, length, NULL, 0, &packet));
+    OK(mbm_frame_parse(PDU(NULL, 0), MBM_PACKET_REQUEST, pdu, length, &packet));
     assert_false(mbm_packet_nextRecord(NULL, &cursor, &record));
     assert_false(mbm_packet_nextRecord(&packet, NULL, &record));
     assert_false(mbm_packet_nextRecord(&packet, &cursor, NULL));

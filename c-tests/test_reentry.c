@@ -40,7 +40,7 @@ static void every_function_of_the_master_is_busy(void)
     mbm_registers view;
     mbm_turn turn = {0};
 
-    IS(MBM_BUSY, mbm_master_begin(m, 1, &port));
+    IS(MBM_BUSY, mbm_master_beginRtu(m, 1, &port));
     IS(MBM_BUSY, mbm_master_setBuffers(m, words, 1, words, 1, other_frame, 8));
     IS(MBM_BUSY, mbm_master_poll(m));
     assert_int_equal(mbm_master_pollDelay(m), 0);
@@ -60,7 +60,7 @@ static void every_function_of_the_master_is_busy(void)
     IS(MBM_BUSY, mbm_master_setWordOrder(m, 2));
     IS(MBM_BUSY, mbm_master_lineUsed(m));
     IS(MBM_BUSY, mbm_master_lineUsedAt(m, 0));
-    IS(MBM_BUSY, mbm_master_beginWith(m, 1, &port, NULL));
+    IS(MBM_BUSY, mbm_master_beginRtuWith(m, 1, &port, NULL));
     IS(MBM_BUSY, mbm_master_takeTurn(m, &turn));
     IS(MBM_BUSY, mbm_master_endTurn(m, &turn));
     assert_null(turn.master);
@@ -69,7 +69,7 @@ static void every_function_of_the_master_is_busy(void)
     IS(MBM_BUSY, mbm_master_clearTransmitBuffer(m));
     IS(MBM_BUSY, mbm_master_beginTransmission(m, 1));
     IS(MBM_BUSY, mbm_master_send(m, 1));
-    IS(MBM_BUSY, mbm_master_send8(m, 1));
+    IS(MBM_BUSY, mbm_master_send(m, 1));
     IS(MBM_BUSY, mbm_master_send32(m, 1));
     IS(MBM_BUSY, mbm_master_sendBit(m, 1));
     IS(MBM_BUSY, mbm_master_getResponseRegisters(m, 0, &view));
@@ -106,7 +106,7 @@ static void within_master(int hook)
 static void begin_master(void)
 {
     OK(mbm_master_setBuffers(&master, words, 4, words + 4, 4, small_frame, 64));
-    OK(mbm_master_begin(&master, 17, &port));
+    OK(mbm_master_beginRtu(&master, 17, &port));
     wire.within = within_master;
 }
 
@@ -123,7 +123,7 @@ static void no_hook_of_a_masters_port_may_call_the_master(void **state)
     /* Outside of a request, too. */
     entered = 0;
     OK(mbm_master_lineUsed(&master));
-    OK(mbm_master_begin(&master, 17, &port));
+    OK(mbm_master_beginRtu(&master, 17, &port));
     OK(mbm_master_setBlocking(&master, 0));
     IS(MBM_PENDING, mbm_master_readHoldingRegisters(&master, 0, 1));
     assert_true(mbm_master_pollDelay(&master) < 0xFFFFFFFFu);
@@ -161,7 +161,7 @@ static void within_idle(int hook)
         break;
     case 1: mbm_master_poll(&master); break;
     case 2: OK(mbm_master_cancel(&master)); break;
-    case 3: OK(mbm_master_begin(&master, 17, &port)); break;
+    case 3: OK(mbm_master_beginRtu(&master, 17, &port)); break;
     default: memset(&fresh, 0, sizeof fresh); memcpy(&master, &fresh, sizeof master);
     }
 }
@@ -186,7 +186,7 @@ static void an_idle_hook_may_call_its_master(void **state)
 
 static void every_function_of_the_server_is_busy(void)
 {
-    IS(MBM_BUSY, mbm_server_begin(&server, &port, &unit, 1, other_frame, 260));
+    IS(MBM_BUSY, mbm_server_beginRtu(&server, &port, &unit, 1, other_frame, 260));
     IS(MBM_BUSY, mbm_server_beginAscii(&server, &port, &unit, 1, other_frame, 260));
     IS(MBM_BUSY, mbm_server_beginTcp(&server, &port, &unit, 1, other_frame, 260));
     IS(MBM_BUSY, mbm_server_beginRtuOverTcp(&server, &port, &unit, 1, other_frame, 260));
@@ -204,7 +204,7 @@ static void within_server(int hook)
 }
 
 static mbm_registerTable table, late_table;
-static mbm_cells cells;
+static mbm_dataCallbacks cells;
 static mbm_custom custom;
 static mbm_diagnostics diagnostics;
 static mbm_files files;
@@ -216,12 +216,12 @@ static void within_unit(void)
 {
     hooks_called++;
     within_server(0);
-    OK(mbm_server_serveInputRegisters(&unit, &late_table));
-    OK(mbm_server_serveHoldingRegisters(&unit, &table));
-    OK(mbm_server_serveCallbacks(&unit, &cells, 1));
-    OK(mbm_server_serveCustom(&unit, &custom));
-    OK(mbm_server_serveFiles(&unit, &files));
-    OK(mbm_server_serveDiagnostics(&unit, &diagnostics));
+    OK(mbm_unit_serveInputRegisters(&unit, &late_table));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+    OK(mbm_unit_serveCallbacks(&unit, &cells, 1));
+    OK(mbm_unit_serveCustom(&unit, &custom));
+    OK(mbm_unit_serveFiles(&unit, &files));
+    OK(mbm_unit_serveDiagnostics(&unit, &diagnostics));
 }
 
 static uint8_t before_write(void *context, uint16_t address, uint16_t quantity, const uint8_t *data)
@@ -257,13 +257,13 @@ static void cell_set(void *context, uint16_t address, uint16_t value)
 static uint16_t carry_out(void *context, const mbm_request *asked, uint8_t *response,
                           uint16_t capacity)
 {
-    static mbm_switches switches;
+    static mbm_functionMask switches;
 
     (void)context;
     (void)capacity;
     (void)asked;
     within_unit();
-    OK(mbm_server_switchOff(&unit, &switches, 7));
+    OK(mbm_unit_switchFunction(&unit, &switches, 7, 0));
     response[0] = 1;
     return 1;
 }
@@ -311,12 +311,12 @@ static void serve_all(void)
     files.count = 1;
     files.before = before_record;
     files.after = after_record;
-    OK(mbm_server_serveHoldingRegisters(&unit, &table));
-    OK(mbm_server_serveMaskAndReadWrite(&table));
-    OK(mbm_server_serveCallbacks(&unit, &cells, 1));
-    OK(mbm_server_serveCustom(&unit, &custom));
-    OK(mbm_server_serveDiagnostics(&unit, &diagnostics));
-    OK(mbm_server_serveFiles(&unit, &files));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+    OK(mbm_registerTable_serveMaskAndReadWrite(&table));
+    OK(mbm_unit_serveCallbacks(&unit, &cells, 1));
+    OK(mbm_unit_serveCustom(&unit, &custom));
+    OK(mbm_unit_serveDiagnostics(&unit, &diagnostics));
+    OK(mbm_unit_serveFiles(&unit, &files));
 }
 
 static size_t ask(const char *pdu, size_t length)
@@ -351,7 +351,7 @@ static void no_hook_of_a_server_may_call_the_server(void **state)
 
     (void)state;
     serve_all();
-    OK(mbm_server_begin(&server, &port, &unit, 1, small_frame, 256));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, small_frame, 256));
     wire.within = within_server;
     for (i = 0; i < COUNT(requests); i++) {
         hooks_called = 0;
@@ -388,7 +388,7 @@ static void a_server_that_its_hook_zeroes_is_touched_no_more(void **state)
 
         serve_all();
         diagnostics.restart = start_over;
-        OK(mbm_server_begin(&server, &port, &unit, 1, small_frame, 256));
+        OK(mbm_server_beginRtu(&server, &port, &unit, 1, small_frame, 256));
         hooked_port_arrive_rtu(&wire, 17, "\x08\0\1\0\0", 5);
         hooks_called = 0;
         wire.length = 0;

@@ -65,13 +65,13 @@ static void every_request_of_the_client_answers(uint8_t status, mbm_clientReques
             OK(mbm_client_cancel(&client, r));                                                     \
     } while (0)
     ASKED(mbm_client_readCoils(&client, r, 0, 1));
-    ASKED(mbm_client_readSingleCoil(&client, r, 0));
+    ASKED(mbm_client_readCoils(&client, r, 0, 1));
     ASKED(mbm_client_readDiscreteInputs(&client, r, 0, 1));
-    ASKED(mbm_client_readSingleDiscreteInput(&client, r, 0));
+    ASKED(mbm_client_readDiscreteInputs(&client, r, 0, 1));
     ASKED(mbm_client_readHoldingRegisters(&client, r, 0, 1));
-    ASKED(mbm_client_readSingleHoldingRegister(&client, r, 0));
+    ASKED(mbm_client_readHoldingRegisters(&client, r, 0, 1));
     ASKED(mbm_client_readInputRegisters(&client, r, 0, 1));
-    ASKED(mbm_client_readSingleInputRegister(&client, r, 0));
+    ASKED(mbm_client_readInputRegisters(&client, r, 0, 1));
     ASKED(mbm_client_writeSingleCoil(&client, r, 0, 1));
     ASKED(mbm_client_writeSingleRegister(&client, r, 0, 1));
     ASKED(mbm_client_writeMultipleCoils(&client, r, 0, 1));
@@ -95,7 +95,7 @@ static void every_function_of_the_client_is_busy(void)
 {
     static mbm_master facade;
     static const mbm_master zero;
-    static const mbm_link link = {.context = NULL};
+    static const mbm_linkHooks link = {.context = NULL};
     static uint8_t asked[sizeof another];
 
     IS(MBM_BUSY, mbm_client_beginRtu(&client, &port, other_frame, 260));
@@ -113,9 +113,9 @@ static void every_function_of_the_client_is_busy(void)
     assert_memory_equal(asked, &request, sizeof request);
     IS(MBM_BUSY, mbm_client_setDelimiter(&client, '!'));
     IS(MBM_BUSY, mbm_client_reconnect(&client, &link));
-    IS(MBM_BUSY, mbm_client_lend(&client, NULL));
-    IS(MBM_BUSY, mbm_client_lend(&client, &facade));
-    IS(MBM_BUSY, mbm_client_takeBack(&client, &facade));
+    IS(MBM_BUSY, mbm_client_suspend(&client, NULL));
+    IS(MBM_BUSY, mbm_client_suspend(&client, &facade));
+    IS(MBM_BUSY, mbm_client_resume(&client, &facade));
     assert_memory_equal(&facade, &zero, sizeof zero);
     IS(MBM_BUSY, mbm_client_poll(&client));
     assert_int_equal(mbm_client_pollDelay(&client), 0);
@@ -210,7 +210,7 @@ static void connect_anew(void *context)
 
 static void done(void *context, mbm_clientRequest *ended)
 {
-    const mbm_link link = {.disconnect = connect_anew};
+    const mbm_linkHooks link = {.disconnect = connect_anew};
     static mbm_master facade;
 
     (void)context;
@@ -223,7 +223,6 @@ static void done(void *context, mbm_clientRequest *ended)
         another.data = ended->data = words;
         every_request_of_the_client_answers(MBM_PENDING, &another);
         every_request_of_the_client_answers(MBM_PENDING, ended);
-        IS(MBM_BUSY, mbm_client_beginRtu(&client, &port, small_frame, 256));
         assert_true(mbm_client_pollDelay(&client) == 0xFFFFFFFFu);
         assert_int_equal(mbm_client_pending(&client), 0);
         IS(framing_of_done == 1 ? MBM_OK : MBM_INVALID_ARGUMENT,
@@ -231,14 +230,14 @@ static void done(void *context, mbm_clientRequest *ended)
         break;
     case 1: OK(mbm_client_reconnect(&client, &link)); break;
     case 2:
-        OK(mbm_client_lend(&client, NULL));
-        IS(MBM_BUSY, mbm_client_lend(&client, NULL));
-        OK(mbm_client_takeBack(&client, NULL));
+        OK(mbm_client_suspend(&client, NULL));
+        IS(MBM_BUSY, mbm_client_suspend(&client, NULL));
+        OK(mbm_client_resume(&client, NULL));
         memset(&facade, 0, sizeof facade);
         OK(mbm_master_setBuffers(&facade, words, 1, words, 1, other_frame, 8));
         if (framing_of_done % 3 == 0) {
-            OK(mbm_client_lend(&client, &facade));
-            OK(mbm_client_takeBack(&client, &facade));
+            OK(mbm_client_suspend(&client, &facade));
+            OK(mbm_client_resume(&client, &facade));
         }
         break;
     case 3:

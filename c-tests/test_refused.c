@@ -49,11 +49,13 @@ static void all_begins_are_refused(uint8_t *frame)
 
     deaf.read = NULL;
     memset(&other, 0, sizeof other);
-    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_begin(&server, &deaf, &other, 1, frame, 20));
-    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_begin(&server, NULL, &other, 1, frame, 20));
-    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_begin(&server, &port, NULL, 1, frame, 20));
-    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_begin(&server, &port, &other, 1, NULL, 20));
-    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_begin(&server, &port, &other, 1, frame, 15));
+    REFUSED(MBM_INVALID_ARGUMENT, server,
+            mbm_server_beginRtu(&server, &deaf, &other, 1, frame, 20));
+    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_beginRtu(&server, NULL, &other, 1, frame, 20));
+    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_beginRtu(&server, &port, NULL, 1, frame, 20));
+    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_beginRtu(&server, &port, &other, 1, NULL, 20));
+    REFUSED(MBM_INVALID_ARGUMENT, server,
+            mbm_server_beginRtu(&server, &port, &other, 1, frame, 15));
     REFUSED(MBM_INVALID_ARGUMENT, server,
             mbm_server_beginAscii(&server, &port, &other, 1, frame, 20));
     REFUSED(MBM_INVALID_ARGUMENT, server,
@@ -82,9 +84,9 @@ static void a_server_goes_on_when_a_begin_was_refused(void **state)
     unit.id = 17;
     table.words = words;
     table.size = MBM_MAX_READ_REGISTERS;
-    OK(mbm_server_serveHoldingRegisters(&unit, &table));
-    OK(mbm_server_serveCustom(&unit, &custom));
-    OK(mbm_server_begin(&server, &port, &unit, 1, frame, MBM_MAX_FRAME));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+    OK(mbm_unit_serveCustom(&unit, &custom));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, MBM_MAX_FRAME));
     all_begins_are_refused(small);
     /* The next request. */
     hooked_port_arrive_rtu(&wire, 17, "\x03\0\0\0\x7D", 5);
@@ -141,9 +143,9 @@ static void settings_of_a_server_that_are_refused_change_nothing(void **state)
 static void records_that_are_refused_are_as_they_were(void **state)
 {
     mbm_registerTable fresh;
-    mbm_cells cells;
+    mbm_dataCallbacks cells;
     mbm_custom custom;
-    mbm_switches switches;
+    mbm_functionMask switches;
 
     (void)state;
     memset(&unit, 0, sizeof unit);
@@ -151,26 +153,26 @@ static void records_that_are_refused_are_as_they_were(void **state)
     memset(&cells, 0, sizeof cells);
     memset(&custom, 0, sizeof custom);
     memset(&switches, 0, sizeof switches);
-    REFUSED(MBM_INVALID_ARGUMENT, fresh, mbm_server_serveHoldingRegisters(NULL, &fresh));
-    REFUSED(MBM_INVALID_ARGUMENT, fresh, mbm_server_serveMaskAndReadWrite(&fresh));
-    REFUSED(MBM_INVALID_ARGUMENT, cells, mbm_server_serveCallbacks(&unit, &cells, 3));
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_server_serveCallbacks(&unit, &cells, 3));
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_server_serveCustom(&unit, &custom));
+    REFUSED(MBM_INVALID_ARGUMENT, fresh, mbm_unit_serveHoldingRegisters(NULL, &fresh));
+    REFUSED(MBM_INVALID_ARGUMENT, fresh, mbm_registerTable_serveMaskAndReadWrite(&fresh));
+    REFUSED(MBM_INVALID_ARGUMENT, cells, mbm_unit_serveCallbacks(&unit, &cells, 3));
+    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveCallbacks(&unit, &cells, 3));
+    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveCustom(&unit, &custom));
     custom.serve = later;
     custom.code = 128;
-    REFUSED(MBM_INVALID_ARGUMENT, custom, mbm_server_serveCustom(&unit, &custom));
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_server_serveCustom(&unit, &custom));
+    REFUSED(MBM_INVALID_ARGUMENT, custom, mbm_unit_serveCustom(&unit, &custom));
+    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveCustom(&unit, &custom));
     custom.code = 65;
     custom.length.kind = 9;
-    REFUSED(MBM_INVALID_ARGUMENT, custom, mbm_server_serveCustom(&unit, &custom));
-    REFUSED(MBM_INVALID_ARGUMENT, switches, mbm_server_switchOff(NULL, &switches, 3));
-    REFUSED(MBM_INVALID_ARGUMENT, switches, mbm_server_switchOff(&unit, &switches, 128));
-    REFUSED(MBM_INVALID_ARGUMENT, switches, mbm_server_switchOn(&switches, 0));
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_server_switchOff(&unit, &switches, 0));
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_server_serveFiles(&unit, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_server_serveFifos(&unit, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_server_serveDiagnostics(&unit, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_server_serveIdentification(&unit, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, custom, mbm_unit_serveCustom(&unit, &custom));
+    REFUSED(MBM_INVALID_ARGUMENT, switches, mbm_unit_switchFunction(NULL, &switches, 3, 0));
+    REFUSED(MBM_INVALID_ARGUMENT, switches, mbm_unit_switchFunction(&unit, &switches, 128, 0));
+    REFUSED(MBM_INVALID_ARGUMENT, switches, mbm_unit_switchFunction(&unit, &switches, 0, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_switchFunction(&unit, &switches, 0, 0));
+    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveFiles(&unit, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveFifos(&unit, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveDiagnostics(&unit, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveIdentification(&unit, NULL));
 }
 
 /* --- master --- */
@@ -187,17 +189,17 @@ static void a_master_goes_on_when_calls_were_refused(void **state)
 
     (void)state;
     memset(&m, 0, sizeof m);
-    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_begin(&m, 1, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_beginRtu(&m, 1, NULL));
     mute.write = NULL;
-    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_begin(&m, 1, &mute));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_beginRtu(&m, 1, &mute));
     REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setBuffers(&m, one, 1, one, 1, small, 7));
-    OK(mbm_master_begin(&m, 17, &port));
+    OK(mbm_master_beginRtu(&m, 17, &port));
     OK(mbm_master_setBuffers(&m, response, 125, transmit, 2, frame, MBM_MAX_FRAME));
     OK(mbm_master_setBlocking(&m, 0));
     transmit[0] = transmit[1] = 0x1234;
     IS(MBM_PENDING, mbm_master_readHoldingRegisters(&m, 0, 125));
 
-    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_begin(&m, 1, &mute));
+    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_beginRtu(&m, 1, &mute));
     REFUSED(MBM_BUSY, m, mbm_master_setBuffers(&m, one, 1, one, 1, small, 8));
     REFUSED(MBM_INVALID_ARGUMENT, m, mbm_master_setBuffers(&m, one, 256, one, 1, small, 8));
     REFUSED(MBM_BUSY, m, mbm_master_readCoils(&m, 0, 1));
@@ -225,7 +227,7 @@ static void a_master_goes_on_when_calls_were_refused(void **state)
     OK(mbm_master_send(&m, 1));
     OK(mbm_master_send(&m, 2));
     REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_master_send(&m, 3));
-    REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_master_send8(&m, 3));
+    REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_master_send(&m, 3));
     REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_master_send32(&m, 3));
     REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_master_sendBit(&m, 1));
     free(frame);
@@ -243,7 +245,7 @@ static void request_from_gives_0_whenever_it_is_refused(void **state)
 
     (void)state;
     memset(&m, 0, sizeof m);
-    OK(mbm_master_begin(&m, 17, &port));
+    OK(mbm_master_beginRtu(&m, 17, &port));
     OK(mbm_master_setBuffers(&m, response, 4, transmit, 4, frame, sizeof frame));
     OK(mbm_master_setBlocking(&m, 0));
     IS(MBM_PENDING, mbm_master_readHoldingRegisters(&m, 0, 2));
@@ -263,26 +265,25 @@ static void request_from_gives_0_whenever_it_is_refused(void **state)
 static void a_sniffer_goes_on_when_calls_were_refused(void **state)
 {
     static mbm_sniffer sniffer;
-    const mbm_framing rtu = {.kind = MBM_FRAMING_RTU}, none = {.kind = 9};
     uint8_t *buffer = (uint8_t *)malloc(MBM_MAX_FRAME), *small = (uint8_t *)malloc(31);
     mbm_event event;
 
     (void)state;
     memset(&sniffer, 0, sizeof sniffer);
-    REFUSED(MBM_BUFFER_TOO_SMALL, sniffer, mbm_sniffer_begin(&sniffer, &rtu, small, 31));
-    OK(mbm_sniffer_begin(&sniffer, &rtu, buffer, MBM_MAX_FRAME));
+    REFUSED(MBM_BUFFER_TOO_SMALL, sniffer, mbm_sniffer_beginRtu(&sniffer, small, 31));
+    OK(mbm_sniffer_beginRtu(&sniffer, buffer, MBM_MAX_FRAME));
     hooked_port_arrive_rtu(&wire, 17, "\3\0\0\0\1", 5);
-    assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, wire.arriving, 4, 0), 4);
-    REFUSED(MBM_BUFFER_TOO_SMALL, sniffer, mbm_sniffer_begin(&sniffer, &rtu, small, 31));
-    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_begin(&sniffer, &none, buffer, 256));
-    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_begin(&sniffer, NULL, buffer, 256));
-    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_begin(&sniffer, &rtu, NULL, 256));
-    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_setTimeout(&sniffer, 0));
-    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_setPatience(&sniffer, 0));
+    assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, wire.arriving, 4, 0), 4);
+    REFUSED(MBM_BUFFER_TOO_SMALL, sniffer, mbm_sniffer_beginRtu(&sniffer, small, 31));
+    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_beginRtu(&sniffer, NULL, 256));
+    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_setFunctions(&sniffer, NULL, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_setDelimiter(&sniffer, '\r'));
+    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_setResponseTimeout(&sniffer, 0));
+    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_setFrameTimeout(&sniffer, 0));
     REFUSED(0, sniffer, mbm_sniffer_feed(&sniffer, 3, wire.arriving, 4, 0));
-    REFUSED(0, sniffer, mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, NULL, 4, 0));
+    REFUSED(0, sniffer, mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, NULL, 4, 0));
     REFUSED(0, sniffer, mbm_sniffer_next(&sniffer, 0, NULL));
-    assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, wire.arriving + 4, 4, 0), 4);
+    assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, wire.arriving + 4, 4, 0), 4);
     assert_int_equal(mbm_sniffer_next(&sniffer, 100000, &event), 1);
     assert_int_equal(event.kind, MBM_EVENT_REQUEST);
     free(buffer);

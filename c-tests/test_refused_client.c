@@ -78,7 +78,7 @@ static void all_settings_out_of_range_are_refused(int framing)
     REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_setInFlight(&client, 17));
     REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_setDelimiter(&client, ':'));
     REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_setDelimiter(&client, 0));
-    REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_takeBack(&client, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_resume(&client, NULL));
     if (framing != 1)
         REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_setDelimiter(&client, '!'));
 }
@@ -110,7 +110,8 @@ static void a_client_goes_on_when_calls_were_refused(void **state)
             IS(MBM_PENDING, mbm_client_poll(&client));
         assert_true(wire.length > 0);
 
-        all_client_begins_are(MBM_BUSY, &port, small, sizeof small);
+        all_client_begins_are(MBM_INVALID_ARGUMENT, &port, small, 7);
+        all_client_begins_are(MBM_INVALID_ARGUMENT, NULL, small, sizeof small);
         all_settings_out_of_range_are_refused(framing);
         if (framing == 1)
             REFUSED(MBM_BUSY, client, mbm_client_setDelimiter(&client, '!'));
@@ -119,9 +120,9 @@ static void a_client_goes_on_when_calls_were_refused(void **state)
         REFUSED(MBM_BUSY, client, mbm_client_readCoils(&client, &request, 0, 1));
         REFUSED(MBM_BUSY, request, mbm_client_readCoils(&client, &request, 0, 1));
         REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_readCoils(&client, NULL, 0, 1));
-        REFUSED(MBM_BUSY, client, mbm_client_lend(&client, NULL));
+        REFUSED(MBM_BUSY, client, mbm_client_suspend(&client, NULL));
         REFUSED(framing == 0 || framing == 3 ? MBM_BUSY : MBM_INVALID_ARGUMENT, client,
-                mbm_client_lend(&client, &facade));
+                mbm_client_suspend(&client, &facade));
         assert_memory_equal(&facade, &zero, sizeof facade);
         /* Requests that are refused have the status, and are not queued. */
         other.unit = 17;
@@ -173,22 +174,22 @@ static void a_full_queue_and_a_lent_line_change_nothing(void **state)
     }
     requests[i].unit = 17;
     REFUSED(MBM_QUEUE_FULL, client, mbm_client_readCoils(&client, &requests[i], 0, 1));
-    OK(mbm_client_lend(&client, NULL));
-    REFUSED(MBM_BUSY, client, mbm_client_lend(&client, &facade));
+    OK(mbm_client_suspend(&client, NULL));
+    REFUSED(MBM_BUSY, client, mbm_client_suspend(&client, &facade));
     assert_memory_equal(&facade, &zero, sizeof facade);
     REFUSED(MBM_BUSY, client, mbm_client_poll(&client));
     REFUSED(MBM_BUSY, client, mbm_client_reconnect(&client, NULL));
-    OK(mbm_client_takeBack(&client, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_takeBack(&client, NULL));
+    OK(mbm_client_resume(&client, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_resume(&client, NULL));
     /* A facade with a request under way is neither lent nor taken back. */
     OK(mbm_master_setBuffers(&facade, facade_words, 2, facade_words, 0, facade_frame, 16));
-    OK(mbm_client_lend(&client, &facade));
+    OK(mbm_client_suspend(&client, &facade));
     OK(mbm_master_setBlocking(&facade, 0));
     IS(MBM_PENDING, mbm_master_readCoils(&facade, 0, 1));
-    REFUSED(MBM_BUSY, client, mbm_client_takeBack(&client, &facade));
-    REFUSED(MBM_BUSY, facade, mbm_client_takeBack(&client, &facade));
+    REFUSED(MBM_BUSY, client, mbm_client_resume(&client, &facade));
+    REFUSED(MBM_BUSY, facade, mbm_client_resume(&client, &facade));
     OK(mbm_master_cancel(&facade));
-    OK(mbm_client_takeBack(&client, &facade));
+    OK(mbm_client_resume(&client, &facade));
     free(incoming);
     free(outgoing);
     incoming = outgoing = NULL;

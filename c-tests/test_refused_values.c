@@ -42,8 +42,8 @@ static void values_that_are_refused_are_as_they_were(void **state)
     KEPT(MBM_INVALID_ARGUMENT, mbm_registers_setFloat(&r, 100, 0, NULL));
     KEPT(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_setString(&r, 100, 5, 0, "a"));
     KEPT(MBM_INVALID_ARGUMENT, mbm_registers_setString(&r, 100, 4, 0, NULL));
-    KEPT(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_setBytes(&r, 100, coils, 5));
-    KEPT(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_setBytesInOrder(&r, 101, 0, coils, 4));
+    KEPT(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_setBytes(&r, 100, MBM_ORDER_ABCD, coils, 5));
+    KEPT(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_setBytes(&r, 101, 0, coils, 4));
     KEPT(MBM_BUFFER_TOO_SMALL, mbm_bits_pack(coils, 17, bytes, 2));
     KEPT(MBM_BUFFER_TOO_SMALL, mbm_bits_packWords(coils, 20, two, 1));
     KEPT(MBM_ILLEGAL_DATA_ADDRESS, mbm_bits_set(bytes, 10, 16, 26, 1));
@@ -81,17 +81,17 @@ static void lengths_are_0_whenever_there_is_none(void **state)
         assert_int_equal(expected.kind, MBM_LENGTH_UNKNOWN);                                       \
     } while (0)
     memset(&unit, 0, sizeof unit);
-    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_server_respond(4, &unit, 1, frame, 8, 16, &length));
-    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_server_respond(0, NULL, 1, frame, 8, 16, &length));
-    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_server_respond(0, &unit, 1, NULL, 8, 16, &length));
-    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_server_respond(0, &unit, 1, frame, 17, 16, &length));
-    NO_LENGTH(MBM_OK, mbm_server_respond(0, &unit, 1, frame, 8, 16, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_respond(0, &unit, 1, frame, 8, 16, NULL));
+    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, FRAMING(4), frame, 8, 16, &length));
+    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_unit_respond(NULL, 1, FRAMING(0), frame, 8, 16, &length));
+    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, FRAMING(0), NULL, 8, 16, &length));
+    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, FRAMING(0), frame, 17, 16, &length));
+    NO_LENGTH(MBM_OK, mbm_unit_respond(&unit, 1, FRAMING(0), frame, 8, 16, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, FRAMING(0), frame, 8, 16, NULL));
     NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_frame_build(&none, &packet, frame, 16, &length));
     NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, NULL, frame, 16, &length));
     NO_LENGTH(MBM_BUFFER_TOO_SMALL, mbm_frame_build(&rtu, &packet, frame, 7, &length));
-    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_packet_build(NULL, NULL, 0, frame, 16, &length));
-    NO_LENGTH(MBM_BUFFER_TOO_SMALL, mbm_packet_build(&packet, NULL, 0, frame, 4, &length));
+    NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_frame_build(PDU(NULL, 0), NULL, frame, 16, &length));
+    NO_LENGTH(MBM_BUFFER_TOO_SMALL, mbm_frame_build(PDU(NULL, 0), &packet, frame, 4, &length));
     NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_frame_exception(&rtu, &packet, 0, frame, 16, &length));
     NO_LENGTH(MBM_BUFFER_TOO_SMALL, mbm_frame_exception(&rtu, &packet, 1, frame, 4, &length));
     NO_LENGTH(MBM_INVALID_ARGUMENT, mbm_frame_looksLikeTcp(NULL, 8, 0, &length));
@@ -100,11 +100,11 @@ static void lengths_are_0_whenever_there_is_none(void **state)
     UNKNOWN(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(&rtu, 9, frame, 2, &expected));
     UNKNOWN(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(NULL, 0, frame, 2, &expected));
     UNKNOWN(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(&rtu, NULL, &expected));
-    UNKNOWN(MBM_INVALID_ARGUMENT, mbm_packet_expectedLength(0, NULL, 2, NULL, 0, &expected));
+    UNKNOWN(MBM_INVALID_ARGUMENT, mbm_frame_expectedLength(PDU(NULL, 0), 0, NULL, 2, &expected));
     packet.quantity = 0;
-    UNKNOWN(MBM_ILLEGAL_DATA_VALUE, mbm_packet_replyLength(&packet, NULL, 0, &expected));
+    UNKNOWN(MBM_ILLEGAL_DATA_VALUE, mbm_frame_replyLength(PDU(NULL, 0), &packet, &expected));
     UNKNOWN(MBM_ILLEGAL_DATA_VALUE, mbm_frame_replyLength(&rtu, &packet, &expected));
-    IS(MBM_INVALID_ARGUMENT, mbm_packet_replyLength(&packet, NULL, 0, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(PDU(NULL, 0), &packet, NULL));
 }
 
 static void other_variables_are_as_they_were_when_a_call_is_refused(void **state)
@@ -126,8 +126,8 @@ static void other_variables_are_as_they_were_when_a_call_is_refused(void **state
     REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(&none, 0, frame, 8, &packet));
     REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(&rtu, 2, frame, 8, &packet));
     REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(&rtu, 0, NULL, 8, &packet));
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_parse(2, frame, 8, NULL, 0, &packet));
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_parse(0, NULL, 8, NULL, 0, &packet));
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(PDU(NULL, 0), 2, frame, 8, &packet));
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(PDU(NULL, 0), 0, NULL, 8, &packet));
     memset(&packet, 0, sizeof packet);
     memset(&record, 0x77, sizeof record);
     memset(&object, 0x77, sizeof object);
@@ -148,7 +148,8 @@ static void other_variables_are_as_they_were_when_a_call_is_refused(void **state
     REFUSED(MBM_ILLEGAL_DATA_ADDRESS, byte, mbm_registers_getUint8(&r, 1, 0, &byte));
     REFUSED(MBM_ILLEGAL_DATA_ADDRESS, word, mbm_registers_getUint16(&r, 1, 0, &word));
     REFUSED(MBM_ILLEGAL_DATA_ADDRESS, wide, mbm_registers_getUint32(&r, 0, 0, &wide));
-    REFUSED(MBM_ILLEGAL_DATA_ADDRESS, bytes, mbm_registers_getBytes(&r, 0, bytes, 4));
+    REFUSED(MBM_ILLEGAL_DATA_ADDRESS, bytes,
+            mbm_registers_getBytes(&r, 0, MBM_ORDER_ABCD, bytes, 4));
     REFUSED(MBM_ILLEGAL_DATA_ADDRESS, text, mbm_registers_getString(&r, 1, 2, 0, text, 4));
     REFUSED(MBM_ILLEGAL_DATA_ADDRESS, byte, mbm_registers_isEqual(&r, 0, bytes, 4, &byte));
     REFUSED(MBM_ILLEGAL_DATA_ADDRESS, byte, mbm_bits_isSet(bytes, 0, 8, 8, &byte));
@@ -158,9 +159,9 @@ static void other_variables_are_as_they_were_when_a_call_is_refused(void **state
 static void the_text_of_an_invalid_argument_speaks_of_ranges_too(void **state)
 {
     (void)state;
-    assert_non_null(strstr(mbm_statusText(MBM_INVALID_ARGUMENT), "out of range"));
-    assert_non_null(strstr(mbm_statusText(MBM_INVALID_ARGUMENT), "NULL"));
-    assert_non_null(strstr(mbm_statusText(MBM_BUSY), "hook"));
+    assert_non_null(strstr(mbm_status_text(MBM_INVALID_ARGUMENT), "out of range"));
+    assert_non_null(strstr(mbm_status_text(MBM_INVALID_ARGUMENT), "NULL"));
+    assert_non_null(strstr(mbm_status_text(MBM_BUSY), "hook"));
 }
 
 #define TEST(test) cmocka_unit_test(test)

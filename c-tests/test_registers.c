@@ -53,7 +53,7 @@ static void a_double_word_is_read_in_four_orders(void **state)
             OK(mbm_registers_getUint32(&r, 30001, orders[i], &value));
             assert_int_equal(value, 2923517522u);
             r.order = orders[i];
-            OK(mbm_registers_getInt32(&r, 30001, MBM_ORDER_DEFAULT, &negative));
+            OK(mbm_registers_getUint32(&r, 30001, MBM_ORDER_DEFAULT, (uint32_t *)&negative));
             assert_int_equal(negative, -1371449774);
         }
     }
@@ -125,7 +125,7 @@ static void values_of_four_registers_have_four_orders_too(void **state)
         assert_true(value > 3.14159265358979 && value < 3.14159265358980);
         OK(mbm_registers_getUint64(&r, 100, orders[i], &wide));
         assert_true(wide == 0x400921FB54442D18u);
-        OK(mbm_registers_getInt64(&r, 100, orders[i], &negative));
+        OK(mbm_registers_getUint64(&r, 100, orders[i], (uint64_t *)&negative));
         assert_true(negative == 0x400921FB54442D18);
 
         OK(mbm_registers_intoBytes(&w, bytes, 8, 100));
@@ -137,7 +137,7 @@ static void values_of_four_registers_have_four_orders_too(void **state)
         OK(mbm_registers_setUint64(&w, 100, MBM_ORDER_DEFAULT, &wide));
         assert_memory_equal(bytes, pi[i], 8);
         negative = -2;
-        OK(mbm_registers_setInt64(&w, 100, MBM_ORDER_ABCD, &negative));
+        OK(mbm_registers_setUint64(&w, 100, MBM_ORDER_ABCD, (const uint64_t *)&negative));
         OK(mbm_registers_getUint64(&w, 100, MBM_ORDER_ABCD, &wide));
         assert_true(wide == 0xFFFFFFFFFFFFFFFEu);
     }
@@ -156,7 +156,7 @@ static void a_double_word_is_written_in_four_orders(void **state)
     for (i = 0; i < 4; i++) {
         to_words(wanted, double_words[i], 2);
         OK(mbm_registers_setUint32(&b, 9, orders[i], 2923517522u));
-        OK(mbm_registers_setInt32(&w, 9, orders[i], -1371449774));
+        OK(mbm_registers_setUint32(&w, 9, orders[i], (uint32_t)-1371449774));
         assert_memory_equal(bytes, double_words[i], 4);
         assert_memory_equal(words, wanted, 4);
     }
@@ -179,15 +179,15 @@ static void one_register_has_numbers_bytes_and_bits(void **state)
     assert_int_equal(word, 0x80FE);
     OK(mbm_registers_getUint16(&r, 5, MBM_ORDER_BADC, &word));
     assert_int_equal(word, 0xFE80);
-    OK(mbm_registers_getInt16(&r, 5, MBM_ORDER_DEFAULT, &number));
+    OK(mbm_registers_getUint16(&r, 5, MBM_ORDER_DEFAULT, (uint16_t *)&number));
     assert_int_equal(number, -32514);
     OK(mbm_registers_getUint8(&r, 5, 1, &byte));
     assert_int_equal(byte, 0x80);
     OK(mbm_registers_getUint8(&r, 5, 0, &byte));
     assert_int_equal(byte, 0xFE);
-    OK(mbm_registers_getInt8(&r, 5, 1, &small));
+    OK(mbm_registers_getUint8(&r, 5, 1, (uint8_t *)&small));
     assert_int_equal(small, -128);
-    OK(mbm_registers_getInt8(&r, 5, 0, &small));
+    OK(mbm_registers_getUint8(&r, 5, 0, (uint8_t *)&small));
     assert_int_equal(small, -2);
     OK(mbm_registers_getBit(&r, 5, 15, &byte));
     assert_int_equal(byte, 1);
@@ -200,11 +200,11 @@ static void one_register_has_numbers_bytes_and_bits(void **state)
     assert_int_equal(words[1], 0x2AAB);
     IS(MBM_INVALID_ARGUMENT, mbm_registers_setBit(&r, 6, 16, 0));
     OK(mbm_registers_setUint8(&r, 6, 1, 0x12));
-    OK(mbm_registers_setInt8(&r, 6, 0, -1));
+    OK(mbm_registers_setUint8(&r, 6, 0, (uint8_t)-1));
     assert_int_equal(words[1], 0x12FF);
     OK(mbm_registers_setUint16(&r, 6, MBM_ORDER_DCBA, 0x3456));
     assert_int_equal(words[1], 0x5634);
-    OK(mbm_registers_setInt16(&r, 6, MBM_ORDER_DEFAULT, -2));
+    OK(mbm_registers_setUint16(&r, 6, MBM_ORDER_DEFAULT, (uint16_t)-2));
     assert_int_equal(words[1], 0xFFFE);
 }
 
@@ -260,7 +260,7 @@ static void raw_bytes_are_copied_and_compared_as_they_travel(void **state)
     (void)state;
     OK(mbm_registers_intoWords(&r, words, 3, 40));
     r.order = MBM_ORDER_DCBA;
-    OK(mbm_registers_getBytes(&r, 41, bytes, 3));
+    OK(mbm_registers_getBytes(&r, 41, MBM_ORDER_ABCD, bytes, 3));
     assert_memory_equal(bytes, three, 3);
     OK(mbm_registers_isEqual(&r, 41, three, 3, &equal));
     assert_int_equal(equal, 1);
@@ -269,10 +269,10 @@ static void raw_bytes_are_copied_and_compared_as_they_travel(void **state)
     equal = 7;
     IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_isEqual(&r, 41, five, 5, &equal));
     assert_int_equal(equal, 7);
-    OK(mbm_registers_setBytes(&r, 40, three, 3));
+    OK(mbm_registers_setBytes(&r, 40, MBM_ORDER_ABCD, three, 3));
     assert_int_equal(words[0], 0x0304);
     assert_int_equal(words[1], 0x0504);
-    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_setBytes(&r, 42, three, 3));
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_setBytes(&r, 42, MBM_ORDER_ABCD, three, 3));
     assert_int_equal(words[2], 0x0506);
 }
 
@@ -290,29 +290,28 @@ static void bytes_of_a_device_that_swaps_them_are_put_in_order(void **state)
         const uint8_t *wanted = i < 2 ? straight : swapped;
 
         OK(mbm_registers_ofBytes(&r, data, 6, 40));
-        OK(mbm_registers_getBytesInOrder(&r, 40, orders[i], bytes, 5));
+        OK(mbm_registers_getBytes(&r, 40, orders[i], bytes, 5));
         assert_memory_equal(bytes, wanted, 5);
         OK(mbm_registers_ofWords(&r, words, 3, 40));
         r.order = orders[i];
-        OK(mbm_registers_getBytesInOrder(&r, 40, MBM_ORDER_DEFAULT, bytes, 5));
+        OK(mbm_registers_getBytes(&r, 40, MBM_ORDER_DEFAULT, bytes, 5));
         assert_memory_equal(bytes, wanted, 5);
         memset(back, 9, 6);
         OK(mbm_registers_intoBytes(&r, back, 6, 40));
-        OK(mbm_registers_setBytesInOrder(&r, 40, orders[i], wanted, 5));
+        OK(mbm_registers_setBytes(&r, 40, orders[i], wanted, 5));
         assert_memory_equal(back, data, 4);
         assert_int_equal(back[4], i < 2 ? 5 : 9);
         assert_int_equal(back[5], i < 2 ? 9 : 6);
     }
     memset(bytes, 7, 5);
-    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_getBytesInOrder(&r, 41, MBM_ORDER_BADC, bytes, 5));
-    IS(MBM_ILLEGAL_DATA_ADDRESS,
-       mbm_registers_setBytesInOrder(&r, 41, MBM_ORDER_BADC, straight, 5));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_getBytesInOrder(&r, 40, 5, bytes, 2));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytesInOrder(&r, 40, 5, straight, 2));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_getBytesInOrder(&r, 40, 0, NULL, 2));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytesInOrder(NULL, 40, 0, straight, 2));
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_getBytes(&r, 41, MBM_ORDER_BADC, bytes, 5));
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_setBytes(&r, 41, MBM_ORDER_BADC, straight, 5));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getBytes(&r, 40, 5, bytes, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytes(&r, 40, 5, straight, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getBytes(&r, 40, 0, NULL, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytes(NULL, 40, 0, straight, 2));
     OK(mbm_registers_ofBytes(&r, data, 6, 40));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytesInOrder(&r, 40, 0, straight, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytes(&r, 40, 0, straight, 2));
     assert_int_equal(bytes[0], 7);
 }
 
@@ -393,8 +392,8 @@ static void null_and_nonsense_are_answered_with_a_status(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_registers_getBit(&r, 0, 0, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint8(&r, 0, 0, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_getString(&r, 0, 2, 0, NULL, 4));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_getBytes(&r, 0, NULL, 2));
-    OK(mbm_registers_getBytes(&r, 0, NULL, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getBytes(&r, 0, MBM_ORDER_ABCD, NULL, 2));
+    OK(mbm_registers_getBytes(&r, 0, MBM_ORDER_ABCD, NULL, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_isEqual(&r, 0, NULL, 2, &byte));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_isEqual(&r, 0, bytes, 2, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_getUint32(&r, 0, MBM_ORDER_DCBA + 1, &value));
@@ -411,7 +410,7 @@ static void null_and_nonsense_are_answered_with_a_status(void **state)
     OK(mbm_registers_intoWords(&r, &word, 1, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_setFloat(&r, 0, 0, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_setString(&r, 0, 2, 0, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytes(&r, 0, NULL, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytes(&r, 0, MBM_ORDER_ABCD, NULL, 2));
     assert_int_equal(word, 9);
 }
 
@@ -426,7 +425,7 @@ static void what_was_lent_to_read_is_not_written(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_registers_setUint16(&r, 0, 0, 9));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_setBit(&r, 0, 0, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_setUint8(&r, 0, 0, 9));
-    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytes(&r, 0, bytes, 2));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setBytes(&r, 0, MBM_ORDER_ABCD, bytes, 2));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_setString(&r, 0, 2, 0, ""));
     assert_int_equal(words[0], 1);
     OK(mbm_registers_ofBytes(&r, bytes, 2, 0));

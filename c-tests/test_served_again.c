@@ -20,8 +20,8 @@ typedef struct {
     mbm_fifos fifos;
     mbm_identification identification;
     mbm_custom custom;
-    mbm_cells cells;
-    mbm_switches switches;
+    mbm_dataCallbacks cells;
+    mbm_functionMask switches;
 } records;
 
 static records first;
@@ -55,38 +55,38 @@ static uint8_t serve(mbm_unit *unit, records *r, int family)
     case 0:
         r->coils.bits = bits;
         r->coils.size = 16;
-        return mbm_server_serveCoils(unit, &r->coils);
+        return mbm_unit_serveCoils(unit, &r->coils);
     case 1:
         r->discrete.bits = bits;
         r->discrete.size = 16;
-        return mbm_server_serveDiscreteInputs(unit, &r->discrete);
+        return mbm_unit_serveDiscreteInputs(unit, &r->discrete);
     case 2:
         r->holding.words = words;
         r->holding.size = 4;
-        return mbm_server_serveHoldingRegisters(unit, &r->holding);
-    case 3: r->cells.get = get; return mbm_server_serveCallbacks(unit, &r->cells, 4);
-    case 4: return mbm_server_serveExceptionStatus(unit, &r->status);
-    case 5: return mbm_server_serveDiagnostics(unit, &r->diagnostics);
+        return mbm_unit_serveHoldingRegisters(unit, &r->holding);
+    case 3: r->cells.get = get; return mbm_unit_serveCallbacks(unit, &r->cells, 4);
+    case 4: return mbm_unit_serveExceptionStatus(unit, &r->status);
+    case 5: return mbm_unit_serveDiagnostics(unit, &r->diagnostics);
     case 6:
         r->id.id = (const uint8_t *)"x";
         r->id.idLength = 1;
-        return mbm_server_serveServerId(unit, &r->id);
+        return mbm_unit_serveServerId(unit, &r->id);
     case 7:
         r->files.files = files;
         r->files.count = 1;
-        return mbm_server_serveFiles(unit, &r->files);
+        return mbm_unit_serveFiles(unit, &r->files);
     case 8:
         r->fifos.fifos = fifos;
         r->fifos.count = 1;
-        return mbm_server_serveFifos(unit, &r->fifos);
+        return mbm_unit_serveFifos(unit, &r->fifos);
     case 9:
         r->identification.objects = objects;
         r->identification.count = 1;
-        return mbm_server_serveIdentification(unit, &r->identification);
+        return mbm_unit_serveIdentification(unit, &r->identification);
     default:
         r->custom.serve = echo;
         r->custom.code = 65;
-        return mbm_server_serveCustom(unit, &r->custom);
+        return mbm_unit_serveCustom(unit, &r->custom);
     }
 }
 
@@ -122,8 +122,8 @@ static unsigned answer(mbm_unit *unit, uint8_t id, const char *pdu, size_t lengt
     frame[0] = id;
     memcpy(frame + 1, pdu, length);
     length = seal(frame, length + 1);
-    OK(mbm_server_respond(MBM_FRAMING_RTU, unit, 1, frame, (uint16_t)length, sizeof frame,
-                          &response));
+    OK(mbm_unit_respond(unit, 1, FRAMING(MBM_FRAMING_RTU), frame, (uint16_t)length, sizeof frame,
+                        &response));
     assert_int_not_equal(response, 0xFFFF);
     return response == 0 ? 0 : frame[1];
 }
@@ -241,7 +241,7 @@ static void one_record_serves_two_units(void **state)
 static void functions_16_and_17_stay_when_another_unit_is_given_the_table(void **state)
 {
     (void)state;
-    OK(mbm_server_serveMaskAndReadWrite(&first.holding));
+    OK(mbm_registerTable_serveMaskAndReadWrite(&first.holding));
     OK(serve(&units[1], &first, 2));
     assert_int_equal(answer(&units[0], 17, "\x16\0\0\xFF\xFF\0\0", 7), 0x16);
     assert_int_equal(answer(&units[1], 18, "\x16\0\0\xFF\xFF\0\0", 7), 0x16);
@@ -254,11 +254,11 @@ static void a_table_that_is_served_as_one_kind_is_refused_as_another(void **stat
 
     (void)state;
     memcpy(&before, &first, sizeof first);
-    IS(MBM_BUSY, mbm_server_serveInputRegisters(&units[0], &first.holding));
-    IS(MBM_BUSY, mbm_server_serveInputRegisters(&units[1], &first.holding));
-    IS(MBM_BUSY, mbm_server_serveDiscreteInputs(&units[1], &first.coils));
-    IS(MBM_BUSY, mbm_server_serveCoils(&units[1], &first.discrete));
-    IS(MBM_BUSY, mbm_server_serveCallbacks(&units[1], &first.cells, 2));
+    IS(MBM_BUSY, mbm_unit_serveInputRegisters(&units[0], &first.holding));
+    IS(MBM_BUSY, mbm_unit_serveInputRegisters(&units[1], &first.holding));
+    IS(MBM_BUSY, mbm_unit_serveDiscreteInputs(&units[1], &first.coils));
+    IS(MBM_BUSY, mbm_unit_serveCoils(&units[1], &first.discrete));
+    IS(MBM_BUSY, mbm_unit_serveCallbacks(&units[1], &first.cells, 2));
     assert_memory_equal(&before, &first, sizeof first);
     all_are_answered(&units[0]);
     assert_int_equal(answered(&units[1], 3), 0);
@@ -266,7 +266,7 @@ static void a_table_that_is_served_as_one_kind_is_refused_as_another(void **stat
     zero(&first, 2);
     first.holding.words = words;
     first.holding.size = 4;
-    OK(mbm_server_serveInputRegisters(&units[1], &first.holding));
+    OK(mbm_unit_serveInputRegisters(&units[1], &first.holding));
     assert_int_equal(answered(&units[1], 3), 4);
 }
 
@@ -276,7 +276,7 @@ static void a_second_record_of_diagnostics_is_refused(void **state)
     mbm_unit before = units[0];
 
     (void)state;
-    IS(MBM_BUSY, mbm_server_serveDiagnostics(&units[0], &second));
+    IS(MBM_BUSY, mbm_unit_serveDiagnostics(&units[0], &second));
     assert_memory_equal(&before, &units[0], sizeof before);
     all_are_answered(&units[0]);
 }
@@ -294,10 +294,10 @@ static void what_a_unit_has_no_place_for_is_refused(void **state)
         more[i].code = (uint8_t)(66 + i);
     }
     for (i = 0; served < MBM_MAX_SERVICES; i++, served++)
-        OK(mbm_server_serveCustom(&units[0], &more[i]));
+        OK(mbm_unit_serveCustom(&units[0], &more[i]));
     memcpy(&before, &units[0], sizeof before);
-    IS(MBM_BUFFER_TOO_SMALL, mbm_server_serveCustom(&units[0], &more[i]));
-    IS(MBM_BUFFER_TOO_SMALL, mbm_server_switchOff(&units[0], &first.switches, 3));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_unit_serveCustom(&units[0], &more[i]));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_unit_switchFunction(&units[0], &first.switches, 3, 0));
     assert_int_equal(first.switches.off[0], 0);
     assert_memory_equal(&before, &units[0], sizeof before);
     assert_int_equal(answer(&units[0], 17, "\x50", 1), 0x50 | 0x80);
@@ -317,7 +317,7 @@ static uint16_t give_diagnostics(void *context, const mbm_request *request, uint
     (void)request;
     (void)response;
     (void)capacity;
-    OK(mbm_server_serveDiagnostics((mbm_unit *)context, &late));
+    OK(mbm_unit_serveDiagnostics((mbm_unit *)context, &late));
     return 0;
 }
 
@@ -337,7 +337,7 @@ static void a_unit_whose_places_are_all_taken_knows_what_it_does_not_serve(void 
         all[i].code = (uint8_t)(66 + i);
     }
     for (i = 0; i < MBM_MAX_SERVICES - 1; i++)
-        OK(mbm_server_serveCustom(&full, &all[i]));
+        OK(mbm_unit_serveCustom(&full, &all[i]));
     /* The last place is taken by a hook, with what hears of every frame. */
     all[0].serve = give_diagnostics;
     all[0].context = &full;
@@ -347,7 +347,7 @@ static void a_unit_whose_places_are_all_taken_knows_what_it_does_not_serve(void 
     memset(&full, 0, sizeof full);
     full.id = 17;
     for (i = 0; i < MBM_MAX_SERVICES; i++)
-        OK(mbm_server_serveCustom(&full, &all[i]));
+        OK(mbm_unit_serveCustom(&full, &all[i]));
     assert_int_equal(answer(&full, 17, "\x51", 1), 0x51);
     assert_int_equal(answer(&full, 17, "\x03\0\0\0\1", 5), 0x83);
 }
@@ -355,20 +355,20 @@ static void a_unit_whose_places_are_all_taken_knows_what_it_does_not_serve(void 
 static void switches_are_set_up_again_like_any_record(void **state)
 {
     (void)state;
-    OK(mbm_server_switchOff(&units[0], &first.switches, 3));
+    OK(mbm_unit_switchFunction(&units[0], &first.switches, 3, 0));
     assert_int_equal(answered(&units[0], 2), 0x83);
     memset(&first.switches, 0, sizeof first.switches);
     all_are_answered(&units[0]);
-    OK(mbm_server_switchOff(&units[0], &first.switches, 4));
+    OK(mbm_unit_switchFunction(&units[0], &first.switches, 4, 0));
     assert_int_equal(answered(&units[0], 2), 3);
     assert_int_equal(answered(&units[0], 3), 0x84);
     /* Two units may share them. */
     OK(serve(&units[1], &first, 2));
-    OK(mbm_server_switchOff(&units[1], &first.switches, 3));
+    OK(mbm_unit_switchFunction(&units[1], &first.switches, 3, 0));
     assert_int_equal(answered(&units[0], 2), 0x83);
     assert_int_equal(answered(&units[1], 2), 0x83);
-    OK(mbm_server_switchOn(&first.switches, 3));
-    OK(mbm_server_switchOn(&first.switches, 4));
+    OK(mbm_unit_switchFunction(&units[0], &first.switches, 3, 1));
+    OK(mbm_unit_switchFunction(&units[0], &first.switches, 4, 1));
     all_are_answered(&units[0]);
 }
 
@@ -393,7 +393,7 @@ static uint8_t shrink_before(void *context, uint16_t address, uint16_t quantity,
     zero_before(context, address, quantity, data);
     hooked->words = fewer;
     hooked->size = 1;
-    OK(mbm_server_serveHoldingRegisters(&units[0], hooked));
+    OK(mbm_unit_serveHoldingRegisters(&units[0], hooked));
     return 0;
 }
 
@@ -410,7 +410,7 @@ static uint8_t become_bits(void *context, uint16_t address, uint16_t quantity, c
     zero_before(context, address, quantity, data);
     table->bits = bit;
     table->size = 8;
-    OK(mbm_server_serveCoils(&units[0], table));
+    OK(mbm_unit_serveCoils(&units[0], table));
     return 0;
 }
 
@@ -425,8 +425,8 @@ static unsigned written(void)
     frame[0] = 17;
     memcpy(frame + 1, pdu, sizeof pdu - 1);
     length = seal(frame, sizeof pdu);
-    OK(mbm_server_respond(MBM_FRAMING_RTU, units, 1, frame, (uint16_t)length, sizeof frame,
-                          &response));
+    OK(mbm_unit_respond(units, 1, FRAMING(MBM_FRAMING_RTU), frame, (uint16_t)length, sizeof frame,
+                        &response));
     return frame[1] & 0x80 ? frame[2] : 0;
 }
 
@@ -444,7 +444,7 @@ static void a_request_goes_on_with_the_table_that_its_hook_sets_up_anew(void **s
         table->words = words;
         table->size = 4;
         table->before = i == 0 ? zero_before : i == 1 ? shrink_before : become_bits;
-        OK(mbm_server_serveHoldingRegisters(units, table));
+        OK(mbm_unit_serveHoldingRegisters(units, table));
         words[3] = 0x7777;
         assert_int_equal(written(), 0);
         assert_int_equal(words[3], 4);
@@ -457,8 +457,8 @@ static void a_request_goes_on_with_the_table_that_its_hook_sets_up_anew(void **s
     table->words = words;
     table->size = 4;
     table->after = shrink_after;
-    OK(mbm_server_serveHoldingRegisters(units, table));
-    OK(mbm_server_serveMaskAndReadWrite(table));
+    OK(mbm_unit_serveHoldingRegisters(units, table));
+    OK(mbm_registerTable_serveMaskAndReadWrite(table));
     assert_int_equal(answer(units, 17, "\x17\0\0\0\4\0\0\0\1\2\0\1", 12), 0x17);
     free(table);
 }

@@ -9,7 +9,7 @@ static mbm_server server;
 static mbm_unit unit;
 static mbm_registerTable table;
 static mbm_custom custom;
-static mbm_switches switches;
+static mbm_functionMask switches;
 static mbm_diagnostics diagnostics;
 static uint16_t words[10];
 static uint8_t frame[MBM_MAX_ASCII_FRAME];
@@ -119,46 +119,46 @@ static void null_is_an_invalid_argument(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_server_poll(NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_server_setSilence(NULL, 1));
     assert_int_equal(mbm_server_pollDelay(NULL), 0xFFFFFFFFu);
-    IS(MBM_INVALID_ARGUMENT, mbm_server_begin(NULL, &port, &unit, 1, frame, 256));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_begin(&server, NULL, &unit, 1, frame, 256));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_begin(&server, &port, NULL, 1, frame, 256));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_begin(&server, &port, &unit, 1, NULL, 256));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_begin(&server, &deaf, &unit, 1, frame, 256));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_begin(&server, &port, &unit, 1, frame, 15));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(NULL, &port, &unit, 1, frame, 256));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(&server, NULL, &unit, 1, frame, 256));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(&server, &port, NULL, 1, frame, 256));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(&server, &port, &unit, 1, NULL, 256));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(&server, &deaf, &unit, 1, frame, 256));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(&server, &port, &unit, 1, frame, 15));
     IS(MBM_INVALID_ARGUMENT, mbm_server_beginAscii(&server, &port, &unit, 1, frame, 31));
     IS(MBM_INVALID_ARGUMENT, mbm_server_beginTcp(&server, &port, &unit, 1, frame, 259));
     IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtuOverTcp(&server, &port, NULL, 1, frame, 256));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveCoils(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveDiscreteInputs(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveHoldingRegisters(NULL, &table));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveInputRegisters(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveMaskAndReadWrite(NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveCallbacks(&unit, NULL, 3));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveFiles(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveFifos(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveExceptionStatus(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveServerId(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveIdentification(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveDiagnostics(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveDiagnostics(NULL, &diagnostics));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveCustom(&unit, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveCustom(&unit, &custom));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_switchOff(&unit, NULL, 3));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_switchOff(&unit, &switches, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_switchOff(&unit, &switches, 128));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_switchOn(NULL, 3));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_respond(4, &unit, 1, frame, 8, 256, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_respond(0, NULL, 1, frame, 8, 256, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_respond(0, &unit, 1, NULL, 8, 256, &length));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_respond(0, &unit, 1, frame, 8, 256, NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_respond(0, &unit, 1, frame, 9, 8, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveCoils(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveDiscreteInputs(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveHoldingRegisters(NULL, &table));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveInputRegisters(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_registerTable_serveMaskAndReadWrite(NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveCallbacks(&unit, NULL, 3));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveFiles(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveFifos(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveExceptionStatus(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveServerId(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveIdentification(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveDiagnostics(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveDiagnostics(NULL, &diagnostics));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveCustom(&unit, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveCustom(&unit, &custom));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_switchFunction(&unit, NULL, 3, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_switchFunction(&unit, &switches, 0, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_switchFunction(&unit, &switches, 128, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_switchFunction(NULL, &switches, 3, 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, FRAMING(4), frame, 8, 256, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(NULL, 1, FRAMING(0), frame, 8, 256, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, FRAMING(0), NULL, 8, 256, &length));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, FRAMING(0), frame, 8, 256, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, FRAMING(0), frame, 9, 8, &length));
 }
 
 static void what_a_unit_does_not_serve_is_exception_01(void **state)
 {
     (void)state;
-    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
-    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     assert_int_equal(ASK("\x04\0\0\0\1"), 5);
     assert_memory_equal(wire.sent, "\x11\x84\x01", 3);
 }
@@ -169,13 +169,13 @@ static void a_unit_without_services_is_none(void **state)
 
     (void)state;
     memset(places, 0, sizeof places);
-    OK(mbm_server_begin(&server, &port, places, 3, frame, sizeof frame));
+    OK(mbm_server_beginRtu(&server, &port, places, 3, frame, sizeof frame));
     assert_int_equal(ASK("\x03\0\0\0\1"), 0);
     places[1].id = 17;
     assert_int_equal(ASK("\x03\0\0\0\1"), 0);
     /* The next one answers. */
     places[2].id = 17;
-    OK(mbm_server_serveHoldingRegisters(&places[2], &table));
+    OK(mbm_unit_serveHoldingRegisters(&places[2], &table));
     assert_int_equal(ASK("\x03\0\0\0\1"), 7);
     assert_int_equal(BROADCAST("\x06\0\1\x56\x78"), 0);
     assert_int_equal(words[1], 0x5678);
@@ -202,7 +202,7 @@ static void a_poll_ends_though_a_peer_floods(void **state)
     flooded.read = flooded_read;
     flooded.context = request;
     OK(mbm_server_beginTcp(&server, &flooded, &unit, 1, frame, sizeof frame));
-    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     OK(mbm_server_poll(&server));
     assert_int_equal(wire.length, 0);
     request[6] = 17;
@@ -220,8 +220,8 @@ static void tables_without_storage_have_no_cells(void **state)
 {
     (void)state;
     table.words = NULL;
-    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
-    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     assert_int_equal(ASK("\x03\0\0\0\1"), 5);
     assert_memory_equal(wire.sent, "\x11\x83\x02", 3);
 }
@@ -231,11 +231,11 @@ static void serving_twice_is_serving_once(void **state)
     mbm_registerTable inputs = {.words = words, .size = 10};
 
     (void)state;
-    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
-    OK(mbm_server_serveHoldingRegisters(&unit, &table));
-    OK(mbm_server_serveInputRegisters(&unit, &inputs));
-    OK(mbm_server_serveHoldingRegisters(&unit, &table));
-    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+    OK(mbm_unit_serveInputRegisters(&unit, &inputs));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     assert_int_equal(ASK("\x04\0\0\0\1"), 7);
     assert_int_equal(ASK("\x05\0\0\0\0"), 5);
     assert_memory_equal(wire.sent, "\x11\x85\x01", 3);
@@ -244,23 +244,23 @@ static void serving_twice_is_serving_once(void **state)
 static void mask_and_read_write_want_holding_registers(void **state)
 {
     (void)state;
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveMaskAndReadWrite(&table));
-    OK(mbm_server_serveInputRegisters(&unit, &table));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveMaskAndReadWrite(&table));
+    IS(MBM_INVALID_ARGUMENT, mbm_registerTable_serveMaskAndReadWrite(&table));
+    OK(mbm_unit_serveInputRegisters(&unit, &table));
+    IS(MBM_INVALID_ARGUMENT, mbm_registerTable_serveMaskAndReadWrite(&table));
 }
 
 static void a_function_is_switched_off_and_on(void **state)
 {
     (void)state;
-    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
-    OK(mbm_server_switchOff(&unit, &switches, MBM_FC_WRITE_SINGLE_REGISTER));
-    OK(mbm_server_serveHoldingRegisters(&unit, &table));
-    OK(mbm_server_switchOff(&unit, &switches, MBM_FC_READ_FIFO_QUEUE));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_unit_switchFunction(&unit, &switches, MBM_FC_WRITE_SINGLE_REGISTER, 0));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+    OK(mbm_unit_switchFunction(&unit, &switches, MBM_FC_READ_FIFO_QUEUE, 0));
     assert_int_equal(ASK("\x06\0\0\1\2"), 5);
     assert_memory_equal(wire.sent, "\x11\x86\x01", 3);
     assert_int_equal(words[0], 0);
     assert_int_equal(ASK("\x03\0\0\0\1"), 7);
-    OK(mbm_server_switchOn(&switches, MBM_FC_WRITE_SINGLE_REGISTER));
+    OK(mbm_unit_switchFunction(&unit, &switches, MBM_FC_WRITE_SINGLE_REGISTER, 1));
     assert_int_equal(ASK("\x06\0\0\1\2"), 8);
     assert_int_equal(words[0], 0x0102);
 }
@@ -285,9 +285,9 @@ static void a_function_of_ours_says_what_is_answered(void **state)
     custom.serve = own;
     custom.context = &said;
     custom.code = 0x64;
-    OK(mbm_server_serveDiagnostics(&unit, &diagnostics));
-    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
-    OK(mbm_server_serveCustom(&unit, &custom));
+    OK(mbm_unit_serveDiagnostics(&unit, &diagnostics));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_unit_serveCustom(&unit, &custom));
     said = 2;
     assert_int_equal(ASK("\144abc"), 6); /* in octal, which ends after three digits */
     assert_memory_equal(wire.sent, "\x11\x64\x5A\x5A", 4);
@@ -327,9 +327,9 @@ static void a_function_of_code_0_is_every_other(void **state)
     (void)state;
     custom.serve = own;
     custom.context = &said;
-    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
-    OK(mbm_server_serveHoldingRegisters(&unit, &table));
-    OK(mbm_server_serveCustom(&unit, &custom));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+    OK(mbm_unit_serveCustom(&unit, &custom));
     said = 0;
     calls = 0;
     assert_int_equal(ASK("\x03\0\0\0\1"), 7);
@@ -351,7 +351,7 @@ static uint16_t count_reads(void *context, uint16_t address)
 /* Serial line guide V1.02, 2.1. */
 static void a_broadcast_of_what_does_not_only_write_is_not_carried_out(void **state)
 {
-    static mbm_cells cells;
+    static mbm_dataCallbacks cells;
 
     (void)state;
     memset(&cells, 0, sizeof cells);
@@ -360,12 +360,12 @@ static void a_broadcast_of_what_does_not_only_write_is_not_carried_out(void **st
     custom.context = &said;
     said = 0;
     calls = reads = 0;
-    OK(mbm_server_serveDiagnostics(&unit, &diagnostics));
-    OK(mbm_server_serveHoldingRegisters(&unit, &table));
-    OK(mbm_server_serveMaskAndReadWrite(&table));
-    OK(mbm_server_serveCallbacks(&unit, &cells, 4));
-    OK(mbm_server_serveCustom(&unit, &custom));
-    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_unit_serveDiagnostics(&unit, &diagnostics));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+    OK(mbm_registerTable_serveMaskAndReadWrite(&table));
+    OK(mbm_unit_serveCallbacks(&unit, &cells, 4));
+    OK(mbm_unit_serveCustom(&unit, &custom));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     diagnostics.diagnosticRegister = 7;
     assert_int_equal(BROADCAST("\x17\0\0\0\1\0\0\0\1\2\x12\x34"), 0);
     assert_int_equal(BROADCAST("\x08\0\x0A\0\0"), 0);
@@ -389,8 +389,8 @@ static void a_broadcast_of_what_does_not_only_write_is_not_carried_out(void **st
 static void a_response_that_the_port_takes_in_pieces_arrives_whole(void **state)
 {
     (void)state;
-    OK(mbm_server_serveHoldingRegisters(&unit, &table));
-    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     for (wire.piece = 1; wire.piece < 9; wire.piece++) {
         wire.drains = wire.piece % 3;
         assert_int_equal(ASK("\x03\0\0\0\1"), 7);
@@ -411,13 +411,13 @@ static void the_length_of_ours_frames_rtu_over_tcp(void **state)
     custom.context = &said;
     custom.code = 0x64;
     custom.length = (mbm_rule){MBM_RULE_FIXED, 0, 0};
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveCustom(&unit, &custom));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveCustom(&unit, &custom));
     said = 1;
     for (i = 0; i < COUNT(rules); i++) {
         unsigned k;
 
         custom.length = rules[i];
-        OK(mbm_server_serveCustom(&unit, &custom));
+        OK(mbm_unit_serveCustom(&unit, &custom));
         OK(mbm_server_beginRtuOverTcp(&server, &port, &unit, 1, frame, sizeof frame));
         wire.first = wire.last = wire.length = 0;
         /* Two in one lump; without a rule they must come one by one. */
@@ -448,8 +448,8 @@ static void a_restart_is_told(void **state)
     diagnostics.restart = restart;
     diagnostics.context = &diagnostics;
     diagnostics.diagnosticRegister = 0xABCD;
-    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
-    OK(mbm_server_serveDiagnostics(&unit, &diagnostics));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_unit_serveDiagnostics(&unit, &diagnostics));
     assert_int_equal(ASK("\x08\0\2\0\0"), 8);
     assert_memory_equal(wire.sent, "\x11\x08\0\2\xAB\xCD", 6);
     assert_int_equal(ASK("\x08\0\1\0\0"), 8);
@@ -461,7 +461,7 @@ static void a_restart_is_told(void **state)
 static void a_lost_link_is_told_and_the_delay_is_that_of_the_line(void **state)
 {
     (void)state;
-    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     OK(mbm_server_setSilence(&server, 5000));
     assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFFu);
     wire.arriving[0] = 17;

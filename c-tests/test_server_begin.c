@@ -29,7 +29,7 @@ static int reset(void **state)
     unit.id = 17;
     table.words = words;
     table.size = 10;
-    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     return 0;
 }
 
@@ -54,13 +54,13 @@ static void calls_within_the_driver_hook(int hook)
 {
     if (hook == HOOK_POST) {
         IS(MBM_BUSY, mbm_server_poll(&server));
-        IS(MBM_BUSY, mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+        IS(MBM_BUSY, mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     }
 }
 
 static void a_begin_while_a_response_leaves_switches_the_driver_off(void **state)
 {
-    static const begin begins[] = {mbm_server_begin, mbm_server_beginAscii, mbm_server_beginTcp,
+    static const begin begins[] = {mbm_server_beginRtu, mbm_server_beginAscii, mbm_server_beginTcp,
                                    mbm_server_beginRtuOverTcp};
     mbm_port stuck = port, other = port;
     unsigned i;
@@ -71,7 +71,7 @@ static void a_begin_while_a_response_leaves_switches_the_driver_off(void **state
     wire.within = calls_within_the_driver_hook;
     for (i = 0; i < COUNT(begins); i++) {
         memset(wire.called, 0, sizeof wire.called);
-        OK(mbm_server_begin(&server, &stuck, &unit, 1, frame, sizeof frame));
+        OK(mbm_server_beginRtu(&server, &stuck, &unit, 1, frame, sizeof frame));
         hooked_port_arrive_rtu(&wire, 17, "\x03\0\0\0\1", 5);
         assert_int_equal(answer(), 7);
         assert_int_equal(wire.called[HOOK_PRE], 1);
@@ -83,7 +83,7 @@ static void a_begin_while_a_response_leaves_switches_the_driver_off(void **state
         OK(begins[i](&server, &port, &unit, 1, frame, sizeof frame));
         assert_int_equal(wire.called[HOOK_POST], 1);
     }
-    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     hooked_port_arrive_rtu(&wire, 17, "\x03\0\0\0\1", 5);
     assert_int_equal(answer(), 7);
 }
@@ -94,7 +94,7 @@ static void a_baud_rate_is_refused_where_no_rtu_line_is_served(void **state)
     unsigned i;
 
     (void)state;
-    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     OK(mbm_server_setBaudRate(&server, 115200));
     OK(mbm_server_setEchoDiscard(&server, 1));
     OK(mbm_server_setBaudRate(&server, 9600));
@@ -129,7 +129,7 @@ static int16_t noisy_read(void *context, uint8_t *bytes, uint16_t capacity)
 
 static void a_poll_takes_no_more_than_some_hundred_bytes_of_noise(void **state)
 {
-    static const begin begins[] = {mbm_server_begin, mbm_server_beginAscii,
+    static const begin begins[] = {mbm_server_beginRtu, mbm_server_beginAscii,
                                    mbm_server_beginRtuOverTcp};
     mbm_port noisy = port;
     unsigned i, polls;
@@ -152,7 +152,7 @@ static void a_frame_that_fills_the_buffer_behind_noise_is_answered(void **state)
     unsigned noise;
 
     (void)state;
-    OK(mbm_server_begin(&server, &port, &unit, 1, frame, 16));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, 16));
     for (noise = 0; noise < 100; noise++) {
         memset(bytes, 0x5A, noise);
         memcpy(bytes + noise, "\x11\x10\0\0\0\2\4\1\2\3\4", 11);

@@ -60,7 +60,7 @@ static void add(unsigned which, uint8_t code)
     ours[which].serve = serve;
     ours[which].context = &ours[which];
     ours[which].code = code;
-    OK(mbm_server_serveCustom(&unit, &ours[which]));
+    OK(mbm_unit_serveCustom(&unit, &ours[which]));
 }
 
 static int reset(void **state)
@@ -107,7 +107,7 @@ static void a_function_of_ours_is_found_wherever_it_stands(void **state)
             reset(state);
             for (i = 0; i < count; i++) {
                 if (i == at)
-                    OK(mbm_server_serveHoldingRegisters(&unit, &table));
+                    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
                 add(i, (uint8_t)(FIRST_CODE + i));
             }
             for (i = 0; i < count; i++)

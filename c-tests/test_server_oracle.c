@@ -241,15 +241,15 @@ static int prepare(void **state)
     holding.base = inputs.base = coils.base = discrete.base = BASE;
     holding.size = inputs.size = coils.size = discrete.size = CELLS;
     holding.valid = inputs.valid = coils.valid = discrete.valid = valid;
-    return mbm_server_serveHoldingRegisters(&unit, &holding) |
-           mbm_server_serveInputRegisters(&unit, &inputs) | mbm_server_serveCoils(&unit, &coils) |
-           mbm_server_serveDiscreteInputs(&unit, &discrete) |
-           mbm_server_serveMaskAndReadWrite(&holding);
+    return mbm_unit_serveHoldingRegisters(&unit, &holding) |
+           mbm_unit_serveInputRegisters(&unit, &inputs) | mbm_unit_serveCoils(&unit, &coils) |
+           mbm_unit_serveDiscreteInputs(&unit, &discrete) |
+           mbm_registerTable_serveMaskAndReadWrite(&holding);
 }
 
 /* The same memory behind functions, cell by cell. */
 static mbm_unit called;
-static mbm_cells callbacks[4];
+static mbm_dataCallbacks callbacks[4];
 
 static uint8_t is_valid(void *context, uint16_t address)
 {
@@ -262,7 +262,7 @@ static uint16_t get(void *context, uint16_t address)
     unsigned i = (unsigned)address - BASE;
 
     assert_true(there(address, 1));
-    switch ((int)((mbm_cells *)context - callbacks) + 1) {
+    switch ((int)((mbm_dataCallbacks *)context - callbacks) + 1) {
     case 1: return memory.coils[i / 8] >> i % 8 & 1;
     case 2: return memory.discrete[i / 8] >> i % 8 & 1 ? 0x100 : 0;
     case 3: return memory.holding[i];
@@ -296,12 +296,12 @@ static int prepare_callbacks(void **state)
         callbacks[i].context = &callbacks[i];
         if (i % 2 == 0) {
             IS(MBM_INVALID_ARGUMENT,
-               mbm_server_serveCallbacks(&called, &callbacks[i], (uint8_t)(i + 1)));
+               mbm_unit_serveCallbacks(&called, &callbacks[i], (uint8_t)(i + 1)));
             callbacks[i].set = set;
         }
-        status |= mbm_server_serveCallbacks(&called, &callbacks[i], (uint8_t)(i + 1));
+        status |= mbm_unit_serveCallbacks(&called, &callbacks[i], (uint8_t)(i + 1));
     }
-    IS(MBM_INVALID_ARGUMENT, mbm_server_serveCallbacks(&called, &callbacks[0], 5));
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_serveCallbacks(&called, &callbacks[0], 5));
     return status;
 }
 
@@ -333,8 +333,8 @@ static void ask(mbm_unit *asked)
         seal(frame, length + 1);
         if (damaged)
             frame[below((unsigned)length + 3)] ^= (uint8_t)(1u << below(8));
-        OK(mbm_server_respond(MBM_FRAMING_RTU, asked, 1, frame, (uint16_t)(length + 3),
-                              sizeof frame, &answered));
+        OK(mbm_unit_respond(asked, 1, FRAMING(MBM_FRAMING_RTU), frame, (uint16_t)(length + 3),
+                            sizeof frame, &answered));
         if (damaged) {
             assert_int_equal(answered, 0);
         } else {

@@ -254,7 +254,7 @@ static void flood(begin_function *how, unsigned size)
 
 static void a_frame_of_each_framing_stays_in_a_buffer_of_any_size(void **state)
 {
-    static begin_function *const all[] = {mbm_server_begin, mbm_server_beginAscii,
+    static begin_function *const all[] = {mbm_server_beginRtu, mbm_server_beginAscii,
                                           mbm_server_beginTcp, mbm_server_beginRtuOverTcp};
     static const unsigned least[] = {16, 32, 260, 16};
     unsigned how, size;
@@ -278,7 +278,7 @@ static void noise_of_any_length_stays_in_the_buffer(void **state)
 
     (void)state;
     for (size = 16; size <= 300; size += size < 24 ? 1 : 92)
-        flood(mbm_server_begin, size);
+        flood(mbm_server_beginRtu, size);
     flood(mbm_server_beginRtuOverTcp, 16);
     flood(mbm_server_beginRtuOverTcp, 41);
     flood(mbm_server_beginAscii, 32);
@@ -298,13 +298,13 @@ static void a_port_that_lies_stays_in_the_buffer(void **state)
 
     (void)state;
     for (size = 16; size < 40; size++) {
-        assert_true(begin(mbm_server_begin, size));
+        assert_true(begin(mbm_server_beginRtu, size));
         line.lies = 1;
         noise(3 * size, size);
         run();
         line.lies = 0;
-        assert_true(begin(mbm_server_begin, size));
-        put(frame, framed(frame, mbm_server_begin, read, sizeof read));
+        assert_true(begin(mbm_server_beginRtu, size));
+        put(frame, framed(frame, mbm_server_beginRtu, read, sizeof read));
         for (turn = 0; turn < 40 && line.next < line.length; turn++)
             (void)mbm_server_poll(&server);
         line.lies = 1;
@@ -320,11 +320,11 @@ static void an_echo_of_any_length_stays_in_the_buffer(void **state)
     unsigned size, length, pieces, more;
 
     (void)state;
-    length = framed(frame, mbm_server_begin, read, sizeof read);
+    length = framed(frame, mbm_server_beginRtu, read, sizeof read);
     for (size = 16; size < 24; size++) {
         for (pieces = 1; pieces < 12; pieces++) {
             for (more = 0; more < 3 * size; more += 5) {
-                assert_true(begin(mbm_server_begin, size));
+                assert_true(begin(mbm_server_beginRtu, size));
                 assert_int_equal(mbm_server_setEchoDiscard(&server, 1), MBM_OK);
                 put(frame, length);
                 run();
@@ -347,8 +347,8 @@ static int prepare(void **state)
     coils.size = 2000;
     custom.serve = fill;
     custom.code = ECHO_CODE;
-    return mbm_server_serveHoldingRegisters(&unit, &holding) ||
-           mbm_server_serveCoils(&unit, &coils) || mbm_server_serveCustom(&unit, &custom);
+    return mbm_unit_serveHoldingRegisters(&unit, &holding) || mbm_unit_serveCoils(&unit, &coils) ||
+           mbm_unit_serveCustom(&unit, &custom);
 }
 
 static int finish(void **state)

@@ -11,13 +11,14 @@ static uint32_t now;
 
 static const uint8_t request[] = {3, 0, 107, 0, 3}, reply[] = {3, 6, 2, 0x2B, 0, 0, 0, 100};
 
-static void begin(uint8_t kind)
+static void begin(uint8_t framing)
 {
-    mbm_framing framing = {0};
+    uint8_t (*const begin[])(mbm_sniffer *, uint8_t *,
+                             uint16_t) = {mbm_sniffer_beginRtu, mbm_sniffer_beginAscii,
+                                          mbm_sniffer_beginTcp, mbm_sniffer_beginRtuOverTcp};
 
-    framing.kind = kind;
     now = 0;
-    OK(mbm_sniffer_begin(&sniffer, &framing, buffer, sizeof buffer));
+    OK(begin[framing](&sniffer, buffer, sizeof buffer));
 }
 
 /* Writes the frame of a PDU of unit 17. */
@@ -29,7 +30,7 @@ static uint16_t frame_of(uint8_t kind, const uint8_t *pdu, uint16_t length, uint
     uint16_t size = 0;
 
     framing.kind = kind;
-    OK(mbm_packet_parse(side, pdu, length, NULL, 0, &packet));
+    OK(mbm_frame_parse(PDU(NULL, 0), side, (uint8_t *)pdu, length, &packet));
     packet.unit = 17;
     packet.transaction = 7;
     OK(mbm_frame_build(&framing, &packet, frame, MBM_MAX_ASCII_FRAME, &size));
@@ -38,7 +39,7 @@ static uint16_t frame_of(uint8_t kind, const uint8_t *pdu, uint16_t length, uint
 
 static void hear(const uint8_t *bytes, uint16_t length)
 {
-    assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, bytes, length, now), length);
+    assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, bytes, length, now), length);
 }
 
 /* Asserts what happened next, in words. */
@@ -85,16 +86,16 @@ static void a_request_and_its_reply_are_told_with_values_in_each_framing(void **
         assert_int_equal(event.status, MBM_OK);
         assert_int_equal(event.unit, 17);
         assert_int_equal(event.function, 3);
-        assert_int_equal(event.time, 12345);
-        assert_int_equal(event.responseTime, 12345);
+        assert_int_equal(event.timeUs, 12345);
+        assert_int_equal(event.responseTimeUs, 12345);
         assert_int_equal(event.address, 107);
         assert_int_equal(event.quantity, 3);
         assert_int_equal(event.packet.kind, MBM_PACKET_RESPONSE);
         assert_int_equal(event.packet.transaction, kind == MBM_FRAMING_TCP ? 7 : 0);
         assert_int_equal(event.packet.dataLength, 6);
         assert_memory_equal(event.packet.data, reply + 2, 6);
-        assert_memory_equal(event.asked, request, sizeof request);
-        assert_int_equal(event.askedLength, sizeof request);
+        assert_memory_equal(event.requestHead, request, sizeof request);
+        assert_int_equal(event.requestHeadLength, sizeof request);
         assert_nothing();
     }
 }
@@ -119,11 +120,11 @@ static void every_example_is_found_as_a_frame(void **state)
             packet.unit = 17;
             OK(mbm_frame_build(&framing, &packet, frame, sizeof frame, &size));
             /* Only the direction tells an unasked reply from a request. */
-            assert_int_equal(
-                mbm_sniffer_feed(&sniffer,
-                                 side == MBM_PACKET_REQUEST ? MBM_TAP_CLIENT : MBM_TAP_SERVER,
-                                 frame, size, now),
-                size);
+            assert_int_equal(mbm_sniffer_feed(&sniffer,
+                                              side == MBM_PACKET_REQUEST ? MBM_DIRECTION_CLIENT
+                                                                         : MBM_DIRECTION_SERVER,
+                                              frame, size, now),
+                             size);
             now += 10000;
             assert_int_equal(mbm_sniffer_next(&sniffer, now, &event), 1);
             assert_int_equal(event.kind,
@@ -142,8 +143,8 @@ static void timeouts_damage_and_noise_are_told(void **state)
     (void)state;
     begin(MBM_FRAMING_RTU);
     OK(mbm_sniffer_setBaudRate(&sniffer, 19200));
-    OK(mbm_sniffer_setTimeout(&sniffer, 200));
-    OK(mbm_sniffer_setPatience(&sniffer, 20));
+    OK(mbm_sniffer_setResponseTimeout(&sniffer, 200));
+    OK(mbm_sniffer_setFrameTimeout(&sniffer, 20));
     hear(frame, length);
     now += 199999;
     assert_next("unit 17  request    03 read holding registers  107..109");
@@ -165,7 +166,6 @@ static void timeouts_damage_and_noise_are_told(void **state)
 static void more_than_the_buffer_holds_is_fed_in_parts(void **state)
 {
     static uint8_t traffic[6000];
-    mbm_framing framing = {0};
     uint8_t small[MBM_MAX_FRAME], frame[MBM_MAX_ASCII_FRAME];
     uint16_t length = 0, fed = 0, size;
     unsigned requests = 0, replies = 0;
@@ -180,10 +180,10 @@ static void more_than_the_buffer_holds_is_fed_in_parts(void **state)
         memcpy(traffic + length, frame, size);
         length = (uint16_t)(length + size);
     }
-    OK(mbm_sniffer_begin(&sniffer, &framing, small, sizeof small));
+    OK(mbm_sniffer_beginRtu(&sniffer, small, sizeof small));
     while (fed < length) {
-        uint16_t taken =
-            mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, traffic + fed, (uint16_t)(length - fed), 0);
+        uint16_t taken = mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, traffic + fed,
+                                          (uint16_t)(length - fed), 0);
 
         assert_true(taken > 0);
         fed = (uint16_t)(fed + taken);
@@ -209,7 +209,8 @@ static void functions_of_your_own_are_taken(void **state)
     (void)state;
     framing.functions = own;
     framing.functionCount = 1;
-    OK(mbm_sniffer_begin(&sniffer, &framing, buffer, sizeof buffer));
+    OK(mbm_sniffer_beginRtu(&sniffer, buffer, sizeof buffer));
+    OK(mbm_sniffer_setFunctions(&sniffer, own, 1));
     packet.unit = 17;
     packet.function = 0x55;
     packet.data = (const uint8_t *)"\x01\x02";
@@ -220,40 +221,57 @@ static void functions_of_your_own_are_taken(void **state)
     assert_next("unit 17  request    55 unknown function: 01 02");
     for (i = 0; i < COUNT(many); i++)
         many[i] = own[0];
-    framing.functions = many;
-    framing.functionCount = COUNT(many);
-    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(&sniffer, &framing, buffer, sizeof buffer));
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setFunctions(&sniffer, many, COUNT(many)));
     many[0].code = 0;
-    framing.functionCount = 1;
-    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(&sniffer, &framing, buffer, sizeof buffer));
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setFunctions(&sniffer, many, 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setFunctions(&sniffer, NULL, 1));
+    /* What is refused leaves the functions as they were. */
+    hear(frame, size);
+    assert_next("unit 17  reply      55 unknown function: 01 02");
+    OK(mbm_sniffer_setFunctions(&sniffer, NULL, 0));
+}
+
+static void another_delimiter_ends_ascii_frames(void **state)
+{
+    mbm_framing framing = {.kind = MBM_FRAMING_ASCII, .delimiter = '!'};
+    mbm_packet packet = {.unit = 17, .function = 7};
+    uint8_t frame[MBM_MAX_ASCII_FRAME];
+    uint16_t size;
+
+    (void)state;
+    OK(mbm_frame_build(&framing, &packet, frame, sizeof frame, &size));
+    assert_int_equal(frame[size - 1], '!');
+    begin(MBM_FRAMING_ASCII);
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setDelimiter(&sniffer, ':'));
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setDelimiter(&sniffer, 0));
+    OK(mbm_sniffer_setDelimiter(&sniffer, '!'));
+    hear(frame, size);
+    assert_next("unit 17  request    07 read exception status");
 }
 
 static void a_sniffer_never_begun_or_of_no_use_is_refused(void **state)
 {
     static mbm_sniffer zeroed;
-    mbm_framing framing = {0};
     mbm_event event;
 
     (void)state;
-    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(NULL, &framing, buffer, sizeof buffer));
-    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(&zeroed, NULL, buffer, sizeof buffer));
-    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(&zeroed, &framing, NULL, 64));
-    IS(MBM_BUFFER_TOO_SMALL,
-       mbm_sniffer_begin(&zeroed, &framing, buffer, MBM_MIN_SNIFFER_BUFFER - 1));
-    framing.kind = 4;
-    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_begin(&zeroed, &framing, buffer, sizeof buffer));
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_beginRtu(NULL, buffer, sizeof buffer));
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_beginAscii(&zeroed, NULL, 64));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_sniffer_beginTcp(&zeroed, buffer, MBM_MIN_SNIFFER_BUFFER - 1));
+    IS(MBM_NOT_INITIALISED, mbm_sniffer_setFunctions(&zeroed, NULL, 0));
+    IS(MBM_NOT_INITIALISED, mbm_sniffer_setDelimiter(&zeroed, '!'));
     IS(MBM_NOT_INITIALISED, mbm_sniffer_setBaudRate(&zeroed, 9600));
-    IS(MBM_NOT_INITIALISED, mbm_sniffer_setTimeout(&zeroed, 1));
-    IS(MBM_NOT_INITIALISED, mbm_sniffer_setPatience(&zeroed, 1));
+    IS(MBM_NOT_INITIALISED, mbm_sniffer_setResponseTimeout(&zeroed, 1));
+    IS(MBM_NOT_INITIALISED, mbm_sniffer_setFrameTimeout(&zeroed, 1));
     IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setBaudRate(NULL, 9600));
-    assert_int_equal(mbm_sniffer_feed(&zeroed, MBM_TAP_BOTH, request, 1, 0), 0);
-    assert_int_equal(mbm_sniffer_feed(NULL, MBM_TAP_BOTH, request, 1, 0), 0);
+    assert_int_equal(mbm_sniffer_feed(&zeroed, MBM_DIRECTION_BOTH, request, 1, 0), 0);
+    assert_int_equal(mbm_sniffer_feed(NULL, MBM_DIRECTION_BOTH, request, 1, 0), 0);
     assert_int_equal(mbm_sniffer_next(&zeroed, 0, &event), 0);
     begin(MBM_FRAMING_RTU);
-    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setTimeout(&sniffer, 0));
-    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setPatience(&sniffer, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setResponseTimeout(&sniffer, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setFrameTimeout(&sniffer, 0));
     assert_int_equal(mbm_sniffer_feed(&sniffer, 3, request, 1, 0), 0);
-    assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, NULL, 1, 0), 0);
+    assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, NULL, 1, 0), 0);
     assert_int_equal(mbm_sniffer_next(&sniffer, 0, NULL), 0);
 }
 
@@ -316,7 +334,7 @@ static void a_text_that_does_not_fit_is_cut_and_ends_all_the_same(void **state)
     event.kind = 7;
     IS(MBM_INVALID_ARGUMENT, mbm_event_text(&event, text, 57));
     event.kind = MBM_EVENT_TIMEOUT;
-    event.askedLength = 200;
+    event.requestHeadLength = 200;
     OK(mbm_event_text(&event, text, 57));
 }
 
@@ -328,6 +346,7 @@ int main(void)
         cmocka_unit_test(timeouts_damage_and_noise_are_told),
         cmocka_unit_test(more_than_the_buffer_holds_is_fed_in_parts),
         cmocka_unit_test(functions_of_your_own_are_taken),
+        cmocka_unit_test(another_delimiter_ends_ascii_frames),
         cmocka_unit_test(a_sniffer_never_begun_or_of_no_use_is_refused),
         cmocka_unit_test(a_frame_is_explained_in_each_framing_and_refused_in_words),
         cmocka_unit_test(a_text_that_does_not_fit_is_cut_and_ends_all_the_same),

@@ -92,19 +92,19 @@ static void *forward(void *context)
     }
 }
 
-static void listen_between(int client, int far_end, uint8_t framing_kind, uint8_t apart)
+static void listen_between(int client, int far_end, uint8_t framing, uint8_t apart)
 {
-    mbm_framing framing = {0};
-
     memset(&line, 0, sizeof line);
-    framing.kind = framing_kind;
-    OK(mbm_sniffer_begin(&line.sniffer, &framing, line.buffer, sizeof line.buffer));
-    OK(mbm_sniffer_setTimeout(&line.sniffer, PATIENCE_MS));
+    if (framing == MBM_FRAMING_TCP)
+        OK(mbm_sniffer_beginTcp(&line.sniffer, line.buffer, sizeof line.buffer));
+    else
+        OK(mbm_sniffer_beginRtu(&line.sniffer, line.buffer, sizeof line.buffer));
+    OK(mbm_sniffer_setResponseTimeout(&line.sniffer, PATIENCE_MS));
     line.begun = micros();
     line.client = client;
     line.server = far_end;
-    line.from_client = apart ? MBM_TAP_CLIENT : MBM_TAP_BOTH;
-    line.from_server = apart ? MBM_TAP_SERVER : MBM_TAP_BOTH;
+    line.from_client = apart ? MBM_DIRECTION_CLIENT : MBM_DIRECTION_BOTH;
+    line.from_server = apart ? MBM_DIRECTION_SERVER : MBM_DIRECTION_BOTH;
     assert_int_equal(pipe(line.stop), 0);
     assert_int_equal(pthread_create(&line.thread, NULL, forward, NULL), 0);
 }
@@ -156,7 +156,7 @@ static void assert_told(const modbus_mapping_t *mapping)
 
         if (t[i].event.kind != kind || t[i].event.function != functions[i / 2])
             fail_msg("event %u: %s", i, t[i].text);
-        assert_true(t[i].event.kind == MBM_EVENT_REQUEST || t[i].event.responseTime < took);
+        assert_true(t[i].event.kind == MBM_EVENT_REQUEST || t[i].event.responseTimeUs < took);
     }
     assert_int_equal(line.count, 2 * CALLS);
     for (i = 0; i < 19; i++)

@@ -436,7 +436,7 @@ static void a_master_reads_rtu_through_a_stream(void **state)
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
     port = mbm_tcp_port(&tcp);
     OK(mbm_master_setBuffers(&node, response, 100, NULL, 0, frame, sizeof frame));
-    OK(mbm_master_begin(&node, MODEL_FIRST_UNIT, &port));
+    OK(mbm_master_beginRtu(&node, MODEL_FIRST_UNIT, &port));
     OK(mbm_master_setGap(&node, 0));
     OK(mbm_master_setResponseTimeout(&node, PATIENCE_MS));
     for (i = 1; i <= 100; i++) {

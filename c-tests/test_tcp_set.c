@@ -381,7 +381,7 @@ static void a_connection_that_is_closed_as_idle_is_ready(void **state)
 {
     (void)state;
     begin_to_listen();
-    listener.idleTime = MINUTE_MS;
+    listener.idleTimeMs = MINUTE_MS;
     take_all_places();
     ahead = 61;
     tell(0, "x");
@@ -409,7 +409,7 @@ static void of_connections_that_are_idle_as_long_the_first_is_closed(void **stat
 {
     (void)state;
     begin_to_listen();
-    listener.idleTime = MINUTE_MS;
+    listener.idleTimeMs = MINUTE_MS;
     stopped.tv_sec = 1000;
     take_all_places();
     stopped.tv_sec += 61;

@@ -212,7 +212,7 @@ static void an_idle_connection_gives_its_descriptor_to_a_new_one(void **state)
 {
     (void)state;
     SKIP_WITHOUT_LIMITS();
-    listener.idleTime = MINUTE_MS;
+    listener.idleTimeMs = MINUTE_MS;
     connect_some(2);
     assert_int_equal(take(), 0);
     assert_int_equal(take(), 1);
@@ -231,7 +231,7 @@ static void without_a_descriptor_nothing_is_closed_while_no_connection_waits(voi
 {
     (void)state;
     SKIP_WITHOUT_LIMITS();
-    listener.idleTime = MINUTE_MS;
+    listener.idleTimeMs = MINUTE_MS;
     connect_some(1);
     assert_int_equal(take(), 0);
     leave_no_descriptor();
@@ -257,7 +257,7 @@ static void where_the_system_refuses_to_poll_the_wait_sleeps_and_looks(void **st
 static void the_oldest_idle_connection_gives_its_place_to_a_new_one(void **state)
 {
     (void)state;
-    listener.idleTime = MINUTE_MS;
+    listener.idleTimeMs = MINUTE_MS;
     fill();
     ahead = 30;
     ask(1);
@@ -288,7 +288,7 @@ static void an_idle_connection_stays_while_no_other_wants_its_place(void **state
     unsigned i;
 
     (void)state;
-    listener.idleTime = MINUTE_MS;
+    listener.idleTimeMs = MINUTE_MS;
     fill();
     ahead = 3600;
     expect_none(EAGAIN);
@@ -320,7 +320,7 @@ static void connections_that_are_not_idle_keep_their_places(void **state)
     ahead = 3600;
     /* Nothing was said of an idle time. */
     expect_turned_away(1);
-    listener.idleTime = MINUTE_MS;
+    listener.idleTimeMs = MINUTE_MS;
     for (i = 0; i < PLACES; i++) {
         places[i].isBusy = i != 0;
         if (i == 0)

@@ -58,7 +58,7 @@ static int end(void **state)
 static void begin_node(node *n, uint8_t unit, const mbm_port *port)
 {
     OK(mbm_master_setBuffers(&n->master, n->words, 2, n->words, 2, n->frame, sizeof n->frame));
-    OK(mbm_master_begin(&n->master, unit, port));
+    OK(mbm_master_beginRtu(&n->master, unit, port));
     OK(mbm_master_setResponseTimeout(&n->master, TIMEOUT_MS));
     OK(mbm_master_setQuietTime(&n->master, 0));
 }

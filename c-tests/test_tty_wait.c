@@ -102,8 +102,8 @@ static void a_server_with_a_pending_function_sleeps_between_polls(void **state)
     custom.serve = pending;
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
     port = mbm_tty_port(&tty);
-    OK(mbm_server_serveCustom(&unit, &custom));
-    OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_unit_serveCustom(&unit, &custom));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     assert_int_equal(write(line.ours, request, sizeof request), sizeof request);
     AWAIT((OK(mbm_server_poll(&server)), mbm_server_pollDelay(&server) == 1000));
     assert_int_equal(write(line.ours, request, sizeof request), sizeof request);

@@ -14,7 +14,7 @@ static void begin_other(sim *s, other *o)
 {
     memset(o, 0, sizeof *o);
     OK(mbm_master_setBuffers(&o->master, o->words, 4, NULL, 0, s->buffer, sizeof s->buffer));
-    OK(mbm_master_begin(&o->master, 3, &s->port));
+    OK(mbm_master_beginRtu(&o->master, 3, &s->port));
 }
 
 static void other_reads(sim *s, other *o, mbm_turn *turn)
@@ -86,7 +86,7 @@ static void the_turn_is_refused_within_a_hook_of_the_object_that_has_it(void **s
     begin_other(s, &within);
     driver_on = s->port.preTransmission;
     s->port.preTransmission = try_a_turn;
-    OK(mbm_master_begin(n, 17, &s->port));
+    OK(mbm_master_beginRtu(n, 17, &s->port));
     OK(mbm_master_takeTurn(n, &shared));
     sim_answer(s, 1, 500, "11 03 02 00 2A +");
     OK(mbm_master_readHoldingRegisters(n, 0, 1));
@@ -147,17 +147,17 @@ static void one_port_serves_objects_with_contexts_of_their_own(void **state)
     shared_port = s->port;
     shared_port.context = NULL;
     begin_other(&second, &o);
-    OK(mbm_master_beginWith(n, 17, &shared_port, s));
-    OK(mbm_master_beginWith(&o.master, 3, &shared_port, &second));
+    OK(mbm_master_beginRtuWith(n, 17, &shared_port, s));
+    OK(mbm_master_beginRtuWith(&o.master, 3, &shared_port, &second));
     sim_reads(s, 500);
     sim_answer(&second, 1, 500, "03 04 02 00 07 +");
     OK(mbm_master_readInputRegisters(&o.master, 0, 1));
     assert_int_equal(s->sent, 1);
     assert_int_equal(second.sent, 1);
     sim_assert_sent(&second, 0, "03 04 00 00 00 01 +");
-    IS(MBM_INVALID_ARGUMENT, mbm_master_beginWith(n, 17, NULL, s));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtuWith(n, 17, NULL, s));
     shared_port.read = NULL;
-    IS(MBM_INVALID_ARGUMENT, mbm_master_beginWith(&o.master, 17, &shared_port, s));
+    IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtuWith(&o.master, 17, &shared_port, s));
 }
 
 int main(void)

@@ -373,7 +373,7 @@ private:
     {
         static const mbm_port hooks = {nullptr,   readHook, writeHook, clockHook,
                                        flushHook, preHook,  postHook,  idleHook};
-        return mbm_master_beginWith(&state.master, slave, &hooks, &state);
+        return mbm_master_beginRtuWith(&state.master, slave, &hooks, &state);
     }
 
     // After a copy: our own buffers and our own context, no request under way.

@@ -56,7 +56,7 @@ public:
     /** An integer in the response: a word, -32768 to 32767. */
     bool getResponseInt16(uint8_t index, int16_t &value, WordOrder order = orderDefault) const
     {
-        return get(mbm_registers_getInt16, index, value, order);
+        return getSigned(mbm_registers_getUint16, index, value, order);
     }
     /** As above; 0 past the end of the buffer. */
     int16_t getResponseInt16(uint8_t index, WordOrder order = orderDefault) const
@@ -82,7 +82,7 @@ public:
     /** An integer in the response: two words, two's complement. */
     bool getResponseInt32(uint8_t index, int32_t &value, WordOrder order = orderDefault) const
     {
-        return get(mbm_registers_getInt32, index, value, order);
+        return getSigned(mbm_registers_getUint32, index, value, order);
     }
     /** As above; 0 past the end of the buffer. */
     int32_t getResponseInt32(uint8_t index, WordOrder order = orderDefault) const
@@ -108,7 +108,7 @@ public:
     /** An integer in the response: four words, two's complement. */
     bool getResponseInt64(uint8_t index, int64_t &value, WordOrder order = orderDefault) const
     {
-        return get(mbm_registers_getInt64, index, value, order);
+        return getSigned(mbm_registers_getUint64, index, value, order);
     }
     /** As above; 0 past the end of the buffer. */
     int64_t getResponseInt64(uint8_t index, WordOrder order = orderDefault) const
@@ -196,7 +196,7 @@ public:
     {
         mbm_registers words;
         uint8_t status = transmit(words);
-        return status == MBM_OK ? mbm_registers_setInt16(&words, index, order, value) : status;
+        return status == MBM_OK ? mbm_registers_setUint16(&words, index, order, static_cast<uint16_t>(value)) : status;
     }
 
     /** Sets an integer to write: two words, 0 to 4294967295. */
@@ -212,7 +212,7 @@ public:
     {
         mbm_registers words;
         uint8_t status = transmit(words);
-        return status == MBM_OK ? mbm_registers_setInt32(&words, index, order, value) : status;
+        return status == MBM_OK ? mbm_registers_setUint32(&words, index, order, static_cast<uint32_t>(value)) : status;
     }
 
     /** Sets an integer to write: four words, without a sign. */
@@ -228,7 +228,8 @@ public:
     {
         mbm_registers words;
         uint8_t status = transmit(words);
-        return status == MBM_OK ? mbm_registers_setInt64(&words, index, order, &value) : status;
+        const uint64_t bits = static_cast<uint64_t>(value);
+        return status == MBM_OK ? mbm_registers_setUint64(&words, index, order, &bits) : status;
     }
 
     /** Sets a float to write: two words, IEEE 754. */
@@ -293,6 +294,14 @@ private:
     {
         mbm_registers words;
         return response(words) && getter(&words, index, order, &value) == MBM_OK;
+    }
+
+    /* A signed number may be written through a pointer to the unsigned type of its size. */
+    template <typename Unsigned, typename Signed>
+    bool getSigned(uint8_t (*getter)(const mbm_registers *, uint16_t, uint8_t, Unsigned *),
+                   uint8_t index, Signed &value, WordOrder order) const
+    {
+        return get(getter, index, reinterpret_cast<Unsigned &>(value), order);
     }
 };
 

@@ -65,70 +65,70 @@ public:
     ModbusUnit &operator=(const ModbusUnit &) = delete;
 
     /** Serves coils: functions 01, 05 and 0F. */
-    uint8_t coils(ModbusBits &bits) { return mbm_server_serveCoils(&unit, bits.use()); }
+    uint8_t coils(ModbusBits &bits) { return mbm_unit_serveCoils(&unit, bits.use()); }
     /** Serves discrete inputs: function 02. */
     uint8_t discreteInputs(ModbusBits &bits)
     {
-        return mbm_server_serveDiscreteInputs(&unit, bits.use());
+        return mbm_unit_serveDiscreteInputs(&unit, bits.use());
     }
     /** Serves holding registers: functions 03, 06 and 10. */
     uint8_t holdingRegisters(ModbusRegisters &registers)
     {
-        return mbm_server_serveHoldingRegisters(&unit, registers.use());
+        return mbm_unit_serveHoldingRegisters(&unit, registers.use());
     }
     /** Serves functions 16 and 17 too, of registers that holdingRegisters took. */
     uint8_t maskAndReadWrite(ModbusRegisters &registers)
     {
-        return mbm_server_serveMaskAndReadWrite(registers.use());
+        return mbm_registerTable_serveMaskAndReadWrite(registers.use());
     }
     /** Serves input registers: function 04. */
     uint8_t inputRegisters(ModbusRegisters &registers)
     {
-        return mbm_server_serveInputRegisters(&unit, registers.use());
+        return mbm_unit_serveInputRegisters(&unit, registers.use());
     }
 
     /** Serves a function of yours. */
     uint8_t function(ModbusFunction &function)
     {
-        return mbm_server_serveCustom(&unit, function.use());
+        return mbm_unit_serveCustom(&unit, function.use());
     }
 
-    /** Serves cells that functions of yours hold; see mbm_server_serveCallbacks. */
-    uint8_t serve(mbm_cells &cells, uint8_t table)
+    /** Serves cells that functions of yours hold; see mbm_unit_serveCallbacks. */
+    uint8_t serve(mbm_dataCallbacks &cells, uint8_t table)
     {
-        return mbm_server_serveCallbacks(&unit, &cells, table);
+        return mbm_unit_serveCallbacks(&unit, &cells, table);
     }
     /** Serves the exception status: function 07. */
     uint8_t serve(mbm_exceptionStatus &status)
     {
-        return mbm_server_serveExceptionStatus(&unit, &status);
+        return mbm_unit_serveExceptionStatus(&unit, &status);
     }
     /** Serves diagnostics: functions 08, 0B and 0C. */
     uint8_t serve(mbm_diagnostics &diagnostics)
     {
-        return mbm_server_serveDiagnostics(&unit, &diagnostics);
+        return mbm_unit_serveDiagnostics(&unit, &diagnostics);
     }
     /** Serves the server id: function 11. */
-    uint8_t serve(mbm_serverId &id) { return mbm_server_serveServerId(&unit, &id); }
+    uint8_t serve(mbm_serverId &id) { return mbm_unit_serveServerId(&unit, &id); }
     /** Serves files: functions 14 and 15. */
-    uint8_t serve(mbm_files &files) { return mbm_server_serveFiles(&unit, &files); }
+    uint8_t serve(mbm_files &files) { return mbm_unit_serveFiles(&unit, &files); }
     /** Serves FIFO queues: function 18. */
-    uint8_t serve(mbm_fifos &fifos) { return mbm_server_serveFifos(&unit, &fifos); }
+    uint8_t serve(mbm_fifos &fifos) { return mbm_unit_serveFifos(&unit, &fifos); }
     /** Serves the device identification: function 2B/0E. */
     uint8_t serve(mbm_identification &identification)
     {
-        return mbm_server_serveIdentification(&unit, &identification);
+        return mbm_unit_serveIdentification(&unit, &identification);
     }
 
     /** Answers function `code` (1 to 127) with exception 01, whatever serves it. */
-    uint8_t switchOff(mbm_switches &switches, uint8_t code)
+    uint8_t switchOff(mbm_functionMask &switches, uint8_t code)
     {
-        return mbm_server_switchOff(&unit, &switches, code);
+        return mbm_unit_switchFunction(&unit, &switches, code, 0);
     }
     /** Serves a function again that switchOff took away. */
-    uint8_t switchOn(mbm_switches &switches, uint8_t code)
+    uint8_t switchOn(mbm_functionMask &switches, uint8_t code)
     {
-        return mbm_server_switchOn(&switches, code);
+        return mbm_unit_switchFunction(&unit, &switches, code, 1);
     }
 
     /** Sets the unit id, 1 to 247. */
@@ -302,7 +302,7 @@ private:
     }
     uint8_t beginRtu(ModbusUnit &first, uint8_t count, Stream &stream, uint32_t baud)
     {
-        uint8_t status = listen(mbm_server_begin, first, count, stream);
+        uint8_t status = listen(mbm_server_beginRtu, first, count, stream);
         if (status == MBM_OK) {
             state.rtu = true;
             setBaudRate(baud);

@@ -14,7 +14,7 @@
 #include "mbm.h"
 
 /**
- * What mbm_statusText says, for Serial.println. That takes a kilobyte of RAM on an
+ * What mbm_status_text says, for Serial.println. That takes a kilobyte of RAM on an
  * AVR board, and this none; a sketch that does not call it is not a byte larger.
  *
  * @param status  any number

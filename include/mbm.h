@@ -10,8 +10,24 @@
  * zero before first use, with no heap and no globals behind them. Nothing is
  * re-entrant on one object, and nothing may be called from an interrupt unless
  * its comment says so; any number of objects may be used side by side, each
- * from one thread. "V1.1b3" is the Modbus application protocol, "serial line
+ * from one thread. Each begin function may be called again at any time, but not
+ * from a hook of the object: what was pending is given up, requests with the
+ * status MBM_CANCELLED. "V1.1b3" is the Modbus application protocol, "serial line
  * guide V1.02" the guide for RTU and ASCII.
+ *
+ * Contents:
+ *    1 Version                 of this header and of the archive
+ *    2 Statuses                what functions return
+ *    3 Port                    your line: read, write, clock, driver; counters
+ *    4 Functions and framings  codes, limits, rules of length; RTU, ASCII, TCP
+ *    5 Master                  RTU, one request at a time, blocking or not
+ *    6 Client                  many requests, every framing, never waits
+ *    7 Server                  answers requests on a line or connection
+ *    8 Units                   what servers serve: tables, callbacks, files
+ *    9 Values                  registers and bits as numbers, in words or bytes
+ *   10 Packets                 requests and responses, built and parsed by hand
+ *   11 Sniffer                 listens on a bus that others use
+ *   12 Ring                    bytes from an interrupt to the main loop
  */
 
 #ifndef MBM_H
@@ -20,8 +36,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/** Version of this header and of the archive it belongs to. */
-#define MBM_VERSION "0.1.0"
+/** Version of this header as a text, "0.2.0" for example; mbm_version is that of the archive. */
+#define MBM_VERSION MBM_VERSION_OF(MBM_VERSION_MAJOR, MBM_VERSION_MINOR, MBM_VERSION_PATCH)
+/** Private: expands the numbers. */
+#define MBM_VERSION_OF(major, minor, patch) MBM_VERSION_TEXT(major, minor, patch)
+/** Private: makes a text of the numbers. */
+#define MBM_VERSION_TEXT(major, minor, patch) #major "." #minor "." #patch
 
 /** Bytes of a frame buffer for any request and reply of so many words. */
 #define MBM_FRAME_BYTES(words) (2u * (words) + 13u)
@@ -32,30 +52,312 @@
 #define mbm_registers_setDouble mbm_registers_setDouble_wants_mdouble_32
 #endif
 
-/**
- * The most requests that wait or are under way in one client.
- */
-#define MBM_CLIENT_DEPTH 16
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+struct mbm_master;
+struct mbm_object;
+struct mbm_unit;
+
+/* ==== 1. Version ==================================================================== */
 
 /**
- * mbm_client_setBackoff: a request is asked again at once.
+ * Version of this header: a new major version may break programs.
  */
-#define MBM_BACKOFF_NONE 0
+#define MBM_VERSION_MAJOR 0
 
 /**
- * mbm_client_setBackoff: always the same wait.
+ * Version of this header: before 1.0.0 a new minor version may break programs.
  */
-#define MBM_BACKOFF_FIXED 1
+#define MBM_VERSION_MINOR 2
 
 /**
- * mbm_client_setBackoff: once, twice, three times the wait, up to the most.
+ * Version of this header: a new patch version breaks nothing.
  */
-#define MBM_BACKOFF_LINEAR 2
+#define MBM_VERSION_PATCH 0
 
 /**
- * mbm_client_setBackoff: once, twice, four times the wait, up to the most.
+ * The version of the archive. It is MBM_VERSION if program and archive belong together.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @return a constant string such as "0.2.0", never NULL
  */
-#define MBM_BACKOFF_EXPONENTIAL 3
+const char *mbm_version(void);
+
+/* ==== 2. Statuses =================================================================== */
+
+/**
+ * The call succeeded.
+ */
+#define MBM_OK 0
+
+/**
+ * Exception of the device: it does not know the function.
+ */
+#define MBM_ILLEGAL_FUNCTION 1
+
+/**
+ * Exception of the device: it has no such address. Also, with nothing sent,
+ * for a range that passes address 65535.
+ */
+#define MBM_ILLEGAL_DATA_ADDRESS 2
+
+/**
+ * Exception of the device: it refuses the quantity or value. Also, with
+ * nothing sent, for a quantity that the standard forbids, and for writes of
+ * more than the transmit buffer holds.
+ */
+#define MBM_ILLEGAL_DATA_VALUE 3
+
+/**
+ * Exception of the device: it failed while it carried the request out.
+ */
+#define MBM_SLAVE_DEVICE_FAILURE 4
+
+/**
+ * Exception of the device: accepted, but it takes long.
+ */
+#define MBM_ACKNOWLEDGE 5
+
+/**
+ * Exception of the device: busy, ask again later.
+ */
+#define MBM_SLAVE_DEVICE_BUSY 6
+
+/**
+ * Exception of the device: a file's memory is inconsistent.
+ */
+#define MBM_MEMORY_PARITY_ERROR 8
+
+/**
+ * Exception of a gateway: no path to the device.
+ */
+#define MBM_GATEWAY_PATH_UNAVAILABLE 10
+
+/**
+ * Exception of a gateway: the device behind it did not answer.
+ */
+#define MBM_GATEWAY_TARGET_FAILED_TO_RESPOND 11
+
+/**
+ * Within the response timeout only frames of other units arrived.
+ */
+#define MBM_INVALID_SLAVE_ID 224
+
+/**
+ * Within the response timeout the unit answered, but to another function.
+ */
+#define MBM_INVALID_FUNCTION 225
+
+/**
+ * No complete reply within the response timeout.
+ */
+#define MBM_RESPONSE_TIMED_OUT 226
+
+/**
+ * The reply arrived damaged: its CRC is wrong.
+ */
+#define MBM_INVALID_CRC 227
+
+/**
+ * An argument that the function cannot take: NULL, a number out of range, a port
+ * without read, write or micros, a buffer that is too short, or an object of
+ * another framing or kind. The comment of the function says which. Nothing was
+ * changed.
+ */
+#define MBM_INVALID_ARGUMENT 228
+
+/**
+ * The unit answered the function with a right CRC, but not this request:
+ * wrong byte count, wrong echo, or an exception code of 0 or from 0x80.
+ */
+#define MBM_MALFORMED_REPLY 229
+
+/**
+ * The port's read or write reported that the link is lost.
+ */
+#define MBM_LINK_LOST 230
+
+/**
+ * The object is in use: it has a request under way, it called the hook that this
+ * call came from, or it is a record that is served in another way. Nothing was
+ * changed.
+ */
+#define MBM_BUSY 231
+
+/**
+ * A function that reads cannot be broadcast; nothing was sent.
+ */
+#define MBM_BROADCAST_NOT_ALLOWED 232
+
+/**
+ * The frame buffer cannot hold the request (nothing was sent), or frame or
+ * response buffer cannot hold the reply (the response words are unchanged), or a
+ * unit has no place for another record.
+ */
+#define MBM_BUFFER_TOO_SMALL 233
+
+/**
+ * The object was never begun, or has no buffers.
+ */
+#define MBM_NOT_INITIALISED 234
+
+/**
+ * The request is under way: call mbm_master_poll again.
+ */
+#define MBM_PENDING 235
+
+/**
+ * For as long as the response timeout the line never fell silent, or the
+ * port took no bytes.
+ */
+#define MBM_LINE_BUSY 236
+
+/**
+ * The request was given up by mbm_master_cancel or mbm_master_beginRtu.
+ */
+#define MBM_CANCELLED 237
+
+/**
+ * A frame that is not whole yet: more bytes are to come.
+ */
+#define MBM_INCOMPLETE_FRAME 238
+
+/**
+ * No frame of this framing begins like that, or has such a length.
+ */
+#define MBM_MALFORMED_FRAME 239
+
+/**
+ * The client has 16 requests already; nothing was queued.
+ */
+#define MBM_QUEUE_FULL 240
+
+/**
+ * Another pending request of the client has this transaction id; nothing was
+ * queued.
+ */
+#define MBM_DUPLICATE_TRANSACTION 241
+
+/**
+ * The request has ended already, or was never queued.
+ */
+#define MBM_NOT_PENDING 242
+
+/**
+ * Explains a status in a few words of English. On an AVR, where constants lie in
+ * RAM, a program that calls it has about 1100 bytes less of that: show the number,
+ * or in a sketch modbusStatusText of ModbusStatusText.h, whose words stay in flash.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param status  any number
+ * @return a constant string, never NULL
+ */
+const char *mbm_status_text(uint8_t status);
+
+/* ==== 3. Port ======================================================================= */
+
+/**
+ * What the firmware supplies: a byte stream, a clock, and optional hooks.
+ *
+ * A master refers to its port, which must stay valid and unchanged for as long as the
+ * master is used; it may be a constant. A client and a server copy theirs. Hooks that
+ * are NULL are not called; `read`, `write` and `micros` must be there.
+ *
+ * A function that a hook calls on the object that called the hook returns
+ * MBM_BUSY and changes nothing; a getter returns what it returns for an object
+ * that was never begun. The hook `idle` is the exception: it may call every
+ * function, and one that starts a request returns MBM_BUSY.
+ */
+typedef struct mbm_port {
+    /**
+     * Handed to every hook. Yours, may be NULL.
+     */
+    void *context;
+    /**
+     * Takes up to `capacity` received bytes without waiting. Returns how
+     * many, 0 if none has arrived yet, negative if the link is lost.
+     */
+    int16_t (*read)(void *context, uint8_t *bytes, uint16_t capacity);
+    /**
+     * Accepts up to `length` bytes to send without waiting for the wire.
+     * Returns how many, 0 if none just now, negative if the link is lost.
+     */
+    int16_t (*write)(void *context, const uint8_t *bytes, uint16_t length);
+    /**
+     * A clock in microseconds that wraps at 2^32. A platform with a
+     * millisecond tick returns `tick * 1000`.
+     */
+    uint32_t (*micros)(void *context);
+    /**
+     * Optional: 1 once the last bit has left, 0 while bits are to come. It
+     * may wait for the last bit instead and return 1.
+     */
+    uint8_t (*flush)(void *context);
+    /**
+     * Optional: called before the first byte of a request (RS-485 driver on).
+     */
+    void (*preTransmission)(void *context);
+    /**
+     * Optional: called after the last bit of a request (RS-485 driver off).
+     */
+    void (*postTransmission)(void *context);
+    /**
+     * Optional: called again and again while a blocking call of `master` waits,
+     * never between preTransmission and postTransmission. It may sleep until a
+     * byte arrives, for at most the time that mbm_master_pollDelay(master)
+     * returns.
+     */
+    void (*idle)(void *context, struct mbm_master *master);
+} mbm_port;
+
+/**
+ * What happened on the line, since the caller zeroed it. Each wraps at 2^32.
+ */
+typedef struct mbm_counters {
+    /**
+     * Requests sent, retries included.
+     */
+    uint32_t requests;
+    /**
+     * Replies that answered a request, exceptions included.
+     */
+    uint32_t replies;
+    /**
+     * Replies that were exceptions.
+     */
+    uint32_t exceptions;
+    /**
+     * Requests whose reply arrived damaged.
+     */
+    uint32_t badCrc;
+    /**
+     * Requests that were not answered in time.
+     */
+    uint32_t timeouts;
+    /**
+     * Frames with a right CRC of other units, or that answered no request of
+     * ours, while a reply was waited for.
+     */
+    uint32_t foreignFrames;
+    /**
+     * Replies that were found behind bytes that were no frame.
+     */
+    uint32_t resynchronisations;
+    /**
+     * Bytes sent.
+     */
+    uint32_t bytesSent;
+    /**
+     * Bytes received, foreign ones and noise included.
+     */
+    uint32_t bytesReceived;
+} mbm_counters;
+
+/* ==== 4. Functions and framings ===================================================== */
 
 /**
  * Serial line, binary, CRC-16 (serial line guide V1.02, 2.5.1).
@@ -76,6 +378,11 @@
  * RTU frames in a TCP stream.
  */
 #define MBM_FRAMING_RTU_OVER_TCP 3
+
+/**
+ * No frame: the PDU alone, for the mbm_frame functions.
+ */
+#define MBM_FRAMING_NONE 4
 
 /**
  * Most bytes of a TCP frame.
@@ -333,516 +640,6 @@
 #define MBM_MAX_FRAME 256
 
 /**
- * A request: what a client sends.
- */
-#define MBM_PACKET_REQUEST 0
-
-/**
- * A response: what a server sends if the request succeeds.
- */
-#define MBM_PACKET_RESPONSE 1
-
-/**
- * An exception: what a server sends if the request fails (V1.1b3, clause 7).
- */
-#define MBM_PACKET_EXCEPTION 2
-
-/**
- * Most bytes of a PDU: function code and data (V1.1b3, 4.1).
- */
-#define MBM_MAX_PDU 253
-
-/**
- * `bytes` is the length.
- */
-#define MBM_LENGTH_EXACT 0
-
-/**
- * It has `bytes` at least. Once so many are there, ask again.
- */
-#define MBM_LENGTH_AT_LEAST 1
-
-/**
- * Silence on the line tells, in ASCII the end character. `bytes` is 0.
- */
-#define MBM_LENGTH_SILENCE 2
-
-/**
- * Nobody knows this function: declare it. Also what silence ends, in RTU over TCP,
- * where there is none. `bytes` is 0.
- */
-#define MBM_LENGTH_UNKNOWN 3
-
-/**
- * The order of the registers that a function is given; in these, MBM_ORDER_ABCD.
- */
-#define MBM_ORDER_DEFAULT 0
-
-/**
- * High word first, high byte first: what most devices do. A is the most
- * significant byte; 2923517522, which is 0xAE415652, arrives as AE41 5652.
- */
-#define MBM_ORDER_ABCD 1
-
-/**
- * Low word first, high byte first: 5652 AE41.
- */
-#define MBM_ORDER_CDAB 2
-
-/**
- * High word first, low byte first: 41AE 5256.
- */
-#define MBM_ORDER_BADC 3
-
-/**
- * Low word first, low byte first: 5256 41AE.
- */
-#define MBM_ORDER_DCBA 4
-
-/**
- * mbm_registers.kind: words to read, as those of mbm_master.
- */
-#define MBM_REGISTERS_OF_WORDS 1
-
-/**
- * mbm_registers.kind: bytes to read, high byte first.
- */
-#define MBM_REGISTERS_OF_BYTES 2
-
-/**
- * mbm_registers.kind: words to write and to read.
- */
-#define MBM_REGISTERS_INTO_WORDS 3
-
-/**
- * mbm_registers.kind: bytes to write and to read, high byte first.
- */
-#define MBM_REGISTERS_INTO_BYTES 4
-
-/**
- * What a function of yours returns for an exception: this, or-ed with the code.
- */
-#define MBM_REPLY_EXCEPTION 256
-
-/**
- * What a function of yours returns for no response at all.
- */
-#define MBM_REPLY_NONE 512
-
-/**
- * What a function of yours returns to be asked again at the next poll, with the
- * same request. The server hears nothing meanwhile.
- */
-#define MBM_REPLY_PENDING 768
-
-/**
- * Most records that one unit serves, each handed to a mbm_server_serve function.
- */
-#define MBM_MAX_SERVICES 16
-
-/**
- * A request.
- */
-#define MBM_EVENT_REQUEST 0
-
-/**
- * The reply to a request.
- */
-#define MBM_EVENT_REPLY 1
-
-/**
- * The exception that answers a request.
- */
-#define MBM_EVENT_EXCEPTION 2
-
-/**
- * A reply or exception to no request that waits for one: a late one, one whose
- * request was not seen, or one that does not answer what was asked.
- */
-#define MBM_EVENT_UNPAIRED 3
-
-/**
- * A request that nobody answered within the timeout, or before the next request.
- */
-#define MBM_EVENT_TIMEOUT 4
-
-/**
- * What looks like a frame, but has a wrong CRC or LRC, or too few bytes.
- */
-#define MBM_EVENT_BAD_CRC 5
-
-/**
- * Bytes that are no frame.
- */
-#define MBM_EVENT_NOISE 6
-
-/**
- * Heard on a line that carries both directions.
- */
-#define MBM_TAP_BOTH 0
-
-/**
- * Heard where only the client sends.
- */
-#define MBM_TAP_CLIENT 1
-
-/**
- * Heard where only servers send.
- */
-#define MBM_TAP_SERVER 2
-
-/**
- * Least bytes of a sniffer's buffer.
- */
-#define MBM_MIN_SNIFFER_BUFFER 32
-
-/**
- * Most functions of your own that a sniffer takes.
- */
-#define MBM_MAX_SNIFFER_FUNCTIONS 19
-
-/**
- * The call succeeded.
- */
-#define MBM_OK 0
-
-/**
- * Exception of the device: it does not know the function.
- */
-#define MBM_ILLEGAL_FUNCTION 1
-
-/**
- * Exception of the device: it has no such address. Also, with nothing sent,
- * for a range that passes address 65535.
- */
-#define MBM_ILLEGAL_DATA_ADDRESS 2
-
-/**
- * Exception of the device: it refuses the quantity or value. Also, with
- * nothing sent, for a quantity that the standard forbids, and for writes of
- * more than the transmit buffer holds.
- */
-#define MBM_ILLEGAL_DATA_VALUE 3
-
-/**
- * Exception of the device: it failed while it carried the request out.
- */
-#define MBM_SLAVE_DEVICE_FAILURE 4
-
-/**
- * Exception of the device: accepted, but it takes long.
- */
-#define MBM_ACKNOWLEDGE 5
-
-/**
- * Exception of the device: busy, ask again later.
- */
-#define MBM_SLAVE_DEVICE_BUSY 6
-
-/**
- * Exception of the device: a file's memory is inconsistent.
- */
-#define MBM_MEMORY_PARITY_ERROR 8
-
-/**
- * Exception of a gateway: no path to the device.
- */
-#define MBM_GATEWAY_PATH_UNAVAILABLE 10
-
-/**
- * Exception of a gateway: the device behind it did not answer.
- */
-#define MBM_GATEWAY_TARGET_FAILED_TO_RESPOND 11
-
-/**
- * Within the response timeout only frames of other units arrived.
- */
-#define MBM_INVALID_SLAVE_ID 224
-
-/**
- * Within the response timeout the unit answered, but to another function.
- */
-#define MBM_INVALID_FUNCTION 225
-
-/**
- * No complete reply within the response timeout.
- */
-#define MBM_RESPONSE_TIMED_OUT 226
-
-/**
- * The reply arrived damaged: its CRC is wrong.
- */
-#define MBM_INVALID_CRC 227
-
-/**
- * An argument that the function cannot take: NULL, a number out of range, a port
- * without read, write or micros, a buffer that is too short, or an object of
- * another framing or kind. The comment of the function says which. Nothing was
- * changed.
- */
-#define MBM_INVALID_ARGUMENT 228
-
-/**
- * The unit answered the function with a right CRC, but not this request:
- * wrong byte count, wrong echo, or an exception code of 0 or from 0x80.
- */
-#define MBM_MALFORMED_REPLY 229
-
-/**
- * The port's read or write reported that the link is lost.
- */
-#define MBM_LINK_LOST 230
-
-/**
- * The object is in use: it has a request under way, it called the hook that this
- * call came from, or it is a record that is served in another way. Nothing was
- * changed.
- */
-#define MBM_BUSY 231
-
-/**
- * A function that reads cannot be broadcast; nothing was sent.
- */
-#define MBM_BROADCAST_NOT_ALLOWED 232
-
-/**
- * The frame buffer cannot hold the request (nothing was sent), or frame or
- * response buffer cannot hold the reply (the response words are unchanged), or a
- * unit has no place for another record.
- */
-#define MBM_BUFFER_TOO_SMALL 233
-
-/**
- * The object was never begun, or has no buffers.
- */
-#define MBM_NOT_INITIALISED 234
-
-/**
- * The request is under way: call mbm_master_poll again.
- */
-#define MBM_PENDING 235
-
-/**
- * For as long as the response timeout the line never fell silent, or the
- * port took no bytes.
- */
-#define MBM_LINE_BUSY 236
-
-/**
- * The request was given up by mbm_master_cancel or mbm_master_begin.
- */
-#define MBM_CANCELLED 237
-
-/**
- * A frame that is not whole yet: more bytes are to come.
- */
-#define MBM_INCOMPLETE_FRAME 238
-
-/**
- * No frame of this framing begins like that, or has such a length.
- */
-#define MBM_MALFORMED_FRAME 239
-
-/**
- * The client has 16 requests already; nothing was queued.
- */
-#define MBM_QUEUE_FULL 240
-
-/**
- * Another pending request of the client has this transaction id; nothing was
- * queued.
- */
-#define MBM_DUPLICATE_TRANSACTION 241
-
-/**
- * The request has ended already, or was never queued.
- */
-#define MBM_NOT_PENDING 242
-
-/**
- * A client of one serial line or one TCP stream: up to 16 requests are queued,
- * mbm_client_poll moves them on, and nothing ever waits.
- *
- * Storage is yours and must be zero before first use, which a static object is.
- * One of the mbm_client_begin functions comes first. Use one object from one
- * thread and never from an interrupt; several objects are independent of each
- * other.
- *
- * A `done` function may call every function on the client that calls it, but
- * mbm_client_poll, which returns MBM_BUSY. A hook of the port, and the `random`
- * function of mbm_client_setJitter, may call none: each returns MBM_BUSY and
- * changes nothing, and a getter returns what it returns for an object that was
- * never begun.
- */
-typedef struct mbm_client {
-    /**
-     * Not for you.
-     */
-    void *pointers[46];
-    /**
-     * Not for you.
-     */
-    uint32_t words[24];
-} mbm_client;
-
-/**
- * A Modbus RTU master: one line, one request at a time.
- *
- * Storage is yours and must be zero before first use, which a static object
- * is (`static mbm_master node;`). Settings and words want mbm_master_begin or
- * mbm_master_setBuffers before them, requests want both. Use one object from one
- * thread and never from an interrupt; several objects are independent of each
- * other. Which functions the hooks of its port may call: see mbm_port.
- *
- * A call that is refused changes nothing, but for what the functions that make a
- * request say of themselves, and mbm_master_send32.
- */
-typedef struct mbm_master {
-    /**
-     * Not for you.
-     */
-    void *pointers[12];
-    /**
-     * Not for you.
-     */
-    uint32_t words[21];
-} mbm_master;
-
-/**
- * What the firmware supplies: a byte stream, a clock, and optional hooks.
- *
- * A master refers to its port, which must stay valid and unchanged for as long as the
- * master is used; it may be a constant. A client and a server copy theirs. Hooks that
- * are NULL are not called; `read`, `write` and `micros` must be there.
- *
- * A function that a hook calls on the object that called the hook returns
- * MBM_BUSY and changes nothing; a getter returns what it returns for an object
- * that was never begun. The hook `idle` is the exception: it may call every
- * function, and one that starts a request returns MBM_BUSY.
- */
-typedef struct mbm_port {
-    /**
-     * Handed to every hook. Yours, may be NULL.
-     */
-    void *context;
-    /**
-     * Takes up to `capacity` received bytes without waiting. Returns how
-     * many, 0 if none has arrived yet, negative if the link is lost.
-     */
-    int16_t (*read)(void *context, uint8_t *bytes, uint16_t capacity);
-    /**
-     * Accepts up to `length` bytes to send without waiting for the wire.
-     * Returns how many, 0 if none just now, negative if the link is lost.
-     */
-    int16_t (*write)(void *context, const uint8_t *bytes, uint16_t length);
-    /**
-     * A clock in microseconds that wraps at 2^32. A platform with a
-     * millisecond tick returns `tick * 1000`.
-     */
-    uint32_t (*micros)(void *context);
-    /**
-     * Optional: 1 once the last bit has left, 0 while bits are to come. It
-     * may wait for the last bit instead and return 1.
-     */
-    uint8_t (*flush)(void *context);
-    /**
-     * Optional: called before the first byte of a request (RS-485 driver on).
-     */
-    void (*preTransmission)(void *context);
-    /**
-     * Optional: called after the last bit of a request (RS-485 driver off).
-     */
-    void (*postTransmission)(void *context);
-    /**
-     * Optional: called again and again while a blocking call of `master` waits,
-     * never between preTransmission and postTransmission. It may sleep until a
-     * byte arrives, for at most the time that mbm_master_pollDelay(master)
-     * returns.
-     */
-    void (*idle)(void *context, struct mbm_master *master);
-} mbm_port;
-
-/**
- * What closes a link and opens it anew, for mbm_client_reconnect.
- */
-typedef struct mbm_link {
-    /**
-     * Handed to both hooks. Yours, may be NULL.
-     */
-    void *context;
-    /**
-     * Optional: closes the link, if it is open.
-     */
-    void (*disconnect)(void *context);
-    /**
-     * Optional: opens the link without waiting. Returns MBM_OK, MBM_PENDING if
-     * that goes on while the port takes no bytes yet, or another status.
-     */
-    uint8_t (*connect)(void *context);
-} mbm_link;
-
-/**
- * A request to a device, and what comes of it. Yours, and zero before you set
- * the fields that you need; it may be used again and again.
- *
- * From the call that queues it until it has ended, which `done` or `status`
- * tells, leave it alone, and what it points to. Data and reply are words in the
- * machine's byte order where a function transfers registers; where it transfers
- * coils or bytes, they are bytes as on the wire, of coils the lowest bit first.
- */
-typedef struct mbm_clientRequest {
-    /**
-     * Optional: called by mbm_client_poll when the request has ended, but not for one
-     * that mbm_client_cancel gave up. It may queue requests, this one too, and cancel
-     * others.
-     */
-    void (*done)(void *context, struct mbm_clientRequest *request);
-    /**
-     * Handed to `done`. Yours, may be NULL.
-     */
-    void *context;
-    /**
-     * What functions that write send.
-     */
-    const void *data;
-    /**
-     * What functions that read fill; NULL if only the status is wanted.
-     */
-    void *reply;
-    /**
-     * Bytes that `reply` has room for.
-     */
-    uint16_t replyBytes;
-    /**
-     * A number of yours, which stays as you set it. In TCP frames no two pending
-     * requests may have the same one, except 0. It is not the transaction identifier
-     * on the wire: mbm_client_wireTransaction returns that.
-     */
-    uint16_t transaction;
-    /**
-     * Whom it is for. On a serial line 1 to 247; 0 is broadcast; 248 to 255, which the
-     * standard reserves, are sent as they are. On TCP 1 to 255.
-     */
-    uint8_t unit;
-    /**
-     * MBM_PENDING from being queued to its end, then how it ended.
-     */
-    uint8_t status;
-    /**
-     * The raw exception code of the response; 0 if it was none.
-     */
-    uint8_t exception;
-    /**
-     * Bytes received in `reply`.
-     */
-    uint8_t length;
-    /**
-     * Not for you.
-     */
-    uint32_t words[8];
-} mbm_clientRequest;
-
-/**
  * How long the PDU of a function of your own is, function code included.
  * Zeroed: as long as its frame.
  */
@@ -861,93 +658,6 @@ typedef struct mbm_rule {
      */
     uint8_t more;
 } mbm_rule;
-
-/**
- * What happened on the line, since the caller zeroed it. Each wraps at 2^32.
- */
-typedef struct mbm_counters {
-    /**
-     * Requests sent, retries included.
-     */
-    uint32_t requests;
-    /**
-     * Replies that answered a request, exceptions included.
-     */
-    uint32_t replies;
-    /**
-     * Replies that were exceptions.
-     */
-    uint32_t exceptions;
-    /**
-     * Requests whose reply arrived damaged.
-     */
-    uint32_t badCrc;
-    /**
-     * Requests that were not answered in time.
-     */
-    uint32_t timeouts;
-    /**
-     * Frames with a right CRC of other units, or that answered no request of
-     * ours, while a reply was waited for.
-     */
-    uint32_t foreignFrames;
-    /**
-     * Replies that were found behind bytes that were no frame.
-     */
-    uint32_t resynchronisations;
-    /**
-     * Bytes sent.
-     */
-    uint32_t bytesSent;
-    /**
-     * Bytes received, foreign ones and noise included.
-     */
-    uint32_t bytesReceived;
-} mbm_counters;
-
-/**
- * What is kept for one unit, in an array of yours for mbm_client_setUnits. The
- * counts are yours to read and to zero; each wraps at 2^32.
- */
-typedef struct mbm_clientUnit {
-    /**
-     * Requests that ended, retries apart.
-     */
-    uint32_t requests;
-    /**
-     * Of these, those that were answered, exceptions included.
-     */
-    uint32_t replies;
-    /**
-     * Of the answers, those that were exceptions.
-     */
-    uint32_t exceptions;
-    /**
-     * Requests that were asked again.
-     */
-    uint32_t retries;
-    /**
-     * Set by you: rest for this unit from the end of a request to the next, in
-     * microseconds; more than 2^31 (36 minutes) means 2^31.
-     */
-    uint32_t delay;
-    /**
-     * Not for you.
-     */
-    uint32_t last;
-    /**
-     * Set by you: which unit this is.
-     */
-    uint8_t unit;
-    /**
-     * How the last request ended, MBM_OK if there was none.
-     */
-    uint8_t status;
-    /**
-     * Not for you.
-     */
-    uint8_t tired;
-} mbm_clientUnit;
 
 /**
  * A function of your own. Codes 65 to 72 and 100 to 110 are left to users, of
@@ -983,173 +693,40 @@ typedef struct mbm_framing {
      */
     uint8_t functionCount;
     /**
-     * MBM_FRAMING_RTU, _ASCII, _TCP or _RTU_OVER_TCP.
+     * MBM_FRAMING_RTU, _ASCII, _TCP, _RTU_OVER_TCP or _NONE.
      */
     uint8_t kind;
     /**
      * ASCII: the last character of a frame; 0 is line feed (V1.1b3, 6.8.1,
      * sub-function 03).
      */
-    uint8_t end;
+    uint8_t delimiter;
 } mbm_framing;
 
-/**
- * A request, response or exception of any function. Parsing zeroes it first,
- * and sets what the function has; building reads that and ignores the rest:
- *
- * function | request | response
- * ---------|---------|---------
- * 01, 02, 03, 04 | address, quantity | data
- * 05 | address, value | address, value
- * 06 | address, value | address, value
- * 07 | | exceptionStatus
- * 08 | subFunction, data | subFunction, data
- * 0B | | commStatus, eventCount
- * 0C | | commStatus, eventCount, messageCount, data (events, the latest first)
- * 0F, 10 | address, quantity, data | address, quantity
- * 11 | | byteCount, data
- * 14 | data (records) | data (records)
- * 15 | data (records) | data (records)
- * 16 | address, andMask, orMask | address, andMask, orMask
- * 17 | address, quantity, writeAddress, writeQuantity, data | data
- * 18 | address | data (registers)
- * 2B, MEI type 0E | meiType, readDeviceIdCode, objectId | meiType, readDeviceIdCode, conformity, moreFollows, nextObjectId, objectCount, data (objects)
- * 2B, others | meiType, data | meiType, data
- * your own | data | data
- *
- * An exception has exceptionCode, and the function of the request. Register
- * data are as on the wire, high bytes first; bits begin with the lowest of the
- * first byte. Records and objects: mbm_packet_nextRecord, mbm_packet_addRecord
- * and their likes for objects.
- */
-typedef struct mbm_packet {
-    /**
-     * The data, without the byte count in front of them. After parsing they
-     * lie within the bytes that were parsed; to build, they are yours. May be
-     * NULL if dataLength is 0.
-     */
-    const uint8_t *data;
-    /**
-     * Bytes of data.
-     */
-    uint16_t dataLength;
-    /**
-     * Transaction identifier of a TCP frame; 0 in other framings.
-     */
-    uint16_t transaction;
-    /**
-     * First coil, input or register, counted from 0; 17: that is read.
-     */
-    uint16_t address;
-    /**
-     * Coils, inputs or registers; 17: that are read.
-     */
-    uint16_t quantity;
-    /**
-     * 17: first register that is written.
-     */
-    uint16_t writeAddress;
-    /**
-     * 17: registers that are written.
-     */
-    uint16_t writeQuantity;
-    /**
-     * 05: 0 is off, anything else is on (parsed: 1). 06: the register.
-     */
-    uint16_t value;
-    /**
-     * 16: bits that are kept.
-     */
-    uint16_t andMask;
-    /**
-     * 16: bits that replace those that are not kept.
-     */
-    uint16_t orMask;
-    /**
-     * 08: one of MBM_DIAGNOSTICS_.
-     */
-    uint16_t subFunction;
-    /**
-     * 0B, 0C: FFFF while a command is carried out, else 0.
-     */
-    uint16_t commStatus;
-    /**
-     * 0B, 0C: successful messages.
-     */
-    uint16_t eventCount;
-    /**
-     * 0C: messages.
-     */
-    uint16_t messageCount;
-    /**
-     * MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE or MBM_PACKET_EXCEPTION.
-     */
-    uint8_t kind;
-    /**
-     * The unit that is asked, or that answers. Of frames only.
-     */
-    uint8_t unit;
-    /**
-     * Function code, 1 to 127; of an exception that of the request.
-     */
-    uint8_t function;
-    /**
-     * Exception: 1 to 127, the same numbers as MBM_ILLEGAL_FUNCTION and others.
-     */
-    uint8_t exceptionCode;
-    /**
-     * 07: eight outputs.
-     */
-    uint8_t exceptionStatus;
-    /**
-     * 11: the byte count. It is dataLength, or less: some devices count the id
-     * only and send more behind it.
-     */
-    uint8_t byteCount;
-    /**
-     * 2B: MBM_MEI_READ_DEVICE_IDENTIFICATION or another.
-     */
-    uint8_t meiType;
-    /**
-     * 2B/0E: one of MBM_DEVICE_ID_.
-     */
-    uint8_t readDeviceIdCode;
-    /**
-     * 2B/0E: the first object, or the only one.
-     */
-    uint8_t objectId;
-    /**
-     * 2B/0E: 01 to 03 or 81 to 83 by the standard; not checked.
-     */
-    uint8_t conformity;
-    /**
-     * 2B/0E: 1 if another request is needed for the rest, else 0.
-     */
-    uint8_t moreFollows;
-    /**
-     * 2B/0E: the object to ask for next; if none follows, 0 by the standard, and
-     * not checked.
-     */
-    uint8_t nextObjectId;
-    /**
-     * 2B/0E: how many objects the data are.
-     */
-    uint8_t objectCount;
-} mbm_packet;
+/* ==== 5. Master ===================================================================== */
 
 /**
- * How long something is.
+ * A Modbus RTU master: one line, one request at a time.
+ *
+ * Storage is yours and must be zero before first use, which a static object
+ * is (`static mbm_master node;`). Settings and words want mbm_master_beginRtu or
+ * mbm_master_setBuffers before them, requests want both. Use one object from one
+ * thread and never from an interrupt; several objects are independent of each
+ * other. Which functions the hooks of its port may call: see mbm_port.
+ *
+ * A call that is refused changes nothing, but for what the functions that make a
+ * request say of themselves, and mbm_master_send32.
  */
-typedef struct mbm_length {
+typedef struct mbm_master {
     /**
-     * All of it, from its first byte, as `kind` says.
+     * Private.
      */
-    uint16_t bytes;
+    void *pointers[12];
     /**
-     * MBM_LENGTH_EXACT, _AT_LEAST, _SILENCE or _UNKNOWN.
+     * Private.
      */
-    uint8_t kind;
-} mbm_length;
+    uint32_t words[21];
+} mbm_master;
 
 /**
  * What masters know of each other that take turns on one line, or in one frame
@@ -1170,1782 +747,6 @@ typedef struct mbm_turn {
 } mbm_turn;
 
 /**
- * Registers in a row, seen as values by the addresses that the device gives
- * them. It owns nothing: what `data` points to is the caller's.
- *
- * One of the functions mbm_registers_of... and mbm_registers_into... fills it
- * in, as do mbm_master_getResponseRegisters and mbm_master_getTransmitRegisters;
- * each field may be set by hand too. Functions that get or set do not change
- * it, so any thread may use it beside others that only get.
- */
-typedef struct mbm_registers {
-    /**
-     * The words or bytes, as `kind` says. NULL: none, MBM_NOT_INITIALISED.
-     */
-    const void *data;
-    /**
-     * The device's address of the first register.
-     */
-    uint16_t first;
-    /**
-     * How many registers there are; `first + count` is 65536 at most.
-     */
-    uint16_t count;
-    /**
-     * One of MBM_REGISTERS_...
-     */
-    uint8_t kind;
-    /**
-     * One of MBM_ORDER_..., for calls that say MBM_ORDER_DEFAULT.
-     */
-    uint8_t order;
-} mbm_registers;
-
-/**
- * Registers of a file: a sub-request of 14 or 15, or what answers it.
- */
-typedef struct mbm_record {
-    /**
-     * The registers, high bytes first, 2 * length bytes. A request of 14,
-     * which reads them, has none: NULL, and ignored.
-     */
-    const uint8_t *data;
-    /**
-     * File number, 1 to 65535; 0 in a response of 14, which does not say.
-     */
-    uint16_t file;
-    /**
-     * The first record, 0 to 9999; 0 in a response of 14.
-     */
-    uint16_t record;
-    /**
-     * How many registers.
-     */
-    uint16_t length;
-} mbm_record;
-
-/**
- * An object of a device identification.
- */
-typedef struct mbm_object {
-    /**
-     * Its value, most often text, without an end.
-     */
-    const uint8_t *data;
-    /**
-     * Bytes of the value.
-     */
-    uint8_t length;
-    /**
-     * 0 vendor name, 1 product code, 2 revision and so on (V1.1b3, 6.21).
-     */
-    uint8_t id;
-} mbm_object;
-
-/**
- * A receive ring between an interrupt handler and the main loop.
- *
- * One side puts bytes in with mbm_ring_put or mbm_ring_write: an interrupt
- * handler, a DMA callback or a thread. One side takes them out with
- * mbm_ring_read: the main loop, as the `read` hook of a port. Each may
- * interrupt the other at any point; neither may be two at once. No interrupt
- * is ever disabled.
- */
-typedef struct mbm_ring {
-    /**
-     * Not for you.
-     */
-    uint8_t *bytes;
-    /**
-     * Not for you.
-     */
-    uint16_t size;
-    /**
-     * Not for you.
-     */
-    uint16_t positions[3];
-} mbm_ring;
-
-/**
- * A Modbus server on one line or one connection.
- *
- * Storage is yours and must be zero before first use, which a static object is
- * (`static mbm_server server;`). What it serves are units, which several
- * servers may share: one on a serial line and four TCP connections, for
- * example, are five servers with the same units. Use a server and its units from
- * one thread and never from an interrupt; servers that share units belong to one
- * thread.
- *
- * Hooks and functions of yours run within mbm_server_poll. A function that they
- * call on the server that is polled returns MBM_BUSY and changes nothing: call
- * it when mbm_server_poll has returned. They may call functions on other servers,
- * and the mbm_server_serve functions on units.
- */
-typedef struct mbm_server {
-    /**
-     * Not for you.
-     */
-    void *pointers[14];
-    /**
-     * Not for you.
-     */
-    uint32_t words[8];
-} mbm_server;
-
-/**
- * The head of each record that a mbm_server_serve function takes. Private.
- */
-typedef struct mbm_service {
-    /**
-     * Serves a request, if it is one of this family. NULL in a zeroed record,
-     * which serves nothing.
-     */
-    size_t (*serve)(struct mbm_service *service, uint8_t *pdu, const void *heading);
-    /**
-     * What kind of record of its family it is served as, from 1 on; 0 in a zeroed one.
-     */
-    uint8_t kind;
-} mbm_service;
-
-/**
- * What a unit knows of its line. Zero it, and hand it to
- * mbm_server_serveDiagnostics. Counters wrap at 2^16; read them as you like.
- */
-typedef struct mbm_diagnostics {
-    /**
-     * Not for you.
-     */
-    struct mbm_service service;
-    /**
-     * Optional: called when the client restarts the line with sub-function 01 of
-     * 08; `clearLog` is 1 if it cleared the event log too.
-     */
-    void (*restart)(void *context, uint8_t clearLog);
-    /**
-     * Handed to `restart`. Yours, may be NULL.
-     */
-    void *context;
-    /**
-     * What sub-function 02 of 08 returns: yours.
-     */
-    uint16_t diagnosticRegister;
-    /**
-     * Sub-function 0B: frames with a right CRC, for whichever unit.
-     */
-    uint16_t busMessages;
-    /**
-     * Sub-function 0C: frames that arrived damaged.
-     */
-    uint16_t busCommunicationErrors;
-    /**
-     * Sub-function 0D: exceptions, those of broadcasts too.
-     */
-    uint16_t exceptionErrors;
-    /**
-     * Sub-function 0E: requests for this unit, and broadcasts.
-     */
-    uint16_t serverMessages;
-    /**
-     * Sub-function 0F: requests that were not answered.
-     */
-    uint16_t noResponses;
-    /**
-     * Sub-function 10: exceptions 07.
-     */
-    uint16_t naks;
-    /**
-     * Sub-function 11: exceptions 06.
-     */
-    uint16_t busy;
-    /**
-     * Sub-function 12: frames that the buffer could not hold.
-     */
-    uint16_t characterOverruns;
-    /**
-     * What 0B returns: requests that were carried out.
-     */
-    uint16_t events;
-    /**
-     * 1 in listen only mode.
-     */
-    uint8_t listenOnly;
-    /**
-     * Not for you.
-     */
-    uint8_t hidden[67];
-} mbm_diagnostics;
-
-/**
- * A unit that servers answer for. Zero it, set `id`, and say what it serves with
- * mbm_server_serveCoils and its sisters.
- *
- * Each of those takes a record of yours, which stays valid for as long as the
- * unit is used. A unit has places for MBM_MAX_SERVICES records; one more is
- * refused with MBM_BUFFER_TOO_SMALL. A record may be handed over again, also
- * after you have zeroed and refilled it, and keeps its place. A zeroed record
- * serves nothing until it is handed over again. One record may serve any number
- * of units.
- */
-typedef struct mbm_unit {
-    /**
-     * Private: the records, in the order in which they are asked, then NULL.
-     */
-    struct mbm_service *services[MBM_MAX_SERVICES];
-    /**
-     * Private: NULL in a unit without diagnostics.
-     */
-    size_t (*monitor)(struct mbm_unit *unit,
-                      const void *heading,
-                      uint8_t concern,
-                      uint8_t *pdu);
-    /**
-     * Not for you.
-     */
-    struct mbm_diagnostics *diagnostics;
-    /**
-     * The unit id, 1 to 247 (serial line guide V1.02, 2.2); 248 to 255, which the
-     * standard reserves, are taken as they are. 0 answers to every id. A unit that
-     * serves nothing is silent, as if it were not there.
-     */
-    uint8_t id;
-} mbm_unit;
-
-/**
- * Cells that your functions hold, one by one, in place of an array. Zero it, set
- * what you need, and hand it to mbm_server_serveCallbacks.
- */
-typedef struct mbm_cells {
-    /**
-     * Not for you.
-     */
-    struct mbm_service service;
-    /**
-     * Handed to each function. Yours, may be NULL.
-     */
-    void *context;
-    /**
-     * Optional, NULL if every address is there: 1 if this one is. What is not
-     * there is answered with exception 02.
-     */
-    uint8_t (*isValid)(void *context, uint16_t address);
-    /**
-     * A cell that is there; of a bit, 0 or anything else.
-     */
-    uint16_t (*get)(void *context, uint16_t address);
-    /**
-     * Sets a cell that is there; a bit to 0 or 1. Not needed for what is only read.
-     */
-    void (*set)(void *context, uint16_t address, uint16_t value);
-    /**
-     * As in mbm_registerTable.
-     */
-    uint8_t (*before)(void *context,
-                      uint16_t address,
-                      uint16_t quantity,
-                      const uint8_t *data);
-    /**
-     * As in mbm_registerTable.
-     */
-    void (*after)(void *context, uint16_t address, uint16_t quantity);
-} mbm_cells;
-
-/**
- * A request for a function of yours.
- */
-typedef struct mbm_request {
-    /**
-     * What stands behind the function code.
-     */
-    const uint8_t *data;
-    /**
-     * Bytes of it, 0 to 252.
-     */
-    uint16_t length;
-    /**
-     * The unit that it was sent to. On a serial line 0 is broadcast: no response is
-     * sent.
-     */
-    uint8_t unit;
-    /**
-     * The function code.
-     */
-    uint8_t function;
-} mbm_request;
-
-/**
- * A function of yours. Zero it, set what you need, and hand it to
- * mbm_server_serveCustom.
- */
-typedef struct mbm_custom {
-    /**
-     * Not for you.
-     */
-    struct mbm_service service;
-    /**
-     * Carries out a request and writes the data of the response, which stand
-     * behind the function code, to `response`. `capacity` is what the frame
-     * buffer has left behind the request, at most 252 of it are used. Returns
-     * how many bytes it wrote, or MBM_REPLY_EXCEPTION | code, MBM_REPLY_NONE or
-     * MBM_REPLY_PENDING.
-     */
-    uint16_t (*serve)(void *context,
-                      const struct mbm_request *request,
-                      uint8_t *response,
-                      uint16_t capacity);
-    /**
-     * Handed to `serve`. Yours, may be NULL.
-     */
-    void *context;
-    /**
-     * The function code, 1 to 127; 0 is every function that nothing before it
-     * serves. 65 to 72 and 100 to 110 are left to users (V1.1b3, 5).
-     */
-    uint8_t code;
-    /**
-     * How long its request PDUs are, which RTU over TCP asks. Zeroed, a request is
-     * whole once its CRC is right.
-     */
-    struct mbm_rule length;
-} mbm_custom;
-
-/**
- * Functions that a unit answers with exception 01, though it could serve them:
- * see mbm_server_switchOff.
- */
-typedef struct mbm_switches {
-    /**
-     * Not for you.
-     */
-    struct mbm_service service;
-    /**
-     * Not for you.
-     */
-    uint8_t off[16];
-} mbm_switches;
-
-/**
- * One file: an array of records, each a register.
- */
-typedef struct mbm_file {
-    /**
-     * The records, from record 0 on.
-     */
-    uint16_t *records;
-    /**
-     * How many, up to 10000.
-     */
-    uint16_t size;
-    /**
-     * The file number, from 1 on.
-     */
-    uint16_t number;
-} mbm_file;
-
-/**
- * Files of yours. Zero it, set what you need, and hand it to
- * mbm_server_serveFiles.
- */
-typedef struct mbm_files {
-    /**
-     * Not for you.
-     */
-    struct mbm_service service;
-    /**
-     * The files.
-     */
-    const struct mbm_file *files;
-    /**
-     * How many.
-     */
-    uint16_t count;
-    /**
-     * Optional: asked before records are written, for each group of a request
-     * before any is written. `data` are the new values, high bytes first.
-     * Returns 0, or an exception code that refuses the whole request.
-     */
-    uint8_t (*before)(void *context,
-                      uint16_t file,
-                      uint16_t record,
-                      uint16_t length,
-                      const uint8_t *data);
-    /**
-     * Optional: told what was written, once a group.
-     */
-    void (*after)(void *context, uint16_t file, uint16_t record, uint16_t length);
-    /**
-     * Handed to both hooks. Yours, may be NULL.
-     */
-    void *context;
-} mbm_files;
-
-/**
- * One queue of registers.
- */
-typedef struct mbm_fifo {
-    /**
-     * The registers, the first to leave first.
-     */
-    const uint16_t *words;
-    /**
-     * The address of the queue.
-     */
-    uint16_t address;
-    /**
-     * How many registers it holds now; more than 31 are answered with exception
-     * 03 (V1.1b3, 6.18).
-     */
-    uint16_t count;
-} mbm_fifo;
-
-/**
- * Queues of yours. Zero it, set both, and hand it to mbm_server_serveFifos.
- */
-typedef struct mbm_fifos {
-    /**
-     * Not for you.
-     */
-    struct mbm_service service;
-    /**
-     * The queues. Reading does not empty them.
-     */
-    const struct mbm_fifo *fifos;
-    /**
-     * How many.
-     */
-    uint16_t count;
-} mbm_fifos;
-
-/**
- * The eight outputs of function 07. Zero it, and hand it to
- * mbm_server_serveExceptionStatus.
- */
-typedef struct mbm_exceptionStatus {
-    /**
-     * Not for you.
-     */
-    struct mbm_service service;
-    /**
-     * The outputs; change them at any time.
-     */
-    uint8_t outputs;
-} mbm_exceptionStatus;
-
-/**
- * What function 11 answers. Zero it, set what you need, and hand it to
- * mbm_server_serveServerId. All together at most 251 bytes, less what the frame
- * buffer lacks; more is answered with exception 04.
- */
-typedef struct mbm_serverId {
-    /**
-     * Not for you.
-     */
-    struct mbm_service service;
-    /**
-     * The id; NULL only with 0 bytes.
-     */
-    const uint8_t *id;
-    /**
-     * What stands behind the run indicator; NULL only with 0 bytes.
-     */
-    const uint8_t *additional;
-    /**
-     * Bytes of the id.
-     */
-    uint8_t idLength;
-    /**
-     * Bytes behind the run indicator.
-     */
-    uint8_t additionalLength;
-    /**
-     * The run indicator: 0 is answered as 00, anything else as FF.
-     */
-    uint8_t running;
-} mbm_serverId;
-
-/**
- * A device identification. Zero it, set both, and hand it to
- * mbm_server_serveIdentification.
- */
-typedef struct mbm_identification {
-    /**
-     * Not for you.
-     */
-    struct mbm_service service;
-    /**
-     * The objects, in any order: ids 0 vendor name, 1 product code and 2 revision,
-     * which every device has; 3 vendor URL, 4 product name, 5 model name, 6 application
-     * name; from 0x80 on yours. Each has 244 bytes at most.
-     */
-    const struct mbm_object *objects;
-    /**
-     * How many.
-     */
-    uint16_t count;
-} mbm_identification;
-
-/**
- * Coils or discrete inputs in an array of yours, eight to a byte, lowest bit
- * first; as mbm_registerTable.
- */
-typedef struct mbm_bitTable {
-    /**
-     * Not for you.
-     */
-    struct mbm_service service;
-    /**
-     * The bits.
-     */
-    uint8_t *bits;
-    /**
-     * As in mbm_registerTable.
-     */
-    const uint8_t *valid;
-    /**
-     * As in mbm_registerTable; `data` are bits, lowest first.
-     */
-    uint8_t (*before)(void *context,
-                      uint16_t address,
-                      uint16_t quantity,
-                      const uint8_t *data);
-    /**
-     * As in mbm_registerTable.
-     */
-    void (*after)(void *context, uint16_t address, uint16_t quantity);
-    /**
-     * As in mbm_registerTable.
-     */
-    void *context;
-    /**
-     * The address of the first bit.
-     */
-    uint16_t base;
-    /**
-     * How many bits there are.
-     */
-    uint16_t size;
-} mbm_bitTable;
-
-/**
- * Holding or input registers in an array of yours. Zero it, set what you need,
- * and hand it to mbm_server_serveHoldingRegisters or
- * mbm_server_serveInputRegisters. You may change words and settings at any
- * time, but not from within a hook of this table: the request under way goes on
- * with the words that the table had when it came. To serve it as another kind of
- * table, zero it first.
- */
-typedef struct mbm_registerTable {
-    /**
-     * Not for you.
-     */
-    struct mbm_service service;
-    /**
-     * The registers.
-     */
-    uint16_t *words;
-    /**
-     * Optional, NULL if every register is there: a bit for each, lowest bit of
-     * the first byte first; 0 answers exception 02.
-     */
-    const uint8_t *valid;
-    /**
-     * Optional: asked before registers are written, once a request. `data` are
-     * the new values, high bytes first. Returns 0, or an exception code that
-     * refuses the whole request.
-     */
-    uint8_t (*before)(void *context,
-                      uint16_t address,
-                      uint16_t quantity,
-                      const uint8_t *data);
-    /**
-     * Optional: told what was written.
-     */
-    void (*after)(void *context, uint16_t address, uint16_t quantity);
-    /**
-     * Handed to both hooks. Yours, may be NULL.
-     */
-    void *context;
-    /**
-     * The address of the first register.
-     */
-    uint16_t base;
-    /**
-     * How many registers there are.
-     */
-    uint16_t size;
-} mbm_registerTable;
-
-/**
- * A sniffer: finds the frames on a bus that others use, and pairs requests with
- * replies. It only listens, and has no port: you feed it what you hear.
- *
- * Storage is yours and must be zero before first use, which a static object is.
- * Everything but mbm_sniffer_begin wants that before. Not re-entrant: use one
- * object from one thread and never from an interrupt; put an mbm_ring between.
- */
-typedef struct mbm_sniffer {
-    /**
-     * Not for you.
-     */
-    void *pointers[1];
-    /**
-     * Not for you.
-     */
-    uint32_t words[171];
-} mbm_sniffer;
-
-/**
- * Something that happened on the bus.
- *
- * What it points to lies in the sniffer's buffer, and is valid until the next
- * call with that sniffer.
- */
-typedef struct mbm_event {
-    /**
-     * The frame; of noise the bytes. An ASCII frame is decoded: unit, PDU, LRC.
-     */
-    const uint8_t *frame;
-    /**
-     * The PDU in the frame; NULL if there is none.
-     */
-    const uint8_t *pdu;
-    /**
-     * What the PDU says, as mbm_packet_parse tells it. If it cannot be read, of a
-     * timeout and of what is no frame: kind, unit, transaction and function alone.
-     */
-    struct mbm_packet packet;
-    /**
-     * When its last byte arrived, in microseconds; of a timeout when the request
-     * was given up.
-     */
-    uint32_t time;
-    /**
-     * From the last byte of the request to the last byte of its reply, or until it
-     * was given up, in microseconds; else 0.
-     */
-    uint32_t responseTime;
-    /**
-     * Bytes of `frame`.
-     */
-    uint16_t frameLength;
-    /**
-     * Bytes of `pdu`.
-     */
-    uint16_t pduLength;
-    /**
-     * How many bytes on the line this was.
-     */
-    uint16_t length;
-    /**
-     * What this is about, also of a reply that does not say so itself: the first
-     * coil, input or register of the request; 17: that is read.
-     */
-    uint16_t address;
-    /**
-     * How many; 17: that are read.
-     */
-    uint16_t quantity;
-    /**
-     * One of MBM_EVENT_.
-     */
-    uint8_t kind;
-    /**
-     * MBM_OK; of a request the exception that a server answers to it; the code of
-     * an exception; MBM_MALFORMED_REPLY if a reply does not answer what was asked;
-     * MBM_RESPONSE_TIMED_OUT; MBM_INVALID_CRC; MBM_BUFFER_TOO_SMALL of noise that
-     * may have been a frame longer than the buffer.
-     */
-    uint8_t status;
-    /**
-     * The unit that is asked, or answers; of a bad CRC the byte in its place.
-     */
-    uint8_t unit;
-    /**
-     * The function code, of an exception that of the request; of a bad CRC the
-     * byte in its place.
-     */
-    uint8_t function;
-    /**
-     * The first bytes of the request's PDU, of replies and timeouts.
-     */
-    uint8_t asked[9];
-    /**
-     * How many those are; 0 if the request is not known.
-     */
-    uint8_t askedLength;
-} mbm_event;
-
-#ifdef __cplusplus
-extern "C" {
-#endif // __cplusplus
-
-/**
- * Packs coils for a write, the first into the lowest bit of the first byte (V1.1b3,
- * 6.11); unused bits of the last byte become 0, bytes behind it stay.
- *
- * @param coils     a byte a coil: 0 is off, anything else is on
- * @param quantity  how many coils, 0 to 65535
- * @param bytes     gets the bits, 8 a byte
- * @param length    how many bytes there are
- * @return MBM_OK, or with nothing packed MBM_BUFFER_TOO_SMALL or
- *         MBM_INVALID_ARGUMENT for a NULL pointer
- */
-uint8_t mbm_bits_pack(const uint8_t *coils,
-                      uint16_t quantity,
-                      uint8_t *bytes,
-                      uint16_t length);
-
-/**
- * Unpacks the coils or discrete inputs of a read (V1.1b3, 6.1).
- *
- * @param bytes     the bits, 8 a byte, the first coil the lowest
- * @param length    how many bytes there are
- * @param coils     gets 0 or 1 a coil
- * @param quantity  how many coils, 0 to 65535
- * @return MBM_OK, or with nothing unpacked MBM_ILLEGAL_DATA_ADDRESS if there are
- *         not so many bits, MBM_INVALID_ARGUMENT for a NULL pointer
- */
-uint8_t mbm_bits_unpack(const uint8_t *bytes,
-                        uint16_t length,
-                        uint8_t *coils,
-                        uint16_t quantity);
-
-/**
- * Whether a coil or discrete input is set, by the device's address.
- *
- * @param bytes     the bits of a read, 8 a byte, the first coil the lowest
- * @param first     the address of the first coil
- * @param quantity  how many coils were read; `bytes` has room for so many
- * @param address   the coil
- * @param on        gets 0 or 1
- * @return MBM_OK, or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS for a coil that
- *         is not among them or a range that passes 65535, MBM_INVALID_ARGUMENT
- *         for a NULL pointer
- */
-uint8_t mbm_bits_isSet(const uint8_t *bytes,
-                       uint16_t first,
-                       uint16_t quantity,
-                       uint16_t address,
-                       uint8_t *on);
-
-/**
- * Sets a coil for a write, by the device's address; the others stay.
- *
- * @param bytes     the bits of a write, 8 a byte, the first coil the lowest
- * @param first     the address of the first coil
- * @param quantity  how many coils are written; `bytes` has room for so many
- * @param address   the coil
- * @param on        0 is off, anything else is on
- * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a coil that is
- *         not among them or a range that passes 65535, MBM_INVALID_ARGUMENT for
- *         a NULL pointer
- */
-uint8_t mbm_bits_set(uint8_t *bytes,
-                     uint16_t first,
-                     uint16_t quantity,
-                     uint16_t address,
-                     uint8_t on);
-
-/**
- * As mbm_bits_pack, into words such as mbm_master's transmit words, 16 to a word.
- *
- * @param coils     a byte a coil: 0 is off, anything else is on
- * @param quantity  how many coils, 0 to 65535
- * @param words     gets the bits, 16 a word
- * @param length    how many words there are
- * @return MBM_OK, or with nothing packed MBM_BUFFER_TOO_SMALL or
- *         MBM_INVALID_ARGUMENT for a NULL pointer
- */
-uint8_t mbm_bits_packWords(const uint8_t *coils,
-                           uint16_t quantity,
-                           uint16_t *words,
-                           uint16_t length);
-
-/**
- * As mbm_bits_unpack, of words such as mbm_master's response words.
- *
- * @param words     the bits, 16 a word, the first coil the lowest
- * @param length    how many words there are
- * @param coils     gets 0 or 1 a coil
- * @param quantity  how many coils, 0 to 65535
- * @return MBM_OK, or with nothing unpacked MBM_ILLEGAL_DATA_ADDRESS if there are
- *         not so many bits, MBM_INVALID_ARGUMENT for a NULL pointer
- */
-uint8_t mbm_bits_unpackWords(const uint16_t *words,
-                             uint16_t length,
-                             uint8_t *coils,
-                             uint16_t quantity);
-
-/**
- * As mbm_bits_isSet, in words such as mbm_master's response words.
- *
- * @param words     the bits of a read, 16 a word, the first coil the lowest
- * @param first     the address of the first coil
- * @param quantity  how many coils were read; `words` has room for so many
- * @param address   the coil
- * @param on        gets 0 or 1
- * @return MBM_OK, or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS for a coil that
- *         is not among them or a range that passes 65535, MBM_INVALID_ARGUMENT
- *         for a NULL pointer
- */
-uint8_t mbm_bits_isSetInWords(const uint16_t *words,
-                              uint16_t first,
-                              uint16_t quantity,
-                              uint16_t address,
-                              uint8_t *on);
-
-/**
- * As mbm_bits_set, in words such as mbm_master's transmit words.
- *
- * @param words     the bits of a write, 16 a word, the first coil the lowest
- * @param first     the address of the first coil
- * @param quantity  how many coils are written; `words` has room for so many
- * @param address   the coil
- * @param on        0 is off, anything else is on
- * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a coil that is
- *         not among them or a range that passes 65535, MBM_INVALID_ARGUMENT for
- *         a NULL pointer
- */
-uint8_t mbm_bits_setInWords(uint16_t *words,
-                            uint16_t first,
-                            uint16_t quantity,
-                            uint16_t address,
-                            uint8_t on);
-
-/**
- * Makes an object a client of a serial line, in RTU frames (serial line guide
- * V1.02, 2.5.1).
- *
- * @param client      the object, zeroed
- * @param port        copied; read, write and micros must be there
- * @param frame       bytes of one frame, valid for as long as the client is used
- * @param frameBytes  at least 8; 256 hold any frame
- * @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
- *         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
- */
-uint8_t mbm_client_beginRtu(struct mbm_client *client,
-                            const struct mbm_port *port,
-                            uint8_t *frame,
-                            uint16_t frameBytes);
-
-/**
- * Makes an object a client of a serial line, in ASCII frames (serial line guide
- * V1.02, 2.5.2). No gap is kept between frames; a second without a character
- * ends one that is not whole.
- *
- * @param client      the object, zeroed
- * @param port        copied; read, write and micros must be there
- * @param frame       bytes of one frame, valid for as long as the client is used
- * @param frameBytes  at least 17; 513 hold any frame
- * @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
- *         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
- */
-uint8_t mbm_client_beginAscii(struct mbm_client *client,
-                              const struct mbm_port *port,
-                              uint8_t *frame,
-                              uint16_t frameBytes);
-
-/**
- * Sets the character that ends ASCII frames behind CR, in place of LF, in both
- * directions; for devices that were told another one (function 08 with
- * sub-function 03, V1.1b3, 6.8.1). That request is answered with the old one: call
- * this when it has ended, for example from its `done`.
- *
- * @param client     the object, begun with mbm_client_beginAscii
- * @param character  1 to 127, but CR, the colon and hexadecimal digits
- * @return MBM_OK; MBM_BUSY while a request is under way; MBM_INVALID_ARGUMENT, also
- *         for a client of another framing; MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setDelimiter(struct mbm_client *client, uint8_t character);
-
-/**
- * Makes an object a client that sends RTU frames through a TCP stream, for
- * converters that pass on what they get. No gap is kept, nothing is broadcast.
- *
- * @param client      the object, zeroed
- * @param port        copied; read, write and micros must be there
- * @param frame       bytes of one frame, valid for as long as the client is used
- * @param frameBytes  at least 8; 256 hold any frame
- * @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
- *         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
- */
-uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
-                                   const struct mbm_port *port,
-                                   uint8_t *frame,
-                                   uint16_t frameBytes);
-
-/**
- * Makes an object a client of a TCP stream, in frames with the MBAP header
- * (messaging on TCP/IP guide V1.0b, 3.1.3). All 16 requests may be under way at
- * once; responses are matched by their transaction id, in any order.
- *
- * @param client         the object, zeroed
- * @param port           copied; read, write and micros must be there
- * @param incoming       received bytes, valid for as long as the client is used
- * @param incomingBytes  at least 9; 260 hold any frame, more take in more
- *                       responses at a time
- * @param outgoing       bytes to send, valid for as long as the client is used
- * @param outgoingBytes  at least 12; 260 hold any frame, more gather more
- *                       requests for one write
- * @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
- *         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
- */
-uint8_t mbm_client_beginTcp(struct mbm_client *client,
-                            const struct mbm_port *port,
-                            uint8_t *incoming,
-                            uint16_t incomingBytes,
-                            uint8_t *outgoing,
-                            uint16_t outgoingBytes);
-
-/**
- * Sets how many requests are under way at once on TCP, for servers that take fewer
- * at a time (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 1 to
- * 16); some drop what comes in one segment with another request. The queue holds 16 in any case.
- *
- * @param client  the object
- * @param most    1 to 16, which is so at first; on a serial line, and in RTU over
- *                TCP, 1
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setInFlight(struct mbm_client *client,
-                               uint8_t most);
-
-/**
- * Closes the link and opens it anew. What was half received is forgotten, and
- * requests that were under way end with MBM_LINK_LOST at the next polls; those
- * that still waited go over the new link.
- *
- * @param client  the object
- * @param link    what does it, used during this call only; NULL if that has been
- *                done already
- * @return what `connect` returns, MBM_OK without it; MBM_BUSY while the line is
- *         lent, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_reconnect(struct mbm_client *client, const struct mbm_link *link);
-
-/**
- * Whether the link is not known to be lost.
- *
- * If `connect` of mbm_client_reconnect returned MBM_PENDING, this is 0 until a reply
- * arrives. Do not reconnect again before the connection had its time: the port knows
- * better whether it is still being made, for example mbm_tcp_isConnected.
- *
- * @param client  the object
- * @return 0 from a request that ended with MBM_LINK_LOST on, until a reply arrives
- *         (an exception is one) or mbm_client_reconnect returns MBM_OK; 1 otherwise,
- *         and also before the first request
- */
-uint8_t mbm_client_isConnected(const struct mbm_client *client);
-
-/**
- * Lends the line to a facade, whose functions then use the client's port; the
- * client's requests wait until mbm_client_takeBack. One of the two has the line
- * at any time. Until then the client's storage must stay: do not zero it.
- *
- * @param client  the object; for a facade, of RTU frames on a line or over TCP
- * @param master  a facade with buffers, which gets the client's port; NULL if
- *                you use the line in another way
- * @return MBM_OK; MBM_BUSY, with both unchanged, if a request is under way or the line
- *         is lent already; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_lend(struct mbm_client *client, struct mbm_master *master);
-
-/**
- * Takes the line back. The facade has no port then, so that its functions refuse
- * with MBM_NOT_INITIALISED.
- *
- * @param client  the object
- * @param master  as for mbm_client_lend
- * @return MBM_OK, MBM_BUSY while the facade has a request under way,
- *         MBM_INVALID_ARGUMENT if the line was not lent, MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_takeBack(struct mbm_client *client, struct mbm_master *master);
-
-/**
- * Moves all requests on, without waiting, and calls `done` of those that have
- * ended, of at most 17 in one call.
- *
- * Call it as often as you like; mbm_client_pollDelay tells when the next call
- * is due.
- *
- * @param client  the object
- * @return MBM_PENDING while requests wait or are under way, MBM_OK if there are
- *         none, MBM_BUSY from within `done` and while the line is lent;
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_poll(struct mbm_client *client);
-
-/**
- * How long mbm_client_poll will find nothing to do unless a byte arrives, so
- * that a program may wait for one in select, or sleep, until then. Bytes are taken
- * only while a request is pending: with none, wait for something else.
- *
- * @param client  the object
- * @return microseconds; 0 means poll now, and is returned within a hook of the port;
- *         0xFFFFFFFF that there is no request; 1000
- *         while a TCP port does not take what is to be sent: to poll sooner, wait
- *         for that too, as mbm_tcp_wait does
- */
-uint32_t mbm_client_pollDelay(struct mbm_client *client);
-
-/**
- * How many requests wait or are under way.
- *
- * @param client  the object
- * @return 0 to 16
- */
-uint8_t mbm_client_pending(const struct mbm_client *client);
-
-/**
- * Gives a request up. It is yours again at once, with the status MBM_CANCELLED;
- * `done` is not called. It may have reached the device, and may still be answered.
- *
- * @param client   the object
- * @param request  a request that this client was given
- * @return MBM_OK; MBM_NOT_PENDING, with nothing changed, for a request that has
- *         ended already or was never queued here; MBM_INVALID_ARGUMENT or
- *         MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_cancel(struct mbm_client *client, struct mbm_clientRequest *request);
-
-/**
- * The transaction identifier on the wire: that of the TCP frame in which the request
- * was sent last. The client chooses it, another one for each frame, also for a retry.
- *
- * @param request  a request, pending or ended
- * @return the identifier; 0 in other framings, for a request that was never sent, and
- *         for NULL. 0 is also an identifier
- */
-uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
-
-/**
- * Function 01: reads coils into `reply`, eight to a byte, the lowest bit first, the
- * last byte padded with zeros (V1.1b3, 6.1).
- *
- * This and the other functions behave alike: they queue a request and return. The
- * request has ended when its `status` is no longer MBM_PENDING: MBM_OK, an exception
- * of the device (0x01 to 0x7F), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
- * MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION, MBM_LINK_LOST,
- * MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes on MBM_OK only.
- *
- * @param client   the object
- * @param request  the request
- * @param address  first coil, 0 to 65535, as on the wire
- * @param quantity  1 to 2000
- * @return MBM_PENDING: the request is queued; or, with nothing queued,
- *         MBM_ILLEGAL_DATA_VALUE or MBM_ILLEGAL_DATA_ADDRESS for what no device
- *         could accept, MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL,
- *         MBM_DUPLICATE_TRANSACTION, MBM_BUFFER_TOO_SMALL if `reply` has no room
- *         for the data, MBM_INVALID_ARGUMENT for `data` that are NULL,
- *         MBM_NOT_INITIALISED; MBM_BUSY, with the request unchanged, if it is
- *         pending already, and from within a hook of the port. A request that
- *         is refused with another of these has it in `status`
- */
-uint8_t mbm_client_readCoils(struct mbm_client *client,
-                             struct mbm_clientRequest *request,
-                             uint16_t address,
-                             uint16_t quantity);
-
-/**
- * Function 01: reads one coil into the lowest bit of a byte (V1.1b3, 6.1).
- *
- * @param client   the object
- * @param request  the request
- * @param address  0 to 65535, as on the wire
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_readSingleCoil(struct mbm_client *client,
-                                  struct mbm_clientRequest *request,
-                                  uint16_t address);
-
-/**
- * Function 02: reads discrete inputs, as mbm_client_readCoils (V1.1b3, 6.2).
- *
- * @param client   the object
- * @param request  the request
- * @param address  first input, 0 to 65535, as on the wire
- * @param quantity  1 to 2000
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_readDiscreteInputs(struct mbm_client *client,
-                                      struct mbm_clientRequest *request,
-                                      uint16_t address,
-                                      uint16_t quantity);
-
-/**
- * Function 02: reads one discrete input into the lowest bit of a byte (V1.1b3, 6.2).
- *
- * @param client   the object
- * @param request  the request
- * @param address  0 to 65535, as on the wire
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_readSingleDiscreteInput(struct mbm_client *client,
-                                           struct mbm_clientRequest *request,
-                                           uint16_t address);
-
-/**
- * Function 03: reads holding registers into the words of `reply` (V1.1b3, 6.3).
- *
- * @param client   the object
- * @param request  the request
- * @param address  first register, 0 to 65535, as on the wire
- * @param quantity  1 to 125
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_readHoldingRegisters(struct mbm_client *client,
-                                        struct mbm_clientRequest *request,
-                                        uint16_t address,
-                                        uint16_t quantity);
-
-/**
- * Function 03: reads one holding register into a word (V1.1b3, 6.3).
- *
- * @param client   the object
- * @param request  the request
- * @param address  0 to 65535, as on the wire
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_readSingleHoldingRegister(struct mbm_client *client,
-                                             struct mbm_clientRequest *request,
-                                             uint16_t address);
-
-/**
- * Function 04: reads input registers into the words of `reply` (V1.1b3, 6.4).
- *
- * @param client   the object
- * @param request  the request
- * @param address  first register, 0 to 65535, as on the wire
- * @param quantity  1 to 125
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_readInputRegisters(struct mbm_client *client,
-                                      struct mbm_clientRequest *request,
-                                      uint16_t address,
-                                      uint16_t quantity);
-
-/**
- * Function 04: reads one input register into a word (V1.1b3, 6.4).
- *
- * @param client   the object
- * @param request  the request
- * @param address  0 to 65535, as on the wire
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_readSingleInputRegister(struct mbm_client *client,
-                                           struct mbm_clientRequest *request,
-                                           uint16_t address);
-
-/**
- * Function 05: switches a coil (V1.1b3, 6.5).
- *
- * @param client   the object
- * @param request  the request
- * @param address  0 to 65535, as on the wire
- * @param on  0 is off, anything else is on
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_writeSingleCoil(struct mbm_client *client,
-                                   struct mbm_clientRequest *request,
-                                   uint16_t address,
-                                   uint8_t on);
-
-/**
- * Function 06: writes a holding register (V1.1b3, 6.6).
- *
- * @param client   the object
- * @param request  the request
- * @param address  0 to 65535, as on the wire
- * @param value  the value
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_writeSingleRegister(struct mbm_client *client,
-                                       struct mbm_clientRequest *request,
-                                       uint16_t address,
-                                       uint16_t value);
-
-/**
- * Function 0F: writes the coils of `data`, eight to a byte, the lowest bit first
- * (V1.1b3, 6.11).
- *
- * @param client   the object
- * @param request  the request
- * @param address  first coil, 0 to 65535, as on the wire
- * @param quantity  1 to 1968
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_writeMultipleCoils(struct mbm_client *client,
-                                      struct mbm_clientRequest *request,
-                                      uint16_t address,
-                                      uint16_t quantity);
-
-/**
- * Function 10: writes the words of `data` (V1.1b3, 6.12).
- *
- * @param client   the object
- * @param request  the request
- * @param address  first register, 0 to 65535, as on the wire
- * @param quantity  1 to 123
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_writeMultipleRegisters(struct mbm_client *client,
-                                          struct mbm_clientRequest *request,
-                                          uint16_t address,
-                                          uint16_t quantity);
-
-/**
- * Function 16: sets a holding register to (register & andMask) | (orMask & ~andMask)
- * (V1.1b3, 6.16).
- *
- * @param client   the object
- * @param request  the request
- * @param address  0 to 65535, as on the wire
- * @param andMask  bits to keep
- * @param orMask  bits to set where none are kept
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_maskWriteRegister(struct mbm_client *client,
-                                     struct mbm_clientRequest *request,
-                                     uint16_t address,
-                                     uint16_t andMask,
-                                     uint16_t orMask);
-
-/**
- * Function 17: writes the words of `data`, then reads into the words of `reply`
- * (V1.1b3, 6.17).
- *
- * @param client   the object
- * @param request  the request
- * @param readAddress  first register to read
- * @param readQuantity  1 to 125
- * @param writeAddress  first register to write
- * @param writeQuantity  1 to 121
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_readWriteMultipleRegisters(struct mbm_client *client,
-                                              struct mbm_clientRequest *request,
-                                              uint16_t readAddress,
-                                              uint16_t readQuantity,
-                                              uint16_t writeAddress,
-                                              uint16_t writeQuantity);
-
-/**
- * Function 07: reads eight outputs into a byte (V1.1b3, 6.7).
- *
- * @param client   the object
- * @param request  the request
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_readExceptionStatus(struct mbm_client *client,
-                                       struct mbm_clientRequest *request);
-
-/**
- * Function 08: sends the words of `data`, and reads as many into `reply` (V1.1b3,
- * 6.8). No device responds to sub-function 04, Force Listen Only Mode.
- *
- * @param client   the object
- * @param request  the request
- * @param subFunction  0 (Return Query Data) to 0x14. Others, which the standard
- *                     reserves, are sent as they are, and a response of one word is
- *                     expected; for one of another length see mbm_client_custom
- * @param words  1; 1 to 125 for sub-function 0
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_diagnostics(struct mbm_client *client,
-                               struct mbm_clientRequest *request,
-                               uint16_t subFunction,
-                               uint16_t words);
-
-/**
- * Function 0B: reads the status word and the event count into two words (V1.1b3,
- * 6.9).
- *
- * @param client   the object
- * @param request  the request
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_getCommEventCounter(struct mbm_client *client,
-                                       struct mbm_clientRequest *request);
-
-/**
- * Function 0C: reads status, event count and message count, two bytes each with the
- * high byte first, and up to 64 events, the latest first (V1.1b3, 6.10).
- *
- * @param client   the object
- * @param request  the request
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_getCommEventLog(struct mbm_client *client,
-                                   struct mbm_clientRequest *request);
-
-/**
- * Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13). `reply`
- * gets all that follows the byte count, also from a device that counts its id alone
- * and sends more. In RTU frames the silence after it ends such a reply; one that
- * counts right is not waited for.
- *
- * @param client   the object
- * @param request  the request
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_reportServerId(struct mbm_client *client,
-                                  struct mbm_clientRequest *request);
-
-/**
- * Function 14: reads records in a row of one file into words (V1.1b3, 6.14).
- *
- * @param client   the object
- * @param request  the request
- * @param file  1 to 65535
- * @param record  first record, 0 to 9999
- * @param quantity  1 to 121
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_readFileRecord(struct mbm_client *client,
-                                  struct mbm_clientRequest *request,
-                                  uint16_t file,
-                                  uint16_t record,
-                                  uint16_t quantity);
-
-/**
- * Function 15: writes the words of `data` to records in a row of one file (V1.1b3,
- * 6.15).
- *
- * @param client   the object
- * @param request  the request
- * @param file  1 to 65535
- * @param record  first record, 0 to 9999
- * @param quantity  1 to 122
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_writeFileRecord(struct mbm_client *client,
-                                   struct mbm_clientRequest *request,
-                                   uint16_t file,
-                                   uint16_t record,
-                                   uint16_t quantity);
-
-/**
- * Function 14 of several groups: `data` are the sub-requests as on the wire, seven
- * bytes each; `reply` gets the sub-responses as on the wire (V1.1b3, 6.14).
- *
- * @param client   the object
- * @param request  the request
- * @param bytes  7 to 245, a multiple of 7
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_readFileRecords(struct mbm_client *client,
-                                   struct mbm_clientRequest *request,
-                                   uint16_t bytes);
-
-/**
- * Function 15 of several groups: `data` are the sub-requests as on the wire (V1.1b3,
- * 6.15).
- *
- * @param client   the object
- * @param request  the request
- * @param bytes  9 to 251
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_writeFileRecords(struct mbm_client *client,
-                                    struct mbm_clientRequest *request,
-                                    uint16_t bytes);
-
-/**
- * Function 18: reads up to 31 registers of a queue into words (V1.1b3, 6.18).
- *
- * @param client   the object
- * @param request  the request
- * @param address  the pointer address of the queue
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_readFifoQueue(struct mbm_client *client,
-                                 struct mbm_clientRequest *request,
-                                 uint16_t address);
-
-/**
- * Function 2B/0E: reads objects that identify the device (V1.1b3, 6.21). `reply` gets,
- * as on the wire, conformity level, more follows (0 or FF), the next object id, how
- * many objects there are, and of each its id, length and value.
- *
- * @param client   the object
- * @param request  the request
- * @param code  1 basic, 2 regular, 3 extended, 4 one object
- * @param object  the object to begin with
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_readDeviceIdentification(struct mbm_client *client,
-                                            struct mbm_clientRequest *request,
-                                            uint8_t code,
-                                            uint8_t object);
-
-/**
- * Function 2B of any MEI type: sends bytes of `data` and reads what comes (V1.1b3,
- * 6.19). On RTU, silence ends the response.
- *
- * @param client   the object
- * @param request  the request
- * @param meiType  0x0D is CANopen
- * @param bytes  0 to 251
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_encapsulatedInterfaceTransport(struct mbm_client *client,
-                                                  struct mbm_clientRequest *request,
-                                                  uint8_t meiType,
-                                                  uint16_t bytes);
-
-/**
- * Any function: sends bytes of `data` behind the function code, and reads what is
- * behind it in the response.
- *
- * @param client    the object
- * @param request   the request
- * @param function  1 to 127
- * @param bytes     0 to 252
- * @param response  how long the response is; used during this call only
- * @return a status; see mbm_client_readCoils
- */
-uint8_t mbm_client_custom(struct mbm_client *client,
-                          struct mbm_clientRequest *request,
-                          uint8_t function,
-                          uint16_t bytes,
-                          const struct mbm_rule *response);
-
-/**
- * Any request, as it arrived from another client: sends `function` and the bytes of
- * `body`, and reads into `reply` all bytes that follow the function code of the
- * response, as on the wire. This is what a gateway needs: `body` and `reply` are
- * what the functions of mbm_server_serveCustom get and return.
- *
- * A response counts only if it answers this request, as in the functions above: its
- * length, byte count, echoed address, value, quantity and records must be right. Of a
- * function that the standard does not define, and of sub-functions of 08 from 0x15 on,
- * silence ends the response on RTU. If you know its length, use mbm_client_custom.
- *
- * 08 with sub-function 04 gets no response: it ends with MBM_OK and `length` 0 after
- * the turnaround delay.
- *
- * @param client    the object
- * @param request   the request; if it is queued, its `data` then points into `body`
- * @param function  1 to 127
- * @param body      the bytes after the function code; leave them alone until the
- *                  request has ended; may be NULL if there are none
- * @param bytes     0 to 252
- * @return a status; see mbm_client_readCoils. MBM_ILLEGAL_DATA_VALUE also for a body
- *         whose length or counts are wrong, MBM_ILLEGAL_FUNCTION for function 0 or
- *         one above 127: what a server answers to such a request
- */
-uint8_t mbm_client_forward(struct mbm_client *client,
-                           struct mbm_clientRequest *request,
-                           uint8_t function,
-                           const uint8_t *body,
-                           uint16_t bytes);
-
-/**
- * Sets how long a response may take. The time begins with the end of the request on a
- * serial line and in RTU over TCP; in TCP frames when mbm_client_poll puts the request
- * into the outgoing buffer, also if the port takes it later.
- *
- * @param client        the object
- * @param milliseconds  0 to 65535; 2000 at first
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setResponseTimeout(struct mbm_client *client, uint16_t milliseconds);
-
-/**
- * Tells the baud rate of an RTU line, from which the gap before a request (t3.5,
- * serial line guide V1.02, 2.5.1.1) and the length of a character follow. It sets
- * nothing on the line. Untold, the gap is 4 ms, which is safe from 9600 up.
- *
- * @param client  the object
- * @param baud    bits per second; 0 goes back to untold
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setBaudRate(struct mbm_client *client, uint32_t baud);
-
-/**
- * Sets the silence before a request, in place of t3.5; a later
- * mbm_client_setBaudRate sets it back. Without effect on TCP.
- *
- * @param client        the object
- * @param microseconds  counted from the last byte seen or sent; more than 2^31
- *                      (36 minutes) means 2^31
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setGap(struct mbm_client *client, uint32_t microseconds);
-
-/**
- * Sets how long a request takes that nobody responds to: a broadcast (serial
- * line guide V1.02, 2.4.1), and 08 with sub-function 04.
- *
- * @param client        the object
- * @param milliseconds  0 to 65535; 100 at first
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setTurnaroundDelay(struct mbm_client *client, uint16_t milliseconds);
-
-/**
- * Sets the quiet time of a serial line, which keeps a late reply from being taken
- * for the answer to a later request; see mbm_master_setQuietTime. Without effect on
- * TCP, where responses have a number.
- *
- * @param client        the object
- * @param milliseconds  0 to 65535; 100 at first; 0 holds no reply
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setQuietTime(struct mbm_client *client, uint16_t milliseconds);
-
-/**
- * Tells that the receiver hears what the driver sends, so each request comes back
- * before its reply and is to be dropped. Without effect on TCP.
- *
- * @param client  the object
- * @param on      0 (at first) or 1
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setEchoDiscard(struct mbm_client *client, uint8_t on);
-
-/**
- * Holds the driver on after the port's flush, for platforms whose flush returns
- * before the last bit has left. Without effect on TCP.
- *
- * @param client      the object
- * @param characters  times one character of the told baud rate (9600 if untold);
- *                    0 at first
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setPostFlushHold(struct mbm_client *client, uint8_t characters);
-
-/**
- * Sets how often a request is repeated whose response is missing, damaged or
- * malformed, or that the port did not take. Exceptions are responses and are not
- * repeated, nor are requests that a lost link interrupted, nor those whose response is
- * too long for a buffer.
- *
- * @param client   the object
- * @param retries  0 to 255; 0 at first
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setRetries(struct mbm_client *client, uint8_t retries);
-
-/**
- * Sets how long a request waits before it is repeated. Other requests are sent
- * meanwhile.
- *
- * @param client            the object
- * @param backoff           MBM_BACKOFF_NONE (at first) to MBM_BACKOFF_EXPONENTIAL
- * @param milliseconds      the wait before the first repetition
- * @param mostMilliseconds  the longest wait
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setBackoff(struct mbm_client *client,
-                              uint8_t backoff,
-                              uint16_t milliseconds,
-                              uint16_t mostMilliseconds);
-
-/**
- * Leaves a part of each wait before a repetition to chance, so that several
- * clients do not keep in step.
- *
- * @param client   the object
- * @param percent  0 (at first) to 100: how much of the wait may be taken off
- * @param random   returns another number each time, for example rand(): one of 32
- *                 bits, of 15 bits, or whose upper bits alone vary. What it
- *                 calls on the client returns MBM_BUSY
- * @param context  handed to `random`
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setJitter(struct mbm_client *client,
-                             uint8_t percent,
-                             uint32_t (*random)(void *context),
-                             void *context);
-
-/**
- * Counts into storage of yours from now on. Read and zero it as you like, but not
- * from an interrupt. In TCP frames, a foreign frame is one whose transaction identifier
- * and unit no pending request has; a resynchronisation is a run of bytes that were no
- * frame.
- *
- * @param client    the object
- * @param counters  zeroed by you; NULL stops counting
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setCounters(struct mbm_client *client, struct mbm_counters *counters);
-
-/**
- * Keeps a record of some units: how often they were asked and answered, and how
- * long each is left alone between two requests.
- *
- * @param client  the object
- * @param units   zeroed by you but for `unit` and `delay`; NULL for none
- * @param count   how many records, 0 to 255
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_client_setUnits(struct mbm_client *client,
-                            struct mbm_clientUnit *units,
-                            uint8_t count);
-
-/**
- * Writes the frame of a packet: request, response or exception. Nothing
- * malformed is ever built.
- *
- * Any thread or interrupt may call it.
- *
- * @param framing   how frames look
- * @param packet    what to build, with its unit, and for TCP the transaction
- * @param frame     receives the frame; may not overlap the packet's data
- * @param capacity  bytes of `frame`; MBM_MAX_FRAME do for RTU,
- *                  MBM_MAX_TCP_FRAME for TCP, MBM_MAX_ASCII_FRAME for all
- * @param length    receives the frame's length; 0 if the status is not MBM_OK
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
- *         that mbm_frame_parse finds in such a frame
- */
-uint8_t mbm_frame_build(const struct mbm_framing *framing,
-                        const struct mbm_packet *packet,
-                        uint8_t *frame,
-                        uint16_t capacity,
-                        uint16_t *length);
-
-/**
- * Reads a frame. The packet's data point into it.
- *
- * A request that is refused with an exception code can be answered with that:
- * see mbm_frame_exception.
- *
- * Any thread or interrupt may call it.
- *
- * @param framing      how frames look
- * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
- *                     and exceptions
- * @param frame        the frame, from its first byte to its last. ASCII is
- *                     decoded where it stands, which overwrites it
- * @param frameLength  its bytes
- * @param packet       receives what it says. If the frame is sound, but not
- *                     what it carries: kind, unit, transaction and function
- *                     alone; if the frame is not sound: kind alone; unchanged
- *                     for MBM_INVALID_ARGUMENT
- * @return MBM_OK, also for an exception; of the frame MBM_INCOMPLETE_FRAME,
- *         MBM_MALFORMED_FRAME, or MBM_INVALID_CRC, also for a wrong LRC; what
- *         mbm_packet_parse says of what it carries; MBM_INVALID_ARGUMENT
- */
-uint8_t mbm_frame_parse(const struct mbm_framing *framing,
-                        uint8_t kind,
-                        uint8_t *frame,
-                        uint16_t frameLength,
-                        struct mbm_packet *packet);
-
-/**
- * Writes the exception that answers a request, where one may: to a request
- * that mbm_frame_parse refused, with its status; to one that your device
- * refuses, with the exception code of your choice.
- *
- * Any thread or interrupt may call it.
- *
- * @param framing   how frames look
- * @param request   the request, as mbm_frame_parse left it
- * @param code      1 to 127, MBM_ILLEGAL_FUNCTION for example
- * @param frame     receives the frame; it may be that of the request
- * @param capacity  bytes of `frame`; 11 always do
- * @param length    receives the frame's length; 0 if the status is not MBM_OK
- * @return MBM_OK; MBM_BROADCAST_NOT_ALLOWED: on a serial line nobody answers
- *         unit 0; MBM_ILLEGAL_FUNCTION for a function from 0x80, which no
- *         exception can name; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also
- *         for a status that is no exception code
- */
-uint8_t mbm_frame_exception(const struct mbm_framing *framing,
-                            const struct mbm_packet *request,
-                            uint8_t code,
-                            uint8_t *frame,
-                            uint16_t capacity,
-                            uint16_t *length);
-
-/**
- * How long the frame is that begins with these bytes.
- *
- * A response to function 11 may be longer than it counts: some devices count the id
- * alone. In RTU frames it is MBM_LENGTH_EXACT once a right CRC stands where the count
- * says, MBM_LENGTH_AT_LEAST before, and if the CRC is wrong there MBM_LENGTH_SILENCE,
- * or MBM_LENGTH_UNKNOWN in a stream.
- *
- * Any thread or interrupt may call it. For ASCII it takes 260 bytes of stack.
- *
- * @param framing   how frames look
- * @param kind      MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and
- *                  exceptions
- * @param bytes     the frame's first bytes; more may follow
- * @param have      how many; may be 0
- * @param expected  receives the length; MBM_LENGTH_UNKNOWN and 0 if the status is
- *                  not MBM_OK
- * @return MBM_OK; MBM_MALFORMED_FRAME if no frame begins like that, or none is
- *         so long; MBM_INVALID_ARGUMENT
- */
-uint8_t mbm_frame_expectedLength(const struct mbm_framing *framing,
-                                 uint8_t kind,
-                                 const uint8_t *bytes,
-                                 uint16_t have,
-                                 struct mbm_length *expected);
-
-/**
- * How long the frame will be that answers a request, if that succeeds. Else it
- * is an exception: 5 bytes in RTU, 9 in TCP, 11 characters in ASCII.
- *
- * Any thread or interrupt may call it. It takes 260 bytes of stack.
- *
- * @param framing   how frames look
- * @param request   the request, as for mbm_frame_build
- * @param expected  receives the length; MBM_LENGTH_EXACT and 0 if nothing ever
- *                  answers it: a broadcast, 08 with sub-function 04;
- *                  MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
- * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a packet that is no request;
- *         else why such a request is never built
- */
-uint8_t mbm_frame_replyLength(const struct mbm_framing *framing,
-                              const struct mbm_packet *request,
-                              struct mbm_length *expected);
-
-/**
- * Says whether bytes look like a Modbus TCP frame, request or response, and how
- * long that is. Eight are needed. The length in the header must be one that a
- * request or a response of this function may have, as far as the bytes tell.
- *
- * Any thread or interrupt may call it.
- *
- * @param bytes         the first bytes
- * @param have          how many
- * @param allowUnknown  0: only with a function code of the standard, or one
- *                      that it leaves to users; else: with any but 0
- * @param expected      receives the bytes of the frame; 0 if the status is not
- *                      MBM_OK
- * @return MBM_OK; MBM_INCOMPLETE_FRAME if more bytes must tell;
- *         MBM_MALFORMED_FRAME if this is something else; MBM_INVALID_ARGUMENT
- */
-uint8_t mbm_frame_looksLikeTcp(const uint8_t *bytes,
-                               uint16_t have,
-                               uint8_t allowUnknown,
-                               uint16_t *expected);
-
-/**
- * The CRC-16 of an RTU frame (serial line guide V1.02, 6.2.2). On the line its
- * low byte comes first.
- *
- * Any thread or interrupt may call it.
- *
- * @param bytes   unit and PDU
- * @param length  how many
- * @return the CRC; 0xFFFF for NULL or no bytes
- */
-uint16_t mbm_frame_crc16(const uint8_t *bytes, uint16_t length);
-
-/**
- * The LRC of an ASCII frame (serial line guide V1.02, 6.2.1).
- *
- * Any thread or interrupt may call it.
- *
- * @param bytes   unit and PDU as bytes, not as characters
- * @param length  how many
- * @return the LRC; 0 for NULL or no bytes
- */
-uint8_t mbm_frame_lrc(const uint8_t *bytes, uint16_t length);
-
-/**
  * Begins to talk to a slave over a port.
  *
  * May be called again at any time, which is cheap: to talk to another slave,
@@ -2962,24 +763,33 @@ uint8_t mbm_frame_lrc(const uint8_t *bytes, uint16_t length);
  * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a missing hook; MBM_BUSY
  *         from within a hook of this object's port but `idle`
  */
-uint8_t mbm_master_begin(struct mbm_master *master,
-                         uint8_t slave,
-                         const struct mbm_port *port);
+uint8_t mbm_master_beginRtu(struct mbm_master *master,
+                            uint8_t slave,
+                            const struct mbm_port *port);
 
 /**
- * As mbm_master_begin, for several objects that share one port, which may be a
+ * As mbm_master_beginRtu, for several objects that share one port, which may be a
  * constant: each object has a context of its own.
  *
  * @param master   the object; zeroed before the first call
- * @param slave    as for mbm_master_begin
- * @param port     as for mbm_master_begin; its `context` is not used
+ * @param slave    as for mbm_master_beginRtu
+ * @param port     as for mbm_master_beginRtu; its `context` is not used
  * @param context  handed to every hook. Yours, may be NULL
- * @return as mbm_master_begin
+ * @return as mbm_master_beginRtu
  */
-uint8_t mbm_master_beginWith(struct mbm_master *master,
-                             uint8_t slave,
-                             const struct mbm_port *port,
-                             void *context);
+uint8_t mbm_master_beginRtuWith(struct mbm_master *master,
+                                uint8_t slave,
+                                const struct mbm_port *port,
+                                void *context);
+
+/**
+ * Sets the write address and empties the queue of send; the words stay.
+ *
+ * @param master   the object
+ * @param address  0 to 65535, for the functions ending in Queued
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_master_beginTransmission(struct mbm_master *master, uint16_t address);
 
 /**
  * Lends the buffers that requests and replies need, before or after begin.
@@ -3272,10 +1082,10 @@ uint8_t mbm_master_getSlaveID(const struct mbm_master *master);
  * byte of the reply.
  *
  * @param master        the object
- * @param milliseconds  0 to 65535; 2000 at first
+ * @param timeoutMs     0 to 65535; 2000 at first
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setResponseTimeout(struct mbm_master *master, uint16_t milliseconds);
+uint8_t mbm_master_setResponseTimeout(struct mbm_master *master, uint16_t timeoutMs);
 
 /**
  * Tells the baud rate of the line, from which the gap before a request (t3.5,
@@ -3294,21 +1104,21 @@ uint8_t mbm_master_setBaudRate(struct mbm_master *master, uint32_t baud);
  * A later mbm_master_setBaudRate sets it back to t3.5.
  *
  * @param master        the object
- * @param microseconds  counted from the last byte seen or sent; more than 2^31
+ * @param gapUs         counted from the last byte seen or sent; more than 2^31
  *                      (36 minutes) means 2^31
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setGap(struct mbm_master *master, uint32_t microseconds);
+uint8_t mbm_master_setGap(struct mbm_master *master, uint32_t gapUs);
 
 /**
  * Sets how long a broadcast takes, since nobody answers it (serial line guide
  * V1.02, 2.4.1).
  *
  * @param master        the object
- * @param milliseconds  0 to 65535; 100 at first
+ * @param delayMs       0 to 65535; 100 at first
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setTurnaroundDelay(struct mbm_master *master, uint16_t milliseconds);
+uint8_t mbm_master_setTurnaroundDelay(struct mbm_master *master, uint16_t delayMs);
 
 /**
  * Sets the quiet time, which keeps a late reply from being taken for the answer
@@ -3326,10 +1136,10 @@ uint8_t mbm_master_setTurnaroundDelay(struct mbm_master *master, uint16_t millis
  * second reply may come after the held one was taken for the answer.
  *
  * @param master        the object
- * @param milliseconds  0 to 65535; 100 at first; 0 holds no reply
+ * @param quietMs       0 to 65535; 100 at first; 0 holds no reply
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setQuietTime(struct mbm_master *master, uint16_t milliseconds);
+uint8_t mbm_master_setQuietTime(struct mbm_master *master, uint16_t quietMs);
 
 /**
  * Sets how often a request is repeated whose reply is missing, damaged or
@@ -3388,10 +1198,10 @@ uint8_t mbm_master_setCounters(struct mbm_master *master, struct mbm_counters *c
  * of changes nothing.
  *
  * @param master        the object
- * @param microseconds  by the clock of its port, at most 2^31 ago
+ * @param timeUs        by the clock of its port, at most 2^31 ago
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_lineUsedAt(struct mbm_master *master, uint32_t microseconds);
+uint8_t mbm_master_lineUsedAt(struct mbm_master *master, uint32_t timeUs);
 
 /**
  * Says that somebody else has just used the line, as mbm_master_lineUsedAt with the
@@ -3423,6 +1233,2083 @@ uint8_t mbm_master_takeTurn(struct mbm_master *master, struct mbm_turn *turn);
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_endTurn(struct mbm_master *master, struct mbm_turn *turn);
+
+/**
+ * A word of the last successful read.
+ *
+ * @param master  the object
+ * @param index   0 to 255
+ * @return the word; 0xFFFF past the end of the response buffer
+ */
+uint16_t mbm_master_getResponseBuffer(const struct mbm_master *master, uint8_t index);
+
+/**
+ * Zeroes the response words; receive goes on where it was.
+ *
+ * @param master  the object
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_master_clearResponseBuffer(struct mbm_master *master);
+
+/**
+ * Sets a word for the functions that write. Does not move the queue of send.
+ *
+ * @param master  the object
+ * @param index   0 to the transmit buffer's words - 1
+ * @param value   the word
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS past the end of the buffer,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_master_setTransmitBuffer(struct mbm_master *master,
+                                     uint8_t index,
+                                     uint16_t value);
+
+/**
+ * Zeroes the transmit words; the queue of send stays.
+ *
+ * @param master  the object
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_master_clearTransmitBuffer(struct mbm_master *master);
+
+/**
+ * Queues a word behind those queued. Bits queued before keep their word.
+ *
+ * @param master  the object
+ * @param word    the word
+ * @return MBM_OK, MBM_BUFFER_TOO_SMALL with nothing queued past the end of the
+ *         transmit buffer, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_master_send(struct mbm_master *master, uint16_t word);
+
+/**
+ * Queues two words, the low one first; the low one alone if only that fits.
+ *
+ * @param master  the object
+ * @param value   both words
+ * @return MBM_OK, MBM_BUFFER_TOO_SMALL if a word did not fit,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_master_send32(struct mbm_master *master, uint32_t value);
+
+/**
+ * Queues a bit behind those queued, lowest bit of a word first.
+ *
+ * @param master  the object
+ * @param on      0 is off, anything else is on
+ * @return MBM_OK, MBM_BUFFER_TOO_SMALL with nothing queued past the end of the
+ *         transmit buffer, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_master_sendBit(struct mbm_master *master, uint8_t on);
+
+/**
+ * How many words of the last successful read mbm_master_receive has yet to give.
+ *
+ * @param master  the object
+ * @return 0 to 125
+ */
+uint8_t mbm_master_available(const struct mbm_master *master);
+
+/**
+ * The next word of the last successful read.
+ *
+ * @param master  the object
+ * @return the word; 0xFFFF when none is left
+ */
+uint16_t mbm_master_receive(struct mbm_master *master);
+
+/* ==== 6. Client ===================================================================== */
+
+/**
+ * The most requests that wait or are under way in one client.
+ */
+#define MBM_CLIENT_DEPTH 16
+
+/**
+ * mbm_client_setBackoff: a request is asked again at once.
+ */
+#define MBM_BACKOFF_NONE 0
+
+/**
+ * mbm_client_setBackoff: always the same wait.
+ */
+#define MBM_BACKOFF_FIXED 1
+
+/**
+ * mbm_client_setBackoff: once, twice, three times the wait, up to the most.
+ */
+#define MBM_BACKOFF_LINEAR 2
+
+/**
+ * mbm_client_setBackoff: once, twice, four times the wait, up to the most.
+ */
+#define MBM_BACKOFF_EXPONENTIAL 3
+
+/**
+ * A client of one serial line or one TCP stream: up to 16 requests are queued,
+ * mbm_client_poll moves them on, and nothing ever waits.
+ *
+ * Storage is yours and must be zero before first use, which a static object is.
+ * One of the mbm_client_begin functions comes first. Use one object from one
+ * thread and never from an interrupt; several objects are independent of each
+ * other.
+ *
+ * A `done` function may call every function on the client that calls it, but
+ * mbm_client_poll, which returns MBM_BUSY. A hook of the port, and the `random`
+ * function of mbm_client_setJitter, may call none: each returns MBM_BUSY and
+ * changes nothing, and a getter returns what it returns for an object that was
+ * never begun.
+ */
+typedef struct mbm_client {
+    /**
+     * Private.
+     */
+    void *pointers[46];
+    /**
+     * Private.
+     */
+    uint32_t words[24];
+} mbm_client;
+
+/**
+ * What closes a link and opens it anew, for mbm_client_reconnect.
+ */
+typedef struct mbm_linkHooks {
+    /**
+     * Handed to both hooks. Yours, may be NULL.
+     */
+    void *context;
+    /**
+     * Optional: closes the link, if it is open.
+     */
+    void (*disconnect)(void *context);
+    /**
+     * Optional: opens the link without waiting. Returns MBM_OK, MBM_PENDING if
+     * that goes on while the port takes no bytes yet, or another status.
+     */
+    uint8_t (*connect)(void *context);
+} mbm_linkHooks;
+
+/**
+ * A request to a device, and what comes of it. Yours, and zero before you set
+ * the fields that you need; it may be used again and again.
+ *
+ * From the call that queues it until it has ended, which `done` or `status`
+ * tells, leave it alone, and what it points to. Data and reply are words in the
+ * machine's byte order where a function transfers registers; where it transfers
+ * coils or bytes, they are bytes as on the wire, of coils the lowest bit first.
+ */
+typedef struct mbm_clientRequest {
+    /**
+     * Optional: called by mbm_client_poll when the request has ended, but not for one
+     * that mbm_client_cancel gave up. It may queue requests, this one too, and cancel
+     * others.
+     */
+    void (*done)(void *context, struct mbm_clientRequest *request);
+    /**
+     * Handed to `done`. Yours, may be NULL.
+     */
+    void *context;
+    /**
+     * What functions that write send.
+     */
+    const void *data;
+    /**
+     * What functions that read fill; NULL if only the status is wanted.
+     */
+    void *reply;
+    /**
+     * Bytes that `reply` has room for.
+     */
+    uint16_t replyBytes;
+    /**
+     * A number of yours, which stays as you set it. In TCP frames no two pending
+     * requests may have the same one, except 0. It is not the transaction identifier
+     * on the wire: mbm_client_wireTransaction returns that.
+     */
+    uint16_t transaction;
+    /**
+     * Whom it is for. On a serial line 1 to 247; 0 is broadcast; 248 to 255, which the
+     * standard reserves, are sent as they are. On TCP 1 to 255.
+     */
+    uint8_t unit;
+    /**
+     * MBM_PENDING from being queued to its end, then how it ended.
+     */
+    uint8_t status;
+    /**
+     * The raw exception code of the response; 0 if it was none.
+     */
+    uint8_t exception;
+    /**
+     * Bytes received in `reply`.
+     */
+    uint8_t length;
+    /**
+     * Private.
+     */
+    uint32_t words[8];
+} mbm_clientRequest;
+
+/**
+ * What is kept for one unit, in an array of yours for mbm_client_setUnits. The
+ * counts are yours to read and to zero; each wraps at 2^32.
+ */
+typedef struct mbm_clientUnit {
+    /**
+     * Requests that ended, retries apart.
+     */
+    uint32_t requests;
+    /**
+     * Of these, those that were answered, exceptions included.
+     */
+    uint32_t replies;
+    /**
+     * Of the answers, those that were exceptions.
+     */
+    uint32_t exceptions;
+    /**
+     * Requests that were asked again.
+     */
+    uint32_t retries;
+    /**
+     * Set by you: rest for this unit from the end of a request to the next, in
+     * microseconds; more than 2^31 (36 minutes) means 2^31.
+     */
+    uint32_t delayUs;
+    /**
+     * Private.
+     */
+    uint32_t last;
+    /**
+     * Set by you: which unit this is.
+     */
+    uint8_t unit;
+    /**
+     * How the last request ended, MBM_OK if there was none.
+     */
+    uint8_t status;
+    /**
+     * Private.
+     */
+    uint8_t tired;
+} mbm_clientUnit;
+
+/**
+ * Makes an object a client of a serial line, in RTU frames (serial line guide
+ * V1.02, 2.5.1).
+ *
+ * This and the other mbm_client_begin functions may be called again at any time, also with
+ * another framing. All pending requests are given up as by mbm_client_cancel: their status
+ * is MBM_CANCELLED and `done` is not called. The settings are as at first. A call that is
+ * refused changes nothing.
+ *
+ * @param client      the object; zeroed before the first call
+ * @param port        copied; read, write and micros must be there
+ * @param frame       bytes of one frame, valid for as long as the client is used
+ * @param frameBytes  at least 8; 256 hold any frame
+ * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
+ *         the client is suspended
+ */
+uint8_t mbm_client_beginRtu(struct mbm_client *client,
+                            const struct mbm_port *port,
+                            uint8_t *frame,
+                            uint16_t frameBytes);
+
+/**
+ * Makes an object a client of a serial line, in ASCII frames (serial line guide
+ * V1.02, 2.5.2). No gap is kept between frames; a second without a character
+ * ends one that is not whole.
+ *
+ * @param client      the object; zeroed before the first call
+ * @param port        copied; read, write and micros must be there
+ * @param frame       bytes of one frame, valid for as long as the client is used
+ * @param frameBytes  at least 17; 513 hold any frame
+ * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
+ *         the client is suspended
+ */
+uint8_t mbm_client_beginAscii(struct mbm_client *client,
+                              const struct mbm_port *port,
+                              uint8_t *frame,
+                              uint16_t frameBytes);
+
+/**
+ * Makes an object a client that sends RTU frames through a TCP stream, for
+ * converters that pass on what they get. No gap is kept, nothing is broadcast.
+ *
+ * @param client      the object; zeroed before the first call
+ * @param port        copied; read, write and micros must be there
+ * @param frame       bytes of one frame, valid for as long as the client is used
+ * @param frameBytes  at least 8; 256 hold any frame
+ * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
+ *         the client is suspended
+ */
+uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
+                                   const struct mbm_port *port,
+                                   uint8_t *frame,
+                                   uint16_t frameBytes);
+
+/**
+ * Makes an object a client of a TCP stream, in frames with the MBAP header
+ * (messaging on TCP/IP guide V1.0b, 3.1.3). All 16 requests may be under way at
+ * once; responses are matched by their transaction id, in any order.
+ *
+ * @param client         the object; zeroed before the first call
+ * @param port           copied; read, write and micros must be there
+ * @param incoming       received bytes, valid for as long as the client is used
+ * @param incomingBytes  at least 9; 260 hold any frame, more take in more
+ *                       responses at a time
+ * @param outgoing       bytes to send, valid for as long as the client is used
+ * @param outgoingBytes  at least 12; 260 hold any frame, more gather more
+ *                       requests for one write
+ * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
+ *         the client is suspended
+ */
+uint8_t mbm_client_beginTcp(struct mbm_client *client,
+                            const struct mbm_port *port,
+                            uint8_t *incoming,
+                            uint16_t incomingBytes,
+                            uint8_t *outgoing,
+                            uint16_t outgoingBytes);
+
+/**
+ * Sets the character that ends ASCII frames behind CR, in place of LF, in both
+ * directions; for devices that were told another one (function 08 with
+ * sub-function 03, V1.1b3, 6.8.1). That request is answered with the old one: call
+ * this when it has ended, for example from its `done`.
+ *
+ * @param client     the object, begun with mbm_client_beginAscii
+ * @param character  1 to 127, but CR, the colon and hexadecimal digits
+ * @return MBM_OK; MBM_BUSY while a request is under way; MBM_INVALID_ARGUMENT, also
+ *         for a client of another framing; MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setDelimiter(struct mbm_client *client, uint8_t character);
+
+/**
+ * Sets how many requests are under way at once on TCP, for servers that take fewer
+ * at a time (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 1 to
+ * 16); some drop what comes in one segment with another request. The queue holds 16 in any case.
+ *
+ * @param client  the object
+ * @param most    1 to 16, which is so at first; on a serial line, and in RTU over
+ *                TCP, 1
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setInFlight(struct mbm_client *client,
+                               uint8_t most);
+
+/**
+ * Closes the link and opens it anew. What was half received is forgotten, and
+ * requests that were under way end with MBM_LINK_LOST at the next polls; those
+ * that still waited go over the new link.
+ *
+ * @param client  the object
+ * @param link    what does it, used during this call only; NULL if that has been
+ *                done already
+ * @return what `connect` returns, MBM_OK without it; MBM_BUSY while the line is
+ *         lent, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_reconnect(struct mbm_client *client, const struct mbm_linkHooks *link);
+
+/**
+ * Whether the link is not known to be lost.
+ *
+ * If `connect` of mbm_client_reconnect returned MBM_PENDING, this is 0 until a reply
+ * arrives. Do not reconnect again before the connection had its time: the port knows
+ * better whether it is still being made, for example mbm_tcp_isConnected.
+ *
+ * @param client  the object
+ * @return 0 from a request that ended with MBM_LINK_LOST on, until a reply arrives
+ *         (an exception is one) or mbm_client_reconnect returns MBM_OK; 1 otherwise,
+ *         and also before the first request
+ */
+uint8_t mbm_client_isConnected(const struct mbm_client *client);
+
+/**
+ * Lends the line to a facade, whose functions then use the client's port; the
+ * client's requests wait until mbm_client_resume. One of the two has the line
+ * at any time. Until then the client's storage must stay: do not zero it.
+ *
+ * @param client  the object; for a facade, of RTU frames on a line or over TCP
+ * @param master  a facade with buffers, which gets the client's port; NULL if
+ *                you use the line in another way
+ * @return MBM_OK; MBM_BUSY, with both unchanged, if a request is under way or the line
+ *         is lent already; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_suspend(struct mbm_client *client, struct mbm_master *master);
+
+/**
+ * Takes the line back. The facade has no port then, so that its functions refuse
+ * with MBM_NOT_INITIALISED.
+ *
+ * @param client  the object
+ * @param master  as for mbm_client_suspend
+ * @return MBM_OK, MBM_BUSY while the facade has a request under way,
+ *         MBM_INVALID_ARGUMENT if the line was not lent, MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_resume(struct mbm_client *client, struct mbm_master *master);
+
+/**
+ * Moves all requests on, without waiting, and calls `done` of those that have
+ * ended, of at most 17 in one call.
+ *
+ * Call it as often as you like; mbm_client_pollDelay tells when the next call
+ * is due.
+ *
+ * @param client  the object
+ * @return MBM_PENDING while requests wait or are under way, MBM_OK if there are
+ *         none, MBM_BUSY from within `done` and while the line is lent;
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_poll(struct mbm_client *client);
+
+/**
+ * How long mbm_client_poll will find nothing to do unless a byte arrives, so
+ * that a program may wait for one in select, or sleep, until then. Bytes are taken
+ * only while a request is pending: with none, wait for something else.
+ *
+ * @param client  the object
+ * @return microseconds; 0 means poll now, and is returned within a hook of the port;
+ *         0xFFFFFFFF that there is no request; 1000
+ *         while a TCP port does not take what is to be sent: to poll sooner, wait
+ *         for that too, as mbm_tcp_wait does
+ */
+uint32_t mbm_client_pollDelay(struct mbm_client *client);
+
+/**
+ * How many requests wait or are under way.
+ *
+ * @param client  the object
+ * @return 0 to 16
+ */
+uint8_t mbm_client_pending(const struct mbm_client *client);
+
+/**
+ * Gives a request up. It is yours again at once, with the status MBM_CANCELLED;
+ * `done` is not called. It may have reached the device, and may still be answered.
+ *
+ * @param client   the object
+ * @param request  a request that this client was given
+ * @return MBM_OK; MBM_NOT_PENDING, with nothing changed, for a request that has
+ *         ended already or was never queued here; MBM_INVALID_ARGUMENT or
+ *         MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_cancel(struct mbm_client *client, struct mbm_clientRequest *request);
+
+/**
+ * The transaction identifier on the wire: that of the TCP frame in which the request
+ * was sent last. The client chooses it, another one for each frame, also for a retry.
+ *
+ * @param request  a request, pending or ended
+ * @return the identifier; 0 in other framings, for a request that was never sent, and
+ *         for NULL. 0 is also an identifier
+ */
+uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
+
+/**
+ * Function 01: reads coils into `reply`, eight to a byte, the lowest bit first, the
+ * last byte padded with zeros (V1.1b3, 6.1).
+ *
+ * This and the other functions behave alike: they queue a request and return. The
+ * request has ended when its `status` is no longer MBM_PENDING: MBM_OK, an exception
+ * of the device (0x01 to 0x7F), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
+ * MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION, MBM_LINK_LOST,
+ * MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes on MBM_OK only.
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  first coil, 0 to 65535, as on the wire
+ * @param quantity  1 to 2000
+ * @return MBM_PENDING: the request is queued; or, with nothing queued,
+ *         MBM_ILLEGAL_DATA_VALUE or MBM_ILLEGAL_DATA_ADDRESS for what no device
+ *         could accept, MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL,
+ *         MBM_DUPLICATE_TRANSACTION, MBM_BUFFER_TOO_SMALL if `reply` has no room
+ *         for the data, MBM_INVALID_ARGUMENT for `data` that are NULL,
+ *         MBM_NOT_INITIALISED; MBM_BUSY, with the request unchanged, if it is
+ *         pending already, and from within a hook of the port. A request that
+ *         is refused with another of these has it in `status`
+ */
+uint8_t mbm_client_readCoils(struct mbm_client *client,
+                             struct mbm_clientRequest *request,
+                             uint16_t address,
+                             uint16_t quantity);
+
+/**
+ * Function 02: reads discrete inputs, as mbm_client_readCoils (V1.1b3, 6.2).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  first input, 0 to 65535, as on the wire
+ * @param quantity  1 to 2000
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readDiscreteInputs(struct mbm_client *client,
+                                      struct mbm_clientRequest *request,
+                                      uint16_t address,
+                                      uint16_t quantity);
+
+/**
+ * Function 03: reads holding registers into the words of `reply` (V1.1b3, 6.3).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  first register, 0 to 65535, as on the wire
+ * @param quantity  1 to 125
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readHoldingRegisters(struct mbm_client *client,
+                                        struct mbm_clientRequest *request,
+                                        uint16_t address,
+                                        uint16_t quantity);
+
+/**
+ * Function 04: reads input registers into the words of `reply` (V1.1b3, 6.4).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  first register, 0 to 65535, as on the wire
+ * @param quantity  1 to 125
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readInputRegisters(struct mbm_client *client,
+                                      struct mbm_clientRequest *request,
+                                      uint16_t address,
+                                      uint16_t quantity);
+
+/**
+ * Function 05: switches a coil (V1.1b3, 6.5).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  0 to 65535, as on the wire
+ * @param on  0 is off, anything else is on
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_writeSingleCoil(struct mbm_client *client,
+                                   struct mbm_clientRequest *request,
+                                   uint16_t address,
+                                   uint8_t on);
+
+/**
+ * Function 06: writes a holding register (V1.1b3, 6.6).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  0 to 65535, as on the wire
+ * @param value  the value
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_writeSingleRegister(struct mbm_client *client,
+                                       struct mbm_clientRequest *request,
+                                       uint16_t address,
+                                       uint16_t value);
+
+/**
+ * Function 0F: writes the coils of `data`, eight to a byte, the lowest bit first
+ * (V1.1b3, 6.11).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  first coil, 0 to 65535, as on the wire
+ * @param quantity  1 to 1968
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_writeMultipleCoils(struct mbm_client *client,
+                                      struct mbm_clientRequest *request,
+                                      uint16_t address,
+                                      uint16_t quantity);
+
+/**
+ * Function 10: writes the words of `data` (V1.1b3, 6.12).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  first register, 0 to 65535, as on the wire
+ * @param quantity  1 to 123
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_writeMultipleRegisters(struct mbm_client *client,
+                                          struct mbm_clientRequest *request,
+                                          uint16_t address,
+                                          uint16_t quantity);
+
+/**
+ * Function 16: sets a holding register to (register & andMask) | (orMask & ~andMask)
+ * (V1.1b3, 6.16).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  0 to 65535, as on the wire
+ * @param andMask  bits to keep
+ * @param orMask  bits to set where none are kept
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_maskWriteRegister(struct mbm_client *client,
+                                     struct mbm_clientRequest *request,
+                                     uint16_t address,
+                                     uint16_t andMask,
+                                     uint16_t orMask);
+
+/**
+ * Function 17: writes the words of `data`, then reads into the words of `reply`
+ * (V1.1b3, 6.17).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param readAddress  first register to read
+ * @param readQuantity  1 to 125
+ * @param writeAddress  first register to write
+ * @param writeQuantity  1 to 121
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readWriteMultipleRegisters(struct mbm_client *client,
+                                              struct mbm_clientRequest *request,
+                                              uint16_t readAddress,
+                                              uint16_t readQuantity,
+                                              uint16_t writeAddress,
+                                              uint16_t writeQuantity);
+
+/**
+ * Function 07: reads eight outputs into a byte (V1.1b3, 6.7).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readExceptionStatus(struct mbm_client *client,
+                                       struct mbm_clientRequest *request);
+
+/**
+ * Function 08: sends the words of `data`, and reads as many into `reply` (V1.1b3,
+ * 6.8). No device responds to sub-function 04, Force Listen Only Mode.
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param subFunction  0 (Return Query Data) to 0x14. Others, which the standard
+ *                     reserves, are sent as they are, and a response of one word is
+ *                     expected; for one of another length see mbm_client_custom
+ * @param words  1; 1 to 125 for sub-function 0
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_diagnostics(struct mbm_client *client,
+                               struct mbm_clientRequest *request,
+                               uint16_t subFunction,
+                               uint16_t words);
+
+/**
+ * Function 0B: reads the status word and the event count into two words (V1.1b3,
+ * 6.9).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_getCommEventCounter(struct mbm_client *client,
+                                       struct mbm_clientRequest *request);
+
+/**
+ * Function 0C: reads status, event count and message count, two bytes each with the
+ * high byte first, and up to 64 events, the latest first (V1.1b3, 6.10).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_getCommEventLog(struct mbm_client *client,
+                                   struct mbm_clientRequest *request);
+
+/**
+ * Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13). `reply`
+ * gets all that follows the byte count, also from a device that counts its id alone
+ * and sends more. In RTU frames the silence after it ends such a reply; one that
+ * counts right is not waited for.
+ *
+ * @param client   the object
+ * @param request  the request
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_reportServerId(struct mbm_client *client,
+                                  struct mbm_clientRequest *request);
+
+/**
+ * Function 14: reads records in a row of one file into words (V1.1b3, 6.14).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param file  1 to 65535
+ * @param record  first record, 0 to 9999
+ * @param quantity  1 to 121
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readFileRecord(struct mbm_client *client,
+                                  struct mbm_clientRequest *request,
+                                  uint16_t file,
+                                  uint16_t record,
+                                  uint16_t quantity);
+
+/**
+ * Function 15: writes the words of `data` to records in a row of one file (V1.1b3,
+ * 6.15).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param file  1 to 65535
+ * @param record  first record, 0 to 9999
+ * @param quantity  1 to 122
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_writeFileRecord(struct mbm_client *client,
+                                   struct mbm_clientRequest *request,
+                                   uint16_t file,
+                                   uint16_t record,
+                                   uint16_t quantity);
+
+/**
+ * Function 14 of several groups: `data` are the sub-requests as on the wire, seven
+ * bytes each; `reply` gets the sub-responses as on the wire (V1.1b3, 6.14).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param bytes  7 to 245, a multiple of 7
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readFileRecords(struct mbm_client *client,
+                                   struct mbm_clientRequest *request,
+                                   uint16_t bytes);
+
+/**
+ * Function 15 of several groups: `data` are the sub-requests as on the wire (V1.1b3,
+ * 6.15).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param bytes  9 to 251
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_writeFileRecords(struct mbm_client *client,
+                                    struct mbm_clientRequest *request,
+                                    uint16_t bytes);
+
+/**
+ * Function 18: reads up to 31 registers of a queue into words (V1.1b3, 6.18).
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param address  the pointer address of the queue
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readFifoQueue(struct mbm_client *client,
+                                 struct mbm_clientRequest *request,
+                                 uint16_t address);
+
+/**
+ * Function 2B/0E: reads objects that identify the device (V1.1b3, 6.21). `reply` gets,
+ * as on the wire, conformity level, more follows (0 or FF), the next object id, how
+ * many objects there are, and of each its id, length and value.
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param code  1 basic, 2 regular, 3 extended, 4 one object
+ * @param object  the object to begin with
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readDeviceIdentification(struct mbm_client *client,
+                                            struct mbm_clientRequest *request,
+                                            uint8_t code,
+                                            uint8_t object);
+
+/**
+ * Function 2B of any MEI type: sends bytes of `data` and reads what comes (V1.1b3,
+ * 6.19). On RTU, silence ends the response.
+ *
+ * @param client   the object
+ * @param request  the request
+ * @param meiType  0x0D is CANopen
+ * @param bytes  0 to 251
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_encapsulatedInterfaceTransport(struct mbm_client *client,
+                                                  struct mbm_clientRequest *request,
+                                                  uint8_t meiType,
+                                                  uint16_t bytes);
+
+/**
+ * Any function: sends bytes of `data` behind the function code, and reads what is
+ * behind it in the response.
+ *
+ * @param client    the object
+ * @param request   the request
+ * @param function  1 to 127
+ * @param bytes     0 to 252
+ * @param response  how long the response is; used during this call only
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_custom(struct mbm_client *client,
+                          struct mbm_clientRequest *request,
+                          uint8_t function,
+                          uint16_t bytes,
+                          const struct mbm_rule *response);
+
+/**
+ * Any request, as it arrived from another client: sends `function` and the bytes of
+ * `body`, and reads into `reply` all bytes that follow the function code of the
+ * response, as on the wire. This is what a gateway needs: `body` and `reply` are
+ * what the functions of mbm_unit_serveCustom get and return.
+ *
+ * A response counts only if it answers this request, as in the functions above: its
+ * length, byte count, echoed address, value, quantity and records must be right. Of a
+ * function that the standard does not define, and of sub-functions of 08 from 0x15 on,
+ * silence ends the response on RTU. If you know its length, use mbm_client_custom.
+ *
+ * 08 with sub-function 04 gets no response: it ends with MBM_OK and `length` 0 after
+ * the turnaround delay.
+ *
+ * @param client    the object
+ * @param request   the request; if it is queued, its `data` then points into `body`
+ * @param function  1 to 127
+ * @param body      the bytes after the function code; leave them alone until the
+ *                  request has ended; may be NULL if there are none
+ * @param bytes     0 to 252
+ * @return a status; see mbm_client_readCoils. MBM_ILLEGAL_DATA_VALUE also for a body
+ *         whose length or counts are wrong, MBM_ILLEGAL_FUNCTION for function 0 or
+ *         one above 127: what a server answers to such a request
+ */
+uint8_t mbm_client_forward(struct mbm_client *client,
+                           struct mbm_clientRequest *request,
+                           uint8_t function,
+                           const uint8_t *body,
+                           uint16_t bytes);
+
+/**
+ * Sets how long a response may take. The time begins with the end of the request on a
+ * serial line and in RTU over TCP; in TCP frames when mbm_client_poll puts the request
+ * into the outgoing buffer, also if the port takes it later.
+ *
+ * @param client        the object
+ * @param timeoutMs     0 to 65535; 2000 at first
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setResponseTimeout(struct mbm_client *client, uint16_t timeoutMs);
+
+/**
+ * Tells the baud rate of an RTU line, from which the gap before a request (t3.5,
+ * serial line guide V1.02, 2.5.1.1) and the length of a character follow. It sets
+ * nothing on the line. Untold, the gap is 4 ms, which is safe from 9600 up.
+ *
+ * @param client  the object
+ * @param baud    bits per second; 0 goes back to untold
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setBaudRate(struct mbm_client *client, uint32_t baud);
+
+/**
+ * Sets the silence before a request, in place of t3.5; a later
+ * mbm_client_setBaudRate sets it back. Without effect on TCP.
+ *
+ * @param client        the object
+ * @param gapUs         counted from the last byte seen or sent; more than 2^31
+ *                      (36 minutes) means 2^31
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setGap(struct mbm_client *client, uint32_t gapUs);
+
+/**
+ * Sets how long a request takes that nobody responds to: a broadcast (serial
+ * line guide V1.02, 2.4.1), and 08 with sub-function 04.
+ *
+ * @param client        the object
+ * @param delayMs       0 to 65535; 100 at first
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setTurnaroundDelay(struct mbm_client *client, uint16_t delayMs);
+
+/**
+ * Sets the quiet time of a serial line, which keeps a late reply from being taken
+ * for the answer to a later request; see mbm_master_setQuietTime. Without effect on
+ * TCP, where responses have a number.
+ *
+ * @param client        the object
+ * @param quietMs       0 to 65535; 100 at first; 0 holds no reply
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setQuietTime(struct mbm_client *client, uint16_t quietMs);
+
+/**
+ * Tells that the receiver hears what the driver sends, so each request comes back
+ * before its reply and is to be dropped. Without effect on TCP.
+ *
+ * @param client  the object
+ * @param on      0 (at first) or 1
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setEchoDiscard(struct mbm_client *client, uint8_t on);
+
+/**
+ * Holds the driver on after the port's flush, for platforms whose flush returns
+ * before the last bit has left. Without effect on TCP.
+ *
+ * @param client      the object
+ * @param characters  times one character of the told baud rate (9600 if untold);
+ *                    0 at first
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setPostFlushHold(struct mbm_client *client, uint8_t characters);
+
+/**
+ * Sets how often a request is repeated whose response is missing, damaged or
+ * malformed, or that the port did not take. Exceptions are responses and are not
+ * repeated, nor are requests that a lost link interrupted, nor those whose response is
+ * too long for a buffer.
+ *
+ * @param client   the object
+ * @param retries  0 to 255; 0 at first
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setRetries(struct mbm_client *client, uint8_t retries);
+
+/**
+ * Sets how long a request waits before it is repeated. Other requests are sent
+ * meanwhile.
+ *
+ * @param client            the object
+ * @param backoff           MBM_BACKOFF_NONE (at first) to MBM_BACKOFF_EXPONENTIAL
+ * @param delayMs           the wait before the first repetition
+ * @param maxDelayMs        the longest wait
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setBackoff(struct mbm_client *client,
+                              uint8_t backoff,
+                              uint16_t delayMs,
+                              uint16_t maxDelayMs);
+
+/**
+ * Leaves a part of each wait before a repetition to chance, so that several
+ * clients do not keep in step.
+ *
+ * @param client   the object
+ * @param percent  0 (at first) to 100: how much of the wait may be taken off
+ * @param random   returns another number each time, for example rand(): one of 32
+ *                 bits, of 15 bits, or whose upper bits alone vary. What it
+ *                 calls on the client returns MBM_BUSY
+ * @param context  handed to `random`
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setJitter(struct mbm_client *client,
+                             uint8_t percent,
+                             uint32_t (*random)(void *context),
+                             void *context);
+
+/**
+ * Counts into storage of yours from now on. Read and zero it as you like, but not
+ * from an interrupt. In TCP frames, a foreign frame is one whose transaction identifier
+ * and unit no pending request has; a resynchronisation is a run of bytes that were no
+ * frame.
+ *
+ * @param client    the object
+ * @param counters  zeroed by you; NULL stops counting
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setCounters(struct mbm_client *client, struct mbm_counters *counters);
+
+/**
+ * Keeps a record of some units: how often they were asked and answered, and how
+ * long each is left alone between two requests.
+ *
+ * @param client  the object
+ * @param units   zeroed by you but for `unit` and `delay`; NULL for none
+ * @param count   how many records, 0 to 255
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_client_setUnits(struct mbm_client *client,
+                            struct mbm_clientUnit *units,
+                            uint8_t count);
+
+/* ==== 7. Server ===================================================================== */
+
+/**
+ * A Modbus server on one line or one connection.
+ *
+ * Storage is yours and must be zero before first use, which a static object is
+ * (`static mbm_server server;`). What it serves are units, which several
+ * servers may share: one on a serial line and four TCP connections, for
+ * example, are five servers with the same units. Use a server and its units from
+ * one thread and never from an interrupt; servers that share units belong to one
+ * thread.
+ *
+ * Hooks and functions of yours run within mbm_server_poll. A function that they
+ * call on the server that is polled returns MBM_BUSY and changes nothing: call
+ * it when mbm_server_poll has returned. They may call functions on other servers,
+ * and the mbm_unit_serve functions on units.
+ */
+typedef struct mbm_server {
+    /**
+     * Private.
+     */
+    void *pointers[14];
+    /**
+     * Private.
+     */
+    uint32_t words[8];
+} mbm_server;
+
+/**
+ * Begins to serve units on a serial line, RTU. The rate is untold, so a frame
+ * ends with 4 ms of silence: see mbm_server_setBaudRate.
+ *
+ * May be called again at any time but from within its hooks; what was under way
+ * is dropped; where a response was leaving, the port that the object had is called
+ * to switch its driver off. A call that is refused changes nothing. Opens nothing: the port is
+ * open already. Units are yours, may be shared between
+ * servers, and stay where they are for as long as the object is used, as does
+ * the buffer, which keeps nothing between requests.
+ *
+ * @param server  the object; zeroed before the first call
+ * @param port    copied; read, write and micros must be there
+ * @param units   what is served: one unit, or an array of them
+ * @param count   how many units
+ * @param frame   bytes of one frame, for requests and responses
+ * @param bytes   at least 16; MBM_MAX_FRAME hold any frame. Longer
+ *                requests are not heard, longer responses become exception 04
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or a
+ *         buffer that is too short; MBM_BUSY from within a hook of this server
+ */
+uint8_t mbm_server_beginRtu(struct mbm_server *server,
+                            const struct mbm_port *port,
+                            struct mbm_unit *units,
+                            uint8_t count,
+                            uint8_t *frame,
+                            uint16_t bytes);
+
+/**
+ * Begins to serve units on a serial line, ASCII (serial line guide V1.02,
+ * 2.5.2). A frame whose next character takes longer than a second is dropped.
+ *
+ * @param server  see mbm_server_beginRtu
+ * @param port    see mbm_server_beginRtu
+ * @param units   see mbm_server_beginRtu
+ * @param count   see mbm_server_beginRtu
+ * @param frame   see mbm_server_beginRtu
+ * @param bytes   at least 32; MBM_MAX_ASCII_FRAME hold any frame
+ * @return a status; see mbm_server_beginRtu
+ */
+uint8_t mbm_server_beginAscii(struct mbm_server *server,
+                              const struct mbm_port *port,
+                              struct mbm_unit *units,
+                              uint8_t count,
+                              uint8_t *frame,
+                              uint16_t bytes);
+
+/**
+ * Begins to serve units on a TCP connection that was accepted. Requests that
+ * wait behind one another in the stream are answered in turn.
+ *
+ * @param server  see mbm_server_beginRtu; one for each connection
+ * @param port    see mbm_server_beginRtu; read, write and clock of the connection
+ * @param units   see mbm_server_beginRtu; the unit ids 0 and 255 mean the first
+ * @param count   see mbm_server_beginRtu
+ * @param frame   see mbm_server_beginRtu; one for each connection
+ * @param bytes   at least MBM_MAX_TCP_FRAME
+ * @return a status; see mbm_server_beginRtu
+ */
+uint8_t mbm_server_beginTcp(struct mbm_server *server,
+                            const struct mbm_port *port,
+                            struct mbm_unit *units,
+                            uint8_t count,
+                            uint8_t *frame,
+                            uint16_t bytes);
+
+/**
+ * Begins to serve units over a stream of RTU frames, in which silence tells
+ * nothing: a TCP connection of RTU over TCP, or a serial adapter that hands
+ * bytes over in lumps. A frame ends where its own bytes say so; behind one that
+ * is damaged, half a second of silence does.
+ *
+ * @param server  see mbm_server_beginRtu; one for each connection
+ * @param port    see mbm_server_beginRtu
+ * @param units   see mbm_server_beginRtu; the unit ids 0 and 255 mean the first
+ * @param count   see mbm_server_beginRtu
+ * @param frame   see mbm_server_beginRtu; one for each connection
+ * @param bytes   at least 16; MBM_MAX_FRAME hold any frame
+ * @return a status; see mbm_server_beginRtu
+ */
+uint8_t mbm_server_beginRtuOverTcp(struct mbm_server *server,
+                                   const struct mbm_port *port,
+                                   struct mbm_unit *units,
+                                   uint8_t count,
+                                   uint8_t *frame,
+                                   uint16_t bytes);
+
+/**
+ * Moves the server on, without waiting: takes bytes in, carries a request out
+ * once it is whole, sends the response.
+ *
+ * Call it as often as you like, at least once per character time of the line
+ * if nothing else buffers its bytes. On a serial line a response begins with
+ * the first call after the line has been silent for t3.5.
+ *
+ * @param server  the object
+ * @return MBM_OK; MBM_LINK_LOST if the port said so, which ends a connection;
+ *         MBM_MALFORMED_FRAME if what came over TCP is not Modbus, so that
+ *         the connection is to be closed; MBM_BUSY from within a hook of this
+ *         server; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_server_poll(struct mbm_server *server);
+
+/**
+ * How long mbm_server_poll will find nothing to do unless a byte arrives, so
+ * that a program may sleep until then.
+ *
+ * @param server  the object
+ * @return microseconds; 0 means poll now, and is returned within a hook of this
+ *         server; 0xFFFFFFFF until a byte arrives; 1000
+ *         while a function of yours returns MBM_REPLY_PENDING or a connection does
+ *         not take the response: to go on sooner, poll when that has changed. No
+ *         byte is taken meanwhile, so do not wait for one
+ */
+uint32_t mbm_server_pollDelay(const struct mbm_server *server);
+
+/**
+ * Sets the silence that ends a frame: t3.5 of RTU, the time between two
+ * characters of ASCII, and in RTU over TCP the silence after a damaged frame. Without
+ * effect in TCP frames. mbm_server_beginRtu and its sisters set it back.
+ *
+ * @param server        the object
+ * @param silenceUs     counted from the last byte seen
+ * @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
+ */
+uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t silenceUs);
+
+/**
+ * Tells the baud rate of an RTU line, from which t3.5 follows (serial line guide
+ * V1.02, 2.5.1.1). It sets nothing on the line. Other framings do not end with t3.5:
+ * for the time that those wait there is mbm_server_setSilence.
+ *
+ * @param server  the object
+ * @param baud    bits per second; 0 goes back to untold
+ * @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings,
+ *         MBM_NOT_INITIALISED or MBM_BUSY
+ */
+uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
+
+/**
+ * Tells that the receiver of an RTU line hears what the driver sends, so that as
+ * many bytes as were sent are dropped behind each response. mbm_server_beginRtu
+ * sets it back.
+ *
+ * @param server  the object
+ * @param on      0 (at first) or 1
+ * @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings,
+ *         MBM_NOT_INITIALISED or MBM_BUSY
+ */
+uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
+
+/* ==== 8. Units ====================================================================== */
+
+/**
+ * What a function of yours returns for an exception: this, or-ed with the code.
+ */
+#define MBM_REPLY_EXCEPTION 256
+
+/**
+ * What a function of yours returns for no response at all.
+ */
+#define MBM_REPLY_NONE 512
+
+/**
+ * What a function of yours returns to be asked again at the next poll, with the
+ * same request. The server hears nothing meanwhile.
+ */
+#define MBM_REPLY_PENDING 768
+
+/**
+ * Most records that one unit serves, each handed to a mbm_unit_serve function.
+ */
+#define MBM_MAX_SERVICES 16
+
+/**
+ * The head of each record that a mbm_unit_serve function takes. Private.
+ */
+typedef struct mbm_service {
+    /**
+     * Serves a request, if it is one of this family. NULL in a zeroed record,
+     * which serves nothing.
+     */
+    size_t (*serve)(struct mbm_service *service, uint8_t *pdu, const void *heading);
+    /**
+     * What kind of record of its family it is served as, from 1 on; 0 in a zeroed one.
+     */
+    uint8_t kind;
+} mbm_service;
+
+/**
+ * What a unit knows of its line. Zero it, and hand it to
+ * mbm_unit_serveDiagnostics. Counters wrap at 2^16; read them as you like.
+ */
+typedef struct mbm_diagnostics {
+    /**
+     * Private.
+     */
+    struct mbm_service service;
+    /**
+     * Optional: called when the client restarts the line with sub-function 01 of
+     * 08; `clearLog` is 1 if it cleared the event log too.
+     */
+    void (*restart)(void *context, uint8_t clearLog);
+    /**
+     * Handed to `restart`. Yours, may be NULL.
+     */
+    void *context;
+    /**
+     * What sub-function 02 of 08 returns: yours.
+     */
+    uint16_t diagnosticRegister;
+    /**
+     * Sub-function 0B: frames with a right CRC, for whichever unit.
+     */
+    uint16_t busMessages;
+    /**
+     * Sub-function 0C: frames that arrived damaged.
+     */
+    uint16_t busCommunicationErrors;
+    /**
+     * Sub-function 0D: exceptions, those of broadcasts too.
+     */
+    uint16_t exceptionErrors;
+    /**
+     * Sub-function 0E: requests for this unit, and broadcasts.
+     */
+    uint16_t serverMessages;
+    /**
+     * Sub-function 0F: requests that were not answered.
+     */
+    uint16_t noResponses;
+    /**
+     * Sub-function 10: exceptions 07.
+     */
+    uint16_t naks;
+    /**
+     * Sub-function 11: exceptions 06.
+     */
+    uint16_t busy;
+    /**
+     * Sub-function 12: frames that the buffer could not hold.
+     */
+    uint16_t characterOverruns;
+    /**
+     * What 0B returns: requests that were carried out.
+     */
+    uint16_t events;
+    /**
+     * 1 in listen only mode.
+     */
+    uint8_t listenOnly;
+    /**
+     * Private.
+     */
+    uint8_t hidden[67];
+} mbm_diagnostics;
+
+/**
+ * A unit that servers answer for. Zero it, set `id`, and say what it serves with
+ * mbm_unit_serveCoils and its sisters.
+ *
+ * Each of those takes a record of yours, which stays valid for as long as the
+ * unit is used. A unit has places for MBM_MAX_SERVICES records; one more is
+ * refused with MBM_BUFFER_TOO_SMALL. A record may be handed over again, also
+ * after you have zeroed and refilled it, and keeps its place. A zeroed record
+ * serves nothing until it is handed over again. One record may serve any number
+ * of units.
+ */
+typedef struct mbm_unit {
+    /**
+     * Private: the records, in the order in which they are asked, then NULL.
+     */
+    struct mbm_service *services[MBM_MAX_SERVICES];
+    /**
+     * Private: NULL in a unit without diagnostics.
+     */
+    size_t (*monitor)(struct mbm_unit *unit,
+                      const void *heading,
+                      uint8_t concern,
+                      uint8_t *pdu);
+    /**
+     * Private.
+     */
+    struct mbm_diagnostics *diagnostics;
+    /**
+     * The unit id, 1 to 247 (serial line guide V1.02, 2.2); 248 to 255, which the
+     * standard reserves, are taken as they are. 0 answers to every id. A unit that
+     * serves nothing is silent, as if it were not there.
+     */
+    uint8_t id;
+} mbm_unit;
+
+/**
+ * Cells that your functions hold, one by one, in place of an array. Zero it, set
+ * what you need, and hand it to mbm_unit_serveCallbacks.
+ */
+typedef struct mbm_dataCallbacks {
+    /**
+     * Private.
+     */
+    struct mbm_service service;
+    /**
+     * Handed to each function. Yours, may be NULL.
+     */
+    void *context;
+    /**
+     * Optional, NULL if every address is there: 1 if this one is. What is not
+     * there is answered with exception 02.
+     */
+    uint8_t (*isValid)(void *context, uint16_t address);
+    /**
+     * A cell that is there; of a bit, 0 or anything else.
+     */
+    uint16_t (*get)(void *context, uint16_t address);
+    /**
+     * Sets a cell that is there; a bit to 0 or 1. Not needed for what is only read.
+     */
+    void (*set)(void *context, uint16_t address, uint16_t value);
+    /**
+     * As in mbm_registerTable.
+     */
+    uint8_t (*before)(void *context,
+                      uint16_t address,
+                      uint16_t quantity,
+                      const uint8_t *data);
+    /**
+     * As in mbm_registerTable.
+     */
+    void (*after)(void *context, uint16_t address, uint16_t quantity);
+} mbm_dataCallbacks;
+
+/**
+ * A request for a function of yours.
+ */
+typedef struct mbm_request {
+    /**
+     * What stands behind the function code.
+     */
+    const uint8_t *data;
+    /**
+     * Bytes of it, 0 to 252.
+     */
+    uint16_t length;
+    /**
+     * The unit that it was sent to. On a serial line 0 is broadcast: no response is
+     * sent.
+     */
+    uint8_t unit;
+    /**
+     * The function code.
+     */
+    uint8_t function;
+} mbm_request;
+
+/**
+ * A function of yours. Zero it, set what you need, and hand it to
+ * mbm_unit_serveCustom.
+ */
+typedef struct mbm_custom {
+    /**
+     * Private.
+     */
+    struct mbm_service service;
+    /**
+     * Carries out a request and writes the data of the response, which stand
+     * behind the function code, to `response`. `capacity` is what the frame
+     * buffer has left behind the request, at most 252 of it are used. Returns
+     * how many bytes it wrote, or MBM_REPLY_EXCEPTION | code, MBM_REPLY_NONE or
+     * MBM_REPLY_PENDING.
+     */
+    uint16_t (*serve)(void *context,
+                      const struct mbm_request *request,
+                      uint8_t *response,
+                      uint16_t capacity);
+    /**
+     * Handed to `serve`. Yours, may be NULL.
+     */
+    void *context;
+    /**
+     * The function code, 1 to 127; 0 is every function that nothing before it
+     * serves. 65 to 72 and 100 to 110 are left to users (V1.1b3, 5).
+     */
+    uint8_t code;
+    /**
+     * How long its request PDUs are, which RTU over TCP asks. Zeroed, a request is
+     * whole once its CRC is right.
+     */
+    struct mbm_rule length;
+} mbm_custom;
+
+/**
+ * Functions that a unit answers with exception 01, though it could serve them:
+ * see mbm_unit_switchFunction.
+ */
+typedef struct mbm_functionMask {
+    /**
+     * Private.
+     */
+    struct mbm_service service;
+    /**
+     * Private.
+     */
+    uint8_t off[16];
+} mbm_functionMask;
+
+/**
+ * One file: an array of records, each a register.
+ */
+typedef struct mbm_file {
+    /**
+     * The records, from record 0 on.
+     */
+    uint16_t *records;
+    /**
+     * How many, up to 10000.
+     */
+    uint16_t size;
+    /**
+     * The file number, from 1 on.
+     */
+    uint16_t number;
+} mbm_file;
+
+/**
+ * Files of yours. Zero it, set what you need, and hand it to
+ * mbm_unit_serveFiles.
+ */
+typedef struct mbm_files {
+    /**
+     * Private.
+     */
+    struct mbm_service service;
+    /**
+     * The files.
+     */
+    const struct mbm_file *files;
+    /**
+     * How many.
+     */
+    uint16_t count;
+    /**
+     * Optional: asked before records are written, for each group of a request
+     * before any is written. `data` are the new values, high bytes first.
+     * Returns 0, or an exception code that refuses the whole request.
+     */
+    uint8_t (*before)(void *context,
+                      uint16_t file,
+                      uint16_t record,
+                      uint16_t length,
+                      const uint8_t *data);
+    /**
+     * Optional: told what was written, once a group.
+     */
+    void (*after)(void *context, uint16_t file, uint16_t record, uint16_t length);
+    /**
+     * Handed to both hooks. Yours, may be NULL.
+     */
+    void *context;
+} mbm_files;
+
+/**
+ * One queue of registers.
+ */
+typedef struct mbm_fifo {
+    /**
+     * The registers, the first to leave first.
+     */
+    const uint16_t *words;
+    /**
+     * The address of the queue.
+     */
+    uint16_t address;
+    /**
+     * How many registers it holds now; more than 31 are answered with exception
+     * 03 (V1.1b3, 6.18).
+     */
+    uint16_t count;
+} mbm_fifo;
+
+/**
+ * Queues of yours. Zero it, set both, and hand it to mbm_unit_serveFifos.
+ */
+typedef struct mbm_fifos {
+    /**
+     * Private.
+     */
+    struct mbm_service service;
+    /**
+     * The queues. Reading does not empty them.
+     */
+    const struct mbm_fifo *fifos;
+    /**
+     * How many.
+     */
+    uint16_t count;
+} mbm_fifos;
+
+/**
+ * The eight outputs of function 07. Zero it, and hand it to
+ * mbm_unit_serveExceptionStatus.
+ */
+typedef struct mbm_exceptionStatus {
+    /**
+     * Private.
+     */
+    struct mbm_service service;
+    /**
+     * The outputs; change them at any time.
+     */
+    uint8_t outputs;
+} mbm_exceptionStatus;
+
+/**
+ * What function 11 answers. Zero it, set what you need, and hand it to
+ * mbm_unit_serveServerId. All together at most 251 bytes, less what the frame
+ * buffer lacks; more is answered with exception 04.
+ */
+typedef struct mbm_serverId {
+    /**
+     * Private.
+     */
+    struct mbm_service service;
+    /**
+     * The id; NULL only with 0 bytes.
+     */
+    const uint8_t *id;
+    /**
+     * What stands behind the run indicator; NULL only with 0 bytes.
+     */
+    const uint8_t *additional;
+    /**
+     * Bytes of the id.
+     */
+    uint8_t idLength;
+    /**
+     * Bytes behind the run indicator.
+     */
+    uint8_t additionalLength;
+    /**
+     * The run indicator: 0 is answered as 00, anything else as FF.
+     */
+    uint8_t running;
+} mbm_serverId;
+
+/**
+ * A device identification. Zero it, set both, and hand it to
+ * mbm_unit_serveIdentification.
+ */
+typedef struct mbm_identification {
+    /**
+     * Private.
+     */
+    struct mbm_service service;
+    /**
+     * The objects, in any order: ids 0 vendor name, 1 product code and 2 revision,
+     * which every device has; 3 vendor URL, 4 product name, 5 model name, 6 application
+     * name; from 0x80 on yours. Each has 244 bytes at most.
+     */
+    const struct mbm_object *objects;
+    /**
+     * How many.
+     */
+    uint16_t count;
+} mbm_identification;
+
+/**
+ * Coils or discrete inputs in an array of yours, eight to a byte, lowest bit
+ * first; as mbm_registerTable.
+ */
+typedef struct mbm_bitTable {
+    /**
+     * Private.
+     */
+    struct mbm_service service;
+    /**
+     * The bits.
+     */
+    uint8_t *bits;
+    /**
+     * As in mbm_registerTable.
+     */
+    const uint8_t *valid;
+    /**
+     * As in mbm_registerTable; `data` are bits, lowest first.
+     */
+    uint8_t (*before)(void *context,
+                      uint16_t address,
+                      uint16_t quantity,
+                      const uint8_t *data);
+    /**
+     * As in mbm_registerTable.
+     */
+    void (*after)(void *context, uint16_t address, uint16_t quantity);
+    /**
+     * As in mbm_registerTable.
+     */
+    void *context;
+    /**
+     * The address of the first bit.
+     */
+    uint16_t base;
+    /**
+     * How many bits there are.
+     */
+    uint16_t size;
+} mbm_bitTable;
+
+/**
+ * Holding or input registers in an array of yours. Zero it, set what you need,
+ * and hand it to mbm_unit_serveHoldingRegisters or
+ * mbm_unit_serveInputRegisters. You may change words and settings at any
+ * time, but not from within a hook of this table: the request under way goes on
+ * with the words that the table had when it came. To serve it as another kind of
+ * table, zero it first.
+ */
+typedef struct mbm_registerTable {
+    /**
+     * Private.
+     */
+    struct mbm_service service;
+    /**
+     * The registers.
+     */
+    uint16_t *words;
+    /**
+     * Optional, NULL if every register is there: a bit for each, lowest bit of
+     * the first byte first; 0 answers exception 02.
+     */
+    const uint8_t *valid;
+    /**
+     * Optional: asked before registers are written, once a request. `data` are
+     * the new values, high bytes first. Returns 0, or an exception code that
+     * refuses the whole request.
+     */
+    uint8_t (*before)(void *context,
+                      uint16_t address,
+                      uint16_t quantity,
+                      const uint8_t *data);
+    /**
+     * Optional: told what was written.
+     */
+    void (*after)(void *context, uint16_t address, uint16_t quantity);
+    /**
+     * Handed to both hooks. Yours, may be NULL.
+     */
+    void *context;
+    /**
+     * The address of the first register.
+     */
+    uint16_t base;
+    /**
+     * How many registers there are.
+     */
+    uint16_t size;
+} mbm_registerTable;
+
+/**
+ * Serves cells that your functions hold.
+ *
+ * @param unit   the unit
+ * @param cells  yours, for as long as the unit is used
+ * @param table  the function that reads them: 1 coils (01, 05, 0F), 2 discrete
+ *               inputs (02), 3 holding registers (03, 06, 10, 16, 17), 4 input
+ *               registers (04)
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, no `get`, no `set`
+ *         where it is needed, or another table; MBM_BUSY and MBM_BUFFER_TOO_SMALL as
+ *         mbm_unit_serveCoils
+ */
+uint8_t mbm_unit_serveCallbacks(struct mbm_unit *unit,
+                                struct mbm_dataCallbacks *cells,
+                                uint8_t table);
+
+/**
+ * Serves a function of yours, on every framing.
+ *
+ * @param unit    the unit
+ * @param custom  yours, for as long as the unit is used
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, no function, a code
+ *         from 128 on, or a length that is no rule; MBM_BUFFER_TOO_SMALL if the unit
+ *         has no place
+ */
+uint8_t mbm_unit_serveCustom(struct mbm_unit *unit, struct mbm_custom *custom);
+
+/**
+ * Switches a function of a unit off or on again. One that is off is answered with
+ * exception 01, whatever serves it.
+ *
+ * @param unit  the unit
+ * @param mask  yours, for as long as the unit is used; zeroed before the first call.
+ *              Units that share one share what is switched off
+ * @param code  the function code, 1 to 127
+ * @param on    0 switches the function off, anything else on
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or another code;
+ *         MBM_BUFFER_TOO_SMALL if the unit has no place
+ */
+uint8_t mbm_unit_switchFunction(struct mbm_unit *unit,
+                                struct mbm_functionMask *mask,
+                                uint8_t code,
+                                uint8_t on);
+
+/**
+ * Serves diagnostics: functions 08, 0B and 0C. Of 08 it serves the sub-functions that
+ * the standard defines, 00 to 04, 0A to 12 and 14; others are exception 01. From now
+ * on the unit counts what its lines bring, logs events, and can be forced into
+ * listen only mode.
+ *
+ * @param unit         the unit
+ * @param diagnostics  yours, for as long as the unit is used; one for each unit, or
+ *                     it counts for all that share it
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit has
+ *         another record of diagnostics; MBM_BUFFER_TOO_SMALL if it has no place
+ */
+uint8_t mbm_unit_serveDiagnostics(struct mbm_unit *unit,
+                                  struct mbm_diagnostics *diagnostics);
+
+/**
+ * Serves files: functions 14 and 15. A request is carried out whole or not at
+ * all. It takes 250 bytes of stack.
+ *
+ * @param unit   the unit
+ * @param files  yours, for as long as the unit is used
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+ *         the unit has no place
+ */
+uint8_t mbm_unit_serveFiles(struct mbm_unit *unit, struct mbm_files *files);
+
+/**
+ * Serves FIFO queues: function 18.
+ *
+ * @param unit   the unit
+ * @param fifos  yours, for as long as the unit is used
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+ *         the unit has no place
+ */
+uint8_t mbm_unit_serveFifos(struct mbm_unit *unit, struct mbm_fifos *fifos);
+
+/**
+ * Serves the exception status: function 07.
+ *
+ * @param unit    the unit
+ * @param status  yours, for as long as the unit is used
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+ *         the unit has no place
+ */
+uint8_t mbm_unit_serveExceptionStatus(struct mbm_unit *unit,
+                                      struct mbm_exceptionStatus *status);
+
+/**
+ * Serves the server id: function 11.
+ *
+ * @param unit  the unit
+ * @param id    yours, for as long as the unit is used
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+ *         the unit has no place
+ */
+uint8_t mbm_unit_serveServerId(struct mbm_unit *unit, struct mbm_serverId *id);
+
+/**
+ * Serves the device identification: function 2B/0E, as streams of objects and
+ * one by one. What does not fit into one response follows in the next that the
+ * client asks for. The conformity level is that of the objects there are.
+ *
+ * @param unit            the unit
+ * @param identification  yours, for as long as the unit is used
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
+ *         the unit has no place
+ */
+uint8_t mbm_unit_serveIdentification(struct mbm_unit *unit,
+                                     struct mbm_identification *identification);
+
+/**
+ * Answers one request, without a server: takes a frame from a buffer and writes
+ * the response frame over it.
+ *
+ * @param units      what is served: one unit, or an array of them
+ * @param count      how many units
+ * @param framing    how frames look; of it, `functions` are not used, for the units
+ *                   know theirs
+ * @param frame      the whole request, and room for the response
+ * @param length     bytes of the request
+ * @param capacity   bytes of the buffer: 256 hold any response in RTU, 513 in
+ *                   ASCII, 260 over TCP; a longer response becomes exception 04
+ * @param response   receives the bytes of the response; 0 where there is none: for a
+ *                   damaged frame, another unit, a broadcast, and with any status
+ *                   but MBM_OK
+ * @return MBM_OK; MBM_PENDING, with the buffer to be filled anew, if a function
+ *         of yours is not done; MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_unit_respond(struct mbm_unit *units,
+                         uint8_t count,
+                         const struct mbm_framing *framing,
+                         uint8_t *frame,
+                         uint16_t length,
+                         uint16_t capacity,
+                         uint16_t *response);
+
+/**
+ * Serves coils: functions 01, 05 and 0F.
+ *
+ * @param unit   the unit
+ * @param table  yours, for as long as the unit is used
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY for a table that
+ *         is served as another kind; MBM_BUFFER_TOO_SMALL if the unit has no place
+ */
+uint8_t mbm_unit_serveCoils(struct mbm_unit *unit, struct mbm_bitTable *table);
+
+/**
+ * Serves discrete inputs: function 02.
+ *
+ * @param unit   the unit
+ * @param table  yours, for as long as the unit is used
+ * @return a status; see mbm_unit_serveCoils
+ */
+uint8_t mbm_unit_serveDiscreteInputs(struct mbm_unit *unit, struct mbm_bitTable *table);
+
+/**
+ * Serves holding registers: functions 03, 06 and 10. For 16 and 17 too, call
+ * mbm_registerTable_serveMaskAndReadWrite behind it.
+ *
+ * @param unit   the unit
+ * @param table  yours, for as long as the unit is used
+ * @return a status; see mbm_unit_serveCoils
+ */
+uint8_t mbm_unit_serveHoldingRegisters(struct mbm_unit *unit,
+                                       struct mbm_registerTable *table);
+
+/**
+ * Serves input registers: function 04.
+ *
+ * @param unit   the unit
+ * @param table  yours, for as long as the unit is used
+ * @return a status; see mbm_unit_serveCoils
+ */
+uint8_t mbm_unit_serveInputRegisters(struct mbm_unit *unit,
+                                     struct mbm_registerTable *table);
+
+/**
+ * Serves functions 16 and 17 beside 03, 06 and 10, on each unit that has the
+ * table: a call of its own, so that firmware without it is smaller. After a table
+ * was zeroed it is to be called again.
+ *
+ * @param table  holding registers that mbm_unit_serveHoldingRegisters took
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL and other tables
+ */
+uint8_t mbm_registerTable_serveMaskAndReadWrite(struct mbm_registerTable *table);
+
+/* ==== 9. Values ===================================================================== */
+
+/**
+ * The order of the registers that a function is given; in these, MBM_ORDER_ABCD.
+ */
+#define MBM_ORDER_DEFAULT 0
+
+/**
+ * High word first, high byte first: what most devices do. A is the most
+ * significant byte; 2923517522, which is 0xAE415652, arrives as AE41 5652.
+ */
+#define MBM_ORDER_ABCD 1
+
+/**
+ * Low word first, high byte first: 5652 AE41.
+ */
+#define MBM_ORDER_CDAB 2
+
+/**
+ * High word first, low byte first: 41AE 5256.
+ */
+#define MBM_ORDER_BADC 3
+
+/**
+ * Low word first, low byte first: 5256 41AE.
+ */
+#define MBM_ORDER_DCBA 4
+
+/**
+ * mbm_registers.kind: words to read, as those of mbm_master.
+ */
+#define MBM_REGISTERS_OF_WORDS 1
+
+/**
+ * mbm_registers.kind: bytes to read, high byte first.
+ */
+#define MBM_REGISTERS_OF_BYTES 2
+
+/**
+ * mbm_registers.kind: words to write and to read.
+ */
+#define MBM_REGISTERS_INTO_WORDS 3
+
+/**
+ * mbm_registers.kind: bytes to write and to read, high byte first.
+ */
+#define MBM_REGISTERS_INTO_BYTES 4
+
+/**
+ * Registers in a row, seen as values by the addresses that the device gives
+ * them. It owns nothing: what `data` points to is the caller's.
+ *
+ * One of the functions mbm_registers_of... and mbm_registers_into... fills it
+ * in, as do mbm_master_getResponseRegisters and mbm_master_getTransmitRegisters;
+ * each field may be set by hand too. Functions that get or set do not change
+ * it, so any thread may use it beside others that only get.
+ */
+typedef struct mbm_registers {
+    /**
+     * The words or bytes, as `kind` says. NULL: none, MBM_NOT_INITIALISED.
+     */
+    const void *data;
+    /**
+     * The device's address of the first register.
+     */
+    uint16_t first;
+    /**
+     * How many registers there are; `first + count` is 65536 at most.
+     */
+    uint16_t count;
+    /**
+     * One of MBM_REGISTERS_...
+     */
+    uint8_t kind;
+    /**
+     * One of MBM_ORDER_..., for calls that say MBM_ORDER_DEFAULT.
+     */
+    uint8_t order;
+} mbm_registers;
+
+/**
+ * Packs coils for a write, the first into the lowest bit of the first byte (V1.1b3,
+ * 6.11); unused bits of the last byte become 0, bytes behind it stay.
+ *
+ * @param coils     a byte a coil: 0 is off, anything else is on
+ * @param quantity  how many coils, 0 to 65535
+ * @param bytes     gets the bits, 8 a byte
+ * @param length    how many bytes there are
+ * @return MBM_OK, or with nothing packed MBM_BUFFER_TOO_SMALL or
+ *         MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_bits_pack(const uint8_t *coils,
+                      uint16_t quantity,
+                      uint8_t *bytes,
+                      uint16_t length);
+
+/**
+ * Unpacks the coils or discrete inputs of a read (V1.1b3, 6.1).
+ *
+ * @param bytes     the bits, 8 a byte, the first coil the lowest
+ * @param length    how many bytes there are
+ * @param coils     gets 0 or 1 a coil
+ * @param quantity  how many coils, 0 to 65535
+ * @return MBM_OK, or with nothing unpacked MBM_ILLEGAL_DATA_ADDRESS if there are
+ *         not so many bits, MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_bits_unpack(const uint8_t *bytes,
+                        uint16_t length,
+                        uint8_t *coils,
+                        uint16_t quantity);
+
+/**
+ * Whether a coil or discrete input is set, by the device's address.
+ *
+ * @param bytes     the bits of a read, 8 a byte, the first coil the lowest
+ * @param first     the address of the first coil
+ * @param quantity  how many coils were read; `bytes` has room for so many
+ * @param address   the coil
+ * @param on        gets 0 or 1
+ * @return MBM_OK, or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS for a coil that
+ *         is not among them or a range that passes 65535, MBM_INVALID_ARGUMENT
+ *         for a NULL pointer
+ */
+uint8_t mbm_bits_isSet(const uint8_t *bytes,
+                       uint16_t first,
+                       uint16_t quantity,
+                       uint16_t address,
+                       uint8_t *on);
+
+/**
+ * Sets a coil for a write, by the device's address; the others stay.
+ *
+ * @param bytes     the bits of a write, 8 a byte, the first coil the lowest
+ * @param first     the address of the first coil
+ * @param quantity  how many coils are written; `bytes` has room for so many
+ * @param address   the coil
+ * @param on        0 is off, anything else is on
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a coil that is
+ *         not among them or a range that passes 65535, MBM_INVALID_ARGUMENT for
+ *         a NULL pointer
+ */
+uint8_t mbm_bits_set(uint8_t *bytes,
+                     uint16_t first,
+                     uint16_t quantity,
+                     uint16_t address,
+                     uint8_t on);
+
+/**
+ * As mbm_bits_pack, into words such as mbm_master's transmit words, 16 to a word.
+ *
+ * @param coils     a byte a coil: 0 is off, anything else is on
+ * @param quantity  how many coils, 0 to 65535
+ * @param words     gets the bits, 16 a word
+ * @param length    how many words there are
+ * @return MBM_OK, or with nothing packed MBM_BUFFER_TOO_SMALL or
+ *         MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_bits_packWords(const uint8_t *coils,
+                           uint16_t quantity,
+                           uint16_t *words,
+                           uint16_t length);
+
+/**
+ * As mbm_bits_unpack, of words such as mbm_master's response words.
+ *
+ * @param words     the bits, 16 a word, the first coil the lowest
+ * @param length    how many words there are
+ * @param coils     gets 0 or 1 a coil
+ * @param quantity  how many coils, 0 to 65535
+ * @return MBM_OK, or with nothing unpacked MBM_ILLEGAL_DATA_ADDRESS if there are
+ *         not so many bits, MBM_INVALID_ARGUMENT for a NULL pointer
+ */
+uint8_t mbm_bits_unpackWords(const uint16_t *words,
+                             uint16_t length,
+                             uint8_t *coils,
+                             uint16_t quantity);
+
+/**
+ * As mbm_bits_isSet, in words such as mbm_master's response words.
+ *
+ * @param words     the bits of a read, 16 a word, the first coil the lowest
+ * @param first     the address of the first coil
+ * @param quantity  how many coils were read; `words` has room for so many
+ * @param address   the coil
+ * @param on        gets 0 or 1
+ * @return MBM_OK, or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS for a coil that
+ *         is not among them or a range that passes 65535, MBM_INVALID_ARGUMENT
+ *         for a NULL pointer
+ */
+uint8_t mbm_bits_isSetInWords(const uint16_t *words,
+                              uint16_t first,
+                              uint16_t quantity,
+                              uint16_t address,
+                              uint8_t *on);
+
+/**
+ * As mbm_bits_set, in words such as mbm_master's transmit words.
+ *
+ * @param words     the bits of a write, 16 a word, the first coil the lowest
+ * @param first     the address of the first coil
+ * @param quantity  how many coils are written; `words` has room for so many
+ * @param address   the coil
+ * @param on        0 is off, anything else is on
+ * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a coil that is
+ *         not among them or a range that passes 65535, MBM_INVALID_ARGUMENT for
+ *         a NULL pointer
+ */
+uint8_t mbm_bits_setInWords(uint16_t *words,
+                            uint16_t first,
+                            uint16_t quantity,
+                            uint16_t address,
+                            uint8_t on);
 
 /**
  * Sets the order of values in the views that mbm_master_getResponseRegisters
@@ -3465,269 +3352,6 @@ uint8_t mbm_master_getResponseRegisters(const struct mbm_master *master,
 uint8_t mbm_master_getTransmitRegisters(const struct mbm_master *master,
                                         uint16_t first,
                                         struct mbm_registers *registers);
-
-/**
- * A word of the last successful read.
- *
- * @param master  the object
- * @param index   0 to 255
- * @return the word; 0xFFFF past the end of the response buffer
- */
-uint16_t mbm_master_getResponseBuffer(const struct mbm_master *master, uint8_t index);
-
-/**
- * Zeroes the response words; receive goes on where it was.
- *
- * @param master  the object
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_clearResponseBuffer(struct mbm_master *master);
-
-/**
- * Sets a word for the functions that write. Does not move the queue of send.
- *
- * @param master  the object
- * @param index   0 to the transmit buffer's words - 1
- * @param value   the word
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS past the end of the buffer,
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_setTransmitBuffer(struct mbm_master *master,
-                                     uint8_t index,
-                                     uint16_t value);
-
-/**
- * Zeroes the transmit words; the queue of send stays.
- *
- * @param master  the object
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_clearTransmitBuffer(struct mbm_master *master);
-
-/**
- * Sets the write address and empties the queue of send; the words stay.
- *
- * @param master   the object
- * @param address  0 to 65535, for the functions ending in Queued
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_beginTransmission(struct mbm_master *master, uint16_t address);
-
-/**
- * Queues a word behind those queued. Bits queued before keep their word.
- *
- * @param master  the object
- * @param word    the word
- * @return MBM_OK, MBM_BUFFER_TOO_SMALL with nothing queued past the end of the
- *         transmit buffer, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_send(struct mbm_master *master, uint16_t word);
-
-/**
- * Queues a byte as one word.
- *
- * @param master  the object
- * @param byte    the low byte of the word; the high byte is 0
- * @return MBM_OK, MBM_BUFFER_TOO_SMALL with nothing queued past the end of the
- *         transmit buffer, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_send8(struct mbm_master *master, uint8_t byte);
-
-/**
- * Queues two words, the low one first; the low one alone if only that fits.
- *
- * @param master  the object
- * @param value   both words
- * @return MBM_OK, MBM_BUFFER_TOO_SMALL if a word did not fit,
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_send32(struct mbm_master *master, uint32_t value);
-
-/**
- * Queues a bit behind those queued, lowest bit of a word first.
- *
- * @param master  the object
- * @param on      0 is off, anything else is on
- * @return MBM_OK, MBM_BUFFER_TOO_SMALL with nothing queued past the end of the
- *         transmit buffer, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_master_sendBit(struct mbm_master *master, uint8_t on);
-
-/**
- * How many words of the last successful read mbm_master_receive has yet to give.
- *
- * @param master  the object
- * @return 0 to 125
- */
-uint8_t mbm_master_available(const struct mbm_master *master);
-
-/**
- * The next word of the last successful read.
- *
- * @param master  the object
- * @return the word; 0xFFFF when none is left
- */
-uint16_t mbm_master_receive(struct mbm_master *master);
-
-/**
- * Writes the PDU of a packet: what goes into a frame. Nothing is written
- * behind it, and nothing malformed is ever built.
- *
- * Any thread or interrupt may call it.
- *
- * @param packet         what to build; unit and transaction are not in a PDU
- * @param functions      functions of your own; may be NULL if there are none
- * @param functionCount  how many
- * @param pdu            receives it; may not overlap the packet's data
- * @param capacity       bytes of `pdu`; MBM_MAX_PDU always do
- * @param length         receives the PDU's length; 0 if the status is not MBM_OK
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
- *         that mbm_packet_parse finds in such a PDU
- */
-uint8_t mbm_packet_build(const struct mbm_packet *packet,
-                         const struct mbm_function *functions,
-                         uint8_t functionCount,
-                         uint8_t *pdu,
-                         uint16_t capacity,
-                         uint16_t *length);
-
-/**
- * Reads a PDU: what stands in a frame. The packet's data point into it.
- *
- * Any thread or interrupt may call it.
- *
- * @param kind           MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for
- *                       responses and exceptions
- * @param pdu            the PDU
- * @param pduLength      its bytes
- * @param functions      functions of your own; may be NULL if there are none
- * @param functionCount  how many
- * @param packet         receives what it says; if the PDU is refused, its kind
- *                       and function alone; unchanged for MBM_INVALID_ARGUMENT
- * @return MBM_OK, also for an exception; MBM_INVALID_ARGUMENT. Of a request
- *         else the exception that answers it: MBM_ILLEGAL_FUNCTION,
- *         MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE. Of a response
- *         else MBM_INVALID_FUNCTION for one that nobody knows, or
- *         MBM_MALFORMED_REPLY
- */
-uint8_t mbm_packet_parse(uint8_t kind,
-                         const uint8_t *pdu,
-                         uint16_t pduLength,
-                         const struct mbm_function *functions,
-                         uint8_t functionCount,
-                         struct mbm_packet *packet);
-
-/**
- * How long the PDU is that begins with these bytes.
- *
- * A response to function 11 is as long as it counts. Some devices count the id alone:
- * mbm_packet_parse takes their longer PDU too. mbm_frame_expectedLength tells these
- * apart, by the frame's check.
- *
- * Any thread or interrupt may call it.
- *
- * @param kind           MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for
- *                       responses and exceptions
- * @param pdu            its first bytes; more may follow
- * @param have           how many; may be 0
- * @param functions      functions of your own; may be NULL if there are none
- * @param functionCount  how many
- * @param expected       receives the length; MBM_LENGTH_UNKNOWN and 0 if the status
- *                       is not MBM_OK
- * @return MBM_OK; MBM_MALFORMED_FRAME for a length that no PDU has;
- *         MBM_INVALID_ARGUMENT
- */
-uint8_t mbm_packet_expectedLength(uint8_t kind,
-                                  const uint8_t *pdu,
-                                  uint16_t have,
-                                  const struct mbm_function *functions,
-                                  uint8_t functionCount,
-                                  struct mbm_length *expected);
-
-/**
- * How long the PDU will be that answers a request, if that succeeds. Else it is
- * an exception of two bytes.
- *
- * Any thread or interrupt may call it.
- *
- * @param request        the request, as for mbm_packet_build
- * @param functions      functions of your own; may be NULL if there are none
- * @param functionCount  how many
- * @param expected       receives the length; MBM_LENGTH_EXACT and 0 if nothing
- *                       ever answers it (08 with sub-function 04);
- *                       MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
- * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a packet that is no request;
- *         else why such a request is never built
- */
-uint8_t mbm_packet_replyLength(const struct mbm_packet *request,
-                               const struct mbm_function *functions,
-                               uint8_t functionCount,
-                               struct mbm_length *expected);
-
-/**
- * Gives the records of 14 or 15 one by one:
- * `for (cursor = 0; mbm_packet_nextRecord(&packet, &cursor, &record);)`
- *
- * Any thread or interrupt may call it.
- *
- * @param packet  a request or response of 14 or 15, as parsed or built
- * @param cursor  where it goes on; yours, 0 to begin
- * @param record  receives the record, whose data point into the packet's
- * @return 1; 0, with cursor and record unchanged, if there is none left, or for NULL
- */
-uint8_t mbm_packet_nextRecord(const struct mbm_packet *packet,
-                              uint16_t *cursor,
-                              struct mbm_record *record);
-
-/**
- * Gives the objects of a device identification one by one, as
- * mbm_packet_nextRecord does records.
- *
- * Any thread or interrupt may call it.
- *
- * @param packet  a response of 2B/0E, as parsed or built
- * @param cursor  where it goes on; yours, 0 to begin
- * @param object  receives the object, whose data point into the packet's
- * @return 1; 0, with cursor and object unchanged, if there is none left, or for NULL
- */
-uint8_t mbm_packet_nextObject(const struct mbm_packet *packet,
-                              uint16_t *cursor,
-                              struct mbm_object *object);
-
-/**
- * Adds a record to a packet of 14 or 15, to be built then. Set the packet's
- * kind and function first, and dataLength to 0.
- *
- * @param packet    grows by the record; unchanged if it is refused
- * @param storage   receives the packet's data, for all its records the same
- * @param capacity  bytes of `storage`; 251 always do
- * @param record    the record; its data may not lie in `storage`
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_ILLEGAL_FUNCTION if this is not 14
- *         or 15; MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE for a
- *         record that there cannot be; MBM_INVALID_ARGUMENT, also for data
- *         that are elsewhere
- */
-uint8_t mbm_packet_addRecord(struct mbm_packet *packet,
-                             uint8_t *storage,
-                             uint16_t capacity,
-                             const struct mbm_record *record);
-
-/**
- * Adds an object to a response of 2B/0E, to be built then. Set the packet's
- * kind, function and meiType first, and dataLength and objectCount to 0.
- *
- * @param packet    grows by the object; unchanged if it is refused
- * @param storage   receives the packet's data, for all its objects the same
- * @param capacity  bytes of `storage`; 246 always do
- * @param object    the object; its data may not lie in `storage`
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL: if 246 bytes are, set moreFollows and
- *         nextObjectId; MBM_ILLEGAL_FUNCTION if this is no such response;
- *         MBM_INVALID_ARGUMENT, also for data that are elsewhere
- */
-uint8_t mbm_packet_addObject(struct mbm_packet *packet,
-                             uint8_t *storage,
-                             uint16_t capacity,
-                             const struct mbm_object *object);
 
 /**
  * Sees words that were read as registers, in order MBM_ORDER_ABCD until
@@ -3806,7 +3430,7 @@ uint8_t mbm_registers_getBit(const struct mbm_registers *registers,
                              uint8_t *on);
 
 /**
- * One byte of a register, 0 to 255.
+ * One byte of a register, 0 to 255; for a signed one, cast the pointer to an int8_t.
  *
  * @param registers  the registers
  * @param address    the register, by the device's address
@@ -3822,21 +3446,8 @@ uint8_t mbm_registers_getUint8(const struct mbm_registers *registers,
                                uint8_t *value);
 
 /**
- * As mbm_registers_getUint8, -128 to 127.
- *
- * @param registers  the registers
- * @param address    the register, by the device's address
- * @param high       0 for the low byte, anything else for the high byte
- * @param value      gets the byte
- * @return as mbm_registers_getUint8
- */
-uint8_t mbm_registers_getInt8(const struct mbm_registers *registers,
-                              uint16_t address,
-                              uint8_t high,
-                              int8_t *value);
-
-/**
- * A number of one register, 0 to 65535. Of the order only the bytes matter.
+ * A number of one register, 0 to 65535; for a signed number, cast the pointer to an
+ * int16_t. Of the order only the bytes matter.
  *
  * @param registers  the registers
  * @param address    the register, by the device's address
@@ -3851,21 +3462,8 @@ uint8_t mbm_registers_getUint16(const struct mbm_registers *registers,
                                 uint16_t *value);
 
 /**
- * As mbm_registers_getUint16, -32768 to 32767.
- *
- * @param registers  the registers
- * @param address    the register, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
- * @param value      gets the number
- * @return as mbm_registers_getUint16
- */
-uint8_t mbm_registers_getInt16(const struct mbm_registers *registers,
-                               uint16_t address,
-                               uint8_t order,
-                               int16_t *value);
-
-/**
- * A number of two registers, 0 to 4294967295.
+ * A number of two registers, 0 to 4294967295; for a signed number (two's complement),
+ * cast the pointer to an int32_t.
  *
  * @param registers  the registers
  * @param address    the first of its registers, by the device's address
@@ -3880,21 +3478,7 @@ uint8_t mbm_registers_getUint32(const struct mbm_registers *registers,
                                 uint32_t *value);
 
 /**
- * As mbm_registers_getUint32, two's complement.
- *
- * @param registers  the registers
- * @param address    the first of its registers, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
- * @param value      gets the number
- * @return as mbm_registers_getUint32
- */
-uint8_t mbm_registers_getInt32(const struct mbm_registers *registers,
-                               uint16_t address,
-                               uint8_t order,
-                               int32_t *value);
-
-/**
- * A number of four registers.
+ * A number of four registers; for a signed number, cast the pointer to an int64_t.
  *
  * @param registers  the registers
  * @param address    the first of its registers, by the device's address
@@ -3907,20 +3491,6 @@ uint8_t mbm_registers_getUint64(const struct mbm_registers *registers,
                                 uint16_t address,
                                 uint8_t order,
                                 uint64_t *value);
-
-/**
- * As mbm_registers_getUint64, two's complement.
- *
- * @param registers  the registers
- * @param address    the first of its registers, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
- * @param value      gets the number
- * @return as mbm_registers_getUint64
- */
-uint8_t mbm_registers_getInt64(const struct mbm_registers *registers,
-                               uint16_t address,
-                               uint8_t order,
-                               int64_t *value);
 
 /**
  * A float of two registers, an IEEE 754 binary32. Its bits are copied, those
@@ -3980,37 +3550,23 @@ uint8_t mbm_registers_getString(const struct mbm_registers *registers,
                                 uint16_t capacity);
 
 /**
- * Raw bytes as they travel, high byte first in every order.
- *
- * @param registers  the registers
- * @param address    the register whose high byte is the first, by the device's
- *                   address
- * @param bytes      gets the bytes; must not overlap the registers
- * @param length     how many bytes, two a register; may be odd
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if they are not all there,
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `bytes` unchanged
- */
-uint8_t mbm_registers_getBytes(const struct mbm_registers *registers,
-                               uint16_t address,
-                               uint8_t *bytes,
-                               uint16_t length);
-
-/**
- * As mbm_registers_getBytes, from a device that swaps the bytes of its registers:
- * with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte of each comes first.
+ * Raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each register comes
+ * first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte, for a device
+ * that swaps the bytes of its registers.
  *
  * @param registers  the registers
  * @param address    the first register, by the device's address
  * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
  * @param bytes      gets the bytes; must not overlap the registers
  * @param length     how many bytes, two a register; may be odd
- * @return as mbm_registers_getBytes
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if there are not so many,
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `bytes` unchanged
  */
-uint8_t mbm_registers_getBytesInOrder(const struct mbm_registers *registers,
-                                      uint16_t address,
-                                      uint8_t order,
-                                      uint8_t *bytes,
-                                      uint16_t length);
+uint8_t mbm_registers_getBytes(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               uint8_t *bytes,
+                               uint16_t length);
 
 /**
  * Whether registers hold these raw bytes, high byte first in every order.
@@ -4062,20 +3618,6 @@ uint8_t mbm_registers_setUint8(const struct mbm_registers *registers,
                                uint8_t value);
 
 /**
- * As mbm_registers_setUint8, -128 to 127.
- *
- * @param registers  the registers, of a kind to write
- * @param address    the register, by the device's address
- * @param high       0 for the low byte, anything else for the high byte
- * @param value      the byte
- * @return as mbm_registers_setUint8
- */
-uint8_t mbm_registers_setInt8(const struct mbm_registers *registers,
-                              uint16_t address,
-                              uint8_t high,
-                              int8_t value);
-
-/**
  * Sets a number of one register. Of the order only the bytes matter.
  *
  * @param registers  the registers, of a kind to write
@@ -4089,20 +3631,6 @@ uint8_t mbm_registers_setUint16(const struct mbm_registers *registers,
                                 uint16_t address,
                                 uint8_t order,
                                 uint16_t value);
-
-/**
- * As mbm_registers_setUint16, -32768 to 32767.
- *
- * @param registers  the registers, of a kind to write
- * @param address    the register, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
- * @param value      the number
- * @return as mbm_registers_setUint16
- */
-uint8_t mbm_registers_setInt16(const struct mbm_registers *registers,
-                               uint16_t address,
-                               uint8_t order,
-                               int16_t value);
 
 /**
  * Sets a number of two registers.
@@ -4120,20 +3648,6 @@ uint8_t mbm_registers_setUint32(const struct mbm_registers *registers,
                                 uint32_t value);
 
 /**
- * As mbm_registers_setUint32, two's complement.
- *
- * @param registers  the registers, of a kind to write
- * @param address    the first of its registers, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
- * @param value      the number
- * @return as mbm_registers_setUint32
- */
-uint8_t mbm_registers_setInt32(const struct mbm_registers *registers,
-                               uint16_t address,
-                               uint8_t order,
-                               int32_t value);
-
-/**
  * Sets a number of four registers.
  *
  * @param registers  the registers, of a kind to write
@@ -4147,20 +3661,6 @@ uint8_t mbm_registers_setUint64(const struct mbm_registers *registers,
                                 uint16_t address,
                                 uint8_t order,
                                 const uint64_t *value);
-
-/**
- * As mbm_registers_setUint64, two's complement.
- *
- * @param registers  the registers, of a kind to write
- * @param address    the first of its registers, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
- * @param value      points to the number
- * @return as mbm_registers_setUint64
- */
-uint8_t mbm_registers_setInt64(const struct mbm_registers *registers,
-                               uint16_t address,
-                               uint8_t order,
-                               const int64_t *value);
 
 /**
  * Sets a float of two registers, an IEEE 754 binary32. Its bits are copied.
@@ -4214,25 +3714,9 @@ uint8_t mbm_registers_setString(const struct mbm_registers *registers,
                                 const char *text);
 
 /**
- * Sets raw bytes as they travel, high byte first in every order.
- *
- * @param registers  the registers, of a kind to write
- * @param address    the register whose high byte is the first, by the device's
- *                   address
- * @param bytes      the bytes; must not overlap the registers
- * @param length     how many bytes, two a register; if odd, the low byte of the
- *                   last register stays
- * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS if there are not so
- *         many registers, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
-                               uint16_t address,
-                               const uint8_t *bytes,
-                               uint16_t length);
-
-/**
- * As mbm_registers_setBytes, for a device that swaps the bytes of its registers:
- * with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte of each comes first.
+ * Sets raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each register
+ * comes first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte, for a
+ * device that swaps the bytes of its registers.
  *
  * @param registers  the registers, of a kind to write
  * @param address    the first register, by the device's address
@@ -4240,13 +3724,857 @@ uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
  * @param bytes      the bytes; must not overlap the registers
  * @param length     how many bytes, two a register; if odd, the other byte of the
  *                   last register stays
- * @return as mbm_registers_setBytes
+ * @return MBM_OK, or with nothing changed MBM_ILLEGAL_DATA_ADDRESS if there are not so
+ *         many, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_registers_setBytesInOrder(const struct mbm_registers *registers,
-                                      uint16_t address,
-                                      uint8_t order,
-                                      const uint8_t *bytes,
-                                      uint16_t length);
+uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
+                               uint16_t address,
+                               uint8_t order,
+                               const uint8_t *bytes,
+                               uint16_t length);
+
+/* ==== 10. Packets =================================================================== */
+
+/**
+ * A request: what a client sends.
+ */
+#define MBM_PACKET_REQUEST 0
+
+/**
+ * A response: what a server sends if the request succeeds.
+ */
+#define MBM_PACKET_RESPONSE 1
+
+/**
+ * An exception: what a server sends if the request fails (V1.1b3, clause 7).
+ */
+#define MBM_PACKET_EXCEPTION 2
+
+/**
+ * Most bytes of a PDU: function code and data (V1.1b3, 4.1).
+ */
+#define MBM_MAX_PDU 253
+
+/**
+ * `bytes` is the length.
+ */
+#define MBM_LENGTH_EXACT 0
+
+/**
+ * It has `bytes` at least. Once so many are there, ask again.
+ */
+#define MBM_LENGTH_AT_LEAST 1
+
+/**
+ * Silence on the line tells, in ASCII the end character. `bytes` is 0.
+ */
+#define MBM_LENGTH_SILENCE 2
+
+/**
+ * Nobody knows this function: declare it. Also what silence ends, in RTU over TCP,
+ * where there is none. `bytes` is 0.
+ */
+#define MBM_LENGTH_UNKNOWN 3
+
+/**
+ * A request, response or exception of any function. Parsing zeroes it first,
+ * and sets what the function has; building reads that and ignores the rest:
+ *
+ * function | request | response
+ * ---------|---------|---------
+ * 01, 02, 03, 04 | address, quantity | data
+ * 05 | address, value | address, value
+ * 06 | address, value | address, value
+ * 07 | | exceptionStatus
+ * 08 | subFunction, data | subFunction, data
+ * 0B | | commStatus, eventCount
+ * 0C | | commStatus, eventCount, messageCount, data (events, the latest first)
+ * 0F, 10 | address, quantity, data | address, quantity
+ * 11 | | byteCount, data
+ * 14 | data (records) | data (records)
+ * 15 | data (records) | data (records)
+ * 16 | address, andMask, orMask | address, andMask, orMask
+ * 17 | address, quantity, writeAddress, writeQuantity, data | data
+ * 18 | address | data (registers)
+ * 2B, MEI type 0E | meiType, readDeviceIdCode, objectId | meiType, readDeviceIdCode, conformity, moreFollows, nextObjectId, objectCount, data (objects)
+ * 2B, others | meiType, data | meiType, data
+ * your own | data | data
+ *
+ * An exception has exceptionCode, and the function of the request. Register
+ * data are as on the wire, high bytes first; bits begin with the lowest of the
+ * first byte. Records and objects: mbm_packet_nextRecord, mbm_packet_addRecord
+ * and their likes for objects.
+ */
+typedef struct mbm_packet {
+    /**
+     * The data, without the byte count in front of them. After parsing they
+     * lie within the bytes that were parsed; to build, they are yours. May be
+     * NULL if dataLength is 0.
+     */
+    const uint8_t *data;
+    /**
+     * Bytes of data.
+     */
+    uint16_t dataLength;
+    /**
+     * Transaction identifier of a TCP frame; 0 in other framings.
+     */
+    uint16_t transaction;
+    /**
+     * First coil, input or register, counted from 0; 17: that is read.
+     */
+    uint16_t address;
+    /**
+     * Coils, inputs or registers; 17: that are read.
+     */
+    uint16_t quantity;
+    /**
+     * 17: first register that is written.
+     */
+    uint16_t writeAddress;
+    /**
+     * 17: registers that are written.
+     */
+    uint16_t writeQuantity;
+    /**
+     * 05: 0 is off, anything else is on (parsed: 1). 06: the register.
+     */
+    uint16_t value;
+    /**
+     * 16: bits that are kept.
+     */
+    uint16_t andMask;
+    /**
+     * 16: bits that replace those that are not kept.
+     */
+    uint16_t orMask;
+    /**
+     * 08: one of MBM_DIAGNOSTICS_.
+     */
+    uint16_t subFunction;
+    /**
+     * 0B, 0C: FFFF while a command is carried out, else 0.
+     */
+    uint16_t commStatus;
+    /**
+     * 0B, 0C: successful messages.
+     */
+    uint16_t eventCount;
+    /**
+     * 0C: messages.
+     */
+    uint16_t messageCount;
+    /**
+     * MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE or MBM_PACKET_EXCEPTION.
+     */
+    uint8_t kind;
+    /**
+     * The unit that is asked, or that answers. Of frames only.
+     */
+    uint8_t unit;
+    /**
+     * Function code, 1 to 127; of an exception that of the request.
+     */
+    uint8_t function;
+    /**
+     * Exception: 1 to 127, the same numbers as MBM_ILLEGAL_FUNCTION and others.
+     */
+    uint8_t exceptionCode;
+    /**
+     * 07: eight outputs.
+     */
+    uint8_t exceptionStatus;
+    /**
+     * 11: the byte count. It is dataLength, or less: some devices count the id
+     * only and send more behind it.
+     */
+    uint8_t byteCount;
+    /**
+     * 2B: MBM_MEI_READ_DEVICE_IDENTIFICATION or another.
+     */
+    uint8_t meiType;
+    /**
+     * 2B/0E: one of MBM_DEVICE_ID_.
+     */
+    uint8_t readDeviceIdCode;
+    /**
+     * 2B/0E: the first object, or the only one.
+     */
+    uint8_t objectId;
+    /**
+     * 2B/0E: 01 to 03 or 81 to 83 by the standard; not checked.
+     */
+    uint8_t conformity;
+    /**
+     * 2B/0E: 1 if another request is needed for the rest, else 0.
+     */
+    uint8_t moreFollows;
+    /**
+     * 2B/0E: the object to ask for next; if none follows, 0 by the standard, and
+     * not checked.
+     */
+    uint8_t nextObjectId;
+    /**
+     * 2B/0E: how many objects the data are.
+     */
+    uint8_t objectCount;
+} mbm_packet;
+
+/**
+ * How long something is.
+ */
+typedef struct mbm_length {
+    /**
+     * All of it, from its first byte, as `kind` says.
+     */
+    uint16_t bytes;
+    /**
+     * MBM_LENGTH_EXACT, _AT_LEAST, _SILENCE or _UNKNOWN.
+     */
+    uint8_t kind;
+} mbm_length;
+
+/**
+ * Registers of a file: a sub-request of 14 or 15, or what answers it.
+ */
+typedef struct mbm_record {
+    /**
+     * The registers, high bytes first, 2 * length bytes. A request of 14,
+     * which reads them, has none: NULL, and ignored.
+     */
+    const uint8_t *data;
+    /**
+     * File number, 1 to 65535; 0 in a response of 14, which does not say.
+     */
+    uint16_t file;
+    /**
+     * The first record, 0 to 9999; 0 in a response of 14.
+     */
+    uint16_t record;
+    /**
+     * How many registers.
+     */
+    uint16_t length;
+} mbm_record;
+
+/**
+ * An object of a device identification.
+ */
+typedef struct mbm_object {
+    /**
+     * Its value, most often text, without an end.
+     */
+    const uint8_t *data;
+    /**
+     * Bytes of the value.
+     */
+    uint8_t length;
+    /**
+     * 0 vendor name, 1 product code, 2 revision and so on (V1.1b3, 6.21).
+     */
+    uint8_t id;
+} mbm_object;
+
+/**
+ * Writes the frame of a packet: request, response or exception. Nothing
+ * malformed is ever built.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param framing   how frames look
+ * @param packet    what to build, with its unit, and for TCP the transaction
+ * @param frame     receives the frame; may not overlap the packet's data
+ * @param capacity  bytes of `frame`; MBM_MAX_FRAME do for RTU, MBM_MAX_TCP_FRAME for
+ *                  TCP, MBM_MAX_PDU for a PDU alone, MBM_MAX_ASCII_FRAME for all
+ * @param length    receives the frame's length; 0 if the status is not MBM_OK
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
+ *         that mbm_frame_parse finds in such a frame
+ */
+uint8_t mbm_frame_build(const struct mbm_framing *framing,
+                        const struct mbm_packet *packet,
+                        uint8_t *frame,
+                        uint16_t capacity,
+                        uint16_t *length);
+
+/**
+ * Reads a frame. The packet's data point into it.
+ *
+ * A request that is refused with an exception code can be answered with that:
+ * see mbm_frame_exception.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param framing      how frames look
+ * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
+ *                     and exceptions
+ * @param frame        the frame, from its first byte to its last. ASCII is
+ *                     decoded where it stands, which overwrites it; others are
+ *                     only read
+ * @param frameLength  its bytes
+ * @param packet       receives what it says. If the frame is sound, but not
+ *                     what it carries: kind, unit, transaction and function
+ *                     alone; if the frame is not sound: kind alone; unchanged
+ *                     for MBM_INVALID_ARGUMENT
+ * @return MBM_OK, also for an exception; MBM_INVALID_ARGUMENT. Of the frame
+ *         MBM_INCOMPLETE_FRAME, MBM_MALFORMED_FRAME, or MBM_INVALID_CRC, also for a
+ *         wrong LRC. Of a request in it the exception that answers it:
+ *         MBM_ILLEGAL_FUNCTION, MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE.
+ *         Of a response in it MBM_INVALID_FUNCTION for a function that is neither the
+ *         standard's nor declared, or MBM_MALFORMED_REPLY
+ */
+uint8_t mbm_frame_parse(const struct mbm_framing *framing,
+                        uint8_t kind,
+                        uint8_t *frame,
+                        uint16_t frameLength,
+                        struct mbm_packet *packet);
+
+/**
+ * Writes the exception that answers a request, where one may: to a request
+ * that mbm_frame_parse refused, with its status; to one that your device
+ * refuses, with the exception code of your choice.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param framing   how frames look
+ * @param request   the request, as mbm_frame_parse left it
+ * @param code      1 to 127, MBM_ILLEGAL_FUNCTION for example
+ * @param frame     receives the frame; it may be that of the request
+ * @param capacity  bytes of `frame`; 11 always do
+ * @param length    receives the frame's length; 0 if the status is not MBM_OK
+ * @return MBM_OK; MBM_BROADCAST_NOT_ALLOWED: on a serial line nobody answers
+ *         unit 0; MBM_ILLEGAL_FUNCTION for a function from 0x80, which no
+ *         exception can name; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also
+ *         for a status that is no exception code, and for MBM_FRAMING_NONE
+ */
+uint8_t mbm_frame_exception(const struct mbm_framing *framing,
+                            const struct mbm_packet *request,
+                            uint8_t code,
+                            uint8_t *frame,
+                            uint16_t capacity,
+                            uint16_t *length);
+
+/**
+ * How long the frame is that begins with these bytes.
+ *
+ * A response to function 11 may be longer than it counts: some devices count the id
+ * alone. In RTU frames it is MBM_LENGTH_EXACT once a right CRC stands where the count
+ * says, MBM_LENGTH_AT_LEAST before, and if the CRC is wrong there MBM_LENGTH_SILENCE,
+ * or MBM_LENGTH_UNKNOWN in a stream. A PDU alone (MBM_FRAMING_NONE) has no CRC that would
+ * tell: its length is the one that it counts, and mbm_frame_parse takes the longer PDU too.
+ *
+ * Any thread or interrupt may call it. For ASCII it takes 260 bytes of stack.
+ *
+ * @param framing   how frames look
+ * @param kind      MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and
+ *                  exceptions
+ * @param bytes     the frame's first bytes; more may follow
+ * @param have      how many; may be 0
+ * @param expected  receives the length; MBM_LENGTH_UNKNOWN and 0 if the status is
+ *                  not MBM_OK
+ * @return MBM_OK; MBM_MALFORMED_FRAME if no frame begins like that, or none is
+ *         so long; MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_frame_expectedLength(const struct mbm_framing *framing,
+                                 uint8_t kind,
+                                 const uint8_t *bytes,
+                                 uint16_t have,
+                                 struct mbm_length *expected);
+
+/**
+ * How long the frame will be that answers a request, if that succeeds. Else it
+ * is an exception: 5 bytes in RTU, 9 in TCP, 11 characters in ASCII, 2 of a PDU alone.
+ *
+ * Any thread or interrupt may call it. It takes 260 bytes of stack.
+ *
+ * @param framing   how frames look
+ * @param request   the request, as for mbm_frame_build
+ * @param expected  receives the length; MBM_LENGTH_EXACT and 0 if nothing ever
+ *                  answers it: a broadcast, 08 with sub-function 04;
+ *                  MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
+ * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a packet that is no request;
+ *         else why such a request is never built
+ */
+uint8_t mbm_frame_replyLength(const struct mbm_framing *framing,
+                              const struct mbm_packet *request,
+                              struct mbm_length *expected);
+
+/**
+ * Says whether bytes look like a Modbus TCP frame, request or response, and how
+ * long that is. Eight are needed. The length in the header must be one that a
+ * request or a response of this function may have, as far as the bytes tell.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param bytes         the first bytes
+ * @param have          how many
+ * @param allowUnknown  0: only with a function code of the standard, or one
+ *                      that it leaves to users; else: with any but 0
+ * @param expected      receives the bytes of the frame; 0 if the status is not
+ *                      MBM_OK
+ * @return MBM_OK; MBM_INCOMPLETE_FRAME if more bytes must tell;
+ *         MBM_MALFORMED_FRAME if this is something else; MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_frame_looksLikeTcp(const uint8_t *bytes,
+                               uint16_t have,
+                               uint8_t allowUnknown,
+                               uint16_t *expected);
+
+/**
+ * The CRC-16 of an RTU frame (serial line guide V1.02, 6.2.2). On the line its
+ * low byte comes first.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param bytes   unit and PDU
+ * @param length  how many
+ * @return the CRC; 0xFFFF for NULL or no bytes
+ */
+uint16_t mbm_frame_crc16(const uint8_t *bytes, uint16_t length);
+
+/**
+ * The LRC of an ASCII frame (serial line guide V1.02, 6.2.1).
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param bytes   unit and PDU as bytes, not as characters
+ * @param length  how many
+ * @return the LRC; 0 for NULL or no bytes
+ */
+uint8_t mbm_frame_lrc(const uint8_t *bytes, uint16_t length);
+
+/**
+ * Gives the records of 14 or 15 one by one:
+ * `for (cursor = 0; mbm_packet_nextRecord(&packet, &cursor, &record);)`
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param packet  a request or response of 14 or 15, as parsed or built
+ * @param cursor  where it goes on; yours, 0 to begin
+ * @param record  receives the record, whose data point into the packet's
+ * @return 1; 0, with cursor and record unchanged, if there is none left, or for NULL
+ */
+uint8_t mbm_packet_nextRecord(const struct mbm_packet *packet,
+                              uint16_t *cursor,
+                              struct mbm_record *record);
+
+/**
+ * Gives the objects of a device identification one by one, as
+ * mbm_packet_nextRecord does records.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param packet  a response of 2B/0E, as parsed or built
+ * @param cursor  where it goes on; yours, 0 to begin
+ * @param object  receives the object, whose data point into the packet's
+ * @return 1; 0, with cursor and object unchanged, if there is none left, or for NULL
+ */
+uint8_t mbm_packet_nextObject(const struct mbm_packet *packet,
+                              uint16_t *cursor,
+                              struct mbm_object *object);
+
+/**
+ * Adds a record to a packet of 14 or 15, to be built then. Set the packet's
+ * kind and function first, and dataLength to 0.
+ *
+ * @param packet    grows by the record; unchanged if it is refused
+ * @param storage   receives the packet's data, for all its records the same
+ * @param capacity  bytes of `storage`; 251 always do
+ * @param record    the record; its data may not lie in `storage`
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_ILLEGAL_FUNCTION if this is not 14
+ *         or 15; MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE for a
+ *         record that there cannot be; MBM_INVALID_ARGUMENT, also for data
+ *         that are elsewhere
+ */
+uint8_t mbm_packet_addRecord(struct mbm_packet *packet,
+                             uint8_t *storage,
+                             uint16_t capacity,
+                             const struct mbm_record *record);
+
+/**
+ * Adds an object to a response of 2B/0E, to be built then. Set the packet's
+ * kind, function and meiType first, and dataLength and objectCount to 0.
+ *
+ * @param packet    grows by the object; unchanged if it is refused
+ * @param storage   receives the packet's data, for all its objects the same
+ * @param capacity  bytes of `storage`; 246 always do
+ * @param object    the object; its data may not lie in `storage`
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL: if 246 bytes are, set moreFollows and
+ *         nextObjectId; MBM_ILLEGAL_FUNCTION if this is no such response;
+ *         MBM_INVALID_ARGUMENT, also for data that are elsewhere
+ */
+uint8_t mbm_packet_addObject(struct mbm_packet *packet,
+                             uint8_t *storage,
+                             uint16_t capacity,
+                             const struct mbm_object *object);
+
+/**
+ * Explains a frame in one line of words, for example
+ * "unit 17  request    03 read holding registers  107..109", or
+ * "bad CRC, 8 bytes" if it is damaged.
+ *
+ * Any thread or interrupt may call it. For ASCII it takes 600 bytes of stack.
+ *
+ * @param framing      how frames look
+ * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
+ *                     and exceptions
+ * @param frame        the frame, from its first byte to its last
+ * @param frameLength  its bytes
+ * @param text         receives the line, which a zero byte ends in any case
+ * @param size         bytes of `text`; 200 do for most frames, 1200 for all
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL: the line is cut; MBM_INVALID_ARGUMENT,
+ *         also for MBM_FRAMING_NONE
+ */
+uint8_t mbm_frame_text(const struct mbm_framing *framing,
+                       uint8_t kind,
+                       const uint8_t *frame,
+                       uint16_t frameLength,
+                       char *text,
+                       uint16_t size);
+
+/* ==== 11. Sniffer =================================================================== */
+
+/**
+ * Heard on a line that carries both directions.
+ */
+#define MBM_DIRECTION_BOTH 0
+
+/**
+ * Heard where only the client sends.
+ */
+#define MBM_DIRECTION_CLIENT 1
+
+/**
+ * Heard where only servers send.
+ */
+#define MBM_DIRECTION_SERVER 2
+
+/**
+ * Least bytes of a sniffer's buffer.
+ */
+#define MBM_MIN_SNIFFER_BUFFER 32
+
+/**
+ * Most functions of your own that a sniffer takes.
+ */
+#define MBM_MAX_SNIFFER_FUNCTIONS 19
+
+/**
+ * A request.
+ */
+#define MBM_EVENT_REQUEST 0
+
+/**
+ * The reply to a request.
+ */
+#define MBM_EVENT_REPLY 1
+
+/**
+ * The exception that answers a request.
+ */
+#define MBM_EVENT_EXCEPTION 2
+
+/**
+ * A reply or exception to no request that waits for one: a late one, one whose
+ * request was not seen, or one that does not answer what was asked.
+ */
+#define MBM_EVENT_UNPAIRED 3
+
+/**
+ * A request that nobody answered within the timeout, or before the next request.
+ */
+#define MBM_EVENT_TIMEOUT 4
+
+/**
+ * What looks like a frame, but has a wrong CRC or LRC, or too few bytes.
+ */
+#define MBM_EVENT_BAD_CRC 5
+
+/**
+ * Bytes that are no frame.
+ */
+#define MBM_EVENT_NOISE 6
+
+/**
+ * A sniffer: finds the frames on a bus that others use, and pairs requests with
+ * replies. It only listens, and has no port: you feed it what you hear.
+ *
+ * Storage is yours and must be zero before first use, which a static object is.
+ * One of the mbm_sniffer_begin functions comes first. Not re-entrant: use one
+ * object from one thread and never from an interrupt; put an mbm_ring between.
+ */
+typedef struct mbm_sniffer {
+    /**
+     * Private.
+     */
+    void *pointers[1];
+    /**
+     * Private.
+     */
+    uint32_t words[171];
+} mbm_sniffer;
+
+/**
+ * Something that happened on the bus.
+ *
+ * What it points to lies in the sniffer's buffer, and is valid until the next
+ * call with that sniffer.
+ */
+typedef struct mbm_event {
+    /**
+     * The frame; of noise the bytes. An ASCII frame is decoded: unit, PDU, LRC.
+     */
+    const uint8_t *frame;
+    /**
+     * The PDU in the frame; NULL if there is none.
+     */
+    const uint8_t *pdu;
+    /**
+     * What the PDU says, as mbm_frame_parse reads it. If it cannot be read, of a
+     * timeout and of what is no frame: kind, unit, transaction and function alone.
+     */
+    struct mbm_packet packet;
+    /**
+     * When its last byte arrived, in microseconds; of a timeout when the request
+     * was given up.
+     */
+    uint32_t timeUs;
+    /**
+     * From the last byte of the request to the last byte of its reply, or until it
+     * was given up, in microseconds; else 0.
+     */
+    uint32_t responseTimeUs;
+    /**
+     * Bytes of `frame`.
+     */
+    uint16_t frameLength;
+    /**
+     * Bytes of `pdu`.
+     */
+    uint16_t pduLength;
+    /**
+     * How many bytes on the line this was.
+     */
+    uint16_t length;
+    /**
+     * What this is about, also of a reply that does not say so itself: the first
+     * coil, input or register of the request; 17: that is read.
+     */
+    uint16_t address;
+    /**
+     * How many; 17: that are read.
+     */
+    uint16_t quantity;
+    /**
+     * One of MBM_EVENT_.
+     */
+    uint8_t kind;
+    /**
+     * MBM_OK; of a request the exception that a server answers to it; the code of
+     * an exception; MBM_MALFORMED_REPLY if a reply does not answer what was asked;
+     * MBM_RESPONSE_TIMED_OUT; MBM_INVALID_CRC; MBM_BUFFER_TOO_SMALL of noise that
+     * may have been a frame longer than the buffer.
+     */
+    uint8_t status;
+    /**
+     * The unit that is asked, or answers; of a bad CRC the byte in its place.
+     */
+    uint8_t unit;
+    /**
+     * The function code, of an exception that of the request; of a bad CRC the
+     * byte in its place.
+     */
+    uint8_t function;
+    /**
+     * The first bytes of the request's PDU, of replies and timeouts.
+     */
+    uint8_t requestHead[9];
+    /**
+     * How many those are; 0 if the request is not known.
+     */
+    uint8_t requestHeadLength;
+} mbm_event;
+
+/**
+ * Begins to listen to RTU frames on a serial line.
+ *
+ * May be called again at any time: received bytes, and a request that still waits for its
+ * reply, are forgotten without an event, and the settings are as at first.
+ *
+ * @param sniffer  the object; zeroed before the first call
+ * @param buffer   where bytes are kept until they are understood; yours, valid
+ *                 for as long as the sniffer is used
+ * @param size     its bytes, MBM_MIN_SNIFFER_BUFFER or more. MBM_MAX_FRAME hold any
+ *                 frame, twice as many where the directions are fed apart. A longer
+ *                 frame becomes an event of kind MBM_EVENT_NOISE
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL or MBM_INVALID_ARGUMENT, with nothing changed
+ */
+uint8_t mbm_sniffer_beginRtu(struct mbm_sniffer *sniffer, uint8_t *buffer, uint16_t size);
+
+/**
+ * Begins to listen to ASCII frames on a serial line.
+ *
+ * @param sniffer  see mbm_sniffer_beginRtu
+ * @param buffer   see mbm_sniffer_beginRtu
+ * @param size     see mbm_sniffer_beginRtu; MBM_MAX_ASCII_FRAME hold any frame
+ * @return a status; see mbm_sniffer_beginRtu
+ */
+uint8_t mbm_sniffer_beginAscii(struct mbm_sniffer *sniffer,
+                               uint8_t *buffer,
+                               uint16_t size);
+
+/**
+ * Begins to listen to a TCP stream, in frames with the MBAP header.
+ *
+ * @param sniffer  see mbm_sniffer_beginRtu
+ * @param buffer   see mbm_sniffer_beginRtu
+ * @param size     see mbm_sniffer_beginRtu; MBM_MAX_TCP_FRAME hold any frame
+ * @return a status; see mbm_sniffer_beginRtu
+ */
+uint8_t mbm_sniffer_beginTcp(struct mbm_sniffer *sniffer, uint8_t *buffer, uint16_t size);
+
+/**
+ * Begins to listen to a TCP stream of RTU frames.
+ *
+ * @param sniffer  see mbm_sniffer_beginRtu
+ * @param buffer   see mbm_sniffer_beginRtu
+ * @param size     see mbm_sniffer_beginRtu; MBM_MAX_FRAME hold any frame
+ * @return a status; see mbm_sniffer_beginRtu
+ */
+uint8_t mbm_sniffer_beginRtuOverTcp(struct mbm_sniffer *sniffer,
+                                    uint8_t *buffer,
+                                    uint16_t size);
+
+/**
+ * Declares functions that the standard does not have. Without that their length is
+ * guessed: silence ends an RTU frame.
+ *
+ * @param sniffer    the object
+ * @param functions  copied; may be NULL if there are none
+ * @param count      how many, at most MBM_MAX_SNIFFER_FUNCTIONS
+ * @return MBM_OK, MBM_NOT_INITIALISED, or MBM_INVALID_ARGUMENT with nothing changed
+ */
+uint8_t mbm_sniffer_setFunctions(struct mbm_sniffer *sniffer,
+                                 const struct mbm_function *functions,
+                                 uint8_t count);
+
+/**
+ * Sets the character that ends ASCII frames after CR, in place of LF, as
+ * mbm_client_setDelimiter. Without effect in other framings.
+ *
+ * @param sniffer    the object
+ * @param character  1 to 127, but CR, the colon and hexadecimal digits
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_sniffer_setDelimiter(struct mbm_sniffer *sniffer, uint8_t character);
+
+/**
+ * Tells the rate of a serial line, from which follow the silence between RTU
+ * frames, and when each of several bytes that are fed at once arrived. At first
+ * it is untold: 4 ms of silence, and what is fed at once arrived at once.
+ *
+ * @param sniffer  the object
+ * @param baud     bits per second; 0 is untold
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_sniffer_setBaudRate(struct mbm_sniffer *sniffer, uint32_t baud);
+
+/**
+ * Sets how long a request may stay unanswered before that is told; 1000 ms at
+ * first. On a serial line the next request ends it too. A longer time than the
+ * master's own pairs late replies. For ten times as long, a reply to a request
+ * that was given up is still told with what was asked, as MBM_EVENT_UNPAIRED.
+ *
+ * @param sniffer       the object
+ * @param timeoutMs     1 to 65535
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_sniffer_setResponseTimeout(struct mbm_sniffer *sniffer, uint16_t timeoutMs);
+
+/**
+ * Sets how long the rest of a frame that has begun is waited for: how coarse
+ * your time stamps are. At first 50 ms in RTU, which a USB adapter needs, and
+ * 1000 ms in ASCII and TCP.
+ *
+ * @param sniffer       the object
+ * @param timeoutMs     1 to 65535
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_sniffer_setFrameTimeout(struct mbm_sniffer *sniffer, uint16_t timeoutMs);
+
+/**
+ * Takes bytes that were heard. Call mbm_sniffer_next until there is nothing
+ * more, then feed the rest, if not all were taken, with the same time: nothing
+ * is lost.
+ *
+ * @param sniffer  the object
+ * @param direction  MBM_DIRECTION_BOTH, or where the directions are heard apart
+ *                 MBM_DIRECTION_CLIENT or MBM_DIRECTION_SERVER. Do not mix them: at a change
+ *                 what is not told of is forgotten
+ * @param bytes    what was heard; NULL only with length 0
+ * @param length   how many
+ * @param nowUs    when the last of them arrived, in microseconds; may wrap
+ * @return how many were taken; 0 also if the sniffer was never begun
+ */
+uint16_t mbm_sniffer_feed(struct mbm_sniffer *sniffer,
+                          uint8_t direction,
+                          const uint8_t *bytes,
+                          uint16_t length,
+                          uint32_t nowUs);
+
+/**
+ * Tells what happened next on the bus, in the order of time. Call it after each
+ * feed until there is nothing more, and now and then while nothing is heard (at
+ * least every half hour): silence ends frames, and requests time out.
+ *
+ * @param sniffer  the object
+ * @param nowUs    the time, in microseconds
+ * @param event    receives what happened; valid until the next call with this
+ *                 sniffer
+ * @return 1 if there is an event; 0, with `event` unchanged, if nothing more is known
+ *         yet, or the sniffer was never begun
+ */
+uint8_t mbm_sniffer_next(struct mbm_sniffer *sniffer,
+                         uint32_t nowUs,
+                         struct mbm_event *event);
+
+/**
+ * Explains an event in one line of words, for example
+ * "unit 17  reply      03 read holding registers  107..109: 555 0 100".
+ *
+ * Any thread may call it while the event is valid.
+ *
+ * @param event  what mbm_sniffer_next gave
+ * @param text   receives the line, which a zero byte ends in any case
+ * @param size   bytes of `text`; 200 do for most events, 2400 for all
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL: the line is cut; MBM_INVALID_ARGUMENT
+ */
+uint8_t mbm_event_text(const struct mbm_event *event, char *text, uint16_t size);
+
+/* ==== 12. Ring ====================================================================== */
+
+/**
+ * A receive ring between an interrupt handler and the main loop.
+ *
+ * One side puts bytes in with mbm_ring_put or mbm_ring_write: an interrupt
+ * handler, a DMA callback or a thread. One side takes them out with
+ * mbm_ring_read: the main loop, as the `read` hook of a port. Each may
+ * interrupt the other at any point; neither may be two at once. No interrupt
+ * is ever disabled.
+ */
+typedef struct mbm_ring {
+    /**
+     * Private.
+     */
+    uint8_t *bytes;
+    /**
+     * Private.
+     */
+    uint16_t size;
+    /**
+     * Private.
+     */
+    uint16_t positions[3];
+} mbm_ring;
 
 /**
  * Makes a ring of your bytes, empty. Neither side may use it meanwhile.
@@ -4310,494 +4638,8 @@ void mbm_ring_clear(struct mbm_ring *ring);
  */
 uint16_t mbm_ring_lost(const struct mbm_ring *ring);
 
-/**
- * Moves the server on, without waiting: takes bytes in, carries a request out
- * once it is whole, sends the response.
- *
- * Call it as often as you like, at least once per character time of the line
- * if nothing else buffers its bytes. On a serial line a response begins with
- * the first call after the line has been silent for t3.5.
- *
- * @param server  the object
- * @return MBM_OK; MBM_LINK_LOST if the port said so, which ends a connection;
- *         MBM_MALFORMED_FRAME if what came over TCP is not Modbus, so that
- *         the connection is to be closed; MBM_BUSY from within a hook of this
- *         server; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_server_poll(struct mbm_server *server);
-
-/**
- * How long mbm_server_poll will find nothing to do unless a byte arrives, so
- * that a program may sleep until then.
- *
- * @param server  the object
- * @return microseconds; 0 means poll now, and is returned within a hook of this
- *         server; 0xFFFFFFFF until a byte arrives; 1000
- *         while a function of yours returns MBM_REPLY_PENDING or a connection does
- *         not take the response: to go on sooner, poll when that has changed. No
- *         byte is taken meanwhile, so do not wait for one
- */
-uint32_t mbm_server_pollDelay(const struct mbm_server *server);
-
-/**
- * Begins to serve units on a serial line, RTU. The rate is untold, so a frame
- * ends with 4 ms of silence: see mbm_server_setBaudRate.
- *
- * May be called again at any time but from within its hooks; what was under way
- * is dropped; where a response was leaving, the port that the object had is called
- * to switch its driver off. A call that is refused changes nothing. Opens nothing: the port is
- * open already. Units are yours, may be shared between
- * servers, and stay where they are for as long as the object is used, as does
- * the buffer, which keeps nothing between requests.
- *
- * @param server  the object; zeroed before the first call
- * @param port    copied; read, write and micros must be there
- * @param units   what is served: one unit, or an array of them
- * @param count   how many units
- * @param frame   bytes of one frame, for requests and responses
- * @param bytes   at least 16; MBM_MAX_FRAME hold any frame. Longer
- *                requests are not heard, longer responses become exception 04
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or a
- *         buffer that is too short; MBM_BUSY from within a hook of this server
- */
-uint8_t mbm_server_begin(struct mbm_server *server,
-                         const struct mbm_port *port,
-                         struct mbm_unit *units,
-                         uint8_t count,
-                         uint8_t *frame,
-                         uint16_t bytes);
-
-/**
- * Begins to serve units on a serial line, ASCII (serial line guide V1.02,
- * 2.5.2). A frame whose next character takes longer than a second is dropped.
- *
- * @param server  see mbm_server_begin
- * @param port    see mbm_server_begin
- * @param units   see mbm_server_begin
- * @param count   see mbm_server_begin
- * @param frame   see mbm_server_begin
- * @param bytes   at least 32; MBM_MAX_ASCII_FRAME hold any frame
- * @return a status; see mbm_server_begin
- */
-uint8_t mbm_server_beginAscii(struct mbm_server *server,
-                              const struct mbm_port *port,
-                              struct mbm_unit *units,
-                              uint8_t count,
-                              uint8_t *frame,
-                              uint16_t bytes);
-
-/**
- * Begins to serve units on a TCP connection that was accepted. Requests that
- * wait behind one another in the stream are answered in turn.
- *
- * @param server  see mbm_server_begin; one for each connection
- * @param port    see mbm_server_begin; read, write and clock of the connection
- * @param units   see mbm_server_begin; the unit ids 0 and 255 mean the first
- * @param count   see mbm_server_begin
- * @param frame   see mbm_server_begin; one for each connection
- * @param bytes   at least MBM_MAX_TCP_FRAME
- * @return a status; see mbm_server_begin
- */
-uint8_t mbm_server_beginTcp(struct mbm_server *server,
-                            const struct mbm_port *port,
-                            struct mbm_unit *units,
-                            uint8_t count,
-                            uint8_t *frame,
-                            uint16_t bytes);
-
-/**
- * Begins to serve units over a stream of RTU frames, in which silence tells
- * nothing: a TCP connection of RTU over TCP, or a serial adapter that hands
- * bytes over in lumps. A frame ends where its own bytes say so; behind one that
- * is damaged, half a second of silence does.
- *
- * @param server  see mbm_server_begin; one for each connection
- * @param port    see mbm_server_begin
- * @param units   see mbm_server_begin; the unit ids 0 and 255 mean the first
- * @param count   see mbm_server_begin
- * @param frame   see mbm_server_begin; one for each connection
- * @param bytes   at least 16; MBM_MAX_FRAME hold any frame
- * @return a status; see mbm_server_begin
- */
-uint8_t mbm_server_beginRtuOverTcp(struct mbm_server *server,
-                                   const struct mbm_port *port,
-                                   struct mbm_unit *units,
-                                   uint8_t count,
-                                   uint8_t *frame,
-                                   uint16_t bytes);
-
-/**
- * Sets the silence that ends a frame: t3.5 of RTU, the time between two
- * characters of ASCII, and in RTU over TCP the silence after a damaged frame. Without
- * effect in TCP frames. mbm_server_begin and its sisters set it back.
- *
- * @param server        the object
- * @param microseconds  counted from the last byte seen
- * @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
- */
-uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t microseconds);
-
-/**
- * Tells the baud rate of an RTU line, from which t3.5 follows (serial line guide
- * V1.02, 2.5.1.1). It sets nothing on the line. Other framings do not end with t3.5:
- * for the time that those wait there is mbm_server_setSilence.
- *
- * @param server  the object
- * @param baud    bits per second; 0 goes back to untold
- * @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings,
- *         MBM_NOT_INITIALISED or MBM_BUSY
- */
-uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
-
-/**
- * Tells that the receiver of an RTU line hears what the driver sends, so that as
- * many bytes as were sent are dropped behind each response. mbm_server_begin
- * sets it back.
- *
- * @param server  the object
- * @param on      0 (at first) or 1
- * @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings,
- *         MBM_NOT_INITIALISED or MBM_BUSY
- */
-uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
-
-/**
- * Serves cells that your functions hold.
- *
- * @param unit   the unit
- * @param cells  yours, for as long as the unit is used
- * @param table  the function that reads them: 1 coils (01, 05, 0F), 2 discrete
- *               inputs (02), 3 holding registers (03, 06, 10, 16, 17), 4 input
- *               registers (04)
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, no `get`, no `set`
- *         where it is needed, or another table; MBM_BUSY and MBM_BUFFER_TOO_SMALL as
- *         mbm_server_serveCoils
- */
-uint8_t mbm_server_serveCallbacks(struct mbm_unit *unit,
-                                  struct mbm_cells *cells,
-                                  uint8_t table);
-
-/**
- * Serves a function of yours, on every framing.
- *
- * @param unit    the unit
- * @param custom  yours, for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, no function, a code
- *         from 128 on, or a length that is no rule; MBM_BUFFER_TOO_SMALL if the unit
- *         has no place
- */
-uint8_t mbm_server_serveCustom(struct mbm_unit *unit, struct mbm_custom *custom);
-
-/**
- * Switches a function of a unit off: it is answered with exception 01 from now
- * on, whatever serves it.
- *
- * @param unit      the unit
- * @param switches  yours, for as long as the unit is used; zeroed before the
- *                  first call. Units that share one share what is switched off
- * @param code      1 to 127
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or another code;
- *         MBM_BUFFER_TOO_SMALL if the unit has no place
- */
-uint8_t mbm_server_switchOff(struct mbm_unit *unit,
-                             struct mbm_switches *switches,
-                             uint8_t code);
-
-/**
- * Switches a function on again.
- *
- * @param switches  what mbm_server_switchOff was given
- * @param code      1 to 127
- * @return MBM_OK or MBM_INVALID_ARGUMENT
- */
-uint8_t mbm_server_switchOn(struct mbm_switches *switches, uint8_t code);
-
-/**
- * Serves diagnostics: functions 08, 0B and 0C. Of 08 it serves the sub-functions that
- * the standard defines, 00 to 04, 0A to 12 and 14; others are exception 01. From now
- * on the unit counts what its lines bring, logs events, and can be forced into
- * listen only mode.
- *
- * @param unit         the unit
- * @param diagnostics  yours, for as long as the unit is used; one for each unit, or
- *                     it counts for all that share it
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit has
- *         another record of diagnostics; MBM_BUFFER_TOO_SMALL if it has no place
- */
-uint8_t mbm_server_serveDiagnostics(struct mbm_unit *unit,
-                                    struct mbm_diagnostics *diagnostics);
-
-/**
- * Serves files: functions 14 and 15. A request is carried out whole or not at
- * all. It takes 250 bytes of stack.
- *
- * @param unit   the unit
- * @param files  yours, for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
- *         the unit has no place
- */
-uint8_t mbm_server_serveFiles(struct mbm_unit *unit, struct mbm_files *files);
-
-/**
- * Serves FIFO queues: function 18.
- *
- * @param unit   the unit
- * @param fifos  yours, for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
- *         the unit has no place
- */
-uint8_t mbm_server_serveFifos(struct mbm_unit *unit, struct mbm_fifos *fifos);
-
-/**
- * Serves the exception status: function 07.
- *
- * @param unit    the unit
- * @param status  yours, for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
- *         the unit has no place
- */
-uint8_t mbm_server_serveExceptionStatus(struct mbm_unit *unit,
-                                        struct mbm_exceptionStatus *status);
-
-/**
- * Serves the server id: function 11.
- *
- * @param unit  the unit
- * @param id    yours, for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
- *         the unit has no place
- */
-uint8_t mbm_server_serveServerId(struct mbm_unit *unit, struct mbm_serverId *id);
-
-/**
- * Serves the device identification: function 2B/0E, as streams of objects and
- * one by one. What does not fit into one response follows in the next that the
- * client asks for. The conformity level is that of the objects there are.
- *
- * @param unit            the unit
- * @param identification  yours, for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
- *         the unit has no place
- */
-uint8_t mbm_server_serveIdentification(struct mbm_unit *unit,
-                                       struct mbm_identification *identification);
-
-/**
- * Answers one request, without a server: takes a frame from a buffer and writes
- * the response frame over it.
- *
- * @param framing    0 RTU, 1 ASCII with LF as its delimiter, 2 TCP, 3 RTU over
- *                   TCP
- * @param units      what is served: one unit, or an array of them
- * @param count      how many units
- * @param frame      the whole request, and room for the response
- * @param length     bytes of the request
- * @param capacity   bytes of the buffer: 256 hold any response in RTU, 513 in
- *                   ASCII, 260 over TCP; a longer response becomes exception 04
- * @param response   receives the bytes of the response; 0 where there is none: for a
- *                   damaged frame, another unit, a broadcast, and with any status
- *                   but MBM_OK
- * @return MBM_OK; MBM_PENDING, with the buffer to be filled anew, if a function
- *         of yours is not done; MBM_INVALID_ARGUMENT
- */
-uint8_t mbm_server_respond(uint8_t framing,
-                           struct mbm_unit *units,
-                           uint8_t count,
-                           uint8_t *frame,
-                           uint16_t length,
-                           uint16_t capacity,
-                           uint16_t *response);
-
-/**
- * Serves coils: functions 01, 05 and 0F.
- *
- * @param unit   the unit
- * @param table  yours, for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY for a table that
- *         is served as another kind; MBM_BUFFER_TOO_SMALL if the unit has no place
- */
-uint8_t mbm_server_serveCoils(struct mbm_unit *unit, struct mbm_bitTable *table);
-
-/**
- * Serves discrete inputs: function 02.
- *
- * @param unit   the unit
- * @param table  yours, for as long as the unit is used
- * @return a status; see mbm_server_serveCoils
- */
-uint8_t mbm_server_serveDiscreteInputs(struct mbm_unit *unit, struct mbm_bitTable *table);
-
-/**
- * Serves holding registers: functions 03, 06 and 10. For 16 and 17 too, call
- * mbm_server_serveMaskAndReadWrite behind it.
- *
- * @param unit   the unit
- * @param table  yours, for as long as the unit is used
- * @return a status; see mbm_server_serveCoils
- */
-uint8_t mbm_server_serveHoldingRegisters(struct mbm_unit *unit,
-                                         struct mbm_registerTable *table);
-
-/**
- * Serves input registers: function 04.
- *
- * @param unit   the unit
- * @param table  yours, for as long as the unit is used
- * @return a status; see mbm_server_serveCoils
- */
-uint8_t mbm_server_serveInputRegisters(struct mbm_unit *unit,
-                                       struct mbm_registerTable *table);
-
-/**
- * Serves functions 16 and 17 beside 03, 06 and 10, on each unit that has the
- * table: a call of its own, so that firmware without it is smaller. After a table
- * was zeroed it is to be called again.
- *
- * @param table  holding registers that mbm_server_serveHoldingRegisters took
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL and other tables
- */
-uint8_t mbm_server_serveMaskAndReadWrite(struct mbm_registerTable *table);
-
-/**
- * Begins to listen. May be called again: what was heard is forgotten, and the
- * settings are as at first.
- *
- * @param sniffer  the object
- * @param framing  how frames look; copied
- * @param buffer   where bytes are kept until they are understood; yours, valid
- *                 for as long as the sniffer is used
- * @param size     its bytes, MBM_MIN_SNIFFER_BUFFER or more. MBM_MAX_FRAME hold
- *                 any RTU frame, MBM_MAX_TCP_FRAME any of TCP,
- *                 MBM_MAX_ASCII_FRAME any of ASCII; twice as many where the
- *                 directions are heard apart. A longer frame is told of as noise
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also for more than
- *         MBM_MAX_SNIFFER_FUNCTIONS functions
- */
-uint8_t mbm_sniffer_begin(struct mbm_sniffer *sniffer,
-                          const struct mbm_framing *framing,
-                          uint8_t *buffer,
-                          uint16_t size);
-
-/**
- * Tells the rate of a serial line, from which follow the silence between RTU
- * frames, and when each of several bytes that are fed at once arrived. At first
- * it is untold: 4 ms of silence, and what is fed at once arrived at once.
- *
- * @param sniffer  the object
- * @param baud     bits per second; 0 is untold
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_sniffer_setBaudRate(struct mbm_sniffer *sniffer, uint32_t baud);
-
-/**
- * Sets how long a request may stay unanswered before that is told; 1000 ms at
- * first. On a serial line the next request ends it too. A longer time than the
- * master's own pairs late replies. For ten times as long, a reply to a request
- * that was given up is still told with what was asked, as MBM_EVENT_UNPAIRED.
- *
- * @param sniffer       the object
- * @param milliseconds  1 to 65535
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_sniffer_setTimeout(struct mbm_sniffer *sniffer, uint16_t milliseconds);
-
-/**
- * Sets how long the rest of a frame that has begun is waited for: how coarse
- * your time stamps are. At first 50 ms in RTU, which a USB adapter needs, and
- * 1000 ms in ASCII and TCP.
- *
- * @param sniffer       the object
- * @param milliseconds  1 to 65535
- * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
- */
-uint8_t mbm_sniffer_setPatience(struct mbm_sniffer *sniffer, uint16_t milliseconds);
-
-/**
- * Takes bytes that were heard. Call mbm_sniffer_next until there is nothing
- * more, then feed the rest, if not all were taken, with the same time: nothing
- * is lost.
- *
- * @param sniffer  the object
- * @param tap      MBM_TAP_BOTH, or where the directions are heard apart
- *                 MBM_TAP_CLIENT or MBM_TAP_SERVER. Do not mix them: at a change
- *                 what is not told of is forgotten
- * @param bytes    what was heard; NULL only with length 0
- * @param length   how many
- * @param now      when the last of them arrived, in microseconds; may wrap
- * @return how many were taken; 0 also if the sniffer was never begun
- */
-uint16_t mbm_sniffer_feed(struct mbm_sniffer *sniffer,
-                          uint8_t tap,
-                          const uint8_t *bytes,
-                          uint16_t length,
-                          uint32_t now);
-
-/**
- * Tells what happened next on the bus, in the order of time. Call it after each
- * feed until there is nothing more, and now and then while nothing is heard (at
- * least every half hour): silence ends frames, and requests time out.
- *
- * @param sniffer  the object
- * @param now      the time, in microseconds
- * @param event    receives what happened; valid until the next call with this
- *                 sniffer
- * @return 1 if there is an event; 0, with `event` unchanged, if nothing more is known
- *         yet, or the sniffer was never begun
- */
-uint8_t mbm_sniffer_next(struct mbm_sniffer *sniffer,
-                         uint32_t now,
-                         struct mbm_event *event);
-
-/**
- * Explains a status in a few words of English. On an AVR, where constants lie in
- * RAM, a program that calls it has about 1100 bytes less of that: show the number,
- * or in a sketch modbusStatusText of ModbusStatusText.h, whose words stay in flash.
- *
- * Any thread or interrupt may call it.
- *
- * @param status  any number
- * @return a constant string, never NULL
- */
-const char *mbm_statusText(uint8_t status);
-
-/**
- * Explains a frame in one line of words, for example
- * "unit 17  request    03 read holding registers  107..109", or
- * "bad CRC, 8 bytes" if it is damaged.
- *
- * Any thread or interrupt may call it. For ASCII it takes 600 bytes of stack.
- *
- * @param framing      how frames look
- * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
- *                     and exceptions
- * @param frame        the frame, from its first byte to its last
- * @param frameLength  its bytes
- * @param text         receives the line, which a zero byte ends in any case
- * @param size         bytes of `text`; 200 do for most frames, 1200 for all
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL: the line is cut; MBM_INVALID_ARGUMENT
- */
-uint8_t mbm_frame_text(const struct mbm_framing *framing,
-                       uint8_t kind,
-                       const uint8_t *frame,
-                       uint16_t frameLength,
-                       char *text,
-                       uint16_t size);
-
-/**
- * Explains an event in one line of words, for example
- * "unit 17  reply      03 read holding registers  107..109: 555 0 100".
- *
- * Any thread may call it while the event is valid.
- *
- * @param event  what mbm_sniffer_next gave
- * @param text   receives the line, which a zero byte ends in any case
- * @param size   bytes of `text`; 200 do for most events, 2400 for all
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL: the line is cut; MBM_INVALID_ARGUMENT
- */
-uint8_t mbm_event_text(const struct mbm_event *event, char *text, uint16_t size);
-
 #ifdef __cplusplus
 }  // extern "C"
-#endif  // __cplusplus
+#endif
 
 #endif  /* MBM_H */

@@ -12,23 +12,23 @@ static mbm_files files;
 static mbm_fifos fifos;
 static mbm_identification identification;
 static mbm_custom custom;
-static mbm_cells cells;
-static mbm_switches switches;
+static mbm_dataCallbacks cells;
+static mbm_functionMask switches;
 #endif
 
 static inline void serve_everything(void)
 {
     serve();
-    (void)CALL(mbm_server_serveMaskAndReadWrite(&holding));
-    (void)CALL(mbm_server_serveDiagnostics(&unit, &diagnostics));
-    (void)CALL(mbm_server_serveExceptionStatus(&unit, &exceptions));
-    (void)CALL(mbm_server_serveServerId(&unit, &id));
-    (void)CALL(mbm_server_serveFiles(&unit, &files));
-    (void)CALL(mbm_server_serveFifos(&unit, &fifos));
-    (void)CALL(mbm_server_serveIdentification(&unit, &identification));
-    (void)CALL(mbm_server_serveCustom(&unit, &custom));
-    (void)CALL(mbm_server_serveCallbacks(&unit, &cells, 3));
-    (void)CALL(mbm_server_switchOff(&unit, &switches, 8));
+    (void)CALL(mbm_registerTable_serveMaskAndReadWrite(&holding));
+    (void)CALL(mbm_unit_serveDiagnostics(&unit, &diagnostics));
+    (void)CALL(mbm_unit_serveExceptionStatus(&unit, &exceptions));
+    (void)CALL(mbm_unit_serveServerId(&unit, &id));
+    (void)CALL(mbm_unit_serveFiles(&unit, &files));
+    (void)CALL(mbm_unit_serveFifos(&unit, &fifos));
+    (void)CALL(mbm_unit_serveIdentification(&unit, &identification));
+    (void)CALL(mbm_unit_serveCustom(&unit, &custom));
+    (void)CALL(mbm_unit_serveCallbacks(&unit, &cells, 3));
+    (void)CALL(mbm_unit_switchFunction(&unit, &switches, 8, 0));
     (void)CALL(mbm_server_beginAscii(&server, (const mbm_port *)0, &unit, 1, frame, sizeof frame));
     (void)CALL(mbm_server_beginTcp(&server, (const mbm_port *)0, &unit, 1, frame, sizeof frame));
 }

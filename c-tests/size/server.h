@@ -39,11 +39,11 @@ static inline void serve(void)
     coils.size = WORDS;
     discrete.bits = input_bits;
     discrete.size = WORDS;
-    (void)mbm_server_serveHoldingRegisters(&unit, &holding);
-    (void)mbm_server_serveInputRegisters(&unit, &inputs);
-    (void)mbm_server_serveCoils(&unit, &coils);
-    (void)mbm_server_serveDiscreteInputs(&unit, &discrete);
-    (void)mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame);
+    (void)mbm_unit_serveHoldingRegisters(&unit, &holding);
+    (void)mbm_unit_serveInputRegisters(&unit, &inputs);
+    (void)mbm_unit_serveCoils(&unit, &coils);
+    (void)mbm_unit_serveDiscreteInputs(&unit, &discrete);
+    (void)mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame);
 #endif
 }
 

@@ -63,7 +63,7 @@ static inline void begin(void)
     USED(transmit);
     USED(frame);
     (void)CALL(mbm_master_setBuffers(&node, response, WORDS, transmit, WORDS, frame, sizeof frame));
-    (void)CALL(mbm_master_begin(&node, 1, &port));
+    (void)CALL(mbm_master_beginRtu(&node, 1, &port));
 }
 
 #endif

@@ -12,7 +12,7 @@ typedef struct asker {
     mbm_tty tty;
     mbm_tcp tcp;
     mbm_tcp_addresses addresses;
-    mbm_link link;
+    mbm_linkHooks link;
     held_clock *clock; /* NULL is the machine's */
     mbm_counters counters;
     char service[8];

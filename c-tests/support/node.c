@@ -13,7 +13,7 @@ void node_begin(node *n, int fd, uint8_t slave)
                                            n->transmit, MBM_MAX_WRITE_REGISTERS, n->frame,
                                            MBM_MAX_FRAME),
                      MBM_OK);
-    assert_int_equal(mbm_master_begin(&n->master, slave, &n->port), MBM_OK);
+    assert_int_equal(mbm_master_beginRtu(&n->master, slave, &n->port), MBM_OK);
     assert_int_equal(mbm_master_setCounters(&n->master, &n->counters), MBM_OK);
     assert_int_equal(mbm_master_setBaudRate(&n->master, 115200), MBM_OK);
     assert_int_equal(mbm_master_setResponseTimeout(&n->master, PATIENCE_MS), MBM_OK);

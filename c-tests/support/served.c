@@ -128,19 +128,19 @@ void served_prepare(served *s)
     s->echo.code = SERVED_ECHO;
     s->echo.serve = echo;
 
-    i = mbm_server_serveCoils(&s->units[0], &s->coils);
-    i |= mbm_server_serveDiscreteInputs(&s->units[0], &s->discrete);
-    i |= mbm_server_serveHoldingRegisters(&s->units[0], &s->holding);
-    i |= mbm_server_serveMaskAndReadWrite(&s->holding);
-    i |= mbm_server_serveInputRegisters(&s->units[0], &s->inputs);
-    i |= mbm_server_serveDiagnostics(&s->units[0], &s->diagnostics);
-    i |= mbm_server_serveExceptionStatus(&s->units[0], &s->status);
-    i |= mbm_server_serveServerId(&s->units[0], &s->id);
-    i |= mbm_server_serveFiles(&s->units[0], &s->files);
-    i |= mbm_server_serveFifos(&s->units[0], &s->fifos);
-    i |= mbm_server_serveIdentification(&s->units[0], &s->identification);
-    i |= mbm_server_serveCustom(&s->units[0], &s->echo);
-    i |= mbm_server_serveHoldingRegisters(&s->units[1], &s->other);
+    i = mbm_unit_serveCoils(&s->units[0], &s->coils);
+    i |= mbm_unit_serveDiscreteInputs(&s->units[0], &s->discrete);
+    i |= mbm_unit_serveHoldingRegisters(&s->units[0], &s->holding);
+    i |= mbm_registerTable_serveMaskAndReadWrite(&s->holding);
+    i |= mbm_unit_serveInputRegisters(&s->units[0], &s->inputs);
+    i |= mbm_unit_serveDiagnostics(&s->units[0], &s->diagnostics);
+    i |= mbm_unit_serveExceptionStatus(&s->units[0], &s->status);
+    i |= mbm_unit_serveServerId(&s->units[0], &s->id);
+    i |= mbm_unit_serveFiles(&s->units[0], &s->files);
+    i |= mbm_unit_serveFifos(&s->units[0], &s->fifos);
+    i |= mbm_unit_serveIdentification(&s->units[0], &s->identification);
+    i |= mbm_unit_serveCustom(&s->units[0], &s->echo);
+    i |= mbm_unit_serveHoldingRegisters(&s->units[1], &s->other);
     must(i == MBM_OK, "units");
 }
 
@@ -180,7 +180,7 @@ static uint8_t begin(served *s, int index)
 
     switch (s->framing) {
     case MBM_FRAMING_RTU:
-        return (uint8_t)(mbm_server_begin(server, &port, s->units, 2, frame, MBM_MAX_FRAME) |
+        return (uint8_t)(mbm_server_beginRtu(server, &port, s->units, 2, frame, MBM_MAX_FRAME) |
                          mbm_server_setBaudRate(server, 115200));
     case MBM_FRAMING_ASCII:
         return mbm_server_beginAscii(server, &port, s->units, 2, frame, MBM_MAX_ASCII_FRAME);

@@ -187,7 +187,7 @@ void sim_begin(sim *s, uint8_t unit)
     s->port.preTransmission = pre;
     s->port.postTransmission = post;
     s->port.idle = idle;
-    assert_int_equal(mbm_master_begin(&s->master, unit, &s->port), MBM_OK);
+    assert_int_equal(mbm_master_beginRtu(&s->master, unit, &s->port), MBM_OK);
 }
 
 int sim_setup(void **state)

@@ -15,4 +15,8 @@
 #define IS(status, call) assert_int_equal(call, status)
 #define OK(call) IS(MBM_OK, call)
 
+/* A framing of the mbm_frame functions: one of MBM_FRAMING_, or PDUs alone with functions. */
+#define FRAMING(code) (&(const mbm_framing){.kind = (code)})
+#define PDU(own, count) (&(const mbm_framing){(own), (count), MBM_FRAMING_NONE, 0})
+
 #endif

@@ -1,61 +1,32 @@
 //! Whole frames: built, parsed, measured, and refused with an exception.
 
-use super::functions::mbm_function;
+use super::framing::mbm_framing;
 use super::packet::{
     mbm_length, mbm_packet, own, put_expected, reply_length, side, MBM_PACKET_REQUEST,
 };
 use super::pointers::{buffer, get, lent, put, put_length};
 use mbm::error::Status;
 use mbm::frame::checksum::{crc16, lrc, Crc16};
-use mbm::frame::{ascii, tcp, Framing};
-use mbm::packet::length;
+use mbm::frame::{Adu, Framing};
 use mbm::packet::refusal::{Exception, Head};
+use mbm::packet::{length, Side};
 use mbm::pdu::custom::Function;
+use mbm::pdu::length::Length;
+use mbm::pdu::limits::MAX_PDU;
 
-/// Serial line, binary, CRC-16 (serial line guide V1.02, 2.5.1).
-pub const MBM_FRAMING_RTU: u8 = 0;
-/// Serial line, hexadecimal characters, LRC (serial line guide V1.02, 2.5.2).
-pub const MBM_FRAMING_ASCII: u8 = 1;
-/// TCP, behind the MBAP header (messaging on TCP/IP guide V1.0b, 3.1.3).
-pub const MBM_FRAMING_TCP: u8 = 2;
-/// RTU frames in a TCP stream.
-pub const MBM_FRAMING_RTU_OVER_TCP: u8 = 3;
-
-/// Most bytes of a TCP frame.
-pub const MBM_MAX_TCP_FRAME: u16 = 260;
-/// Most characters of an ASCII frame.
-pub const MBM_MAX_ASCII_FRAME: u16 = 513;
-
-const _: () = {
-    assert!(MBM_FRAMING_RTU == Framing::Rtu as u8);
-    assert!(MBM_FRAMING_ASCII == Framing::Ascii as u8);
-    assert!(MBM_FRAMING_TCP == Framing::Tcp as u8);
-    assert!(MBM_FRAMING_RTU_OVER_TCP == Framing::RtuOverTcp as u8);
-    assert!(MBM_MAX_TCP_FRAME as usize == tcp::MAX_FRAME);
-    assert!(MBM_MAX_ASCII_FRAME as usize == ascii::MAX_FRAME);
-};
-
-/// How frames look, and what is in them beside the standard. Zeroed: RTU, and
-/// the functions of the standard.
-#[repr(C)]
-#[derive(Clone, Copy)]
-pub struct mbm_framing {
-    /// Functions of your own; may be NULL if there are none.
-    pub functions: *const mbm_function,
-    /// How many.
-    pub functionCount: u8,
-    /// MBM_FRAMING_RTU, _ASCII, _TCP or _RTU_OVER_TCP.
-    pub kind: u8,
-    /// ASCII: the last character of a frame; 0 is line feed (V1.1b3, 6.8.1,
-    /// sub-function 03).
-    pub end: u8,
-}
-
-/// How frames look, in the core's words.
+/// How frames look, in the core's words; without a framing, PDUs alone.
 struct Look {
-    framing: Framing,
+    framing: Option<Framing>,
     end: u8,
     own: Option<Function>,
+}
+
+/// The function code at the start of a frame or PDU.
+fn function(framing: Option<Framing>, bytes: &[u8]) -> Option<u8> {
+    match framing {
+        Some(framing) => length::function(framing, bytes),
+        None => bytes.first().copied(),
+    }
 }
 
 /// What C says of frames, of one that carries the function that `code` tells.
@@ -64,15 +35,15 @@ struct Look {
 /// `framing` is NULL or points to one that is valid.
 unsafe fn look(
     framing: *const mbm_framing,
-    code: impl FnOnce(Framing) -> Option<u8>,
+    code: impl FnOnce(Option<Framing>) -> Option<u8>,
 ) -> Result<Look, Status> {
     // SAFETY: as the caller promises.
     unsafe {
         let told = get(framing).ok_or(Status::INVALID_ARGUMENT)?;
-        let framing = Framing::from_code(told.kind).ok_or(Status::INVALID_ARGUMENT)?;
+        let framing = told.core()?;
         Ok(Look {
             framing,
-            end: if told.end == 0 { ascii::END } else { told.end },
+            end: told.end(),
             own: own(told.functions, told.functionCount, code(framing))?,
         })
     }
@@ -86,8 +57,8 @@ unsafe fn look(
 /// @param framing   how frames look
 /// @param packet    what to build, with its unit, and for TCP the transaction
 /// @param frame     receives the frame; may not overlap the packet's data
-/// @param capacity  bytes of `frame`; MBM_MAX_FRAME do for RTU,
-///                  MBM_MAX_TCP_FRAME for TCP, MBM_MAX_ASCII_FRAME for all
+/// @param capacity  bytes of `frame`; MBM_MAX_FRAME do for RTU, MBM_MAX_TCP_FRAME for
+///                  TCP, MBM_MAX_PDU for a PDU alone, MBM_MAX_ASCII_FRAME for all
 /// @param length    receives the frame's length; 0 if the status is not MBM_OK
 /// @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
 ///         that mbm_frame_parse finds in such a frame
@@ -112,10 +83,12 @@ pub unsafe extern "C" fn mbm_frame_build(
                 transaction, unit, ..
             } = packet.head();
             let own = look.own.as_slice();
-            look.framing
-                .emit(buffer, transaction, unit, look.end, |pdu| {
+            match look.framing {
+                Some(framing) => framing.emit(buffer, transaction, unit, look.end, |pdu| {
                     packet.emit(data, own, pdu)
-                })
+                }),
+                None => packet.emit(data, own, buffer),
+            }
         };
         put_length(length, build())
     }
@@ -132,15 +105,19 @@ pub unsafe extern "C" fn mbm_frame_build(
 /// @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
 ///                     and exceptions
 /// @param frame        the frame, from its first byte to its last. ASCII is
-///                     decoded where it stands, which overwrites it
+///                     decoded where it stands, which overwrites it; others are
+///                     only read
 /// @param frameLength  its bytes
 /// @param packet       receives what it says. If the frame is sound, but not
 ///                     what it carries: kind, unit, transaction and function
 ///                     alone; if the frame is not sound: kind alone; unchanged
 ///                     for MBM_INVALID_ARGUMENT
-/// @return MBM_OK, also for an exception; of the frame MBM_INCOMPLETE_FRAME,
-///         MBM_MALFORMED_FRAME, or MBM_INVALID_CRC, also for a wrong LRC; what
-///         mbm_packet_parse says of what it carries; MBM_INVALID_ARGUMENT
+/// @return MBM_OK, also for an exception; MBM_INVALID_ARGUMENT. Of the frame
+///         MBM_INCOMPLETE_FRAME, MBM_MALFORMED_FRAME, or MBM_INVALID_CRC, also for a
+///         wrong LRC. Of a request in it the exception that answers it:
+///         MBM_ILLEGAL_FUNCTION, MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE.
+///         Of a response in it MBM_INVALID_FUNCTION for a function that is neither the
+///         standard's nor declared, or MBM_MALFORMED_REPLY
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_parse(
     framing: *const mbm_framing,
@@ -154,7 +131,7 @@ pub unsafe extern "C" fn mbm_frame_parse(
         side(kind).and_then(|side| {
             let bytes = buffer(frame, frameLength).filter(|_| !packet.is_null());
             let bytes = bytes.ok_or(Status::INVALID_ARGUMENT)?;
-            let look = look(framing, |framing| length::function(framing, bytes))?;
+            let look = look(framing, |framing| function(framing, bytes))?;
             Ok((side, bytes, look))
         })
     };
@@ -163,7 +140,15 @@ pub unsafe extern "C" fn mbm_frame_parse(
         Err(refused) => return refused.code(),
     };
     let mut found = mbm_packet::of(kind, &[]);
-    let status = match look.framing.parse(bytes, look.end) {
+    let adu = match look.framing {
+        Some(framing) => framing.parse(bytes, look.end),
+        None => Ok(Adu {
+            transaction: 0,
+            unit: 0,
+            pdu: bytes,
+        }),
+    };
+    let status = match adu {
         Ok(adu) => {
             found = mbm_packet::of(kind, adu.pdu);
             found.unit = adu.unit;
@@ -193,7 +178,7 @@ pub unsafe extern "C" fn mbm_frame_parse(
 /// @return MBM_OK; MBM_BROADCAST_NOT_ALLOWED: on a serial line nobody answers
 ///         unit 0; MBM_ILLEGAL_FUNCTION for a function from 0x80, which no
 ///         exception can name; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also
-///         for a status that is no exception code
+///         for a status that is no exception code, and for MBM_FRAMING_NONE
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_exception(
     framing: *const mbm_framing,
@@ -212,8 +197,9 @@ pub unsafe extern "C" fn mbm_frame_exception(
             let buffer = buffer(frame, capacity).filter(|_| !length.is_null());
             let buffer = buffer.ok_or(Status::INVALID_ARGUMENT)?;
             let code = Status::from_code(code);
-            let exception = Exception::new(look.framing, request.head(), code)?;
-            exception.emit(look.framing, look.end, buffer)
+            let framing = look.framing.ok_or(Status::INVALID_ARGUMENT)?;
+            let exception = Exception::new(framing, request.head(), code)?;
+            exception.emit(framing, look.end, buffer)
         };
         put_length(length, build())
     }
@@ -224,7 +210,8 @@ pub unsafe extern "C" fn mbm_frame_exception(
 /// A response to function 11 may be longer than it counts: some devices count the id
 /// alone. In RTU frames it is MBM_LENGTH_EXACT once a right CRC stands where the count
 /// says, MBM_LENGTH_AT_LEAST before, and if the CRC is wrong there MBM_LENGTH_SILENCE,
-/// or MBM_LENGTH_UNKNOWN in a stream.
+/// or MBM_LENGTH_UNKNOWN in a stream. A PDU alone (MBM_FRAMING_NONE) has no CRC that would
+/// tell: its length is the one that it counts, and mbm_frame_parse takes the longer PDU too.
 ///
 /// Any thread or interrupt may call it. For ASCII it takes 260 bytes of stack.
 ///
@@ -250,15 +237,29 @@ pub unsafe extern "C" fn mbm_frame_expectedLength(
         let measure = || {
             let side = side(kind)?;
             let bytes = lent(bytes, have.into()).ok_or(Status::INVALID_ARGUMENT)?;
-            let look = look(framing, |framing| length::function(framing, bytes))?;
-            length::expected(look.framing, side, bytes, look.end, look.own.as_slice())
+            let look = look(framing, |framing| function(framing, bytes))?;
+            let own = look.own.as_slice();
+            match look.framing {
+                Some(framing) => length::expected(framing, side, bytes, look.end, own),
+                None => pdu_length(side, bytes, own),
+            }
         };
         put_expected(expected, measure())
     }
 }
 
+/// How long the PDU is that begins with these bytes.
+fn pdu_length(side: Side, bytes: &[u8], own: &[Function]) -> Result<Length, Status> {
+    match side.length(bytes, own) {
+        Length::Exactly(bytes) | Length::AtLeast(bytes) if bytes > MAX_PDU => {
+            Err(Status::MALFORMED_FRAME)
+        }
+        length => Ok(length),
+    }
+}
+
 /// How long the frame will be that answers a request, if that succeeds. Else it
-/// is an exception: 5 bytes in RTU, 9 in TCP, 11 characters in ASCII.
+/// is an exception: 5 bytes in RTU, 9 in TCP, 11 characters in ASCII, 2 of a PDU alone.
 ///
 /// Any thread or interrupt may call it. It takes 260 bytes of stack.
 ///
@@ -281,8 +282,9 @@ pub unsafe extern "C" fn mbm_frame_replyLength(
             let packet = get(request).ok_or(Status::INVALID_ARGUMENT)?;
             let look = look(framing, |_| Some(packet.function))?;
             let own = look.own.as_slice();
-            reply_length(&packet, own, |request| {
-                length::of_reply(look.framing, packet.unit, request, own)
+            reply_length(&packet, own, |request| match look.framing {
+                Some(framing) => length::of_reply(framing, packet.unit, request, own),
+                None => request.response_length(own),
             })
         };
         put_expected(expected, measure())

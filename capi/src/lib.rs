@@ -19,6 +19,7 @@
 mod bits;
 mod client;
 mod frame;
+mod framing;
 mod functions;
 mod limits;
 mod master;
@@ -32,10 +33,12 @@ mod sniffer;
 mod status;
 mod storage;
 mod text;
+mod version;
 
 pub use bits::*;
 pub use client::*;
 pub use frame::*;
+pub use framing::*;
 pub use functions::*;
 pub use limits::*;
 pub use master::*;
@@ -48,3 +51,4 @@ pub use sniffer::*;
 pub use status::*;
 pub use storage::*;
 pub use text::*;
+pub use version::*;

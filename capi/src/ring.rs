@@ -14,11 +14,11 @@ use mbm::ring::{Place, Positions, Ring, MAX_STORAGE};
 /// is ever disabled.
 #[repr(C)]
 pub struct mbm_ring {
-    /// Not for you.
+    /// Private.
     bytes: *mut u8,
-    /// Not for you.
+    /// Private.
     size: u16,
-    /// Not for you.
+    /// Private.
     positions: [u16; 3],
 }
 

@@ -79,7 +79,7 @@ pub const MBM_PENDING: u8 = 0xEB;
 /// For as long as the response timeout the line never fell silent, or the
 /// port took no bytes.
 pub const MBM_LINE_BUSY: u8 = 0xEC;
-/// The request was given up by mbm_master_cancel or mbm_master_begin.
+/// The request was given up by mbm_master_cancel or mbm_master_beginRtu.
 pub const MBM_CANCELLED: u8 = 0xED;
 /// A frame that is not whole yet: more bytes are to come.
 pub const MBM_INCOMPLETE_FRAME: u8 = 0xEE;
@@ -134,6 +134,6 @@ statuses! {
 /// @param status  any number
 /// @return a constant string, never NULL
 #[no_mangle]
-pub extern "C" fn mbm_statusText(status: u8) -> *const c_char {
+pub extern "C" fn mbm_status_text(status: u8) -> *const c_char {
     text(status).as_ptr()
 }

@@ -1,20 +1,18 @@
-//! Frames and events in words.
+//! Frames in words.
 
-use super::frame::mbm_framing;
+use super::framing::mbm_framing;
 use super::packet::side;
 use super::pointers::{buffer, get, lent_or_none};
-use super::sniffer::mbm_event;
 use core::ffi::c_char;
 use mbm::error::Status;
 use mbm::explain::{self, Line};
-use mbm::frame::{ascii, Framing};
 
 /// The line that starts at a pointer from C; none if it has no room for the zero
 /// byte that ends it.
 ///
 /// # Safety
 /// `text` is NULL or points to `size` bytes, which nothing else uses meanwhile.
-unsafe fn line<'a>(text: *mut c_char, size: u16) -> Result<Line<'a>, Status> {
+pub(super) unsafe fn line<'a>(text: *mut c_char, size: u16) -> Result<Line<'a>, Status> {
     // SAFETY: as the caller promises; a character is a byte.
     let text = unsafe { buffer(text.cast(), size) }.ok_or(Status::INVALID_ARGUMENT)?;
     match text.first_mut() {
@@ -25,7 +23,7 @@ unsafe fn line<'a>(text: *mut c_char, size: u16) -> Result<Line<'a>, Status> {
 }
 
 /// What C is told of a text.
-fn outcome(written: Result<Line, Status>) -> u8 {
+pub(super) fn outcome(written: Result<Line, Status>) -> u8 {
     match written.and_then(Line::finish) {
         Ok(_) => Status::OK.code(),
         Err(refused) => refused.code(),
@@ -45,7 +43,8 @@ fn outcome(written: Result<Line, Status>) -> u8 {
 /// @param frameLength  its bytes
 /// @param text         receives the line, which a zero byte ends in any case
 /// @param size         bytes of `text`; 200 do for most frames, 1200 for all
-/// @return MBM_OK; MBM_BUFFER_TOO_SMALL: the line is cut; MBM_INVALID_ARGUMENT
+/// @return MBM_OK; MBM_BUFFER_TOO_SMALL: the line is cut; MBM_INVALID_ARGUMENT,
+///         also for MBM_FRAMING_NONE
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_text(
     framing: *const mbm_framing,
@@ -60,38 +59,10 @@ pub unsafe extern "C" fn mbm_frame_text(
         let write = || {
             let mut line = line(text, size)?;
             let told = get(framing).ok_or(Status::INVALID_ARGUMENT)?;
-            let framing = Framing::from_code(told.kind).ok_or(Status::INVALID_ARGUMENT)?;
-            let end = if told.end == 0 { ascii::END } else { told.end };
+            let (framing, end) = (told.of_frames()?, told.end());
             let frame = lent_or_none(frame, frameLength.into());
             let frame = frame.ok_or(Status::INVALID_ARGUMENT)?;
             explain::frame(&mut line, framing, side(kind)?, frame, end);
-            Ok(line)
-        };
-        outcome(write())
-    }
-}
-
-/// Explains an event in one line of words, for example
-/// "unit 17  reply      03 read holding registers  107..109: 555 0 100".
-///
-/// Any thread may call it while the event is valid.
-///
-/// @param event  what mbm_sniffer_next gave
-/// @param text   receives the line, which a zero byte ends in any case
-/// @param size   bytes of `text`; 200 do for most events, 2400 for all
-/// @return MBM_OK; MBM_BUFFER_TOO_SMALL: the line is cut; MBM_INVALID_ARGUMENT
-#[no_mangle]
-pub unsafe extern "C" fn mbm_event_text(
-    event: *const mbm_event,
-    text: *mut c_char,
-    size: u16,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        let write = || {
-            let mut line = line(text, size)?;
-            let event = get(event).ok_or(Status::INVALID_ARGUMENT)?;
-            event.told()?.explain(&mut line);
             Ok(line)
         };
         outcome(write())

@@ -24,9 +24,9 @@ fn probes() -> Vec<(String, u64)> {
     probes! {
         sizes: mbm_port mbm_counters mbm_master mbm_registers mbm_ring mbm_rule mbm_function
             mbm_length mbm_packet mbm_record mbm_object mbm_framing mbm_server mbm_unit
-            mbm_service mbm_registerTable mbm_bitTable mbm_cells mbm_file mbm_files mbm_fifo
+            mbm_service mbm_registerTable mbm_bitTable mbm_dataCallbacks mbm_file mbm_files mbm_fifo
             mbm_fifos mbm_exceptionStatus mbm_serverId mbm_identification mbm_request mbm_custom
-            mbm_switches mbm_diagnostics mbm_sniffer mbm_event mbm_client mbm_clientRequest mbm_clientUnit mbm_link
+            mbm_functionMask mbm_diagnostics mbm_sniffer mbm_event mbm_client mbm_clientRequest mbm_clientUnit mbm_linkHooks
             mbm_turn;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
@@ -34,8 +34,8 @@ fn probes() -> Vec<(String, u64)> {
                 resynchronisations bytesSent bytesReceived }
             mbm_clientRequest { done context data reply replyBytes transaction unit status exception
                 length }
-            mbm_clientUnit { requests replies exceptions retries delay unit status }
-            mbm_link { context disconnect connect }
+            mbm_clientUnit { requests replies exceptions retries delayUs unit status }
+            mbm_linkHooks { context disconnect connect }
             mbm_turn { master lastUse }
             mbm_rule { kind bytes more }
             mbm_function { code request response }
@@ -46,13 +46,13 @@ fn probes() -> Vec<(String, u64)> {
                 conformity moreFollows nextObjectId objectCount }
             mbm_record { data file record length }
             mbm_object { data length id }
-            mbm_framing { functions functionCount kind end }
+            mbm_framing { functions functionCount kind delimiter }
             mbm_registers { data first count kind order }
             mbm_service { serve kind }
             mbm_unit { services monitor diagnostics id }
             mbm_registerTable { service words valid before after context base size }
             mbm_bitTable { service bits valid before after context base size }
-            mbm_cells { service context isValid get set before after }
+            mbm_dataCallbacks { service context isValid get set before after }
             mbm_file { records size number }
             mbm_files { service files count before after context }
             mbm_fifo { words address count }
@@ -62,12 +62,12 @@ fn probes() -> Vec<(String, u64)> {
             mbm_identification { service objects count }
             mbm_request { data length unit function }
             mbm_custom { service serve context code length }
-            mbm_switches { service off }
+            mbm_functionMask { service off }
             mbm_diagnostics { service restart context diagnosticRegister busMessages
                 busCommunicationErrors exceptionErrors serverMessages noResponses naks busy
                 characterOverruns events listenOnly hidden }
-            mbm_event { frame pdu packet time responseTime frameLength pduLength length address
-                quantity kind status unit function asked askedLength };
+            mbm_event { frame pdu packet timeUs responseTimeUs frameLength pduLength length address
+                quantity kind status unit function requestHead requestHeadLength };
         constants:
             MBM_OK MBM_ILLEGAL_FUNCTION MBM_ILLEGAL_DATA_ADDRESS MBM_ILLEGAL_DATA_VALUE
             MBM_SLAVE_DEVICE_FAILURE MBM_ACKNOWLEDGE MBM_SLAVE_DEVICE_BUSY
@@ -102,12 +102,13 @@ fn probes() -> Vec<(String, u64)> {
             MBM_RULE_COUNTED MBM_PACKET_REQUEST MBM_PACKET_RESPONSE MBM_PACKET_EXCEPTION
             MBM_MAX_PDU MBM_LENGTH_EXACT MBM_LENGTH_AT_LEAST MBM_LENGTH_SILENCE
             MBM_LENGTH_UNKNOWN MBM_FRAMING_RTU MBM_FRAMING_ASCII MBM_FRAMING_TCP
-            MBM_FRAMING_RTU_OVER_TCP MBM_MAX_TCP_FRAME MBM_MAX_ASCII_FRAME MBM_ORDER_DEFAULT
+            MBM_FRAMING_RTU_OVER_TCP MBM_FRAMING_NONE MBM_VERSION_MAJOR MBM_VERSION_MINOR
+            MBM_VERSION_PATCH MBM_MAX_TCP_FRAME MBM_MAX_ASCII_FRAME MBM_ORDER_DEFAULT
             MBM_ORDER_ABCD MBM_ORDER_CDAB MBM_ORDER_BADC MBM_ORDER_DCBA MBM_REGISTERS_OF_WORDS
             MBM_REGISTERS_OF_BYTES MBM_REGISTERS_INTO_WORDS MBM_REGISTERS_INTO_BYTES
             MBM_REPLY_EXCEPTION MBM_REPLY_NONE MBM_REPLY_PENDING MBM_EVENT_REQUEST MBM_EVENT_REPLY MBM_EVENT_EXCEPTION
-            MBM_EVENT_UNPAIRED MBM_EVENT_TIMEOUT MBM_EVENT_BAD_CRC MBM_EVENT_NOISE MBM_TAP_BOTH
-            MBM_TAP_CLIENT MBM_TAP_SERVER MBM_MIN_SNIFFER_BUFFER MBM_MAX_SNIFFER_FUNCTIONS
+            MBM_EVENT_UNPAIRED MBM_EVENT_TIMEOUT MBM_EVENT_BAD_CRC MBM_EVENT_NOISE MBM_DIRECTION_BOTH
+            MBM_DIRECTION_CLIENT MBM_DIRECTION_SERVER MBM_MIN_SNIFFER_BUFFER MBM_MAX_SNIFFER_FUNCTIONS
             MBM_MAX_SERVICES;
     }
 }
@@ -183,7 +184,7 @@ fn the_probe_counts_every_constant_of_the_header() {
 fn every_status_constant_is_explained_and_no_two_alike() {
     let text = |status| {
         // SAFETY is the callee's: it returns a constant string.
-        let pointer = mbm_statusText(status);
+        let pointer = mbm_status_text(status);
         unsafe { std::ffi::CStr::from_ptr(pointer) }
             .to_str()
             .unwrap()

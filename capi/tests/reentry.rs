@@ -15,7 +15,7 @@ struct World {
     master: *mut mbm_master,
     server: *mut mbm_server,
     unit: *mut mbm_unit,
-    switches: *mut mbm_switches,
+    switches: *mut mbm_functionMask,
     request: *mut mbm_clientRequest,
     again: *mut mbm_clientRequest,
     arriving: Vec<u8>,
@@ -233,7 +233,7 @@ fn hooks_and_idle_use_the_master_that_called_them() {
         let status = mbm_master_setBuffers(master, first, 4, first.add(4), 4, bytes, 64);
         assert_eq!(status, MBM_OK);
         let port = port(world.cast());
-        assert_eq!(mbm_master_begin(master, 17, &port), MBM_OK);
+        assert_eq!(mbm_master_beginRtu(master, 17, &port), MBM_OK);
         assert_eq!(mbm_master_setResponseTimeout(master, 20), MBM_OK);
         assert_eq!(
             mbm_master_readHoldingRegisters(master, 0, 1),
@@ -258,7 +258,7 @@ unsafe extern "C" fn before(context: *mut c_void, _: u16, _: u16, data: *const u
             let world = world(context);
             (world.unit, world.switches)
         };
-        assert_eq!(mbm_server_switchOff(unit, switches, 100), MBM_OK);
+        assert_eq!(mbm_unit_switchFunction(unit, switches, 100, 0), MBM_OK);
     }
     0
 }
@@ -311,14 +311,14 @@ fn hooks_use_the_server_that_called_them() {
             (*custom).context = world.cast();
             (*line).restart = Some(restart);
             (*line).context = world.cast();
-            assert_eq!(mbm_server_serveHoldingRegisters(unit, table), MBM_OK);
-            assert_eq!(mbm_server_serveCustom(unit, custom), MBM_OK);
-            assert_eq!(mbm_server_serveDiagnostics(unit, line), MBM_OK);
+            assert_eq!(mbm_unit_serveHoldingRegisters(unit, table), MBM_OK);
+            assert_eq!(mbm_unit_serveCustom(unit, custom), MBM_OK);
+            assert_eq!(mbm_unit_serveDiagnostics(unit, line), MBM_OK);
             let (port, bytes) = (port(world.cast()), frame.cast::<u8>());
             let status = if tcp {
                 mbm_server_beginTcp(server, &port, unit, 1, bytes, 260)
             } else {
-                mbm_server_begin(server, &port, unit, 1, bytes, 256)
+                mbm_server_beginRtu(server, &port, unit, 1, bytes, 256)
             };
             assert_eq!(status, MBM_OK);
             (*world).server = server;

@@ -160,7 +160,7 @@ static void note(void *context, mbm_clientRequest *request)
     ended_at = clock_micros(0);
     console_print(t->name);
     console_print(": ");
-    console_print(mbm_statusText(request->status));
+    console_print(mbm_status_text(request->status));
     console_print("\n");
 }
 

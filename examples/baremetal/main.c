@@ -31,7 +31,7 @@ static void note(enum step step, const char *name, uint8_t status, uint8_t expec
         report[REPORT_UNEXPECTED]++;
     console_print(name);
     console_print(": ");
-    console_print(mbm_statusText(status));
+    console_print(mbm_status_text(status));
     console_print("\n");
 }
 
@@ -130,7 +130,7 @@ int main(void)
 
     mbm_master_setBuffers(&node, response, MBM_MAX_READ_REGISTERS, transmit, REPORT_SIZE, frame,
                           sizeof frame);
-    mbm_master_begin(&node, UNIT, &port);
+    mbm_master_beginRtu(&node, UNIT, &port);
     mbm_master_setBaudRate(&node, BAUD);
     mbm_master_setResponseTimeout(&node, PRESENT_TIMEOUT);
     mbm_master_setCounters(&node, &counters);

@@ -86,11 +86,11 @@ int main(void)
 
     fill();
     unit.id = SERVE_UNIT;
-    mbm_server_serveHoldingRegisters(&unit, &holding);
-    mbm_server_serveInputRegisters(&unit, &inputs);
-    mbm_server_serveCoils(&unit, &coils);
-    mbm_server_serveDiscreteInputs(&unit, &discrete);
-    mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame);
+    mbm_unit_serveHoldingRegisters(&unit, &holding);
+    mbm_unit_serveInputRegisters(&unit, &inputs);
+    mbm_unit_serveCoils(&unit, &coils);
+    mbm_unit_serveDiscreteInputs(&unit, &discrete);
+    mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame);
     mbm_server_setSilence(&server, SERVE_SILENCE);
     console_print("serving\n");
     while (status == MBM_OK && !is_over())

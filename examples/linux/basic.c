@@ -19,7 +19,7 @@ static uint8_t frame[MBM_FRAME_BYTES(READ_WORDS)];
 static int failed(const char *what, uint8_t status)
 {
     if (status != MBM_OK)
-        fprintf(stderr, "%s: %s\n", what, mbm_statusText(status));
+        fprintf(stderr, "%s: %s\n", what, mbm_status_text(status));
     return status != MBM_OK;
 }
 
@@ -41,7 +41,7 @@ int main(int argc, char **argv)
     }
     port = mbm_tty_port(&tty);
     mbm_master_setBuffers(&node, response, READ_WORDS, transmit, WRITE_WORDS, frame, sizeof frame);
-    mbm_master_begin(&node, (uint8_t)strtoul(argv[3], NULL, 10), &port);
+    mbm_master_beginRtu(&node, (uint8_t)strtoul(argv[3], NULL, 10), &port);
     mbm_master_setBaudRate(&node, baud);
 
     /* Two words to registers 0 and 1, then six words from register 2 on. */

@@ -113,8 +113,8 @@ static int begin(void)
     services[0].serve = serve_read;
     services[1].code = CUSTOM_WRITE;
     services[1].serve = serve_write;
-    if (mbm_server_serveCustom(&unit, &services[0]) != MBM_OK ||
-        mbm_server_serveCustom(&unit, &services[1]) != MBM_OK)
+    if (mbm_unit_serveCustom(&unit, &services[0]) != MBM_OK ||
+        mbm_unit_serveCustom(&unit, &services[1]) != MBM_OK)
         return -1;
     if (mbm_tcp_listen(&listener, "127.0.0.1", "0") != 0)
         return -1;
@@ -161,7 +161,7 @@ static int failed(const char *what, uint8_t status)
 {
     if (status == MBM_OK)
         return 0;
-    printf("%s: %s\n", what, mbm_statusText(status));
+    printf("%s: %s\n", what, mbm_status_text(status));
     return 1;
 }
 

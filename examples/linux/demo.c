@@ -69,11 +69,11 @@ static void show(uint8_t status, uint8_t expected_status)
     requests++;
     print_frame(MBM_PACKET_REQUEST, &wire.sent);
     print_frame(MBM_PACKET_RESPONSE, &wire.received);
-    printf("  result   %s", mbm_statusText(status));
+    printf("  result   %s", mbm_status_text(status));
     for (i = 0; i < words; i++)
         printf("%s0x%04X", i == 0 ? ": " : " ", mbm_master_getResponseBuffer(&node, i));
     printf("\n");
-    expect(status == expected_status, mbm_statusText(expected_status));
+    expect(status == expected_status, mbm_status_text(expected_status));
 }
 
 /* Makes a call after it has printed it as a user would write it. */
@@ -112,7 +112,7 @@ static void begin(void)
     expect(mbm_tty_attach(&tty, device.line.ours) == 0, "a terminal");
     over_tty = mbm_tty_port(&tty);
     port = recorder_port(&wire, &over_tty);
-    expect(mbm_master_begin(&node, UNIT, &port) == MBM_OK, "begin");
+    expect(mbm_master_beginRtu(&node, UNIT, &port) == MBM_OK, "begin");
     expect(mbm_master_setBuffers(&node, response, WORDS, transmit, WORDS, frame, sizeof frame) ==
                MBM_OK,
            "setBuffers");
@@ -180,7 +180,7 @@ static void without_waiting(void)
     printf("mbm_master_setBlocking(&node, 0), then mbm_master_readHoldingRegisters(&node, 0, 2)\n");
     status = mbm_master_readHoldingRegisters(&node, 0, 2);
     expect(status == MBM_PENDING, "pending at once");
-    printf("  at once  %s\n", mbm_statusText(status));
+    printf("  at once  %s\n", mbm_status_text(status));
     while ((status = mbm_master_poll(&node)) == MBM_PENDING)
         rounds++;
     printf("  while mbm_master_poll(&node) said so, the program went round its loop %u times\n",

@@ -150,7 +150,7 @@ static void hang_up(line *l)
 /* Opens a line that is not open, now and then. */
 static int is_there(line *l)
 {
-    const mbm_link link = {l, close_line, open_line};
+    const mbm_linkHooks link = {l, close_line, open_line};
     struct pollfd idle = {l->tty.fd, 0, 0};
 
     /* It may have hung up since the last wait. */
@@ -295,7 +295,7 @@ static void take_connections(void)
         memset(c, 0, sizeof *c);
         c->every.serve = forward;
         c->every.context = c;
-        if (mbm_server_serveCustom(&c->unit, &c->every) != MBM_OK ||
+        if (mbm_unit_serveCustom(&c->unit, &c->every) != MBM_OK ||
             mbm_server_beginTcp(&c->server, &port, &c->unit, 1, c->frame, sizeof c->frame) !=
                 MBM_OK)
             mbm_tcp_close(&tcps[place]);
@@ -443,7 +443,7 @@ int main(int argc, char **argv)
             break;
     if (i < 3 || i < argc)
         return usage(1);
-    listener.idleTime = (uint32_t)idle * 1000u;
+    listener.idleTimeMs = (uint32_t)idle * 1000u;
     if (mbm_tcp_listen(&listener, NULL, argv[0]) != 0) {
         fprintf(stderr, "%s: %s\n", argv[0],
                 listener.lookup ? gai_strerror(listener.lookup) : strerror(errno));

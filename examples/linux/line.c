@@ -152,8 +152,8 @@ static void keep_reason(line *l)
 
 void line_poll(line *l)
 {
-    const mbm_link socket = {&l->tcp, mbm_tcp_disconnect, mbm_tcp_connect};
-    const mbm_link terminal = {l, close_tty, open_tty_again};
+    const mbm_linkHooks socket = {&l->tcp, mbm_tcp_disconnect, mbm_tcp_connect};
+    const mbm_linkHooks terminal = {l, close_tty, open_tty_again};
 
     (void)mbm_client_poll(&l->client);
     keep_reason(l);
@@ -182,7 +182,7 @@ const char *line_reason(const line *l)
 
 const char *line_status(line *l, const mbm_clientRequest *request)
 {
-    const char *text = mbm_statusText(request->status);
+    const char *text = mbm_status_text(request->status);
 
     if (request->status != MBM_LINK_LOST || l->lost_by == 0)
         return text;

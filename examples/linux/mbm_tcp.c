@@ -53,7 +53,7 @@ static int has_socket(const mbm_tcp *tcp)
 }
 
 /* Has the socket's set tell of it. */
-void mbm_tcp_tell(mbm_tcp *tcp)
+void mbm_tcp_markReady(mbm_tcp *tcp)
 {
     if (!tcp->set || tcp->told & MBM_TCP_LISTED)
         return;
@@ -99,7 +99,7 @@ SELDOM static void await_in_set(mbm_tcp *tcp, uint8_t before)
     /* Nobody would learn what happens to it. */
     tcp->awaits = 0;
     drop(tcp, LOST, errno);
-    mbm_tcp_tell(tcp);
+    mbm_tcp_markReady(tcp);
 }
 
 void mbm_tcp_await(mbm_tcp *tcp, uint8_t awaits)
@@ -417,11 +417,11 @@ mbm_port mbm_tcp_port(mbm_tcp *tcp)
 
 /* Poll failed: for a signal, or for lack of memory or of descriptors, whose limit may have
  * been lowered. Then whoever waits looks for itself, and does not spin. */
-SELDOM static int nap(uint32_t micros)
+SELDOM static int nap(uint32_t timeoutUs)
 {
     if (errno == EINTR)
         return 0;
-    usleep(micros < BLIND_NAP ? micros : BLIND_NAP);
+    usleep(timeoutUs < BLIND_NAP ? timeoutUs : BLIND_NAP);
     return 1;
 }
 
@@ -443,15 +443,15 @@ static inline void note(mbm_tcp *tcp, short events)
 }
 
 /* Of a long time a millisecond does not matter, and poll asks for less than ppoll. */
-static inline int sleep_on(struct pollfd *waits, nfds_t count, uint32_t micros)
+static inline int sleep_on(struct pollfd *waits, nfds_t count, uint32_t timeoutUs)
 {
-    if (micros >= LONG_WAIT)
-        return poll(waits, count, micros == MBM_TCP_FOREVER ? -1 : (int)(micros / 1000 + 1));
-    return ppoll(waits, count, &(struct timespec){0, (long)micros * 1000}, NULL);
+    if (timeoutUs >= LONG_WAIT)
+        return poll(waits, count, timeoutUs == MBM_TCP_FOREVER ? -1 : (int)(timeoutUs / 1000 + 1));
+    return ppoll(waits, count, &(struct timespec){0, (long)timeoutUs * 1000}, NULL);
 }
 
 SELDOM static int wait_for_many(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener,
-                                int fd, uint32_t micros)
+                                int fd, uint32_t timeoutUs)
 {
     const int is_listening = listener && listener->port != 0;
     struct pollfd waits[MBM_TCP_WAITS];
@@ -461,8 +461,8 @@ SELDOM static int wait_for_many(mbm_tcp *tcps, size_t count, const mbm_tcp_liste
 
     if (count > MBM_TCP_WAITS - 2)
         return refuse(EINVAL);
-    if (is_listening && listener->awaits == 0 && micros > MBM_TCP_RETRY)
-        micros = MBM_TCP_RETRY;
+    if (is_listening && listener->awaits == 0 && timeoutUs > MBM_TCP_RETRY)
+        timeoutUs = MBM_TCP_RETRY;
     for (i = 0; i < count; i++)
         if (events_of(&tcps[i]) != 0)
             waits[used++] = (struct pollfd){tcps[i].fd, events_of(&tcps[i]), 0};
@@ -470,9 +470,9 @@ SELDOM static int wait_for_many(mbm_tcp *tcps, size_t count, const mbm_tcp_liste
         waits[used++] = (struct pollfd){listener->fd, POLLIN, 0};
     if (fd >= 0)
         waits[used++] = (struct pollfd){fd, POLLIN, 0};
-    ready = sleep_on(waits, used, micros);
+    ready = sleep_on(waits, used, timeoutUs);
     if (ready < 0)
-        return nap(micros);
+        return nap(timeoutUs);
     used = 0;
     for (i = 0; i < count; i++)
         if (events_of(&tcps[i]) != 0)
@@ -481,18 +481,18 @@ SELDOM static int wait_for_many(mbm_tcp *tcps, size_t count, const mbm_tcp_liste
 }
 
 int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, int fd,
-                 uint32_t micros)
+                 uint32_t timeoutUs)
 {
     struct pollfd wait;
     int ready;
 
     /* What a client waits for with every request. */
     if (count != 1 || listener || fd >= 0 || tcps->told || tcps->awaits != POLLIN)
-        return wait_for_many(tcps, count, listener, fd, micros);
+        return wait_for_many(tcps, count, listener, fd, timeoutUs);
     wait = (struct pollfd){tcps->fd, POLLIN, 0};
-    ready = sleep_on(&wait, 1, micros);
+    ready = sleep_on(&wait, 1, timeoutUs);
     if (ready < 0)
-        return nap(micros);
+        return nap(timeoutUs);
     if (ready > 0)
         tcps->told = MBM_TCP_TOLD;
     return ready;

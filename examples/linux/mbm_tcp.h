@@ -47,10 +47,10 @@ extern "C" {
 /** The addresses of a server, for a client that connects to it. Yours, and set by
  *  mbm_tcp_open. */
 typedef struct mbm_tcp_addresses {
-    uint8_t count;                                   /**< not for you */
-    uint8_t next;                                    /**< not for you */
-    socklen_t lengths[MBM_TCP_ADDRESSES];            /**< not for you */
-    struct sockaddr_storage list[MBM_TCP_ADDRESSES]; /**< not for you */
+    uint8_t count;                                   /**< private */
+    uint8_t next;                                    /**< private */
+    socklen_t lengths[MBM_TCP_ADDRESSES];            /**< private */
+    struct sockaddr_storage list[MBM_TCP_ADDRESSES]; /**< private */
 } mbm_tcp_addresses;
 
 /** A socket in use as a port; zero before first use. */
@@ -61,42 +61,42 @@ typedef struct mbm_tcp {
     int lookup;        /**< why mbm_tcp_open found no address, for gai_strerror; else 0 */
     uint8_t isBusy;    /**< yours: 1 while a response to the peer is to come, so that the connection
                             is not idle; only for requests that may take longer than the idle time */
-    uint8_t state;     /**< not for you */
+    uint8_t state;     /**< private */
     uint8_t awaits;    /**< what to poll it for: POLLIN, and POLLOUT while it takes no more */
-    uint8_t told;      /**< not for you */
-    int64_t lastMoved; /**< not for you */
-    mbm_tcp_addresses *addresses; /**< not for you */
-    struct mbm_tcp_set *set;      /**< not for you */
-    struct mbm_tcp *next;         /**< not for you */
+    uint8_t told;      /**< private */
+    int64_t lastMoved; /**< private */
+    mbm_tcp_addresses *addresses; /**< private */
+    struct mbm_tcp_set *set;      /**< private */
+    struct mbm_tcp *next;         /**< private */
 } mbm_tcp;
 
 /** A socket that connections come to; zero before first use. */
 typedef struct mbm_tcp_listener {
-    int fd;            /**< the socket, while `port` is not 0 */
-    int lookup;        /**< why mbm_tcp_listen found no address, for gai_strerror; else 0 */
-    uint16_t port;     /**< where it listens */
-    uint8_t awaits;    /**< what to poll it for: POLLIN, or 0 while connections can only wait */
-    uint8_t isQuiet;   /**< not for you */
-    uint32_t idleTime; /**< yours: milliseconds without a byte read or written after which a
+    int fd;              /**< the socket, while `port` is not 0 */
+    int lookup;          /**< why mbm_tcp_listen found no address, for gai_strerror; else 0 */
+    uint16_t port;       /**< where it listens */
+    uint8_t awaits;      /**< what to poll it for: POLLIN, or 0 while connections can only wait */
+    uint8_t isQuiet;     /**< private */
+    uint32_t idleTimeMs; /**< yours: milliseconds without a byte read or written after which a
                             connection may be closed to make room for another; 0: never */
-    uint32_t refused;  /**< connections that were turned away without a place */
-    uint32_t idle;     /**< connections that were closed because they were idle */
-    int64_t retryAt;   /**< not for you */
-    struct mbm_tcp_set *set; /**< not for you */
+    uint32_t refused;    /**< connections that were turned away without a place */
+    uint32_t idle;       /**< connections that were closed because they were idle */
+    int64_t retryAt;     /**< private */
+    struct mbm_tcp_set *set; /**< private */
 } mbm_tcp_listener;
 
 /** Any number of sockets, of which one wait says which are ready; zero before first use. */
 typedef struct mbm_tcp_set {
     int fd;                     /**< the descriptor of epoll: a program that polls other descriptors
                                      too polls it for POLLIN, and then calls mbm_tcp_waitSet */
-    uint8_t isOpen;             /**< not for you */
-    int64_t now;                /**< not for you */
-    mbm_tcp *first;             /**< not for you */
-    mbm_tcp **end;              /**< not for you */
-    mbm_tcp_listener *listener; /**< not for you */
+    uint8_t isOpen;             /**< private */
+    int64_t now;                /**< private */
+    mbm_tcp *first;             /**< private */
+    mbm_tcp **end;              /**< private */
+    mbm_tcp_listener *listener; /**< private */
     int (*watch)(struct mbm_tcp_set *set, int fd, void *who, uint8_t before,
-                 uint8_t awaits);                      /**< not for you */
-    int (*add)(struct mbm_tcp_set *set, mbm_tcp *tcp); /**< not for you */
+                 uint8_t awaits);                      /**< private */
+    int (*add)(struct mbm_tcp_set *set, mbm_tcp *tcp); /**< private */
 } mbm_tcp_set;
 
 /**
@@ -204,7 +204,7 @@ int mbm_tcp_listen(mbm_tcp_listener *listener, const char *host, const char *ser
  * costs next to nothing while the set knows of no connection that waits.
  *
  * Where every place is in use and a connection waits, the connection that has been idle
- * for longest is closed, if it has been idle for the listener's `idleTime`. Its link is
+ * for longest is closed, if it has been idle for the listener's `idleTimeMs`. Its link is
  * lost: its server's next poll returns MBM_LINK_LOST, the program frees the place, and
  * the next call takes the new connection. Where none is idle, the connections that wait
  * are closed, so that their clients know at once.
@@ -241,7 +241,7 @@ void mbm_tcp_closeListener(mbm_tcp_listener *listener);
  * @param listener  waits for connections too; may be NULL
  * @param fd        waits for bytes of another descriptor too, for example that of
  *                  an mbm_tty; -1 for none
- * @param micros    at most so long, in microseconds, from 100000 on to the next
+ * @param timeoutUs    at most so long, in microseconds, from 100000 on to the next
  *                  millisecond, or MBM_TCP_FOREVER; less while the listener's connections
  *                  can only wait
  * @return 1 if there is something, or if the system refused to poll, after a sleep of at
@@ -249,7 +249,7 @@ void mbm_tcp_closeListener(mbm_tcp_listener *listener);
  *         too many
  */
 int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, int fd,
-                 uint32_t micros);
+                 uint32_t timeoutUs);
 
 /**
  * Begins a set without sockets. It takes one descriptor.
@@ -286,12 +286,12 @@ int mbm_tcp_addListener(mbm_tcp_set *set, mbm_tcp_listener *listener);
  * are ready, not with those that are there.
  *
  * @param set     an open set
- * @param micros  at most so long, in microseconds, rounded up to milliseconds, or
+ * @param timeoutUs  at most so long, in microseconds, rounded up to milliseconds, or
  *                MBM_TCP_FOREVER; less while the listener's connections can only wait
  * @return 1 if there is something: see mbm_tcp_nextReady and mbm_tcp_accept; 0 if the
  *         time is over or a signal came; -1 with errno EBADF for a set that is not open
  */
-int mbm_tcp_waitSet(mbm_tcp_set *set, uint32_t micros);
+int mbm_tcp_waitSet(mbm_tcp_set *set, uint32_t timeoutUs);
 
 /**
  * Takes the next of the sockets that mbm_tcp_waitSet found ready: poll its client or
@@ -320,7 +320,7 @@ struct addrinfo;
 int mbm_tcp_lookUp(const char *host, const char *service, int flags, struct addrinfo **found,
                    int *why);
 int64_t mbm_tcp_milliseconds(void);
-void mbm_tcp_tell(mbm_tcp *tcp);
+void mbm_tcp_markReady(mbm_tcp *tcp);
 void mbm_tcp_await(mbm_tcp *tcp, uint8_t awaits);
 
 #ifdef __cplusplus

@@ -103,11 +103,11 @@ static int close_oldest(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
     mbm_tcp *oldest = NULL;
     size_t i;
 
-    if (listener->idleTime == 0)
+    if (listener->idleTimeMs == 0)
         return 0;
     for (i = 0; i < count; i++) {
         /* The times themselves are compared: the clock goes on from one look to the next. */
-        if (!tcps[i].isBusy && mbm_tcp_idleFor(&tcps[i]) >= (int64_t)listener->idleTime &&
+        if (!tcps[i].isBusy && mbm_tcp_idleFor(&tcps[i]) >= (int64_t)listener->idleTimeMs &&
             (!oldest || tcps[i].lastMoved < oldest->lastMoved))
             oldest = &tcps[i];
     }
@@ -115,7 +115,7 @@ static int close_oldest(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
         return 0;
     mbm_tcp_disconnect(oldest);
     oldest->error = ETIMEDOUT;
-    mbm_tcp_tell(oldest);
+    mbm_tcp_markReady(oldest);
     listener->idle++;
     return 1;
 }

@@ -95,7 +95,7 @@ __attribute__((cold, noinline)) static void note(mbm_tcp *tcp, uint32_t events)
     if (tcp->awaits == POLLOUT)
         /* If it is being connected, that is known from now on. */
         (void)mbm_tcp_isConnected(tcp);
-    mbm_tcp_tell(tcp);
+    mbm_tcp_markReady(tcp);
 }
 
 /* How long connections can only wait, in milliseconds, or -1. Where that is over,
@@ -146,9 +146,9 @@ static int wait_once(mbm_tcp_set *set, int64_t time)
     return count;
 }
 
-int mbm_tcp_waitSet(mbm_tcp_set *set, uint32_t micros)
+int mbm_tcp_waitSet(mbm_tcp_set *set, uint32_t timeoutUs)
 {
-    const int64_t time = micros == MBM_TCP_FOREVER ? -1 : ((int64_t)micros + 999) / 1000;
+    const int64_t time = timeoutUs == MBM_TCP_FOREVER ? -1 : ((int64_t)timeoutUs + 999) / 1000;
     int count;
 
     if (!set->isOpen)

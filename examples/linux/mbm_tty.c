@@ -425,14 +425,14 @@ static uint8_t tty_flush(void *context)
 enum { LONG_WAIT = 100000 };
 
 /* Of a long time a millisecond does not matter, and poll asks for less than ppoll. */
-static inline int sleep_on(struct pollfd *line, nfds_t count, uint32_t micros)
+static inline int sleep_on(struct pollfd *line, nfds_t count, uint32_t timeoutUs)
 {
-    if (micros >= LONG_WAIT)
-        return poll(line, count, micros == MBM_TTY_FOREVER ? -1 : (int)(micros / 1000 + 1));
-    return ppoll(line, count, &(struct timespec){0, (long)micros * 1000}, NULL);
+    if (timeoutUs >= LONG_WAIT)
+        return poll(line, count, timeoutUs == MBM_TTY_FOREVER ? -1 : (int)(timeoutUs / 1000 + 1));
+    return ppoll(line, count, &(struct timespec){0, (long)timeoutUs * 1000}, NULL);
 }
 
-int mbm_tty_wait(mbm_tty *tty, uint32_t micros)
+int mbm_tty_wait(mbm_tty *tty, uint32_t timeoutUs)
 {
     struct pollfd line = {tty->fd, POLLIN, 0};
     int ready;
@@ -440,7 +440,7 @@ int mbm_tty_wait(mbm_tty *tty, uint32_t micros)
     if (!tty->isOpen)
         return refuse(EBADF);
     /* A descriptor in the list would end the wait at a hang-up, whatever it awaits. */
-    ready = sleep_on(&line, tty->awaits != 0, micros);
+    ready = sleep_on(&line, tty->awaits != 0, timeoutUs);
     if (ready < 0)
         return errno == EINTR ? 0 : -1;
     if (ready > 0)

@@ -44,12 +44,12 @@ typedef struct mbm_tty {
     uint8_t isOpen;       /**< 1 from open or attach to close or detach; a zeroed one is closed */
     uint8_t has_uart;     /**< whether there is a transmitter to wait for */
     uint8_t awaits;       /**< what mbm_tty_wait polls it for: POLLIN, or 0; see there */
-    uint8_t has_before;   /**< not for you */
-    uint8_t is_exclusive; /**< not for you */
-    uint8_t is_rs485;     /**< not for you */
-    int flags_before;     /**< not for you */
-    uint32_t rs485_before[8]; /**< not for you */
-    struct termios before;    /**< not for you */
+    uint8_t has_before;   /**< private */
+    uint8_t is_exclusive; /**< private */
+    uint8_t is_rs485;     /**< private */
+    int flags_before;     /**< private */
+    uint32_t rs485_before[8]; /**< private */
+    struct termios before;    /**< private */
 } mbm_tty;
 
 /**
@@ -120,12 +120,12 @@ void mbm_tty_detach(mbm_tty *tty);
  * a server whose function is pending reads nothing, and its program sleeps.
  *
  * @param tty     the terminal
- * @param micros  the longest time to sleep, in microseconds, from 100000 on rounded up to the next
- *                millisecond, or MBM_TTY_FOREVER
+ * @param timeoutUs  the longest time to sleep, in microseconds, from 100000 on rounded up to the
+ * next millisecond, or MBM_TTY_FOREVER
  * @return 1 if bytes have arrived or the link is lost, which the next read reports;
  *         0 if the time is over or a signal came; -1 with errno set
  */
-int mbm_tty_wait(mbm_tty *tty, uint32_t micros);
+int mbm_tty_wait(mbm_tty *tty, uint32_t timeoutUs);
 
 /**
  * The port to give to the begin functions. It may be made before the terminal is open,

@@ -34,10 +34,10 @@ static void tell(const mbm_clientRequest *request)
     case MBM_GATEWAY_TARGET_FAILED_TO_RESPOND: return;
     case MBM_INVALID_CRC:
     case MBM_MALFORMED_REPLY:
-        printf("unit %3u: %s; two with one address?\n", unit, mbm_statusText(request->status));
+        printf("unit %3u: %s; two with one address?\n", unit, mbm_status_text(request->status));
         break;
     default:
-        printf("unit %3u: %s\n", unit, mbm_statusText(request->status));
+        printf("unit %3u: %s\n", unit, mbm_status_text(request->status));
         there += request->exception != 0;
         fflush(stdout);
         return;

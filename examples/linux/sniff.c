@@ -54,16 +54,16 @@ static uint64_t micros(void)
 static void tell(const mbm_event *event)
 {
     static char text[2400];
-    uint64_t time = now - ((uint32_t)now - event->time) - first;
+    uint64_t time = now - ((uint32_t)now - event->timeUs) - first;
 
     totals[event->kind]++;
-    if (event->kind == MBM_EVENT_REPLY && event->responseTime > slowest)
-        slowest = event->responseTime;
+    if (event->kind == MBM_EVENT_REPLY && event->responseTimeUs > slowest)
+        slowest = event->responseTimeUs;
     mbm_event_text(event, text, sizeof text);
     printf("%6llu.%03llu  ", (unsigned long long)(time / 1000000u),
            (unsigned long long)(time / 1000u % 1000u));
-    if (event->responseTime)
-        printf("%6.1f ms  ", event->responseTime / 1000.0);
+    if (event->responseTimeUs)
+        printf("%6.1f ms  ", event->responseTimeUs / 1000.0);
     else
         printf("%11s", "");
     printf("%s\n", text);
@@ -85,7 +85,7 @@ static void hear(const uint8_t *bytes, uint16_t length)
     uint16_t fed = 0;
 
     while (fed < length) {
-        fed = (uint16_t)(fed + mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, bytes + fed,
+        fed = (uint16_t)(fed + mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, bytes + fed,
                                                 (uint16_t)(length - fed), (uint32_t)now));
         tell_all(now);
     }
@@ -222,7 +222,7 @@ int main(int argc, char **argv)
 {
     mbm_tty_options options = {.parity = 'N', .stop = 1};
     struct sigaction action = {0};
-    mbm_framing framing = {0};
+    uint8_t framing = MBM_FRAMING_RTU;
     int option, failed;
 
     if (argc > 1 && strcmp(argv[1], "--help") == 0)
@@ -230,17 +230,22 @@ int main(int argc, char **argv)
     while ((option = getopt(argc, argv, "aht")) != -1) {
         if (option == '?' || option == 'h')
             return usage(option == '?');
-        framing.kind = option == 'a' ? MBM_FRAMING_ASCII : MBM_FRAMING_TCP;
+        framing = option == 'a' ? MBM_FRAMING_ASCII : MBM_FRAMING_TCP;
     }
     argc -= optind;
     argv += optind;
-    options.data = framing.kind == MBM_FRAMING_ASCII ? 7 : 8;
+    options.data = framing == MBM_FRAMING_ASCII ? 7 : 8;
     if (argc < 1 || !read_line(argc, argv, &options))
         return usage(1);
     action.sa_handler = end;
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
-    mbm_sniffer_begin(&sniffer, &framing, buffer, sizeof buffer);
+    if (framing == MBM_FRAMING_TCP)
+        mbm_sniffer_beginTcp(&sniffer, buffer, sizeof buffer);
+    else if (framing == MBM_FRAMING_ASCII)
+        mbm_sniffer_beginAscii(&sniffer, buffer, sizeof buffer);
+    else
+        mbm_sniffer_beginRtu(&sniffer, buffer, sizeof buffer);
     mbm_sniffer_setBaudRate(&sniffer, options.baud);
     if (strcmp(argv[0], "-") == 0)
         failed = replay();

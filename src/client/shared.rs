@@ -131,6 +131,17 @@ impl<J: Job, const N: usize> Shared<J, N> {
         Some(job)
     }
 
+    /// Gives all requests the status [`Status::CANCELLED`]. They stay in the queue, which the
+    /// caller clears.
+    pub fn cancel_all(&mut self) {
+        if let Some(job) = &mut self.active {
+            job.ticket_mut().status = Status::CANCELLED;
+        }
+        for job in self.queue.iter_mut() {
+            job.ticket_mut().status = Status::CANCELLED;
+        }
+    }
+
     /// Notes that the link was opened anew. The next polls end the requests in flight with
     /// [`Status::LINK_LOST`].
     pub fn interrupt(&mut self) {

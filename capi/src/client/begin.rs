@@ -2,13 +2,13 @@
 
 use super::kind;
 use super::object::{line, mbm_client, shared, Kind, SerialLine, TcpLine};
-use crate::frame::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
-use crate::pointers;
+use crate::framing::{is_delimiter, MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
+use crate::pointers::{self, CObject};
 use crate::port::{countable, mbm_port};
 use mbm::error::Status;
-use mbm::frame::ascii;
 
-/// Makes a client of a kind of line out of storage.
+/// Makes a client of a kind of line out of storage. One that was begun before gives up its
+/// requests.
 ///
 /// # Safety
 /// As the header demands of the begin functions.
@@ -30,22 +30,20 @@ unsafe fn begin(
                     && frame_bytes >= u16::from(kind.least)
                     && port.is_complete() =>
             {
-                match pointers::check(pointer) {
-                    Status::NOT_INITIALISED => {
-                        let object = pointers::object(pointer);
-                        (*object).kind = kind;
-                        (*object).shared.connected = true;
-                        kind.settings(object).preset();
-                        (*kind.port(object)).copy(port);
-                        let means = kind.means(object);
-                        means.frame = frame;
-                        means.frame_bytes = countable(frame_bytes);
-                        pointers::calling(pointer, || (kind.start)(object));
-                        Status::OK
-                    }
-                    Status::INVALID_ARGUMENT => Status::INVALID_ARGUMENT,
-                    _ => Status::BUSY,
+                let status = give_up(pointer);
+                if status != Status::NOT_INITIALISED {
+                    return status.code();
                 }
+                let object = pointers::object(pointer);
+                (*object).kind = kind;
+                (*object).shared.connected = true;
+                kind.settings(object).preset();
+                (*kind.port(object)).copy(port);
+                let means = kind.means(object);
+                means.frame = frame;
+                means.frame_bytes = countable(frame_bytes);
+                pointers::calling(pointer, || (kind.start)(object));
+                Status::OK
             }
             _ => Status::INVALID_ARGUMENT,
         }
@@ -53,15 +51,58 @@ unsafe fn begin(
     status.code()
 }
 
+/// Makes zeroed storage of a client again, if it is one: its requests are given up. Returns
+/// [`Status::NOT_INITIALISED`] then, else the status that says why not.
+///
+/// # Safety
+/// As for [`pointers::check`].
+#[inline(always)]
+unsafe fn give_up(client: *mut mbm_client) -> Status {
+    // SAFETY: as the caller promises. Hooks that `release` calls may not use the object, which
+    // the mark says; no reference into it lives then. Zero is a value of every field but for
+    // the kind, which is set before it is used.
+    unsafe {
+        let status = pointers::check(client);
+        if status != Status::OK {
+            return status;
+        }
+        let object = pointers::object(client);
+        if (*object).shared.lent {
+            return Status::BUSY;
+        }
+        mbm_client::mark(client).write(pointers::CALLING);
+        ((*(*object).kind).release)(object, None);
+        shared(object).cancel_all();
+        // Not by memset: libc's is larger than this loop, and most images have no other use
+        // for it.
+        let mut word = client.cast::<usize>();
+        let end = client.add(1).cast::<usize>();
+        loop {
+            word.write_volatile(0);
+            word = word.add(1);
+            if word == end {
+                return Status::NOT_INITIALISED;
+            }
+        }
+    }
+}
+
+const _: () = assert!(size_of::<mbm_client>().is_multiple_of(size_of::<usize>()));
+
 /// Makes an object a client of a serial line, in RTU frames (serial line guide
 /// V1.02, 2.5.1).
 ///
-/// @param client      the object, zeroed
+/// This and the other mbm_client_begin functions may be called again at any time, also with
+/// another framing. All pending requests are given up as by mbm_client_cancel: their status
+/// is MBM_CANCELLED and `done` is not called. The settings are as at first. A call that is
+/// refused changes nothing.
+///
+/// @param client      the object; zeroed before the first call
 /// @param port        copied; read, write and micros must be there
 /// @param frame       bytes of one frame, valid for as long as the client is used
 /// @param frameBytes  at least 8; 256 hold any frame
-/// @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
-///         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+/// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
+///         the client is suspended
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_beginRtu(
     client: *mut mbm_client,
@@ -77,12 +118,12 @@ pub unsafe extern "C" fn mbm_client_beginRtu(
 /// V1.02, 2.5.2). No gap is kept between frames; a second without a character
 /// ends one that is not whole.
 ///
-/// @param client      the object, zeroed
+/// @param client      the object; zeroed before the first call
 /// @param port        copied; read, write and micros must be there
 /// @param frame       bytes of one frame, valid for as long as the client is used
 /// @param frameBytes  at least 17; 513 hold any frame
-/// @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
-///         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+/// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
+///         the client is suspended
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_beginAscii(
     client: *mut mbm_client,
@@ -105,15 +146,10 @@ pub unsafe extern "C" fn mbm_client_beginAscii(
 ///         for a client of another framing; MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, character: u8) -> u8 {
-    let part_of_a_frame =
-        ascii::digit(character).is_some() || matches!(character, ascii::START | ascii::RETURN);
     // SAFETY: as the header demands.
     unsafe {
         pointers::with(client, |object| {
-            if (*(*object).kind).framing != MBM_FRAMING_ASCII
-                || !(1..=127).contains(&character)
-                || part_of_a_frame
-            {
+            if (*(*object).kind).framing != MBM_FRAMING_ASCII || !is_delimiter(character) {
                 return Status::INVALID_ARGUMENT;
             }
             if !shared(object).is_idle() {
@@ -129,12 +165,12 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
 /// Makes an object a client that sends RTU frames through a TCP stream, for
 /// converters that pass on what they get. No gap is kept, nothing is broadcast.
 ///
-/// @param client      the object, zeroed
+/// @param client      the object; zeroed before the first call
 /// @param port        copied; read, write and micros must be there
 /// @param frame       bytes of one frame, valid for as long as the client is used
 /// @param frameBytes  at least 8; 256 hold any frame
-/// @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
-///         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+/// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
+///         the client is suspended
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_beginRtuOverTcp(
     client: *mut mbm_client,
@@ -150,7 +186,7 @@ pub unsafe extern "C" fn mbm_client_beginRtuOverTcp(
 /// (messaging on TCP/IP guide V1.0b, 3.1.3). All 16 requests may be under way at
 /// once; responses are matched by their transaction id, in any order.
 ///
-/// @param client         the object, zeroed
+/// @param client         the object; zeroed before the first call
 /// @param port           copied; read, write and micros must be there
 /// @param incoming       received bytes, valid for as long as the client is used
 /// @param incomingBytes  at least 9; 260 hold any frame, more take in more
@@ -158,8 +194,8 @@ pub unsafe extern "C" fn mbm_client_beginRtuOverTcp(
 /// @param outgoing       bytes to send, valid for as long as the client is used
 /// @param outgoingBytes  at least 12; 260 hold any frame, more gather more
 ///                       requests for one write
-/// @return MBM_OK, MBM_BUSY with nothing changed if it was begun already (to begin
-///         anew, zero it while nothing is pending), or MBM_INVALID_ARGUMENT
+/// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
+///         the client is suspended
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_beginTcp(
     client: *mut mbm_client,

@@ -6,7 +6,7 @@ use super::object::mbm_client;
 use super::object::{line, Kind, Object, SerialLine, TcpLine};
 use super::request::Lent;
 use super::storage::LentByC;
-use crate::frame::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
+use crate::framing::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
 use crate::port::mbm_port;
 use core::mem::offset_of;
 use mbm::client::{ClientEngine, Line};

@@ -1,7 +1,7 @@
 //! The line under a client: lost and found, lent and taken back.
 
 use super::object::{mbm_client, on_line, shared, SerialLine, TcpLine};
-use crate::frame::MBM_FRAMING_RTU;
+use crate::framing::MBM_FRAMING_RTU;
 use crate::master::{self, mbm_master, Core};
 use crate::pointers;
 use core::ffi::c_void;
@@ -10,7 +10,7 @@ use mbm::error::Status;
 
 /// What closes a link and opens it anew, for mbm_client_reconnect.
 #[repr(C)]
-pub struct mbm_link {
+pub struct mbm_linkHooks {
     /// Handed to both hooks. Yours, may be NULL.
     pub context: *mut c_void,
     /// Optional: closes the link, if it is open.
@@ -32,7 +32,7 @@ pub struct mbm_link {
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_reconnect(
     client: *mut mbm_client,
-    link: *const mbm_link,
+    link: *const mbm_linkHooks,
 ) -> u8 {
     // SAFETY: as the header demands. No reference to the client lives while the
     // hooks of the link are called.
@@ -80,7 +80,7 @@ pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8
 }
 
 /// Lends the line to a facade, whose functions then use the client's port; the
-/// client's requests wait until mbm_client_takeBack. One of the two has the line
+/// client's requests wait until mbm_client_resume. One of the two has the line
 /// at any time. Until then the client's storage must stay: do not zero it.
 ///
 /// @param client  the object; for a facade, of RTU frames on a line or over TCP
@@ -89,7 +89,10 @@ pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8
 /// @return MBM_OK; MBM_BUSY, with both unchanged, if a request is under way or the line
 ///         is lent already; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
-pub unsafe extern "C" fn mbm_client_lend(client: *mut mbm_client, master: *mut mbm_master) -> u8 {
+pub unsafe extern "C" fn mbm_client_suspend(
+    client: *mut mbm_client,
+    master: *mut mbm_master,
+) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         let status = pointers::with(client, |object| {
@@ -130,14 +133,11 @@ pub unsafe extern "C" fn mbm_client_lend(client: *mut mbm_client, master: *mut m
 /// with MBM_NOT_INITIALISED.
 ///
 /// @param client  the object
-/// @param master  as for mbm_client_lend
+/// @param master  as for mbm_client_suspend
 /// @return MBM_OK, MBM_BUSY while the facade has a request under way,
 ///         MBM_INVALID_ARGUMENT if the line was not lent, MBM_NOT_INITIALISED
 #[no_mangle]
-pub unsafe extern "C" fn mbm_client_takeBack(
-    client: *mut mbm_client,
-    master: *mut mbm_master,
-) -> u8 {
+pub unsafe extern "C" fn mbm_client_resume(client: *mut mbm_client, master: *mut mbm_master) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         pointers::with(client, |object| {

@@ -29,9 +29,9 @@ const DEPTH: usize = MBM_CLIENT_DEPTH as usize;
 /// never begun.
 #[repr(C)]
 pub struct mbm_client {
-    /// Not for you.
+    /// Private.
     pointers: [*mut c_void; 46],
-    /// Not for you.
+    /// Private.
     words: [u32; 24],
 }
 
@@ -151,7 +151,7 @@ pub(super) unsafe fn line<'a, L>(object: *mut Object) -> &'a mut L {
 macro_rules! on_line {
     ($object:expr, $line:ident => $action:expr) => {
         match (*(*$object).kind).framing {
-            $crate::frame::MBM_FRAMING_TCP => {
+            $crate::framing::MBM_FRAMING_TCP => {
                 let $line = $crate::client::object::line::<TcpLine>($object);
                 $action
             }

@@ -41,7 +41,7 @@ pub struct mbm_clientRequest {
     pub exception: u8,
     /// Bytes received in `reply`.
     pub length: u8,
-    /// Not for you.
+    /// Private.
     words: [u32; 8],
 }
 

@@ -40,14 +40,14 @@ pub struct mbm_clientUnit {
     pub retries: u32,
     /// Set by you: rest for this unit from the end of a request to the next, in
     /// microseconds; more than 2^31 (36 minutes) means 2^31.
-    pub delay: u32,
-    /// Not for you.
+    pub delayUs: u32,
+    /// Private.
     last: u32,
     /// Set by you: which unit this is.
     pub unit: u8,
     /// How the last request ended, MBM_OK if there was none.
     pub status: u8,
-    /// Not for you.
+    /// Private.
     tired: u8,
 }
 
@@ -55,7 +55,7 @@ const _: () = {
     use core::mem::offset_of;
     assert!(size_of::<mbm_clientUnit>() == size_of::<Unit>());
     assert!(align_of::<mbm_clientUnit>() == align_of::<Unit>());
-    assert!(offset_of!(mbm_clientUnit, delay) == offset_of!(Unit, delay));
+    assert!(offset_of!(mbm_clientUnit, delayUs) == offset_of!(Unit, delay));
     assert!(offset_of!(mbm_clientUnit, unit) == offset_of!(Unit, unit));
     assert!(offset_of!(mbm_clientUnit, status) == offset_of!(Unit, status));
 };
@@ -91,17 +91,17 @@ unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> Status) -> 
 /// into the outgoing buffer, also if the port takes it later.
 ///
 /// @param client        the object
-/// @param milliseconds  0 to 65535; 2000 at first
+/// @param timeoutMs     0 to 65535; 2000 at first
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setResponseTimeout(
     client: *mut mbm_client,
-    milliseconds: u16,
+    timeoutMs: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.settings.response_timeout = millis(milliseconds);
+            parts.settings.response_timeout = millis(timeoutMs);
             Status::OK
         })
     }
@@ -129,15 +129,15 @@ pub unsafe extern "C" fn mbm_client_setBaudRate(client: *mut mbm_client, baud: u
 /// mbm_client_setBaudRate sets it back. Without effect on TCP.
 ///
 /// @param client        the object
-/// @param microseconds  counted from the last byte seen or sent; more than 2^31
+/// @param gapUs         counted from the last byte seen or sent; more than 2^31
 ///                      (36 minutes) means 2^31
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
-pub unsafe extern "C" fn mbm_client_setGap(client: *mut mbm_client, microseconds: u32) -> u8 {
+pub unsafe extern "C" fn mbm_client_setGap(client: *mut mbm_client, gapUs: u32) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.settings.set_gap(microseconds);
+            parts.settings.set_gap(gapUs);
             Status::OK
         })
     }
@@ -147,17 +147,17 @@ pub unsafe extern "C" fn mbm_client_setGap(client: *mut mbm_client, microseconds
 /// line guide V1.02, 2.4.1), and 08 with sub-function 04.
 ///
 /// @param client        the object
-/// @param milliseconds  0 to 65535; 100 at first
+/// @param delayMs       0 to 65535; 100 at first
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
     client: *mut mbm_client,
-    milliseconds: u16,
+    delayMs: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.settings.turnaround_delay = millis(milliseconds);
+            parts.settings.turnaround_delay = millis(delayMs);
             Status::OK
         })
     }
@@ -168,14 +168,14 @@ pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
 /// TCP, where responses have a number.
 ///
 /// @param client        the object
-/// @param milliseconds  0 to 65535; 100 at first; 0 holds no reply
+/// @param quietMs       0 to 65535; 100 at first; 0 holds no reply
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
-pub unsafe extern "C" fn mbm_client_setQuietTime(client: *mut mbm_client, milliseconds: u16) -> u8 {
+pub unsafe extern "C" fn mbm_client_setQuietTime(client: *mut mbm_client, quietMs: u16) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.settings.quiet_time = millis(milliseconds);
+            parts.settings.quiet_time = millis(quietMs);
             Status::OK
         })
     }
@@ -259,15 +259,15 @@ pub unsafe extern "C" fn mbm_client_setRetries(client: *mut mbm_client, retries:
 ///
 /// @param client            the object
 /// @param backoff           MBM_BACKOFF_NONE (at first) to MBM_BACKOFF_EXPONENTIAL
-/// @param milliseconds      the wait before the first repetition
-/// @param mostMilliseconds  the longest wait
+/// @param delayMs           the wait before the first repetition
+/// @param maxDelayMs        the longest wait
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setBackoff(
     client: *mut mbm_client,
     backoff: u8,
-    milliseconds: u16,
-    mostMilliseconds: u16,
+    delayMs: u16,
+    maxDelayMs: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
@@ -275,7 +275,7 @@ pub unsafe extern "C" fn mbm_client_setBackoff(
             let Some(backoff) = Backoff::from_code(backoff) else {
                 return Status::INVALID_ARGUMENT;
             };
-            let (wait, most) = (millis(milliseconds), millis(mostMilliseconds));
+            let (wait, most) = (millis(delayMs), millis(maxDelayMs));
             parts.policy.set_backoff(backoff, wait, most);
             Status::OK
         })

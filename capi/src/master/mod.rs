@@ -124,7 +124,7 @@ pub(super) unsafe fn calling<T>(master: *mut mbm_master, action: impl FnOnce(&mu
 /// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a missing hook; MBM_BUSY
 ///         from within a hook of this object's port but `idle`
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_begin(
+pub unsafe extern "C" fn mbm_master_beginRtu(
     master: *mut mbm_master,
     slave: u8,
     port: *const mbm_port,
@@ -133,19 +133,19 @@ pub unsafe extern "C" fn mbm_master_begin(
         return Status::INVALID_ARGUMENT.code();
     }
     // SAFETY: not NULL, so a port; the rest as the header demands.
-    unsafe { mbm_master_beginWith(master, slave, port, (*port).context) }
+    unsafe { mbm_master_beginRtuWith(master, slave, port, (*port).context) }
 }
 
-/// As mbm_master_begin, for several objects that share one port, which may be a
+/// As mbm_master_beginRtu, for several objects that share one port, which may be a
 /// constant: each object has a context of its own.
 ///
 /// @param master   the object; zeroed before the first call
-/// @param slave    as for mbm_master_begin
-/// @param port     as for mbm_master_begin; its `context` is not used
+/// @param slave    as for mbm_master_beginRtu
+/// @param port     as for mbm_master_beginRtu; its `context` is not used
 /// @param context  handed to every hook. Yours, may be NULL
-/// @return as mbm_master_begin
+/// @return as mbm_master_beginRtu
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_beginWith(
+pub unsafe extern "C" fn mbm_master_beginRtuWith(
     master: *mut mbm_master,
     slave: u8,
     port: *const mbm_port,

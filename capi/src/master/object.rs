@@ -5,7 +5,7 @@ use core::ffi::c_void;
 /// A Modbus RTU master: one line, one request at a time.
 ///
 /// Storage is yours and must be zero before first use, which a static object
-/// is (`static mbm_master node;`). Settings and words want mbm_master_begin or
+/// is (`static mbm_master node;`). Settings and words want mbm_master_beginRtu or
 /// mbm_master_setBuffers before them, requests want both. Use one object from one
 /// thread and never from an interrupt; several objects are independent of each
 /// other. Which functions the hooks of its port may call: see mbm_port.
@@ -14,8 +14,8 @@ use core::ffi::c_void;
 /// request say of themselves, and mbm_master_send32.
 #[repr(C)]
 pub struct mbm_master {
-    /// Not for you.
+    /// Private.
     pointers: [*mut c_void; 12],
-    /// Not for you.
+    /// Private.
     words: [u32; 21],
 }

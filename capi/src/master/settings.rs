@@ -49,17 +49,17 @@ pub unsafe extern "C" fn mbm_master_getSlaveID(master: *const mbm_master) -> u8 
 /// byte of the reply.
 ///
 /// @param master        the object
-/// @param milliseconds  0 to 65535; 2000 at first
+/// @param timeoutMs     0 to 65535; 2000 at first
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setResponseTimeout(
     master: *mut mbm_master,
-    milliseconds: u16,
+    timeoutMs: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            master.core.settings().response_timeout = millis(milliseconds);
+            master.core.settings().response_timeout = millis(timeoutMs);
             Status::OK
         })
     }
@@ -88,15 +88,15 @@ pub unsafe extern "C" fn mbm_master_setBaudRate(master: *mut mbm_master, baud: u
 /// A later mbm_master_setBaudRate sets it back to t3.5.
 ///
 /// @param master        the object
-/// @param microseconds  counted from the last byte seen or sent; more than 2^31
+/// @param gapUs         counted from the last byte seen or sent; more than 2^31
 ///                      (36 minutes) means 2^31
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_setGap(master: *mut mbm_master, microseconds: u32) -> u8 {
+pub unsafe extern "C" fn mbm_master_setGap(master: *mut mbm_master, gapUs: u32) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            master.core.settings().set_gap(microseconds);
+            master.core.settings().set_gap(gapUs);
             Status::OK
         })
     }
@@ -106,17 +106,17 @@ pub unsafe extern "C" fn mbm_master_setGap(master: *mut mbm_master, microseconds
 /// V1.02, 2.4.1).
 ///
 /// @param master        the object
-/// @param milliseconds  0 to 65535; 100 at first
+/// @param delayMs       0 to 65535; 100 at first
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setTurnaroundDelay(
     master: *mut mbm_master,
-    milliseconds: u16,
+    delayMs: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            master.core.settings().turnaround_delay = millis(milliseconds);
+            master.core.settings().turnaround_delay = millis(delayMs);
             Status::OK
         })
     }
@@ -137,14 +137,14 @@ pub unsafe extern "C" fn mbm_master_setTurnaroundDelay(
 /// second reply may come after the held one was taken for the answer.
 ///
 /// @param master        the object
-/// @param milliseconds  0 to 65535; 100 at first; 0 holds no reply
+/// @param quietMs       0 to 65535; 100 at first; 0 holds no reply
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_setQuietTime(master: *mut mbm_master, milliseconds: u16) -> u8 {
+pub unsafe extern "C" fn mbm_master_setQuietTime(master: *mut mbm_master, quietMs: u16) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            master.core.settings().quiet_time = millis(milliseconds);
+            master.core.settings().quiet_time = millis(quietMs);
             Status::OK
         })
     }
@@ -251,14 +251,14 @@ pub unsafe extern "C" fn mbm_master_setCounters(
 /// of changes nothing.
 ///
 /// @param master        the object
-/// @param microseconds  by the clock of its port, at most 2^31 ago
+/// @param timeUs        by the clock of its port, at most 2^31 ago
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
-pub unsafe extern "C" fn mbm_master_lineUsedAt(master: *mut mbm_master, microseconds: u32) -> u8 {
+pub unsafe extern "C" fn mbm_master_lineUsedAt(master: *mut mbm_master, timeUs: u32) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            master.core.line_used_at(microseconds);
+            master.core.line_used_at(timeUs);
             Status::OK
         })
     }

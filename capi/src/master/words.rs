@@ -111,18 +111,6 @@ pub unsafe extern "C" fn mbm_master_send(master: *mut mbm_master, word: u16) -> 
     unsafe { with(master, |master| queued(master.core.send(word))) }
 }
 
-/// Queues a byte as one word.
-///
-/// @param master  the object
-/// @param byte    the low byte of the word; the high byte is 0
-/// @return MBM_OK, MBM_BUFFER_TOO_SMALL with nothing queued past the end of the
-///         transmit buffer, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
-#[no_mangle]
-pub unsafe extern "C" fn mbm_master_send8(master: *mut mbm_master, byte: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { with(master, |master| queued(master.core.send(u16::from(byte)))) }
-}
-
 /// Queues two words, the low one first; the low one alone if only that fits.
 ///
 /// @param master  the object

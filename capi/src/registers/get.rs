@@ -72,7 +72,7 @@ pub unsafe extern "C" fn mbm_registers_getBit(
     }
 }
 
-/// One byte of a register, 0 to 255.
+/// One byte of a register, 0 to 255; for a signed one, cast the pointer to an int8_t.
 ///
 /// @param registers  the registers
 /// @param address    the register, by the device's address
@@ -96,25 +96,8 @@ pub unsafe extern "C" fn mbm_registers_getUint8(
     }
 }
 
-/// As mbm_registers_getUint8, -128 to 127.
-///
-/// @param registers  the registers
-/// @param address    the register, by the device's address
-/// @param high       0 for the low byte, anything else for the high byte
-/// @param value      gets the byte
-/// @return as mbm_registers_getUint8
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getInt8(
-    registers: *const mbm_registers,
-    address: u16,
-    high: u8,
-    value: *mut i8,
-) -> u8 {
-    // SAFETY: as the header demands; a byte is a byte.
-    unsafe { mbm_registers_getUint8(registers, address, high, value.cast()) }
-}
-
-/// A number of one register, 0 to 65535. Of the order only the bytes matter.
+/// A number of one register, 0 to 65535; for a signed number, cast the pointer to an
+/// int16_t. Of the order only the bytes matter.
 ///
 /// @param registers  the registers
 /// @param address    the register, by the device's address
@@ -133,25 +116,8 @@ pub unsafe extern "C" fn mbm_registers_getUint16(
     unsafe { get(registers, address, order, value.cast(), 2) }
 }
 
-/// As mbm_registers_getUint16, -32768 to 32767.
-///
-/// @param registers  the registers
-/// @param address    the register, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
-/// @param value      gets the number
-/// @return as mbm_registers_getUint16
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getInt16(
-    registers: *const mbm_registers,
-    address: u16,
-    order: u8,
-    value: *mut i16,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { get(registers, address, order, value.cast(), 2) }
-}
-
-/// A number of two registers, 0 to 4294967295.
+/// A number of two registers, 0 to 4294967295; for a signed number (two's complement),
+/// cast the pointer to an int32_t.
 ///
 /// @param registers  the registers
 /// @param address    the first of its registers, by the device's address
@@ -170,25 +136,7 @@ pub unsafe extern "C" fn mbm_registers_getUint32(
     unsafe { get(registers, address, order, value.cast(), 4) }
 }
 
-/// As mbm_registers_getUint32, two's complement.
-///
-/// @param registers  the registers
-/// @param address    the first of its registers, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
-/// @param value      gets the number
-/// @return as mbm_registers_getUint32
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getInt32(
-    registers: *const mbm_registers,
-    address: u16,
-    order: u8,
-    value: *mut i32,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { get(registers, address, order, value.cast(), 4) }
-}
-
-/// A number of four registers.
+/// A number of four registers; for a signed number, cast the pointer to an int64_t.
 ///
 /// @param registers  the registers
 /// @param address    the first of its registers, by the device's address
@@ -202,24 +150,6 @@ pub unsafe extern "C" fn mbm_registers_getUint64(
     address: u16,
     order: u8,
     value: *mut u64,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { get(registers, address, order, value.cast(), 8) }
-}
-
-/// As mbm_registers_getUint64, two's complement.
-///
-/// @param registers  the registers
-/// @param address    the first of its registers, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
-/// @param value      gets the number
-/// @return as mbm_registers_getUint64
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getInt64(
-    registers: *const mbm_registers,
-    address: u16,
-    order: u8,
-    value: *mut i64,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe { get(registers, address, order, value.cast(), 8) }
@@ -320,40 +250,19 @@ pub unsafe extern "C" fn mbm_registers_getString(
     })
 }
 
-/// Raw bytes as they travel, high byte first in every order.
-///
-/// @param registers  the registers
-/// @param address    the register whose high byte is the first, by the device's
-///                   address
-/// @param bytes      gets the bytes; must not overlap the registers
-/// @param length     how many bytes, two a register; may be odd
-/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if they are not all there,
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `bytes` unchanged
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getBytes(
-    registers: *const mbm_registers,
-    address: u16,
-    bytes: *mut u8,
-    length: u16,
-) -> u8 {
-    // SAFETY: as the header demands.
-    code(unsafe {
-        lent(registers, MBM_ORDER_DEFAULT, false)
-            .and_then(|registers| registers.bytes(address, slice_mut(bytes, length.into())?))
-    })
-}
-
-/// As mbm_registers_getBytes, from a device that swaps the bytes of its registers:
-/// with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte of each comes first.
+/// Raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each register comes
+/// first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte, for a device
+/// that swaps the bytes of its registers.
 ///
 /// @param registers  the registers
 /// @param address    the first register, by the device's address
 /// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
 /// @param bytes      gets the bytes; must not overlap the registers
 /// @param length     how many bytes, two a register; may be odd
-/// @return as mbm_registers_getBytes
+/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if there are not so many,
+///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `bytes` unchanged
 #[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getBytesInOrder(
+pub unsafe extern "C" fn mbm_registers_getBytes(
     registers: *const mbm_registers,
     address: u16,
     order: u8,

@@ -93,24 +93,6 @@ pub unsafe extern "C" fn mbm_registers_setUint8(
     }
 }
 
-/// As mbm_registers_setUint8, -128 to 127.
-///
-/// @param registers  the registers, of a kind to write
-/// @param address    the register, by the device's address
-/// @param high       0 for the low byte, anything else for the high byte
-/// @param value      the byte
-/// @return as mbm_registers_setUint8
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_setInt8(
-    registers: *const mbm_registers,
-    address: u16,
-    high: u8,
-    value: i8,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { mbm_registers_setUint8(registers, address, high, value.cast_unsigned()) }
-}
-
 /// Sets a number of one register. Of the order only the bytes matter.
 ///
 /// @param registers  the registers, of a kind to write
@@ -125,24 +107,6 @@ pub unsafe extern "C" fn mbm_registers_setUint16(
     address: u16,
     order: u8,
     value: u16,
-) -> u8 {
-    // SAFETY: as the header demands; the number is there.
-    unsafe { set(registers, address, order, (&raw const value).cast(), 2) }
-}
-
-/// As mbm_registers_setUint16, -32768 to 32767.
-///
-/// @param registers  the registers, of a kind to write
-/// @param address    the register, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
-/// @param value      the number
-/// @return as mbm_registers_setUint16
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_setInt16(
-    registers: *const mbm_registers,
-    address: u16,
-    order: u8,
-    value: i16,
 ) -> u8 {
     // SAFETY: as the header demands; the number is there.
     unsafe { set(registers, address, order, (&raw const value).cast(), 2) }
@@ -167,24 +131,6 @@ pub unsafe extern "C" fn mbm_registers_setUint32(
     unsafe { set(registers, address, order, (&raw const value).cast(), 4) }
 }
 
-/// As mbm_registers_setUint32, two's complement.
-///
-/// @param registers  the registers, of a kind to write
-/// @param address    the first of its registers, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
-/// @param value      the number
-/// @return as mbm_registers_setUint32
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_setInt32(
-    registers: *const mbm_registers,
-    address: u16,
-    order: u8,
-    value: i32,
-) -> u8 {
-    // SAFETY: as the header demands; the number is there.
-    unsafe { set(registers, address, order, (&raw const value).cast(), 4) }
-}
-
 /// Sets a number of four registers.
 ///
 /// @param registers  the registers, of a kind to write
@@ -199,24 +145,6 @@ pub unsafe extern "C" fn mbm_registers_setUint64(
     address: u16,
     order: u8,
     value: *const u64,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { set(registers, address, order, value.cast(), 8) }
-}
-
-/// As mbm_registers_setUint64, two's complement.
-///
-/// @param registers  the registers, of a kind to write
-/// @param address    the first of its registers, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
-/// @param value      points to the number
-/// @return as mbm_registers_setUint64
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_setInt64(
-    registers: *const mbm_registers,
-    address: u16,
-    order: u8,
-    value: *const i64,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe { set(registers, address, order, value.cast(), 8) }
@@ -305,33 +233,9 @@ pub unsafe extern "C" fn mbm_registers_setString(
     }
 }
 
-/// Sets raw bytes as they travel, high byte first in every order.
-///
-/// @param registers  the registers, of a kind to write
-/// @param address    the register whose high byte is the first, by the device's
-///                   address
-/// @param bytes      the bytes; must not overlap the registers
-/// @param length     how many bytes, two a register; if odd, the low byte of the
-///                   last register stays
-/// @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS if there are not so
-///         many registers, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_setBytes(
-    registers: *const mbm_registers,
-    address: u16,
-    bytes: *const u8,
-    length: u16,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        with(registers, MBM_ORDER_DEFAULT, |registers| {
-            registers.set_bytes(address, slice(bytes, length.into())?)
-        })
-    }
-}
-
-/// As mbm_registers_setBytes, for a device that swaps the bytes of its registers:
-/// with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte of each comes first.
+/// Sets raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each register
+/// comes first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte, for a
+/// device that swaps the bytes of its registers.
 ///
 /// @param registers  the registers, of a kind to write
 /// @param address    the first register, by the device's address
@@ -339,9 +243,10 @@ pub unsafe extern "C" fn mbm_registers_setBytes(
 /// @param bytes      the bytes; must not overlap the registers
 /// @param length     how many bytes, two a register; if odd, the other byte of the
 ///                   last register stays
-/// @return as mbm_registers_setBytes
+/// @return MBM_OK, or with nothing changed MBM_ILLEGAL_DATA_ADDRESS if there are not so
+///         many, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
-pub unsafe extern "C" fn mbm_registers_setBytesInOrder(
+pub unsafe extern "C" fn mbm_registers_setBytes(
     registers: *const mbm_registers,
     address: u16,
     order: u8,

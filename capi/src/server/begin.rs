@@ -1,7 +1,7 @@
 //! Beginning a server, and how it behaves.
 
 use super::{mbm_server, mbm_unit, Core};
-use crate::frame::MBM_MAX_TCP_FRAME;
+use crate::framing::MBM_MAX_TCP_FRAME;
 use crate::pointers::{calling, check, object, CObject, CALLING};
 use crate::port::{countable, mbm_port};
 use mbm::error::Status;
@@ -76,7 +76,7 @@ unsafe fn begin(
 /// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or a
 ///         buffer that is too short; MBM_BUSY from within a hook of this server
 #[no_mangle]
-pub unsafe extern "C" fn mbm_server_begin(
+pub unsafe extern "C" fn mbm_server_beginRtu(
     server: *mut mbm_server,
     port: *const mbm_port,
     units: *mut mbm_unit,
@@ -91,13 +91,13 @@ pub unsafe extern "C" fn mbm_server_begin(
 /// Begins to serve units on a serial line, ASCII (serial line guide V1.02,
 /// 2.5.2). A frame whose next character takes longer than a second is dropped.
 ///
-/// @param server  see mbm_server_begin
-/// @param port    see mbm_server_begin
-/// @param units   see mbm_server_begin
-/// @param count   see mbm_server_begin
-/// @param frame   see mbm_server_begin
+/// @param server  see mbm_server_beginRtu
+/// @param port    see mbm_server_beginRtu
+/// @param units   see mbm_server_beginRtu
+/// @param count   see mbm_server_beginRtu
+/// @param frame   see mbm_server_beginRtu
 /// @param bytes   at least 32; MBM_MAX_ASCII_FRAME hold any frame
-/// @return a status; see mbm_server_begin
+/// @return a status; see mbm_server_beginRtu
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginAscii(
     server: *mut mbm_server,
@@ -117,13 +117,13 @@ pub unsafe extern "C" fn mbm_server_beginAscii(
 /// Begins to serve units on a TCP connection that was accepted. Requests that
 /// wait behind one another in the stream are answered in turn.
 ///
-/// @param server  see mbm_server_begin; one for each connection
-/// @param port    see mbm_server_begin; read, write and clock of the connection
-/// @param units   see mbm_server_begin; the unit ids 0 and 255 mean the first
-/// @param count   see mbm_server_begin
-/// @param frame   see mbm_server_begin; one for each connection
+/// @param server  see mbm_server_beginRtu; one for each connection
+/// @param port    see mbm_server_beginRtu; read, write and clock of the connection
+/// @param units   see mbm_server_beginRtu; the unit ids 0 and 255 mean the first
+/// @param count   see mbm_server_beginRtu
+/// @param frame   see mbm_server_beginRtu; one for each connection
 /// @param bytes   at least MBM_MAX_TCP_FRAME
-/// @return a status; see mbm_server_begin
+/// @return a status; see mbm_server_beginRtu
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginTcp(
     server: *mut mbm_server,
@@ -145,13 +145,13 @@ pub unsafe extern "C" fn mbm_server_beginTcp(
 /// bytes over in lumps. A frame ends where its own bytes say so; behind one that
 /// is damaged, half a second of silence does.
 ///
-/// @param server  see mbm_server_begin; one for each connection
-/// @param port    see mbm_server_begin
-/// @param units   see mbm_server_begin; the unit ids 0 and 255 mean the first
-/// @param count   see mbm_server_begin
-/// @param frame   see mbm_server_begin; one for each connection
+/// @param server  see mbm_server_beginRtu; one for each connection
+/// @param port    see mbm_server_beginRtu
+/// @param units   see mbm_server_beginRtu; the unit ids 0 and 255 mean the first
+/// @param count   see mbm_server_beginRtu
+/// @param frame   see mbm_server_beginRtu; one for each connection
 /// @param bytes   at least 16; MBM_MAX_FRAME hold any frame
-/// @return a status; see mbm_server_begin
+/// @return a status; see mbm_server_beginRtu
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
     server: *mut mbm_server,
@@ -178,18 +178,18 @@ pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
 
 /// Sets the silence that ends a frame: t3.5 of RTU, the time between two
 /// characters of ASCII, and in RTU over TCP the silence after a damaged frame. Without
-/// effect in TCP frames. mbm_server_begin and its sisters set it back.
+/// effect in TCP frames. mbm_server_beginRtu and its sisters set it back.
 ///
 /// @param server        the object
-/// @param microseconds  counted from the last byte seen
+/// @param silenceUs     counted from the last byte seen
 /// @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
 #[no_mangle]
-pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, microseconds: u32) -> u8 {
+pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, silenceUs: u32) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         let status = check(server);
         if status == Status::OK {
-            (*object(server)).set_silence(microseconds);
+            (*object(server)).set_silence(silenceUs);
         }
         status.code()
     }
@@ -219,7 +219,7 @@ pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u
 }
 
 /// Tells that the receiver of an RTU line hears what the driver sends, so that as
-/// many bytes as were sent are dropped behind each response. mbm_server_begin
+/// many bytes as were sent are dropped behind each response. mbm_server_beginRtu
 /// sets it back.
 ///
 /// @param server  the object

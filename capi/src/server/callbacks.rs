@@ -8,10 +8,10 @@ use mbm::server::table::{self, Access, Cells, Kind, Way};
 use mbm::server::Reply;
 
 /// Cells that your functions hold, one by one, in place of an array. Zero it, set
-/// what you need, and hand it to mbm_server_serveCallbacks.
+/// what you need, and hand it to mbm_unit_serveCallbacks.
 #[repr(C)]
-pub struct mbm_cells {
-    /// Not for you.
+pub struct mbm_dataCallbacks {
+    /// Private.
     pub service: mbm_service,
     /// Handed to each function. Yours, may be NULL.
     pub context: *mut c_void,
@@ -37,7 +37,7 @@ pub struct mbm_cells {
 
 /// Cells of C, which its functions may look at: no reference to them is kept.
 #[derive(Clone, Copy)]
-struct ByC(*mut mbm_cells);
+struct ByC(*mut mbm_dataCallbacks);
 
 // SAFETY, of all functions here: the record is the caller's and stays where it
 // is, as the header demands; its functions keep the contract of their comments.
@@ -139,7 +139,7 @@ unsafe extern "C" fn serve(
 ) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
-        let record = service.cast::<mbm_cells>();
+        let record = service.cast::<mbm_dataCallbacks>();
         let kind = Kind::from_code((*record).service.kind);
         if is_unheard(heading, *pdu) {
             return Reply::NOT_MINE.code();
@@ -166,11 +166,11 @@ unsafe extern "C" fn serve(
 ///               registers (04)
 /// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, no `get`, no `set`
 ///         where it is needed, or another table; MBM_BUSY and MBM_BUFFER_TOO_SMALL as
-///         mbm_server_serveCoils
+///         mbm_unit_serveCoils
 #[no_mangle]
-pub unsafe extern "C" fn mbm_server_serveCallbacks(
+pub unsafe extern "C" fn mbm_unit_serveCallbacks(
     unit: *mut mbm_unit,
-    cells: *mut mbm_cells,
+    cells: *mut mbm_dataCallbacks,
     table: u8,
 ) -> u8 {
     // SAFETY: as the header demands.

@@ -19,12 +19,12 @@ pub const MBM_REPLY_NONE: u16 = 0x0200;
 pub const MBM_REPLY_PENDING: u16 = 0x0300;
 
 /// Functions that a unit answers with exception 01, though it could serve them:
-/// see mbm_server_switchOff.
+/// see mbm_unit_switchFunction.
 #[repr(C)]
-pub struct mbm_switches {
-    /// Not for you.
+pub struct mbm_functionMask {
+    /// Private.
     pub service: mbm_service,
-    /// Not for you.
+    /// Private.
     pub off: [u8; 16],
 }
 
@@ -131,10 +131,7 @@ pub(super) unsafe fn rule(units: *const mbm_unit, count: u8, function: u8) -> Op
 ///         from 128 on, or a length that is no rule; MBM_BUFFER_TOO_SMALL if the unit
 ///         has no place
 #[no_mangle]
-pub unsafe extern "C" fn mbm_server_serveCustom(
-    unit: *mut mbm_unit,
-    custom: *mut mbm_custom,
-) -> u8 {
+pub unsafe extern "C" fn mbm_unit_serveCustom(unit: *mut mbm_unit, custom: *mut mbm_custom) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         if custom.is_null()
@@ -157,7 +154,7 @@ unsafe extern "C" fn gate(
 ) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
-        let off = custom::SwitchedOff((*service.cast::<mbm_switches>()).off);
+        let off = custom::SwitchedOff((*service.cast::<mbm_functionMask>()).off);
         if off.is_off(*pdu) {
             Reply::ILLEGAL_FUNCTION.code()
         } else {
@@ -170,7 +167,7 @@ unsafe extern "C" fn gate(
 ///
 /// # Safety
 /// `switches` is a record of them, and `code` 127 at most.
-unsafe fn switch(switches: *mut mbm_switches, code: u8) -> *mut u8 {
+unsafe fn switch(switches: *mut mbm_functionMask, code: u8) -> *mut u8 {
     // SAFETY: as the caller promises; a sixteenth byte has code 127.
     unsafe {
         (&raw mut (*switches).off)
@@ -179,47 +176,36 @@ unsafe fn switch(switches: *mut mbm_switches, code: u8) -> *mut u8 {
     }
 }
 
-/// Switches a function of a unit off: it is answered with exception 01 from now
-/// on, whatever serves it.
+/// Switches a function of a unit off or on again. One that is off is answered with
+/// exception 01, whatever serves it.
 ///
-/// @param unit      the unit
-/// @param switches  yours, for as long as the unit is used; zeroed before the
-///                  first call. Units that share one share what is switched off
-/// @param code      1 to 127
+/// @param unit  the unit
+/// @param mask  yours, for as long as the unit is used; zeroed before the first call.
+///              Units that share one share what is switched off
+/// @param code  the function code, 1 to 127
+/// @param on    0 switches the function off, anything else on
 /// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or another code;
 ///         MBM_BUFFER_TOO_SMALL if the unit has no place
 #[no_mangle]
-pub unsafe extern "C" fn mbm_server_switchOff(
+pub unsafe extern "C" fn mbm_unit_switchFunction(
     unit: *mut mbm_unit,
-    switches: *mut mbm_switches,
+    mask: *mut mbm_functionMask,
     code: u8,
+    on: u8,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        if switches.is_null() || code == 0 || code > 127 {
+        if mask.is_null() || code == 0 || code > 127 {
             return Status::INVALID_ARGUMENT.code();
         }
-        let status = add_first(unit, switches.cast(), gate);
+        let status = add_first(unit, mask.cast(), gate);
         if status == Status::OK.code() {
-            *switch(switches, code) |= 1 << (code % 8);
+            let (byte, bit) = (switch(mask, code), 1 << (code % 8));
+            *byte |= bit;
+            if on != 0 {
+                *byte ^= bit;
+            }
         }
         status
     }
-}
-
-/// Switches a function on again.
-///
-/// @param switches  what mbm_server_switchOff was given
-/// @param code      1 to 127
-/// @return MBM_OK or MBM_INVALID_ARGUMENT
-#[no_mangle]
-pub unsafe extern "C" fn mbm_server_switchOn(switches: *mut mbm_switches, code: u8) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe {
-        if switches.is_null() || code == 0 || code > 127 {
-            return Status::INVALID_ARGUMENT.code();
-        }
-        *switch(switches, code) &= !(1 << (code % 8));
-    }
-    Status::OK.code()
 }

@@ -83,7 +83,7 @@ unsafe extern "C" fn monitor(
 /// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit has
 ///         another record of diagnostics; MBM_BUFFER_TOO_SMALL if it has no place
 #[no_mangle]
-pub unsafe extern "C" fn mbm_server_serveDiagnostics(
+pub unsafe extern "C" fn mbm_unit_serveDiagnostics(
     unit: *mut mbm_unit,
     diagnostics: *mut mbm_diagnostics,
 ) -> u8 {

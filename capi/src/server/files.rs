@@ -18,10 +18,10 @@ pub struct mbm_file {
 }
 
 /// Files of yours. Zero it, set what you need, and hand it to
-/// mbm_server_serveFiles.
+/// mbm_unit_serveFiles.
 #[repr(C)]
 pub struct mbm_files {
-    /// Not for you.
+    /// Private.
     pub service: mbm_service,
     /// The files.
     pub files: *const mbm_file,
@@ -58,10 +58,10 @@ pub struct mbm_fifo {
     pub count: u16,
 }
 
-/// Queues of yours. Zero it, set both, and hand it to mbm_server_serveFifos.
+/// Queues of yours. Zero it, set both, and hand it to mbm_unit_serveFifos.
 #[repr(C)]
 pub struct mbm_fifos {
-    /// Not for you.
+    /// Private.
     pub service: mbm_service,
     /// The queues. Reading does not empty them.
     pub fifos: *const mbm_fifo,
@@ -232,7 +232,7 @@ unsafe extern "C" fn serve_fifos(
 /// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
 ///         the unit has no place
 #[no_mangle]
-pub unsafe extern "C" fn mbm_server_serveFiles(unit: *mut mbm_unit, files: *mut mbm_files) -> u8 {
+pub unsafe extern "C" fn mbm_unit_serveFiles(unit: *mut mbm_unit, files: *mut mbm_files) -> u8 {
     // SAFETY: as the header demands.
     unsafe { add(unit, files.cast(), serve_files) }
 }
@@ -244,7 +244,7 @@ pub unsafe extern "C" fn mbm_server_serveFiles(unit: *mut mbm_unit, files: *mut 
 /// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
 ///         the unit has no place
 #[no_mangle]
-pub unsafe extern "C" fn mbm_server_serveFifos(unit: *mut mbm_unit, fifos: *mut mbm_fifos) -> u8 {
+pub unsafe extern "C" fn mbm_unit_serveFifos(unit: *mut mbm_unit, fifos: *mut mbm_fifos) -> u8 {
     // SAFETY: as the header demands.
     unsafe { add(unit, fifos.cast(), serve_fifos) }
 }

@@ -8,21 +8,21 @@ use core::slice::from_raw_parts;
 use mbm::server::identity::{self, Objects};
 
 /// The eight outputs of function 07. Zero it, and hand it to
-/// mbm_server_serveExceptionStatus.
+/// mbm_unit_serveExceptionStatus.
 #[repr(C)]
 pub struct mbm_exceptionStatus {
-    /// Not for you.
+    /// Private.
     pub service: mbm_service,
     /// The outputs; change them at any time.
     pub outputs: u8,
 }
 
 /// What function 11 answers. Zero it, set what you need, and hand it to
-/// mbm_server_serveServerId. All together at most 251 bytes, less what the frame
+/// mbm_unit_serveServerId. All together at most 251 bytes, less what the frame
 /// buffer lacks; more is answered with exception 04.
 #[repr(C)]
 pub struct mbm_serverId {
-    /// Not for you.
+    /// Private.
     pub service: mbm_service,
     /// The id; NULL only with 0 bytes.
     pub id: *const u8,
@@ -37,10 +37,10 @@ pub struct mbm_serverId {
 }
 
 /// A device identification. Zero it, set both, and hand it to
-/// mbm_server_serveIdentification.
+/// mbm_unit_serveIdentification.
 #[repr(C)]
 pub struct mbm_identification {
-    /// Not for you.
+    /// Private.
     pub service: mbm_service,
     /// The objects, in any order: ids 0 vendor name, 1 product code and 2 revision,
     /// which every device has; 3 vendor URL, 4 product name, 5 model name, 6 application
@@ -134,7 +134,7 @@ unsafe extern "C" fn serve_identification(
 /// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
 ///         the unit has no place
 #[no_mangle]
-pub unsafe extern "C" fn mbm_server_serveExceptionStatus(
+pub unsafe extern "C" fn mbm_unit_serveExceptionStatus(
     unit: *mut mbm_unit,
     status: *mut mbm_exceptionStatus,
 ) -> u8 {
@@ -149,10 +149,7 @@ pub unsafe extern "C" fn mbm_server_serveExceptionStatus(
 /// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
 ///         the unit has no place
 #[no_mangle]
-pub unsafe extern "C" fn mbm_server_serveServerId(
-    unit: *mut mbm_unit,
-    id: *mut mbm_serverId,
-) -> u8 {
+pub unsafe extern "C" fn mbm_unit_serveServerId(unit: *mut mbm_unit, id: *mut mbm_serverId) -> u8 {
     // SAFETY: as the header demands.
     unsafe { add(unit, id.cast(), serve_server_id) }
 }
@@ -166,7 +163,7 @@ pub unsafe extern "C" fn mbm_server_serveServerId(
 /// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
 ///         the unit has no place
 #[no_mangle]
-pub unsafe extern "C" fn mbm_server_serveIdentification(
+pub unsafe extern "C" fn mbm_unit_serveIdentification(
     unit: *mut mbm_unit,
     identification: *mut mbm_identification,
 ) -> u8 {

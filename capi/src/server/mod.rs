@@ -44,12 +44,12 @@ use mbm::FIRMWARE;
 /// Hooks and functions of yours run within mbm_server_poll. A function that they
 /// call on the server that is polled returns MBM_BUSY and changes nothing: call
 /// it when mbm_server_poll has returned. They may call functions on other servers,
-/// and the mbm_server_serve functions on units.
+/// and the mbm_unit_serve functions on units.
 #[repr(C)]
 pub struct mbm_server {
-    /// Not for you.
+    /// Private.
     pointers: [*mut c_void; 14],
-    /// Not for you.
+    /// Private.
     words: [u32; 8],
 }
 
@@ -76,7 +76,7 @@ const _: () = {
     assert!(size_of::<usize>() > 4 || (room - used) * 20 <= room);
 };
 
-/// What mbm_server_begin and its sisters were given.
+/// What mbm_server_beginRtu and its sisters were given.
 #[repr(C)]
 pub(super) struct LentByC {
     bytes: u16,

@@ -7,7 +7,7 @@ use mbm::server::diagnostics::Diagnostics;
 #[cfg(doc)]
 use mbm::server::Reply;
 
-/// The head of each record that a mbm_server_serve function takes. Private.
+/// The head of each record that a mbm_unit_serve function takes. Private.
 #[repr(C)]
 pub struct mbm_service {
     /// Serves a request, if it is one of this family. NULL in a zeroed record,
@@ -43,10 +43,10 @@ pub struct mbm_request {
 }
 
 /// A function of yours. Zero it, set what you need, and hand it to
-/// mbm_server_serveCustom.
+/// mbm_unit_serveCustom.
 #[repr(C)]
 pub struct mbm_custom {
-    /// Not for you.
+    /// Private.
     pub service: mbm_service,
     /// Carries out a request and writes the data of the response, which stand
     /// behind the function code, to `response`. `capacity` is what the frame
@@ -101,10 +101,10 @@ pub(super) unsafe fn is_of_another(service: *const mbm_service, function: u8) ->
 }
 
 /// What a unit knows of its line. Zero it, and hand it to
-/// mbm_server_serveDiagnostics. Counters wrap at 2^16; read them as you like.
+/// mbm_unit_serveDiagnostics. Counters wrap at 2^16; read them as you like.
 #[repr(C)]
 pub struct mbm_diagnostics {
-    /// Not for you.
+    /// Private.
     pub service: mbm_service,
     /// Optional: called when the client restarts the line with sub-function 01 of
     /// 08; `clearLog` is 1 if it cleared the event log too.
@@ -133,7 +133,7 @@ pub struct mbm_diagnostics {
     pub events: u16,
     /// 1 in listen only mode.
     pub listenOnly: u8,
-    /// Not for you.
+    /// Private.
     pub hidden: [u8; 67],
 }
 

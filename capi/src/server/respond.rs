@@ -2,10 +2,11 @@
 
 use super::mbm_unit;
 use super::units;
+use crate::framing::mbm_framing;
+use crate::pointers::get;
 use core::slice::from_raw_parts_mut;
 use mbm::error::Status;
-use mbm::frame::Framing;
-use mbm::server::respond::{respond, DELIMITER};
+use mbm::server::respond::respond;
 use mbm::server::{Heading, Reply, Units};
 
 /// Units of C.
@@ -13,7 +14,7 @@ struct ByC(*mut mbm_unit, u8);
 
 impl Units for ByC {
     fn serve(&mut self, heading: &Heading, pdu: &mut [u8]) -> Reply {
-        // SAFETY: mbm_server_respond demands so many units.
+        // SAFETY: mbm_unit_respond demands so many units.
         let reply = unsafe { units::serve(self.0, self.1, heading, pdu.as_mut_ptr()) };
         Reply::from_number(reply)
     }
@@ -22,10 +23,10 @@ impl Units for ByC {
 /// Answers one request, without a server: takes a frame from a buffer and writes
 /// the response frame over it.
 ///
-/// @param framing    0 RTU, 1 ASCII with LF as its delimiter, 2 TCP, 3 RTU over
-///                   TCP
 /// @param units      what is served: one unit, or an array of them
 /// @param count      how many units
+/// @param framing    how frames look; of it, `functions` are not used, for the units
+///                   know theirs
 /// @param frame      the whole request, and room for the response
 /// @param length     bytes of the request
 /// @param capacity   bytes of the buffer: 256 hold any response in RTU, 513 in
@@ -36,10 +37,10 @@ impl Units for ByC {
 /// @return MBM_OK; MBM_PENDING, with the buffer to be filled anew, if a function
 ///         of yours is not done; MBM_INVALID_ARGUMENT
 #[no_mangle]
-pub unsafe extern "C" fn mbm_server_respond(
-    framing: u8,
+pub unsafe extern "C" fn mbm_unit_respond(
     units: *mut mbm_unit,
     count: u8,
+    framing: *const mbm_framing,
     frame: *mut u8,
     length: u16,
     capacity: u16,
@@ -49,8 +50,13 @@ pub unsafe extern "C" fn mbm_server_respond(
         // SAFETY: not NULL, so room for a length.
         unsafe { response.write(0) }
     }
-    let framing = match Framing::from_code(framing) {
-        Some(framing) if !units.is_null() && !frame.is_null() && !response.is_null() => framing,
+    // SAFETY: as the header demands.
+    let (framing, delimiter) = match unsafe { get(framing) } {
+        Some(told) => (told.of_frames(), told.end()),
+        None => return Status::INVALID_ARGUMENT.code(),
+    };
+    let framing = match framing {
+        Ok(framing) if !units.is_null() && !frame.is_null() && !response.is_null() => framing,
         _ => return Status::INVALID_ARGUMENT.code(),
     };
     if length > capacity {
@@ -61,7 +67,7 @@ pub unsafe extern "C" fn mbm_server_respond(
         let buffer = from_raw_parts_mut(frame, capacity.into());
         let answer = respond(
             framing,
-            DELIMITER,
+            delimiter,
             buffer,
             length.into(),
             &mut ByC(units, count),

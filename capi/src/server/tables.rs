@@ -11,14 +11,14 @@ use mbm::server::Reply;
 use mbm::FIRMWARE;
 
 /// Holding or input registers in an array of yours. Zero it, set what you need,
-/// and hand it to mbm_server_serveHoldingRegisters or
-/// mbm_server_serveInputRegisters. You may change words and settings at any
+/// and hand it to mbm_unit_serveHoldingRegisters or
+/// mbm_unit_serveInputRegisters. You may change words and settings at any
 /// time, but not from within a hook of this table: the request under way goes on
 /// with the words that the table had when it came. To serve it as another kind of
 /// table, zero it first.
 #[repr(C)]
 pub struct mbm_registerTable {
-    /// Not for you.
+    /// Private.
     pub service: mbm_service,
     /// The registers.
     pub words: *mut u16,
@@ -50,7 +50,7 @@ pub struct mbm_registerTable {
 /// first; as mbm_registerTable.
 #[repr(C)]
 pub struct mbm_bitTable {
-    /// Not for you.
+    /// Private.
     pub service: mbm_service,
     /// The bits.
     pub bits: *mut u8,
@@ -338,10 +338,7 @@ unsafe extern "C" fn add_table(
 /// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY for a table that
 ///         is served as another kind; MBM_BUFFER_TOO_SMALL if the unit has no place
 #[no_mangle]
-pub unsafe extern "C" fn mbm_server_serveCoils(
-    unit: *mut mbm_unit,
-    table: *mut mbm_bitTable,
-) -> u8 {
+pub unsafe extern "C" fn mbm_unit_serveCoils(unit: *mut mbm_unit, table: *mut mbm_bitTable) -> u8 {
     // SAFETY: as the header demands.
     unsafe { add_table(unit, table.cast(), Kind::COILS) }
 }
@@ -350,9 +347,9 @@ pub unsafe extern "C" fn mbm_server_serveCoils(
 ///
 /// @param unit   the unit
 /// @param table  yours, for as long as the unit is used
-/// @return a status; see mbm_server_serveCoils
+/// @return a status; see mbm_unit_serveCoils
 #[no_mangle]
-pub unsafe extern "C" fn mbm_server_serveDiscreteInputs(
+pub unsafe extern "C" fn mbm_unit_serveDiscreteInputs(
     unit: *mut mbm_unit,
     table: *mut mbm_bitTable,
 ) -> u8 {
@@ -361,13 +358,13 @@ pub unsafe extern "C" fn mbm_server_serveDiscreteInputs(
 }
 
 /// Serves holding registers: functions 03, 06 and 10. For 16 and 17 too, call
-/// mbm_server_serveMaskAndReadWrite behind it.
+/// mbm_registerTable_serveMaskAndReadWrite behind it.
 ///
 /// @param unit   the unit
 /// @param table  yours, for as long as the unit is used
-/// @return a status; see mbm_server_serveCoils
+/// @return a status; see mbm_unit_serveCoils
 #[no_mangle]
-pub unsafe extern "C" fn mbm_server_serveHoldingRegisters(
+pub unsafe extern "C" fn mbm_unit_serveHoldingRegisters(
     unit: *mut mbm_unit,
     table: *mut mbm_registerTable,
 ) -> u8 {
@@ -379,9 +376,9 @@ pub unsafe extern "C" fn mbm_server_serveHoldingRegisters(
 ///
 /// @param unit   the unit
 /// @param table  yours, for as long as the unit is used
-/// @return a status; see mbm_server_serveCoils
+/// @return a status; see mbm_unit_serveCoils
 #[no_mangle]
-pub unsafe extern "C" fn mbm_server_serveInputRegisters(
+pub unsafe extern "C" fn mbm_unit_serveInputRegisters(
     unit: *mut mbm_unit,
     table: *mut mbm_registerTable,
 ) -> u8 {
@@ -393,10 +390,12 @@ pub unsafe extern "C" fn mbm_server_serveInputRegisters(
 /// table: a call of its own, so that firmware without it is smaller. After a table
 /// was zeroed it is to be called again.
 ///
-/// @param table  holding registers that mbm_server_serveHoldingRegisters took
+/// @param table  holding registers that mbm_unit_serveHoldingRegisters took
 /// @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL and other tables
 #[no_mangle]
-pub unsafe extern "C" fn mbm_server_serveMaskAndReadWrite(table: *mut mbm_registerTable) -> u8 {
+pub unsafe extern "C" fn mbm_registerTable_serveMaskAndReadWrite(
+    table: *mut mbm_registerTable,
+) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         if table.is_null() || (*table).service.kind != Kind::HOLDING_REGISTERS.code() {

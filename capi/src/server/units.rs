@@ -8,11 +8,11 @@ use mbm::error::Status;
 use mbm::server::{dispatch, first_reply, only_writes, Concern, Dispatch, Heading, Reply, ANY};
 use mbm::FIRMWARE;
 
-/// Most records that one unit serves, each handed to a mbm_server_serve function.
+/// Most records that one unit serves, each handed to a mbm_unit_serve function.
 pub const MBM_MAX_SERVICES: u8 = 16;
 
 /// A unit that servers answer for. Zero it, set `id`, and say what it serves with
-/// mbm_server_serveCoils and its sisters.
+/// mbm_unit_serveCoils and its sisters.
 ///
 /// Each of those takes a record of yours, which stays valid for as long as the
 /// unit is used. A unit has places for MBM_MAX_SERVICES records; one more is
@@ -33,7 +33,7 @@ pub struct mbm_unit {
             pdu: *mut u8,
         ) -> usize,
     >,
-    /// Not for you.
+    /// Private.
     pub diagnostics: *mut mbm_diagnostics,
     /// The unit id, 1 to 247 (serial line guide V1.02, 2.2); 248 to 255, which the
     /// standard reserves, are taken as they are. 0 answers to every id. A unit that

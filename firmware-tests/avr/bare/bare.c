@@ -99,10 +99,10 @@ int main(void)
     table.size = CELLS;
     table.after = written;
     unit.id = 17;
-    mbm_server_serveHoldingRegisters(&unit, &table);
-    mbm_server_begin(&server, &serving, &unit, 1, frame, sizeof frame);
+    mbm_unit_serveHoldingRegisters(&unit, &table);
+    mbm_server_beginRtu(&server, &serving, &unit, 1, frame, sizeof frame);
     mbm_server_setBaudRate(&server, 9600);
-    mbm_master_begin(&master, 1, &asking);
+    mbm_master_beginRtu(&master, 1, &asking);
     mbm_master_setBuffers(&master, replies, CELLS, 0, 0, request, sizeof request);
     for (;;) {
         uint8_t i;

@@ -82,7 +82,7 @@ pub fn request(w: &World, client: *mut mbm_client) {
     };
     let status = refused_changes_nothing(w, spans, "a request", || match choice {
         0 => call!(w, client, mbm_client_readCoils(client, request, a, b)),
-        1 => call!(w, client, mbm_client_readSingleCoil(client, request, a)),
+        1 => call!(w, client, mbm_client_readCoils(client, request, a, 1)),
         2 => call!(
             w,
             client,
@@ -91,7 +91,7 @@ pub fn request(w: &World, client: *mut mbm_client) {
         3 => call!(
             w,
             client,
-            mbm_client_readSingleDiscreteInput(client, request, a)
+            mbm_client_readDiscreteInputs(client, request, a, 1)
         ),
         4 => call!(
             w,
@@ -101,7 +101,7 @@ pub fn request(w: &World, client: *mut mbm_client) {
         5 => call!(
             w,
             client,
-            mbm_client_readSingleHoldingRegister(client, request, a)
+            mbm_client_readHoldingRegisters(client, request, a, 1)
         ),
         6 => call!(
             w,
@@ -111,7 +111,7 @@ pub fn request(w: &World, client: *mut mbm_client) {
         7 => call!(
             w,
             client,
-            mbm_client_readSingleInputRegister(client, request, a)
+            mbm_client_readInputRegisters(client, request, a, 1)
         ),
         8 => call!(
             w,

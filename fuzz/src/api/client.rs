@@ -61,7 +61,7 @@ fn set(w: &World, client: *mut mbm_client) {
         .cast();
     for (at, unit) in records.iter().enumerate() {
         // SAFETY: the index is below the count.
-        unsafe { ((*units.add(at)).unit, (*units.add(at)).delay) = (*unit, more.into()) };
+        unsafe { ((*units.add(at)).unit, (*units.add(at)).delayUs) = (*unit, more.into()) };
     }
     let none: *mut mbm_clientUnit = null_mut();
     let units = if w.rarely(8) { null_mut() } else { units };
@@ -127,7 +127,7 @@ fn line(w: &World, client: *mut mbm_client) {
             let link = if hooks >= 0xE0 {
                 null()
             } else {
-                w.put(mbm_link {
+                w.put(mbm_linkHooks {
                     context: null_mut(),
                     disconnect: (hooks & 1 != 0).then_some(disconnect),
                     connect: (hooks & 2 != 0).then_some(connect),
@@ -145,9 +145,9 @@ fn line(w: &World, client: *mut mbm_client) {
             refused_changes_nothing(w, &spans, "lend or takeBack", || match choice {
                 2 => {
                     w.lenders.borrow_mut().push(client);
-                    call!(w, client, mbm_client_lend(client, master))
+                    call!(w, client, mbm_client_suspend(client, master))
                 }
-                _ => call!(w, client, mbm_client_takeBack(client, master)),
+                _ => call!(w, client, mbm_client_resume(client, master)),
             });
         }
     }

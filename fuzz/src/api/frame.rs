@@ -16,8 +16,8 @@ pub fn framing(w: &World) -> *const mbm_framing {
     w.put(mbm_framing {
         functions,
         functionCount: count,
-        kind: if w.rarely(32) { w.byte() } else { w.byte() % 4 },
-        end: if w.rarely(16) { w.byte() } else { 0 },
+        kind: if w.rarely(32) { w.byte() } else { w.byte() % 5 },
+        delimiter: if w.rarely(16) { w.byte() } else { 0 },
     })
 }
 

@@ -12,14 +12,14 @@ fn begin(w: &World, master: *mut mbm_master) {
     let port = ports::port(w, MBM_FRAMING_RTU);
     // The context of any of the ports.
     let context = usize::from(slave % 4) as *mut c_void;
-    refused_changes_nothing(w, &[span(master)], "mbm_master_begin", || {
+    refused_changes_nothing(w, &[span(master)], "mbm_master_beginRtu", || {
         if slave & 4 == 0 {
-            call!(w, master, mbm_master_begin(master, slave, port))
+            call!(w, master, mbm_master_beginRtu(master, slave, port))
         } else {
             call!(
                 w,
                 master,
-                mbm_master_beginWith(master, slave, port, context)
+                mbm_master_beginRtuWith(master, slave, port, context)
             )
         }
     });
@@ -131,7 +131,7 @@ fn words(w: &World, master: *mut mbm_master) {
                 call!(w, master, mbm_master_send(master, word));
             }
         }
-        6 => drop(call!(w, master, mbm_master_send8(master, byte))),
+        6 => drop(call!(w, master, mbm_master_send(master, u16::from(byte)))),
         7 => drop(call!(w, master, mbm_master_send32(master, long))),
         8 => {
             for _ in 0..byte {

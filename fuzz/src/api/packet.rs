@@ -107,9 +107,20 @@ pub fn is_packet(packet: *const mbm_packet) {
     bytes((packet.data, packet.dataLength.into()));
 }
 
+/// PDUs alone, with functions of the caller's.
+fn pdu_alone(w: &World) -> *const mbm_framing {
+    let (functions, count) = functions(w);
+    w.put(mbm_framing {
+        functions,
+        functionCount: count,
+        kind: MBM_FRAMING_NONE,
+        delimiter: 0,
+    })
+}
+
 fn parse(w: &World) {
     let pdu = traffic::pdu(w);
-    let (functions, count) = functions(w);
+    let framing = pdu_alone(w);
     let place = w.array(&pdu);
     let place = if w.rarely(64) { null_mut() } else { place };
     let (kind, length) = (kind(w), pdu.len() as u16);
@@ -121,9 +132,9 @@ fn parse(w: &World) {
     let status = call!(
         w,
         packet,
-        mbm_packet_parse(kind, place, length, functions, count, packet)
+        mbm_frame_parse(framing, kind, place, length, packet)
     );
-    is_status("mbm_packet_parse", status);
+    is_status("mbm_frame_parse of a PDU", status);
     if status == OK {
         is_packet(packet);
         w.packets.keep(packet);
@@ -137,9 +148,9 @@ fn parse(w: &World) {
     let status = call!(
         w,
         expected,
-        mbm_packet_expectedLength(kind, place, have, functions, count, expected)
+        mbm_frame_expectedLength(framing, kind, place, have, expected)
     );
-    is_expected("mbm_packet_expectedLength", status, expected);
+    is_expected("mbm_frame_expectedLength of a PDU", status, expected);
 }
 
 /// Checks the status of a call, and if it succeeded the length that it returned.
@@ -159,7 +170,7 @@ pub fn is_expected(name: &str, status: u8, expected: *const mbm_length) {
 
 fn build(w: &World) {
     let packet = any_or_null(w);
-    let (functions, count) = functions(w);
+    let framing = pdu_alone(w);
     let capacity = if w.rarely(4) { w.word() } else { MBM_MAX_PDU };
     let pdu = if w.rarely(64) {
         null_mut()
@@ -174,11 +185,15 @@ fn build(w: &World) {
     let status = call!(
         w,
         packet,
-        mbm_packet_build(packet, functions, count, pdu, capacity, length)
+        mbm_frame_build(framing, packet, pdu, capacity, length)
     );
-    is_status("mbm_packet_build", status);
+    is_status("mbm_frame_build of a PDU", status);
     if status == OK {
-        let used = is_length("mbm_packet_build", length, capacity.min(MBM_MAX_PDU).into());
+        let used = is_length(
+            "mbm_frame_build of a PDU",
+            length,
+            capacity.min(MBM_MAX_PDU).into(),
+        );
         let rest = bytes((pdu.wrapping_add(used), usize::from(capacity) - used));
         assert!(
             rest.iter().all(|byte| *byte == 0xA5),
@@ -190,12 +205,8 @@ fn build(w: &World) {
     } else {
         w.unset::<mbm_length>()
     };
-    let status = call!(
-        w,
-        packet,
-        mbm_packet_replyLength(packet, functions, count, expected)
-    );
-    is_expected("mbm_packet_replyLength", status, expected);
+    let status = call!(w, packet, mbm_frame_replyLength(framing, packet, expected));
+    is_expected("mbm_frame_replyLength of a PDU", status, expected);
 }
 
 /// Iterates over records or objects.

@@ -72,9 +72,9 @@ impl<T> Pool<T> {
 pub struct Records {
     pub registers: Pool<mbm_registerTable>,
     pub bits: Pool<mbm_bitTable>,
-    pub cells: Pool<mbm_cells>,
+    pub cells: Pool<mbm_dataCallbacks>,
     pub customs: Pool<mbm_custom>,
-    pub switches: Pool<mbm_switches>,
+    pub switches: Pool<mbm_functionMask>,
     pub diagnostics: Pool<mbm_diagnostics>,
     pub files: Pool<mbm_files>,
     pub fifos: Pool<mbm_fifos>,

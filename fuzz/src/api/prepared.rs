@@ -4,6 +4,7 @@
 use super::check::call;
 use super::ports;
 use super::records;
+use super::sniffer;
 use super::world::World;
 use mbm_c::*;
 
@@ -21,14 +22,8 @@ pub fn prepare(w: &World) {
     }
     if what & 8 == 0 {
         let sniffer = w.sniffers.make(w);
-        let framing = w.put(mbm_framing {
-            functions: std::ptr::null(),
-            functionCount: 0,
-            kind: what >> 4 & 3,
-            end: 0,
-        });
         let buffer = w.buffer(300);
-        call!(w, sniffer, mbm_sniffer_begin(sniffer, framing, buffer, 300));
+        sniffer::begin_as(w, sniffer, what >> 4, buffer, 300);
     }
 }
 
@@ -37,7 +32,7 @@ fn master(w: &World) {
     let port = ports::good(w, 0, MBM_FRAMING_RTU);
     let (response, transmit) = (w.noise(250).cast(), w.noise(246).cast());
     let frame = w.noise(256);
-    call!(w, master, mbm_master_begin(master, 1, port));
+    call!(w, master, mbm_master_beginRtu(master, 1, port));
     call!(
         w,
         master,
@@ -80,7 +75,7 @@ fn server(w: &World, framing: u8) {
             call!(
                 w,
                 server,
-                mbm_server_begin(server, port, units, count, frame, 513)
+                mbm_server_beginRtu(server, port, units, count, frame, 513)
             )
         }
         MBM_FRAMING_ASCII => {

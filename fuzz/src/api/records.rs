@@ -181,9 +181,9 @@ fn bit_table(w: &World) -> mbm_bitTable {
     }
 }
 
-fn cells(w: &World, bits: bool) -> mbm_cells {
+fn cells(w: &World, bits: bool) -> mbm_dataCallbacks {
     let hooks = w.byte();
-    mbm_cells {
+    mbm_dataCallbacks {
         service: SERVICE,
         context: null_mut(),
         isValid: (hooks & 1 != 0).then_some(hooks::is_valid),
@@ -346,64 +346,60 @@ pub fn serve(w: &World) {
         };
     }
     match w.byte() % 16 {
-        0 => register!(bits, bit_table(w), mbm_server_serveCoils),
-        1 => register!(bits, bit_table(w), mbm_server_serveDiscreteInputs),
-        2 | 3 => register!(
-            registers,
-            register_table(w),
-            mbm_server_serveHoldingRegisters
-        ),
-        4 => register!(registers, register_table(w), mbm_server_serveInputRegisters),
+        0 => register!(bits, bit_table(w), mbm_unit_serveCoils),
+        1 => register!(bits, bit_table(w), mbm_unit_serveDiscreteInputs),
+        2 | 3 => register!(registers, register_table(w), mbm_unit_serveHoldingRegisters),
+        4 => register!(registers, register_table(w), mbm_unit_serveInputRegisters),
         5 => {
             let table = records.registers.pick(w);
             refused_changes_nothing(w, &[span(table)], "serveMaskAndReadWrite", || {
-                call!(w, table, mbm_server_serveMaskAndReadWrite(table))
+                call!(w, table, mbm_registerTable_serveMaskAndReadWrite(table))
             });
         }
         6 | 7 => {
             let table = w.byte() % 6;
             let fill = || cells(w, table < 3);
             renew(w, &records.cells, fill, |record| {
-                register(w, "mbm_server_serveCallbacks", unit, record, || {
-                    call!(w, unit, mbm_server_serveCallbacks(unit, record, table))
+                register(w, "mbm_unit_serveCallbacks", unit, record, || {
+                    call!(w, unit, mbm_unit_serveCallbacks(unit, record, table))
                 })
             });
         }
-        8 => register!(customs, custom(w), mbm_server_serveCustom),
+        8 => register!(customs, custom(w), mbm_unit_serveCustom),
         9 => {
-            let code = w.byte();
-            let fill = || mbm_switches {
+            let (code, on) = (w.byte(), w.byte() & 1);
+            let fill = || mbm_functionMask {
                 service: SERVICE,
                 off: [0; 16],
             };
             renew(w, &records.switches, fill, |record| {
-                register(w, "mbm_server_switchOff", unit, record, || {
-                    call!(w, unit, mbm_server_switchOff(unit, record, code))
+                register(w, "mbm_unit_switchFunction", unit, record, || {
+                    call!(w, unit, mbm_unit_switchFunction(unit, record, code, on))
                 })
             });
         }
         10 => {
-            let (switches, code) = (records.switches.pick(w), w.byte());
-            refused_changes_nothing(w, &[span(switches)], "mbm_server_switchOn", || {
-                call!(w, switches, mbm_server_switchOn(switches, code))
+            let (mask, code) = (records.switches.pick(w), w.byte());
+            refused_changes_nothing(w, &[span(mask)], "mbm_unit_switchFunction", || {
+                call!(w, unit, mbm_unit_switchFunction(unit, mask, code, 1))
             });
         }
-        11 => register!(diagnostics, diagnostics(w), mbm_server_serveDiagnostics),
-        12 => register!(files, files(w), mbm_server_serveFiles),
-        13 => register!(fifos, fifos(w), mbm_server_serveFifos),
+        11 => register!(diagnostics, diagnostics(w), mbm_unit_serveDiagnostics),
+        12 => register!(files, files(w), mbm_unit_serveFiles),
+        13 => register!(fifos, fifos(w), mbm_unit_serveFifos),
         14 if w.byte() & 1 == 0 => {
             let outputs = w.byte();
             let value = mbm_exceptionStatus {
                 service: SERVICE,
                 outputs,
             };
-            register!(outputs, value, mbm_server_serveExceptionStatus)
+            register!(outputs, value, mbm_unit_serveExceptionStatus)
         }
-        14 => register!(ids, server_id(w), mbm_server_serveServerId),
+        14 => register!(ids, server_id(w), mbm_unit_serveServerId),
         _ => register!(
             identifications,
             identification(w),
-            mbm_server_serveIdentification
+            mbm_unit_serveIdentification
         ),
     }
 }
@@ -421,17 +417,17 @@ pub fn device(w: &World) -> *mut mbm_unit {
     unsafe {
         std::ptr::copy_nonoverlapping(holding, input, 1);
         std::ptr::copy_nonoverlapping(coils, inputs, 1);
-        mbm_server_serveHoldingRegisters(unit, holding);
-        mbm_server_serveMaskAndReadWrite(holding);
-        mbm_server_serveInputRegisters(unit, input);
-        mbm_server_serveCoils(unit, coils);
-        mbm_server_serveDiscreteInputs(unit, inputs);
-        mbm_server_serveDiagnostics(unit, w.put(diagnostics(w)));
-        mbm_server_serveFiles(unit, w.put(files(w)));
-        mbm_server_serveFifos(unit, w.put(fifos(w)));
-        mbm_server_serveServerId(unit, w.put(server_id(w)));
-        mbm_server_serveIdentification(unit, w.put(identification(w)));
-        mbm_server_serveCustom(unit, w.put(custom(w)));
+        mbm_unit_serveHoldingRegisters(unit, holding);
+        mbm_registerTable_serveMaskAndReadWrite(holding);
+        mbm_unit_serveInputRegisters(unit, input);
+        mbm_unit_serveCoils(unit, coils);
+        mbm_unit_serveDiscreteInputs(unit, inputs);
+        mbm_unit_serveDiagnostics(unit, w.put(diagnostics(w)));
+        mbm_unit_serveFiles(unit, w.put(files(w)));
+        mbm_unit_serveFifos(unit, w.put(fifos(w)));
+        mbm_unit_serveServerId(unit, w.put(server_id(w)));
+        mbm_unit_serveIdentification(unit, w.put(identification(w)));
+        mbm_unit_serveCustom(unit, w.put(custom(w)));
     }
     unit
 }

@@ -79,13 +79,9 @@ fn read(w: &World, view: *const mbm_registers) {
     match w.byte() % 15 {
         0 => get!(mbm_registers_getBit, byte % 20),
         1 => get!(mbm_registers_getUint8, byte & 1),
-        2 => get!(mbm_registers_getInt8, byte & 1),
         3 => get!(mbm_registers_getUint16, order),
-        4 => get!(mbm_registers_getInt16, order),
         5 => get!(mbm_registers_getUint32, order),
-        6 => get!(mbm_registers_getInt32, order),
         7 => get!(mbm_registers_getUint64, order),
-        8 => get!(mbm_registers_getInt64, order),
         9 => get!(mbm_registers_getFloat, order),
         10 => get!(mbm_registers_getDouble, order),
         11 => {
@@ -110,12 +106,16 @@ fn read(w: &World, view: *const mbm_registers) {
             let bytes = if w.rarely(32) { null_mut() } else { place };
             let spans = [(place.cast_const(), length.into())];
             refused_changes_nothing(w, &spans, "mbm_registers_getBytes", || match choice {
-                12 => call!(w, view, mbm_registers_getBytes(view, at, bytes, length)),
+                12 => call!(
+                    w,
+                    view,
+                    mbm_registers_getBytes(view, at, MBM_ORDER_ABCD, bytes, length)
+                ),
                 13 => {
                     call!(
                         w,
                         view,
-                        mbm_registers_getBytesInOrder(view, at, order, bytes, length)
+                        mbm_registers_getBytes(view, at, order, bytes, length)
                     )
                 }
                 _ => {
@@ -170,23 +170,11 @@ fn write(w: &World, view: *const mbm_registers) {
     refused_changes_nothing(w, &[memory_of(view)], "a setter", || match choice {
         0 => call!(w, view, mbm_registers_setBit(view, at, byte % 20, byte & 1)),
         1 => call!(w, view, mbm_registers_setUint8(view, at, byte & 1, byte)),
-        2 => call!(
-            w,
-            view,
-            mbm_registers_setInt8(view, at, byte & 1, byte as i8)
-        ),
+        2 => call!(w, view, mbm_registers_setUint8(view, at, byte & 1, byte)),
         3 => call!(w, view, mbm_registers_setUint16(view, at, order, word)),
-        4 => call!(
-            w,
-            view,
-            mbm_registers_setInt16(view, at, order, word as i16)
-        ),
+        4 => call!(w, view, mbm_registers_setUint16(view, at, order, word)),
         5 => call!(w, view, mbm_registers_setUint32(view, at, order, long)),
-        6 => call!(
-            w,
-            view,
-            mbm_registers_setInt32(view, at, order, long as i32)
-        ),
+        6 => call!(w, view, mbm_registers_setUint32(view, at, order, long)),
         7 => call!(
             w,
             view,
@@ -195,7 +183,7 @@ fn write(w: &World, view: *const mbm_registers) {
         8 => call!(
             w,
             view,
-            mbm_registers_setInt64(view, at, order, value!(wide as i64))
+            mbm_registers_setUint64(view, at, order, value!(wide))
         ),
         9 => call!(
             w,
@@ -223,12 +211,16 @@ fn write(w: &World, view: *const mbm_registers) {
             }
             .cast_const();
             if choice == 12 {
-                call!(w, view, mbm_registers_setBytes(view, at, bytes, length))
+                call!(
+                    w,
+                    view,
+                    mbm_registers_setBytes(view, at, MBM_ORDER_ABCD, bytes, length)
+                )
             } else {
                 call!(
                     w,
                     view,
-                    mbm_registers_setBytesInOrder(view, at, order, bytes, length)
+                    mbm_registers_setBytes(view, at, order, bytes, length)
                 )
             }
         }

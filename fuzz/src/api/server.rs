@@ -1,4 +1,4 @@
-//! Servers, and `mbm_server_respond`, which needs no server.
+//! Servers, and `mbm_unit_respond`, which needs no server.
 
 use super::check::{call, checked_call, is_status, refused_changes_nothing, span, OK};
 use super::world::World;
@@ -20,12 +20,12 @@ fn begin(w: &World) {
     };
     let frame = w.buffer(size.into());
     let spans = [span(server)];
-    refused_changes_nothing(w, &spans, "mbm_server_begin", || match framing {
+    refused_changes_nothing(w, &spans, "mbm_server_beginRtu", || match framing {
         MBM_FRAMING_RTU => {
             call!(
                 w,
                 server,
-                mbm_server_begin(server, port, units, count, frame, size)
+                mbm_server_beginRtu(server, port, units, count, frame, size)
             )
         }
         MBM_FRAMING_ASCII => {
@@ -88,6 +88,12 @@ fn respond(w: &World) {
     let framing = if w.rarely(16) { w.byte() } else { w.byte() % 4 };
     let (units, count) = records::array(w);
     let request = traffic::request(w, framing);
+    let framing = w.put(mbm_framing {
+        functions: std::ptr::null(),
+        functionCount: 0,
+        kind: framing,
+        delimiter: if w.rarely(16) { w.byte() } else { 0 },
+    });
     let room = w.word();
     let capacity = if w.rarely(4) { room } else { 513 };
     let length = request.len().min(capacity.into());
@@ -113,15 +119,15 @@ fn respond(w: &World) {
     let status = call!(
         w,
         std::ptr::null::<mbm_unit>(),
-        mbm_server_respond(framing, units, count, frame, length, capacity, response)
+        mbm_unit_respond(units, count, framing, frame, length, capacity, response)
     );
-    is_status("mbm_server_respond", status);
+    is_status("mbm_unit_respond", status);
     if !response.is_null() {
         // SAFETY: the pointer is not NULL.
         let response = unsafe { response.read() };
         assert!(
             response <= capacity,
-            "mbm_server_respond returned the length {response}; the capacity is {capacity}"
+            "mbm_unit_respond returned the length {response}; the capacity is {capacity}"
         );
         assert!(
             status == OK || response == 0,

@@ -2,12 +2,12 @@
 
 use super::check::{call, is_status, refused_changes_nothing, span};
 use super::world::World;
-use super::{frame, traffic};
+use super::{packet, traffic};
 use mbm_c::*;
 use std::ptr::null;
 
 fn begin(w: &World, sniffer: *mut mbm_sniffer) {
-    let framing = frame::framing(w);
+    let framing = w.byte();
     let size = match w.byte() {
         0..0x80 => 260,
         byte @ 0x80..0xC0 => u16::from(byte) % 64,
@@ -15,21 +15,44 @@ fn begin(w: &World, sniffer: *mut mbm_sniffer) {
     };
     let buffer = w.buffer(size.into());
     refused_changes_nothing(w, &[span(sniffer)], "mbm_sniffer_begin", || {
-        call!(
+        begin_as(w, sniffer, framing, buffer, size)
+    });
+}
+
+/// Begins a sniffer of the framing that a number chooses.
+pub fn begin_as(
+    w: &World,
+    sniffer: *mut mbm_sniffer,
+    framing: u8,
+    buffer: *mut u8,
+    size: u16,
+) -> u8 {
+    match framing % 4 {
+        MBM_FRAMING_RTU => call!(w, sniffer, mbm_sniffer_beginRtu(sniffer, buffer, size)),
+        MBM_FRAMING_ASCII => call!(w, sniffer, mbm_sniffer_beginAscii(sniffer, buffer, size)),
+        MBM_FRAMING_TCP => call!(w, sniffer, mbm_sniffer_beginTcp(sniffer, buffer, size)),
+        _ => call!(
             w,
             sniffer,
-            mbm_sniffer_begin(sniffer, framing, buffer, size)
-        )
-    });
+            mbm_sniffer_beginRtuOverTcp(sniffer, buffer, size)
+        ),
+    }
 }
 
 fn set(w: &World, sniffer: *mut mbm_sniffer) {
     let (word, long) = (w.word(), w.long());
-    let choice = w.byte() % 3;
+    let (functions, count) = packet::functions(w);
+    let choice = w.byte() % 5;
     refused_changes_nothing(w, &[span(sniffer)], "mbm_sniffer_set", || match choice {
         0 => call!(w, sniffer, mbm_sniffer_setBaudRate(sniffer, long)),
-        1 => call!(w, sniffer, mbm_sniffer_setTimeout(sniffer, word)),
-        _ => call!(w, sniffer, mbm_sniffer_setPatience(sniffer, word)),
+        3 => call!(w, sniffer, mbm_sniffer_setDelimiter(sniffer, word as u8)),
+        4 => call!(
+            w,
+            sniffer,
+            mbm_sniffer_setFunctions(sniffer, functions, count)
+        ),
+        1 => call!(w, sniffer, mbm_sniffer_setResponseTimeout(sniffer, word)),
+        _ => call!(w, sniffer, mbm_sniffer_setFrameTimeout(sniffer, word)),
     });
 }
 
@@ -49,7 +72,7 @@ fn next(w: &World, sniffer: *mut mbm_sniffer) {
         // SAFETY: an event whose frame and PDU are in the sniffer's buffer.
         let reported = unsafe { *event };
         assert!(reported.kind <= MBM_EVENT_NOISE && reported.packet.kind <= MBM_PACKET_EXCEPTION);
-        assert!(usize::from(reported.askedLength) <= reported.asked.len());
+        assert!(usize::from(reported.requestHeadLength) <= reported.requestHead.len());
         is_status("an event", reported.status);
         super::check::bytes((reported.frame, reported.frameLength.into()));
         super::check::bytes((reported.pdu, reported.pduLength.into()));
@@ -102,8 +125,8 @@ fn random_event(w: &World) {
         pdu: w.noise(pdu.into()),
         // SAFETY: the pointer is a packet with any content.
         packet: unsafe { *super::packet::any(w) },
-        time: w.long(),
-        responseTime: w.long(),
+        timeUs: w.long(),
+        responseTimeUs: w.long(),
         frameLength: frame,
         pduLength: pdu,
         length: w.word(),
@@ -113,8 +136,8 @@ fn random_event(w: &World) {
         status: w.byte(),
         unit: w.byte(),
         function: w.byte(),
-        asked: std::array::from_fn(|_| w.byte()),
-        askedLength: w.byte() % 12,
+        requestHead: std::array::from_fn(|_| w.byte()),
+        requestHeadLength: w.byte() % 12,
     };
     text(w, w.put(reported));
 }

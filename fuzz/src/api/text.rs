@@ -27,9 +27,11 @@ pub fn check_text(w: &World, name: &str, status: u8, text: *const u8, size: u16)
 /// Reads the text of a status.
 pub fn step(w: &World) {
     let status = w.byte();
-    let text = call!(w, std::ptr::null::<u8>(), mbm_statusText(status));
+    let text = call!(w, std::ptr::null::<u8>(), mbm_status_text(status));
     assert!(!text.is_null());
     // SAFETY: a constant string.
     let text = unsafe { std::ffi::CStr::from_ptr(text.cast()) };
     assert!(!text.is_empty() && text.to_bytes().is_ascii());
+    let version = call!(w, std::ptr::null::<u8>(), mbm_version());
+    assert!(!version.is_null());
 }

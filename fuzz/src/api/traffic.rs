@@ -141,10 +141,15 @@ fn respond(w: &World, framing: u8, frame: &[u8]) -> Vec<u8> {
     // SAFETY: a valid unit, and a buffer of the given length.
     unsafe {
         w.inside(Grant::Nothing, || {
-            mbm_server_respond(
-                framing,
+            mbm_unit_respond(
                 w.device.get(),
                 1,
+                &mbm_framing {
+                    functions: std::ptr::null(),
+                    functionCount: 0,
+                    kind: framing,
+                    delimiter: 0,
+                },
                 buffer.as_mut_ptr(),
                 frame.len() as u16,
                 buffer.len() as u16,

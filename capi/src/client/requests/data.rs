@@ -37,22 +37,6 @@ pub unsafe extern "C" fn mbm_client_readCoils(
     unsafe { plain(client, request, address, quantity, Form::READ_COILS) }
 }
 
-/// Function 01: reads one coil into the lowest bit of a byte (V1.1b3, 6.1).
-///
-/// @param client   the object
-/// @param request  the request
-/// @param address  0 to 65535, as on the wire
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_readSingleCoil(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-    address: u16,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { plain(client, request, address, 1, Form::READ_COILS) }
-}
-
 /// Function 02: reads discrete inputs, as mbm_client_readCoils (V1.1b3, 6.2).
 ///
 /// @param client   the object
@@ -77,22 +61,6 @@ pub unsafe extern "C" fn mbm_client_readDiscreteInputs(
             Form::READ_DISCRETE_INPUTS,
         )
     }
-}
-
-/// Function 02: reads one discrete input into the lowest bit of a byte (V1.1b3, 6.2).
-///
-/// @param client   the object
-/// @param request  the request
-/// @param address  0 to 65535, as on the wire
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_readSingleDiscreteInput(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-    address: u16,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { plain(client, request, address, 1, Form::READ_DISCRETE_INPUTS) }
 }
 
 /// Function 03: reads holding registers into the words of `reply` (V1.1b3, 6.3).
@@ -121,22 +89,6 @@ pub unsafe extern "C" fn mbm_client_readHoldingRegisters(
     }
 }
 
-/// Function 03: reads one holding register into a word (V1.1b3, 6.3).
-///
-/// @param client   the object
-/// @param request  the request
-/// @param address  0 to 65535, as on the wire
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_readSingleHoldingRegister(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-    address: u16,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { plain(client, request, address, 1, Form::READ_HOLDING_REGISTERS) }
-}
-
 /// Function 04: reads input registers into the words of `reply` (V1.1b3, 6.4).
 ///
 /// @param client   the object
@@ -161,22 +113,6 @@ pub unsafe extern "C" fn mbm_client_readInputRegisters(
             Form::READ_INPUT_REGISTERS,
         )
     }
-}
-
-/// Function 04: reads one input register into a word (V1.1b3, 6.4).
-///
-/// @param client   the object
-/// @param request  the request
-/// @param address  0 to 65535, as on the wire
-/// @return a status; see mbm_client_readCoils
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_readSingleInputRegister(
-    client: *mut mbm_client,
-    request: *mut mbm_clientRequest,
-    address: u16,
-) -> u8 {
-    // SAFETY: as the header demands.
-    unsafe { plain(client, request, address, 1, Form::READ_INPUT_REGISTERS) }
 }
 
 /// Function 05: switches a coil (V1.1b3, 6.5).

@@ -337,7 +337,7 @@ pub unsafe extern "C" fn mbm_client_custom(
 /// Any request, as it arrived from another client: sends `function` and the bytes of
 /// `body`, and reads into `reply` all bytes that follow the function code of the
 /// response, as on the wire. This is what a gateway needs: `body` and `reply` are
-/// what the functions of mbm_server_serveCustom get and return.
+/// what the functions of mbm_unit_serveCustom get and return.
 ///
 /// A response counts only if it answers this request, as in the functions above: its
 /// length, byte count, echoed address, value, quantity and records must be right. Of a

@@ -26,8 +26,8 @@ static void numbers() {
   CHECK(mbm_registers_setUint32(&view, 100, MBM_ORDER_BADC, four) == MBM_OK);
   CHECK(words[0] == 0x41AE && words[1] == 0x5256);
   CHECK(mbm_registers_getUint32(&view, 100, MBM_ORDER_BADC, &number) == MBM_OK && number == four);
-  CHECK(mbm_registers_setInt16(&view, 103, MBM_ORDER_DEFAULT, -2) == MBM_OK && words[3] == 0xFFFE);
-  CHECK(mbm_registers_getInt16(&view, 103, MBM_ORDER_DEFAULT, &small) == MBM_OK && small == -2);
+  CHECK(mbm_registers_setUint16(&view, 103, MBM_ORDER_DEFAULT, (uint16_t)-2) == MBM_OK && words[3] == 0xFFFE);
+  CHECK(mbm_registers_getUint16(&view, 103, MBM_ORDER_DEFAULT, (uint16_t *)&small) == MBM_OK && small == -2);
   CHECK(mbm_registers_setUint64(&view, 100, MBM_ORDER_DCBA, &wide) == MBM_OK);
   CHECK(words[0] == 0x0807 && words[3] == 0x0201);
   CHECK(mbm_registers_getUint64(&view, 100, MBM_ORDER_ABCD, &wide) == MBM_OK);

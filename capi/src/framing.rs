@@ -1,0 +1,75 @@
+//! Framings: how C names them, for whatever takes one.
+
+use super::functions::mbm_function;
+use mbm::error::Status;
+use mbm::frame::{ascii, tcp, Framing};
+
+/// Serial line, binary, CRC-16 (serial line guide V1.02, 2.5.1).
+pub const MBM_FRAMING_RTU: u8 = 0;
+/// Serial line, hexadecimal characters, LRC (serial line guide V1.02, 2.5.2).
+pub const MBM_FRAMING_ASCII: u8 = 1;
+/// TCP, behind the MBAP header (messaging on TCP/IP guide V1.0b, 3.1.3).
+pub const MBM_FRAMING_TCP: u8 = 2;
+/// RTU frames in a TCP stream.
+pub const MBM_FRAMING_RTU_OVER_TCP: u8 = 3;
+/// No frame: the PDU alone, for the mbm_frame functions.
+pub const MBM_FRAMING_NONE: u8 = 4;
+
+/// Most bytes of a TCP frame.
+pub const MBM_MAX_TCP_FRAME: u16 = 260;
+/// Most characters of an ASCII frame.
+pub const MBM_MAX_ASCII_FRAME: u16 = 513;
+
+const _: () = {
+    assert!(MBM_FRAMING_RTU == Framing::Rtu as u8);
+    assert!(MBM_FRAMING_ASCII == Framing::Ascii as u8);
+    assert!(MBM_FRAMING_TCP == Framing::Tcp as u8);
+    assert!(MBM_FRAMING_RTU_OVER_TCP == Framing::RtuOverTcp as u8);
+    assert!(MBM_MAX_TCP_FRAME as usize == tcp::MAX_FRAME);
+    assert!(MBM_MAX_ASCII_FRAME as usize == ascii::MAX_FRAME);
+};
+
+/// How frames look, and what is in them beside the standard. Zeroed: RTU, and
+/// the functions of the standard.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct mbm_framing {
+    /// Functions of your own; may be NULL if there are none.
+    pub functions: *const mbm_function,
+    /// How many.
+    pub functionCount: u8,
+    /// MBM_FRAMING_RTU, _ASCII, _TCP, _RTU_OVER_TCP or _NONE.
+    pub kind: u8,
+    /// ASCII: the last character of a frame; 0 is line feed (V1.1b3, 6.8.1,
+    /// sub-function 03).
+    pub delimiter: u8,
+}
+
+impl mbm_framing {
+    /// The framing in the core's words; none is that of MBM_FRAMING_NONE.
+    pub(super) fn core(&self) -> Result<Option<Framing>, Status> {
+        match Framing::from_code(self.kind) {
+            None if self.kind != MBM_FRAMING_NONE => Err(Status::INVALID_ARGUMENT),
+            framing => Ok(framing),
+        }
+    }
+
+    /// The framing of what has a frame.
+    pub(super) fn of_frames(&self) -> Result<Framing, Status> {
+        self.core()?.ok_or(Status::INVALID_ARGUMENT)
+    }
+
+    /// The last character of an ASCII frame.
+    pub(super) fn end(&self) -> u8 {
+        match self.delimiter {
+            0 => ascii::END,
+            delimiter => delimiter,
+        }
+    }
+}
+
+/// True for a character that may end ASCII frames.
+pub(super) fn is_delimiter(character: u8) -> bool {
+    let part_of_a_frame = character.is_ascii_hexdigit() || matches!(character, b':' | b'\r');
+    (1..=127).contains(&character) && !part_of_a_frame
+}

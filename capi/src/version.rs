@@ -1,0 +1,37 @@
+//! The version of the library. Its one source is Cargo.toml.
+
+use core::ffi::c_char;
+
+/// Version of this header: a new major version may break programs.
+pub const MBM_VERSION_MAJOR: u8 = 0;
+/// Version of this header: before 1.0.0 a new minor version may break programs.
+pub const MBM_VERSION_MINOR: u8 = 2;
+/// Version of this header: a new patch version breaks nothing.
+pub const MBM_VERSION_PATCH: u8 = 0;
+
+/// The number that a text of digits says.
+const fn number(digits: &str) -> u8 {
+    let mut rest = digits.as_bytes();
+    let mut number = 0;
+    while let [digit, others @ ..] = rest {
+        number = 10 * number + (*digit - b'0');
+        rest = others;
+    }
+    number
+}
+
+const _: () = {
+    assert!(MBM_VERSION_MAJOR == number(env!("CARGO_PKG_VERSION_MAJOR")));
+    assert!(MBM_VERSION_MINOR == number(env!("CARGO_PKG_VERSION_MINOR")));
+    assert!(MBM_VERSION_PATCH == number(env!("CARGO_PKG_VERSION_PATCH")));
+};
+
+/// The version of the archive. It is MBM_VERSION if program and archive belong together.
+///
+/// Any thread or interrupt may call it.
+///
+/// @return a constant string such as "0.2.0", never NULL
+#[no_mangle]
+pub extern "C" fn mbm_version() -> *const c_char {
+    concat!(env!("CARGO_PKG_VERSION"), "\0").as_ptr().cast()
+}
