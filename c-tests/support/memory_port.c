@@ -61,7 +61,7 @@ void memory_port_rtu(memory_port *m, const uint8_t *bytes, size_t count)
     memory_port_bytes(m, frame, seal(frame, count));
 }
 
-/* Lets the time pass until the client has something to do. */
+/* Lets time pass until the client has something to do. */
 static void pass(memory_port *m, mbm_client *client)
 {
     uint32_t delay = mbm_client_pollDelay(client);

@@ -46,11 +46,11 @@ void program_start_limited(program *p, const char *name, const char *const *argu
     p->pid = fork();
     must(p->pid >= 0, "fork");
     if (p->pid == 0) {
-        /* Not to survive the test, whatever ends it. */
+        /* The program must not survive the test, however the test ends. */
         prctl(PR_SET_PDEATHSIG, SIGKILL);
         dup2(in[0], STDIN_FILENO);
         dup2(out[1], STDOUT_FILENO);
-        /* Lines and sockets of the test are to hang up when the test lets go. */
+        /* Lines and sockets of the test must hang up when the test closes them. */
         close_range(3, ~0u, 0);
         if (descriptors)
             must(setrlimit(RLIMIT_NOFILE, &limit) == 0, "setrlimit");
@@ -86,7 +86,7 @@ size_t program_rest(const program *p, char *text, size_t room)
     return length;
 }
 
-/* The state follows the name, which stands in brackets. */
+/* The state follows the name, which is in parentheses. */
 static int is_asleep(const program *p)
 {
     char path[64], text[512], *name;
