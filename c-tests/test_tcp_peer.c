@@ -1,5 +1,5 @@
-/* The peer that plays faults over TCP does play them: each is looked at on a
- * plain socket, so that what tests of clients find is the client's. */
+/* Checks on a plain socket that the TCP peer plays each fault, so that a failure in the
+ * tests of clients is the client's fault. */
 #define _GNU_SOURCE
 #include "await.h"
 #include "tcp_peer.h"
@@ -15,7 +15,7 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Bytes of a reply of one register; what waits for others goes after so long. */
+/* REPLY: bytes of a reply of one register. HELD_MS: how long a reply waits for others. */
 enum { SHORT_MS = 40, REPLY = 11, HELD_MS = 250 };
 
 static tcp_peer *peer;
@@ -47,8 +47,8 @@ static int64_t now_ms(void)
     return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
 }
 
-/* Asks unit 7 for registers from `id` on, which tell the replies as well as their
- * ids do: in one send, so that the peer hears them at once. */
+/* Sends requests to unit 7, in one send, so that the peer receives them at once. They read
+ * the registers from `id` on, so the replies differ in their data as well as in their ids. */
 static void ask_all(unsigned id, unsigned count)
 {
     uint8_t requests[12 * 8];
@@ -68,7 +68,8 @@ static void ask(unsigned id)
     ask_all(id, 1);
 }
 
-/* What one recv takes, 0 at the end of the stream, -1 if nothing came for ms. */
+/* Returns what one recv returns: 0 at the end of the stream. Returns -1 if nothing arrived
+ * within `ms` milliseconds. */
 static ssize_t take(uint8_t *bytes, size_t capacity, int ms)
 {
     struct pollfd wait = {s, POLLIN, 0};
@@ -76,7 +77,7 @@ static ssize_t take(uint8_t *bytes, size_t capacity, int ms)
     return poll(&wait, 1, ms) == 0 ? -1 : recv(s, bytes, capacity, 0);
 }
 
-/* Takes exactly so many bytes. */
+/* Receives exactly `length` bytes. */
 static void take_all(uint8_t *bytes, size_t length)
 {
     while (length > 0) {
@@ -106,7 +107,7 @@ static void expect(unsigned id)
     assert_memory_equal(reply, right, sizeof right);
 }
 
-/* How many segments with data arrived, whether they were taken or not. */
+/* Returns how many segments with data have arrived, whether they were read or not. */
 static unsigned segments(void)
 {
     struct tcp_info info = {0};
@@ -169,7 +170,7 @@ static void requests_in_one_send_and_in_pieces_are_found(void **state)
     assert_int_equal(tcp_peer_count(peer).replies, 4);
 }
 
-static void a_delay_holds_up_one_reply_only(void **state)
+static void a_delay_delays_one_reply_only(void **state)
 {
     int64_t start = now_ms();
 
@@ -181,7 +182,7 @@ static void a_delay_holds_up_one_reply_only(void **state)
     assert_true(now_ms() - start >= 300);
 }
 
-static void hold_turns_the_order_of_replies(void **state)
+static void hold_changes_the_order_of_replies(void **state)
 {
     int64_t start;
 
@@ -192,7 +193,7 @@ static void hold_turns_the_order_of_replies(void **state)
     expect(2);
     expect(3);
     expect(1);
-    /* Nothing follows: it comes by itself. */
+    /* No other reply follows, so it is sent when its time is over. */
     start = now_ms();
     ask(4);
     expect(4);
@@ -214,7 +215,7 @@ static void join_puts_replies_into_one_send(void **state)
     right_reply(right + 2 * REPLY, 3);
     assert_memory_equal(got, right, sizeof right);
     assert_int_equal(segments() - before, 1);
-    /* One is still to join: it goes without. */
+    /* Another reply should join it, but none comes, so it is sent alone. */
     tcp_peer_fault(peer, 4, FAULT_JOIN, 1);
     start = now_ms();
     ask(4);
@@ -222,7 +223,7 @@ static void join_puts_replies_into_one_send(void **state)
     assert_true(now_ms() - start >= HELD_MS);
 }
 
-static void drop_carries_out_and_does_not_answer(void **state)
+static void drop_carries_out_the_request_and_does_not_answer(void **state)
 {
     const uint8_t write_one[12] = {0, 9, 0, 0, 0, 6, 7, 6, 0, 30, 0, 5};
 
@@ -261,7 +262,7 @@ static void split_sends_single_bytes(void **state)
     expect_silence();
 }
 
-/* Asks once, and expects the reply but for one byte. */
+/* Sends one request. Expects the right reply except for one byte. */
 static void expect_changed(tcp_fault fault, unsigned argument, size_t at, uint8_t to)
 {
     uint8_t reply[REPLY], right[REPLY];
@@ -335,7 +336,7 @@ static void half_a_reply_is_followed_by_the_end_of_the_stream(void **state)
     assert_int_equal(tcp_peer_count(peer).replies, 0);
 }
 
-static void close_ends_the_stream_and_reset_breaks_it(void **state)
+static void close_ends_the_stream_and_reset_resets_it(void **state)
 {
     uint8_t byte;
 
@@ -356,7 +357,7 @@ static void close_ends_the_stream_and_reset_breaks_it(void **state)
     assert_int_equal(tcp_peer_count(peer).connections, 3);
 }
 
-static void what_is_no_request_ends_the_connection(void **state)
+static void bytes_that_are_no_request_end_the_connection(void **state)
 {
     const uint8_t nonsense[8] = {0, 1, 0, 1, 0, 6, 7, 3};
     uint8_t byte;
@@ -367,7 +368,7 @@ static void what_is_no_request_ends_the_connection(void **state)
     assert_int_equal(tcp_peer_count(peer).malformed, 1);
 }
 
-static void a_connection_too_many_is_refused(void **state)
+static void a_connection_beyond_the_limit_is_refused(void **state)
 {
     int others[TCP_PEER_CONNECTIONS], first = s;
     uint8_t byte;
@@ -406,7 +407,7 @@ static void hang_up_and_a_restart_at_the_same_port(void **state)
     expect(2);
 }
 
-/* Counts of one run of chaos. */
+/* Returns the counts of one run with random faults. */
 static tcp_peer_counts run_chaos(uint32_t seed)
 {
     static const tcp_fault kinds[] = {FAULT_DROP, FAULT_TWICE, FAULT_OTHER_ID, FAULT_GARBAGE};
@@ -425,7 +426,7 @@ static tcp_peer_counts run_chaos(uint32_t seed)
     return counts;
 }
 
-static void chaos_of_one_seed_repeats_itself(void **state)
+static void random_faults_of_one_seed_repeat(void **state)
 {
     tcp_peer_counts first = run_chaos(7), again, other;
 
@@ -449,21 +450,21 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(the_right_reply_comes_from_the_memory),
         TEST(requests_in_one_send_and_in_pieces_are_found),
-        TEST(a_delay_holds_up_one_reply_only),
-        TEST(hold_turns_the_order_of_replies),
+        TEST(a_delay_delays_one_reply_only),
+        TEST(hold_changes_the_order_of_replies),
         TEST(join_puts_replies_into_one_send),
-        TEST(drop_carries_out_and_does_not_answer),
+        TEST(drop_carries_out_the_request_and_does_not_answer),
         TEST(twice_sends_the_reply_twice),
         TEST(split_sends_single_bytes),
         TEST(a_wrong_field_is_wrong_and_the_rest_is_right),
         TEST(an_exception_leaves_the_memory_alone),
         TEST(garbage_comes_before_the_reply_and_is_no_header),
         TEST(half_a_reply_is_followed_by_the_end_of_the_stream),
-        TEST(close_ends_the_stream_and_reset_breaks_it),
-        TEST(what_is_no_request_ends_the_connection),
-        TEST(a_connection_too_many_is_refused),
+        TEST(close_ends_the_stream_and_reset_resets_it),
+        TEST(bytes_that_are_no_request_end_the_connection),
+        TEST(a_connection_beyond_the_limit_is_refused),
         TEST(hang_up_and_a_restart_at_the_same_port),
-        TEST(chaos_of_one_seed_repeats_itself),
+        TEST(random_faults_of_one_seed_repeat),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);
