@@ -20,8 +20,7 @@ static struct {
     size_t first, last, length;
     uint32_t now;
     int lost;
-    /* `piece`: the most bytes that a write accepts, 0 for all. `drains`: how often flush
-     * says that bytes are left. */
+    /* The most bytes that a write accepts, 0 for all; how often flush must be called. */
     unsigned piece, drains, draining;
 } wire;
 
@@ -270,8 +269,7 @@ static uint16_t custom_result;
 static mbm_request seen;
 static unsigned calls;
 
-static uint16_t serve_custom(void *context, const mbm_request *request, uint8_t *response,
-                             uint16_t capacity)
+static uint16_t own(void *context, const mbm_request *request, uint8_t *response, uint16_t capacity)
 {
     assert_ptr_equal(context, &custom_result);
     assert_true(capacity >= 252);
@@ -284,15 +282,14 @@ static uint16_t serve_custom(void *context, const mbm_request *request, uint8_t 
 static void a_custom_function_determines_the_response(void **state)
 {
     (void)state;
-    custom.serve = serve_custom;
+    custom.serve = own;
     custom.context = &custom_result;
     custom.code = 0x64;
     OK(mbm_server_serveDiagnostics(&unit, &diagnostics));
     OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
     OK(mbm_server_serveCustom(&unit, &custom));
     custom_result = 2;
-    assert_int_equal(ASK("\144abc"),
-                     6); /* 0x64 in octal, since a hexadecimal escape would include the letters */
+    assert_int_equal(ASK("\144abc"), 6); /* in octal: hexadecimal would include the letters */
     assert_memory_equal(wire.sent, "\x11\x64\x5A\x5A", 4);
     assert_int_equal(seen.length, 3);
     assert_int_equal(seen.unit, 17);
@@ -328,7 +325,7 @@ static void a_custom_function_determines_the_response(void **state)
 static void a_custom_function_of_code_0_serves_all_others(void **state)
 {
     (void)state;
-    custom.serve = serve_custom;
+    custom.serve = own;
     custom.context = &custom_result;
     OK(mbm_server_begin(&server, &port, &unit, 1, frame, sizeof frame));
     OK(mbm_server_serveHoldingRegisters(&unit, &table));
@@ -359,7 +356,7 @@ static void a_broadcast_is_carried_out_only_if_it_only_writes(void **state)
     (void)state;
     memset(&cells, 0, sizeof cells);
     cells.get = count_reads;
-    custom.serve = serve_custom;
+    custom.serve = own;
     custom.context = &custom_result;
     custom_result = 0;
     calls = reads = 0;
@@ -410,7 +407,7 @@ static void the_length_rule_of_a_custom_function_frames_rtu_over_tcp(void **stat
     unsigned i;
 
     (void)state;
-    custom.serve = serve_custom;
+    custom.serve = own;
     custom.context = &custom_result;
     custom.code = 0x64;
     custom.length = (mbm_rule){MBM_RULE_FIXED, 0, 0};

@@ -82,8 +82,7 @@ static mbm_tcp tcps[CONNECTIONS];
 static mbm_tcp_listener listener;
 static long quiet = 100; /* milliseconds; the client's default */
 static volatile sig_atomic_t is_over;
-static sigset_t awake; /* the signal mask during a sleep; while the program works, SIGINT and
-                          SIGTERM wait for it */
+static sigset_t awake; /* the signal mask during a sleep, which SIGINT and SIGTERM may end */
 
 static void finish(int number)
 {
@@ -238,7 +237,7 @@ static uint16_t outcome(const connection *c, uint8_t *response, uint16_t capacit
     return NO_RESPONSE;
 }
 
-/* Notes the line that has the connection's request; NULL: no request is under way. Until
+/* Notes the line that has the connection's request, NULL when the request has ended. Until
  * then the connection is not idle, however long its device takes. */
 static void become_busy(connection *c, line *l)
 {
@@ -308,7 +307,7 @@ static void drop_connection(unsigned place)
 {
     connection *c = &connections[place];
 
-    /* Nobody waits for the answer to its request any more. */
+    /* The connection is gone, so its request is given up. */
     if (c->asked)
         mbm_client_cancel(&c->asked->client, &c->request);
     mbm_tcp_close(&tcps[place]);
@@ -332,8 +331,7 @@ static short events_of(unsigned place)
  * refuses a list that is longer than the limit of descriptors. */
 static struct {
     struct pollfd polls[1 + LINES + CONNECTIONS];
-    uint8_t owner[1 + LINES +
-                  CONNECTIONS]; /* the index of a line, or LINES plus the index of a connection */
+    uint8_t owner[1 + LINES + CONNECTIONS]; /* a line's index; from LINES on, a connection's */
     nfds_t count;
 } waits;
 

@@ -16,13 +16,11 @@
 /* Values of mbm_tcp.state. A lost socket keeps its place, since an object may still use it. */
 enum { FREE, CONNECTING, CONNECTED, LOST };
 
-/* How the system finds a peer that is gone. While nothing is sent: seconds of silence
- * before the first probe, seconds between probes, and number of probes. While something is:
- * milliseconds without an acknowledgement. */
+/* A peer is gone if, after seconds of silence, it answers none of some probes, which are
+ * seconds apart, or if it acknowledges no sent byte for milliseconds. */
 enum { QUIET_S = 15, PROBE_S = 5, PROBES = 3, UNANSWERED_MS = 30000 };
 
-/* Microseconds: the sleep if the system refuses to poll, and the shortest wait that counts
- * as long. */
+/* Microseconds: of sleep if the system refuses to poll, and of the shortest long wait. */
 enum { BLIND_NAP = 10000, LONG_WAIT = 100000 };
 
 /* For functions that are rarely called: keeps them apart from those of every request. */
@@ -298,8 +296,7 @@ void mbm_tcp_disconnect(void *context)
         drop(tcp, LOST, ENOTCONN);
 }
 
-/* No bytes were moved. Returns 0 if a signal came or there are none yet, -1 if the link is
- * lost. */
+/* No bytes were moved. Returns 0 for a signal or if there are none yet, -1 for a lost link. */
 COLD static int16_t none_moved(mbm_tcp *tcp, ssize_t count)
 {
     if (tcp->state == LOST)
@@ -324,8 +321,7 @@ int mbm_tcp_isConnected(mbm_tcp *tcp)
     return there;
 }
 
-/* Returns 1 if a read or write can go ahead at once: a connected socket without unsent
- * bytes awaits POLLIN alone. */
+/* 1 if a read or write can go ahead: only a connected socket awaits POLLIN alone. */
 static inline int is_ready(const mbm_tcp *tcp, uint16_t length)
 {
     return tcp->awaits == POLLIN && (int16_t)length > 0;
@@ -419,9 +415,8 @@ mbm_port mbm_tcp_port(mbm_tcp *tcp)
     return port;
 }
 
-/* poll failed: a signal came, or the system lacks memory or descriptors (the limit may have
- * been lowered). In the second case sleeps, so that the program does not spin, and makes it
- * look for itself. */
+/* poll failed: for a signal, or for lack of memory or descriptors (their limit may have been
+ * lowered). Then sleeps, so that the program does not spin, and returns 1: it must look. */
 COLD static int nap(uint32_t micros)
 {
     if (errno == EINTR)

@@ -355,8 +355,7 @@ int mbm_tty_open(mbm_tty *tty, const char *path, uint32_t baud, char parity, int
     return mbm_tty_openWith(tty, path, &options);
 }
 
-/* No bytes were moved. Returns 0 if a signal came or there are none yet, -1 if the link is
- * lost. */
+/* No bytes were moved. Returns 0 for a signal or if there are none yet, -1 for a lost link. */
 static int16_t none_moved(mbm_tty *tty, ssize_t count)
 {
     if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR))
