@@ -1,4 +1,4 @@
-/* How long a server takes to respond. */
+/* The response time of a server. */
 #include "crc.h"
 #include "peer.h"
 #include "rows.h"
@@ -10,11 +10,12 @@
 typedef struct asker {
     board *on;
     wire *bus;
-    span gap[3]; /* from the last byte of a request to the first of its response */
+    span gap[3]; /* from the last byte of a request to the first byte of its response */
     unsigned wrong;
 } asker;
 
-/* In turn reads ten registers, writes them and reads 64, at ever new moments. */
+/* Reads ten registers, writes ten and reads 64 in turn, each time at another moment of the
+ * sketch's loop. */
 static void ask(asker *a)
 {
     static const uint8_t requests[3][7] = {
@@ -31,7 +32,7 @@ static void answered(wire *w, const uint8_t *frame, size_t length)
     asker *a = w->context;
 
     static const size_t lengths[3] = {25, 8, 133};
-    unsigned which = (w->frames - 1) % 3; /* the first is frame 1 */
+    unsigned which = (w->frames - 1) % 3; /* the first frame is number 1 */
 
     a->wrong += length != lengths[which] || crc16(frame, length) != 0;
     if (w->frames > SKIP)
