@@ -119,7 +119,7 @@ static void run(transact one, const char *name, unsigned long count)
 
     for (i = 0; i < count; i++) {
         if (!one()) {
-            fprintf(stderr, "bench: %s: transaction %lu brought wrong data\n", name, i + 1);
+            fprintf(stderr, "bench: %s: transaction %lu returned wrong data\n", name, i + 1);
             exit(1);
         }
     }

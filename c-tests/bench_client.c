@@ -205,7 +205,7 @@ static int by_mbm_16(bench *b, unsigned long count)
 static void run(transact clients, bench *b, unsigned long count)
 {
     if (!clients(b, count)) {
-        fprintf(stderr, "bench: a transaction brought wrong data\n");
+        fprintf(stderr, "bench: a transaction returned wrong data\n");
         exit(1);
     }
 }

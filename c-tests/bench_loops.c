@@ -266,7 +266,7 @@ static void leave(crowd *c)
 }
 
 /* Returns the requests per second. */
-static double ask(const crowd *c, unsigned long total)
+static double measure(const crowd *c, unsigned long total)
 {
     uint8_t answer[MOST];
     struct timespec from, to;
@@ -330,11 +330,11 @@ static void compare(const char *where, const crowd *ours, const crowd *theirs)
     double mbm[ROUNDS], libmodbus[ROUNDS];
     unsigned round;
 
-    ask(ours, PER_ROUND / 10);
-    ask(theirs, PER_ROUND / 10);
+    measure(ours, PER_ROUND / 10);
+    measure(theirs, PER_ROUND / 10);
     for (round = 0; round < ROUNDS; round++) {
-        mbm[round] = ask(ours, PER_ROUND);
-        libmodbus[round] = ask(theirs, PER_ROUND);
+        mbm[round] = measure(ours, PER_ROUND);
+        libmodbus[round] = measure(theirs, PER_ROUND);
     }
     qsort(mbm, ROUNDS, sizeof *mbm, by_size);
     qsort(libmodbus, ROUNDS, sizeof *libmodbus, by_size);

@@ -108,7 +108,7 @@ static void noise(size_t count)
     }
 }
 
-static void listen(events *seen, uint32_t now)
+static void collect_events(events *seen, uint32_t now)
 {
     mbm_event event;
 
@@ -134,10 +134,10 @@ static events feed(mbm_framing framing, size_t piece)
                 break;
         at += mbm_sniffer_feed(&sniffer, MBM_TAP_BOTH, bus.bytes + at, (uint16_t)count,
                                bus.times[at + count - 1]);
-        listen(&seen, bus.times[at - 1]);
+        collect_events(&seen, bus.times[at - 1]);
     }
     CALLGRIND_TOGGLE_COLLECT;
-    listen(&seen, bus.now + 500000);
+    collect_events(&seen, bus.now + 500000);
     return seen;
 }
 

@@ -36,22 +36,22 @@ static struct {
 
 static uint64_t random_state;
 
-static unsigned chance(unsigned of)
+static unsigned chance(unsigned limit)
 {
     random_state ^= random_state << 13;
     random_state ^= random_state >> 7;
     random_state ^= random_state << 17;
-    return (unsigned)(random_state >> 33) % of;
+    return (unsigned)(random_state >> 33) % limit;
 }
 
-static uint16_t any(unsigned of)
+static uint16_t any(unsigned limit)
 {
-    return (uint16_t)chance(of);
+    return (uint16_t)chance(limit);
 }
 
-static uint8_t byte(unsigned of)
+static uint8_t byte(unsigned limit)
 {
-    return (uint8_t)chance(of);
+    return (uint8_t)chance(limit);
 }
 
 static void arrive(const uint8_t *bytes, size_t count)
@@ -161,7 +161,7 @@ static void done(void *context, mbm_clientRequest *request)
         call(1);
 }
 
-static uint8_t ask(mbm_clientRequest *r)
+static uint8_t queue_one(mbm_clientRequest *r)
 {
     const mbm_rule rule = {.kind = byte(5), .bytes = byte(8)};
 
@@ -200,7 +200,7 @@ static void queue_any(void)
     uint8_t status;
 
     if (jobs[i].pending) {
-        assert_int_equal(ask(r), MBM_BUSY);
+        assert_int_equal(queue_one(r), MBM_BUSY);
         return;
     }
     memset(r, 0, sizeof *r);
@@ -211,7 +211,7 @@ static void queue_any(void)
     r->reply = chance(10) ? jobs[i].reply : NULL;
     r->replyBytes = chance(5) ? sizeof jobs[i].reply : any(10);
     r->transaction = chance(2) ? 0 : any(30);
-    status = ask(r);
+    status = queue_one(r);
     assert_int_equal(r->status, status);
     jobs[i].pending = status == MBM_PENDING;
 }

@@ -1,7 +1,7 @@
 /* Clients whose buffers and requests are used in ways that the client does not expect.
  *
  * The client accesses parts of its buffers without checks. The tests give it buffers of many
- * sizes from malloc, exactly as long as begin is told. The port's hooks write and read every byte
+ * sizes from malloc, exactly as long as begin is given. The port's hooks write and read every byte
  * that they are given, so that AddressSanitizer reports one outside. */
 #include "mbm.h"
 #include "test.h"
@@ -107,7 +107,7 @@ static void begin(line *l, unsigned framing)
     OK(mbm_client_setRetries(&l->client, (uint8_t)chance(3)));
 }
 
-static void ask(line *l, mbm_clientRequest *request)
+static void queue_request(line *l, mbm_clientRequest *request)
 {
     if (request->status == MBM_PENDING)
         return;
@@ -149,7 +149,7 @@ static void no_byte_outside_of_the_buffers_is_touched(void **state)
                 break;
             case 2:
             case 3:
-            case 4: ask(&l, request); break;
+            case 4: queue_request(&l, request); break;
             default: (void)mbm_client_poll(&l.client);
             }
         }

@@ -104,7 +104,7 @@ static void done(void *context, mbm_clientRequest *request)
 }
 
 /* Queues reads of some of the units at a client. */
-static void ask(asker *a, unsigned first, unsigned count, unsigned requests)
+static void queue_reads(asker *a, unsigned first, unsigned count, unsigned requests)
 {
     unsigned i;
 
@@ -132,7 +132,7 @@ static void clients_that_take_turns_are_answered_by_every_server(void **state)
     for (round = 0; round < ROUNDS; round++) {
         asker *a = &askers[round % CLIENTS];
 
-        ask(a, 1, SERVERS, MBM_CLIENT_DEPTH);
+        queue_reads(a, 1, SERVERS, MBM_CLIENT_DEPTH);
         while (mbm_client_poll(&a->client) == MBM_PENDING)
             pass();
     }
@@ -182,7 +182,7 @@ static void clients_that_collide_get_no_wrong_data(void **state)
             } else if (line.now >= due[i] && asked[i] < EACH) {
                 /* Each client reads from two units of its own: RTU cannot tell which client
                  * a reply of one unit is for. */
-                ask(&askers[i], 1 + 2 * i, 2, 1);
+                queue_reads(&askers[i], 1 + 2 * i, 2, 1);
                 asked[i]++;
                 due[i] = 0;
             }

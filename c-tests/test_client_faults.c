@@ -33,10 +33,10 @@ typedef struct device {
     pthread_t thread;
 } device;
 
-static unsigned chance(unsigned *state, unsigned of)
+static unsigned chance(unsigned *state, unsigned limit)
 {
     *state = *state * 1103515245u + 12345u;
-    return (*state >> 16) % of;
+    return (*state >> 16) % limit;
 }
 
 static uint16_t value_at(unsigned address)
@@ -216,7 +216,7 @@ static job jobs[MBM_CLIENT_DEPTH];
 static unsigned long queued, ended, right, exceptions, failed, crossed, doubled, total;
 static unsigned seed = 4711;
 
-static void ask(job *j);
+static void queue_job(job *j);
 
 static void done(void *context, mbm_clientRequest *request)
 {
@@ -237,10 +237,10 @@ static void done(void *context, mbm_clientRequest *request)
         failed++;
     }
     if (queued < total)
-        ask(j);
+        queue_job(j);
 }
 
-static void ask(job *j)
+static void queue_job(job *j)
 {
     memset(j->words, 0xEE, sizeof j->words);
     memset(&j->request, 0, sizeof j->request);
@@ -275,7 +275,7 @@ static void every_request_ends_once_and_with_its_own_data(void **state)
     OK(mbm_client_setResponseTimeout(&a.client, TIMEOUT));
     OK(mbm_client_setRetries(&a.client, 1));
     for (i = 0; i < MBM_CLIENT_DEPTH && queued < total; i++)
-        ask(&jobs[i]);
+        queue_job(&jobs[i]);
     while (mbm_client_poll(&a.client) == MBM_PENDING) {
         if (!mbm_client_isConnected(&a.client) && mbm_tcp_isConnected(&a.tcp) < 0) {
             reconnected++;

@@ -35,7 +35,7 @@ static void begin(int framing)
     request.replyBytes = sizeof words;
 }
 
-static void ask(void)
+static void queue_read(void)
 {
     m.sent_count = 0;
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
@@ -83,7 +83,7 @@ static void a_link_is_connected_once_connect_succeeds_or_a_reply_arrives(void **
             begin(framings[i]);
             assert_int_equal(mbm_client_isConnected(&client), 1);
             m.is_lost = 1;
-            ask();
+            queue_read();
             IS(MBM_LINK_LOST, memory_port_run(&m, &client, &request, 100));
             assert_int_equal(mbm_client_isConnected(&client), 0);
 
@@ -92,10 +92,10 @@ static void a_link_is_connected_once_connect_succeeds_or_a_reply_arrives(void **
             IS(statuses[k], mbm_client_reconnect(&client, &link));
             assert_int_equal(mbm_client_isConnected(&client), statuses[k] == MBM_OK);
             /* A request without a reply does not show that there is a link. */
-            ask();
+            queue_read();
             IS(MBM_RESPONSE_TIMED_OUT, memory_port_run(&m, &client, &request, 1000));
             assert_int_equal(mbm_client_isConnected(&client), statuses[k] == MBM_OK);
-            ask();
+            queue_read();
             memory_port_send(&m, &client);
             answer(framings[i]);
             IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
@@ -112,7 +112,7 @@ static void a_link_that_the_program_connected_is_connected(void **state)
     for (i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         m.is_lost = 1;
-        ask();
+        queue_read();
         IS(MBM_LINK_LOST, memory_port_run(&m, &client, &request, 100));
         OK(mbm_client_reconnect(&client, i % 2 ? &none : NULL));
         assert_int_equal(mbm_client_isConnected(&client), 1);
@@ -158,7 +158,7 @@ static void any_random_function_gives_the_whole_range_of_jitter(void **state)
         OK(mbm_client_setRetries(&client, 255));
         OK(mbm_client_setBackoff(&client, MBM_BACKOFF_FIXED, 1000, 1000));
         OK(mbm_client_setJitter(&client, 100, generators[i], NULL));
-        ask();
+        queue_read();
         memory_port_send(&m, &client);
         for (k = 0; k < 255; k++) {
             uint32_t sent_at = m.now, wait;
@@ -187,14 +187,14 @@ static void the_transaction_identifier_on_the_wire_can_be_read(void **state)
     assert_int_equal(mbm_client_wireTransaction(&request), 0);
     assert_int_equal(mbm_client_wireTransaction(NULL), 0);
     /* A second request, so that the identifier is not 0. */
-    ask();
+    queue_read();
     memory_port_send(&m, &client);
     answer(MBM_FRAMING_TCP);
     IS(MBM_OK, memory_port_run(&m, &client, &request, 10));
     request.transaction = 500;
     other.unit = UNIT;
     other.transaction = 501;
-    ask();
+    queue_read();
     IS(MBM_PENDING, mbm_client_readCoils(&client, &other, 0, 1));
     memory_port_send(&m, &client);
     assert_int_equal(m.sent_count, 24);

@@ -35,7 +35,7 @@ static int end(void **state)
     return 0;
 }
 
-static void ask(unsigned i)
+static void queue_read(unsigned i)
 {
     memset(&requests[i], 0, sizeof requests[i]);
     memset(words[i], 0, sizeof words[i]);
@@ -66,13 +66,13 @@ static void finish(void)
 }
 
 /* Makes eight requests, one after the other. The third meets the fault. */
-static void meets(tcp_fault fault, unsigned argument, uint8_t status)
+static void assert_ends_with(tcp_fault fault, unsigned argument, uint8_t status)
 {
     unsigned i;
 
     tcp_peer_fault(peer, MET, fault, argument);
     for (i = 1; i <= ASKED; i++) {
-        ask(i - 1);
+        queue_read(i - 1);
         finish();
         if (i == MET && status != MBM_OK)
             assert_int_equal(requests[i - 1].status, status);
@@ -91,7 +91,7 @@ static void meets_and_retries(tcp_fault fault, unsigned argument)
     OK(mbm_client_setRetries(&a.client, 1));
     tcp_peer_fault(peer, MET, fault, argument);
     for (i = 0; i < ASKED; i++) {
-        ask(i);
+        queue_read(i);
         finish();
         is_right(i);
     }
@@ -102,7 +102,7 @@ static void meets_and_retries(tcp_fault fault, unsigned argument)
     static void name(void **state)                                                                 \
     {                                                                                              \
         (void)state;                                                                               \
-        meets(fault, argument, status);                                                            \
+        assert_ends_with(fault, argument, status);                                                 \
     }
 
 #define MEETS_AND_RETRIES(name, fault, argument, status)                                           \
@@ -144,7 +144,7 @@ static void responses_in_another_order_are_matched(void **state)
     tcp_peer_fault(peer, 2, FAULT_HOLD, 2);
     tcp_peer_fault(peer, 5, FAULT_DELAY, 20);
     for (i = 0; i < ASKED; i++)
-        ask(i);
+        queue_read(i);
     finish();
     for (i = 0; i < ASKED; i++)
         is_right(i);
@@ -158,7 +158,7 @@ static void responses_in_one_segment_are_separated(void **state)
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_JOIN, ASKED - 1);
     for (i = 0; i < ASKED; i++)
-        ask(i);
+        queue_read(i);
     finish();
     for (i = 0; i < ASKED; i++)
         is_right(i);
@@ -171,7 +171,7 @@ static void a_reset_ends_all_requests_under_way(void **state)
     (void)state;
     tcp_peer_fault(peer, MET, FAULT_RESET, 0);
     for (i = 0; i < ASKED; i++)
-        ask(i);
+        queue_read(i);
     finish();
     for (i = 0; i < ASKED; i++) {
         assert_true(requests[i].status == MBM_OK || requests[i].status == MBM_LINK_LOST);
@@ -179,7 +179,7 @@ static void a_reset_ends_all_requests_under_way(void **state)
     }
     assert_true(lost >= ASKED - MET + 1);
     for (i = 0; i < ASKED; i++)
-        ask(i);
+        queue_read(i);
     finish();
     for (i = 0; i < ASKED; i++)
         is_right(i);

@@ -228,7 +228,7 @@ static void bytes_look_like_tcp_with_or_without_unknown_functions(void **state)
 }
 
 /* Returns whether a header with this length, followed by these bytes, looks like TCP. */
-static int looks(uint8_t length, const char *pdu)
+static int looks_like_tcp(uint8_t length, const char *pdu)
 {
     uint8_t frame[64] = {0, 1, 0, 0, 0, length, 0x11};
     uint16_t total = 0, have = (uint16_t)(7 + hex_bytes(frame + 7, pdu));
@@ -247,31 +247,31 @@ static void a_header_with_a_length_that_the_function_never_has_does_not_look_lik
 
     (void)state;
     /* A request has 5 bytes. A response has as many as its byte count says, at least 2. */
-    assert_false(looks(2, "01"));
-    assert_true(looks(3, "01"));
-    assert_true(looks(6, "01 0000 0001"));
-    assert_false(looks(7, "01 0000 0001"));
-    assert_true(looks(7, "01 04 0000"));
-    assert_false(looks(8, "01 04 0000"));
+    assert_false(looks_like_tcp(2, "01"));
+    assert_true(looks_like_tcp(3, "01"));
+    assert_true(looks_like_tcp(6, "01 0000 0001"));
+    assert_false(looks_like_tcp(7, "01 0000 0001"));
+    assert_true(looks_like_tcp(7, "01 04 0000"));
+    assert_false(looks_like_tcp(8, "01 04 0000"));
     /* Only the bytes that have arrived are checked. Bytes after the frame are not. */
-    assert_true(looks(7, "01 04 0000 0000 0005"));
-    assert_false(looks(4, "01 04 00"));
+    assert_true(looks_like_tcp(7, "01 04 0000 0000 0005"));
+    assert_false(looks_like_tcp(4, "01 04 00"));
     /* Functions of fixed length. */
-    assert_true(looks(2, "07"));
-    assert_true(looks(3, "07 2A"));
-    assert_false(looks(4, "07 2A 00"));
-    assert_true(looks(8, "16"));
-    assert_false(looks(7, "16"));
+    assert_true(looks_like_tcp(2, "07"));
+    assert_true(looks_like_tcp(3, "07 2A"));
+    assert_false(looks_like_tcp(4, "07 2A 00"));
+    assert_true(looks_like_tcp(8, "16"));
+    assert_false(looks_like_tcp(7, "16"));
     for (length = 2; length < 255; length++) {
         /* An exception has 2 bytes, whatever its function. */
-        assert_int_equal(looks((uint8_t)length, "81"), length == 3);
-        assert_int_equal(looks((uint8_t)length, "D5 01"), length == 3);
+        assert_int_equal(looks_like_tcp((uint8_t)length, "81"), length == 3);
+        assert_int_equal(looks_like_tcp((uint8_t)length, "D5 01"), length == 3);
         /* A function whose length is unknown may have any length. */
-        assert_true(looks((uint8_t)length, "55"));
-        assert_int_equal(looks((uint8_t)length, "08 0000"), length >= 4);
-        assert_int_equal(looks((uint8_t)length, "2B 0D"), length >= 3);
+        assert_true(looks_like_tcp((uint8_t)length, "55"));
+        assert_int_equal(looks_like_tcp((uint8_t)length, "08 0000"), length >= 4);
+        assert_int_equal(looks_like_tcp((uint8_t)length, "2B 0D"), length >= 3);
         /* The byte count of a server id may cover the id alone. A request has one byte. */
-        assert_int_equal(looks((uint8_t)length, "11 02"), length == 2 || length >= 5);
+        assert_int_equal(looks_like_tcp((uint8_t)length, "11 02"), length == 2 || length >= 5);
     }
 }
 

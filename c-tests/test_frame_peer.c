@@ -147,7 +147,8 @@ static void mbm_builds_the_requests_that_libmodbus_sends_over_tcp(void **state)
 }
 
 /* Sends a request and parses the reply, whose length must be the one that the request implies. */
-static void ask(int fd, const mbm_framing *f, mbm_packet request, uint8_t *frame, mbm_packet *reply)
+static void request_reply(int fd, const mbm_framing *f, mbm_packet request, uint8_t *frame,
+                          mbm_packet *reply)
 {
     mbm_length expected;
     uint16_t length;
@@ -181,7 +182,7 @@ static void answers_what_we_parse(int fd, const mbm_framing *f, const modbus_map
         const mbm_packet *request = &sent[i];
         unsigned at;
 
-        ask(fd, f, *request, frame, &reply);
+        request_reply(fd, f, *request, frame, &reply);
         assert_int_equal(reply.kind, MBM_PACKET_RESPONSE);
         assert_int_equal(reply.address, reply.dataLength ? 0 : request->address);
         assert_int_equal(reply.value, request->value);
@@ -205,7 +206,8 @@ static void answers_what_we_parse(int fd, const mbm_framing *f, const modbus_map
     assert_int_equal(memory->tab_bits[0xAC], 1);
     assert_int_equal(memory->tab_registers[14], 0x1234);
     assert_int_equal(memory->tab_registers[16], 0x0001);
-    ask(fd, f, (mbm_packet){.function = 0x03, .address = 0xFF00, .quantity = 1}, frame, &reply);
+    request_reply(fd, f, (mbm_packet){.function = 0x03, .address = 0xFF00, .quantity = 1}, frame,
+                  &reply);
     assert_int_equal(reply.kind, MBM_PACKET_EXCEPTION);
     assert_int_equal(reply.exceptionCode, MBM_ILLEGAL_DATA_ADDRESS);
 }

@@ -67,7 +67,7 @@ static void stop(gateway *g)
 }
 
 /* Sends a request PDU as a TCP client. */
-static void ask(int fd, const uint8_t *pdu, size_t length)
+static void send_request(int fd, const uint8_t *pdu, size_t length)
 {
     uint8_t frame[MBM_MAX_TCP_FRAME] = {0x12, 0x34, 0, 0, 0, (uint8_t)(length + 1), UNIT};
 
@@ -124,7 +124,7 @@ static void reply(const gateway *g, const uint8_t *pdu, size_t length)
     assert_int_equal(write(g->line.ours, frame, length), length);
 }
 
-#define ASK(fd, pdu) ask(fd, (const uint8_t *)(pdu), sizeof(pdu) - 1)
+#define ASK(fd, pdu) send_request(fd, (const uint8_t *)(pdu), sizeof(pdu) - 1)
 #define EXPECT(fd, pdu) expect(fd, (const uint8_t *)(pdu), sizeof(pdu) - 1)
 #define REQUEST(g, pdu) expect_request(g, (const uint8_t *)(pdu), sizeof(pdu) - 1)
 #define REPLY(g, pdu) reply(g, (const uint8_t *)(pdu), sizeof(pdu) - 1)
@@ -175,7 +175,7 @@ static void a_late_reply_to_one_client_does_not_reach_another(void **state)
 
         start(&gateways[i], TIMEOUT, NULL);
         first[i] = tcp_connect(gateways[i].port);
-        ask(first[i], (const uint8_t *)c->request, c->lengths[0]);
+        send_request(first[i], (const uint8_t *)c->request, c->lengths[0]);
         expect_request(&gateways[i], (const uint8_t *)c->request, c->lengths[0]);
     }
     for (i = 0; i < COUNT(cases); i++) {
@@ -184,7 +184,7 @@ static void a_late_reply_to_one_client_does_not_reach_another(void **state)
 
         expect(first[i], no_response, sizeof no_response);
         second = tcp_connect(gateways[i].port);
-        ask(second, (const uint8_t *)c->other, c->lengths[2]);
+        send_request(second, (const uint8_t *)c->other, c->lengths[2]);
         expect_request(&gateways[i], (const uint8_t *)c->other, c->lengths[2]);
         reply(&gateways[i], (const uint8_t *)c->late_reply, c->lengths[1]);
         reply(&gateways[i], (const uint8_t *)c->other_reply, c->lengths[3]);
@@ -217,7 +217,7 @@ static void a_reply_that_does_not_answer_the_request_becomes_0b(void **state)
         const uint8_t *request = (const uint8_t *)no_answers[i][0];
         const uint8_t no_response[] = {request[0] | 0x80, 0x0B};
 
-        ask(fd, request, lengths[i][0]);
+        send_request(fd, request, lengths[i][0]);
         expect_request(&g, request, lengths[i][0]);
         reply(&g, (const uint8_t *)no_answers[i][1], lengths[i][1]);
         expect(fd, no_response, sizeof no_response);

@@ -185,7 +185,7 @@ static uint16_t quantity(run *r, uint32_t most)
 }
 
 /* Makes a request of a random kind to a random unit. */
-static uint8_t ask(sim *s, run *r)
+static uint8_t make_request(sim *s, run *r)
 {
     mbm_master *n = &s->master;
     uint16_t address = (uint16_t)draw(r, MODEL_CELLS);
@@ -295,7 +295,7 @@ static void transact(sim *s, run *r, unsigned retries)
     s->order_length = 0;
     r->carried_out = 0;
     s->limit = s->now + (retries + 1) * 400000u; /* the call hangs if it takes longer */
-    status = ask(s, r);
+    status = make_request(s, r);
     if (status == MBM_PENDING)
         status = sim_poll(s);
     for (i = 0; i < s->sent; i++)

@@ -318,7 +318,7 @@ static void serve_all(void)
     OK(mbm_server_serveFiles(&unit, &files));
 }
 
-static size_t ask(const char *pdu, size_t length)
+static size_t exchange(const char *pdu, size_t length)
 {
     unsigned i;
 
@@ -329,7 +329,7 @@ static size_t ask(const char *pdu, size_t length)
     return wire.length;
 }
 
-#define ASK(pdu) ask(pdu, sizeof pdu - 1)
+#define ASK(pdu) exchange(pdu, sizeof pdu - 1)
 
 static void no_hook_of_a_server_may_call_the_server(void **state)
 {
@@ -354,7 +354,7 @@ static void no_hook_of_a_server_may_call_the_server(void **state)
     wire.within = within_server;
     for (i = 0; i < COUNT(requests); i++) {
         hooks_called = 0;
-        assert_int_equal(ask(requests[i].pdu, requests[i].length), requests[i].answer);
+        assert_int_equal(exchange(requests[i].pdu, requests[i].length), requests[i].answer);
         assert_true(hooks_called >= requests[i].hooks);
     }
     assert_int_equal(ASK("\x04\0\0\0\1"), 7); /* the value of the hook that is registered first */

@@ -1,6 +1,6 @@
 /* A call that is refused changes nothing: the object is compared byte for byte with its
  * state before the call, and pending requests go on. Buffers have exactly the size that
- * begin is told. */
+ * begin is given. */
 #include "hooked_port.h"
 #include "test.h"
 
@@ -91,7 +91,7 @@ static void a_server_goes_on_after_a_refused_begin(void **state)
     hooked_port_arrive_rtu(&wire, 17, "\x03\0\0\0\x7D", 5);
     poll_for_a_while();
     assert_int_equal(wire.length, 5 + 250);
-    /* A request of which a part has arrived. */
+    /* A part of a request has arrived. */
     wire.length = 0;
     hooked_port_arrive_rtu(&wire, 17, "\x03\0\0\0\x7D", 5);
     wire.last -= 4;

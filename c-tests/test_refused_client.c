@@ -1,5 +1,5 @@
 /* A call of a client that is refused changes nothing, and pending requests go on. Buffers
- * have exactly the size that begin is told. */
+ * have exactly the size that begin is given. */
 #include "hooked_port.h"
 #include "test.h"
 

@@ -84,7 +84,7 @@ static int reset(void **state)
 }
 
 /* Lets the frame of a PDU arrive and polls. Returns the length of what was sent. */
-static size_t ask(uint8_t to, const char *pdu, size_t length)
+static size_t exchange(uint8_t to, const char *pdu, size_t length)
 {
     unsigned i;
 
@@ -97,8 +97,8 @@ static size_t ask(uint8_t to, const char *pdu, size_t length)
     return wire.length;
 }
 
-#define ASK(pdu) ask(17, pdu, sizeof pdu - 1)
-#define BROADCAST(pdu) ask(0, pdu, sizeof pdu - 1)
+#define ASK(pdu) exchange(17, pdu, sizeof pdu - 1)
+#define BROADCAST(pdu) exchange(0, pdu, sizeof pdu - 1)
 
 static void an_object_that_was_never_begun_is_not_initialised(void **state)
 {

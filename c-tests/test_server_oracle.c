@@ -319,8 +319,8 @@ static int untouched(const void *guard, size_t bytes)
 
 static void compare_with_model(mbm_unit *asked)
 {
-    const char *told = getenv("MBM_TRANSACTIONS");
-    long rounds = told ? atol(told) : 1000000, round;
+    const char *fewer = getenv("MBM_TRANSACTIONS");
+    long rounds = fewer ? atol(fewer) : 1000000, round;
     uint8_t packed[2][CELLS / 8];
     unsigned i;
 

@@ -1,5 +1,5 @@
 /* The library accesses a server's frame buffer without checks. The tests use buffers of
- * exactly the size that begin is told, from malloc, so that the address sanitizer reports
+ * exactly the size that begin is given, from malloc, so that the address sanitizer reports
  * an access to one byte before or after. The port checks too that each pointer that it is
  * given lies in the buffer, for builds without the sanitizer. */
 #include "crc.h"
@@ -175,7 +175,7 @@ static unsigned framed(uint8_t *frame, begin_function *how, const uint8_t *pdu, 
     return n;
 }
 
-static void ask(begin_function *how, const uint8_t *pdu, unsigned length)
+static void exchange(begin_function *how, const uint8_t *pdu, unsigned length)
 {
     uint8_t frame[2 * MOST];
 
@@ -197,22 +197,22 @@ static void ask_everything(begin_function *how, unsigned pieces)
         pdu[4] = (uint8_t)n;
         pdu[5] = (uint8_t)(2 * n);
         memset(pdu + 6, (int)n, 2 * n);
-        ask(how, pdu, 6 + 2 * n);
+        exchange(how, pdu, 6 + 2 * n);
     }
     for (n = 1; n <= 125; n++) {
         const uint8_t read[] = {3, 0, 0, 0, (uint8_t)n};
         const uint8_t read_coils[] = {1, 0, 3, (uint8_t)(16 * n >> 8), (uint8_t)(16 * n - 3)};
 
         line.sent = 0;
-        ask(how, read, sizeof read);
+        exchange(how, read, sizeof read);
         assert_int_not_equal(line.sent, 0);
         line.sent = 0;
-        ask(how, read_coils, sizeof read_coils);
+        exchange(how, read_coils, sizeof read_coils);
         assert_int_not_equal(line.sent, 0);
     }
     pdu[0] = ECHO_CODE;
     for (n = 1; n <= 253; n += n < 20 || n > 245 ? 1 : 7)
-        ask(how, pdu, n);
+        exchange(how, pdu, n);
 }
 
 /* Appends bytes that are no frame. */

@@ -49,7 +49,7 @@ static int64_t now_ms(void)
 
 /* Sends requests to unit 7, in one send, so that the peer receives them at once. They read
  * the registers from `id` on, so the replies differ in their data as well as in their ids. */
-static void ask_all(unsigned id, unsigned count)
+static void send_requests(unsigned id, unsigned count)
 {
     uint8_t requests[12 * 8];
     unsigned i;
@@ -63,14 +63,14 @@ static void ask_all(unsigned id, unsigned count)
     assert_int_equal(send(s, requests, 12 * count, MSG_NOSIGNAL), 12 * count);
 }
 
-static void ask(unsigned id)
+static void send_request(unsigned id)
 {
-    ask_all(id, 1);
+    send_requests(id, 1);
 }
 
 /* Returns what one recv returns: 0 at the end of the stream. Returns -1 if nothing arrived
  * within `ms` milliseconds. */
-static ssize_t take(uint8_t *bytes, size_t capacity, int ms)
+static ssize_t receive(uint8_t *bytes, size_t capacity, int ms)
 {
     struct pollfd wait = {s, POLLIN, 0};
 
@@ -78,10 +78,10 @@ static ssize_t take(uint8_t *bytes, size_t capacity, int ms)
 }
 
 /* Receives exactly `length` bytes. */
-static void take_all(uint8_t *bytes, size_t length)
+static void receive_all(uint8_t *bytes, size_t length)
 {
     while (length > 0) {
-        ssize_t count = take(bytes, length, PATIENCE_MS);
+        ssize_t count = receive(bytes, length, PATIENCE_MS);
 
         assert_true(count > 0);
         bytes += count;
@@ -103,7 +103,7 @@ static void expect(unsigned id)
     uint8_t reply[REPLY], right[REPLY];
 
     right_reply(right, id);
-    take_all(reply, sizeof reply);
+    receive_all(reply, sizeof reply);
     assert_memory_equal(reply, right, sizeof right);
 }
 
@@ -121,7 +121,7 @@ static void expect_silence(void)
 {
     uint8_t byte;
 
-    assert_int_equal(take(&byte, 1, SHORT_MS), -1);
+    assert_int_equal(receive(&byte, 1, SHORT_MS), -1);
 }
 
 static void the_right_reply_comes_from_the_memory(void **state)
@@ -133,20 +133,20 @@ static void the_right_reply_comes_from_the_memory(void **state)
     uint8_t reply[12];
 
     (void)state;
-    ask(1);
+    send_request(1);
     expect(1);
     assert_int_equal(send(s, write_one, 12, 0), 12);
-    take_all(reply, 12);
+    receive_all(reply, 12);
     assert_memory_equal(reply, write_one, 12);
     assert_int_equal(tcp_peer_memory(peer)->tab_registers[30], 0xABCD);
     assert_int_equal(send(s, no_such, 12, 0), 12);
-    take_all(reply, 9);
+    receive_all(reply, 9);
     assert_int_equal(reply[7], 0x83);
     assert_int_equal(reply[8], 2);
     assert_int_equal(send(s, no_function, 9, 0), 9);
-    take_all(reply, 9);
+    receive_all(reply, 9);
     assert_memory_equal(reply, unknown, 9);
-    ask(2);
+    send_request(2);
     expect(2);
 }
 
@@ -176,7 +176,7 @@ static void a_delay_delays_one_reply_only(void **state)
 
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_DELAY, 300);
-    ask_all(1, 2);
+    send_requests(1, 2);
     expect(2);
     expect(1);
     assert_true(now_ms() - start >= 300);
@@ -189,13 +189,13 @@ static void hold_changes_the_order_of_replies(void **state)
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_HOLD, 2);
     tcp_peer_fault(peer, 4, FAULT_HOLD, 3);
-    ask_all(1, 3);
+    send_requests(1, 3);
     expect(2);
     expect(3);
     expect(1);
     /* No other reply follows, so it is sent when its time is over. */
     start = now_ms();
-    ask(4);
+    send_request(4);
     expect(4);
     assert_true(now_ms() - start >= HELD_MS);
 }
@@ -208,8 +208,8 @@ static void join_puts_replies_into_one_send(void **state)
 
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_JOIN, 2);
-    ask_all(1, 3);
-    take_all(got, sizeof right);
+    send_requests(1, 3);
+    receive_all(got, sizeof right);
     right_reply(right, 1);
     right_reply(right + REPLY, 2);
     right_reply(right + 2 * REPLY, 3);
@@ -218,7 +218,7 @@ static void join_puts_replies_into_one_send(void **state)
     /* Another reply should join it, but none comes, so it is sent alone. */
     tcp_peer_fault(peer, 4, FAULT_JOIN, 1);
     start = now_ms();
-    ask(4);
+    send_request(4);
     expect(4);
     assert_true(now_ms() - start >= HELD_MS);
 }
@@ -231,7 +231,7 @@ static void drop_carries_out_the_request_and_does_not_answer(void **state)
     tcp_peer_fault(peer, 1, FAULT_DROP, 0);
     assert_int_equal(send(s, write_one, 12, 0), 12);
     expect_silence();
-    ask(1);
+    send_request(1);
     expect(1);
     assert_int_equal(tcp_peer_memory(peer)->tab_registers[30], 5);
     assert_int_equal(tcp_peer_count(peer).faults[FAULT_DROP], 1);
@@ -242,7 +242,7 @@ static void twice_sends_the_reply_twice(void **state)
 {
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_TWICE, 0);
-    ask(1);
+    send_request(1);
     expect(1);
     expect(1);
     expect_silence();
@@ -255,7 +255,7 @@ static void split_sends_single_bytes(void **state)
 
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_SPLIT, 20);
-    ask(1);
+    send_request(1);
     expect(1);
     assert_int_equal(segments() - before, REPLY);
     assert_true(now_ms() - start >= 20 * (REPLY - 1));
@@ -268,10 +268,10 @@ static void expect_changed(tcp_fault fault, unsigned argument, size_t at, uint8_
     uint8_t reply[REPLY], right[REPLY];
 
     tcp_peer_fault(peer, tcp_peer_count(peer).requests + 1, fault, argument);
-    ask(5);
+    send_request(5);
     right_reply(right, 5);
     right[at] = to;
-    take_all(reply, sizeof reply);
+    receive_all(reply, sizeof reply);
     assert_memory_equal(reply, right, sizeof right);
 }
 
@@ -298,7 +298,7 @@ static void an_exception_leaves_the_memory_alone(void **state)
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_EXCEPTION, 6);
     assert_int_equal(send(s, write_one, 12, 0), 12);
-    take_all(reply, 9);
+    receive_all(reply, 9);
     assert_memory_equal(reply, busy, 9);
     assert_int_equal(tcp_peer_memory(peer)->tab_registers[30], tcp_peer_word(30));
 }
@@ -310,11 +310,11 @@ static void garbage_comes_before_the_reply_and_is_no_header(void **state)
 
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_GARBAGE, 7);
-    ask(0x100);
-    take_all(got, 7);
+    send_request(0x100);
+    receive_all(got, 7);
     for (i = 0; i < 7; i++)
         assert_int_equal(got[i], 0xA5);
-    take_all(got + 7, REPLY - 2);
+    receive_all(got + 7, REPLY - 2);
     for (i = 0; i < 7; i++) {
         unsigned protocol = (unsigned)got[i + 2] << 8 | got[i + 3];
         unsigned length = (unsigned)got[i + 4] << 8 | got[i + 5];
@@ -329,10 +329,10 @@ static void half_a_reply_is_followed_by_the_end_of_the_stream(void **state)
 
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_HALF, 4);
-    ask(1);
-    ask(2);
-    take_all(got, 4);
-    assert_int_equal(take(got, sizeof got, PATIENCE_MS), 0);
+    send_request(1);
+    send_request(2);
+    receive_all(got, 4);
+    assert_int_equal(receive(got, sizeof got, PATIENCE_MS), 0);
     assert_int_equal(tcp_peer_count(peer).replies, 0);
 }
 
@@ -343,16 +343,16 @@ static void close_ends_the_stream_and_reset_resets_it(void **state)
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_CLOSE, 0);
     tcp_peer_fault(peer, 2, FAULT_RESET, 0);
-    ask(1);
-    assert_int_equal(take(&byte, 1, PATIENCE_MS), 0);
+    send_request(1);
+    assert_int_equal(receive(&byte, 1, PATIENCE_MS), 0);
     close(s);
     s = tcp_connect(port);
-    ask(2);
-    assert_int_equal(take(&byte, 1, PATIENCE_MS), -1);
+    send_request(2);
+    assert_int_equal(receive(&byte, 1, PATIENCE_MS), -1);
     assert_int_equal(errno, ECONNRESET);
     close(s);
     s = tcp_connect(port);
-    ask(3);
+    send_request(3);
     expect(3);
     assert_int_equal(tcp_peer_count(peer).connections, 3);
 }
@@ -364,7 +364,7 @@ static void bytes_that_are_no_request_end_the_connection(void **state)
 
     (void)state;
     assert_int_equal(send(s, nonsense, sizeof nonsense, 0), sizeof nonsense);
-    assert_true(take(&byte, 1, PATIENCE_MS) <= 0);
+    assert_true(receive(&byte, 1, PATIENCE_MS) <= 0);
     assert_int_equal(tcp_peer_count(peer).malformed, 1);
 }
 
@@ -375,14 +375,14 @@ static void a_connection_beyond_the_limit_is_refused(void **state)
     unsigned i;
 
     (void)state;
-    ask(1);
+    send_request(1);
     expect(1);
     for (i = 0; i < TCP_PEER_CONNECTIONS; i++)
         others[i] = tcp_connect(port);
     s = others[TCP_PEER_CONNECTIONS - 1];
-    assert_true(take(&byte, 1, PATIENCE_MS) <= 0);
+    assert_true(receive(&byte, 1, PATIENCE_MS) <= 0);
     s = others[TCP_PEER_CONNECTIONS - 2];
-    ask(2);
+    send_request(2);
     expect(2);
     assert_int_equal(tcp_peer_count(peer).refused, 1);
     for (i = 0; i < TCP_PEER_CONNECTIONS; i++)
@@ -395,15 +395,15 @@ static void hang_up_and_a_restart_at_the_same_port(void **state)
     uint8_t byte;
 
     (void)state;
-    ask(1);
+    send_request(1);
     expect(1);
     tcp_peer_hang_up(peer);
-    assert_int_equal(take(&byte, 1, PATIENCE_MS), 0);
+    assert_int_equal(receive(&byte, 1, PATIENCE_MS), 0);
     tcp_peer_halt(peer);
     close(s);
     assert_int_equal(tcp_peer_start(peer, port), port);
     s = tcp_connect(port);
-    ask(2);
+    send_request(2);
     expect(2);
 }
 
@@ -417,11 +417,11 @@ static tcp_peer_counts run_chaos(uint32_t seed)
 
     tcp_peer_chaos(peer, seed, 40, kinds, COUNT(kinds), 0);
     for (i = 0; i < 200; i++)
-        ask(i);
+        send_request(i);
     do
         usleep(1000);
     while ((counts = tcp_peer_count(peer)).requests < 200);
-    while (take(got, sizeof got, SHORT_MS) > 0)
+    while (receive(got, sizeof got, SHORT_MS) > 0)
         ;
     return counts;
 }

@@ -52,7 +52,7 @@ static int end(void **state)
 }
 
 /* Reads until `length` bytes have arrived or the link is lost. */
-static int16_t take(uint8_t *bytes, uint16_t length)
+static int16_t read_all(uint8_t *bytes, uint16_t length)
 {
     uint16_t have = 0;
 
@@ -76,7 +76,7 @@ static void await_connection(void)
 
 /* Reads register 5. Returns the length of the reply, 11 bytes, or the negative result of
  * read or write. */
-static int16_t ask(void)
+static int16_t read_register(void)
 {
     const uint8_t read_one[12] = {0, 1, 0, 0, 0, 6, 7, 3, 0, 5, 0, 1};
     uint8_t reply[11] = {0};
@@ -87,7 +87,7 @@ static int16_t ask(void)
     if (count < 0)
         return count;
     assert_int_equal(count, sizeof read_one);
-    count = take(reply, sizeof reply);
+    count = read_all(reply, sizeof reply);
     if (count > 0)
         assert_int_equal(reply[9] << 8 | reply[10], tcp_peer_word(5));
     return count;
@@ -100,8 +100,8 @@ static void a_client_asks_and_reads_the_reply(void **state)
 
     (void)state;
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
-    assert_int_equal(ask(), 11);
-    assert_int_equal(ask(), 11);
+    assert_int_equal(read_register(), 11);
+    assert_int_equal(read_register(), 11);
     assert_int_equal(tcp.error, 0);
     begun = seconds();
     before = port.micros(port.context);
@@ -188,7 +188,7 @@ static void of_several_addresses_the_one_that_answers_is_used(void **state)
 {
     (void)state;
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, NULL, service), 0);
-    assert_int_equal(ask(), 11);
+    assert_int_equal(read_register(), 11);
 }
 
 static void a_failed_open_sets_errno(void **state)
@@ -212,18 +212,18 @@ static void the_end_of_a_stream_and_a_reset_have_different_errors(void **state)
     tcp_peer_fault(peer, 1, FAULT_CLOSE, 0);
     tcp_peer_fault(peer, 2, FAULT_RESET, 0);
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
-    assert_int_equal(ask(), -1);
+    assert_int_equal(read_register(), -1);
     assert_int_equal(tcp.error, EPIPE);
     assert_int_equal(port.read(port.context, &byte, 1), -1);
     assert_int_equal(mbm_tcp_isConnected(&tcp), -1);
     assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
 
     assert_in_set(mbm_tcp_connect(&tcp), ((const unsigned long[]){MBM_OK, MBM_PENDING}), 2);
-    assert_int_equal(ask(), -1);
+    assert_int_equal(read_register(), -1);
     assert_int_equal(tcp.error, ECONNRESET);
 
     assert_in_set(mbm_tcp_connect(&tcp), ((const unsigned long[]){MBM_OK, MBM_PENDING}), 2);
-    assert_int_equal(ask(), 11);
+    assert_int_equal(read_register(), 11);
     assert_int_equal(tcp.error, 0);
 }
 
@@ -237,8 +237,8 @@ static void bytes_before_the_end_of_the_stream_are_still_read(void **state)
     await_connection();
     assert_int_equal(
         port.write(port.context, (const uint8_t[12]){0, 1, 0, 0, 0, 6, 7, 3, 0, 5, 0, 1}, 12), 12);
-    assert_int_equal(take(bytes, 4), 4);
-    assert_int_equal(take(bytes, 1), -1);
+    assert_int_equal(read_all(bytes, 4), 4);
+    assert_int_equal(read_all(bytes, 1), -1);
 }
 
 static void a_disconnected_link_is_lost_until_it_is_connected(void **state)
@@ -248,11 +248,11 @@ static void a_disconnected_link_is_lost_until_it_is_connected(void **state)
     (void)state;
     mbm_tcp_disconnect(&tcp);
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
-    assert_int_equal(ask(), 11);
+    assert_int_equal(read_register(), 11);
     mbm_tcp_disconnect(&tcp);
     assert_int_equal(port.write(port.context, &byte, 1), -1);
     mbm_tcp_connect(&tcp);
-    assert_int_equal(ask(), 11);
+    assert_int_equal(read_register(), 11);
     assert_int_equal(tcp_peer_count(peer).connections, 2);
 }
 

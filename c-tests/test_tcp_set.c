@@ -101,7 +101,7 @@ static void peer_sends(unsigned place, const char *text)
     assert_int_equal(write(peers[place], text, strlen(text)), strlen(text));
 }
 
-static int16_t take(unsigned place, uint16_t most)
+static int16_t read_some(unsigned place, uint16_t most)
 {
     const mbm_port port = mbm_tcp_port(&tcps[place]);
     uint8_t bytes[16];
@@ -111,7 +111,7 @@ static int16_t take(unsigned place, uint16_t most)
 
 static int is_lost(unsigned place)
 {
-    return take(place, 1) < 0;
+    return read_some(place, 1) < 0;
 }
 
 /* Expects that the wait reports this socket and no other. */
@@ -145,7 +145,7 @@ static void the_wait_says_which_of_many_sockets_are_ready(void **state)
     expect_silence();
     peer_sends(7, "x");
     expect_ready(&tcps[7]);
-    assert_int_equal(take(7, 16), 1);
+    assert_int_equal(read_some(7, 16), 1);
     expect_silence();
     /* More sockets than one wait reports. */
     for (i = 0; i < MANY; i += 2)
@@ -156,7 +156,7 @@ static void the_wait_says_which_of_many_sockets_are_ready(void **state)
             i = (unsigned)(tcp - tcps);
             assert_int_equal(i % 2, 0);
             assert_int_equal(seen[i]++, 0);
-            assert_int_equal(take(i, 16), 1);
+            assert_int_equal(read_some(i, 16), 1);
             count++;
         }
     }
@@ -188,11 +188,11 @@ static void bytes_that_are_not_read_do_not_end_the_wait_again(void **state)
     /* Other sockets are reported as before. */
     peer_sends(1, "x");
     expect_ready(&tcps[1]);
-    assert_int_equal(take(1, 16), 1);
+    assert_int_equal(read_some(1, 16), 1);
     /* Once the program has used the port, the remaining bytes are reported. */
-    assert_int_equal(take(0, 2), 2);
+    assert_int_equal(read_some(0, 2), 2);
     expect_ready(&tcps[0]);
-    assert_int_equal(take(0, 16), 3);
+    assert_int_equal(read_some(0, 16), 3);
     expect_silence();
     /* Nor does the end of the stream end the wait again. */
     close(peers[0]);
@@ -223,7 +223,7 @@ static void a_full_socket_is_ready_once_it_accepts_bytes_again(void **state)
      * before is still there. */
     assert_int_equal(port.write(port.context, much, 10), 10);
     expect_ready(&tcps[0]);
-    assert_int_equal(take(0, 16), 1);
+    assert_int_equal(read_some(0, 16), 1);
     expect_silence();
 }
 
@@ -242,7 +242,7 @@ static void a_closed_socket_is_not_reported(void **state)
     assert_ptr_equal(mbm_tcp_nextReady(&set), &tcps[0]);
     mbm_tcp_close(&tcps[2]);
     assert_null(mbm_tcp_nextReady(&set));
-    assert_int_equal(take(0, 16), 1);
+    assert_int_equal(read_some(0, 16), 1);
     expect_silence();
     /* The same while another descriptor keeps the socket open, as in a child process. */
     other = dup(tcps[0].fd);
@@ -272,7 +272,7 @@ static void a_connection_is_reported_when_it_is_made_and_made_anew(void **state)
         assert_int_equal(mbm_tcp_isConnected(&tcps[0]), 1);
         assert_int_equal(port.write(port.context, read_one, 12), 12);
         expect_ready(&tcps[0]);
-        assert_int_equal(take(0, 16), 11);
+        assert_int_equal(read_some(0, 16), 11);
         mbm_tcp_disconnect(&tcps[0]);
         expect_silence();
         assert_in_set(mbm_tcp_connect(&tcps[0]), ((const unsigned long[]){MBM_OK, MBM_PENDING}), 2);
@@ -359,7 +359,7 @@ static void an_accepted_connection_is_in_the_set_of_its_listener(void **state)
     assert_fails(EAGAIN, accept_one());
     peer_sends(0, "x");
     expect_ready(&tcps[0]);
-    assert_int_equal(take(0, 16), 1);
+    assert_int_equal(read_some(0, 16), 1);
     expect_silence();
     mbm_tcp_closeListener(&listener);
     peer_sends(0, "x");
@@ -387,7 +387,7 @@ static void a_connection_that_is_closed_as_idle_is_ready(void **state)
     ahead = 61;
     peer_sends(0, "x");
     expect_ready(&tcps[0]);
-    assert_int_equal(take(0, 16), 1);
+    assert_int_equal(read_some(0, 16), 1);
     connect_some(1);
     wait_for_connection();
     assert_fails(EAGAIN, accept_one());

@@ -101,14 +101,14 @@ static void connect_some(unsigned count)
     AWAIT(waiting() == before + count);
 }
 
-static int take(void)
+static int accept_one(void)
 {
     return mbm_tcp_accept(&listener, places, PLACES);
 }
 
 static void expect_none(int error)
 {
-    assert_int_equal(take(), -1);
+    assert_int_equal(accept_one(), -1);
     assert_int_equal(errno, error);
 }
 
@@ -118,7 +118,7 @@ static void fill(void)
 
     connect_some(PLACES);
     for (i = 0; i < PLACES; i++)
-        assert_int_equal(take(), i);
+        assert_int_equal(accept_one(), i);
 }
 
 /* The peer of a place sends a byte, and the program reads it. */
@@ -174,7 +174,7 @@ static void a_listener_without_a_descriptor_lets_the_program_sleep(void **state)
     (void)state;
     SKIP_WITHOUT_LIMITS();
     connect_some(1);
-    assert_int_equal(take(), 0);
+    assert_int_equal(accept_one(), 0);
     connect_some(2);
     leave_no_descriptor();
     expect_none(EMFILE);
@@ -193,20 +193,20 @@ static void a_waiting_connection_is_accepted_once_a_descriptor_is_free(void **st
     (void)state;
     SKIP_WITHOUT_LIMITS();
     connect_some(1);
-    assert_int_equal(take(), 0);
+    assert_int_equal(accept_one(), 0);
     connect_some(2);
     leave_no_descriptor();
     expect_none(EMFILE);
     mbm_tcp_close(&places[0]);
-    assert_int_equal(take(), 0);
+    assert_int_equal(accept_one(), 0);
     expect_none(EMFILE);
     limit_descriptors(found.rlim_cur);
-    assert_int_equal(take(), 1);
+    assert_int_equal(accept_one(), 1);
     expect_none(EAGAIN);
     /* The listener ends the wait as before. */
     connect_some(1);
     assert_int_equal(wait_for(MBM_TCP_FOREVER), 1);
-    assert_int_equal(take(), 2);
+    assert_int_equal(accept_one(), 2);
 }
 
 static void an_idle_connection_gives_its_descriptor_to_a_new_one(void **state)
@@ -215,14 +215,14 @@ static void an_idle_connection_gives_its_descriptor_to_a_new_one(void **state)
     SKIP_WITHOUT_LIMITS();
     listener.idleTime = MINUTE_MS;
     connect_some(2);
-    assert_int_equal(take(), 0);
-    assert_int_equal(take(), 1);
+    assert_int_equal(accept_one(), 0);
+    assert_int_equal(accept_one(), 1);
     connect_some(1);
     leave_no_descriptor();
     expect_none(EMFILE);
     ahead = 61;
     exchange_byte(0);
-    assert_int_equal(take(), 2);
+    assert_int_equal(accept_one(), 2);
     assert_int_equal(is_lost(1), 1);
     assert_int_equal(is_lost(0), 0);
     assert_int_equal(listener.idle, 1);
@@ -234,7 +234,7 @@ static void without_a_descriptor_nothing_is_closed_while_no_connection_waits(voi
     SKIP_WITHOUT_LIMITS();
     listener.idleTime = MINUTE_MS;
     connect_some(1);
-    assert_int_equal(take(), 0);
+    assert_int_equal(accept_one(), 0);
     leave_no_descriptor();
     ahead = 3600;
     expect_none(EAGAIN);
@@ -274,11 +274,11 @@ static void the_oldest_idle_connection_gives_its_place_to_a_new_one(void **state
     assert_int_equal(places[2].error, ETIMEDOUT);
     mbm_tcp_close(&places[2]);
     assert_int_equal(wait_for(MBM_TCP_FOREVER), 1);
-    assert_int_equal(take(), 2);
+    assert_int_equal(accept_one(), 2);
     expect_none(EAGAIN);
     assert_int_equal(is_lost(1), 1);
     mbm_tcp_close(&places[1]);
-    assert_int_equal(take(), 1);
+    assert_int_equal(accept_one(), 1);
     expect_none(EAGAIN);
     assert_int_equal(listener.idle, 2);
     assert_int_equal(listener.refused, 0);
@@ -331,7 +331,7 @@ static void connections_that_are_not_idle_keep_their_places(void **state)
     /* A new connection in a place is not busy. */
     mbm_tcp_close(&places[2]);
     connect_some(1);
-    assert_int_equal(take(), 2);
+    assert_int_equal(accept_one(), 2);
     assert_int_equal(places[2].isBusy, 0);
 }
 

@@ -18,7 +18,7 @@ typedef struct bus_tap {
     bus *line;
     uint32_t clock_start; /* what the tap's clock shows when the bus is started */
     uint64_t free;        /* when the last byte of the tap will have left */
-    unsigned heard;       /* index of the next byte of the bus that it looks at */
+    unsigned heard;       /* index of the next byte of the bus to read */
 } bus_tap;
 
 struct bus {

@@ -1,5 +1,5 @@
-/* MBM_TEST is the name of the tests to run; `*` and `?` stand for any characters. `make
- * test-c TEST=NAME` sets it. */
+/* MBM_TEST, set by `make test-c TEST=NAME`, is the name of the tests to run; `*` and `?`
+ * stand for any characters. */
 #include "test.h"
 
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-/* The functions that compilers call without being asked to, for programs without a C
+/* The functions that compilers call by themselves, for programs without a C
  * library. Compile this file with -fno-tree-loop-distribute-patterns, or the compiler turns
  * the loops into calls of these same functions.
  * Licence: MIT OR Apache-2.0. */

@@ -178,14 +178,14 @@ static int add_line(char *text, uint16_t timeout)
     line *l = &lines[line_count];
     struct termios unused = {0};
     unsigned baud, stop, first, last, unit;
-    char parity, behind;
+    char parity, extra;
     mbm_port port;
     char *rest = strchr(text, ',');
 
     if (!rest || line_count == LINES)
         return -1;
     *rest++ = 0;
-    if (sscanf(rest, "%u,%c%u,%u-%u%c", &baud, &parity, &stop, &first, &last, &behind) != 5 ||
+    if (sscanf(rest, "%u,%c%u,%u-%u%c", &baud, &parity, &stop, &first, &last, &extra) != 5 ||
         first < 1 || first > last || last > 247 || stop > 2 || baud < 50)
         return -1;
     l->path = text;
@@ -412,10 +412,10 @@ static int usage(int wrong)
 /* Returns a number from `least` to `most`, or -1. */
 static long number(const char *text, long least, long most)
 {
-    char *behind;
-    long value = strtol(text, &behind, 10);
+    char *extra;
+    long value = strtol(text, &extra, 10);
 
-    return behind != text && !*behind && value >= least && value <= most ? value : -1;
+    return extra != text && !*extra && value >= least && value <= most ? value : -1;
 }
 
 int main(int argc, char **argv)

@@ -22,7 +22,7 @@
     "  ascii:PATH[,BAUD[,N|E|O]]   the same in ASCII frames and seven bits\n"                      \
     "  tcp:HOST[,PORT]             Modbus TCP, port 502 if left out\n"                             \
     "  rtuovertcp:HOST[,PORT]      RTU frames in a TCP stream\n"                                   \
-    "Numbers are decimal, or hexadecimal behind 0x.\n"
+    "Numbers are decimal, or hexadecimal with 0x in front.\n"
 
 typedef struct line {
     mbm_client client;

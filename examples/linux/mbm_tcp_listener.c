@@ -162,7 +162,7 @@ static int take_next(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
 }
 
 /* Makes a connection a port in a place, or closes it. */
-static int put(const mbm_tcp_listener *listener, mbm_tcp *tcp, int fd)
+static int put_in_place(const mbm_tcp_listener *listener, mbm_tcp *tcp, int fd)
 {
     int error;
 
@@ -179,7 +179,7 @@ static int put(const mbm_tcp_listener *listener, mbm_tcp *tcp, int fd)
     return 0;
 }
 
-static int take(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
+static int take_connection(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
 {
     size_t place = 0;
     int fd, rounds;
@@ -193,7 +193,7 @@ static int take(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
         if (fd < 0)
             return -1;
         if (place < count)
-            return put(listener, &tcps[place], fd) < 0 ? -1 : (int)place;
+            return put_in_place(listener, &tcps[place], fd) < 0 ? -1 : (int)place;
         listener->refused++;
         turn_away(fd);
     }
@@ -208,7 +208,7 @@ int mbm_tcp_accept(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
         return refuse(EBADF);
     if (listener->isQuiet)
         return refuse(EAGAIN);
-    place = take(listener, tcps, count);
+    place = take_connection(listener, tcps, count);
     error = errno;
     /* A connection that must wait would end every wait at once. */
     await(listener, place >= 0 || error == EAGAIN ? POLLIN : 0);

@@ -225,7 +225,7 @@ static int set_rate(const mbm_tty *tty, uint32_t baud)
 #endif
 
 /* Saves the settings of the terminal, then makes it raw and non-blocking. */
-static int take(mbm_tty *tty)
+static int take_over(mbm_tty *tty)
 {
     struct termios settings;
     int lines;
@@ -252,7 +252,7 @@ int mbm_tty_attach(mbm_tty *tty, int fd)
 {
     memset(tty, 0, sizeof *tty);
     tty->fd = fd;
-    if (take(tty) < 0) {
+    if (take_over(tty) < 0) {
         tty->fd = -1;
         return -1;
     }
@@ -335,7 +335,7 @@ int mbm_tty_openWith(mbm_tty *tty, const char *path, const mbm_tty_options *opti
     tty->fd = fd;
     tty->flags_before = O_RDWR;
     /* Locks first, so that the settings of another program's terminal stay as they are. */
-    if ((options->exclusive && lock(tty) < 0) || take(tty) < 0 || set(tty, options) < 0 ||
+    if ((options->exclusive && lock(tty) < 0) || take_over(tty) < 0 || set(tty, options) < 0 ||
         (options->rs485 && begin_rs485(tty, options) < 0)) {
         error = errno;
         release(tty);

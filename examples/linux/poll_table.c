@@ -67,7 +67,7 @@ static void show(long round)
     fflush(stdout);
 }
 
-static void ask(range *r)
+static void queue_range(range *r)
 {
     memset(&r->request, 0, sizeof r->request);
     r->request.unit = (uint8_t)unit;
@@ -119,7 +119,7 @@ int main(int argc, char **argv)
     due = line_milliseconds();
     for (round = 1; !line_ended && (rounds == 0 || round <= rounds); round++) {
         for (i = 0; i < count; i++)
-            ask(&ranges[i]);
+            queue_range(&ranges[i]);
         while (!line_ended && mbm_client_pending(&at.client) > 0) {
             line_poll(&at);
             if (mbm_client_pending(&at.client) > 0)

@@ -16,7 +16,7 @@ typedef struct asker {
 
 /* Reads ten registers, writes ten and reads 64 in turn, each time at another moment of the
  * sketch's loop. */
-static void ask(asker *a)
+static void send_next(asker *a)
 {
     static const uint8_t requests[3][7] = {
         {1, 3, 0, 0, 0, 10}, {1, 16, 0, 0, 0, 10, 20}, {1, 3, 0, 0, 0, 64}};
@@ -37,7 +37,7 @@ static void answered(wire *w, const uint8_t *frame, size_t length)
     a->wrong += length != lengths[which] || crc16(frame, length) != 0;
     if (w->frames > SKIP)
         note(&a->gap[which], w->first_started - w->heard);
-    ask(a);
+    send_next(a);
 }
 
 static asker serve(const char *name)
@@ -49,7 +49,7 @@ static asker serve(const char *name)
     a.bus = board_uart(a.on, '0', answered, &a);
     if (!board_run(a.on, 10 * MS))
         give_up("a sketch crashed");
-    ask(&a);
+    send_next(&a);
     while (a.bus->frames < SKIP + 3 * COUNTED)
         if (!board_run(a.on, MS))
             give_up("a sketch crashed");

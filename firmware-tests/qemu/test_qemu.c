@@ -310,7 +310,7 @@ static void the_clock_keeps_time(void **state)
     assert_in_range(waited, right / 10 * 8, right / 10 * 19);
 }
 
-static void meets(void **state)
+static void a_fault_ends_as_expected(void **state)
 {
     static device d;
     const fault *f = *state;
@@ -375,7 +375,7 @@ static int test_machine(const machine *m)
             if (*space == '_')
                 *space = ' ';
         tests[i].name = names[i];
-        tests[i].test_func = plain ? behaviours[i].function : meets;
+        tests[i].test_func = plain ? behaviours[i].function : a_fault_ends_as_expected;
         tests[i].initial_state = (void *)(uintptr_t)f;
     }
     board = m;
