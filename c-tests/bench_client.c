@@ -210,7 +210,7 @@ static void run(transact clients, bench *b, unsigned long count)
     }
 }
 
-/* --- what is measured */
+/* --- the measurements */
 
 static int by_size(const void *left, const void *right)
 {

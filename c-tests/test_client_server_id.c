@@ -50,7 +50,7 @@ static device d;
 
 /* Reads the server id of unit 17, which responds with these bytes. Returns the request's
  * status. */
-static uint8_t report(begin_function begin, uint16_t room, const char *answer)
+static uint8_t report(begin_function begin, uint16_t capacity, const char *answer)
 {
     static mbm_client client;
     static uint8_t frame[MBM_MAX_FRAME];
@@ -67,7 +67,7 @@ static uint8_t report(begin_function begin, uint16_t room, const char *answer)
     port.micros = micros;
     request.unit = 17;
     request.reply = reply;
-    request.replyBytes = room;
+    request.replyBytes = capacity;
     OK(begin(&client, &port, frame, sizeof frame));
     IS(MBM_PENDING, mbm_client_reportServerId(&client, &request));
     while (request.status == MBM_PENDING)

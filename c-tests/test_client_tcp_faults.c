@@ -212,5 +212,5 @@ int main(void)
         TEST(a_reset_ends_all_requests_under_way),
     };
 
-    return cmocka_run_group_tests_name("client, each fault of TCP by name", tests, NULL, NULL);
+    return cmocka_run_group_tests_name("client over TCP, each fault", tests, NULL, NULL);
 }

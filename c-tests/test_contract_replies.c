@@ -1,4 +1,4 @@
-/* What the contract with programs for ModbusMaster says about replies: what is a success,
+/* The contract with programs for ModbusMaster about replies: what is a success,
  * which failure has which status, and that a reply is found among the bytes of a bad wire. */
 #include "sim.h"
 #include "test.h"

@@ -290,5 +290,5 @@ int main(void)
         SIM_TEST(a_refused_begin_leaves_the_request_under_way),
     };
 
-    return cmocka_run_group_tests_name("given up", tests, NULL, NULL);
+    return cmocka_run_group_tests_name("requests that end early", tests, NULL, NULL);
 }

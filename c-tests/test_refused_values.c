@@ -55,7 +55,7 @@ static void refused_values_change_nothing(void **state)
     free(bytes);
 }
 
-/* --- what a call writes to the caller's variables --- */
+/* --- the caller's variables --- */
 
 static void a_refused_call_sets_its_length_to_0(void **state)
 {

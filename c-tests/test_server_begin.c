@@ -1,4 +1,4 @@
-/* A server that is begun again, baud rates that it takes, and what it does with noise. */
+/* A server that is begun again, baud rates that it takes, and how it handles noise. */
 #include "crc.h"
 #include "hooked_port.h"
 #include "mbm.h"

@@ -247,5 +247,6 @@ int main(void)
         cmocka_unit_test(frames_of_libmodbus_over_tcp_are_reported_with_known_direction),
     };
 
-    return cmocka_run_group_tests_name("sniffer beside libmodbus", tests, NULL, NULL);
+    return cmocka_run_group_tests_name("sniffer between libmodbus's client and server", tests, NULL,
+                                       NULL);
 }

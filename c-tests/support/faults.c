@@ -127,7 +127,7 @@ static void a_pause_inside(responder *r, const uint8_t *request)
     responder_send(r, frame + length / 2, length - length / 2);
 }
 
-static void two_replies_glued(responder *r, const uint8_t *request)
+static void reply_twice(responder *r, const uint8_t *request)
 {
     uint8_t frame[MOST];
 
@@ -294,7 +294,7 @@ const fault faults[] = {
      "....."},
     {"one byte every 5 ms", a_byte_every_5_ms, 3, 0, ".....", MBM_OK, "....."},
     {"cut in two by a pause longer than t3.5", a_pause_inside, 3, 0, ".....", MBM_OK, "....."},
-    {"two replies glued", two_replies_glued, 3, 0, ".....", MBM_OK, "....."},
+    {"the reply twice without a pause", reply_twice, 3, 0, ".....", MBM_OK, "....."},
     {"one byte too long", one_byte_too_long, 3, 0, ".....", MBM_OK, "....."},
     {"300 bytes of continuous noise, then ours", reply_after_300_bytes_of_noise, 3, 0, ".....",
      MBM_OK, "....."},
@@ -310,8 +310,8 @@ const fault faults[] = {
      MBM_MALFORMED_REPLY, "....."},
     {"a reply later than the timeout, from a device that answers in order", later_than_the_timeout,
      3, 0, "F....", MBM_RESPONSE_TIMED_OUT, "....."},
-    {"the same after a write", later_than_the_timeout, 6, 0, "F....", MBM_RESPONSE_TIMED_OUT,
-     "....."},
+    {"a reply to a write later than the timeout, from such a device", later_than_the_timeout, 6, 0,
+     "F....", MBM_RESPONSE_TIMED_OUT, "....."},
     {"exception 05 (acknowledge)", acknowledge, 3, 0, "F....", 0x05, "F...."},
     {"exception 06 (device busy)", device_busy, 3, 0, "F....", 0x06, "F...."},
     {"exception 0B (gateway target gave no response)", no_response_of_the_target, 3, 0, "F....",

@@ -64,23 +64,24 @@ void program_start_limited(program *p, const char *name, const char *const *argu
     p->output = out[0];
 }
 
-size_t program_line(const program *p, char *text, size_t room)
+size_t program_line(const program *p, char *text, size_t capacity)
 {
     size_t length = 0;
 
-    while (length + 1 < room && read(p->output, text + length, 1) == 1)
+    while (length + 1 < capacity && read(p->output, text + length, 1) == 1)
         if (text[length++] == '\n')
             break;
     text[length] = 0;
     return length;
 }
 
-size_t program_rest(const program *p, char *text, size_t room)
+size_t program_rest(const program *p, char *text, size_t capacity)
 {
     size_t length = 0;
     ssize_t count;
 
-    while (length + 1 < room && (count = read(p->output, text + length, room - 1 - length)) > 0)
+    while (length + 1 < capacity &&
+           (count = read(p->output, text + length, capacity - 1 - length)) > 0)
         length += (size_t)count;
     text[length] = 0;
     return length;

@@ -23,8 +23,8 @@ void program_start_limited(program *p, const char *name, const char *const *argu
 int program_sleeps(const program *p);
 
 /* Reads the program's output up to the end of a line, or all of it. */
-size_t program_line(const program *p, char *text, size_t room);
-size_t program_rest(const program *p, char *text, size_t room);
+size_t program_line(const program *p, char *text, size_t capacity);
+size_t program_rest(const program *p, char *text, size_t capacity);
 
 /* Closes its input and waits for its end. Returns its exit code, or -1. */
 int program_end(program *p);

@@ -31,7 +31,7 @@ struct sim {
     /* the clock */
     uint64_t now;
     uint64_t limit;       /* the test fails when `now` passes it: the call hangs */
-    uint32_t clock_start; /* what the clock showed when `now` was 0 */
+    uint32_t clock_start; /* the time that the clock showed when `now` was 0 */
     uint32_t step;        /* microseconds that each read of the clock takes */
     mbm_master *waits;    /* the master that the idle hook was called for last */
     uint32_t idle_step;   /* microseconds that an idle hook takes, less if a byte arrives */

@@ -24,7 +24,7 @@ typedef struct recorder {
     recording received;
 } recorder;
 
-/** Forgets what was recorded. */
+/** Discards the recorded bytes. */
 void recorder_clear(recorder *wire);
 
 /** A port that records in `wire`, which must outlive it, and passes everything on to `behind`. */

@@ -1,4 +1,4 @@
-/* Watches a bus and prints what is sent on it, one line an event. It sends nothing.
+/* Watches a bus, prints one line for each event, and sends nothing.
  *
  *     sniff /dev/ttyUSB0 19200          a serial line, RTU; Ctrl-C ends
  *     sniff -a /dev/ttyUSB0 9600 E      ASCII, seven bits, even parity

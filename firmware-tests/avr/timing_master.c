@@ -173,7 +173,7 @@ static unsigned long stack_added(const observer *o)
 }
 
 /* The same sketches on the same board, compiled with each of the two libraries. */
-static void beside(const char *peer)
+static void compare_with(const char *peer)
 {
     static const struct {
         const char *sketch, *what;
@@ -214,5 +214,5 @@ void time_master(const char *peer)
     dead_times();
     returns();
     polls();
-    beside(peer);
+    compare_with(peer);
 }
