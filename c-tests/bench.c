@@ -1,6 +1,6 @@
-/* mbm beside libmodbus's own client: FC03 of ten registers from one libmodbus
- * server over one pty. The server is a process of its own, so that a profiler
- * sees the client alone. */
+/* Compares the speed of mbm and of libmodbus as a client: both read ten registers by FC03
+ * from the same libmodbus server over the same pty. The server is a process of its own, so
+ * that a profiler sees only the client. */
 #define _GNU_SOURCE
 #include "mbm_tty.h"
 #include "pty.h"
@@ -17,7 +17,7 @@
 
 enum { UNIT = 17, ADDRESS = 7, QUANTITY = 10, ROUNDS = 11, PER_ROUND = 2000, WARM_UP = 200 };
 
-/* A client: makes one transaction; 0 unless it brought the right data. */
+/* Makes one transaction. Returns 0 if it did not bring the right data. */
 typedef int (*transact)(void);
 
 static mbm_master node;
@@ -58,14 +58,14 @@ static void begin_clients(int fd)
     if (mbm_tty_attach(&tty, fd) != 0)
         fail("tty");
     port = mbm_tty_port(&tty);
-    /* libmodbus keeps no gap before a request, so mbm keeps none either. */
+    /* libmodbus keeps no gap before a request, so mbm keeps none here either. */
     if (mbm_master_beginRtu(&node, UNIT, &port) != MBM_OK ||
         mbm_master_setBuffers(&node, response, QUANTITY, transmit, 1, frame, sizeof frame) !=
             MBM_OK ||
         mbm_master_setGap(&node, 0) != MBM_OK)
         fail("mbm");
-    /* Both use the same descriptor, which is non-blocking as libmodbus's own
-     * would be; the name only serves to make the object. */
+    /* Both use the same descriptor, which is non-blocking as libmodbus's own would be.
+     * libmodbus needs the name only to make its object. */
     peer = modbus_new_rtu("/dev/null", 115200, 'N', 8, 1);
     if (!peer || modbus_set_slave(peer, UNIT) != 0 || modbus_set_socket(peer, fd) != 0)
         fail("libmodbus client");
@@ -97,7 +97,7 @@ static int serve(const char *path)
     return 0;
 }
 
-/* Another image of this program serves the far end. */
+/* Starts this program again as the server at the far end of the pty. */
 static pid_t start_server(const char *program, const pty *line)
 {
     pid_t child = fork();
@@ -119,7 +119,7 @@ static void run(transact one, const char *name, unsigned long count)
 
     for (i = 0; i < count; i++) {
         if (!one()) {
-            fprintf(stderr, "bench: %s: transaction %lu brought wrong data\n", name, i + 1);
+            fprintf(stderr, "bench: %s: transaction %lu returned wrong data\n", name, i + 1);
             exit(1);
         }
     }
@@ -149,8 +149,8 @@ static double median(double *values)
     return values[ROUNDS / 2];
 }
 
-/* Rounds alternate, so that both meet the same conditions. One line: the name and
- * the transactions a second, medians. */
+/* Measures both in alternate rounds, so that the load of the machine affects both alike.
+ * Prints one line: the name and the median of the transactions per second. */
 static void compare(void)
 {
     double mbm[ROUNDS], libmodbus[ROUNDS];
@@ -166,8 +166,8 @@ static void compare(void)
     fflush(stdout);
 }
 
-/* On one CPU a transaction costs what it costs; on several it depends above all
- * on where the scheduler puts the two processes. */
+/* On several CPUs the result depends most on which CPUs the scheduler gives to the two
+ * processes. On one CPU it depends on the work alone. */
 static void compare_on_one_cpu(pid_t server_process)
 {
     cpu_set_t all, one;

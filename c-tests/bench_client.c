@@ -1,6 +1,6 @@
-/* The client that never waits beside libmodbus's: FC03 of ten registers from one
- * server over loopback TCP, and over one pty. The server is a process of its
- * own, so that a profiler sees the client alone. */
+/* Compares the speed of mbm's non-blocking client with that of libmodbus: both read ten
+ * registers by FC03 from one server over loopback TCP and over one pty. The server is a
+ * process of its own, so that a profiler sees only the client. */
 #define _GNU_SOURCE
 #include "clock.h"
 #include "mbm_tcp.h"
@@ -43,8 +43,7 @@ static void fail(const char *what)
     exit(1);
 }
 
-/* --- the server: every whole request that has arrived is answered in one write,
- * in order */
+/* --- the server: it answers all complete requests that have arrived, in order, in one write */
 
 static size_t answer(int is_tcp, const uint8_t *request, uint8_t *response, const uint8_t *rtu)
 {
@@ -105,7 +104,7 @@ static int serve(const char *kind, int fd)
     }
 }
 
-/* Another image of this program serves the far end of `fd`. */
+/* Starts this program again as the server at the far end of `fd`. */
 static pid_t start_server(const char *program, const char *kind, int fd)
 {
     char number[12];
@@ -122,7 +121,7 @@ static pid_t start_server(const char *program, const char *kind, int fd)
     return child;
 }
 
-/* --- the clients; each makes so many transactions */
+/* --- the clients; each function makes `count` transactions */
 
 typedef struct bench {
     mbm_client client;
@@ -206,12 +205,12 @@ static int by_mbm_16(bench *b, unsigned long count)
 static void run(transact clients, bench *b, unsigned long count)
 {
     if (!clients(b, count)) {
-        fprintf(stderr, "bench: a transaction brought wrong data\n");
+        fprintf(stderr, "bench: a transaction returned wrong data\n");
         exit(1);
     }
 }
 
-/* --- what is measured */
+/* --- the measurements */
 
 static int by_size(const void *left, const void *right)
 {
@@ -220,8 +219,9 @@ static int by_size(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
-/* Transactions a second of up to three clients, medians; rounds alternate, so that
- * all meet the same conditions. One line: name, CPUs, figures. */
+/* Prints one line: the name, the CPUs, and the median of the transactions per second of up
+ * to three clients. The clients are measured in alternate rounds, so that the load of the
+ * machine affects all alike. */
 static void compare(const char *name, const char *where, bench *b, const transact *clients,
                     unsigned count)
 {
@@ -268,7 +268,7 @@ static void on_one_cpu(const pid_t *servers)
             fail("sched_setaffinity");
 }
 
-/* A port on which nothing ever arrives, and a clock that stands still. */
+/* A port on which nothing arrives, with a clock that stands still. */
 static int16_t quiet_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     (void)context, (void)bytes, (void)capacity;
@@ -287,7 +287,7 @@ static uint32_t quiet_micros(void *context)
     return 0;
 }
 
-/* Makes `count` polls with so many requests under way, of which none is due. */
+/* Makes `count` polls while `flight` requests are under way. No timeout is due. */
 static void poll_with(unsigned flight, unsigned long count)
 {
     static bench b;
@@ -337,7 +337,7 @@ static void begin(bench *b, const mbm_port *port)
                                               b->outgoing, sizeof b->outgoing)
                         : mbm_client_beginRtu(&b->client, port, b->incoming, sizeof b->incoming);
 
-    /* libmodbus keeps no gap before a request, so mbm keeps none either. */
+    /* libmodbus keeps no gap before a request, so mbm keeps none here either. */
     if (begun != MBM_OK || mbm_client_setGap(&b->client, 0) != MBM_OK)
         fail("mbm");
     b->flight = 1;
@@ -352,7 +352,7 @@ static void begin(bench *b, const mbm_port *port)
         fail("libmodbus client");
 }
 
-/* A stream over the loopback device; gives the server's end. */
+/* Connects a stream over the loopback device. Returns the server's end. */
 static int begin_stream(void)
 {
     struct sockaddr_in at = {0};
@@ -370,7 +370,8 @@ static int begin_stream(void)
         setsockopt(far, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on) != 0)
         fail("loopback");
     close(listener);
-    /* Both clients use the same descriptor; the address only makes the object. */
+    /* Both clients use the same descriptor. libmodbus needs the address only to make its
+     * object. */
     if (mbm_tcp_attach(&stream.tcp, stream.fd) != 0)
         fail("tcp");
     port = mbm_tcp_port(&stream.tcp);
@@ -411,7 +412,7 @@ int main(int argc, char **argv)
     servers[1] = start_server(argv[0], "rtu", dup(ends.theirs));
     if (argc == 1) {
         on_one_cpu(servers);
-        /* Of a pty on several CPUs the scheduler decides, not the client. */
+        /* Over a pty on several CPUs the scheduler decides the result, not the client. */
         compare("tcp", "any", &stream, clients, 3);
         time_polls(0);
         time_polls(1);

@@ -1,4 +1,4 @@
-/* Loops of servers with many connections, ours beside libmodbus's. */
+/* Compares loops of servers with many connections: mbm's and libmodbus's. */
 #define _GNU_SOURCE
 #include "bench_server.h"
 #include "mbm_tcp.h"
@@ -28,7 +28,7 @@ static mbm_tcp places[MANY];
 static mbm_server servers[MANY];
 static uint8_t buffers[MANY][MBM_MAX_TCP_FRAME];
 
-/* One round; how many connections ended. */
+/* Goes through the loop once. Returns how many connections ended. */
 static int go_round(mbm_tcp_listener *listener)
 {
     int ended = 0, i;
@@ -65,7 +65,7 @@ static void loop_of_mbm(mbm_tcp_listener *listener)
         left -= go_round(listener);
 }
 
-/* As libmodbus's own program with many connections does. */
+/* The loop of libmodbus's own example with many connections. */
 static modbus_t *host;
 static fd_set watched;
 static int top;
@@ -80,7 +80,7 @@ static void begin_libmodbus(const mbm_tcp_listener *listener)
     top = listener->fd;
 }
 
-/* One round; how many connections ended. */
+/* Goes through the loop once. Returns how many connections ended. */
 static int go_round_by_libmodbus(const mbm_tcp_listener *listener)
 {
     uint8_t query[MODBUS_TCP_MAX_ADU_LENGTH];
@@ -148,8 +148,8 @@ static void expect(void)
     }
 }
 
-/* Rounds in which `asking` of so many connections have a request for the server, which
- * answers in the same process. What the server's program executes is collected. */
+/* Makes rounds in which `asking` of the `connections` clients have sent a request. The
+ * server answers in the same process. Callgrind counts only the server's instructions. */
 static void count_rounds(const char *name, int is_mbm, int connections, int asking)
 {
     mbm_tcp_listener listener = {0};
@@ -265,8 +265,8 @@ static void leave(crowd *c)
     close(c->wait);
 }
 
-/* Requests per second. */
-static double ask(const crowd *c, unsigned long total)
+/* Returns the requests per second. */
+static double measure(const crowd *c, unsigned long total)
 {
     uint8_t answer[MOST];
     struct timespec from, to;
@@ -319,22 +319,22 @@ static void pin(pid_t process, int cpu)
     for (; index < CPU_SETSIZE; index++)
         if (CPU_ISSET(index, &all) && cpu-- == 0)
             CPU_SET(index, &one);
-    /* A machine of one CPU has no second. */
+    /* A machine with one CPU has no second one. */
     if (CPU_COUNT(&one) && sched_setaffinity(process, sizeof one, &one) != 0)
         fail("sched_setaffinity");
 }
 
-/* Rounds alternate, so that both meet the same weather. */
+/* Measures both in alternate rounds, so that the load of the machine affects both alike. */
 static void compare(const char *where, const crowd *ours, const crowd *theirs)
 {
     double mbm[ROUNDS], libmodbus[ROUNDS];
     unsigned round;
 
-    ask(ours, PER_ROUND / 10);
-    ask(theirs, PER_ROUND / 10);
+    measure(ours, PER_ROUND / 10);
+    measure(theirs, PER_ROUND / 10);
     for (round = 0; round < ROUNDS; round++) {
-        mbm[round] = ask(ours, PER_ROUND);
-        libmodbus[round] = ask(theirs, PER_ROUND);
+        mbm[round] = measure(ours, PER_ROUND);
+        libmodbus[round] = measure(theirs, PER_ROUND);
     }
     qsort(mbm, ROUNDS, sizeof *mbm, by_size);
     qsort(libmodbus, ROUNDS, sizeof *libmodbus, by_size);

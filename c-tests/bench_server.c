@@ -1,9 +1,9 @@
-/* Our server beside libmodbus's, for the same requests.
+/* Compares mbm's server with libmodbus's for the same requests.
  *
- *     bench_server          requests per second of two server loops, 32 connections
- *     bench_server count    the requests one by one, for callgrind to count
- *     bench_server loops    loops of whole programs, for callgrind to count; it is to
- *                           collect nothing at its start */
+ *     bench_server          requests per second of two server loops with 32 connections
+ *     bench_server count    each request by itself, for callgrind
+ *     bench_server loops    loops of whole programs, for callgrind, which must start with
+ *                           collection off */
 #define _GNU_SOURCE
 #include "bench_server.h"
 #include "crc.h"
@@ -21,7 +21,7 @@
 
 enum { COUNTED = 500 };
 
-/* Requests, without unit and what frames them. */
+/* Requests: PDUs, without the unit and the framing. */
 typedef struct asked {
     const char *name;
     uint16_t length;
@@ -99,7 +99,7 @@ static void begin(int is_rtu)
         fail("socketpair");
     memset(&server, 0, sizeof server);
     if (is_rtu) {
-        /* A frame ends where nothing more is there: libmodbus keeps no silence. */
+        /* A request ends when no more bytes are there: libmodbus does not wait for silence. */
         if (mbm_tty_attach(&tty, ends[0]) != 0)
             fail("tty");
         port = mbm_tty_port(&tty);
@@ -127,7 +127,7 @@ static void end(void)
     close(ends[1]);
 }
 
-/* Both answer alike, byte for byte. */
+/* Counts the instructions of both servers. Their responses must agree, byte for byte. */
 static void count(int is_rtu)
 {
     void (*const serves[])(void) = {serve_by_libmodbus, serve_by_mbm};

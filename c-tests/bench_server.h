@@ -1,4 +1,4 @@
-/* What the parts of the bench of servers share. */
+/* What the files of the server benchmark share. */
 #ifndef BENCH_SERVER_H
 #define BENCH_SERVER_H
 
@@ -8,7 +8,7 @@
 
 enum { UNIT = 17, MOST = 260 };
 
-/* What both servers serve: four tables with one pattern. */
+/* The unit that both servers serve: four tables filled with one pattern. */
 extern mbm_unit unit;
 extern modbus_mapping_t *mapping;
 
@@ -18,10 +18,10 @@ void fail(const char *what);
 /* Fills the tables of both servers. */
 void prepare_tables(void);
 
-/* Requests per second of two server loops with 32 connections. */
+/* Measures the requests per second of two server loops with 32 connections. */
 void compare_loops(void);
 
-/* The instructions that loops execute for a request, for callgrind to count. */
+/* Runs the loops for callgrind, which counts the instructions of each request. */
 void count_loops(void);
 
 #endif

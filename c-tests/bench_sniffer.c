@@ -1,6 +1,6 @@
-/* What a sniffer costs for each byte of a line, fed byte by byte and frame by
- * frame; for callgrind, which scripts/bench-sniffer runs. Each case checks how many
- * events it gave, so that a sniffer that finds less is not taken for a faster one. */
+/* Runs a sniffer on the bytes of a line, fed byte by byte and frame by frame, for
+ * callgrind, which scripts/bench-sniffer starts. Each case checks the number of events, so
+ * that a sniffer that finds less is not taken for a faster one. */
 #include "crc.h"
 #include "mbm.h"
 
@@ -11,18 +11,18 @@
 
 enum { UNIT = 17, EXCHANGES = 100, MICROS = 87, SILENCE = 1750, MOST = 600 };
 
-/* A line of bytes, and when each of them arrives. */
+/* The bytes of a line and the time at which each of them arrives. */
 typedef struct line {
     uint8_t bytes[EXCHANGES * MOST];
     uint32_t times[EXCHANGES * MOST];
     size_t length;
     uint32_t now;
-    uint32_t each, between; /* microseconds of a byte, and after a frame */
+    uint32_t each, between; /* microseconds that a byte takes, and of silence after a frame */
 } line;
 
 typedef struct events {
     unsigned of_kind[7];
-    size_t told; /* bytes */
+    size_t reported; /* bytes of all events */
 } events;
 
 static line bus;
@@ -75,7 +75,7 @@ static void put_ascii(const uint8_t *pdu, size_t length)
     put((const uint8_t *)text, at);
 }
 
-/* Function 03 of so many registers, and the reply. */
+/* Appends a request of function 03 for `registers` registers, and its reply. */
 static void exchange(char framing, unsigned registers, unsigned damage)
 {
     uint8_t request[5] = {3, 0, 7, 0, (uint8_t)registers}, reply[2 + 250] = {3};
@@ -108,18 +108,18 @@ static void noise(size_t count)
     }
 }
 
-static void listen(events *seen, uint32_t now)
+static void collect_events(events *seen, uint32_t now)
 {
     mbm_event event;
 
     while (mbm_sniffer_next(&sniffer, now, &event)) {
         seen->of_kind[event.kind]++;
-        seen->told += event.length;
+        seen->reported += event.length;
     }
 }
 
-/* Feeds the line in pieces of `piece` bytes; 0 is a frame at once. */
-static events hear(uint8_t framing, size_t piece)
+/* Feeds the line in pieces of `piece` bytes. 0 means frame by frame. */
+static events feed(uint8_t framing, size_t piece)
 {
     static uint8_t (*const begin[])(mbm_sniffer *, uint8_t *, uint16_t) = {
         mbm_sniffer_beginRtu, mbm_sniffer_beginAscii, mbm_sniffer_beginTcp};
@@ -136,10 +136,10 @@ static events hear(uint8_t framing, size_t piece)
                 break;
         at += mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, bus.bytes + at, (uint16_t)count,
                                bus.times[at + count - 1]);
-        listen(&seen, bus.times[at - 1]);
+        collect_events(&seen, bus.times[at - 1]);
     }
     CALLGRIND_TOGGLE_COLLECT;
-    listen(&seen, bus.now + 500000);
+    collect_events(&seen, bus.now + 500000);
     return seen;
 }
 
@@ -151,7 +151,9 @@ static void clear(uint32_t each, uint32_t between)
     bus.between = between;
 }
 
-/* Counts one case: so many requests, replies and damaged frames must be told. */
+/* Counts the instructions of one case. The sniffer must report all bytes. Unless `wanted`
+ * is 0, it must report that number of requests and of replies, `damaged` of them with a bad
+ * CRC. */
 static void count(const char *name, const char *how, uint8_t kind, size_t piece, unsigned wanted,
                   unsigned damaged)
 {
@@ -159,17 +161,17 @@ static void count(const char *name, const char *how, uint8_t kind, size_t piece,
     events seen;
 
     CALLGRIND_ZERO_STATS;
-    seen = hear(kind, piece);
+    seen = feed(kind, piece);
     snprintf(title, sizeof title, "%s\t%s\t%zu", name, how, bus.length);
     CALLGRIND_DUMP_STATS_AT(title);
-    if (seen.told != bus.length ||
+    if (seen.reported != bus.length ||
         (wanted && (seen.of_kind[MBM_EVENT_REQUEST] != wanted ||
                     seen.of_kind[MBM_EVENT_REPLY] + seen.of_kind[MBM_EVENT_BAD_CRC] != wanted ||
                     seen.of_kind[MBM_EVENT_BAD_CRC] != damaged))) {
         fprintf(stderr,
                 "bench_sniffer: %s: %u requests, %u replies, %u damaged, %zu of %zu bytes\n", title,
                 seen.of_kind[MBM_EVENT_REQUEST], seen.of_kind[MBM_EVENT_REPLY],
-                seen.of_kind[MBM_EVENT_BAD_CRC], seen.told, bus.length);
+                seen.of_kind[MBM_EVENT_BAD_CRC], seen.reported, bus.length);
         exit(1);
     }
 }

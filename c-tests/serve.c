@@ -1,10 +1,10 @@
-/* Serves everything that support/served.h has, for peers of another house:
+/* Serves everything that support/served.h has, to Modbus programs of other projects:
  *
  *     serve rtu | ascii | tcp | rtu-over-tcp
  *
- * Prints `ready PATH` or `ready PORT`, and serves until its input ends. For each
- * line of that it prints how many frames unit 17 has heard: who asks without a
- * response to come sees so that it was heard. */
+ * Prints `ready PATH` or `ready PORT`, and serves until its input ends. For each line of
+ * its input it prints how many frames unit 17 has received. So a test that sends a request
+ * without a response can check that the request arrived. */
 #include "served.h"
 
 #include <stdio.h>

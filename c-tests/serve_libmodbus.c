@@ -1,5 +1,5 @@
-/* libmodbus servers for scripts: unit 17 behind a terminal, and any unit over TCP.
- * Prints `ready PATH PORT` and serves until its standard input ends. */
+/* libmodbus servers for scripts: unit 17 on a pty, and any unit over TCP. Prints `ready
+ * PATH PORT` and serves until its standard input ends. */
 #include "pty.h"
 #include "server.h"
 #include "tcp_server.h"
@@ -21,7 +21,7 @@ int main(void)
 {
     static server rtu;
     static tcp_server tcp;
-    pty line; /* what a client opens; the server's own has one end only with a name */
+    pty line; /* the pty that a client opens; libmodbus's own end is the only one with a name */
 
     server_start(&rtu, 17);
     tcp_server_start(&tcp);

@@ -1,12 +1,12 @@
-/* Arguments, objects and buffers of no use: a status, never a crash, and
- * nothing malformed on the wire. */
+/* Bad arguments, objects and buffers: each call returns a status, never crashes, and sends
+ * nothing malformed. */
 #include "sim.h"
 #include "test.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* The functions that make a request. */
+/* Calls the functions that make a request. */
 static void all_requests_answer(mbm_master *m, uint8_t status)
 {
     IS(status, mbm_master_readCoils(m, 0, 1));
@@ -25,7 +25,7 @@ static void all_requests_answer(mbm_master *m, uint8_t status)
     assert_int_equal(mbm_master_requestFrom(m, 0, 1), 0);
 }
 
-/* All others but begin, setBuffers and statusText. */
+/* Calls all others except begin, setBuffers and statusText. */
 static void all_others_answer(mbm_master *m, uint8_t status)
 {
     mbm_turn turn = {0};
@@ -132,8 +132,8 @@ static void an_object_without_buffers_makes_no_request(void **state)
     IS(MBM_NOT_INITIALISED, mbm_master_poll(&m));
 }
 
-/* requestFrom has no status of its own, so status must have it. */
-static void status_says_why_request_from_gave_nothing(void **state)
+/* requestFrom returns a number of words and no status, so the program needs mbm_master_status. */
+static void status_says_why_request_from_returned_0(void **state)
 {
     mbm_master m;
     NODE;
@@ -189,14 +189,14 @@ static void a_port_without_its_three_hooks_is_refused(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(&m, 1, &clock_less));
     IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(&m, 1, &empty));
     all_requests_answer(&m, MBM_NOT_INITIALISED);
-    /* One that was begun keeps what it had. */
+    /* A begin that is refused leaves a master that was begun before as it was. */
     IS(MBM_INVALID_ARGUMENT, mbm_master_beginRtu(n, 1, &empty));
     assert_int_equal(mbm_master_getSlaveID(n), 17);
     sim_answer(s, 1, 500, "11 03 02 00 01 +");
     OK(mbm_master_readHoldingRegisters(n, 0, 1));
 }
 
-static void forbidden_quantities_are_answered_3_with_nothing_sent(void **state)
+static void forbidden_quantities_return_3_and_nothing_is_sent(void **state)
 {
     static const uint16_t beyond[] = {0, 2001, 2048, 4096, 32768, 65535};
     static const uint16_t registers[] = {0, 126, 128, 256, 257, 512, 32769, 65535};
@@ -225,7 +225,7 @@ static void forbidden_quantities_are_answered_3_with_nothing_sent(void **state)
     sim_assert_order(s, "PWO", "");
 }
 
-static void ranges_beyond_65535_are_answered_2_with_nothing_sent(void **state)
+static void ranges_beyond_65535_return_2_and_nothing_is_sent(void **state)
 {
     NODE;
 
@@ -239,12 +239,12 @@ static void ranges_beyond_65535_are_answered_2_with_nothing_sent(void **state)
     IS(2, mbm_master_readWriteMultipleRegisters(n, 0, 1, 65535, 2));
     assert_int_equal(mbm_master_requestFrom(n, 65535, 2), 0);
     IS(2, mbm_master_status(n));
-    /* A device looks at the quantity first. */
+    /* The quantity is checked before the address, as a device does. */
     IS(3, mbm_master_readHoldingRegisters(n, 65535, 126));
     assert_int_equal(s->sent, 0);
 }
 
-static void request_from_gives_0_for_what_is_refused_after_a_read(void **state)
+static void request_from_returns_0_if_it_is_refused_after_a_read(void **state)
 {
     NODE;
 
@@ -260,7 +260,7 @@ static void request_from_gives_0_for_what_is_refused_after_a_read(void **state)
     IS(MBM_PENDING, mbm_master_status(n));
 }
 
-static void the_last_address_is_in_reach(void **state)
+static void the_last_address_can_be_read_and_written(void **state)
 {
     NODE;
 
@@ -274,15 +274,15 @@ static void the_last_address_is_in_reach(void **state)
     OK(mbm_master_readWriteMultipleRegisters(n, 65535, 1, 65535, 1));
 }
 
-/* Buffers of exactly these sizes, so that sanitizers see one byte more. */
-typedef struct lent {
+/* Buffers of exactly these sizes, so that sanitizers report an access to one byte more. */
+typedef struct buffers {
     uint16_t *response, *transmit;
     uint8_t *frame;
-} lent;
+} buffers;
 
-static lent lend(sim *s, uint16_t response, uint16_t transmit, uint16_t frame)
+static buffers give_buffers(sim *s, uint16_t response, uint16_t transmit, uint16_t frame)
 {
-    lent b;
+    buffers b;
 
     b.response = (uint16_t *)calloc(response + 1u, 2);
     b.transmit = (uint16_t *)calloc(transmit + 1u, 2);
@@ -295,7 +295,7 @@ static lent lend(sim *s, uint16_t response, uint16_t transmit, uint16_t frame)
     return b;
 }
 
-static void take_back(sim *s, lent b)
+static void free_buffers(sim *s, buffers b)
 {
     OK(mbm_master_setBuffers(&s->master, s->response, 125, s->transmit, 123, s->buffer, 256));
     free(b.response);
@@ -323,7 +323,7 @@ static void a_request_is_sent_whole_or_not_at_all(void **state)
     mbm_master_setQuietTime(n, 0);
     mbm_master_setResponseTimeout(n, 50);
     for (bytes = 8; bytes < 24; bytes++) {
-        lent b = lend(s, 4, 4, bytes);
+        buffers b = give_buffers(s, 4, 4, bytes);
 
         s->sent = 0;
         mbm_master_writeSingleRegister(n, 0, 1);
@@ -340,17 +340,17 @@ static void a_request_is_sent_whole_or_not_at_all(void **state)
         IS(bytes >= 21 ? MBM_RESPONSE_TIMED_OUT : MBM_BUFFER_TOO_SMALL,
            mbm_master_readWriteMultipleRegisters(n, 0, 1, 0, 4));
         assert_int_equal(s->sent, bytes >= 21);
-        take_back(s, b);
+        free_buffers(s, b);
     }
 }
 
-static void a_reply_that_passes_the_frame_buffer_is_too_long_and_changes_nothing(void **state)
+static void a_reply_longer_than_the_frame_buffer_is_too_long_and_changes_nothing(void **state)
 {
     uint16_t bytes;
     NODE;
 
     for (bytes = 8; bytes <= 13; bytes++) {
-        lent b = lend(s, 4, 4, bytes);
+        buffers b = give_buffers(s, 4, 4, bytes);
 
         s->answered = 0;
         sim_answer(s, 1, 500, "11 03 08 11 11 22 22 33 33 44 44 +");
@@ -361,18 +361,18 @@ static void a_reply_that_passes_the_frame_buffer_is_too_long_and_changes_nothing
         IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_master_readHoldingRegisters(n, 0, 4));
         sim_answer(s, 1, 500, "11 03 02 12 34 +");
         OK(mbm_master_readHoldingRegisters(n, 0, 1));
-        take_back(s, b);
+        free_buffers(s, b);
     }
 }
 
-static void buffers_for_64_words_pass_on_what_the_device_says_to_66(void **state)
+static void a_read_of_66_words_with_buffers_for_64_returns_the_devices_exception(void **state)
 {
     char reply[600] = "11 03 84";
     unsigned i;
-    lent b;
+    buffers b;
     NODE;
 
-    b = lend(s, 64, 64, MBM_FRAME_BYTES(64));
+    b = give_buffers(s, 64, 64, MBM_FRAME_BYTES(64));
     sim_answer(s, 1, 500, "11 83 02 +");
     IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_master_readHoldingRegisters(n, 0, 66));
     sim_assert_sent(s, 0, "11 03 00 00 00 42 +");
@@ -384,15 +384,15 @@ static void buffers_for_64_words_pass_on_what_the_device_says_to_66(void **state
     for (i = 0; i < 64; i++)
         assert_int_equal(b.response[i], 0);
     assert_int_equal(mbm_master_available(n), 0);
-    take_back(s, b);
+    free_buffers(s, b);
 }
 
-static void a_reply_that_passes_the_response_words_changes_none(void **state)
+static void a_reply_longer_than_the_response_words_changes_none(void **state)
 {
-    lent b;
+    buffers b;
     NODE;
 
-    b = lend(s, 2, 0, 256);
+    b = give_buffers(s, 2, 0, 256);
     sim_answer(s, 1, 500, "11 03 06 11 11 22 22 33 33 +");
     IS(MBM_BUFFER_TOO_SMALL, mbm_master_readHoldingRegisters(n, 0, 3));
     IS(MBM_BUFFER_TOO_SMALL, mbm_master_status(n));
@@ -402,20 +402,20 @@ static void a_reply_that_passes_the_response_words_changes_none(void **state)
     assert_int_equal(b.response[1], 0);
     sim_answer(s, 1, 500, "11 01 04 11 11 22 22 +");
     OK(mbm_master_readCoils(n, 0, 32));
-    take_back(s, b);
-    b = lend(s, 0, 0, 256);
+    free_buffers(s, b);
+    b = give_buffers(s, 0, 0, 256);
     sim_answer(s, 1, 500, "11 03 02 11 11 +");
     IS(MBM_BUFFER_TOO_SMALL, mbm_master_readHoldingRegisters(n, 0, 1));
     assert_int_equal(mbm_master_getResponseBuffer(n, 0), 0xFFFF);
-    take_back(s, b);
+    free_buffers(s, b);
 }
 
-static void writes_beyond_the_transmit_words_are_answered_3_with_nothing_sent(void **state)
+static void writes_beyond_the_transmit_words_return_3_and_nothing_is_sent(void **state)
 {
-    lent b;
+    buffers b;
     NODE;
 
-    b = lend(s, 2, 2, 256);
+    b = give_buffers(s, 2, 2, 256);
     IS(3, mbm_master_writeMultipleRegisters(n, 0, 3));
     IS(3, mbm_master_writeMultipleCoils(n, 0, 33));
     IS(3, mbm_master_readWriteMultipleRegisters(n, 0, 1, 0, 3));
@@ -424,33 +424,33 @@ static void writes_beyond_the_transmit_words_are_answered_3_with_nothing_sent(vo
     OK(mbm_master_writeMultipleCoils(n, 0, 32));
     sim_answer(s, 1, 500, "11 10 00 00 00 02 +");
     OK(mbm_master_writeMultipleRegisters(n, 0, 2));
-    take_back(s, b);
+    free_buffers(s, b);
 }
 
 static void single_writes_need_no_transmit_words(void **state)
 {
-    lent b;
+    buffers b;
     NODE;
 
-    b = lend(s, 0, 0, 16);
+    b = give_buffers(s, 0, 0, 16);
     sim_answer(s, 1, 500, "11 06 00 01 12 34 +");
     OK(mbm_master_writeSingleRegister(n, 1, 0x1234));
     sim_answer(s, 1, 500, "11 16 00 01 12 34 56 78 +");
     OK(mbm_master_maskWriteRegister(n, 1, 0x1234, 0x5678));
     sim_answer(s, 1, 500, "11 05 00 01 FF 00 +");
     OK(mbm_master_writeSingleCoil(n, 1, 1));
-    take_back(s, b);
+    free_buffers(s, b);
 }
 
-static void a_frame_buffer_of_64_kilobytes_is_no_trouble(void **state)
+static void a_frame_buffer_of_64_kilobytes_works(void **state)
 {
-    lent b;
+    buffers b;
     NODE;
 
-    b = lend(s, 125, 123, 65535);
+    b = give_buffers(s, 125, 123, 65535);
     sim_answer(s, 1, 500, "00 00 / 11 03 02 12 34 +");
     OK(mbm_master_readHoldingRegisters(n, 1, 1));
-    take_back(s, b);
+    free_buffers(s, b);
 }
 
 int main(void)
@@ -460,22 +460,22 @@ int main(void)
         SIM_TEST(a_zeroed_object_is_not_initialised_and_stays_zero),
         SIM_TEST(every_status_has_a_text),
         SIM_TEST(an_object_without_buffers_makes_no_request),
-        SIM_TEST(status_says_why_request_from_gave_nothing),
+        SIM_TEST(status_says_why_request_from_returned_0),
         SIM_TEST(an_object_with_buffers_but_never_begun_makes_no_request),
         SIM_TEST(an_object_with_buffers_but_never_begun_has_the_default_slave_id),
         SIM_TEST(a_port_without_its_three_hooks_is_refused),
-        SIM_TEST(forbidden_quantities_are_answered_3_with_nothing_sent),
-        SIM_TEST(ranges_beyond_65535_are_answered_2_with_nothing_sent),
-        SIM_TEST(request_from_gives_0_for_what_is_refused_after_a_read),
-        SIM_TEST(the_last_address_is_in_reach),
+        SIM_TEST(forbidden_quantities_return_3_and_nothing_is_sent),
+        SIM_TEST(ranges_beyond_65535_return_2_and_nothing_is_sent),
+        SIM_TEST(request_from_returns_0_if_it_is_refused_after_a_read),
+        SIM_TEST(the_last_address_can_be_read_and_written),
         SIM_TEST(a_frame_buffer_below_8_bytes_is_refused),
         SIM_TEST(a_request_is_sent_whole_or_not_at_all),
-        SIM_TEST(a_reply_that_passes_the_frame_buffer_is_too_long_and_changes_nothing),
-        SIM_TEST(buffers_for_64_words_pass_on_what_the_device_says_to_66),
-        SIM_TEST(a_reply_that_passes_the_response_words_changes_none),
-        SIM_TEST(writes_beyond_the_transmit_words_are_answered_3_with_nothing_sent),
+        SIM_TEST(a_reply_longer_than_the_frame_buffer_is_too_long_and_changes_nothing),
+        SIM_TEST(a_read_of_66_words_with_buffers_for_64_returns_the_devices_exception),
+        SIM_TEST(a_reply_longer_than_the_response_words_changes_none),
+        SIM_TEST(writes_beyond_the_transmit_words_return_3_and_nothing_is_sent),
         SIM_TEST(single_writes_need_no_transmit_words),
-        SIM_TEST(a_frame_buffer_of_64_kilobytes_is_no_trouble),
+        SIM_TEST(a_frame_buffer_of_64_kilobytes_works),
     };
 
     return cmocka_run_group_tests_name("bad input", tests, NULL, NULL);

@@ -1,9 +1,9 @@
-/* Ports that stall, lie or die, and clocks that wrap: a status, the driver off,
- * and the next request works. Unit 17 is 11 on the wire. */
+/* Ports that stall, lie or lose the link, and clocks that wrap: the call ends with a
+ * status, the driver is off, and the next request works. Unit 17 is 11 on the wire. */
 #include "sim.h"
 #include "test.h"
 
-static void write_may_take_a_byte_at_a_time(void **state)
+static void write_may_accept_a_byte_at_a_time(void **state)
 {
     unsigned i;
     NODE;
@@ -17,7 +17,7 @@ static void write_may_take_a_byte_at_a_time(void **state)
     assert_int_equal(s->frames[0].bytes[7 + 2 * 99], 99);
 }
 
-static void read_may_give_a_byte_at_a_time(void **state)
+static void read_may_return_a_byte_at_a_time(void **state)
 {
     NODE;
 
@@ -27,7 +27,7 @@ static void read_may_give_a_byte_at_a_time(void **state)
     sim_reads(s, 500);
 }
 
-static void a_write_that_never_takes_a_byte_is_a_busy_line(void **state)
+static void a_write_that_never_accepts_a_byte_is_a_busy_line(void **state)
 {
     NODE;
 
@@ -105,13 +105,14 @@ static void a_link_lost_mid_write_switches_the_driver_off(void **state)
     assert_int_equal(s->sent, 9);
 }
 
-/* The half of a request would grow together with the next one. */
+/* Without the gap, a device would take the sent half of the request and the next request
+ * for one frame. */
 static void the_gap_is_kept_after_a_link_lost_mid_write(void **state)
 {
     NODE;
 
     (void)n;
-    s->character = 0; /* what is handed over is on the wire */
+    s->character = 0; /* bytes are on the wire as soon as they are handed over */
     s->cut_allowed = 1;
     s->write_dies_at = 5;
     IS(MBM_LINK_LOST, sim_read_one(s));
@@ -120,7 +121,7 @@ static void the_gap_is_kept_after_a_link_lost_mid_write(void **state)
     assert_in_range(s->frames[1].begin - s->frames[0].end, 4000, 4100);
 }
 
-static void hooks_that_claim_more_than_asked_are_not_believed(void **state)
+static void hooks_that_claim_too_many_bytes_do_no_harm(void **state)
 {
     NODE;
 
@@ -134,8 +135,8 @@ static void hooks_that_claim_more_than_asked_are_not_believed(void **state)
     assert_int_equal(s->frames[1].length, 8);
 }
 
-/* One read with its gap, hold and reply takes 12 ms; the wrap is put at each
- * quarter of a character of it. */
+/* One read with its gap, hold and reply takes 12 ms. The clock wraps at each quarter of a
+ * character in this time. */
 static void the_clock_may_wrap_at_any_time_of_a_transaction(void **state)
 {
     uint32_t ahead;
@@ -189,15 +190,15 @@ static void the_clock_may_wrap_in_a_long_wait(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        SIM_TEST(write_may_take_a_byte_at_a_time),
-        SIM_TEST(read_may_give_a_byte_at_a_time),
-        SIM_TEST(a_write_that_never_takes_a_byte_is_a_busy_line),
+        SIM_TEST(write_may_accept_a_byte_at_a_time),
+        SIM_TEST(read_may_return_a_byte_at_a_time),
+        SIM_TEST(a_write_that_never_accepts_a_byte_is_a_busy_line),
         SIM_TEST(a_flush_that_never_drains_is_a_busy_line),
         SIM_TEST(a_link_lost_in_the_gap_sends_nothing),
         SIM_TEST(a_link_lost_mid_reply_ends_the_request_at_once),
         SIM_TEST(a_link_lost_mid_write_switches_the_driver_off),
         SIM_TEST(the_gap_is_kept_after_a_link_lost_mid_write),
-        SIM_TEST(hooks_that_claim_more_than_asked_are_not_believed),
+        SIM_TEST(hooks_that_claim_too_many_bytes_do_no_harm),
         SIM_TEST(the_clock_may_wrap_at_any_time_of_a_transaction),
         SIM_TEST(the_clock_may_wrap_in_a_long_wait),
     };

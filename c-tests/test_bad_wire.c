@@ -1,6 +1,6 @@
-/* What becomes of five transactions of the facade when the first meets a fault.
- * The device is a script on a pty. Prints the table of docs/reports/fault-table.md, and
- * fails if a row is worse than it was. */
+/* How five transactions of the master end when the first meets a fault. The device is a
+ * script on a pty. Prints the table of docs/reports/fault-table.md, and fails if a row gets
+ * worse. */
 #include "faults.h"
 #include "node.h"
 #include "test.h"
@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* '.' right, 'F' a failed call, 'W' success with wrong data. */
+/* Returns '.' for right data, 'F' for a failed call, 'W' for success with wrong data. */
 static char transact(node *n, const fault *f, unsigned number, uint8_t *status)
 {
     unsigned i;
@@ -28,7 +28,7 @@ static char transact(node *n, const fault *f, unsigned number, uint8_t *status)
     return '.';
 }
 
-/* Plays a fault; returns the status of the first transaction. */
+/* Plays a fault. Returns the status of the first transaction. */
 static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRANSACTIONS + 1])
 {
     responder device;

@@ -1,8 +1,8 @@
-/* Packed coils, held against the examples of V1.1b3. */
+/* Packed coils, checked against the examples of V1.1b3. */
 #include "mbm.h"
 #include "test.h"
 
-/* The reply of 6.1: coils 20 to 38, on the wire 19 to 37. */
+/* The response of 6.1: coils 20 to 38, which have the addresses 19 to 37 on the wire. */
 static const uint8_t coils_19[] = {0xCD, 0x6B, 0x05};
 static const uint16_t words_19[] = {0x6BCD, 0x0005};
 static const uint8_t on_19[19] = {1, 0, 1, 1, 0, 0, 1, 1, 1, 1, 0, 1, 0, 1, 1, 0, 1, 0, 1};
@@ -21,7 +21,7 @@ static void a_coil_is_found_by_its_address(void **state)
     }
 }
 
-static void a_coil_outside_has_no_state(void **state)
+static void a_coil_outside_of_the_words_has_no_state(void **state)
 {
     static const uint16_t outside[] = {0, 18, 38, 39, 65535};
     uint8_t bytes[3] = {0};
@@ -121,7 +121,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_coil_is_found_by_its_address),
-        cmocka_unit_test(a_coil_outside_has_no_state),
+        cmocka_unit_test(a_coil_outside_of_the_words_has_no_state),
         cmocka_unit_test(setting_a_coil_leaves_the_others),
         cmocka_unit_test(coils_are_packed_lowest_bit_first),
         cmocka_unit_test(coils_are_unpacked_to_one_byte_each),

@@ -1,5 +1,5 @@
-/* The client for C against libmodbus: RTU over a pty, TCP over loopback; and what
- * it says to bad calls. */
+/* The client against libmodbus, RTU over a pty and TCP over loopback, and how the client
+ * refuses bad calls. */
 #define _GNU_SOURCE
 #include "await.h"
 #include "client.h"
@@ -21,7 +21,7 @@ static void ends(uint8_t status, mbm_clientRequest *request, uint8_t queued)
     assert_int_equal(asker_wait(&a, request), status);
 }
 
-/* Every function that libmodbus's server has, against its own memory. */
+/* Calls every function that libmodbus's server has, and compares with the server's memory. */
 static void every_function_of_libmodbus(modbus_mapping_t *memory)
 {
     uint16_t words[125], values[] = {0x1234, 0xFEDC, 7};
@@ -141,7 +141,7 @@ static void sixteen_requests_are_pipelined(void **state)
     tcp_server_stop(&s);
 }
 
-static void a_lost_connection_is_told_and_made_anew(void **state)
+static void a_lost_connection_is_reported_and_made_anew(void **state)
 {
     mbm_clientRequest r = asker_request(UNIT, NULL, 0, NULL);
     mbm_clientRequest waiting = asker_request(UNIT, NULL, 0, NULL);
@@ -170,8 +170,8 @@ static void a_lost_connection_is_told_and_made_anew(void **state)
 static unsigned called;
 static uint8_t polled_inside;
 
-/* Queues itself again, thrice, and tries what is refused. */
-static void again(void *context, mbm_clientRequest *request)
+/* Queues the request again, three times, and tries a poll, which is refused. */
+static void queue_again(void *context, mbm_clientRequest *request)
 {
     assert_ptr_equal(context, &a);
     assert_int_equal(request->status, MBM_OK);
@@ -189,7 +189,7 @@ static void a_callback_may_queue_and_may_not_poll(void **state)
     tcp_server_start(&s);
     asker_begin_tcp(&a, s.port);
     called = 0;
-    r.done = again;
+    r.done = queue_again;
     r.context = &a;
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &r, 0, 1));
     IS(MBM_BUSY, mbm_client_readHoldingRegisters(&a.client, &r, 0, 1));
@@ -200,7 +200,7 @@ static void a_callback_may_queue_and_may_not_poll(void **state)
     tcp_server_stop(&s);
 }
 
-static void the_facade_uses_the_line_between_the_clients_requests(void **state)
+static void the_master_uses_the_line_between_the_clients_requests(void **state)
 {
     uint16_t words[4], more[4], none[1];
     uint8_t frame[64];
@@ -239,7 +239,7 @@ static void the_facade_uses_the_line_between_the_clients_requests(void **state)
     server_stop(&s);
 }
 
-static void a_facade_gets_no_line_that_carries_other_frames(void **state)
+static void a_master_gets_no_line_that_carries_other_frames(void **state)
 {
     static mbm_client tcp, ascii;
     static mbm_master node;
@@ -259,7 +259,7 @@ static void a_facade_gets_no_line_that_carries_other_frames(void **state)
     OK(mbm_client_beginAscii(&ascii, &a.port, a.incoming, 513));
     IS(MBM_INVALID_ARGUMENT, mbm_client_suspend(&ascii, &node));
     OK(mbm_client_poll(&ascii));
-    /* What the program does with it is its own. */
+    /* A program may suspend a TCP client for a purpose of its own. */
     OK(mbm_client_suspend(&tcp, NULL));
     OK(mbm_client_resume(&tcp, NULL));
     pty_close(&line);
@@ -321,7 +321,7 @@ static void bad_calls_are_refused_with_a_status(void **state)
     server_stop(&s);
 }
 
-static void a_broadcast_reaches_and_a_rest_is_kept(void **state)
+static void a_broadcast_arrives_and_the_delay_after_it_is_kept(void **state)
 {
     mbm_clientUnit units[1] = {{0}};
     mbm_clientRequest r = asker_request(0, NULL, 0, NULL);
@@ -352,12 +352,12 @@ int main(void)
         cmocka_unit_test(every_function_over_a_pty),
         cmocka_unit_test(every_function_over_tcp),
         cmocka_unit_test(sixteen_requests_are_pipelined),
-        cmocka_unit_test(a_lost_connection_is_told_and_made_anew),
+        cmocka_unit_test(a_lost_connection_is_reported_and_made_anew),
         cmocka_unit_test(a_callback_may_queue_and_may_not_poll),
-        cmocka_unit_test(the_facade_uses_the_line_between_the_clients_requests),
-        cmocka_unit_test(a_facade_gets_no_line_that_carries_other_frames),
+        cmocka_unit_test(the_master_uses_the_line_between_the_clients_requests),
+        cmocka_unit_test(a_master_gets_no_line_that_carries_other_frames),
         cmocka_unit_test(bad_calls_are_refused_with_a_status),
-        cmocka_unit_test(a_broadcast_reaches_and_a_rest_is_kept),
+        cmocka_unit_test(a_broadcast_arrives_and_the_delay_after_it_is_kept),
     };
 
     return cmocka_run_group_tests_name("client", tests, NULL, NULL);

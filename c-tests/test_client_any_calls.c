@@ -1,6 +1,6 @@
-/* The client under calls of any order with any arguments, from callbacks too, over
- * ports that take little, nothing, bring noise, answer, or are lost, and clocks that
- * jump: every request ends once, and all end when nothing more is asked. */
+/* Calls the client's functions in any order with any arguments, also from callbacks. The
+ * ports accept few bytes or none, deliver noise or answers, or lose the link, and the
+ * clocks jump. Every request ends once, and all end when no more are queued. */
 #include "mbm.h"
 #include "test.h"
 
@@ -20,7 +20,7 @@ static struct {
 static mbm_clientUnit units[3];
 static mbm_counters counters;
 static uint16_t data[WORDS];
-/* Requests as they arrive: short ones, and one with many numbers and counts. */
+/* Bodies for forward: short requests, and one with many numbers and counts. */
 static const uint8_t bodies[4][WORDS] = {
     {0, 1, 0, 2}, {0, 0, 0, 0, 2, 0x12, 0x34}, {14, 1, 0}, {7, 6, 0, 1, 0, 0, 0, 1}};
 static uint8_t incoming[1100], outgoing[1100];
@@ -31,27 +31,27 @@ static struct {
     size_t count;
     uint32_t now;
     int mode, is_tcp;
-    int calm; /* takes and brings all at once, and nothing of its own */
+    int calm; /* 1: accepts everything at once and delivers no bytes */
 } wire;
 
 static uint64_t random_state;
 
-static unsigned chance(unsigned of)
+static unsigned chance(unsigned limit)
 {
     random_state ^= random_state << 13;
     random_state ^= random_state >> 7;
     random_state ^= random_state << 17;
-    return (unsigned)(random_state >> 33) % of;
+    return (unsigned)(random_state >> 33) % limit;
 }
 
-static uint16_t any(unsigned of)
+static uint16_t any(unsigned limit)
 {
-    return (uint16_t)chance(of);
+    return (uint16_t)chance(limit);
 }
 
-static uint8_t byte(unsigned of)
+static uint8_t byte(unsigned limit)
 {
-    return (uint8_t)chance(of);
+    return (uint8_t)chance(limit);
 }
 
 static void arrive(const uint8_t *bytes, size_t count)
@@ -87,14 +87,14 @@ static int16_t wire_read(void *context, uint8_t *bytes, uint16_t capacity)
     return (int16_t)count;
 }
 
-/* Something that may answer what was sent. */
+/* Delivers something that may answer the bytes that were sent. */
 static void answer(const uint8_t *bytes, size_t count)
 {
     uint8_t frame[16];
 
     if (!wire.is_tcp || count < 9) {
         if (chance(3) == 0)
-            arrive(bytes, count); /* an echo, which answers 05, 06 and 08 */
+            arrive(bytes, count); /* an echo, which is the right reply to 05, 06 and 08 */
         return;
     }
     memcpy(frame, bytes, 8);
@@ -161,7 +161,7 @@ static void done(void *context, mbm_clientRequest *request)
         call(1);
 }
 
-static uint8_t ask(mbm_clientRequest *r)
+static uint8_t queue_one(mbm_clientRequest *r)
 {
     const mbm_rule rule = {.kind = byte(5), .bytes = byte(8)};
 
@@ -200,7 +200,7 @@ static void queue_any(void)
     uint8_t status;
 
     if (jobs[i].pending) {
-        assert_int_equal(ask(r), MBM_BUSY);
+        assert_int_equal(queue_one(r), MBM_BUSY);
         return;
     }
     memset(r, 0, sizeof *r);
@@ -211,7 +211,7 @@ static void queue_any(void)
     r->reply = chance(10) ? jobs[i].reply : NULL;
     r->replyBytes = chance(5) ? sizeof jobs[i].reply : any(10);
     r->transaction = chance(2) ? 0 : any(30);
-    status = ask(r);
+    status = queue_one(r);
     assert_int_equal(r->status, status);
     jobs[i].pending = status == MBM_PENDING;
 }
@@ -307,7 +307,7 @@ static void begin(unsigned seed)
     OK(mbm_client_setCounters(&client, &counters));
 }
 
-/* Whether the port takes something or nothing: what is asked comes to an end. */
+/* Polls until all requests have ended. The port accepts bytes or none. */
 static void all_end(void)
 {
     unsigned polls = 0;

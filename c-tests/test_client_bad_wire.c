@@ -1,5 +1,5 @@
-/* What becomes of five requests of a client when the first meets a fault: the
- * same faults as the facade's, and the same gate. */
+/* How five requests of a client end when the first meets a fault. The faults and the
+ * expected outcomes are the same as the master's. */
 #include "client.h"
 #include "faults.h"
 #include "test.h"
@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* '.' right, 'F' a failed request, 'W' success with wrong data. */
+/* Returns '.' for right data, 'F' for a failed request, 'W' for success with wrong data. */
 static char transact(asker *a, const fault *f, unsigned number, uint8_t *status)
 {
     uint16_t words[FAULT_REGISTERS];
@@ -32,7 +32,7 @@ static char transact(asker *a, const fault *f, unsigned number, uint8_t *status)
     return '.';
 }
 
-/* Plays a fault; returns the status of the first request. */
+/* Plays a fault. Returns the status of the first request. */
 static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRANSACTIONS + 1])
 {
     responder device;
@@ -60,7 +60,7 @@ static uint8_t outcome(const fault *f, uint8_t retries, char outcomes[FAULT_TRAN
     return first;
 }
 
-static void the_client_fares_as_well_as_the_facade(void **state)
+static void no_row_of_the_fault_table_is_worse_for_the_client(void **state)
 {
     char plain[FAULT_TRANSACTIONS + 1], retried[FAULT_TRANSACTIONS + 1];
     int worse = 0;
@@ -87,7 +87,7 @@ static void the_client_fares_as_well_as_the_facade(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_client_fares_as_well_as_the_facade),
+        cmocka_unit_test(no_row_of_the_fault_table_is_worse_for_the_client),
     };
 
     return cmocka_run_group_tests_name("client on a bad wire", tests, NULL, NULL);

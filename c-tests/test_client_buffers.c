@@ -1,8 +1,8 @@
-/* Storage of the program's that is not as the client expects it.
+/* Clients whose buffers and requests are used in ways that the client does not expect.
  *
- * The client takes parts of its buffers without a check. Buffers of the heap, no byte
- * longer than they are told, of many sizes: the port's hooks fill and read every byte
- * that they are offered, so that AddressSanitizer sees one that is outside. */
+ * The client accesses parts of its buffers without checks. The tests give it buffers of many
+ * sizes from malloc, exactly as long as begin is given. The port's hooks write and read every byte
+ * that they are given, so that AddressSanitizer reports one outside. */
 #include "mbm.h"
 #include "test.h"
 
@@ -16,26 +16,26 @@ typedef struct line {
     mbm_clientRequest requests[REQUESTS];
     uint8_t *incoming, *outgoing;
     uint16_t incoming_bytes, outgoing_bytes;
-    uint8_t sent[600]; /* what is to be answered */
+    uint8_t sent[600]; /* bytes that were sent and get an answer */
     size_t sent_bytes;
     uint32_t now;
     int is_tcp;
 } line;
 
-static uint32_t state_of_chance;
+static uint32_t random_state;
 static unsigned long sum;
 static uint16_t data[130];
 static uint8_t reply[REPLY];
 
 static uint32_t chance(uint32_t below)
 {
-    state_of_chance = state_of_chance * 1664525 + 1013904223;
-    return (state_of_chance >> 8) % below;
+    random_state = random_state * 1664525 + 1013904223;
+    return (random_state >> 8) % below;
 }
 
-/* Some bytes: noise, or of what was sent with a part of it changed, which on TCP looks
- * like responses of any length. */
-static int16_t offer(void *context, uint8_t *bytes, uint16_t capacity)
+/* Delivers noise or the sent bytes, with one part changed: on TCP they look like responses
+ * of any length. */
+static int16_t read_any(void *context, uint8_t *bytes, uint16_t capacity)
 {
     line *l = context;
     uint16_t count = (uint16_t)chance(capacity + 1u), i;
@@ -57,7 +57,7 @@ static int16_t offer(void *context, uint8_t *bytes, uint16_t capacity)
     return (int16_t)count;
 }
 
-static int16_t take(void *context, const uint8_t *bytes, uint16_t length)
+static int16_t write_some(void *context, const uint8_t *bytes, uint16_t length)
 {
     line *l = context;
     uint16_t count = (uint16_t)chance(length + 1u), i;
@@ -83,8 +83,8 @@ static void begin(line *l, unsigned framing)
     memset(l, 0, sizeof *l);
     memset(&port, 0, sizeof port);
     port.context = l;
-    port.read = offer;
-    port.write = take;
+    port.read = read_any;
+    port.write = write_some;
     port.micros = clock_of;
     l->is_tcp = framing == 3;
     l->incoming_bytes = (uint16_t)(17 + chance(chance(2) ? 8 : 600));
@@ -107,7 +107,7 @@ static void begin(line *l, unsigned framing)
     OK(mbm_client_setRetries(&l->client, (uint8_t)chance(3)));
 }
 
-static void ask(line *l, mbm_clientRequest *request)
+static void queue_request(line *l, mbm_clientRequest *request)
 {
     if (request->status == MBM_PENDING)
         return;
@@ -134,7 +134,7 @@ static void no_byte_outside_of_the_buffers_is_touched(void **state)
     unsigned round, step, i;
 
     (void)state;
-    state_of_chance = 7;
+    random_state = 7;
     for (round = 0; round < ROUNDS; round++) {
         begin(&l, round % 4);
         for (step = 0; step < STEPS; step++) {
@@ -149,7 +149,7 @@ static void no_byte_outside_of_the_buffers_is_touched(void **state)
                 break;
             case 2:
             case 3:
-            case 4: ask(&l, request); break;
+            case 4: queue_request(&l, request); break;
             default: (void)mbm_client_poll(&l.client);
             }
         }
@@ -165,14 +165,14 @@ static void no_byte_outside_of_the_buffers_is_touched(void **state)
 
 static int driver;
 
-static int16_t take_one(void *context, const uint8_t *bytes, uint16_t length)
+static int16_t write_one(void *context, const uint8_t *bytes, uint16_t length)
 {
     (void)context;
     (void)bytes;
     return length > 0;
 }
 
-static int16_t offer_nothing(void *context, uint8_t *bytes, uint16_t capacity)
+static int16_t read_nothing(void *context, uint8_t *bytes, uint16_t capacity)
 {
     (void)context;
     (void)bytes;
@@ -192,7 +192,7 @@ static void switch_off(void *context)
     driver--;
 }
 
-/* A client that is in the middle of sending a request, which is then zeroed. */
+/* Zeroes a request while its client is sending it. */
 static void zero_while_sent(line *l)
 {
     mbm_port port;
@@ -201,8 +201,8 @@ static void zero_while_sent(line *l)
     memset(l, 0, sizeof *l);
     memset(&port, 0, sizeof port);
     port.context = l;
-    port.read = offer_nothing;
-    port.write = take_one;
+    port.read = read_nothing;
+    port.write = write_one;
     port.micros = clock_of;
     port.preTransmission = switch_on;
     port.postTransmission = switch_off;

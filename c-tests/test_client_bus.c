@@ -1,6 +1,6 @@
-/* Several clients and several servers on one simulated multi-drop bus. A serial
- * line has one client by the standard; two that take turns work, and two that do not
- * get nothing wrong. */
+/* Several clients and several servers on one simulated multi-drop bus. By the standard a
+ * serial line has one client. Two clients that take turns work. Two that do not may fail,
+ * but get no wrong data. */
 #include "bus.h"
 #include "test.h"
 
@@ -103,8 +103,8 @@ static void done(void *context, mbm_clientRequest *request)
     wrong += differs;
 }
 
-/* Has a client read from some of the units. */
-static void ask(asker *a, unsigned first, unsigned count, unsigned requests)
+/* Queues reads of some of the units at a client. */
+static void queue_reads(asker *a, unsigned first, unsigned count, unsigned requests)
 {
     unsigned i;
 
@@ -132,7 +132,7 @@ static void clients_that_take_turns_are_answered_by_every_server(void **state)
     for (round = 0; round < ROUNDS; round++) {
         asker *a = &askers[round % CLIENTS];
 
-        ask(a, 1, SERVERS, MBM_CLIENT_DEPTH);
+        queue_reads(a, 1, SERVERS, MBM_CLIENT_DEPTH);
         while (mbm_client_poll(&a->client) == MBM_PENDING)
             pass();
     }
@@ -161,7 +161,7 @@ static void a_broadcast_reaches_every_server_at_once(void **state)
     assert_int_equal(line.collisions, 0);
 }
 
-static void clients_that_collide_get_nothing_wrong(void **state)
+static void clients_that_collide_get_no_wrong_data(void **state)
 {
     unsigned asked[CLIENTS] = {0}, i;
     uint64_t due[CLIENTS] = {0};
@@ -180,8 +180,9 @@ static void clients_that_collide_get_nothing_wrong(void **state)
             if (due[i] == 0) {
                 due[i] = line.now + any(NULL) % 200000;
             } else if (line.now >= due[i] && asked[i] < EACH) {
-                /* Two units each: of one unit, RTU cannot tell whose an answer is. */
-                ask(&askers[i], 1 + 2 * i, 2, 1);
+                /* Each client reads from two units of its own: RTU cannot tell which client
+                 * a reply of one unit is for. */
+                queue_reads(&askers[i], 1 + 2 * i, 2, 1);
                 asked[i]++;
                 due[i] = 0;
             }
@@ -200,7 +201,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(clients_that_take_turns_are_answered_by_every_server, begin),
         cmocka_unit_test_setup(a_broadcast_reaches_every_server_at_once, begin),
-        cmocka_unit_test_setup(clients_that_collide_get_nothing_wrong, begin),
+        cmocka_unit_test_setup(clients_that_collide_get_no_wrong_data, begin),
     };
 
     return cmocka_run_group_tests_name("clients and servers on one bus", tests, NULL, NULL);

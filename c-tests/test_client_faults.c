@@ -1,6 +1,6 @@
-/* Many requests over TCP to a device that splits, joins, reorders, doubles, drops
- * and delays its responses, answers with other ids, sends garbage and resets the
- * connection: every request ends once, and with its own data. */
+/* Many requests over TCP to a device that splits, joins, reorders, repeats, drops and
+ * delays its responses, answers with other ids, sends garbage and resets the connection.
+ * Every request ends once, with its own data. */
 #define _GNU_SOURCE
 #include "client.h"
 #include "tcp_server.h"
@@ -33,10 +33,10 @@ typedef struct device {
     pthread_t thread;
 } device;
 
-static unsigned chance(unsigned *state, unsigned of)
+static unsigned chance(unsigned *state, unsigned limit)
 {
     *state = *state * 1103515245u + 12345u;
-    return (*state >> 16) % of;
+    return (*state >> 16) % limit;
 }
 
 static uint16_t value_at(unsigned address)
@@ -67,25 +67,26 @@ static void hold(device *d, const uint8_t *bytes, size_t length, unsigned delay)
     d->held[d->count++].at = held_clock_now(&d->clock) + 1000 * (int64_t)delay;
 }
 
-/* What becomes of the response to a request; 0 if the connection is to go. */
-static int mistreat(device *d, const uint8_t *request)
+/* Decides what happens to the response to a request. Returns 0 if the connection must be
+ * closed. */
+static int choose_fault(device *d, const uint8_t *request)
 {
     uint8_t frame[64];
     size_t length = respond(frame, request);
 
     switch (chance(&d->random, 2000)) {
-    case 0: /* never */
+    case 0: /* no response */
     case 1: return 1;
-    case 2: /* after the timeout */ hold(d, frame, length, 2 * TIMEOUT); return 1;
-    case 3: /* twice */
+    case 2: /* a response after the timeout */ hold(d, frame, length, 2 * TIMEOUT); return 1;
+    case 3: /* the response twice */
     case 4: hold(d, frame, length, 0); break;
-    case 5: /* with another id, too */
+    case 5: /* a response with another id, too */
     case 6:
         frame[0] ^= 0x80;
         hold(d, frame, length, 0);
         frame[0] ^= 0x80;
         break;
-    case 7: { /* behind garbage */
+    case 7: { /* garbage before the response */
         uint8_t garbage[9] = {0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF};
 
         hold(d, garbage, sizeof garbage, 0);
@@ -104,7 +105,8 @@ static int mistreat(device *d, const uint8_t *request)
     return 1;
 }
 
-/* Sends what is due, the last first now and then, in pieces now and then. */
+/* Sends the responses that are due. Now and then the last one goes first, and now and then
+ * they are sent in pieces. */
 static void send_due(device *d)
 {
     uint8_t all[HELD * 64];
@@ -138,8 +140,8 @@ static void send_due(device *d)
     }
 }
 
-/* The client's clock waits for what is to be sent. */
-static void tell_due(device *d)
+/* Tells the client's clock when the next response is due, so that the clock waits for it. */
+static void set_clock_due(device *d)
 {
     int64_t due = HELD_CLOCK_NEVER;
     unsigned i;
@@ -167,7 +169,8 @@ static void *run_device(void *argument)
             if (d->peer < 0) {
                 d->peer = accept(d->listener, NULL, NULL);
                 link = held_clock_link(&d->clock);
-                /* Pieces would wait for each other, longer than the timeout. */
+                /* Without this, one piece would wait for the next, for longer than the
+                 * timeout. */
                 setsockopt(d->peer, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
                 have = 0;
                 continue;
@@ -175,10 +178,10 @@ static void *run_device(void *argument)
             count = recv(d->peer, bytes + have, sizeof bytes - have, 0);
             have += count > 0 ? (size_t)count : 0;
             while (count > 0 && have - used >= FRAME) {
-                if (!mistreat(d, bytes + used))
+                if (!choose_fault(d, bytes + used))
                     count = 0;
                 used += FRAME;
-                tell_due(d);
+                set_clock_due(d);
                 held_clock_done(&d->clock, link, FRAME);
             }
             memmove(bytes, bytes + used, have - used);
@@ -187,13 +190,13 @@ static void *run_device(void *argument)
                 close(d->peer);
                 d->peer = -1;
                 d->count = 0;
-                tell_due(d);
+                set_clock_due(d);
                 continue;
             }
         }
         if (d->peer >= 0)
             send_due(d);
-        tell_due(d);
+        set_clock_due(d);
     }
     if (d->peer >= 0)
         close(d->peer);
@@ -213,7 +216,7 @@ static job jobs[MBM_CLIENT_DEPTH];
 static unsigned long queued, ended, right, exceptions, failed, crossed, doubled, total;
 static unsigned seed = 4711;
 
-static void ask(job *j);
+static void queue_job(job *j);
 
 static void done(void *context, mbm_clientRequest *request)
 {
@@ -234,10 +237,10 @@ static void done(void *context, mbm_clientRequest *request)
         failed++;
     }
     if (queued < total)
-        ask(j);
+        queue_job(j);
 }
 
-static void ask(job *j)
+static void queue_job(job *j)
 {
     memset(j->words, 0xEE, sizeof j->words);
     memset(&j->request, 0, sizeof j->request);
@@ -272,7 +275,7 @@ static void every_request_ends_once_and_with_its_own_data(void **state)
     OK(mbm_client_setResponseTimeout(&a.client, TIMEOUT));
     OK(mbm_client_setRetries(&a.client, 1));
     for (i = 0; i < MBM_CLIENT_DEPTH && queued < total; i++)
-        ask(&jobs[i]);
+        queue_job(&jobs[i]);
     while (mbm_client_poll(&a.client) == MBM_PENDING) {
         if (!mbm_client_isConnected(&a.client) && mbm_tcp_isConnected(&a.tcp) < 0) {
             reconnected++;
@@ -290,7 +293,7 @@ static void every_request_ends_once_and_with_its_own_data(void **state)
     assert_int_equal(right + exceptions + failed, total);
     assert_int_equal(crossed, 0);
     assert_int_equal(doubled, 0);
-    /* A failure is a lost connection, or no answer to a retry either. */
+    /* A request fails only if the connection is lost or the retry gets no answer either. */
     assert_true(right > total - total / 50 - 50);
     assert_true(fewer || (reconnected > 0 && exceptions > 0 && a.counters.foreignFrames > 0 &&
                           a.counters.timeouts > 0 && a.counters.resynchronisations > 0));

@@ -1,4 +1,4 @@
-/* Requests that the client sends as they arrived, and the replies that it takes for
+/* Requests that the client forwards as they arrived, and the replies that it accepts for
  * them, over a port in memory. */
 #include "memory_port.h"
 #include "test.h"
@@ -18,7 +18,8 @@ typedef struct exchange {
     }
 
 static const exchange exchanges[] = {
-    EXCHANGE("\x01\x00\x13\x00\x0D", "\x01\x02\xCD\xFF"), /* the padding too is as it came */
+    EXCHANGE("\x01\x00\x13\x00\x0D",
+             "\x01\x02\xCD\xFF"), /* the padding bits stay as they are too */
     EXCHANGE("\x02\x00\xC4\x00\x16", "\x02\x03\xAC\xDB\x35"),
     EXCHANGE("\x03\x00\x6B\x00\x03", "\x03\x06\x02\x2B\x00\x00\x00\x64"),
     EXCHANGE("\x04\x00\x08\x00\x01", "\x04\x02\x00\x0A"),
@@ -82,7 +83,7 @@ static uint8_t forward(const char *pdu, uint16_t bytes)
     return mbm_client_forward(&client, &request, (uint8_t)pdu[0], body, (uint16_t)(bytes - 1));
 }
 
-/* Sends the request, lets the response arrive, and gives the status. */
+/* Sends the request and lets the response arrive. Returns the request's status. */
 static uint8_t exchange_once(int framing, const exchange *e, const uint8_t *response, uint8_t bytes)
 {
     uint8_t adu[300] = {0, 0, 0, 0, 0, (uint8_t)(bytes + 1), UNIT};
@@ -104,7 +105,7 @@ static uint8_t exchange_once(int framing, const exchange *e, const uint8_t *resp
     return memory_port_run(&m, &client, &request, 1000);
 }
 
-static void every_function_is_sent_and_its_response_taken_as_on_the_wire(void **state)
+static void every_function_and_its_response_are_forwarded_unchanged(void **state)
 {
     unsigned i, k;
 
@@ -124,8 +125,8 @@ static void every_function_is_sent_and_its_response_taken_as_on_the_wire(void **
         }
 }
 
-/* Functions whose response the standard ties to the request, byte by byte. */
-static void a_response_whose_repeated_bytes_differ_is_not_taken(void **state)
+/* The bytes of these responses are fixed by the request: each changed byte must be noticed. */
+static void a_response_whose_repeated_bytes_differ_is_not_accepted(void **state)
 {
     static const struct {
         uint8_t function, first, last;
@@ -201,8 +202,8 @@ static void a_request_that_is_not_forwarded_is_not_queued(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_function_is_sent_and_its_response_taken_as_on_the_wire),
-        cmocka_unit_test(a_response_whose_repeated_bytes_differ_is_not_taken),
+        cmocka_unit_test(every_function_and_its_response_are_forwarded_unchanged),
+        cmocka_unit_test(a_response_whose_repeated_bytes_differ_is_not_accepted),
         cmocka_unit_test(force_listen_only_mode_ends_without_a_response),
         cmocka_unit_test(a_request_that_is_not_forwarded_is_not_queued),
     };

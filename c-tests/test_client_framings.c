@@ -1,5 +1,5 @@
-/* The client against our own server, in each framing: every function that both
- * have, and what one framing has and the others have not. */
+/* The client against mbm's server, in each framing: every function that both have, and the
+ * differences between the framings. */
 #include "await.h"
 #include "client.h"
 #include "served.h"
@@ -17,7 +17,7 @@ static void ends(uint8_t status, mbm_clientRequest *request, uint8_t queued)
     assert_int_equal(asker_wait(&a, request), status);
 }
 
-static void brought(const mbm_clientRequest *request, const void *bytes, size_t length)
+static void assert_reply(const mbm_clientRequest *request, const void *bytes, size_t length)
 {
     assert_int_equal(request->length, length);
     assert_memory_equal(request->reply, bytes, length);
@@ -65,14 +65,14 @@ static void reads_and_writes(void)
     mbm_clientRequest r = asker_request(SERVED_UNIT, bits, sizeof bits, NULL);
 
     ends(MBM_OK, &r, mbm_client_readCoils(c, &r, SERVED_BASE, 2000));
-    brought(&r, s.bits, 250);
+    assert_reply(&r, s.bits, 250);
     ends(MBM_OK, &r, mbm_client_readDiscreteInputs(c, &r, SERVED_BASE, 2000));
-    brought(&r, s.input_bits, 250);
+    assert_reply(&r, s.input_bits, 250);
     r = asker_request(SERVED_UNIT, words, sizeof words, NULL);
     ends(MBM_OK, &r, mbm_client_readHoldingRegisters(c, &r, SERVED_BASE, 125));
-    brought(&r, s.words, 250);
+    assert_reply(&r, s.words, 250);
     ends(MBM_OK, &r, mbm_client_readInputRegisters(c, &r, SERVED_BASE + 100, 125));
-    brought(&r, s.input_words + 100, 250);
+    assert_reply(&r, s.input_words + 100, 250);
     ends(MBM_OK, &r, mbm_client_writeSingleCoil(c, &r, SERVED_BASE, 1));
     ends(MBM_OK, &r, mbm_client_writeSingleRegister(c, &r, SERVED_BASE + 3, 0xA55A));
     assert_int_equal(s.bits[0] & 1, 1);
@@ -88,7 +88,7 @@ static void reads_and_writes(void)
     assert_int_equal(s.words[3], 0xA525);
     ends(MBM_OK, &r,
          mbm_client_readWriteMultipleRegisters(c, &r, SERVED_BASE + 9, 4, SERVED_BASE + 10, 2));
-    brought(&r, s.words + 9, 8);
+    assert_reply(&r, s.words + 9, 8);
     ends(MBM_ILLEGAL_DATA_ADDRESS, &r, mbm_client_readHoldingRegisters(c, &r, 0, 1));
 }
 
@@ -106,14 +106,14 @@ static void files_and_queues(void)
     ends(MBM_OK, &r, mbm_client_writeFileRecord(c, &r, 4, 7, 2));
     assert_memory_equal(s.records + 7, values, 4);
     ends(MBM_OK, &r, mbm_client_readFileRecord(c, &r, 4, 0, 20));
-    brought(&r, s.records, 40);
+    assert_reply(&r, s.records, 40);
     ends(MBM_OK, &r, mbm_client_readFifoQueue(c, &r, 0x04DE));
-    brought(&r, s.queue, 4);
+    assert_reply(&r, s.queue, 4);
     r = asker_request(SERVED_UNIT, bytes, sizeof bytes, written);
     ends(MBM_OK, &r, mbm_client_writeFileRecords(c, &r, sizeof written));
     r.data = groups;
     ends(MBM_OK, &r, mbm_client_readFileRecords(c, &r, sizeof groups));
-    brought(&r, records, sizeof records);
+    assert_reply(&r, records, sizeof records);
     ends(MBM_ILLEGAL_DATA_ADDRESS, &r, mbm_client_readFileRecord(c, &r, 4, 19, 2));
     ends(MBM_ILLEGAL_DATA_ADDRESS, &r, mbm_client_readFifoQueue(c, &r, 0x04DF));
 }
@@ -129,24 +129,24 @@ static void identities_and_diagnostics(void)
     mbm_clientRequest r = asker_request(SERVED_UNIT, bytes, sizeof bytes, NULL);
 
     ends(MBM_OK, &r, mbm_client_readExceptionStatus(c, &r));
-    brought(&r, "\x6D", 1);
+    assert_reply(&r, "\x6D", 1);
     ends(MBM_OK, &r, mbm_client_reportServerId(c, &r));
-    brought(&r, "mbm\xFFtest", 8);
+    assert_reply(&r, "mbm\xFFtest", 8);
     ends(MBM_OK, &r, mbm_client_getCommEventLog(c, &r));
     assert_true(r.length >= 6);
     ends(MBM_OK, &r, mbm_client_readDeviceIdentification(c, &r, 1, 0));
-    brought(&r, "\x83\x00\x00\x03\x00\x05Maker\x01\x05Thing\x02\x04V1.0", 24);
+    assert_reply(&r, "\x83\x00\x00\x03\x00\x05Maker\x01\x05Thing\x02\x04V1.0", 24);
     ends(MBM_ILLEGAL_DATA_ADDRESS, &r, mbm_client_readDeviceIdentification(c, &r, 4, 0x44));
     r.data = "\x04\x80";
     ends(MBM_OK, &r, mbm_client_encapsulatedInterfaceTransport(c, &r, 0x0E, 2));
-    brought(&r, "\x04\x83\x00\x00\x01\x80\x03own", 10);
+    assert_reply(&r, "\x04\x83\x00\x00\x01\x80\x03own", 10);
     r.data = own;
     ends(MBM_OK, &r, mbm_client_custom(c, &r, SERVED_ECHO, 8, &eight));
-    brought(&r, own, 8);
+    assert_reply(&r, own, 8);
     ends(MBM_ILLEGAL_FUNCTION, &r, mbm_client_custom(c, &r, 0x42, 8, &eight));
     r = asker_request(SERVED_UNIT, words, sizeof words, query);
     ends(MBM_OK, &r, mbm_client_diagnostics(c, &r, MBM_DIAGNOSTICS_RETURN_QUERY_DATA, 2));
-    brought(&r, query, 4);
+    assert_reply(&r, query, 4);
     ends(MBM_OK, &r, mbm_client_getCommEventCounter(c, &r));
     assert_int_equal(r.length, 4);
     assert_int_equal(words[0], 0);
@@ -228,8 +228,9 @@ static void the_ascii_delimiter_follows_the_devices(void **state)
     assert_int_equal(set_in_done, MBM_OK);
     r = asker_request(SERVED_UNIT, words, sizeof words, NULL);
     ends(MBM_OK, &r, mbm_client_readHoldingRegisters(&a.client, &r, SERVED_BASE, 2));
-    brought(&r, s.words, 4);
-    /* A device that still wants LF is not answered by one that wants another. */
+    assert_reply(&r, s.words, 4);
+    /* A client with another delimiter does not accept the response of a device that still
+     * uses LF. */
     OK(mbm_client_setDelimiter(&a.client, '\n'));
     OK(mbm_client_setResponseTimeout(&a.client, 50));
     ends(MBM_RESPONSE_TIMED_OUT, &r,
@@ -237,7 +238,7 @@ static void the_ascii_delimiter_follows_the_devices(void **state)
     end();
 }
 
-static void a_delimiter_that_cannot_be_is_refused(void **state)
+static void an_impossible_delimiter_is_refused(void **state)
 {
     static const uint8_t wrong[] = {0, ':', '\r', '0', '9', 'A', 'F', 'a', 'f', 128, 255};
     static mbm_client fresh;
@@ -264,7 +265,7 @@ static void a_delimiter_that_cannot_be_is_refused(void **state)
     end();
 }
 
-static void as_many_are_under_way_over_tcp_as_the_server_takes(void **state)
+static void as_many_requests_are_under_way_over_tcp_as_the_server_accepts(void **state)
 {
     mbm_clientRequest requests[MBM_CLIENT_DEPTH];
     uint16_t words[MBM_CLIENT_DEPTH];
@@ -308,8 +309,8 @@ int main(void)
         cmocka_unit_test(every_function_in_rtu_over_tcp),
         cmocka_unit_test(a_broadcast_reaches_every_unit_in_ascii_and_is_refused_over_tcp),
         cmocka_unit_test(the_ascii_delimiter_follows_the_devices),
-        cmocka_unit_test(as_many_are_under_way_over_tcp_as_the_server_takes),
-        cmocka_unit_test(a_delimiter_that_cannot_be_is_refused),
+        cmocka_unit_test(as_many_requests_are_under_way_over_tcp_as_the_server_accepts),
+        cmocka_unit_test(an_impossible_delimiter_is_refused),
     };
 
     return cmocka_run_group_tests_name("client in each framing", tests, NULL, NULL);

@@ -1,5 +1,5 @@
-/* The client over a port in memory: whether its link is known to be lost, how its
- * waits vary, and which transaction identifier is on the wire. */
+/* The client over a port in memory: when its link is known to be lost, how its waits vary,
+ * and which transaction identifier is on the wire. */
 #include "memory_port.h"
 #include "test.h"
 
@@ -35,13 +35,13 @@ static void begin(int framing)
     request.replyBytes = sizeof words;
 }
 
-static void ask(void)
+static void queue_read(void)
 {
     m.sent_count = 0;
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
 }
 
-/* The right reply to the request that was sent last. */
+/* Delivers the right reply to the last request. */
 static void answer(int framing)
 {
     static const uint8_t rtu[] = {UNIT, 3, 2, 0x12, 0x34};
@@ -83,7 +83,7 @@ static void a_link_is_connected_once_connect_succeeds_or_a_reply_arrives(void **
             begin(framings[i]);
             assert_int_equal(mbm_client_isConnected(&client), 1);
             m.is_lost = 1;
-            ask();
+            queue_read();
             IS(MBM_LINK_LOST, memory_port_run(&m, &client, &request, 100));
             assert_int_equal(mbm_client_isConnected(&client), 0);
 
@@ -92,10 +92,10 @@ static void a_link_is_connected_once_connect_succeeds_or_a_reply_arrives(void **
             IS(statuses[k], mbm_client_reconnect(&client, &link));
             assert_int_equal(mbm_client_isConnected(&client), statuses[k] == MBM_OK);
             /* A request without a reply does not show that there is a link. */
-            ask();
+            queue_read();
             IS(MBM_RESPONSE_TIMED_OUT, memory_port_run(&m, &client, &request, 1000));
             assert_int_equal(mbm_client_isConnected(&client), statuses[k] == MBM_OK);
-            ask();
+            queue_read();
             memory_port_send(&m, &client);
             answer(framings[i]);
             IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
@@ -103,7 +103,7 @@ static void a_link_is_connected_once_connect_succeeds_or_a_reply_arrives(void **
         }
 }
 
-static void a_link_that_the_caller_made_is_connected(void **state)
+static void a_link_that_the_program_connected_is_connected(void **state)
 {
     const mbm_linkHooks none = {NULL, NULL, NULL};
     unsigned i;
@@ -112,7 +112,7 @@ static void a_link_that_the_caller_made_is_connected(void **state)
     for (i = 0; i < COUNT(framings); i++) {
         begin(framings[i]);
         m.is_lost = 1;
-        ask();
+        queue_read();
         IS(MBM_LINK_LOST, memory_port_run(&m, &client, &request, 100));
         OK(mbm_client_reconnect(&client, i % 2 ? &none : NULL));
         assert_int_equal(mbm_client_isConnected(&client), 1);
@@ -121,7 +121,7 @@ static void a_link_that_the_caller_made_is_connected(void **state)
 
 static uint32_t number;
 
-/* Generators of which other bits vary. */
+/* Random functions whose values vary in different bits. */
 static uint32_t of_32_bits(void *context)
 {
     (void)context;
@@ -144,7 +144,7 @@ static uint32_t of_upper_bits(void *context)
     return of_32_bits(context) & 0xFFFF0000u;
 }
 
-static void any_generator_gives_the_whole_jitter(void **state)
+static void any_random_function_gives_the_whole_range_of_jitter(void **state)
 {
     uint32_t (*const generators[])(void *) = {of_32_bits, of_15_bits, of_16_bits, of_upper_bits};
     unsigned i, k;
@@ -158,7 +158,7 @@ static void any_generator_gives_the_whole_jitter(void **state)
         OK(mbm_client_setRetries(&client, 255));
         OK(mbm_client_setBackoff(&client, MBM_BACKOFF_FIXED, 1000, 1000));
         OK(mbm_client_setJitter(&client, 100, generators[i], NULL));
-        ask();
+        queue_read();
         memory_port_send(&m, &client);
         for (k = 0; k < 255; k++) {
             uint32_t sent_at = m.now, wait;
@@ -186,15 +186,15 @@ static void the_transaction_identifier_on_the_wire_can_be_read(void **state)
     begin(MBM_FRAMING_TCP);
     assert_int_equal(mbm_client_wireTransaction(&request), 0);
     assert_int_equal(mbm_client_wireTransaction(NULL), 0);
-    /* Not the first of the client, so that the identifier is not 0. */
-    ask();
+    /* A second request, so that the identifier is not 0. */
+    queue_read();
     memory_port_send(&m, &client);
     answer(MBM_FRAMING_TCP);
     IS(MBM_OK, memory_port_run(&m, &client, &request, 10));
     request.transaction = 500;
     other.unit = UNIT;
     other.transaction = 501;
-    ask();
+    queue_read();
     IS(MBM_PENDING, mbm_client_readCoils(&client, &other, 0, 1));
     memory_port_send(&m, &client);
     assert_int_equal(m.sent_count, 24);
@@ -204,7 +204,7 @@ static void the_transaction_identifier_on_the_wire_can_be_read(void **state)
     assert_int_not_equal(first, mbm_client_wireTransaction(&other));
     assert_int_equal(request.transaction, 500);
     assert_int_equal(other.transaction, 501);
-    /* It stays after the end. */
+    /* The identifier can be read after the end, too. */
     answer(MBM_FRAMING_TCP);
     IS(MBM_OK, memory_port_run(&m, &client, &request, 10));
     assert_int_equal(mbm_client_wireTransaction(&request), first);
@@ -243,8 +243,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_link_is_connected_once_connect_succeeds_or_a_reply_arrives),
-        cmocka_unit_test(a_link_that_the_caller_made_is_connected),
-        cmocka_unit_test(any_generator_gives_the_whole_jitter),
+        cmocka_unit_test(a_link_that_the_program_connected_is_connected),
+        cmocka_unit_test(any_random_function_gives_the_whole_range_of_jitter),
         cmocka_unit_test(the_transaction_identifier_on_the_wire_can_be_read),
         cmocka_unit_test(reserved_units_and_sub_functions_are_sent_as_they_are),
         cmocka_unit_test(an_ascii_frame_buffer_below_17_bytes_is_refused),

@@ -1,5 +1,5 @@
-/* Report Server ID by the client, from devices that count all they send and from
- * devices that count the id alone, over RTU and RTU over TCP. */
+/* The client reads server ids from devices whose byte count covers all data, and from
+ * devices whose byte count covers the id alone, over RTU and RTU over TCP. */
 #include "sim.h"
 #include "test.h"
 
@@ -7,9 +7,9 @@
 
 enum { CHARACTER = 100, DELAY = 3000 };
 
-/* A device with a clock of its own, which answers each request alike. */
+/* A device with a clock of its own, which gives each request the same response. */
 typedef struct device {
-    uint32_t now, end; /* microseconds; when the last byte of the answer is there */
+    uint32_t now, end; /* microseconds; when the last byte of the response has arrived */
     uint8_t answer[64];
     size_t length, read;
 } device;
@@ -48,8 +48,9 @@ static uint8_t reply[64];
 static mbm_clientRequest request;
 static device d;
 
-/* Asks unit 17, which answers with these bytes. */
-static uint8_t report(begin_function begin, uint16_t room, const char *answer)
+/* Reads the server id of unit 17, which responds with these bytes. Returns the request's
+ * status. */
+static uint8_t report(begin_function begin, uint16_t capacity, const char *answer)
 {
     static mbm_client client;
     static uint8_t frame[MBM_MAX_FRAME];
@@ -66,7 +67,7 @@ static uint8_t report(begin_function begin, uint16_t room, const char *answer)
     port.micros = micros;
     request.unit = 17;
     request.reply = reply;
-    request.replyBytes = room;
+    request.replyBytes = capacity;
     OK(begin(&client, &port, frame, sizeof frame));
     IS(MBM_PENDING, mbm_client_reportServerId(&client, &request));
     while (request.status == MBM_PENDING)
@@ -74,7 +75,7 @@ static uint8_t report(begin_function begin, uint16_t room, const char *answer)
     return request.status;
 }
 
-static void brings(const char *answer, const char *data)
+static void assert_report(const char *answer, const char *data)
 {
     uint8_t expected[64];
     size_t length = sim_bytes(expected, data), i;
@@ -86,32 +87,32 @@ static void brings(const char *answer, const char *data)
     }
 }
 
-static void a_server_id_that_counts_all_it_sends_is_read(void **state)
+static void a_server_id_whose_byte_count_covers_all_data_is_read(void **state)
 {
     (void)state;
-    brings("11 11 03 01 02 FF +", "01 02 FF");
-    brings("11 11 00 +", "");
-    brings("11 11 0A 01 02 03 04 05 06 07 08 09 FF +", "01 02 03 04 05 06 07 08 09 FF");
+    assert_report("11 11 03 01 02 FF +", "01 02 FF");
+    assert_report("11 11 00 +", "");
+    assert_report("11 11 0A 01 02 03 04 05 06 07 08 09 FF +", "01 02 03 04 05 06 07 08 09 FF");
 }
 
-static void a_server_id_that_counts_less_than_it_sends_is_read_whole(void **state)
+static void a_server_id_whose_byte_count_covers_less_is_read_whole(void **state)
 {
     (void)state;
-    brings("11 11 02 01 02 FF 07 08 +", "01 02 FF 07 08");
-    brings("11 11 01 2A FF +", "2A FF");
-    brings("11 11 00 2A FF +", "2A FF");
+    assert_report("11 11 02 01 02 FF 07 08 +", "01 02 FF 07 08");
+    assert_report("11 11 01 2A FF +", "2A FF");
+    assert_report("11 11 00 2A FF +", "2A FF");
 }
 
 static void a_server_id_is_found_in_noise(void **state)
 {
     (void)state;
-    brings("FF 00 55 / 11 11 02 01 02 FF 07 08 +", "01 02 FF 07 08");
-    brings("12 11 02 01 02 + / 11 11 02 01 FF +", "01 FF");
-    /* Noise after it does not hide one that counts right. */
-    brings("11 11 02 01 FF + / 00 00 00", "01 FF");
+    assert_report("FF 00 55 / 11 11 02 01 02 FF 07 08 +", "01 02 FF 07 08");
+    assert_report("12 11 02 01 02 + / 11 11 02 01 FF +", "01 FF");
+    /* Noise after a response with a right byte count does not hide it. */
+    assert_report("11 11 02 01 FF + / 00 00 00", "01 FF");
 }
 
-static void a_server_id_that_counts_right_is_not_waited_for(void **state)
+static void a_server_id_with_a_right_byte_count_ends_without_a_wait(void **state)
 {
     (void)state;
     OK(report(mbm_client_beginRtuOverTcp, sizeof reply, "11 11 02 01 FF +"));
@@ -126,13 +127,13 @@ static void a_wrong_server_id_is_refused(void **state)
     for (i = 0; i < COUNT(framings); i++) {
         begin_function begin = framings[i];
 
-        /* It counts more than it sends. */
+        /* The byte count is larger than the data. */
         assert_int_not_equal(report(begin, sizeof reply, "11 11 06 01 02 FF 07 08 +"), MBM_OK);
-        /* Its CRC is wrong. */
+        /* The CRC is wrong. */
         assert_int_not_equal(report(begin, sizeof reply, "11 11 02 01 02 FF 07 08 00 00"), MBM_OK);
-        /* An exception. */
+        /* An exception response. */
         IS(MBM_ILLEGAL_FUNCTION, report(begin, sizeof reply, "11 91 01 +"));
-        /* It does not fit. */
+        /* The data do not fit. */
         IS(MBM_BUFFER_TOO_SMALL, report(begin, 4, "11 11 02 01 02 FF 07 08 +"));
         assert_int_equal(reply[0], 0xEE);
     }
@@ -141,10 +142,10 @@ static void a_wrong_server_id_is_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_server_id_that_counts_all_it_sends_is_read),
-        cmocka_unit_test(a_server_id_that_counts_less_than_it_sends_is_read_whole),
+        cmocka_unit_test(a_server_id_whose_byte_count_covers_all_data_is_read),
+        cmocka_unit_test(a_server_id_whose_byte_count_covers_less_is_read_whole),
         cmocka_unit_test(a_server_id_is_found_in_noise),
-        cmocka_unit_test(a_server_id_that_counts_right_is_not_waited_for),
+        cmocka_unit_test(a_server_id_with_a_right_byte_count_ends_without_a_wait),
         cmocka_unit_test(a_wrong_server_id_is_refused),
     };
 

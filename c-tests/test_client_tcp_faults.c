@@ -1,5 +1,5 @@
-/* The client against a TCP peer that plays each fault by itself: how the request
- * ends that meets it, without a retry and with one, and that the next ones are right. */
+/* The client against a TCP peer that plays one fault in each test: how the request that
+ * meets the fault ends, without a retry and with one, and that the next requests succeed. */
 #define _GNU_SOURCE
 #include "client.h"
 #include "tcp_peer.h"
@@ -35,7 +35,7 @@ static int end(void **state)
     return 0;
 }
 
-static void ask(unsigned i)
+static void queue_read(unsigned i)
 {
     memset(&requests[i], 0, sizeof requests[i]);
     memset(words[i], 0, sizeof words[i]);
@@ -56,7 +56,7 @@ static void is_right(unsigned i)
         assert_int_equal(words[i][word], tcp_peer_word(20 * i + word));
 }
 
-/* Ends all, with a new connection where the old one is lost. */
+/* Polls until all requests have ended. Connects anew if the connection was lost. */
 static void finish(void)
 {
     while (mbm_client_poll(&a.client) == MBM_PENDING)
@@ -65,14 +65,14 @@ static void finish(void)
         IS(MBM_PENDING, mbm_client_reconnect(&a.client, &a.link));
 }
 
-/* One request after the other, of which the third meets a fault. */
-static void meets(tcp_fault fault, unsigned argument, uint8_t status)
+/* Makes eight requests, one after the other. The third meets the fault. */
+static void assert_ends_with(tcp_fault fault, unsigned argument, uint8_t status)
 {
     unsigned i;
 
     tcp_peer_fault(peer, MET, fault, argument);
     for (i = 1; i <= ASKED; i++) {
-        ask(i - 1);
+        queue_read(i - 1);
         finish();
         if (i == MET && status != MBM_OK)
             assert_int_equal(requests[i - 1].status, status);
@@ -83,15 +83,15 @@ static void meets(tcp_fault fault, unsigned argument, uint8_t status)
     assert_int_equal(tcp_peer_count(peer).requests, ASKED);
 }
 
-/* The same with a retry, which a lost link and an exception do not get. */
-static void meets_and_asks_again(tcp_fault fault, unsigned argument)
+/* The same with one retry. A lost link and an exception are not retried. */
+static void meets_and_retries(tcp_fault fault, unsigned argument)
 {
     unsigned i;
 
     OK(mbm_client_setRetries(&a.client, 1));
     tcp_peer_fault(peer, MET, fault, argument);
     for (i = 0; i < ASKED; i++) {
-        ask(i);
+        queue_read(i);
         finish();
         is_right(i);
     }
@@ -102,7 +102,7 @@ static void meets_and_asks_again(tcp_fault fault, unsigned argument)
     static void name(void **state)                                                                 \
     {                                                                                              \
         (void)state;                                                                               \
-        meets(fault, argument, status);                                                            \
+        assert_ends_with(fault, argument, status);                                                 \
     }
 
 #define MEETS_AND_RETRIES(name, fault, argument, status)                                           \
@@ -110,15 +110,15 @@ static void meets_and_asks_again(tcp_fault fault, unsigned argument)
     static void name##_and_a_retry_helps(void **state)                                             \
     {                                                                                              \
         (void)state;                                                                               \
-        meets_and_asks_again(fault, argument);                                                     \
+        meets_and_retries(fault, argument);                                                        \
     }
 
 MEETS(a_response_in_time_is_waited_for, FAULT_DELAY, TIMEOUT / 3, MBM_OK)
 MEETS(a_response_in_single_bytes_is_put_together, FAULT_SPLIT, 1, MBM_OK)
 MEETS(the_second_of_two_responses_is_dropped, FAULT_TWICE, 0, MBM_OK)
 MEETS(a_response_of_another_id_before_the_right_one_is_dropped, FAULT_ALSO_OTHER_ID, 9, MBM_OK)
-MEETS(garbage_before_the_response_is_passed_over, FAULT_GARBAGE, 9, MBM_OK)
-MEETS(an_exception_is_told, FAULT_EXCEPTION, 6, MBM_SLAVE_DEVICE_BUSY)
+MEETS(garbage_before_the_response_is_skipped, FAULT_GARBAGE, 9, MBM_OK)
+MEETS(an_exception_is_reported, FAULT_EXCEPTION, 6, MBM_SLAVE_DEVICE_BUSY)
 MEETS(half_a_response_and_the_end_is_a_lost_link, FAULT_HALF, 6, MBM_LINK_LOST)
 MEETS(the_end_of_the_stream_is_a_lost_link, FAULT_CLOSE, 0, MBM_LINK_LOST)
 MEETS(a_reset_is_a_lost_link, FAULT_RESET, 0, MBM_LINK_LOST)
@@ -144,34 +144,34 @@ static void responses_in_another_order_are_matched(void **state)
     tcp_peer_fault(peer, 2, FAULT_HOLD, 2);
     tcp_peer_fault(peer, 5, FAULT_DELAY, 20);
     for (i = 0; i < ASKED; i++)
-        ask(i);
+        queue_read(i);
     finish();
     for (i = 0; i < ASKED; i++)
         is_right(i);
     assert_int_equal(a.counters.foreignFrames, 0);
 }
 
-static void responses_in_one_segment_are_taken_apart(void **state)
+static void responses_in_one_segment_are_separated(void **state)
 {
     unsigned i;
 
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_JOIN, ASKED - 1);
     for (i = 0; i < ASKED; i++)
-        ask(i);
+        queue_read(i);
     finish();
     for (i = 0; i < ASKED; i++)
         is_right(i);
 }
 
-static void a_reset_ends_all_that_are_under_way(void **state)
+static void a_reset_ends_all_requests_under_way(void **state)
 {
     unsigned i, lost = 0;
 
     (void)state;
     tcp_peer_fault(peer, MET, FAULT_RESET, 0);
     for (i = 0; i < ASKED; i++)
-        ask(i);
+        queue_read(i);
     finish();
     for (i = 0; i < ASKED; i++) {
         assert_true(requests[i].status == MBM_OK || requests[i].status == MBM_LINK_LOST);
@@ -179,7 +179,7 @@ static void a_reset_ends_all_that_are_under_way(void **state)
     }
     assert_true(lost >= ASKED - MET + 1);
     for (i = 0; i < ASKED; i++)
-        ask(i);
+        queue_read(i);
     finish();
     for (i = 0; i < ASKED; i++)
         is_right(i);
@@ -195,8 +195,8 @@ int main(void)
         TEST(a_response_in_single_bytes_is_put_together),
         TEST(the_second_of_two_responses_is_dropped),
         TEST(a_response_of_another_id_before_the_right_one_is_dropped),
-        TEST(garbage_before_the_response_is_passed_over),
-        TEST(an_exception_is_told),
+        TEST(garbage_before_the_response_is_skipped),
+        TEST(an_exception_is_reported),
         TEST(half_a_response_and_the_end_is_a_lost_link),
         TEST(the_end_of_the_stream_is_a_lost_link),
         TEST(a_reset_is_a_lost_link),
@@ -208,9 +208,9 @@ int main(void)
         BOTH(a_response_of_another_function_is_told),
         BOTH(a_length_that_is_too_small_is_malformed),
         TEST(responses_in_another_order_are_matched),
-        TEST(responses_in_one_segment_are_taken_apart),
-        TEST(a_reset_ends_all_that_are_under_way),
+        TEST(responses_in_one_segment_are_separated),
+        TEST(a_reset_ends_all_requests_under_way),
     };
 
-    return cmocka_run_group_tests_name("client, each fault of TCP by name", tests, NULL, NULL);
+    return cmocka_run_group_tests_name("client over TCP, each fault", tests, NULL, NULL);
 }

@@ -1,5 +1,5 @@
-/* What the contract keeps and mends about replies: what is a success, what is
- * which failure, and that a reply is found in what a bad wire delivers. */
+/* The contract with programs for ModbusMaster about replies: what is a success,
+ * which failure has which status, and that a reply is found among the bytes of a bad wire. */
 #include "sim.h"
 #include "test.h"
 
@@ -14,14 +14,14 @@ static uint8_t read_words(sim *s, uint16_t quantity, const char *reply)
     return mbm_master_readHoldingRegisters(&s->master, 0, quantity);
 }
 
-/* The next transaction is not poisoned by what came before. */
+/* The bytes of the previous transaction must not spoil the next one. */
 static void recovers_at_once(sim *s)
 {
     OK(read_words(s, 1, "11 03 02 00 2A +"));
     assert_int_equal(mbm_master_getResponseBuffer(&s->master, 0), 42);
 }
 
-static void found_behind(sim *s, const char *noise)
+static void found_after(sim *s, const char *noise)
 {
     char reply[600];
 
@@ -32,7 +32,7 @@ static void found_behind(sim *s, const char *noise)
     recovers_at_once(s);
 }
 
-static void exception_codes_of_the_device_are_passed_on_raw(void **state)
+static void exception_codes_of_the_device_are_returned_unchanged(void **state)
 {
     unsigned code;
     NODE;
@@ -53,7 +53,7 @@ static void exception_codes_of_the_device_are_passed_on_raw(void **state)
     assert_int_equal(mbm_master_getExceptionCode(n), 0);
 }
 
-static void an_exception_code_of_0_or_from_80_is_malformed_and_kept_raw(void **state)
+static void an_exception_code_of_0_or_from_80_on_is_malformed_and_kept(void **state)
 {
     NODE;
 
@@ -66,7 +66,7 @@ static void an_exception_code_of_0_or_from_80_is_malformed_and_kept_raw(void **s
     recovers_at_once(s);
 }
 
-static void an_exception_with_a_bad_crc_is_none(void **state)
+static void an_exception_with_a_bad_crc_is_no_exception(void **state)
 {
     NODE;
 
@@ -114,7 +114,7 @@ static void each_failure_has_its_status(void **state)
     (void)n;
 }
 
-static void the_most_telling_failure_is_reported(void **state)
+static void the_most_specific_failure_is_reported(void **state)
 {
     NODE;
 
@@ -160,7 +160,7 @@ static void all_125_registers_and_2000_bits_are_readable(void **state)
         assert_int_equal(WORD((uint8_t)i), (2 * i + 1) << 8 | (2 * i));
 }
 
-static void reads_of_65_registers_and_more_are_not_refused_here(void **state)
+static void reads_of_65_registers_and_more_are_sent(void **state)
 {
     NODE;
 
@@ -180,14 +180,14 @@ static void a_byte_count_of_251_to_255_is_malformed(void **state)
 
         snprintf(reply, sizeof reply, "11 03 %02X 12 34 56 78 +", count);
         assert_int_equal(read_words(s, 1, reply), MBM_MALFORMED_REPLY);
-        /* With a CRC that is wrong as well it is no frame at all. */
+        /* With a wrong CRC it is no frame. */
         reply[strlen(reply) - 1] = '\0';
         assert_int_not_equal(read_words(s, 1, reply), MBM_OK);
     }
     recovers_at_once(s);
 }
 
-static void a_byte_count_other_than_asked_is_malformed(void **state)
+static void a_byte_count_that_does_not_suit_the_request_is_malformed(void **state)
 {
     NODE;
 
@@ -234,36 +234,36 @@ static void an_echo_with_another_address_or_value_is_malformed(void **state)
     malformed(s, mbm_master_maskWriteRegister(n, 1, 2, 3));
 }
 
-static void stray_bytes_in_front_cost_nothing(void **state)
+static void the_reply_is_found_after_stray_bytes(void **state)
 {
     NODE;
 
-    found_behind(s, "00");
-    found_behind(s, "FF FE 7F 00 33");
-    found_behind(s, "11");
-    found_behind(s, "11 11 11 11");
+    found_after(s, "00");
+    found_after(s, "FF FE 7F 00 33");
+    found_after(s, "11");
+    found_after(s, "11 11 11 11");
     assert_int_equal(s->counters.resynchronisations, 4);
     (void)n;
 }
 
-static void noise_that_looks_like_our_header_costs_nothing(void **state)
+static void the_reply_is_found_after_noise_that_looks_like_its_header(void **state)
 {
     NODE;
 
     (void)n;
-    found_behind(s, "11 03");
-    found_behind(s, "11 03 04");
-    found_behind(s, "11 03 04 00");
-    found_behind(s, "11 03 04 12 34 56 78");
-    found_behind(s, "11 03 04 00 00 00 00 00 00");
-    found_behind(s, "11 83");
-    found_behind(s, "11 83 02 00 00");
+    found_after(s, "11 03");
+    found_after(s, "11 03 04");
+    found_after(s, "11 03 04 00");
+    found_after(s, "11 03 04 12 34 56 78");
+    found_after(s, "11 03 04 00 00 00 00 00 00");
+    found_after(s, "11 83");
+    found_after(s, "11 83 02 00 00");
     assert_int_equal(s->sent, 14);
 }
 
-/* The head of a long reply keeps the line for what may still come; an exception
- * behind it is found all the same, also if the line was silent between. */
-static void an_exception_behind_noise_that_looks_like_a_longer_reply_is_found(void **state)
+/* Four bytes that look like the start of a longer reply. An exception after them is found,
+ * also if the line was silent between. */
+static void an_exception_after_noise_that_looks_like_a_longer_reply_is_found(void **state)
 {
     NODE;
 
@@ -275,26 +275,26 @@ static void an_exception_behind_noise_that_looks_like_a_longer_reply_is_found(vo
     assert_true(s->now - s->frames[1].end < 30000);
 }
 
-static void a_frame_of_another_unit_in_front_costs_nothing(void **state)
+static void the_reply_is_found_after_a_frame_of_another_unit(void **state)
 {
     NODE;
 
     (void)n;
-    found_behind(s, "12 03 04 AA AA BB BB +");
-    found_behind(s, "12 83 02 +");
-    found_behind(s, "12 03 00 00 00 02 + / 12 03 04 AA AA BB BB +");
+    found_after(s, "12 03 04 AA AA BB BB +");
+    found_after(s, "12 83 02 +");
+    found_after(s, "12 03 00 00 00 02 + / 12 03 04 AA AA BB BB +");
     assert_int_equal(s->counters.foreignFrames, 4);
 }
 
-static void a_late_reply_of_another_function_or_length_costs_nothing(void **state)
+static void the_reply_is_found_after_a_late_reply_of_another_function_or_length(void **state)
 {
     NODE;
 
     (void)n;
-    found_behind(s, "11 04 04 AA AA BB BB +");
-    found_behind(s, "11 03 02 AA AA +");
-    found_behind(s, "11 06 00 01 00 02 +");
-    found_behind(s, "11 84 02 +");
+    found_after(s, "11 04 04 AA AA BB BB +");
+    found_after(s, "11 03 02 AA AA +");
+    found_after(s, "11 06 00 01 00 02 +");
+    found_after(s, "11 84 02 +");
 }
 
 static void a_reply_in_two_pieces_is_found_at_the_end_of_the_second(void **state)
@@ -308,9 +308,9 @@ static void a_reply_in_two_pieces_is_found_at_the_end_of_the_second(void **state
     assert_int_equal(WORD(1), 0x5678);
 }
 
-/* Noise like our head, a pause, and only then the reply: whatever the first
- * call makes of it, its reply must not become the second call's data. */
-static void a_reply_behind_noise_and_a_pause_is_not_taken_for_the_next(void **state)
+/* Noise that looks like the start of our reply, then a pause, then the reply. However the
+ * first call ends, its reply must not become the second call's data. */
+static void a_reply_after_noise_and_a_pause_is_not_taken_for_the_next(void **state)
 {
     uint8_t status;
     NODE;
@@ -324,8 +324,8 @@ static void a_reply_behind_noise_and_a_pause_is_not_taken_for_the_next(void **st
         assert_int_equal(WORD(0), 0x2222);
 }
 
-/* Data may look like anything, so a pause within them ends nothing. */
-static void a_pause_behind_data_that_look_like_a_damaged_exception_ends_nothing(void **state)
+/* Data may have any value, so a pause within the data must not end the request. */
+static void a_pause_after_data_like_a_damaged_exception_does_not_end_the_request(void **state)
 {
     NODE;
 
@@ -335,7 +335,7 @@ static void a_pause_behind_data_that_look_like_a_damaged_exception_ends_nothing(
     assert_int_equal(WORD(3), 0x0506);
 }
 
-static void a_foreign_frame_whose_data_look_like_our_damaged_reply_ends_nothing(void **state)
+static void foreign_data_like_our_damaged_reply_do_not_end_the_request(void **state)
 {
     NODE;
 
@@ -344,7 +344,7 @@ static void a_foreign_frame_whose_data_look_like_our_damaged_reply_ends_nothing(
     OK(mbm_master_readHoldingRegisters(n, 0, 1));
 }
 
-static void an_echo_is_dropped_when_told_to_expect_one(void **state)
+static void an_echo_is_dropped_with_echo_discard_on(void **state)
 {
     NODE;
 
@@ -365,7 +365,7 @@ static void an_echo_is_dropped_when_told_to_expect_one(void **state)
     OK(mbm_master_writeSingleCoil(n, 1, 1));
 }
 
-static void a_damaged_echo_fails_one_request_and_no_more(void **state)
+static void a_damaged_echo_makes_only_one_request_fail(void **state)
 {
     NODE;
 
@@ -380,7 +380,7 @@ static void a_damaged_echo_fails_one_request_and_no_more(void **state)
     OK(mbm_master_writeMultipleRegisters(n, 1, 2));
 }
 
-static void noise_in_front_of_the_echo_hides_no_foreign_frame_behind_it(void **state)
+static void noise_before_the_echo_does_not_hide_a_foreign_frame_after_it(void **state)
 {
     NODE;
 
@@ -403,7 +403,7 @@ static void an_echo_alone_is_no_success(void **state)
     assert_int_equal(mbm_master_maskWriteRegister(n, 1, 2, 3), MBM_RESPONSE_TIMED_OUT);
 }
 
-static void an_echo_without_discard_is_passed_over_where_it_is_no_reply(void **state)
+static void with_discard_off_an_echo_that_is_no_reply_is_skipped(void **state)
 {
     NODE;
 
@@ -445,32 +445,32 @@ static void counters_count_what_happened(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        SIM_TEST(exception_codes_of_the_device_are_passed_on_raw),
-        SIM_TEST(an_exception_code_of_0_or_from_80_is_malformed_and_kept_raw),
-        SIM_TEST(an_exception_with_a_bad_crc_is_none),
+        SIM_TEST(exception_codes_of_the_device_are_returned_unchanged),
+        SIM_TEST(an_exception_code_of_0_or_from_80_on_is_malformed_and_kept),
+        SIM_TEST(an_exception_with_a_bad_crc_is_no_exception),
         SIM_TEST(response_words_survive_a_failure),
         SIM_TEST(each_failure_has_its_status),
-        SIM_TEST(the_most_telling_failure_is_reported),
+        SIM_TEST(the_most_specific_failure_is_reported),
         SIM_TEST(a_bad_crc_fails_after_t35_and_not_after_the_timeout),
         SIM_TEST(all_125_registers_and_2000_bits_are_readable),
-        SIM_TEST(reads_of_65_registers_and_more_are_not_refused_here),
+        SIM_TEST(reads_of_65_registers_and_more_are_sent),
         SIM_TEST(a_byte_count_of_251_to_255_is_malformed),
-        SIM_TEST(a_byte_count_other_than_asked_is_malformed),
+        SIM_TEST(a_byte_count_that_does_not_suit_the_request_is_malformed),
         SIM_TEST(an_echo_with_another_address_or_value_is_malformed),
-        SIM_TEST(stray_bytes_in_front_cost_nothing),
-        SIM_TEST(noise_that_looks_like_our_header_costs_nothing),
-        SIM_TEST(an_exception_behind_noise_that_looks_like_a_longer_reply_is_found),
-        SIM_TEST(a_frame_of_another_unit_in_front_costs_nothing),
-        SIM_TEST(a_late_reply_of_another_function_or_length_costs_nothing),
+        SIM_TEST(the_reply_is_found_after_stray_bytes),
+        SIM_TEST(the_reply_is_found_after_noise_that_looks_like_its_header),
+        SIM_TEST(an_exception_after_noise_that_looks_like_a_longer_reply_is_found),
+        SIM_TEST(the_reply_is_found_after_a_frame_of_another_unit),
+        SIM_TEST(the_reply_is_found_after_a_late_reply_of_another_function_or_length),
         SIM_TEST(a_reply_in_two_pieces_is_found_at_the_end_of_the_second),
-        SIM_TEST(a_reply_behind_noise_and_a_pause_is_not_taken_for_the_next),
-        SIM_TEST(a_pause_behind_data_that_look_like_a_damaged_exception_ends_nothing),
-        SIM_TEST(a_foreign_frame_whose_data_look_like_our_damaged_reply_ends_nothing),
-        SIM_TEST(an_echo_is_dropped_when_told_to_expect_one),
-        SIM_TEST(a_damaged_echo_fails_one_request_and_no_more),
-        SIM_TEST(noise_in_front_of_the_echo_hides_no_foreign_frame_behind_it),
+        SIM_TEST(a_reply_after_noise_and_a_pause_is_not_taken_for_the_next),
+        SIM_TEST(a_pause_after_data_like_a_damaged_exception_does_not_end_the_request),
+        SIM_TEST(foreign_data_like_our_damaged_reply_do_not_end_the_request),
+        SIM_TEST(an_echo_is_dropped_with_echo_discard_on),
+        SIM_TEST(a_damaged_echo_makes_only_one_request_fail),
+        SIM_TEST(noise_before_the_echo_does_not_hide_a_foreign_frame_after_it),
         SIM_TEST(an_echo_alone_is_no_success),
-        SIM_TEST(an_echo_without_discard_is_passed_over_where_it_is_no_reply),
+        SIM_TEST(with_discard_off_an_echo_that_is_no_reply_is_skipped),
         SIM_TEST(a_device_that_does_not_echo_still_answers_reads_with_discard_on),
         SIM_TEST(counters_count_what_happened),
     };

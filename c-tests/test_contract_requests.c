@@ -1,5 +1,6 @@
-/* The contract's members: what each sends, byte for byte, what each takes from
- * a reply, and the words and the queue between. Unit 17 is 11 on the wire. */
+/* The functions of the contract with programs for ModbusMaster: the bytes that each sends,
+ * what each takes from a reply, the buffers of words and the queue. Unit 17 is 11 on the
+ * wire. */
 #include "sim.h"
 #include "test.h"
 
@@ -55,7 +56,7 @@ static void writes_single_cells_as_the_specification_shows(void **state)
     LAST("11 06 00 01 00 03 +");
 }
 
-static void any_state_but_zero_is_on(void **state)
+static void any_state_except_zero_is_on(void **state)
 {
     static const uint8_t states[] = {1, 2, 0x80, 0xFF};
     size_t i;
@@ -107,8 +108,8 @@ static void reads_and_writes_at_once_as_the_specification_shows(void **state)
     assert_int_equal(WORD(5), 255);
 }
 
-/* Whole frames, CRC included, as another library documents them. */
-static void frames_agree_with_another_library_to_the_last_byte(void **state)
+/* Complete frames with their CRC, as the documentation of another library shows them. */
+static void frames_are_the_same_as_in_the_documentation_of_another_library(void **state)
 {
     NODE;
 
@@ -174,7 +175,7 @@ static void the_last_odd_byte_of_coils_is_padded_with_zero(void **state)
     OK(mbm_master_readCoils(n, 0, 24));
     assert_int_equal(WORD(1), 0x00FF);
     assert_int_equal(mbm_master_available(n), 2);
-    /* Bits that nobody asked for are no data, whatever the device sends. */
+    /* The bits beyond the requested quantity are no data, whatever the device sends. */
     sim_answer(s, 1, 100, "11 01 01 FF +");
     OK(mbm_master_readCoils(n, 0, 3));
     assert_int_equal(WORD(0), 0x0007);
@@ -193,7 +194,7 @@ static void coil_pad_bits_are_sent_as_zero(void **state)
     LAST("11 0F 00 00 00 09 02 FF 01 +");
 }
 
-static void get_response_buffer_gives_ffff_past_the_end(void **state)
+static void get_response_buffer_returns_ffff_past_the_end(void **state)
 {
     NODE;
 
@@ -203,7 +204,7 @@ static void get_response_buffer_gives_ffff_past_the_end(void **state)
     assert_int_equal(WORD(255), 0xFFFF);
 }
 
-static void set_transmit_buffer_answers_2_past_the_end_and_leaves_the_queue(void **state)
+static void set_transmit_buffer_returns_2_past_the_end_and_leaves_the_queue(void **state)
 {
     NODE;
 
@@ -281,7 +282,7 @@ static void send_bit_queues_bits_lowest_first(void **state)
     LAST("11 0F 00 05 00 12 03 8D 80 03 +");
 }
 
-static void a_word_behind_bits_starts_a_new_word(void **state)
+static void a_word_after_bits_starts_a_new_word(void **state)
 {
     NODE;
 
@@ -307,7 +308,7 @@ static void queued_registers_are_complete_words_only(void **state)
     LAST("11 10 00 05 00 01 02 FF FF +");
 }
 
-static void what_passes_the_transmit_buffer_is_not_queued(void **state)
+static void words_beyond_the_transmit_buffer_are_not_queued(void **state)
 {
     unsigned i;
     NODE;
@@ -315,7 +316,7 @@ static void what_passes_the_transmit_buffer_is_not_queued(void **state)
     mbm_master_beginTransmission(n, 0);
     for (i = 0; i < 122; i++)
         OK(mbm_master_send(n, 1));
-    /* The low word fits, the high word does not. */
+    /* The low word fits into the buffer, the high word does not. */
     assert_int_equal(mbm_master_send32(n, 0x00020003), MBM_BUFFER_TOO_SMALL);
     assert_int_equal(s->transmit[122], 3);
     assert_int_equal(mbm_master_send(n, 1), MBM_BUFFER_TOO_SMALL);
@@ -334,7 +335,7 @@ static void any_transaction_empties_the_queue_but_keeps_the_words(void **state)
     mbm_master_send(n, 0x1234);
     sim_answer(s, 1, 100, "11 03 02 00 01 +");
     OK(mbm_master_readHoldingRegisters(n, 0, 1));
-    /* Quantity 0 is answered as a device would, with nothing sent. */
+    /* A quantity of 0 gets the status that a device would return. Nothing is sent. */
     assert_int_equal(mbm_master_writeQueuedRegisters(n), MBM_ILLEGAL_DATA_VALUE);
     assert_int_equal(mbm_master_writeQueuedCoils(n), MBM_ILLEGAL_DATA_VALUE);
     assert_int_equal(mbm_master_readWriteQueuedRegisters(n, 0, 1), MBM_ILLEGAL_DATA_VALUE);
@@ -357,7 +358,7 @@ static void a_failed_transaction_empties_the_queue_and_rewinds_receive(void **st
     assert_int_equal(mbm_master_writeQueuedRegisters(n), MBM_ILLEGAL_DATA_VALUE);
 }
 
-static void the_write_address_is_shared_by_all_that_write(void **state)
+static void the_write_address_is_shared_by_all_writing_functions(void **state)
 {
     NODE;
 
@@ -397,7 +398,7 @@ static void single_writes_overwrite_the_first_transmit_words(void **state)
     assert_int_equal(s->transmit[2], 0xEEEE);
 }
 
-static void request_from_gives_exactly_the_words_to_receive(void **state)
+static void request_from_makes_exactly_its_words_available_to_receive(void **state)
 {
     NODE;
 
@@ -435,7 +436,7 @@ static void begin_is_cheap_and_switches_slaves(void **state)
     assert_int_equal(mbm_master_readHoldingRegisters(n, 0, 1), MBM_RESPONSE_TIMED_OUT);
 }
 
-static void set_slave_id_holds_from_the_next_request_on(void **state)
+static void set_slave_id_counts_from_the_next_request_on(void **state)
 {
     NODE;
 
@@ -451,30 +452,30 @@ int main(void)
         SIM_TEST(reads_coils_and_inputs_as_the_specification_shows),
         SIM_TEST(reads_registers_as_the_specification_shows),
         SIM_TEST(writes_single_cells_as_the_specification_shows),
-        SIM_TEST(any_state_but_zero_is_on),
+        SIM_TEST(any_state_except_zero_is_on),
         SIM_TEST(writes_many_cells_as_the_specification_shows),
         SIM_TEST(mask_writes_as_the_specification_shows),
         SIM_TEST(reads_and_writes_at_once_as_the_specification_shows),
-        SIM_TEST(frames_agree_with_another_library_to_the_last_byte),
+        SIM_TEST(frames_are_the_same_as_in_the_documentation_of_another_library),
         SIM_TEST(units_248_to_255_are_accepted),
         SIM_TEST(the_last_odd_byte_of_coils_is_padded_with_zero),
         SIM_TEST(coil_pad_bits_are_sent_as_zero),
-        SIM_TEST(get_response_buffer_gives_ffff_past_the_end),
-        SIM_TEST(set_transmit_buffer_answers_2_past_the_end_and_leaves_the_queue),
+        SIM_TEST(get_response_buffer_returns_ffff_past_the_end),
+        SIM_TEST(set_transmit_buffer_returns_2_past_the_end_and_leaves_the_queue),
         SIM_TEST(clearing_buffers_leaves_the_indices_alone),
         SIM_TEST(begin_transmission_empties_the_queue_and_keeps_the_words),
         SIM_TEST(send_queues_words_bytes_and_double_words_low_first),
         SIM_TEST(send_bit_queues_bits_lowest_first),
-        SIM_TEST(a_word_behind_bits_starts_a_new_word),
+        SIM_TEST(a_word_after_bits_starts_a_new_word),
         SIM_TEST(queued_registers_are_complete_words_only),
-        SIM_TEST(what_passes_the_transmit_buffer_is_not_queued),
+        SIM_TEST(words_beyond_the_transmit_buffer_are_not_queued),
         SIM_TEST(any_transaction_empties_the_queue_but_keeps_the_words),
         SIM_TEST(a_failed_transaction_empties_the_queue_and_rewinds_receive),
-        SIM_TEST(the_write_address_is_shared_by_all_that_write),
+        SIM_TEST(the_write_address_is_shared_by_all_writing_functions),
         SIM_TEST(single_writes_overwrite_the_first_transmit_words),
-        SIM_TEST(request_from_gives_exactly_the_words_to_receive),
+        SIM_TEST(request_from_makes_exactly_its_words_available_to_receive),
         SIM_TEST(begin_is_cheap_and_switches_slaves),
-        SIM_TEST(set_slave_id_holds_from_the_next_request_on),
+        SIM_TEST(set_slave_id_counts_from_the_next_request_on),
     };
 
     return cmocka_run_group_tests_name("contract: requests and words", tests, NULL, NULL);

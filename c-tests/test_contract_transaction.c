@@ -1,5 +1,5 @@
-/* One transaction of the contract: the order of its steps and the gap before
- * it, on the simulated clock. Unit 17 is 11 on the wire. */
+/* One transaction of the contract with programs for ModbusMaster: the order of its steps
+ * and the gap before it, on a simulated clock. Unit 17 is 11 on the wire. */
 #include "sim.h"
 #include "test.h"
 
@@ -10,7 +10,7 @@ static void steps_come_in_order(void **state)
     (void)n;
     sim_deliver_text(s, s->now, "DE AD BE EF");
     sim_reads(s, 5000);
-    /* Stale bytes dropped, driver on, write, flush, driver off, idle, reply. */
+    /* Old bytes dropped, driver on, write, flush, driver off, idle, reply. */
     sim_assert_order(s, "PWFOR", "RPWFOR");
     sim_assert_order(s, "POI", "IPOI");
     assert_int_equal(s->counters.resynchronisations, 0);
@@ -38,7 +38,7 @@ static void bytes_that_wait_in_the_receiver_are_no_part_of_the_reply(void **stat
     sim_reads(s, 500);
 }
 
-static void the_driver_goes_off_only_behind_the_last_bit(void **state)
+static void the_driver_is_switched_off_only_after_the_last_bit(void **state)
 {
     NODE;
 
@@ -48,7 +48,7 @@ static void the_driver_goes_off_only_behind_the_last_bit(void **state)
     sim_assert_time(sim_time_of(s, 'O'), s->frames[0].end);
 }
 
-static void the_driver_is_held_on_behind_an_early_flush(void **state)
+static void the_driver_is_held_on_after_an_early_flush(void **state)
 {
     NODE;
 
@@ -62,7 +62,7 @@ static void the_driver_is_held_on_behind_an_early_flush(void **state)
     assert_int_equal(s->idle_while_driving, 0);
 }
 
-static void a_hold_in_an_untold_rate_is_that_of_9600_baud(void **state)
+static void without_a_baud_rate_the_hold_is_that_of_9600_baud(void **state)
 {
     NODE;
 
@@ -72,7 +72,7 @@ static void a_hold_in_an_untold_rate_is_that_of_9600_baud(void **state)
     sim_assert_time(sim_time_of(s, 'O') - sim_time_of(s, 'F'), 2 * 1146);
 }
 
-static void every_hook_but_three_may_be_missing(void **state)
+static void all_hooks_except_three_may_be_missing(void **state)
 {
     NODE;
 
@@ -101,7 +101,7 @@ static void gap_after_reply(sim *s, uint32_t wanted)
     sim_assert_time(s->frames[s->sent - 1].silence, wanted);
 }
 
-static void the_gap_is_4_ms_while_the_rate_is_untold(void **state)
+static void the_gap_is_4_ms_while_no_baud_rate_is_set(void **state)
 {
     NODE;
 
@@ -133,7 +133,7 @@ static void the_gap_is_1750_us_above_19200_baud(void **state)
     gap_after_reply(s, 1750);
 }
 
-static void a_gap_of_ones_own_holds_until_the_rate_is_told(void **state)
+static void a_set_gap_holds_until_a_baud_rate_is_set(void **state)
 {
     NODE;
 
@@ -169,7 +169,7 @@ static void the_gap_counts_from_the_last_byte_sent(void **state)
     sim_assert_time(s->frames[1].begin - s->frames[0].end, 4000);
 }
 
-static void no_gap_is_waited_for_that_has_passed_already(void **state)
+static void a_gap_that_has_passed_already_is_not_waited_for(void **state)
 {
     uint64_t asked;
     NODE;
@@ -216,13 +216,13 @@ static void no_gap_is_waited_for_after_begin_on_a_silent_line(void **state)
     asked = s->now;
     sim_reads(s, 500);
     sim_assert_time(s->frames[0].begin - asked, 0);
-    /* But after a request on that line. */
+    /* After a request of the object on that line the gap is kept. */
     OK(mbm_master_beginRtu(n, 17, &s->port));
     sim_reads(s, 500);
     sim_assert_time(s->frames[1].silence, 4000);
 }
 
-static void bytes_that_arrive_after_begin_begin_the_gap(void **state)
+static void bytes_that_arrive_after_begin_start_the_gap(void **state)
 {
     NODE;
 
@@ -233,7 +233,7 @@ static void bytes_that_arrive_after_begin_begin_the_gap(void **state)
     sim_assert_time(s->frames[0].silence, 4000);
 }
 
-static void the_gap_counts_from_the_use_of_the_line_that_was_told(void **state)
+static void the_gap_counts_from_the_reported_use_of_the_line(void **state)
 {
     uint64_t asked;
     NODE;
@@ -244,13 +244,13 @@ static void the_gap_counts_from_the_use_of_the_line_that_was_told(void **state)
     OK(mbm_master_lineUsedAt(n, (uint32_t)s->now - 3000));
     sim_reads(s, 500);
     sim_assert_time(s->frames[1].begin - asked, 1000);
-    /* Its own last byte is later than that. */
+    /* The master's own last byte is later than this. */
     OK(mbm_master_lineUsedAt(n, (uint32_t)asked - 3000));
     sim_reads(s, 500);
     sim_assert_time(s->frames[2].silence, 4000);
 }
 
-static void many_objects_share_a_stream(void **state)
+static void several_masters_share_a_stream(void **state)
 {
     static mbm_master other;
     uint16_t words[4];
@@ -292,24 +292,24 @@ int main(void)
         SIM_TEST(steps_come_in_order),
         SIM_TEST(steps_come_in_order_when_the_port_takes_bytes_one_by_one),
         SIM_TEST(bytes_that_wait_in_the_receiver_are_no_part_of_the_reply),
-        SIM_TEST(the_driver_goes_off_only_behind_the_last_bit),
-        SIM_TEST(the_driver_is_held_on_behind_an_early_flush),
-        SIM_TEST(a_hold_in_an_untold_rate_is_that_of_9600_baud),
-        SIM_TEST(every_hook_but_three_may_be_missing),
+        SIM_TEST(the_driver_is_switched_off_only_after_the_last_bit),
+        SIM_TEST(the_driver_is_held_on_after_an_early_flush),
+        SIM_TEST(without_a_baud_rate_the_hold_is_that_of_9600_baud),
+        SIM_TEST(all_hooks_except_three_may_be_missing),
         SIM_TEST(the_first_request_waits_for_the_gap_after_begin),
-        SIM_TEST(the_gap_is_4_ms_while_the_rate_is_untold),
+        SIM_TEST(the_gap_is_4_ms_while_no_baud_rate_is_set),
         SIM_TEST(the_gap_is_three_and_a_half_characters_up_to_19200_baud),
         SIM_TEST(the_gap_is_1750_us_above_19200_baud),
-        SIM_TEST(a_gap_of_ones_own_holds_until_the_rate_is_told),
+        SIM_TEST(a_set_gap_holds_until_a_baud_rate_is_set),
         SIM_TEST(the_gap_counts_from_the_last_foreign_byte),
         SIM_TEST(the_gap_counts_from_the_last_byte_sent),
-        SIM_TEST(no_gap_is_waited_for_that_has_passed_already),
+        SIM_TEST(a_gap_that_has_passed_already_is_not_waited_for),
         SIM_TEST(line_used_makes_the_gap_count_from_now),
         SIM_TEST(idle_is_not_called_while_bytes_wait),
         SIM_TEST(no_gap_is_waited_for_after_begin_on_a_silent_line),
-        SIM_TEST(bytes_that_arrive_after_begin_begin_the_gap),
-        SIM_TEST(the_gap_counts_from_the_use_of_the_line_that_was_told),
-        SIM_TEST(many_objects_share_a_stream),
+        SIM_TEST(bytes_that_arrive_after_begin_start_the_gap),
+        SIM_TEST(the_gap_counts_from_the_reported_use_of_the_line),
+        SIM_TEST(several_masters_share_a_stream),
         SIM_TEST(the_idle_hook_is_given_the_master_that_waits),
     };
 

@@ -1,5 +1,6 @@
-/* How long a transaction of the contract waits for what: reply, quiet time,
- * turnaround, a busy line. On the simulated clock; unit 17 is 11 on the wire. */
+/* The waits of a transaction of the contract with programs for ModbusMaster: for the reply,
+ * the quiet time, the turnaround delay and a busy line, on a simulated clock. Unit 17 is 11
+ * on the wire. */
 #include "sim.h"
 #include "test.h"
 
@@ -34,7 +35,7 @@ static void the_response_timeout_can_be_set(void **state)
     sim_reads(s, 65000000);
 }
 
-static void idle_away(sim *s)
+static void pass_3_seconds(sim *s)
 {
     if (s->sent > 0)
         s->now += 3000000;
@@ -45,23 +46,23 @@ static void a_reply_that_is_complete_as_the_deadline_passes_is_a_success(void **
     NODE;
 
     (void)n;
-    s->on_idle = idle_away;
+    s->on_idle = pass_3_seconds;
     sim_reads(s, 1500000);
 }
 
-/* Ports such as Arduino's give a byte at a time; that changes nothing. */
-static void a_reply_read_byte_by_byte_behind_the_deadline_is_a_success(void **state)
+/* Ports such as Arduino's return one byte for each read. The result must be the same. */
+static void a_reply_read_byte_by_byte_after_the_deadline_is_a_success(void **state)
 {
     NODE;
 
     (void)n;
-    s->on_idle = idle_away;
+    s->on_idle = pass_3_seconds;
     s->read_piece = 1;
     sim_reads(s, 1500000);
 }
 
-/* However much is read behind the deadline, it must have an end. */
-static void chatter_does_not_hold_a_request_for_ever(void **state)
+/* The request must end, however many bytes arrive after the deadline. */
+static void endless_bytes_do_not_keep_a_request_from_ending(void **state)
 {
     static const uint8_t noise[8000] = {0};
     NODE;
@@ -81,12 +82,12 @@ static void a_long_idle_while_a_reply_arrives_is_tolerated(void **state)
     NODE;
 
     mbm_master_setResponseTimeout(n, 10000);
-    s->on_idle = idle_away;
+    s->on_idle = pass_3_seconds;
     sim_reads(s, 100);
     assert_true(s->idles < 1000);
 }
 
-static void the_line_is_left_alone_after_a_timeout(void **state)
+static void the_quiet_time_is_kept_after_a_timeout(void **state)
 {
     uint64_t failed;
     NODE;
@@ -95,8 +96,8 @@ static void the_line_is_left_alone_after_a_timeout(void **state)
     failed = s->now;
     sim_reads(s, 500);
     sim_assert_time(s->frames[1].begin - failed, 100000);
-    /* The reply to it was held, see test_late_replies.c. After that reply the
-     * line is not left alone. */
+    /* This request's reply was held, see test_late_replies.c. After a held reply there is
+     * no quiet time. */
     sim_reads(s, 500);
     sim_reads(s, 500);
     sim_assert_time(s->frames[3].silence, 4000);
@@ -117,13 +118,13 @@ static void a_reply_in_the_quiet_time_is_dropped(void **state)
     assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
     failed = s->now;
     sim_reads(s, 500);
-    /* Whether it makes the quiet time begin anew is left open. */
+    /* Whether the reply starts the quiet time again is not specified. */
     assert_true(s->frames[1].begin >= failed + 100000);
     assert_true(s->frames[1].silence >= 4000);
     assert_true(s->frames[1].begin <= failed + 160000);
 }
 
-/* One frame and then silence is not a line that never falls silent. */
+/* One frame followed by silence does not mean that the line never falls silent. */
 static void a_reply_late_in_the_quiet_time_does_not_make_the_line_busy(void **state)
 {
     NODE;
@@ -134,7 +135,7 @@ static void a_reply_late_in_the_quiet_time_does_not_make_the_line_busy(void **st
     sim_reads(s, 500);
 }
 
-static void a_request_without_reply_is_repeated_as_often_as_told(void **state)
+static void a_request_without_a_reply_is_repeated_as_often_as_set(void **state)
 {
     NODE;
 
@@ -150,7 +151,7 @@ static void a_request_without_reply_is_repeated_as_often_as_told(void **state)
     assert_int_equal(s->sent, 6);
 }
 
-static void damaged_and_malformed_replies_are_worth_a_retry_exceptions_are_not(void **state)
+static void damaged_and_malformed_replies_are_retried_exceptions_are_not(void **state)
 {
     NODE;
 
@@ -215,7 +216,7 @@ static void a_line_that_never_falls_silent_is_busy(void **state)
     assert_in_range(s->now, 100000, 110000);
 }
 
-static void an_endless_drain_is_bounded_even_if_every_read_gives_bytes(void **state)
+static void an_endless_flush_is_bounded_even_if_every_read_returns_bytes(void **state)
 {
     static const uint8_t noise[4000] = {0};
     NODE;
@@ -228,8 +229,8 @@ static void an_endless_drain_is_bounded_even_if_every_read_gives_bytes(void **st
     assert_in_range(s->now, 1000, 10000);
 }
 
-/* A slow line is not a dead port: bytes leave all the time. */
-static void a_request_that_takes_longer_than_the_reply_may_is_sent(void **state)
+/* On a slow line the port still accepts bytes, so it is not stuck. */
+static void a_request_that_takes_longer_than_the_response_timeout_is_sent(void **state)
 {
     NODE;
 
@@ -240,13 +241,13 @@ static void a_request_that_takes_longer_than_the_reply_may_is_sent(void **state)
     OK(mbm_master_writeMultipleRegisters(n, 0, 100));
 }
 
-static void a_port_that_takes_a_byte_now_and_then_is_not_busy(void **state)
+static void a_port_that_accepts_a_byte_now_and_then_is_not_busy(void **state)
 {
     NODE;
 
     s->character = 1146;
     s->write_piece = 1;
-    s->write_busy = 500; /* a byte in 1 ms */
+    s->write_busy = 500; /* one byte in 1 ms */
     OK(mbm_master_setResponseTimeout(n, 100));
     sim_answer(s, 1, 500, "11 10 00 00 00 64 +");
     OK(mbm_master_writeMultipleRegisters(n, 0, 100));
@@ -260,8 +261,8 @@ static void a_gap_longer_than_the_timeout_is_waited_for(void **state)
     gap_after_reply(s, 4000);
 }
 
-/* Polls a non-blocking request to its end, and sleeps for exactly as long as
- * pollDelay says. */
+/* Polls a non-blocking request until it has ended, and sleeps for exactly the time of
+ * pollDelay. */
 static uint8_t poll_as_rarely_as_allowed(sim *s)
 {
     uint8_t status;
@@ -274,7 +275,7 @@ static uint8_t poll_as_rarely_as_allowed(sim *s)
     return status;
 }
 
-static void sleeping_as_poll_delay_says_lengthens_no_timeout(void **state)
+static void sleeping_for_poll_delay_does_not_lengthen_a_timeout(void **state)
 {
     uint64_t begin;
     NODE;
@@ -285,7 +286,7 @@ static void sleeping_as_poll_delay_says_lengthens_no_timeout(void **state)
     assert_int_equal(poll_as_rarely_as_allowed(s), MBM_RESPONSE_TIMED_OUT);
     sim_assert_time(s->now - s->frames[0].end, 500000);
 
-    /* Each repetition waits for the quiet time and for a reply of its own. */
+    /* Each repetition waits for the quiet time and for its own reply. */
     OK(mbm_master_setRetries(n, 2));
     begin = s->now;
     assert_int_equal(sim_read_one(s), MBM_PENDING);
@@ -294,7 +295,7 @@ static void sleeping_as_poll_delay_says_lengthens_no_timeout(void **state)
     assert_in_range(s->now - begin, 1800000, 1800000 + 40 * s->character);
 }
 
-static void sleeping_as_poll_delay_says_lengthens_no_turnaround_delay(void **state)
+static void sleeping_for_poll_delay_does_not_lengthen_a_turnaround_delay(void **state)
 {
     NODE;
 
@@ -306,7 +307,7 @@ static void sleeping_as_poll_delay_says_lengthens_no_turnaround_delay(void **sta
     sim_assert_time(s->now - s->frames[0].end, 200000);
 }
 
-static void sleeping_as_poll_delay_says_lengthens_no_hold_of_a_reply(void **state)
+static void sleeping_for_poll_delay_does_not_lengthen_the_hold_of_a_reply(void **state)
 {
     NODE;
 
@@ -324,7 +325,7 @@ static void sleeping_as_poll_delay_says_lengthens_no_hold_of_a_reply(void **stat
     assert_in_range(s->now - s->last_byte, 100000, 100100);
 }
 
-/* Longer than the clock counts would be no gap at all. */
+/* A longer gap could not be measured with the clock, so it would not be kept at all. */
 static void the_longest_gap_is_2_to_the_31_microseconds(void **state)
 {
     static const uint32_t gaps[] = {0x80000000, 0x80000001, 0xFFFF0000, 0xFFFFFFFE, 0xFFFFFFFF};
@@ -385,24 +386,24 @@ int main(void)
         SIM_TEST(a_reply_may_take_2000_ms),
         SIM_TEST(the_response_timeout_can_be_set),
         SIM_TEST(a_reply_that_is_complete_as_the_deadline_passes_is_a_success),
-        SIM_TEST(a_reply_read_byte_by_byte_behind_the_deadline_is_a_success),
-        SIM_TEST(chatter_does_not_hold_a_request_for_ever),
+        SIM_TEST(a_reply_read_byte_by_byte_after_the_deadline_is_a_success),
+        SIM_TEST(endless_bytes_do_not_keep_a_request_from_ending),
         SIM_TEST(a_long_idle_while_a_reply_arrives_is_tolerated),
-        SIM_TEST(the_line_is_left_alone_after_a_timeout),
+        SIM_TEST(the_quiet_time_is_kept_after_a_timeout),
         SIM_TEST(a_reply_in_the_quiet_time_is_dropped),
         SIM_TEST(a_reply_late_in_the_quiet_time_does_not_make_the_line_busy),
-        SIM_TEST(a_request_without_reply_is_repeated_as_often_as_told),
-        SIM_TEST(damaged_and_malformed_replies_are_worth_a_retry_exceptions_are_not),
+        SIM_TEST(a_request_without_a_reply_is_repeated_as_often_as_set),
+        SIM_TEST(damaged_and_malformed_replies_are_retried_exceptions_are_not),
         SIM_TEST(a_broadcast_succeeds_after_the_turnaround_delay),
         SIM_TEST(a_read_is_not_broadcast),
         SIM_TEST(a_line_that_never_falls_silent_is_busy),
-        SIM_TEST(an_endless_drain_is_bounded_even_if_every_read_gives_bytes),
-        SIM_TEST(a_request_that_takes_longer_than_the_reply_may_is_sent),
-        SIM_TEST(a_port_that_takes_a_byte_now_and_then_is_not_busy),
+        SIM_TEST(an_endless_flush_is_bounded_even_if_every_read_returns_bytes),
+        SIM_TEST(a_request_that_takes_longer_than_the_response_timeout_is_sent),
+        SIM_TEST(a_port_that_accepts_a_byte_now_and_then_is_not_busy),
         SIM_TEST(a_gap_longer_than_the_timeout_is_waited_for),
-        SIM_TEST(sleeping_as_poll_delay_says_lengthens_no_timeout),
-        SIM_TEST(sleeping_as_poll_delay_says_lengthens_no_turnaround_delay),
-        SIM_TEST(sleeping_as_poll_delay_says_lengthens_no_hold_of_a_reply),
+        SIM_TEST(sleeping_for_poll_delay_does_not_lengthen_a_timeout),
+        SIM_TEST(sleeping_for_poll_delay_does_not_lengthen_a_turnaround_delay),
+        SIM_TEST(sleeping_for_poll_delay_does_not_lengthen_the_hold_of_a_reply),
         SIM_TEST(the_longest_gap_is_2_to_the_31_microseconds),
         SIM_TEST(the_longest_gap_of_a_client_is_2_to_the_31_microseconds),
     };

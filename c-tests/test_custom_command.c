@@ -1,4 +1,4 @@
-/* The example with functions of one's own, driven by scripts. */
+/* The example custom_command, driven by scripts. */
 #include "program.h"
 #include "test.h"
 
@@ -7,7 +7,7 @@
 
 static char output[8192];
 
-/* What the example prints for a script, and its exit code. */
+/* Runs a script. Keeps what the example prints, and returns its exit code. */
 static int run(const char *script)
 {
     const char *const none[] = {NULL};
@@ -21,7 +21,7 @@ static int run(const char *script)
     return program_end(&p);
 }
 
-static void what_is_written_is_read_back(void **state)
+static void written_registers_are_read_back(void **state)
 {
     (void)state;
     assert_int_equal(run("# three of ten\n"
@@ -34,7 +34,7 @@ static void what_is_written_is_read_back(void **state)
                                 "register 4: 4660\nregister 5: 0\n");
 }
 
-static void all_ten_registers_are_there(void **state)
+static void all_ten_registers_exist(void **state)
 {
     (void)state;
     assert_int_equal(run("write 0 10 11 12 13 14 15 16 17 18 19\nread 9 1\nread 0 10\n"), 0);
@@ -42,7 +42,7 @@ static void all_ten_registers_are_there(void **state)
         strstr(output, "wrote 10 from register 0 on\nregister 9: 19\nregister 0: 10\n"));
 }
 
-static void what_is_out_of_range_is_02_to_read_and_04_to_write(void **state)
+static void out_of_range_a_read_returns_02_and_a_write_04(void **state)
 {
     (void)state;
     assert_int_equal(run("read 9 2\n"), 1);
@@ -55,7 +55,7 @@ static void what_is_out_of_range_is_02_to_read_and_04_to_write(void **state)
                                 "register 9: 0\n");
 }
 
-static void byte_counts_that_are_odd_or_lie_are_03_and_change_nothing(void **state)
+static void wrong_byte_counts_return_03_and_change_nothing(void **state)
 {
     (void)state;
     assert_int_equal(run("raw 42 00 00 00 01 03 00 01 02\n"
@@ -85,7 +85,7 @@ static void the_frames_are_those_of_the_two_functions(void **state)
                                 "raw: exception 01: illegal function\n");
 }
 
-static void what_is_no_command_is_told_and_passed_over(void **state)
+static void unknown_commands_are_reported_and_skipped(void **state)
 {
     (void)state;
     assert_int_equal(run("dance\nread 1\nread 1 2 3\nwrite 1\nwrite 1 65536\nread -1 1\nraw\n"
@@ -104,12 +104,12 @@ static void what_is_no_command_is_told_and_passed_over(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_written_is_read_back),
-        cmocka_unit_test(all_ten_registers_are_there),
-        cmocka_unit_test(what_is_out_of_range_is_02_to_read_and_04_to_write),
-        cmocka_unit_test(byte_counts_that_are_odd_or_lie_are_03_and_change_nothing),
+        cmocka_unit_test(written_registers_are_read_back),
+        cmocka_unit_test(all_ten_registers_exist),
+        cmocka_unit_test(out_of_range_a_read_returns_02_and_a_write_04),
+        cmocka_unit_test(wrong_byte_counts_return_03_and_change_nothing),
         cmocka_unit_test(the_frames_are_those_of_the_two_functions),
-        cmocka_unit_test(what_is_no_command_is_told_and_passed_over),
+        cmocka_unit_test(unknown_commands_are_reported_and_skipped),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

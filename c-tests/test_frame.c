@@ -14,7 +14,7 @@ static const mbm_framing framings[] = {
 static const mbm_framing *const rtu = &framings[0], *const ascii = &framings[1],
                                 *const tcp = &framings[2];
 
-/* The tests' own way to put a frame around a PDU. */
+/* Builds a frame around a PDU without mbm. */
 static uint16_t wrap(const mbm_framing *f, const mbm_packet *p, const uint8_t *pdu, uint16_t length,
                      uint8_t *frame)
 {
@@ -54,7 +54,7 @@ static uint16_t wrap(const mbm_framing *f, const mbm_packet *p, const uint8_t *p
     return (uint16_t)(2 * i + 3);
 }
 
-/* Example `i` as a frame of one framing, and its packet. */
+/* Writes example `i` as a frame of one framing, and its packet. */
 static uint16_t framed(size_t i, const mbm_framing *f, uint8_t *pdu, mbm_packet *packet,
                        uint8_t *frame)
 {
@@ -140,7 +140,7 @@ static void frames_of_other_implementations_are_parsed_and_built(void **state)
     }
 }
 
-static void the_first_bytes_tell_how_long_a_frame_is(void **state)
+static void the_first_bytes_of_a_frame_determine_its_length(void **state)
 {
     uint8_t pdu[MBM_MAX_PDU], frame[MBM_MAX_ASCII_FRAME];
     mbm_packet packet;
@@ -164,14 +164,14 @@ static void the_first_bytes_tell_how_long_a_frame_is(void **state)
                 else
                     assert_int_equal(expected.bytes, 0);
             }
-            /* TCP has a length, ASCII an end. */
+            /* A TCP frame has a length field, an ASCII frame an end character. */
             if (&framings[f] == tcp || &framings[f] == ascii)
                 assert_int_equal(last, MBM_LENGTH_EXACT);
         }
     }
 }
 
-static void a_request_tells_how_long_its_reply_frame_is(void **state)
+static void a_request_determines_the_length_of_its_reply_frame(void **state)
 {
     static const uint16_t lengths[] = {11, 23, 15, 11};
     mbm_packet packet = {.unit = 1, .function = 0x03, .quantity = 3};
@@ -216,7 +216,8 @@ static void bytes_look_like_tcp_with_or_without_unknown_functions(void **state)
         known += fits;
         assert_int_equal(any, (function & 0x7F) != 0);
     }
-    /* 19 of the standard and 19 left to users, and their exceptions. */
+    /* The 19 functions of the standard and the 19 codes of user-defined functions, with
+     * their exceptions. */
     assert_int_equal(known, 2 * (19 + 19));
     frame[5] = 6;
     frame[7] = 3;
@@ -226,8 +227,8 @@ static void bytes_look_like_tcp_with_or_without_unknown_functions(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_frame_looksLikeTcp(frame, 8, 1, NULL));
 }
 
-/* Whether a header with this length and these bytes after it look like TCP. */
-static int looks(uint8_t length, const char *pdu)
+/* Returns whether a header with this length, followed by these bytes, looks like TCP. */
+static int looks_like_tcp(uint8_t length, const char *pdu)
 {
     uint8_t frame[64] = {0, 1, 0, 0, 0, length, 0x11};
     uint16_t total = 0, have = (uint16_t)(7 + hex_bytes(frame + 7, pdu));
@@ -240,41 +241,41 @@ static int looks(uint8_t length, const char *pdu)
     return status == MBM_OK;
 }
 
-static void a_header_whose_length_the_function_has_not_does_not_look_like_tcp(void **state)
+static void a_header_with_a_length_that_the_function_never_has_does_not_look_like_tcp(void **state)
 {
     unsigned length;
 
     (void)state;
-    /* A request has 5 bytes, a response as many as it counts, at least 2. */
-    assert_false(looks(2, "01"));
-    assert_true(looks(3, "01"));
-    assert_true(looks(6, "01 0000 0001"));
-    assert_false(looks(7, "01 0000 0001"));
-    assert_true(looks(7, "01 04 0000"));
-    assert_false(looks(8, "01 04 0000"));
-    /* As much as has arrived is judged; what comes after the frame is not. */
-    assert_true(looks(7, "01 04 0000 0000 0005"));
-    assert_false(looks(4, "01 04 00"));
-    /* Fixed lengths. */
-    assert_true(looks(2, "07"));
-    assert_true(looks(3, "07 2A"));
-    assert_false(looks(4, "07 2A 00"));
-    assert_true(looks(8, "16"));
-    assert_false(looks(7, "16"));
+    /* A request has 5 bytes. A response has as many as its byte count says, at least 2. */
+    assert_false(looks_like_tcp(2, "01"));
+    assert_true(looks_like_tcp(3, "01"));
+    assert_true(looks_like_tcp(6, "01 0000 0001"));
+    assert_false(looks_like_tcp(7, "01 0000 0001"));
+    assert_true(looks_like_tcp(7, "01 04 0000"));
+    assert_false(looks_like_tcp(8, "01 04 0000"));
+    /* Only the bytes that have arrived are checked. Bytes after the frame are not. */
+    assert_true(looks_like_tcp(7, "01 04 0000 0000 0005"));
+    assert_false(looks_like_tcp(4, "01 04 00"));
+    /* Functions of fixed length. */
+    assert_true(looks_like_tcp(2, "07"));
+    assert_true(looks_like_tcp(3, "07 2A"));
+    assert_false(looks_like_tcp(4, "07 2A 00"));
+    assert_true(looks_like_tcp(8, "16"));
+    assert_false(looks_like_tcp(7, "16"));
     for (length = 2; length < 255; length++) {
         /* An exception has 2 bytes, whatever its function. */
-        assert_int_equal(looks((uint8_t)length, "81"), length == 3);
-        assert_int_equal(looks((uint8_t)length, "D5 01"), length == 3);
-        /* Of what no length is known, any will do. */
-        assert_true(looks((uint8_t)length, "55"));
-        assert_int_equal(looks((uint8_t)length, "08 0000"), length >= 4);
-        assert_int_equal(looks((uint8_t)length, "2B 0D"), length >= 3);
-        /* A device may count its id alone. A request has one byte. */
-        assert_int_equal(looks((uint8_t)length, "11 02"), length == 2 || length >= 5);
+        assert_int_equal(looks_like_tcp((uint8_t)length, "81"), length == 3);
+        assert_int_equal(looks_like_tcp((uint8_t)length, "D5 01"), length == 3);
+        /* A function whose length is unknown may have any length. */
+        assert_true(looks_like_tcp((uint8_t)length, "55"));
+        assert_int_equal(looks_like_tcp((uint8_t)length, "08 0000"), length >= 4);
+        assert_int_equal(looks_like_tcp((uint8_t)length, "2B 0D"), length >= 3);
+        /* The byte count of a server id may cover the id alone. A request has one byte. */
+        assert_int_equal(looks_like_tcp((uint8_t)length, "11 02"), length == 2 || length >= 5);
     }
 }
 
-static void a_server_id_is_as_long_as_its_check_says(void **state)
+static void the_length_of_a_server_id_is_found_by_its_crc(void **state)
 {
     static const char whole[] = "10 11 02 01FF 00EF", more[] = "10 11 02 0102 00 0102 0000";
     uint8_t bytes[16];
@@ -289,7 +290,7 @@ static void a_server_id_is_as_long_as_its_check_says(void **state)
         assert_int_equal(expected.kind, have < 7 ? MBM_LENGTH_AT_LEAST : MBM_LENGTH_EXACT);
         assert_int_equal(expected.bytes, 7);
     }
-    /* Where it counts the id alone, the end of the frame must tell. */
+    /* Where the byte count covers the id alone, only the end of the frame shows the length. */
     length = hex_bytes(bytes, more);
     OK(mbm_frame_expectedLength(rtu, MBM_PACKET_RESPONSE, bytes, length, &expected));
     assert_int_equal(expected.kind, MBM_LENGTH_SILENCE);
@@ -343,7 +344,7 @@ static void a_refused_request_is_answered_with_its_exception(void **state)
     }
 }
 
-static void nobody_answers_a_broadcast_or_a_frame_that_is_none(void **state)
+static void a_serial_broadcast_and_a_bad_frame_get_no_exception(void **state)
 {
     mbm_packet head = {.unit = 0}, packet;
     uint8_t frame[32], reply[32];
@@ -382,7 +383,7 @@ static void checksums_are_those_of_the_guide(void **state)
     assert_int_equal(mbm_frame_lrc(NULL, 2), 0);
 }
 
-static void a_declared_function_travels_in_every_framing(void **state)
+static void a_declared_function_is_built_and_parsed_in_every_framing(void **state)
 {
     const mbm_function own = {0x55, {MBM_RULE_COUNTED, 1, 0}, {MBM_RULE_FIXED, 2, 0}};
     const uint8_t pdu[] = {0x55, 2, 8, 9};
@@ -416,15 +417,15 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_function_is_built_and_parsed_in_every_framing),
         cmocka_unit_test(frames_of_other_implementations_are_parsed_and_built),
-        cmocka_unit_test(the_first_bytes_tell_how_long_a_frame_is),
-        cmocka_unit_test(a_request_tells_how_long_its_reply_frame_is),
+        cmocka_unit_test(the_first_bytes_of_a_frame_determine_its_length),
+        cmocka_unit_test(a_request_determines_the_length_of_its_reply_frame),
         cmocka_unit_test(bytes_look_like_tcp_with_or_without_unknown_functions),
-        cmocka_unit_test(a_header_whose_length_the_function_has_not_does_not_look_like_tcp),
-        cmocka_unit_test(a_server_id_is_as_long_as_its_check_says),
+        cmocka_unit_test(a_header_with_a_length_that_the_function_never_has_does_not_look_like_tcp),
+        cmocka_unit_test(the_length_of_a_server_id_is_found_by_its_crc),
         cmocka_unit_test(a_refused_request_is_answered_with_its_exception),
-        cmocka_unit_test(nobody_answers_a_broadcast_or_a_frame_that_is_none),
+        cmocka_unit_test(a_serial_broadcast_and_a_bad_frame_get_no_exception),
         cmocka_unit_test(checksums_are_those_of_the_guide),
-        cmocka_unit_test(a_declared_function_travels_in_every_framing),
+        cmocka_unit_test(a_declared_function_is_built_and_parsed_in_every_framing),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

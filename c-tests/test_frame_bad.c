@@ -1,4 +1,4 @@
-/* Frames cut short and changed, MBAP lengths, ASCII characters, NULL. */
+/* Frames that are cut short or changed, wrong MBAP lengths, wrong ASCII characters, NULL. */
 #include "examples.h"
 #include "test.h"
 
@@ -9,7 +9,7 @@ static const mbm_framing rtu = {.kind = MBM_FRAMING_RTU};
 static const mbm_framing ascii = {.kind = MBM_FRAMING_ASCII};
 static const mbm_framing tcp = {.kind = MBM_FRAMING_TCP};
 
-/* Example `i`, built, for unit 0x11. */
+/* Writes example `i` as a frame of unit 0x11. */
 static uint16_t framed(size_t i, const mbm_framing *f, uint8_t *frame)
 {
     uint8_t pdu[MBM_MAX_PDU];
@@ -23,8 +23,8 @@ static uint16_t framed(size_t i, const mbm_framing *f, uint8_t *frame)
     return length;
 }
 
-/* Parses a copy in memory of just that size, so that sanitizers see a read
- * beyond; what is parsed is built to the same bytes, but for lower case. */
+/* Parses a copy in memory of exactly this size, so that sanitizers report a read beyond it.
+ * A frame that is parsed must be built to the same bytes, except for lower case. */
 static uint8_t parsed(const mbm_framing *f, uint8_t side, const uint8_t *frame, uint16_t length)
 {
     uint8_t *copy = malloc(length ? length : 1), again[MBM_MAX_ASCII_FRAME];
@@ -129,14 +129,14 @@ static void an_ascii_frame_that_is_cut_or_changed_is_parsed_right_or_refused(voi
                 frame[at] = (uint8_t)value;
                 right += parsed(&ascii, side, frame, length) == MBM_OK;
             }
-            /* A letter may stand in lower case. */
+            /* A hexadecimal letter may be in lower case. */
             assert_int_equal(right, was >= 'A' && was <= 'F' ? 2 : 1);
             frame[at] = was;
         }
     }
 }
 
-static void mbap_lengths_that_no_frame_has_are_malformed(void **state)
+static void impossible_mbap_lengths_are_malformed(void **state)
 {
     static const uint16_t lengths[] = {0, 1, 255, 256, 65535};
     uint8_t frame[600] = {0, 1, 0, 0, 0, 6, 1, 3, 0, 0, 0, 1};
@@ -163,7 +163,7 @@ static void mbap_lengths_that_no_frame_has_are_malformed(void **state)
     IS(MBM_MALFORMED_FRAME, parsed(&tcp, MBM_PACKET_REQUEST, frame, 12));
 }
 
-static void ascii_is_taken_in_lower_case_and_in_pairs_only(void **state)
+static void ascii_digits_may_be_lower_case_and_must_come_in_pairs(void **state)
 {
     static const struct {
         uint8_t status;
@@ -211,7 +211,7 @@ static void ascii_is_taken_in_lower_case_and_in_pairs_only(void **state)
     IS(MBM_MALFORMED_FRAME, parsed(&ascii, MBM_PACKET_REQUEST, text, 514));
 }
 
-static void the_first_bytes_of_no_frame_are_malformed(void **state)
+static void first_bytes_that_begin_no_frame_are_malformed(void **state)
 {
     mbm_length expected;
 
@@ -270,9 +270,9 @@ int main(void)
         cmocka_unit_test(an_rtu_frame_that_is_cut_or_changed_is_refused),
         cmocka_unit_test(a_tcp_frame_that_is_cut_or_changed_is_parsed_right_or_refused),
         cmocka_unit_test(an_ascii_frame_that_is_cut_or_changed_is_parsed_right_or_refused),
-        cmocka_unit_test(mbap_lengths_that_no_frame_has_are_malformed),
-        cmocka_unit_test(ascii_is_taken_in_lower_case_and_in_pairs_only),
-        cmocka_unit_test(the_first_bytes_of_no_frame_are_malformed),
+        cmocka_unit_test(impossible_mbap_lengths_are_malformed),
+        cmocka_unit_test(ascii_digits_may_be_lower_case_and_must_come_in_pairs),
+        cmocka_unit_test(first_bytes_that_begin_no_frame_are_malformed),
         cmocka_unit_test(null_is_an_invalid_argument),
     };
 

@@ -1,5 +1,5 @@
-/* mbm_frame_* against libmodbus, RTU over a pty and TCP over loopback: what its
- * client sends is what we build, what its server answers is what we parse. */
+/* mbm_frame_* against libmodbus, RTU over a pty and TCP over loopback: mbm builds the
+ * requests of libmodbus's client and parses the responses of its server. */
 #define _GNU_SOURCE
 #include "await.h"
 #include "examples.h"
@@ -15,7 +15,7 @@
 static const mbm_framing rtu = {.kind = MBM_FRAMING_RTU};
 static const mbm_framing tcp = {.kind = MBM_FRAMING_TCP};
 
-/* Reads one frame, as long as its first bytes tell. */
+/* Reads one frame, as long as its first bytes say. */
 static uint16_t receive(int fd, const mbm_framing *f, uint8_t kind, uint8_t *frame)
 {
     uint16_t have = 0;
@@ -38,7 +38,7 @@ static uint16_t receive(int fd, const mbm_framing *f, uint8_t kind, uint8_t *fra
     }
 }
 
-/* The calls of libmodbus's client, and the packet that each sends. */
+/* The calls of libmodbus's client, and the packet that each call sends. */
 enum { CALLS = 11 };
 static const uint16_t words[] = {0x1234, 0xABCD, 0x0001};
 static const uint8_t wire_words[] = {0x12, 0x34, 0xAB, 0xCD, 0x00, 0x01};
@@ -63,7 +63,7 @@ static void call(modbus_t *client, unsigned number)
     case 9: done = modbus_write_and_read_registers(client, 14, 3, words, 3, 6, registers); break;
     case 10: done = modbus_report_slave_id(client, (int)sizeof bytes, bytes); break;
     }
-    /* Nobody answers. */
+    /* There is no server. */
     assert_int_equal(done, -1);
 }
 
@@ -111,7 +111,7 @@ static void sends_what_we_build(modbus_t *client, int fd, const mbm_framing *f)
     }
 }
 
-static void what_libmodbus_sends_over_rtu_is_what_we_build(void **state)
+static void mbm_builds_the_requests_that_libmodbus_sends_over_rtu(void **state)
 {
     pty line;
     modbus_t *client;
@@ -127,7 +127,7 @@ static void what_libmodbus_sends_over_rtu_is_what_we_build(void **state)
     pty_close(&line);
 }
 
-static void what_libmodbus_sends_over_tcp_is_what_we_build(void **state)
+static void mbm_builds_the_requests_that_libmodbus_sends_over_tcp(void **state)
 {
     modbus_t *client;
     uint16_t port;
@@ -146,8 +146,9 @@ static void what_libmodbus_sends_over_tcp_is_what_we_build(void **state)
     close(listener);
 }
 
-/* Sends a request and parses the reply, which must be as long as was told. */
-static void ask(int fd, const mbm_framing *f, mbm_packet request, uint8_t *frame, mbm_packet *reply)
+/* Sends a request and parses the reply, whose length must be the one that the request implies. */
+static void request_reply(int fd, const mbm_framing *f, mbm_packet request, uint8_t *frame,
+                          mbm_packet *reply)
 {
     mbm_length expected;
     uint16_t length;
@@ -181,7 +182,7 @@ static void answers_what_we_parse(int fd, const mbm_framing *f, const modbus_map
         const mbm_packet *request = &sent[i];
         unsigned at;
 
-        ask(fd, f, *request, frame, &reply);
+        request_reply(fd, f, *request, frame, &reply);
         assert_int_equal(reply.kind, MBM_PACKET_RESPONSE);
         assert_int_equal(reply.address, reply.dataLength ? 0 : request->address);
         assert_int_equal(reply.value, request->value);
@@ -205,12 +206,13 @@ static void answers_what_we_parse(int fd, const mbm_framing *f, const modbus_map
     assert_int_equal(memory->tab_bits[0xAC], 1);
     assert_int_equal(memory->tab_registers[14], 0x1234);
     assert_int_equal(memory->tab_registers[16], 0x0001);
-    ask(fd, f, (mbm_packet){.function = 0x03, .address = 0xFF00, .quantity = 1}, frame, &reply);
+    request_reply(fd, f, (mbm_packet){.function = 0x03, .address = 0xFF00, .quantity = 1}, frame,
+                  &reply);
     assert_int_equal(reply.kind, MBM_PACKET_EXCEPTION);
     assert_int_equal(reply.exceptionCode, MBM_ILLEGAL_DATA_ADDRESS);
 }
 
-static void what_libmodbus_answers_over_rtu_is_what_we_parse(void **state)
+static void mbm_parses_the_responses_of_libmodbus_over_rtu(void **state)
 {
     static server peer;
 
@@ -220,7 +222,7 @@ static void what_libmodbus_answers_over_rtu_is_what_we_parse(void **state)
     server_stop(&peer);
 }
 
-static void what_libmodbus_answers_over_tcp_is_what_we_parse(void **state)
+static void mbm_parses_the_responses_of_libmodbus_over_tcp(void **state)
 {
     tcp_server peer;
     int fd;
@@ -236,10 +238,10 @@ static void what_libmodbus_answers_over_tcp_is_what_we_parse(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_libmodbus_sends_over_rtu_is_what_we_build),
-        cmocka_unit_test(what_libmodbus_sends_over_tcp_is_what_we_build),
-        cmocka_unit_test(what_libmodbus_answers_over_rtu_is_what_we_parse),
-        cmocka_unit_test(what_libmodbus_answers_over_tcp_is_what_we_parse),
+        cmocka_unit_test(mbm_builds_the_requests_that_libmodbus_sends_over_rtu),
+        cmocka_unit_test(mbm_builds_the_requests_that_libmodbus_sends_over_tcp),
+        cmocka_unit_test(mbm_parses_the_responses_of_libmodbus_over_rtu),
+        cmocka_unit_test(mbm_parses_the_responses_of_libmodbus_over_tcp),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

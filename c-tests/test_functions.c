@@ -1,5 +1,5 @@
-/* The ten functions at their edges, against a real libmodbus server; what was
- * written is looked up in the server's own memory. */
+/* The ten functions at the limits of their quantities, against a libmodbus server. The
+ * tests look up written values in the server's own memory. */
 #include "await.h"
 #include "node.h"
 #include "server.h"
@@ -179,7 +179,7 @@ static void reads_and_writes_multiple_registers(void **state)
                                                                300, quantities[q].write),
                          MBM_OK);
         assert_int_equal(peer.mapping->tab_registers[300 + quantities[q].write], 0x7777);
-        /* The write comes before the read. */
+        /* The server writes before it reads. */
         for (i = 0; i < quantities[q].read; i++) {
             uint16_t value = peer.mapping->tab_registers[300 + i];
 
@@ -231,7 +231,7 @@ static void requests_words_to_receive(void **state)
     assert_int_equal(mbm_master_receive(&n.master), 0xFFFF);
 }
 
-static void hands_on_exceptions_of_the_server(void **state)
+static void returns_exceptions_of_the_server(void **state)
 {
     (void)state;
     assert_int_equal(mbm_master_readHoldingRegisters(&n.master, SERVER_REGISTERS, 1),
@@ -263,7 +263,7 @@ static void reaches_units_1_and_247(void **state)
     reaches_unit(247);
 }
 
-static void a_unit_that_is_not_there_times_out(void **state)
+static void an_absent_unit_times_out(void **state)
 {
     (void)state;
     mbm_master_setSlaveID(&n.master, 18);
@@ -298,7 +298,7 @@ static void a_non_blocking_request_is_pending_until_polled_to_its_end(void **sta
     while ((status = mbm_master_poll(&n.master)) == MBM_PENDING)
         polls++;
     assert_int_equal(status, MBM_OK);
-    /* One sent it; how many found no reply yet is the server's affair. */
+    /* One poll sends the request. How many polls find no reply depends on the server. */
     assert_true(polls > 0);
     assert_int_equal(n.counters.requests, 1);
     assert_int_equal(mbm_master_getResponseBuffer(&n.master, 1), server_pattern(4));
@@ -322,9 +322,9 @@ int main(void)
         TEST(reads_and_writes_multiple_registers),
         TEST(writes_queued_words_and_bits),
         TEST(requests_words_to_receive),
-        TEST(hands_on_exceptions_of_the_server),
+        TEST(returns_exceptions_of_the_server),
         TEST(reaches_units_1_and_247),
-        TEST(a_unit_that_is_not_there_times_out),
+        TEST(an_absent_unit_times_out),
         TEST(a_broadcast_reaches_the_server_and_succeeds),
         TEST(a_non_blocking_request_is_pending_until_polled_to_its_end),
     };

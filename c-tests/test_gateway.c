@@ -1,5 +1,5 @@
-/* The gateway example between libmodbus's TCP client and devices on ptys: one of
- * libmodbus, one of ours. */
+/* The gateway example between libmodbus's TCP client and two devices on ptys: a libmodbus
+ * server and an mbm server. */
 #define _GNU_SOURCE
 #include "asked.h"
 #include "await.h"
@@ -19,7 +19,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/* The timeout is one that a device in a thread of a busy machine keeps. */
+/* The timeout is long enough for a device in a thread of a busy machine. */
 enum { PEER_UNIT = 5, ABSENT = 6, NO_LINE = 200, DEAD_LINE = 40, TIMEOUT_MS = 3000, PLACES = 16 };
 
 static program gateway;
@@ -34,7 +34,7 @@ static modbus_mapping_t *mapping;
 static pthread_t thread;
 static int stop_peer[2];
 static int peer_runs;
-static char name[64]; /* of the peer's line, whichever terminal that is */
+static char name[64]; /* a symbolic link to the terminal of the peer's line */
 
 static void *serve(void *argument)
 {
@@ -48,7 +48,8 @@ static void *serve(void *argument)
         poll(waits, 2, -1);
         if (waits[1].revents)
             return NULL;
-        /* What is not for it, it takes with what follows: see server.c. */
+        /* After a frame for another unit libmodbus takes the next frame for its reply: see
+         * server.c. */
         length = modbus_receive(peer, request);
         if (length == 0)
             modbus_receive(peer, request);
@@ -139,7 +140,7 @@ static void expect_exception(int code, uint8_t unit)
     assert_int_equal(errno, MODBUS_ENOBASE + code);
 }
 
-static void libmodbus_reads_and_writes_through_it(void **state)
+static void libmodbus_reads_and_writes_through_the_gateway(void **state)
 {
     uint16_t words[125], values[] = {1, 0xFFFE, 0x1234};
     uint8_t cells[2000];
@@ -189,11 +190,10 @@ static void every_function_passes_through(void **state)
     close(fd);
 }
 
-/* A busy machine makes times longer, and never shorter: the shortest of so many
- * attempts counts. */
+/* A busy machine can only make the times longer, so the shortest of some attempts counts. */
 enum { ATTEMPTS = 5 };
 
-static void an_absent_device_is_0b_after_the_timeout(void **state)
+static void a_request_to_an_absent_device_gets_0b_after_the_timeout(void **state)
 {
     double took = TIMEOUT_MS;
     unsigned i;
@@ -207,10 +207,10 @@ static void an_absent_device_is_0b_after_the_timeout(void **state)
     }
     assert_true(took > TIMEOUT_MS * 0.9e-3 && took < TIMEOUT_MS * 2e-3);
     modbus_set_slave(client, PEER_UNIT);
-    libmodbus_reads_and_writes_through_it(state);
+    libmodbus_reads_and_writes_through_the_gateway(state);
 }
 
-static void a_unit_without_a_line_is_0a(void **state)
+static void a_request_to_a_unit_without_a_line_gets_0a(void **state)
 {
     double took = TIMEOUT_MS;
     unsigned i;
@@ -224,7 +224,7 @@ static void a_unit_without_a_line_is_0a(void **state)
         expect_exception(0x0A, DEAD_LINE);
         took = seconds() - before;
     }
-    /* Nobody was asked. */
+    /* Three requests took less than one timeout, so no device was waited for. */
     assert_true(took < TIMEOUT_MS * 0.9e-3);
 }
 
@@ -269,7 +269,7 @@ static void requests_of_many_connections_wait_for_their_turn(void **state)
         close(fds[i]);
 }
 
-static void a_line_that_waits_holds_up_no_other(void **state)
+static void a_line_that_waits_does_not_delay_another(void **state)
 {
     static const uint8_t absent[] = {0, 1, 0, 0, 0, 6, ABSENT, 3, 0, 0, 0, 1};
     uint8_t answer[600];
@@ -289,12 +289,12 @@ static void a_line_that_waits_holds_up_no_other(void **state)
         assert_int_equal(asked_bytes(fd, absent, 0, answer, 9), 9);
         assert_int_equal(answer[8], 0x0B);
     }
-    /* All were answered while the other line still waited. */
+    /* All were answered while the first line was still waiting for its device. */
     assert_int_equal(i, 5);
     close(fd);
 }
 
-static void a_connection_that_breaks_takes_its_request_along(void **state)
+static void a_connection_that_breaks_gives_up_its_request(void **state)
 {
     const struct linger hard = {1, 0};
     unsigned i;
@@ -311,10 +311,10 @@ static void a_connection_that_breaks_takes_its_request_along(void **state)
             usleep(1000);
         close(fd);
     }
-    libmodbus_reads_and_writes_through_it(state);
+    libmodbus_reads_and_writes_through_the_gateway(state);
 }
 
-static void connections_beyond_its_places_are_closed(void **state)
+static void connections_beyond_the_places_are_closed(void **state)
 {
     int fds[40];
     unsigned i;
@@ -325,7 +325,7 @@ static void connections_beyond_its_places_are_closed(void **state)
     /* One of the places is the client's. */
     for (i = 0; i < COUNT(fds); i++)
         assert_int_equal(asked_is_served(fds[i], NO_LINE, 0x0A), i < PLACES - 1);
-    libmodbus_reads_and_writes_through_it(state);
+    libmodbus_reads_and_writes_through_the_gateway(state);
     for (i = 0; i < COUNT(fds); i++)
         close(fds[i]);
 }
@@ -345,7 +345,7 @@ static void have_line(void)
     run_peer();
 }
 
-static void a_line_that_is_lost_is_0a_until_it_is_back(void **state)
+static void a_request_to_a_lost_line_gets_0a_until_the_line_is_back(void **state)
 {
     double start;
     uint16_t word;
@@ -363,7 +363,7 @@ static void a_line_that_is_lost_is_0a_until_it_is_back(void **state)
         assert_true(seconds() - start < PATIENCE_MS * 1e-3);
 }
 
-static void a_line_that_was_lost_while_nobody_asked_costs_no_request(void **state)
+static void a_line_that_was_lost_between_requests_fails_no_request(void **state)
 {
     uint16_t word;
 
@@ -374,8 +374,8 @@ static void a_line_that_was_lost_while_nobody_asked_costs_no_request(void **stat
     assert_int_equal(modbus_read_registers(client, 0, 1, &word), 1);
 }
 
-/* Starts a gateway with arguments that are none; what it says where it would listen. */
-static void bad_arguments_are_told(void **state)
+/* A gateway with bad arguments prints no `ready` line and ends with exit code 2. */
+static void bad_arguments_end_the_program(void **state)
 {
     static const char *const bad[][6] = {
         {"0", "300", "/dev/null,19200,E1,9-1"},
@@ -399,24 +399,24 @@ static void bad_arguments_are_told(void **state)
     }
 }
 
-/* A gateway of its own for each, so that none finds what another left behind. */
+/* Each test starts a gateway of its own, so that no test finds the state of another. */
 #define TEST(test) cmocka_unit_test_setup_teardown(test, start, stop)
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(libmodbus_reads_and_writes_through_it),
+        TEST(libmodbus_reads_and_writes_through_the_gateway),
         TEST(exceptions_of_a_device_pass_through),
         TEST(every_function_passes_through),
-        TEST(an_absent_device_is_0b_after_the_timeout),
-        TEST(a_unit_without_a_line_is_0a),
+        TEST(a_request_to_an_absent_device_gets_0b_after_the_timeout),
+        TEST(a_request_to_a_unit_without_a_line_gets_0a),
         TEST(requests_of_many_connections_wait_for_their_turn),
-        TEST(a_line_that_waits_holds_up_no_other),
-        TEST(a_connection_that_breaks_takes_its_request_along),
-        TEST(connections_beyond_its_places_are_closed),
-        TEST(a_line_that_is_lost_is_0a_until_it_is_back),
-        TEST(a_line_that_was_lost_while_nobody_asked_costs_no_request),
-        TEST(bad_arguments_are_told),
+        TEST(a_line_that_waits_does_not_delay_another),
+        TEST(a_connection_that_breaks_gives_up_its_request),
+        TEST(connections_beyond_the_places_are_closed),
+        TEST(a_request_to_a_lost_line_gets_0a_until_the_line_is_back),
+        TEST(a_line_that_was_lost_between_requests_fails_no_request),
+        TEST(bad_arguments_end_the_program),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

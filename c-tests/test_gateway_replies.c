@@ -1,4 +1,4 @@
-/* Which replies of a device the gateway example passes on: the device is the test. */
+/* Which replies of a device the gateway example passes on. The test plays the device. */
 #define _GNU_SOURCE
 #include "asked.h"
 #include "await.h"
@@ -16,19 +16,19 @@
 
 enum { UNIT = 5 };
 
-/* How long a gateway waits for its device, in milliseconds: longer than a busy machine
- * takes to run the device, and far shorter than PATIENCE_MS, for which a test waits for
+/* How long the gateway waits for its device, in milliseconds: longer than a busy machine
+ * takes to run the device, and much shorter than PATIENCE_MS, for which a test waits for
  * the gateway. */
 #define TIMEOUT "4000"
 
-/* A gateway and its one line, at whose other end the test is the device. */
+/* A gateway and its one line. The test is the device at the other end of the line. */
 typedef struct gateway {
     program program;
     pty line;
     uint16_t port;
 } gateway;
 
-/* Starts a gateway whose line is at `path`, with the options before its port. */
+/* Starts a gateway whose line is at `path`. The options come before the port. */
 static void start_at(gateway *g, const char *path, const char *timeout, const char *const *options)
 {
     char text[64], argument[128];
@@ -67,7 +67,7 @@ static void stop(gateway *g)
 }
 
 /* Sends a request PDU as a TCP client. */
-static void ask(int fd, const uint8_t *pdu, size_t length)
+static void send_request(int fd, const uint8_t *pdu, size_t length)
 {
     uint8_t frame[MBM_MAX_TCP_FRAME] = {0x12, 0x34, 0, 0, 0, (uint8_t)(length + 1), UNIT};
 
@@ -75,7 +75,7 @@ static void ask(int fd, const uint8_t *pdu, size_t length)
     assert_int_equal(write(fd, frame, length + 7), length + 7);
 }
 
-/* Reads so many bytes, and no more than those. */
+/* Reads exactly `count` bytes. */
 static void get(int fd, uint8_t *bytes, size_t count)
 {
     struct pollfd readable = {fd, POLLIN, 0};
@@ -91,7 +91,7 @@ static void get(int fd, uint8_t *bytes, size_t count)
     }
 }
 
-/* Expects the next response that a TCP client gets. */
+/* Expects the next response as a TCP client. */
 static void expect(int fd, const uint8_t *pdu, size_t length)
 {
     const uint8_t head[] = {0x12, 0x34, 0, 0, 0, (uint8_t)(length + 1), UNIT};
@@ -103,7 +103,7 @@ static void expect(int fd, const uint8_t *pdu, size_t length)
     assert_memory_equal(frame + 7, pdu, length);
 }
 
-/* As the device, expects a request on the line. */
+/* Expects a request on the line, as the device. */
 static void expect_request(const gateway *g, const uint8_t *pdu, size_t length)
 {
     uint8_t wanted[MBM_MAX_FRAME] = {UNIT}, frame[MBM_MAX_FRAME];
@@ -114,7 +114,7 @@ static void expect_request(const gateway *g, const uint8_t *pdu, size_t length)
     assert_memory_equal(frame, wanted, length);
 }
 
-/* As the device, replies. */
+/* Replies, as the device. */
 static void reply(const gateway *g, const uint8_t *pdu, size_t length)
 {
     uint8_t frame[MBM_MAX_FRAME] = {UNIT};
@@ -124,13 +124,13 @@ static void reply(const gateway *g, const uint8_t *pdu, size_t length)
     assert_int_equal(write(g->line.ours, frame, length), length);
 }
 
-#define ASK(fd, pdu) ask(fd, (const uint8_t *)(pdu), sizeof(pdu) - 1)
+#define ASK(fd, pdu) send_request(fd, (const uint8_t *)(pdu), sizeof(pdu) - 1)
 #define EXPECT(fd, pdu) expect(fd, (const uint8_t *)(pdu), sizeof(pdu) - 1)
 #define REQUEST(g, pdu) expect_request(g, (const uint8_t *)(pdu), sizeof(pdu) - 1)
 #define REPLY(g, pdu) reply(g, (const uint8_t *)(pdu), sizeof(pdu) - 1)
 
-/* One client's request gets no reply in time; that comes after the request of
- * another client, before its reply. The PDUs end with their last byte. */
+/* The device replies to the request of one client too late: after the request of another
+ * client and before its own reply to that. The PDUs end with their last byte. */
 typedef struct late {
     const char *request, *late_reply, *other, *other_reply;
     size_t lengths[4];
@@ -147,10 +147,12 @@ typedef struct late {
 static void a_late_reply_to_one_client_does_not_reach_another(void **state)
 {
     static const late cases[] = {
-        LATE("\x03\x00\x00\x00\x03", "\x03\x06\x00\x01\x00\x02\x00\x03", /* other lengths */
+        LATE("\x03\x00\x00\x00\x03",
+             "\x03\x06\x00\x01\x00\x02\x00\x03", /* replies of different lengths */
              "\x03\x00\x10\x00\x01", "\x03\x02\xAB\xCD"),
         LATE("\x01\x00\x00\x00\x10", "\x01\x02\xFF\xFF", "\x01\x00\x20\x00\x08", "\x01\x01\x55"),
-        LATE("\x06\x00\x05\x00\x07", "\x06\x00\x05\x00\x07", /* other echoes */
+        LATE("\x06\x00\x05\x00\x07",
+             "\x06\x00\x05\x00\x07", /* responses with different addresses and values */
              "\x06\x00\x06\x00\x08", "\x06\x00\x06\x00\x08"),
         LATE("\x10\x00\x05\x00\x01\x02\x11\x11", "\x10\x00\x05\x00\x01",
              "\x10\x00\x09\x00\x01\x02\x22\x22", "\x10\x00\x09\x00\x01"),
@@ -161,7 +163,8 @@ static void a_late_reply_to_one_client_does_not_reach_another(void **state)
         LATE("\x2B\x0E\x01\x00", "\x2B\x0E\x01\x01\x00\x00\x01\x00\x01\x41", "\x2B\x0E\x04\x02",
              "\x2B\x0E\x04\x81\x00\x00\x01\x02\x01\x42"),
     };
-    /* A gateway for each case: all of them wait for the timeout at the same time. */
+    /* Each case has a gateway of its own, so that all of them wait for the timeout at the
+     * same time. */
     gateway gateways[COUNT(cases)];
     int first[COUNT(cases)], second;
     unsigned i;
@@ -172,7 +175,7 @@ static void a_late_reply_to_one_client_does_not_reach_another(void **state)
 
         start(&gateways[i], TIMEOUT, NULL);
         first[i] = tcp_connect(gateways[i].port);
-        ask(first[i], (const uint8_t *)c->request, c->lengths[0]);
+        send_request(first[i], (const uint8_t *)c->request, c->lengths[0]);
         expect_request(&gateways[i], (const uint8_t *)c->request, c->lengths[0]);
     }
     for (i = 0; i < COUNT(cases); i++) {
@@ -181,7 +184,7 @@ static void a_late_reply_to_one_client_does_not_reach_another(void **state)
 
         expect(first[i], no_response, sizeof no_response);
         second = tcp_connect(gateways[i].port);
-        ask(second, (const uint8_t *)c->other, c->lengths[2]);
+        send_request(second, (const uint8_t *)c->other, c->lengths[2]);
         expect_request(&gateways[i], (const uint8_t *)c->other, c->lengths[2]);
         reply(&gateways[i], (const uint8_t *)c->late_reply, c->lengths[1]);
         reply(&gateways[i], (const uint8_t *)c->other_reply, c->lengths[3]);
@@ -192,14 +195,15 @@ static void a_late_reply_to_one_client_does_not_reach_another(void **state)
     }
 }
 
-static void a_reply_that_does_not_answer_the_request_is_0b(void **state)
+static void a_reply_that_does_not_answer_the_request_becomes_0b(void **state)
 {
     static const char *const no_answers[][2] = {
-        {"\x03\x00\x64\x00\x03", "\x03\x02\x12\x34"},                 /* one register of three */
-        {"\x03\x00\x64\x00\x01", "\x03\x06\x11\x11\x22\x22\x33\x33"}, /* three for one */
-        {"\x01\x00\x64\x00\x09", "\x01\x01\xFF"},                     /* nine coils in one byte */
-        {"\x05\x00\x64\xFF\x00", "\x05\x00\x64\x00\x00"},             /* another value */
-        {"\x06\x00\x64\x12\x34", "\x06\x00\x65\x12\x34"},             /* another address */
+        {"\x03\x00\x64\x00\x03", "\x03\x02\x12\x34"}, /* one register instead of three */
+        {"\x03\x00\x64\x00\x01",
+         "\x03\x06\x11\x11\x22\x22\x33\x33"},             /* three registers instead of one */
+        {"\x01\x00\x64\x00\x09", "\x01\x01\xFF"},         /* one byte for nine coils */
+        {"\x05\x00\x64\xFF\x00", "\x05\x00\x64\x00\x00"}, /* another value */
+        {"\x06\x00\x64\x12\x34", "\x06\x00\x65\x12\x34"}, /* another address */
     };
     static const uint8_t lengths[][2] = {{5, 4}, {5, 8}, {5, 3}, {5, 5}, {5, 5}};
     gateway g;
@@ -213,7 +217,7 @@ static void a_reply_that_does_not_answer_the_request_is_0b(void **state)
         const uint8_t *request = (const uint8_t *)no_answers[i][0];
         const uint8_t no_response[] = {request[0] | 0x80, 0x0B};
 
-        ask(fd, request, lengths[i][0]);
+        send_request(fd, request, lengths[i][0]);
         expect_request(&g, request, lengths[i][0]);
         reply(&g, (const uint8_t *)no_answers[i][1], lengths[i][1]);
         expect(fd, no_response, sizeof no_response);
@@ -222,7 +226,7 @@ static void a_reply_that_does_not_answer_the_request_is_0b(void **state)
     stop(&g);
 }
 
-static void a_request_that_no_device_may_carry_out_does_not_reach_the_line(void **state)
+static void a_request_that_the_standard_forbids_does_not_reach_the_line(void **state)
 {
     gateway g;
     struct pollfd asked = {0, POLLIN, 0};
@@ -261,7 +265,7 @@ static void force_listen_only_mode_is_passed_on_and_gets_no_response(void **stat
     stop(&g);
 }
 
-static void functions_that_it_does_not_know_pass_through(void **state)
+static void unknown_functions_pass_through(void **state)
 {
     gateway g;
     int fd;
@@ -319,7 +323,7 @@ static void every_function_of_our_server_passes_through(void **state)
     served_stop(&ours);
 }
 
-/* The times are the least that can be: a busy machine makes them longer. */
+/* The test checks only the shortest time, since a busy machine makes times longer. */
 static void the_quiet_time_is_an_option(void **state)
 {
     static const char *const options[] = {"-q", "1000", NULL};
@@ -360,10 +364,10 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_late_reply_to_one_client_does_not_reach_another),
-        cmocka_unit_test(a_reply_that_does_not_answer_the_request_is_0b),
-        cmocka_unit_test(a_request_that_no_device_may_carry_out_does_not_reach_the_line),
+        cmocka_unit_test(a_reply_that_does_not_answer_the_request_becomes_0b),
+        cmocka_unit_test(a_request_that_the_standard_forbids_does_not_reach_the_line),
         cmocka_unit_test(force_listen_only_mode_is_passed_on_and_gets_no_response),
-        cmocka_unit_test(functions_that_it_does_not_know_pass_through),
+        cmocka_unit_test(unknown_functions_pass_through),
         cmocka_unit_test(every_function_of_our_server_passes_through),
         cmocka_unit_test(the_quiet_time_is_an_option),
     };

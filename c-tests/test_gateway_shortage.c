@@ -1,5 +1,6 @@
-/* The gateway example where descriptors or places are short: it serves whom it serves,
- * sleeps, takes connections again when there is room, and ends by SIGTERM. */
+/* The gateway example without enough descriptors or places: it serves the connections that
+ * it has, sleeps, accepts waiting connections when there is a free place again, and ends on
+ * SIGTERM. */
 #define _GNU_SOURCE
 #include "asked.h"
 #include "await.h"
@@ -16,7 +17,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/* Of the gateway's descriptors 3 are the terminal's, 1 listens and 1 is the line's. */
+/* The gateway needs 5 descriptors itself: 3 for the terminal, 1 to listen and 1 for the line. */
 enum { OWN = 5, NO_LINE = 200, ABSENT = 6, PLACES = 16, MANY = 40, TIMEOUT_MS = 3000 };
 
 static program gateway;
@@ -83,7 +84,7 @@ static int is_served(int fd)
     return asked_is_served(fd, NO_LINE, 0x0A);
 }
 
-static void drop(unsigned first, unsigned last)
+static void close_from_to(unsigned first, unsigned last)
 {
     for (; first < last; first++) {
         close(fds[first]);
@@ -91,7 +92,7 @@ static void drop(unsigned first, unsigned last)
     }
 }
 
-static void with_few_descriptors_it_serves_and_sleeps_and_ends(void **state)
+static void with_few_descriptors_the_gateway_serves_sleeps_and_ends(void **state)
 {
     static const unsigned limits[] = {OWN + 1, OWN + 3, 20, 21, 22};
     unsigned i, k;
@@ -107,11 +108,11 @@ static void with_few_descriptors_it_serves_and_sleeps_and_ends(void **state)
             assert_int_equal(is_served(fds[k]), 1);
         AWAIT(program_sleeps(&gateway));
         stop();
-        drop(0, most);
+        close_from_to(0, most);
     }
 }
 
-static void connections_beyond_its_descriptors_wait_and_are_served_later(void **state)
+static void connections_beyond_the_descriptors_wait_and_are_served_later(void **state)
 {
     enum { SERVED = 4, ALL = 10 };
     unsigned i;
@@ -125,10 +126,10 @@ static void connections_beyond_its_descriptors_wait_and_are_served_later(void **
     AWAIT(program_sleeps(&gateway));
     for (i = 0; i < SERVED; i++)
         assert_int_equal(is_served(fds[i]), 1);
-    drop(0, SERVED);
+    close_from_to(0, SERVED);
     for (; i < 2 * SERVED; i++)
         assert_int_equal(is_served(fds[i]), 1);
-    drop(SERVED, 2 * SERVED);
+    close_from_to(SERVED, 2 * SERVED);
     for (; i < ALL; i++)
         assert_int_equal(is_served(fds[i]), 1);
     stop();
@@ -141,9 +142,9 @@ static void a_new_client_gets_the_place_of_an_idle_one(void **state)
     (void)state;
     start(0, "1");
     connect_to(0, PLACES);
-    /* They are silent for a second, at least. */
+    /* The connections are silent for at least a second. */
     AWAIT((fds[PLACES] = tcp_connect(port), is_served(fds[PLACES])) || (close(fds[PLACES]), 0));
-    /* The first came first. */
+    /* The first connection has been idle for longest. */
     assert_int_equal(recv(fds[0], &byte, 1, 0), 0);
     assert_int_equal(is_served(fds[PLACES]), 1);
     stop();
@@ -184,7 +185,7 @@ static void a_connection_that_waits_for_its_device_is_not_idle(void **state)
     start(0, "1");
     connect_to(0, 1);
     assert_int_equal(write(fds[0], request, sizeof request), sizeof request);
-    /* The request is on its line before the others come. */
+    /* The request is on the line before the other clients connect. */
     assert_int_equal(read(line.ours, answer, 1), 1);
     connect_to(1, PLACES);
     AWAIT((fds[PLACES] = tcp_connect(port), is_served(fds[PLACES])) || (close(fds[PLACES]), 0));
@@ -212,7 +213,7 @@ static void a_lost_line_keeps_its_descriptor(void **state)
     pty_open(&line);
     assert_int_equal(unlink(name), 0);
     assert_int_equal(symlink(line.path, name), 0);
-    /* It opens the line again for a request, at most once a second. */
+    /* The gateway opens the line again when a request needs it, at most once a second. */
     heard = (struct pollfd){line.ours, POLLIN, 0};
     AWAIT((send(fds[0], request, sizeof request, MSG_NOSIGNAL), poll(&heard, 1, 100) == 1));
     stop();
@@ -223,8 +224,8 @@ static void a_lost_line_keeps_its_descriptor(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(with_few_descriptors_it_serves_and_sleeps_and_ends),
-        TEST(connections_beyond_its_descriptors_wait_and_are_served_later),
+        TEST(with_few_descriptors_the_gateway_serves_sleeps_and_ends),
+        TEST(connections_beyond_the_descriptors_wait_and_are_served_later),
         TEST(a_new_client_gets_the_place_of_an_idle_one),
         TEST(a_new_client_gets_the_descriptor_of_an_idle_one),
         TEST(an_idle_time_of_0_closes_none),

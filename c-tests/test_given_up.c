@@ -1,5 +1,5 @@
-/* Hooks that call back, non-blocking requests, and requests that are given up:
- * the driver off, and the next request works. Unit 17 is 11 on the wire. */
+/* Hooks that call the library, non-blocking requests, and requests that end early: the
+ * driver is off afterwards, and the next request works. Unit 17 is 11 on the wire. */
 #include "sim.h"
 #include "test.h"
 
@@ -32,7 +32,7 @@ static void call_back(sim *s)
     assert_int_equal(s->sent, sent);
 }
 
-static void an_idle_hook_that_makes_requests_is_told_busy_and_changes_nothing(void **state)
+static void requests_in_an_idle_hook_return_busy_and_change_nothing(void **state)
 {
     NODE;
 
@@ -42,7 +42,7 @@ static void an_idle_hook_that_makes_requests_is_told_busy_and_changes_nothing(vo
     sim_reads(s, 500);
     assert_true(s->idles > 10);
     s->on_idle = NULL;
-    /* The write address is still the one that was set. */
+    /* The write address is still the one that was set before. */
     mbm_master_send(n, 0x2222);
     sim_answer(s, 1, 500, "11 10 00 55 00 01 +");
     OK(mbm_master_writeQueuedRegisters(n));
@@ -195,7 +195,7 @@ static void the_gap_is_kept_after_a_cancel_mid_send(void **state)
 
     mbm_master_setBlocking(n, 0);
     s->write_piece = 1;
-    s->character = 0; /* what is handed over is on the wire */
+    s->character = 0; /* bytes are on the wire as soon as they are handed over */
     s->cut_allowed = 1;
     IS(MBM_PENDING, sim_read_one(s));
     poll_until(s, 3);
@@ -214,7 +214,7 @@ static void a_cancel_while_the_port_drains_switches_the_driver_off(void **state)
     poll_until(s, 8);
     OK(mbm_master_cancel(n));
     sim_assert_order(s, "PO", "PO");
-    s->post_before_last_bit = 0; /* the caller wanted it so */
+    s->post_before_last_bit = 0; /* the test does this on purpose */
     mbm_master_setBlocking(n, 1);
     sim_reads(s, 500);
 }
@@ -241,7 +241,7 @@ static void begin_mid_send_switches_the_driver_off_on_the_old_port(void **state)
 
     mbm_master_setBlocking(n, 0);
     s->write_piece = 1;
-    s->character = 0; /* what is handed over is on the wire */
+    s->character = 0; /* bytes are on the wire as soon as they are handed over */
     s->cut_allowed = 1;
     IS(MBM_PENDING, sim_read_one(s));
     poll_until(s, 3);
@@ -274,7 +274,7 @@ static void a_refused_begin_leaves_the_request_under_way(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        SIM_TEST(an_idle_hook_that_makes_requests_is_told_busy_and_changes_nothing),
+        SIM_TEST(requests_in_an_idle_hook_return_busy_and_change_nothing),
         SIM_TEST(request_from_in_an_idle_hook_changes_nothing),
         SIM_TEST(an_idle_hook_that_polls_does_no_harm),
         SIM_TEST(an_idle_hook_may_cancel_before_a_byte_is_sent),
@@ -290,5 +290,5 @@ int main(void)
         SIM_TEST(a_refused_begin_leaves_the_request_under_way),
     };
 
-    return cmocka_run_group_tests_name("given up", tests, NULL, NULL);
+    return cmocka_run_group_tests_name("requests that end early", tests, NULL, NULL);
 }

@@ -1,4 +1,4 @@
-/* Buffers longer than an int16_t counts, which a port's read and write return. */
+/* Buffers of more bytes than an int16_t can count. A port's read and write return an int16_t. */
 #include "crc.h"
 #include "mbm.h"
 #include "test.h"
@@ -42,14 +42,14 @@ static uint32_t wire_micros(void *context)
 
 static const mbm_port port = {.read = wire_read, .write = wire_write, .micros = wire_micros};
 
-static void arrives(const uint8_t *bytes, size_t length)
+static void put_arriving(const uint8_t *bytes, size_t length)
 {
     memcpy(wire.arriving, bytes, length);
     wire.first = 0;
     wire.last = length;
 }
 
-static void a_client_uses_of_them_what_a_port_can_count(void **state)
+static void a_client_over_tcp_works_with_large_buffers(void **state)
 {
     static const uint8_t response[] = {0, 0, 0, 0, 0, 7, 1, 3, 4, 0, 1, 0, 2};
     static mbm_client client;
@@ -64,13 +64,13 @@ static void a_client_uses_of_them_what_a_port_can_count(void **state)
     request.replyBytes = sizeof words;
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 2));
     IS(MBM_PENDING, mbm_client_poll(&client));
-    arrives(response, sizeof response);
+    put_arriving(response, sizeof response);
     OK(mbm_client_poll(&client));
     assert_int_equal(request.status, MBM_OK);
     assert_int_equal(words[1], 2);
 }
 
-static void a_client_of_a_serial_line_does_so(void **state)
+static void a_client_on_a_serial_line_works_with_large_buffers(void **state)
 {
     uint8_t response[] = {1, 3, 4, 0, 1, 0, 2, 0, 0};
     static mbm_client client;
@@ -88,16 +88,16 @@ static void a_client_of_a_serial_line_does_so(void **state)
     for (i = 0; i < 10; i++)
         IS(MBM_PENDING, mbm_client_poll(&client));
     (void)seal(response, 7);
-    arrives(response, sizeof response);
+    put_arriving(response, sizeof response);
     for (i = 0; i < 10; i++)
         (void)mbm_client_poll(&client);
     assert_int_equal(request.status, MBM_OK);
     assert_int_equal(words[1], 2);
 }
 
-static void serves(uint8_t (*begin)(mbm_server *, const mbm_port *, mbm_unit *, uint8_t, uint8_t *,
-                                    uint16_t),
-                   const uint8_t *request, size_t length, size_t answered)
+static void assert_served(uint8_t (*begin)(mbm_server *, const mbm_port *, mbm_unit *, uint8_t,
+                                           uint8_t *, uint16_t),
+                          const uint8_t *request, size_t length, size_t answered)
 {
     static mbm_server server;
     static uint16_t words[2];
@@ -112,30 +112,30 @@ static void serves(uint8_t (*begin)(mbm_server *, const mbm_port *, mbm_unit *, 
     table.size = 2;
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     OK(begin(&server, &port, &unit, 1, incoming, LARGE));
-    arrives(request, length);
+    put_arriving(request, length);
     for (i = 0; i < 10; i++)
         OK(mbm_server_poll(&server));
     assert_int_equal(wire.length, answered);
 }
 
-static void a_server_does_so(void **state)
+static void a_server_works_with_large_buffers(void **state)
 {
     static const uint8_t over_tcp[] = {0, 0, 0, 0, 0, 6, 1, 3, 0, 0, 0, 2};
     uint8_t over_rtu[] = {1, 3, 0, 0, 0, 2, 0, 0};
 
     (void)state;
     (void)seal(over_rtu, 6);
-    serves(mbm_server_beginTcp, over_tcp, sizeof over_tcp, 13);
-    serves(mbm_server_beginRtu, over_rtu, sizeof over_rtu, 9);
-    serves(mbm_server_beginRtuOverTcp, over_rtu, sizeof over_rtu, 9);
+    assert_served(mbm_server_beginTcp, over_tcp, sizeof over_tcp, 13);
+    assert_served(mbm_server_beginRtu, over_rtu, sizeof over_rtu, 9);
+    assert_served(mbm_server_beginRtuOverTcp, over_rtu, sizeof over_rtu, 9);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_client_uses_of_them_what_a_port_can_count),
-        cmocka_unit_test(a_client_of_a_serial_line_does_so),
-        cmocka_unit_test(a_server_does_so),
+        cmocka_unit_test(a_client_over_tcp_works_with_large_buffers),
+        cmocka_unit_test(a_client_on_a_serial_line_works_with_large_buffers),
+        cmocka_unit_test(a_server_works_with_large_buffers),
     };
 
     return cmocka_run_group_tests_name("large buffers", tests, NULL, NULL);

@@ -1,7 +1,7 @@
-/* A device that answers in order, but later than the response timeout. Its late
- * reply looks like the answer to the next request: RTU has no number that tells
- * them apart. No late reply may become the data of a later request. On the
- * simulated clock; unit 17 is 11 on the wire. */
+/* A device that answers in order, but later than the response timeout. Its late reply looks
+ * like the answer to the next request: an RTU frame has no number that distinguishes them.
+ * No late reply may become the data of a later request. On a simulated clock; unit 17 is 11
+ * on the wire. */
 #include "crc.h"
 #include "faults.h"
 #include "sim.h"
@@ -12,19 +12,20 @@
 enum {
     TIMEOUT_MS = 500,
     LATE = 750000,  /* microseconds that the device takes for a late reply */
-    PROMPT = 3000,  /* and for all others */
-    QUIET = 100000, /* the quiet time at first */
-    REGISTERS = 125 /* the most that a reply carries */
+    PROMPT = 3000,  /* microseconds that it takes for all others */
+    QUIET = 100000, /* the default quiet time */
+    REGISTERS = 125 /* the most registers of a reply */
 };
 
-/* The device: what it takes for the requests still to come, then PROMPT. */
+/* The device, and the microseconds that it takes for each of the next requests. After those
+ * it takes PROMPT. */
 typedef struct in_order {
     uint32_t takes[8];
     unsigned requests;
-    uint64_t free;     /* when its last reply has left */
-    uint8_t exception; /* the exception it answers the first request with */
-    unsigned cut;      /* the reply that loses its second half, from 1 on */
-    unsigned damaged;  /* the reply that arrives damaged, from 1 on */
+    uint64_t free;     /* when its last reply has been sent */
+    uint8_t exception; /* the exception with which it answers the first request */
+    unsigned cut;      /* the number of the reply that loses its second half; the first is 1 */
+    unsigned damaged;  /* the number of the reply that arrives damaged; the first is 1 */
     unsigned trailing; /* bytes 0x00 that its driver adds to each reply */
 } in_order;
 
@@ -37,7 +38,7 @@ static void answer_in_order(sim *s, const sim_frame *request)
     uint8_t frame[300] = {0};
     size_t length = fault_right_reply(frame, request->bytes);
 
-    if (request->bytes[0] != 17) { /* another device, never late */
+    if (request->bytes[0] != 17) { /* another device, which is never late */
         sim_deliver(s, request->end + PROMPT, frame, length);
         return;
     }
@@ -57,7 +58,7 @@ static void answer_in_order(sim *s, const sim_frame *request)
     d->free = at + length * s->character;
 }
 
-/* The simulation with such a device, whose first reply is late. */
+/* Declares the simulation with such a device. Its first reply is late. */
 #define DEVICE                                                                                     \
     in_order device = {.takes = {LATE}};                                                           \
     NODE;                                                                                          \
@@ -104,8 +105,8 @@ static void a_late_reply_does_not_shift_the_answers_after_a_retry(void **state)
         assert_reads(s, i, 1);
 }
 
-/* The frame buffer holds one reply of that size, not two. */
-static void a_late_reply_of_the_greatest_length_does_not_shift_later_answers(void **state)
+/* The frame buffer has space for one reply of this length, not for two. */
+static void a_late_reply_of_the_longest_length_does_not_shift_later_answers(void **state)
 {
     uint16_t i;
     DEVICE;
@@ -126,12 +127,12 @@ static void a_late_reply_to_a_write_of_the_same_value_costs_one_request(void **s
     assert_reads(s, 9, 1);
 }
 
-static void several_late_replies_in_a_row_are_all_passed_over(void **state)
+static void several_late_replies_in_a_row_are_all_skipped(void **state)
 {
     uint16_t i;
     DEVICE;
 
-    device.takes[0] = 1700000; /* later than two more requests */
+    device.takes[0] = 1700000; /* after two more requests */
     for (i = 0; i < 3; i++)
         assert_int_equal(read_at(s, i), i < 2 ? MBM_RESPONSE_TIMED_OUT : MBM_OK);
     assert_int_equal(mbm_master_getResponseBuffer(n, 0), fault_value(2));
@@ -139,7 +140,7 @@ static void several_late_replies_in_a_row_are_all_passed_over(void **state)
         assert_reads(s, i, 1);
 }
 
-/* The hold lasts beyond the response timeout. */
+/* The reply is held beyond the response timeout. */
 static void a_late_reply_just_before_the_deadline_of_the_next_request_is_no_answer(void **state)
 {
     uint16_t i;
@@ -168,7 +169,7 @@ static void a_late_exception_is_not_the_answer_to_a_later_request(void **state)
     }
 }
 
-static void an_exception_in_time_is_an_answer_on_probation_too(void **state)
+static void after_an_exception_in_time_no_reply_is_held(void **state)
 {
     DEVICE;
 
@@ -176,7 +177,7 @@ static void an_exception_in_time_is_an_answer_on_probation_too(void **state)
     device.exception = 5;
     assert_int_equal(read_at(s, 0), 5);
     assert_reads(s, 1, 1);
-    /* An exception is an answer: nothing is late, nothing is held. */
+    /* An exception is an answer, so no reply is late or held. */
     sim_assert_time(s->frames[1].silence, 4000);
 }
 
@@ -205,7 +206,7 @@ static void a_held_reply_is_no_answer_if_the_next_one_is_cut_off(void **state)
     assert_reads(s, 3, 1);
 }
 
-/* As when an RS-485 driver lets go of the line. */
+/* As when an RS-485 driver releases the line. */
 static void a_byte_of_noise_after_a_held_reply_does_not_spoil_it(void **state)
 {
     uint16_t i;
@@ -221,12 +222,12 @@ static void a_byte_of_noise_after_a_held_reply_does_not_spoil_it(void **state)
         assert_reads(s, (uint16_t)(i * REGISTERS), REGISTERS);
 }
 
-static void probation_costs_one_quiet_time_after_a_failure_and_nothing_else(void **state)
+static void holding_costs_one_quiet_time_after_a_failure_and_nothing_else(void **state)
 {
     uint64_t begin;
     DEVICE;
 
-    device.takes[0] = 0xFFFFFFFF; /* never */
+    device.takes[0] = 0xFFFFFFFF; /* no reply */
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     memset(&device, 0, sizeof device);
     assert_reads(s, 1, 1);
@@ -250,7 +251,7 @@ static void without_a_quiet_time_no_reply_is_held(void **state)
 }
 
 /* Unit 18 answers between the failed request to unit 17 and the late reply. */
-static void the_reply_of_another_unit_ends_no_probation(void **state)
+static void the_reply_of_another_unit_does_not_end_the_holding(void **state)
 {
     DEVICE;
 
@@ -313,8 +314,8 @@ static void a_late_reply_does_not_shift_the_clients_answers_after_a_retry(void *
         client_reads(s, &client, i, MBM_OK);
 }
 
-/* However many right replies arrive, a request has an end. */
-static void a_device_that_never_stops_answering_does_not_hold_a_request_for_ever(void **state)
+/* A request must end, however many right replies arrive. */
+static void a_device_that_never_stops_answering_does_not_keep_a_request_from_ending(void **state)
 {
     uint8_t frame[16];
     const uint8_t request[6] = {17, 3, 0, 7, 0, 1};
@@ -338,21 +339,21 @@ int main(void)
     const struct CMUnitTest tests[] = {
         SIM_TEST(one_late_reply_does_not_shift_the_answers_of_later_requests),
         SIM_TEST(a_late_reply_does_not_shift_the_answers_after_a_retry),
-        SIM_TEST(a_late_reply_of_the_greatest_length_does_not_shift_later_answers),
+        SIM_TEST(a_late_reply_of_the_longest_length_does_not_shift_later_answers),
         SIM_TEST(a_late_reply_to_a_write_of_the_same_value_costs_one_request),
-        SIM_TEST(several_late_replies_in_a_row_are_all_passed_over),
+        SIM_TEST(several_late_replies_in_a_row_are_all_skipped),
         SIM_TEST(a_late_reply_just_before_the_deadline_of_the_next_request_is_no_answer),
         SIM_TEST(a_late_exception_is_not_the_answer_to_a_later_request),
-        SIM_TEST(an_exception_in_time_is_an_answer_on_probation_too),
+        SIM_TEST(after_an_exception_in_time_no_reply_is_held),
         SIM_TEST(a_held_reply_is_no_answer_if_the_next_one_is_damaged),
         SIM_TEST(a_held_reply_is_no_answer_if_the_next_one_is_cut_off),
         SIM_TEST(a_byte_of_noise_after_a_held_reply_does_not_spoil_it),
-        SIM_TEST(probation_costs_one_quiet_time_after_a_failure_and_nothing_else),
+        SIM_TEST(holding_costs_one_quiet_time_after_a_failure_and_nothing_else),
         SIM_TEST(without_a_quiet_time_no_reply_is_held),
-        SIM_TEST(the_reply_of_another_unit_ends_no_probation),
+        SIM_TEST(the_reply_of_another_unit_does_not_end_the_holding),
         SIM_TEST(one_late_reply_does_not_shift_the_clients_answers),
         SIM_TEST(a_late_reply_does_not_shift_the_clients_answers_after_a_retry),
-        SIM_TEST(a_device_that_never_stops_answering_does_not_hold_a_request_for_ever),
+        SIM_TEST(a_device_that_never_stops_answering_does_not_keep_a_request_from_ending),
     };
 
     return cmocka_run_group_tests_name("late replies", tests, NULL, NULL);

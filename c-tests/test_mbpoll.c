@@ -1,4 +1,4 @@
-/* mbpoll, a program of others, asks our server: over TCP and over a pty. */
+/* mbpoll, a program of another project, as a client of mbm's server over TCP and over a pty. */
 #define _GNU_SOURCE
 #include "served.h"
 #include "test.h"
@@ -32,8 +32,8 @@ static int stop(void **state)
     return 0;
 }
 
-/* Runs mbpoll and keeps what it prints; its exit code. What is to be written stands
- * behind the place. */
+/* Runs mbpoll and keeps its output. Returns its exit code. The values to write come last on
+ * the command line. */
 static int mbpoll(const char *where, const char *arguments, const char *values)
 {
     char command[512];
@@ -51,7 +51,7 @@ static int mbpoll(const char *where, const char *arguments, const char *values)
     return WEXITSTATUS((int)count);
 }
 
-/* What it printed of a reference. */
+/* The value that mbpoll printed for a reference. */
 static unsigned long value(unsigned reference, int base)
 {
     char label[16];
@@ -65,14 +65,14 @@ static unsigned long value(unsigned reference, int base)
     return strtoul(found + strlen(label), NULL, base);
 }
 
-static void shows(const char *text)
+static void assert_printed(const char *text)
 {
     if (!strstr(output, text))
         print_error("%s", output);
     assert_non_null(strstr(output, text));
 }
 
-static void it_reads_every_table(void **state)
+static void mbpoll_reads_every_table(void **state)
 {
     unsigned where, i;
 
@@ -92,7 +92,7 @@ static void it_reads_every_table(void **state)
     }
 }
 
-static void it_writes_one_and_several(void **state)
+static void mbpoll_writes_one_and_several_values(void **state)
 {
     served *servers[] = {&tcp, &rtu};
     unsigned where;
@@ -103,32 +103,32 @@ static void it_writes_one_and_several(void **state)
         uint8_t before = servers[where]->bits[2];
 
         assert_int_equal(mbpoll(place[where], "-a 17 -r 120", "4660"), 0);
-        shows("Written 1 references");
+        assert_printed("Written 1 references");
         assert_int_equal(servers[where]->words[20], 4660);
         assert_int_equal(mbpoll(place[where], "-a 17 -r 130", "7 65535 4711"), 0);
-        shows("Written 3 references");
+        assert_printed("Written 3 references");
         assert_memory_equal(&servers[where]->words[30], words, sizeof words);
         assert_int_equal(mbpoll(place[where], "-a 17 -r 118 -t 0", "1 0 1 1"), 0);
         assert_int_equal(servers[where]->bits[2], (before & 3) | 0x34 | (before & 0xC0));
     }
 }
 
-static void it_is_told_exceptions(void **state)
+static void mbpoll_receives_exceptions(void **state)
 {
     unsigned where;
 
     (void)state;
     for (where = 0; where < 2; where++) {
         assert_int_equal(mbpoll(place[where], "-a 17 -r 99", ""), 1);
-        shows("Illegal data address");
+        assert_printed("Illegal data address");
         assert_int_equal(mbpoll(place[where], "-a 17 -r 260", "48879"), 1);
-        shows("Illegal data value");
+        assert_printed("Illegal data value");
         assert_int_equal(mbpoll(place[where], "-a 18 -r 0 -t 1", ""), 1);
-        shows("Illegal function");
+        assert_printed("Illegal function");
     }
 }
 
-static void it_reads_two_units_of_one_line(void **state)
+static void mbpoll_reads_two_units_of_one_line(void **state)
 {
     (void)state;
     rtu.other_words[3] = 1234;
@@ -141,20 +141,22 @@ static void it_reads_two_units_of_one_line(void **state)
     assert_int_equal(value(399, 10), served_pattern(399));
 }
 
-static void it_reads_the_server_id(void **state)
+static void mbpoll_reads_the_server_id(void **state)
 {
     (void)state;
     assert_int_equal(mbpoll(place[1], "-a 17 -u", ""), 0);
-    shows("Length: 8");
-    shows("Data  : m\\FFtest");
+    assert_printed("Length: 8");
+    assert_printed("Data  : m\\FFtest");
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(it_reads_every_table),   cmocka_unit_test(it_writes_one_and_several),
-        cmocka_unit_test(it_is_told_exceptions),  cmocka_unit_test(it_reads_two_units_of_one_line),
-        cmocka_unit_test(it_reads_the_server_id),
+        cmocka_unit_test(mbpoll_reads_every_table),
+        cmocka_unit_test(mbpoll_writes_one_and_several_values),
+        cmocka_unit_test(mbpoll_receives_exceptions),
+        cmocka_unit_test(mbpoll_reads_two_units_of_one_line),
+        cmocka_unit_test(mbpoll_reads_the_server_id),
     };
 
     return cmocka_run_group_tests(tests, start, stop);

@@ -1,4 +1,4 @@
-/* What the fuzzer of call sequences found: fuzz/fuzz_targets/c_api.rs. */
+/* Sequences of calls for which fuzz/fuzz_targets/c_api.rs found a fault. */
 #include "mbm.h"
 #include "test.h"
 
@@ -22,7 +22,7 @@ static int16_t port_write(void *context, const uint8_t *bytes, uint16_t length)
     return (int16_t)length;
 }
 
-/* A peer that sends the same byte for ever. */
+/* A peer that never stops sending the same byte. */
 static int16_t flooded_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     (void)context;
@@ -34,7 +34,7 @@ static int16_t flooded_read(void *context, uint8_t *bytes, uint16_t capacity)
 static const mbm_port flooded = {NULL, flooded_read, port_write, port_micros,
                                  NULL, NULL,         NULL,       NULL};
 
-static void a_poll_of_an_ascii_server_ends_though_a_peer_floods(void **state)
+static void a_poll_of_an_ascii_server_ends_while_a_peer_floods(void **state)
 {
     static mbm_server server;
     static mbm_unit unit;
@@ -51,7 +51,8 @@ static void a_poll_of_an_ascii_server_ends_though_a_peer_floods(void **state)
     }
 }
 
-/* A request of `length` bytes in a buffer of `capacity`: the response ends in it. */
+/* Sends a request of `length` bytes in a buffer of `capacity` bytes, into which the
+ * response must fit. */
 static void answers_with_exception_04(uint8_t framing, mbm_unit *unit, const char *request,
                                       uint16_t length, uint16_t capacity)
 {
@@ -86,7 +87,7 @@ static void a_response_longer_than_its_buffer_is_exception_04(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_poll_of_an_ascii_server_ends_though_a_peer_floods),
+        cmocka_unit_test(a_poll_of_an_ascii_server_ends_while_a_peer_floods),
         cmocka_unit_test(a_response_longer_than_its_buffer_is_exception_04),
     };
 

@@ -1,5 +1,5 @@
-/* mbm_packet_*: every function in both directions, PDUs cut short and changed,
- * and packets that are none. */
+/* mbm_packet_*: every function in both directions, PDUs that are cut short or changed, and
+ * packets that are not possible. */
 #include "examples.h"
 #include "test.h"
 
@@ -7,7 +7,7 @@
 
 static const mbm_rule three_bytes = {MBM_RULE_FIXED, 3, 0};
 
-static void every_example_is_parsed_to_what_it_says(void **state)
+static void every_example_is_parsed_to_its_fields(void **state)
 {
     uint8_t pdu[MBM_MAX_PDU];
     mbm_packet wanted, found;
@@ -66,7 +66,7 @@ static void every_sub_function_of_08_is_built_and_parsed(void **state)
             assert_int_equal(status, MBM_ILLEGAL_FUNCTION);
         }
         packet.kind = MBM_PACKET_RESPONSE;
-        /* Nothing answers Force Listen Only Mode. */
+        /* Force Listen Only Mode has no response. */
         IS(status == MBM_OK && sub_function != MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY
                ? MBM_OK
                : MBM_MALFORMED_REPLY,
@@ -75,8 +75,8 @@ static void every_sub_function_of_08_is_built_and_parsed(void **state)
     assert_int_equal(known, 15);
 }
 
-/* Parsed right, so that building gives the same bytes, or refused with a status
- * that such a PDU has. */
+/* Asserts that a PDU is parsed right, so that building the packet gives the same bytes, or
+ * is refused with a fitting status. Returns whether it was parsed. */
 static unsigned parsed_right(uint8_t side, const uint8_t *pdu, uint16_t length)
 {
     uint8_t again[MBM_MAX_PDU];
@@ -114,7 +114,8 @@ static void a_pdu_cut_short_is_parsed_right_or_refused(void **state)
         for (cut = 0; cut < length; cut++)
             right += parsed_right(example_side(&examples[i]), pdu, cut);
     }
-    /* 08/00, 11 beyond its count, 2B/0D and 41 end where their frames do. */
+    /* The data of 08/00, 2B/0D and 41, and those of 11 after its byte count, may have any
+     * length. */
     assert_in_range(right, 1, 16);
 }
 
@@ -143,7 +144,7 @@ static void a_pdu_with_one_byte_changed_is_parsed_right_or_refused(void **state)
     assert_in_range(right, 1, all - 1);
 }
 
-static void a_byte_too_many_is_refused_unless_the_frame_ends_the_pdu(void **state)
+static void an_extra_byte_is_refused_unless_the_data_may_have_any_length(void **state)
 {
     uint8_t pdu[MBM_MAX_PDU + 1];
     mbm_packet packet;
@@ -157,11 +158,11 @@ static void a_byte_too_many_is_refused_unless_the_frame_ends_the_pdu(void **stat
         pdu[length] = 0;
         right += parsed_right(example_side(&examples[i]), pdu, (uint16_t)(length + 1));
     }
-    /* 11, and 2B/0D and 41 in both directions. */
+    /* The response of 11, and 2B/0D and 41 in both directions. */
     assert_int_equal(right, 5);
 }
 
-static void a_packet_that_cannot_be_is_not_built(void **state)
+static void an_impossible_packet_is_not_built(void **state)
 {
     static const uint8_t data[600];
     static const struct {
@@ -224,7 +225,7 @@ static void a_packet_that_cannot_be_is_not_built(void **state)
     }
 }
 
-static void the_first_bytes_tell_how_long_a_pdu_is(void **state)
+static void the_first_bytes_of_a_pdu_determine_its_length(void **state)
 {
     uint8_t pdu[MBM_MAX_PDU];
     mbm_packet packet;
@@ -261,7 +262,7 @@ static void the_first_bytes_tell_how_long_a_pdu_is(void **state)
                                                      (const uint8_t *)"\x03\xFC", 2, &expected));
 }
 
-static void a_request_tells_how_long_its_response_is(void **state)
+static void a_request_determines_the_length_of_its_response(void **state)
 {
     uint8_t pdu[MBM_MAX_PDU], reply[MBM_MAX_PDU];
     mbm_packet request, response;
@@ -335,7 +336,7 @@ static void a_declared_function_keeps_its_length(void **state)
     IS(MBM_ILLEGAL_FUNCTION, mbm_frame_build(PDU(own, 1), &packet, built, sizeof built, &length));
 }
 
-static void a_declaration_that_cannot_be_is_an_invalid_argument(void **state)
+static void an_impossible_declaration_is_an_invalid_argument(void **state)
 {
     static const mbm_function wrong[] = {
         {0, {0, 0, 0}, {0, 0, 0}},
@@ -388,7 +389,7 @@ static void null_is_an_invalid_argument(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_frame_build(PDU(NULL, 0), &packet, pdu, 8, &length));
 }
 
-static void data_that_lie_in_the_buffer_to_be_written_are_an_invalid_argument(void **state)
+static void data_inside_the_buffer_to_write_are_an_invalid_argument(void **state)
 {
     uint8_t pdu[8] = {0x41, 1, 2};
     mbm_packet packet;
@@ -404,19 +405,19 @@ static void data_that_lie_in_the_buffer_to_be_written_are_an_invalid_argument(vo
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_example_is_parsed_to_what_it_says),
+        cmocka_unit_test(every_example_is_parsed_to_its_fields),
         cmocka_unit_test(every_example_is_built_byte_for_byte),
         cmocka_unit_test(every_sub_function_of_08_is_built_and_parsed),
         cmocka_unit_test(a_pdu_cut_short_is_parsed_right_or_refused),
         cmocka_unit_test(a_pdu_with_one_byte_changed_is_parsed_right_or_refused),
-        cmocka_unit_test(a_byte_too_many_is_refused_unless_the_frame_ends_the_pdu),
-        cmocka_unit_test(a_packet_that_cannot_be_is_not_built),
-        cmocka_unit_test(the_first_bytes_tell_how_long_a_pdu_is),
-        cmocka_unit_test(a_request_tells_how_long_its_response_is),
+        cmocka_unit_test(an_extra_byte_is_refused_unless_the_data_may_have_any_length),
+        cmocka_unit_test(an_impossible_packet_is_not_built),
+        cmocka_unit_test(the_first_bytes_of_a_pdu_determine_its_length),
+        cmocka_unit_test(a_request_determines_the_length_of_its_response),
         cmocka_unit_test(a_declared_function_keeps_its_length),
-        cmocka_unit_test(a_declaration_that_cannot_be_is_an_invalid_argument),
+        cmocka_unit_test(an_impossible_declaration_is_an_invalid_argument),
         cmocka_unit_test(null_is_an_invalid_argument),
-        cmocka_unit_test(data_that_lie_in_the_buffer_to_be_written_are_an_invalid_argument),
+        cmocka_unit_test(data_inside_the_buffer_to_write_are_an_invalid_argument),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,5 +1,5 @@
-/* Records of 14 and 15, objects of a device identification: added to a packet,
- * and given one by one. */
+/* The records of functions 14 and 15 and the objects of a device identification: adding
+ * them to a packet, and reading them one by one. */
 #include "examples.h"
 #include "test.h"
 
@@ -30,7 +30,7 @@ static void a_request_of_14_is_made_of_records(void **state)
     assert_int_equal(i, 2);
 }
 
-/* Adds two records of two registers each and gives them back. */
+/* Adds two records of two registers each, and reads them back. */
 static void carries_data(uint8_t kind, uint8_t function, const char *hex, int is_named)
 {
     const uint8_t first[] = {0x0D, 0xFE, 0x00, 0x20}, second[] = {0x33, 0xCD, 0x00, 0x40};
@@ -58,7 +58,7 @@ static void carries_data(uint8_t kind, uint8_t function, const char *hex, int is
     assert_int_equal(cursor, packet.dataLength);
 }
 
-static void responses_of_14_and_both_sides_of_15_carry_records_with_data(void **state)
+static void responses_of_14_and_both_packets_of_15_have_records_with_data(void **state)
 {
     const char *written = "15 16 06 0004 0001 0002 0DFE0020 06 0003 0009 0002 33CD0040";
 
@@ -68,7 +68,7 @@ static void responses_of_14_and_both_sides_of_15_carry_records_with_data(void **
     carries_data(MBM_PACKET_RESPONSE, 0x15, written, 1);
 }
 
-static void a_record_that_cannot_be_is_not_added(void **state)
+static void an_impossible_record_is_not_added(void **state)
 {
     static uint8_t data[500];
     static const struct {
@@ -180,7 +180,7 @@ static void other_packets_have_neither_records_nor_objects(void **state)
     }
 }
 
-static void null_gives_nothing_and_adds_nothing(void **state)
+static void null_returns_nothing_and_adds_nothing(void **state)
 {
     uint8_t pdu[MBM_MAX_PDU], storage[16];
     mbm_packet packet;
@@ -211,12 +211,12 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_request_of_14_is_made_of_records),
-        cmocka_unit_test(responses_of_14_and_both_sides_of_15_carry_records_with_data),
-        cmocka_unit_test(a_record_that_cannot_be_is_not_added),
+        cmocka_unit_test(responses_of_14_and_both_packets_of_15_have_records_with_data),
+        cmocka_unit_test(an_impossible_record_is_not_added),
         cmocka_unit_test(groups_that_fill_the_storage_leave_the_packet_as_it_was),
         cmocka_unit_test(a_device_identification_is_made_of_objects),
         cmocka_unit_test(other_packets_have_neither_records_nor_objects),
-        cmocka_unit_test(null_gives_nothing_and_adds_nothing),
+        cmocka_unit_test(null_returns_nothing_and_adds_nothing),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,13 +1,13 @@
-/* Thousands of transactions on a bad wire: whatever happens to a reply, a call
- * that succeeds has told the truth.
+/* Thousands of transactions on a bad wire. Whatever happens to a reply, the data of a
+ * call that succeeds are right.
  *
- * Two lies cannot be seen by any RTU master and are counted apart:
- * - blind: the damage made a frame with a right CRC, one in 65536;
- * - late: the reply to an earlier request of the same unit, function and
- *   length came while this one was waited for. Nothing in an RTU frame says
- *   which request it answers; the quiet time after a timeout makes it rare.
- * Requests vary in unit, function and length, so that most late replies can
- * be told apart, and are.
+ * No RTU master can notice two kinds of wrong data. They are counted separately:
+ * - blind: the damaged bytes are a frame with a right CRC, one in 65536;
+ * - late: the reply to an earlier request of the same unit, function and length arrived
+ *   while the master waited for this one. Nothing in an RTU frame says which request it
+ *   answers. The quiet time after a timeout makes this rare.
+ * Requests vary in unit, function and length, so that most late replies can be
+ * distinguished, and are.
  *
  * MBM_SEED and MBM_TRANSACTIONS in the environment change the run. */
 #include "crc.h"
@@ -20,20 +20,20 @@
 
 enum { TIMEOUT_MS = 50, LEDGER = 64 };
 
-/* What may happen to a reply, or to the request. */
+/* What may happen to a reply or to the request. */
 enum {
-    LOST = 1 << 0,      /* the device does not hear the request */
+    LOST = 1 << 0,      /* the device does not receive the request */
     DROP = 1 << 1,      /* a byte of the reply is missing */
     FLIP = 1 << 2,      /* a bit is wrong */
-    INSERT = 1 << 3,    /* bytes too many within it */
-    DELAY = 1 << 4,     /* it comes after the timeout */
-    DUPLICATE = 1 << 5, /* it comes twice */
-    FOREIGN = 1 << 6,   /* a frame of another unit in front */
-    STALE = 1 << 7,     /* a frame of another function in front */
-    CUT = 1 << 8,       /* a pause within it */
-    NOISE = 1 << 9,     /* random bytes in front */
-    HEADER = 1 << 10,   /* bytes in front that look like its head */
-    ECHO = 1 << 11,     /* the request comes back first; discard is on */
+    INSERT = 1 << 3,    /* extra bytes in the reply */
+    DELAY = 1 << 4,     /* it arrives after the timeout */
+    DUPLICATE = 1 << 5, /* it arrives twice */
+    FOREIGN = 1 << 6,   /* a frame of another unit before it */
+    STALE = 1 << 7,     /* a frame of another function before it */
+    CUT = 1 << 8,       /* a pause inside it */
+    NOISE = 1 << 9,     /* random bytes before it */
+    HEADER = 1 << 10,   /* bytes that look like its start before it */
+    ECHO = 1 << 11,     /* the request comes back first; echo discard is on */
     KINDS = 12,
     DESTROYED = LOST | DROP | FLIP | INSERT | DELAY
 };
@@ -46,13 +46,13 @@ typedef struct frame {
 typedef struct run {
     uint32_t random;
     model device;
-    request asked;        /* the request that the device heard last */
-    frame reply;          /* and what it answered, undamaged */
+    request asked;        /* the request that the device received last */
+    frame reply;          /* and its reply, undamaged */
     int carried_out;      /* in this transaction */
     unsigned faults;      /* of this attempt */
-    frame ledger[LEDGER]; /* undamaged replies of the past */
+    frame ledger[LEDGER]; /* undamaged replies to earlier requests */
     unsigned written;
-    uint8_t heard[4096]; /* what the master read for this request */
+    uint8_t heard[4096]; /* the bytes that the master read for this request */
     size_t heard_length;
     unsigned right, failed, intact, late, blind, wrong, exceptions;
     uint64_t longest;
@@ -104,7 +104,7 @@ static void damage(run *r, frame *f)
     }
 }
 
-/* What comes in front of the reply; returns when the reply may begin. */
+/* Sends what comes before the reply. Returns when the reply may begin. */
 static uint64_t in_front(sim *s, run *r, uint64_t at)
 {
     uint8_t bytes[64];
@@ -184,8 +184,8 @@ static uint16_t quantity(run *r, uint32_t most)
     return (uint16_t)(1 + draw(r, draw(r, 8) == 0 ? most : 12));
 }
 
-/* One request of a random kind to a random unit. */
-static uint8_t ask(sim *s, run *r)
+/* Makes a request of a random kind to a random unit. */
+static uint8_t make_request(sim *s, run *r)
 {
     mbm_master *n = &s->master;
     uint16_t address = (uint16_t)draw(r, MODEL_CELLS);
@@ -216,8 +216,8 @@ static uint8_t ask(sim *s, run *r)
     }
 }
 
-/* Whether the outcome of the call is what this reply frame says. */
-static int says(const sim *s, const run *r, uint8_t status, const frame *f)
+/* Returns whether the status and the data of the call are those of this reply frame. */
+static int agrees_with(const sim *s, const run *r, uint8_t status, const frame *f)
 {
     const uint8_t *b = f->bytes;
     int bits = r->asked.function <= 2;
@@ -230,7 +230,8 @@ static int says(const sim *s, const run *r, uint8_t status, const frame *f)
     if (status != MBM_OK)
         return 0;
     if (r->asked.function > 4 && r->asked.function != 0x17)
-        /* The request's own fields: another's echo is another request's. */
+        /* The response repeats fields of the request, so with other fields it answers
+         * another request. */
         return be16(b + 2) == r->asked.address && be16(b + 4) == r->asked.value &&
                (r->asked.function != 0x16 || be16(b + 6) == r->asked.or_mask);
     for (i = 0; i < b[2]; i += 2) {
@@ -245,7 +246,7 @@ static int says(const sim *s, const run *r, uint8_t status, const frame *f)
     return b[2] == (bits ? (r->asked.quantity + 7) / 8 : 2 * r->asked.quantity);
 }
 
-static int was_heard(const run *r, const frame *f)
+static int was_received(const run *r, const frame *f)
 {
     size_t at;
 
@@ -255,18 +256,19 @@ static int was_heard(const run *r, const frame *f)
     return 0;
 }
 
-/* Whether the outcome was taken from the reply to an earlier request. */
+/* Returns whether the call took the reply to an earlier request. */
 static int is_late(const sim *s, const run *r, uint8_t status)
 {
     unsigned i;
 
     for (i = 0; i < LEDGER && i < r->written; i++)
-        if (says(s, r, status, &r->ledger[i]) && was_heard(r, &r->ledger[i]))
+        if (agrees_with(s, r, status, &r->ledger[i]) && was_received(r, &r->ledger[i]))
             return 1;
     return 0;
 }
 
-/* Whether a frame with a right CRC that says so was among the bytes heard. */
+/* Returns whether the bytes that the master read contain a frame with a right CRC and these
+ * data. */
 static int is_blind(const sim *s, const run *r, uint8_t status)
 {
     size_t at, length;
@@ -277,7 +279,7 @@ static int is_blind(const sim *s, const run *r, uint8_t status)
             if (crc16(r->heard + at, length) == 0) {
                 f.length = length;
                 memcpy(f.bytes, r->heard + at, length);
-                if (says(s, r, status, &f))
+                if (agrees_with(s, r, status, &f))
                     return 1;
             }
     return 0;
@@ -292,8 +294,8 @@ static void transact(sim *s, run *r, unsigned retries)
     s->sent = 0;
     s->order_length = 0;
     r->carried_out = 0;
-    s->limit = s->now + (retries + 1) * 400000u; /* beyond it hangs */
-    status = ask(s, r);
+    s->limit = s->now + (retries + 1) * 400000u; /* the call hangs if it takes longer */
+    status = make_request(s, r);
     if (status == MBM_PENDING)
         status = sim_poll(s);
     for (i = 0; i < s->sent; i++)
@@ -303,7 +305,7 @@ static void transact(sim *s, run *r, unsigned retries)
     if (status >= 0x80) {
         r->failed++;
         r->intact += s->sent > 0 && !(r->faults & DESTROYED);
-    } else if (r->carried_out && says(s, r, status, &r->reply)) {
+    } else if (r->carried_out && agrees_with(s, r, status, &r->reply)) {
         r->right++;
         r->exceptions += status != MBM_OK;
     } else if (is_late(s, r, status)) {
@@ -333,7 +335,7 @@ static unsigned transactions(void)
 static unsigned run_faults(sim *s, unsigned retries)
 {
     unsigned long seed = setting("MBM_SEED", 20240229);
-    static run fresh, this_run; /* too large for some stacks */
+    static run fresh, this_run; /* static: too large for some stacks */
     run *r = &this_run;
     unsigned i;
 
@@ -363,12 +365,12 @@ static unsigned run_faults(sim *s, unsigned retries)
     return r->failed;
 }
 
-static void no_fault_makes_a_call_tell_a_lie(void **state)
+static void no_fault_makes_a_call_return_wrong_data(void **state)
 {
     assert_true(run_faults((sim *)*state, 0) < transactions() / 2);
 }
 
-static void two_retries_leave_far_fewer_failures(void **state)
+static void with_two_retries_far_fewer_calls_fail(void **state)
 {
     assert_true(run_faults((sim *)*state, 2) < transactions() / 10);
 }
@@ -376,8 +378,8 @@ static void two_retries_leave_far_fewer_failures(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        SIM_TEST(no_fault_makes_a_call_tell_a_lie),
-        SIM_TEST(two_retries_leave_far_fewer_failures),
+        SIM_TEST(no_fault_makes_a_call_return_wrong_data),
+        SIM_TEST(with_two_retries_far_fewer_calls_fail),
     };
 
     return cmocka_run_group_tests_name("random faults", tests, NULL, NULL);

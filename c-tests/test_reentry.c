@@ -1,6 +1,5 @@
-/* Every function of a master or server, called on it from within each of its hooks:
- * where no call is allowed it returns MBM_BUSY and changes nothing, where calls are
- * allowed they work. */
+/* Every function of a master or server, called from within each of its hooks. Where no call
+ * is allowed, it returns MBM_BUSY and changes nothing. Where calls are allowed, they work. */
 #include "hooked_port.h"
 #include "test.h"
 
@@ -120,7 +119,7 @@ static void no_hook_of_a_masters_port_may_call_the_master(void **state)
     assert_int_equal(mbm_master_receive(&master), 0x1234);
     for (i = 0; i < HOOKS; i++)
         assert_true(wire.called[i] > 0);
-    /* Outside of a request, too. */
+    /* The same outside of a request. */
     entered = 0;
     OK(mbm_master_lineUsed(&master));
     OK(mbm_master_beginRtu(&master, 17, &port));
@@ -128,7 +127,7 @@ static void no_hook_of_a_masters_port_may_call_the_master(void **state)
     IS(MBM_PENDING, mbm_master_readHoldingRegisters(&master, 0, 1));
     assert_true(mbm_master_pollDelay(&master) < 0xFFFFFFFFu);
     assert_true(entered >= 2);
-    /* A cancel switches the driver off. */
+    /* A cancel calls the hook that switches the driver off. */
     entered = 0;
     wire.called[HOOK_POST] = 0;
     while (wire.called[HOOK_WRITE] < 2)
@@ -138,7 +137,7 @@ static void no_hook_of_a_masters_port_may_call_the_master(void **state)
     OK(mbm_master_getSlaveID(&master) == 17 ? MBM_OK : MBM_BUSY);
 }
 
-/* What idle hooks do: each entry is tried in one request of its own. */
+/* What the idle hook does. Each value is tried in a request of its own. */
 static int idle_does;
 
 static void within_idle(int hook)
@@ -211,7 +210,7 @@ static mbm_files files;
 static const mbm_file file = {words, 8, 1};
 static unsigned hooks_called;
 
-/* What a unit serves may change while it serves. */
+/* A hook may change what its unit serves. */
 static void within_unit(void)
 {
     hooks_called++;
@@ -319,7 +318,7 @@ static void serve_all(void)
     OK(mbm_unit_serveFiles(&unit, &files));
 }
 
-static size_t ask(const char *pdu, size_t length)
+static size_t exchange(const char *pdu, size_t length)
 {
     unsigned i;
 
@@ -330,7 +329,7 @@ static size_t ask(const char *pdu, size_t length)
     return wire.length;
 }
 
-#define ASK(pdu) ask(pdu, sizeof pdu - 1)
+#define ASK(pdu) exchange(pdu, sizeof pdu - 1)
 
 static void no_hook_of_a_server_may_call_the_server(void **state)
 {
@@ -355,17 +354,17 @@ static void no_hook_of_a_server_may_call_the_server(void **state)
     wire.within = within_server;
     for (i = 0; i < COUNT(requests); i++) {
         hooks_called = 0;
-        assert_int_equal(ask(requests[i].pdu, requests[i].length), requests[i].answer);
+        assert_int_equal(exchange(requests[i].pdu, requests[i].length), requests[i].answer);
         assert_true(hooks_called >= requests[i].hooks);
     }
-    assert_int_equal(ASK("\x04\0\0\0\1"), 7); /* what a hook served first */
+    assert_int_equal(ASK("\x04\0\0\0\1"), 7); /* the value of the hook that is registered first */
     for (i = 0; i < HOOK_IDLE; i++)
         assert_true(wire.called[i] > 0);
     assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFFu);
     OK(mbm_server_setSilence(&server, 1000));
 }
 
-/* A restart that zeroes the server, or begins it anew in another place. */
+/* A restart hook that zeroes the server, or begins it anew with another framing. */
 static int begins_anew;
 
 static void start_over(void *context, uint8_t clears)
@@ -378,7 +377,7 @@ static void start_over(void *context, uint8_t clears)
         OK(mbm_server_beginTcp(&server, &port, &unit, 1, other_frame, 260));
 }
 
-static void a_server_that_its_hook_zeroes_is_touched_no_more(void **state)
+static void a_server_that_its_hook_zeroes_is_not_accessed_again(void **state)
 {
     static const mbm_server zero;
 
@@ -417,7 +416,7 @@ int main(void)
         TEST(no_hook_of_a_masters_port_may_call_the_master),
         TEST(an_idle_hook_may_call_its_master),
         TEST(no_hook_of_a_server_may_call_the_server),
-        TEST(a_server_that_its_hook_zeroes_is_touched_no_more),
+        TEST(a_server_that_its_hook_zeroes_is_not_accessed_again),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

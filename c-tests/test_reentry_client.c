@@ -1,5 +1,5 @@
-/* Every function of a client, called on it from within each of its hooks: where no call
- * is allowed it returns MBM_BUSY and changes nothing, from `done` calls work. */
+/* Every function of a client, called from within each of its hooks. Where no call is
+ * allowed, it returns MBM_BUSY and changes nothing. Calls from `done` work. */
 #include "hooked_port.h"
 #include "test.h"
 
@@ -139,7 +139,7 @@ static uint32_t reentrant_random(void *context)
     return 7;
 }
 
-/* In framing 0 to 3. */
+/* Begins the client in framing 0 to 3. */
 static void begin_client(int framing)
 {
     memset(&client, 0, sizeof client);
@@ -168,7 +168,7 @@ static void no_hook_of_a_clients_port_nor_its_random_function_may_call_the_clien
 
     (void)state;
     for (framing = 0; framing < 4; framing++) {
-        wire.within = framing == 2 ? NULL : within_client; /* TCP's begin calls no hook */
+        wire.within = framing == 2 ? NULL : within_client; /* the begin of TCP calls no hook */
         begin_client(framing);
         wire.within = within_client;
         OK(mbm_client_setRetries(&client, 2));
@@ -183,7 +183,7 @@ static void no_hook_of_a_clients_port_nor_its_random_function_may_call_the_clien
         IS(MBM_RESPONSE_TIMED_OUT, request.status);
         assert_int_equal(drawn, 2);
         assert_true(entered > drawn);
-        /* Cancelling and connecting anew call hooks where the driver is on. */
+        /* While the driver is on, cancelling and connecting anew call hooks. */
         IS(MBM_PENDING, mbm_client_readCoils(&client, &request, 0, 1));
         IS(MBM_PENDING, mbm_client_poll(&client));
         OK(mbm_client_reconnect(&client, NULL));
@@ -203,7 +203,7 @@ static void connect_anew(void *context)
 {
     (void)context;
     entered++;
-    /* No poll is at work but the one that called `done`. */
+    /* Only the poll that called `done` is running. */
     IS(MBM_BUSY, mbm_client_poll(&client));
     assert_int_equal(mbm_client_isConnected(&client), 1);
 }
@@ -241,11 +241,11 @@ static void done(void *context, mbm_clientRequest *ended)
         }
         break;
     case 3:
-        /* The object is gone; what else it had is given up. */
+        /* The object is zeroed. Its other requests are given up. */
         memset(&client, 0, sizeof client);
         break;
     default:
-        /* One of another framing stands in its place. */
+        /* The object is begun again with another framing. */
         begin_client((framing_of_done + 1) % 4);
         OK(mbm_client_poll(&client));
     }

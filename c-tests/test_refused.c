@@ -1,5 +1,6 @@
-/* A call that is refused changes nothing: each object is compared byte for byte with
- * what it was, and what was pending goes on within buffers of their exact size. */
+/* A call that is refused changes nothing: the object is compared byte for byte with its
+ * state before the call, and pending requests go on. Buffers have exactly the size that
+ * begin is given. */
 #include "hooked_port.h"
 #include "test.h"
 
@@ -72,7 +73,7 @@ static void poll_for_a_while(void)
         OK(mbm_server_poll(&server));
 }
 
-static void a_server_goes_on_when_a_begin_was_refused(void **state)
+static void a_server_goes_on_after_a_refused_begin(void **state)
 {
     uint8_t *frame = (uint8_t *)malloc(MBM_MAX_FRAME), *small = (uint8_t *)malloc(20);
     mbm_custom custom = {.serve = later, .code = 65};
@@ -92,7 +93,7 @@ static void a_server_goes_on_when_a_begin_was_refused(void **state)
     hooked_port_arrive_rtu(&wire, 17, "\x03\0\0\0\x7D", 5);
     poll_for_a_while();
     assert_int_equal(wire.length, 5 + 250);
-    /* One that has half arrived. */
+    /* A part of a request has arrived. */
     wire.length = 0;
     hooked_port_arrive_rtu(&wire, 17, "\x03\0\0\0\x7D", 5);
     wire.last -= 4;
@@ -101,7 +102,7 @@ static void a_server_goes_on_when_a_begin_was_refused(void **state)
     wire.last += 4;
     poll_for_a_while();
     assert_int_equal(wire.length, 5 + 250);
-    /* One that is carried out. */
+    /* A request that is being carried out. */
     wire.length = 0;
     not_yet = 150;
     hooked_port_arrive_rtu(&wire, 17, "\x41\1", 2);
@@ -139,8 +140,8 @@ static void settings_of_a_server_that_are_refused_change_nothing(void **state)
     REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_setEchoDiscard(&server, 1));
 }
 
-/* Records that are refused, and the units that refuse them. */
-static void records_that_are_refused_are_as_they_were(void **state)
+/* Neither the records that are refused nor the units that refuse them change. */
+static void refused_records_are_unchanged(void **state)
 {
     mbm_registerTable fresh;
     mbm_dataCallbacks cells;
@@ -177,7 +178,7 @@ static void records_that_are_refused_are_as_they_were(void **state)
 
 /* --- master --- */
 
-static void a_master_goes_on_when_calls_were_refused(void **state)
+static void a_master_goes_on_after_refused_calls(void **state)
 {
     static mbm_master m;
     uint8_t *frame = (uint8_t *)malloc(MBM_MAX_FRAME), *small = (uint8_t *)malloc(8);
@@ -223,7 +224,7 @@ static void a_master_goes_on_when_calls_were_refused(void **state)
     for (i = 0; i < 300 && mbm_master_poll(&m) == MBM_PENDING; i++) {
     }
     OK(mbm_master_status(&m));
-    /* A full queue of send. */
+    /* The queue of words is full. */
     OK(mbm_master_send(&m, 1));
     OK(mbm_master_send(&m, 2));
     REFUSED(MBM_BUFFER_TOO_SMALL, m, mbm_master_send(&m, 3));
@@ -236,7 +237,7 @@ static void a_master_goes_on_when_calls_were_refused(void **state)
     free(transmit);
 }
 
-static void request_from_gives_0_whenever_it_is_refused(void **state)
+static void request_from_returns_0_whenever_it_is_refused(void **state)
 {
     static mbm_master m;
     static uint16_t response[4], transmit[4];
@@ -262,7 +263,7 @@ static void request_from_gives_0_whenever_it_is_refused(void **state)
 
 /* --- sniffer and ring --- */
 
-static void a_sniffer_goes_on_when_calls_were_refused(void **state)
+static void a_sniffer_goes_on_after_refused_calls(void **state)
 {
     static mbm_sniffer sniffer;
     uint8_t *buffer = (uint8_t *)malloc(MBM_MAX_FRAME), *small = (uint8_t *)malloc(31);
@@ -314,13 +315,13 @@ static void a_ring_keeps_its_bytes_when_a_begin_is_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(a_server_goes_on_when_a_begin_was_refused),
+        TEST(a_server_goes_on_after_a_refused_begin),
         TEST(a_zeroed_server_stays_zero_when_a_begin_is_refused),
         TEST(settings_of_a_server_that_are_refused_change_nothing),
-        TEST(records_that_are_refused_are_as_they_were),
-        TEST(a_master_goes_on_when_calls_were_refused),
-        TEST(request_from_gives_0_whenever_it_is_refused),
-        TEST(a_sniffer_goes_on_when_calls_were_refused),
+        TEST(refused_records_are_unchanged),
+        TEST(a_master_goes_on_after_refused_calls),
+        TEST(request_from_returns_0_whenever_it_is_refused),
+        TEST(a_sniffer_goes_on_after_refused_calls),
         TEST(a_ring_keeps_its_bytes_when_a_begin_is_refused),
     };
 

@@ -1,5 +1,5 @@
-/* A call of a client that is refused changes nothing, and what was pending goes on
- * within buffers of their exact size. */
+/* A call of a client that is refused changes nothing, and pending requests go on. Buffers
+ * have exactly the size that begin is given. */
 #include "hooked_port.h"
 #include "test.h"
 
@@ -26,7 +26,7 @@ static uint16_t facade_words[2];
 static uint8_t facade_frame[16];
 static uint8_t *incoming, *outgoing;
 
-/* Begins in framing 0 to 3, with buffers of exact size. */
+/* Begins in framing 0 to 3, with buffers of exactly this size. */
 static uint8_t begin_client(int framing, uint16_t in, uint16_t out)
 {
     free(incoming);
@@ -83,7 +83,7 @@ static void all_settings_out_of_range_are_refused(int framing)
         REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_setDelimiter(&client, '!'));
 }
 
-static void a_client_goes_on_when_calls_were_refused(void **state)
+static void a_client_goes_on_after_refused_calls(void **state)
 {
     static uint8_t small[20];
     static const mbm_master zero;
@@ -124,7 +124,7 @@ static void a_client_goes_on_when_calls_were_refused(void **state)
         REFUSED(framing == 0 || framing == 3 ? MBM_BUSY : MBM_INVALID_ARGUMENT, client,
                 mbm_client_suspend(&client, &facade));
         assert_memory_equal(&facade, &zero, sizeof facade);
-        /* Requests that are refused have the status, and are not queued. */
+        /* A refused request has the status of the refusal and is not queued. */
         other.unit = 17;
         other.transaction = 7;
         other.reply = reply;
@@ -181,7 +181,7 @@ static void a_full_queue_and_a_lent_line_change_nothing(void **state)
     REFUSED(MBM_BUSY, client, mbm_client_reconnect(&client, NULL));
     OK(mbm_client_resume(&client, NULL));
     REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_resume(&client, NULL));
-    /* A facade with a request under way is neither lent nor taken back. */
+    /* While a master has a request under way, it can be neither given the line nor lose it. */
     OK(mbm_master_setBuffers(&facade, facade_words, 2, facade_words, 0, facade_frame, 16));
     OK(mbm_client_suspend(&client, &facade));
     OK(mbm_master_setBlocking(&facade, 0));
@@ -195,7 +195,7 @@ static void a_full_queue_and_a_lent_line_change_nothing(void **state)
     incoming = outgoing = NULL;
 }
 
-/* The queue has a request once, whatever the caller does to it meanwhile. */
+/* A request is in the queue only once, even if the program zeroes it while it is pending. */
 static void a_request_that_is_zeroed_while_it_is_pending_is_not_queued_twice(void **state)
 {
     mbm_clientRequest *request = (mbm_clientRequest *)malloc(sizeof *request);
@@ -220,7 +220,7 @@ static void a_request_that_is_zeroed_while_it_is_pending_is_not_queued_twice(voi
                 IS(MBM_BUSY, mbm_client_readCoils(&client, request, 0, 1)); /* under way */
         }
         assert_int_equal(mbm_client_pending(&client), 0);
-        /* The same of one that ended before. */
+        /* The same with a request that has ended before. */
         IS(MBM_PENDING, mbm_client_readCoils(&client, request, 0, 1));
         request->status = MBM_OK;
         IS(MBM_BUSY, mbm_client_readCoils(&client, request, 0, 1));
@@ -242,7 +242,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         TEST(a_zeroed_client_stays_zero_when_a_begin_is_refused),
-        TEST(a_client_goes_on_when_calls_were_refused),
+        TEST(a_client_goes_on_after_refused_calls),
         TEST(a_full_queue_and_a_lent_line_change_nothing),
         TEST(a_request_that_is_zeroed_while_it_is_pending_is_not_queued_twice),
     };

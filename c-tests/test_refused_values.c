@@ -1,5 +1,5 @@
-/* What a call that is refused leaves in the caller's variables: lengths are 0, all else
- * is as it was. */
+/* What a refused call leaves in the caller's variables: lengths become 0, all other
+ * variables stay as they were. */
 #include "mbm.h"
 #include "test.h"
 
@@ -10,7 +10,7 @@
 
 /* --- values --- */
 
-static void values_that_are_refused_are_as_they_were(void **state)
+static void refused_values_change_nothing(void **state)
 {
     uint16_t *two = (uint16_t *)malloc(4);
     uint8_t *bytes = (uint8_t *)malloc(2), coils[20];
@@ -48,16 +48,16 @@ static void values_that_are_refused_are_as_they_were(void **state)
     KEPT(MBM_BUFFER_TOO_SMALL, mbm_bits_packWords(coils, 20, two, 1));
     KEPT(MBM_ILLEGAL_DATA_ADDRESS, mbm_bits_set(bytes, 10, 16, 26, 1));
     KEPT(MBM_ILLEGAL_DATA_ADDRESS, mbm_bits_setInWords(two, 10, 32, 9, 1));
-    /* A view that is refused sees nothing. */
+    /* A view that is refused covers no registers. */
     IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_intoWords(&r, two, 2, 65535));
     IS(MBM_NOT_INITIALISED, mbm_registers_setUint16(&r, 65535, 0, 1));
     free(two);
     free(bytes);
 }
 
-/* --- what a call writes to the caller's variables --- */
+/* --- the caller's variables --- */
 
-static void lengths_are_0_whenever_there_is_none(void **state)
+static void a_refused_call_sets_its_length_to_0(void **state)
 {
     const mbm_framing rtu = {.kind = MBM_FRAMING_RTU}, none = {.kind = 9};
     mbm_packet packet = {.function = 3, .quantity = 1, .unit = 17};
@@ -107,7 +107,7 @@ static void lengths_are_0_whenever_there_is_none(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_frame_replyLength(PDU(NULL, 0), &packet, NULL));
 }
 
-static void other_variables_are_as_they_were_when_a_call_is_refused(void **state)
+static void a_refused_call_leaves_other_variables_unchanged(void **state)
 {
     const mbm_framing rtu = {.kind = MBM_FRAMING_RTU}, none = {.kind = 9};
     static mbm_sniffer sniffer;
@@ -156,7 +156,7 @@ static void other_variables_are_as_they_were_when_a_call_is_refused(void **state
     REFUSED(MBM_ILLEGAL_DATA_ADDRESS, bytes, mbm_bits_unpack(frame, 0, bytes, 4));
 }
 
-static void the_text_of_an_invalid_argument_speaks_of_ranges_too(void **state)
+static void the_text_of_invalid_argument_mentions_ranges(void **state)
 {
     (void)state;
     assert_non_null(strstr(mbm_status_text(MBM_INVALID_ARGUMENT), "out of range"));
@@ -169,10 +169,10 @@ static void the_text_of_an_invalid_argument_speaks_of_ranges_too(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(values_that_are_refused_are_as_they_were),
-        TEST(lengths_are_0_whenever_there_is_none),
-        TEST(other_variables_are_as_they_were_when_a_call_is_refused),
-        TEST(the_text_of_an_invalid_argument_speaks_of_ranges_too),
+        TEST(refused_values_change_nothing),
+        TEST(a_refused_call_sets_its_length_to_0),
+        TEST(a_refused_call_leaves_other_variables_unchanged),
+        TEST(the_text_of_invalid_argument_mentions_ranges),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

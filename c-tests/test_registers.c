@@ -1,5 +1,4 @@
-/* Values in registers, held against constants: what another library makes of
- * the same bytes is its own affair. */
+/* Values in registers, compared with constants and not with another library's results. */
 #include "mbm.h"
 #include "test.h"
 
@@ -8,7 +7,7 @@
 
 static const uint8_t orders[] = {MBM_ORDER_ABCD, MBM_ORDER_CDAB, MBM_ORDER_BADC, MBM_ORDER_DCBA};
 
-/* 2923517522 in each of the orders, and the double of pi. */
+/* 2923517522 as a double word, and pi as a double, in each of the four orders. */
 static const uint8_t double_words[4][4] = {
     {0xAE, 0x41, 0x56, 0x52},
     {0x56, 0x52, 0xAE, 0x41},
@@ -22,7 +21,7 @@ static const uint8_t pi[4][8] = {
     {0x18, 0x2D, 0x44, 0x54, 0xFB, 0x21, 0x09, 0x40},
 };
 
-/* Bytes as words, as a master keeps them. */
+/* Copies bytes into words, as a master keeps them. */
 static void to_words(uint16_t *words, const uint8_t *bytes, unsigned count)
 {
     for (; count > 0; count--, bytes += 2)
@@ -59,7 +58,7 @@ static void a_double_word_is_read_in_four_orders(void **state)
     }
 }
 
-static void the_order_at_first_is_high_word_first(void **state)
+static void the_default_order_is_high_word_first(void **state)
 {
     mbm_registers r;
     uint32_t value;
@@ -74,7 +73,7 @@ static void the_order_at_first_is_high_word_first(void **state)
     assert_int_equal(value, 2923517522u);
 }
 
-static void floats_are_those_of_ieee_754(void **state)
+static void floats_are_ieee_754(void **state)
 {
     static const struct {
         float value;
@@ -162,7 +161,7 @@ static void a_double_word_is_written_in_four_orders(void **state)
     }
 }
 
-static void one_register_has_numbers_bytes_and_bits(void **state)
+static void one_register_is_read_as_number_bytes_and_bits(void **state)
 {
     uint16_t words[] = {0x80FE, 0xAAAA};
     mbm_registers r;
@@ -234,7 +233,7 @@ static void a_text_ends_at_its_first_nul_or_with_its_field(void **state)
     assert_string_equal(text, "METER 7");
 }
 
-static void a_text_is_written_with_zeros_behind_it(void **state)
+static void a_text_is_written_with_zeros_after_it(void **state)
 {
     uint8_t bytes[9] = "........";
     mbm_registers r;
@@ -250,7 +249,7 @@ static void a_text_is_written_with_zeros_behind_it(void **state)
     assert_memory_equal(bytes, "ABBADC..", 8);
 }
 
-static void raw_bytes_are_copied_and_compared_as_they_travel(void **state)
+static void raw_bytes_are_copied_and_compared_in_wire_order(void **state)
 {
     static const uint8_t three[] = {3, 4, 5}, other[] = {3, 4, 6}, five[] = {3, 4, 5, 6, 7};
     uint16_t words[] = {0x0102, 0x0304, 0x0506};
@@ -315,7 +314,7 @@ static void bytes_of_a_device_that_swaps_them_are_put_in_order(void **state)
     assert_int_equal(bytes[0], 7);
 }
 
-static void what_lies_outside_is_a_status_and_changes_nothing(void **state)
+static void an_access_outside_of_a_view_changes_nothing(void **state)
 {
     uint16_t words[4] = {0xAAAA, 0xAAAA, 0xAAAA, 0xAAAA};
     mbm_registers r;
@@ -347,7 +346,7 @@ static void what_lies_outside_is_a_status_and_changes_nothing(void **state)
     assert_int_equal(words[3], 1);
 }
 
-static void registers_beyond_65535_are_no_view(void **state)
+static void a_view_beyond_register_65535_is_refused(void **state)
 {
     uint16_t words[2] = {0}, word;
     uint8_t bytes[4] = {0};
@@ -368,7 +367,7 @@ static void registers_beyond_65535_are_no_view(void **state)
     IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_getUint16(&r, 0, 0, &word));
 }
 
-static void null_and_nonsense_are_answered_with_a_status(void **state)
+static void null_and_bad_arguments_return_a_status(void **state)
 {
     static const uint8_t bytes[4] = {1, 2, 3, 4};
     mbm_registers r, none = {0};
@@ -414,7 +413,7 @@ static void null_and_nonsense_are_answered_with_a_status(void **state)
     assert_int_equal(word, 9);
 }
 
-static void what_was_lent_to_read_is_not_written(void **state)
+static void a_view_for_reading_is_not_written(void **state)
 {
     uint16_t words[4] = {1, 2, 3, 4};
     uint8_t bytes[2] = {1, 2};
@@ -462,7 +461,7 @@ static void a_masters_words_are_registers(void **state)
     OK(mbm_registers_setFloat(&r, 65534, MBM_ORDER_DEFAULT, &value));
     assert_int_equal(transmit[0], 0x8000);
     assert_int_equal(transmit[1], 0x4366);
-    /* The last addresses: as many words as there are. */
+    /* Near the last address a view has fewer words. */
     OK(mbm_master_getResponseRegisters(&node, 65534, &r));
     assert_int_equal(r.count, 2);
     OK(mbm_registers_getFloat(&r, 65534, MBM_ORDER_ABCD, &value));
@@ -474,19 +473,19 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_double_word_is_read_in_four_orders),
-        cmocka_unit_test(the_order_at_first_is_high_word_first),
-        cmocka_unit_test(floats_are_those_of_ieee_754),
+        cmocka_unit_test(the_default_order_is_high_word_first),
+        cmocka_unit_test(floats_are_ieee_754),
         cmocka_unit_test(values_of_four_registers_have_four_orders_too),
         cmocka_unit_test(a_double_word_is_written_in_four_orders),
-        cmocka_unit_test(one_register_has_numbers_bytes_and_bits),
+        cmocka_unit_test(one_register_is_read_as_number_bytes_and_bits),
         cmocka_unit_test(a_text_ends_at_its_first_nul_or_with_its_field),
-        cmocka_unit_test(a_text_is_written_with_zeros_behind_it),
-        cmocka_unit_test(raw_bytes_are_copied_and_compared_as_they_travel),
+        cmocka_unit_test(a_text_is_written_with_zeros_after_it),
+        cmocka_unit_test(raw_bytes_are_copied_and_compared_in_wire_order),
         cmocka_unit_test(bytes_of_a_device_that_swaps_them_are_put_in_order),
-        cmocka_unit_test(what_lies_outside_is_a_status_and_changes_nothing),
-        cmocka_unit_test(registers_beyond_65535_are_no_view),
-        cmocka_unit_test(null_and_nonsense_are_answered_with_a_status),
-        cmocka_unit_test(what_was_lent_to_read_is_not_written),
+        cmocka_unit_test(an_access_outside_of_a_view_changes_nothing),
+        cmocka_unit_test(a_view_beyond_register_65535_is_refused),
+        cmocka_unit_test(null_and_bad_arguments_return_a_status),
+        cmocka_unit_test(a_view_for_reading_is_not_written),
         cmocka_unit_test(a_masters_words_are_registers),
     };
 

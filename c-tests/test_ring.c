@@ -1,4 +1,4 @@
-/* The receive ring: one thread puts, another takes. */
+/* The receive ring: one thread puts bytes in, another takes them out. */
 #include "mbm.h"
 #include "test.h"
 
@@ -8,7 +8,7 @@
 
 enum { BYTES = 200000 };
 
-static void a_ring_gives_back_what_was_put_in_order(void **state)
+static void a_ring_returns_bytes_in_order(void **state)
 {
     static mbm_ring ring;
     uint8_t storage[8], taken[8];
@@ -24,7 +24,7 @@ static void a_ring_gives_back_what_was_put_in_order(void **state)
     assert_int_equal(mbm_ring_read(&ring, taken, sizeof taken), 0);
 }
 
-static void what_finds_no_room_is_counted_and_nothing_else_is_lost(void **state)
+static void bytes_beyond_the_capacity_are_counted_and_no_others_are_lost(void **state)
 {
     static mbm_ring ring;
     uint8_t storage[4], taken[8];
@@ -41,7 +41,7 @@ static void what_finds_no_room_is_counted_and_nothing_else_is_lost(void **state)
     assert_int_equal(mbm_ring_available(&ring), 0);
 }
 
-static void a_ring_that_was_never_begun_takes_and_gives_nothing(void **state)
+static void a_ring_that_was_never_begun_accepts_and_returns_nothing(void **state)
 {
     static mbm_ring zeroed;
     mbm_ring *rings[2];
@@ -61,7 +61,7 @@ static void a_ring_that_was_never_begun_takes_and_gives_nothing(void **state)
     }
 }
 
-static void begin_refuses_what_makes_no_ring(void **state)
+static void begin_refuses_bad_arguments(void **state)
 {
     static mbm_ring ring;
     uint8_t storage[4];
@@ -113,10 +113,10 @@ static void one_thread_may_put_while_another_takes(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_ring_gives_back_what_was_put_in_order),
-        cmocka_unit_test(what_finds_no_room_is_counted_and_nothing_else_is_lost),
-        cmocka_unit_test(a_ring_that_was_never_begun_takes_and_gives_nothing),
-        cmocka_unit_test(begin_refuses_what_makes_no_ring),
+        cmocka_unit_test(a_ring_returns_bytes_in_order),
+        cmocka_unit_test(bytes_beyond_the_capacity_are_counted_and_no_others_are_lost),
+        cmocka_unit_test(a_ring_that_was_never_begun_accepts_and_returns_nothing),
+        cmocka_unit_test(begin_refuses_bad_arguments),
         cmocka_unit_test(one_thread_may_put_while_another_takes),
     };
 

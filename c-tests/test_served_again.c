@@ -1,5 +1,5 @@
-/* Records that are handed to a mbm_server_serve function a second time: for the
- * same unit, zeroed before or not, and for another unit. */
+/* Records that are given to a mbm_server_serve function a second time: for the same unit,
+ * zeroed before or not, and for another unit. */
 #include "crc.h"
 #include "mbm.h"
 #include "test.h"
@@ -9,7 +9,7 @@
 
 enum { FAMILIES = 11 };
 
-/* One record of every family, each with what it needs. */
+/* One record of every family, with the data that it needs. */
 typedef struct {
     mbm_bitTable coils, discrete;
     mbm_registerTable holding, inputs;
@@ -48,7 +48,7 @@ static uint16_t get(void *context, uint16_t address)
     return address;
 }
 
-/* Serves one family, with its record filled anew. */
+/* Fills the record of one family anew and registers it. */
 static uint8_t serve(mbm_unit *unit, records *r, int family)
 {
     switch (family) {
@@ -103,7 +103,7 @@ static void zero(records *r, int family)
     memset(record[family], 0, size[family]);
 }
 
-/* A request of each family, which is answered without an exception. */
+/* A request to each family that gets a response without an exception. */
 static const struct {
     const char *pdu;
     size_t length;
@@ -113,7 +113,7 @@ static const struct {
     {"\x18\0\0", 3},     {"\x2B\x0E\1\0", 4}, {"\x41\1", 2},
 };
 
-/* The function code that answers a request to `unit`; 0 for none. */
+/* Returns the function code of the unit's response, or 0 if there is none. */
 static unsigned answer(mbm_unit *unit, uint8_t id, const char *pdu, size_t length)
 {
     uint8_t frame[MBM_MAX_FRAME];
@@ -220,7 +220,7 @@ static void one_record_serves_two_units(void **state)
 
     (void)state;
     memset(&own, 0, sizeof own);
-    /* The second unit has a record of its own first, then those of the other. */
+    /* The second unit has a record of its own first, then the records of the first unit. */
     OK(serve(&units[1], &own, 10));
     for (i = 0; i < FAMILIES - 1; i++) {
         OK(serve(&units[1], &first, i));
@@ -229,7 +229,7 @@ static void one_record_serves_two_units(void **state)
         assert_int_equal(answered(&units[1], 10), function(10));
     }
     all_are_answered(&units[1]);
-    /* What one of them writes, both have. */
+    /* A write through one unit is seen through the other. */
     assert_int_equal(answer(&units[1], 18, "\x06\0\0\x56\x78", 5), 6);
     assert_int_equal(words[0], 0x5678);
     zero(&first, 2);
@@ -247,7 +247,7 @@ static void functions_16_and_17_stay_when_another_unit_is_given_the_table(void *
     assert_int_equal(answer(&units[1], 18, "\x16\0\0\xFF\xFF\0\0", 7), 0x16);
 }
 
-/* As a table of another kind it would answer other functions, on every unit that has it. */
+/* A table of another kind would answer other functions, on every unit that has it. */
 static void a_table_that_is_served_as_one_kind_is_refused_as_another(void **state)
 {
     records before;
@@ -262,7 +262,7 @@ static void a_table_that_is_served_as_one_kind_is_refused_as_another(void **stat
     assert_memory_equal(&before, &first, sizeof first);
     all_are_answered(&units[0]);
     assert_int_equal(answered(&units[1], 3), 0);
-    /* Zeroed, it is a new one. */
+    /* A zeroed record can be registered as any kind. */
     zero(&first, 2);
     first.holding.words = words;
     first.holding.size = 4;
@@ -281,7 +281,7 @@ static void a_second_record_of_diagnostics_is_refused(void **state)
     all_are_answered(&units[0]);
 }
 
-static void what_a_unit_has_no_place_for_is_refused(void **state)
+static void a_service_without_a_free_place_is_refused(void **state)
 {
     static mbm_custom more[MBM_MAX_SERVICES];
     mbm_unit before;
@@ -301,7 +301,7 @@ static void what_a_unit_has_no_place_for_is_refused(void **state)
     assert_int_equal(first.switches.off[0], 0);
     assert_memory_equal(&before, &units[0], sizeof before);
     assert_int_equal(answer(&units[0], 17, "\x50", 1), 0x50 | 0x80);
-    /* Those that it has are taken again all the same. */
+    /* Records that are registered already can still be registered again. */
     for (i = 0; i < FAMILIES; i++) {
         zero(&first, i);
         OK(serve(&units[0], &first, i));
@@ -321,7 +321,7 @@ static uint16_t give_diagnostics(void *context, const mbm_request *request, uint
     return 0;
 }
 
-static void a_unit_whose_places_are_all_taken_knows_what_it_does_not_serve(void **state)
+static void a_unit_with_all_places_taken_refuses_other_functions(void **state)
 {
     static mbm_custom all[MBM_MAX_SERVICES];
     static mbm_unit full;
@@ -338,12 +338,12 @@ static void a_unit_whose_places_are_all_taken_knows_what_it_does_not_serve(void 
     }
     for (i = 0; i < MBM_MAX_SERVICES - 1; i++)
         OK(mbm_unit_serveCustom(&full, &all[i]));
-    /* The last place is taken by a hook, with what hears of every frame. */
+    /* A hook registers the diagnostics, which count every frame, in the last place. */
     all[0].serve = give_diagnostics;
     all[0].context = &full;
     assert_int_equal(answer(&full, 17, "\x42", 1), 0x42);
     assert_int_equal(answer(&full, 17, "\x03\0\0\0\1", 5), 0x83);
-    /* And without that. */
+    /* All places taken, without diagnostics. */
     memset(&full, 0, sizeof full);
     full.id = 17;
     for (i = 0; i < MBM_MAX_SERVICES; i++)
@@ -352,7 +352,7 @@ static void a_unit_whose_places_are_all_taken_knows_what_it_does_not_serve(void 
     assert_int_equal(answer(&full, 17, "\x03\0\0\0\1", 5), 0x83);
 }
 
-static void switches_are_set_up_again_like_any_record(void **state)
+static void switches_can_be_registered_again_like_any_record(void **state)
 {
     (void)state;
     OK(mbm_unit_switchFunction(&units[0], &first.switches, 3, 0));
@@ -362,7 +362,7 @@ static void switches_are_set_up_again_like_any_record(void **state)
     OK(mbm_unit_switchFunction(&units[0], &first.switches, 4, 0));
     assert_int_equal(answered(&units[0], 2), 3);
     assert_int_equal(answered(&units[0], 3), 0x84);
-    /* Two units may share them. */
+    /* Two units may share a record of switches. */
     OK(serve(&units[1], &first, 2));
     OK(mbm_unit_switchFunction(&units[1], &first.switches, 3, 0));
     assert_int_equal(answered(&units[0], 2), 0x83);
@@ -372,8 +372,8 @@ static void switches_are_set_up_again_like_any_record(void **state)
     all_are_answered(&units[0]);
 }
 
-/* A hook that sets its own table up anew while a request is carried out, which goes on
- * with what the table was. */
+/* Hooks that change their own table while a request is carried out. The request goes on
+ * with the table as it was. */
 static mbm_registerTable *hooked;
 static uint16_t fewer[1];
 
@@ -414,7 +414,7 @@ static uint8_t become_bits(void *context, uint16_t address, uint16_t quantity, c
     return 0;
 }
 
-/* Gives the exception that answers a write of four registers, or 0. */
+/* Writes four registers. Returns the exception, or 0. */
 static unsigned written(void)
 {
     static const char pdu[] = "\x10\0\0\0\4\x08\0\1\0\2\0\3\0\4";
@@ -430,7 +430,7 @@ static unsigned written(void)
     return frame[1] & 0x80 ? frame[2] : 0;
 }
 
-static void a_request_goes_on_with_the_table_that_its_hook_sets_up_anew(void **state)
+static void a_request_goes_on_with_the_old_table_if_its_hook_changes_it(void **state)
 {
     mbm_registerTable *table = (mbm_registerTable *)malloc(sizeof *table);
     int i;
@@ -452,7 +452,7 @@ static void a_request_goes_on_with_the_table_that_its_hook_sets_up_anew(void **s
         memset(units, 0, sizeof units);
         units[0].id = 17;
     }
-    /* Function 17 reads behind the hook that tells of what it wrote. */
+    /* Function 17 reads after the `after` hook of its write. */
     memset(table, 0, sizeof *table);
     table->words = words;
     table->size = 4;
@@ -476,11 +476,10 @@ int main(void)
                                reset),
         cmocka_unit_test_setup(a_table_that_is_served_as_one_kind_is_refused_as_another, reset),
         cmocka_unit_test_setup(a_second_record_of_diagnostics_is_refused, reset),
-        cmocka_unit_test_setup(a_unit_whose_places_are_all_taken_knows_what_it_does_not_serve,
-                               reset),
-        cmocka_unit_test_setup(what_a_unit_has_no_place_for_is_refused, reset),
-        cmocka_unit_test_setup(switches_are_set_up_again_like_any_record, reset),
-        cmocka_unit_test_setup(a_request_goes_on_with_the_table_that_its_hook_sets_up_anew, reset),
+        cmocka_unit_test_setup(a_unit_with_all_places_taken_refuses_other_functions, reset),
+        cmocka_unit_test_setup(a_service_without_a_free_place_is_refused, reset),
+        cmocka_unit_test_setup(switches_can_be_registered_again_like_any_record, reset),
+        cmocka_unit_test_setup(a_request_goes_on_with_the_old_table_if_its_hook_changes_it, reset),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,4 +1,4 @@
-/* What mbm_server_* answers to bad input, and what of it only C sees. */
+/* How mbm_server_* answers bad input, and what can only be tested from C. */
 #include "crc.h"
 #include "mbm.h"
 #include "test.h"
@@ -14,13 +14,13 @@ static mbm_diagnostics diagnostics;
 static uint16_t words[10];
 static uint8_t frame[MBM_MAX_ASCII_FRAME];
 
-/* A stream of the test's own: what arrives, what was sent, and a clock. */
+/* A port in memory: bytes that arrive, bytes that were sent, and a clock. */
 static struct {
     uint8_t arriving[600], sent[600];
     size_t first, last, length;
     uint32_t now;
     int lost;
-    /* The most that is taken at once, 0 for all; and how often a drain is not done. */
+    /* The most bytes that a write accepts, 0 for all; how often flush must be called. */
     unsigned piece, drains, draining;
 } wire;
 
@@ -83,8 +83,8 @@ static int reset(void **state)
     return 0;
 }
 
-/* Lets the frame of a PDU arrive, polls, and gives what was sent. */
-static size_t ask(uint8_t to, const char *pdu, size_t length)
+/* Lets the frame of a PDU arrive and polls. Returns the length of what was sent. */
+static size_t exchange(uint8_t to, const char *pdu, size_t length)
 {
     unsigned i;
 
@@ -97,10 +97,10 @@ static size_t ask(uint8_t to, const char *pdu, size_t length)
     return wire.length;
 }
 
-#define ASK(pdu) ask(17, pdu, sizeof pdu - 1)
-#define BROADCAST(pdu) ask(0, pdu, sizeof pdu - 1)
+#define ASK(pdu) exchange(17, pdu, sizeof pdu - 1)
+#define BROADCAST(pdu) exchange(0, pdu, sizeof pdu - 1)
 
-static void an_object_that_was_never_begun_is_told(void **state)
+static void an_object_that_was_never_begun_is_not_initialised(void **state)
 {
     (void)state;
     IS(MBM_NOT_INITIALISED, mbm_server_poll(&server));
@@ -154,7 +154,7 @@ static void null_is_an_invalid_argument(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, FRAMING(0), frame, 9, 8, &length));
 }
 
-static void what_a_unit_does_not_serve_is_exception_01(void **state)
+static void a_function_that_is_not_served_gets_exception_01(void **state)
 {
     (void)state;
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
@@ -163,7 +163,7 @@ static void what_a_unit_does_not_serve_is_exception_01(void **state)
     assert_memory_equal(wire.sent, "\x11\x84\x01", 3);
 }
 
-static void a_unit_without_services_is_none(void **state)
+static void a_unit_without_services_does_not_answer(void **state)
 {
     static mbm_unit places[3];
 
@@ -173,7 +173,7 @@ static void a_unit_without_services_is_none(void **state)
     assert_int_equal(ASK("\x03\0\0\0\1"), 0);
     places[1].id = 17;
     assert_int_equal(ASK("\x03\0\0\0\1"), 0);
-    /* The next one answers. */
+    /* The next unit with this id answers. */
     places[2].id = 17;
     OK(mbm_unit_serveHoldingRegisters(&places[2], &table));
     assert_int_equal(ASK("\x03\0\0\0\1"), 7);
@@ -181,7 +181,7 @@ static void a_unit_without_services_is_none(void **state)
     assert_int_equal(words[1], 0x5678);
 }
 
-/* A peer that asks another unit faster than anybody reads. */
+/* A peer that sends requests to another unit faster than they are read. */
 static int16_t flooded_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     const char *request = (const char *)context;
@@ -193,7 +193,7 @@ static int16_t flooded_read(void *context, uint8_t *bytes, uint16_t capacity)
     return (int16_t)capacity;
 }
 
-static void a_poll_ends_though_a_peer_floods(void **state)
+static void a_poll_ends_while_a_peer_floods(void **state)
 {
     static char request[] = "\0\1\0\0\0\6\x63\x03\0\0\0\1";
     mbm_port flooded = port;
@@ -209,14 +209,14 @@ static void a_poll_ends_though_a_peer_floods(void **state)
     wire.first = 0;
     OK(mbm_server_poll(&server));
     assert_int_equal(wire.length, 11);
-    /* As RTU over TCP this is noise. */
+    /* To a server of RTU over TCP these bytes are noise. */
     wire.first = wire.length = 0;
     OK(mbm_server_beginRtuOverTcp(&server, &flooded, &unit, 1, frame, sizeof frame));
     OK(mbm_server_poll(&server));
     assert_int_equal(wire.length, 0);
 }
 
-static void tables_without_storage_have_no_cells(void **state)
+static void tables_without_storage_have_no_addresses(void **state)
 {
     (void)state;
     table.words = NULL;
@@ -226,7 +226,7 @@ static void tables_without_storage_have_no_cells(void **state)
     assert_memory_equal(wire.sent, "\x11\x83\x02", 3);
 }
 
-static void serving_twice_is_serving_once(void **state)
+static void registering_twice_is_the_same_as_once(void **state)
 {
     mbm_registerTable inputs = {.words = words, .size = 10};
 
@@ -241,7 +241,7 @@ static void serving_twice_is_serving_once(void **state)
     assert_memory_equal(wire.sent, "\x11\x85\x01", 3);
 }
 
-static void mask_and_read_write_want_holding_registers(void **state)
+static void mask_and_read_write_need_holding_registers(void **state)
 {
     (void)state;
     IS(MBM_INVALID_ARGUMENT, mbm_registerTable_serveMaskAndReadWrite(&table));
@@ -265,72 +265,72 @@ static void a_function_is_switched_off_and_on(void **state)
     assert_int_equal(words[0], 0x0102);
 }
 
-static uint16_t said;
+static uint16_t custom_result;
 static mbm_request seen;
 static unsigned calls;
 
 static uint16_t own(void *context, const mbm_request *request, uint8_t *response, uint16_t capacity)
 {
-    assert_ptr_equal(context, &said);
+    assert_ptr_equal(context, &custom_result);
     assert_true(capacity >= 252);
     seen = *request;
     calls++;
-    memset(response, 0x5A, said < 253 ? said : 0);
-    return said;
+    memset(response, 0x5A, custom_result < 253 ? custom_result : 0);
+    return custom_result;
 }
 
-static void a_function_of_ours_says_what_is_answered(void **state)
+static void a_custom_function_determines_the_response(void **state)
 {
     (void)state;
     custom.serve = own;
-    custom.context = &said;
+    custom.context = &custom_result;
     custom.code = 0x64;
     OK(mbm_unit_serveDiagnostics(&unit, &diagnostics));
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     OK(mbm_unit_serveCustom(&unit, &custom));
-    said = 2;
-    assert_int_equal(ASK("\144abc"), 6); /* in octal, which ends after three digits */
+    custom_result = 2;
+    assert_int_equal(ASK("\144abc"), 6); /* in octal: hexadecimal would include the letters */
     assert_memory_equal(wire.sent, "\x11\x64\x5A\x5A", 4);
     assert_int_equal(seen.length, 3);
     assert_int_equal(seen.unit, 17);
     assert_int_equal(seen.function, 0x64);
-    said = 252;
+    custom_result = 252;
     assert_int_equal(ASK("\x64"), 256);
-    said = MBM_REPLY_EXCEPTION | 0x0B;
+    custom_result = MBM_REPLY_EXCEPTION | 0x0B;
     assert_int_equal(ASK("\x64"), 5);
     assert_int_equal(wire.sent[2], 0x0B);
-    said = MBM_REPLY_NONE;
+    custom_result = MBM_REPLY_NONE;
     assert_int_equal(ASK("\x64"), 0);
-    /* What is no answer is a failure of the server. */
-    for (said = 253; said < 0x101; said++) {
+    /* A value that is no response length is a failure of the server. */
+    for (custom_result = 253; custom_result < 0x101; custom_result++) {
         assert_int_equal(ASK("\x64"), 5);
         assert_int_equal(wire.sent[2], 4);
     }
-    said = 0xFFFF;
+    custom_result = 0xFFFF;
     assert_int_equal(ASK("\x64"), 5);
     assert_int_equal(wire.sent[2], 4);
     calls = 0;
     diagnostics.serverMessages = 0;
-    said = MBM_REPLY_PENDING;
+    custom_result = MBM_REPLY_PENDING;
     assert_int_equal(ASK("\x64"), 0);
     assert_true(calls > 10);
     assert_int_equal(diagnostics.serverMessages, 1);
     assert_int_equal(mbm_server_pollDelay(&server), 1000);
-    said = 0;
+    custom_result = 0;
     OK(mbm_server_poll(&server));
     OK(mbm_server_poll(&server));
     assert_int_equal(wire.length, 4);
 }
 
-static void a_function_of_code_0_is_every_other(void **state)
+static void a_custom_function_of_code_0_serves_all_others(void **state)
 {
     (void)state;
     custom.serve = own;
-    custom.context = &said;
+    custom.context = &custom_result;
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     OK(mbm_unit_serveCustom(&unit, &custom));
-    said = 0;
+    custom_result = 0;
     calls = 0;
     assert_int_equal(ASK("\x03\0\0\0\1"), 7);
     assert_int_equal(calls, 0);
@@ -348,8 +348,8 @@ static uint16_t count_reads(void *context, uint16_t address)
     return (uint16_t)++reads;
 }
 
-/* Serial line guide V1.02, 2.1. */
-static void a_broadcast_of_what_does_not_only_write_is_not_carried_out(void **state)
+/* Serial line guide V1.02, 2.1: only writes may be broadcast. */
+static void a_broadcast_is_carried_out_only_if_it_only_writes(void **state)
 {
     static mbm_dataCallbacks cells;
 
@@ -357,8 +357,8 @@ static void a_broadcast_of_what_does_not_only_write_is_not_carried_out(void **st
     memset(&cells, 0, sizeof cells);
     cells.get = count_reads;
     custom.serve = own;
-    custom.context = &said;
-    said = 0;
+    custom.context = &custom_result;
+    custom_result = 0;
     calls = reads = 0;
     OK(mbm_unit_serveDiagnostics(&unit, &diagnostics));
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
@@ -375,7 +375,7 @@ static void a_broadcast_of_what_does_not_only_write_is_not_carried_out(void **st
     assert_int_equal(diagnostics.diagnosticRegister, 7);
     assert_int_equal(diagnostics.noResponses, 4);
     assert_int_equal(calls + reads, 0);
-    /* What only writes is, and so are functions of users. */
+    /* Requests that only write are carried out, and so are user-defined functions. */
     assert_int_equal(BROADCAST("\x16\0\0\xFF\xFF\x12\x34"), 0);
     assert_int_equal(BROADCAST("\x06\0\1\x56\x78"), 0);
     assert_int_equal(BROADCAST("\x41"), 0);
@@ -386,7 +386,7 @@ static void a_broadcast_of_what_does_not_only_write_is_not_carried_out(void **st
     assert_int_equal(reads, 1);
 }
 
-static void a_response_that_the_port_takes_in_pieces_arrives_whole(void **state)
+static void a_response_that_the_port_accepts_in_pieces_is_sent_completely(void **state)
 {
     (void)state;
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
@@ -399,7 +399,7 @@ static void a_response_that_the_port_takes_in_pieces_arrives_whole(void **state)
     }
 }
 
-static void the_length_of_ours_frames_rtu_over_tcp(void **state)
+static void the_length_rule_of_a_custom_function_frames_rtu_over_tcp(void **state)
 {
     mbm_rule rules[] = {{MBM_RULE_FIXED, 4, 0}, {MBM_RULE_COUNTED, 1, 1}, {MBM_RULE_SILENCE, 0, 0}};
     const char *pdus[] = {"\144abc", "\144\1x!", "\14412345"};
@@ -408,11 +408,11 @@ static void the_length_of_ours_frames_rtu_over_tcp(void **state)
 
     (void)state;
     custom.serve = own;
-    custom.context = &said;
+    custom.context = &custom_result;
     custom.code = 0x64;
     custom.length = (mbm_rule){MBM_RULE_FIXED, 0, 0};
     IS(MBM_INVALID_ARGUMENT, mbm_unit_serveCustom(&unit, &custom));
-    said = 1;
+    custom_result = 1;
     for (i = 0; i < COUNT(rules); i++) {
         unsigned k;
 
@@ -420,7 +420,7 @@ static void the_length_of_ours_frames_rtu_over_tcp(void **state)
         OK(mbm_unit_serveCustom(&unit, &custom));
         OK(mbm_server_beginRtuOverTcp(&server, &port, &unit, 1, frame, sizeof frame));
         wire.first = wire.last = wire.length = 0;
-        /* Two in one lump; without a rule they must come one by one. */
+        /* Two requests at once. Without a rule for their length, only one at a time. */
         for (k = 0; k < (rules[i].kind == MBM_RULE_SILENCE ? 1u : 2u); k++) {
             wire.arriving[wire.last] = 17;
             memcpy(wire.arriving + wire.last + 1, pdus[i], lengths[i]);
@@ -442,7 +442,7 @@ static void restart(void *context, uint8_t clear_log)
     cleared += clear_log;
 }
 
-static void a_restart_is_told(void **state)
+static void a_restart_is_reported(void **state)
 {
     (void)state;
     diagnostics.restart = restart;
@@ -458,7 +458,7 @@ static void a_restart_is_told(void **state)
     assert_int_equal(restarts * 10 + cleared, 21);
 }
 
-static void a_lost_link_is_told_and_the_delay_is_that_of_the_line(void **state)
+static void a_lost_link_is_reported_and_poll_delay_is_the_silence(void **state)
 {
     (void)state;
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
@@ -477,22 +477,22 @@ static void a_lost_link_is_told_and_the_delay_is_that_of_the_line(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(an_object_that_was_never_begun_is_told),
+        TEST(an_object_that_was_never_begun_is_not_initialised),
         TEST(null_is_an_invalid_argument),
-        TEST(what_a_unit_does_not_serve_is_exception_01),
-        TEST(a_unit_without_services_is_none),
-        TEST(a_poll_ends_though_a_peer_floods),
-        TEST(tables_without_storage_have_no_cells),
-        TEST(serving_twice_is_serving_once),
-        TEST(mask_and_read_write_want_holding_registers),
+        TEST(a_function_that_is_not_served_gets_exception_01),
+        TEST(a_unit_without_services_does_not_answer),
+        TEST(a_poll_ends_while_a_peer_floods),
+        TEST(tables_without_storage_have_no_addresses),
+        TEST(registering_twice_is_the_same_as_once),
+        TEST(mask_and_read_write_need_holding_registers),
         TEST(a_function_is_switched_off_and_on),
-        TEST(a_function_of_ours_says_what_is_answered),
-        TEST(a_function_of_code_0_is_every_other),
-        TEST(a_broadcast_of_what_does_not_only_write_is_not_carried_out),
-        TEST(a_response_that_the_port_takes_in_pieces_arrives_whole),
-        TEST(the_length_of_ours_frames_rtu_over_tcp),
-        TEST(a_restart_is_told),
-        TEST(a_lost_link_is_told_and_the_delay_is_that_of_the_line),
+        TEST(a_custom_function_determines_the_response),
+        TEST(a_custom_function_of_code_0_serves_all_others),
+        TEST(a_broadcast_is_carried_out_only_if_it_only_writes),
+        TEST(a_response_that_the_port_accepts_in_pieces_is_sent_completely),
+        TEST(the_length_rule_of_a_custom_function_frames_rtu_over_tcp),
+        TEST(a_restart_is_reported),
+        TEST(a_lost_link_is_reported_and_poll_delay_is_the_silence),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

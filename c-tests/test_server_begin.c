@@ -1,4 +1,4 @@
-/* A server that is begun anew, at what rate, and what it does with noise. */
+/* A server that is begun again, baud rates that it takes, and how it handles noise. */
 #include "crc.h"
 #include "hooked_port.h"
 #include "mbm.h"
@@ -33,7 +33,7 @@ static int reset(void **state)
     return 0;
 }
 
-/* Polls until a request that has arrived is answered; gives what was sent. */
+/* Polls until a request that has arrived is answered. Returns the length of what was sent. */
 static size_t answer(void)
 {
     unsigned i;
@@ -58,7 +58,7 @@ static void calls_within_the_driver_hook(int hook)
     }
 }
 
-static void a_begin_while_a_response_leaves_switches_the_driver_off(void **state)
+static void a_begin_while_a_response_is_sent_switches_the_driver_off(void **state)
 {
     static const begin begins[] = {mbm_server_beginRtu, mbm_server_beginAscii, mbm_server_beginTcp,
                                    mbm_server_beginRtuOverTcp};
@@ -88,7 +88,7 @@ static void a_begin_while_a_response_leaves_switches_the_driver_off(void **state
     assert_int_equal(answer(), 7);
 }
 
-static void a_baud_rate_is_refused_where_no_rtu_line_is_served(void **state)
+static void a_baud_rate_is_refused_except_on_an_rtu_line(void **state)
 {
     static const char request[] = ":110300000001EB\r\n", response[] = ":1103020000EA\r\n";
     unsigned i;
@@ -104,7 +104,7 @@ static void a_baud_rate_is_refused_where_no_rtu_line_is_served(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_server_setBaudRate(&server, 9600));
     OK(mbm_server_beginAscii(&server, &port, &unit, 1, frame, sizeof frame));
     IS(MBM_INVALID_ARGUMENT, mbm_server_setBaudRate(&server, 115200));
-    /* Half a second between two characters is no end of an ASCII frame. */
+    /* A pause of half a second between two characters does not end an ASCII frame. */
     for (i = 0; request[i] != '\0'; i++) {
         hooked_port_arrive(&wire, request + i, 1);
         OK(mbm_server_poll(&server));
@@ -115,7 +115,7 @@ static void a_baud_rate_is_refused_where_no_rtu_line_is_served(void **state)
     assert_memory_equal(wire.sent, response, sizeof response - 1);
 }
 
-/* Noise that does not end before 20000 bytes of it were taken. */
+/* Noise without an end: 20000 bytes of it. */
 static int16_t noisy_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     hooked_port *p = context;
@@ -127,7 +127,7 @@ static int16_t noisy_read(void *context, uint8_t *bytes, uint16_t capacity)
     return (int16_t)capacity;
 }
 
-static void a_poll_takes_no_more_than_some_hundred_bytes_of_noise(void **state)
+static void a_poll_reads_at_most_1200_bytes_of_noise(void **state)
 {
     static const begin begins[] = {mbm_server_beginRtu, mbm_server_beginAscii,
                                    mbm_server_beginRtuOverTcp};
@@ -146,7 +146,7 @@ static void a_poll_takes_no_more_than_some_hundred_bytes_of_noise(void **state)
     }
 }
 
-static void a_frame_that_fills_the_buffer_behind_noise_is_answered(void **state)
+static void a_frame_that_fills_the_buffer_after_noise_is_answered(void **state)
 {
     uint8_t bytes[120] = {0};
     unsigned noise;
@@ -168,10 +168,10 @@ static void a_frame_that_fills_the_buffer_behind_noise_is_answered(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(a_begin_while_a_response_leaves_switches_the_driver_off),
-        TEST(a_baud_rate_is_refused_where_no_rtu_line_is_served),
-        TEST(a_poll_takes_no_more_than_some_hundred_bytes_of_noise),
-        TEST(a_frame_that_fills_the_buffer_behind_noise_is_answered),
+        TEST(a_begin_while_a_response_is_sent_switches_the_driver_off),
+        TEST(a_baud_rate_is_refused_except_on_an_rtu_line),
+        TEST(a_poll_reads_at_most_1200_bytes_of_noise),
+        TEST(a_frame_that_fills_the_buffer_after_noise_is_answered),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,4 +1,4 @@
-/* Functions of the user's among the other services of a unit. */
+/* User-defined functions among the other services of a unit. */
 #include "mbm.h"
 #include "test.h"
 
@@ -8,7 +8,7 @@ enum { UNIT = 17, HEAD = 7, FIRST_CODE = 65 };
 
 static struct {
     uint8_t request[12], sent[MBM_MAX_TCP_FRAME];
-    /* Bytes of the request that are still to be read. */
+    /* Bytes of the request that have not been read yet. */
     size_t left;
     size_t length;
 } wire;
@@ -45,7 +45,7 @@ static uint32_t wire_micros(void *context)
 
 static const mbm_port port = {.read = wire_read, .write = wire_write, .micros = wire_micros};
 
-/* Says which record was asked. */
+/* Responds with the number of its record. */
 static uint16_t serve(void *context, const mbm_request *request, uint8_t *response,
                       uint16_t capacity)
 {
@@ -77,7 +77,8 @@ static int reset(void **state)
     return 0;
 }
 
-/* Which record answers a request of this function; -1 for the table, -2 for exception 01. */
+/* Returns the number of the record that answers a request of this function, -1 for the
+ * table, -2 for exception 01. */
 static int answers(uint8_t function)
 {
     const uint8_t request[] = {0, 1, 0, 0, 0, 6, UNIT, function, 0, 0, 0, 1};
@@ -95,12 +96,12 @@ static int answers(uint8_t function)
     return wire.length == HEAD + 2 ? wire.sent[HEAD + 1] : -1;
 }
 
-static void a_function_of_ours_is_found_wherever_it_stands(void **state)
+static void a_custom_function_is_found_at_any_place(void **state)
 {
     unsigned count, at, i;
 
     for (count = 0; count <= MBM_MAX_SERVICES; count++) {
-        /* The table stands at each place among them, or is not there. */
+        /* The table stands at each place among them, or is not registered. */
         for (at = 0; at <= MBM_MAX_SERVICES; at++) {
             if (count == MBM_MAX_SERVICES && at < MBM_MAX_SERVICES)
                 continue;
@@ -120,7 +121,7 @@ static void a_function_of_ours_is_found_wherever_it_stands(void **state)
     }
 }
 
-static void a_function_of_code_0_is_asked_in_its_turn(void **state)
+static void a_custom_function_of_code_0_is_called_in_its_order(void **state)
 {
     unsigned zero, i;
 
@@ -163,8 +164,8 @@ static void a_record_that_was_zeroed_serves_nothing(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(a_function_of_ours_is_found_wherever_it_stands),
-        TEST(a_function_of_code_0_is_asked_in_its_turn),
+        TEST(a_custom_function_is_found_at_any_place),
+        TEST(a_custom_function_of_code_0_is_called_in_its_order),
         TEST(a_code_that_is_changed_counts_from_then_on),
         TEST(a_record_that_was_zeroed_serves_nothing),
     };

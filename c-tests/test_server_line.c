@@ -1,4 +1,4 @@
-/* Our server on a serial line, a pty, asked by libmodbus's client and by hand. */
+/* mbm's server on a serial line, a pty. libmodbus's client and the test itself send requests. */
 #include "asked.h"
 #include "await.h"
 #include "crc.h"
@@ -46,7 +46,7 @@ static void libmodbus_writes_every_table(void **state)
     asked_writes(client, &rtu);
 }
 
-static void the_edges_of_every_table_are_kept(void **state)
+static void accesses_at_the_limits_of_every_table_are_right(void **state)
 {
     (void)state;
     asked_edges(client);
@@ -73,7 +73,7 @@ static void every_function_is_served(void **state)
     asked_functions(modbus_get_socket(client), MBM_FRAMING_RTU, &rtu);
 }
 
-static void counts_that_lie_are_refused_in_time(void **state)
+static void wrong_byte_counts_are_refused_in_time(void **state)
 {
     (void)state;
     asked_lies(modbus_get_socket(client), MBM_FRAMING_RTU, &rtu);
@@ -95,7 +95,7 @@ static void a_broadcast_is_carried_out_and_not_answered(void **state)
     assert_int_equal(modbus_write_register(client, SERVED_BASE, 1), 1);
 }
 
-static void foreign_traffic_around_requests_is_passed_over(void **state)
+static void foreign_frames_around_requests_are_ignored(void **state)
 {
     static const uint8_t ours[] = {SERVED_UNIT, 3, 0, SERVED_BASE, 0, 1, 0, 0};
     uint8_t bytes[600], answer[600];
@@ -105,7 +105,7 @@ static void foreign_traffic_around_requests_is_passed_over(void **state)
     for (round = 0; round < 20; round++) {
         size_t n = 0;
 
-        /* A request and its response of another unit, with no silence anywhere. */
+        /* A request and the response of another unit, with no silence between any frames. */
         for (i = 0; i < round % 4; i++) {
             memcpy(bytes + n, "\x30\x03\x00\x00\x00\x10", 6);
             seal(bytes + n, 6);
@@ -143,7 +143,8 @@ static void listen_only_mode_is_silent_until_a_restart(void **state)
     uint16_t messages;
 
     (void)state;
-    /* Each is waited for: of two requests without silence between, one counts. */
+    /* Each frame is followed by a wait: of two requests without silence between, only one
+     * counts. */
     asked_frames(fd, MBM_FRAMING_RTU, SERVED_UNIT, (const uint8_t *)"\x08\0\x04\0\0", 5, NULL, 0);
     AWAIT(rtu.diagnostics.listenOnly == 1);
     messages = rtu.diagnostics.busMessages;
@@ -156,7 +157,7 @@ static void listen_only_mode_is_silent_until_a_restart(void **state)
                  (const uint8_t *)"\x07\x6D", 2);
 }
 
-/* A server of its own for each, so that none finds what another left behind. */
+/* Each test starts a server of its own, so that no test finds the state of another. */
 #define TEST(test) cmocka_unit_test_setup_teardown(test, start, stop)
 
 int main(void)
@@ -164,14 +165,14 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(libmodbus_reads_every_table),
         TEST(libmodbus_writes_every_table),
-        TEST(the_edges_of_every_table_are_kept),
+        TEST(accesses_at_the_limits_of_every_table_are_right),
         TEST(a_refused_write_changes_nothing),
         TEST(the_server_id_is_reported),
         TEST(every_function_is_served),
-        TEST(counts_that_lie_are_refused_in_time),
+        TEST(wrong_byte_counts_are_refused_in_time),
         TEST(ascii_serves_every_function_too),
         TEST(a_broadcast_is_carried_out_and_not_answered),
-        TEST(foreign_traffic_around_requests_is_passed_over),
+        TEST(foreign_frames_around_requests_are_ignored),
         TEST(damaged_and_cut_frames_are_not_answered),
         TEST(listen_only_mode_is_silent_until_a_restart),
     };

@@ -1,5 +1,6 @@
-/* A million requests to tables in C, most of them nearly right, against a model
- * of the test's own: every answer agrees, and every cell behind it. */
+/* A million requests to the tables of a server, most of them nearly right, compared with a
+ * model of the test's own: every response agrees, and so does every register and bit
+ * afterwards. */
 #include "crc.h"
 #include "mbm.h"
 #include "test.h"
@@ -19,14 +20,14 @@ static unsigned below(unsigned limit)
     return (unsigned)(seed >> 24) % limit;
 }
 
-/* What the server has, with guards around that nothing may touch. */
+/* The server's tables, with guard bytes around them that must not change. */
 static struct {
     uint16_t before[GUARD], holding[CELLS], between[GUARD], inputs[CELLS], behind[GUARD];
     uint8_t bits_before[GUARD], coils[CELLS / 8], bits_between[GUARD], discrete[CELLS / 8];
     uint8_t bits_behind[GUARD];
 } memory;
 
-/* What it should have. */
+/* The contents that the tables should have. */
 static struct {
     uint16_t words[2][CELLS];
     uint8_t bits[2][CELLS];
@@ -37,7 +38,7 @@ static mbm_registerTable holding, inputs;
 static mbm_bitTable coils, discrete;
 static uint8_t valid[CELLS / 8];
 
-static int there(unsigned address, unsigned quantity)
+static int exists(unsigned address, unsigned quantity)
 {
     unsigned i;
 
@@ -74,8 +75,9 @@ static size_t words_of(uint8_t *out, uint8_t function, const uint16_t *cells, un
     return 2 + 2 * quantity;
 }
 
-/* The response, by the book; the model changes as the server should. */
-static size_t by_the_book(const uint8_t *pdu, size_t length, uint8_t *out)
+/* Writes the response by the standard, and changes the model as the server should change
+ * its tables. */
+static size_t expected_response(const uint8_t *pdu, size_t length, uint8_t *out)
 {
     uint8_t function = pdu[0];
     unsigned address = length >= 3 ? word(pdu + 1) : 0, quantity = length >= 5 ? word(pdu + 3) : 0;
@@ -87,7 +89,7 @@ static size_t by_the_book(const uint8_t *pdu, size_t length, uint8_t *out)
     case 2:
         if (length != 5 || quantity < 1 || quantity > 2000)
             return refuse(out, function, 3);
-        if (!there(address, quantity))
+        if (!exists(address, quantity))
             return refuse(out, function, 2);
         bytes = (quantity + 7) / 8;
         memset(out + 1, 0, 1 + bytes);
@@ -99,14 +101,14 @@ static size_t by_the_book(const uint8_t *pdu, size_t length, uint8_t *out)
     case 4:
         if (length != 5 || quantity < 1 || quantity > 125)
             return refuse(out, function, 3);
-        if (!there(address, quantity))
+        if (!exists(address, quantity))
             return refuse(out, function, 2);
         return words_of(out, function, &model.words[function - 3][address - BASE], quantity);
     case 5:
     case 6:
         if (length != 5 || (function == 5 && quantity != 0 && quantity != 0xFF00))
             return refuse(out, function, 3);
-        if (!there(address, 1))
+        if (!exists(address, 1))
             return refuse(out, function, 2);
         if (function == 5)
             model.bits[0][address - BASE] = quantity != 0;
@@ -119,7 +121,7 @@ static size_t by_the_book(const uint8_t *pdu, size_t length, uint8_t *out)
         if (length < 6 || quantity < 1 || quantity > (function == 0x0F ? 1968 : 123) ||
             pdu[5] != bytes || length != 6 + bytes)
             return refuse(out, function, 3);
-        if (!there(address, quantity))
+        if (!exists(address, quantity))
             return refuse(out, function, 2);
         for (i = 0; i < quantity; i++)
             if (function == 0x0F)
@@ -130,7 +132,7 @@ static size_t by_the_book(const uint8_t *pdu, size_t length, uint8_t *out)
     case 0x16:
         if (length != 7)
             return refuse(out, function, 3);
-        if (!there(address, 1))
+        if (!exists(address, 1))
             return refuse(out, function, 2);
         to = model.words[0][address - BASE];
         model.words[0][address - BASE] = (uint16_t)((to & quantity) | (word(pdu + 5) & ~quantity));
@@ -141,7 +143,7 @@ static size_t by_the_book(const uint8_t *pdu, size_t length, uint8_t *out)
         if (length < 10 || quantity < 1 || quantity > 125 || written < 1 || written > 121 ||
             pdu[9] != 2 * written || length != 10 + 2 * written)
             return refuse(out, function, 3);
-        if (!there(address, quantity) || !there(to, written))
+        if (!exists(address, quantity) || !exists(to, written))
             return refuse(out, function, 2);
         for (i = 0; i < written; i++)
             model.words[0][to - BASE + i] = (uint16_t)word(pdu + 10 + 2 * i);
@@ -247,21 +249,21 @@ static int prepare(void **state)
            mbm_registerTable_serveMaskAndReadWrite(&holding);
 }
 
-/* The same memory behind functions, cell by cell. */
+/* The same memory, accessed by callback functions, register by register. */
 static mbm_unit called;
 static mbm_dataCallbacks callbacks[4];
 
 static uint8_t is_valid(void *context, uint16_t address)
 {
     (void)context;
-    return (uint8_t)there(address, 1);
+    return (uint8_t)exists(address, 1);
 }
 
 static uint16_t get(void *context, uint16_t address)
 {
     unsigned i = (unsigned)address - BASE;
 
-    assert_true(there(address, 1));
+    assert_true(exists(address, 1));
     switch ((int)((mbm_dataCallbacks *)context - callbacks) + 1) {
     case 1: return memory.coils[i / 8] >> i % 8 & 1;
     case 2: return memory.discrete[i / 8] >> i % 8 & 1 ? 0x100 : 0;
@@ -274,7 +276,7 @@ static void set(void *context, uint16_t address, uint16_t value)
 {
     unsigned i = (unsigned)address - BASE;
 
-    assert_true(there(address, 1));
+    assert_true(exists(address, 1));
     if (context == &callbacks[2]) {
         memory.holding[i] = value;
         return;
@@ -315,10 +317,10 @@ static int untouched(const void *guard, size_t bytes)
     return 1;
 }
 
-static void ask(mbm_unit *asked)
+static void compare_with_model(mbm_unit *asked)
 {
-    const char *told = getenv("MBM_TRANSACTIONS");
-    long rounds = told ? atol(told) : 1000000, round;
+    const char *fewer = getenv("MBM_TRANSACTIONS");
+    long rounds = fewer ? atol(fewer) : 1000000, round;
     uint8_t packed[2][CELLS / 8];
     unsigned i;
 
@@ -338,7 +340,7 @@ static void ask(mbm_unit *asked)
         if (damaged) {
             assert_int_equal(answered, 0);
         } else {
-            wanted = by_the_book(pdu, length, expected);
+            wanted = expected_response(pdu, length, expected);
             assert_int_equal(answered, wanted + 3);
             assert_memory_equal(frame + 1, expected, wanted);
             assert_int_equal(crc16(frame, answered), 0);
@@ -363,20 +365,20 @@ static void ask(mbm_unit *asked)
 static void only_valid_writes_change_an_array(void **state)
 {
     (void)state;
-    ask(&unit);
+    compare_with_model(&unit);
 }
 
-static void only_valid_writes_reach_a_function(void **state)
+static void only_valid_writes_reach_a_callback(void **state)
 {
     (void)state;
-    ask(&called);
+    compare_with_model(&called);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(only_valid_writes_change_an_array),
-        cmocka_unit_test_setup(only_valid_writes_reach_a_function, prepare_callbacks),
+        cmocka_unit_test_setup(only_valid_writes_reach_a_callback, prepare_callbacks),
     };
 
     return cmocka_run_group_tests(tests, prepare, NULL);

@@ -1,9 +1,7 @@
-/*
- * The frame buffer of a server, which the library accesses without checks: each test uses
- * buffers of exactly the size that begin is told, from malloc, so that the address
- * sanitizer sees one byte before or after. The port checks too that each place that it is
- * given lies in the buffer, for builds without the sanitizer.
- */
+/* The library accesses a server's frame buffer without checks. The tests use buffers of
+ * exactly the size that begin is given, from malloc, so that the address sanitizer reports
+ * an access to one byte before or after. The port checks too that each pointer that it is
+ * given lies in the buffer, for builds without the sanitizer. */
 #include "crc.h"
 #include "mbm.h"
 #include "test.h"
@@ -24,12 +22,12 @@ static mbm_custom custom;
 static uint16_t words[WORDS];
 static uint8_t bits[250];
 
-/* The line: bytes that are still to come, and how the port behaves. */
+/* The line: bytes that are still to arrive, and how the port behaves. */
 static struct {
     uint8_t bytes[4 * MOST];
     unsigned length, next;
-    unsigned at_once; /* how many bytes a read gives at most */
-    int lies;         /* a read or write claims more than it took */
+    unsigned at_once; /* the most bytes that a read returns */
+    int lies;         /* 1: a read or write claims more bytes than it moved */
     unsigned sent;
     uint32_t now;
     uint8_t *frame;
@@ -55,7 +53,7 @@ static int16_t port_read(void *context, uint8_t *bytes, uint16_t capacity)
     memcpy(bytes, line.bytes + line.next, count);
     line.next += count;
     if (line.lies && count) {
-        /* What it says that it gave, it gave: all of the place. */
+        /* The port fills all of the place that it claims to have filled. */
         memset(bytes + count, 0xA5, capacity - count);
         return INT16_MAX;
     }
@@ -86,7 +84,7 @@ static uint32_t port_micros(void *context)
     return line.now;
 }
 
-/* Takes all the room that there is, and more than the request's data. */
+/* Writes to the whole capacity for the response, which is larger than the request's data. */
 static uint16_t fill(void *context, const mbm_request *request, uint8_t *response,
                      uint16_t capacity)
 {
@@ -103,7 +101,7 @@ static uint16_t fill(void *context, const mbm_request *request, uint8_t *respons
 
 static const mbm_port port = {.read = port_read, .write = port_write, .micros = port_micros};
 
-/* Begins with a buffer of this size; whether it was taken. */
+/* Begins with a buffer of this size. Returns whether begin accepted it. */
 static int begin(begin_function *how, unsigned size)
 {
     free(line.frame);
@@ -125,7 +123,7 @@ static void put(const uint8_t *bytes, unsigned count)
     line.length += count;
 }
 
-/* Polls until everything was taken, then until the silence of any framing is over. */
+/* Polls until all bytes were read, then until the silence of any framing is over. */
 static void run(void)
 {
     unsigned turn;
@@ -142,7 +140,7 @@ static void run(void)
     line.length = line.next = 0;
 }
 
-/* A frame of this PDU, as the framing has it; its length. */
+/* Writes the frame of this PDU in the framing. Returns its length. */
 static unsigned framed(uint8_t *frame, begin_function *how, const uint8_t *pdu, unsigned length)
 {
     static const char digits[] = "0123456789ABCDEF";
@@ -177,7 +175,7 @@ static unsigned framed(uint8_t *frame, begin_function *how, const uint8_t *pdu, 
     return n;
 }
 
-static void ask(begin_function *how, const uint8_t *pdu, unsigned length)
+static void exchange(begin_function *how, const uint8_t *pdu, unsigned length)
 {
     uint8_t frame[2 * MOST];
 
@@ -185,7 +183,8 @@ static void ask(begin_function *how, const uint8_t *pdu, unsigned length)
     run();
 }
 
-/* Requests of every length, reads of every length, and functions that take all room. */
+/* Sends requests of every length, reads of every length, and functions that fill the whole
+ * buffer. */
 static void ask_everything(begin_function *how, unsigned pieces)
 {
     uint8_t pdu[260] = {0x10, 0, 0};
@@ -198,25 +197,25 @@ static void ask_everything(begin_function *how, unsigned pieces)
         pdu[4] = (uint8_t)n;
         pdu[5] = (uint8_t)(2 * n);
         memset(pdu + 6, (int)n, 2 * n);
-        ask(how, pdu, 6 + 2 * n);
+        exchange(how, pdu, 6 + 2 * n);
     }
     for (n = 1; n <= 125; n++) {
         const uint8_t read[] = {3, 0, 0, 0, (uint8_t)n};
         const uint8_t read_coils[] = {1, 0, 3, (uint8_t)(16 * n >> 8), (uint8_t)(16 * n - 3)};
 
         line.sent = 0;
-        ask(how, read, sizeof read);
+        exchange(how, read, sizeof read);
         assert_int_not_equal(line.sent, 0);
         line.sent = 0;
-        ask(how, read_coils, sizeof read_coils);
+        exchange(how, read_coils, sizeof read_coils);
         assert_int_not_equal(line.sent, 0);
     }
     pdu[0] = ECHO_CODE;
     for (n = 1; n <= 253; n += n < 20 || n > 245 ? 1 : 7)
-        ask(how, pdu, n);
+        exchange(how, pdu, n);
 }
 
-/* Bytes that are no frame, as many as fill the buffer and up to twice more. */
+/* Appends bytes that are no frame. */
 static void noise(unsigned count, unsigned seed)
 {
     unsigned i;
@@ -242,7 +241,7 @@ static void flood(begin_function *how, unsigned size)
             line.at_once = pieces;
             noise(counts[i], i);
             run();
-            /* And a request right after it. */
+            /* And noise with a request right after it. */
             assert_true(begin(how, size));
             line.at_once = pieces;
             noise(counts[i], i);
@@ -252,7 +251,7 @@ static void flood(begin_function *how, unsigned size)
     }
 }
 
-static void a_frame_of_each_framing_stays_in_a_buffer_of_any_size(void **state)
+static void a_frame_of_each_framing_is_kept_inside_a_buffer_of_any_size(void **state)
 {
     static begin_function *const all[] = {mbm_server_beginRtu, mbm_server_beginAscii,
                                           mbm_server_beginTcp, mbm_server_beginRtuOverTcp};
@@ -272,7 +271,7 @@ static void a_frame_of_each_framing_stays_in_a_buffer_of_any_size(void **state)
     }
 }
 
-static void noise_of_any_length_stays_in_the_buffer(void **state)
+static void noise_of_any_length_is_kept_inside_the_buffer(void **state)
 {
     unsigned size;
 
@@ -283,14 +282,14 @@ static void noise_of_any_length_stays_in_the_buffer(void **state)
     flood(mbm_server_beginRtuOverTcp, 41);
     flood(mbm_server_beginAscii, 32);
     flood(mbm_server_beginAscii, 33);
-    /* Noise ends a stream of TCP. */
+    /* Noise ends a TCP stream. */
     assert_true(begin(mbm_server_beginTcp, 260));
     noise(600, 1);
     for (size = 0; size < 100; size++)
         (void)mbm_server_poll(&server);
 }
 
-static void a_port_that_lies_stays_in_the_buffer(void **state)
+static void a_port_that_lies_is_kept_inside_the_buffer(void **state)
 {
     static const uint8_t read[] = {3, 0, 0, 0, 2};
     uint8_t frame[2 * MOST];
@@ -313,7 +312,7 @@ static void a_port_that_lies_stays_in_the_buffer(void **state)
     }
 }
 
-static void an_echo_of_any_length_stays_in_the_buffer(void **state)
+static void an_echo_of_any_length_is_kept_inside_the_buffer(void **state)
 {
     static const uint8_t read[] = {3, 0, 0, 0, 2};
     uint8_t frame[2 * MOST];
@@ -361,10 +360,10 @@ static int finish(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_frame_of_each_framing_stays_in_a_buffer_of_any_size),
-        cmocka_unit_test(noise_of_any_length_stays_in_the_buffer),
-        cmocka_unit_test(a_port_that_lies_stays_in_the_buffer),
-        cmocka_unit_test(an_echo_of_any_length_stays_in_the_buffer),
+        cmocka_unit_test(a_frame_of_each_framing_is_kept_inside_a_buffer_of_any_size),
+        cmocka_unit_test(noise_of_any_length_is_kept_inside_the_buffer),
+        cmocka_unit_test(a_port_that_lies_is_kept_inside_the_buffer),
+        cmocka_unit_test(an_echo_of_any_length_is_kept_inside_the_buffer),
     };
 
     return cmocka_run_group_tests(tests, prepare, finish);

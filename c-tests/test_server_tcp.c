@@ -1,5 +1,5 @@
-/* Our server behind a socket: TCP and RTU over TCP, several connections, and
- * clients that do not behave. */
+/* mbm's server on a socket: TCP and RTU over TCP, several connections, and clients that
+ * misbehave. */
 #define _GNU_SOURCE
 #include "asked.h"
 #include "await.h"
@@ -44,7 +44,7 @@ static int stop(void **state)
     return 0;
 }
 
-/* Has the server go round its loop: what its sockets told before, it knows. */
+/* Makes the server go through its loop, so that it has seen what its sockets received before. */
 static void go_round(void)
 {
     uint16_t word;
@@ -54,7 +54,7 @@ static void go_round(void)
         assert_int_equal(modbus_read_registers(client, SERVED_BASE, 1, &word), 1);
 }
 
-/* Every place but the client's is free, once the server knows of it. */
+/* Waits until every place except the client's is free. */
 static void all_places_are_free(void)
 {
     int fds[FREE];
@@ -73,7 +73,7 @@ static void all_places_are_free(void)
     }
 }
 
-static void libmodbus_finds_every_table(void **state)
+static void libmodbus_reads_and_writes_every_table(void **state)
 {
     (void)state;
     asked_reads(client);
@@ -123,8 +123,8 @@ static void requests_in_one_segment_are_answered_in_turn(void **state)
     close(fd);
 }
 
-/* The others are served while one sends a byte now and then and one nothing. */
-static void slow_and_half_open_connections_stall_nobody(void **state)
+/* One client sends a byte now and then, one sends nothing. The server serves the others. */
+static void slow_and_half_open_connections_do_not_stall_others(void **state)
 {
     static const uint8_t one[] = {0, 7, 0, 0, 0, 6, SERVED_UNIT, 4, 0, SERVED_BASE, 0, 1};
     int slow = tcp_connect((uint16_t)tcp.port), silent = tcp_connect((uint16_t)tcp.port);
@@ -145,7 +145,7 @@ static void slow_and_half_open_connections_stall_nobody(void **state)
     close(silent);
 }
 
-/* The server's end of a connection, which is served. */
+/* The server's socket of a connection. */
 static int far_end(int fd)
 {
     struct sockaddr_in ours, theirs;
@@ -170,8 +170,9 @@ static int is_full(int fd)
     return poll(&writable, 1, 0) == 0;
 }
 
-/* Until neither end takes any more; then all that was taken is answered, in turn. */
-static void a_client_that_reads_nothing_stalls_nobody(void **state)
+/* Sends until neither end accepts more bytes. Then all requests that were sent are
+ * answered, in order. */
+static void a_client_that_reads_nothing_does_not_stall_others(void **state)
 {
     static uint8_t answers[300];
     uint8_t one[] = {0, 0, 0, 0, 0, 6, SERVED_UNIT, 4, 0, SERVED_BASE, 0, 125};
@@ -216,7 +217,7 @@ static void a_client_that_reads_nothing_stalls_nobody(void **state)
     close(fd);
 }
 
-static void connections_beyond_the_storage_are_closed_and_the_others_served(void **state)
+static void further_connections_are_closed_and_the_others_served(void **state)
 {
     int fds[SERVED_CONNECTIONS + 8];
     unsigned i;
@@ -233,7 +234,7 @@ static void connections_beyond_the_storage_are_closed_and_the_others_served(void
     all_places_are_free();
 }
 
-static void a_stream_that_is_no_modbus_is_closed(void **state)
+static void a_stream_that_is_not_modbus_is_closed(void **state)
 {
     uint8_t byte;
     int fd = tcp_connect((uint16_t)tcp.port);
@@ -246,7 +247,7 @@ static void a_stream_that_is_no_modbus_is_closed(void **state)
     close(fd);
 }
 
-static void a_connection_that_breaks_leaves_its_place(void **state)
+static void a_connection_that_breaks_frees_its_place(void **state)
 {
     const struct linger hard = {1, 0};
     unsigned i;
@@ -264,21 +265,21 @@ static void a_connection_that_breaks_leaves_its_place(void **state)
     all_places_are_free();
 }
 
-/* A server of its own for each, so that none finds what another left behind. */
+/* Each test starts a server of its own, so that no test finds the state of another. */
 #define TEST(test) cmocka_unit_test_setup_teardown(test, start, stop)
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(libmodbus_finds_every_table),
+        TEST(libmodbus_reads_and_writes_every_table),
         TEST(libmodbus_without_a_unit_is_answered),
         TEST(every_function_is_served),
         TEST(requests_in_one_segment_are_answered_in_turn),
-        TEST(slow_and_half_open_connections_stall_nobody),
-        TEST(a_client_that_reads_nothing_stalls_nobody),
-        TEST(connections_beyond_the_storage_are_closed_and_the_others_served),
-        TEST(a_stream_that_is_no_modbus_is_closed),
-        TEST(a_connection_that_breaks_leaves_its_place),
+        TEST(slow_and_half_open_connections_do_not_stall_others),
+        TEST(a_client_that_reads_nothing_does_not_stall_others),
+        TEST(further_connections_are_closed_and_the_others_served),
+        TEST(a_stream_that_is_not_modbus_is_closed),
+        TEST(a_connection_that_breaks_frees_its_place),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

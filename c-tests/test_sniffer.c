@@ -1,4 +1,5 @@
-/* mbm_sniffer_*: what a bus of the test's own comes out as, and what is refused. */
+/* mbm_sniffer_*: the events that it reports for a bus of the test's own, and the calls that
+ * it refuses. */
 #include "examples.h"
 #include "mbm.h"
 #include "test.h"
@@ -21,7 +22,7 @@ static void begin(uint8_t framing)
     OK(begin[framing](&sniffer, buffer, sizeof buffer));
 }
 
-/* Writes the frame of a PDU of unit 17. */
+/* Builds the frame of a PDU of unit 17. */
 static uint16_t frame_of(uint8_t kind, const uint8_t *pdu, uint16_t length, uint8_t side,
                          uint8_t *frame)
 {
@@ -37,12 +38,12 @@ static uint16_t frame_of(uint8_t kind, const uint8_t *pdu, uint16_t length, uint
     return size;
 }
 
-static void hear(const uint8_t *bytes, uint16_t length)
+static void feed(const uint8_t *bytes, uint16_t length)
 {
     assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, bytes, length, now), length);
 }
 
-/* Asserts what happened next, in words. */
+/* Asserts the text of the next event. */
 static void assert_next(const char *words)
 {
     mbm_event event;
@@ -60,7 +61,7 @@ static void assert_nothing(void)
     assert_int_equal(mbm_sniffer_next(&sniffer, now, &event), 0);
 }
 
-static void a_request_and_its_reply_are_told_with_values_in_each_framing(void **state)
+static void a_request_and_its_reply_are_reported_with_values_in_each_framing(void **state)
 {
     uint8_t kind, frame[MBM_MAX_ASCII_FRAME];
     mbm_event event;
@@ -70,7 +71,7 @@ static void a_request_and_its_reply_are_told_with_values_in_each_framing(void **
     for (kind = MBM_FRAMING_RTU; kind <= MBM_FRAMING_RTU_OVER_TCP; kind++) {
         begin(kind);
         length = frame_of(kind, request, sizeof request, MBM_PACKET_REQUEST, frame);
-        hear(frame, length);
+        feed(frame, length);
         assert_int_equal(mbm_sniffer_next(&sniffer, now, &event), 1);
         assert_int_equal(event.kind, MBM_EVENT_REQUEST);
         assert_int_equal(event.length, length);
@@ -80,7 +81,7 @@ static void a_request_and_its_reply_are_told_with_values_in_each_framing(void **
         if (kind != MBM_FRAMING_ASCII)
             assert_memory_equal(event.frame, frame, length);
         now += 12345;
-        hear(frame, frame_of(kind, reply, sizeof reply, MBM_PACKET_RESPONSE, frame));
+        feed(frame, frame_of(kind, reply, sizeof reply, MBM_PACKET_RESPONSE, frame));
         assert_int_equal(mbm_sniffer_next(&sniffer, now, &event), 1);
         assert_int_equal(event.kind, MBM_EVENT_REPLY);
         assert_int_equal(event.status, MBM_OK);
@@ -119,7 +120,7 @@ static void every_example_is_found_as_a_frame(void **state)
             length = example_load(&examples[i], pdu, &packet);
             packet.unit = 17;
             OK(mbm_frame_build(&framing, &packet, frame, sizeof frame, &size));
-            /* Only the direction tells an unasked reply from a request. */
+            /* Only the direction distinguishes a reply without a request from a request. */
             assert_int_equal(mbm_sniffer_feed(&sniffer,
                                               side == MBM_PACKET_REQUEST ? MBM_DIRECTION_CLIENT
                                                                          : MBM_DIRECTION_SERVER,
@@ -135,7 +136,7 @@ static void every_example_is_found_as_a_frame(void **state)
     }
 }
 
-static void timeouts_damage_and_noise_are_told(void **state)
+static void timeouts_damage_and_noise_are_reported(void **state)
 {
     uint8_t frame[MBM_MAX_ASCII_FRAME];
     uint16_t length = frame_of(MBM_FRAMING_RTU, request, sizeof request, MBM_PACKET_REQUEST, frame);
@@ -145,25 +146,25 @@ static void timeouts_damage_and_noise_are_told(void **state)
     OK(mbm_sniffer_setBaudRate(&sniffer, 19200));
     OK(mbm_sniffer_setResponseTimeout(&sniffer, 200));
     OK(mbm_sniffer_setFrameTimeout(&sniffer, 20));
-    hear(frame, length);
+    feed(frame, length);
     now += 199999;
     assert_next("unit 17  request    03 read holding registers  107..109");
     assert_nothing();
     now += 1;
     assert_next("unit 17  timeout    03 read holding registers  107..109");
     frame[3] ^= 1;
-    hear(frame, length);
+    feed(frame, length);
     now += 20000;
     assert_next("bad CRC, 8 bytes");
-    hear((const uint8_t *)"\xFF\xFF\xFF", 3);
+    feed((const uint8_t *)"\xFF\xFF\xFF", 3);
     now += 20000;
     assert_next("noise, 3 bytes");
-    hear((const uint8_t *)"\x11\x83\x02\xC1\x34", 5);
+    feed((const uint8_t *)"\x11\x83\x02\xC1\x34", 5);
     assert_next("unit 17  unpaired   03 read holding registers: exception 02 illegal data address");
     assert_nothing();
 }
 
-static void more_than_the_buffer_holds_is_fed_in_parts(void **state)
+static void more_bytes_than_the_buffer_holds_are_fed_in_parts(void **state)
 {
     static uint8_t traffic[6000];
     uint8_t small[MBM_MAX_FRAME], frame[MBM_MAX_ASCII_FRAME];
@@ -196,7 +197,7 @@ static void more_than_the_buffer_holds_is_fed_in_parts(void **state)
     assert_int_equal(replies, length / 19);
 }
 
-static void functions_of_your_own_are_taken(void **state)
+static void user_defined_functions_are_reported(void **state)
 {
     const mbm_function own[] = {{0x55, {MBM_RULE_FIXED, 3, 0}, {MBM_RULE_COUNTED, 1, 0}}};
     mbm_function many[MBM_MAX_SNIFFER_FUNCTIONS + 1];
@@ -217,7 +218,7 @@ static void functions_of_your_own_are_taken(void **state)
     packet.dataLength = 2;
     OK(mbm_frame_build(&framing, &packet, frame, sizeof frame, &size));
     now = 0;
-    hear(frame, size);
+    feed(frame, size);
     assert_next("unit 17  request    55 unknown function: 01 02");
     for (i = 0; i < COUNT(many); i++)
         many[i] = own[0];
@@ -249,7 +250,7 @@ static void another_delimiter_ends_ascii_frames(void **state)
     assert_next("unit 17  request    07 read exception status");
 }
 
-static void a_sniffer_never_begun_or_of_no_use_is_refused(void **state)
+static void a_sniffer_that_was_not_begun_or_has_bad_arguments_is_refused(void **state)
 {
     static mbm_sniffer zeroed;
     mbm_event event;
@@ -307,7 +308,7 @@ static void a_frame_is_explained_in_each_framing_and_refused_in_words(void **sta
     assert_string_equal(text, "no frame, 1026 bytes");
 }
 
-static void a_text_that_does_not_fit_is_cut_and_ends_all_the_same(void **state)
+static void a_text_that_does_not_fit_is_cut_and_terminated(void **state)
 {
     uint8_t frame[MBM_MAX_ASCII_FRAME];
     mbm_framing framing = {0};
@@ -341,15 +342,15 @@ static void a_text_that_does_not_fit_is_cut_and_ends_all_the_same(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_request_and_its_reply_are_told_with_values_in_each_framing),
+        cmocka_unit_test(a_request_and_its_reply_are_reported_with_values_in_each_framing),
         cmocka_unit_test(every_example_is_found_as_a_frame),
-        cmocka_unit_test(timeouts_damage_and_noise_are_told),
-        cmocka_unit_test(more_than_the_buffer_holds_is_fed_in_parts),
-        cmocka_unit_test(functions_of_your_own_are_taken),
+        cmocka_unit_test(timeouts_damage_and_noise_are_reported),
+        cmocka_unit_test(more_bytes_than_the_buffer_holds_are_fed_in_parts),
+        cmocka_unit_test(user_defined_functions_are_reported),
         cmocka_unit_test(another_delimiter_ends_ascii_frames),
-        cmocka_unit_test(a_sniffer_never_begun_or_of_no_use_is_refused),
+        cmocka_unit_test(a_sniffer_that_was_not_begun_or_has_bad_arguments_is_refused),
         cmocka_unit_test(a_frame_is_explained_in_each_framing_and_refused_in_words),
-        cmocka_unit_test(a_text_that_does_not_fit_is_cut_and_ends_all_the_same),
+        cmocka_unit_test(a_text_that_does_not_fit_is_cut_and_terminated),
     };
 
     return cmocka_run_group_tests_name("sniffer", tests, NULL, NULL);

@@ -1,5 +1,5 @@
-/* The sniffer on a line between a real libmodbus client and server: a thread
- * hands the bytes on and feeds what passes. */
+/* The sniffer on a line between a libmodbus client and a libmodbus server. A thread passes
+ * the bytes on and feeds them to the sniffer. */
 #define _GNU_SOURCE
 #include "await.h"
 #include "mbm.h"
@@ -17,12 +17,12 @@
 
 enum { EVENTS = 64, CALLS = 12 };
 
-/* An event, kept. */
-typedef struct told {
+/* A copy of an event. */
+typedef struct reported {
     mbm_event event;
     uint8_t pdu[MBM_MAX_PDU];
     char text[400];
-} told;
+} reported;
 
 typedef struct tap {
     mbm_sniffer sniffer;
@@ -31,7 +31,7 @@ typedef struct tap {
     uint32_t begun;
     uint8_t from_client, from_server;
     pthread_t thread;
-    told events[EVENTS];
+    reported events[EVENTS];
     unsigned count;
 } tap;
 
@@ -50,7 +50,7 @@ static void keep_events(void)
     mbm_event event;
 
     while (mbm_sniffer_next(&line.sniffer, micros(), &event)) {
-        told *t = &line.events[line.count++ % EVENTS];
+        reported *t = &line.events[line.count++ % EVENTS];
 
         t->event = event;
         if (event.pduLength)
@@ -59,7 +59,7 @@ static void keep_events(void)
     }
 }
 
-static void hand_on(int from, int to, uint8_t tap_kind)
+static void pass_on(int from, int to, uint8_t tap_kind)
 {
     uint8_t bytes[300];
     ssize_t length = read(from, bytes, sizeof bytes);
@@ -85,9 +85,9 @@ static void *forward(void *context)
         if (waits[2].revents)
             return NULL;
         if (waits[0].revents & POLLIN)
-            hand_on(line.client, line.server, line.from_client);
+            pass_on(line.client, line.server, line.from_client);
         if (waits[1].revents & POLLIN)
-            hand_on(line.server, line.client, line.from_server);
+            pass_on(line.server, line.client, line.from_server);
         keep_events();
     }
 }
@@ -117,7 +117,7 @@ static void stop_listening(void)
     close(line.stop[1]);
 }
 
-/* One call of each function that the client has. */
+/* Calls each function that the client has. */
 static void run(modbus_t *client)
 {
     const uint16_t words[2] = {0x1234, 0xABCD};
@@ -142,10 +142,10 @@ static void run(modbus_t *client)
 
 static const uint8_t functions[CALLS] = {1, 2, 3, 4, 5, 6, 15, 16, 17, 22, 23, 3};
 
-/* What was told, against what was called and what the server holds. */
+/* Compares the events with the calls and with the server's memory. */
 static void assert_told(const modbus_mapping_t *mapping)
 {
-    const told *t = line.events;
+    const reported *t = line.events;
     uint32_t took = micros() - line.begun;
     unsigned i;
 
@@ -177,7 +177,7 @@ static void assert_told(const modbus_mapping_t *mapping)
     assert_int_equal(t[23].event.status, MBM_ILLEGAL_DATA_ADDRESS);
 }
 
-static void what_libmodbus_says_on_a_serial_line_is_told(void **state)
+static void frames_of_libmodbus_on_a_serial_line_are_reported(void **state)
 {
     static server device;
     pty ours;
@@ -227,13 +227,13 @@ static void over_tcp(uint8_t apart)
     tcp_server_stop(&device);
 }
 
-static void what_libmodbus_says_over_tcp_is_told(void **state)
+static void frames_of_libmodbus_over_tcp_are_reported(void **state)
 {
     (void)state;
     over_tcp(0);
 }
 
-static void what_libmodbus_says_over_tcp_is_told_heard_apart(void **state)
+static void frames_of_libmodbus_over_tcp_are_reported_with_known_direction(void **state)
 {
     (void)state;
     over_tcp(1);
@@ -242,10 +242,11 @@ static void what_libmodbus_says_over_tcp_is_told_heard_apart(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_libmodbus_says_on_a_serial_line_is_told),
-        cmocka_unit_test(what_libmodbus_says_over_tcp_is_told),
-        cmocka_unit_test(what_libmodbus_says_over_tcp_is_told_heard_apart),
+        cmocka_unit_test(frames_of_libmodbus_on_a_serial_line_are_reported),
+        cmocka_unit_test(frames_of_libmodbus_over_tcp_are_reported),
+        cmocka_unit_test(frames_of_libmodbus_over_tcp_are_reported_with_known_direction),
     };
 
-    return cmocka_run_group_tests_name("sniffer beside libmodbus", tests, NULL, NULL);
+    return cmocka_run_group_tests_name("sniffer between libmodbus's client and server", tests, NULL,
+                                       NULL);
 }

@@ -1,5 +1,5 @@
-/* The peer that plays faults over TCP does play them: each is looked at on a
- * plain socket, so that what tests of clients find is the client's. */
+/* Checks on a plain socket that the TCP peer plays each fault, so that a failure in the
+ * tests of clients is the client's fault. */
 #define _GNU_SOURCE
 #include "await.h"
 #include "tcp_peer.h"
@@ -15,7 +15,7 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Bytes of a reply of one register; what waits for others goes after so long. */
+/* REPLY: bytes of a reply of one register. HELD_MS: how long a reply waits for others. */
 enum { SHORT_MS = 40, REPLY = 11, HELD_MS = 250 };
 
 static tcp_peer *peer;
@@ -47,9 +47,9 @@ static int64_t now_ms(void)
     return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
 }
 
-/* Asks unit 7 for registers from `id` on, which tell the replies as well as their
- * ids do: in one send, so that the peer hears them at once. */
-static void ask_all(unsigned id, unsigned count)
+/* Sends requests to unit 7, in one send, so that the peer receives them at once. They read
+ * the registers from `id` on, so the replies differ in their data as well as in their ids. */
+static void send_requests(unsigned id, unsigned count)
 {
     uint8_t requests[12 * 8];
     unsigned i;
@@ -63,24 +63,25 @@ static void ask_all(unsigned id, unsigned count)
     assert_int_equal(send(s, requests, 12 * count, MSG_NOSIGNAL), 12 * count);
 }
 
-static void ask(unsigned id)
+static void send_request(unsigned id)
 {
-    ask_all(id, 1);
+    send_requests(id, 1);
 }
 
-/* What one recv takes, 0 at the end of the stream, -1 if nothing came for ms. */
-static ssize_t take(uint8_t *bytes, size_t capacity, int ms)
+/* Returns what one recv returns: 0 at the end of the stream. Returns -1 if nothing arrived
+ * within `ms` milliseconds. */
+static ssize_t receive(uint8_t *bytes, size_t capacity, int ms)
 {
     struct pollfd wait = {s, POLLIN, 0};
 
     return poll(&wait, 1, ms) == 0 ? -1 : recv(s, bytes, capacity, 0);
 }
 
-/* Takes exactly so many bytes. */
-static void take_all(uint8_t *bytes, size_t length)
+/* Receives exactly `length` bytes. */
+static void receive_all(uint8_t *bytes, size_t length)
 {
     while (length > 0) {
-        ssize_t count = take(bytes, length, PATIENCE_MS);
+        ssize_t count = receive(bytes, length, PATIENCE_MS);
 
         assert_true(count > 0);
         bytes += count;
@@ -102,11 +103,11 @@ static void expect(unsigned id)
     uint8_t reply[REPLY], right[REPLY];
 
     right_reply(right, id);
-    take_all(reply, sizeof reply);
+    receive_all(reply, sizeof reply);
     assert_memory_equal(reply, right, sizeof right);
 }
 
-/* How many segments with data arrived, whether they were taken or not. */
+/* Returns how many segments with data have arrived, whether they were read or not. */
 static unsigned segments(void)
 {
     struct tcp_info info = {0};
@@ -120,7 +121,7 @@ static void expect_silence(void)
 {
     uint8_t byte;
 
-    assert_int_equal(take(&byte, 1, SHORT_MS), -1);
+    assert_int_equal(receive(&byte, 1, SHORT_MS), -1);
 }
 
 static void the_right_reply_comes_from_the_memory(void **state)
@@ -132,20 +133,20 @@ static void the_right_reply_comes_from_the_memory(void **state)
     uint8_t reply[12];
 
     (void)state;
-    ask(1);
+    send_request(1);
     expect(1);
     assert_int_equal(send(s, write_one, 12, 0), 12);
-    take_all(reply, 12);
+    receive_all(reply, 12);
     assert_memory_equal(reply, write_one, 12);
     assert_int_equal(tcp_peer_memory(peer)->tab_registers[30], 0xABCD);
     assert_int_equal(send(s, no_such, 12, 0), 12);
-    take_all(reply, 9);
+    receive_all(reply, 9);
     assert_int_equal(reply[7], 0x83);
     assert_int_equal(reply[8], 2);
     assert_int_equal(send(s, no_function, 9, 0), 9);
-    take_all(reply, 9);
+    receive_all(reply, 9);
     assert_memory_equal(reply, unknown, 9);
-    ask(2);
+    send_request(2);
     expect(2);
 }
 
@@ -169,32 +170,32 @@ static void requests_in_one_send_and_in_pieces_are_found(void **state)
     assert_int_equal(tcp_peer_count(peer).replies, 4);
 }
 
-static void a_delay_holds_up_one_reply_only(void **state)
+static void a_delay_delays_one_reply_only(void **state)
 {
     int64_t start = now_ms();
 
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_DELAY, 300);
-    ask_all(1, 2);
+    send_requests(1, 2);
     expect(2);
     expect(1);
     assert_true(now_ms() - start >= 300);
 }
 
-static void hold_turns_the_order_of_replies(void **state)
+static void hold_changes_the_order_of_replies(void **state)
 {
     int64_t start;
 
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_HOLD, 2);
     tcp_peer_fault(peer, 4, FAULT_HOLD, 3);
-    ask_all(1, 3);
+    send_requests(1, 3);
     expect(2);
     expect(3);
     expect(1);
-    /* Nothing follows: it comes by itself. */
+    /* No other reply follows, so it is sent when its time is over. */
     start = now_ms();
-    ask(4);
+    send_request(4);
     expect(4);
     assert_true(now_ms() - start >= HELD_MS);
 }
@@ -207,22 +208,22 @@ static void join_puts_replies_into_one_send(void **state)
 
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_JOIN, 2);
-    ask_all(1, 3);
-    take_all(got, sizeof right);
+    send_requests(1, 3);
+    receive_all(got, sizeof right);
     right_reply(right, 1);
     right_reply(right + REPLY, 2);
     right_reply(right + 2 * REPLY, 3);
     assert_memory_equal(got, right, sizeof right);
     assert_int_equal(segments() - before, 1);
-    /* One is still to join: it goes without. */
+    /* Another reply should join it, but none comes, so it is sent alone. */
     tcp_peer_fault(peer, 4, FAULT_JOIN, 1);
     start = now_ms();
-    ask(4);
+    send_request(4);
     expect(4);
     assert_true(now_ms() - start >= HELD_MS);
 }
 
-static void drop_carries_out_and_does_not_answer(void **state)
+static void drop_carries_out_the_request_and_does_not_answer(void **state)
 {
     const uint8_t write_one[12] = {0, 9, 0, 0, 0, 6, 7, 6, 0, 30, 0, 5};
 
@@ -230,7 +231,7 @@ static void drop_carries_out_and_does_not_answer(void **state)
     tcp_peer_fault(peer, 1, FAULT_DROP, 0);
     assert_int_equal(send(s, write_one, 12, 0), 12);
     expect_silence();
-    ask(1);
+    send_request(1);
     expect(1);
     assert_int_equal(tcp_peer_memory(peer)->tab_registers[30], 5);
     assert_int_equal(tcp_peer_count(peer).faults[FAULT_DROP], 1);
@@ -241,7 +242,7 @@ static void twice_sends_the_reply_twice(void **state)
 {
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_TWICE, 0);
-    ask(1);
+    send_request(1);
     expect(1);
     expect(1);
     expect_silence();
@@ -254,23 +255,23 @@ static void split_sends_single_bytes(void **state)
 
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_SPLIT, 20);
-    ask(1);
+    send_request(1);
     expect(1);
     assert_int_equal(segments() - before, REPLY);
     assert_true(now_ms() - start >= 20 * (REPLY - 1));
     expect_silence();
 }
 
-/* Asks once, and expects the reply but for one byte. */
+/* Sends one request. Expects the right reply except for one byte. */
 static void expect_changed(tcp_fault fault, unsigned argument, size_t at, uint8_t to)
 {
     uint8_t reply[REPLY], right[REPLY];
 
     tcp_peer_fault(peer, tcp_peer_count(peer).requests + 1, fault, argument);
-    ask(5);
+    send_request(5);
     right_reply(right, 5);
     right[at] = to;
-    take_all(reply, sizeof reply);
+    receive_all(reply, sizeof reply);
     assert_memory_equal(reply, right, sizeof right);
 }
 
@@ -297,7 +298,7 @@ static void an_exception_leaves_the_memory_alone(void **state)
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_EXCEPTION, 6);
     assert_int_equal(send(s, write_one, 12, 0), 12);
-    take_all(reply, 9);
+    receive_all(reply, 9);
     assert_memory_equal(reply, busy, 9);
     assert_int_equal(tcp_peer_memory(peer)->tab_registers[30], tcp_peer_word(30));
 }
@@ -309,11 +310,11 @@ static void garbage_comes_before_the_reply_and_is_no_header(void **state)
 
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_GARBAGE, 7);
-    ask(0x100);
-    take_all(got, 7);
+    send_request(0x100);
+    receive_all(got, 7);
     for (i = 0; i < 7; i++)
         assert_int_equal(got[i], 0xA5);
-    take_all(got + 7, REPLY - 2);
+    receive_all(got + 7, REPLY - 2);
     for (i = 0; i < 7; i++) {
         unsigned protocol = (unsigned)got[i + 2] << 8 | got[i + 3];
         unsigned length = (unsigned)got[i + 4] << 8 | got[i + 5];
@@ -328,60 +329,60 @@ static void half_a_reply_is_followed_by_the_end_of_the_stream(void **state)
 
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_HALF, 4);
-    ask(1);
-    ask(2);
-    take_all(got, 4);
-    assert_int_equal(take(got, sizeof got, PATIENCE_MS), 0);
+    send_request(1);
+    send_request(2);
+    receive_all(got, 4);
+    assert_int_equal(receive(got, sizeof got, PATIENCE_MS), 0);
     assert_int_equal(tcp_peer_count(peer).replies, 0);
 }
 
-static void close_ends_the_stream_and_reset_breaks_it(void **state)
+static void close_ends_the_stream_and_reset_resets_it(void **state)
 {
     uint8_t byte;
 
     (void)state;
     tcp_peer_fault(peer, 1, FAULT_CLOSE, 0);
     tcp_peer_fault(peer, 2, FAULT_RESET, 0);
-    ask(1);
-    assert_int_equal(take(&byte, 1, PATIENCE_MS), 0);
+    send_request(1);
+    assert_int_equal(receive(&byte, 1, PATIENCE_MS), 0);
     close(s);
     s = tcp_connect(port);
-    ask(2);
-    assert_int_equal(take(&byte, 1, PATIENCE_MS), -1);
+    send_request(2);
+    assert_int_equal(receive(&byte, 1, PATIENCE_MS), -1);
     assert_int_equal(errno, ECONNRESET);
     close(s);
     s = tcp_connect(port);
-    ask(3);
+    send_request(3);
     expect(3);
     assert_int_equal(tcp_peer_count(peer).connections, 3);
 }
 
-static void what_is_no_request_ends_the_connection(void **state)
+static void bytes_that_are_no_request_end_the_connection(void **state)
 {
     const uint8_t nonsense[8] = {0, 1, 0, 1, 0, 6, 7, 3};
     uint8_t byte;
 
     (void)state;
     assert_int_equal(send(s, nonsense, sizeof nonsense, 0), sizeof nonsense);
-    assert_true(take(&byte, 1, PATIENCE_MS) <= 0);
+    assert_true(receive(&byte, 1, PATIENCE_MS) <= 0);
     assert_int_equal(tcp_peer_count(peer).malformed, 1);
 }
 
-static void a_connection_too_many_is_refused(void **state)
+static void a_connection_beyond_the_limit_is_refused(void **state)
 {
     int others[TCP_PEER_CONNECTIONS], first = s;
     uint8_t byte;
     unsigned i;
 
     (void)state;
-    ask(1);
+    send_request(1);
     expect(1);
     for (i = 0; i < TCP_PEER_CONNECTIONS; i++)
         others[i] = tcp_connect(port);
     s = others[TCP_PEER_CONNECTIONS - 1];
-    assert_true(take(&byte, 1, PATIENCE_MS) <= 0);
+    assert_true(receive(&byte, 1, PATIENCE_MS) <= 0);
     s = others[TCP_PEER_CONNECTIONS - 2];
-    ask(2);
+    send_request(2);
     expect(2);
     assert_int_equal(tcp_peer_count(peer).refused, 1);
     for (i = 0; i < TCP_PEER_CONNECTIONS; i++)
@@ -394,19 +395,19 @@ static void hang_up_and_a_restart_at_the_same_port(void **state)
     uint8_t byte;
 
     (void)state;
-    ask(1);
+    send_request(1);
     expect(1);
     tcp_peer_hang_up(peer);
-    assert_int_equal(take(&byte, 1, PATIENCE_MS), 0);
+    assert_int_equal(receive(&byte, 1, PATIENCE_MS), 0);
     tcp_peer_halt(peer);
     close(s);
     assert_int_equal(tcp_peer_start(peer, port), port);
     s = tcp_connect(port);
-    ask(2);
+    send_request(2);
     expect(2);
 }
 
-/* Counts of one run of chaos. */
+/* Returns the counts of one run with random faults. */
 static tcp_peer_counts run_chaos(uint32_t seed)
 {
     static const tcp_fault kinds[] = {FAULT_DROP, FAULT_TWICE, FAULT_OTHER_ID, FAULT_GARBAGE};
@@ -416,16 +417,16 @@ static tcp_peer_counts run_chaos(uint32_t seed)
 
     tcp_peer_chaos(peer, seed, 40, kinds, COUNT(kinds), 0);
     for (i = 0; i < 200; i++)
-        ask(i);
+        send_request(i);
     do
         usleep(1000);
     while ((counts = tcp_peer_count(peer)).requests < 200);
-    while (take(got, sizeof got, SHORT_MS) > 0)
+    while (receive(got, sizeof got, SHORT_MS) > 0)
         ;
     return counts;
 }
 
-static void chaos_of_one_seed_repeats_itself(void **state)
+static void random_faults_of_one_seed_repeat(void **state)
 {
     tcp_peer_counts first = run_chaos(7), again, other;
 
@@ -449,21 +450,21 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(the_right_reply_comes_from_the_memory),
         TEST(requests_in_one_send_and_in_pieces_are_found),
-        TEST(a_delay_holds_up_one_reply_only),
-        TEST(hold_turns_the_order_of_replies),
+        TEST(a_delay_delays_one_reply_only),
+        TEST(hold_changes_the_order_of_replies),
         TEST(join_puts_replies_into_one_send),
-        TEST(drop_carries_out_and_does_not_answer),
+        TEST(drop_carries_out_the_request_and_does_not_answer),
         TEST(twice_sends_the_reply_twice),
         TEST(split_sends_single_bytes),
         TEST(a_wrong_field_is_wrong_and_the_rest_is_right),
         TEST(an_exception_leaves_the_memory_alone),
         TEST(garbage_comes_before_the_reply_and_is_no_header),
         TEST(half_a_reply_is_followed_by_the_end_of_the_stream),
-        TEST(close_ends_the_stream_and_reset_breaks_it),
-        TEST(what_is_no_request_ends_the_connection),
-        TEST(a_connection_too_many_is_refused),
+        TEST(close_ends_the_stream_and_reset_resets_it),
+        TEST(bytes_that_are_no_request_end_the_connection),
+        TEST(a_connection_beyond_the_limit_is_refused),
         TEST(hang_up_and_a_restart_at_the_same_port),
-        TEST(chaos_of_one_seed_repeats_itself),
+        TEST(random_faults_of_one_seed_repeat),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

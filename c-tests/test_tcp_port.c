@@ -1,5 +1,5 @@
-/* The port over TCP sockets: as a client of a peer that plays faults, as a
- * server, and what it does while there is no connection. */
+/* The port over TCP sockets: as a client of a peer that plays faults, as a server, and what
+ * it does while there is no connection. */
 #define _GNU_SOURCE
 #include "await.h"
 #include "clock.h"
@@ -51,8 +51,8 @@ static int end(void **state)
     return 0;
 }
 
-/* Takes bytes until so many are there or the link is lost. */
-static int16_t take(uint8_t *bytes, uint16_t length)
+/* Reads until `length` bytes have arrived or the link is lost. */
+static int16_t read_all(uint8_t *bytes, uint16_t length)
 {
     uint16_t have = 0;
 
@@ -74,8 +74,9 @@ static void await_connection(void)
         assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, PATIENCE), 1);
 }
 
-/* Asks for register 5; what taking the reply of 11 bytes says. */
-static int16_t ask(void)
+/* Reads register 5. Returns the length of the reply, 11 bytes, or the negative result of
+ * read or write. */
+static int16_t read_register(void)
 {
     const uint8_t read_one[12] = {0, 1, 0, 0, 0, 6, 7, 3, 0, 5, 0, 1};
     uint8_t reply[11] = {0};
@@ -86,7 +87,7 @@ static int16_t ask(void)
     if (count < 0)
         return count;
     assert_int_equal(count, sizeof read_one);
-    count = take(reply, sizeof reply);
+    count = read_all(reply, sizeof reply);
     if (count > 0)
         assert_int_equal(reply[9] << 8 | reply[10], tcp_peer_word(5));
     return count;
@@ -99,8 +100,8 @@ static void a_client_asks_and_reads_the_reply(void **state)
 
     (void)state;
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
-    assert_int_equal(ask(), 11);
-    assert_int_equal(ask(), 11);
+    assert_int_equal(read_register(), 11);
+    assert_int_equal(read_register(), 11);
     assert_int_equal(tcp.error, 0);
     begun = seconds();
     before = port.micros(port.context);
@@ -133,8 +134,8 @@ static void a_socket_sends_at_once_and_finds_a_dead_peer(void **state)
     assert_true(fcntl(tcp.fd, F_GETFD) & FD_CLOEXEC);
 }
 
-/* A listener whose queue is full answers no connection until it takes one. */
-static void until_connected_nothing_is_read_and_nothing_taken(void **state)
+/* A listener whose queue is full completes no connection until it accepts one. */
+static void until_connected_nothing_is_read_or_written(void **state)
 {
     struct sockaddr_in address = {0};
     socklen_t size = sizeof address;
@@ -183,14 +184,14 @@ static void a_refused_connection_is_a_lost_link(void **state)
     assert_int_equal(mbm_tcp_isConnected(&tcp), -1);
 }
 
-static void of_several_addresses_the_one_that_answers_is_taken(void **state)
+static void of_several_addresses_the_one_that_answers_is_used(void **state)
 {
     (void)state;
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, NULL, service), 0);
-    assert_int_equal(ask(), 11);
+    assert_int_equal(read_register(), 11);
 }
 
-static void what_cannot_be_opened_says_why(void **state)
+static void a_failed_open_sets_errno(void **state)
 {
     (void)state;
     assert_fails(EADDRNOTAVAIL, mbm_tcp_open(&tcp, &addresses, "127.0.0.1", "no-such-service"));
@@ -203,7 +204,7 @@ static void what_cannot_be_opened_says_why(void **state)
     assert_fails(EBUSY, mbm_tcp_attach(&tcp, 0));
 }
 
-static void a_peer_that_ends_the_stream_is_told_from_one_that_resets_it(void **state)
+static void the_end_of_a_stream_and_a_reset_have_different_errors(void **state)
 {
     uint8_t byte;
 
@@ -211,22 +212,22 @@ static void a_peer_that_ends_the_stream_is_told_from_one_that_resets_it(void **s
     tcp_peer_fault(peer, 1, FAULT_CLOSE, 0);
     tcp_peer_fault(peer, 2, FAULT_RESET, 0);
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
-    assert_int_equal(ask(), -1);
+    assert_int_equal(read_register(), -1);
     assert_int_equal(tcp.error, EPIPE);
     assert_int_equal(port.read(port.context, &byte, 1), -1);
     assert_int_equal(mbm_tcp_isConnected(&tcp), -1);
     assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
 
     assert_in_set(mbm_tcp_connect(&tcp), ((const unsigned long[]){MBM_OK, MBM_PENDING}), 2);
-    assert_int_equal(ask(), -1);
+    assert_int_equal(read_register(), -1);
     assert_int_equal(tcp.error, ECONNRESET);
 
     assert_in_set(mbm_tcp_connect(&tcp), ((const unsigned long[]){MBM_OK, MBM_PENDING}), 2);
-    assert_int_equal(ask(), 11);
+    assert_int_equal(read_register(), 11);
     assert_int_equal(tcp.error, 0);
 }
 
-static void what_came_before_the_end_is_still_read(void **state)
+static void bytes_before_the_end_of_the_stream_are_still_read(void **state)
 {
     uint8_t bytes[4];
 
@@ -236,8 +237,8 @@ static void what_came_before_the_end_is_still_read(void **state)
     await_connection();
     assert_int_equal(
         port.write(port.context, (const uint8_t[12]){0, 1, 0, 0, 0, 6, 7, 3, 0, 5, 0, 1}, 12), 12);
-    assert_int_equal(take(bytes, 4), 4);
-    assert_int_equal(take(bytes, 1), -1);
+    assert_int_equal(read_all(bytes, 4), 4);
+    assert_int_equal(read_all(bytes, 1), -1);
 }
 
 static void a_disconnected_link_is_lost_until_it_is_connected(void **state)
@@ -247,15 +248,15 @@ static void a_disconnected_link_is_lost_until_it_is_connected(void **state)
     (void)state;
     mbm_tcp_disconnect(&tcp);
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
-    assert_int_equal(ask(), 11);
+    assert_int_equal(read_register(), 11);
     mbm_tcp_disconnect(&tcp);
     assert_int_equal(port.write(port.context, &byte, 1), -1);
     mbm_tcp_connect(&tcp);
-    assert_int_equal(ask(), 11);
+    assert_int_equal(read_register(), 11);
     assert_int_equal(tcp_peer_count(peer).connections, 2);
 }
 
-static void a_full_socket_takes_no_more_and_wait_tells_of_room(void **state)
+static void a_full_socket_accepts_no_bytes_until_wait_says_so(void **state)
 {
     static uint8_t much[60000];
     int pair[2], rounds = 0;
@@ -312,7 +313,7 @@ static void wait_ends_with_the_time_or_with_any_of_its_sockets(void **state)
     mbm_tcp_closeListener(&listener);
 }
 
-/* How many connections nobody has accepted yet. */
+/* Returns how many connections wait to be accepted. */
 static unsigned waiting(const mbm_tcp_listener *listener)
 {
     struct tcp_info info = {0};
@@ -322,7 +323,7 @@ static unsigned waiting(const mbm_tcp_listener *listener)
     return info.tcpi_unacked;
 }
 
-static void a_connection_without_a_place_is_ended_politely(void **state)
+static void a_connection_without_a_place_is_ended_without_a_reset(void **state)
 {
     mbm_tcp_listener listener = {0};
     mbm_tcp places[2] = {0};
@@ -345,7 +346,7 @@ static void a_connection_without_a_place_is_ended_politely(void **state)
     assert_int_equal(read(clients[2], &byte, 1), 0);
     assert_int_equal(read(clients[3], &byte, 1), 0);
 
-    /* One that is lost keeps its place, since an object still uses it. */
+    /* A lost connection keeps its place, since an object still uses it. */
     close(clients[0]);
     line = mbm_tcp_port(&places[0]);
     AWAIT(line.read(line.context, (uint8_t *)&byte, 1) == 1);
@@ -369,14 +370,14 @@ static void a_connection_without_a_place_is_ended_politely(void **state)
     assert_fails(EBADF, mbm_tcp_accept(&listener, places, 2));
 }
 
-static void a_port_in_use_cannot_be_listened_at(void **state)
+static void listening_at_a_port_in_use_fails(void **state)
 {
     mbm_tcp_listener first = {0}, second = {0};
     int listens = -1, tries;
     char number[8];
 
     (void)state;
-    /* Another program may get the port in between, now and then. */
+    /* Now and then another program may get the port between the two calls. */
     for (tries = 0; tries < 10 && listens < 0; tries++) {
         assert_int_equal(mbm_tcp_listen(&first, "127.0.0.1", "0"), 0);
         snprintf(number, sizeof number, "%u", first.port);
@@ -389,7 +390,7 @@ static void a_port_in_use_cannot_be_listened_at(void **state)
     mbm_tcp_closeListener(&second);
 }
 
-/* A device that talks RTU through a TCP stream, for one connection. */
+/* A device for one connection, with RTU frames in a TCP stream. */
 static void *device(void *argument)
 {
     mbm_tcp_listener *listener = (mbm_tcp_listener *)argument;
@@ -456,17 +457,17 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(a_client_asks_and_reads_the_reply),
         TEST(a_socket_sends_at_once_and_finds_a_dead_peer),
-        TEST(until_connected_nothing_is_read_and_nothing_taken),
+        TEST(until_connected_nothing_is_read_or_written),
         TEST(a_refused_connection_is_a_lost_link),
-        TEST(of_several_addresses_the_one_that_answers_is_taken),
-        TEST(what_cannot_be_opened_says_why),
-        TEST(a_peer_that_ends_the_stream_is_told_from_one_that_resets_it),
-        TEST(what_came_before_the_end_is_still_read),
+        TEST(of_several_addresses_the_one_that_answers_is_used),
+        TEST(a_failed_open_sets_errno),
+        TEST(the_end_of_a_stream_and_a_reset_have_different_errors),
+        TEST(bytes_before_the_end_of_the_stream_are_still_read),
         TEST(a_disconnected_link_is_lost_until_it_is_connected),
-        TEST(a_full_socket_takes_no_more_and_wait_tells_of_room),
+        TEST(a_full_socket_accepts_no_bytes_until_wait_says_so),
         TEST(wait_ends_with_the_time_or_with_any_of_its_sockets),
-        TEST(a_connection_without_a_place_is_ended_politely),
-        TEST(a_port_in_use_cannot_be_listened_at),
+        TEST(a_connection_without_a_place_is_ended_without_a_reset),
+        TEST(listening_at_a_port_in_use_fails),
         TEST(a_master_reads_rtu_through_a_stream),
     };
 

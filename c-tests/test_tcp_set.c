@@ -1,4 +1,4 @@
-/* A set of sockets: one wait for any number of them, which says who is ready. */
+/* A set of sockets: one wait for any number of them, which says which of them are ready. */
 #define _GNU_SOURCE
 #include "await.h"
 #include "descriptors.h"
@@ -26,11 +26,11 @@ static mbm_tcp tcps[MANY];
 static int peers[MANY];
 static unsigned peer_count;
 static struct rlimit found;
-static time_t ahead;            /* seconds that the clock of the port is fast */
-static struct timespec stopped; /* where it stands, or 0: it goes on */
-static long look_ms;            /* that a look at a clock which stands takes */
+static time_t ahead;            /* seconds by which the clock of the port is fast */
+static struct timespec stopped; /* the time at which it stands still, or 0: it runs */
+static long look_ms;            /* milliseconds that each read of a clock that stands still takes */
 
-/* The program's own comes before that of libc. */
+/* This function replaces that of libc. */
 int clock_gettime(clockid_t id, struct timespec *time)
 {
     const int result = (int)syscall(SYS_clock_gettime, id, time);
@@ -83,7 +83,7 @@ static int end(void **state)
     return 0;
 }
 
-/* Puts so many sockets into the set, each connected with a peer. */
+/* Puts `count` sockets into the set, each connected with a peer. */
 static void fill(unsigned count)
 {
     int pair[2];
@@ -96,12 +96,12 @@ static void fill(unsigned count)
     }
 }
 
-static void tell(unsigned place, const char *text)
+static void peer_sends(unsigned place, const char *text)
 {
     assert_int_equal(write(peers[place], text, strlen(text)), strlen(text));
 }
 
-static int16_t take(unsigned place, uint16_t most)
+static int16_t read_some(unsigned place, uint16_t most)
 {
     const mbm_port port = mbm_tcp_port(&tcps[place]);
     uint8_t bytes[16];
@@ -111,10 +111,10 @@ static int16_t take(unsigned place, uint16_t most)
 
 static int is_lost(unsigned place)
 {
-    return take(place, 1) < 0;
+    return read_some(place, 1) < 0;
 }
 
-/* The wait tells of this one and of no other. */
+/* Expects that the wait reports this socket and no other. */
 static void expect_ready(const mbm_tcp *tcp)
 {
     assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 1);
@@ -143,58 +143,58 @@ static void the_wait_says_which_of_many_sockets_are_ready(void **state)
     (void)state;
     fill(MANY);
     expect_silence();
-    tell(7, "x");
+    peer_sends(7, "x");
     expect_ready(&tcps[7]);
-    assert_int_equal(take(7, 16), 1);
+    assert_int_equal(read_some(7, 16), 1);
     expect_silence();
-    /* More than one wait tells of. */
+    /* More sockets than one wait reports. */
     for (i = 0; i < MANY; i += 2)
-        tell(i, "x");
+        peer_sends(i, "x");
     while (count < MANY / 2) {
         assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 1);
         while ((tcp = mbm_tcp_nextReady(&set))) {
             i = (unsigned)(tcp - tcps);
             assert_int_equal(i % 2, 0);
             assert_int_equal(seen[i]++, 0);
-            assert_int_equal(take(i, 16), 1);
+            assert_int_equal(read_some(i, 16), 1);
             count++;
         }
     }
     expect_silence();
 }
 
-static void one_that_was_not_looked_at_is_not_forgotten(void **state)
+static void a_ready_socket_that_was_not_taken_is_reported_again(void **state)
 {
     (void)state;
     fill(2);
-    tell(0, "x");
+    peer_sends(0, "x");
     assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 1);
-    tell(1, "y");
+    peer_sends(1, "y");
     assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 1);
     assert_ptr_equal(mbm_tcp_nextReady(&set), &tcps[0]);
     assert_ptr_equal(mbm_tcp_nextReady(&set), &tcps[1]);
     assert_null(mbm_tcp_nextReady(&set));
 }
 
-static void bytes_that_nobody_reads_do_not_end_the_wait_again(void **state)
+static void bytes_that_are_not_read_do_not_end_the_wait_again(void **state)
 {
     (void)state;
     fill(2);
-    tell(0, "abcd");
+    peer_sends(0, "abcd");
     expect_ready(&tcps[0]);
     expect_silence();
-    tell(0, "e");
+    peer_sends(0, "e");
     expect_silence();
-    /* The others are told of as before. */
-    tell(1, "x");
+    /* Other sockets are reported as before. */
+    peer_sends(1, "x");
     expect_ready(&tcps[1]);
-    assert_int_equal(take(1, 16), 1);
-    /* Once the port was used, what is left is told of. */
-    assert_int_equal(take(0, 2), 2);
+    assert_int_equal(read_some(1, 16), 1);
+    /* Once the program has used the port, the remaining bytes are reported. */
+    assert_int_equal(read_some(0, 2), 2);
     expect_ready(&tcps[0]);
-    assert_int_equal(take(0, 16), 3);
+    assert_int_equal(read_some(0, 16), 3);
     expect_silence();
-    /* Nor does the end of the stream end it again. */
+    /* Nor does the end of the stream end the wait again. */
     close(peers[0]);
     peers[0] = peers[--peer_count];
     expect_ready(&tcps[0]);
@@ -203,7 +203,7 @@ static void bytes_that_nobody_reads_do_not_end_the_wait_again(void **state)
     expect_silence();
 }
 
-static void a_full_socket_is_ready_once_there_is_room(void **state)
+static void a_full_socket_is_ready_once_it_accepts_bytes_again(void **state)
 {
     static uint8_t much[60000];
     mbm_port port;
@@ -211,7 +211,7 @@ static void a_full_socket_is_ready_once_there_is_room(void **state)
     (void)state;
     fill(1);
     port = mbm_tcp_port(&tcps[0]);
-    tell(0, "x");
+    peer_sends(0, "x");
     expect_ready(&tcps[0]);
     while (port.write(port.context, much, sizeof much) > 0)
         ;
@@ -219,14 +219,15 @@ static void a_full_socket_is_ready_once_there_is_room(void **state)
     while (read(peers[0], much, sizeof much) > 0)
         ;
     expect_ready(&tcps[0]);
-    /* Who has written all waits for bytes again, and these are still there. */
+    /* After a complete write the socket is waited on for bytes again, and the byte from
+     * before is still there. */
     assert_int_equal(port.write(port.context, much, 10), 10);
     expect_ready(&tcps[0]);
-    assert_int_equal(take(0, 16), 1);
+    assert_int_equal(read_some(0, 16), 1);
     expect_silence();
 }
 
-static void a_socket_that_is_closed_is_told_of_no_more(void **state)
+static void a_closed_socket_is_not_reported(void **state)
 {
     unsigned i;
     int other;
@@ -234,24 +235,24 @@ static void a_socket_that_is_closed_is_told_of_no_more(void **state)
     (void)state;
     fill(4);
     for (i = 0; i < 4; i++)
-        tell(i, "x");
+        peer_sends(i, "x");
     assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 1);
     mbm_tcp_close(&tcps[1]);
     mbm_tcp_close(&tcps[3]);
     assert_ptr_equal(mbm_tcp_nextReady(&set), &tcps[0]);
     mbm_tcp_close(&tcps[2]);
     assert_null(mbm_tcp_nextReady(&set));
-    assert_int_equal(take(0, 16), 1);
+    assert_int_equal(read_some(0, 16), 1);
     expect_silence();
-    /* Also while another descriptor keeps its socket open, as in a child process. */
+    /* The same while another descriptor keeps the socket open, as in a child process. */
     other = dup(tcps[0].fd);
     mbm_tcp_close(&tcps[0]);
-    tell(0, "x");
+    peer_sends(0, "x");
     expect_silence();
     close(other);
 }
 
-static void a_connection_is_told_of_when_it_is_made_and_made_anew(void **state)
+static void a_connection_is_reported_when_it_is_made_and_made_anew(void **state)
 {
     tcp_peer *peer = tcp_peer_new();
     mbm_tcp_addresses addresses;
@@ -271,7 +272,7 @@ static void a_connection_is_told_of_when_it_is_made_and_made_anew(void **state)
         assert_int_equal(mbm_tcp_isConnected(&tcps[0]), 1);
         assert_int_equal(port.write(port.context, read_one, 12), 12);
         expect_ready(&tcps[0]);
-        assert_int_equal(take(0, 16), 11);
+        assert_int_equal(read_some(0, 16), 11);
         mbm_tcp_disconnect(&tcps[0]);
         expect_silence();
         assert_in_set(mbm_tcp_connect(&tcps[0]), ((const unsigned long[]){MBM_OK, MBM_PENDING}), 2);
@@ -280,7 +281,7 @@ static void a_connection_is_told_of_when_it_is_made_and_made_anew(void **state)
     tcp_peer_stop(peer);
 }
 
-static void what_cannot_be_put_into_a_set_says_why(void **state)
+static void a_failed_add_to_a_set_sets_errno(void **state)
 {
     mbm_tcp_set closed = {0};
 
@@ -305,7 +306,7 @@ static void begin_to_listen(void)
     assert_int_equal(mbm_tcp_addListener(&set, &listener), 0);
 }
 
-/* How many connections wait to be accepted. */
+/* Returns how many connections wait to be accepted. */
 static unsigned waiting(void)
 {
     struct tcp_info info = {0};
@@ -347,7 +348,7 @@ static void take_all_places(void)
     assert_fails(EAGAIN, accept_one());
 }
 
-static void a_connection_that_is_taken_is_in_the_set_of_its_listener(void **state)
+static void an_accepted_connection_is_in_the_set_of_its_listener(void **state)
 {
     (void)state;
     begin_to_listen();
@@ -356,12 +357,12 @@ static void a_connection_that_is_taken_is_in_the_set_of_its_listener(void **stat
     wait_for_connection();
     assert_int_equal(accept_one(), 0);
     assert_fails(EAGAIN, accept_one());
-    tell(0, "x");
+    peer_sends(0, "x");
     expect_ready(&tcps[0]);
-    assert_int_equal(take(0, 16), 1);
+    assert_int_equal(read_some(0, 16), 1);
     expect_silence();
     mbm_tcp_closeListener(&listener);
-    tell(0, "x");
+    peer_sends(0, "x");
     expect_ready(&tcps[0]);
 }
 
@@ -384,14 +385,14 @@ static void a_connection_that_is_closed_as_idle_is_ready(void **state)
     listener.idleTimeMs = MINUTE_MS;
     take_all_places();
     ahead = 61;
-    tell(0, "x");
+    peer_sends(0, "x");
     expect_ready(&tcps[0]);
-    assert_int_equal(take(0, 16), 1);
+    assert_int_equal(read_some(0, 16), 1);
     connect_some(1);
     wait_for_connection();
     assert_fails(EAGAIN, accept_one());
     assert_int_equal(listener.idle, 1);
-    /* Its program frees the place, and takes the new one. */
+    /* The program of the idle connection frees the place, and the new connection takes it. */
     assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 1);
     assert_ptr_equal(mbm_tcp_nextReady(&set), &tcps[1]);
     assert_null(mbm_tcp_nextReady(&set));
@@ -404,8 +405,8 @@ static void a_connection_that_is_closed_as_idle_is_ready(void **state)
     assert_int_equal(listener.refused, 0);
 }
 
-/* On a slow machine the clock goes on while the connections are looked at. */
-static void of_connections_that_are_idle_as_long_the_first_is_closed(void **state)
+/* On a slow machine time passes while accept looks at the connections. */
+static void of_connections_with_equal_idle_times_the_first_is_closed(void **state)
 {
     (void)state;
     begin_to_listen();
@@ -422,7 +423,7 @@ static void of_connections_that_are_idle_as_long_the_first_is_closed(void **stat
     assert_int_equal(is_lost(1), 0);
 }
 
-/* The next descriptor would be one too many. */
+/* Lowers the limit so that the next descriptor would exceed it. */
 static void leave_no_descriptor(void)
 {
     const int next = dup(0);
@@ -446,15 +447,16 @@ static void without_a_descriptor_the_set_sleeps_and_tries_again(void **state)
     assert_fails(EMFILE, accept_one());
     expect_silence();
     assert_fails(EAGAIN, accept_one());
-    /* The time to the next try is over; those that it has are served meanwhile. */
+    /* The wait ends when it is time to try again. The connections are served meanwhile. */
     assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 0);
     while (accept_one() < 0 && errno == EAGAIN)
         assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 0);
     assert_int_equal(errno, EMFILE);
-    tell(0, "x");
+    peer_sends(0, "x");
     expect_ready(&tcps[0]);
     assert_int_equal(listener.refused, 0);
-    /* A place that is closed makes room, and is taken without waiting for that time. */
+    /* A closed place frees a descriptor, and the waiting connection takes it without
+     * waiting for that time. */
     ahead = -3600;
     mbm_tcp_close(&tcps[0]);
     assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 0);
@@ -473,16 +475,16 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(a_connection_takes_little_memory),
         TEST(the_wait_says_which_of_many_sockets_are_ready),
-        TEST(one_that_was_not_looked_at_is_not_forgotten),
-        TEST(bytes_that_nobody_reads_do_not_end_the_wait_again),
-        TEST(a_full_socket_is_ready_once_there_is_room),
-        TEST(a_socket_that_is_closed_is_told_of_no_more),
-        TEST(a_connection_is_told_of_when_it_is_made_and_made_anew),
-        TEST(what_cannot_be_put_into_a_set_says_why),
-        TEST(a_connection_that_is_taken_is_in_the_set_of_its_listener),
+        TEST(a_ready_socket_that_was_not_taken_is_reported_again),
+        TEST(bytes_that_are_not_read_do_not_end_the_wait_again),
+        TEST(a_full_socket_is_ready_once_it_accepts_bytes_again),
+        TEST(a_closed_socket_is_not_reported),
+        TEST(a_connection_is_reported_when_it_is_made_and_made_anew),
+        TEST(a_failed_add_to_a_set_sets_errno),
+        TEST(an_accepted_connection_is_in_the_set_of_its_listener),
         TEST(accept_looks_only_once_the_set_knows_of_a_connection),
         TEST(a_connection_that_is_closed_as_idle_is_ready),
-        TEST(of_connections_that_are_idle_as_long_the_first_is_closed),
+        TEST(of_connections_with_equal_idle_times_the_first_is_closed),
         TEST(without_a_descriptor_the_set_sleeps_and_tries_again),
     };
 

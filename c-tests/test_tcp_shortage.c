@@ -1,5 +1,5 @@
-/* Connections where places or descriptors are short: those that are served stay served,
- * the program sleeps, and connections are taken again when there is room. */
+/* Connections without enough places or descriptors: those that are served stay served, the
+ * program sleeps, and waiting connections are accepted when there is a free place again. */
 #define _GNU_SOURCE
 #include "await.h"
 #include "descriptors.h"
@@ -24,9 +24,9 @@ static mbm_tcp places[PLACES];
 static int clients[FLOOD + PLACES];
 static unsigned client_count;
 static struct rlimit found;
-static time_t ahead; /* seconds that the clock of the port is fast */
+static time_t ahead; /* seconds by which the clock of the port is fast */
 
-/* The program's own comes before that of libc. */
+/* This function replaces that of libc. */
 int clock_gettime(clockid_t id, struct timespec *time)
 {
     const int result = (int)syscall(SYS_clock_gettime, id, time);
@@ -43,7 +43,7 @@ static void limit_descriptors(rlim_t most)
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &limit), 0);
 }
 
-/* The next descriptor would be one too many. */
+/* Lowers the limit so that the next descriptor would exceed it. */
 static void leave_no_descriptor(void)
 {
     const int next = dup(0);
@@ -81,7 +81,7 @@ static int end(void **state)
     return 0;
 }
 
-/* How many connections wait to be accepted. */
+/* Returns how many connections wait to be accepted. */
 static unsigned waiting(void)
 {
     struct tcp_info info = {0};
@@ -101,14 +101,14 @@ static void connect_some(unsigned count)
     AWAIT(waiting() == before + count);
 }
 
-static int take(void)
+static int accept_one(void)
 {
     return mbm_tcp_accept(&listener, places, PLACES);
 }
 
 static void expect_none(int error)
 {
-    assert_int_equal(take(), -1);
+    assert_int_equal(accept_one(), -1);
     assert_int_equal(errno, error);
 }
 
@@ -118,11 +118,11 @@ static void fill(void)
 
     connect_some(PLACES);
     for (i = 0; i < PLACES; i++)
-        assert_int_equal(take(), i);
+        assert_int_equal(accept_one(), i);
 }
 
-/* The peer of a place sends a byte, which the program reads. */
-static void ask(unsigned place)
+/* The peer of a place sends a byte, and the program reads it. */
+static void exchange_byte(unsigned place)
 {
     const mbm_port port = mbm_tcp_port(&places[place]);
     uint8_t byte;
@@ -174,12 +174,13 @@ static void a_listener_without_a_descriptor_lets_the_program_sleep(void **state)
     (void)state;
     SKIP_WITHOUT_LIMITS();
     connect_some(1);
-    assert_int_equal(take(), 0);
+    assert_int_equal(accept_one(), 0);
     connect_some(2);
     leave_no_descriptor();
     expect_none(EMFILE);
     assert_int_equal(wait_for(1000), 0);
-    /* It tries again by itself, and still serves those that it has. */
+    /* The listener tries again by itself. The program still serves the connections that it
+     * has. */
     assert_int_equal(wait_for(MBM_TCP_FOREVER), 0);
     expect_none(EMFILE);
     assert_int_equal(write(clients[0], "x", 1), 1);
@@ -187,25 +188,25 @@ static void a_listener_without_a_descriptor_lets_the_program_sleep(void **state)
     assert_int_equal(listener.refused, 0);
 }
 
-static void a_connection_that_waited_is_taken_once_a_descriptor_is_free(void **state)
+static void a_waiting_connection_is_accepted_once_a_descriptor_is_free(void **state)
 {
     (void)state;
     SKIP_WITHOUT_LIMITS();
     connect_some(1);
-    assert_int_equal(take(), 0);
+    assert_int_equal(accept_one(), 0);
     connect_some(2);
     leave_no_descriptor();
     expect_none(EMFILE);
     mbm_tcp_close(&places[0]);
-    assert_int_equal(take(), 0);
+    assert_int_equal(accept_one(), 0);
     expect_none(EMFILE);
     limit_descriptors(found.rlim_cur);
-    assert_int_equal(take(), 1);
+    assert_int_equal(accept_one(), 1);
     expect_none(EAGAIN);
     /* The listener ends the wait as before. */
     connect_some(1);
     assert_int_equal(wait_for(MBM_TCP_FOREVER), 1);
-    assert_int_equal(take(), 2);
+    assert_int_equal(accept_one(), 2);
 }
 
 static void an_idle_connection_gives_its_descriptor_to_a_new_one(void **state)
@@ -214,14 +215,14 @@ static void an_idle_connection_gives_its_descriptor_to_a_new_one(void **state)
     SKIP_WITHOUT_LIMITS();
     listener.idleTimeMs = MINUTE_MS;
     connect_some(2);
-    assert_int_equal(take(), 0);
-    assert_int_equal(take(), 1);
+    assert_int_equal(accept_one(), 0);
+    assert_int_equal(accept_one(), 1);
     connect_some(1);
     leave_no_descriptor();
     expect_none(EMFILE);
     ahead = 61;
-    ask(0);
-    assert_int_equal(take(), 2);
+    exchange_byte(0);
+    assert_int_equal(accept_one(), 2);
     assert_int_equal(is_lost(1), 1);
     assert_int_equal(is_lost(0), 0);
     assert_int_equal(listener.idle, 1);
@@ -233,7 +234,7 @@ static void without_a_descriptor_nothing_is_closed_while_no_connection_waits(voi
     SKIP_WITHOUT_LIMITS();
     listener.idleTimeMs = MINUTE_MS;
     connect_some(1);
-    assert_int_equal(take(), 0);
+    assert_int_equal(accept_one(), 0);
     leave_no_descriptor();
     ahead = 3600;
     expect_none(EAGAIN);
@@ -241,7 +242,7 @@ static void without_a_descriptor_nothing_is_closed_while_no_connection_waits(voi
     assert_int_equal(listener.idle, 0);
 }
 
-static void where_the_system_refuses_to_poll_the_wait_sleeps_and_looks(void **state)
+static void if_the_system_refuses_to_poll_the_wait_sleeps_and_reports(void **state)
 {
     (void)state;
     SKIP_WITHOUT_LIMITS();
@@ -249,9 +250,9 @@ static void where_the_system_refuses_to_poll_the_wait_sleeps_and_looks(void **st
     assert_int_equal(write(clients[0], "x", 1), 1);
     limit_descriptors(1);
     assert_int_equal(wait_for(MBM_TCP_FOREVER), 1);
-    ask(1);
+    exchange_byte(1);
     assert_int_equal(wait_for(0), 1);
-    ask(0);
+    exchange_byte(0);
 }
 
 static void the_oldest_idle_connection_gives_its_place_to_a_new_one(void **state)
@@ -260,12 +261,12 @@ static void the_oldest_idle_connection_gives_its_place_to_a_new_one(void **state
     listener.idleTimeMs = MINUTE_MS;
     fill();
     ahead = 30;
-    ask(1);
+    exchange_byte(1);
     ahead = 59;
-    ask(0);
+    exchange_byte(0);
     ahead = 91;
     connect_some(2);
-    /* Of places 1 and 2, which are idle, 2 has been so for longer. */
+    /* Places 1 and 2 are idle, place 2 for longer. */
     expect_none(EAGAIN);
     assert_int_equal(is_lost(0), 0);
     assert_int_equal(is_lost(1), 0);
@@ -273,17 +274,17 @@ static void the_oldest_idle_connection_gives_its_place_to_a_new_one(void **state
     assert_int_equal(places[2].error, ETIMEDOUT);
     mbm_tcp_close(&places[2]);
     assert_int_equal(wait_for(MBM_TCP_FOREVER), 1);
-    assert_int_equal(take(), 2);
+    assert_int_equal(accept_one(), 2);
     expect_none(EAGAIN);
     assert_int_equal(is_lost(1), 1);
     mbm_tcp_close(&places[1]);
-    assert_int_equal(take(), 1);
+    assert_int_equal(accept_one(), 1);
     expect_none(EAGAIN);
     assert_int_equal(listener.idle, 2);
     assert_int_equal(listener.refused, 0);
 }
 
-static void an_idle_connection_stays_while_no_other_wants_its_place(void **state)
+static void an_idle_connection_stays_while_no_other_needs_its_place(void **state)
 {
     unsigned i;
 
@@ -296,7 +297,7 @@ static void an_idle_connection_stays_while_no_other_wants_its_place(void **state
         assert_int_equal(is_lost(i), 0);
 }
 
-/* Its place is not the new one's; the client learns so at once. */
+/* Expects that a new connection gets no place and is closed at once. */
 static void expect_turned_away(uint32_t refused)
 {
     char byte;
@@ -318,19 +319,19 @@ static void connections_that_are_not_idle_keep_their_places(void **state)
     (void)state;
     fill();
     ahead = 3600;
-    /* Nothing was said of an idle time. */
+    /* No idle time is set. */
     expect_turned_away(1);
     listener.idleTimeMs = MINUTE_MS;
     for (i = 0; i < PLACES; i++) {
         places[i].isBusy = i != 0;
         if (i == 0)
-            ask(i);
+            exchange_byte(i);
     }
     expect_turned_away(2);
-    /* One that takes a place anew is not busy. */
+    /* A new connection in a place is not busy. */
     mbm_tcp_close(&places[2]);
     connect_some(1);
-    assert_int_equal(take(), 2);
+    assert_int_equal(accept_one(), 2);
     assert_int_equal(places[2].isBusy, 0);
 }
 
@@ -347,7 +348,7 @@ static void a_flood_of_connections_is_turned_away_in_parts(void **state)
     assert_int_equal(wait_for(1000), 0);
 }
 
-static void a_failed_lookup_leaves_its_reason(void **state)
+static void a_failed_lookup_keeps_its_reason(void **state)
 {
     mbm_tcp_listener other = {0};
     mbm_tcp_addresses addresses;
@@ -371,15 +372,15 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(a_place_is_in_use_until_it_is_closed),
         TEST(a_listener_without_a_descriptor_lets_the_program_sleep),
-        TEST(a_connection_that_waited_is_taken_once_a_descriptor_is_free),
+        TEST(a_waiting_connection_is_accepted_once_a_descriptor_is_free),
         TEST(an_idle_connection_gives_its_descriptor_to_a_new_one),
         TEST(without_a_descriptor_nothing_is_closed_while_no_connection_waits),
-        TEST(where_the_system_refuses_to_poll_the_wait_sleeps_and_looks),
+        TEST(if_the_system_refuses_to_poll_the_wait_sleeps_and_reports),
         TEST(the_oldest_idle_connection_gives_its_place_to_a_new_one),
-        TEST(an_idle_connection_stays_while_no_other_wants_its_place),
+        TEST(an_idle_connection_stays_while_no_other_needs_its_place),
         TEST(connections_that_are_not_idle_keep_their_places),
         TEST(a_flood_of_connections_is_turned_away_in_parts),
-        TEST(a_failed_lookup_leaves_its_reason),
+        TEST(a_failed_lookup_keeps_its_reason),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,4 +1,4 @@
-/* mbm_tcp_wait sleeps where nobody would do anything about what it could tell. */
+/* mbm_tcp_wait sleeps where the program would not react to what it could report. */
 #define _GNU_SOURCE
 #include "mbm_tcp.h"
 #include "tcp_peer.h"
@@ -36,7 +36,7 @@ static int end(void **state)
     return 0;
 }
 
-static void a_connection_that_comes_to_be_ends_the_wait_once(void **state)
+static void a_completed_connection_ends_the_wait_once(void **state)
 {
     (void)state;
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
@@ -44,8 +44,8 @@ static void a_connection_that_comes_to_be_ends_the_wait_once(void **state)
     assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
 }
 
-/* The peer floods and takes nothing: the program that cannot answer sleeps. */
-static void what_nobody_reads_does_not_end_the_wait_again(void **state)
+/* The peer sends, and does not read. The program cannot answer, so it sleeps. */
+static void unread_bytes_do_not_end_the_wait_again(void **state)
 {
     static uint8_t much[60000];
     uint8_t bytes[4];
@@ -57,7 +57,8 @@ static void what_nobody_reads_does_not_end_the_wait_again(void **state)
     assert_int_equal(write(pair[1], "abcd", 4), 4);
     assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
     assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, 1000), 0);
-    /* It does once somebody read, or had said all that was to be said before. */
+    /* They end it again once the program has read, or has written everything that it had to
+     * write. */
     assert_int_equal(port.read(port.context, bytes, 2), 2);
     assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
     while (port.write(port.context, much, sizeof much) > 0)
@@ -70,7 +71,7 @@ static void what_nobody_reads_does_not_end_the_wait_again(void **state)
     assert_int_equal(port.write(port.context, much, 10), 10);
     assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
     assert_int_equal(port.read(port.context, bytes, 4), 2);
-    /* Nor does the end of the stream, once it was told. */
+    /* Nor does the end of the stream, once it was reported. */
     assert_int_equal(read(pair[1], much, sizeof much), 10);
     close(pair[1]);
     assert_int_equal(mbm_tcp_wait(&tcp, 1, NULL, -1, MBM_TCP_FOREVER), 1);
@@ -84,8 +85,8 @@ static void what_nobody_reads_does_not_end_the_wait_again(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(a_connection_that_comes_to_be_ends_the_wait_once),
-        TEST(what_nobody_reads_does_not_end_the_wait_again),
+        TEST(a_completed_connection_ends_the_wait_once),
+        TEST(unread_bytes_do_not_end_the_wait_again),
     };
 
     return cmocka_run_group_tests_name("waiting for TCP", tests, NULL, NULL);

@@ -1,5 +1,5 @@
-/* The port over a terminal. A pty shows what the system does with it; what a
- * pty has not, a driver that knows RS-485, is played by the test's own ioctl. */
+/* The port over a terminal. A pty shows the settings that the system makes. A pty has no
+ * RS-485 driver: the test's own ioctl plays one. */
 #define _GNU_SOURCE
 #include "mbm_tty.h"
 #include "pty.h"
@@ -17,18 +17,19 @@
 static pty line;
 static const mbm_tty_options PLAIN = {.baud = 19200, .parity = 'E', .stop = 1};
 
-/* The driver that is played: whether it is there, the longest delay it can. */
+/* The driver that the test plays: whether it exists, and its longest delay. */
 static struct {
     int there;
     uint32_t longest;
     struct serial_rs485 state;
-    uint32_t nearest; /* what it makes of any rate that has no constant; 0 for that itself */
+    uint32_t nearest; /* the rate that it sets instead of any rate without a constant; 0: the rate
+                         itself */
 } driver;
 
-/* TCGETS2, which <termios.h> does not have. */
+/* TCGETS2, which <termios.h> does not define. */
 #define GET_WITH_RATE _IOR('T', 0x2A, uint32_t[11])
 
-/* The program's own comes before that of libc. */
+/* This function replaces that of libc. */
 int ioctl(int fd, unsigned long request, ...)
 {
     va_list arguments;
@@ -120,13 +121,13 @@ static void every_rate_of_termios_can_be_set(void **state)
 
 static uint32_t rate_of(int fd)
 {
-    uint32_t settings[11]; /* the kernel's termios2: the rates are its last two words */
+    uint32_t settings[11]; /* the kernel's termios2: the last two words are the rates */
 
     assert_int_equal(ioctl(fd, GET_WITH_RATE, settings), 0);
     return settings[10];
 }
 
-static void any_rate_is_set_where_it_is_asked_for(void **state)
+static void any_rate_is_set_if_the_options_allow_it(void **state)
 {
     static const uint32_t rates[] = {76800, 100000, 250000, 19201, 3250000, 9600};
     struct termios before = settings_of(line.theirs), after;
@@ -148,7 +149,7 @@ static void any_rate_is_set_where_it_is_asked_for(void **state)
     }
     options.baud = 0;
     assert_fails(EINVAL, mbm_tty_openWith(&tty, line.path, &options));
-    /* A driver that takes the nearest that it has. */
+    /* A driver that sets the nearest rate that it has. */
     options.baud = 250000;
     driver.nearest = 245200;
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &options), 0);
@@ -186,7 +187,7 @@ static void options_that_no_terminal_has_are_refused_with_einval(void **state)
     assert_fails(EINVAL, mbm_tty_open(&tty, line.path, 9600, 'N', -255));
 }
 
-static void what_cannot_be_opened_says_why(void **state)
+static void a_failed_open_sets_errno(void **state)
 {
     mbm_tty tty;
 
@@ -268,7 +269,7 @@ static void an_exclusive_terminal_is_busy_for_a_second_one(void **state)
     mbm_tty_close(&second);
 }
 
-static void rs485_where_the_driver_knows_none_is_refused_and_nothing_is_changed(void **state)
+static void without_a_driver_for_it_rs485_is_refused_and_nothing_is_changed(void **state)
 {
     struct termios before = settings_of(line.theirs), after;
     mbm_tty_options options = PLAIN;
@@ -282,7 +283,7 @@ static void rs485_where_the_driver_knows_none_is_refused_and_nothing_is_changed(
     assert_same(&before, &after);
 }
 
-static void rs485_tells_the_driver_and_close_takes_it_back(void **state)
+static void rs485_sets_up_the_driver_and_close_restores_it(void **state)
 {
     mbm_tty_options options = PLAIN;
     mbm_tty tty;
@@ -310,7 +311,7 @@ static void rs485_tells_the_driver_and_close_takes_it_back(void **state)
     mbm_tty_close(&tty);
 }
 
-static void an_rs485_delay_that_the_driver_cuts_short_is_refused(void **state)
+static void an_rs485_delay_that_the_driver_shortens_is_refused(void **state)
 {
     mbm_tty_options options = PLAIN;
     mbm_tty tty;
@@ -324,7 +325,7 @@ static void an_rs485_delay_that_the_driver_cuts_short_is_refused(void **state)
     assert_int_equal(driver.state.flags, 0);
 }
 
-static void a_lost_line_is_told_with_its_errno(void **state)
+static void a_lost_line_is_reported_with_its_errno(void **state)
 {
     uint8_t byte;
     mbm_port port;
@@ -347,7 +348,7 @@ static void a_lost_line_is_told_with_its_errno(void **state)
     mbm_tty_close(&tty);
 }
 
-static void a_full_line_takes_no_more_and_is_not_lost(void **state)
+static void a_full_line_accepts_no_bytes_and_is_not_lost(void **state)
 {
     static uint8_t much[40000];
     int16_t taken;
@@ -376,7 +377,7 @@ static void a_socket_can_be_attached(void **state)
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, pair), 0);
     assert_int_equal(mbm_tty_attach(&tty, pair[0]), 0);
     port = mbm_tty_port(&tty);
-    /* No transmitter is there to wait for. */
+    /* A socket has no transmitter to wait for. */
     assert_int_equal(port.flush(port.context), 1);
     assert_int_equal(port.read(port.context, &byte, 1), 0);
     close(pair[1]);
@@ -391,17 +392,17 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         TEST(every_rate_of_termios_can_be_set),
-        TEST(any_rate_is_set_where_it_is_asked_for),
+        TEST(any_rate_is_set_if_the_options_allow_it),
         TEST(options_that_no_terminal_has_are_refused_with_einval),
-        TEST(what_cannot_be_opened_says_why),
+        TEST(a_failed_open_sets_errno),
         TEST(close_leaves_the_terminal_as_it_was_found),
         TEST(detach_gives_the_descriptor_back_as_it_was),
         TEST(an_exclusive_terminal_is_busy_for_a_second_one),
-        TEST(rs485_where_the_driver_knows_none_is_refused_and_nothing_is_changed),
-        TEST(rs485_tells_the_driver_and_close_takes_it_back),
-        TEST(an_rs485_delay_that_the_driver_cuts_short_is_refused),
-        TEST(a_lost_line_is_told_with_its_errno),
-        TEST(a_full_line_takes_no_more_and_is_not_lost),
+        TEST(without_a_driver_for_it_rs485_is_refused_and_nothing_is_changed),
+        TEST(rs485_sets_up_the_driver_and_close_restores_it),
+        TEST(an_rs485_delay_that_the_driver_shortens_is_refused),
+        TEST(a_lost_line_is_reported_with_its_errno),
+        TEST(a_full_line_accepts_no_bytes_and_is_not_lost),
         TEST(a_socket_can_be_attached),
     };
 

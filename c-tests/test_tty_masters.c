@@ -1,6 +1,6 @@
-/* Blocking masters over a terminal and over a TCP socket, on which nothing answers:
- * each request ends with its status, however the port was made and whoever shares it.
- * The watchdog ends the program where one does not. */
+/* Blocking masters over a terminal and over a TCP socket without a device: each request
+ * ends with its status, whenever the port was made and whichever masters share it. If one
+ * does not end, a watchdog ends the program. */
 #define _GNU_SOURCE
 #include "await.h"
 #include "mbm_tcp.h"
@@ -89,7 +89,7 @@ static void a_port_made_before_the_tty_is_open_works_once_it_is(void **state)
 
     (void)state;
     begin_node(&first, 1, &port);
-    /* The descriptor of a zeroed tty is that of the program's input. */
+    /* The descriptor in a zeroed tty is 0, the program's standard input. */
     IS(MBM_LINK_LOST, mbm_master_readHoldingRegisters(&first.master, 0, 1));
     assert_int_equal(tty.error, EBADF);
     assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), -1);
@@ -128,8 +128,8 @@ static void two_masters_with_one_port_struct_each_end_in_time(void **state)
     times_out(&first);
 }
 
-/* Bytes that are no reply arrive, and more of them are there whenever it looks. */
-static void noise_does_not_keep_a_master_from_its_end(void **state)
+/* Bytes that are no reply arrive. Whenever the master looks, more of them are there. */
+static void noise_does_not_keep_a_request_from_ending(void **state)
 {
     mbm_port port;
 
@@ -190,7 +190,7 @@ int main(void)
         TEST(a_port_made_before_the_tty_is_open_works_once_it_is),
         TEST(two_masters_on_one_tty_each_end_in_time),
         TEST(two_masters_with_one_port_struct_each_end_in_time),
-        TEST(noise_does_not_keep_a_master_from_its_end),
+        TEST(noise_does_not_keep_a_request_from_ending),
         TEST(a_socket_closed_and_opened_again_keeps_its_port),
         TEST(a_port_made_before_the_socket_is_open_works_once_it_is),
         TEST(two_masters_on_one_socket_each_end_in_time),

@@ -1,4 +1,4 @@
-/* What options of a terminal become, before any is opened. */
+/* How the options of a terminal become settings, without opening a terminal. */
 #define _DEFAULT_SOURCE
 #include "mbm_tty.h"
 #include "test.h"

@@ -52,7 +52,7 @@ static void wait_ends_with_a_byte_with_the_time_or_with_the_line(void **state)
     mbm_tty_close(&tty);
 }
 
-/* A server whose function is pending reads nothing: its program sleeps. */
+/* A server whose function is pending reads nothing, so its program sleeps. */
 static void bytes_that_are_not_read_do_not_end_the_next_wait(void **state)
 {
     mbm_port port;
@@ -67,7 +67,7 @@ static void bytes_that_are_not_read_do_not_end_the_next_wait(void **state)
     assert_int_equal(mbm_tty_wait(&tty, 1000), 0);
     assert_int_equal(port.write(port.context, &byte, 0), 0);
     assert_int_equal(mbm_tty_wait(&tty, 1000), 0);
-    /* Once the port was read, they do. */
+    /* After the program has read from the port, bytes end the wait again. */
     assert_int_equal(port.read(port.context, &byte, 1), 1);
     assert_int_equal(mbm_tty_wait(&tty, MBM_TTY_FOREVER), 1);
     mbm_tty_close(&tty);
@@ -83,8 +83,8 @@ static uint16_t pending(void *context, const mbm_request *request, uint8_t *resp
     return MBM_REPLY_PENDING;
 }
 
-/* The program's loop of the server, from when its function is pending: each round
- * sleeps for the time that pollDelay says, though the next request has arrived. */
+/* The program's loop of the server while its function is pending: each round sleeps for the
+ * time of pollDelay, though the next request has arrived. */
 static void a_server_with_a_pending_function_sleeps_between_polls(void **state)
 {
     static const uint8_t request[] = {0x11, 0x41, 0xCD, 0xD0};
@@ -115,14 +115,14 @@ static void a_server_with_a_pending_function_sleeps_between_polls(void **state)
     mbm_tty_close(&tty);
 }
 
-static void nothing(int signal_number)
+static void ignore_signal(int signal_number)
 {
     (void)signal_number;
 }
 
 static volatile int waited;
 
-/* A signal before the wait is lost on it: so one after the other. */
+/* A signal before the wait does not end it, so this thread sends one after the other. */
 static void *interrupt(void *thread)
 {
     while (!waited) {
@@ -140,7 +140,7 @@ static void a_signal_ends_the_wait(void **state)
     mbm_tty tty;
 
     (void)state;
-    action.sa_handler = nothing;
+    action.sa_handler = ignore_signal;
     sigaction(SIGUSR1, &action, NULL);
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &PLAIN), 0);
     assert_int_equal(pthread_create(&other, NULL, interrupt, &self), 0);

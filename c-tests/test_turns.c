@@ -1,4 +1,4 @@
-/* Several masters on one line and in one frame buffer, one after the other. */
+/* Several masters on one line and in one frame buffer, which take turns. */
 #include "sim.h"
 #include "test.h"
 
@@ -9,7 +9,7 @@ typedef struct other {
     uint16_t words[4];
 } other;
 
-/* A master of unit 3 beside that of the simulation, in the same frame buffer. */
+/* A master of unit 3 in the same frame buffer as the simulation's master. */
 static void begin_other(sim *s, other *o)
 {
     memset(o, 0, sizeof *o);
@@ -105,13 +105,13 @@ static void a_turn_that_was_given_back_leaves_the_time_of_the_last_use(void **st
     assert_ptr_equal(turn.master, &o.master);
     OK(mbm_master_endTurn(&o.master, &turn));
     assert_null(turn.master);
-    memset(&o, 0xA5, sizeof o); /* its storage is gone */
+    memset(&o, 0xA5, sizeof o); /* its memory may be used for something else */
     OK(mbm_master_takeTurn(n, &turn));
     sim_reads(s, 500);
     sim_assert_time(s->frames[1].silence, 4000);
 }
 
-static void an_object_that_went_with_a_request_under_way_keeps_no_other_waiting(void **state)
+static void an_object_that_gave_back_its_turn_with_a_request_blocks_no_other(void **state)
 {
     mbm_turn turn = {0};
     other o;
@@ -127,7 +127,7 @@ static void an_object_that_went_with_a_request_under_way_keeps_no_other_waiting(
     sim_reads(s, 500);
 }
 
-static void a_turn_wants_a_record(void **state)
+static void a_turn_needs_a_record(void **state)
 {
     NODE;
 
@@ -167,8 +167,8 @@ int main(void)
         SIM_TEST(the_turn_is_refused_while_another_object_has_a_request_under_way),
         SIM_TEST(the_turn_is_refused_within_a_hook_of_the_object_that_has_it),
         SIM_TEST(a_turn_that_was_given_back_leaves_the_time_of_the_last_use),
-        SIM_TEST(an_object_that_went_with_a_request_under_way_keeps_no_other_waiting),
-        SIM_TEST(a_turn_wants_a_record),
+        SIM_TEST(an_object_that_gave_back_its_turn_with_a_request_blocks_no_other),
+        SIM_TEST(a_turn_needs_a_record),
         SIM_TEST(one_port_serves_objects_with_contexts_of_their_own),
     };
 

@@ -1,5 +1,5 @@
-/* A board for the README's program: unit 17 sits in memory and has 0x1234 in
- * register 2. Looks at what the program asks, byte by byte. */
+/* A board for the README's program. Unit 17 is a part of the board's memory and has 0x1234
+ * in register 2. The board checks what the program sends, byte by byte. */
 #include "crc.h"
 
 #include <stdio.h>
@@ -14,7 +14,7 @@ void setup(void);
 void loop(void);
 
 static uint8_t asked[8], reply[17];
-static size_t have, sent;
+static size_t asked_length, sent;
 static int shown;
 
 int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
@@ -22,8 +22,8 @@ int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
     uint16_t taken = 0;
 
     (void)context;
-    while (taken < length && have < sizeof asked)
-        asked[have++] = bytes[taken++];
+    while (taken < length && asked_length < sizeof asked)
+        asked[asked_length++] = bytes[taken++];
     return (int16_t)taken;
 }
 
@@ -32,7 +32,7 @@ int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity)
     static const uint8_t expected[6] = {17, 3, 0, 2, 0, 6};
 
     (void)context;
-    if (have < sizeof asked || memcmp(asked, expected, sizeof expected) != 0 ||
+    if (asked_length < sizeof asked || memcmp(asked, expected, sizeof expected) != 0 ||
         crc16(asked, sizeof asked) != 0 || sent == sizeof reply || capacity == 0)
         return 0;
     if (sent == 0) {

@@ -1,4 +1,4 @@
-/* Loads the library that its argument names, and has it compute a CRC-16. */
+/* Loads the library that its argument names, and calls its CRC-16 function. */
 #include <dlfcn.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -11,7 +11,7 @@ int main(int argc, char **argv)
     void *found;
 
     if (library == NULL) {
-        fprintf(stderr, "load: %s\n", argc == 2 ? dlerror() : "which library?");
+        fprintf(stderr, "load: %s\n", argc == 2 ? dlerror() : "give the path of a library");
         return 1;
     }
     found = dlsym(library, "mbm_frame_crc16");

@@ -1,4 +1,4 @@
-/* What a test sees of the board behind the shim: its clock and its log. */
+/* The state of the simulated board that tests can read: its clock and its log. */
 #ifndef BENCH_H
 #define BENCH_H
 
@@ -8,11 +8,11 @@
 
 struct Bench {
     uint32_t now = 0;      /* microseconds; wraps */
-    uint32_t tick = 20;    /* what a look at the clock takes */
-    bool realTime = false; /* the host's clock instead */
-    unsigned looks = 0;    /* at the clock, so far */
+    uint32_t tick = 20;    /* microseconds that each read of the clock takes */
+    bool realTime = false; /* use the clock of the host instead */
+    unsigned looks = 0;    /* how often the clock was read */
     unsigned yields = 0;
-    std::string log; /* what happened, in order; repetitions once */
+    std::string log; /* the events in order; a repeated event is there once */
 
     void note(const char *event)
     {

@@ -1,4 +1,4 @@
-/* What the tests of the class that serves share: a loop, and what comes of it. */
+/* What the tests of the server class share: a loop, and checks of the responses. */
 #ifndef SERVING_H
 #define SERVING_H
 
@@ -8,7 +8,7 @@
 
 const uint32_t t35 = 2006; // 3.5 characters of 11 bits at 19200 baud, microseconds
 
-/* As loop does, until all is quiet. */
+/* Calls poll as loop() does, for 20 ms. */
 inline void loops(ModbusServer &server)
 {
     uint32_t until = bench().now + 20000;
@@ -22,7 +22,7 @@ inline void hears(ModbusServer &server, const Bytes &bytes)
     loops(server);
 }
 
-/* A request and the one response to it, both without their CRC. */
+/* Sends a request and expects one response. Both are given without their CRC. */
 inline void answers(ModbusServer &server, std::initializer_list<int> request,
                     std::initializer_list<int> response)
 {

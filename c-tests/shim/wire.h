@@ -1,4 +1,4 @@
-/* What the tests of the class share: frames, what was sent, a fresh board. */
+/* What the tests of the class share: frames, the bytes that were sent, a fresh board. */
 #ifndef WIRE_H
 #define WIRE_H
 
@@ -21,7 +21,7 @@ inline Bytes raw(std::initializer_list<int> values)
     return bytes;
 }
 
-/* Puts the CRC behind the bytes. */
+/* Appends the CRC to the bytes. */
 inline Bytes sealed(Bytes bytes)
 {
     size_t length = bytes.size();
@@ -30,7 +30,7 @@ inline Bytes sealed(Bytes bytes)
     return bytes;
 }
 
-/* A frame: the values and their CRC. */
+/* A frame of these values and their CRC. */
 inline Bytes adu(std::initializer_list<int> values)
 {
     return sealed(raw(values));
@@ -48,7 +48,7 @@ inline void assert_bytes(const Bytes &actual, const Bytes &expected)
     assert_memory_equal(actual.data(), expected.data(), expected.size());
 }
 
-/* The one request since the last call is a frame of these values. */
+/* Expects that one frame was sent since the last call: these values and their CRC. */
 inline void assert_sent(HardwareSerial &port, std::initializer_list<int> values)
 {
     assert_int_equal(port.sent.size(), 1);
@@ -56,7 +56,7 @@ inline void assert_sent(HardwareSerial &port, std::initializer_list<int> values)
     port.sent.clear();
 }
 
-/* A board just reset. */
+/* Sets the board to its state after a reset. */
 inline int reset_board(void **)
 {
     bench() = Bench();

@@ -1,4 +1,4 @@
-/* The ten functions. */
+/* A program that calls the ten functions of the master. */
 #include "size.h"
 
 int main(void)

@@ -1,4 +1,4 @@
-/* The calls of ModbusMaster's example "Basic". */
+/* A program with the calls of ModbusMaster's example "Basic". */
 #include "size.h"
 
 int main(void)

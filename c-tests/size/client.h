@@ -1,7 +1,5 @@
-/*
- * What the measured programs with a client share; see size.h. Of a request, data
- * and reply stand in the buffers of size.h.
- */
+/* What the measured programs with a client share. See size.h. The data and the reply of a
+ * request are in the buffers of size.h. */
 #ifndef SIZE_CLIENT_H
 #define SIZE_CLIENT_H
 
@@ -26,7 +24,7 @@ static inline void begin_port(void)
     USED(frame);
 }
 
-/* Every function of the standard, and one of the user's. */
+/* Queues a request of every function of the standard, and of one user-defined function. */
 static inline void every_function(void)
 {
     static const mbm_rule rule = {MBM_RULE_FIXED, 5, 0};

@@ -1,4 +1,4 @@
-/* A client of every kind of line, with every function. */
+/* A client of every framing, with every function. */
 #include "client.h"
 
 static uint8_t outgoing[MBM_FRAME_BYTES(WORDS)];

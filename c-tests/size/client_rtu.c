@@ -1,4 +1,4 @@
-/* A client of an RTU line, with every function. */
+/* A client on an RTU line, with every function. */
 #include "client.h"
 
 int main(void)

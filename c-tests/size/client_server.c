@@ -1,4 +1,4 @@
-/* A client of every kind of line with every function, and a server with everything. */
+/* A client of every framing with every function, and a server with every function. */
 #include "client.h"
 
 #include "everything.h"

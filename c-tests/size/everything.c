@@ -1,5 +1,5 @@
-/* A client and a server with everything: the ten functions, and every family
- * that a server serves, on a serial line in RTU and ASCII and over TCP. */
+/* A master with its ten functions, and a server with every function, on a serial line in
+ * RTU and ASCII and over TCP. */
 #include "everything.h"
 
 int main(void)

@@ -1,4 +1,4 @@
-/* A server with everything: every family that it serves, in RTU, ASCII and TCP. */
+/* A server with every function that a server can serve, in RTU, ASCII and TCP. */
 #ifndef SIZE_EVERYTHING_H
 #define SIZE_EVERYTHING_H
 

@@ -1,4 +1,4 @@
-/* Reads holding registers, and nothing else. */
+/* A program that reads holding registers and does nothing else. */
 #include "size.h"
 
 int main(void)

@@ -1,4 +1,4 @@
-/* Reads holding registers and writes them; the words stand in the buffers. */
+/* A program that reads holding registers and writes them from the transmit words. */
 #include "size.h"
 
 int main(void)

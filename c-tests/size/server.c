@@ -1,4 +1,4 @@
-/* A server on a serial line: four arrays, functions 01 to 06, 0F and 10. */
+/* A server on a serial line with four arrays: functions 01 to 06, 0F and 10. */
 #include "server.h"
 
 int main(void)

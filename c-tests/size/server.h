@@ -1,4 +1,4 @@
-/* What the servers that are measured share: four arrays of 64 cells. */
+/* What the measured servers share: four arrays of 64 registers or bits. */
 #ifndef SIZE_SERVER_H
 #define SIZE_SERVER_H
 

@@ -1,9 +1,7 @@
-/*
- * What the programs that are measured share: buffers of 64 words and a port
- * that does next to nothing. With WITHOUT_MBM the same program is built with
- * every call left out, but with buffers and hooks; the difference is what the
- * library adds, the calls to it included.
- */
+/* What the measured programs share: buffers of 64 words and a port that does next to
+ * nothing. With WITHOUT_MBM the same program is built without any call of mbm, but with its
+ * buffers and hooks. The difference is the size of the library, with the instructions that
+ * call it. */
 #ifndef SIZE_H
 #define SIZE_H
 
@@ -11,7 +9,7 @@
 
 #define WORDS 64
 
-/* The value is used, as far as the compiler can tell. */
+/* Makes the compiler believe that the program uses the value. */
 #define USED(value) __asm__ volatile("" : : "r"(value) : "memory")
 
 static uint16_t response[WORDS];

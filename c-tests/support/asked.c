@@ -135,7 +135,7 @@ static uint8_t hex(int digit)
     return (uint8_t)(digit < 10 ? '0' + digit : 'A' + digit - 10);
 }
 
-/* The frame of a PDU to a unit, written apart from mbm. */
+/* Builds the frame of a PDU to a unit, without mbm. */
 static size_t frame_of(int framing, uint8_t unit, const uint8_t *pdu, size_t length, uint8_t *frame)
 {
     size_t i, n = 0;
@@ -171,7 +171,7 @@ static size_t frame_of(int framing, uint8_t unit, const uint8_t *pdu, size_t len
     }
 }
 
-/* What should not come is waited for this long. */
+/* How long to wait for bytes that should not come. */
 enum { PAUSE_MS = 30 };
 
 size_t asked_bytes(int fd, const uint8_t *bytes, size_t length, uint8_t *answer, size_t expected)
@@ -222,7 +222,7 @@ void asked_frames(int fd, int framing, uint8_t unit, const uint8_t *pdu, size_t 
     assert_memory_equal(answer, wanted, expected);
 }
 
-/* What is sent, and what comes back; both without their closing zero. */
+/* Sends a request and expects a response; both string literals without their final zero byte. */
 #define ANSWERS(request, response)                                                                 \
     asked_frames(fd, framing, SERVED_UNIT, (const uint8_t *)request, sizeof request - 1,           \
                  (const uint8_t *)response, sizeof response - 1)
@@ -242,7 +242,7 @@ void asked_functions(int fd, int framing, served *s)
     ANSWERS("\x03\x00\x00\x00\x01", "\x83\x02");
     ANSWERS("\x08\x00\x0D\x00\x00", "\x08\x00\x0D\x00\x01");
     ANSWERS("\x0B", "\x0B\x00\x00\x00\x01");
-    /* The latest first: what was received 80, sent 40, an exception 41, the restart 00. */
+    /* The event log, the latest event first: received 80, sent 40, exception 41, restart 00. */
     ANSWERS("\x0C", "\x0C\x0F\x00\x00\x00\x01\x00\x04"
                     "\x80\x40\x80\x40\x80\x41\x80\x40\x00");
     ANSWERS("\x08\x00\x07\x00\x00", "\x88\x01");
@@ -288,7 +288,7 @@ void asked_lies(int fd, int framing, served *s)
     ANSWERS("\x17\x00\x64\x00\x01\x00\x64\x00\x00\x00", "\x97\x03");
     ANSWERS("\x14\x00", "\x94\x03");
     if (framing != MBM_FRAMING_RTU_OVER_TCP) {
-        /* Their own bytes say that these are longer or shorter than they are. */
+        /* Their byte counts are longer or shorter than the data. */
         ANSWERS("\x10\x00\x64\x00\x00\x00\x12\x34", "\x90\x03");
         ANSWERS("\x10\x00\x64\x00\x02\x02\x12\x34", "\x90\x03");
         ANSWERS("\x10\x00\x64\x00\x02\x04\x12\x34", "\x90\x03");

@@ -1,4 +1,5 @@
-/* What libmodbus's client finds of a server of ours: the same on every line. */
+/* Requests of libmodbus's client to an mbm server, with checks of the responses. They are
+ * the same on every line. */
 #ifndef ASKED_H
 #define ASKED_H
 
@@ -6,30 +7,31 @@
 
 #include <modbus.h>
 
-/* Every function that the client has, at its edges. */
+/* Calls every function that the client has, at the limits of its quantities. */
 void asked_reads(modbus_t *client);
 void asked_writes(modbus_t *client, served *s);
 void asked_edges(modbus_t *client);
 void asked_refusals(modbus_t *client, served *s);
 
-/* Sends bytes and collects what comes back, up to 600 bytes: waits for so many as are
- * expected, and a while for more, which should not come. Returns how many. */
+/* Sends bytes, then collects up to 600 received bytes: waits until `expected` bytes have
+ * arrived, then a short time for more, which should not come. Returns how many arrived. */
 size_t asked_bytes(int fd, const uint8_t *bytes, size_t length, uint8_t *answer, size_t expected);
 
-/* Asks a unit for its exception status over TCP, and expects a response that ends with
- * this byte; 0 if the connection, for which there is no place, was closed instead. */
+/* Reads the exception status of a unit over TCP and expects a response that ends with the
+ * byte `last`. Returns 0 if the server closed the connection instead, because it had no
+ * place for it. */
 int asked_is_served(int fd, uint8_t unit, uint8_t last);
 
-/* Sends the frame of a PDU to a unit, and expects the frame of another, or none
- * if that is of no bytes. */
+/* Sends the frame of a PDU to a unit and expects the frame of another PDU. A PDU of 0 bytes
+ * expects no response. */
 void asked_frames(int fd, int framing, uint8_t unit, const uint8_t *pdu, size_t length,
                   const uint8_t *response, size_t expected);
 
-/* The functions that libmodbus's client does not have. */
+/* Calls the functions that libmodbus's client does not have. */
 void asked_functions(int fd, int framing, served *s);
 
-/* Counts that lie, quantities out of order, too much and too little: refused, and
- * no cell changes. */
+/* Sends wrong byte counts, quantities out of range, too many and too few bytes. The server
+ * must refuse all of them and change no register or bit. */
 void asked_lies(int fd, int framing, served *s);
 
 #endif

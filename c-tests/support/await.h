@@ -1,4 +1,4 @@
-/* Waiting for what another thread or process does. */
+/* Waits for what another thread or process does. */
 #ifndef AWAIT_H
 #define AWAIT_H
 
@@ -6,19 +6,20 @@
 
 #include <poll.h>
 
-/* How long, in milliseconds: on a busy machine a thread may not run for seconds. A
- * test that finds what it waits for is as quick as ever. */
+/* The longest wait, in milliseconds. On a busy machine a thread may not run for seconds.
+ * The wait ends as soon as the condition holds. */
 enum { PATIENCE_MS = 20000 };
 
-/* Waits until what another thread brings about holds. What is never to come
- * cannot be waited for: a pause shows it, and a slow machine does no harm. */
+/* Waits until a condition holds that another thread or process brings about. Do not use it
+ * for what must not happen: for that, make a pause. A slow machine cannot make such a check
+ * fail. */
 #define AWAIT(condition)                                                                           \
     do {                                                                                           \
         int naps_ = 0;                                                                             \
                                                                                                    \
         while (!(condition)) {                                                                     \
             if (naps_++ == PATIENCE_MS)                                                            \
-                fail_msg("this never came about: %s", #condition);                                 \
+                fail_msg("this did not happen in time: %s", #condition);                           \
             poll(NULL, 0, 1);                                                                      \
         }                                                                                          \
     } while (0)

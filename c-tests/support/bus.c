@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-static int16_t hear(void *context, uint8_t *bytes, uint16_t capacity)
+static int16_t read_bytes(void *context, uint8_t *bytes, uint16_t capacity)
 {
     bus_tap *tap = (bus_tap *)context;
     bus *b = tap->line;
@@ -12,7 +12,7 @@ static int16_t hear(void *context, uint8_t *bytes, uint16_t capacity)
     while (count < capacity && tap->heard < b->count && b->bytes[tap->heard].end <= b->now) {
         unsigned at = tap->heard++;
 
-        /* Nobody hears itself, as with a driver that turns the receiver off. */
+        /* A tap does not receive its own bytes, as with a driver that turns the receiver off. */
         if (b->bytes[at].from != tap)
             bytes[count++] = b->bytes[at].garbled ? b->bytes[at].byte ^ 0x5A : b->bytes[at].byte;
     }
@@ -35,7 +35,7 @@ static void put(bus_tap *tap, uint8_t byte)
     }
     b->collisions += garbled;
     assert_true(b->count < BUS_BYTES);
-    /* Behind all that anybody has heard, for that has ended. */
+    /* Inserts the byte in the order of end times: after every byte that a tap has received. */
     for (place = b->count++; place > 0 && b->bytes[place - 1].end > end; place--)
         b->bytes[place] = b->bytes[place - 1];
     b->bytes[place].end = end;
@@ -82,7 +82,7 @@ mbm_port bus_port(bus *b, uint32_t clock_start)
     tap->line = b;
     tap->clock_start = clock_start;
     port.context = tap;
-    port.read = hear;
+    port.read = read_bytes;
     port.write = send;
     port.micros = micros;
     port.flush = flush;

@@ -1,5 +1,5 @@
-/* A simulated multi-drop bus with a clock of its own: what one tap sends, all others
- * hear a character time later, and what two send at once arrives garbled. */
+/* A simulated multi-drop bus with a clock of its own. All other taps receive what one tap
+ * sends one character time later. What two taps send at the same time arrives garbled. */
 #ifndef BUS_H
 #define BUS_H
 
@@ -9,21 +9,21 @@ enum {
     BUS_BAUD = 19200,
     BUS_CHARACTER = 573, /* microseconds of 11 bits */
     BUS_TAPS = 8,
-    BUS_BYTES = 200000 /* in one test */
+    BUS_BYTES = 200000 /* the most bytes in one test */
 };
 
 typedef struct bus bus;
 
 typedef struct bus_tap {
     bus *line;
-    uint32_t clock_start; /* what its clock showed when the bus was started */
-    uint64_t free;        /* when its last byte will have left */
-    unsigned heard;       /* bytes of the bus that it has passed */
+    uint32_t clock_start; /* the time that the tap's clock shows when the bus is started */
+    uint64_t free;        /* when the last byte of the tap will have left */
+    unsigned heard;       /* index of the next byte of the bus to read */
 } bus_tap;
 
 struct bus {
     uint64_t now;        /* in microseconds */
-    unsigned collisions; /* bytes garbled */
+    unsigned collisions; /* number of garbled bytes */
     bus_tap taps[BUS_TAPS];
     unsigned tap_count;
     unsigned count;
@@ -34,10 +34,10 @@ struct bus {
     } bytes[BUS_BYTES];
 };
 
-/* Empties the bus and its taps. */
+/* Empties the bus and removes its taps. */
 void bus_start(bus *b);
 
-/* A new tap, with a clock that shows `clock_start` when the bus is started. */
+/* Adds a tap whose clock shows `clock_start` when the bus is started. */
 mbm_port bus_port(bus *b, uint32_t clock_start);
 
 #endif

@@ -92,7 +92,6 @@ mbm_clientRequest asker_request(uint8_t unit, void *reply, uint16_t bytes, const
     return request;
 }
 
-/* Sleeps until bytes arrive or the client has something else to do. */
 void asker_rest(asker *a)
 {
     uint32_t delay = mbm_client_pollDelay(&a->client);

@@ -1,4 +1,4 @@
-/* A client with buffers of full size, and what tests want of it. */
+/* A client with buffers of full size, and what tests do with it. */
 #ifndef CLIENT_H
 #define CLIENT_H
 
@@ -13,13 +13,13 @@ typedef struct asker {
     mbm_tcp tcp;
     mbm_tcp_addresses addresses;
     mbm_linkHooks link;
-    held_clock *clock; /* NULL is the machine's */
+    held_clock *clock; /* NULL: the machine's clock */
     mbm_counters counters;
     char service[8];
     uint8_t incoming[1024], outgoing[1024];
 } asker;
 
-/* Zeroes it and begins a client of a terminal, told 115200 baud. */
+/* Zeroes it and begins a client on a terminal, at 115200 baud. */
 void asker_begin_rtu(asker *a, int fd);
 void asker_begin_ascii(asker *a, int fd);
 
@@ -27,16 +27,16 @@ void asker_begin_ascii(asker *a, int fd);
 void asker_begin_tcp(asker *a, uint16_t port);
 void asker_begin_rtu_over_tcp(asker *a, uint16_t port);
 
-/* By a clock that waits for the peer, also for one that a->link connects anew. */
+/* The same with a clock that waits for the peer, also after `link` has connected anew. */
 void asker_begin_tcp_by(asker *a, uint16_t port, held_clock *clock);
 
-/* A request to a unit: where its response goes, and what it brings along. */
+/* A request to a unit: `reply` receives the response, `data` is what the request sends. */
 mbm_clientRequest asker_request(uint8_t unit, void *reply, uint16_t bytes, const void *data);
 
 /* Sleeps until bytes arrive or the client has something else to do. */
 void asker_rest(asker *a);
 
-/* Polls, and sleeps between, until a request or all of them have ended. */
+/* Polls, with sleeps between, until one request or all requests have ended. */
 uint8_t asker_wait(asker *a, const mbm_clientRequest *request);
 void asker_wait_all(asker *a);
 

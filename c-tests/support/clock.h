@@ -1,4 +1,4 @@
-/* How late it is, of this machine's own clock. */
+/* The time of the machine's own clock, in seconds. */
 #ifndef CLOCK_H
 #define CLOCK_H
 

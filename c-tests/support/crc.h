@@ -1,4 +1,4 @@
-/* A CRC-16 of the tests' own, so that mbm is not held against itself. */
+/* A CRC-16 of the tests' own, so that mbm is not checked against itself. */
 #ifndef CRC_H
 #define CRC_H
 
@@ -19,7 +19,7 @@ static inline uint16_t crc16(const uint8_t *bytes, size_t length)
     return crc;
 }
 
-/* Puts the CRC behind `length` bytes; returns the length of the frame. */
+/* Appends the CRC to `length` bytes. Returns the length of the frame. */
 static inline size_t seal(uint8_t *frame, size_t length)
 {
     uint16_t crc = crc16(frame, length);

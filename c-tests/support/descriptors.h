@@ -1,5 +1,5 @@
-/* Tests of a shortage of descriptors. Valgrind keeps a limit to itself: neither the test
- * nor a program that it starts is bound by it, so there is nothing to test. */
+/* For tests of a shortage of descriptors. Under valgrind a limit binds neither the test nor
+ * a program that it starts, so such a test is skipped. */
 #ifndef DESCRIPTORS_H
 #define DESCRIPTORS_H
 

@@ -6,7 +6,7 @@
 #define REQUEST .kind = MBM_PACKET_REQUEST
 #define RESPONSE .kind = MBM_PACKET_RESPONSE
 
-/* A request stands in front of the response to it. */
+/* Each request stands before its response. */
 const example examples[] = {
     {"01 0013 0013", 0, {REQUEST, .function = 0x01, .address = 0x13, .quantity = 0x13}},
     {"01 03 CD6B05", 2, {RESPONSE, .function = 0x01, .dataLength = 3}},

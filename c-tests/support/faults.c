@@ -10,13 +10,11 @@ static const fault *playing;
 static mbm_port line_port;
 static volatile int link_dies;
 
-/* Every register's value tells its address, so that stale data shows. */
 uint16_t fault_value(unsigned address)
 {
     return (uint16_t)(address * 7919u + 1u);
 }
 
-/* The right reply to a request, with its CRC. */
 size_t fault_right_reply(uint8_t *frame, const uint8_t *request)
 {
     unsigned address = (unsigned)request[2] << 8 | request[3];
@@ -34,8 +32,8 @@ size_t fault_right_reply(uint8_t *frame, const uint8_t *request)
     return seal(frame, 3 + 2 * quantity);
 }
 
-/* Sends bytes and the right reply behind them in one piece. */
-static void reply_behind(responder *r, const uint8_t *request, const void *bytes, size_t length)
+/* Sends bytes and, in one piece with them, the right reply. */
+static void reply_after(responder *r, const uint8_t *request, const void *bytes, size_t length)
 {
     uint8_t all[2 * MOST];
 
@@ -45,66 +43,66 @@ static void reply_behind(responder *r, const uint8_t *request, const void *bytes
 
 static void right(responder *r, const uint8_t *request)
 {
-    reply_behind(r, request, "", 0);
+    reply_after(r, request, "", 0);
 }
 
 static void leading_zero(responder *r, const uint8_t *request)
 {
-    reply_behind(r, request, "\0", 1);
+    reply_after(r, request, "\0", 1);
 }
 
 static void five_bytes_of_noise(responder *r, const uint8_t *request)
 {
-    reply_behind(r, request, "\xFF\x00\x55\x01\x99", 5);
+    reply_after(r, request, "\xFF\x00\x55\x01\x99", 5);
 }
 
 static void noise_like_our_header(responder *r, const uint8_t *request)
 {
     const uint8_t header[] = {UNIT, 3, 2 * REGISTERS};
 
-    reply_behind(r, request, header, sizeof header);
+    reply_after(r, request, header, sizeof header);
 }
 
-/* The right reply to another request in front of ours. */
-static void reply_behind_reply_to(responder *r, const uint8_t *request, uint8_t unit,
-                                  uint8_t function, uint16_t quantity)
+/* Sends the right reply to another request, then the right reply to ours. */
+static void reply_after_reply_to(responder *r, const uint8_t *request, uint8_t unit,
+                                 uint8_t function, uint16_t quantity)
 {
     const uint8_t other[] = {unit, function, 3, 0x21, (uint8_t)(quantity >> 8), (uint8_t)quantity};
     uint8_t frame[MOST];
 
-    reply_behind(r, request, frame, fault_right_reply(frame, other));
+    reply_after(r, request, frame, fault_right_reply(frame, other));
 }
 
 static void foreign_reply(responder *r, const uint8_t *request)
 {
-    reply_behind_reply_to(r, request, UNIT + 1, 3, REGISTERS);
+    reply_after_reply_to(r, request, UNIT + 1, 3, REGISTERS);
 }
 
 static void reply_of_another_function(responder *r, const uint8_t *request)
 {
-    reply_behind_reply_to(r, request, UNIT, 4, REGISTERS);
+    reply_after_reply_to(r, request, UNIT, 4, REGISTERS);
 }
 
 static void local_echo(responder *r, const uint8_t *request)
 {
-    reply_behind(r, request, request, 8);
+    reply_after(r, request, request, 8);
 }
 
 static void late_reply_of_another_length(responder *r, const uint8_t *request)
 {
-    reply_behind_reply_to(r, request, UNIT, 3, REGISTERS - 1);
+    reply_after_reply_to(r, request, UNIT, 3, REGISTERS - 1);
 }
 
 static void late_reply_to_another_write(responder *r, const uint8_t *request)
 {
-    reply_behind_reply_to(r, request, UNIT, 6, 0x5AA5);
+    reply_after_reply_to(r, request, UNIT, 6, 0x5AA5);
 }
 
 static void late_exception_of_another_function(responder *r, const uint8_t *request)
 {
     uint8_t frame[5] = {UNIT, 0x90, 2};
 
-    reply_behind(r, request, frame, seal(frame, 3));
+    reply_after(r, request, frame, seal(frame, 3));
 }
 
 static void a_byte_every_5_ms(responder *r, const uint8_t *request)
@@ -129,11 +127,11 @@ static void a_pause_inside(responder *r, const uint8_t *request)
     responder_send(r, frame + length / 2, length - length / 2);
 }
 
-static void two_replies_glued(responder *r, const uint8_t *request)
+static void reply_twice(responder *r, const uint8_t *request)
 {
     uint8_t frame[MOST];
 
-    reply_behind(r, request, frame, fault_right_reply(frame, request));
+    reply_after(r, request, frame, fault_right_reply(frame, request));
 }
 
 static void one_byte_too_long(responder *r, const uint8_t *request)
@@ -160,7 +158,7 @@ static void noise_of_300_bytes(responder *r)
     }
 }
 
-static void reply_behind_300_bytes_of_noise(responder *r, const uint8_t *request)
+static void reply_after_300_bytes_of_noise(responder *r, const uint8_t *request)
 {
     noise_of_300_bytes(r);
     right(r, request);
@@ -238,8 +236,8 @@ static void no_reply(responder *r, const uint8_t *request)
     (void)request;
 }
 
-/* The device takes until the master has given up and has sent its next request.
- * That one waits meanwhile, and is answered after this one. */
+/* The device takes so long that the master has given up and sent its next request, which
+ * waits meanwhile. The device answers this request first, then the next one. */
 static void later_than_the_timeout(responder *r, const uint8_t *request)
 {
     responder_pause_until_request(r);
@@ -296,9 +294,9 @@ const fault faults[] = {
      "....."},
     {"one byte every 5 ms", a_byte_every_5_ms, 3, 0, ".....", MBM_OK, "....."},
     {"cut in two by a pause longer than t3.5", a_pause_inside, 3, 0, ".....", MBM_OK, "....."},
-    {"two replies glued", two_replies_glued, 3, 0, ".....", MBM_OK, "....."},
+    {"the reply twice without a pause", reply_twice, 3, 0, ".....", MBM_OK, "....."},
     {"one byte too long", one_byte_too_long, 3, 0, ".....", MBM_OK, "....."},
-    {"300 bytes of continuous noise, then ours", reply_behind_300_bytes_of_noise, 3, 0, ".....",
+    {"300 bytes of continuous noise, then ours", reply_after_300_bytes_of_noise, 3, 0, ".....",
      MBM_OK, "....."},
     {"300 bytes of continuous noise, no reply", only_300_bytes_of_noise, 3, 0, "F....",
      MBM_RESPONSE_TIMED_OUT, "....."},
@@ -312,8 +310,8 @@ const fault faults[] = {
      MBM_MALFORMED_REPLY, "....."},
     {"a reply later than the timeout, from a device that answers in order", later_than_the_timeout,
      3, 0, "F....", MBM_RESPONSE_TIMED_OUT, "....."},
-    {"the same after a write", later_than_the_timeout, 6, 0, "F....", MBM_RESPONSE_TIMED_OUT,
-     "....."},
+    {"a reply to a write later than the timeout, from such a device", later_than_the_timeout, 6, 0,
+     "F....", MBM_RESPONSE_TIMED_OUT, "....."},
     {"exception 05 (acknowledge)", acknowledge, 3, 0, "F....", 0x05, "F...."},
     {"exception 06 (device busy)", device_busy, 3, 0, "F....", 0x06, "F...."},
     {"exception 0B (gateway target gave no response)", no_response_of_the_target, 3, 0, "F....",
@@ -341,7 +339,7 @@ void fault_start(responder *device, const fault *f)
     responder_start(device, play);
 }
 
-/* The line's read, until a script says that the link is gone. */
+/* The line's read function. It reports a lost link when a script says so. */
 static int16_t read_or_die(void *context, uint8_t *bytes, uint16_t capacity)
 {
     if (link_dies) {

@@ -1,5 +1,5 @@
-/* MBM_TEST runs the tests of that name alone; `*` and `?` stand for any characters.
- * `make test-c TEST=NAME` sets it. */
+/* MBM_TEST, set by `make test-c TEST=NAME`, is the name of the tests to run; `*` and `?`
+ * stand for any characters. */
 #include "test.h"
 
 #include <stdlib.h>

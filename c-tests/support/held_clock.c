@@ -14,7 +14,7 @@ static int64_t machine(void)
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
-static int64_t look(held_clock *c)
+static int64_t read_clock(held_clock *c)
 {
     int64_t now = machine();
 
@@ -25,10 +25,10 @@ static int64_t look(held_clock *c)
     return now - c->behind;
 }
 
-/* Goes on from where it stands, with so many bytes to do. */
+/* Goes on from the time that it shows. The device still has `bytes` bytes to process. */
 static void set(held_clock *c, uint32_t bytes)
 {
-    int64_t shown = look(c);
+    int64_t shown = read_clock(c);
 
     c->stopped = shown;
     c->bytes = bytes;
@@ -51,7 +51,7 @@ int64_t held_clock_now(held_clock *c)
     int64_t shown;
 
     pthread_mutex_lock(&c->lock);
-    shown = look(c);
+    shown = read_clock(c);
     pthread_mutex_unlock(&c->lock);
     return shown;
 }
@@ -59,7 +59,8 @@ int64_t held_clock_now(held_clock *c)
 void held_clock_done(held_clock *c, unsigned link, uint32_t bytes)
 {
     pthread_mutex_lock(&c->lock);
-    /* What others wrote, a client without this clock, it was not told of. */
+    /* A connection made before held_clock_forget, or by a client without this clock, does
+     * not count. */
     if (link == c->link)
         set(c, c->bytes > bytes ? c->bytes - bytes : 0);
     pthread_mutex_unlock(&c->lock);
@@ -112,8 +113,8 @@ static int16_t clock_write(void *context, const uint8_t *bytes, uint16_t length)
     held_clock *c = (held_clock *)context;
     int16_t taken;
 
-    /* Before: the device may be done at once. Nor is the master ever late: it writes
-     * at the time that it knows. */
+    /* Before the write, because the device may process the bytes at once. The bytes are
+     * written at the time that the master read last, so the master is never late either. */
     pthread_mutex_lock(&c->lock);
     set(c, c->bytes);
     if (c->bytes == 0)
@@ -131,7 +132,7 @@ static uint32_t clock_micros(void *context)
     uint32_t told;
 
     pthread_mutex_lock(&c->lock);
-    c->told = look(c);
+    c->told = read_clock(c);
     told = (uint32_t)c->told;
     pthread_mutex_unlock(&c->lock);
     return told;

@@ -1,5 +1,5 @@
-/* A port of the test's own: bytes that arrive, bytes that were sent, a clock, and a
- * function that every hook calls first. */
+/* A port in memory: bytes that arrive, bytes that were sent, a clock, and a function of the
+ * test that every hook calls first. */
 #ifndef HOOKED_PORT_H
 #define HOOKED_PORT_H
 
@@ -12,19 +12,19 @@ enum { HOOK_READ, HOOK_WRITE, HOOK_MICROS, HOOK_FLUSH, HOOK_PRE, HOOK_POST, HOOK
 typedef struct hooked_port {
     uint8_t arriving[600], sent[600];
     size_t first, last, length;
-    uint32_t now, step; /* each look at the clock takes `step` microseconds */
-    uint8_t lost;       /* the link is lost */
+    uint32_t now, step; /* each read of the clock takes `step` microseconds */
+    uint8_t lost;       /* 1: the link is lost */
     void (*within)(int hook);
     unsigned called[HOOKS];
 } hooked_port;
 
-/* All hooks of a port over `p`, which stays where it is. */
+/* A port over `p` with all hooks. `p` must stay where it is. */
 mbm_port hooked_port_of(hooked_port *p);
 
-/* Replaces what is still to arrive. */
+/* Replaces the bytes that are still to arrive. */
 void hooked_port_arrive(hooked_port *p, const void *bytes, size_t length);
 
-/* As hooked_port_arrive, with unit and CRC around a PDU. */
+/* As hooked_port_arrive, but adds unit and CRC to a PDU. */
 void hooked_port_arrive_rtu(hooked_port *p, uint8_t unit, const void *pdu, size_t length);
 
 #endif

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-static int16_t take(void *context, uint8_t *bytes, uint16_t capacity)
+static int16_t read_bytes(void *context, uint8_t *bytes, uint16_t capacity)
 {
     memory_port *m = (memory_port *)context;
     size_t count = m->arriving_count < capacity ? m->arriving_count : capacity;
@@ -39,7 +39,7 @@ mbm_port memory_port_of(memory_port *m)
     mbm_port port = {0};
 
     port.context = m;
-    port.read = take;
+    port.read = read_bytes;
     port.write = send_bytes;
     port.micros = clock_of;
     return port;
@@ -61,7 +61,7 @@ void memory_port_rtu(memory_port *m, const uint8_t *bytes, size_t count)
     memory_port_bytes(m, frame, seal(frame, count));
 }
 
-/* Lets the time pass until the client has something to do. */
+/* Lets time pass until the client has something to do. */
 static void pass(memory_port *m, mbm_client *client)
 {
     uint32_t delay = mbm_client_pollDelay(client);

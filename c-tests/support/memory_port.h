@@ -1,5 +1,5 @@
-/* A port in memory with a clock of its own: the test reads what was sent, and writes
- * what arrives. */
+/* A port in memory with a clock of its own. The test reads the bytes that were sent and
+ * writes the bytes that arrive. */
 #ifndef MEMORY_PORT_H
 #define MEMORY_PORT_H
 
@@ -15,18 +15,18 @@ typedef struct memory_port {
     int is_lost;
 } memory_port;
 
-/* The port to begin a client with. */
+/* The port for the client's begin function. */
 mbm_port memory_port_of(memory_port *m);
 
-/* Lets bytes arrive, and an RTU frame: the CRC is appended. */
+/* Lets bytes arrive. memory_port_rtu appends the CRC. */
 void memory_port_bytes(memory_port *m, const uint8_t *bytes, size_t count);
 void memory_port_rtu(memory_port *m, const uint8_t *bytes, size_t count);
 
-/* Polls until bytes are sent, and lets the time pass before. */
+/* Polls until bytes are sent. Between two polls the time of pollDelay passes. */
 void memory_port_send(memory_port *m, mbm_client *client);
 
-/* Polls, and lets the time pass that pollDelay returns, up to `steps` times or until
- * `request` has ended; its status. */
+/* Polls and lets the time of pollDelay pass, up to `steps` times or until `request` has
+ * ended. Returns the status of `request`. */
 uint8_t memory_port_run(memory_port *m, mbm_client *client, const mbm_clientRequest *request,
                         unsigned steps);
 

@@ -49,7 +49,7 @@ static void store(uint16_t *cells, const uint8_t *data, unsigned quantity)
         cells[i] = be16(data + 2 * i);
 }
 
-/* The reply of a write: the request's address and value or quantity. */
+/* The response of a write repeats the request's address and its value or quantity. */
 static size_t repeat(uint8_t *reply, const request *r)
 {
     reply[2] = (uint8_t)(r->address >> 8);

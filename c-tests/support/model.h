@@ -1,4 +1,4 @@
-/* A device of the tests' own: three units with memory, and what they answer. */
+/* A device of the tests' own: three units with memory, and their responses. */
 #ifndef MODEL_H
 #define MODEL_H
 
@@ -11,10 +11,10 @@ typedef struct model {
     uint16_t holding[MODEL_UNITS][MODEL_CELLS], readings[MODEL_UNITS][MODEL_CELLS];
 } model;
 
-/* Fills the memory so that every cell differs from its neighbours. */
+/* Fills the memory so that each register and bit differs from its neighbours. */
 void model_start(model *m);
 
-/* Carries the request out; returns the length of the reply frame. */
+/* Carries the request out. Returns the length of the reply frame. */
 size_t model_answer(model *m, const request *r, uint8_t *reply);
 
 #endif

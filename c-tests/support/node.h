@@ -14,10 +14,10 @@ typedef struct node {
     uint8_t frame[MBM_MAX_FRAME];
 } node;
 
-/* Zeroes the node, lends its buffers and begins to talk to `slave` over `fd`. */
+/* Zeroes the node, gives it its buffers and begins it for unit `slave` over `fd`. */
 void node_begin(node *n, int fd, uint8_t slave);
 
-/* Bit `index` of the response words. */
+/* Returns bit `index` of the response words. */
 int node_bit(const node *n, unsigned index);
 
 /* Sets bit `index` of the transmit words. */

@@ -46,11 +46,11 @@ void program_start_limited(program *p, const char *name, const char *const *argu
     p->pid = fork();
     must(p->pid >= 0, "fork");
     if (p->pid == 0) {
-        /* Not to survive the test, whatever ends it. */
+        /* The program must not survive the test, however the test ends. */
         prctl(PR_SET_PDEATHSIG, SIGKILL);
         dup2(in[0], STDIN_FILENO);
         dup2(out[1], STDOUT_FILENO);
-        /* Lines and sockets of the test are to hang up when the test lets go. */
+        /* Lines and sockets of the test must hang up when the test closes them. */
         close_range(3, ~0u, 0);
         if (descriptors)
             must(setrlimit(RLIMIT_NOFILE, &limit) == 0, "setrlimit");
@@ -64,29 +64,30 @@ void program_start_limited(program *p, const char *name, const char *const *argu
     p->output = out[0];
 }
 
-size_t program_line(const program *p, char *text, size_t room)
+size_t program_line(const program *p, char *text, size_t capacity)
 {
     size_t length = 0;
 
-    while (length + 1 < room && read(p->output, text + length, 1) == 1)
+    while (length + 1 < capacity && read(p->output, text + length, 1) == 1)
         if (text[length++] == '\n')
             break;
     text[length] = 0;
     return length;
 }
 
-size_t program_rest(const program *p, char *text, size_t room)
+size_t program_rest(const program *p, char *text, size_t capacity)
 {
     size_t length = 0;
     ssize_t count;
 
-    while (length + 1 < room && (count = read(p->output, text + length, room - 1 - length)) > 0)
+    while (length + 1 < capacity &&
+           (count = read(p->output, text + length, capacity - 1 - length)) > 0)
         length += (size_t)count;
     text[length] = 0;
     return length;
 }
 
-/* The state follows the name, which stands in brackets. */
+/* The state follows the name, which is in parentheses. */
 static int is_asleep(const program *p)
 {
     char path[64], text[512], *name;

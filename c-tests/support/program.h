@@ -1,4 +1,4 @@
-/* An example as a process: the one that was built as the test was. */
+/* Runs an example as a process: the one that was built in the same way as the test. */
 #ifndef PROGRAM_H
 #define PROGRAM_H
 
@@ -7,26 +7,26 @@
 
 typedef struct program {
     pid_t pid;
-    int input;  /* what it reads */
-    int output; /* what it prints */
+    int input;  /* a descriptor: what the test writes here, the program reads */
+    int output; /* a descriptor: what the program prints, the test reads here */
 } program;
 
-/* Starts linux/NAME beside the test; arguments end with NULL. */
+/* Starts linux/NAME from the test's own folder. The arguments end with NULL. */
 void program_start(program *p, const char *name, const char *const *arguments);
 
-/* The same with a limit of open descriptors; 0 is none. */
+/* The same with a limit of open descriptors. 0 means no limit. */
 void program_start_limited(program *p, const char *name, const char *const *arguments,
                            unsigned descriptors);
 
-/* Whether it was found asleep in each of 50 looks. One that spins never is; one that
- * sleeps may have to be looked at again. */
+/* Looks at the program 50 times. Returns whether it was asleep each time. A program that
+ * spins never is. One that sleeps may be seen awake, so call again. */
 int program_sleeps(const program *p);
 
-/* Reads what it prints up to the end of a line, or all of it. */
-size_t program_line(const program *p, char *text, size_t room);
-size_t program_rest(const program *p, char *text, size_t room);
+/* Reads the program's output up to the end of a line, or all of it. */
+size_t program_line(const program *p, char *text, size_t capacity);
+size_t program_rest(const program *p, char *text, size_t capacity);
 
-/* Ends its input and waits for its end; its exit code, or -1. */
+/* Closes its input and waits for its end. Returns its exit code, or -1. */
 int program_end(program *p);
 
 #endif

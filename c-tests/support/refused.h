@@ -1,11 +1,11 @@
-/* Calls that are refused. Include test.h and string.h before. */
+/* Checks of calls that are refused. Include test.h and string.h first. */
 #ifndef REFUSED_H
 #define REFUSED_H
 
 #include <valgrind/memcheck.h>
 
-/* Holds that a call returns a status and leaves an object as it was. Bytes between the
- * fields of an object may never have been written; valgrind would report that they are
+/* Asserts that a call returns a status and leaves an object as it was, byte for byte. The
+ * padding of an object may never have been written, and valgrind would report that it is
  * compared. */
 #define REFUSED(status, object, call)                                                              \
     do {                                                                                           \

@@ -30,7 +30,7 @@ static int range(uint16_t address, uint16_t quantity, uint16_t most)
     return quantity >= 1 && quantity <= most && (uint32_t)address + quantity <= 0x10000u;
 }
 
-/* Bits behind the last coil are sent as zero. */
+/* The unused bits of the last byte must be zero. */
 static int padded(const request *r)
 {
     unsigned used = r->written % 8u;
@@ -66,7 +66,7 @@ int request_parse(request *r, const uint8_t *frame, size_t length)
         r->written = 1;
         r->or_mask = be16(frame + 6);
         return 1;
-    default: /* 0x17, as request_size says */
+    default: /* 0x17, since request_size accepts no other function */
         r->write_address = be16(frame + 6);
         r->written = be16(frame + 8);
         r->data = frame + 11;

@@ -23,7 +23,7 @@ void responder_pause(responder *r, unsigned milliseconds)
     int untaken = 0;
     unsigned naps = 0;
 
-    /* What was sent before the pause is heard before it. */
+    /* Waits until the master has read the bytes that were sent before the pause. */
     while (ioctl(r->line.ours, FIONREAD, &untaken) == 0 && untaken > 0 && naps++ < 1000)
         usleep(1000);
     held_clock_pass(&r->clock, 1000 * (int64_t)milliseconds);

@@ -1,5 +1,5 @@
-/* A scripted device at the far end of a pty: answers each request of eight
- * bytes with whatever a script plays. */
+/* A scripted device at the far end of a pty. A script decides what it answers to each
+ * request of eight bytes. */
 #ifndef RESPONDER_H
 #define RESPONDER_H
 
@@ -12,7 +12,7 @@
 
 typedef struct responder responder;
 
-/* Plays the answer to request number `number`, from 1 on. */
+/* Plays the answer to request number `number`. The first request is number 1. */
 typedef void (*responder_script)(responder *r, const uint8_t *request, unsigned number);
 
 struct responder {
@@ -26,7 +26,7 @@ struct responder {
 void responder_start(responder *r, responder_script script);
 void responder_stop(responder *r);
 
-/* For scripts: sends bytes, pauses. */
+/* For scripts: sends bytes, and makes pauses. */
 void responder_send(responder *r, const uint8_t *bytes, size_t length);
 void responder_pause(responder *r, unsigned milliseconds);
 

@@ -1,5 +1,5 @@
-/* A server of ours with everything it can serve, in a thread: at one end of a
- * pty, or behind a listening socket on the loopback, for peers to ask. */
+/* An mbm server with everything that it can serve, in a thread: at one end of a pty, or on
+ * a listening loopback socket. Peers send requests to it. */
 #ifndef SERVED_H
 #define SERVED_H
 
@@ -10,13 +10,13 @@
 
 enum {
     SERVED_UNIT = 17,
-    SERVED_BASE = 100, /* the address of the first cell of each table */
+    SERVED_BASE = 100, /* the address of the first register or bit of each table */
     SERVED_REGISTERS = 300,
     SERVED_BITS = 2400,
-    SERVED_HOLE = 250,    /* no holding register is there */
-    SERVED_REFUSED = 260, /* no holding register may be written with BEEF */
+    SERVED_HOLE = 250,    /* the address of a holding register that does not exist */
+    SERVED_REFUSED = 260, /* the address of a holding register that refuses the value BEEF */
     SERVED_CONNECTIONS = 4,
-    SERVED_ECHO = 0x41 /* a function that sends its data back */
+    SERVED_ECHO = 0x41 /* a function that returns its data */
 };
 
 typedef struct served {
@@ -36,7 +36,7 @@ typedef struct served {
     uint16_t records[20], queue[31];
     mbm_file file;
     mbm_fifo fifo;
-    unsigned written; /* how often the hook was told so */
+    unsigned written; /* how often the hook after a write was called */
 
     mbm_server servers[SERVED_CONNECTIONS];
     uint8_t frames[SERVED_CONNECTIONS][MBM_MAX_ASCII_FRAME];
@@ -49,7 +49,7 @@ typedef struct served {
     pthread_t thread;
 } served;
 
-/* Fills the tables with a known pattern and says what the units serve. */
+/* Fills the tables with a known pattern and registers what the units serve. */
 void served_prepare(served *s);
 
 uint16_t served_pattern(unsigned address);
@@ -58,8 +58,8 @@ uint8_t served_bit_pattern(unsigned address);
 /* Serves on a pty whose far end is s->line.path, RTU or ASCII. */
 void served_on_line(served *s, int framing);
 
-/* Serves connections to 127.0.0.1, s->port, TCP or RTU over TCP; more than
- * SERVED_CONNECTIONS at once are closed as they come. */
+/* Serves connections to 127.0.0.1, port s->port, TCP or RTU over TCP. Connections beyond
+ * SERVED_CONNECTIONS are closed at once. */
 void served_on_tcp(served *s, int framing);
 
 void served_stop(served *s);

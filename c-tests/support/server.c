@@ -48,8 +48,8 @@ static void *serve(void *argument)
         if (waits[1].revents)
             return NULL;
         length = modbus_receive(s->peer, request);
-        /* After a frame for another unit libmodbus takes the next one for that
-         * unit's reply. It is not to be one of ours. */
+        /* After a frame for another unit libmodbus takes the next frame for that unit's
+         * reply. That frame must not be a request of the test. */
         if (length == 0)
             modbus_receive(s->peer, request);
         if (length > 0)

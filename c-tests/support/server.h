@@ -1,4 +1,4 @@
-/* A real libmodbus RTU server in a thread, at the far end of a pty. */
+/* A libmodbus RTU server in a thread, at the far end of a pty. */
 #ifndef SERVER_H
 #define SERVER_H
 
@@ -12,7 +12,7 @@ enum { SERVER_BITS = 3000, SERVER_REGISTERS = 500 };
 typedef struct server {
     pty line;
     modbus_t *peer;
-    modbus_mapping_t *mapping; /* the server's own memory, for tests to look at */
+    modbus_mapping_t *mapping; /* the server's own memory, which tests may read */
     int stop[2];
     pthread_t thread;
 } server;
@@ -21,10 +21,10 @@ typedef struct server {
 void server_start(server *s, int unit);
 void server_stop(server *s);
 
-/* A memory that holds it, as every server here has. */
+/* Allocates a memory with this pattern, as every libmodbus server here has. */
 modbus_mapping_t *server_memory(void);
 
-/* The pattern: every cell differs from its neighbours. */
+/* The pattern: each register and bit differs from its neighbours. */
 uint16_t server_pattern(unsigned address);
 uint8_t server_bit_pattern(unsigned address);
 

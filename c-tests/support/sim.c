@@ -71,8 +71,8 @@ void sim_deliver(sim *s, uint64_t at, const uint8_t *bytes, size_t length)
     }
 }
 
-/* A whole request has left: now its answers have a time. */
-static void heard(sim *s, const sim_frame *frame)
+/* A complete request has left. From now on its answers have a time. */
+static void request_ended(sim *s, const sim_frame *frame)
 {
     unsigned i;
 
@@ -97,7 +97,7 @@ static void byte_sent(sim *s, uint8_t byte)
         frame->begin = s->now;
         frame->silence = s->now - s->last_byte;
         if (s->driver_on)
-            s->driver_on = 2; /* has begun this frame */
+            s->driver_on = 2; /* the frame has begun with the driver on */
     }
     s->transmitted = s->last_byte = frame->end = start + s->character;
     if (frame->length < sizeof frame->bytes)
@@ -106,7 +106,7 @@ static void byte_sent(sim *s, uint8_t byte)
         sim_deliver(s, start, &byte, 1);
     if (request_parse(&parsed, frame->bytes, frame->length)) {
         frame->whole = 1;
-        heard(s, frame);
+        request_ended(s, frame);
     }
 }
 
@@ -216,7 +216,7 @@ int sim_teardown(void **state)
     sim *s = (sim *)*state, end = *s;
     unsigned i, cut = 0;
 
-    free(s); /* first, for what follows may not return */
+    free(s); /* before the checks, since they may not return */
     for (i = 0; i < end.sent; i++)
         cut += !end.frames[i].whole;
     assert_int_equal(cut, end.cut_allowed);

@@ -1,5 +1,5 @@
-/* One master on a simulated wire with a clock of its own: nothing waits, all
- * times are exact, and everything that happens is recorded. */
+/* One master on a simulated wire with a clock of its own. Nothing waits, all times are
+ * exact, and everything that happens is recorded. */
 #ifndef SIM_H
 #define SIM_H
 
@@ -12,12 +12,12 @@ enum { SIM_BYTES = 8192, SIM_FRAMES = 256, SIM_ANSWERS = 32, SIM_ORDER = 512 };
 
 typedef struct sim sim;
 
-/* One request on the wire. Times are in microseconds since the test began. */
+/* One request on the wire. Times are microseconds since the test began. */
 typedef struct sim_frame {
-    uint64_t begin, end; /* first byte handed over; last bit gone */
-    uint64_t silence;    /* from the last byte seen or sent to `begin` */
+    uint64_t begin, end; /* first byte handed over; last bit sent */
+    uint64_t silence;    /* from the last byte received or sent to `begin` */
     uint16_t length;
-    uint8_t whole; /* a request that the standard allows, right CRC */
+    uint8_t whole; /* 1: a request that the standard allows, with a right CRC */
     uint8_t bytes[256];
 } sim_frame;
 
@@ -30,39 +30,39 @@ struct sim {
 
     /* the clock */
     uint64_t now;
-    uint64_t limit;       /* the test fails beyond: a hang */
-    uint32_t clock_start; /* what the clock showed when `now` was 0 */
-    uint32_t step;        /* each look at the clock takes so long */
+    uint64_t limit;       /* the test fails when `now` passes it: the call hangs */
+    uint32_t clock_start; /* the time that the clock showed when `now` was 0 */
+    uint32_t step;        /* microseconds that each read of the clock takes */
     mbm_master *waits;    /* the master that the idle hook was called for last */
-    uint32_t idle_step;   /* an idle hook takes so long, less if a byte comes */
+    uint32_t idle_step;   /* microseconds that an idle hook takes, less if a byte arrives */
 
-    /* the wire and its faults; 0 is none */
-    uint32_t character;     /* a byte takes so long, in both directions */
-    uint16_t write_piece;   /* write accepts at most so many */
-    uint16_t write_busy;    /* write accepts nothing so often before it does */
-    uint16_t write_dies_at; /* link lost after so many bytes of a request */
-    uint16_t read_piece;    /* read gives at most so many */
-    int16_t overclaim;      /* read and write claim so many more than asked */
+    /* the wire and its faults; 0 means none */
+    uint32_t character;     /* microseconds that a byte takes, in both directions */
+    uint16_t write_piece;   /* the most bytes that write accepts at once */
+    uint16_t write_busy;    /* how often write accepts nothing before it accepts bytes */
+    uint16_t write_dies_at; /* the link is lost after this many bytes of a request */
+    uint16_t read_piece;    /* the most bytes that read returns at once */
+    int16_t overclaim;      /* how many bytes too many read and write claim */
     uint8_t write_never, flush_never, flush_lies, read_dead, echo;
 
-    /* what the test may hook in */
-    void (*device)(sim *s, const sim_frame *frame); /* heard a whole request */
+    /* functions of the test */
+    void (*device)(sim *s, const sim_frame *frame); /* called after a complete request */
     void (*on_idle)(sim *s);
-    void (*tap)(sim *s, uint8_t byte); /* the master read a byte */
+    void (*tap)(sim *s, uint8_t byte); /* called when the master has read a byte */
     void *context;
 
     /* what happened */
     sim_frame frames[SIM_FRAMES];
-    unsigned sent;         /* frames begun, the last at sent - 1 */
-    char order[SIM_ORDER]; /* P W F O I R, runs collapsed */
+    unsigned sent;         /* number of frames begun; the last is at sent - 1 */
+    char order[SIM_ORDER]; /* P W F O I R, repetitions once */
     uint64_t order_at[SIM_ORDER];
     size_t order_length;
     unsigned idles, driver_on;
     unsigned idle_while_driving, write_without_driver, post_before_last_bit;
-    unsigned cut_allowed; /* frames that the test itself cut short */
+    unsigned cut_allowed; /* number of frames that the test itself cuts short */
     uint64_t last_byte, transmitted;
 
-    /* what is still to arrive */
+    /* bytes that are still to arrive */
     struct {
         uint64_t at;
         uint8_t byte;
@@ -78,48 +78,48 @@ struct sim {
     uint16_t busy;
 };
 
-/* cmocka's setup and teardown: a begun master for unit 17 with full buffers in
- * *state; at the end nothing malformed may have been sent. */
+/* cmocka's setup and teardown. Setup makes a master that is begun for unit 17, with full
+ * buffers, in *state. Teardown fails if a malformed frame was sent. */
 int sim_setup(void **state);
 int sim_teardown(void **state);
 
-/* Begins to talk to `unit` over the simulated wire, with its hooks. */
+/* Begins the master for `unit` over the simulated wire, with its hooks. */
 void sim_begin(sim *s, uint8_t unit);
 
-/* Bytes of a text such as "11 03 02 00 0A +": + is the CRC of the frame so
- * far, / starts another frame. Returns how many. */
+/* Converts a text such as "11 03 02 00 0A +" to bytes: + is the CRC of the frame so far, /
+ * begins another frame. Returns how many bytes. */
 size_t sim_bytes(uint8_t *bytes, const char *text);
 
-/* Lets bytes arrive `delay` after the end of the nth request from now (1 is
- * the next); each byte takes its character time. */
+/* Lets bytes arrive `delay` microseconds after the end of the nth request from now (1 is
+ * the next). Each byte takes its character time. */
 void sim_answer(sim *s, unsigned nth, uint32_t delay, const char *text);
 
-/* Lets bytes arrive from `at` on. */
+/* Lets bytes arrive from time `at` on. */
 void sim_deliver(sim *s, uint64_t at, const uint8_t *bytes, size_t length);
 void sim_deliver_text(sim *s, uint64_t at, const char *text);
 
-/* Asserts that frame `index` is what the text says. */
+/* Asserts that the frame at `index` is that of the text. */
 void sim_assert_sent(const sim *s, unsigned index, const char *text);
 
 /* Asserts the order of the events whose letters are in `which`. */
 void sim_assert_order(const sim *s, const char *which, const char *order);
 
-/* Polls a non-blocking request to its end, with idle time between. */
+/* Polls a non-blocking request until it has ended, with idle time between. */
 uint8_t sim_poll(sim *s);
 
-/* When the first event of a kind happened. */
+/* The time at which the first event of a kind happened. */
 uint64_t sim_time_of(const sim *s, char event);
 
-/* What the simulation's own steps may add to a time, in microseconds. */
+/* The most that the simulation's own steps may add to a time, in microseconds. */
 enum { SIM_SLACK = 60 };
 void sim_assert_time(uint64_t time, uint64_t wanted);
 
-/* Reads register 0 of unit 17; the second answers that after `delay`, and
+/* sim_read_one reads register 0 of unit 17. sim_reads also answers it after `delay` and
  * asserts that it is read right. */
 uint8_t sim_read_one(sim *s);
 void sim_reads(sim *s, uint32_t delay);
 
-/* The simulation and its master in a test. */
+/* Declares the simulation and its master in a test. */
 #define NODE                                                                                       \
     sim *s = (sim *)*state;                                                                        \
     mbm_master *n = &s->master

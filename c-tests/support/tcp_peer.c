@@ -13,7 +13,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/* Replies that wait for others are sent after so long at the latest. */
+/* The longest time for which a reply waits for other replies. */
 enum { PATIENCE_MS = 250, HEADER = 6 };
 
 typedef struct scripted {
@@ -27,7 +27,7 @@ struct tcp_peer {
     modbus_t *replier;
     modbus_mapping_t *memory;
     pthread_t thread;
-    pthread_mutex_t lock; /* of all below */
+    pthread_mutex_t lock; /* protects all fields below */
     scripted script[TCP_PEER_SCRIPT];
     size_t scripts;
     tcp_fault kinds[FAULTS];
@@ -57,13 +57,13 @@ uint8_t tcp_peer_bit(unsigned address)
     return (uint8_t)(tcp_peer_word(address) >> 7 & 1u);
 }
 
-/* Milliseconds of the clock that delays count by. */
+/* Milliseconds of the clock that delays are counted by. */
 static int64_t now_ms(tcp_peer *p)
 {
     return held_clock_now(p->clock) / 1000;
 }
 
-/* --- what is played */
+/* --- the faults */
 
 static uint32_t draw(tcp_peer *p, uint32_t below)
 {
@@ -88,7 +88,7 @@ static unsigned fitting(tcp_peer *p, tcp_fault fault)
     }
 }
 
-/* The fault of request `number`; takes it out of the script. */
+/* The fault of request `number`. Removes it from the script. */
 static tcp_fault fault_of(tcp_peer *p, unsigned number, unsigned *argument)
 {
     tcp_fault fault = FAULT_NONE;
@@ -120,8 +120,8 @@ static void exception(const uint8_t *request, unsigned code, reply *r)
     r->length = 9;
 }
 
-/* What libmodbus answers, and what it would write to a socket. Of functions that
- * it does not have it would end the connection, or worse. */
+/* Gets libmodbus's reply: what it would write to a socket. libmodbus would end the
+ * connection, or worse, at functions that it does not have, so those get an exception here. */
 static void answer(tcp_peer *p, const uint8_t *request, size_t length, reply *r)
 {
     static const uint8_t has[] = {1, 2, 3, 4, 5, 6, 0x0F, 0x10, 0x11, 0x16, 0x17};
@@ -147,8 +147,8 @@ static void add16(uint8_t *bytes, unsigned more)
     bytes[1] = (uint8_t)value;
 }
 
-/* Plays what is not the right reply in one piece. Returns whether the right
- * reply went out as well. */
+/* Plays a fault other than a right reply in one piece. Returns whether the right reply was
+ * sent as well. */
 static int play(tcp_peer *p, stream *c, tcp_fault fault, unsigned argument, reply *r)
 {
     uint8_t garbage[TCP_PEER_FRAME];
@@ -223,14 +223,14 @@ static int64_t due_ms(const tcp_peer *p, int64_t latest)
     return latest;
 }
 
-static void tell_due(tcp_peer *p)
+static void set_clock_due(tcp_peer *p)
 {
     int64_t due = due_ms(p, HELD_CLOCK_NEVER / 1000);
 
     held_clock_due(p->clock, due < HELD_CLOCK_NEVER / 1000 ? 1000 * due : HELD_CLOCK_NEVER);
 }
 
-static void hear(tcp_peer *p, stream *c)
+static void receive(tcp_peer *p, stream *c)
 {
     const unsigned link = c->link;
     ssize_t count = recv(c->fd, c->input + c->have, sizeof c->input - c->have, 0);
@@ -255,7 +255,7 @@ static void hear(tcp_peer *p, stream *c)
         if (c->have - at < HEADER + length)
             break;
         serve(p, c, frame, HEADER + length);
-        tell_due(p);
+        set_clock_due(p);
         held_clock_done(p->clock, link, (uint32_t)(HEADER + length));
         if (c->fd < 0 || c->ended) {
             c->have = 0;
@@ -267,7 +267,7 @@ static void hear(tcp_peer *p, stream *c)
     memmove(c->input, c->input + at, c->have);
 }
 
-static void welcome(tcp_peer *p)
+static void accept_connection(tcp_peer *p)
 {
     const struct timeval patience = {2, 0};
     const int on = 1;
@@ -321,16 +321,16 @@ static void *run(void *argument)
             stream *c = &p->streams[i];
 
             if (c->fd >= 0 && waits[i].revents)
-                hear(p, c);
+                receive(p, c);
             if (c->fd >= 0)
                 stream_release(c, now_ms(p), 0);
             if (c->fd >= 0 && p->hang_up)
                 stream_end(c);
         }
-        tell_due(p);
+        set_clock_due(p);
         p->hang_up = 0;
         if (waits[i].revents)
-            welcome(p);
+            accept_connection(p);
         pthread_mutex_unlock(&p->lock);
     }
 }
@@ -340,7 +340,7 @@ static void wake(tcp_peer *p, char what)
     must(write(p->wake[1], &what, 1) == 1, "wake");
 }
 
-/* --- what tests call */
+/* --- functions for tests */
 
 tcp_peer *tcp_peer_new(void)
 {
@@ -354,7 +354,7 @@ tcp_peer *tcp_peer_new(void)
     must(pipe(p->wake) == 0, "pipe");
     must(socketpair(AF_UNIX, SOCK_SEQPACKET, 0, p->capture) == 0, "socketpair");
     must(modbus_set_socket(p->replier, p->capture[0]) == 0, "modbus_set_socket");
-    /* It sleeps so long after what it does not like. */
+    /* libmodbus sleeps for this time after a request that it does not accept. */
     must(modbus_set_response_timeout(p->replier, 0, 1) == 0, "modbus_set_response_timeout");
     for (i = 0; i < TCP_PEER_CELLS; i++) {
         p->memory->tab_registers[i] = tcp_peer_word(i);

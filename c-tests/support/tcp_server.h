@@ -1,5 +1,5 @@
-/* A real libmodbus TCP server in a thread, on a port of its own; it takes one
- * connection after the other. */
+/* A libmodbus TCP server in a thread, on a port of its own. It serves one connection after
+ * the other. */
 #ifndef TCP_SERVER_H
 #define TCP_SERVER_H
 
@@ -11,7 +11,7 @@ typedef struct tcp_server {
     uint16_t port;
     int listener;
     modbus_t *peer;
-    modbus_mapping_t *mapping; /* the server's own memory, for tests to look at */
+    modbus_mapping_t *mapping; /* the server's own memory, which tests may read */
     int stop[2];
     pthread_t thread;
 } tcp_server;
@@ -20,11 +20,13 @@ typedef struct tcp_server {
 void tcp_server_start(tcp_server *s);
 void tcp_server_stop(tcp_server *s);
 
-/* A socket that listens on a free port of this machine, and one connected to such. */
+/* tcp_listen makes a socket that listens on a free port of this machine; tcp_connect makes
+ * one that is connected to such a port. */
 int tcp_listen(uint16_t *port);
 int tcp_connect(uint16_t port);
 
-/* One that keeps a free port for listeners with SO_REUSEADDR: nobody else gets it. */
+/* Makes a socket that reserves a free port for listeners with SO_REUSEADDR: no other
+ * program gets it. */
 int tcp_reserve(uint16_t *port);
 
 #endif

@@ -21,7 +21,7 @@ void stream_reset(stream *c)
     stream_let_go(c);
 }
 
-/* A close with bytes unread would be a reset. */
+/* Does not close the socket: a close while bytes are unread would be a reset. */
 void stream_end(stream *c)
 {
     shutdown(c->fd, SHUT_WR);

@@ -1,4 +1,4 @@
-/* cmocka, with what it wants included before it. */
+/* cmocka, with the headers that it needs included first. */
 #ifndef TEST_H
 #define TEST_H
 
@@ -11,7 +11,7 @@
 
 #define COUNT(array) (sizeof(array) / sizeof((array)[0]))
 
-/* What a call of mbm.h returns. */
+/* Compares the status that a function of mbm.h returns. */
 #define IS(status, call) assert_int_equal(call, status)
 #define OK(call) IS(MBM_OK, call)
 

@@ -1,11 +1,11 @@
-/* Calls from within hooks, which change nothing. Include test.h and string.h before. */
+/* For calls from within hooks that must change nothing. Include test.h and string.h first. */
 #ifndef UNCHANGED_H
 #define UNCHANGED_H
 
-/* How often each kind of hook was entered with calls of its own. */
+/* How often a hook has made its calls. */
 static unsigned entered;
 
-/* Looks at the object before and after what is called. */
+/* Asserts that the calls leave the object as it was. */
 #define UNCHANGED_BY(object, calls)                                                                \
     do {                                                                                           \
         static uint8_t before[sizeof(object)];                                                     \

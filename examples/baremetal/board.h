@@ -1,20 +1,20 @@
-/* What the application wants of a board: a UART without waiting, a clock, and
- * somewhere to say how it went. Each has one file per kind of hardware.
+/* What the application needs from a board: a UART whose functions do not wait, a clock, and
+ * a console. Each has one file for each kind of hardware.
  * Licence: MIT OR Apache-2.0. */
 #ifndef BOARD_H
 #define BOARD_H
 
 #include <stdint.h>
 
-/* 8 data bits, no parity, 1 stop bit. Slow, since that makes the silence behind
- * a frame long: QEMU's UARTs have no rate, but a busy computer may pause inside
- * a frame for longer than any wire would. */
+/* 8 data bits, no parity, 1 stop bit. The low rate makes the silence after a frame long.
+ * QEMU's UARTs have no rate, but a busy computer may pause inside a frame for longer than
+ * any wire would. */
 enum { BAUD = 2400 };
 
-/* Clocks and pins, before all else. */
+/* Sets up clocks and pins. Called before all other functions. */
 void machine_start(void);
 
-/* The hooks of mbm_port; there is one UART, so context is not used. */
+/* The hooks of mbm_port. There is one UART, so they do not use `context`. */
 void uart_start(void);
 int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity);
 int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length);
@@ -23,8 +23,8 @@ uint8_t uart_flush(void *context);
 void clock_start(void);
 uint32_t clock_micros(void *context);
 
-/* The debugger's console; QEMU plays the debugger. On a board of your own, an
- * LED and an endless loop do as well. */
+/* Prints to the debugger's console. QEMU plays the debugger. On your own board, use an LED
+ * and an endless loop instead. */
 void console_print(const char *text);
 _Noreturn void console_exit(uint8_t code);
 

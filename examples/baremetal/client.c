@@ -1,6 +1,6 @@
-/* A Modbus client on a board without an operating system: requests are queued,
- * the UART's interrupt fills a ring with what comes back, and the main loop sleeps
- * whenever the client has nothing to do. The requests are those of main.c.
+/* A Modbus client on a board without an operating system. The main loop queues requests and
+ * sleeps whenever the client has nothing to do. The UART's interrupt fills a ring with the
+ * received bytes. The requests are those of main.c.
  * Licence: MIT OR Apache-2.0. */
 #include "board.h"
 #include "mbm.h"
@@ -9,7 +9,8 @@
 
 enum { TIMEOUT = PRESENT_TIMEOUT };
 
-/* A request of main.c, what its end should be, and what queues it. */
+/* A request of main.c: its name, the function that queues it, its unit and the expected
+ * status. */
 typedef struct task {
     const char *name;
     uint8_t (*queue)(mbm_clientRequest *request);
@@ -22,8 +23,8 @@ static mbm_counters counters;
 static mbm_clientRequest requests[STEPS + 1];
 static uint8_t frame[MBM_MAX_FRAME];
 
-/* One for all: a serial line has one request under way, and its reply is noted
- * before the next begins. */
+/* One buffer for all replies: a serial line has one request under way at a time, and the
+ * reply is noted before the next request begins. */
 static uint16_t reply[MBM_MAX_READ_REGISTERS];
 
 static uint16_t report[REPORT_SIZE];
@@ -130,16 +131,17 @@ static const task tasks[STEPS] = {
     [MASK_WRITE] = {"mask a register", mask_write, UNIT, MBM_OK},
     [READ_WRITE] = {"write 2 registers and read 6", read_write, UNIT, MBM_OK},
     [READ_LONGEST] = {"read 125 registers", read_longest, UNIT, MBM_OK},
-    [READ_ABSENT_REGISTER] = {"read a register that is not there", read_absent_register, UNIT,
+    [READ_ABSENT_REGISTER] = {"read an absent register", read_absent_register, UNIT,
                               MBM_ILLEGAL_DATA_ADDRESS},
-    [BROADCAST] = {"write a register of every unit", write_everywhere, 0, MBM_OK},
-    [READ_WHAT_WAS_BROADCAST] = {"read it", read_what_was_broadcast, UNIT, MBM_OK},
-    [ASK_ABSENT_UNIT] = {"ask a unit that is not there", read_one, ABSENT_UNIT,
+    [BROADCAST] = {"write a register in every unit", write_everywhere, 0, MBM_OK},
+    [READ_WHAT_WAS_BROADCAST] = {"read the broadcast register", read_what_was_broadcast, UNIT,
+                                 MBM_OK},
+    [ASK_ABSENT_UNIT] = {"read from a unit that is absent", read_one, ABSENT_UNIT,
                          MBM_RESPONSE_TIMED_OUT},
     [READ_AGAIN] = {"read again", read_two, UNIT, MBM_OK},
 };
 
-/* Notes how a request ended: its status, and the words that it brought. */
+/* Notes the status of a request that has ended, and the sum of the words that it read. */
 static void note(void *context, mbm_clientRequest *request)
 {
     const task *t = context;
@@ -147,7 +149,7 @@ static void note(void *context, mbm_clientRequest *request)
     uint8_t i, count = (uint8_t)((request->length + 1u) / 2u);
     uint16_t sum = 0;
 
-    /* The place of a word counts, so that words in a wrong order show. */
+    /* Each word is weighted with its position, so that a wrong order changes the sum. */
     for (i = 0; i < count; i++)
         sum = (uint16_t)(sum + (i + 1u) * reply[i]);
     for (i = 0; i < MBM_MAX_READ_REGISTERS; i++)

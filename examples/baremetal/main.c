@@ -1,5 +1,5 @@
-/* A Modbus master on a board without an operating system: it sends each kind
- * of request once and reports what came of it.
+/* A Modbus master on a board without an operating system. It sends each kind of request
+ * once and reports how the requests ended.
  * Licence: MIT OR Apache-2.0. */
 #include "board.h"
 #include "mbm.h"
@@ -14,14 +14,14 @@ static uint8_t frame[MBM_FRAME_BYTES(MBM_MAX_READ_REGISTERS)];
 
 static uint16_t report[REPORT_SIZE];
 
-/* Notes how a request ended: its status, and the words that it brought. */
+/* Notes the status of a request that has ended, and the sum of the words that it read. */
 static void note(enum step step, const char *name, uint8_t status, uint8_t expected)
 {
     uint16_t *words = report + REPORT_HEAD + STEP_SIZE * (unsigned)step;
     uint8_t i, count = mbm_master_available(&node);
     uint16_t sum = 0;
 
-    /* The place of a word counts, so that words in a wrong order show. */
+    /* Each word is weighted with its position, so that a wrong order changes the sum. */
     for (i = 0; i < count; i++)
         sum = (uint16_t)(sum + (i + 1u) * mbm_master_receive(&node));
     words[STEP_STATUS] = status;
@@ -77,15 +77,15 @@ static void write_and_read(void)
          MBM_OK);
 }
 
-static void meet_refusals(void)
+static void failing_requests(void)
 {
     uint32_t start;
 
-    note(READ_ABSENT_REGISTER, "read a register that is not there",
+    note(READ_ABSENT_REGISTER, "read an absent register",
          mbm_master_readHoldingRegisters(&node, 60000, 1), MBM_ILLEGAL_DATA_ADDRESS);
 
     mbm_master_setSlaveID(&node, 0);
-    note(BROADCAST, "write a register of every unit",
+    note(BROADCAST, "write a register in every unit",
          mbm_master_writeSingleRegister(&node, 130, 0x5A5A), MBM_OK);
     mbm_master_setSlaveID(&node, UNIT);
     note(READ_WHAT_WAS_BROADCAST, "read it", mbm_master_readHoldingRegisters(&node, 130, 1),
@@ -94,7 +94,7 @@ static void meet_refusals(void)
     mbm_master_setSlaveID(&node, ABSENT_UNIT);
     mbm_master_setResponseTimeout(&node, ABSENT_TIMEOUT);
     start = clock_micros(0);
-    note(ASK_ABSENT_UNIT, "ask a unit that is not there",
+    note(ASK_ABSENT_UNIT, "read from a unit that is absent",
          mbm_master_readHoldingRegisters(&node, 0, 1), MBM_RESPONSE_TIMED_OUT);
     report[REPORT_ABSENT_MILLIS] = (uint16_t)((clock_micros(0) - start) / 1000u);
     mbm_master_setResponseTimeout(&node, PRESENT_TIMEOUT);
@@ -138,7 +138,7 @@ int main(void)
     write();
     read();
     write_and_read();
-    meet_refusals();
+    failing_requests();
     if (send_report() != MBM_OK)
         return 255;
     return report[REPORT_UNEXPECTED];

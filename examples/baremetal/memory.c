@@ -1,6 +1,6 @@
-/* The functions that compilers call on their own account, for programs without
- * a C library. Built with -fno-tree-loop-distribute-patterns, or the
- * loops would become calls to themselves.
+/* The functions that compilers call by themselves, for programs without a C
+ * library. Compile this file with -fno-tree-loop-distribute-patterns, or the compiler turns
+ * the loops into calls of these same functions.
  * Licence: MIT OR Apache-2.0. */
 #include <stddef.h>
 
@@ -51,8 +51,7 @@ int memcmp(const void *left, const void *right, size_t length)
 }
 
 #if defined(__arm__)
-/* The names that Arm's interface for compilers has for them. The figures are
- * the alignment of both ends. */
+/* Their names in Arm's run-time ABI. The digit is the alignment of both pointers. */
 void __aeabi_memcpy(void *to, const void *from, size_t length);
 void __aeabi_memcpy4(void *to, const void *from, size_t length);
 void __aeabi_memcpy8(void *to, const void *from, size_t length);

@@ -1,5 +1,5 @@
-/* How the firmware tells what it found: words that it writes into the
- * device's holding registers when all is done.
+/* The firmware's report: words that it writes into the device's holding registers after all
+ * requests.
  * Licence: MIT OR Apache-2.0. */
 #ifndef REPORT_H
 #define REPORT_H
@@ -25,12 +25,12 @@ enum step {
     STEPS
 };
 
-/* The words in front of those of the steps. */
+/* The words before those of the steps. */
 enum {
     REPORT_MAGIC,
     REPORT_STEPS,
-    REPORT_UNEXPECTED,    /* steps that ended otherwise than they should */
-    REPORT_ABSENT_MILLIS, /* how long the absent unit was waited for */
+    REPORT_UNEXPECTED,    /* number of steps that ended with another status than expected */
+    REPORT_ABSENT_MILLIS, /* how long the master waited for the absent unit */
     REPORT_REQUESTS,      /* the low words of the counters */
     REPORT_REPLIES,
     REPORT_EXCEPTIONS,
@@ -38,13 +38,13 @@ enum {
     REPORT_TIMEOUTS,
     REPORT_FOREIGN_FRAMES,
     REPORT_RESYNCHRONISATIONS,
-    REPORT_POLLS,      /* of the application that sleeps, else 0: how often it polled, */
-    REPORT_SLEEPS,     /* and slept; */
-    REPORT_LOST_BYTES, /* what its ring had no room for */
+    REPORT_POLLS,      /* how often the sleeping application polled, else 0 */
+    REPORT_SLEEPS,     /* how often it slept */
+    REPORT_LOST_BYTES, /* bytes that its ring lost because it was full */
     REPORT_HEAD
 };
 
-/* The words of a step. */
+/* The words of each step. */
 enum { STEP_STATUS, STEP_WORDS, STEP_SUM, STEP_SIZE };
 
 enum {
@@ -53,8 +53,7 @@ enum {
     REPORT_IS_HERE = 0x6D62,
     UNIT = 17,
     ABSENT_UNIT = 99,
-    /* Milliseconds. A simulator hands bytes over one by one, slowly where it has not
-     * much of a computer. */
+    /* Milliseconds. A simulator delivers bytes one by one, slowly on a slow computer. */
     PRESENT_TIMEOUT = 10000,
     ABSENT_TIMEOUT = 150
 };

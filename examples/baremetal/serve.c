@@ -1,5 +1,5 @@
-/* A Modbus server on a board without an operating system: four arrays, of which
- * the inputs follow what is written to the others.
+/* A Modbus server on a board without an operating system: four arrays. What is written to
+ * the holding registers and coils also changes the input registers and discrete inputs.
  * Licence: MIT OR Apache-2.0. */
 #include "serve.h"
 #include "board.h"
@@ -14,9 +14,9 @@ static uint8_t coil_bits[(SERVE_CELLS + 7) / 8], input_bits[(SERVE_CELLS + 7) / 
 static mbm_registerTable holding, inputs;
 static mbm_bitTable coils, discrete;
 
-/* Refuses a write of which one value is too high. */
-static uint8_t registers_come(void *context, uint16_t address, uint16_t quantity,
-                              const uint8_t *data)
+/* Refuses a write if one of its values is too high. */
+static uint8_t registers_before(void *context, uint16_t address, uint16_t quantity,
+                                const uint8_t *data)
 {
     (void)context;
     (void)address;
@@ -48,7 +48,7 @@ static uint8_t is_over(void)
 {
     enum { END = SERVE_END - SERVE_BASE };
 
-    /* The response to the write that ends this has to leave first. */
+    /* The response to the write that ends the program must be sent first. */
     return (coil_bits[END / 8] >> END % 8 & 1) && mbm_server_pollDelay(&server) == UINT32_MAX;
 }
 
@@ -57,7 +57,7 @@ static void fill(void)
     holding.words = holding_words;
     holding.base = SERVE_BASE;
     holding.size = SERVE_CELLS;
-    holding.before = registers_come;
+    holding.before = registers_before;
     holding.after = registers_written;
     inputs.words = input_words;
     inputs.base = SERVE_BASE;

@@ -1,13 +1,13 @@
-/* Functions of one's own, in a client and in a server: both in this program, with
- * Modbus TCP on the loopback between them. 41 reads and 42 writes holding registers
- * of the server, of which there are ten.
+/* User-defined functions in a client and in a server. Both are in this program, with Modbus
+ * TCP on the loopback between them. Function 41 reads and function 42 writes the server's
+ * ten holding registers.
  *
- *     custom_command              asks what to do
- *     custom_command <script      does it, one command a line
+ *     custom_command              prompts for commands
+ *     custom_command <script      runs a script, one command a line
  *
  *     read A N        N registers from A on, by function 41
- *     write A V...    writes values there, by function 42
- *     raw F B...      any function with any data; all in hexadecimal
+ *     write A V...    writes values from A on, by function 42
+ *     raw F B...      any function with any data, all in hexadecimal
  *
  * The exit code is 0 if every command succeeded.
  *
@@ -96,7 +96,7 @@ static mbm_client client;
 static mbm_clientRequest request;
 static uint8_t data[DATA], reply[DATA];
 
-/* Both ends of the connection, for one wait. */
+/* Both ends of the connection, in one array for mbm_tcp_wait. */
 static mbm_tcp ends[2];
 static mbm_tcp_addresses addresses;
 static mbm_tcp *const client_end = &ends[0], *const server_end = &ends[1];
@@ -132,10 +132,10 @@ static int begin(void)
     return mbm_server_beginTcp(&server, &port, &unit, 1, frame, sizeof frame) == MBM_OK ? 0 : -1;
 }
 
-/* Sends `bytes` of data with a function; how it ended. */
-static uint8_t ask(uint8_t function, uint16_t bytes)
+/* Sends a function with `bytes` bytes of data. Returns the request's status. */
+static uint8_t call_function(uint8_t function, uint16_t bytes)
 {
-    /* On TCP a frame says itself how long it is. */
+    /* A TCP frame has a length field, so this rule allows any length. */
     const mbm_rule any = {0};
 
     memset(&request, 0, sizeof request);
@@ -167,8 +167,9 @@ static int failed(const char *what, uint8_t status)
 
 /* --- commands --- */
 
-/* The numbers behind a command: how many, or -1 if one is none or beyond `most`. */
-static int numbers(char *words, int base, unsigned long most, uint16_t *values, int room)
+/* Reads the numbers after a command. Returns how many, or -1 if one is not a number, is
+ * larger than `most`, or exceeds the capacity of `values`. */
+static int numbers(char *words, int base, unsigned long most, uint16_t *values, int capacity)
 {
     int count = 0;
     char *end, *word;
@@ -176,7 +177,7 @@ static int numbers(char *words, int base, unsigned long most, uint16_t *values, 
     for (word = strtok(words, " \t\n"); word; word = strtok(NULL, " \t\n")) {
         unsigned long value = strtoul(word, &end, base);
 
-        if (*end || word[0] == '-' || value > most || count == room)
+        if (*end || word[0] == '-' || value > most || count == capacity)
             return -1;
         values[count++] = (uint16_t)value;
     }
@@ -191,7 +192,7 @@ static int read_registers(const uint16_t *values, int count)
         return -1;
     put_word(data, values[0]);
     put_word(data + 2, values[1]);
-    if (failed("read", ask(CUSTOM_READ, 4)))
+    if (failed("read", call_function(CUSTOM_READ, 4)))
         return 1;
     if (request.length < 3 || reply[2] % 2 != 0 || request.length != 3 + reply[2] ||
         word_at(reply) != values[0])
@@ -212,7 +213,7 @@ static int write_registers(const uint16_t *values, int count)
     data[4] = (uint8_t)(2 * quantity);
     for (i = 0; i < quantity; i++)
         put_word(data + 5 + 2 * i, values[1 + i]);
-    if (failed("write", ask(CUSTOM_WRITE, (uint16_t)(5 + 2 * quantity))))
+    if (failed("write", call_function(CUSTOM_WRITE, (uint16_t)(5 + 2 * quantity))))
         return 1;
     if (request.length != 4 || word_at(reply) != values[0] || word_at(reply + 2) < 1 ||
         word_at(reply + 2) > REGISTERS)
@@ -221,7 +222,7 @@ static int write_registers(const uint16_t *values, int count)
     return 0;
 }
 
-static int ask_raw(const uint16_t *values, int count)
+static int call_raw(const uint16_t *values, int count)
 {
     int i;
 
@@ -229,7 +230,7 @@ static int ask_raw(const uint16_t *values, int count)
         return -1;
     for (i = 1; i < count; i++)
         data[i - 1] = (uint8_t)values[i];
-    if (failed("raw", ask((uint8_t)values[0], (uint16_t)(count - 1))))
+    if (failed("raw", call_function((uint8_t)values[0], (uint16_t)(count - 1))))
         return 1;
     printf("response:");
     for (i = 0; i < request.length; i++)
@@ -238,8 +239,8 @@ static int ask_raw(const uint16_t *values, int count)
     return 0;
 }
 
-/* 0 done, 1 refused, -1 not understood. */
-static int obey(const char *command, char *rest)
+/* Returns 0 if the command succeeded, 1 if it was refused, -1 if it was not understood. */
+static int run_command(const char *command, char *rest)
 {
     uint16_t values[1 + DATA];
 
@@ -248,11 +249,11 @@ static int obey(const char *command, char *rest)
     if (strcmp(command, "write") == 0)
         return write_registers(values, numbers(rest, 0, 0xFFFF, values, 1 + DATA));
     if (strcmp(command, "raw") == 0)
-        return ask_raw(values, numbers(rest, 16, 0xFF, values, 1 + DATA));
+        return call_raw(values, numbers(rest, 16, 0xFF, values, 1 + DATA));
     return -1;
 }
 
-/* What it is asked with --help, and how it is not to be asked. */
+/* Prints the usage: to stdout for --help, to stderr after bad arguments. */
 static int usage(const char *asked)
 {
     const int is_help = strcmp(asked, "--help") == 0 || strcmp(asked, "-h") == 0;
@@ -261,7 +262,7 @@ static int usage(const char *asked)
             "usage: custom_command [<SCRIPT]\n"
             "a prompt, or a script with one command a line:\n"
             "  read A N        N registers from A on, by function 41; there are ten\n"
-            "  write A V...    writes values there, by function 42\n"
+            "  write A V...    writes values from A on, by function 42\n"
             "  raw F B...      any function with any data, all in hexadecimal\n");
     return is_help ? 0 : 2;
 }
@@ -295,7 +296,7 @@ int main(int argc, char **argv)
             *rest++ = 0;
         if (!*command || *command == '#')
             continue;
-        outcome = obey(command, rest);
+        outcome = run_command(command, rest);
         if (outcome < 0)
             printf("%s: not understood\n", command);
         result |= outcome != 0;

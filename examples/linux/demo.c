@@ -1,6 +1,6 @@
-/* Shows every function of mbm at work against a libmodbus server at the far end
- * of a pty: the call, the frames in hex and in words, the result. What was
- * written is looked up in the server's own memory.
+/* Shows every function of mbm against a libmodbus server at the far end of a pty: the call,
+ * the frames in hex and in words, and the result. Written values are looked up in the
+ * server's own memory.
  *
  * Licence: MIT OR Apache-2.0. */
 #include "mbm_tty.h"
@@ -19,17 +19,17 @@ static mbm_counters counters;
 static uint16_t response[WORDS];
 static uint16_t transmit[WORDS];
 static uint8_t frame[MBM_FRAME_BYTES(WORDS)];
-static unsigned requests, surprises;
+static unsigned requests, unexpected;
 
 static void expect(int as_expected, const char *what)
 {
     if (!as_expected) {
-        surprises++;
+        unexpected++;
         printf("  NOT AS EXPECTED: %s\n", what);
     }
 }
 
-/* Hex and words on one line, or below each other where the hex is long. */
+/* Prints hex and words on one line, or below each other if the hex is long. */
 static void print_frame(uint8_t direction, const recording *kept)
 {
     const mbm_framing rtu = {0};
@@ -51,7 +51,7 @@ static void print_frame(uint8_t direction, const recording *kept)
     printf("%s\n", words);
 }
 
-/* Whether the request that was sent last reads; a reply to a write brings no words. */
+/* Returns whether the last request was a read. The response to a write has no words. */
 static int was_read(void)
 {
     uint8_t function = wire.sent.bytes[1];
@@ -59,8 +59,8 @@ static int was_read(void)
     return function <= 0x04 || function == 0x17;
 }
 
-/* Shows what the request that has just ended put on the wire, and its result:
- * the status, and the words that a read brought. */
+/* Prints the frames of the request that has just ended, and its result: the status and the
+ * words of a read. */
 static void show(uint8_t status, uint8_t expected_status)
 {
     uint8_t words = was_read() ? mbm_master_available(&node) : 0;
@@ -76,7 +76,7 @@ static void show(uint8_t status, uint8_t expected_status)
     expect(status == expected_status, mbm_status_text(expected_status));
 }
 
-/* Makes a call after it has printed it as a user would write it. */
+/* Prints a call as a user would write it, then makes it. */
 #define REQUEST(call, expected_status)                                                             \
     do {                                                                                           \
         recorder_clear(&wire);                                                                     \
@@ -84,13 +84,13 @@ static void show(uint8_t status, uint8_t expected_status)
         show(call, expected_status);                                                               \
     } while (0)
 
-/* Whether the words read are `there`, which the server holds. */
+/* Returns whether the words of the response are those in the server's memory. */
 static int read_words(const uint16_t *there, size_t count)
 {
     return mbm_master_available(&node) == count && memcmp(response, there, 2 * count) == 0;
 }
 
-/* Whether the bits read are `there`, one byte each, which the server holds. */
+/* Returns whether the bits of the response are those in the server's memory, one byte each. */
 static int read_bits(const uint8_t *there, unsigned count)
 {
     unsigned i;
@@ -122,7 +122,7 @@ static void begin(void)
            MBM_VERSION, UNIT, device.line.path);
 }
 
-/* The loop of ModbusMaster's Basic sketch. */
+/* One round of ModbusMaster's Basic sketch. */
 static void basic_sketch(void)
 {
     static uint32_t counter = 0x00010000;
@@ -190,7 +190,7 @@ static void without_waiting(void)
     mbm_master_setBlocking(&node, 1);
 }
 
-static void what_goes_wrong(void)
+static void failing_requests(void)
 {
     REQUEST(mbm_master_readHoldingRegisters(&node, SERVER_REGISTERS, 1), MBM_ILLEGAL_DATA_ADDRESS);
     printf("mbm_master_setSlaveID(&node, %d), mbm_master_setResponseTimeout(&node, 200), then\n",
@@ -219,11 +219,11 @@ int main(void)
     other_registers();
     bits();
     without_waiting();
-    what_goes_wrong();
+    failing_requests();
     show_counters();
     server_stop(&device);
-    if (surprises) {
-        printf("demo: %u of the results were not as expected\n", surprises);
+    if (unexpected) {
+        printf("demo: %u of the results were not as expected\n", unexpected);
         return 1;
     }
     printf("demo: %u requests to a libmodbus server, every result as expected\n", requests);

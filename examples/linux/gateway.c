@@ -1,26 +1,26 @@
-/* A gateway: Modbus TCP comes in, RTU goes out to the devices of serial lines.
+/* A gateway from Modbus TCP to the devices of RTU serial lines.
  *
  *     gateway [-i SECONDS] [-q QUIET] PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...
  *     gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,32-40
  *
- * The unit id says which line a request is for; a device has so many milliseconds
- * to respond. Nothing waits: while one line waits for a device, the others and all
- * connections go on. A connection has one request under way; what it sends behind
- * that waits in its socket. Prints `ready PORT` once it listens.
+ * The unit id of a request selects the line. MILLISECONDS is the response timeout of a
+ * device. The gateway never blocks: while one line waits for a device, the others and all
+ * connections go on. A connection has one request under way. Its next requests wait in its
+ * socket. Prints `ready PORT` once it listens.
  *
- * It has 16 places for connections, or as many as the system gives it descriptors for.
- * Where a new client finds none, the connection that has been idle for longest is closed,
- * if that is at least SECONDS (60). One whose device has not answered yet is not idle.
+ * The gateway has 16 places for connections, or fewer if the system gives it fewer
+ * descriptors. When a new client finds no place, the gateway closes the connection that has
+ * been idle for longest, if that is at least SECONDS (60). A connection whose device has
+ * not answered yet is not idle.
  *
- * Where there is no response to hand on, the gateway answers itself (V1.1b3, 7):
- * 0A for a unit of no line, a line that cannot be opened, is lost, or has as many
- * requests as it holds; 0B for a device that does not respond, or whose reply is
- * damaged or does not answer the request; 02 and 03 for a request that the standard
- * does not allow. Functions that it does not know pass through as they are.
+ * Without a response to pass on, the gateway answers itself (V1.1b3, 7): 0A if the unit has
+ * no line, or if its line cannot be opened, is lost, or has a full queue; 0B if the device
+ * does not respond, or if its reply is damaged or does not answer the request; 02 and 03
+ * for a request that the standard does not allow. It passes on unknown functions unchanged.
  *
- * A device may reply after its time is over. QUIET (100) is the quiet time that keeps
- * such a reply from being taken for the answer to the next request, in milliseconds. Make
- * it longer than a device takes for an answer.
+ * A device may reply after its timeout. QUIET (100) is the quiet time in milliseconds, which
+ * keeps such a reply from being taken for the answer to the next request. Make it longer
+ * than a device takes to answer.
  *
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
@@ -39,17 +39,17 @@
 #include <unistd.h>
 
 enum {
-    CONNECTIONS = 16, /* no more than a client holds requests */
+    CONNECTIONS = 16, /* as many as a client's queue has requests */
     LINES = 4,
     DATA = 252,
     REOPEN_MICROS = 1000000,
-    NAP_MICROS = 10000, /* where the system refuses to poll */
+    NAP_MICROS = 10000, /* the sleep if the system refuses to poll */
     IDLE_SECONDS = 60,
     PATH_UNAVAILABLE = MBM_REPLY_EXCEPTION | 0x0A,
     NO_RESPONSE = MBM_REPLY_EXCEPTION | 0x0B
 };
 
-/* A serial line and the client that asks its devices. */
+/* A serial line and the client for its devices. */
 typedef struct line {
     mbm_tty tty;
     int failure; /* errno of the last attempt to open it */
@@ -57,20 +57,20 @@ typedef struct line {
     mbm_tty_options options;
     mbm_client client;
     const char *path;
-    uint32_t tried; /* when it was opened last, if it is not open */
+    uint32_t tried; /* when it was last tried to open the line, while it is not open */
     uint8_t is_open;
     uint8_t frame[MBM_MAX_FRAME];
 } line;
 
-/* A connection, whose one unit is every unit. */
+/* A connection. Its server has one unit, which answers for every unit id. */
 typedef struct connection {
     mbm_server server;
     mbm_unit unit;
     mbm_custom every;
     mbm_clientRequest request;
-    line *asked; /* whose device has the request; else NULL */
+    line *asked; /* the line whose device has the request, or NULL */
     uint8_t reply[DATA];
-    uint8_t frame[2 * MBM_MAX_TCP_FRAME]; /* a request and, behind it, its response */
+    uint8_t frame[2 * MBM_MAX_TCP_FRAME]; /* a request and, after it, its response */
 } connection;
 
 /* All storage is the program's own; mbm allocates nothing. */
@@ -80,9 +80,9 @@ static line *route[256];
 static connection connections[CONNECTIONS];
 static mbm_tcp tcps[CONNECTIONS];
 static mbm_tcp_listener listener;
-static long quiet = 100; /* milliseconds; as the client has it at first */
+static long quiet = 100; /* milliseconds; the client's default */
 static volatile sig_atomic_t is_over;
-static sigset_t awake; /* the signals that come while it works wait for its sleep */
+static sigset_t awake; /* the signal mask during a sleep, which SIGINT and SIGTERM may end */
 
 static void finish(int number)
 {
@@ -100,8 +100,8 @@ static uint32_t micros(void)
 
 /* --- lines --- */
 
-/* Where descriptors are short, a connection that waits would take that of a line which
- * is lost, and the line could not be opened again. */
+/* Keeps a descriptor for a lost line. Without it, a waiting connection could take the
+ * line's descriptor, and the line could not be opened again. */
 static void keep_reserve(line *l)
 {
     int fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
@@ -140,15 +140,15 @@ static uint8_t open_line(void *context)
     return l->is_open ? MBM_OK : MBM_LINK_LOST;
 }
 
-/* A line that hung up while nobody asked is opened again by who does. */
+/* A line that hung up between requests is opened again for the next request. */
 static void hang_up(line *l)
 {
     close_line(l);
     l->tried = micros() - REOPEN_MICROS;
 }
 
-/* Opens a line that is not open, now and then. */
-static int is_there(line *l)
+/* Opens a line that is not open, at most once a second. Returns whether it is open. */
+static int open_if_due(line *l)
 {
     const mbm_linkHooks link = {l, close_line, open_line};
     struct pollfd idle = {l->tty.fd, 0, 0};
@@ -161,7 +161,7 @@ static int is_there(line *l)
     return l->is_open;
 }
 
-/* Moves the requests of a line on. A line that is lost has ended them all. */
+/* Moves the requests of a line on. When the line is lost, all its requests have ended. */
 static void poll_line(line *l)
 {
     mbm_client_poll(&l->client);
@@ -178,14 +178,14 @@ static int add_line(char *text, uint16_t timeout)
     line *l = &lines[line_count];
     struct termios unused = {0};
     unsigned baud, stop, first, last, unit;
-    char parity, behind;
+    char parity, extra;
     mbm_port port;
     char *rest = strchr(text, ',');
 
     if (!rest || line_count == LINES)
         return -1;
     *rest++ = 0;
-    if (sscanf(rest, "%u,%c%u,%u-%u%c", &baud, &parity, &stop, &first, &last, &behind) != 5 ||
+    if (sscanf(rest, "%u,%c%u,%u-%u%c", &baud, &parity, &stop, &first, &last, &extra) != 5 ||
         first < 1 || first > last || last > 247 || stop > 2 || baud < 50)
         return -1;
     l->path = text;
@@ -221,7 +221,7 @@ static int is_unanswered(const mbm_request *request)
            request->data[0] == 0 && request->data[1] == MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY;
 }
 
-/* What became of a request that a device had. */
+/* The response to a request that has ended at its device. */
 static uint16_t outcome(const connection *c, uint8_t *response, uint16_t capacity)
 {
     if (c->request.status == MBM_OK) {
@@ -237,16 +237,16 @@ static uint16_t outcome(const connection *c, uint8_t *response, uint16_t capacit
     return NO_RESPONSE;
 }
 
-/* Its request goes to a line, or NULL: none is under way. The connection is not idle
- * meanwhile, however long its device takes. */
+/* Notes the line that has the connection's request, NULL when the request has ended. Until
+ * then the connection is not idle, however long its device takes. */
 static void become_busy(connection *c, line *l)
 {
     c->asked = l;
     tcps[c - connections].isBusy = l != NULL;
 }
 
-/* Serves every function of every unit: asks the device, and is asked again until
- * that has answered. */
+/* Serves every function of every unit: passes the request to the line's client, and is
+ * called again until the request has ended. */
 static uint16_t forward(void *context, const mbm_request *request, uint8_t *response,
                         uint16_t capacity)
 {
@@ -262,14 +262,15 @@ static uint16_t forward(void *context, const mbm_request *request, uint8_t *resp
             return MBM_REPLY_NONE;
         return outcome(c, response, capacity);
     }
-    if (!l || !is_there(l))
+    if (!l || !open_if_due(l))
         return PATH_UNAVAILABLE;
     memset(&c->request, 0, sizeof c->request);
     c->request.unit = request->unit;
     c->request.reply = c->reply;
     c->request.replyBytes = sizeof c->reply;
-    /* The request's data stay where they are until it is answered. A reply that does
-     * not answer this request, for example a late one to another client, is not taken. */
+    /* The request's data stay where they are until the response is sent. The client does
+     * not accept a reply that does not answer this request, for example a late one to
+     * another client. */
     status = mbm_client_forward(&l->client, &c->request, request->function, request->data,
                                 request->length);
     switch (status) {
@@ -306,18 +307,18 @@ static void drop_connection(unsigned place)
 {
     connection *c = &connections[place];
 
-    /* What it asked is nobody's any more. */
+    /* The connection is gone, so its request is given up. */
     if (c->asked)
         mbm_client_cancel(&c->asked->client, &c->request);
     mbm_tcp_close(&tcps[place]);
 }
 
-/* What to poll a connection for. */
+/* The events to poll a connection for. */
 static short events_of(unsigned place)
 {
     const connection *c = &connections[place];
 
-    /* Its next request may wait. */
+    /* The connection has a request under way. Its next request may wait in the socket. */
     if (c->asked)
         return c->request.status == MBM_PENDING ? 0 : POLLOUT;
     /* The socket was full. */
@@ -326,11 +327,11 @@ static short events_of(unsigned place)
 
 /* --- all of it --- */
 
-/* What one sleep polls: only descriptors that there are, since the system refuses a list
- * that is longer than the limit of descriptors. */
+/* The descriptors of one sleep. A descriptor that is not open is left out, since the system
+ * refuses a list that is longer than the limit of descriptors. */
 static struct {
     struct pollfd polls[1 + LINES + CONNECTIONS];
-    uint8_t owner[1 + LINES + CONNECTIONS]; /* a line, or LINES and on: a connection */
+    uint8_t owner[1 + LINES + CONNECTIONS]; /* a line's index; from LINES on, a connection's */
     nfds_t count;
 } waits;
 
@@ -359,7 +360,7 @@ static void wait_for_work(void)
         mbm_client *client = &lines[i].client;
         uint32_t own = mbm_client_pollDelay(client);
 
-        /* An idle client takes no bytes; a line that hangs up ends the sleep all the same. */
+        /* An idle client reads no bytes, so only a hang-up of its line ends the sleep. */
         if (lines[i].is_open)
             wait_on(lines[i].tty.fd, mbm_client_pending(client) != 0 ? POLLIN : 0, i);
         delay = own < delay ? own : delay;
@@ -372,7 +373,8 @@ static void wait_for_work(void)
     else if (delay > MBM_TCP_RETRY)
         delay = MBM_TCP_RETRY;
     if (sleep_for(delay) < 0 && errno != EINTR) {
-        /* The system refuses to poll: it has no memory, or its limit was lowered. */
+        /* The system refuses to poll: it has no memory, or the limit of descriptors was
+         * lowered. */
         waits.count = 0;
         (void)sleep_for(NAP_MICROS);
     }
@@ -407,13 +409,13 @@ static int usage(int wrong)
     return wrong ? 2 : 0;
 }
 
-/* A number from `least` to `most`, or -1. */
+/* Returns a number from `least` to `most`, or -1. */
 static long number(const char *text, long least, long most)
 {
-    char *behind;
-    long value = strtol(text, &behind, 10);
+    char *extra;
+    long value = strtol(text, &extra, 10);
 
-    return behind != text && !*behind && value >= least && value <= most ? value : -1;
+    return extra != text && !*extra && value >= least && value <= most ? value : -1;
 }
 
 int main(int argc, char **argv)

@@ -128,7 +128,7 @@ static uint8_t open_tty_again(void *context)
     return MBM_LINK_LOST;
 }
 
-/* An idle client takes no bytes, so it does not see that a server hangs up. */
+/* An idle client reads no bytes, so it does not notice that the server hangs up. */
 static int is_lost(line *l)
 {
     int is_connected = mbm_client_isConnected(&l->client);
@@ -141,7 +141,7 @@ static int is_lost(line *l)
     return !is_connected || l->tty.fd < 0;
 }
 
-/* Opening the link again forgets why it was lost. */
+/* Keeps the reason of a lost link, since opening the link again clears it. */
 static void keep_reason(line *l)
 {
     const int error = l->is_tcp ? l->tcp.error : l->tty.error;
@@ -194,7 +194,7 @@ void line_rest(line *l, uint32_t milliseconds)
 {
     uint32_t micros = mbm_client_pollDelay(&l->client);
 
-    /* Not for longer, so that a signal just before it is not slept over. */
+    /* At most a second, since a signal just before the sleep does not end it. */
     if (milliseconds > 1000)
         milliseconds = 1000;
     if (micros / 1000 >= milliseconds)
@@ -204,7 +204,7 @@ void line_rest(line *l, uint32_t milliseconds)
     } else if (mbm_client_pending(&l->client) > 0) {
         (void)mbm_tty_wait(&l->tty, micros);
     } else {
-        /* Bytes that nobody takes, or a line that is lost, would end that at once. */
+        /* Unread bytes or a lost line would end mbm_tty_wait at once. */
         const struct timespec time = {0, (long)(micros % 1000000u) * 1000};
         const struct timespec second = {1, 0};
 

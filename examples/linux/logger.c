@@ -1,12 +1,11 @@
-/* Logs registers or bits of a device to CSV, one line a sample, with progress.
+/* Logs registers or bits of a device as CSV, one line a sample, and shows the progress.
  *
  *     logger tcp:192.168.0.7 -u 1 -i 500 -n 1000 -o log.csv 100 4
  *
- * reads 4 registers from address 100 on, twice a second, a thousand times. -u is the
- * unit (1), -f the function, 1 to 4 (3), -i the interval in milliseconds (1000), -n
- * how many samples (until Ctrl-C), -o the file (stdout), -r how often a sample is
- * asked again (2). A sample that failed has its status, and no values. Progress
- * goes to stderr.
+ * reads 4 registers from address 100 on, twice a second, a thousand times. -u is the unit
+ * (1), -f the function, 1 to 4 (3), -i the interval in milliseconds (1000), -n the number of
+ * samples (until Ctrl-C), -o the file (stdout), -r the number of retries of a sample (2). The
+ * line of a failed sample has its status and no values. The progress goes to stderr.
  *
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
@@ -27,7 +26,7 @@ static uint16_t reply[MOST];
 static long unit = 1, function = 3, interval = 1000, samples;
 static uint16_t address, quantity;
 static unsigned long taken, failed;
-static int unwritten; /* errno of what could not be written */
+static int unwritten; /* errno of a write to the file that failed */
 
 static void end_line(void)
 {
@@ -104,7 +103,7 @@ static const char USAGE[] =
     "  -i MILLISECONDS  from one sample to the next, 1000 if left out\n"
     "  -n SAMPLES       until Ctrl-C if left out\n"
     "  -o FILE          CSV, stdout if left out\n"
-    "  -r RETRIES       how often a sample is asked again, 2 if left out";
+    "  -r RETRIES       how often a failed sample is read again, 2 if left out";
 
 int main(int argc, char **argv)
 {
@@ -145,7 +144,7 @@ int main(int argc, char **argv)
     due = line_milliseconds();
     while (!line_ended && !unwritten && (samples == 0 || taken < (unsigned long)samples)) {
         take_sample();
-        /* A sample that took longer is followed by the next at once. */
+        /* If a sample took longer than the interval, the next one follows at once. */
         due += (uint32_t)interval;
         if ((int32_t)(due - line_milliseconds()) < 0)
             due = line_milliseconds();

@@ -13,18 +13,18 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Of mbm_tcp.state. A lost one keeps its place: an object may still use it. */
+/* Values of mbm_tcp.state. A lost socket keeps its place, since an object may still use it. */
 enum { FREE, CONNECTING, CONNECTED, LOST };
 
-/* Seconds of silence, between the probes that follow, and how many: what finds a
- * peer that is gone while nothing is sent. While something is, milliseconds. */
+/* A peer is gone if, after seconds of silence, it answers none of some probes, which are
+ * seconds apart, or if it acknowledges no sent byte for milliseconds. */
 enum { QUIET_S = 15, PROBE_S = 5, PROBES = 3, UNANSWERED_MS = 30000 };
 
-/* Microseconds: of sleep where the system refuses to poll, and of a wait that is long. */
+/* Microseconds: of sleep if the system refuses to poll, and of the shortest long wait. */
 enum { BLIND_NAP = 10000, LONG_WAIT = 100000 };
 
-/* Kept out of the way of what is done for every request. */
-#define SELDOM __attribute__((cold, noinline))
+/* For functions that are rarely called: keeps them apart from those of every request. */
+#define COLD __attribute__((cold, noinline))
 
 static int16_t tcp_read(void *context, uint8_t *bytes, uint16_t capacity);
 
@@ -34,8 +34,8 @@ static int refuse(int error)
     return -1;
 }
 
-/* The cheapest clock that there is: it is read with every request. */
-SELDOM int64_t mbm_tcp_milliseconds(void)
+/* Uses the cheapest clock, since it is read with every request. */
+COLD int64_t mbm_tcp_milliseconds(void)
 {
     struct timespec now;
 
@@ -52,7 +52,7 @@ static int has_socket(const mbm_tcp *tcp)
     return tcp->state == CONNECTING || tcp->state == CONNECTED;
 }
 
-/* Has the socket's set tell of it. */
+/* Makes the socket's set report it. */
 void mbm_tcp_markReady(mbm_tcp *tcp)
 {
     if (!tcp->set || tcp->told & MBM_TCP_LISTED)
@@ -63,8 +63,8 @@ void mbm_tcp_markReady(mbm_tcp *tcp)
     tcp->set->end = &tcp->next;
 }
 
-/* The set tells of the socket no more. */
-static void untell(mbm_tcp *tcp)
+/* Removes the socket from those that its set reports. */
+static void remove_from_ready(mbm_tcp *tcp)
 {
     mbm_tcp **one;
 
@@ -91,12 +91,12 @@ static void drop(mbm_tcp *tcp, uint8_t state, int error)
         close(fd);
 }
 
-/* What a socket is polled for from now on, also by its set. */
-SELDOM static void await_in_set(mbm_tcp *tcp, uint8_t before)
+/* Sets what the socket's set waits for from now on. */
+COLD static void await_in_set(mbm_tcp *tcp, uint8_t before)
 {
     if (tcp->set->watch(tcp->set, tcp->fd, tcp, before, tcp->awaits) == 0)
         return;
-    /* Nobody would learn what happens to it. */
+    /* The program would never learn what happens to the socket, so its link is lost. */
     tcp->awaits = 0;
     drop(tcp, LOST, errno);
     mbm_tcp_markReady(tcp);
@@ -118,13 +118,13 @@ static void enter(mbm_tcp *tcp, uint8_t state)
     mbm_tcp_await(tcp, state == CONNECTING ? POLLOUT : POLLIN);
 }
 
-/* The program used the port, so that waits tell of bytes again. */
+/* The program used the port, so waits report bytes again. */
 static inline void used(mbm_tcp *tcp)
 {
     tcp->told &= (uint8_t)~MBM_TCP_TOLD;
 }
 
-/* Bytes were moved. In a set the time of its last wait is near enough. */
+/* Bytes were moved. In a set the time of the last wait is accurate enough. */
 static inline void moved(mbm_tcp *tcp)
 {
     tcp->lastMoved = tcp->set ? tcp->set->now : mbm_tcp_milliseconds();
@@ -132,7 +132,7 @@ static inline void moved(mbm_tcp *tcp)
 
 static void set(int fd, int level, int option, int value)
 {
-    /* A socket without it, of another family, works all the same. */
+    /* A socket of another family, without the option, works too. */
     (void)setsockopt(fd, level, option, &value, sizeof value);
 }
 
@@ -153,7 +153,7 @@ static int prepare(int fd)
     return 0;
 }
 
-/* Begins with the next address; lost with `error` if there is none. */
+/* Begins to connect to the next address. If there is none, the link is lost with `error`. */
 static int try_next(mbm_tcp *tcp, int error)
 {
     mbm_tcp_addresses *all = tcp->addresses;
@@ -249,14 +249,14 @@ int64_t mbm_tcp_idleFor(const mbm_tcp *tcp)
 void mbm_tcp_close(mbm_tcp *tcp)
 {
     drop(tcp, FREE, tcp->error);
-    untell(tcp);
-    /* Its descriptor may be what a connection waits for. */
+    remove_from_ready(tcp);
+    /* A waiting connection may need the descriptor that this frees. */
     if (tcp->set && tcp->set->listener)
         tcp->set->listener->retryAt = 0;
     tcp->set = NULL;
 }
 
-/* 1 once connected, 0 before, -1 if there is no link. */
+/* Returns 1 once connected, 0 before, -1 if there is no link. */
 static int progress(mbm_tcp *tcp)
 {
     struct pollfd wait = {tcp->fd, POLLOUT, 0};
@@ -296,8 +296,8 @@ void mbm_tcp_disconnect(void *context)
         drop(tcp, LOST, ENOTCONN);
 }
 
-/* Nothing was moved, for a signal or for now; or else the link is gone. */
-SELDOM static int16_t nothing(mbm_tcp *tcp, ssize_t count)
+/* No bytes were moved. Returns 0 for a signal or if there are none yet, -1 for a lost link. */
+COLD static int16_t none_moved(mbm_tcp *tcp, ssize_t count)
 {
     if (tcp->state == LOST)
         return -1;
@@ -316,24 +316,24 @@ int mbm_tcp_isConnected(mbm_tcp *tcp)
         const ssize_t count = recv(tcp->fd, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
 
         if (count <= 0)
-            return nothing(tcp, count) < 0 ? -1 : 1;
+            return none_moved(tcp, count) < 0 ? -1 : 1;
     }
     return there;
 }
 
-/* 1 if so many bytes may be moved at once: only what is connected awaits bytes alone. */
+/* 1 if a read or write can go ahead: only a connected socket awaits POLLIN alone. */
 static inline int is_ready(const mbm_tcp *tcp, uint16_t length)
 {
     return tcp->awaits == POLLIN && (int16_t)length > 0;
 }
 
-SELDOM static int16_t read_slowly(mbm_tcp *tcp, uint8_t *bytes, uint16_t capacity)
+COLD static int16_t read_slowly(mbm_tcp *tcp, uint8_t *bytes, uint16_t capacity)
 {
     int there = progress(tcp);
 
     if (there <= 0 || capacity == 0)
         return (int16_t)(there < 0 ? -1 : 0);
-    /* Who reads is not stuck with what is to be sent. */
+    /* A program that reads need not wait until its bytes can be sent. */
     mbm_tcp_await(tcp, POLLIN);
     return tcp_read(tcp, bytes, capacity > INT16_MAX ? INT16_MAX : capacity);
 }
@@ -348,15 +348,15 @@ static int16_t tcp_read(void *context, uint8_t *bytes, uint16_t capacity)
     count = read(tcp->fd, bytes, capacity);
     used(tcp);
     if (count <= 0)
-        return nothing(tcp, count);
+        return none_moved(tcp, count);
     moved(tcp);
     return (int16_t)count;
 }
 
-/* So many of the bytes were taken, perhaps not all. */
-SELDOM static int16_t wrote(mbm_tcp *tcp, ssize_t length, ssize_t count)
+/* Evaluates a send: `count` of `length` bytes were accepted. */
+COLD static int16_t wrote(mbm_tcp *tcp, ssize_t length, ssize_t count)
 {
-    if (count <= 0 && nothing(tcp, count) < 0)
+    if (count <= 0 && none_moved(tcp, count) < 0)
         return -1;
     if (count == length)
         used(tcp);
@@ -367,9 +367,9 @@ SELDOM static int16_t wrote(mbm_tcp *tcp, ssize_t length, ssize_t count)
     return (int16_t)count;
 }
 
-SELDOM static int16_t write_slowly(mbm_tcp *tcp, const uint8_t *bytes, uint16_t length)
+COLD static int16_t write_slowly(mbm_tcp *tcp, const uint8_t *bytes, uint16_t length)
 {
-    /* Of more than can be said to be taken it is never all. */
+    /* A length above INT16_MAX is never accepted completely, since the result is an int16_t. */
     const uint16_t most = length > INT16_MAX ? INT16_MAX : length;
     int there = progress(tcp);
 
@@ -415,9 +415,9 @@ mbm_port mbm_tcp_port(mbm_tcp *tcp)
     return port;
 }
 
-/* Poll failed: for a signal, or for lack of memory or of descriptors, whose limit may have
- * been lowered. Then whoever waits looks for itself, and does not spin. */
-SELDOM static int nap(uint32_t timeoutUs)
+/* poll failed: for a signal, or for lack of memory or descriptors (their limit may have been
+ * lowered). Then sleeps, so that the program does not spin, and returns 1: it must look. */
+COLD static int nap(uint32_t timeoutUs)
 {
     if (errno == EINTR)
         return 0;
@@ -425,24 +425,24 @@ SELDOM static int nap(uint32_t timeoutUs)
     return 1;
 }
 
-/* What to poll a socket for: bytes that it told of do not end the wait again. Of who
- * awaits nothing a hang-up would end it too. */
+/* What to poll a socket for. Bytes that were reported do not end the wait again. A socket
+ * that awaits nothing is left out, since a hang-up would end the wait. */
 static inline short events_of(const mbm_tcp *tcp)
 {
     return tcp->told & MBM_TCP_TOLD ? tcp->awaits & POLLOUT : tcp->awaits;
 }
 
-/* Takes note of what poll tells of a socket. */
+/* Notes what poll has found for a socket. */
 static inline void note(mbm_tcp *tcp, short events)
 {
     if (tcp->awaits == POLLOUT && events)
-        /* If it is being connected, that is known from now on. */
+        /* If the socket is connecting, this finds out whether it is connected. */
         (void)progress(tcp);
     else if (events & ~POLLOUT)
         tcp->told |= MBM_TCP_TOLD;
 }
 
-/* Of a long time a millisecond does not matter, and poll asks for less than ppoll. */
+/* In a long wait a millisecond does not matter, and poll costs less than ppoll. */
 static inline int sleep_on(struct pollfd *waits, nfds_t count, uint32_t timeoutUs)
 {
     if (timeoutUs >= LONG_WAIT)
@@ -450,8 +450,8 @@ static inline int sleep_on(struct pollfd *waits, nfds_t count, uint32_t timeoutU
     return ppoll(waits, count, &(struct timespec){0, (long)timeoutUs * 1000}, NULL);
 }
 
-SELDOM static int wait_for_many(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener,
-                                int fd, uint32_t timeoutUs)
+COLD static int wait_for_many(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, int fd,
+                              uint32_t timeoutUs)
 {
     const int is_listening = listener && listener->port != 0;
     struct pollfd waits[MBM_TCP_WAITS];
@@ -486,7 +486,7 @@ int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, 
     struct pollfd wait;
     int ready;
 
-    /* What a client waits for with every request. */
+    /* The usual case: a client waits for a response. */
     if (count != 1 || listener || fd >= 0 || tcps->told || tcps->awaits != POLLIN)
         return wait_for_many(tcps, count, listener, fd, timeoutUs);
     wait = (struct pollfd){tcps->fd, POLLIN, 0};

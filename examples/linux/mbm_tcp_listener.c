@@ -10,8 +10,8 @@
 #include <string.h>
 #include <unistd.h>
 
-/* Connections that one mbm_tcp_accept turns away at most, so that a flood of them does
- * not keep a program from those that it serves. */
+/* The most connections that one mbm_tcp_accept turns away, so that a flood of connections
+ * does not keep a program from those that it serves. */
 enum { TURNED_AWAY = 64 };
 
 static int refuse(int error)
@@ -20,7 +20,8 @@ static int refuse(int error)
     return -1;
 }
 
-/* What the listener is polled for, also by its set: where that refuses, another try. */
+/* Sets what the listener is polled for, also by its set. If the set refuses, mbm_tcp_accept
+ * tries again. */
 static void await(mbm_tcp_listener *listener, uint8_t awaits)
 {
     mbm_tcp_set *set = listener->set;
@@ -50,7 +51,7 @@ static int listen_at(const struct addrinfo *address)
 
     if (fd < 0)
         return -1;
-    /* A server that restarts is not kept from its port by what it left. */
+    /* Without this, a server that restarts could not listen, because of its old connections. */
     (void)setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
     if (fcntl(fd, F_SETFL, O_NONBLOCK) == 0 && fcntl(fd, F_SETFD, FD_CLOEXEC) == 0 &&
         bind(fd, address->ai_addr, address->ai_addrlen) == 0 && listen(fd, SOMAXCONN) == 0)
@@ -85,7 +86,7 @@ int mbm_tcp_listen(mbm_tcp_listener *listener, const char *host, const char *ser
     return 0;
 }
 
-/* The end of the stream and no reset, also if a request came with the client. */
+/* Closes a connection without a reset, also if the client has sent a request already. */
 static void turn_away(int fd)
 {
     uint8_t unread[512];
@@ -97,7 +98,7 @@ static void turn_away(int fd)
     close(fd);
 }
 
-/* Ends the connection that has been idle for longest; whether there was one. */
+/* Ends the connection that has been idle for longest. Returns whether there was one. */
 static int close_oldest(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
 {
     mbm_tcp *oldest = NULL;
@@ -106,7 +107,8 @@ static int close_oldest(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
     if (listener->idleTimeMs == 0)
         return 0;
     for (i = 0; i < count; i++) {
-        /* The times themselves are compared: the clock goes on from one look to the next. */
+        /* Compares the times of the last bytes, since the idle times grow from one call to
+         * the next. */
         if (!tcps[i].isBusy && mbm_tcp_idleFor(&tcps[i]) >= (int64_t)listener->idleTimeMs &&
             (!oldest || tcps[i].lastMoved < oldest->lastMoved))
             oldest = &tcps[i];
@@ -132,7 +134,7 @@ static int is_shortage(int error)
     return error == EMFILE || error == ENFILE || error == ENOBUFS || error == ENOMEM;
 }
 
-/* The descriptor of the next connection. */
+/* Returns the descriptor of the next connection. */
 static int take_next(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
 {
     int fd;
@@ -148,7 +150,7 @@ static int take_next(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
         if (is_shortage(errno)) {
             const int error = errno;
 
-            /* Without a descriptor accept fails also where nothing waits. */
+            /* Without a free descriptor accept fails also if no connection waits. */
             if (!is_connection_waiting(listener))
                 return refuse(EAGAIN);
             if (close_oldest(listener, tcps, count))
@@ -159,8 +161,8 @@ static int take_next(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
     }
 }
 
-/* A connection is to be a port in a place, or is closed. */
-static int put(const mbm_tcp_listener *listener, mbm_tcp *tcp, int fd)
+/* Makes a connection a port in a place, or closes it. */
+static int put_in_place(const mbm_tcp_listener *listener, mbm_tcp *tcp, int fd)
 {
     int error;
 
@@ -177,7 +179,7 @@ static int put(const mbm_tcp_listener *listener, mbm_tcp *tcp, int fd)
     return 0;
 }
 
-static int take(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
+static int take_connection(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
 {
     size_t place = 0;
     int fd, rounds;
@@ -191,7 +193,7 @@ static int take(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
         if (fd < 0)
             return -1;
         if (place < count)
-            return put(listener, &tcps[place], fd) < 0 ? -1 : (int)place;
+            return put_in_place(listener, &tcps[place], fd) < 0 ? -1 : (int)place;
         listener->refused++;
         turn_away(fd);
     }
@@ -206,9 +208,9 @@ int mbm_tcp_accept(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
         return refuse(EBADF);
     if (listener->isQuiet)
         return refuse(EAGAIN);
-    place = take(listener, tcps, count);
+    place = take_connection(listener, tcps, count);
     error = errno;
-    /* A connection that can only wait would end every wait at once. */
+    /* A connection that must wait would end every wait at once. */
     await(listener, place >= 0 || error == EAGAIN ? POLLIN : 0);
     if (place < 0 && listener->set) {
         listener->isQuiet = 1;

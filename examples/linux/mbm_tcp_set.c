@@ -1,5 +1,5 @@
-/* The set of mbm_tcp.h: one wait for any number of sockets, by epoll of Linux.
- * Licence: MIT OR Apache-2.0. */
+/* The set of mbm_tcp.h: one wait for any number of sockets, by Linux's epoll. Licence: MIT
+ * OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "mbm_tcp.h"
 
@@ -8,7 +8,8 @@
 #include <sys/epoll.h>
 #include <unistd.h>
 
-_Static_assert(EPOLLIN == POLLIN && EPOLLOUT == POLLOUT, "what a port awaits is said in both");
+_Static_assert(EPOLLIN == POLLIN && EPOLLOUT == POLLOUT,
+               "the events of poll and epoll have the same values");
 
 static int refuse(int error)
 {
@@ -16,8 +17,8 @@ static int refuse(int error)
     return -1;
 }
 
-/* Has epoll tell of what `who` awaits from now on. One that awaits nothing is taken out,
- * since a hang-up would end each wait otherwise. */
+/* Sets what epoll waits for on a descriptor from now on. If that is nothing, the descriptor
+ * is removed, since a hang-up would end each wait. */
 static int watch(mbm_tcp_set *set, int fd, void *who, uint8_t before, uint8_t awaits)
 {
     struct epoll_event event = {.events = awaits, .data = {.ptr = who}};
@@ -80,12 +81,12 @@ int mbm_tcp_addListener(mbm_tcp_set *set, mbm_tcp_listener *listener)
     return 0;
 }
 
-/* Takes note of what epoll tells of a socket, but bytes of one that told of none. */
+/* Notes what epoll has found for a socket. The simple case, new bytes, is in wait_once. */
 __attribute__((cold, noinline)) static void note(mbm_tcp *tcp, uint32_t events)
 {
     if (events & ~(uint32_t)EPOLLOUT) {
         if ((tcp->told & MBM_TCP_TOLD) && !(tcp->told & MBM_TCP_LISTED)) {
-            /* Nobody used the port: epoll is not asked for bytes until somebody does. */
+            /* The program has not used the port: epoll does not wait for bytes until it does. */
             mbm_tcp_await(tcp, tcp->awaits & POLLOUT);
             if (!(events & EPOLLOUT))
                 return;
@@ -93,13 +94,13 @@ __attribute__((cold, noinline)) static void note(mbm_tcp *tcp, uint32_t events)
         tcp->told |= MBM_TCP_TOLD;
     }
     if (tcp->awaits == POLLOUT)
-        /* If it is being connected, that is known from now on. */
+        /* If the socket is connecting, this finds out whether it is connected. */
         (void)mbm_tcp_isConnected(tcp);
     mbm_tcp_markReady(tcp);
 }
 
-/* How long connections can only wait, in milliseconds, or -1. Where that is over,
- * mbm_tcp_accept looks again. */
+/* Returns for how many milliseconds connections must still wait, or -1 if they need not.
+ * When the time is over, mbm_tcp_accept looks again. */
 static int64_t until_retry(mbm_tcp_set *set)
 {
     mbm_tcp_listener *listener = set->listener;
@@ -114,8 +115,8 @@ static int64_t until_retry(mbm_tcp_set *set)
     return 0;
 }
 
-/* Waits once, for so many milliseconds or for ever if negative, and notes what it learns:
- * of how many descriptors. */
+/* Waits once, for `time` milliseconds or without a limit if negative, and notes what it
+ * finds. Returns the number of descriptors. */
 static int wait_once(mbm_tcp_set *set, int64_t time)
 {
     const int64_t retry = until_retry(set);
@@ -161,7 +162,7 @@ int mbm_tcp_waitSet(mbm_tcp_set *set, uint32_t timeoutUs)
             return errno == EINTR ? 0 : -1;
         if (count == 0)
             return 0;
-        /* What nobody uses ended the wait, right after it began, and does so no more. */
+        /* A socket that the program does not use ended the wait. It will not do so again. */
     } while (!set->listener || set->listener->isQuiet);
     return 1;
 }

@@ -16,7 +16,7 @@
 #include <linux/serial.h>
 #endif
 
-/* POSIX has those up to 38400; the others are there or not. */
+/* POSIX has the rates up to 38400. The others depend on the system. */
 static const struct {
     uint32_t baud;
     speed_t speed;
@@ -93,7 +93,7 @@ static speed_t speed_of(uint32_t baud)
     return B0;
 }
 
-/* What stands in for a rate without a constant, until that is set. */
+/* The rate that termios gets while a rate without a constant is not set yet. */
 static speed_t stand_in(const mbm_tty_options *options)
 {
     return options->anyRate && options->baud > 0 ? B38400 : B0;
@@ -123,7 +123,7 @@ int mbm_tty_settings(struct termios *settings, const mbm_tty_options *options)
     flags |= options->stop == 2 ? CSTOPB : 0;
 
     cfmakeraw(settings);
-    /* A device with one wrong parity bit is heard all the same: the CRC tells. */
+    /* Bytes with a wrong parity bit are received too: the CRC finds the error. */
     settings->c_iflag &= ~(tcflag_t)(INPCK | IXOFF | IXANY);
     settings->c_cflag &= ~(tcflag_t)(CSIZE | PARENB | PARODD | CSTOPB | HUPCL);
 #ifdef CRTSCTS
@@ -152,7 +152,7 @@ static int begin_rs485(mbm_tty *tty, const mbm_tty_options *options)
     if (ioctl(tty->fd, TIOCSRS485, &now) < 0)
         return -1;
     tty->is_rs485 = 1;
-    /* The driver drops what it cannot do, and says so only here. */
+    /* The driver drops settings that it cannot do, and only this shows it. */
     if (ioctl(tty->fd, TIOCGRS485, &now) < 0)
         return -1;
     if (!(now.flags & SER_RS485_ENABLED) || now.delay_rts_before_send != options->rtsDelayBefore ||
@@ -170,7 +170,7 @@ static void end_rs485(mbm_tty *tty)
 }
 
 _Static_assert(sizeof(struct serial_rs485) == sizeof(((mbm_tty *)0)->rs485_before),
-               "room for what the driver was told before");
+               "space for the driver's previous settings");
 #else
 static int begin_rs485(mbm_tty *tty, const mbm_tty_options *options)
 {
@@ -187,8 +187,8 @@ static void end_rs485(mbm_tty *tty)
 
 #if defined(__linux__) && (defined(__x86_64__) || defined(__i386__) || defined(__arm__) ||         \
                            defined(__aarch64__) || defined(__riscv))
-/* struct termios2, its requests and flags: <asm/termbits.h> has them, but not
- * beside <termios.h>. */
+/* struct termios2 with its requests and flags: <asm/termbits.h> defines them, but cannot be
+ * included together with <termios.h>. */
 typedef struct rated {
     uint32_t iflag, oflag, cflag, lflag;
     uint8_t line, cc[19];
@@ -210,7 +210,7 @@ static int set_rate(const mbm_tty *tty, uint32_t baud)
     settings.in = settings.out = baud;
     if (ioctl(tty->fd, SET_RATED, &settings) < 0 || ioctl(tty->fd, GET_RATED, &settings) < 0)
         return -1;
-    /* The driver takes the nearest rate that it has. */
+    /* The driver sets the nearest rate that it has. */
     if (settings.out < baud - baud / 50 || settings.out > baud + baud / 50)
         return refuse(EINVAL);
     return 0;
@@ -224,8 +224,8 @@ static int set_rate(const mbm_tty *tty, uint32_t baud)
 }
 #endif
 
-/* Makes the terminal raw and non-blocking, after it has kept how it was. */
-static int take(mbm_tty *tty)
+/* Saves the settings of the terminal, then makes it raw and non-blocking. */
+static int take_over(mbm_tty *tty)
 {
     struct termios settings;
     int lines;
@@ -252,14 +252,14 @@ int mbm_tty_attach(mbm_tty *tty, int fd)
 {
     memset(tty, 0, sizeof *tty);
     tty->fd = fd;
-    if (take(tty) < 0) {
+    if (take_over(tty) < 0) {
         tty->fd = -1;
         return -1;
     }
     return 0;
 }
 
-/* Leaves the descriptor as it was found, also where it was not opened to the end. */
+/* Restores the settings of the descriptor, also if opening failed. */
 static void release(mbm_tty *tty)
 {
     if (tty->has_before)
@@ -291,8 +291,8 @@ void mbm_tty_close(mbm_tty *tty)
     close(fd);
 }
 
-/* The lock of the terminal stops others, that of the file root too, which the
- * first lets pass. */
+/* TIOCEXCL keeps other programs out except those of root. The lock of the file keeps root's
+ * out too. */
 static int lock(mbm_tty *tty)
 {
     if (flock(tty->fd, LOCK_EX | LOCK_NB) < 0)
@@ -301,8 +301,8 @@ static int lock(mbm_tty *tty)
     return ioctl(tty->fd, TIOCEXCL);
 }
 
-/* tcsetattr is content if it could do anything of what it was asked. A pty has
- * no bits on a wire, and its driver drops parity and seven bits. */
+/* tcsetattr succeeds if it could do any part of its task, so the settings are read back. A
+ * pty sends no bits over a wire, and its driver ignores parity and seven bits. */
 static int set(const mbm_tty *tty, const mbm_tty_options *options)
 {
     const tcflag_t frame = CSIZE | PARENB | PARODD | CSTOPB;
@@ -316,7 +316,7 @@ static int set(const mbm_tty *tty, const mbm_tty_options *options)
         return refuse(EINVAL);
     if (speed_of(options->baud) == B0 && set_rate(tty, options->baud) < 0)
         return -1;
-    /* What arrived at another rate is of no use. */
+    /* Bytes that arrived at another rate are useless. */
     return tcflush(tty->fd, TCIOFLUSH);
 }
 
@@ -334,8 +334,8 @@ int mbm_tty_openWith(mbm_tty *tty, const char *path, const mbm_tty_options *opti
         return -1;
     tty->fd = fd;
     tty->flags_before = O_RDWR;
-    /* Locked first, so that a terminal of another is left as it is. */
-    if ((options->exclusive && lock(tty) < 0) || take(tty) < 0 || set(tty, options) < 0 ||
+    /* Locks first, so that the settings of another program's terminal stay as they are. */
+    if ((options->exclusive && lock(tty) < 0) || take_over(tty) < 0 || set(tty, options) < 0 ||
         (options->rs485 && begin_rs485(tty, options) < 0)) {
         error = errno;
         release(tty);
@@ -355,12 +355,12 @@ int mbm_tty_open(mbm_tty *tty, const char *path, uint32_t baud, char parity, int
     return mbm_tty_openWith(tty, path, &options);
 }
 
-/* Nothing was moved, for a signal or for now; or else the link is gone. */
-static int16_t nothing(mbm_tty *tty, ssize_t count)
+/* No bytes were moved. Returns 0 for a signal or if there are none yet, -1 for a lost link. */
+static int16_t none_moved(mbm_tty *tty, ssize_t count)
 {
     if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR))
         return 0;
-    /* An end of file is the hang-up of a line. */
+    /* The end of file means that the line has hung up. */
     tty->error = count < 0 ? errno : EPIPE;
     return -1;
 }
@@ -387,7 +387,7 @@ static int16_t tty_read(void *context, uint8_t *bytes, uint16_t capacity)
         return 0;
     tty->awaits = POLLIN;
     count = read(tty->fd, bytes, at_most(capacity));
-    return count > 0 ? (int16_t)count : nothing(tty, count);
+    return count > 0 ? (int16_t)count : none_moved(tty, count);
 }
 
 static int16_t tty_write(void *context, const uint8_t *bytes, uint16_t length)
@@ -400,7 +400,7 @@ static int16_t tty_write(void *context, const uint8_t *bytes, uint16_t length)
     if (length == 0)
         return 0;
     count = write(tty->fd, bytes, at_most(length));
-    return count > 0 ? (int16_t)count : nothing(tty, count);
+    return count > 0 ? (int16_t)count : none_moved(tty, count);
 }
 
 static uint32_t tty_micros(void *context)
@@ -417,14 +417,14 @@ static uint8_t tty_flush(void *context)
     const mbm_tty *tty = (const mbm_tty *)context;
     int left = 0;
 
-    /* A pty has no transmitter that could drain. */
+    /* A pty has no transmitter, so there is nothing to wait for. */
     return !tty->isOpen || !tty->has_uart || ioctl(tty->fd, TIOCOUTQ, &left) < 0 || left == 0;
 }
 
-/* Microseconds of a wait that is long. */
+/* The shortest wait that counts as long, in microseconds. */
 enum { LONG_WAIT = 100000 };
 
-/* Of a long time a millisecond does not matter, and poll asks for less than ppoll. */
+/* In a long wait a millisecond does not matter, and poll costs less than ppoll. */
 static inline int sleep_on(struct pollfd *line, nfds_t count, uint32_t timeoutUs)
 {
     if (timeoutUs >= LONG_WAIT)
@@ -439,7 +439,8 @@ int mbm_tty_wait(mbm_tty *tty, uint32_t timeoutUs)
 
     if (!tty->isOpen)
         return refuse(EBADF);
-    /* A descriptor in the list would end the wait at a hang-up, whatever it awaits. */
+    /* An awaited event of 0 would still make a hang-up end the wait, so the list is empty
+     * then. */
     ready = sleep_on(&line, tty->awaits != 0, timeoutUs);
     if (ready < 0)
         return errno == EINTR ? 0 : -1;

@@ -1,12 +1,12 @@
-/* Polls a device and shows what it holds as a table, which a terminal shows in place.
+/* Polls a device and shows its values as a table, which a terminal shows in place.
  *
  *     poll_table rtu:/dev/ttyUSB0,19200 -u 17 100 10 200 4
  *     poll_table tcp:192.168.0.7 -f 4 -i 250 0 20
  *
- * reads 10 registers from address 100 on and 4 from 200 on, every second. -u is the
- * unit (1), -f the function, 1 to 4 (3), -i the interval in milliseconds (1000), -n
- * how often (until Ctrl-C), -p how many requests at once over TCP (16; some servers take
- * one only). What changed since the time before is marked.
+ * The first reads 10 registers from address 100 on and 4 from 200 on, every second. -u is the
+ * unit (1), -f the function, 1 to 4 (3), -i the interval in milliseconds (1000), -n the number
+ * of rounds (until Ctrl-C), -p the number of requests under way at once over TCP (16; some
+ * servers accept only one). Values that have changed since the round before are marked.
  *
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
@@ -18,7 +18,7 @@
 
 enum { MOST = 125 };
 
-/* One stretch of addresses: one request, all of them queued at once. */
+/* A range of addresses, which one request reads. All requests of a round are queued at once. */
 typedef struct range {
     mbm_clientRequest request;
     uint16_t address, quantity;
@@ -67,7 +67,7 @@ static void show(long round)
     fflush(stdout);
 }
 
-static void ask(range *r)
+static void queue_range(range *r)
 {
     memset(&r->request, 0, sizeof r->request);
     r->request.unit = (uint8_t)unit;
@@ -119,7 +119,7 @@ int main(int argc, char **argv)
     due = line_milliseconds();
     for (round = 1; !line_ended && (rounds == 0 || round <= rounds); round++) {
         for (i = 0; i < count; i++)
-            ask(&ranges[i]);
+            queue_range(&ranges[i]);
         while (!line_ended && mbm_client_pending(&at.client) > 0) {
             line_poll(&at);
             if (mbm_client_pending(&at.client) > 0)

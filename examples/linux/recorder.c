@@ -1,4 +1,4 @@
-/* A port that keeps the bytes that go through it. Licence: MIT OR Apache-2.0. */
+/* A port that records the bytes that go through it. Licence: MIT OR Apache-2.0. */
 #include "recorder.h"
 
 static void keep(recording *kept, const uint8_t *bytes, int16_t count)

@@ -1,6 +1,6 @@
 /**
  * @file recorder.h
- * @brief A port that hands everything on to another port and keeps the bytes.
+ * @brief A port that passes everything on to another port and records the bytes.
  *
  * Licence: MIT OR Apache-2.0.
  */
@@ -11,23 +11,23 @@
 
 #include <stddef.h>
 
-/** Bytes of one direction; what does not fit is not kept. */
+/** Bytes of one direction. Bytes beyond the capacity are not kept. */
 typedef struct recording {
     uint8_t bytes[MBM_MAX_FRAME];
     size_t length;
 } recording;
 
-/** The port behind, and what has gone through it. */
+/** The other port, and the bytes that have gone through it. */
 typedef struct recorder {
     mbm_port behind;
     recording sent;
     recording received;
 } recorder;
 
-/** Forgets what was recorded. */
+/** Discards the recorded bytes. */
 void recorder_clear(recorder *wire);
 
-/** A port that records in `wire`, which must outlive it, and works over `behind`. */
+/** A port that records in `wire`, which must outlive it, and passes everything on to `behind`. */
 mbm_port recorder_port(recorder *wire, const mbm_port *behind);
 
 #endif

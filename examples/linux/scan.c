@@ -1,12 +1,12 @@
-/* Looks for the units of a bus: reads holding register 0 of each, and whoever answers,
- * with a value or an exception, is there.
+/* Scans a bus for units: reads holding register 0 of each. A unit that answers with a value
+ * or an exception is present.
  *
  *     scan rtu:/dev/ttyUSB0,19200
  *     scan tcp:192.168.0.7 -t 2000 1 20
  *
- * scans 1 to 247, or the units named. -t is how long to wait for each, in
- * milliseconds: 100 on a serial line, 1000 over TCP, where all that fit are asked at
- * once and a gateway may be behind it; -p is how many at once. Progress goes to stderr.
+ * scans the units 1 to 247, or those that are given. -t is the response timeout in
+ * milliseconds: 100 on a serial line, 1000 over TCP, where a gateway may be in between. -p is
+ * the number of requests under way at once over TCP (16). The progress goes to stderr.
  *
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
@@ -21,9 +21,9 @@ enum { UNITS = 256 };
 static line at;
 static mbm_clientRequest requests[UNITS];
 static uint16_t words[UNITS];
-static unsigned first = 1, last = 247, asked, told, there;
+static unsigned first = 1, last = 247, asked, reported, answering;
 
-static void tell(const mbm_clientRequest *request)
+static void print_result(const mbm_clientRequest *request)
 {
     unsigned unit = request->unit;
 
@@ -38,11 +38,11 @@ static void tell(const mbm_clientRequest *request)
         break;
     default:
         printf("unit %3u: %s\n", unit, mbm_status_text(request->status));
-        there += request->exception != 0;
+        answering += request->exception != 0;
         fflush(stdout);
         return;
     }
-    there++;
+    answering++;
     fflush(stdout);
 }
 
@@ -52,10 +52,10 @@ static const char USAGE[] =
     "  -p REQUESTS      at once over TCP, 16 if left out\n"
     "FIRST to LAST are units, 1 to 247 if left out";
 
-/* Keeps the queue full, and tells what has ended in the order of the units. */
+/* Keeps the queue full, and prints the results in the order of the units. */
 static int scan(void)
 {
-    while (!line_ended && told <= last) {
+    while (!line_ended && reported <= last) {
         while (asked <= last) {
             mbm_clientRequest *request = &requests[asked];
 
@@ -67,16 +67,16 @@ static int scan(void)
             asked++;
         }
         line_poll(&at);
-        while (told < asked && requests[told].status != MBM_PENDING) {
+        while (reported < asked && requests[reported].status != MBM_PENDING) {
             if (isatty(2))
-                fprintf(stderr, "\r%u of %u \r", told - first + 1, last - first + 1);
-            if (requests[told].status == MBM_LINK_LOST) {
-                fprintf(stderr, "unit %u: the link was lost: %s\n", told, line_reason(&at));
+                fprintf(stderr, "\r%u of %u \r", reported - first + 1, last - first + 1);
+            if (requests[reported].status == MBM_LINK_LOST) {
+                fprintf(stderr, "unit %u: the link was lost: %s\n", reported, line_reason(&at));
                 return -1;
             }
-            tell(&requests[told++]);
+            print_result(&requests[reported++]);
         }
-        if (told <= last)
+        if (reported <= last)
             line_rest(&at, 1000);
     }
     return 0;
@@ -111,13 +111,13 @@ int main(int argc, char **argv)
         return 1;
     if (at_once)
         (void)mbm_client_setInFlight(&at.client, (uint8_t)at_once);
-    asked = told = first;
+    asked = reported = first;
     if (timeout == 0)
         timeout = at.is_tcp ? 1000 : 100;
     mbm_client_setResponseTimeout(&at.client, (uint16_t)timeout);
     mbm_client_setQuietTime(&at.client, 0);
     lost = scan();
-    printf("%u of %u units answer\n", there, told - first);
+    printf("%u of %u units answer\n", answering, reported - first);
     line_close(&at);
     return lost ? 1 : 0;
 }

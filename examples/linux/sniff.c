@@ -1,11 +1,11 @@
-/* Watches a bus that others use, and tells what they say, one line an event.
+/* Watches a bus, prints one line for each event, and sends nothing.
  *
  *     sniff /dev/ttyUSB0 19200          a serial line, RTU; Ctrl-C ends
  *     sniff -a /dev/ttyUSB0 9600 E      ASCII, seven bits, even parity
  *     sniff - <recording                a recording, -t for Modbus TCP
  *
- * A line of a recording is a time in milliseconds with a colon, which may be
- * missing (10 ms after the line before), and bytes in hex: "120: 11 03 00 6B".
+ * A line of a recording is a time in milliseconds, a colon and bytes in hex, for example
+ * "120: 11 03 00 6B". Without time and colon it is 10 ms after the line before.
  *
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
@@ -21,7 +21,7 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Microseconds, but for the first. */
+/* Microseconds, except the first. */
 enum {
     KINDS = MBM_EVENT_NOISE + 1,
     LINE_STEP = 10000,
@@ -33,7 +33,7 @@ enum {
 static mbm_sniffer sniffer;
 static uint8_t buffer[MBM_MAX_ASCII_FRAME];
 static unsigned long totals[KINDS];
-static uint64_t first, now; /* microseconds that do not wrap, as the sniffer's do */
+static uint64_t first, now; /* microseconds that do not wrap, unlike the sniffer's */
 static uint32_t slowest;
 static volatile sig_atomic_t ended;
 
@@ -51,7 +51,7 @@ static uint64_t micros(void)
     return (uint64_t)time.tv_sec * 1000000u + (uint64_t)time.tv_nsec / 1000u;
 }
 
-static void tell(const mbm_event *event)
+static void print_event(const mbm_event *event)
 {
     static char text[2400];
     uint64_t time = now - ((uint32_t)now - event->timeUs) - first;
@@ -69,29 +69,29 @@ static void tell(const mbm_event *event)
     printf("%s\n", text);
 }
 
-/* Tells what is known by `time`. */
-static void tell_all(uint64_t time)
+/* Prints the events that have happened by `time`. */
+static void print_events(uint64_t time)
 {
     mbm_event event;
 
     now = time;
     while (mbm_sniffer_next(&sniffer, (uint32_t)now, &event))
-        tell(&event);
+        print_event(&event);
     fflush(stdout);
 }
 
-static void hear(const uint8_t *bytes, uint16_t length)
+static void feed(const uint8_t *bytes, uint16_t length)
 {
     uint16_t fed = 0;
 
     while (fed < length) {
         fed = (uint16_t)(fed + mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, bytes + fed,
                                                 (uint16_t)(length - fed), (uint32_t)now));
-        tell_all(now);
+        print_events(now);
     }
 }
 
-/* 0 once it has watched, 1 if the line was lost, -1 if it could not be opened. */
+/* Returns 0 after Ctrl-C, 1 if the line was lost, -1 if it could not be opened. */
 static int watch(const char *path, const mbm_tty_options *options)
 {
     mbm_tty tty;
@@ -111,20 +111,20 @@ static int watch(const char *path, const mbm_tty_options *options)
         length = read(tty.fd, bytes, sizeof bytes);
         now = micros();
         if (length > 0) {
-            hear(bytes, (uint16_t)length);
+            feed(bytes, (uint16_t)length);
         } else if (length == 0 || (errno != EAGAIN && errno != EINTR)) {
-            fprintf(stderr, "%s: %s\n", path, length == 0 ? "gone" : strerror(errno));
+            fprintf(stderr, "%s: %s\n", path, length == 0 ? "the line hung up" : strerror(errno));
             failed = 1;
             break;
         }
-        tell_all(now);
+        print_events(now);
     }
     mbm_tty_close(&tty);
-    tell_all(micros());
+    print_events(micros());
     return failed;
 }
 
-/* The bytes of hex digits; -1 if there is anything else. */
+/* Converts hex digits to bytes. Returns how many, or -1 if there are other characters. */
 static int bytes_of(const char *text, uint8_t *bytes, int capacity)
 {
     int count = 0;
@@ -143,7 +143,7 @@ static int bytes_of(const char *text, uint8_t *bytes, int capacity)
     return count;
 }
 
-/* Looks now and then, as on a line: often while requests may time out. */
+/* Lets time pass and prints events, as on a line: in short steps while requests may time out. */
 static void pass_time(uint64_t until)
 {
     uint64_t silent = now;
@@ -151,7 +151,7 @@ static void pass_time(uint64_t until)
     while (now < until) {
         uint64_t step = now - silent < ALL_ENDED ? LOOK_STEP : SELDOM_STEP;
 
-        tell_all(until - now < step ? until : now + step);
+        print_events(until - now < step ? until : now + step);
     }
 }
 
@@ -164,22 +164,22 @@ static int replay(void)
 
     while (!ended && fgets(text, sizeof text, stdin)) {
         char *hex = strchr(text, ':'), *behind = hex;
-        double told = hex ? strtod(text, &behind) * 1000.0 : (double)(now + LINE_STEP);
+        double line_time = hex ? strtod(text, &behind) * 1000.0 : (double)(now + LINE_STEP);
 
         number++;
         if (text[0] == '#')
             continue;
-        if (behind != hex || !(told >= (double)now && told < 1e15)) {
-            fprintf(stderr, "line %u: no time, or earlier than the line before\n", number);
+        if (behind != hex || !(line_time >= (double)now && line_time < 1e15)) {
+            fprintf(stderr, "line %u: no time, or a time before that of the line before\n", number);
             return 1;
         }
-        pass_time((uint64_t)told);
+        pass_time((uint64_t)line_time);
         length = bytes_of(hex ? hex + 1 : text, bytes, sizeof bytes);
         if (length < 0) {
             fprintf(stderr, "line %u: not hex\n", number);
             return 1;
         }
-        hear(bytes, (uint16_t)length);
+        feed(bytes, (uint16_t)length);
     }
     pass_time(now + ALL_ENDED);
     return 0;
@@ -194,7 +194,7 @@ static int usage(int wrong)
     return wrong ? 2 : 0;
 }
 
-/* A rate; 0 for what is no number, and for one that is too great. */
+/* Returns a baud rate, or 0 for text that is no number and for a number that is too large. */
 static uint32_t rate_of(const char *text)
 {
     char *rest;
@@ -203,7 +203,7 @@ static uint32_t rate_of(const char *text)
     return isdigit((unsigned char)text[0]) && !*rest && baud <= UINT32_MAX ? (uint32_t)baud : 0;
 }
 
-/* Reads PATH BAUD [PARITY], or - [BAUD] of a recording; whether a line can be set so. */
+/* Reads PATH BAUD [PARITY], or - [BAUD] for a recording. Returns whether a line can be set so. */
 static int read_line(int argc, char **argv, mbm_tty_options *options)
 {
     struct termios unused = {0};

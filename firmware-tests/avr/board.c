@@ -17,11 +17,11 @@
 
 enum { PAINT = 0xC5, SPL_AT = 0x5D };
 
-/* The board's end of a wire: a UART, or two pins. */
+/* The board's end of a wire: a UART or two pins. */
 typedef struct end {
     avr_uart_t *uart;
     avr_irq_t *in;
-    /* bit by bit */
+    /* for a wire of two pins */
     int listening, level, bit_in, bit_out;
     uint16_t shift_in, shift_out;
 } end;
@@ -105,7 +105,7 @@ static avr_cycle_count_t silent(avr_t *avr, avr_cycle_count_t when, void *parame
 }
 
 /* The board has begun to send a byte. */
-static void hear(wire *w, uint8_t byte, uint64_t started)
+static void byte_started(wire *w, uint8_t byte, uint64_t started)
 {
     avr_t *avr = w->on->avr;
     uint64_t silence = 10 * w->bit + 35 * w->bit;
@@ -126,7 +126,7 @@ static avr_cycle_count_t next_byte(avr_t *avr, avr_cycle_count_t when, void *par
     wire *w = parameter;
 
     (void)when;
-    /* The simulator has the byte received one byte's time after this. */
+    /* In the simulator the UART has received the byte one byte time after this call. */
     avr_raise_irq(w->end->in, w->queue[w->tail % QUEUE]);
     w->tail++;
     if (w->tail == w->head)
@@ -150,10 +150,10 @@ static void byte_out(struct avr_irq_t *irq, uint32_t value, void *parameter)
     wire *w = parameter;
 
     (void)irq;
-    hear(w, (uint8_t)value, w->on->avr->cycle);
+    byte_started(w, (uint8_t)value, w->on->avr->cycle);
 }
 
-/* The simulator's bytes are eleven bits long whatever the format: put right. */
+/* The simulator's bytes are always eleven bits long. Corrects that for other formats. */
 static void pace(wire *w)
 {
     avr_uart_t *uart = w->end->uart;
@@ -214,11 +214,11 @@ static avr_cycle_count_t sample(avr_t *avr, avr_cycle_count_t when, void *parame
         e->bit_in++;
         return when + w->bit;
     }
-    /* A frame whose stop bit is no stop bit is none. */
+    /* A byte without a stop bit is not a byte. */
     if (!e->level)
         die("a byte without its stop bit", "SoftwareSerial");
     e->listening = 0;
-    hear(w, (uint8_t)e->shift_in, when - w->bit * 19 / 2);
+    byte_started(w, (uint8_t)e->shift_in, when - w->bit * 19 / 2);
     return 0;
 }
 

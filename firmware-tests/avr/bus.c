@@ -7,7 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* What the client writes at once arrives within this, so that no silence gets
+/* Bytes that the client writes at once arrive within this time, so that no silence gets
  * into a frame. */
 enum { PAUSE_MS = 5 };
 

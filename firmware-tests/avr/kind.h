@@ -1,10 +1,10 @@
-/* The boards that sketches are compiled for, and where each has its pins. */
+/* The boards that sketches are compiled for, and their pins. */
 #ifndef KIND_H
 #define KIND_H
 
 #include "board.h"
 
-/* A pin, and where one board and the other have it. */
+/* A pin of one board, as port and bit. */
 typedef struct pin {
     char port;
     int bit;
@@ -12,13 +12,13 @@ typedef struct pin {
 
 typedef struct kind {
     const char *name, *mcu;
-    char bus; /* the UART that BUS is */
+    char bus; /* the UART that the sketches call BUS */
     pin led, pin2, pin4;
 } kind;
 
 extern const kind uno, minimal, mega, older_mega, atmega644p, atmega1284p;
 
-/* A board of this kind that runs a sketch. */
+/* Starts a board of this kind with a sketch. */
 board *kind_start(const kind *k, const char *sketch);
 
 int is_high(board *b, pin p);

@@ -7,8 +7,8 @@
 #include <string.h>
 #include <unistd.h>
 
-/* The server answers what is for it within a few of these; loaded hosts take
- * longer. What is not for it, it is to have heard before the next. */
+/* The server answers a request to its own unit within a few milliseconds, on a loaded host
+ * later. A request to another unit must have reached it before the next request. */
 enum { ANSWERED_WITHIN_MS = 60000, HEARD_WITHIN_MS = 1000 };
 
 static int is_whole(const uint8_t *reply, size_t length)

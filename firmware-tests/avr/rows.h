@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-/* The smallest, the largest and the sum of the values noted. All zero: none. */
+/* The smallest, the largest and the sum of the noted values. All zero: there are none. */
 typedef struct span {
     uint64_t least, most, sum;
     unsigned count;
@@ -14,20 +14,21 @@ void note(span *s, uint64_t value);
 unsigned long mean(const span *s);
 span joined(const span *one, const span *other);
 
-/* Prints a row of the table of limits. `limit` 0: the row has none. */
+/* Prints a row of the table of limits. If `limit` is 0, the row has none. */
 void row(const char *what, const char *unit, unsigned long least, unsigned long most,
          unsigned long limit);
-/* The same of a span of cycles. */
+/* The same for a span of cycles. */
 void row_cycles(const char *what, const span *s, unsigned long limit);
 
-/* Prints a row of the comparison. `theirs` NULL: not measured, the field stays empty. */
+/* Prints a row of the comparison. If `theirs` is NULL, it was not measured, and the field
+ * stays empty. */
 void row_beside(const char *what, const span *ours, const span *theirs);
 void row_beside_bytes(const char *what, unsigned long ours, const unsigned long *theirs);
 
-/* How many rows exceeded their limit so far. */
+/* How many rows have exceeded their limit so far. */
 unsigned rows_above(void);
 
-/* Ends the program: what was measured cannot be right. */
+/* Ends the program, since the measurement cannot be right. */
 _Noreturn void give_up(const char *why);
 
 #endif

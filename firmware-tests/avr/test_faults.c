@@ -1,5 +1,5 @@
-/* Five reads by a sketch on a simulated Uno, the first of which meets a fault:
- * a bad wire, a device that is not there, one that answers with exceptions. */
+/* Five reads by a sketch on a simulated Uno. The first meets a fault: a bad wire, an absent
+ * device, or a device that answers with exceptions. */
 #include "crc.h"
 #include "peer.h"
 #include "test.h"
@@ -19,8 +19,8 @@ typedef struct fault {
     uint8_t status;       /* of the first read */
 } fault;
 
-/* Bytes, and the right reply right behind them. */
-static void reply_behind(wire *w, const uint8_t *request, const void *bytes, size_t length)
+/* Sends bytes and, right after them, the right reply. */
+static void reply_after(wire *w, const uint8_t *request, const void *bytes, size_t length)
 {
     uint8_t reply[FRAME];
 
@@ -30,47 +30,47 @@ static void reply_behind(wire *w, const uint8_t *request, const void *bytes, siz
 
 static void right(wire *w, const uint8_t *request)
 {
-    reply_behind(w, request, "", 0);
+    reply_after(w, request, "", 0);
 }
 
 static void leading_zero(wire *w, const uint8_t *request)
 {
-    reply_behind(w, request, "\0", 1);
+    reply_after(w, request, "\0", 1);
 }
 
 static void five_bytes_of_noise(wire *w, const uint8_t *request)
 {
-    reply_behind(w, request, "\xFF\x00\x55\x01\x99", 5);
+    reply_after(w, request, "\xFF\x00\x55\x01\x99", 5);
 }
 
 static void noise_like_our_header(wire *w, const uint8_t *request)
 {
-    reply_behind(w, request, "\x01\x03\x14", 3);
+    reply_after(w, request, "\x01\x03\x14", 3);
 }
 
-/* The right reply to another request in front of ours. */
-static void reply_behind_reply_to(wire *w, const uint8_t *request, uint8_t unit, uint8_t function,
-                                  uint8_t quantity)
+/* Sends the right reply to another request, then the right reply to ours. */
+static void reply_after_reply_to(wire *w, const uint8_t *request, uint8_t unit, uint8_t function,
+                                 uint8_t quantity)
 {
     const uint8_t other[] = {unit, function, 3, 0x21, 0, quantity};
     uint8_t reply[FRAME];
 
-    reply_behind(w, request, reply, peer_right_reply(reply, other));
+    reply_after(w, request, reply, peer_right_reply(reply, other));
 }
 
 static void foreign_reply(wire *w, const uint8_t *request)
 {
-    reply_behind_reply_to(w, request, UNIT + 1, 3, REGISTERS);
+    reply_after_reply_to(w, request, UNIT + 1, 3, REGISTERS);
 }
 
 static void reply_of_another_function(wire *w, const uint8_t *request)
 {
-    reply_behind_reply_to(w, request, UNIT, 4, REGISTERS);
+    reply_after_reply_to(w, request, UNIT, 4, REGISTERS);
 }
 
 static void late_reply_of_another_length(wire *w, const uint8_t *request)
 {
-    reply_behind_reply_to(w, request, UNIT, 3, REGISTERS - 1);
+    reply_after_reply_to(w, request, UNIT, 3, REGISTERS - 1);
 }
 
 static void a_pause_inside(wire *w, const uint8_t *request)
@@ -82,7 +82,7 @@ static void a_pause_inside(wire *w, const uint8_t *request)
     wire_play(w, 30 * MS, reply + 9, length - 9);
 }
 
-/* More than the board's 64 bytes of receive buffer. */
+/* More than the board's receive buffer of 64 bytes. */
 static void noise_of_100_bytes(wire *w, const uint8_t *request)
 {
     uint8_t noise[100];
@@ -92,7 +92,7 @@ static void noise_of_100_bytes(wire *w, const uint8_t *request)
         state = state * 1103515245u + 12345u;
         noise[i] = (uint8_t)(state >> 16);
     }
-    reply_behind(w, request, noise, sizeof noise);
+    reply_after(w, request, noise, sizeof noise);
 }
 
 static void bad_crc(wire *w, const uint8_t *request)
@@ -175,13 +175,13 @@ static void play_first(wire *w, const uint8_t *frame, size_t length)
         right(w, frame);
 }
 
-/* What the sketch reports. */
+/* The report in the sketch's RAM. */
 typedef struct report {
     uint8_t status[READS];
     uint16_t words[READS][REGISTERS];
 } report;
 
-/* Where the sketches are: with the library, or with the small one. */
+/* The folder of the sketches: with the library, or with its minimal variant. */
 static const char *place = "uno";
 
 static board *start(const char *sketch)
@@ -212,8 +212,8 @@ static report run(wire_device device, void *context)
     return r;
 }
 
-/* '.' right, 'F' a failed call, 'W' success with wrong data. */
-static char verdict(const report *r, unsigned n, uint16_t (*value)(unsigned address))
+/* Returns '.' for right data, 'F' for a failed call, 'W' for success with wrong data. */
+static char outcome(const report *r, unsigned n, uint16_t (*value)(unsigned address))
 {
     unsigned i;
 
@@ -225,7 +225,7 @@ static char verdict(const report *r, unsigned n, uint16_t (*value)(unsigned addr
     return '.';
 }
 
-static void no_fault_costs_more_than_it_must(void **state)
+static void no_fault_costs_more_reads_than_expected(void **state)
 {
     unsigned i, n, worse = 0;
 
@@ -236,7 +236,7 @@ static void no_fault_costs_more_than_it_must(void **state)
         char found[READS + 1] = "";
 
         for (n = 0; n < READS; n++)
-            found[n] = verdict(&r, n, peer_value);
+            found[n] = outcome(&r, n, peer_value);
         printf("%-42s %s  0x%02X\n", f.name, found, r.status[0]);
         if (strcmp(found, f.expected) != 0 || r.status[0] != f.status) {
             printf("    expected %s, 0x%02X\n", f.expected, f.status);
@@ -246,14 +246,14 @@ static void no_fault_costs_more_than_it_must(void **state)
     assert_int_equal(worse, 0);
 }
 
-static void the_small_library_copes_with_every_fault_too(void **state)
+static void the_minimal_library_passes_every_fault_too(void **state)
 {
     place = "uno-minimal";
-    no_fault_costs_more_than_it_must(state);
+    no_fault_costs_more_reads_than_expected(state);
     place = "uno";
 }
 
-static void a_server_that_is_not_there_is_a_timeout(void **state)
+static void an_absent_server_is_a_timeout(void **state)
 {
     report r = run(NULL, NULL);
     unsigned n;
@@ -268,7 +268,7 @@ static uint16_t held(unsigned address)
     return server_pattern(address);
 }
 
-static void a_servers_exceptions_come_through(void **state)
+static void a_servers_exceptions_are_returned(void **state)
 {
     report r;
     server s;
@@ -276,19 +276,19 @@ static void a_servers_exceptions_come_through(void **state)
 
     (void)state;
     server_start(&s, UNIT);
-    s.mapping->nb_registers = 310; /* the last two reads are beyond */
+    s.mapping->nb_registers = 310; /* the last two reads are beyond the end */
     r = run(peer_libmodbus, &s);
     for (n = 0; n < 3; n++)
-        assert_int_equal(verdict(&r, n, held), '.');
+        assert_int_equal(outcome(&r, n, held), '.');
     for (n = 3; n < READS; n++) {
         assert_int_equal(r.status[n], MBM_ILLEGAL_DATA_ADDRESS);
-        /* What was read before is still there. */
+        /* The values of the earlier reads are still there. */
         assert_int_equal(r.words[n][0], server_pattern(300));
     }
     server_stop(&s);
 }
 
-/* The library must take bytes as fast as the line brings them. */
+/* The library must read bytes as fast as the line delivers them. */
 static void a_reply_of_64_registers_at_115200_baud_arrives_whole(void **state)
 {
     board *b = start("FullSpeed");
@@ -307,10 +307,10 @@ static void a_reply_of_64_registers_at_115200_baud_arrives_whole(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_fault_costs_more_than_it_must),
-        cmocka_unit_test(the_small_library_copes_with_every_fault_too),
-        cmocka_unit_test(a_server_that_is_not_there_is_a_timeout),
-        cmocka_unit_test(a_servers_exceptions_come_through),
+        cmocka_unit_test(no_fault_costs_more_reads_than_expected),
+        cmocka_unit_test(the_minimal_library_passes_every_fault_too),
+        cmocka_unit_test(an_absent_server_is_a_timeout),
+        cmocka_unit_test(a_servers_exceptions_are_returned),
         cmocka_unit_test(a_reply_of_64_registers_at_115200_baud_arrives_whole),
     };
 

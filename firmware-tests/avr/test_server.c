@@ -1,4 +1,4 @@
-/* Sketches that serve, on simulated boards, asked by a real libmodbus client. */
+/* Sketches with a server on simulated boards. A libmodbus client sends the requests. */
 #include "bus.h"
 #include "crc.h"
 #include "kind.h"
@@ -12,7 +12,8 @@
 
 static const kind *const kinds[] = {&uno, &minimal, &mega};
 
-/* t3.5 at 19200 baud, in cycles, less a tick of the core's clock. */
+/* t3.5 at 19200 baud in cycles, and a tick of the core's clock, by which a response may be
+ * early. */
 enum { T35 = 32080, TICK = 64 };
 
 #define FAILS(error, call)                                                                         \
@@ -23,7 +24,7 @@ enum { T35 = 32080, TICK = 64 };
     } while (0)
 #define EXCEPTION(code, call) FAILS(MODBUS_ENOBASE + (code), call)
 
-/* For requests that the client does not have a function for. */
+/* Expects an exception to a request that the client has no function for. */
 static void refuses(modbus_t *client, const uint8_t *request, size_t length, uint8_t exception)
 {
     uint8_t answer[MODBUS_RTU_MAX_ADU_LENGTH];
@@ -34,7 +35,7 @@ static void refuses(modbus_t *client, const uint8_t *request, size_t length, uin
     assert_int_equal(answer[2], exception);
 }
 
-/* --- the example: a sensor and a relay */
+/* --- the example ServeSensorAndRelay */
 
 typedef struct served {
     bus line;
@@ -53,7 +54,7 @@ static void driver_switched(void *context, int level, uint64_t cycle)
     s->level = level;
 }
 
-/* Every response: the driver is on for it and no longer, after t3.5. */
+/* Checks each response: it comes after t3.5, and the driver is on for it and no longer. */
 static void response_seen(void *context, const wire *w, size_t length)
 {
     served *s = context;
@@ -63,12 +64,12 @@ static void response_seen(void *context, const wire *w, size_t length)
     s->wrong += s->level != 0;
     s->wrong += s->rose >= w->first_started || s->rose <= w->heard;
     s->wrong += s->fell < last_bit || s->fell < w->first_started + length * 10 * w->bit;
-    /* Off within a character, before a client could ask again. */
+    /* Off within a character, before a client could send again. */
     s->wrong += s->fell - last_bit > 10 * w->bit;
     s->wrong += w->first_started - w->heard < T35 - TICK;
 }
 
-/* The example, up and running. */
+/* Starts the example and lets it set up. */
 static served *example(const kind *k)
 {
     served *s = calloc(1, sizeof *s);
@@ -159,7 +160,7 @@ static void the_relay_is_a_coil_on(const kind *k)
 }
 ON_ALL(the_relay_is_a_coil)
 
-static void what_is_not_there_is_an_exception_on(const kind *k)
+static void access_to_absent_data_gets_an_exception_on(const kind *k)
 {
     static const uint8_t no_quantity[] = {17, 4, 0, 0, 0, 0}, no_level[] = {17, 5, 0, 0, 1, 2};
     served *s = example(k);
@@ -181,9 +182,9 @@ static void what_is_not_there_is_an_exception_on(const kind *k)
     assert_int_equal(relay(s), 0);
     done(s);
 }
-ON_ALL(what_is_not_there_is_an_exception)
+ON_ALL(access_to_absent_data_gets_an_exception)
 
-static void other_units_and_damage_are_met_with_silence_on(const kind *k)
+static void other_units_and_damaged_frames_get_no_response_on(const kind *k)
 {
     static const uint8_t broadcast_read[] = {0, 1, 0, 0, 0, 1};
     uint8_t frame[16] = {17, 5, 0, 0, 0xFF, 0};
@@ -201,7 +202,7 @@ static void other_units_and_damage_are_met_with_silence_on(const kind *k)
         assert_false(bus_send(&s->line, frame, i));
     frame[0] = 16;
     assert_false(bus_send(&s->line, frame, seal(frame, 6)));
-    /* A foreign response to a foreign request. */
+    /* A response of another unit. */
     memcpy(frame, "\x10\x04\x02\x01\x02", 5);
     assert_false(bus_send(&s->line, frame, seal(frame, 5)));
     memcpy(frame, broadcast_read, 6);
@@ -224,7 +225,7 @@ static void other_units_and_damage_are_met_with_silence_on(const kind *k)
     assert_int_equal(s->responses, 1);
     done(s);
 }
-ON_ALL(other_units_and_damage_are_met_with_silence)
+ON_ALL(other_units_and_damaged_frames_get_no_response)
 
 static void a_broadcast_switches_the_relay_without_a_response_on(const kind *k)
 {
@@ -234,7 +235,7 @@ static void a_broadcast_switches_the_relay_without_a_response_on(const kind *k)
     modbus_set_response_timeout(s->line.client, 0, 200000);
     modbus_set_slave(s->line.client, MODBUS_BROADCAST_ADDRESS);
     bus_go(&s->line);
-    /* The client waits for one all the same. */
+    /* The client waits for a response nevertheless. */
     FAILS(ETIMEDOUT, modbus_write_bit(s->line.client, 0, 1));
     bus_halt(&s->line);
     bus_settle(&s->line);
@@ -284,7 +285,7 @@ static void arrays_units_hooks_and_a_function_are_served(void **state)
     assert_int_equal(back[3], sent[1]);
     assert_int_equal(board_word(b, (uint16_t)(words + 4)), sent[0]);
     assert_int_equal(board_word(b, (uint16_t)(words + 126)), sent[63]);
-    /* The hooks: asked and told three times, last of two registers from 102 on. */
+    /* The hooks were called three times, the last time for two registers from 102 on. */
     assert_int_equal(board_byte(b, (uint16_t)(report + 1)), 3);
     assert_int_equal(board_byte(b, (uint16_t)(report + 2)), 3);
     assert_int_equal(board_word(b, (uint16_t)(report + 3)), 102);
@@ -311,7 +312,7 @@ static void arrays_units_hooks_and_a_function_are_served(void **state)
     refuses(l.client, nothing, sizeof nothing, 3);
     bus_halt(&l);
 
-    /* The client does not know how long the response to 65 is. */
+    /* The client does not know the length of the response to 65. */
     memcpy(frame, adds, sizeof adds);
     assert_true(bus_send(&l, frame, seal(frame, sizeof adds)));
     assert_int_equal(l.length, 6);
@@ -336,8 +337,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_sensor_is_an_input_register),
         cmocka_unit_test(the_relay_is_a_coil),
-        cmocka_unit_test(what_is_not_there_is_an_exception),
-        cmocka_unit_test(other_units_and_damage_are_met_with_silence),
+        cmocka_unit_test(access_to_absent_data_gets_an_exception),
+        cmocka_unit_test(other_units_and_damaged_frames_get_no_response),
         cmocka_unit_test(a_broadcast_switches_the_relay_without_a_response),
         cmocka_unit_test(arrays_units_hooks_and_a_function_are_served),
     };

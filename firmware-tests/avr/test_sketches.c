@@ -1,5 +1,5 @@
-/* The examples and a few sketches more, compiled as the IDE would, run on
- * simulated boards against a real libmodbus server. */
+/* The examples and a few more sketches, compiled as the IDE does, on simulated boards with
+ * a libmodbus server. */
 #include "kind.h"
 #include "peer.h"
 #include "test.h"
@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Collects what a sketch prints. */
+/* What a sketch has printed. */
 typedef struct paper {
     char text[1000];
 } paper;
@@ -63,7 +63,7 @@ static void first_read_reads_what_the_server_holds(void **state)
     first_read(&mega);
 }
 
-static void first_read_says_that_nobody_answers(void **state)
+static void first_read_prints_that_there_is_no_answer(void **state)
 {
     board *b = kind_start(&mega, "FirstRead");
     paper printed = {""};
@@ -89,7 +89,7 @@ static void write_and_read_back(const kind *k)
     assert_true(board_run(b, 700 * MS));
     assert_true(is_high(b, k->led));
     assert_int_equal(s.mapping->tab_registers[9], server_pattern(9));
-    assert_int_equal(s.mapping->tab_registers[10], 1010); /* the second round */
+    assert_int_equal(s.mapping->tab_registers[10], 1010); /* written in the second round */
     assert_int_equal(s.mapping->tab_registers[12], 1012);
     assert_int_equal(s.mapping->tab_registers[13], server_pattern(13));
     assert_int_equal(s.mapping->tab_bits[19], server_bit_pattern(19));
@@ -107,7 +107,7 @@ static void write_and_read_back_writes_to_the_server(void **state)
     write_and_read_back(&mega);
 }
 
-static void the_largest_chips_of_the_unos_instructions_read_and_write(void **state)
+static void the_largest_chips_with_the_unos_instructions_read_and_write(void **state)
 {
     static const kind *const chips[] = {&older_mega, &atmega644p, &atmega1284p};
 
@@ -118,7 +118,7 @@ static void the_largest_chips_of_the_unos_instructions_read_and_write(void **sta
     }
 }
 
-/* The driver-enable pin, and the server behind it. */
+/* The driver-enable pin, and the server after it. */
 typedef struct driver {
     server peer;
     uint64_t rose, fell;
@@ -134,7 +134,7 @@ static void driver_switched(void *context, int level, uint64_t cycle)
     d->level = level;
 }
 
-static void behind_driver(wire *w, const uint8_t *frame, size_t length)
+static void request_after_driver(wire *w, const uint8_t *frame, size_t length)
 {
     driver *d = w->context;
     uint64_t last_bit = w->last_started + 10 * w->bit;
@@ -143,7 +143,7 @@ static void behind_driver(wire *w, const uint8_t *frame, size_t length)
     assert_int_equal(d->level, 0);
     assert_true(d->rose < w->first_started);
     assert_true(d->fell >= last_bit && d->fell >= wire_time);
-    /* Off again well within the 3.5 characters that a slave keeps still. */
+    /* Off again well within the 3.5 characters for which a slave stays silent. */
     assert_true(d->fell - last_bit < 10 * w->bit);
     d->requests++;
     w->context = &d->peer;
@@ -158,7 +158,7 @@ static void half_duplex(const kind *k)
 
     server_start(&d.peer, 1);
     board_watch_pin(b, k->pin2.port, k->pin2.bit, driver_switched, &d);
-    board_uart(b, k->bus, behind_driver, &d);
+    board_uart(b, k->bus, request_after_driver, &d);
     assert_true(board_run(b, 500 * MS));
     assert_true(is_high(b, k->led));
     assert_true(d.requests >= 4);
@@ -174,7 +174,7 @@ static void the_driver_is_on_from_the_first_to_the_last_bit(void **state)
     half_duplex(&mega);
 }
 
-/* Three servers share a wire: each hears what is for it. */
+/* Three servers share a wire. Each receives the requests to its own unit. */
 static void shared(wire *w, const uint8_t *frame, size_t length)
 {
     server *all = w->context;
@@ -206,14 +206,14 @@ static void several_slaves(const kind *k)
     board_free(b);
 }
 
-static void several_slaves_are_told_apart(void **state)
+static void several_slaves_answer_by_their_units(void **state)
 {
     (void)state;
     several_slaves(&uno);
     several_slaves(&mega);
 }
 
-/* Longest time between two changes of a pin. */
+/* The longest time between two changes of a pin. */
 typedef struct rhythm {
     uint64_t last, longest;
     unsigned changes;
@@ -241,8 +241,8 @@ static void non_blocking(const kind *k, int answers)
     bus = board_uart(b, k->bus, answers ? peer_libmodbus : NULL, &s);
     assert_true(board_run(b, 1500 * MS));
     assert_true(r.changes >= 28);
-    /* 50 ms, and the time that a request of 13 bytes takes at 19200 baud: the
-     * core's flush, which the class calls, waits for the last bit. */
+    /* 50 ms, and the time of a request of 13 bytes at 19200 baud, since the core's flush,
+     * which the class calls, waits for the last bit. */
     assert_true(r.longest < 58 * MS);
     if (answers) {
         assert_true(bus->frames > 20);
@@ -318,7 +318,7 @@ static void basic(const kind *k)
     assert_true(board_run(b, 700 * MS));
     rounds = bus->frames / 2;
     assert_true(rounds > 10);
-    /* Any round that failed would have taken two seconds. */
+    /* Each failed round would have taken two seconds. */
     assert_in_range(s.mapping->tab_registers[0], rounds, rounds + 1);
     assert_int_equal(s.mapping->tab_registers[1], 0);
     server_stop(&s);
@@ -333,7 +333,7 @@ static void basic_counts_in_the_server(void **state)
     basic(&mega);
 }
 
-/* Requests of the round, function and quantity, as they came. */
+/* The requests of a round: function and quantity, in order. */
 typedef struct coupler {
     server peer;
     uint8_t functions[30], quantities[30], statuses[30];
@@ -365,7 +365,7 @@ static void phoenix_contact(const kind *k)
     unsigned i;
 
     server_start(&c.peer, 1);
-    /* As the device that refuses 66 registers and gives 64. */
+    /* Like the device that refuses 66 registers and accepts 64. */
     c.peer.mapping->nb_registers = 65;
     board_uart(b, '0', couple, &c);
     assert_true(board_run(b, 700 * MS));
@@ -375,18 +375,18 @@ static void phoenix_contact(const kind *k)
         assert_int_equal(c.quantities[i], quantities[i]);
     }
     assert_int_equal(c.statuses[0], 0);
-    assert_int_equal(c.statuses[1], 2); /* register 2006 is not there */
+    assert_int_equal(c.statuses[1], 2); /* register 2006 does not exist */
     assert_int_equal(c.statuses[5], 0);
-    assert_int_equal(c.statuses[6], 2); /* of 66 */
-    assert_int_equal(c.statuses[7], 0); /* of 64 */
-    assert_int_equal(c.statuses[9], 2); /* 8 to 71 */
+    assert_int_equal(c.statuses[6], 2); /* the read of 66 */
+    assert_int_equal(c.statuses[7], 0); /* the read of 64 */
+    assert_int_equal(c.statuses[9], 2); /* the read of 8 to 71 */
     assert_int_equal(c.peer.mapping->tab_registers[4], server_pattern(8));
     assert_int_equal(c.peer.mapping->tab_registers[5], server_pattern(9));
     server_stop(&c.peer);
     board_free(b);
 }
 
-static void phoenix_contact_makes_its_calls(void **state)
+static void phoenix_contact_makes_its_requests(void **state)
 {
     (void)state;
     phoenix_contact(&uno);
@@ -394,7 +394,7 @@ static void phoenix_contact_makes_its_calls(void **state)
     phoenix_contact(&mega);
 }
 
-/* --- sketches beyond the examples */
+/* --- sketches that are no examples */
 
 static void a_bus_on_two_pins_works(void **state)
 {
@@ -435,7 +435,7 @@ static void two_ports_are_polled_at_once(void **state)
     assert_int_equal(board_byte(b, (uint16_t)(report + 4)), 0);
     assert_int_equal(board_word(b, (uint16_t)(report + 5)), server_pattern(7));
     assert_int_equal(board_word(b, (uint16_t)(report + 7)), server_pattern(8));
-    /* Ten requests of 10 ms each, polled more often than once a millisecond. */
+    /* Ten requests of 10 ms each, with more than one poll in a millisecond. */
     assert_true(board_word(b, (uint16_t)(report + 9)) > 50);
     server_stop(&left);
     server_stop(&right);
@@ -471,16 +471,16 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(first_read_reads_what_the_server_holds),
-        cmocka_unit_test(first_read_says_that_nobody_answers),
+        cmocka_unit_test(first_read_prints_that_there_is_no_answer),
         cmocka_unit_test(write_and_read_back_writes_to_the_server),
-        cmocka_unit_test(the_largest_chips_of_the_unos_instructions_read_and_write),
+        cmocka_unit_test(the_largest_chips_with_the_unos_instructions_read_and_write),
         cmocka_unit_test(the_driver_is_on_from_the_first_to_the_last_bit),
-        cmocka_unit_test(several_slaves_are_told_apart),
+        cmocka_unit_test(several_slaves_answer_by_their_units),
         cmocka_unit_test(without_waiting_the_led_blinks_on),
         cmocka_unit_test(an_energy_meters_floats_are_read),
         cmocka_unit_test(values_pass_between_sketch_and_archive),
         cmocka_unit_test(basic_counts_in_the_server),
-        cmocka_unit_test(phoenix_contact_makes_its_calls),
+        cmocka_unit_test(phoenix_contact_makes_its_requests),
         cmocka_unit_test(a_bus_on_two_pins_works),
         cmocka_unit_test(two_ports_are_polled_at_once),
         cmocka_unit_test(calls_of_version_0_9_work_on_a_second_port),

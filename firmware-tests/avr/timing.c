@@ -1,6 +1,6 @@
-/* How fast a sketch on an Uno is, and how much RAM it takes, in cycles and
- * bytes that repeat exactly: the far end is part of the simulation. Prints the
- * rows of docs/reports/timing.md; those of the comparison with ModbusMaster begin with "=".
+/* Measures the speed and the RAM of sketches on an Uno, in cycles and bytes, which repeat
+ * exactly, since the far end is a part of the simulation. Prints the rows of
+ * docs/reports/timing.md. The rows of the comparison with ModbusMaster begin with "=".
  *
  *   timing [FOLDER]   FOLDER below build/avr has the sketches with ModbusMaster */
 #include "timing.h"

@@ -1,25 +1,25 @@
-/* What the program `timing` measures, one function for each file. Each prints its
+/* The measurements of the program `timing`, one function for each file. Each prints its
  * rows of docs/reports/timing.md. */
 #ifndef TIMING_H
 #define TIMING_H
 
 #include "board.h"
 
-/* Transactions that are left out at first, and that are counted. */
+/* The first transactions, which are not counted, and the number of those that are. */
 enum { SKIP = 2, COUNTED = 20 };
 
 /* An Uno that runs build/avr/FOLDER/NAME.elf. */
 board *timed_board(const char *folder, const char *name);
 
-/* A master, and with `peer` the library ModbusMaster beside it: the folder with the
- * sketches that are compiled with it, or NULL. */
+/* Times a master and, if `peer` is not NULL, the library ModbusMaster: `peer` is the folder
+ * of the sketches that are compiled with it. */
 void time_master(const char *peer);
-/* The gap before a request while the baud rate is untold. */
+/* Times the gap before a request while no baud rate is set. */
 void time_default_gap(void);
-/* A master that waits for a reply, and what arrives is none. */
+/* Times a master that waits for a reply while other bytes arrive. */
 void time_master_flood(void);
 void time_server(void);
-/* A server, and noise without silence. */
+/* Times a server while noise arrives without silence. */
 void time_server_flood(void);
 
 #endif

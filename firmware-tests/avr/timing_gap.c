@@ -1,19 +1,19 @@
-/* The gap that a master keeps while the baud rate is untold. */
+/* The gap that a master keeps while no baud rate is set. */
 #include "peer.h"
 #include "rows.h"
 #include "timing.h"
 
-/* The calls of the sketch, in its order. */
+/* The calls of the sketch, in order. */
 enum { AFTER_BEGIN, OTHER_AFTER_PAUSE, OTHER_AT_ONCE, SAME_AFTER_PAUSE, CALLS };
 
-/* 4 ms; the clock of the core counts steps of 4 us. */
+/* 4 ms; the core's clock counts in steps of 4 us. */
 enum { GAP = 4 * MS, CLOCK_STEP = 4 * MHZ };
 
 typedef struct turns {
     wire *bus;
     uint64_t called, silent_from;
     uint64_t waited[CALLS];  /* from the call to the first byte of its request */
-    uint64_t silence[CALLS]; /* before it, on the line */
+    uint64_t silence[CALLS]; /* the silence on the line before it */
 } turns;
 
 static void is_called(void *context, int level, uint64_t cycle)
@@ -55,18 +55,18 @@ void time_default_gap(void)
     if (t.silence[OTHER_AT_ONCE] < GAP - CLOCK_STEP)
         give_up("another object's request does not keep the gap");
     row_of(
-        "baud rate untold: the first request after begin on a line that was silent for 50 ms, from the call to its first byte",
+        "no baud rate set: the first request after begin on a line that was silent for 50 ms, from the call to its first byte",
         t.waited[AFTER_BEGIN], 3463);
     row_of(
-        "baud rate untold: another object's request after 50 ms of silence, from the call to its "
+        "no baud rate set: another object's request after 50 ms of silence, from the call to its "
         "first byte",
         t.waited[OTHER_AFTER_PAUSE], 3463);
     row_of(
-        "baud rate untold: the same object's request after 50 ms of silence, from the call to its "
+        "no baud rate set: the same object's request after 50 ms of silence, from the call to its "
         "first byte",
         t.waited[SAME_AFTER_PAUSE], 3463);
     row_of(
-        "baud rate untold: another object's request at once, dead time with the gap of 64000 cycles",
+        "no baud rate set: another object's request at once, dead time with the gap of 64000 cycles",
         t.silence[OTHER_AT_ONCE], GAP + GAP / 20);
     board_free(b);
 }

@@ -1,4 +1,4 @@
-/* A master that is answered at once: its dead time, its stack, its polls. */
+/* A master whose requests are answered at once: its dead time, its stack, its polls. */
 #include "peer.h"
 #include "rows.h"
 #include "timing.h"
@@ -8,8 +8,8 @@
 typedef struct observer {
     board *on;
     wire *bus;
-    uint64_t late; /* the last byte of a reply comes so much later */
-    span dead[2];  /* before a request of 8 bytes, and of more */
+    uint64_t late; /* the last byte of a reply comes this many cycles late */
+    span dead[2];  /* before a request of 8 bytes, and before a longer one */
     span back;     /* from the last byte of a reply to the end of the call */
     /* poll by poll */
     span without, with;
@@ -56,7 +56,8 @@ static void poll_begins_or_ends(void *context, int level, uint64_t cycle)
         o->rose = cycle;
         return;
     }
-    /* After the request has left: first a wait of a millisecond, then bytes. */
+    /* After the request has been sent, the wire is silent for a millisecond, then bytes
+     * arrive. */
     if (w->frames > SKIP && o->waiting) {
         unsigned fresh = w->bytes_heard - o->bytes_before;
 
@@ -112,7 +113,7 @@ static void dead_times(void)
 static unsigned long ram_added(const char *folder)
 {
     board *plain = timed_board("uno", "SizeSerial"), *reading = timed_board(folder, "SizeFC03");
-    /* The sketch has two bytes of its own. */
+    /* The sketch itself uses two bytes. */
     unsigned long ram = board_symbol(reading, "_end") - board_symbol(plain, "_end") - 2u;
 
     board_free(plain);
@@ -150,13 +151,14 @@ static void polls(void)
 
     row_cycles("poll while nothing arrives", &o.without, 0);
     row_cycles("poll with new bytes, 115200 baud", &o.with, 0);
-    /* All that a byte costs, the core's interrupt included, above waiting. */
+    /* The cycles of a received byte, with the core's interrupt, above those of waiting. */
     per_byte = (unsigned long)((o.with.sum - o.with.count * mean(&o.without)) / o.bytes_polled);
     row("a received byte, above waiting (one lasts 1388 at 115200 baud)", "cycles", per_byte,
         per_byte, 0);
 }
 
-/* From reset on: how much deeper the stack grows than that of a serial-only sketch. */
+/* How much deeper the stack grows, from reset on, than in a sketch that only uses the
+ * serial port. */
 static unsigned long stack_added(const observer *o)
 {
     board *plain = timed_board("uno", "SizeSerial");
@@ -170,12 +172,12 @@ static unsigned long stack_added(const observer *o)
     return board_stack_depth(o->on) - depth;
 }
 
-/* The same sketches, compiled with either library, on the same board. */
-static void beside(const char *peer)
+/* The same sketches on the same board, compiled with each of the two libraries. */
+static void compare_with(const char *peer)
 {
     static const struct {
         const char *sketch, *what;
-        unsigned longer; /* the request has more than 8 bytes */
+        unsigned longer; /* 1: the request has more than 8 bytes */
     } rows[] = {
         {"TimeRead", "dead time, FC03 of 10 registers, 115200 baud", 0},
         {"TimeBasicNoGap", "dead time, Basic, 19200 baud: before FC10", 1},
@@ -197,7 +199,7 @@ static void beside(const char *peer)
         row_beside(rows[i].what, &ours.dead[rows[i].longer],
                    peer ? &theirs.dead[rows[i].longer] : NULL);
     }
-    /* Those of Basic, which came last. */
+    /* The rows of Basic, which were measured last. */
     both[0] = joined(&ours.dead[0], &ours.dead[1]);
     both[1] = joined(&theirs.dead[0], &theirs.dead[1]);
     row_beside("dead time, Basic, 19200 baud: before both", &both[0], peer ? &both[1] : NULL);
@@ -212,5 +214,5 @@ void time_master(const char *peer)
     dead_times();
     returns();
     polls();
-    beside(peer);
+    compare_with(peer);
 }

@@ -6,8 +6,8 @@
 
 #include <string.h>
 
-/* FULL bytes fill the frame buffer, COUNTED_BYTES are averaged. IN_CORE bytes fit into
- * the core's receive buffer of 64. */
+/* FULL bytes fill the frame buffer. COUNTED_BYTES are averaged. IN_CORE bytes fit into the
+ * core's receive buffer of 64 bytes. */
 enum { FULL = 255, COUNTED_BYTES = 1000, IN_CORE = 60 };
 
 typedef struct flood {
@@ -15,10 +15,10 @@ typedef struct flood {
     wire *bus;
     uint8_t (*byte)(unsigned i);
     unsigned played;
-    uint16_t taken, status; /* where the sketch has them */
+    uint16_t taken, status; /* their addresses in the sketch */
     uint64_t began, longest;
     int takes;
-    /* the cycles of polls with bytes to take, and of all others */
+    /* the cycles of polls with bytes to read, and of all others */
     uint64_t busy;
     span idle;
 } flood;
@@ -41,7 +41,7 @@ static void poll_begins_or_ends(void *context, int level, uint64_t cycle)
         f->began = cycle;
         return;
     }
-    if (f->began == 0) /* this poll began before it was watched */
+    if (f->began == 0) /* the poll began before the measurement */
         return;
     if (lasted > f->longest)
         f->longest = lasted;
@@ -52,7 +52,7 @@ static void poll_begins_or_ends(void *context, int level, uint64_t cycle)
     f->takes = 0;
 }
 
-/* Runs the sketch of a folder until its request has left. */
+/* Runs the sketch of a folder until it has sent its request. */
 static flood *begin(const char *folder, uint8_t (*byte)(unsigned i))
 {
     static flood f;
@@ -82,15 +82,15 @@ static void play(flood *f, unsigned count)
     f->played += count;
 }
 
-/* Until polls took `target` bytes. The line pauses where the core's buffer would
- * overflow: a master that is too slow loses no byte here. */
+/* Plays bytes until polls have read `target` bytes. The line pauses before the core's
+ * buffer would overflow, so a master that is too slow loses no byte here. */
 static void feed(flood *f, unsigned target)
 {
     uint64_t end_at = board_cycle(f->on) + 1500 * MS;
     uint16_t taken;
 
     while ((taken = board_word(f->on, f->taken)) != target) {
-        /* While the sketch stores its low byte, `taken` may exceed what was played. */
+        /* While the sketch stores the low byte, `taken` may exceed what was played. */
         uint16_t waiting = (uint16_t)(f->played - taken);
 
         if (f->bus->bytes_heard == f->played && f->played < target && waiting < IN_CORE) {
@@ -102,10 +102,10 @@ static void feed(flood *f, unsigned target)
             give_up("a master does not take the bytes of a flood");
     }
     if (board_byte(f->on, f->status) != MBM_PENDING)
-        give_up("a request ends within a flood, before its deadline");
+        give_up("a request ends during a flood, before its deadline");
 }
 
-/* Cycles of a byte. A poll without bytes counts where it lasts longer than the
+/* Returns the cycles of a byte. A poll without bytes counts too if it is longer than the
  * shortest: it does work that was put off. */
 static uint64_t per_byte(const char *folder, uint8_t (*byte)(unsigned i))
 {
@@ -121,9 +121,9 @@ static uint64_t per_byte(const char *folder, uint8_t (*byte)(unsigned i))
     return busy / COUNTED_BYTES;
 }
 
-/* The longest poll until the request has ended, of bytes as fast as the line allows. The
- * core loses bytes where the master is too slow, and what is left may be a right reply
- * by chance. Then the flood begins with another byte. */
+/* Returns the longest poll until the request has ended, with bytes as fast as the line
+ * allows. The core loses bytes if the master is too slow, and the rest may be a right reply
+ * by chance. Then the flood begins again with another byte. */
 static uint64_t longest(const char *folder, uint8_t (*byte)(unsigned i))
 {
     unsigned first;
@@ -137,7 +137,7 @@ static uint64_t longest(const char *folder, uint8_t (*byte)(unsigned i))
             if (f->played - f->bus->bytes_heard < FRAME)
                 play(f, FRAME);
             if (!board_run(f->on, MS) || board_cycle(f->on) > 4000 * MS)
-                give_up("a request does not end within a flood");
+                give_up("a request does not end during a flood");
         }
         ended = board_byte(f->on, f->status);
         board_free(f->on);
@@ -146,12 +146,12 @@ static uint64_t longest(const char *folder, uint8_t (*byte)(unsigned i))
         if (ended != MBM_OK)
             break;
     }
-    give_up("a flood is no reply, but its request ends in another way");
+    give_up("a flood is no reply, but the request ends with another status than a timeout");
 }
 
-/* --- what arrives */
+/* --- the bytes that arrive */
 
-/* The beginnings of replies of 125 registers: each is a candidate. */
+/* The first bytes of replies of 125 registers: each of them may be the start of a reply. */
 static uint8_t begins_125(unsigned i)
 {
     static const uint8_t bytes[3] = {0x11, 0x03, 0xFA};

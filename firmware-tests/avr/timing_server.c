@@ -1,4 +1,4 @@
-/* How long a server takes to respond. */
+/* The response time of a server. */
 #include "crc.h"
 #include "peer.h"
 #include "rows.h"
@@ -10,12 +10,13 @@
 typedef struct asker {
     board *on;
     wire *bus;
-    span gap[3]; /* from the last byte of a request to the first of its response */
+    span gap[3]; /* from the last byte of a request to the first byte of its response */
     unsigned wrong;
 } asker;
 
-/* In turn reads ten registers, writes them and reads 64, at ever new moments. */
-static void ask(asker *a)
+/* Reads ten registers, writes ten and reads 64 in turn, each time at another moment of the
+ * sketch's loop. */
+static void send_next(asker *a)
 {
     static const uint8_t requests[3][7] = {
         {1, 3, 0, 0, 0, 10}, {1, 16, 0, 0, 0, 10, 20}, {1, 3, 0, 0, 0, 64}};
@@ -31,12 +32,12 @@ static void answered(wire *w, const uint8_t *frame, size_t length)
     asker *a = w->context;
 
     static const size_t lengths[3] = {25, 8, 133};
-    unsigned which = (w->frames - 1) % 3; /* the first is frame 1 */
+    unsigned which = (w->frames - 1) % 3; /* the first frame is number 1 */
 
     a->wrong += length != lengths[which] || crc16(frame, length) != 0;
     if (w->frames > SKIP)
         note(&a->gap[which], w->first_started - w->heard);
-    ask(a);
+    send_next(a);
 }
 
 static asker serve(const char *name)
@@ -48,7 +49,7 @@ static asker serve(const char *name)
     a.bus = board_uart(a.on, '0', answered, &a);
     if (!board_run(a.on, 10 * MS))
         give_up("a sketch crashed");
-    ask(&a);
+    send_next(&a);
     while (a.bus->frames < SKIP + 3 * COUNTED)
         if (!board_run(a.on, MS))
             give_up("a sketch crashed");

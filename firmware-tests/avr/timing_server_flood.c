@@ -1,4 +1,4 @@
-/* A server, and noise without silence. */
+/* A server while noise arrives without silence. */
 #include "crc.h"
 #include "peer.h"
 #include "rows.h"
@@ -11,12 +11,12 @@ enum {
     FULL = 141,
     NOISE = 1000,
     KINDS = 4
-}; /* its buffer, what comes once that is full, and of how many kinds */
+}; /* the size of its buffer, the bytes after it is full, and the kinds of noise */
 
 typedef struct flood {
     board *on;
     wire *bus;
-    uint64_t rose, busy;            /* of polls with bytes to take */
+    uint64_t rose, busy;            /* of polls with bytes to read */
     uint64_t began, longest, ready; /* of all polls */
     unsigned answers;
 } flood;
@@ -48,11 +48,11 @@ static void is_answered(wire *w, const uint8_t *frame, size_t length)
     f->answers += length == 25 && crc16(frame, length) == 0;
 }
 
-/* The bytes of one kind of noise. */
+/* Byte `i` of a kind of noise. */
 static uint8_t noise(unsigned kind, unsigned i)
 {
     static const uint8_t request[8] = {1, 3, 0, 0, 0, 10, 0xC5, 0xCD};
-    /* How a request begins that fills the buffer. */
+    /* The start of a request that fills the buffer. */
     static const uint8_t beginning[7] = {1, 16, 0, 0, 0, 64, 128};
     static uint32_t random = 1;
 
@@ -94,7 +94,7 @@ void time_server_flood(void)
             if (!board_run(f.on, 100))
                 give_up("a sketch crashed");
         note(&byte, f.busy / (board_word(f.on, taken) - before));
-        /* What is left is taken, and the line is silent. */
+        /* The server reads the rest, and the line is silent. */
         f.longest = 0;
         board_watch_pin(f.on, 'B', 0, polls_once, &f);
         wire_play(f.bus, 10 * MS, request, seal(request, 6));

@@ -7,9 +7,9 @@
 typedef struct fault {
     const char *name;
     device_fault spoil;
-    uint8_t status;            /* of the request that meets it */
-    uint8_t resynchronisation; /* whether the reply is found behind bytes of no frame */
-    uint8_t foreign;           /* whether a frame of others comes before */
+    uint8_t status;            /* of the request that meets the fault */
+    uint8_t resynchronisation; /* 1: the reply is found after bytes that are no frame */
+    uint8_t foreign;           /* 1: a frame of another unit or function comes first */
 } fault;
 
 extern const fault faults[];

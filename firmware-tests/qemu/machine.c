@@ -11,7 +11,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-/* A run takes one second; the machine under the test may be busy. */
+/* A run takes one second. The host of the test may be busy. */
 enum { PATIENCE = 120 /* s */ };
 
 #define ARM(board)                                                                                 \
@@ -40,7 +40,7 @@ static void become_qemu(const machine *m, const char *name, int line, int consol
     const char *arguments[32];
     unsigned n = 0;
 
-    /* Not to survive the test, whatever ends it. */
+    /* QEMU must not survive the test, however the test ends. */
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     dup2(console, 1);
     dup2(console, 2);
@@ -52,8 +52,8 @@ static void become_qemu(const machine *m, const char *name, int line, int consol
              strcmp(arguments[n - 1], "-device") ? "" : "loader,cpu-num=0,file=",
              folder ? folder : "build/baremetal", m->name, name);
     arguments[n++] = image;
-    /* The descriptor itself, not its name: no wait for the other end to open,
-     * and no byte lost before it has. */
+    /* QEMU gets the descriptor itself, not its name: it need not wait for the other end,
+     * and no byte is lost before that is open. */
     snprintf(set, sizeof set, "fd=%d,set=1", line);
     arguments[n++] = "-add-fd";
     arguments[n++] = set;
@@ -74,7 +74,7 @@ static void become_qemu(const machine *m, const char *name, int line, int consol
     _exit(127);
 }
 
-/* Waits without blocking for good; 0 if the time passed. */
+/* Waits with a time limit. Returns 0 if the time is over. */
 static int wait_for(pid_t child, int *status)
 {
     unsigned naps;
@@ -106,7 +106,8 @@ int machine_says(const running *r, const char *text)
     unsigned naps;
 
     for (naps = 0; naps < 100 * PATIENCE; naps++) {
-        /* At a place of its own: the console's writer shares the other. */
+        /* Reads at a position of its own, since the writer of the console uses the position
+         * of the file. */
         ssize_t length = pread(fileno(r->console), console, sizeof console - 1, 0);
 
         console[length < 0 ? 0 : length] = '\0';

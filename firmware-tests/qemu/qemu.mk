@@ -1,7 +1,7 @@
 # The bare metal firmware on machines that QEMU plays.
 
 BAREMETAL := examples/baremetal/Makefile
-# Of the firmware's Makefile.
+# From the firmware's Makefile.
 MACHINES = $(shell $(MAKE) -s --no-print-directory -f $(BAREMETAL) machines)
 VARIANTS = $(shell $(MAKE) -s --no-print-directory -f $(BAREMETAL) variants)
 
@@ -13,7 +13,7 @@ $(QEMU_TESTS): $(BUILD)/firmware/%: firmware-tests/qemu/%.c $(QEMU_SOURCES) $(wi
 	@gcc $(CFLAGS) $(WARNINGS) -Iinclude -Ic-tests/support -Iexamples/baremetal $(MODBUS) $< $(QEMU_SOURCES) \
 		-lmodbus -lcmocka -lpthread -o $@
 
-# The same, with the library as assembler source.
+# The images with the library as assembler source.
 FROM_SOURCE := $(BUILD)/baremetal-source
 
 .PHONY: firmware-test-qemu

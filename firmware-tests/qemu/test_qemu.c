@@ -1,6 +1,6 @@
-/* The bare metal firmware on every machine that QEMU plays: against a real
- * libmodbus server, whose memory is looked at, and against a device of the
- * tests' own on a line with faults. What the firmware reports is checked too.
+/* The bare metal firmware on every machine that QEMU plays: against a libmodbus server,
+ * whose memory is checked, and against a device of the tests' own on a line with faults. The
+ * firmware's report is checked too.
  *
  *     test_qemu [MACHINE...] */
 #include "device.h"
@@ -18,25 +18,25 @@
 static const machine *board;
 static server peer;
 static run done;
-static int hung; /* a run on this machine had to be killed; no more are started */
+static int hung; /* 1: a run on this machine had to be killed, so no more are started */
 
-/* Words of the report, and of a step in it. */
-static uint16_t head(const uint16_t *registers, unsigned word)
+/* A word of the report, and a word of a step in it. */
+static uint16_t report_word(const uint16_t *registers, unsigned word)
 {
     return registers[REPORT_ADDRESS + word];
 }
 
-static uint16_t of(const uint16_t *registers, enum step step, unsigned word)
+static uint16_t step_word(const uint16_t *registers, enum step step, unsigned word)
 {
     return registers[REPORT_ADDRESS + REPORT_HEAD + STEP_SIZE * (unsigned)step + word];
 }
 
 static uint16_t of_absent(const uint16_t *registers)
 {
-    return head(registers, REPORT_ABSENT_MILLIS);
+    return report_word(registers, REPORT_ABSENT_MILLIS);
 }
 
-/* The firmware's sum over words, in which the place counts. */
+/* The firmware's sum of words, in which each word is weighted with its position. */
 static uint16_t sum_of(const uint16_t *words, unsigned count)
 {
     unsigned i, sum = 0;
@@ -57,14 +57,14 @@ static uint16_t sum_of_bits(const uint8_t *bits, unsigned count)
     return sum_of(words, (count + 15) / 16);
 }
 
-static void brought(const uint16_t *registers, enum step step, unsigned words, uint16_t sum)
+static void assert_read(const uint16_t *registers, enum step step, unsigned words, uint16_t sum)
 {
-    assert_int_equal(of(registers, step, STEP_STATUS), MBM_OK);
-    assert_int_equal(of(registers, step, STEP_WORDS), words);
-    assert_int_equal(of(registers, step, STEP_SUM), sum);
+    assert_int_equal(step_word(registers, step, STEP_STATUS), MBM_OK);
+    assert_int_equal(step_word(registers, step, STEP_WORDS), words);
+    assert_int_equal(step_word(registers, step, STEP_SUM), sum);
 }
 
-/* The run was not killed, and so many steps went otherwise than expected. */
+/* Asserts that the run was not killed and that `code` steps had another status than expected. */
 static void ended_with(int code)
 {
     if (!done.ended || done.code != code)
@@ -75,12 +75,11 @@ static void ended_with(int code)
 
 static uint16_t *held(void)
 {
-    assert_int_equal(head(peer.mapping->tab_registers, REPORT_MAGIC), REPORT_IS_HERE);
+    assert_int_equal(report_word(peer.mapping->tab_registers, REPORT_MAGIC), REPORT_IS_HERE);
     return peer.mapping->tab_registers;
 }
 
-/* What this computer does besides makes times longer, and never shorter: of so many
- * runs the shortest counts. */
+/* Other work of this computer can only make times longer, so the shortest of some runs counts. */
 enum { RUNS = 5, MOST_ABSENT = 4 * ABSENT_TIMEOUT };
 
 static int run_with_libmodbus(void **state)
@@ -105,20 +104,20 @@ static int stop(void **state)
     return 0;
 }
 
-/* Every step went as the firmware expects, and it says so in its own words. */
+/* Every step ended as the firmware expects, and the console shows it. */
 static void ends_with_every_request_as_expected(void **state)
 {
     (void)state;
     ended_with(0);
-    assert_int_equal(head(held(), REPORT_STEPS), STEPS);
-    assert_int_equal(head(held(), REPORT_UNEXPECTED), 0);
+    assert_int_equal(report_word(held(), REPORT_STEPS), STEPS);
+    assert_int_equal(report_word(held(), REPORT_UNEXPECTED), 0);
     assert_non_null(strstr(done.console, "read again: "));
 }
 
 static void writes_a_register(void **state)
 {
     (void)state;
-    assert_int_equal(of(held(), WRITE_REGISTER, STEP_STATUS), MBM_OK);
+    assert_int_equal(step_word(held(), WRITE_REGISTER, STEP_STATUS), MBM_OK);
     assert_int_equal(held()[100], 0xBEEF);
     assert_int_equal(held()[99], server_pattern(99));
 }
@@ -126,7 +125,7 @@ static void writes_a_register(void **state)
 static void writes_queued_registers(void **state)
 {
     (void)state;
-    assert_int_equal(of(held(), WRITE_REGISTERS, STEP_STATUS), MBM_OK);
+    assert_int_equal(step_word(held(), WRITE_REGISTERS, STEP_STATUS), MBM_OK);
     assert_int_equal(held()[101], 0x1122);
     assert_int_equal(held()[103], 0x3344);
     assert_int_equal(held()[106], server_pattern(106));
@@ -135,7 +134,7 @@ static void writes_queued_registers(void **state)
 static void writes_a_coil(void **state)
 {
     (void)state;
-    assert_int_equal(of(held(), WRITE_COIL, STEP_STATUS), MBM_OK);
+    assert_int_equal(step_word(held(), WRITE_COIL, STEP_STATUS), MBM_OK);
     assert_int_equal(peer.mapping->tab_bits[40], 1);
 }
 
@@ -144,7 +143,7 @@ static void writes_coils(void **state)
     unsigned i;
 
     (void)state;
-    assert_int_equal(of(held(), WRITE_COILS, STEP_STATUS), MBM_OK);
+    assert_int_equal(step_word(held(), WRITE_COILS, STEP_STATUS), MBM_OK);
     assert_int_equal(peer.mapping->tab_bits[49], server_bit_pattern(49));
     for (i = 0; i < 19; i++)
         assert_int_equal(peer.mapping->tab_bits[50 + i], 0x5A5C3u >> i & 1);
@@ -154,31 +153,32 @@ static void writes_coils(void **state)
 static void reads_holding_registers(void **state)
 {
     (void)state;
-    brought(held(), READ_HOLDING, 10, sum_of(held() + 20, 10));
+    assert_read(held(), READ_HOLDING, 10, sum_of(held() + 20, 10));
 }
 
 static void reads_input_registers(void **state)
 {
     (void)state;
-    brought(held(), READ_INPUT_REGISTERS, 10, sum_of(peer.mapping->tab_input_registers + 30, 10));
+    assert_read(held(), READ_INPUT_REGISTERS, 10,
+                sum_of(peer.mapping->tab_input_registers + 30, 10));
 }
 
 static void reads_coils(void **state)
 {
     (void)state;
-    brought(held(), READ_COILS, 3, sum_of_bits(peer.mapping->tab_bits + 45, 37));
+    assert_read(held(), READ_COILS, 3, sum_of_bits(peer.mapping->tab_bits + 45, 37));
 }
 
 static void reads_discrete_inputs(void **state)
 {
     (void)state;
-    brought(held(), READ_INPUTS, 2, sum_of_bits(peer.mapping->tab_input_bits + 70, 21));
+    assert_read(held(), READ_INPUTS, 2, sum_of_bits(peer.mapping->tab_input_bits + 70, 21));
 }
 
 static void mask_writes_a_register(void **state)
 {
     (void)state;
-    assert_int_equal(of(held(), MASK_WRITE, STEP_STATUS), MBM_OK);
+    assert_int_equal(step_word(held(), MASK_WRITE, STEP_STATUS), MBM_OK);
     assert_int_equal(held()[102], (0x5566 & 0x00FF) | 0x3400);
 }
 
@@ -187,28 +187,29 @@ static void writes_and_reads_in_one_request(void **state)
     (void)state;
     assert_int_equal(held()[104], 0xCAFE);
     assert_int_equal(held()[105], 0xF00D);
-    brought(held(), READ_WRITE, 6, sum_of(held() + 100, 6));
+    assert_read(held(), READ_WRITE, 6, sum_of(held() + 100, 6));
 }
 
 static void reads_125_registers(void **state)
 {
     (void)state;
-    brought(held(), READ_LONGEST, 125, sum_of(held(), 125));
+    assert_read(held(), READ_LONGEST, 125, sum_of(held(), 125));
 }
 
-static void hands_on_an_exception(void **state)
+static void returns_an_exception(void **state)
 {
     (void)state;
-    assert_int_equal(of(held(), READ_ABSENT_REGISTER, STEP_STATUS), MBM_ILLEGAL_DATA_ADDRESS);
-    assert_int_equal(head(held(), REPORT_EXCEPTIONS), 1);
+    assert_int_equal(step_word(held(), READ_ABSENT_REGISTER, STEP_STATUS),
+                     MBM_ILLEGAL_DATA_ADDRESS);
+    assert_int_equal(report_word(held(), REPORT_EXCEPTIONS), 1);
 }
 
-static void a_broadcast_arrives_and_is_not_waited_for(void **state)
+static void a_broadcast_arrives_and_gets_no_response(void **state)
 {
     (void)state;
-    assert_int_equal(of(held(), BROADCAST, STEP_STATUS), MBM_OK);
+    assert_int_equal(step_word(held(), BROADCAST, STEP_STATUS), MBM_OK);
     assert_int_equal(held()[130], 0x5A5A);
-    brought(held(), READ_WHAT_WAS_BROADCAST, 1, 0x5A5A);
+    assert_read(held(), READ_WHAT_WAS_BROADCAST, 1, 0x5A5A);
 }
 
 static void an_absent_unit_times_out_when_it_should(void **state)
@@ -216,54 +217,54 @@ static void an_absent_unit_times_out_when_it_should(void **state)
     uint16_t millis = of_absent(held());
 
     (void)state;
-    assert_int_equal(of(held(), ASK_ABSENT_UNIT, STEP_STATUS), MBM_RESPONSE_TIMED_OUT);
-    assert_int_equal(head(held(), REPORT_TIMEOUTS), 1);
-    /* The gap before it counts, and whatever else this computer does. */
+    assert_int_equal(step_word(held(), ASK_ABSENT_UNIT, STEP_STATUS), MBM_RESPONSE_TIMED_OUT);
+    assert_int_equal(report_word(held(), REPORT_TIMEOUTS), 1);
+    /* The gap before the request counts too, and so does other work of this computer. */
     assert_in_range(millis, ABSENT_TIMEOUT, MOST_ABSENT);
-    brought(held(), READ_AGAIN, 2, sum_of(held() + 100, 2));
+    assert_read(held(), READ_AGAIN, 2, sum_of(held() + 100, 2));
 }
 
 static void counts_what_happened(void **state)
 {
     (void)state;
-    assert_int_equal(head(held(), REPORT_REQUESTS), STEPS);
-    /* Neither the broadcast nor the absent unit is answered. */
-    assert_int_equal(head(held(), REPORT_REPLIES), STEPS - 2);
-    assert_int_equal(head(held(), REPORT_BAD_CRC), 0);
-    assert_int_equal(head(held(), REPORT_FOREIGN_FRAMES), 0);
-    assert_int_equal(head(held(), REPORT_RESYNCHRONISATIONS), 0);
+    assert_int_equal(report_word(held(), REPORT_REQUESTS), STEPS);
+    /* Neither the broadcast nor the request to the absent unit is answered. */
+    assert_int_equal(report_word(held(), REPORT_REPLIES), STEPS - 2);
+    assert_int_equal(report_word(held(), REPORT_BAD_CRC), 0);
+    assert_int_equal(report_word(held(), REPORT_FOREIGN_FRAMES), 0);
+    assert_int_equal(report_word(held(), REPORT_RESYNCHRONISATIONS), 0);
 }
 
-/* Only the firmware with the client polls a ring that an interrupt fills; it polls
- * when something is due or has arrived, and sleeps else. */
+/* Only the firmware with the client reads a ring that an interrupt fills. It polls when
+ * something is due or bytes have arrived, and sleeps otherwise. */
 static void sleeps_instead_of_polling(void **state)
 {
-    unsigned polls = head(held(), REPORT_POLLS), sleeps = head(held(), REPORT_SLEEPS);
+    unsigned polls = report_word(held(), REPORT_POLLS), sleeps = report_word(held(), REPORT_SLEEPS);
 
     (void)state;
-    assert_int_equal(head(held(), REPORT_LOST_BYTES), 0);
+    assert_int_equal(report_word(held(), REPORT_LOST_BYTES), 0);
     if (!strstr(board->name, "-client")) {
         assert_int_equal(polls + sleeps, 0);
         return;
     }
     print_message("%s: %u polls, %u sleeps\n", board->name, polls, sleeps);
     assert_in_range(sleeps, STEPS, polls);
-    /* The wire takes seconds at full length; a loop would poll a million times. */
+    /* The bytes take seconds on the wire. A loop without sleep would poll a million times. */
     assert_in_range(polls, STEPS, 3000);
 }
 
-/* What every step must bring from the device of our own; `met` is what the
- * request that meets the fault ends with. */
+/* Asserts what every step must read from the tests' own device. `met` is the status of the
+ * request that meets the fault. */
 static void all_is_right(const device *d, uint8_t met)
 {
     const uint16_t *registers = d->memory.holding[0];
     unsigned i;
 
-    assert_int_equal(head(registers, REPORT_MAGIC), REPORT_IS_HERE);
+    assert_int_equal(report_word(registers, REPORT_MAGIC), REPORT_IS_HERE);
     assert_int_equal(d->malformed, 0);
     assert_int_equal(d->number, STEPS + 1);
     for (i = 0; i < STEPS; i++) {
-        uint16_t status = of(registers, (enum step)i, STEP_STATUS);
+        uint16_t status = step_word(registers, (enum step)i, STEP_STATUS);
 
         if (i == READ_HOLDING)
             assert_int_equal(status, met);
@@ -275,10 +276,10 @@ static void all_is_right(const device *d, uint8_t met)
             assert_int_equal(status, MBM_OK);
     }
     if (met == MBM_OK)
-        brought(registers, READ_HOLDING, 10, sum_of(registers + 20, 10));
-    brought(registers, READ_INPUT_REGISTERS, 10, sum_of(d->memory.readings[0] + 30, 10));
-    brought(registers, READ_COILS, 3, sum_of_bits(d->memory.coils[0] + 45, 37));
-    brought(registers, READ_WRITE, 6, sum_of(registers + 100, 6));
+        assert_read(registers, READ_HOLDING, 10, sum_of(registers + 20, 10));
+    assert_read(registers, READ_INPUT_REGISTERS, 10, sum_of(d->memory.readings[0] + 30, 10));
+    assert_read(registers, READ_COILS, 3, sum_of_bits(d->memory.coils[0] + 45, 37));
+    assert_read(registers, READ_WRITE, 6, sum_of(registers + 100, 6));
 }
 
 static void run_with_device(device *d, device_fault spoil, int code)
@@ -299,8 +300,8 @@ static void the_clock_keeps_time(void **state)
     unsigned runs;
 
     (void)state;
-    /* From the absent unit's request to the next: its timeout and the quiet time of
-     * 100 ms. */
+    /* From the request to the absent unit to the next request: its timeout and the quiet
+     * time of 100 ms. */
     for (runs = 0; runs < RUNS && waited > right / 10 * 19; runs++) {
         run_with_device(&d, NULL, 0);
         all_is_right(&d, MBM_OK);
@@ -309,7 +310,7 @@ static void the_clock_keeps_time(void **state)
     assert_in_range(waited, right / 10 * 8, right / 10 * 19);
 }
 
-static void meets(void **state)
+static void a_fault_ends_as_expected(void **state)
 {
     static device d;
     const fault *f = *state;
@@ -318,11 +319,12 @@ static void meets(void **state)
 
     run_with_device(&d, f->spoil, failed);
     all_is_right(&d, f->status);
-    assert_int_equal(head(registers, REPORT_UNEXPECTED), failed);
-    assert_int_equal(head(registers, REPORT_BAD_CRC), f->status == MBM_INVALID_CRC);
-    assert_int_equal(head(registers, REPORT_TIMEOUTS), 1 + (f->status == MBM_RESPONSE_TIMED_OUT));
-    assert_int_equal(head(registers, REPORT_RESYNCHRONISATIONS), f->resynchronisation);
-    assert_int_equal(head(registers, REPORT_FOREIGN_FRAMES), f->foreign);
+    assert_int_equal(report_word(registers, REPORT_UNEXPECTED), failed);
+    assert_int_equal(report_word(registers, REPORT_BAD_CRC), f->status == MBM_INVALID_CRC);
+    assert_int_equal(report_word(registers, REPORT_TIMEOUTS),
+                     1 + (f->status == MBM_RESPONSE_TIMED_OUT));
+    assert_int_equal(report_word(registers, REPORT_RESYNCHRONISATIONS), f->resynchronisation);
+    assert_int_equal(report_word(registers, REPORT_FOREIGN_FRAMES), f->foreign);
 }
 
 #define TEST(test)                                                                                 \
@@ -346,8 +348,8 @@ static const struct {
     TEST(mask_writes_a_register),
     TEST(writes_and_reads_in_one_request),
     TEST(reads_125_registers),
-    TEST(hands_on_an_exception),
-    TEST(a_broadcast_arrives_and_is_not_waited_for),
+    TEST(returns_an_exception),
+    TEST(a_broadcast_arrives_and_gets_no_response),
     TEST(an_absent_unit_times_out_when_it_should),
     TEST(counts_what_happened),
     TEST(sleeps_instead_of_polling),
@@ -373,11 +375,11 @@ static int test_machine(const machine *m)
             if (*space == '_')
                 *space = ' ';
         tests[i].name = names[i];
-        tests[i].test_func = plain ? behaviours[i].function : meets;
+        tests[i].test_func = plain ? behaviours[i].function : a_fault_ends_as_expected;
         tests[i].initial_state = (void *)(uintptr_t)f;
     }
     board = m;
-    /* Should all other waits fail: ends this program, and QEMU with it. */
+    /* In case all other time limits fail: ends this program, and QEMU with it. */
     alarm(900);
     return _cmocka_run_group_tests(m->name, tests, count, run_with_libmodbus, stop);
 }

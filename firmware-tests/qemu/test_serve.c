@@ -1,5 +1,5 @@
-/* The bare metal firmware that serves, on every machine that QEMU plays, asked
- * by a real libmodbus client.
+/* The bare metal firmware with a server, on every machine that QEMU plays. A libmodbus
+ * client sends the requests.
  *
  *     test_serve [MACHINE...] */
 #define _GNU_SOURCE
@@ -17,7 +17,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* Longer than what ends a frame. */
+/* Longer than the silence that ends a frame. */
 enum { SILENCE_MS = 2 * SERVE_SILENCE / 1000 };
 
 static const machine *board;
@@ -67,9 +67,9 @@ static int stop(void **state)
     } while (0)
 #define EXCEPTION(code, call) FAILS(MODBUS_ENOBASE + (code), call)
 
-/* The client. libmodbus sends at once behind a response, where the standard has
- * it wait for t3.5; a pty has no characters that take time. */
-static modbus_t *asking(void)
+/* Returns the client after a pause. The standard requires t3.5 between a response and the
+ * next request, but libmodbus sends at once, and on a pty characters take no time. */
+static modbus_t *client_after_pause(void)
 {
     usleep(20000);
     return client;
@@ -83,18 +83,20 @@ static void registers_are_written_and_read(void **state)
     (void)state;
     for (i = 0; i < SERVE_CELLS; i++)
         words[i] = value(i);
-    assert_int_equal(modbus_write_registers(asking(), SERVE_BASE, 123, words), 123);
-    assert_int_equal(modbus_write_registers(asking(), SERVE_BASE + 123, 7, words + 123), 7);
-    assert_int_equal(modbus_read_registers(asking(), SERVE_BASE, 125, back), 125);
+    assert_int_equal(modbus_write_registers(client_after_pause(), SERVE_BASE, 123, words), 123);
+    assert_int_equal(modbus_write_registers(client_after_pause(), SERVE_BASE + 123, 7, words + 123),
+                     7);
+    assert_int_equal(modbus_read_registers(client_after_pause(), SERVE_BASE, 125, back), 125);
     assert_memory_equal(words, back, 250);
-    assert_int_equal(modbus_read_registers(asking(), SERVE_BASE + 5, 125, back), 125);
+    assert_int_equal(modbus_read_registers(client_after_pause(), SERVE_BASE + 5, 125, back), 125);
     assert_memory_equal(words + 5, back, 250);
-    assert_int_equal(modbus_write_register(asking(), SERVE_BASE + 129, 4711), 1);
-    assert_int_equal(modbus_read_registers(asking(), SERVE_BASE + 128, 2, back), 2);
+    assert_int_equal(modbus_write_register(client_after_pause(), SERVE_BASE + 129, 4711), 1);
+    assert_int_equal(modbus_read_registers(client_after_pause(), SERVE_BASE + 128, 2, back), 2);
     assert_int_equal(back[0], value(128));
     assert_int_equal(back[1], 4711);
-    /* As the hook behind the write left them. */
-    assert_int_equal(modbus_read_input_registers(asking(), SERVE_BASE + 9, 120, back), 120);
+    /* The values that the hook after the write has set. */
+    assert_int_equal(modbus_read_input_registers(client_after_pause(), SERVE_BASE + 9, 120, back),
+                     120);
     for (i = 0; i < 120; i++)
         assert_int_equal(back[i], (uint16_t)~value(9 + i));
 }
@@ -107,15 +109,15 @@ static void coils_are_written_and_read(void **state)
     (void)state;
     for (i = 0; i < SERVE_CELLS; i++)
         bits[i] = bit(i);
-    assert_int_equal(modbus_write_bits(asking(), SERVE_BASE, 129, bits), 129);
-    assert_int_equal(modbus_read_bits(asking(), SERVE_BASE + 3, 126, back), 126);
+    assert_int_equal(modbus_write_bits(client_after_pause(), SERVE_BASE, 129, bits), 129);
+    assert_int_equal(modbus_read_bits(client_after_pause(), SERVE_BASE + 3, 126, back), 126);
     assert_memory_equal(bits + 3, back, 126);
-    assert_int_equal(modbus_write_bit(asking(), SERVE_BASE + 50, !bit(50)), 1);
-    assert_int_equal(modbus_read_bits(asking(), SERVE_BASE + 49, 3, back), 3);
+    assert_int_equal(modbus_write_bit(client_after_pause(), SERVE_BASE + 50, !bit(50)), 1);
+    assert_int_equal(modbus_read_bits(client_after_pause(), SERVE_BASE + 49, 3, back), 3);
     assert_int_equal(back[0], bit(49));
     assert_int_equal(back[1], !bit(50));
     assert_int_equal(back[2], bit(51));
-    assert_int_equal(modbus_read_input_bits(asking(), SERVE_BASE + 1, 49, back), 49);
+    assert_int_equal(modbus_read_input_bits(client_after_pause(), SERVE_BASE + 1, 49, back), 49);
     for (i = 0; i < 49; i++)
         assert_int_equal(back[i], !bit(1 + i));
 }
@@ -124,7 +126,8 @@ static void refuses(const uint8_t *request, size_t length, uint8_t exception)
 {
     uint8_t answer[MODBUS_RTU_MAX_ADU_LENGTH];
 
-    assert_true(modbus_send_raw_request(asking(), (uint8_t *)(uintptr_t)request, (int)length) > 0);
+    assert_true(modbus_send_raw_request(client_after_pause(), (uint8_t *)(uintptr_t)request,
+                                        (int)length) > 0);
     assert_int_equal(modbus_receive_confirmation(client, answer), 5);
     assert_int_equal(answer[1], request[1] | 0x80);
     assert_int_equal(answer[2], exception);
@@ -138,24 +141,25 @@ static void refusals_are_exceptions(void **state)
     uint8_t bits[2];
 
     (void)state;
-    assert_int_equal(modbus_write_register(asking(), SERVE_BASE, 9), 1);
-    EXCEPTION(2, modbus_read_registers(asking(), SERVE_BASE - 1, 2, words));
-    EXCEPTION(2, modbus_read_input_registers(asking(), SERVE_BASE + 129, 2, words));
-    EXCEPTION(2, modbus_read_bits(asking(), SERVE_BASE + 129, 2, bits));
-    EXCEPTION(2, modbus_read_input_bits(asking(), 65535, 1, bits));
-    EXCEPTION(1, modbus_mask_write_register(asking(), SERVE_BASE, 0, 1));
+    assert_int_equal(modbus_write_register(client_after_pause(), SERVE_BASE, 9), 1);
+    EXCEPTION(2, modbus_read_registers(client_after_pause(), SERVE_BASE - 1, 2, words));
+    EXCEPTION(2, modbus_read_input_registers(client_after_pause(), SERVE_BASE + 129, 2, words));
+    EXCEPTION(2, modbus_read_bits(client_after_pause(), SERVE_BASE + 129, 2, bits));
+    EXCEPTION(2, modbus_read_input_bits(client_after_pause(), 65535, 1, bits));
+    EXCEPTION(1, modbus_mask_write_register(client_after_pause(), SERVE_BASE, 0, 1));
     words[0] = 1;
     words[1] = SERVE_MOST + 1;
-    EXCEPTION(3, modbus_write_registers(asking(), SERVE_BASE, 2, words));
+    EXCEPTION(3, modbus_write_registers(client_after_pause(), SERVE_BASE, 2, words));
     refuses(no_quantity, sizeof no_quantity, 3);
     refuses(half_on, sizeof half_on, 3);
     refuses(unknown, sizeof unknown, 1);
-    assert_int_equal(modbus_read_registers(asking(), SERVE_BASE, 1, words), 1);
+    assert_int_equal(modbus_read_registers(client_after_pause(), SERVE_BASE, 1, words), 1);
     assert_int_equal(words[0], 9);
 }
 
-/* A stretch in which this computer was never late, so that the firmware, too, has
- * seen it: of two frames that it finds without silence between, the last counts. */
+/* Waits for a time in which this computer was never late, so that the firmware has seen the
+ * silence too. If it finds two frames without silence between them, only the last one
+ * counts. */
 static void silence(void)
 {
     double begun = seconds(), first = begun, last = begun;
@@ -171,7 +175,7 @@ static void silence(void)
     }
 }
 
-/* Bytes by themselves, with silence before and behind; nothing comes back. */
+/* Sends bytes with silence before and after them. Nothing must come back. */
 static void is_ignored(const uint8_t *frame, size_t length)
 {
     uint8_t byte;
@@ -182,41 +186,41 @@ static void is_ignored(const uint8_t *frame, size_t length)
     assert_int_not_equal(read(modbus_get_socket(client), &byte, 1), 1);
 }
 
-static void damage_and_other_units_are_met_with_silence(void **state)
+static void damaged_frames_and_other_units_get_no_response(void **state)
 {
     uint8_t frame[16] = {SERVE_UNIT, 6, 0, 102, 0x12, 0x34};
     size_t length = seal(frame, 6);
     uint16_t word;
 
     (void)state;
-    assert_int_equal(modbus_write_register(asking(), 102, 5), 1);
+    assert_int_equal(modbus_write_register(client_after_pause(), 102, 5), 1);
     frame[5] ^= 0x10;
     is_ignored(frame, length);
     frame[5] ^= 0x10;
     is_ignored(frame, length - 1);
     frame[0]++;
     is_ignored(frame, seal(frame, 6));
-    assert_int_equal(modbus_read_registers(asking(), 102, 1, &word), 1);
+    assert_int_equal(modbus_read_registers(client_after_pause(), 102, 1, &word), 1);
     assert_int_equal(word, 5);
 }
 
-static void a_broadcast_is_carried_out_in_silence(void **state)
+static void a_broadcast_is_carried_out_without_a_response(void **state)
 {
     uint8_t frame[16] = {0, 6, 0, 103, 0x12, 0x34};
     uint16_t word;
 
     (void)state;
     is_ignored(frame, seal(frame, 6));
-    assert_int_equal(modbus_read_registers(asking(), 103, 1, &word), 1);
+    assert_int_equal(modbus_read_registers(client_after_pause(), 103, 1, &word), 1);
     assert_int_equal(word, 0x1234);
 }
 
-static void the_firmware_ends_when_it_is_told_to(void **state)
+static void the_firmware_ends_when_its_coil_is_set(void **state)
 {
     run done;
 
     (void)state;
-    assert_int_equal(modbus_write_bit(asking(), SERVE_END, 1), 1);
+    assert_int_equal(modbus_write_bit(client_after_pause(), SERVE_END, 1), 1);
     done = machine_finish(&firmware, 1);
     if (done.code != 0)
         print_error("%s", done.console);
@@ -231,15 +235,15 @@ int main(int argc, char **argv)
         cmocka_unit_test(registers_are_written_and_read),
         cmocka_unit_test(coils_are_written_and_read),
         cmocka_unit_test(refusals_are_exceptions),
-        cmocka_unit_test(damage_and_other_units_are_met_with_silence),
-        cmocka_unit_test(a_broadcast_is_carried_out_in_silence),
-        cmocka_unit_test(the_firmware_ends_when_it_is_told_to),
+        cmocka_unit_test(damaged_frames_and_other_units_get_no_response),
+        cmocka_unit_test(a_broadcast_is_carried_out_without_a_response),
+        cmocka_unit_test(the_firmware_ends_when_its_coil_is_set),
     };
     int failed = 0, asked = 0, a;
     unsigned m;
 
     for (m = 0; m < machine_count; m++) {
-        /* The application with the client is the same machine. */
+        /* The image with the client is for the same machine, so it is left out. */
         int wanted = argc == 1 && !strstr(machines[m].name, "-client");
 
         for (a = 1; a < argc; a++)
@@ -247,7 +251,7 @@ int main(int argc, char **argv)
         if (!wanted)
             continue;
         board = &machines[m];
-        /* Should all other waits fail: ends this program, and QEMU with it. */
+        /* In case all other time limits fail: ends this program, and QEMU with it. */
         alarm(900);
         failed += cmocka_run_group_tests_name(board->name, tests, start, stop);
         asked++;

@@ -1,7 +1,8 @@
-/* A clock from a counter of any rate. The count divided would wrap too soon,
- * so what has passed is added up. No interrupt, and no race with one; but who
- * does not ask at least once a turn of the counter loses that turn. mbm asks
- * all the time while a request runs, and between requests it does no harm.
+/* A clock made from a counter of any rate. Dividing the count would make the clock wrap too
+ * early, so the microseconds that have passed are added up. This needs no interrupt, but
+ * the clock must be read at least once in each turn of the counter, or that turn is lost.
+ * mbm reads the clock all the time while a request is under way; between requests a lost
+ * turn does no harm.
  * Licence: MIT OR Apache-2.0. */
 #include "counter.h"
 #include "board.h"

@@ -1,4 +1,4 @@
-/* A counter that runs freely; clock/counter.c makes microseconds of it.
+/* A free-running counter. clock/counter.c makes microseconds of it.
  * Licence: MIT OR Apache-2.0. */
 #ifndef COUNTER_H
 #define COUNTER_H
@@ -7,7 +7,7 @@
 
 void counter_start(void);
 
-/* TICKS_PER_MICRO (machine.h) a microsecond, upwards, wrapping at 2^32. */
+/* Counts up, TICKS_PER_MICRO (machine.h) in a microsecond, and wraps at 2^32. */
 uint32_t counter_read(void);
 
 #endif

@@ -1,4 +1,4 @@
-/* RISC-V's machine timer, the lower half of it. Licence: MIT OR Apache-2.0. */
+/* The lower half of RISC-V's machine timer. Licence: MIT OR Apache-2.0. */
 #include "board.h"
 #include "counter.h"
 #include "machine.h"

@@ -1,5 +1,5 @@
-/* TIMER0 of the nRF51 at 1 MHz and 32 bits; its Cortex-M0 has no SysTick.
- * Licence: MIT OR Apache-2.0. */
+/* TIMER0 of the nRF51 at 1 MHz, 32 bits: the chip's Cortex-M0 has no SysTick. Licence: MIT
+ * OR Apache-2.0. */
 #include "board.h"
 #include "counter.h"
 

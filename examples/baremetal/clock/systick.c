@@ -1,5 +1,5 @@
-/* Cortex-M's SysTick, 24 bits, downwards. A turn takes 0.1 s at 168 MHz.
- * Licence: MIT OR Apache-2.0. */
+/* Cortex-M's SysTick: 24 bits, counting down. It wraps after 0.1 s at 168 MHz. Licence: MIT
+ * OR Apache-2.0. */
 #include "board.h"
 #include "counter.h"
 
@@ -16,7 +16,7 @@ void counter_start(void)
     CONTROL = ENABLE | CPU_CLOCK;
 }
 
-/* In 256ths of a cycle, which makes it wrap at 2^32. */
+/* In 256ths of a cycle, so that the 24 bits wrap at 2^32. */
 uint32_t counter_read(void)
 {
     return (LAST - VALUE) << 8;

@@ -1,5 +1,4 @@
-/* Arm's semihosting, which RISC-V has taken over.
- * Licence: MIT OR Apache-2.0. */
+/* Arm's semihosting, which RISC-V uses too. Licence: MIT OR Apache-2.0. */
 #include "board.h"
 
 enum { PRINT = 0x04, EXIT = 0x20, APPLICATION_EXIT = 0x20026 };
@@ -15,8 +14,8 @@ static void call(uint32_t number, const void *parameter)
     register uint32_t a0 __asm__("a0") = number;
     register const void *a1 __asm__("a1") = parameter;
 
-    /* The two shifts mark the break as a call; the three must be full-size
-     * and in one page. */
+    /* The two shifts mark the break as a semihosting call. All three instructions must have
+     * four bytes and lie in one page. */
     __asm__ volatile(".option push\n"
                      ".option norvc\n"
                      ".balign 16\n"

@@ -7,7 +7,7 @@ void console_print(const char *text)
     static int32_t file = -1;
     int32_t length = 0;
 
-    /* Files 0 to 2 are the serial line. */
+    /* Files 0 to 2 are the serial line, so another file is opened. */
     if (file < 0)
         file = simcall(SIMCALL_OPEN, (int32_t)(uintptr_t) "/dev/stderr", 1, 0);
     while (text[length] != '\0')

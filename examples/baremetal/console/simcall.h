@@ -6,8 +6,8 @@
 
 enum { SIMCALL_EXIT = 1, SIMCALL_READ = 3, SIMCALL_WRITE = 4, SIMCALL_OPEN = 5 };
 
-/* One instruction; it stands with the start-up in assembly, since arguments and
- * result are just where a function has them. */
+/* A function of one instruction. It is in the start-up assembly, since the arguments and
+ * the result are already in the right registers. */
 int32_t simcall(int32_t number, int32_t first, int32_t second, int32_t third);
 
 #endif

@@ -1,23 +1,23 @@
-/* Start-up of every Cortex-M: the first vectors, and memory as C expects it.
- * Licence: MIT OR Apache-2.0. */
+/* Start-up of every Cortex-M: the first vectors, and memory as C expects it. Licence: MIT
+ * OR Apache-2.0. */
 #include "board.h"
 
 #include <stddef.h>
 
-/* The linker script says where. */
+/* Symbols of the linker script. */
 extern uint32_t stack_top[], data_load[], data_start[], data_end[], bss_start[], bss_end[];
 
 void reset_handler(void);
 void fault_handler(void);
 
-/* On a board of your own: safe outputs, then a reset. */
+/* On your own board: switch the outputs to a safe state, then reset. */
 void fault_handler(void)
 {
     console_print("fault\n");
     console_exit(254);
 }
 
-/* Where clocks and pins are right after reset, as QEMU's mostly are. */
+/* For machines whose clocks and pins are right after reset, as QEMU's mostly are. */
 __attribute__((weak)) void machine_start(void) {}
 
 void reset_handler(void)
@@ -43,8 +43,8 @@ struct vectors {
     void (*handlers[15])(void);
 };
 
-/* From reset to SysTick. A machine that uses interrupts has their handlers in
- * .vectors.machine, which comes behind. */
+/* From reset to SysTick. The handlers of a machine's interrupts are in .vectors.machine,
+ * which comes after these. */
 __attribute__((section(".vectors"), used)) static const struct vectors vectors = {
     stack_top,
     {

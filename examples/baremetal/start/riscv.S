@@ -1,5 +1,4 @@
-/* Start-up of a RISC-V core that an image is loaded into.
- * Licence: MIT OR Apache-2.0. */
+/* Start-up of a RISC-V core whose image is loaded into RAM. Licence: MIT OR Apache-2.0. */
     .section .start, "ax"
     .globl start
 start:

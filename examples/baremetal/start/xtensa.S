@@ -1,5 +1,5 @@
-/* Start-up of an Xtensa core without register windows, that an image is
- * loaded into. Licence: MIT OR Apache-2.0. */
+/* Start-up of an Xtensa core without register windows, whose image is loaded into RAM.
+ * Licence: MIT OR Apache-2.0. */
     .section .start, "ax"
     .literal_position
     .globl start

@@ -1,6 +1,6 @@
-/* What the ESP8266 has in ROM and the simulated core has not: division, which
- * the core has no instruction for, and a place where impossible branches end.
- * Licence: MIT OR Apache-2.0. */
+/* Functions that the ESP8266 has in its ROM and the simulated core has not: division, for
+ * which the core has no instruction, and abort, where impossible branches end. Licence: MIT
+ * OR Apache-2.0. */
 #include "board.h"
 
 unsigned __udivsi3(unsigned dividend, unsigned divisor);

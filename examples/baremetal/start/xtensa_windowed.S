@@ -1,5 +1,5 @@
-/* Start-up of an Xtensa core with register windows, that an image is loaded
- * into. On an ESP32 its ROM and its system have all this.
+/* Start-up of an Xtensa core with register windows, whose image is loaded into RAM. On an
+ * ESP32 the ROM and the system have all this.
  * Licence: MIT OR Apache-2.0. */
 
 /* The assembler does not know the simulator's instruction. */
@@ -7,9 +7,9 @@
     .byte 0x00, 0x51, 0x00
     .endm
 
-/* Windows that do not fit are spilt below the stacks of those who called: the
- * first four registers there, the others further down. The places of these
- * handlers are the core's. */
+/* Register windows that do not fit are saved below the stacks of the callers: the first
+ * four registers directly below, the others further down. The core defines the addresses of
+ * these handlers. */
     .section .vectors, "ax"
     .balign 1024
 vectors:
@@ -85,8 +85,8 @@ refill12:
     l32e a11, a11, -20
     rfwu
 
-/* movsp moves the stack, below which the caller's window may lie spilt. It is
- * brought back as if we returned to it; then movsp is done again. */
+/* movsp moves the stack while the caller's window may be saved below it. The window is
+ * restored as if we returned to the caller; then movsp is executed again. */
     .org 0x180
 refill:
     wsr a2, excsave2
@@ -112,7 +112,7 @@ refill:
 2:  rotw -2
     j refill8
 
-/* A fault ends the program with 200 and the cause. */
+/* A fault ends the program with exit code 200 plus the cause. */
     .org 0x300
     wsr a0, excsave1
     rsr a0, exccause

@@ -37,8 +37,8 @@ int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
     return count;
 }
 
-/* The last byte may still be in the shift register, which this UART does not
- * tell: with an RS-485 driver, mbm_master_setPostFlushHold adds its time. */
+/* The last byte may still be in the shift register, which this UART does not show. With an
+ * RS-485 driver, mbm_master_setPostFlushHold adds the time of that byte. */
 uint8_t uart_flush(void *context)
 {
     (void)context;

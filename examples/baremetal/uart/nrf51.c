@@ -15,10 +15,10 @@
 
 enum { ENABLED = 4 };
 
-/* 2^32 times the rate over 16 MHz, of which the lowest 12 bits do not count. */
+/* 2^32 times the rate, divided by 16 MHz. The lowest 12 bits are ignored. */
 #define RATE_OF(baud) ((uint32_t)(((uint64_t)(baud) << 32) / 16000000u + 0x800u) & 0xFFFFF000u)
 
-/* TX_READY says that the last byte has left; before the first one it is silent. */
+/* TX_READY says that the last byte has been sent. Before the first byte it is 0. */
 static uint8_t sending;
 
 void uart_start(void)
@@ -39,7 +39,7 @@ int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity)
 
     (void)context;
     while (count < capacity && RX_READY) {
-        /* In this order: the next byte may raise it as soon as one is taken. */
+        /* In this order, since the next byte may set it as soon as this one is read. */
         RX_READY = 0;
         bytes[count++] = (uint8_t)RX_DATA;
     }

@@ -1,6 +1,6 @@
-/* Arm's PL011 under interrupt: what arrives goes into a ring, from which the main
- * loop takes it. The FIFO covers the time until the handler runs.
- * Licence: MIT OR Apache-2.0. */
+/* Arm's PL011 with interrupts: the handler puts received bytes into a ring, and the main
+ * loop reads them from there. The FIFO holds the bytes until the handler runs. Licence: MIT
+ * OR Apache-2.0. */
 #include "board.h"
 #include "machine.h"
 #include "mbm.h"
@@ -20,10 +20,11 @@
 enum { BUSY = 1 << 3, RX_EMPTY = 1 << 4, TX_FULL = 1 << 5 };
 enum { FIFOS = 1 << 4, EIGHT_BITS = 3 << 5 };
 enum { ENABLE = 1 << 0, TX_ENABLE = 1 << 8, RX_ENABLE = 1 << 9 };
-/* Two bytes of sixteen, or one that stays alone for 32 bits. */
+/* An interrupt after two bytes of sixteen, or if one byte has been alone for the time of 32
+ * bits. */
 enum { AN_EIGHTH = 0, RX = 1 << 4, RX_ALONE = 1 << 6 };
 
-/* Room for the longest frame; the handler may be ahead of the main loop by it. */
+/* Holds the longest frame: that is how far the handler may be ahead of the main loop. */
 static uint8_t bytes[MBM_MAX_FRAME + 1];
 static mbm_ring ring;
 

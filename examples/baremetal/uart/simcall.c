@@ -1,5 +1,5 @@
-/* No UART but the simulator's line, which it hands out as files 0 and 1. A
- * stand-in where QEMU has the core and not the chip around it.
+/* In place of a UART: the simulator's line, as its files 0 and 1. For cores that QEMU has
+ * without a chip around them.
  * Licence: MIT OR Apache-2.0. */
 #include "board.h"
 #include "simcall.h"
@@ -8,7 +8,7 @@ void uart_start(void) {}
 
 int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
-    /* -1 says that nothing has arrived. */
+    /* -1 means that nothing has arrived. */
     int32_t count = simcall(SIMCALL_READ, 0, (int32_t)(uintptr_t)bytes, capacity);
 
     (void)context;

@@ -10,7 +10,7 @@
 enum { RX_FULL = 1 << 5, TX_DONE = 1 << 6, TX_EMPTY = 1 << 7 };
 enum { RX_ENABLE = 1 << 2, TX_ENABLE = 1 << 3, ENABLE = 1 << 13 };
 
-/* Clocks and pins of the peripheral are the chip's start-up's business. */
+/* The chip's start-up must set the clocks and pins of the USART. */
 void uart_start(void)
 {
     DIVISOR = (UART_HZ + BAUD / 2u) / BAUD;

@@ -1,7 +1,7 @@
 /* A server on USART 0 and a master on USART 1 of an ATmega1284P, without interrupts and
- * without Arduino's core. The test runs the code for avrxmega3 with it: on this chip
- * that code differs from the chip's own only where an interrupt might come between
- * the two writes to the stack pointer.
+ * without Arduino's core. The test runs the code for avrxmega3 with it. On this chip that
+ * code differs from the chip's own only if an interrupt comes between the two writes to the
+ * stack pointer.
  * Licence: MIT OR Apache-2.0. */
 #include "mbm.h"
 
@@ -46,7 +46,7 @@ static uint8_t sent(void *context)
     return !u->is_sending;
 }
 
-/* Timer 1 counts half microseconds; a look every 32 ms is enough. */
+/* Timer 1 counts half microseconds. The clock must be read at least every 32 ms. */
 static uint32_t micros(void *context)
 {
     static uint32_t total;
@@ -110,7 +110,8 @@ int main(void)
         mbm_server_poll(&server);
         if (!is_wanted || mbm_server_pollDelay(&server) != UINT32_MAX)
             continue;
-        /* The response has left: asks for three registers, and serves what came. */
+        /* The response has been sent: reads three registers as the master, and serves the
+         * status and values. */
         is_wanted = 0;
         words[1] = mbm_master_readHoldingRegisters(&master, FIRST, COUNT);
         for (i = 0; i < COUNT; i++)

@@ -1,5 +1,4 @@
-/* Sleeping until an interrupt: of the UART, or of a timer that is set for it.
- * Licence: MIT OR Apache-2.0. */
+/* A sleep that ends with an interrupt of the UART or of a timer. Licence: MIT OR Apache-2.0. */
 #include "board.h"
 #include "machine.h"
 #include "sleep.h"
@@ -16,12 +15,12 @@
 
 enum {
     TIMER_CLOCK = 1 << 16,
-    ONE_COUNTER = 0, /* of 32 bits, not two of 16 */
+    ONE_COUNTER = 0, /* one counter of 32 bits, not two of 16 */
     ONCE = 1,
     ENABLE = 1,
     TIME_OVER = 1,
     TIMER_INTERRUPT = 19,
-    LONGEST = 100000 /* microseconds: the clock's counter turns in 335 ms */
+    LONGEST = 100000 /* microseconds; the clock's counter wraps after 335 ms */
 };
 
 uint32_t sleeps;
@@ -54,8 +53,8 @@ void sleep_at_most(uint32_t micros)
     is_over = 0;
     TICKS = micros * (TICKS_PER_MICRO / 256u);
     CONTROL = ENABLE;
-    /* What comes between the question and the sleep ends the sleep at once: an
-     * interrupt that is held back wakes the core too. */
+    /* An interrupt between this check and the sleep ends the sleep at once: an interrupt
+     * that is held back wakes the core too. */
     __asm__ volatile("cpsid i" ::: "memory");
     if (!is_over && !uart_has_bytes()) {
         sleeps++;
@@ -63,13 +62,13 @@ void sleep_at_most(uint32_t micros)
     }
     __asm__ volatile("cpsie i\n isb" ::: "memory");
     CONTROL = 0;
-    /* A time that was over meanwhile is not to wake the next sleep. */
+    /* If the time was over meanwhile, it must not wake the next sleep. */
     INTERRUPT_CLEAR = TIME_OVER;
 }
 
 void fault_handler(void);
 
-/* Behind those of the core: of the two that are enabled, and of what must not come. */
+/* The vectors after those of the core: the two enabled interrupts. All others are faults. */
 #define NONE fault_handler
 __attribute__((section(".vectors.machine"), used)) static void (*const vectors[])(void) = {
     NONE, NONE, NONE, NONE, NONE, uart_interrupt, NONE, NONE, NONE, NONE,

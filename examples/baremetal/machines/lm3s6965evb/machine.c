@@ -37,7 +37,7 @@ void machine_start(void)
 
     UART_CLOCKS |= 1;
     PORT_CLOCKS |= 1;
-    /* A peripheral may be touched three cycles after its clock has started. */
+    /* A peripheral may be accessed three cycles after its clock has started. */
     (void)PORT_CLOCKS;
     (void)PORT_CLOCKS;
     PORT_A_FUNCTION |= 3;

@@ -1,5 +1,5 @@
-// The longest reads that the default buffers take, as fast as an Uno's port
-// goes without error: the receiver's buffer of 64 bytes must not overflow.
+// The longest reads that the default buffers allow, at the highest rate at which an Uno's
+// UART has no error: the receive buffer of 64 bytes must not overflow.
 #include <ModbusMaster.h>
 
 ModbusMaster node;

@@ -1,5 +1,5 @@
-// Port and slave given to the constructor, the port opened by begin, words
-// queued and received one by one: as sketches did for version 0.9.
+// The calls of version 0.9: port and slave are given to the constructor, begin opens the
+// port, words are queued and received one by one.
 #include <ModbusMaster.h>
 
 ModbusMaster node(1, 2);

@@ -1,4 +1,4 @@
-// Five reads, told apart by their addresses; a test looks at the report in RAM.
+// Five reads of different addresses. A test reads the report in RAM.
 #include <ModbusMaster.h>
 
 ModbusMaster node;

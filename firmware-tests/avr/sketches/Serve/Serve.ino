@@ -1,10 +1,10 @@
-// Serves four arrays as unit 17, with hooks, a function of its own and 16 and 17,
-// and registers alone as unit 18.
+// Serves four arrays as unit 17, with hooks, a custom function, and functions 16 and 17.
+// Serves holding registers alone as unit 18.
 #include <ModbusServer.h>
 
 uint16_t words[64];
 uint8_t bits[8];
-// 1 once set up; what the hooks were told last.
+// 1 after the set-up; the last arguments of the hooks.
 struct {
   uint8_t ready;
   uint8_t asked, told;
@@ -19,12 +19,12 @@ ModbusRegisterArray<2> others;
 ModbusUnit units[] = {{17}, {18}};
 ModbusServer server;
 
-uint8_t ask(uint16_t, uint16_t quantity, const uint8_t *data) {
+uint8_t beforeWrite(uint16_t, uint16_t quantity, const uint8_t *data) {
   report.asked++;
   return quantity == 1 && data[0] == 0xFF ? MBM_SLAVE_DEVICE_BUSY : 0;
 }
 
-void tell(uint16_t address, uint16_t quantity) {
+void afterWrite(uint16_t address, uint16_t quantity) {
   report.told++;
   report.address = address;
   report.quantity = quantity;
@@ -48,8 +48,8 @@ void setup() {
     readings[i] = 1000 + i;
   for (uint16_t i = 0; i < 50; i += 3)
     inputs.set(i, true);
-  holding.beforeWrite(ask);
-  holding.afterWrite(tell);
+  holding.beforeWrite(beforeWrite);
+  holding.afterWrite(afterWrite);
   units[0].holdingRegisters(holding);
   units[0].maskAndReadWrite(holding);
   units[0].inputRegisters(readings);

@@ -1,4 +1,4 @@
-// One function, nothing else.
+// One function and nothing else.
 #include <ModbusMaster.h>
 
 ModbusMaster node;

@@ -1,5 +1,5 @@
-// What a sketch costs that only uses the serial port: the size of others is
-// counted from here.
+// A sketch that only uses the serial port. The sizes of other sketches are counted above
+// its size.
 void setup() { Serial.begin(19200); }
 
 void loop() {

@@ -1,4 +1,4 @@
-// A bus on two ordinary pins. SoftwareSerial is deaf while it sends.
+// A bus on two ordinary pins. SoftwareSerial receives nothing while it sends.
 #include <ModbusMaster.h>
 #include <SoftwareSerial.h>
 

@@ -1,4 +1,4 @@
-// The calls of the example Basic, with the gap of t3.5 that 19200 baud ask for.
+// The calls of the example Basic, with the gap of t3.5 at 19200 baud.
 #include <ModbusMaster.h>
 
 ModbusMaster node;

@@ -1,5 +1,5 @@
-// Two objects on one line. The sketch tells neither of them the baud rate. Port B, bit 0, is
-// high while a call runs.
+// Two objects on one line. The sketch sets no baud rate. Port B, bit 0, is high while a
+// call runs.
 #include <ModbusMaster.h>
 
 ModbusMaster first, second;
@@ -19,7 +19,7 @@ void setup() {
   read(first); // the line has been silent for 50 ms
   delay(50);
   read(second); // the line was silent for 50 ms
-  read(first); // at once: here the gap is kept
+  read(first); // immediately after: here the gap is kept
   delay(50);
   read(first);
 }

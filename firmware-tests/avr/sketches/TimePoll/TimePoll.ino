@@ -1,4 +1,4 @@
-// As TimeRead, without waiting. Port B, bit 0, is high while poll runs.
+// Reads as TimeRead does, without waiting. Port B, bit 0, is high while poll runs.
 #include <ModbusMaster.h>
 
 ModbusMaster node;

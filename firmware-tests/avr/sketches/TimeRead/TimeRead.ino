@@ -1,6 +1,6 @@
-// Reads ten registers again and again, as fast as the line allows. Port B, bit
-// 0, is high while the call runs. The library ModbusMaster, which is timed with this
-// sketch too, has neither setter.
+// Reads ten registers again and again, as fast as the line allows. Port B, bit 0, is high
+// while the call runs. The library ModbusMaster, which is timed with this sketch too, does
+// not have the two setters.
 #include <ModbusMaster.h>
 
 ModbusMaster node;

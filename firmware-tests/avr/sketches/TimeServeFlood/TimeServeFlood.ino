@@ -1,5 +1,5 @@
-// As TimeServeFast. Port B, bit 0, is high while poll runs, and bit 1 while it runs
-// with bytes to take. `taken` counts the bytes that polls took.
+// As TimeServeFast. Port B, bit 0, is high while poll runs, and bit 1 while it runs and
+// there are bytes to read. `taken` counts the bytes that polls have read.
 #include <ModbusServer.h>
 
 ModbusRegisterArray<64> registers;

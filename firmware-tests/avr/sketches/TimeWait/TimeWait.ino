@@ -1,6 +1,6 @@
-// Waits for as many registers of unit 17 as the response buffer holds. Port B, bit 0,
-// is high while poll runs, and bit 1 while it runs with bytes to take. `taken` counts
-// the bytes that polls took, and `status` is the request's.
+// Waits for as many registers of unit 17 as the response buffer holds. Port B, bit 0, is
+// high while poll runs, and bit 1 while it runs and there are bytes to read. `taken` counts
+// the bytes that polls have read, and `status` is the request's status.
 #include <ModbusMaster.h>
 
 ModbusMaster node;

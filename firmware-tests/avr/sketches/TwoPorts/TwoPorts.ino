@@ -1,4 +1,4 @@
-// Two slaves on two ports, both asked at once. The board counts how often both
+// Two slaves on two ports, with requests at the same time. The sketch counts how often both
 // requests were under way together.
 #include <ModbusMaster.h>
 

@@ -1,5 +1,5 @@
-// Values in registers as this compiler passes them to the archive: by value, by
-// pointer, and a double of 32 bits. Says which line is wrong, or that none is.
+// How this compiler passes values to the archive: by value, by pointer, and as a double of
+// 32 bits. Prints which line is wrong, or that none is.
 #include <ModbusMaster.h>
 #include <string.h>
 
@@ -13,7 +13,7 @@ static bool wrong = false;
     }                           \
   } while (0)
 
-static volatile uint32_t four = 2923517522; // not known when this is compiled
+static volatile uint32_t four = 2923517522; // volatile: not known at compile time
 
 static void numbers() {
   uint16_t words[4];
@@ -44,7 +44,7 @@ static void floats() {
 
   CHECK(mbm_registers_intoWords(&view, words, 4, 0) == MBM_OK);
   CHECK(mbm_registers_getDouble(&view, 0, MBM_ORDER_ABCD, &pi[1]) == MBM_OK);
-  CHECK(pi[0] == 7 && pi[1] == 3.14159265358979 && pi[2] == 7); // and no byte beside it
+  CHECK(pi[0] == 7 && pi[1] == 3.14159265358979 && pi[2] == 7); // and no other byte has changed
   CHECK(mbm_registers_setDouble(&view, 0, MBM_ORDER_ABCD, &third) == MBM_OK);
   CHECK(words[0] == 0x3FD5 && words[1] == 0x5555 && words[2] == 0x6000 && words[3] == 0);
   CHECK(mbm_registers_setFloat(&view, 2, MBM_ORDER_CDAB, &volts) == MBM_OK);
