@@ -227,7 +227,7 @@ static void user_defined_functions_are_reported(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setFunctions(&sniffer, many, 1));
     IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setFunctions(&sniffer, NULL, 1));
     /* What is refused leaves the functions as they were. */
-    hear(frame, size);
+    feed(frame, size);
     assert_next("unit 17  reply      55 unknown function: 01 02");
     OK(mbm_sniffer_setFunctions(&sniffer, NULL, 0));
 }
