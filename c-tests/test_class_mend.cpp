@@ -133,6 +133,26 @@ static void noise_and_foreign_frames_before_the_reply_are_passed_over(void **)
     }
 }
 
+static void a_lenient_object_accepts_replies_that_deviate(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setResponseTimeout(50);
+    node.setLenient(true);
+    Serial.reply(adu({1, 6, 0, 1, 0, 8}));
+    assert_int_equal(node.writeSingleRegister(1, 7), 0);
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 4), 0);
+    assert_int_equal(node.available(), 1);
+    assert_int_equal(node.getResponseBuffer(0), 7);
+    node.setSlaveID(0);
+    Serial.reply(adu({0, 3, 2, 0, 9}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_int_equal(node.getResponseBuffer(0), 9);
+    node.setLenient(false);
+    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBBroadcastNotAllowed);
+}
+
 class Babbler : public Stream {
 public:
     int available() override { return 1; }
@@ -412,6 +432,7 @@ int main()
         TEST(an_echo_with_other_values_is_malformed),
         TEST(exceptions_are_checked),
         TEST(noise_and_foreign_frames_before_the_reply_are_passed_over),
+        TEST(a_lenient_object_accepts_replies_that_deviate),
         TEST(a_line_that_never_falls_silent_is_given_up),
         TEST(a_port_that_takes_no_bytes_is_given_up),
         TEST(a_silence_is_kept_before_each_request),

@@ -295,6 +295,12 @@ public:
     void setRetries(uint8_t retries) { mbm_master_setRetries(&state.master, retries); }
     /** Drops the request itself where the receiver hears the driver; off at first. */
     void setEchoDiscard(bool on) { mbm_master_setEchoDiscard(&state.master, on); }
+    /**
+     * Accepts replies that deviate from the standard, if no right one comes in time:
+     * another echoed address or value, another number of registers. Fills the response
+     * buffer from reads of more words than it holds, and reads from unit 0; off at first.
+     */
+    void setLenient(bool on) { mbm_master_setLenient(&state.master, on); }
     /** Character times that the driver stays on where flush returns early; 0 at first. */
     void setPostFlushHold(uint8_t characters)
     {

@@ -1,7 +1,7 @@
 //! The ModbusMaster-shaped facade: words to send, ten functions, words
 //! received. Each function starts a transaction; `poll` ends it.
 
-use crate::engine::{Engine, Settings, Words};
+use crate::engine::{Engine, Receive, Settings, Words, BROADCAST};
 use crate::error::Status;
 use crate::pdu::query::{Form, Query};
 use crate::pdu::{bits, registers};
@@ -20,6 +20,9 @@ pub struct Master<P, S: Words> {
     slave: u8,
     status: Status,
     engine: Engine<P, S, Query>,
+    /// What waits for the reply if a deviating one is accepted too. (A pointer, so that
+    /// firmware that does not call for it carries none of it.)
+    lenient: Option<Receive<Engine<P, S, Query>>>,
     /// Where the writing functions without arguments write.
     write_address: u16,
     /// Bits queued in the transmit buffer; 16 to a word.
@@ -31,6 +34,7 @@ impl<P, S: Words> Master<P, S> {
     pub const fn new(slave: u8, port: P, storage: S) -> Self {
         Master {
             engine: Engine::new(port, storage),
+            lenient: None,
             write_address: 0,
             transmit_bits: 0,
             response_words: 0,
@@ -113,6 +117,16 @@ impl<P: Port, S: Words> Master<P, S> {
         self.engine.settings.preset();
     }
 
+    /// Whether a reply that deviates from the standard is accepted if no better one comes,
+    /// and reads are sent to unit 0: see [`Engine::receive_lenient`].
+    pub fn set_lenient(&mut self, on: bool) {
+        self.lenient = if on {
+            Some(Engine::receive_lenient)
+        } else {
+            None
+        };
+    }
+
     /// Gives up the request under way, if there is one.
     pub fn cancel(&mut self) {
         if self.engine.is_pending() {
@@ -144,7 +158,7 @@ impl<P: Port, S: Words> Master<P, S> {
     pub fn poll(&mut self) -> Status {
         if self.engine.is_pending() {
             let now = self.engine.port.micros();
-            self.status = match self.engine.poll(now) {
+            self.status = match self.engine.poll_with(now, self.lenient) {
                 Status::OK if self.engine.request().is_read() => self.take_words(),
                 status => status,
             };
@@ -221,14 +235,17 @@ impl<P: Port, S: Words> Master<P, S> {
         self.status = built;
         if built == Status::OK {
             let request = self.engine.request();
-            if request.is_read() {
+            let request_is_read = request.is_read();
+            if request_is_read {
                 self.response_words = 0;
             }
             let words = request.sends().div_ceil(2);
             self.status = if words > self.engine.storage.transmit_words() {
                 Status::ILLEGAL_DATA_VALUE
+            } else if self.slave == BROADCAST && request_is_read && self.lenient.is_none() {
+                Status::BROADCAST_NOT_ALLOWED
             } else {
-                self.engine.start(self.slave)
+                self.engine.start_any(self.slave)
             };
         }
         self.status

@@ -15,6 +15,7 @@
 //! values in use at a time, so they stay in registers, and the code is small.
 
 pub mod ascii;
+mod lenient;
 mod plain;
 mod poll;
 mod receive;
@@ -30,6 +31,7 @@ pub use seen::Seen;
 pub use settings::Settings;
 pub use storage::{Buffers, Count, Counter, Frame, Storage, Words, COUNTERS};
 
+use crate::error::Status;
 use crate::frame::checksum::Crc16;
 
 /// The unit that every slave listens to (serial line guide 2.2).
@@ -65,7 +67,12 @@ enum Probation {
     On,
     /// It may, and one was held.
     Held,
+    /// A deviating reply has come (see `lenient`).
+    Deviating,
 }
+
+/// A function that waits for the reply.
+pub type Receive<E> = fn(&mut E) -> Status;
 
 /// One request and its reply, over the port and in the storage it was given.
 // In this order, small fields first: what lies far from the start of an object
@@ -92,7 +99,8 @@ pub struct Engine<P, S: Storage, Q> {
     /// How many bytes the candidate at the front of the buffer needs at least; of a reply
     /// that was found, the length of its frame.
     least: S::Count,
-    /// Bytes of a held reply, which the storage has set aside.
+    /// Bytes of a held reply, or of what may become a deviating one (see `lenient`), which
+    /// the storage has set aside.
     pub(crate) held: S::Count,
     /// Whether the next reply may be a late one.
     probation: Probation,

@@ -62,14 +62,14 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
 
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    pub(super) fn receive(&mut self) -> Status {
+    pub(super) fn receive<const LENIENT: bool>(&mut self) -> Status {
         let mut over = self.is_over();
         // As the deadline passes, all that has arrived is looked at, even if
         // the port hands it over byte by byte; but not more than a buffer of it.
         let mut budget = S::Count::MAX;
         loop {
             if self.end == self.storage.room() {
-                self.give_up_held();
+                self.make_room::<LENIENT>();
             }
             let heard = self.hear(self.end);
             if heard < 0 {
@@ -82,8 +82,8 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             }
             self.end += heard;
             self.skimmed = false;
-            let found = Q::search(self);
-            if self.is_answered(found) {
+            let found = self.search::<LENIENT>();
+            if self.is_answered::<LENIENT>(found) {
                 return self.found();
             }
             if !over {
@@ -97,7 +97,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         if !self.skimmed && (over || self.is_silent(self.settings.silence)) {
             self.skimmed = true;
             let found = Q::search_silent(self);
-            if self.is_answered(found) {
+            if self.is_answered::<LENIENT>(found) {
                 return self.found();
             }
         }
@@ -105,36 +105,71 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             over = self.is_silent(self.settings.quiet_time) || self.is_over();
         }
         if over {
-            if self.take_held() {
+            let is_held = !LENIENT || self.probation == Probation::Held;
+            if is_held && self.take_held() {
                 return self.found();
             }
-            return self.fail();
+            return self.fail_unless_deviating::<LENIENT>();
         }
         // Without diagnosis it is not known whether it was a reply.
         if cfg!(feature = "diagnosis") && self.skimmed && self.seen >= Seen::BAD_CRC {
-            return self.fail();
+            return self.fail_unless_deviating::<LENIENT>();
         }
         Status::PENDING
+    }
+
+    /// Looks for the reply among what has arrived.
+    #[inline(always)]
+    fn search<const LENIENT: bool>(&mut self) -> bool {
+        if LENIENT {
+            self.search_rtu::<true>()
+        } else {
+            Q::search(self)
+        }
+    }
+
+    /// Makes room in a full frame buffer, by giving up what is set aside.
+    #[inline(always)]
+    fn make_room<const LENIENT: bool>(&mut self) {
+        if LENIENT {
+            Q::drop_kept(self);
+        }
+        if !LENIENT || self.probation == Probation::Held {
+            self.give_up_held();
+        }
+    }
+
+    /// Ends the request that no right reply has answered; if `LENIENT`, with a deviating
+    /// reply if one has come.
+    #[inline(always)]
+    fn fail_unless_deviating<const LENIENT: bool>(&mut self) -> Status {
+        if LENIENT && Q::take_deviating(self) {
+            return self.found();
+        }
+        self.fail()
     }
 
     /// True if a reply that was `found` is the answer. One on probation is held, and
     /// what arrived behind it is searched.
     #[inline(always)]
-    fn is_answered(&mut self, found: bool) -> bool {
-        if !FIRMWARE && self.probation == Probation::Off {
+    fn is_answered<const LENIENT: bool>(&mut self, found: bool) -> bool {
+        if !FIRMWARE && !LENIENT && self.probation == Probation::Off {
             return found;
         }
-        self.is_answered_behind_held(found)
+        self.is_answered_behind_held::<LENIENT>(found)
     }
 
     #[inline(never)]
-    fn is_answered_behind_held(&mut self, mut found: bool) -> bool {
+    fn is_answered_behind_held<const LENIENT: bool>(&mut self, mut found: bool) -> bool {
         while found {
+            if LENIENT {
+                Q::drop_kept(self);
+            }
             if self.probation == Probation::Off {
                 return true;
             }
             self.hold();
-            found = Q::search(self);
+            found = self.search::<LENIENT>();
         }
         false
     }
@@ -202,12 +237,6 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             .wrapping_add(self.settings.quiet_time);
     }
 
-    /// Has the frame buffer begin with the held reply again.
-    pub(super) fn take_back(&mut self) {
-        self.storage.take_back(self.held);
-        self.held = S::Count::ZERO;
-    }
-
     /// Gives up the held reply, which answers no request.
     #[cfg_attr(target_os = "none", inline(never))]
     fn give_up_held(&mut self) {
@@ -236,6 +265,14 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         // A damaged second reply may have overwritten what the first one said.
         Q::judge(self, S::Count::ZERO, held);
         true
+    }
+}
+
+impl<P, S: Storage, Q> Engine<P, S, Q> {
+    /// Has the frame buffer begin with the held reply again.
+    pub(super) fn take_back(&mut self) {
+        self.storage.take_back(self.held);
+        self.held = S::Count::ZERO;
     }
 }
 

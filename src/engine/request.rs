@@ -58,7 +58,7 @@ pub trait Request<P, S: Storage>: Sized {
     /// if it is not there yet.
     #[inline(always)]
     fn search(engine: &mut Engine<P, S, Self>) -> bool {
-        engine.search_rtu()
+        engine.search_rtu::<false>()
     }
 
     /// As [`Request::search`], once the line is silent: also behind a frame that has begun
@@ -66,6 +66,28 @@ pub trait Request<P, S: Storage>: Sized {
     #[inline(always)]
     fn search_silent(engine: &mut Engine<P, S, Self>) -> bool {
         engine.skim(1u8.into())
+    }
+
+    /// Passes over the byte at `front`, but keeps it if it may belong to a deviating reply
+    /// (see `lenient`). Returns where the next byte stands.
+    #[inline(always)]
+    fn pass_and_keep(engine: &mut Engine<P, S, Self>, front: S::Count) -> S::Count {
+        engine.pass(front);
+        front + 1u8.into()
+    }
+
+    /// Notes the frame at `front`, which does not answer the request, as a deviating reply.
+    #[inline(always)]
+    fn note_deviating(_engine: &mut Engine<P, S, Self>, _front: S::Count) {}
+
+    /// Drops the bytes that were kept.
+    #[inline(always)]
+    fn drop_kept(_engine: &mut Engine<P, S, Self>) {}
+
+    /// Has a deviating reply be the answer; false if there was none.
+    #[inline(always)]
+    fn take_deviating(_engine: &mut Engine<P, S, Self>) -> bool {
+        false
     }
 
     /// Bytes of unit and PDU in a frame of `length` bytes on the wire.

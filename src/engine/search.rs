@@ -59,8 +59,9 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
 
     /// Looks for the reply among what has arrived, in RTU frames, and moves it to the
     /// front; false if it is not there yet. Stops at a candidate that is not complete.
+    /// If `LENIENT`, a deviating reply is kept meanwhile (see `lenient`).
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn search_rtu(&mut self) -> bool {
+    pub fn search_rtu<const LENIENT: bool>(&mut self) -> bool {
         if self.least > self.end {
             self.take_in(self.end);
             return false;
@@ -82,7 +83,12 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
                             break true;
                         }
                         Verdict::Echo => {}
-                        Verdict::Wrong => self.see_foreign(Seen::MALFORMED),
+                        Verdict::Wrong => {
+                            if LENIENT {
+                                Q::note_deviating(self, front);
+                            }
+                            self.see_foreign(Seen::MALFORMED);
+                        }
                     }
                     front += length;
                     self.begin_frame(front);
@@ -90,8 +96,12 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
                 }
                 self.see(Seen::BAD_CRC);
             }
-            self.pass(front);
-            front += 1u8.into();
+            if LENIENT {
+                front = Q::pass_and_keep(self, front);
+            } else {
+                self.pass(front);
+                front += 1u8.into();
+            }
         };
         if front > S::Count::ZERO {
             self.drop_front(front);
@@ -176,7 +186,7 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// Passes over the byte at `front`. Where such bytes make up a frame, a damaged
     /// reply seen in it was none.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn pass(&mut self, front: S::Count) {
+    pub(super) fn pass(&mut self, front: S::Count) {
         if cfg!(feature = "diagnosis") && self.passed == 0 {
             self.passed_as = if self.storage.byte(front) != self.unit {
                 Seen::OTHER_UNIT

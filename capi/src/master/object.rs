@@ -15,7 +15,7 @@ use core::ffi::c_void;
 #[repr(C)]
 pub struct mbm_master {
     /// Not for you.
-    pointers: [*mut c_void; 12],
+    pointers: [*mut c_void; 13],
     /// Not for you.
     words: [u32; 21],
 }
