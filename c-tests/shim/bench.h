@@ -12,7 +12,8 @@ struct Bench {
     bool realTime = false; /* the host's clock instead */
     unsigned looks = 0;    /* at the clock, so far */
     unsigned yields = 0;
-    std::string log; /* what happened, in order; repetitions once */
+    uint8_t pins[16] = {}; /* how often each was set high */
+    std::string log;       /* what happened, in order; repetitions once */
 
     void note(const char *event)
     {
