@@ -122,7 +122,7 @@ static void a_full_buffer_is_told_from_a_stream_that_counts_no_bytes(void **)
     Uncounted other;
     ModbusMaster node;
     for (int i = 0; i < 3; i++) {
-        node.begin(1, stream);
+        node.begin(1, stream); /* the same Stream: what it counts is known */
         stream.sent.clear();
         Serial.reply(adu({1, 3, 2, 0, i}));
         assert_int_equal(node.readHoldingRegisters(0, 1), 0);

@@ -461,17 +461,19 @@ private:
     {
         State &state = of(context);
         Stream &stream = *state.stream;
+#if !defined(__AVR__)
         if (state.counts)
             return static_cast<int16_t>(stream.write(bytes, length));
-        // Byte by byte: what a block took is not known of a Stream that returns 0.
-        uint16_t taken = 0;
-        for (; taken < length; taken++) {
-            if (stream.write(bytes[taken]) != 0)
+#endif
+        // Byte by byte: of a block, a Stream that returns 0 took one byte or all.
+        int16_t taken = 0;
+        for (; taken != static_cast<int16_t>(length); taken++) {
+            if (stream.write(*bytes++) != 0)
                 state.counts = true;
             else if (state.counts || stream.getWriteError() != 0)
                 break;
         }
-        return static_cast<int16_t>(taken);
+        return taken;
     }
     static uint32_t clockHook(void *) { return micros() & 0xFFFFFFFFu; }
     static uint8_t flushHook(void *context)
