@@ -53,7 +53,7 @@ public:
      * `port` 1 to 3; Serial for others, and for a UART that the board lacks.
      */
     // Inline always, so that a constant port names one UART.
-    __attribute__((always_inline)) ModbusMaster(uint8_t port, uint8_t slave) : ModbusMaster(slave)
+    MODBUSMASTER_INLINE ModbusMaster(uint8_t port, uint8_t slave) : ModbusMaster(slave)
     {
         state.port = port & 0x7Fu;
         Ports::use(port);

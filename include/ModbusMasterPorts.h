@@ -13,6 +13,10 @@
 
 #include "ModbusMasterOptions.h"
 
+/** @cond a function that the compiler always compiles into its caller */
+#define MODBUSMASTER_INLINE __attribute__((always_inline)) inline
+/** @endcond */
+
 /**
  * Opens UARTs 1 to 3. A UART that a program names takes RAM for its buffers, 157 bytes on
  * a Mega. So the constructor with a port number names the one UART of that number, and
@@ -22,7 +26,7 @@
 template <typename Unused> class ModbusMasterPorts {
 public:
     /** Has open(port, baud) know UART `port`, if the board has it. */
-    __attribute__((always_inline)) static void use(uint8_t port)
+    MODBUSMASTER_INLINE static void use(uint8_t port)
     {
 #if defined(MODBUSMASTER_SERIAL1)
         if (port == 1)

@@ -9,6 +9,11 @@
 #ifndef MODBUSMASTER_UTIL_CRC16_H
 #define MODBUSMASTER_UTIL_CRC16_H
 
+// So that a pedantic compiler does not warn of include_next.
+#if defined(__GNUC__)
+#pragma GCC system_header
+#endif
+
 #if defined(__AVR__)
 #include_next <util/crc16.h>
 #elif defined(__has_include_next)
@@ -17,6 +22,9 @@
 #endif
 #endif
 
+// A C file of another library may mean the header of avr-libc.
+#if defined(__cplusplus)
 #include "../ModbusMasterHelpers.h"
+#endif
 
 #endif

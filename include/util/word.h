@@ -8,6 +8,8 @@
 #ifndef MODBUSMASTER_UTIL_WORD_H
 #define MODBUSMASTER_UTIL_WORD_H
 
+#if defined(__cplusplus)
 #include "../ModbusMasterHelpers.h"
+#endif
 
 #endif
