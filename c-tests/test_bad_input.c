@@ -42,6 +42,7 @@ static void all_others_answer(mbm_master *m, uint8_t status)
     IS(status, mbm_master_setQuietTime(m, 1));
     IS(status, mbm_master_setRetries(m, 1));
     IS(status, mbm_master_setEchoDiscard(m, 1));
+    IS(status, mbm_master_setLenient(m, 1));
     IS(status, mbm_master_setPostFlushHold(m, 1));
     IS(status, mbm_master_setBlocking(m, 1));
     IS(status, mbm_master_setCounters(m, &counters));

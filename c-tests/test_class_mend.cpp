@@ -133,6 +133,26 @@ static void noise_and_foreign_frames_before_the_reply_are_passed_over(void **)
     }
 }
 
+static void a_lenient_object_accepts_replies_that_deviate(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setResponseTimeout(50);
+    node.setLenient(true);
+    Serial.reply(adu({1, 6, 0, 1, 0, 8}));
+    assert_int_equal(node.writeSingleRegister(1, 7), 0);
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 4), 0);
+    assert_int_equal(node.available(), 1);
+    assert_int_equal(node.getResponseBuffer(0), 7);
+    node.setSlaveID(0);
+    Serial.reply(adu({0, 3, 2, 0, 9}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_int_equal(node.getResponseBuffer(0), 9);
+    node.setLenient(false);
+    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBBroadcastNotAllowed);
+}
+
 class Babbler : public Stream {
 public:
     int available() override { return 1; }
@@ -255,6 +275,36 @@ static void the_response_timeout_can_be_set(void **)
         assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBResponseTimedOut);
         assert_in_range(bench().now - Serial.sentAt, ms * 1000, ms * 1000 + 200);
     }
+}
+
+/* How long a call takes that nothing answers: the request on the wire, and the timeout. */
+static uint32_t failing_call(ModbusMaster &node)
+{
+    uint32_t began = bench().now;
+    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBResponseTimedOut);
+    return bench().now - began;
+}
+
+static void the_quiet_time_counts_from_the_failure_while_the_sketch_does_other_work(void **)
+{
+    const uint32_t request = 8 * 573, call = request + 200000, slack = 500;
+    ModbusMaster node, other;
+    node.begin(1, Serial);
+    other.begin(2, Serial);
+    node.setResponseTimeout(200);
+    other.setResponseTimeout(200);
+    bench().now += 1000000;
+    assert_in_range(failing_call(node), call, call + slack);
+    for (uint32_t pause : {150000u, 100000u, 60000u, 1000u}) {
+        uint32_t left = pause < 100000 ? 100000 - pause : 0;
+        bench().now += pause;
+        node.begin(1, Serial); /* as sketches do before each request */
+        assert_in_range(failing_call(node), call + left, call + left + slack);
+    }
+    /* Another object on the same line only keeps the gap. */
+    assert_in_range(failing_call(other), call, call + 4000 + slack);
+    bench().now += 100000;
+    assert_in_range(failing_call(node), call, call + slack);
 }
 
 static void the_slave_can_be_changed(void **)
@@ -412,6 +462,7 @@ int main()
         TEST(an_echo_with_other_values_is_malformed),
         TEST(exceptions_are_checked),
         TEST(noise_and_foreign_frames_before_the_reply_are_passed_over),
+        TEST(a_lenient_object_accepts_replies_that_deviate),
         TEST(a_line_that_never_falls_silent_is_given_up),
         TEST(a_port_that_takes_no_bytes_is_given_up),
         TEST(a_silence_is_kept_before_each_request),
@@ -420,6 +471,7 @@ int main()
         TEST(a_pause_between_two_objects_is_not_waited_for_again),
         TEST(a_late_reply_does_not_shift_the_answers_of_later_requests),
         TEST(the_response_timeout_can_be_set),
+        TEST(the_quiet_time_counts_from_the_failure_while_the_sketch_does_other_work),
         TEST(the_slave_can_be_changed),
         TEST(a_broadcast_succeeds_after_the_turnaround_delay),
         TEST(a_reply_complete_as_the_deadline_passes_succeeds),

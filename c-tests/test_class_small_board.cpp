@@ -39,6 +39,52 @@ static void objects_may_share_the_frame_buffer(void **)
     }
 }
 
+/* A reply of so many registers: values 1 and up. */
+static Bytes registers_of_unit_1(int count)
+{
+    Bytes reply = raw({1, 3, 2 * count});
+    for (int i = 1; i <= count; i++) {
+        reply.push_back(0);
+        reply.push_back(static_cast<uint8_t>(i));
+    }
+    return sealed(reply);
+}
+
+static void a_lenient_read_of_65_to_125_registers_delivers_64(void **)
+{
+    ModbusMaster node;
+    node.begin(1, Serial);
+    for (int quantity : {64, 65, 66, 100, 125}) {
+        node.clearResponseBuffer();
+        node.setLenient(true);
+        Serial.reply(registers_of_unit_1(quantity));
+        assert_int_equal(node.readHoldingRegisters(0, static_cast<uint16_t>(quantity)), 0);
+        assert_int_equal(node.available(), 64);
+        for (int i = 0; i < 64; i++)
+            assert_int_equal(node.getResponseBuffer(static_cast<uint8_t>(i)), i + 1);
+    }
+    node.setLenient(false);
+    Serial.reply(registers_of_unit_1(65));
+    assert_int_equal(node.readHoldingRegisters(0, 65), ModbusMaster::ku8MBBufferTooSmall);
+}
+
+static void a_lenient_object_of_two_that_share_the_frame_disturbs_no_other(void **)
+{
+    ModbusMaster lenient, strict;
+    lenient.begin(1, Serial);
+    strict.begin(2, Serial);
+    lenient.setLenient(true);
+    lenient.setResponseTimeout(50);
+    for (int i = 0; i < 3; i++) {
+        Serial.reply(adu({1, 3, 4, 0, 7, 0, i}));
+        assert_int_equal(lenient.readHoldingRegisters(0, 1), 0);
+        assert_int_equal(lenient.getResponseBuffer(1), i);
+        Serial.reply(adu({2, 3, 2, 0x55, 0x55}));
+        assert_int_equal(strict.readHoldingRegisters(0, 1), 0);
+        assert_int_equal(strict.getResponseBuffer(0), 0x5555);
+    }
+}
+
 static void a_request_beside_that_of_another_object_is_refused(void **)
 {
     ModbusMaster first, second;
@@ -154,6 +200,8 @@ int main()
         TEST(a_uart_that_the_board_lacks_falls_back_to_the_first),
         TEST(objects_are_small),
         TEST(objects_may_share_the_frame_buffer),
+        TEST(a_lenient_read_of_65_to_125_registers_delivers_64),
+        TEST(a_lenient_object_of_two_that_share_the_frame_disturbs_no_other),
         TEST(a_request_beside_that_of_another_object_is_refused),
         TEST(a_request_from_a_callback_of_another_object_is_refused),
         TEST(an_object_that_is_gone_keeps_no_other_from_asking),

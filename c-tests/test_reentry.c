@@ -53,6 +53,7 @@ static void every_function_of_the_master_is_busy(void)
     IS(MBM_BUSY, mbm_master_setQuietTime(m, 1));
     IS(MBM_BUSY, mbm_master_setRetries(m, 1));
     IS(MBM_BUSY, mbm_master_setEchoDiscard(m, 1));
+    IS(MBM_BUSY, mbm_master_setLenient(m, 1));
     IS(MBM_BUSY, mbm_master_setPostFlushHold(m, 1));
     IS(MBM_BUSY, mbm_master_setBlocking(m, 0));
     IS(MBM_BUSY, mbm_master_setCounters(m, &counters));

@@ -14,6 +14,8 @@
 
 #ifndef MODBUSMASTER_H
 #define MODBUSMASTER_H
+/** The original's guard, which sketches look at. */
+#define ModbusMaster_h
 
 #include <Arduino.h>
 #include <stdint.h>
@@ -21,7 +23,9 @@
 
 #include "ModbusMasterBoards.h"
 #include "ModbusMasterConstants.h"
+#include "ModbusMasterHelpers.h"
 #include "ModbusMasterOptions.h"
+#include "ModbusMasterPorts.h"
 #include "ModbusMasterTurn.h"
 #include "ModbusMasterValues.h"
 #include "ModbusStatusText.h"
@@ -48,7 +52,12 @@ public:
      * As ModbusMaster(slave), with begin(baud) opening Serial1 to Serial3 for
      * `port` 1 to 3; Serial for others, and for a UART that the board lacks.
      */
-    ModbusMaster(uint8_t port, uint8_t slave) : ModbusMaster(slave) { state.port = port; }
+    // Inline always, so that a constant port names one UART.
+    MODBUSMASTER_INLINE ModbusMaster(uint8_t port, uint8_t slave) : ModbusMaster(slave)
+    {
+        state.port = port & 0x7Fu;
+        Ports::use(port);
+    }
 
     /**
      * A copy has buffers of its own, with the same words, settings, callbacks
@@ -87,12 +96,16 @@ public:
      *
      * @param slave   1 to 247; 248 to 255 are sent as they are, 0 is broadcast
      * @param stream  must outlive its use here; its read() returns -1 where nothing has
-     *                arrived, as Arduino says
+     *                arrived, as Arduino says. Its write() returns the bytes that it
+     *                took. If it returns 0 for the first byte, without a write error,
+     *                it is taken for a Stream that takes all bytes and counts none
      */
     void begin(uint8_t slave, Stream &stream)
     {
-        if (attach(slave) == MBM_OK)
+        if (attach(slave) == MBM_OK && state.stream != &stream) {
             state.stream = &stream;
+            state.counts = false;
+        }
     }
 
 #if defined(MODBUSMASTER_SERIAL0)
@@ -106,18 +119,12 @@ public:
     void begin(uint32_t baud = 19200)
     {
         setBaudRate(baud);
-        switch (state.port) {
-#if defined(MODBUSMASTER_SERIAL1)
-        case 1: openPort(MODBUSMASTER_SERIAL1, baud); break;
-#endif
-#if defined(MODBUSMASTER_SERIAL2)
-        case 2: openPort(MODBUSMASTER_SERIAL2, baud); break;
-#endif
-#if defined(MODBUSMASTER_SERIAL3)
-        case 3: openPort(MODBUSMASTER_SERIAL3, baud); break;
-#endif
-        default: openPort(MODBUSMASTER_SERIAL0, baud); break;
+        Stream *stream = Ports::open(state.port, baud);
+        if (stream == nullptr) {
+            MODBUSMASTER_SERIAL0.begin(baud);
+            stream = &MODBUSMASTER_SERIAL0;
         }
+        begin(getSlaveID(), *stream);
     }
 #endif
 
@@ -231,9 +238,14 @@ public:
         return request(mbm_master_readHoldingRegisters, address, quantity);
     }
     /** Function 04: reads 1 to 125 input registers; see readCoils. */
-    uint8_t readInputRegisters(uint16_t address, uint16_t quantity)
+    template <typename Quantity> uint8_t readInputRegisters(uint16_t address, Quantity quantity)
     {
-        return request(mbm_master_readInputRegisters, address, quantity);
+        return request(mbm_master_readInputRegisters, address, static_cast<uint16_t>(quantity));
+    }
+    /** As above, with the original's type: a pointer to it is a pointer to this member. */
+    uint8_t readInputRegisters(uint16_t address, uint8_t quantity)
+    {
+        return request(mbm_master_readInputRegisters, address, uint16_t{quantity});
     }
     /** Function 05: switches a coil; any `on` but 0 is on. See readCoils. */
     uint8_t writeSingleCoil(uint16_t address, uint8_t on)
@@ -295,6 +307,12 @@ public:
     void setRetries(uint8_t retries) { mbm_master_setRetries(&state.master, retries); }
     /** Drops the request itself where the receiver hears the driver; off at first. */
     void setEchoDiscard(bool on) { mbm_master_setEchoDiscard(&state.master, on); }
+    /**
+     * Accepts replies that deviate from the standard, if no right one comes in time:
+     * another echoed address or value, another number of registers. Fills the response
+     * buffer from reads of more words than it holds, and reads from unit 0; off at first.
+     */
+    void setLenient(bool on) { mbm_master_setLenient(&state.master, on); }
     /** Character times that the driver stays on where flush returns early; 0 at first. */
     void setPostFlushHold(uint8_t characters)
     {
@@ -328,6 +346,7 @@ private:
         frameBytes = frameNeed < MBM_MAX_FRAME ? +frameNeed : MBM_MAX_FRAME
     };
 
+    typedef ModbusMasterPorts<void> Ports;
     typedef ModbusMasterTurn<void> Turn;
 
     struct Callback {
@@ -344,7 +363,8 @@ private:
         Callback onPre;
         Callback onPost;
         bool sent; // the request is on the wire, so a reply is waited for
-        uint8_t port;
+        uint8_t port : 7;
+        bool counts : 1; // the Stream's write has returned a count
         mbm_master master;
         uint16_t response[responseWords];
         uint16_t transmit[transmitWords];
@@ -383,12 +403,6 @@ private:
         lendBuffers();
         if (state.stream != nullptr)
             attach(getSlaveID());
-    }
-
-    template <typename Port> void openPort(Port &port, uint32_t baud)
-    {
-        port.begin(baud);
-        begin(getSlaveID(), port);
     }
 
     // Every request passes here. False while another object has a request under way in
@@ -432,7 +446,9 @@ private:
         Stream &stream = *of(context).stream;
         const uint8_t *const first = bytes, *const end = bytes + capacity;
         while (bytes != end) {
+            MODBUSMASTER_DEBUG(A, true);
             const int byte = stream.read();
+            MODBUSMASTER_DEBUG(A, false);
             if (byte < 0)
                 break;
             *bytes++ = static_cast<uint8_t>(byte);
@@ -443,7 +459,21 @@ private:
     }
     static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
     {
-        return static_cast<int16_t>(of(context).stream->write(bytes, length));
+        State &state = of(context);
+        Stream &stream = *state.stream;
+#if !defined(__AVR__)
+        if (state.counts)
+            return static_cast<int16_t>(stream.write(bytes, length));
+#endif
+        // Byte by byte: of a block, a Stream that returns 0 took one byte or all.
+        int16_t taken = 0;
+        for (; taken != static_cast<int16_t>(length); taken++) {
+            if (stream.write(*bytes++) != 0)
+                state.counts = true;
+            else if (state.counts || stream.getWriteError() != 0)
+                break;
+        }
+        return taken;
     }
     static uint32_t clockHook(void *) { return micros() & 0xFFFFFFFFu; }
     static uint8_t flushHook(void *context)
@@ -462,7 +492,9 @@ private:
     {
         State &state = of(context);
         if (state.sent) {
+            MODBUSMASTER_DEBUG(B, true);
             call(state.onIdle);
+            MODBUSMASTER_DEBUG(B, false);
             state.sent = true; // a request that the callback tried was refused
         }
         MODBUSMASTER_YIELD();

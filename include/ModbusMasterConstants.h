@@ -1,6 +1,6 @@
 /**
  * @file ModbusMasterConstants.h
- * @brief The constants of ModbusMaster and the helpers that sketches use with it.
+ * @brief The constants of ModbusMaster.
  *
  * Licence: MIT OR Apache-2.0. Included by ModbusMaster.h.
  */
@@ -76,27 +76,5 @@ MODBUSMASTER_HOME(ku8MBLineBusy);
 MODBUSMASTER_HOME(ku8MBCancelled);
 #undef MODBUSMASTER_HOME
 /** @endcond */
-
-// Templates, so that a core's own functions of these names do not clash.
-#if !defined(lowWord)
-/** The low 16 bits of a 32-bit value. */
-template <typename Value> constexpr uint16_t lowWord(Value value)
-{
-    return static_cast<uint16_t>(static_cast<uint32_t>(value) & 0xFFFFu);
-}
-#endif
-#if !defined(highWord)
-/** The high 16 bits of a 32-bit value. */
-template <typename Value> constexpr uint16_t highWord(Value value)
-{
-    return static_cast<uint16_t>(static_cast<uint32_t>(value) >> 16);
-}
-#endif
-// A macro, so that a type of this name (FatFs has one) does not clash.
-#if !defined(LONG)
-/** The 32-bit value of two words. */
-#define LONG(hi, lo) \
-    (static_cast<uint32_t>(static_cast<uint16_t>(hi)) << 16 | static_cast<uint16_t>(lo))
-#endif
 
 #endif

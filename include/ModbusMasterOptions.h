@@ -18,6 +18,9 @@
  * - MODBUSMASTER_SERIAL0 to MODBUSMASTER_SERIAL3  what begin(baud) opens, where
  *   the core does not say which UARTs the board has.
  * - MODBUSMASTER_YIELD()  what a wait runs; yield() where the core has it.
+ * - __MODBUSMASTER_DEBUG__  1: pin __MODBUSMASTER_DEBUG_PIN_A__ (4) is high while a byte
+ *   is read, pin __MODBUSMASTER_DEBUG_PIN_B__ (5) while an idle callback runs. The sketch
+ *   makes them outputs.
  */
 
 #ifndef MODBUSMASTER_OPTIONS_H
@@ -66,6 +69,21 @@
 #else
 #define MODBUSMASTER_YIELD() static_cast<void>(0)
 #endif
+#endif
+
+#if !defined(__MODBUSMASTER_DEBUG__)
+#define __MODBUSMASTER_DEBUG__ (0)
+#endif
+#if !defined(__MODBUSMASTER_DEBUG_PIN_A__)
+#define __MODBUSMASTER_DEBUG_PIN_A__ 4
+#endif
+#if !defined(__MODBUSMASTER_DEBUG_PIN_B__)
+#define __MODBUSMASTER_DEBUG_PIN_B__ 5
+#endif
+#if __MODBUSMASTER_DEBUG__
+#define MODBUSMASTER_DEBUG(pin, level) digitalWrite(__MODBUSMASTER_DEBUG_PIN_##pin##__, level)
+#else
+#define MODBUSMASTER_DEBUG(pin, level) static_cast<void>(0)
 #endif
 /** @endcond */
 

@@ -1,7 +1,7 @@
 //! A master with the interface of the Arduino library ModbusMaster: transmit words, ten
 //! functions, response words. Each function starts a request; `poll` advances it to its end.
 
-use crate::engine::{Engine, Settings, Words};
+use crate::engine::{Engine, Receive, Settings, Words, BROADCAST};
 use crate::error::Status;
 use crate::pdu::query::{Form, Query};
 use crate::pdu::{bits, registers};
@@ -20,6 +20,9 @@ pub struct Master<P, S: Words> {
     slave: u8,
     status: Status,
     engine: Engine<P, S, Query>,
+    /// The function that waits for the reply if deviating replies are accepted; `None` if they
+    /// are not. (A pointer, so that firmware without `set_lenient` does not contain its code.)
+    lenient: Option<Receive<Engine<P, S, Query>>>,
     /// The address to which the write functions without an address argument write.
     write_address: u16,
     /// Number of bits queued in the transmit words; a queued word counts as 16.
@@ -31,6 +34,7 @@ impl<P, S: Words> Master<P, S> {
     pub const fn new(slave: u8, port: P, storage: S) -> Self {
         Master {
             engine: Engine::new(port, storage),
+            lenient: None,
             write_address: 0,
             transmit_bits: 0,
             response_words: 0,
@@ -114,6 +118,16 @@ impl<P: Port, S: Words> Master<P, S> {
         self.engine.settings.preset();
     }
 
+    /// Sets whether a reply that deviates from the standard is accepted if no right reply
+    /// comes, and whether reads are sent to unit 0: see [`Engine::receive_lenient`].
+    pub fn set_lenient(&mut self, on: bool) {
+        self.lenient = if on {
+            Some(Engine::receive_lenient)
+        } else {
+            None
+        };
+    }
+
     /// Cancels the request in progress, if there is one. Its status becomes
     /// [`Status::CANCELLED`].
     pub fn cancel(&mut self) {
@@ -148,7 +162,7 @@ impl<P: Port, S: Words> Master<P, S> {
     pub fn poll(&mut self) -> Status {
         if self.engine.is_pending() {
             let now = self.engine.port.micros();
-            self.status = match self.engine.poll(now) {
+            self.status = match self.engine.poll_with(now, self.lenient) {
                 Status::OK if self.engine.request().is_read() => self.take_words(),
                 status => status,
             };
@@ -228,14 +242,17 @@ impl<P: Port, S: Words> Master<P, S> {
         self.status = built;
         if built == Status::OK {
             let request = self.engine.request();
-            if request.is_read() {
+            let request_is_read = request.is_read();
+            if request_is_read {
                 self.response_words = 0;
             }
             let words = request.sends().div_ceil(2);
             self.status = if words > self.engine.storage.transmit_words() {
                 Status::ILLEGAL_DATA_VALUE
+            } else if self.slave == BROADCAST && request_is_read && self.lenient.is_none() {
+                Status::BROADCAST_NOT_ALLOWED
             } else {
-                self.engine.start(self.slave)
+                self.engine.start_any(self.slave)
             };
         }
         self.status

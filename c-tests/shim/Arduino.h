@@ -28,14 +28,27 @@ inline unsigned long millis()
 {
     return bench().micros() / 1000;
 }
+#define lowByte(w) ((uint8_t)((w)&0xff))
+#define highByte(w) ((uint8_t)((w) >> 8))
+inline void digitalWrite(uint8_t pin, uint8_t level)
+{
+    bench().pins[pin & 15] = static_cast<uint8_t>(bench().pins[pin & 15] + level);
+}
 inline void yield()
 {
     bench().yields++;
 }
 
 class Stream {
+    int writeError = 0;
+
+protected:
+    void setWriteError(int error = 1) { writeError = error; }
+
 public:
     virtual ~Stream() {}
+    int getWriteError() { return writeError; }
+    void clearWriteError() { setWriteError(0); }
     virtual int available() = 0;
     virtual int read() = 0;
     virtual int peek() = 0;
@@ -98,6 +111,10 @@ public:
 
     size_t write(uint8_t value) override
     {
+        if (room == 0) {
+            setWriteError();
+            return 0;
+        }
         bench().note("write");
         if (out.empty())
             startedAt = bench().now;

@@ -442,6 +442,26 @@ static void two_ports_are_polled_at_once(void **state)
     board_free(b);
 }
 
+/* The request takes 8 characters of 0.52 ms; the timeout begins with its last bit. */
+static void a_call_without_reply_takes_the_timeout_and_what_is_left_of_the_quiet_time(void **state)
+{
+    static const unsigned left[] = {0, 0, 50, 100};
+    board *b = kind_start(&uno, "NoReply");
+    uint16_t report = board_symbol(b, "report");
+    wire *bus = board_uart(b, '0', NULL, NULL);
+    unsigned i;
+
+    (void)state;
+    assert_true(board_run_until(b, report, 1, 2000 * MS));
+    assert_int_equal(bus->frames, 4);
+    for (i = 0; i < 4; i++) {
+        unsigned took = board_word(b, (uint16_t)(report + 5 + 2 * i));
+        assert_int_equal(board_byte(b, (uint16_t)(report + 1 + i)), 0xE2);
+        assert_in_range(took, left[i] + 200 + 4, left[i] + 200 + 6);
+    }
+    board_free(b);
+}
+
 static void calls_of_version_0_9_work_on_a_second_port(void **state)
 {
     board *b = kind_start(&mega, "OlderCalls");
@@ -483,6 +503,7 @@ int main(void)
         cmocka_unit_test(phoenix_contact_makes_its_requests),
         cmocka_unit_test(a_bus_on_two_pins_works),
         cmocka_unit_test(two_ports_are_polled_at_once),
+        cmocka_unit_test(a_call_without_reply_takes_the_timeout_and_what_is_left_of_the_quiet_time),
         cmocka_unit_test(calls_of_version_0_9_work_on_a_second_port),
     };
 

@@ -182,7 +182,7 @@ impl<P, S: Means, J: Job> Request<P, S> for ActiveRequest<P, S, J> {
                 }
             }
         }
-        engine.search_rtu()
+        engine.search_rtu::<false>()
     }
 
     fn search_silent(engine: &mut ClientEngine<P, S, J>) -> bool {

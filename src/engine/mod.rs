@@ -17,6 +17,7 @@
 //! time, which fit into the registers, and the code is small.
 
 pub mod ascii;
+mod lenient;
 mod plain;
 mod poll;
 mod receive;
@@ -32,6 +33,7 @@ pub use seen::Seen;
 pub use settings::Settings;
 pub use storage::{Buffers, Count, Counter, Frame, Storage, Words, COUNTERS};
 
+use crate::error::Status;
 use crate::frame::checksum::Crc16;
 
 /// The unit address of a broadcast (serial line guide V1.02, 2.2).
@@ -67,7 +69,12 @@ enum Probation {
     On,
     /// The next reply may be late, and one reply is or was held.
     Held,
+    /// A deviating reply has come (see `lenient`).
+    Deviating,
 }
+
+/// A function that waits for the reply.
+pub type Receive<E> = fn(&mut E) -> Status;
 
 /// One request and its reply, over a port and in the caller's storage.
 // Small fields come first: a Cortex-M0 and an AVR need one more instruction to reach a field
@@ -94,7 +101,8 @@ pub struct Engine<P, S: Storage, Q> {
     /// The least length of the candidate at the front of the buffer. Once the reply is
     /// found: the length of its frame.
     least: S::Count,
-    /// Length of the held reply, which the storage has set aside; 0 if none is held.
+    /// Length of the bytes that the storage has set aside: a held reply, or what may become a
+    /// deviating reply (see `lenient`); 0 if there are none.
     pub(crate) held: S::Count,
     /// Whether the next reply may be a late reply.
     probation: Probation,

@@ -52,7 +52,7 @@ impl<P, S: Words> Request<P, S> for Query {
     #[inline(always)]
     fn search(engine: &mut Engine<P, S, Self>) -> bool {
         let data = engine.request.reads();
-        !FIRMWARE && data > 0 && engine.has_read(data) || engine.search_rtu()
+        !FIRMWARE && data > 0 && engine.has_read(data) || engine.search_rtu::<false>()
     }
 
     #[inline(always)]
@@ -84,6 +84,26 @@ impl<P, S: Words> Request<P, S> for Query {
             engine.see(Seen::TOO_LONG);
         }
         engine.length
+    }
+
+    #[inline(always)]
+    fn pass_and_keep(engine: &mut Engine<P, S, Self>, front: u8) -> u8 {
+        engine.pass_and_keep(front)
+    }
+
+    #[inline(always)]
+    fn note_deviating(engine: &mut Engine<P, S, Self>, front: u8) {
+        engine.note_deviating(front);
+    }
+
+    #[inline(always)]
+    fn drop_kept(engine: &mut Engine<P, S, Self>) {
+        engine.drop_kept();
+    }
+
+    #[inline(always)]
+    fn take_deviating(engine: &mut Engine<P, S, Self>) -> bool {
+        engine.take_deviating()
     }
 
     #[cfg_attr(target_os = "none", inline(never))]

@@ -1,6 +1,6 @@
 //! Moves a request on, from its start to its end.
 
-use super::{Count, Engine, Phase, Probation, Request, Seen, Settings, Storage};
+use super::{Count, Engine, Phase, Probation, Receive, Request, Seen, Settings, Storage};
 use crate::error::Status;
 use crate::frame::checksum::{crc16, Crc16};
 use crate::frame::rtu;
@@ -159,6 +159,16 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         has_elapsed(time, self.now, since)
     }
 
+    /// Waits for the turnaround delay, in which the slaves carry out a broadcast.
+    #[inline(always)]
+    pub(super) fn turn_around(&mut self) -> Status {
+        if self.is_over() {
+            Status::OK
+        } else {
+            self.wait()
+        }
+    }
+
     /// The status of a request that cannot go on, because the line is not silent or the port
     /// accepts nothing: `PENDING`, or `LINE_BUSY` once the phase has expired.
     #[cfg_attr(target_os = "none", inline(never))]
@@ -194,15 +204,23 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// [`Status::PENDING`] until the request has ended, then its status.
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn poll(&mut self, now: u32) -> Status {
+        self.poll_with(now, None)
+    }
+
+    /// As [`Engine::poll`], but `receive` waits for the reply if there is such a function.
+    #[cfg_attr(not(target_os = "none"), inline(always))]
+    pub fn poll_with(&mut self, now: u32, receive: Option<Receive<Self>>) -> Status {
         self.waiting = false;
         self.look_at_clock(now);
         let status = match self.phase {
             Phase::Idle => return Status::OK,
             Phase::Gap => self.listen(),
             Phase::Send | Phase::Flush | Phase::Hold => self.send(),
-            Phase::Reply => self.receive(),
-            Phase::Turnaround if self.is_over() => Status::OK,
-            Phase::Turnaround => self.wait(),
+            phase => match receive {
+                Some(receive) => receive(self),
+                None if phase == Phase::Reply => self.receive::<false>(),
+                None => self.turn_around(),
+            },
         };
         if status.is_failure() {
             self.cancel();

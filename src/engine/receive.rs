@@ -62,14 +62,14 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
 
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    pub(super) fn receive(&mut self) -> Status {
+    pub(super) fn receive<const LENIENT: bool>(&mut self) -> Status {
         let mut over = self.is_over();
         // At the deadline all received bytes are searched, also if the port returns them one
         // by one, but at most as many as a frame buffer holds.
         let mut budget = S::Count::MAX;
         loop {
             if self.end == self.storage.room() {
-                self.give_up_held();
+                self.make_space::<LENIENT>();
             }
             let heard = self.hear(self.end);
             if heard < 0 {
@@ -82,8 +82,8 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             }
             self.end += heard;
             self.skimmed = false;
-            let found = Q::search(self);
-            if self.is_answered(found) {
+            let found = self.search::<LENIENT>();
+            if self.is_answered::<LENIENT>(found) {
                 return self.found();
             }
             if !over {
@@ -97,7 +97,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         if !self.skimmed && (over || self.is_silent(self.settings.silence)) {
             self.skimmed = true;
             let found = Q::search_silent(self);
-            if self.is_answered(found) {
+            if self.is_answered::<LENIENT>(found) {
                 return self.found();
             }
         }
@@ -105,36 +105,71 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             over = self.is_silent(self.settings.quiet_time) || self.is_over();
         }
         if over {
-            if self.take_held() {
+            let is_held = !LENIENT || self.probation == Probation::Held;
+            if is_held && self.take_held() {
                 return self.found();
             }
-            return self.fail();
+            return self.fail_unless_deviating::<LENIENT>();
         }
         // Without diagnosis the engine does not know whether the damaged bytes were a reply.
         if cfg!(feature = "diagnosis") && self.skimmed && self.seen >= Seen::BAD_CRC {
-            return self.fail();
+            return self.fail_unless_deviating::<LENIENT>();
         }
         Status::PENDING
+    }
+
+    /// Searches the received bytes for the reply.
+    #[inline(always)]
+    fn search<const LENIENT: bool>(&mut self) -> bool {
+        if LENIENT {
+            self.search_rtu::<true>()
+        } else {
+            Q::search(self)
+        }
+    }
+
+    /// Makes space in a full frame buffer: drops what was set aside.
+    #[inline(always)]
+    fn make_space<const LENIENT: bool>(&mut self) {
+        if LENIENT {
+            Q::drop_kept(self);
+        }
+        if !LENIENT || self.probation == Probation::Held {
+            self.give_up_held();
+        }
+    }
+
+    /// Ends a request without a right reply. If `LENIENT`, a deviating reply that has arrived is
+    /// the answer.
+    #[inline(always)]
+    fn fail_unless_deviating<const LENIENT: bool>(&mut self) -> Status {
+        if LENIENT && Q::take_deviating(self) {
+            return self.found();
+        }
+        self.fail()
     }
 
     /// True if the reply that was `found` is the answer. A reply on probation is held, and the
     /// bytes after it are searched.
     #[inline(always)]
-    fn is_answered(&mut self, found: bool) -> bool {
-        if !FIRMWARE && self.probation == Probation::Off {
+    fn is_answered<const LENIENT: bool>(&mut self, found: bool) -> bool {
+        if !FIRMWARE && !LENIENT && self.probation == Probation::Off {
             return found;
         }
-        self.is_answered_behind_held(found)
+        self.is_answered_behind_held::<LENIENT>(found)
     }
 
     #[inline(never)]
-    fn is_answered_behind_held(&mut self, mut found: bool) -> bool {
+    fn is_answered_behind_held<const LENIENT: bool>(&mut self, mut found: bool) -> bool {
         while found {
+            if LENIENT {
+                Q::drop_kept(self);
+            }
             if self.probation == Probation::Off {
                 return true;
             }
             self.hold();
-            found = Q::search(self);
+            found = self.search::<LENIENT>();
         }
         false
     }
@@ -203,12 +238,6 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             .wrapping_add(self.settings.quiet_time);
     }
 
-    /// Makes the held reply the front of the frame buffer again.
-    pub(super) fn take_back(&mut self) {
-        self.storage.take_back(self.held);
-        self.held = S::Count::ZERO;
-    }
-
     /// Drops the held reply and counts it as a foreign frame.
     #[cfg_attr(target_os = "none", inline(never))]
     fn give_up_held(&mut self) {
@@ -237,6 +266,14 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         // A damaged second reply may have overwritten the exception code of the first.
         Q::judge(self, S::Count::ZERO, held);
         true
+    }
+}
+
+impl<P, S: Storage, Q> Engine<P, S, Q> {
+    /// Has the frame buffer begin with the held reply again.
+    pub(super) fn take_back(&mut self) {
+        self.storage.take_back(self.held);
+        self.held = S::Count::ZERO;
     }
 }
 

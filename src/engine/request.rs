@@ -58,7 +58,7 @@ pub trait Request<P, S: Storage>: Sized {
     /// False if it has not arrived yet.
     #[inline(always)]
     fn search(engine: &mut Engine<P, S, Self>) -> bool {
-        engine.search_rtu()
+        engine.search_rtu::<false>()
     }
 
     /// As [`Request::search`], once the line is silent: also searches after an incomplete
@@ -66,6 +66,28 @@ pub trait Request<P, S: Storage>: Sized {
     #[inline(always)]
     fn search_silent(engine: &mut Engine<P, S, Self>) -> bool {
         engine.skim(1u8.into())
+    }
+
+    /// Skips the byte at `front`, but keeps it if it may belong to a deviating reply (see
+    /// `lenient`). Returns the index of the next byte.
+    #[inline(always)]
+    fn pass_and_keep(engine: &mut Engine<P, S, Self>, front: S::Count) -> S::Count {
+        engine.pass(front);
+        front + 1u8.into()
+    }
+
+    /// Notes the frame at `front`, which does not answer the request, as a deviating reply.
+    #[inline(always)]
+    fn note_deviating(_engine: &mut Engine<P, S, Self>, _front: S::Count) {}
+
+    /// Drops the bytes that were kept.
+    #[inline(always)]
+    fn drop_kept(_engine: &mut Engine<P, S, Self>) {}
+
+    /// Accepts the deviating reply as the answer. False if there is none.
+    #[inline(always)]
+    fn take_deviating(_engine: &mut Engine<P, S, Self>) -> bool {
+        false
     }
 
     /// How many bytes of unit and PDU a frame of `length` bytes on the wire carries.

@@ -58,8 +58,9 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// Searches the received bytes for the reply in an RTU frame, and moves it to the front of
     /// the buffer. False if it has not arrived yet. The search stops at an incomplete
     /// candidate.
+    /// If `LENIENT`, a deviating reply is kept meanwhile (see `lenient`).
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn search_rtu(&mut self) -> bool {
+    pub fn search_rtu<const LENIENT: bool>(&mut self) -> bool {
         if self.least > self.end {
             self.take_in(self.end);
             return false;
@@ -81,7 +82,12 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
                             break true;
                         }
                         Verdict::Echo => {}
-                        Verdict::Wrong => self.see_foreign(Seen::MALFORMED),
+                        Verdict::Wrong => {
+                            if LENIENT {
+                                Q::note_deviating(self, front);
+                            }
+                            self.see_foreign(Seen::MALFORMED);
+                        }
                     }
                     front += length;
                     self.begin_frame(front);
@@ -89,8 +95,12 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
                 }
                 self.see(Seen::BAD_CRC);
             }
-            self.pass(front);
-            front += 1u8.into();
+            if LENIENT {
+                front = Q::pass_and_keep(self, front);
+            } else {
+                self.pass(front);
+                front += 1u8.into();
+            }
         };
         if front > S::Count::ZERO {
             self.drop_front(front);
@@ -175,7 +185,7 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// Skips the byte at `front`. If the skipped bytes turn out to be a frame, a bad CRC noted
     /// within them is withdrawn.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn pass(&mut self, front: S::Count) {
+    pub(super) fn pass(&mut self, front: S::Count) {
         if cfg!(feature = "diagnosis") && self.passed == 0 {
             self.passed_as = if self.storage.byte(front) != self.unit {
                 Seen::OTHER_UNIT

@@ -13,6 +13,12 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         if unit == BROADCAST && !self.request.may_be_broadcast() {
             return Status::BROADCAST_NOT_ALLOWED;
         }
+        self.start_any(unit)
+    }
+
+    /// As [`Engine::start`], also for a request to unit 0 that may not be broadcast.
+    #[inline(always)]
+    pub fn start_any(&mut self, unit: u8) -> Status {
         if !self.request.fits(self.storage.room()) {
             return Status::BUFFER_TOO_SMALL;
         }

@@ -182,6 +182,12 @@ impl Query {
         self.reads
     }
 
+    /// Has the response carry `bytes` of data, all of whose bits are used.
+    pub fn set_reads(&mut self, bytes: u8) {
+        self.reads = bytes;
+        self.mask = 0xFF;
+    }
+
     /// Bytes of the caller's words that are sent.
     pub const fn sends(&self) -> u8 {
         self.sends

@@ -19,6 +19,8 @@ class Stream {
 public:
     virtual int available() = 0;
     virtual int read() = 0;
+    virtual size_t write(uint8_t value) = 0;
+    int getWriteError();
     virtual size_t write(const uint8_t *bytes, size_t length) = 0;
     virtual void flush() = 0;
 };

@@ -15,7 +15,7 @@ use core::ffi::c_void;
 #[repr(C)]
 pub struct mbm_master {
     /// Private.
-    pointers: [*mut c_void; 12],
+    pointers: [*mut c_void; 13],
     /// Private.
     words: [u32; 21],
 }

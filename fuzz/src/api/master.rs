@@ -58,7 +58,7 @@ fn buffers(w: &World, master: *mut mbm_master) {
 
 fn set(w: &World, master: *mut mbm_master) {
     let (byte, word, long) = (w.byte(), w.word(), w.long());
-    let choice = w.byte() % 16;
+    let choice = w.byte() % 17;
     let counters: *mut mbm_counters = if byte & 1 == 0 {
         null_mut()
     } else {
@@ -80,6 +80,7 @@ fn set(w: &World, master: *mut mbm_master) {
         12 => call!(w, master, mbm_master_lineUsedAt(master, long)),
         14 => call!(w, master, mbm_master_takeTurn(master, w.turn(byte))),
         15 => call!(w, master, mbm_master_endTurn(master, w.turn(byte))),
+        16 => call!(w, master, mbm_master_setLenient(master, byte & 1)),
         _ => call!(w, master, mbm_master_setWordOrder(master, byte % 8)),
     });
 }

@@ -1,0 +1,170 @@
+/* What sketches use of the original library beside the class's calls: its other headers,
+ * their functions, its guard, its debug pins, and Streams that count no bytes. */
+#define __MODBUSMASTER_DEBUG__ 1
+#include "util/crc16.h"
+#include "util/word.h"
+#include "wire.h"
+
+#if !defined(ModbusMaster_h)
+#error "the original's guard is not defined"
+#endif
+#if defined(_UTIL_CRC16_H_) || defined(_UTIL_WORD_H_)
+#error "the guard of avr-libc's <util/crc16.h> is taken"
+#endif
+
+static void crc16_update_computes_the_crc_of_a_frame(void **)
+{
+    const Bytes frame = adu({0x01, 0x42, 0x80, 0x11, 0xFF});
+    uint16_t crc = 0xFFFF;
+    for (size_t i = 0; i + 2 < frame.size(); i++)
+        crc = crc16_update(crc, frame[i]);
+    assert_int_equal(lowByte(crc), frame[frame.size() - 2]);
+    assert_int_equal(highByte(crc), frame[frame.size() - 1]);
+    /* "123456789", the check of CRC-16/MODBUS */
+    crc = 0xFFFF;
+    for (int digit = '1'; digit <= '9'; digit++)
+        crc = crc16_update(crc, static_cast<uint8_t>(digit));
+    assert_int_equal(crc, 0x4B37);
+}
+
+static void the_helpers_split_and_join_words(void **)
+{
+    assert_int_equal(lowWord(0x12345678), 0x5678);
+    assert_int_equal(highWord(0x12345678), 0x1234);
+    assert_int_equal(LONG(0x1234, 0x5678), 0x12345678);
+}
+
+static void members_have_the_originals_types(void **)
+{
+    typedef uint8_t (ModbusMaster::*Read)(uint16_t, uint16_t);
+    uint8_t (ModbusMaster::*original)(uint16_t, uint8_t) = &ModbusMaster::readInputRegisters;
+    const Read reads[] = {&ModbusMaster::readCoils, &ModbusMaster::readDiscreteInputs,
+                          &ModbusMaster::readHoldingRegisters, &ModbusMaster::readInputRegisters};
+    const uint8_t one = 1;
+    ModbusMaster node;
+    node.begin(1, Serial);
+    node.setResponseTimeout(1);
+    for (Read read : reads)
+        assert_int_equal((node.*read)(0, 1), ModbusMaster::ku8MBResponseTimedOut);
+    Serial.sent.clear();
+    node.setResponseTimeout(100);
+    Serial.reply(adu({1, 4, 2, 0, 7}));
+    assert_int_equal((node.*original)(0x102, one), 0);
+    assert_sent(Serial, {1, 4, 1, 2, 0, 1});
+    Serial.reply(adu({1, 4, 2, 0, 7}));
+    assert_int_equal(node.readInputRegisters(0x102, one), 0);
+    assert_sent(Serial, {1, 4, 1, 2, 0, 1});
+    assert_int_equal(node.readInputRegisters(0, 258), ModbusMaster::ku8MBIllegalDataValue);
+}
+
+static void the_debug_pins_show_reads_and_idle_calls(void **)
+{
+    static unsigned idles;
+    ModbusMaster node;
+    idles = 0;
+    node.begin(1, Serial);
+    node.idle([] { idles++; });
+    Serial.reply(adu({1, 3, 2, 0, 7}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_true(bench().pins[__MODBUSMASTER_DEBUG_PIN_A__] >= 7);
+    assert_int_equal(bench().pins[__MODBUSMASTER_DEBUG_PIN_B__], idles & 0xFF);
+    assert_true(idles > 0);
+}
+
+/* Takes every byte, and returns 0 for it. */
+class Uncounted : public Stream {
+public:
+    Bytes sent;
+    int available() override { return Serial.available(); }
+    int read() override { return Serial.read(); }
+    int peek() override { return Serial.peek(); }
+    size_t write(uint8_t value) override
+    {
+        sent.push_back(value);
+        return 0;
+    }
+    void flush() override { Serial.flush(); }
+};
+
+static void a_stream_that_counts_no_bytes_sends_each_request_once(void **)
+{
+    Uncounted stream;
+    ModbusMaster node;
+    node.begin(1, stream);
+    for (int i = 0; i < 3; i++) {
+        node.begin(1, stream);
+        Serial.reply(adu({1, 3, 2, 0, i}));
+        assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+        assert_int_equal(node.getResponseBuffer(0), i);
+        assert_bytes(stream.sent, adu({1, 3, 0, 0, 0, 1}));
+        stream.sent.clear();
+    }
+}
+
+/* Takes three bytes, then none for a while; sets no write error. */
+class Full : public Uncounted {
+public:
+    int room = 3;
+    size_t write(uint8_t value) override
+    {
+        if (room-- <= 0) {
+            room = room < -5 ? 3 : room;
+            return 0;
+        }
+        sent.push_back(value);
+        return 1;
+    }
+};
+
+static void a_full_buffer_is_told_from_a_stream_that_counts_no_bytes(void **)
+{
+    Full stream;
+    Uncounted other;
+    ModbusMaster node;
+    for (int i = 0; i < 3; i++) {
+        node.begin(1, stream); /* the same Stream: what it counts is known */
+        stream.sent.clear();
+        Serial.reply(adu({1, 3, 2, 0, i}));
+        assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+        assert_bytes(stream.sent, adu({1, 3, 0, 0, 0, 1}));
+        stream.room = 0; /* from the second request on it is full at the first byte too */
+    }
+    node.begin(1, other);
+    Serial.reply(adu({1, 3, 2, 0, 9}));
+    assert_int_equal(node.readHoldingRegisters(0, 1), 0);
+    assert_bytes(other.sent, adu({1, 3, 0, 0, 0, 1}));
+}
+
+/* As Arduino's USB port without a host, and SoftwareSerial at a rate it cannot do. */
+class Refusing : public Uncounted {
+public:
+    size_t write(uint8_t) override
+    {
+        setWriteError();
+        return 0;
+    }
+};
+
+static void a_stream_that_sets_its_write_error_took_nothing(void **)
+{
+    Refusing stream;
+    ModbusMaster node;
+    node.begin(1, stream);
+    node.setResponseTimeout(100);
+    assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBLineBusy);
+}
+
+int main()
+{
+    const struct CMUnitTest tests[] = {
+        TEST(crc16_update_computes_the_crc_of_a_frame),
+        TEST(the_helpers_split_and_join_words),
+        TEST(members_have_the_originals_types),
+        TEST(the_debug_pins_show_reads_and_idle_calls),
+        TEST(a_stream_that_counts_no_bytes_sends_each_request_once),
+        TEST(a_full_buffer_is_told_from_a_stream_that_counts_no_bytes),
+        TEST(a_stream_that_sets_its_write_error_took_nothing),
+    };
+
+    return cmocka_run_group_tests_name("class of the original", tests, nullptr, nullptr);
+}

@@ -1,0 +1,30 @@
+/**
+ * @file crc16.h
+ * @brief crc16_update, for sketches that include util/crc16.h for it.
+ *
+ * Licence: MIT OR Apache-2.0. avr-libc has a header of this name; where there is one,
+ * this header includes it too. Its guard is _UTIL_CRC16_H_, which is not taken here.
+ */
+
+#ifndef MODBUSMASTER_UTIL_CRC16_H
+#define MODBUSMASTER_UTIL_CRC16_H
+
+// So that a pedantic compiler does not warn of include_next.
+#if defined(__GNUC__)
+#pragma GCC system_header
+#endif
+
+#if defined(__AVR__)
+#include_next <util/crc16.h>
+#elif defined(__has_include_next)
+#if __has_include_next(<util/crc16.h>)
+#include_next <util/crc16.h>
+#endif
+#endif
+
+// A C file of another library may mean the header of avr-libc.
+#if defined(__cplusplus)
+#include "../ModbusMasterHelpers.h"
+#endif
+
+#endif
