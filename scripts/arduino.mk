@@ -19,6 +19,12 @@ need-avr:
 	@scripts/need gcc libc6-dev arduino-builder arduino-core-avr arduino-ctags gcc-avr avr-libc binutils-avr \
 	    libsimavr-dev libelf-dev pkg-config libmodbus-dev libcmocka-dev
 
+# Not part of `make test`: the sketches are other people's, and so is that library.
+.PHONY: check-sketches
+check-sketches: need-avr library ## Sketches in the folder SKETCHES against the library in MODBUSMASTER and mbm
+	@scripts/need g++
+	@scripts/check-sketches "$(MODBUSMASTER)" "$(SKETCHES)" docs/reports/sketches.md
+
 # --- sketches, each for the boards that a test runs it on
 
 AVR_OUT := $(BUILD)/avr
