@@ -118,6 +118,17 @@ static void the_largest_chips_of_the_unos_instructions_read_and_write(void **sta
     }
 }
 
+static void chips_with_one_uart_have_the_bus_on_it(void **state)
+{
+    static const kind *const chips[] = {&atmega328, &atmega644};
+
+    (void)state;
+    for (unsigned i = 0; i < sizeof chips / sizeof chips[0]; i++) {
+        first_read(chips[i]);
+        write_and_read_back(chips[i]);
+    }
+}
+
 /* The driver-enable pin, and the server behind it. */
 typedef struct driver {
     server peer;
@@ -474,6 +485,7 @@ int main(void)
         cmocka_unit_test(first_read_says_that_nobody_answers),
         cmocka_unit_test(write_and_read_back_writes_to_the_server),
         cmocka_unit_test(the_largest_chips_of_the_unos_instructions_read_and_write),
+        cmocka_unit_test(chips_with_one_uart_have_the_bus_on_it),
         cmocka_unit_test(the_driver_is_on_from_the_first_to_the_last_bit),
         cmocka_unit_test(several_slaves_are_told_apart),
         cmocka_unit_test(without_waiting_the_led_blinks_on),
