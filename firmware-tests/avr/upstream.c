@@ -10,7 +10,7 @@
 #include <string.h>
 
 static const kind *const boards[] = {&uno, &mega, &atmega1284p};
-enum { BOARDS = sizeof boards / sizeof boards[0], ROUND = 13, EVERYTHING = 30000 };
+enum { BOARDS = COUNT(boards), ROUND = 13, EVERYTHING = 30000 };
 
 /* A server that has every address which the examples use, and what the board sent. */
 typedef struct device {
