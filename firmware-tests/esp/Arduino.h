@@ -107,6 +107,9 @@ public:
     virtual size_t write(uint8_t value) = 0;
     virtual size_t write(const uint8_t *bytes, size_t length);
     size_t write(const char *text);
+    int getWriteError();
+    void clearWriteError();
+    virtual int availableForWrite();
     size_t printf(const char *format, ...);
 #define MBM_PRINT(name)                                                                            \
     size_t name(const __FlashStringHelper *text);                                                  \
