@@ -19,6 +19,12 @@ need-avr:
 	@scripts/need gcc libc6-dev arduino-builder arduino-core-avr arduino-ctags gcc-avr avr-libc binutils-avr \
 	    libsimavr-dev libelf-dev pkg-config libmodbus-dev libcmocka-dev
 
+# Not part of `make test`: the sketches are other people's, and so is that library.
+.PHONY: check-sketches
+check-sketches: need-avr library ## Sketches in the folder SKETCHES against the library in MODBUSMASTER and mbm
+	@scripts/need g++
+	@scripts/check-sketches "$(MODBUSMASTER)" "$(SKETCHES)" docs/reports/sketches.md
+
 # --- sketches, each for the boards that a test runs it on
 
 AVR_OUT := $(BUILD)/avr
@@ -33,8 +39,8 @@ AVR_ELFS := $(EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(EXAMPLES:%=$(AVR_OUT)/mega/%.el
 # What it takes with the small library.
 MINIMAL_ELFS := $(patsubst %,$(AVR_OUT)/uno-minimal/%.elf,SizeFC03 Basic PhoenixContact Probe \
                 ServeSensorAndRelay)
-# Other chips of the set avr5 that the simulator knows.
-CHIPS := mega1280 atmega644p atmega1284p
+# Other chips of the set avr5 that the simulator knows: some with two UARTs, some with one.
+CHIPS := mega1280 atmega644p atmega1284p atmega328 atmega644
 CHIP_ELFS := $(foreach chip,$(CHIPS),$(patsubst %,$(AVR_OUT)/$(chip)/%.elf,FirstRead WriteAndReadBack))
 # What waits for 125 registers.
 WIDE_ELFS := $(AVR_OUT)/uno-125/TimeWait.elf
@@ -44,10 +50,13 @@ PEER_ELFS := $(if $(MODBUSMASTER),$(patsubst %,$(AVR_OUT)/uno-peer/%.elf,TimeRea
 # The library as it was when a sketch was last compiled against it.
 DIST_STAMP := $(BUILD)/avr/library
 
-.PHONY: avr-sketches
-avr-sketches: library
+.PHONY: library-stamp
+library-stamp: library
 	@mkdir -p $(AVR_OUT)
 	@cat dist/*.zip dist/minimal/*.zip | cmp -s - $(DIST_STAMP) || cat dist/*.zip dist/minimal/*.zip >$(DIST_STAMP)
+
+.PHONY: avr-sketches
+avr-sketches: library-stamp
 	@$(MAKE) -s --no-print-directory $(BARE) $(AVR_ELFS) $(MINIMAL_ELFS) $(CHIP_ELFS) $(WIDE_ELFS) $(PEER_ELFS)
 
 # The examples are part of the library, from where they are compiled.
@@ -67,6 +76,15 @@ $(eval $(call sketches,uno-minimal))
 $(eval $(call sketches,uno-125))
 $(eval $(call sketches,uno-peer))
 $(PEER_ELFS): $(wildcard $(MODBUSMASTER)/src/*)
+
+# The examples of ModbusMaster itself, in the folder SKETCHES.
+UPSTREAM := $(patsubst %,upstream-%,basic-2 phoenix-2 halfduplex-2 basic-09 phoenix-09)
+UPSTREAM_BOARDS := uno mega atmega1284p
+define upstream
+$(AVR_OUT)/$(1)/upstream-%.elf: $(SKETCHES)/upstream-% scripts/sketch $(DIST_STAMP)
+	@scripts/sketch $(1) $$< $$@
+endef
+$(foreach board,$(UPSTREAM_BOARDS),$(eval $(call upstream,$(board))))
 
 # The code for avrxmega3 in a program for another chip: no simulator has one of its own.
 BARE := $(AVR_OUT)/avrxmega3/Bare.elf
@@ -103,6 +121,14 @@ firmware-test-avr: need-avr
 	@$(MAKE) -s --no-print-directory avr-sketches avr-tests
 	@MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/run-c-tests $(AVR_TESTS)
 
+UPSTREAM_TEST := $(BUILD)/avr-tests/upstream
+$(UPSTREAM_TEST): $(BUILD)/avr-tests/upstream.o $(AVR_SUPPORT)
+	@gcc $^ -lsimavr -lelf -lmodbus -lcmocka -lpthread -o $@
+.PHONY: firmware-test-upstream
+firmware-test-upstream: need-avr library-stamp ## The examples of ModbusMaster, in the folder SKETCHES, on simulated boards
+	@$(MAKE) -s --no-print-directory $(UPSTREAM_TEST) \
+		$(foreach board,$(UPSTREAM_BOARDS),$(UPSTREAM:%=$(AVR_OUT)/$(board)/%.elf))
+	@MBM_TEST_SECONDS=1200 scripts/run-c-tests $(UPSTREAM_TEST)
 
 .PHONY: timing
 timing: need-avr ## Measure bus timing, RAM and flash on a simulated Uno; writes docs/reports/timing.md

@@ -10,6 +10,8 @@ const kind mega = {"mega", "atmega2560", '1', {'B', 7}, {'E', 4}, {'G', 5}};
 const kind older_mega = {"mega1280", "atmega1280", '1', {'B', 7}, {'E', 4}, {'G', 5}};
 const kind atmega644p = {"atmega644p", "atmega644p", '1', {'B', 5}, {'D', 2}, {'D', 4}};
 const kind atmega1284p = {"atmega1284p", "atmega1284p", '1', {'B', 5}, {'D', 2}, {'D', 4}};
+const kind atmega328 = {"atmega328", "atmega328", '0', {'B', 5}, {'D', 2}, {'D', 4}};
+const kind atmega644 = {"atmega644", "atmega644", '0', {'B', 5}, {'D', 2}, {'D', 4}};
 
 board *kind_start(const kind *k, const char *sketch)
 {

@@ -17,6 +17,7 @@ typedef struct kind {
 } kind;
 
 extern const kind uno, minimal, mega, older_mega, atmega644p, atmega1284p;
+extern const kind atmega328, atmega644; /* with one UART */
 
 /* Starts a board of this kind with a sketch. */
 board *kind_start(const kind *k, const char *sketch);

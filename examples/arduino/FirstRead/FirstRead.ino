@@ -2,7 +2,7 @@
 // that works. Where the board has a second UART, the values are printed.
 #include <ModbusMaster.h>
 
-#if defined(__AVR_ATmega328P__) || defined(__AVR_ATmega168__) || defined(ESP8266)
+#if (defined(__AVR__) && !defined(UBRR1H) && !defined(USART1)) || defined(ESP8266)
 #define BUS Serial // the only UART: take the bus off it to upload
 #else
 #define BUS Serial1 // Serial stays free for messages
