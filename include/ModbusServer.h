@@ -138,6 +138,7 @@ public:
 
 private:
     friend class ModbusServer;
+    template <typename Listener, uint8_t Connections> friend class ModbusTcpServer;
 
     mbm_unit unit;
 };

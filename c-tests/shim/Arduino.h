@@ -3,7 +3,9 @@
 #ifndef SHIM_ARDUINO_H
 #define SHIM_ARDUINO_H
 
+#include "Print.h"
 #include "bench.h"
+#include "pins.h"
 
 #include <deque>
 #include <stddef.h>
@@ -15,10 +17,6 @@
 #ifndef SHIM_UARTS
 #define SHIM_UARTS 4
 #endif
-
-/* Texts that an AVR keeps in flash. */
-class __FlashStringHelper;
-#define F(text) (reinterpret_cast<const __FlashStringHelper *>(text))
 
 inline unsigned long micros()
 {
@@ -33,21 +31,13 @@ inline void yield()
     bench().yields++;
 }
 
-class Stream {
+class Stream : public Print {
 public:
-    virtual ~Stream() {}
+    using Print::write;
     virtual int available() = 0;
     virtual int read() = 0;
     virtual int peek() = 0;
-    virtual size_t write(uint8_t value) = 0;
     virtual void flush() {}
-    virtual size_t write(const uint8_t *bytes, size_t length)
-    {
-        size_t count = 0;
-        while (count < length && write(bytes[count]) == 1)
-            count++;
-        return count;
-    }
 };
 
 /* A UART whose far end a test scripts: each flush releases the next reply. */

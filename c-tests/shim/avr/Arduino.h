@@ -15,11 +15,25 @@ unsigned long micros();
 unsigned long millis();
 void yield();
 
-class Stream {
+#define DEC 10
+#define HEX 16
+
+class Print {
+public:
+    virtual size_t write(const uint8_t *bytes, size_t length) = 0;
+    size_t print(const __FlashStringHelper *text);
+    size_t print(char value);
+    size_t print(unsigned char value, int base = DEC);
+    size_t print(int value, int base = DEC);
+    size_t print(unsigned value, int base = DEC);
+    size_t print(unsigned long value, int base = DEC);
+    size_t println();
+};
+
+class Stream : public Print {
 public:
     virtual int available() = 0;
     virtual int read() = 0;
-    virtual size_t write(const uint8_t *bytes, size_t length) = 0;
     virtual void flush() = 0;
 };
 
