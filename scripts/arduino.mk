@@ -23,11 +23,14 @@ need-avr:
 
 AVR_OUT := $(BUILD)/avr
 EXAMPLES := $(notdir $(wildcard examples/arduino/*))
+# These want more flash or RAM than an Uno or a Leonardo has.
+LARGE_EXAMPLES := Sniffer TcpToRtuGateway
+SMALL_EXAMPLES := $(filter-out $(LARGE_EXAMPLES),$(EXAMPLES))
 # These want more than one port.
 MEGA_SKETCHES := TwoPorts OlderCalls
 TEST_SKETCHES := $(notdir $(wildcard firmware-tests/avr/sketches/*))
-AVR_ELFS := $(EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(EXAMPLES:%=$(AVR_OUT)/mega/%.elf) \
-            $(EXAMPLES:%=$(AVR_OUT)/leonardo/%.elf) \
+AVR_ELFS := $(SMALL_EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(EXAMPLES:%=$(AVR_OUT)/mega/%.elf) \
+            $(SMALL_EXAMPLES:%=$(AVR_OUT)/leonardo/%.elf) \
             $(patsubst %,$(AVR_OUT)/uno/%.elf,$(filter-out $(MEGA_SKETCHES),$(TEST_SKETCHES))) \
             $(MEGA_SKETCHES:%=$(AVR_OUT)/mega/%.elf)
 # What it takes with the small library.

@@ -1,0 +1,53 @@
+/* The classes of the Ethernet library, 2.0.0 and later, as far as the examples use them: a
+ * simulated board has no network. The bytes of a connection pass through two functions
+ * that a test may watch; a compiler cannot leave them out. */
+#ifndef STANDIN_ETHERNET_H
+#define STANDIN_ETHERNET_H
+
+#include <Client.h>
+#include <IPAddress.h>
+#include <Server.h>
+
+class EthernetClient : public Client {
+public:
+    EthernetClient() : socket(8) {}
+    int connect(IPAddress ip, uint16_t port) override;
+    int connect(const char *host, uint16_t port) override;
+    size_t write(uint8_t value) override;
+    size_t write(const uint8_t *bytes, size_t length) override;
+    int available() override;
+    int read() override;
+    int read(uint8_t *bytes, size_t length) override;
+    int peek() override;
+    void flush() override;
+    void stop() override;
+    uint8_t connected() override;
+    operator bool() override { return socket < 8; }
+    bool operator==(const EthernetClient &other) { return socket == other.socket; }
+
+private:
+    friend class EthernetServer;
+    uint8_t socket;
+};
+
+class EthernetServer : public Server {
+public:
+    explicit EthernetServer(uint16_t number) : port(number) {}
+    void begin() override;
+    EthernetClient accept();
+    EthernetClient available() { return accept(); }
+    size_t write(uint8_t value) override;
+    using Print::write;
+
+private:
+    uint16_t port;
+};
+
+class EthernetClass {
+public:
+    void begin(uint8_t *mac, IPAddress ip);
+};
+
+extern EthernetClass Ethernet;
+
+#endif
