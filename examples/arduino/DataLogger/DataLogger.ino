@@ -1,6 +1,6 @@
-// Logs a sensor without delay: asks for it ten times a second, and once a second stores
-// the mean of what came. The last 30 means stay in RAM;
-// where a second UART is free, each is printed too. What failed is counted.
+// Logs a sensor without delay: asks it ten times a second, and once a second stores the
+// mean of its replies. The last 30 means stay in RAM; where a second UART is free, each
+// is printed too, as seconds, mean, replies and failures.
 #include <ModbusClient.h>
 
 #if defined(__AVR_ATmega328P__) || defined(__AVR_ATmega168__) || defined(ESP8266)
@@ -10,7 +10,7 @@
 #define MESSAGES
 #endif
 
-const uint8_t led = 13; // changes with each entry
+const uint8_t led = 13; // on while the last mean is above that of all that are kept
 const uint16_t sensorAt = 2;
 
 struct Entry {
@@ -20,20 +20,30 @@ struct Entry {
 };
 
 Entry entries[30];
-uint8_t next;
+uint8_t next, kept;
 uint32_t sum;
 uint8_t readings, failures;
 
 ModbusSerialClient client;
 ModbusRequestOf<1> sensor(1);
 
+uint16_t meanOfAll() {
+  uint32_t all = 0;
+  for (uint8_t i = 0; i < kept; i++)
+    all += entries[i].mean;
+  return kept > 0 ? all / kept : 0;
+}
+
 void store(unsigned long now) {
+  const uint8_t size = sizeof entries / sizeof entries[0];
   Entry &entry = entries[next];
-  next = (next + 1) % (sizeof entries / sizeof entries[0]);
+  next = (next + 1) % size;
+  if (kept < size)
+    kept++;
   entry.seconds = now / 1000;
   entry.mean = readings > 0 ? sum / readings : 0;
   entry.readings = readings;
-  digitalWrite(led, !digitalRead(led));
+  digitalWrite(led, entry.mean > meanOfAll());
 #if defined(MESSAGES)
   Serial.print(entry.seconds);
   Serial.print(',');

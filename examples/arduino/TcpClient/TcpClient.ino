@@ -4,7 +4,7 @@
 #include <Ethernet.h>
 #include <ModbusClient.h>
 
-byte mac[] = {0x02, 0xAB, 0xCD, 0x12, 0x34, 0x56};
+uint8_t mac[] = {0x02, 0xAB, 0xCD, 0x12, 0x34, 0x56};
 const IPAddress own(192, 168, 1, 50);
 const IPAddress device(192, 168, 1, 20);
 const uint8_t unit = 255; // the device itself, not one behind a gateway

@@ -4,7 +4,7 @@
 #include <Ethernet.h>
 #include <ModbusTcpServer.h>
 
-byte mac[] = {0x02, 0xAB, 0xCD, 0x12, 0x34, 0x57};
+uint8_t mac[] = {0x02, 0xAB, 0xCD, 0x12, 0x34, 0x57};
 const IPAddress own(192, 168, 1, 51);
 const uint8_t relayPin = 4;
 
