@@ -306,11 +306,10 @@ static void a_seventeenth_request_finds_the_queue_full(void **)
 {
     ModbusSerialClient client;
     uint16_t words[17] = {};
-    ModbusRequest requests[17] = {{1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1},
-                                  {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1},
-                                  {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1},
-                                  {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1},
-                                  {1, words, 1}};
+    ModbusRequest requests[17] = {
+        {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1},
+        {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1},
+        {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1}};
     client.begin(Serial, 19200);
     for (unsigned i = 0; i < 16; i++)
         assert_int_equal(client.readCoils(requests[i], 0, 1), MBM_PENDING);

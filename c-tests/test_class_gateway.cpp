@@ -86,8 +86,8 @@ static int passes(modbus_t *peer, int (*work)(modbus_t *))
     Task task = {peer, work, -2, 0};
     pthread_t thread;
     assert_int_equal(pthread_create(&thread, nullptr, run, &task), 0);
-    AWAIT((assert_int_equal(gateway->poll(), MBM_OK),
-           __atomic_load_n(&task.over, __ATOMIC_SEQ_CST)));
+    AWAIT(
+        (assert_int_equal(gateway->poll(), MBM_OK), __atomic_load_n(&task.over, __ATOMIC_SEQ_CST)));
     pthread_join(thread, nullptr);
     return task.result;
 }

@@ -39,7 +39,8 @@ static void *run(void *argument)
     return nullptr;
 }
 
-template <typename Server> static int serves(Server &server, modbus_t *peer, int (*work)(modbus_t *))
+template <typename Server>
+static int serves(Server &server, modbus_t *peer, int (*work)(modbus_t *))
 {
     Task task = {peer, work, -2, pthread_t(), 0};
     assert_int_equal(pthread_create(&task.thread, nullptr, run, &task), 0);
@@ -101,12 +102,12 @@ template <typename Listener> static void each_function_is_served()
                             }),
                      3);
     assert_int_equal(holding[2], 3);
-    assert_int_equal(serves(server, peer,
-                            [](modbus_t *p) { return modbus_mask_write_register(p, 5, 0xF0, 5); }),
-                     1);
-    assert_int_equal(holding[5], (77 & 0xF0) | 5);
     assert_int_equal(
-        serves(server, peer, [](modbus_t *p) { return modbus_write_bit(p, 3, 1); }), 1);
+        serves(server, peer, [](modbus_t *p) { return modbus_mask_write_register(p, 5, 0xF0, 5); }),
+        1);
+    assert_int_equal(holding[5], (77 & 0xF0) | 5);
+    assert_int_equal(serves(server, peer, [](modbus_t *p) { return modbus_write_bit(p, 3, 1); }),
+                     1);
     assert_true(coils[3] && coils[1] && !coils[2]);
     assert_int_equal(serves(server, peer,
                             [](modbus_t *p) {

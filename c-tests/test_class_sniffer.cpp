@@ -101,8 +101,8 @@ static void exceptions_and_silent_units_are_printed(void **)
     prints(sniffer, paper, adu({17, 6, 0, 1, 0, 1}));
     paper.text.clear();
     loops(sniffer, 250);
-    assert_non_null(strstr(paper.text.c_str(),
-                           " ms unit 17 no reply 06 write single register 1 (200 ms)\r\n"));
+    assert_non_null(
+        strstr(paper.text.c_str(), " ms unit 17 no reply 06 write single register 1 (200 ms)\r\n"));
 }
 
 static void damage_and_noise_are_printed_as_bytes(void **)

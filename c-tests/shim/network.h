@@ -136,10 +136,7 @@ public:
 
 protected:
     /* Each connection once. */
-    int take()
-    {
-        return accept4(listener, nullptr, nullptr, SOCK_CLOEXEC);
-    }
+    int take() { return accept4(listener, nullptr, nullptr, SOCK_CLOEXEC); }
     /* Any connection from which bytes wait. */
     template <typename Link> Link speaking(std::vector<Link> &links)
     {

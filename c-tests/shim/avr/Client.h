@@ -3,12 +3,12 @@
 #define SHIM_AVR_CLIENT_H
 
 #include "Arduino.h"
-
-class IPAddress;
+#include "IPAddress.h"
 
 class Client : public Stream {
 public:
     using Stream::read;
+    using Stream::write;
     virtual int connect(IPAddress ip, uint16_t port) = 0;
     virtual int connect(const char *host, uint16_t port) = 0;
     virtual int read(uint8_t *bytes, size_t length) = 0;
