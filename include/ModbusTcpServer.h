@@ -24,7 +24,7 @@
  * program:
  * - MODBUSSERVER_CONNECTIONS  how many connections a server keeps where its template
  *   argument does not say so, 1 to 16; 4, on AVR boards of at most 2.5 KB of RAM 2. Each
- *   takes a frame buffer of 260 bytes and about 75 more on AVR, 110 elsewhere.
+ *   takes a frame buffer of 260 bytes and about 80 more on AVR, 105 elsewhere.
  * - MODBUSSERVER_IDLE_MS  milliseconds without a request after which a connection may be
  *   closed for another client; 60000.
  */
