@@ -346,6 +346,33 @@ static void units_are_counted_and_left_alone_for_as_long_as_set(void **)
     assert_int_equal(counters.exceptions, 1);
 }
 
+/* As some variants of SoftwareSerial. */
+class Silent : public HardwareSerial {
+public:
+    size_t write(uint8_t value) override
+    {
+        HardwareSerial::write(value);
+        return 0;
+    }
+    size_t write(const uint8_t *bytes, size_t length) override
+    {
+        return length > 0 ? write(bytes[0]) : 0;
+    }
+};
+
+static void a_stream_that_returns_0_for_what_it_sends_works(void **)
+{
+    ModbusSerialClient client;
+    ModbusRequestOf<1> request(17);
+    Silent port;
+    client.begin(port, 19200);
+    port.reply(adu({17, 3, 2, 0, 5}));
+    client.readHoldingRegisters(request, 0, 1);
+    ends(client);
+    assert_sent(port, {17, 3, 0, 0, 0, 1});
+    assert_int_equal(request.status(), MBM_OK);
+}
+
 static void a_sketch_may_sleep_until_the_next_poll_is_due(void **)
 {
     ModbusSerialClient client;
@@ -380,6 +407,7 @@ int main()
         TEST(a_broadcast_is_not_answered),
         TEST(a_seventeenth_request_finds_the_queue_full),
         TEST(units_are_counted_and_left_alone_for_as_long_as_set),
+        TEST(a_stream_that_returns_0_for_what_it_sends_works),
         TEST(a_sketch_may_sleep_until_the_next_poll_is_due),
     };
     return cmocka_run_group_tests_name("class of a client", tests, nullptr, nullptr);

@@ -62,7 +62,10 @@
 #endif
 /** @endcond */
 
-/** A client of one serial line, in RTU or ASCII frames; one request at a time is under way. */
+/**
+ * A client of one serial line, in RTU or ASCII frames; one request at a time is under way.
+ * While a request leaves, poll waits for the Stream's flush: until its last bit has left.
+ */
 class ModbusSerialClient : public ModbusClient {
 public:
     /** Touches neither clock nor port. */
@@ -182,7 +185,11 @@ private:
     }
     static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
     {
-        return static_cast<int16_t>(of(context).stream->write(bytes, length));
+        // One by one, whatever it returns: some Streams return 0 for a byte that they send.
+        Stream &line = *of(context).stream;
+        for (uint16_t i = 0; i < length; i++)
+            line.write(bytes[i]);
+        return static_cast<int16_t>(length);
     }
     static uint8_t flushHook(void *context)
     {
