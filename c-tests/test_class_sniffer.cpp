@@ -93,7 +93,9 @@ static void exceptions_and_silent_units_are_printed(void **)
     Listening l;
     ModbusSniffer &sniffer = l.sniffer;
     Paper &paper = l.paper;
-    sniffer.setTimeout(200);
+    assert_int_equal(sniffer.setResponseTimeout(200), MBM_OK);
+    assert_int_equal(sniffer.setFrameTimeout(0), MBM_INVALID_ARGUMENT);
+    assert_int_equal(sniffer.setFrameTimeout(50), MBM_OK);
     prints(sniffer, paper, adu({17, 3, 0, 107, 0, 3}));
     std::string text = prints(sniffer, paper, adu({17, 0x83, 2}));
     const char exception[] = "unit 17 exception 03 read holding registers 107..109: code 02 (";

@@ -82,9 +82,12 @@ public:
     void onEvent(void (*function)(const mbm_event &)) { callback.set(function); }
 
     /** Milliseconds after which a request counts as unanswered, 1 to 65535; 1000 at first. */
-    uint8_t setTimeout(uint16_t ms) { return mbm_sniffer_setTimeout(&sniffer, ms); }
-    /** Milliseconds that the rest of a frame may take, 1 to 65535; see mbm_sniffer_setPatience. */
-    uint8_t setPatience(uint16_t ms) { return mbm_sniffer_setPatience(&sniffer, ms); }
+    uint8_t setResponseTimeout(uint16_t ms)
+    {
+        return mbm_sniffer_setTimeout(&sniffer, ms);
+    }
+    /** Milliseconds that the rest of a frame may take, 1 to 65535; 50 in RTU, 1000 in ASCII at first. */
+    uint8_t setFrameTimeout(uint16_t ms) { return mbm_sniffer_setPatience(&sniffer, ms); }
 
     /**
      * Takes the bytes that have arrived, and prints and hands over what is known by now.
