@@ -54,7 +54,7 @@ avr-sketches: library
 	@$(MAKE) -s --no-print-directory $(BARE) $(AVR_ELFS) $(MINIMAL_ELFS) $(CHIP_ELFS) $(WIDE_ELFS) $(PEER_ELFS)
 
 # The examples are part of the library, from where they are compiled.
-SKETCH_SOURCES := scripts/sketch $(wildcard firmware-tests/avr/sketches/*/*.ino)
+SKETCH_SOURCES := scripts/sketch $(wildcard firmware-tests/avr/sketches/*/*.ino firmware-tests/avr/libraries/*/src/*)
 define sketches
 $(AVR_OUT)/$(1)/%.elf: examples/arduino/%/ $(SKETCH_SOURCES) $(DIST_STAMP)
 	@scripts/sketch $(1) dist/mbm/examples/$$* $$@
@@ -80,7 +80,7 @@ $(BARE): firmware-tests/avr/bare/bare.c $(BUILD)/assembler/mbm_avrxmega3.S inclu
 
 # --- the programs that run them
 
-AVR_SUPPORT := $(patsubst %,$(BUILD)/avr-tests/%.o,board bus kind peer server pty)
+AVR_SUPPORT := $(patsubst %,$(BUILD)/avr-tests/%.o,board bus kind peer server pty tcp_server)
 AVR_TESTS := $(patsubst firmware-tests/avr/%.c,$(BUILD)/avr-tests/%,$(wildcard firmware-tests/avr/test_*.c))
 AVR_FLAGS = -std=c11 -O2 -g $(WARNINGS) -Ifirmware-tests/avr -Ic-tests/support -Iinclude -isystem /usr/include/simavr $(MODBUS)
 AVR_HEADERS := $(wildcard firmware-tests/avr/*.h c-tests/support/*.h)

@@ -203,23 +203,6 @@ static void sniffer_prints_a_request_and_its_reply(void **state)
     board_free(b);
 }
 
-/* The stand-in for the network library connects nothing. */
-static void without_a_network_the_tcp_sketches_run_on(void **state)
-{
-    static const char *const names[] = {"TcpClient", "TcpServer"};
-
-    (void)state;
-    for (unsigned i = 0; i < 2; i++) {
-        board *b = kind_start(&uno, names[i]);
-        uint64_t begun = board_cycle(b);
-
-        assert_true(board_run(b, 300 * MS));
-        assert_true(board_cycle(b) - begun >= 300 * MS);
-        assert_false(is_high(b, uno.led));
-        board_free(b);
-    }
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -227,7 +210,6 @@ int main(void)
         cmocka_unit_test(a_logger_stores_a_mean_each_second),
         cmocka_unit_test(a_logger_counts_what_failed_and_keeps_its_time),
         cmocka_unit_test(sniffer_prints_a_request_and_its_reply),
-        cmocka_unit_test(without_a_network_the_tcp_sketches_run_on),
     };
 
     return cmocka_run_group_tests_name("sketches of the client's class", tests, NULL, NULL);

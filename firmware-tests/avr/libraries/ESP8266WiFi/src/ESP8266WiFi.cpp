@@ -1,23 +1,23 @@
 #include "ESP8266WiFi.h"
 
-/* The state of eight sockets, which nothing here opens. */
-static volatile uint8_t open_sockets;
-static volatile uint8_t wire;
+#include <Arduino.h>
+
+#define NETWORK Serial1
+static bool is_waiting; /* a client that the listener has not handed over */
+static bool is_open;
 
 WiFiClass WiFi;
 
-void WiFiClass::begin(const char *name, const char *)
-{
-    wire = static_cast<uint8_t>(name[0]);
-}
-
 int WiFiClient::connect(IPAddress, uint16_t)
 {
-    return open_sockets & 1;
+    return connect("", 0);
 }
 int WiFiClient::connect(const char *, uint16_t)
 {
-    return open_sockets & 1;
+    NETWORK.begin(115200);
+    is_open = true;
+    socket = 0;
+    return 1;
 }
 size_t WiFiClient::write(uint8_t value)
 {
@@ -25,51 +25,55 @@ size_t WiFiClient::write(uint8_t value)
 }
 size_t WiFiClient::write(const uint8_t *bytes, size_t length)
 {
-    for (size_t i = 0; i < length; i++)
-        wire = bytes[i];
-    return length;
+    return connected() ? NETWORK.write(bytes, length) : 0;
 }
 int WiFiClient::available()
 {
-    return connected() ? wire : 0;
+    return connected() ? NETWORK.available() : 0;
 }
 int WiFiClient::read()
 {
-    return connected() ? wire : -1;
+    return connected() ? NETWORK.read() : -1;
 }
 int WiFiClient::read(uint8_t *bytes, size_t length)
 {
-    for (size_t i = 0; i < length; i++)
-        bytes[i] = wire;
-    return static_cast<int>(length);
+    size_t count = 0;
+    while (count < length && available() > 0)
+        bytes[count++] = static_cast<uint8_t>(read());
+    return count > 0 ? static_cast<int>(count) : -1;
 }
 int WiFiClient::peek()
 {
-    return read();
+    return connected() ? NETWORK.peek() : -1;
 }
 void WiFiClient::flush() {}
 void WiFiClient::stop()
 {
-    socket = 8;
+    if (connected())
+        is_open = false;
+    socket = none;
 }
 uint8_t WiFiClient::connected()
 {
-    return socket < 8 && (open_sockets >> socket & 1);
+    return socket != none && is_open;
 }
 
 void WiFiServer::begin()
 {
-    wire = static_cast<uint8_t>(port);
+    NETWORK.begin(115200);
+    is_waiting = true;
 }
 WiFiClient WiFiServer::accept()
 {
     WiFiClient client;
-    if (open_sockets & 1)
+    if (is_waiting) {
+        is_waiting = false;
+        is_open = true;
         client.socket = 0;
+    }
     return client;
 }
 size_t WiFiServer::write(uint8_t value)
 {
-    wire = value;
-    return 1;
+    return NETWORK.write(value);
 }

@@ -1,6 +1,6 @@
-/* The classes of the Ethernet library, 2.0.0 and later, as far as the examples use them: a
- * simulated board has no network. The bytes of a connection pass through two functions
- * that a test may watch; a compiler cannot leave them out. */
+/* The classes of the Ethernet library, 2.0.0 and later, as far as the examples use them. The
+ * network of a simulated board is a UART, Serial: it carries the bytes of one
+ * connection, with 115200 baud, and a test has sockets at its far end. */
 #ifndef STANDIN_ETHERNET_H
 #define STANDIN_ETHERNET_H
 
@@ -10,7 +10,7 @@
 
 class EthernetClient : public Client {
 public:
-    EthernetClient() : socket(8) {}
+    EthernetClient() : socket(none) {}
     int connect(IPAddress ip, uint16_t port) override;
     int connect(const char *host, uint16_t port) override;
     size_t write(uint8_t value) override;
@@ -22,30 +22,28 @@ public:
     void flush() override;
     void stop() override;
     uint8_t connected() override;
-    operator bool() override { return socket < 8; }
+    operator bool() override { return socket != none; }
     bool operator==(const EthernetClient &other) { return socket == other.socket; }
 
 private:
     friend class EthernetServer;
+    enum : uint8_t { none = 8 };
     uint8_t socket;
 };
 
 class EthernetServer : public Server {
 public:
-    explicit EthernetServer(uint16_t number) : port(number) {}
+    explicit EthernetServer(uint16_t) {}
     void begin() override;
     EthernetClient accept();
     EthernetClient available() { return accept(); }
     size_t write(uint8_t value) override;
     using Print::write;
-
-private:
-    uint16_t port;
 };
 
 class EthernetClass {
 public:
-    void begin(uint8_t *mac, IPAddress ip);
+    void begin(uint8_t *, IPAddress) {}
 };
 
 extern EthernetClass Ethernet;
