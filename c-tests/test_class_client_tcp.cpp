@@ -169,13 +169,14 @@ static void replies_in_any_order_find_their_requests(void **)
 {
     tcp_peer *faulty = tcp_peer_new();
     ModbusRequestOf<1> late(7), early(7);
-    tcp_peer_fault(faulty, 11, FAULT_DELAY, 100);
+    tcp_peer_fault(faulty, 1, FAULT_DELAY, 300);
     networkPort(502) = tcp_peer_start(faulty, 0);
     client->connect(device);
     client->readHoldingRegisters(late, 11, 1);
     client->readHoldingRegisters(early, 12, 1);
     AWAIT((client->poll(), !early.pending()));
     assert_int_equal(early.status(), MBM_OK);
+    assert_true(late.pending());
     ends();
     assert_int_equal(late.status(), MBM_OK);
     assert_int_equal(early[0], tcp_peer_word(12));
@@ -188,7 +189,7 @@ static void poll_never_waits_for_a_device(void **)
 {
     tcp_peer *faulty = tcp_peer_new();
     ModbusRequestOf<1> request(7);
-    tcp_peer_fault(faulty, 11, FAULT_DELAY, 300);
+    tcp_peer_fault(faulty, 1, FAULT_DELAY, 300);
     networkPort(502) = tcp_peer_start(faulty, 0);
     client->connect(device);
     client->readHoldingRegisters(request, 11, 1);
