@@ -230,6 +230,9 @@ $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS)))
 COUNTERS := --coverage -Wl$(comma)-u$(comma)__llvm_profile_runtime -Wl$(comma)--defsym$(comma)rust_eh_personality=0
 $(eval $(call variant,coverage,gcc,g++,$(COUNTERS),$(BUILD)/coverage/libmbm.a))
 .SECONDARY:
+# It includes sketches.
+$(BUILD)/plain/test_class_examples.o $(BUILD)/sanitized/test_class_examples.o $(BUILD)/coverage/test_class_examples.o: \
+    $(wildcard examples/arduino/Tcp*/*.ino)
 
 # The programs of the variant `plain`, linked with the code that firmware runs.
 FIRMWARE_TESTS := $(TESTS:%=$(BUILD)/firmware/%)

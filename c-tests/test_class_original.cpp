@@ -66,8 +66,8 @@ static void the_debug_pins_show_reads_and_idle_calls(void **)
     node.idle([] { idles++; });
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(node.readHoldingRegisters(0, 1), 0);
-    assert_true(bench().pins[__MODBUSMASTER_DEBUG_PIN_A__] >= 7);
-    assert_int_equal(bench().pins[__MODBUSMASTER_DEBUG_PIN_B__], idles & 0xFF);
+    assert_true(pins().rises[__MODBUSMASTER_DEBUG_PIN_A__] >= 7);
+    assert_int_equal(pins().rises[__MODBUSMASTER_DEBUG_PIN_B__], idles & 0xFF);
     assert_true(idles > 0);
 }
 

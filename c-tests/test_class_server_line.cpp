@@ -45,6 +45,32 @@ static void a_request_may_pause_for_t15(void **)
     assert_int_equal(registers[0], 0);
 }
 
+/* As some variants of SoftwareSerial. */
+class Silent : public HardwareSerial {
+public:
+    size_t write(uint8_t value) override
+    {
+        HardwareSerial::write(value);
+        return 0;
+    }
+    size_t write(const uint8_t *bytes, size_t length) override
+    {
+        return length > 0 ? write(bytes[0]) : 0;
+    }
+};
+
+static void a_stream_that_returns_0_for_what_it_sends_works(void **)
+{
+    ModbusRegisterArray<1> registers;
+    ModbusServer server;
+    Silent port;
+    server.holdingRegisters(registers);
+    server.begin(17, port, 19200);
+    port.inject(adu({17, 3, 0, 0, 0, 1}));
+    loops(server);
+    assert_sent(port, {17, 3, 2, 0, 0});
+}
+
 static void the_driver_is_off_until_the_silence_has_passed(void **)
 {
     static uint32_t on;
@@ -218,6 +244,7 @@ int main()
     const struct CMUnitTest tests[] = {
         TEST(a_response_begins_after_the_silence),
         TEST(a_request_may_pause_for_t15),
+        TEST(a_stream_that_returns_0_for_what_it_sends_works),
         TEST(the_driver_is_off_until_the_silence_has_passed),
         TEST(a_sketch_may_sleep_for_as_long_as_nothing_is_to_do),
         TEST(the_driver_is_on_while_a_response_leaves),

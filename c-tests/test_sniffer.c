@@ -246,7 +246,7 @@ static void another_delimiter_ends_ascii_frames(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setDelimiter(&sniffer, ':'));
     IS(MBM_INVALID_ARGUMENT, mbm_sniffer_setDelimiter(&sniffer, 0));
     OK(mbm_sniffer_setDelimiter(&sniffer, '!'));
-    hear(frame, size);
+    feed(frame, size);
     assert_next("unit 17  request    07 read exception status");
 }
 

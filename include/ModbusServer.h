@@ -138,6 +138,7 @@ public:
 
 private:
     friend class ModbusServer;
+    template <typename Listener, uint8_t Connections> friend class ModbusTcpServer;
 
     mbm_unit unit;
 };
@@ -355,7 +356,10 @@ private:
             state.ready = false;
             call(state.onPre);
         }
-        return static_cast<int16_t>(state.stream->write(bytes, length));
+        // One by one, whatever it returns: some Streams return 0 for a byte that they send.
+        for (uint16_t i = 0; i < length; i++)
+            state.stream->write(bytes[i]);
+        return static_cast<int16_t>(length);
     }
     static uint32_t clockHook(void *) { return micros() & 0xFFFFFFFFu; }
     static uint8_t flushHook(void *context)

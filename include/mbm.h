@@ -721,7 +721,7 @@ typedef struct mbm_master {
     /**
      * Private.
      */
-    void *pointers[12];
+    void *pointers[13];
     /**
      * Private.
      */
@@ -1160,6 +1160,27 @@ uint8_t mbm_master_setRetries(struct mbm_master *master, uint8_t retries);
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_setEchoDiscard(struct mbm_master *master, uint8_t on);
+
+/**
+ * Accepts replies of devices that deviate from the standard. It has these effects:
+ * - A reply with the right unit, function and CRC is accepted although it repeats another
+ *   address, value or quantity, or carries more or fewer data than were requested. It
+ *   is accepted at the end of the response timeout, if no right reply has come.
+ *   mbm_master_available says how many words came.
+ * - A read of more words than the response words hold succeeds and fills all of them.
+ *   (Such a reply that the frame buffer does not hold must not follow noise directly.)
+ * - Requests that read are sent to unit 0 too, and a reply from unit 0 is accepted.
+ *
+ * Set a short response timeout (mbm_master_setResponseTimeout) if the device deviates in
+ * each reply.
+ *
+ * @param master  the object
+ * @param on      0 (at first) or 1
+ * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED; MBM_BUSY while a request is
+ *         under way
+ */
+uint8_t mbm_master_setLenient(struct mbm_master *master,
+                              uint8_t on);
 
 /**
  * Holds the driver on after the port's flush, for platforms whose flush returns

@@ -29,11 +29,14 @@ check-sketches: need-avr library ## Sketches in the folder SKETCHES against the 
 
 AVR_OUT := $(BUILD)/avr
 EXAMPLES := $(notdir $(wildcard examples/arduino/*))
+# These want more flash or RAM than an Uno or a Leonardo has.
+LARGE_EXAMPLES := Sniffer TcpToRtuGateway
+SMALL_EXAMPLES := $(filter-out $(LARGE_EXAMPLES),$(EXAMPLES))
 # These want more than one port.
 MEGA_SKETCHES := TwoPorts OlderCalls
 TEST_SKETCHES := $(notdir $(wildcard firmware-tests/avr/sketches/*))
-AVR_ELFS := $(EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(EXAMPLES:%=$(AVR_OUT)/mega/%.elf) \
-            $(EXAMPLES:%=$(AVR_OUT)/leonardo/%.elf) \
+AVR_ELFS := $(SMALL_EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(EXAMPLES:%=$(AVR_OUT)/mega/%.elf) \
+            $(SMALL_EXAMPLES:%=$(AVR_OUT)/leonardo/%.elf) \
             $(patsubst %,$(AVR_OUT)/uno/%.elf,$(filter-out $(MEGA_SKETCHES),$(TEST_SKETCHES))) \
             $(MEGA_SKETCHES:%=$(AVR_OUT)/mega/%.elf)
 # What it takes with the small library.
@@ -60,7 +63,7 @@ avr-sketches: library-stamp
 	@$(MAKE) -s --no-print-directory $(BARE) $(AVR_ELFS) $(MINIMAL_ELFS) $(CHIP_ELFS) $(WIDE_ELFS) $(PEER_ELFS)
 
 # The examples are part of the library, from where they are compiled.
-SKETCH_SOURCES := scripts/sketch $(wildcard firmware-tests/avr/sketches/*/*.ino)
+SKETCH_SOURCES := scripts/sketch $(wildcard firmware-tests/avr/sketches/*/*.ino firmware-tests/avr/libraries/*/src/*)
 define sketches
 $(AVR_OUT)/$(1)/%.elf: examples/arduino/%/ $(SKETCH_SOURCES) $(DIST_STAMP)
 	@scripts/sketch $(1) dist/mbm/examples/$$* $$@
@@ -95,7 +98,7 @@ $(BARE): firmware-tests/avr/bare/bare.c $(BUILD)/assembler/mbm_avrxmega3.S inclu
 
 # --- the programs that run them
 
-AVR_SUPPORT := $(patsubst %,$(BUILD)/avr-tests/%.o,board bus kind peer server pty)
+AVR_SUPPORT := $(patsubst %,$(BUILD)/avr-tests/%.o,board bus kind peer server pty tcp_server)
 AVR_TESTS := $(patsubst firmware-tests/avr/%.c,$(BUILD)/avr-tests/%,$(wildcard firmware-tests/avr/test_*.c))
 AVR_FLAGS = -std=c11 -O2 -g $(WARNINGS) -Ifirmware-tests/avr -Ic-tests/support -Iinclude -isystem /usr/include/simavr $(MODBUS)
 AVR_HEADERS := $(wildcard firmware-tests/avr/*.h c-tests/support/*.h)

@@ -3,7 +3,9 @@
 #ifndef SHIM_ARDUINO_H
 #define SHIM_ARDUINO_H
 
+#include "Print.h"
 #include "bench.h"
+#include "pins.h"
 
 #include <deque>
 #include <stddef.h>
@@ -16,10 +18,6 @@
 #define SHIM_UARTS 4
 #endif
 
-/* Texts that an AVR keeps in flash. */
-class __FlashStringHelper;
-#define F(text) (reinterpret_cast<const __FlashStringHelper *>(text))
-
 inline unsigned long micros()
 {
     return bench().micros();
@@ -30,37 +28,18 @@ inline unsigned long millis()
 }
 #define lowByte(w) ((uint8_t)((w)&0xff))
 #define highByte(w) ((uint8_t)((w) >> 8))
-inline void digitalWrite(uint8_t pin, uint8_t level)
-{
-    bench().pins[pin & 15] = static_cast<uint8_t>(bench().pins[pin & 15] + level);
-}
 inline void yield()
 {
     bench().yields++;
 }
 
-class Stream {
-    int writeError = 0;
-
-protected:
-    void setWriteError(int error = 1) { writeError = error; }
-
+class Stream : public Print {
 public:
-    virtual ~Stream() {}
-    int getWriteError() { return writeError; }
-    void clearWriteError() { setWriteError(0); }
+    using Print::write;
     virtual int available() = 0;
     virtual int read() = 0;
     virtual int peek() = 0;
-    virtual size_t write(uint8_t value) = 0;
     virtual void flush() {}
-    virtual size_t write(const uint8_t *bytes, size_t length)
-    {
-        size_t count = 0;
-        while (count < length && write(bytes[count]) == 1)
-            count++;
-        return count;
-    }
 };
 
 /* A UART whose far end a test scripts: each flush releases the next reply. */

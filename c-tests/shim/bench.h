@@ -12,7 +12,6 @@ struct Bench {
     bool realTime = false; /* use the clock of the host instead */
     unsigned looks = 0;    /* how often the clock was read */
     unsigned yields = 0;
-    uint8_t pins[16] = {}; /* how often each pin was set high */
     std::string log; /* the events in order; a repeated event is there once */
 
     void note(const char *event)

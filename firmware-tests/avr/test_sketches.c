@@ -118,9 +118,6 @@ static void the_largest_chips_with_the_unos_instructions_read_and_write(void **s
     }
 }
 
-<<<<<<< int
-/* The driver-enable pin, and the server after it. */
-=======
 static void chips_with_one_uart_have_the_bus_on_it(void **state)
 {
     (void)state;
@@ -128,8 +125,7 @@ static void chips_with_one_uart_have_the_bus_on_it(void **state)
     first_read(&atmega644);
 }
 
-/* The driver-enable pin, and the server behind it. */
->>>>>>> lint
+/* The driver-enable pin, and the server after it. */
 typedef struct driver {
     server peer;
     uint64_t rose, fell;
@@ -504,12 +500,8 @@ int main(void)
         cmocka_unit_test(first_read_reads_what_the_server_holds),
         cmocka_unit_test(first_read_prints_that_there_is_no_answer),
         cmocka_unit_test(write_and_read_back_writes_to_the_server),
-<<<<<<< int
         cmocka_unit_test(the_largest_chips_with_the_unos_instructions_read_and_write),
-=======
-        cmocka_unit_test(the_largest_chips_of_the_unos_instructions_read_and_write),
         cmocka_unit_test(chips_with_one_uart_have_the_bus_on_it),
->>>>>>> lint
         cmocka_unit_test(the_driver_is_on_from_the_first_to_the_last_bit),
         cmocka_unit_test(several_slaves_answer_by_their_units),
         cmocka_unit_test(without_waiting_the_led_blinks_on),

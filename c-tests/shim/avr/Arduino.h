@@ -1,5 +1,5 @@
-/* As much of Arduino as the headers name, for a check by avr-g++, which has no
- * standard library. Nothing here is ever linked. */
+/* As much of Arduino as the headers and the gateway's example name, for checks by
+ * compilers for firmware, which have no standard library. Nothing here is ever linked. */
 #ifndef SHIM_AVR_ARDUINO_H
 #define SHIM_AVR_ARDUINO_H
 
@@ -11,17 +11,38 @@
 class __FlashStringHelper;
 #define F(text) (reinterpret_cast<const __FlashStringHelper *>(text))
 
+#define LOW 0
+#define HIGH 1
+#define OUTPUT 1
+
 unsigned long micros();
 unsigned long millis();
 void yield();
+void pinMode(uint8_t pin, uint8_t mode);
+void digitalWrite(uint8_t pin, uint8_t level);
 
-class Stream {
+#define DEC 10
+#define HEX 16
+
+class Print {
+public:
+    int getWriteError();
+    virtual size_t write(uint8_t value) = 0;
+    virtual size_t write(const uint8_t *bytes, size_t length);
+    size_t print(const __FlashStringHelper *text);
+    size_t print(char value);
+    size_t print(unsigned char value, int base = DEC);
+    size_t print(int value, int base = DEC);
+    size_t print(unsigned value, int base = DEC);
+    size_t print(unsigned long value, int base = DEC);
+    size_t println();
+};
+
+class Stream : public Print {
 public:
     virtual int available() = 0;
     virtual int read() = 0;
-    virtual size_t write(uint8_t value) = 0;
-    int getWriteError();
-    virtual size_t write(const uint8_t *bytes, size_t length) = 0;
+    virtual int peek() = 0;
     virtual void flush() = 0;
 };
 

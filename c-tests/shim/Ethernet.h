@@ -1,0 +1,36 @@
+/* The classes of the Ethernet library, 2.0.0 and later, with this machine's sockets. */
+#ifndef SHIM_ETHERNET_H
+#define SHIM_ETHERNET_H
+
+#include "network.h"
+
+class EthernetClient : public SocketClient {
+public:
+    EthernetClient() {}
+    explicit EthernetClient(int fd) : SocketClient(fd) {}
+};
+
+class EthernetServer : public SocketServer {
+public:
+    explicit EthernetServer(uint16_t port) : SocketServer(port) {}
+    EthernetClient accept()
+    {
+        int fd = take();
+        return fd >= 0 ? EthernetClient(fd) : EthernetClient();
+    }
+    EthernetClient available() { return speaking(known); }
+
+private:
+    std::vector<EthernetClient> known;
+};
+
+class EthernetClass {
+public:
+    int begin(uint8_t *) { return 1; }
+    void begin(uint8_t *, IPAddress) {}
+    int maintain() { return 0; }
+};
+
+static EthernetClass Ethernet __attribute__((unused));
+
+#endif

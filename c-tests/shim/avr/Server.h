@@ -1,0 +1,12 @@
+/* As much of Arduino's Server as network libraries derive from. */
+#ifndef SHIM_AVR_SERVER_H
+#define SHIM_AVR_SERVER_H
+
+#include "Arduino.h"
+
+class Server : public Print {
+public:
+    virtual void begin() = 0;
+};
+
+#endif

@@ -1,0 +1,246 @@
+/* The class of a client: the frame and the reply of every function, by the examples of
+ * the standard where it has them, and the values in a request's words. */
+#include "asking.h"
+
+#include <math.h>
+#include <string.h>
+
+static void words_of(ModbusRequest &request, std::initializer_list<uint16_t> values)
+{
+    uint16_t index = 0;
+    for (uint16_t value : values)
+        request[index++] = value;
+}
+
+static void bits_are_read_and_written(void **)
+{
+    ModbusSerialClient client;
+    ModbusRequestOf<4> request(17);
+    client.begin(Serial, 19200);
+    exchanges(client, client.readCoils(request, 0x13, 0x13), {17, 1, 0, 0x13, 0, 0x13},
+              {17, 1, 3, 0xCD, 0x6B, 5});
+    assert_true(request.getBit(0) && !request.getBit(1) && request.getBit(2));
+    assert_true(request.getBit(18) && !request.getBit(17));
+    assert_int_equal(request.getByte(1), 0x6B);
+    exchanges(client, client.readDiscreteInputs(request, 0xC4, 0x16), {17, 2, 0, 0xC4, 0, 0x16},
+              {17, 2, 3, 0xAC, 0xDB, 0x35});
+    assert_true(!request.getBit(0) && request.getBit(2) && request.getBit(21));
+    exchanges(client, client.writeSingleCoil(request, 0xAC, true), {17, 5, 0, 0xAC, 0xFF, 0},
+              {17, 5, 0, 0xAC, 0xFF, 0});
+    exchanges(client, client.writeSingleCoil(request, 0xAC, false), {17, 5, 0, 0xAC, 0, 0},
+              {17, 5, 0, 0xAC, 0, 0});
+    const bool coils[] = {1, 0, 1, 1, 0, 0, 1, 1, 1, 0};
+    for (uint16_t i = 0; i < 10; i++)
+        assert_int_equal(request.setBit(i, coils[i]), MBM_OK);
+    for (uint16_t i = 10; i < 16; i++)
+        request.setBit(i, false);
+    exchanges(client, client.writeMultipleCoils(request, 0x13, 10),
+              {17, 15, 0, 0x13, 0, 10, 2, 0xCD, 1}, {17, 15, 0, 0x13, 0, 10});
+    assert_int_equal(request.status(), MBM_OK);
+}
+
+static void registers_are_read_and_written(void **)
+{
+    ModbusSerialClient client;
+    ModbusRequestOf<6> request(17);
+    client.begin(Serial, 19200);
+    exchanges(client, client.readInputRegisters(request, 8, 1), {17, 4, 0, 8, 0, 1},
+              {17, 4, 2, 0, 10});
+    assert_int_equal(request[0], 10);
+    words_of(request, {10, 0x0102});
+    exchanges(client, client.writeMultipleRegisters(request, 1, 2),
+              {17, 16, 0, 1, 0, 2, 4, 0, 10, 1, 2}, {17, 16, 0, 1, 0, 2});
+    exchanges(client, client.maskWriteRegister(request, 4, 0xF2, 0x25),
+              {17, 22, 0, 4, 0, 0xF2, 0, 0x25}, {17, 22, 0, 4, 0, 0xF2, 0, 0x25});
+    words_of(request, {0xFF, 0xFE, 0xFD});
+    exchanges(client, client.readWriteMultipleRegisters(request, 3, 6, 14, 3),
+              {17, 23, 0, 3, 0, 6, 0, 14, 0, 3, 6, 0, 0xFF, 0, 0xFE, 0, 0xFD},
+              {17, 23, 12, 0, 0xFE, 10, 0xCD, 0, 1, 0, 3, 0, 13, 0, 0xFF});
+    assert_int_equal(request.status(), MBM_OK);
+    assert_int_equal(request[0], 0xFE);
+    assert_int_equal(request[1], 0x0ACD);
+    assert_int_equal(request[5], 0xFF);
+    exchanges(client, client.readFifoQueue(request, 0x04DE), {17, 24, 4, 0xDE},
+              {17, 24, 0, 6, 0, 2, 1, 0xB8, 0x12, 0x84});
+    assert_int_equal(request.length(), 4);
+    assert_int_equal(request[0], 0x01B8);
+    assert_int_equal(request[1], 0x1284);
+}
+
+static void the_functions_of_a_serial_line_are_asked(void **)
+{
+    ModbusSerialClient client;
+    ModbusRequestOf<8> request(17);
+    client.begin(Serial, 19200);
+    exchanges(client, client.readExceptionStatus(request), {17, 7}, {17, 7, 0x6D});
+    assert_int_equal(request.getByte(0), 0x6D);
+    words_of(request, {0xA537});
+    exchanges(client, client.diagnostics(request, 0), {17, 8, 0, 0, 0xA5, 0x37},
+              {17, 8, 0, 0, 0xA5, 0x37});
+    assert_int_equal(request.status(), MBM_OK);
+    words_of(request, {0});
+    exchanges(client, client.diagnostics(request, MBM_DIAGNOSTICS_BUS_MESSAGE_COUNT),
+              {17, 8, 0, 11, 0, 0}, {17, 8, 0, 11, 0, 99});
+    assert_int_equal(request[0], 99);
+    exchanges(client, client.getCommEventCounter(request), {17, 11}, {17, 11, 0xFF, 0xFF, 1, 8});
+    assert_int_equal(request[1], 0x0108);
+    exchanges(client, client.getCommEventLog(request), {17, 12},
+              {17, 12, 8, 0, 0, 1, 8, 1, 0x21, 0x20, 0});
+    assert_int_equal(request.length(), 8);
+    assert_int_equal(request.getByte(3), 8);
+    assert_int_equal(request.getByte(6), 0x20);
+    exchanges(client, client.reportServerId(request), {17, 17}, {17, 17, 3, 'm', 'b', 0xFF});
+    assert_int_equal(request.length(), 3);
+    assert_int_equal(request.getByte(1), 'b');
+}
+
+static void files_are_read_and_written(void **)
+{
+    ModbusSerialClient client;
+    ModbusRequestOf<8> request(17);
+    client.begin(Serial, 19200);
+    exchanges(client, client.readFileRecord(request, 4, 1, 2), {17, 20, 7, 6, 0, 4, 0, 1, 0, 2},
+              {17, 20, 6, 5, 6, 0x0D, 0xFE, 0, 0x20});
+    assert_int_equal(request[0], 0x0DFE);
+    assert_int_equal(request[1], 0x20);
+    words_of(request, {0x06AF, 0x04BE, 0x100D});
+    exchanges(client, client.writeFileRecord(request, 4, 7, 3),
+              {17, 21, 13, 6, 0, 4, 0, 7, 0, 3, 6, 0xAF, 4, 0xBE, 0x10, 0x0D},
+              {17, 21, 13, 6, 0, 4, 0, 7, 0, 3, 6, 0xAF, 4, 0xBE, 0x10, 0x0D});
+    assert_int_equal(request.status(), MBM_OK);
+    const uint8_t groups[] = {6, 0, 4, 0, 1, 0, 1, 6, 0, 3, 0, 9, 0, 1};
+    for (uint16_t i = 0; i < sizeof groups; i++)
+        assert_int_equal(request.setByte(i, groups[i]), MBM_OK);
+    exchanges(client, client.readFileRecords(request, sizeof groups),
+              {17, 20, 14, 6, 0, 4, 0, 1, 0, 1, 6, 0, 3, 0, 9, 0, 1},
+              {17, 20, 8, 3, 6, 0x0D, 0xFE, 3, 6, 0x33, 0xCD});
+    assert_int_equal(request.getByte(2), 0x0D);
+    assert_int_equal(request.getByte(7), 0xCD);
+    const uint8_t record[] = {6, 0, 4, 0, 7, 0, 1, 0xAB, 0xCD};
+    for (uint16_t i = 0; i < sizeof record; i++)
+        request.setByte(i, record[i]);
+    exchanges(client, client.writeFileRecords(request, sizeof record),
+              {17, 21, 9, 6, 0, 4, 0, 7, 0, 1, 0xAB, 0xCD},
+              {17, 21, 9, 6, 0, 4, 0, 7, 0, 1, 0xAB, 0xCD});
+    assert_int_equal(request.status(), MBM_OK);
+}
+
+static void a_device_identifies_itself(void **)
+{
+    ModbusSerialClient client;
+    ModbusRequestOf<16> request(17);
+    client.begin(Serial, 19200);
+    exchanges(client, client.readDeviceIdentification(request, MBM_DEVICE_ID_BASIC),
+              {17, 43, 14, 1, 0}, {17, 43, 14, 1, 1, 0, 0, 1, 0, 3, 'm', 'b', 'm'});
+    assert_int_equal(request.status(), MBM_OK);
+    assert_int_equal(request.getByte(3), 1);
+    assert_int_equal(request.getByte(5), 3);
+    assert_int_equal(request.getByte(6), 'm');
+    request.setByte(0, 0x60);
+    exchanges(client, client.encapsulatedInterfaceTransport(request, MBM_MEI_CANOPEN, 1),
+              {17, 43, 13, 0x60}, {17, 43, 13, 0x60, 1, 2});
+    assert_int_equal(request.status(), MBM_OK);
+    assert_int_equal(request.length(), 3);
+}
+
+static void functions_of_users_and_of_other_clients_pass(void **)
+{
+    static const uint8_t body[] = {0, 107, 0, 1};
+    const mbm_rule two = {MBM_RULE_FIXED, 3, 0};
+    ModbusSerialClient client;
+    ModbusRequestOf<4> request(17);
+    client.begin(Serial, 19200);
+    request.setByte(0, 0xAA);
+    exchanges(client, client.custom(request, 0x41, 1, two), {17, 0x41, 0xAA},
+              {17, 0x41, 0x12, 0x34});
+    assert_int_equal(request.getByte(1), 0x34);
+    exchanges(client, client.forward(request, 3, body, sizeof body), {17, 3, 0, 107, 0, 1},
+              {17, 3, 2, 2, 43});
+    assert_int_equal(request.length(), 3);
+    assert_int_equal(request.getByte(0), 2);
+    assert_int_equal(request.getByte(2), 43);
+    // The request's own words are sent again afterwards.
+    words_of(request, {0x1234});
+    exchanges(client, client.writeMultipleRegisters(request, 1, 1),
+              {17, 16, 0, 1, 0, 1, 2, 0x12, 0x34}, {17, 16, 0, 1, 0, 1});
+}
+
+static void values_of_each_type_and_order_are_in_the_words(void **)
+{
+    uint16_t words[4] = {0x4365, 0x1234, 0, 0};
+    ModbusRequest request(1, words);
+    char text[9];
+    float value = 0;
+    assert_int_equal(request.size(), 4);
+    assert_int_equal(request.getUInt16(0), 0x4365);
+    assert_int_equal(request.getUInt16(0, ModbusRequest::orderBADC), 0x6543);
+    assert_int_equal(request.getUInt32(0), 0x43651234);
+    assert_int_equal(request.getUInt32(0, ModbusRequest::orderCDAB), 0x12344365);
+    request.setWordOrder(ModbusRequest::orderDCBA);
+    assert_int_equal(request.getUInt32(0), 0x34126543);
+    request.setWordOrder(ModbusRequest::orderABCD);
+    assert_int_equal(request.setFloat(2, 230.5f), MBM_OK);
+    assert_int_equal(words[2], 0x4366);
+    assert_int_equal(words[3], 0x8000);
+    assert_true(request.getFloat(2, value));
+    assert_true(value == 230.5f);
+    assert_int_equal(request.setInt16(0, -2), MBM_OK);
+    assert_int_equal(request.getInt16(0), -2);
+    assert_int_equal(request.setInt32(1, -70000), MBM_OK);
+    assert_int_equal(request.getInt32(1), -70000);
+    assert_int_equal(request.setUInt64(0, 0x0102030405060708u), MBM_OK);
+    assert_int_equal(words[0], 0x0102);
+    assert_true(request.getUInt64(0) == 0x0102030405060708u);
+    assert_int_equal(request.setInt64(0, -5), MBM_OK);
+    assert_true(request.getInt64(0) == -5);
+    assert_int_equal(request.setDouble(0, -1.25), MBM_OK);
+    assert_true(request.getDouble(0) == -1.25);
+    assert_int_equal(request.setString(0, 8, "mbm", ModbusRequest::orderABCD), MBM_OK);
+    assert_int_equal(words[0], 'm' * 256 + 'b');
+    assert_true(request.getString(0, 8, text, sizeof text));
+    assert_string_equal(text, "mbm");
+    assert_int_equal(request.setUInt16(3, 7), MBM_OK);
+    assert_int_equal(request.setUInt32(2, 7), MBM_OK);
+}
+
+static void values_past_the_end_are_refused(void **)
+{
+    ModbusRequestOf<2> request(1);
+    ModbusRequest bare(1);
+    uint32_t unchanged = 77;
+    char text[9] = "as it is";
+    assert_int_equal(request.setFloat(1, 1.0f), MBM_ILLEGAL_DATA_ADDRESS);
+    assert_int_equal(request[1], 0);
+    assert_false(request.getUInt32(1, unchanged));
+    assert_int_equal(unchanged, 77);
+    assert_int_equal(request.getUInt32(1), 0);
+    assert_true(isnan(request.getFloat(1)));
+    assert_true(isnan(request.getDouble(0)));
+    assert_false(request.getString(0, 5, text, sizeof text));
+    assert_int_equal(text[0], 'a');
+    assert_int_equal(request.setBit(31, true), MBM_OK);
+    assert_int_equal(request.setBit(32, true), MBM_ILLEGAL_DATA_ADDRESS);
+    assert_false(request.getBit(32));
+    assert_int_equal(request.setByte(4, 1), MBM_ILLEGAL_DATA_ADDRESS);
+    assert_int_equal(request.getByte(4), 0);
+    assert_int_equal(bare.size(), 0);
+    assert_int_equal(bare.getByte(0), 0);
+    assert_int_equal(bare.getUInt16(0), 0);
+    assert_int_not_equal(bare.setUInt16(0, 1), MBM_OK);
+}
+
+int main()
+{
+    const struct CMUnitTest tests[] = {
+        TEST(bits_are_read_and_written),
+        TEST(registers_are_read_and_written),
+        TEST(the_functions_of_a_serial_line_are_asked),
+        TEST(files_are_read_and_written),
+        TEST(a_device_identifies_itself),
+        TEST(functions_of_users_and_of_other_clients_pass),
+        TEST(values_of_each_type_and_order_are_in_the_words),
+        TEST(values_past_the_end_are_refused),
+    };
+
+    return cmocka_run_group_tests_name("functions of a client's class", tests, nullptr, nullptr);
+}

@@ -1,0 +1,259 @@
+/* The class of a TCP client, over the shim's Ethernet library, on a real libmodbus server. */
+#include "wire.h"
+
+#include "ModbusClient.h"
+#include <Ethernet.h>
+
+extern "C" {
+#include "await.h"
+#include "server.h"
+#include "tcp_peer.h"
+#include "tcp_server.h"
+}
+
+static tcp_server peer;
+static EthernetClient *ethernet;
+static ModbusTcpClient *client;
+static const IPAddress device(192, 168, 1, 20);
+
+static int fresh(void **state)
+{
+    reset_board(state);
+    bench().realTime = true;
+    tcp_server_start(&peer);
+    networkPort(502) = peer.port;
+    ethernet = new EthernetClient;
+    client = new ModbusTcpClient;
+    client->begin(*ethernet);
+    client->setResponseTimeout(PATIENCE_MS);
+    return 0;
+}
+
+static int gone(void **)
+{
+    ethernet->stop();
+    delete client;
+    delete ethernet;
+    tcp_server_stop(&peer);
+    return 0;
+}
+
+/* As loop does: each poll returns at once. */
+static void ends()
+{
+    AWAIT(client->poll() != MBM_PENDING);
+}
+
+static void reads_what_libmodbus_holds(void **)
+{
+    ModbusRequestOf<125> request(255);
+    assert_int_equal(client->connect(device), MBM_OK);
+    assert_true(client->isConnected());
+    assert_int_equal(client->wait((client->readHoldingRegisters(request, 3, 125), request)),
+                     MBM_OK);
+    for (uint16_t i = 0; i < 125; i++)
+        assert_int_equal(request[i], server_pattern(3u + i));
+    assert_int_equal(request.length(), 250);
+    assert_int_equal(client->readCoils(request, 5, 2000), MBM_PENDING);
+    ends();
+    for (uint16_t i = 0; i < 2000; i++)
+        assert_int_equal(request.getBit(i), server_bit_pattern(5u + i));
+    assert_int_equal(client->readDiscreteInputs(request, 7, 3), MBM_PENDING);
+    ends();
+    assert_int_equal(request.getBit(0), !server_bit_pattern(7));
+    assert_int_equal(client->readInputRegisters(request, 9, 1), MBM_PENDING);
+    ends();
+    assert_int_equal(request[0], static_cast<uint16_t>(~server_pattern(9)));
+}
+
+static void writes_reach_libmodbus(void **)
+{
+    ModbusRequestOf<4> request(255);
+    client->connect("device");
+    request.setFloat(0, 21.5f);
+    request.setInt32(2, -3);
+    assert_int_equal(client->wait((client->writeMultipleRegisters(request, 40, 4), request)),
+                     MBM_OK);
+    assert_int_equal(peer.mapping->tab_registers[40], 0x41AC);
+    assert_int_equal(peer.mapping->tab_registers[43], 0xFFFD);
+    assert_int_equal(client->wait((client->writeSingleRegister(request, 50, 0xBEEF), request)), 0);
+    assert_int_equal(peer.mapping->tab_registers[50], 0xBEEF);
+    assert_int_equal(client->wait((client->maskWriteRegister(request, 50, 0xFF00, 0x12), request)),
+                     0);
+    assert_int_equal(peer.mapping->tab_registers[50], 0xBE12);
+    assert_int_equal(client->wait((client->writeSingleCoil(request, 30, true), request)), MBM_OK);
+    assert_int_equal(peer.mapping->tab_bits[30], 1);
+    request[0] = 5;
+    assert_int_equal(client->wait((client->writeMultipleCoils(request, 60, 3), request)), MBM_OK);
+    assert_int_equal(peer.mapping->tab_bits[60], 1);
+    assert_int_equal(peer.mapping->tab_bits[61], 0);
+    assert_int_equal(peer.mapping->tab_bits[62], 1);
+    request[0] = 0x7777;
+    assert_int_equal(
+        client->wait((client->readWriteMultipleRegisters(request, 70, 1, 70, 1), request)), MBM_OK);
+    assert_int_equal(request[0], 0x7777);
+    assert_int_equal(client->wait((client->readHoldingRegisters(request, 499, 2), request)),
+                     MBM_ILLEGAL_DATA_ADDRESS);
+}
+
+static void many_requests_are_under_way_at_once(void **)
+{
+    ModbusRequestOf<1> a(255), b(255), c(255);
+    unsigned sum = 0;
+    client->connect(device);
+    a.onDone([&sum](ModbusRequest &reply) { sum += reply[0]; });
+    b.onDone([&sum](ModbusRequest &reply) { sum += reply[0]; });
+    c.onDone([&sum](ModbusRequest &reply) { sum += reply[0]; });
+    client->readHoldingRegisters(a, 1, 1);
+    client->readHoldingRegisters(b, 2, 1);
+    client->readHoldingRegisters(c, 3, 1);
+    assert_int_equal(client->pending(), 3);
+    client->poll();
+    assert_int_not_equal(a.wireTransaction(), b.wireTransaction());
+    assert_int_not_equal(b.wireTransaction(), c.wireTransaction());
+    ends();
+    assert_int_equal(sum, server_pattern(1) + server_pattern(2) + server_pattern(3));
+}
+
+static void a_client_that_takes_few_bytes_gets_all_of_them(void **)
+{
+    ModbusRequestOf<123> request(255);
+    client->connect(device);
+    ethernet->room = 5;
+    for (uint16_t i = 0; i < 123; i++)
+        request[i] = static_cast<uint16_t>(1000u + i);
+    assert_int_equal(client->writeMultipleRegisters(request, 10, 123), MBM_PENDING);
+    ends();
+    assert_int_equal(request.status(), MBM_OK);
+    assert_int_equal(peer.mapping->tab_registers[132], 1122);
+}
+
+static void without_a_connection_requests_end_at_once(void **)
+{
+    ModbusTcpClient other;
+    ModbusRequestOf<1> request(255);
+    assert_int_equal(other.connect(device), MBM_NOT_INITIALISED);
+    assert_false(other.isConnected());
+    assert_false(client->isConnected());
+    client->readHoldingRegisters(request, 0, 1);
+    ends();
+    assert_int_equal(request.status(), MBM_LINK_LOST);
+    uint16_t nobody;
+    int reserved = tcp_reserve(&nobody);
+    networkPort(502) = nobody;
+    assert_int_equal(client->connect(device), MBM_LINK_LOST);
+    close(reserved);
+}
+
+static void a_connection_that_was_lost_is_made_anew(void **)
+{
+    ModbusRequestOf<1> request(255);
+    client->connect(device);
+    assert_int_equal(client->wait((client->readHoldingRegisters(request, 8, 1), request)), MBM_OK);
+    tcp_server_stop(&peer);
+    AWAIT(!client->isConnected());
+    client->readHoldingRegisters(request, 8, 1);
+    ends();
+    assert_int_equal(request.status(), MBM_LINK_LOST);
+    tcp_server_start(&peer);
+    networkPort(502) = peer.port;
+    request[0] = 0;
+    assert_int_equal(client->readHoldingRegisters(request, 8, 1), MBM_PENDING); // waits
+    assert_int_equal(client->connect(device), MBM_OK);
+    ends();
+    assert_int_equal(request.status(), MBM_OK);
+    assert_int_equal(request[0], server_pattern(8));
+}
+
+static void replies_in_any_order_find_their_requests(void **)
+{
+    tcp_peer *faulty = tcp_peer_new();
+    ModbusRequestOf<1> late(7), early(7);
+    tcp_peer_fault(faulty, 1, FAULT_DELAY, 300);
+    networkPort(502) = tcp_peer_start(faulty, 0);
+    client->connect(device);
+    client->readHoldingRegisters(late, 11, 1);
+    client->readHoldingRegisters(early, 12, 1);
+    AWAIT((client->poll(), !early.pending()));
+    assert_int_equal(early.status(), MBM_OK);
+    assert_true(late.pending());
+    ends();
+    assert_int_equal(late.status(), MBM_OK);
+    assert_int_equal(early[0], tcp_peer_word(12));
+    assert_int_equal(late[0], tcp_peer_word(11));
+    client->stop();
+    tcp_peer_stop(faulty);
+}
+
+static void poll_never_waits_for_a_device(void **)
+{
+    tcp_peer *faulty = tcp_peer_new();
+    ModbusRequestOf<1> request(7);
+    tcp_peer_fault(faulty, 1, FAULT_DELAY, 300);
+    networkPort(502) = tcp_peer_start(faulty, 0);
+    client->connect(device);
+    client->readHoldingRegisters(request, 11, 1);
+    unsigned polls = 0;
+    while (client->poll() == MBM_PENDING)
+        polls++;
+    assert_true(polls > 10);
+    assert_int_equal(request.status(), MBM_OK);
+    client->stop();
+    tcp_peer_stop(faulty);
+}
+
+static void rtu_frames_go_through_a_connection(void **)
+{
+    uint16_t port;
+    int listener = tcp_listen(&port);
+    ModbusRequestOf<1> request(17);
+    networkPort(4001) = port;
+    assert_int_equal(client->beginRtuOverTcp(*ethernet), MBM_OK);
+    client->setResponseTimeout(PATIENCE_MS);
+    assert_int_equal(client->connect(device, 4001), MBM_OK);
+    int converter = accept(listener, nullptr, nullptr);
+    client->readHoldingRegisters(request, 107, 1);
+    client->poll();
+    Bytes expected = adu({17, 3, 0, 107, 0, 1}), reply = adu({17, 3, 2, 2, 43}), seen(8);
+    assert_int_equal(recv(converter, seen.data(), 8, MSG_WAITALL), 8);
+    assert_bytes(seen, expected);
+    assert_int_equal(send(converter, reply.data(), reply.size(), 0), reply.size());
+    ends();
+    assert_int_equal(request.status(), MBM_OK);
+    assert_int_equal(request[0], 555);
+    close(converter);
+    close(listener);
+}
+
+static void begin_is_refused_while_a_request_is_pending(void **)
+{
+    EthernetClient another;
+    ModbusRequestOf<1> request(255);
+    client->connect(device);
+    client->readHoldingRegisters(request, 8, 1);
+    assert_int_equal(client->begin(another), MBM_BUSY);
+    ends();
+    assert_int_equal(request.status(), MBM_OK);
+    assert_int_equal(client->begin(another), MBM_OK);
+    assert_false(client->isConnected());
+}
+
+#define SERVED(test) cmocka_unit_test_setup_teardown(test, fresh, gone)
+
+int main()
+{
+    const struct CMUnitTest tests[] = {
+        SERVED(reads_what_libmodbus_holds),
+        SERVED(writes_reach_libmodbus),
+        SERVED(many_requests_are_under_way_at_once),
+        SERVED(a_client_that_takes_few_bytes_gets_all_of_them),
+        SERVED(without_a_connection_requests_end_at_once),
+        SERVED(a_connection_that_was_lost_is_made_anew),
+        SERVED(replies_in_any_order_find_their_requests),
+        SERVED(poll_never_waits_for_a_device),
+        SERVED(rtu_frames_go_through_a_connection),
+        SERVED(begin_is_refused_while_a_request_is_pending),
+    };
+
+    return cmocka_run_group_tests_name("class of a TCP client", tests, nullptr, nullptr);
+}

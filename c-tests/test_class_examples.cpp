@@ -1,0 +1,145 @@
+/* The examples that use a network, as they are, on the shim's board: real sockets, and a
+ * real libmodbus at the far end. */
+#include "wire.h"
+
+#include "ModbusTcpGateway.h"
+#include "ModbusTcpServer.h"
+#include <ESP8266WiFi.h>
+#include <Ethernet.h>
+
+extern "C" {
+#include "await.h"
+#include "server.h"
+#include "tcp_server.h"
+#include <pthread.h>
+}
+
+/* A sketch is compiled without this warning. */
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wconversion"
+namespace tcp_client {
+#include "../examples/arduino/TcpClient/TcpClient.ino"
+}
+namespace tcp_server_sketch {
+#include "../examples/arduino/TcpServer/TcpServer.ino"
+}
+namespace gateway_sketch {
+#include "../examples/arduino/TcpToRtuGateway/TcpToRtuGateway.ino"
+}
+#pragma GCC diagnostic pop
+
+struct Task {
+    int (*work)(modbus_t *);
+    int result;
+    int over;
+};
+
+/* A libmodbus client in a thread: connects to what the sketch's port 502 is. */
+static void *run(void *argument)
+{
+    Task *task = static_cast<Task *>(argument);
+    modbus_t *peer = modbus_new_tcp("127.0.0.1", networkPort(502));
+    modbus_set_response_timeout(peer, PATIENCE_MS / 1000, 0);
+    task->result = modbus_connect(peer) == 0 ? task->work(peer) : -3;
+    modbus_close(peer);
+    modbus_free(peer);
+    __atomic_store_n(&task->over, 1, __ATOMIC_SEQ_CST);
+    return nullptr;
+}
+
+/* What its work gives, while loop is called again and again. */
+static int gets(void (*loop)(), int (*work)(modbus_t *))
+{
+    Task task = {work, -2, 0};
+    pthread_t thread;
+    assert_int_equal(pthread_create(&thread, nullptr, run, &task), 0);
+    AWAIT((loop(), __atomic_load_n(&task.over, __ATOMIC_SEQ_CST)));
+    pthread_join(thread, nullptr);
+    return task.result;
+}
+
+static int real_time(void **state)
+{
+    reset_board(state);
+    pins() = Pins();
+    bench().realTime = true;
+    return 0;
+}
+
+static void the_tcp_client_reads_writes_and_connects_anew(void **)
+{
+    tcp_server device;
+    tcp_server_start(&device);
+    networkPort(502) = device.port;
+    tcp_client::setup();
+    device.mapping->tab_registers[10] = 300;
+    device.mapping->tab_registers[11] = 33;
+    AWAIT((tcp_client::loop(),
+           __atomic_load_n(&device.mapping->tab_registers[20], __ATOMIC_SEQ_CST) == 333));
+    assert_int_equal(pins().level[13], HIGH);
+    tcp_server_stop(&device);
+    AWAIT((tcp_client::loop(), pins().level[13] == LOW));
+    tcp_server_start(&device);
+    networkPort(502) = device.port;
+    AWAIT((tcp_client::loop(), pins().level[13] == HIGH)); // within five seconds
+    tcp_client::client.stop();
+    tcp_server_stop(&device);
+}
+
+static void the_tcp_server_serves_a_sensor_and_a_relay(void **)
+{
+    static uint16_t word;
+    pins().voltage[A0] = 513;
+    tcp_server_sketch::setup();
+    AWAIT((tcp_server_sketch::loop(), tcp_server_sketch::sensor[0] == 513));
+    assert_int_equal(gets(tcp_server_sketch::loop,
+                          [](modbus_t *peer) {
+                              return modbus_read_input_registers(peer, 0, 1, &word) == 1 &&
+                                             modbus_write_bit(peer, 0, 1) == 1
+                                         ? word
+                                         : -1;
+                          }),
+                     513);
+    assert_int_equal(pins().level[4], HIGH);
+    assert_int_equal(
+        gets(tcp_server_sketch::loop, [](modbus_t *peer) { return modbus_write_bit(peer, 0, 0); }),
+        1);
+    assert_int_equal(pins().level[4], LOW);
+}
+
+static void the_gateway_passes_a_request_to_its_line(void **)
+{
+    static uint16_t word;
+    bench().realTime = false; // that of the shim's UART
+    gateway_sketch::setup();
+    assert_int_equal(Serial.baud, 19200);
+    Serial.reply(adu({17, 3, 2, 2, 43}));
+    assert_int_equal(gets(gateway_sketch::loop,
+                          [](modbus_t *peer) {
+                              modbus_set_slave(peer, 17);
+                              return modbus_read_registers(peer, 107, 1, &word) == 1 ? word : -1;
+                          }),
+                     555);
+    assert_sent(Serial, {17, 3, 0, 107, 0, 1});
+    assert_int_equal(pins().level[4], LOW); // the driver is off again
+    assert_int_equal(gets(gateway_sketch::loop,
+                          [](modbus_t *peer) {
+                              modbus_set_slave(peer, 32); // not of this line
+                              return modbus_read_registers(peer, 107, 1, &word) == 1 ? 0 : errno;
+                          }),
+                     EMBXGPATH);
+    assert_int_equal(Serial.sent.size(), 0);
+}
+
+#define REAL(test) cmocka_unit_test_setup(test, real_time)
+
+int main()
+{
+    const struct CMUnitTest tests[] = {
+        REAL(the_tcp_client_reads_writes_and_connects_anew),
+        REAL(the_tcp_server_serves_a_sensor_and_a_relay),
+        REAL(the_gateway_passes_a_request_to_its_line),
+    };
+
+    return cmocka_run_group_tests_name("examples with a network", tests, nullptr, nullptr);
+}

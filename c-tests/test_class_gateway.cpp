@@ -1,0 +1,224 @@
+/* The class of a gateway: a real libmodbus TCP client on one side, a real libmodbus RTU
+ * server at the far end of a pty on the other. */
+#include "wire.h"
+
+#include "ModbusTcpGateway.h"
+#include <ESP8266WiFi.h>
+
+extern "C" {
+#include "await.h"
+#include "server.h"
+#include <modbus.h>
+#include <pthread.h>
+}
+
+/* The serial line: a pty. */
+class PtyStream : public Stream {
+public:
+    using Print::write;
+    int fd = -1;
+
+    int available() override
+    {
+        int waiting = 0;
+        return ioctl(fd, FIONREAD, &waiting) == 0 ? waiting : 0;
+    }
+    int read() override
+    {
+        uint8_t value;
+        return available() > 0 && ::read(fd, &value, 1) == 1 ? value : -1;
+    }
+    int peek() override { return -1; }
+    size_t write(uint8_t value) override { return ::write(fd, &value, 1) == 1; }
+};
+
+static server device;
+static PtyStream tty;
+static WiFiServer *wifi;
+static ModbusSerialClient *line;
+static ModbusTcpGateway<WiFiServer> *gateway;
+
+static int start(void **state)
+{
+    reset_board(state);
+    bench().realTime = true;
+    server_start(&device, 17);
+    tty.fd = device.line.ours;
+    wifi = new WiFiServer(502);
+    line = new ModbusSerialClient;
+    gateway = new ModbusTcpGateway<WiFiServer>;
+    wifi->begin();
+    line->begin(tty, 115200);
+    line->setResponseTimeout(PATIENCE_MS);
+    assert_int_equal(gateway->poll(), MBM_NOT_INITIALISED);
+    assert_int_equal(gateway->begin(*wifi, *line, 0), MBM_INVALID_ARGUMENT);
+    assert_int_equal(gateway->begin(*wifi, *line, 17, 18), MBM_OK);
+    return 0;
+}
+
+static int stop(void **)
+{
+    delete gateway;
+    delete line;
+    delete wifi;
+    server_stop(&device);
+    return 0;
+}
+
+struct Task {
+    modbus_t *peer;
+    int (*work)(modbus_t *);
+    int result;
+    int over;
+};
+
+static void *run(void *argument)
+{
+    Task *task = static_cast<Task *>(argument);
+    task->result = task->work(task->peer);
+    __atomic_store_n(&task->over, 1, __ATOMIC_SEQ_CST);
+    return nullptr;
+}
+
+/* What a client's work gives, while the sketch's loop goes on. */
+static int passes(modbus_t *peer, int (*work)(modbus_t *))
+{
+    Task task = {peer, work, -2, 0};
+    pthread_t thread;
+    assert_int_equal(pthread_create(&thread, nullptr, run, &task), 0);
+    AWAIT(
+        (assert_int_equal(gateway->poll(), MBM_OK), __atomic_load_n(&task.over, __ATOMIC_SEQ_CST)));
+    pthread_join(thread, nullptr);
+    return task.result;
+}
+
+static modbus_t *client_of(int unit)
+{
+    modbus_t *peer = modbus_new_tcp("127.0.0.1", networkPort(502));
+    modbus_set_slave(peer, unit);
+    modbus_set_response_timeout(peer, PATIENCE_MS / 1000, 0);
+    assert_int_equal(modbus_connect(peer), 0);
+    return peer;
+}
+
+static void hang_up(modbus_t *peer)
+{
+    modbus_close(peer);
+    modbus_free(peer);
+    AWAIT((gateway->poll(), gateway->connections() == 0));
+}
+
+static uint16_t words[125];
+static uint8_t bits[2000];
+
+static int read_registers(modbus_t *peer)
+{
+    return modbus_read_registers(peer, 3, 125, words);
+}
+
+static int error_of_a_read(modbus_t *peer)
+{
+    return modbus_read_registers(peer, 3, 1, words) == 1 ? 0 : errno;
+}
+
+static void requests_and_replies_of_any_length_pass(void **)
+{
+    modbus_t *peer = client_of(17);
+    assert_int_equal(passes(peer, read_registers), 125);
+    for (unsigned i = 0; i < 125; i++)
+        assert_int_equal(words[i], server_pattern(3 + i));
+    assert_int_equal(passes(peer, [](modbus_t *p) { return modbus_read_bits(p, 5, 2000, bits); }),
+                     2000);
+    for (unsigned i = 0; i < 2000; i++)
+        assert_int_equal(bits[i], server_bit_pattern(5 + i));
+    assert_int_equal(
+        passes(peer, [](modbus_t *p) { return modbus_write_registers(p, 40, 123, words); }), 123);
+    assert_int_equal(device.mapping->tab_registers[162], words[122]);
+    assert_int_equal(passes(peer, [](modbus_t *p) { return modbus_write_bit(p, 30, 1); }), 1);
+    assert_int_equal(device.mapping->tab_bits[30], 1);
+    assert_int_equal(passes(peer,
+                            [](modbus_t *p) {
+                                return modbus_write_and_read_registers(p, 70, 2, words, 70, 2,
+                                                                       words + 2);
+                            }),
+                     2);
+    assert_int_equal(words[2], words[0]);
+    hang_up(peer);
+}
+
+static void the_exception_of_a_device_passes(void **)
+{
+    modbus_t *peer = client_of(17);
+    assert_int_equal(passes(peer,
+                            [](modbus_t *p) {
+                                int count = modbus_read_registers(p, SERVER_REGISTERS, 1, words);
+                                return count < 0 ? errno : count;
+                            }),
+                     EMBXILADD);
+    hang_up(peer);
+}
+
+static void a_unit_without_a_line_is_0a_and_a_silent_one_0b(void **)
+{
+    modbus_t *peer = client_of(19);
+    assert_int_equal(passes(peer, error_of_a_read), EMBXGPATH);
+    modbus_set_slave(peer, 255);
+    assert_int_equal(passes(peer, error_of_a_read), EMBXGPATH);
+    line->setResponseTimeout(50);
+    modbus_set_slave(peer, 18);
+    assert_int_equal(passes(peer, error_of_a_read), EMBXGTAR);
+    line->setResponseTimeout(PATIENCE_MS);
+    modbus_set_slave(peer, 17);
+    assert_int_equal(passes(peer, error_of_a_read), 0);
+    hang_up(peer);
+}
+
+static void clients_and_the_sketch_share_the_line(void **)
+{
+    modbus_t *peers[] = {client_of(17), client_of(17), client_of(17), client_of(17)};
+    ModbusRequestOf<1> own(17);
+    for (unsigned round = 0; round < 3; round++)
+        for (modbus_t *peer : peers) {
+            assert_int_equal(line->readHoldingRegisters(own, 9, 1), MBM_PENDING);
+            assert_int_equal(passes(peer, read_registers), 125);
+            AWAIT((gateway->poll(), !own.pending()));
+            assert_int_equal(own[0], server_pattern(9));
+        }
+    assert_int_equal(gateway->connections(), 4);
+    for (unsigned i = 0; i < 4; i++) {
+        modbus_close(peers[i]);
+        modbus_free(peers[i]);
+    }
+    AWAIT((gateway->poll(), gateway->connections() == 0));
+}
+
+static void a_client_that_goes_takes_its_request_along(void **)
+{
+    const uint8_t request[] = {0, 1, 0, 0, 0, 6, 18, 3, 0, 3, 0, 1};
+    WiFiClient hasty;
+    assert_int_equal(hasty.connect("gateway", 502), 1);
+    hasty.write(request, sizeof request);
+    AWAIT((gateway->poll(), line->pending() == 1)); // of unit 18, which nobody is
+    // While a device is waited for, its client is not read: begin closes all.
+    assert_int_equal(gateway->begin(*wifi, *line), MBM_OK);
+    assert_int_equal(line->pending(), 0);
+    assert_int_equal(gateway->connections(), 0);
+    modbus_t *peer = client_of(17);
+    assert_int_equal(passes(peer, error_of_a_read), 0);
+    hang_up(peer);
+}
+
+#define SERVED(test) cmocka_unit_test_setup_teardown(test, start, stop)
+
+int main()
+{
+    const struct CMUnitTest tests[] = {
+        SERVED(requests_and_replies_of_any_length_pass),
+        SERVED(the_exception_of_a_device_passes),
+        SERVED(a_unit_without_a_line_is_0a_and_a_silent_one_0b),
+        SERVED(clients_and_the_sketch_share_the_line),
+        SERVED(a_client_that_goes_takes_its_request_along),
+    };
+
+    return cmocka_run_group_tests_name("class of a gateway", tests, nullptr, nullptr);
+}

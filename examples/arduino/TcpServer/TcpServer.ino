@@ -1,0 +1,36 @@
+// A Modbus TCP server on an Ethernet shield: the voltage at A0 is input register 0, a relay
+// at pin 4 is coil 0. Several clients may be connected at once. With WiFi, put WiFiServer
+// in the place of EthernetServer.
+#include <Ethernet.h>
+#include <ModbusTcpServer.h>
+
+uint8_t mac[] = {0x02, 0xAB, 0xCD, 0x12, 0x34, 0x57};
+const IPAddress own(192, 168, 1, 51);
+const uint8_t relayPin = 4;
+
+EthernetServer ethernet(502);
+ModbusRegisterArray<1> sensor;
+ModbusBitArray<1> relay;
+ModbusTcpServer<EthernetServer> server; // on an Uno for two clients, elsewhere for four
+
+void relayWritten(uint16_t, uint16_t) { digitalWrite(relayPin, relay[0] ? HIGH : LOW); }
+
+void setup() {
+  digitalWrite(relayPin, LOW);
+  pinMode(relayPin, OUTPUT);
+  server.inputRegisters(sensor);
+  server.coils(relay);
+  relay.afterWrite(relayWritten);
+  Ethernet.begin(mac, own);
+  ethernet.begin();
+  server.begin(1, ethernet);
+}
+
+void loop() {
+  static unsigned long measured = 0;
+  if (millis() - measured >= 100) {
+    measured = millis();
+    sensor[0] = analogRead(A0);
+  }
+  server.poll();
+}

@@ -1,0 +1,216 @@
+/* The examples of the client's and the sniffer's classes, compiled as the IDE would, on
+ * simulated boards against real libmodbus servers. */
+#include "kind.h"
+#include "peer.h"
+#include "test.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Collects what a sketch prints. */
+typedef struct paper {
+    char text[2000];
+} paper;
+
+static void print(wire *w, const uint8_t *bytes, size_t length)
+{
+    paper *p = w->context;
+    size_t have = strlen(p->text);
+
+    if (have + length < sizeof p->text)
+        memcpy(p->text + have, bytes, length);
+}
+
+static void floats(modbus_mapping_t *mapping, unsigned address, float value)
+{
+    uint32_t bits;
+
+    memcpy(&bits, &value, sizeof bits);
+    mapping->tab_input_registers[address] = (uint16_t)(bits >> 16);
+    mapping->tab_input_registers[address + 1] = (uint16_t)bits;
+}
+
+/* Longest time between two changes of a pin. */
+typedef struct rhythm {
+    uint64_t last, longest;
+    unsigned changes;
+} rhythm;
+
+static void changed(void *context, int level, uint64_t cycle)
+{
+    rhythm *r = context;
+
+    (void)level;
+    if (r->changes++ && cycle - r->last > r->longest)
+        r->longest = cycle - r->last;
+    r->last = cycle;
+}
+
+/* Two meters share a wire; one that is not `there` is silent. */
+typedef struct meters {
+    server all[2];
+    int there[2];
+} meters;
+
+static void shared(wire *w, const uint8_t *frame, size_t length)
+{
+    meters *m = w->context;
+
+    if (frame[0] < 1 || frame[0] > 2 || !m->there[frame[0] - 1])
+        return;
+    w->context = &m->all[frame[0] - 1];
+    peer_libmodbus(w, frame, length);
+    w->context = m;
+}
+
+static void energy_meter_client(const kind *k)
+{
+    board *b = kind_start(k, "EnergyMeterClient");
+    paper printed = {""};
+    rhythm r = {0, 0, 0};
+    meters m = {.there = {1, 1}};
+
+    for (int i = 0; i < 2; i++) {
+        server_start(&m.all[i], i + 1);
+        floats(m.all[i].mapping, 0, 230.5f);
+        floats(m.all[i].mapping, 6, 2.25f);
+        floats(m.all[i].mapping, 12, 400.0f + 100.0f * (float)i);
+    }
+    board_watch_pin(b, k->led.port, k->led.bit, changed, &r);
+    board_uart(b, k->bus, shared, &m);
+    if (k->bus != '0')
+        board_uart(b, '0', print, &printed);
+    assert_true(board_run(b, 900 * MS));
+    assert_true(is_high(b, k->pin4)); /* 900 W */
+    if (k->bus != '0')
+        assert_string_equal(printed.text,
+                            "1: 230.50 V 2.25 A 400.00 W\r\n2: 230.50 V 2.25 A 500.00 W\r\n");
+    floats(m.all[1].mapping, 12, 600.1f);
+    assert_true(board_run(b, 600 * MS));
+    assert_false(is_high(b, k->pin4));
+    /* A silent meter does not hold up the other, nor the LED. */
+    m.there[0] = 0;
+    floats(m.all[1].mapping, 12, 100.0f);
+    assert_true(board_run(b, 2500 * MS));
+    assert_true(is_high(b, k->pin4));
+    assert_true(r.changes > 70);
+    /* 50 ms, the 8 bytes of a request at 9600 baud, which the core's flush waits for, and
+     * a line of text that is longer than the core's buffer. */
+    assert_true(r.longest < (k->bus == '0' ? 62u : 85u) * MS);
+    server_stop(&m.all[0]);
+    server_stop(&m.all[1]);
+    board_free(b);
+}
+
+static void two_meters_are_read_without_waiting(void **state)
+{
+    (void)state;
+    energy_meter_client(&uno);
+    energy_meter_client(&mega);
+}
+
+static void data_logger(const kind *k)
+{
+    board *b = kind_start(k, "DataLogger");
+    uint16_t entries = board_symbol(b, "entries");
+    paper printed = {""};
+    server s;
+    wire *bus;
+
+    server_start(&s, 1);
+    s.mapping->tab_input_registers[2] = 1000;
+    bus = board_uart(b, k->bus, peer_libmodbus, &s);
+    if (k->bus != '0')
+        board_uart(b, '0', print, &printed);
+    assert_true(board_run(b, 1050 * MS));
+    assert_in_range(bus->frames, 9, 10);
+    assert_int_equal(board_word(b, entries), 1); /* second */
+    assert_int_equal(board_word(b, (uint16_t)(entries + 4)), 1000);
+    assert_in_range(board_byte(b, (uint16_t)(entries + 6)), 9, 10);
+    assert_false(is_high(b, k->led));
+    s.mapping->tab_input_registers[2] = 2000;
+    assert_true(board_run(b, 1000 * MS));
+    assert_true(is_high(b, k->led)); /* above the mean of both */
+    assert_int_equal(board_word(b, (uint16_t)(entries + 7)), 2);
+    assert_in_range(board_word(b, (uint16_t)(entries + 11)), 1900, 2000);
+    if (k->bus != '0')
+        assert_int_equal(strncmp(printed.text, "1,1000,", 7), 0);
+    server_stop(&s);
+    board_free(b);
+}
+
+static void a_logger_stores_a_mean_each_second(void **state)
+{
+    (void)state;
+    data_logger(&uno);
+    data_logger(&mega);
+}
+
+static void a_logger_counts_what_failed_and_keeps_its_time(void **state)
+{
+    board *b = kind_start(&mega, "DataLogger");
+    paper printed = {""};
+
+    (void)state;
+    board_uart(b, mega.bus, NULL, NULL);
+    board_uart(b, '0', print, &printed);
+    assert_true(board_run(b, 3050 * MS));
+    /* Of 80 ms and the quiet time after it: every other request. */
+    assert_non_null(strstr(printed.text, "1,0,0,"));
+    assert_non_null(strstr(printed.text, "\n2,0,0,"));
+    assert_non_null(strstr(printed.text, "\n3,0,0,"));
+    assert_null(strstr(printed.text, ",0\r\n"));
+    board_free(b);
+}
+
+/* A reply that the sniffer is to receive, some time after its request. */
+static void sniffer_prints_a_request_and_its_reply(void **state)
+{
+    static const uint8_t request[] = {17, 3, 0, 107, 0, 3, 0x76, 0x87};
+    static const uint8_t reply[] = {17, 3, 6, 2, 43, 0, 0, 0, 100, 0xC8, 0xBA};
+    board *b = kind_start(&mega, "Sniffer");
+    paper printed = {""};
+    unsigned time, took;
+    wire *bus;
+    char *line;
+
+    (void)state;
+    bus = board_uart(b, mega.bus, NULL, NULL);
+    board_uart(b, '0', print, &printed);
+    assert_true(board_run(b, 50 * MS));
+    wire_play(bus, 0, request, sizeof request);
+    wire_play(bus, 8 * MS, reply, sizeof reply);
+    assert_true(board_run(b, 60 * MS));
+    assert_int_equal(
+        sscanf(printed.text, "%u ms unit 17 request 03 read holding registers 107..109", &time), 1);
+    line = strchr(printed.text, '\n');
+    assert_non_null(line);
+    assert_int_equal(sscanf(line + 1,
+                            "%u ms unit 17 reply 03 read holding registers 107..109: 555 0 100 "
+                            "(%u ms)",
+                            &time, &took),
+                     2);
+    /* 8 ms, and 11 bytes of 9600 baud. */
+    assert_in_range(took, 17, 22);
+    assert_false(is_high(b, mega.led));
+    /* Nobody replies: the LED says so. */
+    wire_play(bus, 0, request, sizeof request);
+    assert_true(board_run(b, 1100 * MS));
+    assert_non_null(strstr(printed.text, " unit 17 no reply 03 read holding registers 107..109"));
+    assert_true(is_high(b, mega.led));
+    assert_int_equal(bus->frames, 0); /* nothing was sent */
+    board_free(b);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(two_meters_are_read_without_waiting),
+        cmocka_unit_test(a_logger_stores_a_mean_each_second),
+        cmocka_unit_test(a_logger_counts_what_failed_and_keeps_its_time),
+        cmocka_unit_test(sniffer_prints_a_request_and_its_reply),
+    };
+
+    return cmocka_run_group_tests_name("sketches of the client's class", tests, NULL, NULL);
+}

@@ -1,0 +1,108 @@
+/**
+ * @file ModbusCallback.h
+ * @brief A function or a lambda with captures, kept without a heap.
+ *
+ * Licence: MIT OR Apache-2.0. Included by ModbusClient.h and ModbusSniffer.h.
+ *
+ * A macro that may be defined before, alike in every file of a program:
+ * - MODBUS_CAPTURE_BYTES  bytes for the captures of one callback; on AVR 4, which hold
+ *   two references or pointers, else those of four pointers. A lambda that captures
+ *   more does not compile.
+ */
+
+#ifndef MODBUSCALLBACK_H
+#define MODBUSCALLBACK_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/** @cond the macro is explained at the head of the file */
+#if !defined(MODBUS_CAPTURE_BYTES)
+#if defined(__AVR__)
+#define MODBUS_CAPTURE_BYTES 4
+#else
+#define MODBUS_CAPTURE_BYTES (4 * sizeof(void *))
+#endif
+#endif
+
+// Cores differ in whether they have <new>: a placement new of our own.
+struct ModbusPlace {
+    void *at;
+};
+inline void *operator new(size_t, ModbusPlace place) noexcept
+{
+    return place.at;
+}
+inline void operator delete(void *, ModbusPlace) noexcept {}
+/** @endcond */
+
+/**
+ * What is called with an `Argument`: nothing at first.
+ *
+ * It takes a function, or a lambda whose captures are plain: numbers, pointers and
+ * references. The captures are copied. What a reference leads to must live for as
+ * long as it may be called.
+ */
+template <typename Argument> class ModbusCallback {
+public:
+    ModbusCallback() : invoke(nullptr), storage() {}
+
+    /** Calls a function from now on; nullptr for none. */
+    void set(void (*function)(Argument &))
+    {
+        if (function != nullptr)
+            keep(function);
+        else
+            invoke = nullptr;
+    }
+    /** Calls a lambda from now on. */
+    template <typename Function> void set(const Function &function) { keep(function); }
+    /** Calls nothing from now on. */
+    void set(decltype(nullptr)) { invoke = nullptr; }
+
+    /** Whether there is something to call. */
+    bool isSet() const { return invoke != nullptr; }
+
+    /** Calls it. It may be set anew meanwhile. */
+    void operator()(Argument &argument) const
+    {
+        if (invoke != nullptr)
+            invoke(storage.bytes, argument);
+    }
+
+private:
+    union Storage {
+        void *pointer;
+        uint32_t word;
+        unsigned char bytes[MODBUS_CAPTURE_BYTES];
+    };
+
+    void (*invoke)(const unsigned char *, Argument &);
+    Storage storage;
+
+    template <typename Function> void keep(const Function &function)
+    {
+        static_assert(sizeof(Function) <= sizeof(Storage),
+                      "this lambda captures more than MODBUS_CAPTURE_BYTES");
+        static_assert(alignof(Function) <= alignof(Storage), "a capture wants wider alignment");
+#if defined(__GNUC__) && !defined(__clang__) && __GNUC__ < 5
+        static_assert(__has_trivial_copy(Function) && __has_trivial_destructor(Function),
+                      "captures are numbers, pointers and references");
+#else
+        static_assert(__is_trivially_copyable(Function),
+                      "captures are numbers, pointers and references");
+#endif
+        new (ModbusPlace{storage.bytes}) Function(function);
+        invoke = call<Function>;
+    }
+
+    template <typename Function> static void call(const unsigned char *bytes, Argument &argument)
+    {
+        // A copy: the callback may set another one in its place.
+        const Function function(*reinterpret_cast<const Function *>(
+            static_cast<const void *>(bytes)));
+        function(argument);
+    }
+};
+
+#endif

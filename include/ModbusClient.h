@@ -1,0 +1,312 @@
+/**
+ * @file ModbusClient.h
+ * @brief Modbus clients for Arduino sketches that never wait: RTU, ASCII and TCP.
+ *
+ * Licence: MIT OR Apache-2.0. Header-only, C++11, no heap. Addresses are those
+ * on the wire, from 0. What a sketch does not call takes no flash.
+ *
+ *     ModbusSerialClient client;
+ *     ModbusRequestOf<2> volts(17); // unit 17, two words
+ *
+ *     void setup() {
+ *       Serial.begin(19200);
+ *       client.begin(Serial, 19200);
+ *       volts.onDone([](ModbusRequest &reply) {
+ *         if (reply.status() == MBM_OK)
+ *           analogWrite(9, reply.getFloat(0));
+ *       });
+ *     }
+ *     void loop() {
+ *       if (!volts.pending())
+ *         client.readHoldingRegisters(volts, 107, 2);
+ *       client.poll();
+ *     }
+ *
+ * Macros that may be defined before this file is included, alike in every file of a
+ * program:
+ * - MODBUSCLIENT_FRAME_BYTES  bytes of the frame buffer of a ModbusSerialClient, 17 to
+ *   513; on AVR 141, which hold 64 registers in RTU, else 256, which hold any RTU frame.
+ *   ASCII takes twice as many and 1.
+ * - MODBUSCLIENT_TCP_BYTES  bytes of each of the two buffers of a ModbusTcpClient, 17 to
+ *   32767; on AVR 141, which hold 64 registers, else 260, which hold any frame.
+ * - MODBUS_CAPTURE_BYTES  in ModbusCallback.h: what a lambda may capture.
+ */
+
+#ifndef MODBUSCLIENT_H
+#define MODBUSCLIENT_H
+
+#include <Arduino.h>
+#include <Client.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "ModbusClientCalls.h"
+#include "ModbusMasterBoards.h"
+#include "ModbusStatusText.h"
+#include "mbm.h"
+
+/** @cond the macros are explained at the head of the file */
+#if !defined(MODBUSCLIENT_FRAME_BYTES)
+#if defined(__AVR__)
+#define MODBUSCLIENT_FRAME_BYTES MBM_FRAME_BYTES(64)
+#else
+#define MODBUSCLIENT_FRAME_BYTES MBM_MAX_FRAME
+#endif
+#endif
+#if !defined(MODBUSCLIENT_TCP_BYTES)
+#if defined(__AVR__)
+#define MODBUSCLIENT_TCP_BYTES MBM_FRAME_BYTES(64)
+#else
+#define MODBUSCLIENT_TCP_BYTES MBM_MAX_TCP_FRAME
+#endif
+#endif
+/** @endcond */
+
+/**
+ * A client of one serial line, in RTU or ASCII frames; one request at a time is under way.
+ * While a request leaves, poll waits for the Stream's flush: until its last bit has left.
+ */
+class ModbusSerialClient : public ModbusClient {
+public:
+    /** Touches neither clock nor port. */
+    ModbusSerialClient() : stream(), onPre(), onPost() {}
+
+    /**
+     * Speaks RTU over a Stream that is open already. May be called again while no request
+     * is pending; settings of the line and of requests are as at first then.
+     *
+     * @param line  must outlive its use here
+     * @param baud  bits per second, for the gap of t3.5; 0: untold, 4 ms
+     * @return MBM_OK; MBM_BUSY, with nothing changed, while a request is pending and from
+     *         within a callback
+     */
+    uint8_t begin(Stream &line, uint32_t baud = 0)
+    {
+        const uint8_t status = attach(mbm_client_beginRtu, line);
+        if (status == MBM_OK && baud != 0)
+            setBaudRate(baud);
+        return status;
+    }
+    /** As begin, with ASCII in place of RTU. */
+    uint8_t beginAscii(Stream &line) { return attach(mbm_client_beginAscii, line); }
+
+    /** Called before a request is written (RS-485 driver on); nullptr for none. */
+    void preTransmission(void (*callback)()) { set(onPre, callback); }
+    /** As preTransmission(callback), which is handed `context`. */
+    void preTransmission(void (*callback)(void *), void *context) { set(onPre, callback, context); }
+    /** Called once a request has left (RS-485 driver off); nullptr for none. */
+    void postTransmission(void (*callback)()) { set(onPost, callback); }
+    /** As postTransmission(callback), which is handed `context`. */
+    void postTransmission(void (*callback)(void *), void *context)
+    {
+        set(onPost, callback, context);
+    }
+
+    /** Tells bits per second, for t3.5; 0: untold, 4 ms. Sets nothing on the Stream. */
+    uint8_t setBaudRate(uint32_t baud) { return mbm_client_setBaudRate(&client, baud); }
+    /** Microseconds of silence before a request, in place of t3.5. */
+    uint8_t setGap(uint32_t us) { return mbm_client_setGap(&client, us); }
+    /** Milliseconds that a broadcast takes; 100 at first. */
+    uint8_t setTurnaroundDelay(uint16_t ms) { return mbm_client_setTurnaroundDelay(&client, ms); }
+    /** Milliseconds that the line is left alone after a timeout; 100 at first. */
+    uint8_t setQuietTime(uint16_t ms) { return mbm_client_setQuietTime(&client, ms); }
+    /** Drops the request itself where the receiver hears the driver; off at first. */
+    uint8_t setEchoDiscard(bool on) { return mbm_client_setEchoDiscard(&client, on); }
+    /** Character times that the driver stays on where flush returns early; 0 at first. */
+    uint8_t setPostFlushHold(uint8_t characters)
+    {
+        return mbm_client_setPostFlushHold(&client, characters);
+    }
+    /** The character that ends ASCII frames after CR, 1 to 127; LF at first. */
+    uint8_t setDelimiter(uint8_t character) { return mbm_client_setDelimiter(&client, character); }
+
+private:
+    static_assert(MODBUSCLIENT_FRAME_BYTES >= 17 && MODBUSCLIENT_FRAME_BYTES <= 513,
+                  "MODBUSCLIENT_FRAME_BYTES is 17 to 513");
+
+    struct Callback {
+        void (*function)(void *);
+        void *context;
+    };
+
+    Stream *stream;
+    Callback onPre;
+    Callback onPost;
+    uint8_t frame[MODBUSCLIENT_FRAME_BYTES];
+
+    static ModbusSerialClient &of(void *context)
+    {
+        return *static_cast<ModbusSerialClient *>(context);
+    }
+
+    uint8_t attach(uint8_t (*how)(mbm_client *, const mbm_port *, uint8_t *, uint16_t),
+                   Stream &line)
+    {
+        uint8_t status = renew();
+        if (status != MBM_OK)
+            return status;
+        mbm_port port;
+        port.context = this;
+        port.read = readHook;
+        port.write = writeHook;
+        port.micros = clockHook;
+        port.flush = flushHook;
+        port.preTransmission = preHook;
+        port.postTransmission = postHook;
+        port.idle = nullptr;
+        stream = &line;
+        return how(&client, &port, frame, MODBUSCLIENT_FRAME_BYTES);
+    }
+
+    static void plain(void *callback) { reinterpret_cast<void (*)()>(callback)(); }
+
+    static void set(Callback &callback, void (*function)(void *), void *context)
+    {
+        callback.function = function;
+        callback.context = context;
+    }
+    static void set(Callback &callback, void (*function)())
+    {
+        set(callback, function != nullptr ? plain : nullptr, reinterpret_cast<void *>(function));
+    }
+    static void call(const Callback &callback)
+    {
+        if (callback.function != nullptr)
+            callback.function(callback.context);
+    }
+
+    static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)
+    {
+        Stream &line = *of(context).stream;
+        uint16_t taken = 0;
+        for (int byte; taken < capacity && (byte = line.read()) >= 0; taken++)
+            bytes[taken] = static_cast<uint8_t>(byte);
+        return static_cast<int16_t>(taken);
+    }
+    static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
+    {
+        // One by one, whatever it returns: some Streams return 0 for a byte that they send.
+        Stream &line = *of(context).stream;
+        for (uint16_t i = 0; i < length; i++)
+            line.write(bytes[i]);
+        return static_cast<int16_t>(length);
+    }
+    static uint8_t flushHook(void *context)
+    {
+        of(context).stream->flush();
+        return 1;
+    }
+    static void preHook(void *context) { call(of(context).onPre); }
+    static void postHook(void *context) { call(of(context).onPost); }
+};
+
+/**
+ * A client of one TCP connection of an Ethernet or WiFi library; up to 16 requests are
+ * under way at once. A device that is itself the end of the connection is unit 255.
+ */
+class ModbusTcpClient : public ModbusClient {
+public:
+    /** Touches neither clock nor network. */
+    ModbusTcpClient() : link() {}
+
+    /**
+     * Speaks Modbus TCP over an EthernetClient, WiFiClient or other Client. May be called
+     * again while no request is pending; settings are as at first then.
+     *
+     * @param connection  must outlive its use here; connected already, or by connect
+     * @return MBM_OK; MBM_BUSY, with nothing changed, while a request is pending and from
+     *         within a callback
+     */
+    uint8_t begin(Client &connection)
+    {
+        const uint8_t status = renew();
+        if (status != MBM_OK)
+            return status;
+        const mbm_port port = portOf(connection);
+        return mbm_client_beginTcp(&client, &port, incoming, MODBUSCLIENT_TCP_BYTES, outgoing,
+                                   MODBUSCLIENT_TCP_BYTES);
+    }
+    /** As begin, with RTU frames, for converters that pass bytes on. */
+    uint8_t beginRtuOverTcp(Client &connection)
+    {
+        const uint8_t status = renew();
+        if (status != MBM_OK)
+            return status;
+        const mbm_port port = portOf(connection);
+        return mbm_client_beginRtuOverTcp(&client, &port, incoming, MODBUSCLIENT_TCP_BYTES);
+    }
+
+    /**
+     * Closes the connection, if it is open, and connects to a device, as the Client's
+     * own connect does: that call may wait, for as long as its library says. Requests
+     * that were under way end with MBM_LINK_LOST at the next poll; those that had not
+     * been sent go over the new connection.
+     *
+     * @param host  what the Client's connect takes: an IPAddress or a name
+     * @param port  502 for most devices
+     * @return MBM_OK; MBM_LINK_LOST if the Client did not connect; MBM_NOT_INITIALISED
+     *         before begin; MBM_BUSY from within a hook
+     */
+    template <typename Host> uint8_t connect(const Host &host, uint16_t port = 502)
+    {
+        if (link == nullptr)
+            return MBM_NOT_INITIALISED;
+        link->stop();
+        const bool connected = link->connect(host, port) > 0;
+        const uint8_t status = mbm_client_reconnect(&client, nullptr);
+        return status == MBM_OK && !connected ? +MBM_LINK_LOST : status;
+    }
+    /** Whether the connection stands, as far as the Client knows. */
+    bool isConnected() { return link != nullptr && link->connected(); }
+    /** Closes the connection; requests that are pending end with MBM_LINK_LOST at the next polls. */
+    void stop()
+    {
+        if (link != nullptr)
+            link->stop();
+    }
+
+    /** How many requests are under way at once, 1 to 16, for devices that take fewer; 16 at first. */
+    uint8_t setInFlight(uint8_t most) { return mbm_client_setInFlight(&client, most); }
+
+private:
+    static_assert(MODBUSCLIENT_TCP_BYTES >= 17 && MODBUSCLIENT_TCP_BYTES <= 32767,
+                  "MODBUSCLIENT_TCP_BYTES is 17 to 32767");
+
+    Client *link;
+    uint8_t incoming[MODBUSCLIENT_TCP_BYTES];
+    uint8_t outgoing[MODBUSCLIENT_TCP_BYTES];
+
+    mbm_port portOf(Client &connection)
+    {
+        mbm_port port;
+        port.context = link = &connection;
+        port.read = readHook;
+        port.write = writeHook;
+        port.micros = clockHook;
+        port.flush = nullptr;
+        port.preTransmission = nullptr;
+        port.postTransmission = nullptr;
+        port.idle = nullptr;
+        return port;
+    }
+
+    static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)
+    {
+        Client &connection = *static_cast<Client *>(context);
+        const int waiting = connection.available();
+        if (waiting <= 0)
+            return connection.connected() ? 0 : -1;
+        const size_t most = static_cast<size_t>(waiting);
+        const int taken = connection.read(bytes, most < capacity ? most : capacity);
+        return taken > 0 ? static_cast<int16_t>(taken) : 0;
+    }
+    static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
+    {
+        Client &connection = *static_cast<Client *>(context);
+        if (!connection.connected())
+            return -1;
+        return static_cast<int16_t>(connection.write(bytes, length));
+    }
+};
+
+#endif

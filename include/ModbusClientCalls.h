@@ -1,0 +1,311 @@
+/**
+ * @file ModbusClientCalls.h
+ * @brief What the clients of every framing have in common: requests and settings.
+ *
+ * Licence: MIT OR Apache-2.0. Included by ModbusClient.h.
+ */
+
+#ifndef MODBUSCLIENTCALLS_H
+#define MODBUSCLIENTCALLS_H
+
+#include <Arduino.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "ModbusMasterOptions.h"
+#include "ModbusRequest.h"
+#include "mbm.h"
+
+/**
+ * Requests to units, of which up to 16 wait or are under way: ModbusSerialClient and
+ * ModbusTcpClient add the line.
+ *
+ * No call waits but wait. Call poll in loop. Use an object from one thread, never from
+ * an interrupt.
+ *
+ * Each of the functions queues a request and returns MBM_PENDING, or why nothing was
+ * queued: MBM_ILLEGAL_DATA_VALUE or MBM_ILLEGAL_DATA_ADDRESS for what no device could
+ * accept, MBM_BUFFER_TOO_SMALL for more than the request's words or the frame hold,
+ * MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL, MBM_NOT_INITIALISED, MBM_INVALID_ARGUMENT; or
+ * MBM_BUSY, with the request unchanged, for one that is pending and from within
+ * preTransmission and postTransmission. Addresses are those on the wire, from 0.
+ */
+class ModbusClient {
+public:
+    ModbusClient(const ModbusClient &) = delete;
+    ModbusClient &operator=(const ModbusClient &) = delete;
+
+    /**
+     * Moves all requests on, without waiting, and calls the callbacks of those that have
+     * ended.
+     *
+     * @return MBM_PENDING while requests wait or are under way, MBM_OK if there are none;
+     *         MBM_BUSY from within a callback; MBM_NOT_INITIALISED before begin
+     */
+    uint8_t poll() { return mbm_client_poll(&client); }
+    /**
+     * Waits until a request has ended, and moves the others on meanwhile; for sketches
+     * that have nothing else to do. Runs yield().
+     *
+     * @return how it ended, or why it was refused; MBM_BUSY from within a callback, and
+     *         MBM_NOT_PENDING for a request of another client, both at once
+     */
+    uint8_t wait(const ModbusRequest &request)
+    {
+        while (request.pending()) {
+            const uint8_t status = poll();
+            if (status != MBM_PENDING && request.pending())
+                return status == MBM_OK ? MBM_NOT_PENDING : status;
+            MODBUSMASTER_YIELD();
+        }
+        return request.status();
+    }
+    /**
+     * How long poll will find nothing to do unless a byte arrives: microseconds, 0 for
+     * now, 0xFFFFFFFF without a request, 1000 while a TCP link takes no bytes.
+     */
+    uint32_t pollDelay() { return mbm_client_pollDelay(&client); }
+    /** How many requests wait or are under way, 0 to 16. */
+    uint8_t pending() const { return mbm_client_pending(&client); }
+    /**
+     * Gives a request up: its status is MBM_CANCELLED and its callback is not called. It
+     * may have reached the device. MBM_OK, or MBM_NOT_PENDING if it has ended already.
+     */
+    uint8_t cancel(ModbusRequest &request)
+    {
+        return mbm_client_cancel(&client, &request.request);
+    }
+
+    /** Function 01: reads 1 to 2000 coils, for getBit of the request; 16 a word. */
+    uint8_t readCoils(ModbusRequest &request, uint16_t address, uint16_t quantity)
+    {
+        return mbm_client_readCoils(&client, fresh(request), address, quantity);
+    }
+    /** Function 02: reads 1 to 2000 discrete inputs, for getBit of the request; 16 a word. */
+    uint8_t readDiscreteInputs(ModbusRequest &request, uint16_t address, uint16_t quantity)
+    {
+        return mbm_client_readDiscreteInputs(&client, fresh(request), address, quantity);
+    }
+    /** Function 03: reads 1 to 125 holding registers. */
+    uint8_t readHoldingRegisters(ModbusRequest &request, uint16_t address, uint16_t quantity)
+    {
+        return mbm_client_readHoldingRegisters(&client, fresh(request), address, quantity);
+    }
+    /** Function 04: reads 1 to 125 input registers. */
+    uint8_t readInputRegisters(ModbusRequest &request, uint16_t address, uint16_t quantity)
+    {
+        return mbm_client_readInputRegisters(&client, fresh(request), address, quantity);
+    }
+    /** Function 05: switches a coil. */
+    uint8_t writeSingleCoil(ModbusRequest &request, uint16_t address, bool on)
+    {
+        return mbm_client_writeSingleCoil(&client, fresh(request), address, on);
+    }
+    /** Function 06: writes a value to a holding register; the words stay. */
+    uint8_t writeSingleRegister(ModbusRequest &request, uint16_t address, uint16_t value)
+    {
+        return mbm_client_writeSingleRegister(&client, fresh(request), address, value);
+    }
+    /** Function 0F: writes 1 to 1968 coils, which setBit of the request has set. */
+    uint8_t writeMultipleCoils(ModbusRequest &request, uint16_t address, uint16_t quantity)
+    {
+        return holds(request, 16, quantity)
+                   ? mbm_client_writeMultipleCoils(&client, fresh(request), address, quantity)
+                   : refuse(request);
+    }
+    /** Function 10: writes 1 to 123 registers from the request's words. */
+    uint8_t writeMultipleRegisters(ModbusRequest &request, uint16_t address, uint16_t quantity)
+    {
+        return holds(request, 1, quantity)
+                   ? mbm_client_writeMultipleRegisters(&client, fresh(request), address, quantity)
+                   : refuse(request);
+    }
+    /** Function 16: (register & andMask) | (orMask & ~andMask). */
+    uint8_t maskWriteRegister(ModbusRequest &request, uint16_t address, uint16_t andMask,
+                              uint16_t orMask)
+    {
+        return mbm_client_maskWriteRegister(&client, fresh(request), address, andMask, orMask);
+    }
+    /** Function 17: writes 1 to 121 of the request's words, then reads 1 to 125 into them. */
+    uint8_t readWriteMultipleRegisters(ModbusRequest &request, uint16_t readAddress,
+                                       uint16_t readQuantity, uint16_t writeAddress,
+                                       uint16_t writeQuantity)
+    {
+        return holds(request, 1, writeQuantity)
+                   ? mbm_client_readWriteMultipleRegisters(&client, fresh(request), readAddress,
+                                                           readQuantity, writeAddress,
+                                                           writeQuantity)
+                   : refuse(request);
+    }
+    /** Function 07: reads eight outputs, byte 0 of the request. */
+    uint8_t readExceptionStatus(ModbusRequest &request)
+    {
+        return mbm_client_readExceptionStatus(&client, fresh(request));
+    }
+    /** Function 08: sends the request's words and reads as many; 1, or 1 to 125 of sub-function 0. */
+    uint8_t diagnostics(ModbusRequest &request, uint16_t subFunction, uint16_t quantity = 1)
+    {
+        return holds(request, 1, quantity)
+                   ? mbm_client_diagnostics(&client, fresh(request), subFunction, quantity)
+                   : refuse(request);
+    }
+    /** Function 0B: reads the status word and the event count, words 0 and 1. */
+    uint8_t getCommEventCounter(ModbusRequest &request)
+    {
+        return mbm_client_getCommEventCounter(&client, fresh(request));
+    }
+    /** Function 0C: reads bytes: status, event count and message count, high byte first; events. */
+    uint8_t getCommEventLog(ModbusRequest &request)
+    {
+        return mbm_client_getCommEventLog(&client, fresh(request));
+    }
+    /** Function 11: reads bytes, length() of them, that the device chooses. */
+    uint8_t reportServerId(ModbusRequest &request)
+    {
+        return mbm_client_reportServerId(&client, fresh(request));
+    }
+    /** Function 14: reads 1 to 121 records in a row (0 to 9999) of a file (1 to 65535). */
+    uint8_t readFileRecord(ModbusRequest &request, uint16_t file, uint16_t record,
+                           uint16_t quantity)
+    {
+        return mbm_client_readFileRecord(&client, fresh(request), file, record, quantity);
+    }
+    /** Function 15: writes 1 to 122 records in a row of a file from the request's words. */
+    uint8_t writeFileRecord(ModbusRequest &request, uint16_t file, uint16_t record,
+                            uint16_t quantity)
+    {
+        return holds(request, 1, quantity)
+                   ? mbm_client_writeFileRecord(&client, fresh(request), file, record, quantity)
+                   : refuse(request);
+    }
+    /** Function 14 of several groups, as bytes on the wire: 7 to 245, a multiple of 7. */
+    uint8_t readFileRecords(ModbusRequest &request, uint16_t bytes)
+    {
+        return holds(request, 2, bytes)
+                   ? mbm_client_readFileRecords(&client, fresh(request), bytes)
+                   : refuse(request);
+    }
+    /** Function 15 of several groups, as bytes on the wire: 9 to 251. */
+    uint8_t writeFileRecords(ModbusRequest &request, uint16_t bytes)
+    {
+        return holds(request, 2, bytes)
+                   ? mbm_client_writeFileRecords(&client, fresh(request), bytes)
+                   : refuse(request);
+    }
+    /** Function 18: reads up to 31 registers of a queue; length() / 2 says how many. */
+    uint8_t readFifoQueue(ModbusRequest &request, uint16_t address)
+    {
+        return mbm_client_readFifoQueue(&client, fresh(request), address);
+    }
+    /**
+     * Function 2B/0E: reads bytes: conformity level, more follows, next object, how many
+     * objects, and of each its id, length and value. `code` is one of MBM_DEVICE_ID_,
+     * `object` the one to begin with.
+     */
+    uint8_t readDeviceIdentification(ModbusRequest &request, uint8_t code, uint8_t object = 0)
+    {
+        return mbm_client_readDeviceIdentification(&client, fresh(request), code, object);
+    }
+    /** Function 2B of any MEI type: sends 0 to 251 bytes and reads bytes. */
+    uint8_t encapsulatedInterfaceTransport(ModbusRequest &request, uint8_t meiType,
+                                           uint16_t bytes)
+    {
+        return holds(request, 2, bytes) ? mbm_client_encapsulatedInterfaceTransport(
+                                           &client, fresh(request), meiType, bytes)
+                                     : refuse(request);
+    }
+    /** A function of yours, 1 to 127: sends 0 to 252 bytes; `response` says how long a reply is. */
+    uint8_t custom(ModbusRequest &request, uint8_t function, uint16_t bytes,
+                   const mbm_rule &response)
+    {
+        return holds(request, 2, bytes)
+                   ? mbm_client_custom(&client, fresh(request), function, bytes, &response)
+                   : refuse(request);
+    }
+    /**
+     * A request of any function as another client sent it, for gateways: `body` is the
+     * 0 to 252 bytes after the function code, which must stay until the request has
+     * ended. The request's words get what follows the function code of the reply, as
+     * bytes on the wire.
+     */
+    uint8_t forward(ModbusRequest &request, uint8_t function, const uint8_t *body, uint16_t bytes)
+    {
+        return mbm_client_forward(&client, fresh(request), function, body, bytes);
+    }
+
+    /** Milliseconds that a reply may take, 0 to 65535; 2000 at first. */
+    uint8_t setResponseTimeout(uint16_t ms) { return mbm_client_setResponseTimeout(&client, ms); }
+    /** How often a request without a proper reply is repeated, 0 to 255; 0 at first. */
+    uint8_t setRetries(uint8_t retries) { return mbm_client_setRetries(&client, retries); }
+    /**
+     * Milliseconds before a repetition: MBM_BACKOFF_NONE (at first), _FIXED, _LINEAR or
+     * _EXPONENTIAL, the first wait and the longest. Other requests are sent meanwhile.
+     */
+    uint8_t setBackoff(uint8_t backoff, uint16_t ms, uint16_t mostMs)
+    {
+        return mbm_client_setBackoff(&client, backoff, ms, mostMs);
+    }
+    /** Percent (0 to 100) of each such wait that `random` may take off; see mbm_client_setJitter. */
+    uint8_t setJitter(uint8_t percent, uint32_t (*random)(void *context), void *context = nullptr)
+    {
+        return mbm_client_setJitter(&client, percent, random, context);
+    }
+    /** Counts into `counters`, which you zeroed; nullptr stops. */
+    uint8_t setCounters(mbm_counters *counters)
+    {
+        return mbm_client_setCounters(&client, counters);
+    }
+    /**
+     * Keeps a record of each unit of an array, which must outlive its use: counts, the
+     * last status, and a rest between two requests. You set `unit` and `delay` of each.
+     */
+    template <size_t N> uint8_t setUnits(mbm_clientUnit (&units)[N])
+    {
+        static_assert(N <= 255, "a client keeps at most 255 records");
+        return mbm_client_setUnits(&client, units, N);
+    }
+
+protected:
+    /** @cond what the clients with a line use */
+    ModbusClient() : client() {}
+
+    mbm_client client;
+
+    // A client of C begins only once: it becomes as new if nothing is pending. Within a
+    // hook or a callback poll is refused.
+    uint8_t renew()
+    {
+        if (pending() != 0)
+            return MBM_BUSY;
+        const uint8_t status = poll();
+        if (status == MBM_OK)
+            client = mbm_client();
+        return status == MBM_BUSY ? status : MBM_OK;
+    }
+
+    static uint32_t clockHook(void *) { return micros() & 0xFFFFFFFFu; }
+    /** @endcond */
+
+private:
+    // Whether its words hold `quantity` of what has so many in a word.
+    static bool holds(const ModbusRequest &request, uint8_t inWord, uint16_t quantity)
+    {
+        return quantity / inWord + (quantity % inWord != 0) <= request.size();
+    }
+    // The words, where forward sent other bytes before.
+    static mbm_clientRequest *fresh(ModbusRequest &request)
+    {
+        if (!request.pending())
+            request.request.data = request.words;
+        return &request.request;
+    }
+    static uint8_t refuse(ModbusRequest &request)
+    {
+        if (request.pending())
+            return MBM_BUSY;
+        request.request.status = MBM_BUFFER_TOO_SMALL;
+        return MBM_BUFFER_TOO_SMALL;
+    }
+};
+
+#endif

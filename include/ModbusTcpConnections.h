@@ -1,0 +1,207 @@
+/**
+ * @file ModbusTcpConnections.h
+ * @brief The connections of a TCP server or gateway: accepts, polls and closes them.
+ *
+ * Licence: MIT OR Apache-2.0. Included by ModbusTcpServer.h and ModbusTcpGateway.h, whose
+ * heads explain the macros.
+ */
+
+#ifndef MODBUSTCPCONNECTIONS_H
+#define MODBUSTCPCONNECTIONS_H
+
+#include <Arduino.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "mbm.h"
+
+/** @cond the macros are explained in ModbusTcpServer.h */
+#if !defined(MODBUSSERVER_CONNECTIONS)
+#if defined(RAMEND) && RAMEND < 0x0B00
+#define MODBUSSERVER_CONNECTIONS 2
+#else
+#define MODBUSSERVER_CONNECTIONS 4
+#endif
+#endif
+#if !defined(MODBUSSERVER_IDLE_MS)
+#define MODBUSSERVER_IDLE_MS 60000
+#endif
+/** @endcond */
+
+/**
+ * Up to `Connections` connections of a `Listener`, each with a server and a frame buffer.
+ * `Derived` says what a connection serves.
+ */
+template <typename Derived, typename Listener, uint8_t Connections, uint16_t FrameBytes>
+class ModbusTcpConnections {
+public:
+    ModbusTcpConnections(const ModbusTcpConnections &) = delete;
+    ModbusTcpConnections &operator=(const ModbusTcpConnections &) = delete;
+
+    /** How many connections there are, 0 to `Connections`. */
+    uint8_t connections() const
+    {
+        uint8_t taken = 0;
+        for (const Place &place : places)
+            taken = static_cast<uint8_t>(taken + place.taken);
+        return taken;
+    }
+
+protected:
+    /** @cond for the classes that serve */
+    ModbusTcpConnections() : polling(), source(), places() {}
+
+    // True within poll, whose hooks can call neither poll nor begin.
+    bool polling;
+
+    // Closes what there is, and takes connections of another listener.
+    void listen(Listener &server)
+    {
+        for (uint8_t i = 0; i < Connections; i++)
+            if (places[i].taken)
+                close(i);
+        source = &server;
+    }
+
+    // Takes new connections, and moves each on.
+    uint8_t move()
+    {
+        if (source == nullptr)
+            return MBM_NOT_INITIALISED;
+        if (polling)
+            return MBM_BUSY;
+        polling = true;
+        for (uint8_t i = 0; i < Connections; i++) {
+            if (!places[i].taken)
+                continue;
+            const uint8_t status = mbm_server_poll(&places[i].server);
+            if (status == MBM_LINK_LOST || status == MBM_MALFORMED_FRAME)
+                close(i);
+        }
+        take(0);
+        polling = false;
+        return MBM_OK;
+    }
+
+    // The connection `index` is in use: it is not idle.
+    void use(uint8_t index) { places[index].used = clock(); }
+    /** @endcond */
+
+private:
+    static_assert(Connections >= 1 && Connections <= 16, "a server keeps 1 to 16 connections");
+
+    // The class of a connection. Never called.
+    static Listener &someListener();
+    typedef decltype(someListener().available()) Link;
+
+    struct Place {
+        Link link;
+        uint32_t used; // milliseconds: when the last bytes were taken
+        bool taken;
+        mbm_server server;
+        uint8_t frame[FrameBytes];
+    };
+
+    Listener *source;
+    Place places[Connections];
+
+    static uint32_t clock() { return millis() & 0xFFFFFFFFu; }
+
+    void close(uint8_t index)
+    {
+        Place &place = places[index];
+        place.link.stop();
+        place.link = Link();
+        place.taken = false;
+        static_cast<Derived *>(this)->closed(index);
+    }
+
+    // accept hands each connection over once. Where a library lacks it, available does
+    // so, or hands over any connection from which bytes wait.
+    template <typename Server> static auto next(Server &server, int) -> decltype(server.accept())
+    {
+        return server.accept();
+    }
+    template <typename Server>
+    static auto next(Server &server, long) -> decltype(server.available())
+    {
+        return server.available();
+    }
+    template <typename Server>
+    static auto known(Server &server, Place &, Link &, int) -> decltype(server.accept(), false)
+    {
+        return false;
+    }
+    template <typename Server> static bool known(Server &, Place &place, Link &link, long)
+    {
+        return place.taken && place.link.operator==(link);
+    }
+
+    void take(int order)
+    {
+        Link link = next(*source, order);
+        if (!link)
+            return;
+        const uint32_t now = clock();
+        uint8_t chosen = 0;
+        for (uint8_t i = 0; i < Connections; i++) {
+            const Place &place = places[i], &best = places[chosen];
+            if (known(*source, places[i], link, order))
+                return;
+            if (best.taken && (!place.taken || now - place.used > now - best.used))
+                chosen = i;
+        }
+        if (places[chosen].taken && now - places[chosen].used < MODBUSSERVER_IDLE_MS) {
+            link.stop();
+            return;
+        }
+        if (places[chosen].taken)
+            close(chosen);
+        open(chosen, link, now);
+    }
+
+    void open(uint8_t index, const Link &link, uint32_t now)
+    {
+        Place &place = places[index];
+        mbm_port port;
+        port.context = &place;
+        port.read = readHook;
+        port.write = writeHook;
+        port.micros = clockHook;
+        port.flush = nullptr;
+        port.preTransmission = nullptr;
+        port.postTransmission = nullptr;
+        port.idle = nullptr;
+        uint8_t count = 1;
+        mbm_unit *units = static_cast<Derived *>(this)->unitsOf(index, count);
+        place.server = mbm_server();
+        place.link = link;
+        place.used = now;
+        place.taken = mbm_server_beginTcp(&place.server, &port, units, count, place.frame,
+                                          FrameBytes) == MBM_OK;
+    }
+
+    static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)
+    {
+        Place &place = *static_cast<Place *>(context);
+        const int waiting = place.link.available();
+        if (waiting <= 0)
+            return place.link.connected() ? 0 : -1;
+        const size_t most = static_cast<size_t>(waiting);
+        const int taken = place.link.read(bytes, most < capacity ? most : capacity);
+        if (taken <= 0)
+            return 0;
+        place.used = clock();
+        return static_cast<int16_t>(taken);
+    }
+    static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
+    {
+        Link &link = static_cast<Place *>(context)->link;
+        if (!link.connected())
+            return -1;
+        return static_cast<int16_t>(link.write(bytes, length));
+    }
+    static uint32_t clockHook(void *) { return micros() & 0xFFFFFFFFu; }
+};
+
+#endif

@@ -1,0 +1,196 @@
+/**
+ * @file ModbusTcpGateway.h
+ * @brief A gateway for Arduino sketches: Modbus TCP comes in, a serial line goes out.
+ *
+ * Licence: MIT OR Apache-2.0. Header-only, C++11, no heap.
+ *
+ *     WiFiServer wifi(502);
+ *     ModbusSerialClient line;
+ *     ModbusTcpGateway<WiFiServer> gateway;
+ *
+ *     void setup() {
+ *       WiFi.begin(name, password);
+ *       wifi.begin();
+ *       Serial.begin(19200);
+ *       line.begin(Serial, 19200);
+ *       line.setResponseTimeout(500);
+ *       gateway.begin(wifi, line);
+ *     }
+ *     void loop() { gateway.poll(); }
+ *
+ * The macros MODBUSSERVER_CONNECTIONS and MODBUSSERVER_IDLE_MS are explained in
+ * ModbusTcpServer.h. Each connection takes about 970 bytes on AVR, 1080 elsewhere: four want a
+ * board with 8 KB of RAM or more.
+ */
+
+#ifndef MODBUSTCPGATEWAY_H
+#define MODBUSTCPGATEWAY_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "ModbusClient.h"
+#include "ModbusTcpConnections.h"
+#include "mbm.h"
+
+/**
+ * Passes requests of up to `Connections` TCP clients on to the devices of one line, and
+ * the replies back, of any function. Each client has one request under way.
+ *
+ * Where there is no reply to pass on, the gateway answers itself (V1.1b3, 7): 0A for a
+ * unit that the line does not have, a line that takes no bytes, or one with as many
+ * requests as it holds; 0B for a device that does not reply, or whose reply is damaged or
+ * does not answer the request; 02 and 03 for a request that the standard does not allow.
+ *
+ * Clients should wait longer than the line's response timeout. The sketch may have
+ * requests of its own on the line. Use an object from one thread.
+ */
+template <typename Listener, uint8_t Connections = MODBUSSERVER_CONNECTIONS>
+class ModbusTcpGateway
+    : public ModbusTcpConnections<ModbusTcpGateway<Listener, Connections>, Listener, Connections,
+                                  2 * MBM_MAX_TCP_FRAME> {
+public:
+    /** Touches neither clock nor network. */
+    ModbusTcpGateway() : line(), lowest(), highest(), passages() {}
+
+    /**
+     * Passes requests of a listener's clients on. Closes the connections that there are.
+     *
+     * @param listener  must outlive its use here; the sketch has called its begin or will
+     * @param devices   the line, begun by the sketch; must outlive its use here
+     * @param first     the lowest unit id of the line, 1 to 247
+     * @param last      the highest
+     * @return MBM_OK; MBM_BUSY, with nothing changed, from within a callback;
+     *         MBM_INVALID_ARGUMENT for units that are none
+     */
+    uint8_t begin(Listener &listener, ModbusClient &devices, uint8_t first = 1,
+                  uint8_t last = 247)
+    {
+        if (this->polling)
+            return MBM_BUSY;
+        if (first == 0 || first > last || last > 247)
+            return MBM_INVALID_ARGUMENT;
+        this->listen(listener);
+        line = &devices;
+        lowest = first;
+        highest = last;
+        return MBM_OK;
+    }
+
+    /**
+     * Moves connections and the line on, without waiting; this polls the line too.
+     *
+     * @return MBM_OK; MBM_NOT_INITIALISED before begin; MBM_BUSY from within a callback
+     */
+    uint8_t poll()
+    {
+        if (line != nullptr && !this->polling)
+            line->poll();
+        return this->move();
+    }
+
+private:
+    template <typename, typename, uint8_t, uint16_t> friend class ModbusTcpConnections;
+
+    enum : uint16_t {
+        noPath = MBM_REPLY_EXCEPTION | MBM_GATEWAY_PATH_UNAVAILABLE,
+        noReply = MBM_REPLY_EXCEPTION | MBM_GATEWAY_TARGET_FAILED_TO_RESPOND
+    };
+
+    // What a connection has asked a device; its one unit is every unit.
+    struct Passage {
+        ModbusTcpGateway *gateway;
+        bool asked;
+        mbm_unit unit;
+        mbm_custom every;
+        ModbusRequestOf<126> request;
+
+        Passage() : gateway(), asked(), unit(), every(), request(1) {}
+    };
+
+    ModbusClient *line;
+    uint8_t lowest;
+    uint8_t highest;
+    Passage passages[Connections];
+
+    mbm_unit *unitsOf(uint8_t index, uint8_t &)
+    {
+        Passage &passage = passages[index];
+        passage.gateway = this;
+        passage.unit = mbm_unit();
+        passage.every = mbm_custom();
+        passage.every.serve = serveHook;
+        passage.every.context = &passage;
+        mbm_unit_serveCustom(&passage.unit, &passage.every);
+        return &passage.unit;
+    }
+    // What the client asked is no longer wanted.
+    void closed(uint8_t index)
+    {
+        if (passages[index].asked)
+            line->cancel(passages[index].request);
+        passages[index].asked = false;
+    }
+
+    static uint16_t serveHook(void *context, const mbm_request *request, uint8_t *response,
+                              uint16_t capacity)
+    {
+        Passage &passage = *static_cast<Passage *>(context);
+        return passage.gateway->pass(passage, *request, response, capacity);
+    }
+
+    // Asks the device at first, and is called again until that has replied.
+    uint16_t pass(Passage &passage, const mbm_request &request, uint8_t *response,
+                  uint16_t capacity)
+    {
+        if (passage.asked) {
+            this->use(static_cast<uint8_t>(&passage - passages));
+            if (passage.request.pending())
+                return MBM_REPLY_PENDING;
+            passage.asked = false;
+            return outcome(passage.request, request, response, capacity);
+        }
+        if (request.unit < lowest || request.unit > highest)
+            return noPath;
+        passage.request.setUnitID(request.unit);
+        const uint8_t status =
+            line->forward(passage.request, request.function, request.data, request.length);
+        switch (status) {
+        case MBM_PENDING: passage.asked = true; return MBM_REPLY_PENDING;
+        case MBM_ILLEGAL_FUNCTION:
+        case MBM_ILLEGAL_DATA_ADDRESS:
+        case MBM_ILLEGAL_DATA_VALUE: return exception(status);
+        case MBM_BUFFER_TOO_SMALL: return exception(MBM_SLAVE_DEVICE_FAILURE);
+        default: return noPath;
+        }
+    }
+
+    static uint16_t exception(uint8_t code)
+    {
+        return static_cast<uint16_t>(MBM_REPLY_EXCEPTION | code);
+    }
+
+    static uint16_t outcome(const ModbusRequest &reply, const mbm_request &request,
+                            uint8_t *response, uint16_t capacity)
+    {
+        if (reply.getExceptionCode() != 0)
+            return exception(reply.getExceptionCode());
+        switch (reply.status()) {
+        case MBM_OK: break;
+        case MBM_LINK_LOST:
+        case MBM_LINE_BUSY: return noPath;
+        default: return noReply;
+        }
+        // Force Listen Only Mode is not answered (V1.1b3, 6.8.1).
+        if (request.function == MBM_FC_DIAGNOSTICS && request.length >= 2 &&
+            request.data[0] == 0 && request.data[1] == MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY)
+            return MBM_REPLY_NONE;
+        if (reply.length() > capacity)
+            return exception(MBM_SLAVE_DEVICE_FAILURE);
+        for (uint16_t i = 0; i < reply.length(); i++)
+            response[i] = reply.getByte(i);
+        return reply.length();
+    }
+};
+
+#endif

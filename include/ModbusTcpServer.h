@@ -1,0 +1,118 @@
+/**
+ * @file ModbusTcpServer.h
+ * @brief A Modbus TCP server for Arduino sketches, over an Ethernet or WiFi library.
+ *
+ * Licence: MIT OR Apache-2.0. Header-only, C++11, no heap. What it serves is set as
+ * with ModbusServer; several servers may serve the same tables.
+ *
+ *     EthernetServer ethernet(502);
+ *     ModbusRegisterArray<2> readings;
+ *     ModbusTcpServer<EthernetServer> server;
+ *
+ *     void setup() {
+ *       Ethernet.begin(mac);
+ *       ethernet.begin();
+ *       server.inputRegisters(readings);
+ *       server.begin(1, ethernet);
+ *     }
+ *     void loop() {
+ *       readings[0] = analogRead(A0);
+ *       server.poll();
+ *     }
+ *
+ * Macros that may be defined before this file is included, alike in every file of a
+ * program:
+ * - MODBUSSERVER_CONNECTIONS  how many connections a server keeps where its template
+ *   argument does not say so, 1 to 16; 4, on AVR boards of at most 2.5 KB of RAM 2. Each
+ *   takes a frame buffer of 260 bytes and about 80 more on AVR, 105 elsewhere.
+ * - MODBUSSERVER_IDLE_MS  milliseconds without a request after which a connection may be
+ *   closed for another client; 60000.
+ */
+
+#ifndef MODBUSTCPSERVER_H
+#define MODBUSTCPSERVER_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "ModbusServer.h"
+#include "ModbusTcpConnections.h"
+#include "mbm.h"
+
+/**
+ * A Modbus TCP server with up to `Connections` clients at once, as one unit or several.
+ *
+ * `Listener` is the library's server class: EthernetServer, WiFiServer or another with
+ * accept() or available(). Where every place is taken, a new client gets that of the
+ * connection that has been idle for longest, if for MODBUSSERVER_IDLE_MS at least; else
+ * its connection is closed. Requests for unit 0 and 255 are for the first unit.
+ *
+ * Call poll in loop. Use an object from one thread, never from an interrupt.
+ */
+template <typename Listener, uint8_t Connections = MODBUSSERVER_CONNECTIONS>
+class ModbusTcpServer
+    : public ModbusUnit,
+      public ModbusTcpConnections<ModbusTcpServer<Listener, Connections>, Listener, Connections,
+                                  MBM_MAX_TCP_FRAME> {
+public:
+    /** Touches neither clock nor network. */
+    ModbusTcpServer() : first(), count() {}
+
+    /**
+     * Answers as unit `id` to the clients of a listener, whose begin the sketch has called
+     * or will. What is served stays. Closes the connections that there are.
+     *
+     * @param id        1 to 247; where clients ask for 0 or 255, it is meant too
+     * @param listener  must outlive its use here
+     * @return MBM_OK; MBM_BUSY, with nothing changed, from within a hook or function of
+     *         this server
+     */
+    uint8_t begin(uint8_t id, Listener &listener)
+    {
+        const uint8_t status = serve(*this, 1, listener);
+        if (status == MBM_OK)
+            setUnitID(id);
+        return status;
+    }
+    /** As begin, for all units of an array, which answer in place of this one. */
+    template <size_t N> uint8_t begin(ModbusUnit (&units)[N], Listener &listener)
+    {
+        static_assert(N <= 247, "a server has 247 units");
+        return serve(units[0], N, listener);
+    }
+
+    /**
+     * Takes new connections, and moves each on: takes bytes in, carries a request out
+     * once it is whole, sends the response. Closes a connection that the client has
+     * closed, or that does not carry Modbus.
+     *
+     * @return MBM_OK; MBM_NOT_INITIALISED before begin; MBM_BUSY from within a hook or
+     *         function of this server
+     */
+    uint8_t poll() { return this->move(); }
+
+private:
+    template <typename, typename, uint8_t, uint16_t> friend class ModbusTcpConnections;
+
+    ModbusUnit *first;
+    uint8_t count;
+
+    uint8_t serve(ModbusUnit &units, uint8_t quantity, Listener &listener)
+    {
+        if (this->polling)
+            return MBM_BUSY;
+        first = &units;
+        count = quantity;
+        this->listen(listener);
+        return MBM_OK;
+    }
+
+    mbm_unit *unitsOf(uint8_t, uint8_t &quantity)
+    {
+        quantity = count;
+        return &first->unit;
+    }
+    void closed(uint8_t) {}
+};
+
+#endif
