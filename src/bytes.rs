@@ -104,8 +104,8 @@ impl<'a> Writer<'a> {
     /// Writes all of `bytes`.
     pub fn put(&mut self, bytes: &[u8]) {
         let end = self.length.saturating_add(bytes.len());
-        if let Some(room) = self.bytes.get_mut(self.length..end) {
-            for (place, byte) in room.iter_mut().zip(bytes) {
+        if let Some(space) = self.bytes.get_mut(self.length..end) {
+            for (place, byte) in space.iter_mut().zip(bytes) {
                 *place = *byte;
             }
         }

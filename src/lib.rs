@@ -70,7 +70,7 @@
 //! # A client
 //!
 //! [`client::Client`] queues requests of every function, and retries them as its policy says.
-//! On TCP it has many requests in flight at the same time. You implement [`client::Job`] for
+//! On TCP it has many requests in flight at the same time. You implement [`client::ClientRequest`] for
 //! your request, which holds the data to send and the data received:
 //!
 //! ```
@@ -193,7 +193,7 @@
 //! # Packets
 //!
 //! You can also decode and encode frames and PDUs by themselves. [`frame::Framing`] decodes
-//! and encodes frames, [`pdu::request::Request`] and [`pdu::response::Response`] decode and
+//! and encodes frames, [`pdu::request::RequestSpec`] and [`pdu::response::Response`] decode and
 //! encode PDUs, and [`packet`] handles user-defined functions.
 //!
 //! ```
@@ -242,11 +242,11 @@ pub mod time;
 pub mod bytes;
 pub mod data;
 pub mod engine;
-pub mod explain;
 pub mod frame;
 pub mod packet;
 pub mod pdu;
 pub mod sniffer;
+pub mod text;
 
 pub mod client;
 pub mod master;

@@ -3,7 +3,7 @@
 
 use crate::engine::{Engine, Receive, Settings, Words, BROADCAST};
 use crate::error::Status;
-use crate::pdu::query::{Form, Query};
+use crate::pdu::query::{FunctionSpec, MasterRequest};
 use crate::pdu::{bits, registers};
 use crate::port::Port;
 
@@ -19,10 +19,10 @@ pub struct Master<P, S: Words> {
     response_index: u8,
     slave: u8,
     status: Status,
-    engine: Engine<P, S, Query>,
+    engine: Engine<P, S, MasterRequest>,
     /// The function that waits for the reply if deviating replies are accepted; `None` if they
     /// are not. (A pointer, so that firmware without `set_lenient` does not contain its code.)
-    lenient: Option<Receive<Engine<P, S, Query>>>,
+    lenient: Option<Receive<Engine<P, S, MasterRequest>>>,
     /// The address to which the write functions without an address argument write.
     write_address: u16,
     /// Number of bits queued in the transmit words; a queued word counts as 16.
@@ -113,9 +113,9 @@ impl<P: Port, S: Words> Master<P, S> {
     }
 
     /// Sets the defaults in a zeroed master, which has no port and no buffers yet.
-    pub fn preset(&mut self) {
+    pub fn set_default_if_zero(&mut self) {
         self.slave = 1;
-        self.engine.settings.preset();
+        self.engine.settings.set_default_if_zero();
     }
 
     /// Sets whether a reply that deviates from the standard is accepted if no right reply
@@ -163,7 +163,7 @@ impl<P: Port, S: Words> Master<P, S> {
         if self.engine.is_pending() {
             let now = self.engine.port.micros();
             self.status = match self.engine.poll_with(now, self.lenient) {
-                Status::OK if self.engine.request().is_read() => self.take_words(),
+                Status::OK if self.engine.request().is_read() => self.store_words(),
                 status => status,
             };
         }
@@ -182,8 +182,8 @@ impl<P: Port, S: Words> Master<P, S> {
 
     /// Copies the data of a successful reply to the response words.
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    fn take_words(&mut self) -> Status {
-        if !self.engine.take_words() {
+    fn store_words(&mut self) -> Status {
+        if !self.engine.store_words() {
             return Status::BUFFER_TOO_SMALL;
         }
         self.response_words = self.engine.response_words();
@@ -192,11 +192,11 @@ impl<P: Port, S: Words> Master<P, S> {
 
     /// [`Status::OK`] if a request may be built, otherwise the error.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn readiness(&mut self) -> Status {
+    fn check_ready(&mut self) -> Status {
         if self.is_pending() {
             return Status::BUSY;
         }
-        if self.engine.port.is_ready() && self.storage().room() > 0 {
+        if self.engine.port.is_ready() && self.storage().capacity() > 0 {
             return Status::OK;
         }
         self.status = Status::NOT_INITIALISED;
@@ -207,8 +207,8 @@ impl<P: Port, S: Words> Master<P, S> {
     /// `word`. If it returns an error, nothing is sent. The address of a write becomes the
     /// write address.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn request(&mut self, address: u16, word: u16, form: Form) -> Status {
-        let ready = self.readiness();
+    pub fn request(&mut self, address: u16, word: u16, form: FunctionSpec) -> Status {
+        let ready = self.check_ready();
         if ready != Status::OK {
             return ready;
         }
@@ -222,8 +222,8 @@ impl<P: Port, S: Words> Master<P, S> {
 
     /// As [`Master::request`], for a request that `build` builds, and that writes to
     /// `address`.
-    fn write(&mut self, address: u16, build: impl FnOnce(&mut Query) -> Status) -> Status {
-        let ready = self.readiness();
+    fn write(&mut self, address: u16, build: impl FnOnce(&mut MasterRequest) -> Status) -> Status {
+        let ready = self.check_ready();
         if ready != Status::OK {
             return ready;
         }
@@ -238,7 +238,7 @@ impl<P: Port, S: Words> Master<P, S> {
     fn start(&mut self, built: Status) -> Status {
         self.transmit_bits = 0;
         self.response_index = 0;
-        self.engine.forget();
+        self.engine.clear_outcome();
         self.status = built;
         if built == Status::OK {
             let request = self.engine.request();
@@ -286,7 +286,7 @@ impl<P: Port, S: Words> Master<P, S> {
 
     /// 06: writes one register. The value also becomes transmit word 0.
     pub fn write_single_register(&mut self, address: u16, value: u16) -> Status {
-        if self.readiness() == Status::OK {
+        if self.check_ready() == Status::OK {
             self.set_transmit_word(0, value);
         }
         self.request(address, value, registers::form::WRITE_SINGLE)
@@ -316,7 +316,7 @@ impl<P: Port, S: Words> Master<P, S> {
     /// 16: sets a register to `(register & and_mask) | (or_mask & !and_mask)`.
     /// The masks also become transmit words 0 and 1.
     pub fn mask_write_register(&mut self, address: u16, and_mask: u16, or_mask: u16) -> Status {
-        if self.readiness() == Status::OK {
+        if self.check_ready() == Status::OK {
             self.set_transmit_word(0, and_mask);
             self.set_transmit_word(1, or_mask);
         }

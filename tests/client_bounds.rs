@@ -64,7 +64,7 @@ proptest! {
     #[test]
     fn every_index_stays_within_the_frame_buffer(
         (framing, case, lines) in any_lines(),
-        room in 8usize..600,
+        space in 8usize..600,
         piece in 1usize..300,
         pause in 1u32..20_000,
         echo: bool,
@@ -72,9 +72,9 @@ proptest! {
         let (build, data, request, response, received) = case;
         // Two of the three sizes are exactly what the request or the reply needs.
         let needs = [request, response].map(|pdu| encoded(framing, 17, pdu).len());
-        for room in [room, needs[0], needs[0].max(needs[1])] {
+        for space in [space, needs[0], needs[0].max(needs[1])] {
             let end = End::default();
-            let frame = Frame::new(vec![0; room.max(17)]);
+            let frame = Frame::new(vec![0; space.max(17)]);
             let lent = Lent { frame, ..Lent::default() };
             let mut line = match framing {
                 Framing::Ascii => Serial::ascii(end.clone(), lent),
@@ -103,14 +103,14 @@ proptest! {
                     }
                     end.pass(1_000);
                 };
-                prop_assert!(task.ticket.has_ended());
+                prop_assert!(task.state.has_ended());
                 let is_right = *bytes == encoded(framing, 17, response);
-                if task.ticket.status == Status::OK && is_right && is_alone {
+                if task.state.status == Status::OK && is_right && is_alone {
                     prop_assert_eq!(task.received(), received);
                 }
                 // No held reply takes space in the frame buffer any more.
-                let whole = usize::from(client.line.engine.storage.frame.room());
-                prop_assert_eq!(whole, room.max(17));
+                let whole = usize::from(client.line.engine.storage.frame.capacity());
+                prop_assert_eq!(whole, space.max(17));
             }
         }
     }

@@ -3,20 +3,20 @@
 #[path = "common/wire.rs"]
 mod wire;
 
-use mbm::client::{Backoff, Client, Line, Policy, Serial, Tcp, Unit};
+use mbm::client::{Backoff, Client, Policy, Serial, Tcp, Transport, Unit};
 use mbm::error::Status;
-use mbm::pdu::outline::Form;
+use mbm::pdu::header::FunctionSpec;
 use wire::{End, Lent, Task};
 
 fn read(unit: u8) -> Task {
-    Task::new(unit, 0, &[], |outline| {
-        outline.set(Form::READ_HOLDING_REGISTERS, 0, 1)
+    Task::new(unit, 0, &[], |header| {
+        header.set(FunctionSpec::READ_HOLDING_REGISTERS, 0, 1)
     })
 }
 
 /// Polls at the times that `poll_delay` returns until the task has ended. Returns when
 /// requests were sent, and the task.
-fn send_times<L: Line<Task>>(end: &End, client: &mut Client<L, Task, 4>) -> (Vec<u32>, Task) {
+fn send_times<L: Transport<Task>>(end: &End, client: &mut Client<L, Task, 4>) -> (Vec<u32>, Task) {
     let mut send_times = Vec::new();
     for _ in 0..10_000 {
         if let Some(task) = client.poll(end.now(), true) {
@@ -65,7 +65,7 @@ fn each_retry_waits_for_the_backoff() {
     *client.policy() = exponential();
     assert!(client.queue(read(1)).is_ok());
     let (send_times, task) = send_times(&end, &mut client);
-    assert_eq!(task.ticket.status, Status::RESPONSE_TIMED_OUT);
+    assert_eq!(task.state.status, Status::RESPONSE_TIMED_OUT);
     assert_eq!(
         pauses(&send_times),
         [300_000, 600_000, 1_000_000, 1_000_000]
@@ -78,7 +78,7 @@ fn each_retry_on_a_serial_line_waits_for_the_backoff() {
     *client.policy() = exponential();
     assert!(client.queue(read(1)).is_ok());
     let (send_times, task) = send_times(&end, &mut client);
-    assert_eq!(task.ticket.status, Status::RESPONSE_TIMED_OUT);
+    assert_eq!(task.state.status, Status::RESPONSE_TIMED_OUT);
     let expected = [300_000, 600_000, 1_000_000, 1_000_000];
     for (pause, expected) in pauses(&send_times).iter().zip(expected) {
         assert!(pause.abs_diff(expected) < 100, "{pause} {expected}");
@@ -105,7 +105,7 @@ fn without_retries_a_request_is_sent_once() {
     assert!(client.queue(read(1)).is_ok());
     let (send_times, task) = send_times(&end, &mut client);
     assert_eq!(
-        (send_times.len(), task.ticket.status),
+        (send_times.len(), task.state.status),
         (1, Status::RESPONSE_TIMED_OUT)
     );
     assert_eq!(end.now(), 2_000_000);
@@ -121,7 +121,7 @@ fn other_requests_are_sent_while_one_waits_for_its_retry() {
     for _ in 0..100_000 {
         let ended = client.poll(end.now(), true);
         order.extend(end.sent().first().copied());
-        if ended.is_some_and(|task| task.ticket.unit == 1) {
+        if ended.is_some_and(|task| task.state.unit == 1) {
             break;
         }
         end.pass(client.poll_delay(end.now()).clamp(1, 1_000_000));
@@ -171,13 +171,13 @@ fn outcomes_of_requests_are_counted_for_each_unit() {
         end.deliver(0, &frame);
         assert!(client.poll(end.now(), true).is_some());
     }
-    let unit = client.line.means.units[1];
+    let unit = client.line.storage.units[1];
     assert_eq!(
         (unit.requests, unit.replies, unit.exceptions, unit.retries),
         (3, 2, 1, 2)
     );
     assert_eq!(unit.status, 4);
-    assert_eq!(client.line.means.units[0].requests, 0);
+    assert_eq!(client.line.storage.units[0].requests, 0);
 }
 
 #[test]
@@ -194,7 +194,7 @@ fn a_jump_of_the_clock_ends_a_wait_but_loses_no_reply() {
     end.pass(900_000_000);
     let task = client.poll(end.now(), true).unwrap();
     assert_eq!(
-        (task.ticket.status, task.received()),
+        (task.state.status, task.received()),
         (Status::OK, &[0, 7][..])
     );
     // The clock jumps back by one minute. The wait ends, and does not last 71 minutes.
@@ -208,7 +208,7 @@ fn a_jump_of_the_clock_ends_a_wait_but_loses_no_reply() {
     assert!(client.poll(end.now(), true).is_none());
     end.pass(0u32.wrapping_sub(60_000_000));
     let task = client.poll(end.now(), true).unwrap();
-    assert_eq!(task.ticket.status, Status::RESPONSE_TIMED_OUT);
+    assert_eq!(task.state.status, Status::RESPONSE_TIMED_OUT);
 }
 
 #[test]

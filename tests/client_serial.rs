@@ -11,17 +11,17 @@ use mbm::engine::Frame;
 use mbm::error::Status;
 use mbm::frame::{ascii, rtu};
 use mbm::pdu::custom::Rule;
-use mbm::pdu::outline::{Form, Outline};
+use mbm::pdu::header::{FunctionSpec, RequestHeader};
 use wire::{End, Lent, Task};
 
-type Line = Client<Serial<End, Lent, Task>, Task, 4>;
+type Transport = Client<Serial<End, Lent, Task>, Task, 4>;
 
-fn rtu_client() -> (End, Line) {
+fn rtu_client() -> (End, Transport) {
     let end = End::default();
     (end.clone(), Client::new(Serial::new(end, Lent::default())))
 }
 
-fn ascii_client() -> (End, Line) {
+fn ascii_client() -> (End, Transport) {
     let end = End::default();
     (
         end.clone(),
@@ -30,7 +30,7 @@ fn ascii_client() -> (End, Line) {
 }
 
 /// Polls every 100 us until a task ends, for at most ten seconds.
-fn run(end: &End, client: &mut Line) -> Task {
+fn run(end: &End, client: &mut Transport) -> Task {
     for _ in 0..100_000 {
         if let Some(task) = client.poll(end.now(), true) {
             return task;
@@ -41,7 +41,7 @@ fn run(end: &End, client: &mut Line) -> Task {
 }
 
 /// Polls until the client has sent bytes, and returns them.
-fn sent(end: &End, client: &mut Line) -> Vec<u8> {
+fn sent(end: &End, client: &mut Transport) -> Vec<u8> {
     for _ in 0..3_000 {
         assert!(client.poll(end.now(), true).is_none());
         let bytes = end.sent();
@@ -82,7 +82,7 @@ fn every_function_is_sent_and_answered_in_rtu() {
         end.deliver(1_000, &reply[..3]);
         end.deliver(9_000, &reply[3..]);
         let task = run(&end, &mut client);
-        assert_eq!(task.ticket.status, Status::OK, "{request:02X?}");
+        assert_eq!(task.state.status, Status::OK, "{request:02X?}");
         assert_eq!(task.received(), *received, "{request:02X?}");
     }
 }
@@ -91,7 +91,7 @@ fn every_function_is_sent_and_answered_in_rtu() {
 fn a_response_of_unknown_length_may_be_as_long_as_a_frame() {
     for length in 250..=253 {
         let (end, mut client) = rtu_client();
-        let build: fn(&mut Outline) -> Status = |o| o.custom(0x43, 0, Rule::Silence);
+        let build: fn(&mut RequestHeader) -> Status = |o| o.custom(0x43, 0, Rule::Silence);
         assert!(client.queue(Task::new(17, 1, &[], build)).is_ok());
         sent(&end, &mut client);
         let mut response = vec![0x5A; length];
@@ -100,7 +100,7 @@ fn a_response_of_unknown_length_may_be_as_long_as_a_frame() {
         end.deliver(1_000, &reply[..100]);
         end.deliver(2_000, &reply[100..]);
         let task = run(&end, &mut client);
-        assert_eq!(task.ticket.status, Status::OK, "{length}");
+        assert_eq!(task.state.status, Status::OK, "{length}");
         assert_eq!(task.received(), &response[1..]);
     }
 }
@@ -115,7 +115,7 @@ fn every_function_is_sent_and_answered_in_ascii() {
         end.deliver(1_000, &characters(18, response));
         end.deliver(2_000, &characters(17, response));
         let task = run(&end, &mut client);
-        assert_eq!(task.ticket.status, Status::OK, "{request:02X?}");
+        assert_eq!(task.state.status, Status::OK, "{request:02X?}");
         assert_eq!(task.received(), *received, "{request:02X?}");
     }
 }
@@ -128,8 +128,8 @@ fn an_exception_is_reported_for_every_function() {
         sent(&end, &mut client);
         end.deliver(1_000, &frame(17, &[request[0] | 0x80, 6]));
         let task = run(&end, &mut client);
-        assert_eq!(task.ticket.status.code(), 6);
-        assert_eq!(task.ticket.exception, 6);
+        assert_eq!(task.state.status.code(), 6);
+        assert_eq!(task.state.exception, 6);
         assert_eq!(task.reply[0], 0xEE);
     }
 }
@@ -145,19 +145,19 @@ fn a_response_that_does_not_match_the_request_is_malformed() {
             wrong[at] ^= 0x40;
             end.deliver(1_000, &frame(17, &wrong));
             let task = run(&end, &mut client);
-            let free = task.ticket.status == Status::OK;
+            let free = task.state.status == Status::OK;
             if free {
                 // Only data that the device chooses may differ.
                 assert!(!matches!(request[0], 5 | 6 | 0x0F | 0x10 | 0x15 | 0x16));
-                assert!(at >= usize::from(task.ticket.outline.data_at()));
+                assert!(at >= usize::from(task.state.header.data_at()));
             } else {
                 assert!(
                     matches!(
-                        task.ticket.status,
+                        task.state.status,
                         Status::MALFORMED_REPLY | Status::RESPONSE_TIMED_OUT
                     ),
                     "{request:02X?} {at} {:?}",
-                    task.ticket.status
+                    task.state.status
                 );
             }
         }
@@ -165,8 +165,8 @@ fn a_response_that_does_not_match_the_request_is_malformed() {
 }
 
 fn read(unit: u8, transaction: u16) -> Task {
-    Task::new(unit, transaction, &[], |outline| {
-        outline.set(Form::READ_HOLDING_REGISTERS, 0, 1)
+    Task::new(unit, transaction, &[], |header| {
+        header.set(FunctionSpec::READ_HOLDING_REGISTERS, 0, 1)
     })
 }
 
@@ -177,7 +177,7 @@ fn requests_are_sent_one_after_the_other_and_in_order() {
         assert!(client.queue(read(number as u8, number)).is_ok());
     }
     let refused = client.queue(read(9, 9)).err().unwrap();
-    assert_eq!(refused.ticket.status, Status::QUEUE_FULL);
+    assert_eq!(refused.state.status, Status::QUEUE_FULL);
     for number in 1..=4u8 {
         let request = sent(&end, &mut client);
         assert_eq!(request[0], number);
@@ -188,7 +188,7 @@ fn requests_are_sent_one_after_the_other_and_in_order() {
         end.deliver(0, &frame(number, &[3, 2, 0, number]));
         let task = run(&end, &mut client);
         assert_eq!(
-            (task.ticket.transaction, task.received()),
+            (task.state.transaction, task.received()),
             (number.into(), &[0, number][..])
         );
     }
@@ -206,19 +206,17 @@ fn only_writes_are_broadcast_and_they_take_the_turnaround_delay() {
                 assert!(broadcast);
                 assert_eq!(sent(&end, &mut client)[0], 0);
                 let begun = end.now();
-                assert_eq!(run(&end, &mut client).ticket.status, Status::OK);
+                assert_eq!(run(&end, &mut client).state.status, Status::OK);
                 assert!((100_000..101_000).contains(&(end.now() - begun)));
             }
             Err(task) => {
                 assert!(!broadcast);
-                assert_eq!(task.ticket.status, Status::BROADCAST_NOT_ALLOWED);
+                assert_eq!(task.state.status, Status::BROADCAST_NOT_ALLOWED);
             }
         }
     }
     for sub_function in 0..0x15 {
-        let task = Task::new(0, 0, &[0, 0], |outline| {
-            outline.diagnostics(sub_function, 1)
-        });
+        let task = Task::new(0, 0, &[0, 0], |header| header.diagnostics(sub_function, 1));
         let queued = client.queue(task).is_ok();
         assert_eq!(queued, matches!(sub_function, 1 | 4 | 0x0A | 0x14));
         if queued {
@@ -230,9 +228,9 @@ fn only_writes_are_broadcast_and_they_take_the_turnaround_delay() {
 #[test]
 fn force_listen_only_mode_ends_without_a_response() {
     let (end, mut client) = rtu_client();
-    let task = Task::new(17, 0, &[0, 0], |outline| outline.diagnostics(4, 1));
+    let task = Task::new(17, 0, &[0, 0], |header| header.diagnostics(4, 1));
     assert!(client.queue(task).is_ok());
-    assert_eq!(run(&end, &mut client).ticket.status, Status::OK);
+    assert_eq!(run(&end, &mut client).state.status, Status::OK);
     assert!(end.now() < 110_000);
 }
 
@@ -247,8 +245,8 @@ fn a_lost_link_ends_the_active_request_and_the_queued_ones() {
     end.0.borrow_mut().dead = true;
     for number in 1..=3 {
         let task = client.poll(end.now(), true).unwrap();
-        assert_eq!(task.ticket.status, Status::LINK_LOST);
-        assert_eq!(task.ticket.transaction, number);
+        assert_eq!(task.state.status, Status::LINK_LOST);
+        assert_eq!(task.state.transaction, number);
     }
     assert!(client.poll(end.now(), true).is_none());
     assert!(!client.is_connected());
@@ -269,7 +267,7 @@ fn a_reconnect_ends_only_the_active_request() {
     client.reconnect();
     let task = run(&end, &mut client);
     assert_eq!(
-        (task.ticket.transaction, task.ticket.status),
+        (task.state.transaction, task.state.status),
         (1, Status::LINK_LOST)
     );
     assert_eq!(sent(&end, &mut client)[0], 2);
@@ -284,11 +282,11 @@ fn a_request_can_be_cancelled_while_it_is_active_or_queued() {
     sent(&end, &mut client);
     for number in [1, 3] {
         let task = client
-            .cancel(|task| task.ticket.transaction == number)
+            .cancel(|task| task.state.transaction == number)
             .unwrap();
-        assert_eq!(task.ticket.status, Status::CANCELLED);
+        assert_eq!(task.state.status, Status::CANCELLED);
         assert!(client
-            .cancel(|task| task.ticket.transaction == number)
+            .cancel(|task| task.state.transaction == number)
             .is_none());
     }
     assert_eq!(sent(&end, &mut client)[0], 2);
@@ -298,8 +296,8 @@ fn a_request_can_be_cancelled_while_it_is_active_or_queued() {
 #[test]
 fn a_suspended_client_sends_nothing() {
     let (end, mut client) = rtu_client();
-    assert!(client.lend());
-    assert!(!client.lend());
+    assert!(client.suspend());
+    assert!(!client.suspend());
     assert!(client.queue(read(1, 1)).is_ok());
     end.pass(50_000);
     assert!(client.poll(end.now(), true).is_none());
@@ -307,33 +305,33 @@ fn a_suspended_client_sends_nothing() {
     assert!(end.sent().is_empty());
     client.take_back();
     sent(&end, &mut client);
-    assert!(!client.lend());
+    assert!(!client.suspend());
 }
 
 #[test]
 fn a_reply_longer_than_the_capacity_of_the_request_ends_with_buffer_too_small() {
     let (end, mut client) = rtu_client();
-    let mut task = Task::new(1, 1, &[], |outline| {
-        outline.set(Form::REPORT_SERVER_ID, 0, 0)
+    let mut task = Task::new(1, 1, &[], |header| {
+        header.set(FunctionSpec::REPORT_SERVER_ID, 0, 0)
     });
-    task.ticket.capacity = 2;
+    task.state.capacity = 2;
     assert!(client.queue(task).is_ok());
     sent(&end, &mut client);
     end.deliver(0, &frame(1, &[0x11, 3, 1, 2, 3]));
     let task = run(&end, &mut client);
-    assert_eq!(task.ticket.status, Status::BUFFER_TOO_SMALL);
-    assert_eq!((task.ticket.length, task.reply[0]), (0, 0xEE));
+    assert_eq!(task.state.status, Status::BUFFER_TOO_SMALL);
+    assert_eq!((task.state.length, task.reply[0]), (0, 0xEE));
 }
 
 /// The device answers in order, but its first reply arrives after the timeout. That late
 /// reply looks like the reply to the next request.
-fn a_late_reply_is_passed_over(line: (End, Line), encode: fn(u8, &[u8]) -> Vec<u8>) {
+fn a_late_reply_is_passed_over(line: (End, Transport), encode: fn(u8, &[u8]) -> Vec<u8>) {
     let (end, mut client) = line;
     client.line.engine.settings.response_timeout = 500_000;
     let reply = |value: u8| encode(17, &[3, 2, 0, value]);
     assert!(client.queue(read(17, 1)).is_ok());
     assert_eq!(
-        run(&end, &mut client).ticket.status,
+        run(&end, &mut client).state.status,
         Status::RESPONSE_TIMED_OUT
     );
     for value in 1..5 {
@@ -344,7 +342,7 @@ fn a_late_reply_is_passed_over(line: (End, Line), encode: fn(u8, &[u8]) -> Vec<u
         }
         end.deliver(30_000, &reply(value));
         let task = run(&end, &mut client);
-        assert_eq!(task.ticket.status, Status::OK);
+        assert_eq!(task.state.status, Status::OK);
         assert_eq!(task.received(), [0, value]);
     }
 }
@@ -364,7 +362,8 @@ fn a_late_reply_in_ascii_frames_is_not_the_answer_to_a_later_request() {
 fn ended_in_ascii(line: &[u8]) -> Task {
     let (end, mut client) = ascii_client();
     client.line.engine.storage.frame = Frame::new(vec![0; 40]);
-    let build: fn(&mut Outline) -> Status = |o| o.set(Form::READ_EXCEPTION_STATUS, 0, 0);
+    let build: fn(&mut RequestHeader) -> Status =
+        |o| o.set(FunctionSpec::READ_EXCEPTION_STATUS, 0, 0);
     assert!(client.queue(Task::new(2, 1, &[], build)).is_ok());
     sent(&end, &mut client);
     // The characters arrive one by one.
@@ -379,7 +378,7 @@ fn an_ascii_frame_is_found_after_noise_and_after_a_truncated_frame() {
     for line in [&b":02075A9D\r\n"[..], b"\xFF12\r\n:0207:02075A9D\r\n"] {
         let task = ended_in_ascii(line);
         assert_eq!(
-            (task.ticket.status, task.received()),
+            (task.state.status, task.received()),
             (Status::OK, &[0x5A][..])
         );
     }
@@ -398,6 +397,6 @@ fn the_most_specific_fault_on_an_ascii_line_becomes_the_status() {
             Status::BUFFER_TOO_SMALL,
         ),
     ] {
-        assert_eq!(ended_in_ascii(line).ticket.status, status, "{line:?}");
+        assert_eq!(ended_in_ascii(line).state.status, status, "{line:?}");
     }
 }

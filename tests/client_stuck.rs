@@ -5,9 +5,9 @@
 #[path = "common/wire.rs"]
 mod wire;
 
-use mbm::client::{Backoff, Client, Line, Serial, Tcp};
+use mbm::client::{Backoff, Client, Serial, Tcp, Transport};
 use mbm::error::Status;
-use mbm::pdu::outline::Form;
+use mbm::pdu::header::FunctionSpec;
 use wire::{End, Lent, Task};
 
 type TcpIp = Client<Tcp<End, Lent>, Task, 16>;
@@ -23,16 +23,16 @@ fn client() -> (End, TcpIp) {
 }
 
 fn read(transaction: u16) -> Task {
-    Task::new(1, transaction, &[], |outline| {
-        outline.set(Form::READ_HOLDING_REGISTERS, transaction, 1)
+    Task::new(1, transaction, &[], |header| {
+        header.set(FunctionSpec::READ_HOLDING_REGISTERS, transaction, 1)
     })
 }
 
 /// Polls once as C does. Returns the number and the status of each request that ended.
-fn poll<L: Line<Task>>(end: &End, client: &mut Client<L, Task, 16>) -> Vec<(u16, Status)> {
+fn poll<L: Transport<Task>>(end: &End, client: &mut Client<L, Task, 16>) -> Vec<(u16, Status)> {
     let mut ended = Vec::new();
     while let Some(task) = client.poll(end.now(), ended.is_empty()) {
-        ended.push((task.ticket.transaction, task.ticket.status));
+        ended.push((task.state.transaction, task.state.status));
     }
     ended
 }
@@ -52,7 +52,7 @@ fn set_stuck(end: &End, stuck: bool) {
 #[test]
 fn requests_that_wait_for_buffer_space_end_if_the_port_accepts_nothing() {
     let (end, mut client) = client();
-    client.line.means.outgoing = vec![0; REQUEST];
+    client.line.storage.outgoing = vec![0; REQUEST];
     set_stuck(&end, true);
     for number in 1..=3 {
         assert!(client.queue(read(number)).is_ok());
@@ -69,7 +69,7 @@ fn requests_that_wait_for_buffer_space_end_if_the_port_accepts_nothing() {
 #[test]
 fn requests_after_a_half_sent_one_end_if_the_port_accepts_no_more() {
     let (end, mut client) = client();
-    client.line.means.outgoing = vec![0; REQUEST];
+    client.line.storage.outgoing = vec![0; REQUEST];
     end.0.borrow_mut().piece = Some(5);
     for number in 1..=3 {
         assert!(client.queue(read(number)).is_ok());
@@ -95,7 +95,7 @@ fn requests_after_a_half_sent_one_end_if_the_port_accepts_no_more() {
 #[test]
 fn a_request_that_waits_for_buffer_space_is_sent_as_soon_as_there_is_some() {
     let (end, mut client) = client();
-    client.line.means.outgoing = vec![0; REQUEST];
+    client.line.storage.outgoing = vec![0; REQUEST];
     end.0.borrow_mut().piece = Some(5);
     for number in 1..=2 {
         assert!(client.queue(read(number)).is_ok());
@@ -132,8 +132,8 @@ fn a_request_cancelled_before_it_is_sent_is_not_sent_later() {
         assert!(client.queue(read(number)).is_ok());
     }
     poll(&end, &mut client);
-    let second = client.cancel(|task| task.ticket.transaction == 2);
-    assert_eq!(second.unwrap().ticket.status, Status::CANCELLED);
+    let second = client.cancel(|task| task.state.transaction == 2);
+    assert_eq!(second.unwrap().state.status, Status::CANCELLED);
     set_stuck(&end, false);
     poll(&end, &mut client);
     assert_eq!(requested(&end), [1, 3]);
@@ -170,7 +170,7 @@ fn a_port_that_accepts_nothing_is_tried_every_millisecond() {
 
 /// The client reads a late response while its request waits for the retry. If it left the
 /// bytes unread, a program that sleeps until bytes arrive would never sleep.
-fn late_bytes_are_read<L: Line<Task>>(end: &End, client: &mut Client<L, Task, 16>) {
+fn late_bytes_are_read<L: Transport<Task>>(end: &End, client: &mut Client<L, Task, 16>) {
     client.policy().retries = 1;
     client
         .policy()

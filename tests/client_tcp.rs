@@ -7,13 +7,13 @@ mod stream;
 use mbm::engine::{Counter, Frame};
 use mbm::error::Status;
 use mbm::frame::tcp;
-use mbm::pdu::outline::{Form, Outline};
+use mbm::pdu::header::{FunctionSpec, RequestHeader};
 use proptest::prelude::*;
 use stream::{client, poll, read, requests, response, wire::Task};
 
 fn assert_right(task: &Task) {
-    assert_eq!(task.ticket.status, Status::OK);
-    assert_eq!(task.received(), task.ticket.transaction.to_be_bytes());
+    assert_eq!(task.state.status, Status::OK);
+    assert_eq!(task.received(), task.state.transaction.to_be_bytes());
 }
 
 #[test]
@@ -23,7 +23,7 @@ fn all_requests_are_under_way_at_once_and_answered_in_any_order() {
         assert!(client.queue(read(1, number)).is_ok());
     }
     assert_eq!(
-        client.queue(read(1, 17)).err().unwrap().ticket.status,
+        client.queue(read(1, 17)).err().unwrap().state.status,
         Status::QUEUE_FULL
     );
     assert!(poll(&end, &mut client).is_empty());
@@ -39,7 +39,7 @@ fn all_requests_are_under_way_at_once_and_answered_in_any_order() {
     assert_eq!(ended.len(), 16);
     for (task, number) in ended.iter().zip((1..=16).rev()) {
         assert_right(task);
-        assert_eq!(task.ticket.transaction, number);
+        assert_eq!(task.state.transaction, number);
     }
 }
 
@@ -63,7 +63,7 @@ fn a_response_may_arrive_and_a_request_may_leave_byte_by_byte() {
 #[test]
 fn a_response_with_an_unknown_transaction_identifier_is_dropped_and_counted() {
     let (end, mut client) = client();
-    let counters = client.line.means.counters.clone();
+    let counters = client.line.storage.counters.clone();
     assert!(client.queue(read(1, 7)).is_ok());
     poll(&end, &mut client);
     let (wire, unit, address) = requests(&end.sent())[0];
@@ -89,7 +89,7 @@ fn a_response_of_another_unit_is_not_taken() {
     assert!(poll(&end, &mut client).is_empty());
     end.pass(2_000_000);
     assert_eq!(
-        poll(&end, &mut client)[0].ticket.status,
+        poll(&end, &mut client)[0].state.status,
         Status::INVALID_SLAVE_ID
     );
 }
@@ -114,7 +114,7 @@ fn a_response_that_does_not_match_the_request_fails_at_once() {
         frame.extend(pdu);
         end.deliver(0, &frame);
         assert_eq!(
-            poll(&end, &mut client)[0].ticket.status,
+            poll(&end, &mut client)[0].state.status,
             status,
             "{pdu:02X?}"
         );
@@ -131,14 +131,14 @@ fn a_server_id_longer_than_its_byte_count_is_taken_whole() {
         (&[0x91, 2, 1], Status::MALFORMED_REPLY),
     ] {
         let (end, mut client) = client();
-        let form = |outline: &mut Outline| outline.set(Form::REPORT_SERVER_ID, 0, 0);
+        let form = |header: &mut RequestHeader| header.set(FunctionSpec::REPORT_SERVER_ID, 0, 0);
         assert!(client.queue(Task::new(1, 7, &[], form)).is_ok());
         poll(&end, &mut client);
         let [a, b] = tcp::header(&end.sent()).unwrap().transaction.to_be_bytes();
         let head = [a, b, 0, 0, 0, pdu.len() as u8 + 1, 1];
         end.deliver(0, &[&head, pdu].concat());
         let task = &poll(&end, &mut client)[0];
-        assert_eq!(task.ticket.status, status, "{pdu:02X?}");
+        assert_eq!(task.state.status, status, "{pdu:02X?}");
         if status == Status::OK {
             assert_eq!(task.received(), [1, 2, 0xFF, 7, 8]);
         }
@@ -178,7 +178,7 @@ fn two_pending_requests_cannot_have_the_same_number() {
     let (end, mut client) = client();
     assert!(client.queue(read(1, 7)).is_ok());
     let refused = client.queue(read(2, 7)).err().unwrap();
-    assert_eq!(refused.ticket.status, Status::DUPLICATE_TRANSACTION);
+    assert_eq!(refused.state.status, Status::DUPLICATE_TRANSACTION);
     assert!(client.queue(read(1, 0)).is_ok());
     assert!(client.queue(read(1, 0)).is_ok());
     poll(&end, &mut client);
@@ -226,11 +226,11 @@ fn a_transaction_identifier_is_not_used_again_while_its_request_is_pending() {
 #[test]
 fn a_broadcast_over_tcp_is_refused() {
     let (_, mut client) = client();
-    let task = Task::new(0, 1, &[], |outline| {
-        outline.set(Form::WRITE_SINGLE_REGISTER, 1, 2)
+    let task = Task::new(0, 1, &[], |header| {
+        header.set(FunctionSpec::WRITE_SINGLE_REGISTER, 1, 2)
     });
     assert_eq!(
-        client.queue(task).err().unwrap().ticket.status,
+        client.queue(task).err().unwrap().state.status,
         Status::BROADCAST_NOT_ALLOWED
     );
 }
@@ -259,8 +259,8 @@ fn no_more_requests_are_in_flight_than_the_limit_allows() {
 #[test]
 fn requests_that_do_not_fit_into_a_small_buffer_are_sent_later() {
     let (end, mut client) = client();
-    client.line.means.outgoing = vec![0; 30];
-    client.line.means.frame = Frame::new(vec![0; 12]);
+    client.line.storage.outgoing = vec![0; 30];
+    client.line.storage.frame = Frame::new(vec![0; 12]);
     for number in 1..=5 {
         assert!(client.queue(read(1, number)).is_ok());
     }
@@ -281,8 +281,8 @@ fn requests_that_do_not_fit_into_a_small_buffer_are_sent_later() {
 #[test]
 fn a_late_poll_reads_all_bytes_that_have_arrived_before_it_checks_deadlines() {
     let (end, mut client) = client();
-    let counters = client.line.means.counters.clone();
-    client.line.means.frame = Frame::new(vec![0; 16]);
+    let counters = client.line.storage.counters.clone();
+    client.line.storage.frame = Frame::new(vec![0; 16]);
     for number in 1..=5 {
         assert!(client.queue(read(1, number)).is_ok());
     }
@@ -314,13 +314,13 @@ fn endless_noise_does_not_keep_a_request_from_timing_out() {
     end.pass(3_000_000);
     let ended = poll(&end, &mut client);
     assert_eq!(ended.len(), 1);
-    assert_eq!(ended[0].ticket.status, Status::RESPONSE_TIMED_OUT);
+    assert_eq!(ended[0].state.status, Status::RESPONSE_TIMED_OUT);
 }
 
 #[test]
 fn a_request_that_waits_for_buffer_space_follows_one_that_was_sent_in_pieces() {
     let (end, mut client) = client();
-    client.line.means.outgoing = vec![0; 12];
+    client.line.storage.outgoing = vec![0; 12];
     end.0.borrow_mut().piece = Some(6);
     for number in 1..=3 {
         assert!(client.queue(read(1, number)).is_ok());
@@ -336,10 +336,10 @@ fn a_request_that_waits_for_buffer_space_follows_one_that_was_sent_in_pieces() {
 #[test]
 fn a_response_longer_than_the_buffer_is_skipped_and_reported() {
     let (end, mut client) = client();
-    client.line.means.frame = Frame::new(vec![0; 12]);
+    client.line.storage.frame = Frame::new(vec![0; 12]);
     assert!(client.queue(read(1, 7)).is_ok());
-    let long = Task::new(1, 8, &[], |outline| {
-        outline.set(Form::READ_HOLDING_REGISTERS, 8, 20)
+    let long = Task::new(1, 8, &[], |header| {
+        header.set(FunctionSpec::READ_HOLDING_REGISTERS, 8, 20)
     });
     assert!(client.queue(long).is_ok());
     poll(&end, &mut client);
@@ -353,14 +353,14 @@ fn a_response_longer_than_the_buffer_is_skipped_and_reported() {
     for _ in 0..10 {
         ended.extend(poll(&end, &mut client));
     }
-    assert_eq!(ended[0].ticket.status, Status::BUFFER_TOO_SMALL);
+    assert_eq!(ended[0].state.status, Status::BUFFER_TOO_SMALL);
     assert_right(&ended[1]);
 }
 
 #[test]
 fn bytes_of_a_skipped_frame_are_not_taken_for_the_response() {
     let (end, mut client) = client();
-    client.line.means.frame = Frame::new(vec![0; 24]);
+    client.line.storage.frame = Frame::new(vec![0; 24]);
     assert!(client.queue(read(1, 7)).is_ok());
     poll(&end, &mut client);
     let (wire, unit, address) = requests(&end.sent())[0];
@@ -391,7 +391,7 @@ fn a_lost_link_ends_all_requests() {
     assert_eq!(ended.len(), 5);
     assert!(ended
         .iter()
-        .all(|task| task.ticket.status == Status::LINK_LOST));
+        .all(|task| task.state.status == Status::LINK_LOST));
     assert!(!client.is_connected());
 }
 
@@ -407,7 +407,7 @@ fn a_reconnect_discards_a_half_received_response() {
     client.reconnect();
     let ended = poll(&end, &mut client);
     assert_eq!(
-        (ended[0].ticket.transaction, ended[0].ticket.status),
+        (ended[0].state.transaction, ended[0].state.status),
         (1, Status::LINK_LOST)
     );
     let sent = requests(&end.sent());
@@ -424,7 +424,7 @@ fn a_cancelled_request_frees_its_place_for_the_next() {
     assert!(client.queue(read(1, 2)).is_ok());
     poll(&end, &mut client);
     let first = requests(&end.sent())[0];
-    assert!(client.cancel(|task| task.ticket.transaction == 1).is_some());
+    assert!(client.cancel(|task| task.state.transaction == 1).is_some());
     end.deliver(0, &response(first));
     assert!(poll(&end, &mut client).is_empty());
     end.deliver(0, &response(requests(&end.sent())[0]));
@@ -440,7 +440,7 @@ fn a_request_that_the_port_never_accepts_ends_with_line_busy() {
     assert!(client.queue(read(1, 1)).is_ok());
     poll(&end, &mut client);
     end.pass(2_000_000);
-    assert_eq!(poll(&end, &mut client)[0].ticket.status, Status::LINE_BUSY);
+    assert_eq!(poll(&end, &mut client)[0].state.status, Status::LINE_BUSY);
 }
 
 proptest! {
@@ -485,11 +485,11 @@ proptest! {
         }
         prop_assert_eq!(client.pending(), 0);
         prop_assert_eq!(ended.len(), usize::from(next));
-        let mut numbers: Vec<u16> = ended.iter().map(|task| task.ticket.transaction).collect();
+        let mut numbers: Vec<u16> = ended.iter().map(|task| task.state.transaction).collect();
         numbers.sort_unstable();
         prop_assert_eq!(numbers, (1..=next).collect::<Vec<_>>());
         for task in ended {
-            match task.ticket.status {
+            match task.state.status {
                 Status::OK => assert_right(&task),
                 other => prop_assert!(other.is_failure()),
             }

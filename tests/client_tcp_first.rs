@@ -42,11 +42,11 @@ fn a_response_has_the_same_result_for_the_first_request_and_for_a_later_one() {
                 ended.extend(poll(&end, &mut client));
                 end.pass(500_000);
             }
-            let task = ended.iter().find(|task| task.ticket.transaction == 7);
+            let task = ended.iter().find(|task| task.state.transaction == 7);
             let task = task.unwrap();
             (
-                task.ticket.status,
-                task.ticket.exception,
+                task.state.status,
+                task.state.exception,
                 task.received().to_vec(),
             )
         });

@@ -4,7 +4,7 @@
 mod vectors;
 
 use mbm::error::Status;
-use mbm::pdu::outline::Outline;
+use mbm::pdu::header::RequestHeader;
 use mbm::pdu::request::Request;
 use proptest::prelude::*;
 use std::sync::LazyLock;
@@ -12,16 +12,16 @@ use vectors::{all, right_pdus, Direction};
 
 /// Forwards a request PDU. Returns its outline and the PDU that is sent, or the status that
 /// refuses it.
-fn forward(pdu: &[u8]) -> Result<(Outline, Vec<u8>), Status> {
-    let mut outline = Outline::NONE;
-    match outline.forward(pdu[0], &pdu[1..]) {
+fn forward(pdu: &[u8]) -> Result<(RequestHeader, Vec<u8>), Status> {
+    let mut header = RequestHeader::NONE;
+    match header.forward(pdu[0], &pdu[1..]) {
         Status::OK => {}
         refused => return Err(refused),
     }
-    let data = &pdu[pdu.len() - usize::from(outline.data_length())..];
-    let mut sent = vec![0; usize::from(outline.request_length())];
-    outline.emit(&mut sent, |index| data[index]);
-    Ok((outline, sent))
+    let data = &pdu[pdu.len() - usize::from(header.data_length())..];
+    let mut sent = vec![0; usize::from(header.request_length())];
+    header.emit(&mut sent, |index| data[index]);
+    Ok((header, sent))
 }
 
 /// The PDU of every valid request of the table.
@@ -37,10 +37,10 @@ static REQUESTS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
 fn every_valid_request_is_forwarded_unchanged() {
     assert!(REQUESTS.len() > 60);
     for pdu in REQUESTS.iter() {
-        let (outline, sent) = forward(pdu).unwrap_or_else(|status| panic!("{pdu:02X?} {status:?}"));
+        let (header, sent) = forward(pdu).unwrap_or_else(|status| panic!("{pdu:02X?} {status:?}"));
         assert_eq!(sent, *pdu);
-        assert!(!outline.sends_words() && !outline.takes_words());
-        assert_eq!((outline.data_at(), outline.mask()), (1, 0xFF));
+        assert!(!header.sends_words() && !header.takes_words());
+        assert_eq!((header.data_at(), header.mask()), (1, 0xFF));
     }
 }
 
@@ -60,16 +60,16 @@ fn the_responses_printed_in_the_standard_match_their_requests() {
         let (Some(request), true) = (request, right(&answer)) else {
             continue;
         };
-        let (outline, _) = forward(&request.bytes).unwrap();
-        let data = &request.bytes[request.bytes.len() - usize::from(outline.data_length())..];
+        let (header, _) = forward(&request.bytes).unwrap();
+        let data = &request.bytes[request.bytes.len() - usize::from(header.data_length())..];
         let pdu = &answer.bytes;
-        let length = outline.expected(pdu, pdu.len()).unwrap();
+        let length = header.expected(pdu, pdu.len()).unwrap();
         assert_eq!(usize::from(length.get()), pdu.len(), "{name}");
         let status = match *pdu.as_slice() {
             [function, code] if function & 0x80 != 0 => Status::exception(code),
             _ => Status::OK,
         };
-        assert_eq!(outline.judge(pdu, |index| data[index]), status, "{name}");
+        assert_eq!(header.validate(pdu, |index| data[index]), status, "{name}");
         count += 1;
     }
     assert!(count >= 18);

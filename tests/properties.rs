@@ -170,7 +170,7 @@ proptest! {
         noise in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..20), 1..60),
         seed: u8,
         piece in 1usize..300,
-        room in 0usize..20,
+        space in 0usize..20,
     ) {
         let reply = right_reply(17, request, seed);
         let query = request.query().unwrap();
@@ -179,7 +179,7 @@ proptest! {
         let bytes: Vec<u8> = false_heads.flatten().chain(&reply).copied().collect();
         prop_assume!(!is_answered_before(17, request, &bytes, reply.len()));
         let least = reply.len().max(usize::from(query.length()) + 3);
-        let mut master = TestMaster::new(17, least + room);
+        let mut master = TestMaster::new(17, least + space);
         // The polls are closer together than the silence that ends a frame.
         prop_assert_eq!(master.request(request, &bytes, piece, 100), Status::OK);
         prop_assert_eq!(master.words(), right_words(request, seed));

@@ -222,10 +222,10 @@ fn data_longer_than_any_pdu_are_refused_for_every_buffer_size() {
             Request::EncapsulatedInterface { mei_type: 1, data },
         ];
         for request in long {
-            for room in [0, 253, 254, 66_000, 70_100] {
-                let emitted = request.emit(&mut vec![0; room]);
+            for space in [0, 253, 254, 66_000, 70_100] {
+                let emitted = request.emit(&mut vec![0; space]);
                 let expected = Err(Status::ILLEGAL_DATA_VALUE);
-                assert_eq!(emitted, expected, "{length} into {room}");
+                assert_eq!(emitted, expected, "{length} into {space}");
             }
         }
         let long = [
@@ -246,10 +246,10 @@ fn data_longer_than_any_pdu_are_refused_for_every_buffer_size() {
             Response::EncapsulatedInterface { mei_type: 1, data },
         ];
         for response in long {
-            for room in [0, 253, 254, 66_000, 70_100] {
-                let emitted = response.emit(&mut vec![0; room]);
+            for space in [0, 253, 254, 66_000, 70_100] {
+                let emitted = response.emit(&mut vec![0; space]);
                 let expected = Err(Status::MALFORMED_REPLY);
-                assert_eq!(emitted, expected, "{length} into {room}");
+                assert_eq!(emitted, expected, "{length} into {space}");
             }
         }
     }

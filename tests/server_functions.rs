@@ -171,8 +171,8 @@ fn a_restart_clears_the_counters_and_on_request_the_event_log() {
 #[test]
 fn a_user_defined_function_gets_the_request_data_and_writes_the_response_data() {
     let mut device = Device::new();
-    device.custom = |data, room| {
-        for (place, byte) in room.iter_mut().zip(data) {
+    device.custom = |data, space| {
+        for (place, byte) in space.iter_mut().zip(data) {
             *place = !byte;
         }
         Outcome::Data(data.len() * 2)
@@ -181,12 +181,12 @@ fn a_user_defined_function_gets_the_request_data_and_writes_the_response_data() 
     assert_eq!(ask(&mut device, &[0x42, 1, 2])[..3], [0x42, 0xFE, 0xFD]);
     device.custom = |_, _| Outcome::Exception(0x0B);
     assert_eq!(ask(&mut device, &[0x42, 1, 2]), [0xC2, 0x0B]);
-    device.custom = |_, _| Outcome::Silent;
+    device.custom = |_, _| Outcome::NoResponse;
     assert_eq!(ask(&mut device, &[0x42, 1, 2]), []);
     // More data than the response can hold.
-    device.custom = |_, room| Outcome::Data(room.len() + 1);
+    device.custom = |_, space| Outcome::Data(space.len() + 1);
     assert_eq!(ask(&mut device, &[0x42, 1, 2]), [0xC2, 4]);
-    device.custom = |_, room| Outcome::Data(room.len());
+    device.custom = |_, space| Outcome::Data(space.len());
     assert_eq!(ask(&mut device, &[0x42, 1, 2]).len(), 1 + 250);
 }
 
@@ -199,8 +199,8 @@ fn a_function_that_returns_pending_is_called_again() {
     line.arrive(0, &[0, 1, 0, 0, 0, 3, 17, 0x42, 7]);
     assert!(line.run(100_000, 100).is_empty());
     assert_eq!(line.device.diagnostics.server_messages, 1);
-    line.device.custom = |data, room| {
-        room[0] = data[0];
+    line.device.custom = |data, space| {
+        space[0] = data[0];
         Outcome::Data(1)
     };
     assert_eq!(line.frames(1_000, 100), [[0, 1, 0, 0, 0, 3, 17, 0x42, 7]]);

@@ -81,11 +81,11 @@ impl Port for End {
     }
 }
 
-type Lent = Buffers<[u8; 256], [u16; 125], [u16; 123]>;
+type ServerStorage = Buffers<[u8; 256], [u16; 125], [u16; 123]>;
 
 struct Loop {
     wire: Rc<RefCell<Wire>>,
-    master: Master<End, Lent>,
+    master: Master<End, ServerStorage>,
     server: Server<End, [u8; 256]>,
     device: Device,
 }

@@ -259,13 +259,13 @@ fn a_million_requests_have_the_same_effects_as_on_the_model() {
         input_bits.0.valid = Some(&valid);
         let services: [&mut dyn Service; 4] =
             [&mut words, &mut input_words, &mut bits, &mut input_bits];
-        let mut reply = Reply::NOT_MINE;
+        let mut reply = Reply::NOT_HANDLED;
         for service in services {
-            if reply == Reply::NOT_MINE {
+            if reply == Reply::NOT_HANDLED {
                 reply = service.serve(&mut buffer, pdu.len());
             }
         }
-        let length = reply.settle(&mut buffer);
+        let length = reply.write_exception(&mut buffer);
         let before = model.clone();
         let expected = model.answer(&pdu);
         writes += u32::from(before != model);

@@ -18,16 +18,16 @@ struct Strict {
 impl Strict {
     fn within(&self, index: u8, count: u8) {
         let end = u16::from(index) + u16::from(count);
-        let room = u16::from(self.room());
-        assert!(end <= room, "{count} bytes from {index} of {room}");
+        let space = u16::from(self.capacity());
+        assert!(end <= space, "{count} bytes from {index} of {space}");
     }
 }
 
 impl Storage for Strict {
     type Count = u8;
 
-    fn room(&self) -> u8 {
-        self.lent.room()
+    fn capacity(&self) -> u8 {
+        self.lent.capacity()
     }
     fn byte(&self, index: u8) -> u8 {
         self.within(index, 1);
@@ -70,13 +70,13 @@ impl Words for Strict {
     fn transmit_words(&self) -> u8 {
         self.lent.transmit_words()
     }
-    fn send_words(&mut self, to: u8, count: u8, high_first: bool) {
+    fn load_words(&mut self, to: u8, count: u8, high_first: bool) {
         self.within(to, count);
         assert!(
             count.div_ceil(2) <= self.transmit_words(),
             "{count} bytes to send"
         );
-        self.lent.send_words(to, count, high_first);
+        self.lent.load_words(to, count, high_first);
     }
     fn response(&mut self) -> &mut [u16] {
         self.lent.response()
@@ -84,14 +84,14 @@ impl Words for Strict {
     fn response_words(&self) -> u8 {
         self.lent.response_words()
     }
-    fn take_words(&mut self, from: u8, count: u8, high_first: bool) {
+    fn store_words(&mut self, from: u8, count: u8, high_first: bool) {
         // For an odd count, one byte more is read.
         self.within(from, count.next_multiple_of(2));
         assert!(
             count.div_ceil(2) <= self.response_words(),
             "{count} bytes to fill"
         );
-        self.lent.take_words(from, count, high_first);
+        self.lent.store_words(from, count, high_first);
     }
 }
 
@@ -155,7 +155,7 @@ proptest! {
     #[test]
     fn every_index_stays_within_the_buffers(
         (call, lines) in any_lines(),
-        room in 8usize..257,
+        space in 8usize..257,
         words in (0usize..126, 0usize..126),
         piece in 1usize..300,
         step in 1u32..20_000,
@@ -167,8 +167,8 @@ proptest! {
         // Two of the three sizes are exactly what the request or the reply needs.
         let query = call.query().unwrap();
         let longest = query.length().max(query.response_length());
-        for room in [room, usize::from(query.length()) + 3, usize::from(longest) + 3] {
-            let lent = Buffers::new(vec![0; room], vec![0; words.0], vec![0; words.1]);
+        for space in [space, usize::from(query.length()) + 3, usize::from(longest) + 3] {
+            let lent = Buffers::new(vec![0; space], vec![0; words.0], vec![0; words.1]);
             let mut master = Master::new(17, Line::default(), Strict { lent, aside: 0 });
             master.settings().retries = retries;
             master.settings().echo_discard = echo;
@@ -178,7 +178,7 @@ proptest! {
                     break;
                 }
                 // With `at_end`, noise fills the buffer so that the bytes end where it ends.
-                let noise = if at_end { room.min(255).saturating_sub(bytes.len()) } else { 0 };
+                let noise = if at_end { space.min(255).saturating_sub(bytes.len()) } else { 0 };
                 let bytes = [&vec![0; noise], &bytes[..]].concat();
                 master.port().deliver(&bytes, piece, step);
                 while master.poll() == Status::PENDING {}

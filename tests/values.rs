@@ -4,7 +4,7 @@
 use mbm::data::bits;
 use mbm::data::order::Order;
 use mbm::data::value::{ShortDouble, Value};
-use mbm::data::view::{Cells, Registers};
+use mbm::data::view::{RegisterBytes, Registers};
 use mbm::error::Status;
 use proptest::prelude::*;
 use std::fmt::Debug;
@@ -19,15 +19,15 @@ fn words(bytes: &[u8]) -> Vec<u16> {
         .collect()
 }
 
-fn ordered<C: Cells>(cells: C, first: u16, order: Order) -> Registers<C> {
+fn ordered<C: RegisterBytes>(cells: C, first: u16, order: Order) -> Registers<C> {
     Registers::new(cells, first, order).unwrap()
 }
 
-fn over<C: Cells>(cells: C, first: u16) -> Registers<C> {
+fn over<C: RegisterBytes>(cells: C, first: u16) -> Registers<C> {
     ordered(cells, first, Order::Abcd)
 }
 
-fn refused<C: Cells>(cells: C, first: u16) -> Option<Status> {
+fn refused<C: RegisterBytes>(cells: C, first: u16) -> Option<Status> {
     Registers::new(cells, first, Order::Abcd).err()
 }
 

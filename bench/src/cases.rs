@@ -1,7 +1,7 @@
 //! The rows: each function with frames of usual length, over RTU and TCP.
 
 use crate::libmodbus;
-use crate::ours::{answer, emit, judge, open, receive, receive_bits, Model};
+use crate::ours::{answer, emit, open, receive, receive_bits, validate, Model};
 use crate::rmodbus_side::{self as theirs, Ask};
 use crate::{Row, Work};
 use mbm::frame::Framing;
@@ -122,7 +122,7 @@ macro_rules! function {
             let frame = response.clone();
             $rows.push(row(
                 "judge response",
-                Box::new(move || judge(framing, &query, black_box(&frame))),
+                Box::new(move || validate(framing, &query, black_box(&frame))),
                 ask.map(|ask| theirs::parse_response(proto, ask, response)),
                 None,
             ));

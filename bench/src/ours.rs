@@ -3,7 +3,7 @@
 use mbm::data::{bits, registers};
 use mbm::error::Status;
 use mbm::frame::{ascii, rtu, tcp, Adu, Framing};
-use mbm::pdu::outline::Outline;
+use mbm::pdu::header::RequestHeader;
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
 use std::hint::black_box;
@@ -196,7 +196,7 @@ pub fn receive(framing: Framing, frame: &[u8], words: &mut [u16]) {
 /// Finds that a frame is the response to a write, and repeats what was written, as
 /// the client does.
 #[inline(always)]
-pub fn judge(framing: Framing, asked: &Outline, frame: &[u8]) {
+pub fn validate(framing: Framing, asked: &RequestHeader, frame: &[u8]) {
     let (adu, transaction) = match framing {
         Framing::Rtu => (rtu::parse(frame), 0),
         _ => (tcp::parse(frame), TRANSACTION),
@@ -208,8 +208,8 @@ pub fn judge(framing: Framing, asked: &Outline, frame: &[u8]) {
 
 /// What the client does where a response is not just the request's beginning.
 #[cold]
-fn says_ok(asked: &Outline, pdu: &[u8]) -> bool {
+fn says_ok(asked: &RequestHeader, pdu: &[u8]) -> bool {
     let length = asked.expected(pdu, pdu.len());
     let is_whole = length.is_some_and(|length| usize::from(length.get()) == pdu.len());
-    is_whole && asked.judge(pdu, |_| 0) == Status::OK
+    is_whole && asked.validate(pdu, |_| 0) == Status::OK
 }

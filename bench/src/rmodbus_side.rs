@@ -3,7 +3,7 @@
 use crate::ours::UNIT;
 use crate::Work;
 use mbm::error::Status;
-use mbm::pdu::outline::{Form, Outline};
+use mbm::pdu::header::{FunctionSpec, RequestHeader};
 use rmodbus::client::ModbusRequest;
 use rmodbus::server::context::ModbusContext;
 use rmodbus::server::storage::ModbusStorageSmall;
@@ -25,21 +25,25 @@ pub enum Ask {
 }
 
 /// The request as mbm's client keeps it, of one that writes.
-pub fn written(ask: Ask) -> Option<Outline> {
+pub fn written(ask: Ask) -> Option<RequestHeader> {
     let (form, first, second) = match ask {
-        Ask::SetCoil(address) => (Form::WRITE_SINGLE_COIL, address, 0xFF00),
-        Ask::SetHolding(address, value) => (Form::WRITE_SINGLE_REGISTER, address, value),
-        Ask::SetCoils(address, values) => {
-            (Form::WRITE_MULTIPLE_COILS, address, values.len() as u16)
-        }
-        Ask::SetHoldings(address, values) => {
-            (Form::WRITE_MULTIPLE_REGISTERS, address, values.len() as u16)
-        }
+        Ask::SetCoil(address) => (FunctionSpec::WRITE_SINGLE_COIL, address, 0xFF00),
+        Ask::SetHolding(address, value) => (FunctionSpec::WRITE_SINGLE_REGISTER, address, value),
+        Ask::SetCoils(address, values) => (
+            FunctionSpec::WRITE_MULTIPLE_COILS,
+            address,
+            values.len() as u16,
+        ),
+        Ask::SetHoldings(address, values) => (
+            FunctionSpec::WRITE_MULTIPLE_REGISTERS,
+            address,
+            values.len() as u16,
+        ),
         _ => return None,
     };
-    let mut outline = Outline::NONE;
-    assert!(outline.set(form, first, second) == Status::OK);
-    Some(outline)
+    let mut header = RequestHeader::NONE;
+    assert!(header.set(form, first, second) == Status::OK);
+    Some(header)
 }
 
 pub fn emit_request(proto: ModbusProto, ask: Ask) -> Work {

@@ -9,7 +9,7 @@ use mbm::error::Status;
 use mbm::frame::checksum::{crc16, lrc, Crc16};
 use mbm::frame::{Adu, Framing};
 use mbm::packet::refusal::{Exception, Head};
-use mbm::packet::{length, Side};
+use mbm::packet::{length, PduKind};
 use mbm::pdu::custom::Function;
 use mbm::pdu::length::Length;
 use mbm::pdu::limits::MAX_PDU;
@@ -249,7 +249,7 @@ pub unsafe extern "C" fn mbm_frame_expectedLength(
 }
 
 /// How long the PDU is that begins with these bytes.
-fn pdu_length(side: Side, bytes: &[u8], own: &[Function]) -> Result<Length, Status> {
+fn pdu_length(side: PduKind, bytes: &[u8], own: &[Function]) -> Result<Length, Status> {
     match side.length(bytes, own) {
         Length::Exactly(bytes) | Length::AtLeast(bytes) if bytes > MAX_PDU => {
             Err(Status::MALFORMED_FRAME)

@@ -35,7 +35,7 @@ const _: () = assert!(size_of::<mbm_counters>() == COUNTERS * size_of::<u32>());
 /// What mbm_master_setBuffers was given.
 // In this order: see `Engine`.
 #[repr(C)]
-pub(super) struct LentByC {
+pub(super) struct MasterBuffers {
     pub(super) frame_bytes: u8,
     pub(super) response_words: u8,
     pub(super) transmit_words: u8,
@@ -62,14 +62,14 @@ unsafe fn words<'a>(first: *mut u16, count: u8) -> &'a mut [u16] {
 ///
 /// Nothing is checked here, for its bytes. The function of the header that sets the fields
 /// demands a buffer of that length, and counters or NULL, valid for as long as the object is
-/// used. The engine, and a client's TCP line, keep every index below `room`:
+/// used. The engine, and a client's TCP line, keep every index below `space`:
 /// `tests/storage_bounds.rs`, `tests/client_bounds.rs` and `c-tests/test_client_buffers.c`
 /// hold them to that.
 macro_rules! lent_frame {
     ($count:ty) => {
         type Count = $count;
 
-        fn room(&self) -> $count {
+        fn capacity(&self) -> $count {
             self.frame_bytes
         }
 
@@ -127,7 +127,7 @@ macro_rules! lent_frame {
 pub(crate) use lent_frame;
 
 // Without buffers nothing is requested.
-impl Storage for LentByC {
+impl Storage for MasterBuffers {
     lent_frame!(u8);
 
     // Volatile, or LLVM would call memmove of libc.
@@ -147,7 +147,7 @@ impl Storage for LentByC {
 }
 
 // The engine keeps every index below the words that it asks for, too.
-impl Words for LentByC {
+impl Words for MasterBuffers {
     fn transmit(&mut self) -> &mut [u16] {
         // SAFETY: see above.
         unsafe { words(self.transmit, self.transmit_words) }
@@ -158,7 +158,7 @@ impl Words for LentByC {
     }
 
     #[inline(always)]
-    fn send_words(&mut self, to: u8, count: u8, high_first: bool) {
+    fn load_words(&mut self, to: u8, count: u8, high_first: bool) {
         // SAFETY: of `transmit_words`, and below `frame_bytes`, see above.
         unsafe {
             if !FIRMWARE && high_first {
@@ -185,7 +185,7 @@ impl Words for LentByC {
     }
 
     #[inline(always)]
-    fn take_words(&mut self, from: u8, count: u8, high_first: bool) {
+    fn store_words(&mut self, from: u8, count: u8, high_first: bool) {
         // SAFETY: below `frame_bytes`, and of `response_words`, see above.
         unsafe {
             if !FIRMWARE && high_first {

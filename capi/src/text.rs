@@ -5,26 +5,26 @@ use super::packet::side;
 use super::pointers::{buffer, get, lent_or_none};
 use core::ffi::c_char;
 use mbm::error::Status;
-use mbm::explain::{self, Line};
+use mbm::text::{self, TextWriter};
 
 /// The line that starts at a pointer from C; none if it has no room for the zero
 /// byte that ends it.
 ///
 /// # Safety
 /// `text` is NULL or points to `size` bytes, which nothing else uses meanwhile.
-pub(super) unsafe fn line<'a>(text: *mut c_char, size: u16) -> Result<Line<'a>, Status> {
+pub(super) unsafe fn line<'a>(text: *mut c_char, size: u16) -> Result<TextWriter<'a>, Status> {
     // SAFETY: as the caller promises; a character is a byte.
     let text = unsafe { buffer(text.cast(), size) }.ok_or(Status::INVALID_ARGUMENT)?;
     match text.first_mut() {
         Some(first) => *first = 0,
         None => return Err(Status::BUFFER_TOO_SMALL),
     }
-    Ok(Line::new(text))
+    Ok(TextWriter::new(text))
 }
 
 /// What C is told of a text.
-pub(super) fn outcome(written: Result<Line, Status>) -> u8 {
-    match written.and_then(Line::finish) {
+pub(super) fn outcome(written: Result<TextWriter, Status>) -> u8 {
+    match written.and_then(TextWriter::finish) {
         Ok(_) => Status::OK.code(),
         Err(refused) => refused.code(),
     }
@@ -62,7 +62,7 @@ pub unsafe extern "C" fn mbm_frame_text(
             let (framing, end) = (told.of_frames()?, told.end());
             let frame = lent_or_none(frame, frameLength.into());
             let frame = frame.ok_or(Status::INVALID_ARGUMENT)?;
-            explain::frame(&mut line, framing, side(kind)?, frame, end);
+            text::frame(&mut line, framing, side(kind)?, frame, end);
             Ok(line)
         };
         outcome(write())

@@ -6,7 +6,7 @@
 use libfuzzer_sys::fuzz_target;
 use mbm::engine::{Buffers, Counter, Engine, Settings, Storage as _, Words as _, BROADCAST};
 use mbm::error::Status;
-use mbm::pdu::query::Query;
+use mbm::pdu::query::MasterRequest;
 use mbm::port::Port;
 use mbm_fuzz::asked::{words, Asked};
 use mbm_fuzz::search::Search;
@@ -33,7 +33,7 @@ struct Line {
     sent: Vec<u8>,
     requests: Vec<Vec<u8>>,
     /// The bytes read since the last request.
-    heard: Vec<u8>,
+    received: Vec<u8>,
     lost: bool,
 }
 
@@ -53,7 +53,7 @@ impl Port for Line {
         let count = waiting.len().min(bytes.len());
         for (place, byte) in bytes.iter_mut().zip(waiting.drain(..count)) {
             *place = byte;
-            self.heard.push(byte);
+            self.received.push(byte);
         }
         if waiting.is_empty() {
             self.script.pop_front();
@@ -98,12 +98,12 @@ impl Port for Line {
         assert!(self.driver);
         self.driver = false;
         self.requests.push(std::mem::take(&mut self.sent));
-        self.heard.clear();
+        self.received.clear();
     }
 }
 
 type Lent = Buffers<Vec<u8>, Vec<u16>, Vec<u16>>;
-type MasterEngine = Engine<Line, Lent, Query>;
+type MasterEngine = Engine<Line, Lent, MasterRequest>;
 
 fuzz_target!(|data: &[u8]| {
     let mut input = Input(data);
@@ -118,11 +118,11 @@ fuzz_target!(|data: &[u8]| {
         driver: false,
         sent: Vec::new(),
         requests: Vec::new(),
-        heard: Vec::new(),
+        received: Vec::new(),
         lost: false,
     };
     let frame = vec![0; 4 + usize::from(input.u8()) % 253];
-    let room = frame.len().min(255);
+    let space = frame.len().min(255);
     let buffers = Buffers::new(frame, vec![0; 125], words());
     let mut engine = Engine::new(line, buffers);
     let time = |input: &mut Input| u32::from(input.u8()) * 64;
@@ -153,19 +153,19 @@ fuzz_target!(|data: &[u8]| {
             port.script.push_back((delay, next));
         }
         let step = 20 + u32::from(input.u8()) * 8;
-        run(&mut engine, &asked, room, step);
+        run(&mut engine, &asked, space, step);
         // No held reply takes space in the frame buffer any more.
-        assert_eq!(usize::from(engine.storage.room()), room);
+        assert_eq!(usize::from(engine.storage.capacity()), space);
     }
 });
 
-fn run(engine: &mut MasterEngine, asked: &Asked, room: usize, step: u32) {
-    engine.forget();
+fn run(engine: &mut MasterEngine, asked: &Asked, space: usize, step: u32) {
+    engine.clear_outcome();
     *engine.request() = asked.query;
     engine.port.requests.clear();
-    engine.port.heard.clear();
+    engine.port.received.clear();
     let started = engine.start(asked.unit);
-    let fits = asked.frame().len() <= room;
+    let fits = asked.frame().len() <= space;
     if started != Status::PENDING {
         let broadcast_read = asked.unit == BROADCAST && asked.data.is_some();
         assert!(match started {
@@ -192,15 +192,15 @@ fn run(engine: &mut MasterEngine, asked: &Asked, room: usize, step: u32) {
         polls += 1;
         assert!(polls < 100_000, "the request never ends");
     };
-    judge(engine, asked, status);
+    validate(engine, asked, status);
     if status.is_failure() {
-        check_no_reply_missed(engine, asked, room, status);
+        check_no_reply_missed(engine, asked, space, status);
     }
 }
 
 /// Checks that the bytes received by a failed request contain no right reply. Skips requests
 /// that may fail for other reasons.
-fn check_no_reply_missed(engine: &mut MasterEngine, asked: &Asked, room: usize, status: Status) {
+fn check_no_reply_missed(engine: &mut MasterEngine, asked: &Asked, space: usize, status: Status) {
     let other = matches!(
         status,
         Status::LINE_BUSY | Status::LINK_LOST | Status::BUFFER_TOO_SMALL
@@ -215,8 +215,8 @@ fn check_no_reply_missed(engine: &mut MasterEngine, asked: &Asked, room: usize, 
     }
     let mut search = Search {
         asked,
-        room,
-        bytes: engine.port.heard.clone(),
+        space,
+        bytes: engine.port.received.clone(),
         at: 0,
     };
     assert_eq!(search.search(false), None, "the engine missed a reply");
@@ -227,7 +227,7 @@ fn check_no_reply_missed(engine: &mut MasterEngine, asked: &Asked, room: usize, 
     );
 }
 
-fn judge(engine: &mut MasterEngine, asked: &Asked, status: Status) {
+fn validate(engine: &mut MasterEngine, asked: &Asked, status: Status) {
     let port = &engine.port;
     assert!(!port.driver && !engine.is_pending());
     let frame = asked.frame();
@@ -249,8 +249,8 @@ fn judge(engine: &mut MasterEngine, asked: &Asked, status: Status) {
         return;
     }
     let replies = || {
-        (0..port.heard.len()).filter_map(|at| {
-            let rest = &port.heard[at..];
+        (0..port.received.len()).filter_map(|at| {
+            let rest = &port.received[at..];
             let reply = rest.get(..asked.frame_length(rest)?)?;
             asked.is_answered_by(reply).then_some(reply)
         })
@@ -270,7 +270,7 @@ fn judge(engine: &mut MasterEngine, asked: &Asked, status: Status) {
         .collect();
     assert!(!right.is_empty(), "success without a right reply");
     if asked.data.is_some() {
-        assert!(engine.take_words());
+        assert!(engine.store_words());
         let words = engine.storage.response().to_vec();
         let has_words = |reply: &Vec<u8>| {
             let data = &reply[3..reply.len() - 2];

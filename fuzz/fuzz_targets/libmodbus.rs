@@ -160,7 +160,7 @@ fn compare(frame: &[u8], served: Option<(Vec<u8>, Vec<u8>)>, over_tcp: bool) {
     assert_eq!(response.function(), adu.pdu[0]);
     match (ours, response) {
         (Ok(_), Response::Exception { code, .. }) => panic!("{adu:02X?}: refused with {code}"),
-        (Ok(request), response) => agrees(&request, &response),
+        (Ok(request), response) => matches_echo(&request, &response),
         (Err(status), Response::Exception { code, .. }) => {
             let same = status.code() == code || is_known_leniency(adu.pdu);
             assert!(same, "{adu:02X?}: {status:?}, not {code}");
@@ -182,7 +182,7 @@ fn is_known_leniency(pdu: &[u8]) -> bool {
 }
 
 /// Checks that the response matches the request.
-fn agrees(request: &Request, response: &Response) {
+fn matches_echo(request: &Request, response: &Response) {
     let mut buffer = [0; 253];
     let length = response.emit(&mut buffer).expect("the response is valid");
     let expected = request.response_length(&[]);

@@ -3,9 +3,9 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use mbm::explain::Line;
 use mbm::frame::{ascii, Framing};
-use mbm::sniffer::{Kind, Sniffer, Tap, MIN_BUFFER};
+use mbm::sniffer::{EventKind, Sniffer, Tap, MIN_BUFFER};
+use mbm::text::TextWriter;
 use mbm_fuzz::asked::Asked;
 use mbm_fuzz::{naive, Input};
 
@@ -99,10 +99,10 @@ impl Bus {
     fn take_events(&mut self) {
         while let Some(event) = self.sniffer.next(&mut self.buffer, &[], self.now) {
             let mut text = [0; 20_000];
-            let mut words = Line::new(&mut text);
-            event.explain(&mut words);
+            let mut words = TextWriter::new(&mut text);
+            event.text(&mut words);
             words.finish().expect("the text fits");
-            if event.kind == Kind::Timeout {
+            if event.kind == EventKind::Timeout {
                 assert!(self.requests.contains(&(event.unit, event.function)));
                 continue;
             }
@@ -110,23 +110,23 @@ impl Bus {
             let start = self.reported;
             self.reported += event.length;
             match event.kind {
-                Kind::Request => self.requests.push((event.unit, event.function)),
-                Kind::Reply | Kind::Exception => {
+                EventKind::Request => self.requests.push((event.unit, event.function)),
+                EventKind::Reply | EventKind::Exception => {
                     assert!(self.requests.contains(&(event.unit, event.function)));
                     assert!(event.asked.is_some());
                 }
-                Kind::Unpaired => {}
+                EventKind::Unpaired => {}
                 _ => continue,
             }
-            let heard = &self.line[start..self.reported];
+            let received = &self.line[start..self.reported];
             let content = match self.framing {
                 Framing::Rtu | Framing::RtuOverTcp => {
-                    assert!(naive::has_crc(heard), "not a frame");
-                    heard[..heard.len() - 2].to_vec()
+                    assert!(naive::has_crc(received), "not a frame");
+                    received[..received.len() - 2].to_vec()
                 }
-                Framing::Ascii => naive::ascii(heard, ascii::END).expect("a frame"),
+                Framing::Ascii => naive::ascii(received, ascii::END).expect("a frame"),
                 Framing::Tcp => {
-                    let (_, unit, pdu) = naive::tcp(heard).expect("a frame");
+                    let (_, unit, pdu) = naive::tcp(received).expect("a frame");
                     [&[unit], pdu].concat()
                 }
             };

@@ -7,15 +7,15 @@ use crate::naive;
 pub struct Search<'a> {
     pub asked: &'a Asked,
     /// The size of the master's frame buffer in bytes.
-    pub room: usize,
+    pub space: usize,
     pub bytes: Vec<u8>,
     pub at: usize,
 }
 
 impl Search<'_> {
-    /// Finds the frame that answers the request. If `skim`, it also searches after the start of
+    /// Finds the frame that answers the request. If `resync`, it also searches after the start of
     /// an incomplete frame.
-    pub fn search(&mut self, skim: bool) -> Option<Vec<u8>> {
+    pub fn search(&mut self, resync: bool) -> Option<Vec<u8>> {
         let mut at = self.at;
         while at < self.bytes.len() {
             let rest = &self.bytes[at..];
@@ -32,12 +32,12 @@ impl Search<'_> {
                 }
                 Some(_) => {}
                 // A frame that the buffer cannot hold is skipped.
-                None if length.is_some_and(|length| length <= self.room) && !skim => break,
+                None if length.is_some_and(|length| length <= self.space) && !resync => break,
                 None => {}
             }
             at += 1;
         }
-        if !skim {
+        if !resync {
             self.at = at;
         }
         None

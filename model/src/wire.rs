@@ -44,7 +44,7 @@ pub fn lent(bytes: usize) -> Lent {
 /// Zeroes the buffers, so that states differ only where the master does. The master keeps
 /// nothing in them between two requests.
 pub fn clear(lent: &mut Lent) {
-    let room = lent.room();
-    lent.bytes(0, room).fill(0);
+    let space = lent.capacity();
+    lent.bytes(0, space).fill(0);
     lent.response().fill(0);
 }

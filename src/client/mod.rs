@@ -2,27 +2,27 @@
 //! returns each request that has ended.
 //!
 //! A serial line carries one request at a time, a TCP stream as many as the
-//! queue holds. The caller implements [`Job`], which is a request with its data.
+//! queue holds. The caller implements [`ClientRequest`], which is a request with its data.
 //! The client copies data only between a request and a frame buffer.
 
 mod active;
-mod job;
-mod line;
-mod means;
 mod policy;
+mod queue;
+mod request;
 mod serial;
-mod shared;
+mod storage;
 mod tcp;
+mod transport;
 mod units;
 
 pub use active::{ActiveRequest, ClientEngine};
-pub use job::{Job, Ticket};
-pub use line::Line;
-pub use means::Means;
 pub use policy::{again, Backoff, Policy};
+pub use queue::RequestQueue;
+pub use request::{ClientRequest, RequestState};
 pub use serial::Serial;
-pub use shared::Shared;
+pub use storage::ClientStorage;
 pub use tcp::Tcp;
+pub use transport::Transport;
 pub use units::{note, rest, Unit};
 
 #[cfg(doc)]
@@ -40,10 +40,10 @@ pub const ASCII_SILENCE: u32 = millis(1000);
 /// all bytes.
 const WRITE_RETRY_DELAY: u32 = millis(1);
 
-/// A client on a [`Line`], for up to `N` requests that are queued or in flight.
+/// A client on a [`Transport`], for up to `N` requests that are queued or in flight.
 #[repr(C)]
 pub struct Client<L, J, const N: usize> {
-    shared: Shared<J, N>,
+    queue: RequestQueue<J, N>,
     /// The serial line or TCP stream.
     pub line: L,
 }
@@ -51,43 +51,43 @@ pub struct Client<L, J, const N: usize> {
 impl<L, J, const N: usize> Client<L, J, N> {
     /// The policy for retries.
     pub fn policy(&mut self) -> &mut Policy {
-        &mut self.shared.policy
+        &mut self.queue.policy
     }
 
     /// False after the link was lost, until a reply arrives, or until the caller calls
     /// [`Client::set_connected`] with true or [`Client::reconnect`].
     pub const fn is_connected(&self) -> bool {
-        self.shared.connected
+        self.queue.connected
     }
 
     /// Sets whether the link is up. [`Client::reconnect`] sets it to true.
     pub fn set_connected(&mut self, connected: bool) {
-        self.shared.connected = connected;
+        self.queue.connected = connected;
     }
 
-    /// Takes the line back after [`Client::lend`].
+    /// Takes the line back after [`Client::suspend`].
     pub fn take_back(&mut self) {
-        self.shared.lent = false;
+        self.queue.suspended = false;
     }
 
-    /// True from [`Client::lend`] to [`Client::take_back`].
+    /// True from [`Client::suspend`] to [`Client::take_back`].
     pub const fn is_lent(&self) -> bool {
-        self.shared.lent
+        self.queue.suspended
     }
 
     /// Number of requests that are queued or in flight.
     pub fn pending(&self) -> usize {
-        self.shared.pending()
+        self.queue.pending()
     }
 }
 
-impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
+impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
     /// A client without requests.
     pub fn new(line: L) -> Self {
-        let mut shared = Shared::new();
-        shared.broadcasts = L::BROADCASTS;
-        shared.has_ids = L::HAS_IDS;
-        Client { shared, line }
+        let mut queue = RequestQueue::new();
+        queue.has_broadcast = L::HAS_BROADCAST;
+        queue.has_transaction_ids = L::HAS_TRANSACTION_IDS;
+        Client { queue, line }
     }
 
     /// Fails to compile unless the line can carry `M` requests at once and the queue
@@ -104,7 +104,7 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// #     fn micros(&mut self) -> u32 { 0 }
     /// # }
     /// # struct J; impl Job for J {
-    /// #     fn ticket(&self) -> &Ticket { &Ticket::NONE }
+    /// #     fn request state(&self) -> &Ticket { &Ticket::NONE }
     /// #     fn ticket_mut(&mut self) -> &mut Ticket { unreachable!() }
     /// #     fn byte(&self, _: usize) -> u8 { 0 }
     /// #     fn put(&mut self, _: usize, _: u8) {}
@@ -125,7 +125,7 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// #     fn micros(&mut self) -> u32 { 0 }
     /// # }
     /// # struct J; impl Job for J {
-    /// #     fn ticket(&self) -> &Ticket { &Ticket::NONE }
+    /// #     fn request state(&self) -> &Ticket { &Ticket::NONE }
     /// #     fn ticket_mut(&mut self) -> &mut Ticket { unreachable!() }
     /// #     fn byte(&self, _: usize) -> u8 { 0 }
     /// #     fn put(&mut self, _: usize, _: u8) {}
@@ -144,35 +144,35 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// Returns the request, with one of these as its status: [`Status::QUEUE_FULL`];
     /// [`Status::BROADCAST_NOT_ALLOWED`]; on TCP [`Status::DUPLICATE_TRANSACTION`] if its
     /// transaction number is not 0 and another pending request has the same number.
-    pub fn queue(&mut self, job: J) -> Result<(), J> {
-        self.shared.enqueue(job)
+    pub fn queue(&mut self, request: J) -> Result<(), J> {
+        self.queue.enqueue(request)
     }
 
     /// Advances all requests to the time `now`, without waiting, and returns one request
     /// that has ended. Call it with `fresh` true first, because new bytes may have arrived;
     /// then with `fresh` false until it returns `None`.
     pub fn poll(&mut self, now: u32, fresh: bool) -> Option<J> {
-        if self.shared.lent {
+        if self.queue.suspended {
             return None;
         }
-        self.line.advance(&mut self.shared, now, fresh)
+        self.line.advance(&mut self.queue, now, fresh)
     }
 
     /// Time in microseconds from `now` until poll has something to do, if no byte arrives
     /// before. Returns `u32::MAX` if no request is pending; poll does not read bytes then.
     /// Returns 1000 while a TCP port does not accept the bytes to send.
     pub fn poll_delay(&mut self, now: u32) -> u32 {
-        self.line.poll_delay(&self.shared, now)
+        self.line.poll_delay(&self.queue, now)
     }
 
     /// Cancels the first pending request for which `matches` returns true, and returns the
     /// request; `None` if there is no such request.
     pub fn cancel(&mut self, matches: impl Fn(&J) -> bool) -> Option<J> {
-        let job = self.shared.withdraw(matches)?;
-        if job.ticket().is_sent() {
-            self.line.release(Some(&job));
+        let request = self.queue.cancel_one(matches)?;
+        if request.state().is_sent() {
+            self.line.release(Some(&request));
         }
-        Some(job)
+        Some(request)
     }
 
     /// Call this after the link was opened anew. The client discards partly received and
@@ -180,12 +180,12 @@ impl<L: Line<J>, J: Job, const N: usize> Client<L, J, N> {
     /// [`Status::LINK_LOST`]. Queued requests are sent over the new link.
     pub fn reconnect(&mut self) {
         self.line.release(None);
-        self.shared.interrupt();
+        self.queue.interrupt();
     }
 
     /// Leaves the line to another user of the port until [`Client::take_back`]. Returns
     /// false, and changes nothing, if a request is in flight or another user has the line.
-    pub fn lend(&mut self) -> bool {
-        self.line.lend(&mut self.shared)
+    pub fn suspend(&mut self) -> bool {
+        self.line.suspend(&mut self.queue)
     }
 }

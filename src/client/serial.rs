@@ -2,10 +2,10 @@
 //! request is in flight at a time.
 
 use super::active::ClientEngine;
-use super::job::{deliver, is_answer, Job, Stage};
-use super::line::Line;
-use super::means::Means;
-use super::shared::Shared;
+use super::queue::RequestQueue;
+use super::request::{is_answer, store_response, ClientRequest, Stage};
+use super::storage::ClientStorage;
+use super::transport::Transport;
 use super::{Client, ASCII_SILENCE, STREAM_SILENCE};
 use crate::engine::Engine;
 use crate::error::Status;
@@ -14,22 +14,22 @@ use crate::port::Port;
 
 /// One request at a time, in RTU or ASCII frames.
 #[repr(C)]
-pub struct Serial<P, S: Means, J> {
+pub struct Serial<P, S: ClientStorage, J> {
     /// The engine that sends the request and finds the reply.
     pub engine: ClientEngine<P, S, J>,
 }
 
-impl<P, S: Means, J: Job> Serial<P, S, J> {
+impl<P, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
     /// A serial line with RTU frames.
-    pub const fn new(port: P, means: S) -> Self {
+    pub const fn new(port: P, storage: S) -> Self {
         Serial {
-            engine: Engine::new(port, means),
+            engine: Engine::new(port, storage),
         }
     }
 
     /// A serial line with ASCII frames.
-    pub fn ascii(port: P, means: S) -> Self {
-        let mut line = Serial::new(port, means);
+    pub fn ascii(port: P, storage: S) -> Self {
+        let mut line = Serial::new(port, storage);
         line.set_ascii();
         line
     }
@@ -50,94 +50,94 @@ impl<P, S: Means, J: Job> Serial<P, S, J> {
     }
 }
 
-impl<P: Port, S: Means, J: Job, const N: usize> Client<Serial<P, S, J>, J, N> {
+impl<P: Port, S: ClientStorage, J: ClientRequest, const N: usize> Client<Serial<P, S, J>, J, N> {
     /// A client that sends RTU frames through a TCP stream, without a silence between
     /// frames and without broadcasts.
-    pub fn over_tcp(port: P, means: S) -> Self {
-        let mut client = Client::new(Serial::new(port, means));
-        client.shared.broadcasts = false;
+    pub fn over_tcp(port: P, storage: S) -> Self {
+        let mut client = Client::new(Serial::new(port, storage));
+        client.queue.has_broadcast = false;
         client.line.set_stream();
         client
     }
 }
 
-impl<P: Port, S: Means, J: Job> Serial<P, S, J> {
+impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
     /// Reads and discards bytes that arrive while all requests only wait. If they stayed in
     /// the port, a program that sleeps until bytes arrive would wake up at once.
     #[cold]
     #[inline(never)]
-    fn drop_late_bytes<const N: usize>(&mut self, shared: &mut Shared<J, N>, now: u32) {
+    fn drop_late_bytes<const N: usize>(&mut self, queue: &mut RequestQueue<J, N>, now: u32) {
         if self.engine.drop_received(now) < 0 {
-            shared.disconnect();
+            queue.disconnect();
         }
     }
 
     /// Passes a request to the engine and starts it.
-    fn start(&mut self, job: J) -> Status {
-        let unit = job.ticket().unit;
-        self.engine.forget();
-        self.engine.request().begin(job);
+    fn start(&mut self, request: J) -> Status {
+        let unit = request.state().unit;
+        self.engine.clear_outcome();
+        self.engine.request().begin(request);
         self.engine.start(unit)
     }
 
     /// Stores the response in the request, and returns the status of the request.
-    fn received(&mut self, job: &mut J, status: Status) -> Status {
-        job.ticket_mut().exception = self.engine.exception_code();
+    fn received(&mut self, request: &mut J, status: Status) -> Status {
+        request.state_mut().exception = self.engine.exception_code();
         // The length is 0 after a broadcast or another request that has no response.
         let length = self.engine.request.length;
         if status != Status::OK || length == 0 {
             return status;
         }
-        deliver(
-            job,
+        store_response(
+            request,
             self.engine.storage.slice(rtu::PDU as u16, length.into()),
         )
     }
 }
 
-impl<P: Port, S: Means, J: Job> Line<J> for Serial<P, S, J> {
+impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, J> {
     const MAX_IN_FLIGHT: usize = 1;
-    const BROADCASTS: bool = true;
-    const HAS_IDS: bool = false;
+    const HAS_BROADCAST: bool = true;
+    const HAS_TRANSACTION_IDS: bool = false;
 
     fn advance<const N: usize>(
         &mut self,
-        shared: &mut Shared<J, N>,
+        queue: &mut RequestQueue<J, N>,
         now: u32,
         fresh: bool,
     ) -> Option<J> {
         // The engine has the request only during this call.
         let mut status = Status::PENDING;
-        if let Some(job) = shared.active.take() {
-            self.engine.request().job = Some(job);
+        if let Some(request) = queue.active.take() {
+            self.engine.request().client_request = Some(request);
         } else {
-            let Some(job) = shared.take_due(now, &mut self.engine.storage) else {
-                if fresh && !shared.queue.is_empty() {
-                    self.drop_late_bytes(shared, now);
+            let Some(request) = queue.take_due(now, &mut self.engine.storage) else {
+                if fresh && !queue.queue.is_empty() {
+                    self.drop_late_bytes(queue, now);
                 }
                 return None;
             };
-            if job.ticket().is(Stage::Lost) {
-                return shared.conclude(job, Status::LINK_LOST, now, &mut self.engine.storage);
+            if request.state().is(Stage::Lost) {
+                return queue.conclude(request, Status::LINK_LOST, now, &mut self.engine.storage);
             }
-            status = self.start(job);
+            status = self.start(request);
         }
         if status == Status::PENDING {
             status = self.engine.poll(now);
         }
-        let mut job = self.engine.request().job.take()?;
+        let mut request = self.engine.request().client_request.take()?;
         if status == Status::PENDING {
-            shared.active = Some(job);
+            queue.active = Some(request);
             return None;
         }
-        let status = self.received(&mut job, status);
+        let status = self.received(&mut request, status);
         if status == Status::LINK_LOST {
-            shared.disconnect();
+            queue.disconnect();
         } else if is_answer(status) {
-            shared.connected = true;
+            queue.connected = true;
         }
         // The queue has space: the active request has always counted as part of it.
-        shared.conclude(job, status, now, &mut self.engine.storage)
+        queue.conclude(request, status, now, &mut self.engine.storage)
     }
 
     fn release(&mut self, _: Option<&J>) {

@@ -24,7 +24,7 @@ pub struct Unit {
     /// Status code of the last request that ended.
     pub status: u8,
     /// `delay` may not have passed since `last` yet.
-    tired: bool,
+    cooling_down: bool,
 }
 
 impl Unit {
@@ -39,15 +39,15 @@ impl Unit {
             last: 0,
             unit,
             status: 0,
-            tired: false,
+            cooling_down: false,
         }
     }
 
     /// Microseconds until the unit may get its next request.
     fn rest(&mut self, now: u32) -> u32 {
         let rest = clamped(self.delay).saturating_sub(elapsed(now, self.last));
-        self.tired &= rest > 0;
-        if self.tired {
+        self.cooling_down &= rest > 0;
+        if self.cooling_down {
             rest
         } else {
             0
@@ -58,7 +58,7 @@ impl Unit {
     /// retry it.
     fn note(&mut self, status: Status, again: bool, now: u32) {
         self.last = now;
-        self.tired = true;
+        self.cooling_down = true;
         self.status = status.code();
         if again {
             self.retries = self.retries.wrapping_add(1);

@@ -8,7 +8,7 @@ use super::value::Value;
 use crate::error::Status;
 
 /// Consecutive registers, accessed as bytes in the order of the wire.
-pub trait Cells {
+pub trait RegisterBytes {
     /// Number of bytes, two for each register.
     fn length(&self) -> usize;
 
@@ -17,12 +17,12 @@ pub trait Cells {
 }
 
 /// Registers that can also be written.
-pub trait CellsMut: Cells {
+pub trait RegisterBytesMut: RegisterBytes {
     /// Sets the byte at the index `place`; does nothing past the end.
     fn set_byte(&mut self, place: usize, value: u8);
 }
 
-impl Cells for &[u8] {
+impl RegisterBytes for &[u8] {
     fn length(&self) -> usize {
         self.len()
     }
@@ -32,7 +32,7 @@ impl Cells for &[u8] {
     }
 }
 
-impl Cells for &[u16] {
+impl RegisterBytes for &[u16] {
     fn length(&self) -> usize {
         self.len().saturating_mul(2)
     }
@@ -43,7 +43,7 @@ impl Cells for &[u16] {
     }
 }
 
-impl Cells for &mut [u8] {
+impl RegisterBytes for &mut [u8] {
     fn length(&self) -> usize {
         self.len()
     }
@@ -53,7 +53,7 @@ impl Cells for &mut [u8] {
     }
 }
 
-impl CellsMut for &mut [u8] {
+impl RegisterBytesMut for &mut [u8] {
     fn set_byte(&mut self, place: usize, value: u8) {
         if let Some(byte) = self.get_mut(place) {
             *byte = value;
@@ -61,7 +61,7 @@ impl CellsMut for &mut [u8] {
     }
 }
 
-impl Cells for &mut [u16] {
+impl RegisterBytes for &mut [u16] {
     fn length(&self) -> usize {
         self.len().saturating_mul(2)
     }
@@ -71,7 +71,7 @@ impl Cells for &mut [u16] {
     }
 }
 
-impl CellsMut for &mut [u16] {
+impl RegisterBytesMut for &mut [u16] {
     fn set_byte(&mut self, place: usize, value: u8) {
         if let Some(word) = self.get_mut(place / 2) {
             let [high, low] = word.to_be_bytes();
@@ -84,8 +84,8 @@ impl CellsMut for &mut [u16] {
     }
 }
 
-/// Typed access to registers: for reading if `C` is [`Cells`], also for writing if it is
-/// [`CellsMut`].
+/// Typed access to registers: for reading if `C` is [`RegisterBytes`], also for writing if it is
+/// [`RegisterBytesMut`].
 #[derive(Clone, Copy)]
 pub struct Registers<C> {
     cells: C,
@@ -94,7 +94,7 @@ pub struct Registers<C> {
     pub order: Order,
 }
 
-impl<C: Cells> Registers<C> {
+impl<C: RegisterBytes> Registers<C> {
     /// Registers in `cells`; the first has the address `first`.
     ///
     /// # Errors
@@ -260,7 +260,7 @@ impl<C: Cells> Registers<C> {
     }
 }
 
-impl<C: CellsMut> Registers<C> {
+impl<C: RegisterBytesMut> Registers<C> {
     /// Sets the registers that begin at `address` from `bytes`, in the order in which
     /// [`Registers::load`] reads them.
     ///

@@ -1,7 +1,7 @@
 //! Finds the reply among the received characters of an ASCII line. Every frame begins with a
 //! colon; characters before a colon are noise.
 
-use super::{Count, Engine, Request, Seen, Storage, Verdict};
+use super::{Count, Engine, Match, RequestSpec, RxFault, Storage};
 use crate::frame::ascii::{self, find, Content};
 use crate::frame::rtu;
 use crate::pdu::EXCEPTION;
@@ -19,42 +19,42 @@ pub fn content(characters: u16) -> u16 {
     (characters - u16::from(AROUND)) / 2
 }
 
-impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
+impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Searches the received characters for the reply in an ASCII frame that ends with
     /// `delimiter`. Leaves the reply decoded at the front of the buffer: unit and PDU, followed
     /// by the remaining characters of its frame.
-    pub fn search_ascii(&mut self, delimiter: u8) -> bool {
+    pub fn find_ascii_reply(&mut self, delimiter: u8) -> bool {
         let mut front = S::Count::ZERO;
         let found = loop {
             let rest = self.storage.slice(front, self.end - front);
             let (begin, end) = find(rest, delimiter);
             let Some(end) = end else {
-                self.pass_characters(begin);
+                self.note_skipped(begin);
                 front += S::Count::of(begin);
                 break false;
             };
-            self.pass_characters(begin);
+            self.note_skipped(begin);
             let begins = front + S::Count::of(begin);
             front += S::Count::of(end);
             if begins < front && self.is_reply(begins, front - begins, delimiter) {
-                self.least = front - begins;
+                self.needed = front - begins;
                 front = begins;
                 break true;
             }
         };
         self.drop_front(front);
-        if !found && self.end == self.storage.room() && self.held == S::Count::ZERO {
+        if !found && self.end == self.storage.capacity() && self.held == S::Count::ZERO {
             // The frame is too long for the buffer.
-            self.see(Seen::TOO_LONG);
+            self.note_fault(RxFault::TOO_LONG);
             self.end = S::Count::ZERO;
         }
         found
     }
 
     /// Notes that characters outside of a frame were skipped.
-    fn pass_characters(&mut self, count: usize) {
+    fn note_skipped(&mut self, count: usize) {
         if count > 0 {
-            self.passed = 1;
+            self.skipped = 1;
         }
     }
 
@@ -66,12 +66,12 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             Content::Damaged(_) => {
                 // The unit has been decoded to the front of the frame.
                 if self.storage.byte(front) == self.unit {
-                    self.see(Seen::BAD_CRC);
+                    self.note_fault(RxFault::BAD_CRC);
                 }
                 return false;
             }
             Content::Malformed => {
-                self.passed = 1;
+                self.skipped = 1;
                 return false;
             }
         };
@@ -80,19 +80,19 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         // the CRC.
         let whole = content + rtu::CRC.into();
         let what = if self.storage.byte(front) != self.unit {
-            Seen::OTHER_UNIT
+            RxFault::OTHER_UNIT
         } else if function != self.request.function() {
-            Seen::OTHER_FUNCTION
-        } else if Q::wanted(self, front, whole) != whole {
-            Seen::MALFORMED
+            RxFault::OTHER_FUNCTION
+        } else if Q::expected_length(self, front, whole) != whole {
+            RxFault::MALFORMED
         } else {
-            match Q::judge(self, front, content) {
-                Verdict::Right => return true,
-                Verdict::Echo => return false,
-                Verdict::Wrong => Seen::MALFORMED,
+            match Q::validate(self, front, content) {
+                Match::Reply => return true,
+                Match::Echo => return false,
+                Match::Unrelated => RxFault::MALFORMED,
             }
         };
-        self.see_foreign(what);
+        self.note_foreign_frame(what);
         false
     }
 }

@@ -14,7 +14,7 @@
 use super::{Engine, Phase, Probation, Words, BROADCAST};
 use crate::error::Status;
 use crate::frame::rtu;
-use crate::pdu::query::Query;
+use crate::pdu::query::MasterRequest;
 use crate::pdu::EXCEPTION;
 use crate::port::Port;
 
@@ -24,7 +24,7 @@ const BEFORE_DATA: u8 = 3;
 /// Bytes of the frame buffer that stay free beside kept bytes. An exception fits.
 const LEFT_FREE: u8 = 8;
 
-impl<P: Port, S: Words> Engine<P, S, Query> {
+impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
     /// Waits for the reply, as [`Engine::poll`] does, and accepts a deviating one. A
     /// request to read is sent to unit 0 too, which is to reply then.
     pub fn receive_lenient(&mut self) -> Status {
@@ -48,13 +48,13 @@ impl<P: Port, S: Words> Engine<P, S, Query> {
     }
 }
 
-impl<P, S: Words> Engine<P, S, Query> {
+impl<P, S: Words> Engine<P, S, MasterRequest> {
     /// Passes over the byte at `front`, but keeps it if it belongs to what may become a
     /// deviating response to a read. Returns where the next byte stands.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn pass_and_keep(&mut self, front: u8) -> u8 {
+    pub(super) fn skip_or_keep_byte(&mut self, front: u8) -> u8 {
         let is_kept = self.is_kept(front);
-        self.pass(front);
+        self.skip_byte(front);
         if !is_kept {
             return front + 1;
         }
@@ -63,7 +63,7 @@ impl<P, S: Words> Engine<P, S, Query> {
         self.storage.set_aside(1);
         self.held += 1;
         self.end -= 1;
-        self.done = self.done.saturating_sub(1);
+        self.processed = self.processed.saturating_sub(1);
         front
     }
 
@@ -74,7 +74,7 @@ impl<P, S: Words> Engine<P, S, Query> {
         if is_settled || !self.request.is_read() {
             return false;
         }
-        if self.passed == 0 {
+        if self.skipped == 0 {
             self.drop_kept();
             let unit = self.storage.byte(front);
             let function = self.storage.byte(front + 1);
@@ -84,7 +84,7 @@ impl<P, S: Words> Engine<P, S, Query> {
             return false;
         }
         let byte = self.storage.bytes(front, 1);
-        let is_residue = self.crc_passed.with(byte).is_residue();
+        let is_residue = self.crc_skipped.with(byte).is_residue();
         let length = self.count_kept();
         if is_residue && length == self.kept_length() && self.kept_data() > 0 {
             self.probation = Probation::Deviating;
@@ -97,7 +97,7 @@ impl<P, S: Words> Engine<P, S, Query> {
         }
         let words = u16::from(self.storage.response_words());
         u16::from(self.held) < (words << 1) + u16::from(BEFORE_DATA)
-            && self.storage.room() > LEFT_FREE
+            && self.storage.capacity() > LEFT_FREE
     }
 
     /// Counts one more byte after those kept, some of which were dropped for want of room;
@@ -162,11 +162,11 @@ impl<P, S: Words> Engine<P, S, Query> {
     }
 
     /// Has a deviating reply be the answer; false if there was none.
-    pub(super) fn take_deviating(&mut self) -> bool {
+    pub(super) fn accept_deviating(&mut self) -> bool {
         // The last bytes may look like the beginning of a right reply, which waits for more.
         let mut front = 0;
         while front < self.end {
-            front = self.pass_and_keep(front);
+            front = self.skip_or_keep_byte(front);
         }
         if self.probation != Probation::Deviating {
             return false;
@@ -178,8 +178,8 @@ impl<P, S: Words> Engine<P, S, Query> {
         }
         self.exception = 0;
         // The reply was counted as a frame that was passed over.
-        self.passed = 0;
-        self.foreign = self.foreign.saturating_sub(1);
+        self.skipped = 0;
+        self.foreign_frames = self.foreign_frames.saturating_sub(1);
         true
     }
 }

@@ -17,20 +17,20 @@
 //! time, which fit into the registers, and the code is small.
 
 pub mod ascii;
+mod fault;
 mod lenient;
-mod plain;
+mod master_request;
 mod poll;
 mod receive;
-mod request;
-mod search;
-mod seen;
+mod rtu;
 mod send;
 mod settings;
+mod spec;
 mod storage;
 
-pub use request::{Request, Verdict};
-pub use seen::Seen;
+pub use fault::RxFault;
 pub use settings::Settings;
+pub use spec::{Match, RequestSpec};
 pub use storage::{Buffers, Count, Counter, Frame, Storage, Words, COUNTERS};
 
 use crate::error::Status;
@@ -52,7 +52,7 @@ enum Phase {
     /// Waits until the port has sent the last bit. The driver is on.
     Flush,
     /// Keeps the driver on for the post-flush hold.
-    Hold,
+    PostFlush,
     /// Waits for the reply.
     Reply,
     /// Gives the slaves time to carry out a broadcast.
@@ -84,7 +84,7 @@ pub type Receive<E> = fn(&mut E) -> Status;
 pub struct Engine<P, S: Storage, Q> {
     phase: Phase,
     /// The phase began in the last poll. Its time starts with the next look at the clock.
-    stamp: bool,
+    phase_begins: bool,
     /// The last poll found nothing to do.
     waiting: bool,
     /// The unit that the request is sent to.
@@ -92,15 +92,15 @@ pub struct Engine<P, S: Storage, Q> {
     retries: u8,
     /// The exception code of the last reply; 0 if the reply was no exception.
     pub(crate) exception: u8,
-    /// See [`Request::reply_length`].
+    /// See [`RequestSpec::reply_length`].
     length: S::Count,
     /// How many bytes the frame buffer holds.
     end: S::Count,
     /// How many of these bytes were sent, or are part of `crc`.
-    done: S::Count,
+    processed: S::Count,
     /// The least length of the candidate at the front of the buffer. Once the reply is
     /// found: the length of its frame.
-    least: S::Count,
+    needed: S::Count,
     /// Length of the bytes that the storage has set aside: a held reply, or what may become a
     /// deviating reply (see `lenient`); 0 if there are none.
     pub(crate) held: S::Count,
@@ -114,19 +114,19 @@ pub struct Engine<P, S: Storage, Q> {
     pub(crate) echo: bool,
     /// No byte has arrived since the received bytes were last searched for a reply after an
     /// incomplete candidate.
-    skimmed: bool,
+    resynced: bool,
     /// The most severe fault among the skipped bytes.
-    seen: Seen,
+    fault: RxFault,
     /// How many skipped frames had a right CRC.
-    foreign: u8,
+    foreign_frames: u8,
     /// How many bytes were skipped since the last frame ended, at most `MIN_FRAME`.
-    passed: u8,
+    skipped: u8,
     /// The fault to note if the skipped bytes turn out to be a frame.
-    passed_as: Seen,
+    skipped_as: RxFault,
     /// The caller's frame buffer, words and counters.
     pub storage: S,
     /// Time at which the phase began.
-    since: u32,
+    phase_start: u32,
     /// How long the phase may last.
     wait: u32,
     /// Time at which the line was last in use.
@@ -134,10 +134,10 @@ pub struct Engine<P, S: Storage, Q> {
     /// The time of the current poll.
     now: u32,
     /// CRC of the bytes skipped since the last frame ended. `crc` continues it over the first
-    /// `done` bytes of the buffer.
-    crc_passed: Crc16,
+    /// `processed` bytes of the buffer.
+    crc_skipped: Crc16,
     crc: Crc16,
-    /// Factor that carries `crc_passed` over the length of a reply; `RESIDUE` until computed.
+    /// Factor that carries `crc_skipped` over the length of a reply; `RESIDUE` until computed.
     weight: Crc16,
     /// The byte stream.
     pub port: P,

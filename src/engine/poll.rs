@@ -1,41 +1,41 @@
 //! Moves a request on, from its start to its end.
 
-use super::{Count, Engine, Phase, Probation, Receive, Request, Seen, Settings, Storage};
+use super::{Count, Engine, Phase, Probation, Receive, RequestSpec, RxFault, Settings, Storage};
 use crate::error::Status;
 use crate::frame::checksum::{crc16, Crc16};
 use crate::frame::rtu;
 use crate::port::Port;
 use crate::time::{elapsed, has_elapsed, LONGEST};
 
-impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
+impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// An engine without a request.
     pub const fn new(port: P, storage: S) -> Self {
         Engine {
             phase: Phase::Idle,
-            stamp: false,
+            phase_begins: false,
             waiting: false,
             unit: 0,
             retries: 0,
             exception: 0,
             length: S::Count::ZERO,
             end: S::Count::ZERO,
-            done: S::Count::ZERO,
-            least: S::Count::ZERO,
+            processed: S::Count::ZERO,
+            needed: S::Count::ZERO,
             held: S::Count::ZERO,
             probation: Probation::Off,
             late_unit: 0,
             late: false,
             echo: false,
-            skimmed: false,
-            seen: Seen::NOTHING,
-            foreign: 0,
-            passed: 0,
-            passed_as: Seen::NOTHING,
-            crc_passed: Crc16::START,
+            resynced: false,
+            fault: RxFault::NOTHING,
+            foreign_frames: 0,
+            skipped: 0,
+            skipped_as: RxFault::NOTHING,
+            crc_skipped: Crc16::START,
             crc: Crc16::START,
             weight: Crc16::RESIDUE,
             request: Q::NONE,
-            since: 0,
+            phase_start: 0,
             wait: 0,
             last_byte: 0,
             now: 0,
@@ -67,7 +67,7 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     }
 
     /// Clears the outcome of the last request.
-    pub fn forget(&mut self) {
+    pub fn clear_outcome(&mut self) {
         self.exception = 0;
     }
 
@@ -75,7 +75,7 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// For model checkers: two engines that will behave alike become equal.
     #[doc(hidden)]
     pub fn rebase(&mut self, now: u32, longest: u32) {
-        for time in [&mut self.since, &mut self.last_byte, &mut self.now] {
+        for time in [&mut self.phase_start, &mut self.last_byte, &mut self.now] {
             *time = 0u32.wrapping_sub(elapsed(now, *time).min(longest));
         }
     }
@@ -106,14 +106,14 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     #[inline(always)]
     pub(crate) fn set_frame_length(&mut self, length: S::Count) {
         self.end = length;
-        self.done = S::Count::ZERO;
+        self.processed = S::Count::ZERO;
     }
 
     /// Enters a phase that may last `wait` microseconds from the next look at the clock on.
     pub(super) fn enter(&mut self, phase: Phase, wait: u32) {
         self.phase = phase;
         self.wait = wait;
-        self.stamp = true;
+        self.phase_begins = true;
     }
 
     pub(super) fn wait(&mut self) -> Status {
@@ -125,9 +125,9 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn look_at_clock(&mut self, now: u32) {
         self.now = now;
-        if self.stamp {
-            self.stamp = false;
-            self.since = now;
+        if self.phase_begins {
+            self.phase_begins = false;
+            self.phase_start = now;
             // The silence is measured from the end of our request; before a request, from the
             // last received byte.
             if self.phase != Phase::Gap {
@@ -137,32 +137,32 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     }
 
     /// True once the time of the phase has expired.
-    pub(super) fn is_over(&self) -> bool {
-        self.has_passed(self.wait, false)
+    pub(super) fn has_expired(&self) -> bool {
+        self.has_elapsed_since(self.wait, false)
     }
 
     /// True once the line has been silent for `time` microseconds.
     #[inline(always)]
     pub(super) fn is_silent(&self, time: u32) -> bool {
-        self.has_passed(time, true)
+        self.has_elapsed_since(time, true)
     }
 
     /// True once `time` microseconds have passed since the line was last in use, or since the
     /// phase began. One function does both, because 32-bit arithmetic is large on an AVR.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn has_passed(&self, time: u32, since_last_byte: bool) -> bool {
-        let since = if since_last_byte {
+    fn has_elapsed_since(&self, time: u32, since_last_byte: bool) -> bool {
+        let phase_start = if since_last_byte {
             self.last_byte
         } else {
-            self.since
+            self.phase_start
         };
-        has_elapsed(time, self.now, since)
+        has_elapsed(time, self.now, phase_start)
     }
 
     /// Waits for the turnaround delay, in which the slaves carry out a broadcast.
     #[inline(always)]
     pub(super) fn turn_around(&mut self) -> Status {
-        if self.is_over() {
+        if self.has_expired() {
             Status::OK
         } else {
             self.wait()
@@ -173,7 +173,7 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// accepts nothing: `PENDING`, or `LINE_BUSY` once the phase has expired.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn stalled(&self) -> Status {
-        if self.is_over() {
+        if self.has_expired() {
             Status::LINE_BUSY
         } else {
             Status::PENDING
@@ -181,7 +181,7 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     }
 }
 
-impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
+impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Notes that the line is in use now. The gap counts from now.
     pub fn line_used(&mut self) {
         self.last_byte = self.port.micros();
@@ -214,8 +214,8 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         self.look_at_clock(now);
         let status = match self.phase {
             Phase::Idle => return Status::OK,
-            Phase::Gap => self.listen(),
-            Phase::Send | Phase::Flush | Phase::Hold => self.send(),
+            Phase::Gap => self.wait_for_silence(),
+            Phase::Send | Phase::Flush | Phase::PostFlush => self.send(),
             phase => match receive {
                 Some(receive) => receive(self),
                 None if phase == Phase::Reply => self.receive::<false>(),
@@ -247,7 +247,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn end(&mut self) {
         self.take_back();
-        if matches!(self.phase, Phase::Send | Phase::Flush | Phase::Hold) {
+        if matches!(self.phase, Phase::Send | Phase::Flush | Phase::PostFlush) {
             self.port.post_transmission();
         }
         self.phase = Phase::Idle;
@@ -260,16 +260,16 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     pub fn poll_delay(&mut self, now: u32) -> u32 {
         self.look_at_clock(now);
         let settings = &self.settings;
-        let (time, since) = match self.phase {
+        let (time, phase_start) = match self.phase {
             Phase::Idle => return u32::MAX,
-            Phase::Send | Phase::Flush | Phase::Hold => return 0,
-            Phase::Gap => (self.silence_to_keep(), self.last_byte),
+            Phase::Send | Phase::Flush | Phase::PostFlush => return 0,
+            Phase::Gap => (self.required_silence(), self.last_byte),
             Phase::Reply if self.probation == Probation::Held => {
                 (settings.quiet_time, self.last_byte)
             }
-            Phase::Reply if !self.skimmed => (settings.silence, self.last_byte),
-            Phase::Reply | Phase::Turnaround => (self.wait, self.since),
+            Phase::Reply if !self.resynced => (settings.silence, self.last_byte),
+            Phase::Reply | Phase::Turnaround => (self.wait, self.phase_start),
         };
-        time.saturating_sub(elapsed(now, since))
+        time.saturating_sub(elapsed(now, phase_start))
     }
 }

@@ -7,31 +7,31 @@
 //! quiet time. A second right reply replaces the held one. If a second reply arrives damaged,
 //! the request fails, because the held reply is then most likely the late one.
 
-use super::{Count, Counter, Engine, Probation, Request, Seen, Storage, Words};
+use super::{Count, Counter, Engine, Probation, RequestSpec, RxFault, Storage, Words};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
-use crate::pdu::query::Query;
+use crate::pdu::query::MasterRequest;
 use crate::port::Port;
 use crate::FIRMWARE;
 
-impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
+impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Reads the received bytes at the time `now` and drops them. Negative if the link is lost.
     pub fn drop_received(&mut self, now: u32) -> i16 {
         self.look_at_clock(now);
-        self.hear(S::Count::ZERO)
+        self.read_bytes(S::Count::ZERO)
     }
 
     /// Reads received bytes into the frame buffer from `index` on. Returns how many; negative
     /// if the link is lost.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn hear(&mut self, index: S::Count) -> i16 {
-        let room = self.storage.room() - index;
-        let heard = self.port.read(self.storage.bytes(index, room));
-        if heard > 0 {
-            self.storage.count(Counter::BytesReceived, heard as u16);
+    pub(super) fn read_bytes(&mut self, index: S::Count) -> i16 {
+        let space = self.storage.capacity() - index;
+        let received = self.port.read(self.storage.bytes(index, space));
+        if received > 0 {
+            self.storage.count(Counter::BytesReceived, received as u16);
             self.last_byte = self.now;
         }
-        heard
+        received
     }
 
     /// Notes that the reply to the pending request may come late.
@@ -45,11 +45,11 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     pub(super) fn begin_reply(&mut self) {
         self.end = S::Count::ZERO;
         self.begin_frame(S::Count::ZERO);
-        self.length = self.request.reply_length(self.storage.room());
+        self.length = self.request.reply_length(self.storage.capacity());
         self.weight = Crc16::RESIDUE;
-        self.seen = Seen::NOTHING;
-        self.foreign = 0;
-        self.skimmed = true;
+        self.fault = RxFault::NOTHING;
+        self.foreign_frames = 0;
+        self.resynced = true;
         if cfg!(feature = "echo") {
             self.echo = self.settings.echo_discard;
         }
@@ -63,56 +63,56 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn receive<const LENIENT: bool>(&mut self) -> Status {
-        let mut over = self.is_over();
+        let mut over = self.has_expired();
         // At the deadline all received bytes are searched, also if the port returns them one
         // by one, but at most as many as a frame buffer holds.
         let mut budget = S::Count::MAX;
         loop {
-            if self.end == self.storage.room() {
+            if self.end == self.storage.capacity() {
                 self.make_space::<LENIENT>();
             }
-            let heard = self.hear(self.end);
-            if heard < 0 {
+            let received = self.read_bytes(self.end);
+            if received < 0 {
                 return Status::LINK_LOST;
             }
-            let heard = S::Count::of(heard as usize);
-            if heard == S::Count::ZERO {
+            let received = S::Count::of(received as usize);
+            if received == S::Count::ZERO {
                 self.waiting = true;
                 break;
             }
-            self.end += heard;
-            self.skimmed = false;
-            let found = self.search::<LENIENT>();
+            self.end += received;
+            self.resynced = false;
+            let found = self.find_reply::<LENIENT>();
             if self.is_answered::<LENIENT>(found) {
                 return self.found();
             }
             if !over {
                 return Status::PENDING;
             }
-            if budget < heard {
+            if budget < received {
                 break;
             }
-            budget -= heard;
+            budget -= received;
         }
-        if !self.skimmed && (over || self.is_silent(self.settings.silence)) {
-            self.skimmed = true;
-            let found = Q::search_silent(self);
+        if !self.resynced && (over || self.is_silent(self.settings.silence)) {
+            self.resynced = true;
+            let found = Q::find_reply_in_silence(self);
             if self.is_answered::<LENIENT>(found) {
                 return self.found();
             }
         }
         if self.probation == Probation::Held {
-            over = self.is_silent(self.settings.quiet_time) || self.is_over();
+            over = self.is_silent(self.settings.quiet_time) || self.has_expired();
         }
         if over {
             let is_held = !LENIENT || self.probation == Probation::Held;
-            if is_held && self.take_held() {
+            if is_held && self.accept_held() {
                 return self.found();
             }
             return self.fail_unless_deviating::<LENIENT>();
         }
         // Without diagnosis the engine does not know whether the damaged bytes were a reply.
-        if cfg!(feature = "diagnosis") && self.skimmed && self.seen >= Seen::BAD_CRC {
+        if cfg!(feature = "diagnosis") && self.resynced && self.fault >= RxFault::BAD_CRC {
             return self.fail_unless_deviating::<LENIENT>();
         }
         Status::PENDING
@@ -120,11 +120,11 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
 
     /// Searches the received bytes for the reply.
     #[inline(always)]
-    fn search<const LENIENT: bool>(&mut self) -> bool {
+    fn find_reply<const LENIENT: bool>(&mut self) -> bool {
         if LENIENT {
-            self.search_rtu::<true>()
+            self.find_rtu_reply::<true>()
         } else {
-            Q::search(self)
+            Q::find_reply(self)
         }
     }
 
@@ -135,7 +135,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             Q::drop_kept(self);
         }
         if !LENIENT || self.probation == Probation::Held {
-            self.give_up_held();
+            self.discard_held();
         }
     }
 
@@ -143,7 +143,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// the answer.
     #[inline(always)]
     fn fail_unless_deviating<const LENIENT: bool>(&mut self) -> Status {
-        if LENIENT && Q::take_deviating(self) {
+        if LENIENT && Q::accept_deviating(self) {
             return self.found();
         }
         self.fail()
@@ -156,11 +156,11 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         if !FIRMWARE && !LENIENT && self.probation == Probation::Off {
             return found;
         }
-        self.is_answered_behind_held::<LENIENT>(found)
+        self.is_answered_after_held::<LENIENT>(found)
     }
 
     #[inline(never)]
-    fn is_answered_behind_held<const LENIENT: bool>(&mut self, mut found: bool) -> bool {
+    fn is_answered_after_held<const LENIENT: bool>(&mut self, mut found: bool) -> bool {
         while found {
             if LENIENT {
                 Q::drop_kept(self);
@@ -168,8 +168,8 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             if self.probation == Probation::Off {
                 return true;
             }
-            self.hold();
-            found = self.search::<LENIENT>();
+            self.hold_reply();
+            found = self.find_reply::<LENIENT>();
         }
         false
     }
@@ -184,11 +184,11 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         if self.exception != 0 {
             self.storage.count(Counter::Exceptions, 1);
         }
-        if self.passed > 0 {
+        if self.skipped > 0 {
             self.storage.count(Counter::Resynchronisations, 1);
         }
         self.storage
-            .count(Counter::ForeignFrames, self.foreign.into());
+            .count(Counter::ForeignFrames, self.foreign_frames.into());
         Status::from_code(self.exception)
     }
 
@@ -197,8 +197,8 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn fail(&mut self) -> Status {
         self.storage
-            .count(Counter::ForeignFrames, self.foreign.into());
-        let status = self.seen.status();
+            .count(Counter::ForeignFrames, self.foreign_frames.into());
+        let status = self.fault.status();
         if status == Status::BUFFER_TOO_SMALL {
             return status;
         }
@@ -208,28 +208,28 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             Counter::Timeouts
         };
         self.storage.count(counter, 1);
-        if !cfg!(feature = "retries") || !Q::IS_PLAIN || self.retries == 0 {
+        if !cfg!(feature = "retries") || !Q::HAS_FIXED_REPLY || self.retries == 0 {
             return status;
         }
         self.retries -= 1;
         // The damaged reply may have been noise, so the right reply may still come.
         self.expect_late_reply();
         self.last_byte = self.now;
-        self.listen_anew()
+        self.begin()
     }
 
     /// Holds the reply at the front of the frame buffer. It replaces a reply that was held
     /// before.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn hold(&mut self) {
-        self.give_up_held();
+    fn hold_reply(&mut self) {
+        self.discard_held();
         // Only unit and PDU are kept, so at least one byte is free for the next byte.
-        self.held = self.request.content(self.least);
+        self.held = self.request.content(self.needed);
         self.storage.set_aside(self.held);
         self.end -= self.held;
-        self.drop_front(self.least - self.held);
+        self.drop_front(self.needed - self.held);
         self.begin_frame(S::Count::ZERO);
-        self.seen = Seen::NOTHING;
+        self.fault = RxFault::NOTHING;
         self.probation = Probation::Held;
         // If the line is never silent, the wait for a second reply ends at this time.
         let timeout = self.settings.response_timeout;
@@ -240,7 +240,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
 
     /// Drops the held reply and counts it as a foreign frame.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn give_up_held(&mut self) {
+    fn discard_held(&mut self) {
         let held = self.held;
         if held > S::Count::ZERO {
             self.storage.count(Counter::ForeignFrames, 1);
@@ -252,11 +252,11 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// Accepts the held reply as the answer. False if no reply is held, or if the bytes after
     /// it may have been the answer.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn take_held(&mut self) -> bool {
+    fn accept_held(&mut self) -> bool {
         let held = self.held;
         // A single byte may be noise; more bytes may be the beginning of a reply.
         if held == S::Count::ZERO
-            || self.seen >= Seen::BAD_CRC
+            || self.fault >= RxFault::BAD_CRC
             || self.end > 1u8.into()
             || !self.is_silent(self.settings.quiet_time)
         {
@@ -264,7 +264,7 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         }
         self.take_back();
         // A damaged second reply may have overwritten the exception code of the first.
-        Q::judge(self, S::Count::ZERO, held);
+        Q::validate(self, S::Count::ZERO, held);
         true
     }
 }
@@ -277,12 +277,12 @@ impl<P, S: Storage, Q> Engine<P, S, Q> {
     }
 }
 
-impl<P: Port, S: Words> Engine<P, S, Query> {
+impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
     /// Copies the data of the reply into the response words. False, with nothing copied, if
     /// there are too few words.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    pub fn take_words(&mut self) -> bool {
+    pub fn store_words(&mut self) -> bool {
         let count = self.request.reads();
         if self.response_words() > self.storage.response_words() {
             return false;
@@ -292,7 +292,7 @@ impl<P: Port, S: Words> Engine<P, S, Query> {
         let byte = self.storage.byte(last) & self.request.mask();
         self.storage.set_byte(last, byte);
         self.storage
-            .take_words(3, count, self.request.has_registers());
+            .store_words(3, count, self.request.has_registers());
         true
     }
 

@@ -1,11 +1,11 @@
 //! Sends a request: waits for silence, writes the frame, waits until its last bit has left.
 
-use super::{Count, Counter, Engine, Phase, Request, Storage, BROADCAST};
+use super::{Count, Counter, Engine, Phase, RequestSpec, Storage, BROADCAST};
 use crate::error::Status;
 use crate::port::Port;
 use crate::time::characters;
 
-impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
+impl<P: Port, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     /// Starts the request to `unit`; the calls of `poll` send it. A refused request sends
     /// nothing: [`Status::BROADCAST_NOT_ALLOWED`] for a request to unit 0 that may not be
     /// broadcast, [`Status::BUFFER_TOO_SMALL`] if the frame buffer cannot hold the request.
@@ -19,30 +19,30 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// As [`Engine::start`], also for a request to unit 0 that may not be broadcast.
     #[inline(always)]
     pub fn start_any(&mut self, unit: u8) -> Status {
-        if !self.request.fits(self.storage.room()) {
+        if !self.request.fits(self.storage.capacity()) {
             return Status::BUFFER_TOO_SMALL;
         }
         self.unit = unit;
-        if cfg!(feature = "retries") && Q::IS_PLAIN {
+        if cfg!(feature = "retries") && Q::HAS_FIXED_REPLY {
             self.retries = self.settings.retries;
         }
-        self.listen_anew()
+        self.begin()
     }
 
     /// Writes the frame of the request and enters the phase that waits for silence.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    pub(super) fn listen_anew(&mut self) -> Status {
+    pub(super) fn begin(&mut self) -> Status {
         self.take_back();
         Q::write(self);
         let wait = self.settings.response_timeout;
-        self.enter(Phase::Gap, wait.wrapping_add(self.silence_to_keep()));
+        self.enter(Phase::Gap, wait.wrapping_add(self.required_silence()));
         Status::PENDING
     }
 
     /// The silence, in microseconds, that the next request waits for.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn silence_to_keep(&self) -> u32 {
+    pub(super) fn required_silence(&self) -> u32 {
         if self.late {
             self.settings.gap.max(self.settings.quiet_time)
         } else {
@@ -55,23 +55,23 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// the response timeout plus the gap.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    pub(super) fn listen(&mut self) -> Status {
-        let heard = self.hear(S::Count::ZERO);
-        if heard < 0 {
+    pub(super) fn wait_for_silence(&mut self) -> Status {
+        let received = self.read_bytes(S::Count::ZERO);
+        if received < 0 {
             return Status::LINK_LOST;
         }
-        if heard > 0 {
+        if received > 0 {
             // The received bytes have overwritten the request.
             Q::write(self);
             return self.stalled();
         }
-        if !self.is_silent(self.silence_to_keep()) {
+        if !self.is_silent(self.required_silence()) {
             return self.wait();
         }
         self.storage.count(Counter::Requests, 1);
         self.late = false;
         self.phase = Phase::Send;
-        self.since = self.now;
+        self.phase_start = self.now;
         self.wait = self.settings.response_timeout;
         self.port.pre_transmission();
         self.send()
@@ -84,8 +84,8 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn send(&mut self) -> Status {
         if self.phase == Phase::Send {
-            let left = self.end - self.done;
-            let sent = self.port.write(self.storage.bytes(self.done, left));
+            let left = self.end - self.processed;
+            let sent = self.port.write(self.storage.bytes(self.processed, left));
             if sent < 0 {
                 return Status::LINK_LOST;
             }
@@ -94,8 +94,8 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             }
             self.storage.count(Counter::BytesSent, sent as u16);
             let sent = S::Count::of(sent as usize);
-            self.done += sent;
-            self.since = self.now;
+            self.processed += sent;
+            self.phase_start = self.now;
             if sent < left {
                 return Status::PENDING;
             }
@@ -105,17 +105,20 @@ impl<P: Port, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
                 .wait
                 .wrapping_add(u32::from(self.settings.character) << 8);
         }
-        if cfg!(feature = "hold") && self.phase == Phase::Hold {
-            if !self.is_over() {
+        if cfg!(feature = "hold") && self.phase == Phase::PostFlush {
+            if !self.has_expired() {
                 return Status::PENDING;
             }
         } else {
             if !self.port.flush() {
                 return self.stalled();
             }
-            let hold = self.settings.post_flush_hold;
-            if cfg!(feature = "hold") && hold > 0 {
-                self.enter(Phase::Hold, characters(self.settings.character, hold));
+            let hold_reply = self.settings.post_flush_hold;
+            if cfg!(feature = "hold") && hold_reply > 0 {
+                self.enter(
+                    Phase::PostFlush,
+                    characters(self.settings.character, hold_reply),
+                );
                 return Status::PENDING;
             }
         }

@@ -58,7 +58,7 @@ impl Settings {
     /// Turns zeroed settings into the default settings. Field by field, because a constant
     /// of the whole struct would take flash, and RAM on an AVR.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn preset(&mut self) {
+    pub fn set_default_if_zero(&mut self) {
         self.gap = Settings::DEFAULT.gap;
         self.silence = Settings::DEFAULT.silence;
         self.response_timeout = Settings::DEFAULT.response_timeout;
@@ -94,7 +94,7 @@ mod tests {
             post_flush_hold: 0,
             echo_discard: false,
         };
-        settings.preset();
+        settings.set_default_if_zero();
         assert_eq!(settings, Settings::DEFAULT);
     }
 }

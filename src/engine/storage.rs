@@ -88,14 +88,14 @@ impl Count for u16 {
 
 /// The memory of an engine: a frame buffer, and counters.
 ///
-/// The engine keeps every index and count within [`Storage::room`], so an implementation need
+/// The engine keeps every index and count within [`Storage::space`], so an implementation need
 /// not check them.
 pub trait Storage {
     /// The type of lengths and indexes.
     type Count: Count;
 
     /// Bytes of the frame buffer, without those that are set aside.
-    fn room(&self) -> Self::Count;
+    fn capacity(&self) -> Self::Count;
 
     /// A byte of the frame buffer.
     fn byte(&self, index: Self::Count) -> u8;
@@ -135,7 +135,7 @@ pub trait Words: Storage<Count = u8> {
 
     /// Copies `count` bytes of the transmit words into the frame buffer from `to` on: the high
     /// byte of each word first if `high_first`, otherwise the low byte.
-    fn send_words(&mut self, to: u8, count: u8, high_first: bool);
+    fn load_words(&mut self, to: u8, count: u8, high_first: bool);
 
     /// The response words, at most 255: a successful read fills them.
     fn response(&mut self) -> &mut [u16];
@@ -146,7 +146,7 @@ pub trait Words: Storage<Count = u8> {
     /// Fills the response words with `count` bytes of the frame buffer from `from` on: the high
     /// byte of each word first if `high_first`, otherwise the low byte. If `count` is odd, the
     /// missing byte of the last word is 0.
-    fn take_words(&mut self, from: u8, count: u8, high_first: bool);
+    fn store_words(&mut self, from: u8, count: u8, high_first: bool);
 }
 
 /// A frame buffer in Rust: an array, a slice or another container of bytes. An index out of
@@ -168,9 +168,9 @@ impl<F> Frame<F> {
 impl<F: AsRef<[u8]> + AsMut<[u8]>> Storage for Frame<F> {
     type Count = u16;
 
-    fn room(&self) -> u16 {
-        let room = self.bytes.as_ref().len().min(u16::MAX.into()) as u16;
-        room.saturating_sub(self.aside)
+    fn capacity(&self) -> u16 {
+        let space = self.bytes.as_ref().len().min(u16::MAX.into()) as u16;
+        space.saturating_sub(self.aside)
     }
 
     fn byte(&self, index: u16) -> u8 {
@@ -239,7 +239,7 @@ where
 {
     type Count = u8;
 
-    fn room(&self) -> u8 {
+    fn capacity(&self) -> u8 {
         // Bytes that are set aside count for the limit of 255 too.
         count(self.frame.bytes.as_ref().len()).saturating_sub(self.frame.aside as u8)
     }
@@ -289,7 +289,7 @@ where
         count(self.transmit.as_ref().len())
     }
 
-    fn send_words(&mut self, to: u8, count: u8, high_first: bool) {
+    fn load_words(&mut self, to: u8, count: u8, high_first: bool) {
         for index in 0..count {
             let word = self.transmit.as_ref().get(usize::from(index / 2));
             let [low, high] = word.map_or([0, 0], |word| word.to_le_bytes());
@@ -310,7 +310,7 @@ where
         count(self.response.as_ref().len())
     }
 
-    fn take_words(&mut self, from: u8, count: u8, high_first: bool) {
+    fn store_words(&mut self, from: u8, count: u8, high_first: bool) {
         for index in 0..count.div_ceil(2) {
             let first = self.byte(from + 2 * index);
             let second = match 2 * index + 1 < count {

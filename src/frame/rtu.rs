@@ -116,11 +116,11 @@ pub fn emit(
     unit: u8,
     pdu: impl FnOnce(&mut [u8]) -> Result<usize, Status>,
 ) -> Result<usize, Status> {
-    let room = buffer.len().saturating_sub(OVERHEAD);
-    let place = buffer.get_mut(PDU..PDU + room);
+    let space = buffer.len().saturating_sub(OVERHEAD);
+    let place = buffer.get_mut(PDU..PDU + space);
     let length = pdu(place.ok_or(Status::BUFFER_TOO_SMALL)?)?;
     // Also tells the compiler that the length of the frame cannot overflow.
-    if length > room {
+    if length > space {
         return Err(Status::BUFFER_TOO_SMALL);
     }
     write(buffer, unit, length, |_| ());

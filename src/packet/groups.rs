@@ -1,7 +1,7 @@
 //! The data of some functions consist of groups: file records (functions 14 and 15, hex), and
 //! objects of a device identification. This module reads and writes one group at a time.
 
-use super::Side;
+use super::PduKind;
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
 use crate::pdu::files::WRITE_FILE_RECORD;
@@ -17,13 +17,13 @@ const NO_RECORD: Record = Record {
 /// Reads the first record in the data of function 14 or 15. Returns the record, its data, and
 /// the length of the group in bytes. The data are empty in a request of 14. In a response of
 /// 14 only the length of the record is known.
-pub fn record(side: Side, function: u8, groups: &[u8]) -> Option<(Record, &[u8], usize)> {
+pub fn record(side: PduKind, function: u8, groups: &[u8]) -> Option<(Record, &[u8], usize)> {
     match (function, side) {
-        (READ_FILE_RECORD, Side::Request) => {
+        (READ_FILE_RECORD, PduKind::Request) => {
             let record = Reads::new(groups).ok()?.iter().next()?;
             Some((record, &[], 7))
         }
-        (READ_FILE_RECORD, Side::Response) => {
+        (READ_FILE_RECORD, PduKind::Response) => {
             let data = Records::new(groups).ok()?.iter().next()?;
             let length = (data.len() / 2) as u16;
             Some((
@@ -51,7 +51,7 @@ pub fn record(side: Side, function: u8, groups: &[u8]) -> Option<(Record, &[u8],
 /// [`Status::BUFFER_TOO_SMALL`]; the error of a request or response that contains only this
 /// record.
 pub fn put_record(
-    side: Side,
+    side: PduKind,
     function: u8,
     head: Record,
     data: &[u8],
@@ -62,7 +62,7 @@ pub fn put_record(
     if !is_read && function != WRITE_FILE_RECORD {
         return Err(Status::ILLEGAL_FUNCTION);
     }
-    if is_read && side == Side::Response {
+    if is_read && side == PduKind::Response {
         // A count that does not fit a byte is refused below, when the group is read.
         writer.u8(data.len().saturating_add(1).min(0xFF) as u8);
         writer.u8(REFERENCE_TYPE);
@@ -76,8 +76,8 @@ pub fn put_record(
     let length = writer.finish()?;
     let group = place.get(..length).unwrap_or_default();
     match (is_read, side) {
-        (true, Side::Request) => Reads::new(group).map(|_| ()),
-        (true, Side::Response) => Records::new(group).map(|_| ()),
+        (true, PduKind::Request) => Reads::new(group).map(|_| ()),
+        (true, PduKind::Response) => Records::new(group).map(|_| ()),
         (false, _) => Writes::new(group).map(|_| ()),
     }?;
     Ok(length)
@@ -120,9 +120,9 @@ mod tests {
         };
         let data = [0x06, 0xAF, 0x04, 0xBE];
         for (side, function, head, data) in [
-            (Side::Request, 0x14, place, &data[..0]),
+            (PduKind::Request, 0x14, place, &data[..0]),
             (
-                Side::Response,
+                PduKind::Response,
                 0x14,
                 Record {
                     length: 2,
@@ -130,8 +130,8 @@ mod tests {
                 },
                 &data,
             ),
-            (Side::Request, 0x15, place, &data),
-            (Side::Response, 0x15, place, &data),
+            (PduKind::Request, 0x15, place, &data),
+            (PduKind::Response, 0x15, place, &data),
         ] {
             let mut bytes = [0; 11];
             let length = put_record(side, function, head, data, &mut bytes).unwrap();
@@ -152,48 +152,54 @@ mod tests {
         };
         for (side, function, head, count, status) in [
             (
-                Side::Request,
+                PduKind::Request,
                 0x14,
                 head(0, 1),
                 0,
                 Status::ILLEGAL_DATA_ADDRESS,
             ),
             (
-                Side::Request,
+                PduKind::Request,
                 0x14,
                 head(1, 0),
                 0,
                 Status::ILLEGAL_DATA_VALUE,
             ),
             (
-                Side::Request,
+                PduKind::Request,
                 0x15,
                 head(1, 2),
                 2,
                 Status::ILLEGAL_DATA_VALUE,
             ),
             (
-                Side::Request,
+                PduKind::Request,
                 0x15,
                 head(1, 250),
                 500,
                 Status::ILLEGAL_DATA_VALUE,
             ),
             (
-                Side::Response,
+                PduKind::Response,
                 0x14,
                 NO_RECORD,
                 3,
                 Status::ILLEGAL_DATA_VALUE,
             ),
             (
-                Side::Response,
+                PduKind::Response,
                 0x14,
                 NO_RECORD,
                 510,
                 Status::ILLEGAL_DATA_VALUE,
             ),
-            (Side::Request, 0x18, head(1, 1), 0, Status::ILLEGAL_FUNCTION),
+            (
+                PduKind::Request,
+                0x18,
+                head(1, 1),
+                0,
+                Status::ILLEGAL_FUNCTION,
+            ),
         ] {
             let found = put_record(side, function, head, &[0; 510][..count], &mut bytes);
             assert_eq!(found, Err(status));

@@ -1,7 +1,7 @@
 //! The length of a frame, derived from its first bytes, and the length of a reply, derived
 //! from its request.
 
-use super::Side;
+use super::PduKind;
 use crate::error::Status;
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::custom::{is_user_defined, Function};
@@ -36,8 +36,8 @@ fn frame_length(framing: Framing, pdu: Length) -> Length {
 
 /// True for a response of Report Server ID. In some devices its byte count covers only the
 /// id, and more bytes follow.
-fn may_be_longer(side: Side, pdu: &[u8]) -> bool {
-    side == Side::Response && pdu.first() == Some(&REPORT_SERVER_ID)
+fn may_be_longer(side: PduKind, pdu: &[u8]) -> bool {
+    side == PduKind::Response && pdu.first() == Some(&REPORT_SERVER_ID)
 }
 
 /// The length of the frame that begins with `bytes`. [`Length::Silence`] of an ASCII frame
@@ -48,7 +48,7 @@ fn may_be_longer(side: Side, pdu: &[u8]) -> bool {
 /// frame would be too long for this framing.
 pub fn expected(
     framing: Framing,
-    side: Side,
+    side: PduKind,
     bytes: &[u8],
     end: u8,
     functions: &[Function],
@@ -94,7 +94,7 @@ pub fn function(framing: Framing, bytes: &[u8]) -> Option<u8> {
 /// As [`expected`], for an ASCII frame.
 #[inline(never)]
 fn expected_ascii(
-    side: Side,
+    side: PduKind,
     bytes: &[u8],
     end: u8,
     functions: &[Function],
@@ -177,13 +177,13 @@ pub fn looks_like_tcp(
     let end = header.total.min(bytes.len());
     let pdu = bytes.get(tcp::PDU..end).unwrap_or_default();
     let whole = header.total - tcp::PDU;
-    let fits = |side: Side| match side.length(pdu, functions) {
+    let fits = |side: PduKind| match side.length(pdu, functions) {
         Length::Exactly(length) if may_be_longer(side, pdu) => length <= whole,
         Length::Exactly(length) => length == whole,
         Length::AtLeast(length) => length <= whole,
         Length::Silence | Length::Unknown => true,
     };
-    let right = fits(Side::Response) || (code == function && fits(Side::Request));
+    let right = fits(PduKind::Response) || (code == function && fits(PduKind::Request));
     if function != 0 && (known || allow_unknown) && right {
         Ok(header.total)
     } else {
@@ -196,7 +196,7 @@ mod tests {
     use super::*;
 
     /// [`expected`] without declared functions.
-    fn expected_length(framing: Framing, side: Side, bytes: &[u8]) -> Result<Length, Status> {
+    fn expected_length(framing: Framing, side: PduKind, bytes: &[u8]) -> Result<Length, Status> {
         expected(framing, side, bytes, ascii::END, &[])
     }
 
@@ -204,11 +204,11 @@ mod tests {
     fn the_first_bytes_of_an_rtu_reply_narrow_its_length() {
         let bytes = [0x11, 3, 4, 0, 1, 0, 2, 0xAA, 0xBB];
         for (have, wanted) in [(0, 4), (1, 4), (2, 5)] {
-            let length = expected_length(Framing::Rtu, Side::Response, &bytes[..have]);
+            let length = expected_length(Framing::Rtu, PduKind::Response, &bytes[..have]);
             assert_eq!(length, Ok(Length::AtLeast(wanted)), "{have}");
         }
         for have in 3..=bytes.len() {
-            let length = expected_length(Framing::Rtu, Side::Response, &bytes[..have]);
+            let length = expected_length(Framing::Rtu, PduKind::Response, &bytes[..have]);
             assert_eq!(length, Ok(Length::Exactly(9)), "{have}");
         }
     }
@@ -217,7 +217,7 @@ mod tests {
     fn the_end_of_an_ascii_frame_overrides_its_predicted_length() {
         let frame = b":110306AE415652434049\r\n";
         for have in 0..frame.len() {
-            let length = expected_length(Framing::Ascii, Side::Response, &frame[..have]);
+            let length = expected_length(Framing::Ascii, PduKind::Response, &frame[..have]);
             let wanted = match have {
                 0..=2 => Length::AtLeast(9),
                 3..=4 => Length::AtLeast(9),
@@ -226,14 +226,14 @@ mod tests {
             };
             assert_eq!(length, Ok(wanted), "{have}");
         }
-        let length = expected_length(Framing::Ascii, Side::Response, frame);
+        let length = expected_length(Framing::Ascii, PduKind::Response, frame);
         assert_eq!(length, Ok(Length::Exactly(23)));
-        let early = expected_length(Framing::Ascii, Side::Response, b":1103\r\n06AE");
+        let early = expected_length(Framing::Ascii, PduKind::Response, b":1103\r\n06AE");
         assert_eq!(early, Ok(Length::Exactly(7)));
-        let unknown = expected_length(Framing::Ascii, Side::Request, b":1155");
+        let unknown = expected_length(Framing::Ascii, PduKind::Request, b":1155");
         assert_eq!(unknown, Ok(Length::Silence));
         for bad in [&b"x"[..], b":1G", b":\r1", b":0207F777", b":0207F7\rX"] {
-            let length = expected_length(Framing::Ascii, Side::Request, bad);
+            let length = expected_length(Framing::Ascii, PduKind::Request, bad);
             assert_eq!(length, Err(Status::MALFORMED_FRAME));
         }
     }
@@ -243,7 +243,7 @@ mod tests {
         // The byte count covers only the id: two bytes of five.
         let frame = b":10110201020001023F\r\n";
         for have in 0..=frame.len() {
-            let length = expected_length(Framing::Ascii, Side::Response, &frame[..have]);
+            let length = expected_length(Framing::Ascii, PduKind::Response, &frame[..have]);
             let wanted = match have {
                 0..=4 => Length::AtLeast(9),
                 5..=6 => Length::AtLeast(11),
@@ -257,20 +257,20 @@ mod tests {
 
     #[test]
     fn lengths_that_no_frame_has_are_malformed() {
-        let length = expected_length(Framing::Rtu, Side::Response, &[1, 3, 252]);
+        let length = expected_length(Framing::Rtu, PduKind::Response, &[1, 3, 252]);
         assert_eq!(length, Err(Status::MALFORMED_FRAME));
-        let length = expected_length(Framing::Tcp, Side::Request, &[0, 1, 0, 0, 255, 255]);
+        let length = expected_length(Framing::Tcp, PduKind::Request, &[0, 1, 0, 0, 255, 255]);
         assert_eq!(length, Err(Status::MALFORMED_FRAME));
-        let length = expected_length(Framing::Ascii, Side::Response, b":0103FF");
+        let length = expected_length(Framing::Ascii, PduKind::Response, b":0103FF");
         assert_eq!(length, Err(Status::MALFORMED_FRAME));
     }
 
     #[test]
     fn silence_ends_a_frame_only_on_a_serial_line() {
         let bytes = [1, 8, 0, 0];
-        let on_a_line = expected_length(Framing::Rtu, Side::Request, &bytes);
+        let on_a_line = expected_length(Framing::Rtu, PduKind::Request, &bytes);
         assert_eq!(on_a_line, Ok(Length::Silence));
-        let in_a_stream = expected_length(Framing::RtuOverTcp, Side::Request, &bytes);
+        let in_a_stream = expected_length(Framing::RtuOverTcp, PduKind::Request, &bytes);
         assert_eq!(in_a_stream, Ok(Length::Unknown));
     }
 

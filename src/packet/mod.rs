@@ -14,19 +14,19 @@ use crate::pdu::response::Response;
 
 /// The kind of a PDU.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Side {
+pub enum PduKind {
     /// Sent by a master or client.
     Request,
     /// Sent by a server. Exceptions are responses.
     Response,
 }
 
-impl Side {
+impl PduKind {
     /// The length of the PDU that begins with these bytes.
     pub fn length(self, pdu: &[u8], functions: &[Function]) -> Length {
         match self {
-            Side::Request => pdu_length::request(pdu, functions),
-            Side::Response => pdu_length::response(pdu, functions),
+            PduKind::Request => pdu_length::request(pdu, functions),
+            PduKind::Response => pdu_length::response(pdu, functions),
         }
     }
 }

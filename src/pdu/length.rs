@@ -150,13 +150,13 @@ pub(super) fn check(pdu: &[u8], function: u8, rule: Option<Rule>) -> Result<(), 
     if !is_free(function) {
         return Err(Status::ILLEGAL_FUNCTION);
     }
-    let agrees = match rule.map(|rule| by_rule(pdu, rule)) {
+    let matches_echo = match rule.map(|rule| by_rule(pdu, rule)) {
         None if !is_user_defined(function) => return Err(Status::ILLEGAL_FUNCTION),
         None | Some(Length::Silence) => true,
         Some(Length::Exactly(length)) => length == pdu.len(),
         Some(_) => false,
     };
-    if agrees {
+    if matches_echo {
         Ok(())
     } else {
         Err(Status::ILLEGAL_DATA_VALUE)

@@ -10,9 +10,9 @@ const HEAD: usize = 9;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 // One number, which a call passes in registers: a microcontroller would copy a
 // constant of several fields to RAM.
-pub struct Form(u32);
+pub struct FunctionSpec(u32);
 
-impl Form {
+impl FunctionSpec {
     /// The response brings data behind a byte count; else it repeats the head.
     const READS: u8 = 1;
     /// Data follow the head behind a byte count.
@@ -20,34 +20,42 @@ impl Form {
     /// The data are registers, not bits.
     const REGISTERS: u8 = 4;
 
-    const fn new(function: u8, traits: u8, most: u16) -> Form {
+    const fn new(function: u8, traits: u8, most: u16) -> FunctionSpec {
         let [low, high] = most.to_le_bytes();
-        Form(u32::from_le_bytes([function, traits, low, high]))
+        FunctionSpec(u32::from_le_bytes([function, traits, low, high]))
     }
 
     /// An address and a value, which the response repeats.
-    pub(super) const fn single(function: u8) -> Form {
-        Form::new(function, 0, 0)
+    pub(super) const fn single(function: u8) -> FunctionSpec {
+        FunctionSpec::new(function, 0, 0)
     }
 
     /// Reads at `most` so many bits.
-    pub(super) const fn reads_bits(function: u8, most: u16) -> Form {
-        Form::new(function, Form::READS, most)
+    pub(super) const fn reads_bits(function: u8, most: u16) -> FunctionSpec {
+        FunctionSpec::new(function, FunctionSpec::READS, most)
     }
 
     /// Reads at `most` so many registers.
-    pub(super) const fn reads_registers(function: u8, most: u16) -> Form {
-        Form::new(function, Form::READS | Form::REGISTERS, most)
+    pub(super) const fn reads_registers(function: u8, most: u16) -> FunctionSpec {
+        FunctionSpec::new(
+            function,
+            FunctionSpec::READS | FunctionSpec::REGISTERS,
+            most,
+        )
     }
 
     /// Writes at `most` so many bits.
-    pub(super) const fn writes_bits(function: u8, most: u16) -> Form {
-        Form::new(function, Form::SENDS, most)
+    pub(super) const fn writes_bits(function: u8, most: u16) -> FunctionSpec {
+        FunctionSpec::new(function, FunctionSpec::SENDS, most)
     }
 
     /// Writes at `most` so many registers.
-    pub(super) const fn writes_registers(function: u8, most: u16) -> Form {
-        Form::new(function, Form::SENDS | Form::REGISTERS, most)
+    pub(super) const fn writes_registers(function: u8, most: u16) -> FunctionSpec {
+        FunctionSpec::new(
+            function,
+            FunctionSpec::SENDS | FunctionSpec::REGISTERS,
+            most,
+        )
     }
 }
 
@@ -56,7 +64,7 @@ impl Form {
 // Lengths first: see `Engine`.
 #[derive(Clone, Copy, Hash, Debug)]
 #[repr(C)]
-pub struct Query {
+pub struct MasterRequest {
     head_length: u8,
     /// Length of the response PDU if the request succeeds.
     response_length: u8,
@@ -71,9 +79,9 @@ pub struct Query {
     head: [u8; HEAD],
 }
 
-impl Query {
+impl MasterRequest {
     /// No request.
-    pub const NONE: Query = Query {
+    pub const NONE: MasterRequest = MasterRequest {
         head_length: 0,
         response_length: 0,
         sends: 0,
@@ -87,8 +95,10 @@ impl Query {
     ///
     /// # Errors
     /// The status with which `build` refuses.
-    pub fn build(build: impl FnOnce(&mut Query) -> Status) -> Result<Query, Status> {
-        let mut request = Query::NONE;
+    pub fn build(
+        build: impl FnOnce(&mut MasterRequest) -> Status,
+    ) -> Result<MasterRequest, Status> {
+        let mut request = MasterRequest::NONE;
         match build(&mut request) {
             Status::OK => Ok(request),
             refused => Err(refused),
@@ -98,14 +108,14 @@ impl Query {
     /// Becomes the request of a form, of an address and a quantity or value; says
     /// whether every device would accept that.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn set(&mut self, form: Form, address: u16, word: u16) -> Status {
+    pub fn set(&mut self, form: FunctionSpec, address: u16, word: u16) -> Status {
         let [function, traits, low, high] = form.0.to_le_bytes();
         let ([a, b], [c, d]) = (address.to_be_bytes(), word.to_be_bytes());
         let [at_0, at_1, at_2, at_3, at_4, ..] = &mut self.head;
         (*at_0, *at_1, *at_2, *at_3, *at_4) = (function, a, b, c, d);
         self.head_length = 5;
         self.response_length = 5;
-        self.registers = traits & Form::REGISTERS != 0;
+        self.registers = traits & FunctionSpec::REGISTERS != 0;
         self.mask = 0xFF;
         // Too many are refused below, so what is cut off here does no harm.
         let mut bytes = (word << 1) as u8;
@@ -115,11 +125,11 @@ impl Query {
         }
         self.sends = bytes;
         self.reads = 0;
-        if traits & Form::READS != 0 {
+        if traits & FunctionSpec::READS != 0 {
             self.reads = bytes;
             self.response_length = bytes.wrapping_add(2);
         }
-        if traits & Form::SENDS == 0 {
+        if traits & FunctionSpec::SENDS == 0 {
             self.sends = 0;
         }
         match u16::from_le_bytes([low, high]) {

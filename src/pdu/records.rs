@@ -69,12 +69,14 @@ impl<'a> Reads<'a> {
     pub fn new(bytes: &'a [u8]) -> Result<Self, Status> {
         check_within(bytes.len(), READ_FILE_BYTES)?;
         let mut reader = Reader::new(bytes);
-        let mut room = FILE_DATA_BYTES.1;
+        let mut space = FILE_DATA_BYTES.1;
         let mut exist = true;
         while !reader.is_empty() {
             let (record, exists) = next_record(&mut reader)?;
             let answer = sub_response_length(record.length);
-            room = room.checked_sub(answer).ok_or(Status::ILLEGAL_DATA_VALUE)?;
+            space = space
+                .checked_sub(answer)
+                .ok_or(Status::ILLEGAL_DATA_VALUE)?;
             exist &= exists;
         }
         check_exist(exist)?;

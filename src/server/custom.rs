@@ -13,15 +13,15 @@ pub fn serve(
     length: usize,
     handler: impl FnOnce(&[u8], &mut [u8]) -> Outcome,
 ) -> Reply {
-    let Some((request, room)) = pdu.split_at_mut_checked(length) else {
+    let Some((request, space)) = pdu.split_at_mut_checked(length) else {
         return Reply::SERVER_DEVICE_FAILURE;
     };
     let data = request.get(1..).unwrap_or_default();
-    let bytes = match handler(data, room) {
-        Outcome::Data(bytes) if bytes <= room.len() && bytes < MAX_PDU => bytes,
+    let bytes = match handler(data, space) {
+        Outcome::Data(bytes) if bytes <= space.len() && bytes < MAX_PDU => bytes,
         Outcome::Data(_) => return Reply::SERVER_DEVICE_FAILURE,
         Outcome::Exception(code) => return Reply::exception(code),
-        Outcome::Silent => return Reply::SILENT,
+        Outcome::NoResponse => return Reply::NO_RESPONSE,
         Outcome::Pending => return Reply::PENDING,
     };
     // Move the response's data to directly after the function code.
@@ -39,7 +39,7 @@ pub enum Outcome {
     /// An exception with this code.
     Exception(u8),
     /// No response.
-    Silent,
+    NoResponse,
     /// Not finished: the server calls the handler again.
     Pending,
 }
@@ -56,32 +56,32 @@ impl<F: FnMut(u8, &[u8], &mut [u8]) -> Outcome> Service for Custom<F> {
     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
         match pdu.first() {
             Some(&function) if self.function == 0 || self.function == function => {
-                serve(pdu, length, |data, room| {
-                    (self.handler)(function, data, room)
+                serve(pdu, length, |data, space| {
+                    (self.handler)(function, data, space)
                 })
             }
-            _ => Reply::NOT_MINE,
+            _ => Reply::NOT_HANDLED,
         }
     }
 }
 
 /// Responds with exception 01 to disabled functions. It comes before the services that would
 /// serve them. One bit for each function code; 1 disables the function.
-pub struct SwitchedOff(pub [u8; 16]);
+pub struct DisabledFunctions(pub [u8; 16]);
 
-impl SwitchedOff {
+impl DisabledFunctions {
     /// True if the function is disabled.
-    pub fn is_off(&self, function: u8) -> bool {
+    pub fn is_disabled(&self, function: u8) -> bool {
         let byte = self.0.get(usize::from(function / 8));
         byte.is_some_and(|byte| byte >> (function % 8) & 1 != 0)
     }
 }
 
-impl Service for SwitchedOff {
+impl Service for DisabledFunctions {
     fn serve(&mut self, pdu: &mut [u8], _length: usize) -> Reply {
         match pdu.first() {
-            Some(function) if self.is_off(*function) => Reply::ILLEGAL_FUNCTION,
-            _ => Reply::NOT_MINE,
+            Some(function) if self.is_disabled(*function) => Reply::ILLEGAL_FUNCTION,
+            _ => Reply::NOT_HANDLED,
         }
     }
 }

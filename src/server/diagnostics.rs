@@ -1,6 +1,6 @@
 //! Functions 08, 0B and 0C: counters of a line, listen only mode and event log.
 
-use super::{Concern, Heading, Reply};
+use super::{Addressing, Reply, RequestInfo};
 use crate::pdu::diagnostics::sub_function as sub;
 use crate::pdu::diagnostics::{CLEAR_LOG, DIAGNOSTICS, GET_COMM_EVENT_COUNTER, GET_COMM_EVENT_LOG};
 use crate::pdu::limits::MAX_EVENTS;
@@ -101,21 +101,21 @@ impl Diagnostics {
 
     /// Counts a frame before it is served. False if the unit must not serve it: a damaged
     /// frame, a frame for another unit, and in listen only mode any request but a restart.
-    pub fn hear(&mut self, heading: &Heading, concern: Concern, pdu: &[u8]) -> bool {
-        if heading.again {
+    pub fn read_bytes(&mut self, info: &RequestInfo, addressing: Addressing, pdu: &[u8]) -> bool {
+        if info.again {
             return true;
         }
-        let damaged = heading.length == 0;
+        let damaged = info.length == 0;
         count(if damaged {
             &mut self.bus_communication_errors
         } else {
             &mut self.bus_messages
         });
-        if heading.overrun {
+        if info.overrun {
             count(&mut self.character_overruns);
         }
-        let broadcast = heading.is_broadcast() && !damaged;
-        if concern == Concern::FOREIGN && !damaged && !broadcast {
+        let broadcast = info.is_broadcast() && !damaged;
+        if addressing == Addressing::FOREIGN && !damaged && !broadcast {
             return false;
         }
         let mut event = RECEIVED;
@@ -125,7 +125,7 @@ impl Diagnostics {
         if self.listen_only != 0 {
             event |= RECEIVED_LISTEN_ONLY;
         }
-        if heading.overrun {
+        if info.overrun {
             event |= OVERRUN;
         }
         if damaged {
@@ -137,15 +137,15 @@ impl Diagnostics {
         }
         count(&mut self.server_messages);
         let is_restart = matches!(pdu, [DIAGNOSTICS, rest @ ..] if rest.starts_with(&RESTART));
-        let served = concern != Concern::FOREIGN && (self.listen_only == 0 || is_restart);
+        let served = addressing != Addressing::FOREIGN && (self.listen_only == 0 || is_restart);
         if !served {
             count(&mut self.no_responses);
         }
         served
     }
 
-    /// Counts the outcome of a request for which `hear` returned true.
-    pub fn done(&mut self, concern: Concern, function: u8, reply: Reply) {
+    /// Counts the outcome of a request for which `read_bytes` returned true.
+    pub fn done(&mut self, addressing: Addressing, function: u8, reply: Reply) {
         let code = reply.exception_code();
         if self.cleared != 0 {
             self.cleared = 0;
@@ -154,7 +154,7 @@ impl Diagnostics {
         } else if function != GET_COMM_EVENT_COUNTER {
             count(&mut self.events);
         }
-        if reply == Reply::SILENT || concern == Concern::BROADCAST {
+        if reply == Reply::NO_RESPONSE || addressing == Addressing::BROADCAST {
             count(&mut self.no_responses);
         }
         let bits = match code {
@@ -204,7 +204,7 @@ impl Diagnostics {
                 _ => Reply::SERVER_DEVICE_FAILURE,
             },
             Some(&GET_COMM_EVENT_LOG) => self.tell_log(pdu),
-            _ => Reply::NOT_MINE,
+            _ => Reply::NOT_HANDLED,
         };
         (reply, Restart::None)
     }
@@ -255,7 +255,7 @@ impl Diagnostics {
             sub::FORCE_LISTEN_ONLY => {
                 self.listen_only = 1;
                 self.note(ENTERED_LISTEN_ONLY);
-                return refuse(Reply::SILENT);
+                return refuse(Reply::NO_RESPONSE);
             }
             sub::CLEAR_COUNTERS => {
                 self.clear_counters();
@@ -286,7 +286,7 @@ impl Diagnostics {
     /// response (clause 6.8.1).
     fn restart(&mut self, clear_log: bool) -> (Reply, Restart) {
         let reply = if self.listen_only != 0 {
-            Reply::SILENT
+            Reply::NO_RESPONSE
         } else {
             Reply::length(5)
         };

@@ -10,7 +10,7 @@ use crate::pdu::limits::{MAX_FIFO, READ_FILE_BYTES};
 /// The records of files. Each record is one register.
 pub trait Files {
     /// True if all of these records exist.
-    fn covers(&self, record: Record) -> bool;
+    fn contains(&self, record: Record) -> bool;
 
     /// Reads existing records into `data`, high byte first.
     fn load(&self, record: Record, data: &mut [u8]);
@@ -50,7 +50,7 @@ pub fn serve(files: &mut impl Files, pdu: &mut [u8], length: usize) -> Reply {
     let (function, count) = match pdu.get(..length) {
         Some([function @ (READ_FILE_RECORD | WRITE_FILE_RECORD), count, ..]) => (*function, *count),
         Some([READ_FILE_RECORD | WRITE_FILE_RECORD]) => return Reply::ILLEGAL_DATA_VALUE,
-        _ => return Reply::NOT_MINE,
+        _ => return Reply::NOT_HANDLED,
     };
     if usize::from(count) + 2 != length {
         return Reply::ILLEGAL_DATA_VALUE;
@@ -76,7 +76,7 @@ fn read(files: &impl Files, pdu: &mut [u8], length: usize) -> Reply {
         Ok(reads) => reads,
         Err(refused) => return refusal(refused),
     };
-    if !reads.iter().all(|record| files.covers(record)) {
+    if !reads.iter().all(|record| files.contains(record)) {
         return Reply::ILLEGAL_DATA_ADDRESS;
     }
     let total = reads.response_length();
@@ -105,7 +105,7 @@ fn write(files: &mut impl Files, request: &[u8], length: usize) -> Reply {
         Ok(writes) => writes,
         Err(refused) => return refusal(refused),
     };
-    if !writes.iter().all(|(record, _)| files.covers(record)) {
+    if !writes.iter().all(|(record, _)| files.contains(record)) {
         return Reply::ILLEGAL_DATA_ADDRESS;
     }
     for (record, data) in writes.iter() {
@@ -126,7 +126,7 @@ fn write(files: &mut impl Files, request: &[u8], length: usize) -> Reply {
 /// Serves function 18, with arguments as of [`serve`].
 pub fn serve_fifos(fifos: &impl Fifos, pdu: &mut [u8], length: usize) -> Reply {
     if pdu.first() != Some(&READ_FIFO_QUEUE) {
-        return Reply::NOT_MINE;
+        return Reply::NOT_HANDLED;
     }
     let address = match pdu.get(1..length) {
         Some(&[high, low]) => u16::from_be_bytes([high, low]),

@@ -17,7 +17,7 @@ pub fn serve_exception_status(outputs: u8, pdu: &mut [u8], length: usize) -> Rep
             *data = outputs;
             Reply::length(2)
         }
-        _ => Reply::NOT_MINE,
+        _ => Reply::NOT_HANDLED,
     }
 }
 
@@ -31,14 +31,14 @@ pub fn serve_server_id(
     length: usize,
 ) -> Reply {
     if pdu.first() != Some(&REPORT_SERVER_ID) {
-        return Reply::NOT_MINE;
+        return Reply::NOT_HANDLED;
     }
     if length != 1 {
         return Reply::ILLEGAL_DATA_VALUE;
     }
     let bytes = id.len() + 1 + additional.len();
-    let room = pdu.get_mut(..2 + bytes).filter(|pdu| pdu.len() <= MAX_PDU);
-    let Some([_, count, data @ ..]) = room else {
+    let space = pdu.get_mut(..2 + bytes).filter(|pdu| pdu.len() <= MAX_PDU);
+    let Some([_, count, data @ ..]) = space else {
         return Reply::SERVER_DEVICE_FAILURE;
     };
     *count = bytes as u8;
@@ -71,7 +71,7 @@ pub fn serve_identification(objects: &impl Objects, pdu: &mut [u8], length: usiz
                 _ => return Reply::ILLEGAL_DATA_VALUE,
             }
         }
-        _ => return Reply::NOT_MINE,
+        _ => return Reply::NOT_HANDLED,
     };
     let has = |mut ids: core::ops::RangeInclusive<u8>| ids.any(|id| objects.object(id).is_some());
     let level = if has(0x80..=0xFF) {
@@ -101,8 +101,8 @@ pub fn serve_identification(objects: &impl Objects, pdu: &mut [u8], length: usiz
             continue;
         };
         let fits = end + 2 + value.len() <= MAX_PDU;
-        let room = pdu.get_mut(end..end + 2 + value.len()).filter(|_| fits);
-        let Some([head, size, place @ ..]) = room else {
+        let space = pdu.get_mut(end..end + 2 + value.len()).filter(|_| fits);
+        let Some([head, size, place @ ..]) = space else {
             next = Some(id);
             break;
         };

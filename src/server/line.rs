@@ -4,8 +4,8 @@
 //! need live while a request is carried out. A framing is two functions kept in the object, so
 //! that firmware carries those it begins with.
 
-use super::heading::STREAM;
-use super::{Heading, Reply, Units};
+use super::info::STREAM;
+use super::{Reply, RequestInfo, Units};
 use crate::bytes::move_to_front;
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
@@ -24,7 +24,7 @@ const NOT_BY_ITSELF: u32 = time::millis(1);
 pub const MOST_REQUESTS: u8 = 16;
 
 /// What the caller lends to a server.
-pub trait Lent {
+pub trait ServerStorage {
     /// The storage of one frame: a request first, then its response.
     fn frame(&mut self) -> &mut [u8];
 
@@ -45,7 +45,7 @@ pub trait Lent {
     }
 
     /// Moves the bytes of that storage from `start` to `end` to its front; the places are
-    /// as for [`Lent::part`].
+    /// as for [`ServerStorage::part`].
     fn keep(&mut self, start: usize, end: usize) {
         move_to_front(self.part(0, end), start);
     }
@@ -58,13 +58,13 @@ pub trait Lent {
     }
 }
 
-impl Lent for &mut [u8] {
+impl ServerStorage for &mut [u8] {
     fn frame(&mut self) -> &mut [u8] {
         self
     }
 }
 
-impl<const N: usize> Lent for [u8; N] {
+impl<const N: usize> ServerStorage for [u8; N] {
     fn frame(&mut self) -> &mut [u8] {
         self
     }
@@ -88,7 +88,7 @@ enum Phase {
 pub(super) type Receive<P, B> = fn(&mut Server<P, B>) -> Status;
 
 /// Makes a frame of the response PDU of so many bytes; returns its length.
-pub(super) type Seal<P, B> = fn(&mut Server<P, B>, usize) -> usize;
+pub(super) type EncodeAdu<P, B> = fn(&mut Server<P, B>, usize) -> usize;
 
 /// A server on one line or connection.
 // In this order, small fields first: see `Transaction`.
@@ -96,11 +96,11 @@ pub(super) type Seal<P, B> = fn(&mut Server<P, B>, usize) -> usize;
 pub struct Server<P, B> {
     phase: Phase,
     /// What arrives is no frame that tells its length; of an echo, that it is waited for.
-    pub(super) astray: bool,
+    pub(super) resyncing: bool,
     /// Ends an ASCII frame.
     pub(super) delimiter: u8,
     /// Over TCP: how many bytes of `last_byte` are the front of the next frame.
-    pub(super) ahead: u8,
+    pub(super) read_ahead: u8,
     /// The CRC of what arrived.
     pub(super) crc: Crc16,
     /// Where in the buffer ends what arrived, or what is to be sent.
@@ -108,45 +108,45 @@ pub struct Server<P, B> {
     /// What of the response was sent; of that, what may still come back.
     pub(super) sent: u16,
     /// The request that was found last.
-    pub request: Heading,
+    pub request: RequestInfo,
     /// When the last byte arrived; see [`Server::keeps_time`].
     pub(super) last_byte: u32,
     /// What the caller lends.
-    pub lent: B,
+    pub storage: B,
     pub(super) now: u32,
     /// The silence that ends a frame.
     silence: u32,
     pub(super) receive: Option<Receive<P, B>>,
-    pub(super) seal: Option<Seal<P, B>>,
+    pub(super) encode_adu: Option<EncodeAdu<P, B>>,
     /// The byte stream.
     pub port: P,
 }
 
-impl<P: Port, B: Lent> Server<P, B> {
+impl<P: Port, B: ServerStorage> Server<P, B> {
     /// A server that has no framing yet.
-    pub const fn new(port: P, lent: B) -> Self {
+    pub const fn new(port: P, storage: B) -> Self {
         Server {
             phase: Phase::Listen,
-            astray: false,
+            resyncing: false,
             delimiter: ascii::END,
-            ahead: 0,
+            read_ahead: 0,
             crc: Crc16::START,
             end: 0,
             sent: 0,
-            request: Heading::NONE,
+            request: RequestInfo::NONE,
             last_byte: 0,
             now: 0,
             silence: time::DEFAULT_SILENCE,
             receive: None,
-            seal: None,
-            lent,
+            encode_adu: None,
+            storage,
             port,
         }
     }
 
     /// A server of this framing.
-    pub fn with_framing(framing: Framing, port: P, lent: B) -> Self {
-        let mut server = Server::new(port, lent);
+    pub fn with_framing(framing: Framing, port: P, storage: B) -> Self {
+        let mut server = Server::new(port, storage);
         match framing {
             Framing::Rtu => server.begin_rtu(),
             Framing::Ascii => server.begin_ascii(),
@@ -161,17 +161,17 @@ impl<P: Port, B: Lent> Server<P, B> {
     pub(super) fn begin(
         &mut self,
         head: u8,
-        room: usize,
+        space: usize,
         receive: Receive<P, B>,
-        seal: Seal<P, B>,
+        encode_adu: EncodeAdu<P, B>,
     ) {
         self.request.head = head;
         self.request.own = STREAM;
-        self.request.room = room as u16;
+        self.request.space = space as u16;
         self.receive = Some(receive);
-        self.seal = Some(seal);
+        self.encode_adu = Some(encode_adu);
         if !FIRMWARE {
-            self.ahead = 0;
+            self.read_ahead = 0;
         }
         self.listen();
     }
@@ -195,17 +195,17 @@ impl<P: Port, B: Lent> Server<P, B> {
         self.phase = Phase::Listen;
         self.end = 0;
         self.request.overrun = false;
-        self.astray = false;
+        self.resyncing = false;
         self.crc = Crc16::START;
-        if !FIRMWARE && self.ahead != 0 {
-            self.take_ahead();
+        if !FIRMWARE && self.read_ahead != 0 {
+            self.use_read_ahead();
         }
     }
 
     /// True once it was begun.
     #[inline(always)]
     pub fn has_framing(&self) -> bool {
-        self.receive.is_some() && self.seal.is_some()
+        self.receive.is_some() && self.encode_adu.is_some()
     }
 
     /// False if [`Server::poll`] may be told any time: over TCP nothing hangs on it.
@@ -254,7 +254,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     }
 
     /// Nothing more is to be expected of this stream.
-    pub(super) fn give_up(&mut self) -> Status {
+    pub(super) fn fail_stream(&mut self) -> Status {
         self.receive = Some(|_| Status::MALFORMED_FRAME);
         Status::MALFORMED_FRAME
     }
@@ -264,52 +264,52 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// takes one byte and gives up its oldest for it, once there is one: one that is full
     /// and silent may hold a frame.
     #[cfg_attr(target_os = "none", inline(always))]
-    pub(super) fn hear(&mut self, until: usize) -> i16 {
-        let capacity = self.lent.capacity();
+    pub(super) fn read_bytes(&mut self, until: usize) -> i16 {
+        let capacity = self.storage.capacity();
         let mut end = usize::from(self.end);
         let (mut start, mut until) = (end, until.min(capacity));
         if end == capacity {
             (start, until) = (0, 1);
         }
-        let heard = self.port.read(self.lent.part(start, until));
-        if heard > 0 {
+        let received = self.port.read(self.storage.part(start, until));
+        if received > 0 {
             self.last_byte = self.now;
             if start != end {
                 start = self.slide();
             }
-            end = start + heard as usize;
+            end = start + received as usize;
             self.end = end as u16;
             // A microcontroller takes the CRC of bytes that need none, too: that is
             // less code, and one framing is all it has.
             if FIRMWARE || usize::from(self.request.head) == rtu::PDU {
-                self.crc = self.crc.with(self.lent.part(start, end));
+                self.crc = self.crc.with(self.storage.part(start, end));
             }
         }
-        heard
+        received
     }
 
-    /// As [`Server::hear`], for all framings but the most common, which has it in line.
+    /// As [`Server::read_bytes`], for all framings but the most common, which has it in line.
     #[inline(never)]
-    pub(super) fn hear_apart(&mut self, until: usize) -> i16 {
-        self.hear(until)
+    pub(super) fn read_bytes_apart(&mut self, until: usize) -> i16 {
+        self.read_bytes(until)
     }
 
-    /// As [`Server::hear`], without CRC and time.
+    /// As [`Server::read_bytes`], without CRC and time.
     #[inline(always)]
     pub(super) fn take(&mut self, until: usize) -> i16 {
-        let frame = self.lent.frame();
+        let frame = self.storage.frame();
         let until = until.min(frame.len());
-        let Some(room) = frame.get_mut(usize::from(self.end)..until) else {
+        let Some(space) = frame.get_mut(usize::from(self.end)..until) else {
             return 0;
         };
-        if room.is_empty() {
+        if space.is_empty() {
             return 0;
         }
-        let heard = self.port.read(room);
-        if heard > 0 {
-            self.end += heard as u16;
+        let received = self.port.read(space);
+        if received > 0 {
+            self.end += received as u16;
         }
-        heard
+        received
     }
 
     /// True once the line has been silent for as long as ends a frame.
@@ -333,7 +333,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// Says that a request was found whose PDU has so many bytes; 0 for a frame
     /// that arrived damaged.
     pub(super) fn found(&mut self, length: usize) -> Status {
-        let unit = self.lent.byte(usize::from(self.request.head) - 1);
+        let unit = self.storage.byte(usize::from(self.request.head) - 1);
         self.found_for(unit, if length > MAX_PDU { 0 } else { length as u16 })
     }
 
@@ -350,10 +350,10 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// The request's PDU and the room behind it, which the response may take.
     pub fn pdu(&mut self) -> &mut [u8] {
         let head = usize::from(self.request.head);
-        let room = usize::from(self.request.room);
-        self.lent
+        let space = usize::from(self.request.space);
+        self.storage
             .frame()
-            .get_mut(head..head + room)
+            .get_mut(head..head + space)
             .unwrap_or_default()
     }
 
@@ -364,9 +364,9 @@ impl<P: Port, B: Lent> Server<P, B> {
             if status != Status::PENDING {
                 return status;
             }
-            let heading = self.request;
-            let reply = units.serve(&heading, self.pdu());
-            if let Some(status) = self.conclude(reply) {
+            let info = self.request;
+            let reply = units.serve(&info, self.pdu());
+            if let Some(status) = self.finish(reply) {
                 return status;
             }
         }
@@ -387,10 +387,10 @@ impl<P: Port, B: Lent> Server<P, B> {
             return false;
         }
         let head = usize::from(self.request.head);
-        let length = reply.settle_served(self.lent.part(head, head + 2));
-        match self.seal {
-            Some(seal) if length != 0 => {
-                self.end = seal(self, length) as u16;
+        let length = reply.write_served_exception(self.storage.part(head, head + 2));
+        match self.encode_adu {
+            Some(encode_adu) if length != 0 => {
+                self.end = encode_adu(self, length) as u16;
                 self.sent = 0;
                 self.phase = Phase::Send;
                 self.port.pre_transmission();
@@ -403,7 +403,7 @@ impl<P: Port, B: Lent> Server<P, B> {
     /// As [`Server::answer`], and what to return, unless [`Server::poll`] is to go
     /// on: it sends, or looks for the next request.
     #[inline(always)]
-    pub fn conclude(&mut self, reply: Reply) -> Option<Status> {
+    pub fn finish(&mut self, reply: Reply) -> Option<Status> {
         if !FIRMWARE {
             return self.answer_at_once(reply);
         }
@@ -414,28 +414,28 @@ impl<P: Port, B: Lent> Server<P, B> {
         }
     }
 
-    /// As [`Server::conclude`], and sends what it can, for a host, which saves a turn
+    /// As [`Server::finish`], and sends what it can, for a host, which saves a turn
     /// of [`Server::poll`].
     #[inline(always)]
     pub(crate) fn answer_at_once(&mut self, reply: Reply) -> Option<Status> {
         let mut length = reply.response_length();
         if length == 0 {
             length = match reply.exception_code() {
-                0 if reply != Reply::NOT_MINE => return self.answer_nothing(reply),
-                _ => self.settle(reply),
+                0 if reply != Reply::NOT_HANDLED => return self.answer_nothing(reply),
+                _ => self.write_exception(reply),
             };
         }
         self.port.pre_transmission();
-        let end = match self.seal {
-            _ if !self.keeps_time() => self.seal_tcp(length),
-            Some(seal) => {
-                let end = seal(self, length);
+        let end = match self.encode_adu {
+            _ if !self.keeps_time() => self.encode_tcp(length),
+            Some(encode_adu) => {
+                let end = encode_adu(self, length);
                 self.sent = end as u16;
                 end
             }
             None => 0,
         };
-        let sent = self.port.write(self.lent.part(0, end));
+        let sent = self.port.write(self.storage.part(0, end));
         if usize::from(sent as u16) != end || !self.port.flush() {
             return Some(self.sent_some(end, sent));
         }
@@ -466,14 +466,14 @@ impl<P: Port, B: Lent> Server<P, B> {
     }
 
     #[inline(never)]
-    fn settle(&mut self, reply: Reply) -> usize {
-        reply.settle(self.pdu())
+    fn write_exception(&mut self, reply: Reply) -> usize {
+        reply.write_exception(self.pdu())
     }
 
     #[cfg_attr(not(target_os = "none"), inline(never))]
     fn send(&mut self) -> Status {
         let mut status = Status::OK;
-        let rest = self.lent.part(self.sent.into(), self.end.into());
+        let rest = self.storage.part(self.sent.into(), self.end.into());
         if !rest.is_empty() {
             let sent = self.port.write(rest);
             if sent < 0 {

@@ -10,9 +10,9 @@ pub struct Reply(usize);
 
 impl Reply {
     /// The service does not serve this function. Another service may.
-    pub const NOT_MINE: Reply = Reply(0);
+    pub const NOT_HANDLED: Reply = Reply(0);
     /// No response is sent, whether or not the request was carried out.
-    pub const SILENT: Reply = Reply(0x0200);
+    pub const NO_RESPONSE: Reply = Reply(0x0200);
     /// Not finished: the server calls the service again with the same request.
     pub const PENDING: Reply = Reply(0xFF);
 
@@ -76,20 +76,20 @@ impl Reply {
     #[inline(always)]
     pub(super) const fn or_illegal(self) -> Reply {
         match self {
-            Reply::NOT_MINE => Reply::ILLEGAL_FUNCTION,
+            Reply::NOT_HANDLED => Reply::ILLEGAL_FUNCTION,
             reply => reply,
         }
     }
 
     /// Writes an exception response over the request at the front of `pdu`.
     /// Returns the length of the response; 0 if there is none.
-    pub fn settle(self, pdu: &mut [u8]) -> usize {
-        self.or_illegal().settle_served(pdu)
+    pub fn write_exception(self, pdu: &mut [u8]) -> usize {
+        self.or_illegal().write_served_exception(pdu)
     }
 
-    /// As [`Reply::settle`], for a request that a service has served.
+    /// As [`Reply::write_exception`], for a request that a service has served.
     #[inline(always)]
-    pub(super) fn settle_served(self, pdu: &mut [u8]) -> usize {
+    pub(super) fn write_served_exception(self, pdu: &mut [u8]) -> usize {
         if self.0 & 0x0100 == 0 {
             return usize::from(self.0 as u8);
         }

@@ -1,8 +1,8 @@
 //! The responder: a frame in, a frame out, and no state between.
 
-use super::framing::{ascii_room, rtu_room, tcp_room};
-use super::heading::{SERIAL, STREAM};
-use super::{Heading, Reply, Units};
+use super::framing::{ascii_space, rtu_space, tcp_space};
+use super::info::{SERIAL, STREAM};
+use super::{Reply, RequestInfo, Units};
 use crate::error::Status;
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::limits::MAX_PDU;
@@ -23,46 +23,46 @@ pub fn respond(
     length: usize,
     units: &mut (impl Units + ?Sized),
 ) -> Result<usize, Status> {
-    let (mut heading, room) = (Heading::NONE, buffer.len());
+    let (mut info, space) = (RequestInfo::NONE, buffer.len());
     let frame = buffer.get_mut(..length).unwrap_or_default();
     let adu = framing.parse(frame, delimiter);
     let (transaction, pdu) = adu.map_or((0, 0), |adu| {
-        heading.to = adu.unit;
+        info.to = adu.unit;
         (adu.transaction, adu.pdu.len())
     });
-    heading.own = if framing.is_serial() { SERIAL } else { STREAM };
-    heading.length = pdu as u16;
-    let room = match framing {
-        Framing::Rtu | Framing::RtuOverTcp => rtu_room(room),
-        Framing::Ascii => ascii_room(room),
-        Framing::Tcp => tcp_room(room),
+    info.own = if framing.is_serial() { SERIAL } else { STREAM };
+    info.length = pdu as u16;
+    let space = match framing {
+        Framing::Rtu | Framing::RtuOverTcp => rtu_space(space),
+        Framing::Ascii => ascii_space(space),
+        Framing::Tcp => tcp_space(space),
     };
-    heading.head = match framing {
+    info.head = match framing {
         Framing::Tcp => tcp::PDU,
         _ => rtu::PDU,
     } as u8;
-    heading.room = room as u16;
-    let start = usize::from(heading.head);
-    let Some(place) = buffer.get_mut(start..start + room) else {
+    info.space = space as u16;
+    let start = usize::from(info.head);
+    let Some(place) = buffer.get_mut(start..start + space) else {
         return Ok(0);
     };
     // Room for the request is room for an exception.
     if pdu > place.len().min(MAX_PDU) || place.len() < 2 {
         return Ok(0);
     }
-    let reply = units.serve(&heading, place);
+    let reply = units.serve(&info, place);
     if reply == Reply::PENDING {
         return Err(Status::PENDING);
     }
-    let mut written = reply.settle(place);
+    let mut written = reply.write_exception(place);
     if written == 0 {
         return Ok(0);
     }
     // Services rely on the room that a server's smallest buffer has.
     if written > place.len() {
-        written = Reply::SERVER_DEVICE_FAILURE.settle(place);
+        written = Reply::SERVER_DEVICE_FAILURE.write_exception(place);
     }
-    let unit = heading.to;
+    let unit = info.to;
     framing.emit(buffer, transaction, unit, delimiter, |_| Ok(written))
 }
 

@@ -1,6 +1,6 @@
 //! The four tables as services, over cells of the program or over arrays.
 
-use super::table::{self, Cells, Kind, Way};
+use super::table::{self, DataModel, Direction, TableKind};
 use super::{Reply, Service};
 use core::ops::Range;
 
@@ -16,36 +16,36 @@ pub struct DiscreteInputs<T>(pub T);
 /// Coils: serves 01, 05 and 0F.
 pub struct Coils<T>(pub T);
 
-impl<T: Cells> Service for InputRegisters<T> {
+impl<T: DataModel> Service for InputRegisters<T> {
     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
-        table::serve(Kind::INPUT_REGISTERS, &mut self.0, pdu, length)
+        table::serve(TableKind::INPUT_REGISTERS, &mut self.0, pdu, length)
     }
 }
 
-impl<T: Cells> Service for HoldingRegisters<T> {
+impl<T: DataModel> Service for HoldingRegisters<T> {
     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
-        match table::serve(Kind::HOLDING_REGISTERS, &mut self.0, pdu, length) {
-            Reply::NOT_MINE => table::serve_more(&mut self.0, pdu, length),
+        match table::serve(TableKind::HOLDING_REGISTERS, &mut self.0, pdu, length) {
+            Reply::NOT_HANDLED => table::serve_more(&mut self.0, pdu, length),
             reply => reply,
         }
     }
 }
 
-impl<T: Cells> Service for DiscreteInputs<T> {
+impl<T: DataModel> Service for DiscreteInputs<T> {
     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
-        table::serve(Kind::DISCRETE_INPUTS, &mut self.0, pdu, length)
+        table::serve(TableKind::DISCRETE_INPUTS, &mut self.0, pdu, length)
     }
 }
 
-impl<T: Cells> Service for Coils<T> {
+impl<T: DataModel> Service for Coils<T> {
     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
-        table::serve(Kind::COILS, &mut self.0, pdu, length)
+        table::serve(TableKind::COILS, &mut self.0, pdu, length)
     }
 }
 
-/// Called before a write, as [`Cells::before`].
+/// Called before a write, as [`DataModel::before`].
 pub type Before<'a> = &'a mut dyn FnMut(u16, u16, &[u8]) -> u8;
-/// Called after a write, as [`Cells::after`].
+/// Called after a write, as [`DataModel::after`].
 pub type After<'a> = &'a mut dyn FnMut(u16, u16);
 
 /// Registers in an array.
@@ -128,19 +128,19 @@ fn places(
     (last <= size && (first..last).all(is_there)).then_some(first..last)
 }
 
-impl Cells for Words<'_> {
-    fn covers(&self, address: u16, quantity: u16) -> bool {
+impl DataModel for Words<'_> {
+    fn contains(&self, address: u16, quantity: u16) -> bool {
         let size = self.words.len();
         places(self.base, size, self.valid, address, quantity).is_some()
     }
 
-    fn transfer(&mut self, way: Way, address: u16, _quantity: u16, data: &mut [u8]) {
+    fn transfer(&mut self, direction: Direction, address: u16, _quantity: u16, data: &mut [u8]) {
         let first = usize::from(address.wrapping_sub(self.base));
         let words = self.words.get_mut(first..).unwrap_or_default();
         for (word, pair) in words.iter_mut().zip(data.as_chunks_mut().0) {
-            match way {
-                Way::Read => *pair = word.to_be_bytes(),
-                Way::Write => *word = u16::from_be_bytes(*pair),
+            match direction {
+                Direction::Read => *pair = word.to_be_bytes(),
+                Direction::Write => *word = u16::from_be_bytes(*pair),
             }
         }
     }
@@ -157,21 +157,21 @@ impl Cells for Words<'_> {
     }
 }
 
-impl Cells for Bits<'_> {
-    fn covers(&self, address: u16, quantity: u16) -> bool {
+impl DataModel for Bits<'_> {
+    fn contains(&self, address: u16, quantity: u16) -> bool {
         let size = usize::from(self.size).min(self.bits.len().saturating_mul(8));
         places(self.base, size, self.valid, address, quantity).is_some()
     }
 
-    fn transfer(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) {
+    fn transfer(&mut self, direction: Direction, address: u16, quantity: u16, data: &mut [u8]) {
         let first = usize::from(address.wrapping_sub(self.base));
-        if way == Way::Read {
+        if direction == Direction::Read {
             data.fill(0);
         }
         for index in 0..usize::from(quantity) {
-            let (from, to, at, place) = match way {
-                Way::Read => (&*self.bits, &mut *data, first + index, index),
-                Way::Write => (&*data, &mut *self.bits, index, first + index),
+            let (from, to, at, place) = match direction {
+                Direction::Read => (&*self.bits, &mut *data, first + index, index),
+                Direction::Write => (&*data, &mut *self.bits, index, first + index),
             };
             let on = bit(from, at);
             if let Some(byte) = to.get_mut(place / 8) {

@@ -15,21 +15,21 @@ use crate::pdu::registers::{MASK_WRITE_REGISTER, READ_WRITE_MULTIPLE_REGISTERS};
 /// One of the four tables, named by the function that reads it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
-pub struct Kind(u8);
+pub struct TableKind(u8);
 
-impl Kind {
+impl TableKind {
     /// Read by 01, written by 05 and 0F.
-    pub const COILS: Kind = Kind(1);
+    pub const COILS: TableKind = TableKind(1);
     /// Read by 02.
-    pub const DISCRETE_INPUTS: Kind = Kind(2);
+    pub const DISCRETE_INPUTS: TableKind = TableKind(2);
     /// Read by 03, written by 06 and 10.
-    pub const HOLDING_REGISTERS: Kind = Kind(3);
+    pub const HOLDING_REGISTERS: TableKind = TableKind(3);
     /// Read by 04.
-    pub const INPUT_REGISTERS: Kind = Kind(4);
+    pub const INPUT_REGISTERS: TableKind = TableKind(4);
 
     /// The table for a number that the C API stores.
-    pub const fn from_code(code: u8) -> Kind {
-        Kind(code)
+    pub const fn from_code(code: u8) -> TableKind {
+        TableKind(code)
     }
 
     /// The number of this table.
@@ -39,7 +39,7 @@ impl Kind {
 
     /// True for coils and discrete inputs.
     pub const fn is_bits(self) -> bool {
-        self.0 <= Kind::DISCRETE_INPUTS.0
+        self.0 <= TableKind::DISCRETE_INPUTS.0
     }
 
     /// How many data bytes `quantity` cells have; 0 for more cells than a request can have.
@@ -57,7 +57,7 @@ impl Kind {
 
 /// The direction of a transfer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Way {
+pub enum Direction {
     /// From the cells into the data.
     Read,
     /// From the data into the cells.
@@ -65,14 +65,14 @@ pub enum Way {
 }
 
 /// The cells of a table: registers or bits.
-pub trait Cells {
+pub trait DataModel {
     /// True if all of the `quantity` cells from `address` on exist. None may lie beyond
     /// address 65535.
-    fn covers(&self, address: u16, quantity: u16) -> bool;
+    fn contains(&self, address: u16, quantity: u16) -> bool;
 
     /// Copies existing cells to or from `data`, which is as on the wire: registers high byte
     /// first, bits lowest first, unused bits 0.
-    fn transfer(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]);
+    fn transfer(&mut self, direction: Direction, address: u16, quantity: u16, data: &mut [u8]);
 
     /// Called before cells are written, with the data as on the wire. An exception code
     /// refuses the request; 0 allows it.
@@ -87,43 +87,55 @@ pub trait Cells {
     }
 }
 
-/// The part of [`Cells`] that the less common functions need. They take it as a trait object,
+/// The part of [`DataModel`] that the less common functions need. They take it as a trait object,
 /// so firmware carries them once for all tables.
-pub trait Access {
+pub trait TableAccess {
     /// Reads or writes `quantity` cells, which are `bytes` bytes of data. Their address follows
-    /// the first byte of `pdu`; `role` says where in `pdu` the data are. Returns
+    /// the first byte of `pdu`; `operation` says where in `pdu` the data are. Returns
     /// [`Reply::ILLEGAL_DATA_ADDRESS`] if a cell does not exist. A read of 0 bytes only checks
     /// the address: it returns [`Reply::SERVER_DEVICE_FAILURE`] if all cells exist.
-    fn access(&mut self, role: Role, quantity: usize, bytes: usize, pdu: &mut [u8]) -> Reply;
+    fn access(
+        &mut self,
+        operation: TableOperation,
+        quantity: usize,
+        bytes: usize,
+        pdu: &mut [u8],
+    ) -> Reply;
 }
 
-impl<T: Cells> Access for T {
+impl<T: DataModel> TableAccess for T {
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    fn access(&mut self, role: Role, quantity: usize, bytes: usize, pdu: &mut [u8]) -> Reply {
+    fn access(
+        &mut self,
+        operation: TableOperation,
+        quantity: usize,
+        bytes: usize,
+        pdu: &mut [u8],
+    ) -> Reply {
         let &mut [_, high, low, ..] = pdu else {
             return Reply::SERVER_DEVICE_FAILURE;
         };
         let (address, quantity) = (word(high, low) as u16, quantity as u16);
-        if !self.covers(address, quantity) {
+        if !self.contains(address, quantity) {
             return Reply::ILLEGAL_DATA_ADDRESS;
         }
-        let at = role.data();
+        let at = operation.data();
         let Some(data) = pdu.get_mut(at..at + bytes) else {
             return Reply::SERVER_DEVICE_FAILURE;
         };
-        if role == Role::READ {
+        if operation == TableOperation::READ {
             if bytes == 0 {
                 return Reply::SERVER_DEVICE_FAILURE;
             }
-            self.transfer(Way::Read, address, quantity, data);
+            self.transfer(Direction::Read, address, quantity, data);
             return counted(pdu, bytes);
         }
         let refused = self.before(address, quantity, data);
         if refused != 0 {
             return Reply::exception(refused);
         }
-        self.transfer(Way::Write, address, quantity, data);
+        self.transfer(Direction::Write, address, quantity, data);
         self.after(address, quantity);
         WRITTEN
     }
@@ -136,24 +148,24 @@ pub const WRITTEN: Reply = Reply::length(5);
 /// in the PDU of the response.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
-pub struct Role(Small);
+pub struct TableOperation(MachineByte);
 
 /// A number below 256, in the type that the machine passes in one register.
 #[cfg(target_arch = "avr")]
-pub type Small = u8;
+pub type MachineByte = u8;
 /// A number below 256, in the type that the machine passes in one register.
 #[cfg(not(target_arch = "avr"))]
-pub type Small = usize;
+pub type MachineByte = usize;
 
-impl Role {
+impl TableOperation {
     /// The function does nothing to the table.
-    pub const NONE: Role = Role(0);
+    pub const NONE: TableOperation = TableOperation(0);
     /// Reads cells.
-    pub const READ: Role = Role(2);
+    pub const READ: TableOperation = TableOperation(2);
     /// Writes one cell.
-    pub const WRITE_ONE: Role = Role(3);
+    pub const WRITE_ONE: TableOperation = TableOperation(3);
     /// Writes several cells.
-    pub const WRITE_SEVERAL: Role = Role(6);
+    pub const WRITE_SEVERAL: TableOperation = TableOperation(6);
 
     /// Index of the data in the PDU.
     #[inline(always)]
@@ -169,47 +181,52 @@ const _: () = assert!(MAX_WRITE_REGISTERS * 16 == MAX_WRITE_BITS);
 
 /// What a function does to this table.
 #[inline(always)]
-pub const fn role(kind: Kind, function: u8) -> Role {
+pub const fn operation(kind: TableKind, function: u8) -> TableOperation {
     if function == kind.0 {
-        return Role::READ;
+        return TableOperation::READ;
     }
     // The functions that write come in pairs, for coils and holding registers.
     if kind.0 & 1 != 0 {
         match function.wrapping_sub(kind.0 >> 1) {
-            WRITE_SINGLE_COIL => return Role::WRITE_ONE,
-            WRITE_MULTIPLE_COILS => return Role::WRITE_SEVERAL,
+            WRITE_SINGLE_COIL => return TableOperation::WRITE_ONE,
+            WRITE_MULTIPLE_COILS => return TableOperation::WRITE_SEVERAL,
             _ => {}
         }
     }
-    Role::NONE
+    TableOperation::NONE
 }
 
 /// Serves a request to a table. The request PDU is the first `length` bytes of `pdu`; the
-/// response overwrites it. [`Reply::NOT_MINE`] if the function is not for this table.
+/// response overwrites it. [`Reply::NOT_HANDLED`] if the function is not for this table.
 #[cfg_attr(target_os = "none", inline(never))]
-pub fn serve(kind: Kind, cells: &mut impl Access, pdu: &mut [u8], length: usize) -> Reply {
+pub fn serve(
+    kind: TableKind,
+    cells: &mut impl TableAccess,
+    pdu: &mut [u8],
+    length: usize,
+) -> Reply {
     let function = pdu.first().copied().unwrap_or(0);
-    serve_as(role(kind, function), kind, cells, pdu, length)
+    serve_as(operation(kind, function), kind, cells, pdu, length)
 }
 
 /// As [`serve`], once it is known what the function does to the table.
 #[inline(always)]
 pub fn serve_as(
-    role: Role,
-    kind: Kind,
-    cells: &mut impl Access,
+    operation: TableOperation,
+    kind: TableKind,
+    cells: &mut impl TableAccess,
     pdu: &mut [u8],
     length: usize,
 ) -> Reply {
-    if role == Role::NONE {
-        return Reply::NOT_MINE;
+    if operation == TableOperation::NONE {
+        return Reply::NOT_HANDLED;
     }
     let request = pdu.get(..length).unwrap_or_default();
     let [_, _, _, c, d, rest @ ..] = request else {
         return Reply::ILLEGAL_DATA_VALUE;
     };
     let mut quantity = word(*c, *d);
-    if role == Role::WRITE_ONE {
+    if operation == TableOperation::WRITE_ONE {
         // FF00 switches a coil on, 0000 off.
         if kind.is_bits() && (*d != 0 || c.wrapping_add(1) > 1) {
             return Reply::ILLEGAL_DATA_VALUE;
@@ -218,9 +235,9 @@ pub fn serve_as(
     }
     let mut bytes = kind.bytes(quantity);
     let is_right = match rest {
-        [] => role != Role::WRITE_SEVERAL,
+        [] => operation != TableOperation::WRITE_SEVERAL,
         [count, data @ ..] => {
-            role == Role::WRITE_SEVERAL
+            operation == TableOperation::WRITE_SEVERAL
                 && usize::from(*count) == bytes
                 && data.len() == bytes
                 && bytes <= MOST_WRITTEN
@@ -230,10 +247,10 @@ pub fn serve_as(
         return Reply::ILLEGAL_DATA_VALUE;
     }
     // A response that does not fit is exception 04, but only after the address check.
-    if role == Role::READ && pdu.len() < 2 + bytes {
+    if operation == TableOperation::READ && pdu.len() < 2 + bytes {
         bytes = 0;
     }
-    cells.access(role, quantity, bytes, pdu)
+    cells.access(operation, quantity, bytes, pdu)
 }
 
 /// Most data bytes that one request reads, of bits or registers.
@@ -267,33 +284,33 @@ pub const fn is_more(function: u8) -> bool {
 
 /// Serves 16 and 17 for holding registers, as [`serve`].
 #[cfg_attr(target_os = "none", inline(never))]
-pub fn serve_more(cells: &mut (impl Access + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
+pub fn serve_more(cells: &mut (impl TableAccess + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
     match pdu.first() {
         Some(&MASK_WRITE_REGISTER) => mask_write(cells, pdu, length),
         Some(&READ_WRITE_MULTIPLE_REGISTERS) => read_write(cells, pdu, length),
-        _ => Reply::NOT_MINE,
+        _ => Reply::NOT_HANDLED,
     }
 }
 
-fn mask_write(cells: &mut (impl Access + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
+fn mask_write(cells: &mut (impl TableAccess + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
     let Some(&[_, a, b, c, d, e, f]) = pdu.first_chunk().filter(|_| length == 7) else {
         return Reply::ILLEGAL_DATA_VALUE;
     };
     let mut cell = [0, a, b, 0, 0];
-    if cells.access(Role::READ, 1, 2, &mut cell) == Reply::ILLEGAL_DATA_ADDRESS {
+    if cells.access(TableOperation::READ, 1, 2, &mut cell) == Reply::ILLEGAL_DATA_ADDRESS {
         return Reply::ILLEGAL_DATA_ADDRESS;
     }
     let [_, _, high, low, _] = cell;
     // c and d are the AND mask, e and f the OR mask.
     let (high, low) = ((high & c) | (e & !c), (low & d) | (f & !d));
-    match cells.access(Role::WRITE_ONE, 1, 2, &mut [0, a, b, high, low]) {
+    match cells.access(TableOperation::WRITE_ONE, 1, 2, &mut [0, a, b, high, low]) {
         WRITTEN => Reply::length(7),
         refused => refused,
     }
 }
 
-fn read_write(cells: &mut (impl Access + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
-    let kind = Kind::HOLDING_REGISTERS;
+fn read_write(cells: &mut (impl TableAccess + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
+    let kind = TableKind::HOLDING_REGISTERS;
     let Some(&[_, _, _, c, d, _, _, g, h, count]) = pdu.first_chunk() else {
         return Reply::SERVER_DEVICE_FAILURE;
     };
@@ -308,7 +325,7 @@ fn read_write(cells: &mut (impl Access + ?Sized), pdu: &mut [u8], length: usize)
     }
     let mut has = |start: usize, quantity| {
         let head = pdu.get_mut(start..).unwrap_or_default();
-        cells.access(Role::READ, quantity, 0, head) != Reply::ILLEGAL_DATA_ADDRESS
+        cells.access(TableOperation::READ, quantity, 0, head) != Reply::ILLEGAL_DATA_ADDRESS
     };
     if !has(0, quantity) || !has(WRITES, written) {
         return Reply::ILLEGAL_DATA_ADDRESS;
@@ -318,8 +335,8 @@ fn read_write(cells: &mut (impl Access + ?Sized), pdu: &mut [u8], length: usize)
         return Reply::SERVER_DEVICE_FAILURE;
     }
     let write = pdu.get_mut(WRITES..).unwrap_or_default();
-    match cells.access(Role::WRITE_SEVERAL, written, data, write) {
-        WRITTEN => cells.access(Role::READ, quantity, bytes, pdu),
+    match cells.access(TableOperation::WRITE_SEVERAL, written, data, write) {
+        WRITTEN => cells.access(TableOperation::READ, quantity, bytes, pdu),
         refused => refused,
     }
 }

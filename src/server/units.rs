@@ -1,7 +1,7 @@
 //! Units: for whom a request is, and who serves it.
 
 use super::diagnostics::Diagnostics;
-use super::{Concern, Heading, Reply};
+use super::{Addressing, Reply, RequestInfo};
 
 /// A family of functions.
 pub trait Service {
@@ -13,7 +13,7 @@ pub trait Service {
 /// What serves the frames of a line.
 pub trait Units {
     /// Serves a frame, whosoever it is. Its PDU is at the front of `pdu`.
-    fn serve(&mut self, heading: &Heading, pdu: &mut [u8]) -> Reply;
+    fn serve(&mut self, info: &RequestInfo, pdu: &mut [u8]) -> Reply;
 }
 
 /// One unit: its id and what it serves.
@@ -32,34 +32,34 @@ pub trait Dispatch {
     type Unit;
 
     /// The next unit; one that has no part in a frame that is this to all may be left out.
-    fn next(&mut self, all: Concern) -> Option<Self::Unit>;
+    fn next(&mut self, all: Addressing) -> Option<Self::Unit>;
 
     /// True if a frame that is no broadcast is for this unit.
     fn is_for(&self, unit: &Self::Unit) -> bool;
 
     /// Has a unit serve the frame, or take notice of it, as far as it concerns the unit;
     /// `None` if the frame is another's, and the unit takes no notice.
-    fn ask(&mut self, unit: Self::Unit, concern: Concern) -> Option<Reply>;
+    fn ask(&mut self, unit: Self::Unit, addressing: Addressing) -> Option<Reply>;
 }
 
 /// Asks the units about a frame that is `all` to those that it is for: the first of them
-/// answers, the others take notice. The reply of that unit, [`Reply::SILENT`] without one.
+/// answers, the others take notice. The reply of that unit, [`Reply::NO_RESPONSE`] without one.
 #[inline(always)]
-pub fn dispatch(units: &mut impl Dispatch, mut all: Concern) -> Reply {
-    let mut answer = Reply::SILENT;
+pub fn dispatch(units: &mut impl Dispatch, mut all: Addressing) -> Reply {
+    let mut answer = Reply::NO_RESPONSE;
     while let Some(unit) = units.next(all) {
         // In this order: it is 12 bytes less on an AVR, in the row of a server of four tables.
         let is_for = units.is_for(&unit);
-        let mut concern = all.to_others();
+        let mut addressing = all.to_others();
         if is_for {
-            concern = all;
+            addressing = all;
         }
-        let Some(reply) = units.ask(unit, concern) else {
+        let Some(reply) = units.ask(unit, addressing) else {
             continue;
         };
-        if concern == Concern::OWN {
+        if addressing == Addressing::OWN {
             answer = reply;
-            all = Concern::FOREIGN;
+            all = Addressing::FOREIGN;
         }
     }
     answer
@@ -70,7 +70,7 @@ pub fn dispatch(units: &mut impl Dispatch, mut all: Concern) -> Reply {
 #[inline(always)]
 pub fn first_reply(replies: impl IntoIterator<Item = Reply>) -> Reply {
     for reply in replies {
-        if reply != Reply::NOT_MINE {
+        if reply != Reply::NOT_HANDLED {
             return reply;
         }
     }
@@ -96,19 +96,19 @@ impl Unit<'_> {
     }
 
     /// Serves a frame, of which notice is taken.
-    fn serve(&mut self, heading: &Heading, concern: Concern, pdu: &mut [u8]) -> Reply {
-        let length = usize::from(heading.length);
+    fn serve(&mut self, info: &RequestInfo, addressing: Addressing, pdu: &mut [u8]) -> Reply {
+        let length = usize::from(info.length);
         let function = pdu.first().copied().unwrap_or(0);
-        let mut served = concern != Concern::FOREIGN;
+        let mut served = addressing != Addressing::FOREIGN;
         if let Some(line) = &mut self.diagnostics {
-            served = line.hear(heading, concern, pdu.get(..length).unwrap_or_default());
+            served = line.read_bytes(info, addressing, pdu.get(..length).unwrap_or_default());
         }
         if !served {
-            return Reply::SILENT;
+            return Reply::NO_RESPONSE;
         }
         let reply = self.walk(pdu, length);
         if let (Some(line), true) = (&mut self.diagnostics, reply != Reply::PENDING) {
-            line.done(concern, function, reply);
+            line.done(addressing, function, reply);
         }
         reply
     }
@@ -117,37 +117,30 @@ impl Unit<'_> {
 /// Units in a slice, and the frame that they are asked about.
 struct Slice<'a, U> {
     units: U,
-    heading: &'a Heading,
+    info: &'a RequestInfo,
     pdu: &'a mut [u8],
 }
 
 impl<'u, 'a: 'u, U: Iterator<Item = &'u mut Unit<'a>>> Dispatch for Slice<'_, U> {
     type Unit = &'u mut Unit<'a>;
 
-    fn next(&mut self, _all: Concern) -> Option<Self::Unit> {
+    fn next(&mut self, _all: Addressing) -> Option<Self::Unit> {
         self.units.next()
     }
 
     fn is_for(&self, unit: &Self::Unit) -> bool {
-        self.heading.is_for(unit.id)
+        self.info.is_for(unit.id)
     }
 
-    fn ask(&mut self, unit: Self::Unit, concern: Concern) -> Option<Reply> {
-        Some(unit.serve(self.heading, concern, self.pdu))
+    fn ask(&mut self, unit: Self::Unit, addressing: Addressing) -> Option<Reply> {
+        Some(unit.serve(self.info, addressing, self.pdu))
     }
 }
 
 impl Units for [Unit<'_>] {
-    fn serve(&mut self, heading: &Heading, pdu: &mut [u8]) -> Reply {
-        let all = heading.concern(pdu.first().copied().unwrap_or(0));
+    fn serve(&mut self, info: &RequestInfo, pdu: &mut [u8]) -> Reply {
+        let all = info.addressing(pdu.first().copied().unwrap_or(0));
         let units = self.iter_mut();
-        dispatch(
-            &mut Slice {
-                units,
-                heading,
-                pdu,
-            },
-            all,
-        )
+        dispatch(&mut Slice { units, info, pdu }, all)
     }
 }

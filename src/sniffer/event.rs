@@ -1,16 +1,16 @@
 //! The events that a sniffer reports.
 
-use super::pairing::Asked;
+use super::pairing::RequestStart;
 use crate::error::Status;
-use crate::explain::{self, Line};
 use crate::pdu::custom::Function;
 use crate::pdu::request::Request;
 use crate::pdu::response::Response;
+use crate::text::{self, TextWriter};
 
 /// The kind of an event.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
-pub enum Kind {
+pub enum EventKind {
     /// A request.
     Request,
     /// The reply to a request.
@@ -32,7 +32,7 @@ pub enum Kind {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Event<'a> {
     /// The kind of event.
-    pub kind: Kind,
+    pub kind: EventKind,
     /// [`Status::OK`], or: of a request, the exception that a server would respond with; of an
     /// exception, its code; [`Status::MALFORMED_REPLY`] of a reply that does not answer the
     /// request; [`Status::RESPONSE_TIMED_OUT`] of a timeout; [`Status::INVALID_CRC`] of a
@@ -57,20 +57,20 @@ pub struct Event<'a> {
     /// How many bytes of the line the event covers.
     pub length: usize,
     /// The start of the request, for replies and timeouts.
-    pub asked: Option<Asked>,
+    pub asked: Option<RequestStart>,
 }
 
-impl Kind {
+impl EventKind {
     /// The kind for a number from the C API.
-    pub const fn from_code(code: u8) -> Option<Kind> {
+    pub const fn from_code(code: u8) -> Option<EventKind> {
         match code {
-            0 => Some(Kind::Request),
-            1 => Some(Kind::Reply),
-            2 => Some(Kind::Exception),
-            3 => Some(Kind::Unpaired),
-            4 => Some(Kind::Timeout),
-            5 => Some(Kind::BadCrc),
-            6 => Some(Kind::Noise),
+            0 => Some(EventKind::Request),
+            1 => Some(EventKind::Reply),
+            2 => Some(EventKind::Exception),
+            3 => Some(EventKind::Unpaired),
+            4 => Some(EventKind::Timeout),
+            5 => Some(EventKind::BadCrc),
+            6 => Some(EventKind::Noise),
             _ => None,
         }
     }
@@ -80,7 +80,7 @@ impl<'a> Event<'a> {
     /// The request, if the event is a request that can be parsed.
     pub fn request(&self, functions: &[Function]) -> Option<Request<'a>> {
         match self.kind {
-            Kind::Request => Request::parse_with(self.pdu, functions).ok(),
+            EventKind::Request => Request::parse_with(self.pdu, functions).ok(),
             _ => None,
         }
     }
@@ -88,7 +88,7 @@ impl<'a> Event<'a> {
     /// The response, if the event is a reply or exception that can be parsed.
     pub fn response(&self, functions: &[Function]) -> Option<Response<'a>> {
         match self.kind {
-            Kind::Reply | Kind::Exception | Kind::Unpaired => {
+            EventKind::Reply | EventKind::Exception | EventKind::Unpaired => {
                 Response::parse_with(self.pdu, functions).ok()
             }
             _ => None,
@@ -96,42 +96,42 @@ impl<'a> Event<'a> {
     }
 
     /// The start of the request that this event is, or that it belongs to, if known.
-    pub fn subject(&self) -> Option<Asked> {
+    pub fn subject(&self) -> Option<RequestStart> {
         match self.kind {
-            Kind::Request => Some(Asked::new(self.pdu)),
+            EventKind::Request => Some(RequestStart::new(self.pdu)),
             _ => self.asked,
         }
     }
 
     /// Writes the event as one line of text.
-    pub fn explain(&self, line: &mut Line) {
-        let asked = self.asked.as_ref().map_or(&[][..], Asked::head);
+    pub fn text(&self, line: &mut TextWriter) {
+        let asked = self.asked.as_ref().map_or(&[][..], RequestStart::head);
         match self.kind {
-            Kind::Request => {
-                explain::start(line, self.unit, "request");
-                explain::request(line, self.pdu);
+            EventKind::Request => {
+                text::start(line, self.unit, "request");
+                text::request(line, self.pdu);
             }
-            Kind::Reply => {
-                explain::start(line, self.unit, "reply");
-                explain::response(line, self.pdu, asked);
+            EventKind::Reply => {
+                text::start(line, self.unit, "reply");
+                text::response(line, self.pdu, asked);
             }
-            Kind::Exception => {
-                explain::start(line, self.unit, "exception");
-                explain::response(line, self.pdu, asked);
+            EventKind::Exception => {
+                text::start(line, self.unit, "exception");
+                text::response(line, self.pdu, asked);
             }
-            Kind::Unpaired => {
-                explain::start(line, self.unit, "unpaired");
-                explain::response(line, self.pdu, asked);
+            EventKind::Unpaired => {
+                text::start(line, self.unit, "unpaired");
+                text::response(line, self.pdu, asked);
             }
-            Kind::Timeout => {
-                explain::start(line, self.unit, "timeout");
-                explain::head(line, asked);
+            EventKind::Timeout => {
+                text::start(line, self.unit, "timeout");
+                text::head(line, asked);
             }
-            Kind::BadCrc => explain::bytes(line, "bad CRC", self.length),
-            Kind::Noise if self.status == Status::BUFFER_TOO_SMALL => {
-                explain::bytes(line, "too long for the buffer", self.length);
+            EventKind::BadCrc => text::bytes(line, "bad CRC", self.length),
+            EventKind::Noise if self.status == Status::BUFFER_TOO_SMALL => {
+                text::bytes(line, "too long for the buffer", self.length);
             }
-            Kind::Noise => explain::bytes(line, "noise", self.length),
+            EventKind::Noise => text::bytes(line, "noise", self.length),
         }
     }
 }

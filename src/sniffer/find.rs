@@ -1,11 +1,11 @@
 //! Where a frame is, in each framing, without knowing who sends it.
 
-use super::lane::{Lane, Timing};
 use super::pairing::Requests;
+use super::stream::{RxStream, Timing};
 use crate::error::Status;
 use crate::frame::ascii::{Content, Mark};
 use crate::frame::{ascii, rtu, tcp, Framing};
-use crate::packet::Side;
+use crate::packet::PduKind;
 use crate::pdu::custom::Function;
 use crate::pdu::diagnostics::{DIAGNOSTICS, REPORT_SERVER_ID};
 use crate::pdu::length::Length;
@@ -13,9 +13,9 @@ use crate::pdu::EXCEPTION;
 
 /// What stands where a frame is looked for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Verdict {
+pub(super) enum Candidate {
     /// A frame of so many bytes, which may be a request, a response or both.
-    Right(usize, bool, bool),
+    Frame(usize, bool, bool),
     /// A whole frame of so many bytes, damaged.
     Damaged(usize),
     /// A frame of so many bytes, which the buffer cannot hold.
@@ -24,7 +24,7 @@ pub(super) enum Verdict {
     /// are there or the line is silent.
     Wait(usize),
     /// No frame.
-    Wrong,
+    NoFrame,
 }
 
 /// The least bytes of an RTU frame.
@@ -55,7 +55,7 @@ impl Context<'_> {
         if code.is_some_and(|code| code & !EXCEPTION == 0) {
             return [None; 2];
         }
-        let of = |side: Side| match side.length(pdu, self.functions) {
+        let of = |side: PduKind| match side.length(pdu, self.functions) {
             Length::Exactly(length) => Length::Exactly(length + rtu::OVERHEAD),
             Length::AtLeast(length) => Length::AtLeast(length + rtu::OVERHEAD),
             other => other,
@@ -66,8 +66,11 @@ impl Context<'_> {
             _ => true,
         };
         let is_exception = code.is_some_and(|code| code & EXCEPTION != 0);
-        let request = (self.request && !is_exception).then(|| of(Side::Request));
-        let response = || match (of(Side::Response), self.requests.reply_length(*unit, pdu)) {
+        let request = (self.request && !is_exception).then(|| of(PduKind::Request));
+        let response = || match (
+            of(PduKind::Response),
+            self.requests.reply_length(*unit, pdu),
+        ) {
             (_, Some(length)) => Length::Exactly(length + rtu::OVERHEAD),
             // Some devices count the id alone and send more behind it.
             (Length::Exactly(total), _)
@@ -125,11 +128,13 @@ impl Context<'_> {
     }
 
     /// An RTU frame that silence ends.
-    fn by_silence(&self, lane: &Lane, bytes: &[u8]) -> Option<usize> {
-        let quiet = lane.quiet(self.now) >= self.timing.silence;
-        let mut ends = lane.silences(lane.at).chain(quiet.then_some(lane.end));
+    fn by_silence(&self, stream: &RxStream, bytes: &[u8]) -> Option<usize> {
+        let quiet = stream.quiet(self.now) >= self.timing.silence;
+        let mut ends = stream
+            .silences(stream.at)
+            .chain(quiet.then_some(stream.end));
         ends.find_map(|end| {
-            let total = usize::from(end - lane.at);
+            let total = usize::from(end - stream.at);
             let is_frame =
                 (MIN_RTU..=rtu::MAX_FRAME).contains(&total) && rtu::is_frame(bytes.get(..total)?);
             is_frame.then_some(total)
@@ -138,10 +143,10 @@ impl Context<'_> {
 
     /// The shortest RTU frame whose CRC is right, where several came as one piece
     /// and their lengths do not tell them apart.
-    fn by_crc(&self, lane: &Lane, bytes: &[u8]) -> Option<usize> {
+    fn by_crc(&self, stream: &RxStream, bytes: &[u8]) -> Option<usize> {
         let is_ended = bytes.len() >= rtu::MAX_FRAME
-            || lane.quiet(self.now) >= self.timing.silence
-            || lane.silences(lane.at).next().is_some();
+            || stream.quiet(self.now) >= self.timing.silence
+            || stream.silences(stream.at).next().is_some();
         if !is_ended {
             return None;
         }
@@ -151,46 +156,46 @@ impl Context<'_> {
     }
 
     /// What stands in RTU bytes.
-    pub fn rtu(&self, lane: &Lane, bytes: &[u8], capacity: usize) -> Verdict {
+    pub fn rtu(&self, stream: &RxStream, bytes: &[u8], capacity: usize) -> Candidate {
         let lengths = self.lengths(bytes);
         let [request, response] = Self::by_length(lengths, bytes);
         match (request, response) {
             (Some(total), other) if other.is_none_or(|other| other == total) => {
-                return Verdict::Right(total, true, other.is_some());
+                return Candidate::Frame(total, true, other.is_some());
             }
             // Two lengths are right: what is asked for decides.
             (Some(_), Some(total)) if self.is_asked(bytes) => {
-                return Verdict::Right(total, false, true);
+                return Candidate::Frame(total, false, true);
             }
-            (Some(total), _) => return Verdict::Right(total, true, false),
-            (None, Some(total)) => return Verdict::Right(total, false, true),
+            (Some(total), _) => return Candidate::Frame(total, true, false),
+            (None, Some(total)) => return Candidate::Frame(total, false, true),
             (None, None) => (),
         }
         let open =
             |length: &Option<Length>| matches!(length, Some(Length::Silence | Length::Unknown));
         let [as_request, as_response] = lengths.map(|length| open(&length));
         let is_open = as_request || as_response;
-        let is_aligned = lane.at == lane.start;
-        let has_silence = lane.has_silence(self.now, &self.timing);
+        let is_aligned = stream.at == stream.start;
+        let has_silence = stream.has_silence(self.now, &self.timing);
         if has_silence && (is_open || is_aligned) {
             // Between two silences the CRC alone decides: some devices miscount.
-            if let Some(total) = self.by_silence(lane, bytes) {
+            if let Some(total) = self.by_silence(stream, bytes) {
                 let [as_request, as_response] = lengths.map(|length| length.is_some());
-                return Verdict::Right(total, as_request, as_response);
+                return Candidate::Frame(total, as_request, as_response);
             }
         }
         if is_open && is_aligned && (has_silence || bytes.len() >= rtu::MAX_FRAME) {
-            if let Some(total) = self.by_crc(lane, bytes) {
-                return Verdict::Right(total, as_request, as_response);
+            if let Some(total) = self.by_crc(stream, bytes) {
+                return Candidate::Frame(total, as_request, as_response);
             }
         }
         let need = Self::need(lengths, bytes.len(), capacity);
-        if let Some(need) = need.filter(|_| !self.is_over(lane)) {
+        if let Some(need) = need.filter(|_| !self.is_over(stream)) {
             // Each byte more may make a CRC right; see by_crc.
-            let is_by_crc = is_open && is_aligned && lane.silences(lane.at).next().is_some();
+            let is_by_crc = is_open && is_aligned && stream.silences(stream.at).next().is_some();
             let need = if is_by_crc { bytes.len() + 1 } else { need };
-            if let Some(other) = self.overtaken(lane, bytes, capacity) {
-                return Verdict::Wait(need.min(other));
+            if let Some(other) = self.overtaken(stream, bytes, capacity) {
+                return Candidate::Wait(need.min(other));
             }
         }
         let too_long = |length: &Length| match length {
@@ -198,8 +203,8 @@ impl Context<'_> {
             _ => None,
         };
         match lengths.iter().flatten().filter_map(too_long).next_back() {
-            Some(total) => Verdict::TooLong(total),
-            None => Verdict::Wrong,
+            Some(total) => Candidate::TooLong(total),
+            None => Candidate::NoFrame,
         }
     }
 
@@ -216,14 +221,14 @@ impl Context<'_> {
     /// How many bytes it takes to look again, if what a lane holds is the beginning of
     /// an RTU frame and the line was not silent since: what [`Context::rtu`] finds
     /// then, at less cost.
-    pub fn begun(&self, framing: Framing, lane: &Lane, part: &[u8]) -> Option<usize> {
+    pub fn begun(&self, framing: Framing, stream: &RxStream, part: &[u8]) -> Option<usize> {
         let capacity = part.len();
         let is_rtu = matches!(framing, Framing::Rtu | Framing::RtuOverTcp);
-        let is_quiet = lane.has_silence(self.now, &self.timing) || self.is_over(lane);
-        if !is_rtu || lane.at != lane.start || is_quiet || lane.is_full(capacity) {
+        let is_quiet = stream.has_silence(self.now, &self.timing) || self.is_over(stream);
+        if !is_rtu || stream.at != stream.start || is_quiet || stream.is_full(capacity) {
             return None;
         }
-        let bytes = part.get(lane.at.into()..lane.end.into())?;
+        let bytes = part.get(stream.at.into()..stream.end.into())?;
         let [unit, code, ..] = *bytes else {
             return None;
         };
@@ -236,10 +241,14 @@ impl Context<'_> {
         let pdu = bytes.get(rtu::PDU..)?;
         let mut need = usize::MAX;
         if self.request && code & EXCEPTION == 0 {
-            need = Self::rest(Side::Request.length(pdu, self.functions), bytes, capacity)?;
+            need = Self::rest(
+                PduKind::Request.length(pdu, self.functions),
+                bytes,
+                capacity,
+            )?;
         }
         if self.response && unit != 0 {
-            let length = Side::Response.length(pdu, self.functions);
+            let length = PduKind::Response.length(pdu, self.functions);
             need = need.min(Self::rest(length, bytes, capacity)?);
         }
         (need < usize::MAX).then_some(need)
@@ -269,17 +278,17 @@ impl Context<'_> {
     }
 
     /// True if what is not complete by now never will be.
-    fn is_over(&self, lane: &Lane) -> bool {
-        lane.quiet(self.now) >= self.timing.patience
+    fn is_over(&self, stream: &RxStream) -> bool {
+        stream.quiet(self.now) >= self.timing.frame_timeout
     }
 
     /// None if a whole frame stands after the next silence: what was not complete
     /// before it never will be. Else how many bytes it takes to see one.
-    fn overtaken(&self, lane: &Lane, bytes: &[u8], capacity: usize) -> Option<usize> {
-        let Some(end) = lane.silences(lane.at).next() else {
+    fn overtaken(&self, stream: &RxStream, bytes: &[u8], capacity: usize) -> Option<usize> {
+        let Some(end) = stream.silences(stream.at).next() else {
             return Some(usize::MAX);
         };
-        let before = usize::from(end - lane.at);
+        let before = usize::from(end - stream.at);
         let next = bytes.get(before..).unwrap_or_default();
         let lengths = self.lengths(next);
         let is_whole = Self::by_length(lengths, next).iter().any(Option::is_some);
@@ -288,48 +297,48 @@ impl Context<'_> {
     }
 
     /// What stands in TCP bytes.
-    pub fn tcp(&self, lane: &Lane, bytes: &[u8], capacity: usize) -> Verdict {
+    pub fn tcp(&self, stream: &RxStream, bytes: &[u8], capacity: usize) -> Candidate {
         let header = match tcp::header(bytes) {
-            Err(Status::INCOMPLETE_FRAME) if !self.is_over(lane) => {
-                return Verdict::Wait(tcp::next_part(bytes.len()));
+            Err(Status::INCOMPLETE_FRAME) if !self.is_over(stream) => {
+                return Candidate::Wait(tcp::next_part(bytes.len()));
             }
-            Err(_) => return Verdict::Wrong,
+            Err(_) => return Candidate::NoFrame,
             Ok(header) => header,
         };
         if header.total > capacity {
-            return Verdict::TooLong(header.total);
+            return Candidate::TooLong(header.total);
         }
         match bytes.get(tcp::PDU..header.total) {
-            Some([code, ..]) if code & !EXCEPTION == 0 => Verdict::Wrong,
+            Some([code, ..]) if code & !EXCEPTION == 0 => Candidate::NoFrame,
             Some(pdu) => {
-                let fits = |side: Side| match side.length(pdu, self.functions) {
+                let fits = |side: PduKind| match side.length(pdu, self.functions) {
                     Length::Exactly(length) => length == pdu.len(),
                     Length::AtLeast(_) => false,
                     Length::Silence | Length::Unknown => true,
                 };
                 let is_exception = pdu.first().is_some_and(|code| code & EXCEPTION != 0);
-                let request = self.request && !is_exception && fits(Side::Request);
-                let response = self.response && fits(Side::Response);
+                let request = self.request && !is_exception && fits(PduKind::Request);
+                let response = self.response && fits(PduKind::Response);
                 // The header says that it is a frame, whatever it carries.
                 let neither = !request && !response;
-                Verdict::Right(
+                Candidate::Frame(
                     header.total,
                     request || (neither && self.request && !is_exception),
                     response || (neither && self.response),
                 )
             }
-            None if self.is_over(lane) => Verdict::Wrong,
-            None => Verdict::Wait(header.total),
+            None if self.is_over(stream) => Candidate::NoFrame,
+            None => Candidate::Wait(header.total),
         }
     }
 
     /// What stands in ASCII characters.
-    pub fn ascii(&self, lane: &Lane, bytes: &mut [u8], capacity: usize) -> Verdict {
+    pub fn ascii(&self, stream: &RxStream, bytes: &mut [u8], capacity: usize) -> Candidate {
         let [ascii::START, ..] = bytes else {
-            return Verdict::Wrong;
+            return Candidate::NoFrame;
         };
         // What was searched before has no end in it.
-        let known = usize::from(lane.searched).max(1);
+        let known = usize::from(stream.searched).max(1);
         let mut before = bytes.get(known - 1).copied().unwrap_or_default();
         for (index, character) in bytes.iter().enumerate().skip(known) {
             let total = index + 1;
@@ -337,23 +346,23 @@ impl Context<'_> {
                 Mark::End => {
                     let frame = bytes.get_mut(..total).unwrap_or_default();
                     return match ascii::decode(frame, self.end, false) {
-                        Content::Right(_) => Verdict::Right(total, true, true),
-                        Content::Damaged(_) => Verdict::Damaged(total),
-                        Content::Malformed => Verdict::Wrong,
+                        Content::Right(_) => Candidate::Frame(total, true, true),
+                        Content::Damaged(_) => Candidate::Damaged(total),
+                        Content::Malformed => Candidate::NoFrame,
                     };
                 }
                 Mark::Inside if total <= ascii::MAX_FRAME => {}
-                _ => return Verdict::Wrong,
+                _ => return Candidate::NoFrame,
             }
             before = *character;
         }
         if bytes.len() >= capacity && capacity < ascii::MAX_FRAME {
-            Verdict::TooLong(bytes.len())
-        } else if self.is_over(lane) {
-            Verdict::Wrong
+            Candidate::TooLong(bytes.len())
+        } else if self.is_over(stream) {
+            Candidate::NoFrame
         } else {
             // Or another colon or end character: [`super::Sniffer::feed`] sees those.
-            Verdict::Wait(ascii::MAX_FRAME + 1)
+            Candidate::Wait(ascii::MAX_FRAME + 1)
         }
     }
 }

@@ -6,23 +6,23 @@
 //! the two it is, the request before it decides. What is no frame costs one byte,
 //! and the search goes on behind it.
 
+mod emit;
 mod event;
 mod find;
-mod lane;
 mod pairing;
-mod tell;
+mod stream;
 
-pub use event::{Event, Kind};
-pub use pairing::Asked;
+pub use event::{Event, EventKind};
+pub use pairing::RequestStart;
 
 use crate::error::Status;
 use crate::frame::{ascii, Framing};
 use crate::pdu::custom::Function;
 use crate::time::{character, silence, DEFAULT_SILENCE};
 use crate::FIRMWARE;
-use find::{Context, Verdict};
-use lane::{Lane, Timing};
+use find::{Candidate, Context};
 use pairing::Requests;
+use stream::{RxStream, Timing};
 
 /// The least bytes of a buffer; [`Framing::max_frame`] hold any frame, twice as
 /// many where the directions are fed apart.
@@ -62,7 +62,7 @@ pub struct Sniffer {
     is_apart: bool,
     timeout: u32,
     timing: Timing,
-    lanes: [Lane; 2],
+    lanes: [RxStream; 2],
     requests: Requests,
     /// For so long from then on, time alone brings nothing to tell of.
     calm_from: u32,
@@ -87,7 +87,7 @@ enum Step {
 impl Sniffer {
     /// A sniffer that has heard nothing.
     pub const fn new(framing: Framing) -> Self {
-        let patience = match framing {
+        let frame_timeout = match framing {
             Framing::Rtu | Framing::RtuOverTcp => RTU_PATIENCE,
             Framing::Ascii | Framing::Tcp => PATIENCE,
         };
@@ -99,9 +99,9 @@ impl Sniffer {
             timing: Timing {
                 character: 0,
                 silence: DEFAULT_SILENCE,
-                patience,
+                frame_timeout,
             },
-            lanes: [Lane::EMPTY; 2],
+            lanes: [RxStream::EMPTY; 2],
             requests: Requests::NONE,
             calm_from: 0,
             calm_for: 0,
@@ -125,9 +125,9 @@ impl Sniffer {
 
     /// Sets how long the rest of a frame is waited for, in microseconds: how
     /// coarse the time stamps are.
-    pub const fn set_patience(&mut self, patience: u32) {
+    pub const fn set_frame_timeout(&mut self, frame_timeout: u32) {
         self.calm_for = 0;
-        self.timing.patience = patience;
+        self.timing.frame_timeout = frame_timeout;
     }
 
     /// Sets the last character of ASCII frames.
@@ -140,14 +140,14 @@ impl Sniffer {
     }
 
     /// The lane of a tap and its part of the buffer.
-    fn part<'a>(&self, buffer: &'a mut [u8], lane: usize) -> &'a mut [u8] {
+    fn part<'a>(&self, buffer: &'a mut [u8], stream: usize) -> &'a mut [u8] {
         // Places in the buffer are 16 bits.
         let most = buffer.len().min(u16::MAX.into());
         let buffer = buffer.get_mut(..most).unwrap_or_default();
         if !self.is_apart {
             return buffer;
         }
-        let half = if lane == 0 {
+        let half = if stream == 0 {
             buffer.get_mut(..most / 2)
         } else {
             buffer.get_mut(most / 2..)
@@ -163,20 +163,20 @@ impl Sniffer {
         let is_apart = tap != Tap::Both;
         if is_apart != self.is_apart {
             self.is_apart = is_apart;
-            self.lanes = [Lane::EMPTY; 2];
+            self.lanes = [RxStream::EMPTY; 2];
         }
         let index = usize::from(tap == Tap::Server);
         let part = self.part(buffer, index);
         let is_ascii = self.framing == Framing::Ascii;
         let [first, second] = &mut self.lanes;
-        let lane = if index == 0 { first } else { second };
+        let stream = if index == 0 { first } else { second };
         let may_decide = |byte: &u8| *byte == ascii::START || *byte == self.end;
         if is_ascii && bytes.iter().any(may_decide) {
-            lane.look_again();
+            stream.look_again();
         }
         match bytes {
-            [byte] if !FIRMWARE && lane.feed_next(part, *byte, now, &self.timing) => 1,
-            _ => lane.feed(part, bytes, now, &self.timing),
+            [byte] if !FIRMWARE && stream.feed_next(part, *byte, now, &self.timing) => 1,
+            _ => stream.feed(part, bytes, now, &self.timing),
         }
     }
 
@@ -213,7 +213,7 @@ impl Sniffer {
                 continue;
             }
             if let Some(step) = self.step(buffer, functions, index, now) {
-                return Some(self.tell(buffer, functions, index, step, now));
+                return Some(self.emit_event(buffer, functions, index, step, now));
             }
         }
         if only_bytes {
@@ -222,7 +222,7 @@ impl Sniffer {
         // Bytes that are not understood yet may hold the reply.
         let known = now.wrapping_sub(self.waited(0, now).max(self.waited(1, now)));
         if let Some(overdue) = self.overdue(known) {
-            return Some(self.give_up(overdue, now));
+            return Some(self.expire(overdue, now));
         }
         self.calm_from = now;
         self.calm_for = self.requests.calm(now, self.timeout, self.late());
@@ -245,8 +245,8 @@ impl Sniffer {
 
     /// How long a lane has held bytes that were not told of.
     fn waited(&self, index: usize, now: u32) -> u32 {
-        let lane = self.lanes.get(index);
-        lane.map_or(0, |lane| lane.waited(now, &self.timing))
+        let stream = self.lanes.get(index);
+        stream.map_or(0, |stream| stream.waited(now, &self.timing))
     }
 
     /// How long the reply to a request that was given up is known as such.
@@ -273,21 +273,21 @@ impl Sniffer {
         let framing = self.framing;
         for index in 0..=usize::from(self.is_apart) {
             let part = self.part(buffer, index);
-            let (context, lane) = self.split(functions, index, now);
-            if only_bytes && lane.is_settled(now) {
+            let (context, stream) = self.split(functions, index, now);
+            if only_bytes && stream.is_settled(now) {
                 continue;
             }
-            let need = if lane.is_empty() {
+            let need = if stream.is_empty() {
                 Some(context.least(framing))
             } else {
-                context.begun(framing, lane, part)
+                context.begun(framing, stream, part)
             };
             let Some(need) = need else {
                 // The other lane may not have been looked into since requests changed.
                 self.calm_for = if only_bytes { self.calm_for } else { 0 };
                 return false;
             };
-            lane.settle(need, part.len(), now, &context.timing);
+            stream.settle(need, part.len(), now, &context.timing);
         }
         true
     }
@@ -304,7 +304,7 @@ impl Sniffer {
         functions: &'c [Function],
         index: usize,
         now: u32,
-    ) -> (Context<'c>, &'c mut Lane) {
+    ) -> (Context<'c>, &'c mut RxStream) {
         let context = Context {
             requests: &self.requests,
             functions,
@@ -329,16 +329,16 @@ impl Sniffer {
         let part = self.part(buffer, index);
         let capacity = part.len();
         let (framing, end) = (self.framing, self.end);
-        let (context, lane) = self.split(functions, index, now);
+        let (context, stream) = self.split(functions, index, now);
         let step = loop {
-            if lane.is_empty() {
-                lane.settle(context.least(framing), capacity, now, &context.timing);
+            if stream.is_empty() {
+                stream.settle(context.least(framing), capacity, now, &context.timing);
                 break None;
             }
             let junk = |until: u16| {
                 Some(Step::Junk {
-                    length: usize::from(until - lane.start),
-                    status: if lane.cut {
+                    length: usize::from(until - stream.start),
+                    status: if stream.cut {
                         Status::BUFFER_TOO_SMALL
                     } else {
                         Status::OK
@@ -347,46 +347,48 @@ impl Sniffer {
                 })
             };
             // What lies between two silences is told of by itself.
-            if let Some(end) = lane
-                .silences(lane.start)
+            if let Some(end) = stream
+                .silences(stream.start)
                 .next()
-                .filter(|end| lane.at >= *end)
+                .filter(|end| stream.at >= *end)
             {
                 break junk(end);
             }
-            if lane.at == lane.end {
-                break junk(lane.end);
+            if stream.at == stream.end {
+                break junk(stream.end);
             }
             let bytes = part
-                .get_mut(lane.at.into()..lane.end.into())
+                .get_mut(stream.at.into()..stream.end.into())
                 .unwrap_or_default();
-            let verdict = if lane.decoded > 0 {
-                Verdict::Right(lane.decoded.into(), true, true)
+            let candidate = if stream.decoded > 0 {
+                Candidate::Frame(stream.decoded.into(), true, true)
             } else {
                 match framing {
-                    Framing::Rtu | Framing::RtuOverTcp => context.rtu(lane, bytes, capacity),
-                    Framing::Tcp => context.tcp(lane, bytes, capacity),
-                    Framing::Ascii => context.ascii(lane, bytes, capacity),
+                    Framing::Rtu | Framing::RtuOverTcp => context.rtu(stream, bytes, capacity),
+                    Framing::Tcp => context.tcp(stream, bytes, capacity),
+                    Framing::Ascii => context.ascii(stream, bytes, capacity),
                 }
             };
-            let is_behind_junk = lane.at > lane.start;
-            match verdict {
-                Verdict::Wait(need) if !lane.is_full(capacity) => {
-                    lane.searched = bytes.len() as u16;
-                    lane.settle(need, capacity, now, &context.timing);
+            let is_behind_junk = stream.at > stream.start;
+            match candidate {
+                Candidate::Wait(need) if !stream.is_full(capacity) => {
+                    stream.searched = bytes.len() as u16;
+                    stream.settle(need, capacity, now, &context.timing);
                     break None;
                 }
-                Verdict::Right(..) | Verdict::Damaged(_) | Verdict::Wait(_) if is_behind_junk => {
-                    break junk(lane.at);
+                Candidate::Frame(..) | Candidate::Damaged(_) | Candidate::Wait(_)
+                    if is_behind_junk =>
+                {
+                    break junk(stream.at);
                 }
-                Verdict::Right(total, request, response) => {
+                Candidate::Frame(total, request, response) => {
                     break Some(Step::Frame {
                         total,
                         content: total,
                         right: Some((request && context.request, response && context.response)),
                     });
                 }
-                Verdict::Damaged(total) => {
+                Candidate::Damaged(total) => {
                     break Some(Step::Frame {
                         total,
                         content: total,
@@ -394,9 +396,9 @@ impl Sniffer {
                     });
                 }
                 // A header is trusted; elsewhere it may be noise.
-                Verdict::TooLong(total) if framing == Framing::Tcp => {
+                Candidate::TooLong(total) if framing == Framing::Tcp => {
                     if is_behind_junk {
-                        break junk(lane.at);
+                        break junk(stream.at);
                     }
                     let length = bytes.len().min(total);
                     break Some(Step::Junk {
@@ -405,21 +407,21 @@ impl Sniffer {
                         more: total - length,
                     });
                 }
-                Verdict::TooLong(_) | Verdict::Wait(_) | Verdict::Wrong => {
-                    lane.cut |= matches!(verdict, Verdict::TooLong(_));
-                    lane.pass();
+                Candidate::TooLong(_) | Candidate::Wait(_) | Candidate::NoFrame => {
+                    stream.cut |= matches!(candidate, Candidate::TooLong(_));
+                    stream.pass();
                 }
             }
         };
         match step {
             Some(Step::Frame { total, right, .. }) if framing == Framing::Ascii => {
-                let at = usize::from(lane.at);
-                if let Some(frame) = part.get_mut(at..at + total).filter(|_| lane.decoded == 0) {
+                let at = usize::from(stream.at);
+                if let Some(frame) = part.get_mut(at..at + total).filter(|_| stream.decoded == 0) {
                     // It has a frame's form: the context looked.
                     ascii::decode(frame, end, true);
                 }
                 let content = total.saturating_sub(3) / 2;
-                lane.decoded = if right.is_some() { total as u16 } else { 0 };
+                stream.decoded = if right.is_some() { total as u16 } else { 0 };
                 Some(Step::Frame {
                     total,
                     content,

@@ -1,30 +1,30 @@
 //! Pairs requests with replies.
 
-use crate::packet::Side;
+use crate::packet::PduKind;
 use crate::pdu::custom::Function;
 use crate::pdu::length::Length;
 use crate::pdu::request::Request;
 use crate::pdu::response::Response;
 use crate::pdu::{bits, diagnostics, files, identification, registers, EXCEPTION};
 
-pub use crate::explain::HEAD;
+pub use crate::text::HEAD;
 
 /// The first bytes of a request PDU. They are needed to interpret its reply.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Asked {
+pub struct RequestStart {
     head: [u8; HEAD],
     length: u8,
 }
 
-impl Asked {
-    const NOTHING: Asked = Asked {
+impl RequestStart {
+    const NOTHING: RequestStart = RequestStart {
         head: [0; HEAD],
         length: 0,
     };
 
     /// The head of a request PDU.
-    pub fn new(pdu: &[u8]) -> Asked {
-        let mut asked = Asked::NOTHING;
+    pub fn new(pdu: &[u8]) -> RequestStart {
+        let mut asked = RequestStart::NOTHING;
         for (place, byte) in asked.head.iter_mut().zip(pdu) {
             *place = *byte;
             asked.length += 1;
@@ -80,24 +80,24 @@ pub(super) enum State {
 
 /// A request on the bus.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Slot {
+pub(super) struct OpenRequest {
     pub state: State,
     pub unit: u8,
     pub transaction: u16,
     pub time: u32,
-    pub asked: Asked,
+    pub asked: RequestStart,
     /// Lengths of the request PDU and of its reply PDU; 0 if only the reply shows its length.
     length: u8,
     reply: u8,
 }
 
-impl Slot {
-    pub const FREE: Slot = Slot {
+impl OpenRequest {
+    pub const FREE: OpenRequest = OpenRequest {
         state: State::Free,
         unit: 0,
         transaction: 0,
         time: 0,
-        asked: Asked::NOTHING,
+        asked: RequestStart::NOTHING,
         length: 0,
         reply: 0,
     };
@@ -156,7 +156,7 @@ pub(super) fn age(now: u32, time: u32) -> u32 {
 
 /// What a PDU is to the requests on the bus.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Role {
+pub(super) enum FrameRole {
     Request,
     /// The reply to the request at this index, which is open or has timed out.
     Reply(usize),
@@ -167,7 +167,7 @@ pub(super) enum Role {
 
 /// A frame, as the pairing needs it.
 #[derive(Clone, Copy)]
-pub(super) struct Seen<'a> {
+pub(super) struct ObservedFrame<'a> {
     pub unit: u8,
     pub transaction: u16,
     pub pdu: &'a [u8],
@@ -182,22 +182,22 @@ pub(super) const SLOTS: usize = 16;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Requests {
-    slots: [Slot; SLOTS],
+    slots: [OpenRequest; SLOTS],
     /// All slots from this index on are free.
     used: u8,
 }
 
 impl Requests {
     pub const NONE: Requests = Requests {
-        slots: [Slot::FREE; SLOTS],
+        slots: [OpenRequest::FREE; SLOTS],
         used: 0,
     };
 
-    fn used(&self) -> &[Slot] {
+    fn used(&self) -> &[OpenRequest] {
         self.slots.get(..self.used.into()).unwrap_or_default()
     }
 
-    fn used_mut(&mut self) -> &mut [Slot] {
+    fn used_mut(&mut self) -> &mut [OpenRequest] {
         self.slots.get_mut(..self.used.into()).unwrap_or_default()
     }
 
@@ -210,8 +210,8 @@ impl Requests {
         self.used = last.map_or(0, |index| index as u8 + 1);
     }
 
-    pub fn get(&self, index: usize) -> Slot {
-        self.slots.get(index).copied().unwrap_or(Slot::FREE)
+    pub fn get(&self, index: usize) -> OpenRequest {
+        self.slots.get(index).copied().unwrap_or(OpenRequest::FREE)
     }
 
     pub fn set_state(&mut self, index: usize, state: State) {
@@ -222,7 +222,12 @@ impl Requests {
     }
 
     /// The earliest request in a state for which `wanted` holds.
-    fn earliest(&self, now: u32, state: State, wanted: impl Fn(&Slot) -> bool) -> Option<usize> {
+    fn earliest(
+        &self,
+        now: u32,
+        state: State,
+        wanted: impl Fn(&OpenRequest) -> bool,
+    ) -> Option<usize> {
         let mut found: Option<(usize, u32)> = None;
         for (index, slot) in self.used().iter().enumerate() {
             if slot.state != state || !wanted(slot) {
@@ -282,31 +287,32 @@ impl Requests {
     }
 
     /// Decides whether a frame is a request, a reply, or a response without a request.
-    pub fn role(&self, seen: &Seen, functions: &[Function], now: u32) -> Role {
-        let Seen {
+    pub fn role(&self, frame: &ObservedFrame, functions: &[Function], now: u32) -> FrameRole {
+        let ObservedFrame {
             unit,
             transaction,
             pdu,
             ..
-        } = *seen;
-        let of = |slot: &Slot| slot.is_of(unit, transaction, pdu);
-        if seen.response {
-            let answered = |slot: &Slot| of(slot) && slot.is_answered_by(pdu);
+        } = *frame;
+        let of = |slot: &OpenRequest| slot.is_of(unit, transaction, pdu);
+        if frame.response {
+            let answered = |slot: &OpenRequest| of(slot) && slot.is_answered_by(pdu);
             if let Some(index) = self.earliest(now, State::Open, answered) {
-                return Role::Reply(index);
+                return FrameRole::Reply(index);
             }
             // A frame that equals the request is the request again.
-            let late = |slot: &Slot| answered(slot) && !(seen.request && slot.is_repeated_by(pdu));
+            let late =
+                |slot: &OpenRequest| answered(slot) && !(frame.request && slot.is_repeated_by(pdu));
             if let Some(index) = self.earliest(now, State::Late, late) {
-                return Role::Reply(index);
+                return FrameRole::Reply(index);
             }
         }
-        let is_response = seen.response && Response::parse_with(pdu, functions).is_ok();
-        let is_request = seen.request && Request::parse_with(pdu, functions).is_ok();
-        if seen.request && (is_request || !is_response) {
-            Role::Request
+        let is_response = frame.response && Response::parse_with(pdu, functions).is_ok();
+        let is_request = frame.request && Request::parse_with(pdu, functions).is_ok();
+        if frame.request && (is_request || !is_response) {
+            FrameRole::Request
         } else {
-            Role::Unpaired(
+            FrameRole::Unpaired(
                 self.used()
                     .iter()
                     .any(|slot| slot.state == State::Open && of(slot)),
@@ -316,11 +322,11 @@ impl Requests {
 
     /// The open request that a new request ends: on a serial line any request, on TCP the one
     /// with the same transaction identifier. If all slots are open, the earliest request.
-    pub fn ended_by(&self, seen: &Seen, one_at_a_time: bool, now: u32) -> Option<usize> {
-        let same = |slot: &Slot| {
-            one_at_a_time || (slot.unit == seen.unit && slot.transaction == seen.transaction)
+    pub fn ended_by(&self, frame: &ObservedFrame, one_at_a_time: bool, now: u32) -> Option<usize> {
+        let same = |slot: &OpenRequest| {
+            one_at_a_time || (slot.unit == frame.unit && slot.transaction == frame.transaction)
         };
-        let any = |_: &Slot| true;
+        let any = |_: &OpenRequest| true;
         let ended = self.earliest(now, State::Open, same);
         ended.or_else(|| {
             let is_full = self.slots.iter().all(|slot| slot.state == State::Open);
@@ -331,13 +337,19 @@ impl Requests {
     }
 
     /// Stores a request that has a reply.
-    pub fn keep(&mut self, seen: &Seen, is_broadcast: bool, functions: &[Function], time: u32) {
-        let Seen {
+    pub fn keep(
+        &mut self,
+        frame: &ObservedFrame,
+        is_broadcast: bool,
+        functions: &[Function],
+        time: u32,
+    ) {
+        let ObservedFrame {
             unit,
             transaction,
             pdu,
             ..
-        } = *seen;
+        } = *frame;
         let function = pdu.first().copied().unwrap_or_default();
         for slot in self.used_mut() {
             let same = slot.unit == unit && slot.asked.function() == function;
@@ -350,7 +362,7 @@ impl Requests {
         }
         let length = match Request::parse_with(pdu, functions) {
             Ok(request) => request.response_length(functions),
-            Err(_) => Side::Response.length(&[function], functions),
+            Err(_) => PduKind::Response.length(&[function], functions),
         };
         let reply = match length {
             // Force Listen Only Mode.
@@ -365,12 +377,12 @@ impl Requests {
         };
         self.used = self.used.max(index as u8 + 1);
         if let Some(slot) = self.slots.get_mut(index) {
-            *slot = Slot {
+            *slot = OpenRequest {
                 state: State::Open,
                 unit,
                 transaction,
                 time,
-                asked: Asked::new(pdu),
+                asked: RequestStart::new(pdu),
                 length: pdu.len() as u8,
                 reply,
             };

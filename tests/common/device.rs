@@ -3,7 +3,7 @@
 use mbm::frame::checksum::crc16;
 use mbm::frame::Framing;
 use mbm::pdu::files::Record;
-use mbm::server::custom::{Custom, Outcome, SwitchedOff};
+use mbm::server::custom::{Custom, DisabledFunctions, Outcome};
 use mbm::server::diagnostics::Diagnostics;
 use mbm::server::files::{self, Fifos, Files};
 use mbm::server::identity::{self, Objects};
@@ -48,7 +48,7 @@ struct Named<'a>(&'a [(u8, Vec<u8>)]);
 struct Told;
 
 impl Files for Stored<'_> {
-    fn covers(&self, record: Record) -> bool {
+    fn contains(&self, record: Record) -> bool {
         (3..5).contains(&record.file) && record.record + record.length <= 10
     }
     fn load(&self, record: Record, data: &mut [u8]) {
@@ -108,7 +108,7 @@ impl Service for Named<'_> {
 impl Service for Told {
     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
         match identity::serve_exception_status(0x6D, pdu, length) {
-            Reply::NOT_MINE => identity::serve_server_id(b"id", true, b"mbm", pdu, length),
+            Reply::NOT_HANDLED => identity::serve_server_id(b"id", true, b"mbm", pdu, length),
             reply => reply,
         }
     }
@@ -160,7 +160,7 @@ impl Device {
         action(Unit {
             id: self.id,
             services: &mut [
-                &mut SwitchedOff(self.off),
+                &mut DisabledFunctions(self.off),
                 &mut holding,
                 &mut InputRegisters(Words::new(100, &mut self.inputs)),
                 &mut coils,
@@ -171,7 +171,7 @@ impl Device {
                 &mut Told,
                 &mut Custom {
                     function: 0x42,
-                    handler: |_, data: &[u8], room: &mut [u8]| custom(data, room),
+                    handler: |_, data: &[u8], space: &mut [u8]| custom(data, space),
                 },
             ],
             diagnostics: Some(&mut self.diagnostics),

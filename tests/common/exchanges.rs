@@ -2,12 +2,12 @@
 
 use mbm::error::Status;
 use mbm::pdu::custom::Rule;
-use mbm::pdu::outline::{Form, Outline};
+use mbm::pdu::header::{FunctionSpec, RequestHeader};
 
 /// The builder of a request, the data to send, the PDU of the request, the PDU of the
 /// response, and the data that the client receives.
 pub type Case = (
-    fn(&mut Outline) -> Status,
+    fn(&mut RequestHeader) -> Status,
     &'static [u8],
     &'static [u8],
     &'static [u8],
@@ -17,49 +17,49 @@ pub type Case = (
 /// The examples of the application protocol, clause 6, and some others.
 pub const CASES: &[Case] = &[
     (
-        |o| o.set(Form::READ_COILS, 0x13, 0x13),
+        |o| o.set(FunctionSpec::READ_COILS, 0x13, 0x13),
         &[],
         &[1, 0, 0x13, 0, 0x13],
         &[1, 3, 0xCD, 0x6B, 0xFD],
         &[0xCD, 0x6B, 0x05],
     ),
     (
-        |o| o.set(Form::READ_DISCRETE_INPUTS, 0xC4, 0x16),
+        |o| o.set(FunctionSpec::READ_DISCRETE_INPUTS, 0xC4, 0x16),
         &[],
         &[2, 0, 0xC4, 0, 0x16],
         &[2, 3, 0xAC, 0xDB, 0x35],
         &[0xAC, 0xDB, 0x35],
     ),
     (
-        |o| o.set(Form::READ_HOLDING_REGISTERS, 0x6B, 3),
+        |o| o.set(FunctionSpec::READ_HOLDING_REGISTERS, 0x6B, 3),
         &[],
         &[3, 0, 0x6B, 0, 3],
         &[3, 6, 2, 0x2B, 0, 0, 0, 0x64],
         &[2, 0x2B, 0, 0, 0, 0x64],
     ),
     (
-        |o| o.set(Form::READ_INPUT_REGISTERS, 8, 1),
+        |o| o.set(FunctionSpec::READ_INPUT_REGISTERS, 8, 1),
         &[],
         &[4, 0, 8, 0, 1],
         &[4, 2, 0, 0x0A],
         &[0, 0x0A],
     ),
     (
-        |o| o.set(Form::WRITE_SINGLE_COIL, 0xAC, 0xFF00),
+        |o| o.set(FunctionSpec::WRITE_SINGLE_COIL, 0xAC, 0xFF00),
         &[],
         &[5, 0, 0xAC, 0xFF, 0],
         &[5, 0, 0xAC, 0xFF, 0],
         &[],
     ),
     (
-        |o| o.set(Form::WRITE_SINGLE_REGISTER, 1, 3),
+        |o| o.set(FunctionSpec::WRITE_SINGLE_REGISTER, 1, 3),
         &[],
         &[6, 0, 1, 0, 3],
         &[6, 0, 1, 0, 3],
         &[],
     ),
     (
-        |o| o.set(Form::READ_EXCEPTION_STATUS, 0, 0),
+        |o| o.set(FunctionSpec::READ_EXCEPTION_STATUS, 0, 0),
         &[],
         &[7],
         &[7, 0x6D],
@@ -80,35 +80,35 @@ pub const CASES: &[Case] = &[
         &[0, 9],
     ),
     (
-        |o| o.set(Form::GET_COMM_EVENT_COUNTER, 0, 0),
+        |o| o.set(FunctionSpec::GET_COMM_EVENT_COUNTER, 0, 0),
         &[],
         &[0x0B],
         &[0x0B, 0xFF, 0xFF, 1, 8],
         &[0xFF, 0xFF, 1, 8],
     ),
     (
-        |o| o.set(Form::GET_COMM_EVENT_LOG, 0, 0),
+        |o| o.set(FunctionSpec::GET_COMM_EVENT_LOG, 0, 0),
         &[],
         &[0x0C],
         &[0x0C, 8, 0, 0, 1, 8, 1, 0x21, 0x20, 0],
         &[0, 0, 1, 8, 1, 0x21, 0x20, 0],
     ),
     (
-        |o| o.set(Form::WRITE_MULTIPLE_COILS, 0x13, 10),
+        |o| o.set(FunctionSpec::WRITE_MULTIPLE_COILS, 0x13, 10),
         &[0xCD, 0xFD],
         &[0x0F, 0, 0x13, 0, 10, 2, 0xCD, 1],
         &[0x0F, 0, 0x13, 0, 10],
         &[],
     ),
     (
-        |o| o.set(Form::WRITE_MULTIPLE_REGISTERS, 1, 2),
+        |o| o.set(FunctionSpec::WRITE_MULTIPLE_REGISTERS, 1, 2),
         &[0, 0x0A, 1, 2],
         &[0x10, 0, 1, 0, 2, 4, 0, 0x0A, 1, 2],
         &[0x10, 0, 1, 0, 2],
         &[],
     ),
     (
-        |o| o.set(Form::REPORT_SERVER_ID, 0, 0),
+        |o| o.set(FunctionSpec::REPORT_SERVER_ID, 0, 0),
         &[],
         &[0x11],
         &[0x11, 3, 0x42, 0xFF, 7],
@@ -159,7 +159,7 @@ pub const CASES: &[Case] = &[
         &[0, 0xFE, 0x0A, 0xCD],
     ),
     (
-        |o| o.set(Form::READ_FIFO_QUEUE, 0x4DE, 0),
+        |o| o.set(FunctionSpec::READ_FIFO_QUEUE, 0x4DE, 0),
         &[],
         &[0x18, 4, 0xDE],
         &[0x18, 0, 6, 0, 2, 1, 0xB8, 0x12, 0x84],

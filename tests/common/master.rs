@@ -4,7 +4,7 @@ use mbm::engine::{Buffers, Words};
 use mbm::error::Status;
 use mbm::frame::checksum::crc16;
 use mbm::master::Master;
-use mbm::pdu::query::Query;
+use mbm::pdu::query::MasterRequest;
 use mbm::pdu::{bits, registers};
 use mbm::port::Port;
 use std::collections::VecDeque;
@@ -84,9 +84,9 @@ impl Call {
     }
 
     /// The request that the call builds, or the status that refuses it.
-    pub fn query(&self) -> Result<Query, Status> {
+    pub fn query(&self) -> Result<MasterRequest, Status> {
         let [a, b, c, d] = self.words;
-        Query::build(|query| match self.function {
+        MasterRequest::build(|query| match self.function {
             0x01 => query.set(bits::form::READ_COILS, a, b),
             0x02 => query.set(bits::form::READ_INPUTS, a, b),
             0x03 => query.set(registers::form::READ_HOLDING, a, b),

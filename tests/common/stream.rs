@@ -6,7 +6,7 @@ pub mod wire;
 
 use mbm::client::{Client, Tcp};
 use mbm::frame::tcp;
-use mbm::pdu::outline::Form;
+use mbm::pdu::header::FunctionSpec;
 use wire::{End, Lent, Task};
 
 pub type TcpIp = Client<Tcp<End, Lent>, Task, 16>;
@@ -17,8 +17,8 @@ pub fn client() -> (End, TcpIp) {
 }
 
 pub fn read(unit: u8, transaction: u16) -> Task {
-    Task::new(unit, transaction, &[], |outline| {
-        outline.set(Form::READ_HOLDING_REGISTERS, transaction, 1)
+    Task::new(unit, transaction, &[], |header| {
+        header.set(FunctionSpec::READ_HOLDING_REGISTERS, transaction, 1)
     })
 }
 

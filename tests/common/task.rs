@@ -1,9 +1,9 @@
 //! A request that owns its data, and the buffers and records that a client works with.
 
-use mbm::client::{Job, Means, Ticket, Unit};
+use mbm::client::{ClientRequest, ClientStorage, RequestState, Unit};
 use mbm::engine::{Counter, Frame, Storage, COUNTERS};
 use mbm::error::Status;
-use mbm::pdu::outline::Outline;
+use mbm::pdu::header::RequestHeader;
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -31,16 +31,16 @@ impl Default for Lent {
 
 impl Lent {
     fn within(&self, index: u16, count: u16) {
-        let (end, room) = (u32::from(index) + u32::from(count), self.room());
-        assert!(end <= room.into(), "{count} bytes from {index} of {room}");
+        let (end, space) = (u32::from(index) + u32::from(count), self.capacity());
+        assert!(end <= space.into(), "{count} bytes from {index} of {space}");
     }
 }
 
 impl Storage for Lent {
     type Count = u16;
 
-    fn room(&self) -> u16 {
-        self.frame.room()
+    fn capacity(&self) -> u16 {
+        self.frame.capacity()
     }
 
     fn byte(&self, index: u16) -> u8 {
@@ -77,7 +77,7 @@ impl Storage for Lent {
     }
 }
 
-impl Means for Lent {
+impl ClientStorage for Lent {
     fn outgoing(&mut self) -> &mut [u8] {
         &mut self.outgoing
     }
@@ -93,7 +93,7 @@ impl Means for Lent {
 
 /// A request that owns its data, in the byte order of the wire.
 pub struct Task {
-    pub ticket: Ticket,
+    pub state: RequestState,
     pub data: Vec<u8>,
     pub reply: Vec<u8>,
 }
@@ -105,15 +105,15 @@ impl Task {
         unit: u8,
         transaction: u16,
         data: &[u8],
-        build: impl FnOnce(&mut Outline) -> Status,
+        build: impl FnOnce(&mut RequestHeader) -> Status,
     ) -> Task {
-        let mut ticket = Ticket::NONE;
-        ticket.unit = unit;
-        ticket.transaction = transaction;
-        ticket.capacity = 252;
-        assert_eq!(build(&mut ticket.outline), Status::OK);
+        let mut state = RequestState::NONE;
+        state.unit = unit;
+        state.transaction = transaction;
+        state.capacity = 252;
+        assert_eq!(build(&mut state.header), Status::OK);
         Task {
-            ticket,
+            state,
             data: data.to_vec(),
             reply: vec![0xEE; 252],
         }
@@ -121,17 +121,17 @@ impl Task {
 
     /// The received data.
     pub fn received(&self) -> &[u8] {
-        &self.reply[..usize::from(self.ticket.length)]
+        &self.reply[..usize::from(self.state.length)]
     }
 }
 
-impl Job for Task {
-    fn ticket(&self) -> &Ticket {
-        &self.ticket
+impl ClientRequest for Task {
+    fn state(&self) -> &RequestState {
+        &self.state
     }
 
-    fn ticket_mut(&mut self) -> &mut Ticket {
-        &mut self.ticket
+    fn state_mut(&mut self) -> &mut RequestState {
+        &mut self.state
     }
 
     fn byte(&self, index: usize) -> u8 {

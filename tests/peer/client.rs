@@ -10,7 +10,7 @@ use mbm::client::{Client, Line, Serial, Tcp};
 use mbm::error::Status;
 use mbm::frame::Framing;
 use mbm::pdu::custom::Rule;
-use mbm::pdu::outline::{Form, Outline};
+use mbm::pdu::header::{FunctionSpec, RequestHeader};
 use mbm::port::Port;
 use std::collections::VecDeque;
 use std::io::Write;
@@ -80,7 +80,7 @@ impl<L: Line<Task>> Requester<L> {
     }
 
     /// Sends a request and waits until it has ended.
-    fn request(&mut self, data: &[u8], build: impl FnOnce(&mut Outline) -> Status) -> Task {
+    fn request(&mut self, data: &[u8], build: impl FnOnce(&mut RequestHeader) -> Status) -> Task {
         assert!(self.client.queue(Task::new(UNIT, 1, data, build)).is_ok());
         let until = Instant::now() + PEER_TIMEOUT;
         while Instant::now() < until {
@@ -97,7 +97,7 @@ impl<L: Line<Task>> Requester<L> {
     fn expect_data(
         &mut self,
         data: &[u8],
-        build: impl FnOnce(&mut Outline) -> Status,
+        build: impl FnOnce(&mut RequestHeader) -> Status,
         expected: &[u8],
     ) {
         let task = self.request(data, build);
@@ -105,19 +105,19 @@ impl<L: Line<Task>> Requester<L> {
             task.ticket.status,
             Status::OK,
             "{:02X?}",
-            task.ticket.outline
+            task.ticket.header
         );
-        assert_eq!(task.received(), expected, "{:02X?}", task.ticket.outline);
+        assert_eq!(task.received(), expected, "{:02X?}", task.ticket.header);
     }
 
     fn expect_status(
         &mut self,
         data: &[u8],
-        build: impl FnOnce(&mut Outline) -> Status,
+        build: impl FnOnce(&mut RequestHeader) -> Status,
         status: Status,
     ) {
         let task = self.request(data, build);
-        assert_eq!(task.ticket.status, status, "{:02X?}", task.ticket.outline);
+        assert_eq!(task.ticket.status, status, "{:02X?}", task.ticket.header);
     }
 
     fn check_every_function(mut self) {
@@ -128,7 +128,7 @@ impl<L: Line<Task>> Requester<L> {
     fn functions_that_libmodbus_lacks(&mut self) {
         self.expect_status(
             &[],
-            |o| o.set(Form::READ_EXCEPTION_STATUS, 0, 0),
+            |o| o.set(FunctionSpec::READ_EXCEPTION_STATUS, 0, 0),
             Status::OK,
         );
         let query = [0xA5, 0x37];
@@ -138,13 +138,13 @@ impl<L: Line<Task>> Requester<L> {
         ] {
             self.expect_status(&[0, 0], |o| o.diagnostics(sub_function, 1), Status::OK);
         }
-        let counter = self.request(&[], |o| o.set(Form::GET_COMM_EVENT_COUNTER, 0, 0));
+        let counter = self.request(&[], |o| o.set(FunctionSpec::GET_COMM_EVENT_COUNTER, 0, 0));
         assert_eq!(counter.received().get(..2), Some(&[0, 0][..]));
-        let log = self.request(&[], |o| o.set(Form::GET_COMM_EVENT_LOG, 0, 0));
+        let log = self.request(&[], |o| o.set(FunctionSpec::GET_COMM_EVENT_LOG, 0, 0));
         assert_eq!(log.ticket.status, Status::OK);
         assert!(log.received().len() >= 6);
         let id = b"Vendor-PC-V2.11\xFF";
-        self.expect_data(&[], |o| o.set(Form::REPORT_SERVER_ID, 0, 0), id);
+        self.expect_data(&[], |o| o.set(FunctionSpec::REPORT_SERVER_ID, 0, 0), id);
         // The server returns the same record of 20 bytes for every request.
         let record = b"SERVER DUMMY RECORD.";
         self.expect_data(&[], |o| o.read_file_record(4, 1, 10), record);
@@ -160,7 +160,11 @@ impl<L: Line<Task>> Requester<L> {
         let written = [6, 0, 4, 0, 7, 0, 1, 0xAF, 4];
         self.expect_status(&written, |o| o.write_file_records(9), Status::OK);
         let queue = [0, 0, 0, 1, 0, 2, 0, 3];
-        self.expect_data(&[], |o| o.set(Form::READ_FIFO_QUEUE, 0x04DE, 0), &queue);
+        self.expect_data(
+            &[],
+            |o| o.set(FunctionSpec::READ_FIFO_QUEUE, 0x04DE, 0),
+            &queue,
+        );
         self.identification();
         let rule = Rule::Counted(1, 0);
         self.expect_data(&[3, 7, 8, 9], |o| o.custom(0x41, 4, rule), &[3, 9, 8, 7]);
@@ -173,7 +177,7 @@ impl<L: Line<Task>> Requester<L> {
         assert_eq!(basic.received().get(4..), Some(&objects[..]));
         let one = self.request(&[], |o| o.read_device_identification(4, 2));
         assert_eq!(one.received().get(3..), Some(&b"\x01\x02\x05V2.11"[..]));
-        let missing = |o: &mut Outline| o.read_device_identification(4, 9);
+        let missing = |o: &mut RequestHeader| o.read_device_identification(4, 9);
         self.expect_status(&[], missing, Status::ILLEGAL_DATA_ADDRESS);
         // The same request as raw bytes of any MEI type.
         let raw = self.request(&[4, 2], |o| o.encapsulated(0x0E, 2));
@@ -182,34 +186,50 @@ impl<L: Line<Task>> Requester<L> {
 
     fn registers_and_bits(&mut self) {
         let words: Vec<u8> = (7..132).flat_map(pattern).collect();
-        self.expect_data(&[], |o| o.set(Form::READ_HOLDING_REGISTERS, 7, 125), &words);
+        self.expect_data(
+            &[],
+            |o| o.set(FunctionSpec::READ_HOLDING_REGISTERS, 7, 125),
+            &words,
+        );
         let others: Vec<u8> = words.iter().map(|byte| !byte).collect();
-        self.expect_data(&[], |o| o.set(Form::READ_INPUT_REGISTERS, 7, 125), &others);
+        self.expect_data(
+            &[],
+            |o| o.set(FunctionSpec::READ_INPUT_REGISTERS, 7, 125),
+            &others,
+        );
         let bit = |address| pattern(address)[1] >> 7;
         let coils = (0..8).fold(0, |byte, i| byte | bit(30 + i) << i);
-        self.expect_data(&[], |o| o.set(Form::READ_COILS, 30, 9), &[coils, bit(38)]);
+        self.expect_data(
+            &[],
+            |o| o.set(FunctionSpec::READ_COILS, 30, 9),
+            &[coils, bit(38)],
+        );
         let inputs = [!coils, 1 - bit(38)];
-        self.expect_data(&[], |o| o.set(Form::READ_DISCRETE_INPUTS, 30, 9), &inputs);
+        self.expect_data(
+            &[],
+            |o| o.set(FunctionSpec::READ_DISCRETE_INPUTS, 30, 9),
+            &inputs,
+        );
         self.expect_status(
             &[],
-            |o| o.set(Form::WRITE_SINGLE_COIL, 30, 0xFF00),
+            |o| o.set(FunctionSpec::WRITE_SINGLE_COIL, 30, 0xFF00),
             Status::OK,
         );
         self.expect_status(
             &[0b101],
-            |o| o.set(Form::WRITE_MULTIPLE_COILS, 31, 3),
+            |o| o.set(FunctionSpec::WRITE_MULTIPLE_COILS, 31, 3),
             Status::OK,
         );
-        self.expect_data(&[], |o| o.set(Form::READ_COILS, 30, 4), &[0b1011]);
+        self.expect_data(&[], |o| o.set(FunctionSpec::READ_COILS, 30, 4), &[0b1011]);
         self.expect_status(
             &[],
-            |o| o.set(Form::WRITE_SINGLE_REGISTER, 9, 0xBEEF),
+            |o| o.set(FunctionSpec::WRITE_SINGLE_REGISTER, 9, 0xBEEF),
             Status::OK,
         );
         let data = [1, 2, 3, 4];
         self.expect_status(
             &data,
-            |o| o.set(Form::WRITE_MULTIPLE_REGISTERS, 10, 2),
+            |o| o.set(FunctionSpec::WRITE_MULTIPLE_REGISTERS, 10, 2),
             Status::OK,
         );
         self.expect_status(
@@ -219,7 +239,7 @@ impl<L: Line<Task>> Requester<L> {
         );
         let all = [0xBE, 0xEF, 7, 8, 3, 0x25];
         self.expect_data(&[7, 8], |o| o.read_write_registers(9, 3, 10, 1), &all);
-        let absent = |o: &mut Outline| o.set(Form::READ_HOLDING_REGISTERS, 60000, 1);
+        let absent = |o: &mut RequestHeader| o.set(FunctionSpec::READ_HOLDING_REGISTERS, 60000, 1);
         self.expect_status(&[], absent, Status::ILLEGAL_DATA_ADDRESS);
     }
 }

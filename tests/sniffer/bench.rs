@@ -1,15 +1,15 @@
 //! A sniffer with its buffer, a clock, and a record of all its events.
 
 use mbm::error::Status;
-use mbm::explain::Line;
 use mbm::frame::{ascii, Framing};
 use mbm::pdu::custom::Function;
-use mbm::sniffer::{Kind, Sniffer, Tap};
+use mbm::sniffer::{EventKind, Sniffer, Tap};
+use mbm::text::TextWriter;
 
 /// A copy of an event.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recorded {
-    pub kind: Kind,
+    pub kind: EventKind,
     pub status: Status,
     pub time: u32,
     pub response_time: u32,
@@ -53,8 +53,8 @@ impl Bench {
             .next(&mut self.buffer, &self.functions, self.now)
         {
             let mut text = [0; 2000];
-            let mut line = Line::new(&mut text);
-            event.explain(&mut line);
+            let mut line = TextWriter::new(&mut text);
+            event.text(&mut line);
             let length = line.finish().unwrap();
             self.events.push(Recorded {
                 kind: event.kind,
@@ -95,7 +95,7 @@ impl Bench {
         self.collect_events();
     }
 
-    pub fn kinds(&self) -> Vec<Kind> {
+    pub fn kinds(&self) -> Vec<EventKind> {
         self.events.iter().map(|event| event.kind).collect()
     }
 
@@ -107,11 +107,11 @@ impl Bench {
     }
 
     /// The kind and PDU of each event, without timeouts.
-    pub fn frames(&self) -> Vec<(Kind, Vec<u8>)> {
+    pub fn frames(&self) -> Vec<(EventKind, Vec<u8>)> {
         let frames = self
             .events
             .iter()
-            .filter(|event| event.kind != Kind::Timeout);
+            .filter(|event| event.kind != EventKind::Timeout);
         frames
             .map(|event| (event.kind, event.pdu.clone()))
             .collect()

@@ -5,7 +5,7 @@ use crate::exchanges::{assert_exchanges, EXCHANGES, READ, READ_REPLY, WRITE};
 use mbm::error::Status;
 use mbm::frame::Framing;
 use mbm::pdu::custom::{Function, Rule};
-use mbm::sniffer::{Kind, Tap};
+use mbm::sniffer::{EventKind, Tap};
 
 #[test]
 fn every_function_is_reported_in_every_framing() {
@@ -25,7 +25,11 @@ fn every_function_is_reported_in_every_framing() {
         bench.wait(2_000_000);
         assert_exchanges(&bench, EXCHANGES);
         for event in &bench.events {
-            let response_time = if event.kind == Kind::Reply { 10_000 } else { 0 };
+            let response_time = if event.kind == EventKind::Reply {
+                10_000
+            } else {
+                0
+            };
             assert_eq!(event.response_time, response_time);
         }
     }
@@ -74,7 +78,7 @@ fn a_frame_in_pieces_with_pauses_is_found() {
         bench.feed(piece);
         bench.wait(16_000);
     }
-    assert_eq!(bench.kinds(), [Kind::Request, Kind::Reply]);
+    assert_eq!(bench.kinds(), [EventKind::Request, EventKind::Reply]);
 }
 
 #[test]
@@ -86,7 +90,12 @@ fn a_repeated_request_means_that_the_first_got_no_reply() {
     bench.wait(10_000);
     bench.feed(&rtu(17, READ_REPLY));
     bench.wait(2_000_000);
-    let kinds = [Kind::Request, Kind::Timeout, Kind::Request, Kind::Reply];
+    let kinds = [
+        EventKind::Request,
+        EventKind::Timeout,
+        EventKind::Request,
+        EventKind::Reply,
+    ];
     assert_eq!(bench.kinds(), kinds);
     assert_eq!(
         bench.events[1].words,
@@ -116,11 +125,11 @@ fn a_frame_equal_to_the_request_is_its_reply_before_the_timeout_and_a_request_af
         bench.wait(1_000_000);
         bench.feed(&rtu(17, pdu));
         let kinds = [
-            Kind::Request,
-            Kind::Reply,
-            Kind::Request,
-            Kind::Timeout,
-            Kind::Request,
+            EventKind::Request,
+            EventKind::Reply,
+            EventKind::Request,
+            EventKind::Timeout,
+            EventKind::Request,
         ];
         assert_eq!(bench.kinds(), kinds);
     }
@@ -139,7 +148,7 @@ fn a_reply_as_long_as_a_request_is_recognised_by_the_pending_request() {
     bench.feed(&rtu(17, &request));
     bench.feed(&rtu(17, &reply));
     bench.feed(&rtu(17, &reply));
-    use Kind::{Reply, Request, Timeout};
+    use EventKind::{Reply, Request, Timeout};
     let kinds = [
         Request, Reply, Request, Reply, Request, Timeout, Request, Reply, Request,
     ];
@@ -157,7 +166,12 @@ fn a_late_reply_is_unpaired_but_described_with_its_request() {
     bench.feed(&rtu(17, READ_REPLY));
     assert_eq!(
         bench.kinds(),
-        [Kind::Request, Kind::Timeout, Kind::Unpaired, Kind::Unpaired]
+        [
+            EventKind::Request,
+            EventKind::Timeout,
+            EventKind::Unpaired,
+            EventKind::Unpaired
+        ]
     );
     assert_eq!(bench.events[2].response_time, 150_000);
     assert_eq!(
@@ -203,7 +217,12 @@ fn a_request_that_looks_like_the_reply_to_an_expired_one_is_a_request() {
     bench.feed(&rtu(17, &request));
     bench.wait(10_000);
     bench.feed(&rtu(17, &[1, 1, 0x15]));
-    let kinds = [Kind::Request, Kind::Timeout, Kind::Request, Kind::Reply];
+    let kinds = [
+        EventKind::Request,
+        EventKind::Timeout,
+        EventKind::Request,
+        EventKind::Reply,
+    ];
     assert_eq!(bench.kinds(), kinds);
 }
 
@@ -215,7 +234,7 @@ fn a_reply_after_the_timeout_is_late_even_if_no_call_came_between() {
     bench.feed(&rtu(17, READ_REPLY));
     assert_eq!(
         bench.kinds(),
-        [Kind::Request, Kind::Timeout, Kind::Unpaired]
+        [EventKind::Request, EventKind::Timeout, EventKind::Unpaired]
     );
 }
 
@@ -225,7 +244,10 @@ fn a_reply_that_does_not_match_its_request_is_unpaired_and_malformed() {
     bench.feed(&rtu(17, READ));
     bench.feed(&rtu(17, &[3, 2, 0, 1]));
     bench.feed(&rtu(17, READ_REPLY));
-    assert_eq!(bench.kinds(), [Kind::Request, Kind::Unpaired, Kind::Reply]);
+    assert_eq!(
+        bench.kinds(),
+        [EventKind::Request, EventKind::Unpaired, EventKind::Reply]
+    );
     assert_eq!(bench.events[1].status, Status::MALFORMED_REPLY);
 }
 
@@ -240,7 +262,10 @@ fn exchanges_of_several_units_in_turn_are_paired() {
     }
     assert_eq!(bench.events.len(), 24);
     for pair in bench.events.chunks(2) {
-        assert_eq!((pair[0].kind, pair[1].kind), (Kind::Request, Kind::Reply));
+        assert_eq!(
+            (pair[0].kind, pair[1].kind),
+            (EventKind::Request, EventKind::Reply)
+        );
         assert_eq!(pair[0].unit, pair[1].unit);
         let address = u16::from_be_bytes([pair[0].pdu[1], pair[0].pdu[2]]);
         assert_eq!(pair[1].asked, Some((address, 1)));
@@ -255,11 +280,11 @@ fn a_request_of_a_second_master_ends_the_wait_for_the_first_reply() {
     bench.feed(&rtu(2, READ_REPLY));
     bench.feed(&rtu(1, READ_REPLY));
     let kinds = [
-        Kind::Request,
-        Kind::Timeout,
-        Kind::Request,
-        Kind::Reply,
-        Kind::Unpaired,
+        EventKind::Request,
+        EventKind::Timeout,
+        EventKind::Request,
+        EventKind::Reply,
+        EventKind::Unpaired,
     ];
     assert_eq!(bench.kinds(), kinds);
     let units: Vec<_> = bench.events.iter().map(|event| event.unit).collect();
@@ -289,14 +314,14 @@ fn sixteen_tcp_requests_can_be_pending() {
     bench.wait(2_000_000);
     assert_eq!(bench.events.len(), 32);
     for event in &bench.events[16..] {
-        assert_eq!(event.kind, Kind::Reply);
+        assert_eq!(event.kind, EventKind::Reply);
         assert_eq!(event.asked, Some((event.transaction, 1)));
     }
     // A 17th request ends the wait for the first reply.
     for transaction in 0..17 {
         bench.feed(&frame(Framing::Tcp, transaction, 17, READ));
     }
-    assert_eq!(bench.events[48].kind, Kind::Timeout);
+    assert_eq!(bench.events[48].kind, EventKind::Timeout);
     assert_eq!(bench.events[48].transaction, 0);
     assert_eq!(bench.events.len(), 50);
 }
@@ -322,12 +347,21 @@ fn two_directions_are_paired_when_their_bytes_are_mixed() {
         bench.wait(10_000);
         bench.feed_at(Tap::Server, &frame(framing, 2, 17, READ_REPLY));
         let kinds = bench.kinds();
-        assert_eq!(kinds[0], Kind::Unpaired, "{framing:?} {kinds:?}");
+        assert_eq!(kinds[0], EventKind::Unpaired, "{framing:?} {kinds:?}");
         assert_eq!(
-            kinds.iter().filter(|kind| **kind == Kind::Request).count(),
+            kinds
+                .iter()
+                .filter(|kind| **kind == EventKind::Request)
+                .count(),
             1
         );
-        assert_eq!(kinds.iter().filter(|kind| **kind == Kind::Reply).count(), 1);
+        assert_eq!(
+            kinds
+                .iter()
+                .filter(|kind| **kind == EventKind::Reply)
+                .count(),
+            1
+        );
         assert_eq!(kinds.len(), 4);
     }
 }
@@ -344,7 +378,12 @@ fn events_of_two_directions_are_reported_in_order_of_time() {
         bench.feed_at(Tap::Client, &frame(Framing::Tcp, 2, 17, READ));
         bench.wait(10_000);
         bench.feed_at(Tap::Server, &frame(Framing::Tcp, 2, 17, READ_REPLY));
-        let kinds = [Kind::Noise, Kind::Unpaired, Kind::Request, Kind::Reply];
+        let kinds = [
+            EventKind::Noise,
+            EventKind::Unpaired,
+            EventKind::Request,
+            EventKind::Reply,
+        ];
         assert_eq!(bench.kinds(), kinds);
         let times: Vec<_> = bench.events.iter().map(|event| event.time).collect();
         assert_eq!(times, [5_000, 5_000, 5_000 + gap, 15_000 + gap]);
@@ -355,16 +394,16 @@ fn events_of_two_directions_are_reported_in_order_of_time() {
 #[test]
 fn a_frame_received_before_a_request_does_not_end_the_wait_for_its_reply() {
     let mut bench = Bench::with_buffer(Framing::Tcp, 2 * Framing::Tcp.max_frame());
-    bench.sniffer.set_patience(60_000_000);
+    bench.sniffer.set_frame_timeout(60_000_000);
     let reply = frame(Framing::Tcp, 1, 17, READ_REPLY);
     bench.feed_at(Tap::Server, &[&[0, 9, 0, 0, 0, 50], &reply[..]].concat());
     bench.now = 1_000_000;
     bench.feed_at(Tap::Client, &frame(Framing::Tcp, 2, 17, READ));
     bench.now = 1_500_000;
     // Now the incomplete frame expires as noise, and the frame within it is reported.
-    bench.sniffer.set_patience(1_000_000);
+    bench.sniffer.set_frame_timeout(1_000_000);
     bench.collect_events();
-    let kinds = [Kind::Request, Kind::Noise, Kind::Unpaired];
+    let kinds = [EventKind::Request, EventKind::Noise, EventKind::Unpaired];
     assert_eq!(bench.kinds(), kinds);
 }
 
@@ -382,7 +421,10 @@ fn broadcasts_and_listen_only_are_never_timeouts() {
         bench.feed(&frame(framing, 2, 17, READ));
         bench.feed(&frame(framing, 2, 17, READ_REPLY));
         bench.wait(3_000_000);
-        assert_eq!(bench.kinds(), [Kind::Request, Kind::Request, Kind::Reply]);
+        assert_eq!(
+            bench.kinds(),
+            [EventKind::Request, EventKind::Request, EventKind::Reply]
+        );
     }
 }
 
@@ -391,7 +433,7 @@ fn a_broadcast_that_is_repeated_is_a_request_each_time() {
     let mut bench = Bench::new(Framing::Rtu);
     bench.feed(&rtu(0, WRITE));
     bench.feed(&rtu(0, WRITE));
-    assert_eq!(bench.kinds(), [Kind::Request; 2]);
+    assert_eq!(bench.kinds(), [EventKind::Request; 2]);
 }
 
 #[test]
@@ -402,7 +444,7 @@ fn a_request_times_out_exactly_when_the_timeout_has_passed() {
     bench.wait(49_999);
     assert_eq!(bench.events.len(), 1);
     bench.wait(1);
-    assert_eq!(bench.kinds(), [Kind::Request, Kind::Timeout]);
+    assert_eq!(bench.kinds(), [EventKind::Request, EventKind::Timeout]);
 }
 
 #[test]
@@ -429,7 +471,7 @@ fn a_frame_of_a_declared_function_is_found_without_silence() {
     bench.functions = vec![own];
     bench.feed(&rtu(17, &[0x55, 1, 2]));
     bench.feed(&rtu(17, &[0x55, 3, 7, 8, 9]));
-    assert_eq!(bench.kinds(), [Kind::Request, Kind::Reply]);
+    assert_eq!(bench.kinds(), [EventKind::Request, EventKind::Reply]);
     assert_eq!(bench.events[0].status, Status::OK);
 }
 
@@ -440,6 +482,6 @@ fn a_frame_between_silences_may_be_longer_than_its_byte_count() {
     bench.wait(10_000);
     bench.feed(&rtu(17, &[0x11, 1, 0xFF, b'm', b'b', b'm']));
     bench.wait(10_000);
-    assert_eq!(bench.kinds(), [Kind::Request, Kind::Reply]);
+    assert_eq!(bench.kinds(), [EventKind::Request, EventKind::Reply]);
     assert_eq!(bench.events[1].status, Status::OK);
 }

@@ -1,7 +1,7 @@
 //! A request and a reply of every function.
 
 use crate::bench::Bench;
-use mbm::sniffer::Kind;
+use mbm::sniffer::EventKind;
 
 pub const READ: &[u8] = &[3, 0, 107, 0, 3];
 pub const READ_REPLY: &[u8] = &[3, 6, 0x02, 0x2B, 0, 0, 0, 100];
@@ -103,12 +103,12 @@ pub fn assert_exchanges(bench: &Bench, exchanges: &[(&[u8], &[u8], &str, &str)])
     let mut wanted = Vec::new();
     for (request, reply, asked, answered) in exchanges {
         wanted.push((
-            Kind::Request,
+            EventKind::Request,
             request.to_vec(),
             format!("unit 17  request    {asked}"),
         ));
         wanted.push((
-            Kind::Reply,
+            EventKind::Reply,
             reply.to_vec(),
             format!("unit 17  reply      {answered}"),
         ));

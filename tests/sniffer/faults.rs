@@ -3,9 +3,9 @@
 use crate::bench::{frame, rtu, Bench};
 use crate::exchanges::{READ, READ_REPLY};
 use mbm::error::Status;
-use mbm::explain::Line;
 use mbm::frame::Framing;
-use mbm::sniffer::{Kind, Tap};
+use mbm::sniffer::{EventKind, Tap};
+use mbm::text::TextWriter;
 
 #[test]
 fn exceptions_are_described_with_their_code() {
@@ -28,7 +28,11 @@ fn exceptions_are_described_with_their_code() {
             bench.feed(&frame(framing, 1, 17, &[0x83, code]));
             assert_eq!(
                 bench.kinds(),
-                [Kind::Request, Kind::Exception, Kind::Unpaired]
+                [
+                    EventKind::Request,
+                    EventKind::Exception,
+                    EventKind::Unpaired
+                ]
             );
             let wanted = format!("03 read holding registers: exception {words}");
             assert_eq!(
@@ -49,7 +53,7 @@ fn a_request_that_a_server_must_refuse_is_reported_as_malformed() {
     let mut bench = Bench::new(Framing::Rtu);
     bench.feed(&rtu(17, &[3, 0, 0, 0, 200]));
     bench.feed(&rtu(17, &[0x83, 3]));
-    assert_eq!(bench.kinds(), [Kind::Request, Kind::Exception]);
+    assert_eq!(bench.kinds(), [EventKind::Request, EventKind::Exception]);
     assert_eq!(bench.events[0].status, Status::ILLEGAL_DATA_VALUE);
     assert_eq!(
         bench.events[0].words,
@@ -62,7 +66,7 @@ fn a_byte_that_cannot_begin_a_reply_is_reported_at_once() {
     let mut bench = Bench::new(Framing::Rtu);
     // No reply has unit 0.
     bench.feed_at(Tap::Server, &[0]);
-    assert_eq!(bench.kinds(), [Kind::Noise]);
+    assert_eq!(bench.kinds(), [EventKind::Noise]);
 }
 
 #[test]
@@ -77,7 +81,7 @@ fn a_frame_of_unknown_length_with_a_pause_is_reported_with_its_last_byte() {
         bench.feed(&[*byte]);
         bench.now += 200;
     }
-    assert_eq!(bench.kinds(), [Kind::Request]);
+    assert_eq!(bench.kinds(), [EventKind::Request]);
 }
 
 #[test]
@@ -98,7 +102,7 @@ fn a_damaged_frame_is_reported_and_the_next_one_is_found() {
             }
             bench.wait(100_000);
             let found: Vec<_> = bench.kinds();
-            use Kind::{BadCrc, Reply, Request, Timeout, Unpaired};
+            use EventKind::{BadCrc, Reply, Request, Timeout, Unpaired};
             let wanted = match damaged {
                 0 => vec![BadCrc, Unpaired, Request, Reply],
                 1 => vec![Request, BadCrc, Timeout, Request, Reply],
@@ -130,7 +134,7 @@ fn an_ascii_frame_with_a_wrong_lrc_is_a_damaged_frame() {
     frame[4] = b'4';
     bench.feed(&frame);
     bench.feed(&self::frame(Framing::Ascii, 0, 17, READ));
-    assert_eq!(bench.kinds(), [Kind::BadCrc, Kind::Request]);
+    assert_eq!(bench.kinds(), [EventKind::BadCrc, EventKind::Request]);
     assert_eq!((bench.events[0].unit, bench.events[0].function), (17, 4));
     assert_eq!(bench.events[0].length, 17);
 }
@@ -149,7 +153,11 @@ fn ascii_frames_without_an_end_or_with_other_characters_are_noise() {
         bench.feed(bad);
         bench.feed(&good);
         bench.wait(100);
-        assert_eq!(bench.kinds(), [Kind::Noise, Kind::Request], "{bad:?}");
+        assert_eq!(
+            bench.kinds(),
+            [EventKind::Noise, EventKind::Request],
+            "{bad:?}"
+        );
         assert_eq!(bench.events[0].length, bad.len());
         assert_eq!(bench.events[0].frame, bad);
     }
@@ -162,7 +170,7 @@ fn another_end_character_of_ascii_can_be_set() {
     let mut frame = frame(Framing::Ascii, 0, 17, READ);
     *frame.last_mut().unwrap() = b'!';
     bench.feed(&frame);
-    assert_eq!(bench.kinds(), [Kind::Request]);
+    assert_eq!(bench.kinds(), [EventKind::Request]);
 }
 
 #[test]
@@ -180,11 +188,11 @@ fn noise_before_and_after_a_frame_is_counted() {
         bench.feed(&[0xFF, 0xFF]);
         bench.wait(100_000);
         let kinds = [
-            Kind::Noise,
-            Kind::Request,
-            Kind::Noise,
-            Kind::Reply,
-            Kind::Noise,
+            EventKind::Noise,
+            EventKind::Request,
+            EventKind::Noise,
+            EventKind::Reply,
+            EventKind::Noise,
         ];
         assert_eq!(bench.kinds(), kinds);
         assert_eq!(bench.words()[0], "noise, 3 bytes");
@@ -200,7 +208,7 @@ fn frames_are_found_in_a_tcp_stream_that_is_joined_in_the_middle_of_a_frame() {
     bench.feed(&tail);
     bench.feed(&frame(Framing::Tcp, 0x1234, 17, READ));
     bench.wait(100);
-    assert_eq!(bench.kinds(), [Kind::Noise, Kind::Request]);
+    assert_eq!(bench.kinds(), [EventKind::Noise, EventKind::Request]);
     assert_eq!(bench.events[0].length, 4);
 }
 
@@ -216,7 +224,12 @@ fn times_are_right_when_the_clock_wraps() {
     bench.wait(1_000_000);
     assert_eq!(
         bench.kinds(),
-        [Kind::Request, Kind::Reply, Kind::Request, Kind::Timeout]
+        [
+            EventKind::Request,
+            EventKind::Reply,
+            EventKind::Request,
+            EventKind::Timeout
+        ]
     );
     assert_eq!(bench.events[1].response_time, 10_000);
     assert_eq!(bench.events[3].response_time, 1_000_000);
@@ -237,11 +250,11 @@ fn a_frame_longer_than_the_buffer_is_reported_and_the_next_one_is_found() {
         let events = &bench.events;
         let good: Vec<_> = kinds
             .iter()
-            .filter(|kind| **kind != Kind::Noise && **kind != Kind::Timeout)
+            .filter(|kind| **kind != EventKind::Noise && **kind != EventKind::Timeout)
             .collect();
         assert_eq!(
             good,
-            [&Kind::Request, &Kind::Request, &Kind::Reply],
+            [&EventKind::Request, &EventKind::Request, &EventKind::Reply],
             "{framing:?} {:?}",
             bench.words()
         );
@@ -250,7 +263,7 @@ fn a_frame_longer_than_the_buffer_is_reported_and_the_next_one_is_found() {
             .any(|event| event.status == Status::BUFFER_TOO_SMALL));
         let noise: usize = events
             .iter()
-            .filter(|event| event.kind == Kind::Noise)
+            .filter(|event| event.kind == EventKind::Noise)
             .map(|event| event.length)
             .sum();
         assert_eq!(noise, frame(framing, 1, 17, &long).len());
@@ -264,8 +277,8 @@ fn a_buffer_too_small_for_the_text_is_reported() {
     bench.sniffer.feed(&mut bench.buffer, Tap::Both, &bytes, 0);
     let event = bench.sniffer.next(&mut bench.buffer, &[], 0).unwrap();
     let mut text = [0xEE; 20];
-    let mut line = Line::new(&mut text);
-    event.explain(&mut line);
+    let mut line = TextWriter::new(&mut text);
+    event.text(&mut line);
     assert_eq!(line.finish(), Err(Status::BUFFER_TOO_SMALL));
     assert_eq!(&text, b"unit 17  request   \0");
 }
@@ -277,7 +290,7 @@ fn an_exception_with_an_invalid_code_is_not_a_request() {
         bench.feed(&frame(framing, 1, 17, READ));
         bench.feed(&frame(framing, 2, 18, &[0x83, 0]));
         bench.wait(100);
-        assert_eq!(bench.kinds(), [Kind::Request, Kind::Unpaired]);
+        assert_eq!(bench.kinds(), [EventKind::Request, EventKind::Unpaired]);
         assert_eq!(bench.events[1].status, Status::MALFORMED_REPLY);
     }
 }

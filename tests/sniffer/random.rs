@@ -4,7 +4,7 @@ use crate::bench::{frame, rtu, Bench};
 use crate::exchanges::EXCHANGES;
 use mbm::frame::checksum::crc16;
 use mbm::frame::Framing;
-use mbm::sniffer::{Kind, Tap};
+use mbm::sniffer::{EventKind, Tap};
 use proptest::prelude::*;
 
 /// For each exchange: noise before it, its index, and the silence after each frame.
@@ -46,8 +46,8 @@ proptest! {
             bytes.extend(before);
             bytes.extend(rtu(17, request));
             bytes.extend(rtu(17, reply));
-            wanted.push((Kind::Request, request.to_vec()));
-            wanted.push((Kind::Reply, reply.to_vec()));
+            wanted.push((EventKind::Request, request.to_vec()));
+            wanted.push((EventKind::Reply, reply.to_vec()));
         }
         prop_assume!(!is_accident(&bytes, &noise));
         let mut bench = Bench::new(Framing::Rtu);
@@ -59,7 +59,7 @@ proptest! {
         let found: Vec<_> = bench
             .frames()
             .into_iter()
-            .filter(|(kind, _)| !matches!(kind, Kind::Noise | Kind::BadCrc))
+            .filter(|(kind, _)| !matches!(kind, EventKind::Noise | EventKind::BadCrc))
             .collect();
         prop_assert_eq!(found, wanted);
         let reported: usize = bench.events.iter().map(|event| event.length).sum();
@@ -80,8 +80,8 @@ proptest! {
             bench.feed(before);
             bench.wait(5_000 + silence);
             for (kind, frame, pdu) in [
-                (Kind::Request, request_frame, request),
-                (Kind::Reply, reply_frame, reply),
+                (EventKind::Request, request_frame, request),
+                (EventKind::Reply, reply_frame, reply),
             ] {
                 bench.feed(&frame);
                 bench.wait(5_000 + silence);
@@ -93,7 +93,7 @@ proptest! {
         let found: Vec<_> = bench
             .frames()
             .into_iter()
-            .filter(|(kind, _)| !matches!(kind, Kind::Noise | Kind::BadCrc))
+            .filter(|(kind, _)| !matches!(kind, EventKind::Noise | EventKind::BadCrc))
             .collect();
         prop_assert_eq!(found, wanted);
         let reported: usize = bench.events.iter().map(|event| event.length).sum();
@@ -187,7 +187,7 @@ proptest! {
             if !is_tcp {
                 bytes.extend(noise.bytes());
             }
-            for (kind, pdu) in [(Kind::Request, request), (Kind::Reply, reply)] {
+            for (kind, pdu) in [(EventKind::Request, request), (EventKind::Reply, reply)] {
                 bytes.extend(frame(framing, index as u16, 17, pdu));
                 wanted.push((kind, pdu.to_vec()));
             }
@@ -200,7 +200,7 @@ proptest! {
         let found: Vec<_> = bench
             .frames()
             .into_iter()
-            .filter(|(kind, _)| *kind != Kind::Noise)
+            .filter(|(kind, _)| *kind != EventKind::Noise)
             .collect();
         prop_assert_eq!(found, wanted);
         let reported: usize = bench.events.iter().map(|event| event.length).sum();

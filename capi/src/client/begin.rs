@@ -1,7 +1,7 @@
 //! A client of each kind of line.
 
 use super::kind;
-use super::object::{line, mbm_client, shared, Kind, SerialLine, TcpLine};
+use super::object::{line, mbm_client, queue, SerialTransport, TcpTransport, TransportKind};
 use crate::framing::{is_delimiter, MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
 use crate::pointers::{self, CObject};
 use crate::port::{countable, mbm_port};
@@ -18,7 +18,7 @@ unsafe fn begin(
     port: *const mbm_port,
     frame: *mut u8,
     frame_bytes: u16,
-    kind: &'static Kind,
+    kind: &'static TransportKind,
 ) -> u8 {
     // SAFETY: as the header demands: each is NULL or what it says, and the object is
     // storage, zeroed or begun; zero is a value of every field but for the kind, which
@@ -36,12 +36,12 @@ unsafe fn begin(
                 }
                 let object = pointers::object(pointer);
                 (*object).kind = kind;
-                (*object).shared.connected = true;
-                kind.settings(object).preset();
+                (*object).queue.connected = true;
+                kind.settings(object).set_default_if_zero();
                 (*kind.port(object)).copy(port);
-                let means = kind.means(object);
-                means.frame = frame;
-                means.frame_bytes = countable(frame_bytes);
+                let storage = kind.storage(object);
+                storage.frame = frame;
+                storage.frame_bytes = countable(frame_bytes);
                 pointers::calling(pointer, || (kind.start)(object));
                 Status::OK
             }
@@ -67,12 +67,12 @@ unsafe fn give_up(client: *mut mbm_client) -> Status {
             return status;
         }
         let object = pointers::object(client);
-        if (*object).shared.lent {
+        if (*object).queue.suspended {
             return Status::BUSY;
         }
         mbm_client::mark(client).write(pointers::CALLING);
         ((*(*object).kind).release)(object, None);
-        shared(object).cancel_all();
+        queue(object).cancel_all();
         // Not by memset: libc's is larger than this loop, and most images have no other use
         // for it.
         let mut word = client.cast::<usize>();
@@ -152,10 +152,10 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
             if (*(*object).kind).framing != MBM_FRAMING_ASCII || !is_delimiter(character) {
                 return Status::INVALID_ARGUMENT;
             }
-            if !shared(object).is_idle() {
+            if !queue(object).is_idle() {
                 return Status::BUSY;
             }
-            let engine = &mut line::<SerialLine>(object).engine;
+            let engine = &mut line::<SerialTransport>(object).engine;
             engine.request().set_ascii(character);
             Status::OK
         })
@@ -212,9 +212,9 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
     unsafe {
         let status = begin(client, port, incoming, incomingBytes, &kind::TCP);
         if status == Status::OK.code() {
-            let means = &mut line::<TcpLine>(pointers::object(client)).means;
-            means.outgoing = outgoing;
-            means.outgoing_bytes = countable(outgoingBytes);
+            let storage = &mut line::<TcpTransport>(pointers::object(client)).storage;
+            storage.outgoing = outgoing;
+            storage.outgoing_bytes = countable(outgoingBytes);
         }
         status
     }
@@ -234,7 +234,7 @@ pub unsafe extern "C" fn mbm_client_setInFlight(client: *mut mbm_client, most: u
     unsafe {
         pointers::with(client, |object| match ((*(*object).kind).framing, most) {
             (MBM_FRAMING_TCP, 1..=super::MBM_CLIENT_DEPTH) => {
-                line::<TcpLine>(object).limit(most);
+                line::<TcpTransport>(object).limit(most);
                 Status::OK
             }
             (MBM_FRAMING_RTU | MBM_FRAMING_ASCII, 1) => Status::OK,

@@ -3,50 +3,50 @@
 
 #[cfg(not(any(target_os = "none", mbm_firmware)))]
 use super::object::mbm_client;
-use super::object::{line, Kind, Object, SerialLine, TcpLine};
-use super::request::Lent;
-use super::storage::LentByC;
+use super::object::{line, Object, SerialTransport, TcpTransport, TransportKind};
+use super::request::RequestPtr;
+use super::storage::ClientBuffers;
 use crate::framing::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
 use crate::port::mbm_port;
 use core::mem::offset_of;
-use mbm::client::{ClientEngine, Line};
+use mbm::client::{ClientEngine, Transport};
 #[cfg(not(any(target_os = "none", mbm_firmware)))]
 use mbm::error::Status;
 
 const LINE: usize = offset_of!(Object, line);
 
-const fn serial(start: unsafe fn(*mut Object), framing: u8, least: u8) -> Kind {
-    type Engine = ClientEngine<mbm_port, LentByC, Lent>;
-    let engine = LINE + offset_of!(SerialLine, engine);
-    Kind {
+const fn serial(start: unsafe fn(*mut Object), framing: u8, least: u8) -> TransportKind {
+    type Engine = ClientEngine<mbm_port, ClientBuffers, RequestPtr>;
+    let engine = LINE + offset_of!(SerialTransport, engine);
+    TransportKind {
         #[cfg(any(target_os = "none", mbm_firmware))]
-        advance: advance::<SerialLine>,
+        advance: advance::<SerialTransport>,
         #[cfg(not(any(target_os = "none", mbm_firmware)))]
-        poll: poll::<SerialLine>,
-        release: release::<SerialLine>,
+        poll: poll::<SerialTransport>,
+        release: release::<SerialTransport>,
         start,
         port: (engine + offset_of!(Engine, port)) as u16,
         settings: (engine + offset_of!(Engine, settings)) as u16,
-        means: (engine + offset_of!(Engine, storage)) as u16,
+        storage: (engine + offset_of!(Engine, storage)) as u16,
         least,
         framing,
     }
 }
 
-pub(super) static RTU: Kind = serial(start_rtu, MBM_FRAMING_RTU, 8);
-pub(super) static RTU_OVER_TCP: Kind = serial(start_stream, MBM_FRAMING_RTU, 8);
+pub(super) static RTU: TransportKind = serial(start_rtu, MBM_FRAMING_RTU, 8);
+pub(super) static RTU_OVER_TCP: TransportKind = serial(start_stream, MBM_FRAMING_RTU, 8);
 /// The shortest request and response, a function code and two words, are 17 characters.
-pub(super) static ASCII: Kind = serial(start_ascii, MBM_FRAMING_ASCII, 17);
-pub(super) static TCP: Kind = Kind {
+pub(super) static ASCII: TransportKind = serial(start_ascii, MBM_FRAMING_ASCII, 17);
+pub(super) static TCP: TransportKind = TransportKind {
     #[cfg(any(target_os = "none", mbm_firmware))]
-    advance: advance::<TcpLine>,
+    advance: advance::<TcpTransport>,
     #[cfg(not(any(target_os = "none", mbm_firmware)))]
-    poll: poll::<TcpLine>,
-    release: release::<TcpLine>,
+    poll: poll::<TcpTransport>,
+    release: release::<TcpTransport>,
     start: start_tcp,
-    port: (LINE + offset_of!(TcpLine, port)) as u16,
-    settings: (LINE + offset_of!(TcpLine, settings)) as u16,
-    means: (LINE + offset_of!(TcpLine, means)) as u16,
+    port: (LINE + offset_of!(TcpTransport, port)) as u16,
+    settings: (LINE + offset_of!(TcpTransport, settings)) as u16,
+    storage: (LINE + offset_of!(TcpTransport, storage)) as u16,
     least: 9,
     framing: MBM_FRAMING_TCP,
 };
@@ -54,23 +54,27 @@ pub(super) static TCP: Kind = Kind {
 /// # Safety
 /// As for [`turns`](super::poll::turns), with a client of the kind `L`.
 #[cfg(not(any(target_os = "none", mbm_firmware)))]
-unsafe fn poll<L: Line<Lent>>(client: *mut mbm_client) -> Status {
+unsafe fn poll<L: Transport<RequestPtr>>(client: *mut mbm_client) -> Status {
     // SAFETY: as the caller promises.
     unsafe { super::poll::turns(client, advance::<L>) }
 }
 
 /// # Safety
 /// As for [`line`].
-unsafe fn advance<L: Line<Lent>>(object: *mut Object, now: u32, fresh: bool) -> Option<Lent> {
+unsafe fn advance<L: Transport<RequestPtr>>(
+    object: *mut Object,
+    now: u32,
+    fresh: bool,
+) -> Option<RequestPtr> {
     // SAFETY: as the caller promises; line and the rest are apart.
-    unsafe { line::<L>(object).advance(&mut (*object).shared, now, fresh) }
+    unsafe { line::<L>(object).advance(&mut (*object).queue, now, fresh) }
 }
 
 /// # Safety
 /// As for [`line`].
-unsafe fn release<L: Line<Lent>>(object: *mut Object, job: Option<&Lent>) {
+unsafe fn release<L: Transport<RequestPtr>>(object: *mut Object, request: Option<&RequestPtr>) {
     // SAFETY: as the caller promises.
-    unsafe { line::<L>(object).release(job) }
+    unsafe { line::<L>(object).release(request) }
 }
 
 /// # Safety
@@ -78,8 +82,8 @@ unsafe fn release<L: Line<Lent>>(object: *mut Object, job: Option<&Lent>) {
 unsafe fn start_rtu(object: *mut Object) {
     // SAFETY: as the caller promises.
     unsafe {
-        (*object).shared.broadcasts = true;
-        line::<SerialLine>(object).engine.line_used();
+        (*object).queue.has_broadcast = true;
+        line::<SerialTransport>(object).engine.line_used();
     }
 }
 
@@ -88,7 +92,7 @@ unsafe fn start_rtu(object: *mut Object) {
 unsafe fn start_stream(object: *mut Object) {
     // SAFETY: as the caller promises.
     unsafe {
-        let line = line::<SerialLine>(object);
+        let line = line::<SerialTransport>(object);
         line.set_stream();
         line.engine.line_used();
     }
@@ -100,7 +104,7 @@ unsafe fn start_ascii(object: *mut Object) {
     // SAFETY: as the caller promises.
     unsafe {
         start_rtu(object);
-        line::<SerialLine>(object).set_ascii();
+        line::<SerialTransport>(object).set_ascii();
     }
 }
 
@@ -109,7 +113,7 @@ unsafe fn start_ascii(object: *mut Object) {
 unsafe fn start_tcp(object: *mut Object) {
     // SAFETY: as the caller promises.
     unsafe {
-        (*object).shared.has_ids = true;
-        line::<TcpLine>(object).limit(super::MBM_CLIENT_DEPTH);
+        (*object).queue.has_transaction_ids = true;
+        line::<TcpTransport>(object).limit(super::MBM_CLIENT_DEPTH);
     }
 }

@@ -2,7 +2,7 @@
 
 mod begin;
 mod kind;
-mod line;
+mod link;
 mod object;
 mod poll;
 mod request;
@@ -11,7 +11,7 @@ mod settings;
 mod storage;
 
 pub use begin::*;
-pub use line::*;
+pub use link::*;
 pub use object::mbm_client;
 pub use poll::*;
 pub use request::mbm_clientRequest;

@@ -1,13 +1,13 @@
 //! The object that C calls a client, and the line in it.
 
-use super::request::Lent;
-use super::storage::LentByC;
+use super::request::RequestPtr;
+use super::storage::ClientBuffers;
 use super::MBM_CLIENT_DEPTH;
 use crate::pointers::CObject;
 use crate::port::mbm_port;
 use core::ffi::c_void;
 use core::mem::ManuallyDrop;
-use mbm::client::{Serial, Shared, Tcp};
+use mbm::client::{RequestQueue, Serial, Tcp};
 use mbm::engine::Settings;
 #[cfg(not(any(target_os = "none", mbm_firmware)))]
 use mbm::error::Status;
@@ -40,18 +40,18 @@ pub struct mbm_client {
 pub struct Object {
     mark: u8,
     pub(super) polling: bool,
-    pub(super) kind: *const Kind,
-    pub(super) shared: Shared<Lent, DEPTH>,
-    pub(super) line: Lines,
+    pub(super) kind: *const TransportKind,
+    pub(super) queue: RequestQueue<RequestPtr, DEPTH>,
+    pub(super) line: Transports,
 }
 
 const _: () = {
-    let room = size_of::<mbm_client>();
+    let space = size_of::<mbm_client>();
     let used = size_of::<Object>();
     assert!(align_of::<mbm_client>() >= align_of::<Object>());
-    assert!(used <= room);
+    assert!(used <= space);
     // Hiding the fields may waste 5 % where RAM is scarce.
-    assert!(size_of::<usize>() > 4 || (room - used) * 20 <= room);
+    assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
 };
 
 // SAFETY: the mark is a field of its own.
@@ -74,45 +74,45 @@ unsafe impl CObject for mbm_client {
 ///
 /// # Safety
 /// `object` is begun, and nothing else uses its client while the reference lives.
-pub(super) unsafe fn shared<'a>(object: *mut Object) -> &'a mut Shared<Lent, DEPTH> {
+pub(super) unsafe fn queue<'a>(object: *mut Object) -> &'a mut RequestQueue<RequestPtr, DEPTH> {
     // SAFETY: as the caller promises.
-    unsafe { &mut (*object).shared }
+    unsafe { &mut (*object).queue }
 }
 
-pub(super) type SerialLine = Serial<mbm_port, LentByC, Lent>;
-pub(super) type TcpLine = Tcp<mbm_port, LentByC>;
+pub(super) type SerialTransport = Serial<mbm_port, ClientBuffers, RequestPtr>;
+pub(super) type TcpTransport = Tcp<mbm_port, ClientBuffers>;
 
 /// Room for the line of any kind.
 #[repr(C)]
-pub(super) union Lines {
-    serial: ManuallyDrop<SerialLine>,
-    tcp: ManuallyDrop<TcpLine>,
+pub(super) union Transports {
+    serial: ManuallyDrop<SerialTransport>,
+    tcp: ManuallyDrop<TcpTransport>,
 }
 
-/// As [`Line::advance`].
-pub(super) type Advance = unsafe fn(*mut Object, now: u32, fresh: bool) -> Option<Lent>;
+/// As [`Transport::advance`].
+pub(super) type Advance = unsafe fn(*mut Object, now: u32, fresh: bool) -> Option<RequestPtr>;
 
 /// What differs from one kind of line to the next.
-pub(super) struct Kind {
+pub(super) struct TransportKind {
     #[cfg(any(target_os = "none", mbm_firmware))]
     pub(super) advance: Advance,
     /// As [`turns`](super::poll::turns).
     #[cfg(not(any(target_os = "none", mbm_firmware)))]
     pub(super) poll: unsafe fn(*mut mbm_client) -> Status,
-    /// As [`Line::release`].
-    pub(super) release: unsafe fn(*mut Object, Option<&Lent>),
+    /// As [`Transport::release`].
+    pub(super) release: unsafe fn(*mut Object, Option<&RequestPtr>),
     /// Completes a client that was just begun.
     pub(super) start: unsafe fn(*mut Object),
     /// Where in an object its port, its settings and what is lent to it stand.
     pub(super) port: u16,
     pub(super) settings: u16,
-    pub(super) means: u16,
+    pub(super) storage: u16,
     /// The least that the frame buffer has.
     pub(super) least: u8,
     pub(super) framing: u8,
 }
 
-impl Kind {
+impl TransportKind {
     /// # Safety
     /// As for [`line`], of this kind.
     pub(super) unsafe fn port(&self, object: *mut Object) -> *mut mbm_port {
@@ -129,9 +129,9 @@ impl Kind {
 
     /// # Safety
     /// As for [`line`], of this kind.
-    pub(super) unsafe fn means<'a>(&self, object: *mut Object) -> &'a mut LentByC {
+    pub(super) unsafe fn storage<'a>(&self, object: *mut Object) -> &'a mut ClientBuffers {
         // SAFETY: as the caller promises; every kind has it there.
-        unsafe { &mut *object.byte_add(self.means.into()).cast() }
+        unsafe { &mut *object.byte_add(self.storage.into()).cast() }
     }
 }
 
@@ -148,18 +148,18 @@ pub(super) unsafe fn line<'a, L>(object: *mut Object) -> &'a mut L {
 /// Does something with the line of an object, whatever its kind. Only functions that few
 /// programs call use it, so most images carry the code of one kind of line.
 /// Unsafe as [`line`] is.
-macro_rules! on_line {
+macro_rules! on_transport {
     ($object:expr, $line:ident => $action:expr) => {
         match (*(*$object).kind).framing {
             $crate::framing::MBM_FRAMING_TCP => {
-                let $line = $crate::client::object::line::<TcpLine>($object);
+                let $line = $crate::client::object::line::<TcpTransport>($object);
                 $action
             }
             _ => {
-                let $line = $crate::client::object::line::<SerialLine>($object);
+                let $line = $crate::client::object::line::<SerialTransport>($object);
                 $action
             }
         }
     };
 }
-pub(super) use on_line;
+pub(super) use on_transport;

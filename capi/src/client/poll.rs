@@ -1,10 +1,12 @@
 //! Moving a client's requests on, and giving them up.
 
-use super::object::{mbm_client, on_line, shared, Advance, Object, SerialLine, TcpLine};
-use super::request::{mbm_clientRequest, Lent};
+use super::object::{
+    mbm_client, on_transport, queue, Advance, Object, SerialTransport, TcpTransport,
+};
+use super::request::{mbm_clientRequest, RequestPtr};
 use super::MBM_CLIENT_DEPTH;
 use crate::{pointers, port};
-use mbm::client::{Job as _, Line as _};
+use mbm::client::{ClientRequest as _, Transport as _};
 use mbm::error::Status;
 
 /// The time on the clock of a client's port.
@@ -31,7 +33,7 @@ pub unsafe extern "C" fn mbm_client_poll(client: *mut mbm_client) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         pointers::with(client, |object| {
-            if (*object).polling || (*object).shared.lent {
+            if (*object).polling || (*object).queue.suspended {
                 return Status::BUSY;
             }
             let kind = (*object).kind;
@@ -70,7 +72,7 @@ pub(super) unsafe fn turns(client: *mut mbm_client, advance: Advance) -> Status 
             turns -= 1;
         }
         (*object).polling = false;
-        if (*object).shared.is_empty() {
+        if (*object).queue.is_empty() {
             Status::OK
         } else {
             Status::PENDING
@@ -95,7 +97,7 @@ pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
             Status::OK => pointers::calling(client, || {
                 let object = pointers::object(client);
                 let now = now(object);
-                on_line!(object, line => line.poll_delay(&(*object).shared, now))
+                on_transport!(object, line => line.poll_delay(&(*object).queue, now))
             }),
             Status::BUSY => 0,
             _ => u32::MAX,
@@ -110,7 +112,7 @@ pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_pending(client: *const mbm_client) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { pointers::ask(client, 0, |object| shared(object).pending() as u8) }
+    unsafe { pointers::ask(client, 0, |object| queue(object).pending() as u8) }
 }
 
 /// Gives a request up. It is yours again at once, with the status MBM_CANCELLED;
@@ -128,13 +130,13 @@ pub unsafe extern "C" fn mbm_client_cancel(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        pointers::with(client, |object| match Lent::new(request) {
+        pointers::with(client, |object| match RequestPtr::new(request) {
             None => Status::INVALID_ARGUMENT,
-            Some(request) => match shared(object).withdraw(|job| *job == request) {
-                Some(job) => {
-                    if job.ticket().is_sent() {
+            Some(request) => match queue(object).cancel_one(|queued| *queued == request) {
+                Some(request) => {
+                    if request.state().is_sent() {
                         let release = (*(*object).kind).release;
-                        pointers::calling(client, || release(object, Some(&job)));
+                        pointers::calling(client, || release(object, Some(&request)));
                     }
                     Status::OK
                 }
@@ -153,5 +155,5 @@ pub unsafe extern "C" fn mbm_client_cancel(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_wireTransaction(request: *const mbm_clientRequest) -> u16 {
     // SAFETY: as the header demands: NULL, or a request that is zeroed or was used.
-    unsafe { Lent::new(request.cast_mut()).map_or(0, |request| request.ticket().wire()) }
+    unsafe { RequestPtr::new(request.cast_mut()).map_or(0, |request| request.state().wire()) }
 }

@@ -5,7 +5,7 @@ use core::mem::offset_of;
 use core::ptr::NonNull;
 #[cfg(not(any(target_os = "none", mbm_firmware)))]
 use mbm::bytes::copy_words;
-use mbm::client::{Job, Ticket};
+use mbm::client::{ClientRequest, RequestState};
 
 /// A request to a device, and what comes of it. Yours, and zero before you set
 /// the fields that you need; it may be used again and again.
@@ -47,47 +47,53 @@ pub struct mbm_clientRequest {
 
 /// What lies behind an `mbm_clientRequest`.
 #[repr(C)]
-pub(super) struct Inside {
+pub(super) struct RequestFields {
     done: Option<unsafe extern "C" fn(context: *mut c_void, request: *mut mbm_clientRequest)>,
     context: *mut c_void,
     pub(super) data: *const u8,
     pub(super) reply: *mut u8,
-    pub(super) ticket: Ticket,
+    pub(super) state: RequestState,
 }
 
 const _: () = {
-    const TICKET: usize = offset_of!(Inside, ticket);
-    assert!(size_of::<Inside>() <= size_of::<mbm_clientRequest>());
-    assert!(align_of::<Inside>() <= align_of::<mbm_clientRequest>());
-    assert!(size_of::<mbm_clientRequest>() - size_of::<Inside>() <= 4);
-    assert!(offset_of!(mbm_clientRequest, replyBytes) == TICKET + offset_of!(Ticket, capacity));
-    assert!(offset_of!(mbm_clientRequest, transaction) == TICKET + offset_of!(Ticket, transaction));
-    assert!(offset_of!(mbm_clientRequest, unit) == TICKET + offset_of!(Ticket, unit));
-    assert!(offset_of!(mbm_clientRequest, status) == TICKET + offset_of!(Ticket, status));
-    assert!(offset_of!(mbm_clientRequest, exception) == TICKET + offset_of!(Ticket, exception));
-    assert!(offset_of!(mbm_clientRequest, length) == TICKET + offset_of!(Ticket, length));
+    const STATE: usize = offset_of!(RequestFields, state);
+    assert!(size_of::<RequestFields>() <= size_of::<mbm_clientRequest>());
+    assert!(align_of::<RequestFields>() <= align_of::<mbm_clientRequest>());
+    assert!(size_of::<mbm_clientRequest>() - size_of::<RequestFields>() <= 4);
+    assert!(
+        offset_of!(mbm_clientRequest, replyBytes) == STATE + offset_of!(RequestState, capacity)
+    );
+    assert!(
+        offset_of!(mbm_clientRequest, transaction) == STATE + offset_of!(RequestState, transaction)
+    );
+    assert!(offset_of!(mbm_clientRequest, unit) == STATE + offset_of!(RequestState, unit));
+    assert!(offset_of!(mbm_clientRequest, status) == STATE + offset_of!(RequestState, status));
+    assert!(
+        offset_of!(mbm_clientRequest, exception) == STATE + offset_of!(RequestState, exception)
+    );
+    assert!(offset_of!(mbm_clientRequest, length) == STATE + offset_of!(RequestState, length));
 };
 
 /// A request that C lends until it has ended.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) struct Lent(NonNull<Inside>);
+pub(super) struct RequestPtr(NonNull<RequestFields>);
 
-impl Lent {
+impl RequestPtr {
     /// The request behind a pointer, if there is one.
     ///
     /// # Safety
     /// It is NULL, or points to a request that is zeroed or was used before, and
     /// stays valid for as long as it is pending.
     pub(super) unsafe fn new(request: *mut mbm_clientRequest) -> Option<Self> {
-        NonNull::new(request.cast()).map(Lent)
+        NonNull::new(request.cast()).map(RequestPtr)
     }
 
-    fn inside(&self) -> &Inside {
+    fn inside(&self) -> &RequestFields {
         // SAFETY: as `new` demands; nothing else uses a pending request.
         unsafe { self.0.as_ref() }
     }
 
-    pub(super) fn inside_mut(&mut self) -> &mut Inside {
+    pub(super) fn inside_mut(&mut self) -> &mut RequestFields {
         // SAFETY: as `new` demands; nothing else uses a pending request.
         unsafe { self.0.as_mut() }
     }
@@ -113,18 +119,18 @@ fn place(index: usize, words: bool) -> usize {
     }
 }
 
-impl Job for Lent {
-    fn ticket(&self) -> &Ticket {
-        &self.inside().ticket
+impl ClientRequest for RequestPtr {
+    fn state(&self) -> &RequestState {
+        &self.inside().state
     }
 
-    fn ticket_mut(&mut self) -> &mut Ticket {
-        &mut self.inside_mut().ticket
+    fn state_mut(&mut self) -> &mut RequestState {
+        &mut self.inside_mut().state
     }
 
     fn byte(&self, index: usize) -> u8 {
         let inside = self.inside();
-        let at = place(index, inside.ticket.outline.sends_words());
+        let at = place(index, inside.state.header.sends_words());
         // SAFETY: what was queued has as many data as the outline says, of words
         // an even number of bytes.
         unsafe { *inside.data.add(at) }
@@ -132,7 +138,7 @@ impl Job for Lent {
 
     fn put(&mut self, index: usize, byte: u8) {
         let inside = self.inside_mut();
-        let at = place(index, inside.ticket.outline.takes_words());
+        let at = place(index, inside.state.header.takes_words());
         // SAFETY: the reply is not NULL and has room for `capacity` bytes, which
         // bound `index`; of words, an even number is received.
         unsafe { *inside.reply.add(at) = byte }
@@ -141,12 +147,12 @@ impl Job for Lent {
     // A microcontroller has the loop over bytes anyway.
     #[cfg(not(any(target_os = "none", mbm_firmware)))]
     #[inline(always)]
-    fn put_all(&mut self, bytes: &[u8]) {
+    fn store_all(&mut self, bytes: &[u8]) {
         let inside = self.inside_mut();
         // SAFETY: the reply is not NULL and has room for `capacity` bytes, of which
         // there are no more than that; nothing else uses it.
         let reply = unsafe { core::slice::from_raw_parts_mut(inside.reply, bytes.len()) };
-        if inside.ticket.outline.takes_words() {
+        if inside.state.header.takes_words() {
             copy_words(reply, bytes);
         } else {
             reply.copy_from_slice(bytes);

@@ -1,11 +1,11 @@
 //! How a client behaves.
 
 use super::object::mbm_client;
-use super::storage::{LentByC, Treatment};
+use super::storage::{ClientBuffers, UnitRecords};
 use crate::pointers;
 use crate::storage::mbm_counters;
 use core::ffi::c_void;
-use mbm::client::{again, note, rest, Backoff, Means as _, Policy, Unit};
+use mbm::client::{again, note, rest, Backoff, ClientStorage as _, Policy, Unit};
 use mbm::engine::Settings;
 use mbm::error::Status;
 use mbm::time::millis;
@@ -48,7 +48,7 @@ pub struct mbm_clientUnit {
     /// How the last request ended, MBM_OK if there was none.
     pub status: u8,
     /// Private.
-    tired: u8,
+    cooling_down: u8,
 }
 
 const _: () = {
@@ -63,7 +63,7 @@ const _: () = {
 /// The parts of a client that settings reach.
 struct Parts<'a> {
     settings: &'a mut Settings,
-    means: &'a mut LentByC,
+    storage: &'a mut ClientBuffers,
     policy: &'a mut Policy,
 }
 
@@ -79,8 +79,8 @@ unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> Status) -> 
             let kind = &*(*object).kind;
             change(Parts {
                 settings: kind.settings(object),
-                means: kind.means(object),
-                policy: &mut (*object).shared.policy,
+                storage: kind.storage(object),
+                policy: &mut (*object).queue.policy,
             })
         })
     }
@@ -246,8 +246,8 @@ pub unsafe extern "C" fn mbm_client_setRetries(client: *mut mbm_client, retries:
     unsafe {
         set(client, |parts| {
             parts.policy.retries = retries;
-            parts.means.again = Some(|means, policy, retries, status| {
-                again(policy, retries, status, || means.random())
+            parts.storage.again = Some(|storage, policy, retries, status| {
+                again(policy, retries, status, || storage.random())
             });
             Status::OK
         })
@@ -306,8 +306,8 @@ pub unsafe extern "C" fn mbm_client_setJitter(
                 return Status::INVALID_ARGUMENT;
             }
             parts.policy.jitter = ((u16::from(percent) * 163) >> 6).min(255) as u8;
-            parts.means.random = random;
-            parts.means.random_context = context;
+            parts.storage.random = random;
+            parts.storage.random_context = context;
             Status::OK
         })
     }
@@ -330,7 +330,7 @@ pub unsafe extern "C" fn mbm_client_setCounters(
     unsafe {
         set(client, |parts| {
             built_in(cfg!(feature = "counters") || counters.is_null(), || {
-                parts.means.counters = counters;
+                parts.storage.counters = counters;
             })
         })
     }
@@ -352,15 +352,15 @@ pub unsafe extern "C" fn mbm_client_setUnits(
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            parts.means.units = units.cast();
-            parts.means.unit_count = count;
-            parts.means.treatment = (!units.is_null()).then_some(&TREATMENT);
+            parts.storage.units = units.cast();
+            parts.storage.unit_count = count;
+            parts.storage.unit_records = (!units.is_null()).then_some(&TREATMENT);
             Status::OK
         })
     }
 }
 
-const TREATMENT: Treatment = Treatment {
-    rest: |means, unit, now| rest(means.units(), unit, now),
-    note: |means, unit, ended, now| note(means.units(), unit, ended.status, ended.again, now),
+const TREATMENT: UnitRecords = UnitRecords {
+    rest: |storage, unit, now| rest(storage.units(), unit, now),
+    note: |storage, unit, ended, now| note(storage.units(), unit, ended.status, ended.again, now),
 };

@@ -3,18 +3,18 @@
 use crate::storage::{lent_frame, mbm_counters};
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
-use mbm::client::{Means, Policy, Unit};
+use mbm::client::{ClientStorage, Policy, Unit};
 use mbm::engine::Storage;
 use mbm::error::Status;
 
-/// How long a request waits to be asked again, if it is. (A pointer, as [`Treatment`].)
-pub(super) type Again = fn(&mut LentByC, &Policy, retries: u8, Status) -> Option<u32>;
+/// How long a request waits to be asked again, if it is. (A pointer, as [`UnitRecords`].)
+pub(super) type Again = fn(&mut ClientBuffers, &Policy, retries: u8, Status) -> Option<u32>;
 
 /// How a unit is treated as its record says. (Behind a pointer, so that firmware
 /// without records carries none of it.)
-pub(super) struct Treatment {
-    pub(super) rest: fn(&mut LentByC, unit: u8, now: u32) -> u32,
-    pub(super) note: fn(&mut LentByC, unit: u8, ended: Ended, now: u32),
+pub(super) struct UnitRecords {
+    pub(super) rest: fn(&mut ClientBuffers, unit: u8, now: u32) -> u32,
+    pub(super) note: fn(&mut ClientBuffers, unit: u8, ended: Ended, now: u32),
 }
 
 /// How a request to a unit ended, and whether it is asked again.
@@ -25,12 +25,12 @@ pub(super) struct Ended {
 
 /// What the begin functions and settings lend.
 #[repr(C)]
-pub(super) struct LentByC {
+pub(super) struct ClientBuffers {
     pub(super) frame: *mut u8,
     pub(super) outgoing: *mut u8,
     pub(super) counters: *mut mbm_counters,
     pub(super) units: *mut Unit,
-    pub(super) treatment: Option<&'static Treatment>,
+    pub(super) unit_records: Option<&'static UnitRecords>,
     pub(super) again: Option<Again>,
     pub(super) random: Option<unsafe extern "C" fn(context: *mut c_void) -> u32>,
     pub(super) random_context: *mut c_void,
@@ -42,11 +42,11 @@ pub(super) struct LentByC {
 // SAFETY, of all functions here: each pointer is NULL, or what the function of
 // the header that set it demands, valid for as long as the object is used; what
 // is NULL has no length, and each is lent for as long as `self` is borrowed.
-impl Storage for LentByC {
+impl Storage for ClientBuffers {
     lent_frame!(u16);
 }
 
-impl Means for LentByC {
+impl ClientStorage for ClientBuffers {
     fn outgoing(&mut self) -> &mut [u8] {
         // SAFETY: see above; a TCP client is begun with one, no other asks for it.
         unsafe { from_raw_parts_mut(self.outgoing, self.outgoing_bytes.into()) }
@@ -66,15 +66,15 @@ impl Means for LentByC {
     }
 
     fn rest(&mut self, unit: u8, now: u32) -> u32 {
-        match self.treatment {
-            Some(treatment) => (treatment.rest)(self, unit, now),
+        match self.unit_records {
+            Some(unit_records) => (unit_records.rest)(self, unit, now),
             None => 0,
         }
     }
 
     fn note(&mut self, unit: u8, status: Status, again: bool, now: u32) {
-        if let Some(treatment) = self.treatment {
-            (treatment.note)(self, unit, Ended { status, again }, now);
+        if let Some(unit_records) = self.unit_records {
+            (unit_records.note)(self, unit, Ended { status, again }, now);
         }
     }
 

@@ -16,11 +16,11 @@ pub use words::*;
 
 use super::pointers::{self, CObject};
 use super::port::{mbm_port, PortRef};
-use super::storage::LentByC;
+use super::storage::MasterBuffers;
 use core::ffi::c_void;
 use mbm::error::Status;
 use mbm::master::Master;
-use mbm::pdu::query::Form;
+use mbm::pdu::query::FunctionSpec;
 
 /// What lies behind an `mbm_master`.
 #[repr(C)]
@@ -32,15 +32,15 @@ pub(super) struct Object {
     order: u8,
 }
 
-pub(super) type Core = Master<PortRef, LentByC>;
+pub(super) type Core = Master<PortRef, MasterBuffers>;
 
 const _: () = {
-    let room = size_of::<mbm_master>();
+    let space = size_of::<mbm_master>();
     let used = size_of::<Object>();
     assert!(align_of::<mbm_master>() >= align_of::<Object>());
-    assert!(used <= room);
+    assert!(used <= space);
     // Hiding the fields may waste 5 % where RAM is scarce.
-    assert!(size_of::<usize>() > 4 || (room - used) * 20 <= room);
+    assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
 };
 
 // SAFETY: the mark is a field of its own.
@@ -88,7 +88,7 @@ pub(super) unsafe fn prepare(master: *mut mbm_master) -> Status {
         match pointers::check(master) {
             Status::NOT_INITIALISED => {
                 let object = mbm_master::access(master);
-                object.core.preset();
+                object.core.set_default_if_zero();
                 object.mark = pointers::BEGUN;
                 Status::OK
             }
@@ -318,7 +318,7 @@ pub unsafe extern "C" fn mbm_master_getExceptionCode(master: *const mbm_master) 
 ///
 /// # Safety
 /// As for [`pointers::with`].
-unsafe fn call(pointer: *mut mbm_master, address: u16, word: u16, form: Form) -> u8 {
+unsafe fn call(pointer: *mut mbm_master, address: u16, word: u16, form: FunctionSpec) -> u8 {
     // SAFETY: as the caller promises.
     unsafe { request(pointer, |master| master.request(address, word, form)) }
 }

@@ -4,7 +4,7 @@ use super::mbm_master;
 use super::Object;
 use crate::pointers::{put_found, with};
 use crate::registers::{self, mbm_registers, MBM_REGISTERS_INTO_WORDS, MBM_REGISTERS_OF_WORDS};
-use crate::storage::LentByC;
+use crate::storage::MasterBuffers;
 use mbm::data::order::Order;
 use mbm::error::Status;
 
@@ -36,7 +36,7 @@ fn view(
     master: &mut Object,
     first: u16,
     kind: u8,
-    words: fn(&LentByC) -> (*mut u16, u8),
+    words: fn(&MasterBuffers) -> (*mut u16, u8),
 ) -> mbm_registers {
     let (words, count) = words(master.core.storage());
     // Less than all addresses, which are one more than this.

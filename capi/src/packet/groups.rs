@@ -157,8 +157,8 @@ unsafe fn add(
         let data = lent_or_none(data, length.into()).ok_or(refused)?;
         let place = buffer(storage, capacity).ok_or(refused)?;
         let used = grown.dataLength;
-        let room = place.get_mut(used.into()..).ok_or(refused)?;
-        let more = write(&mut grown, data, room)?;
+        let space = place.get_mut(used.into()..).ok_or(refused)?;
+        let more = write(&mut grown, data, space)?;
         grown.data = storage;
         grown.dataLength = used.saturating_add(more as u16);
         put(packet, grown);
@@ -196,13 +196,13 @@ pub unsafe extern "C" fn mbm_packet_addRecord(
             Some(bytes) => bytes,
             None => return Status::ILLEGAL_DATA_VALUE.code(),
         };
-        let write = |packet: &mut mbm_packet, data: &[u8], room: &mut [u8]| {
+        let write = |packet: &mut mbm_packet, data: &[u8], space: &mut [u8]| {
             let head = Record {
                 file: added.file,
                 record: added.record,
                 length: added.length,
             };
-            groups::put_record(side(packet.kind)?, packet.function, head, data, room)
+            groups::put_record(side(packet.kind)?, packet.function, head, data, space)
         };
         let done = add(packet, storage, capacity, (added.data, bytes), write);
         done.err().unwrap_or(Status::OK).code()
@@ -231,13 +231,13 @@ pub unsafe extern "C" fn mbm_packet_addObject(
         let Some(added) = get(object) else {
             return Status::INVALID_ARGUMENT.code();
         };
-        let write = |packet: &mut mbm_packet, value: &[u8], room: &mut [u8]| {
+        let write = |packet: &mut mbm_packet, value: &[u8], space: &mut [u8]| {
             if !packet.has_objects() {
                 return Err(Status::ILLEGAL_FUNCTION);
             }
             let count = packet.objectCount.checked_add(1);
             packet.objectCount = count.ok_or(Status::BUFFER_TOO_SMALL)?;
-            groups::put_object(added.id, value, room)
+            groups::put_object(added.id, value, space)
         };
         let value = (added.data, added.length.into());
         let done = add(packet, storage, capacity, value, write);

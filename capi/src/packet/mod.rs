@@ -8,7 +8,7 @@ pub use groups::*;
 use super::functions::{declared, mbm_function};
 use super::pointers::{lent_or_none, overlap, put};
 use mbm::error::Status;
-use mbm::packet::{self, Side};
+use mbm::packet::{self, PduKind};
 use mbm::pdu::custom::Function;
 use mbm::pdu::length::Length;
 use mbm::pdu::limits::MAX_PDU;
@@ -151,10 +151,10 @@ pub struct mbm_packet {
 }
 
 /// The side that C names.
-pub(super) fn side(kind: u8) -> Result<Side, Status> {
+pub(super) fn side(kind: u8) -> Result<PduKind, Status> {
     match kind {
-        MBM_PACKET_REQUEST => Ok(Side::Request),
-        MBM_PACKET_RESPONSE => Ok(Side::Response),
+        MBM_PACKET_REQUEST => Ok(PduKind::Request),
+        MBM_PACKET_RESPONSE => Ok(PduKind::Response),
         _ => Err(Status::INVALID_ARGUMENT),
     }
 }
@@ -191,13 +191,13 @@ impl mbm_packet {
     /// Takes over the PDU from one side.
     pub(super) fn take(
         &mut self,
-        side: Side,
+        side: PduKind,
         pdu: &[u8],
         functions: &[Function],
     ) -> Result<(), Status> {
         match side {
-            Side::Request => self.take_request(&Request::parse_with(pdu, functions)?),
-            Side::Response => self.take_response(&Response::parse_with(pdu, functions)?),
+            PduKind::Request => self.take_request(&Request::parse_with(pdu, functions)?),
+            PduKind::Response => self.take_response(&Response::parse_with(pdu, functions)?),
         }
         Ok(())
     }

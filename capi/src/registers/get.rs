@@ -1,6 +1,6 @@
 //! Values out of registers. What fails leaves the caller's value as it was.
 
-use super::{code, lent, mbm_registers, native, Lent, MBM_ORDER_DEFAULT};
+use super::{code, lent, mbm_registers, native, BorrowedRegisters, MBM_ORDER_DEFAULT};
 use crate::pointers::{self, slice, slice_mut};
 use core::ffi::c_char;
 #[cfg(target_arch = "avr")]
@@ -15,7 +15,7 @@ use mbm::error::Status;
 unsafe fn ask<T>(
     registers: *const mbm_registers,
     answer: *mut T,
-    question: impl FnOnce(&Registers<Lent>) -> Result<T, Status>,
+    question: impl FnOnce(&Registers<BorrowedRegisters>) -> Result<T, Status>,
 ) -> u8 {
     // SAFETY: as the caller promises.
     code(unsafe {

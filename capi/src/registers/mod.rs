@@ -10,7 +10,7 @@ pub use set::*;
 use super::pointers;
 use core::ffi::c_void;
 use mbm::data::order::Order;
-use mbm::data::view::{Cells, CellsMut, Registers};
+use mbm::data::view::{RegisterBytes, RegisterBytesMut, Registers};
 use mbm::error::Status;
 
 /// The order of the registers that a function is given; in these, MBM_ORDER_ABCD.
@@ -73,7 +73,7 @@ fn code(result: Result<(), Status>) -> u8 {
 }
 
 /// The registers of an `mbm_registers`, as bytes in the order of the wire.
-struct Lent {
+struct BorrowedRegisters {
     bytes: *mut u8,
     length: usize,
     /// 1 where words have their low byte first, so that each two bytes have
@@ -83,7 +83,7 @@ struct Lent {
 
 // SAFETY, here and below: [`lent`] was promised so many bytes, which nobody
 // else uses meanwhile; one beyond them is not touched.
-impl Cells for Lent {
+impl RegisterBytes for BorrowedRegisters {
     fn length(&self) -> usize {
         self.length
     }
@@ -94,7 +94,7 @@ impl Cells for Lent {
     }
 }
 
-impl CellsMut for Lent {
+impl RegisterBytesMut for BorrowedRegisters {
     fn set_byte(&mut self, place: usize, value: u8) {
         if place < self.length {
             // SAFETY: see above; lent to write, as the kind says.
@@ -113,7 +113,7 @@ unsafe fn lent(
     registers: *const mbm_registers,
     call: u8,
     to_write: bool,
-) -> Result<Registers<Lent>, Status> {
+) -> Result<Registers<BorrowedRegisters>, Status> {
     // SAFETY: as the caller promises.
     let fields = unsafe { pointers::get(registers) }.ok_or(Status::INVALID_ARGUMENT)?;
     if fields.data.is_null() {
@@ -127,7 +127,7 @@ unsafe fn lent(
         _ => return Err(Status::INVALID_ARGUMENT),
     };
     let own = order(fields.order, Order::Abcd)?;
-    let cells = Lent {
+    let cells = BorrowedRegisters {
         bytes: fields.data.cast_mut().cast(),
         length: usize::from(fields.count).saturating_mul(2),
         swapped: (words && cfg!(target_endian = "little")).into(),

@@ -3,7 +3,7 @@
 //! Numbers of 64 bits and floats come by pointer: what passes through registers
 //! of the processor differs between compilers and float units.
 
-use super::{code, lent, mbm_registers, native, Lent, MBM_ORDER_DEFAULT};
+use super::{code, lent, mbm_registers, native, BorrowedRegisters, MBM_ORDER_DEFAULT};
 use crate::pointers::{self, slice};
 use core::ffi::c_char;
 #[cfg(target_arch = "avr")]
@@ -18,7 +18,7 @@ use mbm::error::Status;
 unsafe fn with(
     registers: *const mbm_registers,
     order: u8,
-    action: impl FnOnce(&mut Registers<Lent>) -> Result<(), Status>,
+    action: impl FnOnce(&mut Registers<BorrowedRegisters>) -> Result<(), Status>,
 ) -> u8 {
     // SAFETY: as the caller promises.
     code(unsafe { lent(registers, order, true) }.and_then(|mut registers| action(&mut registers)))

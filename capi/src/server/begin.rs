@@ -46,10 +46,10 @@ unsafe fn begin(
                 }
             }
             (*core).port.copy(&*port);
-            (*core).lent.frame = frame;
-            (*core).lent.units = units;
-            (*core).lent.bytes = countable(bytes);
-            (*core).lent.count = count;
+            (*core).storage.frame = frame;
+            (*core).storage.units = units;
+            (*core).storage.bytes = countable(bytes);
+            (*core).storage.count = count;
             framing(&mut *core);
         });
     }

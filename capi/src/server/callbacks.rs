@@ -4,7 +4,7 @@ use super::units::{add_as, is_unheard, request};
 use super::{mbm_service, mbm_unit};
 use core::ffi::c_void;
 use mbm::error::Status;
-use mbm::server::table::{self, Access, Cells, Kind, Way};
+use mbm::server::table::{self, DataModel, Direction, TableAccess, TableKind};
 use mbm::server::Reply;
 
 /// Cells that your functions hold, one by one, in place of an array. Zero it, set
@@ -37,11 +37,11 @@ pub struct mbm_dataCallbacks {
 
 /// Cells of C, which its functions may look at: no reference to them is kept.
 #[derive(Clone, Copy)]
-struct ByC(*mut mbm_dataCallbacks);
+struct Callbacks(*mut mbm_dataCallbacks);
 
 // SAFETY, of all functions here: the record is the caller's and stays where it
 // is, as the header demands; its functions keep the contract of their comments.
-impl ByC {
+impl Callbacks {
     fn is_valid(self, address: u16) -> bool {
         // SAFETY: see above.
         unsafe {
@@ -67,15 +67,15 @@ impl ByC {
     }
 }
 
-impl Cells for ByC {
-    fn covers(&self, address: u16, quantity: u16) -> bool {
+impl DataModel for Callbacks {
+    fn contains(&self, address: u16, quantity: u16) -> bool {
         let last = address.checked_add(quantity.wrapping_sub(1));
         last.is_some_and(|last| (address..=last).all(|cell| self.is_valid(cell)))
     }
 
-    fn transfer(&mut self, way: Way, address: u16, quantity: u16, data: &mut [u8]) {
+    fn transfer(&mut self, way: Direction, address: u16, quantity: u16, data: &mut [u8]) {
         // SAFETY: see above.
-        let bits = Kind::from_code(unsafe { (*self.0).service.kind }).is_bits();
+        let bits = TableKind::from_code(unsafe { (*self.0).service.kind }).is_bits();
         for index in 0..quantity {
             let cell = address.wrapping_add(index);
             if bits {
@@ -83,7 +83,7 @@ impl Cells for ByC {
                     return;
                 };
                 let bit = 1 << (index % 8);
-                if way == Way::Write {
+                if way == Direction::Write {
                     self.set(cell, u16::from(*byte & bit != 0));
                 } else {
                     if bit == 1 {
@@ -98,7 +98,7 @@ impl Cells for ByC {
                 let Some([high, low]) = data.get_mut(at..at + 2) else {
                     return;
                 };
-                if way == Way::Write {
+                if way == Direction::Write {
                     self.set(cell, u16::from_be_bytes([*high, *low]));
                 } else {
                     [*high, *low] = self.get(cell).to_be_bytes();
@@ -131,24 +131,20 @@ impl Cells for ByC {
 ///
 /// # Safety
 /// `service` is the head of a record of them; `pdu` has the bytes and room of
-/// `heading`.
-unsafe extern "C" fn serve(
-    service: *mut mbm_service,
-    pdu: *mut u8,
-    heading: *const c_void,
-) -> usize {
+/// `info`.
+unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         let record = service.cast::<mbm_dataCallbacks>();
-        let kind = Kind::from_code((*record).service.kind);
-        if is_unheard(heading, *pdu) {
-            return Reply::NOT_MINE.code();
+        let kind = TableKind::from_code((*record).service.kind);
+        if is_unheard(info, *pdu) {
+            return Reply::NOT_HANDLED.code();
         }
-        let is_more = kind == Kind::HOLDING_REGISTERS && table::is_more(*pdu);
-        let (pdu, length) = request(pdu, heading);
-        let mut cells = ByC(record);
+        let is_more = kind == TableKind::HOLDING_REGISTERS && table::is_more(*pdu);
+        let (pdu, length) = request(pdu, info);
+        let mut cells = Callbacks(record);
         let reply = if is_more {
-            let cells: &mut dyn Access = &mut cells;
+            let cells: &mut dyn TableAccess = &mut cells;
             table::serve_more(cells, pdu, length)
         } else {
             table::serve(kind, &mut cells, pdu, length)

@@ -2,7 +2,7 @@
 
 use core::slice::from_raw_parts_mut;
 use mbm::bytes::copy_words;
-use mbm::server::table::{Kind, Small};
+use mbm::server::table::{MachineByte, TableKind};
 
 /// True if so many bits of a bitmap are 1.
 ///
@@ -13,10 +13,10 @@ use mbm::server::table::{Kind, Small};
 pub(super) unsafe fn are_all_on(map: *const u8, first: usize, quantity: usize) -> bool {
     // SAFETY: as the caller promises.
     unsafe {
-        let mut bit = Place::of_cells(map.cast_mut(), Kind::COILS, first);
+        let mut bit = Place::of_cells(map.cast_mut(), TableKind::COILS, first);
         let mut left = quantity;
         loop {
-            if Small::from(*bit.byte) & bit.mask == 0 {
+            if MachineByte::from(*bit.byte) & bit.mask == 0 {
                 return false;
             }
             bit.step();
@@ -32,7 +32,7 @@ pub(super) unsafe fn are_all_on(map: *const u8, first: usize, quantity: usize) -
 #[derive(Clone, Copy)]
 pub(super) struct Place {
     pub(super) byte: *mut u8,
-    mask: Small,
+    mask: MachineByte,
 }
 
 impl Place {
@@ -41,7 +41,7 @@ impl Place {
     /// # Safety
     /// There is one.
     #[inline(always)]
-    pub(super) unsafe fn of_cells(cells: *mut u8, kind: Kind, index: usize) -> Place {
+    pub(super) unsafe fn of_cells(cells: *mut u8, kind: TableKind, index: usize) -> Place {
         // SAFETY: as the caller promises.
         unsafe {
             if kind.is_bits() {
@@ -56,7 +56,7 @@ impl Place {
 
     /// The first of data.
     #[inline(always)]
-    pub(super) fn of_data(byte: *mut u8, kind: Kind) -> Place {
+    pub(super) fn of_data(byte: *mut u8, kind: TableKind) -> Place {
         let mask = kind.is_bits().into();
         Place { byte, mask }
     }
@@ -88,8 +88,8 @@ pub(super) unsafe fn transfer(mut from: Place, mut to: Place, mut left: usize) {
                 from.byte = from.byte.add(2);
                 to.byte = to.byte.add(2);
             } else {
-                let mut byte = Small::from(*to.byte) & !to.mask;
-                if Small::from(*from.byte) & from.mask != 0 {
+                let mut byte = MachineByte::from(*to.byte) & !to.mask;
+                if MachineByte::from(*from.byte) & from.mask != 0 {
                     byte |= to.mask;
                 }
                 *to.byte = byte as u8;
@@ -111,7 +111,7 @@ pub(super) unsafe fn transfer(mut from: Place, mut to: Place, mut left: usize) {
 #[inline(always)]
 pub(super) unsafe fn transfer_many(
     cells: *mut u8,
-    kind: Kind,
+    kind: TableKind,
     write: bool,
     first: u16,
     quantity: u16,

@@ -8,7 +8,7 @@ use core::ffi::c_void;
 use mbm::error::Status;
 use mbm::pdu::custom::Rule;
 use mbm::server::custom::{self, Outcome};
-use mbm::server::{Heading, Reply};
+use mbm::server::{Reply, RequestInfo};
 
 /// What a function of yours returns for an exception: this, or-ed with the code.
 pub const MBM_REPLY_EXCEPTION: u16 = 0x0100;
@@ -30,19 +30,15 @@ pub struct mbm_functionMask {
 
 /// # Safety
 /// `service` is the head of a function of C; `pdu` has the bytes and room of
-/// `heading`.
-unsafe extern "C" fn serve(
-    service: *mut mbm_service,
-    pdu: *mut u8,
-    heading: *const c_void,
-) -> usize {
+/// `info`.
+unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         let code = (*service.cast::<mbm_custom>()).code;
         if code != 0 && code != *pdu {
-            return Reply::NOT_MINE.code();
+            return Reply::NOT_HANDLED.code();
         }
-        serve_mine(service.cast(), pdu, heading)
+        serve_mine(service.cast(), pdu, info)
     }
 }
 
@@ -52,33 +48,33 @@ unsafe extern "C" fn serve(
 /// # Safety
 /// As for [`serve`].
 #[cfg_attr(not(target_os = "none"), inline(never))]
-unsafe fn serve_mine(record: *mut mbm_custom, pdu: *mut u8, heading: *const c_void) -> usize {
+unsafe fn serve_mine(record: *mut mbm_custom, pdu: *mut u8, info: *const c_void) -> usize {
     // SAFETY: as the caller promises; no reference to the record is kept while
     // its function runs.
     unsafe {
-        let to = (*heading.cast::<Heading>()).to;
-        let (pdu, length) = request(pdu, heading);
+        let to = (*info.cast::<RequestInfo>()).to;
+        let (pdu, length) = request(pdu, info);
         let function = pdu.first().copied().unwrap_or(0);
-        if is_unheard(heading, function) {
-            return Reply::NOT_MINE.code();
+        if is_unheard(info, function) {
+            return Reply::NOT_HANDLED.code();
         }
         let Some(handler) = (*record).serve else {
-            return Reply::NOT_MINE.code();
+            return Reply::NOT_HANDLED.code();
         };
         let context = (*record).context;
-        custom::serve(pdu, length, |data, room| {
+        custom::serve(pdu, length, |data, space| {
             let request = mbm_request {
                 data: data.as_ptr(),
                 length: data.len() as u16,
                 unit: to,
                 function,
             };
-            let capacity = room.len() as u16;
-            let said = handler(context, &raw const request, room.as_mut_ptr(), capacity);
+            let capacity = space.len() as u16;
+            let said = handler(context, &raw const request, space.as_mut_ptr(), capacity);
             match (said & 0xFF00, said as u8) {
                 (0, bytes) => Outcome::Data(bytes.into()),
                 (MBM_REPLY_EXCEPTION, code @ 1..=0x7F) => Outcome::Exception(code),
-                (MBM_REPLY_NONE, 0) => Outcome::Silent,
+                (MBM_REPLY_NONE, 0) => Outcome::NoResponse,
                 (MBM_REPLY_PENDING, 0) => Outcome::Pending,
                 _ => Outcome::Exception(Reply::SERVER_DEVICE_FAILURE.exception_code()),
             }
@@ -154,11 +150,11 @@ unsafe extern "C" fn gate(
 ) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
-        let off = custom::SwitchedOff((*service.cast::<mbm_functionMask>()).off);
-        if off.is_off(*pdu) {
+        let off = custom::DisabledFunctions((*service.cast::<mbm_functionMask>()).off);
+        if off.is_disabled(*pdu) {
             Reply::ILLEGAL_FUNCTION.code()
         } else {
-            Reply::NOT_MINE.code()
+            Reply::NOT_HANDLED.code()
         }
     }
 }

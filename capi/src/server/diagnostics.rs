@@ -5,7 +5,7 @@ use super::{mbm_diagnostics, mbm_service, mbm_unit};
 use core::ffi::c_void;
 use mbm::error::Status;
 use mbm::server::diagnostics::{Diagnostics, Restart};
-use mbm::server::{Concern, Heading, Reply};
+use mbm::server::{Addressing, Reply, RequestInfo};
 
 /// What the core keeps in a record.
 ///
@@ -20,16 +20,12 @@ unsafe fn line<'a>(record: *mut mbm_diagnostics) -> &'a mut Diagnostics {
 /// Serves 08, 0B and 0C.
 ///
 /// # Safety
-/// `service` is the head of a record; `pdu` has the bytes and room of `heading`.
-unsafe extern "C" fn serve(
-    service: *mut mbm_service,
-    pdu: *mut u8,
-    heading: *const c_void,
-) -> usize {
+/// `service` is the head of a record; `pdu` has the bytes and room of `info`.
+unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize {
     // SAFETY: as the caller promises; no reference lives while the hook runs.
     unsafe {
         let record = service.cast::<mbm_diagnostics>();
-        let (pdu, length) = request(pdu, heading);
+        let (pdu, length) = request(pdu, info);
         let (reply, restart) = line(record).serve(pdu, length);
         if let (true, Some(hook)) = (restart != Restart::None, (*record).restart) {
             hook((*record).context, (restart == Restart::ClearLog).into());
@@ -41,32 +37,32 @@ unsafe extern "C" fn serve(
 /// Takes notice of a frame, has it served, and of what became of it.
 ///
 /// # Safety
-/// `unit` is one with a record; `pdu` has the bytes and room of `heading`.
+/// `unit` is one with a record; `pdu` has the bytes and room of `info`.
 unsafe extern "C" fn monitor(
     unit: *mut mbm_unit,
-    heading: *const c_void,
-    concern: u8,
+    info: *const c_void,
+    addressing: u8,
     pdu: *mut u8,
 ) -> usize {
     // SAFETY: as the caller promises; no reference to the record lives while
     // services are at work.
     unsafe {
         let record = (*unit).diagnostics;
-        let concern = match concern {
-            1 => Concern::OWN,
-            2 if !is_unheard(heading, *pdu) => Concern::BROADCAST,
-            _ => Concern::FOREIGN,
+        let addressing = match addressing {
+            1 => Addressing::OWN,
+            2 if !is_unheard(info, *pdu) => Addressing::BROADCAST,
+            _ => Addressing::FOREIGN,
         };
-        let (bytes, length) = request(pdu, heading);
+        let (bytes, length) = request(pdu, info);
         let function = bytes.first().copied().unwrap_or(0);
-        let heading = heading.cast::<Heading>();
+        let info = info.cast::<RequestInfo>();
         let request = bytes.get(..length).unwrap_or_default();
-        if !line(record).hear(&*heading, concern, request) {
-            return Reply::SILENT.code();
+        if !line(record).read_bytes(&*info, addressing, request) {
+            return Reply::NO_RESPONSE.code();
         }
-        let reply = walk(unit, heading.cast(), pdu);
+        let reply = walk(unit, info.cast(), pdu);
         if reply != Reply::PENDING.code() {
-            line(record).done(concern, function, Reply::from_number(reply));
+            line(record).done(addressing, function, Reply::from_number(reply));
         }
         reply
     }

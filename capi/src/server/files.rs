@@ -114,7 +114,7 @@ impl FilesByC {
 }
 
 impl Files for FilesByC {
-    fn covers(&self, record: Record) -> bool {
+    fn contains(&self, record: Record) -> bool {
         self.find(record).is_some()
     }
 
@@ -201,14 +201,14 @@ impl Fifos for FifosByC {
 
 /// # Safety
 /// `service` is the head of a record of files; `pdu` has the bytes and room of
-/// `heading`.
+/// `info`.
 unsafe extern "C" fn serve_files(
     service: *mut mbm_service,
     pdu: *mut u8,
-    heading: *const c_void,
+    info: *const c_void,
 ) -> usize {
     // SAFETY: as the caller promises.
-    let (pdu, length) = unsafe { request(pdu, heading) };
+    let (pdu, length) = unsafe { request(pdu, info) };
     files::serve(&mut FilesByC(service.cast()), pdu, length).code()
 }
 
@@ -217,10 +217,10 @@ unsafe extern "C" fn serve_files(
 unsafe extern "C" fn serve_fifos(
     service: *mut mbm_service,
     pdu: *mut u8,
-    heading: *const c_void,
+    info: *const c_void,
 ) -> usize {
     // SAFETY: as the caller promises.
-    let (pdu, length) = unsafe { request(pdu, heading) };
+    let (pdu, length) = unsafe { request(pdu, info) };
     files::serve_fifos(&FifosByC(service.cast()), pdu, length).code()
 }
 

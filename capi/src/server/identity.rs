@@ -52,16 +52,16 @@ pub struct mbm_identification {
 
 /// # Safety
 /// `service` is the head of a record of its kind; `pdu` has the bytes and room of
-/// `heading`. So of the functions below.
+/// `info`. So of the functions below.
 unsafe extern "C" fn serve_exception_status(
     service: *mut mbm_service,
     pdu: *mut u8,
-    heading: *const c_void,
+    info: *const c_void,
 ) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         let outputs = (*service.cast::<mbm_exceptionStatus>()).outputs;
-        let (pdu, length) = request(pdu, heading);
+        let (pdu, length) = request(pdu, info);
         identity::serve_exception_status(outputs, pdu, length).code()
     }
 }
@@ -81,7 +81,7 @@ unsafe fn bytes<'a>(first: *const u8, length: u8) -> &'a [u8] {
 unsafe extern "C" fn serve_server_id(
     service: *mut mbm_service,
     pdu: *mut u8,
-    heading: *const c_void,
+    info: *const c_void,
 ) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
@@ -89,7 +89,7 @@ unsafe extern "C" fn serve_server_id(
         let id = bytes((*record).id, (*record).idLength);
         let additional = bytes((*record).additional, (*record).additionalLength);
         let running = (*record).running != 0;
-        let (pdu, length) = request(pdu, heading);
+        let (pdu, length) = request(pdu, info);
         identity::serve_server_id(id, running, additional, pdu, length).code()
     }
 }
@@ -120,10 +120,10 @@ impl Objects for ObjectsByC {
 unsafe extern "C" fn serve_identification(
     service: *mut mbm_service,
     pdu: *mut u8,
-    heading: *const c_void,
+    info: *const c_void,
 ) -> usize {
     // SAFETY: as the caller promises.
-    let (pdu, length) = unsafe { request(pdu, heading) };
+    let (pdu, length) = unsafe { request(pdu, info) };
     identity::serve_identification(&ObjectsByC(service.cast()), pdu, length).code()
 }
 

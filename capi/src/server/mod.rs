@@ -29,7 +29,7 @@ use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 use mbm::error::Status;
 use mbm::pdu::custom::Rule;
-use mbm::server::{Lent, Reply, Server, MOST_REQUESTS};
+use mbm::server::{Reply, Server, ServerStorage, MOST_REQUESTS};
 use mbm::FIRMWARE;
 
 /// A Modbus server on one line or one connection.
@@ -65,27 +65,27 @@ struct Object {
     mark: u8,
 }
 
-pub(super) type Core = Server<mbm_port, LentByC>;
+pub(super) type Core = Server<mbm_port, ServerBuffers>;
 
 const _: () = {
-    let room = size_of::<mbm_server>();
+    let space = size_of::<mbm_server>();
     let used = size_of::<Object>();
     assert!(align_of::<mbm_server>() >= align_of::<Object>());
-    assert!(used <= room);
+    assert!(used <= space);
     // Hiding the fields may waste 5 % where RAM is scarce.
-    assert!(size_of::<usize>() > 4 || (room - used) * 20 <= room);
+    assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
 };
 
 /// What mbm_server_beginRtu and its sisters were given.
 #[repr(C)]
-pub(super) struct LentByC {
+pub(super) struct ServerBuffers {
     bytes: u16,
     count: u8,
     frame: *mut u8,
     units: *mut mbm_unit,
 }
 
-impl Lent for LentByC {
+impl ServerStorage for ServerBuffers {
     fn frame(&mut self) -> &mut [u8] {
         // SAFETY: begin demands a buffer of so many bytes for as long as the
         // object is used, and takes no NULL.
@@ -189,10 +189,10 @@ unsafe fn serve(core: *mut Core, mark: *const u8) -> Status {
             core::hint::assert_unchecked((*core).has_framing());
             let status = (*core).look(now);
             if status == Status::PENDING {
-                let heading = &raw const (*core).request;
-                let lent = &raw const (*core).lent;
-                let pdu = (*lent).frame.add((*heading).head.into());
-                let reply = units::serve((*lent).units, (*lent).count, heading, pdu);
+                let info = &raw const (*core).request;
+                let storage = &raw const (*core).storage;
+                let pdu = (*storage).frame.add((*info).head.into());
+                let reply = units::serve((*storage).units, (*storage).count, info, pdu);
                 core::hint::assert_unchecked(mark.read() != CALLING || (*core).has_framing());
                 if mark.read() != CALLING || !(*core).answer_served(Reply::from_number(reply)) {
                     return Status::OK;
@@ -216,14 +216,14 @@ unsafe fn serve(core: *mut Core, mark: *const u8) -> Status {
                 }
                 return status;
             }
-            let heading = &raw const (*core).request;
-            let lent = &raw const (*core).lent;
-            let pdu = (*lent).frame.add((*heading).head.into());
-            let reply = units::serve((*lent).units, (*lent).count, heading, pdu);
+            let info = &raw const (*core).request;
+            let storage = &raw const (*core).storage;
+            let pdu = (*storage).frame.add((*info).head.into());
+            let reply = units::serve((*storage).units, (*storage).count, info, pdu);
             if mark.read() != CALLING {
                 return Status::OK;
             }
-            if let Some(status) = (*core).conclude(Reply::from_number(reply)) {
+            if let Some(status) = (*core).finish(Reply::from_number(reply)) {
                 return status;
             }
         }

@@ -13,20 +13,16 @@ pub struct mbm_service {
     /// Serves a request, if it is one of this family. NULL in a zeroed record,
     /// which serves nothing.
     pub serve: Option<
-        unsafe extern "C" fn(
-            service: *mut mbm_service,
-            pdu: *mut u8,
-            heading: *const c_void,
-        ) -> usize,
+        unsafe extern "C" fn(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize,
     >,
     /// What kind of record of its family it is served as, from 1 on; 0 in a zeroed one.
     pub kind: u8,
 }
 
-/// The function of a service. `pdu` points to the PDU of a request that `heading`
+/// The function of a service. `pdu` points to the PDU of a request that `info`
 /// tells of, and returns a [`Reply`].
 pub(super) type Serve =
-    unsafe extern "C" fn(service: *mut mbm_service, pdu: *mut u8, heading: *const c_void) -> usize;
+    unsafe extern "C" fn(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize;
 
 /// A request for a function of yours.
 #[repr(C)]

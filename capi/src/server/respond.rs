@@ -7,15 +7,15 @@ use crate::pointers::get;
 use core::slice::from_raw_parts_mut;
 use mbm::error::Status;
 use mbm::server::respond::respond;
-use mbm::server::{Heading, Reply, Units};
+use mbm::server::{Reply, RequestInfo, Units};
 
 /// Units of C.
-struct ByC(*mut mbm_unit, u8);
+struct RespondUnits(*mut mbm_unit, u8);
 
-impl Units for ByC {
-    fn serve(&mut self, heading: &Heading, pdu: &mut [u8]) -> Reply {
+impl Units for RespondUnits {
+    fn serve(&mut self, info: &RequestInfo, pdu: &mut [u8]) -> Reply {
         // SAFETY: mbm_unit_respond demands so many units.
-        let reply = unsafe { units::serve(self.0, self.1, heading, pdu.as_mut_ptr()) };
+        let reply = unsafe { units::serve(self.0, self.1, info, pdu.as_mut_ptr()) };
         Reply::from_number(reply)
     }
 }
@@ -70,7 +70,7 @@ pub unsafe extern "C" fn mbm_unit_respond(
             delimiter,
             buffer,
             length.into(),
-            &mut ByC(units, count),
+            &mut RespondUnits(units, count),
         );
         match answer {
             Ok(length) => {

@@ -6,7 +6,7 @@ use super::{mbm_service, mbm_unit};
 use core::ffi::c_void;
 use core::hint::assert_unchecked;
 use mbm::error::Status;
-use mbm::server::table::{self, Access, Kind, Role};
+use mbm::server::table::{self, TableAccess, TableKind, TableOperation};
 use mbm::server::Reply;
 use mbm::FIRMWARE;
 
@@ -88,10 +88,16 @@ const _: () = {
 // SAFETY, of all functions here: the record is the caller's and stays where it
 // is, as the header demands, with arrays of `size` cells behind its pointers; a
 // cell that is looked at lies in them.
-impl Access for Table {
+impl TableAccess for Table {
     #[cfg_attr(target_arch = "avr", inline(never))]
     #[cfg_attr(not(target_arch = "avr"), inline(always))]
-    fn access(&mut self, role: Role, quantity: usize, bytes: usize, pdu: &mut [u8]) -> Reply {
+    fn access(
+        &mut self,
+        operation: TableOperation,
+        quantity: usize,
+        bytes: usize,
+        pdu: &mut [u8],
+    ) -> Reply {
         let table = self.0;
         let pdu = pdu.as_mut_ptr();
         // SAFETY: see above; a PDU has a function and an address, a request that writes has
@@ -102,14 +108,14 @@ impl Access for Table {
             let cells = (*table).words.cast::<u8>();
             let address = usize::from(*pdu.add(1)) << 8 | usize::from(*pdu.add(2));
             let first = address.wrapping_sub((*table).base.into());
-            if cells.is_null() || !covers(table, first, quantity) {
+            if cells.is_null() || !contains(table, first, quantity) {
                 return Reply::ILLEGAL_DATA_ADDRESS;
             }
-            let kind = Kind::from_code((*table).service.kind);
+            let kind = TableKind::from_code((*table).service.kind);
             let place = Place::of_cells(cells, kind, first);
-            let data = Place::of_data(pdu.add(role.data()), kind);
+            let data = Place::of_data(pdu.add(operation.data()), kind);
             let (mut from, mut to, mut reply, mut after) = (data, place, table::WRITTEN, None);
-            if role == Role::READ {
+            if operation == TableOperation::READ {
                 if bytes == 0 {
                     return Reply::SERVER_DEVICE_FAILURE;
                 }
@@ -132,7 +138,7 @@ impl Access for Table {
             if FIRMWARE {
                 transfer(from, to, quantity);
             } else {
-                let write = role != Role::READ;
+                let write = operation != TableOperation::READ;
                 transfer_many(cells, kind, write, first as u16, quantity as u16, data.byte);
             }
             if let Some(hook) = after {
@@ -148,7 +154,7 @@ impl Access for Table {
 /// # Safety
 /// `table` is one, with `size` bits behind `valid`.
 #[inline(always)]
-unsafe fn covers(table: *const mbm_registerTable, first: usize, quantity: usize) -> bool {
+unsafe fn contains(table: *const mbm_registerTable, first: usize, quantity: usize) -> bool {
     // SAFETY: as the caller promises.
     unsafe {
         let size = usize::from((*table).size);
@@ -164,42 +170,44 @@ unsafe fn covers(table: *const mbm_registerTable, first: usize, quantity: usize)
 /// was when the request came.
 struct TableAsItWas(Table, mbm_registerTable);
 
-impl Access for TableAsItWas {
+impl TableAccess for TableAsItWas {
     #[cfg_attr(target_os = "none", inline(never))]
-    fn access(&mut self, role: Role, quantity: usize, bytes: usize, pdu: &mut [u8]) -> Reply {
+    fn access(
+        &mut self,
+        operation: TableOperation,
+        quantity: usize,
+        bytes: usize,
+        pdu: &mut [u8],
+    ) -> Reply {
         let mut was = Table(&raw mut self.1);
-        let table = if role == Role::READ {
+        let table = if operation == TableOperation::READ {
             &mut was
         } else {
             &mut self.0
         };
-        table.access(role, quantity, bytes, pdu)
+        table.access(operation, quantity, bytes, pdu)
     }
 }
 
 /// Serves a table.
 ///
 /// # Safety
-/// `service` is the head of one; `pdu` has the bytes and room of `heading`.
-unsafe extern "C" fn serve(
-    service: *mut mbm_service,
-    pdu: *mut u8,
-    heading: *const c_void,
-) -> usize {
+/// `service` is the head of one; `pdu` has the bytes and room of `info`.
+unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         let table = service.cast::<mbm_registerTable>();
-        let kind = Kind::from_code((*table).service.kind);
-        match table::role(kind, *pdu) {
-            role if FIRMWARE => serve_as(role, table, pdu, heading),
+        let kind = TableKind::from_code((*table).service.kind);
+        match table::operation(kind, *pdu) {
+            operation if FIRMWARE => serve_as(operation, table, pdu, info),
             // A host takes a way of its own for each.
-            Role::READ if !kind.is_bits() && (*table).valid.is_null() => {
-                serve_read_words(table, pdu, heading)
+            TableOperation::READ if !kind.is_bits() && (*table).valid.is_null() => {
+                serve_read_words(table, pdu, info)
             }
-            Role::READ => serve_read(table, pdu, heading),
-            Role::WRITE_ONE => serve_write_one(table, pdu, heading),
-            Role::WRITE_SEVERAL => serve_write_several(table, pdu, heading),
-            _ => Reply::NOT_MINE.code(),
+            TableOperation::READ => serve_read(table, pdu, info),
+            TableOperation::WRITE_ONE => serve_write_one(table, pdu, info),
+            TableOperation::WRITE_SEVERAL => serve_write_several(table, pdu, info),
+            _ => Reply::NOT_HANDLED.code(),
         }
     }
 }
@@ -210,20 +218,20 @@ unsafe extern "C" fn serve(
 /// As for [`serve`].
 #[inline(always)]
 unsafe fn serve_as(
-    role: Role,
+    operation: TableOperation,
     table: *mut mbm_registerTable,
     pdu: *mut u8,
-    heading: *const c_void,
+    info: *const c_void,
 ) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
-        let (pdu, length) = request(pdu, heading);
-        let kind = Kind::from_code((*table).service.kind);
+        let (pdu, length) = request(pdu, info);
+        let kind = TableKind::from_code((*table).service.kind);
         let cells = &mut Table(table);
         if FIRMWARE || kind.is_bits() {
-            table::serve_as(role, kind, cells, pdu, length).code()
+            table::serve_as(operation, kind, cells, pdu, length).code()
         } else {
-            table::serve_as(role, Kind::HOLDING_REGISTERS, cells, pdu, length).code()
+            table::serve_as(operation, TableKind::HOLDING_REGISTERS, cells, pdu, length).code()
         }
     }
 }
@@ -236,22 +244,22 @@ unsafe fn serve_as(
 unsafe fn serve_read_words(
     table: *mut mbm_registerTable,
     pdu: *mut u8,
-    heading: *const c_void,
+    info: *const c_void,
 ) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
-        let is_bits = Kind::from_code((*table).service.kind).is_bits();
+        let is_bits = TableKind::from_code((*table).service.kind).is_bits();
         assert_unchecked(!is_bits && (*table).valid.is_null());
-        serve_as(Role::READ, table, pdu, heading)
+        serve_as(TableOperation::READ, table, pdu, info)
     }
 }
 
 /// # Safety
 /// As for [`serve`].
 #[inline(never)]
-unsafe fn serve_read(table: *mut mbm_registerTable, pdu: *mut u8, heading: *const c_void) -> usize {
+unsafe fn serve_read(table: *mut mbm_registerTable, pdu: *mut u8, info: *const c_void) -> usize {
     // SAFETY: as the caller promises.
-    unsafe { serve_as(Role::READ, table, pdu, heading) }
+    unsafe { serve_as(TableOperation::READ, table, pdu, info) }
 }
 
 /// # Safety
@@ -260,10 +268,10 @@ unsafe fn serve_read(table: *mut mbm_registerTable, pdu: *mut u8, heading: *cons
 unsafe fn serve_write_one(
     table: *mut mbm_registerTable,
     pdu: *mut u8,
-    heading: *const c_void,
+    info: *const c_void,
 ) -> usize {
     // SAFETY: as the caller promises.
-    unsafe { serve_as(Role::WRITE_ONE, table, pdu, heading) }
+    unsafe { serve_as(TableOperation::WRITE_ONE, table, pdu, info) }
 }
 
 /// # Safety
@@ -272,10 +280,10 @@ unsafe fn serve_write_one(
 unsafe fn serve_write_several(
     table: *mut mbm_registerTable,
     pdu: *mut u8,
-    heading: *const c_void,
+    info: *const c_void,
 ) -> usize {
     // SAFETY: as the caller promises.
-    unsafe { serve_as(Role::WRITE_SEVERAL, table, pdu, heading) }
+    unsafe { serve_as(TableOperation::WRITE_SEVERAL, table, pdu, info) }
 }
 
 /// Serves 16 and 17 of a table of holding registers.
@@ -283,13 +291,13 @@ unsafe fn serve_write_several(
 /// # Safety
 /// As for [`serve`].
 #[cfg_attr(not(target_os = "none"), inline(never))]
-unsafe fn serve_more(table: *mut mbm_registerTable, pdu: *mut u8, heading: *const c_void) -> usize {
+unsafe fn serve_more(table: *mut mbm_registerTable, pdu: *mut u8, info: *const c_void) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
-        let (pdu, length) = request(pdu, heading);
+        let (pdu, length) = request(pdu, info);
         let mut cells = TableAsItWas(Table(table), table.read());
         if FIRMWARE {
-            let cells: &mut dyn Access = &mut cells;
+            let cells: &mut dyn TableAccess = &mut cells;
             return table::serve_more(cells, pdu, length).code();
         }
         table::serve_more(&mut cells, pdu, length).code()
@@ -303,16 +311,16 @@ unsafe fn serve_more(table: *mut mbm_registerTable, pdu: *mut u8, heading: *cons
 unsafe extern "C" fn serve_all(
     service: *mut mbm_service,
     pdu: *mut u8,
-    heading: *const c_void,
+    info: *const c_void,
 ) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         if !table::is_more(*pdu) {
-            serve(service, pdu, heading)
-        } else if is_unheard(heading, *pdu) {
-            Reply::NOT_MINE.code()
+            serve(service, pdu, info)
+        } else if is_unheard(info, *pdu) {
+            Reply::NOT_HANDLED.code()
         } else {
-            serve_more(service.cast(), pdu, heading)
+            serve_more(service.cast(), pdu, info)
         }
     }
 }
@@ -325,7 +333,7 @@ unsafe extern "C" fn serve_all(
 unsafe extern "C" fn add_table(
     unit: *mut mbm_unit,
     table: *mut mbm_registerTable,
-    kind: Kind,
+    kind: TableKind,
 ) -> u8 {
     // SAFETY: as the caller promises.
     unsafe { add_as(unit, table.cast(), kind.code(), serve) }.code()
@@ -340,7 +348,7 @@ unsafe extern "C" fn add_table(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveCoils(unit: *mut mbm_unit, table: *mut mbm_bitTable) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { add_table(unit, table.cast(), Kind::COILS) }
+    unsafe { add_table(unit, table.cast(), TableKind::COILS) }
 }
 
 /// Serves discrete inputs: function 02.
@@ -354,7 +362,7 @@ pub unsafe extern "C" fn mbm_unit_serveDiscreteInputs(
     table: *mut mbm_bitTable,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { add_table(unit, table.cast(), Kind::DISCRETE_INPUTS) }
+    unsafe { add_table(unit, table.cast(), TableKind::DISCRETE_INPUTS) }
 }
 
 /// Serves holding registers: functions 03, 06 and 10. For 16 and 17 too, call
@@ -369,7 +377,7 @@ pub unsafe extern "C" fn mbm_unit_serveHoldingRegisters(
     table: *mut mbm_registerTable,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { add_table(unit, table, Kind::HOLDING_REGISTERS) }
+    unsafe { add_table(unit, table, TableKind::HOLDING_REGISTERS) }
 }
 
 /// Serves input registers: function 04.
@@ -383,7 +391,7 @@ pub unsafe extern "C" fn mbm_unit_serveInputRegisters(
     table: *mut mbm_registerTable,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { add_table(unit, table, Kind::INPUT_REGISTERS) }
+    unsafe { add_table(unit, table, TableKind::INPUT_REGISTERS) }
 }
 
 /// Serves functions 16 and 17 beside 03, 06 and 10, on each unit that has the
@@ -398,7 +406,7 @@ pub unsafe extern "C" fn mbm_registerTable_serveMaskAndReadWrite(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        if table.is_null() || (*table).service.kind != Kind::HOLDING_REGISTERS.code() {
+        if table.is_null() || (*table).service.kind != TableKind::HOLDING_REGISTERS.code() {
             return Status::INVALID_ARGUMENT.code();
         }
         (*table).service.serve = Some(serve_all);

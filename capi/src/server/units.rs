@@ -5,7 +5,9 @@ use core::ffi::c_void;
 use core::mem::offset_of;
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 use mbm::error::Status;
-use mbm::server::{dispatch, first_reply, only_writes, Concern, Dispatch, Heading, Reply, ANY};
+use mbm::server::{
+    dispatch, first_reply, only_writes, Addressing, Dispatch, Reply, RequestInfo, ANY,
+};
 use mbm::FIRMWARE;
 
 /// Most records that one unit serves, each handed to a mbm_unit_serve function.
@@ -28,8 +30,8 @@ pub struct mbm_unit {
     pub monitor: Option<
         unsafe extern "C" fn(
             unit: *mut mbm_unit,
-            heading: *const c_void,
-            concern: u8,
+            info: *const c_void,
+            addressing: u8,
             pdu: *mut u8,
         ) -> usize,
     >,
@@ -133,24 +135,24 @@ impl Iterator for Places {
 ///
 /// # Safety
 /// As for [`Serve`]; nothing else uses the PDU while the slice lives.
-pub(super) unsafe fn request<'a>(pdu: *mut u8, heading: *const c_void) -> (&'a mut [u8], usize) {
+pub(super) unsafe fn request<'a>(pdu: *mut u8, info: *const c_void) -> (&'a mut [u8], usize) {
     // SAFETY: as the caller promises.
     unsafe {
-        let heading = heading.cast::<Heading>();
-        let (room, length) = ((*heading).room.into(), (*heading).length.into());
-        core::hint::assert_unchecked(length <= room);
-        (from_raw_parts_mut(pdu, room), length)
+        let info = info.cast::<RequestInfo>();
+        let (space, length) = ((*info).space.into(), (*info).length.into());
+        core::hint::assert_unchecked(length <= space);
+        (from_raw_parts_mut(pdu, space), length)
     }
 }
 
 /// Has the services of a unit look at a request, one after the other.
 ///
 /// # Safety
-/// `unit` is one, and `pdu` has the bytes and the room that `heading` says.
-pub(super) unsafe fn walk(unit: *mut mbm_unit, heading: *const c_void, pdu: *mut u8) -> usize {
+/// `unit` is one, and `pdu` has the bytes and the room that `info` says.
+pub(super) unsafe fn walk(unit: *mut mbm_unit, info: *const c_void, pdu: *mut u8) -> usize {
     // SAFETY: as the caller promises; a PDU has a byte at least.
     unsafe {
-        let replies = Places::new(unit).map(|service| ask(service, heading, pdu));
+        let replies = Places::new(unit).map(|service| ask(service, info, pdu));
         first_reply(replies.map(Reply::from_number)).code()
     }
 }
@@ -161,7 +163,7 @@ pub(super) unsafe fn walk(unit: *mut mbm_unit, heading: *const c_void, pdu: *mut
 /// # Safety
 /// As for [`walk`]; the unit has no `monitor`.
 #[inline(always)]
-unsafe fn walk_alone(unit: *mut mbm_unit, heading: *const c_void, pdu: *mut u8) -> usize {
+unsafe fn walk_alone(unit: *mut mbm_unit, info: *const c_void, pdu: *mut u8) -> usize {
     // SAFETY: as the caller promises; what is read stands in the unit, for the places end
     // with NULL. A hook that gives the unit diagnostics meanwhile is called by a service
     // that serves the request, which ends the walk.
@@ -171,8 +173,8 @@ unsafe fn walk_alone(unit: *mut mbm_unit, heading: *const c_void, pdu: *mut u8) 
             .cast::<*mut mbm_service>();
         while !(*place).is_null() {
             let service = *place;
-            let reply = ask(service, heading, pdu);
-            if reply != Reply::NOT_MINE.code() {
+            let reply = ask(service, info, pdu);
+            if reply != Reply::NOT_HANDLED.code() {
                 return reply;
             }
             place = place.add(1);
@@ -227,12 +229,12 @@ const _: () = {
 /// # Safety
 /// As for [`Serve`].
 #[inline(always)]
-unsafe fn ask(service: *mut mbm_service, heading: *const c_void, pdu: *mut u8) -> usize {
+unsafe fn ask(service: *mut mbm_service, info: *const c_void, pdu: *mut u8) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         match (*service).serve {
-            Some(serve) => serve(service, pdu, heading),
-            None => Reply::NOT_MINE.code(),
+            Some(serve) => serve(service, pdu, info),
+            None => Reply::NOT_HANDLED.code(),
         }
     }
 }
@@ -254,12 +256,12 @@ unsafe fn serves(unit: *const mbm_unit) -> bool {
 ///
 /// # Safety
 /// `units` points to `count` units, and `pdu` has the bytes and the room that
-/// `heading` says.
+/// `info` says.
 #[inline(always)]
 pub(super) unsafe fn serve(
     units: *mut mbm_unit,
     count: u8,
-    heading: *const Heading,
+    info: *const RequestInfo,
     pdu: *mut u8,
 ) -> usize {
     // SAFETY: as the caller promises.
@@ -269,14 +271,14 @@ pub(super) unsafe fn serve(
         if !FIRMWARE
             && count == 1
             && (*units).monitor.is_none()
-            && (*heading).length != 0
-            && (*heading).to == (*units).id
-            && (*heading).to != ANY
+            && (*info).length != 0
+            && (*info).to == (*units).id
+            && (*info).to != ANY
             && serves(units)
         {
-            return walk_alone(units, heading.cast(), pdu);
+            return walk_alone(units, info.cast(), pdu);
         }
-        serve_each(units, count, heading, pdu)
+        serve_each(units, count, info, pdu)
     }
 }
 
@@ -289,15 +291,15 @@ pub(super) unsafe fn serve(
 unsafe fn serve_each(
     units: *mut mbm_unit,
     count: u8,
-    heading: *const Heading,
+    info: *const RequestInfo,
     pdu: *mut u8,
 ) -> usize {
     // SAFETY: as the caller promises.
-    let all = unsafe { (*heading).concern_of_all() };
+    let all = unsafe { (*info).addressing_of_all() };
     let mut frame = Frame {
         unit: units,
         left: count,
-        heading,
+        info,
         pdu,
     };
     dispatch(&mut frame, all).code()
@@ -309,7 +311,7 @@ unsafe fn serve_each(
 struct Frame {
     unit: *mut mbm_unit,
     left: u8,
-    heading: *const Heading,
+    info: *const RequestInfo,
     pdu: *mut u8,
 }
 
@@ -317,12 +319,12 @@ impl Dispatch for Frame {
     type Unit = *mut mbm_unit;
 
     #[inline(always)]
-    fn next(&mut self, all: Concern) -> Option<*mut mbm_unit> {
+    fn next(&mut self, all: Addressing) -> Option<*mut mbm_unit> {
         // SAFETY: as for `serve`.
         unsafe {
             loop {
-                if !FIRMWARE && all != Concern::BROADCAST {
-                    let passed = foreign(self.unit, self.left, self.heading, all);
+                if !FIRMWARE && all != Addressing::BROADCAST {
+                    let passed = foreign(self.unit, self.left, self.info, all);
                     self.left -= passed;
                     self.unit = self.unit.add(passed.into());
                 }
@@ -343,18 +345,18 @@ impl Dispatch for Frame {
     #[inline(always)]
     fn is_for(&self, unit: &*mut mbm_unit) -> bool {
         // SAFETY: as for `serve`.
-        unsafe { (*self.heading).is_for((**unit).id) }
+        unsafe { (*self.info).is_for((**unit).id) }
     }
 
     #[inline(always)]
-    fn ask(&mut self, unit: *mut mbm_unit, concern: Concern) -> Option<Reply> {
+    fn ask(&mut self, unit: *mut mbm_unit, addressing: Addressing) -> Option<Reply> {
         // SAFETY: as for `serve`.
         let reply = unsafe {
-            let (heading, pdu) = (self.heading.cast(), self.pdu);
+            let (info, pdu) = (self.info.cast(), self.pdu);
             match (*unit).monitor {
-                Some(monitor) => monitor(unit, heading, concern.code(), pdu),
-                None if concern == Concern::FOREIGN => return None,
-                None => walk_alone(unit, heading, pdu),
+                Some(monitor) => monitor(unit, info, addressing.code(), pdu),
+                None if addressing == Addressing::FOREIGN => return None,
+                None => walk_alone(unit, info, pdu),
             }
         };
         Some(Reply::from_number(reply))
@@ -367,14 +369,19 @@ impl Dispatch for Frame {
 /// # Safety
 /// `units` points to `count` units.
 #[inline(always)]
-unsafe fn foreign(units: *const mbm_unit, count: u8, heading: *const Heading, all: Concern) -> u8 {
+unsafe fn foreign(
+    units: *const mbm_unit,
+    count: u8,
+    info: *const RequestInfo,
+    all: Addressing,
+) -> u8 {
     // SAFETY: as the caller promises; no function of theirs runs meanwhile.
-    let (heading, units) = unsafe { (&*heading, from_raw_parts(units, count.into())) };
+    let (info, units) = unsafe { (&*info, from_raw_parts(units, count.into())) };
     let takes_notice = |unit: &mbm_unit| unit.monitor.is_some();
-    let answers = |unit: &mbm_unit| unit.id == heading.to || unit.id == ANY;
-    if all == Concern::FOREIGN {
+    let answers = |unit: &mbm_unit| unit.id == info.to || unit.id == ANY;
+    if all == Addressing::FOREIGN {
         before(units, takes_notice)
-    } else if heading.is_for_any() {
+    } else if info.is_for_any() {
         0
     } else {
         before(units, |unit| answers(unit) || takes_notice(unit))
@@ -396,9 +403,9 @@ fn before(units: &[mbm_unit], is_it: impl Fn(&mbm_unit) -> bool) -> u8 {
 /// # Safety
 /// As for [`Serve`].
 #[cfg_attr(target_os = "none", inline(never))]
-pub(super) unsafe fn is_unheard(heading: *const c_void, function: u8) -> bool {
+pub(super) unsafe fn is_unheard(info: *const c_void, function: u8) -> bool {
     // SAFETY: as the caller promises.
-    unsafe { (*heading.cast::<Heading>()).is_broadcast() && !only_writes(function) }
+    unsafe { (*info.cast::<RequestInfo>()).is_broadcast() && !only_writes(function) }
 }
 
 /// As [`add`], and moves the service before all others of the unit.

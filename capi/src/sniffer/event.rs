@@ -5,10 +5,10 @@ use crate::pointers::{get, lent_or_none};
 use crate::text::{line, outcome};
 use core::ffi::c_char;
 use mbm::error::Status;
-use mbm::explain::HEAD;
-use mbm::packet::Side;
+use mbm::packet::PduKind;
 use mbm::pdu::custom::Function;
-use mbm::sniffer::{Asked, Event, Kind};
+use mbm::sniffer::{Event, EventKind, RequestStart};
+use mbm::text::HEAD;
 
 /// A request.
 pub const MBM_EVENT_REQUEST: u8 = 0;
@@ -27,13 +27,13 @@ pub const MBM_EVENT_BAD_CRC: u8 = 5;
 pub const MBM_EVENT_NOISE: u8 = 6;
 
 const _: () = {
-    assert!(MBM_EVENT_REQUEST == Kind::Request as u8);
-    assert!(MBM_EVENT_REPLY == Kind::Reply as u8);
-    assert!(MBM_EVENT_EXCEPTION == Kind::Exception as u8);
-    assert!(MBM_EVENT_UNPAIRED == Kind::Unpaired as u8);
-    assert!(MBM_EVENT_TIMEOUT == Kind::Timeout as u8);
-    assert!(MBM_EVENT_BAD_CRC == Kind::BadCrc as u8);
-    assert!(MBM_EVENT_NOISE == Kind::Noise as u8);
+    assert!(MBM_EVENT_REQUEST == EventKind::Request as u8);
+    assert!(MBM_EVENT_REPLY == EventKind::Reply as u8);
+    assert!(MBM_EVENT_EXCEPTION == EventKind::Exception as u8);
+    assert!(MBM_EVENT_UNPAIRED == EventKind::Unpaired as u8);
+    assert!(MBM_EVENT_TIMEOUT == EventKind::Timeout as u8);
+    assert!(MBM_EVENT_BAD_CRC == EventKind::BadCrc as u8);
+    assert!(MBM_EVENT_NOISE == EventKind::Noise as u8);
 };
 
 /// Something that happened on the bus.
@@ -91,15 +91,17 @@ impl mbm_event {
     /// What C sees of an event.
     pub(super) fn of(event: &Event, functions: &[Function]) -> mbm_event {
         let side = match event.kind {
-            Kind::Request | Kind::Timeout | Kind::BadCrc | Kind::Noise => Side::Request,
-            _ => Side::Response,
+            EventKind::Request | EventKind::Timeout | EventKind::BadCrc | EventKind::Noise => {
+                PduKind::Request
+            }
+            _ => PduKind::Response,
         };
         let kind = match side {
-            Side::Request => MBM_PACKET_REQUEST,
-            Side::Response => MBM_PACKET_RESPONSE,
+            PduKind::Request => MBM_PACKET_REQUEST,
+            PduKind::Response => MBM_PACKET_RESPONSE,
         };
         let mut packet = mbm_packet::of(kind, &[event.function]);
-        if !matches!(event.kind, Kind::BadCrc | Kind::Noise) {
+        if !matches!(event.kind, EventKind::BadCrc | EventKind::Noise) {
             // What cannot be read leaves the packet as it is.
             let _ = packet.take(side, event.pdu, functions);
         }
@@ -107,7 +109,7 @@ impl mbm_event {
         packet.transaction = event.transaction;
         let subject = event.subject();
         let mut asked = [0; HEAD];
-        let head = event.asked.as_ref().map_or(&[][..], Asked::head);
+        let head = event.asked.as_ref().map_or(&[][..], RequestStart::head);
         for (place, byte) in asked.iter_mut().zip(head) {
             *place = *byte;
         }
@@ -148,9 +150,11 @@ impl mbm_event {
             )
         };
         let head = self.requestHead.get(..self.requestHeadLength.into());
-        let asked = head.map(Asked::new).filter(|_| self.requestHeadLength > 0);
+        let asked = head
+            .map(RequestStart::new)
+            .filter(|_| self.requestHeadLength > 0);
         Ok(Event {
-            kind: Kind::from_code(self.kind).ok_or(Status::INVALID_ARGUMENT)?,
+            kind: EventKind::from_code(self.kind).ok_or(Status::INVALID_ARGUMENT)?,
             status: Status::from_code(self.status),
             time: self.timeUs,
             response_time: self.responseTimeUs,
@@ -185,7 +189,7 @@ pub unsafe extern "C" fn mbm_event_text(
         let write = || {
             let mut line = line(text, size)?;
             let event = get(event).ok_or(Status::INVALID_ARGUMENT)?;
-            event.told()?.explain(&mut line);
+            event.told()?.text(&mut line);
             Ok(line)
         };
         outcome(write())

@@ -58,12 +58,12 @@ pub(super) struct Object {
 }
 
 const _: () = {
-    let room = size_of::<mbm_sniffer>();
+    let space = size_of::<mbm_sniffer>();
     let used = size_of::<Object>();
     assert!(align_of::<mbm_sniffer>() >= align_of::<Object>());
-    assert!(used <= room);
+    assert!(used <= space);
     // Hiding the fields may waste 5 % where RAM is scarce.
-    assert!(size_of::<usize>() > 4 || (room - used) * 20 <= room);
+    assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
 };
 
 // SAFETY: the mark is a field of its own.
@@ -299,7 +299,7 @@ pub unsafe extern "C" fn mbm_sniffer_setFrameTimeout(
         return Status::INVALID_ARGUMENT.code();
     }
     // SAFETY: as the header demands.
-    unsafe { with(sniffer, |core| core.set_patience(millis(timeoutMs))) }
+    unsafe { with(sniffer, |core| core.set_frame_timeout(millis(timeoutMs))) }
 }
 
 /// Takes bytes that were heard. Call mbm_sniffer_next until there is nothing

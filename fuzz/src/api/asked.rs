@@ -21,7 +21,7 @@ unsafe extern "C" fn done(_: *mut c_void, request: *mut mbm_clientRequest) {
 
 /// Sets the fields of a request with `bytes` bytes of data.
 fn fill(w: &World, request: *mut mbm_clientRequest, bytes: usize) {
-    let room = match w.byte() {
+    let space = match w.byte() {
         0..0xA0 => 256,
         _ => w.word(),
     };
@@ -36,9 +36,9 @@ fn fill(w: &World, request: *mut mbm_clientRequest, bytes: usize) {
         (*request).reply = if w.rarely(8) {
             null_mut()
         } else {
-            w.noise(room.into()).cast()
+            w.noise(space.into()).cast()
         };
-        (*request).replyBytes = room;
+        (*request).replyBytes = space;
         (*request).transaction = if w.rarely(8) { w.word() } else { 0 };
         (*request).unit = w.unit_id();
     }

@@ -94,8 +94,8 @@ fn respond(w: &World) {
         kind: framing,
         delimiter: if w.rarely(16) { w.byte() } else { 0 },
     });
-    let room = w.word();
-    let capacity = if w.rarely(4) { room } else { 513 };
+    let space = w.word();
+    let capacity = if w.rarely(4) { space } else { 513 };
     let length = request.len().min(capacity.into());
     let frame = w.noise(capacity.into());
     for (at, byte) in request[..length].iter().enumerate() {

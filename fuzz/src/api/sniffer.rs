@@ -84,18 +84,18 @@ fn next(w: &World, sniffer: *mut mbm_sniffer) {
 
 fn feed(w: &World, sniffer: *mut mbm_sniffer) {
     let tap = if w.rarely(16) { w.byte() } else { w.byte() % 3 };
-    let mut heard = traffic::request(w, w.byte() % 4);
+    let mut received = traffic::request(w, w.byte() % 4);
     if w.rarely(2) {
-        let answer = traffic::answer(w, w.byte() % 4, &heard);
-        heard.extend(answer);
+        let answer = traffic::answer(w, w.byte() % 4, &received);
+        received.extend(answer);
     }
-    let bytes = w.array(&heard);
+    let bytes = w.array(&received);
     let bytes = if w.rarely(64) {
         null()
     } else {
         bytes.cast_const()
     };
-    let (length, now) = (heard.len() as u16, w.clock.get());
+    let (length, now) = (received.len() as u16, w.clock.get());
     let taken = call!(
         w,
         sniffer,

@@ -2,9 +2,11 @@
 
 use super::Tcp;
 use crate::bytes::move_to_front;
-use crate::client::job::{data_of, deliver, is_answer, store_data, Job, Stage};
-use crate::client::means::Means;
-use crate::client::shared::Shared;
+use crate::client::queue::RequestQueue;
+use crate::client::request::{
+    data_of, is_answer, store_data, store_response, ClientRequest, Stage,
+};
+use crate::client::storage::ClientStorage;
 use crate::engine::Counter;
 use crate::error::Status;
 use crate::frame::tcp::{self, Header};
@@ -13,11 +15,11 @@ use crate::port::Port;
 /// Index of the data in the response frame of a read, after function code and byte count.
 const READ_DATA: usize = tcp::PDU + 2;
 
-impl<P: Port, S: Means> Tcp<P, S> {
+impl<P: Port, S: ClientStorage> Tcp<P, S> {
     /// Moves the bytes that were not searched yet to the start of the buffer.
     #[cold]
     pub(super) fn compact(&mut self) {
-        move_to_front(self.means.bytes(0, self.end), self.start.into());
+        move_to_front(self.storage.bytes(0, self.end), self.start.into());
         self.end -= self.start;
         self.start = 0;
     }
@@ -25,69 +27,69 @@ impl<P: Port, S: Means> Tcp<P, S> {
     /// As [`Tcp::find`], but finds only the most frequent response: a complete, right one to
     /// the first request in the queue, if that request is a read.
     #[inline]
-    pub(super) fn find_read<J: Job, const N: usize>(
+    pub(super) fn find_read<J: ClientRequest, const N: usize>(
         &mut self,
-        shared: &mut Shared<J, N>,
+        queue: &mut RequestQueue<J, N>,
         now: u32,
     ) -> Option<J> {
-        let job = shared.queue.first_mut()?;
-        let ticket = job.ticket();
-        let asked = ticket.outline.data_of_read()?;
+        let request = queue.queue.first_mut()?;
+        let state = request.state();
+        let asked = state.header.data_of_read()?;
         let total = READ_DATA + usize::from(asked);
         let begin = usize::from(self.start);
         if usize::from(self.end) - begin < total {
             return None;
         }
-        let frame = self.means.slice(self.start, total as u16);
+        let frame = self.storage.slice(self.start, total as u16);
         let (start, rest) = frame.split_first_chunk()?;
         let (count, data) = rest.split_first()?;
-        let function = ticket.outline.function();
-        if u64::from_be_bytes(*start) != tcp::start(ticket.wire, asked + 2, ticket.unit, function)
+        let function = state.header.function();
+        if u64::from_be_bytes(*start) != tcp::start(state.wire, asked + 2, state.unit, function)
             || *count != asked
             || self.skip > 0
-            || !ticket.is(Stage::Sent)
-            || store_data(job, data) != Status::OK
+            || !state.is(Stage::Sent)
+            || store_data(request, data) != Status::OK
         {
             return None;
         }
         self.start += total as u16;
-        self.answered(shared, 0, Status::OK, now)
+        self.answered(queue, 0, Status::OK, now)
     }
 
     /// Ends the request at the index `at`, which was answered, with `status`.
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    fn answered<J: Job, const N: usize>(
+    fn answered<J: ClientRequest, const N: usize>(
         &mut self,
-        shared: &mut Shared<J, N>,
+        queue: &mut RequestQueue<J, N>,
         at: usize,
         status: Status,
         now: u32,
     ) -> Option<J> {
-        self.astray = false;
-        self.flying = self.flying.wrapping_sub(1);
-        shared.connected = true;
+        self.resyncing = false;
+        self.in_flight = self.in_flight.wrapping_sub(1);
+        queue.connected = true;
         if is_answer(status) {
-            self.means.count(Counter::Replies, 1);
+            self.storage.count(Counter::Replies, 1);
             if status != Status::OK {
-                self.means.count(Counter::Exceptions, 1);
+                self.storage.count(Counter::Exceptions, 1);
             }
         }
-        shared.end(at, status, now, &mut self.means)
+        queue.end(at, status, now, &mut self.storage)
     }
 
     /// Finds the next response in the received bytes. Returns a request that has ended.
     #[cold]
-    pub(super) fn find<J: Job, const N: usize>(
+    pub(super) fn find<J: ClientRequest, const N: usize>(
         &mut self,
-        shared: &mut Shared<J, N>,
+        queue: &mut RequestQueue<J, N>,
         now: u32,
     ) -> Option<J> {
         loop {
             if self.skip > 0 {
                 self.skip_frame();
             }
-            let room = usize::from(self.means.room());
-            let rest = self.means.bytes(self.start, self.end - self.start);
+            let space = usize::from(self.storage.capacity());
+            let rest = self.storage.bytes(self.start, self.end - self.start);
             let header = match tcp::header(rest) {
                 Ok(header) => header,
                 Err(Status::INCOMPLETE_FRAME) => return None,
@@ -96,25 +98,28 @@ impl<P: Port, S: Means> Tcp<P, S> {
                     continue;
                 }
             };
-            let mut jobs = shared.queue.iter_mut().enumerate();
-            let asked = jobs.find(|(_, job)| is_answered_by(*job, &header));
-            if asked.is_none() && self.astray {
+            let mut requests = queue.queue.iter_mut().enumerate();
+            let asked = requests.find(|(_, request)| is_answered_by(*request, &header));
+            if asked.is_none() && self.resyncing {
                 self.start += 1;
                 continue;
             }
             let is_whole = header.total <= rest.len();
-            if !is_whole && header.total <= room {
+            if !is_whole && header.total <= space {
                 return None;
             }
-            let Some((at, job)) = asked else {
+            let Some((at, request)) = asked else {
                 self.skip = header.total as u16;
-                self.note_foreign_frame(shared, &header);
+                self.note_foreign_frame(queue, &header);
                 continue;
             };
             let mut status = Status::BUFFER_TOO_SMALL;
             if is_whole {
-                status = judge(job, rest.get(tcp::PDU..header.total).unwrap_or_default());
-                if self.astray && !is_answer(status) && status != Status::BUFFER_TOO_SMALL {
+                status = validate(
+                    request,
+                    rest.get(tcp::PDU..header.total).unwrap_or_default(),
+                );
+                if self.resyncing && !is_answer(status) && status != Status::BUFFER_TOO_SMALL {
                     // These bytes only look like a header.
                     self.start += 1;
                     continue;
@@ -122,8 +127,8 @@ impl<P: Port, S: Means> Tcp<P, S> {
             }
             // Bytes of the frame that did not fit are skipped as they arrive.
             self.skip = header.total as u16;
-            if let Some(job) = self.answered(shared, at, status, now) {
-                return Some(job);
+            if let Some(request) = self.answered(queue, at, status, now) {
+                return Some(request);
             }
         }
     }
@@ -141,61 +146,61 @@ impl<P: Port, S: Means> Tcp<P, S> {
     #[cold]
     pub(super) fn skip_byte(&mut self) {
         self.start += 1;
-        if !self.astray {
-            self.astray = true;
-            self.means.count(Counter::Resynchronisations, 1);
+        if !self.resyncing {
+            self.resyncing = true;
+            self.storage.count(Counter::Resynchronisations, 1);
         }
     }
 
     /// Counts a frame that answers no request. If it has the number of a request, records
     /// there that another unit answered.
     #[cold]
-    fn note_foreign_frame<J: Job, const N: usize>(
+    fn note_foreign_frame<J: ClientRequest, const N: usize>(
         &mut self,
-        shared: &mut Shared<J, N>,
+        queue: &mut RequestQueue<J, N>,
         header: &Header,
     ) {
-        self.means.count(Counter::ForeignFrames, 1);
-        for job in shared.queue.iter_mut() {
-            let ticket = job.ticket_mut();
-            if ticket.is_sent() && ticket.wire == header.transaction {
-                ticket.note_other_unit();
+        self.storage.count(Counter::ForeignFrames, 1);
+        for request in queue.queue.iter_mut() {
+            let state = request.state_mut();
+            if state.is_sent() && state.wire == header.transaction {
+                state.note_other_unit();
             }
         }
     }
 }
 
 /// True if a response with this header answers the request.
-fn is_answered_by<J: Job>(job: &J, header: &Header) -> bool {
-    let ticket = job.ticket();
-    ticket.is_sent() && ticket.wire == header.transaction && ticket.unit == header.unit
+fn is_answered_by<J: ClientRequest>(request: &J, header: &Header) -> bool {
+    let state = request.state();
+    state.is_sent() && state.wire == header.transaction && state.unit == header.unit
 }
 
 /// Checks the response `pdu` and stores its data in the request. Returns the status of the
 /// request.
-fn judge<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
-    let outline = &job.ticket().outline;
-    if outline.is_repeated_by(pdu) {
-        return deliver(job, pdu);
+fn validate<J: ClientRequest>(request: &mut J, pdu: &[u8]) -> Status {
+    let header = &request.state().header;
+    if header.is_repeated_by(pdu) {
+        return store_response(request, pdu);
     }
     let [function, ..] = *pdu else {
         return Status::MALFORMED_REPLY;
     };
-    if function & 0x7F != outline.function() {
+    if function & 0x7F != header.function() {
         return Status::INVALID_FUNCTION;
     }
-    let expected = outline.expected(pdu, pdu.len());
+    let expected = header.expected(pdu, pdu.len());
     if expected.map(|length| length.get().into()) != Some(pdu.len()) {
         return Status::MALFORMED_REPLY;
     }
-    let status = outline.judge(pdu, data_of(job));
+    let status = header.validate(pdu, data_of(request));
     if let [function, code, ..] = *pdu {
         if function & 0x80 != 0 {
-            job.ticket_mut().exception = code;
+            request.state_mut().exception = code;
         }
     }
     match status {
-        Status::OK => deliver(job, pdu),
+        Status::OK => store_response(request, pdu),
         other => other,
     }
 }

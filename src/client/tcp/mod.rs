@@ -3,10 +3,10 @@
 
 mod find;
 
-use super::job::{data_of, Job, Stage};
-use super::line::Line;
-use super::means::Means;
-use super::shared::Shared;
+use super::queue::RequestQueue;
+use super::request::{data_of, ClientRequest, Stage};
+use super::storage::ClientStorage;
+use super::transport::Transport;
 use crate::bytes::move_to_front;
 use crate::engine::{Counter, Settings};
 use crate::error::Status;
@@ -15,11 +15,11 @@ use crate::port::Port;
 use crate::FIRMWARE;
 
 /// A TCP stream with as many requests in flight as the queue holds. Received bytes are in
-/// the frame buffer, bytes to send in [`Means::outgoing`].
+/// the frame buffer, bytes to send in [`ClientStorage::outgoing`].
 #[repr(C)]
 pub struct Tcp<P, S> {
     /// Number of requests in flight, and its limit.
-    flying: u8,
+    in_flight: u8,
     max_in_flight: u8,
     /// The received bytes that were not searched yet: the indices of the first, and after
     /// the last, in the frame buffer.
@@ -36,13 +36,13 @@ pub struct Tcp<P, S> {
     skip: u16,
     /// The frame boundaries are lost. Until they are found, only a right response to a
     /// request counts as a frame.
-    astray: bool,
+    resyncing: bool,
     /// A queued request waits until another ends or the transmit buffer has space.
     blocked: bool,
     /// The byte stream.
     pub port: P,
     /// The caller's buffers and records.
-    pub means: S,
+    pub storage: S,
     /// TCP uses only the response timeout, and the turnaround delay for requests without a
     /// response.
     pub settings: Settings,
@@ -50,7 +50,7 @@ pub struct Tcp<P, S> {
 
 impl<P, S> Tcp<P, S> {
     /// A stream that is open or will be opened.
-    pub const fn new(port: P, means: S) -> Self {
+    pub const fn new(port: P, storage: S) -> Self {
         Tcp {
             next: 0,
             start: 0,
@@ -58,12 +58,12 @@ impl<P, S> Tcp<P, S> {
             skip: 0,
             filled: 0,
             sent: 0,
-            flying: 0,
+            in_flight: 0,
             max_in_flight: u8::MAX,
-            astray: false,
+            resyncing: false,
             blocked: false,
             port,
-            means,
+            storage,
             settings: Settings::DEFAULT,
         }
     }
@@ -79,58 +79,62 @@ impl<P, S> Tcp<P, S> {
         self.skip = 0;
         self.filled = 0;
         self.sent = 0;
-        self.flying = 0;
-        self.astray = false;
+        self.in_flight = 0;
+        self.resyncing = false;
     }
 }
 
-impl<P: Port, S: Means> Tcp<P, S> {
+impl<P: Port, S: ClientStorage> Tcp<P, S> {
     /// Reads the bytes that have arrived; false if the link is lost.
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    fn hear(&mut self) -> bool {
+    fn read_bytes(&mut self) -> bool {
         if self.start == self.end {
             self.start = 0;
             self.end = 0;
         } else if self.start > 0 {
             self.compact();
         }
-        let length = self.means.room() - self.end;
-        let room = self.means.bytes(self.end, length);
-        if room.is_empty() {
+        let length = self.storage.capacity() - self.end;
+        let space = self.storage.bytes(self.end, length);
+        if space.is_empty() {
             return true;
         }
-        let heard = self.port.read(room);
-        if heard < 0 {
+        let received = self.port.read(space);
+        if received < 0 {
             return false;
         }
-        let heard = heard as u16;
-        self.means.count(Counter::BytesReceived, heard);
-        self.end += heard;
+        let received = received as u16;
+        self.storage.count(Counter::BytesReceived, received);
+        self.end += received;
         true
     }
 
     /// Ends the requests whose time is over, and sends queued requests. Returns a request
     /// that has ended.
     #[inline]
-    fn send<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>, now: u32) -> Option<J> {
+    fn send<J: ClientRequest, const N: usize>(
+        &mut self,
+        queue: &mut RequestQueue<J, N>,
+        now: u32,
+    ) -> Option<J> {
         let mut stuck = false;
-        if self.flying == 0 && self.sent < self.filled {
-            let Some(is_stuck) = self.flush_remainder(shared) else {
-                return self.end_all_lost(shared, now);
+        if self.in_flight == 0 && self.sent < self.filled {
+            let Some(is_stuck) = self.flush_remainder(queue) else {
+                return self.end_all_lost(queue, now);
             };
             stuck = is_stuck;
         }
         let mut reads_left = u8::MAX;
-        while shared.delay(now) == 0 {
-            let Some((at, status)) = self.advance_queue(shared, now, stuck) else {
+        while queue.delay(now) == 0 {
+            let Some((at, status)) = self.advance_queue(queue, now, stuck) else {
                 break;
             };
-            if let Some(job) = self.conclude(shared, at, status, now, &mut reads_left) {
-                return Some(job);
+            if let Some(request) = self.conclude(queue, at, status, now, &mut reads_left) {
+                return Some(request);
             }
         }
-        if !self.flush(shared) {
-            return self.end_all_lost(shared, now);
+        if !self.flush(queue) {
+            return self.end_all_lost(queue, now);
         }
         None
     }
@@ -138,9 +142,9 @@ impl<P: Port, S: Means> Tcp<P, S> {
     /// Ends the request that [`Tcp::advance_queue`] found at the index `at`. If the time of
     /// the request is over, reads the port first, as long as `reads_left` is not 0.
     #[cold]
-    fn conclude<J: Job, const N: usize>(
+    fn conclude<J: ClientRequest, const N: usize>(
         &mut self,
-        shared: &mut Shared<J, N>,
+        queue: &mut RequestQueue<J, N>,
         at: usize,
         mut status: Status,
         now: u32,
@@ -150,8 +154,8 @@ impl<P: Port, S: Means> Tcp<P, S> {
             // At the deadline, all bytes that have arrived are searched, even if the
             // buffer cannot hold them at once.
             let before = self.end - self.start;
-            if *reads_left > 0 && !self.hear() {
-                return self.end_all_lost(shared, now);
+            if *reads_left > 0 && !self.read_bytes() {
+                return self.end_all_lost(queue, now);
             }
             *reads_left = reads_left.saturating_sub(1);
             if self.start < self.end {
@@ -160,21 +164,21 @@ impl<P: Port, S: Means> Tcp<P, S> {
                     // that hides the response.
                     self.skip_byte();
                 }
-                return self.find(shared, now);
+                return self.find(queue, now);
             }
-            self.flying = self.flying.wrapping_sub(1);
-            status = self.overdue(shared.queue.get(at)?);
+            self.in_flight = self.in_flight.wrapping_sub(1);
+            status = self.overdue(queue.queue.get(at)?);
         }
-        shared.end(at, status, now, &mut self.means)
+        queue.end(at, status, now, &mut self.storage)
     }
 
     /// Writes the queued requests that are due into the transmit buffer. Returns the index of
     /// a request that has ended and its status, [`Status::PENDING`] if its time is over. A
     /// request for which the buffer has no space waits, unless the bytes before it are
     /// `stuck`.
-    fn advance_queue<J: Job, const N: usize>(
+    fn advance_queue<J: ClientRequest, const N: usize>(
         &mut self,
-        shared: &mut Shared<J, N>,
+        queue: &mut RequestQueue<J, N>,
         now: u32,
         stuck: bool,
     ) -> Option<(usize, Status)> {
@@ -182,25 +186,25 @@ impl<P: Port, S: Means> Tcp<P, S> {
         self.blocked = false;
         let mut at = 0;
         let ended = loop {
-            let Some(job) = shared.queue.get_mut(at) else {
-                shared.set_next_due(now, least);
+            let Some(request) = queue.queue.get_mut(at) else {
+                queue.set_next_due(now, least);
                 return None;
             };
             at += 1;
-            let ticket = job.ticket();
-            let mut wait = ticket.remaining_wait(now, &mut self.means);
+            let state = request.state();
+            let mut wait = state.remaining_wait(now, &mut self.storage);
             if wait == 0 {
-                if ticket.is_sent() {
+                if state.is_sent() {
                     break Status::PENDING;
                 }
-                if !ticket.is(Stage::Queued) {
+                if !state.is(Stage::Queued) {
                     break Status::LINK_LOST;
                 }
-                match self.encode(job, now, stuck) {
+                match self.encode(request, now, stuck) {
                     Status::OK => {
-                        wait = job.ticket().wait;
+                        wait = request.state().wait;
                         if self.next as u8 == 0 {
-                            self.skip_numbers_in_use(&shared.queue);
+                            self.skip_numbers_in_use(&queue.queue);
                         }
                     }
                     Status::BUSY => {
@@ -219,10 +223,10 @@ impl<P: Port, S: Means> Tcp<P, S> {
     /// in flight uses. At most 255 requests are in flight, so there is such a block. The
     /// other 255 numbers of the block then need no search of the queue.
     #[cold]
-    fn skip_numbers_in_use<J: Job>(&mut self, queue: &[J]) {
-        while queue.iter().any(|job| {
-            let ticket = job.ticket();
-            ticket.is_sent() && ticket.wire >> 8 == self.next >> 8
+    fn skip_numbers_in_use<J: ClientRequest>(&mut self, queue: &[J]) {
+        while queue.iter().any(|request| {
+            let state = request.state();
+            state.is_sent() && state.wire >> 8 == self.next >> 8
         }) {
             self.next = self.next.wrapping_add(256);
         }
@@ -231,61 +235,61 @@ impl<P: Port, S: Means> Tcp<P, S> {
     /// Appends the frame of a request to the transmit buffer. Returns [`Status::BUSY`] if
     /// the request has to wait for others, [`Status::LINE_BUSY`] if the bytes before it are
     /// `stuck`, [`Status::BUFFER_TOO_SMALL`] if the buffer can never hold it.
-    fn encode<J: Job>(&mut self, job: &mut J, now: u32, stuck: bool) -> Status {
-        if self.flying >= self.max_in_flight {
+    fn encode<J: ClientRequest>(&mut self, request: &mut J, now: u32, stuck: bool) -> Status {
+        if self.in_flight >= self.max_in_flight {
             return Status::BUSY;
         }
-        let ticket = job.ticket();
-        let (unit, outline) = (ticket.unit, &ticket.outline);
+        let state = request.state();
+        let (unit, header) = (state.unit, &state.header);
         let begin = usize::from(self.filled);
-        let Some(room) = self.means.outgoing().get_mut(begin..) else {
+        let Some(space) = self.storage.outgoing().get_mut(begin..) else {
             return Status::BUSY;
         };
-        let length = match (outline.two_words(), room.first_chunk_mut()) {
+        let length = match (header.two_words(), space.first_chunk_mut()) {
             (Some(words), Some(frame)) => {
-                let start = tcp::start(self.next, 5, unit, outline.function());
+                let start = tcp::start(self.next, 5, unit, header.function());
                 *frame = tcp::short(start, *words);
                 frame.len()
             }
-            _ => match write_frame(job, room, self.next) {
+            _ => match write_frame(request, space, self.next) {
                 Ok(length) => length,
                 Err(refused) if begin == 0 => return refused,
                 Err(_) if stuck => return Status::LINE_BUSY,
                 Err(_) => return Status::BUSY,
             },
         };
-        let ticket = job.ticket_mut();
-        let wait = if ticket.outline.is_answered() {
+        let state = request.state_mut();
+        let wait = if state.header.is_answered() {
             self.settings.response_timeout
         } else {
             self.settings.turnaround_delay
         };
-        ticket.wire = self.next;
-        ticket.enter(Stage::Sent, now, wait);
+        state.wire = self.next;
+        state.enter(Stage::Sent, now, wait);
         self.filled += length as u16;
         self.next = self.next.wrapping_add(1);
-        self.flying += 1;
-        self.means.count(Counter::Requests, 1);
+        self.in_flight += 1;
+        self.storage.count(Counter::Requests, 1);
         Status::OK
     }
 
     /// Writes the transmit buffer to the port; false if the link is lost.
-    fn flush<J: Job, const N: usize>(&mut self, shared: &mut Shared<J, N>) -> bool {
+    fn flush<J: ClientRequest, const N: usize>(&mut self, queue: &mut RequestQueue<J, N>) -> bool {
         if self.sent >= self.filled {
             return true;
         }
-        let bytes = self.means.to_send(self.sent, self.filled);
+        let bytes = self.storage.to_send(self.sent, self.filled);
         let sent = self.port.write(bytes);
         if sent < 0 {
             return false;
         }
         let sent = sent as u16;
-        self.means.count(Counter::BytesSent, sent);
+        self.storage.count(Counter::BytesSent, sent);
         self.sent += sent;
         if self.sent == self.filled {
             self.sent = 0;
             self.filled = 0;
-            shared.changed |= self.blocked;
+            queue.changed |= self.blocked;
             self.blocked = false;
         }
         true
@@ -295,16 +299,16 @@ impl<P: Port, S: Means> Tcp<P, S> {
     /// Returns true if the port accepts none of them: requests that wait for their space
     /// would wait for ever. `None` if the link is lost.
     #[cold]
-    fn flush_remainder<J: Job, const N: usize>(
+    fn flush_remainder<J: ClientRequest, const N: usize>(
         &mut self,
-        shared: &mut Shared<J, N>,
+        queue: &mut RequestQueue<J, N>,
     ) -> Option<bool> {
         let before = self.sent;
-        if !self.flush(shared) {
+        if !self.flush(queue) {
             return None;
         }
         let stuck = before == self.sent;
-        shared.changed |= stuck && self.blocked;
+        queue.changed |= stuck && self.blocked;
         Some(stuck)
     }
 
@@ -312,7 +316,7 @@ impl<P: Port, S: Means> Tcp<P, S> {
     /// none of its bytes were sent. True if the frame was not sent, or only partly.
     #[cold]
     fn remove_unsent(&mut self, wire: u16) -> bool {
-        let (bytes, mut at) = (self.means.to_send(0, self.filled), 0);
+        let (bytes, mut at) = (self.storage.to_send(0, self.filled), 0);
         while let Some(rest) = bytes.get_mut(at..) {
             let Ok(header) = tcp::header(rest) else {
                 break;
@@ -337,15 +341,15 @@ impl<P: Port, S: Means> Tcp<P, S> {
 
     /// Returns the status of a request whose time is over.
     #[cold]
-    fn overdue<J: Job>(&mut self, job: &J) -> Status {
-        let ticket = job.ticket();
-        if !ticket.outline.is_answered() {
+    fn overdue<J: ClientRequest>(&mut self, request: &J) -> Status {
+        let state = request.state();
+        if !state.header.is_answered() {
             return Status::OK;
         }
-        self.means.count(Counter::Timeouts, 1);
-        if self.remove_unsent(ticket.wire) {
+        self.storage.count(Counter::Timeouts, 1);
+        if self.remove_unsent(state.wire) {
             Status::LINE_BUSY
-        } else if ticket.is(Stage::OtherUnit) {
+        } else if state.is(Stage::OtherUnit) {
             Status::INVALID_SLAVE_ID
         } else {
             Status::RESPONSE_TIMED_OUT
@@ -354,74 +358,78 @@ impl<P: Port, S: Means> Tcp<P, S> {
 
     /// Ends all requests, because the link is lost. Returns the first of them.
     #[cold]
-    fn end_all_lost<J: Job, const N: usize>(
+    fn end_all_lost<J: ClientRequest, const N: usize>(
         &mut self,
-        shared: &mut Shared<J, N>,
+        queue: &mut RequestQueue<J, N>,
         now: u32,
     ) -> Option<J> {
         self.clear();
-        shared.disconnect();
-        shared.end(0, Status::LINK_LOST, now, &mut self.means)
+        queue.disconnect();
+        queue.end(0, Status::LINK_LOST, now, &mut self.storage)
     }
 }
 
 /// Writes the frame of any request to the start of `place`, and returns its length.
 #[cold]
-fn write_frame<J: Job>(job: &J, place: &mut [u8], wire: u16) -> Result<usize, Status> {
-    let ticket = job.ticket();
-    let outline = &ticket.outline;
-    tcp::emit(place, wire, ticket.unit, |pdu| {
-        let length = usize::from(outline.request_length());
+fn write_frame<J: ClientRequest>(
+    request: &J,
+    place: &mut [u8],
+    wire: u16,
+) -> Result<usize, Status> {
+    let state = request.state();
+    let header = &state.header;
+    tcp::emit(place, wire, state.unit, |pdu| {
+        let length = usize::from(header.request_length());
         let pdu = pdu.get_mut(..length).ok_or(Status::BUFFER_TOO_SMALL)?;
-        outline.emit(pdu, data_of(job));
+        header.emit(pdu, data_of(request));
         Ok(length)
     })
 }
 
-impl<P: Port, S: Means, J: Job> Line<J> for Tcp<P, S> {
+impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Tcp<P, S> {
     const MAX_IN_FLIGHT: usize = u8::MAX as usize;
-    const BROADCASTS: bool = false;
-    const HAS_IDS: bool = true;
+    const HAS_BROADCAST: bool = false;
+    const HAS_TRANSACTION_IDS: bool = true;
 
     fn advance<const N: usize>(
         &mut self,
-        shared: &mut Shared<J, N>,
+        queue: &mut RequestQueue<J, N>,
         now: u32,
         fresh: bool,
     ) -> Option<J> {
-        if shared.queue.is_empty() {
+        if queue.queue.is_empty() {
             return None;
         }
         // Bytes are read also while all requests only wait. If they stayed in the port, a
         // program that waits for bytes in select would wake up at once.
-        let mut fresh = fresh && (self.flying > 0 || shared.delay(now) > 0);
+        let mut fresh = fresh && (self.in_flight > 0 || queue.delay(now) > 0);
         loop {
             if self.start < self.end {
                 if !FIRMWARE {
-                    if let Some(job) = self.find_read(shared, now) {
-                        return Some(job);
+                    if let Some(request) = self.find_read(queue, now) {
+                        return Some(request);
                     }
                 }
-                if let Some(job) = self.find(shared, now) {
-                    return Some(job);
+                if let Some(request) = self.find(queue, now) {
+                    return Some(request);
                 }
             }
             if !fresh {
-                return self.send(shared, now);
+                return self.send(queue, now);
             }
-            if !self.hear() {
-                return self.end_all_lost(shared, now);
+            if !self.read_bytes() {
+                return self.end_all_lost(queue, now);
             }
             fresh = false;
         }
     }
 
-    fn release(&mut self, job: Option<&J>) {
-        let Some(job) = job else {
+    fn release(&mut self, request: Option<&J>) {
+        let Some(request) = request else {
             return self.clear();
         };
-        self.flying = self.flying.wrapping_sub(1);
-        self.remove_unsent(job.ticket().wire);
+        self.in_flight = self.in_flight.wrapping_sub(1);
+        self.remove_unsent(request.state().wire);
     }
 
     fn is_idle(&self) -> bool {

@@ -16,7 +16,7 @@ const LAYERS: [&[&str]; 9] = [
     &["frame"],
     &["pdu"],
     &["packet"],
-    &["explain"],
+    &["text"],
     &["sniffer", "engine"],
     &["master", "client", "server"],
 ];

@@ -3,7 +3,7 @@
 use super::{plain, special};
 use crate::client::{mbm_client, mbm_clientRequest};
 use mbm::error::Status;
-use mbm::pdu::outline::Form;
+use mbm::pdu::header::FunctionSpec;
 
 /// Function 01: reads coils into `reply`, eight to a byte, the lowest bit first, the
 /// last byte padded with zeros (V1.1b3, 6.1).
@@ -34,7 +34,7 @@ pub unsafe extern "C" fn mbm_client_readCoils(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { plain(client, request, address, quantity, Form::READ_COILS) }
+    unsafe { plain(client, request, address, quantity, FunctionSpec::READ_COILS) }
 }
 
 /// Function 02: reads discrete inputs, as mbm_client_readCoils (V1.1b3, 6.2).
@@ -58,7 +58,7 @@ pub unsafe extern "C" fn mbm_client_readDiscreteInputs(
             request,
             address,
             quantity,
-            Form::READ_DISCRETE_INPUTS,
+            FunctionSpec::READ_DISCRETE_INPUTS,
         )
     }
 }
@@ -84,7 +84,7 @@ pub unsafe extern "C" fn mbm_client_readHoldingRegisters(
             request,
             address,
             quantity,
-            Form::READ_HOLDING_REGISTERS,
+            FunctionSpec::READ_HOLDING_REGISTERS,
         )
     }
 }
@@ -110,7 +110,7 @@ pub unsafe extern "C" fn mbm_client_readInputRegisters(
             request,
             address,
             quantity,
-            Form::READ_INPUT_REGISTERS,
+            FunctionSpec::READ_INPUT_REGISTERS,
         )
     }
 }
@@ -136,7 +136,7 @@ pub unsafe extern "C" fn mbm_client_writeSingleCoil(
             request,
             address,
             if on == 0 { 0 } else { 0xFF00 },
-            Form::WRITE_SINGLE_COIL,
+            FunctionSpec::WRITE_SINGLE_COIL,
         )
     }
 }
@@ -156,7 +156,15 @@ pub unsafe extern "C" fn mbm_client_writeSingleRegister(
     value: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { plain(client, request, address, value, Form::WRITE_SINGLE_REGISTER) }
+    unsafe {
+        plain(
+            client,
+            request,
+            address,
+            value,
+            FunctionSpec::WRITE_SINGLE_REGISTER,
+        )
+    }
 }
 
 /// Function 0F: writes the coils of `data`, eight to a byte, the lowest bit first
@@ -181,7 +189,7 @@ pub unsafe extern "C" fn mbm_client_writeMultipleCoils(
             request,
             address,
             quantity,
-            Form::WRITE_MULTIPLE_COILS,
+            FunctionSpec::WRITE_MULTIPLE_COILS,
         )
     }
 }
@@ -207,7 +215,7 @@ pub unsafe extern "C" fn mbm_client_writeMultipleRegisters(
             request,
             address,
             quantity,
-            Form::WRITE_MULTIPLE_REGISTERS,
+            FunctionSpec::WRITE_MULTIPLE_REGISTERS,
         )
     }
 }
@@ -234,7 +242,7 @@ pub unsafe extern "C" fn mbm_client_maskWriteRegister(
         special(
             client,
             request,
-            Form::MASK_WRITE_REGISTER,
+            FunctionSpec::MASK_WRITE_REGISTER,
             [address.into(), andMask.into(), orMask.into(), 0],
             None,
         )
@@ -265,7 +273,7 @@ pub unsafe extern "C" fn mbm_client_readWriteMultipleRegisters(
         special(
             client,
             request,
-            Form::READ_WRITE_REGISTERS,
+            FunctionSpec::READ_WRITE_REGISTERS,
             [
                 readAddress.into(),
                 readQuantity.into(),
@@ -273,8 +281,8 @@ pub unsafe extern "C" fn mbm_client_readWriteMultipleRegisters(
                 writeQuantity.into(),
             ],
             Some(|inside, words, readable| {
-                let outline = &mut inside.ticket.outline;
-                match outline.add_write(words[2] as u16, words[3] as u16) {
+                let header = &mut inside.state.header;
+                match header.add_write(words[2] as u16, words[3] as u16) {
                     Status::OK => readable,
                     refused => refused,
                 }

@@ -2,13 +2,13 @@
 //! user's.
 
 use super::{bare, plain, special};
-use crate::client::request::Inside;
+use crate::client::request::RequestFields;
 use crate::client::{mbm_client, mbm_clientRequest};
 use crate::functions::{mbm_rule, MBM_RULE_COUNTED, MBM_RULE_FIXED, MBM_RULE_SILENCE};
 use crate::pointers::lent_or_none;
 use mbm::error::Status;
+use mbm::pdu::header::{FunctionSpec, RequestHeader, COUNTS, FIXED, GROUP, OWN};
 use mbm::pdu::limits::MAX_PDU;
-use mbm::pdu::outline::{Form, Outline, COUNTS, FIXED, GROUP, OWN};
 
 /// Function 07: reads eight outputs into a byte (V1.1b3, 6.7).
 ///
@@ -21,7 +21,7 @@ pub unsafe extern "C" fn mbm_client_readExceptionStatus(
     request: *mut mbm_clientRequest,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { bare(client, request, Form::READ_EXCEPTION_STATUS) }
+    unsafe { bare(client, request, FunctionSpec::READ_EXCEPTION_STATUS) }
 }
 
 /// Function 08: sends the words of `data`, and reads as many into `reply` (V1.1b3,
@@ -46,11 +46,11 @@ pub unsafe extern "C" fn mbm_client_diagnostics(
         special(
             client,
             request,
-            Form::DIAGNOSTICS,
+            FunctionSpec::DIAGNOSTICS,
             [subFunction.into(), words.into(), 0, 0],
             Some(|inside, words, _| {
-                let outline = &mut inside.ticket.outline;
-                outline.add_words(words[0] as u16, words[1] as u16)
+                let header = &mut inside.state.header;
+                header.add_words(words[0] as u16, words[1] as u16)
             }),
         )
     }
@@ -68,7 +68,7 @@ pub unsafe extern "C" fn mbm_client_getCommEventCounter(
     request: *mut mbm_clientRequest,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { bare(client, request, Form::GET_COMM_EVENT_COUNTER) }
+    unsafe { bare(client, request, FunctionSpec::GET_COMM_EVENT_COUNTER) }
 }
 
 /// Function 0C: reads status, event count and message count, two bytes each with the
@@ -83,7 +83,7 @@ pub unsafe extern "C" fn mbm_client_getCommEventLog(
     request: *mut mbm_clientRequest,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { bare(client, request, Form::GET_COMM_EVENT_LOG) }
+    unsafe { bare(client, request, FunctionSpec::GET_COMM_EVENT_LOG) }
 }
 
 /// Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13). `reply`
@@ -100,7 +100,7 @@ pub unsafe extern "C" fn mbm_client_reportServerId(
     request: *mut mbm_clientRequest,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { bare(client, request, Form::REPORT_SERVER_ID) }
+    unsafe { bare(client, request, FunctionSpec::REPORT_SERVER_ID) }
 }
 
 /// Function 14: reads records in a row of one file into words (V1.1b3, 6.14).
@@ -124,7 +124,7 @@ pub unsafe extern "C" fn mbm_client_readFileRecord(
         special(
             client,
             request,
-            Form::READ_FILE_RECORD,
+            FunctionSpec::READ_FILE_RECORD,
             [GROUP, file.into(), record.into(), quantity.into()],
             Some(add_group),
         )
@@ -153,7 +153,7 @@ pub unsafe extern "C" fn mbm_client_writeFileRecord(
         special(
             client,
             request,
-            Form::WRITE_FILE_RECORD,
+            FunctionSpec::WRITE_FILE_RECORD,
             [GROUP, file.into(), record.into(), quantity.into()],
             Some(add_group),
         )
@@ -178,9 +178,9 @@ pub unsafe extern "C" fn mbm_client_readFileRecords(
         special(
             client,
             request,
-            Form::READ_FILE_RECORDS,
+            FunctionSpec::READ_FILE_RECORDS,
             [bytes.into(), 0, 0, 0],
-            Some(|inside, words, _| inside.ticket.outline.read_file_records(words[0] as u16)),
+            Some(|inside, words, _| inside.state.header.read_file_records(words[0] as u16)),
         )
     }
 }
@@ -203,9 +203,9 @@ pub unsafe extern "C" fn mbm_client_writeFileRecords(
         special(
             client,
             request,
-            Form::WRITE_FILE_RECORDS,
+            FunctionSpec::WRITE_FILE_RECORDS,
             [bytes.into(), 0, 0, 0],
-            Some(|inside, words, _| inside.ticket.outline.write_file_records(words[0] as u16)),
+            Some(|inside, words, _| inside.state.header.write_file_records(words[0] as u16)),
         )
     }
 }
@@ -223,7 +223,7 @@ pub unsafe extern "C" fn mbm_client_readFifoQueue(
     address: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { plain(client, request, address, 0, Form::READ_FIFO_QUEUE) }
+    unsafe { plain(client, request, address, 0, FunctionSpec::READ_FIFO_QUEUE) }
 }
 
 /// Function 2B/0E: reads objects that identify the device (V1.1b3, 6.21). `reply` gets,
@@ -244,13 +244,13 @@ pub unsafe extern "C" fn mbm_client_readDeviceIdentification(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        let [first, second] = Outline::identification(code, object);
+        let [first, second] = RequestHeader::identification(code, object);
         special(
             client,
             request,
-            Form::READ_DEVICE_IDENTIFICATION,
+            FunctionSpec::READ_DEVICE_IDENTIFICATION,
             [first.into(), second.into(), code.into(), 0],
-            Some(|_, words, _| Outline::check_code(words[2] as u8)),
+            Some(|_, words, _| RequestHeader::check_code(words[2] as u8)),
         )
     }
 }
@@ -275,9 +275,9 @@ pub unsafe extern "C" fn mbm_client_encapsulatedInterfaceTransport(
         special(
             client,
             request,
-            Form::ENCAPSULATED,
+            FunctionSpec::ENCAPSULATED,
             [usize::from(meiType) << 8, bytes.into(), 0, 0],
-            Some(|inside, words, _| inside.ticket.outline.follow(words[1] as u16)),
+            Some(|inside, words, _| inside.state.header.follow(words[1] as u16)),
         )
     }
 }
@@ -310,7 +310,7 @@ pub unsafe extern "C" fn mbm_client_custom(
         special(
             client,
             request,
-            Form::CUSTOM,
+            FunctionSpec::CUSTOM,
             words,
             Some(|inside, words, _| {
                 let response: *const mbm_rule = core::ptr::with_exposed_provenance(words[2]);
@@ -327,8 +327,8 @@ pub unsafe extern "C" fn mbm_client_custom(
                     return Status::INVALID_ARGUMENT;
                 }
                 let numbers = [response.bytes, response.more];
-                let outline = &mut inside.ticket.outline;
-                outline.add_rule(words[0] as u8, words[1] as u16, kind, numbers)
+                let header = &mut inside.state.header;
+                header.add_rule(words[0] as u8, words[1] as u16, kind, numbers)
             }),
         )
     }
@@ -366,7 +366,7 @@ pub unsafe extern "C" fn mbm_client_forward(
 ) -> u8 {
     // SAFETY: as the header demands. The data are the last bytes of the body.
     unsafe {
-        let inside = request.cast::<Inside>();
+        let inside = request.cast::<RequestFields>();
         let before = match inside.as_ref() {
             Some(inside) => inside.data,
             None => body,
@@ -375,17 +375,17 @@ pub unsafe extern "C" fn mbm_client_forward(
         let status = special(
             client,
             request,
-            Form::CUSTOM,
+            FunctionSpec::CUSTOM,
             words,
             Some(|inside, words, _| {
                 let body = core::ptr::with_exposed_provenance(words[2]);
-                let outline = &mut inside.ticket.outline;
+                let header = &mut inside.state.header;
                 let Some(whole) = lent_or_none(body, words[1]) else {
                     return Status::INVALID_ARGUMENT;
                 };
-                let built = outline.forward(words[0] as u8, whole);
+                let built = header.forward(words[0] as u8, whole);
                 if built == Status::OK {
-                    let head = words[1] - usize::from(outline.data_length());
+                    let head = words[1] - usize::from(header.data_length());
                     inside.data = body.wrapping_add(head);
                 }
                 built
@@ -402,8 +402,8 @@ pub unsafe extern "C" fn mbm_client_forward(
 ///
 /// # Safety
 /// None is needed; this is a [`More`](super::More).
-unsafe fn add_group(inside: &mut Inside, words: &[usize; 4], _: Status) -> Status {
+unsafe fn add_group(inside: &mut RequestFields, words: &[usize; 4], _: Status) -> Status {
     let [_, file, record, quantity] = *words;
-    let outline = &mut inside.ticket.outline;
-    outline.add_group(file as u16, record as u16, quantity as u16)
+    let header = &mut inside.state.header;
+    header.add_group(file as u16, record as u16, quantity as u16)
 }

@@ -6,26 +6,26 @@ mod device;
 pub use data::*;
 pub use device::*;
 
-use super::object::{mbm_client, shared};
-use super::request::{mbm_clientRequest, Inside, Lent};
+use super::object::{mbm_client, queue};
+use super::request::{mbm_clientRequest, RequestFields, RequestPtr};
 use crate::pointers;
-use mbm::client::Job as _;
+use mbm::client::ClientRequest as _;
 use mbm::error::Status;
-use mbm::pdu::outline::Form;
+use mbm::pdu::header::FunctionSpec;
 #[cfg(doc)]
-use mbm::pdu::outline::Outline;
+use mbm::pdu::header::RequestHeader;
 use mbm::FIRMWARE;
 
 /// What a function of C is called with: the form of its request, and its arguments
 /// behind client and request, which are the words in the head of its PDU.
 #[derive(Clone, Copy)]
 struct Arguments {
-    form: Form,
+    form: FunctionSpec,
     words: [usize; 4],
 }
 
-/// What a function does besides [`Outline::set_all`], whose status it is given.
-type More = unsafe fn(&mut Inside, &[usize; 4], Status) -> Status;
+/// What a function does besides [`RequestHeader::set_all`], whose status it is given.
+type More = unsafe fn(&mut RequestFields, &[usize; 4], Status) -> Status;
 
 /// Whether the request behind a pointer may be queued.
 ///
@@ -41,8 +41,8 @@ unsafe fn prepare(client: *const mbm_client, request: *mut mbm_clientRequest) ->
             Status::OK => {
                 // One that is pending may have been zeroed.
                 let object = pointers::object(client);
-                match Lent::new(request) {
-                    Some(request) if shared(object).holds(|held| *held == request) => Status::BUSY,
+                match RequestPtr::new(request) {
+                    Some(request) if queue(object).holds(|held| *held == request) => Status::BUSY,
                     _ => Status::OK,
                 }
             }
@@ -64,27 +64,26 @@ unsafe fn submit(
 ) -> Status {
     // SAFETY: as the caller promises, so nobody else uses the request.
     unsafe {
-        let inside = &mut *request.cast::<Inside>();
-        let outline = &mut inside.ticket.outline;
-        let mut status = outline.set_all(arguments.form, &arguments.words);
+        let inside = &mut *request.cast::<RequestFields>();
+        let header = &mut inside.state.header;
+        let mut status = header.set_all(arguments.form, &arguments.words);
         if let Some(more) = more {
             status = more(inside, &arguments.words, status);
         }
-        let outline = &inside.ticket.outline;
+        let header = &inside.state.header;
         if status != Status::OK {
-        } else if outline.data_length() > 0 && inside.data.is_null() {
+        } else if header.data_length() > 0 && inside.data.is_null() {
             status = Status::INVALID_ARGUMENT;
-        } else if !inside.reply.is_null()
-            && u16::from(outline.known_data()) > inside.ticket.capacity
+        } else if !inside.reply.is_null() && u16::from(header.known_data()) > inside.state.capacity
         {
             status = Status::BUFFER_TOO_SMALL;
-        } else if let Some(request) = Lent::new(request) {
-            return match shared(pointers::object(client)).enqueue(request) {
+        } else if let Some(request) = RequestPtr::new(request) {
+            return match queue(pointers::object(client)).enqueue(request) {
                 Ok(()) => Status::PENDING,
-                Err(refused) => refused.ticket().status,
+                Err(refused) => refused.state().status,
             };
         }
-        inside.ticket.status = status;
+        inside.state.status = status;
         status
     }
 }
@@ -101,7 +100,7 @@ unsafe fn is_free(client: *const mbm_client, request: *const mbm_clientRequest) 
         pointers::check(client) == Status::OK
             && !request.is_null()
             && (*request).status != Status::PENDING.code()
-            && (*request.cast::<Inside>()).ticket.has_ended()
+            && (*request.cast::<RequestFields>()).state.has_ended()
     }
 }
 
@@ -114,7 +113,7 @@ unsafe fn is_free(client: *const mbm_client, request: *const mbm_clientRequest) 
 #[cfg_attr(target_os = "none", inline(never))]
 #[cfg_attr(not(target_os = "none"), inline(always))]
 #[allow(improper_ctypes_definitions)] // C does not call it.
-unsafe extern "C" fn queue(
+unsafe extern "C" fn queue_request(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
     arguments: &Arguments,
@@ -133,7 +132,7 @@ unsafe extern "C" fn queue(
     }
 }
 
-/// As [`queue`], of a request that may be pending.
+/// As [`queue_request`], of a request that may be pending.
 ///
 /// # Safety
 /// As the header demands.
@@ -167,11 +166,11 @@ unsafe extern "C" fn plain(
     request: *mut mbm_clientRequest,
     first: u16,
     second: u16,
-    form: Form,
+    form: FunctionSpec,
 ) -> u8 {
     let words = [first.into(), second.into(), 0, 0];
     // SAFETY: as the caller promises.
-    unsafe { queue(client, request, &Arguments { form, words }, None) }
+    unsafe { queue_request(client, request, &Arguments { form, words }, None) }
 }
 
 /// Queues a request that is no more than a function code.
@@ -182,7 +181,7 @@ unsafe extern "C" fn plain(
 unsafe extern "C" fn bare(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
-    form: Form,
+    form: FunctionSpec,
 ) -> u8 {
     // SAFETY: as the caller promises.
     unsafe { plain(client, request, 0, 0, form) }
@@ -196,10 +195,10 @@ unsafe extern "C" fn bare(
 unsafe fn special(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
-    form: Form,
+    form: FunctionSpec,
     words: [usize; 4],
     more: Option<More>,
 ) -> u8 {
     // SAFETY: as the caller promises.
-    unsafe { queue(client, request, &Arguments { form, words }, more) }
+    unsafe { queue_request(client, request, &Arguments { form, words }, more) }
 }

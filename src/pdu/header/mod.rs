@@ -9,7 +9,7 @@ mod form;
 mod forward;
 
 pub use build::GROUP;
-pub use form::Form;
+pub use form::FunctionSpec;
 pub use form::{COUNTS, FIXED, OWN};
 
 use super::identification::{self, MEI_READ_DEVICE_IDENTIFICATION};
@@ -27,8 +27,8 @@ const HEAD: usize = 9;
 /// A request in outline.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
-pub struct Outline {
-    form: Form,
+pub struct RequestHeader {
+    form: FunctionSpec,
     head: [u8; HEAD],
     head_length: u8,
     /// Bytes of the caller's data.
@@ -41,10 +41,10 @@ pub struct Outline {
     repeated: u8,
 }
 
-impl Outline {
+impl RequestHeader {
     /// No request.
-    pub const NONE: Outline = Outline {
-        form: Form::NONE,
+    pub const NONE: RequestHeader = RequestHeader {
+        form: FunctionSpec::NONE,
         head: [0; HEAD],
         head_length: 0,
         data_length: 0,
@@ -145,7 +145,7 @@ impl Outline {
     }
 
     /// The words of a request that is a function code and two words, as sent, at
-    /// little cost. Firmware, where code is dearer, has [`Outline::emit`] alone.
+    /// little cost. Firmware, where code is dearer, has [`RequestHeader::emit`] alone.
     #[inline]
     pub fn two_words(&self) -> Option<&[u8; 4]> {
         let lengths = u16::from_ne_bytes([self.head_length, self.data_length]);
@@ -157,7 +157,7 @@ impl Outline {
     }
 
     /// Writes the request PDU into `pdu`, which has
-    /// [`Outline::request_length`] bytes; `byte` gives those of the data.
+    /// [`RequestHeader::request_length`] bytes; `byte` gives those of the data.
     #[inline]
     pub fn emit(&self, pdu: &mut [u8], byte: impl Fn(usize) -> u8) {
         for (index, place) in pdu.iter_mut().enumerate() {
@@ -172,7 +172,7 @@ impl Outline {
     }
 
     /// True if `pdu`, complete or not, agrees with the head of this request.
-    pub fn agrees(&self, pdu: &[u8]) -> bool {
+    pub fn matches_echo(&self, pdu: &[u8]) -> bool {
         for (ours, theirs) in self.head().iter().zip(pdu) {
             if ours != theirs {
                 return false;
@@ -183,7 +183,7 @@ impl Outline {
 
     /// True if `pdu` is the whole response to a write of one or many coils or
     /// registers, at little cost: it repeats function code, address and value or
-    /// quantity. Firmware, where code is dearer, has [`Outline::judge`] alone.
+    /// quantity. Firmware, where code is dearer, has [`RequestHeader::validate`] alone.
     #[inline]
     pub fn is_repeated_by(&self, pdu: &[u8]) -> bool {
         let Some([function, words @ ..]) = self.head.first_chunk::<5>() else {
@@ -261,11 +261,11 @@ impl Outline {
         (form == READ | 2 << DATA).then_some(self.length.wrapping_sub(2))
     }
 
-    /// What a complete response of the [`Outline::expected`] length says:
+    /// What a complete response of the [`RequestHeader::expected`] length says:
     /// success, an exception of the remote device, or
     /// [`Status::MALFORMED_REPLY`]; `byte` gives the data that were sent.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn judge(&self, pdu: &[u8], byte: impl Fn(usize) -> u8) -> Status {
+    pub fn validate(&self, pdu: &[u8], byte: impl Fn(usize) -> u8) -> Status {
         if let [function, code, ..] = pdu {
             if function & EXCEPTION != 0 {
                 return Status::exception(*code);
@@ -331,29 +331,29 @@ mod tests {
     #[test]
     fn a_response_that_repeats_two_words_is_right_by_the_long_way_too() {
         let forms = [
-            Form::WRITE_SINGLE_COIL,
-            Form::WRITE_SINGLE_REGISTER,
-            Form::WRITE_MULTIPLE_COILS,
-            Form::WRITE_MULTIPLE_REGISTERS,
-            Form::READ_COILS,
-            Form::READ_HOLDING_REGISTERS,
-            Form::READ_FIFO_QUEUE,
+            FunctionSpec::WRITE_SINGLE_COIL,
+            FunctionSpec::WRITE_SINGLE_REGISTER,
+            FunctionSpec::WRITE_MULTIPLE_COILS,
+            FunctionSpec::WRITE_MULTIPLE_REGISTERS,
+            FunctionSpec::READ_COILS,
+            FunctionSpec::READ_HOLDING_REGISTERS,
+            FunctionSpec::READ_FIFO_QUEUE,
         ];
         for (index, form) in forms.into_iter().enumerate() {
-            let mut outline = Outline::NONE;
-            assert_eq!(outline.set(form, 0x0107, 9), Status::OK);
-            let head = [outline.function(), 1, 7, 0, 9];
-            assert_eq!(outline.is_repeated_by(&head), !FIRMWARE && index < 4);
-            assert!(!outline.is_repeated_by(&head[..4]));
-            assert!(!outline.is_repeated_by(&[head.as_slice(), &[0]].concat()));
+            let mut header = RequestHeader::NONE;
+            assert_eq!(header.set(form, 0x0107, 9), Status::OK);
+            let head = [header.function(), 1, 7, 0, 9];
+            assert_eq!(header.is_repeated_by(&head), !FIRMWARE && index < 4);
+            assert!(!header.is_repeated_by(&head[..4]));
+            assert!(!header.is_repeated_by(&[head.as_slice(), &[0]].concat()));
             for at in 0..head.len() {
                 let mut other = head;
                 other[at] ^= 0x80;
-                assert!(!outline.is_repeated_by(&other), "{other:?}");
+                assert!(!header.is_repeated_by(&other), "{other:?}");
             }
             if index < 4 {
-                assert_eq!(outline.expected(&head, 5).map(NonZeroU8::get), Some(5));
-                assert_eq!(outline.judge(&head, |_| 0), Status::OK);
+                assert_eq!(header.expected(&head, 5).map(NonZeroU8::get), Some(5));
+                assert_eq!(header.validate(&head, |_| 0), Status::OK);
             }
         }
     }

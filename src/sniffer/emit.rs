@@ -1,8 +1,8 @@
 //! Turns what the sniffer found into events.
 
-use super::event::{Event, Kind};
+use super::event::{Event, EventKind};
 use super::find::{Context, MIN_RTU};
-use super::pairing::{age, Role, Seen, State};
+use super::pairing::{age, FrameRole, ObservedFrame, State};
 use super::{Sniffer, Step};
 use crate::error::Status;
 use crate::frame::{tcp, Framing};
@@ -13,12 +13,12 @@ use crate::pdu::EXCEPTION;
 
 impl Sniffer {
     /// Reports the timeout of a request.
-    pub(super) fn give_up<'b>(&mut self, index: usize, now: u32) -> Event<'b> {
+    pub(super) fn expire<'b>(&mut self, index: usize, now: u32) -> Event<'b> {
         let slot = self.requests.get(index);
         self.requests.set_state(index, State::Late);
         self.calm_for = 0;
         Event {
-            kind: Kind::Timeout,
+            kind: EventKind::Timeout,
             status: Status::RESPONSE_TIMED_OUT,
             time: now,
             response_time: age(now, slot.time),
@@ -33,7 +33,7 @@ impl Sniffer {
     }
 
     /// Turns a step into an event, and moves the stream past it.
-    pub(super) fn tell<'b>(
+    pub(super) fn emit_event<'b>(
         &mut self,
         buffer: &'b mut [u8],
         functions: &[Function],
@@ -46,25 +46,25 @@ impl Sniffer {
         let part: &'b [u8] = self.part(buffer, index);
         let timing = self.timing;
         let framing = self.framing;
-        let (context, lane) = self.split(functions, index, now);
+        let (context, stream) = self.split(functions, index, now);
         match step {
             Step::Junk {
                 length,
                 status,
                 more,
             } => {
-                let bytes = part.get(lane.start.into()..).unwrap_or_default();
+                let bytes = part.get(stream.start.into()..).unwrap_or_default();
                 let bytes = bytes.get(..length).unwrap_or_default();
-                let end = lane.start + length as u16;
-                let is_ended = lane.silences(lane.start).any(|at| at == end)
-                    || (end == lane.end && lane.quiet(now) >= timing.silence);
-                let time = lane.time(end, &timing);
+                let end = stream.start + length as u16;
+                let is_ended = stream.silences(stream.start).any(|at| at == end)
+                    || (end == stream.end && stream.quiet(now) >= timing.silence);
+                let time = stream.time(end, &timing);
                 let event = junk(framing, &context, bytes, status, is_ended);
                 // The rest of a frame that is too long belongs to it.
-                let cut = lane.cut && !is_ended;
-                lane.consume(end);
-                lane.cut = cut;
-                lane.skip = more as u16;
+                let cut = stream.cut && !is_ended;
+                stream.consume(end);
+                stream.cut = cut;
+                stream.skip = more as u16;
                 Event {
                     time,
                     length: length + more,
@@ -76,12 +76,12 @@ impl Sniffer {
                 content,
                 right,
             } => {
-                let end = lane.at + total as u16;
-                let time = lane.time(end, &timing);
-                let bytes = part.get(lane.at.into()..).unwrap_or_default();
+                let end = stream.at + total as u16;
+                let time = stream.time(end, &timing);
+                let bytes = part.get(stream.at.into()..).unwrap_or_default();
                 let bytes = bytes.get(..content).unwrap_or_default();
                 let told = self.frame(functions, bytes, right, time, is_early);
-                if told.kind == Kind::Timeout {
+                if told.kind == EventKind::Timeout {
                     // The frame itself is the next event.
                     return told;
                 }
@@ -106,7 +106,7 @@ impl Sniffer {
         let (transaction, unit, pdu) = content(self.framing, frame);
         let code = pdu.first().copied().unwrap_or_default();
         let mut event = Event {
-            kind: Kind::BadCrc,
+            kind: EventKind::BadCrc,
             status: Status::INVALID_CRC,
             time,
             response_time: 0,
@@ -124,42 +124,42 @@ impl Sniffer {
         let request = request && code & EXCEPTION == 0;
         let overdue = if is_early { None } else { self.overdue(time) };
         if let Some(overdue) = overdue {
-            return self.give_up(overdue, time);
+            return self.expire(overdue, time);
         }
-        let seen = Seen {
+        let frame = ObservedFrame {
             unit,
             transaction,
             pdu,
             request,
             response,
         };
-        match self.requests.role(&seen, functions, time) {
-            Role::Request => {
+        match self.requests.role(&frame, functions, time) {
+            FrameRole::Request => {
                 let one_at_a_time = self.framing != Framing::Tcp;
-                if let Some(ended) = self.requests.ended_by(&seen, one_at_a_time, time) {
-                    return self.give_up(ended, time);
+                if let Some(ended) = self.requests.ended_by(&frame, one_at_a_time, time) {
+                    return self.expire(ended, time);
                 }
                 let is_broadcast = unit == 0 && self.framing != Framing::Tcp;
-                self.requests.keep(&seen, is_broadcast, functions, time);
-                event.kind = Kind::Request;
+                self.requests.keep(&frame, is_broadcast, functions, time);
+                event.kind = EventKind::Request;
                 event.status = Request::parse_with(pdu, functions)
                     .err()
                     .unwrap_or(Status::OK);
             }
-            Role::Reply(index) => {
+            FrameRole::Reply(index) => {
                 let slot = self.requests.get(index);
                 self.requests.set_state(index, State::Free);
                 event.asked = Some(slot.asked);
                 event.response_time = age(time, slot.time);
                 event.kind = match slot.state {
-                    State::Open if code & EXCEPTION != 0 => Kind::Exception,
-                    State::Open => Kind::Reply,
-                    _ => Kind::Unpaired,
+                    State::Open if code & EXCEPTION != 0 => EventKind::Exception,
+                    State::Open => EventKind::Reply,
+                    _ => EventKind::Unpaired,
                 };
                 event.status = answer(pdu, functions);
             }
-            Role::Unpaired(is_waited_for) => {
-                event.kind = Kind::Unpaired;
+            FrameRole::Unpaired(is_waited_for) => {
+                event.kind = EventKind::Unpaired;
                 event.status = match answer(pdu, functions) {
                     Status::OK if is_waited_for => Status::MALFORMED_REPLY,
                     status => status,
@@ -212,9 +212,9 @@ fn junk<'b>(
     };
     Event {
         kind: if is_damaged {
-            Kind::BadCrc
+            EventKind::BadCrc
         } else {
-            Kind::Noise
+            EventKind::Noise
         },
         status: if is_damaged {
             Status::INVALID_CRC

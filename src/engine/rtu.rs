@@ -10,7 +10,7 @@
 //! unit. Both together give the CRC of the candidate, so each byte is processed at most
 //! twice, however many candidates there were.
 
-use super::{Count, Engine, Request, Seen, Storage, Verdict};
+use super::{Count, Engine, Match, RequestSpec, RxFault, Storage};
 use crate::frame::checksum::Crc16;
 use crate::frame::rtu::{self, MIN_FRAME};
 use crate::pdu::EXCEPTION;
@@ -21,10 +21,10 @@ pub(super) const EXCEPTION_FRAME: u8 = rtu::OVERHEAD as u8 + 2;
 /// Bytes around the data of a read's response frame: unit, function, byte count, CRC.
 const READ_OVERHEAD: u8 = rtu::OVERHEAD as u8 + 2;
 
-impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
-    /// As [`Request::wanted`], for any number of bytes.
+impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
+    /// As [`RequestSpec::expected_length`], for any number of bytes.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn wanted(&mut self, front: S::Count, have: S::Count) -> S::Count {
+    fn expected_length(&mut self, front: S::Count, have: S::Count) -> S::Count {
         if have == S::Count::ZERO {
             return 1u8.into();
         }
@@ -34,15 +34,15 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
         if have == 1u8.into() {
             return 2u8.into();
         }
-        Q::wanted(self, front, have)
+        Q::expected_length(self, front, have)
     }
 
     /// True if the received bytes are exactly the right reply to a read of `data` bytes. This
-    /// is the most frequent case of [`Engine::search_rtu`].
+    /// is the most frequent case of [`Engine::find_rtu_reply`].
     #[inline(always)]
     pub(crate) fn has_read(&mut self, data: u8) -> bool {
         let length = S::Count::from(data) + READ_OVERHEAD.into();
-        if self.end != length || self.done > S::Count::ZERO || self.passed > 0 || self.echo {
+        if self.end != length || self.processed > S::Count::ZERO || self.skipped > 0 || self.echo {
             return false;
         }
         let frame = self.storage.slice(S::Count::ZERO, length);
@@ -51,7 +51,7 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
             return false;
         }
         self.exception = 0;
-        self.least = length;
+        self.needed = length;
         true
     }
 
@@ -60,45 +60,45 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// candidate.
     /// If `LENIENT`, a deviating reply is kept meanwhile (see `lenient`).
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn search_rtu<const LENIENT: bool>(&mut self) -> bool {
-        if self.least > self.end {
-            self.take_in(self.end);
+    pub fn find_rtu_reply<const LENIENT: bool>(&mut self) -> bool {
+        if self.needed > self.end {
+            self.update_crc(self.end);
             return false;
         }
         let mut front = S::Count::ZERO;
         let found = loop {
             let have = self.end - front;
-            let length = self.wanted(front, have);
+            let length = self.expected_length(front, have);
             if length > have {
-                self.least = length;
-                self.take_in(self.end);
+                self.needed = length;
+                self.update_crc(self.end);
                 break false;
             }
             if length > S::Count::ZERO {
-                if self.is_right(front, length) {
-                    match Q::judge(self, front, length - rtu::CRC.into()) {
-                        Verdict::Right => {
-                            self.least = length;
+                if self.has_right_crc(front, length) {
+                    match Q::validate(self, front, length - rtu::CRC.into()) {
+                        Match::Reply => {
+                            self.needed = length;
                             break true;
                         }
-                        Verdict::Echo => {}
-                        Verdict::Wrong => {
+                        Match::Echo => {}
+                        Match::Unrelated => {
                             if LENIENT {
                                 Q::note_deviating(self, front);
                             }
-                            self.see_foreign(Seen::MALFORMED);
+                            self.note_foreign_frame(RxFault::MALFORMED);
                         }
                     }
                     front += length;
                     self.begin_frame(front);
                     continue;
                 }
-                self.see(Seen::BAD_CRC);
+                self.note_fault(RxFault::BAD_CRC);
             }
             if LENIENT {
-                front = Q::pass_and_keep(self, front);
+                front = Q::skip_or_keep_byte(self, front);
             } else {
-                self.pass(front);
+                self.skip_byte(front);
                 front += 1u8.into();
             }
         };
@@ -112,27 +112,27 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// and moves it to the front of the buffer. If no reply is found, nothing changes, because
     /// the rest of the candidate may still arrive.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn skim(&mut self, mut front: S::Count) -> bool {
+    pub fn resync(&mut self, mut front: S::Count) -> bool {
         while front + EXCEPTION_FRAME.into() <= self.end {
-            let have = if Q::IS_PLAIN {
+            let have = if Q::HAS_FIXED_REPLY {
                 // Only an exception is shorter than an incomplete candidate.
                 EXCEPTION_FRAME.into()
             } else {
                 self.end - front
             };
-            let length = self.wanted(front, have);
-            let is_whole = if Q::IS_PLAIN {
+            let length = self.expected_length(front, have);
+            let is_whole = if Q::HAS_FIXED_REPLY {
                 length == have
             } else {
                 length > S::Count::ZERO && length <= have
             };
             if is_whole
-                && self.is_right(front, length)
-                && Q::judge(self, front, length - rtu::CRC.into()) == Verdict::Right
+                && self.has_right_crc(front, length)
+                && Q::validate(self, front, length - rtu::CRC.into()) == Match::Reply
             {
-                self.least = length;
+                self.needed = length;
                 self.drop_front(front);
-                self.passed = 1;
+                self.skipped = 1;
                 return true;
             }
             front += 1u8.into();
@@ -143,41 +143,41 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// Updates the CRC with the bytes up to `end`. Done as bytes arrive, so that little work
     /// is left when the last byte arrives.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn take_in(&mut self, end: S::Count) {
-        let news = self.storage.bytes(self.done, end - self.done);
+    fn update_crc(&mut self, end: S::Count) {
+        let news = self.storage.bytes(self.processed, end - self.processed);
         self.crc = self.crc.with(news);
-        self.done = end;
+        self.processed = end;
     }
 
     /// Starts a new candidate at `front`.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn begin_frame(&mut self, front: S::Count) {
-        self.done = front;
-        self.least = 1u8.into();
-        self.passed = 0;
-        self.crc_passed = Crc16::START;
+        self.processed = front;
+        self.needed = 1u8.into();
+        self.skipped = 0;
+        self.crc_skipped = Crc16::START;
         self.crc = Crc16::START;
     }
 
     /// True if the CRC of the frame at `front` is right.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(crate) fn is_right(&mut self, front: S::Count, length: S::Count) -> bool {
+    pub(crate) fn has_right_crc(&mut self, front: S::Count, length: S::Count) -> bool {
         let end = front + length;
-        let is_first = self.crc_passed == Crc16::START;
-        let is_known = if Q::IS_PLAIN {
+        let is_first = self.crc_skipped == Crc16::START;
+        let is_known = if Q::HAS_FIXED_REPLY {
             length == self.length
         } else {
-            is_first && !self.skimmed
+            is_first && !self.resynced
         };
-        if is_known && self.done <= end {
-            self.take_in(end);
-            if is_first || !Q::IS_PLAIN {
+        if is_known && self.processed <= end {
+            self.update_crc(end);
+            if is_first || !Q::HAS_FIXED_REPLY {
                 return self.crc.is_residue();
             }
             if self.weight.is_residue() {
                 self.weight = Crc16::weight(length.into());
             }
-            return self.crc == self.crc_passed.since_start(self.weight);
+            return self.crc == self.crc_skipped.since_start(self.weight);
         }
         rtu::is_frame(self.storage.bytes(front, length))
     }
@@ -185,48 +185,49 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     /// Skips the byte at `front`. If the skipped bytes turn out to be a frame, a bad CRC noted
     /// within them is withdrawn.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn pass(&mut self, front: S::Count) {
-        if cfg!(feature = "diagnosis") && self.passed == 0 {
-            self.passed_as = if self.storage.byte(front) != self.unit {
-                Seen::OTHER_UNIT
+    pub(super) fn skip_byte(&mut self, front: S::Count) {
+        if cfg!(feature = "diagnosis") && self.skipped == 0 {
+            self.skipped_as = if self.storage.byte(front) != self.unit {
+                RxFault::OTHER_UNIT
             } else if self.storage.byte(front + 1u8.into()) & !EXCEPTION != self.request.function()
             {
-                Seen::OTHER_FUNCTION
+                RxFault::OTHER_FUNCTION
             } else {
-                Seen::MALFORMED
+                RxFault::MALFORMED
             };
         }
-        self.crc_passed = self.crc_passed.with(self.storage.bytes(front, 1u8.into()));
-        if self.done == front {
-            self.done = front + 1u8.into();
-            self.crc = self.crc_passed;
+        self.crc_skipped = self.crc_skipped.with(self.storage.bytes(front, 1u8.into()));
+        if self.processed == front {
+            self.processed = front + 1u8.into();
+            self.crc = self.crc_skipped;
         }
-        if self.passed < MIN_FRAME {
-            self.passed += 1;
+        if self.skipped < MIN_FRAME {
+            self.skipped += 1;
         }
-        if cfg!(feature = "diagnosis") && self.passed == MIN_FRAME && self.crc_passed.is_residue() {
-            if self.seen == Seen::BAD_CRC {
-                self.seen = Seen::NOTHING;
+        if cfg!(feature = "diagnosis") && self.skipped == MIN_FRAME && self.crc_skipped.is_residue()
+        {
+            if self.fault == RxFault::BAD_CRC {
+                self.fault = RxFault::NOTHING;
             }
-            self.see_foreign(self.passed_as);
+            self.note_foreign_frame(self.skipped_as);
             self.begin_frame(front + 1u8.into());
         }
     }
 
     /// Notes a fault, and counts a frame with a right CRC that is not the reply.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn see_foreign(&mut self, what: Seen) {
+    pub(super) fn note_foreign_frame(&mut self, what: RxFault) {
         if cfg!(feature = "counters") {
-            self.foreign = self.foreign.saturating_add(1);
+            self.foreign_frames = self.foreign_frames.saturating_add(1);
         }
-        self.see(what);
+        self.note_fault(what);
     }
 
     /// Notes a fault if it is more severe than the noted one.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(crate) fn see(&mut self, what: Seen) {
-        if self.seen < what {
-            self.seen = what;
+    pub(crate) fn note_fault(&mut self, what: RxFault) {
+        if self.fault < what {
+            self.fault = what;
         }
     }
 
@@ -234,7 +235,7 @@ impl<P, S: Storage, Q: Request<P, S>> Engine<P, S, Q> {
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn drop_front(&mut self, front: S::Count) {
         self.end -= front;
-        self.done = self.done.saturating_sub(front);
+        self.processed = self.processed.saturating_sub(front);
         self.storage.move_down(front, self.end);
     }
 }

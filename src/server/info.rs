@@ -1,12 +1,12 @@
 //! Which unit a received frame is addressed to.
 
-use super::table::Small;
+use super::table::MachineByte;
 use crate::pdu::{bits, files, registers};
 
 /// The address and the position of a received frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(C)]
-pub struct Heading {
+pub struct RequestInfo {
     /// The unit id in the frame.
     pub to: u8,
     /// A second id that addresses the server itself: 255 in a stream. On a serial line 0,
@@ -21,21 +21,21 @@ pub struct Heading {
     /// Length of the PDU; 0 if the frame is damaged.
     pub length: u16,
     /// Greatest length of the response PDU.
-    pub room: u16,
+    pub space: u16,
 }
 
 /// How a frame addresses a unit.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
-pub struct Concern(Small);
+pub struct Addressing(MachineByte);
 
-impl Concern {
+impl Addressing {
     /// The frame is for another unit, or damaged.
-    pub const FOREIGN: Concern = Concern(0);
+    pub const FOREIGN: Addressing = Addressing(0);
     /// The frame is for this unit.
-    pub const OWN: Concern = Concern(1);
+    pub const OWN: Addressing = Addressing(1);
     /// The frame is a broadcast: each unit carries it out, no unit responds.
-    pub const BROADCAST: Concern = Concern(2);
+    pub const BROADCAST: Addressing = Addressing(2);
 
     /// The number of this addressing in the C API.
     #[inline(always)]
@@ -48,44 +48,44 @@ impl Concern {
     /// frame is not.
     #[inline(always)]
     #[must_use]
-    pub const fn to_others(self) -> Concern {
-        Concern(self.0 & Concern::BROADCAST.0)
+    pub const fn to_others(self) -> Addressing {
+        Addressing(self.0 & Addressing::BROADCAST.0)
     }
 }
 
 /// The id of a unit that responds to every id.
 pub const ANY: u8 = 0;
 
-impl Heading {
+impl RequestInfo {
     /// No frame has been received yet.
-    pub const NONE: Heading = Heading {
+    pub const NONE: RequestInfo = RequestInfo {
         to: 0,
         own: STREAM,
         overrun: false,
         head: 1,
         again: false,
         length: 0,
-        room: 0,
+        space: 0,
     };
 
     /// How the frame, with this function code, addresses the unit that its id names.
     #[inline]
-    pub const fn concern(&self, function: u8) -> Concern {
-        match self.concern_of_all() {
-            Concern::BROADCAST if !only_writes(function) => Concern::FOREIGN,
-            concern => concern,
+    pub const fn addressing(&self, function: u8) -> Addressing {
+        match self.addressing_of_all() {
+            Addressing::BROADCAST if !only_writes(function) => Addressing::FOREIGN,
+            addressing => addressing,
         }
     }
 
-    /// As [`Heading::concern`], whatever the function code.
+    /// As [`RequestInfo::addressing`], whatever the function code.
     #[inline(always)]
-    pub const fn concern_of_all(&self) -> Concern {
+    pub const fn addressing_of_all(&self) -> Addressing {
         if self.length == 0 {
-            Concern::FOREIGN
+            Addressing::FOREIGN
         } else if self.is_broadcast() {
-            Concern::BROADCAST
+            Addressing::BROADCAST
         } else {
-            Concern::OWN
+            Addressing::OWN
         }
     }
 
@@ -115,9 +115,9 @@ impl Heading {
     }
 }
 
-/// [`Heading::own`] on a serial line.
+/// [`RequestInfo::own`] on a serial line.
 pub const SERIAL: u8 = 0;
-/// [`Heading::own`] in a stream.
+/// [`RequestInfo::own`] in a stream.
 pub const STREAM: u8 = 255;
 
 /// True for functions that only write and for user-defined functions. Other functions are

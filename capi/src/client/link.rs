@@ -1,11 +1,11 @@
 //! The line under a client: lost and found, lent and taken back.
 
-use super::object::{mbm_client, on_line, shared, SerialLine, TcpLine};
+use super::object::{mbm_client, on_transport, queue, SerialTransport, TcpTransport};
 use crate::framing::MBM_FRAMING_RTU;
 use crate::master::{self, mbm_master, Core};
 use crate::pointers;
 use core::ffi::c_void;
-use mbm::client::Line as _;
+use mbm::client::Transport as _;
 use mbm::error::Status;
 
 /// What closes a link and opens it anew, for mbm_client_reconnect.
@@ -38,12 +38,12 @@ pub unsafe extern "C" fn mbm_client_reconnect(
     // hooks of the link are called.
     unsafe {
         let status = pointers::with(client, |object| {
-            if shared(object).lent {
+            if queue(object).suspended {
                 return Status::BUSY;
             }
             let release = (*(*object).kind).release;
             pointers::calling(client, || release(object, None));
-            shared(object).interrupt();
+            queue(object).interrupt();
             Status::OK
         });
         if status != Status::OK.code() || link.is_null() {
@@ -57,7 +57,7 @@ pub unsafe extern "C" fn mbm_client_reconnect(
         };
         let status = connect((*link).context);
         if status != Status::OK.code() {
-            shared(pointers::object(client)).connected = false;
+            queue(pointers::object(client)).connected = false;
         }
         status
     }
@@ -76,7 +76,7 @@ pub unsafe extern "C" fn mbm_client_reconnect(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { pointers::ask(client, 0, |object| shared(object).connected.into()) }
+    unsafe { pointers::ask(client, 0, |object| queue(object).connected.into()) }
 }
 
 /// Lends the line to a facade, whose functions then use the client's port; the
@@ -109,7 +109,7 @@ pub unsafe extern "C" fn mbm_client_suspend(
                     refused => return refused,
                 }
             }
-            if !on_line!(object, line => line.lend(&mut (*object).shared)) {
+            if !on_transport!(object, line => line.suspend(&mut (*object).queue)) {
                 return Status::BUSY;
             }
             if !master.is_null() {
@@ -141,7 +141,7 @@ pub unsafe extern "C" fn mbm_client_resume(client: *mut mbm_client, master: *mut
     // SAFETY: as the header demands.
     unsafe {
         pointers::with(client, |object| {
-            if !shared(object).lent {
+            if !queue(object).suspended {
                 return Status::INVALID_ARGUMENT;
             }
             match pointers::check(master) {
@@ -156,7 +156,7 @@ pub unsafe extern "C" fn mbm_client_resume(client: *mut mbm_client, master: *mut
                 // None, or none that has the port.
                 _ => {}
             }
-            shared(object).lent = false;
+            queue(object).suspended = false;
             Status::OK
         })
     }

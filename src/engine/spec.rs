@@ -5,24 +5,24 @@ use crate::frame::rtu;
 
 /// What a received frame is to the pending request.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Verdict {
+pub enum Match {
     /// The frame is the reply.
-    Right,
+    Reply,
     /// The frame is the echo of the request.
     Echo,
     /// The frame is neither.
-    Wrong,
+    Unrelated,
 }
 
 /// A request: how its frame is written, and how its reply is recognised. The functions with
 /// an `engine` argument take the engine that holds the request.
-pub trait Request<P, S: Storage>: Sized {
+pub trait RequestSpec<P, S: Storage>: Sized {
     /// No request.
     const NONE: Self;
 
     /// True if the request determines the length of its reply, and the engine repeats the
     /// request as its settings say.
-    const IS_PLAIN: bool;
+    const HAS_FIXED_REPLY: bool;
 
     /// The function code.
     fn function(&self) -> u8;
@@ -35,44 +35,48 @@ pub trait Request<P, S: Storage>: Sized {
         true
     }
 
-    /// True if a frame buffer of `room` bytes holds the frame of the request.
-    fn fits(&self, room: S::Count) -> bool;
+    /// True if a frame buffer of `space` bytes holds the frame of the request.
+    fn fits(&self, space: S::Count) -> bool;
 
     /// Writes the frame of the request into the frame buffer.
     fn write(engine: &mut Engine<P, S, Self>);
 
     /// Length of the frame of a reply that is no exception; 0 if it is not known yet, or
     /// greater than the frame buffer.
-    fn reply_length(&self, room: S::Count) -> S::Count;
+    fn reply_length(&self, space: S::Count) -> S::Count;
 
     /// The length of the frame that begins with the `have` bytes at `front`. These are at least
     /// the unit of the request and one more byte. While they do not determine the length, the
     /// least possible length; 0 if no expected frame begins with them.
-    fn wanted(engine: &mut Engine<P, S, Self>, front: S::Count, have: S::Count) -> S::Count;
+    fn expected_length(
+        engine: &mut Engine<P, S, Self>,
+        front: S::Count,
+        have: S::Count,
+    ) -> S::Count;
 
     /// Compares the frame at `front`, whose CRC is right, with the request. Its unit and PDU
     /// have `content` bytes. Stores the exception code.
-    fn judge(engine: &mut Engine<P, S, Self>, front: S::Count, content: S::Count) -> Verdict;
+    fn validate(engine: &mut Engine<P, S, Self>, front: S::Count, content: S::Count) -> Match;
 
     /// Searches the received bytes for the reply, and moves it to the front of the buffer.
     /// False if it has not arrived yet.
     #[inline(always)]
-    fn search(engine: &mut Engine<P, S, Self>) -> bool {
-        engine.search_rtu::<false>()
+    fn find_reply(engine: &mut Engine<P, S, Self>) -> bool {
+        engine.find_rtu_reply::<false>()
     }
 
-    /// As [`Request::search`], once the line is silent: also searches after an incomplete
+    /// As [`RequestSpec::find_reply`], once the line is silent: also searches after an incomplete
     /// candidate.
     #[inline(always)]
-    fn search_silent(engine: &mut Engine<P, S, Self>) -> bool {
-        engine.skim(1u8.into())
+    fn find_reply_in_silence(engine: &mut Engine<P, S, Self>) -> bool {
+        engine.resync(1u8.into())
     }
 
     /// Skips the byte at `front`, but keeps it if it may belong to a deviating reply (see
     /// `lenient`). Returns the index of the next byte.
     #[inline(always)]
-    fn pass_and_keep(engine: &mut Engine<P, S, Self>, front: S::Count) -> S::Count {
-        engine.pass(front);
+    fn skip_or_keep_byte(engine: &mut Engine<P, S, Self>, front: S::Count) -> S::Count {
+        engine.skip_byte(front);
         front + 1u8.into()
     }
 
@@ -86,7 +90,7 @@ pub trait Request<P, S: Storage>: Sized {
 
     /// Accepts the deviating reply as the answer. False if there is none.
     #[inline(always)]
-    fn take_deviating(_engine: &mut Engine<P, S, Self>) -> bool {
+    fn accept_deviating(_engine: &mut Engine<P, S, Self>) -> bool {
         false
     }
 

@@ -5,18 +5,18 @@ use crate::error::Status;
 use crate::frame::ascii::character;
 
 /// A line of ASCII text in a buffer. If the buffer is too small, the rest of the text is cut
-/// off and [`Line::finish`] returns an error. A zero byte ends the text, also if it was cut.
-pub struct Line<'a> {
+/// off and [`TextWriter::finish`] returns an error. A zero byte ends the text, also if it was cut.
+pub struct TextWriter<'a> {
     text: &'a mut [u8],
     length: usize,
     is_cut: bool,
 }
 
-impl<'a> Line<'a> {
+impl<'a> TextWriter<'a> {
     /// An empty line in the buffer `text`, which needs one byte more than the text has
     /// characters.
     pub const fn new(text: &'a mut [u8]) -> Self {
-        Line {
+        TextWriter {
             text,
             length: 0,
             is_cut: false,
@@ -148,9 +148,9 @@ mod tests {
     use super::*;
     use std::string::String;
 
-    fn text(size: usize, write: impl FnOnce(&mut Line)) -> (Result<usize, Status>, String) {
+    fn text(size: usize, write: impl FnOnce(&mut TextWriter)) -> (Result<usize, Status>, String) {
         let mut buffer = std::vec![0xEE; size];
-        let mut line = Line::new(&mut buffer);
+        let mut line = TextWriter::new(&mut buffer);
         write(&mut line);
         let outcome = line.finish();
         let end = buffer.iter().position(|byte| *byte == 0).unwrap_or(0);

@@ -5,7 +5,7 @@ use super::super::{bits, diagnostics, files, identification, registers};
 /// What a function's request and response look like, as flags and small numbers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
-pub struct Form(pub(super) u32);
+pub struct FunctionSpec(pub(super) u32);
 
 /// A byte count stands between head and data.
 pub(super) const COUNTED: u32 = 1 << 8;
@@ -44,7 +44,7 @@ pub(super) const LENGTH: u32 = 22;
 pub(super) const REPEATED: u32 = 25;
 pub(super) const DATA: u32 = 28;
 
-impl Form {
+impl FunctionSpec {
     pub(super) const fn new(
         function: u8,
         flags: u32,
@@ -52,8 +52,8 @@ impl Form {
         length: u32,
         repeated: u32,
         data: u32,
-    ) -> Form {
-        Form(
+    ) -> FunctionSpec {
+        FunctionSpec(
             function as u32
                 | flags
                 | head << HEAD_LENGTH
@@ -64,13 +64,13 @@ impl Form {
     }
 
     /// 01, 02.
-    pub(super) const fn bits(function: u8) -> Form {
-        Form::new(function, RANGE | BITS | READ, 5, 0, 0, 2)
+    pub(super) const fn bits(function: u8) -> FunctionSpec {
+        FunctionSpec::new(function, RANGE | BITS | READ, 5, 0, 0, 2)
     }
 
     /// 03, 04.
-    pub(super) const fn registers(function: u8) -> Form {
-        Form::new(function, RANGE | READ | TAKES_WORDS, 5, 0, 0, 2)
+    pub(super) const fn registers(function: u8) -> FunctionSpec {
+        FunctionSpec::new(function, RANGE | READ | TAKES_WORDS, 5, 0, 0, 2)
     }
 
     /// True of a request whose response repeats its function code and two words, and
@@ -82,13 +82,13 @@ impl Form {
     }
 
     /// What the response repeats whole.
-    pub(super) const fn echoed(function: u8, flags: u32) -> Form {
-        Form::new(function, flags | BROADCAST, 5, 5, 5, 0)
+    pub(super) const fn echoed(function: u8, flags: u32) -> FunctionSpec {
+        FunctionSpec::new(function, flags | BROADCAST, 5, 5, 5, 0)
     }
 
     /// Nothing but a function code.
-    pub(super) const fn bare(function: u8, flags: u32, length: u32, data: u32) -> Form {
-        Form::new(function, flags, 1, length, 0, data)
+    pub(super) const fn bare(function: u8, flags: u32, length: u32, data: u32) -> FunctionSpec {
+        FunctionSpec::new(function, flags, 1, length, 0, data)
     }
 
     pub(super) const fn has(self, flag: u32) -> bool {
@@ -100,25 +100,28 @@ impl Form {
     }
 
     /// No request.
-    pub(super) const NONE: Form = Form(0);
+    pub(super) const NONE: FunctionSpec = FunctionSpec(0);
 
     /// 01: address and quantity.
-    pub const READ_COILS: Form = Form::bits(bits::READ_COILS);
+    pub const READ_COILS: FunctionSpec = FunctionSpec::bits(bits::READ_COILS);
     /// 02: address and quantity.
-    pub const READ_DISCRETE_INPUTS: Form = Form::bits(bits::READ_DISCRETE_INPUTS);
+    pub const READ_DISCRETE_INPUTS: FunctionSpec = FunctionSpec::bits(bits::READ_DISCRETE_INPUTS);
     /// 03: address and quantity.
-    pub const READ_HOLDING_REGISTERS: Form = Form::registers(registers::READ_HOLDING_REGISTERS);
+    pub const READ_HOLDING_REGISTERS: FunctionSpec =
+        FunctionSpec::registers(registers::READ_HOLDING_REGISTERS);
     /// 04: address and quantity.
-    pub const READ_INPUT_REGISTERS: Form = Form::registers(registers::READ_INPUT_REGISTERS);
+    pub const READ_INPUT_REGISTERS: FunctionSpec =
+        FunctionSpec::registers(registers::READ_INPUT_REGISTERS);
     /// 05: address, and FF00 or 0.
-    pub const WRITE_SINGLE_COIL: Form = Form::echoed(bits::WRITE_SINGLE_COIL, 0);
+    pub const WRITE_SINGLE_COIL: FunctionSpec = FunctionSpec::echoed(bits::WRITE_SINGLE_COIL, 0);
     /// 06: address and value.
-    pub const WRITE_SINGLE_REGISTER: Form = Form::echoed(registers::WRITE_SINGLE_REGISTER, 0);
+    pub const WRITE_SINGLE_REGISTER: FunctionSpec =
+        FunctionSpec::echoed(registers::WRITE_SINGLE_REGISTER, 0);
     /// 07.
-    pub const READ_EXCEPTION_STATUS: Form =
-        Form::bare(diagnostics::READ_EXCEPTION_STATUS, FIXED, 2, 1);
+    pub const READ_EXCEPTION_STATUS: FunctionSpec =
+        FunctionSpec::bare(diagnostics::READ_EXCEPTION_STATUS, FIXED, 2, 1);
     /// 0B; two words are received.
-    pub const GET_COMM_EVENT_COUNTER: Form = Form::bare(
+    pub const GET_COMM_EVENT_COUNTER: FunctionSpec = FunctionSpec::bare(
         diagnostics::GET_COMM_EVENT_COUNTER,
         FIXED | TAKES_WORDS,
         5,
@@ -126,30 +129,33 @@ impl Form {
     );
     /// 0C; status, events and messages as words with the high byte first, then
     /// the events.
-    pub const GET_COMM_EVENT_LOG: Form = Form::bare(diagnostics::GET_COMM_EVENT_LOG, COUNTS, 1, 2);
+    pub const GET_COMM_EVENT_LOG: FunctionSpec =
+        FunctionSpec::bare(diagnostics::GET_COMM_EVENT_LOG, COUNTS, 1, 2);
     /// 0F: address and quantity.
-    pub const WRITE_MULTIPLE_COILS: Form =
-        Form::echoed(bits::WRITE_MULTIPLE_COILS, RANGE | BITS | COUNTED);
+    pub const WRITE_MULTIPLE_COILS: FunctionSpec =
+        FunctionSpec::echoed(bits::WRITE_MULTIPLE_COILS, RANGE | BITS | COUNTED);
     /// 10: address and quantity.
-    pub const WRITE_MULTIPLE_REGISTERS: Form = Form::echoed(
+    pub const WRITE_MULTIPLE_REGISTERS: FunctionSpec = FunctionSpec::echoed(
         registers::WRITE_MULTIPLE_REGISTERS,
         RANGE | COUNTED | SENDS_WORDS,
     );
     /// 11. Its response may be longer than it counts.
-    pub const REPORT_SERVER_ID: Form = Form::bare(diagnostics::REPORT_SERVER_ID, OWN, 0, 2);
+    pub const REPORT_SERVER_ID: FunctionSpec =
+        FunctionSpec::bare(diagnostics::REPORT_SERVER_ID, OWN, 0, 2);
     /// 16, of which the OR mask is to be added.
-    pub const MASK_WRITE_REGISTER: Form =
-        Form::new(registers::MASK_WRITE_REGISTER, BROADCAST, 7, 7, 7, 0);
+    pub const MASK_WRITE_REGISTER: FunctionSpec =
+        FunctionSpec::new(registers::MASK_WRITE_REGISTER, BROADCAST, 7, 7, 7, 0);
     /// 18: address.
-    pub const READ_FIFO_QUEUE: Form =
-        Form::new(files::READ_FIFO_QUEUE, OWN | TAKES_WORDS, 3, 0, 0, 5);
+    pub const READ_FIFO_QUEUE: FunctionSpec =
+        FunctionSpec::new(files::READ_FIFO_QUEUE, OWN | TAKES_WORDS, 3, 0, 0, 5);
 
     /// 17, of which what it writes is to be added.
-    pub const READ_WRITE_REGISTERS: Form =
-        Form(Form::registers(registers::READ_WRITE_MULTIPLE_REGISTERS).0 | COUNTED | SENDS_WORDS);
+    pub const READ_WRITE_REGISTERS: FunctionSpec = FunctionSpec(
+        FunctionSpec::registers(registers::READ_WRITE_MULTIPLE_REGISTERS).0 | COUNTED | SENDS_WORDS,
+    );
 
     /// 08: a sub-function; the data are to be added.
-    pub const DIAGNOSTICS: Form = Form::new(
+    pub const DIAGNOSTICS: FunctionSpec = FunctionSpec::new(
         diagnostics::DIAGNOSTICS,
         FIXED | SENDS_WORDS | TAKES_WORDS,
         3,
@@ -158,7 +164,7 @@ impl Form {
         3,
     );
     /// 14, of which one group is to be added.
-    pub const READ_FILE_RECORD: Form = Form::new(
+    pub const READ_FILE_RECORD: FunctionSpec = FunctionSpec::new(
         files::READ_FILE_RECORD,
         READ | GROUPS | TAKES_WORDS,
         0,
@@ -167,7 +173,7 @@ impl Form {
         4,
     );
     /// 15, of which one group is to be added.
-    pub const WRITE_FILE_RECORD: Form = Form::new(
+    pub const WRITE_FILE_RECORD: FunctionSpec = FunctionSpec::new(
         files::WRITE_FILE_RECORD,
         FIXED | SENDS_WORDS | REPEATS_DATA | BROADCAST,
         0,
@@ -176,7 +182,7 @@ impl Form {
         0,
     );
     /// 14 of groups that the caller built.
-    pub const READ_FILE_RECORDS: Form = Form::new(
+    pub const READ_FILE_RECORDS: FunctionSpec = FunctionSpec::new(
         files::READ_FILE_RECORD,
         COUNTS | GROUPS | COUNTED,
         1,
@@ -185,7 +191,7 @@ impl Form {
         2,
     );
     /// 15 of groups that the caller built.
-    pub const WRITE_FILE_RECORDS: Form = Form::new(
+    pub const WRITE_FILE_RECORDS: FunctionSpec = FunctionSpec::new(
         files::WRITE_FILE_RECORD,
         FIXED | COUNTED | REPEATS_DATA | BROADCAST,
         1,
@@ -194,7 +200,7 @@ impl Form {
         0,
     );
     /// 2B: the MEI type; the data are to be added.
-    pub const ENCAPSULATED: Form = Form::new(
+    pub const ENCAPSULATED: FunctionSpec = FunctionSpec::new(
         identification::ENCAPSULATED_INTERFACE_TRANSPORT,
         OWN,
         2,
@@ -203,7 +209,7 @@ impl Form {
         2,
     );
     /// 2B/0E: code and object behind the MEI type. Its data begin behind the code.
-    pub const READ_DEVICE_IDENTIFICATION: Form = Form::new(
+    pub const READ_DEVICE_IDENTIFICATION: FunctionSpec = FunctionSpec::new(
         identification::ENCAPSULATED_INTERFACE_TRANSPORT,
         OWN,
         4,
@@ -212,5 +218,5 @@ impl Form {
         3,
     );
     /// A user's function, of which the code and the rule are to be added.
-    pub const CUSTOM: Form = Form::new(0, 0, 1, 0, 0, 1);
+    pub const CUSTOM: FunctionSpec = FunctionSpec::new(0, 0, 1, 0, 0, 1);
 }

@@ -1,31 +1,31 @@
 //! The interface between a client and its serial line or TCP stream.
 
-use super::job::Job;
-use super::shared::Shared;
+use super::queue::RequestQueue;
+use super::request::ClientRequest;
 
 /// A serial line, or a TCP stream.
-pub trait Line<J> {
+pub trait Transport<J> {
     /// Greatest number of requests in flight at the same time.
     const MAX_IN_FLIGHT: usize;
 
     /// True if unit 0 addresses all units (broadcast).
-    const BROADCASTS: bool;
+    const HAS_BROADCAST: bool;
 
     /// True if the transaction numbers of pending requests must differ.
-    const HAS_IDS: bool;
+    const HAS_TRANSACTION_IDS: bool;
 
     /// Advances the requests to the time `now`, and returns one that has ended. `fresh` is
     /// true in the first call of each poll, when new bytes may have arrived.
     fn advance<const N: usize>(
         &mut self,
-        shared: &mut Shared<J, N>,
+        queue: &mut RequestQueue<J, N>,
         now: u32,
         fresh: bool,
     ) -> Option<J>;
 
     /// Discards the state of one request in flight; with `None`, of all requests and of
     /// all partly received or partly sent frames.
-    fn release(&mut self, job: Option<&J>);
+    fn release(&mut self, request: Option<&J>);
 
     /// True if no bytes of cancelled requests wait to be sent.
     fn is_idle(&self) -> bool {
@@ -35,25 +35,25 @@ pub trait Line<J> {
     /// Microseconds until the line has something to do; `None` if the queue decides.
     fn delay(&mut self, now: u32) -> Option<u32>;
 
-    /// See [`Client::lend`](super::Client::lend).
-    fn lend<const N: usize>(&self, shared: &mut Shared<J, N>) -> bool
+    /// See [`Client::suspend`](super::Client::suspend).
+    fn suspend<const N: usize>(&self, queue: &mut RequestQueue<J, N>) -> bool
     where
-        J: Job,
+        J: ClientRequest,
     {
-        let free = !shared.lent && shared.is_idle() && self.is_idle();
-        shared.lent |= free;
+        let free = !queue.suspended && queue.is_idle() && self.is_idle();
+        queue.suspended |= free;
         free
     }
 
     /// See [`Client::poll_delay`](super::Client::poll_delay).
-    fn poll_delay<const N: usize>(&mut self, shared: &Shared<J, N>, now: u32) -> u32
+    fn poll_delay<const N: usize>(&mut self, queue: &RequestQueue<J, N>, now: u32) -> u32
     where
-        J: Job,
+        J: ClientRequest,
     {
         match self.delay(now) {
-            _ if shared.lent => u32::MAX,
+            _ if queue.suspended => u32::MAX,
             Some(delay) => delay,
-            None => shared.delay(now),
+            None => queue.delay(now),
         }
     }
 }

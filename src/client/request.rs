@@ -1,9 +1,9 @@
 //! A request of a client: its state, the data to send, and the place for the data of the
 //! response.
 
-use super::means::Means;
+use super::storage::ClientStorage;
 use crate::error::Status;
-use crate::pdu::outline::Outline;
+use crate::pdu::header::RequestHeader;
 use crate::time::elapsed;
 use crate::FIRMWARE;
 
@@ -23,12 +23,12 @@ pub(super) enum Stage {
     Ended,
 }
 
-/// The state of a request. The caller sets `capacity`, `transaction`, `unit` and `outline`
+/// The state of a request. The caller sets `capacity`, `transaction`, `unit` and `header`
 /// before it queues the request, and reads `status`, `exception` and `length` when the
 /// request has ended.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
-pub struct Ticket {
+pub struct RequestState {
     /// Greatest number of data bytes that the caller takes from the response.
     pub capacity: u16,
     /// A number that the caller chooses for the request; 0 for none.
@@ -50,12 +50,12 @@ pub struct Ticket {
     pub(super) since: u32,
     pub(super) wait: u32,
     /// The function and its arguments.
-    pub outline: Outline,
+    pub header: RequestHeader,
 }
 
-impl Ticket {
+impl RequestState {
     /// No request.
-    pub const NONE: Ticket = Ticket {
+    pub const NONE: RequestState = RequestState {
         capacity: 0,
         transaction: 0,
         unit: 0,
@@ -67,7 +67,7 @@ impl Ticket {
         wire: 0,
         since: 0,
         wait: 0,
-        outline: Outline::NONE,
+        header: RequestHeader::NONE,
     };
 
     /// The transaction identifier of the TCP frame in which the request was last sent; 0 if
@@ -100,13 +100,13 @@ impl Ticket {
     /// Microseconds until the request is due.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    pub(super) fn remaining_wait(&self, now: u32, means: &mut impl Means) -> u32 {
+    pub(super) fn remaining_wait(&self, now: u32, storage: &mut impl ClientStorage) -> u32 {
         let wait = match self.wait {
             0 => 0,
             wait => wait.saturating_sub(elapsed(now, self.since)),
         };
         if self.is(Stage::Queued) {
-            wait.max(means.rest(self.unit, now))
+            wait.max(storage.rest(self.unit, now))
         } else {
             wait
         }
@@ -126,22 +126,22 @@ impl Ticket {
 }
 
 /// A request that the caller queues, and that the client returns when it has ended.
-pub trait Job {
+pub trait ClientRequest {
     /// The state of the request.
-    fn ticket(&self) -> &Ticket;
+    fn state(&self) -> &RequestState;
 
-    /// As [`Job::ticket`].
-    fn ticket_mut(&mut self) -> &mut Ticket;
+    /// As [`ClientRequest::state`].
+    fn state_mut(&mut self) -> &mut RequestState;
 
     /// Returns byte `index` of the data to send, in the order of the wire.
     fn byte(&self, index: usize) -> u8;
 
     /// Stores byte `index` of the response's data, in the order of the wire. `index` is
-    /// less than [`Ticket::capacity`].
+    /// less than [`RequestState::capacity`].
     fn put(&mut self, index: usize, byte: u8);
 
     /// Stores all of the response's data.
-    fn put_all(&mut self, bytes: &[u8]) {
+    fn store_all(&mut self, bytes: &[u8]) {
         for (index, byte) in bytes.iter().enumerate() {
             self.put(index, *byte);
         }
@@ -160,43 +160,43 @@ pub(super) fn is_answer(ended: Status) -> bool {
 
 /// Stores the data of the complete response `pdu` in the request.
 #[cfg_attr(not(target_os = "none"), inline(always))]
-pub(super) fn deliver<J: Job>(job: &mut J, pdu: &[u8]) -> Status {
-    let at = usize::from(job.ticket().outline.data_at());
+pub(super) fn store_response<J: ClientRequest>(request: &mut J, pdu: &[u8]) -> Status {
+    let at = usize::from(request.state().header.data_at());
     match pdu.get(at..) {
-        Some(data) if at > 0 => store_data(job, data),
+        Some(data) if at > 0 => store_data(request, data),
         _ => Status::OK,
     }
 }
 
 /// Stores the data of a response in the request.
 #[cfg_attr(not(target_os = "none"), inline(always))]
-pub(super) fn store_data<J: Job>(job: &mut J, data: &[u8]) -> Status {
-    if !job.wants_data() {
+pub(super) fn store_data<J: ClientRequest>(request: &mut J, data: &[u8]) -> Status {
+    if !request.wants_data() {
         return Status::OK;
     }
-    let ticket = job.ticket_mut();
-    if data.len() > usize::from(ticket.capacity) {
+    let state = request.state_mut();
+    if data.len() > usize::from(state.capacity) {
         return Status::BUFFER_TOO_SMALL;
     }
-    ticket.length = data.len() as u8;
-    let words = ticket.outline.takes_words();
+    state.length = data.len() as u8;
+    let words = state.header.takes_words();
     // The mask clears the unused bits of the last byte.
     if FIRMWARE {
-        let mask = ticket.outline.mask();
+        let mask = state.header.mask();
         for (index, byte) in data.iter().enumerate() {
             let is_last = index + 1 == data.len();
-            job.put(index, if is_last { *byte & mask } else { *byte });
+            request.put(index, if is_last { *byte & mask } else { *byte });
         }
         return Status::OK;
     }
-    job.put_all(data);
+    request.store_all(data);
     if words {
         return Status::OK;
     }
-    let mask = job.ticket().outline.mask();
+    let mask = request.state().header.mask();
     if mask != 0xFF {
         if let Some((last, before)) = data.split_last() {
-            job.put(before.len(), *last & mask);
+            request.put(before.len(), *last & mask);
         }
     }
     Status::OK
@@ -204,6 +204,6 @@ pub(super) fn store_data<J: Job>(job: &mut J, data: &[u8]) -> Status {
 
 /// Returns a function that reads the data of a request. (All callers share one closure
 /// type, so generic functions are compiled once.)
-pub(super) fn data_of<J: Job>(job: &J) -> impl Fn(usize) -> u8 + '_ {
-    |index| job.byte(index)
+pub(super) fn data_of<J: ClientRequest>(request: &J) -> impl Fn(usize) -> u8 + '_ {
+    |index| request.byte(index)
 }

@@ -1,9 +1,9 @@
 //! The queue of a client, and what follows when a request ends. Serial lines and TCP
 //! streams use the same queue, so a program contains its code once.
 
-use super::job::{Job, Stage};
-use super::means::Means;
 use super::policy::Policy;
+use super::request::{ClientRequest, Stage};
+use super::storage::ClientStorage;
 use crate::engine::BROADCAST;
 use crate::error::Status;
 use crate::time::elapsed;
@@ -12,17 +12,17 @@ use heapless::Vec;
 
 /// The requests and the policy of a client.
 #[repr(C)]
-pub struct Shared<J, const N: usize> {
+pub struct RequestQueue<J, const N: usize> {
     /// The queue has changed: `since` and `wait` do not hold, a request may be due now.
     pub(super) changed: bool,
     /// The link is up.
     pub connected: bool,
-    /// Another user of the port has the line, see [`Client::lend`](super::Client::lend).
-    pub lent: bool,
+    /// Another user of the port has the line, see [`Client::suspend`](super::Client::suspend).
+    pub suspended: bool,
     /// Unit 0 addresses all units (broadcast).
-    pub broadcasts: bool,
+    pub has_broadcast: bool,
     /// Transaction numbers of pending requests must differ, except 0.
-    pub has_ids: bool,
+    pub has_transaction_ids: bool,
     /// No request is due until `wait` microseconds have passed since `since`.
     since: u32,
     wait: u32,
@@ -34,14 +34,14 @@ pub struct Shared<J, const N: usize> {
     pub(super) queue: Vec<J, N>,
 }
 
-impl<J, const N: usize> Shared<J, N> {
+impl<J, const N: usize> RequestQueue<J, N> {
     pub(super) const fn new() -> Self {
-        Shared {
+        RequestQueue {
             changed: false,
             connected: true,
-            lent: false,
-            broadcasts: false,
-            has_ids: false,
+            suspended: false,
+            has_broadcast: false,
+            has_transaction_ids: false,
             since: 0,
             wait: u32::MAX,
             policy: Policy::DEFAULT,
@@ -66,37 +66,37 @@ impl<J, const N: usize> Shared<J, N> {
     }
 }
 
-impl<J: Job, const N: usize> Shared<J, N> {
+impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
     /// See [`Client::queue`](super::Client::queue).
-    pub fn enqueue(&mut self, mut job: J) -> Result<(), J> {
-        let status = self.readiness(&job);
-        let ticket = job.ticket_mut();
-        ticket.status = status;
+    pub fn enqueue(&mut self, mut request: J) -> Result<(), J> {
+        let status = self.readiness(&request);
+        let state = request.state_mut();
+        state.status = status;
         if status != Status::PENDING {
-            return Err(job);
+            return Err(request);
         }
-        ticket.exception = 0;
-        ticket.length = 0;
-        ticket.retries = 0;
-        ticket.enter(Stage::Queued, 0, 0);
+        state.exception = 0;
+        state.length = 0;
+        state.retries = 0;
+        state.enter(Stage::Queued, 0, 0);
         self.changed = true;
         // `readiness` has checked that the queue is not full.
-        let _ = self.queue.push(job);
+        let _ = self.queue.push(request);
         Ok(())
     }
 
     /// [`Status::PENDING`] if the request may be queued, otherwise the error.
-    fn readiness(&self, job: &J) -> Status {
-        let ticket = job.ticket();
+    fn readiness(&self, request: &J) -> Status {
+        let state = request.state();
         if self.pending() >= N {
             Status::QUEUE_FULL
-        } else if ticket.unit == BROADCAST
-            && !(self.broadcasts && ticket.outline.may_be_broadcast())
+        } else if state.unit == BROADCAST
+            && !(self.has_broadcast && state.header.may_be_broadcast())
         {
             Status::BROADCAST_NOT_ALLOWED
-        } else if self.has_ids
-            && ticket.transaction != 0
-            && self.has_transaction(ticket.transaction)
+        } else if self.has_transaction_ids
+            && state.transaction != 0
+            && self.has_transaction(state.transaction)
         {
             Status::DUPLICATE_TRANSACTION
         } else {
@@ -106,55 +106,55 @@ impl<J: Job, const N: usize> Shared<J, N> {
 
     fn has_transaction(&self, transaction: u16) -> bool {
         let mut queue = self.queue.iter();
-        queue.any(|job| job.ticket().transaction == transaction)
+        queue.any(|request| request.state().transaction == transaction)
     }
 
     /// Takes the active request and marks it as sent, because the caller may have
     /// overwritten its state.
     fn take_active(&mut self) -> Option<J> {
-        let mut job = self.active.take()?;
-        job.ticket_mut().enter(Stage::Sent, 0, 0);
-        Some(job)
+        let mut request = self.active.take()?;
+        request.state_mut().enter(Stage::Sent, 0, 0);
+        Some(request)
     }
 
     /// Removes the first request for which `matches` returns true, with the status
     /// [`Status::CANCELLED`].
-    pub fn withdraw(&mut self, matches: impl Fn(&J) -> bool) -> Option<J> {
-        let mut job = if self.active.as_ref().is_some_and(&matches) {
+    pub fn cancel_one(&mut self, matches: impl Fn(&J) -> bool) -> Option<J> {
+        let mut request = if self.active.as_ref().is_some_and(&matches) {
             self.take_active()?
         } else {
             let at = self.queue.iter().position(matches)?;
             self.remove(at)?
         };
         self.changed = true;
-        job.ticket_mut().status = Status::CANCELLED;
-        Some(job)
+        request.state_mut().status = Status::CANCELLED;
+        Some(request)
     }
 
     /// Gives all requests the status [`Status::CANCELLED`]. They stay in the queue, which the
     /// caller clears.
     pub fn cancel_all(&mut self) {
-        if let Some(job) = &mut self.active {
-            job.ticket_mut().status = Status::CANCELLED;
+        if let Some(request) = &mut self.active {
+            request.state_mut().status = Status::CANCELLED;
         }
-        for job in self.queue.iter_mut() {
-            job.ticket_mut().status = Status::CANCELLED;
+        for request in self.queue.iter_mut() {
+            request.state_mut().status = Status::CANCELLED;
         }
     }
 
     /// Notes that the link was opened anew. The next polls end the requests in flight with
     /// [`Status::LINK_LOST`].
     pub fn interrupt(&mut self) {
-        if let Some(job) = self.take_active() {
-            self.put_first(job);
+        if let Some(request) = self.take_active() {
+            self.put_first(request);
         }
-        self.mark_lost(|job| job.ticket().is_sent());
+        self.mark_lost(|request| request.state().is_sent());
         self.connected = true;
     }
 
     /// True if no request is in flight.
     pub fn is_idle(&self) -> bool {
-        self.active.is_none() && !self.queue.iter().any(|job| job.ticket().is_sent())
+        self.active.is_none() && !self.queue.iter().any(|request| request.state().is_sent())
     }
 
     /// Microseconds until a request is due.
@@ -181,7 +181,7 @@ impl<J: Job, const N: usize> Shared<J, N> {
         Some(moved)
     }
 
-    /// Removes the first request from the queue. (Faster on a host than [`Shared::remove`]:
+    /// Removes the first request from the queue. (Faster on a host than [`RequestQueue::remove`]:
     /// all others move with one copy.)
     #[inline(never)]
     fn remove_first(&mut self) -> Option<J> {
@@ -193,23 +193,23 @@ impl<J: Job, const N: usize> Shared<J, N> {
 
     /// Inserts a request at the front of the queue, which has space for it.
     #[cfg_attr(target_os = "none", inline(always))]
-    pub(super) fn put_first(&mut self, mut job: J) {
+    pub(super) fn put_first(&mut self, mut request: J) {
         for place in self.queue.iter_mut() {
-            core::mem::swap(place, &mut job);
+            core::mem::swap(place, &mut request);
         }
-        let _ = self.queue.push(job);
+        let _ = self.queue.push(request);
     }
 
     /// Removes the first request that is due from the queue. If there is none, records when
     /// the next request is due.
-    pub(super) fn take_due(&mut self, now: u32, means: &mut impl Means) -> Option<J> {
+    pub(super) fn take_due(&mut self, now: u32, storage: &mut impl ClientStorage) -> Option<J> {
         // Firmware without mbm_client_pollDelay has no other use for the delay.
         if !FIRMWARE && self.delay(now) > 0 {
             return None;
         }
         let mut least = u32::MAX;
-        let found = self.queue.iter().position(|job| {
-            let wait = job.ticket().remaining_wait(now, means);
+        let found = self.queue.iter().position(|request| {
+            let wait = request.state().remaining_wait(now, storage);
             least = least.min(wait);
             wait == 0
         });
@@ -235,11 +235,11 @@ impl<J: Job, const N: usize> Shared<J, N> {
         at: usize,
         status: Status,
         now: u32,
-        means: &mut impl Means,
+        storage: &mut impl ClientStorage,
     ) -> Option<J> {
         self.changed = true;
-        let job = self.queue.get_mut(at)?;
-        if end_or_retry(&self.policy, job, status, now, means) {
+        let request = self.queue.get_mut(at)?;
+        if end_or_retry(&self.policy, request, status, now, storage) {
             return self.remove(at);
         }
         None
@@ -249,16 +249,16 @@ impl<J: Job, const N: usize> Shared<J, N> {
     /// of the queue for a retry.
     pub(super) fn conclude(
         &mut self,
-        mut job: J,
+        mut request: J,
         status: Status,
         now: u32,
-        means: &mut impl Means,
+        storage: &mut impl ClientStorage,
     ) -> Option<J> {
         self.changed = true;
-        if end_or_retry(&self.policy, &mut job, status, now, means) {
-            return Some(job);
+        if end_or_retry(&self.policy, &mut request, status, now, storage) {
+            return Some(request);
         }
-        self.put_first(job);
+        self.put_first(request);
         None
     }
 
@@ -272,9 +272,9 @@ impl<J: Job, const N: usize> Shared<J, N> {
     /// Marks the requests for which `which` returns true as lost. The next polls end them
     /// with [`Status::LINK_LOST`].
     pub(super) fn mark_lost(&mut self, mut which: impl FnMut(&J) -> bool) {
-        for job in self.queue.iter_mut() {
-            if which(job) {
-                job.ticket_mut().enter(Stage::Lost, 0, 0);
+        for request in self.queue.iter_mut() {
+            if which(request) {
+                request.state_mut().enter(Stage::Lost, 0, 0);
             }
         }
         self.changed = true;
@@ -286,25 +286,25 @@ impl<J: Job, const N: usize> Shared<J, N> {
 #[cfg_attr(target_os = "none", inline(never))]
 fn end_or_retry(
     policy: &Policy,
-    job: &mut impl Job,
+    request: &mut impl ClientRequest,
     status: Status,
     now: u32,
-    means: &mut impl Means,
+    storage: &mut impl ClientStorage,
 ) -> bool {
-    let (unit, retries) = (job.ticket().unit, job.ticket().retries);
-    // No reference to the request's state exists while `means` may call a hook.
+    let (unit, retries) = (request.state().unit, request.state().retries);
+    // No reference to the request's state exists while `storage` may call a hook.
     let again = if !FIRMWARE && status == Status::OK {
         None
     } else {
-        means.again(policy, retries, status)
+        storage.again(policy, retries, status)
     };
-    means.note(unit, status, again.is_some(), now);
-    let ticket = job.ticket_mut();
+    storage.note(unit, status, again.is_some(), now);
+    let state = request.state_mut();
     let Some(wait) = again else {
-        ticket.end(status);
+        state.end(status);
         return true;
     };
-    ticket.retries = retries + 1;
-    ticket.enter(Stage::Queued, now, wait);
+    state.retries = retries + 1;
+    state.enter(Stage::Queued, now, wait);
     false
 }

@@ -1,14 +1,14 @@
 //! Describes requests and responses in words, one line each.
 
-mod line;
 pub mod names;
+mod writer;
 
-pub use line::Line;
+pub use writer::TextWriter;
 
 use crate::bytes::Reader;
 use crate::error::Status;
 use crate::frame::{ascii, rtu, tcp, Adu, Framing};
-use crate::packet::Side;
+use crate::packet::PduKind;
 use crate::pdu::diagnostics::sub_function as sub;
 use crate::pdu::diagnostics::CLEAR_LOG;
 use crate::pdu::files::{Reads, Record, Writes};
@@ -20,7 +20,7 @@ use crate::pdu::{bits, files, registers, EXCEPTION};
 pub const HEAD: usize = 9;
 
 /// Writes the unit, then the word `what`, in columns of fixed width.
-pub fn start(line: &mut Line, unit: u8, what: &str) {
+pub fn start(line: &mut TextWriter, unit: u8, what: &str) {
     line.put("unit ");
     line.number(unit.into());
     line.put(if unit < 10 {
@@ -34,7 +34,7 @@ pub fn start(line: &mut Line, unit: u8, what: &str) {
 }
 
 /// Writes `what` and a number of bytes, for bytes that are no valid frame.
-pub fn bytes(line: &mut Line, what: &str, count: usize) {
+pub fn bytes(line: &mut TextWriter, what: &str, count: usize) {
     line.put(what);
     line.put(", ");
     line.number(count as u32);
@@ -43,7 +43,7 @@ pub fn bytes(line: &mut Line, what: &str, count: usize) {
 
 /// Describes the content of a frame, or its error. `end` is the last character of an ASCII
 /// frame.
-pub fn frame(line: &mut Line, framing: Framing, side: Side, frame: &[u8], end: u8) {
+pub fn frame(line: &mut TextWriter, framing: Framing, side: PduKind, frame: &[u8], end: u8) {
     let parsed = match framing {
         Framing::Rtu | Framing::RtuOverTcp => rtu::parse(frame),
         Framing::Tcp => tcp::parse(frame),
@@ -54,7 +54,7 @@ pub fn frame(line: &mut Line, framing: Framing, side: Side, frame: &[u8], end: u
 
 /// As [`frame`], for an ASCII frame, which is decoded in a copy on the stack.
 #[inline(never)]
-fn characters(line: &mut Line, side: Side, frame: &[u8], end: u8) {
+fn characters(line: &mut TextWriter, side: PduKind, frame: &[u8], end: u8) {
     let mut copy = [0; ascii::MAX_FRAME];
     let parsed = match copy.get_mut(..frame.len()) {
         Some(copy) => {
@@ -69,9 +69,9 @@ fn characters(line: &mut Line, side: Side, frame: &[u8], end: u8) {
 }
 
 /// Describes a decoded frame, or the error of a frame of `length` bytes.
-fn adu(line: &mut Line, side: Side, parsed: Result<Adu, Status>, length: usize) {
+fn adu(line: &mut TextWriter, side: PduKind, parsed: Result<Adu, Status>, length: usize) {
     match parsed {
-        Ok(adu) if side == Side::Request => {
+        Ok(adu) if side == PduKind::Request => {
             start(line, adu.unit, "request");
             request(line, adu.pdu);
         }
@@ -91,7 +91,7 @@ fn adu(line: &mut Line, side: Side, parsed: Result<Adu, Status>, length: usize) 
 }
 
 /// Writes the code and the name of a function.
-fn function(line: &mut Line, code: u8) {
+fn function(line: &mut TextWriter, code: u8) {
     line.hex(code);
     line.byte(b' ');
     line.put(names::function(code));
@@ -99,7 +99,7 @@ fn function(line: &mut Line, code: u8) {
 
 /// Writes the first and the last of `quantity` addresses. The last may be greater than 65535,
 /// because the request may be wrong.
-fn range(line: &mut Line, address: u16, quantity: u16) {
+fn range(line: &mut TextWriter, address: u16, quantity: u16) {
     line.number(address.into());
     if quantity != 1 {
         line.put("..");
@@ -107,7 +107,7 @@ fn range(line: &mut Line, address: u16, quantity: u16) {
     }
 }
 
-fn records(line: &mut Line, record: Record) {
+fn records(line: &mut TextWriter, record: Record) {
     line.put(" file ");
     line.number(record.file.into());
     line.put(if record.length == 1 {
@@ -118,7 +118,7 @@ fn records(line: &mut Line, record: Record) {
     range(line, record.record, record.length);
 }
 
-fn writes(line: &mut Line, writes: &Writes) {
+fn writes(line: &mut TextWriter, writes: &Writes) {
     let mut first = true;
     for (record, data) in writes.iter() {
         line.put(if first { " " } else { "," });
@@ -129,7 +129,7 @@ fn writes(line: &mut Line, writes: &Writes) {
     }
 }
 
-fn masks(line: &mut Line, address: u16, and_mask: u16, or_mask: u16) {
+fn masks(line: &mut TextWriter, address: u16, and_mask: u16, or_mask: u16) {
     line.number(address.into());
     line.put(": and ");
     line.hex_word(and_mask);
@@ -137,7 +137,7 @@ fn masks(line: &mut Line, address: u16, and_mask: u16, or_mask: u16) {
     line.hex_word(or_mask);
 }
 
-fn diagnostics(line: &mut Line, code: u16, data: &[u8], is_response: bool) {
+fn diagnostics(line: &mut TextWriter, code: u16, data: &[u8], is_response: bool) {
     line.put(", ");
     line.put(names::sub_function(code));
     match (code, data) {
@@ -165,7 +165,7 @@ fn diagnostics(line: &mut Line, code: u16, data: &[u8], is_response: bool) {
 }
 
 /// Writes a PDU that cannot be decoded, as bytes.
-fn malformed(line: &mut Line, pdu: &[u8]) {
+fn malformed(line: &mut TextWriter, pdu: &[u8]) {
     if let Some((code, data)) = pdu.split_first() {
         function(line, *code);
         line.put(", malformed:");
@@ -176,7 +176,7 @@ fn malformed(line: &mut Line, pdu: &[u8]) {
 }
 
 /// Writes data of unknown meaning, as bytes.
-fn raw(line: &mut Line, data: &[u8]) {
+fn raw(line: &mut TextWriter, data: &[u8]) {
     if !data.is_empty() {
         line.byte(b':');
         line.bytes(data);
@@ -185,7 +185,7 @@ fn raw(line: &mut Line, data: &[u8]) {
 
 /// Writes a PDU with an unknown function code. Returns false, and writes nothing, if the
 /// function is known.
-fn unknown(line: &mut Line, pdu: &[u8]) -> bool {
+fn unknown(line: &mut TextWriter, pdu: &[u8]) -> bool {
     match pdu.split_first() {
         Some((code, data)) if names::function(*code) == names::function(0) => {
             function(line, *code);
@@ -197,7 +197,7 @@ fn unknown(line: &mut Line, pdu: &[u8]) -> bool {
 }
 
 /// Describes a request PDU.
-pub fn request(line: &mut Line, pdu: &[u8]) {
+pub fn request(line: &mut TextWriter, pdu: &[u8]) {
     if unknown(line, pdu) {
         return;
     }
@@ -294,13 +294,13 @@ pub fn request(line: &mut Line, pdu: &[u8]) {
     }
 }
 
-fn single_coil(line: &mut Line, address: u16, on: bool) {
+fn single_coil(line: &mut TextWriter, address: u16, on: bool) {
     line.put("  ");
     line.number(address.into());
     line.put(if on { ": on" } else { ": off" });
 }
 
-fn single_register(line: &mut Line, address: u16, value: u16) {
+fn single_register(line: &mut TextWriter, address: u16, value: u16) {
     line.put("  ");
     line.number(address.into());
     line.put(": ");
@@ -310,7 +310,7 @@ fn single_register(line: &mut Line, address: u16, value: u16) {
 /// The arguments of a request that its reply does not repeat, read from the first bytes of
 /// the request.
 #[derive(Clone, Copy)]
-enum Asked {
+enum RequestStart {
     Nothing,
     Range(u16, u16),
     Queue(u16),
@@ -318,7 +318,7 @@ enum Asked {
 }
 
 /// Reads the arguments from the head of a request PDU.
-fn arguments(head: &[u8]) -> Asked {
+fn arguments(head: &[u8]) -> RequestStart {
     let mut reader = Reader::new(head);
     match reader.u8() {
         Some(
@@ -330,30 +330,32 @@ fn arguments(head: &[u8]) -> Asked {
             | registers::WRITE_MULTIPLE_REGISTERS
             | registers::READ_WRITE_MULTIPLE_REGISTERS,
         ) => match (reader.u16(), reader.u16()) {
-            (Some(address), Some(quantity)) => Asked::Range(address, quantity),
-            _ => Asked::Nothing,
+            (Some(address), Some(quantity)) => RequestStart::Range(address, quantity),
+            _ => RequestStart::Nothing,
         },
-        Some(files::READ_FIFO_QUEUE) => reader.u16().map_or(Asked::Nothing, Asked::Queue),
+        Some(files::READ_FIFO_QUEUE) => reader
+            .u16()
+            .map_or(RequestStart::Nothing, RequestStart::Queue),
         Some(files::READ_FILE_RECORD) => {
             // The head contains only the first sub-request. Of the records of others, only
             // the data are written.
             let _ = reader.u8();
             let first = Reads::new(reader.rest()).ok();
             let record = first.and_then(|reads| reads.iter().next());
-            record.map_or(Asked::Nothing, Asked::Record)
+            record.map_or(RequestStart::Nothing, RequestStart::Record)
         }
-        _ => Asked::Nothing,
+        _ => RequestStart::Nothing,
     }
 }
 
 /// Describes a request PDU of which only the head is known.
-pub fn head(line: &mut Line, head: &[u8]) {
+pub fn head(line: &mut TextWriter, head: &[u8]) {
     let Some(code) = head.first() else {
         return;
     };
     match arguments(head) {
         _ if Request::parse(head).is_ok() => request(line, head),
-        Asked::Range(address, quantity) => {
+        RequestStart::Range(address, quantity) => {
             function(line, *code);
             line.put("  ");
             range(line, address, quantity);
@@ -364,7 +366,7 @@ pub fn head(line: &mut Line, head: &[u8]) {
 
 /// Describes a response PDU. `head` is the head of its request, from which the addresses of
 /// the values are taken; it is empty if the request is unknown.
-pub fn response(line: &mut Line, pdu: &[u8], head: &[u8]) {
+pub fn response(line: &mut TextWriter, pdu: &[u8], head: &[u8]) {
     let is_exception = pdu.first().is_some_and(|code| code & EXCEPTION != 0);
     if !is_exception && unknown(line, pdu) {
         return;
@@ -375,7 +377,7 @@ pub fn response(line: &mut Line, pdu: &[u8], head: &[u8]) {
     function(line, response.function());
     let asked = arguments(head);
     if let (
-        Asked::Range(address, quantity),
+        RequestStart::Range(address, quantity),
         Response::ReadBits { .. } | Response::ReadRegisters { .. },
     ) = (asked, response)
     {
@@ -385,7 +387,7 @@ pub fn response(line: &mut Line, pdu: &[u8], head: &[u8]) {
     match response {
         Response::ReadBits { data, .. } => {
             let count = match asked {
-                Asked::Range(_, quantity) => quantity.into(),
+                RequestStart::Range(_, quantity) => quantity.into(),
                 _ => 8 * data.len(),
             };
             line.byte(b':');
@@ -429,7 +431,7 @@ pub fn response(line: &mut Line, pdu: &[u8], head: &[u8]) {
             let mut separator = " ";
             for data in groups.iter() {
                 line.put(separator);
-                if let (Asked::Record(record), " ") = (asked, separator) {
+                if let (RequestStart::Record(record), " ") = (asked, separator) {
                     records(line, record);
                     line.byte(b':');
                 }
@@ -447,7 +449,7 @@ pub fn response(line: &mut Line, pdu: &[u8], head: &[u8]) {
             masks(line, address, and_mask, or_mask);
         }
         Response::FifoQueue { data } => {
-            if let Asked::Queue(address) = asked {
+            if let RequestStart::Queue(address) = asked {
                 line.put("  ");
                 line.number(address.into());
             }
@@ -490,7 +492,7 @@ pub fn response(line: &mut Line, pdu: &[u8], head: &[u8]) {
     }
 }
 
-fn event_counter(line: &mut Line, status: u16, events: u16) {
+fn event_counter(line: &mut TextWriter, status: u16, events: u16) {
     line.put(": status ");
     line.hex_word(status);
     line.put(", events ");

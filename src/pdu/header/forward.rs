@@ -3,16 +3,16 @@
 use super::super::custom::Rule;
 use super::super::{bits, diagnostics, files, identification, registers};
 use super::form::*;
-use super::Outline;
+use super::RequestHeader;
 use crate::error::Status;
 
 /// The last sub-function of 08 that the standard defines or keeps free within its
 /// own range; how long the responses of later ones are, it does not say.
 const LAST_SUB_FUNCTION: u16 = 0x14;
 
-impl Outline {
+impl RequestHeader {
     /// Becomes the request of `function` with the bytes of `body` after the function
-    /// code. Its data to send are the last [`Outline::data_length`] bytes of `body`.
+    /// code. Its data to send are the last [`RequestHeader::data_length`] bytes of `body`.
     /// The data of its response are all bytes after the function code, as on the wire.
     /// The response is judged as that of the same request in another form; of a
     /// function that the standard does not define, only its end tells its length.
@@ -29,25 +29,25 @@ impl Outline {
         };
         let (first, second) = (word(0), word(1));
         let form = match function {
-            bits::READ_COILS => Form::READ_COILS,
-            bits::READ_DISCRETE_INPUTS => Form::READ_DISCRETE_INPUTS,
-            registers::READ_HOLDING_REGISTERS => Form::READ_HOLDING_REGISTERS,
-            registers::READ_INPUT_REGISTERS => Form::READ_INPUT_REGISTERS,
-            bits::WRITE_SINGLE_COIL => Form::WRITE_SINGLE_COIL,
-            registers::WRITE_SINGLE_REGISTER => Form::WRITE_SINGLE_REGISTER,
-            diagnostics::READ_EXCEPTION_STATUS => Form::READ_EXCEPTION_STATUS,
-            diagnostics::GET_COMM_EVENT_COUNTER => Form::GET_COMM_EVENT_COUNTER,
-            diagnostics::GET_COMM_EVENT_LOG => Form::GET_COMM_EVENT_LOG,
-            bits::WRITE_MULTIPLE_COILS => Form::WRITE_MULTIPLE_COILS,
-            registers::WRITE_MULTIPLE_REGISTERS => Form::WRITE_MULTIPLE_REGISTERS,
-            diagnostics::REPORT_SERVER_ID => Form::REPORT_SERVER_ID,
-            files::READ_FIFO_QUEUE => Form::READ_FIFO_QUEUE,
-            _ => Form::NONE,
+            bits::READ_COILS => FunctionSpec::READ_COILS,
+            bits::READ_DISCRETE_INPUTS => FunctionSpec::READ_DISCRETE_INPUTS,
+            registers::READ_HOLDING_REGISTERS => FunctionSpec::READ_HOLDING_REGISTERS,
+            registers::READ_INPUT_REGISTERS => FunctionSpec::READ_INPUT_REGISTERS,
+            bits::WRITE_SINGLE_COIL => FunctionSpec::WRITE_SINGLE_COIL,
+            registers::WRITE_SINGLE_REGISTER => FunctionSpec::WRITE_SINGLE_REGISTER,
+            diagnostics::READ_EXCEPTION_STATUS => FunctionSpec::READ_EXCEPTION_STATUS,
+            diagnostics::GET_COMM_EVENT_COUNTER => FunctionSpec::GET_COMM_EVENT_COUNTER,
+            diagnostics::GET_COMM_EVENT_LOG => FunctionSpec::GET_COMM_EVENT_LOG,
+            bits::WRITE_MULTIPLE_COILS => FunctionSpec::WRITE_MULTIPLE_COILS,
+            registers::WRITE_MULTIPLE_REGISTERS => FunctionSpec::WRITE_MULTIPLE_REGISTERS,
+            diagnostics::REPORT_SERVER_ID => FunctionSpec::REPORT_SERVER_ID,
+            files::READ_FIFO_QUEUE => FunctionSpec::READ_FIFO_QUEUE,
+            _ => FunctionSpec::NONE,
         };
         let built = match function {
-            _ if form != Form::NONE => self.set(form, first, second),
+            _ if form != FunctionSpec::NONE => self.set(form, first, second),
             diagnostics::DIAGNOSTICS if first > LAST_SUB_FUNCTION => {
-                self.set(Form::DIAGNOSTICS, first, 0);
+                self.set(FunctionSpec::DIAGNOSTICS, first, 0);
                 self.form.0 |= OWN;
                 self.follow(length.saturating_sub(2))
             }

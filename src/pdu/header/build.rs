@@ -10,27 +10,27 @@ use super::super::limits::{
 use super::super::query::check_range;
 use super::super::{files, EXCEPTION};
 use super::form::*;
-use super::{Outline, HEAD};
+use super::{RequestHeader, HEAD};
 use crate::error::Status;
 
 /// The first word of one group: its reference type behind the byte count.
 pub const GROUP: usize = files::REFERENCE_TYPE as usize;
 
-// What is behind [`Outline::set`] stands apart, for the functions of C call that first,
+// What is behind [`RequestHeader::set`] stands apart, for the functions of C call that first,
 // at one place for all.
-impl Outline {
+impl RequestHeader {
     /// Becomes a request of two words, as far as its form has them.
     /// [`Status::OK`]; [`Status::ILLEGAL_DATA_VALUE`] for a quantity that the
     /// standard does not allow, [`Status::ILLEGAL_DATA_ADDRESS`] if the range
     /// passes 65535.
-    pub fn set(&mut self, form: Form, first: u16, second: u16) -> Status {
+    pub fn set(&mut self, form: FunctionSpec, first: u16, second: u16) -> Status {
         self.set_all(form, &[first.into(), second.into(), 0, 0])
     }
 
-    /// As [`Outline::set`], with as many words in the head as the function has.
+    /// As [`RequestHeader::set`], with as many words in the head as the function has.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    pub fn set_all(&mut self, form: Form, words: &[usize; 4]) -> Status {
+    pub fn set_all(&mut self, form: FunctionSpec, words: &[usize; 4]) -> Status {
         // No map, which would be a loop.
         let (first, second) = (words[0] as u16, words[1] as u16);
         self.form = form;
@@ -64,11 +64,11 @@ impl Outline {
     /// 16: the register becomes `(register & and) | (or & !and)`.
     pub fn mask_write_register(&mut self, address: u16, and_mask: u16, or_mask: u16) -> Status {
         let words = [address.into(), and_mask.into(), or_mask.into(), 0];
-        self.set_all(Form::MASK_WRITE_REGISTER, &words)
+        self.set_all(FunctionSpec::MASK_WRITE_REGISTER, &words)
     }
 
     /// 17: 1 to 121 registers are written, then 1 to 125 read; else as
-    /// [`Outline::set`].
+    /// [`RequestHeader::set`].
     pub fn read_write_registers(
         &mut self,
         read_address: u16,
@@ -78,14 +78,14 @@ impl Outline {
     ) -> Status {
         let words = [read_address, read_quantity, write_address, write_quantity];
         let words = words.map(usize::from);
-        let readable = self.set_all(Form::READ_WRITE_REGISTERS, &words);
+        let readable = self.set_all(FunctionSpec::READ_WRITE_REGISTERS, &words);
         match self.add_write(write_address, write_quantity) {
             Status::OK => readable,
             refused => refused,
         }
     }
 
-    /// What 17 writes, behind the head that [`Outline::set_all`] set.
+    /// What 17 writes, behind the head that [`RequestHeader::set_all`] set.
     #[inline(always)]
     pub fn add_write(&mut self, address: u16, quantity: u16) -> Status {
         self.head_length = HEAD as u8;
@@ -96,11 +96,11 @@ impl Outline {
     /// 08: a sub-function and `words` words of data; all but Return Query Data
     /// take one. [`Status::ILLEGAL_DATA_VALUE`] for another number of them.
     pub fn diagnostics(&mut self, sub_function: u16, words: u16) -> Status {
-        self.set(Form::DIAGNOSTICS, sub_function, 0);
+        self.set(FunctionSpec::DIAGNOSTICS, sub_function, 0);
         self.add_words(sub_function, words)
     }
 
-    /// How many words of data 08 has, behind what [`Outline::set`] set.
+    /// How many words of data 08 has, behind what [`RequestHeader::set`] set.
     #[inline(always)]
     pub fn add_words(&mut self, sub_function: u16, words: u16) -> Status {
         self.data_length = (words << 1) as u8;
@@ -117,7 +117,7 @@ impl Outline {
         value(words >= 1 && words <= most)
     }
 
-    /// One group of records, of 14 or 15, whose head [`Outline::set_all`] set, but for
+    /// One group of records, of 14 or 15, whose head [`RequestHeader::set_all`] set, but for
     /// its byte count.
     pub fn add_group(&mut self, file: u16, record: u16, length: u16) -> Status {
         let bytes = (length << 1) as u8;
@@ -140,7 +140,7 @@ impl Outline {
         }
     }
 
-    fn group(&mut self, form: Form, file: u16, record: u16, length: u16) -> Status {
+    fn group(&mut self, form: FunctionSpec, file: u16, record: u16, length: u16) -> Status {
         let words = [GROUP, file.into(), record.into(), length.into()];
         self.set_all(form, &words);
         self.add_group(file, record, length)
@@ -150,17 +150,17 @@ impl Outline {
     /// another length, [`Status::ILLEGAL_DATA_ADDRESS`] for file 0 or records
     /// beyond 9999.
     pub fn read_file_record(&mut self, file: u16, record: u16, length: u16) -> Status {
-        self.group(Form::READ_FILE_RECORD, file, record, length)
+        self.group(FunctionSpec::READ_FILE_RECORD, file, record, length)
     }
 
-    /// 15 of 1 to 122 records in a row; else as [`Outline::read_file_record`].
+    /// 15 of 1 to 122 records in a row; else as [`RequestHeader::read_file_record`].
     pub fn write_file_record(&mut self, file: u16, record: u16, length: u16) -> Status {
-        self.group(Form::WRITE_FILE_RECORD, file, record, length)
+        self.group(FunctionSpec::WRITE_FILE_RECORD, file, record, length)
     }
 
     /// 14 of the groups that `bytes` bytes of data are, which their sender built.
     pub fn read_file_records(&mut self, bytes: u16) -> Status {
-        self.set(Form::READ_FILE_RECORDS, 0, 0);
+        self.set(FunctionSpec::READ_FILE_RECORDS, 0, 0);
         self.data_length = bytes as u8;
         let bytes = usize::from(bytes);
         value(bytes >= READ_FILE_BYTES.0 && bytes <= READ_FILE_BYTES.1 && bytes.is_multiple_of(7))
@@ -168,7 +168,7 @@ impl Outline {
 
     /// 15 of the groups that `bytes` bytes of data are, which their sender built.
     pub fn write_file_records(&mut self, bytes: u16) -> Status {
-        self.set(Form::WRITE_FILE_RECORDS, 0, 0);
+        self.set(FunctionSpec::WRITE_FILE_RECORDS, 0, 0);
         self.data_length = bytes as u8;
         self.length = (bytes as u8).wrapping_add(2);
         let bytes = usize::from(bytes);
@@ -177,9 +177,9 @@ impl Outline {
 
     /// 2B/0E: read device id code 1 to 4 and the object to begin with.
     pub fn read_device_identification(&mut self, code: u8, object: u8) -> Status {
-        let [first, second] = Outline::identification(code, object);
-        self.set(Form::READ_DEVICE_IDENTIFICATION, first, second);
-        Outline::check_code(code)
+        let [first, second] = RequestHeader::identification(code, object);
+        self.set(FunctionSpec::READ_DEVICE_IDENTIFICATION, first, second);
+        RequestHeader::check_code(code)
     }
 
     /// The two words of 2B/0E.
@@ -198,14 +198,14 @@ impl Outline {
     /// 2B of any MEI type and so many `bytes` of data; the response ends by
     /// silence or as the framing says.
     pub fn encapsulated(&mut self, mei_type: u8, bytes: u16) -> Status {
-        self.set(Form::ENCAPSULATED, u16::from(mei_type) << 8, 0);
+        self.set(FunctionSpec::ENCAPSULATED, u16::from(mei_type) << 8, 0);
         self.follow(bytes)
     }
 
     /// A function of the user's with so many `bytes` of data, whose response is
     /// as long as `rule` says.
     pub fn custom(&mut self, function: u8, bytes: u16, rule: Rule) -> Status {
-        self.set(Form::CUSTOM, 0, 0);
+        self.set(FunctionSpec::CUSTOM, 0, 0);
         match rule {
             Rule::Fixed(0) | Rule::Counted(0, _) => Status::INVALID_ARGUMENT,
             Rule::Fixed(length) => self.add_rule(function, bytes, FIXED, [length, 0]),
@@ -214,7 +214,7 @@ impl Outline {
         }
     }
 
-    /// The function of the user's, behind the form that [`Outline::set`] set: how the
+    /// The function of the user's, behind the form that [`RequestHeader::set`] set: how the
     /// length of its response is known, with the numbers that this takes.
     #[cfg_attr(target_os = "none", inline(always))]
     pub fn add_rule(

@@ -6,8 +6,8 @@ use crate::engine::{Frame, Storage};
 use crate::error::Status;
 
 /// The storage of a client: the frame buffer of [`Storage`], and more that is optional.
-pub trait Means: Storage<Count = u16> {
-    /// The bytes of [`Means::outgoing`] from index `from` to before index `to`. The client
+pub trait ClientStorage: Storage<Count = u16> {
+    /// The bytes of [`ClientStorage::outgoing`] from index `from` to before index `to`. The client
     /// ensures that `from` <= `to` <= length of the buffer.
     fn to_send(&mut self, from: u16, to: u16) -> &mut [u8] {
         let bytes = self.outgoing().get_mut(from.into()..to.into());
@@ -48,5 +48,5 @@ pub trait Means: Storage<Count = u16> {
 }
 
 /// Only a frame buffer, enough for a client on a serial line. A TCP client needs
-/// [`Means::outgoing`] too and sends nothing without it.
-impl<F: AsRef<[u8]> + AsMut<[u8]>> Means for Frame<F> {}
+/// [`ClientStorage::outgoing`] too and sends nothing without it.
+impl<F: AsRef<[u8]> + AsMut<[u8]>> ClientStorage for Frame<F> {}

@@ -25,7 +25,7 @@ pub(super) struct Timing {
     /// Silence between two frames.
     pub silence: u32,
     /// How long to wait for the rest of an incomplete frame.
-    pub patience: u32,
+    pub frame_timeout: u32,
 }
 
 impl Timing {
@@ -37,7 +37,7 @@ impl Timing {
 
 /// The state of one stream. The caller passes the buffer to each call.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lane {
+pub(super) struct RxStream {
     /// Index of the first byte that was not reported yet, of the byte at which a frame is looked
     /// for, and of the end of the received bytes. No frame begins between the first two.
     pub start: u16,
@@ -53,7 +53,7 @@ pub(super) struct Lane {
     need: u16,
     /// A frame between `start` and `at` may be too long for the buffer.
     pub cut: bool,
-    heard: bool,
+    received: bool,
     count: u8,
     /// How many marks are followed by silence.
     silent: u8,
@@ -65,8 +65,8 @@ pub(super) struct Lane {
     marks: [Mark; MARKS],
 }
 
-impl Lane {
-    pub const EMPTY: Lane = Lane {
+impl RxStream {
+    pub const EMPTY: RxStream = RxStream {
         start: 0,
         at: 0,
         end: 0,
@@ -75,7 +75,7 @@ impl Lane {
         searched: 0,
         need: 0,
         cut: false,
-        heard: false,
+        received: false,
         count: 0,
         silent: 0,
         last: 0,
@@ -117,7 +117,7 @@ impl Lane {
     }
 
     /// Takes one byte that follows the previous byte without silence, the most frequent case of
-    /// [`Lane::feed`]. False, and nothing taken, in all other cases.
+    /// [`RxStream::feed`]. False, and nothing taken, in all other cases.
     #[inline(always)]
     pub fn feed_next(&mut self, buffer: &mut [u8], byte: u8, now: u32, timing: &Timing) -> bool {
         let gap = elapsed(now, self.last).saturating_sub(timing.character);
@@ -138,14 +138,14 @@ impl Lane {
             return 0;
         }
         let on_the_line = timing.on_the_line(bytes.len());
-        if !self.heard {
-            self.heard = true;
+        if !self.received {
+            self.received = true;
             self.last = now.wrapping_sub(on_the_line);
             self.floor = self.last;
         }
         let since = elapsed(now, self.last);
         let gap = since.saturating_sub(on_the_line);
-        if gap >= timing.patience {
+        if gap >= timing.frame_timeout {
             self.skip = 0;
         }
         let (skipped, bytes) = bytes.split_at(bytes.len().min(self.skip.into()));
@@ -160,10 +160,10 @@ impl Lane {
         if !skipped.is_empty() {
             self.last = now.wrapping_sub(timing.on_the_line(bytes.len()).min(since));
         }
-        self.move_to_the_front(buffer);
-        let room = buffer.get_mut(self.end.into()..).unwrap_or_default();
+        self.move_to_front(buffer);
+        let space = buffer.get_mut(self.end.into()..).unwrap_or_default();
         let mut count = 0;
-        for (place, byte) in room.iter_mut().zip(bytes) {
+        for (place, byte) in space.iter_mut().zip(bytes) {
             *place = *byte;
             count += 1;
         }
@@ -195,7 +195,7 @@ impl Lane {
     #[inline(always)]
     fn mark(&mut self, count: u16, time: u32, is_new: bool, timing: &Timing) {
         self.last = time;
-        self.calm = timing.silence.min(timing.patience);
+        self.calm = timing.silence.min(timing.frame_timeout);
         self.end += count;
         let (end, many) = (self.end, usize::from(self.count) >= MARKS / 2);
         match self.last_mark() {
@@ -219,21 +219,21 @@ impl Lane {
     }
 
     /// Notes that no frame can be found before `need` bytes have arrived from `at` on, the line
-    /// has been silent for longer than now, or [`Lane::look_again`] is called.
+    /// has been silent for longer than now, or [`RxStream::look_again`] is called.
     pub fn settle(&mut self, need: usize, capacity: usize, now: u32, timing: &Timing) {
         let need = (usize::from(self.at) + need).min(usize::from(self.start) + capacity);
         self.need = need.min(u16::MAX.into()) as u16;
         let quiet = self.quiet(now);
         let later = |time: u32| if time > quiet { time } else { u32::MAX };
-        self.calm = later(timing.silence).min(later(timing.patience));
+        self.calm = later(timing.silence).min(later(timing.frame_timeout));
     }
 
-    /// Undoes [`Lane::settle`].
+    /// Undoes [`RxStream::settle`].
     pub fn look_again(&mut self) {
         self.need = 0;
     }
 
-    /// True if no frame can be found yet: see [`Lane::settle`].
+    /// True if no frame can be found yet: see [`RxStream::settle`].
     pub fn is_settled(&self, now: u32) -> bool {
         self.end < self.need && self.quiet(now) < self.calm
     }
@@ -256,7 +256,7 @@ impl Lane {
         self.silent = 0;
     }
 
-    fn move_to_the_front(&mut self, buffer: &mut [u8]) {
+    fn move_to_front(&mut self, buffer: &mut [u8]) {
         let by = self.start;
         if by == 0 {
             return;

@@ -1,24 +1,24 @@
 //! The master's requests: one of ten functions, in RTU frames. The request determines the
 //! length of its reply.
 
-use super::search::EXCEPTION_FRAME;
-use super::{Engine, Request, Seen, Verdict, Words};
+use super::rtu::EXCEPTION_FRAME;
+use super::{Engine, Match, RequestSpec, RxFault, Words};
 use crate::error::Status;
 use crate::frame::rtu;
-use crate::pdu::query::Query;
+use crate::pdu::query::MasterRequest;
 use crate::pdu::EXCEPTION;
 use crate::FIRMWARE;
 
 /// Bytes of a frame around its PDU: unit and CRC.
 const AROUND_PDU: u8 = rtu::OVERHEAD as u8;
 
-impl<P, S: Words> Request<P, S> for Query {
-    const NONE: Self = Query::NONE;
-    const IS_PLAIN: bool = true;
+impl<P, S: Words> RequestSpec<P, S> for MasterRequest {
+    const NONE: Self = MasterRequest::NONE;
+    const HAS_FIXED_REPLY: bool = true;
 
     #[inline(always)]
     fn function(&self) -> u8 {
-        Query::function(self)
+        MasterRequest::function(self)
     }
 
     #[inline(always)]
@@ -27,14 +27,14 @@ impl<P, S: Words> Request<P, S> for Query {
     }
 
     #[inline(always)]
-    fn fits(&self, room: u8) -> bool {
-        self.length() <= room.wrapping_sub(AROUND_PDU)
+    fn fits(&self, space: u8) -> bool {
+        self.length() <= space.wrapping_sub(AROUND_PDU)
     }
 
     #[inline(always)]
-    fn reply_length(&self, room: u8) -> u8 {
+    fn reply_length(&self, space: u8) -> u8 {
         let length = self.response_length() + AROUND_PDU;
-        if length > room {
+        if length > space {
             0
         } else {
             length
@@ -50,13 +50,13 @@ impl<P, S: Words> Request<P, S> for Query {
     }
 
     #[inline(always)]
-    fn search(engine: &mut Engine<P, S, Self>) -> bool {
+    fn find_reply(engine: &mut Engine<P, S, Self>) -> bool {
         let data = engine.request.reads();
-        !FIRMWARE && data > 0 && engine.has_read(data) || engine.search_rtu::<false>()
+        !FIRMWARE && data > 0 && engine.has_read(data) || engine.find_rtu_reply::<false>()
     }
 
     #[inline(always)]
-    fn wanted(engine: &mut Engine<P, S, Self>, front: u8, have: u8) -> u8 {
+    fn expected_length(engine: &mut Engine<P, S, Self>, front: u8, have: u8) -> u8 {
         let function = engine.storage.byte(front + 1) ^ engine.request.function();
         if function == EXCEPTION {
             return EXCEPTION_FRAME;
@@ -66,7 +66,7 @@ impl<P, S: Words> Request<P, S> for Query {
         }
         if cfg!(feature = "echo") && engine.echo {
             let known = (have - 1).min(engine.request.head_length());
-            if agrees(engine, front, known) {
+            if matches_echo(engine, front, known) {
                 let length = engine.request.length() + AROUND_PDU;
                 // Until the echo is complete, the bytes may still turn out to be the reply.
                 return if length > have { have + 1 } else { length };
@@ -81,14 +81,14 @@ impl<P, S: Words> Request<P, S> for Query {
             }
         }
         if engine.length == 0 {
-            engine.see(Seen::TOO_LONG);
+            engine.note_fault(RxFault::TOO_LONG);
         }
         engine.length
     }
 
     #[inline(always)]
-    fn pass_and_keep(engine: &mut Engine<P, S, Self>, front: u8) -> u8 {
-        engine.pass_and_keep(front)
+    fn skip_or_keep_byte(engine: &mut Engine<P, S, Self>, front: u8) -> u8 {
+        engine.skip_or_keep_byte(front)
     }
 
     #[inline(always)]
@@ -102,18 +102,18 @@ impl<P, S: Words> Request<P, S> for Query {
     }
 
     #[inline(always)]
-    fn take_deviating(engine: &mut Engine<P, S, Self>) -> bool {
-        engine.take_deviating()
+    fn accept_deviating(engine: &mut Engine<P, S, Self>) -> bool {
+        engine.accept_deviating()
     }
 
     #[cfg_attr(target_os = "none", inline(never))]
-    fn judge(engine: &mut Engine<P, S, Self>, front: u8, _content: u8) -> Verdict {
+    fn validate(engine: &mut Engine<P, S, Self>, front: u8, _content: u8) -> Match {
         engine.exception = 0;
         if engine.storage.byte(front + 1) & EXCEPTION != 0 {
             engine.exception = engine.storage.byte(front + 2);
             return match Status::exception(engine.exception) {
-                Status::MALFORMED_REPLY => Verdict::Wrong,
-                _ => Verdict::Right,
+                Status::MALFORMED_REPLY => Match::Unrelated,
+                _ => Match::Reply,
             };
         }
         let is_echo = cfg!(feature = "echo") && engine.echo;
@@ -122,23 +122,23 @@ impl<P, S: Words> Request<P, S> for Query {
         // take an AVR 100 cycles. A reply at the end of the buffer may be shorter than the
         // head.
         let head = engine.request.head_length();
-        let agrees =
-            (is_echo || !is_read) && engine.end - front > head && agrees(engine, front, head);
-        if is_echo && agrees {
+        let matches_echo =
+            (is_echo || !is_read) && engine.end - front > head && matches_echo(engine, front, head);
+        if is_echo && matches_echo {
             engine.echo = false;
-            return Verdict::Echo;
+            return Match::Echo;
         }
-        if agrees || is_read {
-            Verdict::Right
+        if matches_echo || is_read {
+            Match::Reply
         } else {
-            Verdict::Wrong
+            Match::Unrelated
         }
     }
 }
 
 /// Writes the frame of any request.
 #[inline(never)]
-fn write_any<P, S: Words>(engine: &mut Engine<P, S, Query>) {
+fn write_any<P, S: Words>(engine: &mut Engine<P, S, MasterRequest>) {
     let mut end = engine.request.head_length() + 1;
     engine.storage.set_byte(0, engine.unit);
     let head = engine.storage.bytes(1, engine.request.head_length());
@@ -150,7 +150,7 @@ fn write_any<P, S: Words>(engine: &mut Engine<P, S, Query>) {
         engine.storage.set_byte(end, sends);
         engine
             .storage
-            .send_words(end + 1, sends, engine.request.has_registers());
+            .load_words(end + 1, sends, engine.request.has_registers());
         end += sends;
         let last = engine.storage.byte(end) & engine.request.mask();
         engine.storage.set_byte(end, last);
@@ -161,7 +161,7 @@ fn write_any<P, S: Words>(engine: &mut Engine<P, S, Query>) {
 
 /// True if the `count` bytes after the unit at `front` are equal to the request's.
 #[cfg_attr(target_os = "none", inline(never))]
-fn agrees<P, S: Words>(engine: &Engine<P, S, Query>, front: u8, count: u8) -> bool {
+fn matches_echo<P, S: Words>(engine: &Engine<P, S, MasterRequest>, front: u8, count: u8) -> bool {
     let bytes = engine.storage.slice(front + 1, count);
     engine
         .request
