@@ -193,7 +193,7 @@
 //! # Packets
 //!
 //! You can also decode and encode frames and PDUs by themselves. [`frame::Framing`] decodes
-//! and encodes frames, [`pdu::request::RequestSpec`] and [`pdu::response::Response`] decode and
+//! and encodes frames, [`pdu::request::Request`] and [`pdu::response::Response`] decode and
 //! encode PDUs, and [`packet`] handles user-defined functions.
 //!
 //! ```
