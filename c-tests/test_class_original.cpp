@@ -62,6 +62,7 @@ static void the_debug_pins_show_reads_and_idle_calls(void **)
     static unsigned idles;
     ModbusMaster node;
     idles = 0;
+    pins() = Pins();
     node.begin(1, Serial);
     node.idle([] { idles++; });
     Serial.reply(adu({1, 3, 2, 0, 7}));

@@ -98,7 +98,8 @@ proptest! {
                         brought = true;
                         for (index, piece) in bytes.chunks(piece).enumerate() {
                             end.deliver(index as u32 * pause, piece);
-                            until = Some(end.now() + index as u32 * pause);
+                            let arrives = end.now() + index as u32 * pause;
+                            until = until.max(Some(arrives));
                         }
                     }
                     end.pass(1_000);
