@@ -2,7 +2,7 @@
 //! colon; characters before a colon are noise.
 
 use super::{Count, Engine, Match, RequestSpec, RxFault, Storage};
-use crate::frame::ascii::{self, find, Content};
+use crate::frame::ascii::{self, find, Decoded};
 use crate::frame::rtu;
 use crate::pdu::EXCEPTION;
 
@@ -62,15 +62,15 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     fn is_reply(&mut self, front: S::Count, length: S::Count, delimiter: u8) -> bool {
         let frame = self.storage.bytes(front, length);
         let content = match ascii::decode(frame, delimiter, true) {
-            Content::Right(length) => S::Count::from(length),
-            Content::Damaged(_) => {
+            Decoded::Valid(length) => S::Count::from(length),
+            Decoded::WrongLrc(_) => {
                 // The unit has been decoded to the front of the frame.
                 if self.storage.byte(front) == self.unit {
                     self.note_fault(RxFault::BAD_CRC);
                 }
                 return false;
             }
-            Content::Malformed => {
+            Decoded::Malformed => {
                 self.skipped = 1;
                 return false;
             }

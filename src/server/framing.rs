@@ -3,7 +3,7 @@
 use super::info::SERIAL;
 use super::line::{EncodeAdu, Receive, Server, ServerStorage};
 use crate::error::Status;
-use crate::frame::ascii::{Content, Mark};
+use crate::frame::ascii::{CharacterKind, Decoded};
 use crate::frame::checksum::Crc16;
 use crate::frame::{ascii, rtu, tcp};
 use crate::pdu::custom::Function;
@@ -203,7 +203,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     fn last_frame(&mut self) -> Status {
         let mut length = usize::from(self.end);
         if !self.crc.is_residue() || self.request.overrun {
-            let start = rtu::last(self.storage.part(0, length));
+            let start = rtu::find_last(self.storage.part(0, length));
             self.storage.keep(start, length);
             length -= start;
         }
@@ -303,17 +303,17 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             } else {
                 self.storage.byte(end - 1)
             };
-            match ascii::mark(before, last, delimiter) {
-                Mark::Start => {
+            match ascii::kind_of(before, last, delimiter) {
+                CharacterKind::Start => {
                     self.storage.part(0, 1).fill(last);
                     self.end = 1;
                 }
-                Mark::Inside if end == 0 => self.end = 0,
-                Mark::Inside => {}
-                Mark::End => {
+                CharacterKind::Inside if end == 0 => self.end = 0,
+                CharacterKind::Inside => {}
+                CharacterKind::End => {
                     let frame = self.storage.part(0, end + 1);
                     let length = match ascii::decode(frame, delimiter, true) {
-                        Content::Right(content) => content - 1,
+                        Decoded::Valid(content) => content - 1,
                         _ => 0,
                     };
                     return self.found(length.into());

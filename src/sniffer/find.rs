@@ -3,7 +3,7 @@
 use super::pairing::Requests;
 use super::stream::{RxStream, Timing};
 use crate::error::Status;
-use crate::frame::ascii::{Content, Mark};
+use crate::frame::ascii::{CharacterKind, Decoded};
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::packet::PduKind;
 use crate::pdu::custom::Function;
@@ -152,7 +152,7 @@ impl Context<'_> {
         }
         let is_words = bytes.get(1) == Some(&DIAGNOSTICS);
         let step = if is_words { 2 } else { 1 };
-        rtu::first(bytes, MIN_RTU * step, step)
+        rtu::find_first(bytes, MIN_RTU * step, step)
     }
 
     /// What stands in RTU bytes.
@@ -342,16 +342,16 @@ impl Context<'_> {
         let mut before = bytes.get(known - 1).copied().unwrap_or_default();
         for (index, character) in bytes.iter().enumerate().skip(known) {
             let total = index + 1;
-            match ascii::mark(before, *character, self.end) {
-                Mark::End => {
+            match ascii::kind_of(before, *character, self.end) {
+                CharacterKind::End => {
                     let frame = bytes.get_mut(..total).unwrap_or_default();
                     return match ascii::decode(frame, self.end, false) {
-                        Content::Right(_) => Candidate::Frame(total, true, true),
-                        Content::Damaged(_) => Candidate::Damaged(total),
-                        Content::Malformed => Candidate::NoFrame,
+                        Decoded::Valid(_) => Candidate::Frame(total, true, true),
+                        Decoded::WrongLrc(_) => Candidate::Damaged(total),
+                        Decoded::Malformed => Candidate::NoFrame,
                     };
                 }
-                Mark::Inside if total <= ascii::MAX_FRAME => {}
+                CharacterKind::Inside if total <= ascii::MAX_FRAME => {}
                 _ => return Candidate::NoFrame,
             }
             before = *character;
