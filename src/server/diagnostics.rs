@@ -101,7 +101,7 @@ impl Diagnostics {
 
     /// Counts a frame before it is served. False if the unit must not serve it: a damaged
     /// frame, a frame for another unit, and in listen only mode any request but a restart.
-    pub fn read_bytes(&mut self, info: &RequestInfo, addressing: Addressing, pdu: &[u8]) -> bool {
+    pub fn count_frame(&mut self, info: &RequestInfo, addressing: Addressing, pdu: &[u8]) -> bool {
         if info.again {
             return true;
         }
@@ -144,7 +144,7 @@ impl Diagnostics {
         served
     }
 
-    /// Counts the outcome of a request for which `read_bytes` returned true.
+    /// Counts the outcome of a request for which `count_frame` returned true.
     pub fn done(&mut self, addressing: Addressing, function: u8, reply: Reply) {
         let code = reply.exception_code();
         if self.cleared != 0 {
