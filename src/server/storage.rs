@@ -49,7 +49,7 @@ pub type Before<'a> = &'a mut dyn FnMut(u16, u16, &[u8]) -> u8;
 pub type After<'a> = &'a mut dyn FnMut(u16, u16);
 
 /// Registers in an array.
-pub struct Words<'a> {
+pub struct RegisterArray<'a> {
     /// The registers.
     pub words: &'a mut [u16],
     /// Address of the first register.
@@ -63,15 +63,15 @@ pub struct Words<'a> {
     pub after: Option<After<'a>>,
 }
 
-/// Bits in an array, eight to a byte, lowest first.
-pub struct Bits<'a> {
+/// BitArray in an array, eight to a byte, lowest first.
+pub struct BitArray<'a> {
     /// The bits.
     pub bits: &'a mut [u8],
     /// Address of the first bit.
     pub base: u16,
     /// Number of bits; at most as many as the array holds.
     pub size: u16,
-    /// One bit for each bit, as in [`Words`].
+    /// One bit for each bit, as in [`RegisterArray`].
     pub valid: Option<&'a [u8]>,
     /// Called before a write.
     pub before: Option<Before<'a>>,
@@ -79,10 +79,10 @@ pub struct Bits<'a> {
     pub after: Option<After<'a>>,
 }
 
-impl<'a> Words<'a> {
+impl<'a> RegisterArray<'a> {
     /// Registers from address `base` on, without gaps and without hooks.
     pub fn new(base: u16, words: &'a mut [u16]) -> Self {
-        Words {
+        RegisterArray {
             words,
             base,
             valid: None,
@@ -92,11 +92,11 @@ impl<'a> Words<'a> {
     }
 }
 
-impl<'a> Bits<'a> {
-    /// Bits from address `base` on, as many as the array holds, without gaps and without hooks.
+impl<'a> BitArray<'a> {
+    /// BitArray from address `base` on, as many as the array holds, without gaps and without hooks.
     pub fn new(base: u16, bits: &'a mut [u8]) -> Self {
         let size = u16::try_from(bits.len() * 8).unwrap_or(u16::MAX);
-        Bits {
+        BitArray {
             bits,
             base,
             size,
@@ -129,7 +129,7 @@ fn places(
     (last <= size && (first..last).all(exists)).then_some(first..last)
 }
 
-impl DataModel for Words<'_> {
+impl DataModel for RegisterArray<'_> {
     fn contains(&self, address: u16, quantity: u16) -> bool {
         let size = self.words.len();
         places(self.base, size, self.valid, address, quantity).is_some()
@@ -158,7 +158,7 @@ impl DataModel for Words<'_> {
     }
 }
 
-impl DataModel for Bits<'_> {
+impl DataModel for BitArray<'_> {
     fn contains(&self, address: u16, quantity: u16) -> bool {
         let size = usize::from(self.size).min(self.bits.len().saturating_mul(8));
         places(self.base, size, self.valid, address, quantity).is_some()
