@@ -7,16 +7,16 @@ use crate::frame::rtu;
 use crate::pdu::EXCEPTION;
 
 /// Characters around unit and PDU: colon, two of the LRC, CR and the delimiter.
-const AROUND: u8 = 5;
+const OVERHEAD: u8 = 5;
 
-/// How many characters the frame of a PDU of `length` bytes has.
+/// Length in characters of the frame for a PDU of `length` bytes.
 pub fn frame_length(length: u8) -> u16 {
-    2 * (u16::from(length) + 1) + u16::from(AROUND)
+    2 * (u16::from(length) + 1) + u16::from(OVERHEAD)
 }
 
-/// How many bytes of unit and PDU a frame of so many characters carries.
+/// Length of unit and PDU in a frame of `characters` characters.
 pub fn content(characters: u16) -> u16 {
-    (characters - u16::from(AROUND)) / 2
+    (characters - u16::from(OVERHEAD)) / 2
 }
 
 impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
@@ -79,7 +79,7 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         // The length of an RTU frame of this content: the LRC and one character stand for
         // the CRC.
         let whole = content + rtu::CRC.into();
-        let what = if self.storage.byte(front) != self.unit {
+        let fault = if self.storage.byte(front) != self.unit {
             RxFault::OTHER_UNIT
         } else if function != self.request.function() {
             RxFault::OTHER_FUNCTION
@@ -92,7 +92,7 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
                 Match::Unrelated => RxFault::MALFORMED,
             }
         };
-        self.note_foreign_frame(what);
+        self.note_foreign_frame(fault);
         false
     }
 }

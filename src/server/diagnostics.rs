@@ -145,7 +145,7 @@ impl Diagnostics {
     }
 
     /// Counts the outcome of a request for which `count_frame` returned true.
-    pub fn done(&mut self, addressing: Addressing, function: u8, reply: Reply) {
+    pub fn count_outcome(&mut self, addressing: Addressing, function: u8, reply: Reply) {
         let code = reply.exception_code();
         if self.cleared != 0 {
             self.cleared = 0;
@@ -203,13 +203,13 @@ impl Diagnostics {
                 }
                 _ => Reply::SERVER_DEVICE_FAILURE,
             },
-            Some(&GET_COMM_EVENT_LOG) => self.tell_log(pdu),
+            Some(&GET_COMM_EVENT_LOG) => self.write_log(pdu),
             _ => Reply::NOT_HANDLED,
         };
         (reply, Restart::None)
     }
 
-    fn tell_log(&self, pdu: &mut [u8]) -> Reply {
+    fn write_log(&self, pdu: &mut [u8]) -> Reply {
         let logged = usize::from(self.logged).min(MAX_EVENTS);
         let total = 8 + logged;
         let Some([_, count, a, b, c, d, e, f, log @ ..]) = pdu.get_mut(..total) else {

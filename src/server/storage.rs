@@ -93,7 +93,7 @@ impl<'a> RegisterArray<'a> {
 }
 
 impl<'a> BitArray<'a> {
-    /// BitArray from address `base` on, as many as the array holds, without gaps and without hooks.
+    /// Bits from address `base` on, as many as the array holds, without gaps and without hooks.
     pub fn new(base: u16, bits: &'a mut [u8]) -> Self {
         let size = u16::try_from(bits.len() * 8).unwrap_or(u16::MAX);
         BitArray {

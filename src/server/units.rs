@@ -41,7 +41,7 @@ pub trait Dispatch {
 
     /// Lets a unit serve the frame, or only count it, as `addressing` demands. `None` if the frame
     /// is addressed to another unit, and this unit does not count such frames.
-    fn ask(&mut self, unit: Self::Unit, addressing: Addressing) -> Option<Reply>;
+    fn offer(&mut self, unit: Self::Unit, addressing: Addressing) -> Option<Reply>;
 }
 
 /// Offers a frame to all units; `all` is how it addresses the units that its id names. Returns
@@ -57,7 +57,7 @@ pub fn dispatch(units: &mut impl Dispatch, mut all: Addressing) -> Reply {
         if is_for {
             addressing = all;
         }
-        let Some(reply) = units.ask(unit, addressing) else {
+        let Some(reply) = units.offer(unit, addressing) else {
             continue;
         };
         if addressing == Addressing::OWN {
@@ -111,7 +111,7 @@ impl Unit<'_> {
         }
         let reply = self.serve_pdu(pdu, length);
         if let (Some(line), true) = (&mut self.diagnostics, reply != Reply::PENDING) {
-            line.done(addressing, function, reply);
+            line.count_outcome(addressing, function, reply);
         }
         reply
     }
@@ -135,7 +135,7 @@ impl<'u, 'a: 'u, U: Iterator<Item = &'u mut Unit<'a>>> Dispatch for Slice<'_, U>
         self.info.is_for(unit.id)
     }
 
-    fn ask(&mut self, unit: Self::Unit, addressing: Addressing) -> Option<Reply> {
+    fn offer(&mut self, unit: Self::Unit, addressing: Addressing) -> Option<Reply> {
         Some(unit.serve(self.info, addressing, self.pdu))
     }
 }

@@ -62,7 +62,7 @@ unsafe extern "C" fn monitor(
         }
         let reply = walk(unit, info.cast(), pdu);
         if reply != Reply::PENDING.code() {
-            line(record).done(addressing, function, Reply::from_number(reply));
+            line(record).count_outcome(addressing, function, Reply::from_number(reply));
         }
         reply
     }
