@@ -1513,7 +1513,7 @@ typedef struct mbm_clientUnit {
     /**
      * Private.
      */
-    uint8_t tired;
+    uint8_t cooling_down;
 } mbm_clientUnit;
 
 /**
@@ -2455,7 +2455,7 @@ typedef struct mbm_service {
      * Serves a request, if it is one of this family. NULL in a zeroed record,
      * which serves nothing.
      */
-    size_t (*serve)(struct mbm_service *service, uint8_t *pdu, const void *heading);
+    size_t (*serve)(struct mbm_service *service, uint8_t *pdu, const void *info);
     /**
      * What kind of record of its family it is served as, from 1 on; 0 in a zeroed one.
      */
@@ -2550,8 +2550,8 @@ typedef struct mbm_unit {
      * Private: NULL in a unit without diagnostics.
      */
     size_t (*monitor)(struct mbm_unit *unit,
-                      const void *heading,
-                      uint8_t concern,
+                      const void *info,
+                      uint8_t addressing,
                       uint8_t *pdu);
     /**
      * Private.

@@ -91,22 +91,22 @@
 //! #     }
 //! #     fn micros(&mut self) -> u32 { self.now += 100; self.now }
 //! # }
-//! use mbm::client::{Client, Job, Serial, Ticket};
+//! use mbm::client::{Client, ClientRequest, Serial, RequestState};
 //! use mbm::engine::Frame;
 //! use mbm::error::Status;
-//! use mbm::pdu::outline::Form;
+//! use mbm::pdu::header::FunctionSpec;
 //!
 //! struct Read {
-//!     ticket: Ticket,
+//!     state: RequestState,
 //!     received: [u8; 4],
 //! }
 //!
-//! impl Job for Read {
-//!     fn ticket(&self) -> &Ticket {
-//!         &self.ticket
+//! impl ClientRequest for Read {
+//!     fn state(&self) -> &RequestState {
+//!         &self.state
 //!     }
-//!     fn ticket_mut(&mut self) -> &mut Ticket {
-//!         &mut self.ticket
+//!     fn state_mut(&mut self) -> &mut RequestState {
+//!         &mut self.state
 //!     }
 //!     fn byte(&self, _: usize) -> u8 {
 //!         0 // A read sends no data.
@@ -116,10 +116,10 @@
 //!     }
 //! }
 //!
-//! let mut ticket = Ticket::NONE;
-//! ticket.unit = 17;
-//! ticket.capacity = 4;
-//! let status = ticket.outline.set(Form::READ_HOLDING_REGISTERS, 107, 2);
+//! let mut state = RequestState::NONE;
+//! state.unit = 17;
+//! state.capacity = 4;
+//! let status = state.header.set(FunctionSpec::READ_HOLDING_REGISTERS, 107, 2);
 //! assert_eq!(status, Status::OK);
 //!
 //! # let sends = &[17, 3, 4, 0x02, 0x2B, 0x00, 0x64, 0x9B, 0xA9];
@@ -127,7 +127,7 @@
 //! let line = Serial::new(uart, Frame::new([0; 256]));
 //! // Up to four requests are queued or in flight.
 //! let mut client: Client<_, Read, 4> = Client::new(line);
-//! assert!(client.queue(Read { ticket, received: [0; 4] }).is_ok());
+//! assert!(client.queue(Read { state, received: [0; 4] }).is_ok());
 //!
 //! let mut now = 0;
 //! let read = loop {
@@ -136,7 +136,7 @@
 //!         break read;
 //!     }
 //! };
-//! assert_eq!(read.ticket.status, Status::OK);
+//! assert_eq!(read.state.status, Status::OK);
 //! assert_eq!(read.received, [0x02, 0x2B, 0x00, 0x64]);
 //! ```
 //!
@@ -193,7 +193,7 @@
 //! # Packets
 //!
 //! You can also decode and encode frames and PDUs by themselves. [`frame::Framing`] decodes
-//! and encodes frames, [`pdu::request::RequestSpec`] and [`pdu::response::Response`] decode and
+//! and encodes frames, [`pdu::request::Request`] and [`pdu::response::Response`] decode and
 //! encode PDUs, and [`packet`] handles user-defined functions.
 //!
 //! ```

@@ -14,7 +14,7 @@
 struct Pins {
     uint8_t level[32] = {};
     uint8_t rises[32] = {}; /* how often each pin was set high */
-    int voltage[32] = {}; /* what analogRead gives, 0 to 1023 */
+    int voltage[32] = {};   /* what analogRead gives, 0 to 1023 */
 };
 
 inline Pins &pins()

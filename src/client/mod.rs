@@ -95,7 +95,7 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
     ///
     /// ```
     /// # use mbm::client::*;
-    /// fn one_at_a_time<J: Job, P: mbm::port::Port, S: Means>(client: Client<Serial<P, S, J>, J, 4>) {
+    /// fn one_at_a_time<J: ClientRequest, P: mbm::port::Port, S: ClientStorage>(client: Client<Serial<P, S, J>, J, 4>) {
     ///     client.in_flight::<1>();
     /// }
     /// # struct P; impl mbm::port::Port for P {
@@ -103,9 +103,9 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
     /// #     fn write(&mut self, _: &[u8]) -> i16 { 0 }
     /// #     fn micros(&mut self) -> u32 { 0 }
     /// # }
-    /// # struct J; impl Job for J {
-    /// #     fn request state(&self) -> &Ticket { &Ticket::NONE }
-    /// #     fn ticket_mut(&mut self) -> &mut Ticket { unreachable!() }
+    /// # struct J; impl ClientRequest for J {
+    /// #     fn state(&self) -> &RequestState { &RequestState::NONE }
+    /// #     fn state_mut(&mut self) -> &mut RequestState { unreachable!() }
     /// #     fn byte(&self, _: usize) -> u8 { 0 }
     /// #     fn put(&mut self, _: usize, _: u8) {}
     /// # }
@@ -116,7 +116,7 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
     ///
     /// ```compile_fail
     /// # use mbm::client::*;
-    /// fn two_at_once<J: Job, P: mbm::port::Port, S: Means>(client: Client<Serial<P, S, J>, J, 4>) {
+    /// fn two_at_once<J: ClientRequest, P: mbm::port::Port, S: ClientStorage>(client: Client<Serial<P, S, J>, J, 4>) {
     ///     client.in_flight::<2>();
     /// }
     /// # struct P; impl mbm::port::Port for P {
@@ -124,9 +124,9 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
     /// #     fn write(&mut self, _: &[u8]) -> i16 { 0 }
     /// #     fn micros(&mut self) -> u32 { 0 }
     /// # }
-    /// # struct J; impl Job for J {
-    /// #     fn request state(&self) -> &Ticket { &Ticket::NONE }
-    /// #     fn ticket_mut(&mut self) -> &mut Ticket { unreachable!() }
+    /// # struct J; impl ClientRequest for J {
+    /// #     fn state(&self) -> &RequestState { &RequestState::NONE }
+    /// #     fn state_mut(&mut self) -> &mut RequestState { unreachable!() }
     /// #     fn byte(&self, _: usize) -> u8 { 0 }
     /// #     fn put(&mut self, _: usize, _: u8) {}
     /// # }

@@ -88,7 +88,7 @@ impl Count for u16 {
 
 /// The memory of an engine: a frame buffer, and counters.
 ///
-/// The engine keeps every index and count within [`Storage::space`], so an implementation need
+/// The engine keeps every index and count within [`Storage::capacity`], so an implementation need
 /// not check them.
 pub trait Storage {
     /// The type of lengths and indexes.

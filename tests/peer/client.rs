@@ -6,7 +6,7 @@ mod task;
 
 use crate::live_server::{pattern, LiveServer, PEER_TIMEOUT};
 use crate::UNIT;
-use mbm::client::{Client, Line, Serial, Tcp};
+use mbm::client::{Client, Serial, Tcp, Transport};
 use mbm::error::Status;
 use mbm::frame::Framing;
 use mbm::pdu::custom::Rule;
@@ -67,7 +67,7 @@ struct Requester<L> {
     begun: Instant,
 }
 
-impl<L: Line<Task>> Requester<L> {
+impl<L: Transport<Task>> Requester<L> {
     fn new(line: L) -> Self {
         Self::with(Client::new(line))
     }
@@ -101,13 +101,8 @@ impl<L: Line<Task>> Requester<L> {
         expected: &[u8],
     ) {
         let task = self.request(data, build);
-        assert_eq!(
-            task.ticket.status,
-            Status::OK,
-            "{:02X?}",
-            task.ticket.header
-        );
-        assert_eq!(task.received(), expected, "{:02X?}", task.ticket.header);
+        assert_eq!(task.state.status, Status::OK, "{:02X?}", task.state.header);
+        assert_eq!(task.received(), expected, "{:02X?}", task.state.header);
     }
 
     fn expect_status(
@@ -117,7 +112,7 @@ impl<L: Line<Task>> Requester<L> {
         status: Status,
     ) {
         let task = self.request(data, build);
-        assert_eq!(task.ticket.status, status, "{:02X?}", task.ticket.header);
+        assert_eq!(task.state.status, status, "{:02X?}", task.state.header);
     }
 
     fn check_every_function(mut self) {
@@ -141,7 +136,7 @@ impl<L: Line<Task>> Requester<L> {
         let counter = self.request(&[], |o| o.set(FunctionSpec::GET_COMM_EVENT_COUNTER, 0, 0));
         assert_eq!(counter.received().get(..2), Some(&[0, 0][..]));
         let log = self.request(&[], |o| o.set(FunctionSpec::GET_COMM_EVENT_LOG, 0, 0));
-        assert_eq!(log.ticket.status, Status::OK);
+        assert_eq!(log.state.status, Status::OK);
         assert!(log.received().len() >= 6);
         let id = b"Vendor-PC-V2.11\xFF";
         self.expect_data(&[], |o| o.set(FunctionSpec::REPORT_SERVER_ID, 0, 0), id);
