@@ -1,9 +1,8 @@
 //! A server on one line or connection. The program calls its `poll`.
 //!
 //! The server finds a request and gives its PDU to the program. The program carries the request
-//! out and passes the reply back, and the server sends it. So the program holds no reference to
-//! the server while it carries a request out. Each framing is two function pointers in the
-//! server. So firmware contains only the framings that it begins with.
+//! out without a reference to the server, and passes the reply back. Then the server sends it. A
+//! framing is two function pointers, so firmware contains only the framings that it begins with.
 
 use super::info::STREAM;
 use super::{Reply, RequestInfo, Units};
@@ -79,8 +78,7 @@ enum ServerPhase {
     Listen,
     /// A request was found. The server waits for its reply.
     Request,
-    /// The server passes the response to the port, and waits until the port has sent it. The
-    /// driver of the line is enabled.
+    /// The port sends the response. The driver of the line is enabled.
     Send,
 }
 
@@ -88,8 +86,7 @@ enum ServerPhase {
 /// is then in the buffer at index `request.head`, and its length is `request.length`.
 pub(super) type Receive<P, B> = fn(&mut Server<P, B>) -> Status;
 
-/// Turns the response PDU in the buffer, of the given length, into a frame. Returns the length of
-/// the frame.
+/// Turns the response PDU in the buffer, of this length, into a frame. Returns its length.
 pub(super) type EncodeAdu<P, B> = fn(&mut Server<P, B>, usize) -> usize;
 
 /// A server on one line or connection.
@@ -334,8 +331,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         }
     }
 
-    /// Stores that a request was found, with a PDU of `length` bytes; 0 for a damaged frame.
-    /// Reads the unit id from the buffer.
+    /// Stores that a request was found, with a PDU of `length` bytes; 0 if it is damaged.
     pub(super) fn found(&mut self, length: usize) -> Status {
         let unit = self.storage.byte(usize::from(self.request.head) - 1);
         self.found_for(unit, if length > MAX_PDU { 0 } else { length as u16 })
@@ -351,8 +347,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         Status::PENDING
     }
 
-    /// The part of the buffer that starts with the PDU of the request, and that the PDU of the
-    /// response may fill.
+    /// The PDU of the request, with the space after it that the response may fill.
     pub fn pdu(&mut self) -> &mut [u8] {
         let head = usize::from(self.request.head);
         let space = usize::from(self.request.space);
@@ -448,8 +443,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         Some(Status::OK)
     }
 
-    /// Handles a port that accepted only `sent` bytes of a response, or has not sent them all yet,
-    /// or whose link is lost.
+    /// Handles a port that has not sent the whole response yet, or whose link is lost.
     #[cold]
     fn sent_partly(&mut self, end: usize, sent: i16) -> Status {
         self.end = end as u16;
