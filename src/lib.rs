@@ -165,7 +165,7 @@
 //! # }
 //! use mbm::error::Status;
 //! use mbm::frame::Framing;
-//! use mbm::server::storage::{HoldingRegisters, Words};
+//! use mbm::server::storage::{HoldingRegisters, RegisterArray};
 //! use mbm::server::{Server, Unit};
 //!
 //! let mut words = [555, 100, 0];
@@ -173,7 +173,7 @@
 //! # let arriving = &[17, 6, 0x00, 0x6D, 0x03, 0x78, 0x1A, 0x55];
 //! # let uart = Uart { sends: &[], now: 0, arriving, sent: 0 };
 //! let mut server = Server::with_framing(Framing::Rtu, uart, [0; 256]);
-//! let mut registers = HoldingRegisters(Words::new(107, &mut words));
+//! let mut registers = HoldingRegisters(RegisterArray::new(107, &mut words));
 //! let mut units = [Unit {
 //!     id: 17,
 //!     services: &mut [&mut registers],

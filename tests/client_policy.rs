@@ -3,7 +3,7 @@
 #[path = "common/wire.rs"]
 mod wire;
 
-use mbm::client::{Backoff, Client, Policy, Serial, Tcp, Transport, Unit};
+use mbm::client::{Backoff, Client, Policy, Serial, Tcp, Transport, UnitRecord};
 use mbm::error::Status;
 use mbm::pdu::header::FunctionSpec;
 use wire::{End, Lent, Task};
@@ -131,7 +131,7 @@ fn other_requests_are_sent_while_one_waits_for_its_retry() {
 
 #[test]
 fn the_delay_between_requests_to_one_unit_does_not_delay_other_units() {
-    let units = vec![Unit::new(1, 3_000_000)];
+    let units = vec![UnitRecord::new(1, 3_000_000)];
     let (end, mut client) = tcp(Lent {
         units,
         ..Lent::default()
@@ -154,7 +154,7 @@ fn the_delay_between_requests_to_one_unit_does_not_delay_other_units() {
 
 #[test]
 fn outcomes_of_requests_are_counted_for_each_unit() {
-    let units = vec![Unit::new(9, 0), Unit::new(1, 0)];
+    let units = vec![UnitRecord::new(9, 0), UnitRecord::new(1, 0)];
     let (end, mut client) = tcp(Lent {
         units,
         ..Lent::default()

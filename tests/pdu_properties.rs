@@ -2,7 +2,7 @@
 
 use mbm::pdu::custom::{Function, Rule};
 use mbm::pdu::files::{Reads, Records, Writes};
-use mbm::pdu::identification::Objects;
+use mbm::pdu::identification::ObjectList;
 use mbm::pdu::length::{self, Length};
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
@@ -192,7 +192,7 @@ fn responses(parts: &Parts) -> Vec<Response<'_>> {
     responses.extend(Writes::new(data).map(Response::WriteFileRecord));
     responses.extend(Records::new(data).map(Response::ReadFileRecord));
     for count in 0..4 {
-        let objects = Objects::new(count, data);
+        let objects = ObjectList::new(count, data);
         responses.extend(objects.map(|objects| Response::DeviceIdentification {
             code: quantity as u8,
             conformity: other as u8,

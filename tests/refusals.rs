@@ -5,7 +5,7 @@ mod vectors;
 
 use mbm::error::Status;
 use mbm::pdu::files::{Reads, Records, Writes};
-use mbm::pdu::identification::Objects;
+use mbm::pdu::identification::ObjectList;
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
 use vectors::{right_pdus, Direction};
@@ -328,12 +328,12 @@ fn malformed_file_records_cannot_be_constructed() {
 #[test]
 fn objects_that_do_not_match_their_count_or_lengths_cannot_be_constructed() {
     let value = Err(Status::ILLEGAL_DATA_VALUE);
-    assert_eq!(Objects::new(1, &[0, 2, 65]), value);
-    assert_eq!(Objects::new(1, &[0]), value);
-    assert_eq!(Objects::new(2, &[0, 1, 65]), value);
-    assert_eq!(Objects::new(0, &[0, 1, 65]), value);
-    assert_eq!(Objects::new(255, &[0, 0]), value);
-    assert!(Objects::new(2, &[0, 1, 65, 1, 0]).is_ok());
+    assert_eq!(ObjectList::new(1, &[0, 2, 65]), value);
+    assert_eq!(ObjectList::new(1, &[0]), value);
+    assert_eq!(ObjectList::new(2, &[0, 1, 65]), value);
+    assert_eq!(ObjectList::new(0, &[0, 1, 65]), value);
+    assert_eq!(ObjectList::new(255, &[0, 0]), value);
+    assert!(ObjectList::new(2, &[0, 1, 65, 1, 0]).is_ok());
 }
 
 #[test]
@@ -348,7 +348,7 @@ fn device_identification_that_contradicts_itself_is_refused() {
                         conformity,
                         more_follows,
                         next_object,
-                        objects: Objects::new(count, bytes).unwrap(),
+                        objects: ObjectList::new(count, bytes).unwrap(),
                     };
                     let one = code != 4 || (count == 1 && !more_follows);
                     let right = (1..=4).contains(&code) && one;

@@ -6,7 +6,7 @@ use common::device::{ask, sealed, Device};
 use mbm::frame::Framing;
 use mbm::server::custom::Outcome;
 use mbm::server::respond::respond;
-use mbm::server::storage::{HoldingRegisters, Words};
+use mbm::server::storage::{HoldingRegisters, RegisterArray};
 use mbm::server::Unit;
 
 /// The word that a sub-function of 08 returns.
@@ -238,12 +238,12 @@ fn only_the_addressed_unit_answers_and_a_broadcast_reaches_all_units() {
         let units = &mut [
             Unit {
                 id: 1,
-                services: &mut [&mut HoldingRegisters(Words::new(0, &mut first))],
+                services: &mut [&mut HoldingRegisters(RegisterArray::new(0, &mut first))],
                 diagnostics: None,
             },
             Unit {
                 id: 2,
-                services: &mut [&mut HoldingRegisters(Words::new(0, &mut second))],
+                services: &mut [&mut HoldingRegisters(RegisterArray::new(0, &mut second))],
                 diagnostics: None,
             },
         ];

@@ -1,7 +1,9 @@
 //! A million requests, most of them nearly valid, to the server and to an independent model. All
 //! responses and all registers and bits must be equal.
 
-use mbm::server::storage::{Bits, Coils, DiscreteInputs, HoldingRegisters, InputRegisters, Words};
+use mbm::server::storage::{
+    BitArray, Coils, DiscreteInputs, HoldingRegisters, InputRegisters, RegisterArray,
+};
 use mbm::server::{Reply, Service};
 
 const BASE: u16 = 0xFFC0;
@@ -249,13 +251,13 @@ fn a_million_requests_have_the_same_effects_as_on_the_model() {
         let pdu = request(&mut random);
         let mut buffer = [0; 253];
         buffer[..pdu.len()].copy_from_slice(&pdu);
-        let mut words = HoldingRegisters(Words::new(BASE, &mut holding));
+        let mut words = HoldingRegisters(RegisterArray::new(BASE, &mut holding));
         words.0.valid = Some(&valid);
-        let mut input_words = InputRegisters(Words::new(BASE, &mut inputs));
+        let mut input_words = InputRegisters(RegisterArray::new(BASE, &mut inputs));
         input_words.0.valid = Some(&valid);
-        let mut bits = Coils(Bits::new(BASE, &mut coils));
+        let mut bits = Coils(BitArray::new(BASE, &mut coils));
         bits.0.valid = Some(&valid);
-        let mut input_bits = DiscreteInputs(Bits::new(BASE, &mut discrete));
+        let mut input_bits = DiscreteInputs(BitArray::new(BASE, &mut discrete));
         input_bits.0.valid = Some(&valid);
         let services: [&mut dyn Service; 4] =
             [&mut words, &mut input_words, &mut bits, &mut input_bits];

@@ -144,8 +144,9 @@ fn a_write_of_zero_values_with_data_is_refused() {
 #[test]
 fn the_greatest_quantities_are_accepted() {
     let mut words = [0; 0x200];
-    let mut table =
-        mbm::server::storage::HoldingRegisters(mbm::server::storage::Words::new(0, &mut words));
+    let mut table = mbm::server::storage::HoldingRegisters(
+        mbm::server::storage::RegisterArray::new(0, &mut words),
+    );
     let mut pdu = vec![0x10, 0, 0, 0, 123, 246];
     pdu.resize(252, 7);
     pdu.resize(253, 0);

@@ -5,7 +5,7 @@
 mod vectors;
 
 use mbm::pdu::files::{Reads, Record, Records, Writes};
-use mbm::pdu::identification::{Objects, BASIC, EXTENDED, INDIVIDUAL, REGULAR};
+use mbm::pdu::identification::{ObjectList, BASIC, EXTENDED, INDIVIDUAL, REGULAR};
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
 use vectors::pdu;
@@ -321,7 +321,7 @@ fn objects(values: &[(u8, &str)]) -> Vec<u8> {
 /// `next` as the next object, and has these values.
 fn identification(name: &str, levels: [u8; 2], next: Option<u8>, values: &[(u8, &str)]) {
     let bytes = objects(values);
-    let objects = Objects::new(values.len() as u8, &bytes).unwrap();
+    let objects = ObjectList::new(values.len() as u8, &bytes).unwrap();
     let answer = Response::DeviceIdentification {
         code: levels[0],
         conformity: levels[1],
@@ -390,7 +390,7 @@ fn read_device_identification_with_unusual_conformity_level_or_next_object_id() 
             conformity,
             more_follows: false,
             next_object,
-            objects: Objects::new(1, &objects).unwrap(),
+            objects: ObjectList::new(1, &objects).unwrap(),
         };
         response(name, expected);
     }

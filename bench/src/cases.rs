@@ -6,7 +6,7 @@ use crate::rmodbus_side::{self as theirs, Ask};
 use crate::{Row, Work};
 use mbm::frame::Framing;
 use mbm::pdu::files::{Reads, Records, Writes};
-use mbm::pdu::identification::Objects;
+use mbm::pdu::identification::ObjectList;
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
 use rmodbus::ModbusProto;
@@ -429,7 +429,7 @@ fn rows_of(framing: Framing, rows: &mut Vec<Row>) {
             conformity: black_box(0x83),
             more_follows: false,
             next_object: 0,
-            objects: Objects::new(3, black_box(b"\x00\x01a\x01\x02bc\x02\x03def"))
+            objects: ObjectList::new(3, black_box(b"\x00\x01a\x01\x02bc\x02\x03def"))
                 .expect("in order")
         },
         None,

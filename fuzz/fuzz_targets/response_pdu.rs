@@ -6,7 +6,7 @@ use libfuzzer_sys::fuzz_target;
 use mbm::error::Status;
 use mbm::pdu::custom::is_user_defined;
 use mbm::pdu::files::{Records, Writes};
-use mbm::pdu::identification::Objects;
+use mbm::pdu::identification::ObjectList;
 use mbm::pdu::length;
 use mbm::pdu::response::Response;
 use mbm_fuzz::{lengths, Input};
@@ -97,7 +97,7 @@ fn check_constructed(mut input: Input) {
             or_mask: c,
         },
         13 => Response::FifoQueue { data },
-        14 => match Objects::new(c as u8, data) {
+        14 => match ObjectList::new(c as u8, data) {
             Ok(objects) => Response::DeviceIdentification {
                 code,
                 conformity: function,

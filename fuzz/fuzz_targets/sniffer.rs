@@ -4,7 +4,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use mbm::frame::{ascii, Framing};
-use mbm::sniffer::{EventKind, Sniffer, Tap, MIN_BUFFER};
+use mbm::sniffer::{BusDirection, EventKind, Sniffer, MIN_BUFFER};
 use mbm::text::TextWriter;
 use mbm_fuzz::asked::Asked;
 use mbm_fuzz::{naive, Input};
@@ -88,7 +88,7 @@ impl Bus {
         while !rest.is_empty() {
             let taken = self
                 .sniffer
-                .feed(&mut self.buffer, Tap::Both, rest, self.now);
+                .feed(&mut self.buffer, BusDirection::Both, rest, self.now);
             let before = self.reported;
             self.take_events();
             assert!(taken > 0 || self.reported > before, "no progress");

@@ -23,7 +23,7 @@ pub use serial::Serial;
 pub use storage::ClientStorage;
 pub use tcp::Tcp;
 pub use transport::Transport;
-pub use units::{note, rest, Unit};
+pub use units::{note, rest, UnitRecord};
 
 #[cfg(doc)]
 use crate::error::Status;

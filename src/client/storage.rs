@@ -1,7 +1,7 @@
 //! The buffers, records and random numbers that a caller supplies to a client.
 
 use super::policy::{again, Policy};
-use super::units::{note, rest, Unit};
+use super::units::{note, rest, UnitRecord};
 use crate::engine::{Frame, Storage};
 use crate::error::Status;
 
@@ -20,7 +20,7 @@ pub trait ClientStorage: Storage<Count = u16> {
     }
 
     /// Records of units that need their own delay or counts.
-    fn units(&mut self) -> &mut [Unit] {
+    fn units(&mut self) -> &mut [UnitRecord] {
         &mut []
     }
 

@@ -6,7 +6,7 @@ use crate::time::{clamped, elapsed};
 /// The settings and counts of one unit. The counts wrap at 2^32.
 #[repr(C)]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Unit {
+pub struct UnitRecord {
     /// Requests that ended. A request counts once, however many retries it had.
     pub requests: u32,
     /// Requests that were answered, exceptions included.
@@ -27,10 +27,10 @@ pub struct Unit {
     cooling_down: bool,
 }
 
-impl Unit {
+impl UnitRecord {
     /// The record of a unit that has had no request yet; `delay` is in microseconds.
-    pub const fn new(unit: u8, delay: u32) -> Unit {
-        Unit {
+    pub const fn new(unit: u8, delay: u32) -> UnitRecord {
+        UnitRecord {
             requests: 0,
             replies: 0,
             exceptions: 0,
@@ -75,19 +75,19 @@ impl Unit {
 }
 
 /// The record of a unit, if there is one.
-fn find(units: &mut [Unit], unit: u8) -> Option<&mut Unit> {
+fn find(units: &mut [UnitRecord], unit: u8) -> Option<&mut UnitRecord> {
     units.iter_mut().find(|record| record.unit == unit)
 }
 
 /// Microseconds until a unit may get its next request, by its record in `units`; 0 if it
 /// has no record.
-pub fn rest(units: &mut [Unit], unit: u8, now: u32) -> u32 {
+pub fn rest(units: &mut [UnitRecord], unit: u8, now: u32) -> u32 {
     find(units, unit).map_or(0, |unit| unit.rest(now))
 }
 
 /// Records in `units`, if the unit has a record there, that a request to it ended with
 /// `status`. `again` is true if the client will retry the request.
-pub fn note(units: &mut [Unit], unit: u8, status: Status, again: bool, now: u32) {
+pub fn note(units: &mut [UnitRecord], unit: u8, status: Status, again: bool, now: u32) {
     if let Some(unit) = find(units, unit) {
         unit.note(status, again, now);
     }
@@ -100,7 +100,7 @@ mod tests {
 
     #[test]
     fn a_delay_that_the_clock_cannot_count_ends_after_the_longest_time() {
-        let mut unit = Unit::new(1, u32::MAX);
+        let mut unit = UnitRecord::new(1, u32::MAX);
         unit.note(Status::OK, false, 7);
         assert_eq!(unit.rest(7), LONGEST);
         assert_eq!(unit.rest(7 + LONGEST - 1), 1);

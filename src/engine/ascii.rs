@@ -2,21 +2,21 @@
 //! colon; characters before a colon are noise.
 
 use super::{Count, Engine, Match, RequestSpec, RxFault, Storage};
-use crate::frame::ascii::{self, find, Content};
+use crate::frame::ascii::{self, find, Decoded};
 use crate::frame::rtu;
 use crate::pdu::EXCEPTION;
 
 /// Characters around unit and PDU: colon, two of the LRC, CR and the delimiter.
-const AROUND: u8 = 5;
+const OVERHEAD: u8 = 5;
 
-/// How many characters the frame of a PDU of `length` bytes has.
+/// Length in characters of the frame for a PDU of `length` bytes.
 pub fn frame_length(length: u8) -> u16 {
-    2 * (u16::from(length) + 1) + u16::from(AROUND)
+    2 * (u16::from(length) + 1) + u16::from(OVERHEAD)
 }
 
-/// How many bytes of unit and PDU a frame of so many characters carries.
+/// Length of unit and PDU in a frame of `characters` characters.
 pub fn content(characters: u16) -> u16 {
-    (characters - u16::from(AROUND)) / 2
+    (characters - u16::from(OVERHEAD)) / 2
 }
 
 impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
@@ -62,15 +62,15 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
     fn is_reply(&mut self, front: S::Count, length: S::Count, delimiter: u8) -> bool {
         let frame = self.storage.bytes(front, length);
         let content = match ascii::decode(frame, delimiter, true) {
-            Content::Right(length) => S::Count::from(length),
-            Content::Damaged(_) => {
+            Decoded::Valid(length) => S::Count::from(length),
+            Decoded::WrongLrc(_) => {
                 // The unit has been decoded to the front of the frame.
                 if self.storage.byte(front) == self.unit {
                     self.note_fault(RxFault::BAD_CRC);
                 }
                 return false;
             }
-            Content::Malformed => {
+            Decoded::Malformed => {
                 self.skipped = 1;
                 return false;
             }
@@ -79,7 +79,7 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
         // The length of an RTU frame of this content: the LRC and one character stand for
         // the CRC.
         let whole = content + rtu::CRC.into();
-        let what = if self.storage.byte(front) != self.unit {
+        let fault = if self.storage.byte(front) != self.unit {
             RxFault::OTHER_UNIT
         } else if function != self.request.function() {
             RxFault::OTHER_FUNCTION
@@ -92,7 +92,7 @@ impl<P, S: Storage, Q: RequestSpec<P, S>> Engine<P, S, Q> {
                 Match::Unrelated => RxFault::MALFORMED,
             }
         };
-        self.note_foreign_frame(what);
+        self.note_foreign_frame(fault);
         false
     }
 }

@@ -1,15 +1,14 @@
-//! Accepts a reply that deviates from the standard, if no better one arrives before
-//! the request would fail.
+//! Accepts a reply that deviates from the standard, if no valid reply arrives before the request
+//! would fail.
 //!
-//! A *deviating reply* has the right unit, function and CRC. It repeats another address,
-//! value or quantity than the request to write, or it carries other data than the
-//! request to read asked for, or more than the frame buffer holds. The strict search
-//! passes over such a reply, and goes on to look for a right one. Here the bytes that it
-//! passes over are kept at the front of the frame buffer, as far as they fill response
-//! words. So a right reply always wins.
+//! A *deviating reply* has the right unit, function and CRC. The reply to a write deviates if it
+//! repeats another address, value or quantity than the request. The reply to a read deviates if
+//! it has more or less data than requested, or more than the frame buffer holds. The strict
+//! search skips such a reply and looks for a valid one. Here the skipped bytes are kept at the
+//! front of the frame buffer, as far as they fill response words. So a valid reply always wins.
 //!
-//! Only [`Engine::receive_lenient`] calls this. A program that does not name that
-//! function carries none of it.
+//! Only [`Engine::receive_lenient`] calls this module. A program that does not call that function
+//! contains none of this code.
 
 use super::{Engine, Phase, Probation, Words, BROADCAST};
 use crate::error::Status;
@@ -18,15 +17,16 @@ use crate::pdu::query::MasterRequest;
 use crate::pdu::EXCEPTION;
 use crate::port::Port;
 
-/// Unit, function and byte count: the bytes of a response to a read before its data.
+/// Bytes before the data in the response to a read: unit, function code and byte count.
 const BEFORE_DATA: u8 = 3;
 
-/// Bytes of the frame buffer that stay free beside kept bytes. An exception fits.
+/// Bytes of the frame buffer that must stay free beside the kept bytes. An exception fits into
+/// them.
 const LEFT_FREE: u8 = 8;
 
 impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
-    /// Waits for the reply, as [`Engine::poll`] does, and accepts a deviating one. A
-    /// request to read is sent to unit 0 too, which is to reply then.
+    /// Waits for the reply, as [`Engine::poll`] does, and accepts a deviating reply. A read may be
+    /// sent to unit 0, which then has to reply.
     pub fn receive_lenient(&mut self) -> Status {
         if self.unit == BROADCAST {
             if !self.request.is_read() {
@@ -35,7 +35,7 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
             if self.phase == Phase::Turnaround {
                 self.phase = Phase::Reply;
                 self.wait = self.settings.response_timeout;
-                // Broadcasts leave it at "unit 0 did not answer".
+                // For a broadcast it was left at the value for "unit 0 did not reply".
                 self.probation = Probation::Off;
             }
         }
@@ -49,8 +49,8 @@ impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
 }
 
 impl<P, S: Words> Engine<P, S, MasterRequest> {
-    /// Passes over the byte at `front`, but keeps it if it belongs to what may become a
-    /// deviating response to a read. Returns where the next byte stands.
+    /// Skips the byte at `front`, but keeps it if it may belong to a deviating response to a read.
+    /// Returns the index of the next byte.
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn skip_or_keep_byte(&mut self, front: u8) -> u8 {
         let is_kept = self.is_kept(front);
@@ -67,11 +67,11 @@ impl<P, S: Words> Engine<P, S, MasterRequest> {
         front
     }
 
-    /// True if the byte at `front` is to be kept. Notes it if that byte completes a
+    /// True if the byte at `front` must be kept. Sets `probation` if that byte completes a
     /// deviating response.
     fn is_kept(&mut self, front: u8) -> bool {
-        let is_settled = matches!(self.probation, Probation::Held | Probation::Deviating);
-        if is_settled || !self.request.is_read() {
+        let is_decided = matches!(self.probation, Probation::Held | Probation::Deviating);
+        if is_decided || !self.request.is_read() {
             return false;
         }
         if self.skipped == 0 {
@@ -100,9 +100,9 @@ impl<P, S: Words> Engine<P, S, MasterRequest> {
             && self.storage.capacity() > LEFT_FREE
     }
 
-    /// Counts one more byte after those kept, some of which were dropped for want of room;
-    /// returns how many there are. The count stands in the place of the first kept byte,
-    /// which is the unit.
+    /// Counts one more byte of the response that the kept bytes begin. Returns how many bytes it
+    /// has by now, including bytes that were not kept because the buffer is too small. The count
+    /// is stored in place of the first kept byte, which is the unit.
     fn count_kept(&mut self) -> u8 {
         let held = self.held;
         self.storage.take_back(held);
@@ -115,8 +115,8 @@ impl<P, S: Words> Engine<P, S, MasterRequest> {
         more.saturating_add(1)
     }
 
-    /// The length of the frame that the kept bytes begin, by its byte count; 0 if that is
-    /// not kept, or too great for a frame.
+    /// Length of the frame that the kept bytes begin, from its byte count. 0 if the byte count is
+    /// not kept yet, or is too great for a frame.
     fn kept_length(&mut self) -> u8 {
         let held = self.held;
         if held <= BEFORE_DATA {
@@ -128,7 +128,7 @@ impl<P, S: Words> Engine<P, S, MasterRequest> {
         count.checked_add(BEFORE_DATA + rtu::CRC).unwrap_or(0)
     }
 
-    /// How many bytes of the kept frame's data are kept; of registers, whole ones.
+    /// How many bytes of the frame's data are kept. For registers, only whole registers count.
     fn kept_data(&mut self) -> u8 {
         let length = self.kept_length();
         let kept = self.held.min(length.saturating_sub(rtu::CRC));
@@ -140,8 +140,8 @@ impl<P, S: Words> Engine<P, S, MasterRequest> {
         }
     }
 
-    /// Notes the frame at `front`: its unit, function and CRC are right, but it is not the
-    /// reply. That is a deviating reply, unless it is an exception.
+    /// Handles the frame at `front`, whose unit, function and CRC are right, but which is not the
+    /// expected reply. It is a deviating reply, unless it is an exception.
     pub(super) fn note_deviating(&mut self, front: u8) {
         let is_exception = self.storage.byte(front + 1) & EXCEPTION != 0;
         if !is_exception && self.probation != Probation::Held {
@@ -149,7 +149,7 @@ impl<P, S: Words> Engine<P, S, MasterRequest> {
         }
     }
 
-    /// Drops the kept bytes: a right reply was found, or the room is needed.
+    /// Drops the kept bytes, because a valid reply was found or their space is needed.
     pub(super) fn drop_kept(&mut self) {
         if self.probation != Probation::Held {
             let held = self.held;
@@ -161,9 +161,9 @@ impl<P, S: Words> Engine<P, S, MasterRequest> {
         }
     }
 
-    /// Has a deviating reply be the answer; false if there was none.
+    /// Makes a deviating reply the result of the request. False if there was none.
     pub(super) fn accept_deviating(&mut self) -> bool {
-        // The last bytes may look like the beginning of a right reply, which waits for more.
+        // The last bytes may look like the beginning of a valid reply. Skip them too.
         let mut front = 0;
         while front < self.end {
             front = self.skip_or_keep_byte(front);
@@ -177,7 +177,7 @@ impl<P, S: Words> Engine<P, S, MasterRequest> {
             self.request.set_reads(data);
         }
         self.exception = 0;
-        // The reply was counted as a frame that was passed over.
+        // The reply was counted as a skipped frame.
         self.skipped = 0;
         self.foreign_frames = self.foreign_frames.saturating_sub(1);
         true

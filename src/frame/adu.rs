@@ -1,12 +1,12 @@
-//! What every framing carries.
+//! The content of a frame, which is the same in every framing.
 
-/// What a frame carries.
+/// The content of a frame: unit and PDU.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Adu<'a> {
-    /// The transaction identifier of a TCP frame; 0 in others.
+    /// The transaction identifier of a TCP frame; 0 in other framings.
     pub transaction: u16,
-    /// The unit that a request is for, or a response comes from.
+    /// The unit id: of the unit that receives a request, or that sent a response.
     pub unit: u8,
-    /// Function code and data.
+    /// The PDU: function code and data.
     pub pdu: &'a [u8],
 }

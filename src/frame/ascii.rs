@@ -1,31 +1,31 @@
-//! ASCII: a colon, hexadecimal characters, LRC, carriage return and an end
-//! character (serial line guide V1.02, 2.5.2).
+//! ASCII frames: a colon, two hexadecimal characters for each byte of unit, PDU and LRC, a
+//! carriage return, and an end character (serial line guide V1.02, 2.5.2).
 
 use super::checksum::lrc;
 use super::Adu;
 use crate::error::Status;
 
-/// What a frame begins with.
+/// The colon at the start of a frame.
 pub const START: u8 = b':';
-/// What stands before the end character.
-pub const RETURN: u8 = b'\r';
-/// The end character, unless sub-function 03 of 08 changed it.
+/// The carriage return before the end character.
+pub const CARRIAGE_RETURN: u8 = b'\r';
+/// The default end character, a line feed. Sub-function 03 of function 08 can change it.
 pub const END: u8 = b'\n';
 
-/// The longest frame: colon, unit, PDU of 253 bytes and LRC in two characters
-/// each, and the two that end it.
+/// Characters of the longest frame: the colon, two for each byte of unit, PDU (253 bytes) and
+/// LRC, and two at the end.
 pub const MAX_FRAME: usize = 1 + 2 * (1 + 253 + 1) + 2;
 
-/// Characters of a frame that are no bytes of content.
-const AROUND: usize = 3;
+/// Characters of a frame that are not digits: colon, carriage return and end character.
+const DELIMITERS: usize = 3;
 
-/// The least digits of a frame: two for each of unit, function code and LRC.
-const LEAST_DIGITS: usize = 2 * 3;
+/// Digits of the shortest frame: two each for unit, function code and LRC.
+const MIN_DIGITS: usize = 2 * 3;
 
-/// The most digits of a frame.
-const MAX_DIGITS: usize = MAX_FRAME - AROUND;
+/// Digits of the longest frame.
+const MAX_DIGITS: usize = MAX_FRAME - DELIMITERS;
 
-/// The value of a hexadecimal digit; lower case is taken too.
+/// The value of a hexadecimal digit in upper or lower case; `None` for other characters.
 pub const fn digit(character: u8) -> Option<u8> {
     match character {
         b'0'..=b'9' => Some(character - b'0'),
@@ -35,7 +35,7 @@ pub const fn digit(character: u8) -> Option<u8> {
     }
 }
 
-/// The hexadecimal digit of a value below 16, in upper case.
+/// The hexadecimal digit, in upper case, for a value of 0 to 15.
 pub const fn character(digit: u8) -> u8 {
     if digit < 10 {
         b'0' + digit
@@ -44,7 +44,7 @@ pub const fn character(digit: u8) -> u8 {
     }
 }
 
-/// The byte that a pair of digits is.
+/// The byte that two hexadecimal digits encode; `None` if `pair` is not two digits.
 pub const fn byte(pair: &[u8]) -> Option<u8> {
     match pair {
         [high, low] => match (digit(*high), digit(*low)) {
@@ -55,74 +55,75 @@ pub const fn byte(pair: &[u8]) -> Option<u8> {
     }
 }
 
-/// What a character is in a frame.
+/// The meaning of a character in a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Mark {
-    /// The colon that begins a frame, wherever it stands: a frame before it was cut off.
+pub enum CharacterKind {
+    /// A colon. It always begins a frame: an unfinished frame before it was cut off.
     Start,
-    /// The end character behind a carriage return, which ends a frame.
+    /// The end character after a carriage return. It ends a frame.
     End,
-    /// Any other: a digit, or noise.
+    /// Any other character: a digit, or noise.
     Inside,
 }
 
-/// What `character` is behind the character `before`; `end` is the one that ends frames.
+/// The meaning of `character`, which follows the character `before`. `end` is the end
+/// character of frames.
 #[inline(always)]
-pub const fn mark(before: u8, character: u8, end: u8) -> Mark {
-    if character == end && before == RETURN {
-        Mark::End
+pub const fn kind_of(before: u8, character: u8, end: u8) -> CharacterKind {
+    if character == end && before == CARRIAGE_RETURN {
+        CharacterKind::End
     } else if character == START {
-        Mark::Start
+        CharacterKind::Start
     } else {
-        Mark::Inside
+        CharacterKind::Inside
     }
 }
 
-/// Where the first frame that is whole begins among `characters`, and where it ends if
-/// its end has arrived; `end` is the character that ends it. The last colon counts, for a
-/// frame without an end was cut off. Characters before it are noise.
+/// Finds the first frame in `characters`. Returns the index of its colon, and the index after
+/// its end character `end` if that has arrived. If there are several colons before the end
+/// character, the last one begins the frame: the frames before it were cut off.
 pub fn find(characters: &[u8], end: u8) -> (usize, Option<usize>) {
     let mut begin = None;
     let mut before = 0;
     for (index, character) in characters.iter().enumerate() {
-        match mark(before, *character, end) {
-            Mark::Start => begin = Some(index),
-            Mark::End => return (begin.unwrap_or(index + 1), Some(index + 1)),
-            Mark::Inside => {}
+        match kind_of(before, *character, end) {
+            CharacterKind::Start => begin = Some(index),
+            CharacterKind::End => return (begin.unwrap_or(index + 1), Some(index + 1)),
+            CharacterKind::Inside => {}
         }
         before = *character;
     }
     (begin.unwrap_or(characters.len()), None)
 }
 
-/// What a frame carries.
+/// The result of decoding a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Content {
-    /// So many bytes of unit and PDU; the LRC behind them is right.
-    Right(u8),
-    /// As many, whose LRC is wrong.
-    Damaged(u8),
-    /// Nothing: it is no frame.
+pub enum Decoded {
+    /// The frame is valid. The number is the length of unit and PDU, in bytes.
+    Valid(u8),
+    /// The LRC is wrong. The number is the length of unit and PDU, in bytes.
+    WrongLrc(u8),
+    /// The characters are not a frame.
     Malformed,
 }
 
-/// Decodes the frame that is the whole of `bytes`, unit and PDU and LRC: into its front if
-/// `in_place`, else it stays as it is. Lower case digits are taken too. Of what is
-/// malformed, some may be overwritten.
+/// Decodes the frame that fills `bytes`. Digits may be in upper or lower case. If `in_place` is
+/// true, unit, PDU and LRC are written to the front of `bytes`; a malformed frame may then be
+/// partly overwritten. If it is false, `bytes` does not change.
 #[cfg_attr(target_os = "none", inline(never))]
-pub fn decode(bytes: &mut [u8], end: u8, in_place: bool) -> Content {
+pub fn decode(bytes: &mut [u8], end: u8, in_place: bool) -> Decoded {
     let length = match bytes {
-        [START, characters @ .., RETURN, last] if *last == end => characters.len(),
-        _ => return Content::Malformed,
+        [START, characters @ .., CARRIAGE_RETURN, last] if *last == end => characters.len(),
+        _ => return Decoded::Malformed,
     };
-    if length % 2 != 0 || length.wrapping_sub(LEAST_DIGITS) > MAX_DIGITS - LEAST_DIGITS {
-        return Content::Malformed;
+    if length % 2 != 0 || length.wrapping_sub(MIN_DIGITS) > MAX_DIGITS - MIN_DIGITS {
+        return Decoded::Malformed;
     }
     let mut sum = 0u8;
     for index in 0..length / 2 {
         let at = 1 + 2 * index;
         let Some(decoded) = bytes.get(at..at + 2).and_then(byte) else {
-            return Content::Malformed;
+            return Decoded::Malformed;
         };
         sum = sum.wrapping_add(decoded);
         if let Some(place) = bytes.get_mut(index).filter(|_| in_place) {
@@ -131,30 +132,29 @@ pub fn decode(bytes: &mut [u8], end: u8, in_place: bool) -> Content {
     }
     let content = (length / 2 - 1) as u8;
     if sum == 0 {
-        Content::Right(content)
+        Decoded::Valid(content)
     } else {
-        Content::Damaged(content)
+        Decoded::WrongLrc(content)
     }
 }
 
-/// The frame that is the whole of `bytes`, decoded where it stands. Lower case
-/// digits are taken too.
+/// Decodes the frame that fills `bytes`, in place. Digits may be in upper or lower case.
 ///
 /// # Errors
-/// [`Status::INCOMPLETE_FRAME`] without its end; [`Status::MALFORMED_FRAME`]
-/// without a colon, or for characters that are no pairs of digits;
-/// [`Status::INVALID_CRC`] for a wrong LRC. The bytes may then be overwritten.
+/// [`Status::INCOMPLETE_FRAME`] if the end is missing; [`Status::MALFORMED_FRAME`] if the colon
+/// is missing, or if the characters are not pairs of digits; [`Status::INVALID_CRC`] if the LRC
+/// is wrong. After an error, `bytes` may be overwritten.
 pub fn parse(bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Status> {
     if bytes.first().is_none_or(|first| *first == START)
         && bytes.len() <= MAX_FRAME
-        && (bytes.len() < AROUND || !bytes.ends_with(&[RETURN, end]))
+        && (bytes.len() < DELIMITERS || !bytes.ends_with(&[CARRIAGE_RETURN, end]))
     {
         return Err(Status::INCOMPLETE_FRAME);
     }
     let length = match decode(bytes, end, true) {
-        Content::Right(length) => length,
-        Content::Damaged(_) => return Err(Status::INVALID_CRC),
-        Content::Malformed => return Err(Status::MALFORMED_FRAME),
+        Decoded::Valid(length) => length,
+        Decoded::WrongLrc(_) => return Err(Status::INVALID_CRC),
+        Decoded::Malformed => return Err(Status::MALFORMED_FRAME),
     };
     match bytes.get(..length.into()) {
         Some([unit, pdu @ ..]) => Ok(Adu {
@@ -166,11 +166,11 @@ pub fn parse(bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Status> {
     }
 }
 
-/// Writes the frame of the PDU that `pdu` writes; returns its length. The PDU
-/// stands in the buffer's front first.
+/// Writes a frame to `buffer` and returns its length. The callback `pdu` writes the PDU to the
+/// front of the slice that it gets, and returns the length of the PDU.
 ///
 /// # Errors
-/// As `pdu` says; [`Status::BUFFER_TOO_SMALL`].
+/// The error of `pdu`; [`Status::BUFFER_TOO_SMALL`].
 pub fn emit(
     buffer: &mut [u8],
     unit: u8,
@@ -185,19 +185,19 @@ pub fn emit(
     encode(buffer, content, end)
 }
 
-/// Turns the first `content` bytes of a buffer, unit and PDU, into their frame; returns
-/// its length.
+/// Turns unit and PDU, the first `content` bytes of `buffer`, into a frame in place. Returns the
+/// length of the frame.
 ///
 /// # Errors
-/// [`Status::BUFFER_TOO_SMALL`], with nothing changed.
+/// [`Status::BUFFER_TOO_SMALL`]; `buffer` is then unchanged.
 #[cfg_attr(target_os = "none", inline(never))]
 pub fn encode(buffer: &mut [u8], content: usize, end: u8) -> Result<usize, Status> {
-    let total = 2 * (content + 1) + AROUND;
+    let total = 2 * (content + 1) + DELIMITERS;
     let Some(frame) = buffer.get_mut(..total) else {
         return Err(Status::BUFFER_TOO_SMALL);
     };
     let check = lrc(frame.get(..content).unwrap_or_default());
-    // From the back, so that nothing is overwritten before it is taken.
+    // From the last byte to the first, so that no byte is overwritten before it is encoded.
     for index in (0..=content).rev() {
         let byte = match frame.get(index) {
             Some(byte) if index < content => *byte,
@@ -209,9 +209,9 @@ pub fn encode(buffer: &mut [u8], content: usize, end: u8) -> Result<usize, Statu
             *low = character(byte & 0x0F);
         }
     }
-    if let [first, .., return_, last] = frame {
+    if let [first, .., carriage_return, last] = frame {
         *first = START;
-        *return_ = RETURN;
+        *carriage_return = CARRIAGE_RETURN;
         *last = end;
     }
     Ok(total)
@@ -225,7 +225,7 @@ mod tests {
     const FRAME: &[u8] = b":0207F7\r\n";
 
     #[test]
-    fn a_frame_is_read_and_written() {
+    fn a_frame_is_parsed_and_emitted() {
         let mut bytes = FRAME.to_vec();
         let adu = parse(&mut bytes, END).unwrap();
         assert_eq!((adu.unit, adu.pdu), (2, &[7][..]));
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn lower_case_digits_are_taken() {
+    fn lower_case_digits_are_accepted() {
         assert!(parse(&mut b":0207f7\r\n".to_vec(), END).is_ok());
     }
 
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn characters_that_are_no_pairs_of_digits_are_malformed() {
+    fn characters_that_are_not_pairs_of_digits_are_malformed() {
         for frame in [
             &b":0207F\r\n"[..],
             b":0207FG\r\n",
@@ -272,17 +272,17 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_lrc_is_found() {
+    fn a_wrong_lrc_is_detected() {
         let mut bytes = b":0207F6\r\n".to_vec();
         assert_eq!(parse(&mut bytes, END), Err(Status::INVALID_CRC));
     }
 
     #[test]
-    fn a_frame_that_is_not_decoded_in_place_stays_as_it_is() {
+    fn decode_without_in_place_does_not_change_the_frame() {
         for (frame, content) in [
-            (FRAME, Content::Right(2)),
-            (b":0207F6\r\n", Content::Damaged(2)),
-            (b":0207FG\r\n", Content::Malformed),
+            (FRAME, Decoded::Valid(2)),
+            (b":0207F6\r\n", Decoded::WrongLrc(2)),
+            (b":0207FG\r\n", Decoded::Malformed),
         ] {
             let mut bytes = frame.to_vec();
             assert_eq!(decode(&mut bytes, END, false), content);

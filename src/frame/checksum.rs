@@ -3,15 +3,14 @@
 
 use crate::FIRMWARE;
 
-/// For each byte value, what it has done to the CRC once so many bytes have
-/// followed.
+/// For each byte value: its contribution to the CRC after a fixed number of further bytes.
 type Table = [u16; 256];
 
-/// The tables for 0 to 15 bytes that follow, in fours: 8 KB, which a host has
-/// room for.
+/// The tables for 0 to 15 further bytes, in groups of four. They take 8 KB, so only hosts use
+/// them.
 static TABLES: [[Table; 4]; 4] = tables();
 
-/// Made by the compiler, so no index is wrong at run time.
+// The compiler evaluates this function, so a wrong index is an error of the build.
 #[allow(clippy::indexing_slicing)]
 const fn tables() -> [[Table; 4]; 4] {
     let mut tables = [[[0; 256]; 4]; 4];
@@ -33,9 +32,9 @@ const fn tables() -> [[Table; 4]; 4] {
     tables
 }
 
-/// Takes `bytes` in by table: sixteen at once as long as there are so many, for
-/// none of them waits for another, then four, then one. CONTRIBUTING.md says why this
-/// is not the crate's table.
+/// The CRC after `bytes`, by tables: 16 bytes in one step, then 4, then 1. The bytes of one step
+/// do not depend on each other, so the processor handles them in parallel. CONTRIBUTING.md
+/// explains why this is not the table of the `crc` crate.
 fn by_table(crc: u16, bytes: &[u8]) -> u16 {
     let [last, third, second, first] = &TABLES;
     let [single, ..] = last;
@@ -43,39 +42,42 @@ fn by_table(crc: u16, bytes: &[u8]) -> u16 {
     let crc = sixteens.iter().fold(crc, |crc, bytes| {
         let (fours, _) = bytes.as_chunks::<4>();
         let [a, b, c, d] = fours else { return crc };
-        of_four(first, with(crc, a)) ^ of_four(second, *b) ^ of_four(third, *c) ^ of_four(last, *d)
+        lookup_four(first, xor_into(crc, a))
+            ^ lookup_four(second, *b)
+            ^ lookup_four(third, *c)
+            ^ lookup_four(last, *d)
     });
     let (fours, rest) = rest.as_chunks::<4>();
     let crc = fours
         .iter()
-        .fold(crc, |crc, bytes| of_four(last, with(crc, bytes)));
+        .fold(crc, |crc, bytes| lookup_four(last, xor_into(crc, bytes)));
     rest.iter()
-        .fold(crc, |crc, byte| crc >> 8 ^ of(single, crc as u8 ^ byte))
+        .fold(crc, |crc, byte| crc >> 8 ^ lookup(single, crc as u8 ^ byte))
 }
 
-/// Four bytes with the CRC of what was before them.
-fn with(crc: u16, bytes: &[u8; 4]) -> [u8; 4] {
+/// Combines the CRC of the bytes so far with the next four bytes.
+fn xor_into(crc: u16, bytes: &[u8; 4]) -> [u8; 4] {
     (u32::from_le_bytes(*bytes) ^ u32::from(crc)).to_le_bytes()
 }
 
-/// What four bytes do to the CRC.
-fn of_four(tables: &[Table; 4], bytes: [u8; 4]) -> u16 {
+/// The contribution of four bytes to the CRC.
+fn lookup_four(tables: &[Table; 4], bytes: [u8; 4]) -> u16 {
     let [last, third, second, first] = tables;
     let [a, b, c, d] = bytes;
-    of(first, a) ^ of(second, b) ^ of(third, c) ^ of(last, d)
+    lookup(first, a) ^ lookup(second, b) ^ lookup(third, c) ^ lookup(last, d)
 }
 
-fn of(table: &Table, byte: u8) -> u16 {
+fn lookup(table: &Table, byte: u8) -> u16 {
     match table.get(usize::from(byte)) {
         Some(crc) => *crc,
         None => 0,
     }
 }
 
-/// Takes `bytes` in without a table, which would cost RAM on an AVR and half a
-/// kilobyte of flash elsewhere, and without the crate's loop over bits, which
-/// took a third of the time between a reply and the next request on an AVR:
-/// eight steps at once, which come down to the parity of the byte and two shifts.
+/// The CRC after `bytes`, for firmware: eight bits in one step, which come down to the parity of
+/// the byte and two shifts. A table would take RAM on an AVR, and half a kilobyte of flash
+/// elsewhere. The loop over bits of the `crc` crate took a third of the time between a reply and
+/// the next request on an AVR.
 fn by_parity(crc: u16, bytes: &[u8]) -> u16 {
     bytes.iter().fold(crc, |crc, byte| {
         let low = crc as u8 ^ byte;
@@ -92,9 +94,9 @@ fn by_parity(crc: u16, bytes: &[u8]) -> u16 {
     })
 }
 
-/// What [`Crc16::before`] gives, bit by bit.
+/// [`Crc16::before`], bit by bit.
 #[inline(always)]
-fn back_by_bits(mut crc: u16, byte: u8) -> u16 {
+fn undo_by_bits(mut crc: u16, byte: u8) -> u16 {
     for _ in 0..8 {
         let odd = crc & 0x8000 != 0;
         crc <<= 1;
@@ -105,12 +107,12 @@ fn back_by_bits(mut crc: u16, byte: u8) -> u16 {
     crc ^ u16::from(byte)
 }
 
-/// What [`Crc16::before`] gives: [`by_parity`] the other way round, eight steps at once.
+/// [`Crc16::before`], eight bits in one step: the inverse of [`by_parity`].
 #[inline(always)]
-fn back_by_parity(crc: u16, byte: u8) -> u16 {
+fn undo_by_parity(crc: u16, byte: u8) -> u16 {
     let [low, high] = crc.to_le_bytes();
-    // The upper half is the Gray code of the byte that was shifted out, of its parity and
-    // its upper seven bits. Its last bit is the parity of what that decodes to.
+    // The high byte is a Gray code of the parity and the upper seven bits of the byte that was
+    // shifted out. The lowest bit of that byte is the parity of the decoded value.
     let out = high ^ high >> 1;
     let out = out ^ out >> 2;
     let out = out ^ out >> 4;
@@ -122,7 +124,7 @@ fn back_by_parity(crc: u16, byte: u8) -> u16 {
     u16::from_le_bytes([out ^ byte, low])
 }
 
-/// The CRC with `bytes` taken in.
+/// The CRC after `bytes`.
 #[inline(always)]
 fn update(crc: u16, bytes: &[u8]) -> u16 {
     if FIRMWARE {
@@ -132,7 +134,7 @@ fn update(crc: u16, bytes: &[u8]) -> u16 {
     }
 }
 
-/// A CRC-16 that grows as bytes arrive.
+/// A CRC-16 that can be updated as bytes arrive.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Crc16(u16);
 
@@ -140,29 +142,29 @@ impl Crc16 {
     /// The CRC of no bytes.
     pub const START: Crc16 = Crc16(0xFFFF);
 
-    /// What the bytes of a frame including its CRC leave, if that is right.
+    /// The CRC of a whole frame including its CRC, if the frame's CRC is right.
     pub const RESIDUE: Crc16 = Crc16(0);
 
-    /// The CRC with `bytes` taken in as well.
+    /// The CRC after these `bytes` too.
     #[cfg_attr(target_os = "none", inline(never))]
     #[must_use]
     pub fn with(self, bytes: &[u8]) -> Crc16 {
         Crc16(update(self.0, bytes))
     }
 
-    /// The CRC before `byte` was taken in, from the CRC with it. (What is fast is 40
-    /// bytes more, and an AVR alone is too slow without.)
+    /// The inverse of [`Crc16::with`]: the CRC before `byte`, from the CRC after `byte`. (The
+    /// fast way takes 40 bytes more code. Only an AVR needs it.)
     #[inline(always)]
     #[must_use]
     pub fn before(self, byte: u8) -> Crc16 {
         if FIRMWARE && !cfg!(target_arch = "avr") {
-            Crc16(back_by_bits(self.0, byte))
+            Crc16(undo_by_bits(self.0, byte))
         } else {
-            Crc16(back_by_parity(self.0, byte))
+            Crc16(undo_by_parity(self.0, byte))
         }
     }
 
-    /// How a CRC weighs behind so many bytes: see [`Crc16::since_start`].
+    /// The weight that [`Crc16::since_start`] needs for a frame of `bytes` bytes.
     #[cfg_attr(target_os = "none", inline(never))]
     #[must_use]
     pub fn weight(bytes: u16) -> Crc16 {
@@ -170,9 +172,9 @@ impl Crc16 {
         (0..bytes * 8).fold(first, |weight, _| weight.shifted())
     }
 
-    /// What a run of bytes that began with this CRC ends with, if the last of them
-    /// are a frame with a right CRC; `weight` is that of the frame's length. (The CRC
-    /// is linear: what came before is a difference, multiplied by the weight.)
+    /// The CRC of a run of bytes that ends with a frame whose CRC is right. `self` is the CRC of
+    /// the bytes before that frame, `weight` the weight of the frame's length. (The CRC is
+    /// linear: the bytes before the frame add a difference, multiplied by the weight.)
     #[cfg_attr(target_os = "none", inline(never))]
     #[must_use]
     pub fn since_start(self, mut weight: Crc16) -> Crc16 {
@@ -188,7 +190,7 @@ impl Crc16 {
         Crc16(product)
     }
 
-    /// The CRC one bit later, the bit being 0.
+    /// The CRC after one more bit, which is 0.
     const fn shifted(self) -> Crc16 {
         Crc16(if self.0 & 1 != 0 {
             self.0 >> 1 ^ 0xA001
@@ -197,12 +199,12 @@ impl Crc16 {
         })
     }
 
-    /// The two bytes as sent, low byte first.
+    /// The two bytes of the CRC as they are sent, low byte first.
     pub const fn to_bytes(self) -> [u8; 2] {
         self.0.to_le_bytes()
     }
 
-    /// True after the bytes of a frame including its CRC, if that is right.
+    /// True for the CRC of a whole frame including its CRC, if the frame's CRC is right.
     pub const fn is_residue(self) -> bool {
         self.0 == 0
     }
@@ -213,17 +215,17 @@ pub fn crc16(bytes: &[u8]) -> Crc16 {
     Crc16::START.with(bytes)
 }
 
-/// The CRC-16 of a function code and two words behind a unit, at little cost. Firmware,
-/// where a table is too dear, has [`crc16`] alone.
+/// The CRC-16 of six bytes: unit, function code and two words. It is fast, but needs a table, so
+/// firmware uses [`crc16`] instead.
 #[inline]
 pub fn crc16_of_six(bytes: [u8; 6]) -> Crc16 {
     let [last, [next, first, ..], ..] = &TABLES;
     let [a, b, rest @ ..] = bytes;
     let [low, high] = Crc16::START.to_bytes();
-    Crc16(of(first, a ^ low) ^ of(next, b ^ high) ^ of_four(last, rest))
+    Crc16(lookup(first, a ^ low) ^ lookup(next, b ^ high) ^ lookup_four(last, rest))
 }
 
-/// The LRC of `bytes`: what makes their sum zero.
+/// The LRC of `bytes`: the sum of `bytes` and the LRC is 0 modulo 256.
 pub fn lrc(bytes: &[u8]) -> u8 {
     let sum = bytes.iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte));
     sum.wrapping_neg()
@@ -239,8 +241,8 @@ mod tests {
         assert_eq!(crc16(b"123456789").to_bytes(), [0x37, 0x4B]);
     }
 
-    /// As the catalogue's polynomial has it. The crate reflects the initial
-    /// value; reflecting it here as well cancels out.
+    /// The CRC of the `crc` crate, from its catalogue. The crate reflects the initial value, so
+    /// this function reflects it too.
     fn by_crate(crc: u16, bytes: &[u8]) -> u16 {
         const CRC: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS);
         let mut digest = CRC.digest_with_initial(crc.reverse_bits());
@@ -249,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn all_ways_agree_on_every_byte_and_running_value() {
+    fn all_implementations_agree_for_every_byte_and_every_crc() {
         for crc in 0..=u16::MAX {
             let byte = [(crc >> 8) as u8 ^ 0x5A];
             assert_eq!(by_parity(crc, &byte), by_table(crc, &byte));
@@ -267,35 +269,35 @@ mod tests {
     }
 
     #[test]
-    fn a_right_frame_leaves_no_residue() {
+    fn a_valid_frame_leaves_no_residue() {
         assert!(crc16(&[0x01, 0x04, 0x02, 0xFF, 0xFF, 0xB8, 0x80]).is_residue());
     }
 
     proptest! {
         #[test]
-        fn six_bytes_may_be_taken_in_at_once(bytes: [u8; 6]) {
+        fn crc_of_six_bytes_equals_the_crc_of_any_bytes(bytes: [u8; 6]) {
             prop_assert_eq!(crc16_of_six(bytes), crc16(&bytes));
         }
 
         #[test]
-        fn a_byte_can_be_taken_back(crc: u16, byte: u8) {
+        fn before_undoes_one_byte(crc: u16, byte: u8) {
             let after = Crc16(crc).with(&[byte]);
             prop_assert_eq!(after.before(byte), Crc16(crc));
-            prop_assert_eq!(back_by_bits(after.0, byte), crc);
-            prop_assert_eq!(back_by_parity(after.0, byte), crc);
+            prop_assert_eq!(undo_by_bits(after.0, byte), crc);
+            prop_assert_eq!(undo_by_parity(after.0, byte), crc);
         }
 
         #[test]
-        fn a_frame_is_known_by_the_crc_of_what_came_before(noise: std::vec::Vec<u8>, frame: std::vec::Vec<u8>) {
+        fn since_start_predicts_the_crc_after_a_frame(noise: std::vec::Vec<u8>, frame: std::vec::Vec<u8>) {
             let frame = frame.get(..250).unwrap_or(&frame);
             let before = crc16(&noise);
-            let right = before.with(frame).with(&crc16(frame).to_bytes());
+            let after = before.with(frame).with(&crc16(frame).to_bytes());
             let weight = Crc16::weight(frame.len() as u16 + 2);
-            prop_assert_eq!(right, before.since_start(weight));
+            prop_assert_eq!(after, before.since_start(weight));
         }
 
         #[test]
-        fn bytes_may_arrive_in_any_pieces(bytes: std::vec::Vec<u8>, cut: usize) {
+        fn the_crc_does_not_depend_on_how_the_bytes_are_split(bytes: std::vec::Vec<u8>, cut: usize) {
             let (front, back) = bytes.split_at(cut % (bytes.len() + 1));
             let crc = Crc16::START.with(front).with(back);
             prop_assert_eq!(crc, crc16(&bytes));

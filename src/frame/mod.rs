@@ -1,4 +1,4 @@
-//! Application data units: how a PDU and its unit travel on a line.
+//! Frames (application data units): how each framing carries a unit id and a PDU.
 
 mod adu;
 pub mod ascii;
@@ -10,7 +10,7 @@ pub use adu::Adu;
 
 use crate::error::Status;
 
-/// How frames are told apart.
+/// The framing: how frames are encoded and separated.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Framing {
@@ -20,12 +20,12 @@ pub enum Framing {
     Ascii,
     /// TCP, with the MBAP header (messaging on TCP/IP guide V1.0b, 3.1.3).
     Tcp,
-    /// RTU frames in a TCP stream, where silence tells nothing.
+    /// RTU frames in a TCP stream. Silence does not separate frames there.
     RtuOverTcp,
 }
 
 impl Framing {
-    /// The framing of a number that C hands in.
+    /// The framing for a number from the C API.
     pub const fn from_code(code: u8) -> Option<Framing> {
         match code {
             0 => Some(Framing::Rtu),
@@ -36,12 +36,12 @@ impl Framing {
         }
     }
 
-    /// True on a serial line: unit 0 is broadcast there.
+    /// True on a serial line. Unit 0 is the broadcast address there.
     pub const fn is_serial(self) -> bool {
         matches!(self, Framing::Rtu | Framing::Ascii)
     }
 
-    /// The most bytes that a frame has.
+    /// Length of the longest frame, in bytes.
     pub const fn max_frame(self) -> usize {
         match self {
             Framing::Rtu | Framing::RtuOverTcp => rtu::MAX_FRAME,
@@ -50,12 +50,12 @@ impl Framing {
         }
     }
 
-    /// The frame that is the whole of `bytes`. An ASCII frame is decoded where
-    /// it stands, which overwrites it; `end` is its last character.
+    /// Parses the frame that fills `bytes`. An ASCII frame is decoded in place, which overwrites
+    /// it; `end` is its end character. Other framings ignore `end`.
     ///
     /// # Errors
-    /// [`Status::INCOMPLETE_FRAME`], [`Status::MALFORMED_FRAME`], or
-    /// [`Status::INVALID_CRC`], for a wrong LRC too.
+    /// [`Status::INCOMPLETE_FRAME`]; [`Status::MALFORMED_FRAME`]; [`Status::INVALID_CRC`] if the
+    /// CRC or the LRC is wrong.
     pub fn parse(self, bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Status> {
         match self {
             Framing::Rtu | Framing::RtuOverTcp => rtu::parse(bytes),
@@ -64,11 +64,12 @@ impl Framing {
         }
     }
 
-    /// Writes the frame of the PDU that `pdu` writes; returns its length. The
-    /// `transaction` is for TCP, `end` for ASCII.
+    /// Writes a frame to `buffer` and returns its length. The callback `pdu` writes the PDU to
+    /// the front of the slice that it gets, and returns the length of the PDU. Only TCP uses
+    /// `transaction`, only ASCII uses `end`.
     ///
     /// # Errors
-    /// As `pdu` says; [`Status::BUFFER_TOO_SMALL`].
+    /// The error of `pdu`; [`Status::BUFFER_TOO_SMALL`].
     pub fn emit(
         self,
         buffer: &mut [u8],

@@ -1,26 +1,27 @@
-//! RTU: unit, PDU, CRC-16, and silence around them (serial line guide 2.5.1).
+//! RTU frames: unit, PDU and CRC-16. Silence separates the frames (serial line guide V1.02,
+//! 2.5.1).
 
 use super::checksum::{crc16, crc16_of_six, Crc16};
 use super::Adu;
 use crate::error::Status;
 
-/// The longest frame: unit, PDU of 253 bytes, CRC.
+/// Bytes of the longest frame: unit, PDU of 253 bytes, CRC.
 pub const MAX_FRAME: usize = 256;
 
-/// The least bytes of a frame: unit, function, CRC.
+/// Bytes of the shortest frame: unit, function code, CRC.
 pub const MIN_FRAME: u8 = 4;
 
-/// Bytes of a frame around its PDU: the unit before, the CRC behind.
+/// Bytes of a frame that are not its PDU: the unit before it, the CRC after it.
 pub const OVERHEAD: usize = 3;
 
 /// Bytes of the CRC.
 pub const CRC: u8 = 2;
 
-/// Where the PDU of a frame starts.
+/// Index of the PDU in a frame.
 pub const PDU: usize = 1;
 
-/// Writes the frame of the PDU that `pdu` writes, `length` bytes long. Returns
-/// false, with nothing written, if `buffer` cannot hold it.
+/// Writes a frame to `buffer`. The callback `pdu` writes the PDU of `length` bytes. Returns
+/// false, and writes nothing, if the frame does not fit into `buffer`.
 pub fn write(buffer: &mut [u8], unit: u8, length: usize, pdu: impl FnOnce(&mut [u8])) -> bool {
     let Some(frame) = buffer.get_mut(..length + OVERHEAD) else {
         return false;
@@ -38,18 +39,18 @@ pub fn write(buffer: &mut [u8], unit: u8, length: usize, pdu: impl FnOnce(&mut [
     true
 }
 
-/// The frame of a function code and two words, at little cost: for hosts.
+/// The frame of a PDU of a function code and two words. It is fast, and is meant for hosts.
 #[inline]
 pub fn short(unit: u8, function: u8, [a, b, c, d]: [u8; 4]) -> [u8; 8] {
     let [low, high] = crc16_of_six([unit, function, a, b, c, d]).to_bytes();
     [unit, function, a, b, c, d, low, high]
 }
 
-/// The frame that is the whole of `bytes`.
+/// Parses the frame that fills `bytes`.
 ///
 /// # Errors
-/// [`Status::INCOMPLETE_FRAME`] for less than any frame has,
-/// [`Status::MALFORMED_FRAME`] for more, [`Status::INVALID_CRC`].
+/// [`Status::INCOMPLETE_FRAME`] for fewer bytes than the shortest frame has,
+/// [`Status::MALFORMED_FRAME`] for more than the longest has; [`Status::INVALID_CRC`].
 pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Status> {
     if bytes.len() < usize::from(MIN_FRAME) {
         return Err(Status::INCOMPLETE_FRAME);
@@ -67,16 +68,16 @@ pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Status> {
     }
 }
 
-/// True if the bytes are a frame, as their CRC says. Two or three bytes may be one here, one
-/// without a PDU.
+/// True if the last two bytes are the CRC of the others. This does not check the length: two or
+/// three bytes, a frame without a PDU, may pass.
 #[inline(always)]
 pub fn is_frame(bytes: &[u8]) -> bool {
     crc16(bytes).is_residue()
 }
 
-/// The length of the shortest frame that begins where `bytes` begin, among those of `least`
-/// bytes and each time `step` bytes more; `None` if there is none.
-pub fn first(bytes: &[u8], least: usize, step: usize) -> Option<usize> {
+/// Length of the shortest frame at the start of `bytes` whose CRC is right. Tries lengths from
+/// `least` on in steps of `step`. `None` if there is no such frame.
+pub fn find_first(bytes: &[u8], least: usize, step: usize) -> Option<usize> {
     let mut total = least;
     let mut crc = Crc16::START.with(bytes.get(..total)?);
     while !crc.is_residue() {
@@ -89,11 +90,11 @@ pub fn first(bytes: &[u8], least: usize, step: usize) -> Option<usize> {
     Some(total)
 }
 
-/// Where the last frame of `bytes` begins, which ends where they end; their
-/// length if there is none. What stands before it does not matter: the CRC is
-/// taken back byte by byte until it is that of no bytes; see [`is_frame`].
+/// Index of the longest frame at the end of `bytes` whose CRC is right; the length of `bytes` if
+/// there is none. Goes back from the end, and undoes the CRC byte by byte: a frame begins where
+/// the CRC has its initial value. As for [`is_frame`], a frame may lack a PDU.
 #[cfg_attr(target_os = "none", inline(never))]
-pub fn last(bytes: &[u8]) -> usize {
+pub fn find_last(bytes: &[u8]) -> usize {
     let mut crc = Crc16::RESIDUE;
     let mut start = bytes.len();
     let mut rest = bytes;
@@ -107,10 +108,11 @@ pub fn last(bytes: &[u8]) -> usize {
     start
 }
 
-/// Writes the frame of the PDU that `pdu` writes; returns its length.
+/// Writes a frame to `buffer` and returns its length. The callback `pdu` writes the PDU to the
+/// front of the slice that it gets, and returns the length of the PDU.
 ///
 /// # Errors
-/// As `pdu` says; [`Status::BUFFER_TOO_SMALL`].
+/// The error of `pdu`; [`Status::BUFFER_TOO_SMALL`].
 pub fn emit(
     buffer: &mut [u8],
     unit: u8,
@@ -119,7 +121,7 @@ pub fn emit(
     let space = buffer.len().saturating_sub(OVERHEAD);
     let place = buffer.get_mut(PDU..PDU + space);
     let length = pdu(place.ok_or(Status::BUFFER_TOO_SMALL)?)?;
-    // Also tells the compiler that the length of the frame cannot overflow.
+    // This check also lets the compiler prove that the frame's length does not overflow.
     if length > space {
         return Err(Status::BUFFER_TOO_SMALL);
     }
@@ -132,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_frame_of_two_words_may_be_written_at_once() {
+    fn short_equals_write_for_a_function_code_and_two_words() {
         let mut frame = [0; 8];
         assert!(write(&mut frame, 0x11, 5, |pdu| pdu
             .copy_from_slice(&[3, 0, 0x6B, 0, 3])));

@@ -1,44 +1,44 @@
-//! TCP: the MBAP header and a PDU (messaging on TCP/IP guide V1.0b, 3.1.3).
+//! TCP frames: an MBAP header and a PDU (messaging on TCP/IP guide V1.0b, 3.1.3).
 
 use super::Adu;
 use crate::error::Status;
 use core::ops::RangeInclusive;
 
-/// Bytes of a frame before its PDU: transaction, protocol, length, unit.
+/// Index of the PDU in a frame, after transaction, protocol, length and unit.
 pub const PDU: usize = 7;
 
-/// The longest frame.
+/// Bytes of the longest frame.
 pub const MAX_FRAME: usize = PDU + 253;
 
-/// Bytes of the header that the length does not count: all but the unit.
+/// Bytes of the header that its length field does not count: all but the unit.
 pub const HEADER: usize = 6;
 
-/// What the length of a header may be: unit and PDU.
-const LENGTHS: RangeInclusive<u16> = 2..=(MAX_FRAME - HEADER) as u16;
+/// Valid values of the length field. It counts unit and PDU.
+const VALID_LENGTHS: RangeInclusive<u16> = 2..=(MAX_FRAME - HEADER) as u16;
 
 /// The MBAP header.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Header {
-    /// The transaction identifier, which a response repeats.
+    /// The transaction identifier. A response repeats that of its request.
     pub transaction: u16,
-    /// Bytes of the whole frame.
+    /// Length of the whole frame, in bytes.
     pub total: usize,
-    /// The unit.
+    /// The unit id.
     pub unit: u8,
 }
 
-/// The header of the frame that begins with `bytes`, as soon as it is there;
-/// the protocol identifier and the length are judged as they come in.
+/// Parses the header at the start of `bytes`. The protocol identifier and the length field are
+/// checked as soon as they are complete, even if the rest of the header is still missing.
 ///
 /// # Errors
-/// [`Status::INCOMPLETE_FRAME`] while bytes are missing,
-/// [`Status::MALFORMED_FRAME`] if this can be no Modbus TCP frame.
+/// [`Status::INCOMPLETE_FRAME`] if bytes of the header are missing;
+/// [`Status::MALFORMED_FRAME`] if the bytes cannot begin a Modbus TCP frame.
 pub fn header(bytes: &[u8]) -> Result<Header, Status> {
     let Some([a, b, c, d, e, f, unit]) = bytes.first_chunk() else {
-        return Err(begun(bytes));
+        return Err(partial_header_error(bytes));
     };
     let length = u16::from_be_bytes([*e, *f]);
-    if u16::from_ne_bytes([*c, *d]) != 0 || !LENGTHS.contains(&length) {
+    if u16::from_ne_bytes([*c, *d]) != 0 || !VALID_LENGTHS.contains(&length) {
         return Err(Status::MALFORMED_FRAME);
     }
     Ok(Header {
@@ -48,13 +48,13 @@ pub fn header(bytes: &[u8]) -> Result<Header, Status> {
     })
 }
 
-/// The length in the header of a frame whose PDU has so many bytes.
+/// The length field for a PDU of `pdu` bytes.
 #[inline(always)]
 pub const fn length(pdu: usize) -> [u8; 2] {
     (pdu as u16 + 1).to_be_bytes()
 }
 
-/// How many bytes it takes to judge more of a header than its first `have` allow.
+/// How many bytes of a header are needed to check its next field, if `have` bytes are there.
 pub const fn next_part(have: usize) -> usize {
     match have {
         0..4 => 4,
@@ -63,8 +63,8 @@ pub const fn next_part(have: usize) -> usize {
     }
 }
 
-/// The first eight bytes of a frame, the header and a function code, as one
-/// number; `length` is that of the PDU.
+/// The first eight bytes of a frame as one big-endian number: the header and the function code.
+/// `length` is the length of the PDU.
 #[inline]
 pub fn start(transaction: u16, length: u8, unit: u8, function: u8) -> u64 {
     let first = u32::from(transaction) << 16;
@@ -72,7 +72,7 @@ pub fn start(transaction: u16, length: u8, unit: u8, function: u8) -> u64 {
     u64::from(first) << 32 | u64::from(second)
 }
 
-/// A frame of its [`start`] and two words, as sent.
+/// The frame of a [`start`] and two words.
 #[inline]
 pub fn short(start: u64, words: [u8; 4]) -> [u8; 12] {
     let mut frame = [0; 12];
@@ -85,34 +85,35 @@ pub fn short(start: u64, words: [u8; 4]) -> [u8; 12] {
     frame
 }
 
-/// What there is to say of less than a header.
+/// The error for an incomplete header.
 #[cold]
-fn begun(bytes: &[u8]) -> Status {
-    let right = match *bytes {
-        [_, _, c, d, e, f, ..] => c | d == 0 && LENGTHS.contains(&u16::from_be_bytes([e, f])),
+fn partial_header_error(bytes: &[u8]) -> Status {
+    let is_valid_so_far = match *bytes {
+        [_, _, c, d, e, f, ..] => c | d == 0 && VALID_LENGTHS.contains(&u16::from_be_bytes([e, f])),
         [_, _, c, d, ..] => c | d == 0,
         _ => true,
     };
-    if right {
+    if is_valid_so_far {
         Status::INCOMPLETE_FRAME
     } else {
         Status::MALFORMED_FRAME
     }
 }
 
-/// The frame that is the whole of `bytes`.
+/// Parses the frame that fills `bytes`.
 ///
 /// # Errors
-/// As [`header`]; [`Status::MALFORMED_FRAME`] also for bytes behind the frame.
+/// As [`header`]; [`Status::INCOMPLETE_FRAME`] also if bytes of the PDU are missing;
+/// [`Status::MALFORMED_FRAME`] also if bytes follow the frame.
 pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Status> {
     let Some(([a, b, protocol_and_length @ .., unit], pdu)) = bytes.split_first_chunk::<PDU>()
     else {
-        return Err(refused(bytes));
+        return Err(parse_error(bytes));
     };
-    // The protocol identifier is zero: so the four bytes are the length.
+    // The protocol identifier is 0, so its two bytes and the length field make one number.
     let length = u32::from_be_bytes(*protocol_and_length);
     if pdu.is_empty() || pdu.len() > MAX_FRAME - PDU || length != pdu.len() as u32 + 1 {
-        return Err(refused(bytes));
+        return Err(parse_error(bytes));
     }
     Ok(Adu {
         transaction: u16::from_be_bytes([*a, *b]),
@@ -121,20 +122,21 @@ pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Status> {
     })
 }
 
-/// Why bytes are no whole frame.
+/// The error for bytes that are not one whole frame.
 #[cold]
-fn refused(bytes: &[u8]) -> Status {
+fn parse_error(bytes: &[u8]) -> Status {
     match header(bytes) {
         Ok(header) if bytes.len() > header.total => Status::MALFORMED_FRAME,
         Ok(_) => Status::INCOMPLETE_FRAME,
-        Err(refused) => refused,
+        Err(error) => error,
     }
 }
 
-/// Writes the frame of the PDU that `pdu` writes; returns its length.
+/// Writes a frame to `buffer` and returns its length. The callback `pdu` writes the PDU to the
+/// front of the slice that it gets, and returns the length of the PDU.
 ///
 /// # Errors
-/// As `pdu` says; [`Status::BUFFER_TOO_SMALL`].
+/// The error of `pdu`; [`Status::BUFFER_TOO_SMALL`].
 pub fn emit(
     buffer: &mut [u8],
     transaction: u16,
@@ -158,7 +160,7 @@ mod tests {
     const FRAME: [u8; 12] = [0x81, 0x80, 0, 0, 0, 6, 0x10, 1, 0, 0x6B, 0, 3];
 
     #[test]
-    fn a_frame_is_read_and_written() {
+    fn a_frame_is_parsed_and_emitted() {
         let adu = parse(&FRAME).unwrap();
         assert_eq!((adu.transaction, adu.unit), (0x8180, 0x10));
         let mut buffer = [0; 12];
@@ -170,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_of_two_words_may_be_written_at_once() {
+    fn short_writes_a_frame_of_two_words() {
         let start = start(0x8180, 5, 0x10, 1);
         assert_eq!(short(start, [0, 0x6B, 0, 3]), FRAME);
     }
@@ -183,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn lengths_that_no_frame_has_are_malformed() {
+    fn an_impossible_length_is_malformed() {
         for length in [0u16, 1, 255, 256, 65535] {
             let [high, low] = length.to_be_bytes();
             let bytes = [0, 1, 0, 0, high, low, 1, 3, 0, 0, 0, 1];

@@ -107,14 +107,14 @@ fn expected_ascii(
         return Err(Status::MALFORMED_FRAME);
     }
     let is_end = |pair: &[u8]| match pair {
-        [before, last] => ascii::mark(*before, *last, end) == ascii::Mark::End,
+        [before, last] => ascii::kind_of(*before, *last, end) == ascii::CharacterKind::End,
         _ => false,
     };
     if let Some(at) = characters.windows(2).position(is_end) {
         return Ok(Length::Exactly(1 + at + 2));
     }
     // The last character may be the carriage return before the end character.
-    let digits = characters.strip_suffix(&[ascii::RETURN]);
+    let digits = characters.strip_suffix(&[ascii::CARRIAGE_RETURN]);
     let digits = digits.unwrap_or(characters);
     let mut content = [0; 1 + MAX_PDU + 1];
     let mut pairs = digits.chunks_exact(2);

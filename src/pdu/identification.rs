@@ -3,7 +3,7 @@
 
 use super::fields::byte;
 use super::message::{Request, Response};
-pub use super::objects::Objects;
+pub use super::objects::ObjectList;
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
 
@@ -74,7 +74,7 @@ pub(super) fn parse_response<'a>(reader: &mut Reader<'a>) -> Result<Response<'a>
         conformity,
         more_follows: more == MORE,
         next_object,
-        objects: Objects::new(count, reader.rest())?,
+        objects: ObjectList::new(count, reader.rest())?,
     })
 }
 
@@ -83,7 +83,7 @@ pub(super) fn emit_identification_response(
     head: [u8; 2],
     more_follows: bool,
     next_object: u8,
-    objects: Objects,
+    objects: ObjectList,
 ) {
     let [code, conformity] = head;
     let more = if more_follows { MORE } else { 0 };

@@ -1,7 +1,7 @@
 //! The content of request and response PDUs. [`super::request`] and [`super::response`] parse
 //! and write them, with one file for each family of functions.
 
-use super::objects::Objects;
+use super::objects::ObjectList;
 use super::records::{Reads, Records, Writes};
 
 /// A request PDU. Register data are in the order of the wire, high byte first. The first bit
@@ -151,7 +151,7 @@ pub enum Response<'a> {
         conformity: u8,
         more_follows: bool,
         next_object: u8,
-        objects: Objects<'a>,
+        objects: ObjectList<'a>,
     },
     /// 2B with any other MEI type.
     EncapsulatedInterface {

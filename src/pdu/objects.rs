@@ -6,7 +6,7 @@ use crate::error::Status;
 
 /// The objects of a response, each an id and a value.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Objects<'a> {
+pub struct ObjectList<'a> {
     pub(super) count: u8,
     pub(super) bytes: &'a [u8],
 }
@@ -17,7 +17,7 @@ fn object<'a>(reader: &mut Reader<'a>) -> Result<(u8, &'a [u8]), Status> {
     Ok((id, counted(reader)?))
 }
 
-impl<'a> Objects<'a> {
+impl<'a> ObjectList<'a> {
     /// The `count` objects in `bytes`.
     ///
     /// # Errors
@@ -28,7 +28,7 @@ impl<'a> Objects<'a> {
             object(&mut reader)?;
         }
         if reader.is_empty() {
-            Ok(Objects { count, bytes })
+            Ok(ObjectList { count, bytes })
         } else {
             Err(Status::ILLEGAL_DATA_VALUE)
         }

@@ -26,8 +26,8 @@ pub fn serve(
     };
     // Move the response's data to directly after the function code.
     let cells = Cell::from_mut(pdu).as_slice_of_cells();
-    let behind = cells.get(length..length + bytes).unwrap_or_default();
-    move_items(cells.get(1..).unwrap_or_default(), behind);
+    let following = cells.get(length..length + bytes).unwrap_or_default();
+    move_items(cells.get(1..).unwrap_or_default(), following);
     Reply::length(1 + bytes)
 }
 

@@ -101,7 +101,7 @@ impl Diagnostics {
 
     /// Counts a frame before it is served. False if the unit must not serve it: a damaged
     /// frame, a frame for another unit, and in listen only mode any request but a restart.
-    pub fn read_bytes(&mut self, info: &RequestInfo, addressing: Addressing, pdu: &[u8]) -> bool {
+    pub fn count_frame(&mut self, info: &RequestInfo, addressing: Addressing, pdu: &[u8]) -> bool {
         if info.again {
             return true;
         }
@@ -144,8 +144,8 @@ impl Diagnostics {
         served
     }
 
-    /// Counts the outcome of a request for which `read_bytes` returned true.
-    pub fn done(&mut self, addressing: Addressing, function: u8, reply: Reply) {
+    /// Counts the outcome of a request for which `count_frame` returned true.
+    pub fn count_outcome(&mut self, addressing: Addressing, function: u8, reply: Reply) {
         let code = reply.exception_code();
         if self.cleared != 0 {
             self.cleared = 0;
@@ -203,13 +203,13 @@ impl Diagnostics {
                 }
                 _ => Reply::SERVER_DEVICE_FAILURE,
             },
-            Some(&GET_COMM_EVENT_LOG) => self.tell_log(pdu),
+            Some(&GET_COMM_EVENT_LOG) => self.write_log(pdu),
             _ => Reply::NOT_HANDLED,
         };
         (reply, Restart::None)
     }
 
-    fn tell_log(&self, pdu: &mut [u8]) -> Reply {
+    fn write_log(&self, pdu: &mut [u8]) -> Reply {
         let logged = usize::from(self.logged).min(MAX_EVENTS);
         let total = 8 + logged;
         let Some([_, count, a, b, c, d, e, f, log @ ..]) = pdu.get_mut(..total) else {

@@ -87,7 +87,7 @@ fn read(files: &impl Files, pdu: &mut [u8], length: usize) -> Reply {
     let mut rest = rest;
     for record in reads.iter() {
         let bytes = 2 * usize::from(record.length);
-        let Some((group, behind)) = rest.split_at_mut_checked(2 + bytes) else {
+        let Some((group, following)) = rest.split_at_mut_checked(2 + bytes) else {
             break;
         };
         if let [length, reference, data @ ..] = group {
@@ -95,7 +95,7 @@ fn read(files: &impl Files, pdu: &mut [u8], length: usize) -> Reply {
             *reference = REFERENCE_TYPE;
             files.load(record, data);
         }
-        rest = behind;
+        rest = following;
     }
     Reply::length(total)
 }

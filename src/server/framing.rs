@@ -1,9 +1,9 @@
-//! How each framing finds a request in what arrives, and seals a response.
+//! How each framing finds a request in the received bytes, and encodes a response.
 
 use super::info::SERIAL;
 use super::line::{EncodeAdu, Receive, Server, ServerStorage};
 use crate::error::Status;
-use crate::frame::ascii::{Content, Mark};
+use crate::frame::ascii::{CharacterKind, Decoded};
 use crate::frame::checksum::Crc16;
 use crate::frame::{ascii, rtu, tcp};
 use crate::pdu::custom::Function;
@@ -13,34 +13,36 @@ use crate::port::Port;
 use crate::time;
 use crate::FIRMWARE;
 
-/// Bytes that are given up at once where the buffer is full: fewer cost more time, more
-/// cost a request that takes all of the buffer but a few bytes.
-const SLIDE: usize = 4;
+/// Bytes that a full buffer drops at a time. A smaller number costs more time. A greater number
+/// could drop the start of a request that nearly fills the buffer.
+const DROPPED_AT_ONCE: usize = 4;
 
-/// Bytes that one poll takes at most, where a peer floods with what is no frame.
-const MOST_BYTES: u16 = 512;
+/// Most bytes that one poll reads, in case a peer floods the server with bytes that are not a
+/// frame.
+const MAX_BYTES_PER_POLL: u16 = 512;
 
 /// The inter-character timeout of ASCII (serial line guide V1.02, 2.5.2.1).
 const ASCII_TIMEOUT: u32 = time::millis(1000);
 
-/// What a frame that tells its length may take to arrive between two bytes.
+/// Longest time between two bytes of an RTU frame in a TCP stream.
 const STREAM_TIMEOUT: u32 = time::millis(500);
 
-/// The shortest TCP frame.
-const LEAST_TCP: usize = tcp::PDU + 1;
+/// Bytes of the shortest TCP frame.
+const MIN_TCP: usize = tcp::PDU + 1;
 
-/// What is taken of a TCP stream before its header is known: what most requests
-/// have, so that a host asks once. [`Server::keep_read_ahead`] puts aside 4 bytes.
-const AT_ONCE: usize = if FIRMWARE { LEAST_TCP } else { LEAST_TCP + 4 };
+/// Bytes that the server reads from a TCP stream before the header is known. On a host it is the
+/// length of most requests, so that one call of the port is enough.
+/// [`Server::keep_read_ahead`] can store 4 bytes that belong to the next frame.
+const FIRST_READ: usize = if FIRMWARE { MIN_TCP } else { MIN_TCP + 4 };
 
-/// What a PDU may take of a buffer for RTU. More than a PDU is room for the
-/// response of a user's function beside its request.
+/// Bytes of an RTU buffer that are free for the PDU. They may be more than the longest PDU: a
+/// user-defined function may keep its request there while it writes the response after it.
 pub(super) const fn rtu_space(buffer: usize) -> usize {
     buffer.saturating_sub(rtu::OVERHEAD)
 }
 
-/// As [`rtu_space`], for ASCII: colon, two characters a byte of unit, PDU and LRC,
-/// carriage return and delimiter.
+/// As [`rtu_space`], for ASCII: a frame has a colon, two characters for each byte of unit, PDU
+/// and LRC, a carriage return and an end character.
 pub(super) const fn ascii_space(buffer: usize) -> usize {
     (buffer.saturating_sub(3) / 2).saturating_sub(2)
 }
@@ -50,9 +52,9 @@ pub(super) const fn tcp_space(buffer: usize) -> usize {
     buffer.saturating_sub(tcp::PDU)
 }
 
-/// The status of a port that gave no byte.
+/// The status if the port returned no byte: `received` is 0, or negative if the link is lost.
 #[inline(always)]
-fn nothing_heard(received: i16) -> Status {
+fn no_byte_status(received: i16) -> Status {
     if received < 0 {
         Status::LINK_LOST
     } else {
@@ -61,23 +63,23 @@ fn nothing_heard(received: i16) -> Status {
 }
 
 impl<P: Port, B: ServerStorage> Server<P, B> {
-    /// Listens for RTU frames, which silence ends, at an untold baud rate.
+    /// Begins with RTU frames on a serial line, and the silence for an unknown baud rate.
     pub fn begin_rtu(&mut self) {
-        // A buffer too short for any frame has no room: a slice of so much is empty.
+        // If the buffer is too short for any frame, this wraps. `Server::pdu` is then empty.
         let space = self.storage.capacity().wrapping_sub(rtu::OVERHEAD);
         self.begin(1, space, Self::receive_rtu, Self::encode_rtu);
         self.set_silence(time::DEFAULT_SILENCE);
         self.request.own = SERIAL;
     }
 
-    /// Listens for RTU frames in a stream, where silence tells nothing.
+    /// Begins with RTU frames in a TCP stream. Silence does not separate frames there.
     pub fn begin_rtu_over_tcp(&mut self) {
         let space = rtu_space(self.storage.frame().len());
         self.begin(1, space, Self::receive_by_length, Self::encode_rtu);
         self.set_silence(STREAM_TIMEOUT);
     }
 
-    /// Listens for ASCII frames.
+    /// Begins with ASCII frames on a serial line.
     pub fn begin_ascii(&mut self) {
         let space = ascii_space(self.storage.frame().len());
         self.begin(1, space, Self::receive_ascii, Self::encode_ascii);
@@ -86,7 +88,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.request.own = SERIAL;
     }
 
-    /// Listens for TCP frames.
+    /// Begins with Modbus TCP frames.
     pub fn begin_tcp(&mut self) {
         let space = tcp_space(self.storage.frame().len());
         self.begin(
@@ -97,9 +99,9 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         );
     }
 
-    /// A frame is what stands between two silences. Where there was silence that
-    /// nobody saw, for poll came late, the last frame counts: one of ours that
-    /// is followed by another is no longer waited for.
+    /// Receives an RTU frame, which is the bytes between two silences. If poll is called late, the
+    /// buffer may hold several frames. Then the last one counts: the client no longer waits for
+    /// the response to an earlier one.
     fn receive_rtu(&mut self) -> Status {
         let received = self.read_bytes(usize::MAX);
         if received > 0 {
@@ -108,7 +110,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.receive_no_more(received)
     }
 
-    /// The port gave no byte: a frame has ended where that lasts.
+    /// Handles a port that returned no byte: if the silence is long enough, the frame has ended.
     #[cfg_attr(target_os = "none", inline(always))]
     #[cfg_attr(not(target_os = "none"), inline(never))]
     fn receive_no_more(&mut self, received: i16) -> Status {
@@ -121,55 +123,56 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.last_frame()
     }
 
-    /// As [`Server::receive_no_more`], for all framings but the most common.
-    fn receive_no_more_apart(&mut self, received: i16) -> Status {
+    /// As [`Server::receive_no_more`], for the framings other than RTU. It is not inlined.
+    fn receive_no_more_not_inlined(&mut self, received: i16) -> Status {
         if received < 0 {
             return Status::LINK_LOST;
         }
         if self.end == 0 || !self.is_silent() {
             return Status::OK;
         }
-        self.last_frame_apart()
+        self.last_frame_not_inlined()
     }
 
     #[inline(never)]
-    fn last_frame_apart(&mut self) -> Status {
+    fn last_frame_not_inlined(&mut self) -> Status {
         self.last_frame()
     }
 
-    /// True for RTU frames on a serial line, which t3.5 ends.
+    /// True for RTU frames on a serial line. A silence of t3.5 ends them.
     pub fn is_rtu_line(&self) -> bool {
         let rtu: EncodeAdu<P, B> = Self::encode_rtu;
         let is_rtu = |encode_adu| core::ptr::fn_addr_eq(encode_adu, rtu);
         self.request.is_serial() && self.encode_adu.is_some_and(is_rtu)
     }
 
-    /// Says whether the receiver hears what the driver sends, so that as many
-    /// bytes as were sent are dropped behind each response; false if this is no
-    /// RTU line. (A function of its own, so that only who calls it carries it.)
+    /// Switches the discarding of the echo on or off. It is needed if the receiver gets the bytes
+    /// that the driver sends: the server then drops as many bytes as it sent. Returns false if
+    /// this is not an RTU line. (This is a function of its own, so that only programs that call
+    /// it contain it.)
     pub fn set_echo_discard(&mut self, on: bool) -> bool {
-        let plain: Receive<P, B> = Self::receive_rtu;
-        let echoing: Receive<P, B> = Self::receive_behind_echo;
+        let without_echo: Receive<P, B> = Self::receive_rtu;
+        let after_echo: Receive<P, B> = Self::receive_after_echo;
         let is_rtu = self.is_rtu_line();
         if is_rtu {
-            self.receive = Some(if on { echoing } else { plain });
+            self.receive = Some(if on { after_echo } else { without_echo });
             self.sent = 0;
         }
         is_rtu
     }
 
-    /// As [`Server::receive_rtu`], once our own echo has passed, or the line been
-    /// silent without one.
-    fn receive_behind_echo(&mut self) -> Status {
+    /// As [`Server::receive_rtu`], but first drops the echo of the server's own response. Stops
+    /// waiting for the echo once the line has been silent for long enough.
+    fn receive_after_echo(&mut self) -> Status {
         if self.sent == 0 {
             return self.receive_rtu();
         }
-        // It comes from here on.
+        // This is the first poll after the response: the wait for the echo begins.
         if !self.resyncing {
             self.resyncing = true;
             self.last_byte = self.now;
         }
-        let received = self.read_bytes_apart(self.sent.into());
+        let received = self.read_bytes_not_inlined(self.sent.into());
         if received < 0 {
             return Status::LINK_LOST;
         }
@@ -182,32 +185,33 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         Status::OK
     }
 
-    /// Gives up the oldest bytes of a full buffer, whose first is the newest: where that
-    /// stands from now on. A buffer has more bytes than are given up.
+    /// Drops the oldest bytes of a full buffer, and marks the request as longer than the buffer.
+    /// The newest byte is at index 0. Returns the index to which it was moved. A buffer has more
+    /// bytes than are dropped.
     #[cfg_attr(target_os = "none", inline(always))]
     #[cfg_attr(not(target_os = "none"), inline(never))]
-    pub(super) fn slide(&mut self) -> usize {
+    pub(super) fn drop_oldest(&mut self) -> usize {
         self.request.overrun = true;
         let capacity = self.storage.capacity();
         let newest = self.storage.byte(0);
-        self.storage.keep(SLIDE, capacity);
-        let place = capacity.wrapping_sub(SLIDE);
+        self.storage.keep(DROPPED_AT_ONCE, capacity);
+        let place = capacity.wrapping_sub(DROPPED_AT_ONCE);
         if let [byte] = self.storage.part(place, place + 1) {
             *byte = newest;
         }
         place
     }
 
-    /// Moves the last frame of what arrived to the front.
+    /// Moves the last frame of the received bytes to the front. Any other bytes are dropped.
     #[inline(always)]
     fn last_frame(&mut self) -> Status {
         let mut length = usize::from(self.end);
         if !self.crc.is_residue() || self.request.overrun {
-            let start = rtu::last(self.storage.part(0, length));
+            let start = rtu::find_last(self.storage.part(0, length));
             self.storage.keep(start, length);
             length -= start;
         }
-        // Where there is no frame, nothing is left of what arrived.
+        // If there is no frame, no bytes are left.
         length = length.wrapping_sub(rtu::OVERHEAD);
         if length > MAX_PDU {
             length = 0;
@@ -216,11 +220,12 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.found_for(unit, length as u16)
     }
 
-    /// Frames that tell their length are taken one by one; for others, and to
-    /// find the way back, there is silence.
+    /// Receives RTU frames from a TCP stream. If the first bytes show the length of the frame, the
+    /// frame ends there. Silence ends a frame of unknown length. After an invalid frame, the
+    /// server waits for silence before it looks for the next frame.
     fn receive_by_length(&mut self) -> Status {
         let mut taken = 0;
-        while taken < MOST_BYTES {
+        while taken < MAX_BYTES_PER_POLL {
             let end = usize::from(self.end);
             let frame = self.storage.frame();
             let capacity = frame.len();
@@ -238,7 +243,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
                 None => end > rtu::OVERHEAD,
             };
             if whole && self.crc.is_residue() {
-                return self.last_frame_apart();
+                return self.last_frame_not_inlined();
             }
             if whole {
                 self.resyncing = true;
@@ -247,16 +252,16 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
                 Some((total, _)) if !self.resyncing => total,
                 _ => usize::MAX,
             };
-            let received = self.read_bytes_apart(until);
+            let received = self.read_bytes_not_inlined(until);
             if received <= 0 {
-                return self.receive_no_more_apart(received);
+                return self.receive_no_more_not_inlined(received);
             }
             taken += received as u16;
         }
         Status::OK
     }
 
-    /// The length of the request that has begun to arrive.
+    /// The length of the PDU whose first bytes have been received.
     fn length(&mut self, code: u8) -> Length {
         let function = self.storage.rule(code).map(|rule| Function {
             code,
@@ -277,16 +282,16 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         end + 2
     }
 
-    /// Byte by byte, for a colon begins a frame wherever it stands, and what
-    /// follows a frame belongs to the next.
+    /// Receives an ASCII frame. Reads byte by byte, because each colon begins a new frame, and
+    /// the bytes after a frame belong to the next frame.
     fn receive_ascii(&mut self) -> Status {
-        for _ in 0..MOST_BYTES {
+        for _ in 0..MAX_BYTES_PER_POLL {
             let end = usize::from(self.end);
             if end == self.storage.capacity() {
                 self.request.overrun = true;
                 return self.found(0);
             }
-            let received = self.read_bytes_apart(end + 1);
+            let received = self.read_bytes_not_inlined(end + 1);
             if received < 0 {
                 return Status::LINK_LOST;
             }
@@ -303,17 +308,17 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             } else {
                 self.storage.byte(end - 1)
             };
-            match ascii::mark(before, last, delimiter) {
-                Mark::Start => {
+            match ascii::kind_of(before, last, delimiter) {
+                CharacterKind::Start => {
                     self.storage.part(0, 1).fill(last);
                     self.end = 1;
                 }
-                Mark::Inside if end == 0 => self.end = 0,
-                Mark::Inside => {}
-                Mark::End => {
+                CharacterKind::Inside if end == 0 => self.end = 0,
+                CharacterKind::Inside => {}
+                CharacterKind::End => {
                     let frame = self.storage.part(0, end + 1);
                     let length = match ascii::decode(frame, delimiter, true) {
-                        Content::Right(content) => content - 1,
+                        Decoded::Valid(content) => content - 1,
                         _ => 0,
                     };
                     return self.found(length.into());
@@ -327,7 +332,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         let delimiter = self.delimiter;
         let frame = self.storage.frame();
         let unit = frame.first().copied().unwrap_or(0);
-        // Sub-function 03 of 08 holds for the messages behind it.
+        // Sub-function 03 of function 08 changes the end character, from this response on.
         if let Some(&[_, 0x08, 0, 3, character, 0]) = frame.first_chunk() {
             self.delimiter = character;
         }
@@ -335,62 +340,63 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         ascii::emit(frame, unit, delimiter, |_| Ok(length)).unwrap_or(0)
     }
 
-    /// Never more than one frame is taken from the stream, so that its response
-    /// has the whole buffer; but for a few bytes behind a very short one.
+    /// Receives a TCP frame. Reads only one frame from the stream, so that its response can use
+    /// the whole buffer. After a very short frame, a few bytes of the next frame may be read
+    /// too; see [`Server::keep_read_ahead`].
     fn receive_tcp(&mut self) -> Status {
-        self.receive_on()
+        self.continue_receive()
     }
 
-    /// As [`Server::receive_tcp`], where nothing has arrived yet: takes at once what most
-    /// requests have. For hosts.
+    /// As [`Server::receive_tcp`], if the buffer is empty: reads the length of most requests at
+    /// once. For hosts.
     #[inline(always)]
-    pub(super) fn receive_at_once(&mut self) -> Status {
-        let Some(front) = self.storage.frame().first_chunk_mut::<AT_ONCE>() else {
-            return self.receive_on();
+    pub(super) fn receive_first(&mut self) -> Status {
+        let Some(front) = self.storage.frame().first_chunk_mut::<FIRST_READ>() else {
+            return self.continue_receive();
         };
         let received = self.port.read(front);
-        if received != AT_ONCE as i16 {
-            return self.received_less(received);
+        if received != FIRST_READ as i16 {
+            return self.received_fewer(received);
         }
-        self.end = AT_ONCE as u16;
+        self.end = FIRST_READ as u16;
         match tcp::header(front) {
-            Ok(header) if header.total == AT_ONCE => {
-                self.found_for(header.unit, (AT_ONCE - tcp::PDU) as u16)
+            Ok(header) if header.total == FIRST_READ => {
+                self.found_for(header.unit, (FIRST_READ - tcp::PDU) as u16)
             }
-            Ok(header) if header.total > AT_ONCE => self.receive_rest(header.total, header.unit),
-            _ => self.receive_on(),
+            Ok(header) if header.total > FIRST_READ => self.receive_rest(header.total, header.unit),
+            _ => self.continue_receive(),
         }
     }
 
-    /// Less than what most requests have has arrived, or nothing.
+    /// Continues after the port returned fewer bytes than most requests have, or none.
     #[inline(never)]
-    fn received_less(&mut self, received: i16) -> Status {
+    fn received_fewer(&mut self, received: i16) -> Status {
         if received <= 0 {
-            return nothing_heard(received);
+            return no_byte_status(received);
         }
         self.end = received as u16;
-        self.receive_on()
+        self.continue_receive()
     }
 
-    /// Takes what is left of a frame of `total` bytes.
+    /// Reads the rest of a frame of `total` bytes.
     #[inline(never)]
     fn receive_rest(&mut self, total: usize, unit: u8) -> Status {
-        let received = self.take(total);
+        let received = self.read_stream(total);
         if usize::from(self.end) == total {
             return self.found_for(unit, (total - tcp::PDU) as u16);
         }
         if received > 0 {
-            return self.receive_on();
+            return self.continue_receive();
         }
-        nothing_heard(received)
+        no_byte_status(received)
     }
 
-    /// Goes on with what begins in the buffer.
+    /// Receives the rest of the frame whose first bytes are in the buffer.
     #[cfg_attr(not(target_os = "none"), inline(never))]
-    fn receive_on(&mut self) -> Status {
+    fn continue_receive(&mut self) -> Status {
         loop {
             let end = usize::from(self.end);
-            let mut until = AT_ONCE;
+            let mut until = FIRST_READ;
             let frame = self.storage.frame();
             match tcp::header(frame.get(..end).unwrap_or_default()) {
                 Ok(header) => until = header.total,
@@ -401,47 +407,47 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
                 return self.found_in_stream(until);
             }
             let received = if FIRMWARE {
-                self.read_bytes_apart(until)
+                self.read_bytes_not_inlined(until)
             } else {
-                self.take(until)
+                self.read_stream(until)
             };
             if received <= 0 {
-                return nothing_heard(received);
+                return no_byte_status(received);
             }
         }
     }
 
-    /// The first frame of what arrived is of this length.
+    /// Handles a complete frame of `length` bytes at the front of the buffer.
     #[inline(always)]
     fn found_in_stream(&mut self, length: usize) -> Status {
         let end = usize::from(self.end);
-        if AT_ONCE > LEAST_TCP && end != length {
+        if FIRST_READ > MIN_TCP && end != length {
             self.keep_read_ahead(length);
         }
         self.found(length - tcp::PDU)
     }
 
-    /// Puts aside what stands behind a frame that is shorter than what is taken
-    /// at once.
+    /// Stores the bytes after a frame that is shorter than [`FIRST_READ`]. They belong to the next
+    /// frame. They are stored in `last_byte`, which TCP does not use as a time.
     #[cold]
     fn keep_read_ahead(&mut self, length: usize) {
         let end = usize::from(self.end);
-        let behind = self.storage.frame().get(length..end).unwrap_or_default();
-        let mut aside = [0; 4];
-        for (place, byte) in aside.iter_mut().zip(behind) {
+        let following = self.storage.frame().get(length..end).unwrap_or_default();
+        let mut stored = [0; 4];
+        for (place, byte) in stored.iter_mut().zip(following) {
             *place = *byte;
         }
-        self.last_byte = u32::from_ne_bytes(aside);
-        self.read_ahead = behind.len() as u8;
+        self.last_byte = u32::from_ne_bytes(stored);
+        self.read_ahead = following.len() as u8;
     }
 
-    /// Begins the next frame with what was put aside.
+    /// Begins the next frame with the bytes that [`Server::keep_read_ahead`] stored.
     #[cold]
     pub(super) fn use_read_ahead(&mut self) {
-        let aside = self.last_byte.to_ne_bytes();
+        let stored = self.last_byte.to_ne_bytes();
         let count = core::mem::take(&mut self.read_ahead);
-        let aside = aside.get(..count.into()).unwrap_or_default();
-        for (place, byte) in self.storage.frame().iter_mut().zip(aside) {
+        let stored = stored.get(..count.into()).unwrap_or_default();
+        for (place, byte) in self.storage.frame().iter_mut().zip(stored) {
             *place = *byte;
         }
         self.end = count.into();

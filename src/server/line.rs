@@ -1,8 +1,8 @@
-//! A server on one line or connection, moved on by `poll`.
+//! A server on one line or connection. The program calls its `poll`.
 //!
-//! It finds a request, hands its PDU out, takes the reply and sends it. So no reference to it
-//! need live while a request is carried out. A framing is two functions kept in the object, so
-//! that firmware carries those it begins with.
+//! The server finds a request and gives its PDU to the program. The program carries the request
+//! out without a reference to the server, and passes the reply back. Then the server sends it. A
+//! framing is two function pointers, so firmware contains only the framings that it begins with.
 
 use super::info::STREAM;
 use super::{Reply, RequestInfo, Units};
@@ -16,42 +16,42 @@ use crate::port::Port;
 use crate::time::{self, elapsed};
 use crate::FIRMWARE;
 
-/// How soon to look again at what only the port or a service can bring on.
-const NOT_BY_ITSELF: u32 = time::millis(1);
+/// Time until the next poll if only the port or a service can bring progress.
+const EXTERNAL_POLL_DELAY: u32 = time::millis(1);
 
-/// Requests that one poll takes at most of which none is answered: a peer that floods
-/// with those of others holds nobody up.
+/// Most requests without a response that one call of [`Server::serve`] handles. So a flood of
+/// requests to other units does not block the program.
 pub const MOST_REQUESTS: u8 = 16;
 
-/// What the caller lends to a server.
+/// The storage that the caller supplies for a server.
 pub trait ServerStorage {
-    /// The storage of one frame: a request first, then its response.
+    /// The frame buffer. It holds a request, then its response.
     fn frame(&mut self) -> &mut [u8];
 
-    /// How many bytes that storage has.
+    /// Size of the frame buffer in bytes.
     fn capacity(&mut self) -> usize {
         self.frame().len()
     }
 
-    /// The bytes of that storage from `start` to `end`, both of which lie in it, the first
-    /// not behind the second.
+    /// The bytes of the frame buffer from `start` to `end`. Callers ensure that `start` is not
+    /// after `end`, and that `end` is not after the end of the buffer.
     fn part(&mut self, start: usize, end: usize) -> &mut [u8] {
         self.frame().get_mut(start..end).unwrap_or_default()
     }
 
-    /// The byte at a place of that storage.
+    /// The byte of the frame buffer at index `place`.
     fn byte(&mut self, place: usize) -> u8 {
         self.part(place, place + 1).first().copied().unwrap_or(0)
     }
 
-    /// Moves the bytes of that storage from `start` to `end` to its front; the places are
-    /// as for [`ServerStorage::part`].
+    /// Moves the bytes of the frame buffer from `start` to `end` to its front. The indexes are as
+    /// for [`ServerStorage::part`].
     fn keep(&mut self, start: usize, end: usize) {
         move_to_front(self.part(0, end), start);
     }
 
-    /// How long the requests of a user's function are, for framings without
-    /// silence.
+    /// The length rule for requests of a user-defined function. Framings without silence need
+    /// it.
     fn rule(&self, function: u8) -> Option<Rule> {
         let _ = function;
         None
@@ -70,48 +70,49 @@ impl<const N: usize> ServerStorage for [u8; N] {
     }
 }
 
-/// Where a server stands.
+/// The phase of a server.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
-enum Phase {
-    /// Waiting for a request.
+enum ServerPhase {
+    /// The server waits for a request.
     Listen,
-    /// A request is there, to be answered.
+    /// A request was found. The server waits for its reply.
     Request,
-    /// Handing the response to the port, and waiting for the port to drain; the
-    /// driver is on.
+    /// The port sends the response. The driver of the line is enabled.
     Send,
 }
 
-/// Looks for a request in what arrives: [`Status::PENDING`] once there is one,
-/// with its PDU behind the head and its length noted.
+/// Looks for a request in the received bytes. Returns [`Status::PENDING`] if there is one. Its PDU
+/// is then in the buffer at index `request.head`, and its length is `request.length`.
 pub(super) type Receive<P, B> = fn(&mut Server<P, B>) -> Status;
 
-/// Makes a frame of the response PDU of so many bytes; returns its length.
+/// Turns the response PDU in the buffer, of this length, into a frame. Returns its length.
 pub(super) type EncodeAdu<P, B> = fn(&mut Server<P, B>, usize) -> usize;
 
 /// A server on one line or connection.
-// In this order, small fields first: see `Transaction`.
+// The small fields come first: see `Transaction`.
 #[repr(C)]
 pub struct Server<P, B> {
-    phase: Phase,
-    /// What arrives is no frame that tells its length; of an echo, that it is waited for.
+    phase: ServerPhase,
+    /// In a stream of RTU frames: the received bytes are not a frame of known length. With echo
+    /// discard: the wait for the echo has begun.
     pub(super) resyncing: bool,
-    /// Ends an ASCII frame.
+    /// The end character of ASCII frames.
     pub(super) delimiter: u8,
-    /// Over TCP: how many bytes of `last_byte` are the front of the next frame.
+    /// Over TCP: how many bytes of the next frame are stored in `last_byte`.
     pub(super) read_ahead: u8,
-    /// The CRC of what arrived.
+    /// The CRC of the received bytes.
     pub(super) crc: Crc16,
-    /// Where in the buffer ends what arrived, or what is to be sent.
+    /// Index in the buffer after the received bytes, or after the response to send.
     pub(super) end: u16,
-    /// What of the response was sent; of that, what may still come back.
+    /// How many bytes of the response were sent; with echo discard, then how many of them may
+    /// still come back.
     pub(super) sent: u16,
     /// The request that was found last.
     pub request: RequestInfo,
-    /// When the last byte arrived; see [`Server::keeps_time`].
+    /// Time at which the last byte arrived; see [`Server::keeps_time`].
     pub(super) last_byte: u32,
-    /// What the caller lends.
+    /// The storage that the caller supplies.
     pub storage: B,
     pub(super) now: u32,
     /// The silence that ends a frame.
@@ -126,7 +127,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// A server that has no framing yet.
     pub const fn new(port: P, storage: B) -> Self {
         Server {
-            phase: Phase::Listen,
+            phase: ServerPhase::Listen,
             resyncing: false,
             delimiter: ascii::END,
             read_ahead: 0,
@@ -144,7 +145,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         }
     }
 
-    /// A server of this framing.
+    /// A server that has begun with this framing.
     pub fn with_framing(framing: Framing, port: P, storage: B) -> Self {
         let mut server = Server::new(port, storage);
         match framing {
@@ -156,7 +157,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         server
     }
 
-    /// Begins to listen: drops what was under way.
+    /// Sets the framing and waits for a request. A request in progress is dropped.
     #[inline(always)]
     pub(super) fn begin(
         &mut self,
@@ -176,10 +177,10 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.listen();
     }
 
-    /// True while a response is leaving, with the driver on.
+    /// True while the server sends a response, with the driver of the line enabled.
     #[inline(always)]
     pub fn is_sending(&self) -> bool {
-        self.phase == Phase::Send
+        self.phase == ServerPhase::Send
     }
 
     /// Sets the silence that ends a frame, in microseconds: t3.5 for RTU, the
@@ -192,7 +193,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(super) fn listen(&mut self) {
-        self.phase = Phase::Listen;
+        self.phase = ServerPhase::Listen;
         self.end = 0;
         self.request.overrun = false;
         self.resyncing = false;
@@ -202,22 +203,22 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         }
     }
 
-    /// True once it was begun.
+    /// True if the server has begun with a framing.
     #[inline(always)]
     pub fn has_framing(&self) -> bool {
         self.receive.is_some() && self.encode_adu.is_some()
     }
 
-    /// False if [`Server::poll`] may be told any time: over TCP nothing hangs on it.
+    /// True if [`Server::poll`] needs the right time. Over TCP any time will do.
     #[inline(always)]
     pub fn keeps_time(&self) -> bool {
         usize::from(self.request.head) != tcp::PDU
     }
 
-    /// Moves the server on to the time `now`, without waiting:
-    /// [`Status::PENDING`] if there is a request to be answered,
-    /// [`Status::LINK_LOST`], [`Status::MALFORMED_FRAME`] if the stream is none
-    /// of Modbus TCP, else [`Status::OK`].
+    /// Receives and sends as far as is possible at the time `now` (microseconds) without waiting.
+    /// Returns [`Status::PENDING`] if a request waits for its reply; [`Status::LINK_LOST`];
+    /// [`Status::MALFORMED_FRAME`] if the stream is not Modbus TCP;
+    /// [`Status::NOT_INITIALISED`] without a framing; otherwise [`Status::OK`].
     #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn poll(&mut self, now: u32) -> Status {
         match self.look(now) {
@@ -226,43 +227,43 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         }
     }
 
-    /// The first half of [`Server::poll`], which looks for a request.
+    /// The first half of [`Server::poll`]: looks for a request.
     #[inline(always)]
     pub fn look(&mut self, now: u32) -> Status {
         self.now = now;
         match self.phase {
-            Phase::Listen if !FIRMWARE && !self.keeps_time() && self.end == 0 => {
-                self.receive_at_once()
+            ServerPhase::Listen if !FIRMWARE && !self.keeps_time() && self.end == 0 => {
+                self.receive_first()
             }
-            Phase::Listen => match self.receive {
+            ServerPhase::Listen => match self.receive {
                 Some(receive) => receive(self),
                 None => Status::NOT_INITIALISED,
             },
-            Phase::Request => Status::PENDING,
-            Phase::Send => Status::OK,
+            ServerPhase::Request => Status::PENDING,
+            ServerPhase::Send => Status::OK,
         }
     }
 
-    /// The second half of [`Server::poll`], which sends what there is.
+    /// The second half of [`Server::poll`]: sends the response, if there is one.
     #[inline(always)]
     pub fn go_on(&mut self) -> Status {
-        if self.phase == Phase::Send {
+        if self.phase == ServerPhase::Send {
             self.send()
         } else {
             Status::OK
         }
     }
 
-    /// Nothing more is to be expected of this stream.
+    /// Gives the stream up: from now on each poll returns [`Status::MALFORMED_FRAME`].
     pub(super) fn fail_stream(&mut self) -> Status {
         self.receive = Some(|_| Status::MALFORMED_FRAME);
         Status::MALFORMED_FRAME
     }
 
-    /// Receives behind what has arrived, up to the place `until` of the buffer or to its
-    /// end, into the CRC too: how many bytes, negative if the link is lost. A full buffer
-    /// takes one byte and gives up its oldest for it, once there is one: one that is full
-    /// and silent may hold a frame.
+    /// Reads bytes into the buffer after the received bytes, up to the index `until` or to the end
+    /// of the buffer, and updates the CRC. Returns how many, or a negative number if the link is
+    /// lost. If the buffer is full, reads one byte and drops the oldest bytes for it. They are
+    /// dropped only once such a byte arrives, because the full buffer may hold a frame.
     #[cfg_attr(target_os = "none", inline(always))]
     pub(super) fn read_bytes(&mut self, until: usize) -> i16 {
         let capacity = self.storage.capacity();
@@ -275,12 +276,12 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         if received > 0 {
             self.last_byte = self.now;
             if start != end {
-                start = self.slide();
+                start = self.drop_oldest();
             }
             end = start + received as usize;
             self.end = end as u16;
-            // A microcontroller takes the CRC of bytes that need none, too: that is
-            // less code, and one framing is all it has.
+            // Firmware computes the CRC for framings without a CRC too. That is less code, and
+            // firmware usually has one framing only.
             if FIRMWARE || usize::from(self.request.head) == rtu::PDU {
                 self.crc = self.crc.with(self.storage.part(start, end));
             }
@@ -288,15 +289,15 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         received
     }
 
-    /// As [`Server::read_bytes`], for all framings but the most common, which has it in line.
+    /// As [`Server::read_bytes`], for the framings other than RTU. It is not inlined.
     #[inline(never)]
-    pub(super) fn read_bytes_apart(&mut self, until: usize) -> i16 {
+    pub(super) fn read_bytes_not_inlined(&mut self, until: usize) -> i16 {
         self.read_bytes(until)
     }
 
-    /// As [`Server::read_bytes`], without CRC and time.
+    /// As [`Server::read_bytes`], but without CRC and time, and without dropping bytes.
     #[inline(always)]
-    pub(super) fn take(&mut self, until: usize) -> i16 {
+    pub(super) fn read_stream(&mut self, until: usize) -> i16 {
         let frame = self.storage.frame();
         let until = until.min(frame.len());
         let Some(space) = frame.get_mut(usize::from(self.end)..until) else {
@@ -312,42 +313,41 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         received
     }
 
-    /// True once the line has been silent for as long as ends a frame.
+    /// True if the line has been silent for long enough to end a frame.
     pub(super) fn is_silent(&self) -> bool {
         time::has_elapsed(self.silence, self.now, self.last_byte)
     }
 
-    /// How long, in microseconds from `now`, poll will find nothing to do unless
-    /// a byte arrives. While a service is not done, or a stream does not take the
-    /// response, 1000: to go on sooner, poll when that has changed.
+    /// Microseconds from `now` for which poll has nothing to do unless a byte arrives. It is 1000
+    /// while a service is not finished, or while a stream accepts no bytes of the response: poll
+    /// earlier if that changes.
     pub fn poll_delay(&self, now: u32) -> u32 {
         match self.phase {
-            Phase::Listen if self.end == 0 || !self.keeps_time() => u32::MAX,
-            Phase::Listen => self.silence.saturating_sub(elapsed(now, self.last_byte)),
-            // On a line no byte and no driver may be late.
-            Phase::Send if self.request.is_serial() => 0,
-            _ => NOT_BY_ITSELF,
+            ServerPhase::Listen if self.end == 0 || !self.keeps_time() => u32::MAX,
+            ServerPhase::Listen => self.silence.saturating_sub(elapsed(now, self.last_byte)),
+            // On a serial line, neither the next byte nor switching off the driver may be late.
+            ServerPhase::Send if self.request.is_serial() => 0,
+            _ => EXTERNAL_POLL_DELAY,
         }
     }
 
-    /// Says that a request was found whose PDU has so many bytes; 0 for a frame
-    /// that arrived damaged.
+    /// Stores that a request was found, with a PDU of `length` bytes; 0 if it is damaged.
     pub(super) fn found(&mut self, length: usize) -> Status {
         let unit = self.storage.byte(usize::from(self.request.head) - 1);
         self.found_for(unit, if length > MAX_PDU { 0 } else { length as u16 })
     }
 
-    /// As [`Server::found`], for this unit, with a length that a PDU has.
+    /// As [`Server::found`], with the unit id, and a length that is valid for a PDU.
     #[inline(always)]
     pub(super) fn found_for(&mut self, unit: u8, length: u16) -> Status {
         self.request.to = unit;
         self.request.length = length;
         self.request.again = false;
-        self.phase = Phase::Request;
+        self.phase = ServerPhase::Request;
         Status::PENDING
     }
 
-    /// The request's PDU and the room behind it, which the response may take.
+    /// The PDU of the request, with the space after it that the response may fill.
     pub fn pdu(&mut self) -> &mut [u8] {
         let head = usize::from(self.request.head);
         let space = usize::from(self.request.space);
@@ -357,7 +357,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             .unwrap_or_default()
     }
 
-    /// As [`Server::poll`], with requests served by `units` and answered.
+    /// As [`Server::poll`], but `units` serve the requests, and their replies are sent.
     pub fn serve(&mut self, now: u32, units: &mut (impl Units + ?Sized)) -> Status {
         for _ in 0..MOST_REQUESTS {
             let status = self.poll(now);
@@ -373,13 +373,13 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         Status::OK
     }
 
-    /// Takes the reply to the request: a response stands where its PDU stood.
-    /// False, with the request kept, for [`Reply::PENDING`].
+    /// Takes the reply to the request. The PDU of a response has overwritten that of the request.
+    /// For [`Reply::PENDING`] the server keeps the request and returns false.
     pub fn answer(&mut self, reply: Reply) -> bool {
         self.answer_served(reply.or_illegal())
     }
 
-    /// As [`Server::answer`], to a request that was served.
+    /// As [`Server::answer`], for a request that a service has served.
     #[cfg_attr(target_os = "none", inline(always))]
     pub fn answer_served(&mut self, reply: Reply) -> bool {
         if reply == Reply::PENDING {
@@ -392,7 +392,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             Some(encode_adu) if length != 0 => {
                 self.end = encode_adu(self, length) as u16;
                 self.sent = 0;
-                self.phase = Phase::Send;
+                self.phase = ServerPhase::Send;
                 self.port.pre_transmission();
             }
             _ => self.listen(),
@@ -400,8 +400,8 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         true
     }
 
-    /// As [`Server::answer`], and what to return, unless [`Server::poll`] is to go
-    /// on: it sends, or looks for the next request.
+    /// As [`Server::answer`]. Returns the status that poll returns then, or `None` if poll has to
+    /// continue: it sends the response, or looks for the next request.
     #[inline(always)]
     pub fn finish(&mut self, reply: Reply) -> Option<Status> {
         if !FIRMWARE {
@@ -414,14 +414,14 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         }
     }
 
-    /// As [`Server::finish`], and sends what it can, for a host, which saves a turn
-    /// of [`Server::poll`].
+    /// As [`Server::finish`], and sends as much as the port accepts. For hosts: it saves a call of
+    /// [`Server::poll`].
     #[inline(always)]
     pub(crate) fn answer_at_once(&mut self, reply: Reply) -> Option<Status> {
         let mut length = reply.response_length();
         if length == 0 {
             length = match reply.exception_code() {
-                0 if reply != Reply::NOT_HANDLED => return self.answer_nothing(reply),
+                0 if reply != Reply::NOT_HANDLED => return self.send_nothing(reply),
                 _ => self.write_exception(reply),
             };
         }
@@ -437,27 +437,27 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         };
         let sent = self.port.write(self.storage.part(0, end));
         if usize::from(sent as u16) != end || !self.port.flush() {
-            return Some(self.sent_some(end, sent));
+            return Some(self.sent_partly(end, sent));
         }
         self.end_transmission();
         Some(Status::OK)
     }
 
-    /// The port took so many of the bytes of a response at once, or is lost.
+    /// Handles a port that has not sent the whole response yet, or whose link is lost.
     #[cold]
-    fn sent_some(&mut self, end: usize, sent: i16) -> Status {
+    fn sent_partly(&mut self, end: usize, sent: i16) -> Status {
         self.end = end as u16;
         self.sent = sent.max(0) as u16;
         if sent < 0 {
             self.end_transmission();
             return Status::LINK_LOST;
         }
-        self.phase = Phase::Send;
+        self.phase = ServerPhase::Send;
         Status::OK
     }
 
     #[cold]
-    fn answer_nothing(&mut self, reply: Reply) -> Option<Status> {
+    fn send_nothing(&mut self, reply: Reply) -> Option<Status> {
         if self.answer(reply) {
             None
         } else {

@@ -1,4 +1,4 @@
-//! The responder: a frame in, a frame out, and no state between.
+//! The responder: turns a request frame into a response frame. It keeps no state.
 
 use super::framing::{ascii_space, rtu_space, tcp_space};
 use super::info::{SERIAL, STREAM};
@@ -7,15 +7,16 @@ use crate::error::Status;
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::limits::MAX_PDU;
 
-/// Takes the request frame in the front `length` bytes of `buffer`, has `units`
-/// serve it, and writes the response frame over it, normal or exception. Returns
-/// its length; 0, where there is to be none: for a frame that is damaged or not
-/// whole, for another unit, broadcast, or in listen only mode. An ASCII frame
-/// ends with `delimiter`.
+/// Lets `units` serve the request frame in the first `length` bytes of `buffer`, and writes the
+/// response frame over it, with a normal or an exception response. Returns the length of the
+/// response frame. It is 0 if no response may be sent: the request frame is damaged or
+/// incomplete, is addressed to another unit or broadcast, or the unit is in listen only mode.
+/// `delimiter` is the end character of ASCII frames.
 ///
 /// # Errors
-/// [`Status::PENDING`] if a service is not done; the frame is as it was, but of
-/// ASCII its content alone is left, so it is to be put there anew.
+/// [`Status::PENDING`] if a service is not finished. The request frame is then unchanged, except
+/// for ASCII: its decoding has overwritten the frame. So put an ASCII frame into the buffer again
+/// before the next call.
 pub fn respond(
     framing: Framing,
     delimiter: u8,
@@ -46,7 +47,7 @@ pub fn respond(
     let Some(place) = buffer.get_mut(start..start + space) else {
         return Ok(0);
     };
-    // Room for the request is room for an exception.
+    // The space must hold the request, and at least the two bytes of an exception.
     if pdu > place.len().min(MAX_PDU) || place.len() < 2 {
         return Ok(0);
     }
@@ -58,7 +59,7 @@ pub fn respond(
     if written == 0 {
         return Ok(0);
     }
-    // Services rely on the room that a server's smallest buffer has.
+    // A service may write a longer response, because it relies on the smallest buffer of a server.
     if written > place.len() {
         written = Reply::SERVER_DEVICE_FAILURE.write_exception(place);
     }
@@ -66,5 +67,5 @@ pub fn respond(
     framing.emit(buffer, transaction, unit, delimiter, |_| Ok(written))
 }
 
-/// The end character of ASCII frames, until it is changed.
+/// The default end character of ASCII frames.
 pub const DELIMITER: u8 = ascii::END;

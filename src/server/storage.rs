@@ -1,4 +1,4 @@
-//! The four tables as services, over cells of the program or over arrays.
+//! The four tables as services. Their data are in arrays, or in a data model of the program.
 
 use super::table::{self, DataModel, Direction, TableKind};
 use super::{Reply, Service};
@@ -49,12 +49,13 @@ pub type Before<'a> = &'a mut dyn FnMut(u16, u16, &[u8]) -> u8;
 pub type After<'a> = &'a mut dyn FnMut(u16, u16);
 
 /// Registers in an array.
-pub struct Words<'a> {
+pub struct RegisterArray<'a> {
     /// The registers.
     pub words: &'a mut [u16],
-    /// The address of the first.
+    /// Address of the first register.
     pub base: u16,
-    /// A bit for each, lowest first: 0 is not there. All are there without.
+    /// One bit for each register, lowest bit first: 0 means that the register does not exist.
+    /// `None` if all registers exist.
     pub valid: Option<&'a [u8]>,
     /// Called before a write.
     pub before: Option<Before<'a>>,
@@ -62,15 +63,15 @@ pub struct Words<'a> {
     pub after: Option<After<'a>>,
 }
 
-/// Bits in an array, eight to a byte, lowest first.
-pub struct Bits<'a> {
+/// BitArray in an array, eight to a byte, lowest first.
+pub struct BitArray<'a> {
     /// The bits.
     pub bits: &'a mut [u8],
-    /// The address of the first.
+    /// Address of the first bit.
     pub base: u16,
-    /// How many there are; no more than the array holds.
+    /// Number of bits; at most as many as the array holds.
     pub size: u16,
-    /// As in [`Words`].
+    /// One bit for each bit, as in [`RegisterArray`].
     pub valid: Option<&'a [u8]>,
     /// Called before a write.
     pub before: Option<Before<'a>>,
@@ -78,10 +79,10 @@ pub struct Bits<'a> {
     pub after: Option<After<'a>>,
 }
 
-impl<'a> Words<'a> {
-    /// Registers from `base` on, all of them there, without hooks.
+impl<'a> RegisterArray<'a> {
+    /// Registers from address `base` on, without gaps and without hooks.
     pub fn new(base: u16, words: &'a mut [u16]) -> Self {
-        Words {
+        RegisterArray {
             words,
             base,
             valid: None,
@@ -91,11 +92,11 @@ impl<'a> Words<'a> {
     }
 }
 
-impl<'a> Bits<'a> {
-    /// As many bits from `base` on as the array holds, without hooks.
+impl<'a> BitArray<'a> {
+    /// Bits from address `base` on, as many as the array holds, without gaps and without hooks.
     pub fn new(base: u16, bits: &'a mut [u8]) -> Self {
         let size = u16::try_from(bits.len() * 8).unwrap_or(u16::MAX);
-        Bits {
+        BitArray {
             bits,
             base,
             size,
@@ -111,8 +112,8 @@ fn bit(map: &[u8], index: usize) -> bool {
         .is_some_and(|byte| byte >> (index % 8) & 1 != 0)
 }
 
-/// Where cells stand in an array whose first has the address `base`; `None` unless all of
-/// them are among its `size`, and `valid` says so.
+/// The indexes of `quantity` cells from `address` on, in an array of `size` cells whose first has
+/// the address `base`. `None` unless all of them are in the array, and exist by `valid`.
 fn places(
     base: u16,
     size: usize,
@@ -120,15 +121,15 @@ fn places(
     address: u16,
     quantity: u16,
 ) -> Option<Range<usize>> {
-    // No address is beyond 65535.
+    // The last address must not exceed 65535.
     address.checked_add(quantity.checked_sub(1)?)?;
     let first = usize::from(address.checked_sub(base)?);
     let last = first.checked_add(quantity.into())?;
-    let is_there = |cell| valid.is_none_or(|valid| bit(valid, cell));
-    (last <= size && (first..last).all(is_there)).then_some(first..last)
+    let exists = |cell| valid.is_none_or(|valid| bit(valid, cell));
+    (last <= size && (first..last).all(exists)).then_some(first..last)
 }
 
-impl DataModel for Words<'_> {
+impl DataModel for RegisterArray<'_> {
     fn contains(&self, address: u16, quantity: u16) -> bool {
         let size = self.words.len();
         places(self.base, size, self.valid, address, quantity).is_some()
@@ -157,7 +158,7 @@ impl DataModel for Words<'_> {
     }
 }
 
-impl DataModel for Bits<'_> {
+impl DataModel for BitArray<'_> {
     fn contains(&self, address: u16, quantity: u16) -> bool {
         let size = usize::from(self.size).min(self.bits.len().saturating_mul(8));
         places(self.base, size, self.valid, address, quantity).is_some()

@@ -1,60 +1,63 @@
-//! Units: for whom a request is, and who serves it.
+//! Units: find the unit that a request is addressed to, and let its services serve it.
 
 use super::diagnostics::Diagnostics;
 use super::{Addressing, Reply, RequestInfo};
 
-/// A family of functions.
+/// A service: one family of functions.
 pub trait Service {
-    /// Serves a request, if it is one of this family: its PDU is the front
-    /// `length` bytes of `pdu`. A response overwrites it.
+    /// Serves a request whose function belongs to this family. The PDU of the request is the
+    /// first `length` bytes of `pdu`; the PDU of the response overwrites it. Returns
+    /// [`Reply::NOT_HANDLED`] for any other function.
     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply;
 }
 
-/// What serves the frames of a line.
+/// The units that serve the frames of a line.
 pub trait Units {
-    /// Serves a frame, whosoever it is. Its PDU is at the front of `pdu`.
+    /// Serves a frame, whichever unit it is addressed to. Its PDU is at the front of `pdu`.
     fn serve(&mut self, info: &RequestInfo, pdu: &mut [u8]) -> Reply;
 }
 
-/// One unit: its id and what it serves.
+/// One unit: its id and its services.
 pub struct Unit<'a> {
-    /// 1 to 247; 0, in a stream, is any.
+    /// The unit id, 1 to 247; 0 in a stream responds to every id.
     pub id: u8,
-    /// What it serves; the first that does serves a function.
+    /// The services, in this order: the first one that handles a function serves it.
     pub services: &'a mut [&'a mut dyn Service],
-    /// What it knows of the line: serves 08, 0B and 0C.
+    /// The counters of the line, if any: serve functions 08, 0B and 0C.
     pub diagnostics: Option<&'a mut Diagnostics>,
 }
 
-/// The units of a server, one after the other, as [`dispatch`] asks them about one frame.
+/// The units of a server, as [`dispatch`] offers them one frame, one unit after the other.
 pub trait Dispatch {
     /// A unit.
     type Unit;
 
-    /// The next unit; one that has no part in a frame that is this to all may be left out.
+    /// The next unit. `all` is how the frame addresses units; a unit that such a frame does not
+    /// concern may be left out.
     fn next(&mut self, all: Addressing) -> Option<Self::Unit>;
 
-    /// True if a frame that is no broadcast is for this unit.
+    /// True if a frame that is no broadcast is addressed to this unit.
     fn is_for(&self, unit: &Self::Unit) -> bool;
 
-    /// Has a unit serve the frame, or take notice of it, as far as it concerns the unit;
-    /// `None` if the frame is another's, and the unit takes no notice.
-    fn ask(&mut self, unit: Self::Unit, addressing: Addressing) -> Option<Reply>;
+    /// Lets a unit serve the frame, or only count it, as `addressing` demands. `None` if the frame
+    /// is addressed to another unit, and this unit does not count such frames.
+    fn offer(&mut self, unit: Self::Unit, addressing: Addressing) -> Option<Reply>;
 }
 
-/// Asks the units about a frame that is `all` to those that it is for: the first of them
-/// answers, the others take notice. The reply of that unit, [`Reply::NO_RESPONSE`] without one.
+/// Offers a frame to all units; `all` is how it addresses the units that its id names. Returns
+/// the reply of the first such unit; the other units only count the frame. Returns
+/// [`Reply::NO_RESPONSE`] if there is no such unit, and for a broadcast, which every unit serves.
 #[inline(always)]
 pub fn dispatch(units: &mut impl Dispatch, mut all: Addressing) -> Reply {
     let mut answer = Reply::NO_RESPONSE;
     while let Some(unit) = units.next(all) {
-        // In this order: it is 12 bytes less on an AVR, in the row of a server of four tables.
+        // In this order, a server of four tables takes 12 bytes less on an AVR.
         let is_for = units.is_for(&unit);
         let mut addressing = all.to_others();
         if is_for {
             addressing = all;
         }
-        let Some(reply) = units.ask(unit, addressing) else {
+        let Some(reply) = units.offer(unit, addressing) else {
             continue;
         };
         if addressing == Addressing::OWN {
@@ -65,8 +68,8 @@ pub fn dispatch(units: &mut impl Dispatch, mut all: Addressing) -> Reply {
     answer
 }
 
-/// What services reply one after the other: the first reply of one that serves the
-/// function, [`Reply::ILLEGAL_FUNCTION`] without one.
+/// The first of `replies` that is not [`Reply::NOT_HANDLED`]; [`Reply::ILLEGAL_FUNCTION`] if there
+/// is none. `replies` calls the services one after the other.
 #[inline(always)]
 pub fn first_reply(replies: impl IntoIterator<Item = Reply>) -> Reply {
     for reply in replies {
@@ -84,7 +87,7 @@ impl Service for Diagnostics {
 }
 
 impl Unit<'_> {
-    fn walk(&mut self, pdu: &mut [u8], length: usize) -> Reply {
+    fn serve_pdu(&mut self, pdu: &mut [u8], length: usize) -> Reply {
         let services = self.services.iter_mut().map(|service| &mut **service);
         let line = self.diagnostics.as_deref_mut();
         let line = line.map(|line| line as &mut dyn Service);
@@ -95,26 +98,26 @@ impl Unit<'_> {
         )
     }
 
-    /// Serves a frame, of which notice is taken.
+    /// Serves a frame that is addressed to this unit. Counts any frame in the diagnostics.
     fn serve(&mut self, info: &RequestInfo, addressing: Addressing, pdu: &mut [u8]) -> Reply {
         let length = usize::from(info.length);
         let function = pdu.first().copied().unwrap_or(0);
         let mut served = addressing != Addressing::FOREIGN;
         if let Some(line) = &mut self.diagnostics {
-            served = line.read_bytes(info, addressing, pdu.get(..length).unwrap_or_default());
+            served = line.count_frame(info, addressing, pdu.get(..length).unwrap_or_default());
         }
         if !served {
             return Reply::NO_RESPONSE;
         }
-        let reply = self.walk(pdu, length);
+        let reply = self.serve_pdu(pdu, length);
         if let (Some(line), true) = (&mut self.diagnostics, reply != Reply::PENDING) {
-            line.done(addressing, function, reply);
+            line.count_outcome(addressing, function, reply);
         }
         reply
     }
 }
 
-/// Units in a slice, and the frame that they are asked about.
+/// Units in a slice, and the frame that they are offered.
 struct Slice<'a, U> {
     units: U,
     info: &'a RequestInfo,
@@ -132,7 +135,7 @@ impl<'u, 'a: 'u, U: Iterator<Item = &'u mut Unit<'a>>> Dispatch for Slice<'_, U>
         self.info.is_for(unit.id)
     }
 
-    fn ask(&mut self, unit: Self::Unit, addressing: Addressing) -> Option<Reply> {
+    fn offer(&mut self, unit: Self::Unit, addressing: Addressing) -> Option<Reply> {
         Some(unit.serve(self.info, addressing, self.pdu))
     }
 }

@@ -16,7 +16,7 @@ impl Sniffer {
     pub(super) fn expire<'b>(&mut self, index: usize, now: u32) -> Event<'b> {
         let slot = self.requests.get(index);
         self.requests.set_state(index, State::Late);
-        self.calm_for = 0;
+        self.idle_for = 0;
         Event {
             kind: EventKind::Timeout,
             status: Status::RESPONSE_TIMED_OUT,
@@ -41,14 +41,14 @@ impl Sniffer {
         step: Step,
         now: u32,
     ) -> Event<'b> {
-        let is_early = self.is_early(now);
-        self.calm_for = 0;
+        let is_unchanged = self.is_unchanged(now);
+        self.idle_for = 0;
         let part: &'b [u8] = self.part(buffer, index);
         let timing = self.timing;
         let framing = self.framing;
         let (context, stream) = self.split(functions, index, now);
         match step {
-            Step::Junk {
+            Step::Noise {
                 length,
                 status,
                 more,
@@ -59,7 +59,7 @@ impl Sniffer {
                 let is_ended = stream.silences(stream.start).any(|at| at == end)
                     || (end == stream.end && stream.quiet(now) >= timing.silence);
                 let time = stream.time(end, &timing);
-                let event = junk(framing, &context, bytes, status, is_ended);
+                let event = noise(framing, &context, bytes, status, is_ended);
                 // The rest of a frame that is too long belongs to it.
                 let cut = stream.cut && !is_ended;
                 stream.consume(end);
@@ -74,21 +74,21 @@ impl Sniffer {
             Step::Frame {
                 total,
                 content,
-                right,
+                roles,
             } => {
                 let end = stream.at + total as u16;
                 let time = stream.time(end, &timing);
                 let bytes = part.get(stream.at.into()..).unwrap_or_default();
                 let bytes = bytes.get(..content).unwrap_or_default();
-                let told = self.frame(functions, bytes, right, time, is_early);
-                if told.kind == EventKind::Timeout {
+                let event = self.frame(functions, bytes, roles, time, is_unchanged);
+                if event.kind == EventKind::Timeout {
                     // The frame itself is the next event.
-                    return told;
+                    return event;
                 }
                 self.split(functions, index, now).1.consume(end);
                 Event {
                     length: total,
-                    ..told
+                    ..event
                 }
             }
         }
@@ -99,9 +99,9 @@ impl Sniffer {
         &mut self,
         functions: &[Function],
         frame: &'b [u8],
-        right: Option<(bool, bool)>,
+        roles: Option<(bool, bool)>,
         time: u32,
-        is_early: bool,
+        is_unchanged: bool,
     ) -> Event<'b> {
         let (transaction, unit, pdu) = content(self.framing, frame);
         let code = pdu.first().copied().unwrap_or_default();
@@ -118,11 +118,15 @@ impl Sniffer {
             length: frame.len(),
             asked: None,
         };
-        let Some((request, response)) = right else {
+        let Some((request, response)) = roles else {
             return event;
         };
         let request = request && code & EXCEPTION == 0;
-        let overdue = if is_early { None } else { self.overdue(time) };
+        let overdue = if is_unchanged {
+            None
+        } else {
+            self.overdue(time)
+        };
         if let Some(overdue) = overdue {
             return self.expire(overdue, time);
         }
@@ -194,7 +198,7 @@ fn answer(pdu: &[u8], functions: &[Function]) -> Status {
 
 /// Reports bytes without a frame. On an RTU line they are a damaged frame if they have the
 /// length of a frame, or if silence surrounds them and they begin like a frame.
-fn junk<'b>(
+fn noise<'b>(
     framing: Framing,
     context: &Context,
     bytes: &'b [u8],

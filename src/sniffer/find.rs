@@ -1,9 +1,9 @@
-//! Where a frame is, in each framing, without knowing who sends it.
+//! Finds frames of each framing without knowing whether a client or a server sent them.
 
 use super::pairing::Requests;
 use super::stream::{RxStream, Timing};
 use crate::error::Status;
-use crate::frame::ascii::{Content, Mark};
+use crate::frame::ascii::{CharacterKind, Decoded};
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::packet::PduKind;
 use crate::pdu::custom::Function;
@@ -11,42 +11,43 @@ use crate::pdu::diagnostics::{DIAGNOSTICS, REPORT_SERVER_ID};
 use crate::pdu::length::Length;
 use crate::pdu::EXCEPTION;
 
-/// What stands where a frame is looked for.
+/// What the bytes at the place of the search are.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Candidate {
-    /// A frame of so many bytes, which may be a request, a response or both.
+    /// A frame: its length in bytes, whether it may be a request, and whether it may be a
+    /// response.
     Frame(usize, bool, bool),
-    /// A whole frame of so many bytes, damaged.
+    /// A complete but damaged frame of this length.
     Damaged(usize),
-    /// A frame of so many bytes, which the buffer cannot hold.
+    /// A frame of this length, which the buffer cannot hold.
     TooLong(usize),
-    /// What may become a frame, of which nothing more is known before so many bytes
-    /// are there or the line is silent.
+    /// Possibly the beginning of a frame. The search has to wait until this many bytes have
+    /// arrived or the line is silent.
     Wait(usize),
-    /// No frame.
+    /// Not a frame.
     NoFrame,
 }
 
-/// The least bytes of an RTU frame.
+/// Bytes of the shortest RTU frame.
 pub(super) const MIN_RTU: usize = rtu::MIN_FRAME as usize;
 
-/// What a finder needs to know.
+/// What the search depends on, apart from the bytes of the stream.
 #[derive(Clone, Copy)]
 pub(super) struct Context<'a> {
     pub requests: &'a Requests,
     pub functions: &'a [Function],
     pub timing: Timing,
-    /// Who may speak.
+    /// The stream may carry requests, and responses.
     pub request: bool,
     pub response: bool,
-    /// The end character of ASCII.
+    /// The end character of ASCII frames.
     pub end: u8,
     pub now: u32,
 }
 
 impl Context<'_> {
-    /// The lengths of an RTU frame as a request and as a response, as far as its
-    /// first bytes tell.
+    /// The lengths of an RTU frame as a request and as a response, as far as its first bytes
+    /// show them. `None` if it cannot be one.
     fn lengths(&self, frame: &[u8]) -> [Option<Length>; 2] {
         let Some((unit, pdu)) = frame.split_first() else {
             return [Some(Length::AtLeast(MIN_RTU)); 2];
@@ -55,7 +56,7 @@ impl Context<'_> {
         if code.is_some_and(|code| code & !EXCEPTION == 0) {
             return [None; 2];
         }
-        let of = |side: PduKind| match side.length(pdu, self.functions) {
+        let frame_length = |kind: PduKind| match kind.length(pdu, self.functions) {
             Length::Exactly(length) => Length::Exactly(length + rtu::OVERHEAD),
             Length::AtLeast(length) => Length::AtLeast(length + rtu::OVERHEAD),
             other => other,
@@ -66,13 +67,13 @@ impl Context<'_> {
             _ => true,
         };
         let is_exception = code.is_some_and(|code| code & EXCEPTION != 0);
-        let request = (self.request && !is_exception).then(|| of(PduKind::Request));
+        let request = (self.request && !is_exception).then(|| frame_length(PduKind::Request));
         let response = || match (
-            of(PduKind::Response),
+            frame_length(PduKind::Response),
             self.requests.reply_length(*unit, pdu),
         ) {
             (_, Some(length)) => Length::Exactly(length + rtu::OVERHEAD),
-            // Some devices count the id alone and send more behind it.
+            // The byte count of some devices covers the server id only, though more bytes follow.
             (Length::Exactly(total), _)
                 if code == Some(REPORT_SERVER_ID)
                     && self.requests.is_waiting(*unit, pdu)
@@ -82,12 +83,12 @@ impl Context<'_> {
             }
             (length, _) => length,
         };
-        // Nobody answers a broadcast.
+        // No unit responds to a broadcast.
         let response = (self.response && *unit != 0).then(response);
         [request.filter(fits), response.filter(fits)]
     }
 
-    /// True if bytes of an RTU frame tell that somebody knows this function.
+    /// True if the function code of this RTU frame is known.
     pub fn is_known(&self, frame: &[u8]) -> bool {
         let lengths = self.lengths(frame);
         lengths
@@ -96,12 +97,13 @@ impl Context<'_> {
             .any(|length| *length != Length::Unknown)
     }
 
-    /// True if an RTU frame that begins like that has so many bytes.
+    /// True if `total` is the length of an RTU frame that begins with `frame`.
     pub fn has_length(&self, frame: &[u8], total: usize) -> bool {
         self.lengths(frame).contains(&Some(Length::Exactly(total)))
     }
 
-    /// An RTU frame of one of these lengths.
+    /// The length of the frame, as a request and as a response, if it is complete and its CRC is
+    /// right.
     fn by_length(lengths: [Option<Length>; 2], bytes: &[u8]) -> [Option<usize>; 2] {
         lengths.map(|length| match length {
             Some(Length::Exactly(total)) => {
@@ -112,22 +114,22 @@ impl Context<'_> {
         })
     }
 
-    /// How many bytes must be there before more is known of an RTU frame of these
-    /// lengths; none if nothing is waited for.
+    /// How many bytes of an RTU frame of these lengths the search needs before it can decide
+    /// more; `None` if more bytes change nothing.
     fn need(lengths: [Option<Length>; 2], have: usize, capacity: usize) -> Option<usize> {
-        let of = |length: Option<Length>| match length {
+        let bytes = |length: Option<Length>| match length {
             Some(Length::Exactly(total)) if total > have && total <= capacity => total,
-            // The CRC tells nothing about the length.
+            // The length can be decided without the two bytes of the CRC.
             Some(Length::AtLeast(total)) => (total - 2).max(have + 1),
             Some(Length::Silence | Length::Unknown) if have < rtu::MAX_FRAME => rtu::MAX_FRAME,
             _ => usize::MAX,
         };
         let [request, response] = lengths;
-        let need = of(request).min(of(response));
+        let need = bytes(request).min(bytes(response));
         (need < usize::MAX).then_some(need)
     }
 
-    /// An RTU frame that silence ends.
+    /// The length of an RTU frame that silence ends and whose CRC is right.
     fn by_silence(&self, stream: &RxStream, bytes: &[u8]) -> Option<usize> {
         let quiet = stream.quiet(self.now) >= self.timing.silence;
         let mut ends = stream
@@ -141,8 +143,8 @@ impl Context<'_> {
         })
     }
 
-    /// The shortest RTU frame whose CRC is right, where several came as one piece
-    /// and their lengths do not tell them apart.
+    /// The length of the shortest RTU frame whose CRC is right. It is used where several frames
+    /// arrived without silence between them, and the function does not define their lengths.
     fn by_crc(&self, stream: &RxStream, bytes: &[u8]) -> Option<usize> {
         let is_ended = bytes.len() >= rtu::MAX_FRAME
             || stream.quiet(self.now) >= self.timing.silence
@@ -152,10 +154,10 @@ impl Context<'_> {
         }
         let is_words = bytes.get(1) == Some(&DIAGNOSTICS);
         let step = if is_words { 2 } else { 1 };
-        rtu::first(bytes, MIN_RTU * step, step)
+        rtu::find_first(bytes, MIN_RTU * step, step)
     }
 
-    /// What stands in RTU bytes.
+    /// Examines the RTU bytes at the place of the search.
     pub fn rtu(&self, stream: &RxStream, bytes: &[u8], capacity: usize) -> Candidate {
         let lengths = self.lengths(bytes);
         let [request, response] = Self::by_length(lengths, bytes);
@@ -163,8 +165,8 @@ impl Context<'_> {
             (Some(total), other) if other.is_none_or(|other| other == total) => {
                 return Candidate::Frame(total, true, other.is_some());
             }
-            // Two lengths are right: what is asked for decides.
-            (Some(_), Some(total)) if self.is_asked(bytes) => {
+            // The CRC is right for two lengths: an open request decides.
+            (Some(_), Some(total)) if self.is_reply_expected(bytes) => {
                 return Candidate::Frame(total, false, true);
             }
             (Some(total), _) => return Candidate::Frame(total, true, false),
@@ -178,7 +180,7 @@ impl Context<'_> {
         let is_aligned = stream.at == stream.start;
         let has_silence = stream.has_silence(self.now, &self.timing);
         if has_silence && (is_open || is_aligned) {
-            // Between two silences the CRC alone decides: some devices miscount.
+            // Between two silences only the CRC decides: some devices send a wrong byte count.
             if let Some(total) = self.by_silence(stream, bytes) {
                 let [as_request, as_response] = lengths.map(|length| length.is_some());
                 return Candidate::Frame(total, as_request, as_response);
@@ -190,11 +192,11 @@ impl Context<'_> {
             }
         }
         let need = Self::need(lengths, bytes.len(), capacity);
-        if let Some(need) = need.filter(|_| !self.is_over(stream)) {
-            // Each byte more may make a CRC right; see by_crc.
+        if let Some(need) = need.filter(|_| !self.has_timed_out(stream)) {
+            // Each further byte may complete a frame; see `by_crc`.
             let is_by_crc = is_open && is_aligned && stream.silences(stream.at).next().is_some();
             let need = if is_by_crc { bytes.len() + 1 } else { need };
-            if let Some(other) = self.overtaken(stream, bytes, capacity) {
+            if let Some(other) = self.bytes_for_next_piece(stream, bytes, capacity) {
                 return Candidate::Wait(need.min(other));
             }
         }
@@ -208,23 +210,28 @@ impl Context<'_> {
         }
     }
 
-    /// How many bytes it takes to find anything in an empty lane.
-    pub fn least(&self, framing: Framing) -> usize {
+    /// How many bytes the search needs in an empty stream.
+    pub fn min_bytes(&self, framing: Framing) -> usize {
         match framing {
-            // A unit that nobody answers for is enough to see that there is no reply.
+            // The unit alone shows that a frame to unit 0 cannot be a response.
             Framing::Rtu | Framing::RtuOverTcp => 1 + usize::from(self.request),
             Framing::Tcp => tcp::next_part(0),
             Framing::Ascii => 1,
         }
     }
 
-    /// How many bytes it takes to look again, if what a lane holds is the beginning of
-    /// an RTU frame and the line was not silent since: what [`Context::rtu`] finds
-    /// then, at less cost.
-    pub fn begun(&self, framing: Framing, stream: &RxStream, part: &[u8]) -> Option<usize> {
+    /// How many bytes the search needs, if the stream holds only the beginning of an RTU frame
+    /// and the line was not silent after it; otherwise `None`. The result is that of
+    /// [`Context::rtu`], at less cost.
+    pub fn bytes_to_continue(
+        &self,
+        framing: Framing,
+        stream: &RxStream,
+        part: &[u8],
+    ) -> Option<usize> {
         let capacity = part.len();
         let is_rtu = matches!(framing, Framing::Rtu | Framing::RtuOverTcp);
-        let is_quiet = stream.has_silence(self.now, &self.timing) || self.is_over(stream);
+        let is_quiet = stream.has_silence(self.now, &self.timing) || self.has_timed_out(stream);
         if !is_rtu || stream.at != stream.start || is_quiet || stream.is_full(capacity) {
             return None;
         }
@@ -232,7 +239,7 @@ impl Context<'_> {
         let [unit, code, ..] = *bytes else {
             return None;
         };
-        // Of these two the length depends on what was asked.
+        // Function code 0 is invalid. For 08 and 11, the length depends on the request.
         if matches!(code, 0 | EXCEPTION | DIAGNOSTICS | REPORT_SERVER_ID)
             || bytes.len() >= rtu::MAX_FRAME
         {
@@ -241,7 +248,7 @@ impl Context<'_> {
         let pdu = bytes.get(rtu::PDU..)?;
         let mut need = usize::MAX;
         if self.request && code & EXCEPTION == 0 {
-            need = Self::rest(
+            need = Self::bytes_needed(
                 PduKind::Request.length(pdu, self.functions),
                 bytes,
                 capacity,
@@ -249,14 +256,13 @@ impl Context<'_> {
         }
         if self.response && unit != 0 {
             let length = PduKind::Response.length(pdu, self.functions);
-            need = need.min(Self::rest(length, bytes, capacity)?);
+            need = need.min(Self::bytes_needed(length, bytes, capacity)?);
         }
         (need < usize::MAX).then_some(need)
     }
 
-    /// As [`Context::need`], of a PDU of this length; none of a frame that is whole or
-    /// too long.
-    fn rest(length: Length, bytes: &[u8], capacity: usize) -> Option<usize> {
+    /// As [`Context::need`], for one PDU length; `None` if the frame is complete or too long.
+    fn bytes_needed(length: Length, bytes: &[u8], capacity: usize) -> Option<usize> {
         match length {
             Length::Exactly(length) => match length + rtu::OVERHEAD {
                 total if total > capacity.min(rtu::MAX_FRAME) || total < MIN_RTU => None,
@@ -270,21 +276,27 @@ impl Context<'_> {
         }
     }
 
-    fn is_asked(&self, frame: &[u8]) -> bool {
+    /// True if a request with the unit and function of this frame is open.
+    fn is_reply_expected(&self, frame: &[u8]) -> bool {
         match frame {
             [unit, pdu @ ..] => self.requests.is_waiting(*unit, pdu),
             [] => false,
         }
     }
 
-    /// True if what is not complete by now never will be.
-    fn is_over(&self, stream: &RxStream) -> bool {
+    /// True if the time for the rest of an incomplete frame is over.
+    fn has_timed_out(&self, stream: &RxStream) -> bool {
         stream.quiet(self.now) >= self.timing.frame_timeout
     }
 
-    /// None if a whole frame stands after the next silence: what was not complete
-    /// before it never will be. Else how many bytes it takes to see one.
-    fn overtaken(&self, stream: &RxStream, bytes: &[u8], capacity: usize) -> Option<usize> {
+    /// `None` if a complete frame follows the next silence: the frame before that silence will
+    /// not be completed any more. Otherwise how many bytes the search needs to see such a frame.
+    fn bytes_for_next_piece(
+        &self,
+        stream: &RxStream,
+        bytes: &[u8],
+        capacity: usize,
+    ) -> Option<usize> {
         let Some(end) = stream.silences(stream.at).next() else {
             return Some(usize::MAX);
         };
@@ -296,10 +308,10 @@ impl Context<'_> {
         (!is_whole).then_some(before.saturating_add(need))
     }
 
-    /// What stands in TCP bytes.
+    /// Examines the TCP bytes at the place of the search.
     pub fn tcp(&self, stream: &RxStream, bytes: &[u8], capacity: usize) -> Candidate {
         let header = match tcp::header(bytes) {
-            Err(Status::INCOMPLETE_FRAME) if !self.is_over(stream) => {
+            Err(Status::INCOMPLETE_FRAME) if !self.has_timed_out(stream) => {
                 return Candidate::Wait(tcp::next_part(bytes.len()));
             }
             Err(_) => return Candidate::NoFrame,
@@ -311,7 +323,7 @@ impl Context<'_> {
         match bytes.get(tcp::PDU..header.total) {
             Some([code, ..]) if code & !EXCEPTION == 0 => Candidate::NoFrame,
             Some(pdu) => {
-                let fits = |side: PduKind| match side.length(pdu, self.functions) {
+                let fits = |kind: PduKind| match kind.length(pdu, self.functions) {
                     Length::Exactly(length) => length == pdu.len(),
                     Length::AtLeast(_) => false,
                     Length::Silence | Length::Unknown => true,
@@ -319,7 +331,7 @@ impl Context<'_> {
                 let is_exception = pdu.first().is_some_and(|code| code & EXCEPTION != 0);
                 let request = self.request && !is_exception && fits(PduKind::Request);
                 let response = self.response && fits(PduKind::Response);
-                // The header says that it is a frame, whatever it carries.
+                // The header is valid, so this is a frame, even if its PDU is not valid.
                 let neither = !request && !response;
                 Candidate::Frame(
                     header.total,
@@ -327,41 +339,41 @@ impl Context<'_> {
                     response || (neither && self.response),
                 )
             }
-            None if self.is_over(stream) => Candidate::NoFrame,
+            None if self.has_timed_out(stream) => Candidate::NoFrame,
             None => Candidate::Wait(header.total),
         }
     }
 
-    /// What stands in ASCII characters.
+    /// Examines the ASCII characters at the place of the search.
     pub fn ascii(&self, stream: &RxStream, bytes: &mut [u8], capacity: usize) -> Candidate {
         let [ascii::START, ..] = bytes else {
             return Candidate::NoFrame;
         };
-        // What was searched before has no end in it.
+        // The characters that were searched before do not contain the end.
         let known = usize::from(stream.searched).max(1);
         let mut before = bytes.get(known - 1).copied().unwrap_or_default();
         for (index, character) in bytes.iter().enumerate().skip(known) {
             let total = index + 1;
-            match ascii::mark(before, *character, self.end) {
-                Mark::End => {
+            match ascii::kind_of(before, *character, self.end) {
+                CharacterKind::End => {
                     let frame = bytes.get_mut(..total).unwrap_or_default();
                     return match ascii::decode(frame, self.end, false) {
-                        Content::Right(_) => Candidate::Frame(total, true, true),
-                        Content::Damaged(_) => Candidate::Damaged(total),
-                        Content::Malformed => Candidate::NoFrame,
+                        Decoded::Valid(_) => Candidate::Frame(total, true, true),
+                        Decoded::WrongLrc(_) => Candidate::Damaged(total),
+                        Decoded::Malformed => Candidate::NoFrame,
                     };
                 }
-                Mark::Inside if total <= ascii::MAX_FRAME => {}
+                CharacterKind::Inside if total <= ascii::MAX_FRAME => {}
                 _ => return Candidate::NoFrame,
             }
             before = *character;
         }
         if bytes.len() >= capacity && capacity < ascii::MAX_FRAME {
             Candidate::TooLong(bytes.len())
-        } else if self.is_over(stream) {
+        } else if self.has_timed_out(stream) {
             Candidate::NoFrame
         } else {
-            // Or another colon or end character: [`super::Sniffer::feed`] sees those.
+            // A colon or an end character may end the wait: [`super::Sniffer::feed`] sees those.
             Candidate::Wait(ascii::MAX_FRAME + 1)
         }
     }

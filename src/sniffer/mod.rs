@@ -1,10 +1,10 @@
-//! A sniffer: finds the frames on a bus that others use, and pairs requests with
-//! replies. It only listens.
+//! The sniffer: finds the frames on a bus that other devices use, and pairs requests with
+//! replies. It never sends.
 //!
-//! Nobody tells which side speaks. An RTU frame is therefore looked for with the
-//! lengths of a request and of a response, and is right if its CRC is; which of
-//! the two it is, the request before it decides. What is no frame costs one byte,
-//! and the search goes on behind it.
+//! A frame does not show whether a client or a server sent it. So the search tries the length of
+//! a request and the length of a response. An RTU frame is valid if its CRC is right for one of
+//! them. The requests before it decide whether it is a request or a response. Where no frame
+//! begins, the search skips one byte and tries again.
 
 mod emit;
 mod event;
@@ -24,60 +24,64 @@ use find::{Candidate, Context};
 use pairing::Requests;
 use stream::{RxStream, Timing};
 
-/// The least bytes of a buffer; [`Framing::max_frame`] hold any frame, twice as
-/// many where the directions are fed apart.
+/// Smallest size of the buffer, in bytes. [`Framing::max_frame`] bytes hold any frame. Twice as
+/// many are needed if the two directions are fed separately.
 pub const MIN_BUFFER: usize = 32;
 
-/// How long a request may stay unanswered, at first, in microseconds.
+/// Default time that a reply may take, in microseconds.
 pub const DEFAULT_TIMEOUT: u32 = 1_000_000;
 
-/// For so many timeouts a late reply is known to answer its request. Later, the
-/// next frame like it is more likely another's.
-const LATE: u32 = 10;
+/// A late reply is paired with its request for this many times the timeout. After that, a frame
+/// like it is more likely the reply to another request.
+const LATE_TIMEOUTS: u32 = 10;
 
-/// How long the rest of an RTU frame is waited for, at first: time stamps of a
-/// USB adapter are off by 16 ms and more.
-const RTU_PATIENCE: u32 = 50_000;
+/// Default time that the sniffer waits for the rest of an RTU frame, in microseconds. The time
+/// stamps of a USB adapter are wrong by 16 ms and more.
+const RTU_FRAME_TIMEOUT: u32 = 50_000;
 
-/// How long the rest of other frames is waited for, at first (serial line guide
-/// V1.02, 2.5.2.1).
-const PATIENCE: u32 = 1_000_000;
+/// Default time that the sniffer waits for the rest of any other frame, in microseconds (serial
+/// line guide V1.02, 2.5.2.1).
+const FRAME_TIMEOUT: u32 = 1_000_000;
 
-/// Where bytes were heard.
+/// The direction of bytes on the bus.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Tap {
-    /// On a line that carries both directions.
+pub enum BusDirection {
+    /// The bytes come from a line that carries both directions.
     Both,
-    /// Where only the client sends.
+    /// Only the client sends them.
     Client,
-    /// Where only servers send.
+    /// Only servers send them.
     Server,
 }
 
-/// A sniffer. The buffer is the caller's and is passed to each call.
+/// A sniffer. The caller owns the buffer and passes it to each call.
 #[derive(Clone, Copy, Debug)]
 pub struct Sniffer {
     framing: Framing,
     end: u8,
-    is_apart: bool,
+    is_separate: bool,
     timeout: u32,
     timing: Timing,
-    lanes: [RxStream; 2],
+    streams: [RxStream; 2],
     requests: Requests,
-    /// For so long from then on, time alone brings nothing to tell of.
-    calm_from: u32,
-    calm_for: u32,
+    /// From `idle_from` on, for `idle_for` microseconds, no event comes from the passing of time
+    /// alone: no request was stored or removed since, and none times out.
+    idle_from: u32,
+    idle_for: u32,
 }
 
-/// What there is to tell of, as places in the buffer.
+/// What the next event covers, as lengths in the stream.
 #[derive(Clone, Copy)]
 enum Step {
+    /// A frame of `total` bytes, which are `content` bytes once decoded. `roles` says whether it
+    /// may be a request, and whether it may be a response; `None` if it is damaged.
     Frame {
         total: usize,
         content: usize,
-        right: Option<(bool, bool)>,
+        roles: Option<(bool, bool)>,
     },
-    Junk {
+    /// `length` bytes that are not a frame; `more` bytes that belong to them will follow.
+    Noise {
         length: usize,
         status: Status,
         more: usize,
@@ -85,66 +89,66 @@ enum Step {
 }
 
 impl Sniffer {
-    /// A sniffer that has heard nothing.
+    /// A sniffer that has received nothing yet.
     pub const fn new(framing: Framing) -> Self {
         let frame_timeout = match framing {
-            Framing::Rtu | Framing::RtuOverTcp => RTU_PATIENCE,
-            Framing::Ascii | Framing::Tcp => PATIENCE,
+            Framing::Rtu | Framing::RtuOverTcp => RTU_FRAME_TIMEOUT,
+            Framing::Ascii | Framing::Tcp => FRAME_TIMEOUT,
         };
         Sniffer {
             framing,
             end: ascii::END,
-            is_apart: false,
+            is_separate: false,
             timeout: DEFAULT_TIMEOUT,
             timing: Timing {
                 character: 0,
                 silence: DEFAULT_SILENCE,
                 frame_timeout,
             },
-            lanes: [RxStream::EMPTY; 2],
+            streams: [RxStream::EMPTY; 2],
             requests: Requests::NONE,
-            calm_from: 0,
-            calm_for: 0,
+            idle_from: 0,
+            idle_for: 0,
         }
     }
 
-    /// Sets the rate, from which the silence between frames follows, and when
-    /// each of several bytes that are fed at once arrived; 0 is untold.
+    /// Sets the baud rate. It defines the silence between frames, and the times at which the
+    /// bytes of one [`Sniffer::feed`] arrived. 0 if it is unknown.
     pub const fn set_baud_rate(&mut self, baud: u32) {
-        self.calm_for = 0;
+        self.idle_for = 0;
         self.timing.silence = silence(baud);
         self.timing.character = if baud == 0 { 0 } else { character(baud) as u32 };
     }
 
-    /// Sets how long a request may stay unanswered, in microseconds. For ten times
-    /// as long, a late reply is still known to answer it.
+    /// Sets the time that a reply may take, in microseconds. A late reply is still paired with
+    /// its request for ten times as long.
     pub const fn set_timeout(&mut self, timeout: u32) {
-        self.calm_for = 0;
+        self.idle_for = 0;
         self.timeout = timeout;
     }
 
-    /// Sets how long the rest of a frame is waited for, in microseconds: how
-    /// coarse the time stamps are.
+    /// Sets how long the sniffer waits for the rest of a frame, in microseconds. It should be
+    /// longer than the error of the time stamps.
     pub const fn set_frame_timeout(&mut self, frame_timeout: u32) {
-        self.calm_for = 0;
+        self.idle_for = 0;
         self.timing.frame_timeout = frame_timeout;
     }
 
-    /// Sets the last character of ASCII frames.
+    /// Sets the end character of ASCII frames.
     pub const fn set_end(&mut self, end: u8) {
-        self.calm_for = 0;
-        let [first, second] = &mut self.lanes;
+        self.idle_for = 0;
+        let [first, second] = &mut self.streams;
         first.searched = 0;
         second.searched = 0;
         self.end = end;
     }
 
-    /// The lane of a tap and its part of the buffer.
+    /// The part of the buffer that belongs to a stream.
     fn part<'a>(&self, buffer: &'a mut [u8], stream: usize) -> &'a mut [u8] {
-        // Places in the buffer are 16 bits.
+        // Indexes in the buffer have 16 bits.
         let most = buffer.len().min(u16::MAX.into());
         let buffer = buffer.get_mut(..most).unwrap_or_default();
-        if !self.is_apart {
+        if !self.is_separate {
             return buffer;
         }
         let half = if stream == 0 {
@@ -155,24 +159,30 @@ impl Sniffer {
         half.unwrap_or_default()
     }
 
-    /// Takes bytes of which the last arrived now, in microseconds; how many there
-    /// was room for. Call [`Sniffer::next`] until there is none, then feed the
-    /// rest with the same time. Bytes heard on both directions' line and bytes
-    /// heard apart do not mix: what is not told of is forgotten at a change.
-    pub fn feed(&mut self, buffer: &mut [u8], tap: Tap, bytes: &[u8], now: u32) -> usize {
-        let is_apart = tap != Tap::Both;
-        if is_apart != self.is_apart {
-            self.is_apart = is_apart;
-            self.lanes = [RxStream::EMPTY; 2];
+    /// Takes bytes, the last of which arrived at `now` (microseconds). Returns how many fitted
+    /// into the buffer. Call [`Sniffer::next`] until it returns `None`, then feed the other bytes
+    /// with the same time. Feed either both directions together or each direction separately: a
+    /// change from one to the other discards the bytes that were not reported yet.
+    pub fn feed(
+        &mut self,
+        buffer: &mut [u8],
+        direction: BusDirection,
+        bytes: &[u8],
+        now: u32,
+    ) -> usize {
+        let is_separate = direction != BusDirection::Both;
+        if is_separate != self.is_separate {
+            self.is_separate = is_separate;
+            self.streams = [RxStream::EMPTY; 2];
         }
-        let index = usize::from(tap == Tap::Server);
+        let index = usize::from(direction == BusDirection::Server);
         let part = self.part(buffer, index);
         let is_ascii = self.framing == Framing::Ascii;
-        let [first, second] = &mut self.lanes;
+        let [first, second] = &mut self.streams;
         let stream = if index == 0 { first } else { second };
         let may_decide = |byte: &u8| *byte == ascii::START || *byte == self.end;
         if is_ascii && bytes.iter().any(may_decide) {
-            stream.look_again();
+            stream.resume();
         }
         match bytes {
             [byte] if !FIRMWARE && stream.feed_next(part, *byte, now, &self.timing) => 1,
@@ -180,9 +190,9 @@ impl Sniffer {
         }
     }
 
-    /// What happened next, up to now; none if nothing more is known yet. It
-    /// borrows from the buffer. To be called after each feed until there is none,
-    /// and now and then while nothing arrives; with the same functions each time.
+    /// The next event up to `now` (microseconds); `None` if there is none yet. The event borrows
+    /// from the buffer. Call this after each feed until it returns `None`, and regularly while
+    /// nothing arrives. Pass the same functions each time.
     pub fn next<'b>(
         &mut self,
         buffer: &'b mut [u8],
@@ -195,7 +205,7 @@ impl Sniffer {
         self.look(buffer, functions, now)
     }
 
-    /// As [`Sniffer::next`], of what is more than the beginning of a frame.
+    /// As [`Sniffer::next`], if [`Sniffer::only_waits`] is false.
     #[cfg_attr(not(target_os = "none"), inline(never))]
     pub fn look<'b>(
         &mut self,
@@ -203,13 +213,13 @@ impl Sniffer {
         functions: &[Function],
         now: u32,
     ) -> Option<Event<'b>> {
-        // What was heard first is told first.
-        let is_later = self.is_apart && self.waited(1, now) > self.waited(0, now);
+        // The stream whose bytes arrived first goes first.
+        let is_later = self.is_separate && self.waited(1, now) > self.waited(0, now);
         let order = if is_later { [1, 0] } else { [0, 1] };
-        // Else requests have come or gone, and what a lane holds may mean something else.
-        let only_bytes = self.is_early(now);
+        // If a request was stored or removed, the same bytes may have another meaning.
+        let only_bytes = self.is_unchanged(now);
         for index in order {
-            if only_bytes && self.lanes.get(index)?.is_settled(now) {
+            if only_bytes && self.streams.get(index)?.is_suspended(now) {
                 continue;
             }
             if let Some(step) = self.step(buffer, functions, index, now) {
@@ -219,86 +229,93 @@ impl Sniffer {
         if only_bytes {
             return None;
         }
-        // Bytes that are not understood yet may hold the reply.
+        // Bytes that were not reported yet may contain the reply, so they delay the timeout.
         let known = now.wrapping_sub(self.waited(0, now).max(self.waited(1, now)));
         if let Some(overdue) = self.overdue(known) {
             return Some(self.expire(overdue, now));
         }
-        self.calm_from = now;
-        self.calm_for = self.requests.calm(now, self.timeout, self.late());
+        self.idle_from = now;
+        self.idle_for = self
+            .requests
+            .until_next_timeout(now, self.timeout, self.late());
         None
     }
 
-    /// True if [`Sniffer::next`] has nothing to tell of and need not look: so it is
-    /// after most bytes that are fed one by one.
+    /// True if [`Sniffer::next`] has no event and need not search. That is so after most bytes
+    /// that are fed one by one.
     #[inline]
-    pub fn is_calm(&self, now: u32) -> bool {
-        let [first, second] = &self.lanes;
-        self.is_early(now) && first.is_settled(now) && (!self.is_apart || second.is_settled(now))
+    pub fn is_idle(&self, now: u32) -> bool {
+        let [first, second] = &self.streams;
+        self.is_unchanged(now)
+            && first.is_suspended(now)
+            && (!self.is_separate || second.is_suspended(now))
     }
 
-    /// True if no request came or went since the last look, and none is overdue.
+    /// True if no request was stored or removed since the last search, and none is overdue.
     #[inline(always)]
-    const fn is_early(&self, now: u32) -> bool {
-        now.wrapping_sub(self.calm_from) < self.calm_for
+    const fn is_unchanged(&self, now: u32) -> bool {
+        now.wrapping_sub(self.idle_from) < self.idle_for
     }
 
-    /// How long a lane has held bytes that were not told of.
+    /// How long a stream has held bytes that were not reported yet, in microseconds.
     fn waited(&self, index: usize, now: u32) -> u32 {
-        let stream = self.lanes.get(index);
+        let stream = self.streams.get(index);
         stream.map_or(0, |stream| stream.waited(now, &self.timing))
     }
 
-    /// How long the reply to a request that was given up is known as such.
+    /// How long a late reply is paired with its request, in microseconds.
     const fn late(&self) -> u32 {
-        self.timeout.saturating_mul(LATE)
+        self.timeout.saturating_mul(LATE_TIMEOUTS)
     }
 
-    /// True if no request is overdue and no lane holds more than the beginning of a
-    /// frame: what [`Sniffer::look`] finds then, at less cost. Firmware, where code is
-    /// dearer, looks.
+    /// True if no request is overdue and no stream holds more than the beginning of a frame.
+    /// [`Sniffer::look`] would then find no event, at more cost. Always false in firmware, which
+    /// saves the code of this function.
     #[cfg_attr(not(target_os = "none"), inline(never))]
     pub fn only_waits(&mut self, buffer: &mut [u8], functions: &[Function], now: u32) -> bool {
         if FIRMWARE {
             return false;
         }
-        let only_bytes = self.is_early(now);
+        let only_bytes = self.is_unchanged(now);
         if !only_bytes {
-            self.calm_from = now;
-            self.calm_for = self.requests.calm(now, self.timeout, self.late());
-            if self.calm_for == 0 {
+            self.idle_from = now;
+            self.idle_for = self
+                .requests
+                .until_next_timeout(now, self.timeout, self.late());
+            if self.idle_for == 0 {
                 return false;
             }
         }
         let framing = self.framing;
-        for index in 0..=usize::from(self.is_apart) {
+        for index in 0..=usize::from(self.is_separate) {
             let part = self.part(buffer, index);
             let (context, stream) = self.split(functions, index, now);
-            if only_bytes && stream.is_settled(now) {
+            if only_bytes && stream.is_suspended(now) {
                 continue;
             }
             let need = if stream.is_empty() {
-                Some(context.least(framing))
+                Some(context.min_bytes(framing))
             } else {
-                context.begun(framing, stream, part)
+                context.bytes_to_continue(framing, stream, part)
             };
             let Some(need) = need else {
-                // The other lane may not have been looked into since requests changed.
-                self.calm_for = if only_bytes { self.calm_for } else { 0 };
+                // The other stream may not have been searched since the requests changed.
+                self.idle_for = if only_bytes { self.idle_for } else { 0 };
                 return false;
             };
-            stream.settle(need, part.len(), now, &context.timing);
+            stream.suspend(need, part.len(), now, &context.timing);
         }
         true
     }
 
-    /// A request that is to be given up by now; those given up long ago go.
+    /// The index of a request that is overdue, if any. Removes the requests whose late reply is
+    /// no longer expected.
     fn overdue(&mut self, now: u32) -> Option<usize> {
         self.requests.forget(now, self.late());
         self.requests.overdue(now, self.timeout)
     }
 
-    /// What a finder needs to know, and the lane that it looks into.
+    /// The context of the search, and the stream at `index`.
     fn split<'c>(
         &'c mut self,
         functions: &'c [Function],
@@ -309,16 +326,16 @@ impl Sniffer {
             requests: &self.requests,
             functions,
             timing: self.timing,
-            request: !self.is_apart || index == 0,
-            response: !self.is_apart || index == 1,
+            request: !self.is_separate || index == 0,
+            response: !self.is_separate || index == 1,
             end: self.end,
             now,
         };
-        let [first, second] = &mut self.lanes;
+        let [first, second] = &mut self.streams;
         (context, if index == 0 { first } else { second })
     }
 
-    /// Looks for what there is to tell of in a lane.
+    /// Searches a stream for the next frame or noise to report.
     fn step(
         &mut self,
         buffer: &mut [u8],
@@ -332,11 +349,11 @@ impl Sniffer {
         let (context, stream) = self.split(functions, index, now);
         let step = loop {
             if stream.is_empty() {
-                stream.settle(context.least(framing), capacity, now, &context.timing);
+                stream.suspend(context.min_bytes(framing), capacity, now, &context.timing);
                 break None;
             }
-            let junk = |until: u16| {
-                Some(Step::Junk {
+            let noise = |until: u16| {
+                Some(Step::Noise {
                     length: usize::from(until - stream.start),
                     status: if stream.cut {
                         Status::BUFFER_TOO_SMALL
@@ -346,16 +363,16 @@ impl Sniffer {
                     more: 0,
                 })
             };
-            // What lies between two silences is told of by itself.
+            // Bytes between two silences are one event.
             if let Some(end) = stream
                 .silences(stream.start)
                 .next()
                 .filter(|end| stream.at >= *end)
             {
-                break junk(end);
+                break noise(end);
             }
             if stream.at == stream.end {
-                break junk(stream.end);
+                break noise(stream.end);
             }
             let bytes = part
                 .get_mut(stream.at.into()..stream.end.into())
@@ -369,39 +386,39 @@ impl Sniffer {
                     Framing::Ascii => context.ascii(stream, bytes, capacity),
                 }
             };
-            let is_behind_junk = stream.at > stream.start;
+            let is_after_noise = stream.at > stream.start;
             match candidate {
                 Candidate::Wait(need) if !stream.is_full(capacity) => {
                     stream.searched = bytes.len() as u16;
-                    stream.settle(need, capacity, now, &context.timing);
+                    stream.suspend(need, capacity, now, &context.timing);
                     break None;
                 }
                 Candidate::Frame(..) | Candidate::Damaged(_) | Candidate::Wait(_)
-                    if is_behind_junk =>
+                    if is_after_noise =>
                 {
-                    break junk(stream.at);
+                    break noise(stream.at);
                 }
                 Candidate::Frame(total, request, response) => {
                     break Some(Step::Frame {
                         total,
                         content: total,
-                        right: Some((request && context.request, response && context.response)),
+                        roles: Some((request && context.request, response && context.response)),
                     });
                 }
                 Candidate::Damaged(total) => {
                     break Some(Step::Frame {
                         total,
                         content: total,
-                        right: None,
+                        roles: None,
                     });
                 }
-                // A header is trusted; elsewhere it may be noise.
+                // The length in a TCP header is reliable. In other framings it may be noise.
                 Candidate::TooLong(total) if framing == Framing::Tcp => {
-                    if is_behind_junk {
-                        break junk(stream.at);
+                    if is_after_noise {
+                        break noise(stream.at);
                     }
                     let length = bytes.len().min(total);
-                    break Some(Step::Junk {
+                    break Some(Step::Noise {
                         length,
                         status: Status::BUFFER_TOO_SMALL,
                         more: total - length,
@@ -409,23 +426,23 @@ impl Sniffer {
                 }
                 Candidate::TooLong(_) | Candidate::Wait(_) | Candidate::NoFrame => {
                     stream.cut |= matches!(candidate, Candidate::TooLong(_));
-                    stream.pass();
+                    stream.skip_byte();
                 }
             }
         };
         match step {
-            Some(Step::Frame { total, right, .. }) if framing == Framing::Ascii => {
+            Some(Step::Frame { total, roles, .. }) if framing == Framing::Ascii => {
                 let at = usize::from(stream.at);
                 if let Some(frame) = part.get_mut(at..at + total).filter(|_| stream.decoded == 0) {
-                    // It has a frame's form: the context looked.
+                    // `Context::ascii` has checked that this is a frame.
                     ascii::decode(frame, end, true);
                 }
                 let content = total.saturating_sub(3) / 2;
-                stream.decoded = if right.is_some() { total as u16 } else { 0 };
+                stream.decoded = if roles.is_some() { total as u16 } else { 0 };
                 Some(Step::Frame {
                     total,
                     content,
-                    right,
+                    roles,
                 })
             }
             other => other,

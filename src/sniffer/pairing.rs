@@ -242,7 +242,7 @@ impl Requests {
     }
 
     /// Microseconds from now until the next request times out or is to be forgotten.
-    pub fn calm(&self, now: u32, timeout: u32, old: u32) -> u32 {
+    pub fn until_next_timeout(&self, now: u32, timeout: u32, old: u32) -> u32 {
         let ends = self.used().iter().map(|slot| match slot.state {
             State::Free => u32::MAX / 2,
             State::Open => timeout.saturating_sub(age(now, slot.time)),

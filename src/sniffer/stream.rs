@@ -61,7 +61,7 @@ pub(super) struct RxStream {
     last: u32,
     floor: u32,
     /// ...or the line has been silent for this time.
-    calm: u32,
+    quiet_limit: u32,
     marks: [Mark; MARKS],
 }
 
@@ -80,7 +80,7 @@ impl RxStream {
         silent: 0,
         last: 0,
         floor: 0,
-        calm: 0,
+        quiet_limit: 0,
         marks: [Mark {
             time: 0,
             end: 0,
@@ -195,7 +195,7 @@ impl RxStream {
     #[inline(always)]
     fn mark(&mut self, count: u16, time: u32, is_new: bool, timing: &Timing) {
         self.last = time;
-        self.calm = timing.silence.min(timing.frame_timeout);
+        self.quiet_limit = timing.silence.min(timing.frame_timeout);
         self.end += count;
         let (end, many) = (self.end, usize::from(self.count) >= MARKS / 2);
         match self.last_mark() {
@@ -218,28 +218,28 @@ impl RxStream {
         }
     }
 
-    /// Notes that no frame can be found before `need` bytes have arrived from `at` on, the line
-    /// has been silent for longer than now, or [`RxStream::look_again`] is called.
-    pub fn settle(&mut self, need: usize, capacity: usize, now: u32, timing: &Timing) {
+    /// Suspends the search until `need` bytes have arrived from `at` on, the line has been silent
+    /// for longer than now, or [`RxStream::resume`] is called.
+    pub fn suspend(&mut self, need: usize, capacity: usize, now: u32, timing: &Timing) {
         let need = (usize::from(self.at) + need).min(usize::from(self.start) + capacity);
         self.need = need.min(u16::MAX.into()) as u16;
         let quiet = self.quiet(now);
         let later = |time: u32| if time > quiet { time } else { u32::MAX };
-        self.calm = later(timing.silence).min(later(timing.frame_timeout));
+        self.quiet_limit = later(timing.silence).min(later(timing.frame_timeout));
     }
 
-    /// Undoes [`RxStream::settle`].
-    pub fn look_again(&mut self) {
+    /// Undoes [`RxStream::suspend`].
+    pub fn resume(&mut self) {
         self.need = 0;
     }
 
-    /// True if no frame can be found yet: see [`RxStream::settle`].
-    pub fn is_settled(&self, now: u32) -> bool {
-        self.end < self.need && self.quiet(now) < self.calm
+    /// True while the search is suspended: see [`RxStream::suspend`].
+    pub fn is_suspended(&self, now: u32) -> bool {
+        self.end < self.need && self.quiet(now) < self.quiet_limit
     }
 
-    /// Moves the search for a frame on by one byte.
-    pub fn pass(&mut self) {
+    /// Moves the search on by one byte.
+    pub fn skip_byte(&mut self) {
         self.at += 1;
         self.searched = 0;
     }

@@ -310,7 +310,7 @@ fn single_register(line: &mut TextWriter, address: u16, value: u16) {
 /// The arguments of a request that its reply does not repeat, read from the first bytes of
 /// the request.
 #[derive(Clone, Copy)]
-enum RequestStart {
+enum Arguments {
     Nothing,
     Range(u16, u16),
     Queue(u16),
@@ -318,7 +318,7 @@ enum RequestStart {
 }
 
 /// Reads the arguments from the head of a request PDU.
-fn arguments(head: &[u8]) -> RequestStart {
+fn arguments(head: &[u8]) -> Arguments {
     let mut reader = Reader::new(head);
     match reader.u8() {
         Some(
@@ -330,21 +330,19 @@ fn arguments(head: &[u8]) -> RequestStart {
             | registers::WRITE_MULTIPLE_REGISTERS
             | registers::READ_WRITE_MULTIPLE_REGISTERS,
         ) => match (reader.u16(), reader.u16()) {
-            (Some(address), Some(quantity)) => RequestStart::Range(address, quantity),
-            _ => RequestStart::Nothing,
+            (Some(address), Some(quantity)) => Arguments::Range(address, quantity),
+            _ => Arguments::Nothing,
         },
-        Some(files::READ_FIFO_QUEUE) => reader
-            .u16()
-            .map_or(RequestStart::Nothing, RequestStart::Queue),
+        Some(files::READ_FIFO_QUEUE) => reader.u16().map_or(Arguments::Nothing, Arguments::Queue),
         Some(files::READ_FILE_RECORD) => {
             // The head contains only the first sub-request. Of the records of others, only
             // the data are written.
             let _ = reader.u8();
             let first = Reads::new(reader.rest()).ok();
             let record = first.and_then(|reads| reads.iter().next());
-            record.map_or(RequestStart::Nothing, RequestStart::Record)
+            record.map_or(Arguments::Nothing, Arguments::Record)
         }
-        _ => RequestStart::Nothing,
+        _ => Arguments::Nothing,
     }
 }
 
@@ -355,7 +353,7 @@ pub fn head(line: &mut TextWriter, head: &[u8]) {
     };
     match arguments(head) {
         _ if Request::parse(head).is_ok() => request(line, head),
-        RequestStart::Range(address, quantity) => {
+        Arguments::Range(address, quantity) => {
             function(line, *code);
             line.put("  ");
             range(line, address, quantity);
@@ -377,7 +375,7 @@ pub fn response(line: &mut TextWriter, pdu: &[u8], head: &[u8]) {
     function(line, response.function());
     let asked = arguments(head);
     if let (
-        RequestStart::Range(address, quantity),
+        Arguments::Range(address, quantity),
         Response::ReadBits { .. } | Response::ReadRegisters { .. },
     ) = (asked, response)
     {
@@ -387,7 +385,7 @@ pub fn response(line: &mut TextWriter, pdu: &[u8], head: &[u8]) {
     match response {
         Response::ReadBits { data, .. } => {
             let count = match asked {
-                RequestStart::Range(_, quantity) => quantity.into(),
+                Arguments::Range(_, quantity) => quantity.into(),
                 _ => 8 * data.len(),
             };
             line.byte(b':');
@@ -431,7 +429,7 @@ pub fn response(line: &mut TextWriter, pdu: &[u8], head: &[u8]) {
             let mut separator = " ";
             for data in groups.iter() {
                 line.put(separator);
-                if let (RequestStart::Record(record), " ") = (asked, separator) {
+                if let (Arguments::Record(record), " ") = (asked, separator) {
                     records(line, record);
                     line.byte(b':');
                 }
@@ -449,7 +447,7 @@ pub fn response(line: &mut TextWriter, pdu: &[u8], head: &[u8]) {
             masks(line, address, and_mask, or_mask);
         }
         Response::FifoQueue { data } => {
-            if let RequestStart::Queue(address) = asked {
+            if let Arguments::Queue(address) = asked {
                 line.put("  ");
                 line.number(address.into());
             }

@@ -8,7 +8,9 @@ use mbm::server::diagnostics::Diagnostics;
 use mbm::server::files::{self, Fifos, Files};
 use mbm::server::identity::{self, Objects};
 use mbm::server::respond::respond;
-use mbm::server::storage::{Bits, Coils, DiscreteInputs, HoldingRegisters, InputRegisters, Words};
+use mbm::server::storage::{
+    BitArray, Coils, DiscreteInputs, HoldingRegisters, InputRegisters, RegisterArray,
+};
 use mbm::server::{Reply, Service, Unit};
 
 /// The bytes followed by their CRC.
@@ -148,13 +150,13 @@ impl Device {
             }
         };
         let mut after = |address, quantity| written.push((address, quantity));
-        let mut holding = HoldingRegisters(Words::new(100, &mut self.holding));
+        let mut holding = HoldingRegisters(RegisterArray::new(100, &mut self.holding));
         holding.0.valid = self.valid.as_ref().map(|valid| &valid[..]);
         holding.0.before = Some(&mut before);
         holding.0.after = Some(&mut after);
-        let mut coils = Coils(Bits::new(100, &mut self.coils));
+        let mut coils = Coils(BitArray::new(100, &mut self.coils));
         coils.0.size = 20;
-        let mut discrete = DiscreteInputs(Bits::new(100, &mut self.discrete));
+        let mut discrete = DiscreteInputs(BitArray::new(100, &mut self.discrete));
         discrete.0.size = 20;
         let custom = self.custom;
         action(Unit {
@@ -162,7 +164,7 @@ impl Device {
             services: &mut [
                 &mut DisabledFunctions(self.off),
                 &mut holding,
-                &mut InputRegisters(Words::new(100, &mut self.inputs)),
+                &mut InputRegisters(RegisterArray::new(100, &mut self.inputs)),
                 &mut coils,
                 &mut discrete,
                 &mut Stored(&mut self.files),

@@ -1,6 +1,6 @@
 //! A request that owns its data, and the buffers and records that a client works with.
 
-use mbm::client::{ClientRequest, ClientStorage, RequestState, Unit};
+use mbm::client::{ClientRequest, ClientStorage, RequestState, UnitRecord};
 use mbm::engine::{Counter, Frame, Storage, COUNTERS};
 use mbm::error::Status;
 use mbm::pdu::header::RequestHeader;
@@ -13,7 +13,7 @@ pub struct Lent {
     pub frame: Frame<Vec<u8>>,
     pub outgoing: Vec<u8>,
     pub counters: Rc<RefCell<[u32; COUNTERS]>>,
-    pub units: Vec<Unit>,
+    pub units: Vec<UnitRecord>,
     pub random: u32,
 }
 
@@ -82,7 +82,7 @@ impl ClientStorage for Lent {
         &mut self.outgoing
     }
 
-    fn units(&mut self) -> &mut [Unit] {
+    fn units(&mut self) -> &mut [UnitRecord] {
         &mut self.units
     }
 

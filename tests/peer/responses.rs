@@ -3,7 +3,7 @@
 use crate::process::query;
 use crate::{frame, from_hex, hex, open, read_as, FRAMINGS};
 use mbm::pdu::files::{Records, Writes};
-use mbm::pdu::identification::Objects;
+use mbm::pdu::identification::ObjectList;
 use mbm::pdu::response::Response;
 
 struct Case {
@@ -248,7 +248,7 @@ cases! {
             conformity: 0x83,
             more_follows: false,
             next_object: 0,
-            objects: Objects::new(3, b"\x00\x01a\x01\x02bc\x02\x03def").expect("in order"),
+            objects: ObjectList::new(3, b"\x00\x01a\x01\x02bc\x02\x03def").expect("in order"),
         },
         "ReadDeviceInformationResponse(1, {0: b'a', 1: b'bc', 2: b'def'})",
         "ReadDeviceInformationResponse read_code=1 conformity=131 more_follows=0 \
@@ -260,7 +260,7 @@ cases! {
             conformity: 0x83,
             more_follows: true,
             next_object: 0x81,
-            objects: Objects::new(1, &OBJECT).expect("in order"),
+            objects: ObjectList::new(1, &OBJECT).expect("in order"),
         },
         "ReadDeviceInformationResponse(3, {0x80: b'x' * 200, 0x81: b'y' * 200})",
         "ReadDeviceInformationResponse read_code=3 conformity=131 more_follows=255 \
@@ -277,7 +277,7 @@ cases! {
             conformity: 0x83,
             more_follows: false,
             next_object: 0,
-            objects: Objects::new(1, b"\x06\x04name").expect("in order"),
+            objects: ObjectList::new(1, b"\x06\x04name").expect("in order"),
         },
         "ReadDeviceInformationResponse(4, {6: b'name'})",
         "ReadDeviceInformationResponse read_code=4 conformity=131 more_follows=0 \

@@ -3,7 +3,7 @@
 use mbm::error::Status;
 use mbm::frame::{ascii, Framing};
 use mbm::pdu::custom::Function;
-use mbm::sniffer::{EventKind, Sniffer, Tap};
+use mbm::sniffer::{BusDirection, EventKind, Sniffer};
 use mbm::text::TextWriter;
 
 /// A copy of an event.
@@ -73,10 +73,12 @@ impl Bench {
         }
     }
 
-    pub fn feed_at(&mut self, tap: Tap, bytes: &[u8]) {
+    pub fn feed_at(&mut self, direction: BusDirection, bytes: &[u8]) {
         let mut rest = bytes;
         while !rest.is_empty() {
-            let taken = self.sniffer.feed(&mut self.buffer, tap, rest, self.now);
+            let taken = self
+                .sniffer
+                .feed(&mut self.buffer, direction, rest, self.now);
             let before = self.events.len();
             self.collect_events();
             assert!(taken > 0 || self.events.len() > before, "no progress");
@@ -86,7 +88,7 @@ impl Bench {
 
     /// Lets bytes of both directions arrive now.
     pub fn feed(&mut self, bytes: &[u8]) {
-        self.feed_at(Tap::Both, bytes);
+        self.feed_at(BusDirection::Both, bytes);
     }
 
     /// Lets `time` microseconds pass without bytes.

@@ -5,7 +5,7 @@ use crate::exchanges::{assert_exchanges, EXCHANGES, READ, READ_REPLY, WRITE};
 use mbm::error::Status;
 use mbm::frame::Framing;
 use mbm::pdu::custom::{Function, Rule};
-use mbm::sniffer::{EventKind, Tap};
+use mbm::sniffer::{BusDirection, EventKind};
 
 #[test]
 fn every_function_is_reported_in_every_framing() {
@@ -331,21 +331,24 @@ fn two_directions_are_paired_when_their_bytes_are_mixed() {
     for framing in [Framing::Rtu, Framing::Ascii, Framing::Tcp] {
         let mut bench = Bench::with_buffer(framing, 2 * framing.max_frame());
         // A frame from the server is never a request.
-        bench.feed_at(Tap::Server, &frame(framing, 1, 17, WRITE));
+        bench.feed_at(BusDirection::Server, &frame(framing, 1, 17, WRITE));
         bench.wait(10_000);
         let (request, other) = (
             frame(framing, 2, 17, READ),
             frame(framing, 1, 17, READ_REPLY),
         );
         for (index, byte) in request.iter().enumerate() {
-            bench.feed_at(Tap::Client, &[*byte]);
+            bench.feed_at(BusDirection::Client, &[*byte]);
             if let Some(byte) = other.get(index) {
-                bench.feed_at(Tap::Server, &[*byte]);
+                bench.feed_at(BusDirection::Server, &[*byte]);
             }
         }
-        bench.feed_at(Tap::Server, &other[request.len().min(other.len())..]);
+        bench.feed_at(
+            BusDirection::Server,
+            &other[request.len().min(other.len())..],
+        );
         bench.wait(10_000);
-        bench.feed_at(Tap::Server, &frame(framing, 2, 17, READ_REPLY));
+        bench.feed_at(BusDirection::Server, &frame(framing, 2, 17, READ_REPLY));
         let kinds = bench.kinds();
         assert_eq!(kinds[0], EventKind::Unpaired, "{framing:?} {kinds:?}");
         assert_eq!(
@@ -372,12 +375,18 @@ fn events_of_two_directions_are_reported_in_order_of_time() {
         let mut bench = Bench::with_buffer(Framing::Tcp, 2 * Framing::Tcp.max_frame());
         bench.now = 5_000;
         // The header announces more bytes than ever arrive, and so hides a reply.
-        bench.feed_at(Tap::Server, &[0, 9, 0, 0, 0, 50]);
-        bench.feed_at(Tap::Server, &frame(Framing::Tcp, 1, 17, READ_REPLY));
+        bench.feed_at(BusDirection::Server, &[0, 9, 0, 0, 0, 50]);
+        bench.feed_at(
+            BusDirection::Server,
+            &frame(Framing::Tcp, 1, 17, READ_REPLY),
+        );
         bench.now += gap;
-        bench.feed_at(Tap::Client, &frame(Framing::Tcp, 2, 17, READ));
+        bench.feed_at(BusDirection::Client, &frame(Framing::Tcp, 2, 17, READ));
         bench.wait(10_000);
-        bench.feed_at(Tap::Server, &frame(Framing::Tcp, 2, 17, READ_REPLY));
+        bench.feed_at(
+            BusDirection::Server,
+            &frame(Framing::Tcp, 2, 17, READ_REPLY),
+        );
         let kinds = [
             EventKind::Noise,
             EventKind::Unpaired,
@@ -396,9 +405,12 @@ fn a_frame_received_before_a_request_does_not_end_the_wait_for_its_reply() {
     let mut bench = Bench::with_buffer(Framing::Tcp, 2 * Framing::Tcp.max_frame());
     bench.sniffer.set_frame_timeout(60_000_000);
     let reply = frame(Framing::Tcp, 1, 17, READ_REPLY);
-    bench.feed_at(Tap::Server, &[&[0, 9, 0, 0, 0, 50], &reply[..]].concat());
+    bench.feed_at(
+        BusDirection::Server,
+        &[&[0, 9, 0, 0, 0, 50], &reply[..]].concat(),
+    );
     bench.now = 1_000_000;
-    bench.feed_at(Tap::Client, &frame(Framing::Tcp, 2, 17, READ));
+    bench.feed_at(BusDirection::Client, &frame(Framing::Tcp, 2, 17, READ));
     bench.now = 1_500_000;
     // Now the incomplete frame expires as noise, and the frame within it is reported.
     bench.sniffer.set_frame_timeout(1_000_000);

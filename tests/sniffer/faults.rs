@@ -4,7 +4,7 @@ use crate::bench::{frame, rtu, Bench};
 use crate::exchanges::{READ, READ_REPLY};
 use mbm::error::Status;
 use mbm::frame::Framing;
-use mbm::sniffer::{EventKind, Tap};
+use mbm::sniffer::{BusDirection, EventKind};
 use mbm::text::TextWriter;
 
 #[test]
@@ -65,7 +65,7 @@ fn a_request_that_a_server_must_refuse_is_reported_as_malformed() {
 fn a_byte_that_cannot_begin_a_reply_is_reported_at_once() {
     let mut bench = Bench::new(Framing::Rtu);
     // No reply has unit 0.
-    bench.feed_at(Tap::Server, &[0]);
+    bench.feed_at(BusDirection::Server, &[0]);
     assert_eq!(bench.kinds(), [EventKind::Noise]);
 }
 
@@ -274,7 +274,9 @@ fn a_frame_longer_than_the_buffer_is_reported_and_the_next_one_is_found() {
 fn a_buffer_too_small_for_the_text_is_reported() {
     let mut bench = Bench::new(Framing::Rtu);
     let bytes = rtu(17, READ);
-    bench.sniffer.feed(&mut bench.buffer, Tap::Both, &bytes, 0);
+    bench
+        .sniffer
+        .feed(&mut bench.buffer, BusDirection::Both, &bytes, 0);
     let event = bench.sniffer.next(&mut bench.buffer, &[], 0).unwrap();
     let mut text = [0xEE; 20];
     let mut line = TextWriter::new(&mut text);

@@ -4,7 +4,7 @@ use crate::bench::{frame, rtu, Bench};
 use crate::exchanges::EXCHANGES;
 use mbm::frame::checksum::crc16;
 use mbm::frame::Framing;
-use mbm::sniffer::{EventKind, Tap};
+use mbm::sniffer::{BusDirection, EventKind};
 use proptest::prelude::*;
 
 /// For each exchange: noise before it, its index, and the silence after each frame.
@@ -113,13 +113,13 @@ proptest! {
         let mut bench = Bench::with_buffer(framing, 64 + size);
         bench.sniffer.set_baud_rate(baud);
         let mut count = 0;
-        for (bytes, time, tap) in pieces {
-            let tap = match (is_apart, tap) {
-                (false, _) => Tap::Both,
-                (true, 0) => Tap::Client,
-                _ => Tap::Server,
+        for (bytes, time, direction) in pieces {
+            let direction = match (is_apart, direction) {
+                (false, _) => BusDirection::Both,
+                (true, 0) => BusDirection::Client,
+                _ => BusDirection::Server,
             };
-            bench.feed_at(tap, &bytes);
+            bench.feed_at(direction, &bytes);
             bench.wait(time % 3_000_000);
             count += bytes.len();
         }
@@ -150,16 +150,16 @@ proptest! {
         for (which, is_reply, noise, silence) in pieces {
             let (request, reply, ..) = EXCHANGES[which];
             let pdu = if is_reply { reply } else { request };
-            let tap = match (is_apart, is_reply) {
-                (false, _) => Tap::Both,
-                (true, false) => Tap::Client,
-                (true, true) => Tap::Server,
+            let direction = match (is_apart, is_reply) {
+                (false, _) => BusDirection::Both,
+                (true, false) => BusDirection::Client,
+                (true, true) => BusDirection::Server,
             };
             let bytes = [frame(framing, 1, 17, pdu), noise].concat();
             for some in bytes.chunks(piece) {
                 for bench in [&mut deferred, &mut eager] {
                     bench.now += 200;
-                    bench.feed_at(tap, some);
+                    bench.feed_at(direction, some);
                 }
                 // Setting a timeout makes the sniffer search again, even after a single byte.
                 eager.sniffer.set_timeout(1_000_000);

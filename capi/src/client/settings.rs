@@ -5,7 +5,7 @@ use super::storage::{ClientBuffers, UnitRecords};
 use crate::pointers;
 use crate::storage::mbm_counters;
 use core::ffi::c_void;
-use mbm::client::{again, note, rest, Backoff, ClientStorage as _, Policy, Unit};
+use mbm::client::{again, note, rest, Backoff, ClientStorage as _, Policy, UnitRecord};
 use mbm::engine::Settings;
 use mbm::error::Status;
 use mbm::time::millis;
@@ -53,11 +53,11 @@ pub struct mbm_clientUnit {
 
 const _: () = {
     use core::mem::offset_of;
-    assert!(size_of::<mbm_clientUnit>() == size_of::<Unit>());
-    assert!(align_of::<mbm_clientUnit>() == align_of::<Unit>());
-    assert!(offset_of!(mbm_clientUnit, delayUs) == offset_of!(Unit, delay));
-    assert!(offset_of!(mbm_clientUnit, unit) == offset_of!(Unit, unit));
-    assert!(offset_of!(mbm_clientUnit, status) == offset_of!(Unit, status));
+    assert!(size_of::<mbm_clientUnit>() == size_of::<UnitRecord>());
+    assert!(align_of::<mbm_clientUnit>() == align_of::<UnitRecord>());
+    assert!(offset_of!(mbm_clientUnit, delayUs) == offset_of!(UnitRecord, delay));
+    assert!(offset_of!(mbm_clientUnit, unit) == offset_of!(UnitRecord, unit));
+    assert!(offset_of!(mbm_clientUnit, status) == offset_of!(UnitRecord, status));
 };
 
 /// The parts of a client that settings reach.

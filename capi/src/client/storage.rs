@@ -3,7 +3,7 @@
 use crate::storage::{lent_frame, mbm_counters};
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
-use mbm::client::{ClientStorage, Policy, Unit};
+use mbm::client::{ClientStorage, Policy, UnitRecord};
 use mbm::engine::Storage;
 use mbm::error::Status;
 
@@ -29,7 +29,7 @@ pub(super) struct ClientBuffers {
     pub(super) frame: *mut u8,
     pub(super) outgoing: *mut u8,
     pub(super) counters: *mut mbm_counters,
-    pub(super) units: *mut Unit,
+    pub(super) units: *mut UnitRecord,
     pub(super) unit_records: Option<&'static UnitRecords>,
     pub(super) again: Option<Again>,
     pub(super) random: Option<unsafe extern "C" fn(context: *mut c_void) -> u32>,
@@ -57,7 +57,7 @@ impl ClientStorage for ClientBuffers {
         unsafe { from_raw_parts_mut(self.outgoing.add(from.into()), (to - from).into()) }
     }
 
-    fn units(&mut self) -> &mut [Unit] {
+    fn units(&mut self) -> &mut [UnitRecord] {
         if self.units.is_null() {
             return &mut [];
         }

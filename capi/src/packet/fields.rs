@@ -5,7 +5,7 @@ use crate::functions::*;
 use mbm::error::Status;
 use mbm::packet::refusal::Head;
 use mbm::pdu::files::{Reads, Records, Writes};
-use mbm::pdu::identification::Objects;
+use mbm::pdu::identification::ObjectList;
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
 use mbm::pdu::EXCEPTION;
@@ -376,7 +376,7 @@ impl mbm_packet {
                     conformity: self.conformity,
                     more_follows: self.moreFollows != 0,
                     next_object: self.nextObjectId,
-                    objects: Objects::new(self.objectCount, data).map_err(malformed)?,
+                    objects: ObjectList::new(self.objectCount, data).map_err(malformed)?,
                 },
                 mei_type => Response::EncapsulatedInterface { mei_type, data },
             },

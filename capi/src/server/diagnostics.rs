@@ -57,12 +57,12 @@ unsafe extern "C" fn monitor(
         let function = bytes.first().copied().unwrap_or(0);
         let info = info.cast::<RequestInfo>();
         let request = bytes.get(..length).unwrap_or_default();
-        if !line(record).read_bytes(&*info, addressing, request) {
+        if !line(record).count_frame(&*info, addressing, request) {
             return Reply::NO_RESPONSE.code();
         }
         let reply = walk(unit, info.cast(), pdu);
         if reply != Reply::PENDING.code() {
-            line(record).done(addressing, function, Reply::from_number(reply));
+            line(record).count_outcome(addressing, function, Reply::from_number(reply));
         }
         reply
     }

@@ -349,7 +349,7 @@ impl Dispatch for Frame {
     }
 
     #[inline(always)]
-    fn ask(&mut self, unit: *mut mbm_unit, addressing: Addressing) -> Option<Reply> {
+    fn offer(&mut self, unit: *mut mbm_unit, addressing: Addressing) -> Option<Reply> {
         // SAFETY: as for `serve`.
         let reply = unsafe {
             let (info, pdu) = (self.info.cast(), self.pdu);

@@ -11,7 +11,7 @@ use core::ffi::c_void;
 use mbm::error::Status;
 use mbm::frame::Framing;
 use mbm::pdu::custom::{Function, Rule};
-use mbm::sniffer::{Sniffer, Tap, MIN_BUFFER};
+use mbm::sniffer::{BusDirection, Sniffer, MIN_BUFFER};
 use mbm::time::millis;
 
 /// Heard on a line that carries both directions.
@@ -323,9 +323,9 @@ pub unsafe extern "C" fn mbm_sniffer_feed(
     nowUs: u32,
 ) -> u16 {
     let direction = match direction {
-        MBM_DIRECTION_BOTH => Tap::Both,
-        MBM_DIRECTION_CLIENT => Tap::Client,
-        MBM_DIRECTION_SERVER => Tap::Server,
+        MBM_DIRECTION_BOTH => BusDirection::Both,
+        MBM_DIRECTION_CLIENT => BusDirection::Client,
+        MBM_DIRECTION_SERVER => BusDirection::Server,
         _ => return 0,
     };
     // SAFETY: as the header demands; begin demands that the buffer is valid.
@@ -363,7 +363,7 @@ pub unsafe extern "C" fn mbm_sniffer_next(
     // SAFETY: as the header demands; begin demands that the buffer is valid.
     unsafe {
         ask(sniffer, 0, |object| {
-            if object.core.is_calm(nowUs) || only_waits(object, nowUs) {
+            if object.core.is_idle(nowUs) || only_waits(object, nowUs) {
                 return 0;
             }
             next(object, nowUs, event)
