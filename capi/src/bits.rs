@@ -1,7 +1,7 @@
 //! `mbm_bits_*`: coils and discrete inputs, packed in bytes as they travel or in
 //! words as the master keeps them.
 
-use super::pointers::{put_found, slice, slice_mut};
+use super::pointers::{put_result, slice, slice_mut};
 use mbm::data::bits::{self, Packed};
 use mbm::error::Status;
 
@@ -54,7 +54,7 @@ unsafe fn is_set<T: Packed>(
     // SAFETY: as the caller promises.
     code(unsafe {
         slice(units, self::units::<T>(quantity)).and_then(|units| {
-            put_found(on, || {
+            put_result(on, || {
                 bits::is_set(units, first, quantity, address).map(u8::from)
             })
         })

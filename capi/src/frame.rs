@@ -4,7 +4,7 @@ use super::framing::mbm_framing;
 use super::packet::{
     mbm_length, mbm_packet, own, put_expected, reply_length, side, MBM_PACKET_REQUEST,
 };
-use super::pointers::{buffer, get, lent, put, put_length};
+use super::pointers::{array, buffer, get, put, put_length};
 use mbm::error::Status;
 use mbm::frame::checksum::{crc16, lrc, Crc16};
 use mbm::frame::{Adu, Framing};
@@ -236,7 +236,7 @@ pub unsafe extern "C" fn mbm_frame_expectedLength(
     unsafe {
         let measure = || {
             let side = side(kind)?;
-            let bytes = lent(bytes, have.into()).ok_or(Status::INVALID_ARGUMENT)?;
+            let bytes = array(bytes, have.into()).ok_or(Status::INVALID_ARGUMENT)?;
             let look = look(framing, |framing| function(framing, bytes))?;
             let own = look.own.as_slice();
             match look.framing {
@@ -314,7 +314,7 @@ pub unsafe extern "C" fn mbm_frame_looksLikeTcp(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        let bytes = lent(bytes, have.into()).filter(|_| !expected.is_null());
+        let bytes = array(bytes, have.into()).filter(|_| !expected.is_null());
         let length = match bytes {
             Some(bytes) => length::looks_like_tcp(bytes, allowUnknown != 0, &[]),
             None => Err(Status::INVALID_ARGUMENT),
@@ -334,7 +334,7 @@ pub unsafe extern "C" fn mbm_frame_looksLikeTcp(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_crc16(bytes: *const u8, length: u16) -> u16 {
     // SAFETY: as the header demands.
-    let bytes = unsafe { lent(bytes, length.into()) };
+    let bytes = unsafe { array(bytes, length.into()) };
     let crc = bytes.map_or(Crc16::START, crc16);
     u16::from_le_bytes(crc.to_bytes())
 }
@@ -349,5 +349,5 @@ pub unsafe extern "C" fn mbm_frame_crc16(bytes: *const u8, length: u16) -> u16 {
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_lrc(bytes: *const u8, length: u16) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { lent(bytes, length.into()) }.map_or(0, lrc)
+    unsafe { array(bytes, length.into()) }.map_or(0, lrc)
 }

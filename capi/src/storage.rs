@@ -65,7 +65,7 @@ unsafe fn words<'a>(first: *mut u16, count: u8) -> &'a mut [u16] {
 /// used. The engine, and a client's TCP line, keep every index below `space`:
 /// `tests/storage_bounds.rs`, `tests/client_bounds.rs` and `c-tests/test_client_buffers.c`
 /// hold them to that.
-macro_rules! lent_frame {
+macro_rules! frame_storage {
     ($count:ty) => {
         type Count = $count;
 
@@ -124,11 +124,11 @@ macro_rules! lent_frame {
         }
     };
 }
-pub(crate) use lent_frame;
+pub(crate) use frame_storage;
 
 // Without buffers nothing is requested.
 impl Storage for MasterBuffers {
-    lent_frame!(u8);
+    frame_storage!(u8);
 
     // Volatile, or LLVM would call memmove of libc.
     #[cfg_attr(target_os = "none", inline(never))]

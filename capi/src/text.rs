@@ -2,7 +2,7 @@
 
 use super::framing::mbm_framing;
 use super::packet::side;
-use super::pointers::{buffer, get, lent_or_none};
+use super::pointers::{array_or_empty, buffer, get};
 use core::ffi::c_char;
 use mbm::error::Status;
 use mbm::text::{self, TextWriter};
@@ -60,7 +60,7 @@ pub unsafe extern "C" fn mbm_frame_text(
             let mut line = line(text, size)?;
             let told = get(framing).ok_or(Status::INVALID_ARGUMENT)?;
             let (framing, end) = (told.of_frames()?, told.end());
-            let frame = lent_or_none(frame, frameLength.into());
+            let frame = array_or_empty(frame, frameLength.into());
             let frame = frame.ok_or(Status::INVALID_ARGUMENT)?;
             text::frame(&mut line, framing, side(kind)?, frame, end);
             Ok(line)

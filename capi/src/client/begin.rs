@@ -42,7 +42,7 @@ unsafe fn begin(
                 let storage = kind.storage(object);
                 storage.frame = frame;
                 storage.frame_bytes = countable(frame_bytes);
-                pointers::calling(pointer, || (kind.start)(object));
+                pointers::with_hooks(pointer, || (kind.start)(object));
                 Status::OK
             }
             _ => Status::INVALID_ARGUMENT,
@@ -70,7 +70,7 @@ unsafe fn give_up(client: *mut mbm_client) -> Status {
         if (*object).queue.suspended {
             return Status::BUSY;
         }
-        mbm_client::mark(client).write(pointers::CALLING);
+        mbm_client::mark(client).write(pointers::IN_HOOK);
         ((*(*object).kind).release)(object, None);
         queue(object).cancel_all();
         // Not by memset: libc's is larger than this loop, and most images have no other use

@@ -42,7 +42,7 @@ pub unsafe extern "C" fn mbm_client_reconnect(
                 return Status::BUSY;
             }
             let release = (*(*object).kind).release;
-            pointers::calling(client, || release(object, None));
+            pointers::with_hooks(client, || release(object, None));
             queue(object).interrupt();
             Status::OK
         });
@@ -76,7 +76,7 @@ pub unsafe extern "C" fn mbm_client_reconnect(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { pointers::ask(client, 0, |object| queue(object).connected.into()) }
+    unsafe { pointers::read(client, 0, |object| queue(object).connected.into()) }
 }
 
 /// Lends the line to a facade, whose functions then use the client's port; the
@@ -123,7 +123,7 @@ pub unsafe extern "C" fn mbm_client_suspend(
             Status::OK
         });
         if status == Status::OK.code() && !master.is_null() {
-            master::calling(master, Core::line_used);
+            master::with_hooks(master, Core::line_used);
         }
         status
     }

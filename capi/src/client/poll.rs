@@ -57,12 +57,12 @@ pub(super) unsafe fn turns(client: *mut mbm_client, advance: Advance) -> Status 
     // that may use the object. If it zeroed it, and perhaps began it anew, polling is
     // over.
     unsafe {
-        let now = pointers::calling(client, || now(object));
+        let now = pointers::with_hooks(client, || now(object));
         (*object).polling = true;
         let mut turns = MBM_CLIENT_DEPTH + 1;
         while turns > 0 {
             let fresh = turns > MBM_CLIENT_DEPTH;
-            match pointers::calling(client, || advance(object, now, fresh)) {
+            match pointers::with_hooks(client, || advance(object, now, fresh)) {
                 Some(request) => request.call(),
                 None => break,
             }
@@ -94,7 +94,7 @@ pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
     // SAFETY: as the header demands.
     unsafe {
         match pointers::check(client) {
-            Status::OK => pointers::calling(client, || {
+            Status::OK => pointers::with_hooks(client, || {
                 let object = pointers::object(client);
                 let now = now(object);
                 on_transport!(object, line => line.poll_delay(&(*object).queue, now))
@@ -112,7 +112,7 @@ pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_pending(client: *const mbm_client) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { pointers::ask(client, 0, |object| queue(object).pending() as u8) }
+    unsafe { pointers::read(client, 0, |object| queue(object).pending() as u8) }
 }
 
 /// Gives a request up. It is yours again at once, with the status MBM_CANCELLED;
@@ -136,7 +136,7 @@ pub unsafe extern "C" fn mbm_client_cancel(
                 Some(request) => {
                     if request.state().is_sent() {
                         let release = (*(*object).kind).release;
-                        pointers::calling(client, || release(object, Some(&request)));
+                        pointers::with_hooks(client, || release(object, Some(&request)));
                     }
                     Status::OK
                 }

@@ -1,6 +1,6 @@
 //! What the begin functions and settings of a client lend.
 
-use crate::storage::{lent_frame, mbm_counters};
+use crate::storage::{frame_storage, mbm_counters};
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 use mbm::client::{ClientStorage, Policy, Unit};
@@ -43,7 +43,7 @@ pub(super) struct ClientBuffers {
 // the header that set it demands, valid for as long as the object is used; what
 // is NULL has no length, and each is lent for as long as `self` is borrowed.
 impl Storage for ClientBuffers {
-    lent_frame!(u16);
+    frame_storage!(u16);
 }
 
 impl ClientStorage for ClientBuffers {

@@ -102,10 +102,13 @@ pub(super) unsafe fn prepare(master: *mut mbm_master) -> Status {
 /// # Safety
 /// As for [`pointers::calling`].
 #[inline(always)]
-pub(super) unsafe fn calling<T>(master: *mut mbm_master, action: impl FnOnce(&mut Core) -> T) -> T {
+pub(super) unsafe fn with_hooks<T>(
+    master: *mut mbm_master,
+    action: impl FnOnce(&mut Core) -> T,
+) -> T {
     // SAFETY: begun, so every field is valid; exclusive, for no other function
     // makes a reference while the mark says so.
-    unsafe { pointers::calling(master, || action(&mut *Object::core_of(master))) }
+    unsafe { pointers::with_hooks(master, || action(&mut *Object::core_of(master))) }
 }
 
 /// Begins to talk to a slave over a port.
@@ -158,7 +161,7 @@ pub unsafe extern "C" fn mbm_master_beginRtuWith(
         }
         let status = prepare(master);
         if status == Status::OK {
-            calling(master, |core| {
+            with_hooks(master, |core| {
                 core.begin(slave, |place| place.set(port, context));
             });
         }
@@ -249,7 +252,7 @@ unsafe extern "C" fn poll(master: *mut mbm_master) -> u8 {
     // SAFETY: as the caller promises.
     unsafe {
         match pointers::check(master) {
-            Status::OK => calling(master, Core::poll),
+            Status::OK => with_hooks(master, Core::poll),
             refused => refused,
         }
         .code()
@@ -268,7 +271,7 @@ pub unsafe extern "C" fn mbm_master_pollDelay(master: *mut mbm_master) -> u32 {
     // SAFETY: as the header demands.
     unsafe {
         match pointers::check(master) {
-            Status::OK => calling(master, Core::poll_delay),
+            Status::OK => with_hooks(master, Core::poll_delay),
             Status::BUSY => 0,
             _ => u32::MAX,
         }
@@ -286,7 +289,7 @@ pub unsafe extern "C" fn mbm_master_cancel(master: *mut mbm_master) -> u8 {
     unsafe {
         let status = pointers::check(master);
         if status == Status::OK {
-            calling(master, Core::cancel);
+            with_hooks(master, Core::cancel);
         }
         status.code()
     }
@@ -311,7 +314,7 @@ pub unsafe extern "C" fn mbm_master_status(master: *const mbm_master) -> u8 {
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_getExceptionCode(master: *const mbm_master) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { pointers::ask(master, 0, |master| master.core.exception_code()) }
+    unsafe { pointers::read(master, 0, |master| master.core.exception_code()) }
 }
 
 /// Requests a form of an address and a word and, in blocking mode, sees it through.

@@ -1,8 +1,8 @@
 //! How a master behaves.
 
-use super::calling;
+use super::with_hooks;
 use super::{mbm_master, Core};
-use crate::pointers::{ask, check, with};
+use crate::pointers::{check, read, with};
 use crate::storage::mbm_counters;
 use mbm::error::Status;
 use mbm::time::millis;
@@ -42,7 +42,7 @@ pub unsafe extern "C" fn mbm_master_setSlaveID(master: *mut mbm_master, slave: u
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_getSlaveID(master: *const mbm_master) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { ask(master, 0, |master| master.core.slave()) }
+    unsafe { read(master, 0, |master| master.core.slave()) }
 }
 
 /// Sets how long a reply may take, from the last bit of the request to the last
@@ -305,7 +305,7 @@ pub unsafe extern "C" fn mbm_master_lineUsed(master: *mut mbm_master) -> u8 {
     unsafe {
         let status = check(master);
         if status == Status::OK {
-            calling(master, Core::line_used);
+            with_hooks(master, Core::line_used);
         }
         status.code()
     }

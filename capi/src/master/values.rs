@@ -2,7 +2,7 @@
 
 use super::mbm_master;
 use super::Object;
-use crate::pointers::{put_found, with};
+use crate::pointers::{put_result, with};
 use crate::registers::{self, mbm_registers, MBM_REGISTERS_INTO_WORDS, MBM_REGISTERS_OF_WORDS};
 use crate::storage::MasterBuffers;
 use mbm::data::order::Order;
@@ -72,7 +72,7 @@ pub unsafe extern "C" fn mbm_master_getResponseRegisters(
     // SAFETY: as the header demands; every object is writable storage.
     unsafe {
         with(master.cast_mut(), |master| {
-            put_found(registers, || {
+            put_result(registers, || {
                 Ok(view(master, first, MBM_REGISTERS_OF_WORDS, |storage| {
                     (storage.response, storage.response_words)
                 }))
@@ -100,7 +100,7 @@ pub unsafe extern "C" fn mbm_master_getTransmitRegisters(
     // SAFETY: as the header demands; every object is writable storage.
     unsafe {
         with(master.cast_mut(), |master| {
-            put_found(registers, || {
+            put_result(registers, || {
                 Ok(view(master, first, MBM_REGISTERS_INTO_WORDS, |storage| {
                     (storage.transmit, storage.transmit_words)
                 }))

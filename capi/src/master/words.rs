@@ -1,7 +1,7 @@
 //! Words to send and words received.
 
 use super::mbm_master;
-use crate::pointers::{ask, with};
+use crate::pointers::{read, with};
 use mbm::error::Status;
 use mbm::master::NO_WORD;
 
@@ -14,7 +14,7 @@ use mbm::master::NO_WORD;
 pub unsafe extern "C" fn mbm_master_getResponseBuffer(master: *const mbm_master, index: u8) -> u16 {
     // SAFETY: as the header demands.
     unsafe {
-        ask(master, NO_WORD, |master| {
+        read(master, NO_WORD, |master| {
             master.core.response_word(usize::from(index))
         })
     }
@@ -146,7 +146,7 @@ pub unsafe extern "C" fn mbm_master_sendBit(master: *mut mbm_master, on: u8) -> 
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_available(master: *const mbm_master) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { ask(master, 0, |master| master.core.available()) }
+    unsafe { read(master, 0, |master| master.core.available()) }
 }
 
 /// The next word of the last successful read.
@@ -156,5 +156,5 @@ pub unsafe extern "C" fn mbm_master_available(master: *const mbm_master) -> u8 {
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_receive(master: *mut mbm_master) -> u16 {
     // SAFETY: as the header demands.
-    unsafe { ask(master, NO_WORD, |master| master.core.receive()) }
+    unsafe { read(master, NO_WORD, |master| master.core.receive()) }
 }

@@ -5,7 +5,7 @@ use super::{bare, plain, special};
 use crate::client::request::RequestFields;
 use crate::client::{mbm_client, mbm_clientRequest};
 use crate::functions::{mbm_rule, MBM_RULE_COUNTED, MBM_RULE_FIXED, MBM_RULE_SILENCE};
-use crate::pointers::lent_or_none;
+use crate::pointers::array_or_empty;
 use mbm::error::Status;
 use mbm::pdu::header::{FunctionSpec, RequestHeader, COUNTS, FIXED, GROUP, OWN};
 use mbm::pdu::limits::MAX_PDU;
@@ -380,7 +380,7 @@ pub unsafe extern "C" fn mbm_client_forward(
             Some(|inside, words, _| {
                 let body = core::ptr::with_exposed_provenance(words[2]);
                 let header = &mut inside.state.header;
-                let Some(whole) = lent_or_none(body, words[1]) else {
+                let Some(whole) = array_or_empty(body, words[1]) else {
                     return Status::INVALID_ARGUMENT;
                 };
                 let built = header.forward(words[0] as u8, whole);
