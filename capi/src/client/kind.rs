@@ -1,5 +1,5 @@
-//! The kinds of line that C has, as tables. Firmware carries the code of those whose
-//! mbm_client_begin function it calls, for nothing else names their tables.
+//! The kinds of transport of the client, as tables. Only the mbm_client_begin functions use
+//! the tables, so firmware contains the code of the kinds that it begins, and of no others.
 
 #[cfg(not(any(target_os = "none", mbm_firmware)))]
 use super::object::mbm_client;
