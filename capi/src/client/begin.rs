@@ -1,7 +1,7 @@
 //! The begin functions of the client, one for each framing, and the settings of one framing.
 
 use super::kind;
-use super::object::{line, mbm_client, queue, SerialTransport, TcpTransport, TransportKind};
+use super::object::{mbm_client, queue, transport, SerialTransport, TcpTransport, TransportKind};
 use crate::framing::{is_delimiter, MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
 use crate::pointers::{self, CObject};
 use crate::port::{countable, mbm_port};
@@ -27,7 +27,7 @@ unsafe fn begin(
         match port.as_ref() {
             Some(port)
                 if !frame.is_null()
-                    && frame_bytes >= u16::from(kind.least)
+                    && frame_bytes >= u16::from(kind.min_frame_bytes)
                     && port.is_complete() =>
             {
                 let status = give_up(pointer);
@@ -100,7 +100,7 @@ const _: () = assert!(size_of::<mbm_client>().is_multiple_of(size_of::<usize>())
 /// @param client      the object; zeroed before the first call
 /// @param port        the port, which is copied; read, write and micros must not be NULL
 /// @param frame       the buffer of one frame, valid for as long as the client is used
-/// @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
+/// @param frameBytes  bytes of `frame`, at min_frame_bytes 8; 256 hold any frame
 /// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
 ///         the client is suspended
 #[no_mangle]
@@ -121,7 +121,7 @@ pub unsafe extern "C" fn mbm_client_beginRtu(
 /// @param client      the object; zeroed before the first call
 /// @param port        the port, which is copied; read, write and micros must not be NULL
 /// @param frame       the buffer of one frame, valid for as long as the client is used
-/// @param frameBytes  bytes of `frame`, at least 17; 513 hold any frame
+/// @param frameBytes  bytes of `frame`, at min_frame_bytes 17; 513 hold any frame
 /// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
 ///         the client is suspended
 #[no_mangle]
@@ -156,7 +156,7 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
             if !queue(object).is_idle() {
                 return Status::BUSY;
             }
-            let engine = &mut line::<SerialTransport>(object).engine;
+            let engine = &mut transport::<SerialTransport>(object).engine;
             engine.request().set_ascii(character);
             Status::OK
         })
@@ -169,7 +169,7 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
 /// @param client      the object; zeroed before the first call
 /// @param port        the port, which is copied; read, write and micros must not be NULL
 /// @param frame       the buffer of one frame, valid for as long as the client is used
-/// @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
+/// @param frameBytes  bytes of `frame`, at min_frame_bytes 8; 256 hold any frame
 /// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
 ///         the client is suspended
 #[no_mangle]
@@ -191,11 +191,11 @@ pub unsafe extern "C" fn mbm_client_beginRtuOverTcp(
 /// @param port           the port, which is copied; read, write and micros must not be NULL
 /// @param incoming       the buffer of received bytes, valid for as long as the client is
 ///                       used
-/// @param incomingBytes  bytes of `incoming`, at least 9; 260 hold any frame. A larger
+/// @param incomingBytes  bytes of `incoming`, at min_frame_bytes 9; 260 hold any frame. A larger
 ///                       buffer takes more responses from one read
 /// @param outgoing       the buffer of bytes to send, valid for as long as the client is
 ///                       used
-/// @param outgoingBytes  bytes of `outgoing`, at least 12; 260 hold any frame. A larger
+/// @param outgoingBytes  bytes of `outgoing`, at min_frame_bytes 12; 260 hold any frame. A larger
 ///                       buffer collects more requests for one write
 /// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
 ///         the client is suspended
@@ -215,7 +215,7 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
     unsafe {
         let status = begin(client, port, incoming, incomingBytes, &kind::TCP);
         if status == Status::OK.code() {
-            let storage = &mut line::<TcpTransport>(pointers::object(client)).storage;
+            let storage = &mut transport::<TcpTransport>(pointers::object(client)).storage;
             storage.outgoing = outgoing;
             storage.outgoing_bytes = countable(outgoingBytes);
         }
@@ -238,7 +238,7 @@ pub unsafe extern "C" fn mbm_client_setInFlight(client: *mut mbm_client, most: u
     unsafe {
         pointers::with(client, |object| match ((*(*object).kind).framing, most) {
             (MBM_FRAMING_TCP, 1..=super::MBM_CLIENT_DEPTH) => {
-                line::<TcpTransport>(object).limit(most);
+                transport::<TcpTransport>(object).limit(most);
                 Status::OK
             }
             (MBM_FRAMING_RTU | MBM_FRAMING_ASCII, 1) => Status::OK,

@@ -109,7 +109,7 @@ pub unsafe extern "C" fn mbm_client_suspend(
                     refused => return refused,
                 }
             }
-            if !on_transport!(object, line => line.suspend(&mut (*object).queue)) {
+            if !on_transport!(object, transport => transport.suspend(&mut (*object).queue)) {
                 return Status::BUSY;
             }
             if !master.is_null() {
