@@ -115,7 +115,7 @@ pub unsafe extern "C" fn mbm_client_pending(client: *const mbm_client) -> u8 {
 
 /// Cancels a request. Its status becomes MBM_CANCELLED, `done` is not called, and you may use
 /// the request again at once. The device may have received the request, and may still send
-/// a reply: the client discards it.
+/// a reply.
 ///
 /// @param client   the object
 /// @param request  a request that was queued on this client

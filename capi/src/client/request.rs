@@ -90,12 +90,12 @@ impl RequestPtr {
         NonNull::new(request.cast()).map(RequestPtr)
     }
 
-    fn inside(&self) -> &RequestFields {
+    fn fields(&self) -> &RequestFields {
         // SAFETY: as `new` demands; nothing else uses a pending request.
         unsafe { self.0.as_ref() }
     }
 
-    pub(super) fn inside_mut(&mut self) -> &mut RequestFields {
+    pub(super) fn fields_mut(&mut self) -> &mut RequestFields {
         // SAFETY: as `new` demands; nothing else uses a pending request.
         unsafe { self.0.as_mut() }
     }
@@ -124,38 +124,38 @@ fn place(index: usize, words: bool) -> usize {
 
 impl ClientRequest for RequestPtr {
     fn state(&self) -> &RequestState {
-        &self.inside().state
+        &self.fields().state
     }
 
     fn state_mut(&mut self) -> &mut RequestState {
-        &mut self.inside_mut().state
+        &mut self.fields_mut().state
     }
 
     fn byte(&self, index: usize) -> u8 {
-        let inside = self.inside();
-        let at = place(index, inside.state.header.sends_words());
+        let fields = self.fields();
+        let at = place(index, fields.state.header.sends_words());
         // SAFETY: a queued request has as many data bytes as its header says. Of words, that
         // number is even.
-        unsafe { *inside.data.add(at) }
+        unsafe { *fields.data.add(at) }
     }
 
     fn put(&mut self, index: usize, byte: u8) {
-        let inside = self.inside_mut();
-        let at = place(index, inside.state.header.takes_words());
+        let fields = self.fields_mut();
+        let at = place(index, fields.state.header.takes_words());
         // SAFETY: the reply is not NULL and holds `capacity` bytes; `index` is less. Of words,
         // the client receives an even number of bytes.
-        unsafe { *inside.reply.add(at) = byte }
+        unsafe { *fields.reply.add(at) = byte }
     }
 
     // Not on a microcontroller, where the loop over bytes is in the image anyway.
     #[cfg(not(any(target_os = "none", mbm_firmware)))]
     #[inline(always)]
     fn store_all(&mut self, bytes: &[u8]) {
-        let inside = self.inside_mut();
+        let fields = self.fields_mut();
         // SAFETY: the reply is not NULL and holds `capacity` bytes, and `bytes` is not
         // longer; nothing else uses the reply.
-        let reply = unsafe { core::slice::from_raw_parts_mut(inside.reply, bytes.len()) };
-        if inside.state.header.takes_words() {
+        let reply = unsafe { core::slice::from_raw_parts_mut(fields.reply, bytes.len()) };
+        if fields.state.header.takes_words() {
             copy_words(reply, bytes);
         } else {
             reply.copy_from_slice(bytes);
@@ -163,6 +163,6 @@ impl ClientRequest for RequestPtr {
     }
 
     fn wants_data(&self) -> bool {
-        !self.inside().reply.is_null()
+        !self.fields().reply.is_null()
     }
 }

@@ -9,8 +9,8 @@ use mbm::time::millis;
 
 /// Makes a change that an archive may lack the code for: then it is refused.
 #[inline(always)]
-fn built_in(has: bool, change: impl FnOnce()) -> Status {
-    if has {
+fn if_built_in(built_in: bool, change: impl FnOnce()) -> Status {
+    if built_in {
         change();
         Status::OK
     } else {
@@ -161,7 +161,7 @@ pub unsafe extern "C" fn mbm_master_setRetries(master: *mut mbm_master, retries:
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            built_in(cfg!(feature = "retries") || retries == 0, || {
+            if_built_in(cfg!(feature = "retries") || retries == 0, || {
                 master.core.settings().retries = retries;
             })
         })
@@ -179,7 +179,7 @@ pub unsafe extern "C" fn mbm_master_setEchoDiscard(master: *mut mbm_master, on: 
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            built_in(cfg!(feature = "echo") || on == 0, || {
+            if_built_in(cfg!(feature = "echo") || on == 0, || {
                 master.core.settings().echo_discard = on != 0;
             })
         })
@@ -231,7 +231,7 @@ pub unsafe extern "C" fn mbm_master_setPostFlushHold(
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            built_in(cfg!(feature = "hold") || characters == 0, || {
+            if_built_in(cfg!(feature = "hold") || characters == 0, || {
                 master.core.settings().post_flush_hold = characters;
             })
         })
@@ -269,7 +269,7 @@ pub unsafe extern "C" fn mbm_master_setCounters(
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            built_in(cfg!(feature = "counters") || counters.is_null(), || {
+            if_built_in(cfg!(feature = "counters") || counters.is_null(), || {
                 master.core.storage().counters = counters;
             })
         })
