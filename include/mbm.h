@@ -78,7 +78,8 @@ struct mbm_unit;
 #define MBM_VERSION_PATCH 0
 
 /**
- * The version of the archive. It is MBM_VERSION if program and archive belong together.
+ * Returns the version of the archive. The text equals MBM_VERSION, the version of the
+ * header, if header and archive belong together.
  *
  * Any thread or interrupt may call it.
  *
@@ -94,84 +95,84 @@ const char *mbm_version(void);
 #define MBM_OK 0
 
 /**
- * Exception of the device: it does not know the function.
+ * Exception of the device: it does not support the function.
  */
 #define MBM_ILLEGAL_FUNCTION 1
 
 /**
- * Exception of the device: it has no such address. Also, with nothing sent,
- * for a range that passes address 65535.
+ * Exception of the device: it has no such address. This library also returns it, and sends
+ * nothing, for a range that passes address 65535.
  */
 #define MBM_ILLEGAL_DATA_ADDRESS 2
 
 /**
- * Exception of the device: it refuses the quantity or value. Also, with
- * nothing sent, for a quantity that the standard forbids, and for writes of
- * more than the transmit buffer holds.
+ * Exception of the device: it refuses the quantity or value. This library also returns it,
+ * and sends nothing, for a quantity that the standard forbids, and for a write of more than
+ * the transmit buffer holds.
  */
 #define MBM_ILLEGAL_DATA_VALUE 3
 
 /**
- * Exception of the device: it failed while it carried the request out.
+ * Exception of the device: it failed while it executed the request.
  */
 #define MBM_SLAVE_DEVICE_FAILURE 4
 
 /**
- * Exception of the device: accepted, but it takes long.
+ * Exception of the device: it accepted the request and needs a long time for it.
  */
 #define MBM_ACKNOWLEDGE 5
 
 /**
- * Exception of the device: busy, ask again later.
+ * Exception of the device: it is busy. Send the request again later.
  */
 #define MBM_SLAVE_DEVICE_BUSY 6
 
 /**
- * Exception of the device: a file's memory is inconsistent.
+ * Exception of the device: the memory of a file failed its consistency check.
  */
 #define MBM_MEMORY_PARITY_ERROR 8
 
 /**
- * Exception of a gateway: no path to the device.
+ * Exception of a gateway: it has no path to the device.
  */
 #define MBM_GATEWAY_PATH_UNAVAILABLE 10
 
 /**
- * Exception of a gateway: the device behind it did not answer.
+ * Exception of a gateway: it received no response from the device.
  */
 #define MBM_GATEWAY_TARGET_FAILED_TO_RESPOND 11
 
 /**
- * Within the response timeout only frames of other units arrived.
+ * Only frames of other units arrived within the response timeout.
  */
 #define MBM_INVALID_SLAVE_ID 224
 
 /**
- * Within the response timeout the unit answered, but to another function.
+ * The unit sent a reply to another function, and no other reply arrived within the
+ * response timeout.
  */
 #define MBM_INVALID_FUNCTION 225
 
 /**
- * No complete reply within the response timeout.
+ * No complete reply arrived within the response timeout.
  */
 #define MBM_RESPONSE_TIMED_OUT 226
 
 /**
- * The reply arrived damaged: its CRC is wrong.
+ * The CRC of the reply, or in ASCII its LRC, is wrong.
  */
 #define MBM_INVALID_CRC 227
 
 /**
- * An argument that the function cannot take: NULL, a number out of range, a port
- * without read, write or micros, a buffer that is too short, or an object of
- * another framing or kind. The comment of the function says which. Nothing was
- * changed.
+ * The function cannot accept an argument: NULL, a number out of range, a port without
+ * read, write or micros, a buffer that is too short, or an object of another framing or
+ * kind. The comment of the function says which. The call changed nothing.
  */
 #define MBM_INVALID_ARGUMENT 228
 
 /**
- * The unit answered the function with a right CRC, but not this request:
- * wrong byte count, wrong echo, or an exception code of 0 or from 0x80.
+ * The unit sent a reply of this function with a right CRC, but the reply does not match the
+ * request: a wrong byte count, a wrong echo, or an exception code of 0 or from 0x80.
  */
 #define MBM_MALFORMED_REPLY 229
 
@@ -181,21 +182,21 @@ const char *mbm_version(void);
 #define MBM_LINK_LOST 230
 
 /**
- * The object is in use: it has a request under way, it called the hook that this
- * call came from, or it is a record that is served in another way. Nothing was
- * changed.
+ * The object is in use: it has a request under way, or the call came from a hook that the
+ * object called, or the object is a record that serves in another way. The call changed
+ * nothing.
  */
 #define MBM_BUSY 231
 
 /**
- * A function that reads cannot be broadcast; nothing was sent.
+ * A request that reads cannot be broadcast. Nothing was sent.
  */
 #define MBM_BROADCAST_NOT_ALLOWED 232
 
 /**
- * The frame buffer cannot hold the request (nothing was sent), or frame or
- * response buffer cannot hold the reply (the response words are unchanged), or a
- * unit has no place for another record.
+ * One of these: the frame buffer cannot hold the request, and nothing was sent; the frame
+ * buffer or the response buffer cannot hold the reply, and the response words are
+ * unchanged; a unit cannot take another record.
  */
 #define MBM_BUFFER_TOO_SMALL 233
 
@@ -210,46 +211,47 @@ const char *mbm_version(void);
 #define MBM_PENDING 235
 
 /**
- * For as long as the response timeout the line never fell silent, or the
- * port took no bytes.
+ * The line was not silent, or the port accepted no bytes, for as long as the response
+ * timeout.
  */
 #define MBM_LINE_BUSY 236
 
 /**
- * The request was given up by mbm_master_cancel or mbm_master_beginRtu.
+ * A cancel function or a begin function gave the request up.
  */
 #define MBM_CANCELLED 237
 
 /**
- * A frame that is not whole yet: more bytes are to come.
+ * The frame is not complete: more bytes must follow.
  */
 #define MBM_INCOMPLETE_FRAME 238
 
 /**
- * No frame of this framing begins like that, or has such a length.
+ * No frame of this framing starts with these bytes, or has this length.
  */
 #define MBM_MALFORMED_FRAME 239
 
 /**
- * The client has 16 requests already; nothing was queued.
+ * The client has 16 requests already. Nothing was queued.
  */
 #define MBM_QUEUE_FULL 240
 
 /**
- * Another pending request of the client has this transaction id; nothing was
- * queued.
+ * Another pending request of the client has this transaction number. Nothing was queued.
  */
 #define MBM_DUPLICATE_TRANSACTION 241
 
 /**
- * The request has ended already, or was never queued.
+ * The request has ended already, or was never queued on this client.
  */
 #define MBM_NOT_PENDING 242
 
 /**
- * Explains a status in a few words of English. On an AVR, where constants lie in
- * RAM, a program that calls it has about 1100 bytes less of that: show the number,
- * or in a sketch modbusStatusText of ModbusStatusText.h, whose words stay in flash.
+ * Explains a status in a few words of English.
+ *
+ * On an AVR, constants are in RAM, and a program that calls this function has about 1100
+ * bytes of RAM less. There, show the number; or in a sketch call modbusStatusText of
+ * ModbusStatusText.h, which keeps its words in flash.
  *
  * Any thread or interrupt may call it.
  *
@@ -261,69 +263,70 @@ const char *mbm_status_text(uint8_t status);
 /* ==== 3. Port ======================================================================= */
 
 /**
- * What the firmware supplies: a byte stream, a clock, and optional hooks.
+ * What your firmware supplies: a byte stream, a clock, and optional hooks.
  *
- * A master refers to its port, which must stay valid and unchanged for as long as the
- * master is used; it may be a constant. A client and a server copy theirs. Hooks that
- * are NULL are not called; `read`, `write` and `micros` must be there.
+ * A master keeps a pointer to its port. The port must stay valid and unchanged for as long
+ * as the master is used; it may be a constant. A client and a server copy their port.
+ * `read`, `write` and `micros` must not be NULL. The other hooks may be NULL: then they are
+ * not called.
  *
- * A function that a hook calls on the object that called the hook returns
- * MBM_BUSY and changes nothing; a getter returns what it returns for an object
- * that was never begun. The hook `idle` is the exception: it may call every
- * function, and one that starts a request returns MBM_BUSY.
+ * A hook must not use the object that calls it. If it calls a function on that object, the
+ * function returns MBM_BUSY and changes nothing; a getter returns what it returns for an
+ * object that was never begun. The hook `idle` is the exception: it may call every
+ * function, but one that starts a request returns MBM_BUSY.
  */
 typedef struct mbm_port {
     /**
-     * Handed to every hook. Yours, may be NULL.
+     * Your pointer, passed to every hook; may be NULL.
      */
     void *context;
     /**
-     * Takes up to `capacity` received bytes without waiting. Returns how
-     * many, 0 if none has arrived yet, negative if the link is lost.
+     * Copies up to `capacity` received bytes to `bytes`, without waiting. Returns the
+     * number of bytes, 0 if none has arrived, a negative number if the link is lost.
      */
     int16_t (*read)(void *context, uint8_t *bytes, uint16_t capacity);
     /**
-     * Accepts up to `length` bytes to send without waiting for the wire.
-     * Returns how many, 0 if none just now, negative if the link is lost.
+     * Accepts up to `length` bytes to send, without waiting until they are sent. Returns
+     * the number of bytes accepted, 0 if it can accept none now, a negative number if the
+     * link is lost.
      */
     int16_t (*write)(void *context, const uint8_t *bytes, uint16_t length);
     /**
-     * A clock in microseconds that wraps at 2^32. A platform with a
+     * Returns the time in microseconds; it wraps at 2^32. A platform with a
      * millisecond tick returns `tick * 1000`.
      */
     uint32_t (*micros)(void *context);
     /**
-     * Optional: 1 once the last bit has left, 0 while bits are to come. It
-     * may wait for the last bit instead and return 1.
+     * Optional: returns 1 if the last bit was sent, 0 if bits remain to be sent. It may
+     * also wait until the last bit was sent, and return 1.
      */
     uint8_t (*flush)(void *context);
     /**
-     * Optional: called before the first byte of a request (RS-485 driver on).
+     * Optional: called before the first byte of a frame is sent (RS-485 driver on).
      */
     void (*preTransmission)(void *context);
     /**
-     * Optional: called after the last bit of a request (RS-485 driver off).
+     * Optional: called after the last bit of a frame was sent (RS-485 driver off).
      */
     void (*postTransmission)(void *context);
     /**
-     * Optional: called again and again while a blocking call of `master` waits,
-     * never between preTransmission and postTransmission. It may sleep until a
-     * byte arrives, for at most the time that mbm_master_pollDelay(master)
-     * returns.
+     * Optional: called repeatedly while a blocking function of `master` waits, but never
+     * between preTransmission and postTransmission. It may sleep until a byte arrives, at
+     * most for the time that mbm_master_pollDelay(master) returns.
      */
     void (*idle)(void *context, struct mbm_master *master);
 } mbm_port;
 
 /**
- * What happened on the line, since the caller zeroed it. Each wraps at 2^32.
+ * Counters of what happened on the line since you zeroed them. Each wraps at 2^32.
  */
 typedef struct mbm_counters {
     /**
-     * Requests sent, retries included.
+     * Requests sent, including retries.
      */
     uint32_t requests;
     /**
-     * Replies that answered a request, exceptions included.
+     * Replies that matched a request, including exceptions.
      */
     uint32_t replies;
     /**
@@ -331,20 +334,20 @@ typedef struct mbm_counters {
      */
     uint32_t exceptions;
     /**
-     * Requests whose reply arrived damaged.
+     * Requests whose reply arrived with a wrong CRC.
      */
     uint32_t badCrc;
     /**
-     * Requests that were not answered in time.
+     * Requests without a reply within the response timeout.
      */
     uint32_t timeouts;
     /**
-     * Frames with a right CRC of other units, or that answered no request of
-     * ours, while a reply was waited for.
+     * Frames with a right CRC that arrived during the wait for a reply, from another unit
+     * or not matching the request.
      */
     uint32_t foreignFrames;
     /**
-     * Replies that were found behind bytes that were no frame.
+     * Replies that were found after bytes that were not a frame.
      */
     uint32_t resynchronisations;
     /**
@@ -352,7 +355,7 @@ typedef struct mbm_counters {
      */
     uint32_t bytesSent;
     /**
-     * Bytes received, foreign ones and noise included.
+     * Bytes received, including those of foreign frames and noise.
      */
     uint32_t bytesReceived;
 } mbm_counters;
@@ -360,17 +363,17 @@ typedef struct mbm_counters {
 /* ==== 4. Functions and framings ===================================================== */
 
 /**
- * Serial line, binary, CRC-16 (serial line guide V1.02, 2.5.1).
+ * RTU: serial line, binary, with a CRC-16 (serial line guide V1.02, 2.5.1).
  */
 #define MBM_FRAMING_RTU 0
 
 /**
- * Serial line, hexadecimal characters, LRC (serial line guide V1.02, 2.5.2).
+ * ASCII: serial line, hexadecimal characters, with an LRC (serial line guide V1.02, 2.5.2).
  */
 #define MBM_FRAMING_ASCII 1
 
 /**
- * TCP, behind the MBAP header (messaging on TCP/IP guide V1.0b, 3.1.3).
+ * TCP: the PDU follows the MBAP header (messaging on TCP/IP guide V1.0b, 3.1.3).
  */
 #define MBM_FRAMING_TCP 2
 
@@ -385,12 +388,12 @@ typedef struct mbm_counters {
 #define MBM_FRAMING_NONE 4
 
 /**
- * Most bytes of a TCP frame.
+ * The maximum length of a TCP frame, in bytes.
  */
 #define MBM_MAX_TCP_FRAME 260
 
 /**
- * Most characters of an ASCII frame.
+ * The maximum length of an ASCII frame, in characters.
  */
 #define MBM_MAX_ASCII_FRAME 513
 
@@ -490,77 +493,79 @@ typedef struct mbm_counters {
 #define MBM_FC_ENCAPSULATED_INTERFACE 43
 
 /**
- * Sub-function of 08: the data come back; any number of words (V1.1b3, 6.8.1).
+ * Sub-function of 08: the device returns the data, of any number of words (V1.1b3, 6.8.1).
  */
 #define MBM_DIAGNOSTICS_RETURN_QUERY_DATA 0
 
 /**
- * Sub-function of 08; data FF 00 also clear the event log.
+ * Sub-function of 08: restarts the communications port. The data FF 00 also clear the
+ * event log.
  */
 #define MBM_DIAGNOSTICS_RESTART_COMMUNICATIONS 1
 
 /**
- * Sub-function of 08.
+ * Sub-function of 08: the device returns its diagnostic register.
  */
 #define MBM_DIAGNOSTICS_RETURN_DIAGNOSTIC_REGISTER 2
 
 /**
- * Sub-function of 08; the first byte of the data is the character.
+ * Sub-function of 08: sets the character that ends ASCII frames after CR. The first byte
+ * of the data is the character.
  */
 #define MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER 3
 
 /**
- * Sub-function of 08, which nothing answers.
+ * Sub-function of 08: the device listens only. It sends no reply.
  */
 #define MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY 4
 
 /**
- * Sub-function of 08; clears the diagnostic register too.
+ * Sub-function of 08: clears the counters and the diagnostic register.
  */
 #define MBM_DIAGNOSTICS_CLEAR_COUNTERS 10
 
 /**
- * Sub-function of 08: messages seen on the bus.
+ * Sub-function of 08: the number of messages that the device detected on the bus.
  */
 #define MBM_DIAGNOSTICS_BUS_MESSAGE_COUNT 11
 
 /**
- * Sub-function of 08: messages with a wrong CRC.
+ * Sub-function of 08: the number of messages with a wrong CRC.
  */
 #define MBM_DIAGNOSTICS_BUS_COMMUNICATION_ERROR_COUNT 12
 
 /**
- * Sub-function of 08: exceptions answered.
+ * Sub-function of 08: the number of exceptions that the device sent.
  */
 #define MBM_DIAGNOSTICS_BUS_EXCEPTION_ERROR_COUNT 13
 
 /**
- * Sub-function of 08: messages for this device.
+ * Sub-function of 08: the number of messages addressed to this device.
  */
 #define MBM_DIAGNOSTICS_SERVER_MESSAGE_COUNT 14
 
 /**
- * Sub-function of 08: messages that were not answered.
+ * Sub-function of 08: the number of messages to which the device sent no reply.
  */
 #define MBM_DIAGNOSTICS_SERVER_NO_RESPONSE_COUNT 15
 
 /**
- * Sub-function of 08: messages answered with a NAK.
+ * Sub-function of 08: the number of messages to which the device replied with a NAK.
  */
 #define MBM_DIAGNOSTICS_SERVER_NAK_COUNT 16
 
 /**
- * Sub-function of 08: messages answered with busy.
+ * Sub-function of 08: the number of messages to which the device replied that it is busy.
  */
 #define MBM_DIAGNOSTICS_SERVER_BUSY_COUNT 17
 
 /**
- * Sub-function of 08: messages lost to character overruns.
+ * Sub-function of 08: the number of messages that character overruns destroyed.
  */
 #define MBM_DIAGNOSTICS_BUS_CHARACTER_OVERRUN_COUNT 18
 
 /**
- * Sub-function of 08.
+ * Sub-function of 08: clears the counter of character overruns.
  */
 #define MBM_DIAGNOSTICS_CLEAR_OVERRUN_COUNTER 20
 
@@ -595,53 +600,54 @@ typedef struct mbm_counters {
 #define MBM_DEVICE_ID_INDIVIDUAL 4
 
 /**
- * Length rule: only silence on the line, or what frames the PDU, ends it.
+ * Length rule: the PDU is as long as its frame. On an RTU line silence ends the frame.
  */
 #define MBM_RULE_SILENCE 0
 
 /**
- * Length rule: always so many bytes.
+ * Length rule: the PDU always has the same number of bytes.
  */
 #define MBM_RULE_FIXED 1
 
 /**
- * Length rule: a byte counts the bytes behind it.
+ * Length rule: a byte of the PDU gives the number of bytes that follow it.
  */
 #define MBM_RULE_COUNTED 2
 
 /**
- * Most registers that one request reads (V1.1b3, 6.3 and 6.4).
+ * The maximum number of registers that one request reads (V1.1b3, 6.3 and 6.4).
  */
 #define MBM_MAX_READ_REGISTERS 125
 
 /**
- * Most registers that one request writes (V1.1b3, 6.12).
+ * The maximum number of registers that one request writes (V1.1b3, 6.12).
  */
 #define MBM_MAX_WRITE_REGISTERS 123
 
 /**
- * Most registers that a read/write request writes (V1.1b3, 6.17).
+ * The maximum number of registers that one read/write request writes (V1.1b3, 6.17).
  */
 #define MBM_MAX_READ_WRITE_REGISTERS 121
 
 /**
- * Most coils or discrete inputs that one request reads (V1.1b3, 6.1 and 6.2).
+ * The maximum number of coils or discrete inputs that one request reads (V1.1b3, 6.1 and
+ * 6.2).
  */
 #define MBM_MAX_READ_BITS 2000
 
 /**
- * Most coils that one request writes (V1.1b3, 6.11).
+ * The maximum number of coils that one request writes (V1.1b3, 6.11).
  */
 #define MBM_MAX_WRITE_BITS 1968
 
 /**
- * Most bytes of an RTU frame (serial line guide V1.02, 2.5.1).
+ * The maximum length of an RTU frame, in bytes (serial line guide V1.02, 2.5.1).
  */
 #define MBM_MAX_FRAME 256
 
 /**
- * How long the PDU of a function of your own is, function code included.
- * Zeroed: as long as its frame.
+ * The length rule for the PDUs of a function of your own. A length includes the function
+ * code. A zeroed rule is MBM_RULE_SILENCE.
  */
 typedef struct mbm_rule {
     /**
@@ -649,47 +655,48 @@ typedef struct mbm_rule {
      */
     uint8_t kind;
     /**
-     * FIXED: bytes of the PDU, 1 to 253. COUNTED: where the counting byte
-     * stands, 1 to 252 bytes behind the function code.
+     * MBM_RULE_FIXED: bytes of the PDU, 1 to 253. MBM_RULE_COUNTED: the position of the
+     * counting byte, 1 to 252 bytes after the function code.
      */
     uint8_t bytes;
     /**
-     * COUNTED: bytes that follow those that are counted.
+     * MBM_RULE_COUNTED: the number of bytes that follow the counted bytes.
      */
     uint8_t more;
 } mbm_rule;
 
 /**
- * A function of your own. Codes 65 to 72 and 100 to 110 are left to users, of
- * any length unless you declare them; another code that the standard does not
- * define works once it is declared. A code of the standard keeps its meaning.
+ * Declares a function of your own. The standard leaves the codes 65 to 72 and 100 to 110
+ * to users: without a declaration their PDUs have any length. Another code that the
+ * standard does not define works only with a declaration. A code that the
+ * standard defines keeps its meaning, also if you declare it.
  */
 typedef struct mbm_function {
     /**
-     * 1 to 127.
+     * The function code, 1 to 127.
      */
     uint8_t code;
     /**
-     * Its requests.
+     * The length of its requests.
      */
     struct mbm_rule request;
     /**
-     * Its responses.
+     * The length of its responses.
      */
     struct mbm_rule response;
 } mbm_function;
 
 /**
- * How frames look, and what is in them beside the standard. Zeroed: RTU, and
- * the functions of the standard.
+ * Describes frames: their framing, and the functions of your own in them. Zeroed, it
+ * means RTU with the functions of the standard only.
  */
 typedef struct mbm_framing {
     /**
-     * Functions of your own; may be NULL if there are none.
+     * The declarations of your own functions; may be NULL if `functionCount` is 0.
      */
     const struct mbm_function *functions;
     /**
-     * How many.
+     * The number of declarations in `functions`.
      */
     uint8_t functionCount;
     /**
@@ -697,7 +704,7 @@ typedef struct mbm_framing {
      */
     uint8_t kind;
     /**
-     * ASCII: the last character of a frame; 0 is line feed (V1.1b3, 6.8.1,
+     * ASCII only: the last character of a frame; 0 means line feed (V1.1b3, 6.8.1,
      * sub-function 03).
      */
     uint8_t delimiter;
@@ -708,14 +715,14 @@ typedef struct mbm_framing {
 /**
  * A Modbus RTU master: one line, one request at a time.
  *
- * Storage is yours and must be zero before first use, which a static object
- * is (`static mbm_master node;`). Settings and words want mbm_master_beginRtu or
- * mbm_master_setBuffers before them, requests want both. Use one object from one
- * thread and never from an interrupt; several objects are independent of each
- * other. Which functions the hooks of its port may call: see mbm_port.
+ * You own the storage. It must be zero before first use, as a static object is
+ * (`static mbm_master node;`). Before you use settings and words, call mbm_master_beginRtu
+ * or mbm_master_setBuffers; before you make requests, call both. Use an object from one
+ * thread only, and never from an interrupt. Several objects are independent of each other.
+ * mbm_port says which functions the hooks of the port may call.
  *
- * A call that is refused changes nothing, but for what the functions that make a
- * request say of themselves, and mbm_master_send32.
+ * A call that is refused changes nothing. Exceptions are the functions that make a request,
+ * as mbm_master_readCoils describes, and mbm_master_send32.
  */
 typedef struct mbm_master {
     /**
@@ -729,53 +736,53 @@ typedef struct mbm_master {
 } mbm_master;
 
 /**
- * What masters know of each other that take turns on one line, or in one frame
- * buffer. Storage is yours and must be zero before first use.
+ * Records which of several masters uses a shared line, or a shared frame buffer. You own the
+ * storage. It must be zero before first use.
  *
- * All objects of one turn are used from one thread. Before the storage of an object
- * goes, call mbm_master_endTurn.
+ * Use all objects of one turn from one thread. Call mbm_master_endTurn before you release the
+ * storage of an object.
  */
 typedef struct mbm_turn {
     /**
-     * The object that has the turn; NULL if none has.
+     * The object that has the turn; NULL if none has it.
      */
     struct mbm_master *master;
     /**
-     * When objects that had the turn before used the line last.
+     * When an object that had the turn before used the line last, in microseconds.
      */
     uint32_t lastUse;
 } mbm_turn;
 
 /**
- * Begins to talk to a slave over a port.
+ * Begins a master of RTU frames that sends its requests to a unit over a port.
  *
- * May be called again at any time, which is cheap: to talk to another slave,
- * or over another port. Settings, buffers and the words in them stay; what
- * was queued by send is dropped, and a request under way is given up. Opens
- * nothing: the port is open already. The first request waits for no gap, unless
- * bytes arrive or mbm_master_lineUsed was called.
+ * It may be called again at any time, to use another unit or another port; this is cheap.
+ * Settings, buffers and the words in them stay. The master discards what mbm_master_send
+ * queued, and gives up a request under way with the status MBM_CANCELLED. It does not open
+ * the port: that must be open already. The first request waits for no gap, unless bytes
+ * arrive or mbm_master_lineUsed was called.
  *
  * @param master  the object; zeroed before the first call
- * @param slave   unit id, 1 to 247; 248 to 255 are sent as they are, 0 is
- *                broadcast (serial line guide V1.02, 2.2)
- * @param port    not copied: it must stay valid and unchanged for as long as the
- *                object is used; read, write and micros must be there
+ * @param slave   the unit identifier, 1 to 247; 0 is broadcast (serial line guide V1.02,
+ *                2.2). The master also sends to 248 to 255, which the standard reserves
+ * @param port    the port. It is not copied: it must stay valid and unchanged for as long as
+ *                the object is used. read, write and micros must not be NULL
  * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a missing hook; MBM_BUSY
- *         from within a hook of this object's port but `idle`
+ *         from within a hook of this object's port except `idle`
  */
 uint8_t mbm_master_beginRtu(struct mbm_master *master,
                             uint8_t slave,
                             const struct mbm_port *port);
 
 /**
- * As mbm_master_beginRtu, for several objects that share one port, which may be a
- * constant: each object has a context of its own.
+ * As mbm_master_beginRtu, but with a separate context. Several objects can then share one
+ * port, which may be a constant, and each object has its own context.
  *
  * @param master   the object; zeroed before the first call
  * @param slave    as for mbm_master_beginRtu
  * @param port     as for mbm_master_beginRtu; its `context` is not used
- * @param context  handed to every hook. Yours, may be NULL
- * @return as mbm_master_beginRtu
+ * @param context  your pointer, passed to every hook; may be NULL
+ * @return as for mbm_master_beginRtu
  */
 uint8_t mbm_master_beginRtuWith(struct mbm_master *master,
                                 uint8_t slave,
@@ -783,29 +790,32 @@ uint8_t mbm_master_beginRtuWith(struct mbm_master *master,
                                 void *context);
 
 /**
- * Sets the write address and empties the queue of send; the words stay.
+ * Sets the write address and empties the queue of mbm_master_send. The transmit words do not
+ * change.
  *
  * @param master   the object
- * @param address  0 to 65535, for the functions ending in Queued
+ * @param address  the address to which the functions with Queued in their name write, 0 to
+ *                 65535
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_beginTransmission(struct mbm_master *master, uint16_t address);
+uint8_t mbm_master_beginTransmission(struct mbm_master *master,
+                                     uint16_t address);
 
 /**
- * Lends the buffers that requests and replies need, before or after begin.
+ * Sets the buffers for requests and replies, before or after mbm_master_beginRtu.
  *
- * They must not overlap, and stay valid for as long as the object is used.
- * MBM_FRAME_BYTES(words) bytes of frame serve any request and reply of so
- * many words. What does not fit into a smaller buffer is answered with a
- * status, never cut short.
+ * The buffers must not overlap, and must stay valid for as long as the object is used. A
+ * frame buffer of MBM_FRAME_BYTES(words) bytes suffices for every request and reply with
+ * that number of words. If a request or a reply does not fit into a smaller buffer, the
+ * function that makes the request returns a status. Data are never cut off.
  *
  * @param master         the object; zeroed before the first call
- * @param response       words that reads fill; NULL only with 0 words
+ * @param response       the words that reads fill; NULL only if `responseWords` is 0
  * @param responseWords  0 to 255; 125 hold any reply
- * @param transmit       words that writes send; NULL only with 0 words
+ * @param transmit       the words that writes send; NULL only if `transmitWords` is 0
  * @param transmitWords  0 to 255; 123 hold any request
- * @param frame          bytes of one frame; keeps nothing between requests
- * @param frameBytes     at least 8; 256 hold any frame
+ * @param frame          the buffer of one frame. Its content is not used between requests
+ * @param frameBytes     bytes of `frame`, at least 8; 256 hold any frame
  * @return MBM_OK, MBM_INVALID_ARGUMENT, or MBM_BUSY while a request is under way
  */
 uint8_t mbm_master_setBuffers(struct mbm_master *master,
@@ -817,31 +827,32 @@ uint8_t mbm_master_setBuffers(struct mbm_master *master,
                               uint16_t frameBytes);
 
 /**
- * Moves a non-blocking request on, without waiting.
+ * Sends and receives for a non-blocking request, without waiting.
  *
- * Call it as often as you like, at least once per character time of the line
- * if nothing else buffers its bytes.
+ * Call it as often as you like. If your port does not buffer received bytes, call it at
+ * least once in the time of a character.
  *
  * @param master  the object
- * @return MBM_PENDING until the request has ended, then its status, again at
- *         every call; MBM_OK if there was no request yet
+ * @return MBM_PENDING until the request has ended. Then, at every call, the status of the
+ *         request. MBM_OK if there was no request yet; MBM_BUSY from within a hook of the
+ *         port except `idle`; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_poll(struct mbm_master *master);
 
 /**
- * How long mbm_master_poll will find nothing to do unless a byte arrives, so
- * that a program or an idle hook may sleep until then. A wait that has just begun
- * counts from this call, so sleeping lengthens no timeout.
+ * Returns how long mbm_master_poll will have nothing to do unless a byte arrives. A program
+ * or the hook `idle` may sleep for that time. A waiting time that has just started counts
+ * from this call, so sleeping makes no timeout longer.
  *
  * @param master  the object
- * @return microseconds; 0 means poll now, and is returned within a hook of the port
- *         but `idle`; 0xFFFFFFFF that there is no request
+ * @return microseconds; 0 means poll now, also from within a hook of the port except `idle`;
+ *         0xFFFFFFFF means that no request is under way
  */
 uint32_t mbm_master_pollDelay(struct mbm_master *master);
 
 /**
- * Gives up the request under way, with the driver switched off; its status
- * becomes MBM_CANCELLED. Without a request it does nothing.
+ * Gives up the request under way and switches the driver off. The status of the request
+ * becomes MBM_CANCELLED. If no request is under way, it does nothing.
  *
  * @param master  the object
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
@@ -849,41 +860,45 @@ uint32_t mbm_master_pollDelay(struct mbm_master *master);
 uint8_t mbm_master_cancel(struct mbm_master *master);
 
 /**
- * The status of the last request.
+ * Returns the status of the last request.
  *
  * @param master  the object
- * @return MBM_PENDING while it is under way, MBM_OK if there was none;
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return the status: MBM_PENDING while the request is under way, MBM_OK if there was no
+ *         request; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_status(const struct mbm_master *master);
 
 /**
- * The raw exception code of the last reply, also where it is none that the
- * standard allows (V1.1b3, 7).
+ * Returns the exception code of the last reply as received, also a code that the standard
+ * does not allow (V1.1b3, 7).
  *
  * @param master  the object
- * @return the code; 0 if the last request ended without an exception frame
+ * @return the code; 0 if the last request ended without an exception
  */
 uint8_t mbm_master_getExceptionCode(const struct mbm_master *master);
 
 /**
- * Function 01: reads coils into the response words, 16 to a word, lowest bit
- * first, the last word padded with zeros (V1.1b3, 6.1).
+ * Function 01: reads coils into the response words, 16 in each word. The first coil is the
+ * lowest bit; the last word is padded with zeros (V1.1b3, 6.1).
  *
- * This and the nine other functions behave alike. In blocking mode they return
- * when the request has ended, in non-blocking mode at once with MBM_PENDING, and
- * mbm_master_poll ends it. They empty the queue of send and set receive back to the
- * first word, unless they return MBM_BUSY, MBM_NOT_INITIALISED or
- * MBM_INVALID_ARGUMENT. Response words change only on success. Transmit words stay;
- * only 06 and 16 store their arguments in them. A request that no device could accept
- * (a quantity that the standard forbids, addresses beyond 65535) is not sent: the
- * status is the exception that a device would answer.
+ * All functions that make a request behave as follows. In blocking mode they return when
+ * the request has ended. In non-blocking mode they return MBM_PENDING at once, and you call
+ * mbm_master_poll until the request has ended.
+ *
+ * They empty the queue of mbm_master_send, and mbm_master_receive starts again at the first
+ * word, unless they return MBM_BUSY, MBM_NOT_INITIALISED or MBM_INVALID_ARGUMENT. The
+ * response words change only on success. The transmit words do not change, except that 06
+ * and 16 store their arguments there.
+ *
+ * The master does not send a request that no device could accept, with a quantity that the
+ * standard forbids or addresses beyond 65535. The status is then the exception with which a
+ * device would answer.
  *
  * @param master    the object
- * @param address   first coil, 0 to 65535, as on the wire
- * @param quantity  1 to 2000
+ * @param address   the first coil, 0 to 65535, as on the wire
+ * @param quantity  the number of coils, 1 to 2000
  * @return MBM_OK, or an exception of the device (0x01 to 0x7F), or
- *         MBM_PENDING (non-blocking), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
+ *         MBM_PENDING (non-blocking mode), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
  *         MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION,
  *         MBM_LINK_LOST, MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL,
  *         MBM_BROADCAST_NOT_ALLOWED, MBM_BUSY, MBM_CANCELLED,
@@ -894,12 +909,12 @@ uint8_t mbm_master_readCoils(struct mbm_master *master,
                              uint16_t quantity);
 
 /**
- * Function 02: reads discrete inputs into the response words, 16 to a word,
- * lowest bit first, the last word padded with zeros (V1.1b3, 6.2).
+ * Function 02: reads discrete inputs into the response words, 16 in each word. The first
+ * input is the lowest bit; the last word is padded with zeros (V1.1b3, 6.2).
  *
  * @param master    the object
- * @param address   first input, 0 to 65535, as on the wire
- * @param quantity  1 to 2000
+ * @param address   the first input, 0 to 65535, as on the wire
+ * @param quantity  the number of inputs, 1 to 2000
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_readDiscreteInputs(struct mbm_master *master,
@@ -910,8 +925,8 @@ uint8_t mbm_master_readDiscreteInputs(struct mbm_master *master,
  * Function 03: reads holding registers into the response words (V1.1b3, 6.3).
  *
  * @param master    the object
- * @param address   first register, 0 to 65535, as on the wire
- * @param quantity  1 to 125
+ * @param address   the first register, 0 to 65535, as on the wire
+ * @param quantity  the number of registers, 1 to 125
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_readHoldingRegisters(struct mbm_master *master,
@@ -922,8 +937,8 @@ uint8_t mbm_master_readHoldingRegisters(struct mbm_master *master,
  * Function 04: reads input registers into the response words (V1.1b3, 6.4).
  *
  * @param master    the object
- * @param address   first register, 0 to 65535, as on the wire
- * @param quantity  1 to 125
+ * @param address   the first register, 0 to 65535, as on the wire
+ * @param quantity  the number of registers, 1 to 125
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_readInputRegisters(struct mbm_master *master,
@@ -931,11 +946,11 @@ uint8_t mbm_master_readInputRegisters(struct mbm_master *master,
                                       uint16_t quantity);
 
 /**
- * Function 05: switches one coil (V1.1b3, 6.5). Unit 0 broadcasts.
+ * Function 05: switches one coil on or off (V1.1b3, 6.5). With unit 0 it is a broadcast.
  *
  * @param master   the object
  * @param address  the coil, 0 to 65535; becomes the write address
- * @param state    0 is off, anything else is on
+ * @param state    0 is off, any other value is on
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_writeSingleCoil(struct mbm_master *master,
@@ -943,7 +958,7 @@ uint8_t mbm_master_writeSingleCoil(struct mbm_master *master,
                                    uint8_t state);
 
 /**
- * Function 06: writes one register (V1.1b3, 6.6). Unit 0 broadcasts.
+ * Function 06: writes one register (V1.1b3, 6.6). With unit 0 it is a broadcast.
  *
  * @param master   the object
  * @param address  the register, 0 to 65535; becomes the write address
@@ -955,12 +970,12 @@ uint8_t mbm_master_writeSingleRegister(struct mbm_master *master,
                                        uint16_t value);
 
 /**
- * Function 0F: writes coils from the transmit words, from word 0 on, lowest bit
- * first (V1.1b3, 6.11). Unit 0 broadcasts.
+ * Function 0F: writes coils from the transmit words, starting at word 0. The first coil is
+ * the lowest bit (V1.1b3, 6.11). With unit 0 it is a broadcast.
  *
  * @param master    the object
- * @param address   first coil, 0 to 65535; becomes the write address
- * @param quantity  1 to 1968, and no more than the transmit words hold
+ * @param address   the first coil, 0 to 65535; becomes the write address
+ * @param quantity  the number of coils, 1 to 1968, and not more than the transmit words hold
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_writeMultipleCoils(struct mbm_master *master,
@@ -968,8 +983,8 @@ uint8_t mbm_master_writeMultipleCoils(struct mbm_master *master,
                                       uint16_t quantity);
 
 /**
- * Function 0F: writes the queued bits to the last write address
- * (beginTransmission, sendBit, then this).
+ * Function 0F: writes the queued bits to coils, starting at the last write address. Call
+ * mbm_master_beginTransmission and mbm_master_sendBit before.
  *
  * @param master  the object
  * @return a status; see mbm_master_readCoils
@@ -977,12 +992,12 @@ uint8_t mbm_master_writeMultipleCoils(struct mbm_master *master,
 uint8_t mbm_master_writeQueuedCoils(struct mbm_master *master);
 
 /**
- * Function 10: writes registers from the transmit words, from word 0 on
- * (V1.1b3, 6.12). Unit 0 broadcasts.
+ * Function 10: writes registers from the transmit words, starting at word 0 (V1.1b3, 6.12).
+ * With unit 0 it is a broadcast.
  *
  * @param master    the object
- * @param address   first register, 0 to 65535; becomes the write address
- * @param quantity  1 to 123, and no more than the transmit words
+ * @param address   the first register, 0 to 65535; becomes the write address
+ * @param quantity  the number of registers, 1 to 123, and not more than the transmit words
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_writeMultipleRegisters(struct mbm_master *master,
@@ -990,8 +1005,8 @@ uint8_t mbm_master_writeMultipleRegisters(struct mbm_master *master,
                                           uint16_t quantity);
 
 /**
- * Function 10: writes the queued complete words to the last write address
- * (beginTransmission, send, then this).
+ * Function 10: writes the queued complete words to registers, starting at the last write
+ * address. Call mbm_master_beginTransmission and mbm_master_send before.
  *
  * @param master  the object
  * @return a status; see mbm_master_readCoils
@@ -1001,12 +1016,12 @@ uint8_t mbm_master_writeQueuedRegisters(struct mbm_master *master);
 /**
  * Function 16: the device sets a register to
  * (register AND andMask) OR (orMask AND NOT andMask) (V1.1b3, 6.16).
- * Unit 0 broadcasts.
+ * With unit 0 it is a broadcast.
  *
  * @param master   the object
  * @param address  the register, 0 to 65535; becomes the write address
- * @param andMask  keeps bits; also becomes transmit word 0
- * @param orMask   sets bits where andMask is 0; also becomes transmit word 1
+ * @param andMask  1 for each bit of the register to keep; also becomes transmit word 0
+ * @param orMask   the new value of the bits that are not kept; also becomes transmit word 1
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_maskWriteRegister(struct mbm_master *master,
@@ -1015,15 +1030,16 @@ uint8_t mbm_master_maskWriteRegister(struct mbm_master *master,
                                      uint16_t orMask);
 
 /**
- * Function 17: the device writes registers from the transmit words first, then
- * reads others into the response words, in one request (V1.1b3, 6.17).
+ * Function 17: the device writes the transmit words to registers first. Then it reads
+ * registers, which arrive in the response words. Both in one request (V1.1b3, 6.17).
  *
  * @param master         the object
- * @param readAddress    first register to read, 0 to 65535
- * @param readQuantity   1 to 125
- * @param writeAddress   first register to write, 0 to 65535; becomes the write
+ * @param readAddress    the first register to read, 0 to 65535
+ * @param readQuantity   the number of registers to read, 1 to 125
+ * @param writeAddress   the first register to write, 0 to 65535; becomes the write
  *                       address
- * @param writeQuantity  1 to 121, and no more than the transmit words
+ * @param writeQuantity  the number of registers to write, 1 to 121, and not more than the
+ *                       transmit words
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_readWriteMultipleRegisters(struct mbm_master *master,
@@ -1033,12 +1049,12 @@ uint8_t mbm_master_readWriteMultipleRegisters(struct mbm_master *master,
                                               uint16_t writeQuantity);
 
 /**
- * Function 17: writes the queued complete words to the last write address, then
- * reads.
+ * Function 17: as mbm_master_readWriteMultipleRegisters, but writes the queued complete
+ * words, starting at the last write address.
  *
  * @param master        the object
- * @param readAddress   first register to read, 0 to 65535
- * @param readQuantity  1 to 125
+ * @param readAddress   the first register to read, 0 to 65535
+ * @param readQuantity  the number of registers to read, 1 to 125
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_readWriteQueuedRegisters(struct mbm_master *master,
@@ -1046,136 +1062,143 @@ uint8_t mbm_master_readWriteQueuedRegisters(struct mbm_master *master,
                                             uint16_t readQuantity);
 
 /**
- * Reads holding registers for mbm_master_receive to give, one after the other.
+ * Reads holding registers. mbm_master_receive then returns them one after the other.
  *
  * @param master    the object
- * @param address   first register, 0 to 65535
- * @param quantity  1 to 125
- * @return how many words mbm_master_receive will give; 0 if the request failed
- *         (mbm_master_status says how), another one is under way or, in non-blocking
- *         mode, this one is
+ * @param address   the first register, 0 to 65535
+ * @param quantity  the number of registers, 1 to 125
+ * @return the number of words that mbm_master_receive will return; 0 if the request failed
+ *         (mbm_master_status returns why), if another request is under way, and in
+ *         non-blocking mode
  */
 uint8_t mbm_master_requestFrom(struct mbm_master *master,
                                uint16_t address,
                                uint16_t quantity);
 
 /**
- * Sets the unit that later requests go to.
+ * Sets the unit to which the master sends later requests.
  *
  * @param master  the object
- * @param slave   1 to 247; 248 to 255 are sent as they are, 0 is broadcast
+ * @param slave   the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248
+ *                to 255, which the standard reserves
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setSlaveID(struct mbm_master *master, uint8_t slave);
+uint8_t mbm_master_setSlaveID(struct mbm_master *master,
+                              uint8_t slave);
 
 /**
- * The unit that requests go to.
+ * Returns the unit to which the master sends requests.
  *
  * @param master  the object
- * @return the unit id, 1 until somebody says otherwise; 0 for an object that is
- *         not ready for settings
+ * @return the unit identifier, 1 by default; 0 for an object that was never begun
  */
 uint8_t mbm_master_getSlaveID(const struct mbm_master *master);
 
 /**
- * Sets how long a reply may take, from the last bit of the request to the last
+ * Sets the response timeout: the maximum time from the last bit of the request to the last
  * byte of the reply.
  *
  * @param master        the object
- * @param timeoutMs     0 to 65535; 2000 at first
+ * @param timeoutMs     milliseconds, 0 to 65535; the default is 2000
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setResponseTimeout(struct mbm_master *master, uint16_t timeoutMs);
+uint8_t mbm_master_setResponseTimeout(struct mbm_master *master,
+                                      uint16_t timeoutMs);
 
 /**
- * Tells the baud rate of the line, from which the gap before a request (t3.5,
- * serial line guide V1.02, 2.5.1.1) and the length of a character follow. It
- * sets nothing on the line. Untold, the gap is 4 ms, which is safe from 9600 up.
+ * Sets the baud rate from which the master computes the gap before a request (t3.5, serial
+ * line guide V1.02, 2.5.1.1) and the duration of a character. It does not configure the
+ * serial line. Without a baud rate the gap is 4 ms, which is enough from 9600 up.
  *
  * @param master  the object
- * @param baud    bits per second; 0 goes back to untold
+ * @param baud    bits per second; 0 (the default): unknown
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setBaudRate(struct mbm_master *master, uint32_t baud);
+uint8_t mbm_master_setBaudRate(struct mbm_master *master,
+                               uint32_t baud);
 
 /**
- * Sets the silence before a request, in place of t3.5: 0 where nothing but the
- * master's own traffic needs it, more for devices that are slow to listen again.
- * A later mbm_master_setBaudRate sets it back to t3.5.
+ * Sets the silence before a request, instead of t3.5. Use 0 if no device on the line needs
+ * the gap, and more than t3.5 for devices that need longer before they can receive again.
+ * A later call of mbm_master_setBaudRate sets it back to t3.5.
  *
  * @param master        the object
- * @param gapUs         counted from the last byte seen or sent; more than 2^31
+ * @param gapUs         microseconds from the last byte received or sent; a value above 2^31
  *                      (36 minutes) means 2^31
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setGap(struct mbm_master *master, uint32_t gapUs);
+uint8_t mbm_master_setGap(struct mbm_master *master,
+                          uint32_t gapUs);
 
 /**
- * Sets how long a broadcast takes, since nobody answers it (serial line guide
- * V1.02, 2.4.1).
+ * Sets the turnaround delay: how long the master waits after a broadcast, which no device
+ * answers (serial line guide V1.02, 2.4.1).
  *
  * @param master        the object
- * @param delayMs       0 to 65535; 100 at first
+ * @param delayMs       milliseconds, 0 to 65535; the default is 100
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_setTurnaroundDelay(struct mbm_master *master, uint16_t delayMs);
 
 /**
- * Sets the quiet time, which keeps a late reply from being taken for the answer
- * to a later request. RTU itself cannot tell them apart if unit, function and
- * length are the same, or if the late reply is an exception to the same function.
+ * Sets the quiet time. It prevents that the master accepts a late reply as the reply to a
+ * later request. In RTU the two cannot be distinguished if unit, function and length are the
+ * same, or if the late reply is an exception to the same function.
  *
- * After a request without a right reply, two things happen. The line is left alone
- * for this time before the next request, and bytes that arrive are dropped. Then the
- * next reply of that unit is held until nothing has arrived for this time. A second
- * reply takes the place of the held one, for a device answers in order; if the
- * second one is damaged, the request fails. So a request after a failure takes one
- * quiet time longer, all others take no longer.
+ * After a request without a right reply, the master does two things. It waits for the quiet
+ * time before it sends the next request, and discards bytes that arrive meanwhile. Then it
+ * holds the next reply of that unit until no byte has arrived for the quiet time. A second
+ * reply replaces the held one, because a device answers in order. If the second reply is
+ * damaged, the request fails. So a request after a failure takes one quiet time longer; all
+ * others take no longer.
  *
- * The time must be longer than the device takes for an answer. If it is shorter, the
- * second reply may come after the held one was taken for the answer.
+ * The quiet time must be longer than the device needs for a reply. If it is shorter, the
+ * master may accept the held reply before the second one arrives.
  *
  * @param master        the object
- * @param quietMs       0 to 65535; 100 at first; 0 holds no reply
+ * @param quietMs       milliseconds, 0 to 65535; the default is 100; 0 holds no reply
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setQuietTime(struct mbm_master *master, uint16_t quietMs);
+uint8_t mbm_master_setQuietTime(struct mbm_master *master,
+                                uint16_t quietMs);
 
 /**
- * Sets how often a request is repeated whose reply is missing, damaged or
- * malformed. Exceptions are replies and are not repeated.
+ * Sets how often the master repeats a request whose reply is missing, damaged or malformed.
+ * It does not repeat a request that was answered with an exception.
  *
  * @param master   the object
- * @param retries  0 to 255; 0 at first
+ * @param retries  0 to 255; the default is 0
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setRetries(struct mbm_master *master, uint8_t retries);
+uint8_t mbm_master_setRetries(struct mbm_master *master,
+                              uint8_t retries);
 
 /**
- * Tells that the receiver hears what the driver sends, so each request comes back
- * before its reply and is to be dropped.
+ * Switches echo discarding on or off. Switch it on if the receiver also receives what the
+ * driver sends: then the master discards the copy of each request that arrives before the
+ * reply.
  *
  * @param master  the object
- * @param on      0 (at first) or 1
+ * @param on      0 (the default) or 1
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_setEchoDiscard(struct mbm_master *master, uint8_t on);
 
 /**
  * Accepts replies of devices that deviate from the standard. It has these effects:
- * - A reply with the right unit, function and CRC is accepted although it repeats another
- *   address, value or quantity, or carries more or fewer data than were requested. It
- *   is accepted at the end of the response timeout, if no right reply has come.
- *   mbm_master_available says how many words came.
+ * - The master accepts a reply with the right unit, function and CRC although it repeats
+ *   another address, value or quantity, or carries more or fewer data than were requested.
+ *   It accepts such a reply at the end of the response timeout, if no right reply has
+ *   arrived. mbm_master_available returns the number of words that arrived.
  * - A read of more words than the response words hold succeeds and fills all of them.
- *   (Such a reply that the frame buffer does not hold must not follow noise directly.)
- * - Requests that read are sent to unit 0 too, and a reply from unit 0 is accepted.
+ *   (A reply that is longer than the frame buffer must not follow noise directly.)
+ * - The master also sends requests that read to unit 0, and accepts a reply from unit 0.
  *
  * Set a short response timeout (mbm_master_setResponseTimeout) if the device deviates in
- * each reply.
+ * every reply.
  *
  * @param master  the object
- * @param on      0 (at first) or 1
+ * @param on      0 (the default) or 1
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED; MBM_BUSY while a request is
  *         under way
  */
@@ -1183,50 +1206,55 @@ uint8_t mbm_master_setLenient(struct mbm_master *master,
                               uint8_t on);
 
 /**
- * Holds the driver on after the port's flush, for platforms whose flush returns
- * before the last bit has left.
+ * Sets how long the driver stays on after the port's flush, for platforms whose flush
+ * returns before the last bit was sent.
  *
  * @param master      the object
- * @param characters  times one character of the told baud rate (9600 if untold);
- *                    0 at first
+ * @param characters  the time in characters at the baud rate of mbm_master_setBaudRate
+ *                    (without one, at 9600); the default is 0
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_setPostFlushHold(struct mbm_master *master, uint8_t characters);
 
 /**
- * Chooses between functions that return when the request has ended (at first) and
- * functions that return MBM_PENDING at once, for mbm_master_poll to end them.
+ * Switches between blocking and non-blocking mode. In blocking mode, the default, a function
+ * that makes a request returns when the request has ended. In non-blocking mode it returns
+ * MBM_PENDING at once, and you call mbm_master_poll until the request has ended.
  *
  * @param master  the object
- * @param on      1 blocking, 0 non-blocking; holds from the next request on
+ * @param on      1 blocking, 0 non-blocking; it applies from the next request on
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setBlocking(struct mbm_master *master, uint8_t on);
+uint8_t mbm_master_setBlocking(struct mbm_master *master,
+                               uint8_t on);
 
 /**
- * Counts into storage of yours from now on. Read and zero it as you like, but not
- * from an interrupt.
+ * Sets your storage for counters, in which the master counts from now on. You may read and
+ * zero the counters at any time, but not from an interrupt.
  *
  * @param master    the object
- * @param counters  zeroed by you; NULL stops counting
+ * @param counters  your counters, zeroed; NULL stops counting
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setCounters(struct mbm_master *master, struct mbm_counters *counters);
+uint8_t mbm_master_setCounters(struct mbm_master *master,
+                               struct mbm_counters *counters);
 
 /**
- * Says when somebody else used the line, another object for example: the gap before
- * the next request counts from then. A time before the last use that the object knows
- * of changes nothing.
+ * Reports when another user of the line, for example another object, used the line last.
+ * The gap before the next request counts from that time. A time before the last use that
+ * the object knows changes nothing.
  *
  * @param master        the object
- * @param timeUs        by the clock of its port, at most 2^31 ago
+ * @param timeUs        the time in microseconds on the clock of the object's port, at most
+ *                      2^31 microseconds (36 minutes) ago
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_lineUsedAt(struct mbm_master *master, uint32_t timeUs);
+uint8_t mbm_master_lineUsedAt(struct mbm_master *master,
+                              uint32_t timeUs);
 
 /**
- * Says that somebody else has just used the line, as mbm_master_lineUsedAt with the
- * time of now.
+ * Reports that another user of the line has just used it: as mbm_master_lineUsedAt with the
+ * present time.
  *
  * @param master  the object
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
@@ -1234,38 +1262,40 @@ uint8_t mbm_master_lineUsedAt(struct mbm_master *master, uint32_t timeUs);
 uint8_t mbm_master_lineUsed(struct mbm_master *master);
 
 /**
- * Takes the turn, before a request. The gap before that request counts from the last
- * use of the line by any object that had the turn before.
+ * Gives the turn to an object. Call it before a request. The gap before that request counts
+ * from the last use of the line by any object that had the turn before.
  *
  * @param master  the object, with buffers or begun
- * @param turn    the turn of all objects that share a line or a frame buffer
+ * @param turn    the turn that all objects on the line, or with the frame buffer, share
  * @return MBM_OK; MBM_BUSY, with nothing changed, while another object has the turn
  *         and a request under way; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_takeTurn(struct mbm_master *master, struct mbm_turn *turn);
+uint8_t mbm_master_takeTurn(struct mbm_master *master,
+                            struct mbm_turn *turn);
 
 /**
- * Gives the turn back, before the storage of the object goes; does nothing if the object
- * has not got the turn. A request under way is forgotten: cancel it before, so that the
- * driver is off.
+ * Ends the turn of an object, before you release its storage. It does nothing if the object
+ * does not have the turn. It does not end a request under way: call mbm_master_cancel
+ * before, so that the driver is switched off.
  *
  * @param master  the object
  * @param turn    as for mbm_master_takeTurn
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_endTurn(struct mbm_master *master, struct mbm_turn *turn);
+uint8_t mbm_master_endTurn(struct mbm_master *master,
+                           struct mbm_turn *turn);
 
 /**
- * A word of the last successful read.
+ * Returns a word of the last successful read.
  *
  * @param master  the object
  * @param index   0 to 255
- * @return the word; 0xFFFF past the end of the response buffer
+ * @return the word; 0xFFFF if `index` is past the end of the response buffer
  */
 uint16_t mbm_master_getResponseBuffer(const struct mbm_master *master, uint8_t index);
 
 /**
- * Zeroes the response words; receive goes on where it was.
+ * Zeroes the response words. The position of mbm_master_receive does not change.
  *
  * @param master  the object
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
@@ -1273,12 +1303,13 @@ uint16_t mbm_master_getResponseBuffer(const struct mbm_master *master, uint8_t i
 uint8_t mbm_master_clearResponseBuffer(struct mbm_master *master);
 
 /**
- * Sets a word for the functions that write. Does not move the queue of send.
+ * Sets a transmit word for the functions that write. The queue of mbm_master_send does not
+ * change.
  *
  * @param master  the object
- * @param index   0 to the transmit buffer's words - 1
+ * @param index   0 to the number of transmit words - 1
  * @param value   the word
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS past the end of the buffer,
+ * @return MBM_OK; MBM_ILLEGAL_DATA_ADDRESS if `index` is past the end of the buffer;
  *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_setTransmitBuffer(struct mbm_master *master,
@@ -1286,7 +1317,7 @@ uint8_t mbm_master_setTransmitBuffer(struct mbm_master *master,
                                      uint16_t value);
 
 /**
- * Zeroes the transmit words; the queue of send stays.
+ * Zeroes the transmit words. The queue of mbm_master_send does not change its length.
  *
  * @param master  the object
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
@@ -1294,37 +1325,41 @@ uint8_t mbm_master_setTransmitBuffer(struct mbm_master *master,
 uint8_t mbm_master_clearTransmitBuffer(struct mbm_master *master);
 
 /**
- * Queues a word behind those queued. Bits queued before keep their word.
+ * Queues a word after the words queued before. If the last word holds queued bits, the new
+ * word goes into the next one.
  *
  * @param master  the object
  * @param word    the word
- * @return MBM_OK, MBM_BUFFER_TOO_SMALL with nothing queued past the end of the
- *         transmit buffer, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full;
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_send(struct mbm_master *master, uint16_t word);
+uint8_t mbm_master_send(struct mbm_master *master,
+                        uint16_t word);
 
 /**
- * Queues two words, the low one first; the low one alone if only that fits.
+ * Queues two words, the low one first. If only one word fits, it queues the low one alone.
  *
  * @param master  the object
  * @param value   both words
- * @return MBM_OK, MBM_BUFFER_TOO_SMALL if a word did not fit,
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL if a word did not fit;
  *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_send32(struct mbm_master *master, uint32_t value);
+uint8_t mbm_master_send32(struct mbm_master *master,
+                          uint32_t value);
 
 /**
- * Queues a bit behind those queued, lowest bit of a word first.
+ * Queues a bit after the bits queued before, starting at the lowest bit of a word.
  *
  * @param master  the object
- * @param on      0 is off, anything else is on
- * @return MBM_OK, MBM_BUFFER_TOO_SMALL with nothing queued past the end of the
- *         transmit buffer, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param on      0 is off, any other value is on
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full;
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_sendBit(struct mbm_master *master, uint8_t on);
+uint8_t mbm_master_sendBit(struct mbm_master *master,
+                           uint8_t on);
 
 /**
- * How many words of the last successful read mbm_master_receive has yet to give.
+ * Returns how many words of the last successful read mbm_master_receive has not returned yet.
  *
  * @param master  the object
  * @return 0 to 125
@@ -1332,54 +1367,55 @@ uint8_t mbm_master_sendBit(struct mbm_master *master, uint8_t on);
 uint8_t mbm_master_available(const struct mbm_master *master);
 
 /**
- * The next word of the last successful read.
+ * Returns the next word of the last successful read.
  *
  * @param master  the object
- * @return the word; 0xFFFF when none is left
+ * @return the word; 0xFFFF if no word is left
  */
 uint16_t mbm_master_receive(struct mbm_master *master);
 
 /* ==== 6. Client ===================================================================== */
 
 /**
- * The most requests that wait or are under way in one client.
+ * The maximum number of requests that are pending in one client.
  */
 #define MBM_CLIENT_DEPTH 16
 
 /**
- * mbm_client_setBackoff: a request is asked again at once.
+ * mbm_client_setBackoff: the client repeats a request at once.
  */
 #define MBM_BACKOFF_NONE 0
 
 /**
- * mbm_client_setBackoff: always the same wait.
+ * mbm_client_setBackoff: the client waits `delayMs` before each repetition.
  */
 #define MBM_BACKOFF_FIXED 1
 
 /**
- * mbm_client_setBackoff: once, twice, three times the wait, up to the most.
+ * mbm_client_setBackoff: the client waits `delayMs` before the first repetition, twice that
+ * before the second, three times that before the third, but at most `maxDelayMs`.
  */
 #define MBM_BACKOFF_LINEAR 2
 
 /**
- * mbm_client_setBackoff: once, twice, four times the wait, up to the most.
+ * mbm_client_setBackoff: the client waits `delayMs` before the first repetition, twice that
+ * before the second, four times that before the third, but at most `maxDelayMs`.
  */
 #define MBM_BACKOFF_EXPONENTIAL 3
 
 /**
- * A client of one serial line or one TCP stream: up to 16 requests are queued,
- * mbm_client_poll moves them on, and nothing ever waits.
+ * A client of one serial line or one TCP stream. It queues up to 16 requests.
+ * mbm_client_poll sends and receives; no function ever waits.
  *
- * Storage is yours and must be zero before first use, which a static object is.
- * One of the mbm_client_begin functions comes first. Use one object from one
- * thread and never from an interrupt; several objects are independent of each
- * other.
+ * You own the storage. It must be zero before first use, as a static object is. Call one of
+ * the mbm_client_begin functions first. Use an object from one thread only, and never from
+ * an interrupt. Several objects are independent of each other.
  *
- * A `done` function may call every function on the client that calls it, but
- * mbm_client_poll, which returns MBM_BUSY. A hook of the port, and the `random`
- * function of mbm_client_setJitter, may call none: each returns MBM_BUSY and
- * changes nothing, and a getter returns what it returns for an object that was
- * never begun.
+ * The `done` function of a request may call every function on the client that calls it,
+ * except mbm_client_poll, which then returns MBM_BUSY. A hook of the port, and the `random`
+ * function of mbm_client_setJitter, must not use the client: each function returns MBM_BUSY
+ * and changes nothing, and a getter returns what it returns for an object that was never
+ * begun.
  */
 typedef struct mbm_client {
     /**
@@ -1393,11 +1429,11 @@ typedef struct mbm_client {
 } mbm_client;
 
 /**
- * What closes a link and opens it anew, for mbm_client_reconnect.
+ * Your hooks that close a link and open it again, for mbm_client_reconnect.
  */
 typedef struct mbm_linkHooks {
     /**
-     * Handed to both hooks. Yours, may be NULL.
+     * Your pointer, passed to both hooks; may be NULL.
      */
     void *context;
     /**
@@ -1405,65 +1441,68 @@ typedef struct mbm_linkHooks {
      */
     void (*disconnect)(void *context);
     /**
-     * Optional: opens the link without waiting. Returns MBM_OK, MBM_PENDING if
-     * that goes on while the port takes no bytes yet, or another status.
+     * Optional: opens the link without waiting. Returns MBM_OK if the link is open,
+     * MBM_PENDING if the connection is still being made and the port accepts no bytes yet,
+     * or another status.
      */
     uint8_t (*connect)(void *context);
 } mbm_linkHooks;
 
 /**
- * A request to a device, and what comes of it. Yours, and zero before you set
- * the fields that you need; it may be used again and again.
+ * A request to a device, and its result. You own the storage. Zero it before first use, and
+ * then set the fields that you need. You may use it for any number of requests.
  *
- * From the call that queues it until it has ended, which `done` or `status`
- * tells, leave it alone, and what it points to. Data and reply are words in the
- * machine's byte order where a function transfers registers; where it transfers
- * coils or bytes, they are bytes as on the wire, of coils the lowest bit first.
+ * From the call that queues it until it has ended, do not use or change it, nor what it
+ * points to. It has ended when `done` is called, or when `status` is no longer MBM_PENDING.
+ *
+ * If a function transfers registers, `data` and `reply` are words in the machine's byte
+ * order. If it transfers coils or bytes, they are bytes as on the wire; the first coil is
+ * the lowest bit.
  */
 typedef struct mbm_clientRequest {
     /**
-     * Optional: called by mbm_client_poll when the request has ended, but not for one
-     * that mbm_client_cancel gave up. It may queue requests, this one too, and cancel
-     * others.
+     * Optional: mbm_client_poll calls it when the request has ended, but not after
+     * mbm_client_cancel or a begin function gave the request up. It may queue requests, also
+     * this one, and cancel others.
      */
     void (*done)(void *context, struct mbm_clientRequest *request);
     /**
-     * Handed to `done`. Yours, may be NULL.
+     * Your pointer, passed to `done`; may be NULL.
      */
     void *context;
     /**
-     * What functions that write send.
+     * The data that functions that write send.
      */
     const void *data;
     /**
-     * What functions that read fill; NULL if only the status is wanted.
+     * Receives the data that functions that read return; NULL if you want the status only.
      */
     void *reply;
     /**
-     * Bytes that `reply` has room for.
+     * The number of bytes that `reply` can hold.
      */
     uint16_t replyBytes;
     /**
-     * A number of yours, which stays as you set it. In TCP frames no two pending
-     * requests may have the same one, except 0. It is not the transaction identifier
+     * A number of your choice, which the client does not change. In TCP frames no two
+     * pending requests may have the same one, except 0. It is not the transaction identifier
      * on the wire: mbm_client_wireTransaction returns that.
      */
     uint16_t transaction;
     /**
-     * Whom it is for. On a serial line 1 to 247; 0 is broadcast; 248 to 255, which the
-     * standard reserves, are sent as they are. On TCP 1 to 255.
+     * The unit identifier of the device. On a serial line 1 to 247; 0 is broadcast; the
+     * client also sends to 248 to 255, which the standard reserves. On TCP 1 to 255.
      */
     uint8_t unit;
     /**
-     * MBM_PENDING from being queued to its end, then how it ended.
+     * MBM_PENDING from the call that queues the request until it ends; then its result.
      */
     uint8_t status;
     /**
-     * The raw exception code of the response; 0 if it was none.
+     * The exception code of the response as received; 0 if the response was no exception.
      */
     uint8_t exception;
     /**
-     * Bytes received in `reply`.
+     * The number of bytes received into `reply`.
      */
     uint8_t length;
     /**
@@ -1473,29 +1512,29 @@ typedef struct mbm_clientRequest {
 } mbm_clientRequest;
 
 /**
- * What is kept for one unit, in an array of yours for mbm_client_setUnits. The
- * counts are yours to read and to zero; each wraps at 2^32.
+ * The record of one unit, an item of the array for mbm_client_setUnits. You may read and
+ * zero the counters at any time, but not from an interrupt; each wraps at 2^32.
  */
 typedef struct mbm_clientUnit {
     /**
-     * Requests that ended, retries apart.
+     * Requests that ended, without retries.
      */
     uint32_t requests;
     /**
-     * Of these, those that were answered, exceptions included.
+     * Requests that the unit answered, also with an exception.
      */
     uint32_t replies;
     /**
-     * Of the answers, those that were exceptions.
+     * Requests that the unit answered with an exception.
      */
     uint32_t exceptions;
     /**
-     * Requests that were asked again.
+     * Repetitions of requests.
      */
     uint32_t retries;
     /**
-     * Set by you: rest for this unit from the end of a request to the next, in
-     * microseconds; more than 2^31 (36 minutes) means 2^31.
+     * Set by you: the minimum time from the end of a request to the next request to this
+     * unit, in microseconds; a value above 2^31 (36 minutes) means 2^31.
      */
     uint32_t delayUs;
     /**
@@ -1503,32 +1542,31 @@ typedef struct mbm_clientUnit {
      */
     uint32_t last;
     /**
-     * Set by you: which unit this is.
+     * Set by you: the unit identifier.
      */
     uint8_t unit;
     /**
-     * How the last request ended, MBM_OK if there was none.
+     * The status of the last request that ended; MBM_OK if none has ended.
      */
     uint8_t status;
     /**
      * Private.
      */
-    uint8_t tired;
+    uint8_t cooling_down;
 } mbm_clientUnit;
 
 /**
- * Makes an object a client of a serial line, in RTU frames (serial line guide
- * V1.02, 2.5.1).
+ * Begins a client of a serial line with RTU frames (serial line guide V1.02, 2.5.1).
  *
  * This and the other mbm_client_begin functions may be called again at any time, also with
- * another framing. All pending requests are given up as by mbm_client_cancel: their status
- * is MBM_CANCELLED and `done` is not called. The settings are as at first. A call that is
- * refused changes nothing.
+ * another framing. Then the client gives up all pending requests as mbm_client_cancel does:
+ * their status is MBM_CANCELLED and `done` is not called. All settings return to their
+ * defaults. A call that is refused changes nothing.
  *
  * @param client      the object; zeroed before the first call
- * @param port        copied; read, write and micros must be there
- * @param frame       bytes of one frame, valid for as long as the client is used
- * @param frameBytes  at least 8; 256 hold any frame
+ * @param port        the port, which is copied; read, write and micros must not be NULL
+ * @param frame       the buffer of one frame, valid for as long as the client is used
+ * @param frameBytes  bytes of `frame`, at min_frame_bytes 8; 256 hold any frame
  * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
  *         the client is suspended
  */
@@ -1538,14 +1576,14 @@ uint8_t mbm_client_beginRtu(struct mbm_client *client,
                             uint16_t frameBytes);
 
 /**
- * Makes an object a client of a serial line, in ASCII frames (serial line guide
- * V1.02, 2.5.2). No gap is kept between frames; a second without a character
- * ends one that is not whole.
+ * Begins a client of a serial line with ASCII frames (serial line guide V1.02, 2.5.2). It
+ * keeps no gap between frames. If no character arrives for one second, the client discards
+ * an incomplete frame.
  *
  * @param client      the object; zeroed before the first call
- * @param port        copied; read, write and micros must be there
- * @param frame       bytes of one frame, valid for as long as the client is used
- * @param frameBytes  at least 17; 513 hold any frame
+ * @param port        the port, which is copied; read, write and micros must not be NULL
+ * @param frame       the buffer of one frame, valid for as long as the client is used
+ * @param frameBytes  bytes of `frame`, at min_frame_bytes 17; 513 hold any frame
  * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
  *         the client is suspended
  */
@@ -1555,13 +1593,13 @@ uint8_t mbm_client_beginAscii(struct mbm_client *client,
                               uint16_t frameBytes);
 
 /**
- * Makes an object a client that sends RTU frames through a TCP stream, for
- * converters that pass on what they get. No gap is kept, nothing is broadcast.
+ * Begins a client that sends RTU frames through a TCP stream, for converters that pass
+ * bytes from TCP to a serial line unchanged. It keeps no gap and does not broadcast.
  *
  * @param client      the object; zeroed before the first call
- * @param port        copied; read, write and micros must be there
- * @param frame       bytes of one frame, valid for as long as the client is used
- * @param frameBytes  at least 8; 256 hold any frame
+ * @param port        the port, which is copied; read, write and micros must not be NULL
+ * @param frame       the buffer of one frame, valid for as long as the client is used
+ * @param frameBytes  bytes of `frame`, at min_frame_bytes 8; 256 hold any frame
  * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
  *         the client is suspended
  */
@@ -1571,18 +1609,20 @@ uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
                                    uint16_t frameBytes);
 
 /**
- * Makes an object a client of a TCP stream, in frames with the MBAP header
- * (messaging on TCP/IP guide V1.0b, 3.1.3). All 16 requests may be under way at
- * once; responses are matched by their transaction id, in any order.
+ * Begins a client of a TCP stream with frames that have the MBAP header (messaging on
+ * TCP/IP guide V1.0b, 3.1.3). All 16 requests may be under way at once. The client matches
+ * responses to requests by the transaction identifier, in any order.
  *
  * @param client         the object; zeroed before the first call
- * @param port           copied; read, write and micros must be there
- * @param incoming       received bytes, valid for as long as the client is used
- * @param incomingBytes  at least 9; 260 hold any frame, more take in more
- *                       responses at a time
- * @param outgoing       bytes to send, valid for as long as the client is used
- * @param outgoingBytes  at least 12; 260 hold any frame, more gather more
- *                       requests for one write
+ * @param port           the port, which is copied; read, write and micros must not be NULL
+ * @param incoming       the buffer of received bytes, valid for as long as the client is
+ *                       used
+ * @param incomingBytes  bytes of `incoming`, at min_frame_bytes 9; 260 hold any frame. A larger
+ *                       buffer takes more responses from one read
+ * @param outgoing       the buffer of bytes to send, valid for as long as the client is
+ *                       used
+ * @param outgoingBytes  bytes of `outgoing`, at min_frame_bytes 12; 260 hold any frame. A larger
+ *                       buffer collects more requests for one write
  * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
  *         the client is suspended
  */
@@ -1594,111 +1634,112 @@ uint8_t mbm_client_beginTcp(struct mbm_client *client,
                             uint16_t outgoingBytes);
 
 /**
- * Sets the character that ends ASCII frames behind CR, in place of LF, in both
- * directions; for devices that were told another one (function 08 with
- * sub-function 03, V1.1b3, 6.8.1). That request is answered with the old one: call
- * this when it has ended, for example from its `done`.
+ * Sets the character that ends ASCII frames after CR, instead of LF, in both
+ * directions. Use it for devices that were set to another character by function 08 with
+ * sub-function 03 (V1.1b3, 6.8.1). A device still ends its response to that request with
+ * the old character: call this function when the request has ended, for example in its
+ * `done`.
  *
  * @param client     the object, begun with mbm_client_beginAscii
- * @param character  1 to 127, but CR, the colon and hexadecimal digits
+ * @param character  1 to 127, except CR, the colon and hexadecimal digits
  * @return MBM_OK; MBM_BUSY while a request is under way; MBM_INVALID_ARGUMENT, also
  *         for a client of another framing; MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setDelimiter(struct mbm_client *client, uint8_t character);
 
 /**
- * Sets how many requests are under way at once on TCP, for servers that take fewer
- * at a time (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 1 to
- * 16); some drop what comes in one segment with another request. The queue holds 16 in any case.
+ * Sets how many requests may be under way at once on TCP. Use it for servers that accept
+ * fewer at a time (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 1
+ * to 16): some drop a request that arrives in one segment with another. The queue always
+ * holds 16.
  *
  * @param client  the object
- * @param most    1 to 16, which is so at first; on a serial line, and in RTU over
- *                TCP, 1
+ * @param most    1 to 16; the default is 16. On a serial line and in RTU over TCP only 1
+ *                is accepted
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_setInFlight(struct mbm_client *client,
-                               uint8_t most);
+uint8_t mbm_client_setInFlight(struct mbm_client *client, uint8_t most);
 
 /**
- * Closes the link and opens it anew. What was half received is forgotten, and
- * requests that were under way end with MBM_LINK_LOST at the next polls; those
- * that still waited go over the new link.
+ * Closes the link and opens it again. The client discards an incomplete response. Requests
+ * that were under way end with MBM_LINK_LOST at the next calls of mbm_client_poll. Requests
+ * that were not sent yet are sent over the new link.
  *
  * @param client  the object
- * @param link    what does it, used during this call only; NULL if that has been
- *                done already
- * @return what `connect` returns, MBM_OK without it; MBM_BUSY while the line is
- *         lent, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param link    your hooks, used during this call only; NULL if you have opened the link
+ *                again already
+ * @return what `connect` returns, or MBM_OK without `connect`; MBM_BUSY while the client is
+ *         suspended; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_reconnect(struct mbm_client *client, const struct mbm_linkHooks *link);
+uint8_t mbm_client_reconnect(struct mbm_client *client,
+                             const struct mbm_linkHooks *link);
 
 /**
- * Whether the link is not known to be lost.
+ * Returns whether the link works, as far as the client knows.
  *
- * If `connect` of mbm_client_reconnect returned MBM_PENDING, this is 0 until a reply
- * arrives. Do not reconnect again before the connection had its time: the port knows
- * better whether it is still being made, for example mbm_tcp_isConnected.
+ * If `connect` of mbm_client_reconnect returned MBM_PENDING, this function returns 0 until
+ * a reply arrives. Do not reconnect again while the connection is still being made. The
+ * port knows whether it is: for example, call mbm_tcp_isConnected.
  *
  * @param client  the object
- * @return 0 from a request that ended with MBM_LINK_LOST on, until a reply arrives
- *         (an exception is one) or mbm_client_reconnect returns MBM_OK; 1 otherwise,
- *         and also before the first request
+ * @return 0 after a request ended with MBM_LINK_LOST, until a reply or an exception arrives
+ *         or mbm_client_reconnect returns MBM_OK; otherwise 1, also before the first
+ *         request
  */
 uint8_t mbm_client_isConnected(const struct mbm_client *client);
 
 /**
- * Lends the line to a facade, whose functions then use the client's port; the
- * client's requests wait until mbm_client_resume. One of the two has the line
- * at any time. Until then the client's storage must stay: do not zero it.
+ * Suspends the client, so that a master can use its port. The client's requests wait until
+ * mbm_client_resume. Until then the master uses the client's storage: do not zero it.
  *
- * @param client  the object; for a facade, of RTU frames on a line or over TCP
- * @param master  a facade with buffers, which gets the client's port; NULL if
- *                you use the line in another way
- * @return MBM_OK; MBM_BUSY, with both unchanged, if a request is under way or the line
- *         is lent already; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param client  the object. If `master` is not NULL, it must use RTU or RTU over TCP
+ * @param master  a master with buffers, which then uses the client's port; NULL if you use
+ *                the line in another way
+ * @return MBM_OK; MBM_BUSY, with both objects unchanged, if a request is under way or the
+ *         client is suspended already; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_suspend(struct mbm_client *client, struct mbm_master *master);
+uint8_t mbm_client_suspend(struct mbm_client *client,
+                           struct mbm_master *master);
 
 /**
- * Takes the line back. The facade has no port then, so that its functions refuse
- * with MBM_NOT_INITIALISED.
+ * Resumes the client. The master then has no port: its functions that make a request return
+ * MBM_NOT_INITIALISED.
  *
  * @param client  the object
- * @param master  as for mbm_client_suspend
- * @return MBM_OK, MBM_BUSY while the facade has a request under way,
- *         MBM_INVALID_ARGUMENT if the line was not lent, MBM_NOT_INITIALISED
+ * @param master  the master that was passed to mbm_client_suspend; NULL if none was
+ * @return MBM_OK; MBM_BUSY while the master has a request under way;
+ *         MBM_INVALID_ARGUMENT if the client was not suspended; MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_resume(struct mbm_client *client, struct mbm_master *master);
+uint8_t mbm_client_resume(struct mbm_client *client,
+                          struct mbm_master *master);
 
 /**
- * Moves all requests on, without waiting, and calls `done` of those that have
+ * Sends and receives for all requests, without waiting, and calls `done` of those that have
  * ended, of at most 17 in one call.
  *
- * Call it as often as you like; mbm_client_pollDelay tells when the next call
- * is due.
+ * Call it as often as you like. mbm_client_pollDelay returns when the next call is due.
  *
  * @param client  the object
- * @return MBM_PENDING while requests wait or are under way, MBM_OK if there are
- *         none, MBM_BUSY from within `done` and while the line is lent;
+ * @return MBM_PENDING while requests are pending; MBM_OK if none is; MBM_BUSY from within
+ *         `done` or a hook of the port, and while the client is suspended;
  *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_poll(struct mbm_client *client);
 
 /**
- * How long mbm_client_poll will find nothing to do unless a byte arrives, so
- * that a program may wait for one in select, or sleep, until then. Bytes are taken
- * only while a request is pending: with none, wait for something else.
+ * Returns how long mbm_client_poll will have nothing to do unless a byte arrives. A program
+ * may sleep, or wait for a byte in select, for that time. The client reads bytes only while
+ * a request is pending.
  *
  * @param client  the object
- * @return microseconds; 0 means poll now, and is returned within a hook of the port;
- *         0xFFFFFFFF that there is no request; 1000
- *         while a TCP port does not take what is to be sent: to poll sooner, wait
- *         for that too, as mbm_tcp_wait does
+ * @return microseconds; 0 means poll now, also from within a hook of the port; 0xFFFFFFFF
+ *         means that no request is pending. While a TCP port accepts no bytes to send it is
+ *         1000: to poll sooner, also wait until the port accepts bytes, as mbm_tcp_wait does
  */
 uint32_t mbm_client_pollDelay(struct mbm_client *client);
 
 /**
- * How many requests wait or are under way.
+ * Returns how many requests are pending: queued or under way.
  *
  * @param client  the object
  * @return 0 to 16
@@ -1706,49 +1747,51 @@ uint32_t mbm_client_pollDelay(struct mbm_client *client);
 uint8_t mbm_client_pending(const struct mbm_client *client);
 
 /**
- * Gives a request up. It is yours again at once, with the status MBM_CANCELLED;
- * `done` is not called. It may have reached the device, and may still be answered.
+ * Cancels a request. Its status becomes MBM_CANCELLED, `done` is not called, and you may use
+ * the request again at once. The device may have received the request, and may still send
+ * a reply.
  *
  * @param client   the object
- * @param request  a request that this client was given
+ * @param request  a request that was queued on this client
  * @return MBM_OK; MBM_NOT_PENDING, with nothing changed, for a request that has
  *         ended already or was never queued here; MBM_INVALID_ARGUMENT or
  *         MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_cancel(struct mbm_client *client, struct mbm_clientRequest *request);
+uint8_t mbm_client_cancel(struct mbm_client *client,
+                          struct mbm_clientRequest *request);
 
 /**
- * The transaction identifier on the wire: that of the TCP frame in which the request
- * was sent last. The client chooses it, another one for each frame, also for a retry.
+ * Returns the transaction identifier on the wire: that of the TCP frame in which the client
+ * sent the request last. The client chooses a new one for each frame, also for a retry.
  *
  * @param request  a request, pending or ended
  * @return the identifier; 0 in other framings, for a request that was never sent, and
- *         for NULL. 0 is also an identifier
+ *         for NULL. 0 may also be the identifier of a frame
  */
 uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
 
 /**
- * Function 01: reads coils into `reply`, eight to a byte, the lowest bit first, the
- * last byte padded with zeros (V1.1b3, 6.1).
+ * Function 01: reads coils into the bytes of `reply`, eight in each byte. The first coil is
+ * the lowest bit; the last byte is padded with zeros (V1.1b3, 6.1).
  *
- * This and the other functions behave alike: they queue a request and return. The
- * request has ended when its `status` is no longer MBM_PENDING: MBM_OK, an exception
- * of the device (0x01 to 0x7F), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
+ * This and the other functions that make a request queue the request and return. The
+ * request has ended when its `status` is no longer MBM_PENDING. Then `status` is MBM_OK, an
+ * exception of the device (0x01 to 0x7F), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
  * MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION, MBM_LINK_LOST,
- * MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes on MBM_OK only.
+ * MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes only if it is MBM_OK.
  *
  * @param client   the object
  * @param request  the request
- * @param address  first coil, 0 to 65535, as on the wire
- * @param quantity  1 to 2000
- * @return MBM_PENDING: the request is queued; or, with nothing queued,
- *         MBM_ILLEGAL_DATA_VALUE or MBM_ILLEGAL_DATA_ADDRESS for what no device
- *         could accept, MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL,
- *         MBM_DUPLICATE_TRANSACTION, MBM_BUFFER_TOO_SMALL if `reply` has no room
- *         for the data, MBM_INVALID_ARGUMENT for `data` that are NULL,
- *         MBM_NOT_INITIALISED; MBM_BUSY, with the request unchanged, if it is
- *         pending already, and from within a hook of the port. A request that
- *         is refused with another of these has it in `status`
+ * @param address  the first coil, 0 to 65535, as on the wire
+ * @param quantity  the number of coils, 1 to 2000
+ * @return MBM_PENDING if the request is queued. Otherwise nothing was queued, and the
+ *         request's `status` is the same: MBM_ILLEGAL_DATA_VALUE or
+ *         MBM_ILLEGAL_DATA_ADDRESS for a request that no device could accept,
+ *         MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL, MBM_DUPLICATE_TRANSACTION,
+ *         MBM_BUFFER_TOO_SMALL if `reply` cannot hold the data, MBM_INVALID_ARGUMENT if
+ *         `data` is NULL. With the request unchanged: MBM_BUSY if the request is pending
+ *         already, or from within a hook of the port; MBM_INVALID_ARGUMENT if a pointer is
+ *         NULL; MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_readCoils(struct mbm_client *client,
                              struct mbm_clientRequest *request,
@@ -1756,12 +1799,13 @@ uint8_t mbm_client_readCoils(struct mbm_client *client,
                              uint16_t quantity);
 
 /**
- * Function 02: reads discrete inputs, as mbm_client_readCoils (V1.1b3, 6.2).
+ * Function 02: reads discrete inputs into the bytes of `reply`, as mbm_client_readCoils
+ * does (V1.1b3, 6.2).
  *
  * @param client   the object
  * @param request  the request
- * @param address  first input, 0 to 65535, as on the wire
- * @param quantity  1 to 2000
+ * @param address  the first input, 0 to 65535, as on the wire
+ * @param quantity  the number of inputs, 1 to 2000
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_readDiscreteInputs(struct mbm_client *client,
@@ -1774,8 +1818,8 @@ uint8_t mbm_client_readDiscreteInputs(struct mbm_client *client,
  *
  * @param client   the object
  * @param request  the request
- * @param address  first register, 0 to 65535, as on the wire
- * @param quantity  1 to 125
+ * @param address  the first register, 0 to 65535, as on the wire
+ * @param quantity  the number of registers, 1 to 125
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_readHoldingRegisters(struct mbm_client *client,
@@ -1788,8 +1832,8 @@ uint8_t mbm_client_readHoldingRegisters(struct mbm_client *client,
  *
  * @param client   the object
  * @param request  the request
- * @param address  first register, 0 to 65535, as on the wire
- * @param quantity  1 to 125
+ * @param address  the first register, 0 to 65535, as on the wire
+ * @param quantity  the number of registers, 1 to 125
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_readInputRegisters(struct mbm_client *client,
@@ -1798,12 +1842,12 @@ uint8_t mbm_client_readInputRegisters(struct mbm_client *client,
                                       uint16_t quantity);
 
 /**
- * Function 05: switches a coil (V1.1b3, 6.5).
+ * Function 05: switches one coil on or off (V1.1b3, 6.5).
  *
  * @param client   the object
  * @param request  the request
- * @param address  0 to 65535, as on the wire
- * @param on  0 is off, anything else is on
+ * @param address  the coil, 0 to 65535, as on the wire
+ * @param on  0 is off, any other value is on
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_writeSingleCoil(struct mbm_client *client,
@@ -1812,12 +1856,12 @@ uint8_t mbm_client_writeSingleCoil(struct mbm_client *client,
                                    uint8_t on);
 
 /**
- * Function 06: writes a holding register (V1.1b3, 6.6).
+ * Function 06: writes one holding register (V1.1b3, 6.6).
  *
  * @param client   the object
  * @param request  the request
- * @param address  0 to 65535, as on the wire
- * @param value  the value
+ * @param address  the register, 0 to 65535, as on the wire
+ * @param value  its new value
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_writeSingleRegister(struct mbm_client *client,
@@ -1826,13 +1870,13 @@ uint8_t mbm_client_writeSingleRegister(struct mbm_client *client,
                                        uint16_t value);
 
 /**
- * Function 0F: writes the coils of `data`, eight to a byte, the lowest bit first
- * (V1.1b3, 6.11).
+ * Function 0F: writes coils from the bytes of `data`, eight in each byte. The first coil is
+ * the lowest bit (V1.1b3, 6.11).
  *
  * @param client   the object
  * @param request  the request
- * @param address  first coil, 0 to 65535, as on the wire
- * @param quantity  1 to 1968
+ * @param address  the first coil, 0 to 65535, as on the wire
+ * @param quantity  the number of coils, 1 to 1968
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_writeMultipleCoils(struct mbm_client *client,
@@ -1841,12 +1885,12 @@ uint8_t mbm_client_writeMultipleCoils(struct mbm_client *client,
                                       uint16_t quantity);
 
 /**
- * Function 10: writes the words of `data` (V1.1b3, 6.12).
+ * Function 10: writes the words of `data` to holding registers (V1.1b3, 6.12).
  *
  * @param client   the object
  * @param request  the request
- * @param address  first register, 0 to 65535, as on the wire
- * @param quantity  1 to 123
+ * @param address  the first register, 0 to 65535, as on the wire
+ * @param quantity  the number of registers, 1 to 123
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_writeMultipleRegisters(struct mbm_client *client,
@@ -1860,9 +1904,9 @@ uint8_t mbm_client_writeMultipleRegisters(struct mbm_client *client,
  *
  * @param client   the object
  * @param request  the request
- * @param address  0 to 65535, as on the wire
- * @param andMask  bits to keep
- * @param orMask  bits to set where none are kept
+ * @param address  the register, 0 to 65535, as on the wire
+ * @param andMask  1 for each bit of the register to keep
+ * @param orMask  the new value of the bits that are not kept
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_maskWriteRegister(struct mbm_client *client,
@@ -1872,15 +1916,15 @@ uint8_t mbm_client_maskWriteRegister(struct mbm_client *client,
                                      uint16_t orMask);
 
 /**
- * Function 17: writes the words of `data`, then reads into the words of `reply`
- * (V1.1b3, 6.17).
+ * Function 17: the device writes the words of `data` to holding registers first. Then it
+ * reads holding registers, which arrive in the words of `reply` (V1.1b3, 6.17).
  *
  * @param client   the object
  * @param request  the request
- * @param readAddress  first register to read
- * @param readQuantity  1 to 125
- * @param writeAddress  first register to write
- * @param writeQuantity  1 to 121
+ * @param readAddress  the first register to read, 0 to 65535
+ * @param readQuantity  the number of registers to read, 1 to 125
+ * @param writeAddress  the first register to write, 0 to 65535
+ * @param writeQuantity  the number of registers to write, 1 to 121
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_readWriteMultipleRegisters(struct mbm_client *client,
@@ -1891,7 +1935,8 @@ uint8_t mbm_client_readWriteMultipleRegisters(struct mbm_client *client,
                                               uint16_t writeQuantity);
 
 /**
- * Function 07: reads eight outputs into a byte (V1.1b3, 6.7).
+ * Function 07: reads the eight exception status outputs into one byte of `reply` (V1.1b3,
+ * 6.7).
  *
  * @param client   the object
  * @param request  the request
@@ -1901,15 +1946,15 @@ uint8_t mbm_client_readExceptionStatus(struct mbm_client *client,
                                        struct mbm_clientRequest *request);
 
 /**
- * Function 08: sends the words of `data`, and reads as many into `reply` (V1.1b3,
- * 6.8). No device responds to sub-function 04, Force Listen Only Mode.
+ * Function 08: sends the words of `data`, and reads the same number of words into `reply`
+ * (V1.1b3, 6.8). No device responds to sub-function 04, Force Listen Only Mode.
  *
  * @param client   the object
  * @param request  the request
- * @param subFunction  0 (Return Query Data) to 0x14. Others, which the standard
- *                     reserves, are sent as they are, and a response of one word is
- *                     expected; for one of another length see mbm_client_custom
- * @param words  1; 1 to 125 for sub-function 0
+ * @param subFunction  0 (Return Query Data) to 0x14. The client also sends the others,
+ *                     which the standard reserves, and expects a response of one word; for
+ *                     a response of another length use mbm_client_custom
+ * @param words  the number of words of `data`: 1; for sub-function 0, 1 to 125
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_diagnostics(struct mbm_client *client,
@@ -1918,7 +1963,7 @@ uint8_t mbm_client_diagnostics(struct mbm_client *client,
                                uint16_t words);
 
 /**
- * Function 0B: reads the status word and the event count into two words (V1.1b3,
+ * Function 0B: reads the status word and the event count into two words of `reply` (V1.1b3,
  * 6.9).
  *
  * @param client   the object
@@ -1929,8 +1974,9 @@ uint8_t mbm_client_getCommEventCounter(struct mbm_client *client,
                                        struct mbm_clientRequest *request);
 
 /**
- * Function 0C: reads status, event count and message count, two bytes each with the
- * high byte first, and up to 64 events, the latest first (V1.1b3, 6.10).
+ * Function 0C: reads status, event count and message count, and then up to 64 events, into
+ * the bytes of `reply`. The first three have two bytes each, the high byte first. An event
+ * is one byte; the latest event is first (V1.1b3, 6.10).
  *
  * @param client   the object
  * @param request  the request
@@ -1940,10 +1986,10 @@ uint8_t mbm_client_getCommEventLog(struct mbm_client *client,
                                    struct mbm_clientRequest *request);
 
 /**
- * Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13). `reply`
- * gets all that follows the byte count, also from a device that counts its id alone
- * and sends more. In RTU frames the silence after it ends such a reply; one that
- * counts right is not waited for.
+ * Function 11: reads the server id, whose format is specific to the device (V1.1b3, 6.13).
+ * `reply` receives all bytes after the byte count. Some devices count only the id and send
+ * more bytes: `reply` receives those too. In RTU frames silence ends such a reply. The
+ * client does not wait for silence if the byte count is right.
  *
  * @param client   the object
  * @param request  the request
@@ -1953,13 +1999,14 @@ uint8_t mbm_client_reportServerId(struct mbm_client *client,
                                   struct mbm_clientRequest *request);
 
 /**
- * Function 14: reads records in a row of one file into words (V1.1b3, 6.14).
+ * Function 14: reads consecutive records of one file into the words of `reply` (V1.1b3,
+ * 6.14).
  *
  * @param client   the object
  * @param request  the request
- * @param file  1 to 65535
- * @param record  first record, 0 to 9999
- * @param quantity  1 to 121
+ * @param file  the file number, 1 to 65535
+ * @param record  the first record, 0 to 9999
+ * @param quantity  the number of records, 1 to 121
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_readFileRecord(struct mbm_client *client,
@@ -1969,14 +2016,14 @@ uint8_t mbm_client_readFileRecord(struct mbm_client *client,
                                   uint16_t quantity);
 
 /**
- * Function 15: writes the words of `data` to records in a row of one file (V1.1b3,
+ * Function 15: writes the words of `data` to consecutive records of one file (V1.1b3,
  * 6.15).
  *
  * @param client   the object
  * @param request  the request
- * @param file  1 to 65535
- * @param record  first record, 0 to 9999
- * @param quantity  1 to 122
+ * @param file  the file number, 1 to 65535
+ * @param record  the first record, 0 to 9999
+ * @param quantity  the number of records, 1 to 122
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_writeFileRecord(struct mbm_client *client,
@@ -1986,12 +2033,13 @@ uint8_t mbm_client_writeFileRecord(struct mbm_client *client,
                                    uint16_t quantity);
 
 /**
- * Function 14 of several groups: `data` are the sub-requests as on the wire, seven
- * bytes each; `reply` gets the sub-responses as on the wire (V1.1b3, 6.14).
+ * Function 14 with several groups: reads records of several files, or of several ranges.
+ * `data` contains the sub-requests as on the wire, seven bytes each. `reply` receives the
+ * sub-responses as on the wire (V1.1b3, 6.14).
  *
  * @param client   the object
  * @param request  the request
- * @param bytes  7 to 245, a multiple of 7
+ * @param bytes  the number of bytes of `data`, 7 to 245, a multiple of 7
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_readFileRecords(struct mbm_client *client,
@@ -1999,12 +2047,12 @@ uint8_t mbm_client_readFileRecords(struct mbm_client *client,
                                    uint16_t bytes);
 
 /**
- * Function 15 of several groups: `data` are the sub-requests as on the wire (V1.1b3,
- * 6.15).
+ * Function 15 with several groups: writes records of several files, or of several ranges.
+ * `data` contains the sub-requests as on the wire (V1.1b3, 6.15).
  *
  * @param client   the object
  * @param request  the request
- * @param bytes  9 to 251
+ * @param bytes  the number of bytes of `data`, 9 to 251
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_writeFileRecords(struct mbm_client *client,
@@ -2012,11 +2060,12 @@ uint8_t mbm_client_writeFileRecords(struct mbm_client *client,
                                     uint16_t bytes);
 
 /**
- * Function 18: reads up to 31 registers of a queue into words (V1.1b3, 6.18).
+ * Function 18: reads up to 31 registers of a FIFO queue into the words of `reply` (V1.1b3,
+ * 6.18).
  *
  * @param client   the object
  * @param request  the request
- * @param address  the pointer address of the queue
+ * @param address  the FIFO pointer address of the queue, 0 to 65535
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_readFifoQueue(struct mbm_client *client,
@@ -2024,14 +2073,14 @@ uint8_t mbm_client_readFifoQueue(struct mbm_client *client,
                                  uint16_t address);
 
 /**
- * Function 2B/0E: reads objects that identify the device (V1.1b3, 6.21). `reply` gets,
- * as on the wire, conformity level, more follows (0 or FF), the next object id, how
- * many objects there are, and of each its id, length and value.
+ * Function 2B/0E: reads objects that identify the device (V1.1b3, 6.21). `reply` receives,
+ * as on the wire: the conformity level, more follows (0 or FF), the next object id, the
+ * number of objects, and of each object its id, length and value.
  *
  * @param client   the object
  * @param request  the request
- * @param code  1 basic, 2 regular, 3 extended, 4 one object
- * @param object  the object to begin with
+ * @param code  the read device id code, MBM_DEVICE_ID_BASIC to MBM_DEVICE_ID_INDIVIDUAL
+ * @param object  the id of the first object to read
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_readDeviceIdentification(struct mbm_client *client,
@@ -2040,13 +2089,14 @@ uint8_t mbm_client_readDeviceIdentification(struct mbm_client *client,
                                             uint8_t object);
 
 /**
- * Function 2B of any MEI type: sends bytes of `data` and reads what comes (V1.1b3,
- * 6.19). On RTU, silence ends the response.
+ * Function 2B with any MEI type: sends the bytes of `data` after the MEI type, and reads the
+ * bytes after the MEI type of the response into `reply` (V1.1b3, 6.19). On RTU, silence ends
+ * the response.
  *
  * @param client   the object
  * @param request  the request
- * @param meiType  0x0D is CANopen
- * @param bytes  0 to 251
+ * @param meiType  the MEI type, for example MBM_MEI_CANOPEN
+ * @param bytes  the number of bytes of `data`, 0 to 251
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_encapsulatedInterfaceTransport(struct mbm_client *client,
@@ -2055,14 +2105,14 @@ uint8_t mbm_client_encapsulatedInterfaceTransport(struct mbm_client *client,
                                                   uint16_t bytes);
 
 /**
- * Any function: sends bytes of `data` behind the function code, and reads what is
- * behind it in the response.
+ * Any function code: sends the bytes of `data` after the function code, and reads the bytes
+ * after the function code of the response into `reply`.
  *
  * @param client    the object
  * @param request   the request
- * @param function  1 to 127
- * @param bytes     0 to 252
- * @param response  how long the response is; used during this call only
+ * @param function  the function code, 1 to 127
+ * @param bytes     the number of bytes of `data`, 0 to 252
+ * @param response  the length rule of the response; used during this call only
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_custom(struct mbm_client *client,
@@ -2072,28 +2122,29 @@ uint8_t mbm_client_custom(struct mbm_client *client,
                           const struct mbm_rule *response);
 
 /**
- * Any request, as it arrived from another client: sends `function` and the bytes of
- * `body`, and reads into `reply` all bytes that follow the function code of the
- * response, as on the wire. This is what a gateway needs: `body` and `reply` are
- * what the functions of mbm_unit_serveCustom get and return.
+ * Forwards a request that arrived from another client: sends `function` and the bytes of
+ * `body`, and reads into `reply` all bytes after the function code of the response, as on
+ * the wire. Use it for a gateway: the functions of mbm_unit_serveCustom receive the same
+ * `body` and return the same `reply`.
  *
- * A response counts only if it answers this request, as in the functions above: its
- * length, byte count, echoed address, value, quantity and records must be right. Of a
- * function that the standard does not define, and of sub-functions of 08 from 0x15 on,
- * silence ends the response on RTU. If you know its length, use mbm_client_custom.
+ * The client accepts a response only if it matches the request, as for the other functions:
+ * its length, byte count, echoed address, value, quantity and records must be right. On RTU,
+ * silence ends the response to a function code that the standard does not define, and to
+ * sub-functions of 08 from 0x15 on. If you know the length of the response, use
+ * mbm_client_custom.
  *
- * 08 with sub-function 04 gets no response: it ends with MBM_OK and `length` 0 after
- * the turnaround delay.
+ * No device responds to 08 with sub-function 04: the request ends with MBM_OK and `length` 0
+ * after the turnaround delay.
  *
  * @param client    the object
  * @param request   the request; if it is queued, its `data` then points into `body`
- * @param function  1 to 127
- * @param body      the bytes after the function code; leave them alone until the
- *                  request has ended; may be NULL if there are none
- * @param bytes     0 to 252
- * @return a status; see mbm_client_readCoils. MBM_ILLEGAL_DATA_VALUE also for a body
- *         whose length or counts are wrong, MBM_ILLEGAL_FUNCTION for function 0 or
- *         one above 127: what a server answers to such a request
+ * @param function  the function code, 1 to 127
+ * @param body      the bytes after the function code; do not change them until the request
+ *                  has ended; may be NULL if `bytes` is 0
+ * @param bytes     the number of bytes of `body`, 0 to 252
+ * @return a status; see mbm_client_readCoils. Also those with which a server answers such a
+ *         request: MBM_ILLEGAL_DATA_VALUE if the length or a count in `body` is wrong,
+ *         MBM_ILLEGAL_FUNCTION if the function code is 0 or above 127
  */
 uint8_t mbm_client_forward(struct mbm_client *client,
                            struct mbm_clientRequest *request,
@@ -2102,100 +2153,106 @@ uint8_t mbm_client_forward(struct mbm_client *client,
                            uint16_t bytes);
 
 /**
- * Sets how long a response may take. The time begins with the end of the request on a
- * serial line and in RTU over TCP; in TCP frames when mbm_client_poll puts the request
- * into the outgoing buffer, also if the port takes it later.
+ * Sets the response timeout. On a serial line and in RTU over TCP, the time starts when the
+ * request has been sent. In TCP frames it starts when mbm_client_poll puts the request into
+ * the outgoing buffer, also if the port accepts it later.
  *
  * @param client        the object
- * @param timeoutMs     0 to 65535; 2000 at first
+ * @param timeoutMs     milliseconds, 0 to 65535; the default is 2000
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_setResponseTimeout(struct mbm_client *client, uint16_t timeoutMs);
+uint8_t mbm_client_setResponseTimeout(struct mbm_client *client,
+                                      uint16_t timeoutMs);
 
 /**
- * Tells the baud rate of an RTU line, from which the gap before a request (t3.5,
- * serial line guide V1.02, 2.5.1.1) and the length of a character follow. It sets
- * nothing on the line. Untold, the gap is 4 ms, which is safe from 9600 up.
+ * Sets the baud rate from which the client computes the gap before an RTU request (t3.5,
+ * serial line guide V1.02, 2.5.1.1) and the duration of a character. It does not configure
+ * the serial line. Without a baud rate the gap is 4 ms, which is enough from 9600 up.
  *
  * @param client  the object
- * @param baud    bits per second; 0 goes back to untold
+ * @param baud    bits per second; 0 (the default): unknown
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_setBaudRate(struct mbm_client *client, uint32_t baud);
+uint8_t mbm_client_setBaudRate(struct mbm_client *client,
+                               uint32_t baud);
 
 /**
- * Sets the silence before a request, in place of t3.5; a later
- * mbm_client_setBaudRate sets it back. Without effect on TCP.
+ * Sets the silence before a request, instead of t3.5. A later call of
+ * mbm_client_setBaudRate sets it back to t3.5. It has no effect on TCP.
  *
  * @param client        the object
- * @param gapUs         counted from the last byte seen or sent; more than 2^31
+ * @param gapUs         microseconds from the last byte received or sent; a value above 2^31
  *                      (36 minutes) means 2^31
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_setGap(struct mbm_client *client, uint32_t gapUs);
+uint8_t mbm_client_setGap(struct mbm_client *client,
+                          uint32_t gapUs);
 
 /**
- * Sets how long a request takes that nobody responds to: a broadcast (serial
- * line guide V1.02, 2.4.1), and 08 with sub-function 04.
+ * Sets the turnaround delay: how long the client waits after a request that no device
+ * answers. These requests are a broadcast (serial line guide V1.02, 2.4.1), and 08 with
+ * sub-function 04.
  *
  * @param client        the object
- * @param delayMs       0 to 65535; 100 at first
+ * @param delayMs       milliseconds, 0 to 65535; the default is 100
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setTurnaroundDelay(struct mbm_client *client, uint16_t delayMs);
 
 /**
- * Sets the quiet time of a serial line, which keeps a late reply from being taken
- * for the answer to a later request; see mbm_master_setQuietTime. Without effect on
- * TCP, where responses have a number.
+ * Sets the quiet time of a serial line. It prevents that the client accepts a late reply as
+ * the reply to a later request: see mbm_master_setQuietTime. It has no effect in TCP frames,
+ * whose transaction identifier shows to which request a reply belongs.
  *
  * @param client        the object
- * @param quietMs       0 to 65535; 100 at first; 0 holds no reply
+ * @param quietMs       milliseconds, 0 to 65535; the default is 100; 0 holds no reply
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_setQuietTime(struct mbm_client *client, uint16_t quietMs);
+uint8_t mbm_client_setQuietTime(struct mbm_client *client,
+                                uint16_t quietMs);
 
 /**
- * Tells that the receiver hears what the driver sends, so each request comes back
- * before its reply and is to be dropped. Without effect on TCP.
+ * Switches echo discarding on or off. Switch it on if the receiver also receives what the
+ * driver sends: then the client discards the copy of each request that arrives before the
+ * reply. It has no effect on TCP.
  *
  * @param client  the object
- * @param on      0 (at first) or 1
+ * @param on      0 (the default) or 1
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setEchoDiscard(struct mbm_client *client, uint8_t on);
 
 /**
- * Holds the driver on after the port's flush, for platforms whose flush returns
- * before the last bit has left. Without effect on TCP.
+ * Sets how long the driver stays on after the port's flush, for platforms whose flush
+ * returns before the last bit was sent. It has no effect on TCP.
  *
  * @param client      the object
- * @param characters  times one character of the told baud rate (9600 if untold);
- *                    0 at first
+ * @param characters  the time in characters at the baud rate of mbm_client_setBaudRate
+ *                    (without one, at 9600); the default is 0
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setPostFlushHold(struct mbm_client *client, uint8_t characters);
 
 /**
- * Sets how often a request is repeated whose response is missing, damaged or
- * malformed, or that the port did not take. Exceptions are responses and are not
- * repeated, nor are requests that a lost link interrupted, nor those whose response is
+ * Sets how often the client repeats a request whose response is missing, damaged or
+ * malformed, or that the port did not accept. It does not repeat a request that was
+ * answered with an exception, one that a lost link interrupted, or one whose response is
  * too long for a buffer.
  *
  * @param client   the object
- * @param retries  0 to 255; 0 at first
+ * @param retries  0 to 255; the default is 0
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setRetries(struct mbm_client *client, uint8_t retries);
 
 /**
- * Sets how long a request waits before it is repeated. Other requests are sent
- * meanwhile.
+ * Sets how long a request waits before the client repeats it. Meanwhile the client sends
+ * other requests.
  *
  * @param client            the object
- * @param backoff           MBM_BACKOFF_NONE (at first) to MBM_BACKOFF_EXPONENTIAL
- * @param delayMs           the wait before the first repetition
- * @param maxDelayMs        the longest wait
+ * @param backoff           MBM_BACKOFF_NONE (the default) to MBM_BACKOFF_EXPONENTIAL
+ * @param delayMs           the wait before the first repetition, in milliseconds
+ * @param maxDelayMs        the longest wait, in milliseconds
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setBackoff(struct mbm_client *client,
@@ -2204,15 +2261,17 @@ uint8_t mbm_client_setBackoff(struct mbm_client *client,
                               uint16_t maxDelayMs);
 
 /**
- * Leaves a part of each wait before a repetition to chance, so that several
- * clients do not keep in step.
+ * Shortens each wait before a repetition by a random part, so that several clients do not
+ * repeat their requests at the same time.
  *
  * @param client   the object
- * @param percent  0 (at first) to 100: how much of the wait may be taken off
- * @param random   returns another number each time, for example rand(): one of 32
- *                 bits, of 15 bits, or whose upper bits alone vary. What it
- *                 calls on the client returns MBM_BUSY
- * @param context  handed to `random`
+ * @param percent  0 (the default) to 100: the largest part of the wait by which the client
+ *                 shortens it
+ * @param random   returns a new random number at each call, for example that of rand(). It
+ *                 may have 32 bits, 15 bits, or random bits in its upper half only. A
+ *                 function that it calls on the client returns MBM_BUSY. NULL only if
+ *                 `percent` is 0
+ * @param context  your pointer, passed to `random`; may be NULL
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setJitter(struct mbm_client *client,
@@ -2221,24 +2280,25 @@ uint8_t mbm_client_setJitter(struct mbm_client *client,
                              void *context);
 
 /**
- * Counts into storage of yours from now on. Read and zero it as you like, but not
- * from an interrupt. In TCP frames, a foreign frame is one whose transaction identifier
- * and unit no pending request has; a resynchronisation is a run of bytes that were no
- * frame.
+ * Sets your storage for counters, in which the client counts from now on. You may read and
+ * zero the counters at any time, but not from an interrupt. In TCP frames, foreignFrames
+ * counts frames whose transaction identifier and unit match no pending request, and
+ * resynchronisations counts sequences of bytes that were not a frame.
  *
  * @param client    the object
- * @param counters  zeroed by you; NULL stops counting
+ * @param counters  your counters, zeroed; NULL stops counting
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_setCounters(struct mbm_client *client, struct mbm_counters *counters);
+uint8_t mbm_client_setCounters(struct mbm_client *client,
+                               struct mbm_counters *counters);
 
 /**
- * Keeps a record of some units: how often they were asked and answered, and how
- * long each is left alone between two requests.
+ * Sets the records of units. In a record the client counts the requests to its unit. The
+ * record's `delayUs` sets the minimum time between two requests to the unit.
  *
  * @param client  the object
- * @param units   zeroed by you but for `unit` and `delay`; NULL for none
- * @param count   how many records, 0 to 255
+ * @param units   your array of records, zeroed except `unit` and `delayUs`; NULL for none
+ * @param count   the number of records, 0 to 255
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setUnits(struct mbm_client *client,
@@ -2455,7 +2515,7 @@ typedef struct mbm_service {
      * Serves a request, if it is one of this family. NULL in a zeroed record,
      * which serves nothing.
      */
-    size_t (*serve)(struct mbm_service *service, uint8_t *pdu, const void *heading);
+    size_t (*serve)(struct mbm_service *service, uint8_t *pdu, const void *info);
     /**
      * What kind of record of its family it is served as, from 1 on; 0 in a zeroed one.
      */
@@ -2550,8 +2610,8 @@ typedef struct mbm_unit {
      * Private: NULL in a unit without diagnostics.
      */
     size_t (*monitor)(struct mbm_unit *unit,
-                      const void *heading,
-                      uint8_t concern,
+                      const void *info,
+                      uint8_t addressing,
                       uint8_t *pdu);
     /**
      * Private.
@@ -3200,14 +3260,15 @@ typedef struct mbm_registers {
 } mbm_registers;
 
 /**
- * Packs coils for a write, the first into the lowest bit of the first byte (V1.1b3,
- * 6.11); unused bits of the last byte become 0, bytes behind it stay.
+ * Packs coils into bytes for a write. The first coil goes into the lowest bit of the
+ * first byte (V1.1b3, 6.11). Unused bits of the last byte become 0; the bytes after it do
+ * not change.
  *
- * @param coils     a byte a coil: 0 is off, anything else is on
- * @param quantity  how many coils, 0 to 65535
- * @param bytes     gets the bits, 8 a byte
- * @param length    how many bytes there are
- * @return MBM_OK, or with nothing packed MBM_BUFFER_TOO_SMALL or
+ * @param coils     one byte for each coil: 0 is off, any other value is on
+ * @param quantity  the number of coils, 0 to 65535
+ * @param bytes     receives the bits, 8 in each byte
+ * @param length    the number of bytes that `bytes` can hold
+ * @return MBM_OK; or, with nothing packed, MBM_BUFFER_TOO_SMALL, or
  *         MBM_INVALID_ARGUMENT for a NULL pointer
  */
 uint8_t mbm_bits_pack(const uint8_t *coils,
@@ -3216,14 +3277,14 @@ uint8_t mbm_bits_pack(const uint8_t *coils,
                       uint16_t length);
 
 /**
- * Unpacks the coils or discrete inputs of a read (V1.1b3, 6.1).
+ * Unpacks the coils or discrete inputs that a read returned in bytes (V1.1b3, 6.1).
  *
- * @param bytes     the bits, 8 a byte, the first coil the lowest
- * @param length    how many bytes there are
- * @param coils     gets 0 or 1 a coil
- * @param quantity  how many coils, 0 to 65535
- * @return MBM_OK, or with nothing unpacked MBM_ILLEGAL_DATA_ADDRESS if there are
- *         not so many bits, MBM_INVALID_ARGUMENT for a NULL pointer
+ * @param bytes     the bits, 8 in each byte; the first coil is the lowest bit
+ * @param length    the number of bytes
+ * @param coils     receives one byte for each coil, 0 or 1
+ * @param quantity  the number of coils, 0 to 65535
+ * @return MBM_OK; or, with nothing unpacked, MBM_ILLEGAL_DATA_ADDRESS if `bytes` has
+ *         fewer bits than `quantity`, MBM_INVALID_ARGUMENT for a NULL pointer
  */
 uint8_t mbm_bits_unpack(const uint8_t *bytes,
                         uint16_t length,
@@ -3231,15 +3292,15 @@ uint8_t mbm_bits_unpack(const uint8_t *bytes,
                         uint16_t quantity);
 
 /**
- * Whether a coil or discrete input is set, by the device's address.
+ * Gets the state of one coil or discrete input of a read, by its address in the device.
  *
- * @param bytes     the bits of a read, 8 a byte, the first coil the lowest
- * @param first     the address of the first coil
- * @param quantity  how many coils were read; `bytes` has room for so many
- * @param address   the coil
- * @param on        gets 0 or 1
- * @return MBM_OK, or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS for a coil that
- *         is not among them or a range that passes 65535, MBM_INVALID_ARGUMENT
+ * @param bytes     the bits of the read, 8 in each byte; the first coil is the lowest bit
+ * @param first     the address of the first coil of the read
+ * @param quantity  the number of coils that were read; `bytes` holds that many bits
+ * @param address   the address of the coil
+ * @param on        receives 0 or 1
+ * @return MBM_OK; or, with `on` unchanged, MBM_ILLEGAL_DATA_ADDRESS if the coil is
+ *         outside of the read or the read passes address 65535, MBM_INVALID_ARGUMENT
  *         for a NULL pointer
  */
 uint8_t mbm_bits_isSet(const uint8_t *bytes,
@@ -3249,16 +3310,16 @@ uint8_t mbm_bits_isSet(const uint8_t *bytes,
                        uint8_t *on);
 
 /**
- * Sets a coil for a write, by the device's address; the others stay.
+ * Sets one coil of a write, by its address in the device. The other coils do not change.
  *
- * @param bytes     the bits of a write, 8 a byte, the first coil the lowest
- * @param first     the address of the first coil
- * @param quantity  how many coils are written; `bytes` has room for so many
- * @param address   the coil
- * @param on        0 is off, anything else is on
- * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a coil that is
- *         not among them or a range that passes 65535, MBM_INVALID_ARGUMENT for
- *         a NULL pointer
+ * @param bytes     the bits of the write, 8 in each byte; the first coil is the lowest bit
+ * @param first     the address of the first coil of the write
+ * @param quantity  the number of coils of the write; `bytes` holds that many bits
+ * @param address   the address of the coil
+ * @param on        0 is off, any other value is on
+ * @return MBM_OK; or, with nothing set, MBM_ILLEGAL_DATA_ADDRESS if the coil is outside
+ *         of the write or the write passes address 65535, MBM_INVALID_ARGUMENT for a
+ *         NULL pointer
  */
 uint8_t mbm_bits_set(uint8_t *bytes,
                      uint16_t first,
@@ -3267,13 +3328,14 @@ uint8_t mbm_bits_set(uint8_t *bytes,
                      uint8_t on);
 
 /**
- * As mbm_bits_pack, into words such as mbm_master's transmit words, 16 to a word.
+ * As mbm_bits_pack, but into words, 16 bits in each word; for example the transmit words
+ * of a master.
  *
- * @param coils     a byte a coil: 0 is off, anything else is on
- * @param quantity  how many coils, 0 to 65535
- * @param words     gets the bits, 16 a word
- * @param length    how many words there are
- * @return MBM_OK, or with nothing packed MBM_BUFFER_TOO_SMALL or
+ * @param coils     one byte for each coil: 0 is off, any other value is on
+ * @param quantity  the number of coils, 0 to 65535
+ * @param words     receives the bits, 16 in each word
+ * @param length    the number of words that `words` can hold
+ * @return MBM_OK; or, with nothing packed, MBM_BUFFER_TOO_SMALL, or
  *         MBM_INVALID_ARGUMENT for a NULL pointer
  */
 uint8_t mbm_bits_packWords(const uint8_t *coils,
@@ -3282,14 +3344,14 @@ uint8_t mbm_bits_packWords(const uint8_t *coils,
                            uint16_t length);
 
 /**
- * As mbm_bits_unpack, of words such as mbm_master's response words.
+ * As mbm_bits_unpack, but from words, for example the response words of a master.
  *
- * @param words     the bits, 16 a word, the first coil the lowest
- * @param length    how many words there are
- * @param coils     gets 0 or 1 a coil
- * @param quantity  how many coils, 0 to 65535
- * @return MBM_OK, or with nothing unpacked MBM_ILLEGAL_DATA_ADDRESS if there are
- *         not so many bits, MBM_INVALID_ARGUMENT for a NULL pointer
+ * @param words     the bits, 16 in each word; the first coil is the lowest bit
+ * @param length    the number of words
+ * @param coils     receives one byte for each coil, 0 or 1
+ * @param quantity  the number of coils, 0 to 65535
+ * @return MBM_OK; or, with nothing unpacked, MBM_ILLEGAL_DATA_ADDRESS if `words` has
+ *         fewer bits than `quantity`, MBM_INVALID_ARGUMENT for a NULL pointer
  */
 uint8_t mbm_bits_unpackWords(const uint16_t *words,
                              uint16_t length,
@@ -3297,15 +3359,15 @@ uint8_t mbm_bits_unpackWords(const uint16_t *words,
                              uint16_t quantity);
 
 /**
- * As mbm_bits_isSet, in words such as mbm_master's response words.
+ * As mbm_bits_isSet, but in words, for example the response words of a master.
  *
- * @param words     the bits of a read, 16 a word, the first coil the lowest
- * @param first     the address of the first coil
- * @param quantity  how many coils were read; `words` has room for so many
- * @param address   the coil
- * @param on        gets 0 or 1
- * @return MBM_OK, or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS for a coil that
- *         is not among them or a range that passes 65535, MBM_INVALID_ARGUMENT
+ * @param words     the bits of the read, 16 in each word; the first coil is the lowest bit
+ * @param first     the address of the first coil of the read
+ * @param quantity  the number of coils that were read; `words` holds that many bits
+ * @param address   the address of the coil
+ * @param on        receives 0 or 1
+ * @return MBM_OK; or, with `on` unchanged, MBM_ILLEGAL_DATA_ADDRESS if the coil is
+ *         outside of the read or the read passes address 65535, MBM_INVALID_ARGUMENT
  *         for a NULL pointer
  */
 uint8_t mbm_bits_isSetInWords(const uint16_t *words,
@@ -3315,16 +3377,16 @@ uint8_t mbm_bits_isSetInWords(const uint16_t *words,
                               uint8_t *on);
 
 /**
- * As mbm_bits_set, in words such as mbm_master's transmit words.
+ * As mbm_bits_set, but in words, for example the transmit words of a master.
  *
- * @param words     the bits of a write, 16 a word, the first coil the lowest
- * @param first     the address of the first coil
- * @param quantity  how many coils are written; `words` has room for so many
- * @param address   the coil
- * @param on        0 is off, anything else is on
- * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a coil that is
- *         not among them or a range that passes 65535, MBM_INVALID_ARGUMENT for
- *         a NULL pointer
+ * @param words     the bits of the write, 16 in each word; the first coil is the lowest bit
+ * @param first     the address of the first coil of the write
+ * @param quantity  the number of coils of the write; `words` holds that many bits
+ * @param address   the address of the coil
+ * @param on        0 is off, any other value is on
+ * @return MBM_OK; or, with nothing set, MBM_ILLEGAL_DATA_ADDRESS if the coil is outside
+ *         of the write or the write passes address 65535, MBM_INVALID_ARGUMENT for a
+ *         NULL pointer
  */
 uint8_t mbm_bits_setInWords(uint16_t *words,
                             uint16_t first,
@@ -3333,26 +3395,26 @@ uint8_t mbm_bits_setInWords(uint16_t *words,
                             uint8_t on);
 
 /**
- * Sets the order of values in the views that mbm_master_getResponseRegisters
- * and mbm_master_getTransmitRegisters give from now on.
+ * Sets the byte and word order of values in the views that mbm_master_getResponseRegisters
+ * and mbm_master_getTransmitRegisters fill in from now on.
  *
  * @param master  the object
- * @param order   one of MBM_ORDER_...; MBM_ORDER_ABCD at first
- * @return MBM_OK, MBM_INVALID_ARGUMENT, also for another order, or
- *         MBM_NOT_INITIALISED
+ * @param order   one of MBM_ORDER_...; the default is MBM_ORDER_ABCD
+ * @return MBM_OK; MBM_INVALID_ARGUMENT, also for an unknown order; MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setWordOrder(struct mbm_master *master, uint8_t order);
+uint8_t mbm_master_setWordOrder(struct mbm_master *master,
+                                uint8_t order);
 
 /**
- * Sees the response words as registers to get values from. Copies nothing: it
- * sees what a later read puts there.
+ * Fills in a view of the response words as registers, from which you can get values. The
+ * view copies no words: it also shows those that a later read receives.
  *
- * All words of the buffer are there, those too that the last read did not
- * reach; look at values only once it has succeeded.
+ * The view includes all words of the buffer, also words that the last read did not
+ * change. Get values only after the read has succeeded.
  *
- * @param master     the object; its buffers stay as they are while the view is used
- * @param first      the device's address of word 0: that of the read, or 0 to
- *                   count from word 0
+ * @param master     the object; do not change its buffers while you use the view
+ * @param first      the address in the device of word 0: the address of the read, or 0 if
+ *                   you want to count from word 0
  * @param registers  the view to fill in; unchanged if the status is not MBM_OK
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
@@ -3361,12 +3423,12 @@ uint8_t mbm_master_getResponseRegisters(const struct mbm_master *master,
                                         struct mbm_registers *registers);
 
 /**
- * Sees the transmit words as registers to set values in, for the functions
- * that write. The queue of send does not move.
+ * Fills in a view of the transmit words as registers, in which you can set values for the
+ * functions that write. The queue of mbm_master_send does not change.
  *
- * @param master     the object; its buffers stay as they are while the view is used
- * @param first      the device's address of word 0: that of the write, or 0 to
- *                   count from word 0
+ * @param master     the object; do not change its buffers while you use the view
+ * @param first      the address in the device of word 0: the address of the write, or 0 if
+ *                   you want to count from word 0
  * @param registers  the view to fill in; unchanged if the status is not MBM_OK
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
@@ -3997,19 +4059,19 @@ typedef struct mbm_object {
 } mbm_object;
 
 /**
- * Writes the frame of a packet: request, response or exception. Nothing
- * malformed is ever built.
+ * Writes the frame of a packet: a request, a response or an exception. It never builds a
+ * malformed frame.
  *
  * Any thread or interrupt may call it.
  *
- * @param framing   how frames look
- * @param packet    what to build, with its unit, and for TCP the transaction
- * @param frame     receives the frame; may not overlap the packet's data
- * @param capacity  bytes of `frame`; MBM_MAX_FRAME do for RTU, MBM_MAX_TCP_FRAME for
- *                  TCP, MBM_MAX_PDU for a PDU alone, MBM_MAX_ASCII_FRAME for all
- * @param length    receives the frame's length; 0 if the status is not MBM_OK
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
- *         that mbm_frame_parse finds in such a frame
+ * @param framing   the framing of the frame
+ * @param packet    the packet, with its unit, and for TCP its transaction
+ * @param frame     receives the frame; it must not overlap the packet's data
+ * @param capacity  bytes of `frame`; MBM_MAX_FRAME suffice for RTU, MBM_MAX_TCP_FRAME for
+ *                  TCP, MBM_MAX_PDU for MBM_FRAMING_NONE, MBM_MAX_ASCII_FRAME for all
+ * @param length    receives the frame's length in bytes; 0 if the status is not MBM_OK
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; otherwise the status that
+ *         mbm_frame_parse would return for such a frame
  */
 uint8_t mbm_frame_build(const struct mbm_framing *framing,
                         const struct mbm_packet *packet,
@@ -4018,30 +4080,29 @@ uint8_t mbm_frame_build(const struct mbm_framing *framing,
                         uint16_t *length);
 
 /**
- * Reads a frame. The packet's data point into it.
+ * Parses a frame into a packet. The packet's data point into the frame.
  *
- * A request that is refused with an exception code can be answered with that:
- * see mbm_frame_exception.
+ * If it returns an exception code for a request, mbm_frame_exception writes the exception
+ * that answers the request.
  *
  * Any thread or interrupt may call it.
  *
- * @param framing      how frames look
+ * @param framing      the framing of the frame
  * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
  *                     and exceptions
- * @param frame        the frame, from its first byte to its last. ASCII is
- *                     decoded where it stands, which overwrites it; others are
- *                     only read
- * @param frameLength  its bytes
- * @param packet       receives what it says. If the frame is sound, but not
- *                     what it carries: kind, unit, transaction and function
- *                     alone; if the frame is not sound: kind alone; unchanged
- *                     for MBM_INVALID_ARGUMENT
- * @return MBM_OK, also for an exception; MBM_INVALID_ARGUMENT. Of the frame
+ * @param frame        the frame, from its first byte to its last. An ASCII frame is
+ *                     decoded in place, which overwrites it; other frames do not change
+ * @param frameLength  the number of bytes of `frame`
+ * @param packet       receives the packet. If the frame is valid but its PDU is not, it
+ *                     receives only kind, unit, transaction and function. If the frame is
+ *                     not valid, it receives only the kind. For MBM_INVALID_ARGUMENT it
+ *                     does not change
+ * @return MBM_OK, also for an exception; MBM_INVALID_ARGUMENT. If the frame is not valid:
  *         MBM_INCOMPLETE_FRAME, MBM_MALFORMED_FRAME, or MBM_INVALID_CRC, also for a
- *         wrong LRC. Of a request in it the exception that answers it:
+ *         wrong LRC. If its request is not valid, the exception that answers it:
  *         MBM_ILLEGAL_FUNCTION, MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE.
- *         Of a response in it MBM_INVALID_FUNCTION for a function that is neither the
- *         standard's nor declared, or MBM_MALFORMED_REPLY
+ *         If its response is not valid: MBM_MALFORMED_REPLY, or MBM_INVALID_FUNCTION for a
+ *         function code that the standard does not define and `framing` does not declare
  */
 uint8_t mbm_frame_parse(const struct mbm_framing *framing,
                         uint8_t kind,
@@ -4050,22 +4111,22 @@ uint8_t mbm_frame_parse(const struct mbm_framing *framing,
                         struct mbm_packet *packet);
 
 /**
- * Writes the exception that answers a request, where one may: to a request
- * that mbm_frame_parse refused, with its status; to one that your device
- * refuses, with the exception code of your choice.
+ * Writes the frame of the exception that answers a request. Pass the status of
+ * mbm_frame_parse if that refused the request, or an exception code of your choice if your
+ * device refuses it.
  *
  * Any thread or interrupt may call it.
  *
- * @param framing   how frames look
- * @param request   the request, as mbm_frame_parse left it
- * @param code      1 to 127, MBM_ILLEGAL_FUNCTION for example
- * @param frame     receives the frame; it may be that of the request
- * @param capacity  bytes of `frame`; 11 always do
- * @param length    receives the frame's length; 0 if the status is not MBM_OK
- * @return MBM_OK; MBM_BROADCAST_NOT_ALLOWED: on a serial line nobody answers
- *         unit 0; MBM_ILLEGAL_FUNCTION for a function from 0x80, which no
- *         exception can name; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also
- *         for a status that is no exception code, and for MBM_FRAMING_NONE
+ * @param framing   the framing of the frame
+ * @param request   the request, as mbm_frame_parse filled it in
+ * @param code      the exception code, 1 to 127, for example MBM_ILLEGAL_FUNCTION
+ * @param frame     receives the frame; it may be the buffer of the request's frame
+ * @param capacity  bytes of `frame`; 11 always suffice
+ * @param length    receives the frame's length in bytes; 0 if the status is not MBM_OK
+ * @return MBM_OK; MBM_BROADCAST_NOT_ALLOWED for unit 0 on a serial line, which no device
+ *         answers; MBM_ILLEGAL_FUNCTION for a function code from 0x80 on, which no
+ *         exception can contain; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also
+ *         for a `code` out of range and for MBM_FRAMING_NONE
  */
 uint8_t mbm_frame_exception(const struct mbm_framing *framing,
                             const struct mbm_packet *request,
@@ -4075,25 +4136,26 @@ uint8_t mbm_frame_exception(const struct mbm_framing *framing,
                             uint16_t *length);
 
 /**
- * How long the frame is that begins with these bytes.
+ * Computes the length of a frame from its first bytes.
  *
- * A response to function 11 may be longer than it counts: some devices count the id
- * alone. In RTU frames it is MBM_LENGTH_EXACT once a right CRC stands where the count
- * says, MBM_LENGTH_AT_LEAST before, and if the CRC is wrong there MBM_LENGTH_SILENCE,
- * or MBM_LENGTH_UNKNOWN in a stream. A PDU alone (MBM_FRAMING_NONE) has no CRC that would
- * tell: its length is the one that it counts, and mbm_frame_parse takes the longer PDU too.
+ * A response to function 11 may be longer than its byte count says, because some devices
+ * count only the id. In RTU frames the length is MBM_LENGTH_AT_LEAST until the bytes of the
+ * CRC have arrived at the position that the byte count gives. Then it is MBM_LENGTH_EXACT
+ * if that CRC is right. If it is wrong, it is MBM_LENGTH_SILENCE, or MBM_LENGTH_UNKNOWN in
+ * RTU over TCP. A PDU without a frame (MBM_FRAMING_NONE) has no CRC: its length is the one
+ * that the byte count gives, and mbm_frame_parse accepts a longer PDU too.
  *
- * Any thread or interrupt may call it. For ASCII it takes 260 bytes of stack.
+ * Any thread or interrupt may call it. For ASCII it needs 260 bytes of stack.
  *
- * @param framing   how frames look
+ * @param framing   the framing of the frame
  * @param kind      MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and
  *                  exceptions
  * @param bytes     the frame's first bytes; more may follow
- * @param have      how many; may be 0
+ * @param have      the number of bytes; may be 0
  * @param expected  receives the length; MBM_LENGTH_UNKNOWN and 0 if the status is
  *                  not MBM_OK
- * @return MBM_OK; MBM_MALFORMED_FRAME if no frame begins like that, or none is
- *         so long; MBM_INVALID_ARGUMENT
+ * @return MBM_OK; MBM_MALFORMED_FRAME if no frame starts with these bytes, or if no frame
+ *         may be as long as they say; MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_frame_expectedLength(const struct mbm_framing *framing,
                                  uint8_t kind,
@@ -4102,38 +4164,41 @@ uint8_t mbm_frame_expectedLength(const struct mbm_framing *framing,
                                  struct mbm_length *expected);
 
 /**
- * How long the frame will be that answers a request, if that succeeds. Else it
- * is an exception: 5 bytes in RTU, 9 in TCP, 11 characters in ASCII, 2 of a PDU alone.
+ * Computes the length of the response frame to a request. If the device refuses the
+ * request, it sends an exception instead: 5 bytes in RTU, 9 in TCP, 11 characters in
+ * ASCII, 2 for MBM_FRAMING_NONE.
  *
- * Any thread or interrupt may call it. It takes 260 bytes of stack.
+ * Any thread or interrupt may call it. It needs 260 bytes of stack.
  *
- * @param framing   how frames look
+ * @param framing   the framing of the frame
  * @param request   the request, as for mbm_frame_build
- * @param expected  receives the length; MBM_LENGTH_EXACT and 0 if nothing ever
- *                  answers it: a broadcast, 08 with sub-function 04;
+ * @param expected  receives the length. It is MBM_LENGTH_EXACT and 0 for a request that no
+ *                  device answers: a broadcast, or 08 with sub-function 04. It is
  *                  MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
- * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a packet that is no request;
- *         else why such a request is never built
+ * @return MBM_OK; MBM_INVALID_ARGUMENT, also if the packet is not a request; otherwise the
+ *         status for which mbm_frame_build refuses the request
  */
 uint8_t mbm_frame_replyLength(const struct mbm_framing *framing,
                               const struct mbm_packet *request,
                               struct mbm_length *expected);
 
 /**
- * Says whether bytes look like a Modbus TCP frame, request or response, and how
- * long that is. Eight are needed. The length in the header must be one that a
- * request or a response of this function may have, as far as the bytes tell.
+ * Decides whether bytes look like the start of a Modbus TCP frame, a request or a
+ * response, and computes the frame's length. It needs 8 bytes. The length in the MBAP
+ * header must be one that a request or a response of the function may have, as far as the
+ * bytes show.
  *
  * Any thread or interrupt may call it.
  *
  * @param bytes         the first bytes
- * @param have          how many
- * @param allowUnknown  0: only with a function code of the standard, or one
- *                      that it leaves to users; else: with any but 0
- * @param expected      receives the bytes of the frame; 0 if the status is not
+ * @param have          the number of bytes
+ * @param allowUnknown  0: the function code must be one that the standard defines or
+ *                      leaves to users; any other value: every function code but 0 will do
+ * @param expected      receives the length of the frame in bytes; 0 if the status is not
  *                      MBM_OK
- * @return MBM_OK; MBM_INCOMPLETE_FRAME if more bytes must tell;
- *         MBM_MALFORMED_FRAME if this is something else; MBM_INVALID_ARGUMENT
+ * @return MBM_OK; MBM_INCOMPLETE_FRAME if more bytes are needed to decide;
+ *         MBM_MALFORMED_FRAME if the bytes are not a Modbus TCP frame;
+ *         MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_frame_looksLikeTcp(const uint8_t *bytes,
                                uint16_t have,
@@ -4141,25 +4206,25 @@ uint8_t mbm_frame_looksLikeTcp(const uint8_t *bytes,
                                uint16_t *expected);
 
 /**
- * The CRC-16 of an RTU frame (serial line guide V1.02, 6.2.2). On the line its
- * low byte comes first.
+ * Computes the CRC-16 of an RTU frame (serial line guide V1.02, 6.2.2). A frame carries
+ * its low byte first.
  *
  * Any thread or interrupt may call it.
  *
  * @param bytes   unit and PDU
- * @param length  how many
- * @return the CRC; 0xFFFF for NULL or no bytes
+ * @param length  the number of bytes
+ * @return the CRC; 0xFFFF if `bytes` is NULL or `length` is 0
  */
 uint16_t mbm_frame_crc16(const uint8_t *bytes, uint16_t length);
 
 /**
- * The LRC of an ASCII frame (serial line guide V1.02, 6.2.1).
+ * Computes the LRC of an ASCII frame (serial line guide V1.02, 6.2.1).
  *
  * Any thread or interrupt may call it.
  *
  * @param bytes   unit and PDU as bytes, not as characters
- * @param length  how many
- * @return the LRC; 0 for NULL or no bytes
+ * @param length  the number of bytes
+ * @return the LRC; 0 if `bytes` is NULL or `length` is 0
  */
 uint8_t mbm_frame_lrc(const uint8_t *bytes, uint16_t length);
 
@@ -4229,21 +4294,21 @@ uint8_t mbm_packet_addObject(struct mbm_packet *packet,
                              const struct mbm_object *object);
 
 /**
- * Explains a frame in one line of words, for example
+ * Describes a frame in one line of words, for example
  * "unit 17  request    03 read holding registers  107..109", or
- * "bad CRC, 8 bytes" if it is damaged.
+ * "bad CRC, 8 bytes" if the frame is damaged.
  *
  * Any thread or interrupt may call it. For ASCII it takes 600 bytes of stack.
  *
- * @param framing      how frames look
+ * @param framing      the framing of the frame
  * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
  *                     and exceptions
  * @param frame        the frame, from its first byte to its last
- * @param frameLength  its bytes
- * @param text         receives the line, which a zero byte ends in any case
- * @param size         bytes of `text`; 200 do for most frames, 1200 for all
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL: the line is cut; MBM_INVALID_ARGUMENT,
- *         also for MBM_FRAMING_NONE
+ * @param frameLength  the number of bytes of `frame`
+ * @param text         receives the line. A zero byte always ends it
+ * @param size         bytes of `text`; 200 suffice for most frames, 1200 for all
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL if `text` received only the start of the line;
+ *         MBM_INVALID_ARGUMENT, also for MBM_FRAMING_NONE
  */
 uint8_t mbm_frame_text(const struct mbm_framing *framing,
                        uint8_t kind,
@@ -4576,11 +4641,11 @@ uint8_t mbm_event_text(const struct mbm_event *event, char *text, uint16_t size)
 /**
  * A receive ring between an interrupt handler and the main loop.
  *
- * One side puts bytes in with mbm_ring_put or mbm_ring_write: an interrupt
- * handler, a DMA callback or a thread. One side takes them out with
- * mbm_ring_read: the main loop, as the `read` hook of a port. Each may
- * interrupt the other at any point; neither may be two at once. No interrupt
- * is ever disabled.
+ * The writer, which is an interrupt handler, a DMA callback or a thread, puts bytes in
+ * with mbm_ring_put or mbm_ring_write. The reader, which is the main loop in the `read`
+ * hook of a port, takes them out with mbm_ring_read. Each may interrupt the other at any
+ * point. A ring has only one writer and only one reader at a time. The functions never
+ * disable interrupts.
  */
 typedef struct mbm_ring {
     /**
@@ -4598,64 +4663,67 @@ typedef struct mbm_ring {
 } mbm_ring;
 
 /**
- * Makes a ring of your bytes, empty. Neither side may use it meanwhile.
+ * Begins an empty ring over your storage. Neither writer nor reader may use the ring
+ * meanwhile.
  *
  * @param ring   the object
- * @param bytes  storage, yours, valid for as long as the ring is used
- * @param size   2 to 65535, on an AVR 2 to 256; the ring holds one byte less
+ * @param bytes  your storage; it must stay valid for as long as the ring is used
+ * @param size   bytes of storage, 2 to 65535, on an AVR 2 to 256. The ring holds one byte
+ *               less
  * @return MBM_OK or MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_ring_begin(struct mbm_ring *ring, uint8_t *bytes, uint16_t size);
 
 /**
- * Puts a byte in. An interrupt may call it.
+ * Puts one byte in. The writer calls it, also from an interrupt.
  *
  * @param ring  the object
- * @param byte  the byte received
- * @return 1, or 0 if there was no room: the byte counts as lost
+ * @param byte  the received byte
+ * @return 1; 0 if the ring was full: mbm_ring_lost counts the byte
  */
 uint8_t mbm_ring_put(struct mbm_ring *ring, uint8_t byte);
 
 /**
- * Puts bytes in, in order. An interrupt may call it.
+ * Puts bytes in, in order. The writer calls it, also from an interrupt.
  *
  * @param ring    the object
- * @param bytes   the bytes received; NULL only with length 0
- * @param length  how many
- * @return how many found room; the others count as lost
+ * @param bytes   the received bytes; NULL only if `length` is 0
+ * @param length  the number of bytes
+ * @return the number of bytes that the ring took; mbm_ring_lost counts the others
  */
 uint16_t mbm_ring_write(struct mbm_ring *ring, const uint8_t *bytes, uint16_t length);
 
 /**
- * Takes bytes out, in order, without waiting.
+ * Takes bytes out, in order, without waiting. The reader calls it.
  *
  * @param ring      the object
- * @param bytes     where they go; NULL only with capacity 0
- * @param capacity  at most so many
- * @return how many there were
+ * @param bytes     receives the bytes; NULL only if `capacity` is 0
+ * @param capacity  the number of bytes that `bytes` can hold
+ * @return the number of bytes taken out; 0 if the ring was empty
  */
 uint16_t mbm_ring_read(struct mbm_ring *ring, uint8_t *bytes, uint16_t capacity);
 
 /**
- * How many bytes there are to take out, for the side that takes.
+ * Returns how many bytes mbm_ring_read can take out now. The reader calls it.
  *
  * @param ring  the object
- * @return bytes; 0 also if the ring was never begun
+ * @return the number of bytes; 0 also if the ring was never begun
  */
 uint16_t mbm_ring_available(const struct mbm_ring *ring);
 
 /**
- * Forgets what there is to take out, for the side that takes.
+ * Discards all bytes in the ring. The reader calls it.
  *
  * @param ring  the object
  */
 void mbm_ring_clear(struct mbm_ring *ring);
 
 /**
- * How many bytes found no room since begin; either side may ask.
+ * Returns how many bytes were lost because the ring was full, since mbm_ring_begin.
+ * Writer and reader may call it.
  *
  * @param ring  the object
- * @return bytes; wraps at 65536, on an AVR at 256
+ * @return the number of bytes; it wraps at 65536, on an AVR at 256
  */
 uint16_t mbm_ring_lost(const struct mbm_ring *ring);
 
