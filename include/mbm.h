@@ -4,29 +4,31 @@
  *
  * Licence: MIT OR Apache-2.0. Generated from the source of mbm; do not edit.
  *
- * Every function: pointers are NULL or valid; NULL is answered with
- * MBM_INVALID_ARGUMENT and an object that was never begun with
- * MBM_NOT_INITIALISED, never with a crash. Objects are the caller's storage,
- * zero before first use, with no heap and no globals behind them. Nothing is
- * re-entrant on one object, and nothing may be called from an interrupt unless
- * its comment says so; any number of objects may be used side by side, each
- * from one thread. Each begin function may be called again at any time, but not
- * from a hook of the object: what was pending is given up, requests with the
- * status MBM_CANCELLED. "V1.1b3" is the Modbus application protocol, "serial line
- * guide V1.02" the guide for RTU and ASCII.
+ * Rules of every function:
+ * - A pointer is NULL or valid. For NULL a function returns MBM_INVALID_ARGUMENT, for an
+ *   object that was never begun MBM_NOT_INITIALISED. It never crashes.
+ * - Objects are your storage. Zero it before first use. The library uses no heap and no
+ *   global variables.
+ * - No function is re-entrant on one object. Call no function from an interrupt unless its
+ *   comment allows it. You may use any number of objects side by side, each from one thread.
+ * - You may call a begin function again at any time, but not from a hook of the object. The
+ *   object then gives up what was pending; requests get the status MBM_CANCELLED.
+ *
+ * "V1.1b3" is the Modbus application protocol specification, "serial line guide V1.02" the
+ * guide for RTU and ASCII.
  *
  * Contents:
  *    1 Version                 of this header and of the archive
- *    2 Statuses                what functions return
+ *    2 Statuses                the codes that functions return
  *    3 Port                    your line: read, write, clock, driver; counters
- *    4 Functions and framings  codes, limits, rules of length; RTU, ASCII, TCP
+ *    4 Functions and framings  codes, limits, length rules; RTU, ASCII, TCP
  *    5 Master                  RTU, one request at a time, blocking or not
  *    6 Client                  many requests, every framing, never waits
  *    7 Server                  answers requests on a line or connection
- *    8 Units                   what servers serve: tables, callbacks, files
+ *    8 Units                   the data that servers serve: tables, callbacks, files
  *    9 Values                  registers and bits as numbers, in words or bytes
  *   10 Packets                 requests and responses, built and parsed by hand
- *   11 Sniffer                 listens on a bus that others use
+ *   11 Sniffer                 decodes the traffic between other devices
  *   12 Ring                    bytes from an interrupt to the main loop
  */
 
@@ -36,14 +38,14 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/** Version of this header as a text, "0.2.0" for example; mbm_version is that of the archive. */
+/** Version of this header as a text, for example "0.2.0". mbm_version returns that of the archive. */
 #define MBM_VERSION MBM_VERSION_OF(MBM_VERSION_MAJOR, MBM_VERSION_MINOR, MBM_VERSION_PATCH)
 /** Private: expands the numbers. */
 #define MBM_VERSION_OF(major, minor, patch) MBM_VERSION_TEXT(major, minor, patch)
 /** Private: makes a text of the numbers. */
 #define MBM_VERSION_TEXT(major, minor, patch) #major "." #minor "." #patch
 
-/** Bytes of a frame buffer for any request and reply of so many words. */
+/** Bytes of a frame buffer that suffices for every request and reply with `words` words. */
 #define MBM_FRAME_BYTES(words) (2u * (words) + 13u)
 
 #if defined(__AVR__) && __SIZEOF_DOUBLE__ != 4
