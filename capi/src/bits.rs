@@ -1,7 +1,7 @@
-//! `mbm_bits_*`: coils and discrete inputs, packed in bytes as they travel or in
-//! words as the master keeps them.
+//! `mbm_bits_*`: coils and discrete inputs, packed in bytes as on the wire, or in words as
+//! in the master's word buffers.
 
-use super::pointers::{put_found, slice, slice_mut};
+use super::pointers::{put_result, slice, slice_mut};
 use mbm::data::bits::{self, Packed};
 use mbm::error::Status;
 
@@ -9,7 +9,7 @@ fn code(result: Result<(), Status>) -> u8 {
     result.err().unwrap_or(Status::OK).code()
 }
 
-/// How many units hold so many bits.
+/// The number of bytes or words that hold `quantity` bits.
 fn units<T: Packed>(quantity: u16) -> usize {
     usize::from(quantity).div_ceil(T::BITS)
 }
@@ -54,7 +54,7 @@ unsafe fn is_set<T: Packed>(
     // SAFETY: as the caller promises.
     code(unsafe {
         slice(units, self::units::<T>(quantity)).and_then(|units| {
-            put_found(on, || {
+            put_result(on, || {
                 bits::is_set(units, first, quantity, address).map(u8::from)
             })
         })
@@ -71,14 +71,15 @@ unsafe fn set<T: Packed>(units: *mut T, first: u16, quantity: u16, address: u16,
     })
 }
 
-/// Packs coils for a write, the first into the lowest bit of the first byte (V1.1b3,
-/// 6.11); unused bits of the last byte become 0, bytes behind it stay.
+/// Packs coils into bytes for a write. The first coil goes into the lowest bit of the
+/// first byte (V1.1b3, 6.11). Unused bits of the last byte become 0; the bytes after it do
+/// not change.
 ///
-/// @param coils     a byte a coil: 0 is off, anything else is on
-/// @param quantity  how many coils, 0 to 65535
-/// @param bytes     gets the bits, 8 a byte
-/// @param length    how many bytes there are
-/// @return MBM_OK, or with nothing packed MBM_BUFFER_TOO_SMALL or
+/// @param coils     one byte for each coil: 0 is off, any other value is on
+/// @param quantity  the number of coils, 0 to 65535
+/// @param bytes     receives the bits, 8 in each byte
+/// @param length    the number of bytes that `bytes` can hold
+/// @return MBM_OK; or, with nothing packed, MBM_BUFFER_TOO_SMALL, or
 ///         MBM_INVALID_ARGUMENT for a NULL pointer
 #[no_mangle]
 pub unsafe extern "C" fn mbm_bits_pack(
@@ -91,14 +92,14 @@ pub unsafe extern "C" fn mbm_bits_pack(
     unsafe { pack(coils, quantity, bytes, length) }
 }
 
-/// Unpacks the coils or discrete inputs of a read (V1.1b3, 6.1).
+/// Unpacks the coils or discrete inputs that a read returned in bytes (V1.1b3, 6.1).
 ///
-/// @param bytes     the bits, 8 a byte, the first coil the lowest
-/// @param length    how many bytes there are
-/// @param coils     gets 0 or 1 a coil
-/// @param quantity  how many coils, 0 to 65535
-/// @return MBM_OK, or with nothing unpacked MBM_ILLEGAL_DATA_ADDRESS if there are
-///         not so many bits, MBM_INVALID_ARGUMENT for a NULL pointer
+/// @param bytes     the bits, 8 in each byte; the first coil is the lowest bit
+/// @param length    the number of bytes
+/// @param coils     receives one byte for each coil, 0 or 1
+/// @param quantity  the number of coils, 0 to 65535
+/// @return MBM_OK; or, with nothing unpacked, MBM_ILLEGAL_DATA_ADDRESS if `bytes` has
+///         fewer bits than `quantity`, MBM_INVALID_ARGUMENT for a NULL pointer
 #[no_mangle]
 pub unsafe extern "C" fn mbm_bits_unpack(
     bytes: *const u8,
@@ -110,15 +111,15 @@ pub unsafe extern "C" fn mbm_bits_unpack(
     unsafe { unpack(bytes, length, coils, quantity) }
 }
 
-/// Whether a coil or discrete input is set, by the device's address.
+/// Gets the state of one coil or discrete input of a read, by its address in the device.
 ///
-/// @param bytes     the bits of a read, 8 a byte, the first coil the lowest
-/// @param first     the address of the first coil
-/// @param quantity  how many coils were read; `bytes` has room for so many
-/// @param address   the coil
-/// @param on        gets 0 or 1
-/// @return MBM_OK, or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS for a coil that
-///         is not among them or a range that passes 65535, MBM_INVALID_ARGUMENT
+/// @param bytes     the bits of the read, 8 in each byte; the first coil is the lowest bit
+/// @param first     the address of the first coil of the read
+/// @param quantity  the number of coils that were read; `bytes` holds that many bits
+/// @param address   the address of the coil
+/// @param on        receives 0 or 1
+/// @return MBM_OK; or, with `on` unchanged, MBM_ILLEGAL_DATA_ADDRESS if the coil is
+///         outside of the read or the read passes address 65535, MBM_INVALID_ARGUMENT
 ///         for a NULL pointer
 #[no_mangle]
 pub unsafe extern "C" fn mbm_bits_isSet(
@@ -132,16 +133,16 @@ pub unsafe extern "C" fn mbm_bits_isSet(
     unsafe { is_set(bytes, first, quantity, address, on) }
 }
 
-/// Sets a coil for a write, by the device's address; the others stay.
+/// Sets one coil of a write, by its address in the device. The other coils do not change.
 ///
-/// @param bytes     the bits of a write, 8 a byte, the first coil the lowest
-/// @param first     the address of the first coil
-/// @param quantity  how many coils are written; `bytes` has room for so many
-/// @param address   the coil
-/// @param on        0 is off, anything else is on
-/// @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a coil that is
-///         not among them or a range that passes 65535, MBM_INVALID_ARGUMENT for
-///         a NULL pointer
+/// @param bytes     the bits of the write, 8 in each byte; the first coil is the lowest bit
+/// @param first     the address of the first coil of the write
+/// @param quantity  the number of coils of the write; `bytes` holds that many bits
+/// @param address   the address of the coil
+/// @param on        0 is off, any other value is on
+/// @return MBM_OK; or, with nothing set, MBM_ILLEGAL_DATA_ADDRESS if the coil is outside
+///         of the write or the write passes address 65535, MBM_INVALID_ARGUMENT for a
+///         NULL pointer
 #[no_mangle]
 pub unsafe extern "C" fn mbm_bits_set(
     bytes: *mut u8,
@@ -154,13 +155,14 @@ pub unsafe extern "C" fn mbm_bits_set(
     unsafe { set(bytes, first, quantity, address, on) }
 }
 
-/// As mbm_bits_pack, into words such as mbm_master's transmit words, 16 to a word.
+/// As mbm_bits_pack, but into words, 16 bits in each word; for example the transmit words
+/// of a master.
 ///
-/// @param coils     a byte a coil: 0 is off, anything else is on
-/// @param quantity  how many coils, 0 to 65535
-/// @param words     gets the bits, 16 a word
-/// @param length    how many words there are
-/// @return MBM_OK, or with nothing packed MBM_BUFFER_TOO_SMALL or
+/// @param coils     one byte for each coil: 0 is off, any other value is on
+/// @param quantity  the number of coils, 0 to 65535
+/// @param words     receives the bits, 16 in each word
+/// @param length    the number of words that `words` can hold
+/// @return MBM_OK; or, with nothing packed, MBM_BUFFER_TOO_SMALL, or
 ///         MBM_INVALID_ARGUMENT for a NULL pointer
 #[no_mangle]
 pub unsafe extern "C" fn mbm_bits_packWords(
@@ -173,14 +175,14 @@ pub unsafe extern "C" fn mbm_bits_packWords(
     unsafe { pack(coils, quantity, words, length) }
 }
 
-/// As mbm_bits_unpack, of words such as mbm_master's response words.
+/// As mbm_bits_unpack, but from words, for example the response words of a master.
 ///
-/// @param words     the bits, 16 a word, the first coil the lowest
-/// @param length    how many words there are
-/// @param coils     gets 0 or 1 a coil
-/// @param quantity  how many coils, 0 to 65535
-/// @return MBM_OK, or with nothing unpacked MBM_ILLEGAL_DATA_ADDRESS if there are
-///         not so many bits, MBM_INVALID_ARGUMENT for a NULL pointer
+/// @param words     the bits, 16 in each word; the first coil is the lowest bit
+/// @param length    the number of words
+/// @param coils     receives one byte for each coil, 0 or 1
+/// @param quantity  the number of coils, 0 to 65535
+/// @return MBM_OK; or, with nothing unpacked, MBM_ILLEGAL_DATA_ADDRESS if `words` has
+///         fewer bits than `quantity`, MBM_INVALID_ARGUMENT for a NULL pointer
 #[no_mangle]
 pub unsafe extern "C" fn mbm_bits_unpackWords(
     words: *const u16,
@@ -192,15 +194,15 @@ pub unsafe extern "C" fn mbm_bits_unpackWords(
     unsafe { unpack(words, length, coils, quantity) }
 }
 
-/// As mbm_bits_isSet, in words such as mbm_master's response words.
+/// As mbm_bits_isSet, but in words, for example the response words of a master.
 ///
-/// @param words     the bits of a read, 16 a word, the first coil the lowest
-/// @param first     the address of the first coil
-/// @param quantity  how many coils were read; `words` has room for so many
-/// @param address   the coil
-/// @param on        gets 0 or 1
-/// @return MBM_OK, or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS for a coil that
-///         is not among them or a range that passes 65535, MBM_INVALID_ARGUMENT
+/// @param words     the bits of the read, 16 in each word; the first coil is the lowest bit
+/// @param first     the address of the first coil of the read
+/// @param quantity  the number of coils that were read; `words` holds that many bits
+/// @param address   the address of the coil
+/// @param on        receives 0 or 1
+/// @return MBM_OK; or, with `on` unchanged, MBM_ILLEGAL_DATA_ADDRESS if the coil is
+///         outside of the read or the read passes address 65535, MBM_INVALID_ARGUMENT
 ///         for a NULL pointer
 #[no_mangle]
 pub unsafe extern "C" fn mbm_bits_isSetInWords(
@@ -214,16 +216,16 @@ pub unsafe extern "C" fn mbm_bits_isSetInWords(
     unsafe { is_set(words, first, quantity, address, on) }
 }
 
-/// As mbm_bits_set, in words such as mbm_master's transmit words.
+/// As mbm_bits_set, but in words, for example the transmit words of a master.
 ///
-/// @param words     the bits of a write, 16 a word, the first coil the lowest
-/// @param first     the address of the first coil
-/// @param quantity  how many coils are written; `words` has room for so many
-/// @param address   the coil
-/// @param on        0 is off, anything else is on
-/// @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a coil that is
-///         not among them or a range that passes 65535, MBM_INVALID_ARGUMENT for
-///         a NULL pointer
+/// @param words     the bits of the write, 16 in each word; the first coil is the lowest bit
+/// @param first     the address of the first coil of the write
+/// @param quantity  the number of coils of the write; `words` holds that many bits
+/// @param address   the address of the coil
+/// @param on        0 is off, any other value is on
+/// @return MBM_OK; or, with nothing set, MBM_ILLEGAL_DATA_ADDRESS if the coil is outside
+///         of the write or the write passes address 65535, MBM_INVALID_ARGUMENT for a
+///         NULL pointer
 #[no_mangle]
 pub unsafe extern "C" fn mbm_bits_setInWords(
     words: *mut u16,

@@ -1,10 +1,10 @@
-//! Whole frames: built, parsed, measured, and refused with an exception.
+//! Building, parsing and measuring of whole frames, and the exception for a refused request.
 
 use super::framing::mbm_framing;
 use super::packet::{
     mbm_length, mbm_packet, own, put_expected, reply_length, side, MBM_PACKET_REQUEST,
 };
-use super::pointers::{buffer, get, lent, put, put_length};
+use super::pointers::{array, buffer, get, put, put_length};
 use mbm::error::Status;
 use mbm::frame::checksum::{crc16, lrc, Crc16};
 use mbm::frame::{Adu, Framing};
@@ -14,14 +14,15 @@ use mbm::pdu::custom::Function;
 use mbm::pdu::length::Length;
 use mbm::pdu::limits::MAX_PDU;
 
-/// How frames look, in the core's words; without a framing, PDUs alone.
-struct Look {
+/// The content of an `mbm_framing`, in the core's types.
+struct FrameFormat {
+    /// `None`: PDUs without a frame.
     framing: Option<Framing>,
     end: u8,
     own: Option<Function>,
 }
 
-/// The function code at the start of a frame or PDU.
+/// The function code of a frame or PDU, if it has arrived.
 fn function(framing: Option<Framing>, bytes: &[u8]) -> Option<u8> {
     match framing {
         Some(framing) => length::function(framing, bytes),
@@ -29,39 +30,43 @@ fn function(framing: Option<Framing>, bytes: &[u8]) -> Option<u8> {
     }
 }
 
-/// What C says of frames, of one that carries the function that `code` tells.
+/// Converts an `mbm_framing`. `code` returns the function code whose declaration is needed.
 ///
 /// # Safety
 /// `framing` is NULL or points to one that is valid.
-unsafe fn look(
+unsafe fn format(
     framing: *const mbm_framing,
     code: impl FnOnce(Option<Framing>) -> Option<u8>,
-) -> Result<Look, Status> {
+) -> Result<FrameFormat, Status> {
     // SAFETY: as the caller promises.
     unsafe {
-        let told = get(framing).ok_or(Status::INVALID_ARGUMENT)?;
-        let framing = told.core()?;
-        Ok(Look {
+        let description = get(framing).ok_or(Status::INVALID_ARGUMENT)?;
+        let framing = description.core()?;
+        Ok(FrameFormat {
             framing,
-            end: told.end(),
-            own: own(told.functions, told.functionCount, code(framing))?,
+            end: description.end(),
+            own: own(
+                description.functions,
+                description.functionCount,
+                code(framing),
+            )?,
         })
     }
 }
 
-/// Writes the frame of a packet: request, response or exception. Nothing
-/// malformed is ever built.
+/// Writes the frame of a packet: a request, a response or an exception. It never builds a
+/// malformed frame.
 ///
 /// Any thread or interrupt may call it.
 ///
-/// @param framing   how frames look
-/// @param packet    what to build, with its unit, and for TCP the transaction
-/// @param frame     receives the frame; may not overlap the packet's data
-/// @param capacity  bytes of `frame`; MBM_MAX_FRAME do for RTU, MBM_MAX_TCP_FRAME for
-///                  TCP, MBM_MAX_PDU for a PDU alone, MBM_MAX_ASCII_FRAME for all
-/// @param length    receives the frame's length; 0 if the status is not MBM_OK
-/// @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
-///         that mbm_frame_parse finds in such a frame
+/// @param framing   the framing of the frame
+/// @param packet    the packet, with its unit, and for TCP its transaction
+/// @param frame     receives the frame; it must not overlap the packet's data
+/// @param capacity  bytes of `frame`; MBM_MAX_FRAME suffice for RTU, MBM_MAX_TCP_FRAME for
+///                  TCP, MBM_MAX_PDU for MBM_FRAMING_NONE, MBM_MAX_ASCII_FRAME for all
+/// @param length    receives the frame's length in bytes; 0 if the status is not MBM_OK
+/// @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; otherwise the status that
+///         mbm_frame_parse would return for such a frame
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_build(
     framing: *const mbm_framing,
@@ -75,16 +80,16 @@ pub unsafe extern "C" fn mbm_frame_build(
         let build = || {
             let packet = get(packet).filter(|packet| !packet.lies_in(frame, capacity));
             let packet = packet.ok_or(Status::INVALID_ARGUMENT)?;
-            let look = look(framing, |_| Some(packet.function))?;
+            let format = format(framing, |_| Some(packet.function))?;
             let buffer = buffer(frame, capacity).filter(|_| !length.is_null());
             let buffer = buffer.ok_or(Status::INVALID_ARGUMENT)?;
             let data = packet.data()?;
             let Head {
                 transaction, unit, ..
             } = packet.head();
-            let own = look.own.as_slice();
-            match look.framing {
-                Some(framing) => framing.emit(buffer, transaction, unit, look.end, |pdu| {
+            let own = format.own.as_slice();
+            match format.framing {
+                Some(framing) => framing.emit(buffer, transaction, unit, format.end, |pdu| {
                     packet.emit(data, own, pdu)
                 }),
                 None => packet.emit(data, own, buffer),
@@ -94,30 +99,29 @@ pub unsafe extern "C" fn mbm_frame_build(
     }
 }
 
-/// Reads a frame. The packet's data point into it.
+/// Parses a frame into a packet. The packet's data point into the frame.
 ///
-/// A request that is refused with an exception code can be answered with that:
-/// see mbm_frame_exception.
+/// If it returns an exception code for a request, mbm_frame_exception writes the exception
+/// that answers the request.
 ///
 /// Any thread or interrupt may call it.
 ///
-/// @param framing      how frames look
+/// @param framing      the framing of the frame
 /// @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
 ///                     and exceptions
-/// @param frame        the frame, from its first byte to its last. ASCII is
-///                     decoded where it stands, which overwrites it; others are
-///                     only read
-/// @param frameLength  its bytes
-/// @param packet       receives what it says. If the frame is sound, but not
-///                     what it carries: kind, unit, transaction and function
-///                     alone; if the frame is not sound: kind alone; unchanged
-///                     for MBM_INVALID_ARGUMENT
-/// @return MBM_OK, also for an exception; MBM_INVALID_ARGUMENT. Of the frame
+/// @param frame        the frame, from its first byte to its last. An ASCII frame is
+///                     decoded in place, which overwrites it; other frames do not change
+/// @param frameLength  the number of bytes of `frame`
+/// @param packet       receives the packet. If the frame is valid but its PDU is not, it
+///                     receives only kind, unit, transaction and function. If the frame is
+///                     not valid, it receives only the kind. For MBM_INVALID_ARGUMENT it
+///                     does not change
+/// @return MBM_OK, also for an exception; MBM_INVALID_ARGUMENT. If the frame is not valid:
 ///         MBM_INCOMPLETE_FRAME, MBM_MALFORMED_FRAME, or MBM_INVALID_CRC, also for a
-///         wrong LRC. Of a request in it the exception that answers it:
+///         wrong LRC. If its request is not valid, the exception that answers it:
 ///         MBM_ILLEGAL_FUNCTION, MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE.
-///         Of a response in it MBM_INVALID_FUNCTION for a function that is neither the
-///         standard's nor declared, or MBM_MALFORMED_REPLY
+///         If its response is not valid: MBM_MALFORMED_REPLY, or MBM_INVALID_FUNCTION for a
+///         function code that the standard does not define and `framing` does not declare
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_parse(
     framing: *const mbm_framing,
@@ -128,20 +132,20 @@ pub unsafe extern "C" fn mbm_frame_parse(
 ) -> u8 {
     // SAFETY: as the header demands.
     let arguments = unsafe {
-        side(kind).and_then(|side| {
+        side(kind).and_then(|pdu_kind| {
             let bytes = buffer(frame, frameLength).filter(|_| !packet.is_null());
             let bytes = bytes.ok_or(Status::INVALID_ARGUMENT)?;
-            let look = look(framing, |framing| function(framing, bytes))?;
-            Ok((side, bytes, look))
+            let format = format(framing, |framing| function(framing, bytes))?;
+            Ok((pdu_kind, bytes, format))
         })
     };
-    let (side, bytes, look) = match arguments {
+    let (pdu_kind, bytes, format) = match arguments {
         Ok(arguments) => arguments,
         Err(refused) => return refused.code(),
     };
     let mut found = mbm_packet::of(kind, &[]);
-    let adu = match look.framing {
-        Some(framing) => framing.parse(bytes, look.end),
+    let adu = match format.framing {
+        Some(framing) => framing.parse(bytes, format.end),
         None => Ok(Adu {
             transaction: 0,
             unit: 0,
@@ -153,7 +157,7 @@ pub unsafe extern "C" fn mbm_frame_parse(
             found = mbm_packet::of(kind, adu.pdu);
             found.unit = adu.unit;
             found.transaction = adu.transaction;
-            let taken = found.take(side, adu.pdu, look.own.as_slice());
+            let taken = found.take(pdu_kind, adu.pdu, format.own.as_slice());
             taken.err().unwrap_or(Status::OK)
         }
         Err(refused) => refused,
@@ -163,22 +167,22 @@ pub unsafe extern "C" fn mbm_frame_parse(
     status.code()
 }
 
-/// Writes the exception that answers a request, where one may: to a request
-/// that mbm_frame_parse refused, with its status; to one that your device
-/// refuses, with the exception code of your choice.
+/// Writes the frame of the exception that answers a request. Pass the status of
+/// mbm_frame_parse if that refused the request, or an exception code of your choice if your
+/// device refuses it.
 ///
 /// Any thread or interrupt may call it.
 ///
-/// @param framing   how frames look
-/// @param request   the request, as mbm_frame_parse left it
-/// @param code      1 to 127, MBM_ILLEGAL_FUNCTION for example
-/// @param frame     receives the frame; it may be that of the request
-/// @param capacity  bytes of `frame`; 11 always do
-/// @param length    receives the frame's length; 0 if the status is not MBM_OK
-/// @return MBM_OK; MBM_BROADCAST_NOT_ALLOWED: on a serial line nobody answers
-///         unit 0; MBM_ILLEGAL_FUNCTION for a function from 0x80, which no
-///         exception can name; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also
-///         for a status that is no exception code, and for MBM_FRAMING_NONE
+/// @param framing   the framing of the frame
+/// @param request   the request, as mbm_frame_parse filled it in
+/// @param code      the exception code, 1 to 127, for example MBM_ILLEGAL_FUNCTION
+/// @param frame     receives the frame; it may be the buffer of the request's frame
+/// @param capacity  bytes of `frame`; 11 always suffice
+/// @param length    receives the frame's length in bytes; 0 if the status is not MBM_OK
+/// @return MBM_OK; MBM_BROADCAST_NOT_ALLOWED for unit 0 on a serial line, which no device
+///         answers; MBM_ILLEGAL_FUNCTION for a function code from 0x80 on, which no
+///         exception can contain; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also
+///         for a `code` out of range and for MBM_FRAMING_NONE
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_exception(
     framing: *const mbm_framing,
@@ -193,37 +197,38 @@ pub unsafe extern "C" fn mbm_frame_exception(
         let build = || {
             let request = get(request).filter(|packet| packet.kind == MBM_PACKET_REQUEST);
             let request = request.ok_or(Status::INVALID_ARGUMENT)?;
-            let look = look(framing, |_| None)?;
+            let format = format(framing, |_| None)?;
             let buffer = buffer(frame, capacity).filter(|_| !length.is_null());
             let buffer = buffer.ok_or(Status::INVALID_ARGUMENT)?;
             let code = Status::from_code(code);
-            let framing = look.framing.ok_or(Status::INVALID_ARGUMENT)?;
+            let framing = format.framing.ok_or(Status::INVALID_ARGUMENT)?;
             let exception = Exception::new(framing, request.head(), code)?;
-            exception.emit(framing, look.end, buffer)
+            exception.emit(framing, format.end, buffer)
         };
         put_length(length, build())
     }
 }
 
-/// How long the frame is that begins with these bytes.
+/// Computes the length of a frame from its first bytes.
 ///
-/// A response to function 11 may be longer than it counts: some devices count the id
-/// alone. In RTU frames it is MBM_LENGTH_EXACT once a right CRC stands where the count
-/// says, MBM_LENGTH_AT_LEAST before, and if the CRC is wrong there MBM_LENGTH_SILENCE,
-/// or MBM_LENGTH_UNKNOWN in a stream. A PDU alone (MBM_FRAMING_NONE) has no CRC that would
-/// tell: its length is the one that it counts, and mbm_frame_parse takes the longer PDU too.
+/// A response to function 11 may be longer than its byte count says, because some devices
+/// count only the id. In RTU frames the length is MBM_LENGTH_AT_LEAST until the bytes of the
+/// CRC have arrived at the position that the byte count gives. Then it is MBM_LENGTH_EXACT
+/// if that CRC is right. If it is wrong, it is MBM_LENGTH_SILENCE, or MBM_LENGTH_UNKNOWN in
+/// RTU over TCP. A PDU without a frame (MBM_FRAMING_NONE) has no CRC: its length is the one
+/// that the byte count gives, and mbm_frame_parse accepts a longer PDU too.
 ///
-/// Any thread or interrupt may call it. For ASCII it takes 260 bytes of stack.
+/// Any thread or interrupt may call it. For ASCII it needs 260 bytes of stack.
 ///
-/// @param framing   how frames look
+/// @param framing   the framing of the frame
 /// @param kind      MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and
 ///                  exceptions
 /// @param bytes     the frame's first bytes; more may follow
-/// @param have      how many; may be 0
+/// @param have      the number of bytes; may be 0
 /// @param expected  receives the length; MBM_LENGTH_UNKNOWN and 0 if the status is
 ///                  not MBM_OK
-/// @return MBM_OK; MBM_MALFORMED_FRAME if no frame begins like that, or none is
-///         so long; MBM_INVALID_ARGUMENT
+/// @return MBM_OK; MBM_MALFORMED_FRAME if no frame starts with these bytes, or if no frame
+///         may be as long as they say; MBM_INVALID_ARGUMENT
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_expectedLength(
     framing: *const mbm_framing,
@@ -235,22 +240,22 @@ pub unsafe extern "C" fn mbm_frame_expectedLength(
     // SAFETY: as the header demands.
     unsafe {
         let measure = || {
-            let side = side(kind)?;
-            let bytes = lent(bytes, have.into()).ok_or(Status::INVALID_ARGUMENT)?;
-            let look = look(framing, |framing| function(framing, bytes))?;
-            let own = look.own.as_slice();
-            match look.framing {
-                Some(framing) => length::expected(framing, side, bytes, look.end, own),
-                None => pdu_length(side, bytes, own),
+            let pdu_kind = side(kind)?;
+            let bytes = array(bytes, have.into()).ok_or(Status::INVALID_ARGUMENT)?;
+            let format = format(framing, |framing| function(framing, bytes))?;
+            let own = format.own.as_slice();
+            match format.framing {
+                Some(framing) => length::expected(framing, pdu_kind, bytes, format.end, own),
+                None => pdu_length(pdu_kind, bytes, own),
             }
         };
         put_expected(expected, measure())
     }
 }
 
-/// How long the PDU is that begins with these bytes.
-fn pdu_length(side: PduKind, bytes: &[u8], own: &[Function]) -> Result<Length, Status> {
-    match side.length(bytes, own) {
+/// The length of a PDU, from its first bytes.
+fn pdu_length(pdu_kind: PduKind, bytes: &[u8], own: &[Function]) -> Result<Length, Status> {
+    match pdu_kind.length(bytes, own) {
         Length::Exactly(bytes) | Length::AtLeast(bytes) if bytes > MAX_PDU => {
             Err(Status::MALFORMED_FRAME)
         }
@@ -258,18 +263,19 @@ fn pdu_length(side: PduKind, bytes: &[u8], own: &[Function]) -> Result<Length, S
     }
 }
 
-/// How long the frame will be that answers a request, if that succeeds. Else it
-/// is an exception: 5 bytes in RTU, 9 in TCP, 11 characters in ASCII, 2 of a PDU alone.
+/// Computes the length of the response frame to a request. If the device refuses the
+/// request, it sends an exception instead: 5 bytes in RTU, 9 in TCP, 11 characters in
+/// ASCII, 2 for MBM_FRAMING_NONE.
 ///
-/// Any thread or interrupt may call it. It takes 260 bytes of stack.
+/// Any thread or interrupt may call it. It needs 260 bytes of stack.
 ///
-/// @param framing   how frames look
+/// @param framing   the framing of the frame
 /// @param request   the request, as for mbm_frame_build
-/// @param expected  receives the length; MBM_LENGTH_EXACT and 0 if nothing ever
-///                  answers it: a broadcast, 08 with sub-function 04;
+/// @param expected  receives the length. It is MBM_LENGTH_EXACT and 0 for a request that no
+///                  device answers: a broadcast, or 08 with sub-function 04. It is
 ///                  MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
-/// @return MBM_OK; MBM_INVALID_ARGUMENT, also for a packet that is no request;
-///         else why such a request is never built
+/// @return MBM_OK; MBM_INVALID_ARGUMENT, also if the packet is not a request; otherwise the
+///         status for which mbm_frame_build refuses the request
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_replyLength(
     framing: *const mbm_framing,
@@ -280,9 +286,9 @@ pub unsafe extern "C" fn mbm_frame_replyLength(
     unsafe {
         let measure = || {
             let packet = get(request).ok_or(Status::INVALID_ARGUMENT)?;
-            let look = look(framing, |_| Some(packet.function))?;
-            let own = look.own.as_slice();
-            reply_length(&packet, own, |request| match look.framing {
+            let format = format(framing, |_| Some(packet.function))?;
+            let own = format.own.as_slice();
+            reply_length(&packet, own, |request| match format.framing {
                 Some(framing) => length::of_reply(framing, packet.unit, request, own),
                 None => request.response_length(own),
             })
@@ -291,20 +297,22 @@ pub unsafe extern "C" fn mbm_frame_replyLength(
     }
 }
 
-/// Says whether bytes look like a Modbus TCP frame, request or response, and how
-/// long that is. Eight are needed. The length in the header must be one that a
-/// request or a response of this function may have, as far as the bytes tell.
+/// Decides whether bytes look like the start of a Modbus TCP frame, a request or a
+/// response, and computes the frame's length. It needs 8 bytes. The length in the MBAP
+/// header must be one that a request or a response of the function may have, as far as the
+/// bytes show.
 ///
 /// Any thread or interrupt may call it.
 ///
 /// @param bytes         the first bytes
-/// @param have          how many
-/// @param allowUnknown  0: only with a function code of the standard, or one
-///                      that it leaves to users; else: with any but 0
-/// @param expected      receives the bytes of the frame; 0 if the status is not
+/// @param have          the number of bytes
+/// @param allowUnknown  0: the function code must be one that the standard defines or
+///                      leaves to users; any other value: every function code but 0 will do
+/// @param expected      receives the length of the frame in bytes; 0 if the status is not
 ///                      MBM_OK
-/// @return MBM_OK; MBM_INCOMPLETE_FRAME if more bytes must tell;
-///         MBM_MALFORMED_FRAME if this is something else; MBM_INVALID_ARGUMENT
+/// @return MBM_OK; MBM_INCOMPLETE_FRAME if more bytes are needed to decide;
+///         MBM_MALFORMED_FRAME if the bytes are not a Modbus TCP frame;
+///         MBM_INVALID_ARGUMENT
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_looksLikeTcp(
     bytes: *const u8,
@@ -314,7 +322,7 @@ pub unsafe extern "C" fn mbm_frame_looksLikeTcp(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        let bytes = lent(bytes, have.into()).filter(|_| !expected.is_null());
+        let bytes = array(bytes, have.into()).filter(|_| !expected.is_null());
         let length = match bytes {
             Some(bytes) => length::looks_like_tcp(bytes, allowUnknown != 0, &[]),
             None => Err(Status::INVALID_ARGUMENT),
@@ -323,31 +331,31 @@ pub unsafe extern "C" fn mbm_frame_looksLikeTcp(
     }
 }
 
-/// The CRC-16 of an RTU frame (serial line guide V1.02, 6.2.2). On the line its
-/// low byte comes first.
+/// Computes the CRC-16 of an RTU frame (serial line guide V1.02, 6.2.2). A frame carries
+/// its low byte first.
 ///
 /// Any thread or interrupt may call it.
 ///
 /// @param bytes   unit and PDU
-/// @param length  how many
-/// @return the CRC; 0xFFFF for NULL or no bytes
+/// @param length  the number of bytes
+/// @return the CRC; 0xFFFF if `bytes` is NULL or `length` is 0
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_crc16(bytes: *const u8, length: u16) -> u16 {
     // SAFETY: as the header demands.
-    let bytes = unsafe { lent(bytes, length.into()) };
+    let bytes = unsafe { array(bytes, length.into()) };
     let crc = bytes.map_or(Crc16::START, crc16);
     u16::from_le_bytes(crc.to_bytes())
 }
 
-/// The LRC of an ASCII frame (serial line guide V1.02, 6.2.1).
+/// Computes the LRC of an ASCII frame (serial line guide V1.02, 6.2.1).
 ///
 /// Any thread or interrupt may call it.
 ///
 /// @param bytes   unit and PDU as bytes, not as characters
-/// @param length  how many
-/// @return the LRC; 0 for NULL or no bytes
+/// @param length  the number of bytes
+/// @return the LRC; 0 if `bytes` is NULL or `length` is 0
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_lrc(bytes: *const u8, length: u16) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { lent(bytes, length.into()) }.map_or(0, lrc)
+    unsafe { array(bytes, length.into()) }.map_or(0, lrc)
 }

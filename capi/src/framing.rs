@@ -1,23 +1,23 @@
-//! Framings: how C names them, for whatever takes one.
+//! The framings, as C programs name them.
 
 use super::functions::mbm_function;
 use mbm::error::Status;
 use mbm::frame::{ascii, tcp, Framing};
 
-/// Serial line, binary, CRC-16 (serial line guide V1.02, 2.5.1).
+/// RTU: serial line, binary, with a CRC-16 (serial line guide V1.02, 2.5.1).
 pub const MBM_FRAMING_RTU: u8 = 0;
-/// Serial line, hexadecimal characters, LRC (serial line guide V1.02, 2.5.2).
+/// ASCII: serial line, hexadecimal characters, with an LRC (serial line guide V1.02, 2.5.2).
 pub const MBM_FRAMING_ASCII: u8 = 1;
-/// TCP, behind the MBAP header (messaging on TCP/IP guide V1.0b, 3.1.3).
+/// TCP: the PDU follows the MBAP header (messaging on TCP/IP guide V1.0b, 3.1.3).
 pub const MBM_FRAMING_TCP: u8 = 2;
 /// RTU frames in a TCP stream.
 pub const MBM_FRAMING_RTU_OVER_TCP: u8 = 3;
 /// No frame: the PDU alone, for the mbm_frame functions.
 pub const MBM_FRAMING_NONE: u8 = 4;
 
-/// Most bytes of a TCP frame.
+/// The maximum length of a TCP frame, in bytes.
 pub const MBM_MAX_TCP_FRAME: u16 = 260;
-/// Most characters of an ASCII frame.
+/// The maximum length of an ASCII frame, in characters.
 pub const MBM_MAX_ASCII_FRAME: u16 = 513;
 
 const _: () = {
@@ -29,24 +29,24 @@ const _: () = {
     assert!(MBM_MAX_ASCII_FRAME as usize == ascii::MAX_FRAME);
 };
 
-/// How frames look, and what is in them beside the standard. Zeroed: RTU, and
-/// the functions of the standard.
+/// Describes frames: their framing, and the functions of your own in them. Zeroed, it
+/// means RTU with the functions of the standard only.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_framing {
-    /// Functions of your own; may be NULL if there are none.
+    /// The declarations of your own functions; may be NULL if `functionCount` is 0.
     pub functions: *const mbm_function,
-    /// How many.
+    /// The number of declarations in `functions`.
     pub functionCount: u8,
     /// MBM_FRAMING_RTU, _ASCII, _TCP, _RTU_OVER_TCP or _NONE.
     pub kind: u8,
-    /// ASCII: the last character of a frame; 0 is line feed (V1.1b3, 6.8.1,
+    /// ASCII only: the last character of a frame; 0 means line feed (V1.1b3, 6.8.1,
     /// sub-function 03).
     pub delimiter: u8,
 }
 
 impl mbm_framing {
-    /// The framing in the core's words; none is that of MBM_FRAMING_NONE.
+    /// Converts the framing to the core's type. `None` is MBM_FRAMING_NONE.
     pub(super) fn core(&self) -> Result<Option<Framing>, Status> {
         match Framing::from_code(self.kind) {
             None if self.kind != MBM_FRAMING_NONE => Err(Status::INVALID_ARGUMENT),
@@ -54,7 +54,7 @@ impl mbm_framing {
         }
     }
 
-    /// The framing of what has a frame.
+    /// As [`Self::core`], but MBM_FRAMING_NONE is an error.
     pub(super) fn of_frames(&self) -> Result<Framing, Status> {
         self.core()?.ok_or(Status::INVALID_ARGUMENT)
     }

@@ -44,35 +44,37 @@ pub const MBM_FC_READ_FIFO_QUEUE: u8 = 0x18;
 /// Encapsulated Interface Transport (V1.1b3, 6.19).
 pub const MBM_FC_ENCAPSULATED_INTERFACE: u8 = 0x2B;
 
-/// Sub-function of 08: the data come back; any number of words (V1.1b3, 6.8.1).
+/// Sub-function of 08: the device returns the data, of any number of words (V1.1b3, 6.8.1).
 pub const MBM_DIAGNOSTICS_RETURN_QUERY_DATA: u16 = 0x00;
-/// Sub-function of 08; data FF 00 also clear the event log.
+/// Sub-function of 08: restarts the communications port. The data FF 00 also clear the
+/// event log.
 pub const MBM_DIAGNOSTICS_RESTART_COMMUNICATIONS: u16 = 0x01;
-/// Sub-function of 08.
+/// Sub-function of 08: the device returns its diagnostic register.
 pub const MBM_DIAGNOSTICS_RETURN_DIAGNOSTIC_REGISTER: u16 = 0x02;
-/// Sub-function of 08; the first byte of the data is the character.
+/// Sub-function of 08: sets the character that ends ASCII frames after CR. The first byte
+/// of the data is the character.
 pub const MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER: u16 = 0x03;
-/// Sub-function of 08, which nothing answers.
+/// Sub-function of 08: the device listens only. It sends no reply.
 pub const MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY: u16 = 0x04;
-/// Sub-function of 08; clears the diagnostic register too.
+/// Sub-function of 08: clears the counters and the diagnostic register.
 pub const MBM_DIAGNOSTICS_CLEAR_COUNTERS: u16 = 0x0A;
-/// Sub-function of 08: messages seen on the bus.
+/// Sub-function of 08: the number of messages that the device detected on the bus.
 pub const MBM_DIAGNOSTICS_BUS_MESSAGE_COUNT: u16 = 0x0B;
-/// Sub-function of 08: messages with a wrong CRC.
+/// Sub-function of 08: the number of messages with a wrong CRC.
 pub const MBM_DIAGNOSTICS_BUS_COMMUNICATION_ERROR_COUNT: u16 = 0x0C;
-/// Sub-function of 08: exceptions answered.
+/// Sub-function of 08: the number of exceptions that the device sent.
 pub const MBM_DIAGNOSTICS_BUS_EXCEPTION_ERROR_COUNT: u16 = 0x0D;
-/// Sub-function of 08: messages for this device.
+/// Sub-function of 08: the number of messages addressed to this device.
 pub const MBM_DIAGNOSTICS_SERVER_MESSAGE_COUNT: u16 = 0x0E;
-/// Sub-function of 08: messages that were not answered.
+/// Sub-function of 08: the number of messages to which the device sent no reply.
 pub const MBM_DIAGNOSTICS_SERVER_NO_RESPONSE_COUNT: u16 = 0x0F;
-/// Sub-function of 08: messages answered with a NAK.
+/// Sub-function of 08: the number of messages to which the device replied with a NAK.
 pub const MBM_DIAGNOSTICS_SERVER_NAK_COUNT: u16 = 0x10;
-/// Sub-function of 08: messages answered with busy.
+/// Sub-function of 08: the number of messages to which the device replied that it is busy.
 pub const MBM_DIAGNOSTICS_SERVER_BUSY_COUNT: u16 = 0x11;
-/// Sub-function of 08: messages lost to character overruns.
+/// Sub-function of 08: the number of messages that character overruns destroyed.
 pub const MBM_DIAGNOSTICS_BUS_CHARACTER_OVERRUN_COUNT: u16 = 0x12;
-/// Sub-function of 08.
+/// Sub-function of 08: clears the counter of character overruns.
 pub const MBM_DIAGNOSTICS_CLEAR_OVERRUN_COUNTER: u16 = 0x14;
 
 /// MEI type of 2B: CANopen General Reference (V1.1b3, 6.20).
@@ -88,11 +90,11 @@ pub const MBM_DEVICE_ID_EXTENDED: u8 = 3;
 /// Read device id code: one object.
 pub const MBM_DEVICE_ID_INDIVIDUAL: u8 = 4;
 
-/// Length rule: only silence on the line, or what frames the PDU, ends it.
+/// Length rule: the PDU is as long as its frame. On an RTU line silence ends the frame.
 pub const MBM_RULE_SILENCE: u8 = 0;
-/// Length rule: always so many bytes.
+/// Length rule: the PDU always has the same number of bytes.
 pub const MBM_RULE_FIXED: u8 = 1;
-/// Length rule: a byte counts the bytes behind it.
+/// Length rule: a byte of the PDU gives the number of bytes that follow it.
 pub const MBM_RULE_COUNTED: u8 = 2;
 
 const _: () = {
@@ -139,36 +141,37 @@ const _: () = {
     assert!(MBM_DEVICE_ID_INDIVIDUAL == identification::INDIVIDUAL);
 };
 
-/// How long the PDU of a function of your own is, function code included.
-/// Zeroed: as long as its frame.
+/// The length rule for the PDUs of a function of your own. A length includes the function
+/// code. A zeroed rule is MBM_RULE_SILENCE.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_rule {
     /// MBM_RULE_SILENCE, MBM_RULE_FIXED or MBM_RULE_COUNTED.
     pub kind: u8,
-    /// FIXED: bytes of the PDU, 1 to 253. COUNTED: where the counting byte
-    /// stands, 1 to 252 bytes behind the function code.
+    /// MBM_RULE_FIXED: bytes of the PDU, 1 to 253. MBM_RULE_COUNTED: the position of the
+    /// counting byte, 1 to 252 bytes after the function code.
     pub bytes: u8,
-    /// COUNTED: bytes that follow those that are counted.
+    /// MBM_RULE_COUNTED: the number of bytes that follow the counted bytes.
     pub more: u8,
 }
 
-/// A function of your own. Codes 65 to 72 and 100 to 110 are left to users, of
-/// any length unless you declare them; another code that the standard does not
-/// define works once it is declared. A code of the standard keeps its meaning.
+/// Declares a function of your own. The standard leaves the codes 65 to 72 and 100 to 110
+/// to users: without a declaration their PDUs have any length. Another code that the
+/// standard does not define works only with a declaration. A code that the
+/// standard defines keeps its meaning, also if you declare it.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_function {
-    /// 1 to 127.
+    /// The function code, 1 to 127.
     pub code: u8,
-    /// Its requests.
+    /// The length of its requests.
     pub request: mbm_rule,
-    /// Its responses.
+    /// The length of its responses.
     pub response: mbm_rule,
 }
 
-/// The core's word for a rule; none if it is no rule. (Inlined: to pack and unpack
-/// what it returns takes more than what it does.)
+/// Converts a rule to the core's type. `None` if the rule is not valid. (Inlined: a call
+/// that passes the result takes more flash than the conversion.)
 #[inline(always)]
 pub(super) fn rule(rule: mbm_rule) -> Option<Rule> {
     let fits = |most| rule.bytes > 0 && rule.bytes <= most;
@@ -180,10 +183,10 @@ pub(super) fn rule(rule: mbm_rule) -> Option<Rule> {
     }
 }
 
-/// The declaration of a function code, if there is one.
+/// The declaration of a function code, if `functions` has one.
 ///
 /// # Errors
-/// [`Status::INVALID_ARGUMENT`] if one of these can be no declaration.
+/// [`Status::INVALID_ARGUMENT`] if any item of `functions` is not a valid declaration.
 pub(super) fn declared(
     functions: &[mbm_function],
     code: Option<u8>,

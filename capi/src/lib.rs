@@ -1,19 +1,20 @@
 //! The C ABI of mbm, and its only unsafe code.
 //!
 //! Rules of every function here:
-//! - a pointer is NULL, or points to what its comment says; NULL, and an
-//!   object that was never begun, is answered with a status;
-//! - objects are the caller's storage, zeroed before first use;
-//! - integers and pointers only: no enum, no bool, no float by value;
-//! - nothing is re-entrant on one object; any number of objects may be used
+//! - A pointer is NULL, or points to what the function's comment says. For NULL, and for
+//!   an object that was never begun, the function returns a status.
+//! - Objects are the caller's storage, zeroed before first use.
+//! - Arguments and results are integers and pointers only: no enum, no bool, no float by
+//!   value.
+//! - No function is re-entrant on one object. A program may use any number of objects
 //!   side by side.
 //!
-//! The comments become those of `include/mbm.h`, so they speak to C.
+//! cbindgen copies the comments into `include/mbm.h`, so they are written for C programmers.
 
 #![no_std]
 #![warn(missing_docs, clippy::indexing_slicing, clippy::unwrap_used)]
 #![allow(non_camel_case_types, non_snake_case)]
-// What a caller must hold is the same for every function, and stands above.
+// The safety rules are the same for every function: see the rules above.
 #![allow(clippy::missing_safety_doc)]
 
 mod bits;

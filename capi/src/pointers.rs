@@ -1,15 +1,16 @@
-//! Where pointers from C become references: to arrays and values, and to the objects
-//! that C programs begin.
+//! The functions that make references of the pointers that C programs pass: to arrays,
+//! to values, and to the objects that C programs begin.
 
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 use mbm::error::Status;
 
-/// The `count` things from a pointer on; none for NULL, or for more than any
-/// memory has.
+/// The array of `count` items at `first`. `None` if `first` is NULL, or if the array
+/// would be longer than any memory.
 ///
 /// # Safety
-/// `first` is NULL or points to so many, which nothing changes meanwhile.
-pub(crate) unsafe fn lent<'a, T>(first: *const T, count: usize) -> Option<&'a [T]> {
+/// `first` is NULL or points to `count` items, which nothing changes while the slice
+/// lives.
+pub(crate) unsafe fn array<'a, T>(first: *const T, count: usize) -> Option<&'a [T]> {
     if first.is_null() || count > isize::MAX as usize / size_of::<T>() {
         return None;
     }
@@ -17,23 +18,23 @@ pub(crate) unsafe fn lent<'a, T>(first: *const T, count: usize) -> Option<&'a [T
     Some(unsafe { from_raw_parts(first, count) })
 }
 
-/// As [`lent`], where no pointer is needed to nothing.
+/// As [`array`], but `first` may also be NULL if `count` is 0.
 ///
 /// # Safety
-/// As for [`lent`].
-pub(crate) unsafe fn lent_or_none<'a, T>(first: *const T, count: usize) -> Option<&'a [T]> {
+/// As for [`array`].
+pub(crate) unsafe fn array_or_empty<'a, T>(first: *const T, count: usize) -> Option<&'a [T]> {
     if count == 0 {
         return Some(&[]);
     }
     // SAFETY: as the caller promises.
-    unsafe { lent(first, count) }
+    unsafe { array(first, count) }
 }
 
-/// The buffer of so many bytes that starts at a pointer; none for NULL.
+/// The writable buffer of `capacity` bytes at `first`. `None` if `first` is NULL.
 ///
 /// # Safety
-/// `first` is NULL or points to so many bytes, which nothing else uses
-/// meanwhile: see [`overlap`].
+/// `first` is NULL or points to `capacity` bytes, which nothing else uses while the slice
+/// lives: see [`overlap`].
 pub(crate) unsafe fn buffer<'a>(first: *mut u8, capacity: u16) -> Option<&'a mut [u8]> {
     let capacity = usize::from(capacity);
     if first.is_null() || capacity > isize::MAX as usize {
@@ -43,13 +44,13 @@ pub(crate) unsafe fn buffer<'a>(first: *mut u8, capacity: u16) -> Option<&'a mut
     Some(unsafe { from_raw_parts_mut(first, capacity) })
 }
 
-/// True if two stretches of bytes have one in common.
+/// True if the `bytes` bytes at `one` and the `more` bytes at `other` have a byte in common.
 pub(crate) fn overlap(one: *const u8, bytes: u16, other: *const u8, more: u16) -> bool {
     let (one, other) = (one as usize, other as usize);
     one < other.saturating_add(usize::from(more)) && other < one.saturating_add(usize::from(bytes))
 }
 
-/// What a pointer points to; none for NULL.
+/// A copy of the value at `place`. `None` if `place` is NULL.
 ///
 /// # Safety
 /// `place` is NULL or points to a value.
@@ -58,11 +59,11 @@ pub(crate) unsafe fn get<T: Copy>(place: *const T) -> Option<T> {
     (!place.is_null()).then(|| unsafe { place.read() })
 }
 
-/// Leaves a value where a pointer points to, and [`Status::OK`] for C;
-/// [`Status::INVALID_ARGUMENT`] for NULL.
+/// Writes a value to `place`. Returns the code of [`Status::OK`], or of
+/// [`Status::INVALID_ARGUMENT`] if `place` is NULL.
 ///
 /// # Safety
-/// `place` is NULL or points to room for a value.
+/// `place` is NULL or points to storage of a value.
 pub(crate) unsafe fn put<T>(place: *mut T, value: T) -> u8 {
     if place.is_null() {
         return Status::INVALID_ARGUMENT.code();
@@ -72,7 +73,8 @@ pub(crate) unsafe fn put<T>(place: *mut T, value: T) -> u8 {
     Status::OK.code()
 }
 
-/// As [`put`], of a length, or of 0 and the status that says why there is none.
+/// As [`put`], for a length. Of an error, it writes the length 0 and returns the code of
+/// that error.
 ///
 /// # Safety
 /// As for [`put`].
@@ -88,50 +90,54 @@ pub(crate) unsafe fn put_length(place: *mut u16, length: Result<usize, Status>) 
     }
 }
 
-/// An object of C: storage of its caller's, zeroed before first use, which a begin
-/// function makes an object of.
+/// A type of object that C programs use. The C program owns the storage and zeroes it before
+/// first use; a begin function makes an object of it.
 ///
 /// # Safety
-/// `mark` gives a byte of the storage that zeroed storage has zero, and to which only
-/// what begins an object, and [`calling`], write.
+/// `mark` returns a byte of the storage. That byte is zero in zeroed storage, and only the
+/// begin functions and [`with_hooks`] write it.
 pub(crate) unsafe trait CObject: Sized {
-    /// How the functions on it reach what lies behind it: by a reference, or by a
-    /// pointer where hooks that run meanwhile may hand the object to this library.
+    /// How the functions of this library reach the fields of the object: by a reference; or
+    /// by a pointer, if hooks that run meanwhile may pass the object to this library.
     type Access<'a>;
 
-    /// The mark of an object, which is read before any reference to it is made.
+    /// The byte that says whether the storage is an object. [`check`] reads it before
+    /// any reference to the object is made.
     ///
     /// # Safety
-    /// `object` points to storage of one, zeroed or begun.
+    /// `object` points to storage of an object, zeroed or begun.
     unsafe fn mark(object: *const Self) -> *mut u8;
 
-    /// What lies behind an object.
+    /// The fields of an object.
     ///
     /// # Safety
-    /// [`check`] found one, and nothing else uses it while a reference lives.
+    /// [`check`] returned [`Status::OK`] for the object. Nothing else uses it while a
+    /// reference lives.
     unsafe fn access<'a>(object: *mut Self) -> Self::Access<'a>;
 }
 
-/// Marks an object that was begun; zeroed storage does not carry it.
-pub(crate) const BEGUN: u8 = CALLING & !1;
+/// The mark of an object that was begun. Zeroed storage does not have it.
+pub(crate) const BEGUN: u8 = IN_HOOK & !1;
 
-/// Marks an object while hooks may be called that may not use it.
-pub(crate) const CALLING: u8 = Status::BUSY.code();
-const _: () = assert!(CALLING & 1 != 0);
+/// The mark of an object while it may call hooks that must not use it.
+pub(crate) const IN_HOOK: u8 = Status::BUSY.code();
+const _: () = assert!(IN_HOOK & 1 != 0);
 
-/// Whether there is an object behind a pointer from C: [`Status::OK`],
-/// [`Status::INVALID_ARGUMENT`] for NULL, [`Status::NOT_INITIALISED`] for one that was
-/// never begun, [`Status::BUSY`] from within a hook that may not use it.
+/// Whether the functions of this library may use the object at a pointer from C:
+/// [`Status::OK`]; [`Status::INVALID_ARGUMENT`] if the pointer is NULL;
+/// [`Status::NOT_INITIALISED`] if the object was never begun; [`Status::BUSY`] if a hook
+/// that may not use the object makes the call.
 ///
 /// # Safety
-/// `object` is NULL or points to storage of one, zeroed or begun.
+/// `object` is NULL or points to storage of an object, zeroed or begun.
 #[cfg_attr(all(target_os = "none", not(target_arch = "avr")), inline(never))]
 pub(crate) unsafe fn check<O: CObject>(object: *const O) -> Status {
     // SAFETY: as the caller promises.
     unsafe { check_once(object) }
 }
 
-/// [`check`], for a function that most images have no other with of its noun.
+/// As [`check`], inlined: for a function that is, in most images, the only one of its
+/// object's type that checks.
 ///
 /// # Safety
 /// As for [`check`].
@@ -143,12 +149,12 @@ pub(crate) unsafe fn check_once<O: CObject>(object: *const O) -> Status {
     // SAFETY: not NULL, so storage of an object.
     match unsafe { O::mark(object).read() } {
         BEGUN => Status::OK,
-        CALLING => Status::BUSY,
+        IN_HOOK => Status::BUSY,
         _ => Status::NOT_INITIALISED,
     }
 }
 
-/// What lies behind a pointer to an object.
+/// The fields of the object at a pointer.
 ///
 /// # Safety
 /// As for [`CObject::access`]; every object is writable storage.
@@ -157,26 +163,27 @@ pub(crate) unsafe fn object<'a, O: CObject>(object: *const O) -> O::Access<'a> {
     unsafe { O::access(object.cast_mut()) }
 }
 
-/// Runs `action`, which may call hooks of an object. A call on the same object from
-/// within them is refused by [`check`], which looks at the mark alone: a reference that
-/// `action` makes does not cover that.
+/// Runs `action`, which may call hooks of an object. If a hook calls this library on the
+/// same object, [`check`] refuses that call. It reads the mark only, which no reference
+/// that `action` makes includes.
 ///
 /// # Safety
-/// [`check`] found an object, or one is being begun, and no reference to it lives.
+/// [`check`] returned [`Status::OK`] for the object, or the object is being begun. No
+/// reference to it lives.
 #[inline(always)]
-pub(crate) unsafe fn calling<O: CObject, T>(object: *const O, action: impl FnOnce() -> T) -> T {
+pub(crate) unsafe fn with_hooks<O: CObject, T>(object: *const O, action: impl FnOnce() -> T) -> T {
     // SAFETY: as the caller promises; every object is writable storage.
     unsafe {
         let mark = O::mark(object);
-        mark.write(CALLING);
+        mark.write(IN_HOOK);
         let result = action();
         mark.write(BEGUN);
         result
     }
 }
 
-/// Runs `action` on an object, or returns the status that says why not. It calls no
-/// hook but within [`calling`].
+/// Checks the object and runs `action` on it. Returns the code of the status of the check,
+/// or of `action`. `action` calls hooks only inside [`with_hooks`].
 ///
 /// # Safety
 /// As for [`check`]; nothing else uses the object meanwhile.
@@ -194,31 +201,31 @@ pub(crate) unsafe fn with<'a, O: CObject>(
     status.code()
 }
 
-/// Asks an object something; `otherwise` where there is none, and from within a hook
-/// that may not use it.
+/// Checks the object and returns what `getter` reads of it. Returns `otherwise` if the
+/// check refuses.
 ///
 /// # Safety
 /// As for [`with`].
-pub(crate) unsafe fn ask<'a, O: CObject, T>(
+pub(crate) unsafe fn read<'a, O: CObject, T>(
     object: *const O,
     otherwise: T,
-    question: impl FnOnce(O::Access<'a>) -> T,
+    getter: impl FnOnce(O::Access<'a>) -> T,
 ) -> T {
     // SAFETY: checked; exclusive as the caller promises, and every object is
     // writable storage.
     unsafe {
         match check(object) {
-            Status::OK => question(O::access(object.cast_mut())),
+            Status::OK => getter(O::access(object.cast_mut())),
             _ => otherwise,
         }
     }
 }
 
-/// Puts what `find` gives where C wants it, and nothing if it gives a status.
+/// Writes the result of `find` to `place`; nothing if `find` returns an error.
 ///
 /// # Safety
 /// `place` is NULL or points to a `T`.
-pub(crate) unsafe fn put_found<T>(
+pub(crate) unsafe fn put_result<T>(
     place: *mut T,
     find: impl FnOnce() -> Result<T, Status>,
 ) -> Result<(), Status> {
@@ -226,15 +233,15 @@ pub(crate) unsafe fn put_found<T>(
         return Err(Status::INVALID_ARGUMENT);
     }
     let found = find()?;
-    // SAFETY: not NULL, so room for it.
+    // SAFETY: not NULL, so storage of a `T`.
     unsafe { place.write(found) };
     Ok(())
 }
 
-/// An array of C; NULL is one of no items alone.
+/// The array of `count` items at `items`. `items` may be NULL only if `count` is 0.
 ///
 /// # Safety
-/// `items` is NULL or points to `count` items that nobody writes meanwhile.
+/// `items` is NULL or points to `count` items, which nothing writes while the slice lives.
 pub(crate) unsafe fn slice<'a, T>(items: *const T, count: usize) -> Result<&'a [T], Status> {
     match (items.is_null(), count) {
         (_, 0) => Ok(&[]),
@@ -244,10 +251,10 @@ pub(crate) unsafe fn slice<'a, T>(items: *const T, count: usize) -> Result<&'a [
     }
 }
 
-/// As [`slice`], to write.
+/// As [`slice`], writable.
 ///
 /// # Safety
-/// As for [`slice`], and nobody else reads them meanwhile.
+/// As for [`slice`]; nothing else reads the items either.
 pub(crate) unsafe fn slice_mut<'a, T>(items: *mut T, count: usize) -> Result<&'a mut [T], Status> {
     match (items.is_null(), count) {
         (_, 0) => Ok(&mut []),
@@ -257,9 +264,10 @@ pub(crate) unsafe fn slice_mut<'a, T>(items: *mut T, count: usize) -> Result<&'a
     }
 }
 
-/// The characters of a C string, without its NUL.
+/// The characters of a C string, without the NUL that ends it.
 ///
-/// Looks at no more than `most` and one: of a longer string it gives so many.
+/// It reads at most `most + 1` characters. Of a longer string it returns the first
+/// `most + 1`.
 ///
 /// # Safety
 /// `text` is NULL or points to characters that a NUL ends.
@@ -268,7 +276,7 @@ pub(crate) unsafe fn text<'a>(text: *const u8, most: usize) -> Result<&'a [u8], 
         return Err(Status::INVALID_ARGUMENT);
     }
     let mut count = 0;
-    // SAFETY: nothing behind the NUL is looked at.
+    // SAFETY: no byte after the NUL is read.
     unsafe {
         while count <= most && *text.add(count) != 0 {
             count += 1;

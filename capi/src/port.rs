@@ -1,47 +1,48 @@
-//! The port that C supplies.
+//! The port: what the C program supplies for a line.
 
 use super::master::object::mbm_master;
 use core::ffi::c_void;
 use core::ptr::null;
 use mbm::port::Port;
 
-/// What the firmware supplies: a byte stream, a clock, and optional hooks.
+/// What your firmware supplies: a byte stream, a clock, and optional hooks.
 ///
-/// A master refers to its port, which must stay valid and unchanged for as long as the
-/// master is used; it may be a constant. A client and a server copy theirs. Hooks that
-/// are NULL are not called; `read`, `write` and `micros` must be there.
+/// A master keeps a pointer to its port. The port must stay valid and unchanged for as long
+/// as the master is used; it may be a constant. A client and a server copy their port.
+/// `read`, `write` and `micros` must not be NULL. The other hooks may be NULL: then they are
+/// not called.
 ///
-/// A function that a hook calls on the object that called the hook returns
-/// MBM_BUSY and changes nothing; a getter returns what it returns for an object
-/// that was never begun. The hook `idle` is the exception: it may call every
-/// function, and one that starts a request returns MBM_BUSY.
+/// A hook must not use the object that calls it. If it calls a function on that object, the
+/// function returns MBM_BUSY and changes nothing; a getter returns what it returns for an
+/// object that was never begun. The hook `idle` is the exception: it may call every
+/// function, but one that starts a request returns MBM_BUSY.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_port {
-    /// Handed to every hook. Yours, may be NULL.
+    /// Your pointer, passed to every hook; may be NULL.
     pub context: *mut c_void,
-    /// Takes up to `capacity` received bytes without waiting. Returns how
-    /// many, 0 if none has arrived yet, negative if the link is lost.
+    /// Copies up to `capacity` received bytes to `bytes`, without waiting. Returns the
+    /// number of bytes, 0 if none has arrived, a negative number if the link is lost.
     pub read:
         Option<unsafe extern "C" fn(context: *mut c_void, bytes: *mut u8, capacity: u16) -> i16>,
-    /// Accepts up to `length` bytes to send without waiting for the wire.
-    /// Returns how many, 0 if none just now, negative if the link is lost.
+    /// Accepts up to `length` bytes to send, without waiting until they are sent. Returns
+    /// the number of bytes accepted, 0 if it can accept none now, a negative number if the
+    /// link is lost.
     pub write:
         Option<unsafe extern "C" fn(context: *mut c_void, bytes: *const u8, length: u16) -> i16>,
-    /// A clock in microseconds that wraps at 2^32. A platform with a
+    /// Returns the time in microseconds; it wraps at 2^32. A platform with a
     /// millisecond tick returns `tick * 1000`.
     pub micros: Option<unsafe extern "C" fn(context: *mut c_void) -> u32>,
-    /// Optional: 1 once the last bit has left, 0 while bits are to come. It
-    /// may wait for the last bit instead and return 1.
+    /// Optional: returns 1 if the last bit was sent, 0 if bits remain to be sent. It may
+    /// also wait until the last bit was sent, and return 1.
     pub flush: Option<unsafe extern "C" fn(context: *mut c_void) -> u8>,
-    /// Optional: called before the first byte of a request (RS-485 driver on).
+    /// Optional: called before the first byte of a frame is sent (RS-485 driver on).
     pub preTransmission: Option<unsafe extern "C" fn(context: *mut c_void)>,
-    /// Optional: called after the last bit of a request (RS-485 driver off).
+    /// Optional: called after the last bit of a frame was sent (RS-485 driver off).
     pub postTransmission: Option<unsafe extern "C" fn(context: *mut c_void)>,
-    /// Optional: called again and again while a blocking call of `master` waits,
-    /// never between preTransmission and postTransmission. It may sleep until a
-    /// byte arrives, for at most the time that mbm_master_pollDelay(master)
-    /// returns.
+    /// Optional: called repeatedly while a blocking function of `master` waits, but never
+    /// between preTransmission and postTransmission. It may sleep until a byte arrives, at
+    /// most for the time that mbm_master_pollDelay(master) returns.
     pub idle: Option<unsafe extern "C" fn(context: *mut c_void, master: *mut mbm_master)>,
 }
 
@@ -51,8 +52,9 @@ impl mbm_port {
         self.read.is_some() && self.write.is_some() && self.micros.is_some()
     }
 
-    /// Becomes as another. (At once is a call of memcpy: little on an AVR, and in an
-    /// ESP's ROM, but 170 bytes of libc on a Cortex-M0.)
+    /// Copies another port into this one. (The assignment of the whole struct calls memcpy:
+    /// that is small on an AVR and in the ROM of an ESP, but 170 bytes of libc on a
+    /// Cortex-M0.)
     pub(super) fn copy(&mut self, from: &mbm_port) {
         if cfg!(any(target_arch = "avr", target_arch = "xtensa")) {
             *self = *from;
@@ -83,7 +85,8 @@ pub(super) unsafe fn now(port: *const mbm_port) -> u32 {
     }
 }
 
-/// Bytes of a buffer that are used: more a port's hooks could not count.
+/// The number of bytes of a buffer that is used: at most as many as the `i16` that a port's
+/// hooks return can count.
 pub(super) const fn countable(bytes: u16) -> u16 {
     if bytes > i16::MAX as u16 {
         i16::MAX as u16
@@ -92,12 +95,12 @@ pub(super) const fn countable(bytes: u16) -> u16 {
     }
 }
 
-// SAFETY, here and below: the hooks are C functions that keep the contract
-// that their comments state, slices are valid for their length and no longer than
-// an i16 counts, and what a complete port has is called of such a port only.
+// SAFETY, here and below: the hooks are C functions that keep the contract of their
+// comments. Slices are valid for their length, and an i16 can count that. `read`, `write`
+// and `micros` are called on complete ports only, which have them.
 impl Port for mbm_port {
     fn is_ready(&self) -> bool {
-        // Begin takes complete ports only.
+        // The begin functions accept complete ports only.
         self.read.is_some()
     }
 
@@ -147,7 +150,7 @@ impl Port for mbm_port {
     }
 }
 
-/// A port that stays where it is, and what its hooks are handed.
+/// A pointer to a port, and the context that its hooks receive.
 #[repr(C)]
 pub(super) struct PortRef {
     port: *const mbm_port,
@@ -158,7 +161,7 @@ impl PortRef {
     /// Refers to a port.
     ///
     /// # Safety
-    /// The port is complete, and stays as it is for as long as this refers to it.
+    /// The port is complete, and does not change for as long as this refers to it.
     #[inline(always)]
     pub(super) unsafe fn set(&mut self, port: *const mbm_port, context: *mut c_void) {
         self.port = port;
@@ -173,8 +176,8 @@ impl PortRef {
     /// Calls the hook `idle`.
     ///
     /// # Safety
-    /// `this` refers to a port. No reference to what holds it lives, for the hook may
-    /// use that.
+    /// `this` refers to a port. No reference to the object that holds `this` lives, because
+    /// the hook may use that object.
     #[inline(always)]
     pub(super) unsafe fn idle(this: *const PortRef, master: *mut mbm_master) {
         // SAFETY: as the caller promises.
@@ -186,8 +189,8 @@ impl PortRef {
     }
 }
 
-// The port is complete, as PortRef::set demands; the engine calls nothing of a master
-// that is not ready.
+// SAFETY, here and below: the port is complete, as PortRef::set demands. The engine calls no
+// hook if the port is not ready.
 impl Port for PortRef {
     fn is_ready(&self) -> bool {
         !self.port.is_null()

@@ -7,11 +7,11 @@ use mbm::ring::{Place, Positions, Ring, MAX_STORAGE};
 
 /// A receive ring between an interrupt handler and the main loop.
 ///
-/// One side puts bytes in with mbm_ring_put or mbm_ring_write: an interrupt
-/// handler, a DMA callback or a thread. One side takes them out with
-/// mbm_ring_read: the main loop, as the `read` hook of a port. Each may
-/// interrupt the other at any point; neither may be two at once. No interrupt
-/// is ever disabled.
+/// The writer, which is an interrupt handler, a DMA callback or a thread, puts bytes in
+/// with mbm_ring_put or mbm_ring_write. The reader, which is the main loop in the `read`
+/// hook of a port, takes them out with mbm_ring_read. Each may interrupt the other at any
+/// point. A ring has only one writer and only one reader at a time. The functions never
+/// disable interrupts.
 #[repr(C)]
 pub struct mbm_ring {
     /// Private.
@@ -29,7 +29,7 @@ const _: () = {
     assert!(size_of::<AtomicU8>() == 1);
 };
 
-/// The ring behind a pointer, if it was begun.
+/// The ring at a pointer from C, if it was begun.
 ///
 /// # Safety
 /// `ring` is NULL or points to an `mbm_ring`, zeroed or begun.
@@ -42,8 +42,8 @@ unsafe fn ring<'a>(ring: *const mbm_ring) -> Option<Ring<'a>> {
     if bytes.is_null() {
         return None;
     }
-    // SAFETY: begin demands that so many bytes are valid as long as the ring is
-    // used; both sides reach them, and the positions, as atomics only.
+    // SAFETY: mbm_ring_begin demands that `size` bytes are valid for as long as the ring is
+    // used. Writer and reader use the bytes and the positions as atomics only.
     unsafe {
         let bytes = from_raw_parts(bytes.cast::<AtomicU8>(), size.into());
         let positions = &*(&raw const (*ring).positions).cast::<Positions>();
@@ -51,18 +51,20 @@ unsafe fn ring<'a>(ring: *const mbm_ring) -> Option<Ring<'a>> {
     }
 }
 
-/// Makes a ring of your bytes, empty. Neither side may use it meanwhile.
+/// Begins an empty ring over your storage. Neither writer nor reader may use the ring
+/// meanwhile.
 ///
 /// @param ring   the object
-/// @param bytes  storage, yours, valid for as long as the ring is used
-/// @param size   2 to 65535, on an AVR 2 to 256; the ring holds one byte less
+/// @param bytes  your storage; it must stay valid for as long as the ring is used
+/// @param size   bytes of storage, 2 to 65535, on an AVR 2 to 256. The ring holds one byte
+///               less
 /// @return MBM_OK or MBM_INVALID_ARGUMENT
 #[no_mangle]
 pub unsafe extern "C" fn mbm_ring_begin(ring: *mut mbm_ring, bytes: *mut u8, size: u16) -> u8 {
     if ring.is_null() || bytes.is_null() || size < 2 || usize::from(size) > MAX_STORAGE {
         return Status::INVALID_ARGUMENT.code();
     }
-    // SAFETY: not NULL, so storage of a ring, which nobody uses meanwhile.
+    // SAFETY: not NULL, so storage of a ring, which nothing else uses meanwhile.
     unsafe {
         ring.write(mbm_ring {
             bytes,
@@ -73,11 +75,11 @@ pub unsafe extern "C" fn mbm_ring_begin(ring: *mut mbm_ring, bytes: *mut u8, siz
     Status::OK.code()
 }
 
-/// Puts a byte in. An interrupt may call it.
+/// Puts one byte in. The writer calls it, also from an interrupt.
 ///
 /// @param ring  the object
-/// @param byte  the byte received
-/// @return 1, or 0 if there was no room: the byte counts as lost
+/// @param byte  the received byte
+/// @return 1; 0 if the ring was full: mbm_ring_lost counts the byte
 #[no_mangle]
 pub unsafe extern "C" fn mbm_ring_put(ring: *mut mbm_ring, byte: u8) -> u8 {
     // SAFETY: as the header demands.
@@ -87,53 +89,53 @@ pub unsafe extern "C" fn mbm_ring_put(ring: *mut mbm_ring, byte: u8) -> u8 {
     }
 }
 
-/// Puts bytes in, in order. An interrupt may call it.
+/// Puts bytes in, in order. The writer calls it, also from an interrupt.
 ///
 /// @param ring    the object
-/// @param bytes   the bytes received; NULL only with length 0
-/// @param length  how many
-/// @return how many found room; the others count as lost
+/// @param bytes   the received bytes; NULL only if `length` is 0
+/// @param length  the number of bytes
+/// @return the number of bytes that the ring took; mbm_ring_lost counts the others
 #[no_mangle]
 pub unsafe extern "C" fn mbm_ring_write(ring: *mut mbm_ring, bytes: *const u8, length: u16) -> u16 {
     if bytes.is_null() {
         return 0;
     }
-    // SAFETY: as the header demands; so many bytes are valid.
+    // SAFETY: as the header demands.
     match unsafe { self::ring(ring) } {
         Some(ring) => ring.write(unsafe { from_raw_parts(bytes, length.into()) }),
         None => 0,
     }
 }
 
-/// Takes bytes out, in order, without waiting.
+/// Takes bytes out, in order, without waiting. The reader calls it.
 ///
 /// @param ring      the object
-/// @param bytes     where they go; NULL only with capacity 0
-/// @param capacity  at most so many
-/// @return how many there were
+/// @param bytes     receives the bytes; NULL only if `capacity` is 0
+/// @param capacity  the number of bytes that `bytes` can hold
+/// @return the number of bytes taken out; 0 if the ring was empty
 #[no_mangle]
 pub unsafe extern "C" fn mbm_ring_read(ring: *mut mbm_ring, bytes: *mut u8, capacity: u16) -> u16 {
     if bytes.is_null() {
         return 0;
     }
-    // SAFETY: as the header demands; so many bytes are valid.
+    // SAFETY: as the header demands.
     match unsafe { self::ring(ring) } {
         Some(ring) => ring.read(unsafe { from_raw_parts_mut(bytes, capacity.into()) }),
         None => 0,
     }
 }
 
-/// How many bytes there are to take out, for the side that takes.
+/// Returns how many bytes mbm_ring_read can take out now. The reader calls it.
 ///
 /// @param ring  the object
-/// @return bytes; 0 also if the ring was never begun
+/// @return the number of bytes; 0 also if the ring was never begun
 #[no_mangle]
 pub unsafe extern "C" fn mbm_ring_available(ring: *const mbm_ring) -> u16 {
     // SAFETY: as the header demands.
     unsafe { self::ring(ring) }.map_or(0, |ring| ring.available())
 }
 
-/// Forgets what there is to take out, for the side that takes.
+/// Discards all bytes in the ring. The reader calls it.
 ///
 /// @param ring  the object
 #[no_mangle]
@@ -144,10 +146,11 @@ pub unsafe extern "C" fn mbm_ring_clear(ring: *mut mbm_ring) {
     }
 }
 
-/// How many bytes found no room since begin; either side may ask.
+/// Returns how many bytes were lost because the ring was full, since mbm_ring_begin.
+/// Writer and reader may call it.
 ///
 /// @param ring  the object
-/// @return bytes; wraps at 65536, on an AVR at 256
+/// @return the number of bytes; it wraps at 65536, on an AVR at 256
 #[no_mangle]
 pub unsafe extern "C" fn mbm_ring_lost(ring: *const mbm_ring) -> u16 {
     // SAFETY: as the header demands.

@@ -1,10 +1,10 @@
-//! Status numbers and their explanation.
+//! The status codes and the function that explains them.
 
 use core::ffi::{c_char, CStr};
 use mbm::error::Status;
 
-/// Declares the constants of C, holds each against the core's number, and
-/// knows their words.
+/// Asserts that each constant of C equals the core's number, and defines the function that
+/// returns the text of a status.
 macro_rules! statuses {
     ($($constant:ident = $core:expr, $text:literal;)*) => {
         $(const _: () = assert!($constant == $core.code());)*
@@ -21,76 +21,75 @@ macro_rules! statuses {
 
 /// The call succeeded.
 pub const MBM_OK: u8 = 0x00;
-/// Exception of the device: it does not know the function.
+/// Exception of the device: it does not support the function.
 pub const MBM_ILLEGAL_FUNCTION: u8 = 0x01;
-/// Exception of the device: it has no such address. Also, with nothing sent,
-/// for a range that passes address 65535.
+/// Exception of the device: it has no such address. This library also returns it, and sends
+/// nothing, for a range that passes address 65535.
 pub const MBM_ILLEGAL_DATA_ADDRESS: u8 = 0x02;
-/// Exception of the device: it refuses the quantity or value. Also, with
-/// nothing sent, for a quantity that the standard forbids, and for writes of
-/// more than the transmit buffer holds.
+/// Exception of the device: it refuses the quantity or value. This library also returns it,
+/// and sends nothing, for a quantity that the standard forbids, and for a write of more than
+/// the transmit buffer holds.
 pub const MBM_ILLEGAL_DATA_VALUE: u8 = 0x03;
-/// Exception of the device: it failed while it carried the request out.
+/// Exception of the device: it failed while it executed the request.
 pub const MBM_SLAVE_DEVICE_FAILURE: u8 = 0x04;
-/// Exception of the device: accepted, but it takes long.
+/// Exception of the device: it accepted the request and needs a long time for it.
 pub const MBM_ACKNOWLEDGE: u8 = 0x05;
-/// Exception of the device: busy, ask again later.
+/// Exception of the device: it is busy. Send the request again later.
 pub const MBM_SLAVE_DEVICE_BUSY: u8 = 0x06;
-/// Exception of the device: a file's memory is inconsistent.
+/// Exception of the device: the memory of a file failed its consistency check.
 pub const MBM_MEMORY_PARITY_ERROR: u8 = 0x08;
-/// Exception of a gateway: no path to the device.
+/// Exception of a gateway: it has no path to the device.
 pub const MBM_GATEWAY_PATH_UNAVAILABLE: u8 = 0x0A;
-/// Exception of a gateway: the device behind it did not answer.
+/// Exception of a gateway: it received no response from the device.
 pub const MBM_GATEWAY_TARGET_FAILED_TO_RESPOND: u8 = 0x0B;
 
-/// Within the response timeout only frames of other units arrived.
+/// Only frames of other units arrived within the response timeout.
 pub const MBM_INVALID_SLAVE_ID: u8 = 0xE0;
-/// Within the response timeout the unit answered, but to another function.
+/// The unit sent a reply to another function, and no other reply arrived within the
+/// response timeout.
 pub const MBM_INVALID_FUNCTION: u8 = 0xE1;
-/// No complete reply within the response timeout.
+/// No complete reply arrived within the response timeout.
 pub const MBM_RESPONSE_TIMED_OUT: u8 = 0xE2;
-/// The reply arrived damaged: its CRC is wrong.
+/// The CRC of the reply, or in ASCII its LRC, is wrong.
 pub const MBM_INVALID_CRC: u8 = 0xE3;
 
-/// An argument that the function cannot take: NULL, a number out of range, a port
-/// without read, write or micros, a buffer that is too short, or an object of
-/// another framing or kind. The comment of the function says which. Nothing was
-/// changed.
+/// The function cannot accept an argument: NULL, a number out of range, a port without
+/// read, write or micros, a buffer that is too short, or an object of another framing or
+/// kind. The comment of the function says which. The call changed nothing.
 pub const MBM_INVALID_ARGUMENT: u8 = 0xE4;
-/// The unit answered the function with a right CRC, but not this request:
-/// wrong byte count, wrong echo, or an exception code of 0 or from 0x80.
+/// The unit sent a reply of this function with a right CRC, but the reply does not match the
+/// request: a wrong byte count, a wrong echo, or an exception code of 0 or from 0x80.
 pub const MBM_MALFORMED_REPLY: u8 = 0xE5;
 /// The port's read or write reported that the link is lost.
 pub const MBM_LINK_LOST: u8 = 0xE6;
-/// The object is in use: it has a request under way, it called the hook that this
-/// call came from, or it is a record that is served in another way. Nothing was
-/// changed.
+/// The object is in use: it has a request under way, or the call came from a hook that the
+/// object called, or the object is a record that serves in another way. The call changed
+/// nothing.
 pub const MBM_BUSY: u8 = 0xE7;
-/// A function that reads cannot be broadcast; nothing was sent.
+/// A request that reads cannot be broadcast. Nothing was sent.
 pub const MBM_BROADCAST_NOT_ALLOWED: u8 = 0xE8;
-/// The frame buffer cannot hold the request (nothing was sent), or frame or
-/// response buffer cannot hold the reply (the response words are unchanged), or a
-/// unit has no place for another record.
+/// One of these: the frame buffer cannot hold the request, and nothing was sent; the frame
+/// buffer or the response buffer cannot hold the reply, and the response words are
+/// unchanged; a unit cannot take another record.
 pub const MBM_BUFFER_TOO_SMALL: u8 = 0xE9;
 /// The object was never begun, or has no buffers.
 pub const MBM_NOT_INITIALISED: u8 = 0xEA;
 /// The request is under way: call mbm_master_poll again.
 pub const MBM_PENDING: u8 = 0xEB;
-/// For as long as the response timeout the line never fell silent, or the
-/// port took no bytes.
+/// The line was not silent, or the port accepted no bytes, for as long as the response
+/// timeout.
 pub const MBM_LINE_BUSY: u8 = 0xEC;
-/// The request was given up by mbm_master_cancel or mbm_master_beginRtu.
+/// A cancel function or a begin function gave the request up.
 pub const MBM_CANCELLED: u8 = 0xED;
-/// A frame that is not whole yet: more bytes are to come.
+/// The frame is not complete: more bytes must follow.
 pub const MBM_INCOMPLETE_FRAME: u8 = 0xEE;
-/// No frame of this framing begins like that, or has such a length.
+/// No frame of this framing starts with these bytes, or has this length.
 pub const MBM_MALFORMED_FRAME: u8 = 0xEF;
-/// The client has 16 requests already; nothing was queued.
+/// The client has 16 requests already. Nothing was queued.
 pub const MBM_QUEUE_FULL: u8 = 0xF0;
-/// Another pending request of the client has this transaction id; nothing was
-/// queued.
+/// Another pending request of the client has this transaction number. Nothing was queued.
 pub const MBM_DUPLICATE_TRANSACTION: u8 = 0xF1;
-/// The request has ended already, or was never queued.
+/// The request has ended already, or was never queued on this client.
 pub const MBM_NOT_PENDING: u8 = 0xF2;
 
 statuses! {
@@ -125,9 +124,11 @@ statuses! {
     MBM_NOT_PENDING = Status::NOT_PENDING, c"the request is not pending";
 }
 
-/// Explains a status in a few words of English. On an AVR, where constants lie in
-/// RAM, a program that calls it has about 1100 bytes less of that: show the number,
-/// or in a sketch modbusStatusText of ModbusStatusText.h, whose words stay in flash.
+/// Explains a status in a few words of English.
+///
+/// On an AVR, constants are in RAM, and a program that calls this function has about 1100
+/// bytes of RAM less. There, show the number; or in a sketch call modbusStatusText of
+/// ModbusStatusText.h, which keeps its words in flash.
 ///
 /// Any thread or interrupt may call it.
 ///

@@ -1,39 +1,39 @@
-//! The buffers and counters that C lends.
+//! The buffers and counters that belong to the C program.
 
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 use mbm::bytes::copy_words;
 use mbm::engine::{Storage, Words, COUNTERS};
 use mbm::FIRMWARE;
 
-/// What happened on the line, since the caller zeroed it. Each wraps at 2^32.
+/// Counters of what happened on the line since you zeroed them. Each wraps at 2^32.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_counters {
-    /// Requests sent, retries included.
+    /// Requests sent, including retries.
     pub requests: u32,
-    /// Replies that answered a request, exceptions included.
+    /// Replies that matched a request, including exceptions.
     pub replies: u32,
     /// Replies that were exceptions.
     pub exceptions: u32,
-    /// Requests whose reply arrived damaged.
+    /// Requests whose reply arrived with a wrong CRC.
     pub badCrc: u32,
-    /// Requests that were not answered in time.
+    /// Requests without a reply within the response timeout.
     pub timeouts: u32,
-    /// Frames with a right CRC of other units, or that answered no request of
-    /// ours, while a reply was waited for.
+    /// Frames with a right CRC that arrived during the wait for a reply, from another unit
+    /// or not matching the request.
     pub foreignFrames: u32,
-    /// Replies that were found behind bytes that were no frame.
+    /// Replies that were found after bytes that were not a frame.
     pub resynchronisations: u32,
     /// Bytes sent.
     pub bytesSent: u32,
-    /// Bytes received, foreign ones and noise included.
+    /// Bytes received, including those of foreign frames and noise.
     pub bytesReceived: u32,
 }
 
 const _: () = assert!(size_of::<mbm_counters>() == COUNTERS * size_of::<u32>());
 
-/// What mbm_master_setBuffers was given.
-// In this order: see `Engine`.
+/// The arguments of mbm_master_setBuffers.
+// The order of the fields saves flash: see `Engine`.
 #[repr(C)]
 pub(super) struct MasterBuffers {
     pub(super) frame_bytes: u8,
@@ -45,10 +45,10 @@ pub(super) struct MasterBuffers {
     pub(super) counters: *mut mbm_counters,
 }
 
-/// Words from a pointer on; none where nobody lent any.
+/// The array of `count` words at `first`; an empty one if `first` is NULL.
 ///
 /// # Safety
-/// `first` points to so many words, or is NULL.
+/// `first` is NULL or points to `count` words.
 unsafe fn words<'a>(first: *mut u16, count: u8) -> &'a mut [u16] {
     if first.is_null() {
         return &mut [];
@@ -57,15 +57,16 @@ unsafe fn words<'a>(first: *mut u16, count: u8) -> &'a mut [u16] {
     unsafe { from_raw_parts_mut(first, count.into()) }
 }
 
-/// The functions of [`Storage`] over the fields `frame`, `frame_bytes` and `counters` of a
-/// struct: a frame buffer that C lends, whose lengths are of the type `$count`.
+/// Implements the functions of [`Storage`] for a struct with the fields `frame`,
+/// `frame_bytes` and `counters`: a frame buffer of the C program, whose lengths are of the
+/// type `$count`.
 ///
-/// Nothing is checked here, for its bytes. The function of the header that sets the fields
+/// To save flash, no function here checks an index. The C function that sets the fields
 /// demands a buffer of that length, and counters or NULL, valid for as long as the object is
-/// used. The engine, and a client's TCP line, keep every index below `space`:
+/// used. The engine and the client's TCP transport keep every index within the buffer:
 /// `tests/storage_bounds.rs`, `tests/client_bounds.rs` and `c-tests/test_client_buffers.c`
-/// hold them to that.
-macro_rules! lent_frame {
+/// prove that.
+macro_rules! frame_storage {
     ($count:ty) => {
         type Count = $count;
 
@@ -104,19 +105,19 @@ macro_rules! lent_frame {
         }
 
         fn take_back(&mut self, count: $count) {
-            // SAFETY: as many as were set aside.
+            // SAFETY: `set_aside` moved `frame` by that many bytes.
             self.frame = unsafe { self.frame.sub(count.into()) };
             self.frame_bytes += count;
         }
 
-        // On a microcontroller once, not at every call: flash.
+        // Not inlined on a microcontroller, to save flash.
         #[cfg_attr(all(feature = "counters", target_os = "none"), inline(never))]
         fn count(&mut self, counter: mbm::engine::Counter, more: u16) {
             if !cfg!(feature = "counters") || self.counters.is_null() {
                 return;
             }
-            // SAFETY: the caller's counters are COUNTERS integers in a row, and
-            // `counter` is less than that.
+            // SAFETY: mbm_counters is an array of COUNTERS integers, and `counter` is less
+            // than COUNTERS.
             unsafe {
                 let counter = self.counters.cast::<u32>().add(counter as usize);
                 *counter = (*counter).wrapping_add(more.into());
@@ -124,16 +125,16 @@ macro_rules! lent_frame {
         }
     };
 }
-pub(crate) use lent_frame;
+pub(crate) use frame_storage;
 
-// Without buffers nothing is requested.
+// Before mbm_master_setBuffers, the engine refuses every request.
 impl Storage for MasterBuffers {
-    lent_frame!(u8);
+    frame_storage!(u8);
 
-    // Volatile, or LLVM would call memmove of libc.
+    // Volatile: otherwise LLVM would call memmove of libc, which costs flash.
     #[cfg_attr(target_os = "none", inline(never))]
     fn move_down(&mut self, from: u8, count: u8) {
-        // SAFETY: both stretches lie within `frame_bytes`, see above.
+        // SAFETY: both ranges lie within `frame_bytes`, see above.
         unsafe {
             let mut to = self.frame;
             let mut from = to.add(from.into());
@@ -146,7 +147,7 @@ impl Storage for MasterBuffers {
     }
 }
 
-// The engine keeps every index below the words that it asks for, too.
+// SAFETY, below: the engine keeps every index below the number of words, too.
 impl Words for MasterBuffers {
     fn transmit(&mut self) -> &mut [u16] {
         // SAFETY: see above.
@@ -159,7 +160,7 @@ impl Words for MasterBuffers {
 
     #[inline(always)]
     fn load_words(&mut self, to: u8, count: u8, high_first: bool) {
-        // SAFETY: of `transmit_words`, and below `frame_bytes`, see above.
+        // SAFETY: within `transmit_words` and `frame_bytes`, see above.
         unsafe {
             if !FIRMWARE && high_first {
                 let words = from_raw_parts(self.transmit.cast(), count.into());
@@ -186,7 +187,7 @@ impl Words for MasterBuffers {
 
     #[inline(always)]
     fn store_words(&mut self, from: u8, count: u8, high_first: bool) {
-        // SAFETY: below `frame_bytes`, and of `response_words`, see above.
+        // SAFETY: within `frame_bytes` and `response_words`, see above.
         unsafe {
             if !FIRMWARE && high_first {
                 let words = from_raw_parts_mut(self.response.cast(), count.into());
@@ -194,7 +195,8 @@ impl Words for MasterBuffers {
             }
             let mut word = self.response;
             let mut byte = self.frame.add(from.into());
-            // The CRC stands there, and is in no word.
+            // An odd last byte is padded with 0. This overwrites a byte of the CRC, which
+            // has been checked.
             *byte.add(count.into()) = 0;
             for _ in 0..count.div_ceil(2) {
                 let bytes = [*byte, *byte.add(1)];
@@ -210,7 +212,7 @@ impl Words for MasterBuffers {
     }
 }
 
-/// What turns the index of a byte on the wire into its index in memory.
+/// The mask that converts the index of a byte on the wire to its index in memory, by XOR.
 const fn flip(high_first: bool) -> u8 {
     (high_first != cfg!(target_endian = "big")) as u8
 }

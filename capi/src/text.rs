@@ -1,14 +1,14 @@
-//! Frames in words.
+//! Frames described in words.
 
 use super::framing::mbm_framing;
 use super::packet::side;
-use super::pointers::{buffer, get, lent_or_none};
+use super::pointers::{array_or_empty, buffer, get};
 use core::ffi::c_char;
 use mbm::error::Status;
 use mbm::text::{self, TextWriter};
 
-/// The line that starts at a pointer from C; none if it has no room for the zero
-/// byte that ends it.
+/// The writer of a line of text into a buffer of C. It is an error if `size` is 0: the
+/// zero byte that ends the line must fit.
 ///
 /// # Safety
 /// `text` is NULL or points to `size` bytes, which nothing else uses meanwhile.
@@ -22,7 +22,7 @@ pub(super) unsafe fn line<'a>(text: *mut c_char, size: u16) -> Result<TextWriter
     Ok(TextWriter::new(text))
 }
 
-/// What C is told of a text.
+/// The status code of a text: whether the whole text fitted.
 pub(super) fn outcome(written: Result<TextWriter, Status>) -> u8 {
     match written.and_then(TextWriter::finish) {
         Ok(_) => Status::OK.code(),
@@ -30,21 +30,21 @@ pub(super) fn outcome(written: Result<TextWriter, Status>) -> u8 {
     }
 }
 
-/// Explains a frame in one line of words, for example
+/// Describes a frame in one line of words, for example
 /// "unit 17  request    03 read holding registers  107..109", or
-/// "bad CRC, 8 bytes" if it is damaged.
+/// "bad CRC, 8 bytes" if the frame is damaged.
 ///
 /// Any thread or interrupt may call it. For ASCII it takes 600 bytes of stack.
 ///
-/// @param framing      how frames look
+/// @param framing      the framing of the frame
 /// @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
 ///                     and exceptions
 /// @param frame        the frame, from its first byte to its last
-/// @param frameLength  its bytes
-/// @param text         receives the line, which a zero byte ends in any case
-/// @param size         bytes of `text`; 200 do for most frames, 1200 for all
-/// @return MBM_OK; MBM_BUFFER_TOO_SMALL: the line is cut; MBM_INVALID_ARGUMENT,
-///         also for MBM_FRAMING_NONE
+/// @param frameLength  the number of bytes of `frame`
+/// @param text         receives the line. A zero byte always ends it
+/// @param size         bytes of `text`; 200 suffice for most frames, 1200 for all
+/// @return MBM_OK; MBM_BUFFER_TOO_SMALL if `text` received only the start of the line;
+///         MBM_INVALID_ARGUMENT, also for MBM_FRAMING_NONE
 #[no_mangle]
 pub unsafe extern "C" fn mbm_frame_text(
     framing: *const mbm_framing,
@@ -58,9 +58,9 @@ pub unsafe extern "C" fn mbm_frame_text(
     unsafe {
         let write = || {
             let mut line = line(text, size)?;
-            let told = get(framing).ok_or(Status::INVALID_ARGUMENT)?;
-            let (framing, end) = (told.of_frames()?, told.end());
-            let frame = lent_or_none(frame, frameLength.into());
+            let description = get(framing).ok_or(Status::INVALID_ARGUMENT)?;
+            let (framing, end) = (description.of_frames()?, description.end());
+            let frame = array_or_empty(frame, frameLength.into());
             let frame = frame.ok_or(Status::INVALID_ARGUMENT)?;
             text::frame(&mut line, framing, side(kind)?, frame, end);
             Ok(line)

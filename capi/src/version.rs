@@ -1,4 +1,4 @@
-//! The version of the library. Its one source is Cargo.toml.
+//! The version of the library, which Cargo.toml defines.
 
 use core::ffi::c_char;
 
@@ -9,7 +9,7 @@ pub const MBM_VERSION_MINOR: u8 = 2;
 /// Version of this header: a new patch version breaks nothing.
 pub const MBM_VERSION_PATCH: u8 = 0;
 
-/// The number that a text of digits says.
+/// Converts decimal digits to a number.
 const fn number(digits: &str) -> u8 {
     let mut rest = digits.as_bytes();
     let mut number = 0;
@@ -26,7 +26,8 @@ const _: () = {
     assert!(MBM_VERSION_PATCH == number(env!("CARGO_PKG_VERSION_PATCH")));
 };
 
-/// The version of the archive. It is MBM_VERSION if program and archive belong together.
+/// Returns the version of the archive. The text equals MBM_VERSION, the version of the
+/// header, if header and archive belong together.
 ///
 /// Any thread or interrupt may call it.
 ///

@@ -1,5 +1,5 @@
-//! What C sees of `mbm.h` is what Rust means: sizes, offsets, constants. A
-//! probe is compiled by the C compiler, run, and held against Rust.
+//! Sizes, offsets and constants are the same in C and in Rust. The test compiles and runs a C
+//! program that includes `mbm.h`, and compares what it prints with the values in Rust.
 
 use mbm_c::*;
 use std::fs;
@@ -7,7 +7,7 @@ use std::mem::{align_of, offset_of, size_of};
 use std::path::Path;
 use std::process::Command;
 
-/// A C expression and the value that Rust has for it.
+/// Pairs of a C expression and its value in Rust.
 macro_rules! probes {
     (sizes: $($type:ident)*; offsets: $($owner:ident { $($field:ident)* })*; constants: $($constant:ident)*;) => {
         vec![
@@ -113,7 +113,7 @@ fn probes() -> Vec<(String, u64)> {
     }
 }
 
-/// Compiles and runs a C program that prints each expression's value.
+/// The values of the expressions in C: compiles and runs a C program that prints them.
 fn values_in_c(compiler: &mut Command, expressions: &[String], folder: &Path) -> Vec<u64> {
     let mut source = String::from(
         "#include <stdalign.h>\n#include <stddef.h>\n#include <stdio.h>\n#include \"mbm.h\"\nint main(void)\n{\n",
@@ -154,15 +154,15 @@ fn sizes_offsets_and_constants_agree_with_c() {
         .opt_level(0)
         .get_compiler()
         .to_command();
-    let found = values_in_c(&mut compiler, &expressions, folder);
-    assert_eq!(found.len(), probes.len());
-    for ((name, rust), c) in probes.iter().zip(found) {
+    let values = values_in_c(&mut compiler, &expressions, folder);
+    assert_eq!(values.len(), probes.len());
+    for ((name, rust), c) in probes.iter().zip(values) {
         assert_eq!(*rust, c, "{name}");
     }
 }
 
 #[test]
-fn the_probe_counts_every_constant_of_the_header() {
+fn the_probes_include_every_constant_of_the_header() {
     let header = include_str!("../../include/mbm.h");
     let defined = header
         .lines()
@@ -181,9 +181,9 @@ fn the_probe_counts_every_constant_of_the_header() {
 }
 
 #[test]
-fn every_status_constant_is_explained_and_no_two_alike() {
+fn every_status_constant_has_its_own_text() {
     let text = |status| {
-        // SAFETY is the callee's: it returns a constant string.
+        // SAFETY: mbm_status_text returns a constant string.
         let pointer = mbm_status_text(status);
         unsafe { std::ffi::CStr::from_ptr(pointer) }
             .to_str()
@@ -194,7 +194,7 @@ fn every_status_constant_is_explained_and_no_two_alike() {
     let mut texts: Vec<String> = statuses.iter().map(|status| text(*status)).collect();
     texts.sort();
     texts.dedup();
-    // 07 and 09 are exception codes that the standard does not name.
+    // 07 and 09 have the same text: the standard does not name these exception codes.
     assert_eq!(texts.len(), statuses.len() - 1);
     assert_eq!(text(0xFF), "not a status");
 }

@@ -1,6 +1,7 @@
-//! The C functions as C calls them, with hooks that use the object that called them:
-//! small enough for Miri, which checks what a sanitizer cannot, that no reference is
-//! used again behind a call into C: `cargo +nightly miri test -p mbm-c --test reentry`.
+//! The tests call the C functions as a C program does, with hooks that use the object that
+//! calls them. They are small enough for Miri, which checks what a sanitizer cannot: that no
+//! reference is used after a call into C invalidated it. Run them with
+//! `cargo +nightly miri test -p mbm-c --test reentry`.
 
 use mbm_c::*;
 use std::ffi::c_void;
@@ -9,32 +10,32 @@ use std::ptr::{null, null_mut};
 
 const BUSY: u8 = MBM_BUSY;
 
-/// What all hooks share, behind raw pointers as in C.
-struct World {
+/// The state that all hooks share, reached through raw pointers as in C.
+struct HookState {
     client: *mut mbm_client,
     master: *mut mbm_master,
     server: *mut mbm_server,
     unit: *mut mbm_unit,
-    switches: *mut mbm_functionMask,
+    function_mask: *mut mbm_functionMask,
     request: *mut mbm_clientRequest,
     again: *mut mbm_clientRequest,
-    arriving: Vec<u8>,
+    received: Vec<u8>,
     now: u32,
     calls: u32,
     done: u32,
 }
 
-unsafe fn world<'a>(context: *mut c_void) -> &'a mut World {
-    unsafe { &mut *context.cast::<World>() }
+unsafe fn state<'a>(context: *mut c_void) -> &'a mut HookState {
+    unsafe { &mut *context.cast::<HookState>() }
 }
 
-/// Uses each object there is.
-unsafe fn disturb(context: *mut c_void) {
+/// Calls functions on each object, which the library must refuse.
+unsafe fn use_objects(context: *mut c_void) {
     unsafe {
         let (client, master, server) = {
-            let world = world(context);
-            world.calls += 1;
-            (world.client, world.master, world.server)
+            let state = state(context);
+            state.calls += 1;
+            (state.client, state.master, state.server)
         };
         if !client.is_null() {
             assert_eq!(mbm_client_poll(client), BUSY);
@@ -58,10 +59,10 @@ unsafe fn disturb(context: *mut c_void) {
 
 unsafe extern "C" fn read(context: *mut c_void, bytes: *mut u8, capacity: u16) -> i16 {
     unsafe {
-        disturb(context);
-        let arriving = &mut world(context).arriving;
-        let count = arriving.len().min(capacity.into());
-        for (index, byte) in arriving.drain(..count).enumerate() {
+        use_objects(context);
+        let received = &mut state(context).received;
+        let count = received.len().min(capacity.into());
+        for (index, byte) in received.drain(..count).enumerate() {
             bytes.add(index).write(byte);
         }
         count as i16
@@ -70,7 +71,7 @@ unsafe extern "C" fn read(context: *mut c_void, bytes: *mut u8, capacity: u16) -
 
 unsafe extern "C" fn write(context: *mut c_void, bytes: *const u8, length: u16) -> i16 {
     unsafe {
-        disturb(context);
+        use_objects(context);
         bytes.add(usize::from(length) - 1).read();
         length as i16
     }
@@ -78,25 +79,25 @@ unsafe extern "C" fn write(context: *mut c_void, bytes: *const u8, length: u16) 
 
 unsafe extern "C" fn micros(context: *mut c_void) -> u32 {
     unsafe {
-        disturb(context);
-        let world = world(context);
-        world.now += 2500;
-        world.now
+        use_objects(context);
+        let state = state(context);
+        state.now += 2500;
+        state.now
     }
 }
 
 unsafe extern "C" fn flush(context: *mut c_void) -> u8 {
-    unsafe { disturb(context) };
+    unsafe { use_objects(context) };
     1
 }
 
 unsafe extern "C" fn driver(context: *mut c_void) {
-    unsafe { disturb(context) }
+    unsafe { use_objects(context) }
 }
 
 unsafe extern "C" fn idle(context: *mut c_void, _master: *mut mbm_master) {
     unsafe {
-        let master = world(context).master;
+        let master = state(context).master;
         assert_eq!(mbm_master_readCoils(master, 0, 1), BUSY);
         assert_eq!(mbm_master_setQuietTime(master, 1), MBM_OK);
         mbm_master_poll(master);
@@ -105,14 +106,14 @@ unsafe extern "C" fn idle(context: *mut c_void, _master: *mut mbm_master) {
 
 unsafe extern "C" fn random(context: *mut c_void) -> u32 {
     unsafe {
-        disturb(context);
-        // Another client looks at the request that this one has.
+        use_objects(context);
+        // Another client is given the request that is pending on this one.
         let mut other: mbm_client = zeroed();
         let (mut incoming, mut outgoing) = ([0; 16], [0; 16]);
         let (first, second) = (incoming.as_mut_ptr(), outgoing.as_mut_ptr());
         let status = mbm_client_beginTcp(&mut other, &port(null_mut()), first, 16, second, 16);
         assert_eq!(status, MBM_OK);
-        let request = world(context).request;
+        let request = state(context).request;
         assert_eq!(mbm_client_readCoils(&mut other, request, 0, 1), BUSY);
         assert_eq!((*request).status, MBM_PENDING);
     }
@@ -122,14 +123,14 @@ unsafe extern "C" fn random(context: *mut c_void) -> u32 {
 unsafe extern "C" fn done(context: *mut c_void, request: *mut mbm_clientRequest) {
     unsafe {
         let (client, again) = {
-            let world = world(context);
-            world.done += 1;
-            (world.client, world.again)
+            let state = state(context);
+            state.done += 1;
+            (state.client, state.again)
         };
         assert_eq!(mbm_client_poll(client), BUSY);
         assert_eq!(mbm_client_setRetries(client, 0), MBM_OK);
         mbm_client_pollDelay(client);
-        if world(context).done < 3 {
+        if state(context).done < 3 {
             assert_eq!(mbm_client_readCoils(client, request, 1, 2), MBM_PENDING);
         }
         if (*again).status != MBM_PENDING {
@@ -152,16 +153,16 @@ fn port(context: *mut c_void) -> mbm_port {
     }
 }
 
-fn new_world() -> *mut World {
-    Box::into_raw(Box::new(World {
+fn new_state() -> *mut HookState {
+    Box::into_raw(Box::new(HookState {
         client: null_mut(),
         master: null_mut(),
         server: null_mut(),
         unit: null_mut(),
-        switches: null_mut(),
+        function_mask: null_mut(),
         request: null_mut(),
         again: null_mut(),
-        arriving: Vec::new(),
+        received: Vec::new(),
         now: 0,
         calls: 0,
         done: 0,
@@ -169,7 +170,7 @@ fn new_world() -> *mut World {
 }
 
 fn boxed<T>() -> *mut T {
-    // The objects of C are zero before first use.
+    // A C program zeroes its objects before first use.
     Box::into_raw(Box::new(unsafe { zeroed() }))
 }
 
@@ -177,12 +178,12 @@ fn boxed<T>() -> *mut T {
 fn hooks_and_done_use_the_client_that_called_them() {
     for framing in 0..4 {
         unsafe {
-            let world = new_world();
+            let state = new_state();
             let (client, request) = (boxed::<mbm_client>(), boxed::<mbm_clientRequest>());
             let (one, two) = (boxed::<[u8; 300]>(), boxed::<[u8; 300]>());
-            (*world).again = boxed();
-            (*(*world).again).unit = 17;
-            let port = port(world.cast());
+            (*state).again = boxed();
+            (*(*state).again).unit = 17;
+            let port = port(state.cast());
             let (first, second) = (one.cast::<u8>(), two.cast::<u8>());
             let status = match framing {
                 0 => mbm_client_beginRtu(client, &port, first, 300),
@@ -191,7 +192,7 @@ fn hooks_and_done_use_the_client_that_called_them() {
                 _ => mbm_client_beginRtuOverTcp(client, &port, first, 300),
             };
             assert_eq!(status, MBM_OK);
-            (*world).client = client;
+            (*state).client = client;
             assert_eq!(mbm_client_setResponseTimeout(client, 20), MBM_OK);
             assert_eq!(mbm_client_setRetries(client, 1), MBM_OK);
             assert_eq!(
@@ -199,13 +200,13 @@ fn hooks_and_done_use_the_client_that_called_them() {
                 MBM_OK
             );
             assert_eq!(
-                mbm_client_setJitter(client, 50, Some(random), world.cast()),
+                mbm_client_setJitter(client, 50, Some(random), state.cast()),
                 MBM_OK
             );
-            (*world).request = request;
+            (*state).request = request;
             (*request).unit = 17;
             (*request).done = Some(done);
-            (*request).context = world.cast();
+            (*request).context = state.cast();
             assert_eq!(mbm_client_readCoils(client, request, 0, 1), MBM_PENDING);
             for _ in 0..500 {
                 if mbm_client_poll(client) != MBM_PENDING {
@@ -213,10 +214,10 @@ fn hooks_and_done_use_the_client_that_called_them() {
                 }
             }
             assert_eq!(mbm_client_pending(client), 0);
-            assert_eq!((*world).done, 3);
-            assert!((*world).calls > 10);
-            drop(Box::from_raw((*world).again));
-            drop(Box::from_raw(world));
+            assert_eq!((*state).done, 3);
+            assert!((*state).calls > 10);
+            drop(Box::from_raw((*state).again));
+            drop(Box::from_raw(state));
             drop((Box::from_raw(client), Box::from_raw(request)));
             drop((Box::from_raw(one), Box::from_raw(two)));
         }
@@ -226,13 +227,13 @@ fn hooks_and_done_use_the_client_that_called_them() {
 #[test]
 fn hooks_and_idle_use_the_master_that_called_them() {
     unsafe {
-        let (world, master) = (new_world(), boxed::<mbm_master>());
+        let (state, master) = (new_state(), boxed::<mbm_master>());
         let (words, frame) = (boxed::<[u16; 8]>(), boxed::<[u8; 64]>());
-        (*world).master = master;
+        (*state).master = master;
         let (first, bytes) = (words.cast::<u16>(), frame.cast::<u8>());
         let status = mbm_master_setBuffers(master, first, 4, first.add(4), 4, bytes, 64);
         assert_eq!(status, MBM_OK);
-        let port = port(world.cast());
+        let port = port(state.cast());
         assert_eq!(mbm_master_beginRtu(master, 17, &port), MBM_OK);
         assert_eq!(mbm_master_setResponseTimeout(master, 20), MBM_OK);
         assert_eq!(
@@ -243,38 +244,38 @@ fn hooks_and_idle_use_the_master_that_called_them() {
         assert_eq!(mbm_master_writeSingleRegister(master, 0, 1), MBM_PENDING);
         assert_eq!(mbm_master_poll(master), MBM_PENDING);
         assert_eq!(mbm_master_cancel(master), MBM_OK);
-        assert!((*world).calls > 10);
-        drop((Box::from_raw(world), Box::from_raw(master)));
+        assert!((*state).calls > 10);
+        drop((Box::from_raw(state), Box::from_raw(master)));
         drop((Box::from_raw(words), Box::from_raw(frame)));
     }
 }
 
 unsafe extern "C" fn before(context: *mut c_void, _: u16, _: u16, data: *const u8) -> u8 {
     unsafe {
-        disturb(context);
+        use_objects(context);
         data.read();
-        // The unit may be given more meanwhile.
-        let (unit, switches) = {
-            let world = world(context);
-            (world.unit, world.switches)
+        // A hook may register another service on the unit.
+        let (unit, function_mask) = {
+            let state = state(context);
+            (state.unit, state.function_mask)
         };
-        assert_eq!(mbm_unit_switchFunction(unit, switches, 100, 0), MBM_OK);
+        assert_eq!(mbm_unit_switchFunction(unit, function_mask, 100, 0), MBM_OK);
     }
     0
 }
 
 unsafe extern "C" fn after(context: *mut c_void, _: u16, _: u16) {
-    unsafe { disturb(context) }
+    unsafe { use_objects(context) }
 }
 
-unsafe extern "C" fn carry_out(
+unsafe extern "C" fn serve_custom(
     context: *mut c_void,
     request: *const mbm_request,
     response: *mut u8,
     capacity: u16,
 ) -> u16 {
     unsafe {
-        disturb(context);
+        use_objects(context);
         assert!(capacity > 4);
         response.write(*(*request).data);
     }
@@ -282,7 +283,7 @@ unsafe extern "C" fn carry_out(
 }
 
 unsafe extern "C" fn restart(context: *mut c_void, _: u8) {
-    unsafe { disturb(context) }
+    unsafe { use_objects(context) }
 }
 
 #[test]
@@ -296,7 +297,7 @@ fn hooks_use_the_server_that_called_them() {
     ];
     for tcp in [false, true] {
         unsafe {
-            let (world, server, unit) = (new_world(), boxed::<mbm_server>(), boxed::<mbm_unit>());
+            let (state, server, unit) = (new_state(), boxed::<mbm_server>(), boxed::<mbm_unit>());
             let (words, frame) = (boxed::<[u16; 8]>(), boxed::<[u8; 260]>());
             let (table, custom) = (boxed::<mbm_registerTable>(), boxed::<mbm_custom>());
             let line = boxed::<mbm_diagnostics>();
@@ -305,28 +306,28 @@ fn hooks_use_the_server_that_called_them() {
             (*table).size = 8;
             (*table).before = Some(before);
             (*table).after = Some(after);
-            (*table).context = world.cast();
-            (*custom).serve = Some(carry_out);
+            (*table).context = state.cast();
+            (*custom).serve = Some(serve_custom);
             (*custom).code = 65;
-            (*custom).context = world.cast();
+            (*custom).context = state.cast();
             (*line).restart = Some(restart);
-            (*line).context = world.cast();
+            (*line).context = state.cast();
             assert_eq!(mbm_unit_serveHoldingRegisters(unit, table), MBM_OK);
             assert_eq!(mbm_unit_serveCustom(unit, custom), MBM_OK);
             assert_eq!(mbm_unit_serveDiagnostics(unit, line), MBM_OK);
-            let (port, bytes) = (port(world.cast()), frame.cast::<u8>());
+            let (port, bytes) = (port(state.cast()), frame.cast::<u8>());
             let status = if tcp {
                 mbm_server_beginTcp(server, &port, unit, 1, bytes, 260)
             } else {
                 mbm_server_beginRtu(server, &port, unit, 1, bytes, 256)
             };
             assert_eq!(status, MBM_OK);
-            (*world).server = server;
-            (*world).unit = unit;
-            (*world).switches = boxed();
+            (*state).server = server;
+            (*state).unit = unit;
+            (*state).function_mask = boxed();
             for request in REQUESTS {
-                let calls = (*world).calls;
-                (*world).arriving = if tcp {
+                let calls = (*state).calls;
+                (*state).received = if tcp {
                     [&[0, 1, 0, 0, 0, request.len() as u8][..], request].concat()
                 } else {
                     let crc = mbm_frame_crc16(request.as_ptr(), request.len() as u16);
@@ -335,12 +336,12 @@ fn hooks_use_the_server_that_called_them() {
                 for _ in 0..8 {
                     assert_eq!(mbm_server_poll(server), MBM_OK);
                 }
-                assert!((*world).calls > calls + 2);
+                assert!((*state).calls > calls + 2);
             }
             assert_eq!(*words.cast::<u16>().add(1), 2);
-            drop(Box::from_raw((*world).switches));
+            drop(Box::from_raw((*state).function_mask));
             drop((
-                Box::from_raw(world),
+                Box::from_raw(state),
                 Box::from_raw(server),
                 Box::from_raw(unit),
             ));

@@ -1,14 +1,14 @@
-//! A client of each kind of line.
+//! The begin functions of the client, one for each framing, and the settings of one framing.
 
 use super::kind;
-use super::object::{line, mbm_client, queue, SerialTransport, TcpTransport, TransportKind};
+use super::object::{mbm_client, queue, transport, SerialTransport, TcpTransport, TransportKind};
 use crate::framing::{is_delimiter, MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
 use crate::pointers::{self, CObject};
 use crate::port::{countable, mbm_port};
 use mbm::error::Status;
 
-/// Makes a client of a kind of line out of storage. One that was begun before gives up its
-/// requests.
+/// Begins a client of one kind of transport. A client that was begun before first gives up
+/// its requests.
 ///
 /// # Safety
 /// As the header demands of the begin functions.
@@ -20,14 +20,14 @@ unsafe fn begin(
     frame_bytes: u16,
     kind: &'static TransportKind,
 ) -> u8 {
-    // SAFETY: as the header demands: each is NULL or what it says, and the object is
-    // storage, zeroed or begun; zero is a value of every field but for the kind, which
-    // no one uses before it is set.
+    // SAFETY: as the header demands: each pointer is NULL or valid, and the object is
+    // storage, zeroed or begun. Zero is a valid value of every field except `kind`, which
+    // is set before it is used.
     let status = unsafe {
         match port.as_ref() {
             Some(port)
                 if !frame.is_null()
-                    && frame_bytes >= u16::from(kind.least)
+                    && frame_bytes >= u16::from(kind.min_frame_bytes)
                     && port.is_complete() =>
             {
                 let status = give_up(pointer);
@@ -42,7 +42,7 @@ unsafe fn begin(
                 let storage = kind.storage(object);
                 storage.frame = frame;
                 storage.frame_bytes = countable(frame_bytes);
-                pointers::calling(pointer, || (kind.start)(object));
+                pointers::with_hooks(pointer, || (kind.start)(object));
                 Status::OK
             }
             _ => Status::INVALID_ARGUMENT,
@@ -51,16 +51,17 @@ unsafe fn begin(
     status.code()
 }
 
-/// Makes zeroed storage of a client again, if it is one: its requests are given up. Returns
-/// [`Status::NOT_INITIALISED`] then, else the status that says why not.
+/// If the storage is a client, gives up its requests and zeroes the storage. Returns
+/// [`Status::NOT_INITIALISED`] if the storage is zeroed now, otherwise the status that says
+/// why the client cannot be begun.
 ///
 /// # Safety
 /// As for [`pointers::check`].
 #[inline(always)]
 unsafe fn give_up(client: *mut mbm_client) -> Status {
-    // SAFETY: as the caller promises. Hooks that `release` calls may not use the object, which
-    // the mark says; no reference into it lives then. Zero is a value of every field but for
-    // the kind, which is set before it is used.
+    // SAFETY: as the caller promises. While `release` calls hooks, the mark refuses their calls
+    // on the object, and no reference into it lives. Zero is a valid value of every field
+    // except `kind`, which is set before it is used.
     unsafe {
         let status = pointers::check(client);
         if status != Status::OK {
@@ -70,11 +71,11 @@ unsafe fn give_up(client: *mut mbm_client) -> Status {
         if (*object).queue.suspended {
             return Status::BUSY;
         }
-        mbm_client::mark(client).write(pointers::CALLING);
+        mbm_client::mark(client).write(pointers::IN_HOOK);
         ((*(*object).kind).release)(object, None);
         queue(object).cancel_all();
-        // Not by memset: libc's is larger than this loop, and most images have no other use
-        // for it.
+        // A loop instead of memset: libc's memset is larger, and most images do not need it
+        // otherwise.
         let mut word = client.cast::<usize>();
         let end = client.add(1).cast::<usize>();
         loop {
@@ -89,18 +90,17 @@ unsafe fn give_up(client: *mut mbm_client) -> Status {
 
 const _: () = assert!(size_of::<mbm_client>().is_multiple_of(size_of::<usize>()));
 
-/// Makes an object a client of a serial line, in RTU frames (serial line guide
-/// V1.02, 2.5.1).
+/// Begins a client of a serial line with RTU frames (serial line guide V1.02, 2.5.1).
 ///
 /// This and the other mbm_client_begin functions may be called again at any time, also with
-/// another framing. All pending requests are given up as by mbm_client_cancel: their status
-/// is MBM_CANCELLED and `done` is not called. The settings are as at first. A call that is
-/// refused changes nothing.
+/// another framing. Then the client gives up all pending requests as mbm_client_cancel does:
+/// their status is MBM_CANCELLED and `done` is not called. All settings return to their
+/// defaults. A call that is refused changes nothing.
 ///
 /// @param client      the object; zeroed before the first call
-/// @param port        copied; read, write and micros must be there
-/// @param frame       bytes of one frame, valid for as long as the client is used
-/// @param frameBytes  at least 8; 256 hold any frame
+/// @param port        the port, which is copied; read, write and micros must not be NULL
+/// @param frame       the buffer of one frame, valid for as long as the client is used
+/// @param frameBytes  bytes of `frame`, at min_frame_bytes 8; 256 hold any frame
 /// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
 ///         the client is suspended
 #[no_mangle]
@@ -114,14 +114,14 @@ pub unsafe extern "C" fn mbm_client_beginRtu(
     unsafe { begin(client, port, frame, frameBytes, &kind::RTU) }
 }
 
-/// Makes an object a client of a serial line, in ASCII frames (serial line guide
-/// V1.02, 2.5.2). No gap is kept between frames; a second without a character
-/// ends one that is not whole.
+/// Begins a client of a serial line with ASCII frames (serial line guide V1.02, 2.5.2). It
+/// keeps no gap between frames. If no character arrives for one second, the client discards
+/// an incomplete frame.
 ///
 /// @param client      the object; zeroed before the first call
-/// @param port        copied; read, write and micros must be there
-/// @param frame       bytes of one frame, valid for as long as the client is used
-/// @param frameBytes  at least 17; 513 hold any frame
+/// @param port        the port, which is copied; read, write and micros must not be NULL
+/// @param frame       the buffer of one frame, valid for as long as the client is used
+/// @param frameBytes  bytes of `frame`, at min_frame_bytes 17; 513 hold any frame
 /// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
 ///         the client is suspended
 #[no_mangle]
@@ -135,13 +135,14 @@ pub unsafe extern "C" fn mbm_client_beginAscii(
     unsafe { begin(client, port, frame, frameBytes, &kind::ASCII) }
 }
 
-/// Sets the character that ends ASCII frames behind CR, in place of LF, in both
-/// directions; for devices that were told another one (function 08 with
-/// sub-function 03, V1.1b3, 6.8.1). That request is answered with the old one: call
-/// this when it has ended, for example from its `done`.
+/// Sets the character that ends ASCII frames after CR, instead of LF, in both
+/// directions. Use it for devices that were set to another character by function 08 with
+/// sub-function 03 (V1.1b3, 6.8.1). A device still ends its response to that request with
+/// the old character: call this function when the request has ended, for example in its
+/// `done`.
 ///
 /// @param client     the object, begun with mbm_client_beginAscii
-/// @param character  1 to 127, but CR, the colon and hexadecimal digits
+/// @param character  1 to 127, except CR, the colon and hexadecimal digits
 /// @return MBM_OK; MBM_BUSY while a request is under way; MBM_INVALID_ARGUMENT, also
 ///         for a client of another framing; MBM_NOT_INITIALISED
 #[no_mangle]
@@ -155,20 +156,20 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
             if !queue(object).is_idle() {
                 return Status::BUSY;
             }
-            let engine = &mut line::<SerialTransport>(object).engine;
+            let engine = &mut transport::<SerialTransport>(object).engine;
             engine.request().set_ascii(character);
             Status::OK
         })
     }
 }
 
-/// Makes an object a client that sends RTU frames through a TCP stream, for
-/// converters that pass on what they get. No gap is kept, nothing is broadcast.
+/// Begins a client that sends RTU frames through a TCP stream, for converters that pass
+/// bytes from TCP to a serial line unchanged. It keeps no gap and does not broadcast.
 ///
 /// @param client      the object; zeroed before the first call
-/// @param port        copied; read, write and micros must be there
-/// @param frame       bytes of one frame, valid for as long as the client is used
-/// @param frameBytes  at least 8; 256 hold any frame
+/// @param port        the port, which is copied; read, write and micros must not be NULL
+/// @param frame       the buffer of one frame, valid for as long as the client is used
+/// @param frameBytes  bytes of `frame`, at min_frame_bytes 8; 256 hold any frame
 /// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
 ///         the client is suspended
 #[no_mangle]
@@ -182,18 +183,20 @@ pub unsafe extern "C" fn mbm_client_beginRtuOverTcp(
     unsafe { begin(client, port, frame, frameBytes, &kind::RTU_OVER_TCP) }
 }
 
-/// Makes an object a client of a TCP stream, in frames with the MBAP header
-/// (messaging on TCP/IP guide V1.0b, 3.1.3). All 16 requests may be under way at
-/// once; responses are matched by their transaction id, in any order.
+/// Begins a client of a TCP stream with frames that have the MBAP header (messaging on
+/// TCP/IP guide V1.0b, 3.1.3). All 16 requests may be under way at once. The client matches
+/// responses to requests by the transaction identifier, in any order.
 ///
 /// @param client         the object; zeroed before the first call
-/// @param port           copied; read, write and micros must be there
-/// @param incoming       received bytes, valid for as long as the client is used
-/// @param incomingBytes  at least 9; 260 hold any frame, more take in more
-///                       responses at a time
-/// @param outgoing       bytes to send, valid for as long as the client is used
-/// @param outgoingBytes  at least 12; 260 hold any frame, more gather more
-///                       requests for one write
+/// @param port           the port, which is copied; read, write and micros must not be NULL
+/// @param incoming       the buffer of received bytes, valid for as long as the client is
+///                       used
+/// @param incomingBytes  bytes of `incoming`, at min_frame_bytes 9; 260 hold any frame. A larger
+///                       buffer takes more responses from one read
+/// @param outgoing       the buffer of bytes to send, valid for as long as the client is
+///                       used
+/// @param outgoingBytes  bytes of `outgoing`, at min_frame_bytes 12; 260 hold any frame. A larger
+///                       buffer collects more requests for one write
 /// @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
 ///         the client is suspended
 #[no_mangle]
@@ -212,7 +215,7 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
     unsafe {
         let status = begin(client, port, incoming, incomingBytes, &kind::TCP);
         if status == Status::OK.code() {
-            let storage = &mut line::<TcpTransport>(pointers::object(client)).storage;
+            let storage = &mut transport::<TcpTransport>(pointers::object(client)).storage;
             storage.outgoing = outgoing;
             storage.outgoing_bytes = countable(outgoingBytes);
         }
@@ -220,13 +223,14 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
     }
 }
 
-/// Sets how many requests are under way at once on TCP, for servers that take fewer
-/// at a time (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 1 to
-/// 16); some drop what comes in one segment with another request. The queue holds 16 in any case.
+/// Sets how many requests may be under way at once on TCP. Use it for servers that accept
+/// fewer at a time (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 1
+/// to 16): some drop a request that arrives in one segment with another. The queue always
+/// holds 16.
 ///
 /// @param client  the object
-/// @param most    1 to 16, which is so at first; on a serial line, and in RTU over
-///                TCP, 1
+/// @param most    1 to 16; the default is 16. On a serial line and in RTU over TCP only 1
+///                is accepted
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setInFlight(client: *mut mbm_client, most: u8) -> u8 {
@@ -234,7 +238,7 @@ pub unsafe extern "C" fn mbm_client_setInFlight(client: *mut mbm_client, most: u
     unsafe {
         pointers::with(client, |object| match ((*(*object).kind).framing, most) {
             (MBM_FRAMING_TCP, 1..=super::MBM_CLIENT_DEPTH) => {
-                line::<TcpTransport>(object).limit(most);
+                transport::<TcpTransport>(object).limit(most);
                 Status::OK
             }
             (MBM_FRAMING_RTU | MBM_FRAMING_ASCII, 1) => Status::OK,

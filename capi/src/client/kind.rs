@@ -1,9 +1,9 @@
-//! The kinds of line that C has, as tables. Firmware carries the code of those whose
-//! mbm_client_begin function it calls, for nothing else names their tables.
+//! The kinds of transport of the client, as tables. Only the mbm_client_begin functions use
+//! the tables, so firmware contains the code of the kinds that it begins, and of no others.
 
 #[cfg(not(any(target_os = "none", mbm_firmware)))]
 use super::object::mbm_client;
-use super::object::{line, Object, SerialTransport, TcpTransport, TransportKind};
+use super::object::{transport, Object, SerialTransport, TcpTransport, TransportKind};
 use super::request::RequestPtr;
 use super::storage::ClientBuffers;
 use crate::framing::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
@@ -13,11 +13,11 @@ use mbm::client::{ClientEngine, Transport};
 #[cfg(not(any(target_os = "none", mbm_firmware)))]
 use mbm::error::Status;
 
-const LINE: usize = offset_of!(Object, line);
+const TRANSPORT: usize = offset_of!(Object, transport);
 
-const fn serial(start: unsafe fn(*mut Object), framing: u8, least: u8) -> TransportKind {
+const fn serial(start: unsafe fn(*mut Object), framing: u8, min_frame_bytes: u8) -> TransportKind {
     type Engine = ClientEngine<mbm_port, ClientBuffers, RequestPtr>;
-    let engine = LINE + offset_of!(SerialTransport, engine);
+    let engine = TRANSPORT + offset_of!(SerialTransport, engine);
     TransportKind {
         #[cfg(any(target_os = "none", mbm_firmware))]
         advance: advance::<SerialTransport>,
@@ -28,7 +28,7 @@ const fn serial(start: unsafe fn(*mut Object), framing: u8, least: u8) -> Transp
         port: (engine + offset_of!(Engine, port)) as u16,
         settings: (engine + offset_of!(Engine, settings)) as u16,
         storage: (engine + offset_of!(Engine, storage)) as u16,
-        least,
+        min_frame_bytes,
         framing,
     }
 }
@@ -44,76 +44,76 @@ pub(super) static TCP: TransportKind = TransportKind {
     poll: poll::<TcpTransport>,
     release: release::<TcpTransport>,
     start: start_tcp,
-    port: (LINE + offset_of!(TcpTransport, port)) as u16,
-    settings: (LINE + offset_of!(TcpTransport, settings)) as u16,
-    storage: (LINE + offset_of!(TcpTransport, storage)) as u16,
-    least: 9,
+    port: (TRANSPORT + offset_of!(TcpTransport, port)) as u16,
+    settings: (TRANSPORT + offset_of!(TcpTransport, settings)) as u16,
+    storage: (TRANSPORT + offset_of!(TcpTransport, storage)) as u16,
+    min_frame_bytes: 9,
     framing: MBM_FRAMING_TCP,
 };
 
 /// # Safety
-/// As for [`turns`](super::poll::turns), with a client of the kind `L`.
+/// As for [`advance_all`](super::poll::advance_all), with a transport of the type `T`.
 #[cfg(not(any(target_os = "none", mbm_firmware)))]
-unsafe fn poll<L: Transport<RequestPtr>>(client: *mut mbm_client) -> Status {
+unsafe fn poll<T: Transport<RequestPtr>>(client: *mut mbm_client) -> Status {
     // SAFETY: as the caller promises.
-    unsafe { super::poll::turns(client, advance::<L>) }
+    unsafe { super::poll::advance_all(client, advance::<T>) }
 }
 
 /// # Safety
-/// As for [`line`].
-unsafe fn advance<L: Transport<RequestPtr>>(
+/// As for [`transport`].
+unsafe fn advance<T: Transport<RequestPtr>>(
     object: *mut Object,
     now: u32,
     fresh: bool,
 ) -> Option<RequestPtr> {
-    // SAFETY: as the caller promises; line and the rest are apart.
-    unsafe { line::<L>(object).advance(&mut (*object).queue, now, fresh) }
+    // SAFETY: as the caller promises; the transport is apart from the queue.
+    unsafe { transport::<T>(object).advance(&mut (*object).queue, now, fresh) }
 }
 
 /// # Safety
-/// As for [`line`].
-unsafe fn release<L: Transport<RequestPtr>>(object: *mut Object, request: Option<&RequestPtr>) {
+/// As for [`transport`].
+unsafe fn release<T: Transport<RequestPtr>>(object: *mut Object, request: Option<&RequestPtr>) {
     // SAFETY: as the caller promises.
-    unsafe { line::<L>(object).release(request) }
+    unsafe { transport::<T>(object).release(request) }
 }
 
 /// # Safety
-/// As for [`line`].
+/// As for [`transport`].
 unsafe fn start_rtu(object: *mut Object) {
     // SAFETY: as the caller promises.
     unsafe {
         (*object).queue.has_broadcast = true;
-        line::<SerialTransport>(object).engine.line_used();
+        transport::<SerialTransport>(object).engine.line_used();
     }
 }
 
 /// # Safety
-/// As for [`line`].
+/// As for [`transport`].
 unsafe fn start_stream(object: *mut Object) {
     // SAFETY: as the caller promises.
     unsafe {
-        let line = line::<SerialTransport>(object);
-        line.set_stream();
-        line.engine.line_used();
+        let transport = transport::<SerialTransport>(object);
+        transport.set_stream();
+        transport.engine.line_used();
     }
 }
 
 /// # Safety
-/// As for [`line`].
+/// As for [`transport`].
 unsafe fn start_ascii(object: *mut Object) {
     // SAFETY: as the caller promises.
     unsafe {
         start_rtu(object);
-        line::<SerialTransport>(object).set_ascii();
+        transport::<SerialTransport>(object).set_ascii();
     }
 }
 
 /// # Safety
-/// As for [`line`].
+/// As for [`transport`].
 unsafe fn start_tcp(object: *mut Object) {
     // SAFETY: as the caller promises.
     unsafe {
         (*object).queue.has_transaction_ids = true;
-        line::<TcpTransport>(object).limit(super::MBM_CLIENT_DEPTH);
+        transport::<TcpTransport>(object).limit(super::MBM_CLIENT_DEPTH);
     }
 }

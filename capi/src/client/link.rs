@@ -1,4 +1,4 @@
-//! The line under a client: lost and found, lent and taken back.
+//! The client's link: lost and opened again, suspended and resumed.
 
 use super::object::{mbm_client, on_transport, queue, SerialTransport, TcpTransport};
 use crate::framing::MBM_FRAMING_RTU;
@@ -8,27 +8,28 @@ use core::ffi::c_void;
 use mbm::client::Transport as _;
 use mbm::error::Status;
 
-/// What closes a link and opens it anew, for mbm_client_reconnect.
+/// Your hooks that close a link and open it again, for mbm_client_reconnect.
 #[repr(C)]
 pub struct mbm_linkHooks {
-    /// Handed to both hooks. Yours, may be NULL.
+    /// Your pointer, passed to both hooks; may be NULL.
     pub context: *mut c_void,
     /// Optional: closes the link, if it is open.
     pub disconnect: Option<unsafe extern "C" fn(context: *mut c_void)>,
-    /// Optional: opens the link without waiting. Returns MBM_OK, MBM_PENDING if
-    /// that goes on while the port takes no bytes yet, or another status.
+    /// Optional: opens the link without waiting. Returns MBM_OK if the link is open,
+    /// MBM_PENDING if the connection is still being made and the port accepts no bytes yet,
+    /// or another status.
     pub connect: Option<unsafe extern "C" fn(context: *mut c_void) -> u8>,
 }
 
-/// Closes the link and opens it anew. What was half received is forgotten, and
-/// requests that were under way end with MBM_LINK_LOST at the next polls; those
-/// that still waited go over the new link.
+/// Closes the link and opens it again. The client discards an incomplete response. Requests
+/// that were under way end with MBM_LINK_LOST at the next calls of mbm_client_poll. Requests
+/// that were not sent yet are sent over the new link.
 ///
 /// @param client  the object
-/// @param link    what does it, used during this call only; NULL if that has been
-///                done already
-/// @return what `connect` returns, MBM_OK without it; MBM_BUSY while the line is
-///         lent, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @param link    your hooks, used during this call only; NULL if you have opened the link
+///                again already
+/// @return what `connect` returns, or MBM_OK without `connect`; MBM_BUSY while the client is
+///         suspended; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_reconnect(
     client: *mut mbm_client,
@@ -42,7 +43,7 @@ pub unsafe extern "C" fn mbm_client_reconnect(
                 return Status::BUSY;
             }
             let release = (*(*object).kind).release;
-            pointers::calling(client, || release(object, None));
+            pointers::with_hooks(client, || release(object, None));
             queue(object).interrupt();
             Status::OK
         });
@@ -63,31 +64,30 @@ pub unsafe extern "C" fn mbm_client_reconnect(
     }
 }
 
-/// Whether the link is not known to be lost.
+/// Returns whether the link works, as far as the client knows.
 ///
-/// If `connect` of mbm_client_reconnect returned MBM_PENDING, this is 0 until a reply
-/// arrives. Do not reconnect again before the connection had its time: the port knows
-/// better whether it is still being made, for example mbm_tcp_isConnected.
+/// If `connect` of mbm_client_reconnect returned MBM_PENDING, this function returns 0 until
+/// a reply arrives. Do not reconnect again while the connection is still being made. The
+/// port knows whether it is: for example, call mbm_tcp_isConnected.
 ///
 /// @param client  the object
-/// @return 0 from a request that ended with MBM_LINK_LOST on, until a reply arrives
-///         (an exception is one) or mbm_client_reconnect returns MBM_OK; 1 otherwise,
-///         and also before the first request
+/// @return 0 after a request ended with MBM_LINK_LOST, until a reply or an exception arrives
+///         or mbm_client_reconnect returns MBM_OK; otherwise 1, also before the first
+///         request
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_isConnected(client: *const mbm_client) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { pointers::ask(client, 0, |object| queue(object).connected.into()) }
+    unsafe { pointers::read(client, 0, |object| queue(object).connected.into()) }
 }
 
-/// Lends the line to a facade, whose functions then use the client's port; the
-/// client's requests wait until mbm_client_resume. One of the two has the line
-/// at any time. Until then the client's storage must stay: do not zero it.
+/// Suspends the client, so that a master can use its port. The client's requests wait until
+/// mbm_client_resume. Until then the master uses the client's storage: do not zero it.
 ///
-/// @param client  the object; for a facade, of RTU frames on a line or over TCP
-/// @param master  a facade with buffers, which gets the client's port; NULL if
-///                you use the line in another way
-/// @return MBM_OK; MBM_BUSY, with both unchanged, if a request is under way or the line
-///         is lent already; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @param client  the object. If `master` is not NULL, it must use RTU or RTU over TCP
+/// @param master  a master with buffers, which then uses the client's port; NULL if you use
+///                the line in another way
+/// @return MBM_OK; MBM_BUSY, with both objects unchanged, if a request is under way or the
+///         client is suspended already; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_suspend(
     client: *mut mbm_client,
@@ -98,7 +98,7 @@ pub unsafe extern "C" fn mbm_client_suspend(
         let status = pointers::with(client, |object| {
             if !master.is_null() {
                 if (*(*object).kind).framing != MBM_FRAMING_RTU {
-                    // A facade speaks RTU.
+                    // A master uses RTU frames only.
                     return Status::INVALID_ARGUMENT;
                 }
                 match pointers::check(master) {
@@ -109,7 +109,7 @@ pub unsafe extern "C" fn mbm_client_suspend(
                     refused => return refused,
                 }
             }
-            if !on_transport!(object, line => line.suspend(&mut (*object).queue)) {
+            if !on_transport!(object, transport => transport.suspend(&mut (*object).queue)) {
                 return Status::BUSY;
             }
             if !master.is_null() {
@@ -123,19 +123,19 @@ pub unsafe extern "C" fn mbm_client_suspend(
             Status::OK
         });
         if status == Status::OK.code() && !master.is_null() {
-            master::calling(master, Core::line_used);
+            master::with_hooks(master, Core::line_used);
         }
         status
     }
 }
 
-/// Takes the line back. The facade has no port then, so that its functions refuse
-/// with MBM_NOT_INITIALISED.
+/// Resumes the client. The master then has no port: its functions that make a request return
+/// MBM_NOT_INITIALISED.
 ///
 /// @param client  the object
-/// @param master  as for mbm_client_suspend
-/// @return MBM_OK, MBM_BUSY while the facade has a request under way,
-///         MBM_INVALID_ARGUMENT if the line was not lent, MBM_NOT_INITIALISED
+/// @param master  the master that was passed to mbm_client_suspend; NULL if none was
+/// @return MBM_OK; MBM_BUSY while the master has a request under way;
+///         MBM_INVALID_ARGUMENT if the client was not suspended; MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_resume(client: *mut mbm_client, master: *mut mbm_master) -> u8 {
     // SAFETY: as the header demands.
@@ -153,7 +153,7 @@ pub unsafe extern "C" fn mbm_client_resume(client: *mut mbm_client, master: *mut
                     core.port().clear();
                 }
                 Status::BUSY => return Status::BUSY,
-                // None, or none that has the port.
+                // There is no master, or it does not use the port.
                 _ => {}
             }
             queue(object).suspended = false;

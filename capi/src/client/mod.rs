@@ -1,4 +1,4 @@
-//! `mbm_client_*`: the client that never waits, for C.
+//! `mbm_client_*`: the client, whose functions never wait.
 
 mod begin;
 mod kind;
@@ -18,5 +18,5 @@ pub use request::mbm_clientRequest;
 pub use requests::*;
 pub use settings::*;
 
-/// The most requests that wait or are under way in one client.
+/// The maximum number of requests that are pending in one client.
 pub const MBM_CLIENT_DEPTH: u8 = 16;

@@ -1,4 +1,4 @@
-//! The object that C calls a client, and the line in it.
+//! The client object and the transport in it.
 
 use super::request::RequestPtr;
 use super::storage::ClientBuffers;
@@ -14,19 +14,18 @@ use mbm::error::Status;
 
 const DEPTH: usize = MBM_CLIENT_DEPTH as usize;
 
-/// A client of one serial line or one TCP stream: up to 16 requests are queued,
-/// mbm_client_poll moves them on, and nothing ever waits.
+/// A client of one serial line or one TCP stream. It queues up to 16 requests.
+/// mbm_client_poll sends and receives; no function ever waits.
 ///
-/// Storage is yours and must be zero before first use, which a static object is.
-/// One of the mbm_client_begin functions comes first. Use one object from one
-/// thread and never from an interrupt; several objects are independent of each
-/// other.
+/// You own the storage. It must be zero before first use, as a static object is. Call one of
+/// the mbm_client_begin functions first. Use an object from one thread only, and never from
+/// an interrupt. Several objects are independent of each other.
 ///
-/// A `done` function may call every function on the client that calls it, but
-/// mbm_client_poll, which returns MBM_BUSY. A hook of the port, and the `random`
-/// function of mbm_client_setJitter, may call none: each returns MBM_BUSY and
-/// changes nothing, and a getter returns what it returns for an object that was
-/// never begun.
+/// The `done` function of a request may call every function on the client that calls it,
+/// except mbm_client_poll, which then returns MBM_BUSY. A hook of the port, and the `random`
+/// function of mbm_client_setJitter, must not use the client: each function returns MBM_BUSY
+/// and changes nothing, and a getter returns what it returns for an object that was never
+/// begun.
 #[repr(C)]
 pub struct mbm_client {
     /// Private.
@@ -35,14 +34,14 @@ pub struct mbm_client {
     words: [u32; 24],
 }
 
-/// What lies behind an `mbm_client`.
+/// The fields in the storage of an `mbm_client`.
 #[repr(C)]
 pub struct Object {
     mark: u8,
     pub(super) polling: bool,
     pub(super) kind: *const TransportKind,
     pub(super) queue: RequestQueue<RequestPtr, DEPTH>,
-    pub(super) line: Transports,
+    pub(super) transport: Transports,
 }
 
 const _: () = {
@@ -56,8 +55,8 @@ const _: () = {
 
 // SAFETY: the mark is a field of its own.
 unsafe impl CObject for mbm_client {
-    // Hooks run while the client is in use, and may hand it to functions of this
-    // library, which then look at the mark: no reference covers that.
+    // A pointer: hooks run while the client is in use, and may pass it to functions of this
+    // library, which then read the mark. No reference may include the mark.
     type Access<'a> = *mut Object;
 
     unsafe fn mark(client: *const mbm_client) -> *mut u8 {
@@ -70,7 +69,7 @@ unsafe impl CObject for mbm_client {
     }
 }
 
-/// What clients of every line have in common. The mark stands outside of it.
+/// The queue of a client, which every kind of transport uses. It does not include the mark.
 ///
 /// # Safety
 /// `object` is begun, and nothing else uses its client while the reference lives.
@@ -82,7 +81,7 @@ pub(super) unsafe fn queue<'a>(object: *mut Object) -> &'a mut RequestQueue<Requ
 pub(super) type SerialTransport = Serial<mbm_port, ClientBuffers, RequestPtr>;
 pub(super) type TcpTransport = Tcp<mbm_port, ClientBuffers>;
 
-/// Room for the line of any kind.
+/// Storage of a transport of any kind.
 #[repr(C)]
 pub(super) union Transports {
     serial: ManuallyDrop<SerialTransport>,
@@ -92,71 +91,71 @@ pub(super) union Transports {
 /// As [`Transport::advance`].
 pub(super) type Advance = unsafe fn(*mut Object, now: u32, fresh: bool) -> Option<RequestPtr>;
 
-/// What differs from one kind of line to the next.
+/// The functions and numbers in which the kinds of transport differ.
 pub(super) struct TransportKind {
     #[cfg(any(target_os = "none", mbm_firmware))]
     pub(super) advance: Advance,
-    /// As [`turns`](super::poll::turns).
+    /// As [`advance_all`](super::poll::advance_all).
     #[cfg(not(any(target_os = "none", mbm_firmware)))]
     pub(super) poll: unsafe fn(*mut mbm_client) -> Status,
     /// As [`Transport::release`].
     pub(super) release: unsafe fn(*mut Object, Option<&RequestPtr>),
-    /// Completes a client that was just begun.
+    /// Completes the begin function of a client.
     pub(super) start: unsafe fn(*mut Object),
-    /// Where in an object its port, its settings and what is lent to it stand.
+    /// The offsets, in bytes, of port, settings and buffers in an object.
     pub(super) port: u16,
     pub(super) settings: u16,
     pub(super) storage: u16,
-    /// The least that the frame buffer has.
-    pub(super) least: u8,
+    /// The minimum size of the frame buffer, in bytes.
+    pub(super) min_frame_bytes: u8,
     pub(super) framing: u8,
 }
 
 impl TransportKind {
     /// # Safety
-    /// As for [`line`], of this kind.
+    /// As for [`transport`], of this kind.
     pub(super) unsafe fn port(&self, object: *mut Object) -> *mut mbm_port {
         // SAFETY: as the caller promises.
         unsafe { object.byte_add(self.port.into()).cast() }
     }
 
     /// # Safety
-    /// As for [`line`], of this kind.
+    /// As for [`transport`], of this kind.
     pub(super) unsafe fn settings<'a>(&self, object: *mut Object) -> &'a mut Settings {
-        // SAFETY: as the caller promises; every kind has settings there.
+        // SAFETY: as the caller promises; the offset is that of the settings.
         unsafe { &mut *object.byte_add(self.settings.into()).cast() }
     }
 
     /// # Safety
-    /// As for [`line`], of this kind.
+    /// As for [`transport`], of this kind.
     pub(super) unsafe fn storage<'a>(&self, object: *mut Object) -> &'a mut ClientBuffers {
-        // SAFETY: as the caller promises; every kind has it there.
+        // SAFETY: as the caller promises; the offset is that of the storage.
         unsafe { &mut *object.byte_add(self.storage.into()).cast() }
     }
 }
 
-/// The line of an object.
+/// The transport of an object.
 ///
 /// # Safety
-/// `object` is a client of the kind `L`, and nothing else uses its line while the
-/// reference lives.
-pub(super) unsafe fn line<'a, L>(object: *mut Object) -> &'a mut L {
+/// `object` is a client with a transport of the type `T`, and nothing else uses the
+/// transport while the reference lives.
+pub(super) unsafe fn transport<'a, T>(object: *mut Object) -> &'a mut T {
     // SAFETY: as the caller promises.
-    unsafe { &mut *(&raw mut (*object).line).cast() }
+    unsafe { &mut *(&raw mut (*object).transport).cast() }
 }
 
-/// Does something with the line of an object, whatever its kind. Only functions that few
-/// programs call use it, so most images carry the code of one kind of line.
-/// Unsafe as [`line`] is.
+/// Evaluates an expression with the transport of an object, of either type. Only functions
+/// that few programs call use it, so most images contain the code of one transport.
+/// Unsafe as [`transport`] is.
 macro_rules! on_transport {
-    ($object:expr, $line:ident => $action:expr) => {
+    ($object:expr, $transport:ident => $action:expr) => {
         match (*(*$object).kind).framing {
             $crate::framing::MBM_FRAMING_TCP => {
-                let $line = $crate::client::object::line::<TcpTransport>($object);
+                let $transport = $crate::client::object::transport::<TcpTransport>($object);
                 $action
             }
             _ => {
-                let $line = $crate::client::object::line::<SerialTransport>($object);
+                let $transport = $crate::client::object::transport::<SerialTransport>($object);
                 $action
             }
         }

@@ -1,4 +1,4 @@
-//! Moving a client's requests on, and giving them up.
+//! Polling a client, and cancelling its requests.
 
 use super::object::{
     mbm_client, on_transport, queue, Advance, Object, SerialTransport, TcpTransport,
@@ -18,15 +18,14 @@ unsafe fn now(object: *mut Object) -> u32 {
     unsafe { port::now((*(*object).kind).port(object)) }
 }
 
-/// Moves all requests on, without waiting, and calls `done` of those that have
+/// Sends and receives for all requests, without waiting, and calls `done` of those that have
 /// ended, of at most 17 in one call.
 ///
-/// Call it as often as you like; mbm_client_pollDelay tells when the next call
-/// is due.
+/// Call it as often as you like. mbm_client_pollDelay returns when the next call is due.
 ///
 /// @param client  the object
-/// @return MBM_PENDING while requests wait or are under way, MBM_OK if there are
-///         none, MBM_BUSY from within `done` and while the line is lent;
+/// @return MBM_PENDING while requests are pending; MBM_OK if none is; MBM_BUSY from within
+///         `done` or a hook of the port, and while the client is suspended;
 ///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_poll(client: *mut mbm_client) -> u8 {
@@ -40,36 +39,36 @@ pub unsafe extern "C" fn mbm_client_poll(client: *mut mbm_client) -> u8 {
             #[cfg(not(any(target_os = "none", mbm_firmware)))]
             return ((*kind).poll)(client);
             #[cfg(any(target_os = "none", mbm_firmware))]
-            turns(client, (*kind).advance)
+            advance_all(client, (*kind).advance)
         })
     }
 }
 
-/// Polls, and calls `done` of the requests that ended. One function for all kinds of
-/// line, but a part of each kind's own on a host, with `advance` in it.
+/// Advances the requests, and calls `done` of those that ended. Firmware has this function
+/// once, for all kinds of transport. On a host each kind has a copy, with `advance` inlined.
 ///
 /// # Safety
-/// `client` is begun, with a line that `advance` is for; no reference into it lives.
+/// `client` is begun, and `advance` is that of its transport; no reference into it lives.
 #[cfg_attr(not(any(target_os = "none", mbm_firmware)), inline(always))]
-pub(super) unsafe fn turns(client: *mut mbm_client, advance: Advance) -> Status {
+pub(super) unsafe fn advance_all(client: *mut mbm_client, advance: Advance) -> Status {
     let object = pointers::object(client);
-    // SAFETY: as the caller promises. No reference lives while `done` is called, for
-    // that may use the object. If it zeroed it, and perhaps began it anew, polling is
-    // over.
+    // SAFETY: as the caller promises. No reference lives while `done` is called, because
+    // `done` may use the object. If `done` zeroed the object, or began it again, `polling`
+    // is false and the loop ends.
     unsafe {
-        let now = pointers::calling(client, || now(object));
+        let now = pointers::with_hooks(client, || now(object));
         (*object).polling = true;
-        let mut turns = MBM_CLIENT_DEPTH + 1;
-        while turns > 0 {
-            let fresh = turns > MBM_CLIENT_DEPTH;
-            match pointers::calling(client, || advance(object, now, fresh)) {
-                Some(request) => request.call(),
+        let mut rounds = MBM_CLIENT_DEPTH + 1;
+        while rounds > 0 {
+            let fresh = rounds > MBM_CLIENT_DEPTH;
+            match pointers::with_hooks(client, || advance(object, now, fresh)) {
+                Some(request) => request.call_done(),
                 None => break,
             }
             if !(*object).polling {
                 return Status::OK;
             }
-            turns -= 1;
+            rounds -= 1;
         }
         (*object).polling = false;
         if (*object).queue.is_empty() {
@@ -80,24 +79,23 @@ pub(super) unsafe fn turns(client: *mut mbm_client, advance: Advance) -> Status 
     }
 }
 
-/// How long mbm_client_poll will find nothing to do unless a byte arrives, so
-/// that a program may wait for one in select, or sleep, until then. Bytes are taken
-/// only while a request is pending: with none, wait for something else.
+/// Returns how long mbm_client_poll will have nothing to do unless a byte arrives. A program
+/// may sleep, or wait for a byte in select, for that time. The client reads bytes only while
+/// a request is pending.
 ///
 /// @param client  the object
-/// @return microseconds; 0 means poll now, and is returned within a hook of the port;
-///         0xFFFFFFFF that there is no request; 1000
-///         while a TCP port does not take what is to be sent: to poll sooner, wait
-///         for that too, as mbm_tcp_wait does
+/// @return microseconds; 0 means poll now, also from within a hook of the port; 0xFFFFFFFF
+///         means that no request is pending. While a TCP port accepts no bytes to send it is
+///         1000: to poll sooner, also wait until the port accepts bytes, as mbm_tcp_wait does
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
     // SAFETY: as the header demands.
     unsafe {
         match pointers::check(client) {
-            Status::OK => pointers::calling(client, || {
+            Status::OK => pointers::with_hooks(client, || {
                 let object = pointers::object(client);
                 let now = now(object);
-                on_transport!(object, line => line.poll_delay(&(*object).queue, now))
+                on_transport!(object, transport => transport.poll_delay(&(*object).queue, now))
             }),
             Status::BUSY => 0,
             _ => u32::MAX,
@@ -105,21 +103,22 @@ pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
     }
 }
 
-/// How many requests wait or are under way.
+/// Returns how many requests are pending: queued or under way.
 ///
 /// @param client  the object
 /// @return 0 to 16
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_pending(client: *const mbm_client) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { pointers::ask(client, 0, |object| queue(object).pending() as u8) }
+    unsafe { pointers::read(client, 0, |object| queue(object).pending() as u8) }
 }
 
-/// Gives a request up. It is yours again at once, with the status MBM_CANCELLED;
-/// `done` is not called. It may have reached the device, and may still be answered.
+/// Cancels a request. Its status becomes MBM_CANCELLED, `done` is not called, and you may use
+/// the request again at once. The device may have received the request, and may still send
+/// a reply.
 ///
 /// @param client   the object
-/// @param request  a request that this client was given
+/// @param request  a request that was queued on this client
 /// @return MBM_OK; MBM_NOT_PENDING, with nothing changed, for a request that has
 ///         ended already or was never queued here; MBM_INVALID_ARGUMENT or
 ///         MBM_NOT_INITIALISED
@@ -136,7 +135,7 @@ pub unsafe extern "C" fn mbm_client_cancel(
                 Some(request) => {
                     if request.state().is_sent() {
                         let release = (*(*object).kind).release;
-                        pointers::calling(client, || release(object, Some(&request)));
+                        pointers::with_hooks(client, || release(object, Some(&request)));
                     }
                     Status::OK
                 }
@@ -146,12 +145,12 @@ pub unsafe extern "C" fn mbm_client_cancel(
     }
 }
 
-/// The transaction identifier on the wire: that of the TCP frame in which the request
-/// was sent last. The client chooses it, another one for each frame, also for a retry.
+/// Returns the transaction identifier on the wire: that of the TCP frame in which the client
+/// sent the request last. The client chooses a new one for each frame, also for a retry.
 ///
 /// @param request  a request, pending or ended
 /// @return the identifier; 0 in other framings, for a request that was never sent, and
-///         for NULL. 0 is also an identifier
+///         for NULL. 0 may also be the identifier of a frame
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_wireTransaction(request: *const mbm_clientRequest) -> u16 {
     // SAFETY: as the header demands: NULL, or a request that is zeroed or was used.

@@ -1,4 +1,4 @@
-//! A request of C's, as the core sees it.
+//! The request object of the client, and how the core uses it.
 
 use core::ffi::c_void;
 use core::mem::offset_of;
@@ -7,45 +7,47 @@ use core::ptr::NonNull;
 use mbm::bytes::copy_words;
 use mbm::client::{ClientRequest, RequestState};
 
-/// A request to a device, and what comes of it. Yours, and zero before you set
-/// the fields that you need; it may be used again and again.
+/// A request to a device, and its result. You own the storage. Zero it before first use, and
+/// then set the fields that you need. You may use it for any number of requests.
 ///
-/// From the call that queues it until it has ended, which `done` or `status`
-/// tells, leave it alone, and what it points to. Data and reply are words in the
-/// machine's byte order where a function transfers registers; where it transfers
-/// coils or bytes, they are bytes as on the wire, of coils the lowest bit first.
+/// From the call that queues it until it has ended, do not use or change it, nor what it
+/// points to. It has ended when `done` is called, or when `status` is no longer MBM_PENDING.
+///
+/// If a function transfers registers, `data` and `reply` are words in the machine's byte
+/// order. If it transfers coils or bytes, they are bytes as on the wire; the first coil is
+/// the lowest bit.
 #[repr(C)]
 pub struct mbm_clientRequest {
-    /// Optional: called by mbm_client_poll when the request has ended, but not for one
-    /// that mbm_client_cancel gave up. It may queue requests, this one too, and cancel
-    /// others.
+    /// Optional: mbm_client_poll calls it when the request has ended, but not after
+    /// mbm_client_cancel or a begin function gave the request up. It may queue requests, also
+    /// this one, and cancel others.
     pub done: Option<unsafe extern "C" fn(context: *mut c_void, request: *mut mbm_clientRequest)>,
-    /// Handed to `done`. Yours, may be NULL.
+    /// Your pointer, passed to `done`; may be NULL.
     pub context: *mut c_void,
-    /// What functions that write send.
+    /// The data that functions that write send.
     pub data: *const c_void,
-    /// What functions that read fill; NULL if only the status is wanted.
+    /// Receives the data that functions that read return; NULL if you want the status only.
     pub reply: *mut c_void,
-    /// Bytes that `reply` has room for.
+    /// The number of bytes that `reply` can hold.
     pub replyBytes: u16,
-    /// A number of yours, which stays as you set it. In TCP frames no two pending
-    /// requests may have the same one, except 0. It is not the transaction identifier
+    /// A number of your choice, which the client does not change. In TCP frames no two
+    /// pending requests may have the same one, except 0. It is not the transaction identifier
     /// on the wire: mbm_client_wireTransaction returns that.
     pub transaction: u16,
-    /// Whom it is for. On a serial line 1 to 247; 0 is broadcast; 248 to 255, which the
-    /// standard reserves, are sent as they are. On TCP 1 to 255.
+    /// The unit identifier of the device. On a serial line 1 to 247; 0 is broadcast; the
+    /// client also sends to 248 to 255, which the standard reserves. On TCP 1 to 255.
     pub unit: u8,
-    /// MBM_PENDING from being queued to its end, then how it ended.
+    /// MBM_PENDING from the call that queues the request until it ends; then its result.
     pub status: u8,
-    /// The raw exception code of the response; 0 if it was none.
+    /// The exception code of the response as received; 0 if the response was no exception.
     pub exception: u8,
-    /// Bytes received in `reply`.
+    /// The number of bytes received into `reply`.
     pub length: u8,
     /// Private.
     words: [u32; 8],
 }
 
-/// What lies behind an `mbm_clientRequest`.
+/// The fields in the storage of an `mbm_clientRequest`.
 #[repr(C)]
 pub(super) struct RequestFields {
     done: Option<unsafe extern "C" fn(context: *mut c_void, request: *mut mbm_clientRequest)>,
@@ -74,12 +76,12 @@ const _: () = {
     assert!(offset_of!(mbm_clientRequest, length) == STATE + offset_of!(RequestState, length));
 };
 
-/// A request that C lends until it has ended.
+/// A pointer to a request of the C program, which stays valid until the request has ended.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) struct RequestPtr(NonNull<RequestFields>);
 
 impl RequestPtr {
-    /// The request behind a pointer, if there is one.
+    /// The request at a pointer; `None` for NULL.
     ///
     /// # Safety
     /// It is NULL, or points to a request that is zeroed or was used before, and
@@ -88,20 +90,20 @@ impl RequestPtr {
         NonNull::new(request.cast()).map(RequestPtr)
     }
 
-    fn inside(&self) -> &RequestFields {
+    fn fields(&self) -> &RequestFields {
         // SAFETY: as `new` demands; nothing else uses a pending request.
         unsafe { self.0.as_ref() }
     }
 
-    pub(super) fn inside_mut(&mut self) -> &mut RequestFields {
+    pub(super) fn fields_mut(&mut self) -> &mut RequestFields {
         // SAFETY: as `new` demands; nothing else uses a pending request.
         unsafe { self.0.as_mut() }
     }
 
-    /// Tells C that the request has ended.
-    pub(super) fn call(self) {
+    /// Calls the request's `done`, if it has one.
+    pub(super) fn call_done(self) {
         let pointer = self.0.as_ptr();
-        // SAFETY: as `new` demands; no reference lives while C has it.
+        // SAFETY: as `new` demands; no reference lives while `done` runs.
         unsafe {
             if let Some(done) = (*pointer).done {
                 done((*pointer).context, pointer.cast());
@@ -110,7 +112,8 @@ impl RequestPtr {
     }
 }
 
-/// Where the byte at `index` of words on the wire stands in memory.
+/// The index in memory of the byte that has the index `index` on the wire. They differ in
+/// words on a little-endian machine.
 fn place(index: usize, words: bool) -> usize {
     if words && cfg!(target_endian = "little") {
         index ^ 1
@@ -121,38 +124,38 @@ fn place(index: usize, words: bool) -> usize {
 
 impl ClientRequest for RequestPtr {
     fn state(&self) -> &RequestState {
-        &self.inside().state
+        &self.fields().state
     }
 
     fn state_mut(&mut self) -> &mut RequestState {
-        &mut self.inside_mut().state
+        &mut self.fields_mut().state
     }
 
     fn byte(&self, index: usize) -> u8 {
-        let inside = self.inside();
-        let at = place(index, inside.state.header.sends_words());
-        // SAFETY: what was queued has as many data as the outline says, of words
-        // an even number of bytes.
-        unsafe { *inside.data.add(at) }
+        let fields = self.fields();
+        let at = place(index, fields.state.header.sends_words());
+        // SAFETY: a queued request has as many data bytes as its header says. Of words, that
+        // number is even.
+        unsafe { *fields.data.add(at) }
     }
 
     fn put(&mut self, index: usize, byte: u8) {
-        let inside = self.inside_mut();
-        let at = place(index, inside.state.header.takes_words());
-        // SAFETY: the reply is not NULL and has room for `capacity` bytes, which
-        // bound `index`; of words, an even number is received.
-        unsafe { *inside.reply.add(at) = byte }
+        let fields = self.fields_mut();
+        let at = place(index, fields.state.header.takes_words());
+        // SAFETY: the reply is not NULL and holds `capacity` bytes; `index` is less. Of words,
+        // the client receives an even number of bytes.
+        unsafe { *fields.reply.add(at) = byte }
     }
 
-    // A microcontroller has the loop over bytes anyway.
+    // Not on a microcontroller, where the loop over bytes is in the image anyway.
     #[cfg(not(any(target_os = "none", mbm_firmware)))]
     #[inline(always)]
     fn store_all(&mut self, bytes: &[u8]) {
-        let inside = self.inside_mut();
-        // SAFETY: the reply is not NULL and has room for `capacity` bytes, of which
-        // there are no more than that; nothing else uses it.
-        let reply = unsafe { core::slice::from_raw_parts_mut(inside.reply, bytes.len()) };
-        if inside.state.header.takes_words() {
+        let fields = self.fields_mut();
+        // SAFETY: the reply is not NULL and holds `capacity` bytes, and `bytes` is not
+        // longer; nothing else uses the reply.
+        let reply = unsafe { core::slice::from_raw_parts_mut(fields.reply, bytes.len()) };
+        if fields.state.header.takes_words() {
             copy_words(reply, bytes);
         } else {
             reply.copy_from_slice(bytes);
@@ -160,6 +163,6 @@ impl ClientRequest for RequestPtr {
     }
 
     fn wants_data(&self) -> bool {
-        !self.inside().reply.is_null()
+        !self.fields().reply.is_null()
     }
 }

@@ -1,4 +1,4 @@
-//! How a client behaves.
+//! The settings of a client.
 
 use super::object::mbm_client;
 use super::storage::{ClientBuffers, UnitRecords};
@@ -10,13 +10,15 @@ use mbm::engine::Settings;
 use mbm::error::Status;
 use mbm::time::millis;
 
-/// mbm_client_setBackoff: a request is asked again at once.
+/// mbm_client_setBackoff: the client repeats a request at once.
 pub const MBM_BACKOFF_NONE: u8 = 0;
-/// mbm_client_setBackoff: always the same wait.
+/// mbm_client_setBackoff: the client waits `delayMs` before each repetition.
 pub const MBM_BACKOFF_FIXED: u8 = 1;
-/// mbm_client_setBackoff: once, twice, three times the wait, up to the most.
+/// mbm_client_setBackoff: the client waits `delayMs` before the first repetition, twice that
+/// before the second, three times that before the third, but at most `maxDelayMs`.
 pub const MBM_BACKOFF_LINEAR: u8 = 2;
-/// mbm_client_setBackoff: once, twice, four times the wait, up to the most.
+/// mbm_client_setBackoff: the client waits `delayMs` before the first repetition, twice that
+/// before the second, four times that before the third, but at most `maxDelayMs`.
 pub const MBM_BACKOFF_EXPONENTIAL: u8 = 3;
 
 const _: () = {
@@ -26,26 +28,26 @@ const _: () = {
     assert!(MBM_BACKOFF_EXPONENTIAL == Backoff::Exponential as u8);
 };
 
-/// What is kept for one unit, in an array of yours for mbm_client_setUnits. The
-/// counts are yours to read and to zero; each wraps at 2^32.
+/// The record of one unit, an item of the array for mbm_client_setUnits. You may read and
+/// zero the counters at any time, but not from an interrupt; each wraps at 2^32.
 #[repr(C)]
 pub struct mbm_clientUnit {
-    /// Requests that ended, retries apart.
+    /// Requests that ended, without retries.
     pub requests: u32,
-    /// Of these, those that were answered, exceptions included.
+    /// Requests that the unit answered, also with an exception.
     pub replies: u32,
-    /// Of the answers, those that were exceptions.
+    /// Requests that the unit answered with an exception.
     pub exceptions: u32,
-    /// Requests that were asked again.
+    /// Repetitions of requests.
     pub retries: u32,
-    /// Set by you: rest for this unit from the end of a request to the next, in
-    /// microseconds; more than 2^31 (36 minutes) means 2^31.
+    /// Set by you: the minimum time from the end of a request to the next request to this
+    /// unit, in microseconds; a value above 2^31 (36 minutes) means 2^31.
     pub delayUs: u32,
     /// Private.
     last: u32,
-    /// Set by you: which unit this is.
+    /// Set by you: the unit identifier.
     pub unit: u8,
-    /// How the last request ended, MBM_OK if there was none.
+    /// The status of the last request that ended; MBM_OK if none has ended.
     pub status: u8,
     /// Private.
     cooling_down: u8,
@@ -60,7 +62,7 @@ const _: () = {
     assert!(offset_of!(mbm_clientUnit, status) == offset_of!(UnitRecord, status));
 };
 
-/// The parts of a client that settings reach.
+/// The parts of a client that the functions here change.
 struct Parts<'a> {
     settings: &'a mut Settings,
     storage: &'a mut ClientBuffers,
@@ -86,12 +88,12 @@ unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> Status) -> 
     }
 }
 
-/// Sets how long a response may take. The time begins with the end of the request on a
-/// serial line and in RTU over TCP; in TCP frames when mbm_client_poll puts the request
-/// into the outgoing buffer, also if the port takes it later.
+/// Sets the response timeout. On a serial line and in RTU over TCP, the time starts when the
+/// request has been sent. In TCP frames it starts when mbm_client_poll puts the request into
+/// the outgoing buffer, also if the port accepts it later.
 ///
 /// @param client        the object
-/// @param timeoutMs     0 to 65535; 2000 at first
+/// @param timeoutMs     milliseconds, 0 to 65535; the default is 2000
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setResponseTimeout(
@@ -107,12 +109,12 @@ pub unsafe extern "C" fn mbm_client_setResponseTimeout(
     }
 }
 
-/// Tells the baud rate of an RTU line, from which the gap before a request (t3.5,
-/// serial line guide V1.02, 2.5.1.1) and the length of a character follow. It sets
-/// nothing on the line. Untold, the gap is 4 ms, which is safe from 9600 up.
+/// Sets the baud rate from which the client computes the gap before an RTU request (t3.5,
+/// serial line guide V1.02, 2.5.1.1) and the duration of a character. It does not configure
+/// the serial line. Without a baud rate the gap is 4 ms, which is enough from 9600 up.
 ///
 /// @param client  the object
-/// @param baud    bits per second; 0 goes back to untold
+/// @param baud    bits per second; 0 (the default): unknown
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setBaudRate(client: *mut mbm_client, baud: u32) -> u8 {
@@ -125,11 +127,11 @@ pub unsafe extern "C" fn mbm_client_setBaudRate(client: *mut mbm_client, baud: u
     }
 }
 
-/// Sets the silence before a request, in place of t3.5; a later
-/// mbm_client_setBaudRate sets it back. Without effect on TCP.
+/// Sets the silence before a request, instead of t3.5. A later call of
+/// mbm_client_setBaudRate sets it back to t3.5. It has no effect on TCP.
 ///
 /// @param client        the object
-/// @param gapUs         counted from the last byte seen or sent; more than 2^31
+/// @param gapUs         microseconds from the last byte received or sent; a value above 2^31
 ///                      (36 minutes) means 2^31
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
@@ -143,11 +145,12 @@ pub unsafe extern "C" fn mbm_client_setGap(client: *mut mbm_client, gapUs: u32) 
     }
 }
 
-/// Sets how long a request takes that nobody responds to: a broadcast (serial
-/// line guide V1.02, 2.4.1), and 08 with sub-function 04.
+/// Sets the turnaround delay: how long the client waits after a request that no device
+/// answers. These requests are a broadcast (serial line guide V1.02, 2.4.1), and 08 with
+/// sub-function 04.
 ///
 /// @param client        the object
-/// @param delayMs       0 to 65535; 100 at first
+/// @param delayMs       milliseconds, 0 to 65535; the default is 100
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
@@ -163,12 +166,12 @@ pub unsafe extern "C" fn mbm_client_setTurnaroundDelay(
     }
 }
 
-/// Sets the quiet time of a serial line, which keeps a late reply from being taken
-/// for the answer to a later request; see mbm_master_setQuietTime. Without effect on
-/// TCP, where responses have a number.
+/// Sets the quiet time of a serial line. It prevents that the client accepts a late reply as
+/// the reply to a later request: see mbm_master_setQuietTime. It has no effect in TCP frames,
+/// whose transaction identifier shows to which request a reply belongs.
 ///
 /// @param client        the object
-/// @param quietMs       0 to 65535; 100 at first; 0 holds no reply
+/// @param quietMs       milliseconds, 0 to 65535; the default is 100; 0 holds no reply
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setQuietTime(client: *mut mbm_client, quietMs: u16) -> u8 {
@@ -181,30 +184,31 @@ pub unsafe extern "C" fn mbm_client_setQuietTime(client: *mut mbm_client, quietM
     }
 }
 
-/// Tells that the receiver hears what the driver sends, so each request comes back
-/// before its reply and is to be dropped. Without effect on TCP.
+/// Switches echo discarding on or off. Switch it on if the receiver also receives what the
+/// driver sends: then the client discards the copy of each request that arrives before the
+/// reply. It has no effect on TCP.
 ///
 /// @param client  the object
-/// @param on      0 (at first) or 1
+/// @param on      0 (the default) or 1
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setEchoDiscard(client: *mut mbm_client, on: u8) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            built_in(cfg!(feature = "echo") || on == 0, || {
+            if_built_in(cfg!(feature = "echo") || on == 0, || {
                 parts.settings.echo_discard = on != 0;
             })
         })
     }
 }
 
-/// Holds the driver on after the port's flush, for platforms whose flush returns
-/// before the last bit has left. Without effect on TCP.
+/// Sets how long the driver stays on after the port's flush, for platforms whose flush
+/// returns before the last bit was sent. It has no effect on TCP.
 ///
 /// @param client      the object
-/// @param characters  times one character of the told baud rate (9600 if untold);
-///                    0 at first
+/// @param characters  the time in characters at the baud rate of mbm_client_setBaudRate
+///                    (without one, at 9600); the default is 0
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setPostFlushHold(
@@ -214,17 +218,17 @@ pub unsafe extern "C" fn mbm_client_setPostFlushHold(
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            built_in(cfg!(feature = "hold") || characters == 0, || {
+            if_built_in(cfg!(feature = "hold") || characters == 0, || {
                 parts.settings.post_flush_hold = characters;
             })
         })
     }
 }
 
-/// Makes a change that an archive may lack the code for: then it is refused.
+/// Makes a change if the archive contains the code for it; otherwise refuses it.
 #[inline(always)]
-fn built_in(has: bool, change: impl FnOnce()) -> Status {
-    if has {
+fn if_built_in(built_in: bool, change: impl FnOnce()) -> Status {
+    if built_in {
         change();
         Status::OK
     } else {
@@ -232,13 +236,13 @@ fn built_in(has: bool, change: impl FnOnce()) -> Status {
     }
 }
 
-/// Sets how often a request is repeated whose response is missing, damaged or
-/// malformed, or that the port did not take. Exceptions are responses and are not
-/// repeated, nor are requests that a lost link interrupted, nor those whose response is
+/// Sets how often the client repeats a request whose response is missing, damaged or
+/// malformed, or that the port did not accept. It does not repeat a request that was
+/// answered with an exception, one that a lost link interrupted, or one whose response is
 /// too long for a buffer.
 ///
 /// @param client   the object
-/// @param retries  0 to 255; 0 at first
+/// @param retries  0 to 255; the default is 0
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setRetries(client: *mut mbm_client, retries: u8) -> u8 {
@@ -254,13 +258,13 @@ pub unsafe extern "C" fn mbm_client_setRetries(client: *mut mbm_client, retries:
     }
 }
 
-/// Sets how long a request waits before it is repeated. Other requests are sent
-/// meanwhile.
+/// Sets how long a request waits before the client repeats it. Meanwhile the client sends
+/// other requests.
 ///
 /// @param client            the object
-/// @param backoff           MBM_BACKOFF_NONE (at first) to MBM_BACKOFF_EXPONENTIAL
-/// @param delayMs           the wait before the first repetition
-/// @param maxDelayMs        the longest wait
+/// @param backoff           MBM_BACKOFF_NONE (the default) to MBM_BACKOFF_EXPONENTIAL
+/// @param delayMs           the wait before the first repetition, in milliseconds
+/// @param maxDelayMs        the longest wait, in milliseconds
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setBackoff(
@@ -282,15 +286,17 @@ pub unsafe extern "C" fn mbm_client_setBackoff(
     }
 }
 
-/// Leaves a part of each wait before a repetition to chance, so that several
-/// clients do not keep in step.
+/// Shortens each wait before a repetition by a random part, so that several clients do not
+/// repeat their requests at the same time.
 ///
 /// @param client   the object
-/// @param percent  0 (at first) to 100: how much of the wait may be taken off
-/// @param random   returns another number each time, for example rand(): one of 32
-///                 bits, of 15 bits, or whose upper bits alone vary. What it
-///                 calls on the client returns MBM_BUSY
-/// @param context  handed to `random`
+/// @param percent  0 (the default) to 100: the largest part of the wait by which the client
+///                 shortens it
+/// @param random   returns a new random number at each call, for example that of rand(). It
+///                 may have 32 bits, 15 bits, or random bits in its upper half only. A
+///                 function that it calls on the client returns MBM_BUSY. NULL only if
+///                 `percent` is 0
+/// @param context  your pointer, passed to `random`; may be NULL
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setJitter(
@@ -313,13 +319,13 @@ pub unsafe extern "C" fn mbm_client_setJitter(
     }
 }
 
-/// Counts into storage of yours from now on. Read and zero it as you like, but not
-/// from an interrupt. In TCP frames, a foreign frame is one whose transaction identifier
-/// and unit no pending request has; a resynchronisation is a run of bytes that were no
-/// frame.
+/// Sets your storage for counters, in which the client counts from now on. You may read and
+/// zero the counters at any time, but not from an interrupt. In TCP frames, foreignFrames
+/// counts frames whose transaction identifier and unit match no pending request, and
+/// resynchronisations counts sequences of bytes that were not a frame.
 ///
 /// @param client    the object
-/// @param counters  zeroed by you; NULL stops counting
+/// @param counters  your counters, zeroed; NULL stops counting
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setCounters(
@@ -329,19 +335,19 @@ pub unsafe extern "C" fn mbm_client_setCounters(
     // SAFETY: as the header demands.
     unsafe {
         set(client, |parts| {
-            built_in(cfg!(feature = "counters") || counters.is_null(), || {
+            if_built_in(cfg!(feature = "counters") || counters.is_null(), || {
                 parts.storage.counters = counters;
             })
         })
     }
 }
 
-/// Keeps a record of some units: how often they were asked and answered, and how
-/// long each is left alone between two requests.
+/// Sets the records of units. In a record the client counts the requests to its unit. The
+/// record's `delayUs` sets the minimum time between two requests to the unit.
 ///
 /// @param client  the object
-/// @param units   zeroed by you but for `unit` and `delay`; NULL for none
-/// @param count   how many records, 0 to 255
+/// @param units   your array of records, zeroed except `unit` and `delayUs`; NULL for none
+/// @param count   the number of records, 0 to 255
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setUnits(
@@ -354,13 +360,13 @@ pub unsafe extern "C" fn mbm_client_setUnits(
         set(client, |parts| {
             parts.storage.units = units.cast();
             parts.storage.unit_count = count;
-            parts.storage.unit_records = (!units.is_null()).then_some(&TREATMENT);
+            parts.storage.unit_records = (!units.is_null()).then_some(&UNIT_RECORDS);
             Status::OK
         })
     }
 }
 
-const TREATMENT: UnitRecords = UnitRecords {
+const UNIT_RECORDS: UnitRecords = UnitRecords {
     rest: |storage, unit, now| rest(storage.units(), unit, now),
     note: |storage, unit, ended, now| note(storage.units(), unit, ended.status, ended.again, now),
 };

@@ -1,29 +1,30 @@
-//! What the begin functions and settings of a client lend.
+//! The buffers and hooks that the begin functions and settings of a client receive.
 
-use crate::storage::{lent_frame, mbm_counters};
+use crate::storage::{frame_storage, mbm_counters};
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 use mbm::client::{ClientStorage, Policy, UnitRecord};
 use mbm::engine::Storage;
 use mbm::error::Status;
 
-/// How long a request waits to be asked again, if it is. (A pointer, as [`UnitRecords`].)
+/// The function that computes how long a request waits for its repetition. `None` means that
+/// the client does not repeat it. (A pointer, for the reason that [`UnitRecords`] gives.)
 pub(super) type Again = fn(&mut ClientBuffers, &Policy, retries: u8, Status) -> Option<u32>;
 
-/// How a unit is treated as its record says. (Behind a pointer, so that firmware
-/// without records carries none of it.)
+/// The functions that use the records of units. (Called through a pointer that
+/// mbm_client_setUnits sets, so that firmware that does not call it does not contain them.)
 pub(super) struct UnitRecords {
     pub(super) rest: fn(&mut ClientBuffers, unit: u8, now: u32) -> u32,
     pub(super) note: fn(&mut ClientBuffers, unit: u8, ended: Ended, now: u32),
 }
 
-/// How a request to a unit ended, and whether it is asked again.
+/// How a request to a unit ended, and whether the client repeats it.
 pub(super) struct Ended {
     pub(super) status: Status,
     pub(super) again: bool,
 }
 
-/// What the begin functions and settings lend.
+/// The buffers and hooks of a client.
 #[repr(C)]
 pub(super) struct ClientBuffers {
     pub(super) frame: *mut u8,
@@ -39,21 +40,21 @@ pub(super) struct ClientBuffers {
     pub(super) unit_count: u8,
 }
 
-// SAFETY, of all functions here: each pointer is NULL, or what the function of
-// the header that set it demands, valid for as long as the object is used; what
-// is NULL has no length, and each is lent for as long as `self` is borrowed.
+// SAFETY, of all functions here: each pointer is NULL, or valid as the C function that set
+// it demands, for as long as the object is used. A slice lives only as long as `self` is
+// borrowed.
 impl Storage for ClientBuffers {
-    lent_frame!(u16);
+    frame_storage!(u16);
 }
 
 impl ClientStorage for ClientBuffers {
     fn outgoing(&mut self) -> &mut [u8] {
-        // SAFETY: see above; a TCP client is begun with one, no other asks for it.
+        // SAFETY: see above; the begin function of a TCP client set it, and only TCP uses it.
         unsafe { from_raw_parts_mut(self.outgoing, self.outgoing_bytes.into()) }
     }
 
     fn to_send(&mut self, from: u16, to: u16) -> &mut [u8] {
-        // SAFETY: see above; the client keeps its places within the buffer.
+        // SAFETY: see above; the client keeps `from` and `to` within the buffer.
         unsafe { from_raw_parts_mut(self.outgoing.add(from.into()), (to - from).into()) }
     }
 

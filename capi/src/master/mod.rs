@@ -1,4 +1,4 @@
-//! `mbm_master_*`: the facade for C.
+//! `mbm_master_*`: the master for C.
 
 pub(crate) mod object;
 mod requests;
@@ -22,13 +22,14 @@ use mbm::error::Status;
 use mbm::master::Master;
 use mbm::pdu::query::FunctionSpec;
 
-/// What lies behind an `mbm_master`.
+/// The fields in the storage of an `mbm_master`.
 #[repr(C)]
 pub(super) struct Object {
     mark: u8,
     non_blocking: bool,
     core: Core,
-    /// Of values in the words, as C counts it; last, as it is seldom wanted.
+    /// The order of words in values: one of `MBM_ORDER_...`. It is the last field because few
+    /// programs use it.
     order: u8,
 }
 
@@ -59,8 +60,8 @@ unsafe impl CObject for mbm_master {
 }
 
 impl Object {
-    /// The core in storage of an object, which leaves the mark out: that is read while
-    /// the core is in use.
+    /// The core of an object. It does not include the mark, which is read while the core is
+    /// in use.
     ///
     /// # Safety
     /// `master` points to storage of an object, zeroed or begun.
@@ -69,21 +70,21 @@ impl Object {
         unsafe { &raw mut (*master.cast::<Object>()).core }
     }
 
-    /// The facade itself.
+    /// The core of the master.
     pub(super) fn core(&mut self) -> &mut Core {
         &mut self.core
     }
 }
 
-/// As [`pointers::check`], but zeroed storage becomes a master, with
-/// defaults and without port and buffers.
+/// As [`pointers::check`], but makes zeroed storage a master with default settings, without
+/// port and buffers.
 ///
 /// # Safety
 /// As for [`pointers::with`].
 #[cfg_attr(target_os = "none", inline(never))]
 pub(super) unsafe fn prepare(master: *mut mbm_master) -> Status {
-    // SAFETY: as the caller promises; what is not begun is zeroed, and zero is
-    // a value of every field.
+    // SAFETY: as the caller promises; storage that was not begun is zeroed, and zero is a
+    // valid value of every field.
     unsafe {
         match pointers::check(master) {
             Status::NOT_INITIALISED => {
@@ -102,27 +103,30 @@ pub(super) unsafe fn prepare(master: *mut mbm_master) -> Status {
 /// # Safety
 /// As for [`pointers::calling`].
 #[inline(always)]
-pub(super) unsafe fn calling<T>(master: *mut mbm_master, action: impl FnOnce(&mut Core) -> T) -> T {
-    // SAFETY: begun, so every field is valid; exclusive, for no other function
-    // makes a reference while the mark says so.
-    unsafe { pointers::calling(master, || action(&mut *Object::core_of(master))) }
+pub(super) unsafe fn with_hooks<T>(
+    master: *mut mbm_master,
+    action: impl FnOnce(&mut Core) -> T,
+) -> T {
+    // SAFETY: begun, so every field is valid; exclusive, because the mark keeps every other
+    // function from making a reference.
+    unsafe { pointers::with_hooks(master, || action(&mut *Object::core_of(master))) }
 }
 
-/// Begins to talk to a slave over a port.
+/// Begins a master of RTU frames that sends its requests to a unit over a port.
 ///
-/// May be called again at any time, which is cheap: to talk to another slave,
-/// or over another port. Settings, buffers and the words in them stay; what
-/// was queued by send is dropped, and a request under way is given up. Opens
-/// nothing: the port is open already. The first request waits for no gap, unless
-/// bytes arrive or mbm_master_lineUsed was called.
+/// It may be called again at any time, to use another unit or another port; this is cheap.
+/// Settings, buffers and the words in them stay. The master discards what mbm_master_send
+/// queued, and gives up a request under way with the status MBM_CANCELLED. It does not open
+/// the port: that must be open already. The first request waits for no gap, unless bytes
+/// arrive or mbm_master_lineUsed was called.
 ///
 /// @param master  the object; zeroed before the first call
-/// @param slave   unit id, 1 to 247; 248 to 255 are sent as they are, 0 is
-///                broadcast (serial line guide V1.02, 2.2)
-/// @param port    not copied: it must stay valid and unchanged for as long as the
-///                object is used; read, write and micros must be there
+/// @param slave   the unit identifier, 1 to 247; 0 is broadcast (serial line guide V1.02,
+///                2.2). The master also sends to 248 to 255, which the standard reserves
+/// @param port    the port. It is not copied: it must stay valid and unchanged for as long as
+///                the object is used. read, write and micros must not be NULL
 /// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a missing hook; MBM_BUSY
-///         from within a hook of this object's port but `idle`
+///         from within a hook of this object's port except `idle`
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_beginRtu(
     master: *mut mbm_master,
@@ -136,14 +140,14 @@ pub unsafe extern "C" fn mbm_master_beginRtu(
     unsafe { mbm_master_beginRtuWith(master, slave, port, (*port).context) }
 }
 
-/// As mbm_master_beginRtu, for several objects that share one port, which may be a
-/// constant: each object has a context of its own.
+/// As mbm_master_beginRtu, but with a separate context. Several objects can then share one
+/// port, which may be a constant, and each object has its own context.
 ///
 /// @param master   the object; zeroed before the first call
 /// @param slave    as for mbm_master_beginRtu
 /// @param port     as for mbm_master_beginRtu; its `context` is not used
-/// @param context  handed to every hook. Yours, may be NULL
-/// @return as mbm_master_beginRtu
+/// @param context  your pointer, passed to every hook; may be NULL
+/// @return as for mbm_master_beginRtu
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_beginRtuWith(
     master: *mut mbm_master,
@@ -158,28 +162,28 @@ pub unsafe extern "C" fn mbm_master_beginRtuWith(
         }
         let status = prepare(master);
         if status == Status::OK {
-            calling(master, |core| {
-                core.begin(slave, |place| place.set(port, context));
+            with_hooks(master, |core| {
+                core.begin(slave, |port_ref| port_ref.set(port, context));
             });
         }
         status.code()
     }
 }
 
-/// Lends the buffers that requests and replies need, before or after begin.
+/// Sets the buffers for requests and replies, before or after mbm_master_beginRtu.
 ///
-/// They must not overlap, and stay valid for as long as the object is used.
-/// MBM_FRAME_BYTES(words) bytes of frame serve any request and reply of so
-/// many words. What does not fit into a smaller buffer is answered with a
-/// status, never cut short.
+/// The buffers must not overlap, and must stay valid for as long as the object is used. A
+/// frame buffer of MBM_FRAME_BYTES(words) bytes suffices for every request and reply with
+/// that number of words. If a request or a reply does not fit into a smaller buffer, the
+/// function that makes the request returns a status. Data are never cut off.
 ///
 /// @param master         the object; zeroed before the first call
-/// @param response       words that reads fill; NULL only with 0 words
+/// @param response       the words that reads fill; NULL only if `responseWords` is 0
 /// @param responseWords  0 to 255; 125 hold any reply
-/// @param transmit       words that writes send; NULL only with 0 words
+/// @param transmit       the words that writes send; NULL only if `transmitWords` is 0
 /// @param transmitWords  0 to 255; 123 hold any request
-/// @param frame          bytes of one frame; keeps nothing between requests
-/// @param frameBytes     at least 8; 256 hold any frame
+/// @param frame          the buffer of one frame. Its content is not used between requests
+/// @param frameBytes     bytes of `frame`, at least 8; 256 hold any frame
 /// @return MBM_OK, MBM_INVALID_ARGUMENT, or MBM_BUSY while a request is under way
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setBuffers(
@@ -191,12 +195,12 @@ pub unsafe extern "C" fn mbm_master_setBuffers(
     frame: *mut u8,
     frameBytes: u16,
 ) -> u8 {
-    let useless = (response.is_null() && responseWords > 0)
+    let refused = (response.is_null() && responseWords > 0)
         || (transmit.is_null() && transmitWords > 0)
         || (responseWords | transmitWords) > 255
         || frame.is_null()
         || frameBytes < 8;
-    if useless {
+    if refused {
         return Status::INVALID_ARGUMENT.code();
     }
     // SAFETY: as the header demands.
@@ -210,7 +214,7 @@ pub unsafe extern "C" fn mbm_master_setBuffers(
             return Status::BUSY.code();
         }
         let storage = master.core.storage();
-        // No words start where words were before, but not at NULL.
+        // An empty buffer keeps the earlier pointer, so that no pointer becomes NULL.
         if !response.is_null() {
             storage.response = response;
         }
@@ -220,20 +224,21 @@ pub unsafe extern "C" fn mbm_master_setBuffers(
         storage.frame = frame;
         storage.response_words = responseWords as u8;
         storage.transmit_words = transmitWords as u8;
-        // No frame of a master is longer.
+        // No frame of a master is longer than 255 bytes.
         storage.frame_bytes = frameBytes.min(u8::MAX.into()) as u8;
         Status::OK.code()
     }
 }
 
-/// Moves a non-blocking request on, without waiting.
+/// Sends and receives for a non-blocking request, without waiting.
 ///
-/// Call it as often as you like, at least once per character time of the line
-/// if nothing else buffers its bytes.
+/// Call it as often as you like. If your port does not buffer received bytes, call it at
+/// least once in the time of a character.
 ///
 /// @param master  the object
-/// @return MBM_PENDING until the request has ended, then its status, again at
-///         every call; MBM_OK if there was no request yet
+/// @return MBM_PENDING until the request has ended. Then, at every call, the status of the
+///         request. MBM_OK if there was no request yet; MBM_BUSY from within a hook of the
+///         port except `idle`; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_poll(master: *mut mbm_master) -> u8 {
     // SAFETY: as the header demands.
@@ -249,34 +254,34 @@ unsafe extern "C" fn poll(master: *mut mbm_master) -> u8 {
     // SAFETY: as the caller promises.
     unsafe {
         match pointers::check(master) {
-            Status::OK => calling(master, Core::poll),
+            Status::OK => with_hooks(master, Core::poll),
             refused => refused,
         }
         .code()
     }
 }
 
-/// How long mbm_master_poll will find nothing to do unless a byte arrives, so
-/// that a program or an idle hook may sleep until then. A wait that has just begun
-/// counts from this call, so sleeping lengthens no timeout.
+/// Returns how long mbm_master_poll will have nothing to do unless a byte arrives. A program
+/// or the hook `idle` may sleep for that time. A waiting time that has just started counts
+/// from this call, so sleeping makes no timeout longer.
 ///
 /// @param master  the object
-/// @return microseconds; 0 means poll now, and is returned within a hook of the port
-///         but `idle`; 0xFFFFFFFF that there is no request
+/// @return microseconds; 0 means poll now, also from within a hook of the port except `idle`;
+///         0xFFFFFFFF means that no request is under way
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_pollDelay(master: *mut mbm_master) -> u32 {
     // SAFETY: as the header demands.
     unsafe {
         match pointers::check(master) {
-            Status::OK => calling(master, Core::poll_delay),
+            Status::OK => with_hooks(master, Core::poll_delay),
             Status::BUSY => 0,
             _ => u32::MAX,
         }
     }
 }
 
-/// Gives up the request under way, with the driver switched off; its status
-/// becomes MBM_CANCELLED. Without a request it does nothing.
+/// Gives up the request under way and switches the driver off. The status of the request
+/// becomes MBM_CANCELLED. If no request is under way, it does nothing.
 ///
 /// @param master  the object
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
@@ -286,44 +291,45 @@ pub unsafe extern "C" fn mbm_master_cancel(master: *mut mbm_master) -> u8 {
     unsafe {
         let status = pointers::check(master);
         if status == Status::OK {
-            calling(master, Core::cancel);
+            with_hooks(master, Core::cancel);
         }
         status.code()
     }
 }
 
-/// The status of the last request.
+/// Returns the status of the last request.
 ///
 /// @param master  the object
-/// @return MBM_PENDING while it is under way, MBM_OK if there was none;
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return the status: MBM_PENDING while the request is under way, MBM_OK if there was no
+///         request; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_status(master: *const mbm_master) -> u8 {
     // SAFETY: as the header demands.
     unsafe { pointers::with(master.cast_mut(), |master| master.core.status()) }
 }
 
-/// The raw exception code of the last reply, also where it is none that the
-/// standard allows (V1.1b3, 7).
+/// Returns the exception code of the last reply as received, also a code that the standard
+/// does not allow (V1.1b3, 7).
 ///
 /// @param master  the object
-/// @return the code; 0 if the last request ended without an exception frame
+/// @return the code; 0 if the last request ended without an exception
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_getExceptionCode(master: *const mbm_master) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { pointers::ask(master, 0, |master| master.core.exception_code()) }
+    unsafe { pointers::read(master, 0, |master| master.core.exception_code()) }
 }
 
-/// Requests a form of an address and a word and, in blocking mode, sees it through.
+/// Starts a request that has an address and a word and, in blocking mode, polls until it has
+/// ended.
 ///
 /// # Safety
 /// As for [`pointers::with`].
-unsafe fn call(pointer: *mut mbm_master, address: u16, word: u16, form: FunctionSpec) -> u8 {
+unsafe fn call(pointer: *mut mbm_master, address: u16, word: u16, function: FunctionSpec) -> u8 {
     // SAFETY: as the caller promises.
-    unsafe { request(pointer, |master| master.request(address, word, form)) }
+    unsafe { request(pointer, |master| master.request(address, word, function)) }
 }
 
-/// Starts a request and, in blocking mode, sees it through.
+/// Starts a request and, in blocking mode, polls until it has ended.
 ///
 /// # Safety
 /// As for [`pointers::with`].
@@ -335,18 +341,18 @@ unsafe fn request(pointer: *mut mbm_master, start: impl FnOnce(&mut Core) -> Sta
     }
 }
 
-/// In blocking mode, polls a request until it has ended; calls the idle hook
-/// where there is nothing to do.
+/// In blocking mode, polls until the request has ended, and calls the hook `idle` whenever
+/// there is nothing to do.
 ///
 /// # Safety
-/// As for [`pointers::with`]; the status is what that master said last.
+/// As for [`pointers::with`]; `status` is the one that the last call on that master returned.
 #[inline(never)]
 unsafe fn finish(pointer: *mut mbm_master, mut status: u8) -> u8 {
     if status != Status::PENDING.code() {
         return status;
     }
-    // SAFETY: pending, so begun. No reference lives while the hook is called,
-    // for the hook may use the object, which `poll` looks at anew.
+    // SAFETY: pending, so begun. No reference lives while the hook is called, because the
+    // hook may use the object. `poll` checks the object again.
     unsafe {
         let blocking = !(*pointer.cast::<Object>()).non_blocking;
         while blocking && status == Status::PENDING.code() {

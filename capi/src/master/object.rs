@@ -1,17 +1,17 @@
-//! The storage of a master, which ports name too.
+//! The storage of a master. The port's hook `idle` uses it too.
 
 use core::ffi::c_void;
 
 /// A Modbus RTU master: one line, one request at a time.
 ///
-/// Storage is yours and must be zero before first use, which a static object
-/// is (`static mbm_master node;`). Settings and words want mbm_master_beginRtu or
-/// mbm_master_setBuffers before them, requests want both. Use one object from one
-/// thread and never from an interrupt; several objects are independent of each
-/// other. Which functions the hooks of its port may call: see mbm_port.
+/// You own the storage. It must be zero before first use, as a static object is
+/// (`static mbm_master node;`). Before you use settings and words, call mbm_master_beginRtu
+/// or mbm_master_setBuffers; before you make requests, call both. Use an object from one
+/// thread only, and never from an interrupt. Several objects are independent of each other.
+/// mbm_port says which functions the hooks of the port may call.
 ///
-/// A call that is refused changes nothing, but for what the functions that make a
-/// request say of themselves, and mbm_master_send32.
+/// A call that is refused changes nothing. Exceptions are the functions that make a request,
+/// as mbm_master_readCoils describes, and mbm_master_send32.
 #[repr(C)]
 pub struct mbm_master {
     /// Private.

@@ -1,26 +1,30 @@
-//! The ten functions, and their forms without arguments.
+//! The ten functions, and those of them that use the queue of words to send.
 
 use super::{call, mbm_master, request};
 use mbm::error::Status;
 use mbm::pdu::{bits, registers};
 
-/// Function 01: reads coils into the response words, 16 to a word, lowest bit
-/// first, the last word padded with zeros (V1.1b3, 6.1).
+/// Function 01: reads coils into the response words, 16 in each word. The first coil is the
+/// lowest bit; the last word is padded with zeros (V1.1b3, 6.1).
 ///
-/// This and the nine other functions behave alike. In blocking mode they return
-/// when the request has ended, in non-blocking mode at once with MBM_PENDING, and
-/// mbm_master_poll ends it. They empty the queue of send and set receive back to the
-/// first word, unless they return MBM_BUSY, MBM_NOT_INITIALISED or
-/// MBM_INVALID_ARGUMENT. Response words change only on success. Transmit words stay;
-/// only 06 and 16 store their arguments in them. A request that no device could accept
-/// (a quantity that the standard forbids, addresses beyond 65535) is not sent: the
-/// status is the exception that a device would answer.
+/// All functions that make a request behave as follows. In blocking mode they return when
+/// the request has ended. In non-blocking mode they return MBM_PENDING at once, and you call
+/// mbm_master_poll until the request has ended.
+///
+/// They empty the queue of mbm_master_send, and mbm_master_receive starts again at the first
+/// word, unless they return MBM_BUSY, MBM_NOT_INITIALISED or MBM_INVALID_ARGUMENT. The
+/// response words change only on success. The transmit words do not change, except that 06
+/// and 16 store their arguments there.
+///
+/// The master does not send a request that no device could accept, with a quantity that the
+/// standard forbids or addresses beyond 65535. The status is then the exception with which a
+/// device would answer.
 ///
 /// @param master    the object
-/// @param address   first coil, 0 to 65535, as on the wire
-/// @param quantity  1 to 2000
+/// @param address   the first coil, 0 to 65535, as on the wire
+/// @param quantity  the number of coils, 1 to 2000
 /// @return MBM_OK, or an exception of the device (0x01 to 0x7F), or
-///         MBM_PENDING (non-blocking), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
+///         MBM_PENDING (non-blocking mode), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
 ///         MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION,
 ///         MBM_LINK_LOST, MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL,
 ///         MBM_BROADCAST_NOT_ALLOWED, MBM_BUSY, MBM_CANCELLED,
@@ -35,12 +39,12 @@ pub unsafe extern "C" fn mbm_master_readCoils(
     unsafe { call(master, address, quantity, bits::form::READ_COILS) }
 }
 
-/// Function 02: reads discrete inputs into the response words, 16 to a word,
-/// lowest bit first, the last word padded with zeros (V1.1b3, 6.2).
+/// Function 02: reads discrete inputs into the response words, 16 in each word. The first
+/// input is the lowest bit; the last word is padded with zeros (V1.1b3, 6.2).
 ///
 /// @param master    the object
-/// @param address   first input, 0 to 65535, as on the wire
-/// @param quantity  1 to 2000
+/// @param address   the first input, 0 to 65535, as on the wire
+/// @param quantity  the number of inputs, 1 to 2000
 /// @return a status; see mbm_master_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_readDiscreteInputs(
@@ -55,8 +59,8 @@ pub unsafe extern "C" fn mbm_master_readDiscreteInputs(
 /// Function 03: reads holding registers into the response words (V1.1b3, 6.3).
 ///
 /// @param master    the object
-/// @param address   first register, 0 to 65535, as on the wire
-/// @param quantity  1 to 125
+/// @param address   the first register, 0 to 65535, as on the wire
+/// @param quantity  the number of registers, 1 to 125
 /// @return a status; see mbm_master_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_readHoldingRegisters(
@@ -71,8 +75,8 @@ pub unsafe extern "C" fn mbm_master_readHoldingRegisters(
 /// Function 04: reads input registers into the response words (V1.1b3, 6.4).
 ///
 /// @param master    the object
-/// @param address   first register, 0 to 65535, as on the wire
-/// @param quantity  1 to 125
+/// @param address   the first register, 0 to 65535, as on the wire
+/// @param quantity  the number of registers, 1 to 125
 /// @return a status; see mbm_master_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_readInputRegisters(
@@ -84,11 +88,11 @@ pub unsafe extern "C" fn mbm_master_readInputRegisters(
     unsafe { call(master, address, quantity, registers::form::READ_INPUT) }
 }
 
-/// Function 05: switches one coil (V1.1b3, 6.5). Unit 0 broadcasts.
+/// Function 05: switches one coil on or off (V1.1b3, 6.5). With unit 0 it is a broadcast.
 ///
 /// @param master   the object
 /// @param address  the coil, 0 to 65535; becomes the write address
-/// @param state    0 is off, anything else is on
+/// @param state    0 is off, any other value is on
 /// @return a status; see mbm_master_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_writeSingleCoil(
@@ -104,7 +108,7 @@ pub unsafe extern "C" fn mbm_master_writeSingleCoil(
     }
 }
 
-/// Function 06: writes one register (V1.1b3, 6.6). Unit 0 broadcasts.
+/// Function 06: writes one register (V1.1b3, 6.6). With unit 0 it is a broadcast.
 ///
 /// @param master   the object
 /// @param address  the register, 0 to 65535; becomes the write address
@@ -124,12 +128,12 @@ pub unsafe extern "C" fn mbm_master_writeSingleRegister(
     }
 }
 
-/// Function 0F: writes coils from the transmit words, from word 0 on, lowest bit
-/// first (V1.1b3, 6.11). Unit 0 broadcasts.
+/// Function 0F: writes coils from the transmit words, starting at word 0. The first coil is
+/// the lowest bit (V1.1b3, 6.11). With unit 0 it is a broadcast.
 ///
 /// @param master    the object
-/// @param address   first coil, 0 to 65535; becomes the write address
-/// @param quantity  1 to 1968, and no more than the transmit words hold
+/// @param address   the first coil, 0 to 65535; becomes the write address
+/// @param quantity  the number of coils, 1 to 1968, and not more than the transmit words hold
 /// @return a status; see mbm_master_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_writeMultipleCoils(
@@ -141,8 +145,8 @@ pub unsafe extern "C" fn mbm_master_writeMultipleCoils(
     unsafe { call(master, address, quantity, bits::form::WRITE_MULTIPLE) }
 }
 
-/// Function 0F: writes the queued bits to the last write address
-/// (beginTransmission, sendBit, then this).
+/// Function 0F: writes the queued bits to coils, starting at the last write address. Call
+/// mbm_master_beginTransmission and mbm_master_sendBit before.
 ///
 /// @param master  the object
 /// @return a status; see mbm_master_readCoils
@@ -152,12 +156,12 @@ pub unsafe extern "C" fn mbm_master_writeQueuedCoils(master: *mut mbm_master) ->
     unsafe { request(master, |master| master.write_queued_coils()) }
 }
 
-/// Function 10: writes registers from the transmit words, from word 0 on
-/// (V1.1b3, 6.12). Unit 0 broadcasts.
+/// Function 10: writes registers from the transmit words, starting at word 0 (V1.1b3, 6.12).
+/// With unit 0 it is a broadcast.
 ///
 /// @param master    the object
-/// @param address   first register, 0 to 65535; becomes the write address
-/// @param quantity  1 to 123, and no more than the transmit words
+/// @param address   the first register, 0 to 65535; becomes the write address
+/// @param quantity  the number of registers, 1 to 123, and not more than the transmit words
 /// @return a status; see mbm_master_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_writeMultipleRegisters(
@@ -169,8 +173,8 @@ pub unsafe extern "C" fn mbm_master_writeMultipleRegisters(
     unsafe { call(master, address, quantity, registers::form::WRITE_MULTIPLE) }
 }
 
-/// Function 10: writes the queued complete words to the last write address
-/// (beginTransmission, send, then this).
+/// Function 10: writes the queued complete words to registers, starting at the last write
+/// address. Call mbm_master_beginTransmission and mbm_master_send before.
 ///
 /// @param master  the object
 /// @return a status; see mbm_master_readCoils
@@ -182,12 +186,12 @@ pub unsafe extern "C" fn mbm_master_writeQueuedRegisters(master: *mut mbm_master
 
 /// Function 16: the device sets a register to
 /// (register AND andMask) OR (orMask AND NOT andMask) (V1.1b3, 6.16).
-/// Unit 0 broadcasts.
+/// With unit 0 it is a broadcast.
 ///
 /// @param master   the object
 /// @param address  the register, 0 to 65535; becomes the write address
-/// @param andMask  keeps bits; also becomes transmit word 0
-/// @param orMask   sets bits where andMask is 0; also becomes transmit word 1
+/// @param andMask  1 for each bit of the register to keep; also becomes transmit word 0
+/// @param orMask   the new value of the bits that are not kept; also becomes transmit word 1
 /// @return a status; see mbm_master_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_maskWriteRegister(
@@ -204,15 +208,16 @@ pub unsafe extern "C" fn mbm_master_maskWriteRegister(
     }
 }
 
-/// Function 17: the device writes registers from the transmit words first, then
-/// reads others into the response words, in one request (V1.1b3, 6.17).
+/// Function 17: the device writes the transmit words to registers first. Then it reads
+/// registers, which arrive in the response words. Both in one request (V1.1b3, 6.17).
 ///
 /// @param master         the object
-/// @param readAddress    first register to read, 0 to 65535
-/// @param readQuantity   1 to 125
-/// @param writeAddress   first register to write, 0 to 65535; becomes the write
+/// @param readAddress    the first register to read, 0 to 65535
+/// @param readQuantity   the number of registers to read, 1 to 125
+/// @param writeAddress   the first register to write, 0 to 65535; becomes the write
 ///                       address
-/// @param writeQuantity  1 to 121, and no more than the transmit words
+/// @param writeQuantity  the number of registers to write, 1 to 121, and not more than the
+///                       transmit words
 /// @return a status; see mbm_master_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_readWriteMultipleRegisters(
@@ -235,12 +240,12 @@ pub unsafe extern "C" fn mbm_master_readWriteMultipleRegisters(
     }
 }
 
-/// Function 17: writes the queued complete words to the last write address, then
-/// reads.
+/// Function 17: as mbm_master_readWriteMultipleRegisters, but writes the queued complete
+/// words, starting at the last write address.
 ///
 /// @param master        the object
-/// @param readAddress   first register to read, 0 to 65535
-/// @param readQuantity  1 to 125
+/// @param readAddress   the first register to read, 0 to 65535
+/// @param readQuantity  the number of registers to read, 1 to 125
 /// @return a status; see mbm_master_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_readWriteQueuedRegisters(
@@ -256,14 +261,14 @@ pub unsafe extern "C" fn mbm_master_readWriteQueuedRegisters(
     }
 }
 
-/// Reads holding registers for mbm_master_receive to give, one after the other.
+/// Reads holding registers. mbm_master_receive then returns them one after the other.
 ///
 /// @param master    the object
-/// @param address   first register, 0 to 65535
-/// @param quantity  1 to 125
-/// @return how many words mbm_master_receive will give; 0 if the request failed
-///         (mbm_master_status says how), another one is under way or, in non-blocking
-///         mode, this one is
+/// @param address   the first register, 0 to 65535
+/// @param quantity  the number of registers, 1 to 125
+/// @return the number of words that mbm_master_receive will return; 0 if the request failed
+///         (mbm_master_status returns why), if another request is under way, and in
+///         non-blocking mode
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_requestFrom(
     master: *mut mbm_master,

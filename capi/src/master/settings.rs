@@ -1,16 +1,16 @@
-//! How a master behaves.
+//! The settings of a master.
 
-use super::calling;
+use super::with_hooks;
 use super::{mbm_master, Core};
-use crate::pointers::{ask, check, with};
+use crate::pointers::{check, read, with};
 use crate::storage::mbm_counters;
 use mbm::error::Status;
 use mbm::time::millis;
 
-/// Makes a change that an archive may lack the code for: then it is refused.
+/// Makes a change if the archive contains the code for it; otherwise refuses it.
 #[inline(always)]
-fn built_in(has: bool, change: impl FnOnce()) -> Status {
-    if has {
+fn if_built_in(built_in: bool, change: impl FnOnce()) -> Status {
+    if built_in {
         change();
         Status::OK
     } else {
@@ -18,10 +18,11 @@ fn built_in(has: bool, change: impl FnOnce()) -> Status {
     }
 }
 
-/// Sets the unit that later requests go to.
+/// Sets the unit to which the master sends later requests.
 ///
 /// @param master  the object
-/// @param slave   1 to 247; 248 to 255 are sent as they are, 0 is broadcast
+/// @param slave   the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248
+///                to 255, which the standard reserves
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setSlaveID(master: *mut mbm_master, slave: u8) -> u8 {
@@ -34,22 +35,21 @@ pub unsafe extern "C" fn mbm_master_setSlaveID(master: *mut mbm_master, slave: u
     }
 }
 
-/// The unit that requests go to.
+/// Returns the unit to which the master sends requests.
 ///
 /// @param master  the object
-/// @return the unit id, 1 until somebody says otherwise; 0 for an object that is
-///         not ready for settings
+/// @return the unit identifier, 1 by default; 0 for an object that was never begun
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_getSlaveID(master: *const mbm_master) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { ask(master, 0, |master| master.core.slave()) }
+    unsafe { read(master, 0, |master| master.core.slave()) }
 }
 
-/// Sets how long a reply may take, from the last bit of the request to the last
+/// Sets the response timeout: the maximum time from the last bit of the request to the last
 /// byte of the reply.
 ///
 /// @param master        the object
-/// @param timeoutMs     0 to 65535; 2000 at first
+/// @param timeoutMs     milliseconds, 0 to 65535; the default is 2000
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setResponseTimeout(
@@ -65,12 +65,12 @@ pub unsafe extern "C" fn mbm_master_setResponseTimeout(
     }
 }
 
-/// Tells the baud rate of the line, from which the gap before a request (t3.5,
-/// serial line guide V1.02, 2.5.1.1) and the length of a character follow. It
-/// sets nothing on the line. Untold, the gap is 4 ms, which is safe from 9600 up.
+/// Sets the baud rate from which the master computes the gap before a request (t3.5, serial
+/// line guide V1.02, 2.5.1.1) and the duration of a character. It does not configure the
+/// serial line. Without a baud rate the gap is 4 ms, which is enough from 9600 up.
 ///
 /// @param master  the object
-/// @param baud    bits per second; 0 goes back to untold
+/// @param baud    bits per second; 0 (the default): unknown
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setBaudRate(master: *mut mbm_master, baud: u32) -> u8 {
@@ -83,12 +83,12 @@ pub unsafe extern "C" fn mbm_master_setBaudRate(master: *mut mbm_master, baud: u
     }
 }
 
-/// Sets the silence before a request, in place of t3.5: 0 where nothing but the
-/// master's own traffic needs it, more for devices that are slow to listen again.
-/// A later mbm_master_setBaudRate sets it back to t3.5.
+/// Sets the silence before a request, instead of t3.5. Use 0 if no device on the line needs
+/// the gap, and more than t3.5 for devices that need longer before they can receive again.
+/// A later call of mbm_master_setBaudRate sets it back to t3.5.
 ///
 /// @param master        the object
-/// @param gapUs         counted from the last byte seen or sent; more than 2^31
+/// @param gapUs         microseconds from the last byte received or sent; a value above 2^31
 ///                      (36 minutes) means 2^31
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
@@ -102,11 +102,11 @@ pub unsafe extern "C" fn mbm_master_setGap(master: *mut mbm_master, gapUs: u32) 
     }
 }
 
-/// Sets how long a broadcast takes, since nobody answers it (serial line guide
-/// V1.02, 2.4.1).
+/// Sets the turnaround delay: how long the master waits after a broadcast, which no device
+/// answers (serial line guide V1.02, 2.4.1).
 ///
 /// @param master        the object
-/// @param delayMs       0 to 65535; 100 at first
+/// @param delayMs       milliseconds, 0 to 65535; the default is 100
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setTurnaroundDelay(
@@ -122,22 +122,22 @@ pub unsafe extern "C" fn mbm_master_setTurnaroundDelay(
     }
 }
 
-/// Sets the quiet time, which keeps a late reply from being taken for the answer
-/// to a later request. RTU itself cannot tell them apart if unit, function and
-/// length are the same, or if the late reply is an exception to the same function.
+/// Sets the quiet time. It prevents that the master accepts a late reply as the reply to a
+/// later request. In RTU the two cannot be distinguished if unit, function and length are the
+/// same, or if the late reply is an exception to the same function.
 ///
-/// After a request without a right reply, two things happen. The line is left alone
-/// for this time before the next request, and bytes that arrive are dropped. Then the
-/// next reply of that unit is held until nothing has arrived for this time. A second
-/// reply takes the place of the held one, for a device answers in order; if the
-/// second one is damaged, the request fails. So a request after a failure takes one
-/// quiet time longer, all others take no longer.
+/// After a request without a right reply, the master does two things. It waits for the quiet
+/// time before it sends the next request, and discards bytes that arrive meanwhile. Then it
+/// holds the next reply of that unit until no byte has arrived for the quiet time. A second
+/// reply replaces the held one, because a device answers in order. If the second reply is
+/// damaged, the request fails. So a request after a failure takes one quiet time longer; all
+/// others take no longer.
 ///
-/// The time must be longer than the device takes for an answer. If it is shorter, the
-/// second reply may come after the held one was taken for the answer.
+/// The quiet time must be longer than the device needs for a reply. If it is shorter, the
+/// master may accept the held reply before the second one arrives.
 ///
 /// @param master        the object
-/// @param quietMs       0 to 65535; 100 at first; 0 holds no reply
+/// @param quietMs       milliseconds, 0 to 65535; the default is 100; 0 holds no reply
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setQuietTime(master: *mut mbm_master, quietMs: u16) -> u8 {
@@ -150,36 +150,37 @@ pub unsafe extern "C" fn mbm_master_setQuietTime(master: *mut mbm_master, quietM
     }
 }
 
-/// Sets how often a request is repeated whose reply is missing, damaged or
-/// malformed. Exceptions are replies and are not repeated.
+/// Sets how often the master repeats a request whose reply is missing, damaged or malformed.
+/// It does not repeat a request that was answered with an exception.
 ///
 /// @param master   the object
-/// @param retries  0 to 255; 0 at first
+/// @param retries  0 to 255; the default is 0
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setRetries(master: *mut mbm_master, retries: u8) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            built_in(cfg!(feature = "retries") || retries == 0, || {
+            if_built_in(cfg!(feature = "retries") || retries == 0, || {
                 master.core.settings().retries = retries;
             })
         })
     }
 }
 
-/// Tells that the receiver hears what the driver sends, so each request comes back
-/// before its reply and is to be dropped.
+/// Switches echo discarding on or off. Switch it on if the receiver also receives what the
+/// driver sends: then the master discards the copy of each request that arrives before the
+/// reply.
 ///
 /// @param master  the object
-/// @param on      0 (at first) or 1
+/// @param on      0 (the default) or 1
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setEchoDiscard(master: *mut mbm_master, on: u8) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            built_in(cfg!(feature = "echo") || on == 0, || {
+            if_built_in(cfg!(feature = "echo") || on == 0, || {
                 master.core.settings().echo_discard = on != 0;
             })
         })
@@ -187,19 +188,19 @@ pub unsafe extern "C" fn mbm_master_setEchoDiscard(master: *mut mbm_master, on: 
 }
 
 /// Accepts replies of devices that deviate from the standard. It has these effects:
-/// - A reply with the right unit, function and CRC is accepted although it repeats another
-///   address, value or quantity, or carries more or fewer data than were requested. It
-///   is accepted at the end of the response timeout, if no right reply has come.
-///   mbm_master_available says how many words came.
+/// - The master accepts a reply with the right unit, function and CRC although it repeats
+///   another address, value or quantity, or carries more or fewer data than were requested.
+///   It accepts such a reply at the end of the response timeout, if no right reply has
+///   arrived. mbm_master_available returns the number of words that arrived.
 /// - A read of more words than the response words hold succeeds and fills all of them.
-///   (Such a reply that the frame buffer does not hold must not follow noise directly.)
-/// - Requests that read are sent to unit 0 too, and a reply from unit 0 is accepted.
+///   (A reply that is longer than the frame buffer must not follow noise directly.)
+/// - The master also sends requests that read to unit 0, and accepts a reply from unit 0.
 ///
 /// Set a short response timeout (mbm_master_setResponseTimeout) if the device deviates in
-/// each reply.
+/// every reply.
 ///
 /// @param master  the object
-/// @param on      0 (at first) or 1
+/// @param on      0 (the default) or 1
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED; MBM_BUSY while a request is
 ///         under way
 #[no_mangle]
@@ -216,12 +217,12 @@ pub unsafe extern "C" fn mbm_master_setLenient(master: *mut mbm_master, on: u8) 
     }
 }
 
-/// Holds the driver on after the port's flush, for platforms whose flush returns
-/// before the last bit has left.
+/// Sets how long the driver stays on after the port's flush, for platforms whose flush
+/// returns before the last bit was sent.
 ///
 /// @param master      the object
-/// @param characters  times one character of the told baud rate (9600 if untold);
-///                    0 at first
+/// @param characters  the time in characters at the baud rate of mbm_master_setBaudRate
+///                    (without one, at 9600); the default is 0
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setPostFlushHold(
@@ -231,18 +232,19 @@ pub unsafe extern "C" fn mbm_master_setPostFlushHold(
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            built_in(cfg!(feature = "hold") || characters == 0, || {
+            if_built_in(cfg!(feature = "hold") || characters == 0, || {
                 master.core.settings().post_flush_hold = characters;
             })
         })
     }
 }
 
-/// Chooses between functions that return when the request has ended (at first) and
-/// functions that return MBM_PENDING at once, for mbm_master_poll to end them.
+/// Switches between blocking and non-blocking mode. In blocking mode, the default, a function
+/// that makes a request returns when the request has ended. In non-blocking mode it returns
+/// MBM_PENDING at once, and you call mbm_master_poll until the request has ended.
 ///
 /// @param master  the object
-/// @param on      1 blocking, 0 non-blocking; holds from the next request on
+/// @param on      1 blocking, 0 non-blocking; it applies from the next request on
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setBlocking(master: *mut mbm_master, on: u8) -> u8 {
@@ -255,11 +257,11 @@ pub unsafe extern "C" fn mbm_master_setBlocking(master: *mut mbm_master, on: u8)
     }
 }
 
-/// Counts into storage of yours from now on. Read and zero it as you like, but not
-/// from an interrupt.
+/// Sets your storage for counters, in which the master counts from now on. You may read and
+/// zero the counters at any time, but not from an interrupt.
 ///
 /// @param master    the object
-/// @param counters  zeroed by you; NULL stops counting
+/// @param counters  your counters, zeroed; NULL stops counting
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setCounters(
@@ -269,19 +271,20 @@ pub unsafe extern "C" fn mbm_master_setCounters(
     // SAFETY: as the header demands.
     unsafe {
         with(master, |master| {
-            built_in(cfg!(feature = "counters") || counters.is_null(), || {
+            if_built_in(cfg!(feature = "counters") || counters.is_null(), || {
                 master.core.storage().counters = counters;
             })
         })
     }
 }
 
-/// Says when somebody else used the line, another object for example: the gap before
-/// the next request counts from then. A time before the last use that the object knows
-/// of changes nothing.
+/// Reports when another user of the line, for example another object, used the line last.
+/// The gap before the next request counts from that time. A time before the last use that
+/// the object knows changes nothing.
 ///
 /// @param master        the object
-/// @param timeUs        by the clock of its port, at most 2^31 ago
+/// @param timeUs        the time in microseconds on the clock of the object's port, at most
+///                      2^31 microseconds (36 minutes) ago
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_lineUsedAt(master: *mut mbm_master, timeUs: u32) -> u8 {
@@ -294,8 +297,8 @@ pub unsafe extern "C" fn mbm_master_lineUsedAt(master: *mut mbm_master, timeUs: 
     }
 }
 
-/// Says that somebody else has just used the line, as mbm_master_lineUsedAt with the
-/// time of now.
+/// Reports that another user of the line has just used it: as mbm_master_lineUsedAt with the
+/// present time.
 ///
 /// @param master  the object
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
@@ -305,7 +308,7 @@ pub unsafe extern "C" fn mbm_master_lineUsed(master: *mut mbm_master) -> u8 {
     unsafe {
         let status = check(master);
         if status == Status::OK {
-            calling(master, Core::line_used);
+            with_hooks(master, Core::line_used);
         }
         status.code()
     }

@@ -1,28 +1,28 @@
-//! Several masters that take turns.
+//! Several masters that use one line or one frame buffer in turn.
 
 use super::{mbm_master, Object};
 use crate::pointers::check;
 use core::ptr::null_mut;
 use mbm::error::Status;
 
-/// What masters know of each other that take turns on one line, or in one frame
-/// buffer. Storage is yours and must be zero before first use.
+/// Records which of several masters uses a shared line, or a shared frame buffer. You own the
+/// storage. It must be zero before first use.
 ///
-/// All objects of one turn are used from one thread. Before the storage of an object
-/// goes, call mbm_master_endTurn.
+/// Use all objects of one turn from one thread. Call mbm_master_endTurn before you release the
+/// storage of an object.
 #[repr(C)]
 pub struct mbm_turn {
-    /// The object that has the turn; NULL if none has.
+    /// The object that has the turn; NULL if none has it.
     pub master: *mut mbm_master,
-    /// When objects that had the turn before used the line last.
+    /// When an object that had the turn before used the line last, in microseconds.
     pub lastUse: u32,
 }
 
-/// Takes the turn, before a request. The gap before that request counts from the last
-/// use of the line by any object that had the turn before.
+/// Gives the turn to an object. Call it before a request. The gap before that request counts
+/// from the last use of the line by any object that had the turn before.
 ///
 /// @param master  the object, with buffers or begun
-/// @param turn    the turn of all objects that share a line or a frame buffer
+/// @param turn    the turn that all objects on the line, or with the frame buffer, share
 /// @return MBM_OK; MBM_BUSY, with nothing changed, while another object has the turn
 ///         and a request under way; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
@@ -39,7 +39,7 @@ pub unsafe extern "C" fn mbm_master_takeTurn(master: *mut mbm_master, turn: *mut
         let before = (*turn).master;
         if before != master {
             if !before.is_null() {
-                // Within a hook of that object, a reference to its core lives.
+                // If that object is calling a hook, a reference to its core lives.
                 if check(before) == Status::BUSY || (*Object::core_of(before)).is_pending() {
                     return Status::BUSY.code();
                 }
@@ -52,9 +52,9 @@ pub unsafe extern "C" fn mbm_master_takeTurn(master: *mut mbm_master, turn: *mut
     Status::OK.code()
 }
 
-/// Gives the turn back, before the storage of the object goes; does nothing if the object
-/// has not got the turn. A request under way is forgotten: cancel it before, so that the
-/// driver is off.
+/// Ends the turn of an object, before you release its storage. It does nothing if the object
+/// does not have the turn. It does not end a request under way: call mbm_master_cancel
+/// before, so that the driver is switched off.
 ///
 /// @param master  the object
 /// @param turn    as for mbm_master_takeTurn

@@ -1,20 +1,19 @@
-//! The master's words as values: see `mbm_registers`.
+//! Views of the master's words as registers, to get and set values: see `mbm_registers`.
 
 use super::mbm_master;
 use super::Object;
-use crate::pointers::{put_found, with};
+use crate::pointers::{put_result, with};
 use crate::registers::{self, mbm_registers, MBM_REGISTERS_INTO_WORDS, MBM_REGISTERS_OF_WORDS};
 use crate::storage::MasterBuffers;
 use mbm::data::order::Order;
 use mbm::error::Status;
 
-/// Sets the order of values in the views that mbm_master_getResponseRegisters
-/// and mbm_master_getTransmitRegisters give from now on.
+/// Sets the byte and word order of values in the views that mbm_master_getResponseRegisters
+/// and mbm_master_getTransmitRegisters fill in from now on.
 ///
 /// @param master  the object
-/// @param order   one of MBM_ORDER_...; MBM_ORDER_ABCD at first
-/// @return MBM_OK, MBM_INVALID_ARGUMENT, also for another order, or
-///         MBM_NOT_INITIALISED
+/// @param order   one of MBM_ORDER_...; the default is MBM_ORDER_ABCD
+/// @return MBM_OK; MBM_INVALID_ARGUMENT, also for an unknown order; MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setWordOrder(master: *mut mbm_master, order: u8) -> u8 {
     // SAFETY: as the header demands.
@@ -31,7 +30,8 @@ pub unsafe extern "C" fn mbm_master_setWordOrder(master: *mut mbm_master, order:
     }
 }
 
-/// Words as registers from `first` on, as many as there are addresses for.
+/// The view of words as registers with addresses from `first` on. It has at most as many words
+/// as there are addresses up to 65535.
 fn view(
     master: &mut Object,
     first: u16,
@@ -39,7 +39,7 @@ fn view(
     words: fn(&MasterBuffers) -> (*mut u16, u8),
 ) -> mbm_registers {
     let (words, count) = words(master.core.storage());
-    // Less than all addresses, which are one more than this.
+    // With `first` 0, 65536 would not fit into 16 bits; the words are fewer in any case.
     let count = u16::from(count).min((u16::MAX - first).saturating_add(1));
     let order = master.order;
     let data = words.cast_const().cast();
@@ -52,15 +52,15 @@ fn view(
     }
 }
 
-/// Sees the response words as registers to get values from. Copies nothing: it
-/// sees what a later read puts there.
+/// Fills in a view of the response words as registers, from which you can get values. The
+/// view copies no words: it also shows those that a later read receives.
 ///
-/// All words of the buffer are there, those too that the last read did not
-/// reach; look at values only once it has succeeded.
+/// The view includes all words of the buffer, also words that the last read did not
+/// change. Get values only after the read has succeeded.
 ///
-/// @param master     the object; its buffers stay as they are while the view is used
-/// @param first      the device's address of word 0: that of the read, or 0 to
-///                   count from word 0
+/// @param master     the object; do not change its buffers while you use the view
+/// @param first      the address in the device of word 0: the address of the read, or 0 if
+///                   you want to count from word 0
 /// @param registers  the view to fill in; unchanged if the status is not MBM_OK
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
@@ -72,7 +72,7 @@ pub unsafe extern "C" fn mbm_master_getResponseRegisters(
     // SAFETY: as the header demands; every object is writable storage.
     unsafe {
         with(master.cast_mut(), |master| {
-            put_found(registers, || {
+            put_result(registers, || {
                 Ok(view(master, first, MBM_REGISTERS_OF_WORDS, |storage| {
                     (storage.response, storage.response_words)
                 }))
@@ -83,12 +83,12 @@ pub unsafe extern "C" fn mbm_master_getResponseRegisters(
     }
 }
 
-/// Sees the transmit words as registers to set values in, for the functions
-/// that write. The queue of send does not move.
+/// Fills in a view of the transmit words as registers, in which you can set values for the
+/// functions that write. The queue of mbm_master_send does not change.
 ///
-/// @param master     the object; its buffers stay as they are while the view is used
-/// @param first      the device's address of word 0: that of the write, or 0 to
-///                   count from word 0
+/// @param master     the object; do not change its buffers while you use the view
+/// @param first      the address in the device of word 0: the address of the write, or 0 if
+///                   you want to count from word 0
 /// @param registers  the view to fill in; unchanged if the status is not MBM_OK
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
@@ -100,7 +100,7 @@ pub unsafe extern "C" fn mbm_master_getTransmitRegisters(
     // SAFETY: as the header demands; every object is writable storage.
     unsafe {
         with(master.cast_mut(), |master| {
-            put_found(registers, || {
+            put_result(registers, || {
                 Ok(view(master, first, MBM_REGISTERS_INTO_WORDS, |storage| {
                     (storage.transmit, storage.transmit_words)
                 }))

@@ -1,26 +1,26 @@
-//! Words to send and words received.
+//! The words to send and the received words.
 
 use super::mbm_master;
-use crate::pointers::{ask, with};
+use crate::pointers::{read, with};
 use mbm::error::Status;
 use mbm::master::NO_WORD;
 
-/// A word of the last successful read.
+/// Returns a word of the last successful read.
 ///
 /// @param master  the object
 /// @param index   0 to 255
-/// @return the word; 0xFFFF past the end of the response buffer
+/// @return the word; 0xFFFF if `index` is past the end of the response buffer
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_getResponseBuffer(master: *const mbm_master, index: u8) -> u16 {
     // SAFETY: as the header demands.
     unsafe {
-        ask(master, NO_WORD, |master| {
+        read(master, NO_WORD, |master| {
             master.core.response_word(usize::from(index))
         })
     }
 }
 
-/// Zeroes the response words; receive goes on where it was.
+/// Zeroes the response words. The position of mbm_master_receive does not change.
 ///
 /// @param master  the object
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
@@ -35,12 +35,13 @@ pub unsafe extern "C" fn mbm_master_clearResponseBuffer(master: *mut mbm_master)
     }
 }
 
-/// Sets a word for the functions that write. Does not move the queue of send.
+/// Sets a transmit word for the functions that write. The queue of mbm_master_send does not
+/// change.
 ///
 /// @param master  the object
-/// @param index   0 to the transmit buffer's words - 1
+/// @param index   0 to the number of transmit words - 1
 /// @param value   the word
-/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS past the end of the buffer,
+/// @return MBM_OK; MBM_ILLEGAL_DATA_ADDRESS if `index` is past the end of the buffer;
 ///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_setTransmitBuffer(
@@ -60,7 +61,7 @@ pub unsafe extern "C" fn mbm_master_setTransmitBuffer(
     }
 }
 
-/// Zeroes the transmit words; the queue of send stays.
+/// Zeroes the transmit words. The queue of mbm_master_send does not change its length.
 ///
 /// @param master  the object
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
@@ -75,10 +76,12 @@ pub unsafe extern "C" fn mbm_master_clearTransmitBuffer(master: *mut mbm_master)
     }
 }
 
-/// Sets the write address and empties the queue of send; the words stay.
+/// Sets the write address and empties the queue of mbm_master_send. The transmit words do not
+/// change.
 ///
 /// @param master   the object
-/// @param address  0 to 65535, for the functions ending in Queued
+/// @param address  the address to which the functions with Queued in their name write, 0 to
+///                 65535
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_beginTransmission(master: *mut mbm_master, address: u16) -> u8 {
@@ -91,6 +94,7 @@ pub unsafe extern "C" fn mbm_master_beginTransmission(master: *mut mbm_master, a
     }
 }
 
+/// The status of a word or bit that was queued if it `fits`.
 fn queued(fits: bool) -> Status {
     if fits {
         Status::OK
@@ -99,23 +103,24 @@ fn queued(fits: bool) -> Status {
     }
 }
 
-/// Queues a word behind those queued. Bits queued before keep their word.
+/// Queues a word after the words queued before. If the last word holds queued bits, the new
+/// word goes into the next one.
 ///
 /// @param master  the object
 /// @param word    the word
-/// @return MBM_OK, MBM_BUFFER_TOO_SMALL with nothing queued past the end of the
-///         transmit buffer, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return MBM_OK; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full;
+///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_send(master: *mut mbm_master, word: u16) -> u8 {
     // SAFETY: as the header demands.
     unsafe { with(master, |master| queued(master.core.send(word))) }
 }
 
-/// Queues two words, the low one first; the low one alone if only that fits.
+/// Queues two words, the low one first. If only one word fits, it queues the low one alone.
 ///
 /// @param master  the object
 /// @param value   both words
-/// @return MBM_OK, MBM_BUFFER_TOO_SMALL if a word did not fit,
+/// @return MBM_OK; MBM_BUFFER_TOO_SMALL if a word did not fit;
 ///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_send32(master: *mut mbm_master, value: u32) -> u8 {
@@ -127,34 +132,34 @@ pub unsafe extern "C" fn mbm_master_send32(master: *mut mbm_master, value: u32) 
     }
 }
 
-/// Queues a bit behind those queued, lowest bit of a word first.
+/// Queues a bit after the bits queued before, starting at the lowest bit of a word.
 ///
 /// @param master  the object
-/// @param on      0 is off, anything else is on
-/// @return MBM_OK, MBM_BUFFER_TOO_SMALL with nothing queued past the end of the
-///         transmit buffer, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @param on      0 is off, any other value is on
+/// @return MBM_OK; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full;
+///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_sendBit(master: *mut mbm_master, on: u8) -> u8 {
     // SAFETY: as the header demands.
     unsafe { with(master, |master| queued(master.core.send_bit(on != 0))) }
 }
 
-/// How many words of the last successful read mbm_master_receive has yet to give.
+/// Returns how many words of the last successful read mbm_master_receive has not returned yet.
 ///
 /// @param master  the object
 /// @return 0 to 125
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_available(master: *const mbm_master) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { ask(master, 0, |master| master.core.available()) }
+    unsafe { read(master, 0, |master| master.core.available()) }
 }
 
-/// The next word of the last successful read.
+/// Returns the next word of the last successful read.
 ///
 /// @param master  the object
-/// @return the word; 0xFFFF when none is left
+/// @return the word; 0xFFFF if no word is left
 #[no_mangle]
 pub unsafe extern "C" fn mbm_master_receive(master: *mut mbm_master) -> u16 {
     // SAFETY: as the header demands.
-    unsafe { ask(master, NO_WORD, |master| master.core.receive()) }
+    unsafe { read(master, NO_WORD, |master| master.core.receive()) }
 }

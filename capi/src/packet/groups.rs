@@ -4,7 +4,7 @@ use super::{mbm_packet, side, MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
 use crate::functions::{
     MBM_FC_ENCAPSULATED_INTERFACE, MBM_FC_READ_FILE_RECORD, MBM_MEI_READ_DEVICE_IDENTIFICATION,
 };
-use crate::pointers::{buffer, get, lent_or_none, overlap, put};
+use crate::pointers::{array_or_empty, buffer, get, overlap, put};
 use mbm::error::Status;
 use mbm::packet::groups;
 use mbm::pdu::files::Record;
@@ -154,7 +154,7 @@ unsafe fn add(
         if !behind_others || (length > 0 && overlap(data, length, storage, capacity)) {
             return Err(refused);
         }
-        let data = lent_or_none(data, length.into()).ok_or(refused)?;
+        let data = array_or_empty(data, length.into()).ok_or(refused)?;
         let place = buffer(storage, capacity).ok_or(refused)?;
         let used = grown.dataLength;
         let space = place.get_mut(used.into()..).ok_or(refused)?;

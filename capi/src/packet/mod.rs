@@ -6,7 +6,7 @@ mod groups;
 pub use groups::*;
 
 use super::functions::{declared, mbm_function};
-use super::pointers::{lent_or_none, overlap, put};
+use super::pointers::{array_or_empty, overlap, put};
 use mbm::error::Status;
 use mbm::packet::{self, PduKind};
 use mbm::pdu::custom::Function;
@@ -166,7 +166,7 @@ impl mbm_packet {
     /// `data` is NULL or points to `dataLength` bytes.
     pub(super) unsafe fn data<'a>(&self) -> Result<&'a [u8], Status> {
         // SAFETY: as the caller promises.
-        let data = unsafe { lent_or_none(self.data, self.dataLength.into()) };
+        let data = unsafe { array_or_empty(self.data, self.dataLength.into()) };
         data.ok_or(Status::INVALID_ARGUMENT)
     }
 
@@ -213,7 +213,7 @@ pub(super) unsafe fn own(
     code: Option<u8>,
 ) -> Result<Option<Function>, Status> {
     // SAFETY: as the caller promises.
-    let functions = unsafe { lent_or_none(functions, count.into()) };
+    let functions = unsafe { array_or_empty(functions, count.into()) };
     declared(functions.ok_or(Status::INVALID_ARGUMENT)?, code)
 }
 

@@ -20,7 +20,7 @@ unsafe fn ask<T>(
     // SAFETY: as the caller promises.
     code(unsafe {
         lent(registers, MBM_ORDER_DEFAULT, false)
-            .and_then(|registers| pointers::put_found(answer, || question(&registers)))
+            .and_then(|registers| pointers::put_result(answer, || question(&registers)))
     })
 }
 
@@ -206,7 +206,7 @@ pub unsafe extern "C" fn mbm_registers_getDouble(
         }
         bytes.reverse();
         let double = ShortDouble::from_bytes(bytes);
-        code(pointers::put_found(value.cast(), || Ok(double)))
+        code(pointers::put_result(value.cast(), || Ok(double)))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{mbm_server, mbm_unit, Core};
 use crate::framing::MBM_MAX_TCP_FRAME;
-use crate::pointers::{calling, check, object, CObject, CALLING};
+use crate::pointers::{check, object, with_hooks, CObject, IN_HOOK};
 use crate::port::{countable, mbm_port};
 use mbm::error::Status;
 use mbm::time;
@@ -34,11 +34,11 @@ unsafe fn begin(
         if !(*port).is_complete() {
             return Status::INVALID_ARGUMENT;
         }
-        if mbm_server::mark(server).read() == CALLING {
+        if mbm_server::mark(server).read() == IN_HOOK {
             return Status::BUSY;
         }
         let core = object(server);
-        calling(server, || {
+        with_hooks(server, || {
             // The driver of the port that the object had is not left on.
             if (*core).is_sending() {
                 if let Some(post) = (*core).port.postTransmission {

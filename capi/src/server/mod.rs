@@ -23,7 +23,7 @@ pub use respond::*;
 pub use tables::*;
 pub use units::*;
 
-use super::pointers::{calling, check, check_once, object, CObject, BEGUN, CALLING};
+use super::pointers::{check, check_once, object, with_hooks, CObject, BEGUN, IN_HOOK};
 use super::port::{self, mbm_port};
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
@@ -165,7 +165,7 @@ pub unsafe extern "C" fn mbm_server_poll(server: *mut mbm_server) -> u8 {
             return status.code();
         }
         let mark = mbm_server::mark(server);
-        mark.write(CALLING);
+        mark.write(IN_HOOK);
         let status = serve(object(server), mark);
         // An object that a hook zeroed stays zero.
         mark.write(mark.read() & BEGUN);
@@ -193,8 +193,8 @@ unsafe fn serve(core: *mut Core, mark: *const u8) -> Status {
                 let storage = &raw const (*core).storage;
                 let pdu = (*storage).frame.add((*info).head.into());
                 let reply = units::serve((*storage).units, (*storage).count, info, pdu);
-                core::hint::assert_unchecked(mark.read() != CALLING || (*core).has_framing());
-                if mark.read() != CALLING || !(*core).answer_served(Reply::from_number(reply)) {
+                core::hint::assert_unchecked(mark.read() != IN_HOOK || (*core).has_framing());
+                if mark.read() != IN_HOOK || !(*core).answer_served(Reply::from_number(reply)) {
                     return Status::OK;
                 }
             } else if status != Status::OK {
@@ -220,7 +220,7 @@ unsafe fn serve(core: *mut Core, mark: *const u8) -> Status {
             let storage = &raw const (*core).storage;
             let pdu = (*storage).frame.add((*info).head.into());
             let reply = units::serve((*storage).units, (*storage).count, info, pdu);
-            if mark.read() != CALLING {
+            if mark.read() != IN_HOOK {
                 return Status::OK;
             }
             if let Some(status) = (*core).finish(Reply::from_number(reply)) {
@@ -247,7 +247,7 @@ pub unsafe extern "C" fn mbm_server_pollDelay(server: *const mbm_server) -> u32 
         match check(server) {
             Status::OK => {
                 let core = object(server);
-                let now = calling(server, || port::now(&raw const (*core).port));
+                let now = with_hooks(server, || port::now(&raw const (*core).port));
                 (*core).poll_delay(now)
             }
             Status::BUSY => 0,

@@ -1,7 +1,7 @@
 //! What a sniffer reports: events, and events in words.
 
 use crate::packet::{mbm_packet, MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
-use crate::pointers::{get, lent_or_none};
+use crate::pointers::{array_or_empty, get};
 use crate::text::{line, outcome};
 use core::ffi::c_char;
 use mbm::error::Status;
@@ -145,8 +145,8 @@ impl mbm_event {
         // SAFETY: as the caller promises.
         let (frame, pdu) = unsafe {
             (
-                lent_or_none(self.frame, self.frameLength.into()),
-                lent_or_none(self.pdu, self.pduLength.into()),
+                array_or_empty(self.frame, self.frameLength.into()),
+                array_or_empty(self.pdu, self.pduLength.into()),
             )
         };
         let head = self.requestHead.get(..self.requestHeadLength.into());

@@ -6,7 +6,7 @@ pub use event::*;
 
 use crate::framing::is_delimiter;
 use crate::functions::{declared, mbm_function};
-use crate::pointers::{self, ask, buffer, lent_or_none, put, CObject, BEGUN};
+use crate::pointers::{self, array_or_empty, buffer, put, read, CObject, BEGUN};
 use core::ffi::c_void;
 use mbm::error::Status;
 use mbm::frame::Framing;
@@ -223,7 +223,7 @@ pub unsafe extern "C" fn mbm_sniffer_setFunctions(
     // SAFETY: as the header demands.
     unsafe {
         pointers::with(sniffer, |object| {
-            match lent_or_none(functions, count.into()).map(all) {
+            match array_or_empty(functions, count.into()).map(all) {
                 Some(Ok(functions)) => {
                     object.functions = functions;
                     object.count = count;
@@ -330,9 +330,9 @@ pub unsafe extern "C" fn mbm_sniffer_feed(
     };
     // SAFETY: as the header demands; begin demands that the buffer is valid.
     unsafe {
-        let bytes = lent_or_none(bytes, length.into());
+        let bytes = array_or_empty(bytes, length.into());
         let Some(bytes) = bytes else { return 0 };
-        ask(sniffer, 0, |object| {
+        read(sniffer, 0, |object| {
             match buffer(object.buffer, object.size) {
                 Some(buffer) => object.core.feed(buffer, direction, bytes, nowUs) as u16,
                 None => 0,
@@ -362,7 +362,7 @@ pub unsafe extern "C" fn mbm_sniffer_next(
     }
     // SAFETY: as the header demands; begin demands that the buffer is valid.
     unsafe {
-        ask(sniffer, 0, |object| {
+        read(sniffer, 0, |object| {
             if object.core.is_idle(nowUs) || only_waits(object, nowUs) {
                 return 0;
             }

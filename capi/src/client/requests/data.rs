@@ -1,31 +1,31 @@
 //! Requests for coils, discrete inputs and registers.
 
-use super::{plain, special};
+use super::{two_words, with_more};
 use crate::client::{mbm_client, mbm_clientRequest};
 use mbm::error::Status;
 use mbm::pdu::header::FunctionSpec;
 
-/// Function 01: reads coils into `reply`, eight to a byte, the lowest bit first, the
-/// last byte padded with zeros (V1.1b3, 6.1).
+/// Function 01: reads coils into the bytes of `reply`, eight in each byte. The first coil is
+/// the lowest bit; the last byte is padded with zeros (V1.1b3, 6.1).
 ///
-/// This and the other functions behave alike: they queue a request and return. The
-/// request has ended when its `status` is no longer MBM_PENDING: MBM_OK, an exception
-/// of the device (0x01 to 0x7F), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
+/// This and the other functions that make a request queue the request and return. The
+/// request has ended when its `status` is no longer MBM_PENDING. Then `status` is MBM_OK, an
+/// exception of the device (0x01 to 0x7F), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
 /// MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION, MBM_LINK_LOST,
-/// MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes on MBM_OK only.
+/// MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes only if it is MBM_OK.
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param address  first coil, 0 to 65535, as on the wire
-/// @param quantity  1 to 2000
-/// @return MBM_PENDING: the request is queued; or, with nothing queued,
-///         MBM_ILLEGAL_DATA_VALUE or MBM_ILLEGAL_DATA_ADDRESS for what no device
-///         could accept, MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL,
-///         MBM_DUPLICATE_TRANSACTION, MBM_BUFFER_TOO_SMALL if `reply` has no room
-///         for the data, MBM_INVALID_ARGUMENT for `data` that are NULL,
-///         MBM_NOT_INITIALISED; MBM_BUSY, with the request unchanged, if it is
-///         pending already, and from within a hook of the port. A request that
-///         is refused with another of these has it in `status`
+/// @param address  the first coil, 0 to 65535, as on the wire
+/// @param quantity  the number of coils, 1 to 2000
+/// @return MBM_PENDING if the request is queued. Otherwise nothing was queued, and the
+///         request's `status` is the same: MBM_ILLEGAL_DATA_VALUE or
+///         MBM_ILLEGAL_DATA_ADDRESS for a request that no device could accept,
+///         MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL, MBM_DUPLICATE_TRANSACTION,
+///         MBM_BUFFER_TOO_SMALL if `reply` cannot hold the data, MBM_INVALID_ARGUMENT if
+///         `data` is NULL. With the request unchanged: MBM_BUSY if the request is pending
+///         already, or from within a hook of the port; MBM_INVALID_ARGUMENT if a pointer is
+///         NULL; MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readCoils(
     client: *mut mbm_client,
@@ -34,15 +34,16 @@ pub unsafe extern "C" fn mbm_client_readCoils(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { plain(client, request, address, quantity, FunctionSpec::READ_COILS) }
+    unsafe { two_words(client, request, address, quantity, FunctionSpec::READ_COILS) }
 }
 
-/// Function 02: reads discrete inputs, as mbm_client_readCoils (V1.1b3, 6.2).
+/// Function 02: reads discrete inputs into the bytes of `reply`, as mbm_client_readCoils
+/// does (V1.1b3, 6.2).
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param address  first input, 0 to 65535, as on the wire
-/// @param quantity  1 to 2000
+/// @param address  the first input, 0 to 65535, as on the wire
+/// @param quantity  the number of inputs, 1 to 2000
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readDiscreteInputs(
@@ -53,7 +54,7 @@ pub unsafe extern "C" fn mbm_client_readDiscreteInputs(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        plain(
+        two_words(
             client,
             request,
             address,
@@ -67,8 +68,8 @@ pub unsafe extern "C" fn mbm_client_readDiscreteInputs(
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param address  first register, 0 to 65535, as on the wire
-/// @param quantity  1 to 125
+/// @param address  the first register, 0 to 65535, as on the wire
+/// @param quantity  the number of registers, 1 to 125
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readHoldingRegisters(
@@ -79,7 +80,7 @@ pub unsafe extern "C" fn mbm_client_readHoldingRegisters(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        plain(
+        two_words(
             client,
             request,
             address,
@@ -93,8 +94,8 @@ pub unsafe extern "C" fn mbm_client_readHoldingRegisters(
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param address  first register, 0 to 65535, as on the wire
-/// @param quantity  1 to 125
+/// @param address  the first register, 0 to 65535, as on the wire
+/// @param quantity  the number of registers, 1 to 125
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readInputRegisters(
@@ -105,7 +106,7 @@ pub unsafe extern "C" fn mbm_client_readInputRegisters(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        plain(
+        two_words(
             client,
             request,
             address,
@@ -115,12 +116,12 @@ pub unsafe extern "C" fn mbm_client_readInputRegisters(
     }
 }
 
-/// Function 05: switches a coil (V1.1b3, 6.5).
+/// Function 05: switches one coil on or off (V1.1b3, 6.5).
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param address  0 to 65535, as on the wire
-/// @param on  0 is off, anything else is on
+/// @param address  the coil, 0 to 65535, as on the wire
+/// @param on  0 is off, any other value is on
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_writeSingleCoil(
@@ -131,7 +132,7 @@ pub unsafe extern "C" fn mbm_client_writeSingleCoil(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        plain(
+        two_words(
             client,
             request,
             address,
@@ -141,12 +142,12 @@ pub unsafe extern "C" fn mbm_client_writeSingleCoil(
     }
 }
 
-/// Function 06: writes a holding register (V1.1b3, 6.6).
+/// Function 06: writes one holding register (V1.1b3, 6.6).
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param address  0 to 65535, as on the wire
-/// @param value  the value
+/// @param address  the register, 0 to 65535, as on the wire
+/// @param value  its new value
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_writeSingleRegister(
@@ -157,7 +158,7 @@ pub unsafe extern "C" fn mbm_client_writeSingleRegister(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        plain(
+        two_words(
             client,
             request,
             address,
@@ -167,13 +168,13 @@ pub unsafe extern "C" fn mbm_client_writeSingleRegister(
     }
 }
 
-/// Function 0F: writes the coils of `data`, eight to a byte, the lowest bit first
-/// (V1.1b3, 6.11).
+/// Function 0F: writes coils from the bytes of `data`, eight in each byte. The first coil is
+/// the lowest bit (V1.1b3, 6.11).
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param address  first coil, 0 to 65535, as on the wire
-/// @param quantity  1 to 1968
+/// @param address  the first coil, 0 to 65535, as on the wire
+/// @param quantity  the number of coils, 1 to 1968
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_writeMultipleCoils(
@@ -184,7 +185,7 @@ pub unsafe extern "C" fn mbm_client_writeMultipleCoils(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        plain(
+        two_words(
             client,
             request,
             address,
@@ -194,12 +195,12 @@ pub unsafe extern "C" fn mbm_client_writeMultipleCoils(
     }
 }
 
-/// Function 10: writes the words of `data` (V1.1b3, 6.12).
+/// Function 10: writes the words of `data` to holding registers (V1.1b3, 6.12).
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param address  first register, 0 to 65535, as on the wire
-/// @param quantity  1 to 123
+/// @param address  the first register, 0 to 65535, as on the wire
+/// @param quantity  the number of registers, 1 to 123
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_writeMultipleRegisters(
@@ -210,7 +211,7 @@ pub unsafe extern "C" fn mbm_client_writeMultipleRegisters(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        plain(
+        two_words(
             client,
             request,
             address,
@@ -225,9 +226,9 @@ pub unsafe extern "C" fn mbm_client_writeMultipleRegisters(
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param address  0 to 65535, as on the wire
-/// @param andMask  bits to keep
-/// @param orMask  bits to set where none are kept
+/// @param address  the register, 0 to 65535, as on the wire
+/// @param andMask  1 for each bit of the register to keep
+/// @param orMask  the new value of the bits that are not kept
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_maskWriteRegister(
@@ -239,7 +240,7 @@ pub unsafe extern "C" fn mbm_client_maskWriteRegister(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        special(
+        with_more(
             client,
             request,
             FunctionSpec::MASK_WRITE_REGISTER,
@@ -249,15 +250,15 @@ pub unsafe extern "C" fn mbm_client_maskWriteRegister(
     }
 }
 
-/// Function 17: writes the words of `data`, then reads into the words of `reply`
-/// (V1.1b3, 6.17).
+/// Function 17: the device writes the words of `data` to holding registers first. Then it
+/// reads holding registers, which arrive in the words of `reply` (V1.1b3, 6.17).
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param readAddress  first register to read
-/// @param readQuantity  1 to 125
-/// @param writeAddress  first register to write
-/// @param writeQuantity  1 to 121
+/// @param readAddress  the first register to read, 0 to 65535
+/// @param readQuantity  the number of registers to read, 1 to 125
+/// @param writeAddress  the first register to write, 0 to 65535
+/// @param writeQuantity  the number of registers to write, 1 to 121
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readWriteMultipleRegisters(
@@ -270,7 +271,7 @@ pub unsafe extern "C" fn mbm_client_readWriteMultipleRegisters(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        special(
+        with_more(
             client,
             request,
             FunctionSpec::READ_WRITE_REGISTERS,
@@ -280,8 +281,8 @@ pub unsafe extern "C" fn mbm_client_readWriteMultipleRegisters(
                 writeAddress.into(),
                 writeQuantity.into(),
             ],
-            Some(|inside, words, readable| {
-                let header = &mut inside.state.header;
+            Some(|fields, words, readable| {
+                let header = &mut fields.state.header;
                 match header.add_write(words[2] as u16, words[3] as u16) {
                     Status::OK => readable,
                     refused => refused,

@@ -1,16 +1,16 @@
-//! Requests for what a device tells of itself, its files, and functions of the
-//! user's.
+//! Requests for device information, for file records, and with functions of the user.
 
-use super::{bare, plain, special};
+use super::{code_only, two_words, with_more};
 use crate::client::request::RequestFields;
 use crate::client::{mbm_client, mbm_clientRequest};
 use crate::functions::{mbm_rule, MBM_RULE_COUNTED, MBM_RULE_FIXED, MBM_RULE_SILENCE};
-use crate::pointers::lent_or_none;
+use crate::pointers::array_or_empty;
 use mbm::error::Status;
 use mbm::pdu::header::{FunctionSpec, RequestHeader, COUNTS, FIXED, GROUP, OWN};
 use mbm::pdu::limits::MAX_PDU;
 
-/// Function 07: reads eight outputs into a byte (V1.1b3, 6.7).
+/// Function 07: reads the eight exception status outputs into one byte of `reply` (V1.1b3,
+/// 6.7).
 ///
 /// @param client   the object
 /// @param request  the request
@@ -21,18 +21,18 @@ pub unsafe extern "C" fn mbm_client_readExceptionStatus(
     request: *mut mbm_clientRequest,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { bare(client, request, FunctionSpec::READ_EXCEPTION_STATUS) }
+    unsafe { code_only(client, request, FunctionSpec::READ_EXCEPTION_STATUS) }
 }
 
-/// Function 08: sends the words of `data`, and reads as many into `reply` (V1.1b3,
-/// 6.8). No device responds to sub-function 04, Force Listen Only Mode.
+/// Function 08: sends the words of `data`, and reads the same number of words into `reply`
+/// (V1.1b3, 6.8). No device responds to sub-function 04, Force Listen Only Mode.
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param subFunction  0 (Return Query Data) to 0x14. Others, which the standard
-///                     reserves, are sent as they are, and a response of one word is
-///                     expected; for one of another length see mbm_client_custom
-/// @param words  1; 1 to 125 for sub-function 0
+/// @param subFunction  0 (Return Query Data) to 0x14. The client also sends the others,
+///                     which the standard reserves, and expects a response of one word; for
+///                     a response of another length use mbm_client_custom
+/// @param words  the number of words of `data`: 1; for sub-function 0, 1 to 125
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_diagnostics(
@@ -43,20 +43,20 @@ pub unsafe extern "C" fn mbm_client_diagnostics(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        special(
+        with_more(
             client,
             request,
             FunctionSpec::DIAGNOSTICS,
             [subFunction.into(), words.into(), 0, 0],
-            Some(|inside, words, _| {
-                let header = &mut inside.state.header;
+            Some(|fields, words, _| {
+                let header = &mut fields.state.header;
                 header.add_words(words[0] as u16, words[1] as u16)
             }),
         )
     }
 }
 
-/// Function 0B: reads the status word and the event count into two words (V1.1b3,
+/// Function 0B: reads the status word and the event count into two words of `reply` (V1.1b3,
 /// 6.9).
 ///
 /// @param client   the object
@@ -68,11 +68,12 @@ pub unsafe extern "C" fn mbm_client_getCommEventCounter(
     request: *mut mbm_clientRequest,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { bare(client, request, FunctionSpec::GET_COMM_EVENT_COUNTER) }
+    unsafe { code_only(client, request, FunctionSpec::GET_COMM_EVENT_COUNTER) }
 }
 
-/// Function 0C: reads status, event count and message count, two bytes each with the
-/// high byte first, and up to 64 events, the latest first (V1.1b3, 6.10).
+/// Function 0C: reads status, event count and message count, and then up to 64 events, into
+/// the bytes of `reply`. The first three have two bytes each, the high byte first. An event
+/// is one byte; the latest event is first (V1.1b3, 6.10).
 ///
 /// @param client   the object
 /// @param request  the request
@@ -83,13 +84,13 @@ pub unsafe extern "C" fn mbm_client_getCommEventLog(
     request: *mut mbm_clientRequest,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { bare(client, request, FunctionSpec::GET_COMM_EVENT_LOG) }
+    unsafe { code_only(client, request, FunctionSpec::GET_COMM_EVENT_LOG) }
 }
 
-/// Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13). `reply`
-/// gets all that follows the byte count, also from a device that counts its id alone
-/// and sends more. In RTU frames the silence after it ends such a reply; one that
-/// counts right is not waited for.
+/// Function 11: reads the server id, whose format is specific to the device (V1.1b3, 6.13).
+/// `reply` receives all bytes after the byte count. Some devices count only the id and send
+/// more bytes: `reply` receives those too. In RTU frames silence ends such a reply. The
+/// client does not wait for silence if the byte count is right.
 ///
 /// @param client   the object
 /// @param request  the request
@@ -100,16 +101,17 @@ pub unsafe extern "C" fn mbm_client_reportServerId(
     request: *mut mbm_clientRequest,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { bare(client, request, FunctionSpec::REPORT_SERVER_ID) }
+    unsafe { code_only(client, request, FunctionSpec::REPORT_SERVER_ID) }
 }
 
-/// Function 14: reads records in a row of one file into words (V1.1b3, 6.14).
+/// Function 14: reads consecutive records of one file into the words of `reply` (V1.1b3,
+/// 6.14).
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param file  1 to 65535
-/// @param record  first record, 0 to 9999
-/// @param quantity  1 to 121
+/// @param file  the file number, 1 to 65535
+/// @param record  the first record, 0 to 9999
+/// @param quantity  the number of records, 1 to 121
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readFileRecord(
@@ -121,7 +123,7 @@ pub unsafe extern "C" fn mbm_client_readFileRecord(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        special(
+        with_more(
             client,
             request,
             FunctionSpec::READ_FILE_RECORD,
@@ -131,14 +133,14 @@ pub unsafe extern "C" fn mbm_client_readFileRecord(
     }
 }
 
-/// Function 15: writes the words of `data` to records in a row of one file (V1.1b3,
+/// Function 15: writes the words of `data` to consecutive records of one file (V1.1b3,
 /// 6.15).
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param file  1 to 65535
-/// @param record  first record, 0 to 9999
-/// @param quantity  1 to 122
+/// @param file  the file number, 1 to 65535
+/// @param record  the first record, 0 to 9999
+/// @param quantity  the number of records, 1 to 122
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_writeFileRecord(
@@ -150,7 +152,7 @@ pub unsafe extern "C" fn mbm_client_writeFileRecord(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        special(
+        with_more(
             client,
             request,
             FunctionSpec::WRITE_FILE_RECORD,
@@ -160,12 +162,13 @@ pub unsafe extern "C" fn mbm_client_writeFileRecord(
     }
 }
 
-/// Function 14 of several groups: `data` are the sub-requests as on the wire, seven
-/// bytes each; `reply` gets the sub-responses as on the wire (V1.1b3, 6.14).
+/// Function 14 with several groups: reads records of several files, or of several ranges.
+/// `data` contains the sub-requests as on the wire, seven bytes each. `reply` receives the
+/// sub-responses as on the wire (V1.1b3, 6.14).
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param bytes  7 to 245, a multiple of 7
+/// @param bytes  the number of bytes of `data`, 7 to 245, a multiple of 7
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readFileRecords(
@@ -175,22 +178,22 @@ pub unsafe extern "C" fn mbm_client_readFileRecords(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        special(
+        with_more(
             client,
             request,
             FunctionSpec::READ_FILE_RECORDS,
             [bytes.into(), 0, 0, 0],
-            Some(|inside, words, _| inside.state.header.read_file_records(words[0] as u16)),
+            Some(|fields, words, _| fields.state.header.read_file_records(words[0] as u16)),
         )
     }
 }
 
-/// Function 15 of several groups: `data` are the sub-requests as on the wire (V1.1b3,
-/// 6.15).
+/// Function 15 with several groups: writes records of several files, or of several ranges.
+/// `data` contains the sub-requests as on the wire (V1.1b3, 6.15).
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param bytes  9 to 251
+/// @param bytes  the number of bytes of `data`, 9 to 251
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_writeFileRecords(
@@ -200,21 +203,22 @@ pub unsafe extern "C" fn mbm_client_writeFileRecords(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        special(
+        with_more(
             client,
             request,
             FunctionSpec::WRITE_FILE_RECORDS,
             [bytes.into(), 0, 0, 0],
-            Some(|inside, words, _| inside.state.header.write_file_records(words[0] as u16)),
+            Some(|fields, words, _| fields.state.header.write_file_records(words[0] as u16)),
         )
     }
 }
 
-/// Function 18: reads up to 31 registers of a queue into words (V1.1b3, 6.18).
+/// Function 18: reads up to 31 registers of a FIFO queue into the words of `reply` (V1.1b3,
+/// 6.18).
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param address  the pointer address of the queue
+/// @param address  the FIFO pointer address of the queue, 0 to 65535
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readFifoQueue(
@@ -223,17 +227,17 @@ pub unsafe extern "C" fn mbm_client_readFifoQueue(
     address: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { plain(client, request, address, 0, FunctionSpec::READ_FIFO_QUEUE) }
+    unsafe { two_words(client, request, address, 0, FunctionSpec::READ_FIFO_QUEUE) }
 }
 
-/// Function 2B/0E: reads objects that identify the device (V1.1b3, 6.21). `reply` gets,
-/// as on the wire, conformity level, more follows (0 or FF), the next object id, how
-/// many objects there are, and of each its id, length and value.
+/// Function 2B/0E: reads objects that identify the device (V1.1b3, 6.21). `reply` receives,
+/// as on the wire: the conformity level, more follows (0 or FF), the next object id, the
+/// number of objects, and of each object its id, length and value.
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param code  1 basic, 2 regular, 3 extended, 4 one object
-/// @param object  the object to begin with
+/// @param code  the read device id code, MBM_DEVICE_ID_BASIC to MBM_DEVICE_ID_INDIVIDUAL
+/// @param object  the id of the first object to read
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_readDeviceIdentification(
@@ -245,7 +249,7 @@ pub unsafe extern "C" fn mbm_client_readDeviceIdentification(
     // SAFETY: as the header demands.
     unsafe {
         let [first, second] = RequestHeader::identification(code, object);
-        special(
+        with_more(
             client,
             request,
             FunctionSpec::READ_DEVICE_IDENTIFICATION,
@@ -255,13 +259,14 @@ pub unsafe extern "C" fn mbm_client_readDeviceIdentification(
     }
 }
 
-/// Function 2B of any MEI type: sends bytes of `data` and reads what comes (V1.1b3,
-/// 6.19). On RTU, silence ends the response.
+/// Function 2B with any MEI type: sends the bytes of `data` after the MEI type, and reads the
+/// bytes after the MEI type of the response into `reply` (V1.1b3, 6.19). On RTU, silence ends
+/// the response.
 ///
 /// @param client   the object
 /// @param request  the request
-/// @param meiType  0x0D is CANopen
-/// @param bytes  0 to 251
+/// @param meiType  the MEI type, for example MBM_MEI_CANOPEN
+/// @param bytes  the number of bytes of `data`, 0 to 251
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_encapsulatedInterfaceTransport(
@@ -272,24 +277,24 @@ pub unsafe extern "C" fn mbm_client_encapsulatedInterfaceTransport(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        special(
+        with_more(
             client,
             request,
             FunctionSpec::ENCAPSULATED,
             [usize::from(meiType) << 8, bytes.into(), 0, 0],
-            Some(|inside, words, _| inside.state.header.follow(words[1] as u16)),
+            Some(|fields, words, _| fields.state.header.follow(words[1] as u16)),
         )
     }
 }
 
-/// Any function: sends bytes of `data` behind the function code, and reads what is
-/// behind it in the response.
+/// Any function code: sends the bytes of `data` after the function code, and reads the bytes
+/// after the function code of the response into `reply`.
 ///
 /// @param client    the object
 /// @param request   the request
-/// @param function  1 to 127
-/// @param bytes     0 to 252
-/// @param response  how long the response is; used during this call only
+/// @param function  the function code, 1 to 127
+/// @param bytes     the number of bytes of `data`, 0 to 252
+/// @param response  the length rule of the response; used during this call only
 /// @return a status; see mbm_client_readCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_custom(
@@ -307,12 +312,12 @@ pub unsafe extern "C" fn mbm_client_custom(
             response.expose_provenance(),
             0,
         ];
-        special(
+        with_more(
             client,
             request,
             FunctionSpec::CUSTOM,
             words,
-            Some(|inside, words, _| {
+            Some(|fields, words, _| {
                 let response: *const mbm_rule = core::ptr::with_exposed_provenance(words[2]);
                 let Some(response) = response.as_ref() else {
                     return Status::INVALID_ARGUMENT;
@@ -327,35 +332,36 @@ pub unsafe extern "C" fn mbm_client_custom(
                     return Status::INVALID_ARGUMENT;
                 }
                 let numbers = [response.bytes, response.more];
-                let header = &mut inside.state.header;
+                let header = &mut fields.state.header;
                 header.add_rule(words[0] as u8, words[1] as u16, kind, numbers)
             }),
         )
     }
 }
 
-/// Any request, as it arrived from another client: sends `function` and the bytes of
-/// `body`, and reads into `reply` all bytes that follow the function code of the
-/// response, as on the wire. This is what a gateway needs: `body` and `reply` are
-/// what the functions of mbm_unit_serveCustom get and return.
+/// Forwards a request that arrived from another client: sends `function` and the bytes of
+/// `body`, and reads into `reply` all bytes after the function code of the response, as on
+/// the wire. Use it for a gateway: the functions of mbm_unit_serveCustom receive the same
+/// `body` and return the same `reply`.
 ///
-/// A response counts only if it answers this request, as in the functions above: its
-/// length, byte count, echoed address, value, quantity and records must be right. Of a
-/// function that the standard does not define, and of sub-functions of 08 from 0x15 on,
-/// silence ends the response on RTU. If you know its length, use mbm_client_custom.
+/// The client accepts a response only if it matches the request, as for the other functions:
+/// its length, byte count, echoed address, value, quantity and records must be right. On RTU,
+/// silence ends the response to a function code that the standard does not define, and to
+/// sub-functions of 08 from 0x15 on. If you know the length of the response, use
+/// mbm_client_custom.
 ///
-/// 08 with sub-function 04 gets no response: it ends with MBM_OK and `length` 0 after
-/// the turnaround delay.
+/// No device responds to 08 with sub-function 04: the request ends with MBM_OK and `length` 0
+/// after the turnaround delay.
 ///
 /// @param client    the object
 /// @param request   the request; if it is queued, its `data` then points into `body`
-/// @param function  1 to 127
-/// @param body      the bytes after the function code; leave them alone until the
-///                  request has ended; may be NULL if there are none
-/// @param bytes     0 to 252
-/// @return a status; see mbm_client_readCoils. MBM_ILLEGAL_DATA_VALUE also for a body
-///         whose length or counts are wrong, MBM_ILLEGAL_FUNCTION for function 0 or
-///         one above 127: what a server answers to such a request
+/// @param function  the function code, 1 to 127
+/// @param body      the bytes after the function code; do not change them until the request
+///                  has ended; may be NULL if `bytes` is 0
+/// @param bytes     the number of bytes of `body`, 0 to 252
+/// @return a status; see mbm_client_readCoils. Also those with which a server answers such a
+///         request: MBM_ILLEGAL_DATA_VALUE if the length or a count in `body` is wrong,
+///         MBM_ILLEGAL_FUNCTION if the function code is 0 or above 127
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_forward(
     client: *mut mbm_client,
@@ -364,46 +370,46 @@ pub unsafe extern "C" fn mbm_client_forward(
     body: *const u8,
     bytes: u16,
 ) -> u8 {
-    // SAFETY: as the header demands. The data are the last bytes of the body.
+    // SAFETY: as the header demands. `data` is set to the last bytes of the body.
     unsafe {
-        let inside = request.cast::<RequestFields>();
-        let before = match inside.as_ref() {
-            Some(inside) => inside.data,
+        let fields = request.cast::<RequestFields>();
+        let previous_data = match fields.as_ref() {
+            Some(fields) => fields.data,
             None => body,
         };
         let words = [function.into(), bytes.into(), body.expose_provenance(), 0];
-        let status = special(
+        let status = with_more(
             client,
             request,
             FunctionSpec::CUSTOM,
             words,
-            Some(|inside, words, _| {
+            Some(|fields, words, _| {
                 let body = core::ptr::with_exposed_provenance(words[2]);
-                let header = &mut inside.state.header;
-                let Some(whole) = lent_or_none(body, words[1]) else {
+                let header = &mut fields.state.header;
+                let Some(bytes) = array_or_empty(body, words[1]) else {
                     return Status::INVALID_ARGUMENT;
                 };
-                let built = header.forward(words[0] as u8, whole);
-                if built == Status::OK {
+                let status = header.forward(words[0] as u8, bytes);
+                if status == Status::OK {
                     let head = words[1] - usize::from(header.data_length());
-                    inside.data = body.wrapping_add(head);
+                    fields.data = body.wrapping_add(head);
                 }
-                built
+                status
             }),
         );
-        if status != Status::PENDING.code() && !inside.is_null() {
-            (*inside).data = before;
+        if status != Status::PENDING.code() && !fields.is_null() {
+            (*fields).data = previous_data;
         }
         status
     }
 }
 
-/// The group of file records that a request reads or writes.
+/// Adds the group of file records that the request reads or writes.
 ///
 /// # Safety
-/// None is needed; this is a [`More`](super::More).
-unsafe fn add_group(inside: &mut RequestFields, words: &[usize; 4], _: Status) -> Status {
+/// Always safe. It is unsafe only to have the type [`More`](super::More).
+unsafe fn add_group(fields: &mut RequestFields, words: &[usize; 4], _: Status) -> Status {
     let [_, file, record, quantity] = *words;
-    let header = &mut inside.state.header;
+    let header = &mut fields.state.header;
     header.add_group(file as u16, record as u16, quantity as u16)
 }

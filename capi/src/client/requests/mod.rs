@@ -1,4 +1,4 @@
-//! One function for each request.
+//! One function for each kind of request.
 
 mod data;
 mod device;
@@ -16,18 +16,19 @@ use mbm::pdu::header::FunctionSpec;
 use mbm::pdu::header::RequestHeader;
 use mbm::FIRMWARE;
 
-/// What a function of C is called with: the form of its request, and its arguments
-/// behind client and request, which are the words in the head of its PDU.
+/// The arguments of a C function that makes a request: its function code, and the arguments
+/// after `client` and `request`, which are the words at the start of the PDU.
 #[derive(Clone, Copy)]
 struct Arguments {
-    form: FunctionSpec,
+    function: FunctionSpec,
     words: [usize; 4],
 }
 
-/// What a function does besides [`RequestHeader::set_all`], whose status it is given.
+/// The further steps of a function after [`RequestHeader::set_all`]. It receives the status
+/// of that function, and returns the status of the request.
 type More = unsafe fn(&mut RequestFields, &[usize; 4], Status) -> Status;
 
-/// Whether the request behind a pointer may be queued.
+/// Checks whether the request may be queued.
 ///
 /// # Safety
 /// As the header demands.
@@ -39,10 +40,12 @@ unsafe fn prepare(client: *const mbm_client, request: *mut mbm_clientRequest) ->
             Status::OK if request.is_null() => Status::INVALID_ARGUMENT,
             Status::OK if (*request).status == Status::PENDING.code() => Status::BUSY,
             Status::OK => {
-                // One that is pending may have been zeroed.
+                // The C program may have zeroed a pending request, so search the queue.
                 let object = pointers::object(client);
                 match RequestPtr::new(request) {
-                    Some(request) if queue(object).holds(|held| *held == request) => Status::BUSY,
+                    Some(request) if queue(object).holds(|queued| *queued == request) => {
+                        Status::BUSY
+                    }
                     _ => Status::OK,
                 }
             }
@@ -51,10 +54,11 @@ unsafe fn prepare(client: *const mbm_client, request: *mut mbm_clientRequest) ->
     }
 }
 
-/// Builds a request and queues it, unless it is refused.
+/// Builds a request and queues it; or returns the status that says why it is refused.
 ///
 /// # Safety
-/// As the header demands; the request is [`prepare`]d, or no client has it.
+/// As the header demands; [`prepare`] returned [`Status::OK`] for the request, or
+/// [`is_free`] returned true.
 #[inline(always)]
 unsafe fn submit(
     client: *mut mbm_client,
@@ -62,19 +66,19 @@ unsafe fn submit(
     arguments: &Arguments,
     more: Option<More>,
 ) -> Status {
-    // SAFETY: as the caller promises, so nobody else uses the request.
+    // SAFETY: as the caller promises, so nothing else uses the request.
     unsafe {
-        let inside = &mut *request.cast::<RequestFields>();
-        let header = &mut inside.state.header;
-        let mut status = header.set_all(arguments.form, &arguments.words);
+        let fields = &mut *request.cast::<RequestFields>();
+        let header = &mut fields.state.header;
+        let mut status = header.set_all(arguments.function, &arguments.words);
         if let Some(more) = more {
-            status = more(inside, &arguments.words, status);
+            status = more(fields, &arguments.words, status);
         }
-        let header = &inside.state.header;
+        let header = &fields.state.header;
         if status != Status::OK {
-        } else if header.data_length() > 0 && inside.data.is_null() {
+        } else if header.data_length() > 0 && fields.data.is_null() {
             status = Status::INVALID_ARGUMENT;
-        } else if !inside.reply.is_null() && u16::from(header.known_data()) > inside.state.capacity
+        } else if !fields.reply.is_null() && u16::from(header.known_data()) > fields.state.capacity
         {
             status = Status::BUFFER_TOO_SMALL;
         } else if let Some(request) = RequestPtr::new(request) {
@@ -83,13 +87,13 @@ unsafe fn submit(
                 Err(refused) => refused.state().status,
             };
         }
-        inside.state.status = status;
+        fields.state.status = status;
         status
     }
 }
 
-/// True if a client gave the request back, and nothing happened to it since: so no
-/// client has it.
+/// True if the request has ended on a client and was not changed since. Then it is in no
+/// client's queue.
 ///
 /// # Safety
 /// As the header demands.
@@ -104,9 +108,9 @@ unsafe fn is_free(client: *const mbm_client, request: *const mbm_clientRequest) 
     }
 }
 
-/// Queues a request. (A host looks first whether it is one that was used before, as
-/// most are. By C's convention the status comes extended to a word, as the function of
-/// C that calls this has to return it: 40 bytes less on a Cortex-M0+.)
+/// Queues a request. (A host first checks whether the request was used before, as most
+/// were: that check is faster. The calling convention of C extends the status to a word, as
+/// the calling function must return it: that saves 40 bytes on a Cortex-M0+.)
 ///
 /// # Safety
 /// As the header demands.
@@ -119,7 +123,7 @@ unsafe extern "C" fn queue_request(
     arguments: &Arguments,
     more: Option<More>,
 ) -> u8 {
-    // SAFETY: as the caller promises; no client has it, or it is prepared.
+    // SAFETY: as the caller promises; the request is free, or `queue_unknown` checks it.
     unsafe {
         if FIRMWARE {
             return queue_unknown(client, request, arguments, more);
@@ -127,12 +131,12 @@ unsafe extern "C" fn queue_request(
         if is_free(client, request) {
             return submit(client, request, arguments, more).code();
         }
-        // A copy, which only this way has in memory.
+        // A copy: so that only this path needs the arguments in memory.
         queue_unknown(client, request, &{ *arguments }, more)
     }
 }
 
-/// As [`queue_request`], of a request that may be pending.
+/// As [`queue_request`], for a request that may be pending.
 ///
 /// # Safety
 /// As the header demands.
@@ -145,7 +149,7 @@ unsafe extern "C" fn queue_unknown(
     arguments: &Arguments,
     more: Option<More>,
 ) -> u8 {
-    // SAFETY: as the caller promises; built once it is prepared.
+    // SAFETY: as the caller promises; `prepare` returned OK before `submit`.
     unsafe {
         let status = match prepare(client, request) {
             Status::OK => submit(client, request, arguments, more),
@@ -155,50 +159,50 @@ unsafe extern "C" fn queue_unknown(
     }
 }
 
-/// Queues a request of two words at most.
+/// Queues a request that has at most two words.
 ///
 /// # Safety
 /// As the header demands.
 #[cfg_attr(target_os = "none", inline(never))]
 #[cfg_attr(not(target_os = "none"), inline(always))]
-unsafe extern "C" fn plain(
+unsafe extern "C" fn two_words(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
     first: u16,
     second: u16,
-    form: FunctionSpec,
+    function: FunctionSpec,
 ) -> u8 {
     let words = [first.into(), second.into(), 0, 0];
     // SAFETY: as the caller promises.
-    unsafe { queue_request(client, request, &Arguments { form, words }, None) }
+    unsafe { queue_request(client, request, &Arguments { function, words }, None) }
 }
 
-/// Queues a request that is no more than a function code.
+/// Queues a request that consists of its function code only.
 ///
 /// # Safety
 /// As the header demands.
 #[cfg_attr(target_os = "none", inline(never))]
-unsafe extern "C" fn bare(
+unsafe extern "C" fn code_only(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
-    form: FunctionSpec,
+    function: FunctionSpec,
 ) -> u8 {
     // SAFETY: as the caller promises.
-    unsafe { plain(client, request, 0, 0, form) }
+    unsafe { two_words(client, request, 0, 0, function) }
 }
 
-/// Queues a request that more is to be done for.
+/// Queues a request that needs up to four words, or further steps.
 ///
 /// # Safety
 /// As the header demands.
 #[inline(always)]
-unsafe fn special(
+unsafe fn with_more(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
-    form: FunctionSpec,
+    function: FunctionSpec,
     words: [usize; 4],
     more: Option<More>,
 ) -> u8 {
     // SAFETY: as the caller promises.
-    unsafe { queue_request(client, request, &Arguments { form, words }, more) }
+    unsafe { queue_request(client, request, &Arguments { function, words }, more) }
 }
