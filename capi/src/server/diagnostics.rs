@@ -70,9 +70,9 @@ unsafe extern "C" fn monitor(
 }
 
 /// Serves diagnostics: functions 08, 0B and 0C (hex). Function 08 has the sub-functions
-/// of the standard, 00 to 04, 0A to 12 and 14 (hex); others are answered with exception
-/// 01. From now on the unit counts the frames on its lines and logs events, and a client
-/// can force it into listen only mode.
+/// of the standard, 00 to 04, 0A to 12 and 14 (hex); it answers others with exception 01
+/// (illegal function). After this call the unit counts the frames on its lines and logs
+/// events, and a client can force it into listen only mode.
 ///
 /// @param unit         the unit
 /// @param diagnostics  must stay valid for as long as the unit is used. Use one struct

@@ -145,7 +145,7 @@ impl mbm_event {
     ///
     /// # Safety
     /// `frame` and `pdu` are NULL or point to as many bytes as their lengths say.
-    unsafe fn to_event<'a>(&self) -> Result<Event<'a>, Status> {
+    unsafe fn core_event<'a>(&self) -> Result<Event<'a>, Status> {
         // SAFETY: as the caller promises.
         let (frame, pdu) = unsafe {
             (
@@ -194,7 +194,7 @@ pub unsafe extern "C" fn mbm_event_text(
         let write = || {
             let mut line = line(text, size)?;
             let event = get(event).ok_or(Status::INVALID_ARGUMENT)?;
-            event.to_event()?.text(&mut line);
+            event.core_event()?.text(&mut line);
             Ok(line)
         };
         outcome(write())
