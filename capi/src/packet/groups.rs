@@ -62,8 +62,8 @@ unsafe fn next<T>(
     }
 }
 
-/// Reads the records of function 14 or 15 (hex) one by one: `for (cursor = 0;
-/// mbm_packet_nextRecord(&packet, &cursor, &record);)`
+/// Reads the records of function 14 or 15 (hex) one by one:
+/// `for (cursor = 0; mbm_packet_nextRecord(&packet, &cursor, &record);)`
 ///
 /// Any thread or interrupt may call it.
 ///
@@ -181,8 +181,8 @@ unsafe fn add(
 /// @param record    the record; its data must not overlap `storage`
 /// @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_ILLEGAL_FUNCTION if the function is not 14
 ///         or 15; MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE for an invalid
-///         record; MBM_INVALID_ARGUMENT for a NULL pointer, another kind of packet, or a
-///         packet current data are not in `storage`
+///         record; MBM_INVALID_ARGUMENT for a NULL pointer, an exception packet, record
+///         data that overlap `storage`, or packet data that are not in `storage`
 #[no_mangle]
 pub unsafe extern "C" fn mbm_packet_addRecord(
     packet: *mut mbm_packet,
@@ -228,7 +228,8 @@ pub unsafe extern "C" fn mbm_packet_addRecord(
 /// @return MBM_OK; MBM_BUFFER_TOO_SMALL: if `storage` has 246 bytes, the object belongs
 ///         into the next response, so set moreFollows and nextObjectId;
 ///         MBM_ILLEGAL_FUNCTION if the packet is no such response; MBM_INVALID_ARGUMENT
-///         for a NULL pointer, or a packet current data are not in `storage`
+///         for a NULL pointer, object data that overlap `storage`, or packet data that
+///         are not in `storage`
 #[no_mangle]
 pub unsafe extern "C" fn mbm_packet_addObject(
     packet: *mut mbm_packet,

@@ -86,7 +86,7 @@ struct BorrowedRegisters {
 }
 
 // SAFETY, here and below: the caller of [`view`] promises that `bytes` points to `length`
-// bytes that nothing else uses meanwhile. Each access is checked against `length`.
+// bytes, which nothing else uses meanwhile. Each access is checked against `length`.
 impl RegisterBytes for BorrowedRegisters {
     fn length(&self) -> usize {
         self.length

@@ -184,8 +184,8 @@ pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
 /// effect in TCP. The begin functions restore the default.
 ///
 /// @param server     the object
-/// @param silenceUs  microseconds since the last received byte, at most 0x80000000; a greater
-///                   value counts as that
+/// @param silenceUs  microseconds since the last received byte; a value above 2^31
+///                   (36 minutes) counts as 2^31
 /// @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, silenceUs: u32) -> u8 {

@@ -168,11 +168,11 @@ unsafe fn transfer_bits(cells: *mut u8, write: bool, first: u16, quantity: u16, 
     for (index, byte) in data.iter_mut().enumerate() {
         // The bits of this data byte that are copied. They lie in two bytes of the cells.
         let mask = if left < 8 { (1u16 << left) - 1 } else { 0xFF };
-        let next_cell = cells.get(index + 1).copied().unwrap_or(0);
+        let next_byte = cells.get(index + 1).copied().unwrap_or(0);
         let Some(cell) = cells.get_mut(index) else {
             return;
         };
-        let both = u16::from_le_bytes([*cell, next_cell]);
+        let both = u16::from_le_bytes([*cell, next_byte]);
         if write {
             let value = (both & !(mask << shift)) | ((u16::from(*byte) & mask) << shift);
             let [low, high] = value.to_le_bytes();

@@ -105,7 +105,7 @@ impl TableAccess for Table {
         // SAFETY: see above. The PDU has a function code and an address; a write request has
         // its data; the response of a read has space for `bytes` bytes.
         unsafe {
-            // The fields that say where the cells are, are read only once, because a hook
+            // The code reads the fields that locate the cells only once, because a hook
             // may zero the struct or fill it in anew.
             let cells = (*table).words.cast::<u8>();
             let address = usize::from(*pdu.add(1)) << 8 | usize::from(*pdu.add(2));

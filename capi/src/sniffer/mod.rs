@@ -35,7 +35,7 @@ const _: () = {
 /// A sniffer: finds the frames on a bus that others use, and pairs requests with replies.
 /// It never sends and has no port: you pass it the bytes that you receive.
 ///
-/// You provide the storage. It must be zero before first use; a static object is. Call
+/// You provide the storage. It must be zero before first use; a static object is zero. Call
 /// one of the mbm_sniffer_begin functions first. Not re-entrant: use one object from one
 /// thread, and never from an interrupt; pass bytes from an interrupt through an mbm_ring.
 #[repr(C)]
