@@ -34,8 +34,9 @@ pub const MBM_LENGTH_EXACT: u8 = 0;
 pub const MBM_LENGTH_AT_LEAST: u8 = 1;
 /// Silence on the line ends the frame; in ASCII the end character does. `bytes` is 0.
 pub const MBM_LENGTH_SILENCE: u8 = 2;
-/// The length is not known: the function is not declared. In RTU over TCP also a function
-/// whose frames silence ends, because a stream has no silence. `bytes` is 0.
+/// The length is not known, because the function is not declared: see mbm_function. In
+/// RTU over TCP also for a function whose frames silence ends, because a stream has no
+/// silence. `bytes` is 0.
 pub const MBM_LENGTH_UNKNOWN: u8 = 3;
 
 /// The length of a PDU or frame, as far as it is known.

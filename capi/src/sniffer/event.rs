@@ -83,7 +83,8 @@ pub struct mbm_event {
     /// The function code, of an exception the one of the request; for MBM_EVENT_BAD_CRC
     /// the byte at that position.
     pub function: u8,
-    /// The first bytes of the request's PDU, for replies, exceptions and timeouts.
+    /// The first bytes of the request's PDU: for replies, exceptions and timeouts, and
+    /// for MBM_EVENT_UNPAIRED if the reply is late and its request is still known.
     pub requestHead: [u8; 9],
     /// How many bytes of requestHead are set; 0 if the request is not known.
     pub requestHeadLength: u8,
