@@ -121,7 +121,8 @@ pub unsafe extern "C" fn mbm_server_beginAscii(
 /// the server answers them in order.
 ///
 /// @param server  see mbm_server_beginRtu; one for each connection
-/// @param port    see mbm_server_beginRtu; its hooks read and write the connection
+/// @param port    see mbm_server_beginRtu; its hooks read and write the connection and give
+///                the time
 /// @param units   see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
 /// @param count   see mbm_server_beginRtu
 /// @param frame   see mbm_server_beginRtu; one for each connection

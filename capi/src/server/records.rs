@@ -46,8 +46,8 @@ pub struct mbm_custom {
     pub service: mbm_service,
     /// Carries out a request and writes the data of the response, without the function
     /// code, to `response`. `capacity` is the space in bytes that the frame buffer has
-    /// for them; the server sends at most 252 bytes. Returns the number of bytes written,
-    /// or MBM_REPLY_EXCEPTION | code, or MBM_REPLY_NONE, or MBM_REPLY_PENDING.
+    /// after the request; the server sends at most 252 bytes. Returns the number of bytes
+    /// written, or MBM_REPLY_EXCEPTION | code, or MBM_REPLY_NONE, or MBM_REPLY_PENDING.
     pub serve: Option<
         unsafe extern "C" fn(
             context: *mut c_void,

@@ -175,8 +175,7 @@ impl mbm_event {
 }
 
 /// Writes an event as one line of text, for example
-///
-/// "unit 17 reply 03 read holding registers 107..109: 555 0 100".
+/// "unit 17  reply      03 read holding registers  107..109: 555 0 100".
 ///
 /// Any thread may call it while the event is valid.
 ///
