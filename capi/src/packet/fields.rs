@@ -1,4 +1,4 @@
-//! Which fields of the flat packet a request or response has.
+//! The fields of the flat packet that each request or response uses.
 
 use super::{mbm_packet, MBM_PACKET_EXCEPTION, MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
 use crate::functions::*;
@@ -11,7 +11,7 @@ use mbm::pdu::response::Response;
 use mbm::pdu::EXCEPTION;
 
 impl mbm_packet {
-    /// A packet that says nothing.
+    /// A packet with all fields zero.
     pub(crate) const NONE: mbm_packet = mbm_packet {
         data: core::ptr::null(),
         dataLength: 0,
@@ -42,7 +42,7 @@ impl mbm_packet {
         objectCount: 0,
     };
 
-    /// A packet that says whose PDU this is, and nothing else.
+    /// A packet with the kind and the function code of a PDU; all other fields are zero.
     pub(crate) fn of(kind: u8, pdu: &[u8]) -> mbm_packet {
         let function = pdu.first().copied().unwrap_or_default();
         mbm_packet {
@@ -52,7 +52,7 @@ impl mbm_packet {
         }
     }
 
-    /// From whom to whom it goes.
+    /// The transaction, the unit and the function code.
     pub(crate) const fn head(&self) -> Head {
         Head {
             transaction: self.transaction,
@@ -66,7 +66,7 @@ impl mbm_packet {
         self.dataLength = data.len() as u16;
     }
 
-    /// Takes over what a request says.
+    /// Sets the fields that a request has.
     pub(crate) fn take_request(&mut self, request: &Request) {
         self.kind = MBM_PACKET_REQUEST;
         self.function = request.function();
@@ -148,7 +148,7 @@ impl mbm_packet {
         }
     }
 
-    /// Takes over what a response says.
+    /// Sets the fields that a response has.
     pub(crate) fn take_response(&mut self, response: &Response) {
         self.kind = MBM_PACKET_RESPONSE;
         self.function = response.function();
@@ -232,7 +232,7 @@ impl mbm_packet {
         }
     }
 
-    /// The request that this is, with these data.
+    /// The request that the fields describe, with `data` as its data.
     pub(crate) fn request<'a>(&self, data: &'a [u8]) -> Result<Request<'a>, Status> {
         let (function, address, quantity) = (self.function, self.address, self.quantity);
         Ok(match function {
@@ -298,7 +298,7 @@ impl mbm_packet {
         })
     }
 
-    /// The response or exception that this is, with these data.
+    /// The response or exception that the fields describe, with `data` as its data.
     pub(crate) fn response<'a>(&self, data: &'a [u8]) -> Result<Response<'a>, Status> {
         let (function, address, quantity) = (self.function, self.address, self.quantity);
         match self.kind {

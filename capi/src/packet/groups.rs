@@ -1,4 +1,4 @@
-//! Records and objects: the groups that the data of some packets consist of.
+//! Records and objects: the groups in the data of some packets.
 
 use super::{mbm_packet, side, MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
 use crate::functions::{
@@ -9,16 +9,18 @@ use mbm::error::Status;
 use mbm::packet::groups;
 use mbm::pdu::files::Record;
 
-/// Registers of a file: a sub-request of 14 or 15, or what answers it.
+/// Registers of a file: one group of function 14 or 15 (hex), in a request or a response.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_record {
-    /// The registers, high bytes first, 2 * length bytes. A request of 14,
-    /// which reads them, has none: NULL, and ignored.
+    /// The registers, the high byte of each first; 2 * length bytes. A request of
+    /// function 14 reads registers and has no data: NULL after parsing, ignored for
+    /// building.
     pub data: *const u8,
-    /// File number, 1 to 65535; 0 in a response of 14, which does not say.
+    /// The file number, 1 to 65535; 0 in a response of function 14, which does not
+    /// contain it.
     pub file: u16,
-    /// The first record, 0 to 9999; 0 in a response of 14.
+    /// The first record, 0 to 9999; 0 in a response of function 14.
     pub record: u16,
     /// How many registers.
     pub length: u16,
@@ -28,16 +30,15 @@ pub struct mbm_record {
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_object {
-    /// Its value, most often text, without an end.
+    /// The value, usually text, without a NUL.
     pub data: *const u8,
-    /// Bytes of the value.
+    /// Length of the value in bytes.
     pub length: u8,
-    /// 0 vendor name, 1 product code, 2 revision and so on (V1.1b3, 6.21).
+    /// The object id: 0 vendor name, 1 product code, 2 revision and so on (V1.1b3, 6.21).
     pub id: u8,
 }
 
-/// The next group of a packet's data, found by `first` at the cursor, which
-/// moves behind it.
+/// Reads the group at the cursor with `first`, and moves the cursor past it.
 ///
 /// # Safety
 /// The pointers are NULL or valid.
@@ -61,15 +62,17 @@ unsafe fn next<T>(
     }
 }
 
-/// Gives the records of 14 or 15 one by one:
+/// Reads the records of function 14 or 15 (hex) one by one:
 /// `for (cursor = 0; mbm_packet_nextRecord(&packet, &cursor, &record);)`
 ///
 /// Any thread or interrupt may call it.
 ///
-/// @param packet  a request or response of 14 or 15, as parsed or built
-/// @param cursor  where it goes on; yours, 0 to begin
-/// @param record  receives the record, whose data point into the packet's
-/// @return 1; 0, with cursor and record unchanged, if there is none left, or for NULL
+/// @param packet  a request or response of function 14 or 15, parsed or to be built
+/// @param cursor  the position in the data; a variable of yours, 0 for the first record
+/// @param record  receives the record; its data pointer points into the data of the
+///                packet
+/// @return 1 if there is a record. 0, with `cursor` and `record` unchanged, if there are
+///         no more records, and for NULL
 #[no_mangle]
 pub unsafe extern "C" fn mbm_packet_nextRecord(
     packet: *const mbm_packet,
@@ -95,15 +98,17 @@ pub unsafe extern "C" fn mbm_packet_nextRecord(
     unsafe { next(packet, cursor, record, first) }
 }
 
-/// Gives the objects of a device identification one by one, as
-/// mbm_packet_nextRecord does records.
+/// Reads the objects of a device identification one by one, as mbm_packet_nextRecord
+/// reads records.
 ///
 /// Any thread or interrupt may call it.
 ///
-/// @param packet  a response of 2B/0E, as parsed or built
-/// @param cursor  where it goes on; yours, 0 to begin
-/// @param object  receives the object, whose data point into the packet's
-/// @return 1; 0, with cursor and object unchanged, if there is none left, or for NULL
+/// @param packet  a response of function 2B/0E (hex), parsed or to be built
+/// @param cursor  the position in the data; a variable of yours, 0 for the first object
+/// @param object  receives the object; its data pointer points into the data of the
+///                packet
+/// @return 1 if there is an object. 0, with `cursor` and `object` unchanged, if there are
+///         no more objects, and for NULL
 #[no_mangle]
 pub unsafe extern "C" fn mbm_packet_nextObject(
     packet: *const mbm_packet,
@@ -134,8 +139,8 @@ impl mbm_packet {
     }
 }
 
-/// Writes a group behind those of a packet, in storage that holds them, and
-/// counts it to the packet's data.
+/// Writes a group after the other groups of a packet, which are in `storage`, and adds
+/// its length to dataLength.
 ///
 /// # Safety
 /// The pointers are NULL or valid.
@@ -149,34 +154,35 @@ unsafe fn add(
     let refused = Status::INVALID_ARGUMENT;
     // SAFETY: as the caller promises; data and storage do not overlap.
     unsafe {
-        let mut grown = get(packet).ok_or(refused)?;
-        let behind_others = grown.dataLength == 0 || core::ptr::eq(grown.data, storage);
-        if !behind_others || (length > 0 && overlap(data, length, storage, capacity)) {
+        let mut extended = get(packet).ok_or(refused)?;
+        let is_contiguous = extended.dataLength == 0 || core::ptr::eq(extended.data, storage);
+        if !is_contiguous || (length > 0 && overlap(data, length, storage, capacity)) {
             return Err(refused);
         }
         let data = array_or_empty(data, length.into()).ok_or(refused)?;
         let place = buffer(storage, capacity).ok_or(refused)?;
-        let used = grown.dataLength;
+        let used = extended.dataLength;
         let space = place.get_mut(used.into()..).ok_or(refused)?;
-        let more = write(&mut grown, data, space)?;
-        grown.data = storage;
-        grown.dataLength = used.saturating_add(more as u16);
-        put(packet, grown);
+        let more = write(&mut extended, data, space)?;
+        extended.data = storage;
+        extended.dataLength = used.saturating_add(more as u16);
+        put(packet, extended);
     }
     Ok(())
 }
 
-/// Adds a record to a packet of 14 or 15, to be built then. Set the packet's
-/// kind and function first, and dataLength to 0.
+/// Adds a record to the data of a packet of function 14 or 15 (hex) that you are going to
+/// build. Set the kind and the function of the packet first, and dataLength to 0.
 ///
-/// @param packet    grows by the record; unchanged if it is refused
-/// @param storage   receives the packet's data, for all its records the same
-/// @param capacity  bytes of `storage`; 251 always do
-/// @param record    the record; its data may not lie in `storage`
-/// @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_ILLEGAL_FUNCTION if this is not 14
-///         or 15; MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE for a
-///         record that there cannot be; MBM_INVALID_ARGUMENT, also for data
-///         that are elsewhere
+/// @param packet    gets the record; unchanged if the call fails
+/// @param storage   receives the data of the packet; use the same storage for all its
+///                  records
+/// @param capacity  size of `storage` in bytes; 251 are always enough
+/// @param record    the record; its data must not overlap `storage`
+/// @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_ILLEGAL_FUNCTION if the function is not 14
+///         or 15; MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE for an invalid
+///         record; MBM_INVALID_ARGUMENT for a NULL pointer, an exception packet, record
+///         data that overlap `storage`, or packet data that are not in `storage`
 #[no_mangle]
 pub unsafe extern "C" fn mbm_packet_addRecord(
     packet: *mut mbm_packet,
@@ -186,11 +192,12 @@ pub unsafe extern "C" fn mbm_packet_addRecord(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        let Some((added, whose)) = get(record).zip(get(packet)) else {
+        let Some((added, current)) = get(record).zip(get(packet)) else {
             return Status::INVALID_ARGUMENT.code();
         };
-        // A request of 14 names the registers, and carries none.
-        let reads = whose.kind == MBM_PACKET_REQUEST && whose.function == MBM_FC_READ_FILE_RECORD;
+        // A request of function 14 names the registers and has no data.
+        let reads =
+            current.kind == MBM_PACKET_REQUEST && current.function == MBM_FC_READ_FILE_RECORD;
         let bytes = match added.length.checked_mul(2) {
             _ if reads => 0,
             Some(bytes) => bytes,
@@ -209,16 +216,20 @@ pub unsafe extern "C" fn mbm_packet_addRecord(
     }
 }
 
-/// Adds an object to a response of 2B/0E, to be built then. Set the packet's
-/// kind, function and meiType first, and dataLength and objectCount to 0.
+/// Adds an object to the data of a response of function 2B/0E (hex) that you are going to
+/// build. Set the kind, the function and the meiType of the packet first, and dataLength
+/// and objectCount to 0.
 ///
-/// @param packet    grows by the object; unchanged if it is refused
-/// @param storage   receives the packet's data, for all its objects the same
-/// @param capacity  bytes of `storage`; 246 always do
-/// @param object    the object; its data may not lie in `storage`
-/// @return MBM_OK; MBM_BUFFER_TOO_SMALL: if 246 bytes are, set moreFollows and
-///         nextObjectId; MBM_ILLEGAL_FUNCTION if this is no such response;
-///         MBM_INVALID_ARGUMENT, also for data that are elsewhere
+/// @param packet    gets the object; unchanged if the call fails
+/// @param storage   receives the data of the packet; use the same storage for all its
+///                  objects
+/// @param capacity  size of `storage` in bytes; 246 are always enough
+/// @param object    the object; its data must not overlap `storage`
+/// @return MBM_OK; MBM_BUFFER_TOO_SMALL: if `storage` has 246 bytes, the object belongs
+///         into the next response, so set moreFollows and nextObjectId;
+///         MBM_ILLEGAL_FUNCTION if the packet is no such response; MBM_INVALID_ARGUMENT
+///         for a NULL pointer, object data that overlap `storage`, or packet data that
+///         are not in `storage`
 #[no_mangle]
 pub unsafe extern "C" fn mbm_packet_addObject(
     packet: *mut mbm_packet,

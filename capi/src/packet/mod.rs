@@ -1,4 +1,5 @@
-//! Requests and responses as flat structs: built, parsed, measured.
+//! Requests and responses as flat structs: their fields, their encoding and decoding,
+//! their lengths.
 
 mod fields;
 mod groups;
@@ -15,35 +16,36 @@ use mbm::pdu::limits::MAX_PDU;
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
 
-/// A request: what a client sends.
+/// A request: a client sends it.
 pub const MBM_PACKET_REQUEST: u8 = 0;
-/// A response: what a server sends if the request succeeds.
+/// A response: a server sends it if the request succeeds.
 pub const MBM_PACKET_RESPONSE: u8 = 1;
-/// An exception: what a server sends if the request fails (V1.1b3, clause 7).
+/// An exception: a server sends it if the request fails (V1.1b3, clause 7).
 pub const MBM_PACKET_EXCEPTION: u8 = 2;
 
-/// Most bytes of a PDU: function code and data (V1.1b3, 4.1).
+/// The longest PDU, function code and data, in bytes (V1.1b3, 4.1).
 pub const MBM_MAX_PDU: u16 = 253;
 
 const _: () = assert!(MBM_MAX_PDU as usize == MAX_PDU);
 
-/// `bytes` is the length.
+/// The length is exactly `bytes`.
 pub const MBM_LENGTH_EXACT: u8 = 0;
-/// It has `bytes` at least. Once so many are there, ask again.
+/// The length is at least `bytes`. Call the function again once you have that many bytes.
 pub const MBM_LENGTH_AT_LEAST: u8 = 1;
-/// Silence on the line tells, in ASCII the end character. `bytes` is 0.
+/// Silence on the line ends the frame; in ASCII the end character does. `bytes` is 0.
 pub const MBM_LENGTH_SILENCE: u8 = 2;
-/// Nobody knows this function: declare it. Also what silence ends, in RTU over TCP,
-/// where there is none. `bytes` is 0.
+/// The length is not known, because the function is not declared: see mbm_function. In
+/// RTU over TCP also for a function whose frames silence ends, because a stream has no
+/// silence. `bytes` is 0.
 pub const MBM_LENGTH_UNKNOWN: u8 = 3;
 
-/// How long something is.
+/// The length of a PDU or frame, as far as it is known.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_length {
-    /// All of it, from its first byte, as `kind` says.
+    /// The length in bytes from the first byte on; `kind` says how to read it.
     pub bytes: u16,
-    /// MBM_LENGTH_EXACT, _AT_LEAST, _SILENCE or _UNKNOWN.
+    /// MBM_LENGTH_EXACT, MBM_LENGTH_AT_LEAST, MBM_LENGTH_SILENCE or MBM_LENGTH_UNKNOWN.
     pub kind: u8,
 }
 
@@ -60,8 +62,9 @@ impl From<Length> for mbm_length {
     }
 }
 
-/// A request, response or exception of any function. Parsing zeroes it first,
-/// and sets what the function has; building reads that and ignores the rest:
+/// A request, response or exception of any function. Each function uses the fields in this
+/// table (function codes in hex). Parsing sets them and zeroes all others; building reads
+/// them and ignores all others.
 ///
 /// function | request | response
 /// ---------|---------|---------
@@ -83,74 +86,77 @@ impl From<Length> for mbm_length {
 /// 2B, others | meiType, data | meiType, data
 /// your own | data | data
 ///
-/// An exception has exceptionCode, and the function of the request. Register
-/// data are as on the wire, high bytes first; bits begin with the lowest of the
-/// first byte. Records and objects: mbm_packet_nextRecord, mbm_packet_addRecord
-/// and their likes for objects.
+/// An exception has exceptionCode, and the function code of the request. Register data are
+/// as on the wire, the high byte of each register first. Bits begin with the lowest bit of
+/// the first byte. To read records or objects, use mbm_packet_nextRecord and
+/// mbm_packet_nextObject; to write them, mbm_packet_addRecord and mbm_packet_addObject.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_packet {
-    /// The data, without the byte count in front of them. After parsing they
-    /// lie within the bytes that were parsed; to build, they are yours. May be
-    /// NULL if dataLength is 0.
+    /// The data, without the byte count before them. Parsing sets a pointer into the
+    /// parsed bytes. To build a packet, point it to bytes of yours. May be NULL if
+    /// dataLength is 0.
     pub data: *const u8,
-    /// Bytes of data.
+    /// Length of `data` in bytes.
     pub dataLength: u16,
-    /// Transaction identifier of a TCP frame; 0 in other framings.
+    /// The transaction identifier of a TCP frame; 0 in other framings.
     pub transaction: u16,
-    /// First coil, input or register, counted from 0; 17: that is read.
+    /// The first coil, input or register, counted from 0; for function 17 the first that
+    /// is read.
     pub address: u16,
-    /// Coils, inputs or registers; 17: that are read.
+    /// How many coils, inputs or registers; for function 17 how many are read.
     pub quantity: u16,
-    /// 17: first register that is written.
+    /// 17: the first register that is written.
     pub writeAddress: u16,
-    /// 17: registers that are written.
+    /// 17: how many registers are written.
     pub writeQuantity: u16,
-    /// 05: 0 is off, anything else is on (parsed: 1). 06: the register.
+    /// 05: 0 is off, any other value is on; parsing sets 1 for on. 06: the value of the
+    /// register.
     pub value: u16,
-    /// 16: bits that are kept.
+    /// 16: the bits that keep their value.
     pub andMask: u16,
-    /// 16: bits that replace those that are not kept.
+    /// 16: the new values of the other bits.
     pub orMask: u16,
-    /// 08: one of MBM_DIAGNOSTICS_.
+    /// 08: the sub-function, one of MBM_DIAGNOSTICS_...
     pub subFunction: u16,
-    /// 0B, 0C: FFFF while a command is carried out, else 0.
+    /// 0B, 0C: FFFF (hex) while the device carries out a command, else 0.
     pub commStatus: u16,
-    /// 0B, 0C: successful messages.
+    /// 0B, 0C: the count of successful messages.
     pub eventCount: u16,
-    /// 0C: messages.
+    /// 0C: the count of messages.
     pub messageCount: u16,
     /// MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE or MBM_PACKET_EXCEPTION.
     pub kind: u8,
-    /// The unit that is asked, or that answers. Of frames only.
+    /// The unit id that the request addresses, or that replies. Only frames have it.
     pub unit: u8,
-    /// Function code, 1 to 127; of an exception that of the request.
+    /// The function code, 1 to 127; of an exception the one of the request.
     pub function: u8,
-    /// Exception: 1 to 127, the same numbers as MBM_ILLEGAL_FUNCTION and others.
+    /// Exception: the code, 1 to 127. The numbers are those of MBM_ILLEGAL_FUNCTION and
+    /// the statuses after it.
     pub exceptionCode: u8,
-    /// 07: eight outputs.
+    /// 07: the eight outputs, one bit each.
     pub exceptionStatus: u8,
-    /// 11: the byte count. It is dataLength, or less: some devices count the id
-    /// only and send more behind it.
+    /// 11: the byte count, at most dataLength. Some devices count only the id and send
+    /// more bytes after it.
     pub byteCount: u8,
-    /// 2B: MBM_MEI_READ_DEVICE_IDENTIFICATION or another.
+    /// 2B: MBM_MEI_READ_DEVICE_IDENTIFICATION or another MEI type.
     pub meiType: u8,
-    /// 2B/0E: one of MBM_DEVICE_ID_.
+    /// 2B/0E: one of MBM_DEVICE_ID_...
     pub readDeviceIdCode: u8,
-    /// 2B/0E: the first object, or the only one.
+    /// 2B/0E: the first object to read, or the only one.
     pub objectId: u8,
-    /// 2B/0E: 01 to 03 or 81 to 83 by the standard; not checked.
+    /// 2B/0E: the conformity level, by the standard 01 to 03 or 81 to 83 (hex); not
+    /// checked.
     pub conformity: u8,
-    /// 2B/0E: 1 if another request is needed for the rest, else 0.
+    /// 2B/0E: 1 if the client has to send another request for the rest, else 0.
     pub moreFollows: u8,
-    /// 2B/0E: the object to ask for next; if none follows, 0 by the standard, and
-    /// not checked.
+    /// 2B/0E: the object to request next. By the standard 0 if none follows; not checked.
     pub nextObjectId: u8,
-    /// 2B/0E: how many objects the data are.
+    /// 2B/0E: how many objects `data` contains.
     pub objectCount: u8,
 }
 
-/// The side that C names.
+/// The kind of PDU for a number of C.
 pub(super) fn side(kind: u8) -> Result<PduKind, Status> {
     match kind {
         MBM_PACKET_REQUEST => Ok(PduKind::Request),
@@ -160,7 +166,7 @@ pub(super) fn side(kind: u8) -> Result<PduKind, Status> {
 }
 
 impl mbm_packet {
-    /// Its data; an error for a NULL pointer.
+    /// The data of the packet; an error for a NULL pointer with a length.
     ///
     /// # Safety
     /// `data` is NULL or points to `dataLength` bytes.
@@ -170,12 +176,12 @@ impl mbm_packet {
         data.ok_or(Status::INVALID_ARGUMENT)
     }
 
-    /// True if its data lie in a buffer that is to be written.
+    /// True if the data overlap a buffer that is to be written.
     pub(super) fn lies_in(&self, buffer: *const u8, capacity: u16) -> bool {
         overlap(self.data, self.dataLength, buffer, capacity)
     }
 
-    /// Writes the PDU with these data.
+    /// Writes the PDU of this packet, with `data` as its data.
     pub(super) fn emit(
         &self,
         data: &[u8],
@@ -188,7 +194,7 @@ impl mbm_packet {
         }
     }
 
-    /// Takes over the PDU from one side.
+    /// Sets the fields from a PDU.
     pub(super) fn take(
         &mut self,
         side: PduKind,
@@ -203,7 +209,7 @@ impl mbm_packet {
     }
 }
 
-/// The declaration of a function code among what C declares.
+/// The declaration of a function code in the array of C, or `None` without one.
 ///
 /// # Safety
 /// `functions` is NULL or points to `count` declarations.
@@ -217,7 +223,7 @@ pub(super) unsafe fn own(
     declared(functions.ok_or(Status::INVALID_ARGUMENT)?, code)
 }
 
-/// Measures the reply to a request, which must be one that can be built.
+/// Measures the reply to a request. Fails for a request that cannot be built.
 ///
 /// # Safety
 /// As for [`mbm_packet::data`].
@@ -235,18 +241,18 @@ pub(super) unsafe fn reply_length(
     Ok(measure(&request))
 }
 
-/// Hands a length to C; MBM_LENGTH_UNKNOWN with the status that says why there is
-/// none.
+/// Writes a length for C. Without a length it writes MBM_LENGTH_UNKNOWN and returns the
+/// status that says why.
 ///
 /// # Safety
 /// As for [`put`].
 pub(super) unsafe fn put_expected(place: *mut mbm_length, length: Result<Length, Status>) -> u8 {
-    let told = match length {
+    let known = match length {
         Ok(length) => length,
         Err(_) => Length::Unknown,
     };
     // SAFETY: as the caller promises.
-    let status = unsafe { put(place, told.into()) };
+    let status = unsafe { put(place, known.into()) };
     match length {
         Err(refused) if status == Status::OK.code() => refused.code(),
         _ => status,

@@ -1,6 +1,6 @@
-//! Values out of registers. What fails leaves the caller's value as it was.
+//! Reads values from registers. A call that fails leaves the caller's value unchanged.
 
-use super::{code, lent, mbm_registers, native, BorrowedRegisters, MBM_ORDER_DEFAULT};
+use super::{code, machine_order_mask, mbm_registers, view, BorrowedRegisters, MBM_ORDER_DEFAULT};
 use crate::pointers::{self, slice, slice_mut};
 use core::ffi::c_char;
 #[cfg(target_arch = "avr")]
@@ -8,27 +8,27 @@ use mbm::data::value::{ShortDouble, Value};
 use mbm::data::view::Registers;
 use mbm::error::Status;
 
-/// Puts what `question` finds where C wants it.
+/// Writes the value that `find` returns to `value`.
 ///
 /// # Safety
-/// As for [`lent`]; `answer` is NULL or points to a `T`.
-unsafe fn ask<T>(
+/// As for [`view`]; `value` is NULL or points to a `T`.
+unsafe fn get_value<T>(
     registers: *const mbm_registers,
-    answer: *mut T,
-    question: impl FnOnce(&Registers<BorrowedRegisters>) -> Result<T, Status>,
+    value: *mut T,
+    find: impl FnOnce(&Registers<BorrowedRegisters>) -> Result<T, Status>,
 ) -> u8 {
     // SAFETY: as the caller promises.
     code(unsafe {
-        lent(registers, MBM_ORDER_DEFAULT, false)
-            .and_then(|registers| pointers::put_result(answer, || question(&registers)))
+        view(registers, MBM_ORDER_DEFAULT, false)
+            .and_then(|registers| pointers::put_result(value, || find(&registers)))
     })
 }
 
-/// Puts the bytes of a number where C wants them, as this machine has them:
-/// all numbers of a size in one function, for flash.
+/// Writes the bytes of a number to `number`, in the byte order of this machine. One
+/// function for all numbers of a size keeps the code small.
 ///
 /// # Safety
-/// As for [`lent`]; `number` is NULL or points to one of `size` bytes.
+/// As for [`view`]; `number` is NULL or points to `size` bytes.
 #[cfg_attr(target_os = "none", inline(never))]
 unsafe fn get(
     registers: *const mbm_registers,
@@ -42,21 +42,21 @@ unsafe fn get(
     }
     // SAFETY: as the caller promises.
     code(unsafe {
-        lent(registers, order, false).and_then(|registers| {
-            let mask = registers.order.mask(size) ^ native(size);
+        view(registers, order, false).and_then(|registers| {
+            let mask = registers.order.mask(size) ^ machine_order_mask(size);
             registers.load(address, mask, slice_mut(number, size)?)
         })
     })
 }
 
-/// One bit of a register.
+/// Reads one bit of a register.
 ///
 /// @param registers  the registers
-/// @param address    the register, by the device's address
+/// @param address    the device's address of the register
 /// @param bit        0, the least significant, to 15
-/// @param on         gets 0 or 1
-/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for a register that is not there,
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `on` unchanged
+/// @param on         receives 0 or 1
+/// @return MBM_OK; or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS if the register does
+///         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getBit(
     registers: *const mbm_registers,
@@ -66,21 +66,22 @@ pub unsafe extern "C" fn mbm_registers_getBit(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        ask(registers, on, |registers| {
+        get_value(registers, on, |registers| {
             registers.bit(address, bit).map(u8::from)
         })
     }
 }
 
-/// One byte of a register, 0 to 255; for a signed one, cast the pointer to an int8_t.
+/// Reads one byte of a register, 0 to 255. For a signed byte, pass a pointer to an
+/// int8_t, cast to uint8_t *.
 ///
 /// @param registers  the registers
-/// @param address    the register, by the device's address
-/// @param high       0 for the low byte, anything else for the high byte, which
-///                   travels first
-/// @param value      gets the byte
-/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for a register that is not there,
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+/// @param address    the device's address of the register
+/// @param high       0 for the low byte, anything else for the high byte, which is
+///                   transmitted first
+/// @param value      receives the byte
+/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if the register
+///         does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getUint8(
     registers: *const mbm_registers,
@@ -90,21 +91,21 @@ pub unsafe extern "C" fn mbm_registers_getUint8(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        ask(registers, value, |registers| {
+        get_value(registers, value, |registers| {
             registers.u8(address, high != 0)
         })
     }
 }
 
-/// A number of one register, 0 to 65535; for a signed number, cast the pointer to an
-/// int16_t. Of the order only the bytes matter.
+/// Reads a number of one register, 0 to 65535. For a signed number, pass a pointer to an
+/// int16_t, cast to uint16_t *. The order of words has no effect; the order of bytes has.
 ///
 /// @param registers  the registers
-/// @param address    the register, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
-/// @param value      gets the number
-/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for a register that is not there,
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+/// @param address    the device's address of the register
+/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+/// @param value      receives the number
+/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if the register
+///         does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getUint16(
     registers: *const mbm_registers,
@@ -116,15 +117,15 @@ pub unsafe extern "C" fn mbm_registers_getUint16(
     unsafe { get(registers, address, order, value.cast(), 2) }
 }
 
-/// A number of two registers, 0 to 4294967295; for a signed number (two's complement),
-/// cast the pointer to an int32_t.
+/// Reads a number of two registers, 0 to 4294967295. For a signed number (two's
+/// complement), pass a pointer to an int32_t, cast to uint32_t *.
 ///
 /// @param registers  the registers
-/// @param address    the first of its registers, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
-/// @param value      gets the number
-/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for two registers that are not both there,
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+/// @param address    the device's address of the first of its registers
+/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+/// @param value      receives the number
+/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the two
+///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getUint32(
     registers: *const mbm_registers,
@@ -136,14 +137,15 @@ pub unsafe extern "C" fn mbm_registers_getUint32(
     unsafe { get(registers, address, order, value.cast(), 4) }
 }
 
-/// A number of four registers; for a signed number, cast the pointer to an int64_t.
+/// Reads a number of four registers. For a signed number, pass a pointer to an int64_t,
+/// cast to uint64_t *.
 ///
 /// @param registers  the registers
-/// @param address    the first of its registers, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
-/// @param value      gets the number
-/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for four registers that are not all there,
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+/// @param address    the device's address of the first of its registers
+/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+/// @param value      receives the number
+/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the four
+///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getUint64(
     registers: *const mbm_registers,
@@ -155,15 +157,15 @@ pub unsafe extern "C" fn mbm_registers_getUint64(
     unsafe { get(registers, address, order, value.cast(), 8) }
 }
 
-/// A float of two registers, an IEEE 754 binary32. Its bits are copied, those
-/// of what is not a number too.
+/// Reads a float of two registers, an IEEE 754 binary32. Its bits are copied, also those
+/// of a NaN.
 ///
 /// @param registers  the registers
-/// @param address    the first of its registers, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
-/// @param value      gets the number
-/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for two registers that are not both there,
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+/// @param address    the device's address of the first of its registers
+/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+/// @param value      receives the number
+/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the two
+///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getFloat(
     registers: *const mbm_registers,
@@ -175,15 +177,15 @@ pub unsafe extern "C" fn mbm_registers_getFloat(
     unsafe { get(registers, address, order, value.cast(), 4) }
 }
 
-/// A double of four registers, an IEEE 754 binary64. Its bits are copied; on AVR,
-/// where C's double has 32 bits (-mdouble=32), it is rounded to the nearest.
+/// Reads a double of four registers, an IEEE 754 binary64. Its bits are copied. On AVR,
+/// where a double of C has 32 bits (-mdouble=32), the number is rounded to the nearest.
 ///
 /// @param registers  the registers
-/// @param address    the first of its registers, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
-/// @param value      gets the number
-/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for four registers that are not all there,
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+/// @param address    the device's address of the first of its registers
+/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+/// @param value      receives the number
+/// @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the four
+///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getDouble(
     registers: *const mbm_registers,
@@ -210,22 +212,22 @@ pub unsafe extern "C" fn mbm_registers_getDouble(
     }
 }
 
-/// A text, which ends at its first NUL or with its field.
+/// Reads a text. It ends at its first NUL or at the end of its field.
 ///
-/// Its registers follow each other in every order. In one with the low byte
-/// first, the first of two characters is a register's low byte. Characters are
-/// copied as they are, ASCII or not.
+/// The registers of a text follow each other in every order. In an order with the low
+/// byte first, the first of two characters is the low byte of a register. Characters are
+/// copied without a check, also if they are not ASCII.
 ///
 /// @param registers  the registers
-/// @param address    the first of its registers, by the device's address
-/// @param length     bytes of its field, two a register; an odd one ends with a
-///                   register's first character
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
-/// @param text       gets the text and a NUL
-/// @param capacity   bytes of `text`; `length + 1` are always enough
-/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the field is not all there,
-///         MBM_BUFFER_TOO_SMALL, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED,
-///         with `text` unchanged
+/// @param address    the device's address of the first register of the field
+/// @param length     length of the field in bytes, two for each register; an odd length
+///                   ends with the first character of a register
+/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+/// @param text       receives the text and a NUL
+/// @param capacity   size of `text` in bytes; `length + 1` are always enough
+/// @return MBM_OK; or with `text` unchanged MBM_ILLEGAL_DATA_ADDRESS if part of the field
+///         does not exist, MBM_BUFFER_TOO_SMALL, MBM_INVALID_ARGUMENT or
+///         MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getString(
     registers: *const mbm_registers,
@@ -240,7 +242,7 @@ pub unsafe extern "C" fn mbm_registers_getString(
     }
     // SAFETY: as the header demands.
     code(unsafe {
-        lent(registers, order, false).and_then(|registers| {
+        view(registers, order, false).and_then(|registers| {
             let text = slice_mut::<u8>(text.cast(), capacity.into())?;
             let (end, place) = text.split_last_mut().ok_or(Status::BUFFER_TOO_SMALL)?;
             let count = registers.text(address, length.into(), place)?.len();
@@ -250,17 +252,17 @@ pub unsafe extern "C" fn mbm_registers_getString(
     })
 }
 
-/// Raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each register comes
-/// first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte, for a device
-/// that swaps the bytes of its registers.
+/// Reads raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each register
+/// is first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte, for a
+/// device that swaps the bytes of its registers.
 ///
 /// @param registers  the registers
-/// @param address    the first register, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
-/// @param bytes      gets the bytes; must not overlap the registers
-/// @param length     how many bytes, two a register; may be odd
-/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if there are not so many,
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `bytes` unchanged
+/// @param address    the device's address of the first register
+/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+/// @param bytes      receives the bytes; must not overlap the registers
+/// @param length     how many bytes, two for each register; may be odd
+/// @return MBM_OK; or with `bytes` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the
+///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_getBytes(
     registers: *const mbm_registers,
@@ -271,23 +273,24 @@ pub unsafe extern "C" fn mbm_registers_getBytes(
 ) -> u8 {
     // SAFETY: as the header demands.
     code(unsafe {
-        lent(registers, order, false).and_then(|registers| {
+        view(registers, order, false).and_then(|registers| {
             let bytes = slice_mut(bytes, length.into())?;
             registers.bytes_in(registers.order, address, bytes)
         })
     })
 }
 
-/// Whether registers hold these raw bytes, high byte first in every order.
+/// Compares registers with raw bytes, the high byte of each register first in every
+/// order.
 ///
 /// @param registers  the registers
-/// @param address    the register whose high byte is the first, by the device's
-///                   address
+/// @param address    the device's address of the register whose high byte is compared
+///                   with the first byte
 /// @param bytes      the bytes to compare with
-/// @param length     how many bytes, two a register; may be odd
-/// @param equal      gets 0 or 1
-/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if there are not so many,
-///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `equal` unchanged
+/// @param length     how many bytes, two for each register; may be odd
+/// @param equal      receives 1 if all bytes are equal, else 0
+/// @return MBM_OK; or with `equal` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the
+///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_isEqual(
     registers: *const mbm_registers,
@@ -298,7 +301,7 @@ pub unsafe extern "C" fn mbm_registers_isEqual(
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe {
-        ask(registers, equal, |registers| {
+        get_value(registers, equal, |registers| {
             let bytes = slice(bytes, length.into())?;
             registers.is_equal(address, bytes).map(u8::from)
         })

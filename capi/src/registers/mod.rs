@@ -1,5 +1,5 @@
-//! `mbm_registers_*`: received words or bytes as values, and values into what
-//! is to be sent.
+//! `mbm_registers_*`: reads values from received registers, and writes values into
+//! registers to be sent.
 
 mod get;
 mod set;
@@ -13,50 +13,54 @@ use mbm::data::order::Order;
 use mbm::data::view::{RegisterBytes, RegisterBytesMut, Registers};
 use mbm::error::Status;
 
-/// The order of the registers that a function is given; in these, MBM_ORDER_ABCD.
+/// Passed to a function: use the order of the mbm_registers. As that order itself:
+/// MBM_ORDER_ABCD.
 pub const MBM_ORDER_DEFAULT: u8 = 0;
-/// High word first, high byte first: what most devices do. A is the most
-/// significant byte; 2923517522, which is 0xAE415652, arrives as AE41 5652.
+/// High word first, high byte first, as most devices do. A is the most significant byte.
+/// Example: 2923517522, which is 0xAE415652, is transmitted as AE41 5652 (hex).
 pub const MBM_ORDER_ABCD: u8 = 1;
-/// Low word first, high byte first: 5652 AE41.
+/// Low word first, high byte first. The example is transmitted as 5652 AE41.
 pub const MBM_ORDER_CDAB: u8 = 2;
-/// High word first, low byte first: 41AE 5256.
+/// High word first, low byte first. The example is transmitted as 41AE 5256.
 pub const MBM_ORDER_BADC: u8 = 3;
-/// Low word first, low byte first: 5256 41AE.
+/// Low word first, low byte first. The example is transmitted as 5256 41AE.
 pub const MBM_ORDER_DCBA: u8 = 4;
 
-/// mbm_registers.kind: words to read, as those of mbm_master.
+/// mbm_registers.kind: words that may only be read, for example the response words of
+/// mbm_master.
 pub const MBM_REGISTERS_OF_WORDS: u8 = 1;
-/// mbm_registers.kind: bytes to read, high byte first.
+/// mbm_registers.kind: bytes that may only be read, the high byte of each register first.
 pub const MBM_REGISTERS_OF_BYTES: u8 = 2;
-/// mbm_registers.kind: words to write and to read.
+/// mbm_registers.kind: words that may be read and written.
 pub const MBM_REGISTERS_INTO_WORDS: u8 = 3;
-/// mbm_registers.kind: bytes to write and to read, high byte first.
+/// mbm_registers.kind: bytes that may be read and written, the high byte of each register
+/// first.
 pub const MBM_REGISTERS_INTO_BYTES: u8 = 4;
 
-/// Registers in a row, seen as values by the addresses that the device gives
-/// them. It owns nothing: what `data` points to is the caller's.
+/// A view of consecutive registers, with the addresses that the device gives them. The
+/// view owns nothing: `data` points to memory of the program.
 ///
-/// One of the functions mbm_registers_of... and mbm_registers_into... fills it
-/// in, as do mbm_master_getResponseRegisters and mbm_master_getTransmitRegisters;
-/// each field may be set by hand too. Functions that get or set do not change
-/// it, so any thread may use it beside others that only get.
+/// mbm_registers_ofWords, ofBytes, intoWords and intoBytes fill the view in; so do
+/// mbm_master_getResponseRegisters and mbm_master_getTransmitRegisters. You may also set
+/// each field yourself. The get and set functions do not change the view. Several threads
+/// may use one view at the same time as long as none of them writes the registers.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_registers {
-    /// The words or bytes, as `kind` says. NULL: none, MBM_NOT_INITIALISED.
+    /// The words or bytes; `kind` says which. If it is NULL, every function returns
+    /// MBM_NOT_INITIALISED.
     pub data: *const c_void,
     /// The device's address of the first register.
     pub first: u16,
-    /// How many registers there are; `first + count` is 65536 at most.
+    /// How many registers; `first + count` is at most 65536.
     pub count: u16,
     /// One of MBM_REGISTERS_...
     pub kind: u8,
-    /// One of MBM_ORDER_..., for calls that say MBM_ORDER_DEFAULT.
+    /// One of MBM_ORDER_...: the order for calls with MBM_ORDER_DEFAULT.
     pub order: u8,
 }
 
-/// The order that a call names, or `default` where it names none.
+/// The order that a call names; `default` for MBM_ORDER_DEFAULT.
 pub(super) fn order(code: u8, default: Order) -> Result<Order, Status> {
     match code {
         MBM_ORDER_DEFAULT => Ok(default),
@@ -76,20 +80,20 @@ fn code(result: Result<(), Status>) -> u8 {
 struct BorrowedRegisters {
     bytes: *mut u8,
     length: usize,
-    /// 1 where words have their low byte first, so that each two bytes have
-    /// changed places.
+    /// 1 if the machine stores the low byte of a word first, so that the two bytes of
+    /// each register are exchanged; else 0.
     swapped: usize,
 }
 
-// SAFETY, here and below: [`lent`] was promised so many bytes, which nobody
-// else uses meanwhile; one beyond them is not touched.
+// SAFETY, here and below: the caller of [`view`] promises that `bytes` points to `length`
+// bytes, which nothing else uses meanwhile. Each access is checked against `length`.
 impl RegisterBytes for BorrowedRegisters {
     fn length(&self) -> usize {
         self.length
     }
 
     fn byte(&self, place: usize) -> Option<u8> {
-        // SAFETY: see above; both bytes of a register are there, or none.
+        // SAFETY: see above; `length` is even, so the other byte of the register exists too.
         (place < self.length).then(|| unsafe { *self.bytes.add(place ^ self.swapped) })
     }
 }
@@ -97,21 +101,21 @@ impl RegisterBytes for BorrowedRegisters {
 impl RegisterBytesMut for BorrowedRegisters {
     fn set_byte(&mut self, place: usize, value: u8) {
         if place < self.length {
-            // SAFETY: see above; lent to write, as the kind says.
+            // SAFETY: see above; `view` has checked that the kind allows writing.
             unsafe { *self.bytes.add(place ^ self.swapped) = value };
         }
     }
 }
 
-/// The registers behind a pointer, their values in the order of this call.
+/// The registers of an `mbm_registers`, with the order of this call.
 ///
 /// # Safety
-/// `registers` is NULL or points to an `mbm_registers`, whose data, unless NULL,
-/// is what its other fields say; nobody else uses that while the result lives.
+/// `registers` is NULL or points to an `mbm_registers`. Its `data` is NULL or points to what
+/// the other fields say, which nothing else uses while the result lives.
 #[cfg_attr(target_os = "none", inline(never))]
-unsafe fn lent(
+unsafe fn view(
     registers: *const mbm_registers,
-    call: u8,
+    call_order: u8,
     to_write: bool,
 ) -> Result<Registers<BorrowedRegisters>, Status> {
     // SAFETY: as the caller promises.
@@ -126,18 +130,18 @@ unsafe fn lent(
         MBM_REGISTERS_OF_BYTES if !to_write => false,
         _ => return Err(Status::INVALID_ARGUMENT),
     };
-    let own = order(fields.order, Order::Abcd)?;
+    let default = order(fields.order, Order::Abcd)?;
     let cells = BorrowedRegisters {
         bytes: fields.data.cast_mut().cast(),
         length: usize::from(fields.count).saturating_mul(2),
         swapped: (words && cfg!(target_endian = "little")).into(),
     };
-    Registers::new(cells, fields.first, order(call, own)?)
+    Registers::new(cells, fields.first, order(call_order, default)?)
 }
 
-/// What the places of a number's bytes on this machine differ by from those of
-/// the bytes with the most significant first.
-const fn native(size: usize) -> usize {
+/// The mask that converts an index of a byte of a number, most significant byte first, to
+/// the index in this machine's byte order.
+const fn machine_order_mask(size: usize) -> usize {
     if cfg!(target_endian = "little") {
         size - 1
     } else {
@@ -145,10 +149,10 @@ const fn native(size: usize) -> usize {
     }
 }
 
-/// Fills a view in; one that cannot be is left without data.
+/// Fills a view in. If the arguments are invalid, the view has no data.
 ///
 /// # Safety
-/// `registers` is NULL or points to an `mbm_registers`, which may be anything.
+/// `registers` is NULL or points to an `mbm_registers`, with any content.
 unsafe fn fill(
     registers: *mut mbm_registers,
     data: *const c_void,
@@ -172,7 +176,7 @@ unsafe fn fill(
         core::ptr::null()
     };
     let order = MBM_ORDER_ABCD;
-    // SAFETY: not NULL, so room for a view.
+    // SAFETY: not NULL, so it points to a view.
     unsafe {
         registers.write(mbm_registers {
             data,
@@ -185,14 +189,16 @@ unsafe fn fill(
     status.code()
 }
 
-/// Sees words that were read as registers, in order MBM_ORDER_ABCD until
-/// `registers->order` is set. Copies nothing: it sees what the words are then.
+/// Fills in a view of words that were read as registers. The order is MBM_ORDER_ABCD
+/// until you set `registers->order`. Nothing is copied: the view always shows the present
+/// words.
 ///
-/// @param registers  the view to fill in
-/// @param words      words as mbm_master's response words; valid while it is used
+/// @param registers  the view to fill in; without data after an error
+/// @param words      the words, for example the response words of mbm_master; must stay
+///                   valid while the view is used
 /// @param count      how many words
-/// @param first      the device's address of the first, 0 to 65535
-/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if they pass address 65535, or
+/// @param first      the device's address of the first register, 0 to 65535
+/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535, or
 ///         MBM_INVALID_ARGUMENT for a NULL pointer
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_ofWords(
@@ -213,15 +219,15 @@ pub unsafe extern "C" fn mbm_registers_ofWords(
     }
 }
 
-/// As mbm_registers_ofWords, of the data bytes of a reply or a request.
+/// As mbm_registers_ofWords, for the data bytes of a reply or a request.
 ///
-/// @param registers  the view to fill in
-/// @param bytes      register bytes, each high byte first (V1.1b3, 4.2); valid
-///                   while it is used
+/// @param registers  the view to fill in; without data after an error
+/// @param bytes      the bytes, the high byte of each register first (V1.1b3, 4.2); must
+///                   stay valid while the view is used
 /// @param length     how many bytes, an even number
 /// @param first      the device's address of the first register, 0 to 65535
-/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if they pass address 65535, or
-///         MBM_INVALID_ARGUMENT for a NULL pointer or odd bytes
+/// @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535, or
+///         MBM_INVALID_ARGUMENT for a NULL pointer or an odd length
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_ofBytes(
     registers: *mut mbm_registers,
@@ -246,14 +252,14 @@ pub unsafe extern "C" fn mbm_registers_ofBytes(
     }
 }
 
-/// As mbm_registers_ofWords, of words that are also written, such as
-/// mbm_master's transmit words.
+/// As mbm_registers_ofWords, for words that you also write, for example the transmit
+/// words of mbm_master.
 ///
-/// @param registers  the view to fill in
-/// @param words      words to write; valid while it is used
+/// @param registers  the view to fill in; without data after an error
+/// @param words      the words to write; must stay valid while the view is used
 /// @param count      how many words
-/// @param first      the device's address of the first, 0 to 65535
-/// @return as mbm_registers_ofWords
+/// @param first      the device's address of the first register, 0 to 65535
+/// @return a status; see mbm_registers_ofWords
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_intoWords(
     registers: *mut mbm_registers,
@@ -273,13 +279,13 @@ pub unsafe extern "C" fn mbm_registers_intoWords(
     }
 }
 
-/// As mbm_registers_ofBytes, of bytes that are also written.
+/// As mbm_registers_ofBytes, for bytes that you also write.
 ///
-/// @param registers  the view to fill in
-/// @param bytes      register bytes to write; valid while it is used
+/// @param registers  the view to fill in; without data after an error
+/// @param bytes      the bytes to write; must stay valid while the view is used
 /// @param length     how many bytes, an even number
 /// @param first      the device's address of the first register, 0 to 65535
-/// @return as mbm_registers_ofBytes
+/// @return a status; see mbm_registers_ofBytes
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_intoBytes(
     registers: *mut mbm_registers,

@@ -1,9 +1,9 @@
-//! Values into registers. What fails leaves the registers as they were.
+//! Writes values into registers. A call that fails leaves the registers unchanged.
 //!
-//! Numbers of 64 bits and floats come by pointer: what passes through registers
-//! of the processor differs between compilers and float units.
+//! Numbers of 64 bits and floats are passed by pointer, because compilers and float units
+//! pass them by value in different ways.
 
-use super::{code, lent, mbm_registers, native, BorrowedRegisters, MBM_ORDER_DEFAULT};
+use super::{code, machine_order_mask, mbm_registers, view, BorrowedRegisters, MBM_ORDER_DEFAULT};
 use crate::pointers::{self, slice};
 use core::ffi::c_char;
 #[cfg(target_arch = "avr")]
@@ -11,24 +11,24 @@ use mbm::data::value::{ShortDouble, Value};
 use mbm::data::view::Registers;
 use mbm::error::Status;
 
-/// Runs `action` on registers to write.
+/// Runs `action` on registers that may be written.
 ///
 /// # Safety
-/// As for [`lent`].
+/// As for [`view`].
 unsafe fn with(
     registers: *const mbm_registers,
     order: u8,
     action: impl FnOnce(&mut Registers<BorrowedRegisters>) -> Result<(), Status>,
 ) -> u8 {
     // SAFETY: as the caller promises.
-    code(unsafe { lent(registers, order, true) }.and_then(|mut registers| action(&mut registers)))
+    code(unsafe { view(registers, order, true) }.and_then(|mut registers| action(&mut registers)))
 }
 
-/// Sets a number from its bytes as this machine has them: all numbers of a size
-/// in one function, for flash.
+/// Sets a number from its bytes in the byte order of this machine. One function for all
+/// numbers of a size keeps the code small.
 ///
 /// # Safety
-/// As for [`lent`]; `number` is NULL or points to one of `size` bytes.
+/// As for [`view`]; `number` is NULL or points to `size` bytes.
 #[cfg_attr(target_os = "none", inline(never))]
 unsafe fn set(
     registers: *const mbm_registers,
@@ -40,20 +40,20 @@ unsafe fn set(
     // SAFETY: as the caller promises.
     unsafe {
         with(registers, order, |registers| {
-            let mask = registers.order.mask(size) ^ native(size);
+            let mask = registers.order.mask(size) ^ machine_order_mask(size);
             registers.store(address, mask, slice(number, size)?)
         })
     }
 }
 
-/// Sets one bit of a register; the others stay.
+/// Writes one bit of a register; the other bits do not change.
 ///
-/// @param registers  the registers, of a kind to write
-/// @param address    the register, by the device's address
+/// @param registers  the registers, of a kind that may be written
+/// @param address    the device's address of the register
 /// @param bit        0, the least significant, to 15
-/// @param on         0 is off, anything else is on
-/// @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a register that
-///         is not there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @param on         0 for off, anything else for on
+/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if the register does
+///         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setBit(
     registers: *const mbm_registers,
@@ -69,15 +69,15 @@ pub unsafe extern "C" fn mbm_registers_setBit(
     }
 }
 
-/// Sets one byte of a register; the other stays.
+/// Writes one byte of a register; the other byte does not change.
 ///
-/// @param registers  the registers, of a kind to write
-/// @param address    the register, by the device's address
-/// @param high       0 for the low byte, anything else for the high byte, which
-///                   travels first
+/// @param registers  the registers, of a kind that may be written
+/// @param address    the device's address of the register
+/// @param high       0 for the low byte, anything else for the high byte, which is
+///                   transmitted first
 /// @param value      the byte
-/// @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a register that
-///         is not there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if the register does
+///         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setUint8(
     registers: *const mbm_registers,
@@ -93,14 +93,15 @@ pub unsafe extern "C" fn mbm_registers_setUint8(
     }
 }
 
-/// Sets a number of one register. Of the order only the bytes matter.
+/// Writes a number into one register. The order of words has no effect; the order of
+/// bytes has.
 ///
-/// @param registers  the registers, of a kind to write
-/// @param address    the register, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+/// @param registers  the registers, of a kind that may be written
+/// @param address    the device's address of the register
+/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      the number
-/// @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a register
-///         that is not there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if the register does
+///         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setUint16(
     registers: *const mbm_registers,
@@ -112,14 +113,14 @@ pub unsafe extern "C" fn mbm_registers_setUint16(
     unsafe { set(registers, address, order, (&raw const value).cast(), 2) }
 }
 
-/// Sets a number of two registers.
+/// Writes a number into two registers.
 ///
-/// @param registers  the registers, of a kind to write
-/// @param address    the first of its registers, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+/// @param registers  the registers, of a kind that may be written
+/// @param address    the device's address of the first of its registers
+/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      the number
-/// @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for two registers
-///         that are not both there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the two
+///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setUint32(
     registers: *const mbm_registers,
@@ -131,14 +132,14 @@ pub unsafe extern "C" fn mbm_registers_setUint32(
     unsafe { set(registers, address, order, (&raw const value).cast(), 4) }
 }
 
-/// Sets a number of four registers.
+/// Writes a number into four registers.
 ///
-/// @param registers  the registers, of a kind to write
-/// @param address    the first of its registers, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+/// @param registers  the registers, of a kind that may be written
+/// @param address    the device's address of the first of its registers
+/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      points to the number
-/// @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for four registers
-///         that are not all there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the four
+///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setUint64(
     registers: *const mbm_registers,
@@ -150,14 +151,14 @@ pub unsafe extern "C" fn mbm_registers_setUint64(
     unsafe { set(registers, address, order, value.cast(), 8) }
 }
 
-/// Sets a float of two registers, an IEEE 754 binary32. Its bits are copied.
+/// Writes a float into two registers, as an IEEE 754 binary32. Its bits are copied.
 ///
-/// @param registers  the registers, of a kind to write
-/// @param address    the first of its registers, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+/// @param registers  the registers, of a kind that may be written
+/// @param address    the device's address of the first of its registers
+/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      points to the number
-/// @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for two registers
-///         that are not both there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the two
+///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setFloat(
     registers: *const mbm_registers,
@@ -169,15 +170,15 @@ pub unsafe extern "C" fn mbm_registers_setFloat(
     unsafe { set(registers, address, order, value.cast(), 4) }
 }
 
-/// Sets a double of four registers, an IEEE 754 binary64. On AVR, where C's
-/// double has 32 bits (-mdouble=32), to the value that it has there.
+/// Writes a double into four registers, as an IEEE 754 binary64. On AVR, where a double
+/// of C has 32 bits (-mdouble=32), it is converted without loss.
 ///
-/// @param registers  the registers, of a kind to write
-/// @param address    the first of its registers, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+/// @param registers  the registers, of a kind that may be written
+/// @param address    the device's address of the first of its registers
+/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param value      points to the number
-/// @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for four registers
-///         that are not all there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the four
+///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setDouble(
     registers: *const mbm_registers,
@@ -204,17 +205,17 @@ pub unsafe extern "C" fn mbm_registers_setDouble(
     }
 }
 
-/// Fills a field with a text and NULs behind it, laid out as
-/// mbm_registers_getString reads it.
+/// Writes a text into a field and fills the rest of the field with NULs, in the layout
+/// that mbm_registers_getString reads.
 ///
-/// @param registers  the registers, of a kind to write
-/// @param address    the first of its registers, by the device's address
-/// @param length     bytes of the field, two a register; if it is odd, the byte
-///                   behind the field becomes 0 too
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
-/// @param text       ends with a NUL, which needs no room in the field
-/// @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS if the field is not
-///         all there, MBM_BUFFER_TOO_SMALL for a text longer than the field,
+/// @param registers  the registers, of a kind that may be written
+/// @param address    the device's address of the first register of the field
+/// @param length     length of the field in bytes, two for each register; if it is odd,
+///                   the byte after the field becomes 0 too
+/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+/// @param text       the text; ends with a NUL, which need not fit into the field
+/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if part of the field
+///         does not exist, MBM_BUFFER_TOO_SMALL if the text is longer than the field,
 ///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setString(
@@ -233,18 +234,18 @@ pub unsafe extern "C" fn mbm_registers_setString(
     }
 }
 
-/// Sets raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each register
-/// comes first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte, for a
-/// device that swaps the bytes of its registers.
+/// Writes raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each
+/// register is first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low
+/// byte, for a device that swaps the bytes of its registers.
 ///
-/// @param registers  the registers, of a kind to write
-/// @param address    the first register, by the device's address
-/// @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+/// @param registers  the registers, of a kind that may be written
+/// @param address    the device's address of the first register
+/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
 /// @param bytes      the bytes; must not overlap the registers
-/// @param length     how many bytes, two a register; if odd, the other byte of the
-///                   last register stays
-/// @return MBM_OK, or with nothing changed MBM_ILLEGAL_DATA_ADDRESS if there are not so
-///         many, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @param length     how many bytes, two for each register; if it is odd, the other byte
+///                   of the last register does not change
+/// @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the
+///         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registers_setBytes(
     registers: *const mbm_registers,

@@ -1,4 +1,4 @@
-//! Beginning a server, and how it behaves.
+//! The functions that begin a server, and its settings.
 
 use super::{mbm_server, mbm_unit, Core};
 use crate::framing::MBM_MAX_TCP_FRAME;
@@ -7,14 +7,14 @@ use crate::port::{countable, mbm_port};
 use mbm::error::Status;
 use mbm::time;
 
-/// The least that a frame buffer may have for RTU.
-const LEAST: u16 = 16;
+/// The shortest frame buffer for RTU, in bytes.
+const MIN_FRAME: u16 = 16;
 
-/// Begins a server: port, units and a buffer are all checked, then all kept; `framing`
-/// does the rest.
+/// Begins a server: checks the port, the units and the buffer, then stores all of them.
+/// `framing` sets the framing.
 ///
 /// # Safety
-/// As the header demands of each argument.
+/// Each argument is as the header requires.
 #[cfg_attr(target_os = "none", inline(never))]
 unsafe fn begin(
     server: *mut mbm_server,
@@ -25,11 +25,12 @@ unsafe fn begin(
     bytes: u16,
     framing: fn(&mut Core),
 ) -> Status {
-    if server.is_null() || port.is_null() || units.is_null() || frame.is_null() || bytes < LEAST {
+    if server.is_null() || port.is_null() || units.is_null() || frame.is_null() || bytes < MIN_FRAME
+    {
         return Status::INVALID_ARGUMENT;
     }
-    // SAFETY: not NULL, so a port, and an object of which zero is a value of
-    // every field.
+    // SAFETY: not NULL, so a port and the storage of an object. Zero is a valid value of
+    // every field of the object.
     unsafe {
         if !(*port).is_complete() {
             return Status::INVALID_ARGUMENT;
@@ -39,7 +40,7 @@ unsafe fn begin(
         }
         let core = object(server);
         with_hooks(server, || {
-            // The driver of the port that the object had is not left on.
+            // The previous port must not keep its driver switched on.
             if (*core).is_sending() {
                 if let Some(post) = (*core).port.postTransmission {
                     post((*core).port.context);
@@ -56,25 +57,26 @@ unsafe fn begin(
     Status::OK
 }
 
-/// Begins to serve units on a serial line, RTU. The rate is untold, so a frame
-/// ends with 4 ms of silence: see mbm_server_setBaudRate.
+/// Begins a server for RTU on a serial line. The baud rate is unknown at first, so 4 ms
+/// of silence end a frame: see mbm_server_setBaudRate.
 ///
-/// May be called again at any time but from within its hooks; what was under way
-/// is dropped; where a response was leaving, the port that the object had is called
-/// to switch its driver off. A call that is refused changes nothing. Opens nothing: the port is
-/// open already. Units are yours, may be shared between
-/// servers, and stay where they are for as long as the object is used, as does
-/// the buffer, which keeps nothing between requests.
+/// You may call it again at any time, but not from within a hook of the server. The
+/// server then drops the request or response in progress; if it was sending, it calls
+/// postTransmission of the previous port to switch the driver off. A call that fails
+/// changes nothing. The function does not open the port. The units and the buffer must
+/// stay valid, at the same address, for as long as the server is used. Several servers
+/// may share units. The buffer holds no data between requests.
 ///
-/// @param server  the object; zeroed before the first call
-/// @param port    copied; read, write and micros must be there
-/// @param units   what is served: one unit, or an array of them
+/// @param server  the object; zero it before the first call
+/// @param port    is copied; its hooks read, write and micros are required
+/// @param units   the units to serve: one unit, or an array of units
 /// @param count   how many units
-/// @param frame   bytes of one frame, for requests and responses
-/// @param bytes   at least 16; MBM_MAX_FRAME hold any frame. Longer
-///                requests are not heard, longer responses become exception 04
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or a
-///         buffer that is too short; MBM_BUSY from within a hook of this server
+/// @param frame   buffer for one frame, a request or a response
+/// @param bytes   size of `frame` in bytes, at least 16. MBM_MAX_FRAME holds every frame.
+///                The server ignores a longer request, and answers exception 04 in place
+///                of a longer response
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or a buffer
+///         that is too short; MBM_BUSY from within a hook of this server
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginRtu(
     server: *mut mbm_server,
@@ -88,15 +90,16 @@ pub unsafe extern "C" fn mbm_server_beginRtu(
     unsafe { begin(server, port, units, count, frame, bytes, Core::begin_rtu) }.code()
 }
 
-/// Begins to serve units on a serial line, ASCII (serial line guide V1.02,
-/// 2.5.2). A frame whose next character takes longer than a second is dropped.
+/// Begins a server for ASCII on a serial line (serial line guide V1.02, 2.5.2). The
+/// server drops a frame if the next character takes longer than one second.
 ///
 /// @param server  see mbm_server_beginRtu
 /// @param port    see mbm_server_beginRtu
 /// @param units   see mbm_server_beginRtu
 /// @param count   see mbm_server_beginRtu
 /// @param frame   see mbm_server_beginRtu
-/// @param bytes   at least 32; MBM_MAX_ASCII_FRAME hold any frame
+/// @param bytes   size of `frame` in bytes, at least 32; MBM_MAX_ASCII_FRAME holds every
+///                frame
 /// @return a status; see mbm_server_beginRtu
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginAscii(
@@ -107,22 +110,23 @@ pub unsafe extern "C" fn mbm_server_beginAscii(
     frame: *mut u8,
     bytes: u16,
 ) -> u8 {
-    if bytes < 2 * LEAST {
+    if bytes < 2 * MIN_FRAME {
         return Status::INVALID_ARGUMENT.code();
     }
     // SAFETY: as the header demands.
     unsafe { begin(server, port, units, count, frame, bytes, Core::begin_ascii) }.code()
 }
 
-/// Begins to serve units on a TCP connection that was accepted. Requests that
-/// wait behind one another in the stream are answered in turn.
+/// Begins a server on an accepted TCP connection. If several requests are in the stream,
+/// the server answers them in order.
 ///
 /// @param server  see mbm_server_beginRtu; one for each connection
-/// @param port    see mbm_server_beginRtu; read, write and clock of the connection
-/// @param units   see mbm_server_beginRtu; the unit ids 0 and 255 mean the first
+/// @param port    see mbm_server_beginRtu; its hooks read and write the connection and give
+///                the time
+/// @param units   see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
 /// @param count   see mbm_server_beginRtu
 /// @param frame   see mbm_server_beginRtu; one for each connection
-/// @param bytes   at least MBM_MAX_TCP_FRAME
+/// @param bytes   size of `frame` in bytes, at least MBM_MAX_TCP_FRAME
 /// @return a status; see mbm_server_beginRtu
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginTcp(
@@ -140,17 +144,17 @@ pub unsafe extern "C" fn mbm_server_beginTcp(
     unsafe { begin(server, port, units, count, frame, bytes, Core::begin_tcp) }.code()
 }
 
-/// Begins to serve units over a stream of RTU frames, in which silence tells
-/// nothing: a TCP connection of RTU over TCP, or a serial adapter that hands
-/// bytes over in lumps. A frame ends where its own bytes say so; behind one that
-/// is damaged, half a second of silence does.
+/// Begins a server for a stream of RTU frames without timing: a TCP connection that
+/// carries RTU, or a serial adapter that delivers bytes in blocks. The server finds the
+/// end of a frame from its bytes. After a damaged frame, half a second of silence ends
+/// the damaged bytes.
 ///
 /// @param server  see mbm_server_beginRtu; one for each connection
 /// @param port    see mbm_server_beginRtu
-/// @param units   see mbm_server_beginRtu; the unit ids 0 and 255 mean the first
+/// @param units   see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
 /// @param count   see mbm_server_beginRtu
 /// @param frame   see mbm_server_beginRtu; one for each connection
-/// @param bytes   at least 16; MBM_MAX_FRAME hold any frame
+/// @param bytes   size of `frame` in bytes, at least 16; MBM_MAX_FRAME holds every frame
 /// @return a status; see mbm_server_beginRtu
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
@@ -176,12 +180,13 @@ pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
     .code()
 }
 
-/// Sets the silence that ends a frame: t3.5 of RTU, the time between two
-/// characters of ASCII, and in RTU over TCP the silence after a damaged frame. Without
-/// effect in TCP frames. mbm_server_beginRtu and its sisters set it back.
+/// Sets the silence that ends a frame. In RTU it is t3.5, in ASCII the longest time
+/// between two characters, in RTU over TCP the silence after a damaged frame. It has no
+/// effect in TCP. The begin functions restore the default.
 ///
-/// @param server        the object
-/// @param silenceUs     counted from the last byte seen
+/// @param server     the object
+/// @param silenceUs  microseconds since the last received byte; a value above 2^31
+///                   (36 minutes) counts as 2^31
 /// @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, silenceUs: u32) -> u8 {
@@ -195,12 +200,12 @@ pub unsafe extern "C" fn mbm_server_setSilence(server: *mut mbm_server, silenceU
     }
 }
 
-/// Tells the baud rate of an RTU line, from which t3.5 follows (serial line guide
-/// V1.02, 2.5.1.1). It sets nothing on the line. Other framings do not end with t3.5:
-/// for the time that those wait there is mbm_server_setSilence.
+/// Sets the baud rate from which an RTU server computes t3.5 (serial line guide V1.02,
+/// 2.5.1.1). It does not change the rate of the line. Other framings do not use t3.5: see
+/// mbm_server_setSilence.
 ///
 /// @param server  the object
-/// @param baud    bits per second; 0 goes back to untold
+/// @param baud    bits per second; 0 if the rate is unknown, as after mbm_server_beginRtu
 /// @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings,
 ///         MBM_NOT_INITIALISED or MBM_BUSY
 #[no_mangle]
@@ -218,12 +223,12 @@ pub unsafe extern "C" fn mbm_server_setBaudRate(server: *mut mbm_server, baud: u
     }
 }
 
-/// Tells that the receiver of an RTU line hears what the driver sends, so that as
-/// many bytes as were sent are dropped behind each response. mbm_server_beginRtu
-/// sets it back.
+/// Sets whether the server discards its own echo: on an RTU line whose receiver also
+/// receives what the driver sends, the server then drops as many bytes after each
+/// response as it has sent. mbm_server_beginRtu switches it off.
 ///
 /// @param server  the object
-/// @param on      0 (at first) or 1
+/// @param on      0 for off, the default; anything else for on
 /// @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings,
 ///         MBM_NOT_INITIALISED or MBM_BUSY
 #[no_mangle]

@@ -1,26 +1,29 @@
-//! The four tables, cell by cell, where the caller's callbacks hold them.
+//! The four tables, with cells that the program's callbacks get and set one by one.
 
-use super::units::{add_as, is_unheard, request};
+use super::units::{add_as, is_ignored_broadcast, request};
 use super::{mbm_service, mbm_unit};
 use core::ffi::c_void;
 use mbm::error::Status;
 use mbm::server::table::{self, DataModel, Direction, TableAccess, TableKind};
 use mbm::server::Reply;
 
-/// Cells that your functions hold, one by one, in place of an array. Zero it, set
-/// what you need, and hand it to mbm_unit_serveCallbacks.
+/// Cells that your functions get and set one by one, in place of an array. A cell is a
+/// register, a coil or a discrete input. Zero the struct, set the fields that you need,
+/// and pass it to mbm_unit_serveCallbacks.
 #[repr(C)]
 pub struct mbm_dataCallbacks {
     /// Private.
     pub service: mbm_service,
-    /// Handed to each function. Yours, may be NULL.
+    /// Passed to each function. Any value; may be NULL.
     pub context: *mut c_void,
-    /// Optional, NULL if every address is there: 1 if this one is. What is not
-    /// there is answered with exception 02.
+    /// Optional; NULL if every address exists. Otherwise returns 1 if this address
+    /// exists, else 0. A request for an address that does not exist is answered with
+    /// exception 02.
     pub isValid: Option<unsafe extern "C" fn(context: *mut c_void, address: u16) -> u8>,
-    /// A cell that is there; of a bit, 0 or anything else.
+    /// Required. Returns the value of an existing cell; of a bit, 0 for off and any other
+    /// value for on.
     pub get: Option<unsafe extern "C" fn(context: *mut c_void, address: u16) -> u16>,
-    /// Sets a cell that is there; a bit to 0 or 1. Not needed for what is only read.
+    /// Sets an existing cell; a bit to 0 or 1. Required for coils and holding registers.
     pub set: Option<unsafe extern "C" fn(context: *mut c_void, address: u16, value: u16)>,
     /// As in mbm_registerTable.
     pub before: Option<
@@ -35,12 +38,12 @@ pub struct mbm_dataCallbacks {
     pub after: Option<unsafe extern "C" fn(context: *mut c_void, address: u16, quantity: u16)>,
 }
 
-/// Cells of C, which its functions may look at: no reference to them is kept.
+/// The callbacks of C. They may use the struct, so no reference to it is kept.
 #[derive(Clone, Copy)]
 struct Callbacks(*mut mbm_dataCallbacks);
 
-// SAFETY, of all functions here: the record is the caller's and stays where it
-// is, as the header demands; its functions keep the contract of their comments.
+// SAFETY, of all functions here: the header requires that the struct stays valid, at the
+// same address, and that its functions do what their comments say.
 impl Callbacks {
     fn is_valid(self, address: u16) -> bool {
         // SAFETY: see above.
@@ -73,7 +76,7 @@ impl DataModel for Callbacks {
         last.is_some_and(|last| (address..=last).all(|cell| self.is_valid(cell)))
     }
 
-    fn transfer(&mut self, way: Direction, address: u16, quantity: u16, data: &mut [u8]) {
+    fn transfer(&mut self, direction: Direction, address: u16, quantity: u16, data: &mut [u8]) {
         // SAFETY: see above.
         let bits = TableKind::from_code(unsafe { (*self.0).service.kind }).is_bits();
         for index in 0..quantity {
@@ -83,7 +86,7 @@ impl DataModel for Callbacks {
                     return;
                 };
                 let bit = 1 << (index % 8);
-                if way == Direction::Write {
+                if direction == Direction::Write {
                     self.set(cell, u16::from(*byte & bit != 0));
                 } else {
                     if bit == 1 {
@@ -98,7 +101,7 @@ impl DataModel for Callbacks {
                 let Some([high, low]) = data.get_mut(at..at + 2) else {
                     return;
                 };
-                if way == Direction::Write {
+                if direction == Direction::Write {
                     self.set(cell, u16::from_be_bytes([*high, *low]));
                 } else {
                     [*high, *low] = self.get(cell).to_be_bytes();
@@ -127,17 +130,17 @@ impl DataModel for Callbacks {
     }
 }
 
-/// Serves cells.
+/// Serves a request to the cells.
 ///
 /// # Safety
-/// `service` is the head of a record of them; `pdu` has the bytes and room of
-/// `info`.
+/// `service` is the head of a `mbm_dataCallbacks`; `pdu` has the length and the space that
+/// `info` gives.
 unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         let record = service.cast::<mbm_dataCallbacks>();
         let kind = TableKind::from_code((*record).service.kind);
-        if is_unheard(info, *pdu) {
+        if is_ignored_broadcast(info, *pdu) {
             return Reply::NOT_HANDLED.code();
         }
         let is_more = kind == TableKind::HOLDING_REGISTERS && table::is_more(*pdu);
@@ -153,15 +156,15 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const
     }
 }
 
-/// Serves cells that your functions hold.
+/// Serves cells that your functions get and set.
 ///
 /// @param unit   the unit
-/// @param cells  yours, for as long as the unit is used
-/// @param table  the function that reads them: 1 coils (01, 05, 0F), 2 discrete
-///               inputs (02), 3 holding registers (03, 06, 10, 16, 17), 4 input
-///               registers (04)
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, no `get`, no `set`
-///         where it is needed, or another table; MBM_BUSY and MBM_BUFFER_TOO_SMALL as
+/// @param cells  must stay valid for as long as the unit is used
+/// @param table  the table, named by the function that reads it: 1 coils (functions 01,
+///               05, 0F), 2 discrete inputs (02), 3 holding registers (03, 06, 10, 16,
+///               17), 4 input registers (04); functions in hex
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a NULL `get`, a NULL `set`
+///         for table 1 or 3, or another table; MBM_BUSY and MBM_BUFFER_TOO_SMALL as
 ///         mbm_unit_serveCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveCallbacks(

@@ -1,13 +1,13 @@
-//! Cells of a table: moved one by one, and many at a time, as a host does.
+//! Copies cells of a table: cell by cell, and on a host many at a time.
 
 use core::slice::from_raw_parts_mut;
 use mbm::bytes::copy_words;
 use mbm::server::table::{MachineByte, TableKind};
 
-/// True if so many bits of a bitmap are 1.
+/// True if all `quantity` bits of a bitmap, from bit `first` on, are 1.
 ///
 /// # Safety
-/// The bitmap has them, and there is one at least.
+/// The bitmap has these bits. `quantity` is at least 1.
 #[cfg_attr(target_os = "none", inline(always))]
 #[cfg_attr(not(target_os = "none"), inline(never))]
 pub(super) unsafe fn are_all_on(map: *const u8, first: usize, quantity: usize) -> bool {
@@ -28,7 +28,7 @@ pub(super) unsafe fn are_all_on(map: *const u8, first: usize, quantity: usize) -
     }
 }
 
-/// Where a bit stands, or with an empty mask a register.
+/// The position of a bit. With an empty mask it is the position of a register.
 #[derive(Clone, Copy)]
 pub(super) struct Place {
     pub(super) byte: *mut u8,
@@ -36,10 +36,10 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// The cell with this index.
+    /// The position of the cell with this index.
     ///
     /// # Safety
-    /// There is one.
+    /// The cell exists.
     #[inline(always)]
     pub(super) unsafe fn of_cells(cells: *mut u8, kind: TableKind, index: usize) -> Place {
         // SAFETY: as the caller promises.
@@ -54,14 +54,14 @@ impl Place {
         }
     }
 
-    /// The first of data.
+    /// The position of the first cell in the data of a PDU.
     #[inline(always)]
     pub(super) fn of_data(byte: *mut u8, kind: TableKind) -> Place {
         let mask = kind.is_bits().into();
         Place { byte, mask }
     }
 
-    /// Becomes the next bit.
+    /// Moves to the next bit.
     #[inline(always)]
     #[allow(clippy::unnecessary_cast)] // It is needed on an AVR.
     fn step(&mut self) {
@@ -71,17 +71,18 @@ impl Place {
     }
 }
 
-/// Moves so many cells.
+/// Copies `left` cells, at least one.
 ///
 /// # Safety
-/// There are so many at both; nothing else uses them meanwhile.
+/// Both positions have `left` cells, which nothing else uses meanwhile.
 #[cfg_attr(target_os = "none", inline(never))]
 pub(super) unsafe fn transfer(mut from: Place, mut to: Place, mut left: usize) {
     // SAFETY: as the caller promises.
     unsafe {
         loop {
             if from.mask == 0 {
-                // From one order of bytes to the other, whichever is which.
+                // Swaps between the byte order of the machine and that of the wire; the
+                // same code does both directions.
                 let high = usize::from(cfg!(target_endian = "little"));
                 *to.byte = *from.byte.add(high);
                 *to.byte.add(1) = *from.byte.add(1 - high);
@@ -104,10 +105,11 @@ pub(super) unsafe fn transfer(mut from: Place, mut to: Place, mut left: usize) {
     }
 }
 
-/// Moves cells from `first` on, from or into data.
+/// Copies `quantity` cells, from cell `first` on, into `data`, or with `write` out of
+/// `data`.
 ///
 /// # Safety
-/// Behind `cells` and `data` are all of them, and nothing else uses them meanwhile.
+/// `cells` and `data` contain these cells, which nothing else uses meanwhile.
 #[inline(always)]
 pub(super) unsafe fn transfer_many(
     cells: *mut u8,
@@ -132,10 +134,10 @@ pub(super) unsafe fn transfer_many(
     }
 }
 
-/// Moves registers from `first` on, from or into data.
+/// As [`transfer_many`], for registers.
 ///
 /// # Safety
-/// Behind `words` and `data` are all of them, and nothing else uses them meanwhile.
+/// `words` and `data` contain these registers, which nothing else uses meanwhile.
 #[inline(always)]
 unsafe fn transfer_words(words: *mut u16, write: bool, first: u16, quantity: u16, data: *mut u8) {
     // SAFETY: as the caller promises.
@@ -151,11 +153,11 @@ unsafe fn transfer_words(words: *mut u16, write: bool, first: u16, quantity: u16
     }
 }
 
-/// Moves bits from `first` on, from or into data, eight at a time.
+/// As [`transfer_many`], for bits, eight at a time.
 ///
 /// # Safety
-/// Behind `cells` are all bytes that have some of them, and nothing else uses
-/// them meanwhile.
+/// `cells` contains every byte that has one of these bits; nothing else uses these bytes
+/// meanwhile.
 #[inline(never)]
 unsafe fn transfer_bits(cells: *mut u8, write: bool, first: u16, quantity: u16, data: &mut [u8]) {
     let shift = first & 7;
@@ -164,13 +166,13 @@ unsafe fn transfer_bits(cells: *mut u8, write: bool, first: u16, quantity: u16, 
     let cells = unsafe { from_raw_parts_mut(cells.add(usize::from(first >> 3)), count) };
     let mut left = quantity;
     for (index, byte) in data.iter_mut().enumerate() {
-        // What of this byte is meant, and where it stands in two of the cells.
+        // The bits of this data byte that are copied. They lie in two bytes of the cells.
         let mask = if left < 8 { (1u16 << left) - 1 } else { 0xFF };
-        let behind = cells.get(index + 1).copied().unwrap_or(0);
+        let next_byte = cells.get(index + 1).copied().unwrap_or(0);
         let Some(cell) = cells.get_mut(index) else {
             return;
         };
-        let both = u16::from_le_bytes([*cell, behind]);
+        let both = u16::from_le_bytes([*cell, next_byte]);
         if write {
             let value = (both & !(mask << shift)) | ((u16::from(*byte) & mask) << shift);
             let [low, high] = value.to_le_bytes();

@@ -1,7 +1,7 @@
-//! Functions that the caller defines, and functions switched off.
+//! Functions that the user defines, and functions that the user switches off.
 
 use super::records::{is_custom, mbm_custom, mbm_request, CUSTOM};
-use super::units::{add_as, add_first, is_unheard, request, Places};
+use super::units::{add_as, add_first, is_ignored_broadcast, request, Services};
 use super::{mbm_service, mbm_unit};
 use crate::functions;
 use core::ffi::c_void;
@@ -10,16 +10,17 @@ use mbm::pdu::custom::Rule;
 use mbm::server::custom::{self, Outcome};
 use mbm::server::{Reply, RequestInfo};
 
-/// What a function of yours returns for an exception: this, or-ed with the code.
+/// A function of yours returns this, or-ed with the exception code (1 to 127), to answer
+/// with an exception.
 pub const MBM_REPLY_EXCEPTION: u16 = 0x0100;
-/// What a function of yours returns for no response at all.
+/// A function of yours returns this to send no response.
 pub const MBM_REPLY_NONE: u16 = 0x0200;
-/// What a function of yours returns to be asked again at the next poll, with the
-/// same request. The server hears nothing meanwhile.
+/// A function of yours returns this if it has not finished. The next poll calls it again
+/// with the same request. The server receives nothing meanwhile.
 pub const MBM_REPLY_PENDING: u16 = 0x0300;
 
-/// Functions that a unit answers with exception 01, though it could serve them:
-/// see mbm_unit_switchFunction.
+/// The functions that a unit answers with exception 01, even if it could serve them: see
+/// mbm_unit_switchFunction.
 #[repr(C)]
 pub struct mbm_functionMask {
     /// Private.
@@ -29,8 +30,8 @@ pub struct mbm_functionMask {
 }
 
 /// # Safety
-/// `service` is the head of a function of C; `pdu` has the bytes and room of
-/// `info`.
+/// `service` is the head of a `mbm_custom`; `pdu` has the length and the space that `info`
+/// gives.
 unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
@@ -38,24 +39,24 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const
         if code != 0 && code != *pdu {
             return Reply::NOT_HANDLED.code();
         }
-        serve_mine(service.cast(), pdu, info)
+        call_handler(service.cast(), pdu, info)
     }
 }
 
-/// [`serve`], of the function that the record serves: apart, for a request of another is
-/// to cost little.
+/// Calls the handler of the record. A function of its own, so that a request for another
+/// function stays cheap.
 ///
 /// # Safety
 /// As for [`serve`].
 #[cfg_attr(not(target_os = "none"), inline(never))]
-unsafe fn serve_mine(record: *mut mbm_custom, pdu: *mut u8, info: *const c_void) -> usize {
-    // SAFETY: as the caller promises; no reference to the record is kept while
-    // its function runs.
+unsafe fn call_handler(record: *mut mbm_custom, pdu: *mut u8, info: *const c_void) -> usize {
+    // SAFETY: as the caller promises; no reference to the record is kept while its
+    // function runs.
     unsafe {
         let to = (*info.cast::<RequestInfo>()).to;
         let (pdu, length) = request(pdu, info);
         let function = pdu.first().copied().unwrap_or(0);
-        if is_unheard(info, function) {
+        if is_ignored_broadcast(info, function) {
             return Reply::NOT_HANDLED.code();
         }
         let Some(handler) = (*record).serve else {
@@ -70,8 +71,8 @@ unsafe fn serve_mine(record: *mut mbm_custom, pdu: *mut u8, info: *const c_void)
                 function,
             };
             let capacity = space.len() as u16;
-            let said = handler(context, &raw const request, space.as_mut_ptr(), capacity);
-            match (said & 0xFF00, said as u8) {
+            let returned = handler(context, &raw const request, space.as_mut_ptr(), capacity);
+            match (returned & 0xFF00, returned as u8) {
                 (0, bytes) => Outcome::Data(bytes.into()),
                 (MBM_REPLY_EXCEPTION, code @ 1..=0x7F) => Outcome::Exception(code),
                 (MBM_REPLY_NONE, 0) => Outcome::NoResponse,
@@ -83,12 +84,12 @@ unsafe fn serve_mine(record: *mut mbm_custom, pdu: *mut u8, info: *const c_void)
     }
 }
 
-/// The length rule of a function, if the record with this head is that function.
+/// The length rule of `function`, if this is the head of the record for that function.
 ///
 /// # Safety
 /// `service` is the head of a record of any kind.
-unsafe fn declared(service: *const mbm_service, function: u8) -> Option<Rule> {
-    // SAFETY: as the caller promises; what this file serves is a function of C.
+unsafe fn rule_of(service: *const mbm_service, function: u8) -> Option<Rule> {
+    // SAFETY: as the caller promises; a record of that kind is a `mbm_custom`.
     unsafe {
         if !is_custom(service) {
             return None;
@@ -101,7 +102,7 @@ unsafe fn declared(service: *const mbm_service, function: u8) -> Option<Rule> {
     }
 }
 
-/// The length rule that a unit has for a user's function.
+/// The length rule that the units have for a user's function.
 ///
 /// # Safety
 /// `units` points to `count` units.
@@ -109,8 +110,8 @@ pub(super) unsafe fn rule(units: *const mbm_unit, count: u8, function: u8) -> Op
     // SAFETY: as the caller promises.
     unsafe {
         for index in 0..count {
-            for service in Places::new(units.add(index.into())) {
-                if let Some(rule) = declared(service, function) {
+            for service in Services::new(units.add(index.into())) {
+                if let Some(rule) = rule_of(service, function) {
                     return Some(rule);
                 }
             }
@@ -119,13 +120,13 @@ pub(super) unsafe fn rule(units: *const mbm_unit, count: u8, function: u8) -> Op
     None
 }
 
-/// Serves a function of yours, on every framing.
+/// Serves a function of yours, in every framing.
 ///
 /// @param unit    the unit
-/// @param custom  yours, for as long as the unit is used
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, no function, a code
-///         from 128 on, or a length that is no rule; MBM_BUFFER_TOO_SMALL if the unit
-///         has no place
+/// @param custom  must stay valid for as long as the unit is used
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a NULL `serve`, a code above
+///         127 or an invalid `length`; MBM_BUFFER_TOO_SMALL if the unit has
+///         MBM_MAX_SERVICES records already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveCustom(unit: *mut mbm_unit, custom: *mut mbm_custom) -> u8 {
     // SAFETY: as the header demands.
@@ -141,12 +142,15 @@ pub unsafe extern "C" fn mbm_unit_serveCustom(unit: *mut mbm_unit, custom: *mut 
     }
 }
 
+/// Answers a disabled function with exception 01, and leaves any other to the services
+/// after this one.
+///
 /// # Safety
-/// `service` is the head of switches; `pdu` points to a function code.
-unsafe extern "C" fn gate(
+/// `service` is the head of a `mbm_functionMask`; `pdu` points to a function code.
+unsafe extern "C" fn refuse_disabled(
     service: *mut mbm_service,
     pdu: *mut u8,
-    _heading: *const c_void,
+    _info: *const c_void,
 ) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
@@ -159,29 +163,25 @@ unsafe extern "C" fn gate(
     }
 }
 
-/// The byte that has the switch of a function.
+/// The byte of the mask that has the bit of a function.
 ///
 /// # Safety
-/// `switches` is a record of them, and `code` 127 at most.
-unsafe fn switch(switches: *mut mbm_functionMask, code: u8) -> *mut u8 {
-    // SAFETY: as the caller promises; a sixteenth byte has code 127.
-    unsafe {
-        (&raw mut (*switches).off)
-            .cast::<u8>()
-            .add((code / 8).into())
-    }
+/// `mask` is valid; `code` is at most 127.
+unsafe fn mask_byte(mask: *mut mbm_functionMask, code: u8) -> *mut u8 {
+    // SAFETY: as the caller promises; code 127 is in the last of the 16 bytes.
+    unsafe { (&raw mut (*mask).off).cast::<u8>().add((code / 8).into()) }
 }
 
-/// Switches a function of a unit off or on again. One that is off is answered with
-/// exception 01, whatever serves it.
+/// Switches a function of a unit off or on. The unit answers a function that is off with
+/// exception 01, even if a record serves it.
 ///
 /// @param unit  the unit
-/// @param mask  yours, for as long as the unit is used; zeroed before the first call.
-///              Units that share one share what is switched off
+/// @param mask  must stay valid for as long as the unit is used; zero it before the first
+///              call. Units that share a mask have the same functions off
 /// @param code  the function code, 1 to 127
-/// @param on    0 switches the function off, anything else on
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or another code;
-///         MBM_BUFFER_TOO_SMALL if the unit has no place
+/// @param on    0 switches the function off, anything else switches it on
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a code out of range;
+///         MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES records already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_switchFunction(
     unit: *mut mbm_unit,
@@ -194,9 +194,9 @@ pub unsafe extern "C" fn mbm_unit_switchFunction(
         if mask.is_null() || code == 0 || code > 127 {
             return Status::INVALID_ARGUMENT.code();
         }
-        let status = add_first(unit, mask.cast(), gate);
+        let status = add_first(unit, mask.cast(), refuse_disabled);
         if status == Status::OK.code() {
-            let (byte, bit) = (switch(mask, code), 1 << (code % 8));
+            let (byte, bit) = (mask_byte(mask, code), 1 << (code % 8));
             *byte |= bit;
             if on != 0 {
                 *byte ^= bit;

@@ -1,32 +1,33 @@
-//! Counters of a line, listen only mode and event log.
+//! The counters of a unit's line, its listen only mode and its event log.
 
-use super::units::{add, is_unheard, request, walk};
+use super::units::{add, call_services, is_ignored_broadcast, request};
 use super::{mbm_diagnostics, mbm_service, mbm_unit};
 use core::ffi::c_void;
 use mbm::error::Status;
 use mbm::server::diagnostics::{Diagnostics, Restart};
 use mbm::server::{Addressing, Reply, RequestInfo};
 
-/// What the core keeps in a record.
+/// The fields of a record that the core uses.
 ///
 /// # Safety
-/// `record` is one, and nothing else uses it while the reference lives.
-unsafe fn line<'a>(record: *mut mbm_diagnostics) -> &'a mut Diagnostics {
-    // SAFETY: as the caller promises; the fields are those of the core, as is
-    // asserted above.
+/// `record` is valid, and nothing else uses it while the reference lives.
+unsafe fn core_fields<'a>(record: *mut mbm_diagnostics) -> &'a mut Diagnostics {
+    // SAFETY: as the caller promises; records.rs asserts that the fields have the layout
+    // of the core's struct.
     unsafe { &mut *(&raw mut (*record).diagnosticRegister).cast() }
 }
 
-/// Serves 08, 0B and 0C.
+/// Serves functions 08, 0B and 0C (hex).
 ///
 /// # Safety
-/// `service` is the head of a record; `pdu` has the bytes and room of `info`.
+/// `service` is the head of a `mbm_diagnostics`; `pdu` has the length and the space that
+/// `info` gives.
 unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize {
     // SAFETY: as the caller promises; no reference lives while the hook runs.
     unsafe {
         let record = service.cast::<mbm_diagnostics>();
         let (pdu, length) = request(pdu, info);
-        let (reply, restart) = line(record).serve(pdu, length);
+        let (reply, restart) = core_fields(record).serve(pdu, length);
         if let (true, Some(hook)) = (restart != Restart::None, (*record).restart) {
             hook((*record).context, (restart == Restart::ClearLog).into());
         }
@@ -34,50 +35,51 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const
     }
 }
 
-/// Takes notice of a frame, has it served, and of what became of it.
+/// Counts a frame, has the unit serve it if it is for this unit, and counts the outcome.
 ///
 /// # Safety
-/// `unit` is one with a record; `pdu` has the bytes and room of `info`.
+/// `unit` is a unit with diagnostics; `pdu` has the length and the space that `info` gives.
 unsafe extern "C" fn monitor(
     unit: *mut mbm_unit,
     info: *const c_void,
     addressing: u8,
     pdu: *mut u8,
 ) -> usize {
-    // SAFETY: as the caller promises; no reference to the record lives while
-    // services are at work.
+    // SAFETY: as the caller promises; no reference to the record lives while services
+    // run.
     unsafe {
         let record = (*unit).diagnostics;
         let addressing = match addressing {
             1 => Addressing::OWN,
-            2 if !is_unheard(info, *pdu) => Addressing::BROADCAST,
+            2 if !is_ignored_broadcast(info, *pdu) => Addressing::BROADCAST,
             _ => Addressing::FOREIGN,
         };
         let (bytes, length) = request(pdu, info);
         let function = bytes.first().copied().unwrap_or(0);
         let info = info.cast::<RequestInfo>();
         let request = bytes.get(..length).unwrap_or_default();
-        if !line(record).count_frame(&*info, addressing, request) {
+        if !core_fields(record).count_frame(&*info, addressing, request) {
             return Reply::NO_RESPONSE.code();
         }
-        let reply = walk(unit, info.cast(), pdu);
+        let reply = call_services(unit, info.cast(), pdu);
         if reply != Reply::PENDING.code() {
-            line(record).count_outcome(addressing, function, Reply::from_number(reply));
+            core_fields(record).count_outcome(addressing, function, Reply::from_number(reply));
         }
         reply
     }
 }
 
-/// Serves diagnostics: functions 08, 0B and 0C. Of 08 it serves the sub-functions that
-/// the standard defines, 00 to 04, 0A to 12 and 14; others are exception 01. From now
-/// on the unit counts what its lines bring, logs events, and can be forced into
-/// listen only mode.
+/// Serves diagnostics: functions 08, 0B and 0C (hex). Function 08 has the sub-functions
+/// of the standard, 00 to 04, 0A to 12 and 14 (hex); it answers others with exception 01
+/// (illegal function). After this call the unit counts the frames on its lines and logs
+/// events, and a client can force it into listen only mode.
 ///
 /// @param unit         the unit
-/// @param diagnostics  yours, for as long as the unit is used; one for each unit, or
-///                     it counts for all that share it
+/// @param diagnostics  must stay valid for as long as the unit is used. Use one struct
+///                     for each unit: a shared one counts for all units that share it
 /// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit has
-///         another record of diagnostics; MBM_BUFFER_TOO_SMALL if it has no place
+///         another mbm_diagnostics; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
+///         records already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveDiagnostics(
     unit: *mut mbm_unit,

@@ -1,4 +1,4 @@
-//! Files and FIFO queues, in arrays of the caller.
+//! Files and FIFO queues, in arrays of the program.
 
 use super::units::{add, request};
 use super::{mbm_service, mbm_unit};
@@ -6,30 +6,31 @@ use core::ffi::c_void;
 use mbm::pdu::files::Record;
 use mbm::server::files::{self, Fifos, Files};
 
-/// One file: an array of records, each a register.
+/// One file: an array of records. A record is one register.
 #[repr(C)]
 pub struct mbm_file {
-    /// The records, from record 0 on.
+    /// The records, starting with record 0.
     pub records: *mut u16,
-    /// How many, up to 10000.
+    /// How many records the file has, at most 10000.
     pub size: u16,
-    /// The file number, from 1 on.
+    /// The file number, 1 to 65535.
     pub number: u16,
 }
 
-/// Files of yours. Zero it, set what you need, and hand it to
+/// Files of yours. Zero the struct, set the fields that you need, and pass it to
 /// mbm_unit_serveFiles.
 #[repr(C)]
 pub struct mbm_files {
     /// Private.
     pub service: mbm_service,
-    /// The files.
+    /// The files: an array of `count` elements.
     pub files: *const mbm_file,
-    /// How many.
+    /// How many files.
     pub count: u16,
-    /// Optional: asked before records are written, for each group of a request
-    /// before any is written. `data` are the new values, high bytes first.
-    /// Returns 0, or an exception code that refuses the whole request.
+    /// Optional: called before records are written, once for each group of a request,
+    /// before any group is written. `data` has the new values, the high byte of each
+    /// first. Return 0 to allow the write, or an exception code to refuse the whole
+    /// request.
     pub before: Option<
         unsafe extern "C" fn(
             context: *mut c_void,
@@ -39,46 +40,48 @@ pub struct mbm_files {
             data: *const u8,
         ) -> u8,
     >,
-    /// Optional: told what was written, once a group.
+    /// Optional: called after the records of a group were written, once for each group.
     pub after:
         Option<unsafe extern "C" fn(context: *mut c_void, file: u16, record: u16, length: u16)>,
-    /// Handed to both hooks. Yours, may be NULL.
+    /// Passed to both hooks. Any value; may be NULL.
     pub context: *mut c_void,
 }
 
-/// One queue of registers.
+/// One FIFO queue of registers.
 #[repr(C)]
 pub struct mbm_fifo {
-    /// The registers, the first to leave first.
+    /// The registers, the oldest first.
     pub words: *const u16,
-    /// The address of the queue.
+    /// The address of the queue (the FIFO pointer address).
     pub address: u16,
-    /// How many registers it holds now; more than 31 are answered with exception
-    /// 03 (V1.1b3, 6.18).
+    /// How many registers the queue holds now. If there are more than 31, the server
+    /// answers with exception 03 (V1.1b3, 6.18).
     pub count: u16,
 }
 
-/// Queues of yours. Zero it, set both, and hand it to mbm_unit_serveFifos.
+/// FIFO queues of yours. Zero the struct, set `fifos` and `count`, and pass it to
+/// mbm_unit_serveFifos.
 #[repr(C)]
 pub struct mbm_fifos {
     /// Private.
     pub service: mbm_service,
-    /// The queues. Reading does not empty them.
+    /// The queues: an array of `count` elements. A read leaves the registers in the
+    /// queue.
     pub fifos: *const mbm_fifo,
-    /// How many.
+    /// How many queues.
     pub count: u16,
 }
 
-/// Files of C, whose hooks may look at them: no reference to them is kept.
-struct FilesByC(*mut mbm_files);
+/// The files of C. Their hooks may use the struct, so no reference to it is kept.
+struct CFiles(*mut mbm_files);
 
-/// Queues of C.
-struct FifosByC(*mut mbm_fifos);
+/// The FIFO queues of C.
+struct CFifos(*mut mbm_fifos);
 
-/// Fills bytes from the registers at a pointer, high bytes first.
+/// Copies registers into `data`, the high byte of each first.
 ///
 /// # Safety
-/// There are as many registers as bytes for them.
+/// `words` points to `data.len() / 2` registers.
 unsafe fn load(words: *const u16, data: &mut [u8]) {
     for (index, pair) in data.as_chunks_mut().0.iter_mut().enumerate() {
         // SAFETY: as the caller promises.
@@ -86,11 +89,11 @@ unsafe fn load(words: *const u16, data: &mut [u8]) {
     }
 }
 
-// SAFETY, of all functions here: the records are the caller's and stay where
-// they are, as the header demands, with arrays of the told sizes behind their
-// pointers; what is `covered` lies in them.
-impl FilesByC {
-    /// The first of these records, if all are there.
+// SAFETY, of all functions here: the header requires that the structs stay valid, at the
+// same address, with arrays of the given sizes. `find` returns only records within these
+// arrays.
+impl CFiles {
+    /// The first of these records, or `None` if not all of them exist.
     fn find(&self, wanted: Record) -> Option<*mut u16> {
         // SAFETY: see above.
         unsafe {
@@ -101,10 +104,10 @@ impl FilesByC {
             for _ in 0..(*self.0).count {
                 if (*file).number == wanted.file {
                     let size = (*file).size;
-                    let there = !(*file).records.is_null()
+                    let exist = !(*file).records.is_null()
                         && wanted.record <= size
                         && wanted.length <= size - wanted.record;
-                    return there.then(|| (*file).records.add(wanted.record.into()));
+                    return exist.then(|| (*file).records.add(wanted.record.into()));
                 }
                 file = file.add(1);
             }
@@ -113,7 +116,7 @@ impl FilesByC {
     }
 }
 
-impl Files for FilesByC {
+impl Files for CFiles {
     fn contains(&self, record: Record) -> bool {
         self.find(record).is_some()
     }
@@ -160,7 +163,7 @@ impl Files for FilesByC {
     }
 }
 
-impl FifosByC {
+impl CFifos {
     fn find(&self, address: u16) -> Option<*const mbm_fifo> {
         // SAFETY: see above.
         unsafe {
@@ -179,7 +182,7 @@ impl FifosByC {
     }
 }
 
-impl Fifos for FifosByC {
+impl Fifos for CFifos {
     fn count(&self, address: u16) -> Option<u16> {
         // SAFETY: see above.
         self.find(address).map(|fifo| unsafe {
@@ -200,8 +203,8 @@ impl Fifos for FifosByC {
 }
 
 /// # Safety
-/// `service` is the head of a record of files; `pdu` has the bytes and room of
-/// `info`.
+/// `service` is the head of a `mbm_files`; `pdu` has the length and the space that `info`
+/// gives.
 unsafe extern "C" fn serve_files(
     service: *mut mbm_service,
     pdu: *mut u8,
@@ -209,11 +212,11 @@ unsafe extern "C" fn serve_files(
 ) -> usize {
     // SAFETY: as the caller promises.
     let (pdu, length) = unsafe { request(pdu, info) };
-    files::serve(&mut FilesByC(service.cast()), pdu, length).code()
+    files::serve(&mut CFiles(service.cast()), pdu, length).code()
 }
 
 /// # Safety
-/// As for [`serve_files`], of queues.
+/// As for [`serve_files`], with a `mbm_fifos`.
 unsafe extern "C" fn serve_fifos(
     service: *mut mbm_service,
     pdu: *mut u8,
@@ -221,28 +224,29 @@ unsafe extern "C" fn serve_fifos(
 ) -> usize {
     // SAFETY: as the caller promises.
     let (pdu, length) = unsafe { request(pdu, info) };
-    files::serve_fifos(&FifosByC(service.cast()), pdu, length).code()
+    files::serve_fifos(&CFifos(service.cast()), pdu, length).code()
 }
 
-/// Serves files: functions 14 and 15. A request is carried out whole or not at
-/// all. It takes 250 bytes of stack.
+/// Serves files: functions 14 and 15 (hex), Read File Record and Write File Record. A
+/// request is carried out completely or not at all. Serving a request takes 250 bytes of
+/// stack.
 ///
 /// @param unit   the unit
-/// @param files  yours, for as long as the unit is used
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
-///         the unit has no place
+/// @param files  must stay valid for as long as the unit is used
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
+///         unit has MBM_MAX_SERVICES records already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveFiles(unit: *mut mbm_unit, files: *mut mbm_files) -> u8 {
     // SAFETY: as the header demands.
     unsafe { add(unit, files.cast(), serve_files) }
 }
 
-/// Serves FIFO queues: function 18.
+/// Serves FIFO queues: function 18 (hex), Read FIFO Queue.
 ///
 /// @param unit   the unit
-/// @param fifos  yours, for as long as the unit is used
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
-///         the unit has no place
+/// @param fifos  must stay valid for as long as the unit is used
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
+///         unit has MBM_MAX_SERVICES records already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveFifos(unit: *mut mbm_unit, fifos: *mut mbm_fifos) -> u8 {
     // SAFETY: as the header demands.

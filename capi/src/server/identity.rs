@@ -1,4 +1,5 @@
-//! What a device tells of itself.
+//! What a device reports about itself: exception status, server id and device
+//! identification.
 
 use super::units::{add, request};
 use super::{mbm_service, mbm_unit};
@@ -7,52 +8,55 @@ use core::ffi::c_void;
 use core::slice::from_raw_parts;
 use mbm::server::identity::{self, Objects};
 
-/// The eight outputs of function 07. Zero it, and hand it to
+/// The eight exception status outputs of function 07. Zero the struct and pass it to
 /// mbm_unit_serveExceptionStatus.
 #[repr(C)]
 pub struct mbm_exceptionStatus {
     /// Private.
     pub service: mbm_service,
-    /// The outputs; change them at any time.
+    /// The outputs, one bit each. You may change them at any time.
     pub outputs: u8,
 }
 
-/// What function 11 answers. Zero it, set what you need, and hand it to
-/// mbm_unit_serveServerId. All together at most 251 bytes, less what the frame
-/// buffer lacks; more is answered with exception 04.
+/// The response of function 11 (hex), Report Server ID. Zero the struct, set the fields
+/// that you need, and pass it to mbm_unit_serveServerId. The id, the run indicator (1
+/// byte) and the additional data together have at most 251 bytes, fewer if the frame
+/// buffer holds less than a whole frame. If they are longer, the server answers with
+/// exception 04.
 #[repr(C)]
 pub struct mbm_serverId {
     /// Private.
     pub service: mbm_service,
-    /// The id; NULL only with 0 bytes.
+    /// The server id; NULL only if idLength is 0.
     pub id: *const u8,
-    /// What stands behind the run indicator; NULL only with 0 bytes.
+    /// The data after the run indicator; NULL only if additionalLength is 0.
     pub additional: *const u8,
-    /// Bytes of the id.
+    /// Length of `id` in bytes.
     pub idLength: u8,
-    /// Bytes behind the run indicator.
+    /// Length of `additional` in bytes.
     pub additionalLength: u8,
-    /// The run indicator: 0 is answered as 00, anything else as FF.
+    /// The run indicator: 0 is sent as 00, any other value as FF (hex).
     pub running: u8,
 }
 
-/// A device identification. Zero it, set both, and hand it to
+/// A device identification. Zero the struct, set `objects` and `count`, and pass it to
 /// mbm_unit_serveIdentification.
 #[repr(C)]
 pub struct mbm_identification {
     /// Private.
     pub service: mbm_service,
-    /// The objects, in any order: ids 0 vendor name, 1 product code and 2 revision,
-    /// which every device has; 3 vendor URL, 4 product name, 5 model name, 6 application
-    /// name; from 0x80 on yours. Each has 244 bytes at most.
+    /// The objects, in any order. Every device has the ids 0 (vendor name), 1 (product
+    /// code) and 2 (revision). Optional are 3 (vendor URL), 4 (product name), 5 (model
+    /// name) and 6 (application name), and from 0x80 on your own. An object has at most
+    /// 244 bytes.
     pub objects: *const mbm_object,
-    /// How many.
+    /// How many objects.
     pub count: u16,
 }
 
 /// # Safety
-/// `service` is the head of a record of its kind; `pdu` has the bytes and room of
-/// `info`. So of the functions below.
+/// `service` is the head of the struct that the function casts it to; `pdu` has the length
+/// and the space that `info` gives. The same holds for the functions below.
 unsafe extern "C" fn serve_exception_status(
     service: *mut mbm_service,
     pdu: *mut u8,
@@ -66,10 +70,10 @@ unsafe extern "C" fn serve_exception_status(
     }
 }
 
-/// The bytes at a pointer; none at NULL.
+/// The `length` bytes at a pointer; an empty slice for NULL.
 ///
 /// # Safety
-/// There are so many, which nothing changes while the slice lives.
+/// `first` is NULL or points to `length` bytes, which nothing changes while the slice lives.
 unsafe fn bytes<'a>(first: *const u8, length: u8) -> &'a [u8] {
     if first.is_null() {
         return &[];
@@ -94,13 +98,13 @@ unsafe extern "C" fn serve_server_id(
     }
 }
 
-/// Objects of C.
-struct ObjectsByC(*const mbm_identification);
+/// The objects of C.
+struct CObjects(*const mbm_identification);
 
-impl Objects for ObjectsByC {
+impl Objects for CObjects {
     fn object(&self, id: u8) -> Option<&[u8]> {
-        // SAFETY: the record is the caller's and stays where it is, as the header
-        // demands, with so many objects behind its pointer.
+        // SAFETY: the header requires that the struct stays valid, at the same address,
+        // with `count` objects.
         unsafe {
             let mut object = (*self.0).objects;
             if object.is_null() {
@@ -124,15 +128,15 @@ unsafe extern "C" fn serve_identification(
 ) -> usize {
     // SAFETY: as the caller promises.
     let (pdu, length) = unsafe { request(pdu, info) };
-    identity::serve_identification(&ObjectsByC(service.cast()), pdu, length).code()
+    identity::serve_identification(&CObjects(service.cast()), pdu, length).code()
 }
 
-/// Serves the exception status: function 07.
+/// Serves function 07, Read Exception Status.
 ///
 /// @param unit    the unit
-/// @param status  yours, for as long as the unit is used
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
-///         the unit has no place
+/// @param status  must stay valid for as long as the unit is used
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
+///         unit has MBM_MAX_SERVICES records already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveExceptionStatus(
     unit: *mut mbm_unit,
@@ -142,26 +146,27 @@ pub unsafe extern "C" fn mbm_unit_serveExceptionStatus(
     unsafe { add(unit, status.cast(), serve_exception_status) }
 }
 
-/// Serves the server id: function 11.
+/// Serves function 11 (hex), Report Server ID.
 ///
 /// @param unit  the unit
-/// @param id    yours, for as long as the unit is used
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
-///         the unit has no place
+/// @param id    must stay valid for as long as the unit is used
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
+///         unit has MBM_MAX_SERVICES records already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveServerId(unit: *mut mbm_unit, id: *mut mbm_serverId) -> u8 {
     // SAFETY: as the header demands.
     unsafe { add(unit, id.cast(), serve_server_id) }
 }
 
-/// Serves the device identification: function 2B/0E, as streams of objects and
-/// one by one. What does not fit into one response follows in the next that the
-/// client asks for. The conformity level is that of the objects there are.
+/// Serves function 2B/0E (hex), Read Device Identification: streams of objects, and
+/// single objects. If the objects do not fit into one response, the client reads the rest
+/// with further requests. The server computes the conformity level from the objects that
+/// exist.
 ///
 /// @param unit            the unit
-/// @param identification  yours, for as long as the unit is used
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
-///         the unit has no place
+/// @param identification  must stay valid for as long as the unit is used
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
+///         unit has MBM_MAX_SERVICES records already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveIdentification(
     unit: *mut mbm_unit,

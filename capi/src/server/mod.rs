@@ -1,4 +1,4 @@
-//! `mbm_server_*`: a server on a line or connection for C.
+//! `mbm_server_*`: a server on a line or connection, for C.
 
 mod begin;
 mod callbacks;
@@ -32,19 +32,18 @@ use mbm::pdu::custom::Rule;
 use mbm::server::{Reply, Server, ServerStorage, MOST_REQUESTS};
 use mbm::FIRMWARE;
 
-/// A Modbus server on one line or one connection.
+/// A Modbus server on one serial line or one connection.
 ///
-/// Storage is yours and must be zero before first use, which a static object is
-/// (`static mbm_server server;`). What it serves are units, which several
-/// servers may share: one on a serial line and four TCP connections, for
-/// example, are five servers with the same units. Use a server and its units from
-/// one thread and never from an interrupt; servers that share units belong to one
-/// thread.
+/// You provide the storage. It must be zero before first use; a static object is zero. A
+/// server serves units. Several servers may share units: for example, a server on a
+/// serial line and four servers on TCP connections are five servers with the same units.
+/// Use a server and its units from one thread, and never from an interrupt. Use all
+/// servers that share units from the same thread.
 ///
-/// Hooks and functions of yours run within mbm_server_poll. A function that they
-/// call on the server that is polled returns MBM_BUSY and changes nothing: call
-/// it when mbm_server_poll has returned. They may call functions on other servers,
-/// and the mbm_unit_serve functions on units.
+/// mbm_server_poll calls your hooks and your functions. If they call a function on the
+/// server that is being polled, it returns MBM_BUSY and changes nothing; call it after
+/// mbm_server_poll has returned. They may call functions on other servers, and the
+/// mbm_unit_serve functions on any unit.
 #[repr(C)]
 pub struct mbm_server {
     /// Private.
@@ -53,11 +52,11 @@ pub struct mbm_server {
     words: [u32; 8],
 }
 
-/// What lies behind an `mbm_server`.
+/// The real content of an `mbm_server`.
 #[repr(C)]
 struct Object {
-    // Where one instruction reaches it; on a host, where the core has the address
-    // of the object.
+    // The mark is first where one instruction then reaches it. On a host the core is
+    // first, so that it has the address of the object.
     #[cfg(any(target_os = "none", mbm_firmware))]
     mark: u8,
     core: Core,
@@ -72,11 +71,12 @@ const _: () = {
     let used = size_of::<Object>();
     assert!(align_of::<mbm_server>() >= align_of::<Object>());
     assert!(used <= space);
-    // Hiding the fields may waste 5 % where RAM is scarce.
+    // On a 16-bit or 32-bit machine, where RAM is scarce, at most 5 % of the storage may
+    // be unused.
     assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
 };
 
-/// What mbm_server_beginRtu and its sisters were given.
+/// The frame buffer and the units that the program passed to a begin function.
 #[repr(C)]
 pub(super) struct ServerBuffers {
     bytes: u16,
@@ -87,8 +87,8 @@ pub(super) struct ServerBuffers {
 
 impl ServerStorage for ServerBuffers {
     fn frame(&mut self) -> &mut [u8] {
-        // SAFETY: begin demands a buffer of so many bytes for as long as the
-        // object is used, and takes no NULL.
+        // SAFETY: begin requires a buffer of `bytes` bytes that is valid for as long as
+        // the object is used, and refuses NULL.
         unsafe {
             core::hint::assert_unchecked(!self.frame.is_null());
             from_raw_parts_mut(self.frame, usize::from(self.bytes))
@@ -101,9 +101,9 @@ impl ServerStorage for ServerBuffers {
 
     fn part(&mut self, start: usize, end: usize) -> &mut [u8] {
         debug_assert!(start <= end && end <= self.bytes.into());
-        // SAFETY: begin demands a buffer of so many bytes for as long as the object is
-        // used, and the core keeps to the contract of `part`: places come from what a
-        // port took or gave, of which more than there was room for does not count.
+        // SAFETY: begin requires a buffer of `bytes` bytes that is valid for as long as the
+        // object is used. The core keeps the contract of `part`: `start` and `end` come from
+        // the counts that the port returned, which the core limits to the buffer.
         unsafe { from_raw_parts_mut(self.frame.add(start), end - start) }
     }
 
@@ -122,15 +122,16 @@ impl ServerStorage for ServerBuffers {
     }
 
     fn rule(&self, function: u8) -> Option<Rule> {
-        // SAFETY: begin demands so many units for as long as the object is used.
+        // SAFETY: begin requires `count` units that are valid for as long as the
+        // object is used.
         unsafe { custom::rule(self.units, self.count, function) }
     }
 }
 
 // SAFETY: the mark is a field of its own.
 unsafe impl CObject for mbm_server {
-    // A pointer, for while a poll is at work hooks may hand the server to functions of
-    // this library. The core leaves the mark out, which those look at.
+    // A pointer, because hooks may pass the server to functions of this library during a
+    // poll. Those functions read the mark, which is outside of the core.
     type Access<'a> = *mut Core;
 
     unsafe fn mark(server: *const mbm_server) -> *mut u8 {
@@ -144,18 +145,18 @@ unsafe impl CObject for mbm_server {
     }
 }
 
-/// Moves the server on, without waiting: takes bytes in, carries a request out
-/// once it is whole, sends the response.
+/// Polls the server, without waiting: receives bytes, carries out a complete request, and
+/// sends the response.
 ///
-/// Call it as often as you like, at least once per character time of the line
-/// if nothing else buffers its bytes. On a serial line a response begins with
-/// the first call after the line has been silent for t3.5.
+/// Call it often: at least once per character time of the line if nothing else buffers
+/// received bytes. On a serial line the response starts with the first call after the
+/// line has been silent for t3.5.
 ///
 /// @param server  the object
-/// @return MBM_OK; MBM_LINK_LOST if the port said so, which ends a connection;
-///         MBM_MALFORMED_FRAME if what came over TCP is not Modbus, so that
-///         the connection is to be closed; MBM_BUSY from within a hook of this
-///         server; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+/// @return MBM_OK; MBM_LINK_LOST if the port reported that the connection is lost: close
+///         it; MBM_MALFORMED_FRAME if the bytes received over TCP are not Modbus: close
+///         the connection; MBM_BUSY from within a hook of this server;
+///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_poll(server: *mut mbm_server) -> u8 {
     // SAFETY: as the header demands.
@@ -166,24 +167,24 @@ pub unsafe extern "C" fn mbm_server_poll(server: *mut mbm_server) -> u8 {
         }
         let mark = mbm_server::mark(server);
         mark.write(IN_HOOK);
-        let status = serve(object(server), mark);
-        // An object that a hook zeroed stays zero.
+        let status = poll(object(server), mark);
+        // If a hook zeroed the object, its mark stays zero.
         mark.write(mark.read() & BEGUN);
         status.code()
     }
 }
 
-/// Takes bytes in, and answers requests.
+/// Receives bytes, and serves and answers the requests among them.
 ///
 /// # Safety
-/// The core is that of an object that is begun and whose mark says that it polls,
-/// so that no function of this file uses it meanwhile.
+/// `core` belongs to an object that was begun. The mark of the object is `IN_HOOK`, so
+/// no function of this file uses the object meanwhile.
 #[inline(always)]
-unsafe fn serve(core: *mut Core, mark: *const u8) -> Status {
-    // SAFETY: as the caller promises. No reference to the core lives while units
-    // are served, or while the clock is read: both are the caller's code.
+unsafe fn poll(core: *mut Core, mark: *const u8) -> Status {
+    // SAFETY: as the caller promises. Units and the clock are code of the program; no
+    // reference to the core lives while they run.
     unsafe {
-        // One request a poll is as much as a line brings.
+        // Firmware serves one request a poll, which is enough for the rate of a line.
         if FIRMWARE {
             let now = port::now(&raw const (*core).port);
             core::hint::assert_unchecked((*core).has_framing());
@@ -231,18 +232,19 @@ unsafe fn serve(core: *mut Core, mark: *const u8) -> Status {
     Status::OK
 }
 
-/// How long mbm_server_poll will find nothing to do unless a byte arrives, so
-/// that a program may sleep until then.
+/// Returns how long the program may sleep before the next mbm_server_poll, unless a byte
+/// arrives earlier.
 ///
 /// @param server  the object
-/// @return microseconds; 0 means poll now, and is returned within a hook of this
-///         server; 0xFFFFFFFF until a byte arrives; 1000
-///         while a function of yours returns MBM_REPLY_PENDING or a connection does
-///         not take the response: to go on sooner, poll when that has changed. No
-///         byte is taken meanwhile, so do not wait for one
+/// @return microseconds. 0: poll now; a call from within a hook of this server returns 0
+///         too. 0xFFFFFFFF: sleep until a byte arrives; also for NULL and for a server
+///         that was never begun. 1000: a function of yours has returned
+///         MBM_REPLY_PENDING, or a connection does not accept the response yet; the
+///         server receives no bytes meanwhile, so do not wait for one, but poll earlier
+///         if you know that the function or the connection is ready
 #[no_mangle]
 pub unsafe extern "C" fn mbm_server_pollDelay(server: *const mbm_server) -> u32 {
-    // SAFETY: as the header demands; no reference lives while the clock is read.
+    // SAFETY: as the header requires; no reference lives while the clock is read.
     unsafe {
         match check(server) {
             Status::OK => {

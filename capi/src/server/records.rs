@@ -1,4 +1,4 @@
-//! The records that a unit knows: the head of every one, a user's function, and that of
+//! The records that a unit knows: the head of every record, a user's function, and the
 //! diagnostics.
 
 use crate::functions::mbm_rule;
@@ -10,45 +10,44 @@ use mbm::server::Reply;
 /// The head of each record that a mbm_unit_serve function takes. Private.
 #[repr(C)]
 pub struct mbm_service {
-    /// Serves a request, if it is one of this family. NULL in a zeroed record,
+    /// Serves a request if its function belongs to this record. NULL in a zeroed record,
     /// which serves nothing.
     pub serve: Option<
         unsafe extern "C" fn(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize,
     >,
-    /// What kind of record of its family it is served as, from 1 on; 0 in a zeroed one.
+    /// The kind of the record within its family, from 1 on; 0 in a zeroed record.
     pub kind: u8,
 }
 
-/// The function of a service. `pdu` points to the PDU of a request that `info`
-/// tells of, and returns a [`Reply`].
+/// The function of a service. `pdu` points to the PDU of the request that `info`
+/// describes. Returns the number of a [`Reply`].
 pub(super) type Serve =
     unsafe extern "C" fn(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize;
 
 /// A request for a function of yours.
 #[repr(C)]
 pub struct mbm_request {
-    /// What stands behind the function code.
+    /// The data of the request: the bytes after the function code.
     pub data: *const u8,
-    /// Bytes of it, 0 to 252.
+    /// Length of `data` in bytes, 0 to 252.
     pub length: u16,
-    /// The unit that it was sent to. On a serial line 0 is broadcast: no response is
-    /// sent.
+    /// The unit id in the request. 0 on a serial line is a broadcast: the server then
+    /// sends no response.
     pub unit: u8,
     /// The function code.
     pub function: u8,
 }
 
-/// A function of yours. Zero it, set what you need, and hand it to
+/// A function of yours. Zero the struct, set the fields that you need, and pass it to
 /// mbm_unit_serveCustom.
 #[repr(C)]
 pub struct mbm_custom {
     /// Private.
     pub service: mbm_service,
-    /// Carries out a request and writes the data of the response, which stand
-    /// behind the function code, to `response`. `capacity` is what the frame
-    /// buffer has left behind the request, at most 252 of it are used. Returns
-    /// how many bytes it wrote, or MBM_REPLY_EXCEPTION | code, MBM_REPLY_NONE or
-    /// MBM_REPLY_PENDING.
+    /// Carries out a request and writes the data of the response, without the function
+    /// code, to `response`. `capacity` is the space in bytes that the frame buffer has
+    /// after the request; the server sends at most 252 bytes. Returns the number of bytes
+    /// written, or MBM_REPLY_EXCEPTION | code, or MBM_REPLY_NONE, or MBM_REPLY_PENDING.
     pub serve: Option<
         unsafe extern "C" fn(
             context: *mut c_void,
@@ -57,20 +56,20 @@ pub struct mbm_custom {
             capacity: u16,
         ) -> u16,
     >,
-    /// Handed to `serve`. Yours, may be NULL.
+    /// Passed to `serve`. Any value; may be NULL.
     pub context: *mut c_void,
-    /// The function code, 1 to 127; 0 is every function that nothing before it
-    /// serves. 65 to 72 and 100 to 110 are left to users (V1.1b3, 5).
+    /// The function code, 1 to 127. 0 means every function that no earlier record of the
+    /// unit serves. The standard reserves 65 to 72 and 100 to 110 for users (V1.1b3, 5).
     pub code: u8,
-    /// How long its request PDUs are, which RTU over TCP asks. Zeroed, a request is
-    /// whole once its CRC is right.
+    /// The length of the request PDUs, which a server of RTU over TCP needs. If it is
+    /// zeroed, a request is complete when its CRC is right.
     pub length: mbm_rule,
 }
 
-/// The kind of a function of yours, which no other record has.
+/// The kind of a user's function. No other record has this kind.
 pub(super) const CUSTOM: u8 = 0x80;
 
-/// True if the record with this head is a function of C.
+/// True if this is the head of a user's function.
 ///
 /// # Safety
 /// `service` is the head of a record of any kind.
@@ -80,14 +79,13 @@ pub(super) unsafe fn is_custom(service: *const mbm_service) -> bool {
     unsafe { (*service).kind == CUSTOM }
 }
 
-/// True if the record with this head is a function of C that has another code than
-/// `function`.
+/// True if this is the head of a user's function with another code than `function`.
 ///
 /// # Safety
 /// As for [`is_custom`].
 #[inline(always)]
-pub(super) unsafe fn is_of_another(service: *const mbm_service, function: u8) -> bool {
-    // SAFETY: as the caller promises; a record of that kind is a function of C.
+pub(super) unsafe fn is_other_custom(service: *const mbm_service, function: u8) -> bool {
+    // SAFETY: as the caller promises; a record of that kind is a `mbm_custom`.
     unsafe {
         is_custom(service) && {
             let code = (*service.cast::<mbm_custom>()).code;
@@ -96,38 +94,39 @@ pub(super) unsafe fn is_of_another(service: *const mbm_service, function: u8) ->
     }
 }
 
-/// What a unit knows of its line. Zero it, and hand it to
-/// mbm_unit_serveDiagnostics. Counters wrap at 2^16; read them as you like.
+/// The counters, the event log and the listen only mode of a unit. Zero the struct and
+/// pass it to mbm_unit_serveDiagnostics. The counters wrap at 65536; you may read them at
+/// any time. The sub-functions below are those of function 08 (V1.1b3, 6.8), in hex.
 #[repr(C)]
 pub struct mbm_diagnostics {
     /// Private.
     pub service: mbm_service,
-    /// Optional: called when the client restarts the line with sub-function 01 of
-    /// 08; `clearLog` is 1 if it cleared the event log too.
+    /// Optional: called when the client restarts the communications (sub-function 01).
+    /// `clearLog` is 1 if the client cleared the event log too, else 0.
     pub restart: Option<unsafe extern "C" fn(context: *mut c_void, clearLog: u8)>,
-    /// Handed to `restart`. Yours, may be NULL.
+    /// Passed to `restart`. Any value; may be NULL.
     pub context: *mut c_void,
-    /// What sub-function 02 of 08 returns: yours.
+    /// The value that sub-function 02 returns. You set it.
     pub diagnosticRegister: u16,
-    /// Sub-function 0B: frames with a right CRC, for whichever unit.
+    /// Sub-function 0B: frames with a right CRC, for any unit.
     pub busMessages: u16,
-    /// Sub-function 0C: frames that arrived damaged.
+    /// Sub-function 0C: damaged frames.
     pub busCommunicationErrors: u16,
-    /// Sub-function 0D: exceptions, those of broadcasts too.
+    /// Sub-function 0D: exceptions, including those that broadcasts caused.
     pub exceptionErrors: u16,
     /// Sub-function 0E: requests for this unit, and broadcasts.
     pub serverMessages: u16,
-    /// Sub-function 0F: requests that were not answered.
+    /// Sub-function 0F: requests without a response.
     pub noResponses: u16,
-    /// Sub-function 10: exceptions 07.
+    /// Sub-function 10: exceptions with code 07.
     pub naks: u16,
-    /// Sub-function 11: exceptions 06.
+    /// Sub-function 11: exceptions with code 06.
     pub busy: u16,
-    /// Sub-function 12: frames that the buffer could not hold.
+    /// Sub-function 12: frames that were too long for the buffer.
     pub characterOverruns: u16,
-    /// What 0B returns: requests that were carried out.
+    /// The event count that function 0B returns: requests that were carried out.
     pub events: u16,
-    /// 1 in listen only mode.
+    /// 1 in listen only mode, else 0.
     pub listenOnly: u8,
     /// Private.
     pub hidden: [u8; 67],

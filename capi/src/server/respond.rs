@@ -1,4 +1,4 @@
-//! The responder: a frame in, a frame out.
+//! The responder: takes a request frame, writes a response frame.
 
 use super::mbm_unit;
 use super::units;
@@ -9,33 +9,33 @@ use mbm::error::Status;
 use mbm::server::respond::respond;
 use mbm::server::{Reply, RequestInfo, Units};
 
-/// Units of C.
+/// The units that C passed, and how many.
 struct RespondUnits(*mut mbm_unit, u8);
 
 impl Units for RespondUnits {
     fn serve(&mut self, info: &RequestInfo, pdu: &mut [u8]) -> Reply {
-        // SAFETY: mbm_unit_respond demands so many units.
+        // SAFETY: mbm_unit_respond requires `self.1` units.
         let reply = unsafe { units::serve(self.0, self.1, info, pdu.as_mut_ptr()) };
         Reply::from_number(reply)
     }
 }
 
-/// Answers one request, without a server: takes a frame from a buffer and writes
+/// Answers one request without a server: reads a request frame from a buffer and writes
 /// the response frame over it.
 ///
-/// @param units      what is served: one unit, or an array of them
-/// @param count      how many units
-/// @param framing    how frames look; of it, `functions` are not used, for the units
-///                   know theirs
-/// @param frame      the whole request, and room for the response
-/// @param length     bytes of the request
-/// @param capacity   bytes of the buffer: 256 hold any response in RTU, 513 in
-///                   ASCII, 260 over TCP; a longer response becomes exception 04
-/// @param response   receives the bytes of the response; 0 where there is none: for a
-///                   damaged frame, another unit, a broadcast, and with any status
-///                   but MBM_OK
-/// @return MBM_OK; MBM_PENDING, with the buffer to be filled anew, if a function
-///         of yours is not done; MBM_INVALID_ARGUMENT
+/// @param units     the units to serve: one unit, or an array of units
+/// @param count     how many units
+/// @param framing   the framing. Its `functions` are not used: units know their own
+///                  functions
+/// @param frame     holds the complete request; receives the response
+/// @param length    length of the request in bytes
+/// @param capacity  size of `frame` in bytes. 256 hold every response in RTU, 513 in
+///                  ASCII, 260 in TCP. A longer response becomes exception 04
+/// @param response  receives the length of the response in bytes; 0 without a response:
+///                  after a damaged frame, a request for another unit, a broadcast, and
+///                  with any status but MBM_OK
+/// @return MBM_OK; MBM_PENDING if a function of yours returned MBM_REPLY_PENDING: write
+///         the request into `frame` again before the next call; MBM_INVALID_ARGUMENT
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_respond(
     units: *mut mbm_unit,
@@ -47,12 +47,12 @@ pub unsafe extern "C" fn mbm_unit_respond(
     response: *mut u16,
 ) -> u8 {
     if !response.is_null() {
-        // SAFETY: not NULL, so room for a length.
+        // SAFETY: not NULL, so it points to a length.
         unsafe { response.write(0) }
     }
     // SAFETY: as the header demands.
     let (framing, delimiter) = match unsafe { get(framing) } {
-        Some(told) => (told.of_frames(), told.end()),
+        Some(fields) => (fields.of_frames(), fields.end()),
         None => return Status::INVALID_ARGUMENT.code(),
     };
     let framing = match framing {

@@ -1,7 +1,7 @@
-//! The four tables, in arrays of the caller.
+//! The four tables of the data model, in arrays of the program.
 
 use super::cells::{are_all_on, transfer, transfer_many, Place};
-use super::units::{add_as, is_unheard, request};
+use super::units::{add_as, is_ignored_broadcast, request};
 use super::{mbm_service, mbm_unit};
 use core::ffi::c_void;
 use core::hint::assert_unchecked;
@@ -10,24 +10,25 @@ use mbm::server::table::{self, TableAccess, TableKind, TableOperation};
 use mbm::server::Reply;
 use mbm::FIRMWARE;
 
-/// Holding or input registers in an array of yours. Zero it, set what you need,
-/// and hand it to mbm_unit_serveHoldingRegisters or
-/// mbm_unit_serveInputRegisters. You may change words and settings at any
-/// time, but not from within a hook of this table: the request under way goes on
-/// with the words that the table had when it came. To serve it as another kind of
-/// table, zero it first.
+/// Holding registers or input registers in an array of yours. Zero the struct, set the
+/// fields that you need, and pass it to mbm_unit_serveHoldingRegisters or
+/// mbm_unit_serveInputRegisters. You may change the registers at any time, and the fields
+/// too, except from within a hook of this table: the server finishes a request with the
+/// `words` that the table had when the request came. To serve the struct as another kind
+/// of table, zero it first.
 #[repr(C)]
 pub struct mbm_registerTable {
     /// Private.
     pub service: mbm_service,
-    /// The registers.
+    /// The registers: `size` words.
     pub words: *mut u16,
-    /// Optional, NULL if every register is there: a bit for each, lowest bit of
-    /// the first byte first; 0 answers exception 02.
+    /// Optional; NULL if every register exists. Otherwise a bitmap with one bit for each
+    /// register, the lowest bit of the first byte first. A request for a register whose
+    /// bit is 0 is answered with exception 02.
     pub valid: *const u8,
-    /// Optional: asked before registers are written, once a request. `data` are
-    /// the new values, high bytes first. Returns 0, or an exception code that
-    /// refuses the whole request.
+    /// Optional: called once a request, before registers are written. `data` has the new
+    /// values, the high byte of each first. Return 0 to allow the write, or an exception
+    /// code to refuse the whole request.
     pub before: Option<
         unsafe extern "C" fn(
             context: *mut c_void,
@@ -36,9 +37,9 @@ pub struct mbm_registerTable {
             data: *const u8,
         ) -> u8,
     >,
-    /// Optional: told what was written.
+    /// Optional: called after registers were written, with the address and the quantity.
     pub after: Option<unsafe extern "C" fn(context: *mut c_void, address: u16, quantity: u16)>,
-    /// Handed to both hooks. Yours, may be NULL.
+    /// Passed to both hooks. Any value; may be NULL.
     pub context: *mut c_void,
     /// The address of the first register.
     pub base: u16,
@@ -46,17 +47,19 @@ pub struct mbm_registerTable {
     pub size: u16,
 }
 
-/// Coils or discrete inputs in an array of yours, eight to a byte, lowest bit
-/// first; as mbm_registerTable.
+/// Coils or discrete inputs in an array of yours, eight bits in a byte, the lowest bit
+/// first. Use it as mbm_registerTable, with mbm_unit_serveCoils or
+/// mbm_unit_serveDiscreteInputs.
 #[repr(C)]
 pub struct mbm_bitTable {
     /// Private.
     pub service: mbm_service,
-    /// The bits.
+    /// The bits: `size` bits, in (size + 7) / 8 bytes.
     pub bits: *mut u8,
     /// As in mbm_registerTable.
     pub valid: *const u8,
-    /// As in mbm_registerTable; `data` are bits, lowest first.
+    /// As in mbm_registerTable. `data` has the new bits, the lowest bit of the first byte
+    /// first.
     pub before: Option<
         unsafe extern "C" fn(
             context: *mut c_void,
@@ -75,19 +78,18 @@ pub struct mbm_bitTable {
     pub size: u16,
 }
 
-/// A table of C, whose hooks may look at it: no reference to it is kept.
+/// A table of C. Its hooks may use the struct, so no reference to it is kept.
 struct Table(*mut mbm_registerTable);
 
-// The two tables are one record, but for what `words` points to.
+// Both structs have the same layout; only the type of the array differs.
 const _: () = {
     use core::mem::offset_of;
     assert!(offset_of!(mbm_registerTable, words) == offset_of!(mbm_bitTable, bits));
     assert!(offset_of!(mbm_registerTable, size) == offset_of!(mbm_bitTable, size));
 };
 
-// SAFETY, of all functions here: the record is the caller's and stays where it
-// is, as the header demands, with arrays of `size` cells behind its pointers; a
-// cell that is looked at lies in them.
+// SAFETY, of all functions here: the header requires that the struct stays valid, at the
+// same address, with arrays of `size` cells. Each access is within these arrays.
 impl TableAccess for Table {
     #[cfg_attr(target_arch = "avr", inline(never))]
     #[cfg_attr(not(target_arch = "avr"), inline(always))]
@@ -100,11 +102,11 @@ impl TableAccess for Table {
     ) -> Reply {
         let table = self.0;
         let pdu = pdu.as_mut_ptr();
-        // SAFETY: see above; a PDU has a function and an address, a request that writes has
-        // its data, and there is room for so many bytes of a response.
+        // SAFETY: see above. The PDU has a function code and an address; a write request has
+        // its data; the response of a read has space for `bytes` bytes.
         unsafe {
-            // What says where the cells are is taken once, for a hook may zero the
-            // record or set it up anew.
+            // The code reads the fields that locate the cells only once, because a hook
+            // may zero the struct or fill it in anew.
             let cells = (*table).words.cast::<u8>();
             let address = usize::from(*pdu.add(1)) << 8 | usize::from(*pdu.add(2));
             let first = address.wrapping_sub((*table).base.into());
@@ -120,7 +122,7 @@ impl TableAccess for Table {
                     return Reply::SERVER_DEVICE_FAILURE;
                 }
                 *pdu.add(1) = bytes as u8;
-                // There are bits without a cell.
+                // The last byte may have bits without a cell: they are 0.
                 *pdu.add(1 + bytes) = 0;
                 reply = Reply::length(2 + bytes);
                 (from, to) = (place, data);
@@ -134,7 +136,8 @@ impl TableAccess for Table {
                 }
                 after = (*table).after;
             }
-            // A host has room for code that takes many cells at a time.
+            // Firmware has the smaller code, which copies cell by cell; a host copies
+            // many at a time.
             if FIRMWARE {
                 transfer(from, to, quantity);
             } else {
@@ -149,10 +152,11 @@ impl TableAccess for Table {
     }
 }
 
-/// True if a table has so many cells from the one with this index on.
+/// True if a table has `quantity` cells from the index `first` on, and all of them are
+/// valid.
 ///
 /// # Safety
-/// `table` is one, with `size` bits behind `valid`.
+/// `table` is a table; `valid` is NULL or has `size` bits.
 #[inline(always)]
 unsafe fn contains(table: *const mbm_registerTable, first: usize, quantity: usize) -> bool {
     // SAFETY: as the caller promises.
@@ -166,11 +170,11 @@ unsafe fn contains(table: *const mbm_registerTable, first: usize, quantity: usiz
     }
 }
 
-/// As [`Table`], for function 17: what it reads once its hooks were called is where it
-/// was when the request came.
-struct TableAsItWas(Table, mbm_registerTable);
+/// As [`Table`], for function 17 (hex), which writes and then reads: the read uses the
+/// fields that the table had when the request came, also if a hook has changed them.
+struct TableSnapshot(Table, mbm_registerTable);
 
-impl TableAccess for TableAsItWas {
+impl TableAccess for TableSnapshot {
     #[cfg_attr(target_os = "none", inline(never))]
     fn access(
         &mut self,
@@ -179,9 +183,9 @@ impl TableAccess for TableAsItWas {
         bytes: usize,
         pdu: &mut [u8],
     ) -> Reply {
-        let mut was = Table(&raw mut self.1);
+        let mut copy = Table(&raw mut self.1);
         let table = if operation == TableOperation::READ {
-            &mut was
+            &mut copy
         } else {
             &mut self.0
         };
@@ -189,10 +193,10 @@ impl TableAccess for TableAsItWas {
     }
 }
 
-/// Serves a table.
+/// Serves a request to a table.
 ///
 /// # Safety
-/// `service` is the head of one; `pdu` has the bytes and room of `info`.
+/// `service` is the head of a table; `pdu` has the length and the space that `info` gives.
 unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
@@ -200,7 +204,7 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const
         let kind = TableKind::from_code((*table).service.kind);
         match table::operation(kind, *pdu) {
             operation if FIRMWARE => serve_as(operation, table, pdu, info),
-            // A host takes a way of its own for each.
+            // A host has one compiled function for each operation.
             TableOperation::READ if !kind.is_bits() && (*table).valid.is_null() => {
                 serve_read_words(table, pdu, info)
             }
@@ -212,7 +216,7 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const
     }
 }
 
-/// Serves a request that does this to the table.
+/// Serves a request with this operation on the table.
 ///
 /// # Safety
 /// As for [`serve`].
@@ -236,7 +240,7 @@ unsafe fn serve_as(
     }
 }
 
-/// [`serve_read`], of registers that are all there.
+/// [`serve_read`] for registers that all exist.
 ///
 /// # Safety
 /// As for [`serve`].
@@ -286,16 +290,20 @@ unsafe fn serve_write_several(
     unsafe { serve_as(TableOperation::WRITE_SEVERAL, table, pdu, info) }
 }
 
-/// Serves 16 and 17 of a table of holding registers.
+/// Serves functions 16 and 17 (hex) of a table of holding registers.
 ///
 /// # Safety
 /// As for [`serve`].
 #[cfg_attr(not(target_os = "none"), inline(never))]
-unsafe fn serve_more(table: *mut mbm_registerTable, pdu: *mut u8, info: *const c_void) -> usize {
+unsafe fn serve_mask_and_read_write(
+    table: *mut mbm_registerTable,
+    pdu: *mut u8,
+    info: *const c_void,
+) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         let (pdu, length) = request(pdu, info);
-        let mut cells = TableAsItWas(Table(table), table.read());
+        let mut cells = TableSnapshot(Table(table), table.read());
         if FIRMWARE {
             let cells: &mut dyn TableAccess = &mut cells;
             return table::serve_more(cells, pdu, length).code();
@@ -304,11 +312,11 @@ unsafe fn serve_more(table: *mut mbm_registerTable, pdu: *mut u8, info: *const c
     }
 }
 
-/// Serves holding registers, 16 and 17 too.
+/// Serves holding registers, functions 16 and 17 (hex) too.
 ///
 /// # Safety
 /// As for [`serve`].
-unsafe extern "C" fn serve_all(
+unsafe extern "C" fn serve_holding_registers(
     service: *mut mbm_service,
     pdu: *mut u8,
     info: *const c_void,
@@ -317,10 +325,10 @@ unsafe extern "C" fn serve_all(
     unsafe {
         if !table::is_more(*pdu) {
             serve(service, pdu, info)
-        } else if is_unheard(info, *pdu) {
+        } else if is_ignored_broadcast(info, *pdu) {
             Reply::NOT_HANDLED.code()
         } else {
-            serve_more(service.cast(), pdu, info)
+            serve_mask_and_read_write(service.cast(), pdu, info)
         }
     }
 }
@@ -339,12 +347,13 @@ unsafe extern "C" fn add_table(
     unsafe { add_as(unit, table.cast(), kind.code(), serve) }.code()
 }
 
-/// Serves coils: functions 01, 05 and 0F.
+/// Serves coils: functions 01, 05 and 0F (hex).
 ///
 /// @param unit   the unit
-/// @param table  yours, for as long as the unit is used
-/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY for a table that
-///         is served as another kind; MBM_BUFFER_TOO_SMALL if the unit has no place
+/// @param table  must stay valid for as long as the unit is used
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY for a table that is
+///         served as another kind; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
+///         records already
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveCoils(unit: *mut mbm_unit, table: *mut mbm_bitTable) -> u8 {
     // SAFETY: as the header demands.
@@ -354,7 +363,7 @@ pub unsafe extern "C" fn mbm_unit_serveCoils(unit: *mut mbm_unit, table: *mut mb
 /// Serves discrete inputs: function 02.
 ///
 /// @param unit   the unit
-/// @param table  yours, for as long as the unit is used
+/// @param table  must stay valid for as long as the unit is used
 /// @return a status; see mbm_unit_serveCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveDiscreteInputs(
@@ -365,11 +374,11 @@ pub unsafe extern "C" fn mbm_unit_serveDiscreteInputs(
     unsafe { add_table(unit, table.cast(), TableKind::DISCRETE_INPUTS) }
 }
 
-/// Serves holding registers: functions 03, 06 and 10. For 16 and 17 too, call
-/// mbm_registerTable_serveMaskAndReadWrite behind it.
+/// Serves holding registers: functions 03, 06 and 10 (hex). For functions 16 and 17 too,
+/// call mbm_registerTable_serveMaskAndReadWrite afterwards.
 ///
 /// @param unit   the unit
-/// @param table  yours, for as long as the unit is used
+/// @param table  must stay valid for as long as the unit is used
 /// @return a status; see mbm_unit_serveCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveHoldingRegisters(
@@ -383,7 +392,7 @@ pub unsafe extern "C" fn mbm_unit_serveHoldingRegisters(
 /// Serves input registers: function 04.
 ///
 /// @param unit   the unit
-/// @param table  yours, for as long as the unit is used
+/// @param table  must stay valid for as long as the unit is used
 /// @return a status; see mbm_unit_serveCoils
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveInputRegisters(
@@ -394,12 +403,13 @@ pub unsafe extern "C" fn mbm_unit_serveInputRegisters(
     unsafe { add_table(unit, table, TableKind::INPUT_REGISTERS) }
 }
 
-/// Serves functions 16 and 17 beside 03, 06 and 10, on each unit that has the
-/// table: a call of its own, so that firmware without it is smaller. After a table
-/// was zeroed it is to be called again.
+/// Adds functions 16 and 17 (hex), Mask Write Register and Read/Write Multiple Registers,
+/// to a table of holding registers, on every unit that serves the table. It is a function
+/// of its own so that firmware without these two is smaller. Call it again after you have
+/// zeroed the table.
 ///
-/// @param table  holding registers that mbm_unit_serveHoldingRegisters took
-/// @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL and other tables
+/// @param table  holding registers that mbm_unit_serveHoldingRegisters accepted
+/// @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL and for any other table
 #[no_mangle]
 pub unsafe extern "C" fn mbm_registerTable_serveMaskAndReadWrite(
     table: *mut mbm_registerTable,
@@ -409,7 +419,7 @@ pub unsafe extern "C" fn mbm_registerTable_serveMaskAndReadWrite(
         if table.is_null() || (*table).service.kind != TableKind::HOLDING_REGISTERS.code() {
             return Status::INVALID_ARGUMENT.code();
         }
-        (*table).service.serve = Some(serve_all);
+        (*table).service.serve = Some(serve_holding_registers);
     }
     Status::OK.code()
 }

@@ -1,6 +1,6 @@
 //! Units and their services.
 
-use super::records::{is_custom, is_of_another, mbm_diagnostics, mbm_service, Serve};
+use super::records::{is_custom, is_other_custom, mbm_diagnostics, mbm_service, Serve};
 use core::ffi::c_void;
 use core::mem::offset_of;
 use core::slice::{from_raw_parts, from_raw_parts_mut};
@@ -10,21 +10,22 @@ use mbm::server::{
 };
 use mbm::FIRMWARE;
 
-/// Most records that one unit serves, each handed to a mbm_unit_serve function.
+/// The most records that one unit can serve. Each is one struct that you pass to a
+/// mbm_unit_serve function.
 pub const MBM_MAX_SERVICES: u8 = 16;
 
-/// A unit that servers answer for. Zero it, set `id`, and say what it serves with
-/// mbm_unit_serveCoils and its sisters.
+/// A unit that servers answer for. Zero it, set `id`, and call the mbm_unit_serve
+/// functions, for example mbm_unit_serveCoils, for what it serves.
 ///
-/// Each of those takes a record of yours, which stays valid for as long as the
-/// unit is used. A unit has places for MBM_MAX_SERVICES records; one more is
-/// refused with MBM_BUFFER_TOO_SMALL. A record may be handed over again, also
-/// after you have zeroed and refilled it, and keeps its place. A zeroed record
-/// serves nothing until it is handed over again. One record may serve any number
-/// of units.
+/// Each mbm_unit_serve function takes a record: a struct of yours, which must stay valid
+/// for as long as the unit is used. A unit has places for MBM_MAX_SERVICES records; one
+/// more returns MBM_BUFFER_TOO_SMALL. You may pass a record again, also after you have
+/// zeroed and refilled it; it keeps its place. A zeroed record serves nothing until you
+/// pass it again. Any number of units may share one record.
 #[repr(C)]
 pub struct mbm_unit {
-    /// Private: the records, in the order in which they are asked, then NULL.
+    /// Private: the records in the order in which the unit calls them. NULL follows the
+    /// last one.
     pub services: [*mut mbm_service; MBM_MAX_SERVICES as usize],
     /// Private: NULL in a unit without diagnostics.
     pub monitor: Option<
@@ -37,20 +38,20 @@ pub struct mbm_unit {
     >,
     /// Private.
     pub diagnostics: *mut mbm_diagnostics,
-    /// The unit id, 1 to 247 (serial line guide V1.02, 2.2); 248 to 255, which the
-    /// standard reserves, are taken as they are. 0 answers to every id. A unit that
-    /// serves nothing is silent, as if it were not there.
+    /// The unit id, 1 to 247 (serial line guide V1.02, 2.2). The ids 248 to 255, which
+    /// the standard reserves, are accepted. 0 answers to every id. A unit without any
+    /// record does not answer.
     pub id: u8,
 }
 
-/// Puts a service into the first free place of a unit, unless it has one there
-/// already. A record that is not zeroed keeps its function: another unit may have
-/// it, with functions 16 and 17. One that is served as another kind, for it would answer
-/// other functions on each unit that has it, is [`Status::BUSY`].
+/// Puts a service into the first free place of a unit, unless the unit has it already. A
+/// record that is not zero keeps its `serve` function: another unit may serve it with
+/// functions 16 and 17 (hex). Returns [`Status::BUSY`] for a record that is served as
+/// another kind, because it would then serve other functions on every unit that has it.
 ///
 /// # Safety
-/// Each pointer is NULL or points to what it says, and `service` is the head of
-/// a record, zeroed or served by `serve`.
+/// Each pointer is NULL or valid. `service` is the head of a record that is zero or that
+/// `serve` serves.
 #[cfg_attr(target_os = "none", inline(never))]
 pub(super) unsafe fn add_as(
     unit: *mut mbm_unit,
@@ -61,7 +62,7 @@ pub(super) unsafe fn add_as(
     if unit.is_null() || service.is_null() {
         return Status::INVALID_ARGUMENT;
     }
-    // SAFETY: not NULL, and the place is one of the unit's.
+    // SAFETY: not NULL, and `place` is within the services of the unit.
     unsafe {
         let known = (*service).kind;
         if known != 0 && known != kind {
@@ -84,7 +85,7 @@ pub(super) unsafe fn add_as(
     Status::OK
 }
 
-/// As [`add_as`], of a family with one kind of records.
+/// As [`add_as`], for a family with only one kind of record.
 ///
 /// # Safety
 /// As for [`add_as`].
@@ -93,28 +94,28 @@ pub(super) unsafe fn add(unit: *mut mbm_unit, service: *mut mbm_service, serve: 
     unsafe { add_as(unit, service, 1, serve) }.code()
 }
 
-/// The places of a unit, one after the other, up to the first that is free. What
-/// is called for one may fill others.
-pub(super) struct Places {
+/// The services of a unit, one after the other, up to the first free place. The code that
+/// runs for one service may add others.
+pub(super) struct Services {
     place: *const *mut mbm_service,
     end: *const *mut mbm_service,
 }
 
-impl Places {
+impl Services {
     /// # Safety
-    /// `unit` is one, and stays so while its places are looked at.
+    /// `unit` is a unit, and stays one while the iterator is used.
     #[inline(always)]
-    pub(super) unsafe fn new(unit: *const mbm_unit) -> Places {
+    pub(super) unsafe fn new(unit: *const mbm_unit) -> Services {
         // SAFETY: as the caller promises.
         unsafe {
             let place = (&raw const (*unit).services).cast::<*mut mbm_service>();
             let end = place.add(MBM_MAX_SERVICES.into());
-            Places { place, end }
+            Services { place, end }
         }
     }
 }
 
-impl Iterator for Places {
+impl Iterator for Services {
     type Item = *mut mbm_service;
 
     #[inline(always)]
@@ -122,7 +123,7 @@ impl Iterator for Places {
         if self.place == self.end {
             return None;
         }
-        // SAFETY: not the end, so one of the places.
+        // SAFETY: not the end, so a place of the unit.
         unsafe {
             let service = *self.place;
             self.place = self.place.add(1);
@@ -131,7 +132,8 @@ impl Iterator for Places {
     }
 }
 
-/// The PDU of a request with the room behind it, and its length.
+/// The PDU of a request, including the space that the response may take, and the length
+/// of the request.
 ///
 /// # Safety
 /// As for [`Serve`]; nothing else uses the PDU while the slice lives.
@@ -145,74 +147,80 @@ pub(super) unsafe fn request<'a>(pdu: *mut u8, info: *const c_void) -> (&'a mut 
     }
 }
 
-/// Has the services of a unit look at a request, one after the other.
+/// Calls the services of a unit one after the other until one of them handles the
+/// request.
 ///
 /// # Safety
-/// `unit` is one, and `pdu` has the bytes and the room that `info` says.
-pub(super) unsafe fn walk(unit: *mut mbm_unit, info: *const c_void, pdu: *mut u8) -> usize {
-    // SAFETY: as the caller promises; a PDU has a byte at least.
+/// `unit` is a unit; `pdu` has the length and the space that `info` gives.
+pub(super) unsafe fn call_services(
+    unit: *mut mbm_unit,
+    info: *const c_void,
+    pdu: *mut u8,
+) -> usize {
+    // SAFETY: as the caller promises; a PDU has at least one byte.
     unsafe {
-        let replies = Places::new(unit).map(|service| ask(service, info, pdu));
+        let replies = Services::new(unit).map(|service| call_service(service, info, pdu));
         first_reply(replies.map(Reply::from_number)).code()
     }
 }
 
-/// As [`walk`], of a unit without diagnostics, which ends where all places are taken too:
-/// behind the last of them stands the pointer to what diagnostics need, which is NULL.
+/// As [`call_services`], for a unit without diagnostics. The loop needs no count: if all
+/// places are taken, it ends at the next field, the pointer to the monitor function,
+/// which is NULL in such a unit.
 ///
 /// # Safety
-/// As for [`walk`]; the unit has no `monitor`.
+/// As for [`call_services`]; the unit has no `monitor`.
 #[inline(always)]
-unsafe fn walk_alone(unit: *mut mbm_unit, info: *const c_void, pdu: *mut u8) -> usize {
-    // SAFETY: as the caller promises; what is read stands in the unit, for the places end
-    // with NULL. A hook that gives the unit diagnostics meanwhile is called by a service
-    // that serves the request, which ends the walk.
+unsafe fn call_services_alone(unit: *mut mbm_unit, info: *const c_void, pdu: *mut u8) -> usize {
+    // SAFETY: as the caller promises. The loop reads only fields of the unit, because
+    // NULL follows the services. If a hook adds diagnostics to the unit, the service that
+    // called the hook handles the request, which ends the loop.
     unsafe {
         let mut place = unit
             .byte_add(offset_of!(mbm_unit, services))
             .cast::<*mut mbm_service>();
         while !(*place).is_null() {
             let service = *place;
-            let reply = ask(service, info, pdu);
+            let reply = call_service(service, info, pdu);
             if reply != Reply::NOT_HANDLED.code() {
                 return reply;
             }
             place = place.add(1);
-            // Where one function of the user's stands, there are often more.
+            // After one function of the user there are often more.
             if !FIRMWARE && is_custom(service) {
-                place = pass(unit, place, *pdu);
+                place = skip_custom(unit, place, *pdu);
             }
         }
     }
     Reply::ILLEGAL_FUNCTION.code()
 }
 
-/// The first place from this one on that has no function of the user's of another code.
-/// A host calls none of these, and looks at four at a time.
+/// Returns the first place, from `place` on, that is not a user's function with another
+/// code. A host skips those without a call, four at a time.
 ///
 /// # Safety
-/// `place` is one of the unit's, or the end of them, behind which is NULL.
+/// `place` is a place of the unit or its end, where NULL is.
 #[inline(never)]
-unsafe fn pass(
+unsafe fn skip_custom(
     unit: *const mbm_unit,
     mut place: *mut *mut mbm_service,
     function: u8,
 ) -> *mut *mut mbm_service {
-    // SAFETY: as the caller promises; where the fourth place from here on has a record, so
-    // have those before it.
+    // SAFETY: as the caller promises; if the fourth place from here has a record, so have
+    // those before it.
     unsafe {
-        let is_passed = |place: *mut *mut mbm_service| is_of_another(*place, function);
+        let is_skipped = |place: *mut *mut mbm_service| is_other_custom(*place, function);
         let last = unit
             .byte_add(offset_of!(mbm_unit, services))
             .cast::<*mut mbm_service>()
             .add(MBM_MAX_SERVICES as usize - 4);
         while place.cast_const() <= last
             && !(*place.add(3)).is_null()
-            && (0..4).all(|index| is_passed(place.add(index)))
+            && (0..4).all(|index| is_skipped(place.add(index)))
         {
             place = place.add(4);
         }
-        while !(*place).is_null() && is_passed(place) {
+        while !(*place).is_null() && is_skipped(place) {
             place = place.add(1);
         }
     }
@@ -224,12 +232,12 @@ const _: () = {
     assert!(offset_of!(mbm_unit, monitor) == end);
 };
 
-/// Has a service look at a request. A record that was zeroed has no function.
+/// Has one service handle a request. A zeroed record has no function and handles nothing.
 ///
 /// # Safety
 /// As for [`Serve`].
 #[inline(always)]
-unsafe fn ask(service: *mut mbm_service, info: *const c_void, pdu: *mut u8) -> usize {
+unsafe fn call_service(service: *mut mbm_service, info: *const c_void, pdu: *mut u8) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         match (*service).serve {
@@ -239,10 +247,10 @@ unsafe fn ask(service: *mut mbm_service, info: *const c_void, pdu: *mut u8) -> u
     }
 }
 
-/// True if a unit serves something.
+/// True if the unit has at least one service.
 ///
 /// # Safety
-/// `unit` is one.
+/// `unit` is a unit.
 #[inline(always)]
 unsafe fn serves(unit: *const mbm_unit) -> bool {
     // SAFETY: as the caller promises.
@@ -252,11 +260,10 @@ unsafe fn serves(unit: *const mbm_unit) -> bool {
     }
 }
 
-/// Has each unit look at a frame; the first that it is for answers.
+/// Passes a frame to each unit. The first unit that it addresses answers.
 ///
 /// # Safety
-/// `units` points to `count` units, and `pdu` has the bytes and the room that
-/// `info` says.
+/// `units` points to `count` units; `pdu` has the length and the space that `info` gives.
 #[inline(always)]
 pub(super) unsafe fn serve(
     units: *mut mbm_unit,
@@ -266,8 +273,8 @@ pub(super) unsafe fn serve(
 ) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
-        // One unit alone, which takes no notice of what is others', and is asked by
-        // its id: soon done.
+        // A fast path for a single unit without diagnostics that the request addresses by
+        // its id.
         if !FIRMWARE
             && count == 1
             && (*units).monitor.is_none()
@@ -276,13 +283,13 @@ pub(super) unsafe fn serve(
             && (*info).to != ANY
             && serves(units)
         {
-            return walk_alone(units, info.cast(), pdu);
+            return call_services_alone(units, info.cast(), pdu);
         }
         serve_each(units, count, info, pdu)
     }
 }
 
-/// [`serve`], whatever the units.
+/// [`serve`] for any number and kind of units.
 ///
 /// # Safety
 /// As for [`serve`].
@@ -296,7 +303,7 @@ unsafe fn serve_each(
 ) -> usize {
     // SAFETY: as the caller promises.
     let all = unsafe { (*info).addressing_of_all() };
-    let mut frame = Frame {
+    let mut frame = UnitsForFrame {
         unit: units,
         left: count,
         info,
@@ -305,17 +312,16 @@ unsafe fn serve_each(
     dispatch(&mut frame, all).code()
 }
 
-/// A frame that the units are asked about, and those that are not asked yet.
-///
-/// The pointers are as for [`serve`]; no reference lives while a unit is asked.
-struct Frame {
+/// A frame, and the units that have not seen it yet. The pointers are as for [`serve`];
+/// no reference lives while a unit runs.
+struct UnitsForFrame {
     unit: *mut mbm_unit,
     left: u8,
     info: *const RequestInfo,
     pdu: *mut u8,
 }
 
-impl Dispatch for Frame {
+impl Dispatch for UnitsForFrame {
     type Unit = *mut mbm_unit;
 
     #[inline(always)]
@@ -324,9 +330,9 @@ impl Dispatch for Frame {
         unsafe {
             loop {
                 if !FIRMWARE && all != Addressing::BROADCAST {
-                    let passed = foreign(self.unit, self.left, self.info, all);
-                    self.left -= passed;
-                    self.unit = self.unit.add(passed.into());
+                    let skipped = count_skipped(self.unit, self.left, self.info, all);
+                    self.left -= skipped;
+                    self.unit = self.unit.add(skipped.into());
                 }
                 if self.left == 0 {
                     return None;
@@ -334,7 +340,7 @@ impl Dispatch for Frame {
                 let unit = self.unit;
                 self.unit = unit.add(1);
                 self.left -= 1;
-                // A unit that serves nothing is as if it were not there.
+                // Skips a unit without services.
                 if serves(unit) {
                     return Some(unit);
                 }
@@ -356,59 +362,60 @@ impl Dispatch for Frame {
             match (*unit).monitor {
                 Some(monitor) => monitor(unit, info, addressing.code(), pdu),
                 None if addressing == Addressing::FOREIGN => return None,
-                None => walk_alone(unit, info, pdu),
+                None => call_services_alone(unit, info, pdu),
             }
         };
         Some(Reply::from_number(reply))
     }
 }
 
-/// How many of these units, up to the first other, neither answer a frame nor take
-/// notice of it, where it is no broadcast: a host calls none of them.
+/// Counts the units at the start of the array that neither answer this frame nor monitor
+/// it. The frame is no broadcast. A host skips these units without a call.
 ///
 /// # Safety
 /// `units` points to `count` units.
 #[inline(always)]
-unsafe fn foreign(
+unsafe fn count_skipped(
     units: *const mbm_unit,
     count: u8,
     info: *const RequestInfo,
     all: Addressing,
 ) -> u8 {
-    // SAFETY: as the caller promises; no function of theirs runs meanwhile.
+    // SAFETY: as the caller promises; no function of the program runs meanwhile.
     let (info, units) = unsafe { (&*info, from_raw_parts(units, count.into())) };
-    let takes_notice = |unit: &mbm_unit| unit.monitor.is_some();
+    let monitors = |unit: &mbm_unit| unit.monitor.is_some();
     let answers = |unit: &mbm_unit| unit.id == info.to || unit.id == ANY;
     if all == Addressing::FOREIGN {
-        before(units, takes_notice)
+        count_before(units, monitors)
     } else if info.is_for_any() {
         0
     } else {
-        before(units, |unit| answers(unit) || takes_notice(unit))
+        count_before(units, |unit| answers(unit) || monitors(unit))
     }
 }
 
-/// How many units come before the first of which this is true; four at a time.
+/// Counts the units before the first one for which `is_match` returns true, four at a
+/// time.
 #[inline(always)]
-fn before(units: &[mbm_unit], is_it: impl Fn(&mbm_unit) -> bool) -> u8 {
+fn count_before(units: &[mbm_unit], is_match: impl Fn(&mbm_unit) -> bool) -> u8 {
     let (fours, _) = units.as_chunks::<4>();
-    let is_in = |four: &[mbm_unit; 4]| four.iter().any(&is_it);
-    let passed = 4 * fours.iter().position(is_in).unwrap_or(fours.len());
-    let mut rest = units.iter().skip(passed);
-    (passed + rest.position(&is_it).unwrap_or(units.len() - passed)) as u8
+    let is_in = |four: &[mbm_unit; 4]| four.iter().any(&is_match);
+    let skipped = 4 * fours.iter().position(is_in).unwrap_or(fours.len());
+    let mut rest = units.iter().skip(skipped);
+    (skipped + rest.position(&is_match).unwrap_or(units.len() - skipped)) as u8
 }
 
-/// True for a broadcast of a function that is not carried out then.
+/// True for a broadcast of a function that a unit does not carry out as a broadcast.
 ///
 /// # Safety
 /// As for [`Serve`].
 #[cfg_attr(target_os = "none", inline(never))]
-pub(super) unsafe fn is_unheard(info: *const c_void, function: u8) -> bool {
+pub(super) unsafe fn is_ignored_broadcast(info: *const c_void, function: u8) -> bool {
     // SAFETY: as the caller promises.
     unsafe { (*info.cast::<RequestInfo>()).is_broadcast() && !only_writes(function) }
 }
 
-/// As [`add`], and moves the service before all others of the unit.
+/// As [`add`], but puts the service before all others of the unit.
 ///
 /// # Safety
 /// As for [`add`].
@@ -419,7 +426,7 @@ pub(super) unsafe fn add_first(unit: *mut mbm_unit, new: *mut mbm_service, serve
         if status == Status::OK.code() {
             let mut moved = new;
             let mut place = (&raw mut (*unit).services).cast::<*mut mbm_service>();
-            // The one that stands in the place of `new` moves no further.
+            // The loop ends at the place where `add` put `new`.
             loop {
                 core::ptr::swap(place, &raw mut moved);
                 if moved == new {

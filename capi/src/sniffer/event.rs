@@ -1,4 +1,4 @@
-//! What a sniffer reports: events, and events in words.
+//! The events of a sniffer, and events as text.
 
 use crate::packet::{mbm_packet, MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
 use crate::pointers::{array_or_empty, get};
@@ -14,14 +14,15 @@ use mbm::text::HEAD;
 pub const MBM_EVENT_REQUEST: u8 = 0;
 /// The reply to a request.
 pub const MBM_EVENT_REPLY: u8 = 1;
-/// The exception that answers a request.
+/// An exception that answers a request.
 pub const MBM_EVENT_EXCEPTION: u8 = 2;
-/// A reply or exception to no request that waits for one: a late one, one whose
-/// request was not seen, or one that does not answer what was asked.
+/// A reply or exception without a matching request: it is late, or its request was not
+/// received, or it does not match the request.
 pub const MBM_EVENT_UNPAIRED: u8 = 3;
-/// A request that nobody answered within the timeout, or before the next request.
+/// A request without a reply: none came before the timeout, or on a serial line before
+/// the next request.
 pub const MBM_EVENT_TIMEOUT: u8 = 4;
-/// What looks like a frame, but has a wrong CRC or LRC, or too few bytes.
+/// Bytes that look like a frame, but the CRC or LRC is wrong, or bytes are missing.
 pub const MBM_EVENT_BAD_CRC: u8 = 5;
 /// Bytes that are no frame.
 pub const MBM_EVENT_NOISE: u8 = 6;
@@ -36,74 +37,78 @@ const _: () = {
     assert!(MBM_EVENT_NOISE == EventKind::Noise as u8);
 };
 
-/// Something that happened on the bus.
+/// One event on the bus.
 ///
-/// What it points to lies in the sniffer's buffer, and is valid until the next
-/// call with that sniffer.
+/// Its pointers point into the buffer of the sniffer, and are valid until the next call
+/// with that sniffer.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_event {
-    /// The frame; of noise the bytes. An ASCII frame is decoded: unit, PDU, LRC.
+    /// The bytes of the frame; of MBM_EVENT_NOISE all its bytes. An ASCII frame is
+    /// decoded: unit id, PDU, LRC.
     pub frame: *const u8,
-    /// The PDU in the frame; NULL if there is none.
+    /// The PDU within the frame; NULL without a PDU.
     pub pdu: *const u8,
-    /// What the PDU says, as mbm_frame_parse reads it. If it cannot be read, of a
-    /// timeout and of what is no frame: kind, unit, transaction and function alone.
+    /// The fields of the PDU, as mbm_frame_parse sets them. If the PDU is malformed, and
+    /// for MBM_EVENT_TIMEOUT, MBM_EVENT_BAD_CRC and MBM_EVENT_NOISE, only kind, unit,
+    /// transaction and function are set.
     pub packet: mbm_packet,
-    /// When its last byte arrived, in microseconds; of a timeout when the request
-    /// was given up.
+    /// When the last byte arrived, in microseconds; for MBM_EVENT_TIMEOUT when the
+    /// timeout ended.
     pub timeUs: u32,
-    /// From the last byte of the request to the last byte of its reply, or until it
-    /// was given up, in microseconds; else 0.
+    /// Time from the last byte of the request to the last byte of its reply, or to the
+    /// timeout, in microseconds; 0 for other events.
     pub responseTimeUs: u32,
-    /// Bytes of `frame`.
+    /// Length of `frame` in bytes.
     pub frameLength: u16,
-    /// Bytes of `pdu`.
+    /// Length of `pdu` in bytes.
     pub pduLength: u16,
-    /// How many bytes on the line this was.
+    /// How many bytes of the line or stream this event covers, at most 65535.
     pub length: u16,
-    /// What this is about, also of a reply that does not say so itself: the first
-    /// coil, input or register of the request; 17: that is read.
+    /// The first coil, input or register of the request; for function 17 (hex) the first
+    /// that is read. Also set for a reply, which does not contain it.
     pub address: u16,
-    /// How many; 17: that are read.
+    /// The quantity of the request; for function 17 (hex) the quantity that is read.
     pub quantity: u16,
-    /// One of MBM_EVENT_.
+    /// One of MBM_EVENT_...
     pub kind: u8,
-    /// MBM_OK; of a request the exception that a server answers to it; the code of
-    /// an exception; MBM_MALFORMED_REPLY if a reply does not answer what was asked;
-    /// MBM_RESPONSE_TIMED_OUT; MBM_INVALID_CRC; MBM_BUFFER_TOO_SMALL of noise that
-    /// may have been a frame longer than the buffer.
+    /// MBM_OK; of a request that a server must refuse, the exception for it; of an
+    /// exception its code; MBM_MALFORMED_REPLY if a reply does not match its request;
+    /// MBM_RESPONSE_TIMED_OUT; MBM_INVALID_CRC; MBM_BUFFER_TOO_SMALL for noise that may
+    /// be a frame longer than the buffer.
     pub status: u8,
-    /// The unit that is asked, or answers; of a bad CRC the byte in its place.
+    /// The unit that the request addresses, or that replies; for MBM_EVENT_BAD_CRC the
+    /// byte at that position.
     pub unit: u8,
-    /// The function code, of an exception that of the request; of a bad CRC the
-    /// byte in its place.
+    /// The function code, of an exception the one of the request; for MBM_EVENT_BAD_CRC
+    /// the byte at that position.
     pub function: u8,
-    /// The first bytes of the request's PDU, of replies and timeouts.
+    /// The first bytes of the request's PDU: for replies, exceptions and timeouts, and
+    /// for MBM_EVENT_UNPAIRED if the reply is late and its request is still known.
     pub requestHead: [u8; 9],
-    /// How many those are; 0 if the request is not known.
+    /// How many bytes of requestHead are set; 0 if the request is not known.
     pub requestHeadLength: u8,
 }
 
 const _: () = assert!(HEAD == 9);
 
 impl mbm_event {
-    /// What C sees of an event.
-    pub(super) fn of(event: &Event, functions: &[Function]) -> mbm_event {
-        let side = match event.kind {
+    /// Converts an event of the core to one of C.
+    pub(super) fn from_event(event: &Event, functions: &[Function]) -> mbm_event {
+        let pdu_kind = match event.kind {
             EventKind::Request | EventKind::Timeout | EventKind::BadCrc | EventKind::Noise => {
                 PduKind::Request
             }
             _ => PduKind::Response,
         };
-        let kind = match side {
+        let kind = match pdu_kind {
             PduKind::Request => MBM_PACKET_REQUEST,
             PduKind::Response => MBM_PACKET_RESPONSE,
         };
         let mut packet = mbm_packet::of(kind, &[event.function]);
         if !matches!(event.kind, EventKind::BadCrc | EventKind::Noise) {
-            // What cannot be read leaves the packet as it is.
-            let _ = packet.take(side, event.pdu, functions);
+            // A malformed PDU leaves the packet unchanged.
+            let _ = packet.take(pdu_kind, event.pdu, functions);
         }
         packet.unit = event.unit;
         packet.transaction = event.transaction;
@@ -137,11 +142,11 @@ impl mbm_event {
         }
     }
 
-    /// The event that C hands back.
+    /// Converts an event of C to one of the core.
     ///
     /// # Safety
-    /// `frame` and `pdu` are NULL or point to their lengths' bytes.
-    unsafe fn told<'a>(&self) -> Result<Event<'a>, Status> {
+    /// `frame` and `pdu` are NULL or point to as many bytes as their lengths say.
+    unsafe fn core_event<'a>(&self) -> Result<Event<'a>, Status> {
         // SAFETY: as the caller promises.
         let (frame, pdu) = unsafe {
             (
@@ -169,15 +174,15 @@ impl mbm_event {
     }
 }
 
-/// Explains an event in one line of words, for example
+/// Writes an event as one line of text, for example
 /// "unit 17  reply      03 read holding registers  107..109: 555 0 100".
 ///
 /// Any thread may call it while the event is valid.
 ///
-/// @param event  what mbm_sniffer_next gave
-/// @param text   receives the line, which a zero byte ends in any case
-/// @param size   bytes of `text`; 200 do for most events, 2400 for all
-/// @return MBM_OK; MBM_BUFFER_TOO_SMALL: the line is cut; MBM_INVALID_ARGUMENT
+/// @param event  an event that mbm_sniffer_next returned
+/// @param text   receives the line; always ends with a NUL
+/// @param size   size of `text` in bytes; 200 are enough for most events, 2400 for all
+/// @return MBM_OK; MBM_BUFFER_TOO_SMALL if the line was cut; MBM_INVALID_ARGUMENT
 #[no_mangle]
 pub unsafe extern "C" fn mbm_event_text(
     event: *const mbm_event,
@@ -189,7 +194,7 @@ pub unsafe extern "C" fn mbm_event_text(
         let write = || {
             let mut line = line(text, size)?;
             let event = get(event).ok_or(Status::INVALID_ARGUMENT)?;
-            event.told()?.text(&mut line);
+            event.core_event()?.text(&mut line);
             Ok(line)
         };
         outcome(write())

@@ -1,4 +1,4 @@
-//! `mbm_sniffer_*`: listening on a bus that others use.
+//! `mbm_sniffer_*`: reads the frames on a bus that others use.
 
 mod event;
 
@@ -14,16 +14,16 @@ use mbm::pdu::custom::{Function, Rule};
 use mbm::sniffer::{BusDirection, Sniffer, MIN_BUFFER};
 use mbm::time::millis;
 
-/// Heard on a line that carries both directions.
+/// The bytes come from a line that carries both directions.
 pub const MBM_DIRECTION_BOTH: u8 = 0;
-/// Heard where only the client sends.
+/// The bytes come from a line or stream on which only the client sends.
 pub const MBM_DIRECTION_CLIENT: u8 = 1;
-/// Heard where only servers send.
+/// The bytes come from a line or stream on which only servers send.
 pub const MBM_DIRECTION_SERVER: u8 = 2;
 
-/// Least bytes of a sniffer's buffer.
+/// The smallest buffer of a sniffer, in bytes.
 pub const MBM_MIN_SNIFFER_BUFFER: u16 = 32;
-/// Most functions of your own that a sniffer takes.
+/// The most functions of your declaration that a sniffer accepts.
 pub const MBM_MAX_SNIFFER_FUNCTIONS: u8 = 19;
 
 const FUNCTIONS: usize = MBM_MAX_SNIFFER_FUNCTIONS as usize;
@@ -32,12 +32,12 @@ const _: () = {
     assert!(MBM_MIN_SNIFFER_BUFFER as usize == MIN_BUFFER);
 };
 
-/// A sniffer: finds the frames on a bus that others use, and pairs requests with
-/// replies. It only listens, and has no port: you feed it what you hear.
+/// A sniffer: finds the frames on a bus that others use, and pairs requests with replies.
+/// It never sends and has no port: you pass it the bytes that you receive.
 ///
-/// Storage is yours and must be zero before first use, which a static object is.
-/// One of the mbm_sniffer_begin functions comes first. Not re-entrant: use one
-/// object from one thread and never from an interrupt; put an mbm_ring between.
+/// You provide the storage. It must be zero before first use; a static object is zero. Call
+/// one of the mbm_sniffer_begin functions first. Not re-entrant: use one object from one
+/// thread, and never from an interrupt; pass bytes from an interrupt through an mbm_ring.
 #[repr(C)]
 pub struct mbm_sniffer {
     /// Private.
@@ -46,7 +46,7 @@ pub struct mbm_sniffer {
     words: [u32; 171],
 }
 
-/// What lies behind an `mbm_sniffer`.
+/// The real content of an `mbm_sniffer`.
 #[repr(C)]
 pub(super) struct Object {
     buffer: *mut u8,
@@ -62,7 +62,8 @@ const _: () = {
     let used = size_of::<Object>();
     assert!(align_of::<mbm_sniffer>() >= align_of::<Object>());
     assert!(used <= space);
-    // Hiding the fields may waste 5 % where RAM is scarce.
+    // On a 16-bit or 32-bit machine, where RAM is scarce, at most 5 % of the storage may
+    // be unused.
     assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
 };
 
@@ -81,7 +82,7 @@ unsafe impl CObject for mbm_sniffer {
     }
 }
 
-/// Changes a sniffer, or says why not.
+/// Changes the settings of a sniffer, or returns the status that says why not.
 ///
 /// # Safety
 /// As for [`pointers::with`].
@@ -95,29 +96,29 @@ unsafe fn with(sniffer: *mut mbm_sniffer, change: impl FnOnce(&mut Sniffer)) -> 
     }
 }
 
-const NOTHING: Function = Function {
+const NO_FUNCTION: Function = Function {
     code: 0,
     request: Rule::Silence,
     response: Rule::Silence,
 };
 
-/// What C declares, as the core keeps it.
-fn all(functions: &[mbm_function]) -> Result<[Function; FUNCTIONS], Status> {
-    let mut kept = [NOTHING; FUNCTIONS];
+/// Converts the declarations of C to those of the core.
+fn convert(functions: &[mbm_function]) -> Result<[Function; FUNCTIONS], Status> {
+    let mut converted = [NO_FUNCTION; FUNCTIONS];
     if functions.len() > FUNCTIONS {
         return Err(Status::INVALID_ARGUMENT);
     }
-    for (place, function) in kept.iter_mut().zip(functions) {
-        let own = declared(core::slice::from_ref(function), Some(function.code))?;
-        *place = own.ok_or(Status::INVALID_ARGUMENT)?;
+    for (place, function) in converted.iter_mut().zip(functions) {
+        let declaration = declared(core::slice::from_ref(function), Some(function.code))?;
+        *place = declaration.ok_or(Status::INVALID_ARGUMENT)?;
     }
-    Ok(kept)
+    Ok(converted)
 }
 
-/// Makes a sniffer out of storage.
+/// Writes a new sniffer to the storage.
 ///
 /// # Safety
-/// As the header demands of the begin functions.
+/// As the header requires for the begin functions.
 unsafe fn begin(sniffer: *mut mbm_sniffer, buffer: *mut u8, size: u16, framing: Framing) -> u8 {
     if sniffer.is_null() || buffer.is_null() {
         return Status::INVALID_ARGUMENT.code();
@@ -130,25 +131,26 @@ unsafe fn begin(sniffer: *mut mbm_sniffer, buffer: *mut u8, size: u16, framing: 
         size,
         mark: BEGUN,
         count: 0,
-        functions: [NOTHING; FUNCTIONS],
+        functions: [NO_FUNCTION; FUNCTIONS],
         core: Sniffer::new(framing),
     };
-    // SAFETY: storage of a sniffer has room for an object.
+    // SAFETY: the storage of a sniffer is large enough for an object.
     unsafe { put(sniffer.cast(), object) }
 }
 
-/// Begins to listen to RTU frames on a serial line.
+/// Begins a sniffer for RTU frames on a serial line.
 ///
-/// May be called again at any time: received bytes, and a request that still waits for its
-/// reply, are forgotten without an event, and the settings are as at first.
+/// You may call it again at any time. The sniffer then discards received bytes and
+/// unanswered requests without an event, and its settings return to their defaults.
 ///
-/// @param sniffer  the object; zeroed before the first call
-/// @param buffer   where bytes are kept until they are understood; yours, valid
-///                 for as long as the sniffer is used
-/// @param size     its bytes, MBM_MIN_SNIFFER_BUFFER or more. MBM_MAX_FRAME hold any
-///                 frame, twice as many where the directions are fed apart. A longer
-///                 frame becomes an event of kind MBM_EVENT_NOISE
-/// @return MBM_OK; MBM_BUFFER_TOO_SMALL or MBM_INVALID_ARGUMENT, with nothing changed
+/// @param sniffer  the object; zero it before the first call
+/// @param buffer   holds received bytes until the sniffer has reported them; must stay
+///                 valid for as long as the sniffer is used
+/// @param size     size of `buffer` in bytes, at least MBM_MIN_SNIFFER_BUFFER.
+///                 MBM_MAX_FRAME holds every frame; with separate directions use twice as
+///                 much. A longer frame becomes an event of kind MBM_EVENT_NOISE
+/// @return MBM_OK; or with nothing changed MBM_BUFFER_TOO_SMALL for a size that is too
+///         small, MBM_INVALID_ARGUMENT for a NULL pointer
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_beginRtu(
     sniffer: *mut mbm_sniffer,
@@ -159,11 +161,11 @@ pub unsafe extern "C" fn mbm_sniffer_beginRtu(
     unsafe { begin(sniffer, buffer, size, Framing::Rtu) }
 }
 
-/// Begins to listen to ASCII frames on a serial line.
+/// Begins a sniffer for ASCII frames on a serial line.
 ///
 /// @param sniffer  see mbm_sniffer_beginRtu
 /// @param buffer   see mbm_sniffer_beginRtu
-/// @param size     see mbm_sniffer_beginRtu; MBM_MAX_ASCII_FRAME hold any frame
+/// @param size     see mbm_sniffer_beginRtu; MBM_MAX_ASCII_FRAME holds every frame
 /// @return a status; see mbm_sniffer_beginRtu
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_beginAscii(
@@ -175,11 +177,11 @@ pub unsafe extern "C" fn mbm_sniffer_beginAscii(
     unsafe { begin(sniffer, buffer, size, Framing::Ascii) }
 }
 
-/// Begins to listen to a TCP stream, in frames with the MBAP header.
+/// Begins a sniffer for a TCP stream of frames with the MBAP header.
 ///
 /// @param sniffer  see mbm_sniffer_beginRtu
 /// @param buffer   see mbm_sniffer_beginRtu
-/// @param size     see mbm_sniffer_beginRtu; MBM_MAX_TCP_FRAME hold any frame
+/// @param size     see mbm_sniffer_beginRtu; MBM_MAX_TCP_FRAME holds every frame
 /// @return a status; see mbm_sniffer_beginRtu
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_beginTcp(
@@ -191,11 +193,11 @@ pub unsafe extern "C" fn mbm_sniffer_beginTcp(
     unsafe { begin(sniffer, buffer, size, Framing::Tcp) }
 }
 
-/// Begins to listen to a TCP stream of RTU frames.
+/// Begins a sniffer for a TCP stream of RTU frames.
 ///
 /// @param sniffer  see mbm_sniffer_beginRtu
 /// @param buffer   see mbm_sniffer_beginRtu
-/// @param size     see mbm_sniffer_beginRtu; MBM_MAX_FRAME hold any frame
+/// @param size     see mbm_sniffer_beginRtu; MBM_MAX_FRAME holds every frame
 /// @return a status; see mbm_sniffer_beginRtu
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_beginRtuOverTcp(
@@ -207,13 +209,14 @@ pub unsafe extern "C" fn mbm_sniffer_beginRtuOverTcp(
     unsafe { begin(sniffer, buffer, size, Framing::RtuOverTcp) }
 }
 
-/// Declares functions that the standard does not have. Without that their length is
-/// guessed: silence ends an RTU frame.
+/// Declares functions that the standard does not define, in place of those declared
+/// before. The sniffer does not know the length of an undeclared function: silence then
+/// ends an RTU frame.
 ///
 /// @param sniffer    the object
-/// @param functions  copied; may be NULL if there are none
-/// @param count      how many, at most MBM_MAX_SNIFFER_FUNCTIONS
-/// @return MBM_OK, MBM_NOT_INITIALISED, or MBM_INVALID_ARGUMENT with nothing changed
+/// @param functions  an array that is copied; may be NULL if `count` is 0
+/// @param count      how many functions, at most MBM_MAX_SNIFFER_FUNCTIONS
+/// @return MBM_OK; MBM_NOT_INITIALISED; MBM_INVALID_ARGUMENT with nothing changed
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setFunctions(
     sniffer: *mut mbm_sniffer,
@@ -223,7 +226,7 @@ pub unsafe extern "C" fn mbm_sniffer_setFunctions(
     // SAFETY: as the header demands.
     unsafe {
         pointers::with(sniffer, |object| {
-            match array_or_empty(functions, count.into()).map(all) {
+            match array_or_empty(functions, count.into()).map(convert) {
                 Some(Ok(functions)) => {
                     object.functions = functions;
                     object.count = count;
@@ -235,11 +238,11 @@ pub unsafe extern "C" fn mbm_sniffer_setFunctions(
     }
 }
 
-/// Sets the character that ends ASCII frames after CR, in place of LF, as
-/// mbm_client_setDelimiter. Without effect in other framings.
+/// Sets the character that ends an ASCII frame after CR, LF at first; as
+/// mbm_client_setDelimiter. It has no effect in other framings.
 ///
 /// @param sniffer    the object
-/// @param character  1 to 127, but CR, the colon and hexadecimal digits
+/// @param character  1 to 127, except CR, the colon and hexadecimal digits
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setDelimiter(sniffer: *mut mbm_sniffer, character: u8) -> u8 {
@@ -250,12 +253,12 @@ pub unsafe extern "C" fn mbm_sniffer_setDelimiter(sniffer: *mut mbm_sniffer, cha
     unsafe { with(sniffer, |core| core.set_end(character)) }
 }
 
-/// Tells the rate of a serial line, from which follow the silence between RTU
-/// frames, and when each of several bytes that are fed at once arrived. At first
-/// it is untold: 4 ms of silence, and what is fed at once arrived at once.
+/// Sets the baud rate of a serial line. From it the sniffer computes the silence between
+/// RTU frames, and the arrival time of each byte if you feed several at once. Without it
+/// the silence is 4 ms, and all bytes of one feed count as received at the same time.
 ///
 /// @param sniffer  the object
-/// @param baud     bits per second; 0 is untold
+/// @param baud     bits per second; 0, the default, if the rate is unknown
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setBaudRate(sniffer: *mut mbm_sniffer, baud: u32) -> u8 {
@@ -263,13 +266,14 @@ pub unsafe extern "C" fn mbm_sniffer_setBaudRate(sniffer: *mut mbm_sniffer, baud
     unsafe { with(sniffer, |core| core.set_baud_rate(baud)) }
 }
 
-/// Sets how long a request may stay unanswered before that is told; 1000 ms at
-/// first. On a serial line the next request ends it too. A longer time than the
-/// master's own pairs late replies. For ten times as long, a reply to a request
-/// that was given up is still told with what was asked, as MBM_EVENT_UNPAIRED.
+/// Sets how long the sniffer waits for the reply to a request before it reports
+/// MBM_EVENT_TIMEOUT; 1000 ms at first. On a serial line the next request ends the wait
+/// too. A timeout longer than the one of the client also pairs late replies with their
+/// requests. For ten times the timeout, a reply to a request that has timed out is
+/// reported as MBM_EVENT_UNPAIRED with the start of that request (requestHead).
 ///
-/// @param sniffer       the object
-/// @param timeoutMs     1 to 65535
+/// @param sniffer    the object
+/// @param timeoutMs  1 to 65535 ms
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setResponseTimeout(
@@ -283,12 +287,12 @@ pub unsafe extern "C" fn mbm_sniffer_setResponseTimeout(
     unsafe { with(sniffer, |core| core.set_timeout(millis(timeoutMs))) }
 }
 
-/// Sets how long the rest of a frame that has begun is waited for: how coarse
-/// your time stamps are. At first 50 ms in RTU, which a USB adapter needs, and
-/// 1000 ms in ASCII and TCP.
+/// Sets how long the sniffer waits for the rest of an incomplete frame. Choose it longer
+/// than the error of your time stamps. At first it is 50 ms in RTU and RTU over TCP,
+/// which suits a USB adapter, and 1000 ms in ASCII and TCP.
 ///
-/// @param sniffer       the object
-/// @param timeoutMs     1 to 65535
+/// @param sniffer    the object
+/// @param timeoutMs  1 to 65535 ms
 /// @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setFrameTimeout(
@@ -302,18 +306,20 @@ pub unsafe extern "C" fn mbm_sniffer_setFrameTimeout(
     unsafe { with(sniffer, |core| core.set_frame_timeout(millis(timeoutMs))) }
 }
 
-/// Takes bytes that were heard. Call mbm_sniffer_next until there is nothing
-/// more, then feed the rest, if not all were taken, with the same time: nothing
+/// Passes received bytes to the sniffer. Then call mbm_sniffer_next until it returns 0.
+/// If the sniffer did not accept all bytes, feed the rest now with the same time; no byte
 /// is lost.
 ///
-/// @param sniffer  the object
-/// @param direction  MBM_DIRECTION_BOTH, or where the directions are heard apart
-///                 MBM_DIRECTION_CLIENT or MBM_DIRECTION_SERVER. Do not mix them: at a change
-///                 what is not told of is forgotten
-/// @param bytes    what was heard; NULL only with length 0
-/// @param length   how many
-/// @param nowUs    when the last of them arrived, in microseconds; may wrap
-/// @return how many were taken; 0 also if the sniffer was never begun
+/// @param sniffer    the object
+/// @param direction  MBM_DIRECTION_BOTH; MBM_DIRECTION_CLIENT or MBM_DIRECTION_SERVER if
+///                   you receive the directions separately. Do not mix MBM_DIRECTION_BOTH
+///                   with the other two: on a change the sniffer discards the bytes that
+///                   it has not reported yet
+/// @param bytes      the received bytes; NULL only if `length` is 0
+/// @param length     how many bytes
+/// @param nowUs      arrival time of the last of the bytes, in microseconds; may wrap
+/// @return how many bytes the sniffer accepted; 0 also for a sniffer that was never
+///         begun, or for an invalid argument
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_feed(
     sniffer: *mut mbm_sniffer,
@@ -341,16 +347,16 @@ pub unsafe extern "C" fn mbm_sniffer_feed(
     }
 }
 
-/// Tells what happened next on the bus, in the order of time. Call it after each
-/// feed until there is nothing more, and now and then while nothing is heard (at
-/// least every half hour): silence ends frames, and requests time out.
+/// Returns the next event on the bus, in order of time. Call it after each feed until it
+/// returns 0. Call it also while no bytes arrive, at least every half hour: silence ends
+/// frames, and requests time out.
 ///
 /// @param sniffer  the object
-/// @param nowUs    the time, in microseconds
-/// @param event    receives what happened; valid until the next call with this
-///                 sniffer
-/// @return 1 if there is an event; 0, with `event` unchanged, if nothing more is known
-///         yet, or the sniffer was never begun
+/// @param nowUs    the time now, in microseconds; may wrap
+/// @param event    receives the event; the data that it points to are valid until the
+///                 next call with this sniffer
+/// @return 1 if there is an event. 0, with `event` unchanged, if there is none yet, for
+///         NULL, and for a sniffer that was never begun
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_next(
     sniffer: *mut mbm_sniffer,
@@ -371,11 +377,10 @@ pub unsafe extern "C" fn mbm_sniffer_next(
     }
 }
 
-/// True if there is nothing to tell of, and nothing more to look for: see
-/// [`Sniffer::only_waits`].
+/// True if the sniffer has no event and no data to examine: see [`Sniffer::only_waits`].
 ///
 /// # Safety
-/// The object was begun with a buffer that is valid.
+/// The object was begun with a buffer that is still valid.
 unsafe fn only_waits(object: &mut Object, now: u32) -> bool {
     // SAFETY: as the caller promises.
     let buffer = unsafe { buffer(object.buffer, object.size) };
@@ -384,12 +389,12 @@ unsafe fn only_waits(object: &mut Object, now: u32) -> bool {
     buffer.is_none_or(|buffer| core.only_waits(buffer, functions.unwrap_or_default(), now))
 }
 
-/// As [`mbm_sniffer_next`], where the sniffer has to look. On its own, for a call
-/// that has nothing to tell is not to pay for the registers and the stack of one that
-/// has.
+/// [`mbm_sniffer_next`] for the case that the sniffer has to examine data. A function of
+/// its own, so that a call without an event does not save the registers that this one
+/// needs.
 ///
 /// # Safety
-/// The object was begun with a buffer that is valid, `event` points to room for one.
+/// The object was begun with a buffer that is still valid. `event` points to an event.
 #[inline(never)]
 unsafe fn next(object: &mut Object, now: u32, event: *mut mbm_event) -> u8 {
     // SAFETY: as the caller promises.
@@ -400,8 +405,8 @@ unsafe fn next(object: &mut Object, now: u32, event: *mut mbm_event) -> u8 {
         let functions = object.functions.get(..object.count.into());
         let functions = functions.unwrap_or_default();
         match object.core.look(buffer, functions, now) {
-            Some(told) => {
-                put(event, mbm_event::of(&told, functions));
+            Some(found) => {
+                put(event, mbm_event::from_event(&found, functions));
                 1
             }
             None => 0,
