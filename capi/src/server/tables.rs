@@ -291,16 +291,20 @@ unsafe fn serve_write_several(
 /// # Safety
 /// As for [`serve`].
 #[cfg_attr(not(target_os = "none"), inline(never))]
-unsafe fn serve_more(table: *mut mbm_registerTable, pdu: *mut u8, info: *const c_void) -> usize {
+unsafe fn serve_mask_and_read_write(
+    table: *mut mbm_registerTable,
+    pdu: *mut u8,
+    info: *const c_void,
+) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
         let (pdu, length) = request(pdu, info);
         let mut cells = TableAsItWas(Table(table), table.read());
         if FIRMWARE {
             let cells: &mut dyn TableAccess = &mut cells;
-            return table::serve_more(cells, pdu, length).code();
+            return table::serve_mask_and_read_write(cells, pdu, length).code();
         }
-        table::serve_more(&mut cells, pdu, length).code()
+        table::serve_mask_and_read_write(&mut cells, pdu, length).code()
     }
 }
 
@@ -315,12 +319,12 @@ unsafe extern "C" fn serve_all(
 ) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
-        if !table::is_more(*pdu) {
+        if !table::is_mask_or_read_write(*pdu) {
             serve(service, pdu, info)
         } else if is_unheard(info, *pdu) {
             Reply::NOT_HANDLED.code()
         } else {
-            serve_more(service.cast(), pdu, info)
+            serve_mask_and_read_write(service.cast(), pdu, info)
         }
     }
 }
