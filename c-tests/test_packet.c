@@ -267,7 +267,6 @@ static void a_request_determines_the_length_of_its_response(void **state)
     uint8_t pdu[MBM_MAX_PDU], reply[MBM_MAX_PDU];
     mbm_packet request, response;
     mbm_length expected;
-    unsigned exact = 0;
     size_t i;
 
     (void)state;
@@ -285,12 +284,13 @@ static void a_request_determines_the_length_of_its_response(void **state)
             assert_int_equal(expected.bytes, 2 + 2 * request.quantity);
         if (expected.kind == MBM_LENGTH_EXACT) {
             assert_int_equal(expected.bytes, length);
-            exact++;
+        } else if (!strchr("\x0C\x11\x18\x2B\x41", request.function)) {
+            fail_msg("function %02X: its request must determine the length of the response",
+                     request.function);
         }
         if (expected.kind == MBM_LENGTH_AT_LEAST)
             assert_in_range(expected.bytes, 1, length);
     }
-    assert_int_equal(exact, 18);
     request = (mbm_packet){.function = 0x03, .quantity = 126};
     IS(MBM_ILLEGAL_DATA_VALUE, mbm_frame_replyLength(PDU(NULL, 0), &request, &expected));
     request = (mbm_packet){

@@ -189,10 +189,15 @@ fn a_byte_count_that_overflows_gives_a_length_beyond_any_pdu() {
 fn the_length_of_an_undeclared_function_is_unknown() {
     for code in 0..=255u8 {
         let public = mbm::pdu::is_public(code);
+        let differ = "of src/pdu/length.rs and `is_public` of src/pdu/mod.rs differ";
         let known = length::request(&[code], &[]) != Length::Unknown;
-        assert_eq!(known, public, "{code:02X}");
+        assert_eq!(known, public, "{code:02X}: `request` {differ}");
         let known = length::response(&[code], &[]) != Length::Unknown;
-        assert_eq!(known, public || code >= 0x80, "{code:02X}");
+        assert_eq!(
+            known,
+            public || code >= 0x80,
+            "{code:02X}: `response` {differ}"
+        );
     }
 }
 

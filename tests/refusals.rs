@@ -158,7 +158,11 @@ fn a_variant_with_the_function_code_of_another_is_refused() {
         let exception = Response::Exception { function, code: 1 };
         let sent = |response: Response| response.emit(&mut [0; BUFFER_SIZE]).is_ok();
         assert_eq!(sent(bits), matches!(function, 1 | 2));
-        assert_eq!(sent(registers), matches!(function, 3 | 4 | 0x17));
+        assert_eq!(
+            sent(registers),
+            matches!(function, 3 | 4 | 0x17),
+            "{function:02X}: `Response::ReadRegisters` is for 03, 04 and 17; add a new function here"
+        );
         assert_eq!(sent(wrote), matches!(function, 0x0F | 0x10));
         assert_eq!(sent(custom), free);
         assert_eq!(sent(exception), function < 0x80);

@@ -164,20 +164,22 @@ fn sizes_offsets_and_constants_agree_with_c() {
 #[test]
 fn the_probes_include_every_constant_of_the_header() {
     let header = include_str!("../../include/mbm.h");
-    let defined = header
+    let defined: Vec<_> = header
         .lines()
         .filter_map(|line| line.strip_prefix("#define MBM_"))
-        .filter(|rest| {
-            rest.split_whitespace()
-                .nth(1)
-                .is_some_and(|value| value.parse::<u64>().is_ok())
-        })
-        .count();
-    let probed = probes()
-        .iter()
-        .filter(|(name, _)| name.starts_with("MBM_"))
-        .count();
-    assert_eq!(defined, probed);
+        .filter_map(|rest| rest.split_once(' '))
+        .filter(|(_, value)| value.trim().parse::<u64>().is_ok())
+        .map(|(name, _)| format!("MBM_{name}"))
+        .collect();
+    let mut probed: Vec<_> = probes().into_iter().map(|(name, _)| name).collect();
+    probed.retain(|name| name.starts_with("MBM_"));
+    for name in &defined {
+        assert!(
+            probed.contains(name),
+            "`probes` in capi/tests/abi.rs lacks {name}"
+        );
+    }
+    assert_eq!(defined.len(), probed.len());
 }
 
 #[test]

@@ -25,7 +25,7 @@ impl<T: DataModel> Service for InputRegisters<T> {
 impl<T: DataModel> Service for HoldingRegisters<T> {
     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
         match table::serve(TableKind::HOLDING_REGISTERS, &mut self.0, pdu, length) {
-            Reply::NOT_HANDLED => table::serve_more(&mut self.0, pdu, length),
+            Reply::NOT_HANDLED => table::serve_mask_and_read_write(&mut self.0, pdu, length),
             reply => reply,
         }
     }

@@ -273,9 +273,9 @@ fn counted(pdu: &mut [u8], bytes: usize) -> Reply {
     Reply::length(2 + bytes)
 }
 
-/// True for functions that [`serve_more`] serves.
+/// True for functions that [`serve_mask_and_read_write`] serves.
 #[inline(always)]
-pub const fn is_more(function: u8) -> bool {
+pub const fn is_mask_or_read_write(function: u8) -> bool {
     matches!(
         function,
         MASK_WRITE_REGISTER | READ_WRITE_MULTIPLE_REGISTERS
@@ -284,7 +284,11 @@ pub const fn is_more(function: u8) -> bool {
 
 /// Serves 16 and 17 for holding registers, as [`serve`].
 #[cfg_attr(target_os = "none", inline(never))]
-pub fn serve_more(cells: &mut (impl TableAccess + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
+pub fn serve_mask_and_read_write(
+    cells: &mut (impl TableAccess + ?Sized),
+    pdu: &mut [u8],
+    length: usize,
+) -> Reply {
     match pdu.first() {
         Some(&MASK_WRITE_REGISTER) => mask_write(cells, pdu, length),
         Some(&READ_WRITE_MULTIPLE_REGISTERS) => read_write(cells, pdu, length),

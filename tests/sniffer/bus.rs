@@ -36,6 +36,17 @@ fn every_function_is_reported_in_every_framing() {
 }
 
 #[test]
+fn every_public_function_has_an_exchange() {
+    for code in (0..=255).filter(|code| mbm::pdu::is_public(*code)) {
+        assert!(
+            EXCHANGES.iter().any(|(request, ..)| request[0] == code),
+            "{code:02X}: tests/sniffer/exchanges.rs has no exchange of this function; its texts come \
+             from src/text/mod.rs, the address and quantity of its events from src/sniffer/pairing.rs"
+        );
+    }
+}
+
+#[test]
 fn exchanges_are_found_when_bytes_arrive_one_by_one() {
     for framing in [Framing::Rtu, Framing::Ascii, Framing::Tcp] {
         let mut bench = Bench::new(framing);

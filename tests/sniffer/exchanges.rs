@@ -1,6 +1,7 @@
 //! A request and a reply of every function.
 
 use crate::bench::Bench;
+use mbm::pdu::request::Request;
 use mbm::sniffer::EventKind;
 
 pub const READ: &[u8] = &[3, 0, 107, 0, 3];
@@ -98,6 +99,51 @@ pub const EXCHANGES: &[(&[u8], &[u8], &str, &str)] = &[
      "30 unknown function: 01", "30 unknown function: 09 09"),
 ];
 
+/// The address and the quantity of the events of a request; 0 where it has none. (The match names
+/// every variant, so the compiler asks for a new one.)
+fn address_and_quantity(request: &[u8]) -> (u16, u16) {
+    match Request::parse(request) {
+        Ok(
+            Request::ReadBits {
+                address, quantity, ..
+            }
+            | Request::ReadRegisters {
+                address, quantity, ..
+            }
+            | Request::WriteMultipleCoils {
+                address, quantity, ..
+            }
+            | Request::WriteMultipleRegisters {
+                address, quantity, ..
+            }
+            | Request::ReadWriteMultipleRegisters {
+                read_address: address,
+                read_quantity: quantity,
+                ..
+            },
+        ) => (address, quantity),
+        Ok(
+            Request::WriteSingleCoil { address, .. }
+            | Request::WriteSingleRegister { address, .. }
+            | Request::MaskWriteRegister { address, .. },
+        ) => (address, 1),
+        Ok(Request::ReadFifoQueue { address }) => (address, 0),
+        Ok(
+            Request::ReadExceptionStatus
+            | Request::Diagnostics { .. }
+            | Request::GetCommEventCounter
+            | Request::GetCommEventLog
+            | Request::ReportServerId
+            | Request::ReadFileRecord(_)
+            | Request::WriteFileRecord(_)
+            | Request::ReadDeviceIdentification { .. }
+            | Request::EncapsulatedInterface { .. }
+            | Request::Custom { .. },
+        )
+        | Err(_) => (0, 0),
+    }
+}
+
 /// Checks that the events are the request and the reply of each exchange, with their texts.
 pub fn assert_exchanges(bench: &Bench, exchanges: &[(&[u8], &[u8], &str, &str)]) {
     let mut wanted = Vec::new();
@@ -122,4 +168,12 @@ pub fn assert_exchanges(bench: &Bench, exchanges: &[(&[u8], &[u8], &str, &str)])
         assert_eq!(wanted, found, "event {index}");
     }
     assert_eq!(wanted.len(), found.len(), "{:?}", &found[wanted.len()..]);
+    for ((request, ..), events) in exchanges.iter().zip(bench.events.chunks(2)) {
+        assert_eq!(
+            events[1].asked,
+            Some(address_and_quantity(request)),
+            "{:02X}: `address` or `quantity` in src/sniffer/pairing.rs is wrong for this function",
+            request[0]
+        );
+    }
 }

@@ -143,12 +143,13 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const
         if is_ignored_broadcast(info, *pdu) {
             return Reply::NOT_HANDLED.code();
         }
-        let is_more = kind == TableKind::HOLDING_REGISTERS && table::is_more(*pdu);
+        let is_mask_or_read_write =
+            kind == TableKind::HOLDING_REGISTERS && table::is_mask_or_read_write(*pdu);
         let (pdu, length) = request(pdu, info);
         let mut cells = Callbacks(record);
-        let reply = if is_more {
+        let reply = if is_mask_or_read_write {
             let cells: &mut dyn TableAccess = &mut cells;
-            table::serve_more(cells, pdu, length)
+            table::serve_mask_and_read_write(cells, pdu, length)
         } else {
             table::serve(kind, &mut cells, pdu, length)
         };

@@ -306,9 +306,9 @@ unsafe fn serve_mask_and_read_write(
         let mut cells = TableSnapshot(Table(table), table.read());
         if FIRMWARE {
             let cells: &mut dyn TableAccess = &mut cells;
-            return table::serve_more(cells, pdu, length).code();
+            return table::serve_mask_and_read_write(cells, pdu, length).code();
         }
-        table::serve_more(&mut cells, pdu, length).code()
+        table::serve_mask_and_read_write(&mut cells, pdu, length).code()
     }
 }
 
@@ -323,7 +323,7 @@ unsafe extern "C" fn serve_holding_registers(
 ) -> usize {
     // SAFETY: as the caller promises.
     unsafe {
-        if !table::is_more(*pdu) {
+        if !table::is_mask_or_read_write(*pdu) {
             serve(service, pdu, info)
         } else if is_ignored_broadcast(info, *pdu) {
             Reply::NOT_HANDLED.code()

@@ -1,0 +1,117 @@
+//! Every function code of the standard is in every place where mbm looks at function codes. Each
+//! message names the file in which the code is missing. `CONTRIBUTING.md` has the order of the
+//! steps; `scripts/check-functions` checks the places that are not Rust code of the core.
+
+#[path = "common/exchanges.rs"]
+mod exchanges;
+#[path = "common/vectors.rs"]
+mod vectors;
+
+use mbm::pdu::header::RequestHeader;
+use mbm::pdu::length::Length;
+use mbm::pdu::request::Request;
+use mbm::pdu::response::Response;
+use mbm::pdu::{diagnostics, files, identification, is_public};
+use vectors::{right_pdus, Direction, Vector};
+
+/// The valid vectors of a direction, without exception responses.
+fn vectors_of(direction: Direction) -> Vec<Vector> {
+    let right = right_pdus().into_iter();
+    right
+        .filter(|vector| vector.direction == direction && vector.bytes[0] < 0x80)
+        .collect()
+}
+
+fn public_codes() -> impl Iterator<Item = u8> {
+    (0..=255).filter(|code| is_public(*code))
+}
+
+#[test]
+fn every_public_function_is_named_in_texts() {
+    for code in 0..=255u8 {
+        let name = mbm::text::names::function(code);
+        let is_named = !matches!(name, "unknown function" | "user-defined function");
+        assert_eq!(
+            is_named,
+            is_public(code),
+            "{code:02X}: `is_public` in src/pdu/mod.rs and `function` in src/text/names.rs differ"
+        );
+    }
+}
+
+#[test]
+fn every_public_function_has_a_vector_that_is_parsed_as_its_own_variant() {
+    for (direction, file) in [
+        (Direction::Request, "request"),
+        (Direction::Response, "response"),
+    ] {
+        let vectors = vectors_of(direction);
+        for code in public_codes() {
+            let vector = vectors.iter().find(|vector| vector.bytes[0] == code);
+            let vector = vector.unwrap_or_else(|| {
+                panic!("{code:02X}: tests/vectors.txt has no valid {file} of this function")
+            });
+            let is_custom = match direction {
+                Direction::Request => {
+                    matches!(Request::parse(&vector.bytes), Ok(Request::Custom { .. }))
+                }
+                Direction::Response => {
+                    matches!(Response::parse(&vector.bytes), Ok(Response::Custom { .. }))
+                }
+            };
+            assert!(
+                !is_custom,
+                "{code:02X}: `read` in src/pdu/{file}.rs has no arm for this function"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_request_determines_the_length_of_its_response_unless_only_the_device_knows_it() {
+    let only_the_device = [
+        diagnostics::GET_COMM_EVENT_LOG,
+        diagnostics::REPORT_SERVER_ID,
+        files::READ_FIFO_QUEUE,
+        identification::ENCAPSULATED_INTERFACE_TRANSPORT,
+    ];
+    for vector in vectors_of(Direction::Request) {
+        let code = vector.bytes[0];
+        let request = Request::parse(&vector.bytes).expect(vector.name);
+        let is_known = matches!(request.response_length(&[]), Length::Exactly(_));
+        assert!(
+            is_known || !is_public(code) || only_the_device.contains(&code),
+            "{}: `Request::response_length` in src/pdu/request.rs has no arm for {code:02X}",
+            vector.name
+        );
+    }
+}
+
+#[test]
+fn a_client_builds_every_public_function() {
+    for code in public_codes() {
+        assert!(
+            exchanges::CASES.iter().any(|case| case.2[0] == code),
+            "{code:02X}: tests/common/exchanges.rs has no request of this function"
+        );
+    }
+}
+
+#[test]
+fn a_gateway_knows_the_length_of_the_response_of_every_public_function() {
+    for (_, _, request, response, _) in exchanges::CASES {
+        let code = request[0];
+        let mut header = RequestHeader::NONE;
+        assert!(!header.forward(code, &request[1..]).is_failure());
+        // The end of these responses is the end of the frame.
+        let own_end = code == diagnostics::REPORT_SERVER_ID || matches!(request, [0x2B, 0x0D, ..]);
+        if is_public(code) && !own_end {
+            let found = header.expected(response, response.len() + 9);
+            assert_eq!(
+                found.map(|length| usize::from(length.get())),
+                Some(response.len()),
+                "{code:02X}: `forward` has no arm for this function, and takes it for a user-defined one"
+            );
+        }
+    }
+}
