@@ -1,5 +1,5 @@
-/* What sketches use of the original library beside the class's calls: its other headers,
- * their functions, its guard, its debug pins, and Streams that count no bytes. */
+/* Parts of ModbusMaster 2.0.1 that sketches use besides the members of its class: its other
+ * headers, their functions, its guard, its debug pins, and Streams whose write returns 0. */
 #define __MODBUSMASTER_DEBUG__ 1
 #include "util/crc16.h"
 #include "util/word.h"
@@ -102,14 +102,32 @@ static void a_stream_that_counts_no_bytes_sends_each_request_once(void **)
     }
 }
 
+static void a_stream_that_counts_no_bytes_sends_the_longest_request(void **)
+{
+    const uint16_t words = 121; /* the most that function 17 writes: 255 bytes */
+    Bytes request = raw({1, 0x17, 0, 0, 0, 1, 0, 0, 0, words, 2 * words});
+    Uncounted stream;
+    ModbusMaster node;
+    node.begin(1, stream);
+    for (uint16_t i = 0; i < words; i++) {
+        node.setTransmitBuffer(static_cast<uint8_t>(i), i);
+        request.push_back(0);
+        request.push_back(static_cast<uint8_t>(i));
+    }
+    Serial.reply(adu({1, 0x17, 2, 0, 7}));
+    assert_int_equal(node.readWriteMultipleRegisters(0, 1, 0, words), 0);
+    assert_bytes(stream.sent, sealed(request));
+    assert_int_equal(stream.sent.size(), 255);
+}
+
 /* Takes three bytes, then none for a while; sets no write error. */
 class Full : public Uncounted {
 public:
-    int room = 3;
+    int space = 3;
     size_t write(uint8_t value) override
     {
-        if (room-- <= 0) {
-            room = room < -5 ? 3 : room;
+        if (space-- <= 0) {
+            space = space < -5 ? 3 : space;
             return 0;
         }
         sent.push_back(value);
@@ -117,18 +135,18 @@ public:
     }
 };
 
-static void a_full_buffer_is_told_from_a_stream_that_counts_no_bytes(void **)
+static void a_full_buffer_is_distinguished_from_a_stream_that_counts_no_bytes(void **)
 {
     Full stream;
     Uncounted other;
     ModbusMaster node;
     for (int i = 0; i < 3; i++) {
-        node.begin(1, stream); /* the same Stream: what it counts is known */
+        node.begin(1, stream); /* the same Stream: the object still knows that it counts */
         stream.sent.clear();
         Serial.reply(adu({1, 3, 2, 0, i}));
         assert_int_equal(node.readHoldingRegisters(0, 1), 0);
         assert_bytes(stream.sent, adu({1, 3, 0, 0, 0, 1}));
-        stream.room = 0; /* from the second request on it is full at the first byte too */
+        stream.space = 0; /* from the second request on it is full at the first byte too */
     }
     node.begin(1, other);
     Serial.reply(adu({1, 3, 2, 0, 9}));
@@ -163,7 +181,8 @@ int main()
         TEST(members_have_the_originals_types),
         TEST(the_debug_pins_show_reads_and_idle_calls),
         TEST(a_stream_that_counts_no_bytes_sends_each_request_once),
-        TEST(a_full_buffer_is_told_from_a_stream_that_counts_no_bytes),
+        TEST(a_stream_that_counts_no_bytes_sends_the_longest_request),
+        TEST(a_full_buffer_is_distinguished_from_a_stream_that_counts_no_bytes),
         TEST(a_stream_that_sets_its_write_error_took_nothing),
     };
 

@@ -1,12 +1,12 @@
 /**
  * @file ModbusCallback.h
- * @brief A function or a lambda with captures, kept without a heap.
+ * @brief Holds a function, or a lambda with captures, without a heap.
  *
  * Licence: MIT OR Apache-2.0. Included by ModbusClient.h and ModbusSniffer.h.
  *
- * A macro that may be defined before, alike in every file of a program:
+ * A macro that may be defined before, the same in every file of a program:
  * - MODBUS_CAPTURE_BYTES  bytes for the captures of one callback; on AVR 4, which hold
- *   two references or pointers, else those of four pointers. A lambda that captures
+ *   two references or pointers, else as many as four pointers have. A lambda that captures
  *   more does not compile.
  */
 
@@ -25,29 +25,29 @@
 #endif
 #endif
 
-// Cores differ in whether they have <new>: a placement new of our own.
+// Not every core has <new>, so this is a placement new of our own.
 struct ModbusPlace {
-    void *at;
+    void *address;
 };
 inline void *operator new(size_t, ModbusPlace place) noexcept
 {
-    return place.at;
+    return place.address;
 }
 inline void operator delete(void *, ModbusPlace) noexcept {}
 /** @endcond */
 
 /**
- * What is called with an `Argument`: nothing at first.
+ * A callback with an `Argument`; none at first.
  *
- * It takes a function, or a lambda whose captures are plain: numbers, pointers and
- * references. The captures are copied. What a reference leads to must live for as
- * long as it may be called.
+ * It holds a function, or a lambda that captures numbers, pointers and references. The
+ * captures are copied. An object that a lambda refers to must exist for as long as
+ * the callback may be called.
  */
 template <typename Argument> class ModbusCallback {
 public:
     ModbusCallback() : invoke(nullptr), storage() {}
 
-    /** Calls a function from now on; nullptr for none. */
+    /** Sets a function; nullptr for none. */
     void set(void (*function)(Argument &))
     {
         if (function != nullptr)
@@ -55,15 +55,15 @@ public:
         else
             invoke = nullptr;
     }
-    /** Calls a lambda from now on. */
+    /** Sets a lambda. */
     template <typename Function> void set(const Function &function) { keep(function); }
-    /** Calls nothing from now on. */
+    /** Removes the callback. */
     void set(decltype(nullptr)) { invoke = nullptr; }
 
-    /** Whether there is something to call. */
+    /** Whether a callback is set. */
     bool isSet() const { return invoke != nullptr; }
 
-    /** Calls it. It may be set anew meanwhile. */
+    /** Calls it. The callback may set another one in its place. */
     void operator()(Argument &argument) const
     {
         if (invoke != nullptr)
@@ -98,7 +98,7 @@ private:
 
     template <typename Function> static void call(const unsigned char *bytes, Argument &argument)
     {
-        // A copy: the callback may set another one in its place.
+        // A copy, because the callback may set another one in its place.
         const Function function(*reinterpret_cast<const Function *>(
             static_cast<const void *>(bytes)));
         function(argument);

@@ -22,14 +22,14 @@
  *       client.poll();
  *     }
  *
- * Macros that may be defined before this file is included, alike in every file of a
- * program:
+ * Macros that may be defined before this file is included, the same in every file
+ * of a program:
  * - MODBUSCLIENT_FRAME_BYTES  bytes of the frame buffer of a ModbusSerialClient, 17 to
  *   513; on AVR 141, which hold 64 registers in RTU, else 256, which hold any RTU frame.
  *   ASCII takes twice as many and 1.
  * - MODBUSCLIENT_TCP_BYTES  bytes of each of the two buffers of a ModbusTcpClient, 17 to
  *   32767; on AVR 141, which hold 64 registers, else 260, which hold any frame.
- * - MODBUS_CAPTURE_BYTES  in ModbusCallback.h: what a lambda may capture.
+ * - MODBUS_CAPTURE_BYTES  in ModbusCallback.h: how much a lambda may capture.
  */
 
 #ifndef MODBUSCLIENT_H
@@ -63,8 +63,8 @@
 /** @endcond */
 
 /**
- * A client of one serial line, in RTU or ASCII frames; one request at a time is under way.
- * While a request leaves, poll waits for the Stream's flush: until its last bit has left.
+ * A client of one serial line, in RTU or ASCII frames. One request at a time is under way.
+ * poll waits in one case: at the end of a request, until the Stream's flush returns.
  */
 class ModbusSerialClient : public ModbusClient {
 public:
@@ -72,11 +72,11 @@ public:
     ModbusSerialClient() : stream(), onPre(), onPost() {}
 
     /**
-     * Speaks RTU over a Stream that is open already. May be called again while no request
-     * is pending; settings of the line and of requests are as at first then.
+     * Speaks RTU over a Stream that is already open. May be called again while no request
+     * is pending; that sets all settings to their defaults.
      *
      * @param line  must outlive its use here
-     * @param baud  bits per second, for the gap of t3.5; 0: untold, 4 ms
+     * @param baud  bits per second, for the silence of t3.5; 0: unknown, 4 ms
      * @return MBM_OK; MBM_BUSY, with nothing changed, while a request is pending and from
      *         within a callback
      */
@@ -87,32 +87,32 @@ public:
             setBaudRate(baud);
         return status;
     }
-    /** As begin, with ASCII in place of RTU. */
+    /** As begin, with ASCII instead of RTU. */
     uint8_t beginAscii(Stream &line) { return attach(mbm_client_beginAscii, line); }
 
-    /** Called before a request is written (RS-485 driver on); nullptr for none. */
+    /** Sets a callback before each request (RS-485 driver on); nullptr for none. */
     void preTransmission(void (*callback)()) { set(onPre, callback); }
-    /** As preTransmission(callback), which is handed `context`. */
+    /** As preTransmission(callback), with `context` as its argument. */
     void preTransmission(void (*callback)(void *), void *context) { set(onPre, callback, context); }
-    /** Called once a request has left (RS-485 driver off); nullptr for none. */
+    /** Sets a callback after the last bit of each request (RS-485 driver off); nullptr for none. */
     void postTransmission(void (*callback)()) { set(onPost, callback); }
-    /** As postTransmission(callback), which is handed `context`. */
+    /** As postTransmission(callback), with `context` as its argument. */
     void postTransmission(void (*callback)(void *), void *context)
     {
         set(onPost, callback, context);
     }
 
-    /** Tells bits per second, for t3.5; 0: untold, 4 ms. Sets nothing on the Stream. */
+    /** Bits per second, from which t3.5 follows; 0: unknown, a silence of 4 ms. The Stream stays as it is. */
     uint8_t setBaudRate(uint32_t baud) { return mbm_client_setBaudRate(&client, baud); }
-    /** Microseconds of silence before a request, in place of t3.5. */
+    /** Microseconds of silence before a request, instead of t3.5. */
     uint8_t setGap(uint32_t us) { return mbm_client_setGap(&client, us); }
-    /** Milliseconds that a broadcast takes; 100 at first. */
+    /** Milliseconds from a broadcast to the next request; 100 at first. */
     uint8_t setTurnaroundDelay(uint16_t ms) { return mbm_client_setTurnaroundDelay(&client, ms); }
-    /** Milliseconds that the line is left alone after a timeout; 100 at first. */
+    /** Milliseconds after a failed request before the next one is sent; 100 at first. */
     uint8_t setQuietTime(uint16_t ms) { return mbm_client_setQuietTime(&client, ms); }
-    /** Drops the request itself where the receiver hears the driver; off at first. */
+    /** Discards the local echo, if the receiver receives what the driver sends; off at first. */
     uint8_t setEchoDiscard(bool on) { return mbm_client_setEchoDiscard(&client, on); }
-    /** Character times that the driver stays on where flush returns early; 0 at first. */
+    /** Character times that the driver stays on after flush, for cores whose flush returns early; 0 at first. */
     uint8_t setPostFlushHold(uint8_t characters)
     {
         return mbm_client_setPostFlushHold(&client, characters);
@@ -134,15 +134,15 @@ private:
     Callback onPost;
     uint8_t frame[MODBUSCLIENT_FRAME_BYTES];
 
-    static ModbusSerialClient &of(void *context)
+    static ModbusSerialClient &clientOf(void *context)
     {
         return *static_cast<ModbusSerialClient *>(context);
     }
 
-    uint8_t attach(uint8_t (*how)(mbm_client *, const mbm_port *, uint8_t *, uint16_t),
+    uint8_t attach(uint8_t (*beginFraming)(mbm_client *, const mbm_port *, uint8_t *, uint16_t),
                    Stream &line)
     {
-        uint8_t status = renew();
+        uint8_t status = reset();
         if (status != MBM_OK)
             return status;
         mbm_port port;
@@ -155,10 +155,10 @@ private:
         port.postTransmission = postHook;
         port.idle = nullptr;
         stream = &line;
-        return how(&client, &port, frame, MODBUSCLIENT_FRAME_BYTES);
+        return beginFraming(&client, &port, frame, MODBUSCLIENT_FRAME_BYTES);
     }
 
-    static void plain(void *callback) { reinterpret_cast<void (*)()>(callback)(); }
+    static void withoutContext(void *callback) { reinterpret_cast<void (*)()>(callback)(); }
 
     static void set(Callback &callback, void (*function)(void *), void *context)
     {
@@ -167,7 +167,7 @@ private:
     }
     static void set(Callback &callback, void (*function)())
     {
-        set(callback, function != nullptr ? plain : nullptr, reinterpret_cast<void *>(function));
+        set(callback, function != nullptr ? withoutContext : nullptr, reinterpret_cast<void *>(function));
     }
     static void call(const Callback &callback)
     {
@@ -177,7 +177,7 @@ private:
 
     static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)
     {
-        Stream &line = *of(context).stream;
+        Stream &line = *clientOf(context).stream;
         uint16_t taken = 0;
         for (int byte; taken < capacity && (byte = line.read()) >= 0; taken++)
             bytes[taken] = static_cast<uint8_t>(byte);
@@ -185,24 +185,25 @@ private:
     }
     static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
     {
-        // One by one, whatever it returns: some Streams return 0 for a byte that they send.
-        Stream &line = *of(context).stream;
+        // Byte by byte, and the result is ignored: some Streams return 0 for a byte that they send.
+        Stream &line = *clientOf(context).stream;
         for (uint16_t i = 0; i < length; i++)
             line.write(bytes[i]);
         return static_cast<int16_t>(length);
     }
     static uint8_t flushHook(void *context)
     {
-        of(context).stream->flush();
+        clientOf(context).stream->flush();
         return 1;
     }
-    static void preHook(void *context) { call(of(context).onPre); }
-    static void postHook(void *context) { call(of(context).onPost); }
+    static void preHook(void *context) { call(clientOf(context).onPre); }
+    static void postHook(void *context) { call(clientOf(context).onPost); }
 };
 
 /**
- * A client of one TCP connection of an Ethernet or WiFi library; up to 16 requests are
- * under way at once. A device that is itself the end of the connection is unit 255.
+ * A client of one TCP connection of an Ethernet or WiFi library. Up to 16 requests are
+ * under way at once. The device at the other end of the connection is unit 255; other units
+ * are behind a gateway.
  */
 class ModbusTcpClient : public ModbusClient {
 public:
@@ -211,15 +212,15 @@ public:
 
     /**
      * Speaks Modbus TCP over an EthernetClient, WiFiClient or other Client. May be called
-     * again while no request is pending; settings are as at first then.
+     * again while no request is pending; that sets all settings to their defaults.
      *
-     * @param connection  must outlive its use here; connected already, or by connect
+     * @param connection  must outlive its use here; connected before, or by connect
      * @return MBM_OK; MBM_BUSY, with nothing changed, while a request is pending and from
      *         within a callback
      */
     uint8_t begin(Client &connection)
     {
-        const uint8_t status = renew();
+        const uint8_t status = reset();
         if (status != MBM_OK)
             return status;
         const mbm_port port = portOf(connection);
@@ -229,7 +230,7 @@ public:
     /** As begin, with RTU frames, for converters that pass bytes on. */
     uint8_t beginRtuOverTcp(Client &connection)
     {
-        const uint8_t status = renew();
+        const uint8_t status = reset();
         if (status != MBM_OK)
             return status;
         const mbm_port port = portOf(connection);
@@ -237,12 +238,12 @@ public:
     }
 
     /**
-     * Closes the connection, if it is open, and connects to a device, as the Client's
-     * own connect does: that call may wait, for as long as its library says. Requests
+     * Closes the connection, if it is open, and connects to a device with the
+     * Client's own connect, which may wait as long as its library does. Requests
      * that were under way end with MBM_LINK_LOST at the next poll; those that had not
      * been sent go over the new connection.
      *
-     * @param host  what the Client's connect takes: an IPAddress or a name
+     * @param host  an argument of the Client's connect: an IPAddress or a name
      * @param port  502 for most devices
      * @return MBM_OK; MBM_LINK_LOST if the Client did not connect; MBM_NOT_INITIALISED
      *         before begin; MBM_BUSY from within a hook
@@ -256,7 +257,7 @@ public:
         const uint8_t status = mbm_client_reconnect(&client, nullptr);
         return status == MBM_OK && !connected ? +MBM_LINK_LOST : status;
     }
-    /** Whether the connection stands, as far as the Client knows. */
+    /** The result of the Client's connected(); false before begin. */
     bool isConnected() { return link != nullptr && link->connected(); }
     /** Closes the connection; requests that are pending end with MBM_LINK_LOST at the next polls. */
     void stop()

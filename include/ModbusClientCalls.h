@@ -1,6 +1,6 @@
 /**
  * @file ModbusClientCalls.h
- * @brief What the clients of every framing have in common: requests and settings.
+ * @brief The requests and settings that the clients of every framing share.
  *
  * Licence: MIT OR Apache-2.0. Included by ModbusClient.h.
  */
@@ -17,18 +17,18 @@
 #include "mbm.h"
 
 /**
- * Requests to units, of which up to 16 wait or are under way: ModbusSerialClient and
- * ModbusTcpClient add the line.
+ * Queues requests to units, up to 16 at once. ModbusSerialClient and ModbusTcpClient add
+ * the line.
  *
- * No call waits but wait. Call poll in loop. Use an object from one thread, never from
+ * Only wait waits. Call poll in loop. Use an object from one thread, never from
  * an interrupt.
  *
- * Each of the functions queues a request and returns MBM_PENDING, or why nothing was
- * queued: MBM_ILLEGAL_DATA_VALUE or MBM_ILLEGAL_DATA_ADDRESS for what no device could
- * accept, MBM_BUFFER_TOO_SMALL for more than the request's words or the frame hold,
+ * Each of the functions queues a request and returns MBM_PENDING, or the reason why
+ * nothing was queued: MBM_ILLEGAL_DATA_VALUE or MBM_ILLEGAL_DATA_ADDRESS if no device could
+ * accept the request, MBM_BUFFER_TOO_SMALL if the request's words or the frame are too few,
  * MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL, MBM_NOT_INITIALISED, MBM_INVALID_ARGUMENT; or
- * MBM_BUSY, with the request unchanged, for one that is pending and from within
- * preTransmission and postTransmission. Addresses are those on the wire, from 0.
+ * MBM_BUSY, with the request unchanged, if it is pending or if preTransmission or
+ * postTransmission calls. Addresses are those on the wire, from 0.
  */
 class ModbusClient {
 public:
@@ -36,7 +36,7 @@ public:
     ModbusClient &operator=(const ModbusClient &) = delete;
 
     /**
-     * Moves all requests on, without waiting, and calls the callbacks of those that have
+     * Continues all requests, without waiting, and calls the callbacks of those that have
      * ended.
      *
      * @return MBM_PENDING while requests wait or are under way, MBM_OK if there are none;
@@ -44,11 +44,12 @@ public:
      */
     uint8_t poll() { return mbm_client_poll(&client); }
     /**
-     * Waits until a request has ended, and moves the others on meanwhile; for sketches
-     * that have nothing else to do. Runs yield().
+     * Waits until a request has ended, and continues the others meanwhile; for sketches
+     * that have nothing else to do. Calls yield().
      *
-     * @return how it ended, or why it was refused; MBM_BUSY from within a callback, and
-     *         MBM_NOT_PENDING for a request of another client, both at once
+     * @return the status of the request when it has ended, or of its refusal.
+     *         At once MBM_BUSY from within a callback, and MBM_NOT_PENDING for a request of
+     *         another client
      */
     uint8_t wait(const ModbusRequest &request)
     {
@@ -61,15 +62,15 @@ public:
         return request.status();
     }
     /**
-     * How long poll will find nothing to do unless a byte arrives: microseconds, 0 for
-     * now, 0xFFFFFFFF without a request, 1000 while a TCP link takes no bytes.
+     * How many microseconds poll has nothing to do unless a byte arrives: 0 for now,
+     * 0xFFFFFFFF without a request, 1000 while a TCP connection takes no bytes.
      */
     uint32_t pollDelay() { return mbm_client_pollDelay(&client); }
     /** How many requests wait or are under way, 0 to 16. */
     uint8_t pending() const { return mbm_client_pending(&client); }
     /**
-     * Gives a request up: its status is MBM_CANCELLED and its callback is not called. It
-     * may have reached the device. MBM_OK, or MBM_NOT_PENDING if it has ended already.
+     * Cancels a request: its status becomes MBM_CANCELLED and its callback is not called.
+     * The device may have received it. Returns MBM_OK, or MBM_NOT_PENDING if it has ended.
      */
     uint8_t cancel(ModbusRequest &request)
     {
@@ -79,52 +80,52 @@ public:
     /** Function 01: reads 1 to 2000 coils, for getBit of the request; 16 a word. */
     uint8_t readCoils(ModbusRequest &request, uint16_t address, uint16_t quantity)
     {
-        return mbm_client_readCoils(&client, fresh(request), address, quantity);
+        return mbm_client_readCoils(&client, withWords(request), address, quantity);
     }
     /** Function 02: reads 1 to 2000 discrete inputs, for getBit of the request; 16 a word. */
     uint8_t readDiscreteInputs(ModbusRequest &request, uint16_t address, uint16_t quantity)
     {
-        return mbm_client_readDiscreteInputs(&client, fresh(request), address, quantity);
+        return mbm_client_readDiscreteInputs(&client, withWords(request), address, quantity);
     }
     /** Function 03: reads 1 to 125 holding registers. */
     uint8_t readHoldingRegisters(ModbusRequest &request, uint16_t address, uint16_t quantity)
     {
-        return mbm_client_readHoldingRegisters(&client, fresh(request), address, quantity);
+        return mbm_client_readHoldingRegisters(&client, withWords(request), address, quantity);
     }
     /** Function 04: reads 1 to 125 input registers. */
     uint8_t readInputRegisters(ModbusRequest &request, uint16_t address, uint16_t quantity)
     {
-        return mbm_client_readInputRegisters(&client, fresh(request), address, quantity);
+        return mbm_client_readInputRegisters(&client, withWords(request), address, quantity);
     }
     /** Function 05: switches a coil. */
     uint8_t writeSingleCoil(ModbusRequest &request, uint16_t address, bool on)
     {
-        return mbm_client_writeSingleCoil(&client, fresh(request), address, on);
+        return mbm_client_writeSingleCoil(&client, withWords(request), address, on);
     }
-    /** Function 06: writes a value to a holding register; the words stay. */
+    /** Function 06: writes a value to a holding register; the request's words stay. */
     uint8_t writeSingleRegister(ModbusRequest &request, uint16_t address, uint16_t value)
     {
-        return mbm_client_writeSingleRegister(&client, fresh(request), address, value);
+        return mbm_client_writeSingleRegister(&client, withWords(request), address, value);
     }
-    /** Function 0F: writes 1 to 1968 coils, which setBit of the request has set. */
+    /** Function 0F: writes 1 to 1968 coils, which you set with setBit of the request. */
     uint8_t writeMultipleCoils(ModbusRequest &request, uint16_t address, uint16_t quantity)
     {
         return holds(request, 16, quantity)
-                   ? mbm_client_writeMultipleCoils(&client, fresh(request), address, quantity)
+                   ? mbm_client_writeMultipleCoils(&client, withWords(request), address, quantity)
                    : refuse(request);
     }
     /** Function 10: writes 1 to 123 registers from the request's words. */
     uint8_t writeMultipleRegisters(ModbusRequest &request, uint16_t address, uint16_t quantity)
     {
         return holds(request, 1, quantity)
-                   ? mbm_client_writeMultipleRegisters(&client, fresh(request), address, quantity)
+                   ? mbm_client_writeMultipleRegisters(&client, withWords(request), address, quantity)
                    : refuse(request);
     }
     /** Function 16: (register & andMask) | (orMask & ~andMask). */
     uint8_t maskWriteRegister(ModbusRequest &request, uint16_t address, uint16_t andMask,
                               uint16_t orMask)
     {
-        return mbm_client_maskWriteRegister(&client, fresh(request), address, andMask, orMask);
+        return mbm_client_maskWriteRegister(&client, withWords(request), address, andMask, orMask);
     }
     /** Function 17: writes 1 to 121 of the request's words, then reads 1 to 125 into them. */
     uint8_t readWriteMultipleRegisters(ModbusRequest &request, uint16_t readAddress,
@@ -132,7 +133,7 @@ public:
                                        uint16_t writeQuantity)
     {
         return holds(request, 1, writeQuantity)
-                   ? mbm_client_readWriteMultipleRegisters(&client, fresh(request), readAddress,
+                   ? mbm_client_readWriteMultipleRegisters(&client, withWords(request), readAddress,
                                                            readQuantity, writeAddress,
                                                            writeQuantity)
                    : refuse(request);
@@ -140,62 +141,62 @@ public:
     /** Function 07: reads eight outputs, byte 0 of the request. */
     uint8_t readExceptionStatus(ModbusRequest &request)
     {
-        return mbm_client_readExceptionStatus(&client, fresh(request));
+        return mbm_client_readExceptionStatus(&client, withWords(request));
     }
     /** Function 08: sends the request's words and reads as many; 1, or 1 to 125 of sub-function 0. */
     uint8_t diagnostics(ModbusRequest &request, uint16_t subFunction, uint16_t quantity = 1)
     {
         return holds(request, 1, quantity)
-                   ? mbm_client_diagnostics(&client, fresh(request), subFunction, quantity)
+                   ? mbm_client_diagnostics(&client, withWords(request), subFunction, quantity)
                    : refuse(request);
     }
     /** Function 0B: reads the status word and the event count, words 0 and 1. */
     uint8_t getCommEventCounter(ModbusRequest &request)
     {
-        return mbm_client_getCommEventCounter(&client, fresh(request));
+        return mbm_client_getCommEventCounter(&client, withWords(request));
     }
     /** Function 0C: reads bytes: status, event count and message count, high byte first; events. */
     uint8_t getCommEventLog(ModbusRequest &request)
     {
-        return mbm_client_getCommEventLog(&client, fresh(request));
+        return mbm_client_getCommEventLog(&client, withWords(request));
     }
-    /** Function 11: reads bytes, length() of them, that the device chooses. */
+    /** Function 11: reads bytes whose meaning the device defines; length() is their number. */
     uint8_t reportServerId(ModbusRequest &request)
     {
-        return mbm_client_reportServerId(&client, fresh(request));
+        return mbm_client_reportServerId(&client, withWords(request));
     }
     /** Function 14: reads 1 to 121 records in a row (0 to 9999) of a file (1 to 65535). */
     uint8_t readFileRecord(ModbusRequest &request, uint16_t file, uint16_t record,
                            uint16_t quantity)
     {
-        return mbm_client_readFileRecord(&client, fresh(request), file, record, quantity);
+        return mbm_client_readFileRecord(&client, withWords(request), file, record, quantity);
     }
     /** Function 15: writes 1 to 122 records in a row of a file from the request's words. */
     uint8_t writeFileRecord(ModbusRequest &request, uint16_t file, uint16_t record,
                             uint16_t quantity)
     {
         return holds(request, 1, quantity)
-                   ? mbm_client_writeFileRecord(&client, fresh(request), file, record, quantity)
+                   ? mbm_client_writeFileRecord(&client, withWords(request), file, record, quantity)
                    : refuse(request);
     }
     /** Function 14 of several groups, as bytes on the wire: 7 to 245, a multiple of 7. */
     uint8_t readFileRecords(ModbusRequest &request, uint16_t bytes)
     {
         return holds(request, 2, bytes)
-                   ? mbm_client_readFileRecords(&client, fresh(request), bytes)
+                   ? mbm_client_readFileRecords(&client, withWords(request), bytes)
                    : refuse(request);
     }
     /** Function 15 of several groups, as bytes on the wire: 9 to 251. */
     uint8_t writeFileRecords(ModbusRequest &request, uint16_t bytes)
     {
         return holds(request, 2, bytes)
-                   ? mbm_client_writeFileRecords(&client, fresh(request), bytes)
+                   ? mbm_client_writeFileRecords(&client, withWords(request), bytes)
                    : refuse(request);
     }
     /** Function 18: reads up to 31 registers of a queue; length() / 2 says how many. */
     uint8_t readFifoQueue(ModbusRequest &request, uint16_t address)
     {
-        return mbm_client_readFifoQueue(&client, fresh(request), address);
+        return mbm_client_readFifoQueue(&client, withWords(request), address);
     }
     /**
      * Function 2B/0E: reads bytes: conformity level, more follows, next object, how many
@@ -204,14 +205,14 @@ public:
      */
     uint8_t readDeviceIdentification(ModbusRequest &request, uint8_t code, uint8_t object = 0)
     {
-        return mbm_client_readDeviceIdentification(&client, fresh(request), code, object);
+        return mbm_client_readDeviceIdentification(&client, withWords(request), code, object);
     }
     /** Function 2B of any MEI type: sends 0 to 251 bytes and reads bytes. */
     uint8_t encapsulatedInterfaceTransport(ModbusRequest &request, uint8_t meiType,
                                            uint16_t bytes)
     {
         return holds(request, 2, bytes) ? mbm_client_encapsulatedInterfaceTransport(
-                                           &client, fresh(request), meiType, bytes)
+                                           &client, withWords(request), meiType, bytes)
                                      : refuse(request);
     }
     /** A function of yours, 1 to 127: sends 0 to 252 bytes; `response` says how long a reply is. */
@@ -219,7 +220,7 @@ public:
                    const mbm_rule &response)
     {
         return holds(request, 2, bytes)
-                   ? mbm_client_custom(&client, fresh(request), function, bytes, &response)
+                   ? mbm_client_custom(&client, withWords(request), function, bytes, &response)
                    : refuse(request);
     }
     /**
@@ -230,12 +231,12 @@ public:
      */
     uint8_t forward(ModbusRequest &request, uint8_t function, const uint8_t *body, uint16_t bytes)
     {
-        return mbm_client_forward(&client, fresh(request), function, body, bytes);
+        return mbm_client_forward(&client, withWords(request), function, body, bytes);
     }
 
     /** Milliseconds that a reply may take, 0 to 65535; 2000 at first. */
     uint8_t setResponseTimeout(uint16_t ms) { return mbm_client_setResponseTimeout(&client, ms); }
-    /** How often a request without a proper reply is repeated, 0 to 255; 0 at first. */
+    /** How often a request is repeated if its reply is missing, damaged or malformed, 0 to 255; 0 at first. */
     uint8_t setRetries(uint8_t retries) { return mbm_client_setRetries(&client, retries); }
     /**
      * Milliseconds before a repetition: MBM_BACKOFF_NONE (at first), _FIXED, _LINEAR or
@@ -245,19 +246,19 @@ public:
     {
         return mbm_client_setBackoff(&client, backoff, ms, mostMs);
     }
-    /** Percent (0 to 100) of each such wait that `random` may take off; see mbm_client_setJitter. */
+    /** The part of each such wait that `random` may take off, 0 to 100 percent; see mbm_client_setJitter. */
     uint8_t setJitter(uint8_t percent, uint32_t (*random)(void *context), void *context = nullptr)
     {
         return mbm_client_setJitter(&client, percent, random, context);
     }
-    /** Counts into `counters`, which you zeroed; nullptr stops. */
+    /** Counts into `counters`; set them to 0 before. nullptr stops counting. */
     uint8_t setCounters(mbm_counters *counters)
     {
         return mbm_client_setCounters(&client, counters);
     }
     /**
      * Keeps a record of each unit of an array, which must outlive its use: counts, the
-     * last status, and a rest between two requests. You set `unit` and `delay` of each.
+     * last status, and a pause between two requests. Set `unit` and `delayUs` of each before.
      */
     template <size_t N> uint8_t setUnits(mbm_clientUnit (&units)[N])
     {
@@ -266,14 +267,15 @@ public:
     }
 
 protected:
-    /** @cond what the clients with a line use */
+    /** @cond for ModbusSerialClient and ModbusTcpClient */
     ModbusClient() : client() {}
 
     mbm_client client;
 
-    // A client of C begins only once: it becomes as new if nothing is pending. Within a
-    // hook or a callback poll is refused.
-    uint8_t renew()
+    // Resets the client before it begins again, so that all settings are defaults. Refuses
+    // with MBM_BUSY while a request is pending, and within hooks and callbacks, where poll
+    // returns MBM_BUSY. (mbm_client_beginRtu and the others would cancel the requests.)
+    uint8_t reset()
     {
         if (pending() != 0)
             return MBM_BUSY;
@@ -287,13 +289,13 @@ protected:
     /** @endcond */
 
 private:
-    // Whether its words hold `quantity` of what has so many in a word.
-    static bool holds(const ModbusRequest &request, uint8_t inWord, uint16_t quantity)
+    // Whether the request's words hold `quantity` items, of which a word holds `perWord`.
+    static bool holds(const ModbusRequest &request, uint8_t perWord, uint16_t quantity)
     {
-        return quantity / inWord + (quantity % inWord != 0) <= request.size();
+        return quantity / perWord + (quantity % perWord != 0) <= request.size();
     }
-    // The words, where forward sent other bytes before.
-    static mbm_clientRequest *fresh(ModbusRequest &request)
+    // Sets the data back to the request's words: forward may have set other bytes.
+    static mbm_clientRequest *withWords(ModbusRequest &request)
     {
         if (!request.pending())
             request.request.data = request.words;

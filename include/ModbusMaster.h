@@ -5,16 +5,16 @@
  * Licence: MIT OR Apache-2.0. Header-only, C++11, no heap.
  *
  * Sketches written for the ModbusMaster library, 0.9 to 2.0.1, compile and run
- * unchanged. Addresses are those on the wire, from 0. What differs for the
- * better: a reply is found behind noise and foreign frames, checked against
- * its request, and a silence of t3.5 is kept before each request.
+ * unchanged. Addresses are those on the wire, from 0. Better than there: the class
+ * finds a reply after noise and frames of other units, compares it with its request,
+ * and keeps a silence of t3.5 before each request.
  *
  * The macros that size the buffers and choose ports are in ModbusMasterOptions.h.
  */
 
 #ifndef MODBUSMASTER_H
 #define MODBUSMASTER_H
-/** The original's guard, which sketches look at. */
+/** The include guard of the original library, which some sketches test. */
 #define ModbusMaster_h
 
 #include <Arduino.h>
@@ -36,14 +36,14 @@
  *
  * Any number of objects may share a Stream, one request after the other. Use
  * an object from one thread, never from an interrupt. Callbacks may call other
- * objects. On its own object an idle callback may call everything; requests are
- * answered with ku8MBBusy. In preTransmission and postTransmission everything is
- * answered with ku8MBBusy, and changes nothing; but words may be read, set and cleared.
+ * objects. An idle callback may call every member of its own object, but requests
+ * return ku8MBBusy. From preTransmission and postTransmission every call on the same
+ * object returns ku8MBBusy and changes nothing, except those that read, set or clear words.
  */
 class ModbusMaster : public ModbusMasterStatics<void>, public ModbusMasterValues<ModbusMaster> {
 public:
     /** Slave 1; begin(baud) opens Serial. Touches neither clock nor port. */
-    ModbusMaster() : state() { lendBuffers(); }
+    ModbusMaster() : state() { setBuffers(); }
 
     /** As ModbusMaster(), for `slave` (1 to 247; 0 is broadcast). */
     ModbusMaster(uint8_t slave) : ModbusMaster() { setSlaveID(slave); }
@@ -52,37 +52,38 @@ public:
      * As ModbusMaster(slave), with begin(baud) opening Serial1 to Serial3 for
      * `port` 1 to 3; Serial for others, and for a UART that the board lacks.
      */
-    // Inline always, so that a constant port names one UART.
+    // Always inline, so that a constant port number links only that UART.
     MODBUSMASTER_INLINE ModbusMaster(uint8_t port, uint8_t slave) : ModbusMaster(slave)
     {
-        state.port = port & 0x7Fu;
+        state.port = port;
         Ports::use(port);
     }
 
     /**
-     * A copy has buffers of its own, with the same words, settings, callbacks
+     * A copy has its own buffers, with the same words, settings, callbacks
      * and Stream. Its queue of send is empty, and a request under way stays
-     * with the original; copy between requests, for the driver's sake. A copy made
-     * within preTransmission or postTransmission answers everything with ku8MBBusy.
+     * with the original. Copy between requests only, or the RS-485 driver may stay on.
+     * If you copy within preTransmission or postTransmission, the copy returns ku8MBBusy
+     * for every call.
      */
-    ModbusMaster(const ModbusMaster &other) : state(other.state) { settle(); }
+    ModbusMaster(const ModbusMaster &other) : state(other.state) { adoptCopy(); }
 
     /**
-     * As the copy; a request of this object that is under way is given up. Within
-     * preTransmission and postTransmission of either object it changes nothing.
+     * Copies as the constructor does, and cancels this object's request under way.
+     * Within preTransmission and postTransmission of either object it changes nothing.
      */
     ModbusMaster &operator=(const ModbusMaster &other)
     {
         if (this != &other && mbm_master_status(&other.state.master) != MBM_BUSY &&
             mbm_master_cancel(&state.master) != MBM_BUSY) {
             state = other.state;
-            settle();
+            adoptCopy();
         }
         return *this;
     }
 
 #if defined(MODBUSMASTER_SHARE_FRAME)
-    /** A request under way is forgotten; cancel it before, for the driver's sake. */
+    /** Drops a request under way. Call cancel before, or the RS-485 driver may stay on. */
     ~ModbusMaster()
     {
         Turn::end(state.master);
@@ -90,29 +91,28 @@ public:
 #endif
 
     /**
-     * Talks to a slave over a Stream that is open already. Cheap, and may be
-     * called again and again. Callbacks, settings and words stay; what send
-     * queued is dropped, a request under way is given up.
+     * Talks to a slave over a Stream that is already open. It takes little time and may
+     * be called before each request. Callbacks, settings and words stay; the queue of
+     * send is emptied, and a request under way is cancelled.
      *
      * @param slave   1 to 247; 248 to 255 are sent as they are, 0 is broadcast
-     * @param stream  must outlive its use here; its read() returns -1 where nothing has
-     *                arrived, as Arduino says. Its write() returns the bytes that it
-     *                took. If it returns 0 for the first byte, without a write error,
-     *                it is taken for a Stream that takes all bytes and counts none
+     * @param stream  must outlive its use here; its read() returns -1 if no byte has
+     *                arrived, as Arduino specifies. Its write() returns how many bytes
+     *                it took. If it returns 0 for the first byte and sets no write
+     *                error, the object treats it as a Stream that takes every byte and
+     *                always returns 0
      */
     void begin(uint8_t slave, Stream &stream)
     {
-        if (attach(slave) == MBM_OK && state.stream != &stream) {
+        if (attach(slave) == MBM_OK)
             state.stream = &stream;
-            state.counts = false;
-        }
     }
 
 #if defined(MODBUSMASTER_SERIAL0)
     /**
      * Opens the port of the constructor (8N1) and talks to its slave over it.
-     * The response timeout is 2000 ms here too; version 0.9 gave up after 200,
-     * for which call setResponseTimeout(200).
+     * The response timeout is 2000 ms here too. It was 200 ms in version 0.9: call
+     * setResponseTimeout(200) for that.
      *
      * @param baud  bits per second
      */
@@ -128,22 +128,22 @@ public:
     }
 #endif
 
-    /** Called again and again while a reply is waited for; nullptr for none. */
+    /** Sets a callback that is called repeatedly while a reply is awaited; nullptr for none. */
     void idle(void (*callback)()) { set(state.onIdle, callback); }
-    /** As idle(callback), which is handed `context`. */
+    /** As idle(callback), with `context` as its argument. */
     void idle(void (*callback)(void *), void *context) { set(state.onIdle, callback, context); }
 
-    /** Called before a request is written (RS-485 driver on); nullptr for none. */
+    /** Sets a callback before each request (RS-485 driver on); nullptr for none. */
     void preTransmission(void (*callback)()) { set(state.onPre, callback); }
-    /** As preTransmission(callback), which is handed `context`. */
+    /** As preTransmission(callback), with `context` as its argument. */
     void preTransmission(void (*callback)(void *), void *context)
     {
         set(state.onPre, callback, context);
     }
 
-    /** Called once a request has left (RS-485 driver off); nullptr for none. */
+    /** Sets a callback after the last bit of each request (RS-485 driver off); nullptr for none. */
     void postTransmission(void (*callback)()) { set(state.onPost, callback); }
-    /** As postTransmission(callback), which is handed `context`. */
+    /** As postTransmission(callback), with `context` as its argument. */
     void postTransmission(void (*callback)(void *), void *context)
     {
         set(state.onPost, callback, context);
@@ -154,7 +154,7 @@ public:
     {
         return index < responseWords ? state.response[index] : 0xFFFF;
     }
-    /** Zeroes the response words; receive goes on where it was. */
+    /** Sets the response words to 0; receive continues at the same word. */
     void clearResponseBuffer() { memset(state.response, 0, sizeof state.response); }
     /** Sets a word to write: ku8MBSuccess, or 0x02 past the end of the buffer. */
     uint8_t setTransmitBuffer(uint8_t index, uint16_t value)
@@ -164,7 +164,7 @@ public:
         state.transmit[index] = value;
         return ku8MBSuccess;
     }
-    /** Zeroes the words to write; the queue of send stays. */
+    /** Sets the words to write to 0; the queue of send stays. */
     void clearTransmitBuffer() { memset(state.transmit, 0, sizeof state.transmit); }
 
     /** Sets the address of later writes without one; empties the queue of send. */
@@ -199,16 +199,16 @@ public:
     uint8_t sendBit(bool on) { return mbm_master_sendBit(&state.master, on); }
 
     /**
-     * Reads 1 to 125 holding registers for receive to give.
+     * Reads 1 to 125 holding registers, which receive then returns one by one.
      *
-     * @return how many words receive will give; 0 if the request failed (status
-     *         says how) or, non-blocking, is under way
+     * @return how many words receive will return; 0 if the request failed (status
+     *         returns the reason) or if, in non-blocking mode, it is under way
      */
     uint8_t requestFrom(uint16_t address, uint16_t quantity)
     {
         return mayRequest() ? mbm_master_requestFrom(&state.master, address, quantity) : 0;
     }
-    /** How many words of the last successful read receive has yet to give. */
+    /** How many words of the last successful read receive has not returned yet. */
     uint8_t available() const { return mbm_master_available(&state.master); }
     /** The next word of the last successful read; 0xFFFF when none is left. */
     uint16_t receive() { return mbm_master_receive(&state.master); }
@@ -216,12 +216,12 @@ public:
     /**
      * Function 01: reads 1 to 2000 coils, 16 to a response word, lowest bit first.
      *
-     * This and the nine other functions wait for the reply, unless setBlocking
-     * said otherwise. All empty the queue of send; response words change only
-     * on success, and the words to write never.
+     * This and the nine other functions wait for the reply, unless setBlocking(false)
+     * was called. All empty the queue of send. Response words change only on success.
+     * The words to write stay, except for functions 06 and 16.
      *
-     * @return ku8MBSuccess, the device's exception code (0x01 to 0x7F), or why
-     *         there is no reply (0xE0 and up)
+     * @return ku8MBSuccess, the device's exception code (0x01 to 0x7F), or the
+     *         reason why there is no reply (0xE0 and up)
      */
     uint8_t readCoils(uint16_t address, uint16_t quantity)
     {
@@ -242,17 +242,17 @@ public:
     {
         return request(mbm_master_readInputRegisters, address, static_cast<uint16_t>(quantity));
     }
-    /** As above, with the original's type: a pointer to it is a pointer to this member. */
+    /** As above, with the parameter types of ModbusMaster 2.0.1, for pointers to members. */
     uint8_t readInputRegisters(uint16_t address, uint8_t quantity)
     {
         return request(mbm_master_readInputRegisters, address, uint16_t{quantity});
     }
-    /** Function 05: switches a coil; any `on` but 0 is on. See readCoils. */
+    /** Function 05: switches a coil; every `on` other than 0 means on. See readCoils. */
     uint8_t writeSingleCoil(uint16_t address, uint8_t on)
     {
         return request(mbm_master_writeSingleCoil, address, on);
     }
-    /** Function 06: writes a register, by way of word 0. See readCoils. */
+    /** Function 06: stores the value in word 0 and writes it. See readCoils. */
     uint8_t writeSingleRegister(uint16_t address, uint16_t value)
     {
         return request(mbm_master_writeSingleRegister, address, value);
@@ -271,7 +271,7 @@ public:
     }
     /** Function 10: writes the queued complete words to the last write address. */
     uint8_t writeMultipleRegisters() { return request(mbm_master_writeQueuedRegisters); }
-    /** Function 16: (register & andMask) | (orMask & ~andMask), by way of words 0 and 1. */
+    /** Function 16: (register & andMask) | (orMask & ~andMask); stores the masks in words 0 and 1. */
     uint8_t maskWriteRegister(uint16_t address, uint16_t andMask, uint16_t orMask)
     {
         return request(mbm_master_maskWriteRegister, address, andMask, orMask);
@@ -291,43 +291,43 @@ public:
 
     /** Milliseconds from the end of a request to the end of its reply; 2000 at first. */
     void setResponseTimeout(uint16_t ms) { mbm_master_setResponseTimeout(&state.master, ms); }
-    /** The unit of later requests: 1 to 247; 248 to 255 as they are, 0 broadcasts. */
+    /** The unit of later requests: 1 to 247; 248 to 255 are sent as they are, 0 broadcasts. */
     void setSlaveID(uint8_t slave) { mbm_master_setSlaveID(&state.master, slave); }
     /** The unit of later requests. */
     uint8_t getSlaveID() const { return mbm_master_getSlaveID(&state.master); }
-    /** Tells bits per second, for t3.5; 0: untold, 4 ms. Sets nothing on the Stream. */
+    /** Bits per second, from which t3.5 follows; 0: unknown, a silence of 4 ms. The Stream stays as it is. */
     void setBaudRate(uint32_t baud) { mbm_master_setBaudRate(&state.master, baud); }
-    /** Microseconds of silence before a request, in place of t3.5. */
+    /** Microseconds of silence before a request, instead of t3.5. */
     void setGap(uint32_t us) { mbm_master_setGap(&state.master, us); }
-    /** Milliseconds that a broadcast takes; 100 at first. */
+    /** Milliseconds from a broadcast to the next request; 100 at first. */
     void setTurnaroundDelay(uint16_t ms) { mbm_master_setTurnaroundDelay(&state.master, ms); }
-    /** Milliseconds that the line is left alone after a timeout; 100 at first. */
+    /** Milliseconds after a failed request before the next one is sent; 100 at first. */
     void setQuietTime(uint16_t ms) { mbm_master_setQuietTime(&state.master, ms); }
-    /** How often a request without a proper reply is repeated; 0 at first. */
+    /** How often a request is repeated if its reply is missing, damaged or malformed; 0 at first. */
     void setRetries(uint8_t retries) { mbm_master_setRetries(&state.master, retries); }
-    /** Drops the request itself where the receiver hears the driver; off at first. */
+    /** Discards the local echo, if the receiver receives what the driver sends; off at first. */
     void setEchoDiscard(bool on) { mbm_master_setEchoDiscard(&state.master, on); }
     /**
-     * Accepts replies that deviate from the standard, if no right one comes in time:
-     * another echoed address or value, another number of registers. Fills the response
-     * buffer from reads of more words than it holds, and reads from unit 0; off at first.
+     * Accepts replies that deviate from the standard if no correct one arrives in time:
+     * another echoed address or value, another number of registers. A read of more words
+     * than the response buffer holds fills the buffer. Unit 0 may be read. Off at first.
      */
     void setLenient(bool on) { mbm_master_setLenient(&state.master, on); }
-    /** Character times that the driver stays on where flush returns early; 0 at first. */
+    /** Character times that the driver stays on after flush, for cores whose flush returns early; 0 at first. */
     void setPostFlushHold(uint8_t characters)
     {
         mbm_master_setPostFlushHold(&state.master, characters);
     }
-    /** false: the functions return ku8MBPending at once, and poll ends them. */
+    /** false: the functions return ku8MBPending at once, and poll completes the request. */
     void setBlocking(bool on) { mbm_master_setBlocking(&state.master, on); }
-    /** Counts into `counters`, which you zeroed; nullptr stops. Copies share them. */
+    /** Counts into `counters`; set them to 0 before. nullptr stops counting. Copies share them. */
     void setCounters(mbm_counters *counters) { mbm_master_setCounters(&state.master, counters); }
 
-    /** Moves a non-blocking request on: ku8MBPending until it has ended, then how. */
+    /** Continues a non-blocking request: ku8MBPending until it has ended, then its status. */
     uint8_t poll() { return mbm_master_poll(&state.master); }
-    /** Gives a non-blocking request up, with the driver off. */
+    /** Cancels a non-blocking request and switches the driver off. */
     void cancel() { mbm_master_cancel(&state.master); }
-    /** How the last request ended; ku8MBPending while it is under way. */
+    /** The status of the last request; ku8MBPending while it is under way. */
     uint8_t status() const { return mbm_master_status(&state.master); }
     /** The raw exception code of the last reply; 0 if it was no exception. */
     uint8_t getExceptionCode() const { return mbm_master_getExceptionCode(&state.master); }
@@ -342,8 +342,8 @@ private:
         responseWords = MODBUSMASTER_RESPONSE_WORDS,
         transmitWords = MODBUSMASTER_TRANSMIT_WORDS,
         mostWords = responseWords > transmitWords ? +responseWords : +transmitWords,
-        frameNeed = MBM_FRAME_BYTES(mostWords),
-        frameBytes = frameNeed < MBM_MAX_FRAME ? +frameNeed : MBM_MAX_FRAME
+        frameOfWords = MBM_FRAME_BYTES(mostWords),
+        frameBytes = frameOfWords < MBM_MAX_FRAME ? +frameOfWords : MBM_MAX_FRAME
     };
 
     typedef ModbusMasterPorts<void> Ports;
@@ -357,14 +357,14 @@ private:
     friend class ModbusMasterValues<ModbusMaster>;
 
     struct State {
-        // What the hooks use comes first, within AVR's short displacements.
+        // The members that the hooks use come first: AVR reaches 63 bytes with one instruction.
         Stream *stream;
+        Stream *counting; // the last Stream whose write returned another number than 0
         Callback onIdle;
         Callback onPre;
         Callback onPost;
         bool sent; // the request is on the wire, so a reply is waited for
-        uint8_t port : 7;
-        bool counts : 1; // the Stream's write has returned a count
+        uint8_t port;
         mbm_master master;
         uint16_t response[responseWords];
         uint16_t transmit[transmitWords];
@@ -375,9 +375,9 @@ private:
 
     State state;
 
-    static State &of(void *context) { return *static_cast<State *>(context); }
+    static State &stateOf(void *context) { return *static_cast<State *>(context); }
 
-    void lendBuffers()
+    void setBuffers()
     {
 #if defined(MODBUSMASTER_SHARE_FRAME)
         static uint8_t frame[frameBytes];
@@ -388,7 +388,7 @@ private:
                               transmitWords, frame, frameBytes);
     }
 
-    // Touches the clock and the driver, not the Stream.
+    // Uses the clock and the driver, not the Stream.
     uint8_t attach(uint8_t slave)
     {
         static const mbm_port hooks = {nullptr,   readHook, writeHook, clockHook,
@@ -396,17 +396,17 @@ private:
         return mbm_master_beginRtuWith(&state.master, slave, &hooks, &state);
     }
 
-    // After a copy: our own buffers and our own context, no request under way.
-    void settle()
+    // After a copy: sets this object's buffers and context, and cancels the copied request.
+    void adoptCopy()
     {
         cancel();
-        lendBuffers();
+        setBuffers();
         if (state.stream != nullptr)
             attach(getSlaveID());
     }
 
-    // Every request passes here. False while another object has a request under way in
-    // the frame that all share.
+    // Every request calls this. Returns false while another object has a request under way
+    // in the shared frame buffer.
     bool mayRequest()
     {
         if (!Turn::take(state.master))
@@ -424,7 +424,7 @@ private:
     uint8_t sendWord(uint16_t word) { return mbm_master_send(&state.master, word); }
     uint8_t sendWords(uint32_t words) { return mbm_master_send32(&state.master, words); }
 
-    static void plain(void *callback) { reinterpret_cast<void (*)()>(callback)(); }
+    static void withoutContext(void *callback) { reinterpret_cast<void (*)()>(callback)(); }
 
     static void set(Callback &callback, void (*function)(void *), void *context)
     {
@@ -433,7 +433,7 @@ private:
     }
     static void set(Callback &callback, void (*function)())
     {
-        set(callback, function != nullptr ? plain : nullptr, reinterpret_cast<void *>(function));
+        set(callback, function != nullptr ? withoutContext : nullptr, reinterpret_cast<void *>(function));
     }
     static void call(const Callback &callback)
     {
@@ -443,7 +443,7 @@ private:
 
     static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)
     {
-        Stream &stream = *of(context).stream;
+        Stream &stream = *stateOf(context).stream;
         const uint8_t *const first = bytes, *const end = bytes + capacity;
         while (bytes != end) {
             MODBUSMASTER_DEBUG(A, true);
@@ -459,43 +459,45 @@ private:
     }
     static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
     {
-        State &state = of(context);
-        Stream &stream = *state.stream;
+        State &state = stateOf(context);
 #if !defined(__AVR__)
-        if (state.counts)
-            return static_cast<int16_t>(stream.write(bytes, length));
+        if (state.counting == state.stream)
+            return static_cast<int16_t>(state.stream->write(bytes, length));
 #endif
-        // Byte by byte: of a block, a Stream that returns 0 took one byte or all.
-        int16_t taken = 0;
-        for (; taken != static_cast<int16_t>(length); taken++) {
-            if (stream.write(*bytes++) != 0)
-                state.counts = true;
-            else if (state.counts || stream.getWriteError() != 0)
+        // Byte by byte: if the write of a block returns 0, it took one byte or all. A
+        // request of this class has 4 to 255 bytes; an 8-bit counter saves flash on AVR.
+        uint8_t left = static_cast<uint8_t>(length);
+        do {
+            Stream &stream = *state.stream;
+            if (stream.write(*bytes) != 0)
+                state.counting = &stream;
+            else if (state.counting == &stream || stream.getWriteError() != 0)
                 break;
-        }
-        return taken;
+            bytes++;
+        } while (--left != 0);
+        return static_cast<uint8_t>(length - left);
     }
     static uint32_t clockHook(void *) { return micros() & 0xFFFFFFFFu; }
     static uint8_t flushHook(void *context)
     {
-        of(context).stream->flush();
+        stateOf(context).stream->flush();
         return 1;
     }
-    static void preHook(void *context) { call(of(context).onPre); }
+    static void preHook(void *context) { call(stateOf(context).onPre); }
     static void postHook(void *context)
     {
-        of(context).sent = true;
+        stateOf(context).sent = true;
         Turn::used();
-        call(of(context).onPost);
+        call(stateOf(context).onPost);
     }
     static void idleHook(void *context, mbm_master *)
     {
-        State &state = of(context);
+        State &state = stateOf(context);
         if (state.sent) {
             MODBUSMASTER_DEBUG(B, true);
             call(state.onIdle);
             MODBUSMASTER_DEBUG(B, false);
-            state.sent = true; // a request that the callback tried was refused
+            state.sent = true; // a refused request of the callback has cleared it
         }
         MODBUSMASTER_YIELD();
     }

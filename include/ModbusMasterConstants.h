@@ -13,8 +13,8 @@
 #include "mbm.h"
 
 /**
- * The constants of ModbusMaster; use them as ModbusMaster::ku8MBSuccess. A
- * template, since C++11 gives only a template's statics a home in a header.
+ * The constants of ModbusMaster; use them as ModbusMaster::ku8MBSuccess. It is
+ * a template, because in C++11 only a template's static members can be defined in a header.
  */
 template <typename Unused> class ModbusMasterStatics {
 public:
@@ -28,9 +28,9 @@ public:
     static const uint8_t ku8MBSlaveDeviceFailure = MBM_SLAVE_DEVICE_FAILURE;
     /** The call succeeded. */
     static const uint8_t ku8MBSuccess = MBM_OK;
-    /** Only other units answered. */
+    /** Only other units replied. */
     static const uint8_t ku8MBInvalidSlaveID = MBM_INVALID_SLAVE_ID;
-    /** The unit answered another function. */
+    /** The unit replied with another function code. */
     static const uint8_t ku8MBInvalidFunction = MBM_INVALID_FUNCTION;
     /** No complete reply within the response timeout. */
     static const uint8_t ku8MBResponseTimedOut = MBM_RESPONSE_TIMED_OUT;
@@ -38,43 +38,43 @@ public:
     static const uint8_t ku8MBInvalidCRC = MBM_INVALID_CRC;
     /** The reply does not answer the request. */
     static const uint8_t ku8MBMalformedReply = MBM_MALFORMED_REPLY;
-    /** A request of this object is under way; nothing was changed. */
+    /** A request of this object is under way, or a callback called; nothing was changed. */
     static const uint8_t ku8MBBusy = MBM_BUSY;
     /** A function that reads cannot be broadcast; nothing was sent. */
     static const uint8_t ku8MBBroadcastNotAllowed = MBM_BROADCAST_NOT_ALLOWED;
     /** The buffers cannot hold the request or its reply. */
     static const uint8_t ku8MBBufferTooSmall = MBM_BUFFER_TOO_SMALL;
-    /** begin was not called yet. */
+    /** begin has not been called. */
     static const uint8_t ku8MBNotInitialised = MBM_NOT_INITIALISED;
     /** The request is under way: call poll again. */
     static const uint8_t ku8MBPending = MBM_PENDING;
     /** The line never fell silent, or the port took no bytes. */
     static const uint8_t ku8MBLineBusy = MBM_LINE_BUSY;
-    /** The request was given up by cancel or begin. */
+    /** cancel or begin ended the request. */
     static const uint8_t ku8MBCancelled = MBM_CANCELLED;
 };
 
-/** @cond the homes of what is declared above */
-#define MODBUSMASTER_HOME(name) \
+/** @cond the definitions of the constants */
+#define MODBUSMASTER_DEFINE(name) \
     template <typename Unused> const uint8_t ModbusMasterStatics<Unused>::name
-MODBUSMASTER_HOME(ku8MBIllegalFunction);
-MODBUSMASTER_HOME(ku8MBIllegalDataAddress);
-MODBUSMASTER_HOME(ku8MBIllegalDataValue);
-MODBUSMASTER_HOME(ku8MBSlaveDeviceFailure);
-MODBUSMASTER_HOME(ku8MBSuccess);
-MODBUSMASTER_HOME(ku8MBInvalidSlaveID);
-MODBUSMASTER_HOME(ku8MBInvalidFunction);
-MODBUSMASTER_HOME(ku8MBResponseTimedOut);
-MODBUSMASTER_HOME(ku8MBInvalidCRC);
-MODBUSMASTER_HOME(ku8MBMalformedReply);
-MODBUSMASTER_HOME(ku8MBBusy);
-MODBUSMASTER_HOME(ku8MBBroadcastNotAllowed);
-MODBUSMASTER_HOME(ku8MBBufferTooSmall);
-MODBUSMASTER_HOME(ku8MBNotInitialised);
-MODBUSMASTER_HOME(ku8MBPending);
-MODBUSMASTER_HOME(ku8MBLineBusy);
-MODBUSMASTER_HOME(ku8MBCancelled);
-#undef MODBUSMASTER_HOME
+MODBUSMASTER_DEFINE(ku8MBIllegalFunction);
+MODBUSMASTER_DEFINE(ku8MBIllegalDataAddress);
+MODBUSMASTER_DEFINE(ku8MBIllegalDataValue);
+MODBUSMASTER_DEFINE(ku8MBSlaveDeviceFailure);
+MODBUSMASTER_DEFINE(ku8MBSuccess);
+MODBUSMASTER_DEFINE(ku8MBInvalidSlaveID);
+MODBUSMASTER_DEFINE(ku8MBInvalidFunction);
+MODBUSMASTER_DEFINE(ku8MBResponseTimedOut);
+MODBUSMASTER_DEFINE(ku8MBInvalidCRC);
+MODBUSMASTER_DEFINE(ku8MBMalformedReply);
+MODBUSMASTER_DEFINE(ku8MBBusy);
+MODBUSMASTER_DEFINE(ku8MBBroadcastNotAllowed);
+MODBUSMASTER_DEFINE(ku8MBBufferTooSmall);
+MODBUSMASTER_DEFINE(ku8MBNotInitialised);
+MODBUSMASTER_DEFINE(ku8MBPending);
+MODBUSMASTER_DEFINE(ku8MBLineBusy);
+MODBUSMASTER_DEFINE(ku8MBCancelled);
+#undef MODBUSMASTER_DEFINE
 /** @endcond */
 
 #endif

@@ -1,23 +1,23 @@
 /**
  * @file ModbusMasterOptions.h
- * @brief What a sketch may choose of ModbusMaster, and what holds if it does not.
+ * @brief The macros of ModbusMaster that a sketch may define, and their defaults.
  *
  * Licence: MIT OR Apache-2.0. Included by ModbusMaster.h.
  *
- * Macros that may be defined before ModbusMaster.h is included, alike in every
- * file of a program:
+ * Macros that may be defined before ModbusMaster.h is included, the same in
+ * every file of a program:
  * - MODBUSMASTER_RESPONSE_WORDS  words that a read fills, 1 to 125; 64 on AVR,
- *   else 125. A longer reply is answered with ku8MBBufferTooSmall.
+ *   else 125. A longer read returns ku8MBBufferTooSmall.
  * - MODBUSMASTER_TRANSMIT_WORDS  words that a write sends, 2 to 123; 64 on AVR,
- *   else 123. A longer write is answered with ku8MBIllegalDataValue.
- * - MODBUSMASTER_SHARE_FRAME  one frame buffer for all objects, as on AVR boards of
- *   at most 2.5 KB of RAM anyway. A request beside that of another object is answered
- *   with ku8MBBusy. Not for objects of several threads.
+ *   else 123. A longer write returns ku8MBIllegalDataValue.
+ * - MODBUSMASTER_SHARE_FRAME  one frame buffer for all objects. It is defined on AVR
+ *   boards of at most 2.5 KB of RAM. A request while another object's request is under
+ *   way returns ku8MBBusy. Do not define it if several threads use objects.
  * - MODBUSMASTER_OWN_FRAMES  a frame buffer for each object on those boards too, so
  *   that several objects may have a request under way at the same time.
- * - MODBUSMASTER_SERIAL0 to MODBUSMASTER_SERIAL3  what begin(baud) opens, where
+ * - MODBUSMASTER_SERIAL0 to MODBUSMASTER_SERIAL3  the UARTs that begin(baud) opens, if
  *   the core does not say which UARTs the board has.
- * - MODBUSMASTER_YIELD()  what a wait runs; yield() where the core has it.
+ * - MODBUSMASTER_YIELD()  is called while a function waits; yield() if the core has it.
  * - __MODBUSMASTER_DEBUG__  1: pin __MODBUSMASTER_DEBUG_PIN_A__ (4) is high while a byte
  *   is read, pin __MODBUSMASTER_DEBUG_PIN_B__ (5) while an idle callback runs. The sketch
  *   makes them outputs.
@@ -49,7 +49,7 @@
 #define MODBUSMASTER_SHARE_FRAME
 #endif
 
-// Cores with NO_GLOBAL_* leave it to the sketch to make the ports.
+// With NO_GLOBAL_* the core defines no ports; the sketch defines them.
 #if !defined(MODBUSMASTER_SERIAL0) && !defined(NO_GLOBAL_INSTANCES) && !defined(NO_GLOBAL_SERIAL)
 #define MODBUSMASTER_SERIAL0 Serial
 #endif

@@ -13,19 +13,19 @@
 
 #include "ModbusMasterOptions.h"
 
-/** @cond a function that the compiler always compiles into its caller */
+/** @cond a function that is always inlined */
 #define MODBUSMASTER_INLINE __attribute__((always_inline)) inline
 /** @endcond */
 
 /**
- * Opens UARTs 1 to 3. A UART that a program names takes RAM for its buffers, 157 bytes on
- * a Mega. So the constructor with a port number names the one UART of that number, and
- * begin(baud) names none of the three. A template, since C++11 gives only a template's
- * statics a home in a header.
+ * Opens UARTs 1 to 3. A UART that a program refers to takes RAM for its buffers, 157 bytes
+ * on a Mega. So the constructor with a port number refers to the UART of that number only,
+ * and begin(baud) to none of the three. It is a template, because in C++11 only a
+ * template's static members can be defined in a header.
  */
 template <typename Unused> class ModbusMasterPorts {
 public:
-    /** Has open(port, baud) know UART `port`, if the board has it. */
+    /** Lets open(port, baud) open UART `port`, if the board has it. */
     MODBUSMASTER_INLINE static void use(uint8_t port)
     {
 #if defined(MODBUSMASTER_SERIAL1)
@@ -43,7 +43,7 @@ public:
         static_cast<void>(port);
     }
 
-    /** Opens the UART of that number and returns it; null for one that is not in use. */
+    /** Opens UART `port` and returns it; nullptr if use(port) was not called. */
     static Stream *open(uint8_t port, uint32_t baud)
     {
         if (port < 1 || port > 3 || openers[port - 1] == nullptr)
@@ -71,7 +71,7 @@ private:
 #endif
 };
 
-/** @cond the home of what is declared above */
+/** @cond the definition of the static member */
 template <typename Unused>
 typename ModbusMasterPorts<Unused>::Opener ModbusMasterPorts<Unused>::openers[3] = {};
 /** @endcond */

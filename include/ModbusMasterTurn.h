@@ -1,6 +1,6 @@
 /**
  * @file ModbusMasterTurn.h
- * @brief What the objects of ModbusMaster know of each other.
+ * @brief Orders the requests of several ModbusMaster objects.
  *
  * Licence: MIT OR Apache-2.0. Included by ModbusMaster.h.
  */
@@ -15,28 +15,28 @@
 #include "mbm.h"
 
 /**
- * The object that sent a request last. The gap before the request of another object
- * counts from the last use of a line by any object, as all may share one. A template,
- * since C++11 gives only a template's statics a home in a header.
+ * The object that sent the last request. All objects may share a line: so the silence
+ * before a request counts from the last use of a line by any object. It is a template,
+ * because in C++11 only a template's static members can be defined in a header.
  */
 template <typename Unused> class ModbusMasterTurn {
 #if defined(MODBUSMASTER_SHARE_FRAME)
 public:
-    /** False while another object has a request under way in the frame that all share. */
+    /** False while another object has a request under way in the shared frame buffer. */
     static bool take(mbm_master &master)
     {
         return shared.master == &master || mbm_master_takeTurn(&master, &shared) == MBM_OK;
     }
-    /** An object goes. */
+    /** Called by the destructor of an object. */
     static void end(mbm_master &master) { mbm_master_endTurn(&master, &shared); }
-    /** A line was used just now: the object itself knows. */
+    /** A line was used just now; mbm_turn records that itself. */
     static void used() {}
 
 private:
     static mbm_turn shared;
 #else
 public:
-    /** True: each object has a frame of its own. */
+    /** Always true: each object has its own frame buffer. */
     static bool take(mbm_master &master)
     {
         if (last != &master) {
@@ -49,14 +49,14 @@ public:
     static void used() { lastUse = micros() & 0xFFFFFFFFu; }
 
 private:
-    // Never looked into. Threads that race for it, each with a line of its own, cost a
-    // needless gap at most.
+    // The pointer is only compared. Two threads, each with its own line, may race for it;
+    // at worst one of them waits for a silence that was not needed.
     static const mbm_master *last;
     static uint32_t lastUse;
 #endif
 };
 
-/** @cond the homes of what is declared above */
+/** @cond the definitions of the static members */
 #if defined(MODBUSMASTER_SHARE_FRAME)
 template <typename Unused> mbm_turn ModbusMasterTurn<Unused>::shared = {nullptr, 0};
 #else

@@ -1,9 +1,9 @@
 /**
  * @file ModbusMasterValues.h
- * @brief What ModbusMaster adds: floats, wide integers, texts and single bits.
+ * @brief Floats, wide integers, texts and single bits in the words of ModbusMaster.
  *
  * Licence: MIT OR Apache-2.0. Included by ModbusMaster.h. A sketch that calls
- * none of it is not a byte larger.
+ * none of these members is not larger.
  */
 
 #ifndef MODBUSMASTER_VALUES_H
@@ -18,13 +18,13 @@
  * The words of a ModbusMaster as values. `index` counts words from 0, as with
  * getResponseBuffer and setTransmitBuffer: a float at index 2 is in words 2 and 3.
  *
- * Each value is read in two ways. With a variable behind the index, the result is
- * true, or false with the variable unchanged if the buffer ends before the value
- * does. Without, the value is the result: of such a one, 0 or NaN. Both give what
- * the last successful read put there, so ask whether it was successful.
+ * There are two ways to read each value. With a variable after the index, the result
+ * is true, or false with the variable unchanged if the value extends past the buffer.
+ * Without a variable, the result is the value: 0 or NAN past the buffer. Both read the
+ * words of the last successful read, so check its status first.
  *
- * What sets a value gives ku8MBSuccess, or 0x02 with nothing set if the buffer
- * ends before the value does.
+ * The members that set a value return ku8MBSuccess, or 0x02 with nothing set if the
+ * value extends past the buffer.
  */
 template <typename Master> class ModbusMasterValues {
 public:
@@ -37,7 +37,7 @@ public:
         orderDCBA = MBM_ORDER_DCBA        /**< low word first, low byte first */
     };
 
-    /** The order of values where a call names none; orderABCD at first. */
+    /** The order of values for calls without an order; orderABCD at first. */
     void setWordOrder(WordOrder order) { mbm_master_setWordOrder(&core(), order); }
 
     /** An integer in the response: a word, 0 to 65535; only the bytes of its order matter. */
@@ -148,7 +148,7 @@ public:
     /**
      * A text in the response, up to its first NUL or the end of its field.
      *
-     * @param index   the word it begins in
+     * @param index   the word in which it begins
      * @param length  bytes of its field, two a word
      * @param text    gets the text and a NUL
      * @param size    bytes of `text`: length + 1 are always enough
@@ -249,11 +249,11 @@ public:
     }
 
     /**
-     * Sets a text to write, with NULs behind it up to the end of its field.
+     * Sets a text to write, padded with NULs to the end of its field.
      *
-     * @param index   the word it begins in
+     * @param index   the word in which it begins
      * @param length  bytes of its field, two a word
-     * @param text    ends with a NUL, which needs no room in the field
+     * @param text    ends with a NUL, which the field need not hold
      * @param order   with orderBADC or orderDCBA the low byte of a word comes first
      * @return ku8MBSuccess, or with nothing set 0x02 if the buffer ends before the
      *         field does, ku8MBBufferTooSmall if the field ends before the text does

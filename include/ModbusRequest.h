@@ -1,6 +1,6 @@
 /**
  * @file ModbusRequest.h
- * @brief A request of a ModbusClient, with its words and what comes of it.
+ * @brief A request of a ModbusClient: its unit, words, status and callback.
  *
  * Licence: MIT OR Apache-2.0. Included by ModbusClient.h.
  */
@@ -16,16 +16,16 @@
 #include "mbm.h"
 
 /**
- * A request to one unit. Its words are what a function that writes sends, and what a
- * function that reads fills; ModbusValues reads and sets values in them. It may be used
- * again and again.
+ * A request to one unit. Functions that write send its words, functions that read fill
+ * them; the members of ModbusValues read and set values in them. Use it as often as you
+ * like.
  *
- * While it is pending it must not be destroyed, and its words must be left alone:
- * make requests global or static. ModbusRequestOf has words of its own.
+ * While it is pending, do not destroy it and do not change its words: make requests
+ * global or static. ModbusRequestOf has its own words.
  */
 class ModbusRequest : public ModbusValues {
 public:
-    /** For `unit`, without words: for what only writes a value. */
+    /** For `unit`, without words: for functions 05, 06 and 16. */
     ModbusRequest(uint8_t unit) : ModbusRequest(unit, nullptr, 0) {}
     /** For `unit`, with the words of an array, which must outlive it. */
     template <size_t N>
@@ -44,8 +44,8 @@ public:
     }
 
     /**
-     * Sets whom later calls are for: on a serial line 1 to 247, 0 broadcasts; on TCP 1
-     * to 255. MBM_OK; MBM_BUSY, with nothing changed, while the request is pending.
+     * Sets the unit of later calls: on a serial line 1 to 247, 0 broadcasts; on TCP 1
+     * to 255. Returns MBM_OK; MBM_BUSY, with nothing changed, while the request is pending.
      */
     uint8_t setUnitID(uint8_t unit)
     {
@@ -54,28 +54,28 @@ public:
         request.unit = unit;
         return MBM_OK;
     }
-    /** Whom it is for. */
+    /** The unit of later calls. */
     uint8_t getUnitID() const { return request.unit; }
 
     /**
-     * How it ended: MBM_OK, the device's exception code (0x01 to 0x7F), or why there is
-     * no reply (0xE0 and up). MBM_PENDING until then, MBM_OK before the first call.
+     * MBM_OK, the device's exception code (0x01 to 0x7F), or the reason why there is
+     * no reply (0xE0 and up). MBM_PENDING until it has ended, MBM_OK before the first call.
      */
     uint8_t status() const { return request.status; }
-    /** Whether it waits or is under way. */
+    /** Whether it waits in the queue or is under way. */
     bool pending() const { return request.status == MBM_PENDING; }
     /** The raw exception code of the reply; 0 if it was no exception. */
     uint8_t getExceptionCode() const { return request.exception; }
-    /** How many bytes the reply filled, two a word. */
+    /** How many bytes the reply filled; a word has two. */
     uint8_t length() const { return request.length; }
     /** The transaction identifier of the frame sent last; 0 in RTU and ASCII. */
     uint16_t wireTransaction() const { return mbm_client_wireTransaction(&request); }
 
     /**
-     * Sets what is called when it has ended: a function, or a lambda with captures that
-     * MODBUS_CAPTURE_BYTES hold; nullptr for none. It is called from poll or wait of
-     * the client, may make requests, this one too, and is not called for a request
-     * that cancel gave up.
+     * Sets the callback that runs when the request has ended: a function, or a lambda
+     * whose captures take at most MODBUS_CAPTURE_BYTES; nullptr for none. poll or wait of
+     * the client calls it. It may queue requests, also this one. It is not called for a
+     * request that cancel ended.
      */
     template <typename Function> void onDone(const Function &function)
     {
@@ -102,7 +102,7 @@ private:
     }
 };
 
-/** A request with words of its own, all 0 at first. */
+/** A request with its own words, all 0 at first. */
 template <uint16_t Words> class ModbusRequestOf : public ModbusRequest {
 public:
     static_assert(Words >= 1 && Words <= 126, "a request transfers 1 to 126 words");

@@ -3,7 +3,7 @@
  * @brief A Modbus RTU or ASCII server for Arduino sketches, over mbm.h.
  *
  * Licence: MIT OR Apache-2.0. Header-only, C++11, no heap. Addresses are those
- * on the wire, from 0. What a sketch does not call takes no flash.
+ * on the wire, from 0. Members that a sketch does not call take no flash.
  *
  *     ModbusRegisterArray<2> readings;
  *     ModbusServer server;
@@ -18,10 +18,10 @@
  *       server.poll();
  *     }
  *
- * A macro that may be defined before this file is included, alike in every file
+ * A macro that may be defined before this file is included, the same in every file
  * of a program:
  * - MODBUSSERVER_FRAME_BYTES  bytes of the frame buffer, 32 to 256; on AVR 141,
- *   which hold 64 registers each way, else 256. Longer requests are not heard,
+ *   which hold 64 registers each way, else 256. Longer requests are ignored,
  *   longer responses become exception 04.
  */
 
@@ -48,14 +48,14 @@
 /** @endcond */
 
 /**
- * What answers to one unit id: the tables and functions that it serves. A
- * ModbusServer is one itself; only several units on one line take objects of
- * this class.
+ * A unit: the tables and functions that are served under one unit id. A
+ * ModbusServer is a unit itself. Use objects of this class only if one line has
+ * several units.
  *
- * Each member that serves something returns MBM_OK, or MBM_BUFFER_TOO_SMALL for
- * more than MBM_MAX_SERVICES (16) of them, and may be called before begin or after
- * it. What is served is not copied: it must outlive the unit. Several units may
- * serve the same object; MBM_BUSY for a table that is served as another kind.
+ * A member that serves an object returns MBM_OK; MBM_BUFFER_TOO_SMALL if the unit
+ * serves MBM_MAX_SERVICES (16) already; MBM_BUSY if a table is served as another kind.
+ * It may be called before begin or after it. Objects are not copied: they must outlive
+ * the unit. Several units may serve the same object.
  */
 class ModbusUnit {
 public:
@@ -65,35 +65,35 @@ public:
     ModbusUnit &operator=(const ModbusUnit &) = delete;
 
     /** Serves coils: functions 01, 05 and 0F. */
-    uint8_t coils(ModbusBits &bits) { return mbm_unit_serveCoils(&unit, bits.use()); }
+    uint8_t coils(ModbusBits &bits) { return mbm_unit_serveCoils(&unit, bits.record()); }
     /** Serves discrete inputs: function 02. */
     uint8_t discreteInputs(ModbusBits &bits)
     {
-        return mbm_unit_serveDiscreteInputs(&unit, bits.use());
+        return mbm_unit_serveDiscreteInputs(&unit, bits.record());
     }
     /** Serves holding registers: functions 03, 06 and 10. */
     uint8_t holdingRegisters(ModbusRegisters &registers)
     {
-        return mbm_unit_serveHoldingRegisters(&unit, registers.use());
+        return mbm_unit_serveHoldingRegisters(&unit, registers.record());
     }
-    /** Serves functions 16 and 17 too, of registers that holdingRegisters took. */
+    /** Serves functions 16 and 17 too. Call holdingRegisters with the same registers before. */
     uint8_t maskAndReadWrite(ModbusRegisters &registers)
     {
-        return mbm_registerTable_serveMaskAndReadWrite(registers.use());
+        return mbm_registerTable_serveMaskAndReadWrite(registers.record());
     }
     /** Serves input registers: function 04. */
     uint8_t inputRegisters(ModbusRegisters &registers)
     {
-        return mbm_unit_serveInputRegisters(&unit, registers.use());
+        return mbm_unit_serveInputRegisters(&unit, registers.record());
     }
 
     /** Serves a function of yours. */
     uint8_t function(ModbusFunction &function)
     {
-        return mbm_unit_serveCustom(&unit, function.use());
+        return mbm_unit_serveCustom(&unit, function.record());
     }
 
-    /** Serves cells that functions of yours hold; see mbm_unit_serveCallbacks. */
+    /** Serves registers or bits through functions of yours; see mbm_unit_serveCallbacks. */
     uint8_t serve(mbm_dataCallbacks &cells, uint8_t table)
     {
         return mbm_unit_serveCallbacks(&unit, &cells, table);
@@ -120,12 +120,12 @@ public:
         return mbm_unit_serveIdentification(&unit, &identification);
     }
 
-    /** Answers function `code` (1 to 127) with exception 01, whatever serves it. */
+    /** Answers function `code` (1 to 127) with exception 01, even if it is served. */
     uint8_t switchOff(mbm_functionMask &switches, uint8_t code)
     {
         return mbm_unit_switchFunction(&unit, &switches, code, 0);
     }
-    /** Serves a function again that switchOff took away. */
+    /** Serves function `code` again after switchOff. */
     uint8_t switchOn(mbm_functionMask &switches, uint8_t code)
     {
         return mbm_unit_switchFunction(&unit, &switches, code, 1);
@@ -147,9 +147,8 @@ private:
  * A Modbus server on one serial line, as one unit or as several.
  *
  * Call poll in loop, and keep loop short: a response begins with the first poll
- * after the line has been silent for t3.5, and a Stream that buffers 64 bytes
- * has lost some if it is not asked for that long. Use an object from one
- * thread, never from an interrupt.
+ * after t3.5 of silence, and a Stream that buffers 64 bytes loses bytes if poll
+ * does not read it in time. Use an object from one thread, never from an interrupt.
  */
 class ModbusServer : public ModbusUnit {
 public:
@@ -157,31 +156,31 @@ public:
     ModbusServer() : state() {}
 
     /**
-     * Answers as unit `id` over a Stream that is open already. May be called
-     * again; what was under way is dropped, what is served stays.
+     * Answers as unit `id` over a Stream that is already open. May be called
+     * again: a request under way is dropped; the unit keeps its tables and functions.
      *
      * @param id      1 to 247
      * @param stream  must outlive its use here
-     * @param baud    bits per second, for t3.5; 0: untold, 4 ms
+     * @param baud    bits per second, for t3.5; 0: unknown, 4 ms
      * @return MBM_OK; MBM_BUSY, with nothing changed, from within a hook or function
      *         of this server
      */
     uint8_t begin(uint8_t id, Stream &stream, uint32_t baud = 0)
     {
-        return named(id, beginRtu(*this, 1, stream, baud));
+        return withId(id, beginRtu(*this, 1, stream, baud));
     }
 
-    /** As begin, for all units of an array, which answer in place of this one. */
+    /** As begin, for all units of an array, which answer instead of this one. */
     template <size_t N> uint8_t begin(ModbusUnit (&units)[N], Stream &stream, uint32_t baud = 0)
     {
         static_assert(N <= 247, "a line has 247 units");
         return beginRtu(units[0], N, stream, baud);
     }
 
-    /** As begin, with ASCII in place of RTU; a frame needs twice the bytes and 1. */
+    /** As begin, with ASCII instead of RTU; a frame takes twice as many bytes and 1. */
     uint8_t beginAscii(uint8_t id, Stream &stream)
     {
-        return named(id, listen(mbm_server_beginAscii, *this, 1, stream));
+        return withId(id, listen(mbm_server_beginAscii, *this, 1, stream));
     }
 
     /** As beginAscii, for all units of an array. */
@@ -192,9 +191,8 @@ public:
     }
 
     /**
-     * Moves the server on: takes bytes in, carries a request out once it is
-     * whole, sends the response. While a response leaves, the Stream is waited
-     * for: until it has taken and flushed all bytes.
+     * Receives bytes, executes a complete request and sends the response. It waits
+     * in one case: until the Stream has taken and flushed the bytes of a response.
      *
      * @return MBM_OK; MBM_NOT_INITIALISED before begin; MBM_BUSY from within a hook
      *         or function of this server
@@ -202,31 +200,30 @@ public:
     uint8_t poll() { return mbm_server_poll(&state.server); }
 
     /**
-     * How long poll will find nothing to do unless a byte arrives: microseconds,
-     * 0 for now, 0xFFFFFFFF until a byte arrives; 1000 while a function of yours is
-     * not done.
+     * How many microseconds poll has nothing to do unless a byte arrives: 0 for now,
+     * 0xFFFFFFFF until a byte arrives, 1000 while a function of yours is pending.
      */
     uint32_t pollDelay() const { return mbm_server_pollDelay(&state.server); }
 
-    /** Called before a response is written (RS-485 driver on); nullptr for none. */
+    /** Sets a callback before each response (RS-485 driver on); nullptr for none. */
     void preTransmission(void (*callback)()) { set(state.onPre, callback); }
-    /** As preTransmission(callback), which is handed `context`. */
+    /** As preTransmission(callback), with `context` as its argument. */
     void preTransmission(void (*callback)(void *), void *context)
     {
         set(state.onPre, callback, context);
     }
 
-    /** Called once a response has left (RS-485 driver off); nullptr for none. */
+    /** Sets a callback after the last bit of each response (RS-485 driver off); nullptr for none. */
     void postTransmission(void (*callback)()) { set(state.onPost, callback); }
-    /** As postTransmission(callback), which is handed `context`. */
+    /** As postTransmission(callback), with `context` as its argument. */
     void postTransmission(void (*callback)(void *), void *context)
     {
         set(state.onPost, callback, context);
     }
 
     /**
-     * Tells bits per second, for t3.5; 0: untold, 4 ms. Sets nothing on the Stream.
-     * Without effect before begin and after beginAscii, where t3.5 ends no frame.
+     * Bits per second, from which t3.5 follows; 0: unknown, 4 ms. The Stream stays as it
+     * is. It has no effect before begin, and after beginAscii, because ASCII has no t3.5.
      */
     void setBaudRate(uint32_t baud)
     {
@@ -235,10 +232,10 @@ public:
         setSilence(baud == 0 ? 4000 : baud > 19200 ? 1750 : 38500000 / baud + 1);
     }
     /**
-     * Microseconds of silence before a response, in place of t3.5; of RTU, after
-     * begin. After half of it, which is more than the t1.5 that a frame may pause
-     * (serial line guide V1.02, 2.5.1.1), a request is carried out, so that
-     * the response is ready in time.
+     * Microseconds of silence before a response, instead of t3.5 (RTU only; call it
+     * after begin). The server executes a request after half of that time, so that the
+     * response is ready in time. Half of t3.5 is more than t1.5, the longest pause inside
+     * a frame (serial line guide V1.02, 2.5.1.1).
      */
     void setSilence(uint32_t us)
     {
@@ -246,13 +243,13 @@ public:
             state.silence = us;
     }
 
-    /** Drops the response itself where the receiver hears the driver; of RTU, after begin. */
+    /** Discards the local echo, if the receiver receives what the driver sends (RTU only; call it after begin). */
     void setEchoDiscard(bool on) { mbm_server_setEchoDiscard(&state.server, on); }
 
 private:
     static_assert(MODBUSSERVER_FRAME_BYTES >= 32 && MODBUSSERVER_FRAME_BYTES <= 256,
                   "MODBUSSERVER_FRAME_BYTES is 32 to 256");
-    static_assert(sizeof(ModbusUnit) == sizeof(mbm_unit), "an array of one is one of the other");
+    static_assert(sizeof(ModbusUnit) == sizeof(mbm_unit), "an array of ModbusUnit is an array of mbm_unit");
 
     enum : uint8_t { shortWait = 100 }; // microseconds
 
@@ -261,12 +258,12 @@ private:
         void *context;
     };
 
-    // The hooks' context: what they use comes first, as in ModbusMaster.
+    // The hooks' context. The members that they use come first, as in ModbusMaster.
     struct State {
         Stream *stream;
         Callback onPre;
         Callback onPost;
-        uint32_t heard; // when the last byte was seen
+        uint32_t receivedAt; // microseconds: when the last byte was read
         uint32_t silence;
         bool ready; // a response waits for the silence to end
         bool rtu;
@@ -276,10 +273,10 @@ private:
 
     State state;
 
-    static State &of(void *context) { return *static_cast<State *>(context); }
+    static State &stateOf(void *context) { return *static_cast<State *>(context); }
 
-    uint8_t listen(uint8_t (*how)(mbm_server *, const mbm_port *, mbm_unit *, uint8_t, uint8_t *,
-                                  uint16_t),
+    uint8_t listen(uint8_t (*beginFraming)(mbm_server *, const mbm_port *, mbm_unit *, uint8_t,
+                                         uint8_t *, uint16_t),
                    ModbusUnit &first, uint8_t count, Stream &stream)
     {
         mbm_port port;
@@ -291,7 +288,7 @@ private:
         port.preTransmission = preHook;
         port.postTransmission = postHook;
         port.idle = nullptr;
-        uint8_t status = how(&state.server, &port, &first.unit, count, state.frame,
+        uint8_t status = beginFraming(&state.server, &port, &first.unit, count, state.frame,
                              MODBUSSERVER_FRAME_BYTES);
         if (status == MBM_OK) {
             state.stream = &stream;
@@ -310,14 +307,14 @@ private:
         }
         return status;
     }
-    uint8_t named(uint8_t id, uint8_t status)
+    uint8_t withId(uint8_t id, uint8_t status)
     {
         if (status == MBM_OK)
             setUnitID(id);
         return status;
     }
 
-    static void plain(void *callback) { reinterpret_cast<void (*)()>(callback)(); }
+    static void withoutContext(void *callback) { reinterpret_cast<void (*)()>(callback)(); }
 
     static void set(Callback &callback, void (*function)(void *), void *context)
     {
@@ -326,7 +323,7 @@ private:
     }
     static void set(Callback &callback, void (*function)())
     {
-        set(callback, function != nullptr ? plain : nullptr, reinterpret_cast<void *>(function));
+        set(callback, function != nullptr ? withoutContext : nullptr, reinterpret_cast<void *>(function));
     }
     static void call(const Callback &callback)
     {
@@ -336,27 +333,27 @@ private:
 
     static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)
     {
-        Stream &stream = *of(context).stream;
-        uint16_t room = capacity;
-        for (; room > 0 && stream.available() > 0; room--)
+        Stream &stream = *stateOf(context).stream;
+        uint16_t left = capacity;
+        for (; left > 0 && stream.available() > 0; left--)
             *bytes++ = static_cast<uint8_t>(stream.read());
-        if (room != capacity)
-            of(context).heard = clockHook(context);
-        return static_cast<int16_t>(capacity - room);
+        if (left != capacity)
+            stateOf(context).receivedAt = clockHook(context);
+        return static_cast<int16_t>(capacity - left);
     }
     static int16_t writeHook(void *context, const uint8_t *bytes, uint16_t length)
     {
-        State &state = of(context);
+        State &state = stateOf(context);
         if (state.ready) {
-            // The last of it is waited for here: loop may take longer.
-            if (clockHook(context) - state.heard + shortWait < state.silence)
+            // Waits here for the last 100 us of the silence, because loop may take longer.
+            if (clockHook(context) - state.receivedAt + shortWait < state.silence)
                 return 0;
-            while (clockHook(context) - state.heard < state.silence) {
+            while (clockHook(context) - state.receivedAt < state.silence) {
             }
             state.ready = false;
             call(state.onPre);
         }
-        // One by one, whatever it returns: some Streams return 0 for a byte that they send.
+        // Byte by byte, and the result is ignored: some Streams return 0 for a byte that they send.
         for (uint16_t i = 0; i < length; i++)
             state.stream->write(bytes[i]);
         return static_cast<int16_t>(length);
@@ -364,12 +361,12 @@ private:
     static uint32_t clockHook(void *) { return micros() & 0xFFFFFFFFu; }
     static uint8_t flushHook(void *context)
     {
-        of(context).stream->flush();
+        stateOf(context).stream->flush();
         return 1;
     }
     // The driver stays off until the silence has passed.
-    static void preHook(void *context) { of(context).ready = true; }
-    static void postHook(void *context) { call(of(context).onPost); }
+    static void preHook(void *context) { stateOf(context).ready = true; }
+    static void postHook(void *context) { call(stateOf(context).onPost); }
 };
 
 #endif

@@ -1,6 +1,6 @@
 /**
  * @file ModbusServerTables.h
- * @brief What a ModbusServer serves: registers, bits and functions of a sketch.
+ * @brief Registers, bits and functions that a ModbusServer serves.
  *
  * Licence: MIT OR Apache-2.0. Included by ModbusServer.h.
  */
@@ -14,10 +14,10 @@
 #include "mbm.h"
 
 /**
- * What both kinds of table have in common.
+ * The members that ModbusRegisters and ModbusBits share. A cell is a register or a bit.
  *
- * Hooks are told the address on the wire of the first cell and how many there
- * are. They may read this table's cells, and leave changes of them to loop.
+ * A hook gets the address on the wire of the first cell and the number of cells. It
+ * may read this table's cells; change them in loop, not in a hook.
  */
 template <typename Table> class ModbusTable {
 public:
@@ -25,33 +25,33 @@ public:
     ModbusTable &operator=(const ModbusTable &) = delete;
 
     /**
-     * Asked before cells are written, once a request: `data` are the new values,
-     * of registers high bytes first, of bits lowest bit first. Returns 0, or an
-     * exception code that refuses the whole request. nullptr for none.
+     * Sets a hook that is called once before a request writes cells. `data` are the new
+     * values: registers with the high byte first, bits with the lowest bit first. The hook
+     * returns 0, or an exception code that refuses the whole request. nullptr for none.
      */
     void beforeWrite(uint8_t (*hook)(uint16_t address, uint16_t quantity, const uint8_t *data))
     {
         onBefore = hook;
         table.before = hook != nullptr ? beforeHook : nullptr;
     }
-    /** Told what was written; nullptr for none. */
+    /** Sets a hook that is called after a request has written cells; nullptr for none. */
     void afterWrite(void (*hook)(uint16_t address, uint16_t quantity))
     {
         onAfter = hook;
         table.after = hook != nullptr ? afterHook : nullptr;
     }
     /**
-     * Which cells are there: a bit for each, lowest bit of the first byte first.
-     * Others are answered with exception 02. nullptr: all are.
+     * Says which cells exist: one bit for each, lowest bit of the first byte first.
+     * A request for another cell is answered with exception 02. nullptr: all exist.
      */
     void setValid(const uint8_t *bits) { table.valid = bits; }
     /** The address of the first cell. */
     uint16_t address() const { return table.base; }
-    /** How many cells there are. */
+    /** How many cells the table has. */
     uint16_t size() const { return table.size; }
 
 protected:
-    /** @cond what the two kinds use */
+    /** @cond for ModbusRegisters and ModbusBits */
     ModbusTable(uint16_t size, uint16_t address) : table(), onBefore(), onAfter()
     {
         table.context = this;
@@ -68,7 +68,7 @@ private:
     uint8_t (*onBefore)(uint16_t, uint16_t, const uint8_t *);
     void (*onAfter)(uint16_t, uint16_t);
 
-    Table *use() { return &table; }
+    Table *record() { return &table; }
 
     static uint8_t beforeHook(void *context, uint16_t address, uint16_t quantity,
                               const uint8_t *data)
@@ -131,10 +131,10 @@ public:
     }
 };
 
-/** Registers with storage of their own, all 0 at first. */
+/** Registers with their own storage, all 0 at first. */
 template <uint16_t Quantity> class ModbusRegisterArray : public ModbusRegisters {
 public:
-    /** The first stands at `address`. */
+    /** The first one has this address. */
     ModbusRegisterArray(uint16_t address = 0)
         : ModbusRegisters(storage, Quantity, address), storage()
     {
@@ -144,10 +144,10 @@ private:
     uint16_t storage[Quantity];
 };
 
-/** Bits with storage of their own, all 0 at first. */
+/** Bits with their own storage, all 0 at first. */
 template <uint16_t Quantity> class ModbusBitArray : public ModbusBits {
 public:
-    /** The first stands at `address`. */
+    /** The first one has this address. */
     ModbusBitArray(uint16_t address = 0) : ModbusBits(storage, Quantity, address), storage() {}
 
 private:
@@ -159,7 +159,7 @@ class ModbusFunction {
 public:
     /**
      * @param code     1 to 127, of which 65 to 72 and 100 to 110 are left to
-     *                 users; 0 is every function that nothing before it serves
+     *                 users; 0 is every function that no object before it serves
      * @param handler  writes the data of the response, at most `capacity` bytes, and
      *                 returns how many; or MBM_REPLY_EXCEPTION | code,
      *                 MBM_REPLY_NONE, MBM_REPLY_PENDING to be called again
@@ -181,7 +181,7 @@ private:
     mbm_custom custom;
     uint16_t (*handle)(const mbm_request &, uint8_t *, uint16_t);
 
-    mbm_custom *use() { return &custom; }
+    mbm_custom *record() { return &custom; }
 
     static uint16_t serveHook(void *context, const mbm_request *request, uint8_t *response,
                               uint16_t capacity)

@@ -1,6 +1,6 @@
 /**
  * @file ModbusSniffer.h
- * @brief Prints what others say on a serial line, for Arduino sketches.
+ * @brief Prints the frames of a serial line, for Arduino sketches.
  *
  * Licence: MIT OR Apache-2.0. Header-only, C++11, no heap.
  *
@@ -19,10 +19,10 @@
  *     120 ms unit 17 request 03 read holding registers 107..109
  *     129 ms unit 17 reply 03 read holding registers 107..109: 555 0 100 (9 ms)
  *
- * A macro that may be defined before this file is included, alike in every file of a
- * program:
+ * A macro that may be defined before this file is included, the same in every file
+ * of a program:
  * - MODBUSSNIFFER_BUFFER_BYTES  bytes of its buffer, 32 to 32767; 256, which hold any RTU
- *   frame. 513 hold any frame of ASCII. A longer frame is noise.
+ *   frame. 513 hold any ASCII frame. A longer frame is reported as noise.
  */
 
 #ifndef MODBUSSNIFFER_H
@@ -43,11 +43,12 @@
 /** @endcond */
 
 /**
- * Listens to a line: finds frames, and pairs requests with replies. It takes about 690
- * bytes of RAM beside its buffer on AVR.
+ * Receives the bytes of a line, finds the frames, and pairs requests with replies. On AVR it
+ * takes about 700 bytes of RAM beside its buffer, and a sketch with it about 40 KB of flash:
+ * a Mega has them, an Uno does not.
  *
  * Call poll in loop, more often than the Stream's buffer fills: 64 bytes take 33 ms at
- * 19200 baud. What is printed takes time too: give the Print more baud than the line has.
+ * 19200 baud. Printing takes time too: give the Print a higher rate than the line.
  */
 class ModbusSniffer {
 public:
@@ -57,17 +58,17 @@ public:
     ModbusSniffer &operator=(const ModbusSniffer &) = delete;
 
     /**
-     * Listens to RTU frames of a Stream that is open already. May be called again: what
-     * was received is forgotten, settings are as at first.
+     * Receives RTU frames from a Stream that is already open. May be called again: it drops
+     * received bytes and sets all settings to their defaults.
      *
      * @param line  must outlive its use here; nothing is written to it
-     * @param baud  bits per second, for the silence between frames; 0: untold, 4 ms
+     * @param baud  bits per second, for the silence between frames; 0: unknown, 4 ms
      * @return MBM_OK
      */
     uint8_t begin(Stream &line, uint32_t baud = 0)
     {
         const uint8_t status =
-            listen(line, mbm_sniffer_beginRtu(&sniffer, buffer, MODBUSSNIFFER_BUFFER_BYTES));
+            attach(line, mbm_sniffer_beginRtu(&sniffer, buffer, MODBUSSNIFFER_BUFFER_BYTES));
         if (status == MBM_OK && baud != 0)
             mbm_sniffer_setBaudRate(&sniffer, baud);
         return status;
@@ -75,7 +76,7 @@ public:
     /** As begin, for ASCII frames. */
     uint8_t beginAscii(Stream &line)
     {
-        return listen(line, mbm_sniffer_beginAscii(&sniffer, buffer, MODBUSSNIFFER_BUFFER_BYTES));
+        return attach(line, mbm_sniffer_beginAscii(&sniffer, buffer, MODBUSSNIFFER_BUFFER_BYTES));
     }
 
     /** Prints each event as a line; see modbusPrintEvent. */
@@ -84,8 +85,8 @@ public:
     void printNothing() { out = nullptr; }
 
     /**
-     * Sets what each event is handed to: a function, or a lambda with captures that
-     * MODBUS_CAPTURE_BYTES hold; nullptr for none. The event is valid during the call.
+     * Sets a callback for each event: a function, or a lambda whose captures take at most
+     * MODBUS_CAPTURE_BYTES; nullptr for none. The event is valid during the call.
      */
     template <typename Function> void onEvent(const Function &function) { callback.set(function); }
     /** @copydoc onEvent */
@@ -100,7 +101,7 @@ public:
     uint8_t setFrameTimeout(uint16_t ms) { return mbm_sniffer_setFrameTimeout(&sniffer, ms); }
 
     /**
-     * Takes the bytes that have arrived, and prints and hands over what is known by now.
+     * Reads the bytes that have arrived, prints new events and calls the callback for each.
      * Before begin it does nothing.
      */
     void poll()
@@ -134,7 +135,7 @@ private:
     mbm_sniffer sniffer;
     uint8_t buffer[MODBUSSNIFFER_BUFFER_BYTES];
 
-    uint8_t listen(Stream &line, uint8_t status)
+    uint8_t attach(Stream &line, uint8_t status)
     {
         if (status == MBM_OK)
             stream = &line;

@@ -1,6 +1,6 @@
 /**
  * @file ModbusSnifferText.h
- * @brief An event of a ModbusSniffer as a line of text, whose words stay in flash.
+ * @brief Prints an event of a ModbusSniffer as a line of text. The words stay in flash.
  *
  * Licence: MIT OR Apache-2.0. Included by ModbusSniffer.h.
  */
@@ -71,7 +71,7 @@ inline void modbusPrintBits(Print &out, const mbm_event &event)
     }
 }
 
-// What a request carries to a device, or a reply from it.
+// The values in a request or in a reply.
 inline void modbusPrintValues(Print &out, const mbm_event &event)
 {
     const mbm_packet &packet = event.packet;
@@ -113,7 +113,7 @@ inline void modbusPrintValues(Print &out, const mbm_event &event)
     }
 }
 
-// Function code, its name, and the cells that it is about.
+// The function code, its name, and the addresses of the request.
 inline void modbusPrintFunction(Print &out, const mbm_event &event)
 {
     modbusPrintHex(out, event.function);
@@ -130,9 +130,9 @@ inline void modbusPrintFunction(Print &out, const mbm_event &event)
 /** @endcond */
 
 /**
- * Prints an event as a line: the time in milliseconds, the unit, what it is, the function
- * and the cells it is about, the values of registers in decimal and of coils as 0 and 1,
- * and the time that a reply took. Of frames that are damaged, and of noise, the bytes.
+ * Prints an event as a line: the time in milliseconds, the unit, the kind of event, the
+ * function and its addresses, registers in decimal, coils as 0 and 1, and the response time
+ * in milliseconds. For damaged frames and noise it prints the bytes.
  */
 inline void modbusPrintEvent(Print &out, const mbm_event &event)
 {

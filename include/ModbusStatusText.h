@@ -1,6 +1,6 @@
 /**
  * @file ModbusStatusText.h
- * @brief What a status means, in words that stay in flash.
+ * @brief The text of each status. The texts stay in flash.
  *
  * Licence: MIT OR Apache-2.0. Included by ModbusMaster.h and ModbusServer.h.
  */
@@ -14,8 +14,8 @@
 #include "mbm.h"
 
 /**
- * What mbm_status_text says, for Serial.println. That takes a kilobyte of RAM on an
- * AVR board, and this none; a sketch that does not call it is not a byte larger.
+ * The texts of mbm_status_text, for Serial.println. mbm_status_text takes a kilobyte of RAM
+ * on an AVR board, this function none. A sketch that does not call it is not larger.
  *
  * @param status  any number
  * @return a constant text

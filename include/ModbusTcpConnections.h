@@ -1,6 +1,6 @@
 /**
  * @file ModbusTcpConnections.h
- * @brief The connections of a TCP server or gateway: accepts, polls and closes them.
+ * @brief Accepts, polls and closes the connections of a TCP server or gateway.
  *
  * Licence: MIT OR Apache-2.0. Included by ModbusTcpServer.h and ModbusTcpGateway.h, whose
  * heads explain the macros.
@@ -38,7 +38,7 @@ public:
     ModbusTcpConnections(const ModbusTcpConnections &) = delete;
     ModbusTcpConnections &operator=(const ModbusTcpConnections &) = delete;
 
-    /** How many connections there are, 0 to `Connections`. */
+    /** How many clients are connected, 0 to `Connections`. */
     uint8_t connections() const
     {
         uint8_t taken = 0;
@@ -48,13 +48,13 @@ public:
     }
 
 protected:
-    /** @cond for the classes that serve */
+    /** @cond for ModbusTcpServer and ModbusTcpGateway */
     ModbusTcpConnections() : polling(), source(), places() {}
 
-    // True within poll, whose hooks can call neither poll nor begin.
+    // True within poll: hooks then get MBM_BUSY from poll and begin.
     bool polling;
 
-    // Closes what there is, and takes connections of another listener.
+    // Closes all connections, and accepts those of another listener from now on.
     void listen(Listener &server)
     {
         for (uint8_t i = 0; i < Connections; i++)
@@ -63,8 +63,8 @@ protected:
         source = &server;
     }
 
-    // Takes new connections, and moves each on.
-    uint8_t move()
+    // Polls the server of each connection, and accepts a new one.
+    uint8_t pollAll()
     {
         if (source == nullptr)
             return MBM_NOT_INITIALISED;
@@ -78,25 +78,25 @@ protected:
             if (status == MBM_LINK_LOST || status == MBM_MALFORMED_FRAME)
                 close(i);
         }
-        take(0);
+        acceptNext(0);
         polling = false;
         return MBM_OK;
     }
 
-    // The connection `index` is in use: it is not idle.
-    void use(uint8_t index) { places[index].used = clock(); }
+    // Marks the connection `index` as not idle.
+    void markUsed(uint8_t index) { places[index].used = clock(); }
     /** @endcond */
 
 private:
     static_assert(Connections >= 1 && Connections <= 16, "a server keeps 1 to 16 connections");
 
-    // The class of a connection. Never called.
+    // Declares the class of a connection. Never called.
     static Listener &someListener();
     typedef decltype(someListener().available()) Link;
 
     struct Place {
         Link link;
-        uint32_t used; // milliseconds: when the last bytes were taken
+        uint32_t used; // milliseconds: when the last bytes were received
         bool taken;
         mbm_server server;
         uint8_t frame[FrameBytes];
@@ -116,8 +116,8 @@ private:
         static_cast<Derived *>(this)->closed(index);
     }
 
-    // accept hands each connection over once. Where a library lacks it, available does
-    // so, or hands over any connection from which bytes wait.
+    // accept returns each connection once. If a library lacks it, available returns each
+    // connection once, or any connection that has bytes to read.
     template <typename Server> static auto next(Server &server, int) -> decltype(server.accept())
     {
         return server.accept();
@@ -128,16 +128,16 @@ private:
         return server.available();
     }
     template <typename Server>
-    static auto known(Server &server, Place &, Link &, int) -> decltype(server.accept(), false)
+    static auto isKnown(Server &server, Place &, Link &, int) -> decltype(server.accept(), false)
     {
         return false;
     }
-    template <typename Server> static bool known(Server &, Place &place, Link &link, long)
+    template <typename Server> static bool isKnown(Server &, Place &place, Link &link, long)
     {
         return place.taken && place.link.operator==(link);
     }
 
-    void take(int order)
+    void acceptNext(int order)
     {
         Link link = next(*source, order);
         if (!link)
@@ -146,7 +146,7 @@ private:
         uint8_t chosen = 0;
         for (uint8_t i = 0; i < Connections; i++) {
             const Place &place = places[i], &best = places[chosen];
-            if (known(*source, places[i], link, order))
+            if (isKnown(*source, places[i], link, order))
                 return;
             if (best.taken && (!place.taken || now - place.used > now - best.used))
                 chosen = i;

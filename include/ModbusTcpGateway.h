@@ -1,6 +1,6 @@
 /**
  * @file ModbusTcpGateway.h
- * @brief A gateway for Arduino sketches: Modbus TCP comes in, a serial line goes out.
+ * @brief A gateway for Arduino sketches: from Modbus TCP clients to a serial line.
  *
  * Licence: MIT OR Apache-2.0. Header-only, C++11, no heap.
  *
@@ -19,7 +19,7 @@
  *     void loop() { gateway.poll(); }
  *
  * The macros MODBUSSERVER_CONNECTIONS and MODBUSSERVER_IDLE_MS are explained in
- * ModbusTcpServer.h. Each connection takes about 970 bytes on AVR, 1080 elsewhere: four want a
+ * ModbusTcpServer.h. Each connection takes about 970 bytes on AVR, 1080 elsewhere: four need a
  * board with 8 KB of RAM or more.
  */
 
@@ -37,13 +37,13 @@
  * Passes requests of up to `Connections` TCP clients on to the devices of one line, and
  * the replies back, of any function. Each client has one request under way.
  *
- * Where there is no reply to pass on, the gateway answers itself (V1.1b3, 7): 0A for a
- * unit that the line does not have, a line that takes no bytes, or one with as many
- * requests as it holds; 0B for a device that does not reply, or whose reply is damaged or
- * does not answer the request; 02 and 03 for a request that the standard does not allow.
+ * Without a reply of a device, the gateway answers with an exception (V1.1b3, 7): 0A for a
+ * unit that the line does not have, or if the line takes no bytes or its queue is full; 0B if
+ * the device does not reply, or its reply is damaged or does not answer the request; 02 and
+ * 03 for a request that the standard does not allow.
  *
- * Clients should wait longer than the line's response timeout. The sketch may have
- * requests of its own on the line. Use an object from one thread.
+ * Clients should wait longer than the line's response timeout. The sketch may send
+ * its own requests on the line. Use an object from one thread.
  */
 template <typename Listener, uint8_t Connections = MODBUSSERVER_CONNECTIONS>
 class ModbusTcpGateway
@@ -54,14 +54,14 @@ public:
     ModbusTcpGateway() : line(), lowest(), highest(), passages() {}
 
     /**
-     * Passes requests of a listener's clients on. Closes the connections that there are.
+     * Passes on the requests of a listener's clients. Closes all connections.
      *
      * @param listener  must outlive its use here; the sketch has called its begin or will
      * @param devices   the line, begun by the sketch; must outlive its use here
      * @param first     the lowest unit id of the line, 1 to 247
      * @param last      the highest
      * @return MBM_OK; MBM_BUSY, with nothing changed, from within a callback;
-     *         MBM_INVALID_ARGUMENT for units that are none
+     *         MBM_INVALID_ARGUMENT for unit ids out of range
      */
     uint8_t begin(Listener &listener, ModbusClient &devices, uint8_t first = 1,
                   uint8_t last = 247)
@@ -78,7 +78,7 @@ public:
     }
 
     /**
-     * Moves connections and the line on, without waiting; this polls the line too.
+     * Continues all connections and polls the line, without waiting.
      *
      * @return MBM_OK; MBM_NOT_INITIALISED before begin; MBM_BUSY from within a callback
      */
@@ -86,7 +86,7 @@ public:
     {
         if (line != nullptr && !this->polling)
             line->poll();
-        return this->move();
+        return this->pollAll();
     }
 
 private:
@@ -97,15 +97,15 @@ private:
         noReply = MBM_REPLY_EXCEPTION | MBM_GATEWAY_TARGET_FAILED_TO_RESPOND
     };
 
-    // What a connection has asked a device; its one unit is every unit.
+    // The request of one connection to a device. `unit` answers for every unit id.
     struct Passage {
         ModbusTcpGateway *gateway;
-        bool asked;
+        bool sent;
         mbm_unit unit;
         mbm_custom every;
         ModbusRequestOf<126> request;
 
-        Passage() : gateway(), asked(), unit(), every(), request(1) {}
+        Passage() : gateway(), sent(), unit(), every(), request(1) {}
     };
 
     ModbusClient *line;
@@ -124,12 +124,12 @@ private:
         mbm_unit_serveCustom(&passage.unit, &passage.every);
         return &passage.unit;
     }
-    // What the client asked is no longer wanted.
+    // Cancels the request of a client whose connection was closed.
     void closed(uint8_t index)
     {
-        if (passages[index].asked)
+        if (passages[index].sent)
             line->cancel(passages[index].request);
-        passages[index].asked = false;
+        passages[index].sent = false;
     }
 
     static uint16_t serveHook(void *context, const mbm_request *request, uint8_t *response,
@@ -139,15 +139,15 @@ private:
         return passage.gateway->pass(passage, *request, response, capacity);
     }
 
-    // Asks the device at first, and is called again until that has replied.
+    // The first call sends the request to the device; later ones wait for its end.
     uint16_t pass(Passage &passage, const mbm_request &request, uint8_t *response,
                   uint16_t capacity)
     {
-        if (passage.asked) {
-            this->use(static_cast<uint8_t>(&passage - passages));
+        if (passage.sent) {
+            this->markUsed(static_cast<uint8_t>(&passage - passages));
             if (passage.request.pending())
                 return MBM_REPLY_PENDING;
-            passage.asked = false;
+            passage.sent = false;
             return outcome(passage.request, request, response, capacity);
         }
         if (request.unit < lowest || request.unit > highest)
@@ -156,7 +156,7 @@ private:
         const uint8_t status =
             line->forward(passage.request, request.function, request.data, request.length);
         switch (status) {
-        case MBM_PENDING: passage.asked = true; return MBM_REPLY_PENDING;
+        case MBM_PENDING: passage.sent = true; return MBM_REPLY_PENDING;
         case MBM_ILLEGAL_FUNCTION:
         case MBM_ILLEGAL_DATA_ADDRESS:
         case MBM_ILLEGAL_DATA_VALUE: return exception(status);

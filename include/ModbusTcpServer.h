@@ -2,8 +2,8 @@
  * @file ModbusTcpServer.h
  * @brief A Modbus TCP server for Arduino sketches, over an Ethernet or WiFi library.
  *
- * Licence: MIT OR Apache-2.0. Header-only, C++11, no heap. What it serves is set as
- * with ModbusServer; several servers may serve the same tables.
+ * Licence: MIT OR Apache-2.0. Header-only, C++11, no heap. Register tables and
+ * functions as with ModbusServer; several servers may serve the same tables.
  *
  *     EthernetServer ethernet(502);
  *     ModbusRegisterArray<2> readings;
@@ -20,10 +20,10 @@
  *       server.poll();
  *     }
  *
- * Macros that may be defined before this file is included, alike in every file of a
- * program:
- * - MODBUSSERVER_CONNECTIONS  how many connections a server keeps where its template
- *   argument does not say so, 1 to 16; 4, on AVR boards of at most 2.5 KB of RAM 2. Each
+ * Macros that may be defined before this file is included, the same in every file
+ * of a program:
+ * - MODBUSSERVER_CONNECTIONS  the connections of a server without that template
+ *   argument, 1 to 16; 4, on AVR boards of at most 2.5 KB of RAM 2. Each
  *   takes a frame buffer of 260 bytes and about 80 more on AVR, 105 elsewhere.
  * - MODBUSSERVER_IDLE_MS  milliseconds without a request after which a connection may be
  *   closed for another client; 60000.
@@ -43,9 +43,9 @@
  * A Modbus TCP server with up to `Connections` clients at once, as one unit or several.
  *
  * `Listener` is the library's server class: EthernetServer, WiFiServer or another with
- * accept() or available(). Where every place is taken, a new client gets that of the
- * connection that has been idle for longest, if for MODBUSSERVER_IDLE_MS at least; else
- * its connection is closed. Requests for unit 0 and 255 are for the first unit.
+ * accept() or available(). If all connections are taken, the server closes the one that
+ * has been idle longest, if it has been idle for MODBUSSERVER_IDLE_MS, and accepts the new
+ * one; else it closes the new one. Requests for unit 0 and 255 are for the first unit.
  *
  * Call poll in loop. Use an object from one thread, never from an interrupt.
  */
@@ -60,9 +60,9 @@ public:
 
     /**
      * Answers as unit `id` to the clients of a listener, whose begin the sketch has called
-     * or will. What is served stays. Closes the connections that there are.
+     * or will. The unit keeps its tables and functions. Closes all connections.
      *
-     * @param id        1 to 247; where clients ask for 0 or 255, it is meant too
+     * @param id        1 to 247; requests for 0 and 255 are for this unit too
      * @param listener  must outlive its use here
      * @return MBM_OK; MBM_BUSY, with nothing changed, from within a hook or function of
      *         this server
@@ -74,7 +74,7 @@ public:
             setUnitID(id);
         return status;
     }
-    /** As begin, for all units of an array, which answer in place of this one. */
+    /** As begin, for all units of an array, which answer instead of this one. */
     template <size_t N> uint8_t begin(ModbusUnit (&units)[N], Listener &listener)
     {
         static_assert(N <= 247, "a server has 247 units");
@@ -82,14 +82,14 @@ public:
     }
 
     /**
-     * Takes new connections, and moves each on: takes bytes in, carries a request out
-     * once it is whole, sends the response. Closes a connection that the client has
-     * closed, or that does not carry Modbus.
+     * Accepts a new connection. Of each connection it receives bytes, executes a complete
+     * request and sends the response. Closes a connection that the client has closed, or
+     * whose bytes are not Modbus TCP.
      *
      * @return MBM_OK; MBM_NOT_INITIALISED before begin; MBM_BUSY from within a hook or
      *         function of this server
      */
-    uint8_t poll() { return this->move(); }
+    uint8_t poll() { return this->pollAll(); }
 
 private:
     template <typename, typename, uint8_t, uint16_t> friend class ModbusTcpConnections;

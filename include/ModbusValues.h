@@ -1,9 +1,9 @@
 /**
  * @file ModbusValues.h
- * @brief Words of a sketch as floats, integers, texts and bits.
+ * @brief Floats, integers, texts and bits in an array of words.
  *
- * Licence: MIT OR Apache-2.0. Included by ModbusClient.h. What a sketch does not call
- * takes no flash.
+ * Licence: MIT OR Apache-2.0. Included by ModbusClient.h. Members that a sketch does not
+ * call take no flash.
  */
 
 #ifndef MODBUSVALUES_H
@@ -19,12 +19,12 @@
  * An array of words, and the values in it. `index` counts words from 0: a float at
  * index 2 is in words 2 and 3.
  *
- * Each value is read in two ways. With a variable behind the index, the result is
- * true, or false with the variable unchanged if the words end before the value does.
- * Without, the value is the result: 0 or NAN if the words end before it does.
+ * There are two ways to read each value. With a variable after the index, the result is
+ * true, or false with the variable unchanged if the value extends past the words.
+ * Without a variable, the result is the value: 0 or NAN past the words.
  *
- * What sets a value returns MBM_OK, or MBM_ILLEGAL_DATA_ADDRESS with nothing set if the
- * words end before the value does.
+ * The members that set a value return MBM_OK, or MBM_ILLEGAL_DATA_ADDRESS with nothing set
+ * if the value extends past the words.
  */
 class ModbusValues {
 public:
@@ -40,7 +40,7 @@ public:
     ModbusValues(const ModbusValues &) = delete;
     ModbusValues &operator=(const ModbusValues &) = delete;
 
-    /** The order of values where a call names none; orderABCD at first. */
+    /** The order of values for calls without an order; orderABCD at first. */
     void setWordOrder(WordOrder order) { view.order = order; }
     /** How many words there are. */
     uint16_t size() const { return view.count; }
@@ -149,7 +149,7 @@ public:
     /**
      * A text, up to its first NUL or the end of its field.
      *
-     * @param index   the word it begins in
+     * @param index   the word in which it begins
      * @param length  bytes of its field, two a word
      * @param text    gets the text and a NUL
      * @param bytes   bytes of `text`: length + 1 are always enough
@@ -204,9 +204,9 @@ public:
         return mbm_registers_setDouble(&view, index, order, &value);
     }
     /**
-     * Sets a text, with NULs behind it up to the end of its field.
+     * Sets a text, padded with NULs to the end of its field.
      *
-     * @param index   the word it begins in
+     * @param index   the word in which it begins
      * @param length  bytes of its field, two a word
      * @param text    ends with a NUL, which the field need not hold
      * @param order   with orderBADC or orderDCBA the low byte of a word comes first
@@ -232,7 +232,7 @@ public:
         return setByte(bit / 8, static_cast<uint8_t>(on ? old | mask : old & ~mask));
     }
     /**
-     * A byte of what transfers bytes, as on the wire: coils, server id, device
+     * A byte as on the wire, for functions that transfer bytes: coils, server id, device
      * identification, functions of yours. 0 past the end of the words.
      */
     uint8_t getByte(uint16_t index) const

@@ -60,6 +60,7 @@ inline void assert_sent(HardwareSerial &port, std::initializer_list<int> values)
 inline int reset_board(void **)
 {
     bench() = Bench();
+    pins() = Pins();
     for (unsigned i = 0; i < 4; i++)
         shimSerial(i).reset();
     return 0;

@@ -2,14 +2,14 @@
  * @file crc16.h
  * @brief crc16_update, for sketches that include util/crc16.h for it.
  *
- * Licence: MIT OR Apache-2.0. avr-libc has a header of this name; where there is one,
- * this header includes it too. Its guard is _UTIL_CRC16_H_, which is not taken here.
+ * Licence: MIT OR Apache-2.0. avr-libc has a header of this name. If it is present,
+ * this header includes it too; so the guard here is not avr-libc's _UTIL_CRC16_H_.
  */
 
 #ifndef MODBUSMASTER_UTIL_CRC16_H
 #define MODBUSMASTER_UTIL_CRC16_H
 
-// So that a pedantic compiler does not warn of include_next.
+// Prevents the warning of pedantic compilers about include_next.
 #if defined(__GNUC__)
 #pragma GCC system_header
 #endif
@@ -22,7 +22,7 @@
 #endif
 #endif
 
-// A C file of another library may mean the header of avr-libc.
+// A C file of another library needs avr-libc's header only.
 #if defined(__cplusplus)
 #include "../ModbusMasterHelpers.h"
 #endif
