@@ -20,7 +20,7 @@ use super::storage::MasterBuffers;
 use core::ffi::c_void;
 use mbm::error::Status;
 use mbm::master::Master;
-use mbm::pdu::query::FunctionSpec;
+use mbm::pdu::master_request::MasterSpec;
 
 /// What lies behind an `mbm_master`.
 #[repr(C)]
@@ -314,13 +314,13 @@ pub unsafe extern "C" fn mbm_master_getExceptionCode(master: *const mbm_master) 
     unsafe { pointers::ask(master, 0, |master| master.core.exception_code()) }
 }
 
-/// Requests a form of an address and a word and, in blocking mode, sees it through.
+/// Requests the function `spec` with an address and a word and, in blocking mode, sees it through.
 ///
 /// # Safety
 /// As for [`pointers::with`].
-unsafe fn call(pointer: *mut mbm_master, address: u16, word: u16, form: FunctionSpec) -> u8 {
+unsafe fn call(pointer: *mut mbm_master, address: u16, word: u16, spec: MasterSpec) -> u8 {
     // SAFETY: as the caller promises.
-    unsafe { request(pointer, |master| master.request(address, word, form)) }
+    unsafe { request(pointer, |master| master.request(address, word, spec)) }
 }
 
 /// Starts a request and, in blocking mode, sees it through.

@@ -3,7 +3,7 @@
 use super::{plain, special};
 use crate::client::{mbm_client, mbm_clientRequest};
 use mbm::error::Status;
-use mbm::pdu::header::FunctionSpec;
+use mbm::pdu::function_spec::FunctionSpec;
 
 /// Function 01: reads coils into `reply`, eight to a byte, the lowest bit first, the
 /// last byte padded with zeros (V1.1b3, 6.1).
