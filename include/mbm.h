@@ -4,29 +4,31 @@
  *
  * Licence: MIT OR Apache-2.0. Generated from the source of mbm; do not edit.
  *
- * Every function: pointers are NULL or valid; NULL is answered with
- * MBM_INVALID_ARGUMENT and an object that was never begun with
- * MBM_NOT_INITIALISED, never with a crash. Objects are the caller's storage,
- * zero before first use, with no heap and no globals behind them. Nothing is
- * re-entrant on one object, and nothing may be called from an interrupt unless
- * its comment says so; any number of objects may be used side by side, each
- * from one thread. Each begin function may be called again at any time, but not
- * from a hook of the object: what was pending is given up, requests with the
- * status MBM_CANCELLED. "V1.1b3" is the Modbus application protocol, "serial line
- * guide V1.02" the guide for RTU and ASCII.
+ * Rules of every function:
+ * - A pointer is NULL or valid. For NULL a function returns MBM_INVALID_ARGUMENT, for an
+ *   object that was never begun MBM_NOT_INITIALISED. It never crashes.
+ * - Objects are your storage. Zero it before first use. The library uses no heap and no
+ *   global variables.
+ * - No function is re-entrant on one object. Call no function from an interrupt unless its
+ *   comment allows it. You may use any number of objects side by side, each from one thread.
+ * - You may call a begin function again at any time, but not from a hook of the object. The
+ *   object then gives up what was pending; requests get the status MBM_CANCELLED.
+ *
+ * "V1.1b3" is the Modbus application protocol specification, "serial line guide V1.02" the
+ * guide for RTU and ASCII.
  *
  * Contents:
  *    1 Version                 of this header and of the archive
- *    2 Statuses                what functions return
+ *    2 Statuses                the codes that functions return
  *    3 Port                    your line: read, write, clock, driver; counters
- *    4 Functions and framings  codes, limits, rules of length; RTU, ASCII, TCP
+ *    4 Functions and framings  codes, limits, length rules; RTU, ASCII, TCP
  *    5 Master                  RTU, one request at a time, blocking or not
  *    6 Client                  many requests, every framing, never waits
  *    7 Server                  answers requests on a line or connection
- *    8 Units                   what servers serve: tables, callbacks, files
+ *    8 Units                   the data that servers serve: tables, callbacks, files
  *    9 Values                  registers and bits as numbers, in words or bytes
  *   10 Packets                 requests and responses, built and parsed by hand
- *   11 Sniffer                 listens on a bus that others use
+ *   11 Sniffer                 decodes the traffic between other devices
  *   12 Ring                    bytes from an interrupt to the main loop
  */
 
@@ -36,14 +38,14 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/** Version of this header as a text, "0.2.0" for example; mbm_version is that of the archive. */
+/** Version of this header as a text, for example "0.2.0". mbm_version returns that of the archive. */
 #define MBM_VERSION MBM_VERSION_OF(MBM_VERSION_MAJOR, MBM_VERSION_MINOR, MBM_VERSION_PATCH)
 /** Private: expands the numbers. */
 #define MBM_VERSION_OF(major, minor, patch) MBM_VERSION_TEXT(major, minor, patch)
 /** Private: makes a text of the numbers. */
 #define MBM_VERSION_TEXT(major, minor, patch) #major "." #minor "." #patch
 
-/** Bytes of a frame buffer for any request and reply of so many words. */
+/** Bytes of a frame buffer that suffices for every request and reply with `words` words. */
 #define MBM_FRAME_BYTES(words) (2u * (words) + 13u)
 
 #if defined(__AVR__) && __SIZEOF_DOUBLE__ != 4
@@ -78,7 +80,8 @@ struct mbm_unit;
 #define MBM_VERSION_PATCH 0
 
 /**
- * The version of the archive. It is MBM_VERSION if program and archive belong together.
+ * Returns the version of the archive. The text equals MBM_VERSION, the version of the
+ * header, if header and archive belong together.
  *
  * Any thread or interrupt may call it.
  *
@@ -94,84 +97,84 @@ const char *mbm_version(void);
 #define MBM_OK 0
 
 /**
- * Exception of the device: it does not know the function.
+ * Exception of the device: it does not support the function.
  */
 #define MBM_ILLEGAL_FUNCTION 1
 
 /**
- * Exception of the device: it has no such address. Also, with nothing sent,
- * for a range that passes address 65535.
+ * Exception of the device: it has no such address. This library also returns it, and sends
+ * nothing, for a range that passes address 65535.
  */
 #define MBM_ILLEGAL_DATA_ADDRESS 2
 
 /**
- * Exception of the device: it refuses the quantity or value. Also, with
- * nothing sent, for a quantity that the standard forbids, and for writes of
- * more than the transmit buffer holds.
+ * Exception of the device: it refuses the quantity or value. This library also returns it,
+ * and sends nothing, for a quantity that the standard forbids, and for a write of more than
+ * the transmit buffer holds.
  */
 #define MBM_ILLEGAL_DATA_VALUE 3
 
 /**
- * Exception of the device: it failed while it carried the request out.
+ * Exception of the device: it failed while it executed the request.
  */
 #define MBM_SLAVE_DEVICE_FAILURE 4
 
 /**
- * Exception of the device: accepted, but it takes long.
+ * Exception of the device: it accepted the request and needs a long time for it.
  */
 #define MBM_ACKNOWLEDGE 5
 
 /**
- * Exception of the device: busy, ask again later.
+ * Exception of the device: it is busy. Send the request again later.
  */
 #define MBM_SLAVE_DEVICE_BUSY 6
 
 /**
- * Exception of the device: a file's memory is inconsistent.
+ * Exception of the device: the memory of a file failed its consistency check.
  */
 #define MBM_MEMORY_PARITY_ERROR 8
 
 /**
- * Exception of a gateway: no path to the device.
+ * Exception of a gateway: it has no path to the device.
  */
 #define MBM_GATEWAY_PATH_UNAVAILABLE 10
 
 /**
- * Exception of a gateway: the device behind it did not answer.
+ * Exception of a gateway: it received no response from the device.
  */
 #define MBM_GATEWAY_TARGET_FAILED_TO_RESPOND 11
 
 /**
- * Within the response timeout only frames of other units arrived.
+ * Only frames of other units arrived within the response timeout.
  */
 #define MBM_INVALID_SLAVE_ID 224
 
 /**
- * Within the response timeout the unit answered, but to another function.
+ * The unit sent a reply to another function, and no other reply arrived within the
+ * response timeout.
  */
 #define MBM_INVALID_FUNCTION 225
 
 /**
- * No complete reply within the response timeout.
+ * No complete reply arrived within the response timeout.
  */
 #define MBM_RESPONSE_TIMED_OUT 226
 
 /**
- * The reply arrived damaged: its CRC is wrong.
+ * The CRC of the reply, or in ASCII its LRC, is wrong.
  */
 #define MBM_INVALID_CRC 227
 
 /**
- * An argument that the function cannot take: NULL, a number out of range, a port
- * without read, write or micros, a buffer that is too short, or an object of
- * another framing or kind. The comment of the function says which. Nothing was
- * changed.
+ * The function cannot accept an argument: NULL, a number out of range, a port without
+ * read, write or micros, a buffer that is too short, or an object of another framing or
+ * kind. The comment of the function says which. The call changed nothing.
  */
 #define MBM_INVALID_ARGUMENT 228
 
 /**
- * The unit answered the function with a right CRC, but not this request:
- * wrong byte count, wrong echo, or an exception code of 0 or from 0x80.
+ * The unit sent a reply of this function with a right CRC, but the reply does not match the
+ * request: a wrong byte count, a wrong echo, or an exception code of 0 or from 0x80.
  */
 #define MBM_MALFORMED_REPLY 229
 
@@ -181,21 +184,21 @@ const char *mbm_version(void);
 #define MBM_LINK_LOST 230
 
 /**
- * The object is in use: it has a request under way, it called the hook that this
- * call came from, or it is a record that is served in another way. Nothing was
- * changed.
+ * The object is in use: it has a request under way, or the call came from a hook that the
+ * object called, or the object is a record that serves in another way. The call changed
+ * nothing.
  */
 #define MBM_BUSY 231
 
 /**
- * A function that reads cannot be broadcast; nothing was sent.
+ * A request that reads cannot be broadcast. Nothing was sent.
  */
 #define MBM_BROADCAST_NOT_ALLOWED 232
 
 /**
- * The frame buffer cannot hold the request (nothing was sent), or frame or
- * response buffer cannot hold the reply (the response words are unchanged), or a
- * unit has no place for another record.
+ * One of these: the frame buffer cannot hold the request, and nothing was sent; the frame
+ * buffer or the response buffer cannot hold the reply, and the response words are
+ * unchanged; a unit cannot take another record.
  */
 #define MBM_BUFFER_TOO_SMALL 233
 
@@ -210,46 +213,47 @@ const char *mbm_version(void);
 #define MBM_PENDING 235
 
 /**
- * For as long as the response timeout the line never fell silent, or the
- * port took no bytes.
+ * The line was not silent, or the port accepted no bytes, for as long as the response
+ * timeout.
  */
 #define MBM_LINE_BUSY 236
 
 /**
- * The request was given up by mbm_master_cancel or mbm_master_beginRtu.
+ * A cancel function or a begin function gave the request up.
  */
 #define MBM_CANCELLED 237
 
 /**
- * A frame that is not whole yet: more bytes are to come.
+ * The frame is not complete: more bytes must follow.
  */
 #define MBM_INCOMPLETE_FRAME 238
 
 /**
- * No frame of this framing begins like that, or has such a length.
+ * No frame of this framing starts with these bytes, or has this length.
  */
 #define MBM_MALFORMED_FRAME 239
 
 /**
- * The client has 16 requests already; nothing was queued.
+ * The client has 16 requests already. Nothing was queued.
  */
 #define MBM_QUEUE_FULL 240
 
 /**
- * Another pending request of the client has this transaction id; nothing was
- * queued.
+ * Another pending request of the client has this transaction number. Nothing was queued.
  */
 #define MBM_DUPLICATE_TRANSACTION 241
 
 /**
- * The request has ended already, or was never queued.
+ * The request has ended already, or was never queued on this client.
  */
 #define MBM_NOT_PENDING 242
 
 /**
- * Explains a status in a few words of English. On an AVR, where constants lie in
- * RAM, a program that calls it has about 1100 bytes less of that: show the number,
- * or in a sketch modbusStatusText of ModbusStatusText.h, whose words stay in flash.
+ * Explains a status in a few words of English.
+ *
+ * On an AVR, constants are in RAM, and a program that calls this function has about 1100
+ * bytes of RAM less. There, show the number; or in a sketch call modbusStatusText of
+ * ModbusStatusText.h, which keeps its words in flash.
  *
  * Any thread or interrupt may call it.
  *
@@ -261,69 +265,70 @@ const char *mbm_status_text(uint8_t status);
 /* ==== 3. Port ======================================================================= */
 
 /**
- * What the firmware supplies: a byte stream, a clock, and optional hooks.
+ * What your firmware supplies: a byte stream, a clock, and optional hooks.
  *
- * A master refers to its port, which must stay valid and unchanged for as long as the
- * master is used; it may be a constant. A client and a server copy theirs. Hooks that
- * are NULL are not called; `read`, `write` and `micros` must be there.
+ * A master keeps a pointer to its port. The port must stay valid and unchanged for as long
+ * as the master is used; it may be a constant. A client and a server copy their port.
+ * `read`, `write` and `micros` must not be NULL. The other hooks may be NULL: then they are
+ * not called.
  *
- * A function that a hook calls on the object that called the hook returns
- * MBM_BUSY and changes nothing; a getter returns what it returns for an object
- * that was never begun. The hook `idle` is the exception: it may call every
- * function, and one that starts a request returns MBM_BUSY.
+ * A hook must not use the object that calls it. If it calls a function on that object, the
+ * function returns MBM_BUSY and changes nothing; a getter returns what it returns for an
+ * object that was never begun. The hook `idle` is the exception: it may call every
+ * function, but one that starts a request returns MBM_BUSY.
  */
 typedef struct mbm_port {
     /**
-     * Handed to every hook. Yours, may be NULL.
+     * Your pointer, passed to every hook; may be NULL.
      */
     void *context;
     /**
-     * Takes up to `capacity` received bytes without waiting. Returns how
-     * many, 0 if none has arrived yet, negative if the link is lost.
+     * Copies up to `capacity` received bytes to `bytes`, without waiting. Returns the
+     * number of bytes, 0 if none has arrived, a negative number if the link is lost.
      */
     int16_t (*read)(void *context, uint8_t *bytes, uint16_t capacity);
     /**
-     * Accepts up to `length` bytes to send without waiting for the wire.
-     * Returns how many, 0 if none just now, negative if the link is lost.
+     * Accepts up to `length` bytes to send, without waiting until they are sent. Returns
+     * the number of bytes accepted, 0 if it can accept none now, a negative number if the
+     * link is lost.
      */
     int16_t (*write)(void *context, const uint8_t *bytes, uint16_t length);
     /**
-     * A clock in microseconds that wraps at 2^32. A platform with a
+     * Returns the time in microseconds; it wraps at 2^32. A platform with a
      * millisecond tick returns `tick * 1000`.
      */
     uint32_t (*micros)(void *context);
     /**
-     * Optional: 1 once the last bit has left, 0 while bits are to come. It
-     * may wait for the last bit instead and return 1.
+     * Optional: returns 1 if the last bit was sent, 0 if bits remain to be sent. It may
+     * also wait until the last bit was sent, and return 1.
      */
     uint8_t (*flush)(void *context);
     /**
-     * Optional: called before the first byte of a request (RS-485 driver on).
+     * Optional: called before the first byte of a frame is sent (RS-485 driver on).
      */
     void (*preTransmission)(void *context);
     /**
-     * Optional: called after the last bit of a request (RS-485 driver off).
+     * Optional: called after the last bit of a frame was sent (RS-485 driver off).
      */
     void (*postTransmission)(void *context);
     /**
-     * Optional: called again and again while a blocking call of `master` waits,
-     * never between preTransmission and postTransmission. It may sleep until a
-     * byte arrives, for at most the time that mbm_master_pollDelay(master)
-     * returns.
+     * Optional: called repeatedly while a blocking function of `master` waits, but never
+     * between preTransmission and postTransmission. It may sleep until a byte arrives, at
+     * most for the time that mbm_master_pollDelay(master) returns.
      */
     void (*idle)(void *context, struct mbm_master *master);
 } mbm_port;
 
 /**
- * What happened on the line, since the caller zeroed it. Each wraps at 2^32.
+ * Counters of what happened on the line since you zeroed them. Each wraps at 2^32.
  */
 typedef struct mbm_counters {
     /**
-     * Requests sent, retries included.
+     * Requests sent, including retries.
      */
     uint32_t requests;
     /**
-     * Replies that answered a request, exceptions included.
+     * Replies that matched a request, including exceptions.
      */
     uint32_t replies;
     /**
@@ -331,20 +336,20 @@ typedef struct mbm_counters {
      */
     uint32_t exceptions;
     /**
-     * Requests whose reply arrived damaged.
+     * Requests whose reply arrived with a wrong CRC.
      */
     uint32_t badCrc;
     /**
-     * Requests that were not answered in time.
+     * Requests without a reply within the response timeout.
      */
     uint32_t timeouts;
     /**
-     * Frames with a right CRC of other units, or that answered no request of
-     * ours, while a reply was waited for.
+     * Frames with a right CRC that arrived during the wait for a reply, from another unit
+     * or not matching the request.
      */
     uint32_t foreignFrames;
     /**
-     * Replies that were found behind bytes that were no frame.
+     * Replies that were found after bytes that were not a frame.
      */
     uint32_t resynchronisations;
     /**
@@ -352,7 +357,7 @@ typedef struct mbm_counters {
      */
     uint32_t bytesSent;
     /**
-     * Bytes received, foreign ones and noise included.
+     * Bytes received, including those of foreign frames and noise.
      */
     uint32_t bytesReceived;
 } mbm_counters;
@@ -360,17 +365,17 @@ typedef struct mbm_counters {
 /* ==== 4. Functions and framings ===================================================== */
 
 /**
- * Serial line, binary, CRC-16 (serial line guide V1.02, 2.5.1).
+ * RTU: serial line, binary, with a CRC-16 (serial line guide V1.02, 2.5.1).
  */
 #define MBM_FRAMING_RTU 0
 
 /**
- * Serial line, hexadecimal characters, LRC (serial line guide V1.02, 2.5.2).
+ * ASCII: serial line, hexadecimal characters, with an LRC (serial line guide V1.02, 2.5.2).
  */
 #define MBM_FRAMING_ASCII 1
 
 /**
- * TCP, behind the MBAP header (messaging on TCP/IP guide V1.0b, 3.1.3).
+ * TCP: the PDU follows the MBAP header (messaging on TCP/IP guide V1.0b, 3.1.3).
  */
 #define MBM_FRAMING_TCP 2
 
@@ -385,12 +390,12 @@ typedef struct mbm_counters {
 #define MBM_FRAMING_NONE 4
 
 /**
- * Most bytes of a TCP frame.
+ * The maximum length of a TCP frame, in bytes.
  */
 #define MBM_MAX_TCP_FRAME 260
 
 /**
- * Most characters of an ASCII frame.
+ * The maximum length of an ASCII frame, in characters.
  */
 #define MBM_MAX_ASCII_FRAME 513
 
@@ -490,77 +495,79 @@ typedef struct mbm_counters {
 #define MBM_FC_ENCAPSULATED_INTERFACE 43
 
 /**
- * Sub-function of 08: the data come back; any number of words (V1.1b3, 6.8.1).
+ * Sub-function of 08: the device returns the data, of any number of words (V1.1b3, 6.8.1).
  */
 #define MBM_DIAGNOSTICS_RETURN_QUERY_DATA 0
 
 /**
- * Sub-function of 08; data FF 00 also clear the event log.
+ * Sub-function of 08: restarts the communications port. The data FF 00 also clear the
+ * event log.
  */
 #define MBM_DIAGNOSTICS_RESTART_COMMUNICATIONS 1
 
 /**
- * Sub-function of 08.
+ * Sub-function of 08: the device returns its diagnostic register.
  */
 #define MBM_DIAGNOSTICS_RETURN_DIAGNOSTIC_REGISTER 2
 
 /**
- * Sub-function of 08; the first byte of the data is the character.
+ * Sub-function of 08: sets the character that ends ASCII frames after CR. The first byte
+ * of the data is the character.
  */
 #define MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER 3
 
 /**
- * Sub-function of 08, which nothing answers.
+ * Sub-function of 08: the device listens only. It sends no reply.
  */
 #define MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY 4
 
 /**
- * Sub-function of 08; clears the diagnostic register too.
+ * Sub-function of 08: clears the counters and the diagnostic register.
  */
 #define MBM_DIAGNOSTICS_CLEAR_COUNTERS 10
 
 /**
- * Sub-function of 08: messages seen on the bus.
+ * Sub-function of 08: the number of messages that the device detected on the bus.
  */
 #define MBM_DIAGNOSTICS_BUS_MESSAGE_COUNT 11
 
 /**
- * Sub-function of 08: messages with a wrong CRC.
+ * Sub-function of 08: the number of messages with a wrong CRC.
  */
 #define MBM_DIAGNOSTICS_BUS_COMMUNICATION_ERROR_COUNT 12
 
 /**
- * Sub-function of 08: exceptions answered.
+ * Sub-function of 08: the number of exceptions that the device sent.
  */
 #define MBM_DIAGNOSTICS_BUS_EXCEPTION_ERROR_COUNT 13
 
 /**
- * Sub-function of 08: messages for this device.
+ * Sub-function of 08: the number of messages addressed to this device.
  */
 #define MBM_DIAGNOSTICS_SERVER_MESSAGE_COUNT 14
 
 /**
- * Sub-function of 08: messages that were not answered.
+ * Sub-function of 08: the number of messages to which the device sent no reply.
  */
 #define MBM_DIAGNOSTICS_SERVER_NO_RESPONSE_COUNT 15
 
 /**
- * Sub-function of 08: messages answered with a NAK.
+ * Sub-function of 08: the number of messages to which the device replied with a NAK.
  */
 #define MBM_DIAGNOSTICS_SERVER_NAK_COUNT 16
 
 /**
- * Sub-function of 08: messages answered with busy.
+ * Sub-function of 08: the number of messages to which the device replied that it is busy.
  */
 #define MBM_DIAGNOSTICS_SERVER_BUSY_COUNT 17
 
 /**
- * Sub-function of 08: messages lost to character overruns.
+ * Sub-function of 08: the number of messages that character overruns destroyed.
  */
 #define MBM_DIAGNOSTICS_BUS_CHARACTER_OVERRUN_COUNT 18
 
 /**
- * Sub-function of 08.
+ * Sub-function of 08: clears the counter of character overruns.
  */
 #define MBM_DIAGNOSTICS_CLEAR_OVERRUN_COUNTER 20
 
@@ -595,53 +602,54 @@ typedef struct mbm_counters {
 #define MBM_DEVICE_ID_INDIVIDUAL 4
 
 /**
- * Length rule: only silence on the line, or what frames the PDU, ends it.
+ * Length rule: the PDU is as long as its frame. On an RTU line silence ends the frame.
  */
 #define MBM_RULE_SILENCE 0
 
 /**
- * Length rule: always so many bytes.
+ * Length rule: the PDU always has the same number of bytes.
  */
 #define MBM_RULE_FIXED 1
 
 /**
- * Length rule: a byte counts the bytes behind it.
+ * Length rule: a byte of the PDU gives the number of bytes that follow it.
  */
 #define MBM_RULE_COUNTED 2
 
 /**
- * Most registers that one request reads (V1.1b3, 6.3 and 6.4).
+ * The maximum number of registers that one request reads (V1.1b3, 6.3 and 6.4).
  */
 #define MBM_MAX_READ_REGISTERS 125
 
 /**
- * Most registers that one request writes (V1.1b3, 6.12).
+ * The maximum number of registers that one request writes (V1.1b3, 6.12).
  */
 #define MBM_MAX_WRITE_REGISTERS 123
 
 /**
- * Most registers that a read/write request writes (V1.1b3, 6.17).
+ * The maximum number of registers that one read/write request writes (V1.1b3, 6.17).
  */
 #define MBM_MAX_READ_WRITE_REGISTERS 121
 
 /**
- * Most coils or discrete inputs that one request reads (V1.1b3, 6.1 and 6.2).
+ * The maximum number of coils or discrete inputs that one request reads (V1.1b3, 6.1 and
+ * 6.2).
  */
 #define MBM_MAX_READ_BITS 2000
 
 /**
- * Most coils that one request writes (V1.1b3, 6.11).
+ * The maximum number of coils that one request writes (V1.1b3, 6.11).
  */
 #define MBM_MAX_WRITE_BITS 1968
 
 /**
- * Most bytes of an RTU frame (serial line guide V1.02, 2.5.1).
+ * The maximum length of an RTU frame, in bytes (serial line guide V1.02, 2.5.1).
  */
 #define MBM_MAX_FRAME 256
 
 /**
- * How long the PDU of a function of your own is, function code included.
- * Zeroed: as long as its frame.
+ * The length rule for the PDUs of a function of your own. A length includes the function
+ * code. A zeroed rule is MBM_RULE_SILENCE.
  */
 typedef struct mbm_rule {
     /**
@@ -649,47 +657,48 @@ typedef struct mbm_rule {
      */
     uint8_t kind;
     /**
-     * FIXED: bytes of the PDU, 1 to 253. COUNTED: where the counting byte
-     * stands, 1 to 252 bytes behind the function code.
+     * MBM_RULE_FIXED: bytes of the PDU, 1 to 253. MBM_RULE_COUNTED: the position of the
+     * counting byte, 1 to 252 bytes after the function code.
      */
     uint8_t bytes;
     /**
-     * COUNTED: bytes that follow those that are counted.
+     * MBM_RULE_COUNTED: the number of bytes that follow the counted bytes.
      */
     uint8_t more;
 } mbm_rule;
 
 /**
- * A function of your own. Codes 65 to 72 and 100 to 110 are left to users, of
- * any length unless you declare them; another code that the standard does not
- * define works once it is declared. A code of the standard keeps its meaning.
+ * Declares a function of your own. The standard leaves the codes 65 to 72 and 100 to 110
+ * to users: without a declaration their PDUs have any length. Another code that the
+ * standard does not define works only with a declaration. A code that the
+ * standard defines keeps its meaning, also if you declare it.
  */
 typedef struct mbm_function {
     /**
-     * 1 to 127.
+     * The function code, 1 to 127.
      */
     uint8_t code;
     /**
-     * Its requests.
+     * The length of its requests.
      */
     struct mbm_rule request;
     /**
-     * Its responses.
+     * The length of its responses.
      */
     struct mbm_rule response;
 } mbm_function;
 
 /**
- * How frames look, and what is in them beside the standard. Zeroed: RTU, and
- * the functions of the standard.
+ * Describes frames: their framing, and the functions of your own in them. Zeroed, it
+ * means RTU with the functions of the standard only.
  */
 typedef struct mbm_framing {
     /**
-     * Functions of your own; may be NULL if there are none.
+     * The declarations of your own functions; may be NULL if `functionCount` is 0.
      */
     const struct mbm_function *functions;
     /**
-     * How many.
+     * The number of declarations in `functions`.
      */
     uint8_t functionCount;
     /**
@@ -697,7 +706,7 @@ typedef struct mbm_framing {
      */
     uint8_t kind;
     /**
-     * ASCII: the last character of a frame; 0 is line feed (V1.1b3, 6.8.1,
+     * ASCII only: the last character of a frame; 0 means line feed (V1.1b3, 6.8.1,
      * sub-function 03).
      */
     uint8_t delimiter;
@@ -708,14 +717,14 @@ typedef struct mbm_framing {
 /**
  * A Modbus RTU master: one line, one request at a time.
  *
- * Storage is yours and must be zero before first use, which a static object
- * is (`static mbm_master node;`). Settings and words want mbm_master_beginRtu or
- * mbm_master_setBuffers before them, requests want both. Use one object from one
- * thread and never from an interrupt; several objects are independent of each
- * other. Which functions the hooks of its port may call: see mbm_port.
+ * You own the storage. It must be zero before first use, as a static object is
+ * (`static mbm_master node;`). Before you use settings and words, call mbm_master_beginRtu
+ * or mbm_master_setBuffers; before you make requests, call both. Use an object from one
+ * thread only, and never from an interrupt. Several objects are independent of each other.
+ * mbm_port says which functions the hooks of the port may call.
  *
- * A call that is refused changes nothing, but for what the functions that make a
- * request say of themselves, and mbm_master_send32.
+ * A call that is refused changes nothing. Exceptions are the functions that make a request,
+ * as mbm_master_readCoils describes, and mbm_master_send32.
  */
 typedef struct mbm_master {
     /**
@@ -729,53 +738,53 @@ typedef struct mbm_master {
 } mbm_master;
 
 /**
- * What masters know of each other that take turns on one line, or in one frame
- * buffer. Storage is yours and must be zero before first use.
+ * Records which of several masters uses a shared line, or a shared frame buffer. You own the
+ * storage. It must be zero before first use.
  *
- * All objects of one turn are used from one thread. Before the storage of an object
- * goes, call mbm_master_endTurn.
+ * Use all objects of one turn from one thread. Call mbm_master_endTurn before you release the
+ * storage of an object.
  */
 typedef struct mbm_turn {
     /**
-     * The object that has the turn; NULL if none has.
+     * The object that has the turn; NULL if none has it.
      */
     struct mbm_master *master;
     /**
-     * When objects that had the turn before used the line last.
+     * When an object that had the turn before used the line last, in microseconds.
      */
     uint32_t lastUse;
 } mbm_turn;
 
 /**
- * Begins to talk to a slave over a port.
+ * Begins a master of RTU frames that sends its requests to a unit over a port.
  *
- * May be called again at any time, which is cheap: to talk to another slave,
- * or over another port. Settings, buffers and the words in them stay; what
- * was queued by send is dropped, and a request under way is given up. Opens
- * nothing: the port is open already. The first request waits for no gap, unless
- * bytes arrive or mbm_master_lineUsed was called.
+ * It may be called again at any time, to use another unit or another port; this is cheap.
+ * Settings, buffers and the words in them stay. The master discards what mbm_master_send
+ * queued, and gives up a request under way with the status MBM_CANCELLED. It does not open
+ * the port: that must be open already. The first request waits for no gap, unless bytes
+ * arrive or mbm_master_lineUsed was called.
  *
  * @param master  the object; zeroed before the first call
- * @param slave   unit id, 1 to 247; 248 to 255 are sent as they are, 0 is
- *                broadcast (serial line guide V1.02, 2.2)
- * @param port    not copied: it must stay valid and unchanged for as long as the
- *                object is used; read, write and micros must be there
+ * @param slave   the unit identifier, 1 to 247; 0 is broadcast (serial line guide V1.02,
+ *                2.2). The master also sends to 248 to 255, which the standard reserves
+ * @param port    the port. It is not copied: it must stay valid and unchanged for as long as
+ *                the object is used. read, write and micros must not be NULL
  * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a missing hook; MBM_BUSY
- *         from within a hook of this object's port but `idle`
+ *         from within a hook of this object's port except `idle`
  */
 uint8_t mbm_master_beginRtu(struct mbm_master *master,
                             uint8_t slave,
                             const struct mbm_port *port);
 
 /**
- * As mbm_master_beginRtu, for several objects that share one port, which may be a
- * constant: each object has a context of its own.
+ * As mbm_master_beginRtu, but with a separate context. Several objects can then share one
+ * port, which may be a constant, and each object has its own context.
  *
  * @param master   the object; zeroed before the first call
  * @param slave    as for mbm_master_beginRtu
  * @param port     as for mbm_master_beginRtu; its `context` is not used
- * @param context  handed to every hook. Yours, may be NULL
- * @return as mbm_master_beginRtu
+ * @param context  your pointer, passed to every hook; may be NULL
+ * @return as for mbm_master_beginRtu
  */
 uint8_t mbm_master_beginRtuWith(struct mbm_master *master,
                                 uint8_t slave,
@@ -783,29 +792,32 @@ uint8_t mbm_master_beginRtuWith(struct mbm_master *master,
                                 void *context);
 
 /**
- * Sets the write address and empties the queue of send; the words stay.
+ * Sets the write address and empties the queue of mbm_master_send. The transmit words do not
+ * change.
  *
  * @param master   the object
- * @param address  0 to 65535, for the functions ending in Queued
+ * @param address  the address to which the functions with Queued in their name write, 0 to
+ *                 65535
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_beginTransmission(struct mbm_master *master, uint16_t address);
+uint8_t mbm_master_beginTransmission(struct mbm_master *master,
+                                     uint16_t address);
 
 /**
- * Lends the buffers that requests and replies need, before or after begin.
+ * Sets the buffers for requests and replies, before or after mbm_master_beginRtu.
  *
- * They must not overlap, and stay valid for as long as the object is used.
- * MBM_FRAME_BYTES(words) bytes of frame serve any request and reply of so
- * many words. What does not fit into a smaller buffer is answered with a
- * status, never cut short.
+ * The buffers must not overlap, and must stay valid for as long as the object is used. A
+ * frame buffer of MBM_FRAME_BYTES(words) bytes suffices for every request and reply with
+ * that number of words. If a request or a reply does not fit into a smaller buffer, the
+ * function that makes the request returns a status. Data are never cut off.
  *
  * @param master         the object; zeroed before the first call
- * @param response       words that reads fill; NULL only with 0 words
+ * @param response       the words that reads fill; NULL only if `responseWords` is 0
  * @param responseWords  0 to 255; 125 hold any reply
- * @param transmit       words that writes send; NULL only with 0 words
+ * @param transmit       the words that writes send; NULL only if `transmitWords` is 0
  * @param transmitWords  0 to 255; 123 hold any request
- * @param frame          bytes of one frame; keeps nothing between requests
- * @param frameBytes     at least 8; 256 hold any frame
+ * @param frame          the buffer of one frame. Its content is not used between requests
+ * @param frameBytes     bytes of `frame`, at least 8; 256 hold any frame
  * @return MBM_OK, MBM_INVALID_ARGUMENT, or MBM_BUSY while a request is under way
  */
 uint8_t mbm_master_setBuffers(struct mbm_master *master,
@@ -817,31 +829,32 @@ uint8_t mbm_master_setBuffers(struct mbm_master *master,
                               uint16_t frameBytes);
 
 /**
- * Moves a non-blocking request on, without waiting.
+ * Sends and receives for a non-blocking request, without waiting.
  *
- * Call it as often as you like, at least once per character time of the line
- * if nothing else buffers its bytes.
+ * Call it as often as you like. If your port does not buffer received bytes, call it at
+ * least once in the time of a character.
  *
  * @param master  the object
- * @return MBM_PENDING until the request has ended, then its status, again at
- *         every call; MBM_OK if there was no request yet
+ * @return MBM_PENDING until the request has ended. Then, at every call, the status of the
+ *         request. MBM_OK if there was no request yet; MBM_BUSY from within a hook of the
+ *         port except `idle`; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_poll(struct mbm_master *master);
 
 /**
- * How long mbm_master_poll will find nothing to do unless a byte arrives, so
- * that a program or an idle hook may sleep until then. A wait that has just begun
- * counts from this call, so sleeping lengthens no timeout.
+ * Returns how long mbm_master_poll will have nothing to do unless a byte arrives. A program
+ * or the hook `idle` may sleep for that time. A waiting time that has just started counts
+ * from this call, so sleeping makes no timeout longer.
  *
  * @param master  the object
- * @return microseconds; 0 means poll now, and is returned within a hook of the port
- *         but `idle`; 0xFFFFFFFF that there is no request
+ * @return microseconds; 0 means poll now, also from within a hook of the port except `idle`;
+ *         0xFFFFFFFF means that no request is under way
  */
 uint32_t mbm_master_pollDelay(struct mbm_master *master);
 
 /**
- * Gives up the request under way, with the driver switched off; its status
- * becomes MBM_CANCELLED. Without a request it does nothing.
+ * Gives up the request under way and switches the driver off. The status of the request
+ * becomes MBM_CANCELLED. If no request is under way, it does nothing.
  *
  * @param master  the object
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
@@ -849,41 +862,45 @@ uint32_t mbm_master_pollDelay(struct mbm_master *master);
 uint8_t mbm_master_cancel(struct mbm_master *master);
 
 /**
- * The status of the last request.
+ * Returns the status of the last request.
  *
  * @param master  the object
- * @return MBM_PENDING while it is under way, MBM_OK if there was none;
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return the status: MBM_PENDING while the request is under way, MBM_OK if there was no
+ *         request; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_status(const struct mbm_master *master);
 
 /**
- * The raw exception code of the last reply, also where it is none that the
- * standard allows (V1.1b3, 7).
+ * Returns the exception code of the last reply as received, also a code that the standard
+ * does not allow (V1.1b3, 7).
  *
  * @param master  the object
- * @return the code; 0 if the last request ended without an exception frame
+ * @return the code; 0 if the last request ended without an exception
  */
 uint8_t mbm_master_getExceptionCode(const struct mbm_master *master);
 
 /**
- * Function 01: reads coils into the response words, 16 to a word, lowest bit
- * first, the last word padded with zeros (V1.1b3, 6.1).
+ * Function 01: reads coils into the response words, 16 in each word. The first coil is the
+ * lowest bit; the last word is padded with zeros (V1.1b3, 6.1).
  *
- * This and the nine other functions behave alike. In blocking mode they return
- * when the request has ended, in non-blocking mode at once with MBM_PENDING, and
- * mbm_master_poll ends it. They empty the queue of send and set receive back to the
- * first word, unless they return MBM_BUSY, MBM_NOT_INITIALISED or
- * MBM_INVALID_ARGUMENT. Response words change only on success. Transmit words stay;
- * only 06 and 16 store their arguments in them. A request that no device could accept
- * (a quantity that the standard forbids, addresses beyond 65535) is not sent: the
- * status is the exception that a device would answer.
+ * All functions that make a request behave as follows. In blocking mode they return when
+ * the request has ended. In non-blocking mode they return MBM_PENDING at once, and you call
+ * mbm_master_poll until the request has ended.
+ *
+ * They empty the queue of mbm_master_send, and mbm_master_receive starts again at the first
+ * word, unless they return MBM_BUSY, MBM_NOT_INITIALISED or MBM_INVALID_ARGUMENT. The
+ * response words change only on success. The transmit words do not change, except that 06
+ * and 16 store their arguments there.
+ *
+ * The master does not send a request that no device could accept, with a quantity that the
+ * standard forbids or addresses beyond 65535. The status is then the exception with which a
+ * device would answer.
  *
  * @param master    the object
- * @param address   first coil, 0 to 65535, as on the wire
- * @param quantity  1 to 2000
+ * @param address   the first coil, 0 to 65535, as on the wire
+ * @param quantity  the number of coils, 1 to 2000
  * @return MBM_OK, or an exception of the device (0x01 to 0x7F), or
- *         MBM_PENDING (non-blocking), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
+ *         MBM_PENDING (non-blocking mode), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
  *         MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION,
  *         MBM_LINK_LOST, MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL,
  *         MBM_BROADCAST_NOT_ALLOWED, MBM_BUSY, MBM_CANCELLED,
@@ -894,12 +911,12 @@ uint8_t mbm_master_readCoils(struct mbm_master *master,
                              uint16_t quantity);
 
 /**
- * Function 02: reads discrete inputs into the response words, 16 to a word,
- * lowest bit first, the last word padded with zeros (V1.1b3, 6.2).
+ * Function 02: reads discrete inputs into the response words, 16 in each word. The first
+ * input is the lowest bit; the last word is padded with zeros (V1.1b3, 6.2).
  *
  * @param master    the object
- * @param address   first input, 0 to 65535, as on the wire
- * @param quantity  1 to 2000
+ * @param address   the first input, 0 to 65535, as on the wire
+ * @param quantity  the number of inputs, 1 to 2000
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_readDiscreteInputs(struct mbm_master *master,
@@ -910,8 +927,8 @@ uint8_t mbm_master_readDiscreteInputs(struct mbm_master *master,
  * Function 03: reads holding registers into the response words (V1.1b3, 6.3).
  *
  * @param master    the object
- * @param address   first register, 0 to 65535, as on the wire
- * @param quantity  1 to 125
+ * @param address   the first register, 0 to 65535, as on the wire
+ * @param quantity  the number of registers, 1 to 125
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_readHoldingRegisters(struct mbm_master *master,
@@ -922,8 +939,8 @@ uint8_t mbm_master_readHoldingRegisters(struct mbm_master *master,
  * Function 04: reads input registers into the response words (V1.1b3, 6.4).
  *
  * @param master    the object
- * @param address   first register, 0 to 65535, as on the wire
- * @param quantity  1 to 125
+ * @param address   the first register, 0 to 65535, as on the wire
+ * @param quantity  the number of registers, 1 to 125
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_readInputRegisters(struct mbm_master *master,
@@ -931,11 +948,11 @@ uint8_t mbm_master_readInputRegisters(struct mbm_master *master,
                                       uint16_t quantity);
 
 /**
- * Function 05: switches one coil (V1.1b3, 6.5). Unit 0 broadcasts.
+ * Function 05: switches one coil on or off (V1.1b3, 6.5). With unit 0 it is a broadcast.
  *
  * @param master   the object
  * @param address  the coil, 0 to 65535; becomes the write address
- * @param state    0 is off, anything else is on
+ * @param state    0 is off, any other value is on
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_writeSingleCoil(struct mbm_master *master,
@@ -943,7 +960,7 @@ uint8_t mbm_master_writeSingleCoil(struct mbm_master *master,
                                    uint8_t state);
 
 /**
- * Function 06: writes one register (V1.1b3, 6.6). Unit 0 broadcasts.
+ * Function 06: writes one register (V1.1b3, 6.6). With unit 0 it is a broadcast.
  *
  * @param master   the object
  * @param address  the register, 0 to 65535; becomes the write address
@@ -955,12 +972,12 @@ uint8_t mbm_master_writeSingleRegister(struct mbm_master *master,
                                        uint16_t value);
 
 /**
- * Function 0F: writes coils from the transmit words, from word 0 on, lowest bit
- * first (V1.1b3, 6.11). Unit 0 broadcasts.
+ * Function 0F: writes coils from the transmit words, starting at word 0. The first coil is
+ * the lowest bit (V1.1b3, 6.11). With unit 0 it is a broadcast.
  *
  * @param master    the object
- * @param address   first coil, 0 to 65535; becomes the write address
- * @param quantity  1 to 1968, and no more than the transmit words hold
+ * @param address   the first coil, 0 to 65535; becomes the write address
+ * @param quantity  the number of coils, 1 to 1968, and not more than the transmit words hold
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_writeMultipleCoils(struct mbm_master *master,
@@ -968,8 +985,8 @@ uint8_t mbm_master_writeMultipleCoils(struct mbm_master *master,
                                       uint16_t quantity);
 
 /**
- * Function 0F: writes the queued bits to the last write address
- * (beginTransmission, sendBit, then this).
+ * Function 0F: writes the queued bits to coils, starting at the last write address. Call
+ * mbm_master_beginTransmission and mbm_master_sendBit before.
  *
  * @param master  the object
  * @return a status; see mbm_master_readCoils
@@ -977,12 +994,12 @@ uint8_t mbm_master_writeMultipleCoils(struct mbm_master *master,
 uint8_t mbm_master_writeQueuedCoils(struct mbm_master *master);
 
 /**
- * Function 10: writes registers from the transmit words, from word 0 on
- * (V1.1b3, 6.12). Unit 0 broadcasts.
+ * Function 10: writes registers from the transmit words, starting at word 0 (V1.1b3, 6.12).
+ * With unit 0 it is a broadcast.
  *
  * @param master    the object
- * @param address   first register, 0 to 65535; becomes the write address
- * @param quantity  1 to 123, and no more than the transmit words
+ * @param address   the first register, 0 to 65535; becomes the write address
+ * @param quantity  the number of registers, 1 to 123, and not more than the transmit words
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_writeMultipleRegisters(struct mbm_master *master,
@@ -990,8 +1007,8 @@ uint8_t mbm_master_writeMultipleRegisters(struct mbm_master *master,
                                           uint16_t quantity);
 
 /**
- * Function 10: writes the queued complete words to the last write address
- * (beginTransmission, send, then this).
+ * Function 10: writes the queued complete words to registers, starting at the last write
+ * address. Call mbm_master_beginTransmission and mbm_master_send before.
  *
  * @param master  the object
  * @return a status; see mbm_master_readCoils
@@ -1001,12 +1018,12 @@ uint8_t mbm_master_writeQueuedRegisters(struct mbm_master *master);
 /**
  * Function 16: the device sets a register to
  * (register AND andMask) OR (orMask AND NOT andMask) (V1.1b3, 6.16).
- * Unit 0 broadcasts.
+ * With unit 0 it is a broadcast.
  *
  * @param master   the object
  * @param address  the register, 0 to 65535; becomes the write address
- * @param andMask  keeps bits; also becomes transmit word 0
- * @param orMask   sets bits where andMask is 0; also becomes transmit word 1
+ * @param andMask  1 for each bit of the register to keep; also becomes transmit word 0
+ * @param orMask   the new value of the bits that are not kept; also becomes transmit word 1
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_maskWriteRegister(struct mbm_master *master,
@@ -1015,15 +1032,16 @@ uint8_t mbm_master_maskWriteRegister(struct mbm_master *master,
                                      uint16_t orMask);
 
 /**
- * Function 17: the device writes registers from the transmit words first, then
- * reads others into the response words, in one request (V1.1b3, 6.17).
+ * Function 17: the device writes the transmit words to registers first. Then it reads
+ * registers, which arrive in the response words. Both in one request (V1.1b3, 6.17).
  *
  * @param master         the object
- * @param readAddress    first register to read, 0 to 65535
- * @param readQuantity   1 to 125
- * @param writeAddress   first register to write, 0 to 65535; becomes the write
+ * @param readAddress    the first register to read, 0 to 65535
+ * @param readQuantity   the number of registers to read, 1 to 125
+ * @param writeAddress   the first register to write, 0 to 65535; becomes the write
  *                       address
- * @param writeQuantity  1 to 121, and no more than the transmit words
+ * @param writeQuantity  the number of registers to write, 1 to 121, and not more than the
+ *                       transmit words
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_readWriteMultipleRegisters(struct mbm_master *master,
@@ -1033,12 +1051,12 @@ uint8_t mbm_master_readWriteMultipleRegisters(struct mbm_master *master,
                                               uint16_t writeQuantity);
 
 /**
- * Function 17: writes the queued complete words to the last write address, then
- * reads.
+ * Function 17: as mbm_master_readWriteMultipleRegisters, but writes the queued complete
+ * words, starting at the last write address.
  *
  * @param master        the object
- * @param readAddress   first register to read, 0 to 65535
- * @param readQuantity  1 to 125
+ * @param readAddress   the first register to read, 0 to 65535
+ * @param readQuantity  the number of registers to read, 1 to 125
  * @return a status; see mbm_master_readCoils
  */
 uint8_t mbm_master_readWriteQueuedRegisters(struct mbm_master *master,
@@ -1046,136 +1064,143 @@ uint8_t mbm_master_readWriteQueuedRegisters(struct mbm_master *master,
                                             uint16_t readQuantity);
 
 /**
- * Reads holding registers for mbm_master_receive to give, one after the other.
+ * Reads holding registers. mbm_master_receive then returns them one after the other.
  *
  * @param master    the object
- * @param address   first register, 0 to 65535
- * @param quantity  1 to 125
- * @return how many words mbm_master_receive will give; 0 if the request failed
- *         (mbm_master_status says how), another one is under way or, in non-blocking
- *         mode, this one is
+ * @param address   the first register, 0 to 65535
+ * @param quantity  the number of registers, 1 to 125
+ * @return the number of words that mbm_master_receive will return; 0 if the request failed
+ *         (mbm_master_status returns why), if another request is under way, and in
+ *         non-blocking mode
  */
 uint8_t mbm_master_requestFrom(struct mbm_master *master,
                                uint16_t address,
                                uint16_t quantity);
 
 /**
- * Sets the unit that later requests go to.
+ * Sets the unit to which the master sends later requests.
  *
  * @param master  the object
- * @param slave   1 to 247; 248 to 255 are sent as they are, 0 is broadcast
+ * @param slave   the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248
+ *                to 255, which the standard reserves
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setSlaveID(struct mbm_master *master, uint8_t slave);
+uint8_t mbm_master_setSlaveID(struct mbm_master *master,
+                              uint8_t slave);
 
 /**
- * The unit that requests go to.
+ * Returns the unit to which the master sends requests.
  *
  * @param master  the object
- * @return the unit id, 1 until somebody says otherwise; 0 for an object that is
- *         not ready for settings
+ * @return the unit identifier, 1 by default; 0 for an object that was never begun
  */
 uint8_t mbm_master_getSlaveID(const struct mbm_master *master);
 
 /**
- * Sets how long a reply may take, from the last bit of the request to the last
+ * Sets the response timeout: the maximum time from the last bit of the request to the last
  * byte of the reply.
  *
  * @param master        the object
- * @param timeoutMs     0 to 65535; 2000 at first
+ * @param timeoutMs     milliseconds, 0 to 65535; the default is 2000
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setResponseTimeout(struct mbm_master *master, uint16_t timeoutMs);
+uint8_t mbm_master_setResponseTimeout(struct mbm_master *master,
+                                      uint16_t timeoutMs);
 
 /**
- * Tells the baud rate of the line, from which the gap before a request (t3.5,
- * serial line guide V1.02, 2.5.1.1) and the length of a character follow. It
- * sets nothing on the line. Untold, the gap is 4 ms, which is safe from 9600 up.
+ * Sets the baud rate from which the master computes the gap before a request (t3.5, serial
+ * line guide V1.02, 2.5.1.1) and the duration of a character. It does not configure the
+ * serial line. Without a baud rate the gap is 4 ms, which is enough from 9600 up.
  *
  * @param master  the object
- * @param baud    bits per second; 0 goes back to untold
+ * @param baud    bits per second; 0 (the default): unknown
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setBaudRate(struct mbm_master *master, uint32_t baud);
+uint8_t mbm_master_setBaudRate(struct mbm_master *master,
+                               uint32_t baud);
 
 /**
- * Sets the silence before a request, in place of t3.5: 0 where nothing but the
- * master's own traffic needs it, more for devices that are slow to listen again.
- * A later mbm_master_setBaudRate sets it back to t3.5.
+ * Sets the silence before a request, instead of t3.5. Use 0 if no device on the line needs
+ * the gap, and more than t3.5 for devices that need longer before they can receive again.
+ * A later call of mbm_master_setBaudRate sets it back to t3.5.
  *
  * @param master        the object
- * @param gapUs         counted from the last byte seen or sent; more than 2^31
+ * @param gapUs         microseconds from the last byte received or sent; a value above 2^31
  *                      (36 minutes) means 2^31
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setGap(struct mbm_master *master, uint32_t gapUs);
+uint8_t mbm_master_setGap(struct mbm_master *master,
+                          uint32_t gapUs);
 
 /**
- * Sets how long a broadcast takes, since nobody answers it (serial line guide
- * V1.02, 2.4.1).
+ * Sets the turnaround delay: how long the master waits after a broadcast, which no device
+ * answers (serial line guide V1.02, 2.4.1).
  *
  * @param master        the object
- * @param delayMs       0 to 65535; 100 at first
+ * @param delayMs       milliseconds, 0 to 65535; the default is 100
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_setTurnaroundDelay(struct mbm_master *master, uint16_t delayMs);
 
 /**
- * Sets the quiet time, which keeps a late reply from being taken for the answer
- * to a later request. RTU itself cannot tell them apart if unit, function and
- * length are the same, or if the late reply is an exception to the same function.
+ * Sets the quiet time. It prevents that the master accepts a late reply as the reply to a
+ * later request. In RTU the two cannot be distinguished if unit, function and length are the
+ * same, or if the late reply is an exception to the same function.
  *
- * After a request without a right reply, two things happen. The line is left alone
- * for this time before the next request, and bytes that arrive are dropped. Then the
- * next reply of that unit is held until nothing has arrived for this time. A second
- * reply takes the place of the held one, for a device answers in order; if the
- * second one is damaged, the request fails. So a request after a failure takes one
- * quiet time longer, all others take no longer.
+ * After a request without a right reply, the master does two things. It waits for the quiet
+ * time before it sends the next request, and discards bytes that arrive meanwhile. Then it
+ * holds the next reply of that unit until no byte has arrived for the quiet time. A second
+ * reply replaces the held one, because a device answers in order. If the second reply is
+ * damaged, the request fails. So a request after a failure takes one quiet time longer; all
+ * others take no longer.
  *
- * The time must be longer than the device takes for an answer. If it is shorter, the
- * second reply may come after the held one was taken for the answer.
+ * The quiet time must be longer than the device needs for a reply. If it is shorter, the
+ * master may accept the held reply before the second one arrives.
  *
  * @param master        the object
- * @param quietMs       0 to 65535; 100 at first; 0 holds no reply
+ * @param quietMs       milliseconds, 0 to 65535; the default is 100; 0 holds no reply
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setQuietTime(struct mbm_master *master, uint16_t quietMs);
+uint8_t mbm_master_setQuietTime(struct mbm_master *master,
+                                uint16_t quietMs);
 
 /**
- * Sets how often a request is repeated whose reply is missing, damaged or
- * malformed. Exceptions are replies and are not repeated.
+ * Sets how often the master repeats a request whose reply is missing, damaged or malformed.
+ * It does not repeat a request that was answered with an exception.
  *
  * @param master   the object
- * @param retries  0 to 255; 0 at first
+ * @param retries  0 to 255; the default is 0
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setRetries(struct mbm_master *master, uint8_t retries);
+uint8_t mbm_master_setRetries(struct mbm_master *master,
+                              uint8_t retries);
 
 /**
- * Tells that the receiver hears what the driver sends, so each request comes back
- * before its reply and is to be dropped.
+ * Switches echo discarding on or off. Switch it on if the receiver also receives what the
+ * driver sends: then the master discards the copy of each request that arrives before the
+ * reply.
  *
  * @param master  the object
- * @param on      0 (at first) or 1
+ * @param on      0 (the default) or 1
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_setEchoDiscard(struct mbm_master *master, uint8_t on);
 
 /**
  * Accepts replies of devices that deviate from the standard. It has these effects:
- * - A reply with the right unit, function and CRC is accepted although it repeats another
- *   address, value or quantity, or carries more or fewer data than were requested. It
- *   is accepted at the end of the response timeout, if no right reply has come.
- *   mbm_master_available says how many words came.
+ * - The master accepts a reply with the right unit, function and CRC although it repeats
+ *   another address, value or quantity, or carries more or fewer data than were requested.
+ *   It accepts such a reply at the end of the response timeout, if no right reply has
+ *   arrived. mbm_master_available returns the number of words that arrived.
  * - A read of more words than the response words hold succeeds and fills all of them.
- *   (Such a reply that the frame buffer does not hold must not follow noise directly.)
- * - Requests that read are sent to unit 0 too, and a reply from unit 0 is accepted.
+ *   (A reply that is longer than the frame buffer must not follow noise directly.)
+ * - The master also sends requests that read to unit 0, and accepts a reply from unit 0.
  *
  * Set a short response timeout (mbm_master_setResponseTimeout) if the device deviates in
- * each reply.
+ * every reply.
  *
  * @param master  the object
- * @param on      0 (at first) or 1
+ * @param on      0 (the default) or 1
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED; MBM_BUSY while a request is
  *         under way
  */
@@ -1183,50 +1208,55 @@ uint8_t mbm_master_setLenient(struct mbm_master *master,
                               uint8_t on);
 
 /**
- * Holds the driver on after the port's flush, for platforms whose flush returns
- * before the last bit has left.
+ * Sets how long the driver stays on after the port's flush, for platforms whose flush
+ * returns before the last bit was sent.
  *
  * @param master      the object
- * @param characters  times one character of the told baud rate (9600 if untold);
- *                    0 at first
+ * @param characters  the time in characters at the baud rate of mbm_master_setBaudRate
+ *                    (without one, at 9600); the default is 0
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_setPostFlushHold(struct mbm_master *master, uint8_t characters);
 
 /**
- * Chooses between functions that return when the request has ended (at first) and
- * functions that return MBM_PENDING at once, for mbm_master_poll to end them.
+ * Switches between blocking and non-blocking mode. In blocking mode, the default, a function
+ * that makes a request returns when the request has ended. In non-blocking mode it returns
+ * MBM_PENDING at once, and you call mbm_master_poll until the request has ended.
  *
  * @param master  the object
- * @param on      1 blocking, 0 non-blocking; holds from the next request on
+ * @param on      1 blocking, 0 non-blocking; it applies from the next request on
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setBlocking(struct mbm_master *master, uint8_t on);
+uint8_t mbm_master_setBlocking(struct mbm_master *master,
+                               uint8_t on);
 
 /**
- * Counts into storage of yours from now on. Read and zero it as you like, but not
- * from an interrupt.
+ * Sets your storage for counters, in which the master counts from now on. You may read and
+ * zero the counters at any time, but not from an interrupt.
  *
  * @param master    the object
- * @param counters  zeroed by you; NULL stops counting
+ * @param counters  your counters, zeroed; NULL stops counting
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setCounters(struct mbm_master *master, struct mbm_counters *counters);
+uint8_t mbm_master_setCounters(struct mbm_master *master,
+                               struct mbm_counters *counters);
 
 /**
- * Says when somebody else used the line, another object for example: the gap before
- * the next request counts from then. A time before the last use that the object knows
- * of changes nothing.
+ * Reports when another user of the line, for example another object, used the line last.
+ * The gap before the next request counts from that time. A time before the last use that
+ * the object knows changes nothing.
  *
  * @param master        the object
- * @param timeUs        by the clock of its port, at most 2^31 ago
+ * @param timeUs        the time in microseconds on the clock of the object's port, at most
+ *                      2^31 microseconds (36 minutes) ago
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_lineUsedAt(struct mbm_master *master, uint32_t timeUs);
+uint8_t mbm_master_lineUsedAt(struct mbm_master *master,
+                              uint32_t timeUs);
 
 /**
- * Says that somebody else has just used the line, as mbm_master_lineUsedAt with the
- * time of now.
+ * Reports that another user of the line has just used it: as mbm_master_lineUsedAt with the
+ * present time.
  *
  * @param master  the object
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
@@ -1234,38 +1264,40 @@ uint8_t mbm_master_lineUsedAt(struct mbm_master *master, uint32_t timeUs);
 uint8_t mbm_master_lineUsed(struct mbm_master *master);
 
 /**
- * Takes the turn, before a request. The gap before that request counts from the last
- * use of the line by any object that had the turn before.
+ * Gives the turn to an object. Call it before a request. The gap before that request counts
+ * from the last use of the line by any object that had the turn before.
  *
  * @param master  the object, with buffers or begun
- * @param turn    the turn of all objects that share a line or a frame buffer
+ * @param turn    the turn that all objects on the line, or with the frame buffer, share
  * @return MBM_OK; MBM_BUSY, with nothing changed, while another object has the turn
  *         and a request under way; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_takeTurn(struct mbm_master *master, struct mbm_turn *turn);
+uint8_t mbm_master_takeTurn(struct mbm_master *master,
+                            struct mbm_turn *turn);
 
 /**
- * Gives the turn back, before the storage of the object goes; does nothing if the object
- * has not got the turn. A request under way is forgotten: cancel it before, so that the
- * driver is off.
+ * Ends the turn of an object, before you release its storage. It does nothing if the object
+ * does not have the turn. It does not end a request under way: call mbm_master_cancel
+ * before, so that the driver is switched off.
  *
  * @param master  the object
  * @param turn    as for mbm_master_takeTurn
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_endTurn(struct mbm_master *master, struct mbm_turn *turn);
+uint8_t mbm_master_endTurn(struct mbm_master *master,
+                           struct mbm_turn *turn);
 
 /**
- * A word of the last successful read.
+ * Returns a word of the last successful read.
  *
  * @param master  the object
  * @param index   0 to 255
- * @return the word; 0xFFFF past the end of the response buffer
+ * @return the word; 0xFFFF if `index` is past the end of the response buffer
  */
 uint16_t mbm_master_getResponseBuffer(const struct mbm_master *master, uint8_t index);
 
 /**
- * Zeroes the response words; receive goes on where it was.
+ * Zeroes the response words. The position of mbm_master_receive does not change.
  *
  * @param master  the object
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
@@ -1273,12 +1305,13 @@ uint16_t mbm_master_getResponseBuffer(const struct mbm_master *master, uint8_t i
 uint8_t mbm_master_clearResponseBuffer(struct mbm_master *master);
 
 /**
- * Sets a word for the functions that write. Does not move the queue of send.
+ * Sets a transmit word for the functions that write. The queue of mbm_master_send does not
+ * change.
  *
  * @param master  the object
- * @param index   0 to the transmit buffer's words - 1
+ * @param index   0 to the number of transmit words - 1
  * @param value   the word
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS past the end of the buffer,
+ * @return MBM_OK; MBM_ILLEGAL_DATA_ADDRESS if `index` is past the end of the buffer;
  *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_master_setTransmitBuffer(struct mbm_master *master,
@@ -1286,7 +1319,7 @@ uint8_t mbm_master_setTransmitBuffer(struct mbm_master *master,
                                      uint16_t value);
 
 /**
- * Zeroes the transmit words; the queue of send stays.
+ * Zeroes the transmit words. The queue of mbm_master_send does not change its length.
  *
  * @param master  the object
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
@@ -1294,37 +1327,41 @@ uint8_t mbm_master_setTransmitBuffer(struct mbm_master *master,
 uint8_t mbm_master_clearTransmitBuffer(struct mbm_master *master);
 
 /**
- * Queues a word behind those queued. Bits queued before keep their word.
+ * Queues a word after the words queued before. If the last word holds queued bits, the new
+ * word goes into the next one.
  *
  * @param master  the object
  * @param word    the word
- * @return MBM_OK, MBM_BUFFER_TOO_SMALL with nothing queued past the end of the
- *         transmit buffer, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full;
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_send(struct mbm_master *master, uint16_t word);
+uint8_t mbm_master_send(struct mbm_master *master,
+                        uint16_t word);
 
 /**
- * Queues two words, the low one first; the low one alone if only that fits.
+ * Queues two words, the low one first. If only one word fits, it queues the low one alone.
  *
  * @param master  the object
  * @param value   both words
- * @return MBM_OK, MBM_BUFFER_TOO_SMALL if a word did not fit,
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL if a word did not fit;
  *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_send32(struct mbm_master *master, uint32_t value);
+uint8_t mbm_master_send32(struct mbm_master *master,
+                          uint32_t value);
 
 /**
- * Queues a bit behind those queued, lowest bit of a word first.
+ * Queues a bit after the bits queued before, starting at the lowest bit of a word.
  *
  * @param master  the object
- * @param on      0 is off, anything else is on
- * @return MBM_OK, MBM_BUFFER_TOO_SMALL with nothing queued past the end of the
- *         transmit buffer, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param on      0 is off, any other value is on
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full;
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_sendBit(struct mbm_master *master, uint8_t on);
+uint8_t mbm_master_sendBit(struct mbm_master *master,
+                           uint8_t on);
 
 /**
- * How many words of the last successful read mbm_master_receive has yet to give.
+ * Returns how many words of the last successful read mbm_master_receive has not returned yet.
  *
  * @param master  the object
  * @return 0 to 125
@@ -1332,54 +1369,55 @@ uint8_t mbm_master_sendBit(struct mbm_master *master, uint8_t on);
 uint8_t mbm_master_available(const struct mbm_master *master);
 
 /**
- * The next word of the last successful read.
+ * Returns the next word of the last successful read.
  *
  * @param master  the object
- * @return the word; 0xFFFF when none is left
+ * @return the word; 0xFFFF if no word is left
  */
 uint16_t mbm_master_receive(struct mbm_master *master);
 
 /* ==== 6. Client ===================================================================== */
 
 /**
- * The most requests that wait or are under way in one client.
+ * The maximum number of requests that are pending in one client.
  */
 #define MBM_CLIENT_DEPTH 16
 
 /**
- * mbm_client_setBackoff: a request is asked again at once.
+ * mbm_client_setBackoff: the client repeats a request at once.
  */
 #define MBM_BACKOFF_NONE 0
 
 /**
- * mbm_client_setBackoff: always the same wait.
+ * mbm_client_setBackoff: the client waits `delayMs` before each repetition.
  */
 #define MBM_BACKOFF_FIXED 1
 
 /**
- * mbm_client_setBackoff: once, twice, three times the wait, up to the most.
+ * mbm_client_setBackoff: the client waits `delayMs` before the first repetition, twice that
+ * before the second, three times that before the third, but at most `maxDelayMs`.
  */
 #define MBM_BACKOFF_LINEAR 2
 
 /**
- * mbm_client_setBackoff: once, twice, four times the wait, up to the most.
+ * mbm_client_setBackoff: the client waits `delayMs` before the first repetition, twice that
+ * before the second, four times that before the third, but at most `maxDelayMs`.
  */
 #define MBM_BACKOFF_EXPONENTIAL 3
 
 /**
- * A client of one serial line or one TCP stream: up to 16 requests are queued,
- * mbm_client_poll moves them on, and nothing ever waits.
+ * A client of one serial line or one TCP stream. It queues up to 16 requests.
+ * mbm_client_poll sends and receives; no function ever waits.
  *
- * Storage is yours and must be zero before first use, which a static object is.
- * One of the mbm_client_begin functions comes first. Use one object from one
- * thread and never from an interrupt; several objects are independent of each
- * other.
+ * You own the storage. It must be zero before first use, as a static object is. Call one of
+ * the mbm_client_begin functions first. Use an object from one thread only, and never from
+ * an interrupt. Several objects are independent of each other.
  *
- * A `done` function may call every function on the client that calls it, but
- * mbm_client_poll, which returns MBM_BUSY. A hook of the port, and the `random`
- * function of mbm_client_setJitter, may call none: each returns MBM_BUSY and
- * changes nothing, and a getter returns what it returns for an object that was
- * never begun.
+ * The `done` function of a request may call every function on the client that calls it,
+ * except mbm_client_poll, which then returns MBM_BUSY. A hook of the port, and the `random`
+ * function of mbm_client_setJitter, must not use the client: each function returns MBM_BUSY
+ * and changes nothing, and a getter returns what it returns for an object that was never
+ * begun.
  */
 typedef struct mbm_client {
     /**
@@ -1393,11 +1431,11 @@ typedef struct mbm_client {
 } mbm_client;
 
 /**
- * What closes a link and opens it anew, for mbm_client_reconnect.
+ * Your hooks that close a link and open it again, for mbm_client_reconnect.
  */
 typedef struct mbm_linkHooks {
     /**
-     * Handed to both hooks. Yours, may be NULL.
+     * Your pointer, passed to both hooks; may be NULL.
      */
     void *context;
     /**
@@ -1405,65 +1443,68 @@ typedef struct mbm_linkHooks {
      */
     void (*disconnect)(void *context);
     /**
-     * Optional: opens the link without waiting. Returns MBM_OK, MBM_PENDING if
-     * that goes on while the port takes no bytes yet, or another status.
+     * Optional: opens the link without waiting. Returns MBM_OK if the link is open,
+     * MBM_PENDING if the connection is still being made and the port accepts no bytes yet,
+     * or another status.
      */
     uint8_t (*connect)(void *context);
 } mbm_linkHooks;
 
 /**
- * A request to a device, and what comes of it. Yours, and zero before you set
- * the fields that you need; it may be used again and again.
+ * A request to a device, and its result. You own the storage. Zero it before first use, and
+ * then set the fields that you need. You may use it for any number of requests.
  *
- * From the call that queues it until it has ended, which `done` or `status`
- * tells, leave it alone, and what it points to. Data and reply are words in the
- * machine's byte order where a function transfers registers; where it transfers
- * coils or bytes, they are bytes as on the wire, of coils the lowest bit first.
+ * From the call that queues it until it has ended, do not use or change it, nor what it
+ * points to. It has ended when `done` is called, or when `status` is no longer MBM_PENDING.
+ *
+ * If a function transfers registers, `data` and `reply` are words in the machine's byte
+ * order. If it transfers coils or bytes, they are bytes as on the wire; the first coil is
+ * the lowest bit.
  */
 typedef struct mbm_clientRequest {
     /**
-     * Optional: called by mbm_client_poll when the request has ended, but not for one
-     * that mbm_client_cancel gave up. It may queue requests, this one too, and cancel
-     * others.
+     * Optional: mbm_client_poll calls it when the request has ended, but not after
+     * mbm_client_cancel or a begin function gave the request up. It may queue requests, also
+     * this one, and cancel others.
      */
     void (*done)(void *context, struct mbm_clientRequest *request);
     /**
-     * Handed to `done`. Yours, may be NULL.
+     * Your pointer, passed to `done`; may be NULL.
      */
     void *context;
     /**
-     * What functions that write send.
+     * The data that functions that write send.
      */
     const void *data;
     /**
-     * What functions that read fill; NULL if only the status is wanted.
+     * Receives the data that functions that read return; NULL if you want the status only.
      */
     void *reply;
     /**
-     * Bytes that `reply` has room for.
+     * The number of bytes that `reply` can hold.
      */
     uint16_t replyBytes;
     /**
-     * A number of yours, which stays as you set it. In TCP frames no two pending
-     * requests may have the same one, except 0. It is not the transaction identifier
+     * A number of your choice, which the client does not change. In TCP frames no two
+     * pending requests may have the same one, except 0. It is not the transaction identifier
      * on the wire: mbm_client_wireTransaction returns that.
      */
     uint16_t transaction;
     /**
-     * Whom it is for. On a serial line 1 to 247; 0 is broadcast; 248 to 255, which the
-     * standard reserves, are sent as they are. On TCP 1 to 255.
+     * The unit identifier of the device. On a serial line 1 to 247; 0 is broadcast; the
+     * client also sends to 248 to 255, which the standard reserves. On TCP 1 to 255.
      */
     uint8_t unit;
     /**
-     * MBM_PENDING from being queued to its end, then how it ended.
+     * MBM_PENDING from the call that queues the request until it ends; then its result.
      */
     uint8_t status;
     /**
-     * The raw exception code of the response; 0 if it was none.
+     * The exception code of the response as received; 0 if the response was no exception.
      */
     uint8_t exception;
     /**
-     * Bytes received in `reply`.
+     * The number of bytes received into `reply`.
      */
     uint8_t length;
     /**
@@ -1473,29 +1514,29 @@ typedef struct mbm_clientRequest {
 } mbm_clientRequest;
 
 /**
- * What is kept for one unit, in an array of yours for mbm_client_setUnits. The
- * counts are yours to read and to zero; each wraps at 2^32.
+ * The record of one unit, an item of the array for mbm_client_setUnits. You may read and
+ * zero the counters at any time, but not from an interrupt; each wraps at 2^32.
  */
 typedef struct mbm_clientUnit {
     /**
-     * Requests that ended, retries apart.
+     * Requests that ended, without retries.
      */
     uint32_t requests;
     /**
-     * Of these, those that were answered, exceptions included.
+     * Requests that the unit answered, also with an exception.
      */
     uint32_t replies;
     /**
-     * Of the answers, those that were exceptions.
+     * Requests that the unit answered with an exception.
      */
     uint32_t exceptions;
     /**
-     * Requests that were asked again.
+     * Repetitions of requests.
      */
     uint32_t retries;
     /**
-     * Set by you: rest for this unit from the end of a request to the next, in
-     * microseconds; more than 2^31 (36 minutes) means 2^31.
+     * Set by you: the minimum time from the end of a request to the next request to this
+     * unit, in microseconds; a value above 2^31 (36 minutes) means 2^31.
      */
     uint32_t delayUs;
     /**
@@ -1503,11 +1544,11 @@ typedef struct mbm_clientUnit {
      */
     uint32_t last;
     /**
-     * Set by you: which unit this is.
+     * Set by you: the unit identifier.
      */
     uint8_t unit;
     /**
-     * How the last request ended, MBM_OK if there was none.
+     * The status of the last request that ended; MBM_OK if none has ended.
      */
     uint8_t status;
     /**
@@ -1517,18 +1558,17 @@ typedef struct mbm_clientUnit {
 } mbm_clientUnit;
 
 /**
- * Makes an object a client of a serial line, in RTU frames (serial line guide
- * V1.02, 2.5.1).
+ * Begins a client of a serial line with RTU frames (serial line guide V1.02, 2.5.1).
  *
  * This and the other mbm_client_begin functions may be called again at any time, also with
- * another framing. All pending requests are given up as by mbm_client_cancel: their status
- * is MBM_CANCELLED and `done` is not called. The settings are as at first. A call that is
- * refused changes nothing.
+ * another framing. Then the client gives up all pending requests as mbm_client_cancel does:
+ * their status is MBM_CANCELLED and `done` is not called. All settings return to their
+ * defaults. A call that is refused changes nothing.
  *
  * @param client      the object; zeroed before the first call
- * @param port        copied; read, write and micros must be there
- * @param frame       bytes of one frame, valid for as long as the client is used
- * @param frameBytes  at least 8; 256 hold any frame
+ * @param port        the port, which is copied; read, write and micros must not be NULL
+ * @param frame       the buffer of one frame, valid for as long as the client is used
+ * @param frameBytes  bytes of `frame`, at min_frame_bytes 8; 256 hold any frame
  * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
  *         the client is suspended
  */
@@ -1538,14 +1578,14 @@ uint8_t mbm_client_beginRtu(struct mbm_client *client,
                             uint16_t frameBytes);
 
 /**
- * Makes an object a client of a serial line, in ASCII frames (serial line guide
- * V1.02, 2.5.2). No gap is kept between frames; a second without a character
- * ends one that is not whole.
+ * Begins a client of a serial line with ASCII frames (serial line guide V1.02, 2.5.2). It
+ * keeps no gap between frames. If no character arrives for one second, the client discards
+ * an incomplete frame.
  *
  * @param client      the object; zeroed before the first call
- * @param port        copied; read, write and micros must be there
- * @param frame       bytes of one frame, valid for as long as the client is used
- * @param frameBytes  at least 17; 513 hold any frame
+ * @param port        the port, which is copied; read, write and micros must not be NULL
+ * @param frame       the buffer of one frame, valid for as long as the client is used
+ * @param frameBytes  bytes of `frame`, at min_frame_bytes 17; 513 hold any frame
  * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
  *         the client is suspended
  */
@@ -1555,13 +1595,13 @@ uint8_t mbm_client_beginAscii(struct mbm_client *client,
                               uint16_t frameBytes);
 
 /**
- * Makes an object a client that sends RTU frames through a TCP stream, for
- * converters that pass on what they get. No gap is kept, nothing is broadcast.
+ * Begins a client that sends RTU frames through a TCP stream, for converters that pass
+ * bytes from TCP to a serial line unchanged. It keeps no gap and does not broadcast.
  *
  * @param client      the object; zeroed before the first call
- * @param port        copied; read, write and micros must be there
- * @param frame       bytes of one frame, valid for as long as the client is used
- * @param frameBytes  at least 8; 256 hold any frame
+ * @param port        the port, which is copied; read, write and micros must not be NULL
+ * @param frame       the buffer of one frame, valid for as long as the client is used
+ * @param frameBytes  bytes of `frame`, at min_frame_bytes 8; 256 hold any frame
  * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
  *         the client is suspended
  */
@@ -1571,18 +1611,20 @@ uint8_t mbm_client_beginRtuOverTcp(struct mbm_client *client,
                                    uint16_t frameBytes);
 
 /**
- * Makes an object a client of a TCP stream, in frames with the MBAP header
- * (messaging on TCP/IP guide V1.0b, 3.1.3). All 16 requests may be under way at
- * once; responses are matched by their transaction id, in any order.
+ * Begins a client of a TCP stream with frames that have the MBAP header (messaging on
+ * TCP/IP guide V1.0b, 3.1.3). All 16 requests may be under way at once. The client matches
+ * responses to requests by the transaction identifier, in any order.
  *
  * @param client         the object; zeroed before the first call
- * @param port           copied; read, write and micros must be there
- * @param incoming       received bytes, valid for as long as the client is used
- * @param incomingBytes  at least 9; 260 hold any frame, more take in more
- *                       responses at a time
- * @param outgoing       bytes to send, valid for as long as the client is used
- * @param outgoingBytes  at least 12; 260 hold any frame, more gather more
- *                       requests for one write
+ * @param port           the port, which is copied; read, write and micros must not be NULL
+ * @param incoming       the buffer of received bytes, valid for as long as the client is
+ *                       used
+ * @param incomingBytes  bytes of `incoming`, at min_frame_bytes 9; 260 hold any frame. A larger
+ *                       buffer takes more responses from one read
+ * @param outgoing       the buffer of bytes to send, valid for as long as the client is
+ *                       used
+ * @param outgoingBytes  bytes of `outgoing`, at min_frame_bytes 12; 260 hold any frame. A larger
+ *                       buffer collects more requests for one write
  * @return MBM_OK; MBM_INVALID_ARGUMENT; MBM_BUSY from within a hook of the port, and while
  *         the client is suspended
  */
@@ -1594,111 +1636,112 @@ uint8_t mbm_client_beginTcp(struct mbm_client *client,
                             uint16_t outgoingBytes);
 
 /**
- * Sets the character that ends ASCII frames behind CR, in place of LF, in both
- * directions; for devices that were told another one (function 08 with
- * sub-function 03, V1.1b3, 6.8.1). That request is answered with the old one: call
- * this when it has ended, for example from its `done`.
+ * Sets the character that ends ASCII frames after CR, instead of LF, in both
+ * directions. Use it for devices that were set to another character by function 08 with
+ * sub-function 03 (V1.1b3, 6.8.1). A device still ends its response to that request with
+ * the old character: call this function when the request has ended, for example in its
+ * `done`.
  *
  * @param client     the object, begun with mbm_client_beginAscii
- * @param character  1 to 127, but CR, the colon and hexadecimal digits
+ * @param character  1 to 127, except CR, the colon and hexadecimal digits
  * @return MBM_OK; MBM_BUSY while a request is under way; MBM_INVALID_ARGUMENT, also
  *         for a client of another framing; MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setDelimiter(struct mbm_client *client, uint8_t character);
 
 /**
- * Sets how many requests are under way at once on TCP, for servers that take fewer
- * at a time (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 1 to
- * 16); some drop what comes in one segment with another request. The queue holds 16 in any case.
+ * Sets how many requests may be under way at once on TCP. Use it for servers that accept
+ * fewer at a time (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 1
+ * to 16): some drop a request that arrives in one segment with another. The queue always
+ * holds 16.
  *
  * @param client  the object
- * @param most    1 to 16, which is so at first; on a serial line, and in RTU over
- *                TCP, 1
+ * @param most    1 to 16; the default is 16. On a serial line and in RTU over TCP only 1
+ *                is accepted
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_setInFlight(struct mbm_client *client,
-                               uint8_t most);
+uint8_t mbm_client_setInFlight(struct mbm_client *client, uint8_t most);
 
 /**
- * Closes the link and opens it anew. What was half received is forgotten, and
- * requests that were under way end with MBM_LINK_LOST at the next polls; those
- * that still waited go over the new link.
+ * Closes the link and opens it again. The client discards an incomplete response. Requests
+ * that were under way end with MBM_LINK_LOST at the next calls of mbm_client_poll. Requests
+ * that were not sent yet are sent over the new link.
  *
  * @param client  the object
- * @param link    what does it, used during this call only; NULL if that has been
- *                done already
- * @return what `connect` returns, MBM_OK without it; MBM_BUSY while the line is
- *         lent, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param link    your hooks, used during this call only; NULL if you have opened the link
+ *                again already
+ * @return what `connect` returns, or MBM_OK without `connect`; MBM_BUSY while the client is
+ *         suspended; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_reconnect(struct mbm_client *client, const struct mbm_linkHooks *link);
+uint8_t mbm_client_reconnect(struct mbm_client *client,
+                             const struct mbm_linkHooks *link);
 
 /**
- * Whether the link is not known to be lost.
+ * Returns whether the link works, as far as the client knows.
  *
- * If `connect` of mbm_client_reconnect returned MBM_PENDING, this is 0 until a reply
- * arrives. Do not reconnect again before the connection had its time: the port knows
- * better whether it is still being made, for example mbm_tcp_isConnected.
+ * If `connect` of mbm_client_reconnect returned MBM_PENDING, this function returns 0 until
+ * a reply arrives. Do not reconnect again while the connection is still being made. The
+ * port knows whether it is: for example, call mbm_tcp_isConnected.
  *
  * @param client  the object
- * @return 0 from a request that ended with MBM_LINK_LOST on, until a reply arrives
- *         (an exception is one) or mbm_client_reconnect returns MBM_OK; 1 otherwise,
- *         and also before the first request
+ * @return 0 after a request ended with MBM_LINK_LOST, until a reply or an exception arrives
+ *         or mbm_client_reconnect returns MBM_OK; otherwise 1, also before the first
+ *         request
  */
 uint8_t mbm_client_isConnected(const struct mbm_client *client);
 
 /**
- * Lends the line to a facade, whose functions then use the client's port; the
- * client's requests wait until mbm_client_resume. One of the two has the line
- * at any time. Until then the client's storage must stay: do not zero it.
+ * Suspends the client, so that a master can use its port. The client's requests wait until
+ * mbm_client_resume. Until then the master uses the client's storage: do not zero it.
  *
- * @param client  the object; for a facade, of RTU frames on a line or over TCP
- * @param master  a facade with buffers, which gets the client's port; NULL if
- *                you use the line in another way
- * @return MBM_OK; MBM_BUSY, with both unchanged, if a request is under way or the line
- *         is lent already; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param client  the object. If `master` is not NULL, it must use RTU or RTU over TCP
+ * @param master  a master with buffers, which then uses the client's port; NULL if you use
+ *                the line in another way
+ * @return MBM_OK; MBM_BUSY, with both objects unchanged, if a request is under way or the
+ *         client is suspended already; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_suspend(struct mbm_client *client, struct mbm_master *master);
+uint8_t mbm_client_suspend(struct mbm_client *client,
+                           struct mbm_master *master);
 
 /**
- * Takes the line back. The facade has no port then, so that its functions refuse
- * with MBM_NOT_INITIALISED.
+ * Resumes the client. The master then has no port: its functions that make a request return
+ * MBM_NOT_INITIALISED.
  *
  * @param client  the object
- * @param master  as for mbm_client_suspend
- * @return MBM_OK, MBM_BUSY while the facade has a request under way,
- *         MBM_INVALID_ARGUMENT if the line was not lent, MBM_NOT_INITIALISED
+ * @param master  the master that was passed to mbm_client_suspend; NULL if none was
+ * @return MBM_OK; MBM_BUSY while the master has a request under way;
+ *         MBM_INVALID_ARGUMENT if the client was not suspended; MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_resume(struct mbm_client *client, struct mbm_master *master);
+uint8_t mbm_client_resume(struct mbm_client *client,
+                          struct mbm_master *master);
 
 /**
- * Moves all requests on, without waiting, and calls `done` of those that have
+ * Sends and receives for all requests, without waiting, and calls `done` of those that have
  * ended, of at most 17 in one call.
  *
- * Call it as often as you like; mbm_client_pollDelay tells when the next call
- * is due.
+ * Call it as often as you like. mbm_client_pollDelay returns when the next call is due.
  *
  * @param client  the object
- * @return MBM_PENDING while requests wait or are under way, MBM_OK if there are
- *         none, MBM_BUSY from within `done` and while the line is lent;
+ * @return MBM_PENDING while requests are pending; MBM_OK if none is; MBM_BUSY from within
+ *         `done` or a hook of the port, and while the client is suspended;
  *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_poll(struct mbm_client *client);
 
 /**
- * How long mbm_client_poll will find nothing to do unless a byte arrives, so
- * that a program may wait for one in select, or sleep, until then. Bytes are taken
- * only while a request is pending: with none, wait for something else.
+ * Returns how long mbm_client_poll will have nothing to do unless a byte arrives. A program
+ * may sleep, or wait for a byte in select, for that time. The client reads bytes only while
+ * a request is pending.
  *
  * @param client  the object
- * @return microseconds; 0 means poll now, and is returned within a hook of the port;
- *         0xFFFFFFFF that there is no request; 1000
- *         while a TCP port does not take what is to be sent: to poll sooner, wait
- *         for that too, as mbm_tcp_wait does
+ * @return microseconds; 0 means poll now, also from within a hook of the port; 0xFFFFFFFF
+ *         means that no request is pending. While a TCP port accepts no bytes to send it is
+ *         1000: to poll sooner, also wait until the port accepts bytes, as mbm_tcp_wait does
  */
 uint32_t mbm_client_pollDelay(struct mbm_client *client);
 
 /**
- * How many requests wait or are under way.
+ * Returns how many requests are pending: queued or under way.
  *
  * @param client  the object
  * @return 0 to 16
@@ -1706,49 +1749,51 @@ uint32_t mbm_client_pollDelay(struct mbm_client *client);
 uint8_t mbm_client_pending(const struct mbm_client *client);
 
 /**
- * Gives a request up. It is yours again at once, with the status MBM_CANCELLED;
- * `done` is not called. It may have reached the device, and may still be answered.
+ * Cancels a request. Its status becomes MBM_CANCELLED, `done` is not called, and you may use
+ * the request again at once. The device may have received the request, and may still send
+ * a reply.
  *
  * @param client   the object
- * @param request  a request that this client was given
+ * @param request  a request that was queued on this client
  * @return MBM_OK; MBM_NOT_PENDING, with nothing changed, for a request that has
  *         ended already or was never queued here; MBM_INVALID_ARGUMENT or
  *         MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_cancel(struct mbm_client *client, struct mbm_clientRequest *request);
+uint8_t mbm_client_cancel(struct mbm_client *client,
+                          struct mbm_clientRequest *request);
 
 /**
- * The transaction identifier on the wire: that of the TCP frame in which the request
- * was sent last. The client chooses it, another one for each frame, also for a retry.
+ * Returns the transaction identifier on the wire: that of the TCP frame in which the client
+ * sent the request last. The client chooses a new one for each frame, also for a retry.
  *
  * @param request  a request, pending or ended
  * @return the identifier; 0 in other framings, for a request that was never sent, and
- *         for NULL. 0 is also an identifier
+ *         for NULL. 0 may also be the identifier of a frame
  */
 uint16_t mbm_client_wireTransaction(const struct mbm_clientRequest *request);
 
 /**
- * Function 01: reads coils into `reply`, eight to a byte, the lowest bit first, the
- * last byte padded with zeros (V1.1b3, 6.1).
+ * Function 01: reads coils into the bytes of `reply`, eight in each byte. The first coil is
+ * the lowest bit; the last byte is padded with zeros (V1.1b3, 6.1).
  *
- * This and the other functions behave alike: they queue a request and return. The
- * request has ended when its `status` is no longer MBM_PENDING: MBM_OK, an exception
- * of the device (0x01 to 0x7F), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
+ * This and the other functions that make a request queue the request and return. The
+ * request has ended when its `status` is no longer MBM_PENDING. Then `status` is MBM_OK, an
+ * exception of the device (0x01 to 0x7F), MBM_RESPONSE_TIMED_OUT, MBM_INVALID_CRC,
  * MBM_MALFORMED_REPLY, MBM_INVALID_SLAVE_ID, MBM_INVALID_FUNCTION, MBM_LINK_LOST,
- * MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes on MBM_OK only.
+ * MBM_LINE_BUSY, MBM_BUFFER_TOO_SMALL or MBM_CANCELLED. `reply` changes only if it is MBM_OK.
  *
  * @param client   the object
  * @param request  the request
- * @param address  first coil, 0 to 65535, as on the wire
- * @param quantity  1 to 2000
- * @return MBM_PENDING: the request is queued; or, with nothing queued,
- *         MBM_ILLEGAL_DATA_VALUE or MBM_ILLEGAL_DATA_ADDRESS for what no device
- *         could accept, MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL,
- *         MBM_DUPLICATE_TRANSACTION, MBM_BUFFER_TOO_SMALL if `reply` has no room
- *         for the data, MBM_INVALID_ARGUMENT for `data` that are NULL,
- *         MBM_NOT_INITIALISED; MBM_BUSY, with the request unchanged, if it is
- *         pending already, and from within a hook of the port. A request that
- *         is refused with another of these has it in `status`
+ * @param address  the first coil, 0 to 65535, as on the wire
+ * @param quantity  the number of coils, 1 to 2000
+ * @return MBM_PENDING if the request is queued. Otherwise nothing was queued, and the
+ *         request's `status` is the same: MBM_ILLEGAL_DATA_VALUE or
+ *         MBM_ILLEGAL_DATA_ADDRESS for a request that no device could accept,
+ *         MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL, MBM_DUPLICATE_TRANSACTION,
+ *         MBM_BUFFER_TOO_SMALL if `reply` cannot hold the data, MBM_INVALID_ARGUMENT if
+ *         `data` is NULL. With the request unchanged: MBM_BUSY if the request is pending
+ *         already, or from within a hook of the port; MBM_INVALID_ARGUMENT if a pointer is
+ *         NULL; MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_readCoils(struct mbm_client *client,
                              struct mbm_clientRequest *request,
@@ -1756,12 +1801,13 @@ uint8_t mbm_client_readCoils(struct mbm_client *client,
                              uint16_t quantity);
 
 /**
- * Function 02: reads discrete inputs, as mbm_client_readCoils (V1.1b3, 6.2).
+ * Function 02: reads discrete inputs into the bytes of `reply`, as mbm_client_readCoils
+ * does (V1.1b3, 6.2).
  *
  * @param client   the object
  * @param request  the request
- * @param address  first input, 0 to 65535, as on the wire
- * @param quantity  1 to 2000
+ * @param address  the first input, 0 to 65535, as on the wire
+ * @param quantity  the number of inputs, 1 to 2000
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_readDiscreteInputs(struct mbm_client *client,
@@ -1774,8 +1820,8 @@ uint8_t mbm_client_readDiscreteInputs(struct mbm_client *client,
  *
  * @param client   the object
  * @param request  the request
- * @param address  first register, 0 to 65535, as on the wire
- * @param quantity  1 to 125
+ * @param address  the first register, 0 to 65535, as on the wire
+ * @param quantity  the number of registers, 1 to 125
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_readHoldingRegisters(struct mbm_client *client,
@@ -1788,8 +1834,8 @@ uint8_t mbm_client_readHoldingRegisters(struct mbm_client *client,
  *
  * @param client   the object
  * @param request  the request
- * @param address  first register, 0 to 65535, as on the wire
- * @param quantity  1 to 125
+ * @param address  the first register, 0 to 65535, as on the wire
+ * @param quantity  the number of registers, 1 to 125
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_readInputRegisters(struct mbm_client *client,
@@ -1798,12 +1844,12 @@ uint8_t mbm_client_readInputRegisters(struct mbm_client *client,
                                       uint16_t quantity);
 
 /**
- * Function 05: switches a coil (V1.1b3, 6.5).
+ * Function 05: switches one coil on or off (V1.1b3, 6.5).
  *
  * @param client   the object
  * @param request  the request
- * @param address  0 to 65535, as on the wire
- * @param on  0 is off, anything else is on
+ * @param address  the coil, 0 to 65535, as on the wire
+ * @param on  0 is off, any other value is on
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_writeSingleCoil(struct mbm_client *client,
@@ -1812,12 +1858,12 @@ uint8_t mbm_client_writeSingleCoil(struct mbm_client *client,
                                    uint8_t on);
 
 /**
- * Function 06: writes a holding register (V1.1b3, 6.6).
+ * Function 06: writes one holding register (V1.1b3, 6.6).
  *
  * @param client   the object
  * @param request  the request
- * @param address  0 to 65535, as on the wire
- * @param value  the value
+ * @param address  the register, 0 to 65535, as on the wire
+ * @param value  its new value
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_writeSingleRegister(struct mbm_client *client,
@@ -1826,13 +1872,13 @@ uint8_t mbm_client_writeSingleRegister(struct mbm_client *client,
                                        uint16_t value);
 
 /**
- * Function 0F: writes the coils of `data`, eight to a byte, the lowest bit first
- * (V1.1b3, 6.11).
+ * Function 0F: writes coils from the bytes of `data`, eight in each byte. The first coil is
+ * the lowest bit (V1.1b3, 6.11).
  *
  * @param client   the object
  * @param request  the request
- * @param address  first coil, 0 to 65535, as on the wire
- * @param quantity  1 to 1968
+ * @param address  the first coil, 0 to 65535, as on the wire
+ * @param quantity  the number of coils, 1 to 1968
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_writeMultipleCoils(struct mbm_client *client,
@@ -1841,12 +1887,12 @@ uint8_t mbm_client_writeMultipleCoils(struct mbm_client *client,
                                       uint16_t quantity);
 
 /**
- * Function 10: writes the words of `data` (V1.1b3, 6.12).
+ * Function 10: writes the words of `data` to holding registers (V1.1b3, 6.12).
  *
  * @param client   the object
  * @param request  the request
- * @param address  first register, 0 to 65535, as on the wire
- * @param quantity  1 to 123
+ * @param address  the first register, 0 to 65535, as on the wire
+ * @param quantity  the number of registers, 1 to 123
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_writeMultipleRegisters(struct mbm_client *client,
@@ -1860,9 +1906,9 @@ uint8_t mbm_client_writeMultipleRegisters(struct mbm_client *client,
  *
  * @param client   the object
  * @param request  the request
- * @param address  0 to 65535, as on the wire
- * @param andMask  bits to keep
- * @param orMask  bits to set where none are kept
+ * @param address  the register, 0 to 65535, as on the wire
+ * @param andMask  1 for each bit of the register to keep
+ * @param orMask  the new value of the bits that are not kept
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_maskWriteRegister(struct mbm_client *client,
@@ -1872,15 +1918,15 @@ uint8_t mbm_client_maskWriteRegister(struct mbm_client *client,
                                      uint16_t orMask);
 
 /**
- * Function 17: writes the words of `data`, then reads into the words of `reply`
- * (V1.1b3, 6.17).
+ * Function 17: the device writes the words of `data` to holding registers first. Then it
+ * reads holding registers, which arrive in the words of `reply` (V1.1b3, 6.17).
  *
  * @param client   the object
  * @param request  the request
- * @param readAddress  first register to read
- * @param readQuantity  1 to 125
- * @param writeAddress  first register to write
- * @param writeQuantity  1 to 121
+ * @param readAddress  the first register to read, 0 to 65535
+ * @param readQuantity  the number of registers to read, 1 to 125
+ * @param writeAddress  the first register to write, 0 to 65535
+ * @param writeQuantity  the number of registers to write, 1 to 121
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_readWriteMultipleRegisters(struct mbm_client *client,
@@ -1891,7 +1937,8 @@ uint8_t mbm_client_readWriteMultipleRegisters(struct mbm_client *client,
                                               uint16_t writeQuantity);
 
 /**
- * Function 07: reads eight outputs into a byte (V1.1b3, 6.7).
+ * Function 07: reads the eight exception status outputs into one byte of `reply` (V1.1b3,
+ * 6.7).
  *
  * @param client   the object
  * @param request  the request
@@ -1901,15 +1948,15 @@ uint8_t mbm_client_readExceptionStatus(struct mbm_client *client,
                                        struct mbm_clientRequest *request);
 
 /**
- * Function 08: sends the words of `data`, and reads as many into `reply` (V1.1b3,
- * 6.8). No device responds to sub-function 04, Force Listen Only Mode.
+ * Function 08: sends the words of `data`, and reads the same number of words into `reply`
+ * (V1.1b3, 6.8). No device responds to sub-function 04, Force Listen Only Mode.
  *
  * @param client   the object
  * @param request  the request
- * @param subFunction  0 (Return Query Data) to 0x14. Others, which the standard
- *                     reserves, are sent as they are, and a response of one word is
- *                     expected; for one of another length see mbm_client_custom
- * @param words  1; 1 to 125 for sub-function 0
+ * @param subFunction  0 (Return Query Data) to 0x14. The client also sends the others,
+ *                     which the standard reserves, and expects a response of one word; for
+ *                     a response of another length use mbm_client_custom
+ * @param words  the number of words of `data`: 1; for sub-function 0, 1 to 125
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_diagnostics(struct mbm_client *client,
@@ -1918,7 +1965,7 @@ uint8_t mbm_client_diagnostics(struct mbm_client *client,
                                uint16_t words);
 
 /**
- * Function 0B: reads the status word and the event count into two words (V1.1b3,
+ * Function 0B: reads the status word and the event count into two words of `reply` (V1.1b3,
  * 6.9).
  *
  * @param client   the object
@@ -1929,8 +1976,9 @@ uint8_t mbm_client_getCommEventCounter(struct mbm_client *client,
                                        struct mbm_clientRequest *request);
 
 /**
- * Function 0C: reads status, event count and message count, two bytes each with the
- * high byte first, and up to 64 events, the latest first (V1.1b3, 6.10).
+ * Function 0C: reads status, event count and message count, and then up to 64 events, into
+ * the bytes of `reply`. The first three have two bytes each, the high byte first. An event
+ * is one byte; the latest event is first (V1.1b3, 6.10).
  *
  * @param client   the object
  * @param request  the request
@@ -1940,10 +1988,10 @@ uint8_t mbm_client_getCommEventLog(struct mbm_client *client,
                                    struct mbm_clientRequest *request);
 
 /**
- * Function 11: reads what the device says of itself, as it likes (V1.1b3, 6.13). `reply`
- * gets all that follows the byte count, also from a device that counts its id alone
- * and sends more. In RTU frames the silence after it ends such a reply; one that
- * counts right is not waited for.
+ * Function 11: reads the server id, whose format is specific to the device (V1.1b3, 6.13).
+ * `reply` receives all bytes after the byte count. Some devices count only the id and send
+ * more bytes: `reply` receives those too. In RTU frames silence ends such a reply. The
+ * client does not wait for silence if the byte count is right.
  *
  * @param client   the object
  * @param request  the request
@@ -1953,13 +2001,14 @@ uint8_t mbm_client_reportServerId(struct mbm_client *client,
                                   struct mbm_clientRequest *request);
 
 /**
- * Function 14: reads records in a row of one file into words (V1.1b3, 6.14).
+ * Function 14: reads consecutive records of one file into the words of `reply` (V1.1b3,
+ * 6.14).
  *
  * @param client   the object
  * @param request  the request
- * @param file  1 to 65535
- * @param record  first record, 0 to 9999
- * @param quantity  1 to 121
+ * @param file  the file number, 1 to 65535
+ * @param record  the first record, 0 to 9999
+ * @param quantity  the number of records, 1 to 121
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_readFileRecord(struct mbm_client *client,
@@ -1969,14 +2018,14 @@ uint8_t mbm_client_readFileRecord(struct mbm_client *client,
                                   uint16_t quantity);
 
 /**
- * Function 15: writes the words of `data` to records in a row of one file (V1.1b3,
+ * Function 15: writes the words of `data` to consecutive records of one file (V1.1b3,
  * 6.15).
  *
  * @param client   the object
  * @param request  the request
- * @param file  1 to 65535
- * @param record  first record, 0 to 9999
- * @param quantity  1 to 122
+ * @param file  the file number, 1 to 65535
+ * @param record  the first record, 0 to 9999
+ * @param quantity  the number of records, 1 to 122
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_writeFileRecord(struct mbm_client *client,
@@ -1986,12 +2035,13 @@ uint8_t mbm_client_writeFileRecord(struct mbm_client *client,
                                    uint16_t quantity);
 
 /**
- * Function 14 of several groups: `data` are the sub-requests as on the wire, seven
- * bytes each; `reply` gets the sub-responses as on the wire (V1.1b3, 6.14).
+ * Function 14 with several groups: reads records of several files, or of several ranges.
+ * `data` contains the sub-requests as on the wire, seven bytes each. `reply` receives the
+ * sub-responses as on the wire (V1.1b3, 6.14).
  *
  * @param client   the object
  * @param request  the request
- * @param bytes  7 to 245, a multiple of 7
+ * @param bytes  the number of bytes of `data`, 7 to 245, a multiple of 7
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_readFileRecords(struct mbm_client *client,
@@ -1999,12 +2049,12 @@ uint8_t mbm_client_readFileRecords(struct mbm_client *client,
                                    uint16_t bytes);
 
 /**
- * Function 15 of several groups: `data` are the sub-requests as on the wire (V1.1b3,
- * 6.15).
+ * Function 15 with several groups: writes records of several files, or of several ranges.
+ * `data` contains the sub-requests as on the wire (V1.1b3, 6.15).
  *
  * @param client   the object
  * @param request  the request
- * @param bytes  9 to 251
+ * @param bytes  the number of bytes of `data`, 9 to 251
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_writeFileRecords(struct mbm_client *client,
@@ -2012,11 +2062,12 @@ uint8_t mbm_client_writeFileRecords(struct mbm_client *client,
                                     uint16_t bytes);
 
 /**
- * Function 18: reads up to 31 registers of a queue into words (V1.1b3, 6.18).
+ * Function 18: reads up to 31 registers of a FIFO queue into the words of `reply` (V1.1b3,
+ * 6.18).
  *
  * @param client   the object
  * @param request  the request
- * @param address  the pointer address of the queue
+ * @param address  the FIFO pointer address of the queue, 0 to 65535
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_readFifoQueue(struct mbm_client *client,
@@ -2024,14 +2075,14 @@ uint8_t mbm_client_readFifoQueue(struct mbm_client *client,
                                  uint16_t address);
 
 /**
- * Function 2B/0E: reads objects that identify the device (V1.1b3, 6.21). `reply` gets,
- * as on the wire, conformity level, more follows (0 or FF), the next object id, how
- * many objects there are, and of each its id, length and value.
+ * Function 2B/0E: reads objects that identify the device (V1.1b3, 6.21). `reply` receives,
+ * as on the wire: the conformity level, more follows (0 or FF), the next object id, the
+ * number of objects, and of each object its id, length and value.
  *
  * @param client   the object
  * @param request  the request
- * @param code  1 basic, 2 regular, 3 extended, 4 one object
- * @param object  the object to begin with
+ * @param code  the read device id code, MBM_DEVICE_ID_BASIC to MBM_DEVICE_ID_INDIVIDUAL
+ * @param object  the id of the first object to read
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_readDeviceIdentification(struct mbm_client *client,
@@ -2040,13 +2091,14 @@ uint8_t mbm_client_readDeviceIdentification(struct mbm_client *client,
                                             uint8_t object);
 
 /**
- * Function 2B of any MEI type: sends bytes of `data` and reads what comes (V1.1b3,
- * 6.19). On RTU, silence ends the response.
+ * Function 2B with any MEI type: sends the bytes of `data` after the MEI type, and reads the
+ * bytes after the MEI type of the response into `reply` (V1.1b3, 6.19). On RTU, silence ends
+ * the response.
  *
  * @param client   the object
  * @param request  the request
- * @param meiType  0x0D is CANopen
- * @param bytes  0 to 251
+ * @param meiType  the MEI type, for example MBM_MEI_CANOPEN
+ * @param bytes  the number of bytes of `data`, 0 to 251
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_encapsulatedInterfaceTransport(struct mbm_client *client,
@@ -2055,14 +2107,14 @@ uint8_t mbm_client_encapsulatedInterfaceTransport(struct mbm_client *client,
                                                   uint16_t bytes);
 
 /**
- * Any function: sends bytes of `data` behind the function code, and reads what is
- * behind it in the response.
+ * Any function code: sends the bytes of `data` after the function code, and reads the bytes
+ * after the function code of the response into `reply`.
  *
  * @param client    the object
  * @param request   the request
- * @param function  1 to 127
- * @param bytes     0 to 252
- * @param response  how long the response is; used during this call only
+ * @param function  the function code, 1 to 127
+ * @param bytes     the number of bytes of `data`, 0 to 252
+ * @param response  the length rule of the response; used during this call only
  * @return a status; see mbm_client_readCoils
  */
 uint8_t mbm_client_custom(struct mbm_client *client,
@@ -2072,28 +2124,29 @@ uint8_t mbm_client_custom(struct mbm_client *client,
                           const struct mbm_rule *response);
 
 /**
- * Any request, as it arrived from another client: sends `function` and the bytes of
- * `body`, and reads into `reply` all bytes that follow the function code of the
- * response, as on the wire. This is what a gateway needs: `body` and `reply` are
- * what the functions of mbm_unit_serveCustom get and return.
+ * Forwards a request that arrived from another client: sends `function` and the bytes of
+ * `body`, and reads into `reply` all bytes after the function code of the response, as on
+ * the wire. Use it for a gateway: the functions of mbm_unit_serveCustom receive the same
+ * `body` and return the same `reply`.
  *
- * A response counts only if it answers this request, as in the functions above: its
- * length, byte count, echoed address, value, quantity and records must be right. Of a
- * function that the standard does not define, and of sub-functions of 08 from 0x15 on,
- * silence ends the response on RTU. If you know its length, use mbm_client_custom.
+ * The client accepts a response only if it matches the request, as for the other functions:
+ * its length, byte count, echoed address, value, quantity and records must be right. On RTU,
+ * silence ends the response to a function code that the standard does not define, and to
+ * sub-functions of 08 from 0x15 on. If you know the length of the response, use
+ * mbm_client_custom.
  *
- * 08 with sub-function 04 gets no response: it ends with MBM_OK and `length` 0 after
- * the turnaround delay.
+ * No device responds to 08 with sub-function 04: the request ends with MBM_OK and `length` 0
+ * after the turnaround delay.
  *
  * @param client    the object
  * @param request   the request; if it is queued, its `data` then points into `body`
- * @param function  1 to 127
- * @param body      the bytes after the function code; leave them alone until the
- *                  request has ended; may be NULL if there are none
- * @param bytes     0 to 252
- * @return a status; see mbm_client_readCoils. MBM_ILLEGAL_DATA_VALUE also for a body
- *         whose length or counts are wrong, MBM_ILLEGAL_FUNCTION for function 0 or
- *         one above 127: what a server answers to such a request
+ * @param function  the function code, 1 to 127
+ * @param body      the bytes after the function code; do not change them until the request
+ *                  has ended; may be NULL if `bytes` is 0
+ * @param bytes     the number of bytes of `body`, 0 to 252
+ * @return a status; see mbm_client_readCoils. Also those with which a server answers such a
+ *         request: MBM_ILLEGAL_DATA_VALUE if the length or a count in `body` is wrong,
+ *         MBM_ILLEGAL_FUNCTION if the function code is 0 or above 127
  */
 uint8_t mbm_client_forward(struct mbm_client *client,
                            struct mbm_clientRequest *request,
@@ -2102,100 +2155,106 @@ uint8_t mbm_client_forward(struct mbm_client *client,
                            uint16_t bytes);
 
 /**
- * Sets how long a response may take. The time begins with the end of the request on a
- * serial line and in RTU over TCP; in TCP frames when mbm_client_poll puts the request
- * into the outgoing buffer, also if the port takes it later.
+ * Sets the response timeout. On a serial line and in RTU over TCP, the time starts when the
+ * request has been sent. In TCP frames it starts when mbm_client_poll puts the request into
+ * the outgoing buffer, also if the port accepts it later.
  *
  * @param client        the object
- * @param timeoutMs     0 to 65535; 2000 at first
+ * @param timeoutMs     milliseconds, 0 to 65535; the default is 2000
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_setResponseTimeout(struct mbm_client *client, uint16_t timeoutMs);
+uint8_t mbm_client_setResponseTimeout(struct mbm_client *client,
+                                      uint16_t timeoutMs);
 
 /**
- * Tells the baud rate of an RTU line, from which the gap before a request (t3.5,
- * serial line guide V1.02, 2.5.1.1) and the length of a character follow. It sets
- * nothing on the line. Untold, the gap is 4 ms, which is safe from 9600 up.
+ * Sets the baud rate from which the client computes the gap before an RTU request (t3.5,
+ * serial line guide V1.02, 2.5.1.1) and the duration of a character. It does not configure
+ * the serial line. Without a baud rate the gap is 4 ms, which is enough from 9600 up.
  *
  * @param client  the object
- * @param baud    bits per second; 0 goes back to untold
+ * @param baud    bits per second; 0 (the default): unknown
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_setBaudRate(struct mbm_client *client, uint32_t baud);
+uint8_t mbm_client_setBaudRate(struct mbm_client *client,
+                               uint32_t baud);
 
 /**
- * Sets the silence before a request, in place of t3.5; a later
- * mbm_client_setBaudRate sets it back. Without effect on TCP.
+ * Sets the silence before a request, instead of t3.5. A later call of
+ * mbm_client_setBaudRate sets it back to t3.5. It has no effect on TCP.
  *
  * @param client        the object
- * @param gapUs         counted from the last byte seen or sent; more than 2^31
+ * @param gapUs         microseconds from the last byte received or sent; a value above 2^31
  *                      (36 minutes) means 2^31
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_setGap(struct mbm_client *client, uint32_t gapUs);
+uint8_t mbm_client_setGap(struct mbm_client *client,
+                          uint32_t gapUs);
 
 /**
- * Sets how long a request takes that nobody responds to: a broadcast (serial
- * line guide V1.02, 2.4.1), and 08 with sub-function 04.
+ * Sets the turnaround delay: how long the client waits after a request that no device
+ * answers. These requests are a broadcast (serial line guide V1.02, 2.4.1), and 08 with
+ * sub-function 04.
  *
  * @param client        the object
- * @param delayMs       0 to 65535; 100 at first
+ * @param delayMs       milliseconds, 0 to 65535; the default is 100
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setTurnaroundDelay(struct mbm_client *client, uint16_t delayMs);
 
 /**
- * Sets the quiet time of a serial line, which keeps a late reply from being taken
- * for the answer to a later request; see mbm_master_setQuietTime. Without effect on
- * TCP, where responses have a number.
+ * Sets the quiet time of a serial line. It prevents that the client accepts a late reply as
+ * the reply to a later request: see mbm_master_setQuietTime. It has no effect in TCP frames,
+ * whose transaction identifier shows to which request a reply belongs.
  *
  * @param client        the object
- * @param quietMs       0 to 65535; 100 at first; 0 holds no reply
+ * @param quietMs       milliseconds, 0 to 65535; the default is 100; 0 holds no reply
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_setQuietTime(struct mbm_client *client, uint16_t quietMs);
+uint8_t mbm_client_setQuietTime(struct mbm_client *client,
+                                uint16_t quietMs);
 
 /**
- * Tells that the receiver hears what the driver sends, so each request comes back
- * before its reply and is to be dropped. Without effect on TCP.
+ * Switches echo discarding on or off. Switch it on if the receiver also receives what the
+ * driver sends: then the client discards the copy of each request that arrives before the
+ * reply. It has no effect on TCP.
  *
  * @param client  the object
- * @param on      0 (at first) or 1
+ * @param on      0 (the default) or 1
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setEchoDiscard(struct mbm_client *client, uint8_t on);
 
 /**
- * Holds the driver on after the port's flush, for platforms whose flush returns
- * before the last bit has left. Without effect on TCP.
+ * Sets how long the driver stays on after the port's flush, for platforms whose flush
+ * returns before the last bit was sent. It has no effect on TCP.
  *
  * @param client      the object
- * @param characters  times one character of the told baud rate (9600 if untold);
- *                    0 at first
+ * @param characters  the time in characters at the baud rate of mbm_client_setBaudRate
+ *                    (without one, at 9600); the default is 0
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setPostFlushHold(struct mbm_client *client, uint8_t characters);
 
 /**
- * Sets how often a request is repeated whose response is missing, damaged or
- * malformed, or that the port did not take. Exceptions are responses and are not
- * repeated, nor are requests that a lost link interrupted, nor those whose response is
+ * Sets how often the client repeats a request whose response is missing, damaged or
+ * malformed, or that the port did not accept. It does not repeat a request that was
+ * answered with an exception, one that a lost link interrupted, or one whose response is
  * too long for a buffer.
  *
  * @param client   the object
- * @param retries  0 to 255; 0 at first
+ * @param retries  0 to 255; the default is 0
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setRetries(struct mbm_client *client, uint8_t retries);
 
 /**
- * Sets how long a request waits before it is repeated. Other requests are sent
- * meanwhile.
+ * Sets how long a request waits before the client repeats it. Meanwhile the client sends
+ * other requests.
  *
  * @param client            the object
- * @param backoff           MBM_BACKOFF_NONE (at first) to MBM_BACKOFF_EXPONENTIAL
- * @param delayMs           the wait before the first repetition
- * @param maxDelayMs        the longest wait
+ * @param backoff           MBM_BACKOFF_NONE (the default) to MBM_BACKOFF_EXPONENTIAL
+ * @param delayMs           the wait before the first repetition, in milliseconds
+ * @param maxDelayMs        the longest wait, in milliseconds
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setBackoff(struct mbm_client *client,
@@ -2204,15 +2263,17 @@ uint8_t mbm_client_setBackoff(struct mbm_client *client,
                               uint16_t maxDelayMs);
 
 /**
- * Leaves a part of each wait before a repetition to chance, so that several
- * clients do not keep in step.
+ * Shortens each wait before a repetition by a random part, so that several clients do not
+ * repeat their requests at the same time.
  *
  * @param client   the object
- * @param percent  0 (at first) to 100: how much of the wait may be taken off
- * @param random   returns another number each time, for example rand(): one of 32
- *                 bits, of 15 bits, or whose upper bits alone vary. What it
- *                 calls on the client returns MBM_BUSY
- * @param context  handed to `random`
+ * @param percent  0 (the default) to 100: the largest part of the wait by which the client
+ *                 shortens it
+ * @param random   returns a new random number at each call, for example that of rand(). It
+ *                 may have 32 bits, 15 bits, or random bits in its upper half only. A
+ *                 function that it calls on the client returns MBM_BUSY. NULL only if
+ *                 `percent` is 0
+ * @param context  your pointer, passed to `random`; may be NULL
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setJitter(struct mbm_client *client,
@@ -2221,24 +2282,25 @@ uint8_t mbm_client_setJitter(struct mbm_client *client,
                              void *context);
 
 /**
- * Counts into storage of yours from now on. Read and zero it as you like, but not
- * from an interrupt. In TCP frames, a foreign frame is one whose transaction identifier
- * and unit no pending request has; a resynchronisation is a run of bytes that were no
- * frame.
+ * Sets your storage for counters, in which the client counts from now on. You may read and
+ * zero the counters at any time, but not from an interrupt. In TCP frames, foreignFrames
+ * counts frames whose transaction identifier and unit match no pending request, and
+ * resynchronisations counts sequences of bytes that were not a frame.
  *
  * @param client    the object
- * @param counters  zeroed by you; NULL stops counting
+ * @param counters  your counters, zeroed; NULL stops counting
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
-uint8_t mbm_client_setCounters(struct mbm_client *client, struct mbm_counters *counters);
+uint8_t mbm_client_setCounters(struct mbm_client *client,
+                               struct mbm_counters *counters);
 
 /**
- * Keeps a record of some units: how often they were asked and answered, and how
- * long each is left alone between two requests.
+ * Sets the records of units. In a record the client counts the requests to its unit. The
+ * record's `delayUs` sets the minimum time between two requests to the unit.
  *
  * @param client  the object
- * @param units   zeroed by you but for `unit` and `delay`; NULL for none
- * @param count   how many records, 0 to 255
+ * @param units   your array of records, zeroed except `unit` and `delayUs`; NULL for none
+ * @param count   the number of records, 0 to 255
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setUnits(struct mbm_client *client,
@@ -2248,19 +2310,18 @@ uint8_t mbm_client_setUnits(struct mbm_client *client,
 /* ==== 7. Server ===================================================================== */
 
 /**
- * A Modbus server on one line or one connection.
+ * A Modbus server on one serial line or one connection.
  *
- * Storage is yours and must be zero before first use, which a static object is
- * (`static mbm_server server;`). What it serves are units, which several
- * servers may share: one on a serial line and four TCP connections, for
- * example, are five servers with the same units. Use a server and its units from
- * one thread and never from an interrupt; servers that share units belong to one
- * thread.
+ * You provide the storage. It must be zero before first use; a static object is zero. A
+ * server serves units. Several servers may share units: for example, a server on a
+ * serial line and four servers on TCP connections are five servers with the same units.
+ * Use a server and its units from one thread, and never from an interrupt. Use all
+ * servers that share units from the same thread.
  *
- * Hooks and functions of yours run within mbm_server_poll. A function that they
- * call on the server that is polled returns MBM_BUSY and changes nothing: call
- * it when mbm_server_poll has returned. They may call functions on other servers,
- * and the mbm_unit_serve functions on units.
+ * mbm_server_poll calls your hooks and your functions. If they call a function on the
+ * server that is being polled, it returns MBM_BUSY and changes nothing; call it after
+ * mbm_server_poll has returned. They may call functions on other servers, and the
+ * mbm_unit_serve functions on any unit.
  */
 typedef struct mbm_server {
     /**
@@ -2274,25 +2335,26 @@ typedef struct mbm_server {
 } mbm_server;
 
 /**
- * Begins to serve units on a serial line, RTU. The rate is untold, so a frame
- * ends with 4 ms of silence: see mbm_server_setBaudRate.
+ * Begins a server for RTU on a serial line. The baud rate is unknown at first, so 4 ms
+ * of silence end a frame: see mbm_server_setBaudRate.
  *
- * May be called again at any time but from within its hooks; what was under way
- * is dropped; where a response was leaving, the port that the object had is called
- * to switch its driver off. A call that is refused changes nothing. Opens nothing: the port is
- * open already. Units are yours, may be shared between
- * servers, and stay where they are for as long as the object is used, as does
- * the buffer, which keeps nothing between requests.
+ * You may call it again at any time, but not from within a hook of the server. The
+ * server then drops the request or response in progress; if it was sending, it calls
+ * postTransmission of the previous port to switch the driver off. A call that fails
+ * changes nothing. The function does not open the port. The units and the buffer must
+ * stay valid, at the same address, for as long as the server is used. Several servers
+ * may share units. The buffer holds no data between requests.
  *
- * @param server  the object; zeroed before the first call
- * @param port    copied; read, write and micros must be there
- * @param units   what is served: one unit, or an array of them
+ * @param server  the object; zero it before the first call
+ * @param port    is copied; its hooks read, write and micros are required
+ * @param units   the units to serve: one unit, or an array of units
  * @param count   how many units
- * @param frame   bytes of one frame, for requests and responses
- * @param bytes   at least 16; MBM_MAX_FRAME hold any frame. Longer
- *                requests are not heard, longer responses become exception 04
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or a
- *         buffer that is too short; MBM_BUSY from within a hook of this server
+ * @param frame   buffer for one frame, a request or a response
+ * @param bytes   size of `frame` in bytes, at least 16. MBM_MAX_FRAME holds every frame.
+ *                The server ignores a longer request, and answers exception 04 in place
+ *                of a longer response
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a missing hook or a buffer
+ *         that is too short; MBM_BUSY from within a hook of this server
  */
 uint8_t mbm_server_beginRtu(struct mbm_server *server,
                             const struct mbm_port *port,
@@ -2302,15 +2364,16 @@ uint8_t mbm_server_beginRtu(struct mbm_server *server,
                             uint16_t bytes);
 
 /**
- * Begins to serve units on a serial line, ASCII (serial line guide V1.02,
- * 2.5.2). A frame whose next character takes longer than a second is dropped.
+ * Begins a server for ASCII on a serial line (serial line guide V1.02, 2.5.2). The
+ * server drops a frame if the next character takes longer than one second.
  *
  * @param server  see mbm_server_beginRtu
  * @param port    see mbm_server_beginRtu
  * @param units   see mbm_server_beginRtu
  * @param count   see mbm_server_beginRtu
  * @param frame   see mbm_server_beginRtu
- * @param bytes   at least 32; MBM_MAX_ASCII_FRAME hold any frame
+ * @param bytes   size of `frame` in bytes, at least 32; MBM_MAX_ASCII_FRAME holds every
+ *                frame
  * @return a status; see mbm_server_beginRtu
  */
 uint8_t mbm_server_beginAscii(struct mbm_server *server,
@@ -2321,15 +2384,16 @@ uint8_t mbm_server_beginAscii(struct mbm_server *server,
                               uint16_t bytes);
 
 /**
- * Begins to serve units on a TCP connection that was accepted. Requests that
- * wait behind one another in the stream are answered in turn.
+ * Begins a server on an accepted TCP connection. If several requests are in the stream,
+ * the server answers them in order.
  *
  * @param server  see mbm_server_beginRtu; one for each connection
- * @param port    see mbm_server_beginRtu; read, write and clock of the connection
- * @param units   see mbm_server_beginRtu; the unit ids 0 and 255 mean the first
+ * @param port    see mbm_server_beginRtu; its hooks read and write the connection and give
+ *                the time
+ * @param units   see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
  * @param count   see mbm_server_beginRtu
  * @param frame   see mbm_server_beginRtu; one for each connection
- * @param bytes   at least MBM_MAX_TCP_FRAME
+ * @param bytes   size of `frame` in bytes, at least MBM_MAX_TCP_FRAME
  * @return a status; see mbm_server_beginRtu
  */
 uint8_t mbm_server_beginTcp(struct mbm_server *server,
@@ -2340,17 +2404,17 @@ uint8_t mbm_server_beginTcp(struct mbm_server *server,
                             uint16_t bytes);
 
 /**
- * Begins to serve units over a stream of RTU frames, in which silence tells
- * nothing: a TCP connection of RTU over TCP, or a serial adapter that hands
- * bytes over in lumps. A frame ends where its own bytes say so; behind one that
- * is damaged, half a second of silence does.
+ * Begins a server for a stream of RTU frames without timing: a TCP connection that
+ * carries RTU, or a serial adapter that delivers bytes in blocks. The server finds the
+ * end of a frame from its bytes. After a damaged frame, half a second of silence ends
+ * the damaged bytes.
  *
  * @param server  see mbm_server_beginRtu; one for each connection
  * @param port    see mbm_server_beginRtu
- * @param units   see mbm_server_beginRtu; the unit ids 0 and 255 mean the first
+ * @param units   see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
  * @param count   see mbm_server_beginRtu
  * @param frame   see mbm_server_beginRtu; one for each connection
- * @param bytes   at least 16; MBM_MAX_FRAME hold any frame
+ * @param bytes   size of `frame` in bytes, at least 16; MBM_MAX_FRAME holds every frame
  * @return a status; see mbm_server_beginRtu
  */
 uint8_t mbm_server_beginRtuOverTcp(struct mbm_server *server,
@@ -2361,64 +2425,66 @@ uint8_t mbm_server_beginRtuOverTcp(struct mbm_server *server,
                                    uint16_t bytes);
 
 /**
- * Moves the server on, without waiting: takes bytes in, carries a request out
- * once it is whole, sends the response.
+ * Polls the server, without waiting: receives bytes, carries out a complete request, and
+ * sends the response.
  *
- * Call it as often as you like, at least once per character time of the line
- * if nothing else buffers its bytes. On a serial line a response begins with
- * the first call after the line has been silent for t3.5.
+ * Call it often: at least once per character time of the line if nothing else buffers
+ * received bytes. On a serial line the response starts with the first call after the
+ * line has been silent for t3.5.
  *
  * @param server  the object
- * @return MBM_OK; MBM_LINK_LOST if the port said so, which ends a connection;
- *         MBM_MALFORMED_FRAME if what came over TCP is not Modbus, so that
- *         the connection is to be closed; MBM_BUSY from within a hook of this
- *         server; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_OK; MBM_LINK_LOST if the port reported that the connection is lost: close
+ *         it; MBM_MALFORMED_FRAME if the bytes received over TCP are not Modbus: close
+ *         the connection; MBM_BUSY from within a hook of this server;
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_server_poll(struct mbm_server *server);
 
 /**
- * How long mbm_server_poll will find nothing to do unless a byte arrives, so
- * that a program may sleep until then.
+ * Returns how long the program may sleep before the next mbm_server_poll, unless a byte
+ * arrives earlier.
  *
  * @param server  the object
- * @return microseconds; 0 means poll now, and is returned within a hook of this
- *         server; 0xFFFFFFFF until a byte arrives; 1000
- *         while a function of yours returns MBM_REPLY_PENDING or a connection does
- *         not take the response: to go on sooner, poll when that has changed. No
- *         byte is taken meanwhile, so do not wait for one
+ * @return microseconds. 0: poll now; a call from within a hook of this server returns 0
+ *         too. 0xFFFFFFFF: sleep until a byte arrives; also for NULL and for a server
+ *         that was never begun. 1000: a function of yours has returned
+ *         MBM_REPLY_PENDING, or a connection does not accept the response yet; the
+ *         server receives no bytes meanwhile, so do not wait for one, but poll earlier
+ *         if you know that the function or the connection is ready
  */
 uint32_t mbm_server_pollDelay(const struct mbm_server *server);
 
 /**
- * Sets the silence that ends a frame: t3.5 of RTU, the time between two
- * characters of ASCII, and in RTU over TCP the silence after a damaged frame. Without
- * effect in TCP frames. mbm_server_beginRtu and its sisters set it back.
+ * Sets the silence that ends a frame. In RTU it is t3.5, in ASCII the longest time
+ * between two characters, in RTU over TCP the silence after a damaged frame. It has no
+ * effect in TCP. The begin functions restore the default.
  *
- * @param server        the object
- * @param silenceUs     counted from the last byte seen
+ * @param server     the object
+ * @param silenceUs  microseconds since the last received byte; a value above 2^31
+ *                   (36 minutes) counts as 2^31
  * @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
  */
 uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t silenceUs);
 
 /**
- * Tells the baud rate of an RTU line, from which t3.5 follows (serial line guide
- * V1.02, 2.5.1.1). It sets nothing on the line. Other framings do not end with t3.5:
- * for the time that those wait there is mbm_server_setSilence.
+ * Sets the baud rate from which an RTU server computes t3.5 (serial line guide V1.02,
+ * 2.5.1.1). It does not change the rate of the line. Other framings do not use t3.5: see
+ * mbm_server_setSilence.
  *
  * @param server  the object
- * @param baud    bits per second; 0 goes back to untold
+ * @param baud    bits per second; 0 if the rate is unknown, as after mbm_server_beginRtu
  * @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings,
  *         MBM_NOT_INITIALISED or MBM_BUSY
  */
 uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
 
 /**
- * Tells that the receiver of an RTU line hears what the driver sends, so that as
- * many bytes as were sent are dropped behind each response. mbm_server_beginRtu
- * sets it back.
+ * Sets whether the server discards its own echo: on an RTU line whose receiver also
+ * receives what the driver sends, the server then drops as many bytes after each
+ * response as it has sent. mbm_server_beginRtu switches it off.
  *
  * @param server  the object
- * @param on      0 (at first) or 1
+ * @param on      0 for off, the default; anything else for on
  * @return MBM_OK, MBM_INVALID_ARGUMENT for NULL and for other framings,
  *         MBM_NOT_INITIALISED or MBM_BUSY
  */
@@ -2427,23 +2493,25 @@ uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
 /* ==== 8. Units ====================================================================== */
 
 /**
- * What a function of yours returns for an exception: this, or-ed with the code.
+ * A function of yours returns this, or-ed with the exception code (1 to 127), to answer
+ * with an exception.
  */
 #define MBM_REPLY_EXCEPTION 256
 
 /**
- * What a function of yours returns for no response at all.
+ * A function of yours returns this to send no response.
  */
 #define MBM_REPLY_NONE 512
 
 /**
- * What a function of yours returns to be asked again at the next poll, with the
- * same request. The server hears nothing meanwhile.
+ * A function of yours returns this if it has not finished. The next poll calls it again
+ * with the same request. The server receives nothing meanwhile.
  */
 #define MBM_REPLY_PENDING 768
 
 /**
- * Most records that one unit serves, each handed to a mbm_unit_serve function.
+ * The most records that one unit can serve. Each is one struct that you pass to a
+ * mbm_unit_serve function.
  */
 #define MBM_MAX_SERVICES 16
 
@@ -2452,19 +2520,20 @@ uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
  */
 typedef struct mbm_service {
     /**
-     * Serves a request, if it is one of this family. NULL in a zeroed record,
+     * Serves a request if its function belongs to this record. NULL in a zeroed record,
      * which serves nothing.
      */
     size_t (*serve)(struct mbm_service *service, uint8_t *pdu, const void *info);
     /**
-     * What kind of record of its family it is served as, from 1 on; 0 in a zeroed one.
+     * The kind of the record within its family, from 1 on; 0 in a zeroed record.
      */
     uint8_t kind;
 } mbm_service;
 
 /**
- * What a unit knows of its line. Zero it, and hand it to
- * mbm_unit_serveDiagnostics. Counters wrap at 2^16; read them as you like.
+ * The counters, the event log and the listen only mode of a unit. Zero the struct and
+ * pass it to mbm_unit_serveDiagnostics. The counters wrap at 65536; you may read them at
+ * any time. The sub-functions below are those of function 08 (V1.1b3, 6.8), in hex.
  */
 typedef struct mbm_diagnostics {
     /**
@@ -2472,28 +2541,28 @@ typedef struct mbm_diagnostics {
      */
     struct mbm_service service;
     /**
-     * Optional: called when the client restarts the line with sub-function 01 of
-     * 08; `clearLog` is 1 if it cleared the event log too.
+     * Optional: called when the client restarts the communications (sub-function 01).
+     * `clearLog` is 1 if the client cleared the event log too, else 0.
      */
     void (*restart)(void *context, uint8_t clearLog);
     /**
-     * Handed to `restart`. Yours, may be NULL.
+     * Passed to `restart`. Any value; may be NULL.
      */
     void *context;
     /**
-     * What sub-function 02 of 08 returns: yours.
+     * The value that sub-function 02 returns. You set it.
      */
     uint16_t diagnosticRegister;
     /**
-     * Sub-function 0B: frames with a right CRC, for whichever unit.
+     * Sub-function 0B: frames with a right CRC, for any unit.
      */
     uint16_t busMessages;
     /**
-     * Sub-function 0C: frames that arrived damaged.
+     * Sub-function 0C: damaged frames.
      */
     uint16_t busCommunicationErrors;
     /**
-     * Sub-function 0D: exceptions, those of broadcasts too.
+     * Sub-function 0D: exceptions, including those that broadcasts caused.
      */
     uint16_t exceptionErrors;
     /**
@@ -2501,27 +2570,27 @@ typedef struct mbm_diagnostics {
      */
     uint16_t serverMessages;
     /**
-     * Sub-function 0F: requests that were not answered.
+     * Sub-function 0F: requests without a response.
      */
     uint16_t noResponses;
     /**
-     * Sub-function 10: exceptions 07.
+     * Sub-function 10: exceptions with code 07.
      */
     uint16_t naks;
     /**
-     * Sub-function 11: exceptions 06.
+     * Sub-function 11: exceptions with code 06.
      */
     uint16_t busy;
     /**
-     * Sub-function 12: frames that the buffer could not hold.
+     * Sub-function 12: frames that were too long for the buffer.
      */
     uint16_t characterOverruns;
     /**
-     * What 0B returns: requests that were carried out.
+     * The event count that function 0B returns: requests that were carried out.
      */
     uint16_t events;
     /**
-     * 1 in listen only mode.
+     * 1 in listen only mode, else 0.
      */
     uint8_t listenOnly;
     /**
@@ -2531,19 +2600,19 @@ typedef struct mbm_diagnostics {
 } mbm_diagnostics;
 
 /**
- * A unit that servers answer for. Zero it, set `id`, and say what it serves with
- * mbm_unit_serveCoils and its sisters.
+ * A unit that servers answer for. Zero it, set `id`, and call the mbm_unit_serve
+ * functions, for example mbm_unit_serveCoils, for what it serves.
  *
- * Each of those takes a record of yours, which stays valid for as long as the
- * unit is used. A unit has places for MBM_MAX_SERVICES records; one more is
- * refused with MBM_BUFFER_TOO_SMALL. A record may be handed over again, also
- * after you have zeroed and refilled it, and keeps its place. A zeroed record
- * serves nothing until it is handed over again. One record may serve any number
- * of units.
+ * Each mbm_unit_serve function takes a record: a struct of yours, which must stay valid
+ * for as long as the unit is used. A unit has places for MBM_MAX_SERVICES records; one
+ * more returns MBM_BUFFER_TOO_SMALL. You may pass a record again, also after you have
+ * zeroed and refilled it; it keeps its place. A zeroed record serves nothing until you
+ * pass it again. Any number of units may share one record.
  */
 typedef struct mbm_unit {
     /**
-     * Private: the records, in the order in which they are asked, then NULL.
+     * Private: the records in the order in which the unit calls them. NULL follows the
+     * last one.
      */
     struct mbm_service *services[MBM_MAX_SERVICES];
     /**
@@ -2558,16 +2627,17 @@ typedef struct mbm_unit {
      */
     struct mbm_diagnostics *diagnostics;
     /**
-     * The unit id, 1 to 247 (serial line guide V1.02, 2.2); 248 to 255, which the
-     * standard reserves, are taken as they are. 0 answers to every id. A unit that
-     * serves nothing is silent, as if it were not there.
+     * The unit id, 1 to 247 (serial line guide V1.02, 2.2). The ids 248 to 255, which
+     * the standard reserves, are accepted. 0 answers to every id. A unit without any
+     * record does not answer.
      */
     uint8_t id;
 } mbm_unit;
 
 /**
- * Cells that your functions hold, one by one, in place of an array. Zero it, set
- * what you need, and hand it to mbm_unit_serveCallbacks.
+ * Cells that your functions get and set one by one, in place of an array. A cell is a
+ * register, a coil or a discrete input. Zero the struct, set the fields that you need,
+ * and pass it to mbm_unit_serveCallbacks.
  */
 typedef struct mbm_dataCallbacks {
     /**
@@ -2575,20 +2645,22 @@ typedef struct mbm_dataCallbacks {
      */
     struct mbm_service service;
     /**
-     * Handed to each function. Yours, may be NULL.
+     * Passed to each function. Any value; may be NULL.
      */
     void *context;
     /**
-     * Optional, NULL if every address is there: 1 if this one is. What is not
-     * there is answered with exception 02.
+     * Optional; NULL if every address exists. Otherwise returns 1 if this address
+     * exists, else 0. A request for an address that does not exist is answered with
+     * exception 02.
      */
     uint8_t (*isValid)(void *context, uint16_t address);
     /**
-     * A cell that is there; of a bit, 0 or anything else.
+     * Required. Returns the value of an existing cell; of a bit, 0 for off and any other
+     * value for on.
      */
     uint16_t (*get)(void *context, uint16_t address);
     /**
-     * Sets a cell that is there; a bit to 0 or 1. Not needed for what is only read.
+     * Sets an existing cell; a bit to 0 or 1. Required for coils and holding registers.
      */
     void (*set)(void *context, uint16_t address, uint16_t value);
     /**
@@ -2609,16 +2681,16 @@ typedef struct mbm_dataCallbacks {
  */
 typedef struct mbm_request {
     /**
-     * What stands behind the function code.
+     * The data of the request: the bytes after the function code.
      */
     const uint8_t *data;
     /**
-     * Bytes of it, 0 to 252.
+     * Length of `data` in bytes, 0 to 252.
      */
     uint16_t length;
     /**
-     * The unit that it was sent to. On a serial line 0 is broadcast: no response is
-     * sent.
+     * The unit id in the request. 0 on a serial line is a broadcast: the server then
+     * sends no response.
      */
     uint8_t unit;
     /**
@@ -2628,7 +2700,7 @@ typedef struct mbm_request {
 } mbm_request;
 
 /**
- * A function of yours. Zero it, set what you need, and hand it to
+ * A function of yours. Zero the struct, set the fields that you need, and pass it to
  * mbm_unit_serveCustom.
  */
 typedef struct mbm_custom {
@@ -2637,35 +2709,34 @@ typedef struct mbm_custom {
      */
     struct mbm_service service;
     /**
-     * Carries out a request and writes the data of the response, which stand
-     * behind the function code, to `response`. `capacity` is what the frame
-     * buffer has left behind the request, at most 252 of it are used. Returns
-     * how many bytes it wrote, or MBM_REPLY_EXCEPTION | code, MBM_REPLY_NONE or
-     * MBM_REPLY_PENDING.
+     * Carries out a request and writes the data of the response, without the function
+     * code, to `response`. `capacity` is the space in bytes that the frame buffer has
+     * after the request; the server sends at most 252 bytes. Returns the number of bytes
+     * written, or MBM_REPLY_EXCEPTION | code, or MBM_REPLY_NONE, or MBM_REPLY_PENDING.
      */
     uint16_t (*serve)(void *context,
                       const struct mbm_request *request,
                       uint8_t *response,
                       uint16_t capacity);
     /**
-     * Handed to `serve`. Yours, may be NULL.
+     * Passed to `serve`. Any value; may be NULL.
      */
     void *context;
     /**
-     * The function code, 1 to 127; 0 is every function that nothing before it
-     * serves. 65 to 72 and 100 to 110 are left to users (V1.1b3, 5).
+     * The function code, 1 to 127. 0 means every function that no earlier record of the
+     * unit serves. The standard reserves 65 to 72 and 100 to 110 for users (V1.1b3, 5).
      */
     uint8_t code;
     /**
-     * How long its request PDUs are, which RTU over TCP asks. Zeroed, a request is
-     * whole once its CRC is right.
+     * The length of the request PDUs, which a server of RTU over TCP needs. If it is
+     * zeroed, a request is complete when its CRC is right.
      */
     struct mbm_rule length;
 } mbm_custom;
 
 /**
- * Functions that a unit answers with exception 01, though it could serve them:
- * see mbm_unit_switchFunction.
+ * The functions that a unit answers with exception 01, even if it could serve them: see
+ * mbm_unit_switchFunction.
  */
 typedef struct mbm_functionMask {
     /**
@@ -2679,25 +2750,25 @@ typedef struct mbm_functionMask {
 } mbm_functionMask;
 
 /**
- * One file: an array of records, each a register.
+ * One file: an array of records. A record is one register.
  */
 typedef struct mbm_file {
     /**
-     * The records, from record 0 on.
+     * The records, starting with record 0.
      */
     uint16_t *records;
     /**
-     * How many, up to 10000.
+     * How many records the file has, at most 10000.
      */
     uint16_t size;
     /**
-     * The file number, from 1 on.
+     * The file number, 1 to 65535.
      */
     uint16_t number;
 } mbm_file;
 
 /**
- * Files of yours. Zero it, set what you need, and hand it to
+ * Files of yours. Zero the struct, set the fields that you need, and pass it to
  * mbm_unit_serveFiles.
  */
 typedef struct mbm_files {
@@ -2706,17 +2777,18 @@ typedef struct mbm_files {
      */
     struct mbm_service service;
     /**
-     * The files.
+     * The files: an array of `count` elements.
      */
     const struct mbm_file *files;
     /**
-     * How many.
+     * How many files.
      */
     uint16_t count;
     /**
-     * Optional: asked before records are written, for each group of a request
-     * before any is written. `data` are the new values, high bytes first.
-     * Returns 0, or an exception code that refuses the whole request.
+     * Optional: called before records are written, once for each group of a request,
+     * before any group is written. `data` has the new values, the high byte of each
+     * first. Return 0 to allow the write, or an exception code to refuse the whole
+     * request.
      */
     uint8_t (*before)(void *context,
                       uint16_t file,
@@ -2724,36 +2796,37 @@ typedef struct mbm_files {
                       uint16_t length,
                       const uint8_t *data);
     /**
-     * Optional: told what was written, once a group.
+     * Optional: called after the records of a group were written, once for each group.
      */
     void (*after)(void *context, uint16_t file, uint16_t record, uint16_t length);
     /**
-     * Handed to both hooks. Yours, may be NULL.
+     * Passed to both hooks. Any value; may be NULL.
      */
     void *context;
 } mbm_files;
 
 /**
- * One queue of registers.
+ * One FIFO queue of registers.
  */
 typedef struct mbm_fifo {
     /**
-     * The registers, the first to leave first.
+     * The registers, the oldest first.
      */
     const uint16_t *words;
     /**
-     * The address of the queue.
+     * The address of the queue (the FIFO pointer address).
      */
     uint16_t address;
     /**
-     * How many registers it holds now; more than 31 are answered with exception
-     * 03 (V1.1b3, 6.18).
+     * How many registers the queue holds now. If there are more than 31, the server
+     * answers with exception 03 (V1.1b3, 6.18).
      */
     uint16_t count;
 } mbm_fifo;
 
 /**
- * Queues of yours. Zero it, set both, and hand it to mbm_unit_serveFifos.
+ * FIFO queues of yours. Zero the struct, set `fifos` and `count`, and pass it to
+ * mbm_unit_serveFifos.
  */
 typedef struct mbm_fifos {
     /**
@@ -2761,17 +2834,18 @@ typedef struct mbm_fifos {
      */
     struct mbm_service service;
     /**
-     * The queues. Reading does not empty them.
+     * The queues: an array of `count` elements. A read leaves the registers in the
+     * queue.
      */
     const struct mbm_fifo *fifos;
     /**
-     * How many.
+     * How many queues.
      */
     uint16_t count;
 } mbm_fifos;
 
 /**
- * The eight outputs of function 07. Zero it, and hand it to
+ * The eight exception status outputs of function 07. Zero the struct and pass it to
  * mbm_unit_serveExceptionStatus.
  */
 typedef struct mbm_exceptionStatus {
@@ -2780,15 +2854,17 @@ typedef struct mbm_exceptionStatus {
      */
     struct mbm_service service;
     /**
-     * The outputs; change them at any time.
+     * The outputs, one bit each. You may change them at any time.
      */
     uint8_t outputs;
 } mbm_exceptionStatus;
 
 /**
- * What function 11 answers. Zero it, set what you need, and hand it to
- * mbm_unit_serveServerId. All together at most 251 bytes, less what the frame
- * buffer lacks; more is answered with exception 04.
+ * The response of function 11 (hex), Report Server ID. Zero the struct, set the fields
+ * that you need, and pass it to mbm_unit_serveServerId. The id, the run indicator (1
+ * byte) and the additional data together have at most 251 bytes, fewer if the frame
+ * buffer holds less than a whole frame. If they are longer, the server answers with
+ * exception 04.
  */
 typedef struct mbm_serverId {
     /**
@@ -2796,29 +2872,29 @@ typedef struct mbm_serverId {
      */
     struct mbm_service service;
     /**
-     * The id; NULL only with 0 bytes.
+     * The server id; NULL only if idLength is 0.
      */
     const uint8_t *id;
     /**
-     * What stands behind the run indicator; NULL only with 0 bytes.
+     * The data after the run indicator; NULL only if additionalLength is 0.
      */
     const uint8_t *additional;
     /**
-     * Bytes of the id.
+     * Length of `id` in bytes.
      */
     uint8_t idLength;
     /**
-     * Bytes behind the run indicator.
+     * Length of `additional` in bytes.
      */
     uint8_t additionalLength;
     /**
-     * The run indicator: 0 is answered as 00, anything else as FF.
+     * The run indicator: 0 is sent as 00, any other value as FF (hex).
      */
     uint8_t running;
 } mbm_serverId;
 
 /**
- * A device identification. Zero it, set both, and hand it to
+ * A device identification. Zero the struct, set `objects` and `count`, and pass it to
  * mbm_unit_serveIdentification.
  */
 typedef struct mbm_identification {
@@ -2827,20 +2903,22 @@ typedef struct mbm_identification {
      */
     struct mbm_service service;
     /**
-     * The objects, in any order: ids 0 vendor name, 1 product code and 2 revision,
-     * which every device has; 3 vendor URL, 4 product name, 5 model name, 6 application
-     * name; from 0x80 on yours. Each has 244 bytes at most.
+     * The objects, in any order. Every device has the ids 0 (vendor name), 1 (product
+     * code) and 2 (revision). Optional are 3 (vendor URL), 4 (product name), 5 (model
+     * name) and 6 (application name), and from 0x80 on your own. An object has at most
+     * 244 bytes.
      */
     const struct mbm_object *objects;
     /**
-     * How many.
+     * How many objects.
      */
     uint16_t count;
 } mbm_identification;
 
 /**
- * Coils or discrete inputs in an array of yours, eight to a byte, lowest bit
- * first; as mbm_registerTable.
+ * Coils or discrete inputs in an array of yours, eight bits in a byte, the lowest bit
+ * first. Use it as mbm_registerTable, with mbm_unit_serveCoils or
+ * mbm_unit_serveDiscreteInputs.
  */
 typedef struct mbm_bitTable {
     /**
@@ -2848,7 +2926,7 @@ typedef struct mbm_bitTable {
      */
     struct mbm_service service;
     /**
-     * The bits.
+     * The bits: `size` bits, in (size + 7) / 8 bytes.
      */
     uint8_t *bits;
     /**
@@ -2856,7 +2934,8 @@ typedef struct mbm_bitTable {
      */
     const uint8_t *valid;
     /**
-     * As in mbm_registerTable; `data` are bits, lowest first.
+     * As in mbm_registerTable. `data` has the new bits, the lowest bit of the first byte
+     * first.
      */
     uint8_t (*before)(void *context,
                       uint16_t address,
@@ -2881,12 +2960,12 @@ typedef struct mbm_bitTable {
 } mbm_bitTable;
 
 /**
- * Holding or input registers in an array of yours. Zero it, set what you need,
- * and hand it to mbm_unit_serveHoldingRegisters or
- * mbm_unit_serveInputRegisters. You may change words and settings at any
- * time, but not from within a hook of this table: the request under way goes on
- * with the words that the table had when it came. To serve it as another kind of
- * table, zero it first.
+ * Holding registers or input registers in an array of yours. Zero the struct, set the
+ * fields that you need, and pass it to mbm_unit_serveHoldingRegisters or
+ * mbm_unit_serveInputRegisters. You may change the registers at any time, and the fields
+ * too, except from within a hook of this table: the server finishes a request with the
+ * `words` that the table had when the request came. To serve the struct as another kind
+ * of table, zero it first.
  */
 typedef struct mbm_registerTable {
     /**
@@ -2894,29 +2973,30 @@ typedef struct mbm_registerTable {
      */
     struct mbm_service service;
     /**
-     * The registers.
+     * The registers: `size` words.
      */
     uint16_t *words;
     /**
-     * Optional, NULL if every register is there: a bit for each, lowest bit of
-     * the first byte first; 0 answers exception 02.
+     * Optional; NULL if every register exists. Otherwise a bitmap with one bit for each
+     * register, the lowest bit of the first byte first. A request for a register whose
+     * bit is 0 is answered with exception 02.
      */
     const uint8_t *valid;
     /**
-     * Optional: asked before registers are written, once a request. `data` are
-     * the new values, high bytes first. Returns 0, or an exception code that
-     * refuses the whole request.
+     * Optional: called once a request, before registers are written. `data` has the new
+     * values, the high byte of each first. Return 0 to allow the write, or an exception
+     * code to refuse the whole request.
      */
     uint8_t (*before)(void *context,
                       uint16_t address,
                       uint16_t quantity,
                       const uint8_t *data);
     /**
-     * Optional: told what was written.
+     * Optional: called after registers were written, with the address and the quantity.
      */
     void (*after)(void *context, uint16_t address, uint16_t quantity);
     /**
-     * Handed to both hooks. Yours, may be NULL.
+     * Passed to both hooks. Any value; may be NULL.
      */
     void *context;
     /**
@@ -2930,15 +3010,15 @@ typedef struct mbm_registerTable {
 } mbm_registerTable;
 
 /**
- * Serves cells that your functions hold.
+ * Serves cells that your functions get and set.
  *
  * @param unit   the unit
- * @param cells  yours, for as long as the unit is used
- * @param table  the function that reads them: 1 coils (01, 05, 0F), 2 discrete
- *               inputs (02), 3 holding registers (03, 06, 10, 16, 17), 4 input
- *               registers (04)
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, no `get`, no `set`
- *         where it is needed, or another table; MBM_BUSY and MBM_BUFFER_TOO_SMALL as
+ * @param cells  must stay valid for as long as the unit is used
+ * @param table  the table, named by the function that reads it: 1 coils (functions 01,
+ *               05, 0F), 2 discrete inputs (02), 3 holding registers (03, 06, 10, 16,
+ *               17), 4 input registers (04); functions in hex
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a NULL `get`, a NULL `set`
+ *         for table 1 or 3, or another table; MBM_BUSY and MBM_BUFFER_TOO_SMALL as
  *         mbm_unit_serveCoils
  */
 uint8_t mbm_unit_serveCallbacks(struct mbm_unit *unit,
@@ -2946,27 +3026,27 @@ uint8_t mbm_unit_serveCallbacks(struct mbm_unit *unit,
                                 uint8_t table);
 
 /**
- * Serves a function of yours, on every framing.
+ * Serves a function of yours, in every framing.
  *
  * @param unit    the unit
- * @param custom  yours, for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, no function, a code
- *         from 128 on, or a length that is no rule; MBM_BUFFER_TOO_SMALL if the unit
- *         has no place
+ * @param custom  must stay valid for as long as the unit is used
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a NULL `serve`, a code above
+ *         127 or an invalid `length`; MBM_BUFFER_TOO_SMALL if the unit has
+ *         MBM_MAX_SERVICES records already
  */
 uint8_t mbm_unit_serveCustom(struct mbm_unit *unit, struct mbm_custom *custom);
 
 /**
- * Switches a function of a unit off or on again. One that is off is answered with
- * exception 01, whatever serves it.
+ * Switches a function of a unit off or on. The unit answers a function that is off with
+ * exception 01, even if a record serves it.
  *
  * @param unit  the unit
- * @param mask  yours, for as long as the unit is used; zeroed before the first call.
- *              Units that share one share what is switched off
+ * @param mask  must stay valid for as long as the unit is used; zero it before the first
+ *              call. Units that share a mask have the same functions off
  * @param code  the function code, 1 to 127
- * @param on    0 switches the function off, anything else on
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or another code;
- *         MBM_BUFFER_TOO_SMALL if the unit has no place
+ * @param on    0 switches the function off, anything else switches it on
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer or a code out of range;
+ *         MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES records already
  */
 uint8_t mbm_unit_switchFunction(struct mbm_unit *unit,
                                 struct mbm_functionMask *mask,
@@ -2974,92 +3054,95 @@ uint8_t mbm_unit_switchFunction(struct mbm_unit *unit,
                                 uint8_t on);
 
 /**
- * Serves diagnostics: functions 08, 0B and 0C. Of 08 it serves the sub-functions that
- * the standard defines, 00 to 04, 0A to 12 and 14; others are exception 01. From now
- * on the unit counts what its lines bring, logs events, and can be forced into
- * listen only mode.
+ * Serves diagnostics: functions 08, 0B and 0C (hex). Function 08 has the sub-functions
+ * of the standard, 00 to 04, 0A to 12 and 14 (hex); it answers others with exception 01
+ * (illegal function). After this call the unit counts the frames on its lines and logs
+ * events, and a client can force it into listen only mode.
  *
  * @param unit         the unit
- * @param diagnostics  yours, for as long as the unit is used; one for each unit, or
- *                     it counts for all that share it
+ * @param diagnostics  must stay valid for as long as the unit is used. Use one struct
+ *                     for each unit: a shared one counts for all units that share it
  * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY if the unit has
- *         another record of diagnostics; MBM_BUFFER_TOO_SMALL if it has no place
+ *         another mbm_diagnostics; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
+ *         records already
  */
 uint8_t mbm_unit_serveDiagnostics(struct mbm_unit *unit,
                                   struct mbm_diagnostics *diagnostics);
 
 /**
- * Serves files: functions 14 and 15. A request is carried out whole or not at
- * all. It takes 250 bytes of stack.
+ * Serves files: functions 14 and 15 (hex), Read File Record and Write File Record. A
+ * request is carried out completely or not at all. Serving a request takes 250 bytes of
+ * stack.
  *
  * @param unit   the unit
- * @param files  yours, for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
- *         the unit has no place
+ * @param files  must stay valid for as long as the unit is used
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
+ *         unit has MBM_MAX_SERVICES records already
  */
 uint8_t mbm_unit_serveFiles(struct mbm_unit *unit, struct mbm_files *files);
 
 /**
- * Serves FIFO queues: function 18.
+ * Serves FIFO queues: function 18 (hex), Read FIFO Queue.
  *
  * @param unit   the unit
- * @param fifos  yours, for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
- *         the unit has no place
+ * @param fifos  must stay valid for as long as the unit is used
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
+ *         unit has MBM_MAX_SERVICES records already
  */
 uint8_t mbm_unit_serveFifos(struct mbm_unit *unit, struct mbm_fifos *fifos);
 
 /**
- * Serves the exception status: function 07.
+ * Serves function 07, Read Exception Status.
  *
  * @param unit    the unit
- * @param status  yours, for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
- *         the unit has no place
+ * @param status  must stay valid for as long as the unit is used
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
+ *         unit has MBM_MAX_SERVICES records already
  */
 uint8_t mbm_unit_serveExceptionStatus(struct mbm_unit *unit,
                                       struct mbm_exceptionStatus *status);
 
 /**
- * Serves the server id: function 11.
+ * Serves function 11 (hex), Report Server ID.
  *
  * @param unit  the unit
- * @param id    yours, for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
- *         the unit has no place
+ * @param id    must stay valid for as long as the unit is used
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
+ *         unit has MBM_MAX_SERVICES records already
  */
 uint8_t mbm_unit_serveServerId(struct mbm_unit *unit, struct mbm_serverId *id);
 
 /**
- * Serves the device identification: function 2B/0E, as streams of objects and
- * one by one. What does not fit into one response follows in the next that the
- * client asks for. The conformity level is that of the objects there are.
+ * Serves function 2B/0E (hex), Read Device Identification: streams of objects, and
+ * single objects. If the objects do not fit into one response, the client reads the rest
+ * with further requests. The server computes the conformity level from the objects that
+ * exist.
  *
  * @param unit            the unit
- * @param identification  yours, for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if
- *         the unit has no place
+ * @param identification  must stay valid for as long as the unit is used
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUFFER_TOO_SMALL if the
+ *         unit has MBM_MAX_SERVICES records already
  */
 uint8_t mbm_unit_serveIdentification(struct mbm_unit *unit,
                                      struct mbm_identification *identification);
 
 /**
- * Answers one request, without a server: takes a frame from a buffer and writes
+ * Answers one request without a server: reads a request frame from a buffer and writes
  * the response frame over it.
  *
- * @param units      what is served: one unit, or an array of them
- * @param count      how many units
- * @param framing    how frames look; of it, `functions` are not used, for the units
- *                   know theirs
- * @param frame      the whole request, and room for the response
- * @param length     bytes of the request
- * @param capacity   bytes of the buffer: 256 hold any response in RTU, 513 in
- *                   ASCII, 260 over TCP; a longer response becomes exception 04
- * @param response   receives the bytes of the response; 0 where there is none: for a
- *                   damaged frame, another unit, a broadcast, and with any status
- *                   but MBM_OK
- * @return MBM_OK; MBM_PENDING, with the buffer to be filled anew, if a function
- *         of yours is not done; MBM_INVALID_ARGUMENT
+ * @param units     the units to serve: one unit, or an array of units
+ * @param count     how many units
+ * @param framing   the framing. Its `functions` are not used: units know their own
+ *                  functions
+ * @param frame     holds the complete request; receives the response
+ * @param length    length of the request in bytes
+ * @param capacity  size of `frame` in bytes. 256 hold every response in RTU, 513 in
+ *                  ASCII, 260 in TCP. A longer response becomes exception 04
+ * @param response  receives the length of the response in bytes; 0 without a response:
+ *                  after a damaged frame, a request for another unit, a broadcast, and
+ *                  with any status but MBM_OK
+ * @return MBM_OK; MBM_PENDING if a function of yours returned MBM_REPLY_PENDING: write
+ *         the request into `frame` again before the next call; MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_unit_respond(struct mbm_unit *units,
                          uint8_t count,
@@ -3070,12 +3153,13 @@ uint8_t mbm_unit_respond(struct mbm_unit *units,
                          uint16_t *response);
 
 /**
- * Serves coils: functions 01, 05 and 0F.
+ * Serves coils: functions 01, 05 and 0F (hex).
  *
  * @param unit   the unit
- * @param table  yours, for as long as the unit is used
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY for a table that
- *         is served as another kind; MBM_BUFFER_TOO_SMALL if the unit has no place
+ * @param table  must stay valid for as long as the unit is used
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer; MBM_BUSY for a table that is
+ *         served as another kind; MBM_BUFFER_TOO_SMALL if the unit has MBM_MAX_SERVICES
+ *         records already
  */
 uint8_t mbm_unit_serveCoils(struct mbm_unit *unit, struct mbm_bitTable *table);
 
@@ -3083,17 +3167,17 @@ uint8_t mbm_unit_serveCoils(struct mbm_unit *unit, struct mbm_bitTable *table);
  * Serves discrete inputs: function 02.
  *
  * @param unit   the unit
- * @param table  yours, for as long as the unit is used
+ * @param table  must stay valid for as long as the unit is used
  * @return a status; see mbm_unit_serveCoils
  */
 uint8_t mbm_unit_serveDiscreteInputs(struct mbm_unit *unit, struct mbm_bitTable *table);
 
 /**
- * Serves holding registers: functions 03, 06 and 10. For 16 and 17 too, call
- * mbm_registerTable_serveMaskAndReadWrite behind it.
+ * Serves holding registers: functions 03, 06 and 10 (hex). For functions 16 and 17 too,
+ * call mbm_registerTable_serveMaskAndReadWrite afterwards.
  *
  * @param unit   the unit
- * @param table  yours, for as long as the unit is used
+ * @param table  must stay valid for as long as the unit is used
  * @return a status; see mbm_unit_serveCoils
  */
 uint8_t mbm_unit_serveHoldingRegisters(struct mbm_unit *unit,
@@ -3103,82 +3187,87 @@ uint8_t mbm_unit_serveHoldingRegisters(struct mbm_unit *unit,
  * Serves input registers: function 04.
  *
  * @param unit   the unit
- * @param table  yours, for as long as the unit is used
+ * @param table  must stay valid for as long as the unit is used
  * @return a status; see mbm_unit_serveCoils
  */
 uint8_t mbm_unit_serveInputRegisters(struct mbm_unit *unit,
                                      struct mbm_registerTable *table);
 
 /**
- * Serves functions 16 and 17 beside 03, 06 and 10, on each unit that has the
- * table: a call of its own, so that firmware without it is smaller. After a table
- * was zeroed it is to be called again.
+ * Adds functions 16 and 17 (hex), Mask Write Register and Read/Write Multiple Registers,
+ * to a table of holding registers, on every unit that serves the table. It is a function
+ * of its own so that firmware without these two is smaller. Call it again after you have
+ * zeroed the table.
  *
- * @param table  holding registers that mbm_unit_serveHoldingRegisters took
- * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL and other tables
+ * @param table  holding registers that mbm_unit_serveHoldingRegisters accepted
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL and for any other table
  */
 uint8_t mbm_registerTable_serveMaskAndReadWrite(struct mbm_registerTable *table);
 
 /* ==== 9. Values ===================================================================== */
 
 /**
- * The order of the registers that a function is given; in these, MBM_ORDER_ABCD.
+ * Passed to a function: use the order of the mbm_registers. As that order itself:
+ * MBM_ORDER_ABCD.
  */
 #define MBM_ORDER_DEFAULT 0
 
 /**
- * High word first, high byte first: what most devices do. A is the most
- * significant byte; 2923517522, which is 0xAE415652, arrives as AE41 5652.
+ * High word first, high byte first, as most devices do. A is the most significant byte.
+ * Example: 2923517522, which is 0xAE415652, is transmitted as AE41 5652 (hex).
  */
 #define MBM_ORDER_ABCD 1
 
 /**
- * Low word first, high byte first: 5652 AE41.
+ * Low word first, high byte first. The example is transmitted as 5652 AE41.
  */
 #define MBM_ORDER_CDAB 2
 
 /**
- * High word first, low byte first: 41AE 5256.
+ * High word first, low byte first. The example is transmitted as 41AE 5256.
  */
 #define MBM_ORDER_BADC 3
 
 /**
- * Low word first, low byte first: 5256 41AE.
+ * Low word first, low byte first. The example is transmitted as 5256 41AE.
  */
 #define MBM_ORDER_DCBA 4
 
 /**
- * mbm_registers.kind: words to read, as those of mbm_master.
+ * mbm_registers.kind: words that may only be read, for example the response words of
+ * mbm_master.
  */
 #define MBM_REGISTERS_OF_WORDS 1
 
 /**
- * mbm_registers.kind: bytes to read, high byte first.
+ * mbm_registers.kind: bytes that may only be read, the high byte of each register first.
  */
 #define MBM_REGISTERS_OF_BYTES 2
 
 /**
- * mbm_registers.kind: words to write and to read.
+ * mbm_registers.kind: words that may be read and written.
  */
 #define MBM_REGISTERS_INTO_WORDS 3
 
 /**
- * mbm_registers.kind: bytes to write and to read, high byte first.
+ * mbm_registers.kind: bytes that may be read and written, the high byte of each register
+ * first.
  */
 #define MBM_REGISTERS_INTO_BYTES 4
 
 /**
- * Registers in a row, seen as values by the addresses that the device gives
- * them. It owns nothing: what `data` points to is the caller's.
+ * A view of consecutive registers, with the addresses that the device gives them. The
+ * view owns nothing: `data` points to memory of the program.
  *
- * One of the functions mbm_registers_of... and mbm_registers_into... fills it
- * in, as do mbm_master_getResponseRegisters and mbm_master_getTransmitRegisters;
- * each field may be set by hand too. Functions that get or set do not change
- * it, so any thread may use it beside others that only get.
+ * mbm_registers_ofWords, ofBytes, intoWords and intoBytes fill the view in; so do
+ * mbm_master_getResponseRegisters and mbm_master_getTransmitRegisters. You may also set
+ * each field yourself. The get and set functions do not change the view. Several threads
+ * may use one view at the same time as long as none of them writes the registers.
  */
 typedef struct mbm_registers {
     /**
-     * The words or bytes, as `kind` says. NULL: none, MBM_NOT_INITIALISED.
+     * The words or bytes; `kind` says which. If it is NULL, every function returns
+     * MBM_NOT_INITIALISED.
      */
     const void *data;
     /**
@@ -3186,7 +3275,7 @@ typedef struct mbm_registers {
      */
     uint16_t first;
     /**
-     * How many registers there are; `first + count` is 65536 at most.
+     * How many registers; `first + count` is at most 65536.
      */
     uint16_t count;
     /**
@@ -3194,20 +3283,21 @@ typedef struct mbm_registers {
      */
     uint8_t kind;
     /**
-     * One of MBM_ORDER_..., for calls that say MBM_ORDER_DEFAULT.
+     * One of MBM_ORDER_...: the order for calls with MBM_ORDER_DEFAULT.
      */
     uint8_t order;
 } mbm_registers;
 
 /**
- * Packs coils for a write, the first into the lowest bit of the first byte (V1.1b3,
- * 6.11); unused bits of the last byte become 0, bytes behind it stay.
+ * Packs coils into bytes for a write. The first coil goes into the lowest bit of the
+ * first byte (V1.1b3, 6.11). Unused bits of the last byte become 0; the bytes after it do
+ * not change.
  *
- * @param coils     a byte a coil: 0 is off, anything else is on
- * @param quantity  how many coils, 0 to 65535
- * @param bytes     gets the bits, 8 a byte
- * @param length    how many bytes there are
- * @return MBM_OK, or with nothing packed MBM_BUFFER_TOO_SMALL or
+ * @param coils     one byte for each coil: 0 is off, any other value is on
+ * @param quantity  the number of coils, 0 to 65535
+ * @param bytes     receives the bits, 8 in each byte
+ * @param length    the number of bytes that `bytes` can hold
+ * @return MBM_OK; or, with nothing packed, MBM_BUFFER_TOO_SMALL, or
  *         MBM_INVALID_ARGUMENT for a NULL pointer
  */
 uint8_t mbm_bits_pack(const uint8_t *coils,
@@ -3216,14 +3306,14 @@ uint8_t mbm_bits_pack(const uint8_t *coils,
                       uint16_t length);
 
 /**
- * Unpacks the coils or discrete inputs of a read (V1.1b3, 6.1).
+ * Unpacks the coils or discrete inputs that a read returned in bytes (V1.1b3, 6.1).
  *
- * @param bytes     the bits, 8 a byte, the first coil the lowest
- * @param length    how many bytes there are
- * @param coils     gets 0 or 1 a coil
- * @param quantity  how many coils, 0 to 65535
- * @return MBM_OK, or with nothing unpacked MBM_ILLEGAL_DATA_ADDRESS if there are
- *         not so many bits, MBM_INVALID_ARGUMENT for a NULL pointer
+ * @param bytes     the bits, 8 in each byte; the first coil is the lowest bit
+ * @param length    the number of bytes
+ * @param coils     receives one byte for each coil, 0 or 1
+ * @param quantity  the number of coils, 0 to 65535
+ * @return MBM_OK; or, with nothing unpacked, MBM_ILLEGAL_DATA_ADDRESS if `bytes` has
+ *         fewer bits than `quantity`, MBM_INVALID_ARGUMENT for a NULL pointer
  */
 uint8_t mbm_bits_unpack(const uint8_t *bytes,
                         uint16_t length,
@@ -3231,15 +3321,15 @@ uint8_t mbm_bits_unpack(const uint8_t *bytes,
                         uint16_t quantity);
 
 /**
- * Whether a coil or discrete input is set, by the device's address.
+ * Gets the state of one coil or discrete input of a read, by its address in the device.
  *
- * @param bytes     the bits of a read, 8 a byte, the first coil the lowest
- * @param first     the address of the first coil
- * @param quantity  how many coils were read; `bytes` has room for so many
- * @param address   the coil
- * @param on        gets 0 or 1
- * @return MBM_OK, or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS for a coil that
- *         is not among them or a range that passes 65535, MBM_INVALID_ARGUMENT
+ * @param bytes     the bits of the read, 8 in each byte; the first coil is the lowest bit
+ * @param first     the address of the first coil of the read
+ * @param quantity  the number of coils that were read; `bytes` holds that many bits
+ * @param address   the address of the coil
+ * @param on        receives 0 or 1
+ * @return MBM_OK; or, with `on` unchanged, MBM_ILLEGAL_DATA_ADDRESS if the coil is
+ *         outside of the read or the read passes address 65535, MBM_INVALID_ARGUMENT
  *         for a NULL pointer
  */
 uint8_t mbm_bits_isSet(const uint8_t *bytes,
@@ -3249,16 +3339,16 @@ uint8_t mbm_bits_isSet(const uint8_t *bytes,
                        uint8_t *on);
 
 /**
- * Sets a coil for a write, by the device's address; the others stay.
+ * Sets one coil of a write, by its address in the device. The other coils do not change.
  *
- * @param bytes     the bits of a write, 8 a byte, the first coil the lowest
- * @param first     the address of the first coil
- * @param quantity  how many coils are written; `bytes` has room for so many
- * @param address   the coil
- * @param on        0 is off, anything else is on
- * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a coil that is
- *         not among them or a range that passes 65535, MBM_INVALID_ARGUMENT for
- *         a NULL pointer
+ * @param bytes     the bits of the write, 8 in each byte; the first coil is the lowest bit
+ * @param first     the address of the first coil of the write
+ * @param quantity  the number of coils of the write; `bytes` holds that many bits
+ * @param address   the address of the coil
+ * @param on        0 is off, any other value is on
+ * @return MBM_OK; or, with nothing set, MBM_ILLEGAL_DATA_ADDRESS if the coil is outside
+ *         of the write or the write passes address 65535, MBM_INVALID_ARGUMENT for a
+ *         NULL pointer
  */
 uint8_t mbm_bits_set(uint8_t *bytes,
                      uint16_t first,
@@ -3267,13 +3357,14 @@ uint8_t mbm_bits_set(uint8_t *bytes,
                      uint8_t on);
 
 /**
- * As mbm_bits_pack, into words such as mbm_master's transmit words, 16 to a word.
+ * As mbm_bits_pack, but into words, 16 bits in each word; for example the transmit words
+ * of a master.
  *
- * @param coils     a byte a coil: 0 is off, anything else is on
- * @param quantity  how many coils, 0 to 65535
- * @param words     gets the bits, 16 a word
- * @param length    how many words there are
- * @return MBM_OK, or with nothing packed MBM_BUFFER_TOO_SMALL or
+ * @param coils     one byte for each coil: 0 is off, any other value is on
+ * @param quantity  the number of coils, 0 to 65535
+ * @param words     receives the bits, 16 in each word
+ * @param length    the number of words that `words` can hold
+ * @return MBM_OK; or, with nothing packed, MBM_BUFFER_TOO_SMALL, or
  *         MBM_INVALID_ARGUMENT for a NULL pointer
  */
 uint8_t mbm_bits_packWords(const uint8_t *coils,
@@ -3282,14 +3373,14 @@ uint8_t mbm_bits_packWords(const uint8_t *coils,
                            uint16_t length);
 
 /**
- * As mbm_bits_unpack, of words such as mbm_master's response words.
+ * As mbm_bits_unpack, but from words, for example the response words of a master.
  *
- * @param words     the bits, 16 a word, the first coil the lowest
- * @param length    how many words there are
- * @param coils     gets 0 or 1 a coil
- * @param quantity  how many coils, 0 to 65535
- * @return MBM_OK, or with nothing unpacked MBM_ILLEGAL_DATA_ADDRESS if there are
- *         not so many bits, MBM_INVALID_ARGUMENT for a NULL pointer
+ * @param words     the bits, 16 in each word; the first coil is the lowest bit
+ * @param length    the number of words
+ * @param coils     receives one byte for each coil, 0 or 1
+ * @param quantity  the number of coils, 0 to 65535
+ * @return MBM_OK; or, with nothing unpacked, MBM_ILLEGAL_DATA_ADDRESS if `words` has
+ *         fewer bits than `quantity`, MBM_INVALID_ARGUMENT for a NULL pointer
  */
 uint8_t mbm_bits_unpackWords(const uint16_t *words,
                              uint16_t length,
@@ -3297,15 +3388,15 @@ uint8_t mbm_bits_unpackWords(const uint16_t *words,
                              uint16_t quantity);
 
 /**
- * As mbm_bits_isSet, in words such as mbm_master's response words.
+ * As mbm_bits_isSet, but in words, for example the response words of a master.
  *
- * @param words     the bits of a read, 16 a word, the first coil the lowest
- * @param first     the address of the first coil
- * @param quantity  how many coils were read; `words` has room for so many
- * @param address   the coil
- * @param on        gets 0 or 1
- * @return MBM_OK, or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS for a coil that
- *         is not among them or a range that passes 65535, MBM_INVALID_ARGUMENT
+ * @param words     the bits of the read, 16 in each word; the first coil is the lowest bit
+ * @param first     the address of the first coil of the read
+ * @param quantity  the number of coils that were read; `words` holds that many bits
+ * @param address   the address of the coil
+ * @param on        receives 0 or 1
+ * @return MBM_OK; or, with `on` unchanged, MBM_ILLEGAL_DATA_ADDRESS if the coil is
+ *         outside of the read or the read passes address 65535, MBM_INVALID_ARGUMENT
  *         for a NULL pointer
  */
 uint8_t mbm_bits_isSetInWords(const uint16_t *words,
@@ -3315,16 +3406,16 @@ uint8_t mbm_bits_isSetInWords(const uint16_t *words,
                               uint8_t *on);
 
 /**
- * As mbm_bits_set, in words such as mbm_master's transmit words.
+ * As mbm_bits_set, but in words, for example the transmit words of a master.
  *
- * @param words     the bits of a write, 16 a word, the first coil the lowest
- * @param first     the address of the first coil
- * @param quantity  how many coils are written; `words` has room for so many
- * @param address   the coil
- * @param on        0 is off, anything else is on
- * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a coil that is
- *         not among them or a range that passes 65535, MBM_INVALID_ARGUMENT for
- *         a NULL pointer
+ * @param words     the bits of the write, 16 in each word; the first coil is the lowest bit
+ * @param first     the address of the first coil of the write
+ * @param quantity  the number of coils of the write; `words` holds that many bits
+ * @param address   the address of the coil
+ * @param on        0 is off, any other value is on
+ * @return MBM_OK; or, with nothing set, MBM_ILLEGAL_DATA_ADDRESS if the coil is outside
+ *         of the write or the write passes address 65535, MBM_INVALID_ARGUMENT for a
+ *         NULL pointer
  */
 uint8_t mbm_bits_setInWords(uint16_t *words,
                             uint16_t first,
@@ -3333,26 +3424,26 @@ uint8_t mbm_bits_setInWords(uint16_t *words,
                             uint8_t on);
 
 /**
- * Sets the order of values in the views that mbm_master_getResponseRegisters
- * and mbm_master_getTransmitRegisters give from now on.
+ * Sets the byte and word order of values in the views that mbm_master_getResponseRegisters
+ * and mbm_master_getTransmitRegisters fill in from now on.
  *
  * @param master  the object
- * @param order   one of MBM_ORDER_...; MBM_ORDER_ABCD at first
- * @return MBM_OK, MBM_INVALID_ARGUMENT, also for another order, or
- *         MBM_NOT_INITIALISED
+ * @param order   one of MBM_ORDER_...; the default is MBM_ORDER_ABCD
+ * @return MBM_OK; MBM_INVALID_ARGUMENT, also for an unknown order; MBM_NOT_INITIALISED
  */
-uint8_t mbm_master_setWordOrder(struct mbm_master *master, uint8_t order);
+uint8_t mbm_master_setWordOrder(struct mbm_master *master,
+                                uint8_t order);
 
 /**
- * Sees the response words as registers to get values from. Copies nothing: it
- * sees what a later read puts there.
+ * Fills in a view of the response words as registers, from which you can get values. The
+ * view copies no words: it also shows those that a later read receives.
  *
- * All words of the buffer are there, those too that the last read did not
- * reach; look at values only once it has succeeded.
+ * The view includes all words of the buffer, also words that the last read did not
+ * change. Get values only after the read has succeeded.
  *
- * @param master     the object; its buffers stay as they are while the view is used
- * @param first      the device's address of word 0: that of the read, or 0 to
- *                   count from word 0
+ * @param master     the object; do not change its buffers while you use the view
+ * @param first      the address in the device of word 0: the address of the read, or 0 if
+ *                   you want to count from word 0
  * @param registers  the view to fill in; unchanged if the status is not MBM_OK
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
@@ -3361,12 +3452,12 @@ uint8_t mbm_master_getResponseRegisters(const struct mbm_master *master,
                                         struct mbm_registers *registers);
 
 /**
- * Sees the transmit words as registers to set values in, for the functions
- * that write. The queue of send does not move.
+ * Fills in a view of the transmit words as registers, in which you can set values for the
+ * functions that write. The queue of mbm_master_send does not change.
  *
- * @param master     the object; its buffers stay as they are while the view is used
- * @param first      the device's address of word 0: that of the write, or 0 to
- *                   count from word 0
+ * @param master     the object; do not change its buffers while you use the view
+ * @param first      the address in the device of word 0: the address of the write, or 0 if
+ *                   you want to count from word 0
  * @param registers  the view to fill in; unchanged if the status is not MBM_OK
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
@@ -3375,14 +3466,16 @@ uint8_t mbm_master_getTransmitRegisters(const struct mbm_master *master,
                                         struct mbm_registers *registers);
 
 /**
- * Sees words that were read as registers, in order MBM_ORDER_ABCD until
- * `registers->order` is set. Copies nothing: it sees what the words are then.
+ * Fills in a view of words that were read as registers. The order is MBM_ORDER_ABCD
+ * until you set `registers->order`. Nothing is copied: the view always shows the present
+ * words.
  *
- * @param registers  the view to fill in
- * @param words      words as mbm_master's response words; valid while it is used
+ * @param registers  the view to fill in; without data after an error
+ * @param words      the words, for example the response words of mbm_master; must stay
+ *                   valid while the view is used
  * @param count      how many words
- * @param first      the device's address of the first, 0 to 65535
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if they pass address 65535, or
+ * @param first      the device's address of the first register, 0 to 65535
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535, or
  *         MBM_INVALID_ARGUMENT for a NULL pointer
  */
 uint8_t mbm_registers_ofWords(struct mbm_registers *registers,
@@ -3391,15 +3484,15 @@ uint8_t mbm_registers_ofWords(struct mbm_registers *registers,
                               uint16_t first);
 
 /**
- * As mbm_registers_ofWords, of the data bytes of a reply or a request.
+ * As mbm_registers_ofWords, for the data bytes of a reply or a request.
  *
- * @param registers  the view to fill in
- * @param bytes      register bytes, each high byte first (V1.1b3, 4.2); valid
- *                   while it is used
+ * @param registers  the view to fill in; without data after an error
+ * @param bytes      the bytes, the high byte of each register first (V1.1b3, 4.2); must
+ *                   stay valid while the view is used
  * @param length     how many bytes, an even number
  * @param first      the device's address of the first register, 0 to 65535
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if they pass address 65535, or
- *         MBM_INVALID_ARGUMENT for a NULL pointer or odd bytes
+ * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535, or
+ *         MBM_INVALID_ARGUMENT for a NULL pointer or an odd length
  */
 uint8_t mbm_registers_ofBytes(struct mbm_registers *registers,
                               const uint8_t *bytes,
@@ -3407,14 +3500,14 @@ uint8_t mbm_registers_ofBytes(struct mbm_registers *registers,
                               uint16_t first);
 
 /**
- * As mbm_registers_ofWords, of words that are also written, such as
- * mbm_master's transmit words.
+ * As mbm_registers_ofWords, for words that you also write, for example the transmit
+ * words of mbm_master.
  *
- * @param registers  the view to fill in
- * @param words      words to write; valid while it is used
+ * @param registers  the view to fill in; without data after an error
+ * @param words      the words to write; must stay valid while the view is used
  * @param count      how many words
- * @param first      the device's address of the first, 0 to 65535
- * @return as mbm_registers_ofWords
+ * @param first      the device's address of the first register, 0 to 65535
+ * @return a status; see mbm_registers_ofWords
  */
 uint8_t mbm_registers_intoWords(struct mbm_registers *registers,
                                 uint16_t *words,
@@ -3422,13 +3515,13 @@ uint8_t mbm_registers_intoWords(struct mbm_registers *registers,
                                 uint16_t first);
 
 /**
- * As mbm_registers_ofBytes, of bytes that are also written.
+ * As mbm_registers_ofBytes, for bytes that you also write.
  *
- * @param registers  the view to fill in
- * @param bytes      register bytes to write; valid while it is used
+ * @param registers  the view to fill in; without data after an error
+ * @param bytes      the bytes to write; must stay valid while the view is used
  * @param length     how many bytes, an even number
  * @param first      the device's address of the first register, 0 to 65535
- * @return as mbm_registers_ofBytes
+ * @return a status; see mbm_registers_ofBytes
  */
 uint8_t mbm_registers_intoBytes(struct mbm_registers *registers,
                                 uint8_t *bytes,
@@ -3436,14 +3529,14 @@ uint8_t mbm_registers_intoBytes(struct mbm_registers *registers,
                                 uint16_t first);
 
 /**
- * One bit of a register.
+ * Reads one bit of a register.
  *
  * @param registers  the registers
- * @param address    the register, by the device's address
+ * @param address    the device's address of the register
  * @param bit        0, the least significant, to 15
- * @param on         gets 0 or 1
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for a register that is not there,
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `on` unchanged
+ * @param on         receives 0 or 1
+ * @return MBM_OK; or with `on` unchanged MBM_ILLEGAL_DATA_ADDRESS if the register does
+ *         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_getBit(const struct mbm_registers *registers,
                              uint16_t address,
@@ -3451,15 +3544,16 @@ uint8_t mbm_registers_getBit(const struct mbm_registers *registers,
                              uint8_t *on);
 
 /**
- * One byte of a register, 0 to 255; for a signed one, cast the pointer to an int8_t.
+ * Reads one byte of a register, 0 to 255. For a signed byte, pass a pointer to an
+ * int8_t, cast to uint8_t *.
  *
  * @param registers  the registers
- * @param address    the register, by the device's address
- * @param high       0 for the low byte, anything else for the high byte, which
- *                   travels first
- * @param value      gets the byte
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for a register that is not there,
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ * @param address    the device's address of the register
+ * @param high       0 for the low byte, anything else for the high byte, which is
+ *                   transmitted first
+ * @param value      receives the byte
+ * @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if the register
+ *         does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_getUint8(const struct mbm_registers *registers,
                                uint16_t address,
@@ -3467,15 +3561,15 @@ uint8_t mbm_registers_getUint8(const struct mbm_registers *registers,
                                uint8_t *value);
 
 /**
- * A number of one register, 0 to 65535; for a signed number, cast the pointer to an
- * int16_t. Of the order only the bytes matter.
+ * Reads a number of one register, 0 to 65535. For a signed number, pass a pointer to an
+ * int16_t, cast to uint16_t *. The order of words has no effect; the order of bytes has.
  *
  * @param registers  the registers
- * @param address    the register, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
- * @param value      gets the number
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for a register that is not there,
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ * @param address    the device's address of the register
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param value      receives the number
+ * @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if the register
+ *         does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_getUint16(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -3483,15 +3577,15 @@ uint8_t mbm_registers_getUint16(const struct mbm_registers *registers,
                                 uint16_t *value);
 
 /**
- * A number of two registers, 0 to 4294967295; for a signed number (two's complement),
- * cast the pointer to an int32_t.
+ * Reads a number of two registers, 0 to 4294967295. For a signed number (two's
+ * complement), pass a pointer to an int32_t, cast to uint32_t *.
  *
  * @param registers  the registers
- * @param address    the first of its registers, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
- * @param value      gets the number
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for two registers that are not both there,
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ * @param address    the device's address of the first of its registers
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param value      receives the number
+ * @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the two
+ *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_getUint32(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -3499,14 +3593,15 @@ uint8_t mbm_registers_getUint32(const struct mbm_registers *registers,
                                 uint32_t *value);
 
 /**
- * A number of four registers; for a signed number, cast the pointer to an int64_t.
+ * Reads a number of four registers. For a signed number, pass a pointer to an int64_t,
+ * cast to uint64_t *.
  *
  * @param registers  the registers
- * @param address    the first of its registers, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
- * @param value      gets the number
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for four registers that are not all there,
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ * @param address    the device's address of the first of its registers
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param value      receives the number
+ * @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the four
+ *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_getUint64(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -3514,15 +3609,15 @@ uint8_t mbm_registers_getUint64(const struct mbm_registers *registers,
                                 uint64_t *value);
 
 /**
- * A float of two registers, an IEEE 754 binary32. Its bits are copied, those
- * of what is not a number too.
+ * Reads a float of two registers, an IEEE 754 binary32. Its bits are copied, also those
+ * of a NaN.
  *
  * @param registers  the registers
- * @param address    the first of its registers, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
- * @param value      gets the number
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for two registers that are not both there,
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ * @param address    the device's address of the first of its registers
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param value      receives the number
+ * @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the two
+ *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_getFloat(const struct mbm_registers *registers,
                                uint16_t address,
@@ -3530,15 +3625,15 @@ uint8_t mbm_registers_getFloat(const struct mbm_registers *registers,
                                float *value);
 
 /**
- * A double of four registers, an IEEE 754 binary64. Its bits are copied; on AVR,
- * where C's double has 32 bits (-mdouble=32), it is rounded to the nearest.
+ * Reads a double of four registers, an IEEE 754 binary64. Its bits are copied. On AVR,
+ * where a double of C has 32 bits (-mdouble=32), the number is rounded to the nearest.
  *
  * @param registers  the registers
- * @param address    the first of its registers, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
- * @param value      gets the number
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS for four registers that are not all there,
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `value` unchanged
+ * @param address    the device's address of the first of its registers
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param value      receives the number
+ * @return MBM_OK; or with `value` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the four
+ *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_getDouble(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -3546,22 +3641,22 @@ uint8_t mbm_registers_getDouble(const struct mbm_registers *registers,
                                 double *value);
 
 /**
- * A text, which ends at its first NUL or with its field.
+ * Reads a text. It ends at its first NUL or at the end of its field.
  *
- * Its registers follow each other in every order. In one with the low byte
- * first, the first of two characters is a register's low byte. Characters are
- * copied as they are, ASCII or not.
+ * The registers of a text follow each other in every order. In an order with the low
+ * byte first, the first of two characters is the low byte of a register. Characters are
+ * copied without a check, also if they are not ASCII.
  *
  * @param registers  the registers
- * @param address    the first of its registers, by the device's address
- * @param length     bytes of its field, two a register; an odd one ends with a
- *                   register's first character
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
- * @param text       gets the text and a NUL
- * @param capacity   bytes of `text`; `length + 1` are always enough
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if the field is not all there,
- *         MBM_BUFFER_TOO_SMALL, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED,
- *         with `text` unchanged
+ * @param address    the device's address of the first register of the field
+ * @param length     length of the field in bytes, two for each register; an odd length
+ *                   ends with the first character of a register
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param text       receives the text and a NUL
+ * @param capacity   size of `text` in bytes; `length + 1` are always enough
+ * @return MBM_OK; or with `text` unchanged MBM_ILLEGAL_DATA_ADDRESS if part of the field
+ *         does not exist, MBM_BUFFER_TOO_SMALL, MBM_INVALID_ARGUMENT or
+ *         MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_getString(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -3571,17 +3666,17 @@ uint8_t mbm_registers_getString(const struct mbm_registers *registers,
                                 uint16_t capacity);
 
 /**
- * Raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each register comes
- * first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte, for a device
- * that swaps the bytes of its registers.
+ * Reads raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each register
+ * is first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte, for a
+ * device that swaps the bytes of its registers.
  *
  * @param registers  the registers
- * @param address    the first register, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
- * @param bytes      gets the bytes; must not overlap the registers
- * @param length     how many bytes, two a register; may be odd
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if there are not so many,
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `bytes` unchanged
+ * @param address    the device's address of the first register
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param bytes      receives the bytes; must not overlap the registers
+ * @param length     how many bytes, two for each register; may be odd
+ * @return MBM_OK; or with `bytes` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the
+ *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_getBytes(const struct mbm_registers *registers,
                                uint16_t address,
@@ -3590,16 +3685,17 @@ uint8_t mbm_registers_getBytes(const struct mbm_registers *registers,
                                uint16_t length);
 
 /**
- * Whether registers hold these raw bytes, high byte first in every order.
+ * Compares registers with raw bytes, the high byte of each register first in every
+ * order.
  *
  * @param registers  the registers
- * @param address    the register whose high byte is the first, by the device's
- *                   address
+ * @param address    the device's address of the register whose high byte is compared
+ *                   with the first byte
  * @param bytes      the bytes to compare with
- * @param length     how many bytes, two a register; may be odd
- * @param equal      gets 0 or 1
- * @return MBM_OK, MBM_ILLEGAL_DATA_ADDRESS if there are not so many,
- *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED, with `equal` unchanged
+ * @param length     how many bytes, two for each register; may be odd
+ * @param equal      receives 1 if all bytes are equal, else 0
+ * @return MBM_OK; or with `equal` unchanged MBM_ILLEGAL_DATA_ADDRESS if one of the
+ *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_isEqual(const struct mbm_registers *registers,
                               uint16_t address,
@@ -3608,14 +3704,14 @@ uint8_t mbm_registers_isEqual(const struct mbm_registers *registers,
                               uint8_t *equal);
 
 /**
- * Sets one bit of a register; the others stay.
+ * Writes one bit of a register; the other bits do not change.
  *
- * @param registers  the registers, of a kind to write
- * @param address    the register, by the device's address
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the register
  * @param bit        0, the least significant, to 15
- * @param on         0 is off, anything else is on
- * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a register that
- *         is not there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param on         0 for off, anything else for on
+ * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if the register does
+ *         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_setBit(const struct mbm_registers *registers,
                              uint16_t address,
@@ -3623,15 +3719,15 @@ uint8_t mbm_registers_setBit(const struct mbm_registers *registers,
                              uint8_t on);
 
 /**
- * Sets one byte of a register; the other stays.
+ * Writes one byte of a register; the other byte does not change.
  *
- * @param registers  the registers, of a kind to write
- * @param address    the register, by the device's address
- * @param high       0 for the low byte, anything else for the high byte, which
- *                   travels first
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the register
+ * @param high       0 for the low byte, anything else for the high byte, which is
+ *                   transmitted first
  * @param value      the byte
- * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a register that
- *         is not there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if the register does
+ *         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_setUint8(const struct mbm_registers *registers,
                                uint16_t address,
@@ -3639,14 +3735,15 @@ uint8_t mbm_registers_setUint8(const struct mbm_registers *registers,
                                uint8_t value);
 
 /**
- * Sets a number of one register. Of the order only the bytes matter.
+ * Writes a number into one register. The order of words has no effect; the order of
+ * bytes has.
  *
- * @param registers  the registers, of a kind to write
- * @param address    the register, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the register
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param value      the number
- * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for a register
- *         that is not there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if the register does
+ *         not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_setUint16(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -3654,14 +3751,14 @@ uint8_t mbm_registers_setUint16(const struct mbm_registers *registers,
                                 uint16_t value);
 
 /**
- * Sets a number of two registers.
+ * Writes a number into two registers.
  *
- * @param registers  the registers, of a kind to write
- * @param address    the first of its registers, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the first of its registers
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param value      the number
- * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for two registers
- *         that are not both there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the two
+ *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_setUint32(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -3669,14 +3766,14 @@ uint8_t mbm_registers_setUint32(const struct mbm_registers *registers,
                                 uint32_t value);
 
 /**
- * Sets a number of four registers.
+ * Writes a number into four registers.
  *
- * @param registers  the registers, of a kind to write
- * @param address    the first of its registers, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the first of its registers
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param value      points to the number
- * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for four registers
- *         that are not all there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the four
+ *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_setUint64(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -3684,14 +3781,14 @@ uint8_t mbm_registers_setUint64(const struct mbm_registers *registers,
                                 const uint64_t *value);
 
 /**
- * Sets a float of two registers, an IEEE 754 binary32. Its bits are copied.
+ * Writes a float into two registers, as an IEEE 754 binary32. Its bits are copied.
  *
- * @param registers  the registers, of a kind to write
- * @param address    the first of its registers, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the first of its registers
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param value      points to the number
- * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for two registers
- *         that are not both there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the two
+ *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_setFloat(const struct mbm_registers *registers,
                                uint16_t address,
@@ -3699,15 +3796,15 @@ uint8_t mbm_registers_setFloat(const struct mbm_registers *registers,
                                const float *value);
 
 /**
- * Sets a double of four registers, an IEEE 754 binary64. On AVR, where C's
- * double has 32 bits (-mdouble=32), to the value that it has there.
+ * Writes a double into four registers, as an IEEE 754 binary64. On AVR, where a double
+ * of C has 32 bits (-mdouble=32), it is converted without loss.
  *
- * @param registers  the registers, of a kind to write
- * @param address    the first of its registers, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the first of its registers
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param value      points to the number
- * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS for four registers
- *         that are not all there, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the four
+ *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_setDouble(const struct mbm_registers *registers,
                                 uint16_t address,
@@ -3715,17 +3812,17 @@ uint8_t mbm_registers_setDouble(const struct mbm_registers *registers,
                                 const double *value);
 
 /**
- * Fills a field with a text and NULs behind it, laid out as
- * mbm_registers_getString reads it.
+ * Writes a text into a field and fills the rest of the field with NULs, in the layout
+ * that mbm_registers_getString reads.
  *
- * @param registers  the registers, of a kind to write
- * @param address    the first of its registers, by the device's address
- * @param length     bytes of the field, two a register; if it is odd, the byte
- *                   behind the field becomes 0 too
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
- * @param text       ends with a NUL, which needs no room in the field
- * @return MBM_OK, or with nothing set MBM_ILLEGAL_DATA_ADDRESS if the field is not
- *         all there, MBM_BUFFER_TOO_SMALL for a text longer than the field,
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the first register of the field
+ * @param length     length of the field in bytes, two for each register; if it is odd,
+ *                   the byte after the field becomes 0 too
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+ * @param text       the text; ends with a NUL, which need not fit into the field
+ * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if part of the field
+ *         does not exist, MBM_BUFFER_TOO_SMALL if the text is longer than the field,
  *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_setString(const struct mbm_registers *registers,
@@ -3735,18 +3832,18 @@ uint8_t mbm_registers_setString(const struct mbm_registers *registers,
                                 const char *text);
 
 /**
- * Sets raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each register
- * comes first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low byte, for a
- * device that swaps the bytes of its registers.
+ * Writes raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each
+ * register is first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low
+ * byte, for a device that swaps the bytes of its registers.
  *
- * @param registers  the registers, of a kind to write
- * @param address    the first register, by the device's address
- * @param order      one of MBM_ORDER_..., MBM_ORDER_DEFAULT for that of `registers`
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the first register
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
  * @param bytes      the bytes; must not overlap the registers
- * @param length     how many bytes, two a register; if odd, the other byte of the
- *                   last register stays
- * @return MBM_OK, or with nothing changed MBM_ILLEGAL_DATA_ADDRESS if there are not so
- *         many, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ * @param length     how many bytes, two for each register; if it is odd, the other byte
+ *                   of the last register does not change
+ * @return MBM_OK; or with nothing written MBM_ILLEGAL_DATA_ADDRESS if one of the
+ *         registers does not exist, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
                                uint16_t address,
@@ -3757,49 +3854,51 @@ uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
 /* ==== 10. Packets =================================================================== */
 
 /**
- * A request: what a client sends.
+ * A request: a client sends it.
  */
 #define MBM_PACKET_REQUEST 0
 
 /**
- * A response: what a server sends if the request succeeds.
+ * A response: a server sends it if the request succeeds.
  */
 #define MBM_PACKET_RESPONSE 1
 
 /**
- * An exception: what a server sends if the request fails (V1.1b3, clause 7).
+ * An exception: a server sends it if the request fails (V1.1b3, clause 7).
  */
 #define MBM_PACKET_EXCEPTION 2
 
 /**
- * Most bytes of a PDU: function code and data (V1.1b3, 4.1).
+ * The longest PDU, function code and data, in bytes (V1.1b3, 4.1).
  */
 #define MBM_MAX_PDU 253
 
 /**
- * `bytes` is the length.
+ * The length is exactly `bytes`.
  */
 #define MBM_LENGTH_EXACT 0
 
 /**
- * It has `bytes` at least. Once so many are there, ask again.
+ * The length is at least `bytes`. Call the function again once you have that many bytes.
  */
 #define MBM_LENGTH_AT_LEAST 1
 
 /**
- * Silence on the line tells, in ASCII the end character. `bytes` is 0.
+ * Silence on the line ends the frame; in ASCII the end character does. `bytes` is 0.
  */
 #define MBM_LENGTH_SILENCE 2
 
 /**
- * Nobody knows this function: declare it. Also what silence ends, in RTU over TCP,
- * where there is none. `bytes` is 0.
+ * The length is not known, because the function is not declared: see mbm_function. In
+ * RTU over TCP also for a function whose frames silence ends, because a stream has no
+ * silence. `bytes` is 0.
  */
 #define MBM_LENGTH_UNKNOWN 3
 
 /**
- * A request, response or exception of any function. Parsing zeroes it first,
- * and sets what the function has; building reads that and ignores the rest:
+ * A request, response or exception of any function. Each function uses the fields in this
+ * table (function codes in hex). Parsing sets them and zeroes all others; building reads
+ * them and ignores all others.
  *
  * function | request | response
  * ---------|---------|---------
@@ -3821,68 +3920,70 @@ uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
  * 2B, others | meiType, data | meiType, data
  * your own | data | data
  *
- * An exception has exceptionCode, and the function of the request. Register
- * data are as on the wire, high bytes first; bits begin with the lowest of the
- * first byte. Records and objects: mbm_packet_nextRecord, mbm_packet_addRecord
- * and their likes for objects.
+ * An exception has exceptionCode, and the function code of the request. Register data are
+ * as on the wire, the high byte of each register first. Bits begin with the lowest bit of
+ * the first byte. To read records or objects, use mbm_packet_nextRecord and
+ * mbm_packet_nextObject; to write them, mbm_packet_addRecord and mbm_packet_addObject.
  */
 typedef struct mbm_packet {
     /**
-     * The data, without the byte count in front of them. After parsing they
-     * lie within the bytes that were parsed; to build, they are yours. May be
-     * NULL if dataLength is 0.
+     * The data, without the byte count before them. Parsing sets a pointer into the
+     * parsed bytes. To build a packet, point it to bytes of yours. May be NULL if
+     * dataLength is 0.
      */
     const uint8_t *data;
     /**
-     * Bytes of data.
+     * Length of `data` in bytes.
      */
     uint16_t dataLength;
     /**
-     * Transaction identifier of a TCP frame; 0 in other framings.
+     * The transaction identifier of a TCP frame; 0 in other framings.
      */
     uint16_t transaction;
     /**
-     * First coil, input or register, counted from 0; 17: that is read.
+     * The first coil, input or register, counted from 0; for function 17 the first that
+     * is read.
      */
     uint16_t address;
     /**
-     * Coils, inputs or registers; 17: that are read.
+     * How many coils, inputs or registers; for function 17 how many are read.
      */
     uint16_t quantity;
     /**
-     * 17: first register that is written.
+     * 17: the first register that is written.
      */
     uint16_t writeAddress;
     /**
-     * 17: registers that are written.
+     * 17: how many registers are written.
      */
     uint16_t writeQuantity;
     /**
-     * 05: 0 is off, anything else is on (parsed: 1). 06: the register.
+     * 05: 0 is off, any other value is on; parsing sets 1 for on. 06: the value of the
+     * register.
      */
     uint16_t value;
     /**
-     * 16: bits that are kept.
+     * 16: the bits that keep their value.
      */
     uint16_t andMask;
     /**
-     * 16: bits that replace those that are not kept.
+     * 16: the new values of the other bits.
      */
     uint16_t orMask;
     /**
-     * 08: one of MBM_DIAGNOSTICS_.
+     * 08: the sub-function, one of MBM_DIAGNOSTICS_...
      */
     uint16_t subFunction;
     /**
-     * 0B, 0C: FFFF while a command is carried out, else 0.
+     * 0B, 0C: FFFF (hex) while the device carries out a command, else 0.
      */
     uint16_t commStatus;
     /**
-     * 0B, 0C: successful messages.
+     * 0B, 0C: the count of successful messages.
      */
     uint16_t eventCount;
     /**
-     * 0C: messages.
+     * 0C: the count of messages.
      */
     uint16_t messageCount;
     /**
@@ -3890,86 +3991,89 @@ typedef struct mbm_packet {
      */
     uint8_t kind;
     /**
-     * The unit that is asked, or that answers. Of frames only.
+     * The unit id that the request addresses, or that replies. Only frames have it.
      */
     uint8_t unit;
     /**
-     * Function code, 1 to 127; of an exception that of the request.
+     * The function code, 1 to 127; of an exception the one of the request.
      */
     uint8_t function;
     /**
-     * Exception: 1 to 127, the same numbers as MBM_ILLEGAL_FUNCTION and others.
+     * Exception: the code, 1 to 127. The numbers are those of MBM_ILLEGAL_FUNCTION and
+     * the statuses after it.
      */
     uint8_t exceptionCode;
     /**
-     * 07: eight outputs.
+     * 07: the eight outputs, one bit each.
      */
     uint8_t exceptionStatus;
     /**
-     * 11: the byte count. It is dataLength, or less: some devices count the id
-     * only and send more behind it.
+     * 11: the byte count, at most dataLength. Some devices count only the id and send
+     * more bytes after it.
      */
     uint8_t byteCount;
     /**
-     * 2B: MBM_MEI_READ_DEVICE_IDENTIFICATION or another.
+     * 2B: MBM_MEI_READ_DEVICE_IDENTIFICATION or another MEI type.
      */
     uint8_t meiType;
     /**
-     * 2B/0E: one of MBM_DEVICE_ID_.
+     * 2B/0E: one of MBM_DEVICE_ID_...
      */
     uint8_t readDeviceIdCode;
     /**
-     * 2B/0E: the first object, or the only one.
+     * 2B/0E: the first object to read, or the only one.
      */
     uint8_t objectId;
     /**
-     * 2B/0E: 01 to 03 or 81 to 83 by the standard; not checked.
+     * 2B/0E: the conformity level, by the standard 01 to 03 or 81 to 83 (hex); not
+     * checked.
      */
     uint8_t conformity;
     /**
-     * 2B/0E: 1 if another request is needed for the rest, else 0.
+     * 2B/0E: 1 if the client has to send another request for the rest, else 0.
      */
     uint8_t moreFollows;
     /**
-     * 2B/0E: the object to ask for next; if none follows, 0 by the standard, and
-     * not checked.
+     * 2B/0E: the object to request next. By the standard 0 if none follows; not checked.
      */
     uint8_t nextObjectId;
     /**
-     * 2B/0E: how many objects the data are.
+     * 2B/0E: how many objects `data` contains.
      */
     uint8_t objectCount;
 } mbm_packet;
 
 /**
- * How long something is.
+ * The length of a PDU or frame, as far as it is known.
  */
 typedef struct mbm_length {
     /**
-     * All of it, from its first byte, as `kind` says.
+     * The length in bytes from the first byte on; `kind` says how to read it.
      */
     uint16_t bytes;
     /**
-     * MBM_LENGTH_EXACT, _AT_LEAST, _SILENCE or _UNKNOWN.
+     * MBM_LENGTH_EXACT, MBM_LENGTH_AT_LEAST, MBM_LENGTH_SILENCE or MBM_LENGTH_UNKNOWN.
      */
     uint8_t kind;
 } mbm_length;
 
 /**
- * Registers of a file: a sub-request of 14 or 15, or what answers it.
+ * Registers of a file: one group of function 14 or 15 (hex), in a request or a response.
  */
 typedef struct mbm_record {
     /**
-     * The registers, high bytes first, 2 * length bytes. A request of 14,
-     * which reads them, has none: NULL, and ignored.
+     * The registers, the high byte of each first; 2 * length bytes. A request of
+     * function 14 reads registers and has no data: NULL after parsing, ignored for
+     * building.
      */
     const uint8_t *data;
     /**
-     * File number, 1 to 65535; 0 in a response of 14, which does not say.
+     * The file number, 1 to 65535; 0 in a response of function 14, which does not
+     * contain it.
      */
     uint16_t file;
     /**
-     * The first record, 0 to 9999; 0 in a response of 14.
+     * The first record, 0 to 9999; 0 in a response of function 14.
      */
     uint16_t record;
     /**
@@ -3983,33 +4087,33 @@ typedef struct mbm_record {
  */
 typedef struct mbm_object {
     /**
-     * Its value, most often text, without an end.
+     * The value, usually text, without a NUL.
      */
     const uint8_t *data;
     /**
-     * Bytes of the value.
+     * Length of the value in bytes.
      */
     uint8_t length;
     /**
-     * 0 vendor name, 1 product code, 2 revision and so on (V1.1b3, 6.21).
+     * The object id: 0 vendor name, 1 product code, 2 revision and so on (V1.1b3, 6.21).
      */
     uint8_t id;
 } mbm_object;
 
 /**
- * Writes the frame of a packet: request, response or exception. Nothing
- * malformed is ever built.
+ * Writes the frame of a packet: a request, a response or an exception. It never builds a
+ * malformed frame.
  *
  * Any thread or interrupt may call it.
  *
- * @param framing   how frames look
- * @param packet    what to build, with its unit, and for TCP the transaction
- * @param frame     receives the frame; may not overlap the packet's data
- * @param capacity  bytes of `frame`; MBM_MAX_FRAME do for RTU, MBM_MAX_TCP_FRAME for
- *                  TCP, MBM_MAX_PDU for a PDU alone, MBM_MAX_ASCII_FRAME for all
- * @param length    receives the frame's length; 0 if the status is not MBM_OK
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; else the fault
- *         that mbm_frame_parse finds in such a frame
+ * @param framing   the framing of the frame
+ * @param packet    the packet, with its unit, and for TCP its transaction
+ * @param frame     receives the frame; it must not overlap the packet's data
+ * @param capacity  bytes of `frame`; MBM_MAX_FRAME suffice for RTU, MBM_MAX_TCP_FRAME for
+ *                  TCP, MBM_MAX_PDU for MBM_FRAMING_NONE, MBM_MAX_ASCII_FRAME for all
+ * @param length    receives the frame's length in bytes; 0 if the status is not MBM_OK
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT; otherwise the status that
+ *         mbm_frame_parse would return for such a frame
  */
 uint8_t mbm_frame_build(const struct mbm_framing *framing,
                         const struct mbm_packet *packet,
@@ -4018,30 +4122,29 @@ uint8_t mbm_frame_build(const struct mbm_framing *framing,
                         uint16_t *length);
 
 /**
- * Reads a frame. The packet's data point into it.
+ * Parses a frame into a packet. The packet's data point into the frame.
  *
- * A request that is refused with an exception code can be answered with that:
- * see mbm_frame_exception.
+ * If it returns an exception code for a request, mbm_frame_exception writes the exception
+ * that answers the request.
  *
  * Any thread or interrupt may call it.
  *
- * @param framing      how frames look
+ * @param framing      the framing of the frame
  * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
  *                     and exceptions
- * @param frame        the frame, from its first byte to its last. ASCII is
- *                     decoded where it stands, which overwrites it; others are
- *                     only read
- * @param frameLength  its bytes
- * @param packet       receives what it says. If the frame is sound, but not
- *                     what it carries: kind, unit, transaction and function
- *                     alone; if the frame is not sound: kind alone; unchanged
- *                     for MBM_INVALID_ARGUMENT
- * @return MBM_OK, also for an exception; MBM_INVALID_ARGUMENT. Of the frame
+ * @param frame        the frame, from its first byte to its last. An ASCII frame is
+ *                     decoded in place, which overwrites it; other frames do not change
+ * @param frameLength  the number of bytes of `frame`
+ * @param packet       receives the packet. If the frame is valid but its PDU is not, it
+ *                     receives only kind, unit, transaction and function. If the frame is
+ *                     not valid, it receives only the kind. For MBM_INVALID_ARGUMENT it
+ *                     does not change
+ * @return MBM_OK, also for an exception; MBM_INVALID_ARGUMENT. If the frame is not valid:
  *         MBM_INCOMPLETE_FRAME, MBM_MALFORMED_FRAME, or MBM_INVALID_CRC, also for a
- *         wrong LRC. Of a request in it the exception that answers it:
+ *         wrong LRC. If its request is not valid, the exception that answers it:
  *         MBM_ILLEGAL_FUNCTION, MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE.
- *         Of a response in it MBM_INVALID_FUNCTION for a function that is neither the
- *         standard's nor declared, or MBM_MALFORMED_REPLY
+ *         If its response is not valid: MBM_MALFORMED_REPLY, or MBM_INVALID_FUNCTION for a
+ *         function code that the standard does not define and `framing` does not declare
  */
 uint8_t mbm_frame_parse(const struct mbm_framing *framing,
                         uint8_t kind,
@@ -4050,22 +4153,22 @@ uint8_t mbm_frame_parse(const struct mbm_framing *framing,
                         struct mbm_packet *packet);
 
 /**
- * Writes the exception that answers a request, where one may: to a request
- * that mbm_frame_parse refused, with its status; to one that your device
- * refuses, with the exception code of your choice.
+ * Writes the frame of the exception that answers a request. Pass the status of
+ * mbm_frame_parse if that refused the request, or an exception code of your choice if your
+ * device refuses it.
  *
  * Any thread or interrupt may call it.
  *
- * @param framing   how frames look
- * @param request   the request, as mbm_frame_parse left it
- * @param code      1 to 127, MBM_ILLEGAL_FUNCTION for example
- * @param frame     receives the frame; it may be that of the request
- * @param capacity  bytes of `frame`; 11 always do
- * @param length    receives the frame's length; 0 if the status is not MBM_OK
- * @return MBM_OK; MBM_BROADCAST_NOT_ALLOWED: on a serial line nobody answers
- *         unit 0; MBM_ILLEGAL_FUNCTION for a function from 0x80, which no
- *         exception can name; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also
- *         for a status that is no exception code, and for MBM_FRAMING_NONE
+ * @param framing   the framing of the frame
+ * @param request   the request, as mbm_frame_parse filled it in
+ * @param code      the exception code, 1 to 127, for example MBM_ILLEGAL_FUNCTION
+ * @param frame     receives the frame; it may be the buffer of the request's frame
+ * @param capacity  bytes of `frame`; 11 always suffice
+ * @param length    receives the frame's length in bytes; 0 if the status is not MBM_OK
+ * @return MBM_OK; MBM_BROADCAST_NOT_ALLOWED for unit 0 on a serial line, which no device
+ *         answers; MBM_ILLEGAL_FUNCTION for a function code from 0x80 on, which no
+ *         exception can contain; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT, also
+ *         for a `code` out of range and for MBM_FRAMING_NONE
  */
 uint8_t mbm_frame_exception(const struct mbm_framing *framing,
                             const struct mbm_packet *request,
@@ -4075,25 +4178,26 @@ uint8_t mbm_frame_exception(const struct mbm_framing *framing,
                             uint16_t *length);
 
 /**
- * How long the frame is that begins with these bytes.
+ * Computes the length of a frame from its first bytes.
  *
- * A response to function 11 may be longer than it counts: some devices count the id
- * alone. In RTU frames it is MBM_LENGTH_EXACT once a right CRC stands where the count
- * says, MBM_LENGTH_AT_LEAST before, and if the CRC is wrong there MBM_LENGTH_SILENCE,
- * or MBM_LENGTH_UNKNOWN in a stream. A PDU alone (MBM_FRAMING_NONE) has no CRC that would
- * tell: its length is the one that it counts, and mbm_frame_parse takes the longer PDU too.
+ * A response to function 11 may be longer than its byte count says, because some devices
+ * count only the id. In RTU frames the length is MBM_LENGTH_AT_LEAST until the bytes of the
+ * CRC have arrived at the position that the byte count gives. Then it is MBM_LENGTH_EXACT
+ * if that CRC is right. If it is wrong, it is MBM_LENGTH_SILENCE, or MBM_LENGTH_UNKNOWN in
+ * RTU over TCP. A PDU without a frame (MBM_FRAMING_NONE) has no CRC: its length is the one
+ * that the byte count gives, and mbm_frame_parse accepts a longer PDU too.
  *
- * Any thread or interrupt may call it. For ASCII it takes 260 bytes of stack.
+ * Any thread or interrupt may call it. For ASCII it needs 260 bytes of stack.
  *
- * @param framing   how frames look
+ * @param framing   the framing of the frame
  * @param kind      MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and
  *                  exceptions
  * @param bytes     the frame's first bytes; more may follow
- * @param have      how many; may be 0
+ * @param have      the number of bytes; may be 0
  * @param expected  receives the length; MBM_LENGTH_UNKNOWN and 0 if the status is
  *                  not MBM_OK
- * @return MBM_OK; MBM_MALFORMED_FRAME if no frame begins like that, or none is
- *         so long; MBM_INVALID_ARGUMENT
+ * @return MBM_OK; MBM_MALFORMED_FRAME if no frame starts with these bytes, or if no frame
+ *         may be as long as they say; MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_frame_expectedLength(const struct mbm_framing *framing,
                                  uint8_t kind,
@@ -4102,38 +4206,41 @@ uint8_t mbm_frame_expectedLength(const struct mbm_framing *framing,
                                  struct mbm_length *expected);
 
 /**
- * How long the frame will be that answers a request, if that succeeds. Else it
- * is an exception: 5 bytes in RTU, 9 in TCP, 11 characters in ASCII, 2 of a PDU alone.
+ * Computes the length of the response frame to a request. If the device refuses the
+ * request, it sends an exception instead: 5 bytes in RTU, 9 in TCP, 11 characters in
+ * ASCII, 2 for MBM_FRAMING_NONE.
  *
- * Any thread or interrupt may call it. It takes 260 bytes of stack.
+ * Any thread or interrupt may call it. It needs 260 bytes of stack.
  *
- * @param framing   how frames look
+ * @param framing   the framing of the frame
  * @param request   the request, as for mbm_frame_build
- * @param expected  receives the length; MBM_LENGTH_EXACT and 0 if nothing ever
- *                  answers it: a broadcast, 08 with sub-function 04;
+ * @param expected  receives the length. It is MBM_LENGTH_EXACT and 0 for a request that no
+ *                  device answers: a broadcast, or 08 with sub-function 04. It is
  *                  MBM_LENGTH_UNKNOWN and 0 if the status is not MBM_OK
- * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a packet that is no request;
- *         else why such a request is never built
+ * @return MBM_OK; MBM_INVALID_ARGUMENT, also if the packet is not a request; otherwise the
+ *         status for which mbm_frame_build refuses the request
  */
 uint8_t mbm_frame_replyLength(const struct mbm_framing *framing,
                               const struct mbm_packet *request,
                               struct mbm_length *expected);
 
 /**
- * Says whether bytes look like a Modbus TCP frame, request or response, and how
- * long that is. Eight are needed. The length in the header must be one that a
- * request or a response of this function may have, as far as the bytes tell.
+ * Decides whether bytes look like the start of a Modbus TCP frame, a request or a
+ * response, and computes the frame's length. It needs 8 bytes. The length in the MBAP
+ * header must be one that a request or a response of the function may have, as far as the
+ * bytes show.
  *
  * Any thread or interrupt may call it.
  *
  * @param bytes         the first bytes
- * @param have          how many
- * @param allowUnknown  0: only with a function code of the standard, or one
- *                      that it leaves to users; else: with any but 0
- * @param expected      receives the bytes of the frame; 0 if the status is not
+ * @param have          the number of bytes
+ * @param allowUnknown  0: the function code must be one that the standard defines or
+ *                      leaves to users; any other value: every function code but 0 will do
+ * @param expected      receives the length of the frame in bytes; 0 if the status is not
  *                      MBM_OK
- * @return MBM_OK; MBM_INCOMPLETE_FRAME if more bytes must tell;
- *         MBM_MALFORMED_FRAME if this is something else; MBM_INVALID_ARGUMENT
+ * @return MBM_OK; MBM_INCOMPLETE_FRAME if more bytes are needed to decide;
+ *         MBM_MALFORMED_FRAME if the bytes are not a Modbus TCP frame;
+ *         MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_frame_looksLikeTcp(const uint8_t *bytes,
                                uint16_t have,
@@ -4141,70 +4248,75 @@ uint8_t mbm_frame_looksLikeTcp(const uint8_t *bytes,
                                uint16_t *expected);
 
 /**
- * The CRC-16 of an RTU frame (serial line guide V1.02, 6.2.2). On the line its
- * low byte comes first.
+ * Computes the CRC-16 of an RTU frame (serial line guide V1.02, 6.2.2). A frame carries
+ * its low byte first.
  *
  * Any thread or interrupt may call it.
  *
  * @param bytes   unit and PDU
- * @param length  how many
- * @return the CRC; 0xFFFF for NULL or no bytes
+ * @param length  the number of bytes
+ * @return the CRC; 0xFFFF if `bytes` is NULL or `length` is 0
  */
 uint16_t mbm_frame_crc16(const uint8_t *bytes, uint16_t length);
 
 /**
- * The LRC of an ASCII frame (serial line guide V1.02, 6.2.1).
+ * Computes the LRC of an ASCII frame (serial line guide V1.02, 6.2.1).
  *
  * Any thread or interrupt may call it.
  *
  * @param bytes   unit and PDU as bytes, not as characters
- * @param length  how many
- * @return the LRC; 0 for NULL or no bytes
+ * @param length  the number of bytes
+ * @return the LRC; 0 if `bytes` is NULL or `length` is 0
  */
 uint8_t mbm_frame_lrc(const uint8_t *bytes, uint16_t length);
 
 /**
- * Gives the records of 14 or 15 one by one:
+ * Reads the records of function 14 or 15 (hex) one by one:
  * `for (cursor = 0; mbm_packet_nextRecord(&packet, &cursor, &record);)`
  *
  * Any thread or interrupt may call it.
  *
- * @param packet  a request or response of 14 or 15, as parsed or built
- * @param cursor  where it goes on; yours, 0 to begin
- * @param record  receives the record, whose data point into the packet's
- * @return 1; 0, with cursor and record unchanged, if there is none left, or for NULL
+ * @param packet  a request or response of function 14 or 15, parsed or to be built
+ * @param cursor  the position in the data; a variable of yours, 0 for the first record
+ * @param record  receives the record; its data pointer points into the data of the
+ *                packet
+ * @return 1 if there is a record. 0, with `cursor` and `record` unchanged, if there are
+ *         no more records, and for NULL
  */
 uint8_t mbm_packet_nextRecord(const struct mbm_packet *packet,
                               uint16_t *cursor,
                               struct mbm_record *record);
 
 /**
- * Gives the objects of a device identification one by one, as
- * mbm_packet_nextRecord does records.
+ * Reads the objects of a device identification one by one, as mbm_packet_nextRecord
+ * reads records.
  *
  * Any thread or interrupt may call it.
  *
- * @param packet  a response of 2B/0E, as parsed or built
- * @param cursor  where it goes on; yours, 0 to begin
- * @param object  receives the object, whose data point into the packet's
- * @return 1; 0, with cursor and object unchanged, if there is none left, or for NULL
+ * @param packet  a response of function 2B/0E (hex), parsed or to be built
+ * @param cursor  the position in the data; a variable of yours, 0 for the first object
+ * @param object  receives the object; its data pointer points into the data of the
+ *                packet
+ * @return 1 if there is an object. 0, with `cursor` and `object` unchanged, if there are
+ *         no more objects, and for NULL
  */
 uint8_t mbm_packet_nextObject(const struct mbm_packet *packet,
                               uint16_t *cursor,
                               struct mbm_object *object);
 
 /**
- * Adds a record to a packet of 14 or 15, to be built then. Set the packet's
- * kind and function first, and dataLength to 0.
+ * Adds a record to the data of a packet of function 14 or 15 (hex) that you are going to
+ * build. Set the kind and the function of the packet first, and dataLength to 0.
  *
- * @param packet    grows by the record; unchanged if it is refused
- * @param storage   receives the packet's data, for all its records the same
- * @param capacity  bytes of `storage`; 251 always do
- * @param record    the record; its data may not lie in `storage`
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_ILLEGAL_FUNCTION if this is not 14
- *         or 15; MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE for a
- *         record that there cannot be; MBM_INVALID_ARGUMENT, also for data
- *         that are elsewhere
+ * @param packet    gets the record; unchanged if the call fails
+ * @param storage   receives the data of the packet; use the same storage for all its
+ *                  records
+ * @param capacity  size of `storage` in bytes; 251 are always enough
+ * @param record    the record; its data must not overlap `storage`
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL; MBM_ILLEGAL_FUNCTION if the function is not 14
+ *         or 15; MBM_ILLEGAL_DATA_ADDRESS or MBM_ILLEGAL_DATA_VALUE for an invalid
+ *         record; MBM_INVALID_ARGUMENT for a NULL pointer, an exception packet, record
+ *         data that overlap `storage`, or packet data that are not in `storage`
  */
 uint8_t mbm_packet_addRecord(struct mbm_packet *packet,
                              uint8_t *storage,
@@ -4212,16 +4324,20 @@ uint8_t mbm_packet_addRecord(struct mbm_packet *packet,
                              const struct mbm_record *record);
 
 /**
- * Adds an object to a response of 2B/0E, to be built then. Set the packet's
- * kind, function and meiType first, and dataLength and objectCount to 0.
+ * Adds an object to the data of a response of function 2B/0E (hex) that you are going to
+ * build. Set the kind, the function and the meiType of the packet first, and dataLength
+ * and objectCount to 0.
  *
- * @param packet    grows by the object; unchanged if it is refused
- * @param storage   receives the packet's data, for all its objects the same
- * @param capacity  bytes of `storage`; 246 always do
- * @param object    the object; its data may not lie in `storage`
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL: if 246 bytes are, set moreFollows and
- *         nextObjectId; MBM_ILLEGAL_FUNCTION if this is no such response;
- *         MBM_INVALID_ARGUMENT, also for data that are elsewhere
+ * @param packet    gets the object; unchanged if the call fails
+ * @param storage   receives the data of the packet; use the same storage for all its
+ *                  objects
+ * @param capacity  size of `storage` in bytes; 246 are always enough
+ * @param object    the object; its data must not overlap `storage`
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL: if `storage` has 246 bytes, the object belongs
+ *         into the next response, so set moreFollows and nextObjectId;
+ *         MBM_ILLEGAL_FUNCTION if the packet is no such response; MBM_INVALID_ARGUMENT
+ *         for a NULL pointer, object data that overlap `storage`, or packet data that
+ *         are not in `storage`
  */
 uint8_t mbm_packet_addObject(struct mbm_packet *packet,
                              uint8_t *storage,
@@ -4229,21 +4345,21 @@ uint8_t mbm_packet_addObject(struct mbm_packet *packet,
                              const struct mbm_object *object);
 
 /**
- * Explains a frame in one line of words, for example
+ * Describes a frame in one line of words, for example
  * "unit 17  request    03 read holding registers  107..109", or
- * "bad CRC, 8 bytes" if it is damaged.
+ * "bad CRC, 8 bytes" if the frame is damaged.
  *
  * Any thread or interrupt may call it. For ASCII it takes 600 bytes of stack.
  *
- * @param framing      how frames look
+ * @param framing      the framing of the frame
  * @param kind         MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses
  *                     and exceptions
  * @param frame        the frame, from its first byte to its last
- * @param frameLength  its bytes
- * @param text         receives the line, which a zero byte ends in any case
- * @param size         bytes of `text`; 200 do for most frames, 1200 for all
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL: the line is cut; MBM_INVALID_ARGUMENT,
- *         also for MBM_FRAMING_NONE
+ * @param frameLength  the number of bytes of `frame`
+ * @param text         receives the line. A zero byte always ends it
+ * @param size         bytes of `text`; 200 suffice for most frames, 1200 for all
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL if `text` received only the start of the line;
+ *         MBM_INVALID_ARGUMENT, also for MBM_FRAMING_NONE
  */
 uint8_t mbm_frame_text(const struct mbm_framing *framing,
                        uint8_t kind,
@@ -4255,27 +4371,27 @@ uint8_t mbm_frame_text(const struct mbm_framing *framing,
 /* ==== 11. Sniffer =================================================================== */
 
 /**
- * Heard on a line that carries both directions.
+ * The bytes come from a line that carries both directions.
  */
 #define MBM_DIRECTION_BOTH 0
 
 /**
- * Heard where only the client sends.
+ * The bytes come from a line or stream on which only the client sends.
  */
 #define MBM_DIRECTION_CLIENT 1
 
 /**
- * Heard where only servers send.
+ * The bytes come from a line or stream on which only servers send.
  */
 #define MBM_DIRECTION_SERVER 2
 
 /**
- * Least bytes of a sniffer's buffer.
+ * The smallest buffer of a sniffer, in bytes.
  */
 #define MBM_MIN_SNIFFER_BUFFER 32
 
 /**
- * Most functions of your own that a sniffer takes.
+ * The most functions of your declaration that a sniffer accepts.
  */
 #define MBM_MAX_SNIFFER_FUNCTIONS 19
 
@@ -4290,23 +4406,24 @@ uint8_t mbm_frame_text(const struct mbm_framing *framing,
 #define MBM_EVENT_REPLY 1
 
 /**
- * The exception that answers a request.
+ * An exception that answers a request.
  */
 #define MBM_EVENT_EXCEPTION 2
 
 /**
- * A reply or exception to no request that waits for one: a late one, one whose
- * request was not seen, or one that does not answer what was asked.
+ * A reply or exception without a matching request: it is late, or its request was not
+ * received, or it does not match the request.
  */
 #define MBM_EVENT_UNPAIRED 3
 
 /**
- * A request that nobody answered within the timeout, or before the next request.
+ * A request without a reply: none came before the timeout, or on a serial line before
+ * the next request.
  */
 #define MBM_EVENT_TIMEOUT 4
 
 /**
- * What looks like a frame, but has a wrong CRC or LRC, or too few bytes.
+ * Bytes that look like a frame, but the CRC or LRC is wrong, or bytes are missing.
  */
 #define MBM_EVENT_BAD_CRC 5
 
@@ -4316,12 +4433,12 @@ uint8_t mbm_frame_text(const struct mbm_framing *framing,
 #define MBM_EVENT_NOISE 6
 
 /**
- * A sniffer: finds the frames on a bus that others use, and pairs requests with
- * replies. It only listens, and has no port: you feed it what you hear.
+ * A sniffer: finds the frames on a bus that others use, and pairs requests with replies.
+ * It never sends and has no port: you pass it the bytes that you receive.
  *
- * Storage is yours and must be zero before first use, which a static object is.
- * One of the mbm_sniffer_begin functions comes first. Not re-entrant: use one
- * object from one thread and never from an interrupt; put an mbm_ring between.
+ * You provide the storage. It must be zero before first use; a static object is zero. Call
+ * one of the mbm_sniffer_begin functions first. Not re-entrant: use one object from one
+ * thread, and never from an interrupt; pass bytes from an interrupt through an mbm_ring.
  */
 typedef struct mbm_sniffer {
     /**
@@ -4335,108 +4452,113 @@ typedef struct mbm_sniffer {
 } mbm_sniffer;
 
 /**
- * Something that happened on the bus.
+ * One event on the bus.
  *
- * What it points to lies in the sniffer's buffer, and is valid until the next
- * call with that sniffer.
+ * Its pointers point into the buffer of the sniffer, and are valid until the next call
+ * with that sniffer.
  */
 typedef struct mbm_event {
     /**
-     * The frame; of noise the bytes. An ASCII frame is decoded: unit, PDU, LRC.
+     * The bytes of the frame; of MBM_EVENT_NOISE all its bytes. An ASCII frame is
+     * decoded: unit id, PDU, LRC.
      */
     const uint8_t *frame;
     /**
-     * The PDU in the frame; NULL if there is none.
+     * The PDU within the frame; NULL without a PDU.
      */
     const uint8_t *pdu;
     /**
-     * What the PDU says, as mbm_frame_parse reads it. If it cannot be read, of a
-     * timeout and of what is no frame: kind, unit, transaction and function alone.
+     * The fields of the PDU, as mbm_frame_parse sets them. If the PDU is malformed, and
+     * for MBM_EVENT_TIMEOUT, MBM_EVENT_BAD_CRC and MBM_EVENT_NOISE, only kind, unit,
+     * transaction and function are set.
      */
     struct mbm_packet packet;
     /**
-     * When its last byte arrived, in microseconds; of a timeout when the request
-     * was given up.
+     * When the last byte arrived, in microseconds; for MBM_EVENT_TIMEOUT when the
+     * timeout ended.
      */
     uint32_t timeUs;
     /**
-     * From the last byte of the request to the last byte of its reply, or until it
-     * was given up, in microseconds; else 0.
+     * Time from the last byte of the request to the last byte of its reply, or to the
+     * timeout, in microseconds; 0 for other events.
      */
     uint32_t responseTimeUs;
     /**
-     * Bytes of `frame`.
+     * Length of `frame` in bytes.
      */
     uint16_t frameLength;
     /**
-     * Bytes of `pdu`.
+     * Length of `pdu` in bytes.
      */
     uint16_t pduLength;
     /**
-     * How many bytes on the line this was.
+     * How many bytes of the line or stream this event covers, at most 65535.
      */
     uint16_t length;
     /**
-     * What this is about, also of a reply that does not say so itself: the first
-     * coil, input or register of the request; 17: that is read.
+     * The first coil, input or register of the request; for function 17 (hex) the first
+     * that is read. Also set for a reply, which does not contain it.
      */
     uint16_t address;
     /**
-     * How many; 17: that are read.
+     * The quantity of the request; for function 17 (hex) the quantity that is read.
      */
     uint16_t quantity;
     /**
-     * One of MBM_EVENT_.
+     * One of MBM_EVENT_...
      */
     uint8_t kind;
     /**
-     * MBM_OK; of a request the exception that a server answers to it; the code of
-     * an exception; MBM_MALFORMED_REPLY if a reply does not answer what was asked;
-     * MBM_RESPONSE_TIMED_OUT; MBM_INVALID_CRC; MBM_BUFFER_TOO_SMALL of noise that
-     * may have been a frame longer than the buffer.
+     * MBM_OK; of a request that a server must refuse, the exception for it; of an
+     * exception its code; MBM_MALFORMED_REPLY if a reply does not match its request;
+     * MBM_RESPONSE_TIMED_OUT; MBM_INVALID_CRC; MBM_BUFFER_TOO_SMALL for noise that may
+     * be a frame longer than the buffer.
      */
     uint8_t status;
     /**
-     * The unit that is asked, or answers; of a bad CRC the byte in its place.
+     * The unit that the request addresses, or that replies; for MBM_EVENT_BAD_CRC the
+     * byte at that position.
      */
     uint8_t unit;
     /**
-     * The function code, of an exception that of the request; of a bad CRC the
-     * byte in its place.
+     * The function code, of an exception the one of the request; for MBM_EVENT_BAD_CRC
+     * the byte at that position.
      */
     uint8_t function;
     /**
-     * The first bytes of the request's PDU, of replies and timeouts.
+     * The first bytes of the request's PDU: for replies, exceptions and timeouts, and
+     * for MBM_EVENT_UNPAIRED if the reply is late and its request is still known.
      */
     uint8_t requestHead[9];
     /**
-     * How many those are; 0 if the request is not known.
+     * How many bytes of requestHead are set; 0 if the request is not known.
      */
     uint8_t requestHeadLength;
 } mbm_event;
 
 /**
- * Begins to listen to RTU frames on a serial line.
+ * Begins a sniffer for RTU frames on a serial line.
  *
- * May be called again at any time: received bytes, and a request that still waits for its
- * reply, are forgotten without an event, and the settings are as at first.
+ * You may call it again at any time. The sniffer then discards received bytes and
+ * unanswered requests without an event, and its settings return to their defaults.
  *
- * @param sniffer  the object; zeroed before the first call
- * @param buffer   where bytes are kept until they are understood; yours, valid
- *                 for as long as the sniffer is used
- * @param size     its bytes, MBM_MIN_SNIFFER_BUFFER or more. MBM_MAX_FRAME hold any
- *                 frame, twice as many where the directions are fed apart. A longer
- *                 frame becomes an event of kind MBM_EVENT_NOISE
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL or MBM_INVALID_ARGUMENT, with nothing changed
+ * @param sniffer  the object; zero it before the first call
+ * @param buffer   holds received bytes until the sniffer has reported them; must stay
+ *                 valid for as long as the sniffer is used
+ * @param size     size of `buffer` in bytes, at least MBM_MIN_SNIFFER_BUFFER.
+ *                 MBM_MAX_FRAME holds every frame; with separate directions use twice as
+ *                 much. A longer frame becomes an event of kind MBM_EVENT_NOISE
+ * @return MBM_OK; or with nothing changed MBM_BUFFER_TOO_SMALL for a size that is too
+ *         small, MBM_INVALID_ARGUMENT for a NULL pointer
  */
 uint8_t mbm_sniffer_beginRtu(struct mbm_sniffer *sniffer, uint8_t *buffer, uint16_t size);
 
 /**
- * Begins to listen to ASCII frames on a serial line.
+ * Begins a sniffer for ASCII frames on a serial line.
  *
  * @param sniffer  see mbm_sniffer_beginRtu
  * @param buffer   see mbm_sniffer_beginRtu
- * @param size     see mbm_sniffer_beginRtu; MBM_MAX_ASCII_FRAME hold any frame
+ * @param size     see mbm_sniffer_beginRtu; MBM_MAX_ASCII_FRAME holds every frame
  * @return a status; see mbm_sniffer_beginRtu
  */
 uint8_t mbm_sniffer_beginAscii(struct mbm_sniffer *sniffer,
@@ -4444,21 +4566,21 @@ uint8_t mbm_sniffer_beginAscii(struct mbm_sniffer *sniffer,
                                uint16_t size);
 
 /**
- * Begins to listen to a TCP stream, in frames with the MBAP header.
+ * Begins a sniffer for a TCP stream of frames with the MBAP header.
  *
  * @param sniffer  see mbm_sniffer_beginRtu
  * @param buffer   see mbm_sniffer_beginRtu
- * @param size     see mbm_sniffer_beginRtu; MBM_MAX_TCP_FRAME hold any frame
+ * @param size     see mbm_sniffer_beginRtu; MBM_MAX_TCP_FRAME holds every frame
  * @return a status; see mbm_sniffer_beginRtu
  */
 uint8_t mbm_sniffer_beginTcp(struct mbm_sniffer *sniffer, uint8_t *buffer, uint16_t size);
 
 /**
- * Begins to listen to a TCP stream of RTU frames.
+ * Begins a sniffer for a TCP stream of RTU frames.
  *
  * @param sniffer  see mbm_sniffer_beginRtu
  * @param buffer   see mbm_sniffer_beginRtu
- * @param size     see mbm_sniffer_beginRtu; MBM_MAX_FRAME hold any frame
+ * @param size     see mbm_sniffer_beginRtu; MBM_MAX_FRAME holds every frame
  * @return a status; see mbm_sniffer_beginRtu
  */
 uint8_t mbm_sniffer_beginRtuOverTcp(struct mbm_sniffer *sniffer,
@@ -4466,75 +4588,79 @@ uint8_t mbm_sniffer_beginRtuOverTcp(struct mbm_sniffer *sniffer,
                                     uint16_t size);
 
 /**
- * Declares functions that the standard does not have. Without that their length is
- * guessed: silence ends an RTU frame.
+ * Declares functions that the standard does not define, in place of those declared
+ * before. The sniffer does not know the length of an undeclared function: silence then
+ * ends an RTU frame.
  *
  * @param sniffer    the object
- * @param functions  copied; may be NULL if there are none
- * @param count      how many, at most MBM_MAX_SNIFFER_FUNCTIONS
- * @return MBM_OK, MBM_NOT_INITIALISED, or MBM_INVALID_ARGUMENT with nothing changed
+ * @param functions  an array that is copied; may be NULL if `count` is 0
+ * @param count      how many functions, at most MBM_MAX_SNIFFER_FUNCTIONS
+ * @return MBM_OK; MBM_NOT_INITIALISED; MBM_INVALID_ARGUMENT with nothing changed
  */
 uint8_t mbm_sniffer_setFunctions(struct mbm_sniffer *sniffer,
                                  const struct mbm_function *functions,
                                  uint8_t count);
 
 /**
- * Sets the character that ends ASCII frames after CR, in place of LF, as
- * mbm_client_setDelimiter. Without effect in other framings.
+ * Sets the character that ends an ASCII frame after CR, LF at first; as
+ * mbm_client_setDelimiter. It has no effect in other framings.
  *
  * @param sniffer    the object
- * @param character  1 to 127, but CR, the colon and hexadecimal digits
+ * @param character  1 to 127, except CR, the colon and hexadecimal digits
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_sniffer_setDelimiter(struct mbm_sniffer *sniffer, uint8_t character);
 
 /**
- * Tells the rate of a serial line, from which follow the silence between RTU
- * frames, and when each of several bytes that are fed at once arrived. At first
- * it is untold: 4 ms of silence, and what is fed at once arrived at once.
+ * Sets the baud rate of a serial line. From it the sniffer computes the silence between
+ * RTU frames, and the arrival time of each byte if you feed several at once. Without it
+ * the silence is 4 ms, and all bytes of one feed count as received at the same time.
  *
  * @param sniffer  the object
- * @param baud     bits per second; 0 is untold
+ * @param baud     bits per second; 0, the default, if the rate is unknown
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_sniffer_setBaudRate(struct mbm_sniffer *sniffer, uint32_t baud);
 
 /**
- * Sets how long a request may stay unanswered before that is told; 1000 ms at
- * first. On a serial line the next request ends it too. A longer time than the
- * master's own pairs late replies. For ten times as long, a reply to a request
- * that was given up is still told with what was asked, as MBM_EVENT_UNPAIRED.
+ * Sets how long the sniffer waits for the reply to a request before it reports
+ * MBM_EVENT_TIMEOUT; 1000 ms at first. On a serial line the next request ends the wait
+ * too. A timeout longer than the one of the client also pairs late replies with their
+ * requests. For ten times the timeout, a reply to a request that has timed out is
+ * reported as MBM_EVENT_UNPAIRED with the start of that request (requestHead).
  *
- * @param sniffer       the object
- * @param timeoutMs     1 to 65535
+ * @param sniffer    the object
+ * @param timeoutMs  1 to 65535 ms
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_sniffer_setResponseTimeout(struct mbm_sniffer *sniffer, uint16_t timeoutMs);
 
 /**
- * Sets how long the rest of a frame that has begun is waited for: how coarse
- * your time stamps are. At first 50 ms in RTU, which a USB adapter needs, and
- * 1000 ms in ASCII and TCP.
+ * Sets how long the sniffer waits for the rest of an incomplete frame. Choose it longer
+ * than the error of your time stamps. At first it is 50 ms in RTU and RTU over TCP,
+ * which suits a USB adapter, and 1000 ms in ASCII and TCP.
  *
- * @param sniffer       the object
- * @param timeoutMs     1 to 65535
+ * @param sniffer    the object
+ * @param timeoutMs  1 to 65535 ms
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_sniffer_setFrameTimeout(struct mbm_sniffer *sniffer, uint16_t timeoutMs);
 
 /**
- * Takes bytes that were heard. Call mbm_sniffer_next until there is nothing
- * more, then feed the rest, if not all were taken, with the same time: nothing
+ * Passes received bytes to the sniffer. Then call mbm_sniffer_next until it returns 0.
+ * If the sniffer did not accept all bytes, feed the rest now with the same time; no byte
  * is lost.
  *
- * @param sniffer  the object
- * @param direction  MBM_DIRECTION_BOTH, or where the directions are heard apart
- *                 MBM_DIRECTION_CLIENT or MBM_DIRECTION_SERVER. Do not mix them: at a change
- *                 what is not told of is forgotten
- * @param bytes    what was heard; NULL only with length 0
- * @param length   how many
- * @param nowUs    when the last of them arrived, in microseconds; may wrap
- * @return how many were taken; 0 also if the sniffer was never begun
+ * @param sniffer    the object
+ * @param direction  MBM_DIRECTION_BOTH; MBM_DIRECTION_CLIENT or MBM_DIRECTION_SERVER if
+ *                   you receive the directions separately. Do not mix MBM_DIRECTION_BOTH
+ *                   with the other two: on a change the sniffer discards the bytes that
+ *                   it has not reported yet
+ * @param bytes      the received bytes; NULL only if `length` is 0
+ * @param length     how many bytes
+ * @param nowUs      arrival time of the last of the bytes, in microseconds; may wrap
+ * @return how many bytes the sniffer accepted; 0 also for a sniffer that was never
+ *         begun, or for an invalid argument
  */
 uint16_t mbm_sniffer_feed(struct mbm_sniffer *sniffer,
                           uint8_t direction,
@@ -4543,31 +4669,31 @@ uint16_t mbm_sniffer_feed(struct mbm_sniffer *sniffer,
                           uint32_t nowUs);
 
 /**
- * Tells what happened next on the bus, in the order of time. Call it after each
- * feed until there is nothing more, and now and then while nothing is heard (at
- * least every half hour): silence ends frames, and requests time out.
+ * Returns the next event on the bus, in order of time. Call it after each feed until it
+ * returns 0. Call it also while no bytes arrive, at least every half hour: silence ends
+ * frames, and requests time out.
  *
  * @param sniffer  the object
- * @param nowUs    the time, in microseconds
- * @param event    receives what happened; valid until the next call with this
- *                 sniffer
- * @return 1 if there is an event; 0, with `event` unchanged, if nothing more is known
- *         yet, or the sniffer was never begun
+ * @param nowUs    the time now, in microseconds; may wrap
+ * @param event    receives the event; the data that it points to are valid until the
+ *                 next call with this sniffer
+ * @return 1 if there is an event. 0, with `event` unchanged, if there is none yet, for
+ *         NULL, and for a sniffer that was never begun
  */
 uint8_t mbm_sniffer_next(struct mbm_sniffer *sniffer,
                          uint32_t nowUs,
                          struct mbm_event *event);
 
 /**
- * Explains an event in one line of words, for example
+ * Writes an event as one line of text, for example
  * "unit 17  reply      03 read holding registers  107..109: 555 0 100".
  *
  * Any thread may call it while the event is valid.
  *
- * @param event  what mbm_sniffer_next gave
- * @param text   receives the line, which a zero byte ends in any case
- * @param size   bytes of `text`; 200 do for most events, 2400 for all
- * @return MBM_OK; MBM_BUFFER_TOO_SMALL: the line is cut; MBM_INVALID_ARGUMENT
+ * @param event  an event that mbm_sniffer_next returned
+ * @param text   receives the line; always ends with a NUL
+ * @param size   size of `text` in bytes; 200 are enough for most events, 2400 for all
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL if the line was cut; MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_event_text(const struct mbm_event *event, char *text, uint16_t size);
 
@@ -4576,11 +4702,11 @@ uint8_t mbm_event_text(const struct mbm_event *event, char *text, uint16_t size)
 /**
  * A receive ring between an interrupt handler and the main loop.
  *
- * One side puts bytes in with mbm_ring_put or mbm_ring_write: an interrupt
- * handler, a DMA callback or a thread. One side takes them out with
- * mbm_ring_read: the main loop, as the `read` hook of a port. Each may
- * interrupt the other at any point; neither may be two at once. No interrupt
- * is ever disabled.
+ * The writer, which is an interrupt handler, a DMA callback or a thread, puts bytes in
+ * with mbm_ring_put or mbm_ring_write. The reader, which is the main loop in the `read`
+ * hook of a port, takes them out with mbm_ring_read. Each may interrupt the other at any
+ * point. A ring has only one writer and only one reader at a time. The functions never
+ * disable interrupts.
  */
 typedef struct mbm_ring {
     /**
@@ -4598,64 +4724,67 @@ typedef struct mbm_ring {
 } mbm_ring;
 
 /**
- * Makes a ring of your bytes, empty. Neither side may use it meanwhile.
+ * Begins an empty ring over your storage. Neither writer nor reader may use the ring
+ * meanwhile.
  *
  * @param ring   the object
- * @param bytes  storage, yours, valid for as long as the ring is used
- * @param size   2 to 65535, on an AVR 2 to 256; the ring holds one byte less
+ * @param bytes  your storage; it must stay valid for as long as the ring is used
+ * @param size   bytes of storage, 2 to 65535, on an AVR 2 to 256. The ring holds one byte
+ *               less
  * @return MBM_OK or MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_ring_begin(struct mbm_ring *ring, uint8_t *bytes, uint16_t size);
 
 /**
- * Puts a byte in. An interrupt may call it.
+ * Puts one byte in. The writer calls it, also from an interrupt.
  *
  * @param ring  the object
- * @param byte  the byte received
- * @return 1, or 0 if there was no room: the byte counts as lost
+ * @param byte  the received byte
+ * @return 1; 0 if the ring was full: mbm_ring_lost counts the byte
  */
 uint8_t mbm_ring_put(struct mbm_ring *ring, uint8_t byte);
 
 /**
- * Puts bytes in, in order. An interrupt may call it.
+ * Puts bytes in, in order. The writer calls it, also from an interrupt.
  *
  * @param ring    the object
- * @param bytes   the bytes received; NULL only with length 0
- * @param length  how many
- * @return how many found room; the others count as lost
+ * @param bytes   the received bytes; NULL only if `length` is 0
+ * @param length  the number of bytes
+ * @return the number of bytes that the ring took; mbm_ring_lost counts the others
  */
 uint16_t mbm_ring_write(struct mbm_ring *ring, const uint8_t *bytes, uint16_t length);
 
 /**
- * Takes bytes out, in order, without waiting.
+ * Takes bytes out, in order, without waiting. The reader calls it.
  *
  * @param ring      the object
- * @param bytes     where they go; NULL only with capacity 0
- * @param capacity  at most so many
- * @return how many there were
+ * @param bytes     receives the bytes; NULL only if `capacity` is 0
+ * @param capacity  the number of bytes that `bytes` can hold
+ * @return the number of bytes taken out; 0 if the ring was empty
  */
 uint16_t mbm_ring_read(struct mbm_ring *ring, uint8_t *bytes, uint16_t capacity);
 
 /**
- * How many bytes there are to take out, for the side that takes.
+ * Returns how many bytes mbm_ring_read can take out now. The reader calls it.
  *
  * @param ring  the object
- * @return bytes; 0 also if the ring was never begun
+ * @return the number of bytes; 0 also if the ring was never begun
  */
 uint16_t mbm_ring_available(const struct mbm_ring *ring);
 
 /**
- * Forgets what there is to take out, for the side that takes.
+ * Discards all bytes in the ring. The reader calls it.
  *
  * @param ring  the object
  */
 void mbm_ring_clear(struct mbm_ring *ring);
 
 /**
- * How many bytes found no room since begin; either side may ask.
+ * Returns how many bytes were lost because the ring was full, since mbm_ring_begin.
+ * Writer and reader may call it.
  *
  * @param ring  the object
- * @return bytes; wraps at 65536, on an AVR at 256
+ * @return the number of bytes; it wraps at 65536, on an AVR at 256
  */
 uint16_t mbm_ring_lost(const struct mbm_ring *ring);
 

@@ -3,8 +3,9 @@
 
 use crate::engine::{Engine, Receive, Settings, Words, BROADCAST};
 use crate::error::Status;
-use crate::pdu::query::{FunctionSpec, MasterRequest};
-use crate::pdu::{bits, registers};
+use crate::pdu::bits;
+use crate::pdu::function_spec::FunctionSpec;
+use crate::pdu::master_request::{MasterRequest, MasterSpec};
 use crate::port::Port;
 
 /// The value returned for a word that does not exist.
@@ -203,17 +204,17 @@ impl<P: Port, S: Words> Master<P, S> {
         self.status
     }
 
-    /// Starts the request of the function `form`, with an address and a quantity or value
+    /// Starts the request of the function `spec`, with an address and a quantity or value
     /// `word`. If it returns an error, nothing is sent. The address of a write becomes the
     /// write address.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn request(&mut self, address: u16, word: u16, form: FunctionSpec) -> Status {
+    pub fn request(&mut self, address: u16, word: u16, spec: MasterSpec) -> Status {
         let ready = self.check_ready();
         if ready != Status::OK {
             return ready;
         }
         let request = self.engine.request();
-        let built = request.set(form, address, word);
+        let built = request.set(spec, address, word);
         if !request.is_read() {
             self.write_address = address;
         }
@@ -260,28 +261,44 @@ impl<P: Port, S: Words> Master<P, S> {
 
     /// 01: reads 1 to 2000 coils into the response words.
     pub fn read_coils(&mut self, address: u16, quantity: u16) -> Status {
-        self.request(address, quantity, bits::form::READ_COILS)
+        self.request(address, quantity, MasterSpec::new(FunctionSpec::READ_COILS))
     }
 
     /// 02: reads 1 to 2000 discrete inputs into the response words.
     pub fn read_discrete_inputs(&mut self, address: u16, quantity: u16) -> Status {
-        self.request(address, quantity, bits::form::READ_INPUTS)
+        self.request(
+            address,
+            quantity,
+            MasterSpec::new(FunctionSpec::READ_DISCRETE_INPUTS),
+        )
     }
 
     /// 03: reads 1 to 125 holding registers into the response words.
     pub fn read_holding_registers(&mut self, address: u16, quantity: u16) -> Status {
-        self.request(address, quantity, registers::form::READ_HOLDING)
+        self.request(
+            address,
+            quantity,
+            MasterSpec::new(FunctionSpec::READ_HOLDING_REGISTERS),
+        )
     }
 
     /// 04: reads 1 to 125 input registers into the response words.
     pub fn read_input_registers(&mut self, address: u16, quantity: u16) -> Status {
-        self.request(address, quantity, registers::form::READ_INPUT)
+        self.request(
+            address,
+            quantity,
+            MasterSpec::new(FunctionSpec::READ_INPUT_REGISTERS),
+        )
     }
 
     /// 05: switches one coil off if `on` is 0, otherwise on.
     pub fn write_single_coil(&mut self, address: u16, on: u16) -> Status {
         let value = if on == 0 { 0 } else { bits::ON };
-        self.request(address, value, bits::form::WRITE_SINGLE)
+        self.request(
+            address,
+            value,
+            MasterSpec::new(FunctionSpec::WRITE_SINGLE_COIL),
+        )
     }
 
     /// 06: writes one register. The value also becomes transmit word 0.
@@ -289,12 +306,20 @@ impl<P: Port, S: Words> Master<P, S> {
         if self.check_ready() == Status::OK {
             self.set_transmit_word(0, value);
         }
-        self.request(address, value, registers::form::WRITE_SINGLE)
+        self.request(
+            address,
+            value,
+            MasterSpec::new(FunctionSpec::WRITE_SINGLE_REGISTER),
+        )
     }
 
     /// 0F: writes 1 to 1968 coils from the transmit words, lowest bit first.
     pub fn write_multiple_coils(&mut self, address: u16, quantity: u16) -> Status {
-        self.request(address, quantity, bits::form::WRITE_MULTIPLE)
+        self.request(
+            address,
+            quantity,
+            MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_COILS),
+        )
     }
 
     /// 0F: writes the queued bits to the last write address.
@@ -304,7 +329,11 @@ impl<P: Port, S: Words> Master<P, S> {
 
     /// 10: writes 1 to 123 registers from the transmit words.
     pub fn write_multiple_registers(&mut self, address: u16, quantity: u16) -> Status {
-        self.request(address, quantity, registers::form::WRITE_MULTIPLE)
+        self.request(
+            address,
+            quantity,
+            MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_REGISTERS),
+        )
     }
 
     /// 10: writes the queued words to the last write address. A word begun by
@@ -321,7 +350,7 @@ impl<P: Port, S: Words> Master<P, S> {
             self.set_transmit_word(1, or_mask);
         }
         self.write(address, |request| {
-            registers::mask_write(request, address, and_mask, or_mask)
+            request.mask_write_register(address, and_mask, or_mask)
         })
     }
 
@@ -335,13 +364,7 @@ impl<P: Port, S: Words> Master<P, S> {
         write_quantity: u16,
     ) -> Status {
         self.write(write_address, |request| {
-            registers::read_write(
-                request,
-                read_address,
-                read_quantity,
-                write_address,
-                write_quantity,
-            )
+            request.read_write_registers(read_address, read_quantity, write_address, write_quantity)
         })
     }
 

@@ -11,7 +11,8 @@ use mbm::engine::Frame;
 use mbm::error::Status;
 use mbm::frame::{ascii, rtu};
 use mbm::pdu::custom::Rule;
-use mbm::pdu::header::{FunctionSpec, RequestHeader};
+use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::header::RequestHeader;
 use wire::{End, Lent, Task};
 
 type Transport = Client<Serial<End, Lent, Task>, Task, 4>;

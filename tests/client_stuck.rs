@@ -7,7 +7,7 @@ mod wire;
 
 use mbm::client::{Backoff, Client, Serial, Tcp, Transport};
 use mbm::error::Status;
-use mbm::pdu::header::FunctionSpec;
+use mbm::pdu::function_spec::FunctionSpec;
 use wire::{End, Lent, Task};
 
 type TcpIp = Client<Tcp<End, Lent>, Task, 16>;

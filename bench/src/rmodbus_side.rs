@@ -3,7 +3,8 @@
 use crate::ours::UNIT;
 use crate::Work;
 use mbm::error::Status;
-use mbm::pdu::header::{FunctionSpec, RequestHeader};
+use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::header::RequestHeader;
 use rmodbus::client::ModbusRequest;
 use rmodbus::server::context::ModbusContext;
 use rmodbus::server::storage::ModbusStorageSmall;

@@ -6,7 +6,7 @@
 use libfuzzer_sys::fuzz_target;
 use mbm::engine::{Buffers, Counter, Engine, Settings, Storage as _, Words as _, BROADCAST};
 use mbm::error::Status;
-use mbm::pdu::query::MasterRequest;
+use mbm::pdu::master_request::MasterRequest;
 use mbm::port::Port;
 use mbm_fuzz::asked::{words, Asked};
 use mbm_fuzz::search::Search;
@@ -161,7 +161,7 @@ fuzz_target!(|data: &[u8]| {
 
 fn run(engine: &mut MasterEngine, asked: &Asked, space: usize, step: u32) {
     engine.clear_outcome();
-    *engine.request() = asked.query;
+    *engine.request() = asked.request;
     engine.port.requests.clear();
     engine.port.received.clear();
     let started = engine.start(asked.unit);

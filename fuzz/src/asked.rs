@@ -1,13 +1,13 @@
 //! A request of the master: as mbm builds it, as the standard describes it, and its responses.
 
 use crate::{be, naive, Input};
-use mbm::pdu::query::{FunctionSpec, MasterRequest};
-use mbm::pdu::{bits, registers};
+use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::master_request::{MasterRequest, MasterSpec};
 
 /// A request and its PDU.
 pub struct Asked {
     pub unit: u8,
-    pub query: MasterRequest,
+    pub request: MasterRequest,
     pub pdu: Vec<u8>,
     /// The number of data bytes in the response to a read; `None` for a write.
     pub data: Option<usize>,
@@ -29,71 +29,85 @@ impl Asked {
         let (a, b, c, d) = (input.u16(), input.u16(), input.u16(), input.u16());
         let words = words();
         let read = |function, most| {
-            let form: FunctionSpec = match function {
-                1 => bits::form::READ_COILS,
-                2 => bits::form::READ_INPUTS,
-                3 => registers::form::READ_HOLDING,
-                _ => registers::form::READ_INPUT,
+            let spec: MasterSpec = match function {
+                1 => MasterSpec::new(FunctionSpec::READ_COILS),
+                2 => MasterSpec::new(FunctionSpec::READ_DISCRETE_INPUTS),
+                3 => MasterSpec::new(FunctionSpec::READ_HOLDING_REGISTERS),
+                _ => MasterSpec::new(FunctionSpec::READ_INPUT_REGISTERS),
             };
-            (function, form, 1 + b % most)
+            (function, spec, 1 + b % most)
         };
         let head = |function: u8, words: &[u16]| [vec![function], be(words)].concat();
         let counted = |head: Vec<u8>, data: Vec<u8>| [head, vec![data.len() as u8], data].concat();
         let (built, pdu, data) = match kind {
             0..=3 => {
-                let (function, form, quantity) = read(kind + 1, if kind < 2 { 2000 } else { 125 });
+                let (function, spec, quantity) = read(kind + 1, if kind < 2 { 2000 } else { 125 });
                 let data = match kind {
                     0 | 1 => usize::from(quantity).div_ceil(8),
                     _ => 2 * usize::from(quantity),
                 };
                 let pdu = head(function, &[a, quantity]);
                 (
-                    MasterRequest::build(|q| q.set(form, a, quantity)),
+                    MasterRequest::build(|q| q.set(spec, a, quantity)),
                     pdu,
                     Some(data),
                 )
             }
             4 => {
                 let value = if b == 0 { 0 } else { 0xFF00 };
-                let built = MasterRequest::build(|q| q.set(bits::form::WRITE_SINGLE, a, value));
+                let built = MasterRequest::build(|q| {
+                    q.set(MasterSpec::new(FunctionSpec::WRITE_SINGLE_COIL), a, value)
+                });
                 (built, head(5, &[a, value]), None)
             }
             5 => {
-                let built = MasterRequest::build(|q| q.set(registers::form::WRITE_SINGLE, a, b));
+                let built = MasterRequest::build(|q| {
+                    q.set(MasterSpec::new(FunctionSpec::WRITE_SINGLE_REGISTER), a, b)
+                });
                 (built, head(6, &[a, b]), None)
             }
             6 => {
                 let quantity = 1 + b % 1968;
                 let pdu = counted(head(15, &[a, quantity]), naive::coils(&words, quantity));
-                let built =
-                    MasterRequest::build(|q| q.set(bits::form::WRITE_MULTIPLE, a, quantity));
+                let built = MasterRequest::build(|q| {
+                    q.set(
+                        MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_COILS),
+                        a,
+                        quantity,
+                    )
+                });
                 (built, pdu, None)
             }
             7 => {
                 let quantity = 1 + b % 123;
                 let data = be(&words[..quantity.into()]);
-                let built =
-                    MasterRequest::build(|q| q.set(registers::form::WRITE_MULTIPLE, a, quantity));
+                let built = MasterRequest::build(|q| {
+                    q.set(
+                        MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_REGISTERS),
+                        a,
+                        quantity,
+                    )
+                });
                 (built, counted(head(16, &[a, quantity]), data), None)
             }
             8 => {
-                let built = MasterRequest::build(|q| registers::mask_write(q, a, b, c));
+                let built = MasterRequest::build(|q| q.mask_write_register(a, b, c));
                 (built, head(22, &[a, b, c]), None)
             }
             _ => {
                 let (reads, writes) = (1 + b % 125, 1 + d % 121);
-                let built = MasterRequest::build(|q| registers::read_write(q, a, reads, c, writes));
+                let built = MasterRequest::build(|q| q.read_write_registers(a, reads, c, writes));
                 let data = be(&words[..writes.into()]);
                 let pdu = counted(head(23, &[a, reads, c, writes]), data);
                 (built, pdu, Some(2 * usize::from(reads)))
             }
         };
-        let query = built.ok()?;
+        let request = built.ok()?;
         let bits = (kind < 2).then_some(1 + b % 2000);
         Some(Asked {
             unit,
             bits,
-            query,
+            request,
             pdu,
             data,
         })

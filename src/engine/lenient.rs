@@ -13,7 +13,7 @@
 use super::{Engine, Phase, Probation, Words, BROADCAST};
 use crate::error::Status;
 use crate::frame::rtu;
-use crate::pdu::query::MasterRequest;
+use crate::pdu::master_request::MasterRequest;
 use crate::pdu::EXCEPTION;
 use crate::port::Port;
 

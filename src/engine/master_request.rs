@@ -5,7 +5,7 @@ use super::rtu::EXCEPTION_FRAME;
 use super::{Engine, Match, RequestSpec, RxFault, Words};
 use crate::error::Status;
 use crate::frame::rtu;
-use crate::pdu::query::MasterRequest;
+use crate::pdu::master_request::MasterRequest;
 use crate::pdu::EXCEPTION;
 use crate::FIRMWARE;
 

@@ -10,7 +10,7 @@
 use super::{Count, Counter, Engine, Probation, RequestSpec, RxFault, Storage, Words};
 use crate::error::Status;
 use crate::frame::checksum::Crc16;
-use crate::pdu::query::MasterRequest;
+use crate::pdu::master_request::MasterRequest;
 use crate::port::Port;
 use crate::FIRMWARE;
 

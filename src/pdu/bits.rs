@@ -3,7 +3,6 @@
 use super::fields::{check_end_and_range, counted, word};
 use super::limits::{MAX_READ_BITS, MAX_WRITE_BITS};
 use super::message::{Request, Response};
-use super::query::FunctionSpec;
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
 
@@ -21,25 +20,6 @@ pub const ON: u16 = 0xFF00;
 
 const fn byte_count(quantity: u16) -> u8 {
     quantity.div_ceil(8) as u8
-}
-
-/// The forms of these requests, for [`MasterRequest::set`](super::query::MasterRequest::set).
-pub mod form {
-    use super::{
-        FunctionSpec, MAX_READ_BITS, MAX_WRITE_BITS, READ_COILS as COILS, READ_DISCRETE_INPUTS,
-        WRITE_MULTIPLE_COILS, WRITE_SINGLE_COIL,
-    };
-
-    /// 01: an address and 1 to 2000 coils.
-    pub const READ_COILS: FunctionSpec = FunctionSpec::reads_bits(COILS, MAX_READ_BITS);
-    /// 02: an address and 1 to 2000 inputs.
-    pub const READ_INPUTS: FunctionSpec =
-        FunctionSpec::reads_bits(READ_DISCRETE_INPUTS, MAX_READ_BITS);
-    /// 05: an address and [`ON`](super::ON) or 0.
-    pub const WRITE_SINGLE: FunctionSpec = FunctionSpec::single(WRITE_SINGLE_COIL);
-    /// 0F: an address and 1 to 1968 coils.
-    pub const WRITE_MULTIPLE: FunctionSpec =
-        FunctionSpec::writes_bits(WRITE_MULTIPLE_COILS, MAX_WRITE_BITS);
 }
 
 pub(super) fn parse_read<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Status> {

@@ -1,7 +1,6 @@
 //! Functions that the parsers of all families share. An error is the exception that a server
 //! answers to such a request; [`super::response`] converts it to the error of a response.
 
-use super::query::check_range;
 use crate::bytes::Reader;
 use crate::error::Status;
 
@@ -19,6 +18,18 @@ pub(super) fn word(reader: &mut Reader) -> Result<u16, Status> {
 pub(super) fn counted<'a>(reader: &mut Reader<'a>) -> Result<&'a [u8], Status> {
     let count = usize::from(byte(reader)?);
     reader.take(count).ok_or(Status::ILLEGAL_DATA_VALUE)
+}
+
+/// Checks a range of addresses as every device would (application protocol,
+/// figures 11 and following: quantity first, then addresses).
+pub(super) fn check_range(address: u16, quantity: u16, most: u16) -> Status {
+    if quantity == 0 || quantity > most {
+        Status::ILLEGAL_DATA_VALUE
+    } else if address.checked_add(quantity - 1).is_none() {
+        Status::ILLEGAL_DATA_ADDRESS
+    } else {
+        Status::OK
+    }
 }
 
 /// As [`check_range`], after checking that the PDU ends here. A server checks lengths and

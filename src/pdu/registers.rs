@@ -3,7 +3,6 @@
 use super::fields::{check_end_and_range, check_within, counted, word};
 use super::limits::{MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS, MAX_WRITE_REGISTERS};
 use super::message::{Request, Response};
-use super::query::{check_range, FunctionSpec, MasterRequest};
 use crate::bytes::{Reader, Writer};
 use crate::error::Status;
 
@@ -19,61 +18,6 @@ pub const WRITE_MULTIPLE_REGISTERS: u8 = 0x10;
 pub const MASK_WRITE_REGISTER: u8 = 0x16;
 /// Read/Write Multiple Registers (clause 6.17).
 pub const READ_WRITE_MULTIPLE_REGISTERS: u8 = 0x17;
-
-/// The forms of these requests, for [`MasterRequest::set`].
-pub mod form {
-    use super::{
-        FunctionSpec, MAX_READ_REGISTERS, MAX_WRITE_REGISTERS, READ_HOLDING_REGISTERS,
-        READ_INPUT_REGISTERS, WRITE_MULTIPLE_REGISTERS, WRITE_SINGLE_REGISTER,
-    };
-
-    /// 03: an address and 1 to 125 registers.
-    pub const READ_HOLDING: FunctionSpec =
-        FunctionSpec::reads_registers(READ_HOLDING_REGISTERS, MAX_READ_REGISTERS);
-    /// 04: an address and 1 to 125 registers.
-    pub const READ_INPUT: FunctionSpec =
-        FunctionSpec::reads_registers(READ_INPUT_REGISTERS, MAX_READ_REGISTERS);
-    /// 06: an address and a value.
-    pub const WRITE_SINGLE: FunctionSpec = FunctionSpec::single(WRITE_SINGLE_REGISTER);
-    /// 10: an address and 1 to 123 registers.
-    pub const WRITE_MULTIPLE: FunctionSpec =
-        FunctionSpec::writes_registers(WRITE_MULTIPLE_REGISTERS, MAX_WRITE_REGISTERS);
-}
-
-/// Builds a request of 16: the register becomes
-/// `(register & and_mask) | (or_mask & !and_mask)`.
-pub fn mask_write(
-    request: &mut MasterRequest,
-    address: u16,
-    and_mask: u16,
-    or_mask: u16,
-) -> Status {
-    let status = request.set(FunctionSpec::single(MASK_WRITE_REGISTER), address, and_mask);
-    request.append_word(or_mask);
-    status
-}
-
-/// Builds a request of 17. The values to write are the sender's transmit words. Returns
-/// [`Status::ILLEGAL_DATA_VALUE`] unless 1 to 125 registers are read and 1 to 121 written,
-/// [`Status::ILLEGAL_DATA_ADDRESS`] if a range goes beyond address 65535, otherwise
-/// [`Status::OK`].
-pub fn read_write(
-    request: &mut MasterRequest,
-    read_address: u16,
-    read_quantity: u16,
-    write_address: u16,
-    write_quantity: u16,
-) -> Status {
-    let form = FunctionSpec::reads_registers(READ_WRITE_MULTIPLE_REGISTERS, MAX_READ_REGISTERS);
-    let readable = request.set(form, read_address, read_quantity);
-    request.append_word(write_address);
-    request.append_word(write_quantity);
-    request.append_data((write_quantity << 1) as u8);
-    match check_range(write_address, write_quantity, MAX_READ_WRITE_REGISTERS) {
-        Status::OK => readable,
-        refused => refused,
-    }
-}
 
 pub(super) fn parse_read<'a>(function: u8, reader: &mut Reader) -> Result<Request<'a>, Status> {
     let (address, quantity) = (word(reader)?, word(reader)?);

@@ -2,7 +2,8 @@
 
 use mbm::error::Status;
 use mbm::pdu::custom::Rule;
-use mbm::pdu::header::{FunctionSpec, RequestHeader};
+use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::header::RequestHeader;
 
 /// The builder of a request, the data to send, the PDU of the request, the PDU of the
 /// response, and the data that the client receives.

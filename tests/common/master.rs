@@ -4,8 +4,9 @@ use mbm::engine::{Buffers, Words};
 use mbm::error::Status;
 use mbm::frame::checksum::crc16;
 use mbm::master::Master;
-use mbm::pdu::query::MasterRequest;
-use mbm::pdu::{bits, registers};
+use mbm::pdu::bits;
+use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::master_request::{MasterRequest, MasterSpec};
 use mbm::port::Port;
 use std::collections::VecDeque;
 
@@ -87,20 +88,24 @@ impl Call {
     pub fn query(&self) -> Result<MasterRequest, Status> {
         let [a, b, c, d] = self.words;
         MasterRequest::build(|query| match self.function {
-            0x01 => query.set(bits::form::READ_COILS, a, b),
-            0x02 => query.set(bits::form::READ_INPUTS, a, b),
-            0x03 => query.set(registers::form::READ_HOLDING, a, b),
-            0x04 => query.set(registers::form::READ_INPUT, a, b),
+            0x01 => query.set(MasterSpec::new(FunctionSpec::READ_COILS), a, b),
+            0x02 => query.set(MasterSpec::new(FunctionSpec::READ_DISCRETE_INPUTS), a, b),
+            0x03 => query.set(MasterSpec::new(FunctionSpec::READ_HOLDING_REGISTERS), a, b),
+            0x04 => query.set(MasterSpec::new(FunctionSpec::READ_INPUT_REGISTERS), a, b),
             0x05 => query.set(
-                bits::form::WRITE_SINGLE,
+                MasterSpec::new(FunctionSpec::WRITE_SINGLE_COIL),
                 a,
                 if b == 0 { 0 } else { bits::ON },
             ),
-            0x06 => query.set(registers::form::WRITE_SINGLE, a, b),
-            0x0F => query.set(bits::form::WRITE_MULTIPLE, a, b),
-            0x10 => query.set(registers::form::WRITE_MULTIPLE, a, b),
-            0x16 => registers::mask_write(query, a, b, c),
-            0x17 => registers::read_write(query, a, b, c, d),
+            0x06 => query.set(MasterSpec::new(FunctionSpec::WRITE_SINGLE_REGISTER), a, b),
+            0x0F => query.set(MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_COILS), a, b),
+            0x10 => query.set(
+                MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_REGISTERS),
+                a,
+                b,
+            ),
+            0x16 => query.mask_write_register(a, b, c),
+            0x17 => query.read_write_registers(a, b, c, d),
             other => panic!("the master has no function {other:#x}"),
         })
     }

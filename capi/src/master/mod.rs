@@ -20,7 +20,7 @@ use super::storage::MasterBuffers;
 use core::ffi::c_void;
 use mbm::error::Status;
 use mbm::master::Master;
-use mbm::pdu::query::FunctionSpec;
+use mbm::pdu::master_request::MasterSpec;
 
 /// The fields in the storage of an `mbm_master`.
 #[repr(C)]
@@ -324,9 +324,9 @@ pub unsafe extern "C" fn mbm_master_getExceptionCode(master: *const mbm_master) 
 ///
 /// # Safety
 /// As for [`pointers::with`].
-unsafe fn call(pointer: *mut mbm_master, address: u16, word: u16, function: FunctionSpec) -> u8 {
+unsafe fn call(pointer: *mut mbm_master, address: u16, word: u16, spec: MasterSpec) -> u8 {
     // SAFETY: as the caller promises.
-    unsafe { request(pointer, |master| master.request(address, word, function)) }
+    unsafe { request(pointer, |master| master.request(address, word, spec)) }
 }
 
 /// Starts a request and, in blocking mode, polls until it has ended.

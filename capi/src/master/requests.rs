@@ -2,7 +2,8 @@
 
 use super::{call, mbm_master, request};
 use mbm::error::Status;
-use mbm::pdu::{bits, registers};
+use mbm::pdu::function_spec::FunctionSpec;
+use mbm::pdu::master_request::MasterSpec;
 
 /// Function 01: reads coils into the response words, 16 in each word. The first coil is the
 /// lowest bit; the last word is padded with zeros (V1.1b3, 6.1).
@@ -36,7 +37,14 @@ pub unsafe extern "C" fn mbm_master_readCoils(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { call(master, address, quantity, bits::form::READ_COILS) }
+    unsafe {
+        call(
+            master,
+            address,
+            quantity,
+            MasterSpec::new(FunctionSpec::READ_COILS),
+        )
+    }
 }
 
 /// Function 02: reads discrete inputs into the response words, 16 in each word. The first
@@ -53,7 +61,14 @@ pub unsafe extern "C" fn mbm_master_readDiscreteInputs(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { call(master, address, quantity, bits::form::READ_INPUTS) }
+    unsafe {
+        call(
+            master,
+            address,
+            quantity,
+            MasterSpec::new(FunctionSpec::READ_DISCRETE_INPUTS),
+        )
+    }
 }
 
 /// Function 03: reads holding registers into the response words (V1.1b3, 6.3).
@@ -69,7 +84,14 @@ pub unsafe extern "C" fn mbm_master_readHoldingRegisters(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { call(master, address, quantity, registers::form::READ_HOLDING) }
+    unsafe {
+        call(
+            master,
+            address,
+            quantity,
+            MasterSpec::new(FunctionSpec::READ_HOLDING_REGISTERS),
+        )
+    }
 }
 
 /// Function 04: reads input registers into the response words (V1.1b3, 6.4).
@@ -85,7 +107,14 @@ pub unsafe extern "C" fn mbm_master_readInputRegisters(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { call(master, address, quantity, registers::form::READ_INPUT) }
+    unsafe {
+        call(
+            master,
+            address,
+            quantity,
+            MasterSpec::new(FunctionSpec::READ_INPUT_REGISTERS),
+        )
+    }
 }
 
 /// Function 05: switches one coil on or off (V1.1b3, 6.5). With unit 0 it is a broadcast.
@@ -142,7 +171,14 @@ pub unsafe extern "C" fn mbm_master_writeMultipleCoils(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { call(master, address, quantity, bits::form::WRITE_MULTIPLE) }
+    unsafe {
+        call(
+            master,
+            address,
+            quantity,
+            MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_COILS),
+        )
+    }
 }
 
 /// Function 0F: writes the queued bits to coils, starting at the last write address. Call
@@ -170,7 +206,14 @@ pub unsafe extern "C" fn mbm_master_writeMultipleRegisters(
     quantity: u16,
 ) -> u8 {
     // SAFETY: as the header demands.
-    unsafe { call(master, address, quantity, registers::form::WRITE_MULTIPLE) }
+    unsafe {
+        call(
+            master,
+            address,
+            quantity,
+            MasterSpec::new(FunctionSpec::WRITE_MULTIPLE_REGISTERS),
+        )
+    }
 }
 
 /// Function 10: writes the queued complete words to registers, starting at the last write

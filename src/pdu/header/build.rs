@@ -2,14 +2,14 @@
 
 use super::super::custom::Rule;
 use super::super::diagnostics::sub_function;
+use super::super::fields::check_range;
+use super::super::function_spec::*;
 use super::super::identification::MEI_READ_DEVICE_IDENTIFICATION;
 use super::super::limits::{
     FILE_DATA_BYTES, MAX_PDU, MAX_READ_BITS, MAX_READ_REGISTERS, MAX_READ_WRITE_REGISTERS,
     MAX_RECORD, MAX_WRITE_BITS, MAX_WRITE_REGISTERS, READ_FILE_BYTES, WRITE_FILE_BYTES,
 };
-use super::super::query::check_range;
 use super::super::{files, EXCEPTION};
-use super::form::*;
 use super::{RequestHeader, HEAD};
 use crate::error::Status;
 
@@ -34,7 +34,7 @@ impl RequestHeader {
         // No map, which would be a loop.
         let (first, second) = (words[0] as u16, words[1] as u16);
         self.form = form;
-        self.head[0] = form.0 as u8;
+        self.head[0] = form.function();
         for (place, word) in self.head[1..].as_chunks_mut().0.iter_mut().zip(words) {
             *place = (*word as u16).to_be_bytes();
         }

@@ -1,8 +1,8 @@
 //! A request that arrived as bytes, and is sent as it is to another device.
 
 use super::super::custom::Rule;
+use super::super::function_spec::*;
 use super::super::{bits, diagnostics, files, identification, registers};
-use super::form::*;
 use super::RequestHeader;
 use crate::error::Status;
 

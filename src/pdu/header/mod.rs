@@ -5,13 +5,11 @@
 //! which calls every function carries next to nothing for each.
 
 mod build;
-mod form;
 mod forward;
 
 pub use build::GROUP;
-pub use form::FunctionSpec;
-pub use form::{COUNTS, FIXED, OWN};
 
+use super::function_spec::*;
 use super::identification::{self, MEI_READ_DEVICE_IDENTIFICATION};
 use super::length::Length;
 use super::limits::{MAX_FIFO, MAX_PDU};
@@ -19,7 +17,6 @@ use super::{diagnostics, files, length, EXCEPTION};
 use crate::error::Status;
 use crate::FIRMWARE;
 use core::num::NonZeroU8;
-use form::*;
 
 /// The longest head: that of 17, and of 14 and 15 with one group.
 const HEAD: usize = 9;

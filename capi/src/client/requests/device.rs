@@ -6,7 +6,8 @@ use crate::client::{mbm_client, mbm_clientRequest};
 use crate::functions::{mbm_rule, MBM_RULE_COUNTED, MBM_RULE_FIXED, MBM_RULE_SILENCE};
 use crate::pointers::array_or_empty;
 use mbm::error::Status;
-use mbm::pdu::header::{FunctionSpec, RequestHeader, COUNTS, FIXED, GROUP, OWN};
+use mbm::pdu::function_spec::{FunctionSpec, COUNTS, FIXED, OWN};
+use mbm::pdu::header::{RequestHeader, GROUP};
 use mbm::pdu::limits::MAX_PDU;
 
 /// Function 07: reads the eight exception status outputs into one byte of `reply` (V1.1b3,

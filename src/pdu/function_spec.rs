@@ -1,8 +1,12 @@
-//! What distinguishes one function from another, as a number.
+//! One description of each function's request and response, for the master and the client.
+//!
+//! The client uses a [`FunctionSpec`] as it is. The compiler converts it for the master, see
+//! [`MasterSpec`](super::master_request::MasterSpec).
 
-use super::super::{bits, diagnostics, files, identification, registers};
+use super::limits::{MAX_READ_BITS, MAX_READ_REGISTERS, MAX_WRITE_BITS, MAX_WRITE_REGISTERS};
+use super::{bits, diagnostics, files, identification, registers};
 
-/// What a function's request and response look like, as flags and small numbers.
+/// How the request and the response of a function are composed: flags and small numbers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
 pub struct FunctionSpec(pub(super) u32);
@@ -93,6 +97,24 @@ impl FunctionSpec {
 
     pub(super) const fn has(self, flag: u32) -> bool {
         self.0 & flag != 0
+    }
+
+    /// The function code.
+    pub(super) const fn function(self) -> u8 {
+        self.0 as u8
+    }
+
+    /// The greatest quantity of bits or registers that the standard allows; 0 if the request
+    /// has no quantity.
+    #[inline(always)]
+    pub(super) const fn greatest_quantity(self) -> u16 {
+        match (self.has(READ), self.has(BITS)) {
+            _ if !self.has(RANGE) => 0,
+            (true, true) => MAX_READ_BITS,
+            (true, false) => MAX_READ_REGISTERS,
+            (false, true) => MAX_WRITE_BITS,
+            (false, false) => MAX_WRITE_REGISTERS,
+        }
     }
 
     pub(super) const fn number(self, at: u32) -> u8 {
