@@ -14,7 +14,7 @@ fn begin(w: &World, sniffer: *mut mbm_sniffer) {
         _ => w.word(),
     };
     let buffer = w.buffer(size.into());
-    refused_changes_nothing(w, &[span(sniffer)], "mbm_sniffer_begin", || {
+    refused_changes_nothing(w, &[span(sniffer)], "a sniffer that begins", || {
         begin_as(w, sniffer, framing, buffer, size)
     });
 }
