@@ -198,7 +198,7 @@ static void a_client_that_goes_takes_its_request_along(void **)
     WiFiClient hasty;
     assert_int_equal(hasty.connect("gateway", 502), 1);
     hasty.write(request, sizeof request);
-    AWAIT((gateway->poll(), line->pending() == 1)); // of unit 18, which nobody is
+    AWAIT((gateway->poll(), line->pending() == 1)); // of unit 18, which does not exist
     // While a device is waited for, its client is not read: begin closes all.
     assert_int_equal(gateway->begin(*wifi, *line), MBM_OK);
     assert_int_equal(line->pending(), 0);

@@ -39,7 +39,7 @@ static void objects_may_share_the_frame_buffer(void **)
     }
 }
 
-/* A reply of so many registers: values 1 and up. */
+/* A reply with `count` registers, whose values are 1, 2 and so on. */
 static Bytes registers_of_unit_1(int count)
 {
     Bytes reply = raw({1, 3, 2 * count});

@@ -17,7 +17,7 @@ public:
     }
 };
 
-/* Loops for so many milliseconds. */
+/* Polls the sniffer for `ms` milliseconds. */
 static void loops(ModbusSniffer &sniffer, uint32_t ms)
 {
     uint32_t until = bench().now + ms * 1000;
@@ -146,7 +146,7 @@ static void a_callback_gets_each_event(void **)
     prints(sniffer, paper, adu({17, 3, 2, 2, 43}));
     assert_int_equal(events, 2);
     assert_int_equal(value, 555);
-    assert_string_equal(paper.text.c_str(), ""); // nobody asked for it
+    assert_string_equal(paper.text.c_str(), ""); // printTo was not called
     replies = 0;
     sniffer.onEvent(count_replies);
     sniffer.printTo(paper);

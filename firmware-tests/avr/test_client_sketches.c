@@ -194,7 +194,7 @@ static void sniffer_prints_a_request_and_its_reply(void **state)
     /* 8 ms, and 11 bytes of 9600 baud. */
     assert_in_range(took, 17, 22);
     assert_false(is_high(b, mega.led));
-    /* Nobody replies: the LED says so. */
+    /* No device replies: the sketch switches the LED on. */
     wire_play(bus, 0, request, sizeof request);
     assert_true(board_run(b, 1100 * MS));
     assert_non_null(strstr(printed.text, " unit 17 no reply 03 read holding registers 107..109"));
