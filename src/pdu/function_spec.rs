@@ -11,41 +11,43 @@ use super::{bits, diagnostics, files, identification, registers};
 #[repr(transparent)]
 pub struct FunctionSpec(pub(super) u32);
 
-/// A byte count stands between head and data.
+/// A byte count stands between the head and the data.
 pub(super) const COUNTED: u32 = 1 << 8;
 /// The data to send are words.
 pub(super) const SENDS_WORDS: u32 = 1 << 9;
 /// The data received are words.
 pub(super) const TAKES_WORDS: u32 = 1 << 10;
-/// The response repeats all of the request.
+/// The response repeats the whole request.
 pub(super) const REPEATS_DATA: u32 = 1 << 11;
-/// Every unit may be told at once.
+/// The request may be broadcast.
 pub(super) const BROADCAST: u32 = 1 << 12;
-/// The data of the response are groups of files.
+/// The data of the response are groups of file records.
 pub(super) const GROUPS: u32 = 1 << 13;
-/// Nothing responds.
+/// Units do not respond.
 pub(super) const UNANSWERED: u32 = 1 << 14;
 /// The second word is a quantity.
 pub(super) const RANGE: u32 = 1 << 15;
-/// ... and one of bits.
+/// The quantity counts bits, not registers.
 pub(super) const BITS: u32 = 1 << 16;
 
-/// How the length of the response is known, two bits: it is so long,
+/// Two bits say how the length of the response is known. `FIXED`: the request determines it.
 pub const FIXED: u32 = 0;
-/// so long, and its second byte counts,
+/// The request determines it, and the second byte of the response counts the data.
 pub(super) const READ: u32 = 1 << 17;
-/// the byte at an offset counts,
+/// The byte at an index counts the bytes after it.
 pub const COUNTS: u32 = 2 << 17;
-/// its own rules say, or nothing but its end.
+/// The function has a rule of its own, or only the end of the frame ends the response.
 pub const OWN: u32 = 3 << 17;
+/// The mask of these two bits.
 pub(super) const KIND: u32 = 3 << 17;
 
-/// From this bit on, three bits each: length of the head and of the response,
-/// or the offset of the byte that counts; how much the response repeats; where
-/// its data begin, 0 for none.
+/// The lowest of three bits: the length of the head.
 pub(super) const HEAD_LENGTH: u32 = 19;
+/// The lowest of three bits: the length of the response, or the index of the byte that counts.
 pub(super) const LENGTH: u32 = 22;
+/// The lowest of three bits: the number of bytes of the request that the response repeats.
 pub(super) const REPEATED: u32 = 25;
+/// The lowest of three bits: the index of the data in the response; 0 if it has none.
 pub(super) const DATA: u32 = 28;
 
 impl FunctionSpec {
@@ -77,20 +79,19 @@ impl FunctionSpec {
         FunctionSpec::new(function, RANGE | READ | TAKES_WORDS, 5, 0, 0, 2)
     }
 
-    /// True of a request whose response repeats its function code and two words, and
-    /// nothing else.
+    /// True if the response is the function code and two words of the request.
     #[inline]
     pub(super) const fn repeats_two_words(self) -> bool {
         let fields = 7 << HEAD_LENGTH | 7 << LENGTH | 7 << REPEATED | KIND | REPEATS_DATA;
         self.0 & fields == 5 << HEAD_LENGTH | 5 << LENGTH | 5 << REPEATED
     }
 
-    /// What the response repeats whole.
+    /// A request that the response repeats.
     pub(super) const fn echoed(function: u8, flags: u32) -> FunctionSpec {
         FunctionSpec::new(function, flags | BROADCAST, 5, 5, 5, 0)
     }
 
-    /// Nothing but a function code.
+    /// A request that is a function code alone.
     pub(super) const fn bare(function: u8, flags: u32, length: u32, data: u32) -> FunctionSpec {
         FunctionSpec::new(function, flags, 1, length, 0, data)
     }
@@ -142,15 +143,15 @@ impl FunctionSpec {
     /// 07.
     pub const READ_EXCEPTION_STATUS: FunctionSpec =
         FunctionSpec::bare(diagnostics::READ_EXCEPTION_STATUS, FIXED, 2, 1);
-    /// 0B; two words are received.
+    /// 0B: two words are received.
     pub const GET_COMM_EVENT_COUNTER: FunctionSpec = FunctionSpec::bare(
         diagnostics::GET_COMM_EVENT_COUNTER,
         FIXED | TAKES_WORDS,
         5,
         1,
     );
-    /// 0C; status, events and messages as words with the high byte first, then
-    /// the events.
+    /// 0C: status, event count and message count are received as words with the high byte
+    /// first, then the events.
     pub const GET_COMM_EVENT_LOG: FunctionSpec =
         FunctionSpec::bare(diagnostics::GET_COMM_EVENT_LOG, COUNTS, 1, 2);
     /// 0F: address and quantity.
@@ -161,22 +162,22 @@ impl FunctionSpec {
         registers::WRITE_MULTIPLE_REGISTERS,
         RANGE | COUNTED | SENDS_WORDS,
     );
-    /// 11. Its response may be longer than it counts.
+    /// 11. Its response may be longer than its byte count says.
     pub const REPORT_SERVER_ID: FunctionSpec =
         FunctionSpec::bare(diagnostics::REPORT_SERVER_ID, OWN, 0, 2);
-    /// 16, of which the OR mask is to be added.
+    /// 16: address and AND mask; the OR mask is added later.
     pub const MASK_WRITE_REGISTER: FunctionSpec =
         FunctionSpec::new(registers::MASK_WRITE_REGISTER, BROADCAST, 7, 7, 7, 0);
     /// 18: address.
     pub const READ_FIFO_QUEUE: FunctionSpec =
         FunctionSpec::new(files::READ_FIFO_QUEUE, OWN | TAKES_WORDS, 3, 0, 0, 5);
 
-    /// 17, of which what it writes is to be added.
+    /// 17: address and quantity to read; the range to write is added later.
     pub const READ_WRITE_REGISTERS: FunctionSpec = FunctionSpec(
         FunctionSpec::registers(registers::READ_WRITE_MULTIPLE_REGISTERS).0 | COUNTED | SENDS_WORDS,
     );
 
-    /// 08: a sub-function; the data are to be added.
+    /// 08: a sub-function; the data are added later.
     pub const DIAGNOSTICS: FunctionSpec = FunctionSpec::new(
         diagnostics::DIAGNOSTICS,
         FIXED | SENDS_WORDS | TAKES_WORDS,
@@ -185,7 +186,7 @@ impl FunctionSpec {
         3,
         3,
     );
-    /// 14, of which one group is to be added.
+    /// 14: one group is added later.
     pub const READ_FILE_RECORD: FunctionSpec = FunctionSpec::new(
         files::READ_FILE_RECORD,
         READ | GROUPS | TAKES_WORDS,
@@ -194,7 +195,7 @@ impl FunctionSpec {
         0,
         4,
     );
-    /// 15, of which one group is to be added.
+    /// 15: one group is added later.
     pub const WRITE_FILE_RECORD: FunctionSpec = FunctionSpec::new(
         files::WRITE_FILE_RECORD,
         FIXED | SENDS_WORDS | REPEATS_DATA | BROADCAST,
@@ -203,7 +204,7 @@ impl FunctionSpec {
         0,
         0,
     );
-    /// 14 of groups that the caller built.
+    /// 14: the caller supplies the groups.
     pub const READ_FILE_RECORDS: FunctionSpec = FunctionSpec::new(
         files::READ_FILE_RECORD,
         COUNTS | GROUPS | COUNTED,
@@ -212,7 +213,7 @@ impl FunctionSpec {
         0,
         2,
     );
-    /// 15 of groups that the caller built.
+    /// 15: the caller supplies the groups.
     pub const WRITE_FILE_RECORDS: FunctionSpec = FunctionSpec::new(
         files::WRITE_FILE_RECORD,
         FIXED | COUNTED | REPEATS_DATA | BROADCAST,
@@ -221,7 +222,7 @@ impl FunctionSpec {
         1,
         0,
     );
-    /// 2B: the MEI type; the data are to be added.
+    /// 2B: the MEI type; the data are added later.
     pub const ENCAPSULATED: FunctionSpec = FunctionSpec::new(
         identification::ENCAPSULATED_INTERFACE_TRANSPORT,
         OWN,
@@ -230,7 +231,7 @@ impl FunctionSpec {
         2,
         2,
     );
-    /// 2B/0E: code and object behind the MEI type. Its data begin behind the code.
+    /// 2B/0E: MEI type, read device id code and object id. Its data begin after the code.
     pub const READ_DEVICE_IDENTIFICATION: FunctionSpec = FunctionSpec::new(
         identification::ENCAPSULATED_INTERFACE_TRANSPORT,
         OWN,
@@ -239,6 +240,6 @@ impl FunctionSpec {
         3,
         3,
     );
-    /// A user's function, of which the code and the rule are to be added.
+    /// A user-defined function; its code and its length rule are added later.
     pub const CUSTOM: FunctionSpec = FunctionSpec::new(0, 0, 1, 0, 0, 1);
 }

@@ -1,4 +1,4 @@
-//! A request of the master: its head, and how many of the transmit words follow it.
+//! A request of the master: its head, and the number of transmit words that follow it.
 
 use super::fields::check_range;
 use super::function_spec::*;
@@ -8,22 +8,23 @@ use crate::error::Status;
 /// Function code, and at most four words of address and quantity.
 const HEAD: usize = 9;
 
-/// What the master needs of a [`FunctionSpec`]. The compiler converts each constant: without
-/// that, [`MasterRequest::set`] takes at least 22 bytes more on an AVR, 16 on a Cortex-M0+.
+/// The part of a [`FunctionSpec`] that the master needs. The compiler converts each constant.
+/// Converted at run time, they would enlarge [`MasterRequest::set`] by at least 22 bytes on an
+/// AVR and 16 on a Cortex-M0+.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-// One number, which a call passes in registers: a microcontroller would copy a
-// constant of several fields to RAM.
+// One number, because a call passes it in registers. A microcontroller would copy a constant
+// of several fields to RAM first.
 pub struct MasterSpec(u32);
 
 impl MasterSpec {
-    /// The response brings data behind a byte count; else it repeats the head.
+    /// The response carries data after a byte count. Without this flag it repeats the head.
     const READS: u8 = 1;
-    /// Data follow the head behind a byte count.
+    /// A byte count and data follow the head.
     const SENDS: u8 = 2;
     /// The data are registers, not bits.
     const REGISTERS: u8 = 4;
 
-    /// What the master needs of `spec`, which is that of one of the master's functions.
+    /// Converts `spec`, which must be that of one of the master's functions.
     #[inline(always)]
     pub const fn new(spec: FunctionSpec) -> MasterSpec {
         let mut flags = 0;
@@ -41,8 +42,8 @@ impl MasterSpec {
     }
 }
 
-/// A request as the master keeps it until the response has arrived: the head, and how many
-/// bytes of the transmit words follow it.
+/// A request, which the master keeps until the response has arrived: the head, and the
+/// number of bytes of the transmit words that follow it.
 // Lengths first: see `Engine`.
 #[derive(Clone, Copy, Hash, Debug)]
 #[repr(C)]
@@ -50,11 +51,11 @@ pub struct MasterRequest {
     head_length: u8,
     /// Length of the response PDU if the request succeeds.
     response_length: u8,
-    /// Bytes of data that follow the head behind their count; 0: neither do.
+    /// Bytes of data that follow the head and their byte count; 0: neither follows.
     sends: u8,
     /// Bytes of data in the response; 0: it repeats the head.
     reads: u8,
-    /// The bits used of the last byte of data.
+    /// A mask of the bits that are used in the last byte of data.
     mask: u8,
     /// The data are registers, which travel high byte first.
     registers: bool,
@@ -87,7 +88,7 @@ impl MasterRequest {
         }
     }
 
-    /// Becomes the request of the function `spec`, with an address and a quantity or value
+    /// Sets the request of the function `spec`, with an address and a quantity or value
     /// `word`. Returns [`Status::ILLEGAL_DATA_VALUE`] for a quantity that the standard does
     /// not allow, [`Status::ILLEGAL_DATA_ADDRESS`] if the range goes beyond address 65535,
     /// otherwise [`Status::OK`].
@@ -101,7 +102,7 @@ impl MasterRequest {
         self.response_length = 5;
         self.registers = flags & MasterSpec::REGISTERS != 0;
         self.mask = 0xFF;
-        // Too many are refused below, so what is cut off here does no harm.
+        // A greater quantity is refused below, so the lost high bits do no harm.
         let mut bytes = (word << 1) as u8;
         if !self.registers {
             bytes = (word.wrapping_add(7) >> 3) as u8;
@@ -122,7 +123,7 @@ impl MasterRequest {
         }
     }
 
-    /// 16: the register becomes `(register & and_mask) | (or_mask & !and_mask)`.
+    /// 16 (hex): the register becomes `(register & and_mask) | (or_mask & !and_mask)`.
     pub fn mask_write_register(&mut self, address: u16, and_mask: u16, or_mask: u16) -> Status {
         let spec = MasterSpec::new(FunctionSpec::MASK_WRITE_REGISTER);
         let status = self.set(spec, address, and_mask);
@@ -130,7 +131,7 @@ impl MasterRequest {
         status
     }
 
-    /// 17: the values to write are the transmit words. Returns [`Status::ILLEGAL_DATA_VALUE`]
+    /// 17 (hex): the values to write are the transmit words. Returns [`Status::ILLEGAL_DATA_VALUE`]
     /// unless 1 to 125 registers are read and 1 to 121 written,
     /// [`Status::ILLEGAL_DATA_ADDRESS`] if a range goes beyond address 65535, otherwise
     /// [`Status::OK`].
@@ -152,7 +153,7 @@ impl MasterRequest {
         }
     }
 
-    /// Has a word follow the head.
+    /// Appends a word to the head.
     fn append_word(&mut self, word: u16) {
         let at = usize::from(self.head_length);
         if let Some(place) = self.head.get_mut(at..at + 2) {
@@ -169,12 +170,12 @@ impl MasterRequest {
         self.head[0]
     }
 
-    /// The head, and what follows it in memory.
+    /// The memory of the head: its first [`MasterRequest::head_length`] bytes are used.
     pub const fn head(&self) -> &[u8] {
         &self.head
     }
 
-    /// Bytes of the head, with which the response to a write agrees.
+    /// Bytes of the head. The response to a write repeats them.
     pub const fn head_length(&self) -> u8 {
         self.head_length
     }
@@ -201,7 +202,7 @@ impl MasterRequest {
         self.reads
     }
 
-    /// Has the response carry `bytes` of data, all of whose bits are used.
+    /// Sets the bytes of data in the response to `bytes`. All bits of them are used.
     pub fn set_reads(&mut self, bytes: u8) {
         self.reads = bytes;
         self.mask = 0xFF;
@@ -212,12 +213,12 @@ impl MasterRequest {
         self.sends
     }
 
-    /// The bits used of the last byte of data.
+    /// A mask of the bits that are used in the last byte of data.
     pub const fn mask(&self) -> u8 {
         self.mask
     }
 
-    /// The words of a request that is a function code and two words, as sent.
+    /// The two words of a request that consists of a function code and two words.
     pub fn two_words(&self) -> Option<[u8; 4]> {
         let [_, a, b, c, d, ..] = self.head;
         (self.head_length == 5 && self.sends == 0).then_some([a, b, c, d])

@@ -1,4 +1,4 @@
-//! One way to build an outline for each request.
+//! Builds the header of each request.
 
 use super::super::custom::Rule;
 use super::super::diagnostics::sub_function;
@@ -13,45 +13,47 @@ use super::super::{files, EXCEPTION};
 use super::{RequestHeader, HEAD};
 use crate::error::Status;
 
-/// The first word of one group: its reference type behind the byte count.
+/// The first word of a group of records: the byte count, which is set later, and the
+/// reference type.
 pub const GROUP: usize = files::REFERENCE_TYPE as usize;
 
-// What is behind [`RequestHeader::set`] stands apart, for the functions of C call that first,
-// at one place for all.
+// `add_…` and `follow` are functions of their own because all functions of the C API call
+// `set` in one common place first, which is smaller.
 impl RequestHeader {
-    /// Becomes a request of two words, as far as its form has them.
-    /// [`Status::OK`]; [`Status::ILLEGAL_DATA_VALUE`] for a quantity that the
-    /// standard does not allow, [`Status::ILLEGAL_DATA_ADDRESS`] if the range
-    /// passes 65535.
-    pub fn set(&mut self, form: FunctionSpec, first: u16, second: u16) -> Status {
-        self.set_all(form, &[first.into(), second.into(), 0, 0])
+    /// Builds the header of the function `spec`. `first` and `second` are the words after the
+    /// function code; a function with fewer words ignores them. Returns
+    /// [`Status::ILLEGAL_DATA_VALUE`] for a quantity that the standard does not allow,
+    /// [`Status::ILLEGAL_DATA_ADDRESS`] if the range goes beyond address 65535, otherwise
+    /// [`Status::OK`].
+    pub fn set(&mut self, spec: FunctionSpec, first: u16, second: u16) -> Status {
+        self.set_all(spec, &[first.into(), second.into(), 0, 0])
     }
 
-    /// As [`RequestHeader::set`], with as many words in the head as the function has.
+    /// As [`RequestHeader::set`], with up to four words after the function code.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]
-    pub fn set_all(&mut self, form: FunctionSpec, words: &[usize; 4]) -> Status {
-        // No map, which would be a loop.
+    pub fn set_all(&mut self, spec: FunctionSpec, words: &[usize; 4]) -> Status {
+        // `map` would compile to a loop.
         let (first, second) = (words[0] as u16, words[1] as u16);
-        self.form = form;
-        self.head[0] = form.function();
+        self.spec = spec;
+        self.head[0] = spec.function();
         for (place, word) in self.head[1..].as_chunks_mut().0.iter_mut().zip(words) {
             *place = (*word as u16).to_be_bytes();
         }
-        self.head_length = form.number(HEAD_LENGTH);
-        self.length = form.number(LENGTH);
-        self.repeated = form.number(REPEATED);
+        self.head_length = spec.number(HEAD_LENGTH);
+        self.length = spec.number(LENGTH);
+        self.repeated = spec.number(REPEATED);
         self.data_length = 0;
         self.more = 0;
-        if !form.has(RANGE) {
+        if !spec.has(RANGE) {
             return Status::OK;
         }
-        let (bytes, read, write) = if form.has(BITS) {
+        let (bytes, read, write) = if spec.has(BITS) {
             (second.div_ceil(8), MAX_READ_BITS, MAX_WRITE_BITS)
         } else {
             (second << 1, MAX_READ_REGISTERS, MAX_WRITE_REGISTERS)
         };
-        let most = if form.has(READ) {
+        let most = if spec.has(READ) {
             self.length = (bytes as u8).wrapping_add(2);
             read
         } else {
@@ -61,13 +63,13 @@ impl RequestHeader {
         check_range(first, second, most)
     }
 
-    /// 16: the register becomes `(register & and) | (or & !and)`.
+    /// 16 (hex): the register becomes `(register & and_mask) | (or_mask & !and_mask)`.
     pub fn mask_write_register(&mut self, address: u16, and_mask: u16, or_mask: u16) -> Status {
         let words = [address.into(), and_mask.into(), or_mask.into(), 0];
         self.set_all(FunctionSpec::MASK_WRITE_REGISTER, &words)
     }
 
-    /// 17: 1 to 121 registers are written, then 1 to 125 read; else as
+    /// 17 (hex): the unit writes 1 to 121 registers and then reads 1 to 125. Returns as
     /// [`RequestHeader::set`].
     pub fn read_write_registers(
         &mut self,
@@ -85,7 +87,7 @@ impl RequestHeader {
         }
     }
 
-    /// What 17 writes, behind the head that [`RequestHeader::set_all`] set.
+    /// Adds the range that 17 (hex) writes, after [`RequestHeader::set_all`].
     #[inline(always)]
     pub fn add_write(&mut self, address: u16, quantity: u16) -> Status {
         self.head_length = HEAD as u8;
@@ -93,14 +95,15 @@ impl RequestHeader {
         check_range(address, quantity, MAX_READ_WRITE_REGISTERS)
     }
 
-    /// 08: a sub-function and `words` words of data; all but Return Query Data
-    /// take one. [`Status::ILLEGAL_DATA_VALUE`] for another number of them.
+    /// 08: a sub-function and `words` words of data. Returns [`Status::ILLEGAL_DATA_VALUE`]
+    /// for 0 words, for more than one unless the sub-function is Return Query Data, and for
+    /// more than a PDU holds; otherwise [`Status::OK`].
     pub fn diagnostics(&mut self, sub_function: u16, words: u16) -> Status {
         self.set(FunctionSpec::DIAGNOSTICS, sub_function, 0);
         self.add_words(sub_function, words)
     }
 
-    /// How many words of data 08 has, behind what [`RequestHeader::set`] set.
+    /// Adds the number of words of data to 08, after [`RequestHeader::set`].
     #[inline(always)]
     pub fn add_words(&mut self, sub_function: u16, words: u16) -> Status {
         self.data_length = (words << 1) as u8;
@@ -113,16 +116,16 @@ impl RequestHeader {
             | sub_function::CLEAR_OVERRUN_COUNTER => (BROADCAST, 1),
             _ => (0, 1),
         };
-        self.form.0 |= more;
+        self.spec.0 |= more;
         value(words >= 1 && words <= most)
     }
 
-    /// One group of records, of 14 or 15, whose head [`RequestHeader::set_all`] set, but for
-    /// its byte count.
+    /// Sets the byte count of 14 or 15 (hex) with one group of records, after
+    /// [`RequestHeader::set_all`].
     pub fn add_group(&mut self, file: u16, record: u16, length: u16) -> Status {
         let bytes = (length << 1) as u8;
         self.head_length = HEAD as u8;
-        let (count, most) = if self.form.has(REPEATS_DATA) {
+        let (count, most) = if self.spec.has(REPEATS_DATA) {
             self.data_length = bytes;
             self.length = bytes.wrapping_add(HEAD as u8);
             (bytes.wrapping_add(7), (WRITE_FILE_BYTES.1 - 7) / 2)
@@ -140,25 +143,26 @@ impl RequestHeader {
         }
     }
 
-    fn group(&mut self, form: FunctionSpec, file: u16, record: u16, length: u16) -> Status {
+    fn group(&mut self, spec: FunctionSpec, file: u16, record: u16, length: u16) -> Status {
         let words = [GROUP, file.into(), record.into(), length.into()];
-        self.set_all(form, &words);
+        self.set_all(spec, &words);
         self.add_group(file, record, length)
     }
 
-    /// 14 of 1 to 121 records in a row. [`Status::ILLEGAL_DATA_VALUE`] for
-    /// another length, [`Status::ILLEGAL_DATA_ADDRESS`] for file 0 or records
-    /// beyond 9999.
+    /// 14 (hex): reads `length` consecutive records, 1 to 121. Returns
+    /// [`Status::ILLEGAL_DATA_VALUE`] for another length, [`Status::ILLEGAL_DATA_ADDRESS`]
+    /// for file 0 and for a record above 9999, otherwise [`Status::OK`].
     pub fn read_file_record(&mut self, file: u16, record: u16, length: u16) -> Status {
         self.group(FunctionSpec::READ_FILE_RECORD, file, record, length)
     }
 
-    /// 15 of 1 to 122 records in a row; else as [`RequestHeader::read_file_record`].
+    /// 15 (hex): writes `length` consecutive records, 1 to 122. Returns as
+    /// [`RequestHeader::read_file_record`].
     pub fn write_file_record(&mut self, file: u16, record: u16, length: u16) -> Status {
         self.group(FunctionSpec::WRITE_FILE_RECORD, file, record, length)
     }
 
-    /// 14 of the groups that `bytes` bytes of data are, which their sender built.
+    /// 14 (hex) with several groups: the caller supplies the groups as `bytes` bytes of data.
     pub fn read_file_records(&mut self, bytes: u16) -> Status {
         self.set(FunctionSpec::READ_FILE_RECORDS, 0, 0);
         self.data_length = bytes as u8;
@@ -166,7 +170,7 @@ impl RequestHeader {
         value(bytes >= READ_FILE_BYTES.0 && bytes <= READ_FILE_BYTES.1 && bytes.is_multiple_of(7))
     }
 
-    /// 15 of the groups that `bytes` bytes of data are, which their sender built.
+    /// 15 (hex) with several groups: the caller supplies the groups as `bytes` bytes of data.
     pub fn write_file_records(&mut self, bytes: u16) -> Status {
         self.set(FunctionSpec::WRITE_FILE_RECORDS, 0, 0);
         self.data_length = bytes as u8;
@@ -175,35 +179,36 @@ impl RequestHeader {
         value(bytes >= WRITE_FILE_BYTES.0 && bytes <= WRITE_FILE_BYTES.1)
     }
 
-    /// 2B/0E: read device id code 1 to 4 and the object to begin with.
+    /// 2B/0E (hex): `code` is the read device id code, 1 to 4, `object` the id of the first
+    /// object to read.
     pub fn read_device_identification(&mut self, code: u8, object: u8) -> Status {
         let [first, second] = RequestHeader::identification(code, object);
         self.set(FunctionSpec::READ_DEVICE_IDENTIFICATION, first, second);
         RequestHeader::check_code(code)
     }
 
-    /// The two words of 2B/0E.
+    /// The two words of 2B/0E (hex).
     #[inline(always)]
     pub fn identification(code: u8, object: u8) -> [u16; 2] {
         let mei_type = MEI_READ_DEVICE_IDENTIFICATION;
         [u16::from_be_bytes([mei_type, code]), u16::from(object) << 8]
     }
 
-    /// [`Status::OK`] for a read device id code.
+    /// Returns [`Status::OK`] if `code` is a read device id code.
     #[inline(always)]
     pub fn check_code(code: u8) -> Status {
         value(matches!(code, 1..=4))
     }
 
-    /// 2B of any MEI type and so many `bytes` of data; the response ends by
-    /// silence or as the framing says.
+    /// 2B (hex) of any MEI type, with `bytes` bytes of data. The end of the frame ends the
+    /// response.
     pub fn encapsulated(&mut self, mei_type: u8, bytes: u16) -> Status {
         self.set(FunctionSpec::ENCAPSULATED, u16::from(mei_type) << 8, 0);
         self.follow(bytes)
     }
 
-    /// A function of the user's with so many `bytes` of data, whose response is
-    /// as long as `rule` says.
+    /// A user-defined function with `bytes` bytes of data. `rule` gives the length of its
+    /// response.
     pub fn custom(&mut self, function: u8, bytes: u16, rule: Rule) -> Status {
         self.set(FunctionSpec::CUSTOM, 0, 0);
         match rule {
@@ -214,8 +219,8 @@ impl RequestHeader {
         }
     }
 
-    /// The function of the user's, behind the form that [`RequestHeader::set`] set: how the
-    /// length of its response is known, with the numbers that this takes.
+    /// Adds the function code of a user-defined function, the `kind` of its length rule and
+    /// the numbers of that rule, after [`RequestHeader::set`].
     #[cfg_attr(target_os = "none", inline(always))]
     pub fn add_rule(
         &mut self,
@@ -224,7 +229,7 @@ impl RequestHeader {
         kind: u32,
         [length, more]: [u8; 2],
     ) -> Status {
-        self.form.0 |= kind | u32::from(function);
+        self.spec.0 |= kind | u32::from(function);
         self.head[0] = function;
         self.length = length;
         self.more = more;
@@ -234,7 +239,7 @@ impl RequestHeader {
         self.follow(bytes)
     }
 
-    /// So many bytes of data follow the head.
+    /// Sets the number of bytes of data that follow the head.
     pub fn follow(&mut self, bytes: u16) -> Status {
         self.data_length = bytes as u8;
         value(usize::from(bytes) + usize::from(self.head_length) <= MAX_PDU)

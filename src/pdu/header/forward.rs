@@ -1,4 +1,5 @@
-//! A request that arrived as bytes, and is sent as it is to another device.
+//! Builds the header of a request that arrived as bytes, to send it to another device
+//! unchanged.
 
 use super::super::custom::Rule;
 use super::super::function_spec::*;
@@ -6,19 +7,19 @@ use super::super::{bits, diagnostics, files, identification, registers};
 use super::RequestHeader;
 use crate::error::Status;
 
-/// The last sub-function of 08 that the standard defines or keeps free within its
-/// own range; how long the responses of later ones are, it does not say.
+/// The last sub-function of 08 that the standard defines or reserves. The standard does not
+/// give the length of the responses of greater ones.
 const LAST_SUB_FUNCTION: u16 = 0x14;
 
 impl RequestHeader {
-    /// Becomes the request of `function` with the bytes of `body` after the function
-    /// code. Its data to send are the last [`RequestHeader::data_length`] bytes of `body`.
-    /// The data of its response are all bytes after the function code, as on the wire.
-    /// The response is judged as that of the same request in another form; of a
-    /// function that the standard does not define, only its end tells its length.
+    /// Builds the header of the request that consists of `function` and `body`. Its data to
+    /// send are the last [`RequestHeader::data_length`] bytes of `body`. The data of its
+    /// response are all bytes after the function code, as on the wire. The response is
+    /// validated as that of any request. The length of the response to a function that the
+    /// standard does not define is known from the end of the frame.
     ///
-    /// [`Status::OK`], or the exception that answers such a request:
-    /// [`Status::ILLEGAL_FUNCTION`] for a function code that there cannot be,
+    /// Returns [`Status::OK`], or the exception that answers such a request:
+    /// [`Status::ILLEGAL_FUNCTION`] for the function code 0 and for 128 to 255,
     /// [`Status::ILLEGAL_DATA_VALUE`] or [`Status::ILLEGAL_DATA_ADDRESS`] for a
     /// length, count, quantity or range that the standard does not allow.
     pub fn forward(&mut self, function: u8, body: &[u8]) -> Status {
@@ -28,7 +29,7 @@ impl RequestHeader {
             None => 0,
         };
         let (first, second) = (word(0), word(1));
-        let form = match function {
+        let spec = match function {
             bits::READ_COILS => FunctionSpec::READ_COILS,
             bits::READ_DISCRETE_INPUTS => FunctionSpec::READ_DISCRETE_INPUTS,
             registers::READ_HOLDING_REGISTERS => FunctionSpec::READ_HOLDING_REGISTERS,
@@ -45,10 +46,10 @@ impl RequestHeader {
             _ => FunctionSpec::NONE,
         };
         let built = match function {
-            _ if form != FunctionSpec::NONE => self.set(form, first, second),
+            _ if spec != FunctionSpec::NONE => self.set(spec, first, second),
             diagnostics::DIAGNOSTICS if first > LAST_SUB_FUNCTION => {
                 self.set(FunctionSpec::DIAGNOSTICS, first, 0);
-                self.form.0 |= OWN;
+                self.spec.0 |= OWN;
                 self.follow(length.saturating_sub(2))
             }
             diagnostics::DIAGNOSTICS => self.diagnostics(first, length.saturating_sub(2) / 2),
@@ -72,14 +73,16 @@ impl RequestHeader {
         if built != Status::OK {
             return built;
         }
-        self.form.0 &= !(SENDS_WORDS | TAKES_WORDS | BITS | 7 << DATA);
-        self.form.0 |= 1 << DATA;
+        self.spec.0 &= !(SENDS_WORDS | TAKES_WORDS | BITS | 7 << DATA);
+        self.spec.0 |= 1 << DATA;
         let data = body.len().checked_sub(usize::from(self.data_length));
         let data = data.and_then(|at| body.get(at..)).unwrap_or_default();
         let byte = |index: usize| data.get(index).copied().unwrap_or_default();
-        // The counts in the body are the right ones, and nothing follows.
+        // The counts in `body` must be right, and no byte may follow.
         if usize::from(self.request_length()) == 1 + body.len()
-            && (1..).zip(body).all(|(at, own)| self.at(at, &byte) == *own)
+            && (1..)
+                .zip(body)
+                .all(|(at, own)| self.byte_at(at, &byte) == *own)
         {
             Status::OK
         } else {

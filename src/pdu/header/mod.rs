@@ -1,8 +1,8 @@
-//! A request in outline: the head of its PDU, how the caller's data follow it,
-//! and how its response is known. The data stay where they are.
+//! A request of the client: the head of its PDU, how the caller's data follow it, and how
+//! its response is recognised. The data stay in the caller's memory.
 //!
-//! What distinguishes one function from another is a number, so that firmware
-//! which calls every function carries next to nothing for each.
+//! One number, the [`FunctionSpec`], describes each function. So a firmware that calls every
+//! function needs few bytes for each.
 
 mod build;
 mod forward;
@@ -18,30 +18,30 @@ use crate::error::Status;
 use crate::FIRMWARE;
 use core::num::NonZeroU8;
 
-/// The longest head: that of 17, and of 14 and 15 with one group.
+/// Bytes of the longest head: that of 17, and that of 14 and 15 with one group (hex).
 const HEAD: usize = 9;
 
-/// A request in outline.
+/// The header of a request.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct RequestHeader {
-    form: FunctionSpec,
+    spec: FunctionSpec,
     head: [u8; HEAD],
     head_length: u8,
     /// Bytes of the caller's data.
     data_length: u8,
-    /// Length of the response PDU, or the offset of the byte that counts.
+    /// Length of the response PDU, or the index of the byte that counts.
     length: u8,
-    /// Bytes behind those that are counted.
+    /// Bytes after the counted ones.
     more: u8,
-    /// How much of the request the response repeats, if not all.
+    /// Bytes of the request that the response repeats, unless it repeats all.
     repeated: u8,
 }
 
 impl RequestHeader {
     /// No request.
     pub const NONE: RequestHeader = RequestHeader {
-        form: FunctionSpec::NONE,
+        spec: FunctionSpec::NONE,
         head: [0; HEAD],
         head_length: 0,
         data_length: 0,
@@ -69,33 +69,33 @@ impl RequestHeader {
 
     /// True if the data to send are words.
     pub const fn sends_words(&self) -> bool {
-        self.form.has(SENDS_WORDS)
+        self.spec.has(SENDS_WORDS)
     }
 
     /// True if the data received are words.
     pub const fn takes_words(&self) -> bool {
-        self.form.has(TAKES_WORDS)
+        self.spec.has(TAKES_WORDS)
     }
 
-    /// True if the request may be sent to all units at once: 05, 06, 0F, 10, 15,
-    /// 16, and of 08 the sub-functions 01, 04, 0A and 14.
+    /// True if the request may be broadcast: 05, 06, 0F, 10, 15 and 16, and the
+    /// sub-functions 01, 04, 0A and 14 of 08 (hex).
     pub const fn may_be_broadcast(&self) -> bool {
-        self.form.has(BROADCAST)
+        self.spec.has(BROADCAST)
     }
 
-    /// False for what turns a device mute (08 with sub-function 04).
+    /// False for a request without a response: 08 with sub-function 04, Force Listen Only Mode.
     pub const fn is_answered(&self) -> bool {
-        !self.form.has(UNANSWERED)
+        !self.spec.has(UNANSWERED)
     }
 
-    /// Where in the response its data begin; 0 if there are none.
+    /// Index of the first byte of data in the response; 0 if it has no data.
     pub const fn data_at(&self) -> u8 {
-        self.form.number(DATA)
+        self.spec.number(DATA)
     }
 
-    /// How many bytes of data the response has, if that is known already; 0 else.
+    /// Bytes of data in the response, if the request determines them; otherwise 0.
     pub const fn known_data(&self) -> u8 {
-        if self.data_at() > 0 && matches!(self.form.0 & KIND, FIXED | READ) {
+        if self.data_at() > 0 && matches!(self.spec.0 & KIND, FIXED | READ) {
             self.length.wrapping_sub(self.data_at())
         } else {
             0
@@ -105,17 +105,17 @@ impl RequestHeader {
     /// Length of the request PDU.
     pub const fn request_length(&self) -> u8 {
         let length = self.head_length + self.data_length;
-        if self.form.has(COUNTED) {
+        if self.spec.has(COUNTED) {
             length + 1
         } else {
             length
         }
     }
 
-    /// The bits of the last byte of data that are used.
+    /// A mask of the bits that are used in the last byte of data.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn mask(&self) -> u8 {
-        if !self.form.has(BITS) {
+        if !self.spec.has(BITS) {
             return 0xFF;
         }
         match self.head[4] & 7 {
@@ -124,51 +124,51 @@ impl RequestHeader {
         }
     }
 
-    /// The byte of the request PDU at `index`; `byte` gives those of the data.
+    /// The byte of the request PDU at `index`. `byte` returns a byte of the data.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn at(&self, index: usize, byte: &impl Fn(usize) -> u8) -> u8 {
-        let mut behind = index.wrapping_sub(usize::from(self.head_length));
+    fn byte_at(&self, index: usize, byte: &impl Fn(usize) -> u8) -> u8 {
+        let mut after_head = index.wrapping_sub(usize::from(self.head_length));
         match self.head.get(index) {
             Some(byte) if index < usize::from(self.head_length) => return *byte,
             _ => {}
         }
-        if self.form.has(COUNTED) {
-            if behind == 0 {
+        if self.spec.has(COUNTED) {
+            if after_head == 0 {
                 return self.data_length;
             }
-            behind -= 1;
+            after_head -= 1;
         }
-        byte(behind)
+        byte(after_head)
     }
 
-    /// The words of a request that is a function code and two words, as sent, at
-    /// little cost. Firmware, where code is dearer, has [`RequestHeader::emit`] alone.
+    /// The two words of a request that consists of a function code and two words. Faster than
+    /// [`RequestHeader::emit`]. Firmware has only that, to save flash.
     #[inline]
     pub fn two_words(&self) -> Option<&[u8; 4]> {
         let lengths = u16::from_ne_bytes([self.head_length, self.data_length]);
-        if !FIRMWARE && lengths == u16::from_ne_bytes([5, 0]) && !self.form.has(COUNTED) {
+        if !FIRMWARE && lengths == u16::from_ne_bytes([5, 0]) && !self.spec.has(COUNTED) {
             self.head.first_chunk::<5>()?.last_chunk()
         } else {
             None
         }
     }
 
-    /// Writes the request PDU into `pdu`, which has
-    /// [`RequestHeader::request_length`] bytes; `byte` gives those of the data.
+    /// Writes the request PDU into `pdu`, which has [`RequestHeader::request_length`] bytes.
+    /// `byte` returns a byte of the data.
     #[inline]
     pub fn emit(&self, pdu: &mut [u8], byte: impl Fn(usize) -> u8) {
         for (index, place) in pdu.iter_mut().enumerate() {
-            *place = self.at(index, &byte);
+            *place = self.byte_at(index, &byte);
         }
-        // Of a request that writes bits, the last byte is one of data.
-        if self.form.has(COUNTED) {
+        // The last byte of a request that writes bits is a byte of data.
+        if self.spec.has(COUNTED) {
             if let Some(last) = pdu.last_mut() {
                 *last &= self.mask();
             }
         }
     }
 
-    /// True if `pdu`, complete or not, agrees with the head of this request.
+    /// True if `pdu`, complete or not, begins as the head of this request does.
     pub fn matches_echo(&self, pdu: &[u8]) -> bool {
         for (ours, theirs) in self.head().iter().zip(pdu) {
             if ours != theirs {
@@ -178,30 +178,30 @@ impl RequestHeader {
         true
     }
 
-    /// True if `pdu` is the whole response to a write of one or many coils or
-    /// registers, at little cost: it repeats function code, address and value or
-    /// quantity. Firmware, where code is dearer, has [`RequestHeader::validate`] alone.
+    /// True if `pdu` is the whole response to a write of one or many coils or registers: it
+    /// repeats function code, address and value or quantity. Faster than
+    /// [`RequestHeader::validate`]. Firmware has only that, to save flash.
     #[inline]
     pub fn is_repeated_by(&self, pdu: &[u8]) -> bool {
         let Some([function, words @ ..]) = self.head.first_chunk::<5>() else {
             return false;
         };
         !FIRMWARE
-            && self.form.repeats_two_words()
+            && self.spec.repeats_two_words()
             && matches!(pdu, [code, a, b, c, d] if code == function && [*a, *b, *c, *d] == *words)
     }
 
-    /// The length of the response that begins with the bytes of `pdu`, or the
-    /// least length while they do not tell; `None` if no response to it begins
-    /// so. Where nothing but its end tells, it is `whole`; of 11, what it counts if
-    /// that is more.
+    /// The length of the response that begins with `pdu`. While `pdu` is too short to
+    /// determine the length, the least possible length; `None` if no response to this request
+    /// begins with `pdu`. If only the end of the frame determines the length, `whole`; for 11
+    /// (hex) the counted length if that is greater.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn expected(&self, pdu: &[u8], whole: usize) -> Option<NonZeroU8> {
         let length = match pdu {
             [] => 2,
             [function, ..] if *function == self.function() | EXCEPTION => 2,
             [function, ..] if *function != self.function() => return None,
-            _ => match self.form.0 & KIND {
+            _ => match self.spec.0 & KIND {
                 FIXED => usize::from(self.length),
                 READ => match pdu {
                     [_, count, ..] if *count != self.length - 2 => return None,
@@ -224,8 +224,8 @@ impl RequestHeader {
         }
     }
 
-    /// The length where the response's own rules tell: of 11, 18 and 2B/0E, or of
-    /// what only its end ends.
+    /// As [`RequestHeader::expected`], for the functions 11, 18 and 2B/0E (hex), which have
+    /// rules of their own, and for those whose response only the end of the frame ends.
     fn own_length(&self, pdu: &[u8], whole: usize) -> usize {
         let mut least = 2;
         let rule = match self.head {
@@ -250,17 +250,17 @@ impl RequestHeader {
         }
     }
 
-    /// How many bytes of data answer a read, behind function code and byte count;
-    /// `None` of other requests, and of those whose data begin elsewhere.
+    /// Bytes of data in the response to a read, after function code and byte count; `None`
+    /// for other requests, and for those whose data begin elsewhere.
     #[inline]
     pub fn data_of_read(&self) -> Option<u8> {
-        let form = self.form.0 & (KIND | 7 << DATA);
-        (form == READ | 2 << DATA).then_some(self.length.wrapping_sub(2))
+        let kind = self.spec.0 & (KIND | 7 << DATA);
+        (kind == READ | 2 << DATA).then_some(self.length.wrapping_sub(2))
     }
 
-    /// What a complete response of the [`RequestHeader::expected`] length says:
-    /// success, an exception of the remote device, or
-    /// [`Status::MALFORMED_REPLY`]; `byte` gives the data that were sent.
+    /// The status of a complete response, which has the length
+    /// [`RequestHeader::expected`]: [`Status::OK`], an exception, or
+    /// [`Status::MALFORMED_REPLY`]. `byte` returns a byte of the data that were sent.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn validate(&self, pdu: &[u8], byte: impl Fn(usize) -> u8) -> Status {
         if let [function, code, ..] = pdu {
@@ -268,16 +268,16 @@ impl RequestHeader {
                 return Status::exception(*code);
             }
         }
-        let repeated = if self.form.has(REPEATS_DATA) {
+        let repeated = if self.spec.has(REPEATS_DATA) {
             pdu.len()
         } else {
             usize::from(self.repeated)
         };
-        // No response is shorter than what it repeats, nor than where its data begin.
+        // A response holds at least the bytes that it repeats and those before its data.
         if pdu.len() >= repeated.max(self.data_at().into())
-            && self.begins(pdu, repeated, &byte)
+            && self.is_repeated(pdu, repeated, &byte)
             && match *pdu {
-                _ if self.form.has(GROUPS) => self.answers_groups(pdu, byte),
+                _ if self.spec.has(GROUPS) => self.answers_groups(pdu, byte),
                 [files::READ_FIFO_QUEUE, _, bytes, high, words, ..] => {
                     high == 0 && u16::from(words) <= MAX_FIFO && bytes == 2 * words + 2
                 }
@@ -290,32 +290,36 @@ impl RequestHeader {
         }
     }
 
-    /// True if the first bytes of a `pdu` that has so many are those of the request.
+    /// True if the first `count` bytes of `pdu` are those of the request. `pdu` has at least
+    /// that many.
     #[inline(always)]
-    fn begins(&self, pdu: &[u8], count: usize, byte: &impl Fn(usize) -> u8) -> bool {
+    fn is_repeated(&self, pdu: &[u8], count: usize, byte: &impl Fn(usize) -> u8) -> bool {
         for (index, theirs) in pdu.get(..count).unwrap_or_default().iter().enumerate() {
-            if *theirs != self.at(index, byte) {
+            if *theirs != self.byte_at(index, byte) {
                 return false;
             }
         }
         true
     }
 
-    /// True if a response to 14 has the groups that were asked for, each as long.
+    /// True if a response to 14 (hex) has the requested groups, each of the requested length.
     fn answers_groups(&self, pdu: &[u8], byte: impl Fn(usize) -> u8) -> bool {
-        // Where the low byte of a group's length stands in the request.
-        let mut asked = 8;
+        // Index of the low byte of a group's length in the request.
+        let mut length_at = 8;
         let mut at = 2;
-        while asked < usize::from(self.request_length()) {
-            // In steps, for step_by divides, which a Cortex-M0 has no instruction for.
-            let records = [self.at(asked - 1, &byte), self.at(asked, &byte)];
+        while length_at < usize::from(self.request_length()) {
+            // `step_by` would divide, for which a Cortex-M0 has no instruction.
+            let records = [
+                self.byte_at(length_at - 1, &byte),
+                self.byte_at(length_at, &byte),
+            ];
             let bytes = usize::from(u16::from_be_bytes(records)) << 1 | 1;
             match pdu.get(at..) {
                 Some([count, files::REFERENCE_TYPE, ..]) if usize::from(*count) == bytes => {}
                 _ => return false,
             }
             at += bytes + 1;
-            asked += 7;
+            length_at += 7;
         }
         at == pdu.len()
     }
@@ -326,8 +330,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_response_that_repeats_two_words_is_right_by_the_long_way_too() {
-        let forms = [
+    fn a_response_that_repeats_two_words_also_passes_validate() {
+        let specs = [
             FunctionSpec::WRITE_SINGLE_COIL,
             FunctionSpec::WRITE_SINGLE_REGISTER,
             FunctionSpec::WRITE_MULTIPLE_COILS,
@@ -336,9 +340,9 @@ mod tests {
             FunctionSpec::READ_HOLDING_REGISTERS,
             FunctionSpec::READ_FIFO_QUEUE,
         ];
-        for (index, form) in forms.into_iter().enumerate() {
+        for (index, spec) in specs.into_iter().enumerate() {
             let mut header = RequestHeader::NONE;
-            assert_eq!(header.set(form, 0x0107, 9), Status::OK);
+            assert_eq!(header.set(spec, 0x0107, 9), Status::OK);
             let head = [header.function(), 1, 7, 0, 9];
             assert_eq!(header.is_repeated_by(&head), !FIRMWARE && index < 4);
             assert!(!header.is_repeated_by(&head[..4]));
