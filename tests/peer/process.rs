@@ -17,7 +17,13 @@ impl Script {
     pub fn start(name: &str, arguments: &[&str]) -> Script {
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/peer");
         let python = built("build/venv/bin/python", "venv");
-        Script::spawn(Command::new(python).arg(script.join(name)).args(arguments))
+        // -B: Python writes no compiled files into the folder of the tests.
+        Script::spawn(
+            Command::new(python)
+                .arg("-B")
+                .arg(script.join(name))
+                .args(arguments),
+        )
     }
 
     /// Starts mbm's server in C, `c-tests/serve.c`.

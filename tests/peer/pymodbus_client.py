@@ -10,36 +10,12 @@ without a response it prints `silent`, after it `sent`; each time it waits for a
 
 import sys
 
-from pymodbus import FramerType
+from custom_pdu import FRAMERS, Custom
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
-from pymodbus.pdu import ModbusPDU
 from pymodbus.pdu.file_message import FileRecord
 
 UNIT, BASE, REGISTERS, BITS, HOLE, REFUSED = 17, 100, 300, 2400, 250, 260
-FRAMERS = {
-    "rtu": FramerType.RTU,
-    "ascii": FramerType.ASCII,
-    "tcp": FramerType.SOCKET,
-    "rtu-over-tcp": FramerType.RTU,
-}
 
-
-class Custom(ModbusPDU):
-    """The user-defined function 0x41. The server returns its data: a byte count, and the bytes
-    that it counts."""
-
-    function_code = 0x41
-    rtu_byte_count_pos = 2
-
-    def __init__(self, data=b"", dev_id=UNIT, transaction_id=0):
-        super().__init__(dev_id=dev_id, transaction_id=transaction_id)
-        self.data = data
-
-    def encode(self):
-        return bytes([len(self.data)]) + self.data
-
-    def decode(self, data):
-        self.data = data[1 : 1 + data[0]]
 
 
 class Unknown(Custom):
@@ -247,10 +223,10 @@ def identity(check):
 def custom(check):
     check.client.register(Custom)
     for data in (b"own data", bytes(range(100))):
-        answer = check.client.execute(False, Custom(data))
+        answer = check.client.execute(False, Custom(data, UNIT))
         assert not answer.isError() and answer.data == data, answer
         check.right += 1
-    answer = check.client.execute(False, Unknown(b"x"))
+    answer = check.client.execute(False, Unknown(b"x", UNIT))
     assert answer.exception_code == 1, answer
     check.right += 1
 

@@ -13,14 +13,14 @@ it is `nothing` or `error`.
 import logging
 import sys
 
+from custom_pdu import FRAMERS, Custom
 from pymodbus.client.mixin import ModbusClientMixin
 from pymodbus.exceptions import ModbusException
-from pymodbus.framer import FRAMER_NAME_TO_CLASS, FramerType
+from pymodbus.framer import FRAMER_NAME_TO_CLASS
 from pymodbus.pdu import (
     DecodePDU,
     ExceptionResponse,
     FileRecord,
-    ModbusPDU,
     bit_message,
     diag_message,
     file_message,
@@ -30,12 +30,6 @@ from pymodbus.pdu import (
 )
 
 UNIT, TRANSACTION = 17, 0x1234
-
-FRAMINGS = {
-    "rtu": FramerType.RTU,
-    "ascii": FramerType.ASCII,
-    "tcp": FramerType.SOCKET,
-}
 
 # The fields to print, by class. All classes of function 08 have the same fields.
 FIELDS = {
@@ -93,22 +87,6 @@ FIELDS = {
 }
 
 
-class Custom(ModbusPDU):
-    """A user-defined function: a byte count, and the bytes that it counts."""
-
-    function_code = 0x41
-    rtu_byte_count_pos = 2
-
-    def __init__(self, data=b"", dev_id=1, transaction_id=0):
-        super().__init__(dev_id=dev_id, transaction_id=transaction_id)
-        self.data = data
-
-    def encode(self):
-        return bytes([len(self.data)]) + self.data
-
-    def decode(self, data):
-        self.data = data[1 : 1 + data[0]]
-
 
 class Client(ModbusClientMixin):
     """A client that returns a request instead of sending it."""
@@ -137,7 +115,7 @@ for module in (
 def framer(framing, is_server):
     decoder = DecodePDU(is_server)
     decoder.register(Custom)
-    return FRAMER_NAME_TO_CLASS[FRAMINGS[framing]](decoder)
+    return FRAMER_NAME_TO_CLASS[FRAMERS[framing]](decoder)
 
 
 def text(value):

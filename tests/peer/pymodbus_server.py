@@ -14,36 +14,16 @@ import asyncio
 import logging
 import sys
 
-from pymodbus import FramerType, ModbusDeviceIdentification
-from pymodbus.pdu import ModbusPDU
+from custom_pdu import FRAMERS, Custom
+from pymodbus import ModbusDeviceIdentification
 from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 CELLS = 2048
-FRAMINGS = {
-    "rtu": FramerType.RTU,
-    "ascii": FramerType.ASCII,
-    "tcp": FramerType.SOCKET,
-    "rtu-over-tcp": FramerType.RTU,
-}
 
 
-class Custom(ModbusPDU):
-    """The user-defined function 0x41: a byte count, and the bytes that it counts. The response
-    has the bytes in reverse order."""
-
-    function_code = 0x41
-    rtu_byte_count_pos = 2
-
-    def __init__(self, data=b"", dev_id=1, transaction_id=0):
-        super().__init__(dev_id=dev_id, transaction_id=transaction_id)
-        self.data = data
-
-    def encode(self):
-        return bytes([len(self.data)]) + self.data
-
-    def decode(self, data):
-        self.data = data[1 : 1 + data[0]]
+class Reversing(Custom):
+    """The response has the bytes of the request in reverse order."""
 
     async def datastore_update(self, context, device_id):
         return Custom(self.data[::-1], device_id, self.transaction_id)
@@ -69,7 +49,7 @@ def device(unit):
 
 def arguments():
     parser = argparse.ArgumentParser(description="A pymodbus server for tests.")
-    parser.add_argument("--framing", choices=FRAMINGS, required=True)
+    parser.add_argument("--framing", choices=FRAMERS, required=True)
     where = parser.add_mutually_exclusive_group(required=True)
     where.add_argument("--tty", help="the device to serve on")
     where.add_argument("--port", type=int, help="the TCP port to serve on; 0 takes a free one")
@@ -90,11 +70,11 @@ async def main():
         }
     )
     common = {
-        "framer": FRAMINGS[args.framing],
+        "framer": FRAMERS[args.framing],
         "identity": identity,
         "ignore_missing_devices": args.framing != "tcp",
         "broadcast_enable": args.framing in ("rtu", "ascii"),
-        "custom_pdu": [Custom],
+        "custom_pdu": [Reversing],
     }
     if args.tty:
         server = ModbusSerialServer(

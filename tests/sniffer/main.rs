@@ -5,3 +5,4 @@ mod bus;
 mod exchanges;
 mod faults;
 mod random;
+mod times;
