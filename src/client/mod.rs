@@ -55,24 +55,14 @@ impl<L, J, const N: usize> Client<L, J, N> {
     }
 
     /// False after the link was lost, until a reply arrives, or until the caller calls
-    /// [`Client::set_connected`] with true or [`Client::reconnect`].
+    /// [`Client::reconnect`].
     pub const fn is_connected(&self) -> bool {
         self.queue.connected
-    }
-
-    /// Sets whether the link is up. [`Client::reconnect`] sets it to true.
-    pub fn set_connected(&mut self, connected: bool) {
-        self.queue.connected = connected;
     }
 
     /// Takes the line back after [`Client::suspend`].
     pub fn take_back(&mut self) {
         self.queue.suspended = false;
-    }
-
-    /// True from [`Client::suspend`] to [`Client::take_back`].
-    pub const fn is_lent(&self) -> bool {
-        self.queue.suspended
     }
 
     /// Number of requests that are queued or in flight.
@@ -88,54 +78,6 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
         queue.has_broadcast = L::HAS_BROADCAST;
         queue.has_transaction_ids = L::HAS_TRANSACTION_IDS;
         Client { queue, line }
-    }
-
-    /// Fails to compile unless the line can carry `M` requests at once and the queue
-    /// can hold them. A serial line is half duplex and carries 1.
-    ///
-    /// ```
-    /// # use mbm::client::*;
-    /// fn one_at_a_time<J: ClientRequest, P: mbm::port::Port, S: ClientStorage>(client: Client<Serial<P, S, J>, J, 4>) {
-    ///     client.in_flight::<1>();
-    /// }
-    /// # struct P; impl mbm::port::Port for P {
-    /// #     fn read(&mut self, _: &mut [u8]) -> i16 { 0 }
-    /// #     fn write(&mut self, _: &[u8]) -> i16 { 0 }
-    /// #     fn micros(&mut self) -> u32 { 0 }
-    /// # }
-    /// # struct J; impl ClientRequest for J {
-    /// #     fn state(&self) -> &RequestState { &RequestState::NONE }
-    /// #     fn state_mut(&mut self) -> &mut RequestState { unreachable!() }
-    /// #     fn byte(&self, _: usize) -> u8 { 0 }
-    /// #     fn put(&mut self, _: usize, _: u8) {}
-    /// # }
-    /// # fn main() { one_at_a_time::<J, P, _>(Client::new(Serial::new(P, mbm::engine::Frame::new([0; 8])))); }
-    /// ```
-    ///
-    /// Two do not compile:
-    ///
-    /// ```compile_fail
-    /// # use mbm::client::*;
-    /// fn two_at_once<J: ClientRequest, P: mbm::port::Port, S: ClientStorage>(client: Client<Serial<P, S, J>, J, 4>) {
-    ///     client.in_flight::<2>();
-    /// }
-    /// # struct P; impl mbm::port::Port for P {
-    /// #     fn read(&mut self, _: &mut [u8]) -> i16 { 0 }
-    /// #     fn write(&mut self, _: &[u8]) -> i16 { 0 }
-    /// #     fn micros(&mut self) -> u32 { 0 }
-    /// # }
-    /// # struct J; impl ClientRequest for J {
-    /// #     fn state(&self) -> &RequestState { &RequestState::NONE }
-    /// #     fn state_mut(&mut self) -> &mut RequestState { unreachable!() }
-    /// #     fn byte(&self, _: usize) -> u8 { 0 }
-    /// #     fn put(&mut self, _: usize, _: u8) {}
-    /// # }
-    /// # fn main() { two_at_once::<J, P, _>(Client::new(Serial::new(P, mbm::engine::Frame::new([0; 8])))); }
-    /// ```
-    #[must_use]
-    pub fn in_flight<const M: usize>(self) -> Self {
-        const { assert!(M >= 1 && M <= L::MAX_IN_FLIGHT && M <= N) }
-        self
     }
 
     /// Queues a request. [`Client::poll`] returns it when it has ended.

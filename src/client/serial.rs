@@ -96,7 +96,6 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
 }
 
 impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, J> {
-    const MAX_IN_FLIGHT: usize = 1;
     const HAS_BROADCAST: bool = true;
     const HAS_TRANSACTION_IDS: bool = false;
 

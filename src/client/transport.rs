@@ -5,9 +5,6 @@ use super::request::ClientRequest;
 
 /// A serial line, or a TCP stream.
 pub trait Transport<J> {
-    /// Greatest number of requests in flight at the same time.
-    const MAX_IN_FLIGHT: usize;
-
     /// True if unit 0 addresses all units (broadcast).
     const HAS_BROADCAST: bool;
 

@@ -90,7 +90,7 @@ pub(super) type Receive<P, B> = fn(&mut Server<P, B>) -> Status;
 pub(super) type EncodeAdu<P, B> = fn(&mut Server<P, B>, usize) -> usize;
 
 /// A server on one line or connection.
-// The small fields come first: see `Transaction`.
+// The small fields come first: see `Engine`.
 #[repr(C)]
 pub struct Server<P, B> {
     phase: ServerPhase,

@@ -387,7 +387,6 @@ fn write_frame<J: ClientRequest>(
 }
 
 impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Tcp<P, S> {
-    const MAX_IN_FLIGHT: usize = u8::MAX as usize;
     const HAS_BROADCAST: bool = false;
     const HAS_TRANSACTION_IDS: bool = true;
 
