@@ -295,7 +295,7 @@ sniff: ## Build and check the example that watches a bus, build/plain/linux/snif
 	@$(MAKE) --no-print-directory $(SNIFF)
 	@scripts/check-sniff $(SNIFF)
 
-CLIENTS := $(patsubst %,$(BUILD)/plain/linux/%,poll_table scan logger)
+CLIENTS := $(patsubst %,$(BUILD)/plain/linux/%,poll_table scan logger plan)
 $(CLIENTS): %: %.o $(patsubst %,$(BUILD)/plain/linux/%.o,line mbm_tty mbm_tcp) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 PEERS := $(BUILD)/plain/serve_libmodbus
@@ -310,10 +310,17 @@ clients: ## Build and check the client examples poll_table, scan and logger in b
 	@$(BUILD)/venv/bin/python scripts/check-clients-lost $(BUILD)/plain
 
 .PHONY: demo
-demo: ## Show every function against a libmodbus server, frame by frame
-	@scripts/need gcc libc6-dev pkg-config libmodbus-dev
+demo: ## Show every function against a libmodbus server, frame by frame, and a plan at work
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
 	@$(MAKE) --no-print-directory $(DEMO) $(BUILD)/plain/linux/basic
 	@$(DEMO)
+	@$(MAKE) --no-print-directory plan
+
+.PHONY: plan
+plan: ## A plan of ten fields at work against a libmodbus server
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
+	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/plan $(PEERS)
+	@scripts/demo-plan $(BUILD)/plain
 
 # The programs that the commands in the pages run.
 PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway) $(SNIFF) $(CLIENTS) $(SERVE)
