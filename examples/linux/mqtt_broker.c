@@ -73,7 +73,7 @@ static void on_message(struct mosquitto *mosquitto, void *context,
     } else if (message->payloadlen > MQTT_LONGEST_WRITE) {
         event.kind = MQTT_REFUSED;
         event.reason = "the payload is too long";
-    } else {
+    } else if (message->payloadlen > 0) {
         memcpy(event.payload, message->payload, (size_t)message->payloadlen);
     }
     send_event(broker, &event);
