@@ -115,8 +115,8 @@ abi: ## Generate packaging/mbm.abi, with which `make check` compares the C inter
 
 .PHONY: compile-commands
 compile-commands: ## Write compile_commands.json, for editors and clang-tidy
-	@scripts/need gcc g++ libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind
-	@$(MAKE) --no-print-directory --dry-run --always-make $(TESTS:%=$(BUILD)/plain/%) $(SERVE) $(PEERS) \
+	@scripts/need gcc g++ libc6-dev pkg-config libmodbus-dev libcmocka-dev valgrind libmosquitto-dev libcjson-dev
+	@$(MAKE) --no-print-directory --dry-run --always-make $(TESTS:%=$(BUILD)/plain/%) $(SERVE) $(PEERS) $(MQTT) \
 		$(TESTED_EXAMPLES:%=$(BUILD)/plain/linux/%) $(CLIENTS) $(DEMO) $(SNIFF) $(BUILD)/plain/linux/basic | scripts/compile-commands
 
 .PHONY: tidy
@@ -295,7 +295,7 @@ sniff: ## Build and check the example that watches a bus, build/plain/linux/snif
 	@$(MAKE) --no-print-directory $(SNIFF)
 	@scripts/check-sniff $(SNIFF)
 
-CLIENTS := $(patsubst %,$(BUILD)/plain/linux/%,poll_table scan logger)
+CLIENTS := $(patsubst %,$(BUILD)/plain/linux/%,poll_table scan logger plan)
 $(CLIENTS): %: %.o $(patsubst %,$(BUILD)/plain/linux/%.o,line mbm_tty mbm_tcp) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 PEERS := $(BUILD)/plain/serve_libmodbus
@@ -310,10 +310,27 @@ clients: ## Build and check the client examples poll_table, scan and logger in b
 	@$(BUILD)/venv/bin/python scripts/check-clients-lost $(BUILD)/plain
 
 .PHONY: demo
-demo: ## Show every function against a libmodbus server, frame by frame
-	@scripts/need gcc libc6-dev pkg-config libmodbus-dev
+demo: ## Show every function against a libmodbus server, frame by frame, and a plan at work
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
 	@$(MAKE) --no-print-directory $(DEMO) $(BUILD)/plain/linux/basic
 	@$(DEMO)
+	@$(MAKE) --no-print-directory plan
+
+.PHONY: plan
+plan: ## A plan of ten fields at work against a libmodbus server
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3
+	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/plan $(PEERS)
+	@scripts/demo-plan $(BUILD)/plain
+
+MQTT := $(BUILD)/plain/linux/mqtt_bridge
+$(MQTT): $(patsubst %,$(BUILD)/plain/linux/%.o,mqtt_bridge mqtt_broker mqtt_fields mqtt_value line mbm_tty mbm_tcp) $(ARCHIVE)
+	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmosquitto -lcjson -lm -lpthread -o $@
+
+.PHONY: mqtt
+mqtt: ## Show and check the bridge to MQTT on a libmodbus server and a mosquitto broker
+	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3 libmosquitto-dev libcjson-dev mosquitto mosquitto-clients openssl
+	@$(MAKE) --no-print-directory $(MQTT) $(PEERS)
+	@scripts/check-mqtt $(BUILD)/plain
 
 # The programs that the commands in the pages run.
 PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway) $(SNIFF) $(CLIENTS) $(SERVE)

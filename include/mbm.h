@@ -24,12 +24,13 @@
  *    4 Functions and framings  codes, limits, length rules; RTU, ASCII, TCP
  *    5 Master                  RTU, one request at a time, blocking or not
  *    6 Client                  many requests, every framing, never waits
- *    7 Server                  answers requests on a line or connection
- *    8 Units                   the data that servers serve: tables, callbacks, files
- *    9 Values                  registers and bits as numbers, in words or bytes
- *   10 Packets                 requests and responses, built and parsed by hand
- *   11 Sniffer                 decodes the traffic between other devices
- *   12 Ring                    bytes from an interrupt to the main loop
+ *    7 Plan                    a table of values that a client reads again and again
+ *    8 Server                  answers requests on a line or connection
+ *    9 Units                   the data that servers serve: tables, callbacks, files
+ *   10 Values                  registers and bits as numbers, in words or bytes
+ *   11 Packets                 requests and responses, built and parsed by hand
+ *   12 Sniffer                 decodes the traffic between other devices
+ *   13 Ring                    bytes from an interrupt to the main loop
  */
 
 #ifndef MBM_H
@@ -52,6 +53,7 @@
 /* The archive has a double of 32 bits: what calls these must not link. */
 #define mbm_registers_getDouble mbm_registers_getDouble_wants_mdouble_32
 #define mbm_registers_setDouble mbm_registers_setDouble_wants_mdouble_32
+#define mbm_plan_getDouble mbm_plan_getDouble_wants_mdouble_32
 #endif
 
 #ifdef __cplusplus
@@ -59,6 +61,7 @@ extern "C" {
 #endif
 
 struct mbm_master;
+struct mbm_registers;
 struct mbm_object;
 struct mbm_unit;
 
@@ -247,6 +250,11 @@ const char *mbm_version(void);
  * The request has ended already, or was never queued on this client.
  */
 #define MBM_NOT_PENDING 242
+
+/**
+ * Two fields of a plan share an address of one unit and table.
+ */
+#define MBM_FIELDS_OVERLAP 243
 
 /**
  * Explains a status in a few words of English.
@@ -2307,7 +2315,516 @@ uint8_t mbm_client_setUnits(struct mbm_client *client,
                             struct mbm_clientUnit *units,
                             uint8_t count);
 
-/* ==== 7. Server ===================================================================== */
+/* ==== 7. Plan ======================================================================= */
+
+/**
+ * A table of the data model (V1.1b3, 4.3): coils. The number of each table is that of the
+ * function that reads it.
+ */
+#define MBM_TABLE_COILS 1
+
+/**
+ * The discrete inputs.
+ */
+#define MBM_TABLE_DISCRETE_INPUTS 2
+
+/**
+ * The holding registers.
+ */
+#define MBM_TABLE_HOLDING_REGISTERS 3
+
+/**
+ * The input registers.
+ */
+#define MBM_TABLE_INPUT_REGISTERS 4
+
+/**
+ * The type of a value: a coil or a discrete input, 0 or 1.
+ */
+#define MBM_TYPE_BIT 1
+
+/**
+ * One register, 0 to 65535.
+ */
+#define MBM_TYPE_UINT16 2
+
+/**
+ * One register, -32768 to 32767.
+ */
+#define MBM_TYPE_INT16 3
+
+/**
+ * Two registers.
+ */
+#define MBM_TYPE_UINT32 4
+
+/**
+ * Two registers, two's complement.
+ */
+#define MBM_TYPE_INT32 5
+
+/**
+ * Four registers.
+ */
+#define MBM_TYPE_UINT64 6
+
+/**
+ * Four registers, two's complement.
+ */
+#define MBM_TYPE_INT64 7
+
+/**
+ * Two registers, an IEEE 754 binary32.
+ */
+#define MBM_TYPE_FLOAT 8
+
+/**
+ * Four registers, an IEEE 754 binary64.
+ */
+#define MBM_TYPE_DOUBLE 9
+
+/**
+ * A text, two characters a register, which ends at its first NUL or with its field.
+ */
+#define MBM_TYPE_TEXT 10
+
+/**
+ * The longest interval of a field in milliseconds: a day.
+ */
+#define MBM_PLAN_LONGEST_INTERVAL 86400000
+
+/**
+ * The most fields of one plan.
+ */
+#define MBM_PLAN_MAX_FIELDS 32767
+
+/**
+ * A plan: a table of fields that a client reads from units again and again.
+ *
+ * Storage is yours and must be zero before first use, which a static object is.
+ * mbm_plan_begin comes first. Use it from the thread that uses its client, and never from an
+ * interrupt. It stays where it is until mbm_plan_end.
+ */
+typedef struct mbm_plan {
+    /**
+     * Private.
+     */
+    void *pointers[3];
+    /**
+     * Private.
+     */
+    uint32_t words[4];
+} mbm_plan;
+
+/**
+ * A field of a plan: a value, or several of one type in a row, that a program wants from a
+ * unit again and again. A table of them may be constant.
+ */
+typedef struct mbm_planField {
+    /**
+     * The unit, 1 to 255.
+     */
+    uint8_t unit;
+    /**
+     * One of MBM_TABLE_...
+     */
+    uint8_t table;
+    /**
+     * One of MBM_TYPE_...: MBM_TYPE_BIT for coils and discrete inputs, another for registers.
+     */
+    uint8_t type;
+    /**
+     * One of MBM_ORDER_...; MBM_ORDER_DEFAULT is MBM_ORDER_ABCD.
+     */
+    uint8_t order;
+    /**
+     * The first bit or register, 0 to 65535, as on the wire.
+     */
+    uint16_t address;
+    /**
+     * The number of values; of a text the number of characters. 0 means 1.
+     */
+    uint16_t count;
+    /**
+     * The time from one read to the next in milliseconds, 1 to MBM_PLAN_LONGEST_INTERVAL.
+     */
+    uint32_t intervalMs;
+    /**
+     * mbm_plan_getInteger multiplies by this; 0 means 1. Only integers have a scale.
+     */
+    int32_t multiplier;
+    /**
+     * It divides by this after that; 0 means 1. Not negative.
+     */
+    int32_t divisor;
+} mbm_planField;
+
+/**
+ * Storage of a plan, one for each field.
+ */
+typedef struct mbm_planPosition {
+    /**
+     * Private.
+     */
+    uint32_t words[2];
+} mbm_planPosition;
+
+/**
+ * Storage of a plan, one for each read.
+ */
+typedef struct mbm_planRead {
+    /**
+     * Private.
+     */
+    uint32_t words[8];
+} mbm_planRead;
+
+/**
+ * How much one read of a unit may request, if not as much as the plan's other reads.
+ */
+typedef struct mbm_planUnitLimits {
+    /**
+     * Bits, 1 to 2000; 0 means as `bitsPerRead` of the plan.
+     */
+    uint16_t bitsPerRead;
+    /**
+     * Registers, 1 to 125; 0 means as `registersPerRead` of the plan.
+     */
+    uint8_t registersPerRead;
+    /**
+     * The unit.
+     */
+    uint8_t unit;
+} mbm_planUnitLimits;
+
+/**
+ * Addresses that no read of a plan may touch.
+ */
+typedef struct mbm_planExcludedRange {
+    /**
+     * The first address.
+     */
+    uint16_t first;
+    /**
+     * The last address, not less than `first`.
+     */
+    uint16_t last;
+    /**
+     * The unit; 0 for every unit.
+     */
+    uint8_t unit;
+    /**
+     * One of MBM_TABLE_...
+     */
+    uint8_t table;
+} mbm_planExcludedRange;
+
+/**
+ * What a plan is made of. It may be constant. It stays valid and as it is, with everything
+ * that it points to, for as long as the plan is used.
+ */
+typedef struct mbm_planSetup {
+    /**
+     * The fields, in any order.
+     */
+    const struct mbm_planField *fields;
+    /**
+     * Storage: as many as fields.
+     */
+    struct mbm_planPosition *positions;
+    /**
+     * Storage: as many as reads; there are never more reads than fields.
+     */
+    struct mbm_planRead *reads;
+    /**
+     * Storage: the registers of all reads and the bits of all reads, 16 to a word.
+     */
+    uint16_t *data;
+    /**
+     * Storage: the requests with which the plan reads, zeroed. With one it sends one read after
+     * the other; more are for Modbus TCP, where several may be under way at once.
+     */
+    struct mbm_clientRequest *requests;
+    /**
+     * Units with limits of their own; NULL for none.
+     */
+    const struct mbm_planUnitLimits *units;
+    /**
+     * Addresses that no read may touch; NULL for none.
+     */
+    const struct mbm_planExcludedRange *excluded;
+    /**
+     * Optional: called by mbm_client_poll, or mbm_plan_poll, for each field of a read that has
+     * ended, and for each field of a unit that the plan takes for silent. It may call every
+     * function on the plan, and on the client what a `done` function may call.
+     */
+    void (*update)(void *context, struct mbm_plan *plan, uint16_t field);
+    /**
+     * Handed to `update`. Yours, may be NULL.
+     */
+    void *context;
+    /**
+     * How long the plan leaves a unit alone after a first request without an answer, in
+     * milliseconds; each further one doubles it. 0 means 1000.
+     */
+    uint32_t backoffMs;
+    /**
+     * The longest such time in milliseconds; 0 means 60000.
+     */
+    uint32_t longestBackoffMs;
+    /**
+     * How many fields, 1 to MBM_PLAN_MAX_FIELDS.
+     */
+    uint16_t fieldCount;
+    /**
+     * How many reads there is storage for.
+     */
+    uint16_t readCount;
+    /**
+     * How many words there are in `data`.
+     */
+    uint16_t dataWords;
+    /**
+     * The most bits that one read requests, 1 to 2000; 0 means 2000.
+     */
+    uint16_t bitsPerRead;
+    /**
+     * The most bits between two fields that one read may cover as well.
+     */
+    uint16_t bitGap;
+    /**
+     * The most registers that one read requests, 1 to 125; 0 means 125.
+     */
+    uint8_t registersPerRead;
+    /**
+     * The most registers between two fields that one read may cover as well.
+     */
+    uint8_t registerGap;
+    /**
+     * How many requests, 1 to 16.
+     */
+    uint8_t requestCount;
+    /**
+     * How many units with limits of their own.
+     */
+    uint8_t unitCount;
+    /**
+     * How many excluded ranges.
+     */
+    uint8_t excludedCount;
+} mbm_planSetup;
+
+/**
+ * A read of a plan: one request that it repeats.
+ */
+typedef struct mbm_planReadInfo {
+    /**
+     * The time from one read to the next, in milliseconds.
+     */
+    uint32_t intervalMs;
+    /**
+     * The first bit or register, as on the wire.
+     */
+    uint16_t address;
+    /**
+     * How many bits or registers.
+     */
+    uint16_t quantity;
+    /**
+     * The unit.
+     */
+    uint8_t unit;
+    /**
+     * One of MBM_TABLE_...
+     */
+    uint8_t table;
+    /**
+     * How it ended last; MBM_PENDING before it has ended once.
+     */
+    uint8_t status;
+} mbm_planReadInfo;
+
+/**
+ * Groups the fields of a table into reads. mbm_plan_poll sends them from then on.
+ *
+ * Fields with the same unit, table and interval are read together. Of all ways to cover them
+ * within the limits, the plan takes one with the fewest reads, and of these one with the fewest
+ * bits or registers. All reads are due at once; the rounds after the first are spread, so that
+ * reads of one interval follow each other at equal distances.
+ *
+ * @param plan    the object, zeroed
+ * @param client  the client that sends the reads, begun; the program may use it too, and other
+ *                plans
+ * @param setup   table, limits and storage; it stays valid and as it is until mbm_plan_end
+ * @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
+ * @return MBM_OK; MBM_BUSY if it was begun already; of a field MBM_INVALID_ARGUMENT for an
+ *         unknown table, type or order, a type that the table does not have, an interval out
+ *         of range, a negative divisor or a scale of what is no integer, MBM_BROADCAST_NOT_ALLOWED for unit 0,
+ *         MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address 65535 or into an excluded range,
+ *         MBM_ILLEGAL_DATA_VALUE if it is longer than a read may be, MBM_FIELDS_OVERLAP for
+ *         the later of two that share an address, MBM_BUFFER_TOO_SMALL for the first without
+ *         storage for its read or its data; MBM_INVALID_ARGUMENT also for NULL pointers and
+ *         counts out of range; MBM_NOT_INITIALISED for a client that was never begun. The
+ *         object is changed on MBM_OK only; `positions` and `reads` may be changed always
+ */
+uint8_t mbm_plan_begin(struct mbm_plan *plan,
+                       struct mbm_client *client,
+                       const struct mbm_planSetup *setup,
+                       uint16_t *field);
+
+/**
+ * Ends a plan: gives its requests up and lets go of its storage. To begin it again, call
+ * mbm_plan_begin.
+ *
+ * @param plan  the object
+ * @return MBM_OK; MBM_BUSY from within a hook of the client's port, with nothing changed;
+ *         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_plan_end(struct mbm_plan *plan);
+
+/**
+ * Queues the reads that are due, as far as there are requests for them. It does not poll the
+ * client: call mbm_client_poll after it.
+ *
+ * @param plan  the object
+ * @return MBM_OK; MBM_BUSY from within a hook of the client's port; MBM_INVALID_ARGUMENT;
+ *         MBM_NOT_INITIALISED, also for a client that was zeroed
+ */
+uint8_t mbm_plan_poll(struct mbm_plan *plan);
+
+/**
+ * How long mbm_plan_poll has nothing to do, so that a program may sleep until then or until
+ * mbm_client_pollDelay is over, whichever comes first.
+ *
+ * @param plan  the object
+ * @return microseconds; 0 means poll now, and is returned within a hook of the client's port;
+ *         0xFFFFFFFF if there is nothing to do before a request of the client has ended, and
+ *         for an object that was never begun
+ */
+uint32_t mbm_plan_pollDelay(struct mbm_plan *plan);
+
+/**
+ * How the last read of a field ended, and how old its value is. The functions that get a value
+ * return the last one that was read, also after a read has failed: this says whether it is
+ * still worth something.
+ *
+ * @param plan   the object
+ * @param field  the index of the field
+ * @param ageMs  gets the milliseconds since the value arrived, 2147483647 (24 days) at most;
+ *               0xFFFFFFFF if none ever did; may be NULL
+ * @return MBM_PENDING before the first read has ended, then as it ended: MBM_OK, an exception
+ *         of the device, or a failure such as MBM_RESPONSE_TIMED_OUT; MBM_INVALID_ARGUMENT
+ *         for a field that is not there, or MBM_NOT_INITIALISED, with `ageMs` unchanged
+ */
+uint8_t mbm_plan_getStatus(struct mbm_plan *plan,
+                           uint16_t field,
+                           uint32_t *ageMs);
+
+/**
+ * A value as an integer: multiplied and divided as its field says, rounded to the nearest,
+ * halves away from 0.
+ *
+ * @param plan   the object
+ * @param field  the index of the field, of a bit or an integer
+ * @param index  which of its values, 0 for the first
+ * @param value  gets the number
+ * @return MBM_OK; MBM_BUFFER_TOO_SMALL if it is not in the range of `value`;
+ *         MBM_INVALID_ARGUMENT, also for a float or a text; MBM_NOT_INITIALISED; if no value
+ *         has arrived yet the status that mbm_plan_getStatus returns. `value` changes on MBM_OK
+ *         only
+ */
+uint8_t mbm_plan_getInteger(const struct mbm_plan *plan,
+                            uint16_t field,
+                            uint16_t index,
+                            int64_t *value);
+
+/**
+ * A value of type MBM_TYPE_FLOAT, whose bits are copied, or MBM_TYPE_DOUBLE, which is rounded
+ * to the nearest.
+ *
+ * @param plan   the object
+ * @param field  the index of the field
+ * @param index  which of its values, 0 for the first
+ * @param value  gets the number
+ * @return MBM_OK; MBM_INVALID_ARGUMENT, also for other types; MBM_NOT_INITIALISED; if no value
+ *         has arrived yet the status that mbm_plan_getStatus returns. `value` changes on MBM_OK
+ *         only
+ */
+uint8_t mbm_plan_getFloat(const struct mbm_plan *plan,
+                          uint16_t field,
+                          uint16_t index,
+                          float *value);
+
+/**
+ * A value of type MBM_TYPE_FLOAT or MBM_TYPE_DOUBLE as a double. On AVR, where C's double has
+ * 32 bits, it is mbm_plan_getFloat.
+ *
+ * @param plan   the object
+ * @param field  the index of the field
+ * @param index  which of its values, 0 for the first
+ * @param value  gets the number
+ * @return as mbm_plan_getFloat
+ */
+uint8_t mbm_plan_getDouble(const struct mbm_plan *plan,
+                           uint16_t field,
+                           uint16_t index,
+                           double *value);
+
+/**
+ * A text, which ends at its first NUL or with its field. In an order with the low byte first,
+ * the first of two characters is a register's low byte.
+ *
+ * @param plan      the object
+ * @param field     the index of the field, of type MBM_TYPE_TEXT
+ * @param text      gets the text and a NUL
+ * @param capacity  bytes of `text`; the field's count and one are always enough
+ * @return as mbm_plan_getInteger; MBM_BUFFER_TOO_SMALL if the text does not fit. `text` changes
+ *         on MBM_OK only
+ */
+uint8_t mbm_plan_getText(const struct mbm_plan *plan,
+                         uint16_t field,
+                         char *text,
+                         uint16_t capacity);
+
+/**
+ * The registers of a field as they were read, for mbm_registers_get... functions, in the order
+ * of the field. It copies nothing: the next reply changes what it sees.
+ *
+ * @param plan       the object
+ * @param field      the index of the field, of registers
+ * @param registers  the view to fill in
+ * @return as mbm_plan_getInteger
+ */
+uint8_t mbm_plan_getRegisters(const struct mbm_plan *plan,
+                              uint16_t field,
+                              struct mbm_registers *registers);
+
+/**
+ * Makes the read of a field due at once, for a value that is wanted now. A unit that does not
+ * answer is left alone all the same.
+ *
+ * @param plan   the object
+ * @param field  the index of the field
+ * @return MBM_OK; MBM_BUSY from within a hook of the client's port; MBM_INVALID_ARGUMENT for a
+ *         field that is not there; MBM_NOT_INITIALISED
+ */
+uint8_t mbm_plan_refresh(struct mbm_plan *plan,
+                         uint16_t field);
+
+/**
+ * The reads that the plan has made of the fields: one request each.
+ *
+ * @param plan   the object
+ * @param index  0 for the first read
+ * @param read   gets the read
+ * @return MBM_OK; MBM_INVALID_ARGUMENT, also behind the last read, or MBM_NOT_INITIALISED, with
+ *         `read` unchanged
+ */
+uint8_t mbm_plan_getRead(const struct mbm_plan *plan,
+                         uint16_t index,
+                         struct mbm_planReadInfo *read);
+
+/* ==== 8. Server ===================================================================== */
 
 /**
  * A Modbus server on one serial line or one connection.
@@ -2490,7 +3007,7 @@ uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
  */
 uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
 
-/* ==== 8. Units ====================================================================== */
+/* ==== 9. Units ====================================================================== */
 
 /**
  * A function of yours returns this, or-ed with the exception code (1 to 127), to answer
@@ -3204,7 +3721,7 @@ uint8_t mbm_unit_serveInputRegisters(struct mbm_unit *unit,
  */
 uint8_t mbm_registerTable_serveMaskAndReadWrite(struct mbm_registerTable *table);
 
-/* ==== 9. Values ===================================================================== */
+/* ==== 10. Values ==================================================================== */
 
 /**
  * Passed to a function: use the order of the mbm_registers. As that order itself:
@@ -3851,7 +4368,7 @@ uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
                                const uint8_t *bytes,
                                uint16_t length);
 
-/* ==== 10. Packets =================================================================== */
+/* ==== 11. Packets =================================================================== */
 
 /**
  * A request: a client sends it.
@@ -4368,7 +4885,7 @@ uint8_t mbm_frame_text(const struct mbm_framing *framing,
                        char *text,
                        uint16_t size);
 
-/* ==== 11. Sniffer =================================================================== */
+/* ==== 12. Sniffer =================================================================== */
 
 /**
  * The bytes come from a line that carries both directions.
@@ -4697,7 +5214,7 @@ uint8_t mbm_sniffer_next(struct mbm_sniffer *sniffer,
  */
 uint8_t mbm_event_text(const struct mbm_event *event, char *text, uint16_t size);
 
-/* ==== 12. Ring ====================================================================== */
+/* ==== 13. Ring ====================================================================== */
 
 /**
  * A receive ring between an interrupt handler and the main loop.

@@ -65,6 +65,9 @@ impl Status {
     /// The request is not pending: it has ended, or was never queued.
     pub const NOT_PENDING: Status = Status(0xF2);
 
+    /// Two fields of a plan share an address of one unit and table.
+    pub const FIELDS_OVERLAP: Status = Status(0xF3);
+
     /// The status for an exception code of the remote device.
     ///
     /// Code 0 and codes from 0x80 on become [`Status::MALFORMED_REPLY`]: the standard has no

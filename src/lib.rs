@@ -216,7 +216,7 @@
 //! A module uses only modules to its left:
 //!
 //! ```text
-//! bytes -> frame -> pdu -> packet -> explain -> {sniffer, engine} -> {master, client, server}
+//! bytes -> frame -> pdu -> packet -> text -> {sniffer, engine} -> {master, client, plan, server}
 //! ```
 //!
 //! Each of them may use `atomic`, `error`, `time`, `port`, `ring` and `data`. `make check`
@@ -250,6 +250,7 @@ pub mod text;
 
 pub mod client;
 pub mod master;
+pub mod plan;
 pub mod server;
 
 /// True if the crate is compiled for firmware. Some functions have a longer, faster branch

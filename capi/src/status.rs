@@ -91,6 +91,8 @@ pub const MBM_QUEUE_FULL: u8 = 0xF0;
 pub const MBM_DUPLICATE_TRANSACTION: u8 = 0xF1;
 /// The request has ended already, or was never queued on this client.
 pub const MBM_NOT_PENDING: u8 = 0xF2;
+/// Two fields of a plan share an address of one unit and table.
+pub const MBM_FIELDS_OVERLAP: u8 = 0xF3;
 
 statuses! {
     MBM_OK = Status::OK, c"success";
@@ -122,6 +124,7 @@ statuses! {
     MBM_QUEUE_FULL = Status::QUEUE_FULL, c"the queue is full";
     MBM_DUPLICATE_TRANSACTION = Status::DUPLICATE_TRANSACTION, c"another pending request has this transaction id";
     MBM_NOT_PENDING = Status::NOT_PENDING, c"the request is not pending";
+    MBM_FIELDS_OVERLAP = Status::FIELDS_OVERLAP, c"two fields of the plan overlap";
 }
 
 /// Explains a status in a few words of English.

@@ -27,7 +27,8 @@ fn probes() -> Vec<(String, u64)> {
             mbm_service mbm_registerTable mbm_bitTable mbm_dataCallbacks mbm_file mbm_files mbm_fifo
             mbm_fifos mbm_exceptionStatus mbm_serverId mbm_identification mbm_request mbm_custom
             mbm_functionMask mbm_diagnostics mbm_sniffer mbm_event mbm_client mbm_clientRequest mbm_clientUnit mbm_linkHooks
-            mbm_turn;
+            mbm_turn mbm_plan mbm_planPosition mbm_planRead mbm_planSetup mbm_planUnitLimits
+            mbm_planExcludedRange mbm_planReadInfo mbm_planField;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
             mbm_counters { requests replies exceptions badCrc timeouts foreignFrames
@@ -37,6 +38,12 @@ fn probes() -> Vec<(String, u64)> {
             mbm_clientUnit { requests replies exceptions retries delayUs unit status }
             mbm_linkHooks { context disconnect connect }
             mbm_turn { master lastUse }
+            mbm_planUnitLimits { bitsPerRead registersPerRead unit }
+            mbm_planExcludedRange { first last unit table }
+            mbm_planReadInfo { intervalMs address quantity unit table status }
+            mbm_planSetup { fields positions reads data requests units excluded update context
+                backoffMs longestBackoffMs fieldCount readCount dataWords bitsPerRead bitGap
+                registersPerRead registerGap requestCount unitCount excludedCount }
             mbm_rule { kind bytes more }
             mbm_function { code request response }
             mbm_length { bytes kind }
@@ -109,7 +116,12 @@ fn probes() -> Vec<(String, u64)> {
             MBM_REPLY_EXCEPTION MBM_REPLY_NONE MBM_REPLY_PENDING MBM_EVENT_REQUEST MBM_EVENT_REPLY MBM_EVENT_EXCEPTION
             MBM_EVENT_UNPAIRED MBM_EVENT_TIMEOUT MBM_EVENT_BAD_CRC MBM_EVENT_NOISE MBM_DIRECTION_BOTH
             MBM_DIRECTION_CLIENT MBM_DIRECTION_SERVER MBM_MIN_SNIFFER_BUFFER MBM_MAX_SNIFFER_FUNCTIONS
-            MBM_MAX_SERVICES;
+            MBM_MAX_SERVICES MBM_FIELDS_OVERLAP MBM_TABLE_COILS MBM_TABLE_DISCRETE_INPUTS
+            MBM_TABLE_HOLDING_REGISTERS MBM_TABLE_INPUT_REGISTERS MBM_TYPE_BIT MBM_TYPE_UINT16
+            MBM_TYPE_INT16 MBM_TYPE_UINT32 MBM_TYPE_INT32 MBM_TYPE_UINT64 MBM_TYPE_INT64
+            MBM_TYPE_FLOAT MBM_TYPE_DOUBLE MBM_TYPE_TEXT MBM_PLAN_LONGEST_INTERVAL
+            MBM_PLAN_MAX_FIELDS;
+
     }
 }
 

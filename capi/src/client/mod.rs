@@ -13,8 +13,10 @@ mod storage;
 pub use begin::*;
 pub use link::*;
 pub use object::mbm_client;
+pub(crate) use poll::clock;
 pub use poll::*;
 pub use request::mbm_clientRequest;
+pub(crate) use requests::read_table;
 pub use requests::*;
 pub use settings::*;
 

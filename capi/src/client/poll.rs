@@ -18,6 +18,15 @@ unsafe fn now(object: *mut Object) -> u32 {
     unsafe { port::now((*(*object).kind).port(object)) }
 }
 
+/// The time on the clock of a client's port, in microseconds.
+///
+/// # Safety
+/// [`pointers::check`] found a client; no reference into it lives.
+pub(crate) unsafe fn clock(client: *mut mbm_client) -> u32 {
+    // SAFETY: as the caller promises.
+    unsafe { pointers::with_hooks(client, || now(pointers::object(client))) }
+}
+
 /// Sends and receives for all requests, without waiting, and calls `done` of those that have
 /// ended, of at most 17 in one call.
 ///

@@ -2,6 +2,7 @@
 //! as far as a first reply.
 
 use super::check::call;
+use super::plan;
 use super::ports;
 use super::records;
 use super::sniffer;
@@ -16,6 +17,10 @@ pub fn prepare(w: &World) {
     }
     if what & 2 == 0 {
         client(w, what >> 4);
+    }
+    if what & 3 == 0 && what >= 0x80 {
+        let (plan, client) = (w.plans.make(w), w.clients.any());
+        plan::begin(w, plan, client);
     }
     if what & 4 == 0 {
         server(w, what >> 6);

@@ -49,6 +49,7 @@ pub struct World {
     pub masters: Pool<mbm_master>,
     turn: Cell<*mut mbm_turn>,
     pub clients: Pool<mbm_client>,
+    pub plans: Pool<mbm_plan>,
     /// Clients whose port a master uses, or used when it was copied.
     pub lenders: RefCell<Vec<*mut mbm_client>>,
     pub requests: Pool<mbm_clientRequest>,
@@ -90,6 +91,7 @@ impl World {
             masters: Pool::new(),
             turn: Cell::new(std::ptr::null_mut()),
             clients: Pool::new(),
+            plans: Pool::new(),
             lenders: RefCell::default(),
             requests: Pool::new(),
             servers: Pool::new(),

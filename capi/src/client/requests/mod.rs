@@ -177,6 +177,27 @@ unsafe extern "C" fn two_words(
     unsafe { queue_request(client, request, &Arguments { function, words }, None) }
 }
 
+/// Queues a read of a table of the data model, by the number of its function, 01 to 04.
+///
+/// # Safety
+/// As the header demands of mbm_client_readCoils.
+pub(crate) unsafe fn read_table(
+    client: *mut mbm_client,
+    request: *mut mbm_clientRequest,
+    function: u8,
+    address: u16,
+    quantity: u16,
+) -> u8 {
+    let function = match function {
+        1 => FunctionSpec::READ_COILS,
+        2 => FunctionSpec::READ_DISCRETE_INPUTS,
+        3 => FunctionSpec::READ_HOLDING_REGISTERS,
+        _ => FunctionSpec::READ_INPUT_REGISTERS,
+    };
+    // SAFETY: as the caller promises.
+    unsafe { two_words(client, request, address, quantity, function) }
+}
+
 /// Queues a request that consists of its function code only.
 ///
 /// # Safety

@@ -1,0 +1,409 @@
+/* The values of a plan in every type and order, its reads, and what it refuses. */
+#include "plan_device.h"
+#include "test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "refused.h"
+
+enum { HOLDING = MBM_TABLE_HOLDING_REGISTERS, COILS = MBM_TABLE_COILS };
+
+static plan_device d;
+
+static int rtu(void **state)
+{
+    (void)state;
+    plan_device_begin(&d, 0);
+    return 0;
+}
+
+static mbm_planField *add(uint8_t type, uint16_t address)
+{
+    return plan_device_add(&d, 1, type == MBM_TYPE_BIT ? COILS : HOLDING, type, address, 1000);
+}
+
+static void read_all(void)
+{
+    plan_device_start(&d);
+    plan_device_run(&d, 200);
+}
+
+/* Registers of a number, the most significant first, as a device with `order` has them. */
+static void put(uint16_t address, uint64_t number, unsigned registers, uint8_t order)
+{
+    unsigned i;
+
+    for (i = 0; i < registers; i++) {
+        unsigned at = order == MBM_ORDER_CDAB || order == MBM_ORDER_DCBA ? i : registers - 1 - i;
+        uint16_t word = (uint16_t)(number >> (16 * i));
+
+        if (order == MBM_ORDER_BADC || order == MBM_ORDER_DCBA)
+            word = (uint16_t)(word << 8 | word >> 8);
+        d.registers[address + at] = word;
+    }
+}
+
+static void integers_have_their_sign_in_every_order(void **state)
+{
+    static const struct {
+        uint8_t type;
+        unsigned registers;
+        uint64_t bits;
+        int64_t value;
+    } numbers[] = {
+        {MBM_TYPE_UINT16, 1, 0xFFFE, 0xFFFE},
+        {MBM_TYPE_INT16, 1, 0xFFFE, -2},
+        {MBM_TYPE_UINT32, 2, 0xAE415652, 2923517522},
+        {MBM_TYPE_INT32, 2, 0xAE415652, -1371449774},
+        {MBM_TYPE_UINT64, 4, 0x0123456789ABCDEF, 0x0123456789ABCDEF},
+        {MBM_TYPE_INT64, 4, 0xFFFFFFFFFFFFFFFE, -2},
+        {MBM_TYPE_INT64, 4, 0x8000000000000001, -INT64_MAX},
+    };
+    uint8_t order;
+    unsigned i;
+
+    (void)state;
+    for (order = MBM_ORDER_DEFAULT; order <= MBM_ORDER_DCBA; order++) {
+        plan_device_begin(&d, 0);
+        for (i = 0; i < COUNT(numbers); i++) {
+            add(numbers[i].type, (uint16_t)(10 * i))->order = order;
+            put((uint16_t)(10 * i), numbers[i].bits, numbers[i].registers, order);
+        }
+        d.setup.registerGap = 10;
+        read_all();
+        assert_int_equal(d.requested, 1);
+        for (i = 0; i < COUNT(numbers); i++)
+            assert_true(plan_device_integer(&d, (uint16_t)i, 0) == numbers[i].value);
+    }
+}
+
+static void floats_and_doubles_are_numbers_too(void **state)
+{
+    const float pi = 3.14159274f;
+    const double e = 2.718281828459045;
+    uint32_t pi_bits;
+    uint64_t e_bits;
+    uint8_t order;
+
+    (void)state;
+    memcpy(&pi_bits, &pi, sizeof pi);
+    memcpy(&e_bits, &e, sizeof e);
+    for (order = MBM_ORDER_ABCD; order <= MBM_ORDER_DCBA; order++) {
+        float single = 0;
+        double wide = 0;
+        int64_t none = 77;
+
+        plan_device_begin(&d, 0);
+        add(MBM_TYPE_FLOAT, 10)->order = order;
+        add(MBM_TYPE_DOUBLE, 20)->order = order;
+        add(MBM_TYPE_INT16, 30);
+        put(10, pi_bits, 2, order);
+        put(20, e_bits, 4, order);
+        put(30, 0xFFFD, 1, MBM_ORDER_ABCD);
+        d.setup.registerGap = 10;
+        read_all();
+        OK(mbm_plan_getFloat(&d.plan, 0, 0, &single));
+        assert_true(memcmp(&single, &pi, sizeof pi) == 0);
+        OK(mbm_plan_getDouble(&d.plan, 0, 0, &wide));
+        assert_true(wide == (double)pi);
+        OK(mbm_plan_getDouble(&d.plan, 1, 0, &wide));
+        assert_true(memcmp(&wide, &e, sizeof e) == 0);
+        OK(mbm_plan_getFloat(&d.plan, 1, 0, &single));
+        assert_true(single == (float)e);
+        IS(MBM_INVALID_ARGUMENT, mbm_plan_getFloat(&d.plan, 2, 0, &single));
+        IS(MBM_INVALID_ARGUMENT, mbm_plan_getDouble(&d.plan, 2, 0, &wide));
+        IS(MBM_INVALID_ARGUMENT, mbm_plan_getInteger(&d.plan, 0, 0, &none));
+        IS(MBM_INVALID_ARGUMENT, mbm_plan_getInteger(&d.plan, 1, 0, &none));
+        assert_int_equal(none, 77);
+    }
+}
+
+static void a_number_is_scaled_and_rounded_to_the_nearest(void **state)
+{
+    static const struct {
+        uint16_t bits;
+        int32_t multiplier, divisor;
+        int64_t value;
+    } scales[] = {
+        {2301, 1, 10, 230},   {2305, 1, 10, 231},
+        {0xFFFB, 1, 10, -1}, /* -0.5 */
+        {0xFFFC, 1, 10, 0},   {7, -3, 2, -11},
+        {0xFFF9, -3, 2, 11},  {1000, 0, 0, 1000},
+        {1000, 0, 3, 333},    {1000, 100000, 0, 100000000},
+        {5, 1, INT32_MAX, 0}, {30000, INT32_MIN, 1, -64424509440000},
+    };
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(scales); i++) {
+        mbm_planField *field = add(MBM_TYPE_INT16, (uint16_t)i);
+
+        field->multiplier = scales[i].multiplier;
+        field->divisor = scales[i].divisor;
+        put((uint16_t)i, scales[i].bits, 1, MBM_ORDER_ABCD);
+    }
+    read_all();
+    for (i = 0; i < COUNT(scales); i++)
+        assert_true(plan_device_integer(&d, (uint16_t)i, 0) == scales[i].value);
+}
+
+static void a_number_beyond_64_bits_is_too_large(void **state)
+{
+    int64_t value = 77;
+
+    (void)state;
+    add(MBM_TYPE_UINT64, 0);
+    add(MBM_TYPE_INT64, 4)->multiplier = 3;
+    add(MBM_TYPE_UINT64, 8)->divisor = 2;
+    put(0, UINT64_MAX, 4, MBM_ORDER_ABCD);
+    put(4, INT64_MAX, 4, MBM_ORDER_ABCD);
+    put(8, UINT64_MAX - 1, 4, MBM_ORDER_ABCD);
+    read_all();
+    IS(MBM_BUFFER_TOO_SMALL, mbm_plan_getInteger(&d.plan, 0, 0, &value));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_plan_getInteger(&d.plan, 1, 0, &value));
+    assert_int_equal(value, 77);
+    OK(mbm_plan_getInteger(&d.plan, 2, 0, &value));
+    assert_true(value == INT64_MAX);
+}
+
+static void a_field_may_have_many_values(void **state)
+{
+    unsigned i;
+    int64_t value = 77;
+
+    (void)state;
+    add(MBM_TYPE_UINT32, 0)->count = 5;
+    add(MBM_TYPE_BIT, 3)->count = 30;
+    for (i = 0; i < 5; i++)
+        put((uint16_t)(2 * i), 100000u * i, 2, MBM_ORDER_ABCD);
+    read_all();
+    for (i = 0; i < 5; i++)
+        assert_int_equal(plan_device_integer(&d, 0, (uint16_t)i), 100000 * i);
+    for (i = 0; i < 30; i++)
+        assert_int_equal(plan_device_integer(&d, 1, (uint16_t)i), d.registers[3 + i] & 1);
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_getInteger(&d.plan, 0, 5, &value));
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_getInteger(&d.plan, 1, 30, &value));
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_getInteger(&d.plan, 2, 0, &value));
+    assert_int_equal(value, 77);
+}
+
+static void a_text_ends_at_its_nul_or_with_its_field(void **state)
+{
+    char text[8] = "unset";
+
+    (void)state;
+    add(MBM_TYPE_TEXT, 0)->count = 5;
+    add(MBM_TYPE_TEXT, 3)->count = 6;
+    d.fields[1].order = MBM_ORDER_BADC;
+    put(0, 0x4D6574657221, 3, MBM_ORDER_ABCD); /* "Meter!" */
+    put(3, 0x656B5700, 2, MBM_ORDER_ABCD);     /* "ek", "W" and NUL */
+    read_all();
+    IS(MBM_BUFFER_TOO_SMALL, mbm_plan_getText(&d.plan, 0, text, 5));
+    assert_string_equal(text, "unset");
+    OK(mbm_plan_getText(&d.plan, 0, text, 6));
+    assert_string_equal(text, "Meter");
+    OK(mbm_plan_getText(&d.plan, 1, text, sizeof text));
+    assert_string_equal(text, "ke");
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_getText(&d.plan, 0, NULL, 6));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_plan_getText(&d.plan, 0, text, 0));
+    {
+        float number = 0;
+
+        IS(MBM_INVALID_ARGUMENT, mbm_plan_getFloat(&d.plan, 0, 0, &number));
+    }
+}
+
+static void the_registers_of_a_field_are_a_view(void **state)
+{
+    mbm_registers view;
+    uint32_t value = 0;
+
+    (void)state;
+    add(MBM_TYPE_UINT16, 10);
+    add(MBM_TYPE_UINT32, 12)->order = MBM_ORDER_CDAB;
+    add(MBM_TYPE_BIT, 3);
+    put(12, 123456789, 2, MBM_ORDER_CDAB);
+    d.setup.registerGap = 1;
+    read_all();
+    OK(mbm_plan_getRegisters(&d.plan, 1, &view));
+    assert_int_equal(view.first, 12);
+    assert_int_equal(view.count, 2);
+    OK(mbm_registers_getUint32(&view, 12, MBM_ORDER_DEFAULT, &value));
+    assert_int_equal(value, 123456789);
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_getRegisters(&d.plan, 2, &view));
+}
+
+static void the_reads_can_be_looked_at(void **state)
+{
+    mbm_planReadInfo read;
+
+    (void)state;
+    add(MBM_TYPE_UINT16, 50);
+    add(MBM_TYPE_UINT16, 10);
+    add(MBM_TYPE_UINT16, 11);
+    plan_device_start(&d);
+    OK(mbm_plan_getRead(&d.plan, 0, &read));
+    assert_int_equal(read.unit, 1);
+    assert_int_equal(read.table, HOLDING);
+    assert_int_equal(read.address, 10);
+    assert_int_equal(read.quantity, 2);
+    assert_int_equal(read.intervalMs, 1000);
+    IS(MBM_PENDING, read.status);
+    OK(mbm_plan_getRead(&d.plan, 1, &read));
+    assert_int_equal(read.address, 50);
+    plan_device_run(&d, 200);
+    OK(mbm_plan_getRead(&d.plan, 1, &read));
+    IS(MBM_OK, read.status);
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_getRead(&d.plan, 2, &read));
+    assert_int_equal(read.address, 50);
+}
+
+/* A begin that is refused with a status because of a field. */
+static void refuses(uint8_t status, uint16_t wrong)
+{
+    uint16_t field = 77;
+
+    REFUSED(status, d.plan, plan_device_try(&d, &field));
+    assert_int_equal(field, wrong);
+    REFUSED(status, d.plan, plan_device_try(&d, NULL));
+    IS(MBM_NOT_INITIALISED, mbm_plan_poll(&d.plan));
+}
+
+static void a_wrong_field_is_named(void **state)
+{
+    mbm_planField *field;
+
+    (void)state;
+    add(MBM_TYPE_UINT16, 0);
+    field = add(MBM_TYPE_UINT32, 20);
+    field->type = 99;
+    refuses(MBM_INVALID_ARGUMENT, 1);
+    field->type = MBM_TYPE_UINT32;
+    field->table = 5;
+    refuses(MBM_INVALID_ARGUMENT, 1);
+    field->table = HOLDING;
+    field->address = 0xFFFF;
+    refuses(MBM_ILLEGAL_DATA_ADDRESS, 1);
+    field->address = 20;
+    field->unit = 0;
+    refuses(MBM_BROADCAST_NOT_ALLOWED, 1);
+    field->unit = 1;
+    field->count = 63;
+    refuses(MBM_ILLEGAL_DATA_VALUE, 1);
+    field->count = 1;
+    d.fields[0].address = 21;
+    refuses(MBM_FIELDS_OVERLAP, 1);
+    d.fields[0].address = 0;
+    d.setup.readCount = 1;
+    refuses(MBM_BUFFER_TOO_SMALL, 1);
+    d.setup.readCount = 2;
+    d.setup.dataWords = 2;
+    refuses(MBM_BUFFER_TOO_SMALL, 1);
+    d.setup.dataWords = 3;
+    plan_device_start(&d);
+}
+
+static void a_setup_that_is_not_complete_is_refused(void **state)
+{
+    const mbm_planSetup whole = d.setup;
+    unsigned i;
+
+    (void)state;
+    add(MBM_TYPE_UINT16, 0);
+    for (i = 0; i < 12; i++) {
+        uint16_t count = d.setup.fieldCount;
+
+        d.setup = whole;
+        d.setup.fieldCount = count;
+        switch (i) {
+        case 0: d.setup.fields = NULL; break;
+        case 1: d.setup.positions = NULL; break;
+        case 2: d.setup.reads = NULL; break;
+        case 3: d.setup.data = NULL; break;
+        case 4: d.setup.requests = NULL; break;
+        case 5: d.setup.requestCount = 0; break;
+        case 6: d.setup.requestCount = 17; break;
+        case 7: d.setup.unitCount = 1; break;
+        case 8: d.setup.excludedCount = 1; break;
+        case 9: d.setup.fieldCount = 0; break;
+        case 10: d.setup.fieldCount = MBM_PLAN_MAX_FIELDS + 1; break;
+        default: break;
+        }
+        if (i < 11)
+            refuses(MBM_INVALID_ARGUMENT, 0xFFFF);
+        d.setup.fieldCount = count;
+    }
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_begin(NULL, &d.client, &d.setup, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_begin(&d.plan, NULL, &d.setup, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_begin(&d.plan, &d.client, NULL, NULL));
+    memset(&d.client, 0, sizeof d.client);
+    refuses(MBM_NOT_INITIALISED, 0xFFFF);
+}
+
+static void what_was_never_begun_is_refused(void **state)
+{
+    static mbm_plan plan;
+    mbm_registers view = {0};
+    mbm_planReadInfo read = {0};
+    int64_t integer = 7;
+    float single = 7;
+    double wide = 7;
+    uint32_t age = 7;
+    char text[4] = "abc";
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < 2; i++) {
+        mbm_plan *object = i ? &plan : NULL;
+        uint8_t status = i ? MBM_NOT_INITIALISED : MBM_INVALID_ARGUMENT;
+
+        IS(status, mbm_plan_poll(object));
+        IS(status, mbm_plan_end(object));
+        IS(status, mbm_plan_getStatus(object, 0, &age));
+        IS(status, mbm_plan_getInteger(object, 0, 0, &integer));
+        IS(status, mbm_plan_getFloat(object, 0, 0, &single));
+        IS(status, mbm_plan_getDouble(object, 0, 0, &wide));
+        IS(status, mbm_plan_getText(object, 0, text, sizeof text));
+        IS(status, mbm_plan_getRegisters(object, 0, &view));
+        IS(status, mbm_plan_getRead(object, 0, &read));
+        IS(status, mbm_plan_refresh(object, 0));
+        assert_int_equal(mbm_plan_pollDelay(object), UINT32_MAX);
+    }
+    assert_true(integer == 7 && single == 7 && wide == 7 && age == 7);
+    assert_string_equal(text, "abc");
+}
+
+static void a_plan_is_begun_once(void **state)
+{
+    uint16_t field = 0;
+
+    (void)state;
+    add(MBM_TYPE_UINT16, 0);
+    plan_device_start(&d);
+    REFUSED(MBM_BUSY, d.plan, plan_device_try(&d, &field));
+    plan_device_run(&d, 200);
+    assert_int_equal(plan_device_integer(&d, 0, 0), d.registers[0]);
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_refresh(&d.plan, 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_getStatus(&d.plan, 1, NULL));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(integers_have_their_sign_in_every_order),
+        cmocka_unit_test(floats_and_doubles_are_numbers_too),
+        cmocka_unit_test_setup(a_number_is_scaled_and_rounded_to_the_nearest, rtu),
+        cmocka_unit_test_setup(a_number_beyond_64_bits_is_too_large, rtu),
+        cmocka_unit_test_setup(a_field_may_have_many_values, rtu),
+        cmocka_unit_test_setup(a_text_ends_at_its_nul_or_with_its_field, rtu),
+        cmocka_unit_test_setup(the_registers_of_a_field_are_a_view, rtu),
+        cmocka_unit_test_setup(the_reads_can_be_looked_at, rtu),
+        cmocka_unit_test_setup(a_wrong_field_is_named, rtu),
+        cmocka_unit_test_setup(a_setup_that_is_not_complete_is_refused, rtu),
+        cmocka_unit_test(what_was_never_begun_is_refused),
+        cmocka_unit_test_setup(a_plan_is_begun_once, rtu),
+    };
+
+    return cmocka_run_group_tests_name("plan values", tests, NULL, NULL);
+}

@@ -1,0 +1,118 @@
+//! Beginning and ending a plan.
+
+use super::object::{reads, setup};
+use super::setup::mbm_planSetup;
+use super::storage::mbm_plan;
+use crate::client::{self, mbm_client, mbm_client_cancel};
+use crate::pointers;
+use mbm::error::Status;
+use mbm::plan::{group, schedule, NO_SLOT};
+
+/// Groups the fields of a table into reads. mbm_plan_poll sends them from then on.
+///
+/// Fields with the same unit, table and interval are read together. Of all ways to cover them
+/// within the limits, the plan takes one with the fewest reads, and of these one with the fewest
+/// bits or registers. All reads are due at once; the rounds after the first are spread, so that
+/// reads of one interval follow each other at equal distances.
+///
+/// @param plan    the object, zeroed
+/// @param client  the client that sends the reads, begun; the program may use it too, and other
+///                plans
+/// @param setup   table, limits and storage; it stays valid and as it is until mbm_plan_end
+/// @param field   gets the index of the field that is wrong, 0xFFFF if it is none; may be NULL
+/// @return MBM_OK; MBM_BUSY if it was begun already; of a field MBM_INVALID_ARGUMENT for an
+///         unknown table, type or order, a type that the table does not have, an interval out
+///         of range, a negative divisor or a scale of what is no integer, MBM_BROADCAST_NOT_ALLOWED for unit 0,
+///         MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address 65535 or into an excluded range,
+///         MBM_ILLEGAL_DATA_VALUE if it is longer than a read may be, MBM_FIELDS_OVERLAP for
+///         the later of two that share an address, MBM_BUFFER_TOO_SMALL for the first without
+///         storage for its read or its data; MBM_INVALID_ARGUMENT also for NULL pointers and
+///         counts out of range; MBM_NOT_INITIALISED for a client that was never begun. The
+///         object is changed on MBM_OK only; `positions` and `reads` may be changed always
+#[no_mangle]
+pub unsafe extern "C" fn mbm_plan_begin(
+    plan: *mut mbm_plan,
+    client: *mut mbm_client,
+    setup: *const mbm_planSetup,
+    field: *mut u16,
+) -> u8 {
+    // SAFETY: as the header demands: each is NULL or what it says.
+    unsafe {
+        let mut wrong = u16::MAX;
+        let status = begin(plan, client, setup, &mut wrong);
+        pointers::put(field, wrong);
+        status.code()
+    }
+}
+
+/// # Safety
+/// As the header demands of mbm_plan_begin.
+unsafe fn begin(
+    plan: *mut mbm_plan,
+    client: *mut mbm_client,
+    setup: *const mbm_planSetup,
+    wrong: &mut u16,
+) -> Status {
+    // SAFETY: as the caller promises. Nothing uses the storage of a plan that is not begun.
+    unsafe {
+        match pointers::check(plan) {
+            Status::NOT_INITIALISED => {}
+            Status::INVALID_ARGUMENT => return Status::INVALID_ARGUMENT,
+            _ => return Status::BUSY,
+        }
+        let usable = pointers::check(client);
+        if usable != Status::OK {
+            return usable;
+        }
+        let Some(given) = setup.as_ref().filter(|setup| setup.is_complete()) else {
+            return Status::INVALID_ARGUMENT;
+        };
+        let (fields, positions) = (given.fields(), given.positions());
+        let reads = given.reads(u16::MAX);
+        let count = match group::group(fields, &given.limits(), positions, reads, given.dataWords) {
+            Ok(count) => count as u16,
+            Err(refusal) => {
+                *wrong = refusal.field as u16;
+                return refusal.status;
+            }
+        };
+        schedule::start(given.reads(count), 0);
+        let object = pointers::object(plan);
+        (*object).read_count = count;
+        (*object).setup = setup;
+        (*object).client = client;
+        (*object).rest = 0;
+        (*object).millis = 0;
+        (*object).micros = client::clock(client);
+        (*object).mark = pointers::BEGUN;
+        Status::OK
+    }
+}
+
+/// Ends a plan: gives its requests up and lets go of its storage. To begin it again, call
+/// mbm_plan_begin.
+///
+/// @param plan  the object
+/// @return MBM_OK; MBM_BUSY from within a hook of the client's port, with nothing changed;
+///         MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_plan_end(plan: *mut mbm_plan) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        pointers::with(plan, |object| {
+            let client = (*object).client;
+            if pointers::check(client) == Status::BUSY {
+                return Status::BUSY;
+            }
+            for index in 0..reads(object).len() {
+                let read = reads(object).get_mut(index);
+                let slot = read.map_or(NO_SLOT, |read| core::mem::replace(&mut read.slot, NO_SLOT));
+                if slot < setup(object).requestCount {
+                    mbm_client_cancel(client, setup(object).requests.add(slot.into()));
+                }
+            }
+            (*object).mark = 0;
+            Status::OK
+        })
+    }
+}

@@ -1,0 +1,91 @@
+//! What lies behind a plan of C, and its clock.
+
+use super::setup::mbm_planSetup;
+use super::storage::mbm_plan;
+use crate::client::{self, mbm_client};
+use crate::pointers::{self, CObject};
+use mbm::error::Status;
+use mbm::plan::Read;
+
+/// What lies behind an `mbm_plan`.
+#[repr(C)]
+pub struct Object {
+    pub(super) mark: u8,
+    pub(super) read_count: u16,
+    pub(super) setup: *const mbm_planSetup,
+    pub(super) client: *mut mbm_client,
+    /// The clock of the port when it was last read, in microseconds.
+    pub(super) micros: u32,
+    /// Microseconds that are not yet in `millis`.
+    pub(super) rest: u32,
+    /// The plan's own time in milliseconds.
+    pub(super) millis: u32,
+}
+
+const _: () = {
+    assert!(align_of::<mbm_plan>() >= align_of::<Object>());
+    assert!(size_of::<Object>() <= size_of::<mbm_plan>());
+};
+
+// SAFETY: the mark is a field of its own.
+unsafe impl CObject for mbm_plan {
+    // `update` runs while the plan is in use and may call its functions: no reference covers
+    // the object then.
+    type Access<'a> = *mut Object;
+
+    unsafe fn mark(plan: *const mbm_plan) -> *mut u8 {
+        // SAFETY: as the caller promises; every object is writable storage.
+        unsafe { &raw mut (*plan.cast::<Object>().cast_mut()).mark }
+    }
+
+    unsafe fn access<'a>(plan: *mut mbm_plan) -> Self::Access<'a> {
+        plan.cast()
+    }
+}
+
+/// The setup of a plan.
+///
+/// # Safety
+/// `object` is begun.
+pub(super) unsafe fn setup<'a>(object: *mut Object) -> &'a mbm_planSetup {
+    // SAFETY: as mbm_plan_begin demands, it stays valid and as it is.
+    unsafe { &*(*object).setup }
+}
+
+/// The reads of a plan.
+///
+/// # Safety
+/// `object` is begun, and nothing else uses its reads while the result lives.
+pub(super) unsafe fn reads<'a>(object: *mut Object) -> &'a mut [Read] {
+    // SAFETY: as the caller promises.
+    unsafe { setup(object).reads((*object).read_count) }
+}
+
+/// Brings the plan's time up to date and returns it, in milliseconds; as it was if the client
+/// may not be used now.
+///
+/// # Safety
+/// `object` is begun, and no reference into it or its client lives.
+#[cfg_attr(target_os = "none", inline(never))]
+pub(super) unsafe fn time(object: *mut Object) -> u32 {
+    // SAFETY: as the caller promises.
+    unsafe {
+        if pointers::check((*object).client) == Status::OK {
+            let micros = client::clock((*object).client);
+            let passed = mbm::time::elapsed(micros, (*object).micros);
+            if passed > 0 {
+                (*object).micros = micros;
+                let mut rest = (*object).rest.saturating_add(passed);
+                // Without a division, which a Cortex-M0+ lacks.
+                for shift in [20, 15, 10, 5, 0] {
+                    while rest >= 1000 << shift {
+                        rest -= 1000 << shift;
+                        (*object).millis = (*object).millis.wrapping_add(1 << shift);
+                    }
+                }
+                (*object).rest = rest;
+            }
+        }
+        (*object).millis
+    }
+}

@@ -1,0 +1,202 @@
+//! What C hands to a plan: its table, its limits and its storage.
+
+use super::storage::mbm_plan;
+use crate::client::mbm_clientRequest;
+use crate::pointers;
+use core::ffi::c_void;
+use core::mem::offset_of;
+use mbm::plan::schedule::Backoff;
+use mbm::plan::{ExcludedRange, Field, Limits, Position, Read, UnitLimits};
+
+/// A field of a plan: a value, or several of one type in a row, that a program wants from a
+/// unit again and again. A table of them may be constant.
+#[repr(C)]
+pub struct mbm_planField {
+    /// The unit, 1 to 255.
+    pub unit: u8,
+    /// One of MBM_TABLE_...
+    pub table: u8,
+    /// One of MBM_TYPE_...: MBM_TYPE_BIT for coils and discrete inputs, another for registers.
+    pub r#type: u8,
+    /// One of MBM_ORDER_...; MBM_ORDER_DEFAULT is MBM_ORDER_ABCD.
+    pub order: u8,
+    /// The first bit or register, 0 to 65535, as on the wire.
+    pub address: u16,
+    /// The number of values; of a text the number of characters. 0 means 1.
+    pub count: u16,
+    /// The time from one read to the next in milliseconds, 1 to MBM_PLAN_LONGEST_INTERVAL.
+    pub intervalMs: u32,
+    /// mbm_plan_getInteger multiplies by this; 0 means 1. Only integers have a scale.
+    pub multiplier: i32,
+    /// It divides by this after that; 0 means 1. Not negative.
+    pub divisor: i32,
+}
+
+/// How much one read of a unit may request, if not as much as the plan's other reads.
+#[repr(C)]
+pub struct mbm_planUnitLimits {
+    /// Bits, 1 to 2000; 0 means as `bitsPerRead` of the plan.
+    pub bitsPerRead: u16,
+    /// Registers, 1 to 125; 0 means as `registersPerRead` of the plan.
+    pub registersPerRead: u8,
+    /// The unit.
+    pub unit: u8,
+}
+
+/// Addresses that no read of a plan may touch.
+#[repr(C)]
+pub struct mbm_planExcludedRange {
+    /// The first address.
+    pub first: u16,
+    /// The last address, not less than `first`.
+    pub last: u16,
+    /// The unit; 0 for every unit.
+    pub unit: u8,
+    /// One of MBM_TABLE_...
+    pub table: u8,
+}
+
+/// Storage of a plan, one for each field.
+#[repr(C)]
+pub struct mbm_planPosition {
+    /// Private.
+    words: [u32; 2],
+}
+
+/// Storage of a plan, one for each read.
+#[repr(C)]
+pub struct mbm_planRead {
+    /// Private.
+    words: [u32; 8],
+}
+
+/// What a plan is made of. It may be constant. It stays valid and as it is, with everything
+/// that it points to, for as long as the plan is used.
+#[repr(C)]
+pub struct mbm_planSetup {
+    /// The fields, in any order.
+    pub fields: *const mbm_planField,
+    /// Storage: as many as fields.
+    pub positions: *mut mbm_planPosition,
+    /// Storage: as many as reads; there are never more reads than fields.
+    pub reads: *mut mbm_planRead,
+    /// Storage: the registers of all reads and the bits of all reads, 16 to a word.
+    pub data: *mut u16,
+    /// Storage: the requests with which the plan reads, zeroed. With one it sends one read after
+    /// the other; more are for Modbus TCP, where several may be under way at once.
+    pub requests: *mut mbm_clientRequest,
+    /// Units with limits of their own; NULL for none.
+    pub units: *const mbm_planUnitLimits,
+    /// Addresses that no read may touch; NULL for none.
+    pub excluded: *const mbm_planExcludedRange,
+    /// Optional: called by mbm_client_poll, or mbm_plan_poll, for each field of a read that has
+    /// ended, and for each field of a unit that the plan takes for silent. It may call every
+    /// function on the plan, and on the client what a `done` function may call.
+    pub update: Option<unsafe extern "C" fn(context: *mut c_void, plan: *mut mbm_plan, field: u16)>,
+    /// Handed to `update`. Yours, may be NULL.
+    pub context: *mut c_void,
+    /// How long the plan leaves a unit alone after a first request without an answer, in
+    /// milliseconds; each further one doubles it. 0 means 1000.
+    pub backoffMs: u32,
+    /// The longest such time in milliseconds; 0 means 60000.
+    pub longestBackoffMs: u32,
+    /// How many fields, 1 to MBM_PLAN_MAX_FIELDS.
+    pub fieldCount: u16,
+    /// How many reads there is storage for.
+    pub readCount: u16,
+    /// How many words there are in `data`.
+    pub dataWords: u16,
+    /// The most bits that one read requests, 1 to 2000; 0 means 2000.
+    pub bitsPerRead: u16,
+    /// The most bits between two fields that one read may cover as well.
+    pub bitGap: u16,
+    /// The most registers that one read requests, 1 to 125; 0 means 125.
+    pub registersPerRead: u8,
+    /// The most registers between two fields that one read may cover as well.
+    pub registerGap: u8,
+    /// How many requests, 1 to 16.
+    pub requestCount: u8,
+    /// How many units with limits of their own.
+    pub unitCount: u8,
+    /// How many excluded ranges.
+    pub excludedCount: u8,
+}
+
+const _: () = {
+    assert!(size_of::<mbm_planField>() == size_of::<Field>());
+    assert!(align_of::<mbm_planField>() == align_of::<Field>());
+    assert!(offset_of!(mbm_planField, r#type) == offset_of!(Field, value_type));
+    assert!(offset_of!(mbm_planField, address) == offset_of!(Field, address));
+    assert!(offset_of!(mbm_planField, count) == offset_of!(Field, count));
+    assert!(offset_of!(mbm_planField, intervalMs) == offset_of!(Field, interval_ms));
+    assert!(offset_of!(mbm_planField, multiplier) == offset_of!(Field, multiplier));
+    assert!(offset_of!(mbm_planField, divisor) == offset_of!(Field, divisor));
+    assert!(size_of::<mbm_planUnitLimits>() == size_of::<UnitLimits>());
+    assert!(offset_of!(mbm_planUnitLimits, unit) == offset_of!(UnitLimits, unit));
+    assert!(size_of::<mbm_planExcludedRange>() == size_of::<ExcludedRange>());
+    assert!(offset_of!(mbm_planExcludedRange, table) == offset_of!(ExcludedRange, table));
+    assert!(size_of::<mbm_planPosition>() == size_of::<Position>());
+    assert!(align_of::<mbm_planPosition>() >= align_of::<Position>());
+    assert!(size_of::<mbm_planRead>() == size_of::<Read>());
+    assert!(align_of::<mbm_planRead>() >= align_of::<Read>());
+};
+
+impl mbm_planSetup {
+    /// True if every pointer that must be there is, and the counts are in range.
+    pub(super) fn is_complete(&self) -> bool {
+        !self.fields.is_null()
+            && !self.positions.is_null()
+            && !self.reads.is_null()
+            && !self.data.is_null()
+            && !self.requests.is_null()
+            && self.requestCount.wrapping_sub(1) < crate::client::MBM_CLIENT_DEPTH
+            && (!self.units.is_null() || self.unitCount == 0)
+            && (!self.excluded.is_null() || self.excludedCount == 0)
+    }
+
+    pub(super) fn backoff(&self) -> Backoff {
+        let or = |value: u32, default| if value == 0 { default } else { value };
+        let longest = or(self.longestBackoffMs, 60_000);
+        Backoff {
+            first_ms: or(self.backoffMs, 1000),
+            longest_ms: longest.min(super::MBM_PLAN_LONGEST_INTERVAL),
+        }
+    }
+
+    // SAFETY, of all below: `self` was handed to mbm_plan_begin, whose comment demands arrays
+    // of these lengths; nothing else uses those of the storage while a result lives. The
+    // types of C and of the core have the same layout.
+
+    pub(super) unsafe fn fields<'a>(&self) -> &'a [Field] {
+        unsafe { pointers::array(self.fields.cast(), self.fieldCount.into()).unwrap_or(&[]) }
+    }
+
+    pub(super) unsafe fn positions<'a>(&self) -> &'a mut [Position] {
+        let positions = self.positions.cast();
+        unsafe { pointers::slice_mut(positions, self.fieldCount.into()).unwrap_or(&mut []) }
+    }
+
+    pub(super) unsafe fn reads<'a>(&self, count: u16) -> &'a mut [Read] {
+        let count = self.readCount.min(count);
+        unsafe { pointers::slice_mut(self.reads.cast(), count.into()).unwrap_or(&mut []) }
+    }
+
+    pub(super) unsafe fn data<'a>(&self) -> &'a [u16] {
+        unsafe { pointers::array(self.data, self.dataWords.into()).unwrap_or(&[]) }
+    }
+
+    pub(super) unsafe fn limits<'a>(&self) -> Limits<'a> {
+        unsafe {
+            let units = pointers::array(self.units.cast(), self.unitCount.into());
+            let excluded = pointers::array(self.excluded.cast(), self.excludedCount.into());
+            Limits {
+                bits: self.bitsPerRead,
+                registers: self.registersPerRead,
+                bit_gap: self.bitGap,
+                register_gap: self.registerGap,
+                units: units.unwrap_or(&[]),
+                excluded: excluded.unwrap_or(&[]),
+            }
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! The object that C calls a plan.
+
+use core::ffi::c_void;
+
+/// A plan: a table of fields that a client reads from units again and again.
+///
+/// Storage is yours and must be zero before first use, which a static object is.
+/// mbm_plan_begin comes first. Use it from the thread that uses its client, and never from an
+/// interrupt. It stays where it is until mbm_plan_end.
+#[repr(C)]
+pub struct mbm_plan {
+    /// Private.
+    pointers: [*mut c_void; 3],
+    /// Private.
+    words: [u32; 4],
+}

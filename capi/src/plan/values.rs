@@ -1,0 +1,340 @@
+//! The values of a plan, how old they are, and its reads.
+
+use super::object::{reads, setup, time};
+use super::storage::mbm_plan;
+use crate::pointers::{self, slice_mut};
+use crate::registers::{mbm_registers, MBM_REGISTERS_OF_WORDS};
+use core::ffi::c_char;
+use mbm::error::Status;
+use mbm::plan::value::Words;
+use mbm::plan::{schedule, Read};
+
+/// A read of a plan: one request that it repeats.
+#[repr(C)]
+pub struct mbm_planReadInfo {
+    /// The time from one read to the next, in milliseconds.
+    pub intervalMs: u32,
+    /// The first bit or register, as on the wire.
+    pub address: u16,
+    /// How many bits or registers.
+    pub quantity: u16,
+    /// The unit.
+    pub unit: u8,
+    /// One of MBM_TABLE_...
+    pub table: u8,
+    /// How it ended last; MBM_PENDING before it has ended once.
+    pub status: u8,
+}
+
+/// The index of the read that a field is in.
+///
+/// # Safety
+/// `plan` is NULL or storage of a plan.
+unsafe fn read_of(plan: *const mbm_plan, field: u16) -> Result<usize, Status> {
+    // SAFETY: as the caller promises.
+    unsafe {
+        match pointers::check(plan) {
+            Status::OK => {
+                let setup = setup(pointers::object(plan));
+                let position = setup.positions().get(usize::from(field));
+                Ok(position.ok_or(Status::INVALID_ARGUMENT)?.read())
+            }
+            refused => Err(refused),
+        }
+    }
+}
+
+/// Finds something in the words of a field and puts it where C wants it. Without a value it is
+/// refused with the status of the field.
+///
+/// # Safety
+/// As the header demands; `place` is NULL or points to a `T`.
+#[inline(always)]
+unsafe fn get<T>(
+    plan: *const mbm_plan,
+    field: u16,
+    place: *mut T,
+    find: impl FnOnce(&Words) -> Result<T, Status>,
+) -> u8 {
+    // SAFETY: as the caller promises.
+    let found = unsafe {
+        pointers::put_result(place, || {
+            let mut found = Words::NONE;
+            match words(plan, field, &mut found) {
+                Status::OK => find(&found),
+                refused => Err(refused),
+            }
+        })
+    };
+    found.err().unwrap_or(Status::OK).code()
+}
+
+/// Finds the words of a field that has a value.
+///
+/// # Safety
+/// As for [`read_of`]; nothing changes the data while `found` lives.
+#[cfg_attr(target_os = "none", inline(never))]
+unsafe fn words(plan: *const mbm_plan, field: u16, found: &mut Words) -> Status {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let index = match read_of(plan, field) {
+            Ok(index) => index,
+            Err(refused) => return refused,
+        };
+        let object = pointers::object(plan);
+        let read = reads(object).get(index).unwrap_or(&Read::NONE);
+        if !read.has_data() {
+            return read.status();
+        }
+        let setup = setup(object);
+        let words = setup.data().get(read.offset.into()..);
+        let words = words.and_then(|words| words.get(..read.words().into()));
+        if let (Some(words), Some(field)) = (words, setup.fields().get(usize::from(field))) {
+            found.words = words;
+            found.field = field;
+            found.before = field.address.wrapping_sub(read.address).into();
+            return Status::OK;
+        }
+        Status::INVALID_ARGUMENT
+    }
+}
+
+/// How the last read of a field ended, and how old its value is. The functions that get a value
+/// return the last one that was read, also after a read has failed: this says whether it is
+/// still worth something.
+///
+/// @param plan   the object
+/// @param field  the index of the field
+/// @param ageMs  gets the milliseconds since the value arrived, 2147483647 (24 days) at most;
+///               0xFFFFFFFF if none ever did; may be NULL
+/// @return MBM_PENDING before the first read has ended, then as it ended: MBM_OK, an exception
+///         of the device, or a failure such as MBM_RESPONSE_TIMED_OUT; MBM_INVALID_ARGUMENT
+///         for a field that is not there, or MBM_NOT_INITIALISED, with `ageMs` unchanged
+#[no_mangle]
+pub unsafe extern "C" fn mbm_plan_getStatus(
+    plan: *mut mbm_plan,
+    field: u16,
+    ageMs: *mut u32,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        let index = match read_of(plan, field) {
+            Ok(index) => index,
+            Err(refused) => return refused.code(),
+        };
+        let object = pointers::object(plan);
+        let now = time(object);
+        let Some(read) = reads(object).get(index) else {
+            return Status::INVALID_ARGUMENT.code();
+        };
+        pointers::put(
+            ageMs,
+            if read.has_data() {
+                read.age(now)
+            } else {
+                u32::MAX
+            },
+        );
+        read.status().code()
+    }
+}
+
+/// A value as an integer: multiplied and divided as its field says, rounded to the nearest,
+/// halves away from 0.
+///
+/// @param plan   the object
+/// @param field  the index of the field, of a bit or an integer
+/// @param index  which of its values, 0 for the first
+/// @param value  gets the number
+/// @return MBM_OK; MBM_BUFFER_TOO_SMALL if it is not in the range of `value`;
+///         MBM_INVALID_ARGUMENT, also for a float or a text; MBM_NOT_INITIALISED; if no value
+///         has arrived yet the status that mbm_plan_getStatus returns. `value` changes on MBM_OK
+///         only
+#[no_mangle]
+pub unsafe extern "C" fn mbm_plan_getInteger(
+    plan: *const mbm_plan,
+    field: u16,
+    index: u16,
+    value: *mut i64,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe { get(plan, field, value, |words| words.integer(index)) }
+}
+
+/// A value of type MBM_TYPE_FLOAT, whose bits are copied, or MBM_TYPE_DOUBLE, which is rounded
+/// to the nearest.
+///
+/// @param plan   the object
+/// @param field  the index of the field
+/// @param index  which of its values, 0 for the first
+/// @param value  gets the number
+/// @return MBM_OK; MBM_INVALID_ARGUMENT, also for other types; MBM_NOT_INITIALISED; if no value
+///         has arrived yet the status that mbm_plan_getStatus returns. `value` changes on MBM_OK
+///         only
+#[no_mangle]
+pub unsafe extern "C" fn mbm_plan_getFloat(
+    plan: *const mbm_plan,
+    field: u16,
+    index: u16,
+    value: *mut f32,
+) -> u8 {
+    // SAFETY: as the header demands; a float is its bits.
+    unsafe { get(plan, field, value.cast(), |words| words.float(index)) }
+}
+
+/// A value of type MBM_TYPE_FLOAT or MBM_TYPE_DOUBLE as a double. On AVR, where C's double has
+/// 32 bits, it is mbm_plan_getFloat.
+///
+/// @param plan   the object
+/// @param field  the index of the field
+/// @param index  which of its values, 0 for the first
+/// @param value  gets the number
+/// @return as mbm_plan_getFloat
+#[no_mangle]
+pub unsafe extern "C" fn mbm_plan_getDouble(
+    plan: *const mbm_plan,
+    field: u16,
+    index: u16,
+    value: *mut f64,
+) -> u8 {
+    // SAFETY: as the header demands; a double is its bits.
+    #[cfg(not(target_arch = "avr"))]
+    unsafe {
+        get(plan, field, value.cast(), |words| words.double(index))
+    }
+    // SAFETY: as the header demands; C's double is a float here.
+    #[cfg(target_arch = "avr")]
+    unsafe {
+        mbm_plan_getFloat(plan, field, index, value.cast())
+    }
+}
+
+/// A text, which ends at its first NUL or with its field. In an order with the low byte first,
+/// the first of two characters is a register's low byte.
+///
+/// @param plan      the object
+/// @param field     the index of the field, of type MBM_TYPE_TEXT
+/// @param text      gets the text and a NUL
+/// @param capacity  bytes of `text`; the field's count and one are always enough
+/// @return as mbm_plan_getInteger; MBM_BUFFER_TOO_SMALL if the text does not fit. `text` changes
+///         on MBM_OK only
+#[no_mangle]
+pub unsafe extern "C" fn mbm_plan_getText(
+    plan: *const mbm_plan,
+    field: u16,
+    text: *mut c_char,
+    capacity: u16,
+) -> u8 {
+    let copy = |words: &Words| {
+        // SAFETY: as the header demands.
+        let text = unsafe { slice_mut::<u8>(text.cast(), capacity.into())? };
+        let (end, place) = text.split_last_mut().ok_or(Status::BUFFER_TOO_SMALL)?;
+        let count = words.text(place)?;
+        *place.get_mut(count).unwrap_or(end) = 0;
+        Ok(())
+    };
+    if text.is_null() {
+        return Status::INVALID_ARGUMENT.code();
+    }
+    // SAFETY: as the header demands.
+    unsafe {
+        let mut found = Words::NONE;
+        match words(plan, field, &mut found) {
+            Status::OK => copy(&found).err().unwrap_or(Status::OK).code(),
+            refused => refused.code(),
+        }
+    }
+}
+
+/// The registers of a field as they were read, for mbm_registers_get... functions, in the order
+/// of the field. It copies nothing: the next reply changes what it sees.
+///
+/// @param plan       the object
+/// @param field      the index of the field, of registers
+/// @param registers  the view to fill in
+/// @return as mbm_plan_getInteger
+#[no_mangle]
+pub unsafe extern "C" fn mbm_plan_getRegisters(
+    plan: *const mbm_plan,
+    field: u16,
+    registers: *mut mbm_registers,
+) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        get(plan, field, registers, |words| {
+            if words.field.is_in_bits() {
+                return Err(Status::INVALID_ARGUMENT);
+            }
+            let own = words.words.get(words.before..);
+            Ok(mbm_registers {
+                data: own.ok_or(Status::INVALID_ARGUMENT)?.as_ptr().cast(),
+                first: words.field.address,
+                count: words.field.length() as u16,
+                kind: MBM_REGISTERS_OF_WORDS,
+                order: words.field.order,
+            })
+        })
+    }
+}
+
+/// Makes the read of a field due at once, for a value that is wanted now. A unit that does not
+/// answer is left alone all the same.
+///
+/// @param plan   the object
+/// @param field  the index of the field
+/// @return MBM_OK; MBM_BUSY from within a hook of the client's port; MBM_INVALID_ARGUMENT for a
+///         field that is not there; MBM_NOT_INITIALISED
+#[no_mangle]
+pub unsafe extern "C" fn mbm_plan_refresh(plan: *mut mbm_plan, field: u16) -> u8 {
+    // SAFETY: as the header demands.
+    unsafe {
+        match read_of(plan, field) {
+            Ok(index) => {
+                let object = pointers::object(plan);
+                if pointers::check((*object).client) == Status::BUSY {
+                    return Status::BUSY.code();
+                }
+                let now = time(object);
+                schedule::hasten(reads(object), index, now);
+                Status::OK.code()
+            }
+            Err(refused) => refused.code(),
+        }
+    }
+}
+
+/// The reads that the plan has made of the fields: one request each.
+///
+/// @param plan   the object
+/// @param index  0 for the first read
+/// @param read   gets the read
+/// @return MBM_OK; MBM_INVALID_ARGUMENT, also behind the last read, or MBM_NOT_INITIALISED, with
+///         `read` unchanged
+#[no_mangle]
+pub unsafe extern "C" fn mbm_plan_getRead(
+    plan: *const mbm_plan,
+    index: u16,
+    read: *mut mbm_planReadInfo,
+) -> u8 {
+    let find = || {
+        // SAFETY: as the header demands.
+        let own = unsafe {
+            match pointers::check(plan) {
+                Status::OK => reads(pointers::object(plan)).get(usize::from(index)),
+                refused => return Err(refused),
+            }
+        };
+        let own = own.ok_or(Status::INVALID_ARGUMENT)?;
+        Ok(mbm_planReadInfo {
+            intervalMs: own.interval_ms,
+            address: own.address,
+            quantity: own.quantity,
+            unit: own.unit,
+            table: own.table,
+            status: own.status().code(),
+        })
+    };
+    // SAFETY: as the header demands.
+    let found = unsafe { pointers::put_result(read, find) };
+    found.err().unwrap_or(Status::OK).code()
+}

@@ -1,0 +1,202 @@
+#define _GNU_SOURCE
+#include "mqtt_value.h"
+
+#include <cjson/cJSON.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The longest text field: 125 registers. */
+enum { LONGEST_TEXT = 250, LONGEST_NUMBER = 40 };
+
+/* JSON has no word for infinity and not-a-number. */
+static void print_real(char *text, double value, int digits, int is_json)
+{
+    if (is_json && !isfinite(value))
+        strcpy(text, "null");
+    else
+        snprintf(text, LONGEST_NUMBER, "%.*g", digits, value);
+}
+
+/* Writes one number or bit. Returns 0 if no value has arrived yet. */
+static int print_number(const mbm_plan *plan, const mqtt_field *field, const mbm_planField *planned,
+                        uint16_t at, uint16_t index, int is_json, char text[LONGEST_NUMBER])
+{
+    int64_t integer;
+    double real;
+    uint8_t status;
+
+    if (planned->type == MBM_TYPE_FLOAT || planned->type == MBM_TYPE_DOUBLE) {
+        status = mbm_plan_getDouble(plan, at, index, &real);
+        if (status == MBM_OK)
+            print_real(text, real * field->scale, planned->type == MBM_TYPE_FLOAT ? 7 : 15,
+                       is_json);
+        return status == MBM_OK;
+    }
+    status = mbm_plan_getInteger(plan, at, index, &integer);
+    if (status == MBM_BUFFER_TOO_SMALL) {
+        /* A uint64 above the range of int64_t. */
+        mbm_registers registers;
+        uint64_t large = 0;
+
+        status = mbm_plan_getRegisters(plan, at, &registers);
+        if (status == MBM_OK)
+            status = mbm_registers_getUint64(&registers, (uint16_t)(planned->address + 4 * index),
+                                             planned->order, &large);
+        if (field->is_scaled)
+            print_real(text, (double)large * field->scale, 15, is_json);
+        else
+            snprintf(text, LONGEST_NUMBER, "%" PRIu64, large);
+        return status == MBM_OK;
+    }
+    if (status != MBM_OK)
+        return 0;
+    if (planned->type == MBM_TYPE_BIT && is_json)
+        strcpy(text, integer ? "true" : "false");
+    else if (field->is_scaled)
+        print_real(text, (double)integer * field->scale, 15, is_json);
+    else
+        snprintf(text, LONGEST_NUMBER, "%" PRId64, integer);
+    return 1;
+}
+
+/* Writes a text. Bytes above 127 are taken as Latin-1. */
+static int print_text(const mbm_plan *plan, uint16_t field, int is_json, char *text, size_t size)
+{
+    char latin[LONGEST_TEXT + 1], utf8[2 * LONGEST_TEXT + 1];
+    size_t from, to = 0;
+    cJSON *json;
+    int fits;
+
+    if (mbm_plan_getText(plan, field, latin, sizeof latin) != MBM_OK)
+        return 0;
+    for (from = 0; latin[from]; from++) {
+        const unsigned char byte = (unsigned char)latin[from];
+
+        if (byte >= 0x80)
+            utf8[to++] = (char)(0xC0 | byte >> 6);
+        utf8[to++] = (char)(byte >= 0x80 ? 0x80 | (byte & 0x3F) : byte);
+    }
+    utf8[to] = '\0';
+    if (!is_json)
+        return (size_t)snprintf(text, size, "%s", utf8) < size;
+    json = cJSON_CreateString(utf8);
+    fits = json && cJSON_PrintPreallocated(json, text, (int)size, 0);
+    cJSON_Delete(json);
+    return fits;
+}
+
+int mqtt_value_text(const mbm_plan *plan, const mqtt_fields *fields, uint16_t field, int is_json,
+                    char *text, size_t size)
+{
+    const mbm_planField *planned = &fields->planned[field];
+    const uint16_t count = planned->count ? planned->count : 1;
+    const int is_array = is_json && count > 1;
+    size_t length = 0;
+    uint16_t index;
+
+    if (planned->type == MBM_TYPE_TEXT)
+        return print_text(plan, field, is_json, text, size);
+    for (index = 0; index < count; index++) {
+        const char *before = index > 0 ? "," : is_array ? "[" : "";
+        char number[LONGEST_NUMBER];
+
+        if (!print_number(plan, &fields->fields[field], planned, field, index, is_json, number))
+            return 0;
+        length += (size_t)snprintf(text + length, size - length, "%s%s", before, number);
+        if (length + 2 > size)
+            return 0;
+    }
+    if (is_array)
+        strcpy(text + length, "]");
+    return 1;
+}
+
+/* Reads a payload. Returns 0 if it is no number and no truth value. */
+static int parse_payload(const char *payload, double *value)
+{
+    static const char *const WORDS[] = {"off", "on", "OFF", "ON"};
+    cJSON *json = cJSON_Parse(payload);
+    const cJSON *item =
+        cJSON_IsObject(json) ? cJSON_GetObjectItemCaseSensitive(json, "value") : json;
+    int is_right = 1, at;
+
+    if (cJSON_IsNumber(item))
+        *value = item->valuedouble;
+    else if (cJSON_IsBool(item))
+        *value = cJSON_IsTrue(item);
+    else
+        is_right = 0;
+    cJSON_Delete(json);
+    for (at = 0; at < 4 && !is_right; at++) {
+        is_right = strcmp(payload, WORDS[at]) == 0;
+        *value = at & 1;
+    }
+    return is_right && isfinite(*value);
+}
+
+/* Converts a number to the integer of a field. Returns 0 if it is out of range. */
+static int to_integer(double value, uint8_t type, uint64_t *integer)
+{
+    /* A double holds each integer up to 2^53. */
+    static const double EXACT = 9007199254740992.0;
+    static const struct {
+        double least, most;
+    } RANGES[] = {
+        [MBM_TYPE_BIT] = {0, 1},
+        [MBM_TYPE_UINT16] = {0, UINT16_MAX},
+        [MBM_TYPE_INT16] = {INT16_MIN, INT16_MAX},
+        [MBM_TYPE_UINT32] = {0, UINT32_MAX},
+        [MBM_TYPE_INT32] = {INT32_MIN, INT32_MAX},
+        [MBM_TYPE_UINT64] = {0, EXACT},
+        [MBM_TYPE_INT64] = {-EXACT, EXACT},
+    };
+
+    value = round(value);
+    if (value < RANGES[type].least || value > RANGES[type].most)
+        return 0;
+    *integer = (uint64_t)(int64_t)value;
+    return 1;
+}
+
+uint16_t mqtt_value_parse(const mqtt_fields *fields, uint16_t field, const char *payload,
+                          uint16_t words[MQTT_WRITE_WORDS], const char **wrong)
+{
+    const mbm_planField *planned = &fields->planned[field];
+    const uint8_t order = planned->order;
+    mbm_registers registers;
+    uint64_t integer = 0;
+    double value;
+    float single;
+
+    *wrong = "the payload is no number";
+    if (!parse_payload(payload, &value))
+        return 0;
+    *wrong = "the number is out of range";
+    value /= fields->fields[field].scale;
+    (void)mbm_registers_intoWords(&registers, words, MQTT_WRITE_WORDS, 0);
+    switch (planned->type) {
+    case MBM_TYPE_FLOAT:
+        single = (float)value;
+        if (!isfinite(single))
+            return 0;
+        (void)mbm_registers_setFloat(&registers, 0, order, &single);
+        return 2;
+    case MBM_TYPE_DOUBLE: (void)mbm_registers_setDouble(&registers, 0, order, &value); return 4;
+    default: break;
+    }
+    if (!to_integer(value, planned->type, &integer))
+        return 0;
+    switch (planned->type) {
+    case MBM_TYPE_UINT32:
+    case MBM_TYPE_INT32:
+        (void)mbm_registers_setUint32(&registers, 0, order, (uint32_t)integer);
+        return 2;
+    case MBM_TYPE_UINT64:
+    case MBM_TYPE_INT64: (void)mbm_registers_setUint64(&registers, 0, order, &integer); return 4;
+    case MBM_TYPE_BIT: words[0] = (uint16_t)integer; return 1;
+    default: (void)mbm_registers_setUint16(&registers, 0, order, (uint16_t)integer); return 1;
+    }
+}

@@ -1,0 +1,174 @@
+//! Tables of a plan, of any content: what is accepted keeps every limit and is as good as the
+//! best way to group it; what is refused names a field that is there. Then reads end in any way,
+//! at any time, and values come out of any words.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use mbm::error::Status;
+use mbm::plan::group::group;
+use mbm::plan::schedule::{self, Backoff};
+use mbm::plan::value::Words;
+use mbm::plan::{ExcludedRange, Field, Limits, Position, Read, UnitLimits, NO_SLOT};
+use mbm_fuzz::Input;
+
+fn u32_of(input: &mut Input) -> u32 {
+    u32::from(input.u16()) << 16 | u32::from(input.u16())
+}
+
+fn field(input: &mut Input) -> Field {
+    let shape = input.u8();
+    Field {
+        unit: shape & 3,
+        table: shape >> 2 & 7,
+        value_type: input.u8() % 12,
+        order: shape >> 5,
+        address: match input.u8() {
+            byte @ 0..0xE0 => byte.into(),
+            _ => input.u16(),
+        },
+        count: input.u8().into(),
+        interval_ms: if input.u8() & 1 == 0 {
+            1000
+        } else {
+            u32_of(input)
+        },
+        multiplier: if shape & 1 == 0 {
+            0
+        } else {
+            u32_of(input) as i32
+        },
+        divisor: i32::from(input.u8()) - 4,
+    }
+}
+
+/// The least reads, and the least bits and registers of those, of the fields of one group.
+fn best(own: &[Field], limits: &Limits) -> (usize, u32) {
+    let mut least = vec![(0, 0)];
+    for end in 1..=own.len() {
+        let mut found = (usize::MAX, u32::MAX);
+        for start in 0..end {
+            let (first, last) = (&own[start], &own[end - 1]);
+            let length = last.end() - u32::from(first.address);
+            let gaps = own[start..end]
+                .windows(2)
+                .all(|pair| u32::from(pair[1].address) - pair[0].end() <= limits.widest_gap(first));
+            let touched = limits.excludes(first, first.address.into(), last.end());
+            if gaps && !touched && length <= limits.longest_read(first) {
+                let (reads, quantity): (usize, u32) = least[start];
+                found = found.min((reads + 1, quantity + length));
+            }
+        }
+        least.push(found);
+    }
+    least[own.len()]
+}
+
+fuzz_target!(|data: &[u8]| {
+    let mut input = Input(data);
+    let units = [UnitLimits {
+        bits: input.u16(),
+        registers: input.u8(),
+        unit: input.u8() & 3,
+    }];
+    let excluded = [ExcludedRange {
+        first: input.u8().into(),
+        last: input.u8().into(),
+        unit: input.u8() & 3,
+        table: input.u8() & 7,
+    }];
+    let limits = Limits {
+        bits: input.u16(),
+        registers: input.u8(),
+        bit_gap: input.u16(),
+        register_gap: input.u8(),
+        units: &units,
+        excluded: &excluded,
+    };
+    let (read_count, words) = (usize::from(input.u8()), input.u16());
+    let fields: Vec<Field> = (0..input.u8() % 24).map(|_| field(&mut input)).collect();
+    let mut positions = vec![Position::NONE; fields.len()];
+    let mut reads = vec![Read::NONE; read_count];
+    let count = match group(&fields, &limits, &mut positions, &mut reads, words) {
+        Ok(count) => count,
+        Err(refusal) => {
+            assert!(refusal.status.is_failure() || refusal.status.is_exception());
+            let reversed = excluded[0].last < excluded[0].first;
+            assert!(refusal.field < fields.len() || fields.is_empty() || reversed);
+            return;
+        }
+    };
+    let reads = &mut reads[..count];
+    let mut groups: Vec<Vec<Field>> = Vec::new();
+    for field in &fields {
+        let place = groups.iter_mut().find(|own| {
+            let one = own[0];
+            (one.unit, one.table, one.interval_ms) == (field.unit, field.table, field.interval_ms)
+        });
+        match place {
+            Some(own) => own.push(*field),
+            None => groups.push(vec![*field]),
+        }
+    }
+    let (mut least, mut quantity) = (0, 0);
+    for own in &mut groups {
+        own.sort_by_key(|field| field.address);
+        let found = best(own, &limits);
+        least += found.0;
+        quantity += found.1;
+    }
+    assert_eq!(count, least);
+    let total: u32 = reads.iter().map(|read| u32::from(read.quantity)).sum();
+    assert_eq!(total, quantity);
+
+    let mut now = u32_of(&mut input);
+    let backoff = Backoff {
+        first_ms: u32_of(&mut input),
+        longest_ms: u32_of(&mut input),
+    };
+    schedule::start(reads, now);
+    let mut queued = Vec::new();
+    while !input.is_empty() {
+        match input.u8() % 4 {
+            0 => match schedule::next(reads, now) {
+                Ok(index) => {
+                    assert_eq!(reads[index].slot, NO_SLOT);
+                    reads[index].slot = 0;
+                    queued.push(index);
+                }
+                Err(delay) => assert!(delay > 0),
+            },
+            1 if !queued.is_empty() => {
+                let index = queued.remove(usize::from(input.u8()) % queued.len());
+                let status = Status::from_code(input.u8());
+                schedule::end(reads, index, status, now, &backoff);
+                assert_eq!(reads[index].status(), status);
+            }
+            2 => now = now.wrapping_add(1 << (input.u8() % 28)),
+            _ => schedule::hasten(reads, usize::from(input.u8()), now),
+        }
+    }
+    let data: Vec<u16> = (0..total).map(|at| at as u16).collect();
+    for read in reads.iter() {
+        for position in read.positions() {
+            let field = &fields[positions[position].field()];
+            let view = Words {
+                words: &data[..read.words().into()],
+                before: usize::from(field.address - read.address),
+                field,
+            };
+            for index in 0..3 {
+                let raw = view.raw(index);
+                assert_eq!(
+                    raw.is_ok(),
+                    index < field.values() && field.value_type != 10
+                );
+                let is_float = raw.is_ok() && matches!(field.value_type, 8 | 9);
+                assert_eq!(view.double(index).is_ok(), is_float);
+                assert_eq!(view.float(index).is_ok(), is_float);
+                assert!(view.integer(index).is_err() || (raw.is_ok() && !is_float));
+            }
+            let mut text = [0; 256];
+            assert_eq!(view.text(&mut text).is_ok(), field.value_type == 10);
+        }
+    }
+});

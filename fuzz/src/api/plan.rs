@@ -1,0 +1,213 @@
+//! The plan.
+
+use super::check::{call, checked_call, is_status, refused_changes_nothing, span, OK, PENDING};
+use super::world::{Grant, World};
+use mbm_c::*;
+use std::ffi::c_void;
+use std::ptr::null_mut;
+
+unsafe extern "C" fn update(_: *mut c_void, plan: *mut mbm_plan, field: u16) {
+    let w = World::current();
+    // SAFETY: the plan passes itself.
+    let status = unsafe { mbm_plan_getStatus(plan, field, null_mut()) };
+    is_status("mbm_plan_getStatus", status);
+    w.hook(Grant::All, 6);
+}
+
+fn field(w: &World) -> mbm_planField {
+    let byte = w.byte();
+    let bits = byte & 1 != 0;
+    let good = !w.rarely(12);
+    mbm_planField {
+        unit: w.unit_id(),
+        table: if good {
+            1 + (byte >> 1 & 1) + if bits { 0 } else { 2 }
+        } else {
+            byte % 6
+        },
+        r#type: match (good, bits) {
+            (true, true) => MBM_TYPE_BIT,
+            (true, false) => 2 + (byte >> 2) % 9,
+            _ => w.byte() % 12,
+        },
+        order: if good { byte % 5 } else { byte % 8 },
+        address: w.word(),
+        count: w.word() % 40,
+        intervalMs: if good {
+            1 + u32::from(w.word())
+        } else {
+            w.long()
+        },
+        multiplier: if byte & 4 == 0 { 0 } else { w.long() as i32 },
+        divisor: if byte & 8 == 0 {
+            0
+        } else {
+            w.long() as i32 & if good { i32::MAX } else { -1 }
+        },
+    }
+}
+
+/// Begins a plan over a client, with storage of exactly what its setup says.
+pub fn begin(w: &World, plan: *mut mbm_plan, client: *mut mbm_client) {
+    let fields: Vec<_> = (0..w.byte() % 10).map(|_| field(w)).collect();
+    let count = fields.len();
+    let (reads, words, requests) = (w.byte() % 12, w.word() % 300, w.byte() % 6);
+    let units: Vec<_> = (0..w.byte() % 3)
+        .map(|_| mbm_planUnitLimits {
+            bitsPerRead: w.word(),
+            registersPerRead: w.byte(),
+            unit: w.unit_id(),
+        })
+        .collect();
+    let excluded: Vec<_> = (0..w.byte() % 3)
+        .map(|_| mbm_planExcludedRange {
+            first: w.word(),
+            last: w.word(),
+            unit: w.byte() % 4,
+            table: w.byte() % 5,
+        })
+        .collect();
+    let null_one = w.byte();
+    let unless = |index: u8, pointer: *mut u8| {
+        if null_one == 0xF0 + index {
+            null_mut()
+        } else {
+            pointer
+        }
+    };
+    let block = |size: usize, count: usize| w.block(size * count, 8);
+    let setup = w.put(mbm_planSetup {
+        fields: unless(0, w.array(&fields).cast()).cast(),
+        positions: unless(1, block(size_of::<mbm_planPosition>(), count)).cast(),
+        reads: unless(2, block(size_of::<mbm_planRead>(), reads.into())).cast(),
+        data: unless(3, block(2, words.into())).cast(),
+        requests: unless(4, block(size_of::<mbm_clientRequest>(), requests.into())).cast(),
+        units: unless(5, w.array(&units).cast()).cast(),
+        excluded: unless(6, w.array(&excluded).cast()).cast(),
+        update: (!w.rarely(4)).then_some(update),
+        context: null_mut(),
+        backoffMs: w.long(),
+        longestBackoffMs: w.long(),
+        fieldCount: count as u16,
+        readCount: reads.into(),
+        dataWords: words,
+        bitsPerRead: w.word(),
+        bitGap: w.word(),
+        registersPerRead: w.byte(),
+        registerGap: w.byte(),
+        requestCount: requests,
+        unitCount: units.len() as u8,
+        excludedCount: excluded.len() as u8,
+    });
+    let setup = if w.rarely(64) { null_mut() } else { setup };
+    let wrong = if w.rarely(8) {
+        null_mut()
+    } else {
+        w.unset::<u16>()
+    };
+    let status = refused_changes_nothing(w, &[span(plan)], "mbm_plan_begin", || {
+        call!(w, plan, mbm_plan_begin(plan, client, setup, wrong))
+    });
+    if !wrong.is_null() {
+        // SAFETY: not NULL.
+        let index = usize::from(unsafe { *wrong });
+        assert!(index == 0xFFFF || (index < count && status != OK));
+    }
+}
+
+/// A value gets what a call gives, and stays as it is if that refuses.
+fn get<T>(w: &World, name: &str, call: impl FnOnce(*mut T) -> u8) {
+    let value = if w.rarely(32) {
+        null_mut()
+    } else {
+        w.unset::<T>()
+    };
+    let before = super::check::bytes(span(value));
+    if is_status(name, call(value)) != OK {
+        assert!(super::check::bytes(span(value)) == before, "{name} changed");
+    }
+}
+
+fn look(w: &World, plan: *mut mbm_plan) {
+    let (field, index) = (u16::from(w.byte() % 12), u16::from(w.byte() % 8));
+    macro_rules! get {
+        ($name:ident($($argument:expr),*)) => {
+            get(w, stringify!($name), |value| {
+                call!(w, plan, $name(plan, $($argument,)* value))
+            })
+        };
+    }
+    match w.byte() % 8 {
+        0 => {
+            let age = if w.rarely(4) { null_mut() } else { w.unset() };
+            let status = call!(w, plan, mbm_plan_getStatus(plan, field, age));
+            is_status("mbm_plan_getStatus", status);
+        }
+        1 | 2 => get!(mbm_plan_getInteger(field, index)),
+        3 => get!(mbm_plan_getFloat(field, index)),
+        4 => get!(mbm_plan_getDouble(field, index)),
+        5 => get!(mbm_plan_getRegisters(field)),
+        6 => get!(mbm_plan_getRead(index)),
+        _ => {
+            let capacity = w.word();
+            let place = w.unset_bytes(capacity.into());
+            let text = if w.rarely(32) {
+                null_mut()
+            } else {
+                place.cast()
+            };
+            is_status(
+                "mbm_plan_getText",
+                call!(w, plan, mbm_plan_getText(plan, field, text, capacity)),
+            );
+        }
+    }
+}
+
+/// Polls a plan and its client in turns, while time passes.
+fn run(w: &World, plan: *mut mbm_plan, client: *mut mbm_client) {
+    for _ in 0..1 + w.byte() % 16 {
+        checked_call(w, span(plan), "mbm_plan_poll", || {
+            call!(w, plan, mbm_plan_poll(plan))
+        });
+        let status = call!(w, client, mbm_client_poll(client));
+        if status != OK && status != PENDING {
+            break;
+        }
+        call!(w, plan, mbm_plan_pollDelay(plan));
+        if w.byte() < 0x80 {
+            w.clock
+                .set(w.clock.get().wrapping_add(1 << (w.byte() % 24)));
+        }
+    }
+}
+
+/// Does something with a plan.
+pub fn step(w: &World) {
+    let plan = w.plans.pick(w);
+    let client = w.clients.pick(w);
+    match w.byte() % 16 {
+        0 | 1 => begin(w, plan, client),
+        2..=7 => run(w, plan, client),
+        8..=12 => look(w, plan),
+        13 => {
+            let field = u16::from(w.byte() % 12);
+            checked_call(w, span(plan), "mbm_plan_refresh", || {
+                call!(w, plan, mbm_plan_refresh(plan, field))
+            });
+        }
+        14 => {
+            refused_changes_nothing(w, &[span(plan)], "mbm_plan_end", || {
+                call!(w, plan, mbm_plan_end(plan))
+            });
+        }
+        _ => {
+            // The user may zero a plan outside of every call.
+            if !plan.is_null() && !w.is_inside() {
+                w.note(|| format!("memset({plan:?}, 0, plan)"));
+                // SAFETY: nothing uses it now.
+                unsafe { plan.cast::<u8>().write_bytes(0, size_of::<mbm_plan>()) };
+            }
+        }
+    }
+}

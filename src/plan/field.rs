@@ -1,0 +1,143 @@
+//! A field of the table, and what is wrong with it.
+
+use crate::data::order::Order;
+
+/// The tables of the data model (V1.1b3, 4.3). Each number is the function that reads it.
+pub const COILS: u8 = 1;
+/// The discrete inputs.
+pub const DISCRETE_INPUTS: u8 = 2;
+/// The holding registers.
+pub const HOLDING_REGISTERS: u8 = 3;
+/// The input registers.
+pub const INPUT_REGISTERS: u8 = 4;
+
+/// The types of a value: a coil or a discrete input.
+pub const BIT: u8 = 1;
+/// One register.
+pub const UINT16: u8 = 2;
+/// One register, two's complement.
+pub const INT16: u8 = 3;
+/// Two registers.
+pub const UINT32: u8 = 4;
+/// Two registers, two's complement.
+pub const INT32: u8 = 5;
+/// Four registers.
+pub const UINT64: u8 = 6;
+/// Four registers, two's complement.
+pub const INT64: u8 = 7;
+/// An IEEE 754 binary32 in two registers.
+pub const FLOAT: u8 = 8;
+/// An IEEE 754 binary64 in four registers.
+pub const DOUBLE: u8 = 9;
+/// A text, two characters a register.
+pub const TEXT: u8 = 10;
+
+/// The longest interval: a day.
+pub const LONGEST_INTERVAL_MS: u32 = 86_400_000;
+
+/// A value, or several of one type in a row, that a program wants of a unit.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Field {
+    /// The unit, 1 to 255.
+    pub unit: u8,
+    /// [`COILS`] to [`INPUT_REGISTERS`].
+    pub table: u8,
+    /// [`BIT`] to [`TEXT`].
+    pub value_type: u8,
+    /// The order of the bytes: 0 and 1 for [`Order::Abcd`], 2 to 4 for the orders that follow.
+    pub order: u8,
+    /// The first bit or register, 0 to 65535, as on the wire.
+    pub address: u16,
+    /// The number of values, of a text the number of characters; 0 means 1.
+    pub count: u16,
+    /// The time from one read to the next, 1 to [`LONGEST_INTERVAL_MS`].
+    pub interval_ms: u32,
+    /// Each integer is multiplied by this; 0 means 1. Other types have no scale.
+    pub multiplier: i32,
+    /// Each integer is then divided by this; 0 means 1; not negative.
+    pub divisor: i32,
+}
+
+impl Field {
+    /// A field of nothing. It stands for a field that does not exist.
+    pub const NONE: Field = Field {
+        unit: 0,
+        table: 0,
+        value_type: 0,
+        order: 0,
+        address: 0,
+        count: 0,
+        interval_ms: 0,
+        multiplier: 0,
+        divisor: 0,
+    };
+
+    /// The registers of one value; 0 for a bit, a text, and an unknown type.
+    pub const fn value_registers(&self) -> u8 {
+        match self.value_type {
+            UINT16 | INT16 => 1,
+            UINT32 | INT32 | FLOAT => 2,
+            UINT64 | INT64 | DOUBLE => 4,
+            _ => 0,
+        }
+    }
+
+    /// The number of values, at least 1.
+    pub const fn values(&self) -> u16 {
+        if self.count == 0 {
+            1
+        } else {
+            self.count
+        }
+    }
+
+    /// The number of bits or registers that the field takes.
+    pub const fn length(&self) -> u32 {
+        let count = self.values() as u32;
+        match self.value_type {
+            BIT => count,
+            TEXT => count.div_ceil(2),
+            _ => count * self.value_registers() as u32,
+        }
+    }
+
+    /// The address after the last bit or register, up to 65536.
+    pub const fn end(&self) -> u32 {
+        self.address as u32 + self.length()
+    }
+
+    /// True if the field is in a table of bits.
+    pub const fn is_in_bits(&self) -> bool {
+        self.table <= DISCRETE_INPUTS
+    }
+
+    /// True if the values are integers.
+    pub const fn is_integer(&self) -> bool {
+        matches!(self.value_type, UINT16..=INT64)
+    }
+
+    /// True if the values are integers with a sign.
+    pub const fn is_signed(&self) -> bool {
+        matches!(self.value_type, INT16 | INT32 | INT64)
+    }
+
+    /// The order of the bytes, if the field names one.
+    pub const fn byte_order(&self) -> Option<Order> {
+        match self.order {
+            0 | 1 => Some(Order::Abcd),
+            2 => Some(Order::Cdab),
+            3 => Some(Order::Badc),
+            4 => Some(Order::Dcba),
+            _ => None,
+        }
+    }
+
+    /// True if both are of one unit and table and share an address.
+    pub fn overlaps(&self, other: &Field) -> bool {
+        self.unit == other.unit
+            && self.table == other.table
+            && u32::from(self.address) < other.end()
+            && u32::from(other.address) < self.end()
+    }
+}

@@ -1,0 +1,111 @@
+//! What a read may be: how long, over which gaps, and where not.
+
+use super::field::{Field, BIT, INPUT_REGISTERS, LONGEST_INTERVAL_MS, TEXT};
+use crate::error::Status;
+use crate::pdu::limits::{MAX_READ_BITS, MAX_READ_REGISTERS};
+
+/// How much one read of a unit may request. 0 means as [`Limits`] says.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UnitLimits {
+    /// Bits, up to 2000.
+    pub bits: u16,
+    /// Registers, up to 125.
+    pub registers: u8,
+    /// The unit.
+    pub unit: u8,
+}
+
+/// Addresses that no read may touch.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ExcludedRange {
+    /// The first address.
+    pub first: u16,
+    /// The last address.
+    pub last: u16,
+    /// The unit; 0 for every unit.
+    pub unit: u8,
+    /// The table, as in a field.
+    pub table: u8,
+}
+
+/// What a read may be.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits<'a> {
+    /// The most bits that one read requests; 0 or more than 2000 mean 2000.
+    pub bits: u16,
+    /// The most registers that one read requests; 0 or more than 125 mean 125.
+    pub registers: u8,
+    /// The most bits between two fields that one read may cover in passing.
+    pub bit_gap: u16,
+    /// The most registers between two fields that one read may cover in passing.
+    pub register_gap: u8,
+    /// Units with other limits.
+    pub units: &'a [UnitLimits],
+    /// Addresses that no read may touch.
+    pub excluded: &'a [ExcludedRange],
+}
+
+impl Limits<'_> {
+    /// Checks a field by itself: [`Status::OK`]; [`Status::INVALID_ARGUMENT`] for an unknown
+    /// table, type or order, a type that the table does not have, an interval out of range, a
+    /// negative divisor, or a scale of a value that is no integer;
+    /// [`Status::BROADCAST_NOT_ALLOWED`] for unit 0; [`Status::ILLEGAL_DATA_ADDRESS`] if the
+    /// field goes beyond address 65535 or into an excluded range;
+    /// [`Status::ILLEGAL_DATA_VALUE`] if one read cannot hold it.
+    pub fn check(&self, field: &Field) -> Status {
+        let end = field.end();
+        let known = field.table.wrapping_sub(1) < INPUT_REGISTERS
+            && field.value_type.wrapping_sub(1) < TEXT
+            && field.is_in_bits() == (field.value_type == BIT)
+            && field.order <= 4
+            && field.divisor >= 0
+            && (field.is_integer() || field.multiplier | field.divisor == 0)
+            && field.interval_ms.wrapping_sub(1) < LONGEST_INTERVAL_MS;
+        if !known {
+            Status::INVALID_ARGUMENT
+        } else if field.unit == 0 {
+            Status::BROADCAST_NOT_ALLOWED
+        } else if end > 0x1_0000 || self.excludes(field, field.address.into(), end) {
+            Status::ILLEGAL_DATA_ADDRESS
+        } else if field.length() > self.longest_read(field) {
+            Status::ILLEGAL_DATA_VALUE
+        } else {
+            Status::OK
+        }
+    }
+
+    /// The most bits or registers of one read from the table of a field.
+    pub fn longest_read(&self, field: &Field) -> u32 {
+        let own = self.units.iter().find(|limits| limits.unit == field.unit);
+        let (most, all, own): (u16, u16, u16) = if field.is_in_bits() {
+            (MAX_READ_BITS, self.bits, own.map_or(0, |own| own.bits))
+        } else {
+            let own = own.map_or(0, |own| own.registers.into());
+            (MAX_READ_REGISTERS, self.registers.into(), own)
+        };
+        let limit = if own > 0 { own } else { all };
+        (limit.wrapping_sub(1).min(most - 1) + 1).into()
+    }
+
+    /// The widest gap that a read from the table of a field may cover.
+    pub fn widest_gap(&self, field: &Field) -> u32 {
+        if field.is_in_bits() {
+            self.bit_gap.into()
+        } else {
+            self.register_gap.into()
+        }
+    }
+
+    /// True if an address from `first` up to, but not including, `end` in the table of a field
+    /// is excluded.
+    pub fn excludes(&self, field: &Field, first: u32, end: u32) -> bool {
+        self.excluded.iter().any(|range| {
+            (range.unit == 0 || range.unit == field.unit)
+                && range.table == field.table
+                && u32::from(range.first) < end
+                && u32::from(range.last) >= first
+        })
+    }
+}

@@ -1,0 +1,19 @@
+//! A plan of fields: a constant table says which values of which units a program wants, and
+//! how often. The plan groups the fields into reads and says which read is due.
+//!
+//! [`group`] finds the fewest reads for the table, and of these the reads with the fewest
+//! registers. [`schedule`] spreads the reads over time and keeps away from units that do not
+//! answer. The caller sends each read and stores its reply; [`value`] gets values out of it.
+//! Nothing here sends anything or has a clock: time is an argument in milliseconds, which may
+//! wrap.
+
+pub mod field;
+pub mod group;
+pub mod limits;
+mod read;
+pub mod schedule;
+pub mod value;
+
+pub use field::Field;
+pub use limits::{ExcludedRange, Limits, UnitLimits};
+pub use read::{Position, Read, NO_SLOT};

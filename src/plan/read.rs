@@ -1,0 +1,145 @@
+//! The storage of a plan: one [`Position`] for each field, and one [`Read`] for each read.
+
+use crate::error::Status;
+use core::ops::Range;
+
+/// One for each field. While the plan groups its fields, position `n` holds the field that is
+/// `n`th in the sorted table. Then position `n` names the read that field `n` is in.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Position {
+    /// While grouping, the cost of the best reads for the fields from here on; then the read
+    /// that the field with this index is in.
+    pub(super) cost_or_read: u32,
+    /// The index of the field at this place of the sorted table.
+    pub(super) field: u16,
+    /// The last position of the best read that begins here.
+    pub(super) last: u16,
+}
+
+impl Position {
+    /// A position without a field.
+    pub const NONE: Position = Position {
+        cost_or_read: 0,
+        field: 0,
+        last: 0,
+    };
+
+    /// The index of the field at this place of the sorted table.
+    pub const fn field(&self) -> usize {
+        self.field as usize
+    }
+
+    /// The index of the read that the field with the index of this position is in.
+    pub const fn read(&self) -> usize {
+        self.cost_or_read as usize
+    }
+}
+
+/// [`Read::slot`] of a read that is not queued.
+pub const NO_SLOT: u8 = 0xFF;
+
+/// The last two reads of the unit that ended had no answer, or all since.
+pub(super) const SUSPENDED: u8 = 1;
+/// The read of the unit that ended last had no answer.
+pub(super) const DOUBTED: u8 = 2;
+/// A reply has arrived at least once.
+pub(super) const HAS_DATA: u8 = 4;
+/// The status is news for the program.
+pub(super) const NEWS: u8 = 8;
+
+/// One request that the plan repeats, and what came of it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Read {
+    /// When it is next due, in milliseconds.
+    pub(super) due: u32,
+    /// It is not sent before this time, if `failures` is not 0.
+    pub(super) not_before: u32,
+    /// When its last good reply arrived.
+    pub(super) read_at: u32,
+    /// The time from one read to the next, in milliseconds.
+    pub interval_ms: u32,
+    /// The first and the last of its fields, as positions of the sorted table.
+    pub(super) first: u16,
+    pub(super) last: u16,
+    /// The first bit or register.
+    pub address: u16,
+    /// The number of bits or registers.
+    pub quantity: u16,
+    /// Where its data begin, in words from the start of the plan's data.
+    pub offset: u16,
+    /// The unit.
+    pub unit: u8,
+    /// The table; its number is that of the function.
+    pub table: u8,
+    /// How it ended last; [`Status::PENDING`] before it has ended once.
+    pub(super) status: u8,
+    /// The request that it is queued as, or [`NO_SLOT`].
+    pub slot: u8,
+    /// How often in a row it had no answer; counts up to 31.
+    pub(super) failures: u8,
+    pub(super) flags: u8,
+}
+
+impl Read {
+    /// A read of nothing.
+    pub const NONE: Read = Read {
+        due: 0,
+        not_before: 0,
+        read_at: 0,
+        interval_ms: 0,
+        first: 0,
+        last: 0,
+        address: 0,
+        quantity: 0,
+        offset: 0,
+        unit: 0,
+        table: 0,
+        status: Status::PENDING.code(),
+        slot: NO_SLOT,
+        failures: 0,
+        flags: 0,
+    };
+
+    /// True if the read requests bits.
+    pub const fn is_of_bits(&self) -> bool {
+        self.table <= super::field::DISCRETE_INPUTS
+    }
+
+    /// The number of words that its data take.
+    pub const fn words(&self) -> u16 {
+        if self.is_of_bits() {
+            self.quantity.div_ceil(16)
+        } else {
+            self.quantity
+        }
+    }
+
+    /// The positions of its fields: from the first to the one after the last.
+    pub fn positions(&self) -> Range<usize> {
+        self.first.into()..usize::from(self.last) + 1
+    }
+
+    /// How it ended last; [`Status::PENDING`] before it has ended once.
+    pub const fn status(&self) -> Status {
+        Status::from_code(self.status)
+    }
+
+    /// True if a good reply has arrived at least once.
+    pub const fn has_data(&self) -> bool {
+        self.flags & HAS_DATA != 0
+    }
+
+    /// The milliseconds since the last good reply. Without one it means nothing.
+    pub const fn age(&self, now: u32) -> u32 {
+        now.wrapping_sub(self.read_at)
+    }
+
+    /// Its fields' positions, once, after the status was set.
+    pub fn take_news(&mut self) -> Option<Range<usize>> {
+        let news = self.flags & NEWS != 0;
+        self.flags &= !NEWS;
+        news.then(|| self.positions())
+    }
+}
