@@ -138,9 +138,9 @@ static void without_a_connection_requests_end_at_once(void **)
     client->readHoldingRegisters(request, 0, 1);
     ends();
     assert_int_equal(request.status(), MBM_LINK_LOST);
-    uint16_t nobody;
-    int reserved = tcp_reserve(&nobody);
-    networkPort(502) = nobody;
+    uint16_t unusedPort;
+    int reserved = tcp_reserve(&unusedPort);
+    networkPort(502) = unusedPort;
     assert_int_equal(client->connect(device), MBM_LINK_LOST);
     close(reserved);
 }

@@ -5,7 +5,7 @@
 #error "the guard of avr-libc's <util/crc16.h> is taken"
 #endif
 
-static const uint32_t untold_gap = 4000;
+static const uint32_t gap_without_baud_rate = 4000;
 
 static void available_counts_every_word(void **)
 {
@@ -197,7 +197,8 @@ static void a_silence_is_kept_before_each_request(void **)
 {
     ModbusMaster node;
     node.begin(1, Serial);
-    assert_in_range(silence_before(node, node), untold_gap - 100, untold_gap + 100);
+    assert_in_range(silence_before(node, node), gap_without_baud_rate - 100,
+                    gap_without_baud_rate + 100);
     node.setBaudRate(115200);
     assert_in_range(silence_before(node, node), 1650, 1850);
     node.setGap(9000);
@@ -213,8 +214,10 @@ static void the_silence_counts_from_another_objects_last_use(void **)
     second.begin(1, Serial);
     bench().now += 1000000;
     for (int again = 0; again < 3; again++) {
-        assert_in_range(silence_before(first, second), untold_gap, untold_gap + 100);
-        assert_in_range(silence_before(second, first), untold_gap, untold_gap + 100);
+        assert_in_range(silence_before(first, second), gap_without_baud_rate,
+                        gap_without_baud_rate + 100);
+        assert_in_range(silence_before(second, first), gap_without_baud_rate,
+                        gap_without_baud_rate + 100);
     }
 }
 
@@ -392,7 +395,7 @@ static void the_driver_can_be_held_on_after_the_flush(void **)
     assert_in_range(released - Serial.sentAt, 2 * 1146, 2 * 1146 + 100);
 }
 
-static void an_echo_is_dropped_when_told(void **)
+static void an_echo_is_dropped_with_setEcho(void **)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -416,7 +419,7 @@ static void the_wait_yields(void **)
     assert_true(bench().yields - before > 4000);
 }
 
-static void a_request_without_a_reply_is_repeated_when_told(void **)
+static void a_request_without_a_reply_is_repeated_with_setRetries(void **)
 {
     mbm_counters counters = {};
     ModbusMaster node;
@@ -479,9 +482,9 @@ int main()
         TEST(a_word_after_bits_starts_a_new_word),
         TEST(callbacks_may_have_a_context),
         TEST(the_driver_can_be_held_on_after_the_flush),
-        TEST(an_echo_is_dropped_when_told),
+        TEST(an_echo_is_dropped_with_setEcho),
         TEST(the_wait_yields),
-        TEST(a_request_without_a_reply_is_repeated_when_told),
+        TEST(a_request_without_a_reply_is_repeated_with_setRetries),
         TEST(a_request_may_be_polled_or_cancelled),
     };
 

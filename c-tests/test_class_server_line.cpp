@@ -18,7 +18,7 @@ static void a_response_begins_after_the_silence(void **)
     last = bench().now;
     hears(server, request);
     assert_in_range(Serial.startedAt - last, 9000, 9000 + 6 * bench().tick);
-    server.setBaudRate(0); // untold: 4 ms
+    server.setBaudRate(0); // unknown baud rate: 4 ms
     last = bench().now;
     hears(server, request);
     assert_in_range(Serial.startedAt - last, 4000, 4000 + 6 * bench().tick);
@@ -136,7 +136,7 @@ static void callbacks_are_handed_their_context(void **)
     assert_int_equal(off, 2);
 }
 
-static void an_echo_of_the_response_is_dropped_if_told_to(void **)
+static void an_echo_of_the_response_is_dropped_if_set_so(void **)
 {
     ModbusRegisterArray<2> registers;
     ModbusServer server;
@@ -249,7 +249,7 @@ int main()
         TEST(a_sketch_may_sleep_for_as_long_as_nothing_is_to_do),
         TEST(the_driver_is_on_while_a_response_leaves),
         TEST(callbacks_are_handed_their_context),
-        TEST(an_echo_of_the_response_is_dropped_if_told_to),
+        TEST(an_echo_of_the_response_is_dropped_if_set_so),
         TEST(a_write_taken_in_pieces_is_one_response),
         TEST(damaged_and_foreign_frames_are_not_answered),
         TEST(ascii_is_served),

@@ -70,37 +70,37 @@ static void a_sketch_sets_what_a_client_reads(void **)
     assert_int_equal(same[1], 513);
 }
 
-static uint16_t told_address, told_quantity, told_count;
+static uint16_t written_address, written_quantity, written_count;
 
-static void a_hook_refuses_a_write_and_another_is_told_of_it(void **)
+static void one_hook_refuses_a_write_and_another_is_called_after_it(void **)
 {
     ModbusRegisterArray<4> registers(10);
     ModbusServer server;
-    told_count = 0;
+    written_count = 0;
     registers.beforeWrite([](uint16_t address, uint16_t quantity, const uint8_t *data) -> uint8_t {
         assert_int_equal(address, 11);
         assert_int_equal(quantity, 1);
         return data[0] > 0x10 ? 4 : 0;
     });
     registers.afterWrite([](uint16_t address, uint16_t quantity) {
-        told_address = address;
-        told_quantity = quantity;
-        told_count++;
+        written_address = address;
+        written_quantity = quantity;
+        written_count++;
     });
     server.holdingRegisters(registers);
     server.begin(17, Serial, 19200);
     answers(server, {17, 6, 0, 11, 0x11, 0}, {17, 0x86, 4});
     assert_int_equal(registers[1], 0);
-    assert_int_equal(told_count, 0);
+    assert_int_equal(written_count, 0);
     answers(server, {17, 6, 0, 11, 0x10, 0}, {17, 6, 0, 11, 0x10, 0});
     assert_int_equal(registers[1], 0x1000);
-    assert_int_equal(told_count, 1);
-    assert_int_equal(told_address, 11);
-    assert_int_equal(told_quantity, 1);
+    assert_int_equal(written_count, 1);
+    assert_int_equal(written_address, 11);
+    assert_int_equal(written_quantity, 1);
     registers.beforeWrite(nullptr);
     registers.afterWrite(nullptr);
     answers(server, {17, 6, 0, 10, 0x11, 0}, {17, 6, 0, 10, 0x11, 0});
-    assert_int_equal(told_count, 1);
+    assert_int_equal(written_count, 1);
 }
 
 static void cells_that_are_not_there_are_refused(void **)
@@ -314,7 +314,7 @@ int main()
         TEST(registers_and_bits_of_arrays_are_served),
         TEST(writes_reach_the_arrays),
         TEST(a_sketch_sets_what_a_client_reads),
-        TEST(a_hook_refuses_a_write_and_another_is_told_of_it),
+        TEST(one_hook_refuses_a_write_and_another_is_called_after_it),
         TEST(cells_that_are_not_there_are_refused),
         TEST(mask_and_read_write_are_served_when_asked_for),
         TEST(a_unit_that_serves_nothing_is_silent),

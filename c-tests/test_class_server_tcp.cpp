@@ -234,7 +234,7 @@ static void what_is_not_modbus_is_hung_up_on(void **)
     assert_int_equal(server.connections(), 0);
 }
 
-static void several_units_are_told_apart(void **)
+static void requests_reach_the_unit_they_address(void **)
 {
     EthernetServer listener(502);
     ModbusTcpServer<EthernetServer> server;
@@ -324,7 +324,7 @@ int main()
         REAL(a_client_without_a_place_is_hung_up_on),
         REAL(the_connection_that_was_idle_for_longest_gives_its_place_up),
         REAL(what_is_not_modbus_is_hung_up_on),
-        REAL(several_units_are_told_apart),
+        REAL(requests_reach_the_unit_they_address),
         REAL(a_hook_cannot_poll_or_begin_its_server),
         REAL(a_connection_that_takes_few_bytes_gets_the_whole_response),
     };

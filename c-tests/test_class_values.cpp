@@ -87,7 +87,7 @@ static void each_type_is_read(void **)
     assert_true(node.getResponseInt32(3, two) && two == 0x2D18FFFE);
 }
 
-static void a_value_past_the_end_is_told_and_never_made_up(void **)
+static void a_value_past_the_end_is_an_error_and_not_invented(void **)
 {
     ModbusMaster node; // 125 words
     float value = 7;
@@ -183,7 +183,7 @@ int main()
         TEST(a_float_is_read_high_word_first),
         TEST(the_order_is_set_for_all_calls_or_named_by_one),
         TEST(each_type_is_read),
-        TEST(a_value_past_the_end_is_told_and_never_made_up),
+        TEST(a_value_past_the_end_is_an_error_and_not_invented),
         TEST(each_type_is_written),
         TEST(what_passes_the_words_to_write_is_refused_with_02),
         TEST(texts_are_read_and_written),

@@ -129,8 +129,8 @@ MEETS_AND_RETRIES(a_response_of_another_id_only_times_out, FAULT_OTHER_ID, 9,
                   MBM_RESPONSE_TIMED_OUT)
 MEETS_AND_RETRIES(a_response_of_another_protocol_times_out, FAULT_WRONG_PROTOCOL, 1,
                   MBM_RESPONSE_TIMED_OUT)
-MEETS_AND_RETRIES(a_response_of_another_unit_is_told, FAULT_WRONG_UNIT, 1, MBM_INVALID_SLAVE_ID)
-MEETS_AND_RETRIES(a_response_of_another_function_is_told, FAULT_WRONG_FUNCTION, 4,
+MEETS_AND_RETRIES(a_response_of_another_unit_is_reported, FAULT_WRONG_UNIT, 1, MBM_INVALID_SLAVE_ID)
+MEETS_AND_RETRIES(a_response_of_another_function_is_reported, FAULT_WRONG_FUNCTION, 4,
                   MBM_INVALID_FUNCTION)
 MEETS_AND_RETRIES(a_length_that_is_too_small_is_malformed, FAULT_SHORT_LENGTH, 2,
                   MBM_MALFORMED_REPLY)
@@ -204,8 +204,8 @@ int main(void)
         BOTH(a_late_response_answers_nothing_else),
         BOTH(a_response_of_another_id_only_times_out),
         BOTH(a_response_of_another_protocol_times_out),
-        BOTH(a_response_of_another_unit_is_told),
-        BOTH(a_response_of_another_function_is_told),
+        BOTH(a_response_of_another_unit_is_reported),
+        BOTH(a_response_of_another_function_is_reported),
         BOTH(a_length_that_is_too_small_is_malformed),
         TEST(responses_in_another_order_are_matched),
         TEST(responses_in_one_segment_are_separated),

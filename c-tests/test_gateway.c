@@ -280,12 +280,12 @@ static void a_line_that_waits_does_not_delay_another(void **state)
     (void)state;
     modbus_set_slave(client, SERVED_UNIT);
     for (i = attempts = 0; i < 5 && attempts < ATTEMPTS; attempts++) {
-        struct pollfd told = {fd, POLLIN, 0};
+        struct pollfd pending = {fd, POLLIN, 0};
 
         assert_int_equal(write(fd, absent, sizeof absent), sizeof absent);
-        for (i = 0; i < 5 && poll(&told, 1, 0) == 0; i++)
+        for (i = 0; i < 5 && poll(&pending, 1, 0) == 0; i++)
             assert_int_equal(modbus_read_registers(client, SERVED_BASE, 1, &word), 1);
-        i = poll(&told, 1, 0) == 0 ? i : 0;
+        i = poll(&pending, 1, 0) == 0 ? i : 0;
         assert_int_equal(asked_bytes(fd, absent, 0, answer, 9), 9);
         assert_int_equal(answer[8], 0x0B);
     }

@@ -143,7 +143,7 @@ static void run(modbus_t *client)
 static const uint8_t functions[CALLS] = {1, 2, 3, 4, 5, 6, 15, 16, 17, 22, 23, 3};
 
 /* Compares the events with the calls and with the server's memory. */
-static void assert_told(const modbus_mapping_t *mapping)
+static void assert_all_reported(const modbus_mapping_t *mapping)
 {
     const reported *t = line.events;
     uint32_t took = micros() - line.begun;
@@ -193,7 +193,7 @@ static void frames_of_libmodbus_on_a_serial_line_are_reported(void **state)
     assert_int_equal(modbus_connect(client), 0);
     run(client);
     stop_listening();
-    assert_told(device.mapping);
+    assert_all_reported(device.mapping);
     modbus_close(client);
     modbus_free(client);
     server_stop(&device);
@@ -218,7 +218,7 @@ static void over_tcp(uint8_t apart)
     listen_between(to_client, to_server, MBM_FRAMING_TCP, apart);
     run(client);
     stop_listening();
-    assert_told(device.mapping);
+    assert_all_reported(device.mapping);
     modbus_close(client);
     modbus_free(client);
     close(to_server);

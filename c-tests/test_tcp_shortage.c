@@ -357,11 +357,11 @@ static void a_failed_lookup_keeps_its_reason(void **state)
     (void)state;
     memset(&place, 0, sizeof place);
     assert_int_equal(mbm_tcp_open(&place, &addresses, "no such host", "502"), -1);
-    assert_int_not_equal(place.lookup, 0);
+    assert_int_not_equal(place.lookupError, 0);
     assert_int_equal(mbm_tcp_listen(&other, NULL, "no-such-service"), -1);
-    assert_int_equal(other.lookup, EAI_SERVICE);
+    assert_int_equal(other.lookupError, EAI_SERVICE);
     assert_int_equal(mbm_tcp_listen(&other, "127.0.0.1", "0"), 0);
-    assert_int_equal(other.lookup, 0);
+    assert_int_equal(other.lookupError, 0);
     mbm_tcp_closeListener(&other);
 }
 

@@ -41,6 +41,7 @@
 #include <stdint.h>
 
 #include "ModbusClientCalls.h"
+#include "ModbusHooks.h"
 #include "ModbusMasterBoards.h"
 #include "ModbusStatusText.h"
 #include "mbm.h"
@@ -66,7 +67,8 @@
  * A client of one serial line, in RTU or ASCII frames. One request at a time is under way.
  * poll waits in one case: at the end of a request, until the Stream's flush returns.
  */
-class ModbusSerialClient : public ModbusClient {
+class ModbusSerialClient : public ModbusClient,
+                           public ModbusTransmissionHooks<ModbusSerialClient> {
 public:
     /** Touches neither clock nor port. */
     ModbusSerialClient() : stream(), onPre(), onPost() {}
@@ -90,18 +92,6 @@ public:
     /** As begin, with ASCII instead of RTU. */
     uint8_t beginAscii(Stream &line) { return attach(mbm_client_beginAscii, line); }
 
-    /** Sets a callback before each request (RS-485 driver on); nullptr for none. */
-    void preTransmission(void (*callback)()) { set(onPre, callback); }
-    /** As preTransmission(callback), with `context` as its argument. */
-    void preTransmission(void (*callback)(void *), void *context) { set(onPre, callback, context); }
-    /** Sets a callback after the last bit of each request (RS-485 driver off); nullptr for none. */
-    void postTransmission(void (*callback)()) { set(onPost, callback); }
-    /** As postTransmission(callback), with `context` as its argument. */
-    void postTransmission(void (*callback)(void *), void *context)
-    {
-        set(onPost, callback, context);
-    }
-
     /** Bits per second, from which t3.5 follows; 0: unknown, a silence of 4 ms. The Stream stays as it is. */
     uint8_t setBaudRate(uint32_t baud) { return mbm_client_setBaudRate(&client, baud); }
     /** Microseconds of silence before a request, instead of t3.5. */
@@ -124,15 +114,15 @@ private:
     static_assert(MODBUSCLIENT_FRAME_BYTES >= 17 && MODBUSCLIENT_FRAME_BYTES <= 513,
                   "MODBUSCLIENT_FRAME_BYTES is 17 to 513");
 
-    struct Callback {
-        void (*function)(void *);
-        void *context;
-    };
+    friend class ModbusTransmissionHooks<ModbusSerialClient>;
 
     Stream *stream;
-    Callback onPre;
-    Callback onPost;
+    ModbusHook onPre;
+    ModbusHook onPost;
     uint8_t frame[MODBUSCLIENT_FRAME_BYTES];
+
+    ModbusHook &preHookOf() { return onPre; }
+    ModbusHook &postHookOf() { return onPost; }
 
     static ModbusSerialClient &clientOf(void *context)
     {
@@ -145,34 +135,10 @@ private:
         uint8_t status = reset();
         if (status != MBM_OK)
             return status;
-        mbm_port port;
-        port.context = this;
-        port.read = readHook;
-        port.write = writeHook;
-        port.micros = clockHook;
-        port.flush = flushHook;
-        port.preTransmission = preHook;
-        port.postTransmission = postHook;
-        port.idle = nullptr;
+        const mbm_port port = modbusPort(this, readHook, writeHook, clockHook, flushHook, preHook,
+                                         postHook);
         stream = &line;
         return beginFraming(&client, &port, frame, MODBUSCLIENT_FRAME_BYTES);
-    }
-
-    static void withoutContext(void *callback) { reinterpret_cast<void (*)()>(callback)(); }
-
-    static void set(Callback &callback, void (*function)(void *), void *context)
-    {
-        callback.function = function;
-        callback.context = context;
-    }
-    static void set(Callback &callback, void (*function)())
-    {
-        set(callback, function != nullptr ? withoutContext : nullptr, reinterpret_cast<void *>(function));
-    }
-    static void call(const Callback &callback)
-    {
-        if (callback.function != nullptr)
-            callback.function(callback.context);
     }
 
     static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)
@@ -196,8 +162,8 @@ private:
         clientOf(context).stream->flush();
         return 1;
     }
-    static void preHook(void *context) { call(clientOf(context).onPre); }
-    static void postHook(void *context) { call(clientOf(context).onPost); }
+    static void preHook(void *context) { clientOf(context).onPre.call(); }
+    static void postHook(void *context) { clientOf(context).onPost.call(); }
 };
 
 /**
@@ -279,16 +245,8 @@ private:
 
     mbm_port portOf(Client &connection)
     {
-        mbm_port port;
-        port.context = link = &connection;
-        port.read = readHook;
-        port.write = writeHook;
-        port.micros = clockHook;
-        port.flush = nullptr;
-        port.preTransmission = nullptr;
-        port.postTransmission = nullptr;
-        port.idle = nullptr;
-        return port;
+        link = &connection;
+        return modbusPort(link, readHook, writeHook, clockHook);
     }
 
     static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)

@@ -21,6 +21,7 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "ModbusHooks.h"
 #include "ModbusMasterBoards.h"
 #include "ModbusMasterConstants.h"
 #include "ModbusMasterHelpers.h"
@@ -40,7 +41,9 @@
  * return ku8MBBusy. From preTransmission and postTransmission every call on the same
  * object returns ku8MBBusy and changes nothing, except those that read, set or clear words.
  */
-class ModbusMaster : public ModbusMasterStatics<void>, public ModbusMasterValues<ModbusMaster> {
+class ModbusMaster : public ModbusMasterStatics<void>,
+                     public ModbusMasterValues<ModbusMaster>,
+                     public ModbusTransmissionHooks<ModbusMaster> {
 public:
     /** Slave 1; begin(baud) opens Serial. Touches neither clock nor port. */
     ModbusMaster() : state() { setBuffers(); }
@@ -129,25 +132,9 @@ public:
 #endif
 
     /** Sets a callback that is called repeatedly while a reply is awaited; nullptr for none. */
-    void idle(void (*callback)()) { set(state.onIdle, callback); }
+    void idle(void (*callback)()) { state.onIdle.set(callback); }
     /** As idle(callback), with `context` as its argument. */
-    void idle(void (*callback)(void *), void *context) { set(state.onIdle, callback, context); }
-
-    /** Sets a callback before each request (RS-485 driver on); nullptr for none. */
-    void preTransmission(void (*callback)()) { set(state.onPre, callback); }
-    /** As preTransmission(callback), with `context` as its argument. */
-    void preTransmission(void (*callback)(void *), void *context)
-    {
-        set(state.onPre, callback, context);
-    }
-
-    /** Sets a callback after the last bit of each request (RS-485 driver off); nullptr for none. */
-    void postTransmission(void (*callback)()) { set(state.onPost, callback); }
-    /** As postTransmission(callback), with `context` as its argument. */
-    void postTransmission(void (*callback)(void *), void *context)
-    {
-        set(state.onPost, callback, context);
-    }
+    void idle(void (*callback)(void *), void *context) { state.onIdle.set(callback, context); }
 
     /** A word of the last successful read; 0xFFFF past the end of the buffer. */
     uint16_t getResponseBuffer(uint8_t index) const
@@ -349,20 +336,16 @@ private:
     typedef ModbusMasterPorts<void> Ports;
     typedef ModbusMasterTurn<void> Turn;
 
-    struct Callback {
-        void (*function)(void *);
-        void *context;
-    };
-
     friend class ModbusMasterValues<ModbusMaster>;
+    friend class ModbusTransmissionHooks<ModbusMaster>;
 
     struct State {
         // The members that the hooks use come first: AVR reaches 63 bytes with one instruction.
         Stream *stream;
         Stream *counting; // the last Stream whose write returned another number than 0
-        Callback onIdle;
-        Callback onPre;
-        Callback onPost;
+        ModbusHook onIdle;
+        ModbusHook onPre;
+        ModbusHook onPost;
         bool sent; // the request is on the wire, so a reply is waited for
         uint8_t port;
         mbm_master master;
@@ -376,6 +359,9 @@ private:
     State state;
 
     static State &stateOf(void *context) { return *static_cast<State *>(context); }
+
+    ModbusHook &preHookOf() { return state.onPre; }
+    ModbusHook &postHookOf() { return state.onPost; }
 
     void setBuffers()
     {
@@ -424,23 +410,6 @@ private:
     uint8_t sendWord(uint16_t word) { return mbm_master_send(&state.master, word); }
     uint8_t sendWords(uint32_t words) { return mbm_master_send32(&state.master, words); }
 
-    static void withoutContext(void *callback) { reinterpret_cast<void (*)()>(callback)(); }
-
-    static void set(Callback &callback, void (*function)(void *), void *context)
-    {
-        callback.function = function;
-        callback.context = context;
-    }
-    static void set(Callback &callback, void (*function)())
-    {
-        set(callback, function != nullptr ? withoutContext : nullptr, reinterpret_cast<void *>(function));
-    }
-    static void call(const Callback &callback)
-    {
-        if (callback.function != nullptr)
-            callback.function(callback.context);
-    }
-
     static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)
     {
         Stream &stream = *stateOf(context).stream;
@@ -483,19 +452,19 @@ private:
         stateOf(context).stream->flush();
         return 1;
     }
-    static void preHook(void *context) { call(stateOf(context).onPre); }
+    static void preHook(void *context) { stateOf(context).onPre.call(); }
     static void postHook(void *context)
     {
         stateOf(context).sent = true;
         Turn::used();
-        call(stateOf(context).onPost);
+        stateOf(context).onPost.call();
     }
     static void idleHook(void *context, mbm_master *)
     {
         State &state = stateOf(context);
         if (state.sent) {
             MODBUSMASTER_DEBUG(B, true);
-            call(state.onIdle);
+            state.onIdle.call();
             MODBUSMASTER_DEBUG(B, false);
             state.sent = true; // a refused request of the callback has cleared it
         }

@@ -9,9 +9,9 @@
 #ifndef MODBUSMASTER_VALUES_H
 #define MODBUSMASTER_VALUES_H
 
-#include <math.h>
 #include <stdint.h>
 
+#include "ModbusNumbers.h"
 #include "mbm.h"
 
 /**
@@ -26,17 +26,10 @@
  * The members that set a value return ku8MBSuccess, or 0x02 with nothing set if the
  * value extends past the buffer.
  */
-template <typename Master> class ModbusMasterValues {
+template <typename Master>
+class ModbusMasterValues : public ModbusWordOrder,
+                           public ModbusNumbers<ModbusMasterValues<Master>> {
 public:
-    /** How a device lays 0xAABBCCDD out, byte by byte, in two registers. */
-    enum WordOrder : uint8_t {
-        orderDefault = MBM_ORDER_DEFAULT, /**< as setWordOrder says */
-        orderABCD = MBM_ORDER_ABCD,       /**< high word first: most devices */
-        orderCDAB = MBM_ORDER_CDAB,       /**< low word first, as send does */
-        orderBADC = MBM_ORDER_BADC,       /**< high word first, low byte first */
-        orderDCBA = MBM_ORDER_DCBA        /**< low word first, low byte first */
-    };
-
     /** The order of values for calls without an order; orderABCD at first. */
     void setWordOrder(WordOrder order) { mbm_master_setWordOrder(&core(), order); }
 
@@ -48,22 +41,18 @@ public:
     /** As above; 0 past the end of the buffer. */
     uint16_t getResponseUInt16(uint8_t index, WordOrder order = orderDefault) const
     {
-        uint16_t value = 0;
-        getResponseUInt16(index, value, order);
-        return value;
+        return valueOf(mbm_registers_getUint16, index, order, uint16_t{0});
     }
 
     /** An integer in the response: a word, -32768 to 32767. */
     bool getResponseInt16(uint8_t index, int16_t &value, WordOrder order = orderDefault) const
     {
-        return getSigned(mbm_registers_getUint16, index, value, order);
+        return get(mbm_registers_getUint16, index, value, order);
     }
     /** As above; 0 past the end of the buffer. */
     int16_t getResponseInt16(uint8_t index, WordOrder order = orderDefault) const
     {
-        int16_t value = 0;
-        getResponseInt16(index, value, order);
-        return value;
+        return valueOf(mbm_registers_getUint16, index, order, int16_t{0});
     }
 
     /** An integer in the response: two words, 0 to 4294967295. */
@@ -74,22 +63,18 @@ public:
     /** As above; 0 past the end of the buffer. */
     uint32_t getResponseUInt32(uint8_t index, WordOrder order = orderDefault) const
     {
-        uint32_t value = 0;
-        getResponseUInt32(index, value, order);
-        return value;
+        return valueOf(mbm_registers_getUint32, index, order, uint32_t{0});
     }
 
     /** An integer in the response: two words, two's complement. */
     bool getResponseInt32(uint8_t index, int32_t &value, WordOrder order = orderDefault) const
     {
-        return getSigned(mbm_registers_getUint32, index, value, order);
+        return get(mbm_registers_getUint32, index, value, order);
     }
     /** As above; 0 past the end of the buffer. */
     int32_t getResponseInt32(uint8_t index, WordOrder order = orderDefault) const
     {
-        int32_t value = 0;
-        getResponseInt32(index, value, order);
-        return value;
+        return valueOf(mbm_registers_getUint32, index, order, int32_t{0});
     }
 
     /** An integer in the response: four words, without a sign. */
@@ -100,22 +85,18 @@ public:
     /** As above; 0 past the end of the buffer. */
     uint64_t getResponseUInt64(uint8_t index, WordOrder order = orderDefault) const
     {
-        uint64_t value = 0;
-        getResponseUInt64(index, value, order);
-        return value;
+        return valueOf(mbm_registers_getUint64, index, order, uint64_t{0});
     }
 
     /** An integer in the response: four words, two's complement. */
     bool getResponseInt64(uint8_t index, int64_t &value, WordOrder order = orderDefault) const
     {
-        return getSigned(mbm_registers_getUint64, index, value, order);
+        return get(mbm_registers_getUint64, index, value, order);
     }
     /** As above; 0 past the end of the buffer. */
     int64_t getResponseInt64(uint8_t index, WordOrder order = orderDefault) const
     {
-        int64_t value = 0;
-        getResponseInt64(index, value, order);
-        return value;
+        return valueOf(mbm_registers_getUint64, index, order, int64_t{0});
     }
 
     /** A float in the response: two words, IEEE 754. */
@@ -126,9 +107,7 @@ public:
     /** As above; NAN past the end of the buffer. */
     float getResponseFloat(uint8_t index, WordOrder order = orderDefault) const
     {
-        float value = NAN;
-        getResponseFloat(index, value, order);
-        return value;
+        return valueOf(mbm_registers_getFloat, index, order, NAN);
     }
 
     /** A double in the response: four words, IEEE 754; rounded where a double has 32 bits, as on AVR. */
@@ -139,10 +118,7 @@ public:
     /** As above; NAN past the end of the buffer. */
     double getResponseDouble(uint8_t index, WordOrder order = orderDefault) const
     {
-        const float none = NAN;
-        double value = static_cast<double>(none);
-        getResponseDouble(index, value, order);
-        return value;
+        return valueOf(mbm_registers_getDouble, index, order, notANumber());
     }
 
     /**
@@ -159,18 +135,20 @@ public:
     bool getResponseString(uint8_t index, uint8_t length, char *text, uint16_t size,
                            WordOrder order = orderDefault) const
     {
-        mbm_registers words;
-        return response(words) &&
-               mbm_registers_getString(&words, index, length, order, text, size) == MBM_OK;
+        mbm_registers space;
+        const mbm_registers *words;
+        return toRead(space, words) == MBM_OK &&
+               mbm_registers_getString(words, index, length, order, text, size) == MBM_OK;
     }
 
     /** Whether a coil or input of the response is on: `bit` 0 is the first one read. */
     bool getResponseBit(uint16_t bit, bool &on) const
     {
-        mbm_registers words;
+        mbm_registers space;
+        const mbm_registers *words;
         uint8_t value;
-        bool found = response(words) &&
-                     mbm_registers_getBit(&words, bit / 16, bit % 16, &value) == MBM_OK;
+        bool found = toRead(space, words) == MBM_OK &&
+                     mbm_registers_getBit(words, bit / 16, bit % 16, &value) == MBM_OK;
         if (found)
             on = value != 0;
         return found;
@@ -186,66 +164,49 @@ public:
     /** Sets an integer to write: a word, 0 to 65535; only the bytes of its order matter. */
     uint8_t setTransmitUInt16(uint8_t index, uint16_t value, WordOrder order = orderDefault)
     {
-        mbm_registers words;
-        uint8_t status = transmit(words);
-        return status == MBM_OK ? mbm_registers_setUint16(&words, index, order, value) : status;
+        return set(mbm_registers_setUint16, index, order, value);
     }
 
     /** Sets an integer to write: a word, -32768 to 32767. */
     uint8_t setTransmitInt16(uint8_t index, int16_t value, WordOrder order = orderDefault)
     {
-        mbm_registers words;
-        uint8_t status = transmit(words);
-        return status == MBM_OK ? mbm_registers_setUint16(&words, index, order, static_cast<uint16_t>(value)) : status;
+        return set(mbm_registers_setUint16, index, order, static_cast<uint16_t>(value));
     }
 
     /** Sets an integer to write: two words, 0 to 4294967295. */
     uint8_t setTransmitUInt32(uint8_t index, uint32_t value, WordOrder order = orderDefault)
     {
-        mbm_registers words;
-        uint8_t status = transmit(words);
-        return status == MBM_OK ? mbm_registers_setUint32(&words, index, order, value) : status;
+        return set(mbm_registers_setUint32, index, order, value);
     }
 
     /** Sets an integer to write: two words, two's complement. */
     uint8_t setTransmitInt32(uint8_t index, int32_t value, WordOrder order = orderDefault)
     {
-        mbm_registers words;
-        uint8_t status = transmit(words);
-        return status == MBM_OK ? mbm_registers_setUint32(&words, index, order, static_cast<uint32_t>(value)) : status;
+        return set(mbm_registers_setUint32, index, order, static_cast<uint32_t>(value));
     }
 
     /** Sets an integer to write: four words, without a sign. */
     uint8_t setTransmitUInt64(uint8_t index, uint64_t value, WordOrder order = orderDefault)
     {
-        mbm_registers words;
-        uint8_t status = transmit(words);
-        return status == MBM_OK ? mbm_registers_setUint64(&words, index, order, &value) : status;
+        return set(mbm_registers_setUint64, index, order, value);
     }
 
     /** Sets an integer to write: four words, two's complement. */
     uint8_t setTransmitInt64(uint8_t index, int64_t value, WordOrder order = orderDefault)
     {
-        mbm_registers words;
-        uint8_t status = transmit(words);
-        const uint64_t bits = static_cast<uint64_t>(value);
-        return status == MBM_OK ? mbm_registers_setUint64(&words, index, order, &bits) : status;
+        return set(mbm_registers_setUint64, index, order, static_cast<uint64_t>(value));
     }
 
     /** Sets a float to write: two words, IEEE 754. */
     uint8_t setTransmitFloat(uint8_t index, float value, WordOrder order = orderDefault)
     {
-        mbm_registers words;
-        uint8_t status = transmit(words);
-        return status == MBM_OK ? mbm_registers_setFloat(&words, index, order, &value) : status;
+        return set(mbm_registers_setFloat, index, order, value);
     }
 
     /** Sets a double to write: four words, IEEE 754; rounded where a double has 32 bits, as on AVR. */
     uint8_t setTransmitDouble(uint8_t index, double value, WordOrder order = orderDefault)
     {
-        mbm_registers words;
-        uint8_t status = transmit(words);
-        return status == MBM_OK ? mbm_registers_setDouble(&words, index, order, &value) : status;
+        return set(mbm_registers_setDouble, index, order, value);
     }
 
     /**
@@ -261,47 +222,42 @@ public:
     uint8_t setTransmitString(uint8_t index, uint8_t length, const char *text,
                               WordOrder order = orderDefault)
     {
-        mbm_registers words;
-        uint8_t status = transmit(words);
-        return status == MBM_OK ? mbm_registers_setString(&words, index, length, order, text)
+        mbm_registers space;
+        const mbm_registers *words;
+        const uint8_t status = toWrite(space, words);
+        return status == MBM_OK ? mbm_registers_setString(words, index, length, order, text)
                                 : status;
     }
 
     /** Sets a coil to write: `bit` 0 is the first one written. */
     uint8_t setTransmitBit(uint16_t bit, bool on)
     {
-        mbm_registers words;
-        uint8_t status = transmit(words);
-        return status == MBM_OK ? mbm_registers_setBit(&words, bit / 16, bit % 16, on) : status;
+        mbm_registers space;
+        const mbm_registers *words;
+        const uint8_t status = toWrite(space, words);
+        return status == MBM_OK ? mbm_registers_setBit(words, bit / 16, bit % 16, on) : status;
     }
 
 private:
+    typedef ModbusNumbers<ModbusMasterValues> Numbers;
+    friend Numbers;
+    using Numbers::get;
+    using Numbers::notANumber;
+    using Numbers::set;
+    using Numbers::valueOf;
+
     const mbm_master &core() const { return static_cast<const Master *>(this)->state.master; }
     mbm_master &core() { return static_cast<Master *>(this)->state.master; }
 
-    bool response(mbm_registers &words) const
+    uint8_t toRead(mbm_registers &space, const mbm_registers *&words) const
     {
-        return mbm_master_getResponseRegisters(&core(), 0, &words) == MBM_OK;
+        words = &space;
+        return mbm_master_getResponseRegisters(&core(), 0, &space);
     }
-    uint8_t transmit(mbm_registers &words)
+    uint8_t toWrite(mbm_registers &space, const mbm_registers *&words)
     {
-        return mbm_master_getTransmitRegisters(&core(), 0, &words);
-    }
-
-    template <typename Value>
-    bool get(uint8_t (*getter)(const mbm_registers *, uint16_t, uint8_t, Value *), uint8_t index,
-             Value &value, WordOrder order) const
-    {
-        mbm_registers words;
-        return response(words) && getter(&words, index, order, &value) == MBM_OK;
-    }
-
-    /* A signed number may be written through a pointer to the unsigned type of its size. */
-    template <typename Unsigned, typename Signed>
-    bool getSigned(uint8_t (*getter)(const mbm_registers *, uint16_t, uint8_t, Unsigned *),
-                   uint8_t index, Signed &value, WordOrder order) const
-    {
-        return get(getter, index, reinterpret_cast<Unsigned &>(value), order);
+        words = &space;
+        return mbm_master_getTransmitRegisters(&core(), 0, &space);
     }
 };
 

@@ -32,6 +32,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "ModbusHooks.h"
 #include "ModbusMasterBoards.h"
 #include "ModbusServerTables.h"
 #include "ModbusStatusText.h"
@@ -150,7 +151,7 @@ private:
  * after t3.5 of silence, and a Stream that buffers 64 bytes loses bytes if poll
  * does not read it in time. Use an object from one thread, never from an interrupt.
  */
-class ModbusServer : public ModbusUnit {
+class ModbusServer : public ModbusUnit, public ModbusTransmissionHooks<ModbusServer> {
 public:
     /** Touches neither clock nor port. */
     ModbusServer() : state() {}
@@ -205,22 +206,6 @@ public:
      */
     uint32_t pollDelay() const { return mbm_server_pollDelay(&state.server); }
 
-    /** Sets a callback before each response (RS-485 driver on); nullptr for none. */
-    void preTransmission(void (*callback)()) { set(state.onPre, callback); }
-    /** As preTransmission(callback), with `context` as its argument. */
-    void preTransmission(void (*callback)(void *), void *context)
-    {
-        set(state.onPre, callback, context);
-    }
-
-    /** Sets a callback after the last bit of each response (RS-485 driver off); nullptr for none. */
-    void postTransmission(void (*callback)()) { set(state.onPost, callback); }
-    /** As postTransmission(callback), with `context` as its argument. */
-    void postTransmission(void (*callback)(void *), void *context)
-    {
-        set(state.onPost, callback, context);
-    }
-
     /**
      * Bits per second, from which t3.5 follows; 0: unknown, 4 ms. The Stream stays as it
      * is. It has no effect before begin, and after beginAscii, because ASCII has no t3.5.
@@ -253,16 +238,13 @@ private:
 
     enum : uint8_t { shortWait = 100 }; // microseconds
 
-    struct Callback {
-        void (*function)(void *);
-        void *context;
-    };
+    friend class ModbusTransmissionHooks<ModbusServer>;
 
     // The hooks' context. The members that they use come first, as in ModbusMaster.
     struct State {
         Stream *stream;
-        Callback onPre;
-        Callback onPost;
+        ModbusHook onPre;
+        ModbusHook onPost;
         uint32_t receivedAt; // microseconds: when the last byte was read
         uint32_t silence;
         bool ready; // a response waits for the silence to end
@@ -275,19 +257,15 @@ private:
 
     static State &stateOf(void *context) { return *static_cast<State *>(context); }
 
+    ModbusHook &preHookOf() { return state.onPre; }
+    ModbusHook &postHookOf() { return state.onPost; }
+
     uint8_t listen(uint8_t (*beginFraming)(mbm_server *, const mbm_port *, mbm_unit *, uint8_t,
                                          uint8_t *, uint16_t),
                    ModbusUnit &first, uint8_t count, Stream &stream)
     {
-        mbm_port port;
-        port.context = &state;
-        port.read = readHook;
-        port.write = writeHook;
-        port.micros = clockHook;
-        port.flush = flushHook;
-        port.preTransmission = preHook;
-        port.postTransmission = postHook;
-        port.idle = nullptr;
+        const mbm_port port = modbusPort(&state, readHook, writeHook, clockHook, flushHook,
+                                         preHook, postHook);
         uint8_t status = beginFraming(&state.server, &port, &first.unit, count, state.frame,
                              MODBUSSERVER_FRAME_BYTES);
         if (status == MBM_OK) {
@@ -314,23 +292,6 @@ private:
         return status;
     }
 
-    static void withoutContext(void *callback) { reinterpret_cast<void (*)()>(callback)(); }
-
-    static void set(Callback &callback, void (*function)(void *), void *context)
-    {
-        callback.function = function;
-        callback.context = context;
-    }
-    static void set(Callback &callback, void (*function)())
-    {
-        set(callback, function != nullptr ? withoutContext : nullptr, reinterpret_cast<void *>(function));
-    }
-    static void call(const Callback &callback)
-    {
-        if (callback.function != nullptr)
-            callback.function(callback.context);
-    }
-
     static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)
     {
         Stream &stream = *stateOf(context).stream;
@@ -351,7 +312,7 @@ private:
             while (clockHook(context) - state.receivedAt < state.silence) {
             }
             state.ready = false;
-            call(state.onPre);
+            state.onPre.call();
         }
         // Byte by byte, and the result is ignored: some Streams return 0 for a byte that they send.
         for (uint16_t i = 0; i < length; i++)
@@ -366,7 +327,7 @@ private:
     }
     // The driver stays off until the silence has passed.
     static void preHook(void *context) { stateOf(context).ready = true; }
-    static void postHook(void *context) { call(stateOf(context).onPost); }
+    static void postHook(void *context) { stateOf(context).onPost.call(); }
 };
 
 #endif

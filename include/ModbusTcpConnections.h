@@ -13,6 +13,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "ModbusHooks.h"
 #include "mbm.h"
 
 /** @cond the macros are explained in ModbusTcpServer.h */
@@ -163,15 +164,7 @@ private:
     void open(uint8_t index, const Link &link, uint32_t now)
     {
         Place &place = places[index];
-        mbm_port port;
-        port.context = &place;
-        port.read = readHook;
-        port.write = writeHook;
-        port.micros = clockHook;
-        port.flush = nullptr;
-        port.preTransmission = nullptr;
-        port.postTransmission = nullptr;
-        port.idle = nullptr;
+        const mbm_port port = modbusPort(&place, readHook, writeHook, clockHook);
         uint8_t count = 1;
         mbm_unit *units = static_cast<Derived *>(this)->unitsOf(index, count);
         place.server = mbm_server();

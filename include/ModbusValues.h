@@ -9,10 +9,10 @@
 #ifndef MODBUSVALUES_H
 #define MODBUSVALUES_H
 
-#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
 
+#include "ModbusNumbers.h"
 #include "mbm.h"
 
 /**
@@ -26,17 +26,8 @@
  * The members that set a value return MBM_OK, or MBM_ILLEGAL_DATA_ADDRESS with nothing set
  * if the value extends past the words.
  */
-class ModbusValues {
+class ModbusValues : public ModbusWordOrder, public ModbusNumbers<ModbusValues> {
 public:
-    /** How a device lays 0xAABBCCDD out, byte by byte, in two registers. */
-    enum WordOrder : uint8_t {
-        orderDefault = MBM_ORDER_DEFAULT, /**< as setWordOrder says */
-        orderABCD = MBM_ORDER_ABCD,       /**< high word first: most devices */
-        orderCDAB = MBM_ORDER_CDAB,       /**< low word first */
-        orderBADC = MBM_ORDER_BADC,       /**< high word first, low byte first */
-        orderDCBA = MBM_ORDER_DCBA        /**< low word first, low byte first */
-    };
-
     ModbusValues(const ModbusValues &) = delete;
     ModbusValues &operator=(const ModbusValues &) = delete;
 
@@ -52,99 +43,82 @@ public:
     /** An integer: a word, 0 to 65535; only the bytes of its order matter. */
     bool getUInt16(uint16_t index, uint16_t &value, WordOrder order = orderDefault) const
     {
-        return mbm_registers_getUint16(&view, index, order, &value) == MBM_OK;
+        return get(mbm_registers_getUint16, index, value, order);
     }
     /** @copydoc getUInt16 */
     uint16_t getUInt16(uint16_t index, WordOrder order = orderDefault) const
     {
-        uint16_t value = 0;
-        getUInt16(index, value, order);
-        return value;
+        return valueOf(mbm_registers_getUint16, index, order, uint16_t{0});
     }
     /** An integer: a word, -32768 to 32767. */
     bool getInt16(uint16_t index, int16_t &value, WordOrder order = orderDefault) const
     {
-        return mbm_registers_getUint16(&view, index, order, (uint16_t *)&value) == MBM_OK;
+        return get(mbm_registers_getUint16, index, value, order);
     }
     /** @copydoc getInt16 */
     int16_t getInt16(uint16_t index, WordOrder order = orderDefault) const
     {
-        int16_t value = 0;
-        getInt16(index, value, order);
-        return value;
+        return valueOf(mbm_registers_getUint16, index, order, int16_t{0});
     }
     /** An integer: two words, 0 to 4294967295. */
     bool getUInt32(uint16_t index, uint32_t &value, WordOrder order = orderDefault) const
     {
-        return mbm_registers_getUint32(&view, index, order, &value) == MBM_OK;
+        return get(mbm_registers_getUint32, index, value, order);
     }
     /** @copydoc getUInt32 */
     uint32_t getUInt32(uint16_t index, WordOrder order = orderDefault) const
     {
-        uint32_t value = 0;
-        getUInt32(index, value, order);
-        return value;
+        return valueOf(mbm_registers_getUint32, index, order, uint32_t{0});
     }
     /** An integer: two words, two's complement. */
     bool getInt32(uint16_t index, int32_t &value, WordOrder order = orderDefault) const
     {
-        return mbm_registers_getUint32(&view, index, order, (uint32_t *)&value) == MBM_OK;
+        return get(mbm_registers_getUint32, index, value, order);
     }
     /** @copydoc getInt32 */
     int32_t getInt32(uint16_t index, WordOrder order = orderDefault) const
     {
-        int32_t value = 0;
-        getInt32(index, value, order);
-        return value;
+        return valueOf(mbm_registers_getUint32, index, order, int32_t{0});
     }
     /** An integer: four words, without a sign. */
     bool getUInt64(uint16_t index, uint64_t &value, WordOrder order = orderDefault) const
     {
-        return mbm_registers_getUint64(&view, index, order, &value) == MBM_OK;
+        return get(mbm_registers_getUint64, index, value, order);
     }
     /** @copydoc getUInt64 */
     uint64_t getUInt64(uint16_t index, WordOrder order = orderDefault) const
     {
-        uint64_t value = 0;
-        getUInt64(index, value, order);
-        return value;
+        return valueOf(mbm_registers_getUint64, index, order, uint64_t{0});
     }
     /** An integer: four words, two's complement. */
     bool getInt64(uint16_t index, int64_t &value, WordOrder order = orderDefault) const
     {
-        return mbm_registers_getUint64(&view, index, order, (uint64_t *)&value) == MBM_OK;
+        return get(mbm_registers_getUint64, index, value, order);
     }
     /** @copydoc getInt64 */
     int64_t getInt64(uint16_t index, WordOrder order = orderDefault) const
     {
-        int64_t value = 0;
-        getInt64(index, value, order);
-        return value;
+        return valueOf(mbm_registers_getUint64, index, order, int64_t{0});
     }
     /** A float: two words, IEEE 754. */
     bool getFloat(uint16_t index, float &value, WordOrder order = orderDefault) const
     {
-        return mbm_registers_getFloat(&view, index, order, &value) == MBM_OK;
+        return get(mbm_registers_getFloat, index, value, order);
     }
     /** @copydoc getFloat */
     float getFloat(uint16_t index, WordOrder order = orderDefault) const
     {
-        float value = NAN;
-        getFloat(index, value, order);
-        return value;
+        return valueOf(mbm_registers_getFloat, index, order, NAN);
     }
     /** A double: four words, IEEE 754; rounded where a double has 32 bits, as on AVR. */
     bool getDouble(uint16_t index, double &value, WordOrder order = orderDefault) const
     {
-        return mbm_registers_getDouble(&view, index, order, &value) == MBM_OK;
+        return get(mbm_registers_getDouble, index, value, order);
     }
     /** @copydoc getDouble */
     double getDouble(uint16_t index, WordOrder order = orderDefault) const
     {
-        const float none = NAN;
-        double value = static_cast<double>(none);
-        getDouble(index, value, order);
-        return value;
+        return valueOf(mbm_registers_getDouble, index, order, notANumber());
     }
     /**
      * A text, up to its first NUL or the end of its field.
@@ -166,42 +140,42 @@ public:
     /** Sets an integer: a word, 0 to 65535; only the bytes of its order matter. */
     uint8_t setUInt16(uint16_t index, uint16_t value, WordOrder order = orderDefault)
     {
-        return mbm_registers_setUint16(&view, index, order, value);
+        return set(mbm_registers_setUint16, index, order, value);
     }
     /** Sets an integer: a word, -32768 to 32767. */
     uint8_t setInt16(uint16_t index, int16_t value, WordOrder order = orderDefault)
     {
-        return mbm_registers_setUint16(&view, index, order, (uint16_t)value);
+        return set(mbm_registers_setUint16, index, order, static_cast<uint16_t>(value));
     }
     /** Sets an integer: two words, 0 to 4294967295. */
     uint8_t setUInt32(uint16_t index, uint32_t value, WordOrder order = orderDefault)
     {
-        return mbm_registers_setUint32(&view, index, order, value);
+        return set(mbm_registers_setUint32, index, order, value);
     }
     /** Sets an integer: two words, two's complement. */
     uint8_t setInt32(uint16_t index, int32_t value, WordOrder order = orderDefault)
     {
-        return mbm_registers_setUint32(&view, index, order, (uint32_t)value);
+        return set(mbm_registers_setUint32, index, order, static_cast<uint32_t>(value));
     }
     /** Sets an integer: four words, without a sign. */
     uint8_t setUInt64(uint16_t index, uint64_t value, WordOrder order = orderDefault)
     {
-        return mbm_registers_setUint64(&view, index, order, &value);
+        return set(mbm_registers_setUint64, index, order, value);
     }
     /** Sets an integer: four words, two's complement. */
     uint8_t setInt64(uint16_t index, int64_t value, WordOrder order = orderDefault)
     {
-        return mbm_registers_setUint64(&view, index, order, (const uint64_t *)&value);
+        return set(mbm_registers_setUint64, index, order, static_cast<uint64_t>(value));
     }
     /** Sets a float: two words, IEEE 754. */
     uint8_t setFloat(uint16_t index, float value, WordOrder order = orderDefault)
     {
-        return mbm_registers_setFloat(&view, index, order, &value);
+        return set(mbm_registers_setFloat, index, order, value);
     }
     /** Sets a double: four words, IEEE 754; rounded where a double has 32 bits, as on AVR. */
     uint8_t setDouble(uint16_t index, double value, WordOrder order = orderDefault)
     {
-        return mbm_registers_setDouble(&view, index, order, &value);
+        return set(mbm_registers_setDouble, index, order, value);
     }
     /**
      * Sets a text, padded with NULs to the end of its field.
@@ -261,6 +235,19 @@ protected:
     mbm_registers view;
     uint16_t *words;
     /** @endcond */
+
+private:
+    friend class ModbusNumbers<ModbusValues>;
+
+    uint8_t toRead(mbm_registers &, const mbm_registers *&described) const
+    {
+        described = &view;
+        return MBM_OK;
+    }
+    uint8_t toWrite(mbm_registers &space, const mbm_registers *&described)
+    {
+        return toRead(space, described);
+    }
 };
 
 #endif

@@ -98,7 +98,7 @@ $(BARE): firmware-tests/avr/bare/bare.c $(BUILD)/assembler/mbm_avrxmega3.S inclu
 
 # --- the programs that run them
 
-AVR_SUPPORT := $(patsubst %,$(BUILD)/avr-tests/%.o,board bus kind peer server pty tcp_server)
+AVR_SUPPORT := $(patsubst %,$(BUILD)/avr-tests/%.o,board bus kind peer sketch server pty tcp_server)
 AVR_TESTS := $(patsubst firmware-tests/avr/%.c,$(BUILD)/avr-tests/%,$(wildcard firmware-tests/avr/test_*.c))
 AVR_FLAGS = -std=c11 -O2 -g $(WARNINGS) -Ifirmware-tests/avr -Ic-tests/support -Iinclude -isystem /usr/include/simavr $(MODBUS)
 AVR_HEADERS := $(wildcard firmware-tests/avr/*.h c-tests/support/*.h)

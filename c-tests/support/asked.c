@@ -52,7 +52,7 @@ void asked_writes(modbus_t *client, served *s)
 {
     uint16_t words[MODBUS_MAX_WR_WRITE_REGISTERS + 2], back[MODBUS_MAX_READ_REGISTERS];
     uint8_t cells[MODBUS_MAX_WRITE_BITS];
-    unsigned i, told = s->written;
+    unsigned i, before = s->written;
     uint16_t kept;
 
     assert_int_equal(modbus_write_register(client, SERVED_BASE, 0xABCD), 1);
@@ -61,7 +61,7 @@ void asked_writes(modbus_t *client, served *s)
     assert_int_equal(s->bits[0] & 1, 1);
     assert_int_equal(modbus_write_bit(client, SERVED_BASE, 0), 1);
     assert_int_equal(s->bits[0] & 1, 0);
-    assert_int_equal(s->written - told, 3);
+    assert_int_equal(s->written - before, 3);
 
     for (i = 0; i < MODBUS_MAX_WRITE_REGISTERS; i++)
         words[i] = (uint16_t)(i * 257);
@@ -193,13 +193,13 @@ size_t asked_bytes(int fd, const uint8_t *bytes, size_t length, uint8_t *answer,
 int asked_is_served(int fd, uint8_t unit, uint8_t last)
 {
     const uint8_t request[] = {0, 1, 0, 0, 0, 2, unit, 7};
-    struct pollfd told = {fd, POLLIN, 0};
+    struct pollfd input = {fd, POLLIN, 0};
     uint8_t answer[9];
     ssize_t count;
 
     if (send(fd, request, sizeof request, MSG_NOSIGNAL) != sizeof request)
         return 0;
-    assert_int_equal(poll(&told, 1, PATIENCE_MS), 1);
+    assert_int_equal(poll(&input, 1, PATIENCE_MS), 1);
     count = recv(fd, answer, sizeof answer, 0);
     if (count <= 0)
         return 0;

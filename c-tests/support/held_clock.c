@@ -39,7 +39,7 @@ void held_clock_start(held_clock *c)
 {
     memset(c, 0, sizeof *c);
     c->due = HELD_CLOCK_NEVER;
-    c->told = machine();
+    c->readTime = machine();
     if (pthread_mutex_init(&c->lock, NULL)) {
         perror("held_clock");
         abort();
@@ -118,7 +118,7 @@ static int16_t clock_write(void *context, const uint8_t *bytes, uint16_t length)
     pthread_mutex_lock(&c->lock);
     set(c, c->bytes);
     if (c->bytes == 0)
-        c->stopped = c->told;
+        c->stopped = c->readTime;
     c->bytes += length;
     pthread_mutex_unlock(&c->lock);
     taken = c->port.write(c->port.context, bytes, length);
@@ -129,13 +129,13 @@ static int16_t clock_write(void *context, const uint8_t *bytes, uint16_t length)
 static uint32_t clock_micros(void *context)
 {
     held_clock *c = (held_clock *)context;
-    uint32_t told;
+    uint32_t shown;
 
     pthread_mutex_lock(&c->lock);
-    c->told = read_clock(c);
-    told = (uint32_t)c->told;
+    c->readTime = read_clock(c);
+    shown = (uint32_t)c->readTime;
     pthread_mutex_unlock(&c->lock);
-    return told;
+    return shown;
 }
 
 static uint8_t clock_flush(void *context)

@@ -15,13 +15,13 @@
 
 typedef struct held_clock {
     pthread_mutex_t lock;
-    int64_t behind;  /* microseconds by which this clock is late against the machine's */
-    int64_t stopped; /* the time that it shows while it stands still */
-    int64_t told;    /* the time that the master read last */
-    int64_t due;     /* the time that it does not go beyond */
-    uint32_t bytes;  /* bytes that were written and that the device has not processed */
-    unsigned link;   /* how many connections were forgotten */
-    mbm_port port;   /* the line's port */
+    int64_t behind;   /* microseconds by which this clock is late against the machine's */
+    int64_t stopped;  /* the time that it shows while it stands still */
+    int64_t readTime; /* the time that the master read last */
+    int64_t due;      /* the time that it does not go beyond */
+    uint32_t bytes;   /* bytes that were written and that the device has not processed */
+    unsigned link;    /* how many connections were forgotten */
+    mbm_port port;    /* the line's port */
 } held_clock;
 
 void held_clock_start(held_clock *c);

@@ -10,7 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { UNIT = 17, NOBODY = 99, WORDS = 8, SHORT_FRAME = 8 };
+enum { UNIT = 17, ABSENT_UNIT = 99, WORDS = 8, SHORT_FRAME = 8 };
 
 static server device;
 static recorder wire;
@@ -194,8 +194,8 @@ static void failing_requests(void)
 {
     REQUEST(mbm_master_readHoldingRegisters(&node, SERVER_REGISTERS, 1), MBM_ILLEGAL_DATA_ADDRESS);
     printf("mbm_master_setSlaveID(&node, %d), mbm_master_setResponseTimeout(&node, 200), then\n",
-           NOBODY);
-    mbm_master_setSlaveID(&node, NOBODY);
+           ABSENT_UNIT);
+    mbm_master_setSlaveID(&node, ABSENT_UNIT);
     mbm_master_setResponseTimeout(&node, 200);
     REQUEST(mbm_master_readHoldingRegisters(&node, 0, 1), MBM_RESPONSE_TIMED_OUT);
 }

@@ -322,7 +322,7 @@ static short events_of(unsigned place)
     if (c->asked)
         return c->request.status == MBM_PENDING ? 0 : POLLOUT;
     /* The socket was full. */
-    return tcps[place].awaits & POLLOUT ? POLLOUT : POLLIN;
+    return tcps[place].events & POLLOUT ? POLLOUT : POLLIN;
 }
 
 /* --- all of it --- */
@@ -368,7 +368,7 @@ static void wait_for_work(void)
     for (i = 0; i < CONNECTIONS; i++)
         if (mbm_tcp_isInUse(&tcps[i]))
             wait_on(tcps[i].fd, events_of(i), LINES + i);
-    if (listener.awaits)
+    if (listener.events)
         wait_on(listener.fd, POLLIN, UINT8_MAX);
     else if (delay > MBM_TCP_RETRY)
         delay = MBM_TCP_RETRY;
@@ -448,7 +448,7 @@ int main(int argc, char **argv)
     listener.idleTimeMs = (uint32_t)idle * 1000u;
     if (mbm_tcp_listen(&listener, NULL, argv[0]) != 0) {
         fprintf(stderr, "%s: %s\n", argv[0],
-                listener.lookup ? gai_strerror(listener.lookup) : strerror(errno));
+                listener.lookupError ? gai_strerror(listener.lookupError) : strerror(errno));
         return 1;
     }
     sigemptyset(&ends);

@@ -94,7 +94,7 @@ int line_open(line *l, const char *place)
         const int error = errno;
 
         fprintf(stderr, "%s: %s\n%s", place,
-                l->tcp.lookup ? gai_strerror(l->tcp.lookup) : strerror(error),
+                l->tcp.lookupError ? gai_strerror(l->tcp.lookupError) : strerror(error),
                 error == EINVAL ? LINE_HELP : "");
         return -1;
     }

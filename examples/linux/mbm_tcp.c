@@ -16,12 +16,12 @@
 /* Values of mbm_tcp.state. A lost socket keeps its place, since an object may still use it. */
 enum { FREE, CONNECTING, CONNECTED, LOST };
 
-/* A peer is gone if, after seconds of silence, it answers none of some probes, which are
- * seconds apart, or if it acknowledges no sent byte for milliseconds. */
-enum { QUIET_S = 15, PROBE_S = 5, PROBES = 3, UNANSWERED_MS = 30000 };
+/* The link is lost if the peer sends nothing for IDLE_S and then answers none of the probes, or
+ * if it does not acknowledge a sent byte for UNACKNOWLEDGED_MS. */
+enum { IDLE_S = 15, PROBE_INTERVAL_S = 5, PROBE_COUNT = 3, UNACKNOWLEDGED_MS = 30000 };
 
-/* Microseconds: of sleep if the system refuses to poll, and of the shortest long wait. */
-enum { BLIND_NAP = 10000, LONG_WAIT = 100000 };
+/* The sleep after poll has failed, and the shortest wait that poll does instead of ppoll. */
+enum { POLL_RETRY_US = 10000, LONG_WAIT_US = 100000 };
 
 /* For functions that are rarely called: keeps them apart from those of every request. */
 #define COLD __attribute__((cold, noinline))
@@ -55,9 +55,9 @@ static int has_socket(const mbm_tcp *tcp)
 /* Makes the socket's set report it. */
 void mbm_tcp_markReady(mbm_tcp *tcp)
 {
-    if (!tcp->set || tcp->told & MBM_TCP_LISTED)
+    if (!tcp->set || tcp->readiness & MBM_TCP_LISTED)
         return;
-    tcp->told |= MBM_TCP_LISTED;
+    tcp->readiness |= MBM_TCP_LISTED;
     tcp->next = NULL;
     *tcp->set->end = tcp;
     tcp->set->end = &tcp->next;
@@ -68,22 +68,22 @@ static void remove_from_ready(mbm_tcp *tcp)
 {
     mbm_tcp **one;
 
-    if (tcp->told & MBM_TCP_LISTED) {
+    if (tcp->readiness & MBM_TCP_LISTED) {
         for (one = &tcp->set->first; *one != tcp; one = &(*one)->next)
             ;
         *one = tcp->next;
         if (!tcp->next)
             tcp->set->end = one;
     }
-    tcp->told = 0;
+    tcp->readiness = 0;
 }
 
 /* Enters a state without a socket. */
-static void drop(mbm_tcp *tcp, uint8_t state, int error)
+static void leave_socket(mbm_tcp *tcp, uint8_t state, int error)
 {
     const int fd = has_socket(tcp) ? tcp->fd : -1;
 
-    mbm_tcp_await(tcp, 0);
+    mbm_tcp_setEvents(tcp, 0);
     tcp->state = state;
     tcp->error = error;
     tcp->fd = -1;
@@ -92,42 +92,42 @@ static void drop(mbm_tcp *tcp, uint8_t state, int error)
 }
 
 /* Sets what the socket's set waits for from now on. */
-COLD static void await_in_set(mbm_tcp *tcp, uint8_t before)
+COLD static void set_events_in_set(mbm_tcp *tcp, uint8_t before)
 {
-    if (tcp->set->watch(tcp->set, tcp->fd, tcp, before, tcp->awaits) == 0)
+    if (tcp->set->watch(tcp->set, tcp->fd, tcp, before, tcp->events) == 0)
         return;
     /* The program would never learn what happens to the socket, so its link is lost. */
-    tcp->awaits = 0;
-    drop(tcp, LOST, errno);
+    tcp->events = 0;
+    leave_socket(tcp, LOST, errno);
     mbm_tcp_markReady(tcp);
 }
 
-void mbm_tcp_await(mbm_tcp *tcp, uint8_t awaits)
+void mbm_tcp_setEvents(mbm_tcp *tcp, uint8_t events)
 {
-    const uint8_t before = tcp->awaits;
+    const uint8_t before = tcp->events;
 
-    tcp->awaits = awaits;
-    if (before != awaits && tcp->set)
-        await_in_set(tcp, before);
+    tcp->events = events;
+    if (before != events && tcp->set)
+        set_events_in_set(tcp, before);
 }
 
 static void enter(mbm_tcp *tcp, uint8_t state)
 {
     tcp->state = state;
-    tcp->told &= (uint8_t)~MBM_TCP_TOLD;
-    mbm_tcp_await(tcp, state == CONNECTING ? POLLOUT : POLLIN);
+    tcp->readiness &= (uint8_t)~MBM_TCP_REPORTED;
+    mbm_tcp_setEvents(tcp, state == CONNECTING ? POLLOUT : POLLIN);
 }
 
 /* The program used the port, so waits report bytes again. */
-static inline void used(mbm_tcp *tcp)
+static inline void report_again(mbm_tcp *tcp)
 {
-    tcp->told &= (uint8_t)~MBM_TCP_TOLD;
+    tcp->readiness &= (uint8_t)~MBM_TCP_REPORTED;
 }
 
 /* Bytes were moved. In a set the time of the last wait is accurate enough. */
-static inline void moved(mbm_tcp *tcp)
+static inline void note_activity(mbm_tcp *tcp)
 {
-    tcp->lastMoved = tcp->set ? tcp->set->now : mbm_tcp_milliseconds();
+    tcp->lastActivity = tcp->set ? tcp->set->now : mbm_tcp_milliseconds();
 }
 
 static void set(int fd, int level, int option, int value)
@@ -143,12 +143,12 @@ static int prepare(int fd)
     set(fd, IPPROTO_TCP, TCP_NODELAY, 1);
     set(fd, SOL_SOCKET, SO_KEEPALIVE, 1);
 #ifdef TCP_KEEPIDLE
-    set(fd, IPPROTO_TCP, TCP_KEEPIDLE, QUIET_S);
-    set(fd, IPPROTO_TCP, TCP_KEEPINTVL, PROBE_S);
-    set(fd, IPPROTO_TCP, TCP_KEEPCNT, PROBES);
+    set(fd, IPPROTO_TCP, TCP_KEEPIDLE, IDLE_S);
+    set(fd, IPPROTO_TCP, TCP_KEEPINTVL, PROBE_INTERVAL_S);
+    set(fd, IPPROTO_TCP, TCP_KEEPCNT, PROBE_COUNT);
 #endif
 #ifdef TCP_USER_TIMEOUT
-    set(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, UNANSWERED_MS);
+    set(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, UNACKNOWLEDGED_MS);
 #endif
     return 0;
 }
@@ -158,7 +158,7 @@ static int try_next(mbm_tcp *tcp, int error)
 {
     mbm_tcp_addresses *all = tcp->addresses;
 
-    drop(tcp, LOST, error);
+    leave_socket(tcp, LOST, error);
     while (all && all->next < all->count) {
         const struct sockaddr_storage *address = &all->list[all->next];
         const socklen_t length = all->lengths[all->next++];
@@ -182,16 +182,16 @@ static int try_next(mbm_tcp *tcp, int error)
 }
 
 int mbm_tcp_lookUp(const char *host, const char *service, int flags, struct addrinfo **found,
-                   int *why)
+                   int *error)
 {
     struct addrinfo hints = {0};
 
     hints.ai_socktype = SOCK_STREAM;
     hints.ai_flags = flags;
-    *why = getaddrinfo(host, service, &hints, found);
-    switch (*why) {
+    *error = getaddrinfo(host, service, &hints, found);
+    switch (*error) {
     case 0: return 0;
-    case EAI_SYSTEM: *why = 0; return -1;
+    case EAI_SYSTEM: *error = 0; return -1;
     case EAI_AGAIN: return refuse(EAGAIN);
     case EAI_MEMORY: return refuse(ENOMEM);
     default: return refuse(EADDRNOTAVAIL);
@@ -204,7 +204,7 @@ int mbm_tcp_open(mbm_tcp *tcp, mbm_tcp_addresses *addresses, const char *host, c
 
     if (tcp->state != FREE)
         return refuse(EBUSY);
-    if (mbm_tcp_lookUp(host, service, 0, &found, &tcp->lookup) < 0)
+    if (mbm_tcp_lookUp(host, service, 0, &found, &tcp->lookupError) < 0)
         return -1;
     memset(tcp, 0, sizeof *tcp);
     tcp->addresses = addresses;
@@ -217,7 +217,7 @@ int mbm_tcp_open(mbm_tcp *tcp, mbm_tcp_addresses *addresses, const char *host, c
     }
     freeaddrinfo(found);
     if (try_next(tcp, EADDRNOTAVAIL) < 0) {
-        drop(tcp, FREE, tcp->error);
+        leave_socket(tcp, FREE, tcp->error);
         return refuse(tcp->error);
     }
     return 0;
@@ -231,7 +231,7 @@ int mbm_tcp_attach(mbm_tcp *tcp, int fd)
         return -1;
     memset(tcp, 0, sizeof *tcp);
     tcp->fd = fd;
-    tcp->lastMoved = mbm_tcp_milliseconds();
+    tcp->lastActivity = mbm_tcp_milliseconds();
     enter(tcp, CONNECTED);
     return 0;
 }
@@ -243,12 +243,12 @@ int mbm_tcp_isInUse(const mbm_tcp *tcp)
 
 int64_t mbm_tcp_idleFor(const mbm_tcp *tcp)
 {
-    return tcp->state == CONNECTED ? mbm_tcp_milliseconds() - tcp->lastMoved : -1;
+    return tcp->state == CONNECTED ? mbm_tcp_milliseconds() - tcp->lastActivity : -1;
 }
 
 void mbm_tcp_close(mbm_tcp *tcp)
 {
-    drop(tcp, FREE, tcp->error);
+    leave_socket(tcp, FREE, tcp->error);
     remove_from_ready(tcp);
     /* A waiting connection may need the descriptor that this frees. */
     if (tcp->set && tcp->set->listener)
@@ -293,7 +293,7 @@ void mbm_tcp_disconnect(void *context)
     mbm_tcp *tcp = (mbm_tcp *)context;
 
     if (tcp->state != FREE)
-        drop(tcp, LOST, ENOTCONN);
+        leave_socket(tcp, LOST, ENOTCONN);
 }
 
 /* No bytes were moved. Returns 0 for a signal or if there are none yet, -1 for a lost link. */
@@ -303,38 +303,38 @@ COLD static int16_t none_moved(mbm_tcp *tcp, ssize_t count)
         return -1;
     if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR))
         return 0;
-    drop(tcp, LOST, count < 0 ? errno : EPIPE);
+    leave_socket(tcp, LOST, count < 0 ? errno : EPIPE);
     return -1;
 }
 
 int mbm_tcp_isConnected(mbm_tcp *tcp)
 {
-    int there = progress(tcp);
+    int link = progress(tcp);
     char byte;
 
-    if (there == 1) {
+    if (link == 1) {
         const ssize_t count = recv(tcp->fd, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
 
         if (count <= 0)
             return none_moved(tcp, count) < 0 ? -1 : 1;
     }
-    return there;
+    return link;
 }
 
-/* 1 if a read or write can go ahead: only a connected socket awaits POLLIN alone. */
+/* 1 if a read or write can go ahead: only a connected socket polls for POLLIN alone. */
 static inline int is_ready(const mbm_tcp *tcp, uint16_t length)
 {
-    return tcp->awaits == POLLIN && (int16_t)length > 0;
+    return tcp->events == POLLIN && (int16_t)length > 0;
 }
 
 COLD static int16_t read_slowly(mbm_tcp *tcp, uint8_t *bytes, uint16_t capacity)
 {
-    int there = progress(tcp);
+    int link = progress(tcp);
 
-    if (there <= 0 || capacity == 0)
-        return (int16_t)(there < 0 ? -1 : 0);
+    if (link <= 0 || capacity == 0)
+        return (int16_t)(link < 0 ? -1 : 0);
     /* A program that reads need not wait until its bytes can be sent. */
-    mbm_tcp_await(tcp, POLLIN);
+    mbm_tcp_setEvents(tcp, POLLIN);
     return tcp_read(tcp, bytes, capacity > INT16_MAX ? INT16_MAX : capacity);
 }
 
@@ -346,24 +346,24 @@ static int16_t tcp_read(void *context, uint8_t *bytes, uint16_t capacity)
     if (!is_ready(tcp, capacity))
         return read_slowly(tcp, bytes, capacity);
     count = read(tcp->fd, bytes, capacity);
-    used(tcp);
+    report_again(tcp);
     if (count <= 0)
         return none_moved(tcp, count);
-    moved(tcp);
+    note_activity(tcp);
     return (int16_t)count;
 }
 
 /* Evaluates a send: `count` of `length` bytes were accepted. */
-COLD static int16_t wrote(mbm_tcp *tcp, ssize_t length, ssize_t count)
+COLD static int16_t finish_write(mbm_tcp *tcp, ssize_t length, ssize_t count)
 {
     if (count <= 0 && none_moved(tcp, count) < 0)
         return -1;
     if (count == length)
-        used(tcp);
-    mbm_tcp_await(tcp, count == length ? POLLIN : tcp->awaits | POLLOUT);
+        report_again(tcp);
+    mbm_tcp_setEvents(tcp, count == length ? POLLIN : tcp->events | POLLOUT);
     if (count <= 0)
         return 0;
-    moved(tcp);
+    note_activity(tcp);
     return (int16_t)count;
 }
 
@@ -371,11 +371,11 @@ COLD static int16_t write_slowly(mbm_tcp *tcp, const uint8_t *bytes, uint16_t le
 {
     /* A length above INT16_MAX is never accepted completely, since the result is an int16_t. */
     const uint16_t most = length > INT16_MAX ? INT16_MAX : length;
-    int there = progress(tcp);
+    int link = progress(tcp);
 
-    if (there <= 0 || length == 0)
-        return (int16_t)(there < 0 ? -1 : 0);
-    return wrote(tcp, length, send(tcp->fd, bytes, most, MSG_NOSIGNAL));
+    if (link <= 0 || length == 0)
+        return (int16_t)(link < 0 ? -1 : 0);
+    return finish_write(tcp, length, send(tcp->fd, bytes, most, MSG_NOSIGNAL));
 }
 
 static int16_t tcp_write(void *context, const uint8_t *bytes, uint16_t length)
@@ -388,9 +388,9 @@ static int16_t tcp_write(void *context, const uint8_t *bytes, uint16_t length)
         return write_slowly(tcp, bytes, length);
     count = send(tcp->fd, bytes, (size_t)all, MSG_NOSIGNAL);
     if (count != all)
-        return wrote(tcp, all, count);
-    used(tcp);
-    moved(tcp);
+        return finish_write(tcp, all, count);
+    report_again(tcp);
+    note_activity(tcp);
     return (int16_t)count;
 }
 
@@ -417,35 +417,35 @@ mbm_port mbm_tcp_port(mbm_tcp *tcp)
 
 /* poll failed: for a signal, or for lack of memory or descriptors (their limit may have been
  * lowered). Then sleeps, so that the program does not spin, and returns 1: it must look. */
-COLD static int nap(uint32_t timeoutUs)
+COLD static int after_failed_poll(uint32_t timeoutUs)
 {
     if (errno == EINTR)
         return 0;
-    usleep(timeoutUs < BLIND_NAP ? timeoutUs : BLIND_NAP);
+    usleep(timeoutUs < POLL_RETRY_US ? timeoutUs : POLL_RETRY_US);
     return 1;
 }
 
 /* What to poll a socket for. Bytes that were reported do not end the wait again. A socket
- * that awaits nothing is left out, since a hang-up would end the wait. */
+ * without events is left out, since a hang-up would end the wait. */
 static inline short events_of(const mbm_tcp *tcp)
 {
-    return tcp->told & MBM_TCP_TOLD ? tcp->awaits & POLLOUT : tcp->awaits;
+    return tcp->readiness & MBM_TCP_REPORTED ? tcp->events & POLLOUT : tcp->events;
 }
 
 /* Notes what poll has found for a socket. */
-static inline void note(mbm_tcp *tcp, short events)
+static inline void note_events(mbm_tcp *tcp, short events)
 {
-    if (tcp->awaits == POLLOUT && events)
+    if (tcp->events == POLLOUT && events)
         /* If the socket is connecting, this finds out whether it is connected. */
         (void)progress(tcp);
     else if (events & ~POLLOUT)
-        tcp->told |= MBM_TCP_TOLD;
+        tcp->readiness |= MBM_TCP_REPORTED;
 }
 
 /* In a long wait a millisecond does not matter, and poll costs less than ppoll. */
 static inline int sleep_on(struct pollfd *waits, nfds_t count, uint32_t timeoutUs)
 {
-    if (timeoutUs >= LONG_WAIT)
+    if (timeoutUs >= LONG_WAIT_US)
         return poll(waits, count, timeoutUs == MBM_TCP_FOREVER ? -1 : (int)(timeoutUs / 1000 + 1));
     return ppoll(waits, count, &(struct timespec){0, (long)timeoutUs * 1000}, NULL);
 }
@@ -461,22 +461,22 @@ COLD static int wait_for_many(mbm_tcp *tcps, size_t count, const mbm_tcp_listene
 
     if (count > MBM_TCP_WAITS - 2)
         return refuse(EINVAL);
-    if (is_listening && listener->awaits == 0 && timeoutUs > MBM_TCP_RETRY)
+    if (is_listening && listener->events == 0 && timeoutUs > MBM_TCP_RETRY)
         timeoutUs = MBM_TCP_RETRY;
     for (i = 0; i < count; i++)
         if (events_of(&tcps[i]) != 0)
             waits[used++] = (struct pollfd){tcps[i].fd, events_of(&tcps[i]), 0};
-    if (is_listening && listener->awaits != 0)
+    if (is_listening && listener->events != 0)
         waits[used++] = (struct pollfd){listener->fd, POLLIN, 0};
     if (fd >= 0)
         waits[used++] = (struct pollfd){fd, POLLIN, 0};
     ready = sleep_on(waits, used, timeoutUs);
     if (ready < 0)
-        return nap(timeoutUs);
+        return after_failed_poll(timeoutUs);
     used = 0;
     for (i = 0; i < count; i++)
         if (events_of(&tcps[i]) != 0)
-            note(&tcps[i], waits[used++].revents);
+            note_events(&tcps[i], waits[used++].revents);
     return ready > 0;
 }
 
@@ -487,13 +487,13 @@ int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, 
     int ready;
 
     /* The usual case: a client waits for a response. */
-    if (count != 1 || listener || fd >= 0 || tcps->told || tcps->awaits != POLLIN)
+    if (count != 1 || listener || fd >= 0 || tcps->readiness || tcps->events != POLLIN)
         return wait_for_many(tcps, count, listener, fd, timeoutUs);
     wait = (struct pollfd){tcps->fd, POLLIN, 0};
     ready = sleep_on(&wait, 1, timeoutUs);
     if (ready < 0)
-        return nap(timeoutUs);
+        return after_failed_poll(timeoutUs);
     if (ready > 0)
-        tcps->told = MBM_TCP_TOLD;
+        tcps->readiness = MBM_TCP_REPORTED;
     return ready;
 }

@@ -55,17 +55,17 @@ typedef struct mbm_tcp_addresses {
 
 /** A socket in use as a port; zero before first use. */
 typedef struct mbm_tcp {
-    int fd;         /**< the socket, while there is one */
-    int error;      /**< why the link was lost, an errno: EPIPE if the peer closed it, ETIMEDOUT if
-                         mbm_tcp_accept closed it as idle; else 0 */
-    int lookup;     /**< why mbm_tcp_open found no address, for gai_strerror; else 0 */
-    uint8_t isBusy; /**< set by the program: 1 while the peer waits for a response, so that the
-                         connection is not idle; needed only for requests that may take longer
-                         than the idle time */
-    uint8_t state;  /**< private */
-    uint8_t awaits; /**< what to poll it for: POLLIN, and POLLOUT while it accepts no more bytes */
-    uint8_t told;   /**< private */
-    int64_t lastMoved;            /**< private */
+    int fd;          /**< the socket, while there is one */
+    int error;       /**< why the link was lost, an errno: EPIPE if the peer closed it, ETIMEDOUT if
+                          mbm_tcp_accept closed it as idle; else 0 */
+    int lookupError; /**< why mbm_tcp_open found no address, for gai_strerror; else 0 */
+    uint8_t isBusy;  /**< set by the program: 1 while the peer waits for a response, so that the
+                          connection is not idle; needed only for requests that may take longer
+                          than the idle time */
+    uint8_t state;   /**< private */
+    uint8_t events;  /**< what to poll it for: POLLIN, and POLLOUT while it accepts no more bytes */
+    uint8_t readiness;            /**< private */
+    int64_t lastActivity;         /**< private */
     mbm_tcp_addresses *addresses; /**< private */
     struct mbm_tcp_set *set;      /**< private */
     struct mbm_tcp *next;         /**< private */
@@ -73,11 +73,11 @@ typedef struct mbm_tcp {
 
 /** A socket that listens for connections; zero before first use. */
 typedef struct mbm_tcp_listener {
-    int fd;              /**< the socket, while `port` is not 0 */
-    int lookup;          /**< why mbm_tcp_listen found no address, for gai_strerror; else 0 */
-    uint16_t port;       /**< where it listens */
-    uint8_t awaits;      /**< what to poll it for: POLLIN, or 0 while connections must wait */
-    uint8_t isQuiet;     /**< private */
+    int fd;                  /**< the socket, while `port` is not 0 */
+    int lookupError;         /**< why mbm_tcp_listen found no address, for gai_strerror; else 0 */
+    uint16_t port;           /**< where it listens */
+    uint8_t events;          /**< what to poll it for: POLLIN, or 0 while connections must wait */
+    uint8_t nothingToAccept; /**< private */
     uint32_t idleTimeMs; /**< set by the program: milliseconds without a byte read or written after
                             which a connection may be closed for a new one; 0: never */
     uint32_t refused;    /**< number of connections that were closed for lack of a place */
@@ -95,8 +95,8 @@ typedef struct mbm_tcp_set {
     mbm_tcp *first;             /**< private */
     mbm_tcp **end;              /**< private */
     mbm_tcp_listener *listener; /**< private */
-    int (*watch)(struct mbm_tcp_set *set, int fd, void *who, uint8_t before,
-                 uint8_t awaits);                      /**< private */
+    int (*watch)(struct mbm_tcp_set *set, int fd, void *owner, uint8_t before,
+                 uint8_t events);                      /**< private */
     int (*add)(struct mbm_tcp_set *set, mbm_tcp *tcp); /**< private */
 } mbm_tcp_set;
 
@@ -111,7 +111,7 @@ typedef struct mbm_tcp_set {
  * @param service    a port number, for example MBM_TCP_SERVICE
  * @return 0, or -1 with errno set: EBUSY if `tcp` is in use, EADDRNOTAVAIL for an unknown
  *         name or service, EAGAIN if the lookup may succeed later, or an error of socket
- *         or connect. If the lookup failed, `lookup` says why
+ *         or connect. If the lookup failed, `lookupError` says why
  */
 int mbm_tcp_open(mbm_tcp *tcp, mbm_tcp_addresses *addresses, const char *host, const char *service);
 
@@ -242,7 +242,7 @@ void mbm_tcp_closeListener(mbm_tcp_listener *listener);
  * @param listener  waits for connections too; may be NULL
  * @param fd        waits for bytes of another descriptor too, for example that of
  *                  an mbm_tty; -1 for none
- * @param timeoutUs the longest sleep in timeoutUseconds, from 100000 on rounded up to the next
+ * @param timeoutUs the longest sleep in microseconds, from 100000 on rounded up to the next
  *                  millisecond, or MBM_TCP_FOREVER; it is shorter while the listener's
  *                  connections must wait
  * @return 1 if a socket needs the program, or if the system refused to poll, after a sleep
@@ -286,7 +286,7 @@ int mbm_tcp_addListener(mbm_tcp_set *set, mbm_tcp_listener *listener);
  * ready, not with the number of all sockets.
  *
  * @param set     an open set
- * @param timeoutUs  the longest sleep in timeoutUseconds, rounded up to milliseconds, or
+ * @param timeoutUs  the longest sleep in microseconds, rounded up to milliseconds, or
  *                MBM_TCP_FOREVER; it is shorter while the listener's connections must wait
  * @return 1 if a socket is ready or a connection waits: see mbm_tcp_nextReady and
  *         mbm_tcp_accept; 0 if the time is over or a signal came; -1 with errno EBADF for a
@@ -314,15 +314,16 @@ void mbm_tcp_closeSet(mbm_tcp_set *set);
 
 /* Private: shared by the sources of this port. */
 enum {
-    MBM_TCP_TOLD = 1,  /* in mbm_tcp.told: a wait reported it, and the port was not used since */
+    MBM_TCP_REPORTED =
+        1, /* in mbm_tcp.readiness: a wait reported it, and the port was not used since */
     MBM_TCP_LISTED = 2 /* mbm_tcp_nextReady has not returned it yet */
 };
 struct addrinfo;
 int mbm_tcp_lookUp(const char *host, const char *service, int flags, struct addrinfo **found,
-                   int *why);
+                   int *error);
 int64_t mbm_tcp_milliseconds(void);
 void mbm_tcp_markReady(mbm_tcp *tcp);
-void mbm_tcp_await(mbm_tcp *tcp, uint8_t awaits);
+void mbm_tcp_setEvents(mbm_tcp *tcp, uint8_t events);
 
 #ifdef __cplusplus
 }

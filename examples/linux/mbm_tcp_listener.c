@@ -12,7 +12,7 @@
 
 /* The most connections that one mbm_tcp_accept turns away, so that a flood of connections
  * does not keep a program from those that it serves. */
-enum { TURNED_AWAY = 64 };
+enum { MAX_REJECTED = 64 };
 
 static int refuse(int error)
 {
@@ -22,14 +22,14 @@ static int refuse(int error)
 
 /* Sets what the listener is polled for, also by its set. If the set refuses, mbm_tcp_accept
  * tries again. */
-static void await(mbm_tcp_listener *listener, uint8_t awaits)
+static void set_events(mbm_tcp_listener *listener, uint8_t events)
 {
     mbm_tcp_set *set = listener->set;
-    const uint8_t before = listener->awaits;
+    const uint8_t before = listener->events;
 
-    listener->awaits = awaits;
-    if (set && before != awaits && set->watch(set, listener->fd, listener, before, awaits) < 0)
-        listener->awaits = 0;
+    listener->events = events;
+    if (set && before != events && set->watch(set, listener->fd, listener, before, events) < 0)
+        listener->events = 0;
 }
 
 static uint16_t port_of(int fd)
@@ -68,7 +68,7 @@ int mbm_tcp_listen(mbm_tcp_listener *listener, const char *host, const char *ser
 
     if (listener->port != 0)
         return refuse(EBUSY);
-    if (mbm_tcp_lookUp(host, service, AI_PASSIVE, &found, &listener->lookup) < 0)
+    if (mbm_tcp_lookUp(host, service, AI_PASSIVE, &found, &listener->lookupError) < 0)
         return -1;
     errno = EADDRNOTAVAIL;
     for (one = found; one && fd < 0; one = one->ai_next)
@@ -79,15 +79,15 @@ int mbm_tcp_listen(mbm_tcp_listener *listener, const char *host, const char *ser
         return refuse(error);
     listener->fd = fd;
     listener->port = port_of(fd);
-    listener->awaits = POLLIN;
-    listener->isQuiet = 0;
+    listener->events = POLLIN;
+    listener->nothingToAccept = 0;
     listener->refused = 0;
     listener->idle = 0;
     return 0;
 }
 
 /* Closes a connection without a reset, also if the client has sent a request already. */
-static void turn_away(int fd)
+static void reject(int fd)
 {
     uint8_t unread[512];
     int rounds = 0;
@@ -110,7 +110,7 @@ static int close_oldest(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
         /* Compares the times of the last bytes, since the idle times grow from one call to
          * the next. */
         if (!tcps[i].isBusy && mbm_tcp_idleFor(&tcps[i]) >= (int64_t)listener->idleTimeMs &&
-            (!oldest || tcps[i].lastMoved < oldest->lastMoved))
+            (!oldest || tcps[i].lastActivity < oldest->lastActivity))
             oldest = &tcps[i];
     }
     if (!oldest)
@@ -188,14 +188,14 @@ static int take_connection(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t cou
         place++;
     if (place == count && is_connection_waiting(listener) && close_oldest(listener, tcps, count))
         return refuse(EAGAIN);
-    for (rounds = 0; rounds < TURNED_AWAY; rounds++) {
+    for (rounds = 0; rounds < MAX_REJECTED; rounds++) {
         fd = take_next(listener, tcps, count);
         if (fd < 0)
             return -1;
         if (place < count)
             return put_in_place(listener, &tcps[place], fd) < 0 ? -1 : (int)place;
         listener->refused++;
-        turn_away(fd);
+        reject(fd);
     }
     return refuse(EAGAIN);
 }
@@ -206,14 +206,14 @@ int mbm_tcp_accept(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
 
     if (listener->port == 0)
         return refuse(EBADF);
-    if (listener->isQuiet)
+    if (listener->nothingToAccept)
         return refuse(EAGAIN);
     place = take_connection(listener, tcps, count);
     error = errno;
     /* A connection that must wait would end every wait at once. */
-    await(listener, place >= 0 || error == EAGAIN ? POLLIN : 0);
+    set_events(listener, place >= 0 || error == EAGAIN ? POLLIN : 0);
     if (place < 0 && listener->set) {
-        listener->isQuiet = 1;
+        listener->nothingToAccept = 1;
         listener->retryAt = mbm_tcp_milliseconds() + MBM_TCP_RETRY / 1000;
     }
     errno = error;
@@ -223,13 +223,13 @@ int mbm_tcp_accept(mbm_tcp_listener *listener, mbm_tcp *tcps, size_t count)
 void mbm_tcp_closeListener(mbm_tcp_listener *listener)
 {
     if (listener->port != 0) {
-        await(listener, 0);
+        set_events(listener, 0);
         close(listener->fd);
     }
     if (listener->set)
         listener->set->listener = NULL;
     listener->set = NULL;
-    listener->isQuiet = 0;
+    listener->nothingToAccept = 0;
     listener->fd = -1;
     listener->port = 0;
 }

@@ -19,13 +19,13 @@ static int refuse(int error)
 
 /* Sets what epoll waits for on a descriptor from now on. If that is nothing, the descriptor
  * is removed, since a hang-up would end each wait. */
-static int watch(mbm_tcp_set *set, int fd, void *who, uint8_t before, uint8_t awaits)
+static int watch(mbm_tcp_set *set, int fd, void *owner, uint8_t before, uint8_t events)
 {
-    struct epoll_event event = {.events = awaits, .data = {.ptr = who}};
+    struct epoll_event event = {.events = events, .data = {.ptr = owner}};
 
     if (before == 0)
         return epoll_ctl(set->fd, EPOLL_CTL_ADD, fd, &event);
-    if (awaits != 0)
+    if (events != 0)
         return epoll_ctl(set->fd, EPOLL_CTL_MOD, fd, &event);
     (void)epoll_ctl(set->fd, EPOLL_CTL_DEL, fd, &event);
     return 0;
@@ -37,7 +37,7 @@ int mbm_tcp_add(mbm_tcp_set *set, mbm_tcp *tcp)
         return refuse(EBADF);
     if (tcp->set)
         return refuse(EBUSY);
-    if (tcp->awaits != 0 && watch(set, tcp->fd, tcp, 0, tcp->awaits) < 0)
+    if (tcp->events != 0 && watch(set, tcp->fd, tcp, 0, tcp->events) < 0)
         return -1;
     tcp->set = set;
     return 0;
@@ -74,7 +74,7 @@ int mbm_tcp_addListener(mbm_tcp_set *set, mbm_tcp_listener *listener)
         return refuse(EBADF);
     if (listener->set || set->listener)
         return refuse(EBUSY);
-    if (listener->awaits != 0 && watch(set, listener->fd, listener, 0, listener->awaits) < 0)
+    if (listener->events != 0 && watch(set, listener->fd, listener, 0, listener->events) < 0)
         return -1;
     listener->set = set;
     set->listener = listener;
@@ -82,18 +82,18 @@ int mbm_tcp_addListener(mbm_tcp_set *set, mbm_tcp_listener *listener)
 }
 
 /* Notes what epoll has found for a socket. The simple case, new bytes, is in wait_once. */
-__attribute__((cold, noinline)) static void note(mbm_tcp *tcp, uint32_t events)
+__attribute__((cold, noinline)) static void note_events(mbm_tcp *tcp, uint32_t events)
 {
     if (events & ~(uint32_t)EPOLLOUT) {
-        if ((tcp->told & MBM_TCP_TOLD) && !(tcp->told & MBM_TCP_LISTED)) {
+        if ((tcp->readiness & MBM_TCP_REPORTED) && !(tcp->readiness & MBM_TCP_LISTED)) {
             /* The program has not used the port: epoll does not wait for bytes until it does. */
-            mbm_tcp_await(tcp, tcp->awaits & POLLOUT);
+            mbm_tcp_setEvents(tcp, tcp->events & POLLOUT);
             if (!(events & EPOLLOUT))
                 return;
         }
-        tcp->told |= MBM_TCP_TOLD;
+        tcp->readiness |= MBM_TCP_REPORTED;
     }
-    if (tcp->awaits == POLLOUT)
+    if (tcp->events == POLLOUT)
         /* If the socket is connecting, this finds out whether it is connected. */
         (void)mbm_tcp_isConnected(tcp);
     mbm_tcp_markReady(tcp);
@@ -106,12 +106,12 @@ static int64_t until_retry(mbm_tcp_set *set)
     mbm_tcp_listener *listener = set->listener;
     int64_t left;
 
-    if (!listener || listener->awaits != 0)
+    if (!listener || listener->events != 0)
         return -1;
     left = listener->retryAt - set->now;
     if (left > 0)
         return left;
-    listener->isQuiet = 0;
+    listener->nothingToAccept = 0;
     return 0;
 }
 
@@ -133,14 +133,14 @@ static int wait_once(mbm_tcp_set *set, int64_t time)
         mbm_tcp *tcp = (mbm_tcp *)events[i].data.ptr;
 
         if (events[i].data.ptr == set->listener) {
-            set->listener->isQuiet = 0;
-        } else if (events[i].events == EPOLLIN && tcp->told == 0) {
-            tcp->told = MBM_TCP_TOLD | MBM_TCP_LISTED;
+            set->listener->nothingToAccept = 0;
+        } else if (events[i].events == EPOLLIN && tcp->readiness == 0) {
+            tcp->readiness = MBM_TCP_REPORTED | MBM_TCP_LISTED;
             tcp->next = NULL;
             *set->end = tcp;
             set->end = &tcp->next;
         } else {
-            note(tcp, events[i].events);
+            note_events(tcp, events[i].events);
         }
     }
     (void)until_retry(set);
@@ -163,7 +163,7 @@ int mbm_tcp_waitSet(mbm_tcp_set *set, uint32_t timeoutUs)
         if (count == 0)
             return 0;
         /* A socket that the program does not use ended the wait. It will not do so again. */
-    } while (!set->listener || set->listener->isQuiet);
+    } while (!set->listener || set->listener->nothingToAccept);
     return 1;
 }
 
@@ -175,7 +175,7 @@ mbm_tcp *mbm_tcp_nextReady(mbm_tcp_set *set)
         set->first = tcp->next;
         if (!set->first)
             set->end = &set->first;
-        tcp->told &= (uint8_t)~MBM_TCP_LISTED;
+        tcp->readiness &= (uint8_t)~MBM_TCP_LISTED;
     }
     return tcp;
 }

@@ -244,7 +244,7 @@ static int take_over(mbm_tty *tty)
     }
     tty->has_uart = ioctl(tty->fd, TIOCMGET, &lines) == 0;
     tty->isOpen = 1;
-    tty->awaits = POLLIN;
+    tty->events = POLLIN;
     return 0;
 }
 
@@ -385,7 +385,7 @@ static int16_t tty_read(void *context, uint8_t *bytes, uint16_t capacity)
         return not_open(tty);
     if (capacity == 0)
         return 0;
-    tty->awaits = POLLIN;
+    tty->events = POLLIN;
     count = read(tty->fd, bytes, at_most(capacity));
     return count > 0 ? (int16_t)count : none_moved(tty, count);
 }
@@ -441,11 +441,11 @@ int mbm_tty_wait(mbm_tty *tty, uint32_t timeoutUs)
         return refuse(EBADF);
     /* An awaited event of 0 would still make a hang-up end the wait, so the list is empty
      * then. */
-    ready = sleep_on(&line, tty->awaits != 0, timeoutUs);
+    ready = sleep_on(&line, tty->events != 0, timeoutUs);
     if (ready < 0)
         return errno == EINTR ? 0 : -1;
     if (ready > 0)
-        tty->awaits = 0;
+        tty->events = 0;
     return ready > 0;
 }
 

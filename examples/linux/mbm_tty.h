@@ -43,7 +43,7 @@ typedef struct mbm_tty {
     int error;            /**< why the link was lost, an errno; 0 while there is a link */
     uint8_t isOpen;       /**< 1 from open or attach to close or detach; a zeroed one is closed */
     uint8_t has_uart;     /**< whether there is a transmitter to wait for */
-    uint8_t awaits;       /**< what mbm_tty_wait polls it for: POLLIN or 0 */
+    uint8_t events;       /**< what mbm_tty_wait polls it for: POLLIN or 0 */
     uint8_t has_before;   /**< private */
     uint8_t is_exclusive; /**< private */
     uint8_t is_rs485;     /**< private */

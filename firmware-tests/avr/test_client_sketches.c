@@ -2,50 +2,12 @@
  * simulated boards against real libmodbus servers. */
 #include "kind.h"
 #include "peer.h"
+#include "sketch.h"
 #include "test.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Collects what a sketch prints. */
-typedef struct paper {
-    char text[2000];
-} paper;
-
-static void print(wire *w, const uint8_t *bytes, size_t length)
-{
-    paper *p = w->context;
-    size_t have = strlen(p->text);
-
-    if (have + length < sizeof p->text)
-        memcpy(p->text + have, bytes, length);
-}
-
-static void floats(modbus_mapping_t *mapping, unsigned address, float value)
-{
-    uint32_t bits;
-
-    memcpy(&bits, &value, sizeof bits);
-    mapping->tab_input_registers[address] = (uint16_t)(bits >> 16);
-    mapping->tab_input_registers[address + 1] = (uint16_t)bits;
-}
-
-/* Longest time between two changes of a pin. */
-typedef struct rhythm {
-    uint64_t last, longest;
-    unsigned changes;
-} rhythm;
-
-static void changed(void *context, int level, uint64_t cycle)
-{
-    rhythm *r = context;
-
-    (void)level;
-    if (r->changes++ && cycle - r->last > r->longest)
-        r->longest = cycle - r->last;
-    r->last = cycle;
-}
 
 /* Two meters share a wire; one that is not `there` is silent. */
 typedef struct meters {
@@ -67,34 +29,34 @@ static void shared(wire *w, const uint8_t *frame, size_t length)
 static void energy_meter_client(const kind *k)
 {
     board *b = kind_start(k, "EnergyMeterClient");
-    paper printed = {""};
-    rhythm r = {0, 0, 0};
+    printed_text printed = {""};
+    pin_rhythm r = {0, 0, 0};
     meters m = {.there = {1, 1}};
 
     for (int i = 0; i < 2; i++) {
         server_start(&m.all[i], i + 1);
-        floats(m.all[i].mapping, 0, 230.5f);
-        floats(m.all[i].mapping, 6, 2.25f);
-        floats(m.all[i].mapping, 12, 400.0f + 100.0f * (float)i);
+        set_input_float(&m.all[i], 0, 230.5f);
+        set_input_float(&m.all[i], 6, 2.25f);
+        set_input_float(&m.all[i], 12, 400.0f + 100.0f * (float)i);
     }
-    board_watch_pin(b, k->led.port, k->led.bit, changed, &r);
+    board_watch_pin(b, k->led.port, k->led.bit, measure_rhythm, &r);
     board_uart(b, k->bus, shared, &m);
     if (k->bus != '0')
-        board_uart(b, '0', print, &printed);
+        board_uart(b, '0', collect_text, &printed);
     assert_true(board_run(b, 900 * MS));
     assert_true(is_high(b, k->pin4)); /* 900 W */
     if (k->bus != '0')
         assert_string_equal(printed.text,
                             "1: 230.50 V 2.25 A 400.00 W\r\n2: 230.50 V 2.25 A 500.00 W\r\n");
-    floats(m.all[1].mapping, 12, 600.1f);
+    set_input_float(&m.all[1], 12, 600.1f);
     assert_true(board_run(b, 600 * MS));
     assert_false(is_high(b, k->pin4));
     /* A silent meter does not hold up the other, nor the LED. */
     m.there[0] = 0;
-    floats(m.all[1].mapping, 12, 100.0f);
+    set_input_float(&m.all[1], 12, 100.0f);
     assert_true(board_run(b, 2500 * MS));
     assert_true(is_high(b, k->pin4));
-    assert_true(r.changes > 70);
+    assert_true(r.switches > 70);
     /* 50 ms, the 8 bytes of a request at 9600 baud, which the core's flush waits for, and
      * a line of text that is longer than the core's buffer. */
     assert_true(r.longest < (k->bus == '0' ? 62u : 85u) * MS);
@@ -114,7 +76,7 @@ static void data_logger(const kind *k)
 {
     board *b = kind_start(k, "DataLogger");
     uint16_t entries = board_symbol(b, "entries");
-    paper printed = {""};
+    printed_text printed = {""};
     server s;
     wire *bus;
 
@@ -122,7 +84,7 @@ static void data_logger(const kind *k)
     s.mapping->tab_input_registers[2] = 1000;
     bus = board_uart(b, k->bus, peer_libmodbus, &s);
     if (k->bus != '0')
-        board_uart(b, '0', print, &printed);
+        board_uart(b, '0', collect_text, &printed);
     assert_true(board_run(b, 1050 * MS));
     assert_in_range(bus->frames, 9, 10);
     assert_int_equal(board_word(b, entries), 1); /* second */
@@ -150,11 +112,11 @@ static void a_logger_stores_a_mean_each_second(void **state)
 static void a_logger_counts_what_failed_and_keeps_its_time(void **state)
 {
     board *b = kind_start(&mega, "DataLogger");
-    paper printed = {""};
+    printed_text printed = {""};
 
     (void)state;
     board_uart(b, mega.bus, NULL, NULL);
-    board_uart(b, '0', print, &printed);
+    board_uart(b, '0', collect_text, &printed);
     assert_true(board_run(b, 3050 * MS));
     /* Of 80 ms and the quiet time after it: every other request. */
     assert_non_null(strstr(printed.text, "1,0,0,"));
@@ -170,14 +132,14 @@ static void sniffer_prints_a_request_and_its_reply(void **state)
     static const uint8_t request[] = {17, 3, 0, 107, 0, 3, 0x76, 0x87};
     static const uint8_t reply[] = {17, 3, 6, 2, 43, 0, 0, 0, 100, 0xC8, 0xBA};
     board *b = kind_start(&mega, "Sniffer");
-    paper printed = {""};
+    printed_text printed = {""};
     unsigned time, took;
     wire *bus;
     char *line;
 
     (void)state;
     bus = board_uart(b, mega.bus, NULL, NULL);
-    board_uart(b, '0', print, &printed);
+    board_uart(b, '0', collect_text, &printed);
     assert_true(board_run(b, 50 * MS));
     wire_play(bus, 0, request, sizeof request);
     wire_play(bus, 8 * MS, reply, sizeof reply);

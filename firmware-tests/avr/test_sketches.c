@@ -2,48 +2,26 @@
  * a libmodbus server. */
 #include "kind.h"
 #include "peer.h"
+#include "sketch.h"
 #include "test.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* What a sketch has printed. */
-typedef struct paper {
-    char text[1000];
-} paper;
-
-static void print(wire *w, const uint8_t *bytes, size_t length)
-{
-    paper *p = w->context;
-    size_t have = strlen(p->text);
-
-    if (have + length < sizeof p->text)
-        memcpy(p->text + have, bytes, length);
-}
-
-static void floats(modbus_mapping_t *mapping, unsigned address, float value)
-{
-    uint32_t bits;
-
-    memcpy(&bits, &value, sizeof bits);
-    mapping->tab_input_registers[address] = (uint16_t)(bits >> 16);
-    mapping->tab_input_registers[address + 1] = (uint16_t)bits;
-}
-
 /* --- the examples, each on both boards */
 
 static void first_read(const kind *k)
 {
     board *b = kind_start(k, "FirstRead");
-    paper printed = {""};
+    printed_text printed = {""};
     char expected[100];
     server s;
 
     server_start(&s, 1);
     board_uart(b, k->bus, peer_libmodbus, &s);
     if (k->bus != '0')
-        board_uart(b, '0', print, &printed);
+        board_uart(b, '0', collect_text, &printed);
     assert_true(board_run(b, 400 * MS));
     assert_true(is_high(b, k->led));
     if (k->bus != '0') {
@@ -66,12 +44,12 @@ static void first_read_reads_what_the_server_holds(void **state)
 static void first_read_prints_that_there_is_no_answer(void **state)
 {
     board *b = kind_start(&mega, "FirstRead");
-    paper printed = {""};
+    printed_text printed = {""};
     wire *bus;
 
     (void)state;
     bus = board_uart(b, mega.bus, NULL, NULL);
-    board_uart(b, '0', print, &printed);
+    board_uart(b, '0', collect_text, &printed);
     assert_true(board_run(b, 2500 * MS));
     assert_int_equal(bus->frames, 1);
     assert_false(is_high(b, mega.led));
@@ -220,34 +198,18 @@ static void several_slaves_answer_by_their_units(void **state)
     several_slaves(&mega);
 }
 
-/* The longest time between two changes of a pin. */
-typedef struct rhythm {
-    uint64_t last, longest;
-    unsigned changes;
-} rhythm;
-
-static void changed(void *context, int level, uint64_t cycle)
-{
-    rhythm *r = context;
-
-    (void)level;
-    if (r->changes++ && cycle - r->last > r->longest)
-        r->longest = cycle - r->last;
-    r->last = cycle;
-}
-
 static void non_blocking(const kind *k, int answers)
 {
     board *b = kind_start(k, "NonBlocking");
-    rhythm r = {0, 0, 0};
+    pin_rhythm r = {0, 0, 0};
     server s;
     wire *bus;
 
     server_start(&s, 1);
-    board_watch_pin(b, k->led.port, k->led.bit, changed, &r);
+    board_watch_pin(b, k->led.port, k->led.bit, measure_rhythm, &r);
     bus = board_uart(b, k->bus, answers ? peer_libmodbus : NULL, &s);
     assert_true(board_run(b, 1500 * MS));
-    assert_true(r.changes >= 28);
+    assert_true(r.switches >= 28);
     /* 50 ms, and the time of a request of 13 bytes at 19200 baud, since the core's flush,
      * which the class calls, waits for the last bit. */
     assert_true(r.longest < 58 * MS);
@@ -273,21 +235,21 @@ static void without_waiting_the_led_blinks_on(void **state)
 static void energy_meter(const kind *k)
 {
     board *b = kind_start(k, "EnergyMeter");
-    paper printed = {""};
+    printed_text printed = {""};
     server s;
 
     server_start(&s, 1);
-    floats(s.mapping, 0, 230.5f);
-    floats(s.mapping, 6, 2.25f);
-    floats(s.mapping, 12, 518.6f);
+    set_input_float(&s, 0, 230.5f);
+    set_input_float(&s, 6, 2.25f);
+    set_input_float(&s, 12, 518.6f);
     board_uart(b, k->bus, peer_libmodbus, &s);
     if (k->bus != '0')
-        board_uart(b, '0', print, &printed);
+        board_uart(b, '0', collect_text, &printed);
     assert_true(board_run(b, 400 * MS));
     assert_true(is_high(b, k->pin4));
     if (k->bus != '0')
         assert_string_equal(printed.text, "230.50 V 2.25 A 518.60 W\r\n");
-    floats(s.mapping, 12, 1000.1f);
+    set_input_float(&s, 12, 1000.1f);
     assert_true(board_run(b, 700 * MS));
     assert_false(is_high(b, k->pin4));
     server_stop(&s);
@@ -304,10 +266,10 @@ static void an_energy_meters_floats_are_read(void **state)
 static void values_pass_between_sketch_and_archive(void **state)
 {
     board *b = kind_start(&uno, "Values");
-    paper printed = {""};
+    printed_text printed = {""};
 
     (void)state;
-    board_uart(b, '0', print, &printed);
+    board_uart(b, '0', collect_text, &printed);
     assert_true(board_run(b, 100 * MS));
     assert_string_equal(printed.text, "none\r\n");
     board_free(b);

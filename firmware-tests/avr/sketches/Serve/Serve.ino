@@ -7,7 +7,7 @@ uint8_t bits[8];
 // 1 after the set-up; the last arguments of the hooks.
 struct {
   uint8_t ready;
-  uint8_t asked, told;
+  uint8_t beforeCalls, afterCalls;
   uint16_t address, quantity;
 } report;
 
@@ -20,12 +20,12 @@ ModbusUnit units[] = {{17}, {18}};
 ModbusServer server;
 
 uint8_t beforeWrite(uint16_t, uint16_t quantity, const uint8_t *data) {
-  report.asked++;
+  report.beforeCalls++;
   return quantity == 1 && data[0] == 0xFF ? MBM_SLAVE_DEVICE_BUSY : 0;
 }
 
 void afterWrite(uint16_t address, uint16_t quantity) {
-  report.told++;
+  report.afterCalls++;
   report.address = address;
   report.quantity = quantity;
 }
