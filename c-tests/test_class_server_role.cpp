@@ -213,7 +213,7 @@ static void the_other_functions_are_served_from_their_records(void **)
     mbm_fifo fifo = {queued, 30, 2};
     mbm_fifos fifos = {};
     mbm_object object = {};
-    mbm_identification identification = {};
+    mbm_serverIdentification identification = {};
     mbm_dataCallbacks cells = {};
     ModbusServer server;
     status.outputs = 0x6D;

@@ -73,7 +73,7 @@ static void answers_with_exception_04(uint8_t framing, mbm_unit *unit, const cha
 static void a_response_longer_than_its_buffer_is_exception_04(void **state)
 {
     static mbm_unit unit;
-    static mbm_identification identification;
+    static mbm_serverIdentification identification;
     static mbm_diagnostics diagnostics;
 
     (void)state;

@@ -18,7 +18,7 @@ typedef struct {
     mbm_serverId id;
     mbm_files files;
     mbm_fifos fifos;
-    mbm_identification identification;
+    mbm_serverIdentification identification;
     mbm_custom custom;
     mbm_dataCallbacks cells;
     mbm_functionMask switches;

@@ -116,7 +116,7 @@ public:
     /** Serves FIFO queues: function 18. */
     uint8_t serve(mbm_fifos &fifos) { return mbm_unit_serveFifos(&unit, &fifos); }
     /** Serves the device identification: function 2B/0E. */
-    uint8_t serve(mbm_identification &identification)
+    uint8_t serve(mbm_serverIdentification &identification)
     {
         return mbm_unit_serveIdentification(&unit, &identification);
     }

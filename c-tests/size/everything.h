@@ -10,7 +10,7 @@ static mbm_exceptionStatus exceptions;
 static mbm_serverId id;
 static mbm_files files;
 static mbm_fifos fifos;
-static mbm_identification identification;
+static mbm_serverIdentification identification;
 static mbm_custom custom;
 static mbm_dataCallbacks cells;
 static mbm_functionMask switches;

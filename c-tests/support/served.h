@@ -28,7 +28,7 @@ typedef struct served {
     mbm_serverId id;
     mbm_files files;
     mbm_fifos fifos;
-    mbm_identification identification;
+    mbm_serverIdentification identification;
     mbm_custom echo;
     uint16_t words[SERVED_REGISTERS], input_words[SERVED_REGISTERS], other_words[10];
     uint8_t bits[SERVED_BITS / 8], input_bits[SERVED_BITS / 8];

@@ -25,7 +25,7 @@ fn probes() -> Vec<(String, u64)> {
         sizes: mbm_port mbm_counters mbm_master mbm_registers mbm_ring mbm_rule mbm_function
             mbm_length mbm_packet mbm_record mbm_object mbm_framing mbm_server mbm_unit
             mbm_service mbm_registerTable mbm_bitTable mbm_dataCallbacks mbm_file mbm_files mbm_fifo
-            mbm_fifos mbm_access mbm_accessHooks mbm_recordHooks mbm_exceptionStatus mbm_serverId mbm_identification mbm_request mbm_custom
+            mbm_fifos mbm_access mbm_accessHooks mbm_recordHooks mbm_exceptionStatus mbm_serverId mbm_serverIdentification mbm_request mbm_custom
             mbm_functionMask mbm_diagnostics mbm_sniffer mbm_event mbm_client mbm_clientRequest mbm_clientUnit mbm_linkHooks
             mbm_turn mbm_plan mbm_planPosition mbm_planRead mbm_planSetup mbm_planUnitLimits
             mbm_planExcludedRange mbm_planReadInfo mbm_planField;
@@ -69,7 +69,7 @@ fn probes() -> Vec<(String, u64)> {
             mbm_fifos { service fifos count }
             mbm_exceptionStatus { service outputs }
             mbm_serverId { service id additional idLength additionalLength running }
-            mbm_identification { service objects count }
+            mbm_serverIdentification { service objects count }
             mbm_request { data connection length unit function }
             mbm_custom { service serve context code length }
             mbm_functionMask { service off }

@@ -42,7 +42,7 @@ pub struct mbm_serverId {
 /// A device identification. Zero the struct, set `objects` and `count`, and pass it to
 /// mbm_unit_serveIdentification.
 #[repr(C)]
-pub struct mbm_identification {
+pub struct mbm_serverIdentification {
     /// Private.
     pub service: mbm_service,
     /// The objects, in any order. Every device has the ids 0 (vendor name), 1 (product
@@ -99,7 +99,7 @@ unsafe extern "C" fn serve_server_id(
 }
 
 /// The objects of C.
-struct CObjects(*const mbm_identification);
+struct CObjects(*const mbm_serverIdentification);
 
 impl Objects for CObjects {
     fn object(&self, id: u8) -> Option<&[u8]> {
@@ -170,7 +170,7 @@ pub unsafe extern "C" fn mbm_unit_serveServerId(unit: *mut mbm_unit, id: *mut mb
 #[no_mangle]
 pub unsafe extern "C" fn mbm_unit_serveIdentification(
     unit: *mut mbm_unit,
-    identification: *mut mbm_identification,
+    identification: *mut mbm_serverIdentification,
 ) -> u8 {
     // SAFETY: as the header demands.
     unsafe { add(unit, identification.cast(), serve_identification) }

@@ -80,7 +80,7 @@ pub struct Records {
     pub fifos: Pool<mbm_fifos>,
     pub outputs: Pool<mbm_exceptionStatus>,
     pub ids: Pool<mbm_serverId>,
-    pub identifications: Pool<mbm_identification>,
+    pub identifications: Pool<mbm_serverIdentification>,
 }
 
 impl Default for Records {

@@ -276,7 +276,7 @@ fn server_id(w: &World) -> mbm_serverId {
     }
 }
 
-fn identification(w: &World) -> mbm_identification {
+fn identification(w: &World) -> mbm_serverIdentification {
     let objects: Vec<mbm_object> = (0..w.byte() % 8)
         .map(|id| {
             let length = w.word() as u8;
@@ -291,7 +291,7 @@ fn identification(w: &World) -> mbm_identification {
             }
         })
         .collect();
-    mbm_identification {
+    mbm_serverIdentification {
         service: SERVICE,
         objects: w.array(&objects),
         count: objects.len() as u16,
