@@ -249,6 +249,7 @@ pub mod sniffer;
 pub mod text;
 
 pub mod client;
+pub mod gateway;
 pub mod master;
 pub mod plan;
 pub mod server;

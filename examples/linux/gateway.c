@@ -1,12 +1,19 @@
-/* A gateway from Modbus TCP to the devices of RTU serial lines.
+/* A gateway from Modbus TCP to the devices of serial lines: a program over mbm_gateway.
  *
- *     gateway [-i SECONDS] [-q QUIET] PORT MILLISECONDS PATH,BAUD,PARITY+STOP,FIRST-LAST...
- *     gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,32-40
+ *     gateway [-f MOST] [-i SECONDS] [-q QUIET] [-w WAIT] PORT MILLISECONDS
+ *             PATH,BAUD,PARITY+STOP[,ascii],FIRST-LAST[=UNIT]...
+ *     gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,101-131=1
  *
- * The unit id of a request selects the line. MILLISECONDS is the response timeout of a
- * device. The gateway never blocks: while one line waits for a device, the others and all
- * connections go on. A connection has one request under way. Its next requests wait in its
- * socket. Prints `ready PORT` once it listens.
+ * The unit id of a request selects the line. =UNIT rewrites the ids: here the unit 101 on TCP
+ * is unit 1 on the second line. A line may have several ranges. 0-0 sends requests for unit 0
+ * as broadcasts; 255-255=5 leads clients that address the gateway itself to unit 5.
+ * MILLISECONDS is the response timeout of a device. The gateway never blocks: while one line
+ * waits for a device, the others and all connections go on. Prints `ready PORT` once it
+ * listens.
+ *
+ * A connection may have MOST (8) requests under way. Its next requests wait in its socket.
+ * When a line is free, the connections take turns. With WAIT, a request that has waited for
+ * its line for so many milliseconds is answered with 0A and not sent.
  *
  * The gateway has 16 places for connections, or fewer if the system gives it fewer
  * descriptors. When a new client finds no place, the gateway closes the connection that has
@@ -14,9 +21,9 @@
  * not answered yet is not idle.
  *
  * Without a response to pass on, the gateway answers itself (V1.1b3, 7): 0A if the unit has
- * no line, or if its line cannot be opened, is lost, or has a full queue; 0B if the device
- * does not respond, or if its reply is damaged or does not answer the request; 02 and 03
- * for a request that the standard does not allow. It passes on unknown functions unchanged.
+ * no line, or if its line cannot be opened or is lost; 0B if the device does not respond, or
+ * if its reply is damaged or does not answer the request; 01, 02 and 03 for a request that
+ * the standard does not allow. It passes on unknown functions unchanged.
  *
  * A device may reply after its timeout. QUIET (100) is the quiet time in milliseconds, which
  * keeps such a reply from being taken for the answer to the next request. Make it longer
@@ -39,14 +46,13 @@
 #include <unistd.h>
 
 enum {
-    CONNECTIONS = 16, /* as many as a client's queue has requests */
+    CONNECTIONS = 16,
+    REQUESTS = 128,
+    IN_FLIGHT = 8,
     LINES = 4,
-    DATA = 252,
     REOPEN_MICROS = 1000000,
     NAP_MICROS = 10000, /* the sleep if the system refuses to poll */
-    IDLE_SECONDS = 60,
-    PATH_UNAVAILABLE = MBM_REPLY_EXCEPTION | 0x0A,
-    NO_RESPONSE = MBM_REPLY_EXCEPTION | 0x0B
+    IDLE_SECONDS = 60
 };
 
 /* A serial line and the client for its devices. */
@@ -59,25 +65,24 @@ typedef struct line {
     const char *path;
     uint32_t tried; /* when it was last tried to open the line, while it is not open */
     uint8_t is_open;
-    uint8_t frame[MBM_MAX_FRAME];
+    uint8_t frame[MBM_MAX_ASCII_FRAME];
 } line;
-
-/* A connection. Its server has one unit, which answers for every unit id. */
-typedef struct connection {
-    mbm_server server;
-    mbm_unit unit;
-    mbm_custom every;
-    mbm_clientRequest request;
-    line *asked; /* the line whose device has the request, or NULL */
-    uint8_t reply[DATA];
-    uint8_t frame[2 * MBM_MAX_TCP_FRAME]; /* a request and, after it, its response */
-} connection;
 
 /* All storage is the program's own; mbm allocates nothing. */
 static line lines[LINES];
-static unsigned line_count;
-static line *route[256];
-static connection connections[CONNECTIONS];
+static mbm_gateway gateway;
+static mbm_gatewayLine gateway_lines[LINES];
+static mbm_gatewayRoute routes[256];
+static mbm_gatewayConnection connections[CONNECTIONS];
+static mbm_gatewayRequest requests[REQUESTS];
+static mbm_gatewayConfig config = {
+    .routes = routes,
+    .lines = gateway_lines,
+    .connections = connections,
+    .requests = requests,
+    .requestCount = REQUESTS,
+    .connectionCount = CONNECTIONS,
+};
 static mbm_tcp tcps[CONNECTIONS];
 static mbm_tcp_listener listener;
 static long quiet = 100; /* milliseconds; the client's default */
@@ -147,9 +152,10 @@ static void hang_up(line *l)
     l->tried = micros() - REOPEN_MICROS;
 }
 
-/* Opens a line that is not open, at most once a second. Returns whether it is open. */
-static int open_if_due(line *l)
+/* Returns whether a line is open. If not, tries to open it, at most once a second. */
+static uint8_t is_ready(void *context)
 {
+    line *l = (line *)context;
     const mbm_linkHooks link = {l, close_line, open_line};
     struct pollfd idle = {l->tty.fd, 0, 0};
 
@@ -161,10 +167,9 @@ static int open_if_due(line *l)
     return l->is_open;
 }
 
-/* Moves the requests of a line on. When the line is lost, all its requests have ended. */
-static void poll_line(line *l)
+/* Closes a line that is lost. All its requests have ended then. */
+static void close_if_lost(line *l)
 {
-    mbm_client_poll(&l->client);
     if (l->is_open && l->tty.error != 0 && mbm_client_pending(&l->client) == 0) {
         fprintf(stderr, "%s: %s\n", l->path, strerror(l->tty.error));
         close_line(l);
@@ -172,115 +177,69 @@ static void poll_line(line *l)
     }
 }
 
-/* PATH,BAUD,PARITY+STOP,FIRST-LAST */
+/* FIRST-LAST[=UNIT]. No unit may have two routes. */
+static int add_route(const char *text, uint8_t to)
+{
+    mbm_gatewayRoute *route = &routes[config.routeCount];
+    unsigned first, last, unit = 0, i;
+    char extra;
+    int fields = sscanf(text, "%u-%u%c%u%c", &first, &last, &extra, &unit, &extra);
+
+    if ((fields != 2 && (fields != 4 || !strchr(text, '='))) || first > last || last > 255 ||
+        unit > 255 || config.routeCount == UINT8_MAX)
+        return -1;
+    for (i = 0; i < config.routeCount; i++)
+        if (first <= routes[i].last && last >= routes[i].first)
+            return -1;
+    *route = (mbm_gatewayRoute){(uint8_t)first, (uint8_t)last, to, (uint8_t)unit};
+    config.routeCount++;
+    return 0;
+}
+
+/* PATH,BAUD,PARITY+STOP[,ascii],FIRST-LAST[=UNIT]... */
 static int add_line(char *text, uint16_t timeout)
 {
-    line *l = &lines[line_count];
+    const uint8_t index = config.lineCount;
+    line *l = &lines[index];
     struct termios unused = {0};
-    unsigned baud, stop, first, last, unit;
-    char parity, extra;
+    unsigned baud, stop;
+    char parity, extra, *field, *rest = NULL;
+    int is_ascii = 0;
     mbm_port port;
-    char *rest = strchr(text, ',');
 
-    if (!rest || line_count == LINES)
+    if (index == LINES || !(l->path = strtok_r(text, ",", &rest)) ||
+        !(field = strtok_r(NULL, ",", &rest)) || sscanf(field, "%u%c", &baud, &extra) != 1 ||
+        !(field = strtok_r(NULL, ",", &rest)) ||
+        sscanf(field, "%c%u%c", &parity, &stop, &extra) != 2 || stop > 2 || baud < 50)
         return -1;
-    *rest++ = 0;
-    if (sscanf(rest, "%u,%c%u,%u-%u%c", &baud, &parity, &stop, &first, &last, &extra) != 5 ||
-        first < 1 || first > last || last > 247 || stop > 2 || baud < 50)
-        return -1;
-    l->path = text;
     l->options.baud = baud;
     l->options.anyRate = 1;
     l->options.parity = parity;
     l->options.stop = (uint8_t)stop;
-    if (mbm_tty_settings(&unused, &l->options) != 0)
+    field = strtok_r(NULL, ",", &rest);
+    if (field && strcmp(field, "ascii") == 0) {
+        is_ascii = 1;
+        field = strtok_r(NULL, ",", &rest);
+    }
+    if (!field || mbm_tty_settings(&unused, &l->options) != 0)
         return -1;
-    for (unit = first; unit <= last; unit++)
-        if (route[unit])
+    for (; field; field = strtok_r(NULL, ",", &rest))
+        if (add_route(field, index) != 0)
             return -1;
-    line_count++;
+    config.lineCount++;
     port = mbm_tty_port(&l->tty);
     if (open_line(l) != MBM_OK)
         fprintf(stderr, "%s: %s\n", text, strerror(l->failure));
-    if (mbm_client_beginRtu(&l->client, &port, l->frame, sizeof l->frame) != MBM_OK ||
-        mbm_client_setBaudRate(&l->client, baud) != MBM_OK ||
-        mbm_client_setResponseTimeout(&l->client, timeout) != MBM_OK ||
-        mbm_client_setQuietTime(&l->client, (uint16_t)quiet) != MBM_OK)
+    if (is_ascii ? mbm_client_beginAscii(&l->client, &port, l->frame, sizeof l->frame)
+                 : mbm_client_beginRtu(&l->client, &port, l->frame, sizeof l->frame) ||
+                       mbm_client_setBaudRate(&l->client, baud))
         return -1;
-    for (unit = first; unit <= last; unit++)
-        route[unit] = l;
-    return 0;
-}
-
-/* --- requests --- */
-
-/* True for 08 with sub-function 04, Force Listen Only Mode: no device responds to it. */
-static int is_unanswered(const mbm_request *request)
-{
-    return request->function == MBM_FC_DIAGNOSTICS && request->length >= 2 &&
-           request->data[0] == 0 && request->data[1] == MBM_DIAGNOSTICS_FORCE_LISTEN_ONLY;
-}
-
-/* The response to a request that has ended at its device. */
-static uint16_t outcome(const connection *c, uint8_t *response, uint16_t capacity)
-{
-    if (c->request.status == MBM_OK) {
-        if (c->request.length > capacity)
-            return MBM_REPLY_EXCEPTION | MBM_SLAVE_DEVICE_FAILURE;
-        memcpy(response, c->reply, c->request.length);
-        return c->request.length;
-    }
-    if (c->request.exception != 0)
-        return (uint16_t)(MBM_REPLY_EXCEPTION | c->request.exception);
-    if (c->request.status == MBM_LINK_LOST || c->request.status == MBM_LINE_BUSY)
-        return PATH_UNAVAILABLE;
-    return NO_RESPONSE;
-}
-
-/* Notes the line that has the connection's request, NULL when the request has ended. Until
- * then the connection is not idle, however long its device takes. */
-static void become_busy(connection *c, line *l)
-{
-    c->asked = l;
-    tcps[c - connections].isBusy = l != NULL;
-}
-
-/* Serves every function of every unit: passes the request to the line's client, and is
- * called again until the request has ended. */
-static uint16_t forward(void *context, const mbm_request *request, uint8_t *response,
-                        uint16_t capacity)
-{
-    connection *c = (connection *)context;
-    line *l = route[request->unit];
-    uint8_t status;
-
-    if (c->asked) {
-        if (c->request.status == MBM_PENDING)
-            return MBM_REPLY_PENDING;
-        become_busy(c, NULL);
-        if (c->request.status == MBM_OK && is_unanswered(request))
-            return MBM_REPLY_NONE;
-        return outcome(c, response, capacity);
-    }
-    if (!l || !open_if_due(l))
-        return PATH_UNAVAILABLE;
-    memset(&c->request, 0, sizeof c->request);
-    c->request.unit = request->unit;
-    c->request.reply = c->reply;
-    c->request.replyBytes = sizeof c->reply;
-    /* The request's data stay where they are until the response is sent. The client does
-     * not accept a reply that does not answer this request, for example a late one to
-     * another client. */
-    status = mbm_client_forward(&l->client, &c->request, request->function, request->data,
-                                request->length);
-    switch (status) {
-    case MBM_PENDING: become_busy(c, l); return MBM_REPLY_PENDING;
-    case MBM_QUEUE_FULL: return PATH_UNAVAILABLE;
-    case MBM_ILLEGAL_FUNCTION:
-    case MBM_ILLEGAL_DATA_ADDRESS:
-    case MBM_ILLEGAL_DATA_VALUE: return (uint16_t)(MBM_REPLY_EXCEPTION | status);
-    default: return MBM_REPLY_EXCEPTION | MBM_SLAVE_DEVICE_FAILURE;
-    }
+    gateway_lines[index] =
+        (mbm_gatewayLine){.client = &l->client, .context = l, .isReady = is_ready};
+    return mbm_client_setResponseTimeout(&l->client, timeout) == MBM_OK &&
+                   mbm_client_setQuietTime(&l->client, (uint16_t)quiet) == MBM_OK
+               ? 0
+               : -1;
 }
 
 /* --- connections --- */
@@ -290,39 +249,26 @@ static void take_connections(void)
     int place;
 
     while ((place = mbm_tcp_accept(&listener, tcps, CONNECTIONS)) >= 0) {
-        connection *c = &connections[place];
-        mbm_port port = mbm_tcp_port(&tcps[place]);
+        const mbm_port port = mbm_tcp_port(&tcps[place]);
 
-        memset(c, 0, sizeof *c);
-        c->every.serve = forward;
-        c->every.context = c;
-        if (mbm_unit_serveCustom(&c->unit, &c->every) != MBM_OK ||
-            mbm_server_beginTcp(&c->server, &port, &c->unit, 1, c->frame, sizeof c->frame) !=
-                MBM_OK)
+        if (mbm_gateway_open(&gateway, (uint8_t)place, &port) != MBM_OK)
             mbm_tcp_close(&tcps[place]);
     }
 }
 
+/* Gives the requests of a connection up, and closes it. */
 static void drop_connection(unsigned place)
 {
-    connection *c = &connections[place];
-
-    /* The connection is gone, so its request is given up. */
-    if (c->asked)
-        mbm_client_cancel(&c->asked->client, &c->request);
+    mbm_gateway_close(&gateway, (uint8_t)place);
     mbm_tcp_close(&tcps[place]);
 }
 
 /* The events to poll a connection for. */
 static short events_of(unsigned place)
 {
-    const connection *c = &connections[place];
+    const int reads = mbm_gateway_isReading(&gateway, (uint8_t)place);
 
-    /* The connection has a request under way. Its next request may wait in the socket. */
-    if (c->asked)
-        return c->request.status == MBM_PENDING ? 0 : POLLOUT;
-    /* The socket was full. */
-    return tcps[place].events & POLLOUT ? POLLOUT : POLLIN;
+    return (short)((reads ? POLLIN : 0) | (tcps[place].events & POLLOUT));
 }
 
 /* --- all of it --- */
@@ -351,19 +297,15 @@ static int sleep_for(uint32_t micros)
 /* Sleeps until there is something to do. */
 static void wait_for_work(void)
 {
-    uint32_t delay = UINT32_MAX;
+    uint32_t delay = mbm_gateway_pollDelay(&gateway);
     unsigned i;
     nfds_t n;
 
     waits.count = 0;
-    for (i = 0; i < line_count; i++) {
-        mbm_client *client = &lines[i].client;
-        uint32_t own = mbm_client_pollDelay(client);
-
+    for (i = 0; i < config.lineCount; i++) {
         /* An idle client reads no bytes, so only a hang-up of its line ends the sleep. */
         if (lines[i].is_open)
-            wait_on(lines[i].tty.fd, mbm_client_pending(client) != 0 ? POLLIN : 0, i);
-        delay = own < delay ? own : delay;
+            wait_on(lines[i].tty.fd, mbm_client_pending(&lines[i].client) != 0 ? POLLIN : 0, i);
     }
     for (i = 0; i < CONNECTIONS; i++)
         if (mbm_tcp_isInUse(&tcps[i]))
@@ -384,8 +326,7 @@ static void wait_for_work(void)
 
         if (owner < LINES && !one->events && one->revents)
             hang_up(&lines[owner]);
-        else if (owner >= LINES && owner < LINES + CONNECTIONS &&
-                 connections[owner - LINES].asked &&
+        else if (owner >= LINES && owner < LINES + CONNECTIONS && !(one->events & POLLIN) &&
                  (one->revents & (POLLERR | POLLHUP | POLLNVAL)))
             drop_connection(owner - LINES);
     }
@@ -395,17 +336,23 @@ static int usage(int wrong)
 {
     fprintf(
         wrong ? stderr : stdout,
-        "usage: gateway [-i SECONDS] [-q QUIET] PORT MILLISECONDS\n"
-        "               PATH,BAUD,PARITY+STOP,FIRST-LAST...\n"
+        "usage: gateway [-f MOST] [-i SECONDS] [-q QUIET] [-w WAIT] PORT MILLISECONDS\n"
+        "               PATH,BAUD,PARITY+STOP[,ascii],FIRST-LAST[=UNIT]...\n"
+        "  -f MOST              requests of one connection that are under way at once, 8 if left\n"
+        "                       out\n"
         "  -i SECONDS           that a connection is idle before it may be closed for a new\n"
         "                       client, 60 if left out, 0 for never\n"
         "  -q QUIET             milliseconds that a line is left alone after a request without\n"
         "                       a right reply, 0 to 65535, 100 if left out\n"
+        "  -w WAIT              milliseconds that a request may wait for its line, then it is\n"
+        "                       answered with exception 0A; 0 for any time, if left out\n"
         "  PORT                 where it listens, 0 for one that is free\n"
         "  MILLISECONDS         that a device has to respond, up to 65535\n"
         "  PATH,BAUD,...        up to 4 serial lines, the parity N, E or O, 1 or 2 stop bits,\n"
-        "                       and the units on it, 1 to 247, each on one line\n"
-        "for example: gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,32-40\n");
+        "                       and the units on it, 0 to 255, each on one line; =UNIT: the\n"
+        "                       id on the line of the unit FIRST. Several ranges may follow\n"
+        "for example: gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 "
+        "/dev/ttyUSB1,9600,N2,101-131=1\n");
     return wrong ? 2 : 0;
 }
 
@@ -421,20 +368,24 @@ static long number(const char *text, long least, long most)
 int main(int argc, char **argv)
 {
     struct sigaction action = {0};
-    long idle = IDLE_SECONDS, timeout;
+    long idle = IDLE_SECONDS, timeout, most = IN_FLIGHT, wait = 0;
     sigset_t ends;
     int i, option;
 
     if (argc == 2 && strcmp(argv[1], "--help") == 0)
         return usage(0);
-    while ((option = getopt(argc, argv, "hi:q:")) != -1) {
-        if (option == 'i')
+    while ((option = getopt(argc, argv, "f:hi:q:w:")) != -1) {
+        if (option == 'f')
+            most = number(optarg, 1, REQUESTS);
+        else if (option == 'w')
+            wait = number(optarg, 0, UINT16_MAX);
+        else if (option == 'i')
             idle = number(optarg, 0, 1000000);
         else if (option == 'q')
             quiet = number(optarg, 0, UINT16_MAX);
         else
             return usage(option != 'h');
-        if (idle < 0 || quiet < 0)
+        if (idle < 0 || quiet < 0 || most < 0 || wait < 0)
             return usage(1);
     }
     argc -= optind;
@@ -443,7 +394,9 @@ int main(int argc, char **argv)
     for (i = 2; timeout > 0 && i < argc; i++)
         if (add_line(argv[i], (uint16_t)timeout) != 0)
             break;
-    if (i < 3 || i < argc)
+    if (i < 3 || i < argc || mbm_gateway_begin(&gateway, &config) != MBM_OK ||
+        mbm_gateway_setInFlight(&gateway, (uint16_t)most) != MBM_OK ||
+        mbm_gateway_setQueueTime(&gateway, (uint16_t)wait) != MBM_OK)
         return usage(1);
     listener.idleTimeMs = (uint32_t)idle * 1000u;
     if (mbm_tcp_listen(&listener, NULL, argv[0]) != 0) {
@@ -464,18 +417,23 @@ int main(int argc, char **argv)
         unsigned place;
 
         take_connections();
-        for (place = 0; place < line_count; place++)
-            poll_line(&lines[place]);
-        for (place = 0; place < CONNECTIONS; place++)
-            if (mbm_tcp_isInUse(&tcps[place]) &&
-                mbm_server_poll(&connections[place].server) != MBM_OK)
+        mbm_gateway_poll(&gateway);
+        for (place = 0; place < config.lineCount; place++)
+            close_if_lost(&lines[place]);
+        for (place = 0; place < CONNECTIONS; place++) {
+            if (!mbm_tcp_isInUse(&tcps[place]))
+                continue;
+            /* A connection is not idle while its device has not answered. */
+            tcps[place].isBusy = mbm_gateway_pending(&gateway, (uint8_t)place) != 0;
+            if (mbm_gateway_status(&gateway, (uint8_t)place) != MBM_OK)
                 drop_connection(place);
+        }
         wait_for_work();
     }
     for (i = 0; i < CONNECTIONS; i++)
         if (mbm_tcp_isInUse(&tcps[i]))
             drop_connection((unsigned)i);
-    for (i = 0; i < (int)line_count; i++) {
+    for (i = 0; i < config.lineCount; i++) {
         close_line(&lines[i]);
         free_reserve(&lines[i]);
     }

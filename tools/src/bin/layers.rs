@@ -18,7 +18,7 @@ const LAYERS: [&[&str]; 9] = [
     &["packet"],
     &["text"],
     &["sniffer", "engine"],
-    &["master", "client", "plan", "server"],
+    &["master", "client", "plan", "server", "gateway"],
 ];
 
 fn layer(module: &str) -> Option<usize> {

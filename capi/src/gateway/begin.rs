@@ -1,0 +1,117 @@
+//! Beginning a gateway.
+
+use super::object::{mbm_gateway, Core};
+use super::parts::{mbm_gatewayConfig, mbm_gatewayRequest};
+use crate::pointers::{self, CObject, BEGUN};
+use mbm::error::Status;
+
+/// Begins a gateway without connections.
+///
+/// You may call it again at any time, also with another config. The gateway then gives up all
+/// connections and their requests; it cancels those that a line has, and its settings return
+/// to their defaults. A call that is refused changes nothing.
+///
+/// @param gateway  the object; zero it before the first call
+/// @param config   what the gateway consists of. What it points to must stay valid, and must
+///                 be used by one gateway only, for as long as the gateway is used; lines and
+///                 requests must be zero before first use
+/// @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a count out of range, fewer
+///         requests than connections, a route to a line that does not exist or to a unit id
+///         above 255, and a line without client; MBM_NOT_INITIALISED if the client of a line
+///         was not begun; MBM_BUSY from within a hook of the gateway, and of a client of its
+///         lines
+#[no_mangle]
+pub unsafe extern "C" fn mbm_gateway_begin(
+    gateway: *mut mbm_gateway,
+    config: *const mbm_gatewayConfig,
+) -> u8 {
+    if config.is_null() {
+        return Status::INVALID_ARGUMENT.code();
+    }
+    // SAFETY: not NULL; the rest as the header demands.
+    unsafe {
+        let status = match check(&*config) {
+            Status::OK => give_up(gateway),
+            refused => refused,
+        };
+        if status == Status::OK {
+            // Zero is a valid value of every field of the object.
+            let core = &mut *pointers::object(gateway);
+            let parts = &mut core.storage;
+            copy(&mut parts.config, &*config);
+            (parts.serve, parts.forward_declared) = (None, None);
+            for index in 0..parts.config.requestCount {
+                // The client of the line that had it, if any, has it no more.
+                let place: *mut mbm_gatewayRequest = parts.config.requests.add(index.into());
+                (*place).request.status = Status::OK.code();
+                (*place).request.done = None;
+            }
+            core.reset();
+            mbm_gateway::mark(gateway).write(BEGUN);
+        }
+        status.code()
+    }
+}
+
+/// Copies a config. (The assignment of the whole struct calls memcpy, which most firmware does
+/// not need otherwise.)
+fn copy(to: &mut mbm_gatewayConfig, from: &mbm_gatewayConfig) {
+    to.routes = from.routes;
+    to.lines = from.lines;
+    to.connections = from.connections;
+    to.requests = from.requests;
+    to.requestCount = from.requestCount;
+    to.routeCount = from.routeCount;
+    to.lineCount = from.lineCount;
+    to.connectionCount = from.connectionCount;
+}
+
+/// [`Status::OK`] if a gateway can consist of these parts.
+///
+/// # Safety
+/// Each pointer is NULL, or points to as many items as its count says.
+unsafe fn check(config: &mbm_gatewayConfig) -> Status {
+    if config.routes.is_null()
+        || config.connections.is_null()
+        || config.requests.is_null()
+        || config.lines.is_null() && config.lineCount > 0
+        || config.routeCount == 0
+        || config.connectionCount == 0
+        || config.lineCount >= super::MBM_GATEWAY_LOCAL
+        || config.requestCount < config.connectionCount.into()
+        || config.requestCount == u16::MAX
+        // SAFETY: as the caller promises.
+        || !unsafe { config.routes() }
+            .iter()
+            .all(|route| route.is_valid(config.lineCount))
+    {
+        return Status::INVALID_ARGUMENT;
+    }
+    // SAFETY: as the caller promises.
+    unsafe { config.check_clients() }
+}
+
+/// Gives up the connections of a gateway that was begun before.
+///
+/// # Safety
+/// `gateway` is NULL, or storage of a gateway, zeroed or begun.
+unsafe fn give_up(gateway: *mut mbm_gateway) -> Status {
+    // SAFETY: as the caller promises.
+    unsafe {
+        match pointers::check(gateway) {
+            Status::OK => {}
+            Status::NOT_INITIALISED => return Status::OK,
+            refused => return refused,
+        }
+        let core: *mut Core = pointers::object(gateway);
+        if (*core).storage.config.check_clients() == Status::BUSY {
+            return Status::BUSY;
+        }
+        pointers::with_hooks(gateway, || {
+            for connection in 0..(*core).storage.config.connectionCount {
+                (*core).close(connection);
+            }
+        });
+    }
+    Status::OK
+}

@@ -1,0 +1,180 @@
+//! The gateway object, and what becomes of its requests.
+
+use super::state::{LineState, Stage, NONE};
+use super::storage::GatewayStorage;
+use crate::error::Status;
+use crate::frame::tcp;
+use crate::pdu::EXCEPTION;
+use crate::time;
+
+/// Index of the function code in a frame.
+pub(super) const FUNCTION: usize = tcp::PDU;
+
+/// The exception for a request that the gateway cannot pass on (V1.1b3, 7).
+pub(super) const PATH_UNAVAILABLE: u8 = 0x0A;
+/// The exception for a request that the device did not answer (V1.1b3, 7).
+pub(super) const TARGET_FAILED: u8 = 0x0B;
+
+/// A gateway.
+#[repr(C)]
+pub struct Gateway<S> {
+    /// The number that the next request or response gets in the order.
+    pub(super) order: u32,
+    /// How long a request may wait for its line, in microseconds; 0 for ever.
+    pub(super) queue_time: u32,
+    /// The most requests of one connection.
+    pub(super) most: u16,
+    /// The caller's memory, connections, lines and units.
+    pub storage: S,
+}
+
+impl<S: GatewayStorage> Gateway<S> {
+    /// A gateway that has no connection yet. The storage may be used before.
+    pub fn new(storage: S) -> Self {
+        let mut gateway = Gateway {
+            order: 0,
+            queue_time: 0,
+            most: u16::MAX,
+            storage,
+        };
+        gateway.reset();
+        gateway
+    }
+
+    /// Sets all that the gateway keeps to its first state. No line may have a request.
+    pub fn reset(&mut self) {
+        (self.order, self.queue_time, self.most) = (0, 0, u16::MAX);
+        for request in 0..self.storage.request_count() {
+            self.storage.request(request).stage = Stage::Free;
+        }
+        for connection in 0..self.storage.connection_count() {
+            let state = self.storage.connection(connection);
+            state.clear(Status::NOT_INITIALISED);
+        }
+        for line in 0..self.storage.line_count() {
+            *self.storage.line(line) = LineState::NEW;
+        }
+    }
+
+    /// Sets how many requests of one connection may be under way, at least 1.
+    pub fn set_most_requests(&mut self, most: u16) {
+        self.most = most;
+    }
+
+    /// See [`Gateway::set_most_requests`].
+    pub fn most_requests(&self) -> u16 {
+        self.most
+    }
+
+    /// Sets how long a request may wait for its line, in microseconds; 0 for ever.
+    pub fn set_queue_time(&mut self, microseconds: u32) {
+        self.queue_time = time::clamped(microseconds);
+    }
+
+    /// See [`Gateway::set_queue_time`].
+    pub fn queue_time(&self) -> u32 {
+        self.queue_time
+    }
+
+    /// Serves the connection that the storage has at this place from now on.
+    pub fn open(&mut self, connection: u8) {
+        self.storage.connection(connection).clear(Status::OK);
+    }
+
+    /// Gives up a connection and its requests. Its place is free then.
+    pub fn close(&mut self, connection: u8) {
+        self.lose(connection, Status::NOT_INITIALISED);
+    }
+
+    /// [`Status::OK`] while the connection is open; [`Status::LINK_LOST`] or
+    /// [`Status::MALFORMED_FRAME`] if the gateway has given it up;
+    /// [`Status::NOT_INITIALISED`] for a free place.
+    pub fn status(&mut self, connection: u8) -> Status {
+        self.storage.connection(connection).status
+    }
+
+    /// How many requests of a connection are complete and not answered yet.
+    pub fn pending(&mut self, connection: u8) -> u16 {
+        let state = self.storage.connection(connection);
+        state.requests - u16::from(state.receiving != NONE)
+    }
+
+    /// True if the next poll reads bytes from a connection. Otherwise it has as many requests
+    /// under way as it may have.
+    pub fn is_reading(&mut self, connection: u8) -> bool {
+        let state = *self.storage.connection(connection);
+        state.is_open() && (state.receiving != NONE || self.may_have_more(connection))
+    }
+
+    /// True if a connection may have another request. Each place for a connection keeps one
+    /// place for a request, so that no client takes all of them.
+    pub(super) fn may_have_more(&mut self, connection: u8) -> bool {
+        let own = self.storage.connection(connection).requests;
+        let (mut free, mut kept) = (self.storage.request_count(), 0);
+        for other in 0..self.storage.connection_count() {
+            let requests = self.storage.connection(other).requests;
+            free = free.saturating_sub(requests);
+            kept += u16::from(requests == 0);
+        }
+        own < self.most && free > 0 && (own == 0 || free > kept)
+    }
+
+    /// Gives up a connection and its requests. Its status becomes `status`.
+    pub(super) fn lose(&mut self, connection: u8, status: Status) {
+        for request in 0..self.storage.request_count() {
+            let state = *self.storage.request(request);
+            if state.stage == Stage::Free || state.connection != connection {
+                continue;
+            }
+            if let Some(line) = state.line() {
+                self.storage.cancel(line, request);
+            }
+            self.storage.request(request).stage = Stage::Free;
+        }
+        self.storage.connection(connection).clear(status);
+    }
+
+    /// The next number in the order of requests and responses.
+    pub(super) fn next_order(&mut self) -> u32 {
+        self.order = self.order.wrapping_add(1);
+        self.order
+    }
+
+    /// Frees the place of a request.
+    pub(super) fn release(&mut self, request: u16) {
+        let state = self.storage.request(request);
+        state.stage = Stage::Free;
+        let connection = state.connection;
+        let state = self.storage.connection(connection);
+        state.requests = state.requests.saturating_sub(1);
+    }
+
+    /// Answers a request with an exception.
+    pub(super) fn refuse(&mut self, request: u16, code: u8) {
+        if let Some([function, data]) = self.storage.frame(request).get_mut(FUNCTION..FUNCTION + 2)
+        {
+            *function |= EXCEPTION;
+            *data = code;
+        }
+        self.answer(request, 2);
+    }
+
+    /// Answers a request with the PDU of `length` bytes in its frame. The header of the frame
+    /// still has transaction identifier and unit id of the request.
+    pub(super) fn answer(&mut self, request: u16, length: u16) {
+        if let Some(place) = self.storage.frame(request).get_mut(4..6) {
+            place.copy_from_slice(&tcp::length(length.into()));
+        }
+        self.answered(request, length + tcp::PDU as u16);
+    }
+
+    /// The frame of a request now has its response, of `length` bytes.
+    pub(super) fn answered(&mut self, request: u16, length: u16) {
+        let order = self.next_order();
+        let state = self.storage.request(request);
+        state.stage = Stage::Answered;
+        state.length = length;
+        state.sent = 0;
+        state.order = order;
+    }
+}

@@ -1,0 +1,70 @@
+//! One round of the gateway, and the time until the next.
+
+use super::object::Gateway;
+use super::state::Stage;
+use super::storage::GatewayStorage;
+use crate::time;
+
+/// Time until the next poll if only a connection or a unit can bring progress.
+const EXTERNAL_POLL_DELAY: u32 = time::millis(1);
+
+impl<S: GatewayStorage> Gateway<S> {
+    /// Moves all lines and connections on, without waiting.
+    pub fn poll(&mut self) {
+        for line in 0..self.storage.line_count() {
+            self.collect(line);
+        }
+        for request in 0..self.storage.request_count() {
+            if self.storage.request(request).stage == Stage::Local {
+                self.serve(request);
+            }
+        }
+        for connection in 0..self.storage.connection_count() {
+            // Sending first makes places free.
+            self.send_if_open(connection);
+            self.receive(connection);
+        }
+        for line in 0..self.storage.line_count() {
+            self.start(line);
+        }
+        for connection in 0..self.storage.connection_count() {
+            self.send_if_open(connection);
+        }
+    }
+
+    fn send_if_open(&mut self, connection: u8) {
+        if self.storage.connection(connection).is_open() {
+            self.send(connection);
+        }
+    }
+
+    /// Microseconds for which poll has nothing to do, unless a byte arrives on a line, or on a
+    /// connection that it reads. 1000 while a connection does not take a response, and while
+    /// a unit of the gateway has not finished.
+    pub fn poll_delay(&mut self) -> u32 {
+        let mut delay = u32::MAX;
+        for line in 0..self.storage.line_count() {
+            delay = delay.min(self.storage.line_delay(line));
+        }
+        for request in 0..self.storage.request_count() {
+            let state = *self.storage.request(request);
+            let own = match state.stage {
+                Stage::Local => EXTERNAL_POLL_DELAY,
+                Stage::Answered if self.storage.connection(state.connection).is_blocked => {
+                    EXTERNAL_POLL_DELAY
+                }
+                Stage::Answered => 0,
+                Stage::Queued if self.queue_time != 0 => self.left_in_queue(&state),
+                _ => u32::MAX,
+            };
+            delay = delay.min(own);
+        }
+        for connection in 0..self.storage.connection_count() {
+            // A place for another request became free after the connection was last read.
+            if self.storage.connection(connection).is_held && self.may_have_more(connection) {
+                delay = 0;
+            }
+        }
+        delay
+    }
+}

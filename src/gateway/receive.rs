@@ -1,0 +1,130 @@
+//! Requests arrive.
+
+use super::object::{Gateway, PATH_UNAVAILABLE};
+use super::route::{Route, ALL_LINES, LOCAL};
+use super::state::{Stage, NONE};
+use super::storage::GatewayStorage;
+use crate::error::Status;
+use crate::frame::tcp;
+
+/// Bytes of the shortest frame. The gateway reads them first, and then up to the end of the
+/// frame, so that no bytes of the next frame arrive.
+const SHORTEST: u16 = tcp::PDU as u16 + 1;
+
+impl<S: GatewayStorage> Gateway<S> {
+    /// Reads requests from a connection, until it has no more bytes or no place for them.
+    pub(super) fn receive(&mut self, connection: u8) {
+        self.storage.connection(connection).is_held = false;
+        while self.storage.connection(connection).is_open() {
+            let Some(request) = self.place(connection) else {
+                self.storage.connection(connection).is_held = true;
+                return;
+            };
+            let have = self.storage.request(request).length;
+            let until = self.total(request, have).max(SHORTEST);
+            match self.storage.read(connection, request, have, until) {
+                0 => {
+                    if have == 0 {
+                        // Another connection may need the place.
+                        self.storage.connection(connection).receiving = NONE;
+                        self.release(request);
+                    }
+                    return;
+                }
+                ..0 => self.lose(connection, Status::LINK_LOST),
+                count => self.received(connection, request, have.saturating_add(count as u16)),
+            }
+        }
+    }
+
+    /// Length of the frame whose first `have` bytes have arrived; 0 if it is not known yet.
+    fn total(&mut self, request: u16, have: u16) -> u16 {
+        let bytes = self.storage.frame(request).get(..have.into());
+        match tcp::header(bytes.unwrap_or_default()) {
+            Ok(header) => header.total as u16,
+            Err(_) => 0,
+        }
+    }
+
+    /// The place for the request that arrives on a connection.
+    fn place(&mut self, connection: u8) -> Option<u16> {
+        let receiving = self.storage.connection(connection).receiving;
+        if receiving != NONE {
+            return Some(receiving);
+        }
+        if !self.may_have_more(connection) {
+            return None;
+        }
+        for request in 0..self.storage.request_count() {
+            let state = self.storage.request(request);
+            if state.stage == Stage::Free {
+                state.stage = Stage::Receiving;
+                state.connection = connection;
+                state.length = 0;
+                let state = self.storage.connection(connection);
+                state.receiving = request;
+                state.requests += 1;
+                return Some(request);
+            }
+        }
+        None
+    }
+
+    /// Takes the bytes of a frame. The first `have` bytes are there now.
+    fn received(&mut self, connection: u8, request: u16, have: u16) {
+        self.storage.request(request).length = have;
+        let bytes = self.storage.frame(request).get(..have.into());
+        match tcp::header(bytes.unwrap_or_default()) {
+            Ok(header) if have >= header.total as u16 => {
+                self.storage.connection(connection).receiving = NONE;
+                self.direct(connection, request, header.unit);
+            }
+            Err(Status::MALFORMED_FRAME) => self.lose(connection, Status::MALFORMED_FRAME),
+            _ => {}
+        }
+    }
+
+    /// Sends a complete request where its unit id leads to.
+    fn direct(&mut self, connection: u8, request: u16, unit: u8) {
+        let Some(to) = Route::find(self.storage.routes(), unit) else {
+            return self.refuse(request, PATH_UNAVAILABLE);
+        };
+        let order = self.next_order();
+        let since = match self.queue_time {
+            0 => 0,
+            _ => self.storage.now(connection),
+        };
+        let state = self.storage.request(request);
+        state.unit = to.unit;
+        state.order = order;
+        state.since = since;
+        state.is_for_all = to.line == ALL_LINES;
+        state.line = if state.is_for_all { 0 } else { to.line };
+        if to.line == LOCAL {
+            state.stage = Stage::Local;
+            self.serve(request);
+        } else {
+            state.stage = Stage::Queued;
+        }
+    }
+
+    /// Lets the gateway's own units serve a request, again until they have finished.
+    pub(super) fn serve(&mut self, request: u16) {
+        let state = self.storage.request(request);
+        let (unit, length) = (state.unit, state.length);
+        let unit_on_tcp = self.replace_unit(request, unit);
+        let response = self.storage.serve(request, length);
+        self.replace_unit(request, unit_on_tcp);
+        match response {
+            None => {}
+            Some(0) => self.release(request),
+            Some(length) => self.answered(request, length),
+        }
+    }
+
+    /// Writes a unit id into a frame. Returns the one that was there.
+    fn replace_unit(&mut self, request: u16, unit: u8) -> u8 {
+        let place = self.storage.frame(request).get_mut(tcp::HEADER);
+        place.map_or(0, |place| core::mem::replace(place, unit))
+    }
+}

@@ -1,0 +1,105 @@
+//! The map of units: which line a request goes to, and which unit it is for there.
+
+/// [`Route::line`] of a broadcast to all lines, one after the other.
+pub const ALL_LINES: u8 = 0xFF;
+
+/// [`Route::line`] of units that the gateway serves itself.
+pub const LOCAL: u8 = 0xFE;
+
+/// A range of unit ids on TCP, and where requests for them go.
+#[repr(C)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Route {
+    /// The first unit id on TCP.
+    pub first: u8,
+    /// The last unit id on TCP.
+    pub last: u8,
+    /// The index of the line, [`ALL_LINES`] or [`LOCAL`].
+    pub line: u8,
+    /// The unit on the line that has the id `first` on TCP; the units after it follow. 0: the
+    /// ids on the line are those on TCP.
+    pub unit: u8,
+}
+
+/// Where a request goes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Destination {
+    /// As [`Route::line`].
+    pub line: u8,
+    /// The unit id there. 0 on a line is a broadcast.
+    pub unit: u8,
+}
+
+impl Route {
+    /// True if the range is not empty, leads to one of `lines` lines, and all unit ids there
+    /// exist. Only a broadcast may go to all lines.
+    pub fn is_valid(&self, lines: u8) -> bool {
+        let Some(more) = self.last.checked_sub(self.first) else {
+            return false;
+        };
+        match self.line {
+            ALL_LINES => self.last == 0 && self.unit == 0,
+            LOCAL => self.unit.checked_add(more).is_some(),
+            line => line < lines && self.unit.checked_add(more).is_some(),
+        }
+    }
+
+    /// The first of the routes that has the unit id `unit` on TCP.
+    pub fn find(routes: &[Route], unit: u8) -> Option<Destination> {
+        let covers = |route: &&Route| (route.first..=route.last).contains(&unit);
+        let route = routes.iter().find(covers)?;
+        let unit = match route.unit {
+            0 => unit,
+            first => first.wrapping_add(unit.wrapping_sub(route.first)),
+        };
+        Some(Destination {
+            line: route.line,
+            unit,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn route(first: u8, last: u8, line: u8, unit: u8) -> Route {
+        Route {
+            first,
+            last,
+            line,
+            unit,
+        }
+    }
+
+    #[test]
+    fn a_range_of_units_is_rewritten() {
+        let routes = [
+            route(100, 110, 1, 1),
+            route(1, 247, 0, 0),
+            route(255, 255, 2, 7),
+        ];
+        let found = |unit| Route::find(&routes, unit).map(|found| (found.line, found.unit));
+        assert_eq!(found(100), Some((1, 1)));
+        assert_eq!(found(110), Some((1, 11)));
+        assert_eq!(found(99), Some((0, 99)));
+        assert_eq!(found(111), Some((0, 111)));
+        assert_eq!(found(255), Some((2, 7)));
+        assert_eq!(found(0), None);
+        assert_eq!(found(248), None);
+    }
+
+    #[test]
+    fn a_route_that_leads_nowhere_is_invalid() {
+        assert!(route(1, 247, 0, 0).is_valid(1));
+        assert!(route(0, 255, 0, 0).is_valid(1));
+        assert!(!route(1, 247, 1, 0).is_valid(1));
+        assert!(!route(2, 1, 0, 0).is_valid(1));
+        assert!(route(1, 10, 0, 246).is_valid(1));
+        assert!(!route(1, 11, 0, 246).is_valid(1));
+        assert!(route(0, 0, ALL_LINES, 0).is_valid(1));
+        assert!(!route(0, 1, ALL_LINES, 0).is_valid(1));
+        assert!(!route(0, 0, ALL_LINES, 5).is_valid(1));
+        assert!(route(1, 1, LOCAL, 0).is_valid(0));
+    }
+}

@@ -1,0 +1,74 @@
+//! What the caller of the gateway supplies: memory, connections, lines and units.
+
+use super::route::Route;
+use super::state::{ConnectionState, LineState, Transaction};
+use crate::error::Status;
+
+/// How a request stands at its line.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Outcome {
+    /// [`Status::PENDING`]; [`Status::OK`] after a reply; else why there is none.
+    pub status: Status,
+    /// The exception code of the reply; 0 if it was none.
+    pub exception: u8,
+    /// Bytes of the reply after the function code. They are in the frame at
+    /// [`BODY`](GatewayStorage::BODY).
+    pub length: u16,
+}
+
+/// The memory of a gateway, its connections, its lines and its own units. An index that the
+/// gateway passes is always less than the number of such items.
+pub trait GatewayStorage {
+    /// Index in a frame of the bytes after the function code.
+    const BODY: usize = crate::frame::tcp::PDU + 1;
+
+    /// Number of places for requests.
+    fn request_count(&self) -> u16;
+    /// Number of places for connections.
+    fn connection_count(&self) -> u8;
+    /// Number of lines.
+    fn line_count(&self) -> u8;
+    /// The map of units.
+    fn routes(&self) -> &[Route];
+
+    /// A request.
+    fn request(&mut self, request: u16) -> &mut Transaction;
+    /// The frame of a request, of [`MAX_FRAME`](crate::frame::tcp::MAX_FRAME) bytes.
+    fn frame(&mut self, request: u16) -> &mut [u8];
+    /// A connection.
+    fn connection(&mut self, connection: u8) -> &mut ConnectionState;
+    /// A line.
+    fn line(&mut self, line: u8) -> &mut LineState;
+
+    /// Reads from a connection into the bytes `from` to `until` of a frame; as
+    /// [`Port::read`](crate::port::Port::read).
+    fn read(&mut self, connection: u8, request: u16, from: u16, until: u16) -> i16;
+    /// Writes the bytes `from` to `until` of a frame to a connection; as
+    /// [`Port::write`](crate::port::Port::write).
+    fn write(&mut self, connection: u8, request: u16, from: u16, until: u16) -> i16;
+    /// The clock of a connection, in microseconds.
+    fn now(&mut self, connection: u8) -> u32;
+
+    /// Moves the requests of a line on. Returns [`Status::PENDING`] while the line has
+    /// requests, [`Status::BUSY`] while it cannot be used, [`Status::OK`] if it has none, and
+    /// another status if it is no line any more.
+    fn poll_line(&mut self, line: u8) -> Status;
+    /// As [`Gateway::poll_delay`](super::Gateway::poll_delay), of a line.
+    fn line_delay(&mut self, line: u8) -> u32;
+    /// How many requests of the gateway a line may have at a time.
+    fn line_depth(&self, line: u8) -> u16;
+    /// True if a line can take a request now.
+    fn is_ready(&mut self, line: u8) -> bool;
+    /// Gives the request in a frame, whose body has `length` bytes, to a line, for the unit
+    /// `unit` there. Returns [`Status::PENDING`] if the line has taken it.
+    fn forward(&mut self, line: u8, request: u16, unit: u8, length: u16) -> Status;
+    /// How a request stands that a line has taken.
+    fn outcome(&mut self, request: u16) -> Outcome;
+    /// Takes a request back from a line.
+    fn cancel(&mut self, line: u8, request: u16);
+
+    /// Lets the gateway's own units serve the request in a frame of `length` bytes, and write
+    /// the response frame over it. Returns the length of the response, 0 for none; `None` if
+    /// a unit has not finished.
+    fn serve(&mut self, request: u16, length: u16) -> Option<u16>;
+}
