@@ -216,7 +216,7 @@
 //! A module uses only modules to its left:
 //!
 //! ```text
-//! bytes -> frame -> pdu -> packet -> explain -> {sniffer, engine} -> {master, client, server}
+//! bytes -> frame -> pdu -> packet -> explain -> {sniffer, trace, engine} -> {master, client, server}
 //! ```
 //!
 //! Each of them may use `atomic`, `error`, `time`, `port`, `ring` and `data`. `make check`
@@ -247,6 +247,7 @@ pub mod packet;
 pub mod pdu;
 pub mod sniffer;
 pub mod text;
+pub mod trace;
 
 pub mod client;
 pub mod master;

@@ -34,6 +34,7 @@ mod sniffer;
 mod status;
 mod storage;
 mod text;
+mod trace;
 mod version;
 
 pub use bits::*;
@@ -52,4 +53,5 @@ pub use sniffer::*;
 pub use status::*;
 pub use storage::*;
 pub use text::*;
+pub use trace::*;
 pub use version::*;
