@@ -315,6 +315,8 @@ fn each_frame_has_the_time_of_its_first_byte() {
         bench.receive(&[byte]);
         bench.pass(1_000);
     }
+    // FF and the unit 17 may begin a frame of the function 11, whose end only silence shows.
+    bench.trace.hand_out_rest();
     let first = u32::MAX - 2_000;
     let times: Vec<u32> = bench.taken().iter().map(|record| record.time).collect();
     let expected =
