@@ -26,6 +26,7 @@
 #define _GNU_SOURCE
 #include "mbm_tcp.h"
 #include "mbm_tty.h"
+#include "trace_options.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -199,7 +200,7 @@ static int add_line(char *text, uint16_t timeout)
         if (route[unit])
             return -1;
     line_count++;
-    port = mbm_tty_port(&l->tty);
+    port = trace_client(mbm_tty_port(&l->tty), MBM_FRAMING_RTU, l->path);
     if (open_line(l) != MBM_OK)
         fprintf(stderr, "%s: %s\n", text, strerror(l->failure));
     if (mbm_client_beginRtu(&l->client, &port, l->frame, sizeof l->frame) != MBM_OK ||
@@ -291,8 +292,11 @@ static void take_connections(void)
 
     while ((place = mbm_tcp_accept(&listener, tcps, CONNECTIONS)) >= 0) {
         connection *c = &connections[place];
-        mbm_port port = mbm_tcp_port(&tcps[place]);
+        char name[24];
+        mbm_port port;
 
+        snprintf(name, sizeof name, "client %d", place);
+        port = trace_server(mbm_tcp_port(&tcps[place]), MBM_FRAMING_TCP, name);
         memset(c, 0, sizeof *c);
         c->every.serve = forward;
         c->every.context = c;
@@ -405,7 +409,7 @@ static int usage(int wrong)
         "  MILLISECONDS         that a device has to respond, up to 65535\n"
         "  PATH,BAUD,...        up to 4 serial lines, the parity N, E or O, 1 or 2 stop bits,\n"
         "                       and the units on it, 1 to 247, each on one line\n"
-        "for example: gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,32-40\n");
+        "for example: gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 /dev/ttyUSB1,9600,N2,32-40\n" TRACE_HELP);
     return wrong ? 2 : 0;
 }
 
@@ -425,6 +429,7 @@ int main(int argc, char **argv)
     sigset_t ends;
     int i, option;
 
+    trace_options(&argc, argv);
     if (argc == 2 && strcmp(argv[1], "--help") == 0)
         return usage(0);
     while ((option = getopt(argc, argv, "hi:q:")) != -1) {
