@@ -20,6 +20,8 @@ TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
 # Examples that the test of the same name runs.
 TESTED_EXAMPLES := custom_command gateway
+# The options --trace and --pcap of the examples for Linux.
+TRACE = $(patsubst %,$(BUILD)/$(1)/linux/%.o,trace_options pcap_file)
 # The files that clang-format formats. The headers in include/ are documentation too, and are
 # formatted by hand.
 C_SOURCES = $(shell git ls-files 'c-tests/*.[ch]' 'c-tests/*.cpp' 'examples/*.[ch]' 'firmware-tests/*.[ch]')
@@ -218,7 +220,7 @@ $(BUILD)/$(1)/%.o: examples/%.c $(HEADERS)
 	@$(2) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst examples/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(or $(5),$(ARCHIVE))
 	@$(3) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $(LIBS) -o $$@
-$(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(or $(5),$(ARCHIVE))
+$(TESTED_EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(BUILD)/$(1)/linux/mbm_tcp.o $(BUILD)/$(1)/linux/mbm_tcp_listener.o $(BUILD)/$(1)/linux/mbm_tty.o $(call TRACE,$(1)) $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
 $(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)/linux/%
 $(BUILD)/$(1)/test_gateway_replies $(BUILD)/$(1)/test_gateway_shortage: | $(BUILD)/$(1)/linux/gateway
@@ -238,7 +240,7 @@ $(BUILD)/plain/test_class_examples.o $(BUILD)/sanitized/test_class_examples.o $(
 FIRMWARE_TESTS := $(TESTS:%=$(BUILD)/firmware/%)
 $(FIRMWARE_TESTS): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(patsubst c-tests/%.c,$(BUILD)/plain/%.o,$(patsubst examples/%.c,$(BUILD)/plain/%.o,$(SUPPORT))) $(FIRMWARE_ARCHIVE)
 	@g++ $(filter %.o,$^) $(FIRMWARE_ARCHIVE) $(LIBS) -o $@
-$(TESTED_EXAMPLES:%=$(BUILD)/firmware/linux/%): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(BUILD)/plain/linux/mbm_tcp.o $(BUILD)/plain/linux/mbm_tcp_listener.o $(BUILD)/plain/linux/mbm_tty.o $(FIRMWARE_ARCHIVE)
+$(TESTED_EXAMPLES:%=$(BUILD)/firmware/linux/%): $(BUILD)/firmware/%: $(BUILD)/plain/%.o $(BUILD)/plain/linux/mbm_tcp.o $(BUILD)/plain/linux/mbm_tcp_listener.o $(BUILD)/plain/linux/mbm_tty.o $(call TRACE,plain) $(FIRMWARE_ARCHIVE)
 	@mkdir -p $(@D)
 	@gcc $(filter %.o,$^) $(FIRMWARE_ARCHIVE) -Wl,--gc-sections -o $@
 $(TESTED_EXAMPLES:%=$(BUILD)/firmware/test_%): $(BUILD)/firmware/test_%: | $(BUILD)/firmware/linux/%
@@ -280,13 +282,13 @@ bench: ## Compare speed and instructions with libmodbus and rmodbus; writes docs
 	@CARGO="$(CARGO)" scripts/bench-frames
 
 DEMO := $(BUILD)/plain/linux/demo
-$(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/recorder linux/mbm_tty support/pty support/server) $(ARCHIVE)
+$(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/recorder linux/mbm_tty support/pty support/server) $(call TRACE,plain) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
-$(BUILD)/plain/linux/basic: $(patsubst %,$(BUILD)/plain/%.o,linux/basic linux/mbm_tty) $(ARCHIVE)
+$(BUILD)/plain/linux/basic: $(patsubst %,$(BUILD)/plain/%.o,linux/basic linux/mbm_tty) $(call TRACE,plain) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
 SNIFF := $(BUILD)/plain/linux/sniff
-$(SNIFF): $(patsubst %,$(BUILD)/plain/%.o,linux/sniff linux/mbm_tty) $(ARCHIVE)
+$(SNIFF): $(patsubst %,$(BUILD)/plain/%.o,linux/sniff linux/mbm_tty) $(call TRACE,plain) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 
 .PHONY: sniff
@@ -296,7 +298,7 @@ sniff: ## Build and check the example that watches a bus, build/plain/linux/snif
 	@scripts/check-sniff $(SNIFF)
 
 CLIENTS := $(patsubst %,$(BUILD)/plain/linux/%,poll_table scan logger plan)
-$(CLIENTS): %: %.o $(patsubst %,$(BUILD)/plain/linux/%.o,line mbm_tty mbm_tcp) $(ARCHIVE)
+$(CLIENTS): %: %.o $(patsubst %,$(BUILD)/plain/linux/%.o,line mbm_tty mbm_tcp) $(call TRACE,plain) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
 PEERS := $(BUILD)/plain/serve_libmodbus
 $(PEERS): $(patsubst %,$(BUILD)/plain/%.o,serve_libmodbus support/server support/tcp_server support/pty) $(ARCHIVE)
@@ -323,7 +325,7 @@ plan: ## A plan of ten fields at work against a libmodbus server
 	@scripts/demo-plan $(BUILD)/plain
 
 MQTT := $(BUILD)/plain/linux/mqtt_bridge
-$(MQTT): $(patsubst %,$(BUILD)/plain/linux/%.o,mqtt_bridge mqtt_broker mqtt_fields mqtt_value line mbm_tty mbm_tcp) $(ARCHIVE)
+$(MQTT): $(patsubst %,$(BUILD)/plain/linux/%.o,mqtt_bridge mqtt_broker mqtt_fields mqtt_value line mbm_tty mbm_tcp) $(call TRACE,plain) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmosquitto -lcjson -lm -lpthread -o $@
 
 .PHONY: mqtt

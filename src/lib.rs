@@ -216,7 +216,7 @@
 //! A module uses only modules to its left:
 //!
 //! ```text
-//! bytes -> frame -> pdu -> packet -> text -> {sniffer, engine} -> {master, client, plan, server}
+//! bytes -> frame -> pdu -> packet -> text -> {sniffer, trace, engine} -> {master, client, plan, server, gateway}
 //! ```
 //!
 //! Each of them may use `atomic`, `error`, `time`, `port`, `ring` and `data`. `make check`
@@ -247,6 +247,7 @@ pub mod packet;
 pub mod pdu;
 pub mod sniffer;
 pub mod text;
+pub mod trace;
 
 pub mod client;
 pub mod gateway;

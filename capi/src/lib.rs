@@ -36,6 +36,7 @@ mod sniffer;
 mod status;
 mod storage;
 mod text;
+mod trace;
 mod version;
 
 pub use bits::*;
@@ -56,4 +57,5 @@ pub use sniffer::*;
 pub use status::*;
 pub use storage::*;
 pub use text::*;
+pub use trace::*;
 pub use version::*;

@@ -158,6 +158,14 @@ pub(super) struct PortRef {
 }
 
 impl PortRef {
+    /// A reference to a port.
+    ///
+    /// # Safety
+    /// As for [`PortRef::set`].
+    pub(super) const unsafe fn new(port: *const mbm_port, context: *mut c_void) -> PortRef {
+        PortRef { port, context }
+    }
+
     /// Refers to a port.
     ///
     /// # Safety

@@ -4,6 +4,7 @@
  *
  * Licence: MIT OR Apache-2.0. */
 #include "mbm_tty.h"
+#include "trace_options.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -30,8 +31,9 @@ int main(int argc, char **argv)
     uint32_t baud;
     uint8_t i;
 
+    trace_options(&argc, argv);
     if (argc != 4) {
-        fprintf(stderr, "usage: %s path baud slave\n", argv[0]);
+        fprintf(stderr, "usage: %s path baud slave\n%s", argv[0], TRACE_HELP);
         return 2;
     }
     baud = (uint32_t)strtoul(argv[2], NULL, 10);
@@ -39,7 +41,7 @@ int main(int argc, char **argv)
         perror(argv[1]);
         return 1;
     }
-    port = mbm_tty_port(&tty);
+    port = trace_client(mbm_tty_port(&tty), MBM_FRAMING_RTU, argv[1]);
     mbm_master_setBuffers(&node, response, READ_WORDS, transmit, WRITE_WORDS, frame, sizeof frame);
     mbm_master_beginRtu(&node, (uint8_t)strtoul(argv[3], NULL, 10), &port);
     mbm_master_setBaudRate(&node, baud);

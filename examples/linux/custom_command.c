@@ -13,6 +13,7 @@
  *
  * Licence: MIT OR Apache-2.0. */
 #include "mbm_tcp.h"
+#include "trace_options.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -121,14 +122,14 @@ static int begin(void)
     snprintf(service, sizeof service, "%u", listener.port);
     if (mbm_tcp_open(client_end, &addresses, "127.0.0.1", service) != 0)
         return -1;
-    port = mbm_tcp_port(client_end);
+    port = trace_client(mbm_tcp_port(client_end), MBM_FRAMING_TCP, "client");
     if (mbm_client_beginTcp(&client, &port, incoming, sizeof incoming, outgoing, sizeof outgoing) !=
         MBM_OK)
         return -1;
     while (mbm_tcp_accept(&listener, server_end, 1) < 0)
         if (errno != EAGAIN || mbm_tcp_wait(NULL, 0, &listener, -1, MBM_TCP_FOREVER) < 0)
             return -1;
-    port = mbm_tcp_port(server_end);
+    port = trace_server(mbm_tcp_port(server_end), MBM_FRAMING_TCP, "server");
     return mbm_server_beginTcp(&server, &port, &unit, 1, frame, sizeof frame) == MBM_OK ? 0 : -1;
 }
 
@@ -263,7 +264,7 @@ static int usage(const char *asked)
             "a prompt, or a script with one command a line:\n"
             "  read A N        N registers from A on, by function 41; there are ten\n"
             "  write A V...    writes values from A on, by function 42\n"
-            "  raw F B...      any function with any data, all in hexadecimal\n");
+            "  raw F B...      any function with any data, all in hexadecimal\n" TRACE_HELP);
     return is_help ? 0 : 2;
 }
 
@@ -273,6 +274,7 @@ int main(int argc, char **argv)
     int result = 0;
     char line[2048];
 
+    trace_options(&argc, argv);
     if (argc > 1)
         return usage(argv[1]);
     setvbuf(stdout, NULL, _IOLBF, 0);

@@ -6,6 +6,7 @@
 #include "mbm_tty.h"
 #include "recorder.h"
 #include "server.h"
+#include "trace_options.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -110,7 +111,7 @@ static void begin(void)
 
     server_start(&device, UNIT);
     expect(mbm_tty_attach(&tty, device.line.ours) == 0, "a terminal");
-    over_tty = mbm_tty_port(&tty);
+    over_tty = trace_client(mbm_tty_port(&tty), MBM_FRAMING_RTU, device.line.path);
     port = recorder_port(&wire, &over_tty);
     expect(mbm_master_beginRtu(&node, UNIT, &port) == MBM_OK, "begin");
     expect(mbm_master_setBuffers(&node, response, WORDS, transmit, WORDS, frame, sizeof frame) ==
@@ -212,8 +213,9 @@ static void show_counters(void)
            "all answered but one");
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
+    trace_options(&argc, argv);
     begin();
     basic_sketch();
     other_registers();

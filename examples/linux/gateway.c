@@ -33,6 +33,7 @@
 #define _GNU_SOURCE
 #include "mbm_tcp.h"
 #include "mbm_tty.h"
+#include "trace_options.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -227,7 +228,8 @@ static int add_line(char *text, uint16_t timeout)
         if (add_route(field, index) != 0)
             return -1;
     config.lineCount++;
-    port = mbm_tty_port(&l->tty);
+    port = trace_client(mbm_tty_port(&l->tty), is_ascii ? MBM_FRAMING_ASCII : MBM_FRAMING_RTU,
+                        l->path);
     if (open_line(l) != MBM_OK)
         fprintf(stderr, "%s: %s\n", text, strerror(l->failure));
     if (is_ascii ? mbm_client_beginAscii(&l->client, &port, l->frame, sizeof l->frame)
@@ -249,8 +251,11 @@ static void take_connections(void)
     int place;
 
     while ((place = mbm_tcp_accept(&listener, tcps, CONNECTIONS)) >= 0) {
-        const mbm_port port = mbm_tcp_port(&tcps[place]);
+        char name[24];
+        mbm_port port;
 
+        snprintf(name, sizeof name, "client %d", place);
+        port = trace_server(mbm_tcp_port(&tcps[place]), MBM_FRAMING_TCP, name);
         if (mbm_gateway_open(&gateway, (uint8_t)place, &port) != MBM_OK)
             mbm_tcp_close(&tcps[place]);
     }
@@ -352,7 +357,7 @@ static int usage(int wrong)
         "                       and the units on it, 0 to 255, each on one line; =UNIT: the\n"
         "                       id on the line of the unit FIRST. Several ranges may follow\n"
         "for example: gateway 502 500 /dev/ttyUSB0,19200,E1,1-31 "
-        "/dev/ttyUSB1,9600,N2,101-131=1\n");
+        "/dev/ttyUSB1,9600,N2,101-131=1\n" TRACE_HELP);
     return wrong ? 2 : 0;
 }
 
@@ -372,6 +377,7 @@ int main(int argc, char **argv)
     sigset_t ends;
     int i, option;
 
+    trace_options(&argc, argv);
     if (argc == 2 && strcmp(argv[1], "--help") == 0)
         return usage(0);
     while ((option = getopt(argc, argv, "f:hi:q:w:")) != -1) {

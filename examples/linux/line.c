@@ -1,6 +1,8 @@
 #define _GNU_SOURCE
 #include "line.h"
 
+#include "trace_options.h"
+
 #include <errno.h>
 #include <netdb.h>
 #include <poll.h>
@@ -48,7 +50,7 @@ static int open_tty(line *l, char *path, int ascii)
     strcpy(l->path, path);
     if (mbm_tty_openWith(&l->tty, path, &l->options) != 0)
         return -1;
-    port = mbm_tty_port(&l->tty);
+    port = trace_client(mbm_tty_port(&l->tty), ascii ? MBM_FRAMING_ASCII : MBM_FRAMING_RTU, path);
     if (ascii)
         return mbm_client_beginAscii(&l->client, &port, l->incoming, sizeof l->incoming);
     mbm_client_beginRtu(&l->client, &port, l->incoming, sizeof l->incoming);
@@ -66,7 +68,8 @@ static int open_tcp(line *l, char *host, int rtu)
         return -1;
     l->is_tcp = 1;
     l->connected = line_milliseconds();
-    port = mbm_tcp_port(&l->tcp);
+    port =
+        trace_client(mbm_tcp_port(&l->tcp), rtu ? MBM_FRAMING_RTU_OVER_TCP : MBM_FRAMING_TCP, host);
     if (rtu)
         return mbm_client_beginRtuOverTcp(&l->client, &port, l->incoming, sizeof l->incoming);
     return mbm_client_beginTcp(&l->client, &port, l->incoming, sizeof l->incoming, l->outgoing,
@@ -214,7 +217,7 @@ void line_rest(line *l, uint32_t milliseconds)
 
 int line_usage(int wrong, const char *usage)
 {
-    fprintf(wrong ? stderr : stdout, "usage: %s\n%s", usage, LINE_HELP);
+    fprintf(wrong ? stderr : stdout, "usage: %s\n%s%s", usage, LINE_HELP, TRACE_HELP);
     return wrong ? 2 : 0;
 }
 

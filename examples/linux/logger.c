@@ -10,6 +10,7 @@
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "line.h"
+#include "trace_options.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -112,6 +113,7 @@ int main(int argc, char **argv)
     uint32_t due;
     int option;
 
+    trace_options(&argc, argv);
     if (line_wants_help(argc, argv))
         return line_usage(0, USAGE);
     while ((option = getopt(argc, argv, "u:f:i:n:o:r:")) != -1) {

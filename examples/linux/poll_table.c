@@ -11,6 +11,7 @@
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "line.h"
+#include "trace_options.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -91,6 +92,7 @@ int main(int argc, char **argv)
     int option;
     long round;
 
+    trace_options(&argc, argv);
     if (line_wants_help(argc, argv))
         return line_usage(0, USAGE);
     while ((option = getopt(argc, argv, "u:f:i:n:p:")) != -1) {

@@ -10,6 +10,7 @@
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "mbm_tty.h"
+#include "trace_options.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -34,6 +35,9 @@ static mbm_sniffer sniffer;
 static uint8_t buffer[MBM_MAX_ASCII_FRAME];
 static unsigned long totals[KINDS];
 static uint64_t first, now; /* microseconds that do not wrap, unlike the sniffer's */
+static uint64_t epoch;      /* the time of `first`, since 1970; of a recording 0 */
+static const char *bus;
+static uint8_t framing = MBM_FRAMING_RTU;
 static uint32_t slowest;
 static volatile sig_atomic_t ended;
 
@@ -43,11 +47,11 @@ static void end(int signal_number)
     ended = 1;
 }
 
-static uint64_t micros(void)
+static uint64_t micros(clockid_t clock)
 {
     struct timespec time;
 
-    clock_gettime(CLOCK_MONOTONIC, &time);
+    clock_gettime(clock, &time);
     return (uint64_t)time.tv_sec * 1000000u + (uint64_t)time.tv_nsec / 1000u;
 }
 
@@ -56,6 +60,7 @@ static void print_event(const mbm_event *event)
     static char text[2400];
     uint64_t time = now - ((uint32_t)now - event->timeUs) - first;
 
+    trace_event(event, framing, bus, epoch + time);
     totals[event->kind]++;
     if (event->kind == MBM_EVENT_REPLY && event->responseTimeUs > slowest)
         slowest = event->responseTimeUs;
@@ -103,13 +108,14 @@ static int watch(const char *path, const mbm_tty_options *options)
         perror(path);
         return -1;
     }
-    first = micros();
+    first = micros(CLOCK_MONOTONIC);
+    epoch = micros(CLOCK_REALTIME);
     while (!ended) {
         struct pollfd line = {tty.fd, POLLIN, 0};
 
         poll(&line, 1, 5);
         length = read(tty.fd, bytes, sizeof bytes);
-        now = micros();
+        now = micros(CLOCK_MONOTONIC);
         if (length > 0) {
             feed(bytes, (uint16_t)length);
         } else if (length == 0 || (errno != EAGAIN && errno != EINTR)) {
@@ -120,7 +126,7 @@ static int watch(const char *path, const mbm_tty_options *options)
         print_events(now);
     }
     mbm_tty_close(&tty);
-    print_events(micros());
+    print_events(micros(CLOCK_MONOTONIC));
     return failed;
 }
 
@@ -190,7 +196,7 @@ static int usage(int wrong)
     fprintf(wrong ? stderr : stdout,
             "usage: sniff [-a] path baud [N|E|O]   or   sniff [-a|-t] - [baud]\n"
             "  -a  ASCII frames, -t TCP frames; else RTU\n"
-            "  -   a recording from stdin\n");
+            "  -   a recording from stdin\n" TRACE_HELP);
     return wrong ? 2 : 0;
 }
 
@@ -222,9 +228,9 @@ int main(int argc, char **argv)
 {
     mbm_tty_options options = {.parity = 'N', .stop = 1};
     struct sigaction action = {0};
-    uint8_t framing = MBM_FRAMING_RTU;
     int option, failed;
 
+    trace_options(&argc, argv);
     if (argc > 1 && strcmp(argv[1], "--help") == 0)
         return usage(0);
     while ((option = getopt(argc, argv, "aht")) != -1) {
@@ -237,6 +243,7 @@ int main(int argc, char **argv)
     options.data = framing == MBM_FRAMING_ASCII ? 7 : 8;
     if (argc < 1 || !read_line(argc, argv, &options))
         return usage(1);
+    bus = argv[0];
     action.sa_handler = end;
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);

@@ -17,7 +17,7 @@ const LAYERS: [&[&str]; 9] = [
     &["pdu"],
     &["packet"],
     &["text"],
-    &["sniffer", "engine"],
+    &["sniffer", "trace", "engine"],
     &["master", "client", "plan", "server", "gateway"],
 ];
 

@@ -1,0 +1,406 @@
+//! `mbm_trace_*`: a port that passes everything on, and hands out each frame.
+
+mod record;
+
+pub use record::{mbm_traceRecord, mbm_trace_ofEvent, MBM_TRACE_RECEIVED, MBM_TRACE_SENT};
+
+use crate::framing::{is_delimiter, mbm_framing};
+use crate::functions::declared;
+use crate::master::mbm_master;
+use crate::pointers::{
+    array_or_empty, check, get, object, with, with_hooks, CObject, BEGUN, IN_HOOK,
+};
+use crate::port::{countable, mbm_port, PortRef};
+use core::ffi::c_void;
+use core::ptr::null;
+use core::slice::{from_raw_parts, from_raw_parts_mut};
+use mbm::error::Status;
+use mbm::frame::Framing;
+use mbm::packet::PduKind;
+use mbm::port::Port;
+use mbm::time::millis;
+use mbm::trace::{Trace, MIN_BUFFER};
+use record::{CObserver, TraceHook};
+
+/// The smallest buffer of a trace, in bytes.
+pub const MBM_MIN_TRACE_BUFFER: u16 = 32;
+
+const _: () = assert!(MBM_MIN_TRACE_BUFFER as usize == MIN_BUFFER);
+
+/// A trace: stands between a port and the master, client or server that uses it, passes
+/// everything on, and calls your hook for each frame that is sent or received.
+///
+/// You provide the storage. It must be zero before first use; a static object is zero. Call
+/// mbm_trace_beginClient or mbm_trace_beginServer, then begin the master, client or server
+/// with mbm_trace_port instead of your port. The object must not move while its port is in
+/// use. A program that begins no trace contains no part of it. Not re-entrant: use it from
+/// the thread of the object that uses its port.
+#[repr(C)]
+pub struct mbm_trace {
+    /// Private.
+    pointers: [*mut c_void; 26],
+    /// Private.
+    words: [u32; 9],
+}
+
+/// The real content of an `mbm_trace`.
+#[repr(C)]
+struct Object {
+    mark: u8,
+    /// The port that the traced object uses.
+    outer: mbm_port,
+    /// The port before which the trace stands. It is not in the core, because the hooks that
+    /// only pass a call on read it also while a reference to the core lives.
+    inner: mbm_port,
+    core: Core,
+}
+
+type Core = Trace<PortRef, CBuffer, CObserver>;
+
+/// The caller's buffer.
+pub struct CBuffer {
+    bytes: *mut u8,
+    size: u16,
+}
+
+impl AsMut<[u8]> for CBuffer {
+    fn as_mut(&mut self) -> &mut [u8] {
+        // SAFETY: the begin functions demand that the buffer is valid and used by nothing else.
+        unsafe { from_raw_parts_mut(self.bytes, self.size.into()) }
+    }
+}
+
+const _: () = {
+    let space = size_of::<mbm_trace>();
+    let used = size_of::<Object>();
+    assert!(align_of::<mbm_trace>() >= align_of::<Object>());
+    assert!(used <= space);
+    // On a 16-bit or 32-bit machine, where RAM is scarce, at most 5 % of the storage may
+    // be unused.
+    assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
+};
+
+// SAFETY: the mark is a field of its own.
+unsafe impl CObject for mbm_trace {
+    type Access<'a> = *mut Core;
+
+    unsafe fn mark(trace: *const mbm_trace) -> *mut u8 {
+        // SAFETY: as the caller promises; every object is writable storage.
+        unsafe { &raw mut (*trace.cast::<Object>().cast_mut()).mark }
+    }
+
+    unsafe fn access<'a>(trace: *mut mbm_trace) -> Self::Access<'a> {
+        // SAFETY: as the caller promises.
+        unsafe { &raw mut (*trace.cast::<Object>()).core }
+    }
+}
+
+/// Runs `action` on the core of a trace, or returns the status that says why not. `action` may
+/// call hooks.
+///
+/// # Safety
+/// As for [`check`].
+unsafe fn with_core<T>(
+    trace: *mut mbm_trace,
+    action: impl FnOnce(&mut Core) -> T,
+) -> Result<T, Status> {
+    // SAFETY: as the caller promises. Nothing else makes a reference to the core of a marked
+    // object.
+    unsafe {
+        match check(trace) {
+            Status::OK => {
+                let core = object(trace);
+                Ok(with_hooks(trace, || action(&mut *core)))
+            }
+            refused => Err(refused),
+        }
+    }
+}
+
+/// The port before which a trace stands.
+///
+/// # Safety
+/// `context` points to a trace that was begun.
+unsafe fn inner(context: *mut c_void) -> *const mbm_port {
+    // SAFETY: as the caller promises.
+    unsafe { &raw const (*context.cast::<Object>()).inner }
+}
+
+// SAFETY, here and below: only a port of a trace has these hooks, and their context is the
+// trace. A trace that is not begun, because it was zeroed, has lost its link. The port of a
+// trace whose own hook runs has no bytes and accepts none.
+
+unsafe extern "C" fn read(context: *mut c_void, bytes: *mut u8, capacity: u16) -> i16 {
+    // SAFETY: see above; the arguments are those of a port.
+    let result = unsafe {
+        with_core(context.cast(), |core| {
+            core.read(from_raw_parts_mut(bytes, countable(capacity).into()))
+        })
+    };
+    result.unwrap_or_else(unusable)
+}
+
+unsafe extern "C" fn write(context: *mut c_void, bytes: *const u8, length: u16) -> i16 {
+    // SAFETY: see above; the arguments are those of a port.
+    let result = unsafe {
+        with_core(context.cast(), |core| {
+            core.write(from_raw_parts(bytes, countable(length).into()))
+        })
+    };
+    result.unwrap_or_else(unusable)
+}
+
+/// What the port of a trace returns that must not be used now.
+fn unusable(status: Status) -> i16 {
+    if status == Status::BUSY {
+        0
+    } else {
+        -1
+    }
+}
+
+unsafe extern "C" fn micros(context: *mut c_void) -> u32 {
+    // SAFETY: see above.
+    unsafe {
+        let port = inner(context);
+        (*port).micros.map_or(0, |micros| micros((*port).context))
+    }
+}
+
+unsafe extern "C" fn flush(context: *mut c_void) -> u8 {
+    // SAFETY: see above.
+    unsafe {
+        let port = inner(context);
+        (*port).flush.map_or(1, |flush| flush((*port).context))
+    }
+}
+
+unsafe extern "C" fn pre_transmission(context: *mut c_void) {
+    // SAFETY: see above.
+    unsafe {
+        let port = inner(context);
+        if let Some(hook) = (*port).preTransmission {
+            hook((*port).context);
+        }
+    }
+}
+
+unsafe extern "C" fn post_transmission(context: *mut c_void) {
+    // SAFETY: see above.
+    let _ = unsafe { with_core(context.cast(), Core::post_transmission) };
+}
+
+unsafe extern "C" fn idle(context: *mut c_void, master: *mut mbm_master) {
+    // SAFETY: see above. No reference lives, because the hook may use every object.
+    unsafe {
+        let port = inner(context);
+        if let Some(hook) = (*port).idle {
+            hook((*port).context, master);
+        }
+    }
+}
+
+/// Begins a trace of an object that sends PDUs of the kind `sends`.
+///
+/// # Safety
+/// Each argument is as the header requires.
+#[allow(clippy::too_many_arguments)]
+unsafe fn begin(
+    trace: *mut mbm_trace,
+    sends: PduKind,
+    port: *const mbm_port,
+    framing: *const mbm_framing,
+    buffer: *mut u8,
+    size: u16,
+    hook: TraceHook,
+    context: *mut c_void,
+) -> Result<(), Status> {
+    // SAFETY: as the header demands.
+    unsafe {
+        let (described, kind) = described(framing)?;
+        let port = get(port).filter(mbm_port::is_complete);
+        let port = port.ok_or(Status::INVALID_ARGUMENT)?;
+        // A trace that passes its own bytes on to itself would never end.
+        let is_own = port.context == trace.cast();
+        if trace.is_null() || buffer.is_null() || hook.is_none() || is_own {
+            return Err(Status::INVALID_ARGUMENT);
+        }
+        if size < MBM_MIN_TRACE_BUFFER {
+            return Err(Status::BUFFER_TOO_SMALL);
+        }
+        if mbm_trace::mark(trace).read() == IN_HOOK {
+            return Err(Status::BUSY);
+        }
+        let observer = CObserver {
+            hook,
+            context,
+            functions: described.functions,
+            function_count: described.functionCount,
+        };
+        let buffer = CBuffer {
+            bytes: buffer,
+            size,
+        };
+        let object = trace.cast::<Object>();
+        let passed_on = PortRef::new(&raw const (*object).inner, port.context);
+        object.write(Object {
+            mark: BEGUN,
+            outer: mbm_port {
+                context: trace.cast(),
+                read: Some(read),
+                write: Some(write),
+                micros: Some(micros),
+                flush: port.flush.map(|_| flush as _),
+                preTransmission: port.preTransmission.map(|_| pre_transmission as _),
+                // It ends a sent frame.
+                postTransmission: Some(post_transmission),
+                idle: port.idle.map(|_| idle as _),
+            },
+            inner: port,
+            core: Trace::new(passed_on, kind, sends, described.end(), buffer, observer),
+        });
+        Ok(())
+    }
+}
+
+/// A copy of the description of frames, if it is valid.
+///
+/// # Safety
+/// `framing` is NULL or points to a description whose declarations are valid.
+unsafe fn described(framing: *const mbm_framing) -> Result<(mbm_framing, Framing), Status> {
+    // SAFETY: as the caller promises.
+    let (described, functions) = unsafe {
+        let described = get(framing).ok_or(Status::INVALID_ARGUMENT)?;
+        let count = described.functionCount;
+        (described, array_or_empty(described.functions, count.into()))
+    };
+    declared(functions.ok_or(Status::INVALID_ARGUMENT)?, None)?;
+    if !is_delimiter(described.end()) {
+        return Err(Status::INVALID_ARGUMENT);
+    }
+    Ok((described, described.of_frames()?))
+}
+
+/// The code of a result.
+fn code(result: Result<(), Status>) -> u8 {
+    result.err().unwrap_or(Status::OK).code()
+}
+
+/// Begins the trace of a master or client. Then begin that master or client with
+/// mbm_trace_port.
+///
+/// The hook is called from within the functions of the master or client, when the last byte
+/// of a frame was sent or read. Bytes that are not followed by the rest of a frame are handed
+/// out at the first read after the frame timeout (see mbm_trace_setFrameTimeout), on a serial
+/// line when the next frame is sent, when the link is lost, or by mbm_trace_flush. `record`
+/// and its bytes are valid until the hook returns. The hook must not use this trace, nor the
+/// object that uses its port: such a call returns MBM_BUSY and changes nothing. On a serial
+/// line it should not take longer than a character.
+///
+/// You may call this function again at any time, but not from within the hook. The trace then
+/// drops the bytes that it has not handed out, and its frame timeout is the default.
+///
+/// @param trace    the object; zero it before the first call
+/// @param port     is copied; its hooks read, write and micros are required. Its optional
+///                 hooks are passed on. It must not be the port of this trace
+/// @param framing  the framing of the object that will use the port, and the declarations of
+///                 your own functions, which must stay valid and unchanged. Without a
+///                 declaration, the end of a received RTU frame is not known from its bytes
+/// @param buffer   holds incomplete frames: one half of it those that are sent, the other
+///                 those that are received. It must stay valid for as long as the trace is
+///                 used
+/// @param size     size of `buffer` in bytes, at least MBM_MIN_TRACE_BUFFER. Two times
+///                 MBM_MAX_FRAME, MBM_MAX_ASCII_FRAME or MBM_MAX_TCP_FRAME holds every
+///                 frame; a longer one is handed out in pieces
+/// @param hook     is called for each frame
+/// @param context  your pointer, passed to `hook`: for example the link or its name
+/// @return MBM_OK; or with nothing changed MBM_BUFFER_TOO_SMALL for a size that is too
+///         small, MBM_INVALID_ARGUMENT for a NULL pointer, an incomplete port or a framing
+///         that is not valid, MBM_BUSY from within the hook
+#[no_mangle]
+pub unsafe extern "C" fn mbm_trace_beginClient(
+    trace: *mut mbm_trace,
+    port: *const mbm_port,
+    framing: *const mbm_framing,
+    buffer: *mut u8,
+    size: u16,
+    hook: Option<unsafe extern "C" fn(context: *mut c_void, record: *const mbm_traceRecord)>,
+    context: *mut c_void,
+) -> u8 {
+    let sends = PduKind::Request;
+    // SAFETY: as the header demands.
+    code(unsafe { begin(trace, sends, port, framing, buffer, size, hook, context) })
+}
+
+/// Begins the trace of a server. Then begin that server with mbm_trace_port.
+///
+/// @param trace    see mbm_trace_beginClient
+/// @param port     see mbm_trace_beginClient
+/// @param framing  see mbm_trace_beginClient
+/// @param buffer   see mbm_trace_beginClient
+/// @param size     see mbm_trace_beginClient
+/// @param hook     see mbm_trace_beginClient
+/// @param context  see mbm_trace_beginClient
+/// @return a status; see mbm_trace_beginClient
+#[no_mangle]
+pub unsafe extern "C" fn mbm_trace_beginServer(
+    trace: *mut mbm_trace,
+    port: *const mbm_port,
+    framing: *const mbm_framing,
+    buffer: *mut u8,
+    size: u16,
+    hook: Option<unsafe extern "C" fn(context: *mut c_void, record: *const mbm_traceRecord)>,
+    context: *mut c_void,
+) -> u8 {
+    let sends = PduKind::Response;
+    // SAFETY: as the header demands.
+    code(unsafe { begin(trace, sends, port, framing, buffer, size, hook, context) })
+}
+
+/// Returns the port that passes everything on to the port of the trace. Pass it to the begin
+/// function of a master, client or server.
+///
+/// @param trace  the object
+/// @return the port, which is valid for as long as the trace is used. NULL for a trace that
+///         was never begun, and from within its hook: the begin functions refuse it
+#[no_mangle]
+pub unsafe extern "C" fn mbm_trace_port(trace: *mut mbm_trace) -> *const mbm_port {
+    // SAFETY: as the header demands.
+    unsafe {
+        match check(trace) {
+            Status::OK => &raw const (*trace.cast::<Object>()).outer,
+            _ => null(),
+        }
+    }
+}
+
+/// Sets how long the trace waits for the rest of an incomplete frame. At first it is 50 ms in
+/// RTU, which suits a USB adapter, and 1000 ms in the other framings.
+///
+/// @param trace      the object
+/// @param timeoutMs  1 to 65535 ms
+/// @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
+#[no_mangle]
+pub unsafe extern "C" fn mbm_trace_setFrameTimeout(trace: *mut mbm_trace, timeoutMs: u16) -> u8 {
+    if timeoutMs == 0 {
+        return Status::INVALID_ARGUMENT.code();
+    }
+    // SAFETY: as the header demands.
+    unsafe {
+        with(trace, |core| {
+            (*core).set_frame_timeout(millis(timeoutMs));
+            Status::OK
+        })
+    }
+}
+
+/// Calls the hook for the bytes that wait for the rest of their frame: before the program
+/// ends, or before a link is closed.
+///
+/// @param trace  the object
+/// @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
+#[no_mangle]
+pub unsafe extern "C" fn mbm_trace_flush(trace: *mut mbm_trace) -> u8 {
+    // SAFETY: as the header demands.
+    code(unsafe { with_core(trace, Core::hand_out_rest) })
+}

@@ -1,0 +1,30 @@
+/* The options --trace and --pcap FILE, which all example programs have: every frame that the
+ * program sends, receives or overhears, in words on stderr, and in a file for Wireshark.
+ *
+ * Without the options the ports are as they were, and nothing is traced.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef TRACE_OPTIONS_H
+#define TRACE_OPTIONS_H
+
+#include "mbm.h"
+
+/* The description of both options, for a usage text. */
+#define TRACE_HELP                                                                                 \
+    "tracing, of all programs:\n"                                                                  \
+    "  --trace          prints each frame in words and hexadecimal, to stderr\n"                   \
+    "  --pcap FILE      writes each frame to a pcapng file: wireshark -o mbrtu.tcp.port:503 FILE\n"
+
+/* Takes both options out of the arguments. Ends the program if it cannot write the file. */
+void trace_options(int *argc, char **argv);
+
+/* Returns the port to use instead of the port of a master or client, or of a server. `framing`
+ * is one of MBM_FRAMING_. `name` tells the link from others; a link with the same name as one
+ * before takes its place. */
+mbm_port trace_client(mbm_port port, uint8_t framing, const char *name);
+mbm_port trace_server(mbm_port port, uint8_t framing, const char *name);
+
+/* Traces an event of a sniffer. `time` is in microseconds since 1970. */
+void trace_event(const mbm_event *event, uint8_t framing, const char *name, uint64_t time);
+
+#endif

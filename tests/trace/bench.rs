@@ -1,0 +1,197 @@
+//! A trace before a port in memory, and the records that it hands out.
+
+use mbm::error::Status;
+use mbm::frame::{ascii, Framing};
+use mbm::packet::PduKind;
+use mbm::pdu::custom::Function;
+use mbm::port::Port;
+use mbm::trace::{Direction, Observer, Record, Trace};
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+/// The port of a test: bytes to be read, how many bytes each write accepts, and a clock.
+#[derive(Default)]
+pub struct Wire {
+    pub arriving: VecDeque<u8>,
+    /// How many bytes the next writes accept; without an entry all of them.
+    pub accepts: VecDeque<i16>,
+    pub now: u32,
+    pub is_lost: bool,
+    pub calls: Vec<&'static str>,
+}
+
+pub type Shared = Rc<RefCell<Wire>>;
+
+pub struct TestPort(pub Shared);
+
+impl Port for TestPort {
+    fn read(&mut self, bytes: &mut [u8]) -> i16 {
+        let mut wire = self.0.borrow_mut();
+        if wire.is_lost {
+            return -1;
+        }
+        let count = bytes.len().min(wire.arriving.len());
+        for (place, byte) in bytes.iter_mut().zip(wire.arriving.drain(..count)) {
+            *place = byte;
+        }
+        count as i16
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> i16 {
+        let mut wire = self.0.borrow_mut();
+        if wire.is_lost {
+            return -1;
+        }
+        let accepted = wire.accepts.pop_front().unwrap_or(i16::MAX);
+        accepted.min(bytes.len() as i16)
+    }
+
+    fn micros(&mut self) -> u32 {
+        self.0.borrow().now
+    }
+
+    fn flush(&mut self) -> bool {
+        self.0.borrow_mut().calls.push("flush");
+        false
+    }
+
+    fn pre_transmission(&mut self) {
+        self.0.borrow_mut().calls.push("pre");
+    }
+
+    fn post_transmission(&mut self) {
+        self.0.borrow_mut().calls.push("post");
+    }
+}
+
+/// A record that outlives its bytes.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Kept {
+    pub direction: Direction,
+    pub kind: PduKind,
+    pub status: Status,
+    pub time: u32,
+    pub bytes: Vec<u8>,
+}
+
+#[derive(Default)]
+pub struct Keeper {
+    pub records: Rc<RefCell<Vec<Kept>>>,
+    pub functions: Vec<Function>,
+}
+
+impl Observer for Keeper {
+    fn frame(&mut self, record: &Record<'_>) {
+        self.records.borrow_mut().push(Kept {
+            direction: record.direction,
+            kind: record.kind,
+            status: record.status,
+            time: record.time,
+            bytes: record.bytes.to_vec(),
+        });
+    }
+
+    fn declaration(&self, code: u8) -> Option<Function> {
+        self.functions
+            .iter()
+            .find(|function| function.code == code)
+            .copied()
+    }
+}
+
+/// A trace, its wire, and what it has handed out.
+pub struct Bench {
+    pub wire: Shared,
+    pub records: Rc<RefCell<Vec<Kept>>>,
+    pub trace: Trace<TestPort, Vec<u8>, Keeper>,
+}
+
+impl Bench {
+    pub fn new(framing: Framing, sends: PduKind) -> Bench {
+        Bench::with_buffer(framing, sends, 2 * framing.max_frame())
+    }
+
+    pub fn with_buffer(framing: Framing, sends: PduKind, size: usize) -> Bench {
+        let wire = Shared::default();
+        let keeper = Keeper::default();
+        let records = keeper.records.clone();
+        let port = TestPort(wire.clone());
+        let trace = Trace::new(port, framing, sends, ascii::END, vec![0; size], keeper);
+        Bench {
+            wire,
+            records,
+            trace,
+        }
+    }
+
+    /// Lets bytes arrive, and reads as a master does: until nothing is left.
+    pub fn receive(&mut self, bytes: &[u8]) {
+        self.wire.borrow_mut().arriving.extend(bytes);
+        let mut place = [0; 64];
+        while self.trace.read(&mut place) > 0 {}
+    }
+
+    /// Writes a frame as a master does: what is left of it, until all is accepted.
+    pub fn send(&mut self, frame: &[u8]) {
+        let mut left = frame;
+        self.trace.pre_transmission();
+        while !left.is_empty() {
+            let count = self.trace.write(left);
+            assert!(count >= 0);
+            left = &left[count as usize..];
+        }
+        self.trace.post_transmission();
+    }
+
+    pub fn pass(&mut self, micros: u32) {
+        let mut wire = self.wire.borrow_mut();
+        wire.now = wire.now.wrapping_add(micros);
+    }
+
+    pub fn taken(&mut self) -> Vec<Kept> {
+        self.records.take()
+    }
+}
+
+pub fn with_crc(bytes: &[u8]) -> Vec<u8> {
+    let mut frame = bytes.to_vec();
+    frame.extend(mbm::frame::checksum::crc16(bytes).to_bytes());
+    frame
+}
+
+pub fn frame(framing: Framing, pdu: &[u8]) -> Vec<u8> {
+    let mut buffer = [0; ascii::MAX_FRAME];
+    let write = |place: &mut [u8]| {
+        place[..pdu.len()].copy_from_slice(pdu);
+        Ok(pdu.len())
+    };
+    let length = framing.emit(&mut buffer, 7, 17, ascii::END, write).unwrap();
+    buffer[..length].to_vec()
+}
+
+pub fn record(
+    direction: Direction,
+    kind: PduKind,
+    status: Status,
+    time: u32,
+    bytes: &[u8],
+) -> Kept {
+    Kept {
+        direction,
+        kind,
+        status,
+        time,
+        bytes: bytes.to_vec(),
+    }
+}
+
+pub const ALL: [Framing; 4] = [
+    Framing::Rtu,
+    Framing::Ascii,
+    Framing::Tcp,
+    Framing::RtuOverTcp,
+];
+
+pub const READ: &[u8] = &[3, 0, 107, 0, 3];
+pub const REPLY: &[u8] = &[3, 6, 2, 43, 0, 0, 0, 100];
