@@ -27,10 +27,12 @@
  *    7 Plan                    a table of values that a client reads again and again
  *    8 Server                  answers requests on a line or connection
  *    9 Units                   the data that servers serve: tables, callbacks, files
- *   10 Values                  registers and bits as numbers, in words or bytes
- *   11 Packets                 requests and responses, built and parsed by hand
- *   12 Sniffer                 decodes the traffic between other devices
- *   13 Ring                    bytes from an interrupt to the main loop
+ *   10 Gateway                 from Modbus TCP to the lines of clients
+ *   11 Values                  registers and bits as numbers, in words or bytes
+ *   12 Packets                 requests and responses, built and parsed by hand
+ *   13 Sniffer                 decodes the traffic between other devices
+ *   14 Trace                   calls your hook for each frame sent and received
+ *   15 Ring                    bytes from an interrupt to the main loop
  */
 
 #ifndef MBM_H
@@ -61,9 +63,9 @@ extern "C" {
 #endif
 
 struct mbm_master;
+struct mbm_unit;
 struct mbm_registers;
 struct mbm_object;
-struct mbm_unit;
 
 /* ==== 1. Version ==================================================================== */
 
@@ -3027,6 +3029,12 @@ uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
 #define MBM_REPLY_PENDING 768
 
 /**
+ * A function of yours returns this to decline the request: the next record of the unit that
+ * serves the function code answers, or exception 01 if there is none.
+ */
+#define MBM_REPLY_DECLINED 1024
+
+/**
  * The most records that one unit can serve. Each is one struct that you pass to a
  * mbm_unit_serve function.
  */
@@ -3152,6 +3160,95 @@ typedef struct mbm_unit {
 } mbm_unit;
 
 /**
+ * A request that reads or writes cells of yours, as your hooks get it. A cell is a register,
+ * a coil, a discrete input or a record of a file.
+ */
+typedef struct mbm_access {
+    /**
+     * The new values, in the hooks of a write: registers and records with the high byte
+     * first, bits with the lowest bit of the first byte first. NULL in beforeRead. Valid
+     * until the hook returns.
+     */
+    const uint8_t *data;
+    /**
+     * The line or connection that the request came from: the `context` of the port of the
+     * server that received it, or the `connection` of mbm_unit_respond.
+     */
+    void *connection;
+    /**
+     * The address of the first cell; of a file, the number of the first record.
+     */
+    uint16_t address;
+    /**
+     * How many cells, 1 to 2000.
+     */
+    uint16_t quantity;
+    /**
+     * The number of the file; 0 for tables and callbacks.
+     */
+    uint16_t file;
+    /**
+     * The unit id in the request. 0 on a serial line is a broadcast.
+     */
+    uint8_t unit;
+    /**
+     * The function code of the request.
+     */
+    uint8_t function;
+} mbm_access;
+
+/**
+ * Functions of yours that the server calls around a read or a write of cells. Each is
+ * optional. Pass the struct to mbm_registerTable_setHooks, mbm_bitTable_setHooks,
+ * mbm_dataCallbacks_setHooks or mbm_files_setHooks. It may be a constant, and any number
+ * of records may share it.
+ *
+ * The server calls the hooks only for a request that is right and whose cells all exist.
+ * Functions 16 and 17 (hex) read and write: for them the server calls beforeRead,
+ * beforeWrite and afterWrite in this order. A request of function 14 or 15 (hex) has
+ * several groups of records. The server calls each hook once for each group; it calls the
+ * hook for all groups before it reads or writes any of them.
+ *
+ * A hook may change cells. It may call any function of this library but those on the
+ * server that calls it, which return MBM_BUSY. If it changes its record, or sets other
+ * hooks for it, that counts from the next request on.
+ */
+typedef struct mbm_accessHooks {
+    /**
+     * Your pointer, passed to each hook; may be NULL.
+     */
+    void *context;
+    /**
+     * Called before cells are read. It may refresh them. Returns 0 to allow the read, or an
+     * exception code to refuse the whole request; a number above 127 becomes exception 04.
+     */
+    uint8_t (*beforeRead)(void *context, const struct mbm_access *access);
+    /**
+     * Called before cells are written. Returns as beforeRead.
+     */
+    uint8_t (*beforeWrite)(void *context, const struct mbm_access *access);
+    /**
+     * Called after cells were written.
+     */
+    void (*afterWrite)(void *context, const struct mbm_access *access);
+} mbm_accessHooks;
+
+/**
+ * The hooks of a record. Private.
+ */
+typedef struct mbm_recordHooks {
+    /**
+     * The hooks.
+     */
+    const struct mbm_accessHooks *hooks;
+    /**
+     * Calls the hooks. NULL if there are none. A program in which no record has hooks does
+     * not contain the function.
+     */
+    void (*call)(void);
+} mbm_recordHooks;
+
+/**
  * Cells that your functions get and set one by one, in place of an array. A cell is a
  * register, a coil or a discrete input. Zero the struct, set the fields that you need,
  * and pass it to mbm_unit_serveCallbacks.
@@ -3177,20 +3274,15 @@ typedef struct mbm_dataCallbacks {
      */
     uint16_t (*get)(void *context, uint16_t address);
     /**
-     * Sets an existing cell; a bit to 0 or 1. Required for coils and holding registers.
+     * Sets an existing cell; a bit to 0 or 1. Coils and holding registers without it are
+     * read-only: the unit answers functions that write them with exception 01, unless a
+     * later record serves these functions.
      */
     void (*set)(void *context, uint16_t address, uint16_t value);
     /**
-     * As in mbm_registerTable.
+     * Private: see mbm_dataCallbacks_setHooks.
      */
-    uint8_t (*before)(void *context,
-                      uint16_t address,
-                      uint16_t quantity,
-                      const uint8_t *data);
-    /**
-     * As in mbm_registerTable.
-     */
-    void (*after)(void *context, uint16_t address, uint16_t quantity);
+    struct mbm_recordHooks hooks;
 } mbm_dataCallbacks;
 
 /**
@@ -3201,6 +3293,11 @@ typedef struct mbm_request {
      * The data of the request: the bytes after the function code.
      */
     const uint8_t *data;
+    /**
+     * The line or connection that the request came from: the `context` of the port of the
+     * server that received it, or the `connection` of mbm_unit_respond.
+     */
+    void *connection;
     /**
      * Length of `data` in bytes, 0 to 252.
      */
@@ -3219,6 +3316,11 @@ typedef struct mbm_request {
 /**
  * A function of yours. Zero the struct, set the fields that you need, and pass it to
  * mbm_unit_serveCustom.
+ *
+ * A unit asks its records in the order in which they were registered. So a function that is
+ * registered before the record that serves the same code is asked first. It answers the
+ * request itself, for example with an exception, or it returns MBM_REPLY_DECLINED: then the
+ * record after it answers.
  */
 typedef struct mbm_custom {
     /**
@@ -3229,7 +3331,8 @@ typedef struct mbm_custom {
      * Carries out a request and writes the data of the response, without the function
      * code, to `response`. `capacity` is the space in bytes that the frame buffer has
      * after the request; the server sends at most 252 bytes. Returns the number of bytes
-     * written, or MBM_REPLY_EXCEPTION | code, or MBM_REPLY_NONE, or MBM_REPLY_PENDING.
+     * written, or MBM_REPLY_EXCEPTION | code, or MBM_REPLY_NONE, MBM_REPLY_PENDING or
+     * MBM_REPLY_DECLINED.
      */
     uint16_t (*serve)(void *context,
                       const struct mbm_request *request,
@@ -3302,24 +3405,9 @@ typedef struct mbm_files {
      */
     uint16_t count;
     /**
-     * Optional: called before records are written, once for each group of a request,
-     * before any group is written. `data` has the new values, the high byte of each
-     * first. Return 0 to allow the write, or an exception code to refuse the whole
-     * request.
+     * Private: see mbm_files_setHooks.
      */
-    uint8_t (*before)(void *context,
-                      uint16_t file,
-                      uint16_t record,
-                      uint16_t length,
-                      const uint8_t *data);
-    /**
-     * Optional: called after the records of a group were written, once for each group.
-     */
-    void (*after)(void *context, uint16_t file, uint16_t record, uint16_t length);
-    /**
-     * Passed to both hooks. Any value; may be NULL.
-     */
-    void *context;
+    struct mbm_recordHooks hooks;
 } mbm_files;
 
 /**
@@ -3414,7 +3502,7 @@ typedef struct mbm_serverId {
  * A device identification. Zero the struct, set `objects` and `count`, and pass it to
  * mbm_unit_serveIdentification.
  */
-typedef struct mbm_identification {
+typedef struct mbm_serverIdentification {
     /**
      * Private.
      */
@@ -3430,51 +3518,7 @@ typedef struct mbm_identification {
      * How many objects.
      */
     uint16_t count;
-} mbm_identification;
-
-/**
- * Coils or discrete inputs in an array of yours, eight bits in a byte, the lowest bit
- * first. Use it as mbm_registerTable, with mbm_unit_serveCoils or
- * mbm_unit_serveDiscreteInputs.
- */
-typedef struct mbm_bitTable {
-    /**
-     * Private.
-     */
-    struct mbm_service service;
-    /**
-     * The bits: `size` bits, in (size + 7) / 8 bytes.
-     */
-    uint8_t *bits;
-    /**
-     * As in mbm_registerTable.
-     */
-    const uint8_t *valid;
-    /**
-     * As in mbm_registerTable. `data` has the new bits, the lowest bit of the first byte
-     * first.
-     */
-    uint8_t (*before)(void *context,
-                      uint16_t address,
-                      uint16_t quantity,
-                      const uint8_t *data);
-    /**
-     * As in mbm_registerTable.
-     */
-    void (*after)(void *context, uint16_t address, uint16_t quantity);
-    /**
-     * As in mbm_registerTable.
-     */
-    void *context;
-    /**
-     * The address of the first bit.
-     */
-    uint16_t base;
-    /**
-     * How many bits there are.
-     */
-    uint16_t size;
-} mbm_bitTable;
+} mbm_serverIdentification;
 
 /**
  * Holding registers or input registers in an array of yours. Zero the struct, set the
@@ -3500,22 +3544,9 @@ typedef struct mbm_registerTable {
      */
     const uint8_t *valid;
     /**
-     * Optional: called once a request, before registers are written. `data` has the new
-     * values, the high byte of each first. Return 0 to allow the write, or an exception
-     * code to refuse the whole request.
+     * Private: see mbm_registerTable_setHooks.
      */
-    uint8_t (*before)(void *context,
-                      uint16_t address,
-                      uint16_t quantity,
-                      const uint8_t *data);
-    /**
-     * Optional: called after registers were written, with the address and the quantity.
-     */
-    void (*after)(void *context, uint16_t address, uint16_t quantity);
-    /**
-     * Passed to both hooks. Any value; may be NULL.
-     */
-    void *context;
+    struct mbm_recordHooks hooks;
     /**
      * The address of the first register.
      */
@@ -3527,6 +3558,38 @@ typedef struct mbm_registerTable {
 } mbm_registerTable;
 
 /**
+ * Coils or discrete inputs in an array of yours, eight bits in a byte, the lowest bit
+ * first. Use it as mbm_registerTable, with mbm_unit_serveCoils or
+ * mbm_unit_serveDiscreteInputs.
+ */
+typedef struct mbm_bitTable {
+    /**
+     * Private.
+     */
+    struct mbm_service service;
+    /**
+     * The bits: `size` bits, in (size + 7) / 8 bytes.
+     */
+    uint8_t *bits;
+    /**
+     * As in mbm_registerTable.
+     */
+    const uint8_t *valid;
+    /**
+     * Private: see mbm_bitTable_setHooks.
+     */
+    struct mbm_recordHooks hooks;
+    /**
+     * The address of the first bit.
+     */
+    uint16_t base;
+    /**
+     * How many bits there are.
+     */
+    uint16_t size;
+} mbm_bitTable;
+
+/**
  * Serves cells that your functions get and set.
  *
  * @param unit   the unit
@@ -3534,13 +3597,22 @@ typedef struct mbm_registerTable {
  * @param table  the table, named by the function that reads it: 1 coils (functions 01,
  *               05, 0F), 2 discrete inputs (02), 3 holding registers (03, 06, 10, 16,
  *               17), 4 input registers (04); functions in hex
- * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a NULL `get`, a NULL `set`
- *         for table 1 or 3, or another table; MBM_BUSY and MBM_BUFFER_TOO_SMALL as
- *         mbm_unit_serveCoils
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a NULL `get` or another table;
+ *         MBM_BUSY and MBM_BUFFER_TOO_SMALL as mbm_unit_serveCoils
  */
 uint8_t mbm_unit_serveCallbacks(struct mbm_unit *unit,
                                 struct mbm_dataCallbacks *cells,
                                 uint8_t table);
+
+/**
+ * Sets the functions that are called around a read or a write of cells, or removes them.
+ *
+ * @param cells  the cells, registered already or not. Zeroing the struct removes the hooks
+ * @param hooks  must stay valid for as long as the cells are served; NULL for no hooks
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL `cells`
+ */
+uint8_t mbm_dataCallbacks_setHooks(struct mbm_dataCallbacks *cells,
+                                   const struct mbm_accessHooks *hooks);
 
 /**
  * Serves a function of yours, in every framing.
@@ -3599,6 +3671,17 @@ uint8_t mbm_unit_serveDiagnostics(struct mbm_unit *unit,
 uint8_t mbm_unit_serveFiles(struct mbm_unit *unit, struct mbm_files *files);
 
 /**
+ * Sets the functions that are called around a read or a write of records, or removes them.
+ * In mbm_access, `file` is the number of the file and `address` the first record.
+ *
+ * @param files  the files, registered already or not. Zeroing the struct removes the hooks
+ * @param hooks  must stay valid for as long as the files are served; NULL for no hooks
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL `files`
+ */
+uint8_t mbm_files_setHooks(struct mbm_files *files,
+                           const struct mbm_accessHooks *hooks);
+
+/**
  * Serves FIFO queues: function 18 (hex), Read FIFO Queue.
  *
  * @param unit   the unit
@@ -3641,33 +3724,56 @@ uint8_t mbm_unit_serveServerId(struct mbm_unit *unit, struct mbm_serverId *id);
  *         unit has MBM_MAX_SERVICES records already
  */
 uint8_t mbm_unit_serveIdentification(struct mbm_unit *unit,
-                                     struct mbm_identification *identification);
+                                     struct mbm_serverIdentification *identification);
 
 /**
  * Answers one request without a server: reads a request frame from a buffer and writes
  * the response frame over it.
  *
- * @param units     the units to serve: one unit, or an array of units
- * @param count     how many units
- * @param framing   the framing. Its `functions` are not used: units know their own
- *                  functions
- * @param frame     holds the complete request; receives the response
- * @param length    length of the request in bytes
- * @param capacity  size of `frame` in bytes. 256 hold every response in RTU, 513 in
- *                  ASCII, 260 in TCP. A longer response becomes exception 04
- * @param response  receives the length of the response in bytes; 0 without a response:
- *                  after a damaged frame, a request for another unit, a broadcast, and
- *                  with any status but MBM_OK
+ * @param units       the units to serve: one unit, or an array of units
+ * @param count       how many units
+ * @param connection  your pointer, which hooks and functions of yours get as the connection
+ *                    that the request came from; may be NULL
+ * @param framing     the framing. Its `functions` are not used: units know their own
+ *                    functions
+ * @param frame       holds the complete request; receives the response
+ * @param length      length of the request in bytes
+ * @param capacity    size of `frame` in bytes. 256 hold every response in RTU, 513 in
+ *                    ASCII, 260 in TCP. A longer response becomes exception 04
+ * @param response    receives the length of the response in bytes; 0 without a response:
+ *                    after a damaged frame, a request for another unit, a broadcast, and
+ *                    with any status but MBM_OK
  * @return MBM_OK; MBM_PENDING if a function of yours returned MBM_REPLY_PENDING: write
  *         the request into `frame` again before the next call; MBM_INVALID_ARGUMENT
  */
 uint8_t mbm_unit_respond(struct mbm_unit *units,
                          uint8_t count,
+                         void *connection,
                          const struct mbm_framing *framing,
                          uint8_t *frame,
                          uint16_t length,
                          uint16_t capacity,
                          uint16_t *response);
+
+/**
+ * Sets the functions that are called around a read or a write of registers, or removes them.
+ *
+ * @param table  the table, registered already or not. Zeroing the struct removes the hooks
+ * @param hooks  must stay valid for as long as the table is served; NULL for no hooks
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL `table`
+ */
+uint8_t mbm_registerTable_setHooks(struct mbm_registerTable *table,
+                                   const struct mbm_accessHooks *hooks);
+
+/**
+ * Sets the functions that are called around a read or a write of bits, or removes them.
+ *
+ * @param table  the table, registered already or not. Zeroing the struct removes the hooks
+ * @param hooks  must stay valid for as long as the table is served; NULL for no hooks
+ * @return MBM_OK, or MBM_INVALID_ARGUMENT for NULL `table`
+ */
+uint8_t mbm_bitTable_setHooks(struct mbm_bitTable *table,
+                              const struct mbm_accessHooks *hooks);
 
 /**
  * Serves coils: functions 01, 05 and 0F (hex).
@@ -3721,7 +3827,365 @@ uint8_t mbm_unit_serveInputRegisters(struct mbm_unit *unit,
  */
 uint8_t mbm_registerTable_serveMaskAndReadWrite(struct mbm_registerTable *table);
 
-/* ==== 10. Values ==================================================================== */
+/* ==== 10. Gateway =================================================================== */
+
+/**
+ * The `line` of a route for broadcasts: to all lines, one after the other.
+ */
+#define MBM_GATEWAY_ALL_LINES 255
+
+/**
+ * The `line` of a route to the gateway's own units: see mbm_gateway_serveUnits.
+ */
+#define MBM_GATEWAY_LOCAL 254
+
+/**
+ * A gateway: takes requests from Modbus TCP connections, passes each to the line of its unit,
+ * and sends the reply back. mbm_gateway_poll does all of it; no function ever waits.
+ *
+ * You provide the storage. It must be zero before first use; a static object is zero. Call
+ * mbm_gateway_begin first. Use a gateway, its lines' clients and its own units from one
+ * thread, and never from an interrupt.
+ *
+ * mbm_gateway_poll calls the hooks of the connections' ports and of the lines' ports,
+ * `isReady` of the lines, and the functions of the gateway's own units. If one of them calls a
+ * function on the gateway, the function returns MBM_BUSY and changes nothing; a getter returns
+ * what it returns for an object that was never begun. The same holds for the `done` function
+ * of a request of your own that mbm_gateway_poll ends.
+ */
+typedef struct mbm_gateway {
+    /**
+     * Private.
+     */
+    void *pointers[13];
+    /**
+     * Private.
+     */
+    uint32_t words[2];
+} mbm_gateway;
+
+/**
+ * Leads requests for a range of unit ids on TCP to a line. A table of routes may be constant.
+ * The first route that has the unit id counts. Examples:
+ *
+ * - {1, 31, 0, 0}: the units 1 to 31, on line 0 with the same ids
+ * - {101, 131, 1, 1}: the units 101 to 131, which have the ids 1 to 31 on line 1
+ * - {255, 255, 0, 5}: a client that addresses the gateway itself reaches unit 5 on line 0
+ *   (messaging on TCP/IP guide V1.0b, 4.4.1.2). The same with 0 instead of 255
+ * - {0, 0, 0, 0}: unit 0 is a broadcast on line 0 (serial line guide V1.02, 2.1)
+ * - {0, 0, MBM_GATEWAY_ALL_LINES, 0}: unit 0 is a broadcast on each line
+ */
+typedef struct mbm_gatewayRoute {
+    /**
+     * The first unit id on TCP, 0 to 255.
+     */
+    uint8_t first;
+    /**
+     * The last unit id on TCP.
+     */
+    uint8_t last;
+    /**
+     * The index of the line, MBM_GATEWAY_ALL_LINES or MBM_GATEWAY_LOCAL.
+     */
+    uint8_t line;
+    /**
+     * The id on the line of the unit that is `first` on TCP; the units after it follow, up to
+     * 255. 0: the ids on the line are those on TCP. A request whose unit id on the line is 0
+     * is a broadcast.
+     */
+    uint8_t unit;
+} mbm_gatewayRoute;
+
+/**
+ * A line of a gateway. Zero it, then set the fields that you need.
+ */
+typedef struct mbm_gatewayLine {
+    /**
+     * The client of the line, in any framing. Begin it before the gateway, with a frame
+     * buffer that holds every frame. Its settings hold: response timeout, retries, quiet
+     * time. You may send requests of your own with it.
+     */
+    struct mbm_client *client;
+    /**
+     * Your pointer, passed to `isReady`; may be NULL.
+     */
+    void *context;
+    /**
+     * Optional: called before each request to the line. Returns 1 if the line can take it, 0
+     * if the gateway shall answer with exception 0A, for example because a terminal is not
+     * open. It may call every function on the client except mbm_client_poll, and no function
+     * on the gateway (MBM_BUSY).
+     */
+    uint8_t (*isReady)(void *context);
+    /**
+     * The most requests that the gateway queues in the client at a time, 1 to 16; 0 means 1.
+     * With 1, the clients on TCP take turns with every request. A line that is a TCP
+     * connection can have more under way.
+     */
+    uint8_t inFlight;
+    /**
+     * Private.
+     */
+    uint8_t last;
+} mbm_gatewayLine;
+
+/**
+ * A place for a TCP connection.
+ */
+typedef struct mbm_gatewayConnection {
+    /**
+     * Private.
+     */
+    struct mbm_port port;
+    /**
+     * Private.
+     */
+    uint32_t words[3];
+} mbm_gatewayConnection;
+
+/**
+ * A place for a request, which then holds its response. It has about 340 bytes on a 32-bit
+ * machine.
+ */
+typedef struct mbm_gatewayRequest {
+    /**
+     * Private.
+     */
+    struct mbm_clientRequest request;
+    /**
+     * Private.
+     */
+    uint32_t words[5];
+    /**
+     * Private.
+     */
+    uint8_t frame[MBM_MAX_TCP_FRAME];
+} mbm_gatewayRequest;
+
+/**
+ * What a gateway consists of. The gateway copies this struct, but not what it points to.
+ */
+typedef struct mbm_gatewayConfig {
+    /**
+     * The map of units. It may be in flash.
+     */
+    const struct mbm_gatewayRoute *routes;
+    /**
+     * The lines; may be NULL if `lineCount` is 0.
+     */
+    struct mbm_gatewayLine *lines;
+    /**
+     * The places for connections. The index in this array is the connection's number.
+     */
+    struct mbm_gatewayConnection *connections;
+    /**
+     * The places for requests. Each connection always has one. Connections that send several
+     * requests without waiting for the replies share the others.
+     */
+    struct mbm_gatewayRequest *requests;
+    /**
+     * The number of `requests`, at least `connectionCount` and below 65535.
+     */
+    uint16_t requestCount;
+    /**
+     * The number of `routes`, at least 1.
+     */
+    uint8_t routeCount;
+    /**
+     * The number of `lines`, 0 to 253.
+     */
+    uint8_t lineCount;
+    /**
+     * The number of `connections`, at least 1.
+     */
+    uint8_t connectionCount;
+} mbm_gatewayConfig;
+
+/**
+ * Begins a gateway without connections.
+ *
+ * You may call it again at any time, also with another config. The gateway then gives up all
+ * connections and their requests; it cancels those that a line has, and its settings return
+ * to their defaults. A call that is refused changes nothing.
+ *
+ * @param gateway  the object; zero it before the first call
+ * @param config   what the gateway consists of. What it points to must stay valid, and must
+ *                 be used by one gateway only, for as long as the gateway is used; lines and
+ *                 requests must be zero before first use
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for a NULL pointer, a count out of range, fewer
+ *         requests than connections, a route to a line that does not exist or to a unit id
+ *         above 255, and a line without client; MBM_NOT_INITIALISED if the client of a line
+ *         was not begun; MBM_BUSY from within a hook of the gateway, and of a client of its
+ *         lines
+ */
+uint8_t mbm_gateway_begin(struct mbm_gateway *gateway,
+                          const struct mbm_gatewayConfig *config);
+
+/**
+ * Gives the gateway an accepted TCP connection. mbm_gateway_poll then reads its requests and
+ * writes their responses. The gateway never opens or closes the socket itself.
+ *
+ * @param gateway     the object
+ * @param connection  the number of a free place, below `connectionCount`
+ * @param port        the connection; is copied. Its hooks read, write and micros are
+ *                    required. The clocks of all connections count the same time
+ * @return MBM_OK; MBM_BUSY if the place has an open connection, and from within a hook of the
+ *         gateway; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_gateway_open(struct mbm_gateway *gateway,
+                         uint8_t connection,
+                         const struct mbm_port *port);
+
+/**
+ * Gives up a connection and its requests. A request that a line has is cancelled: the device
+ * may have received it, but its reply reaches nobody. The place is free then.
+ *
+ * @param gateway     the object
+ * @param connection  the number of the place; nothing happens if it is free already
+ * @return MBM_OK; MBM_BUSY from within a hook of the gateway, and from within a hook of a
+ *         port of its lines; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_gateway_close(struct mbm_gateway *gateway,
+                          uint8_t connection);
+
+/**
+ * Returns how a connection is. Call it after mbm_gateway_poll for each connection: if the
+ * connection is lost, close its socket, and call mbm_gateway_close or mbm_gateway_open.
+ *
+ * @param gateway     the object
+ * @param connection  the number of the place
+ * @return MBM_OK while the connection is open; MBM_LINK_LOST if its port reported that the
+ *         connection is lost; MBM_MALFORMED_FRAME if it sent bytes that are not Modbus TCP;
+ *         MBM_NOT_INITIALISED for a free place; MBM_INVALID_ARGUMENT for a number out of range
+ */
+uint8_t mbm_gateway_status(const struct mbm_gateway *gateway,
+                           uint8_t connection);
+
+/**
+ * Returns how many requests of a connection are under way: complete, but not answered yet.
+ * The connection is not idle while it has one.
+ *
+ * @param gateway     the object
+ * @param connection  the number of the place
+ * @return the number of requests; 0 for a free place and for a number out of range
+ */
+uint16_t mbm_gateway_pending(const struct mbm_gateway *gateway,
+                             uint8_t connection);
+
+/**
+ * Returns whether the next mbm_gateway_poll reads bytes from a connection. If not, the
+ * connection has as many requests under way as it may have, and its next requests wait in its
+ * socket: do not wait for bytes of it.
+ *
+ * @param gateway     the object
+ * @param connection  the number of the place
+ * @return 1 or 0
+ */
+uint8_t mbm_gateway_isReading(const struct mbm_gateway *gateway,
+                              uint8_t connection);
+
+/**
+ * Polls the clients of all lines, receives requests, passes them on, and sends responses.
+ * Never waits.
+ *
+ * Call it often. You need not poll the clients of the lines; you may.
+ *
+ * @param gateway  the object
+ * @return MBM_OK; MBM_BUSY from within a hook of the gateway, and from within a hook of a port
+ *         of its lines; MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_gateway_poll(struct mbm_gateway *gateway);
+
+/**
+ * Returns for how long mbm_gateway_poll will have nothing to do, unless a byte arrives on a
+ * line whose client has requests, or on a connection that the gateway reads (see
+ * mbm_gateway_isReading), or a connection is lost.
+ *
+ * @param gateway  the object
+ * @return microseconds; 0 means poll now, also from within a hook of the gateway; 0xFFFFFFFF
+ *         means that no request is under way. While a connection does not accept a response,
+ *         and while a function of the gateway's own units returns MBM_REPLY_PENDING, it is at
+ *         most 1000
+ */
+uint32_t mbm_gateway_pollDelay(struct mbm_gateway *gateway);
+
+/**
+ * Sets how many requests of one connection may be under way at once
+ * (NumberMaxOfServerTransaction of the messaging on TCP/IP guide V1.0b, 4.4.1). The next
+ * requests of the connection wait in its socket.
+ *
+ * @param gateway  the object
+ * @param most     1 to 65535; the default is 65535. Fewer if there are not enough places for
+ *                 requests
+ * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_gateway_setInFlight(struct mbm_gateway *gateway,
+                                uint16_t most);
+
+/**
+ * Returns the number that mbm_gateway_setInFlight has set.
+ *
+ * @param gateway  the object
+ * @return the number; 0 if the gateway was never begun
+ */
+uint16_t mbm_gateway_inFlight(const struct mbm_gateway *gateway);
+
+/**
+ * Sets for how long a request may wait until its line is free. After that time the gateway
+ * answers it with exception 0A and does not send it. Set it to the time that the clients on
+ * TCP wait, less the response timeout of the line: then no device carries out a request that
+ * its client has given up.
+ *
+ * @param gateway  the object
+ * @param timeMs   milliseconds; 0, the default, lets requests wait for any time
+ * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_gateway_setQueueTime(struct mbm_gateway *gateway,
+                                 uint16_t timeMs);
+
+/**
+ * Returns the time that mbm_gateway_setQueueTime has set.
+ *
+ * @param gateway  the object
+ * @return milliseconds; 0 also if the gateway was never begun
+ */
+uint16_t mbm_gateway_queueTime(const struct mbm_gateway *gateway);
+
+/**
+ * Serves units of the gateway itself: those that a route to MBM_GATEWAY_LOCAL leads to. The
+ * unit ids that such a route maps to are those of the units; 0 and 255 address the first
+ * unit. A request for an id that no unit has gets no response.
+ *
+ * A function of a unit that returns MBM_REPLY_PENDING is called again at each
+ * mbm_gateway_poll. Other requests go on meanwhile, also those for the same unit.
+ *
+ * @param gateway  the object
+ * @param units    one unit, or an array of units; must stay valid for as long as the gateway
+ *                 is used. Servers may serve the same units. NULL only if `count` is 0
+ * @param count    how many units
+ * @return MBM_OK, MBM_BUSY, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
+ */
+uint8_t mbm_gateway_serveUnits(struct mbm_gateway *gateway,
+                               struct mbm_unit *units,
+                               uint8_t count);
+
+/**
+ * Declares functions of your own. The gateway passes on every function. If one of your own is
+ * declared, the gateway also checks the length of its requests, and knows on RTU when its
+ * replies end without waiting for a silence.
+ *
+ * @param gateway    the object
+ * @param functions  the declarations; they must stay valid for as long as the gateway is used.
+ *                   NULL only if `count` is 0
+ * @param count      how many declarations
+ * @return MBM_OK; MBM_INVALID_ARGUMENT, also for a declaration that is not valid; MBM_BUSY or
+ *         MBM_NOT_INITIALISED
+ */
+uint8_t mbm_gateway_setFunctions(struct mbm_gateway *gateway,
+                                 const struct mbm_function *functions,
+                                 uint8_t count);
+
+/* ==== 11. Values ==================================================================== */
 
 /**
  * Passed to a function: use the order of the mbm_registers. As that order itself:
@@ -4368,7 +4832,7 @@ uint8_t mbm_registers_setBytes(const struct mbm_registers *registers,
                                const uint8_t *bytes,
                                uint16_t length);
 
-/* ==== 11. Packets =================================================================== */
+/* ==== 12. Packets =================================================================== */
 
 /**
  * A request: a client sends it.
@@ -4885,7 +5349,7 @@ uint8_t mbm_frame_text(const struct mbm_framing *framing,
                        char *text,
                        uint16_t size);
 
-/* ==== 12. Sniffer =================================================================== */
+/* ==== 13. Sniffer =================================================================== */
 
 /**
  * The bytes come from a line that carries both directions.
@@ -5214,7 +5678,189 @@ uint8_t mbm_sniffer_next(struct mbm_sniffer *sniffer,
  */
 uint8_t mbm_event_text(const struct mbm_event *event, char *text, uint16_t size);
 
-/* ==== 13. Ring ====================================================================== */
+/* ==== 14. Trace ===================================================================== */
+
+/**
+ * The smallest buffer of a trace, in bytes.
+ */
+#define MBM_MIN_TRACE_BUFFER 32
+
+/**
+ * The bytes were received.
+ */
+#define MBM_TRACE_RECEIVED 0
+
+/**
+ * The bytes were sent.
+ */
+#define MBM_TRACE_SENT 1
+
+/**
+ * A trace: stands between a port and the master, client or server that uses it, passes
+ * everything on, and calls your hook for each frame that is sent or received.
+ *
+ * You provide the storage. It must be zero before first use; a static object is zero. Call
+ * mbm_trace_beginClient or mbm_trace_beginServer, then begin the master, client or server
+ * with mbm_trace_port instead of your port. The object must not move while its port is in
+ * use. A program that begins no trace contains no part of it. Not re-entrant: use it from
+ * the thread of the object that uses its port.
+ */
+typedef struct mbm_trace {
+    /**
+     * Private.
+     */
+    void *pointers[26];
+    /**
+     * Private.
+     */
+    uint32_t words[9];
+} mbm_trace;
+
+/**
+ * One frame on a line or connection, or bytes that are no frame.
+ */
+typedef struct mbm_traceRecord {
+    /**
+     * The bytes as they are on the line. Of a sniffer's event in ASCII they are decoded, from
+     * the unit to the LRC.
+     */
+    const uint8_t *bytes;
+    /**
+     * When the first byte was sent or read, in microseconds by the clock of the port. The
+     * time of a frame that followed other bytes without a pause is estimated. Of a sniffer's
+     * event: when the last byte arrived.
+     */
+    uint32_t timeUs;
+    /**
+     * The number of bytes.
+     */
+    uint16_t length;
+    /**
+     * MBM_TRACE_RECEIVED or MBM_TRACE_SENT.
+     */
+    uint8_t direction;
+    /**
+     * MBM_PACKET_REQUEST, or MBM_PACKET_RESPONSE for responses and exceptions. On a serial
+     * line a received frame may be the echo of a request, or may be meant for others; if a
+     * frame can be both, it is the kind that the other side of this link sends.
+     */
+    uint8_t kind;
+    /**
+     * MBM_OK of a whole frame; MBM_INVALID_CRC if its CRC or LRC is wrong;
+     * MBM_INCOMPLETE_FRAME of the beginning of a frame whose rest did not come;
+     * MBM_MALFORMED_FRAME of bytes that begin no frame; MBM_BUFFER_TOO_SMALL of a piece of
+     * a frame that is longer than half of the trace's buffer.
+     */
+    uint8_t status;
+} mbm_traceRecord;
+
+/**
+ * Begins the trace of a master or client. Then begin that master or client with
+ * mbm_trace_port.
+ *
+ * The hook is called from within the functions of the master or client, when the last byte
+ * of a frame was sent or read. Bytes that are not followed by the rest of a frame are handed
+ * out at the first read after the frame timeout (see mbm_trace_setFrameTimeout), on a serial
+ * line when the next frame is sent, when the link is lost, or by mbm_trace_flush. `record`
+ * and its bytes are valid until the hook returns. The hook must not use this trace, nor the
+ * object that uses its port: such a call returns MBM_BUSY and changes nothing. On a serial
+ * line it should not take longer than a character.
+ *
+ * You may call this function again at any time, but not from within the hook. The trace then
+ * drops the bytes that it has not handed out, and its frame timeout is the default.
+ *
+ * @param trace    the object; zero it before the first call
+ * @param port     is copied; its hooks read, write and micros are required. Its optional
+ *                 hooks are passed on. It must not be the port of this trace
+ * @param framing  the framing of the object that will use the port, and the declarations of
+ *                 your own functions, which must stay valid and unchanged. Without a
+ *                 declaration, the end of a received RTU frame is not known from its bytes
+ * @param buffer   holds incomplete frames: one half of it those that are sent, the other
+ *                 those that are received. It must stay valid for as long as the trace is
+ *                 used
+ * @param size     size of `buffer` in bytes, at least MBM_MIN_TRACE_BUFFER. Two times
+ *                 MBM_MAX_FRAME, MBM_MAX_ASCII_FRAME or MBM_MAX_TCP_FRAME holds every
+ *                 frame; a longer one is handed out in pieces
+ * @param hook     is called for each frame
+ * @param context  your pointer, passed to `hook`: for example the link or its name
+ * @return MBM_OK; or with nothing changed MBM_BUFFER_TOO_SMALL for a size that is too
+ *         small, MBM_INVALID_ARGUMENT for a NULL pointer, an incomplete port or a framing
+ *         that is not valid, MBM_BUSY from within the hook
+ */
+uint8_t mbm_trace_beginClient(struct mbm_trace *trace,
+                              const struct mbm_port *port,
+                              const struct mbm_framing *framing,
+                              uint8_t *buffer,
+                              uint16_t size,
+                              void (*hook)(void *context,
+                                           const struct mbm_traceRecord *record),
+                              void *context);
+
+/**
+ * Begins the trace of a server. Then begin that server with mbm_trace_port.
+ *
+ * @param trace    see mbm_trace_beginClient
+ * @param port     see mbm_trace_beginClient
+ * @param framing  see mbm_trace_beginClient
+ * @param buffer   see mbm_trace_beginClient
+ * @param size     see mbm_trace_beginClient
+ * @param hook     see mbm_trace_beginClient
+ * @param context  see mbm_trace_beginClient
+ * @return a status; see mbm_trace_beginClient
+ */
+uint8_t mbm_trace_beginServer(struct mbm_trace *trace,
+                              const struct mbm_port *port,
+                              const struct mbm_framing *framing,
+                              uint8_t *buffer,
+                              uint16_t size,
+                              void (*hook)(void *context,
+                                           const struct mbm_traceRecord *record),
+                              void *context);
+
+/**
+ * Returns the port that passes everything on to the port of the trace. Pass it to the begin
+ * function of a master, client or server.
+ *
+ * @param trace  the object
+ * @return the port, which is valid for as long as the trace is used. NULL for a trace that
+ *         was never begun, and from within its hook: the begin functions refuse it
+ */
+const struct mbm_port *mbm_trace_port(struct mbm_trace *trace);
+
+/**
+ * Sets how long the trace waits for the rest of an incomplete frame. At first it is 50 ms in
+ * RTU, which suits a USB adapter, and 1000 ms in the other framings.
+ *
+ * @param trace      the object
+ * @param timeoutMs  1 to 65535 ms
+ * @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
+ */
+uint8_t mbm_trace_setFrameTimeout(struct mbm_trace *trace,
+                                  uint16_t timeoutMs);
+
+/**
+ * Calls the hook for the bytes that wait for the rest of their frame: before the program
+ * ends, or before a link is closed.
+ *
+ * @param trace  the object
+ * @return MBM_OK, MBM_INVALID_ARGUMENT, MBM_NOT_INITIALISED or MBM_BUSY
+ */
+uint8_t mbm_trace_flush(struct mbm_trace *trace);
+
+/**
+ * Makes the record of an event of a sniffer, so that one hook serves what this program sends
+ * and what it overhears. The direction is MBM_TRACE_RECEIVED; `kind` says whether a client or
+ * a server sent the frame.
+ *
+ * @param event   an event that mbm_sniffer_next returned
+ * @param record  receives the record; its bytes are valid as long as those of the event
+ * @return MBM_OK; MBM_INVALID_ARGUMENT, with `record` unchanged, for NULL and for
+ *         MBM_EVENT_TIMEOUT, which has no bytes
+ */
+uint8_t mbm_trace_ofEvent(const struct mbm_event *event,
+                          struct mbm_traceRecord *record);
+
+/* ==== 15. Ring ====================================================================== */
 
 /**
  * A receive ring between an interrupt handler and the main loop.
