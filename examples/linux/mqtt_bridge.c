@@ -10,6 +10,7 @@
 #include "line.h"
 #include "mqtt_broker.h"
 #include "mqtt_value.h"
+#include "trace_options.h"
 
 #include <poll.h>
 #include <stdio.h>
@@ -355,6 +356,7 @@ int main(int argc, char **argv)
     uint16_t timeout = 1000;
     int failed = 1;
 
+    trace_options(&argc, argv);
     if (line_wants_help(argc, argv))
         return line_usage(0, USAGE);
     if (!read_options(argc, argv, &options, &timeout))

@@ -10,6 +10,7 @@
  * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "line.h"
+#include "trace_options.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -123,6 +124,7 @@ int main(int argc, char **argv)
     uint16_t wrong;
     uint8_t status;
 
+    trace_options(&argc, argv);
     if (line_wants_help(argc, argv))
         return line_usage(0, USAGE);
     while ((option = getopt(argc, argv, "s:")) != -1) {

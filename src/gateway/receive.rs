@@ -111,9 +111,9 @@ impl<S: GatewayStorage> Gateway<S> {
     /// Lets the gateway's own units serve a request, again until they have finished.
     pub(super) fn serve(&mut self, request: u16) {
         let state = self.storage.request(request);
-        let (unit, length) = (state.unit, state.length);
+        let (connection, unit, length) = (state.connection, state.unit, state.length);
         let unit_on_tcp = self.replace_unit(request, unit);
-        let response = self.storage.serve(request, length);
+        let response = self.storage.serve(connection, request, length);
         self.replace_unit(request, unit_on_tcp);
         match response {
             None => {}

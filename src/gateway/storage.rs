@@ -67,8 +67,9 @@ pub trait GatewayStorage {
     /// Takes a request back from a line.
     fn cancel(&mut self, line: u8, request: u16);
 
-    /// Lets the gateway's own units serve the request in a frame of `length` bytes, and write
+    /// Lets the gateway's own units serve the request of a connection, in a frame of `length`
+    /// bytes, and write
     /// the response frame over it. Returns the length of the response, 0 for none; `None` if
     /// a unit has not finished.
-    fn serve(&mut self, request: u16, length: u16) -> Option<u16>;
+    fn serve(&mut self, connection: u8, request: u16, length: u16) -> Option<u16>;
 }

@@ -7,6 +7,7 @@ use crate::framing::{mbm_framing, MBM_FRAMING_TCP, MBM_MAX_TCP_FRAME};
 use crate::functions::{declared, mbm_function};
 use crate::pointers;
 use crate::server::{mbm_unit, mbm_unit_respond};
+use core::ffi::c_void;
 use core::ptr::null;
 use core::slice::from_raw_parts;
 use mbm::error::Status;
@@ -110,7 +111,12 @@ pub unsafe extern "C" fn mbm_gateway_serveUnits(
 }
 
 /// As [`Serve`](super::storage::Serve).
-unsafe fn serve(parts: &Parts, frame: *mut u8, length: u16) -> Option<u16> {
+unsafe fn serve(
+    parts: &Parts,
+    connection: *mut c_void,
+    frame: *mut u8,
+    length: u16,
+) -> Option<u16> {
     let framing = mbm_framing {
         functions: null(),
         functionCount: 0,
@@ -123,6 +129,7 @@ unsafe fn serve(parts: &Parts, frame: *mut u8, length: u16) -> Option<u16> {
         mbm_unit_respond(
             parts.units,
             parts.unit_count,
+            connection,
             &raw const framing,
             frame,
             length,

@@ -9,6 +9,7 @@ use crate::framing::MBM_MAX_TCP_FRAME;
 use crate::functions::mbm_function;
 use crate::port;
 use crate::server::mbm_unit;
+use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 use mbm::error::Status;
 use mbm::gateway::{ConnectionState, GatewayStorage, LineState, Outcome, Route, Transaction};
@@ -17,9 +18,11 @@ use mbm::port::Port as _;
 /// Bytes of a frame before the body: the header and the function code.
 const BODY: usize = <Parts as GatewayStorage>::BODY;
 
-/// Serves a request frame of `length` bytes with the gateway's own units. (A pointer that
+/// Serves a request frame of `length` bytes with the gateway's own units. `connection` is the
+/// context of the port from which it came. (A pointer that
 /// mbm_gateway_serveUnits sets, so that firmware that does not call it contains no server.)
-pub(super) type Serve = unsafe fn(&Parts, frame: *mut u8, length: u16) -> Option<u16>;
+pub(super) type Serve =
+    unsafe fn(&Parts, connection: *mut c_void, frame: *mut u8, length: u16) -> Option<u16>;
 
 /// Forwards a request whose function the program has declared; `None` for another request. (A
 /// pointer that mbm_gateway_setFunctions sets, for the same reason.)
@@ -195,11 +198,12 @@ impl GatewayStorage for Parts {
         }
     }
 
-    fn serve(&mut self, request: u16, length: u16) -> Option<u16> {
+    fn serve(&mut self, connection: u8, request: u16, length: u16) -> Option<u16> {
+        let port = mbm_gatewayConnection::port(self.connection_at(connection));
         let frame = mbm_gatewayRequest::frame(self.request_at(request));
         match self.serve {
             // SAFETY: see above.
-            Some(serve) => unsafe { serve(self, frame, length) },
+            Some(serve) => unsafe { serve(self, (*port).context, frame, length) },
             None => Some(0),
         }
     }
