@@ -346,25 +346,11 @@ static void units_are_counted_and_left_alone_for_as_long_as_set(void **)
     assert_int_equal(counters.exceptions, 1);
 }
 
-/* As some variants of SoftwareSerial. */
-class Silent : public HardwareSerial {
-public:
-    size_t write(uint8_t value) override
-    {
-        HardwareSerial::write(value);
-        return 0;
-    }
-    size_t write(const uint8_t *bytes, size_t length) override
-    {
-        return length > 0 ? write(bytes[0]) : 0;
-    }
-};
-
 static void a_stream_that_returns_0_for_what_it_sends_works(void **)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
-    Silent port;
+    ZeroWriteSerial port;
     client.begin(port, 19200);
     port.reply(adu({17, 3, 2, 0, 5}));
     client.readHoldingRegisters(request, 0, 1);

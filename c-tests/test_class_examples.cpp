@@ -1,5 +1,6 @@
 /* The examples that use a network, as they are, on the shim's board: real sockets, and a
  * real libmodbus at the far end. */
+#include "libmodbus_client.h"
 #include "wire.h"
 
 #include "ModbusTcpGateway.h"
@@ -8,10 +9,8 @@
 #include <Ethernet.h>
 
 extern "C" {
-#include "await.h"
 #include "server.h"
 #include "tcp_server.h"
-#include <pthread.h>
 }
 
 /* A sketch is compiled without this warning. */
@@ -28,34 +27,13 @@ namespace gateway_sketch {
 }
 #pragma GCC diagnostic pop
 
-struct Task {
-    int (*work)(modbus_t *);
-    int result;
-    int over;
-};
-
-/* A libmodbus client in a thread: connects to what the sketch's port 502 is. */
-static void *run(void *argument)
+/* Returns the result of a client's call, while the sketch's `loop` runs. */
+static int gets(void (*loop)(), int (*call)(modbus_t *))
 {
-    Task *task = static_cast<Task *>(argument);
-    modbus_t *peer = modbus_new_tcp("127.0.0.1", networkPort(502));
-    modbus_set_response_timeout(peer, PATIENCE_MS / 1000, 0);
-    task->result = modbus_connect(peer) == 0 ? task->work(peer) : -3;
-    modbus_close(peer);
-    modbus_free(peer);
-    __atomic_store_n(&task->over, 1, __ATOMIC_SEQ_CST);
-    return nullptr;
-}
-
-/* What its work gives, while loop is called again and again. */
-static int gets(void (*loop)(), int (*work)(modbus_t *))
-{
-    Task task = {work, -2, 0};
-    pthread_t thread;
-    assert_int_equal(pthread_create(&thread, nullptr, run, &task), 0);
-    AWAIT((loop(), __atomic_load_n(&task.over, __ATOMIC_SEQ_CST)));
-    pthread_join(thread, nullptr);
-    return task.result;
+    modbus_t *peer = connect_client(502);
+    const int result = result_of(peer, call, loop);
+    close_client(peer);
+    return result;
 }
 
 static int real_time(void **state)

@@ -1,36 +1,15 @@
 /* The class of a gateway: a real libmodbus TCP client on one side, a real libmodbus RTU
  * server at the far end of a pty on the other. */
+#include "libmodbus_client.h"
+#include "pty_stream.h"
 #include "wire.h"
 
 #include "ModbusTcpGateway.h"
 #include <ESP8266WiFi.h>
 
 extern "C" {
-#include "await.h"
 #include "server.h"
-#include <modbus.h>
-#include <pthread.h>
 }
-
-/* The serial line: a pty. */
-class PtyStream : public Stream {
-public:
-    using Print::write;
-    int fd = -1;
-
-    int available() override
-    {
-        int waiting = 0;
-        return ioctl(fd, FIONREAD, &waiting) == 0 ? waiting : 0;
-    }
-    int read() override
-    {
-        uint8_t value;
-        return available() > 0 && ::read(fd, &value, 1) == 1 ? value : -1;
-    }
-    int peek() override { return -1; }
-    size_t write(uint8_t value) override { return ::write(fd, &value, 1) == 1; }
-};
 
 static server device;
 static PtyStream tty;
@@ -65,46 +44,20 @@ static int stop(void **)
     return 0;
 }
 
-struct Task {
-    modbus_t *peer;
-    int (*work)(modbus_t *);
-    int result;
-    int over;
-};
-
-static void *run(void *argument)
+/* Returns the result of a client's call, while the sketch's loop polls the gateway. */
+static int passes(modbus_t *peer, int (*call)(modbus_t *))
 {
-    Task *task = static_cast<Task *>(argument);
-    task->result = task->work(task->peer);
-    __atomic_store_n(&task->over, 1, __ATOMIC_SEQ_CST);
-    return nullptr;
-}
-
-/* What a client's work gives, while the sketch's loop goes on. */
-static int passes(modbus_t *peer, int (*work)(modbus_t *))
-{
-    Task task = {peer, work, -2, 0};
-    pthread_t thread;
-    assert_int_equal(pthread_create(&thread, nullptr, run, &task), 0);
-    AWAIT(
-        (assert_int_equal(gateway->poll(), MBM_OK), __atomic_load_n(&task.over, __ATOMIC_SEQ_CST)));
-    pthread_join(thread, nullptr);
-    return task.result;
+    return result_of(peer, call, [] { assert_int_equal(gateway->poll(), MBM_OK); });
 }
 
 static modbus_t *client_of(int unit)
 {
-    modbus_t *peer = modbus_new_tcp("127.0.0.1", networkPort(502));
-    modbus_set_slave(peer, unit);
-    modbus_set_response_timeout(peer, PATIENCE_MS / 1000, 0);
-    assert_int_equal(modbus_connect(peer), 0);
-    return peer;
+    return connect_client(502, unit);
 }
 
 static void hang_up(modbus_t *peer)
 {
-    modbus_close(peer);
-    modbus_free(peer);
+    close_client(peer);
     AWAIT((gateway->poll(), gateway->connections() == 0));
 }
 
@@ -185,10 +138,8 @@ static void clients_and_the_sketch_share_the_line(void **)
             assert_int_equal(own[0], server_pattern(9));
         }
     assert_int_equal(gateway->connections(), 4);
-    for (unsigned i = 0; i < 4; i++) {
-        modbus_close(peers[i]);
-        modbus_free(peers[i]);
-    }
+    for (modbus_t *peer : peers)
+        close_client(peer);
     AWAIT((gateway->poll(), gateway->connections() == 0));
 }
 

@@ -1,4 +1,5 @@
 /* The class against a real libmodbus server, at the far end of a pty. */
+#include "pty_stream.h"
 #include "wire.h"
 
 extern "C" {
@@ -7,26 +8,6 @@ extern "C" {
 }
 
 #include <poll.h>
-#include <sys/ioctl.h>
-#include <unistd.h>
-
-class PtyStream : public Stream {
-public:
-    int fd = -1;
-
-    int available() override
-    {
-        int waiting = 0;
-        return ioctl(fd, FIONREAD, &waiting) == 0 ? waiting : 0;
-    }
-    int read() override
-    {
-        uint8_t value;
-        return available() > 0 && ::read(fd, &value, 1) == 1 ? value : -1;
-    }
-    int peek() override { return -1; }
-    size_t write(uint8_t value) override { return ::write(fd, &value, 1) == 1; }
-};
 
 static server peer;
 static PtyStream line;

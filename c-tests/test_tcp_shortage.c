@@ -5,6 +5,7 @@
 #include "descriptors.h"
 #include "mbm_tcp.h"
 #include "tcp_server.h"
+#include "tcp_waiting.h"
 #include "test.h"
 
 #include <errno.h>
@@ -81,24 +82,10 @@ static int end(void **state)
     return 0;
 }
 
-/* Returns how many connections wait to be accepted. */
-static unsigned waiting(void)
-{
-    struct tcp_info info = {0};
-    socklen_t size = sizeof info;
-
-    assert_int_equal(getsockopt(listener.fd, IPPROTO_TCP, TCP_INFO, &info, &size), 0);
-    return info.tcpi_unacked;
-}
-
 static void connect_some(unsigned count)
 {
-    const unsigned before = waiting();
-    unsigned i;
-
-    for (i = 0; i < count; i++)
-        clients[client_count++] = tcp_connect(listener.port);
-    AWAIT(waiting() == before + count);
+    tcp_connect_some(clients + client_count, count, listener.fd, listener.port);
+    client_count += count;
 }
 
 static int accept_one(void)

@@ -56,6 +56,20 @@ inline void assert_sent(HardwareSerial &port, std::initializer_list<int> values)
     port.sent.clear();
 }
 
+/* Its write sends the byte and returns 0, like some variants of SoftwareSerial. */
+class ZeroWriteSerial : public HardwareSerial {
+public:
+    size_t write(uint8_t value) override
+    {
+        HardwareSerial::write(value);
+        return 0;
+    }
+    size_t write(const uint8_t *bytes, size_t length) override
+    {
+        return length > 0 ? write(bytes[0]) : 0;
+    }
+};
+
 /* Sets the board to its state after a reset. */
 inline int reset_board(void **)
 {

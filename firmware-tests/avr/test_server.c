@@ -1,11 +1,11 @@
 /* Sketches with a server on simulated boards. A libmodbus client sends the requests. */
 #include "bus.h"
 #include "crc.h"
+#include "fails.h"
 #include "kind.h"
 #include "mbm.h"
 #include "test.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,14 +15,6 @@ static const kind *const kinds[] = {&uno, &minimal, &mega};
 /* t3.5 at 19200 baud in cycles, and a tick of the core's clock, by which a response may be
  * early. */
 enum { T35 = 32080, TICK = 64 };
-
-#define FAILS(error, call)                                                                         \
-    do {                                                                                           \
-        errno = 0;                                                                                 \
-        assert_int_equal(call, -1);                                                                \
-        assert_int_equal(errno, error);                                                            \
-    } while (0)
-#define EXCEPTION(code, call) FAILS(MODBUS_ENOBASE + (code), call)
 
 /* Expects an exception to a request that the client has no function for. */
 static void refuses(modbus_t *client, const uint8_t *request, size_t length, uint8_t exception)
