@@ -176,6 +176,26 @@ static void access_to_absent_data_gets_an_exception_on(const kind *k)
 }
 ON_ALL(access_to_absent_data_gets_an_exception)
 
+/* Sets coil 0 with a request to `unit`, which gets no response: the client waits for one,
+ * also after a broadcast. Returns the coil as unit 17 has it then. */
+static uint8_t coil_after_write_to(served *s, int unit)
+{
+    uint8_t on = 7;
+
+    modbus_set_response_timeout(s->line.client, 0, 200000);
+    modbus_set_slave(s->line.client, unit);
+    bus_go(&s->line);
+    FAILS(ETIMEDOUT, modbus_write_bit(s->line.client, 0, 1));
+    bus_halt(&s->line);
+    bus_settle(&s->line);
+    bus_go(&s->line);
+    modbus_set_response_timeout(s->line.client, 20, 0);
+    modbus_set_slave(s->line.client, 17);
+    assert_int_equal(modbus_read_bits(s->line.client, 0, 1, &on), 1);
+    bus_halt(&s->line);
+    return on;
+}
+
 static void other_units_and_damaged_frames_get_no_response_on(const kind *k)
 {
     static const uint8_t broadcast_read[] = {0, 1, 0, 0, 0, 1};
@@ -183,7 +203,6 @@ static void other_units_and_damaged_frames_get_no_response_on(const kind *k)
     size_t length = seal(frame, 6);
     served *s = example(k);
     unsigned i;
-    uint8_t on;
 
     for (i = 0; i < 8 * length; i += 5) {
         frame[i / 8] ^= (uint8_t)(1 << i % 8);
@@ -202,18 +221,7 @@ static void other_units_and_damaged_frames_get_no_response_on(const kind *k)
     assert_int_equal(relay(s), 0);
     assert_int_equal(s->rose, 0);
 
-    modbus_set_response_timeout(s->line.client, 0, 200000);
-    modbus_set_slave(s->line.client, 18);
-    bus_go(&s->line);
-    FAILS(ETIMEDOUT, modbus_write_bit(s->line.client, 0, 1));
-    bus_halt(&s->line);
-    bus_settle(&s->line);
-    bus_go(&s->line);
-    modbus_set_response_timeout(s->line.client, 20, 0);
-    modbus_set_slave(s->line.client, 17);
-    assert_int_equal(modbus_read_bits(s->line.client, 0, 1, &on), 1);
-    bus_halt(&s->line);
-    assert_int_equal(on, 0);
+    assert_int_equal(coil_after_write_to(s, 18), 0);
     assert_int_equal(s->responses, 1);
     done(s);
 }
@@ -222,21 +230,8 @@ ON_ALL(other_units_and_damaged_frames_get_no_response)
 static void a_broadcast_switches_the_relay_without_a_response_on(const kind *k)
 {
     served *s = example(k);
-    uint8_t on = 0;
 
-    modbus_set_response_timeout(s->line.client, 0, 200000);
-    modbus_set_slave(s->line.client, MODBUS_BROADCAST_ADDRESS);
-    bus_go(&s->line);
-    /* The client waits for a response nevertheless. */
-    FAILS(ETIMEDOUT, modbus_write_bit(s->line.client, 0, 1));
-    bus_halt(&s->line);
-    bus_settle(&s->line);
-    bus_go(&s->line);
-    modbus_set_response_timeout(s->line.client, 20, 0);
-    modbus_set_slave(s->line.client, 17);
-    assert_int_equal(modbus_read_bits(s->line.client, 0, 1, &on), 1);
-    bus_halt(&s->line);
-    assert_int_equal(on, 1);
+    assert_int_equal(coil_after_write_to(s, MODBUS_BROADCAST_ADDRESS), 1);
     assert_int_equal(relay(s), 1);
     assert_int_equal(s->responses, 1);
     done(s);
