@@ -156,15 +156,21 @@ static void a_place_is_in_use_until_it_is_closed(void **state)
     assert_int_equal(mbm_tcp_isInUse(&place), 0);
 }
 
-static void a_listener_without_a_descriptor_lets_the_program_sleep(void **state)
+/* Accepts one connection. Two more wait, for which there is no descriptor. */
+static void accept_one_and_let_two_wait(void)
 {
-    (void)state;
-    SKIP_WITHOUT_LIMITS();
     connect_some(1);
     assert_int_equal(accept_one(), 0);
     connect_some(2);
     leave_no_descriptor();
     expect_none(EMFILE);
+}
+
+static void a_listener_without_a_descriptor_lets_the_program_sleep(void **state)
+{
+    (void)state;
+    SKIP_WITHOUT_LIMITS();
+    accept_one_and_let_two_wait();
     assert_int_equal(wait_for(1000), 0);
     /* The listener tries again by itself. The program still serves the connections that it
      * has. */
@@ -179,11 +185,7 @@ static void a_waiting_connection_is_accepted_once_a_descriptor_is_free(void **st
 {
     (void)state;
     SKIP_WITHOUT_LIMITS();
-    connect_some(1);
-    assert_int_equal(accept_one(), 0);
-    connect_some(2);
-    leave_no_descriptor();
-    expect_none(EMFILE);
+    accept_one_and_let_two_wait();
     mbm_tcp_close(&places[0]);
     assert_int_equal(accept_one(), 0);
     expect_none(EMFILE);
