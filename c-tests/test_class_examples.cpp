@@ -1,5 +1,5 @@
-/* The examples that use a network, as they are, on the shim's board: real sockets, and a
- * real libmodbus at the far end. */
+/* The unchanged examples that use a network, on a simulated board. Real sockets connect them
+ * to a real libmodbus. */
 #include "libmodbus_client.h"
 #include "wire.h"
 
@@ -13,7 +13,7 @@ extern "C" {
 #include "tcp_server.h"
 }
 
-/* A sketch is compiled without this warning. */
+/* Arduino cores do not enable this warning for sketches. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wconversion"
 namespace tcp_client {
@@ -40,11 +40,11 @@ static int real_time(void **state)
 {
     reset_board(state);
     pins() = Pins();
-    bench().realTime = true;
+    board().realTime = true;
     return 0;
 }
 
-static void the_tcp_client_reads_writes_and_connects_anew(void **)
+static void the_tcp_client_reads_writes_and_connects_again(void **)
 {
     tcp_server device;
     tcp_server_start(&device);
@@ -59,7 +59,7 @@ static void the_tcp_client_reads_writes_and_connects_anew(void **)
     AWAIT((tcp_client::loop(), pins().level[13] == LOW));
     tcp_server_start(&device);
     networkPort(502) = device.port;
-    AWAIT((tcp_client::loop(), pins().level[13] == HIGH)); // within five seconds
+    AWAIT((tcp_client::loop(), pins().level[13] == HIGH)); // the sketch tries every five seconds
     tcp_client::client.stop();
     tcp_server_stop(&device);
 }
@@ -88,7 +88,7 @@ static void the_tcp_server_serves_a_sensor_and_a_relay(void **)
 static void the_gateway_passes_a_request_to_its_line(void **)
 {
     static uint16_t word;
-    bench().realTime = false; // that of the shim's UART
+    board().realTime = false; // the simulated UART has a clock of its own
     gateway_sketch::setup();
     assert_int_equal(Serial.baud, 19200);
     Serial.reply(adu({17, 3, 2, 2, 43}));
@@ -99,10 +99,10 @@ static void the_gateway_passes_a_request_to_its_line(void **)
                           }),
                      555);
     assert_sent(Serial, {17, 3, 0, 107, 0, 1});
-    assert_int_equal(pins().level[4], LOW); // the driver is off again
+    assert_int_equal(pins().level[4], LOW); // the driver is off
     assert_int_equal(gets(gateway_sketch::loop,
                           [](modbus_t *peer) {
-                              modbus_set_slave(peer, 32); // not of this line
+                              modbus_set_slave(peer, 32); // not one of the gateway's units
                               return modbus_read_registers(peer, 107, 1, &word) == 1 ? 0 : errno;
                           }),
                      EMBXGPATH);
@@ -114,7 +114,7 @@ static void the_gateway_passes_a_request_to_its_line(void **)
 int main()
 {
     const struct CMUnitTest tests[] = {
-        REAL(the_tcp_client_reads_writes_and_connects_anew),
+        REAL(the_tcp_client_reads_writes_and_connects_again),
         REAL(the_tcp_server_serves_a_sensor_and_a_relay),
         REAL(the_gateway_passes_a_request_to_its_line),
     };

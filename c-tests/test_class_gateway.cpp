@@ -1,5 +1,5 @@
-/* The class of a gateway: a real libmodbus TCP client on one side, a real libmodbus RTU
- * server at the far end of a pty on the other. */
+/* ModbusTcpGateway between a real libmodbus TCP client and a real libmodbus RTU server on a
+ * pty. */
 #include "libmodbus_client.h"
 #include "pty_stream.h"
 #include "wire.h"
@@ -20,7 +20,7 @@ static ModbusTcpGateway<WiFiServer> *gateway;
 static int start(void **state)
 {
     reset_board(state);
-    bench().realTime = true;
+    board().realTime = true;
     server_start(&device, 17);
     tty.fd = device.line.ours;
     wifi = new WiFiServer(502);
@@ -74,7 +74,7 @@ static int error_of_a_read(modbus_t *peer)
     return modbus_read_registers(peer, 3, 1, words) == 1 ? 0 : errno;
 }
 
-static void requests_and_replies_of_any_length_pass(void **)
+static void requests_and_replies_of_any_length_are_forwarded(void **)
 {
     modbus_t *peer = client_of(17);
     assert_int_equal(passes(peer, read_registers), 125);
@@ -99,7 +99,7 @@ static void requests_and_replies_of_any_length_pass(void **)
     hang_up(peer);
 }
 
-static void the_exception_of_a_device_passes(void **)
+static void the_exception_of_a_device_is_forwarded(void **)
 {
     modbus_t *peer = client_of(17);
     assert_int_equal(passes(peer,
@@ -111,7 +111,7 @@ static void the_exception_of_a_device_passes(void **)
     hang_up(peer);
 }
 
-static void a_unit_without_a_line_is_0a_and_a_silent_one_0b(void **)
+static void a_unit_without_a_line_gets_0a_and_a_silent_unit_0b(void **)
 {
     modbus_t *peer = client_of(19);
     assert_int_equal(passes(peer, error_of_a_read), EMBXGPATH);
@@ -143,14 +143,14 @@ static void clients_and_the_sketch_share_the_line(void **)
     AWAIT((gateway->poll(), gateway->connections() == 0));
 }
 
-static void a_client_that_goes_takes_its_request_along(void **)
+static void closing_a_connection_cancels_its_request(void **)
 {
     const uint8_t request[] = {0, 1, 0, 0, 0, 6, 18, 3, 0, 3, 0, 1};
     WiFiClient hasty;
     assert_int_equal(hasty.connect("gateway", 502), 1);
     hasty.write(request, sizeof request);
-    AWAIT((gateway->poll(), line->pending() == 1)); // of unit 18, which does not exist
-    // While a device is waited for, its client is not read: begin closes all.
+    AWAIT((gateway->poll(), line->pending() == 1)); // unit 18 does not exist
+    // The gateway does not read a client whose request is pending. begin closes all of them.
     assert_int_equal(gateway->begin(*wifi, *line), MBM_OK);
     assert_int_equal(line->pending(), 0);
     assert_int_equal(gateway->connections(), 0);
@@ -164,11 +164,11 @@ static void a_client_that_goes_takes_its_request_along(void **)
 int main()
 {
     const struct CMUnitTest tests[] = {
-        SERVED(requests_and_replies_of_any_length_pass),
-        SERVED(the_exception_of_a_device_passes),
-        SERVED(a_unit_without_a_line_is_0a_and_a_silent_one_0b),
+        SERVED(requests_and_replies_of_any_length_are_forwarded),
+        SERVED(the_exception_of_a_device_is_forwarded),
+        SERVED(a_unit_without_a_line_gets_0a_and_a_silent_unit_0b),
         SERVED(clients_and_the_sketch_share_the_line),
-        SERVED(a_client_that_goes_takes_its_request_along),
+        SERVED(closing_a_connection_cancels_its_request),
     };
 
     return cmocka_run_group_tests_name("class of a gateway", tests, nullptr, nullptr);

@@ -1,4 +1,4 @@
-/* The class against a real libmodbus server, at the far end of a pty. */
+/* ModbusMaster with a real libmodbus server on a pty. */
 #include "pty_stream.h"
 #include "wire.h"
 
@@ -15,7 +15,7 @@ static ModbusMaster node;
 
 static int start(void **)
 {
-    bench().realTime = true;
+    board().realTime = true;
     server_start(&peer, 17);
     line.fd = peer.line.ours;
     node = ModbusMaster();
@@ -78,7 +78,7 @@ static void writes_reach_the_servers_memory(void **)
     assert_int_equal(node.getResponseBuffer(0), 0x7777);
 }
 
-static void an_exception_of_the_server_is_handed_on(void **)
+static void an_exception_of_the_server_is_returned(void **)
 {
     assert_int_equal(node.readHoldingRegisters(SERVER_REGISTERS, 1),
                      ModbusMaster::ku8MBIllegalDataAddress);
@@ -101,7 +101,7 @@ int main()
     const struct CMUnitTest tests[] = {
         SERVED(reads_what_the_server_holds),
         SERVED(writes_reach_the_servers_memory),
-        SERVED(an_exception_of_the_server_is_handed_on),
+        SERVED(an_exception_of_the_server_is_returned),
         SERVED(copies_take_turns_on_one_line),
     };
 

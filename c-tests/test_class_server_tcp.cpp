@@ -1,5 +1,5 @@
-/* The class of a TCP server, over the shim's Ethernet and WiFi libraries, asked by real
- * libmodbus clients from threads of their own. */
+/* ModbusTcpServer over the shim's Ethernet and WiFi libraries. Its clients are real libmodbus
+ * clients in threads of their own. */
 #include "libmodbus_client.h"
 #include "wire.h"
 
@@ -7,11 +7,11 @@
 #include <ESP8266WiFi.h>
 #include <Ethernet.h>
 
-/* A library from before accept: available hands over any connection with bytes. */
+/* An older library, without accept: available returns any connection with bytes. */
 class OlderServer : public SocketServer {
 public:
     explicit OlderServer(uint16_t port) : SocketServer(port) {}
-    EthernetClient available() { return speaking(known); }
+    EthernetClient available() { return withBytes(known); }
 
 private:
     std::vector<EthernetClient> known;
@@ -27,7 +27,7 @@ static int serves(Server &server, modbus_t *peer, int (*call)(modbus_t *))
 static int real_time(void **state)
 {
     reset_board(state);
-    bench().realTime = true;
+    board().realTime = true;
     return 0;
 }
 
@@ -129,7 +129,7 @@ static void four_clients_are_served_at_once(void **)
     four_at_once<OlderServer>();
 }
 
-static void a_client_without_a_place_is_hung_up_on(void **)
+static void a_connection_without_a_free_place_is_closed(void **)
 {
     EthernetServer listener(502);
     ModbusTcpServer<EthernetServer, 1> server;
@@ -146,13 +146,13 @@ static void a_client_without_a_place_is_hung_up_on(void **)
     close_client(second);
     close_client(first);
     AWAIT((server.poll(), server.connections() == 0));
-    // The place is free again.
+    // The place of the closed connection is free.
     modbus_t *third = connect_client(502);
     assert_int_equal(serves(server, third, read_first), 5);
     close_client(third);
 }
 
-static void the_connection_that_was_idle_for_longest_gives_its_place_up(void **)
+static void the_connection_that_was_idle_for_longest_is_closed_for_a_new_one(void **)
 {
     EthernetServer listener(502);
     ModbusTcpServer<EthernetServer, 2> server;
@@ -160,14 +160,14 @@ static void the_connection_that_was_idle_for_longest_gives_its_place_up(void **)
     listener.begin();
     server.holdingRegisters(holding);
     server.begin(1, listener);
-    bench().realTime = false; // a clock of the test's own
-    bench().tick = 0;
+    board().realTime = false; // the test sets the clock
+    board().tick = 0;
     modbus_t *busy = connect_client(502), *idle = connect_client(502);
     assert_int_equal(serves(server, busy, read_first), 0);
     assert_int_equal(serves(server, idle, read_first), 0);
-    bench().now += 40000000u;
+    board().now += 40000000u;
     assert_int_equal(serves(server, busy, read_first), 0);
-    bench().now += 25000000u; // 65 s after `idle`, 25 s after `busy`
+    board().now += 25000000u; // 65 s after `idle`, 25 s after `busy`
     modbus_t *newcomer = connect_client(502);
     assert_int_equal(serves(server, newcomer, read_first), 0);
     assert_int_equal(server.connections(), 2);
@@ -178,7 +178,7 @@ static void the_connection_that_was_idle_for_longest_gives_its_place_up(void **)
     close_client(newcomer);
 }
 
-static void what_is_not_modbus_is_hung_up_on(void **)
+static void a_connection_with_bytes_that_are_no_modbus_is_closed(void **)
 {
     EthernetServer listener(502);
     ModbusTcpServer<EthernetServer> server;
@@ -235,7 +235,7 @@ static void a_hook_cannot_poll_or_begin_its_server(void **)
         serves(server, peer, [](modbus_t *p) { return modbus_write_register(p, 0, 8); }), 1);
     assert_int_equal(holding[0], 8);
     assert_int_equal(server.getUnitID(), 1);
-    // Beginning again closes what there is.
+    // begin closes the connections.
     assert_int_equal(server.begin(3, listener), MBM_OK);
     assert_int_equal(server.connections(), 0);
     assert_int_equal(serves(server, peer, read_first), -1);
@@ -250,9 +250,9 @@ static void a_connection_that_takes_few_bytes_gets_the_whole_response(void **)
         explicit NarrowServer(uint16_t port) : SocketServer(port) {}
         EthernetClient accept()
         {
-            int fd = take();
+            int fd = acceptFd();
             EthernetClient link = fd >= 0 ? EthernetClient(fd) : EthernetClient();
-            link.room = few;
+            link.writeSpace = few;
             return link;
         }
         EthernetClient available() { return accept(); }
@@ -281,9 +281,9 @@ int main()
         REAL(libmodbus_reads_and_writes_over_wifi),
         REAL(a_library_without_accept_serves_too),
         REAL(four_clients_are_served_at_once),
-        REAL(a_client_without_a_place_is_hung_up_on),
-        REAL(the_connection_that_was_idle_for_longest_gives_its_place_up),
-        REAL(what_is_not_modbus_is_hung_up_on),
+        REAL(a_connection_without_a_free_place_is_closed),
+        REAL(the_connection_that_was_idle_for_longest_is_closed_for_a_new_one),
+        REAL(a_connection_with_bytes_that_are_no_modbus_is_closed),
         REAL(requests_reach_the_unit_they_address),
         REAL(a_hook_cannot_poll_or_begin_its_server),
         REAL(a_connection_that_takes_few_bytes_gets_the_whole_response),

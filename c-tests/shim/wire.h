@@ -1,4 +1,4 @@
-/* What the tests of the class share: frames, the bytes that were sent, a fresh board. */
+/* What the tests of the sketch classes share: frames, checks of sent bytes, the setup. */
 #ifndef WIRE_H
 #define WIRE_H
 
@@ -30,7 +30,7 @@ inline Bytes sealed(Bytes bytes)
     return bytes;
 }
 
-/* A frame of these values and their CRC. */
+/* Returns a frame: these bytes and their CRC. */
 inline Bytes adu(std::initializer_list<int> values)
 {
     return sealed(raw(values));
@@ -56,7 +56,7 @@ inline void assert_sent(HardwareSerial &port, std::initializer_list<int> values)
     port.sent.clear();
 }
 
-/* Its write sends the byte and returns 0, like some variants of SoftwareSerial. */
+/* A UART whose write returns 0 for a byte that it sends, like some variants of SoftwareSerial. */
 class ZeroWriteSerial : public HardwareSerial {
 public:
     size_t write(uint8_t value) override
@@ -73,7 +73,7 @@ public:
 /* Sets the board to its state after a reset. */
 inline int reset_board(void **)
 {
-    bench() = Bench();
+    board() = Board();
     pins() = Pins();
     for (unsigned i = 0; i < 4; i++)
         shimSerial(i).reset();
