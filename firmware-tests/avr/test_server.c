@@ -54,11 +54,11 @@ static void response_seen(void *context, const wire *w, size_t length)
 
     s->responses++;
     s->wrong += s->level != 0;
-    s->wrong += s->rose >= w->first_started || s->rose <= w->heard;
+    s->wrong += s->rose >= w->first_started || s->rose <= w->received;
     s->wrong += s->fell < last_bit || s->fell < w->first_started + length * 10 * w->bit;
     /* Off within a character, before a client could send again. */
     s->wrong += s->fell - last_bit > 10 * w->bit;
-    s->wrong += w->first_started - w->heard < T35 - TICK;
+    s->wrong += w->first_started - w->received < T35 - TICK;
 }
 
 /* Starts the example and lets it set up. */
