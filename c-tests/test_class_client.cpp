@@ -1,5 +1,5 @@
-/* The class of a client on a serial line: what a sketch is promised, on the shim's board. */
-#include "asking.h"
+/* ModbusSerialClient on a simulated board: what its documentation promises. */
+#include "client_checks.h"
 
 static void a_reply_ends_in_the_words_of_its_request(void **)
 {
@@ -10,8 +10,8 @@ static void a_reply_ends_in_the_words_of_its_request(void **)
     assert_int_equal(client.poll(), MBM_NOT_INITIALISED);
     assert_int_equal(client.begin(Serial, 19200), MBM_OK);
     assert_int_equal(client.poll(), MBM_OK);
-    exchanges(client, client.readHoldingRegisters(request, 107, 3), {17, 3, 0, 107, 0, 3},
-              {17, 3, 6, 2, 43, 0, 0, 0, 100});
+    expect_exchange(client, client.readHoldingRegisters(request, 107, 3), {17, 3, 0, 107, 0, 3},
+                    {17, 3, 6, 2, 43, 0, 0, 0, 100});
     assert_int_equal(request.status(), MBM_OK);
     assert_int_equal(request.length(), 6);
     assert_int_equal(request[0], 555);
@@ -27,7 +27,8 @@ static void an_exception_leaves_the_words(void **)
     ModbusRequestOf<1> request(17);
     client.begin(Serial, 19200);
     request[0] = 0x5555;
-    exchanges(client, client.readInputRegisters(request, 8, 1), {17, 4, 0, 8, 0, 1}, {17, 0x84, 2});
+    expect_exchange(client, client.readInputRegisters(request, 8, 1), {17, 4, 0, 8, 0, 1},
+                    {17, 0x84, 2});
     assert_int_equal(request.status(), MBM_ILLEGAL_DATA_ADDRESS);
     assert_int_equal(request.getExceptionCode(), 2);
     assert_int_equal(request[0], 0x5555);
@@ -50,26 +51,26 @@ static void a_function_or_a_lambda_is_called_when_a_request_has_ended(void **)
     client.begin(Serial, 19200);
     calls = 0;
     request.onDone(count_call);
-    exchanges(client, client.readHoldingRegisters(request, 0, 1), {17, 3, 0, 0, 0, 1},
-              {17, 3, 2, 0, 7});
+    expect_exchange(client, client.readHoldingRegisters(request, 0, 1), {17, 3, 0, 0, 0, 1},
+                    {17, 3, 2, 0, 7});
     assert_int_equal(calls, 1);
     request.onDone([&seen, &times](ModbusRequest &reply) {
         seen = reply[0];
         times++;
     });
-    exchanges(client, client.readHoldingRegisters(request, 0, 1), {17, 3, 0, 0, 0, 1},
-              {17, 3, 2, 0, 9});
+    expect_exchange(client, client.readHoldingRegisters(request, 0, 1), {17, 3, 0, 0, 0, 1},
+                    {17, 3, 2, 0, 9});
     assert_int_equal(seen, 9);
     assert_int_equal(times, 1);
     request.onDone(nullptr);
-    exchanges(client, client.readHoldingRegisters(request, 0, 1), {17, 3, 0, 0, 0, 1},
-              {17, 3, 2, 0, 11});
+    expect_exchange(client, client.readHoldingRegisters(request, 0, 1), {17, 3, 0, 0, 0, 1},
+                    {17, 3, 2, 0, 11});
     assert_int_equal(seen, 9);
     assert_int_equal(calls, 1);
     assert_int_equal(request[0], 11);
 }
 
-static void a_callback_may_take_another_in_its_place_and_ask_again(void **)
+static void a_callback_may_replace_itself_and_send_a_request(void **)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
@@ -77,7 +78,7 @@ static void a_callback_may_take_another_in_its_place_and_ask_again(void **)
     client.begin(Serial, 19200);
     request.onDone([&](ModbusRequest &first) {
         first.onDone([&order, &times](ModbusRequest &) { order = order * 10 + 2, times++; });
-        order = order * 10 + 1; // its captures are still there
+        order = order * 10 + 1; // the captures of this callback still exist
         times++;
         assert_int_equal(client.readHoldingRegisters(first, 1, 1), MBM_PENDING);
         assert_int_equal(client.poll(), MBM_BUSY);
@@ -87,14 +88,14 @@ static void a_callback_may_take_another_in_its_place_and_ask_again(void **)
     Serial.reply(adu({17, 3, 2, 0, 1}));
     Serial.reply(adu({17, 3, 2, 0, 2}));
     assert_int_equal(client.readHoldingRegisters(request, 0, 1), MBM_PENDING);
-    ends(client);
+    run_until_idle(client);
     assert_int_equal(order, 12);
     assert_int_equal(times, 2);
     assert_int_equal(request[0], 2);
     assert_int_equal(Serial.sent.size(), 2);
 }
 
-static void units_are_asked_in_turn(void **)
+static void requests_are_sent_in_their_order(void **)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> first(1), second(2), third(3);
@@ -105,7 +106,7 @@ static void units_are_asked_in_turn(void **)
     client.readHoldingRegisters(second, 5, 1);
     client.readHoldingRegisters(third, 5, 1);
     assert_int_equal(client.pending(), 3);
-    ends(client);
+    run_until_idle(client);
     assert_int_equal(first[0], 11);
     assert_int_equal(second[0], 22);
     assert_int_equal(third[0], 33);
@@ -124,15 +125,15 @@ static void a_pending_request_is_refused_and_unchanged(void **)
     assert_int_equal(client.begin(Serial), MBM_BUSY);
     assert_true(request.pending());
     Serial.reply(adu({17, 3, 2, 0, 1}));
-    ends(client);
+    run_until_idle(client);
     assert_sent(Serial, {17, 3, 0, 5, 0, 1});
     assert_int_equal(request.status(), MBM_OK);
     assert_int_equal(request.setUnitID(4), MBM_OK);
-    exchanges(client, client.readHoldingRegisters(request, 5, 1), {4, 3, 0, 5, 0, 1},
-              {4, 3, 2, 0, 2});
+    expect_exchange(client, client.readHoldingRegisters(request, 5, 1), {4, 3, 0, 5, 0, 1},
+                    {4, 3, 2, 0, 2});
 }
 
-static void more_than_the_words_hold_is_refused(void **)
+static void a_request_that_needs_more_words_than_it_has_is_refused(void **)
 {
     ModbusSerialClient client;
     ModbusRequestOf<2> request(17);
@@ -155,12 +156,12 @@ static void more_than_the_words_hold_is_refused(void **)
     assert_int_equal(client.writeMultipleRegisters(bare, 0, 1), small);
     assert_int_equal(client.writeMultipleRegisters(bare, 0, 65535), small);
     assert_int_equal(client.pending(), 0);
-    // As much as they hold is sent.
+    // A request that fits into its words is sent.
     request.setBit(31, true);
-    exchanges(client, client.writeMultipleCoils(request, 0, 32),
-              {17, 15, 0, 0, 0, 32, 4, 0, 0, 0, 0x80}, {17, 15, 0, 0, 0, 32});
-    exchanges(client, client.writeSingleRegister(bare, 3, 0x1234), {17, 6, 0, 3, 0x12, 0x34},
-              {17, 6, 0, 3, 0x12, 0x34});
+    expect_exchange(client, client.writeMultipleCoils(request, 0, 32),
+                    {17, 15, 0, 0, 0, 32, 4, 0, 0, 0, 0x80}, {17, 15, 0, 0, 0, 32});
+    expect_exchange(client, client.writeSingleRegister(bare, 3, 0x1234), {17, 6, 0, 3, 0x12, 0x34},
+                    {17, 6, 0, 3, 0x12, 0x34});
 }
 
 static void a_request_is_repeated_as_often_as_set(void **)
@@ -172,11 +173,11 @@ static void a_request_is_repeated_as_often_as_set(void **)
     client.setRetries(2);
     assert_int_equal(client.setBackoff(MBM_BACKOFF_FIXED, 20, 20), MBM_OK);
     assert_int_equal(client.readHoldingRegisters(request, 0, 1), MBM_PENDING);
-    ends(client);
+    run_until_idle(client);
     assert_int_equal(Serial.sent.size(), 3);
     assert_int_equal(request.status(), MBM_RESPONSE_TIMED_OUT);
     Serial.sent.clear();
-    Serial.reply(raw({17, 3, 2, 0, 1, 0, 0})); // damaged
+    Serial.reply(raw({17, 3, 2, 0, 1, 0, 0})); // a wrong CRC
     Serial.reply(adu({17, 3, 2, 0, 5}));
     assert_int_equal(client.wait((client.readHoldingRegisters(request, 0, 1), request)), MBM_OK);
     assert_int_equal(Serial.sent.size(), 2);
@@ -192,11 +193,11 @@ static void poll_returns_before_the_reply_comes(void **)
     client.readHoldingRegisters(request, 0, 1);
     unsigned polls = 0;
     while (request.pending()) {
-        uint32_t before = bench().now;
+        uint32_t before = board().now;
         client.poll();
         polls++;
-        // The Stream's flush waits for the eight bytes to leave; nothing else waits.
-        assert_true(bench().now - before < 8 * Serial.character + 50 * bench().tick);
+        // Only flush waits, for the eight bytes of the request.
+        assert_true(board().now - before < 8 * Serial.character + 50 * board().tick);
     }
     assert_true(polls > 1000);
 }
@@ -209,10 +210,10 @@ static void wait_returns_how_a_request_ended(void **)
     other.begin(Serial1, 19200);
     Serial.reply(adu({17, 3, 2, 0, 5}));
     client.readHoldingRegisters(request, 0, 1);
-    unsigned yields = bench().yields;
+    unsigned yields = board().yields;
     assert_int_equal(client.wait(request), MBM_OK);
-    assert_true(bench().yields > yields);
-    assert_int_equal(client.wait(request), MBM_OK); // at once
+    assert_true(board().yields > yields);
+    assert_int_equal(client.wait(request), MBM_OK); // returns at once
     client.readHoldingRegisters(request, 0, 0);
     assert_int_equal(client.wait(request), MBM_ILLEGAL_DATA_VALUE);
     other.readHoldingRegisters(foreign, 0, 1);
@@ -227,37 +228,37 @@ static void the_driver_is_on_while_a_request_leaves(void **)
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
     client.begin(Serial, 19200);
-    client.preTransmission([] { bench().note("on"); });
-    client.postTransmission([](void *what) { bench().note(static_cast<const char *>(what)); },
+    client.preTransmission([] { board().logEvent("on"); });
+    client.postTransmission([](void *what) { board().logEvent(static_cast<const char *>(what)); },
                             const_cast<char *>("off"));
     client.readHoldingRegisters(request, 0, 1);
     Serial.reply(adu({17, 3, 2, 0, 5}));
-    bench().log.clear();
-    ends(client);
-    assert_string_equal(bench().log.c_str(), "on write flush off read ");
+    board().log.clear();
+    run_until_idle(client);
+    assert_string_equal(board().log.c_str(), "on write flush off read ");
 }
 
-static ModbusSerialClient *hooked;
-static ModbusRequest *asked;
+static ModbusSerialClient *called_client;
+static ModbusRequest *other_request;
 
 static void a_driver_callback_can_call_nothing(void **)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17), another(18);
     client.begin(Serial, 19200);
-    hooked = &client;
-    asked = &another;
+    called_client = &client;
+    other_request = &another;
     client.preTransmission([] {
-        assert_int_equal(hooked->begin(Serial), MBM_BUSY);
-        assert_int_equal(hooked->poll(), MBM_BUSY);
-        assert_int_equal(hooked->readCoils(*asked, 0, 1), MBM_BUSY);
+        assert_int_equal(called_client->begin(Serial), MBM_BUSY);
+        assert_int_equal(called_client->poll(), MBM_BUSY);
+        assert_int_equal(called_client->readCoils(*other_request, 0, 1), MBM_BUSY);
     });
-    exchanges(client, client.readHoldingRegisters(request, 0, 1), {17, 3, 0, 0, 0, 1},
-              {17, 3, 2, 0, 5});
+    expect_exchange(client, client.readHoldingRegisters(request, 0, 1), {17, 3, 0, 0, 0, 1},
+                    {17, 3, 2, 0, 5});
     assert_int_equal(another.status(), MBM_OK);
 }
 
-static void begin_makes_a_client_anew(void **)
+static void begin_resets_the_settings_of_a_client(void **)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
@@ -267,9 +268,9 @@ static void begin_makes_a_client_anew(void **)
     assert_int_equal(client.begin(Serial1, 19200), MBM_OK);
     client.setResponseTimeout(20);
     client.readHoldingRegisters(request, 0, 1);
-    ends(client);
+    run_until_idle(client);
     assert_int_equal(Serial.sent.size(), 0);
-    assert_int_equal(Serial1.sent.size(), 1); // without retries
+    assert_int_equal(Serial1.sent.size(), 1); // no retry
 }
 
 static void ascii_frames_go_both_ways(void **)
@@ -280,7 +281,7 @@ static void ascii_frames_go_both_ways(void **)
     const char reply[] = ":110302022BBD\r\n", expected[] = ":1103006B000180\r\n";
     Serial.reply(Bytes(reply, reply + sizeof reply - 1));
     assert_int_equal(client.readHoldingRegisters(request, 107, 1), MBM_PENDING);
-    ends(client);
+    run_until_idle(client);
     assert_int_equal(Serial.sent.size(), 1);
     assert_bytes(Serial.sent[0], Bytes(expected, expected + sizeof expected - 1));
     assert_int_equal(request.status(), MBM_OK);
@@ -288,7 +289,7 @@ static void ascii_frames_go_both_ways(void **)
     assert_int_equal(client.setDelimiter('!'), MBM_OK);
 }
 
-static void a_broadcast_is_not_answered(void **)
+static void a_broadcast_ends_without_a_response(void **)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> all(0);
@@ -296,8 +297,8 @@ static void a_broadcast_is_not_answered(void **)
     client.setTurnaroundDelay(30);
     assert_int_equal(client.readCoils(all, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
     assert_int_equal(client.writeSingleCoil(all, 1, true), MBM_PENDING);
-    ends(client);
-    assert_in_range(bench().now - Serial.sentAt, 30000, 31000);
+    run_until_idle(client);
+    assert_in_range(board().now - Serial.sentAt, 30000, 31000);
     assert_sent(Serial, {0, 5, 0, 1, 0xFF, 0});
     assert_int_equal(all.status(), MBM_OK);
 }
@@ -320,7 +321,7 @@ static void a_seventeenth_request_finds_the_queue_full(void **)
     assert_int_equal(client.pending(), 0);
 }
 
-static void units_are_counted_and_left_alone_for_as_long_as_set(void **)
+static void a_units_record_counts_its_requests_and_delays_the_next(void **)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> first(1), second(1);
@@ -333,10 +334,10 @@ static void units_are_counted_and_left_alone_for_as_long_as_set(void **)
     assert_int_equal(client.setCounters(&counters), MBM_OK);
     Serial.reply(adu({1, 3, 2, 0, 1}));
     Serial.reply(adu({1, 0x83, 2}));
-    uint32_t begun = bench().now;
+    uint32_t begun = board().now;
     client.readHoldingRegisters(first, 0, 1);
     client.readHoldingRegisters(second, 0, 1);
-    ends(client);
+    run_until_idle(client);
     assert_true(Serial.startedAt - begun > 50000);
     assert_int_equal(units[0].requests, 2);
     assert_int_equal(units[0].replies, 2);
@@ -346,29 +347,15 @@ static void units_are_counted_and_left_alone_for_as_long_as_set(void **)
     assert_int_equal(counters.exceptions, 1);
 }
 
-/* As some variants of SoftwareSerial. */
-class Silent : public HardwareSerial {
-public:
-    size_t write(uint8_t value) override
-    {
-        HardwareSerial::write(value);
-        return 0;
-    }
-    size_t write(const uint8_t *bytes, size_t length) override
-    {
-        return length > 0 ? write(bytes[0]) : 0;
-    }
-};
-
 static void a_stream_that_returns_0_for_what_it_sends_works(void **)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
-    Silent port;
+    ZeroWriteSerial port;
     client.begin(port, 19200);
     port.reply(adu({17, 3, 2, 0, 5}));
     client.readHoldingRegisters(request, 0, 1);
-    ends(client);
+    run_until_idle(client);
     assert_sent(port, {17, 3, 0, 0, 0, 1});
     assert_int_equal(request.status(), MBM_OK);
 }
@@ -393,20 +380,20 @@ int main()
         TEST(a_reply_ends_in_the_words_of_its_request),
         TEST(an_exception_leaves_the_words),
         TEST(a_function_or_a_lambda_is_called_when_a_request_has_ended),
-        TEST(a_callback_may_take_another_in_its_place_and_ask_again),
-        TEST(units_are_asked_in_turn),
+        TEST(a_callback_may_replace_itself_and_send_a_request),
+        TEST(requests_are_sent_in_their_order),
         TEST(a_pending_request_is_refused_and_unchanged),
-        TEST(more_than_the_words_hold_is_refused),
+        TEST(a_request_that_needs_more_words_than_it_has_is_refused),
         TEST(a_request_is_repeated_as_often_as_set),
         TEST(poll_returns_before_the_reply_comes),
         TEST(wait_returns_how_a_request_ended),
         TEST(the_driver_is_on_while_a_request_leaves),
         TEST(a_driver_callback_can_call_nothing),
-        TEST(begin_makes_a_client_anew),
+        TEST(begin_resets_the_settings_of_a_client),
         TEST(ascii_frames_go_both_ways),
-        TEST(a_broadcast_is_not_answered),
+        TEST(a_broadcast_ends_without_a_response),
         TEST(a_seventeenth_request_finds_the_queue_full),
-        TEST(units_are_counted_and_left_alone_for_as_long_as_set),
+        TEST(a_units_record_counts_its_requests_and_delays_the_next),
         TEST(a_stream_that_returns_0_for_what_it_sends_works),
         TEST(a_sketch_may_sleep_until_the_next_poll_is_due),
     };

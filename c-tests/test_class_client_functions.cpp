@@ -1,6 +1,6 @@
-/* The class of a client: the frame and the reply of every function, by the examples of
- * the standard where it has them, and the values in a request's words. */
-#include "asking.h"
+/* ModbusSerialClient: the request and the reply of every function, and the values in a
+ * request's words. The frames are the examples of the standard where it has one. */
+#include "client_checks.h"
 
 #include <math.h>
 #include <string.h>
@@ -17,25 +17,25 @@ static void bits_are_read_and_written(void **)
     ModbusSerialClient client;
     ModbusRequestOf<4> request(17);
     client.begin(Serial, 19200);
-    exchanges(client, client.readCoils(request, 0x13, 0x13), {17, 1, 0, 0x13, 0, 0x13},
-              {17, 1, 3, 0xCD, 0x6B, 5});
+    expect_exchange(client, client.readCoils(request, 0x13, 0x13), {17, 1, 0, 0x13, 0, 0x13},
+                    {17, 1, 3, 0xCD, 0x6B, 5});
     assert_true(request.getBit(0) && !request.getBit(1) && request.getBit(2));
     assert_true(request.getBit(18) && !request.getBit(17));
     assert_int_equal(request.getByte(1), 0x6B);
-    exchanges(client, client.readDiscreteInputs(request, 0xC4, 0x16), {17, 2, 0, 0xC4, 0, 0x16},
-              {17, 2, 3, 0xAC, 0xDB, 0x35});
+    expect_exchange(client, client.readDiscreteInputs(request, 0xC4, 0x16),
+                    {17, 2, 0, 0xC4, 0, 0x16}, {17, 2, 3, 0xAC, 0xDB, 0x35});
     assert_true(!request.getBit(0) && request.getBit(2) && request.getBit(21));
-    exchanges(client, client.writeSingleCoil(request, 0xAC, true), {17, 5, 0, 0xAC, 0xFF, 0},
-              {17, 5, 0, 0xAC, 0xFF, 0});
-    exchanges(client, client.writeSingleCoil(request, 0xAC, false), {17, 5, 0, 0xAC, 0, 0},
-              {17, 5, 0, 0xAC, 0, 0});
+    expect_exchange(client, client.writeSingleCoil(request, 0xAC, true), {17, 5, 0, 0xAC, 0xFF, 0},
+                    {17, 5, 0, 0xAC, 0xFF, 0});
+    expect_exchange(client, client.writeSingleCoil(request, 0xAC, false), {17, 5, 0, 0xAC, 0, 0},
+                    {17, 5, 0, 0xAC, 0, 0});
     const bool coils[] = {1, 0, 1, 1, 0, 0, 1, 1, 1, 0};
     for (uint16_t i = 0; i < 10; i++)
         assert_int_equal(request.setBit(i, coils[i]), MBM_OK);
     for (uint16_t i = 10; i < 16; i++)
         request.setBit(i, false);
-    exchanges(client, client.writeMultipleCoils(request, 0x13, 10),
-              {17, 15, 0, 0x13, 0, 10, 2, 0xCD, 1}, {17, 15, 0, 0x13, 0, 10});
+    expect_exchange(client, client.writeMultipleCoils(request, 0x13, 10),
+                    {17, 15, 0, 0x13, 0, 10, 2, 0xCD, 1}, {17, 15, 0, 0x13, 0, 10});
     assert_int_equal(request.status(), MBM_OK);
 }
 
@@ -44,52 +44,53 @@ static void registers_are_read_and_written(void **)
     ModbusSerialClient client;
     ModbusRequestOf<6> request(17);
     client.begin(Serial, 19200);
-    exchanges(client, client.readInputRegisters(request, 8, 1), {17, 4, 0, 8, 0, 1},
-              {17, 4, 2, 0, 10});
+    expect_exchange(client, client.readInputRegisters(request, 8, 1), {17, 4, 0, 8, 0, 1},
+                    {17, 4, 2, 0, 10});
     assert_int_equal(request[0], 10);
     words_of(request, {10, 0x0102});
-    exchanges(client, client.writeMultipleRegisters(request, 1, 2),
-              {17, 16, 0, 1, 0, 2, 4, 0, 10, 1, 2}, {17, 16, 0, 1, 0, 2});
-    exchanges(client, client.maskWriteRegister(request, 4, 0xF2, 0x25),
-              {17, 22, 0, 4, 0, 0xF2, 0, 0x25}, {17, 22, 0, 4, 0, 0xF2, 0, 0x25});
+    expect_exchange(client, client.writeMultipleRegisters(request, 1, 2),
+                    {17, 16, 0, 1, 0, 2, 4, 0, 10, 1, 2}, {17, 16, 0, 1, 0, 2});
+    expect_exchange(client, client.maskWriteRegister(request, 4, 0xF2, 0x25),
+                    {17, 22, 0, 4, 0, 0xF2, 0, 0x25}, {17, 22, 0, 4, 0, 0xF2, 0, 0x25});
     words_of(request, {0xFF, 0xFE, 0xFD});
-    exchanges(client, client.readWriteMultipleRegisters(request, 3, 6, 14, 3),
-              {17, 23, 0, 3, 0, 6, 0, 14, 0, 3, 6, 0, 0xFF, 0, 0xFE, 0, 0xFD},
-              {17, 23, 12, 0, 0xFE, 10, 0xCD, 0, 1, 0, 3, 0, 13, 0, 0xFF});
+    expect_exchange(client, client.readWriteMultipleRegisters(request, 3, 6, 14, 3),
+                    {17, 23, 0, 3, 0, 6, 0, 14, 0, 3, 6, 0, 0xFF, 0, 0xFE, 0, 0xFD},
+                    {17, 23, 12, 0, 0xFE, 10, 0xCD, 0, 1, 0, 3, 0, 13, 0, 0xFF});
     assert_int_equal(request.status(), MBM_OK);
     assert_int_equal(request[0], 0xFE);
     assert_int_equal(request[1], 0x0ACD);
     assert_int_equal(request[5], 0xFF);
-    exchanges(client, client.readFifoQueue(request, 0x04DE), {17, 24, 4, 0xDE},
-              {17, 24, 0, 6, 0, 2, 1, 0xB8, 0x12, 0x84});
+    expect_exchange(client, client.readFifoQueue(request, 0x04DE), {17, 24, 4, 0xDE},
+                    {17, 24, 0, 6, 0, 2, 1, 0xB8, 0x12, 0x84});
     assert_int_equal(request.length(), 4);
     assert_int_equal(request[0], 0x01B8);
     assert_int_equal(request[1], 0x1284);
 }
 
-static void the_functions_of_a_serial_line_are_asked(void **)
+static void the_functions_of_a_serial_line_are_sent(void **)
 {
     ModbusSerialClient client;
     ModbusRequestOf<8> request(17);
     client.begin(Serial, 19200);
-    exchanges(client, client.readExceptionStatus(request), {17, 7}, {17, 7, 0x6D});
+    expect_exchange(client, client.readExceptionStatus(request), {17, 7}, {17, 7, 0x6D});
     assert_int_equal(request.getByte(0), 0x6D);
     words_of(request, {0xA537});
-    exchanges(client, client.diagnostics(request, 0), {17, 8, 0, 0, 0xA5, 0x37},
-              {17, 8, 0, 0, 0xA5, 0x37});
+    expect_exchange(client, client.diagnostics(request, 0), {17, 8, 0, 0, 0xA5, 0x37},
+                    {17, 8, 0, 0, 0xA5, 0x37});
     assert_int_equal(request.status(), MBM_OK);
     words_of(request, {0});
-    exchanges(client, client.diagnostics(request, MBM_DIAGNOSTICS_BUS_MESSAGE_COUNT),
-              {17, 8, 0, 11, 0, 0}, {17, 8, 0, 11, 0, 99});
+    expect_exchange(client, client.diagnostics(request, MBM_DIAGNOSTICS_BUS_MESSAGE_COUNT),
+                    {17, 8, 0, 11, 0, 0}, {17, 8, 0, 11, 0, 99});
     assert_int_equal(request[0], 99);
-    exchanges(client, client.getCommEventCounter(request), {17, 11}, {17, 11, 0xFF, 0xFF, 1, 8});
+    expect_exchange(client, client.getCommEventCounter(request), {17, 11},
+                    {17, 11, 0xFF, 0xFF, 1, 8});
     assert_int_equal(request[1], 0x0108);
-    exchanges(client, client.getCommEventLog(request), {17, 12},
-              {17, 12, 8, 0, 0, 1, 8, 1, 0x21, 0x20, 0});
+    expect_exchange(client, client.getCommEventLog(request), {17, 12},
+                    {17, 12, 8, 0, 0, 1, 8, 1, 0x21, 0x20, 0});
     assert_int_equal(request.length(), 8);
     assert_int_equal(request.getByte(3), 8);
     assert_int_equal(request.getByte(6), 0x20);
-    exchanges(client, client.reportServerId(request), {17, 17}, {17, 17, 3, 'm', 'b', 0xFF});
+    expect_exchange(client, client.reportServerId(request), {17, 17}, {17, 17, 3, 'm', 'b', 0xFF});
     assert_int_equal(request.length(), 3);
     assert_int_equal(request.getByte(1), 'b');
 }
@@ -99,29 +100,29 @@ static void files_are_read_and_written(void **)
     ModbusSerialClient client;
     ModbusRequestOf<8> request(17);
     client.begin(Serial, 19200);
-    exchanges(client, client.readFileRecord(request, 4, 1, 2), {17, 20, 7, 6, 0, 4, 0, 1, 0, 2},
-              {17, 20, 6, 5, 6, 0x0D, 0xFE, 0, 0x20});
+    expect_exchange(client, client.readFileRecord(request, 4, 1, 2),
+                    {17, 20, 7, 6, 0, 4, 0, 1, 0, 2}, {17, 20, 6, 5, 6, 0x0D, 0xFE, 0, 0x20});
     assert_int_equal(request[0], 0x0DFE);
     assert_int_equal(request[1], 0x20);
     words_of(request, {0x06AF, 0x04BE, 0x100D});
-    exchanges(client, client.writeFileRecord(request, 4, 7, 3),
-              {17, 21, 13, 6, 0, 4, 0, 7, 0, 3, 6, 0xAF, 4, 0xBE, 0x10, 0x0D},
-              {17, 21, 13, 6, 0, 4, 0, 7, 0, 3, 6, 0xAF, 4, 0xBE, 0x10, 0x0D});
+    expect_exchange(client, client.writeFileRecord(request, 4, 7, 3),
+                    {17, 21, 13, 6, 0, 4, 0, 7, 0, 3, 6, 0xAF, 4, 0xBE, 0x10, 0x0D},
+                    {17, 21, 13, 6, 0, 4, 0, 7, 0, 3, 6, 0xAF, 4, 0xBE, 0x10, 0x0D});
     assert_int_equal(request.status(), MBM_OK);
     const uint8_t groups[] = {6, 0, 4, 0, 1, 0, 1, 6, 0, 3, 0, 9, 0, 1};
     for (uint16_t i = 0; i < sizeof groups; i++)
         assert_int_equal(request.setByte(i, groups[i]), MBM_OK);
-    exchanges(client, client.readFileRecords(request, sizeof groups),
-              {17, 20, 14, 6, 0, 4, 0, 1, 0, 1, 6, 0, 3, 0, 9, 0, 1},
-              {17, 20, 8, 3, 6, 0x0D, 0xFE, 3, 6, 0x33, 0xCD});
+    expect_exchange(client, client.readFileRecords(request, sizeof groups),
+                    {17, 20, 14, 6, 0, 4, 0, 1, 0, 1, 6, 0, 3, 0, 9, 0, 1},
+                    {17, 20, 8, 3, 6, 0x0D, 0xFE, 3, 6, 0x33, 0xCD});
     assert_int_equal(request.getByte(2), 0x0D);
     assert_int_equal(request.getByte(7), 0xCD);
     const uint8_t record[] = {6, 0, 4, 0, 7, 0, 1, 0xAB, 0xCD};
     for (uint16_t i = 0; i < sizeof record; i++)
         request.setByte(i, record[i]);
-    exchanges(client, client.writeFileRecords(request, sizeof record),
-              {17, 21, 9, 6, 0, 4, 0, 7, 0, 1, 0xAB, 0xCD},
-              {17, 21, 9, 6, 0, 4, 0, 7, 0, 1, 0xAB, 0xCD});
+    expect_exchange(client, client.writeFileRecords(request, sizeof record),
+                    {17, 21, 9, 6, 0, 4, 0, 7, 0, 1, 0xAB, 0xCD},
+                    {17, 21, 9, 6, 0, 4, 0, 7, 0, 1, 0xAB, 0xCD});
     assert_int_equal(request.status(), MBM_OK);
 }
 
@@ -130,20 +131,20 @@ static void a_device_identifies_itself(void **)
     ModbusSerialClient client;
     ModbusRequestOf<16> request(17);
     client.begin(Serial, 19200);
-    exchanges(client, client.readDeviceIdentification(request, MBM_DEVICE_ID_BASIC),
-              {17, 43, 14, 1, 0}, {17, 43, 14, 1, 1, 0, 0, 1, 0, 3, 'm', 'b', 'm'});
+    expect_exchange(client, client.readDeviceIdentification(request, MBM_DEVICE_ID_BASIC),
+                    {17, 43, 14, 1, 0}, {17, 43, 14, 1, 1, 0, 0, 1, 0, 3, 'm', 'b', 'm'});
     assert_int_equal(request.status(), MBM_OK);
     assert_int_equal(request.getByte(3), 1);
     assert_int_equal(request.getByte(5), 3);
     assert_int_equal(request.getByte(6), 'm');
     request.setByte(0, 0x60);
-    exchanges(client, client.encapsulatedInterfaceTransport(request, MBM_MEI_CANOPEN, 1),
-              {17, 43, 13, 0x60}, {17, 43, 13, 0x60, 1, 2});
+    expect_exchange(client, client.encapsulatedInterfaceTransport(request, MBM_MEI_CANOPEN, 1),
+                    {17, 43, 13, 0x60}, {17, 43, 13, 0x60, 1, 2});
     assert_int_equal(request.status(), MBM_OK);
     assert_int_equal(request.length(), 3);
 }
 
-static void functions_of_users_and_of_other_clients_pass(void **)
+static void user_defined_and_forwarded_functions_are_sent(void **)
 {
     static const uint8_t body[] = {0, 107, 0, 1};
     const mbm_rule two = {MBM_RULE_FIXED, 3, 0};
@@ -151,18 +152,18 @@ static void functions_of_users_and_of_other_clients_pass(void **)
     ModbusRequestOf<4> request(17);
     client.begin(Serial, 19200);
     request.setByte(0, 0xAA);
-    exchanges(client, client.custom(request, 0x41, 1, two), {17, 0x41, 0xAA},
-              {17, 0x41, 0x12, 0x34});
+    expect_exchange(client, client.custom(request, 0x41, 1, two), {17, 0x41, 0xAA},
+                    {17, 0x41, 0x12, 0x34});
     assert_int_equal(request.getByte(1), 0x34);
-    exchanges(client, client.forward(request, 3, body, sizeof body), {17, 3, 0, 107, 0, 1},
-              {17, 3, 2, 2, 43});
+    expect_exchange(client, client.forward(request, 3, body, sizeof body), {17, 3, 0, 107, 0, 1},
+                    {17, 3, 2, 2, 43});
     assert_int_equal(request.length(), 3);
     assert_int_equal(request.getByte(0), 2);
     assert_int_equal(request.getByte(2), 43);
-    // The request's own words are sent again afterwards.
+    // The next request sends its own words again.
     words_of(request, {0x1234});
-    exchanges(client, client.writeMultipleRegisters(request, 1, 1),
-              {17, 16, 0, 1, 0, 1, 2, 0x12, 0x34}, {17, 16, 0, 1, 0, 1});
+    expect_exchange(client, client.writeMultipleRegisters(request, 1, 1),
+                    {17, 16, 0, 1, 0, 1, 2, 0x12, 0x34}, {17, 16, 0, 1, 0, 1});
 }
 
 static void values_of_each_type_and_order_are_in_the_words(void **)
@@ -234,10 +235,10 @@ int main()
     const struct CMUnitTest tests[] = {
         TEST(bits_are_read_and_written),
         TEST(registers_are_read_and_written),
-        TEST(the_functions_of_a_serial_line_are_asked),
+        TEST(the_functions_of_a_serial_line_are_sent),
         TEST(files_are_read_and_written),
         TEST(a_device_identifies_itself),
-        TEST(functions_of_users_and_of_other_clients_pass),
+        TEST(user_defined_and_forwarded_functions_are_sent),
         TEST(values_of_each_type_and_order_are_in_the_words),
         TEST(values_past_the_end_are_refused),
     };

@@ -1,4 +1,4 @@
-/* The class of a TCP client, over the shim's Ethernet library, on a real libmodbus server. */
+/* ModbusTcpClient over the shim's Ethernet library, with a real libmodbus server. */
 #include "wire.h"
 
 #include "ModbusClient.h"
@@ -19,7 +19,7 @@ static const IPAddress device(192, 168, 1, 20);
 static int fresh(void **state)
 {
     reset_board(state);
-    bench().realTime = true;
+    board().realTime = true;
     tcp_server_start(&peer);
     networkPort(502) = peer.port;
     ethernet = new EthernetClient;
@@ -38,8 +38,8 @@ static int gone(void **)
     return 0;
 }
 
-/* As loop does: each poll returns at once. */
-static void ends()
+/* Calls poll, as a sketch's loop does, until no request is pending. */
+static void run_until_idle()
 {
     AWAIT(client->poll() != MBM_PENDING);
 }
@@ -55,14 +55,14 @@ static void reads_what_libmodbus_holds(void **)
         assert_int_equal(request[i], server_pattern(3u + i));
     assert_int_equal(request.length(), 250);
     assert_int_equal(client->readCoils(request, 5, 2000), MBM_PENDING);
-    ends();
+    run_until_idle();
     for (uint16_t i = 0; i < 2000; i++)
         assert_int_equal(request.getBit(i), server_bit_pattern(5u + i));
     assert_int_equal(client->readDiscreteInputs(request, 7, 3), MBM_PENDING);
-    ends();
+    run_until_idle();
     assert_int_equal(request.getBit(0), !server_bit_pattern(7));
     assert_int_equal(client->readInputRegisters(request, 9, 1), MBM_PENDING);
-    ends();
+    run_until_idle();
     assert_int_equal(request[0], static_cast<uint16_t>(~server_pattern(9)));
 }
 
@@ -111,7 +111,7 @@ static void many_requests_are_under_way_at_once(void **)
     client->poll();
     assert_int_not_equal(a.wireTransaction(), b.wireTransaction());
     assert_int_not_equal(b.wireTransaction(), c.wireTransaction());
-    ends();
+    run_until_idle();
     assert_int_equal(sum, server_pattern(1) + server_pattern(2) + server_pattern(3));
 }
 
@@ -119,11 +119,11 @@ static void a_client_that_takes_few_bytes_gets_all_of_them(void **)
 {
     ModbusRequestOf<123> request(255);
     client->connect(device);
-    ethernet->room = 5;
+    ethernet->writeSpace = 5;
     for (uint16_t i = 0; i < 123; i++)
         request[i] = static_cast<uint16_t>(1000u + i);
     assert_int_equal(client->writeMultipleRegisters(request, 10, 123), MBM_PENDING);
-    ends();
+    run_until_idle();
     assert_int_equal(request.status(), MBM_OK);
     assert_int_equal(peer.mapping->tab_registers[132], 1122);
 }
@@ -136,7 +136,7 @@ static void without_a_connection_requests_end_at_once(void **)
     assert_false(other.isConnected());
     assert_false(client->isConnected());
     client->readHoldingRegisters(request, 0, 1);
-    ends();
+    run_until_idle();
     assert_int_equal(request.status(), MBM_LINK_LOST);
     uint16_t unusedPort;
     int reserved = tcp_reserve(&unusedPort);
@@ -145,7 +145,7 @@ static void without_a_connection_requests_end_at_once(void **)
     close(reserved);
 }
 
-static void a_connection_that_was_lost_is_made_anew(void **)
+static void a_lost_connection_can_be_made_again(void **)
 {
     ModbusRequestOf<1> request(255);
     client->connect(device);
@@ -153,14 +153,15 @@ static void a_connection_that_was_lost_is_made_anew(void **)
     tcp_server_stop(&peer);
     AWAIT(!client->isConnected());
     client->readHoldingRegisters(request, 8, 1);
-    ends();
+    run_until_idle();
     assert_int_equal(request.status(), MBM_LINK_LOST);
     tcp_server_start(&peer);
     networkPort(502) = peer.port;
     request[0] = 0;
-    assert_int_equal(client->readHoldingRegisters(request, 8, 1), MBM_PENDING); // waits
+    assert_int_equal(client->readHoldingRegisters(request, 8, 1),
+                     MBM_PENDING); // stays in the queue
     assert_int_equal(client->connect(device), MBM_OK);
-    ends();
+    run_until_idle();
     assert_int_equal(request.status(), MBM_OK);
     assert_int_equal(request[0], server_pattern(8));
 }
@@ -177,7 +178,7 @@ static void replies_in_any_order_find_their_requests(void **)
     AWAIT((client->poll(), !early.pending()));
     assert_int_equal(early.status(), MBM_OK);
     assert_true(late.pending());
-    ends();
+    run_until_idle();
     assert_int_equal(late.status(), MBM_OK);
     assert_int_equal(early[0], tcp_peer_word(12));
     assert_int_equal(late[0], tcp_peer_word(11));
@@ -202,7 +203,7 @@ static void poll_never_waits_for_a_device(void **)
     tcp_peer_stop(faulty);
 }
 
-static void rtu_frames_go_through_a_connection(void **)
+static void rtu_frames_are_sent_over_a_tcp_connection(void **)
 {
     uint16_t port;
     int listener = tcp_listen(&port);
@@ -218,7 +219,7 @@ static void rtu_frames_go_through_a_connection(void **)
     assert_int_equal(recv(converter, seen.data(), 8, MSG_WAITALL), 8);
     assert_bytes(seen, expected);
     assert_int_equal(send(converter, reply.data(), reply.size(), 0), reply.size());
-    ends();
+    run_until_idle();
     assert_int_equal(request.status(), MBM_OK);
     assert_int_equal(request[0], 555);
     close(converter);
@@ -232,7 +233,7 @@ static void begin_is_refused_while_a_request_is_pending(void **)
     client->connect(device);
     client->readHoldingRegisters(request, 8, 1);
     assert_int_equal(client->begin(another), MBM_BUSY);
-    ends();
+    run_until_idle();
     assert_int_equal(request.status(), MBM_OK);
     assert_int_equal(client->begin(another), MBM_OK);
     assert_false(client->isConnected());
@@ -248,10 +249,10 @@ int main()
         SERVED(many_requests_are_under_way_at_once),
         SERVED(a_client_that_takes_few_bytes_gets_all_of_them),
         SERVED(without_a_connection_requests_end_at_once),
-        SERVED(a_connection_that_was_lost_is_made_anew),
+        SERVED(a_lost_connection_can_be_made_again),
         SERVED(replies_in_any_order_find_their_requests),
         SERVED(poll_never_waits_for_a_device),
-        SERVED(rtu_frames_go_through_a_connection),
+        SERVED(rtu_frames_are_sent_over_a_tcp_connection),
         SERVED(begin_is_refused_while_a_request_is_pending),
     };
 

@@ -1,5 +1,6 @@
-/* The examples that use a network, as they are, on the shim's board: real sockets, and a
- * real libmodbus at the far end. */
+/* The unchanged examples that use a network, on a simulated board. Real sockets connect them
+ * to a real libmodbus. */
+#include "libmodbus_client.h"
 #include "wire.h"
 
 #include "ModbusTcpGateway.h"
@@ -8,13 +9,11 @@
 #include <Ethernet.h>
 
 extern "C" {
-#include "await.h"
 #include "server.h"
 #include "tcp_server.h"
-#include <pthread.h>
 }
 
-/* A sketch is compiled without this warning. */
+/* Arduino cores do not enable this warning for sketches. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wconversion"
 namespace tcp_client {
@@ -28,45 +27,24 @@ namespace gateway_sketch {
 }
 #pragma GCC diagnostic pop
 
-struct Task {
-    int (*work)(modbus_t *);
-    int result;
-    int over;
-};
-
-/* A libmodbus client in a thread: connects to what the sketch's port 502 is. */
-static void *run(void *argument)
+/* Returns the result of a client's call, while the sketch's `loop` runs. */
+static int gets(void (*loop)(), int (*call)(modbus_t *))
 {
-    Task *task = static_cast<Task *>(argument);
-    modbus_t *peer = modbus_new_tcp("127.0.0.1", networkPort(502));
-    modbus_set_response_timeout(peer, PATIENCE_MS / 1000, 0);
-    task->result = modbus_connect(peer) == 0 ? task->work(peer) : -3;
-    modbus_close(peer);
-    modbus_free(peer);
-    __atomic_store_n(&task->over, 1, __ATOMIC_SEQ_CST);
-    return nullptr;
-}
-
-/* What its work gives, while loop is called again and again. */
-static int gets(void (*loop)(), int (*work)(modbus_t *))
-{
-    Task task = {work, -2, 0};
-    pthread_t thread;
-    assert_int_equal(pthread_create(&thread, nullptr, run, &task), 0);
-    AWAIT((loop(), __atomic_load_n(&task.over, __ATOMIC_SEQ_CST)));
-    pthread_join(thread, nullptr);
-    return task.result;
+    modbus_t *peer = connect_client(502);
+    const int result = result_of(peer, call, loop);
+    close_client(peer);
+    return result;
 }
 
 static int real_time(void **state)
 {
     reset_board(state);
     pins() = Pins();
-    bench().realTime = true;
+    board().realTime = true;
     return 0;
 }
 
-static void the_tcp_client_reads_writes_and_connects_anew(void **)
+static void the_tcp_client_reads_writes_and_connects_again(void **)
 {
     tcp_server device;
     tcp_server_start(&device);
@@ -81,7 +59,7 @@ static void the_tcp_client_reads_writes_and_connects_anew(void **)
     AWAIT((tcp_client::loop(), pins().level[13] == LOW));
     tcp_server_start(&device);
     networkPort(502) = device.port;
-    AWAIT((tcp_client::loop(), pins().level[13] == HIGH)); // within five seconds
+    AWAIT((tcp_client::loop(), pins().level[13] == HIGH)); // the sketch tries every five seconds
     tcp_client::client.stop();
     tcp_server_stop(&device);
 }
@@ -110,7 +88,7 @@ static void the_tcp_server_serves_a_sensor_and_a_relay(void **)
 static void the_gateway_passes_a_request_to_its_line(void **)
 {
     static uint16_t word;
-    bench().realTime = false; // that of the shim's UART
+    board().realTime = false; // the simulated UART has a clock of its own
     gateway_sketch::setup();
     assert_int_equal(Serial.baud, 19200);
     Serial.reply(adu({17, 3, 2, 2, 43}));
@@ -121,10 +99,10 @@ static void the_gateway_passes_a_request_to_its_line(void **)
                           }),
                      555);
     assert_sent(Serial, {17, 3, 0, 107, 0, 1});
-    assert_int_equal(pins().level[4], LOW); // the driver is off again
+    assert_int_equal(pins().level[4], LOW); // the driver is off
     assert_int_equal(gets(gateway_sketch::loop,
                           [](modbus_t *peer) {
-                              modbus_set_slave(peer, 32); // not of this line
+                              modbus_set_slave(peer, 32); // not one of the gateway's units
                               return modbus_read_registers(peer, 107, 1, &word) == 1 ? 0 : errno;
                           }),
                      EMBXGPATH);
@@ -136,7 +114,7 @@ static void the_gateway_passes_a_request_to_its_line(void **)
 int main()
 {
     const struct CMUnitTest tests[] = {
-        REAL(the_tcp_client_reads_writes_and_connects_anew),
+        REAL(the_tcp_client_reads_writes_and_connects_again),
         REAL(the_tcp_server_serves_a_sensor_and_a_relay),
         REAL(the_gateway_passes_a_request_to_its_line),
     };

@@ -1,36 +1,15 @@
-/* The class of a gateway: a real libmodbus TCP client on one side, a real libmodbus RTU
- * server at the far end of a pty on the other. */
+/* ModbusTcpGateway between a real libmodbus TCP client and a real libmodbus RTU server on a
+ * pty. */
+#include "libmodbus_client.h"
+#include "pty_stream.h"
 #include "wire.h"
 
 #include "ModbusTcpGateway.h"
 #include <ESP8266WiFi.h>
 
 extern "C" {
-#include "await.h"
 #include "server.h"
-#include <modbus.h>
-#include <pthread.h>
 }
-
-/* The serial line: a pty. */
-class PtyStream : public Stream {
-public:
-    using Print::write;
-    int fd = -1;
-
-    int available() override
-    {
-        int waiting = 0;
-        return ioctl(fd, FIONREAD, &waiting) == 0 ? waiting : 0;
-    }
-    int read() override
-    {
-        uint8_t value;
-        return available() > 0 && ::read(fd, &value, 1) == 1 ? value : -1;
-    }
-    int peek() override { return -1; }
-    size_t write(uint8_t value) override { return ::write(fd, &value, 1) == 1; }
-};
 
 static server device;
 static PtyStream tty;
@@ -41,7 +20,7 @@ static ModbusTcpGateway<WiFiServer> *gateway;
 static int start(void **state)
 {
     reset_board(state);
-    bench().realTime = true;
+    board().realTime = true;
     server_start(&device, 17);
     tty.fd = device.line.ours;
     wifi = new WiFiServer(502);
@@ -65,46 +44,20 @@ static int stop(void **)
     return 0;
 }
 
-struct Task {
-    modbus_t *peer;
-    int (*work)(modbus_t *);
-    int result;
-    int over;
-};
-
-static void *run(void *argument)
+/* Returns the result of a client's call, while the sketch's loop polls the gateway. */
+static int passes(modbus_t *peer, int (*call)(modbus_t *))
 {
-    Task *task = static_cast<Task *>(argument);
-    task->result = task->work(task->peer);
-    __atomic_store_n(&task->over, 1, __ATOMIC_SEQ_CST);
-    return nullptr;
-}
-
-/* What a client's work gives, while the sketch's loop goes on. */
-static int passes(modbus_t *peer, int (*work)(modbus_t *))
-{
-    Task task = {peer, work, -2, 0};
-    pthread_t thread;
-    assert_int_equal(pthread_create(&thread, nullptr, run, &task), 0);
-    AWAIT(
-        (assert_int_equal(gateway->poll(), MBM_OK), __atomic_load_n(&task.over, __ATOMIC_SEQ_CST)));
-    pthread_join(thread, nullptr);
-    return task.result;
+    return result_of(peer, call, [] { assert_int_equal(gateway->poll(), MBM_OK); });
 }
 
 static modbus_t *client_of(int unit)
 {
-    modbus_t *peer = modbus_new_tcp("127.0.0.1", networkPort(502));
-    modbus_set_slave(peer, unit);
-    modbus_set_response_timeout(peer, PATIENCE_MS / 1000, 0);
-    assert_int_equal(modbus_connect(peer), 0);
-    return peer;
+    return connect_client(502, unit);
 }
 
 static void hang_up(modbus_t *peer)
 {
-    modbus_close(peer);
-    modbus_free(peer);
+    close_client(peer);
     AWAIT((gateway->poll(), gateway->connections() == 0));
 }
 
@@ -121,7 +74,7 @@ static int error_of_a_read(modbus_t *peer)
     return modbus_read_registers(peer, 3, 1, words) == 1 ? 0 : errno;
 }
 
-static void requests_and_replies_of_any_length_pass(void **)
+static void requests_and_replies_of_any_length_are_forwarded(void **)
 {
     modbus_t *peer = client_of(17);
     assert_int_equal(passes(peer, read_registers), 125);
@@ -146,7 +99,7 @@ static void requests_and_replies_of_any_length_pass(void **)
     hang_up(peer);
 }
 
-static void the_exception_of_a_device_passes(void **)
+static void the_exception_of_a_device_is_forwarded(void **)
 {
     modbus_t *peer = client_of(17);
     assert_int_equal(passes(peer,
@@ -158,7 +111,7 @@ static void the_exception_of_a_device_passes(void **)
     hang_up(peer);
 }
 
-static void a_unit_without_a_line_is_0a_and_a_silent_one_0b(void **)
+static void a_unit_without_a_line_gets_0a_and_a_silent_unit_0b(void **)
 {
     modbus_t *peer = client_of(19);
     assert_int_equal(passes(peer, error_of_a_read), EMBXGPATH);
@@ -185,21 +138,19 @@ static void clients_and_the_sketch_share_the_line(void **)
             assert_int_equal(own[0], server_pattern(9));
         }
     assert_int_equal(gateway->connections(), 4);
-    for (unsigned i = 0; i < 4; i++) {
-        modbus_close(peers[i]);
-        modbus_free(peers[i]);
-    }
+    for (modbus_t *peer : peers)
+        close_client(peer);
     AWAIT((gateway->poll(), gateway->connections() == 0));
 }
 
-static void a_client_that_goes_takes_its_request_along(void **)
+static void closing_a_connection_cancels_its_request(void **)
 {
     const uint8_t request[] = {0, 1, 0, 0, 0, 6, 18, 3, 0, 3, 0, 1};
     WiFiClient hasty;
     assert_int_equal(hasty.connect("gateway", 502), 1);
     hasty.write(request, sizeof request);
-    AWAIT((gateway->poll(), line->pending() == 1)); // of unit 18, which does not exist
-    // While a device is waited for, its client is not read: begin closes all.
+    AWAIT((gateway->poll(), line->pending() == 1)); // unit 18 does not exist
+    // The gateway does not read a client whose request is pending. begin closes all of them.
     assert_int_equal(gateway->begin(*wifi, *line), MBM_OK);
     assert_int_equal(line->pending(), 0);
     assert_int_equal(gateway->connections(), 0);
@@ -213,11 +164,11 @@ static void a_client_that_goes_takes_its_request_along(void **)
 int main()
 {
     const struct CMUnitTest tests[] = {
-        SERVED(requests_and_replies_of_any_length_pass),
-        SERVED(the_exception_of_a_device_passes),
-        SERVED(a_unit_without_a_line_is_0a_and_a_silent_one_0b),
+        SERVED(requests_and_replies_of_any_length_are_forwarded),
+        SERVED(the_exception_of_a_device_is_forwarded),
+        SERVED(a_unit_without_a_line_gets_0a_and_a_silent_unit_0b),
         SERVED(clients_and_the_sketch_share_the_line),
-        SERVED(a_client_that_goes_takes_its_request_along),
+        SERVED(closing_a_connection_cancels_its_request),
     };
 
     return cmocka_run_group_tests_name("class of a gateway", tests, nullptr, nullptr);

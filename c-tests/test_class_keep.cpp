@@ -1,5 +1,6 @@
-/* What sketches rely on: one transaction in its order, and what outlives it. */
-// Before cmocka, whose macro `fail` the C++ library would trip over.
+/* What sketches for ModbusMaster rely on: the order of one transaction, and the state that it
+ * leaves. */
+// Included before cmocka, whose macro `fail` breaks the C++ library.
 #include <memory>
 #include <vector>
 
@@ -7,24 +8,24 @@
 
 static void logs_callbacks(ModbusMaster &node)
 {
-    node.preTransmission([] { bench().note("pre"); });
-    node.postTransmission([] { bench().note("post"); });
-    node.idle([] { bench().note("idle"); });
+    node.preTransmission([] { board().logEvent("pre"); });
+    node.postTransmission([] { board().logEvent("post"); });
+    node.idle([] { board().logEvent("idle"); });
 }
 
-static void a_transaction_drops_then_sends_then_waits(void **)
+static void a_transaction_discards_old_bytes_then_sends_then_waits(void **)
 {
     ModbusMaster node;
     Serial.character = 0;
     node.begin(1, Serial);
     logs_callbacks(node);
     for (int again = 0; again < 2; again++) {
-        bench().log.clear();
+        board().log.clear();
         Serial.inject(adu({1, 3, 2, 0x66, 0x66}));
         Serial.reply(adu({1, 3, 2, 0, 7}));
         assert_int_equal(node.readHoldingRegisters(0, 1), 0);
         assert_int_equal(node.getResponseBuffer(0), 7);
-        assert_string_equal(bench().log.c_str(), "read pre write flush post idle read ");
+        assert_string_equal(board().log.c_str(), "read pre write flush post idle read ");
     }
 }
 
@@ -32,19 +33,19 @@ static void a_write_taken_in_pieces_stays_between_the_callbacks(void **)
 {
     ModbusMaster node;
     Serial.character = 0;
-    Serial.room = 3;
+    Serial.writeSpace = 3;
     node.begin(1, Serial);
     logs_callbacks(node);
-    for (int again = 0; again < 2; again++) { /* byte by byte, then in blocks */
-        bench().log.clear();
+    for (int again = 0; again < 2; again++) { /* first byte by byte, then in blocks */
+        board().log.clear();
         Serial.reply(adu({1, 3, 2, 0, 7}));
         assert_int_equal(node.readHoldingRegisters(0, 1), 0);
         assert_sent(Serial, {1, 3, 0, 0, 0, 1});
-        assert_string_equal(bench().log.c_str(), "pre write flush post idle read ");
+        assert_string_equal(board().log.c_str(), "pre write flush post idle read ");
     }
 }
 
-static void idle_is_called_only_while_a_reply_is_waited_for(void **)
+static void idle_is_called_only_while_the_master_waits_for_a_reply(void **)
 {
     static unsigned yields_before_sending;
     ModbusMaster node;
@@ -52,10 +53,10 @@ static void idle_is_called_only_while_a_reply_is_waited_for(void **)
     node.setGap(15000);
     node.setResponseTimeout(20);
     logs_callbacks(node);
-    node.preTransmission([] { yields_before_sending = bench().yields; });
+    node.preTransmission([] { yields_before_sending = board().yields; });
     assert_int_equal(node.readCoils(0, 1), ModbusMaster::ku8MBResponseTimedOut);
-    assert_string_equal(bench().log.c_str(), "write flush post idle ");
-    assert_true(yields_before_sending > 100); // the silence was waited for as well
+    assert_string_equal(board().log.c_str(), "write flush post idle ");
+    assert_true(yields_before_sending > 100); // the wait for the silence yields too
 }
 
 static void the_driver_is_off_again_after_a_failure(void **)
@@ -66,7 +67,7 @@ static void the_driver_is_off_again_after_a_failure(void **)
     logs_callbacks(node);
     node.idle(nullptr);
     assert_int_equal(node.writeSingleCoil(0, 1), ModbusMaster::ku8MBResponseTimedOut);
-    assert_string_equal(bench().log.c_str(), "pre write flush post ");
+    assert_string_equal(board().log.c_str(), "pre write flush post ");
 }
 
 static void the_response_timeout_is_two_seconds(void **)
@@ -76,11 +77,11 @@ static void the_response_timeout_is_two_seconds(void **)
     of_version_0_9.begin(19200);
     for (ModbusMaster *node : {&with_stream, &of_version_0_9}) {
         assert_int_equal(node->readCoils(0, 1), ModbusMaster::ku8MBResponseTimedOut);
-        assert_in_range(bench().now - Serial.sentAt, 2000000, 2000200);
+        assert_in_range(board().now - Serial.sentAt, 2000000, 2000200);
     }
 }
 
-static void exception_codes_are_handed_on_raw(void **)
+static void exception_codes_are_returned_unchanged(void **)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -104,7 +105,7 @@ static void each_failure_has_its_status(void **)
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBResponseTimedOut);
 }
 
-static void old_words_survive_a_failure_and_words_to_send_a_transaction(void **)
+static void a_failure_keeps_the_response_words_and_a_transaction_the_transmit_words(void **)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -168,7 +169,7 @@ static void the_write_address_is_shared(void **)
     assert_sent(Serial, {1, 16, 0, 0x55, 0, 1, 2, 0, 9});
 }
 
-static void reads_of_65_to_125_registers_are_the_devices_to_judge(void **)
+static void reads_of_65_to_125_registers_are_sent(void **)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -200,10 +201,10 @@ static void callbacks_survive_begin(void **)
     Serial.character = 0;
     Serial.reply(adu({2, 3, 2, 0, 7}));
     assert_int_equal(node.readHoldingRegisters(0, 1), 0);
-    assert_string_equal(bench().log.c_str(), "pre write flush post idle read ");
+    assert_string_equal(board().log.c_str(), "pre write flush post idle read ");
 }
 
-static void zero_and_nullptr_take_callbacks_away(void **)
+static void zero_and_nullptr_remove_callbacks(void **)
 {
     ModbusMaster node;
     logs_callbacks(node);
@@ -214,14 +215,14 @@ static void zero_and_nullptr_take_callbacks_away(void **)
     node.begin(1, Serial);
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(node.readHoldingRegisters(0, 1), 0);
-    assert_string_equal(bench().log.c_str(), "write flush read ");
+    assert_string_equal(board().log.c_str(), "write flush read ");
 }
 
 static void a_long_idle_does_not_lose_the_reply(void **)
 {
     ModbusMaster node;
     node.begin(1, Serial);
-    node.idle([] { bench().now += 1900000; });
+    node.idle([] { board().now += 1900000; });
     Serial.delay = 1500000;
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(node.readHoldingRegisters(0, 1), 0);
@@ -245,7 +246,7 @@ static void an_idle_callback_may_use_another_object(void **)
     assert_int_equal(other.getResponseBuffer(0), 22);
 }
 
-static void an_idle_callback_is_refused_on_its_own_object_and_goes_on(void **)
+static void requests_of_an_idle_callback_on_its_own_object_are_refused(void **)
 {
     static ModbusMaster *self;
     static unsigned calls;
@@ -290,7 +291,7 @@ static void copies_have_buffers_and_callbacks_of_their_own(void **)
     assert_sent(Serial, {5, 16, 0, 0, 0, 1, 2, 3, 4});
     assert_int_equal(called, 3);
     assert_int_equal(copy.readCoils(0, 1), ModbusMaster::ku8MBResponseTimedOut);
-    assert_in_range(bench().now - Serial.sentAt, 40000, 40200);
+    assert_in_range(board().now - Serial.sentAt, 40000, 40200);
 }
 
 static void a_copy_leaves_a_request_under_way_to_the_original(void **)
@@ -311,7 +312,7 @@ static void a_copy_leaves_a_request_under_way_to_the_original(void **)
     assert_int_equal(copy.getResponseBuffer(0), 0);
 }
 
-static void an_assignment_gives_up_the_request_under_way(void **)
+static void an_assignment_cancels_the_request_under_way(void **)
 {
     ModbusMaster node, other;
     node.begin(1, Serial);
@@ -321,9 +322,9 @@ static void an_assignment_gives_up_the_request_under_way(void **)
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);
     while (Serial.sent.empty())
         assert_int_equal(node.poll(), ModbusMaster::ku8MBPending);
-    assert_string_equal(bench().log.c_str(), "pre write flush ");
+    assert_string_equal(board().log.c_str(), "pre write flush ");
     node = other;
-    assert_string_equal(bench().log.c_str(), "pre write flush post ");
+    assert_string_equal(board().log.c_str(), "pre write flush post ");
 }
 
 static void an_assignment_to_itself_changes_nothing(void **)
@@ -356,27 +357,27 @@ static void objects_live_in_containers_that_move_them(void **)
 int main()
 {
     const struct CMUnitTest tests[] = {
-        TEST(a_transaction_drops_then_sends_then_waits),
+        TEST(a_transaction_discards_old_bytes_then_sends_then_waits),
         TEST(a_write_taken_in_pieces_stays_between_the_callbacks),
-        TEST(idle_is_called_only_while_a_reply_is_waited_for),
+        TEST(idle_is_called_only_while_the_master_waits_for_a_reply),
         TEST(the_driver_is_off_again_after_a_failure),
         TEST(the_response_timeout_is_two_seconds),
-        TEST(exception_codes_are_handed_on_raw),
+        TEST(exception_codes_are_returned_unchanged),
         TEST(each_failure_has_its_status),
-        TEST(old_words_survive_a_failure_and_words_to_send_a_transaction),
+        TEST(a_failure_keeps_the_response_words_and_a_transaction_the_transmit_words),
         TEST(any_transaction_empties_the_queue),
         TEST(any_transaction_takes_receive_back_to_the_first_word),
         TEST(the_write_address_is_shared),
-        TEST(reads_of_65_to_125_registers_are_the_devices_to_judge),
+        TEST(reads_of_65_to_125_registers_are_sent),
         TEST(units_above_247_are_accepted),
         TEST(callbacks_survive_begin),
-        TEST(zero_and_nullptr_take_callbacks_away),
+        TEST(zero_and_nullptr_remove_callbacks),
         TEST(a_long_idle_does_not_lose_the_reply),
         TEST(an_idle_callback_may_use_another_object),
-        TEST(an_idle_callback_is_refused_on_its_own_object_and_goes_on),
+        TEST(requests_of_an_idle_callback_on_its_own_object_are_refused),
         TEST(copies_have_buffers_and_callbacks_of_their_own),
         TEST(a_copy_leaves_a_request_under_way_to_the_original),
-        TEST(an_assignment_gives_up_the_request_under_way),
+        TEST(an_assignment_cancels_the_request_under_way),
         TEST(an_assignment_to_itself_changes_nothing),
         TEST(objects_live_in_containers_that_move_them),
     };

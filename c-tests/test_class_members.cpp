@@ -1,15 +1,15 @@
-/* Each member of ModbusMaster, held against the bytes on the wire. */
+/* Each member of ModbusMaster: the bytes that it sends and the values that it returns. */
 #include "wire.h"
 
 static ModbusMaster global_node;
 static ModbusMaster global_array[2] = {4, 5};
-static const unsigned looks_before_main = bench().looks;
+static const unsigned clock_reads_before_main = board().clockReads;
 
 static void constructors_touch_neither_clock_nor_port(void **)
 {
-    assert_int_equal(looks_before_main, 0);
+    assert_int_equal(clock_reads_before_main, 0);
     ModbusMaster one, two(2), three(1, 3);
-    assert_int_equal(bench().looks, 0);
+    assert_int_equal(board().clockReads, 0);
     for (unsigned i = 0; i < 4; i++)
         assert_int_equal(shimSerial(i).baud, 0);
 }
@@ -89,10 +89,10 @@ static void settings_may_be_made_before_begin(void **)
     node.setResponseTimeout(30);
     node.begin(19200);
     assert_int_equal(node.readCoils(0, 1), ModbusMaster::ku8MBResponseTimedOut);
-    assert_in_range(bench().now - Serial.sentAt, 30000, 30500);
+    assert_in_range(board().now - Serial.sentAt, 30000, 30500);
 }
 
-static void a_request_before_begin_is_answered_with_a_status(void **)
+static void a_request_before_begin_returns_a_status(void **)
 {
     ModbusMaster node;
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBNotInitialised);
@@ -126,7 +126,7 @@ static void set_transmit_buffer_does_not_move_the_queue(void **)
     assert_sent(Serial, {1, 16, 0, 0, 0, 1, 2, 7, 8});
 }
 
-static void clearing_the_words_leaves_the_indices_alone(void **)
+static void clearing_the_words_keeps_the_indices(void **)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -343,9 +343,9 @@ static void constants_serve_as_values_labels_and_references(void **)
     }
 }
 
-typedef long LONG; // as FatFs has it
+typedef long LONG; // FatFs defines such a name
 
-static void every_status_has_the_words_that_it_has_in_c(void **)
+static void every_status_has_the_same_text_as_in_c(void **)
 {
     for (unsigned status = 0; status < 256; status++) {
         const uint8_t number = static_cast<uint8_t>(status);
@@ -388,11 +388,11 @@ int main()
         TEST(begin_with_a_stream_opens_nothing_and_may_be_repeated),
         TEST(words_may_be_queued_before_begin),
         TEST(settings_may_be_made_before_begin),
-        TEST(a_request_before_begin_is_answered_with_a_status),
+        TEST(a_request_before_begin_returns_a_status),
         TEST(response_words_past_the_end_are_ffff),
         TEST(transmit_words_past_the_end_are_refused_with_02),
         TEST(set_transmit_buffer_does_not_move_the_queue),
-        TEST(clearing_the_words_leaves_the_indices_alone),
+        TEST(clearing_the_words_keeps_the_indices),
         TEST(begin_transmission_sets_the_address_and_keeps_the_words),
         TEST(send_takes_every_integer_type),
         TEST(words_past_the_end_are_dropped),
@@ -403,7 +403,7 @@ int main()
         TEST(reading_and_writing_at_once_has_two_forms),
         TEST(write_single_register_overwrites_word_0),
         TEST(constants_serve_as_values_labels_and_references),
-        TEST(every_status_has_the_words_that_it_has_in_c),
+        TEST(every_status_has_the_same_text_as_in_c),
         TEST(helpers_split_and_join_words),
         TEST(arrays_hold_independent_objects),
     };

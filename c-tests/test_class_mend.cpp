@@ -1,4 +1,4 @@
-/* What goes wrong with ModbusMaster 2.0.1 and must not here. */
+/* The faults of ModbusMaster 2.0.1 that this class does not have. */
 #include "wire.h"
 
 #if defined(_UTIL_CRC16_H_)
@@ -66,7 +66,7 @@ static void a_byte_count_of_251_to_255_is_malformed(void **)
     }
 }
 
-static void fewer_words_than_asked_for_are_malformed(void **)
+static void a_reply_with_fewer_words_than_requested_is_malformed(void **)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -110,7 +110,7 @@ static void exceptions_are_checked(void **)
     }
 }
 
-static void noise_and_foreign_frames_before_the_reply_are_passed_over(void **)
+static void noise_and_frames_of_other_units_before_the_reply_are_skipped(void **)
 {
     const Bytes strays[] = {raw({0}),
                             raw({0xFF}),
@@ -161,33 +161,33 @@ public:
     size_t write(uint8_t) override { return 1; }
 };
 
-static void a_line_that_never_falls_silent_is_given_up(void **)
+static void a_request_on_a_line_that_is_never_silent_times_out(void **)
 {
     Babbler babbler;
     ModbusMaster node;
     node.begin(1, babbler);
     node.setResponseTimeout(100);
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBLineBusy);
-    assert_in_range(bench().now, 100000, 105000); /* the timeout and the gap */
+    assert_in_range(board().now, 100000, 105000); /* the timeout and the gap */
 }
 
-static void a_port_that_takes_no_bytes_is_given_up(void **)
+static void a_request_on_a_port_that_accepts_no_bytes_times_out(void **)
 {
     ModbusMaster node;
-    Serial.room = 0;
+    Serial.writeSpace = 0;
     node.begin(1, Serial);
     node.setResponseTimeout(100);
-    node.postTransmission([] { bench().note("post"); });
+    node.postTransmission([] { board().logEvent("post"); });
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBLineBusy);
-    assert_string_equal(bench().log.c_str(), "post ");
+    assert_string_equal(board().log.c_str(), "post ");
 }
 
-/* The silence before the request that `read` makes after a successful one. */
+/* Returns the silence before a request that follows a successful one. */
 static uint32_t silence_before(ModbusMaster &first, ModbusMaster &second)
 {
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(first.readHoldingRegisters(0, 1), 0);
-    uint32_t end = bench().now;
+    uint32_t end = board().now;
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(second.readHoldingRegisters(0, 1), 0);
     return Serial.startedAt - end;
@@ -212,7 +212,7 @@ static void the_silence_counts_from_another_objects_last_use(void **)
     ModbusMaster first, second;
     first.begin(1, Serial);
     second.begin(1, Serial);
-    bench().now += 1000000;
+    board().now += 1000000;
     for (int again = 0; again < 3; again++) {
         assert_in_range(silence_before(first, second), gap_without_baud_rate,
                         gap_without_baud_rate + 100);
@@ -221,38 +221,38 @@ static void the_silence_counts_from_another_objects_last_use(void **)
     }
 }
 
-static void a_silent_line_is_not_waited_for_again(void **)
+static void a_line_that_was_silent_for_long_enough_needs_no_wait(void **)
 {
     ModbusMaster node;
     node.begin(1, Serial);
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(node.readHoldingRegisters(0, 1), 0);
-    bench().now += 1000000;
-    uint32_t asked = bench().now;
+    board().now += 1000000;
+    uint32_t other_request = board().now;
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(node.readHoldingRegisters(0, 1), 0);
-    assert_in_range(Serial.startedAt - asked, 0, 200);
+    assert_in_range(Serial.startedAt - other_request, 0, 200);
 }
 
-static void a_pause_between_two_objects_is_not_waited_for_again(void **)
+static void a_pause_between_two_objects_counts_as_silence(void **)
 {
     ModbusMaster first, second;
     first.begin(1, Serial);
     second.begin(1, Serial);
-    bench().now += 100000000; /* later than the clock of any test before */
-    uint32_t asked = bench().now;
+    board().now += 100000000; /* later than any time of an earlier test */
+    uint32_t other_request = board().now;
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(first.readHoldingRegisters(0, 1), 0);
-    assert_in_range(Serial.startedAt - asked, 0, 200);
-    bench().now += 1000000;
-    asked = bench().now;
+    assert_in_range(Serial.startedAt - other_request, 0, 200);
+    board().now += 1000000;
+    other_request = board().now;
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(second.readHoldingRegisters(0, 1), 0);
-    assert_in_range(Serial.startedAt - asked, 0, 200);
+    assert_in_range(Serial.startedAt - other_request, 0, 200);
 }
 
-/* A device that answers in order, but the first time later than the timeout. */
-static void a_late_reply_does_not_shift_the_answers_of_later_requests(void **)
+/* A device whose first reply is later than the timeout. It replies to all requests in order. */
+static void a_late_reply_is_not_taken_for_that_of_a_later_request(void **)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -276,16 +276,16 @@ static void the_response_timeout_can_be_set(void **)
         node.setQuietTime(0);
         node.setGap(0);
         assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBResponseTimedOut);
-        assert_in_range(bench().now - Serial.sentAt, ms * 1000, ms * 1000 + 200);
+        assert_in_range(board().now - Serial.sentAt, ms * 1000, ms * 1000 + 200);
     }
 }
 
-/* How long a call takes that nothing answers: the request on the wire, and the timeout. */
+/* The time of a call without a reply: that of the request on the wire, and the timeout. */
 static uint32_t failing_call(ModbusMaster &node)
 {
-    uint32_t began = bench().now;
+    uint32_t began = board().now;
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBResponseTimedOut);
-    return bench().now - began;
+    return board().now - began;
 }
 
 static void the_quiet_time_counts_from_the_failure_while_the_sketch_does_other_work(void **)
@@ -296,17 +296,17 @@ static void the_quiet_time_counts_from_the_failure_while_the_sketch_does_other_w
     other.begin(2, Serial);
     node.setResponseTimeout(200);
     other.setResponseTimeout(200);
-    bench().now += 1000000;
+    board().now += 1000000;
     assert_in_range(failing_call(node), call, call + slack);
     for (uint32_t pause : {150000u, 100000u, 60000u, 1000u}) {
         uint32_t left = pause < 100000 ? 100000 - pause : 0;
-        bench().now += pause;
-        node.begin(1, Serial); /* as sketches do before each request */
+        board().now += pause;
+        node.begin(1, Serial); /* some sketches do so before each request */
         assert_in_range(failing_call(node), call + left, call + left + slack);
     }
-    /* Another object on the same line only keeps the gap. */
+    /* For another object on the same line only the gap counts, not the quiet time. */
     assert_in_range(failing_call(other), call, call + 4000 + slack);
-    bench().now += 100000;
+    board().now += 100000;
     assert_in_range(failing_call(node), call, call + slack);
 }
 
@@ -328,7 +328,7 @@ static void a_broadcast_succeeds_after_the_turnaround_delay(void **)
     node.setTurnaroundDelay(70);
     assert_int_equal(node.writeSingleRegister(1, 2), 0);
     assert_sent(Serial, {0, 6, 0, 1, 0, 2});
-    assert_in_range(bench().now - Serial.sentAt, 70000, 70200);
+    assert_in_range(board().now - Serial.sentAt, 70000, 70200);
     assert_int_equal(node.readCoils(0, 1), ModbusMaster::ku8MBBroadcastNotAllowed);
     assert_int_equal(Serial.sent.size(), 0);
 }
@@ -337,7 +337,7 @@ static void a_reply_complete_as_the_deadline_passes_succeeds(void **)
 {
     ModbusMaster node;
     node.begin(1, Serial);
-    node.idle([] { bench().now += 3000000; });
+    node.idle([] { board().now += 3000000; });
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(node.readHoldingRegisters(0, 1), 0);
     assert_int_equal(node.getResponseBuffer(0), 7);
@@ -388,7 +388,7 @@ static void the_driver_can_be_held_on_after_the_flush(void **)
     ModbusMaster node;
     node.begin(9600);
     node.setPostFlushHold(2);
-    node.postTransmission([] { released = bench().now; });
+    node.postTransmission([] { released = board().now; });
     Serial.delay = 10000;
     Serial.reply(adu({1, 3, 2, 0, 7}));
     assert_int_equal(node.readHoldingRegisters(0, 1), 0);
@@ -414,9 +414,9 @@ static void the_wait_yields(void **)
     ModbusMaster node;
     node.begin(1, Serial);
     node.setResponseTimeout(100);
-    unsigned before = bench().yields;
+    unsigned before = board().yields;
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBResponseTimedOut);
-    assert_true(bench().yields - before > 4000);
+    assert_true(board().yields - before > 4000);
 }
 
 static void a_request_without_a_reply_is_repeated_with_setRetries(void **)
@@ -461,18 +461,18 @@ int main()
         TEST(the_largest_reads_are_complete),
         TEST(writes_of_more_than_the_buffer_send_nothing),
         TEST(a_byte_count_of_251_to_255_is_malformed),
-        TEST(fewer_words_than_asked_for_are_malformed),
+        TEST(a_reply_with_fewer_words_than_requested_is_malformed),
         TEST(an_echo_with_other_values_is_malformed),
         TEST(exceptions_are_checked),
-        TEST(noise_and_foreign_frames_before_the_reply_are_passed_over),
+        TEST(noise_and_frames_of_other_units_before_the_reply_are_skipped),
         TEST(a_lenient_object_accepts_replies_that_deviate),
-        TEST(a_line_that_never_falls_silent_is_given_up),
-        TEST(a_port_that_takes_no_bytes_is_given_up),
+        TEST(a_request_on_a_line_that_is_never_silent_times_out),
+        TEST(a_request_on_a_port_that_accepts_no_bytes_times_out),
         TEST(a_silence_is_kept_before_each_request),
         TEST(the_silence_counts_from_another_objects_last_use),
-        TEST(a_silent_line_is_not_waited_for_again),
-        TEST(a_pause_between_two_objects_is_not_waited_for_again),
-        TEST(a_late_reply_does_not_shift_the_answers_of_later_requests),
+        TEST(a_line_that_was_silent_for_long_enough_needs_no_wait),
+        TEST(a_pause_between_two_objects_counts_as_silence),
+        TEST(a_late_reply_is_not_taken_for_that_of_a_later_request),
         TEST(the_response_timeout_can_be_set),
         TEST(the_quiet_time_counts_from_the_failure_while_the_sketch_does_other_work),
         TEST(the_slave_can_be_changed),

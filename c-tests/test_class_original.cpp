@@ -20,7 +20,7 @@ static void crc16_update_computes_the_crc_of_a_frame(void **)
         crc = crc16_update(crc, frame[i]);
     assert_int_equal(lowByte(crc), frame[frame.size() - 2]);
     assert_int_equal(highByte(crc), frame[frame.size() - 1]);
-    /* "123456789", the check of CRC-16/MODBUS */
+    /* "123456789", the check value of CRC-16/MODBUS */
     crc = 0xFFFF;
     for (int digit = '1'; digit <= '9'; digit++)
         crc = crc16_update(crc, static_cast<uint8_t>(digit));
@@ -72,7 +72,7 @@ static void the_debug_pins_show_reads_and_idle_calls(void **)
     assert_true(idles > 0);
 }
 
-/* Takes every byte, and returns 0 for it. */
+/* Accepts every byte and returns 0. */
 class Uncounted : public Stream {
 public:
     Bytes sent;
@@ -87,7 +87,7 @@ public:
     void flush() override { Serial.flush(); }
 };
 
-static void a_stream_that_counts_no_bytes_sends_each_request_once(void **)
+static void a_stream_that_returns_no_count_sends_each_request_once(void **)
 {
     Uncounted stream;
     ModbusMaster node;
@@ -102,9 +102,9 @@ static void a_stream_that_counts_no_bytes_sends_each_request_once(void **)
     }
 }
 
-static void a_stream_that_counts_no_bytes_sends_the_longest_request(void **)
+static void a_stream_that_returns_no_count_sends_the_longest_request(void **)
 {
-    const uint16_t words = 121; /* the most that function 17 writes: 255 bytes */
+    const uint16_t words = 121; /* the longest request of function 17: 255 bytes */
     Bytes request = raw({1, 0x17, 0, 0, 0, 1, 0, 0, 0, words, 2 * words});
     Uncounted stream;
     ModbusMaster node;
@@ -120,7 +120,7 @@ static void a_stream_that_counts_no_bytes_sends_the_longest_request(void **)
     assert_int_equal(stream.sent.size(), 255);
 }
 
-/* Takes three bytes, then none for a while; sets no write error. */
+/* Accepts three bytes, then no byte for some time. Sets no write error. */
 class Full : public Uncounted {
 public:
     int space = 3;
@@ -135,18 +135,18 @@ public:
     }
 };
 
-static void a_full_buffer_is_distinguished_from_a_stream_that_counts_no_bytes(void **)
+static void a_full_buffer_is_distinguished_from_a_stream_that_returns_no_count(void **)
 {
     Full stream;
     Uncounted other;
     ModbusMaster node;
     for (int i = 0; i < 3; i++) {
-        node.begin(1, stream); /* the same Stream: the object still knows that it counts */
+        node.begin(1, stream); /* the object remembers that this Stream returns counts */
         stream.sent.clear();
         Serial.reply(adu({1, 3, 2, 0, i}));
         assert_int_equal(node.readHoldingRegisters(0, 1), 0);
         assert_bytes(stream.sent, adu({1, 3, 0, 0, 0, 1}));
-        stream.space = 0; /* from the second request on it is full at the first byte too */
+        stream.space = 0; /* from the second request on the Stream accepts no first byte either */
     }
     node.begin(1, other);
     Serial.reply(adu({1, 3, 2, 0, 9}));
@@ -154,7 +154,8 @@ static void a_full_buffer_is_distinguished_from_a_stream_that_counts_no_bytes(vo
     assert_bytes(other.sent, adu({1, 3, 0, 0, 0, 1}));
 }
 
-/* As Arduino's USB port without a host, and SoftwareSerial at a rate it cannot do. */
+/* Sets its write error, like Arduino's USB port without a host and SoftwareSerial at a baud rate
+ * that it does not support. */
 class Refusing : public Uncounted {
 public:
     size_t write(uint8_t) override
@@ -164,7 +165,7 @@ public:
     }
 };
 
-static void a_stream_that_sets_its_write_error_took_nothing(void **)
+static void a_write_error_means_that_no_byte_was_accepted(void **)
 {
     Refusing stream;
     ModbusMaster node;
@@ -180,10 +181,10 @@ int main()
         TEST(the_helpers_split_and_join_words),
         TEST(members_have_the_originals_types),
         TEST(the_debug_pins_show_reads_and_idle_calls),
-        TEST(a_stream_that_counts_no_bytes_sends_each_request_once),
-        TEST(a_stream_that_counts_no_bytes_sends_the_longest_request),
-        TEST(a_full_buffer_is_distinguished_from_a_stream_that_counts_no_bytes),
-        TEST(a_stream_that_sets_its_write_error_took_nothing),
+        TEST(a_stream_that_returns_no_count_sends_each_request_once),
+        TEST(a_stream_that_returns_no_count_sends_the_longest_request),
+        TEST(a_full_buffer_is_distinguished_from_a_stream_that_returns_no_count),
+        TEST(a_write_error_means_that_no_byte_was_accepted),
     };
 
     return cmocka_run_group_tests_name("class of the original", tests, nullptr, nullptr);

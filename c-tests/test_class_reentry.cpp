@@ -1,5 +1,5 @@
-/* The classes, called from within their own callbacks: refused, and nothing changes. */
-#include "serving.h"
+/* Calls from within an object's own callbacks are refused and change nothing. */
+#include "server_checks.h"
 
 #include "ModbusMaster.h"
 
@@ -84,8 +84,8 @@ static void hooks_cannot_begin_their_server(void **)
     registers.beforeWrite(begin_other);
     assert_int_equal(server.holdingRegisters(registers), MBM_OK);
     assert_int_equal(server.begin(17, Serial, 19200), MBM_OK);
-    answers(server, {17, 6, 0, 1, 0, 5}, {17, 6, 0, 1, 0, 5});
-    answers(server, {17, 6, 0, 1, 0, 6}, {17, 6, 0, 1, 0, 6});
+    expect_response(server, {17, 6, 0, 1, 0, 5}, {17, 6, 0, 1, 0, 5});
+    expect_response(server, {17, 6, 0, 1, 0, 6}, {17, 6, 0, 1, 0, 6});
     assert_int_equal(entered, 2);
     assert_int_equal(registers[1], 6);
 }
@@ -99,8 +99,8 @@ static void several_units_may_serve_one_array(void **)
     assert_int_equal(units[1].holdingRegisters(registers), MBM_OK);
     assert_int_equal(units[1].inputRegisters(registers), MBM_BUSY);
     assert_int_equal(server.begin(units, Serial, 19200), MBM_OK);
-    answers(server, {17, 6, 0, 1, 0, 5}, {17, 6, 0, 1, 0, 5});
-    answers(server, {18, 3, 0, 1, 0, 1}, {18, 3, 2, 0, 5});
+    expect_response(server, {17, 6, 0, 1, 0, 5}, {17, 6, 0, 1, 0, 5});
+    expect_response(server, {18, 3, 0, 1, 0, 1}, {18, 3, 2, 0, 5});
 }
 
 int main()

@@ -1,4 +1,5 @@
-/* The class against a real libmodbus server, at the far end of a pty. */
+/* ModbusMaster with a real libmodbus server on a pty. */
+#include "pty_stream.h"
 #include "wire.h"
 
 extern "C" {
@@ -7,26 +8,6 @@ extern "C" {
 }
 
 #include <poll.h>
-#include <sys/ioctl.h>
-#include <unistd.h>
-
-class PtyStream : public Stream {
-public:
-    int fd = -1;
-
-    int available() override
-    {
-        int waiting = 0;
-        return ioctl(fd, FIONREAD, &waiting) == 0 ? waiting : 0;
-    }
-    int read() override
-    {
-        uint8_t value;
-        return available() > 0 && ::read(fd, &value, 1) == 1 ? value : -1;
-    }
-    int peek() override { return -1; }
-    size_t write(uint8_t value) override { return ::write(fd, &value, 1) == 1; }
-};
 
 static server peer;
 static PtyStream line;
@@ -34,7 +15,7 @@ static ModbusMaster node;
 
 static int start(void **)
 {
-    bench().realTime = true;
+    board().realTime = true;
     server_start(&peer, 17);
     line.fd = peer.line.ours;
     node = ModbusMaster();
@@ -97,7 +78,7 @@ static void writes_reach_the_servers_memory(void **)
     assert_int_equal(node.getResponseBuffer(0), 0x7777);
 }
 
-static void an_exception_of_the_server_is_handed_on(void **)
+static void an_exception_of_the_server_is_returned(void **)
 {
     assert_int_equal(node.readHoldingRegisters(SERVER_REGISTERS, 1),
                      ModbusMaster::ku8MBIllegalDataAddress);
@@ -120,7 +101,7 @@ int main()
     const struct CMUnitTest tests[] = {
         SERVED(reads_what_the_server_holds),
         SERVED(writes_reach_the_servers_memory),
-        SERVED(an_exception_of_the_server_is_handed_on),
+        SERVED(an_exception_of_the_server_is_returned),
         SERVED(copies_take_turns_on_one_line),
     };
 

@@ -1,5 +1,5 @@
-/* The class that serves: silences, the driver, echoes and damage on its line. */
-#include "serving.h"
+/* ModbusServer: silences, the driver, echoes and damaged frames. */
+#include "server_checks.h"
 
 static void a_response_begins_after_the_silence(void **)
 {
@@ -8,20 +8,20 @@ static void a_response_begins_after_the_silence(void **)
     server.holdingRegisters(registers);
     server.begin(17, Serial, 19200);
     Bytes request = adu({17, 3, 0, 0, 0, 1});
-    uint32_t last = bench().now + 100 + 573 * static_cast<uint32_t>(request.size() - 1);
-    Serial.arrive(request, bench().now + 100, 573);
-    loops(server);
+    uint32_t last = board().now + 100 + 573 * static_cast<uint32_t>(request.size() - 1);
+    Serial.arrive(request, board().now + 100, 573);
+    run_loop(server);
     assert_int_equal(Serial.sent.size(), 1);
-    assert_in_range(Serial.startedAt - last, t35, t35 + 6 * bench().tick);
+    assert_in_range(Serial.startedAt - last, t35, t35 + 6 * board().tick);
     Serial.sent.clear();
     server.setSilence(9000);
-    last = bench().now;
-    hears(server, request);
-    assert_in_range(Serial.startedAt - last, 9000, 9000 + 6 * bench().tick);
+    last = board().now;
+    receive(server, request);
+    assert_in_range(Serial.startedAt - last, 9000, 9000 + 6 * board().tick);
     server.setBaudRate(0); // unknown baud rate: 4 ms
-    last = bench().now;
-    hears(server, request);
-    assert_in_range(Serial.startedAt - last, 4000, 4000 + 6 * bench().tick);
+    last = board().now;
+    receive(server, request);
+    assert_in_range(Serial.startedAt - last, 4000, 4000 + 6 * board().tick);
 }
 
 static void a_request_may_pause_for_t15(void **)
@@ -34,40 +34,26 @@ static void a_request_may_pause_for_t15(void **)
     Bytes request = adu({17, 6, 0, 0, 0, 1});
     Bytes front(request.begin(), request.begin() + 4), rest(request.begin() + 4, request.end());
     Serial.inject(front);
-    Serial.arrive(rest, bench().now + t15, 573);
-    loops(server);
+    Serial.arrive(rest, board().now + t15, 573);
+    run_loop(server);
     assert_sent(Serial, {17, 6, 0, 0, 0, 1});
     registers[0] = 0;
     Serial.inject(front);
-    Serial.arrive(rest, bench().now + 2 * t35, 573);
-    loops(server);
+    Serial.arrive(rest, board().now + 2 * t35, 573);
+    run_loop(server);
     assert_int_equal(Serial.sent.size(), 0);
     assert_int_equal(registers[0], 0);
 }
-
-/* As some variants of SoftwareSerial. */
-class Silent : public HardwareSerial {
-public:
-    size_t write(uint8_t value) override
-    {
-        HardwareSerial::write(value);
-        return 0;
-    }
-    size_t write(const uint8_t *bytes, size_t length) override
-    {
-        return length > 0 ? write(bytes[0]) : 0;
-    }
-};
 
 static void a_stream_that_returns_0_for_what_it_sends_works(void **)
 {
     ModbusRegisterArray<1> registers;
     ModbusServer server;
-    Silent port;
+    ZeroWriteSerial port;
     server.holdingRegisters(registers);
     server.begin(17, port, 19200);
     port.inject(adu({17, 3, 0, 0, 0, 1}));
-    loops(server);
+    run_loop(server);
     assert_sent(port, {17, 3, 2, 0, 0});
 }
 
@@ -78,21 +64,21 @@ static void the_driver_is_off_until_the_silence_has_passed(void **)
     ModbusServer server;
     server.inputRegisters(registers);
     server.begin(17, Serial, 19200);
-    server.preTransmission([] { on = bench().now; });
-    uint32_t asked = bench().now;
-    answers(server, {17, 3, 0, 0, 0, 1}, {17, 0x83, 1});
-    assert_in_range(on - asked, t35, t35 + 6 * bench().tick);
+    server.preTransmission([] { on = board().now; });
+    uint32_t requested_at = board().now;
+    expect_response(server, {17, 3, 0, 0, 0, 1}, {17, 0x83, 1});
+    assert_in_range(on - requested_at, t35, t35 + 6 * board().tick);
 }
 
-static void a_sketch_may_sleep_for_as_long_as_nothing_is_to_do(void **)
+static void a_sketch_may_sleep_for_the_time_of_pollDelay(void **)
 {
     ModbusServer server;
     server.begin(17, Serial, 19200);
     assert_int_equal(server.pollDelay(), 0xFFFFFFFF);
     Serial.inject(raw({17}));
     server.poll();
-    // A request is carried out while the silence before its response lasts.
-    assert_in_range(server.pollDelay(), t35 / 2 - 6 * bench().tick, t35 / 2);
+    // The server executes a request during the silence before its response.
+    assert_in_range(server.pollDelay(), t35 / 2 - 6 * board().tick, t35 / 2);
 }
 
 static void the_driver_is_on_while_a_response_leaves(void **)
@@ -101,19 +87,19 @@ static void the_driver_is_on_while_a_response_leaves(void **)
     ModbusServer server;
     server.holdingRegisters(registers);
     server.begin(17, Serial, 19200);
-    server.preTransmission([] { bench().note("pre"); });
-    server.postTransmission([] { bench().note("post"); });
-    hears(server, adu({17, 3, 0, 0, 0, 1}));
-    assert_string_equal(bench().log.c_str(), "read pre write flush post ");
-    bench().log.clear();
+    server.preTransmission([] { board().logEvent("pre"); });
+    server.postTransmission([] { board().logEvent("post"); });
+    receive(server, adu({17, 3, 0, 0, 0, 1}));
+    assert_string_equal(board().log.c_str(), "read pre write flush post ");
+    board().log.clear();
     Serial.sent.clear();
-    keeps_silent(server, adu({18, 3, 0, 0, 0, 1}));
-    assert_string_equal(bench().log.c_str(), "read ");
+    expect_no_response(server, adu({18, 3, 0, 0, 0, 1}));
+    assert_string_equal(board().log.c_str(), "read ");
     server.preTransmission(nullptr);
     server.postTransmission(nullptr);
-    bench().log.clear();
-    hears(server, adu({17, 3, 0, 0, 0, 1}));
-    assert_string_equal(bench().log.c_str(), "read write flush ");
+    board().log.clear();
+    receive(server, adu({17, 3, 0, 0, 0, 1}));
+    assert_string_equal(board().log.c_str(), "read write flush ");
 }
 
 static void counts(void *context)
@@ -121,7 +107,7 @@ static void counts(void *context)
     ++*static_cast<int *>(context);
 }
 
-static void callbacks_are_handed_their_context(void **)
+static void callbacks_get_their_context(void **)
 {
     int on = 0, off = 0;
     ModbusRegisterArray<1> registers;
@@ -130,8 +116,8 @@ static void callbacks_are_handed_their_context(void **)
     server.begin(17, Serial, 19200);
     server.preTransmission(counts, &on);
     server.postTransmission(counts, &off);
-    answers(server, {17, 3, 0, 0, 0, 1}, {17, 0x83, 1});
-    answers(server, {17, 3, 0, 0, 0, 1}, {17, 0x83, 1});
+    expect_response(server, {17, 3, 0, 0, 0, 1}, {17, 0x83, 1});
+    expect_response(server, {17, 3, 0, 0, 0, 1}, {17, 0x83, 1});
     assert_int_equal(on, 2);
     assert_int_equal(off, 2);
 }
@@ -143,27 +129,27 @@ static void an_echo_of_the_response_is_dropped_if_set_so(void **)
     server.holdingRegisters(registers);
     server.begin(17, Serial, 19200);
     server.setEchoDiscard(true);
-    // The echo of function 06 is a request, word for word.
+    // The response of function 06 has the same bytes as its request.
     server.preTransmission([] { Serial.inject(adu({17, 6, 0, 1, 0, 7})); });
-    answers(server, {17, 6, 0, 1, 0, 7}, {17, 6, 0, 1, 0, 7});
+    expect_response(server, {17, 6, 0, 1, 0, 7}, {17, 6, 0, 1, 0, 7});
     server.preTransmission(nullptr);
-    answers(server, {17, 3, 0, 1, 0, 1}, {17, 3, 2, 0, 7});
+    expect_response(server, {17, 3, 0, 1, 0, 1}, {17, 3, 2, 0, 7});
 }
 
-static void a_write_taken_in_pieces_is_one_response(void **)
+static void a_response_written_in_pieces_is_one_frame(void **)
 {
     ModbusRegisterArray<2> registers;
     ModbusServer server;
-    Serial.room = 2;
+    Serial.writeSpace = 2;
     server.holdingRegisters(registers);
     server.begin(17, Serial, 19200);
-    server.preTransmission([] { bench().note("pre"); });
-    server.postTransmission([] { bench().note("post"); });
-    answers(server, {17, 3, 0, 0, 0, 2}, {17, 3, 4, 0, 0, 0, 0});
-    assert_string_equal(bench().log.c_str(), "read pre write flush post ");
+    server.preTransmission([] { board().logEvent("pre"); });
+    server.postTransmission([] { board().logEvent("post"); });
+    expect_response(server, {17, 3, 0, 0, 0, 2}, {17, 3, 4, 0, 0, 0, 0});
+    assert_string_equal(board().log.c_str(), "read pre write flush post ");
 }
 
-static void damaged_and_foreign_frames_are_not_answered(void **)
+static void damaged_frames_and_those_of_other_units_get_no_response(void **)
 {
     ModbusRegisterArray<1> registers;
     ModbusServer server;
@@ -171,12 +157,12 @@ static void damaged_and_foreign_frames_are_not_answered(void **)
     server.begin(17, Serial, 19200);
     Bytes damaged = adu({17, 6, 0, 0, 0, 9});
     damaged[5] ^= 1;
-    keeps_silent(server, damaged);
-    keeps_silent(server, adu({18, 6, 0, 0, 0, 9}));
-    keeps_silent(server, adu({18, 3, 2, 0, 9}));
-    keeps_silent(server, raw({17, 6, 0}));
+    expect_no_response(server, damaged);
+    expect_no_response(server, adu({18, 6, 0, 0, 0, 9}));
+    expect_no_response(server, adu({18, 3, 2, 0, 9}));
+    expect_no_response(server, raw({17, 6, 0}));
     assert_int_equal(registers[0], 0);
-    answers(server, {17, 6, 0, 0, 0, 9}, {17, 6, 0, 0, 0, 9});
+    expect_response(server, {17, 6, 0, 0, 0, 9}, {17, 6, 0, 0, 0, 9});
 }
 
 static void ascii_is_served(void **)
@@ -185,41 +171,41 @@ static void ascii_is_served(void **)
     ModbusUnit units[1] = {{17}};
     ModbusServer server;
     static const char request[] = ":110300000001EB\r\n", response[] = ":1103020000EA\r\n";
-    Bytes asked(request, request + sizeof request - 1);
+    Bytes frame(request, request + sizeof request - 1);
     Bytes answer(response, response + sizeof response - 1);
     server.holdingRegisters(registers);
     units[0].holdingRegisters(registers);
     assert_int_equal(server.beginAscii(17, Serial), MBM_OK);
-    hears(server, asked);
+    receive(server, frame);
     assert_int_equal(Serial.sent.size(), 1);
     assert_bytes(Serial.sent[0], answer);
     Serial.sent.clear();
     assert_int_equal(server.beginAscii(units, Serial), MBM_OK);
-    hears(server, asked);
+    receive(server, frame);
     assert_int_equal(Serial.sent.size(), 1);
     assert_bytes(Serial.sent[0], answer);
 }
 
-static void a_baud_rate_does_not_shorten_what_ascii_waits_for(void **)
+static void a_baud_rate_does_not_change_the_timeout_of_ascii(void **)
 {
     ModbusRegisterArray<1> registers;
     ModbusServer server;
     static const char request[] = ":110300000001EB\r\n";
-    Bytes asked(request, request + sizeof request - 1);
+    Bytes frame(request, request + sizeof request - 1);
     server.holdingRegisters(registers);
     assert_int_equal(server.beginAscii(17, Serial), MBM_OK);
     server.setBaudRate(19200);
-    Serial.arrive(asked, bench().now + 100, 3000);
+    Serial.arrive(frame, board().now + 100, 3000);
     for (int i = 0; i < 4; i++)
-        loops(server);
+        run_loop(server);
     assert_int_equal(Serial.sent.size(), 1);
     Serial.sent.clear();
     server.begin(17, Serial, 19200);
     server.beginAscii(17, Serial);
     server.setBaudRate(19200);
-    Serial.arrive(asked, bench().now + 100, 3000);
+    Serial.arrive(frame, board().now + 100, 3000);
     for (int i = 0; i < 4; i++)
-        loops(server);
+        run_loop(server);
     assert_int_equal(Serial.sent.size(), 1);
 }
 
@@ -234,8 +220,8 @@ static void begin_may_be_called_again(void **)
     Serial1.inject(raw({18, 3}));
     server.poll();
     server.begin(18, Serial, 19200);
-    answers(server, {18, 3, 0, 0, 0, 1}, {18, 3, 2, 0, 0});
-    keeps_silent(server, adu({17, 3, 0, 0, 0, 1}));
+    expect_response(server, {18, 3, 0, 0, 0, 1}, {18, 3, 2, 0, 0});
+    expect_no_response(server, adu({17, 3, 0, 0, 0, 1}));
     assert_int_equal(Serial1.sent.size(), 0);
 }
 
@@ -246,14 +232,14 @@ int main()
         TEST(a_request_may_pause_for_t15),
         TEST(a_stream_that_returns_0_for_what_it_sends_works),
         TEST(the_driver_is_off_until_the_silence_has_passed),
-        TEST(a_sketch_may_sleep_for_as_long_as_nothing_is_to_do),
+        TEST(a_sketch_may_sleep_for_the_time_of_pollDelay),
         TEST(the_driver_is_on_while_a_response_leaves),
-        TEST(callbacks_are_handed_their_context),
+        TEST(callbacks_get_their_context),
         TEST(an_echo_of_the_response_is_dropped_if_set_so),
-        TEST(a_write_taken_in_pieces_is_one_response),
-        TEST(damaged_and_foreign_frames_are_not_answered),
+        TEST(a_response_written_in_pieces_is_one_frame),
+        TEST(damaged_frames_and_those_of_other_units_get_no_response),
         TEST(ascii_is_served),
-        TEST(a_baud_rate_does_not_shorten_what_ascii_waits_for),
+        TEST(a_baud_rate_does_not_change_the_timeout_of_ascii),
         TEST(begin_may_be_called_again),
     };
 

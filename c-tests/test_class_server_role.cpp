@@ -1,5 +1,5 @@
-/* The class that serves: what a sketch is promised, on the shim's board. */
-#include "serving.h"
+/* ModbusServer on a simulated board: what its documentation promises. */
+#include "server_checks.h"
 
 static void registers_and_bits_of_arrays_are_served(void **)
 {
@@ -13,14 +13,14 @@ static void registers_and_bits_of_arrays_are_served(void **)
     assert_int_equal(server.coils(coils), MBM_OK);
     assert_int_equal(server.discreteInputs(inputs), MBM_OK);
     assert_int_equal(server.begin(17, Serial, 19200), MBM_OK);
-    answers(server, {17, 3, 0, 100, 0, 3}, {17, 3, 6, 0x11, 0x11, 0x22, 0x22, 0x33, 0x33});
-    answers(server, {17, 3, 0, 99, 0, 1}, {17, 0x83, 2});
-    answers(server, {17, 3, 0, 101, 0, 3}, {17, 0x83, 2});
-    answers(server, {17, 4, 0, 8, 0, 1}, {17, 4, 2, 0x22, 0x22});
-    answers(server, {17, 4, 0, 8, 0, 2}, {17, 0x84, 2});
-    answers(server, {17, 1, 0, 0, 0, 16}, {17, 1, 2, 0x05, 0x80});
-    answers(server, {17, 2, 0, 20, 0, 3}, {17, 2, 1, 5});
-    answers(server, {17, 2, 0, 20, 0, 4}, {17, 0x82, 2});
+    expect_response(server, {17, 3, 0, 100, 0, 3}, {17, 3, 6, 0x11, 0x11, 0x22, 0x22, 0x33, 0x33});
+    expect_response(server, {17, 3, 0, 99, 0, 1}, {17, 0x83, 2});
+    expect_response(server, {17, 3, 0, 101, 0, 3}, {17, 0x83, 2});
+    expect_response(server, {17, 4, 0, 8, 0, 1}, {17, 4, 2, 0x22, 0x22});
+    expect_response(server, {17, 4, 0, 8, 0, 2}, {17, 0x84, 2});
+    expect_response(server, {17, 1, 0, 0, 0, 16}, {17, 1, 2, 0x05, 0x80});
+    expect_response(server, {17, 2, 0, 20, 0, 3}, {17, 2, 1, 5});
+    expect_response(server, {17, 2, 0, 20, 0, 4}, {17, 0x82, 2});
     assert_int_equal(holding.size(), 3);
     assert_int_equal(holding.address(), 100);
     assert_int_equal(coils.size(), 16);
@@ -35,19 +35,19 @@ static void writes_reach_the_arrays(void **)
     server.holdingRegisters(registers);
     server.coils(coils);
     server.begin(17, Serial, 19200);
-    answers(server, {17, 6, 0, 11, 0xBE, 0xEF}, {17, 6, 0, 11, 0xBE, 0xEF});
+    expect_response(server, {17, 6, 0, 11, 0xBE, 0xEF}, {17, 6, 0, 11, 0xBE, 0xEF});
     assert_int_equal(registers[1], 0xBEEF);
-    answers(server, {17, 16, 0, 12, 0, 2, 4, 1, 2, 3, 4}, {17, 16, 0, 12, 0, 2});
+    expect_response(server, {17, 16, 0, 12, 0, 2, 4, 1, 2, 3, 4}, {17, 16, 0, 12, 0, 2});
     assert_int_equal(registers[2], 0x0102);
     assert_int_equal(registers[3], 0x0304);
-    answers(server, {17, 16, 0, 13, 0, 2, 4, 9, 9, 9, 9}, {17, 0x90, 2});
-    assert_int_equal(registers[3], 0x0304); // all of it or nothing
-    answers(server, {17, 5, 0, 8, 0xFF, 0}, {17, 5, 0, 8, 0xFF, 0});
+    expect_response(server, {17, 16, 0, 13, 0, 2, 4, 9, 9, 9, 9}, {17, 0x90, 2});
+    assert_int_equal(registers[3], 0x0304); // unchanged: a refused write writes no register
+    expect_response(server, {17, 5, 0, 8, 0xFF, 0}, {17, 5, 0, 8, 0xFF, 0});
     assert_true(coils[8]);
-    answers(server, {17, 15, 0, 1, 0, 3, 1, 5}, {17, 15, 0, 1, 0, 3});
+    expect_response(server, {17, 15, 0, 1, 0, 3, 1, 5}, {17, 15, 0, 1, 0, 3});
     assert_true(coils[1] && !coils[2] && coils[3]);
-    answers(server, {17, 5, 0, 8, 0x12, 0}, {17, 0x85, 3});
-    answers(server, {17, 5, 0, 9, 0, 0}, {17, 0x85, 2});
+    expect_response(server, {17, 5, 0, 8, 0x12, 0}, {17, 0x85, 3});
+    expect_response(server, {17, 5, 0, 9, 0, 0}, {17, 0x85, 2});
 }
 
 static void a_sketch_sets_what_a_client_reads(void **)
@@ -58,14 +58,14 @@ static void a_sketch_sets_what_a_client_reads(void **)
     server.inputRegisters(readings);
     server.discreteInputs(inputs);
     server.begin(1, Serial, 19200);
-    answers(server, {1, 4, 0, 0, 0, 2}, {1, 4, 4, 0, 0, 0, 0});
+    expect_response(server, {1, 4, 0, 0, 0, 2}, {1, 4, 4, 0, 0, 0, 0});
     readings[1] = 513;
     inputs.set(9, true);
     inputs.set(1, true);
     inputs.set(2, true);
     inputs.set(1, false);
-    answers(server, {1, 4, 0, 0, 0, 2}, {1, 4, 4, 0, 0, 2, 1});
-    answers(server, {1, 2, 0, 0, 0, 10}, {1, 2, 2, 4, 2});
+    expect_response(server, {1, 4, 0, 0, 0, 2}, {1, 4, 4, 0, 0, 2, 1});
+    expect_response(server, {1, 2, 0, 0, 0, 10}, {1, 2, 2, 4, 2});
     const ModbusRegisters &same = readings;
     assert_int_equal(same[1], 513);
 }
@@ -89,21 +89,21 @@ static void one_hook_refuses_a_write_and_another_is_called_after_it(void **)
     });
     server.holdingRegisters(registers);
     server.begin(17, Serial, 19200);
-    answers(server, {17, 6, 0, 11, 0x11, 0}, {17, 0x86, 4});
+    expect_response(server, {17, 6, 0, 11, 0x11, 0}, {17, 0x86, 4});
     assert_int_equal(registers[1], 0);
     assert_int_equal(written_count, 0);
-    answers(server, {17, 6, 0, 11, 0x10, 0}, {17, 6, 0, 11, 0x10, 0});
+    expect_response(server, {17, 6, 0, 11, 0x10, 0}, {17, 6, 0, 11, 0x10, 0});
     assert_int_equal(registers[1], 0x1000);
     assert_int_equal(written_count, 1);
     assert_int_equal(written_address, 11);
     assert_int_equal(written_quantity, 1);
     registers.beforeWrite(nullptr);
     registers.afterWrite(nullptr);
-    answers(server, {17, 6, 0, 10, 0x11, 0}, {17, 6, 0, 10, 0x11, 0});
+    expect_response(server, {17, 6, 0, 10, 0x11, 0}, {17, 6, 0, 10, 0x11, 0});
     assert_int_equal(written_count, 1);
 }
 
-static void cells_that_are_not_there_are_refused(void **)
+static void absent_registers_and_bits_are_refused(void **)
 {
     static const uint8_t valid[] = {0x05};
     ModbusRegisterArray<3> registers;
@@ -111,32 +111,32 @@ static void cells_that_are_not_there_are_refused(void **)
     registers.setValid(valid);
     server.holdingRegisters(registers);
     server.begin(17, Serial, 19200);
-    answers(server, {17, 3, 0, 2, 0, 1}, {17, 3, 2, 0, 0});
-    answers(server, {17, 3, 0, 0, 0, 3}, {17, 0x83, 2});
+    expect_response(server, {17, 3, 0, 2, 0, 1}, {17, 3, 2, 0, 0});
+    expect_response(server, {17, 3, 0, 0, 0, 3}, {17, 0x83, 2});
 }
 
-static void mask_and_read_write_are_served_when_asked_for(void **)
+static void mask_write_and_read_write_are_served_after_maskAndReadWrite(void **)
 {
     ModbusRegisterArray<4> registers;
     ModbusServer server;
     server.holdingRegisters(registers);
     server.begin(17, Serial, 19200);
     registers[0] = 0x0012;
-    answers(server, {17, 22, 0, 0, 0, 0xF2, 0, 0x25}, {17, 0x96, 1});
+    expect_response(server, {17, 22, 0, 0, 0, 0xF2, 0, 0x25}, {17, 0x96, 1});
     assert_int_equal(server.maskAndReadWrite(registers), MBM_OK);
-    answers(server, {17, 22, 0, 0, 0, 0xF2, 0, 0x25}, {17, 22, 0, 0, 0, 0xF2, 0, 0x25});
+    expect_response(server, {17, 22, 0, 0, 0, 0xF2, 0, 0x25}, {17, 22, 0, 0, 0, 0xF2, 0, 0x25});
     assert_int_equal(registers[0], 0x0017);
-    answers(server, {17, 23, 0, 0, 0, 2, 0, 1, 0, 1, 2, 7, 8}, {17, 23, 4, 0, 0x17, 7, 8});
+    expect_response(server, {17, 23, 0, 0, 0, 2, 0, 1, 0, 1, 2, 7, 8}, {17, 23, 4, 0, 0x17, 7, 8});
 }
 
-static void a_unit_that_serves_nothing_is_silent(void **)
+static void a_unit_without_tables_sends_no_response(void **)
 {
     ModbusServer server;
     server.begin(17, Serial, 19200);
-    keeps_silent(server, adu({17, 3, 0, 0, 0, 1}));
+    expect_no_response(server, adu({17, 3, 0, 0, 0, 1}));
 }
 
-static void several_units_each_have_their_own(void **)
+static void each_of_several_units_serves_its_own_tables(void **)
 {
     ModbusUnit units[2] = {{5}, {6}};
     ModbusRegisterArray<1> left, right;
@@ -144,18 +144,18 @@ static void several_units_each_have_their_own(void **)
     units[0].holdingRegisters(left);
     units[1].holdingRegisters(right);
     assert_int_equal(server.begin(units, Serial, 19200), MBM_OK);
-    answers(server, {5, 6, 0, 0, 0, 5}, {5, 6, 0, 0, 0, 5});
-    answers(server, {6, 6, 0, 0, 0, 6}, {6, 6, 0, 0, 0, 6});
+    expect_response(server, {5, 6, 0, 0, 0, 5}, {5, 6, 0, 0, 0, 5});
+    expect_response(server, {6, 6, 0, 0, 0, 6}, {6, 6, 0, 0, 0, 6});
     assert_int_equal(left[0], 5);
     assert_int_equal(right[0], 6);
-    keeps_silent(server, adu({1, 6, 0, 0, 0, 7}));
-    keeps_silent(server, adu({0, 6, 0, 0, 0, 8}));
+    expect_no_response(server, adu({1, 6, 0, 0, 0, 7}));
+    expect_no_response(server, adu({0, 6, 0, 0, 0, 8}));
     assert_int_equal(left[0], 8);
     assert_int_equal(right[0], 8);
     units[1].setUnitID(9);
     assert_int_equal(units[1].getUnitID(), 9);
-    answers(server, {9, 3, 0, 0, 0, 1}, {9, 3, 2, 0, 8});
-    keeps_silent(server, adu({6, 3, 0, 0, 0, 1}));
+    expect_response(server, {9, 3, 0, 0, 0, 1}, {9, 3, 2, 0, 8});
+    expect_no_response(server, adu({6, 3, 0, 0, 0, 1}));
 }
 
 static uint16_t adds(const mbm_request &request, uint8_t *response, uint16_t capacity)
@@ -175,10 +175,10 @@ static void a_function_of_the_sketch_is_served(void **)
     assert_int_equal(server.function(sum), MBM_OK);
     assert_int_equal(server.function(none), MBM_INVALID_ARGUMENT);
     server.begin(17, Serial, 19200);
-    answers(server, {17, 65, 3, 4}, {17, 65, 7});
-    answers(server, {17, 65, 3}, {17, 65 | 0x80, 3});
-    keeps_silent(server, adu({17, 65, 0xFF, 1}));
-    answers(server, {17, 66, 3, 4}, {17, 66 | 0x80, 1});
+    expect_response(server, {17, 65, 3, 4}, {17, 65, 7});
+    expect_response(server, {17, 65, 3}, {17, 65 | 0x80, 3});
+    expect_no_response(server, adu({17, 65, 0xFF, 1}));
+    expect_response(server, {17, 66, 3, 4}, {17, 66 | 0x80, 1});
 }
 
 static void a_function_can_be_switched_off_and_on(void **)
@@ -189,10 +189,10 @@ static void a_function_can_be_switched_off_and_on(void **)
     server.holdingRegisters(registers);
     server.begin(17, Serial, 19200);
     assert_int_equal(server.switchOff(switches, 6), MBM_OK);
-    answers(server, {17, 6, 0, 0, 0, 9}, {17, 0x86, 1});
-    answers(server, {17, 3, 0, 0, 0, 1}, {17, 3, 2, 0, 0});
+    expect_response(server, {17, 6, 0, 0, 0, 9}, {17, 0x86, 1});
+    expect_response(server, {17, 3, 0, 0, 0, 1}, {17, 3, 2, 0, 0});
     assert_int_equal(server.switchOn(switches, 6), MBM_OK);
-    answers(server, {17, 6, 0, 0, 0, 9}, {17, 6, 0, 0, 0, 9});
+    expect_response(server, {17, 6, 0, 0, 0, 9}, {17, 6, 0, 0, 0, 9});
 }
 
 static uint16_t address_itself(void *, uint16_t address)
@@ -237,16 +237,17 @@ static void the_other_functions_are_served_from_their_records(void **)
     assert_int_equal(server.serve(identification), MBM_OK);
     assert_int_equal(server.serve(cells, 4), MBM_OK);
     server.begin(17, Serial, 19200);
-    answers(server, {17, 7}, {17, 7, 0x6D});
-    answers(server, {17, 8, 0, 0, 0xA5, 0x37}, {17, 8, 0, 0, 0xA5, 0x37});
-    answers(server, {17, 17}, {17, 17, 4, 'm', 'b', 'm', 0xFF});
-    answers(server, {17, 20, 7, 6, 0, 4, 0, 1, 0, 1}, {17, 20, 4, 3, 6, 0, 2});
-    answers(server, {17, 24, 0, 30}, {17, 24, 0, 6, 0, 2, 0, 8, 0, 9});
-    answers(server, {17, 43, 14, 4, 0}, {17, 43, 14, 4, 0x81, 0, 0, 1, 0, 3, 'm', 'b', 'm'});
-    answers(server, {17, 4, 0x12, 0x34, 0, 1}, {17, 4, 2, 0x12, 0x34});
+    expect_response(server, {17, 7}, {17, 7, 0x6D});
+    expect_response(server, {17, 8, 0, 0, 0xA5, 0x37}, {17, 8, 0, 0, 0xA5, 0x37});
+    expect_response(server, {17, 17}, {17, 17, 4, 'm', 'b', 'm', 0xFF});
+    expect_response(server, {17, 20, 7, 6, 0, 4, 0, 1, 0, 1}, {17, 20, 4, 3, 6, 0, 2});
+    expect_response(server, {17, 24, 0, 30}, {17, 24, 0, 6, 0, 2, 0, 8, 0, 9});
+    expect_response(server, {17, 43, 14, 4, 0},
+                    {17, 43, 14, 4, 0x81, 0, 0, 1, 0, 3, 'm', 'b', 'm'});
+    expect_response(server, {17, 4, 0x12, 0x34, 0, 1}, {17, 4, 2, 0x12, 0x34});
 }
 
-/* Two ends of one wire, each a Stream. */
+/* The two ends of a wire. Each is a Stream. */
 class Loop : public Stream {
 public:
     Loop *far = nullptr;
@@ -315,10 +316,10 @@ int main()
         TEST(writes_reach_the_arrays),
         TEST(a_sketch_sets_what_a_client_reads),
         TEST(one_hook_refuses_a_write_and_another_is_called_after_it),
-        TEST(cells_that_are_not_there_are_refused),
-        TEST(mask_and_read_write_are_served_when_asked_for),
-        TEST(a_unit_that_serves_nothing_is_silent),
-        TEST(several_units_each_have_their_own),
+        TEST(absent_registers_and_bits_are_refused),
+        TEST(mask_write_and_read_write_are_served_after_maskAndReadWrite),
+        TEST(a_unit_without_tables_sends_no_response),
+        TEST(each_of_several_units_serves_its_own_tables),
         TEST(a_function_of_the_sketch_is_served),
         TEST(a_function_can_be_switched_off_and_on),
         TEST(the_other_functions_are_served_from_their_records),

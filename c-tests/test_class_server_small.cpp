@@ -1,4 +1,4 @@
-/* The class that serves, with the frame buffer that sketches on AVR have. */
+/* ModbusServer with the frame buffer that it has on AVR. */
 #define MODBUSSERVER_FRAME_BYTES MBM_FRAME_BYTES(64)
 #include "wire.h"
 
@@ -7,7 +7,7 @@
 static ModbusRegisterArray<125> registers;
 static ModbusServer server;
 
-static void hears(const Bytes &bytes)
+static void receive(const Bytes &bytes)
 {
     Serial.inject(bytes);
     for (unsigned i = 0; i < 1000; i++)
@@ -37,29 +37,29 @@ static void transfers_of_64_registers_fit(void **)
     for (int i = 0; i < 128; i++)
         write.push_back(static_cast<uint8_t>(i));
     response.insert(response.end(), write.begin() + 7, write.end());
-    hears(sealed(write));
+    receive(sealed(write));
     assert_sent(Serial, {17, 16, 0, 0, 0, 64});
     assert_int_equal(registers[63], 126 << 8 | 127);
-    hears(adu({17, 3, 0, 0, 0, 64}));
+    receive(adu({17, 3, 0, 0, 0, 64}));
     assert_int_equal(Serial.sent.size(), 1);
     assert_bytes(Serial.sent[0], sealed(response));
 }
 
 static void a_longer_response_becomes_an_exception(void **)
 {
-    hears(adu({17, 3, 0, 0, 0, 125}));
+    receive(adu({17, 3, 0, 0, 0, 125}));
     assert_sent(Serial, {17, 0x83, 4});
 }
 
-static void a_longer_request_is_not_heard_and_the_next_is(void **)
+static void a_request_longer_than_the_buffer_is_ignored(void **)
 {
     Bytes write = raw({17, 16, 0, 0, 0, 123, 246});
     write.resize(7 + 246, 0xEE);
     registers[0] = 1;
-    hears(sealed(write));
+    receive(sealed(write));
     assert_int_equal(Serial.sent.size(), 0);
     assert_int_equal(registers[0], 1);
-    hears(adu({17, 3, 0, 0, 0, 1}));
+    receive(adu({17, 3, 0, 0, 0, 1}));
     assert_sent(Serial, {17, 3, 2, 0, 1});
 }
 
@@ -71,7 +71,7 @@ int main()
         SERVED(an_object_is_little_more_than_its_frame),
         SERVED(transfers_of_64_registers_fit),
         SERVED(a_longer_response_becomes_an_exception),
-        SERVED(a_longer_request_is_not_heard_and_the_next_is),
+        SERVED(a_request_longer_than_the_buffer_is_ignored),
     };
 
     return cmocka_run_group_tests_name("class that serves, small", tests, nullptr, nullptr);

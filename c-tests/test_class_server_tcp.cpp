@@ -1,73 +1,33 @@
-/* The class of a TCP server, over the shim's Ethernet and WiFi libraries, asked by real
- * libmodbus clients from threads of their own. */
+/* ModbusTcpServer over the shim's Ethernet and WiFi libraries. Its clients are real libmodbus
+ * clients in threads of their own. */
+#include "libmodbus_client.h"
 #include "wire.h"
 
 #include "ModbusTcpServer.h"
 #include <ESP8266WiFi.h>
 #include <Ethernet.h>
 
-extern "C" {
-#include "await.h"
-#include <modbus.h>
-#include <pthread.h>
-}
-
-/* A library from before accept: available hands over any connection with bytes. */
+/* An older library, without accept: available returns any connection with bytes. */
 class OlderServer : public SocketServer {
 public:
     explicit OlderServer(uint16_t port) : SocketServer(port) {}
-    EthernetClient available() { return speaking(known); }
+    EthernetClient available() { return withBytes(known); }
 
 private:
     std::vector<EthernetClient> known;
 };
 
-/* What a libmodbus client does in its thread, while the test polls the server. */
-struct Task {
-    modbus_t *peer;
-    int (*work)(modbus_t *);
-    int result;
-    pthread_t thread;
-    volatile int over;
-};
-
-static void *run(void *argument)
-{
-    Task *task = static_cast<Task *>(argument);
-    task->result = task->work(task->peer);
-    __atomic_store_n(&task->over, 1, __ATOMIC_SEQ_CST);
-    return nullptr;
-}
-
+/* Returns the result of a client's call, while the sketch's loop polls the server. */
 template <typename Server>
-static int serves(Server &server, modbus_t *peer, int (*work)(modbus_t *))
+static int serves(Server &server, modbus_t *peer, int (*call)(modbus_t *))
 {
-    Task task = {peer, work, -2, pthread_t(), 0};
-    assert_int_equal(pthread_create(&task.thread, nullptr, run, &task), 0);
-    AWAIT((assert_int_equal(server.poll(), MBM_OK), __atomic_load_n(&task.over, __ATOMIC_SEQ_CST)));
-    pthread_join(task.thread, nullptr);
-    return task.result;
-}
-
-static modbus_t *client_of(uint16_t port, int unit = 255)
-{
-    modbus_t *peer = modbus_new_tcp("127.0.0.1", networkPort(port));
-    modbus_set_slave(peer, unit);
-    modbus_set_response_timeout(peer, PATIENCE_MS / 1000, 0);
-    assert_int_equal(modbus_connect(peer), 0);
-    return peer;
-}
-
-static void hang_up(modbus_t *peer)
-{
-    modbus_close(peer);
-    modbus_free(peer);
+    return result_of(peer, call, [&server] { assert_int_equal(server.poll(), MBM_OK); });
 }
 
 static int real_time(void **state)
 {
     reset_board(state);
-    bench().realTime = true;
+    board().realTime = true;
     return 0;
 }
 
@@ -88,7 +48,7 @@ template <typename Listener> static void each_function_is_served()
     assert_int_equal(server.getUnitID(), 7);
     holding[2] = 0xBEEF;
     coils.set(1, true);
-    modbus_t *peer = client_of(502);
+    modbus_t *peer = connect_client(502);
     assert_int_equal(
         serves(server, peer, [](modbus_t *p) { return modbus_read_registers(p, 1, 3, words); }), 3);
     assert_int_equal(words[1], 0xBEEF);
@@ -116,7 +76,7 @@ template <typename Listener> static void each_function_is_served()
                             }),
                      EMBXILADD);
     assert_int_equal(server.connections(), 1);
-    hang_up(peer);
+    close_client(peer);
     AWAIT((server.poll(), server.connections() == 0));
 }
 
@@ -150,7 +110,7 @@ template <typename Listener> static void four_at_once()
     server.holdingRegisters(holding);
     server.begin(1, listener);
     for (modbus_t *&peer : peers)
-        peer = client_of(502);
+        peer = connect_client(502);
     for (uint16_t round = 0; round < 3; round++)
         for (modbus_t *peer : peers) {
             holding[0] = static_cast<uint16_t>(100 + round);
@@ -158,7 +118,7 @@ template <typename Listener> static void four_at_once()
         }
     assert_int_equal(server.connections(), 4);
     for (modbus_t *peer : peers)
-        hang_up(peer);
+        close_client(peer);
     AWAIT((server.poll(), server.connections() == 0));
 }
 
@@ -169,7 +129,7 @@ static void four_clients_are_served_at_once(void **)
     four_at_once<OlderServer>();
 }
 
-static void a_client_without_a_place_is_hung_up_on(void **)
+static void a_connection_without_a_free_place_is_closed(void **)
 {
     EthernetServer listener(502);
     ModbusTcpServer<EthernetServer, 1> server;
@@ -178,21 +138,21 @@ static void a_client_without_a_place_is_hung_up_on(void **)
     server.holdingRegisters(holding);
     server.begin(1, listener);
     holding[0] = 5;
-    modbus_t *first = client_of(502);
+    modbus_t *first = connect_client(502);
     assert_int_equal(serves(server, first, read_first), 5);
-    modbus_t *second = client_of(502);
+    modbus_t *second = connect_client(502);
     assert_int_equal(serves(server, second, read_first), -1);
     assert_int_equal(serves(server, first, read_first), 5);
-    hang_up(second);
-    hang_up(first);
+    close_client(second);
+    close_client(first);
     AWAIT((server.poll(), server.connections() == 0));
-    // The place is free again.
-    modbus_t *third = client_of(502);
+    // The place of the closed connection is free.
+    modbus_t *third = connect_client(502);
     assert_int_equal(serves(server, third, read_first), 5);
-    hang_up(third);
+    close_client(third);
 }
 
-static void the_connection_that_was_idle_for_longest_gives_its_place_up(void **)
+static void the_connection_that_was_idle_for_longest_is_closed_for_a_new_one(void **)
 {
     EthernetServer listener(502);
     ModbusTcpServer<EthernetServer, 2> server;
@@ -200,25 +160,25 @@ static void the_connection_that_was_idle_for_longest_gives_its_place_up(void **)
     listener.begin();
     server.holdingRegisters(holding);
     server.begin(1, listener);
-    bench().realTime = false; // a clock of the test's own
-    bench().tick = 0;
-    modbus_t *busy = client_of(502), *idle = client_of(502);
+    board().realTime = false; // the test sets the clock
+    board().tick = 0;
+    modbus_t *busy = connect_client(502), *idle = connect_client(502);
     assert_int_equal(serves(server, busy, read_first), 0);
     assert_int_equal(serves(server, idle, read_first), 0);
-    bench().now += 40000000u;
+    board().now += 40000000u;
     assert_int_equal(serves(server, busy, read_first), 0);
-    bench().now += 25000000u; // 65 s after `idle`, 25 s after `busy`
-    modbus_t *newcomer = client_of(502);
+    board().now += 25000000u; // 65 s after `idle`, 25 s after `busy`
+    modbus_t *newcomer = connect_client(502);
     assert_int_equal(serves(server, newcomer, read_first), 0);
     assert_int_equal(server.connections(), 2);
     assert_int_equal(serves(server, idle, read_first), -1);
     assert_int_equal(serves(server, busy, read_first), 0);
-    hang_up(idle);
-    hang_up(busy);
-    hang_up(newcomer);
+    close_client(idle);
+    close_client(busy);
+    close_client(newcomer);
 }
 
-static void what_is_not_modbus_is_hung_up_on(void **)
+static void a_connection_with_bytes_that_are_no_modbus_is_closed(void **)
 {
     EthernetServer listener(502);
     ModbusTcpServer<EthernetServer> server;
@@ -246,11 +206,11 @@ static void requests_reach_the_unit_they_address(void **)
     first[0] = 11;
     second[0] = 22;
     assert_int_equal(server.begin(units, listener), MBM_OK);
-    modbus_t *peer = client_of(502, 2);
+    modbus_t *peer = connect_client(502, 2);
     assert_int_equal(serves(server, peer, read_first), 22);
     modbus_set_slave(peer, 255);
     assert_int_equal(serves(server, peer, read_first), 11);
-    hang_up(peer);
+    close_client(peer);
 }
 
 static ModbusTcpServer<EthernetServer> *polled;
@@ -270,16 +230,16 @@ static void a_hook_cannot_poll_or_begin_its_server(void **)
     });
     server.holdingRegisters(holding);
     server.begin(1, listener);
-    modbus_t *peer = client_of(502);
+    modbus_t *peer = connect_client(502);
     assert_int_equal(
         serves(server, peer, [](modbus_t *p) { return modbus_write_register(p, 0, 8); }), 1);
     assert_int_equal(holding[0], 8);
     assert_int_equal(server.getUnitID(), 1);
-    // Beginning again closes what there is.
+    // begin closes the connections.
     assert_int_equal(server.begin(3, listener), MBM_OK);
     assert_int_equal(server.connections(), 0);
     assert_int_equal(serves(server, peer, read_first), -1);
-    hang_up(peer);
+    close_client(peer);
 }
 
 static void a_connection_that_takes_few_bytes_gets_the_whole_response(void **)
@@ -290,9 +250,9 @@ static void a_connection_that_takes_few_bytes_gets_the_whole_response(void **)
         explicit NarrowServer(uint16_t port) : SocketServer(port) {}
         EthernetClient accept()
         {
-            int fd = take();
+            int fd = acceptFd();
             EthernetClient link = fd >= 0 ? EthernetClient(fd) : EthernetClient();
-            link.room = few;
+            link.writeSpace = few;
             return link;
         }
         EthernetClient available() { return accept(); }
@@ -304,12 +264,12 @@ static void a_connection_that_takes_few_bytes_gets_the_whole_response(void **)
     server.holdingRegisters(holding);
     server.begin(1, listener);
     holding[99] = 0x1234;
-    modbus_t *peer = client_of(502);
+    modbus_t *peer = connect_client(502);
     assert_int_equal(
         serves(server, peer, [](modbus_t *p) { return modbus_read_registers(p, 0, 100, all); }),
         100);
     assert_int_equal(all[99], 0x1234);
-    hang_up(peer);
+    close_client(peer);
 }
 
 #define REAL(test) cmocka_unit_test_setup(test, real_time)
@@ -321,9 +281,9 @@ int main()
         REAL(libmodbus_reads_and_writes_over_wifi),
         REAL(a_library_without_accept_serves_too),
         REAL(four_clients_are_served_at_once),
-        REAL(a_client_without_a_place_is_hung_up_on),
-        REAL(the_connection_that_was_idle_for_longest_gives_its_place_up),
-        REAL(what_is_not_modbus_is_hung_up_on),
+        REAL(a_connection_without_a_free_place_is_closed),
+        REAL(the_connection_that_was_idle_for_longest_is_closed_for_a_new_one),
+        REAL(a_connection_with_bytes_that_are_no_modbus_is_closed),
         REAL(requests_reach_the_unit_they_address),
         REAL(a_hook_cannot_poll_or_begin_its_server),
         REAL(a_connection_that_takes_few_bytes_gets_the_whole_response),

@@ -1,4 +1,5 @@
-/* A board with one UART and little RAM: buffers as on AVR, the frame shared. */
+/* A board with one UART and little RAM. The buffers are as on AVR, and all objects share one
+ * frame buffer. */
 #define SHIM_UARTS 1
 #define MODBUSMASTER_RESPONSE_WORDS 64
 #define MODBUSMASTER_TRANSMIT_WORDS 64
@@ -39,7 +40,7 @@ static void objects_may_share_the_frame_buffer(void **)
     }
 }
 
-/* A reply with `count` registers, whose values are 1, 2 and so on. */
+/* Returns a reply with `count` registers, whose values are 1, 2 and so on. */
 static Bytes registers_of_unit_1(int count)
 {
     Bytes reply = raw({1, 3, 2 * count});
@@ -68,7 +69,7 @@ static void a_lenient_read_of_65_to_125_registers_delivers_64(void **)
     assert_int_equal(node.readHoldingRegisters(0, 65), ModbusMaster::ku8MBBufferTooSmall);
 }
 
-static void a_lenient_object_of_two_that_share_the_frame_disturbs_no_other(void **)
+static void a_lenient_object_leaves_others_that_share_its_frame_unchanged(void **)
 {
     ModbusMaster lenient, strict;
     lenient.begin(1, Serial);
@@ -85,7 +86,7 @@ static void a_lenient_object_of_two_that_share_the_frame_disturbs_no_other(void 
     }
 }
 
-static void a_request_beside_that_of_another_object_is_refused(void **)
+static void a_request_is_refused_while_another_object_uses_the_frame(void **)
 {
     ModbusMaster first, second;
     first.begin(1, Serial);
@@ -97,7 +98,7 @@ static void a_request_beside_that_of_another_object_is_refused(void **)
     assert_int_equal(second.requestFrom(0, 1), 0);
     assert_int_equal(second.status(), 0);
     while (first.poll() == ModbusMaster::ku8MBPending)
-        bench().now += 100;
+        board().now += 100;
     assert_int_equal(first.status(), 0);
     assert_int_equal(first.getResponseBuffer(0), 7);
     Serial.reply(adu({2, 3, 2, 0, 8}));
@@ -124,7 +125,7 @@ static void a_request_from_a_callback_of_another_object_is_refused(void **)
         assert_int_equal(answer, ModbusMaster::ku8MBBusy);
 }
 
-static void an_object_that_is_gone_keeps_no_other_from_asking(void **)
+static void a_destroyed_object_frees_the_shared_frame(void **)
 {
     ModbusMaster second;
     second.begin(2, Serial);
@@ -164,7 +165,7 @@ static void transfers_of_64_registers_fit(void **)
     assert_int_equal(node.readWriteMultipleRegisters(0, 64, 0, 64), 0);
 }
 
-static void reads_of_65_registers_are_the_devices_to_judge(void **)
+static void reads_of_65_registers_are_sent(void **)
 {
     ModbusMaster node;
     node.begin(1, Serial);
@@ -201,13 +202,13 @@ int main()
         TEST(objects_are_small),
         TEST(objects_may_share_the_frame_buffer),
         TEST(a_lenient_read_of_65_to_125_registers_delivers_64),
-        TEST(a_lenient_object_of_two_that_share_the_frame_disturbs_no_other),
-        TEST(a_request_beside_that_of_another_object_is_refused),
+        TEST(a_lenient_object_leaves_others_that_share_its_frame_unchanged),
+        TEST(a_request_is_refused_while_another_object_uses_the_frame),
         TEST(a_request_from_a_callback_of_another_object_is_refused),
-        TEST(an_object_that_is_gone_keeps_no_other_from_asking),
+        TEST(a_destroyed_object_frees_the_shared_frame),
         TEST(the_buffer_ends_after_64_words),
         TEST(transfers_of_64_registers_fit),
-        TEST(reads_of_65_registers_are_the_devices_to_judge),
+        TEST(reads_of_65_registers_are_sent),
         TEST(writes_of_more_than_the_buffer_send_nothing),
     };
 

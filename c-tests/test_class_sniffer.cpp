@@ -1,11 +1,11 @@
-/* The class of a sniffer: what it prints of a line that others use, on the shim's board. */
+/* ModbusSniffer on a simulated board: what it prints of a line that others use. */
 #include "wire.h"
 
 #include "ModbusSniffer.h"
 
 #include <string.h>
 
-/* Collects what is printed. */
+/* Collects the printed text. */
 class Paper : public Print {
 public:
     using Print::write;
@@ -18,21 +18,22 @@ public:
 };
 
 /* Polls the sniffer for `ms` milliseconds. */
-static void loops(ModbusSniffer &sniffer, uint32_t ms)
+static void run_loop(ModbusSniffer &sniffer, uint32_t ms)
 {
-    uint32_t until = bench().now + ms * 1000;
-    while (static_cast<int32_t>(until - bench().now) > 0)
+    uint32_t until = board().now + ms * 1000;
+    while (static_cast<int32_t>(until - board().now) > 0)
         sniffer.poll();
 }
 
-/* A frame arrives byte by byte, `ms` after now: the last line printed, but for its time. A
- * request that the frame leaves unanswered has a line before it. */
+/* Lets a frame arrive byte by byte after `ms` milliseconds. Returns the last printed line,
+ * without its time. If the frame is a request and the one before has no reply, the sniffer
+ * prints a line for that one first. */
 static std::string prints(ModbusSniffer &sniffer, Paper &paper, const Bytes &bytes,
                           uint32_t ms = 10)
 {
     paper.text.clear();
-    Serial.arrive(bytes, bench().now + ms * 1000, Serial.character);
-    loops(sniffer, ms + 25);
+    Serial.arrive(bytes, board().now + ms * 1000, Serial.character);
+    run_loop(sniffer, ms + 25);
     size_t end = paper.text.rfind("\r\n");
     size_t line = end == std::string::npos || end == 0 ? end : paper.text.rfind('\n', end - 1);
     size_t begin = paper.text.find(" ms ", line == std::string::npos ? 0 : line);
@@ -61,7 +62,7 @@ static void requests_and_replies_are_printed(void **)
     std::string reply = prints(sniffer, paper, adu({17, 3, 6, 2, 43, 0, 0, 0, 100}));
     const char begin[] = "unit 17 reply 03 read holding registers 107..109: 555 0 100 (";
     assert_int_equal(reply.compare(0, sizeof begin - 1, begin), 0);
-    // From the end of the request to the end of the reply: what a loop of 25 ms leaves.
+    // The response time is measured in steps of the loop, which takes 25 ms.
     unsigned took = 0;
     assert_int_equal(sscanf(reply.c_str() + sizeof begin - 1, "%u ms)", &took), 1);
     assert_in_range(took, 25, 45);
@@ -102,12 +103,12 @@ static void exceptions_and_silent_units_are_printed(void **)
     assert_int_equal(text.compare(0, sizeof exception - 1, exception), 0);
     prints(sniffer, paper, adu({17, 6, 0, 1, 0, 1}));
     paper.text.clear();
-    loops(sniffer, 250);
+    run_loop(sniffer, 250);
     assert_non_null(
         strstr(paper.text.c_str(), " ms unit 17 no reply 06 write single register 1 (200 ms)\r\n"));
 }
 
-static void damage_and_noise_are_printed_as_bytes(void **)
+static void damaged_frames_and_noise_are_printed_as_bytes(void **)
 {
     Listening l;
     ModbusSniffer &sniffer = l.sniffer;
@@ -115,10 +116,10 @@ static void damage_and_noise_are_printed_as_bytes(void **)
     Bytes damaged = adu({17, 3, 0, 107, 0, 3});
     damaged[3] = 106;
     std::string text = prints(sniffer, paper, damaged, 60);
-    loops(sniffer, 100);
+    run_loop(sniffer, 100);
     assert_non_null(strstr(paper.text.c_str(), " bytes: 11 03 00 6A 00 03"));
     text = prints(sniffer, paper, raw({0xFF, 0xFE}), 100);
-    loops(sniffer, 100);
+    run_loop(sniffer, 100);
     assert_non_null(strstr(paper.text.c_str(), "noise, 2 bytes: FF FE\r\n"));
 }
 
@@ -135,7 +136,7 @@ static void a_callback_gets_each_event(void **)
     Paper paper;
     unsigned events = 0;
     uint16_t value = 0;
-    sniffer.poll(); // before begin: nothing
+    sniffer.poll(); // before begin it does nothing
     sniffer.begin(Serial, 19200);
     sniffer.onEvent([&](const mbm_event &event) {
         events++;
@@ -183,7 +184,7 @@ int main()
         TEST(requests_and_replies_are_printed),
         TEST(writes_are_printed_with_their_values),
         TEST(exceptions_and_silent_units_are_printed),
-        TEST(damage_and_noise_are_printed_as_bytes),
+        TEST(damaged_frames_and_noise_are_printed_as_bytes),
         TEST(a_callback_gets_each_event),
         TEST(ascii_frames_are_printed_too),
         TEST(nothing_is_ever_sent),

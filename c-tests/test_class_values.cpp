@@ -1,4 +1,4 @@
-/* The class's floats, wide integers, texts and bits, held against constants. */
+/* ModbusMaster's floats, wide integers, texts and bits, compared with constants. */
 #include "wire.h"
 
 #include <math.h>
@@ -7,7 +7,7 @@
 
 static_assert(std::is_empty<ModbusMasterValues<ModbusMaster>>::value, "no byte more an object");
 
-/* Has the node read words that are these bytes. */
+/* Lets the node read words with these bytes. */
 static void read(ModbusMaster &node, std::initializer_list<int> bytes)
 {
     int count = static_cast<int>(bytes.size());
@@ -18,7 +18,7 @@ static void read(ModbusMaster &node, std::initializer_list<int> bytes)
     Serial.sent.clear();
 }
 
-/* The words to write, from the first on, are these bytes. */
+/* Asserts that the transmit words begin with these bytes. */
 static void assert_writes(ModbusMaster &node, std::initializer_list<int> bytes)
 {
     int count = static_cast<int>(bytes.size());
@@ -89,7 +89,7 @@ static void each_type_is_read(void **)
 
 static void a_value_past_the_end_is_an_error_and_not_invented(void **)
 {
-    ModbusMaster node; // 125 words
+    ModbusMaster node; // its response buffer has 125 words
     float value = 7;
     uint64_t whole = 7;
     bool on = true;
@@ -130,9 +130,9 @@ static void each_type_is_written(void **)
                          3, 4, 1, 2, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFE});
 }
 
-static void what_passes_the_words_to_write_is_refused_with_02(void **)
+static void values_past_the_transmit_words_are_refused_with_02(void **)
 {
-    ModbusMaster node; // 123 words
+    ModbusMaster node; // its transmit buffer has 123 words
     assert_int_equal(node.setTransmitFloat(121, 1), 0);
     assert_int_equal(node.setTransmitFloat(122, 1), ModbusMaster::ku8MBIllegalDataAddress);
     assert_int_equal(node.setTransmitDouble(120, 1), 2);
@@ -185,7 +185,7 @@ int main()
         TEST(each_type_is_read),
         TEST(a_value_past_the_end_is_an_error_and_not_invented),
         TEST(each_type_is_written),
-        TEST(what_passes_the_words_to_write_is_refused_with_02),
+        TEST(values_past_the_transmit_words_are_refused_with_02),
         TEST(texts_are_read_and_written),
         TEST(coils_are_read_and_written_one_by_one),
     };

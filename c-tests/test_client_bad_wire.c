@@ -72,14 +72,7 @@ static void no_row_of_the_fault_table_is_worse_for_the_client(void **state)
         uint8_t status = outcome(f, 0, plain);
 
         outcome(f, 1, retried);
-        printf("%-46s %s  %s  %s\n", f->name, plain, retried,
-               status == MBM_OK ? "" : mbm_status_text(status));
-        if (!fault_as_good(plain, f->expected) || !fault_as_good(retried, f->retried) ||
-            status != f->status) {
-            printf("    worse: expected %s %s %s\n", f->expected, f->retried,
-                   mbm_status_text(f->status));
-            worse++;
-        }
+        worse += fault_report(f, plain, retried, status);
     }
     assert_int_equal(worse, 0);
 }

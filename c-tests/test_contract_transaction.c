@@ -3,6 +3,8 @@
 #include "sim.h"
 #include "test.h"
 
+#include <string.h>
+
 static void steps_come_in_order(void **state)
 {
     NODE;
@@ -250,20 +252,29 @@ static void the_gap_counts_from_the_reported_use_of_the_line(void **state)
     sim_assert_time(s->frames[2].silence, 4000);
 }
 
-static void several_masters_share_a_stream(void **state)
+/* Returns a second master, with buffers, for the same line. */
+static mbm_master *another_master(void)
 {
     static mbm_master other;
-    uint16_t words[4];
-    uint8_t frame[MBM_FRAME_BYTES(4)];
+    static uint16_t words[4];
+    static uint8_t frame[MBM_FRAME_BYTES(4)];
+
+    memset(&other, 0, sizeof other);
+    OK(mbm_master_setBuffers(&other, words, 4, NULL, 0, frame, sizeof frame));
+    return &other;
+}
+
+static void several_masters_share_a_stream(void **state)
+{
+    mbm_master *other = another_master();
     NODE;
 
-    OK(mbm_master_setBuffers(&other, words, 4, NULL, 0, frame, sizeof frame));
-    OK(mbm_master_beginRtu(&other, 3, &s->port));
+    OK(mbm_master_beginRtu(other, 3, &s->port));
     sim_reads(s, 500);
-    mbm_master_lineUsed(&other);
+    mbm_master_lineUsed(other);
     sim_answer(s, 1, 500, "03 04 02 00 07 +");
-    OK(mbm_master_readInputRegisters(&other, 0, 1));
-    assert_int_equal(words[0], 7);
+    OK(mbm_master_readInputRegisters(other, 0, 1));
+    assert_int_equal(mbm_master_getResponseBuffer(other, 0), 7);
     sim_assert_time(s->frames[1].silence, 4000);
     assert_int_equal(mbm_master_getResponseBuffer(n, 0), 42);
     mbm_master_lineUsed(n);
@@ -272,18 +283,15 @@ static void several_masters_share_a_stream(void **state)
 
 static void the_idle_hook_is_given_the_master_that_waits(void **state)
 {
-    static mbm_master other;
-    uint16_t words[4];
-    uint8_t frame[MBM_FRAME_BYTES(4)];
+    mbm_master *other = another_master();
     NODE;
 
-    OK(mbm_master_setBuffers(&other, words, 4, NULL, 0, frame, sizeof frame));
-    OK(mbm_master_beginRtu(&other, 3, &s->port));
+    OK(mbm_master_beginRtu(other, 3, &s->port));
     sim_reads(s, 500);
     assert_ptr_equal(s->waits, n);
     sim_answer(s, 1, 500, "03 04 02 00 07 +");
-    OK(mbm_master_readInputRegisters(&other, 0, 1));
-    assert_ptr_equal(s->waits, &other);
+    OK(mbm_master_readInputRegisters(other, 0, 1));
+    assert_ptr_equal(s->waits, other);
 }
 
 int main(void)

@@ -285,15 +285,20 @@ static void client_reads(sim *s, mbm_client *client, uint16_t address, uint8_t s
         assert_int_equal(word, fault_value(address));
 }
 
+static void begin_client(sim *s, mbm_client *client)
+{
+    memset(client, 0, sizeof *client);
+    OK(mbm_client_beginRtu(client, &s->port, s->buffer, sizeof s->buffer));
+    OK(mbm_client_setResponseTimeout(client, TIMEOUT_MS));
+}
+
 static void one_late_reply_does_not_shift_the_clients_answers(void **state)
 {
-    static mbm_client client;
+    mbm_client client;
     uint16_t i;
     DEVICE;
 
-    memset(&client, 0, sizeof client);
-    OK(mbm_client_beginRtu(&client, &s->port, s->buffer, sizeof s->buffer));
-    OK(mbm_client_setResponseTimeout(&client, TIMEOUT_MS));
+    begin_client(s, &client);
     client_reads(s, &client, 0, MBM_RESPONSE_TIMED_OUT);
     for (i = 1; i < 100; i++)
         client_reads(s, &client, i, MBM_OK);
@@ -301,13 +306,11 @@ static void one_late_reply_does_not_shift_the_clients_answers(void **state)
 
 static void a_late_reply_does_not_shift_the_clients_answers_after_a_retry(void **state)
 {
-    static mbm_client client;
+    mbm_client client;
     uint16_t i;
     DEVICE;
 
-    memset(&client, 0, sizeof client);
-    OK(mbm_client_beginRtu(&client, &s->port, s->buffer, sizeof s->buffer));
-    OK(mbm_client_setResponseTimeout(&client, TIMEOUT_MS));
+    begin_client(s, &client);
     OK(mbm_client_setRetries(&client, 1));
     device.takes[1] = 50000;
     for (i = 0; i < 100; i++)

@@ -1,24 +1,12 @@
 /* A call of a client that is refused changes nothing, and pending requests go on. Buffers
  * have exactly the size that begin is given. */
-#include "hooked_port.h"
 #include "test.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 #include "refused.h"
-
-static hooked_port wire;
-static mbm_port port;
-
-static int reset(void **state)
-{
-    (void)state;
-    memset(&wire, 0, sizeof wire);
-    wire.step = 100;
-    port = hooked_port_of(&wire);
-    return 0;
-}
+#include "refused_wire.h"
 
 static mbm_client client;
 static mbm_master facade;

@@ -18,10 +18,7 @@ static int start(void **state)
     served_prepare(&ascii);
     served_on_line(&ascii, MBM_FRAMING_ASCII);
     client = modbus_new_rtu(rtu.line.path, 115200, 'N', 8, 1);
-    if (!client || modbus_set_slave(client, SERVED_UNIT) || modbus_connect(client))
-        return -1;
-    modbus_set_response_timeout(client, PATIENCE_MS / 1000, 0);
-    return 0;
+    return asked_connect(client, SERVED_UNIT);
 }
 
 static int stop(void **state)

@@ -28,10 +28,7 @@ static int start(void **state)
     served_prepare(&rtu);
     served_on_tcp(&rtu, MBM_FRAMING_RTU_OVER_TCP);
     client = modbus_new_tcp("127.0.0.1", tcp.port);
-    if (!client || modbus_set_slave(client, SERVED_UNIT) || modbus_connect(client))
-        return -1;
-    modbus_set_response_timeout(client, PATIENCE_MS / 1000, 0);
-    return 0;
+    return asked_connect(client, SERVED_UNIT);
 }
 
 static int stop(void **state)

@@ -3,9 +3,9 @@
 #define _GNU_SOURCE
 #include "await.h"
 #include "clock.h"
-#include "mbm_tcp.h"
+#include "fails.h"
 #include "model.h"
-#include "tcp_peer.h"
+#include "port_of_peer.h"
 #include "tcp_server.h"
 #include "test.h"
 
@@ -20,36 +20,6 @@
 #include <unistd.h>
 
 enum { SECOND = 1000000, PATIENCE = 1000 * PATIENCE_MS };
-
-static tcp_peer *peer;
-static mbm_tcp tcp;
-static mbm_tcp_addresses addresses;
-static mbm_port port;
-static char service[8];
-
-static void assert_fails(int error, int result)
-{
-    assert_int_equal(result, -1);
-    assert_int_equal(errno, error);
-}
-
-static int begin(void **state)
-{
-    (void)state;
-    peer = tcp_peer_new();
-    snprintf(service, sizeof service, "%u", tcp_peer_start(peer, 0));
-    memset(&tcp, 0, sizeof tcp);
-    port = mbm_tcp_port(&tcp);
-    return 0;
-}
-
-static int end(void **state)
-{
-    (void)state;
-    mbm_tcp_close(&tcp);
-    tcp_peer_stop(peer);
-    return 0;
-}
 
 /* Reads until `length` bytes have arrived or the link is lost. */
 static int16_t read_all(uint8_t *bytes, uint16_t length)
@@ -194,14 +164,14 @@ static void of_several_addresses_the_one_that_answers_is_used(void **state)
 static void a_failed_open_sets_errno(void **state)
 {
     (void)state;
-    assert_fails(EADDRNOTAVAIL, mbm_tcp_open(&tcp, &addresses, "127.0.0.1", "no-such-service"));
-    assert_fails(EBADF, mbm_tcp_attach(&tcp, -1));
+    FAILS(EADDRNOTAVAIL, mbm_tcp_open(&tcp, &addresses, "127.0.0.1", "no-such-service"));
+    FAILS(EBADF, mbm_tcp_attach(&tcp, -1));
     assert_int_equal(mbm_tcp_connect(&tcp), MBM_LINK_LOST);
     assert_int_equal(tcp.error, ENOTCONN);
     mbm_tcp_close(&tcp);
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
-    assert_fails(EBUSY, mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service));
-    assert_fails(EBUSY, mbm_tcp_attach(&tcp, 0));
+    FAILS(EBUSY, mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service));
+    FAILS(EBUSY, mbm_tcp_attach(&tcp, 0));
 }
 
 static void the_end_of_a_stream_and_a_reset_have_different_errors(void **state)
@@ -291,7 +261,7 @@ static void wait_ends_with_the_time_or_with_any_of_its_sockets(void **state)
     (void)state;
     assert_int_equal(mbm_tcp_wait(many, MBM_TCP_WAITS - 2, NULL, -1, 20500), 0);
     assert_true(seconds() - start >= 0.0205);
-    assert_fails(EINVAL, mbm_tcp_wait(many, MBM_TCP_WAITS - 1, NULL, -1, 0));
+    FAILS(EINVAL, mbm_tcp_wait(many, MBM_TCP_WAITS - 1, NULL, -1, 0));
 
     assert_int_equal(pipe(pipes), 0);
     assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
@@ -333,7 +303,7 @@ static void a_connection_without_a_place_is_ended_without_a_reset(void **state)
 
     (void)state;
     assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
-    assert_fails(EAGAIN, mbm_tcp_accept(&listener, places, 2));
+    FAILS(EAGAIN, mbm_tcp_accept(&listener, places, 2));
     for (i = 0; i < 4; i++) {
         clients[i] = tcp_connect(listener.port);
         assert_int_equal(write(clients[i], "x", 1), 1);
@@ -341,7 +311,7 @@ static void a_connection_without_a_place_is_ended_without_a_reset(void **state)
     AWAIT(waiting(&listener) == 4);
     assert_int_equal(mbm_tcp_accept(&listener, places, 2), 0);
     assert_int_equal(mbm_tcp_accept(&listener, places, 2), 1);
-    assert_fails(EAGAIN, mbm_tcp_accept(&listener, places, 2));
+    FAILS(EAGAIN, mbm_tcp_accept(&listener, places, 2));
     assert_int_equal(listener.refused, 2);
     assert_int_equal(read(clients[2], &byte, 1), 0);
     assert_int_equal(read(clients[3], &byte, 1), 0);
@@ -353,7 +323,7 @@ static void a_connection_without_a_place_is_ended_without_a_reset(void **state)
     AWAIT(line.read(line.context, (uint8_t *)&byte, 1) < 0);
     clients[0] = tcp_connect(listener.port);
     AWAIT(waiting(&listener) == 1);
-    assert_fails(EAGAIN, mbm_tcp_accept(&listener, places, 2));
+    FAILS(EAGAIN, mbm_tcp_accept(&listener, places, 2));
     assert_int_equal(listener.refused, 3);
     mbm_tcp_close(&places[0]);
     close(clients[2]);
@@ -367,7 +337,7 @@ static void a_connection_without_a_place_is_ended_without_a_reset(void **state)
     mbm_tcp_close(&places[1]);
     mbm_tcp_closeListener(&listener);
     mbm_tcp_closeListener(&listener);
-    assert_fails(EBADF, mbm_tcp_accept(&listener, places, 2));
+    FAILS(EBADF, mbm_tcp_accept(&listener, places, 2));
 }
 
 static void listening_at_a_port_in_use_fails(void **state)
@@ -381,8 +351,8 @@ static void listening_at_a_port_in_use_fails(void **state)
     for (tries = 0; tries < 10 && listens < 0; tries++) {
         assert_int_equal(mbm_tcp_listen(&first, "127.0.0.1", "0"), 0);
         snprintf(number, sizeof number, "%u", first.port);
-        assert_fails(EBUSY, mbm_tcp_listen(&first, "127.0.0.1", "0"));
-        assert_fails(EADDRINUSE, mbm_tcp_listen(&second, "127.0.0.1", number));
+        FAILS(EBUSY, mbm_tcp_listen(&first, "127.0.0.1", "0"));
+        FAILS(EADDRINUSE, mbm_tcp_listen(&second, "127.0.0.1", number));
         mbm_tcp_closeListener(&first);
         listens = mbm_tcp_listen(&second, NULL, number);
     }

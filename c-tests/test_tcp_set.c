@@ -2,9 +2,11 @@
 #define _GNU_SOURCE
 #include "await.h"
 #include "descriptors.h"
+#include "fails.h"
 #include "mbm_tcp.h"
 #include "tcp_peer.h"
 #include "tcp_server.h"
+#include "tcp_waiting.h"
 #include "test.h"
 
 #include <errno.h>
@@ -42,12 +44,6 @@ int clock_gettime(clockid_t id, struct timespec *time)
         *time = stopped;
     }
     return result;
-}
-
-static void assert_fails(int error, int result)
-{
-    assert_int_equal(result, -1);
-    assert_int_equal(errno, error);
 }
 
 static int begin(void **state)
@@ -286,16 +282,16 @@ static void a_failed_add_to_a_set_sets_errno(void **state)
     mbm_tcp_set closed = {0};
 
     (void)state;
-    assert_fails(EBUSY, mbm_tcp_openSet(&set));
-    assert_fails(EBADF, mbm_tcp_waitSet(&closed, 0));
-    assert_fails(EBADF, mbm_tcp_add(&set, &tcps[0]));
+    FAILS(EBUSY, mbm_tcp_openSet(&set));
+    FAILS(EBADF, mbm_tcp_waitSet(&closed, 0));
+    FAILS(EBADF, mbm_tcp_add(&set, &tcps[0]));
     fill(1);
-    assert_fails(EBADF, mbm_tcp_add(&closed, &tcps[0]));
-    assert_fails(EBUSY, mbm_tcp_add(&set, &tcps[0]));
-    assert_fails(EBADF, mbm_tcp_addListener(&set, &listener));
+    FAILS(EBADF, mbm_tcp_add(&closed, &tcps[0]));
+    FAILS(EBUSY, mbm_tcp_add(&set, &tcps[0]));
+    FAILS(EBADF, mbm_tcp_addListener(&set, &listener));
     assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
     assert_int_equal(mbm_tcp_addListener(&set, &listener), 0);
-    assert_fails(EBUSY, mbm_tcp_addListener(&set, &listener));
+    FAILS(EBUSY, mbm_tcp_addListener(&set, &listener));
 }
 
 /* --- with a listener --- */
@@ -306,24 +302,10 @@ static void begin_to_listen(void)
     assert_int_equal(mbm_tcp_addListener(&set, &listener), 0);
 }
 
-/* Returns how many connections wait to be accepted. */
-static unsigned waiting(void)
-{
-    struct tcp_info info = {0};
-    socklen_t size = sizeof info;
-
-    assert_int_equal(getsockopt(listener.fd, IPPROTO_TCP, TCP_INFO, &info, &size), 0);
-    return info.tcpi_unacked;
-}
-
 static void connect_some(unsigned count)
 {
-    const unsigned before = waiting();
-    unsigned i;
-
-    for (i = 0; i < count; i++)
-        peers[peer_count++] = tcp_connect(listener.port);
-    AWAIT(waiting() == before + count);
+    tcp_connect_some(peers + peer_count, count, listener.fd, listener.port);
+    peer_count += count;
 }
 
 static int accept_one(void)
@@ -345,18 +327,18 @@ static void take_all_places(void)
     wait_for_connection();
     for (i = 0; i < PLACES; i++)
         assert_int_equal(accept_one(), i);
-    assert_fails(EAGAIN, accept_one());
+    FAILS(EAGAIN, accept_one());
 }
 
 static void an_accepted_connection_is_in_the_set_of_its_listener(void **state)
 {
     (void)state;
     begin_to_listen();
-    assert_fails(EAGAIN, accept_one());
+    FAILS(EAGAIN, accept_one());
     connect_some(1);
     wait_for_connection();
     assert_int_equal(accept_one(), 0);
-    assert_fails(EAGAIN, accept_one());
+    FAILS(EAGAIN, accept_one());
     peer_sends(0, "x");
     expect_ready(&tcps[0]);
     assert_int_equal(read_some(0, 16), 1);
@@ -370,9 +352,9 @@ static void accept_looks_only_once_the_set_knows_of_a_connection(void **state)
 {
     (void)state;
     begin_to_listen();
-    assert_fails(EAGAIN, accept_one());
+    FAILS(EAGAIN, accept_one());
     connect_some(1);
-    assert_fails(EAGAIN, accept_one());
+    FAILS(EAGAIN, accept_one());
     wait_for_connection();
     wait_for_connection();
     assert_int_equal(accept_one(), 0);
@@ -390,7 +372,7 @@ static void a_connection_that_is_closed_as_idle_is_ready(void **state)
     assert_int_equal(read_some(0, 16), 1);
     connect_some(1);
     wait_for_connection();
-    assert_fails(EAGAIN, accept_one());
+    FAILS(EAGAIN, accept_one());
     assert_int_equal(listener.idle, 1);
     /* The program of the idle connection frees the place, and the new connection takes it. */
     assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 1);
@@ -400,7 +382,7 @@ static void a_connection_that_is_closed_as_idle_is_ready(void **state)
     assert_int_equal(tcps[1].error, ETIMEDOUT);
     mbm_tcp_close(&tcps[1]);
     assert_int_equal(accept_one(), 1);
-    assert_fails(EAGAIN, accept_one());
+    FAILS(EAGAIN, accept_one());
     assert_int_equal(is_lost(0), 0);
     assert_int_equal(listener.refused, 0);
 }
@@ -417,7 +399,7 @@ static void of_connections_with_equal_idle_times_the_first_is_closed(void **stat
     look_ms = 1;
     connect_some(1);
     wait_for_connection();
-    assert_fails(EAGAIN, accept_one());
+    FAILS(EAGAIN, accept_one());
     assert_int_equal(listener.idle, 1);
     assert_int_equal(is_lost(0), 1);
     assert_int_equal(is_lost(1), 0);
@@ -444,9 +426,9 @@ static void without_a_descriptor_the_set_sleeps_and_tries_again(void **state)
     assert_int_equal(accept_one(), 0);
     connect_some(2);
     leave_no_descriptor();
-    assert_fails(EMFILE, accept_one());
+    FAILS(EMFILE, accept_one());
     expect_silence();
-    assert_fails(EAGAIN, accept_one());
+    FAILS(EAGAIN, accept_one());
     /* The wait ends when it is time to try again. The connections are served meanwhile. */
     assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 0);
     while (accept_one() < 0 && errno == EAGAIN)
@@ -461,7 +443,7 @@ static void without_a_descriptor_the_set_sleeps_and_tries_again(void **state)
     mbm_tcp_close(&tcps[0]);
     assert_int_equal(mbm_tcp_waitSet(&set, MBM_TCP_FOREVER), 0);
     assert_int_equal(accept_one(), 0);
-    assert_fails(EMFILE, accept_one());
+    FAILS(EMFILE, accept_one());
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &found), 0);
     ahead = 0;
     (void)mbm_tcp_waitSet(&set, MBM_TCP_FOREVER);

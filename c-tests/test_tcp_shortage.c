@@ -5,6 +5,7 @@
 #include "descriptors.h"
 #include "mbm_tcp.h"
 #include "tcp_server.h"
+#include "tcp_waiting.h"
 #include "test.h"
 
 #include <errno.h>
@@ -81,24 +82,10 @@ static int end(void **state)
     return 0;
 }
 
-/* Returns how many connections wait to be accepted. */
-static unsigned waiting(void)
-{
-    struct tcp_info info = {0};
-    socklen_t size = sizeof info;
-
-    assert_int_equal(getsockopt(listener.fd, IPPROTO_TCP, TCP_INFO, &info, &size), 0);
-    return info.tcpi_unacked;
-}
-
 static void connect_some(unsigned count)
 {
-    const unsigned before = waiting();
-    unsigned i;
-
-    for (i = 0; i < count; i++)
-        clients[client_count++] = tcp_connect(listener.port);
-    AWAIT(waiting() == before + count);
+    tcp_connect_some(clients + client_count, count, listener.fd, listener.port);
+    client_count += count;
 }
 
 static int accept_one(void)
@@ -169,15 +156,21 @@ static void a_place_is_in_use_until_it_is_closed(void **state)
     assert_int_equal(mbm_tcp_isInUse(&place), 0);
 }
 
-static void a_listener_without_a_descriptor_lets_the_program_sleep(void **state)
+/* Accepts one connection. Two more wait, for which there is no descriptor. */
+static void accept_one_and_let_two_wait(void)
 {
-    (void)state;
-    SKIP_WITHOUT_LIMITS();
     connect_some(1);
     assert_int_equal(accept_one(), 0);
     connect_some(2);
     leave_no_descriptor();
     expect_none(EMFILE);
+}
+
+static void a_listener_without_a_descriptor_lets_the_program_sleep(void **state)
+{
+    (void)state;
+    SKIP_WITHOUT_LIMITS();
+    accept_one_and_let_two_wait();
     assert_int_equal(wait_for(1000), 0);
     /* The listener tries again by itself. The program still serves the connections that it
      * has. */
@@ -192,11 +185,7 @@ static void a_waiting_connection_is_accepted_once_a_descriptor_is_free(void **st
 {
     (void)state;
     SKIP_WITHOUT_LIMITS();
-    connect_some(1);
-    assert_int_equal(accept_one(), 0);
-    connect_some(2);
-    leave_no_descriptor();
-    expect_none(EMFILE);
+    accept_one_and_let_two_wait();
     mbm_tcp_close(&places[0]);
     assert_int_equal(accept_one(), 0);
     expect_none(EMFILE);

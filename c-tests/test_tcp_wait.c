@@ -1,40 +1,13 @@
 /* mbm_tcp_wait sleeps where the program would not react to what it could report. */
 #define _GNU_SOURCE
-#include "mbm_tcp.h"
-#include "tcp_peer.h"
+#include "port_of_peer.h"
 #include "test.h"
 
 #include <errno.h>
 #include <fcntl.h>
-#include <stdio.h>
-#include <string.h>
 #include <unistd.h>
 
 enum { SECOND = 1000000 };
-
-static tcp_peer *peer;
-static mbm_tcp tcp;
-static mbm_tcp_addresses addresses;
-static mbm_port port;
-static char service[8];
-
-static int begin(void **state)
-{
-    (void)state;
-    peer = tcp_peer_new();
-    snprintf(service, sizeof service, "%u", tcp_peer_start(peer, 0));
-    memset(&tcp, 0, sizeof tcp);
-    port = mbm_tcp_port(&tcp);
-    return 0;
-}
-
-static int end(void **state)
-{
-    (void)state;
-    mbm_tcp_close(&tcp);
-    tcp_peer_stop(peer);
-    return 0;
-}
 
 static void a_completed_connection_ends_the_wait_once(void **state)
 {

@@ -1,6 +1,7 @@
 /* The port over a terminal. A pty shows the settings that the system makes. A pty has no
  * RS-485 driver: the test's own ioctl plays one. */
 #define _GNU_SOURCE
+#include "fails.h"
 #include "mbm_tty.h"
 #include "pty.h"
 #include "test.h"
@@ -89,12 +90,6 @@ static void assert_same(const struct termios *a, const struct termios *b)
     assert_memory_equal(a->c_cc, b->c_cc, sizeof a->c_cc);
 }
 
-static void assert_fails(int error, int result)
-{
-    assert_int_equal(result, -1);
-    assert_int_equal(errno, error);
-}
-
 static void every_rate_of_termios_can_be_set(void **state)
 {
     static const struct {
@@ -148,14 +143,14 @@ static void any_rate_is_set_if_the_options_allow_it(void **state)
         assert_int_equal(rate_of(line.theirs), rate);
     }
     options.baud = 0;
-    assert_fails(EINVAL, mbm_tty_openWith(&tty, line.path, &options));
+    FAILS(EINVAL, mbm_tty_openWith(&tty, line.path, &options));
     /* A driver that sets the nearest rate that it has. */
     options.baud = 250000;
     driver.nearest = 245200;
     assert_int_equal(mbm_tty_openWith(&tty, line.path, &options), 0);
     mbm_tty_close(&tty);
     driver.nearest = 230400;
-    assert_fails(EINVAL, mbm_tty_openWith(&tty, line.path, &options));
+    FAILS(EINVAL, mbm_tty_openWith(&tty, line.path, &options));
     after = settings_of(line.theirs);
     assert_same(&before, &after);
 }
@@ -179,12 +174,12 @@ static void options_that_no_terminal_has_are_refused_with_einval(void **state)
 
     (void)state;
     for (i = 0; i < COUNT(bad); i++) {
-        assert_fails(EINVAL, mbm_tty_openWith(&tty, line.path, &bad[i]));
+        FAILS(EINVAL, mbm_tty_openWith(&tty, line.path, &bad[i]));
         assert_int_equal(tty.fd, -1);
-        assert_fails(EINVAL, mbm_tty_settings(&settings, &bad[i]));
+        FAILS(EINVAL, mbm_tty_settings(&settings, &bad[i]));
     }
-    assert_fails(EINVAL, mbm_tty_open(&tty, line.path, 9600, 'N', 257));
-    assert_fails(EINVAL, mbm_tty_open(&tty, line.path, 9600, 'N', -255));
+    FAILS(EINVAL, mbm_tty_open(&tty, line.path, 9600, 'N', 257));
+    FAILS(EINVAL, mbm_tty_open(&tty, line.path, 9600, 'N', -255));
 }
 
 static void a_failed_open_sets_errno(void **state)
@@ -192,11 +187,11 @@ static void a_failed_open_sets_errno(void **state)
     mbm_tty tty;
 
     (void)state;
-    assert_fails(ENOENT, mbm_tty_openWith(&tty, "/dev/no-such-terminal", &PLAIN));
-    assert_fails(ENOTTY, mbm_tty_openWith(&tty, "/dev/null", &PLAIN));
+    FAILS(ENOENT, mbm_tty_openWith(&tty, "/dev/no-such-terminal", &PLAIN));
+    FAILS(ENOTTY, mbm_tty_openWith(&tty, "/dev/null", &PLAIN));
     assert_int_equal(tty.fd, -1);
-    assert_fails(EBADF, mbm_tty_attach(&tty, -1));
-    assert_fails(EBADF, mbm_tty_wait(&tty, 0));
+    FAILS(EBADF, mbm_tty_attach(&tty, -1));
+    FAILS(EBADF, mbm_tty_wait(&tty, 0));
     mbm_tty_close(&tty);
 }
 
@@ -258,7 +253,7 @@ static void an_exclusive_terminal_is_busy_for_a_second_one(void **state)
     assert_int_equal(exclusive, 1);
     before = settings_of(line.theirs);
     options.baud = 1200;
-    assert_fails(EBUSY, mbm_tty_openWith(&second, line.path, &options));
+    FAILS(EBUSY, mbm_tty_openWith(&second, line.path, &options));
     after = settings_of(line.theirs);
     assert_same(&before, &after);
 
@@ -277,7 +272,7 @@ static void without_a_driver_for_it_rs485_is_refused_and_nothing_is_changed(void
 
     (void)state;
     options.rs485 = 1;
-    assert_fails(ENOTTY, mbm_tty_openWith(&tty, line.path, &options));
+    FAILS(ENOTTY, mbm_tty_openWith(&tty, line.path, &options));
     assert_int_equal(tty.fd, -1);
     after = settings_of(line.theirs);
     assert_same(&before, &after);
@@ -321,7 +316,7 @@ static void an_rs485_delay_that_the_driver_shortens_is_refused(void **state)
     driver.longest = 100;
     options.rs485 = 1;
     options.rtsDelayBefore = 101;
-    assert_fails(EINVAL, mbm_tty_openWith(&tty, line.path, &options));
+    FAILS(EINVAL, mbm_tty_openWith(&tty, line.path, &options));
     assert_int_equal(driver.state.flags, 0);
 }
 

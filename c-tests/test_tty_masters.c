@@ -68,13 +68,30 @@ static void times_out(node *n)
     IS(MBM_RESPONSE_TIMED_OUT, mbm_master_readHoldingRegisters(&n->master, 0, 1));
 }
 
+static void both_time_out(void)
+{
+    times_out(&first);
+    times_out(&second);
+    times_out(&first);
+}
+
+static mbm_port open_tty(void)
+{
+    assert_int_equal(mbm_tty_openWith(&tty, line.path, &OPTIONS), 0);
+    return mbm_tty_port(&tty);
+}
+
+static mbm_port open_socket(void)
+{
+    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
+    return mbm_tcp_port(&tcp);
+}
+
 static void a_tty_closed_and_opened_again_keeps_its_port(void **state)
 {
-    mbm_port port;
+    mbm_port port = open_tty();
 
     (void)state;
-    assert_int_equal(mbm_tty_openWith(&tty, line.path, &OPTIONS), 0);
-    port = mbm_tty_port(&tty);
     begin_node(&first, 1, &port);
     times_out(&first);
     mbm_tty_close(&tty);
@@ -101,41 +118,31 @@ static void a_port_made_before_the_tty_is_open_works_once_it_is(void **state)
 
 static void two_masters_on_one_tty_each_end_in_time(void **state)
 {
-    mbm_port port;
+    mbm_port port = open_tty();
 
     (void)state;
-    assert_int_equal(mbm_tty_openWith(&tty, line.path, &OPTIONS), 0);
-    port = mbm_tty_port(&tty);
     begin_node(&first, 1, &port);
     port = mbm_tty_port(&tty);
     begin_node(&second, 2, &port);
-    times_out(&first);
-    times_out(&second);
-    times_out(&first);
+    both_time_out();
 }
 
 static void two_masters_with_one_port_struct_each_end_in_time(void **state)
 {
-    mbm_port port;
+    mbm_port port = open_tty();
 
     (void)state;
-    assert_int_equal(mbm_tty_openWith(&tty, line.path, &OPTIONS), 0);
-    port = mbm_tty_port(&tty);
     begin_node(&first, 1, &port);
     begin_node(&second, 2, &port);
-    times_out(&first);
-    times_out(&second);
-    times_out(&first);
+    both_time_out();
 }
 
 /* Bytes that are no reply arrive. Whenever the master looks, more of them are there. */
 static void noise_does_not_keep_a_request_from_ending(void **state)
 {
-    mbm_port port;
+    mbm_port port = open_tty();
 
     (void)state;
-    assert_int_equal(mbm_tty_openWith(&tty, line.path, &OPTIONS), 0);
-    port = mbm_tty_port(&tty);
     begin_node(&first, 1, &port);
     assert_int_equal(write(line.ours, "\x07\x03\x02", 3), 3);
     IS(MBM_RESPONSE_TIMED_OUT, mbm_master_readHoldingRegisters(&first.master, 0, 1));
@@ -143,11 +150,9 @@ static void noise_does_not_keep_a_request_from_ending(void **state)
 
 static void a_socket_closed_and_opened_again_keeps_its_port(void **state)
 {
-    mbm_port port;
+    mbm_port port = open_socket();
 
     (void)state;
-    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
-    port = mbm_tcp_port(&tcp);
     begin_node(&first, 1, &port);
     times_out(&first);
     mbm_tcp_close(&tcp);
@@ -169,16 +174,12 @@ static void a_port_made_before_the_socket_is_open_works_once_it_is(void **state)
 
 static void two_masters_on_one_socket_each_end_in_time(void **state)
 {
-    mbm_port port;
+    mbm_port port = open_socket();
 
     (void)state;
-    assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
-    port = mbm_tcp_port(&tcp);
     begin_node(&first, 1, &port);
     begin_node(&second, 2, &port);
-    times_out(&first);
-    times_out(&second);
-    times_out(&first);
+    both_time_out();
 }
 
 #define TEST(name) cmocka_unit_test_setup_teardown(name, begin, end)

@@ -84,7 +84,7 @@ private:
     {
         static_assert(sizeof(Function) <= sizeof(Storage),
                       "this lambda captures more than MODBUS_CAPTURE_BYTES");
-        static_assert(alignof(Function) <= alignof(Storage), "a capture wants wider alignment");
+        static_assert(alignof(Function) <= alignof(Storage), "a capture needs a larger alignment");
 #if defined(__GNUC__) && !defined(__clang__) && __GNUC__ < 5
         static_assert(__has_trivial_copy(Function) && __has_trivial_destructor(Function),
                       "captures are numbers, pointers and references");

@@ -70,7 +70,7 @@
 class ModbusSerialClient : public ModbusClient,
                            public ModbusTransmissionHooks<ModbusSerialClient> {
 public:
-    /** Touches neither clock nor port. */
+    /** Uses neither clock nor port. */
     ModbusSerialClient() : stream(), onPre(), onPost() {}
 
     /**
@@ -173,7 +173,7 @@ private:
  */
 class ModbusTcpClient : public ModbusClient {
 public:
-    /** Touches neither clock nor network. */
+    /** Uses neither clock nor network. */
     ModbusTcpClient() : link() {}
 
     /**

@@ -20,15 +20,15 @@
  * Queues requests to units, up to 16 at once. ModbusSerialClient and ModbusTcpClient add
  * the line.
  *
- * Only wait waits. Call poll in loop. Use an object from one thread, never from
- * an interrupt.
+ * All members except wait return at once. Call poll in loop. Use an object from one
+ * thread, never from an interrupt.
  *
  * Each of the functions queues a request and returns MBM_PENDING, or the reason why
  * nothing was queued: MBM_ILLEGAL_DATA_VALUE or MBM_ILLEGAL_DATA_ADDRESS if no device could
  * accept the request, MBM_BUFFER_TOO_SMALL if the request's words or the frame are too few,
  * MBM_BROADCAST_NOT_ALLOWED, MBM_QUEUE_FULL, MBM_NOT_INITIALISED, MBM_INVALID_ARGUMENT; or
  * MBM_BUSY, with the request unchanged, if it is pending or if preTransmission or
- * postTransmission calls. Addresses are those on the wire, from 0.
+ * postTransmission makes the call. Addresses are those on the wire, from 0.
  */
 class ModbusClient {
 public:

@@ -5,11 +5,11 @@
  * Licence: MIT OR Apache-2.0. Header-only, C++11, no heap.
  *
  * Sketches written for the ModbusMaster library, 0.9 to 2.0.1, compile and run
- * unchanged. Addresses are those on the wire, from 0. Better than there: the class
- * finds a reply after noise and frames of other units, compares it with its request,
- * and keeps a silence of t3.5 before each request.
+ * unchanged. Addresses are those on the wire, from 0. Unlike that library, the class
+ * finds a reply after noise and frames of other units, checks that it belongs to the
+ * request, and keeps a silence of t3.5 before each request.
  *
- * The macros that size the buffers and choose ports are in ModbusMasterOptions.h.
+ * The macros for the size of the buffers and for the ports are in ModbusMasterOptions.h.
  */
 
 #ifndef MODBUSMASTER_H
@@ -45,7 +45,7 @@ class ModbusMaster : public ModbusMasterStatics<void>,
                      public ModbusMasterValues<ModbusMaster>,
                      public ModbusTransmissionHooks<ModbusMaster> {
 public:
-    /** Slave 1; begin(baud) opens Serial. Touches neither clock nor port. */
+    /** For slave 1, with begin(baud) opening Serial. Uses neither clock nor port. */
     ModbusMaster() : state() { setBuffers(); }
 
     /** As ModbusMaster(), for `slave` (1 to 247; 0 is broadcast). */
@@ -64,8 +64,8 @@ public:
 
     /**
      * A copy has its own buffers, with the same words, settings, callbacks
-     * and Stream. Its queue of send is empty, and a request under way stays
-     * with the original. Copy between requests only, or the RS-485 driver may stay on.
+     * and Stream. Its queue of send is empty. A request under way belongs to the
+     * original only. Copy between requests only, or the RS-485 driver may stay on.
      * If you copy within preTransmission or postTransmission, the copy returns ku8MBBusy
      * for every call.
      */
@@ -86,7 +86,7 @@ public:
     }
 
 #if defined(MODBUSMASTER_SHARE_FRAME)
-    /** Drops a request under way. Call cancel before, or the RS-485 driver may stay on. */
+    /** Ends a request under way. Call cancel before, or the RS-485 driver may stay on. */
     ~ModbusMaster()
     {
         Turn::end(state.master);
@@ -94,15 +94,15 @@ public:
 #endif
 
     /**
-     * Talks to a slave over a Stream that is already open. It takes little time and may
-     * be called before each request. Callbacks, settings and words stay; the queue of
-     * send is emptied, and a request under way is cancelled.
+     * Sends later requests to a slave, over a Stream that is already open. It takes little
+     * time, so a sketch may call it before each request. It keeps callbacks, settings and
+     * words, empties the queue of send, and cancels a request under way.
      *
      * @param slave   1 to 247; 248 to 255 are sent as they are, 0 is broadcast
      * @param stream  must outlive its use here; its read() returns -1 if no byte has
      *                arrived, as Arduino specifies. Its write() returns how many bytes
-     *                it took. If it returns 0 for the first byte and sets no write
-     *                error, the object treats it as a Stream that takes every byte and
+     *                it accepted. If it returns 0 for the first byte and sets no write
+     *                error, the object treats it as a Stream that accepts every byte and
      *                always returns 0
      */
     void begin(uint8_t slave, Stream &stream)
@@ -113,7 +113,7 @@ public:
 
 #if defined(MODBUSMASTER_SERIAL0)
     /**
-     * Opens the port of the constructor (8N1) and talks to its slave over it.
+     * Opens the port of the constructor (8N1), and sends later requests to its slave there.
      * The response timeout is 2000 ms here too. It was 200 ms in version 0.9: call
      * setResponseTimeout(200) for that.
      *
@@ -131,7 +131,7 @@ public:
     }
 #endif
 
-    /** Sets a callback that is called repeatedly while a reply is awaited; nullptr for none. */
+    /** Sets a callback that is called again and again while a function waits for a reply; nullptr for none. */
     void idle(void (*callback)()) { state.onIdle.set(callback); }
     /** As idle(callback), with `context` as its argument. */
     void idle(void (*callback)(void *), void *context) { state.onIdle.set(callback, context); }
@@ -189,7 +189,7 @@ public:
      * Reads 1 to 125 holding registers, which receive then returns one by one.
      *
      * @return how many words receive will return; 0 if the request failed (status
-     *         returns the reason) or if, in non-blocking mode, it is under way
+     *         returns the reason), or if it is still under way in non-blocking mode
      */
     uint8_t requestFrom(uint16_t address, uint16_t quantity)
     {

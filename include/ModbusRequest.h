@@ -16,9 +16,8 @@
 #include "mbm.h"
 
 /**
- * A request to one unit. Functions that write send its words, functions that read fill
- * them; the members of ModbusValues read and set values in them. Use it as often as you
- * like.
+ * A request to one unit. A write sends its words, and a read fills them. The members of
+ * ModbusValues read and set values in the words. Use a request as often as you like.
  *
  * While it is pending, do not destroy it and do not change its words: make requests
  * global or static. ModbusRequestOf has its own words.
@@ -73,7 +72,7 @@ public:
 
     /**
      * Sets the callback that runs when the request has ended: a function, or a lambda
-     * whose captures take at most MODBUS_CAPTURE_BYTES; nullptr for none. poll or wait of
+     * whose captures have at most MODBUS_CAPTURE_BYTES; nullptr for none. poll or wait of
      * the client calls it. It may queue requests, also this one. It is not called for a
      * request that cancel ended.
      */

@@ -153,7 +153,7 @@ private:
  */
 class ModbusServer : public ModbusUnit, public ModbusTransmissionHooks<ModbusServer> {
 public:
-    /** Touches neither clock nor port. */
+    /** Uses neither clock nor port. */
     ModbusServer() : state() {}
 
     /**

@@ -107,7 +107,7 @@ private:
     }
 };
 
-/** Holding or input registers in an array of yours. */
+/** Holding or input registers in an array that you provide. */
 class ModbusRegisters : public ModbusTable<mbm_registerTable> {
 public:
     /** All words of an array, from `address` on. */
@@ -130,7 +130,7 @@ public:
     const uint16_t &operator[](uint16_t index) const { return table.words[index]; }
 };
 
-/** Coils or discrete inputs in an array of yours, lowest bit of a byte first. */
+/** Coils or discrete inputs in an array that you provide, lowest bit of a byte first. */
 class ModbusBits : public ModbusTable<mbm_bitTable> {
 public:
     /** All bits of an array, eight to a byte, from `address` on. */
@@ -180,11 +180,11 @@ private:
     uint8_t storage[(Quantity + 7u) / 8u];
 };
 
-/** A function of yours, for ModbusUnit::function. */
+/** A user-defined function, for ModbusUnit::function. */
 class ModbusFunction {
 public:
     /**
-     * @param code     1 to 127, of which 65 to 72 and 100 to 110 are left to
+     * @param code     1 to 127, of which the standard leaves 65 to 72 and 100 to 110 to
      *                 users; 0 is every function that no object before it serves
      * @param handler  writes the data of the response, at most `capacity` bytes, and
      *                 returns how many; or MBM_REPLY_EXCEPTION | code,

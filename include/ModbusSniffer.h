@@ -8,7 +8,7 @@
  *
  *     void setup() {
  *       Serial.begin(115200);
- *       Serial1.begin(19200); // the receiver of the bus; nothing is ever sent
+ *       Serial1.begin(19200); // the receiver of the bus; the sniffer never sends
  *       sniffer.printTo(Serial);
  *       sniffer.begin(Serial1, 19200);
  *     }
@@ -44,15 +44,15 @@
 
 /**
  * Receives the bytes of a line, finds the frames, and pairs requests with replies. On AVR it
- * takes about 700 bytes of RAM beside its buffer, and a sketch with it about 40 KB of flash:
- * a Mega has them, an Uno does not.
+ * needs about 700 bytes of RAM in addition to its buffer, and about 40 KB of flash: a Mega has
+ * them, an Uno does not.
  *
  * Call poll in loop, more often than the Stream's buffer fills: 64 bytes take 33 ms at
- * 19200 baud. Printing takes time too: give the Print a higher rate than the line.
+ * 19200 baud. Printing takes time too: open the port that prints at a higher rate than that of the line.
  */
 class ModbusSniffer {
 public:
-    /** Touches neither clock nor port. */
+    /** Uses neither clock nor port. */
     ModbusSniffer() : stream(), out(), callback(), sniffer() {}
     ModbusSniffer(const ModbusSniffer &) = delete;
     ModbusSniffer &operator=(const ModbusSniffer &) = delete;
@@ -85,14 +85,14 @@ public:
     void printNothing() { out = nullptr; }
 
     /**
-     * Sets a callback for each event: a function, or a lambda whose captures take at most
+     * Sets a callback for each event: a function, or a lambda whose captures have at most
      * MODBUS_CAPTURE_BYTES; nullptr for none. The event is valid during the call.
      */
     template <typename Function> void onEvent(const Function &function) { callback.set(function); }
     /** @copydoc onEvent */
     void onEvent(void (*function)(const mbm_event &)) { callback.set(function); }
 
-    /** Milliseconds after which a request counts as unanswered, 1 to 65535; 1000 at first. */
+    /** Milliseconds after which a request counts as one without a reply, 1 to 65535; 1000 at first. */
     uint8_t setResponseTimeout(uint16_t ms)
     {
         return mbm_sniffer_setResponseTimeout(&sniffer, ms);

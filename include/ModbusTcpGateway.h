@@ -34,11 +34,11 @@
 #include "mbm.h"
 
 /**
- * Passes requests of up to `Connections` TCP clients on to the devices of one line, and
- * the replies back, of any function. Each client has one request under way.
+ * Forwards requests of up to `Connections` TCP clients to the devices of one line, and
+ * returns the replies. It forwards any function. Each client has one request under way.
  *
  * Without a reply of a device, the gateway answers with an exception (V1.1b3, 7): 0A for a
- * unit that the line does not have, or if the line takes no bytes or its queue is full; 0B if
+ * unit that the line does not have, or if the line accepts no bytes or its queue is full; 0B if
  * the device does not reply, or its reply is damaged or does not answer the request; 02 and
  * 03 for a request that the standard does not allow.
  *
@@ -50,13 +50,13 @@ class ModbusTcpGateway
     : public ModbusTcpConnections<ModbusTcpGateway<Listener, Connections>, Listener, Connections,
                                   2 * MBM_MAX_TCP_FRAME> {
 public:
-    /** Touches neither clock nor network. */
+    /** Uses neither clock nor network. */
     ModbusTcpGateway() : line(), lowest(), highest(), passages() {}
 
     /**
-     * Passes on the requests of a listener's clients. Closes all connections.
+     * Forwards the requests of a listener's clients from now on. Closes all connections.
      *
-     * @param listener  must outlive its use here; the sketch has called its begin or will
+     * @param listener  must outlive its use here; the sketch calls its begin, before or after
      * @param devices   the line, begun by the sketch; must outlive its use here
      * @param first     the lowest unit id of the line, 1 to 247
      * @param last      the highest

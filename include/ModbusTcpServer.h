@@ -55,12 +55,12 @@ class ModbusTcpServer
       public ModbusTcpConnections<ModbusTcpServer<Listener, Connections>, Listener, Connections,
                                   MBM_MAX_TCP_FRAME> {
 public:
-    /** Touches neither clock nor network. */
+    /** Uses neither clock nor network. */
     ModbusTcpServer() : first(), count() {}
 
     /**
-     * Answers as unit `id` to the clients of a listener, whose begin the sketch has called
-     * or will. The unit keeps its tables and functions. Closes all connections.
+     * Answers the clients of a listener as unit `id`. The sketch calls the listener's begin,
+     * before or after. The unit keeps its tables and functions. Closes all connections.
      *
      * @param id        1 to 247; requests for 0 and 255 are for this unit too
      * @param listener  must outlive its use here

@@ -19,7 +19,7 @@ need-avr:
 	@scripts/need gcc libc6-dev arduino-builder arduino-core-avr arduino-ctags gcc-avr avr-libc binutils-avr \
 	    libsimavr-dev libelf-dev pkg-config libmodbus-dev libcmocka-dev
 
-# Not part of `make test`: the sketches are other people's, and so is that library.
+# Not part of `make test`, because the sketches and that library are not in the repository.
 .PHONY: check-sketches
 check-sketches: need-avr library ## Sketches in the folder SKETCHES against the library in MODBUSMASTER and mbm
 	@scripts/need g++
@@ -29,28 +29,28 @@ check-sketches: need-avr library ## Sketches in the folder SKETCHES against the 
 
 AVR_OUT := $(BUILD)/avr
 EXAMPLES := $(notdir $(wildcard examples/arduino/*))
-# These want more flash or RAM than an Uno or a Leonardo has.
+# These need more flash or RAM than an Uno or a Leonardo has.
 LARGE_EXAMPLES := Sniffer TcpToRtuGateway
 SMALL_EXAMPLES := $(filter-out $(LARGE_EXAMPLES),$(EXAMPLES))
-# These want more than one port.
+# These need more than one UART.
 MEGA_SKETCHES := TwoPorts OlderCalls
 TEST_SKETCHES := $(notdir $(wildcard firmware-tests/avr/sketches/*))
 AVR_ELFS := $(SMALL_EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(EXAMPLES:%=$(AVR_OUT)/mega/%.elf) \
             $(SMALL_EXAMPLES:%=$(AVR_OUT)/leonardo/%.elf) \
             $(patsubst %,$(AVR_OUT)/uno/%.elf,$(filter-out $(MEGA_SKETCHES),$(TEST_SKETCHES))) \
             $(MEGA_SKETCHES:%=$(AVR_OUT)/mega/%.elf)
-# What it takes with the small library.
+# Sketches that run with the small library too.
 MINIMAL_ELFS := $(patsubst %,$(AVR_OUT)/uno-minimal/%.elf,SizeFC03 Basic PhoenixContact Probe \
                 ServeSensorAndRelay)
 # Other chips of the set avr5 that the simulator knows: some with two UARTs, some with one.
 CHIPS := mega1280 atmega644p atmega1284p atmega328 atmega644
 CHIP_ELFS := $(foreach chip,$(CHIPS),$(patsubst %,$(AVR_OUT)/$(chip)/%.elf,FirstRead WriteAndReadBack))
-# What waits for 125 registers.
+# A sketch that waits for replies of 125 registers.
 WIDE_ELFS := $(AVR_OUT)/uno-125/TimeWait.elf
-# With MODBUSMASTER, the folder of that library: what it is measured with.
+# With MODBUSMASTER, the folder of that library: the sketches that measure it.
 PEER_ELFS := $(if $(MODBUSMASTER),$(patsubst %,$(AVR_OUT)/uno-peer/%.elf,TimeRead TimeBasicNoGap SizeFC03 \
                 Basic PhoenixContact))
-# The library as it was when a sketch was last compiled against it.
+# A copy of the libraries with which the sketches were last compiled.
 DIST_STAMP := $(BUILD)/avr/library
 
 .PHONY: library-stamp
@@ -62,7 +62,7 @@ library-stamp: library
 avr-sketches: library-stamp
 	@$(MAKE) -s --no-print-directory $(BARE) $(AVR_ELFS) $(MINIMAL_ELFS) $(CHIP_ELFS) $(WIDE_ELFS) $(PEER_ELFS)
 
-# The examples are part of the library, from where they are compiled.
+# The examples are compiled from their copies in the library.
 SKETCH_SOURCES := scripts/sketch $(wildcard firmware-tests/avr/sketches/*/*.ino firmware-tests/avr/libraries/*/src/*)
 define sketches
 $(AVR_OUT)/$(1)/%.elf: examples/arduino/%/ $(SKETCH_SOURCES) $(DIST_STAMP)
@@ -72,7 +72,7 @@ $(AVR_OUT)/$(1)/%.elf: firmware-tests/avr/sketches/%/ $(SKETCH_SOURCES) $(DIST_S
 endef
 $(eval $(call sketches,uno))
 $(eval $(call sketches,mega))
-# Compiled only: the simulator has no USB for its Serial.
+# The tests do not run these, because the simulator has no USB for Serial.
 $(eval $(call sketches,leonardo))
 $(foreach chip,$(CHIPS),$(eval $(call sketches,$(chip))))
 $(eval $(call sketches,uno-minimal))
@@ -80,7 +80,7 @@ $(eval $(call sketches,uno-125))
 $(eval $(call sketches,uno-peer))
 $(PEER_ELFS): $(wildcard $(MODBUSMASTER)/src/*)
 
-# The examples of ModbusMaster itself, in the folder SKETCHES.
+# The examples of ModbusMaster, in the folder SKETCHES.
 UPSTREAM := $(patsubst %,upstream-%,basic-2 phoenix-2 halfduplex-2 basic-09 phoenix-09)
 UPSTREAM_BOARDS := uno mega atmega1284p
 define upstream
@@ -89,14 +89,14 @@ $(AVR_OUT)/$(1)/upstream-%.elf: $(SKETCHES)/upstream-% scripts/sketch $(DIST_STA
 endef
 $(foreach board,$(UPSTREAM_BOARDS),$(eval $(call upstream,$(board))))
 
-# The code for avrxmega3 in a program for another chip: no simulator has one of its own.
+# The code for avrxmega3 in a program for another chip, because no simulator has an avrxmega3.
 BARE := $(AVR_OUT)/avrxmega3/Bare.elf
 $(BARE): firmware-tests/avr/bare/bare.c $(BUILD)/assembler/mbm_avrxmega3.S include/mbm.h
 	@mkdir -p $(@D)
 	@avr-gcc -mmcu=atmega1284p -U__AVR_ARCH__ -D__AVR_ARCH__=103 -c $(BUILD)/assembler/mbm_avrxmega3.S -o $(@D)/mbm.o
 	@avr-gcc -mmcu=atmega1284p -std=c11 -Os $(WARNINGS) -Iinclude -Wl,--gc-sections $< $(@D)/mbm.o -o $@
 
-# --- the programs that run them
+# --- the programs that run the sketches
 
 AVR_SUPPORT := $(patsubst %,$(BUILD)/avr-tests/%.o,board bus kind peer sketch server pty tcp_server)
 AVR_TESTS := $(patsubst firmware-tests/avr/%.c,$(BUILD)/avr-tests/%,$(wildcard firmware-tests/avr/test_*.c))

@@ -1,5 +1,5 @@
-"""The instruction sets that the Arduino library serves, and how the compilers here are
-told of a processor. Read by assembler and arduino, and by the checks of both."""
+"""The instruction sets for which the Arduino library has code, and the processors that
+Debian's compilers know. scripts/assembler, scripts/arduino and their checks import this file."""
 
 import pathlib
 import re
@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 
 class Set(NamedTuple):
-    """mcu: the archive whose code it is. kind: the dialect of its text. guard: the
-    condition on the user's compiler. what: the boards, for people."""
+    """mcu: the archive with this code. kind: the dialect of the assembler source. guard: the
+    preprocessor condition for the user's compiler. what: the boards, as a text for users."""
     mcu: str
     kind: str
     guard: str
@@ -21,12 +21,12 @@ SETS = {
                 "AVR of 16 to 128 KB of flash (Uno, Nano, Leonardo, 1284P)"),
     "avr6": Set("atmega2560", "avr", "defined(__AVR_ARCH__) && __AVR_ARCH__ == 6",
                 "AVR of 256 KB of flash (Mega 2560)"),
-    # Those of at most 8 KB lack the long calls, and the memory for a sketch.
+    # Chips of at most 8 KB lack the long calls, and the memory for a sketch.
     "avrxmega3": Set("atmega4809", "avr",
                      "defined(__AVR_ARCH__) && __AVR_ARCH__ == 103 && defined(__AVR_HAVE_JMP_CALL__)",
                      "AVR of the series 0, 1 and 2 from 16 KB (Nano Every, Uno WiFi R2, ATtiny1616)"),
-    # Cores that do not tell the assembler the processor get this code, which runs on
-    # every Cortex-M: arduino-pico before 4.1, and some for SAMD. Their C++ is told.
+    # This code runs on every Cortex-M. It is also the code for cores that give the processor to
+    # the C++ compiler, but not to the assembler: arduino-pico before 4.1, and some for SAMD.
     "armv6m": Set("cortex-m0plus", "arm",
                   "defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__)"
                   " || (defined(__ASSEMBLER__) && defined(ARDUINO) && defined(__ARM_ARCH_4T__))",
@@ -47,21 +47,21 @@ PACKAGES = ["gcc-avr", "avr-libc", "gcc-arm-none-eabi", "gcc-riscv64-unknown-elf
 
 
 class Target(NamedTuple):
-    """A processor as a compiler is told of it."""
+    """A processor, with the options that select it in the compiler."""
     name: str
     prefix: str
     flags: tuple
 
 
 def avr() -> list:
-    """Every microcontroller that avr-gcc knows."""
+    """Returns every microcontroller that avr-gcc knows."""
     folder = subprocess.run(["avr-gcc", "-print-file-name=device-specs"], check=True, text=True,
                             stdout=subprocess.PIPE).stdout.strip()
     names = [path.name.removeprefix("specs-") for path in pathlib.Path(folder).glob("specs-*")]
     return [Target(name, "avr-", (f"-mmcu={name}",)) for name in sorted(names)]
 
 
-# The options for floats with which images for these processors are built.
+# The float units for which images for these processors are built.
 FLOATS = {
     "cortex-m4": ["fpv4-sp-d16"], "cortex-m7": ["fpv5-sp-d16", "fpv5-d16"], "cortex-m33": ["fpv5-sp-d16"],
     "cortex-m35p": ["fpv5-sp-d16"], "cortex-m55": ["auto"],
@@ -69,10 +69,10 @@ FLOATS = {
 
 
 def arm() -> list:
-    """Every Cortex-M that arm-none-eabi-gcc knows, with each float ABI; and others."""
-    asked = subprocess.run(["arm-none-eabi-gcc", "-mcpu=list", "-E", "-"], text=True, stdin=subprocess.DEVNULL,
+    """Returns every Cortex-M that arm-none-eabi-gcc knows, with each float ABI, and two others."""
+    printed = subprocess.run(["arm-none-eabi-gcc", "-mcpu=list", "-E", "-"], text=True, stdin=subprocess.DEVNULL,
                            stderr=subprocess.PIPE).stderr
-    known = sorted(set(re.findall(r"\bcortex-m[\w.+-]+", asked)))
+    known = sorted(set(re.findall(r"\bcortex-m[\w.+-]+", printed)))
     out = [Target("cortex-a9", "arm-none-eabi-", ("-mcpu=cortex-a9",)),
            Target("arm7tdmi", "arm-none-eabi-", ("-mcpu=arm7tdmi",))]
     for cpu in known:
@@ -85,7 +85,7 @@ def arm() -> list:
     return out
 
 
-# As the cores of these boards have it, without extensions that gcc 12 does not know.
+# The -march of the cores for these boards, without extensions that gcc 12 does not know.
 RISCV = {
     "rv32imc": "ilp32",                                  # ESP32-C2, C3
     "rv32imc_zicsr_zifencei": "ilp32",
@@ -106,7 +106,7 @@ def riscv() -> list:
 
 
 def xtensa() -> list:
-    # The ESP32's own compiler is not to be had: what it defines, given to its sibling.
+    # Debian has no compiler for the ESP32. That for the ESP8266 gets its predefined macros.
     windowed = ("-U__XTENSA_CALL0_ABI__", "-D__XTENSA_WINDOWED_ABI__")
     return [Target("lx106", "xtensa-lx106-elf-", ("-mlongcalls",)),
             Target("esp32", "xtensa-lx106-elf-", ("-mlongcalls", *windowed))]

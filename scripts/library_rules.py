@@ -1,33 +1,33 @@
-"""The rules of arduino-lint for a library and for its examples, under the numbers that they
-have there (https://arduino.github.io/arduino-lint/latest/rules/library/). That program is not
-to be had here. Read by check-arduino.
+"""The rules of arduino-lint for a library and its examples, with their numbers there
+(https://arduino.github.io/arduino-lint/latest/rules/library/). Debian has no package of that
+program. check-arduino imports this file.
 
-Each rule takes a Library and yields what is wrong. Rules that arduino-lint gives as a warning
-are errors here.
+Each rule is a function that takes a Library and yields a text for each fault. The warnings of
+arduino-lint are errors here.
 """
 
 import difflib
 import pathlib
 import re
 
-# Rules that are not held, and why.
+# Rules that are not checked, and the reason.
 NOT_HELD = {
     "LP013": "for Arduino's own libraries",
-    "LP017": "needs the index of the Library Manager; check-arduino holds the names that are known to be taken",
+    "LP017": "needs the index of the Library Manager; check-arduino has a list of names that are taken",
     "LP018": "for libraries that are in that index",
     "LP022": "for libraries that are in that index",
     "LP042": "needs the network",
     "LP048": "needs the index of the Library Manager",
-    "LP056": "the project has no page of its own, and the IDE wants the line: it stays empty",
-    "SD001": "for sketches that are no examples",
-    "SD002": "for sketches that are no examples",
+    "LP056": "the project has no web page, and the IDE needs the line, so it is empty",
+    "SD001": "for sketches outside a library",
+    "SD002": "for sketches outside a library",
 }
 
 KNOWN = ["name", "version", "author", "maintainer", "sentence", "paragraph", "category", "url", "architectures",
          "includes", "precompiled", "ldflags", "depends", "dot_a_linkage", "license", "email"]
 CATEGORIES = ["Display", "Communication", "Signal Input/Output", "Sensors", "Device Control", "Timing",
               "Data Storage", "Data Processing", "Other"]
-# Names of architectures in other tools, and Arduino's for them.
+# Names of architectures in PlatformIO, and Arduino's names.
 ALIASES = {"atmelavr": ["avr"], "atmelmegaavr": ["megaavr"], "atmelsam": ["sam", "samd"], "espressif32": ["esp32"],
            "espressif8266": ["esp8266"], "intel_arc32": ["arc32"], "nordicnrf52": ["nRF5", "nrf52", "mbed"],
            "raspberrypi": ["mbed", "mbed_nano", "rp2040"], "ststm32": ["stm32", "STM32F1", "STM32F4"]}
@@ -35,7 +35,7 @@ ARCHITECTURES = ["arc32", "avr", "esp32", "esp8266", "mbed", "mbed_edge", "mbed_
                  "mbed_opta", "mbed_portenta", "mbed_rp2040", "megaavr", "nRF5", "nrf52", "renesas",
                  "renesas_portenta", "renesas_uno", "rp2040", "sam", "samd", "samd_beta", "stm32", "STM32F1",
                  "STM32F4", "teensy"]
-# A short list: arduino-lint's is that of another program.
+# A short list of our own. arduino-lint uses the list of another program.
 MISSPELT = {"accross", "adress", "agressive", "alot", "arguement", "asynchronus", "becuase", "begining", "beleive",
             "calender", "comming", "compatability", "definately", "dependancy", "existance", "finaly", "freind",
             "garantee", "independant", "lenght", "libary", "lisence", "neccessary", "occured", "occurence", "paramter",
@@ -49,7 +49,7 @@ CODE = [".h", ".hh", ".hpp", ".c", ".cpp", ".ino", ".pde"]
 
 
 class Library:
-    """What the rules look at. rows is empty if library.properties cannot be read."""
+    """A library, as the rules see it. `rows` is empty if library.properties cannot be read."""
 
     def __init__(self, root: pathlib.Path):
         self.root, self.rows, self.unreadable = root, {}, None
@@ -79,7 +79,7 @@ def parse(text: str) -> dict:
             raise ValueError(f"line {number} is not key=value")
         key, value = (part.strip() for part in line.split("=", 1))
         if key in rows:
-            raise ValueError(f"line {number}: {key} stands there twice")
+            raise ValueError(f"line {number}: {key} is there twice")
         rows[key] = value
     return rows
 
@@ -88,7 +88,7 @@ RULES = {}
 
 
 def rule(*numbers):
-    """Of a function that yields texts for one rule, or pairs of rule and text for several."""
+    """Registers a function that yields texts for one rule, or pairs of rule and text for several."""
     def register(function):
         for number in numbers:
             RULES[number] = function
@@ -106,7 +106,7 @@ def findings(library: Library) -> list:
 
 
 def alike(names: list, right: str) -> list:
-    """Names that look as if `right` was meant."""
+    """Returns the names that are probably misspellings of `right`."""
     return [name for name in names if name.lower() != right and
             difflib.SequenceMatcher(None, name.lower(), right).ratio() >= 0.85]
 
@@ -120,7 +120,7 @@ def other_case(names: list, right: str) -> list:
 @rule("LS001")
 def invalid(library):
     if not library.headers:
-        yield "no header: this is no library"
+        yield "no header"
 
 
 @rule("LS002", "LS003")
@@ -141,9 +141,9 @@ def odd_files(library):
         if path.is_symlink():
             yield "LS005", f"{where} is a symbolic link"
         if str(where) == ".development":
-            yield "LS006", ".development keeps a library out of the Library Manager"
+            yield "LS006", "the Library Manager refuses a library with .development"
         if path.suffix.lower() == ".exe":
-            yield "LS007", f"{where} keeps a library out of the Library Manager"
+            yield "LS007", f"{where}: the Library Manager refuses a library with this file"
 
 
 @rule("LS008")
@@ -158,7 +158,7 @@ def folders(library):
     for name in other_case(names, "src"):
         yield "LS009", f"the folder {name} must be called src"
     if "src" in names and "utility" in names:
-        yield "LS010", "a folder utility beside src is not compiled"
+        yield "LS010", "the folder utility is not compiled, because there is a folder src"
     for name in alike(names, "extras"):
         yield "LS011", f"the folder {name}: is extras meant?"
     for name in other_case(names, "extras"):
@@ -219,33 +219,33 @@ def name(library):
     if name.lower().startswith("arduino"):
         yield "LP012", "names with Arduino in front are reserved"
     if "arduino" in name.lower():
-        yield "LP014", "the name says Arduino, which goes without saying"
+        yield "LP014", "the name has the needless word Arduino"
     if " " in name:
         yield "LP015", "the name has a space"
     if "library" in name.lower():
-        yield "LP016", "the name says library, which goes without saying"
+        yield "LP016", "the name has the needless word library"
 
 
 @rule("LP020", "LP021")
 def version(library):
     version = library.rows.get("version")
     if version is not None and not re.fullmatch(RELAXED, version):
-        yield "LP020", f"the version {version!r} is none"
+        yield "LP020", f"{version!r} is not a version"
     elif version is not None and not re.fullmatch(SEMVER, version):
-        yield "LP021", f"the version {version!r} is not that of semver.org"
+        yield "LP021", f"the version {version!r} is not a version of semver.org"
 
 
 @rule("LP027", "LP057", "LP028", "LP030")
 def people(library):
     maintainer = library.rows.get("maintainer", "").lower()
     if maintainer.startswith("arduino"):
-        yield "LP027", "the maintainer is not Arduino"
+        yield "LP027", "the maintainer must not be Arduino"
     if "arduino" in maintainer:
         yield "LP057", "the maintainer's name has Arduino in it"
     if "email" in library.rows:
-        yield "LP028", "the field email is an old name of maintainer"
+        yield "LP028", "the field email is the old name of maintainer"
     if library.rows.get("email", "").lower().startswith("arduino"):
-        yield "LP030", "the email is not Arduino's"
+        yield "LP030", "the email must not be Arduino's"
 
 
 @rule("LP033", "LP035", "LP036")
@@ -256,7 +256,7 @@ def texts(library):
                 yield number, f"{key}: {word} is misspelt"
     sentence = library.rows.get("sentence")
     if sentence and sentence in library.rows.get("paragraph", ""):
-        yield "LP036", "the paragraph repeats the sentence, which is shown before it"
+        yield "LP036", "the paragraph begins with the sentence, and the IDE shows both"
 
 
 @rule("LP038", "LP039", "LP041")
@@ -265,10 +265,10 @@ def values(library):
     if category == "Uncategorized":
         yield "LP039", "the category is Uncategorized"
     elif category is not None and category not in CATEGORIES:
-        yield "LP038", f"the category {category!r} is not one of the list"
+        yield "LP038", f"the category {category!r} is unknown"
     url = library.rows.get("url")
     if url and not re.fullmatch(r"https?://[\w.-]+(/\S*)?", url):
-        yield "LP041", f"the url {url!r} is no web address"
+        yield "LP041", f"the url {url!r} is not a web address"
 
 
 @rule("LP045", "LP046")
@@ -288,10 +288,10 @@ def depends(library):
     for item in filter(None, re.split(r",(?![^(]*\))", library.rows.get("depends", ""))):
         found = re.fullmatch(r"\s*([A-Za-z0-9][A-Za-z0-9_. -]*?)\s*(\((.*)\))?\s*", item)
         if not found:
-            yield "LP047", f"depends: {item.strip()!r} is no name of a library"
+            yield "LP047", f"depends: {item.strip()!r} is not the name of a library"
         elif found.group(2) and not re.fullmatch(rf"[\s()!&|<>=^]*((<|<=|=|>=|>|\^){RELAXED}[\s()!&|]*)+",
                                                  found.group(3)):
-            yield "LP058", f"depends: {found.group(2)} is no constraint of versions"
+            yield "LP058", f"depends: {found.group(2)} is not a version constraint"
 
 
 @rule("LP049", "LP050", "LP053", "LP054")
@@ -324,7 +324,7 @@ def arduino_header(library):
             for wrong in re.findall(r'^\s*#\s*include\s*[<"](arduino\.h)[>"]', path.read_text(), re.M | re.I):
                 if wrong != "Arduino.h":
                     inside = path.relative_to(library.root).parts[0] == "examples"
-                    yield "SC001" if inside else "LC001", f"{path.name} includes {wrong}, which is Arduino.h"
+                    yield "SC001" if inside else "LC001", f"{path.name} includes {wrong} instead of Arduino.h"
 
 
 @rule("LD001", "LD002")
@@ -340,7 +340,7 @@ def documents(library):
 def examples(library):
     for path in library.files:
         if path.suffix in (".ino", ".pde") and path.relative_to(library.root).parts[0] not in ("examples", "extras"):
-            yield "LD003", f"{path.relative_to(library.root)}: sketches belong into examples"
+            yield "LD003", f"{path.relative_to(library.root)}: sketches belong in examples"
     if not any((folder / f"{folder.name}.ino").is_file() for folder in library.sketches):
         yield "LD004", "no examples"
     names = library.folders()

@@ -1,10 +1,10 @@
-/* As much of Arduino as ModbusMaster.h uses, for tests on a host. A test may
- * define SHIM_UARTS (1 to 4) before it includes this: the UARTs of its board. */
+/* The part of Arduino that the library's classes use, for tests on a host. SHIM_UARTS, 1 to 4,
+ * is the number of the board's UARTs. A test may define it before it includes this file. */
 #ifndef SHIM_ARDUINO_H
 #define SHIM_ARDUINO_H
 
 #include "Print.h"
-#include "bench.h"
+#include "board.h"
 #include "pins.h"
 
 #include <deque>
@@ -20,17 +20,17 @@
 
 inline unsigned long micros()
 {
-    return bench().micros();
+    return board().micros();
 }
 inline unsigned long millis()
 {
-    return bench().micros() / 1000;
+    return board().micros() / 1000;
 }
 #define lowByte(w) ((uint8_t)((w)&0xff))
 #define highByte(w) ((uint8_t)((w) >> 8))
 inline void yield()
 {
-    bench().yields++;
+    board().yields++;
 }
 
 class Stream : public Print {
@@ -42,28 +42,28 @@ public:
     virtual void flush() {}
 };
 
-/* A UART whose far end a test scripts: each flush releases the next reply. */
+/* A UART. The test queues replies, and each flush lets the next reply arrive. */
 class HardwareSerial : public Stream {
 public:
     typedef std::vector<uint8_t> Bytes;
 
-    unsigned long baud = 0;   /* 0: not open */
-    std::vector<Bytes> sent;  /* what went out between two flushes */
-    uint32_t sentAt = 0;      /* when the last byte had left */
-    uint32_t startedAt = 0;   /* when the first byte was handed over */
-    uint32_t delay = 1000;    /* from a flush to the reply, microseconds */
-    uint32_t character = 573; /* between two bytes of a reply */
-    size_t room = SIZE_MAX;   /* bytes that one write takes */
+    unsigned long baud = 0;       /* 0: not open */
+    std::vector<Bytes> sent;      /* each element: the bytes between two flushes */
+    uint32_t sentAt = 0;          /* time of the end of the last sent byte, us */
+    uint32_t startedAt = 0;       /* time of the first write of a frame, us */
+    uint32_t delay = 1000;        /* from a flush to the reply, us */
+    uint32_t character = 573;     /* from one byte of a reply to the next, us */
+    size_t writeSpace = SIZE_MAX; /* bytes that one write accepts */
 
     void begin(unsigned long rate) { baud = rate; }
 
-    /* What comes back after the next flush that has no reply yet. */
+    /* Queues a reply: each flush takes one from the queue. */
     void reply(const Bytes &bytes) { replies.push_back(bytes); }
 
-    /* What arrives now, asked for by nobody. */
-    void inject(const Bytes &bytes) { arrive(bytes, bench().now, 0); }
+    /* Lets bytes arrive now, without a request. */
+    void inject(const Bytes &bytes) { arrive(bytes, board().now, 0); }
 
-    /* What arrives at a time. */
+    /* Lets bytes arrive from a time on, `pace` microseconds apart. */
     void arrive(const Bytes &bytes, uint32_t when, uint32_t pace)
     {
         for (size_t i = 0; i < bytes.size(); i++)
@@ -74,14 +74,14 @@ public:
     {
         int count = 0;
         for (const Arrival &arrival : line)
-            count += static_cast<int32_t>(bench().now - arrival.when) >= 0;
+            count += static_cast<int32_t>(board().now - arrival.when) >= 0;
         return count;
     }
     int read() override
     {
         if (available() == 0)
             return -1;
-        bench().note("read");
+        board().logEvent("read");
         uint8_t value = line.front().value;
         line.pop_front();
         return value;
@@ -90,34 +90,34 @@ public:
 
     size_t write(uint8_t value) override
     {
-        if (room == 0) {
+        if (writeSpace == 0) {
             setWriteError();
             return 0;
         }
-        bench().note("write");
+        board().logEvent("write");
         if (out.empty())
-            startedAt = bench().now;
+            startedAt = board().now;
         out.push_back(value);
         return 1;
     }
     size_t write(const uint8_t *bytes, size_t length) override
     {
-        return Stream::write(bytes, length < room ? length : room);
+        return Stream::write(bytes, length < writeSpace ? length : writeSpace);
     }
     void flush() override
     {
-        bench().note("flush");
-        bench().now += static_cast<uint32_t>(out.size()) * character;
-        sentAt = bench().now;
+        board().logEvent("flush");
+        board().now += static_cast<uint32_t>(out.size()) * character;
+        sentAt = board().now;
         sent.push_back(out);
         out.clear();
         if (!replies.empty()) {
-            arrive(replies.front(), bench().now + delay, character);
+            arrive(replies.front(), board().now + delay, character);
             replies.pop_front();
         }
     }
 
-    /* As fresh from the factory. */
+    /* Sets all members to their first values. */
     void reset() { *this = HardwareSerial(); }
 
 private:

@@ -1,4 +1,4 @@
-/* The classes of the ESP8266's WiFi library, with this machine's sockets. */
+/* The classes of the ESP8266's WiFi library, over sockets of this machine. */
 #ifndef SHIM_ESP8266WIFI_H
 #define SHIM_ESP8266WIFI_H
 
@@ -17,7 +17,7 @@ public:
     explicit WiFiServer(uint16_t port) : SocketServer(port) {}
     WiFiClient accept()
     {
-        int fd = take();
+        int fd = acceptFd();
         return fd >= 0 ? WiFiClient(fd) : WiFiClient();
     }
     WiFiClient available() { return accept(); }

@@ -1,4 +1,4 @@
-/* The classes of the Ethernet library, 2.0.0 and later, with this machine's sockets. */
+/* The classes of the Ethernet library, 2.0.0 and later, over sockets of this machine. */
 #ifndef SHIM_ETHERNET_H
 #define SHIM_ETHERNET_H
 
@@ -15,10 +15,10 @@ public:
     explicit EthernetServer(uint16_t port) : SocketServer(port) {}
     EthernetClient accept()
     {
-        int fd = take();
+        int fd = acceptFd();
         return fd >= 0 ? EthernetClient(fd) : EthernetClient();
     }
-    EthernetClient available() { return speaking(known); }
+    EthernetClient available() { return withBytes(known); }
 
 private:
     std::vector<EthernetClient> known;

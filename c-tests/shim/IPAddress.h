@@ -1,4 +1,4 @@
-/* As much of Arduino's IPAddress as the shim's network takes. */
+/* The part of Arduino's IPAddress that the shim's network uses. */
 #ifndef SHIM_IPADDRESS_H
 #define SHIM_IPADDRESS_H
 

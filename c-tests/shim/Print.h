@@ -1,4 +1,4 @@
-/* As much of Arduino's Print as the library and its examples call. */
+/* The part of Arduino's Print that the library and its examples use. */
 #ifndef SHIM_PRINT_H
 #define SHIM_PRINT_H
 
@@ -10,7 +10,7 @@
 #define DEC 10
 #define HEX 16
 
-/* Texts that an AVR keeps in flash. */
+/* On an AVR these texts stay in flash. */
 class __FlashStringHelper;
 #define F(text) (reinterpret_cast<const __FlashStringHelper *>(text))
 

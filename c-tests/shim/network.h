@@ -1,6 +1,5 @@
-/* A network library's classes with real sockets behind them. Every address is this
- * machine; a test says which of its ports a sketch means by a port, and finds the one on
- * which a sketch listens. */
+/* The classes of a network library over real sockets. Every address is that of this machine.
+ * networkPort maps the ports of a sketch to free ports of this machine. */
 #ifndef SHIM_NETWORK_H
 #define SHIM_NETWORK_H
 
@@ -18,28 +17,29 @@
 #include <unistd.h>
 #include <vector>
 
-/* The port of this machine that is meant by a sketch's port. */
-inline uint16_t &networkPort(uint16_t sketch)
+/* Returns the port of this machine for a port of the sketch. A listener sets it, and a test sets
+ * it before a sketch connects. */
+inline uint16_t &networkPort(uint16_t sketchPort)
 {
     static std::map<uint16_t, uint16_t> ports;
-    return ports[sketch];
+    return ports[sketchPort];
 }
 
-/* A connection; as on the chips, copies are the same connection. */
+/* A connection. A copy is the same connection, as in the real libraries. */
 class SocketClient : public Client {
 public:
-    size_t room = SIZE_MAX; /* bytes that one write takes */
+    size_t writeSpace = SIZE_MAX; /* bytes that one write accepts */
 
     SocketClient() {}
     explicit SocketClient(int fd) : socket(std::make_shared<Socket>(fd)) {}
 
-    int connect(IPAddress, uint16_t port) override { return dial(networkPort(port)); }
-    int connect(const char *, uint16_t port) override { return dial(networkPort(port)); }
+    int connect(IPAddress, uint16_t port) override { return connectTo(networkPort(port)); }
+    int connect(const char *, uint16_t port) override { return connectTo(networkPort(port)); }
 
     size_t write(uint8_t value) override { return write(&value, 1); }
     size_t write(const uint8_t *bytes, size_t length) override
     {
-        ssize_t sent = send(fd(), bytes, length < room ? length : room, MSG_NOSIGNAL);
+        ssize_t sent = send(fd(), bytes, length < writeSpace ? length : writeSpace, MSG_NOSIGNAL);
         return sent < 0 ? 0 : static_cast<size_t>(sent);
     }
     int available() override
@@ -63,12 +63,12 @@ public:
     }
     void flush() override {}
     void stop() override { socket.reset(); }
-    /* As the libraries have it: also while bytes wait that were not read. */
+    /* True also after the peer has closed, while received bytes are unread, as in the libraries. */
     uint8_t connected() override
     {
         uint8_t value;
-        ssize_t seen = fd() < 0 ? 0 : recv(fd(), &value, 1, MSG_PEEK);
-        return seen > 0 || (seen < 0 && (errno == EAGAIN || errno == EWOULDBLOCK));
+        ssize_t count = fd() < 0 ? 0 : recv(fd(), &value, 1, MSG_PEEK);
+        return count > 0 || (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK));
     }
     operator bool() override { return fd() >= 0; }
     bool operator==(const SocketClient &other) const { return socket == other.socket; }
@@ -88,7 +88,7 @@ private:
 
     int fd() const { return socket ? socket->fd : -1; }
 
-    int dial(uint16_t port)
+    int connectTo(uint16_t port)
     {
         struct sockaddr_in to;
         memset(&to, 0, sizeof to);
@@ -105,10 +105,10 @@ private:
     }
 };
 
-/* A listener, with both ways in which libraries hand connections over. */
+/* A listener. Its derived classes return connections in one of two ways. */
 class SocketServer {
 public:
-    explicit SocketServer(uint16_t port) : named(port) {}
+    explicit SocketServer(uint16_t port) : sketchPort(port) {}
     ~SocketServer() { end(); }
     SocketServer(const SocketServer &) = delete;
     SocketServer &operator=(const SocketServer &) = delete;
@@ -125,7 +125,7 @@ public:
         if (bind(listener, reinterpret_cast<struct sockaddr *>(&at), sizeof at) == 0 &&
             listen(listener, 8) == 0 &&
             getsockname(listener, reinterpret_cast<struct sockaddr *>(&at), &length) == 0)
-            networkPort(named) = ntohs(at.sin_port);
+            networkPort(sketchPort) = ntohs(at.sin_port);
     }
     void end()
     {
@@ -135,12 +135,12 @@ public:
     }
 
 protected:
-    /* Each connection once. */
-    int take() { return accept4(listener, nullptr, nullptr, SOCK_CLOEXEC); }
-    /* Any connection from which bytes wait. */
-    template <typename Link> Link speaking(std::vector<Link> &links)
+    /* Returns the descriptor of a new connection, each once, or -1. */
+    int acceptFd() { return accept4(listener, nullptr, nullptr, SOCK_CLOEXEC); }
+    /* Returns any connection with unread bytes, as often as it has some. */
+    template <typename Link> Link withBytes(std::vector<Link> &links)
     {
-        for (int fd = take(); fd >= 0; fd = take())
+        for (int fd = acceptFd(); fd >= 0; fd = acceptFd())
             links.push_back(Link(fd));
         for (Link &link : links)
             if (link.available() > 0)
@@ -149,7 +149,7 @@ protected:
     }
 
 private:
-    uint16_t named;
+    uint16_t sketchPort;
     int listener = -1;
 };
 

@@ -1,4 +1,4 @@
-/* The pins of the shim's board, as a sketch drives them and a test looks at them. */
+/* The pins of the simulated board. The sketch drives them, and the test reads them. */
 #ifndef SHIM_PINS_H
 #define SHIM_PINS_H
 
@@ -14,7 +14,7 @@
 struct Pins {
     uint8_t level[32] = {};
     uint8_t rises[32] = {}; /* how often each pin was set high */
-    int voltage[32] = {};   /* what analogRead gives, 0 to 1023 */
+    int voltage[32] = {};   /* what analogRead returns, 0 to 1023 */
 };
 
 inline Pins &pins()

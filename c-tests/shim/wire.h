@@ -1,4 +1,4 @@
-/* What the tests of the class share: frames, the bytes that were sent, a fresh board. */
+/* What the tests of the sketch classes share: frames, checks of sent bytes, the setup. */
 #ifndef WIRE_H
 #define WIRE_H
 
@@ -30,7 +30,7 @@ inline Bytes sealed(Bytes bytes)
     return bytes;
 }
 
-/* A frame of these values and their CRC. */
+/* Returns a frame: these bytes and their CRC. */
 inline Bytes adu(std::initializer_list<int> values)
 {
     return sealed(raw(values));
@@ -56,10 +56,24 @@ inline void assert_sent(HardwareSerial &port, std::initializer_list<int> values)
     port.sent.clear();
 }
 
+/* A UART whose write returns 0 for a byte that it sends, like some variants of SoftwareSerial. */
+class ZeroWriteSerial : public HardwareSerial {
+public:
+    size_t write(uint8_t value) override
+    {
+        HardwareSerial::write(value);
+        return 0;
+    }
+    size_t write(const uint8_t *bytes, size_t length) override
+    {
+        return length > 0 ? write(bytes[0]) : 0;
+    }
+};
+
 /* Sets the board to its state after a reset. */
 inline int reset_board(void **)
 {
-    bench() = Bench();
+    board() = Board();
     pins() = Pins();
     for (unsigned i = 0; i < 4; i++)
         shimSerial(i).reset();

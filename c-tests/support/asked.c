@@ -2,20 +2,19 @@
 #include "asked.h"
 #include "await.h"
 #include "crc.h"
-#include "test.h"
+#include "fails.h"
 
-#include <errno.h>
 #include <poll.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
-#define EXCEPTION(code, call)                                                                      \
-    do {                                                                                           \
-        errno = 0;                                                                                 \
-        assert_int_equal(call, -1);                                                                \
-        assert_int_equal(errno, MODBUS_ENOBASE + (code));                                          \
-    } while (0)
+int asked_connect(modbus_t *client, int unit)
+{
+    if (!client || modbus_set_slave(client, unit) || modbus_connect(client))
+        return -1;
+    return modbus_set_response_timeout(client, PATIENCE_MS / 1000, 0);
+}
 
 void asked_reads(modbus_t *client)
 {

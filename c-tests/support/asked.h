@@ -7,6 +7,9 @@
 
 #include <modbus.h>
 
+/* Connects a client, for requests to a unit. Returns 0, or -1 if that fails. */
+int asked_connect(modbus_t *client, int unit);
+
 /* Calls every function that the client has, at the limits of its quantities. */
 void asked_reads(modbus_t *client);
 void asked_writes(modbus_t *client, served *s);

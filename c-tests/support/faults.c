@@ -2,6 +2,7 @@
 #include "crc.h"
 #include "test.h"
 
+#include <stdio.h>
 #include <string.h>
 
 enum { UNIT = FAULT_UNIT, REGISTERS = FAULT_REGISTERS, MOST = 260 };
@@ -361,4 +362,15 @@ int fault_as_good(const char *found, const char *expected)
 {
     return strspn(found, ".F") == FAULT_TRANSACTIONS &&
            !(strchr(found, 'F') && strcmp(found, expected) != 0);
+}
+
+int fault_report(const fault *f, const char *plain, const char *retried, uint8_t status)
+{
+    printf("%-46s %s  %s  %s\n", f->name, plain, retried,
+           status == MBM_OK ? "" : mbm_status_text(status));
+    if (fault_as_good(plain, f->expected) && fault_as_good(retried, f->retried) &&
+        status == f->status)
+        return 0;
+    printf("    worse: expected %s %s %s\n", f->expected, f->retried, mbm_status_text(f->status));
+    return 1;
 }

@@ -37,4 +37,8 @@ mbm_port fault_port(responder *device, const mbm_port *line);
 /* Returns 1 if no transaction ended worse than expected: '.' right data, 'F' a failed call. */
 int fault_as_good(const char *found, const char *expected);
 
+/* Prints how the transactions of a fault ended, without and with a retry, and the status of
+ * the first. Returns 1 if anything is worse than expected. */
+int fault_report(const fault *f, const char *plain, const char *retried, uint8_t status);
+
 #endif

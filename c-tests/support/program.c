@@ -1,5 +1,6 @@
 #define _GNU_SOURCE
 #include "program.h"
+#include "must.h"
 
 #include <fcntl.h>
 #include <signal.h>
@@ -10,14 +11,6 @@
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
-
-static void must(int ok, const char *what)
-{
-    if (!ok) {
-        perror(what);
-        abort();
-    }
-}
 
 void program_start(program *p, const char *name, const char *const *arguments)
 {

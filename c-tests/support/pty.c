@@ -1,19 +1,12 @@
 #define _GNU_SOURCE
 #include "pty.h"
+#include "must.h"
 
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <termios.h>
 #include <unistd.h>
-
-static void must(int ok, const char *what)
-{
-    if (!ok) {
-        perror(what);
-        abort();
-    }
-}
 
 void pty_open(pty *line)
 {

@@ -1,5 +1,6 @@
 #define _GNU_SOURCE
 #include "served.h"
+#include "must.h"
 
 #include <arpa/inet.h>
 #include <errno.h>
@@ -12,14 +13,6 @@
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
-
-static void must(int ok, const char *what)
-{
-    if (!ok) {
-        perror(what);
-        abort();
-    }
-}
 
 uint16_t served_pattern(unsigned address)
 {

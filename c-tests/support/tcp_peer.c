@@ -2,6 +2,7 @@
 #include "tcp_peer.h"
 #include "tcp_server.h"
 #include "tcp_stream.h"
+#include "must.h"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -38,14 +39,6 @@ struct tcp_peer {
     tcp_peer_counts counts;
     stream streams[TCP_PEER_CONNECTIONS];
 };
-
-static void must(int ok, const char *what)
-{
-    if (!ok) {
-        perror(what);
-        abort();
-    }
-}
 
 uint16_t tcp_peer_word(unsigned address)
 {

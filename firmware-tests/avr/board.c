@@ -141,8 +141,8 @@ static void received(struct avr_irq_t *irq, uint32_t value, void *parameter)
     (void)irq;
     if (!value)
         return;
-    w->heard = w->on->avr->cycle;
-    w->bytes_heard++;
+    w->received = w->on->avr->cycle;
+    w->bytes_received++;
 }
 
 static void byte_out(struct avr_irq_t *irq, uint32_t value, void *parameter)
@@ -250,8 +250,8 @@ static avr_cycle_count_t next_bit(avr_t *avr, avr_cycle_count_t when, void *para
         return when + w->bit;
     }
     e->bit_out = 0;
-    w->heard = avr->cycle;
-    w->bytes_heard++;
+    w->received = avr->cycle;
+    w->bytes_received++;
     w->tail++;
     if (w->tail == w->head)
         return 0;

@@ -23,8 +23,8 @@ struct wire {
     unsigned frames; /* number of frames so far, including the one that the device is called with */
     uint64_t first_started; /* first byte of that frame: the time of its start bit */
     uint64_t last_started;  /* last byte of it: the time of its start bit */
-    uint64_t heard;         /* when the board had received the last byte of a reply */
-    unsigned bytes_heard;
+    uint64_t received;      /* when the board had received the last byte of a reply */
+    unsigned bytes_received;
     /* private */
     struct end *end;
     uint8_t frame[FRAME];

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Two meters share a wire; one that is not `there` is silent. */
+/* Two meters on one wire. A meter that is not `there` sends no reply. */
 typedef struct meters {
     server all[2];
     int there[2];
@@ -51,7 +51,7 @@ static void energy_meter_client(const kind *k)
     set_input_float(&m.all[1], 12, 600.1f);
     assert_true(board_run(b, 600 * MS));
     assert_false(is_high(b, k->pin4));
-    /* A silent meter does not hold up the other, nor the LED. */
+    /* A silent meter delays neither the other meter nor the LED. */
     m.there[0] = 0;
     set_input_float(&m.all[1], 12, 100.0f);
     assert_true(board_run(b, 2500 * MS));

@@ -282,7 +282,7 @@ static void a_servers_exceptions_are_returned(void **state)
         assert_int_equal(outcome(&r, n, held), '.');
     for (n = 3; n < READS; n++) {
         assert_int_equal(r.status[n], MBM_ILLEGAL_DATA_ADDRESS);
-        /* The values of the earlier reads are still there. */
+        /* A failed read keeps the values of the reads before. */
         assert_int_equal(r.words[n][0], server_pattern(300));
     }
     server_stop(&s);

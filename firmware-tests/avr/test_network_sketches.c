@@ -1,6 +1,6 @@
-/* The examples that use a network, on simulated boards: the library's place is taken by
- * firmware-tests/avr/libraries, whose connection is a UART. This test carries its bytes to
- * the sockets of a real libmodbus. */
+/* The examples that use a network, on simulated boards. The network libraries of
+ * firmware-tests/avr/libraries have a UART as their connection. This test carries its bytes
+ * to the sockets of a real libmodbus. */
 #define _GNU_SOURCE
 #include "kind.h"
 #include "peer.h"
@@ -15,7 +15,7 @@
 
 enum { HEADER = 6, PATIENCE_MS = 60000 };
 
-/* Takes exactly so many bytes of a connection, however long the host takes. */
+/* Reads exactly `length` bytes of a connection, however long the host needs. */
 static void take(int fd, uint8_t *bytes, size_t length)
 {
     while (length > 0) {
@@ -30,8 +30,8 @@ static void take(int fd, uint8_t *bytes, size_t length)
     }
 }
 
-/* Requests of a board, carried to a server. Simulated time stands still until it has
- * replied to each. */
+/* Sends the requests of a board to a server. Simulated time stands still until the server
+ * has replied to each. */
 static void to_server(wire *w, const uint8_t *frames, size_t length)
 {
     const int *fd = w->context;
@@ -103,7 +103,7 @@ static void *run(void *argument)
     return NULL;
 }
 
-/* Responses of a board, carried to the client. */
+/* Sends the responses of a board to the client. */
 static void to_client(wire *w, const uint8_t *frame, size_t length)
 {
     const int *fd = w->context;
@@ -111,7 +111,7 @@ static void to_client(wire *w, const uint8_t *frame, size_t length)
     assert_int_equal(send(*fd, frame, length, MSG_NOSIGNAL), length);
 }
 
-/* What a client's work gives; the board runs while there are requests. */
+/* Returns the result of a client's work. The board runs until the work is done. */
 static int gets(board *b, wire *network, int (*work)(modbus_t *peer))
 {
     task t = {.work = work, .result = -2};

@@ -1,11 +1,11 @@
 /* Sketches with a server on simulated boards. A libmodbus client sends the requests. */
 #include "bus.h"
 #include "crc.h"
+#include "fails.h"
 #include "kind.h"
 #include "mbm.h"
 #include "test.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,14 +15,6 @@ static const kind *const kinds[] = {&uno, &minimal, &mega};
 /* t3.5 at 19200 baud in cycles, and a tick of the core's clock, by which a response may be
  * early. */
 enum { T35 = 32080, TICK = 64 };
-
-#define FAILS(error, call)                                                                         \
-    do {                                                                                           \
-        errno = 0;                                                                                 \
-        assert_int_equal(call, -1);                                                                \
-        assert_int_equal(errno, error);                                                            \
-    } while (0)
-#define EXCEPTION(code, call) FAILS(MODBUS_ENOBASE + (code), call)
 
 /* Expects an exception to a request that the client has no function for. */
 static void refuses(modbus_t *client, const uint8_t *request, size_t length, uint8_t exception)
@@ -62,11 +54,11 @@ static void response_seen(void *context, const wire *w, size_t length)
 
     s->responses++;
     s->wrong += s->level != 0;
-    s->wrong += s->rose >= w->first_started || s->rose <= w->heard;
+    s->wrong += s->rose >= w->first_started || s->rose <= w->received;
     s->wrong += s->fell < last_bit || s->fell < w->first_started + length * 10 * w->bit;
     /* Off within a character, before a client could send again. */
     s->wrong += s->fell - last_bit > 10 * w->bit;
-    s->wrong += w->first_started - w->heard < T35 - TICK;
+    s->wrong += w->first_started - w->received < T35 - TICK;
 }
 
 /* Starts the example and lets it set up. */
@@ -184,6 +176,26 @@ static void access_to_absent_data_gets_an_exception_on(const kind *k)
 }
 ON_ALL(access_to_absent_data_gets_an_exception)
 
+/* Sets coil 0 with a request to `unit`, which gets no response: the client waits for one,
+ * also after a broadcast. Returns the coil as unit 17 has it then. */
+static uint8_t coil_after_write_to(served *s, int unit)
+{
+    uint8_t on = 7;
+
+    modbus_set_response_timeout(s->line.client, 0, 200000);
+    modbus_set_slave(s->line.client, unit);
+    bus_go(&s->line);
+    FAILS(ETIMEDOUT, modbus_write_bit(s->line.client, 0, 1));
+    bus_halt(&s->line);
+    bus_settle(&s->line);
+    bus_go(&s->line);
+    modbus_set_response_timeout(s->line.client, 20, 0);
+    modbus_set_slave(s->line.client, 17);
+    assert_int_equal(modbus_read_bits(s->line.client, 0, 1, &on), 1);
+    bus_halt(&s->line);
+    return on;
+}
+
 static void other_units_and_damaged_frames_get_no_response_on(const kind *k)
 {
     static const uint8_t broadcast_read[] = {0, 1, 0, 0, 0, 1};
@@ -191,7 +203,6 @@ static void other_units_and_damaged_frames_get_no_response_on(const kind *k)
     size_t length = seal(frame, 6);
     served *s = example(k);
     unsigned i;
-    uint8_t on;
 
     for (i = 0; i < 8 * length; i += 5) {
         frame[i / 8] ^= (uint8_t)(1 << i % 8);
@@ -210,18 +221,7 @@ static void other_units_and_damaged_frames_get_no_response_on(const kind *k)
     assert_int_equal(relay(s), 0);
     assert_int_equal(s->rose, 0);
 
-    modbus_set_response_timeout(s->line.client, 0, 200000);
-    modbus_set_slave(s->line.client, 18);
-    bus_go(&s->line);
-    FAILS(ETIMEDOUT, modbus_write_bit(s->line.client, 0, 1));
-    bus_halt(&s->line);
-    bus_settle(&s->line);
-    bus_go(&s->line);
-    modbus_set_response_timeout(s->line.client, 20, 0);
-    modbus_set_slave(s->line.client, 17);
-    assert_int_equal(modbus_read_bits(s->line.client, 0, 1, &on), 1);
-    bus_halt(&s->line);
-    assert_int_equal(on, 0);
+    assert_int_equal(coil_after_write_to(s, 18), 0);
     assert_int_equal(s->responses, 1);
     done(s);
 }
@@ -230,21 +230,8 @@ ON_ALL(other_units_and_damaged_frames_get_no_response)
 static void a_broadcast_switches_the_relay_without_a_response_on(const kind *k)
 {
     served *s = example(k);
-    uint8_t on = 0;
 
-    modbus_set_response_timeout(s->line.client, 0, 200000);
-    modbus_set_slave(s->line.client, MODBUS_BROADCAST_ADDRESS);
-    bus_go(&s->line);
-    /* The client waits for a response nevertheless. */
-    FAILS(ETIMEDOUT, modbus_write_bit(s->line.client, 0, 1));
-    bus_halt(&s->line);
-    bus_settle(&s->line);
-    bus_go(&s->line);
-    modbus_set_response_timeout(s->line.client, 20, 0);
-    modbus_set_slave(s->line.client, 17);
-    assert_int_equal(modbus_read_bits(s->line.client, 0, 1, &on), 1);
-    bus_halt(&s->line);
-    assert_int_equal(on, 1);
+    assert_int_equal(coil_after_write_to(s, MODBUS_BROADCAST_ADDRESS), 1);
     assert_int_equal(relay(s), 1);
     assert_int_equal(s->responses, 1);
     done(s);

@@ -32,7 +32,7 @@ static void is_asked(wire *w, const uint8_t *frame, size_t length)
     if (call >= CALLS)
         give_up("TimeFirst sends more requests than it makes calls");
     t->waited[call] = w->first_started - t->called;
-    t->silence[call] = w->first_started - w->heard;
+    t->silence[call] = w->first_started - w->received;
     peer_right(w, frame, length);
 }
 

@@ -25,9 +25,9 @@ static void answer(wire *w, const uint8_t *frame, size_t length)
     size_t have = peer_right_reply(reply, frame);
 
     if (w->frames > SKIP)
-        note(&o->dead[length > 8], w->first_started - w->heard);
+        note(&o->dead[length > 8], w->first_started - w->received);
     o->bytes_due = (unsigned)have;
-    w->bytes_heard = 0;
+    w->bytes_received = 0;
     o->bytes_before = 0;
     o->waiting = 1;
     wire_play(w, MS, reply, have - 1);
@@ -44,7 +44,7 @@ static void call_begins_or_ends(void *context, int level, uint64_t cycle)
         board_paint(o->on);
     }
     if (!level && w->frames > SKIP)
-        note(&o->back, cycle - w->heard);
+        note(&o->back, cycle - w->received);
 }
 
 static void poll_begins_or_ends(void *context, int level, uint64_t cycle)
@@ -59,18 +59,18 @@ static void poll_begins_or_ends(void *context, int level, uint64_t cycle)
     /* After the request has been sent, the wire is silent for a millisecond, then bytes
      * arrive. */
     if (w->frames > SKIP && o->waiting) {
-        unsigned fresh = w->bytes_heard - o->bytes_before;
+        unsigned fresh = w->bytes_received - o->bytes_before;
 
-        if (w->bytes_heard == 0)
+        if (w->bytes_received == 0)
             note(&o->without, cycle - o->rose);
-        else if (w->bytes_heard == o->bytes_due)
+        else if (w->bytes_received == o->bytes_due)
             o->waiting = 0;
         else if (fresh) {
             note(&o->with, cycle - o->rose);
             o->bytes_polled += fresh;
         }
     }
-    o->bytes_before = w->bytes_heard;
+    o->bytes_before = w->bytes_received;
 }
 
 static observer observe(const char *folder, const char *name, uint64_t late, pin_changed changed)

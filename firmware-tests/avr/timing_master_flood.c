@@ -93,7 +93,7 @@ static void feed(flood *f, unsigned target)
         /* While the sketch stores the low byte, `taken` may exceed what was played. */
         uint16_t waiting = (uint16_t)(f->played - taken);
 
-        if (f->bus->bytes_heard == f->played && f->played < target && waiting < IN_CORE) {
+        if (f->bus->bytes_received == f->played && f->played < target && waiting < IN_CORE) {
             unsigned count = IN_CORE - waiting;
 
             play(f, count < target - f->played ? count : target - f->played);
@@ -134,7 +134,7 @@ static uint64_t longest(const char *folder, uint8_t (*byte)(unsigned i))
 
         f->played = first;
         while (board_byte(f->on, f->status) == MBM_PENDING) {
-            if (f->played - f->bus->bytes_heard < FRAME)
+            if (f->played - f->bus->bytes_received < FRAME)
                 play(f, FRAME);
             if (!board_run(f->on, MS) || board_cycle(f->on) > 4000 * MS)
                 give_up("a request does not end during a flood");

@@ -36,7 +36,7 @@ static void answered(wire *w, const uint8_t *frame, size_t length)
 
     a->wrong += length != lengths[which] || crc16(frame, length) != 0;
     if (w->frames > SKIP)
-        note(&a->gap[which], w->first_started - w->heard);
+        note(&a->gap[which], w->first_started - w->received);
     send_next(a);
 }
 

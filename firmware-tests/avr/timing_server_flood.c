@@ -85,12 +85,12 @@ void time_server_flood(void)
         for (i = 0; i < sizeof bytes; i++)
             bytes[i] = noise(kind, i);
         wire_play(f.bus, MS, bytes, sizeof bytes);
-        while (f.bus->bytes_heard < FULL)
+        while (f.bus->bytes_received < FULL)
             if (!board_run(f.on, 100))
                 give_up("a sketch crashed");
         f.busy = 0;
         before = board_word(f.on, taken);
-        while (f.bus->bytes_heard < sizeof bytes)
+        while (f.bus->bytes_received < sizeof bytes)
             if (!board_run(f.on, 100))
                 give_up("a sketch crashed");
         note(&byte, f.busy / (board_word(f.on, taken) - before));
@@ -100,7 +100,7 @@ void time_server_flood(void)
         wire_play(f.bus, 10 * MS, request, seal(request, 6));
         if (!board_run(f.on, 9 * MS))
             give_up("a sketch crashed");
-        note(&deaf, f.ready - f.bus->heard);
+        note(&deaf, f.ready - f.bus->received);
         if (!board_run(f.on, 30 * MS))
             give_up("a sketch crashed");
         if (board_word(f.on, taken) != sizeof bytes + 8 || f.answers != 1)

@@ -17,7 +17,7 @@ typedef struct device {
     server peer;
     uint8_t functions[ROUND], quantities[ROUND];
     unsigned count; /* requests so far */
-    char text[500]; /* what is no frame */
+    char text[500]; /* sent bytes that are no frame */
     int driver;     /* the pin that switches the line's driver */
     unsigned driven;
 } device;
@@ -139,7 +139,7 @@ static void half_duplex(const kind *k, const char *sketch)
     assert_true(board_run(b, 1000 * MS));
     assert_int_equal(d.count, 4);
     assert_int_equal(d.peer.mapping->tab_bits[2], 0);
-    /* The driver was off again when each request had been heard. */
+    /* After each request the driver was off. */
     assert_int_equal(d.driven, 4);
     server_stop(&d.peer);
     board_free(b);

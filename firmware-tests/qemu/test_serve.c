@@ -5,13 +5,13 @@
 #define _GNU_SOURCE
 #include "clock.h"
 #include "crc.h"
+#include "fails.h"
 #include "machine.h"
 #include "mbm.h"
 #include "pty.h"
 #include "serve.h"
 #include "test.h"
 
-#include <errno.h>
 #include <modbus.h>
 #include <stdio.h>
 #include <string.h>
@@ -58,14 +58,6 @@ static int stop(void **state)
     pty_close(&line);
     return 0;
 }
-
-#define FAILS(error, call)                                                                         \
-    do {                                                                                           \
-        errno = 0;                                                                                 \
-        assert_int_equal(call, -1);                                                                \
-        assert_int_equal(errno, error);                                                            \
-    } while (0)
-#define EXCEPTION(code, call) FAILS(MODBUS_ENOBASE + (code), call)
 
 /* Returns the client after a pause. The standard requires t3.5 between a response and the
  * next request, but libmodbus sends at once, and on a pty characters take no time. */

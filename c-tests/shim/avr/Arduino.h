@@ -1,5 +1,5 @@
-/* As much of Arduino as the headers and the gateway's example name, for checks by
- * compilers for firmware, which have no standard library. Nothing here is ever linked. */
+/* The part of Arduino that the headers and the gateway example use, for checks by
+ * compilers for firmware. They have no standard library, and nothing is linked. */
 #ifndef SHIM_AVR_ARDUINO_H
 #define SHIM_AVR_ARDUINO_H
 

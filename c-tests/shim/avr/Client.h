@@ -1,4 +1,4 @@
-/* As much of Arduino's Client as the headers name, for a check by avr-g++. */
+/* The part of Arduino's Client that the headers use, for a check by avr-g++. */
 #ifndef SHIM_AVR_CLIENT_H
 #define SHIM_AVR_CLIENT_H
 

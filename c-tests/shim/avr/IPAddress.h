@@ -1,4 +1,4 @@
-/* An address, for a check by a compiler for firmware. */
+/* An IP address, for checks by compilers for firmware. */
 #ifndef SHIM_AVR_IPADDRESS_H
 #define SHIM_AVR_IPADDRESS_H
 

@@ -1,4 +1,4 @@
-/* As much of Arduino's Server as network libraries derive from. */
+/* The part of Arduino's Server that network libraries derive from. */
 #ifndef SHIM_AVR_SERVER_H
 #define SHIM_AVR_SERVER_H
 

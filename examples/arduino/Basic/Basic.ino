@@ -1,6 +1,6 @@
-// The calls of the ModbusMaster manual's first example: a counter goes to
-// slave 2 as two words, six registers come back. No pause between rounds.
-// Boards whose Serial is their USB port have the bus on Serial1.
+// The calls of the first example in ModbusMaster's manual: writes a counter to
+// slave 2 as two words, then reads six registers, again and again without a pause.
+// If Serial is the USB port of your board, use Serial1 for the bus.
 #include <ModbusMaster.h>
 
 ModbusMaster node;
@@ -23,5 +23,5 @@ void loop() {
   if (result == node.ku8MBSuccess)
     for (uint8_t i = 0; i < 6; i++)
       data[i] = node.getResponseBuffer(i);
-  (void)data; // yours to use
+  (void)data; // use the values here
 }

@@ -1,16 +1,16 @@
-// Logs a sensor without delay: asks it ten times a second, and once a second stores the
-// mean of its replies. The last 30 means stay in RAM; where a second UART is free, each
-// is printed too, as seconds, mean, replies and failures.
+// Logs a sensor without delay: reads it ten times a second, and once a second stores the
+// mean of the values. RAM holds the last 30 means. On a board with a second UART the sketch
+// also prints each entry: seconds, mean, number of replies, number of failures.
 #include <ModbusClient.h>
 
 #if defined(__AVR_ATmega328P__) || defined(__AVR_ATmega168__) || defined(ESP8266)
-#define BUS Serial // the only UART: take the bus off it to upload
+#define BUS Serial // the only UART: disconnect the bus from it to upload
 #else
 #define BUS Serial1 // Serial stays free for messages
 #define MESSAGES
 #endif
 
-const uint8_t led = 13; // on while the last mean is above that of all that are kept
+const uint8_t led = 13; // on while the last mean is above the mean of all stored means
 const uint16_t sensorAt = 2;
 
 struct Entry {
@@ -76,14 +76,14 @@ void setup() {
 }
 
 void loop() {
-  static unsigned long asked = 0, stored = 0;
+  static unsigned long lastRequest = 0, lastStore = 0;
   const unsigned long now = millis();
-  if (now - asked >= 100) {
-    asked += 100;
-    client.readInputRegisters(sensor, sensorAt, 1); // refused while one is pending
+  if (now - lastRequest >= 100) {
+    lastRequest += 100;
+    client.readInputRegisters(sensor, sensorAt, 1); // refused while the last request is pending
   }
-  if (now - stored >= 1000) {
-    stored += 1000;
+  if (now - lastStore >= 1000) {
+    lastStore += 1000;
     store(now);
   }
   client.poll();

@@ -1,23 +1,23 @@
-// Many energy meters hold their readings as 32-bit floats, two input registers
-// each, the high word first; others put the low word first. This one reads
-// voltage, current and power, and switches a load off above 1000 W.
+// Reads voltage, current and power of an energy meter, and switches a load off
+// above 1000 W. Many meters hold each value as a 32-bit float in two input
+// registers, the high word first. Others put the low word first.
 #include <ModbusMaster.h>
 
 #if (defined(__AVR__) && !defined(UBRR1H) && !defined(USART1)) || defined(ESP8266)
-#define BUS Serial // the only UART: take the bus off it to upload
+#define BUS Serial // the only UART: disconnect the bus from it to upload
 #else
 #define BUS Serial1 // Serial stays free for messages
 #define MESSAGES
 #endif
 
 const uint8_t load = 4;       // a relay
-const uint16_t voltageAt = 0; // from your meter's manual, counted from 0
+const uint16_t voltageAt = 0; // the addresses are in your meter's manual; count from 0
 const uint16_t currentAt = 6;
 const uint16_t powerAt = 12;
 
 ModbusMaster meter;
 
-// False, with the value untouched, if the meter does not answer properly.
+// Returns false and leaves `value` as it is if the meter sends no correct reply.
 bool readFloat(uint16_t address, float &value) {
   return meter.readInputRegisters(address, 2) == meter.ku8MBSuccess &&
          meter.getResponseFloat(0, value);
@@ -33,7 +33,7 @@ void setup() {
   meter.begin(1, BUS);
   meter.setBaudRate(9600);
   meter.setRetries(2);
-  // meter.setWordOrder(meter.orderCDAB); // low word first? Then this.
+  // meter.setWordOrder(meter.orderCDAB); // if your meter has the low word first
 }
 
 void loop() {

@@ -1,10 +1,11 @@
-// Two energy meters on one line, read without waiting: loop goes on while a meter is
-// asked. Each holds voltage, current and power as floats in input registers 0, 6 and 12.
-// A load is switched off while both meters together measure more than 1000 W.
+// Reads two energy meters on one line without waiting: loop continues while a reply is
+// pending. Each meter holds voltage, current and power as floats in input registers 0, 6
+// and 12. The sketch switches a load off while both meters together measure more than
+// 1000 W.
 #include <ModbusClient.h>
 
 #if defined(__AVR_ATmega328P__) || defined(__AVR_ATmega168__) || defined(ESP8266)
-#define BUS Serial // the only UART: take the bus off it to upload
+#define BUS Serial // the only UART: disconnect the bus from it to upload
 #else
 #define BUS Serial1 // Serial stays free for messages
 #define MESSAGES
@@ -12,7 +13,7 @@
 
 const uint8_t load = 4; // a relay
 const uint8_t led = 13;
-const uint16_t voltageAt = 0; // from your meter's manual, counted from 0
+const uint16_t voltageAt = 0; // the addresses are in your meter's manual; count from 0
 const uint16_t currentAt = 6;
 const uint16_t powerAt = 12;
 
@@ -20,10 +21,10 @@ ModbusSerialClient client;
 ModbusRequestOf<14> first(1), second(2); // unit id; registers 0 to 13
 float power[2];
 
-// Called from client.poll() when a meter has replied, or has not.
-void keep(const ModbusRequest &meter, float &watts) {
+// client.poll() calls this when a request has ended, with or without a reply.
+void store(const ModbusRequest &meter, float &watts) {
   if (meter.status() != MBM_OK)
-    return; // the last value stays
+    return; // the last value remains
   watts = meter.getFloat(powerAt);
   digitalWrite(load, power[0] + power[1] <= 1000.0f);
 #if defined(MESSAGES)
@@ -49,21 +50,21 @@ void setup() {
   client.begin(BUS, 9600);
   client.setResponseTimeout(300);
   client.setRetries(2);
-  first.onDone([](ModbusRequest &meter) { keep(meter, power[0]); });
-  second.onDone([](ModbusRequest &meter) { keep(meter, power[1]); });
-  // first.setWordOrder(first.orderCDAB); // low word first? Then this.
+  first.onDone([](ModbusRequest &meter) { store(meter, power[0]); });
+  second.onDone([](ModbusRequest &meter) { store(meter, power[1]); });
+  // first.setWordOrder(first.orderCDAB); // if your meters have the low word first
 }
 
 void loop() {
-  static unsigned long asked = 0, blinked = 0;
-  if (millis() - asked >= 500 && client.pending() == 0) {
-    asked = millis();
+  static unsigned long lastRequest = 0, lastBlink = 0;
+  if (millis() - lastRequest >= 500 && client.pending() == 0) {
+    lastRequest = millis();
     client.readInputRegisters(first, 0, 14);
     client.readInputRegisters(second, 0, 14);
   }
   client.poll(); // never waits for a meter
-  if (millis() - blinked >= 50) {
-    blinked += 50;
+  if (millis() - lastBlink >= 50) {
+    lastBlink += 50;
     digitalWrite(led, !digitalRead(led));
   }
 }

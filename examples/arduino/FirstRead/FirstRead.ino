@@ -1,9 +1,9 @@
-// Reads six holding registers of slave 1, once a second. The LED is on while
-// that works. Where the board has a second UART, the values are printed.
+// Reads six holding registers of slave 1 once a second. The LED is on if the last
+// read succeeded. On a board with a second UART the sketch prints the values.
 #include <ModbusMaster.h>
 
 #if (defined(__AVR__) && !defined(UBRR1H) && !defined(USART1)) || defined(ESP8266)
-#define BUS Serial // the only UART: take the bus off it to upload
+#define BUS Serial // the only UART: disconnect the bus from it to upload
 #else
 #define BUS Serial1 // Serial stays free for messages
 #define MESSAGES
@@ -20,11 +20,11 @@ void setup() {
 #endif
   BUS.begin(19200);
   node.begin(1, BUS);
-  node.setBaudRate(19200); // the silence before each request follows from it
+  node.setBaudRate(19200); // sets the silence before each request
 }
 
 void loop() {
-  // Addresses are those on the wire: 2 is what manuals may call 40003.
+  // Addresses are those on the wire. Some manuals call address 2 register 40003.
   uint8_t result = node.readHoldingRegisters(2, 6);
   digitalWrite(led, result == node.ku8MBSuccess);
 #if defined(MESSAGES)
@@ -35,7 +35,7 @@ void loop() {
     }
     Serial.println();
   } else {
-    Serial.print(F("status 0x")); // explained in ModbusMasterConstants.h
+    Serial.print(F("status 0x")); // the codes are in ModbusMasterConstants.h
     Serial.println(result, HEX);
   }
 #endif

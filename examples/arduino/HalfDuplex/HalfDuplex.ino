@@ -1,9 +1,9 @@
-// RS-485: a transceiver such as the MAX485, with DE and /RE tied together on
-// pin 2, drives the line only while a request is being sent.
+// RS-485 with a transceiver such as the MAX485. Connect DE and /RE to pin 2: the
+// transceiver drives the line only while the sketch sends a request.
 #include <ModbusMaster.h>
 
 #if (defined(__AVR__) && !defined(UBRR1H) && !defined(USART1)) || defined(ESP8266)
-#define BUS Serial // the only UART: take the bus off it to upload
+#define BUS Serial // the only UART: disconnect the bus from it to upload
 #else
 #define BUS Serial1 // Serial stays free for messages
 #endif
@@ -25,12 +25,12 @@ void setup() {
   node.begin(1, BUS);
   node.setBaudRate(9600);
   node.preTransmission(driverOn);
-  node.postTransmission(driverOff); // the last bit has left by then
-  node.setRetries(1); // a request without a proper reply is sent once more
+  node.postTransmission(driverOff); // called after the last bit
+  node.setRetries(1); // repeats a request once if it gets no correct reply
 
-  // On cores whose Serial.flush() returns too early, hold the driver on:
+  // If your core's Serial.flush() returns before the last bit, keep the driver on longer:
   // node.setPostFlushHold(1);
-  // Where the receiver stays on and hears the request itself:
+  // If the receiver stays on while the driver sends, discard the echo:
   // node.setEchoDiscard(true);
 }
 

@@ -1,9 +1,9 @@
-// The functions return at once, and poll moves the request on: the LED goes on
-// blinking evenly whether the slave answers or not.
+// Requests without waiting: the functions return at once, and poll does the rest.
+// The LED blinks evenly, whether the slave replies or not.
 #include <ModbusMaster.h>
 
 #if (defined(__AVR__) && !defined(UBRR1H) && !defined(USART1)) || defined(ESP8266)
-#define BUS Serial // the only UART: take the bus off it to upload
+#define BUS Serial // the only UART: disconnect the bus from it to upload
 #else
 #define BUS Serial1 // Serial stays free for messages
 #endif
@@ -11,7 +11,7 @@
 const uint8_t led = 13; // the built-in one of many boards
 
 ModbusMaster node;
-uint16_t answered;
+uint16_t replies;
 
 void setup() {
   pinMode(led, OUTPUT);
@@ -30,16 +30,16 @@ void blink() {
   digitalWrite(led, !digitalRead(led));
 }
 
-// Reads a register, writes it elsewhere, and begins again.
-void converse() {
+// Reads a register, writes its value to another one, and starts again.
+void copyRegister() {
   static bool reading = false;
   uint8_t result = node.poll();
   if (result == node.ku8MBPending)
     return;
   if (reading && result == node.ku8MBSuccess) {
-    answered++;
+    replies++;
     node.setTransmitBuffer(0, node.getResponseBuffer(0));
-    node.setTransmitBuffer(1, answered);
+    node.setTransmitBuffer(1, replies);
     node.writeMultipleRegisters(40, 2);
     reading = false;
   } else {
@@ -50,5 +50,5 @@ void converse() {
 
 void loop() {
   blink();
-  converse();
+  copyRegister();
 }

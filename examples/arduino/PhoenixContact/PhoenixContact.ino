@@ -1,6 +1,6 @@
-// The calls that the ModbusMaster manual makes to a Phoenix Contact bus
-// coupler. It refuses reads of more than 64 registers with exception 02.
-// Boards whose Serial is their USB port have the bus on Serial1.
+// The calls of ModbusMaster's manual for a bus coupler of Phoenix Contact. The coupler
+// refuses reads of more than 64 registers with exception 02.
+// If Serial is the USB port of your board, use Serial1 for the bus.
 #include <ModbusMaster.h>
 
 ModbusMaster node;
@@ -11,25 +11,25 @@ void setup() {
 }
 
 void loop() {
-  // In one request: write one word to the outputs, read one from the inputs.
+  // One request writes one word to the outputs and reads two words of the inputs.
   node.setTransmitBuffer(0, 0xABCD);
   uint8_t result = node.readWriteMultipleRegisters(8, 2, 4, 1);
 
-  // Commands, one register each.
+  // Two commands of one register each.
   result = node.writeSingleRegister(2006, 0);
   result = node.writeSingleRegister(2006, 1);
 
-  // What was read goes back out.
+  // Writes the words that it has read.
   if (node.readHoldingRegisters(8, 2) == node.ku8MBSuccess) {
     node.setTransmitBuffer(0, node.getResponseBuffer(0));
     node.setTransmitBuffer(1, node.getResponseBuffer(1));
     result = node.writeMultipleRegisters(4, 2);
   }
 
-  // 17 coils: the seventeenth is the lowest bit of the second word.
+  // Reads 17 coils. The last is the lowest bit of the second word.
   result = node.readCoils(0, 17);
 
-  // One more than fits is refused by the device, 64 are what it gives.
+  // The device refuses 66 registers, and returns 64.
   if (node.readHoldingRegisters(0, 66) == node.ku8MBIllegalDataAddress)
     result = node.readHoldingRegisters(0, 64);
 
@@ -37,6 +37,6 @@ void loop() {
   result = node.readHoldingRegisters(8, 64);
   result = node.readHoldingRegisters(72, 8);
   result = node.readInputRegisters(0, 8);
-  (void)result; // yours to use
+  (void)result; // use the status here
   delay(100);
 }

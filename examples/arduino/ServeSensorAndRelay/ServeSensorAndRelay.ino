@@ -1,10 +1,10 @@
-// A server (slave), unit 17, on RS-485: a sensor at A0 is input register 0, a
-// relay at pin 4 is coil 0. DE and /RE of the transceiver are tied together on
-// pin 2; it drives the line only while a response is being sent.
+// A server (slave) with unit id 17 on RS-485: a sensor at A0 is input register 0, and a
+// relay at pin 4 is coil 0. Connect DE and /RE of the transceiver to pin 2: it drives the
+// line only while the sketch sends a response.
 #include <ModbusServer.h>
 
 #if (defined(__AVR__) && !defined(UBRR1H) && !defined(USART1)) || defined(ESP8266)
-#define BUS Serial // the only UART: take the bus off it to upload
+#define BUS Serial // the only UART: disconnect the bus from it to upload
 #else
 #define BUS Serial1 // Serial stays free for messages
 #endif
@@ -31,17 +31,17 @@ void setup() {
   server.coils(relay);
   relay.afterWrite(relayWritten);
   server.preTransmission(driverOn);
-  server.postTransmission(driverOff); // the last bit has left by then
+  server.postTransmission(driverOff); // called after the last bit
 
   BUS.begin(19200);
   server.begin(17, BUS, 19200);
 }
 
 void loop() {
-  static unsigned long measured = 0;
-  // Not in every round: a measurement would hold the response up.
-  if (millis() - measured >= 100) {
-    measured += 100;
+  static unsigned long lastMeasurement = 0;
+  // Ten times a second only, because a measurement delays the response.
+  if (millis() - lastMeasurement >= 100) {
+    lastMeasurement += 100;
     sensor[0] = analogRead(A0);
   }
   server.poll();

@@ -1,12 +1,12 @@
-// Three slaves on one bus. Each has an object of its own, which keeps its own
-// words; all share the port, and on a small board one frame buffer. Smaller buffers
-// leave RAM for the rest of the sketch.
+// Three slaves on one bus. Each slave has an object of its own, with its own words. All
+// objects share the port, and on a small board also one frame buffer. The buffers of this
+// sketch are smaller than usual, to leave RAM for other things.
 #define MODBUSMASTER_RESPONSE_WORDS 16
 #define MODBUSMASTER_TRANSMIT_WORDS 8
 #include <ModbusMaster.h>
 
 #if (defined(__AVR__) && !defined(UBRR1H) && !defined(USART1)) || defined(ESP8266)
-#define BUS Serial // the only UART: take the bus off it to upload
+#define BUS Serial // the only UART: disconnect the bus from it to upload
 #else
 #define BUS Serial1 // Serial stays free for messages
 #endif
@@ -22,7 +22,7 @@ void setup() {
   for (uint8_t i = 0; i < sensors; i++) {
     sensor[i].begin(sensor[i].getSlaveID(), BUS);
     sensor[i].setBaudRate(19200);
-    sensor[i].setResponseTimeout(200); // one that is missing holds up the others no longer
+    sensor[i].setResponseTimeout(200); // a missing slave delays the others for 200 ms
   }
 }
 
@@ -32,7 +32,7 @@ void loop() {
     if (sensor[i].readHoldingRegisters(5, 1) != ModbusMaster::ku8MBSuccess)
       continue;
     present++;
-    // Each is told what was read of it.
+    // Writes the value that it has read to the next register.
     sensor[i].writeSingleRegister(6, sensor[i].getResponseBuffer(0));
   }
   digitalWrite(led, present == sensors);

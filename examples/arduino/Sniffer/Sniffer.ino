@@ -1,10 +1,10 @@
-// Prints what others say on a bus, one line for each frame. Connect the receiver of a
-// transceiver, with its driver off: nothing is ever sent. The messages are faster than the
-// bus, so that none of its bytes is lost meanwhile.
+// Prints each frame of a bus on one line. Connect the receiver of a transceiver and keep its
+// driver off, since the sketch never sends. Messages are printed at a higher speed than that
+// bits per second on the bus, so that no byte of the bus is lost meanwhile.
 #include <ModbusSniffer.h>
 
-const uint32_t baud = 9600; // of the bus
-const uint8_t led = 13;     // on from a request that was not answered to the next reply
+const uint32_t baud = 9600; // bits per second on the bus
+const uint8_t led = 13;     // on after a request without a reply, until the next reply
 
 ModbusSniffer sniffer;
 
@@ -15,7 +15,7 @@ void setup() {
   sniffer.begin(Serial1, baud);
   Serial.begin(115200);
 #else
-  // One UART: it receives the bus, and prints at the same speed. A busy bus is too fast.
+  // A board with one UART prints at the speed of the bus. On a busy bus it loses bytes.
   Serial.begin(baud);
   sniffer.begin(Serial, baud);
 #endif

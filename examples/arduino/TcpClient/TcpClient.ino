@@ -1,13 +1,13 @@
-// A Modbus TCP client on an Ethernet shield: reads two registers of a device at
-// 192.168.1.20 every 100 ms, and writes their sum to another. The connection is made anew
-// where it was lost. With WiFi, put WiFiClient in the place of EthernetClient.
+// A Modbus TCP client on an Ethernet shield: every 100 ms it reads two registers of the
+// device at 192.168.1.20 and writes their sum to a third. If the connection is lost, it
+// connects again. For WiFi, replace EthernetClient by WiFiClient.
 #include <Ethernet.h>
 #include <ModbusClient.h>
 
 uint8_t mac[] = {0x02, 0xAB, 0xCD, 0x12, 0x34, 0x56};
 const IPAddress own(192, 168, 1, 50);
 const IPAddress device(192, 168, 1, 20);
-const uint8_t unit = 255; // the device itself, not one behind a gateway
+const uint8_t unit = 255; // the device itself; a device behind a gateway has another id
 const uint8_t led = 13;   // on while the device replies
 
 EthernetClient ethernet;
@@ -16,13 +16,13 @@ ModbusRequestOf<2> readings(unit);
 ModbusRequest sum(unit);
 
 void connect() {
-  static unsigned long tried = 0;
+  static unsigned long lastTry = 0;
   static bool first = true;
-  // The Ethernet library waits while it connects: not in every round.
-  if (!first && millis() - tried < 5000)
+  // Every five seconds only, because the Ethernet library waits while it connects.
+  if (!first && millis() - lastTry < 5000)
     return;
   first = false;
-  tried = millis();
+  lastTry = millis();
   client.connect(device);
 }
 
@@ -39,11 +39,11 @@ void setup() {
 }
 
 void loop() {
-  static unsigned long asked = 0;
+  static unsigned long lastRequest = 0;
   if (!client.isConnected())
     connect();
-  if (millis() - asked >= 100 && client.pending() == 0) {
-    asked = millis();
+  if (millis() - lastRequest >= 100 && client.pending() == 0) {
+    lastRequest = millis();
     client.readHoldingRegisters(readings, 10, 2);
   }
   client.poll();

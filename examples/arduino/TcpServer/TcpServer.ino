@@ -1,6 +1,6 @@
-// A Modbus TCP server on an Ethernet shield: the voltage at A0 is input register 0, a relay
-// at pin 4 is coil 0. Several clients may be connected at once. With WiFi, put WiFiServer
-// in the place of EthernetServer.
+// A Modbus TCP server on an Ethernet shield: the voltage at A0 is input register 0, and a
+// relay at pin 4 is coil 0. Several clients may be connected at once. For WiFi, replace
+// EthernetServer by WiFiServer.
 #include <Ethernet.h>
 #include <ModbusTcpServer.h>
 
@@ -11,7 +11,7 @@ const uint8_t relayPin = 4;
 EthernetServer ethernet(502);
 ModbusRegisterArray<1> sensor;
 ModbusBitArray<1> relay;
-ModbusTcpServer<EthernetServer> server; // on an Uno for two clients, elsewhere for four
+ModbusTcpServer<EthernetServer> server; // two clients at once on an Uno, four on larger boards
 
 void relayWritten(const mbm_access &) { digitalWrite(relayPin, relay[0] ? HIGH : LOW); }
 
@@ -27,9 +27,9 @@ void setup() {
 }
 
 void loop() {
-  static unsigned long measured = 0;
-  if (millis() - measured >= 100) {
-    measured = millis();
+  static unsigned long lastMeasurement = 0;
+  if (millis() - lastMeasurement >= 100) {
+    lastMeasurement = millis();
     sensor[0] = analogRead(A0);
   }
   server.poll();

@@ -1,6 +1,6 @@
-// A gateway on an ESP8266: Modbus TCP comes in over WiFi, RTU goes out to the devices of a
-// serial line, and their replies go back. DE and /RE of the transceiver are tied together
-// on pin 4. On an ESP32, include <WiFi.h> and put the line on Serial1.
+// A gateway on an ESP8266: it receives Modbus TCP over WiFi, sends the requests as RTU to
+// the devices of a serial line, and returns their replies. Connect DE and /RE of the
+// transceiver to pin 4. On an ESP32, include <WiFi.h> and use Serial1 for the line.
 #include <ESP8266WiFi.h>
 #include <ModbusTcpGateway.h>
 
@@ -11,7 +11,7 @@ const uint32_t baud = 19200;
 
 WiFiServer wifi(502);
 ModbusSerialClient line;
-ModbusTcpGateway<WiFiServer> gateway; // for four clients
+ModbusTcpGateway<WiFiServer> gateway; // up to four clients at once
 
 void driverOn() { digitalWrite(driverEnable, HIGH); }
 void driverOff() { digitalWrite(driverEnable, LOW); }
@@ -22,11 +22,11 @@ void setup() {
   Serial.begin(baud);
   line.begin(Serial, baud);
   line.preTransmission(driverOn);
-  line.postTransmission(driverOff); // the last bit has left by then
+  line.postTransmission(driverOff); // called after the last bit
   line.setResponseTimeout(500);
   WiFi.begin(name, password);
   wifi.begin();
-  gateway.begin(wifi, line, 1, 31); // the unit ids of the line
+  gateway.begin(wifi, line, 1, 31); // units 1 to 31 are on the line
 }
 
-void loop() { gateway.poll(); } // connections and line; nothing waits
+void loop() { gateway.poll(); } // serves the connections and the line without waiting

@@ -1,9 +1,9 @@
-// Writes three registers and a few coils of slave 1, reads them back and
-// switches the LED on if they came back as they went.
+// Writes three registers and twelve coils of slave 1 and reads them back. The LED is on if
+// the values read are the values written.
 #include <ModbusMaster.h>
 
 #if (defined(__AVR__) && !defined(UBRR1H) && !defined(USART1)) || defined(ESP8266)
-#define BUS Serial // the only UART: take the bus off it to upload
+#define BUS Serial // the only UART: disconnect the bus from it to upload
 #else
 #define BUS Serial1 // Serial stays free for messages
 #endif
@@ -12,8 +12,8 @@ const uint8_t led = 13; // the built-in one of many boards
 
 ModbusMaster node;
 
-bool registersComeBack(uint16_t seed) {
-  node.beginTransmission(10); // where the queued words go
+bool registersMatch(uint16_t seed) {
+  node.beginTransmission(10); // the address of the words that send queues
   node.send(seed);
   node.send(seed + 1);
   node.send(seed + 2);
@@ -27,8 +27,8 @@ bool registersComeBack(uint16_t seed) {
   return true;
 }
 
-bool coilsComeBack(uint16_t pattern) {
-  node.setTransmitBuffer(0, pattern); // the lowest bit is the first coil
+bool coilsMatch(uint16_t pattern) {
+  node.setTransmitBuffer(0, pattern); // the lowest bit is coil 20
   if (node.writeMultipleCoils(20, 11) != node.ku8MBSuccess)
     return false;
   if (node.writeSingleCoil(31, true) != node.ku8MBSuccess)
@@ -47,7 +47,7 @@ void setup() {
 
 void loop() {
   static uint16_t round = 1000;
-  bool good = registersComeBack(round) && coilsComeBack(round);
+  bool good = registersMatch(round) && coilsMatch(round);
   digitalWrite(led, good);
   round += 10;
   delay(500);

@@ -24,25 +24,9 @@ void uart_start(void)
     FIFO = FIFOS_ON | FIFOS_CLEAR;
 }
 
-int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity)
-{
-    int16_t count = 0;
-
-    (void)context;
-    while (count < capacity && (STATUS & RX_FULL))
-        bytes[count++] = DATA;
-    return count;
-}
-
-int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
-{
-    int16_t count = 0;
-
-    (void)context;
-    while (count < length && (STATUS & TX_EMPTY))
-        DATA = bytes[count++];
-    return count;
-}
+#define HAS_BYTE (STATUS & RX_FULL)
+#define CAN_SEND (STATUS & TX_EMPTY)
+#include "polled.h"
 
 uint8_t uart_flush(void *context)
 {

@@ -17,25 +17,9 @@ void uart_start(void)
     CONTROL = TX_ENABLE | RX_ENABLE;
 }
 
-int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity)
-{
-    int16_t count = 0;
-
-    (void)context;
-    while (count < capacity && (STATE & RX_FULL))
-        bytes[count++] = (uint8_t)DATA;
-    return count;
-}
-
-int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
-{
-    int16_t count = 0;
-
-    (void)context;
-    while (count < length && !(STATE & TX_FULL))
-        DATA = bytes[count++];
-    return count;
-}
+#define HAS_BYTE (STATE & RX_FULL)
+#define CAN_SEND !(STATE & TX_FULL)
+#include "polled.h"
 
 /* The last byte may still be in the shift register, which this UART does not show. With an
  * RS-485 driver, mbm_master_setPostFlushHold adds the time of that byte. */

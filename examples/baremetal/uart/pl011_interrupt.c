@@ -1,25 +1,15 @@
 /* Arm's PL011 with interrupts: the handler puts received bytes into a ring, and the main
  * loop reads them from there. The FIFO holds the bytes until the handler runs. Licence: MIT
  * OR Apache-2.0. */
-#include "board.h"
-#include "machine.h"
 #include "mbm.h"
+#include "pl011.h"
 #include "sleep.h"
 
-#define DATA REGISTER(UART_BASE + 0x00)
-#define FLAGS REGISTER(UART_BASE + 0x18)
-#define DIVISOR REGISTER(UART_BASE + 0x24)
-#define FRACTION REGISTER(UART_BASE + 0x28)
-#define LINE REGISTER(UART_BASE + 0x2C)
-#define CONTROL REGISTER(UART_BASE + 0x30)
 #define FIFO_LEVELS REGISTER(UART_BASE + 0x34)
 #define INTERRUPT_MASK REGISTER(UART_BASE + 0x38)
 #define INTERRUPT_CLEAR REGISTER(UART_BASE + 0x44)
 #define NVIC_ENABLE REGISTER(0xE000E100u)
 
-enum { BUSY = 1 << 3, RX_EMPTY = 1 << 4, TX_FULL = 1 << 5 };
-enum { FIFOS = 1 << 4, EIGHT_BITS = 3 << 5 };
-enum { ENABLE = 1 << 0, TX_ENABLE = 1 << 8, RX_ENABLE = 1 << 9 };
 /* An interrupt after two bytes of sixteen, or if one byte has been alone for the time of 32
  * bits. */
 enum { AN_EIGHTH = 0, RX = 1 << 4, RX_ALONE = 1 << 6 };
@@ -30,14 +20,8 @@ static mbm_ring ring;
 
 void uart_start(void)
 {
-    /* In 64ths of the clock divided by 16. */
-    uint32_t divisor = (UART_HZ * 4u + BAUD / 2u) / BAUD;
-
     mbm_ring_begin(&ring, bytes, sizeof bytes);
-    CONTROL = 0;
-    DIVISOR = divisor / 64;
-    FRACTION = divisor % 64;
-    LINE = FIFOS | EIGHT_BITS;
+    pl011_set_line();
     FIFO_LEVELS = AN_EIGHTH;
     INTERRUPT_MASK = RX | RX_ALONE;
     NVIC_ENABLE = 1u << UART_INTERRUPT;

@@ -7,7 +7,7 @@
 class WiFiClass {
 public:
     void begin(const char *, const char *) {}
-    static HardwareSerial &uart() { return Serial1; }
+    static HardwareSerial &uart();
 };
 
 typedef UartClient<WiFiClass> WiFiClient;

@@ -7,7 +7,8 @@
 class EthernetClass {
 public:
     void begin(uint8_t *, IPAddress) {}
-    static HardwareSerial &uart() { return Serial; }
+    /* On a Leonardo, Serial has another class. */
+    static decltype((Serial)) uart() { return Serial; }
 };
 
 typedef UartClient<EthernetClass> EthernetClient;

@@ -1,20 +1,20 @@
-/* The state of the simulated board that tests can read: its clock and its log. */
-#ifndef BENCH_H
-#define BENCH_H
+/* The state of the simulated board, for tests: its clock and its log. */
+#ifndef SHIM_BOARD_H
+#define SHIM_BOARD_H
 
 #include <stdint.h>
 #include <string>
 #include <time.h>
 
-struct Bench {
-    uint32_t now = 0;      /* microseconds; wraps */
-    uint32_t tick = 20;    /* microseconds that each read of the clock takes */
-    bool realTime = false; /* use the clock of the host instead */
-    unsigned looks = 0;    /* how often the clock was read */
+struct Board {
+    uint32_t now = 0;        /* microseconds, modulo 2^32 */
+    uint32_t tick = 20;      /* microseconds that each read of the clock takes */
+    bool realTime = false;   /* use the clock of the host instead */
+    unsigned clockReads = 0; /* how often the clock was read */
     unsigned yields = 0;
-    std::string log; /* the events in order; a repeated event is there once */
+    std::string log; /* the events in their order; equal events in a row are logged once */
 
-    void note(const char *event)
+    void logEvent(const char *event)
     {
         std::string entry(event);
         entry += ' ';
@@ -27,7 +27,7 @@ struct Bench {
 
     uint32_t micros()
     {
-        looks++;
+        clockReads++;
         if (realTime) {
             struct timespec t;
             clock_gettime(CLOCK_MONOTONIC, &t);
@@ -39,9 +39,9 @@ struct Bench {
     }
 };
 
-inline Bench &bench()
+inline Board &board()
 {
-    static Bench only;
+    static Board only;
     return only;
 }
 
