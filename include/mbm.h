@@ -2686,9 +2686,9 @@ typedef struct mbm_access {
  *
  * The server calls the hooks only for a request that is right and whose cells all exist.
  * Functions 16 and 17 (hex) read and write: for them the server calls beforeRead,
- * beforeWrite and afterWrite in this order. A request of function 14 or 15 (hex) has
- * several groups of records. The server calls each hook once for each group; it calls the
- * hook for all groups before it reads or writes any of them.
+ * beforeWrite and afterWrite in this order. A request of function 14 or 15 (hex) has one or
+ * more groups of records, and the server calls each hook once for each group. It calls
+ * beforeWrite for all groups before it writes any of them.
  *
  * A hook may change cells. It may call any function of this library but those on the
  * server that calls it, which return MBM_BUSY. If it changes its record, or sets other

@@ -8,7 +8,7 @@ use core::ffi::c_void;
 use core::hint::assert_unchecked;
 use core::mem::transmute;
 use mbm::error::Status;
-use mbm::server::table::{self, TableAccess, TableKind, TableOperation, TableSteps};
+use mbm::server::table::{self, TableAccess, TableKind, TableOperation};
 use mbm::server::Reply;
 use mbm::FIRMWARE;
 
@@ -59,9 +59,8 @@ pub struct mbm_bitTable {
 /// struct, so no reference to it is kept.
 pub(super) struct Table(pub(super) *mut mbm_registerTable, pub(super) *const c_void);
 
-/// Serves an access as [`TableAccess::access`] and calls the hooks of the table around it. The
-/// cells exist. With the operation [`TableOperation::NONE`] it only asks whether they may be
-/// read, as [`TableSteps::ask_read`].
+/// Serves an access as [`TableAccess::access`], to cells that exist, and calls the hooks of the
+/// table around it.
 ///
 /// A table has this function only with hooks, so a program without hooks does not contain it.
 pub(super) type AccessWithHooks = unsafe fn(
@@ -174,29 +173,28 @@ impl TableAccess for TableSnapshot {
         bytes: usize,
         pdu: &mut [u8],
     ) -> Reply {
-        let mut copy = Table(&raw mut self.1, self.0 .1);
-        let table = if operation == TableOperation::READ {
-            &mut copy
-        } else {
-            &mut self.0
-        };
-        table.access(operation, quantity, bytes, pdu)
-    }
-}
-
-impl TableSteps for TableSnapshot {
-    fn ask_read(&mut self, _quantity: usize, pdu: &mut [u8]) -> Reply {
-        // SAFETY: see `Table`; a request that reads and writes has at least a quantity.
+        let Table(table, info) = self.0;
+        let mut fields = Table(table, info);
+        let (mut part, mut count) = (operation, bytes);
+        if operation.reads() {
+            fields.0 = &raw mut self.1;
+            part = TableOperation::READ;
+        }
+        if operation == TableOperation::ASK {
+            count = 0;
+        }
+        let reply = fields.access(part, quantity, count, pdu);
+        // Without bytes to read, the reply says whether the cells exist.
+        if count == bytes || reply == Reply::ILLEGAL_DATA_ADDRESS {
+            return reply;
+        }
+        // SAFETY: see `Table`; the cells exist.
         unsafe {
-            match access_with_hooks(self.0 .0) {
-                Some(ask) => ask(self.0 .0, self.0 .1, TableOperation::NONE, pdu.as_mut_ptr()),
+            match access_with_hooks(table) {
+                Some(ask) => ask(table, info, operation, pdu.as_mut_ptr()),
                 None => Reply::NOT_HANDLED,
             }
         }
-    }
-
-    fn load(&mut self, quantity: usize, bytes: usize, pdu: &mut [u8]) -> Reply {
-        self.access(TableOperation::READ, quantity, bytes, pdu)
     }
 }
 
@@ -313,7 +311,7 @@ unsafe fn serve_mask_and_read_write(
         let mut cells = TableSnapshot(Table(table, info), table.read());
         cells.1.hooks.call = None;
         if FIRMWARE {
-            let cells: &mut dyn TableSteps = &mut cells;
+            let cells: &mut dyn TableAccess = &mut cells;
             return table::serve_mask_and_read_write(cells, pdu, length).code();
         }
         table::serve_mask_and_read_write(&mut cells, pdu, length).code()
