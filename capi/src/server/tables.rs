@@ -160,9 +160,9 @@ unsafe fn contains(table: *const mbm_registerTable, first: usize, quantity: usiz
     }
 }
 
-/// As [`Table`], for functions that read and write: the read uses the fields that the table
-/// had when the request came, also if a hook has changed them. The copy has no hooks.
-struct TableSnapshot(Table, mbm_registerTable);
+/// As [`Table`], for functions that read and write: a copy of the table. It has the fields that
+/// the table had when the request came, also if a hook has changed them.
+struct TableSnapshot(mbm_registerTable, *const c_void);
 
 impl TableAccess for TableSnapshot {
     #[cfg_attr(target_os = "none", inline(never))]
@@ -173,23 +173,24 @@ impl TableAccess for TableSnapshot {
         bytes: usize,
         pdu: &mut [u8],
     ) -> Reply {
-        let Table(table, info) = self.0;
-        let mut fields = Table(table, info);
         let (mut part, mut count) = (operation, bytes);
-        if operation.reads() {
-            fields.0 = &raw mut self.1;
-            part = TableOperation::READ;
-        }
-        if operation == TableOperation::ASK {
-            count = 0;
-        }
-        let reply = fields.access(part, quantity, count, pdu);
-        // Without bytes to read, the reply says whether the cells exist.
-        if count == bytes || reply == Reply::ILLEGAL_DATA_ADDRESS {
-            return reply;
-        }
-        // SAFETY: see `Table`; the cells exist.
+        let (table, info) = (&raw mut self.0, self.1);
+        // SAFETY: see `Table`; where a hook is called, the cells exist.
         unsafe {
+            let call = (*table).hooks.call;
+            if operation.reads() {
+                part = TableOperation::READ;
+                (*table).hooks.call = None;
+            }
+            if operation == TableOperation::ASK {
+                count = 0;
+            }
+            let reply = Table(table, info).access(part, quantity, count, pdu);
+            (*table).hooks.call = call;
+            // Without bytes to read, the reply says whether the cells exist.
+            if count == bytes || reply == Reply::ILLEGAL_DATA_ADDRESS {
+                return reply;
+            }
             match access_with_hooks(table) {
                 Some(ask) => ask(table, info, operation, pdu.as_mut_ptr()),
                 None => Reply::NOT_HANDLED,
@@ -308,8 +309,7 @@ unsafe fn serve_mask_and_read_write(
     // SAFETY: as the caller promises.
     unsafe {
         let (pdu, length) = request(pdu, info);
-        let mut cells = TableSnapshot(Table(table, info), table.read());
-        cells.1.hooks.call = None;
+        let mut cells = TableSnapshot(table.read(), info);
         if FIRMWARE {
             let cells: &mut dyn TableAccess = &mut cells;
             return table::serve_mask_and_read_write(cells, pdu, length).code();
