@@ -252,7 +252,8 @@ static void a_response_that_does_not_fit_calls_no_hook(void **state)
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     OK(mbm_registerTable_setHooks(&table, &watching.hooks));
     seal(small, 6);
-    OK(mbm_unit_respond(&unit, 1, NULL, FRAMING(MBM_FRAMING_RTU), small, 8, sizeof small, &answered));
+    OK(mbm_unit_respond(&unit, 1, NULL, FRAMING(MBM_FRAMING_RTU), small, 8, sizeof small,
+                        &answered));
     assert_memory_equal(small, "\x11\x83\4", 3);
     watched_were("");
 }

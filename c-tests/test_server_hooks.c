@@ -123,8 +123,8 @@ static void refresh(char hook, const mbm_access *access)
     if (hook != 'r')
         return;
     refreshed++;
-    for (i = access->address - SERVED_BASE; i < access->address - SERVED_BASE + 0u + access->quantity;
-         i++)
+    for (i = access->address - SERVED_BASE;
+         i < access->address - SERVED_BASE + 0u + access->quantity; i++)
         if (access->function == 3)
             rtu.words[i] = (uint16_t)(1000 * refreshed + i);
         else if (access->function == 1)
@@ -180,11 +180,12 @@ static void a_write_over_ascii_is_watched_too(void **state)
 {
     (void)state;
     asked_frames(ascii.line.theirs, MBM_FRAMING_ASCII, SERVED_UNIT,
-                 (const uint8_t *)"\x10\0\144\0\1\2\xAB\xCD", 8, (const uint8_t *)"\x10\0\144\0\1", 5);
+                 (const uint8_t *)"\x10\0\144\0\1\2\xAB\xCD", 8, (const uint8_t *)"\x10\0\144\0\1",
+                 5);
     watched_were("w17/10 100+1 ABCD;a17/10 100+1 ABCD;");
     assert_ptr_equal(watching.connection, &ascii.fds[0]);
-    asked_frames(ascii.line.theirs, MBM_FRAMING_ASCII, SERVED_UNIT,
-                 (const uint8_t *)"\3\0\144\0\1", 5, (const uint8_t *)"\3\2\xAB\xCD", 4);
+    asked_frames(ascii.line.theirs, MBM_FRAMING_ASCII, SERVED_UNIT, (const uint8_t *)"\3\0\144\0\1",
+                 5, (const uint8_t *)"\3\2\xAB\xCD", 4);
     watched_were("r17/03 100+1;");
 }
 
@@ -228,7 +229,8 @@ static void two_connections_are_told_apart(void **state)
     writer = watching.connection;
     assert_int_equal(modbus_read_registers(second, SERVED_BASE, 1, &word), 1);
     assert_ptr_not_equal(watching.connection, writer);
-    assert_true((const int *)writer >= tcp.fds && (const int *)writer < tcp.fds + SERVED_CONNECTIONS);
+    assert_true((const int *)writer >= tcp.fds &&
+                (const int *)writer < tcp.fds + SERVED_CONNECTIONS);
     watching.within = let_one_write;
     assert_int_equal(modbus_write_register(first, SERVED_BASE, 77), 1);
     EXCEPTION(1, modbus_write_register(second, SERVED_BASE, 78));
@@ -241,15 +243,15 @@ static void a_broadcast_is_watched_as_unit_0(void **state)
     uint16_t word;
 
     (void)state;
-    asked_frames(modbus_get_socket(line), MBM_FRAMING_RTU, 0,
-                 (const uint8_t *)"\x06\0\x64\x33\x44", 5, NULL, 0);
+    asked_frames(modbus_get_socket(line), MBM_FRAMING_RTU, 0, (const uint8_t *)"\x06\0\x64\x33\x44",
+                 5, NULL, 0);
     AWAIT(rtu.words[0] == 0x3344);
     /* The response to the next request comes after the hooks of the broadcast. */
     assert_int_equal(modbus_read_registers(line, SERVED_BASE, 1, &word), 1);
     watched_were("w0/06 100+1 3344;a0/06 100+1 3344;r17/03 100+1;");
     /* A broadcast read is not carried out. */
-    asked_frames(modbus_get_socket(line), MBM_FRAMING_RTU, 0,
-                 (const uint8_t *)"\x03\0\x64\0\1", 5, NULL, 0);
+    asked_frames(modbus_get_socket(line), MBM_FRAMING_RTU, 0, (const uint8_t *)"\x03\0\x64\0\1", 5,
+                 NULL, 0);
     assert_int_equal(modbus_read_registers(line, SERVED_BASE, 1, &word), 1);
     watched_were("r17/03 100+1;");
 }
@@ -260,20 +262,19 @@ static void read_write_multiple_calls_all_hooks_before_it_writes(void **state)
     uint16_t back[3], before[sizeof rtu.words / 2];
 
     (void)state;
-    assert_int_equal(modbus_write_and_read_registers(line, SERVED_BASE + 1, 2, words, SERVED_BASE, 3,
-                                                     back),
-                     3);
+    assert_int_equal(
+        modbus_write_and_read_registers(line, SERVED_BASE + 1, 2, words, SERVED_BASE, 3, back), 3);
     watched_were("r17/17 100+3;w17/17 101+2 11112222;a17/17 101+2 11112222;");
     assert_true(back[0] == rtu.words[0] && back[1] == 0x1111 && back[2] == 0x2222);
     memcpy(before, rtu.words, sizeof before);
     watching.refuse_read = 5;
-    EXCEPTION(5, modbus_write_and_read_registers(line, SERVED_BASE + 1, 1, words, SERVED_BASE, 3,
-                                                 back));
+    EXCEPTION(
+        5, modbus_write_and_read_registers(line, SERVED_BASE + 1, 1, words, SERVED_BASE, 3, back));
     watched_were("r17/17 100+3;");
     watching.refuse_read = 0;
     watching.refuse_write = 6;
-    EXCEPTION(6, modbus_write_and_read_registers(line, SERVED_BASE + 2, 1, words, SERVED_BASE, 3,
-                                                 back));
+    EXCEPTION(
+        6, modbus_write_and_read_registers(line, SERVED_BASE + 2, 1, words, SERVED_BASE, 3, back));
     watched_were("r17/17 100+3;w17/17 102+1 1111;");
     assert_memory_equal(before, rtu.words, sizeof before);
 }
@@ -292,9 +293,8 @@ static void read_write_multiple_reads_what_the_hook_after_the_write_has_left(voi
 
     (void)state;
     watching.within = answer_in_place;
-    assert_int_equal(modbus_write_and_read_registers(line, SERVED_BASE, 1, &command, SERVED_BASE, 1,
-                                                     &back),
-                     1);
+    assert_int_equal(
+        modbus_write_and_read_registers(line, SERVED_BASE, 1, &command, SERVED_BASE, 1, &back), 1);
     assert_int_equal(back, 0xEDCB);
 }
 
@@ -319,13 +319,13 @@ static void mask_write_calls_the_hooks_of_a_read_and_a_write(void **state)
 static void a_wrong_request_calls_no_hook(void **state)
 {
     static const char *const wrong[] = {
-        "\3\0\144\0\0",            /* no register */
-        "\3\0\143\0\2",            /* the first does not exist */
-        "\3\0\372\0\1",            /* a hole */
-        "\6\0\143\0\1",            /* a register that does not exist */
-        "\5\0\144\1\0",            /* neither on nor off */
-        "\x10\0\144\0\1\1\0",      /* a wrong byte count */
-        "\x16\0\143\0\1\0\1",      /* a register that does not exist */
+        "\3\0\144\0\0",                   /* no register */
+        "\3\0\143\0\2",                   /* the first does not exist */
+        "\3\0\372\0\1",                   /* a hole */
+        "\6\0\143\0\1",                   /* a register that does not exist */
+        "\5\0\144\1\0",                   /* neither on nor off */
+        "\x10\0\144\0\1\1\0",             /* a wrong byte count */
+        "\x16\0\143\0\1\0\1",             /* a register that does not exist */
         "\x17\0\143\0\1\0\144\0\1\2\0\1", /* reads what does not exist */
         "\x17\0\144\0\1\0\143\0\1\2\0\1", /* writes what does not exist */
     };
@@ -354,13 +354,14 @@ static void records_of_files_are_watched_in_each_group(void **state)
     (void)state;
     asked_frames(fd, MBM_FRAMING_TCP, SERVED_UNIT, (const uint8_t *)write, sizeof write - 1,
                  (const uint8_t *)write, sizeof write - 1);
-    watched_were("w17/15 4:1+2 01020304;w17/15 4:7+1 0506;a17/15 4:1+2 01020304;a17/15 4:7+1 0506;");
+    watched_were(
+        "w17/15 4:1+2 01020304;w17/15 4:7+1 0506;a17/15 4:1+2 01020304;a17/15 4:7+1 0506;");
     asked_frames(fd, MBM_FRAMING_TCP, SERVED_UNIT, (const uint8_t *)read, sizeof read - 1,
                  (const uint8_t *)"\x14\x0A\5\6\1\2\3\4\3\6\5\6", 12);
     watched_were("r17/14 4:1+2;r17/14 4:7+1;");
     watching.refuse_write = 9;
-    asked_frames(fd, MBM_FRAMING_TCP, SERVED_UNIT, (const uint8_t *)"\x15\x09\6\0\4\0\1\0\1\7\7", 11,
-                 (const uint8_t *)"\x95\x09", 2);
+    asked_frames(fd, MBM_FRAMING_TCP, SERVED_UNIT, (const uint8_t *)"\x15\x09\6\0\4\0\1\0\1\7\7",
+                 11, (const uint8_t *)"\x95\x09", 2);
     watching.refuse_read = 10;
     asked_frames(fd, MBM_FRAMING_TCP, SERVED_UNIT, (const uint8_t *)read, sizeof read - 1,
                  (const uint8_t *)"\x94\x0A", 2);

@@ -880,6 +880,87 @@ uint8_t mbm_master_status(const struct mbm_master *master);
 uint8_t mbm_master_getExceptionCode(const struct mbm_master *master);
 
 /**
+ * Returns the response timeout: see mbm_master_setResponseTimeout.
+ *
+ * @param master  the object
+ * @return milliseconds; 0 for an object that was never begun
+ */
+uint16_t mbm_master_getResponseTimeout(const struct mbm_master *master);
+
+/**
+ * Returns the silence before a request that is in effect: what mbm_master_setGap set, or t3.5
+ * of the rate that mbm_master_setBaudRate set, or 4 ms.
+ *
+ * @param master  the object
+ * @return microseconds; 0 for an object that was never begun
+ */
+uint32_t mbm_master_getGap(const struct mbm_master *master);
+
+/**
+ * Returns the turnaround delay: see mbm_master_setTurnaroundDelay.
+ *
+ * @param master  the object
+ * @return milliseconds; 0 for an object that was never begun
+ */
+uint16_t mbm_master_getTurnaroundDelay(const struct mbm_master *master);
+
+/**
+ * Returns the quiet time: see mbm_master_setQuietTime.
+ *
+ * @param master  the object
+ * @return milliseconds; 0 for an object that was never begun
+ */
+uint16_t mbm_master_getQuietTime(const struct mbm_master *master);
+
+/**
+ * Returns how often a request is repeated: see mbm_master_setRetries.
+ *
+ * @param master  the object
+ * @return 0 to 255; 0 for an object that was never begun
+ */
+uint8_t mbm_master_getRetries(const struct mbm_master *master);
+
+/**
+ * Returns whether echo discarding is on: see mbm_master_setEchoDiscard.
+ *
+ * @param master  the object
+ * @return 1 or 0; 0 for an object that was never begun
+ */
+uint8_t mbm_master_getEchoDiscard(const struct mbm_master *master);
+
+/**
+ * Returns whether deviating replies are accepted: see mbm_master_setLenient.
+ *
+ * @param master  the object
+ * @return 1 or 0; 0 for an object that was never begun
+ */
+uint8_t mbm_master_getLenient(const struct mbm_master *master);
+
+/**
+ * Returns how long the driver stays on after the flush: see mbm_master_setPostFlushHold.
+ *
+ * @param master  the object
+ * @return characters; 0 for an object that was never begun
+ */
+uint8_t mbm_master_getPostFlushHold(const struct mbm_master *master);
+
+/**
+ * Returns whether requests block: see mbm_master_setBlocking.
+ *
+ * @param master  the object
+ * @return 1 for blocking, 0 for non-blocking; 0 for an object that was never begun
+ */
+uint8_t mbm_master_getBlocking(const struct mbm_master *master);
+
+/**
+ * Returns the order of values: see mbm_master_setWordOrder.
+ *
+ * @param master  the object
+ * @return one of MBM_ORDER_...; MBM_ORDER_ABCD for an object that was never begun
+ */
+uint8_t mbm_master_getWordOrder(const struct mbm_master *master);
+
+/**
  * Function 01: reads coils into the response words, 16 in each word. The first coil is the
  * lowest bit; the last word is padded with zeros (V1.1b3, 6.1).
  *
@@ -1661,6 +1742,71 @@ uint8_t mbm_client_setDelimiter(struct mbm_client *client, uint8_t character);
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setInFlight(struct mbm_client *client, uint8_t most);
+
+/**
+ * Returns the response timeout: see mbm_client_setResponseTimeout.
+ *
+ * @param client  the object
+ * @return milliseconds; 0 for an object that was never begun
+ */
+uint16_t mbm_client_getResponseTimeout(const struct mbm_client *client);
+
+/**
+ * Returns the silence before a request on an RTU line that is in effect: what
+ * mbm_client_setGap set, or t3.5 of the rate that mbm_client_setBaudRate set, or 4 ms.
+ *
+ * @param client  the object
+ * @return microseconds; 0 for an object that was never begun
+ */
+uint32_t mbm_client_getGap(const struct mbm_client *client);
+
+/**
+ * Returns the turnaround delay: see mbm_client_setTurnaroundDelay.
+ *
+ * @param client  the object
+ * @return milliseconds; 0 for an object that was never begun
+ */
+uint16_t mbm_client_getTurnaroundDelay(const struct mbm_client *client);
+
+/**
+ * Returns the quiet time: see mbm_client_setQuietTime.
+ *
+ * @param client  the object
+ * @return milliseconds; 0 for an object that was never begun
+ */
+uint16_t mbm_client_getQuietTime(const struct mbm_client *client);
+
+/**
+ * Returns how often a request is repeated: see mbm_client_setRetries.
+ *
+ * @param client  the object
+ * @return 0 to 255; 0 for an object that was never begun
+ */
+uint8_t mbm_client_getRetries(const struct mbm_client *client);
+
+/**
+ * Returns whether echo discarding is on: see mbm_client_setEchoDiscard.
+ *
+ * @param client  the object
+ * @return 1 or 0; 0 for an object that was never begun
+ */
+uint8_t mbm_client_getEchoDiscard(const struct mbm_client *client);
+
+/**
+ * Returns how long the driver stays on after the flush: see mbm_client_setPostFlushHold.
+ *
+ * @param client  the object
+ * @return characters; 0 for an object that was never begun
+ */
+uint8_t mbm_client_getPostFlushHold(const struct mbm_client *client);
+
+/**
+ * Returns how many requests may be under way at once: see mbm_client_setInFlight.
+ *
+ * @param client  the object
+ * @return 1 to 16; 1 on a serial line and in RTU over TCP; 0 for an object that was never begun
+ */
+uint8_t mbm_client_getInFlight(const struct mbm_client *client);
 
 /**
  * Closes the link and opens it again. The client discards an incomplete response. Requests
@@ -2467,6 +2613,15 @@ uint32_t mbm_server_pollDelay(const struct mbm_server *server);
 uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t silenceUs);
 
 /**
+ * Returns the silence that ends a frame: what mbm_server_setSilence set, or t3.5 of the rate
+ * that mbm_server_setBaudRate set, or the default of the framing.
+ *
+ * @param server  the object
+ * @return microseconds; 0 for an object that was never begun
+ */
+uint32_t mbm_server_getSilence(const struct mbm_server *server);
+
+/**
  * Sets the baud rate from which an RTU server computes t3.5 (serial line guide V1.02,
  * 2.5.1.1). It does not change the rate of the line. Other framings do not use t3.5: see
  * mbm_server_setSilence.
@@ -2489,6 +2644,14 @@ uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
  *         MBM_NOT_INITIALISED or MBM_BUSY
  */
 uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
+
+/**
+ * Returns whether the server discards its own echo: see mbm_server_setEchoDiscard.
+ *
+ * @param server  the object
+ * @return 1 or 0; 0 for an object that was never begun
+ */
+uint8_t mbm_server_getEchoDiscard(const struct mbm_server *server);
 
 /* ==== 8. Units ====================================================================== */
 
@@ -4740,6 +4903,14 @@ uint8_t mbm_sniffer_setBaudRate(struct mbm_sniffer *sniffer, uint32_t baud);
 uint8_t mbm_sniffer_setResponseTimeout(struct mbm_sniffer *sniffer, uint16_t timeoutMs);
 
 /**
+ * Returns the response timeout: see mbm_sniffer_setResponseTimeout.
+ *
+ * @param sniffer  the object
+ * @return milliseconds; 0 for an object that was never begun
+ */
+uint16_t mbm_sniffer_getResponseTimeout(const struct mbm_sniffer *sniffer);
+
+/**
  * Sets how long the sniffer waits for the rest of an incomplete frame. Choose it longer
  * than the error of your time stamps. At first it is 50 ms in RTU and RTU over TCP,
  * which suits a USB adapter, and 1000 ms in ASCII and TCP.
@@ -4749,6 +4920,14 @@ uint8_t mbm_sniffer_setResponseTimeout(struct mbm_sniffer *sniffer, uint16_t tim
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_sniffer_setFrameTimeout(struct mbm_sniffer *sniffer, uint16_t timeoutMs);
+
+/**
+ * Returns the frame timeout: see mbm_sniffer_setFrameTimeout.
+ *
+ * @param sniffer  the object
+ * @return milliseconds; 0 for an object that was never begun
+ */
+uint16_t mbm_sniffer_getFrameTimeout(const struct mbm_sniffer *sniffer);
 
 /**
  * Passes received bytes to the sniffer. Then call mbm_sniffer_next until it returns 0.

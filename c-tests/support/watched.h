@@ -10,7 +10,7 @@ typedef struct watched {
      * the address of a record stands the file. "w17/10 104+2 00010002;" */
     char text[4000];
     size_t length;
-    const void *connection; /* that the last call came from */
+    const void *connection;            /* that the last call came from */
     uint8_t refuse_read, refuse_write; /* what the hooks return */
     /* Unless NULL, called within each hook. */
     void (*within)(char hook, const mbm_access *access);
