@@ -19,7 +19,7 @@ SUPPORT := $(wildcard c-tests/support/*.c) $(wildcard examples/linux/mbm_*.c)
 TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
 # Examples that the test of the same name runs.
-TESTED_EXAMPLES := custom_command gateway
+TESTED_EXAMPLES := custom_command gateway guarded_server
 # The files that clang-format formats. The headers in include/ are documentation too, and are
 # formatted by hand.
 C_SOURCES = $(shell git ls-files 'c-tests/*.[ch]' 'c-tests/*.cpp' 'examples/*.[ch]' 'firmware-tests/*.[ch]')
@@ -315,8 +315,14 @@ demo: ## Show every function against a libmodbus server, frame by frame
 	@$(MAKE) --no-print-directory $(DEMO) $(BUILD)/plain/linux/basic
 	@$(DEMO)
 
+.PHONY: guarded
+guarded: ## Show a server that refreshes registers at each read and refuses one of two clients
+	@scripts/need gcc libc6-dev
+	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/guarded_server
+	@$(BUILD)/plain/linux/guarded_server
+
 # The programs that the commands in the pages run.
-PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway) $(SNIFF) $(CLIENTS) $(SERVE)
+PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway guarded_server) $(SNIFF) $(CLIENTS) $(SERVE)
 ARM_LIBC := $(if $(shell command -v arm-none-eabi-gcc),libnewlib-arm-none-eabi)
 .PHONY: check-pages
 check-pages: $(ARCHIVE) ## Compile and run the blocks of README and docs, and check links; PAGES=--all: skip nothing

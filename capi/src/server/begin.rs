@@ -1,6 +1,7 @@
 //! The functions that begin a server, and its settings.
 
-use super::{mbm_server, mbm_unit, Core};
+use super::buffers::Core;
+use super::{mbm_server, mbm_unit};
 use crate::framing::MBM_MAX_TCP_FRAME;
 use crate::pointers::{check, object, read, with_hooks, CObject, IN_HOOK};
 use crate::port::{countable, mbm_port};

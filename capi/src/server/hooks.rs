@@ -1,6 +1,6 @@
 //! The hooks that the program sets for the cells of its tables, callbacks and files.
 
-use super::Core;
+use super::buffers::Core;
 use core::ffi::c_void;
 use core::mem::{offset_of, transmute, MaybeUninit};
 use mbm::pdu::files::Record;
