@@ -19,7 +19,7 @@ SUPPORT := $(wildcard c-tests/support/*.c) $(wildcard examples/linux/mbm_*.c)
 TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
 # Examples that the test of the same name runs.
-TESTED_EXAMPLES := custom_command gateway
+TESTED_EXAMPLES := custom_command gateway guarded_server
 # The options --trace and --pcap of the examples for Linux.
 TRACE = $(patsubst %,$(BUILD)/$(1)/linux/%.o,trace_options pcap_file)
 # The files that clang-format formats. The headers in include/ are documentation too, and are
@@ -334,8 +334,14 @@ mqtt: ## Show and check the bridge to MQTT on a libmodbus server and a mosquitto
 	@$(MAKE) --no-print-directory $(MQTT) $(PEERS)
 	@scripts/check-mqtt $(BUILD)/plain
 
+.PHONY: guarded
+guarded: ## Show a server that refreshes registers at each read and refuses one of two clients
+	@scripts/need gcc libc6-dev
+	@$(MAKE) --no-print-directory $(BUILD)/plain/linux/guarded_server
+	@$(BUILD)/plain/linux/guarded_server
+
 # The programs that the commands in the pages run.
-PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway) $(SNIFF) $(CLIENTS) $(SERVE)
+PAGE_PROGRAMS := $(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway guarded_server) $(SNIFF) $(CLIENTS) $(SERVE)
 ARM_LIBC := $(if $(shell command -v arm-none-eabi-gcc),libnewlib-arm-none-eabi)
 .PHONY: check-pages
 check-pages: $(ARCHIVE) ## Compile and run the blocks of README and docs, and check links; PAGES=--all: skip nothing

@@ -212,6 +212,8 @@ static const mbm_file file = {words, 8, 1};
 static unsigned hooks_called;
 
 /* A hook may change what its unit serves. */
+static mbm_accessHooks access_hooks;
+
 static void within_unit(void)
 {
     hooks_called++;
@@ -222,6 +224,12 @@ static void within_unit(void)
     OK(mbm_unit_serveCustom(&unit, &custom));
     OK(mbm_unit_serveFiles(&unit, &files));
     OK(mbm_unit_serveDiagnostics(&unit, &diagnostics));
+    OK(mbm_registerTable_setHooks(&table, NULL));
+    OK(mbm_registerTable_setHooks(&table, &access_hooks));
+    OK(mbm_dataCallbacks_setHooks(&cells, NULL));
+    OK(mbm_dataCallbacks_setHooks(&cells, &access_hooks));
+    OK(mbm_files_setHooks(&files, NULL));
+    OK(mbm_files_setHooks(&files, &access_hooks));
 }
 
 static uint8_t before_access(void *context, const mbm_access *access)
@@ -277,8 +285,8 @@ static void restarted(void *context, uint8_t clears)
 
 static void serve_all(void)
 {
-    static const mbm_accessHooks access_hooks = {NULL, before_access, before_access, after_access};
-
+    access_hooks.beforeRead = access_hooks.beforeWrite = before_access;
+    access_hooks.afterWrite = after_access;
     memset(&table, 0, sizeof table);
     memset(&late_table, 0, sizeof late_table);
     memset(&cells, 0, sizeof cells);
@@ -328,11 +336,14 @@ static void no_hook_of_a_server_may_call_the_server(void **state)
         unsigned hooks;
     } requests[] = {
         {"\x06\0\0\0\1", 5, 8, 2},
-        {"\x17\0\0\0\1\0\0\0\1\2\0\1", 12, 7, 2},
-        {"\x01\0\0\0\2", 5, 6, 4},
+        {"\x03\0\0\0\1", 5, 7, 1},
+        {"\x16\0\0\0\0\0\1", 7, 10, 3},
+        {"\x17\0\0\0\1\0\0\0\1\2\0\1", 12, 7, 3},
+        {"\x01\0\0\0\2", 5, 6, 5},
         {"\x05\0\0\xFF\0", 5, 8, 4},
         {"\x41", 1, 5, 1},
         {"\x08\0\1\0\0", 5, 8, 1},
+        {"\x14\x07\6\0\1\0\0\0\1", 9, 9, 1},
         {"\x15\x09\6\0\1\0\0\0\1\0\2", 11, 14, 2},
     };
     unsigned i;

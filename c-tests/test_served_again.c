@@ -435,6 +435,11 @@ static void a_request_goes_on_with_the_old_table_if_its_hook_changes_it(void **s
         {.beforeWrite = become_bits},
     };
     static const mbm_accessHooks after_hooks = {.afterWrite = shrink_after};
+    static const mbm_accessHooks read_hooks[] = {
+        {.beforeRead = zero_before},
+        {.beforeRead = shrink_before},
+        {.beforeRead = become_bits},
+    };
     mbm_registerTable *table = (mbm_registerTable *)malloc(sizeof *table);
     int i;
 
@@ -463,6 +468,26 @@ static void a_request_goes_on_with_the_old_table_if_its_hook_changes_it(void **s
     OK(mbm_unit_serveHoldingRegisters(units, table));
     OK(mbm_registerTable_serveMaskAndReadWrite(table));
     assert_int_equal(answer(units, 17, "\x17\0\0\0\4\0\0\0\1\2\0\1", 12), 0x17);
+    /* Each function that reads, after a hook that changed the table. */
+    for (i = 0; i < 9; i++) {
+        memset(units, 0, sizeof units);
+        units[0].id = 17;
+        memset(table, 0, sizeof *table);
+        table->words = words;
+        table->size = 4;
+        words[3] = 0x00F0;
+        OK(mbm_registerTable_setHooks(table, &read_hooks[i % 3]));
+        OK(mbm_unit_serveHoldingRegisters(units, table));
+        OK(mbm_registerTable_serveMaskAndReadWrite(table));
+        if (i < 3)
+            assert_int_equal(answer(units, 17, "\3\0\0\0\4", 5), 3);
+        else if (i < 6)
+            assert_int_equal(answer(units, 17, "\x16\0\3\0\xFF\x0F\0", 7), 0x16);
+        else
+            assert_int_equal(answer(units, 17, "\x17\0\0\0\4\0\3\0\1\2\x0F\xF0", 12), 0x17);
+        assert_int_equal(words[3], i < 3 ? 0x00F0 : 0x0FF0);
+        assert_int_equal(fewer[0], 0);
+    }
     free(table);
 }
 

@@ -1,4 +1,5 @@
 /* User-defined functions among the other services of a unit. */
+#include "crc.h"
 #include "mbm.h"
 #include "test.h"
 
@@ -159,6 +160,162 @@ static void a_record_that_was_zeroed_serves_nothing(void **state)
     assert_int_equal(answers(FIRST_CODE + 7), 7);
 }
 
+/* What the declining function returns, and its last request. */
+static struct {
+    uint16_t reply;
+    unsigned calls;
+    uint8_t unit, function, first;
+    const void *connection;
+} declining;
+
+static uint16_t decline(void *context, const mbm_request *request, uint8_t *response,
+                        uint16_t capacity)
+{
+    (void)context;
+    declining.calls++;
+    declining.unit = request->unit;
+    declining.function = request->function;
+    declining.first = request->length > 0 ? request->data[0] : 0xFF;
+    declining.connection = request->connection;
+    /* A function that declines may have written already. */
+    memset(response, 0xEE, capacity);
+    return declining.reply;
+}
+
+static void add_declining(unsigned which, uint8_t code)
+{
+    memset(&declining, 0, sizeof declining);
+    declining.reply = MBM_REPLY_DECLINED;
+    ours[which].serve = decline;
+    ours[which].code = code;
+    OK(mbm_unit_serveCustom(&unit, &ours[which]));
+}
+
+static void a_function_that_declines_leaves_the_request_to_the_built_in_one(void **state)
+{
+    unsigned before, i;
+
+    (void)state;
+    for (before = 0; before < MBM_MAX_SERVICES - 1; before++) {
+        reset(state);
+        for (i = 0; i < before; i++)
+            add(i, (uint8_t)(FIRST_CODE + i));
+        add_declining(before, 3);
+        OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+        words[0] = 0xABCD;
+        assert_int_equal(answers(3), -1);
+        assert_memory_equal(wire.sent + HEAD, "\3\2\xAB\xCD", 4);
+        assert_int_equal(declining.calls, 1);
+    }
+}
+
+static void a_function_before_the_built_in_one_may_answer_or_refuse(void **state)
+{
+    (void)state;
+    add_declining(0, 3);
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+    declining.reply = 1;
+    assert_int_equal(answers(3), 0xEE);
+    declining.reply = MBM_REPLY_EXCEPTION | MBM_ILLEGAL_FUNCTION;
+    assert_int_equal(answers(3), -2);
+    declining.reply = MBM_REPLY_DECLINED;
+    assert_int_equal(answers(3), -1);
+    assert_int_equal(declining.calls, 3);
+}
+
+static void a_function_that_declines_leaves_the_request_to_the_next_of_its_code(void **state)
+{
+    (void)state;
+    add_declining(0, FIRST_CODE);
+    add_declining(1, 0);
+    add(2, FIRST_CODE);
+    add(3, FIRST_CODE);
+    assert_int_equal(answers(FIRST_CODE), 2);
+    assert_int_equal(declining.calls, 2);
+}
+
+static void a_request_that_all_decline_is_answered_with_exception_01(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < MBM_MAX_SERVICES; i++)
+        add_declining(i, i % 2 ? FIRST_CODE : 0);
+    assert_int_equal(answers(FIRST_CODE), -2);
+    assert_int_equal(declining.calls, MBM_MAX_SERVICES);
+}
+
+static void a_function_that_was_pending_may_decline_then(void **state)
+{
+    (void)state;
+    add_declining(0, 3);
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+    declining.reply = MBM_REPLY_PENDING;
+    wire.left = sizeof wire.request;
+    memcpy(wire.request, "\0\1\0\0\0\6\x11\3\0\0\0\1", 12);
+    wire.length = 0;
+    OK(mbm_server_poll(&server));
+    OK(mbm_server_poll(&server));
+    assert_int_equal(wire.length, 0);
+    declining.reply = MBM_REPLY_DECLINED;
+    OK(mbm_server_poll(&server));
+    assert_int_equal(wire.length, HEAD + 4);
+    assert_int_equal(declining.calls, 3);
+}
+
+static void a_declined_request_is_counted_as_the_record_that_answers_has_it(void **state)
+{
+    static mbm_diagnostics diagnostics;
+
+    (void)state;
+    memset(&diagnostics, 0, sizeof diagnostics);
+    add_declining(0, 0);
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+    OK(mbm_unit_serveDiagnostics(&unit, &diagnostics));
+    assert_int_equal(answers(3), -1);
+    assert_int_equal(diagnostics.events, 1);
+    assert_int_equal(diagnostics.exceptionErrors, 0);
+    assert_int_equal(answers(FIRST_CODE), -2);
+    assert_int_equal(diagnostics.events, 1);
+    assert_int_equal(diagnostics.exceptionErrors, 1);
+}
+
+static void a_decline_with_other_bits_is_exception_04(void **state)
+{
+    (void)state;
+    add_declining(0, 3);
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+    declining.reply = MBM_REPLY_DECLINED | 1;
+    memcpy(wire.request, "\0\1\0\0\0\6\x11\3\0\0\0\1", 12);
+    wire.left = sizeof wire.request;
+    wire.length = 0;
+    OK(mbm_server_poll(&server));
+    assert_memory_equal(wire.sent + HEAD, "\x83\4", 2);
+}
+
+static void a_function_gets_the_connection_of_its_request(void **state)
+{
+    int connection;
+    mbm_port own = port;
+    uint8_t request[MBM_MAX_FRAME] = {UNIT, FIRST_CODE, 7};
+    uint16_t length;
+
+    (void)state;
+    add_declining(0, FIRST_CODE);
+    own.context = &connection;
+    OK(mbm_server_beginTcp(&server, &own, &unit, 1, frame, sizeof frame));
+    assert_int_equal(answers(FIRST_CODE), -2);
+    assert_ptr_equal(declining.connection, &connection);
+    assert_int_equal(declining.unit, UNIT);
+    assert_int_equal(declining.function, FIRST_CODE);
+    seal(request, 3);
+    OK(mbm_unit_respond(&unit, 1, words, FRAMING(MBM_FRAMING_RTU), request, 5, sizeof request,
+                        &length));
+    assert_int_equal(length, 5);
+    assert_int_equal(declining.first, 7);
+    assert_ptr_equal(declining.connection, words);
+}
+
 #define TEST(test) cmocka_unit_test_setup(test, reset)
 
 int main(void)
@@ -168,6 +325,14 @@ int main(void)
         TEST(a_custom_function_of_code_0_is_called_in_its_order),
         TEST(a_code_that_is_changed_counts_from_then_on),
         TEST(a_record_that_was_zeroed_serves_nothing),
+        TEST(a_function_that_declines_leaves_the_request_to_the_built_in_one),
+        TEST(a_function_before_the_built_in_one_may_answer_or_refuse),
+        TEST(a_function_that_declines_leaves_the_request_to_the_next_of_its_code),
+        TEST(a_request_that_all_decline_is_answered_with_exception_01),
+        TEST(a_function_that_was_pending_may_decline_then),
+        TEST(a_declined_request_is_counted_as_the_record_that_answers_has_it),
+        TEST(a_decline_with_other_bits_is_exception_04),
+        TEST(a_function_gets_the_connection_of_its_request),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -236,8 +236,12 @@ public:
 
     /** Milliseconds that a reply may take, 0 to 65535; 2000 at first. */
     uint8_t setResponseTimeout(uint16_t ms) { return mbm_client_setResponseTimeout(&client, ms); }
+    /** What setResponseTimeout has set. */
+    uint16_t getResponseTimeout() const { return mbm_client_getResponseTimeout(&client); }
     /** How often a request is repeated if its reply is missing, damaged or malformed, 0 to 255; 0 at first. */
     uint8_t setRetries(uint8_t retries) { return mbm_client_setRetries(&client, retries); }
+    /** What setRetries has set. */
+    uint8_t getRetries() const { return mbm_client_getRetries(&client); }
     /**
      * Milliseconds before a repetition: MBM_BACKOFF_NONE (at first), _FIXED, _LINEAR or
      * _EXPONENTIAL, the first wait and the longest. Other requests are sent meanwhile.

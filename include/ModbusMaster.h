@@ -278,6 +278,8 @@ public:
 
     /** Milliseconds from the end of a request to the end of its reply; 2000 at first. */
     void setResponseTimeout(uint16_t ms) { mbm_master_setResponseTimeout(&state.master, ms); }
+    /** What setResponseTimeout has set. */
+    uint16_t getResponseTimeout() const { return mbm_master_getResponseTimeout(&state.master); }
     /** The unit of later requests: 1 to 247; 248 to 255 are sent as they are, 0 broadcasts. */
     void setSlaveID(uint8_t slave) { mbm_master_setSlaveID(&state.master, slave); }
     /** The unit of later requests. */
@@ -286,27 +288,43 @@ public:
     void setBaudRate(uint32_t baud) { mbm_master_setBaudRate(&state.master, baud); }
     /** Microseconds of silence before a request, instead of t3.5. */
     void setGap(uint32_t us) { mbm_master_setGap(&state.master, us); }
+    /** The silence in effect: of setGap, or t3.5 of setBaudRate. */
+    uint32_t getGap() const { return mbm_master_getGap(&state.master); }
     /** Milliseconds from a broadcast to the next request; 100 at first. */
     void setTurnaroundDelay(uint16_t ms) { mbm_master_setTurnaroundDelay(&state.master, ms); }
+    /** What setTurnaroundDelay has set. */
+    uint16_t getTurnaroundDelay() const { return mbm_master_getTurnaroundDelay(&state.master); }
     /** Milliseconds after a failed request before the next one is sent; 100 at first. */
     void setQuietTime(uint16_t ms) { mbm_master_setQuietTime(&state.master, ms); }
+    /** What setQuietTime has set. */
+    uint16_t getQuietTime() const { return mbm_master_getQuietTime(&state.master); }
     /** How often a request is repeated if its reply is missing, damaged or malformed; 0 at first. */
     void setRetries(uint8_t retries) { mbm_master_setRetries(&state.master, retries); }
+    /** What setRetries has set. */
+    uint8_t getRetries() const { return mbm_master_getRetries(&state.master); }
     /** Discards the local echo, if the receiver receives what the driver sends; off at first. */
     void setEchoDiscard(bool on) { mbm_master_setEchoDiscard(&state.master, on); }
+    /** What setEchoDiscard has set. */
+    bool getEchoDiscard() const { return mbm_master_getEchoDiscard(&state.master) != 0; }
     /**
      * Accepts replies that deviate from the standard if no correct one arrives in time:
      * another echoed address or value, another number of registers. A read of more words
      * than the response buffer holds fills the buffer. Unit 0 may be read. Off at first.
      */
     void setLenient(bool on) { mbm_master_setLenient(&state.master, on); }
+    /** What setLenient has set. */
+    bool getLenient() const { return mbm_master_getLenient(&state.master) != 0; }
     /** Character times that the driver stays on after flush, for cores whose flush returns early; 0 at first. */
     void setPostFlushHold(uint8_t characters)
     {
         mbm_master_setPostFlushHold(&state.master, characters);
     }
+    /** What setPostFlushHold has set. */
+    uint8_t getPostFlushHold() const { return mbm_master_getPostFlushHold(&state.master); }
     /** false: the functions return ku8MBPending at once, and poll completes the request. */
     void setBlocking(bool on) { mbm_master_setBlocking(&state.master, on); }
+    /** What setBlocking has set; true at first. */
+    bool getBlocking() const { return mbm_master_getBlocking(&state.master) != 0; }
     /** Counts into `counters`; set them to 0 before. nullptr stops counting. Copies share them. */
     void setCounters(mbm_counters *counters) { mbm_master_setCounters(&state.master, counters); }
 

@@ -32,6 +32,11 @@ class ModbusMasterValues : public ModbusWordOrder,
 public:
     /** The order of values for calls without an order; orderABCD at first. */
     void setWordOrder(WordOrder order) { mbm_master_setWordOrder(&core(), order); }
+    /** The order in effect. */
+    WordOrder getWordOrder() const
+    {
+        return static_cast<WordOrder>(mbm_master_getWordOrder(&core()));
+    }
 
     /** An integer in the response: a word, 0 to 65535; only the bytes of its order matter. */
     bool getResponseUInt16(uint8_t index, uint16_t &value, WordOrder order = orderDefault) const

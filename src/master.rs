@@ -129,6 +129,11 @@ impl<P: Port, S: Words> Master<P, S> {
         };
     }
 
+    /// Whether a reply that deviates from the standard is accepted.
+    pub fn is_lenient(&self) -> bool {
+        self.lenient.is_some()
+    }
+
     /// Cancels the request in progress, if there is one. Its status becomes
     /// [`Status::CANCELLED`].
     pub fn cancel(&mut self) {

@@ -58,6 +58,11 @@ pub const fn millis(milliseconds: u16) -> u32 {
     milliseconds as u32 * 1000
 }
 
+/// Converts microseconds to whole milliseconds.
+pub const fn to_millis(microseconds: u32) -> u16 {
+    (microseconds / 1000) as u16
+}
+
 /// The length of a character of 11 bits, in microseconds, rounded up, at most 65535.
 /// [`DEFAULT_CHARACTER`] if `baud` is 0.
 pub const fn character(baud: u32) -> u16 {
@@ -135,6 +140,13 @@ mod tests {
                 let time = u32::from(character) * u32::from(count);
                 assert_eq!(characters(character, count), time);
             }
+        }
+    }
+
+    #[test]
+    fn milliseconds_come_back_as_they_were() {
+        for milliseconds in 0..=u16::MAX {
+            assert_eq!(to_millis(millis(milliseconds)), milliseconds);
         }
     }
 

@@ -299,10 +299,12 @@ unsafe extern "C" fn restart(context: *mut c_void, _: u8) {
 
 #[test]
 fn hooks_use_the_server_that_called_them() {
-    const REQUESTS: [&[u8]; 5] = [
+    const REQUESTS: [&[u8]; 7] = [
         &[17, 6, 0, 0, 0, 1],
         &[17, 16, 0, 0, 0, 2, 4, 0, 1, 0, 2],
         &[17, 3, 0, 0, 0, 2],
+        &[17, 22, 0, 3, 0xFF, 0xFF, 0, 0],
+        &[17, 23, 0, 0, 0, 2, 0, 1, 0, 1, 2, 0, 2],
         &[17, 65, 9],
         &[17, 8, 0, 1, 0, 0],
     ];
@@ -328,6 +330,7 @@ fn hooks_use_the_server_that_called_them() {
             (*line).restart = Some(restart);
             (*line).context = state.cast();
             assert_eq!(mbm_unit_serveHoldingRegisters(unit, table), MBM_OK);
+            assert_eq!(mbm_registerTable_serveMaskAndReadWrite(table), MBM_OK);
             assert_eq!(mbm_unit_serveCustom(unit, custom), MBM_OK);
             assert_eq!(mbm_unit_serveDiagnostics(unit, line), MBM_OK);
             let (port, bytes) = (port(state.cast()), frame.cast::<u8>());

@@ -90,12 +90,6 @@ fn read(files: &mut impl Files, pdu: &mut [u8], length: usize) -> Reply {
     let Some([_, count, rest @ ..]) = pdu.get_mut(..total) else {
         return Reply::SERVER_DEVICE_FAILURE;
     };
-    for record in reads.iter() {
-        let refused = files.before_read(record);
-        if refused != 0 {
-            return Reply::exception(refused);
-        }
-    }
     *count = rest.len() as u8;
     let mut rest = rest;
     for record in reads.iter() {
@@ -106,6 +100,10 @@ fn read(files: &mut impl Files, pdu: &mut [u8], length: usize) -> Reply {
         if let [length, reference, data @ ..] = group {
             *length = bytes as u8 + 1;
             *reference = REFERENCE_TYPE;
+            let refused = files.before_read(record);
+            if refused != 0 {
+                return Reply::exception(refused);
+            }
             files.load(record, data);
         }
         rest = following;

@@ -161,6 +161,13 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         is_rtu
     }
 
+    /// True if the discarding of the echo is on.
+    pub fn discards_echo(&self) -> bool {
+        let after_echo: Receive<P, B> = Self::receive_after_echo;
+        let is_on = |receive| core::ptr::fn_addr_eq(receive, after_echo);
+        self.receive.is_some_and(is_on)
+    }
+
     /// As [`Server::receive_rtu`], but first drops the echo of the server's own response. Stops
     /// waiting for the echo once the line has been silent for long enough.
     fn receive_after_echo(&mut self) -> Status {

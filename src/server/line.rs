@@ -115,8 +115,8 @@ pub struct Server<P, B> {
     /// The storage that the caller supplies.
     pub storage: B,
     pub(super) now: u32,
-    /// The silence that ends a frame.
-    silence: u32,
+    /// The silence that ends a frame. Set it with [`Server::set_silence`].
+    pub silence: u32,
     pub(super) receive: Option<Receive<P, B>>,
     pub(super) encode_adu: Option<EncodeAdu<P, B>>,
     /// The byte stream.

@@ -43,9 +43,9 @@ impl<T: DataModel> Service for Coils<T> {
     }
 }
 
-/// Called before a read, as [`DataModel::before_read`].
+/// Called before a read, as [`DataModel::before`].
 pub type BeforeRead<'a> = &'a mut dyn FnMut(u16, u16) -> u8;
-/// Called before a write, as [`DataModel::before_write`].
+/// Called before a write, as [`DataModel::before`].
 pub type BeforeWrite<'a> = &'a mut dyn FnMut(u16, u16, &[u8]) -> u8;
 /// Called after a write, as [`DataModel::after_write`].
 pub type AfterWrite<'a> = &'a mut dyn FnMut(u16, u16, &[u8]);
@@ -154,14 +154,12 @@ impl DataModel for RegisterArray<'_> {
         }
     }
 
-    fn before_read(&mut self, address: u16, quantity: u16) -> u8 {
-        let hook = self.before_read.as_mut();
-        hook.map_or(0, |hook| hook(address, quantity))
-    }
-
-    fn before_write(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
-        let hook = self.before_write.as_mut();
-        hook.map_or(0, |hook| hook(address, quantity, data))
+    fn before(&mut self, direction: Direction, address: u16, quantity: u16, data: &[u8]) -> u8 {
+        match (direction, &mut self.before_read, &mut self.before_write) {
+            (Direction::Read, Some(hook), _) => hook(address, quantity),
+            (Direction::Write, _, Some(hook)) => hook(address, quantity, data),
+            _ => 0,
+        }
     }
 
     fn after_write(&mut self, address: u16, quantity: u16, data: &[u8]) {
@@ -195,14 +193,12 @@ impl DataModel for BitArray<'_> {
         }
     }
 
-    fn before_read(&mut self, address: u16, quantity: u16) -> u8 {
-        let hook = self.before_read.as_mut();
-        hook.map_or(0, |hook| hook(address, quantity))
-    }
-
-    fn before_write(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
-        let hook = self.before_write.as_mut();
-        hook.map_or(0, |hook| hook(address, quantity, data))
+    fn before(&mut self, direction: Direction, address: u16, quantity: u16, data: &[u8]) -> u8 {
+        match (direction, &mut self.before_read, &mut self.before_write) {
+            (Direction::Read, Some(hook), _) => hook(address, quantity),
+            (Direction::Write, _, Some(hook)) => hook(address, quantity, data),
+            _ => 0,
+        }
     }
 
     fn after_write(&mut self, address: u16, quantity: u16, data: &[u8]) {

@@ -74,17 +74,11 @@ pub trait DataModel {
     /// first, bits lowest first, unused bits 0.
     fn transfer(&mut self, direction: Direction, address: u16, quantity: u16, data: &mut [u8]);
 
-    /// Called before cells are read. It may change the cells. An exception code refuses the
-    /// request; 0 allows it.
-    fn before_read(&mut self, address: u16, quantity: u16) -> u8 {
-        let _ = (address, quantity);
-        0
-    }
-
-    /// Called before cells are written, with the data as on the wire. An exception code
-    /// refuses the request; 0 allows it.
-    fn before_write(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
-        let _ = (address, quantity, data);
+    /// Called before cells are read or written. Before a read, it may change the cells; before a
+    /// write, `data` has the new values as on the wire. An exception code refuses the request;
+    /// 0 allows it.
+    fn before(&mut self, direction: Direction, address: u16, quantity: u16, data: &[u8]) -> u8 {
+        let _ = (direction, address, quantity, data);
         0
     }
 
@@ -94,15 +88,15 @@ pub trait DataModel {
     }
 }
 
-/// The part of [`DataModel`] that functions need.
-///
-/// The first byte of `pdu` is the function code of the request, and the address of the cells
-/// follows it.
+/// The part of [`DataModel`] that functions need. The less common ones take it as a trait
+/// object, so firmware carries them once for all tables.
 pub trait TableAccess {
-    /// Reads or writes `quantity` cells, which are `bytes` bytes of data; `operation` says where
-    /// in `pdu` the data are. Returns [`Reply::ILLEGAL_DATA_ADDRESS`] if a cell does not exist. A
-    /// read of 0 bytes only checks the address: it returns [`Reply::SERVER_DEVICE_FAILURE`] if
-    /// all cells exist.
+    /// Carries out `operation` on `quantity` cells, which are `bytes` bytes of data. The first
+    /// byte of `pdu` is the function code of the request. The address of the cells follows it,
+    /// and unless one cell is written the quantity; `operation` says where the data are.
+    ///
+    /// Returns [`Reply::ILLEGAL_DATA_ADDRESS`] if a cell does not exist. A read of 0 bytes only
+    /// checks that: it returns [`Reply::SERVER_DEVICE_FAILURE`] if all cells exist.
     fn access(
         &mut self,
         operation: TableOperation,
@@ -110,17 +104,6 @@ pub trait TableAccess {
         bytes: usize,
         pdu: &mut [u8],
     ) -> Reply;
-}
-
-/// The two steps of a read, for functions that also write. They take it as a trait object, so
-/// firmware carries them once for all tables.
-pub trait TableSteps: TableAccess {
-    /// Asks whether these existing cells may be read. Returns [`Reply::NOT_HANDLED`] if so, else
-    /// an exception. The quantity is in `pdu` too, after the address.
-    fn ask_read(&mut self, quantity: usize, pdu: &mut [u8]) -> Reply;
-
-    /// Reads cells as [`TableAccess::access`], once [`TableSteps::ask_read`] has allowed it.
-    fn load(&mut self, quantity: usize, bytes: usize, pdu: &mut [u8]) -> Reply;
 }
 
 impl<T: DataModel> TableAccess for T {
@@ -133,57 +116,35 @@ impl<T: DataModel> TableAccess for T {
         bytes: usize,
         pdu: &mut [u8],
     ) -> Reply {
-        let (address, quantity) = (address_in(pdu), quantity as u16);
+        let &mut [_, high, low, ..] = pdu else {
+            return Reply::SERVER_DEVICE_FAILURE;
+        };
+        let (address, quantity) = (word(high, low) as u16, quantity as u16);
         if !self.contains(address, quantity) {
             return Reply::ILLEGAL_DATA_ADDRESS;
         }
-        if operation == TableOperation::READ {
-            if bytes == 0 {
-                return Reply::SERVER_DEVICE_FAILURE;
-            }
-            return match self.before_read(address, quantity) {
-                0 => self.load(quantity.into(), bytes, pdu),
-                refused => Reply::exception(refused),
-            };
+        let (mut direction, mut at) = (Direction::Read, TableOperation::READ.data());
+        if !operation.reads() {
+            (direction, at) = (Direction::Write, operation.data());
         }
-        let at = operation.data();
-        let Some(data) = pdu.get_mut(at..at + bytes) else {
+        let Some(data) = pdu.get_mut(at..at + bytes).filter(|_| bytes != 0) else {
             return Reply::SERVER_DEVICE_FAILURE;
         };
-        let refused = self.before_write(address, quantity, data);
-        if refused != 0 {
-            return Reply::exception(refused);
+        if operation != TableOperation::LOAD {
+            let refused = self.before(direction, address, quantity, data);
+            if refused != 0 {
+                return Reply::exception(refused);
+            }
+            if operation == TableOperation::ASK {
+                return Reply::NOT_HANDLED;
+            }
         }
-        self.transfer(Direction::Write, address, quantity, data);
+        self.transfer(direction, address, quantity, data);
+        if direction == Direction::Read {
+            return counted(pdu, bytes);
+        }
         self.after_write(address, quantity, data);
         WRITTEN
-    }
-}
-
-impl<T: DataModel> TableSteps for T {
-    fn ask_read(&mut self, quantity: usize, pdu: &mut [u8]) -> Reply {
-        match self.before_read(address_in(pdu), quantity as u16) {
-            0 => Reply::NOT_HANDLED,
-            refused => Reply::exception(refused),
-        }
-    }
-
-    fn load(&mut self, quantity: usize, bytes: usize, pdu: &mut [u8]) -> Reply {
-        let (address, at) = (address_in(pdu), TableOperation::READ.data());
-        let Some(data) = pdu.get_mut(at..at + bytes) else {
-            return Reply::SERVER_DEVICE_FAILURE;
-        };
-        self.transfer(Direction::Read, address, quantity as u16, data);
-        counted(pdu, bytes)
-    }
-}
-
-/// The address after the function code.
-#[inline(always)]
-fn address_in(pdu: &[u8]) -> u16 {
-    match pdu {
-        &[_, high, low, ..] => u16::from_be_bytes([high, low]),
-        _ => 0,
     }
 }
 
@@ -208,12 +169,23 @@ impl TableOperation {
     pub const NONE: TableOperation = TableOperation(0);
     /// Reads cells.
     pub const READ: TableOperation = TableOperation(2);
+    /// The first part of a read, for functions that also write: asks whether the cells may be
+    /// read. Returns [`Reply::NOT_HANDLED`] if so.
+    pub const ASK: TableOperation = TableOperation(10);
+    /// The other part of a read: reads cells that may be read.
+    pub const LOAD: TableOperation = TableOperation(18);
     /// Writes one cell.
     pub const WRITE_ONE: TableOperation = TableOperation(3);
     /// Writes several cells.
     pub const WRITE_SEVERAL: TableOperation = TableOperation(6);
 
-    /// Index of the data in the PDU.
+    /// True for a read and for both parts of one.
+    #[inline(always)]
+    pub const fn reads(self) -> bool {
+        self.0 & 7 == TableOperation::READ.0
+    }
+
+    /// Index of the data in the PDU, if this is no part of a read.
     #[inline(always)]
     #[allow(clippy::unnecessary_cast)] // It is needed on an AVR.
     pub const fn data(self) -> usize {
@@ -331,7 +303,7 @@ pub const fn is_mask_or_read_write(function: u8) -> bool {
 /// Serves 16 and 17 for holding registers, as [`serve`].
 #[cfg_attr(target_os = "none", inline(never))]
 pub fn serve_mask_and_read_write(
-    cells: &mut (impl TableSteps + ?Sized),
+    cells: &mut (impl TableAccess + ?Sized),
     pdu: &mut [u8],
     length: usize,
 ) -> Reply {
@@ -342,19 +314,16 @@ pub fn serve_mask_and_read_write(
     }
 }
 
-fn mask_write(cells: &mut (impl TableSteps + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
+fn mask_write(cells: &mut (impl TableAccess + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
     let Some(&[code, a, b, c, d, e, f]) = pdu.first_chunk().filter(|_| length == 7) else {
         return Reply::ILLEGAL_DATA_VALUE;
     };
     let mut cell = [code, a, b, 0, 1];
-    if !exist(cells, 1, &mut cell) {
-        return Reply::ILLEGAL_DATA_ADDRESS;
-    }
-    let refused = cells.ask_read(1, &mut cell);
+    let refused = cells.access(TableOperation::ASK, 1, 2, &mut cell);
     if refused != Reply::NOT_HANDLED {
         return refused;
     }
-    cells.load(1, 2, &mut cell);
+    cells.access(TableOperation::LOAD, 1, 2, &mut cell);
     let [_, _, high, low, _] = cell;
     // c and d are the AND mask, e and f the OR mask.
     let (high, low) = ((high & c) | (e & !c), (low & d) | (f & !d));
@@ -369,18 +338,13 @@ fn mask_write(cells: &mut (impl TableSteps + ?Sized), pdu: &mut [u8], length: us
     }
 }
 
-/// True if all of these cells exist.
-fn exist(cells: &mut (impl TableSteps + ?Sized), quantity: usize, pdu: &mut [u8]) -> bool {
-    cells.access(TableOperation::READ, quantity, 0, pdu) != Reply::ILLEGAL_DATA_ADDRESS
-}
-
-fn read_write(cells: &mut (impl TableSteps + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
+fn read_write(cells: &mut (impl TableAccess + ?Sized), pdu: &mut [u8], length: usize) -> Reply {
     let kind = TableKind::HOLDING_REGISTERS;
     let Some(&[_, _, _, c, d, _, _, g, h, count]) = pdu.first_chunk() else {
         return Reply::SERVER_DEVICE_FAILURE;
     };
     let (quantity, written) = (word(c, d), word(g, h));
-    let (bytes, data) = (kind.bytes(quantity), usize::from(count));
+    let (mut bytes, data) = (kind.bytes(quantity), usize::from(count));
     if quantity.wrapping_sub(1) >= MAX_READ_REGISTERS.into()
         || written.wrapping_sub(1) >= MAX_READ_WRITE_REGISTERS.into()
         || data != kind.bytes(written)
@@ -388,14 +352,15 @@ fn read_write(cells: &mut (impl TableSteps + ?Sized), pdu: &mut [u8], length: us
     {
         return Reply::ILLEGAL_DATA_VALUE;
     }
-    if !exist(cells, quantity, pdu) || !exist(cells, written, write_part(pdu)) {
-        return Reply::ILLEGAL_DATA_ADDRESS;
-    }
     // Do not write if the response would not fit, or if the read is refused.
     if pdu.len() < 2 + bytes {
-        return Reply::SERVER_DEVICE_FAILURE;
+        bytes = 0;
     }
-    let refused = cells.ask_read(quantity, pdu);
+    let exists = cells.access(TableOperation::READ, written, 0, write_part(pdu));
+    if exists == Reply::ILLEGAL_DATA_ADDRESS {
+        return exists;
+    }
+    let refused = cells.access(TableOperation::ASK, quantity, bytes, pdu);
     if refused != Reply::NOT_HANDLED {
         return refused;
     }
@@ -404,7 +369,7 @@ fn read_write(cells: &mut (impl TableSteps + ?Sized), pdu: &mut [u8], length: us
         *code = READ_WRITE_MULTIPLE_REGISTERS;
     }
     match cells.access(TableOperation::WRITE_SEVERAL, written, data, write) {
-        WRITTEN => cells.load(quantity, bytes, pdu),
+        WRITTEN => cells.access(TableOperation::LOAD, quantity, bytes, pdu),
         refused => refused,
     }
 }

@@ -1,6 +1,7 @@
 //! `mbm_client_*`: the client, whose functions never wait.
 
 mod begin;
+mod getters;
 mod kind;
 mod link;
 mod object;
@@ -11,6 +12,7 @@ mod settings;
 mod storage;
 
 pub use begin::*;
+pub use getters::*;
 pub use link::*;
 pub use object::mbm_client;
 pub(crate) use poll::clock;

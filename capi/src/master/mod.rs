@@ -1,5 +1,6 @@
 //! `mbm_master_*`: the master for C.
 
+mod getters;
 pub(crate) mod object;
 mod requests;
 mod settings;
@@ -7,6 +8,7 @@ mod turn;
 mod values;
 mod words;
 
+pub use getters::*;
 pub use object::*;
 pub use requests::*;
 pub use settings::*;

@@ -1,12 +1,12 @@
 //! The four tables, with cells that the program's callbacks get and set one by one.
 
-use super::hooks::{mbm_access, mbm_accessHooks, mbm_recordHooks, Hook};
+use super::hooks::{mbm_accessHooks, mbm_recordHooks, Hook, HookCaller};
 use super::units::{add_as, is_ignored_broadcast, request};
 use super::{mbm_service, mbm_unit};
 use core::ffi::c_void;
-use core::ptr::{null, null_mut};
+use core::ptr::null;
 use mbm::error::Status;
-use mbm::server::table::{self, DataModel, Direction, TableKind, TableSteps};
+use mbm::server::table::{self, DataModel, Direction, TableAccess, TableKind};
 use mbm::server::Reply;
 
 /// Cells that your functions get and set one by one, in place of an array. A cell is a
@@ -33,54 +33,32 @@ pub struct mbm_dataCallbacks {
     pub hooks: mbm_recordHooks,
 }
 
-/// The callbacks of C, and the request. They may use the struct, so no reference to it is
-/// kept.
-struct Callbacks {
-    record: *mut mbm_dataCallbacks,
-    /// The hooks that the record had when the request came.
-    hooks: mbm_recordHooks,
-    info: *const c_void,
-    function: u8,
-}
+/// The callbacks of C. They may use the struct, so no reference to it is kept.
+struct Callbacks(*mut mbm_dataCallbacks, HookCaller);
 
 // SAFETY, of all functions here: the header requires that the struct stays valid, at the
 // same address, and that its functions do what their comments say.
 impl Callbacks {
-    /// Calls a hook, if there are hooks.
-    fn call(&self, hook: Hook, address: u16, quantity: u16, data: *const u8) -> u8 {
-        // SAFETY: see above.
-        unsafe {
-            self.hooks.call(self.info, hook, || mbm_access {
-                connection: null_mut(),
-                data,
-                address,
-                quantity,
-                file: 0,
-                unit: 0,
-                function: self.function,
-            })
-        }
-    }
     fn is_valid(&self, address: u16) -> bool {
         // SAFETY: see above.
         unsafe {
-            let check = (*self.record).isValid;
-            check.is_none_or(|check| check((*self.record).context, address) != 0)
+            let check = (*self.0).isValid;
+            check.is_none_or(|check| check((*self.0).context, address) != 0)
         }
     }
     fn get(&self, address: u16) -> u16 {
         // SAFETY: see above.
         unsafe {
-            (*self.record)
+            (*self.0)
                 .get
-                .map_or(0, |get| get((*self.record).context, address))
+                .map_or(0, |get| get((*self.0).context, address))
         }
     }
     fn set(&self, address: u16, value: u16) {
         // SAFETY: see above.
         unsafe {
-            if let Some(set) = (*self.record).set {
-                set((*self.record).context, address, value);
+            if let Some(set) = (*self.0).set {
+                set((*self.0).context, address, value);
             }
         }
     }
@@ -94,7 +72,7 @@ impl DataModel for Callbacks {
 
     fn transfer(&mut self, direction: Direction, address: u16, quantity: u16, data: &mut [u8]) {
         // SAFETY: see above.
-        let bits = TableKind::from_code(unsafe { (*self.record).service.kind }).is_bits();
+        let bits = TableKind::from_code(unsafe { (*self.0).service.kind }).is_bits();
         for index in 0..quantity {
             let cell = address.wrapping_add(index);
             if bits {
@@ -126,16 +104,19 @@ impl DataModel for Callbacks {
         }
     }
 
-    fn before_read(&mut self, address: u16, quantity: u16) -> u8 {
-        self.call(Hook::BeforeRead, address, quantity, null())
-    }
-
-    fn before_write(&mut self, address: u16, quantity: u16, data: &[u8]) -> u8 {
-        self.call(Hook::BeforeWrite, address, quantity, data.as_ptr())
+    fn before(&mut self, direction: Direction, address: u16, quantity: u16, data: &[u8]) -> u8 {
+        let (mut hook, mut data) = (Hook::BeforeRead, data.as_ptr());
+        if direction == Direction::Write {
+            hook = Hook::BeforeWrite;
+        } else {
+            data = null();
+        }
+        self.1.call(hook, address, quantity, data)
     }
 
     fn after_write(&mut self, address: u16, quantity: u16, data: &[u8]) {
-        self.call(Hook::AfterWrite, address, quantity, data.as_ptr());
+        self.1
+            .call(Hook::AfterWrite, address, quantity, data.as_ptr());
     }
 }
 
@@ -158,15 +139,10 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const
         if (*record).set.is_none() && function != kind.code() {
             return Reply::NOT_HANDLED.code();
         }
-        let mut cells = Callbacks {
-            record,
-            hooks: (*record).hooks,
-            info,
-            function,
-        };
+        let mut cells = Callbacks(record, HookCaller::new((*record).hooks, info, function));
         let (pdu, length) = request(pdu, info);
         let reply = if is_mask_or_read_write {
-            let cells: &mut dyn TableSteps = &mut cells;
+            let cells: &mut dyn TableAccess = &mut cells;
             table::serve_mask_and_read_write(cells, pdu, length)
         } else {
             table::serve(kind, &mut cells, pdu, length)

@@ -1,10 +1,10 @@
 //! Files and FIFO queues, in arrays of the program.
 
-use super::hooks::{mbm_access, mbm_accessHooks, mbm_recordHooks, Hook};
+use super::hooks::{mbm_accessHooks, mbm_recordHooks, Hook, HookCaller};
 use super::units::{add, request};
 use super::{mbm_service, mbm_unit};
 use core::ffi::c_void;
-use core::ptr::{null, null_mut};
+use core::ptr::null;
 use mbm::error::Status;
 use mbm::pdu::files::Record;
 use mbm::server::files::{self, Fifos, Files};
@@ -59,15 +59,8 @@ pub struct mbm_fifos {
     pub count: u16,
 }
 
-/// The files of C, and the request. Their hooks may use the struct, so no reference to it is
-/// kept.
-struct CFiles {
-    record: *mut mbm_files,
-    /// The hooks that the record had when the request came.
-    hooks: mbm_recordHooks,
-    info: *const c_void,
-    function: u8,
-}
+/// The files of C. Their hooks may use the struct, so no reference to it is kept.
+struct CFiles(*mut mbm_files, HookCaller);
 
 /// The FIFO queues of C.
 struct CFifos(*mut mbm_fifos);
@@ -87,31 +80,15 @@ unsafe fn load(words: *const u16, data: &mut [u8]) {
 // same address, with arrays of the given sizes. `find` returns only records within these
 // arrays.
 impl CFiles {
-    /// Calls a hook, if there are hooks.
-    fn call(&self, hook: Hook, record: Record, data: *const u8) -> u8 {
-        // SAFETY: see above.
-        unsafe {
-            self.hooks.call(self.info, hook, || mbm_access {
-                connection: null_mut(),
-                data,
-                address: record.record,
-                quantity: record.length,
-                file: record.file,
-                unit: 0,
-                function: self.function,
-            })
-        }
-    }
-
     /// The first of these records, or `None` if not all of them exist.
     fn find(&self, wanted: Record) -> Option<*mut u16> {
         // SAFETY: see above.
         unsafe {
-            let mut file = (*self.record).files;
+            let mut file = (*self.0).files;
             if file.is_null() {
                 return None;
             }
-            for _ in 0..(*self.record).count {
+            for _ in 0..(*self.0).count {
                 if (*file).number == wanted.file {
                     let size = (*file).size;
                     let exist = !(*file).records.is_null()
@@ -148,15 +125,16 @@ impl Files for CFiles {
     }
 
     fn before_read(&mut self, record: Record) -> u8 {
-        self.call(Hook::BeforeRead, record, null())
+        self.1.call_of_file(Hook::BeforeRead, record, null())
     }
 
     fn before_write(&mut self, record: Record, data: &[u8]) -> u8 {
-        self.call(Hook::BeforeWrite, record, data.as_ptr())
+        self.1
+            .call_of_file(Hook::BeforeWrite, record, data.as_ptr())
     }
 
     fn after_write(&mut self, record: Record, data: &[u8]) {
-        self.call(Hook::AfterWrite, record, data.as_ptr());
+        self.1.call_of_file(Hook::AfterWrite, record, data.as_ptr());
     }
 }
 
@@ -210,12 +188,7 @@ unsafe extern "C" fn serve_files(
     // SAFETY: as the caller promises.
     unsafe {
         let record = service.cast::<mbm_files>();
-        let mut files = CFiles {
-            record,
-            hooks: (*record).hooks,
-            info,
-            function: *pdu,
-        };
+        let mut files = CFiles(record, HookCaller::new((*record).hooks, info, *pdu));
         let (pdu, length) = request(pdu, info);
         files::serve(&mut files, pdu, length).code()
     }

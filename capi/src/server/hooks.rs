@@ -1,8 +1,9 @@
 //! The hooks that the program sets for the cells of its tables, callbacks and files.
 
-use super::Core;
+use super::buffers::Core;
 use core::ffi::c_void;
-use core::mem::{offset_of, transmute};
+use core::mem::{offset_of, transmute, MaybeUninit};
+use mbm::pdu::files::Record;
 use mbm::server::{Reply, RequestInfo};
 
 /// A request that reads or writes cells of yours, as your hooks get it. A cell is a register,
@@ -35,9 +36,9 @@ pub struct mbm_access {
 ///
 /// The server calls the hooks only for a request that is right and whose cells all exist.
 /// Functions 16 and 17 (hex) read and write: for them the server calls beforeRead,
-/// beforeWrite and afterWrite in this order. A request of function 14 or 15 (hex) has
-/// several groups of records. The server calls each hook once for each group; it calls the
-/// hook for all groups before it reads or writes any of them.
+/// beforeWrite and afterWrite in this order. A request of function 14 or 15 (hex) has one or
+/// more groups of records, and the server calls each hook once for each group. It calls
+/// beforeWrite for all groups before it writes any of them.
 ///
 /// A hook may change cells. It may call any function of this library but those on the
 /// server that calls it, which return MBM_BUSY. If it changes its record, or sets other
@@ -77,8 +78,8 @@ type CallHook = unsafe extern "C" fn(
 ) -> u8;
 
 impl mbm_recordHooks {
-    /// The hooks of a record that calls them with [`mbm_recordHooks::call`]. `hooks` may be
-    /// NULL for none.
+    /// The hooks of a record that calls them through [`HookCaller`]. `hooks` may be NULL for
+    /// none.
     pub(super) fn new(hooks: *const mbm_accessHooks) -> mbm_recordHooks {
         let call: CallHook = call_hook;
         // SAFETY: both are pointers to functions; `call` has the right type again when it is
@@ -89,29 +90,59 @@ impl mbm_recordHooks {
             call: (!hooks.is_null()).then_some(call),
         }
     }
+}
+
+/// The hooks that a record had when a request came, and the request.
+pub(super) struct HookCaller {
+    hooks: mbm_recordHooks,
+    info: *const c_void,
+    /// `function` and `file` are set, from `call` on also the other fields.
+    access: MaybeUninit<mbm_access>,
+}
+
+impl HookCaller {
+    /// # Safety
+    /// [`mbm_recordHooks::new`] made the hooks, or they are zeroed. They stay valid. `info` is
+    /// as for [`connection`].
+    #[inline(always)]
+    pub(super) unsafe fn new(hooks: mbm_recordHooks, info: *const c_void, function: u8) -> Self {
+        let mut access = MaybeUninit::<mbm_access>::uninit();
+        let fields = access.as_mut_ptr();
+        // SAFETY: fields of that storage.
+        unsafe {
+            (*fields).function = function;
+            (*fields).file = 0;
+        }
+        HookCaller {
+            hooks,
+            info,
+            access,
+        }
+    }
 
     /// Calls a hook, if there are hooks. Returns 0, or the exception code with which the hook
-    /// refuses the request.
-    ///
-    /// # Safety
-    /// [`mbm_recordHooks::new`] made these hooks, or they are zeroed; they are valid. `info` is
-    /// as for [`connection`].
-    pub(super) unsafe fn call(
-        self,
-        info: *const c_void,
-        hook: Hook,
-        access: impl FnOnce() -> mbm_access,
-    ) -> u8 {
-        // SAFETY: as the caller promises.
+    /// refuses the request. `data` is NULL for a read.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub(super) fn call(&mut self, hook: Hook, address: u16, quantity: u16, data: *const u8) -> u8 {
+        let Some(call) = self.hooks.call else {
+            return 0;
+        };
+        let access = self.access.as_mut_ptr();
+        // SAFETY: as `new` requires.
         unsafe {
-            match self.call {
-                Some(call) => {
-                    let call = transmute::<unsafe extern "C" fn(), CallHook>(call);
-                    call(self.hooks, info, hook, &mut access())
-                }
-                None => 0,
-            }
+            (*access).address = address;
+            (*access).quantity = quantity;
+            (*access).data = data;
+            let call = transmute::<unsafe extern "C" fn(), CallHook>(call);
+            call(self.hooks.hooks, self.info, hook, access)
         }
+    }
+
+    /// As [`HookCaller::call`], for records of a file.
+    pub(super) fn call_of_file(&mut self, hook: Hook, record: Record, data: *const u8) -> u8 {
+        // SAFETY: a field of that storage.
+        unsafe { (*self.access.as_mut_ptr()).file = record.file };
+        self.call(hook, record.record, record.length, data)
     }
 }
 
@@ -139,8 +170,8 @@ pub(super) unsafe fn connection(info: *const c_void) -> *mut c_void {
     }
 }
 
-/// Calls a hook. The function sets the fields of `access` that are known from `info`. Returns
-/// 0, or the exception code with which the hook refuses the request.
+/// Calls a hook. The function sets the fields `connection` and `unit` of `access`, which are
+/// known from `info`. Returns 0, or the exception code with which the hook refuses the request.
 ///
 /// # Safety
 /// `hooks` and `access` are valid, and the functions do what the header says; `info` is as

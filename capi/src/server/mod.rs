@@ -1,6 +1,7 @@
 //! `mbm_server_*`: a server on a line or connection, for C.
 
 mod begin;
+mod buffers;
 mod callbacks;
 mod cells;
 mod custom;
@@ -28,12 +29,13 @@ pub use tables::*;
 pub use units::*;
 
 use super::pointers::{check, check_once, object, with_hooks, CObject, BEGUN, IN_HOOK};
-use super::port::{self, mbm_port};
+use super::port;
+use buffers::{Core, ServerBuffers};
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 use mbm::error::Status;
 use mbm::pdu::custom::Rule;
-use mbm::server::{Reply, Server, ServerStorage, MOST_REQUESTS};
+use mbm::server::{Reply, ServerStorage, MOST_REQUESTS};
 use mbm::FIRMWARE;
 
 /// A Modbus server on one serial line or one connection.
@@ -68,8 +70,6 @@ struct Object {
     mark: u8,
 }
 
-pub(super) type Core = Server<mbm_port, ServerBuffers>;
-
 const _: () = {
     let space = size_of::<mbm_server>();
     let used = size_of::<Object>();
@@ -79,15 +79,6 @@ const _: () = {
     // be unused.
     assert!(size_of::<usize>() > 4 || (space - used) * 20 <= space);
 };
-
-/// The frame buffer and the units that the program passed to a begin function.
-#[repr(C)]
-pub(super) struct ServerBuffers {
-    bytes: u16,
-    count: u8,
-    frame: *mut u8,
-    units: *mut mbm_unit,
-}
 
 impl ServerStorage for ServerBuffers {
     fn frame(&mut self) -> &mut [u8] {

@@ -1,7 +1,8 @@
 //! The responder: takes a request frame, writes a response frame.
 
+use super::buffers::Core;
+use super::mbm_unit;
 use super::units;
-use super::{mbm_unit, Core};
 use crate::framing::mbm_framing;
 use crate::pointers::get;
 use core::ffi::c_void;

@@ -28,7 +28,7 @@ unsafe fn access(
         let hooks = (*table).hooks.hooks;
         let mut copy = table.read();
         copy.hooks.call = None;
-        let reads = operation == TableOperation::READ || operation == TableOperation::NONE;
+        let reads = operation.reads();
         let word = |at| u16::from_be_bytes([*pdu.add(at), *pdu.add(at + 1)]);
         let quantity = match operation {
             TableOperation::WRITE_ONE => 1,
@@ -52,7 +52,7 @@ unsafe fn access(
         if refused != 0 {
             return Reply::exception(refused);
         }
-        if operation == TableOperation::NONE {
+        if operation == TableOperation::ASK {
             return Reply::NOT_HANDLED;
         }
         let quantity = quantity.into();

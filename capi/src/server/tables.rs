@@ -8,7 +8,7 @@ use core::ffi::c_void;
 use core::hint::assert_unchecked;
 use core::mem::transmute;
 use mbm::error::Status;
-use mbm::server::table::{self, TableAccess, TableKind, TableOperation, TableSteps};
+use mbm::server::table::{self, TableAccess, TableKind, TableOperation};
 use mbm::server::Reply;
 use mbm::FIRMWARE;
 
@@ -59,9 +59,8 @@ pub struct mbm_bitTable {
 /// struct, so no reference to it is kept.
 pub(super) struct Table(pub(super) *mut mbm_registerTable, pub(super) *const c_void);
 
-/// Serves an access as [`TableAccess::access`] and calls the hooks of the table around it. The
-/// cells exist. With the operation [`TableOperation::NONE`] it only asks whether they may be
-/// read, as [`TableSteps::ask_read`].
+/// Serves an access as [`TableAccess::access`], to cells that exist, and calls the hooks of the
+/// table around it.
 ///
 /// A table has this function only with hooks, so a program without hooks does not contain it.
 pub(super) type AccessWithHooks = unsafe fn(
@@ -161,9 +160,9 @@ unsafe fn contains(table: *const mbm_registerTable, first: usize, quantity: usiz
     }
 }
 
-/// As [`Table`], for functions that read and write: the read uses the fields that the table
-/// had when the request came, also if a hook has changed them. The copy has no hooks.
-struct TableSnapshot(Table, mbm_registerTable);
+/// As [`Table`], for functions that read and write: a copy of the table. It has the fields that
+/// the table had when the request came, also if a hook has changed them.
+struct TableSnapshot(mbm_registerTable, *const c_void);
 
 impl TableAccess for TableSnapshot {
     #[cfg_attr(target_os = "none", inline(never))]
@@ -174,29 +173,29 @@ impl TableAccess for TableSnapshot {
         bytes: usize,
         pdu: &mut [u8],
     ) -> Reply {
-        let mut copy = Table(&raw mut self.1, self.0 .1);
-        let table = if operation == TableOperation::READ {
-            &mut copy
-        } else {
-            &mut self.0
-        };
-        table.access(operation, quantity, bytes, pdu)
-    }
-}
-
-impl TableSteps for TableSnapshot {
-    fn ask_read(&mut self, _quantity: usize, pdu: &mut [u8]) -> Reply {
-        // SAFETY: see `Table`; a request that reads and writes has at least a quantity.
+        let (mut part, mut count) = (operation, bytes);
+        let (table, info) = (&raw mut self.0, self.1);
+        // SAFETY: see `Table`; where a hook is called, the cells exist.
         unsafe {
-            match access_with_hooks(self.0 .0) {
-                Some(ask) => ask(self.0 .0, self.0 .1, TableOperation::NONE, pdu.as_mut_ptr()),
+            let call = (*table).hooks.call;
+            if operation.reads() {
+                part = TableOperation::READ;
+                (*table).hooks.call = None;
+            }
+            if operation == TableOperation::ASK {
+                count = 0;
+            }
+            let reply = Table(table, info).access(part, quantity, count, pdu);
+            (*table).hooks.call = call;
+            // Without bytes to read, the reply says whether the cells exist.
+            if count == bytes || reply == Reply::ILLEGAL_DATA_ADDRESS {
+                return reply;
+            }
+            match access_with_hooks(table) {
+                Some(ask) => ask(table, info, operation, pdu.as_mut_ptr()),
                 None => Reply::NOT_HANDLED,
             }
         }
-    }
-
-    fn load(&mut self, quantity: usize, bytes: usize, pdu: &mut [u8]) -> Reply {
-        self.access(TableOperation::READ, quantity, bytes, pdu)
     }
 }
 
@@ -310,10 +309,9 @@ unsafe fn serve_mask_and_read_write(
     // SAFETY: as the caller promises.
     unsafe {
         let (pdu, length) = request(pdu, info);
-        let mut cells = TableSnapshot(Table(table, info), table.read());
-        cells.1.hooks.call = None;
+        let mut cells = TableSnapshot(table.read(), info);
         if FIRMWARE {
-            let cells: &mut dyn TableSteps = &mut cells;
+            let cells: &mut dyn TableAccess = &mut cells;
             return table::serve_mask_and_read_write(cells, pdu, length).code();
         }
         table::serve_mask_and_read_write(&mut cells, pdu, length).code()

@@ -83,6 +83,21 @@ fn set(w: &World, master: *mut mbm_master) {
         16 => call!(w, master, mbm_master_setLenient(master, byte & 1)),
         _ => call!(w, master, mbm_master_setWordOrder(master, byte % 8)),
     });
+    get(w, master);
+}
+
+/// Reads the settings.
+fn get(w: &World, master: *mut mbm_master) {
+    call!(w, master, mbm_master_getResponseTimeout(master));
+    assert!(call!(w, master, mbm_master_getGap(master)) <= 1 << 31);
+    call!(w, master, mbm_master_getTurnaroundDelay(master));
+    call!(w, master, mbm_master_getQuietTime(master));
+    call!(w, master, mbm_master_getRetries(master));
+    assert!(call!(w, master, mbm_master_getEchoDiscard(master)) <= 1);
+    assert!(call!(w, master, mbm_master_getLenient(master)) <= 1);
+    call!(w, master, mbm_master_getPostFlushHold(master));
+    assert!(call!(w, master, mbm_master_getBlocking(master)) <= 1);
+    call!(w, master, mbm_master_getWordOrder(master));
 }
 
 /// Starts a request. A blocking one must return.

@@ -54,6 +54,8 @@ fn set(w: &World, sniffer: *mut mbm_sniffer) {
         1 => call!(w, sniffer, mbm_sniffer_setResponseTimeout(sniffer, word)),
         _ => call!(w, sniffer, mbm_sniffer_setFrameTimeout(sniffer, word)),
     });
+    call!(w, sniffer, mbm_sniffer_getResponseTimeout(sniffer));
+    call!(w, sniffer, mbm_sniffer_getFrameTimeout(sniffer));
 }
 
 fn next(w: &World, sniffer: *mut mbm_sniffer) {
