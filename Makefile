@@ -311,6 +311,13 @@ clients: ## Build and check the client examples poll_table, scan and logger in b
 	@$(BUILD)/venv/bin/python scripts/check-clients $(BUILD)/plain
 	@$(BUILD)/venv/bin/python scripts/check-clients-lost $(BUILD)/plain
 
+.PHONY: trace
+trace: ## Compare what the examples print with --trace with what tshark reads in their --pcap files
+	@scripts/need tshark python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
+	@$(MAKE) --no-print-directory venv $(CLIENTS) $(PEERS) $(DEMO) $(SNIFF) \
+		$(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway)
+	@$(BUILD)/venv/bin/python scripts/check-trace $(BUILD)/plain
+
 .PHONY: demo
 demo: ## Show every function against a libmodbus server, frame by frame
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev

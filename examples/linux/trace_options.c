@@ -64,8 +64,7 @@ static void take(traced *link, const mbm_traceRecord *record, const mbm_event *e
         mbm_frame_text(&link->framing, record->kind, record->bytes, record->length, words,
                        sizeof words);
     else
-        snprintf(words, sizeof words, "%s, %u bytes", mbm_status_text(record->status),
-                 record->length);
+        snprintf(words, sizeof words, "%s, %u bytes", pcap_fault(record->status), record->length);
     if (is_printed)
         print_record(link, record, words, time);
     if (pcap)
