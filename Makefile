@@ -282,7 +282,7 @@ bench: ## Compare speed and instructions with libmodbus and rmodbus; writes docs
 	@CARGO="$(CARGO)" scripts/bench-frames
 
 DEMO := $(BUILD)/plain/linux/demo
-$(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/recorder linux/mbm_tty support/pty support/server) $(call TRACE,plain) $(ARCHIVE)
+$(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/mbm_tty support/pty support/server) $(call TRACE,plain) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
 $(BUILD)/plain/linux/basic: $(patsubst %,$(BUILD)/plain/%.o,linux/basic linux/mbm_tty) $(call TRACE,plain) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
