@@ -282,7 +282,7 @@ bench: ## Compare speed and instructions with libmodbus and rmodbus; writes docs
 	@CARGO="$(CARGO)" scripts/bench-frames
 
 DEMO := $(BUILD)/plain/linux/demo
-$(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/recorder linux/mbm_tty support/pty support/server) $(call TRACE,plain) $(ARCHIVE)
+$(DEMO): $(patsubst %,$(BUILD)/plain/%.o,linux/demo linux/mbm_tty support/pty support/server) $(call TRACE,plain) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -lmodbus -lpthread -o $@
 $(BUILD)/plain/linux/basic: $(patsubst %,$(BUILD)/plain/%.o,linux/basic linux/mbm_tty) $(call TRACE,plain) $(ARCHIVE)
 	@gcc $(filter %.o,$^) $(ARCHIVE) -Wl,--gc-sections -o $@
@@ -310,6 +310,13 @@ clients: ## Build and check the client examples poll_table, scan and logger in b
 	@$(MAKE) --no-print-directory venv $(CLIENTS) $(PEERS)
 	@$(BUILD)/venv/bin/python scripts/check-clients $(BUILD)/plain
 	@$(BUILD)/venv/bin/python scripts/check-clients-lost $(BUILD)/plain
+
+.PHONY: trace
+trace: ## Compare what the examples print with --trace with what tshark reads in their --pcap files
+	@scripts/need tshark python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
+	@$(MAKE) --no-print-directory venv $(CLIENTS) $(PEERS) $(DEMO) $(SNIFF) \
+		$(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway)
+	@$(BUILD)/venv/bin/python scripts/check-trace $(BUILD)/plain
 
 .PHONY: demo
 demo: ## Show every function against a libmodbus server, frame by frame, and a plan at work

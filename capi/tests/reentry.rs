@@ -15,6 +15,7 @@ struct HookState {
     client: *mut mbm_client,
     master: *mut mbm_master,
     server: *mut mbm_server,
+    trace: *mut mbm_trace,
     unit: *mut mbm_unit,
     function_mask: *mut mbm_functionMask,
     request: *mut mbm_clientRequest,
@@ -32,10 +33,10 @@ unsafe fn state<'a>(context: *mut c_void) -> &'a mut HookState {
 /// Calls functions on each object, which the library must refuse.
 unsafe fn use_objects(context: *mut c_void) {
     unsafe {
-        let (client, master, server) = {
+        let (client, master, server, trace) = {
             let state = state(context);
             state.calls += 1;
-            (state.client, state.master, state.server)
+            (state.client, state.master, state.server, state.trace)
         };
         if !client.is_null() {
             assert_eq!(mbm_client_poll(client), BUSY);
@@ -53,6 +54,11 @@ unsafe fn use_objects(context: *mut c_void) {
             assert_eq!(mbm_server_poll(server), BUSY);
             assert_eq!(mbm_server_setSilence(server, 9), BUSY);
             mbm_server_pollDelay(server);
+        }
+        if !trace.is_null() {
+            // From within hooks that are only passed on it succeeds, and calls the trace's hook.
+            mbm_trace_flush(trace);
+            mbm_trace_setFrameTimeout(trace, 10);
         }
     }
 }
@@ -158,6 +164,7 @@ fn new_state() -> *mut HookState {
         client: null_mut(),
         master: null_mut(),
         server: null_mut(),
+        trace: null_mut(),
         unit: null_mut(),
         function_mask: null_mut(),
         request: null_mut(),
@@ -221,6 +228,49 @@ fn hooks_and_done_use_the_client_that_called_them() {
             drop((Box::from_raw(client), Box::from_raw(request)));
             drop((Box::from_raw(one), Box::from_raw(two)));
         }
+    }
+}
+
+unsafe extern "C" fn traced(context: *mut c_void, record: *const mbm_traceRecord) {
+    unsafe {
+        let last = usize::from((*record).length) - 1;
+        (*record).bytes.add(last).read();
+        assert_eq!(mbm_trace_flush(state(context).trace), BUSY);
+        assert!(mbm_trace_port(state(context).trace).is_null());
+        state(context).done += 1;
+        use_objects(context);
+    }
+}
+
+#[test]
+fn hooks_use_the_trace_that_called_them() {
+    unsafe {
+        let (state, master, trace) = (new_state(), boxed::<mbm_master>(), boxed::<mbm_trace>());
+        let (words, frame) = (boxed::<[u16; 8]>(), boxed::<[u8; 64]>());
+        let (buffer, framing) = (boxed::<[u8; 64]>(), boxed::<mbm_framing>());
+        (*state).master = master;
+        (*state).trace = trace;
+        let (first, bytes) = (words.cast::<u16>(), frame.cast::<u8>());
+        let status = mbm_master_setBuffers(master, first, 4, first.add(4), 4, bytes, 64);
+        assert_eq!(status, MBM_OK);
+        let port = port(state.cast());
+        let place = buffer.cast();
+        let hook = Some(traced as unsafe extern "C" fn(_, _));
+        let status = mbm_trace_beginClient(trace, &port, framing, place, 64, hook, state.cast());
+        assert_eq!(status, MBM_OK);
+        let status = mbm_master_beginRtu(master, 17, mbm_trace_port(trace));
+        assert_eq!(status, MBM_OK);
+        assert_eq!(mbm_master_setResponseTimeout(master, 20), MBM_OK);
+        (*state).received = vec![17, 3];
+        let status = mbm_master_readHoldingRegisters(master, 0, 1);
+        assert_eq!(status, MBM_RESPONSE_TIMED_OUT);
+        assert_eq!(mbm_trace_flush(trace), MBM_OK);
+        assert_eq!((*state).done, 2);
+        assert!((*state).calls > 10);
+        drop((Box::from_raw(state), Box::from_raw(master)));
+        drop((Box::from_raw(words), Box::from_raw(frame)));
+        drop((Box::from_raw(buffer), Box::from_raw(framing)));
+        drop(Box::from_raw(trace));
     }
 }
 

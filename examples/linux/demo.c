@@ -4,7 +4,6 @@
  *
  * Licence: MIT OR Apache-2.0. */
 #include "mbm_tty.h"
-#include "recorder.h"
 #include "server.h"
 #include "trace_options.h"
 
@@ -13,8 +12,17 @@
 
 enum { UNIT = 17, ABSENT_UNIT = 99, WORDS = 8, SHORT_FRAME = 8 };
 
+/* The bytes of one direction, since the last call. */
+typedef struct recording {
+    uint8_t bytes[MBM_MAX_FRAME];
+    size_t length;
+} recording;
+
 static server device;
-static recorder wire;
+static mbm_trace wire;
+static uint8_t incomplete[2 * MBM_MAX_FRAME];
+static recording sent, received;
+static const mbm_framing rtu = {.kind = MBM_FRAMING_RTU};
 static mbm_master node;
 static mbm_counters counters;
 static uint16_t response[WORDS];
@@ -30,10 +38,25 @@ static void expect(int as_expected, const char *what)
     }
 }
 
+/* The hook of the trace. */
+static void keep(void *context, const mbm_traceRecord *record)
+{
+    recording *const kept = record->direction == MBM_TRACE_SENT ? &sent : &received;
+    uint16_t i;
+
+    (void)context;
+    for (i = 0; i < record->length && kept->length < sizeof kept->bytes; i++)
+        kept->bytes[kept->length++] = record->bytes[i];
+}
+
+static void forget_frames(void)
+{
+    sent.length = received.length = 0;
+}
+
 /* Prints hex and words on one line, or below each other if the hex is long. */
 static void print_frame(uint8_t direction, const recording *kept)
 {
-    const mbm_framing rtu = {0};
     char words[160];
     size_t i;
 
@@ -55,7 +78,7 @@ static void print_frame(uint8_t direction, const recording *kept)
 /* Returns whether the last request was a read. The response to a write has no words. */
 static int was_read(void)
 {
-    uint8_t function = wire.sent.bytes[1];
+    uint8_t function = sent.bytes[1];
 
     return function <= 0x04 || function == 0x17;
 }
@@ -68,8 +91,9 @@ static void show(uint8_t status, uint8_t expected_status)
     uint8_t i;
 
     requests++;
-    print_frame(MBM_PACKET_REQUEST, &wire.sent);
-    print_frame(MBM_PACKET_RESPONSE, &wire.received);
+    mbm_trace_flush(&wire);
+    print_frame(MBM_PACKET_REQUEST, &sent);
+    print_frame(MBM_PACKET_RESPONSE, &received);
     printf("  result   %s", mbm_status_text(status));
     for (i = 0; i < words; i++)
         printf("%s0x%04X", i == 0 ? ": " : " ", mbm_master_getResponseBuffer(&node, i));
@@ -80,7 +104,7 @@ static void show(uint8_t status, uint8_t expected_status)
 /* Prints a call as a user would write it, then makes it. */
 #define REQUEST(call, expected_status)                                                             \
     do {                                                                                           \
-        recorder_clear(&wire);                                                                     \
+        forget_frames();                                                                           \
         printf("%s\n", #call);                                                                     \
         show(call, expected_status);                                                               \
     } while (0)
@@ -106,14 +130,15 @@ static int read_bits(const uint8_t *there, unsigned count)
 static void begin(void)
 {
     static mbm_tty tty;
-    static mbm_port port;
-    mbm_port over_tty;
+    mbm_port port;
 
     server_start(&device, UNIT);
     expect(mbm_tty_attach(&tty, device.line.ours) == 0, "a terminal");
-    over_tty = trace_client(mbm_tty_port(&tty), MBM_FRAMING_RTU, device.line.path);
-    port = recorder_port(&wire, &over_tty);
-    expect(mbm_master_beginRtu(&node, UNIT, &port) == MBM_OK, "begin");
+    port = trace_client(mbm_tty_port(&tty), MBM_FRAMING_RTU, device.line.path);
+    expect(mbm_trace_beginClient(&wire, &port, &rtu, incomplete, sizeof incomplete, keep, NULL) ==
+               MBM_OK,
+           "a trace");
+    expect(mbm_master_beginRtu(&node, UNIT, mbm_trace_port(&wire)) == MBM_OK, "begin");
     expect(mbm_master_setBuffers(&node, response, WORDS, transmit, WORDS, frame, sizeof frame) ==
                MBM_OK,
            "setBuffers");
@@ -177,7 +202,7 @@ static void without_waiting(void)
     uint8_t status;
 
     mbm_master_setBlocking(&node, 0);
-    recorder_clear(&wire);
+    forget_frames();
     printf("mbm_master_setBlocking(&node, 0), then mbm_master_readHoldingRegisters(&node, 0, 2)\n");
     status = mbm_master_readHoldingRegisters(&node, 0, 2);
     expect(status == MBM_PENDING, "pending at once");

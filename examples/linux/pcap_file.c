@@ -100,6 +100,16 @@ static int end_block(FILE *file, block *b)
     return fwrite(b->bytes, 1, b->length, file) == b->length && fflush(file) == 0 ? 0 : -1;
 }
 
+const char *pcap_fault(uint8_t status)
+{
+    switch (status) {
+    case MBM_INVALID_CRC: return "bad CRC";
+    case MBM_INCOMPLETE_FRAME: return "incomplete frame";
+    case MBM_BUFFER_TOO_SMALL: return "part of a frame";
+    default: return "no frame";
+    }
+}
+
 int pcap_start(FILE *file)
 {
     static const char application[] = "mbm " MBM_VERSION;
@@ -288,7 +298,7 @@ int pcap_write(FILE *file, pcap_link *link, const mbm_traceRecord *record, uint6
     memcpy(b.bytes + start - 4, &packet, sizeof packet);
     put_padding(&b);
     if (!is_valid) {
-        const char *const comment = mbm_status_text(record->status);
+        const char *const comment = pcap_fault(record->status);
 
         put_option(&b, OPTION_COMMENT, comment, strlen(comment));
         /* What follows does not continue these bytes. */

@@ -26,6 +26,9 @@ typedef struct pcap_link {
     uint32_t sequences[2]; /* of the client and of the server */
 } pcap_link;
 
+/* What is wrong with a record whose status is not MBM_OK, in words. */
+const char *pcap_fault(uint8_t status);
+
 /* Writes the start of a file. Returns 0, or -1 with errno set. */
 int pcap_start(FILE *file);
 

@@ -40,11 +40,11 @@ static void print_record(const traced *link, const mbm_traceRecord *record, cons
 {
     const time_t seconds = (time_t)(time / 1000000u);
     char clock[16];
-    struct tm local;
+    struct tm utc;
     uint16_t i;
 
-    localtime_r(&seconds, &local);
-    strftime(clock, sizeof clock, "%H:%M:%S", &local);
+    gmtime_r(&seconds, &utc);
+    strftime(clock, sizeof clock, "%H:%M:%S", &utc);
     fprintf(stderr, "%s.%06u  %s  %-8s  %s [", clock, (unsigned)(time % 1000000u), link->name,
             record->direction == MBM_TRACE_SENT ? "sent" : "received", words);
     for (i = 0; i < record->length; i++)
@@ -64,8 +64,7 @@ static void take(traced *link, const mbm_traceRecord *record, const mbm_event *e
         mbm_frame_text(&link->framing, record->kind, record->bytes, record->length, words,
                        sizeof words);
     else
-        snprintf(words, sizeof words, "%s, %u bytes", mbm_status_text(record->status),
-                 record->length);
+        snprintf(words, sizeof words, "%s, %u bytes", pcap_fault(record->status), record->length);
     if (is_printed)
         print_record(link, record, words, time);
     if (pcap)

@@ -12,7 +12,7 @@
 /* The description of both options, for a usage text. */
 #define TRACE_HELP                                                                                 \
     "tracing, of all programs:\n"                                                                  \
-    "  --trace          prints each frame in words and hexadecimal, to stderr\n"                   \
+    "  --trace          prints each frame in words and hexadecimal to stderr, times in UTC\n"      \
     "  --pcap FILE      writes each frame to a pcapng file: wireshark -o mbrtu.tcp.port:503 FILE\n"
 
 /* Takes both options out of the arguments. Ends the program if it cannot write the file. */

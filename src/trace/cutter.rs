@@ -126,13 +126,11 @@ impl Rules {
         match self.length(self.kind, bytes, observer) {
             Ok(Length::Exactly(length)) if length < bytes.len() => Status::MALFORMED_FRAME,
             Ok(Length::Exactly(length)) if length == bytes.len() => Status::INVALID_CRC,
-            Ok(Length::Silence | Length::Unknown)
-                if self.framing != Framing::Ascii && bytes.len() >= least =>
-            {
+            Ok(Length::Silence) if self.framing != Framing::Ascii && bytes.len() >= least => {
                 Status::INVALID_CRC
             }
+            Ok(Length::Unknown) | Err(_) => Status::MALFORMED_FRAME,
             Ok(_) => Status::INCOMPLETE_FRAME,
-            Err(_) => Status::MALFORMED_FRAME,
         }
     }
 }

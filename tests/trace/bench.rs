@@ -18,6 +18,7 @@ pub struct Wire {
     pub accepts: VecDeque<i16>,
     pub now: u32,
     pub is_lost: bool,
+    pub flushed: bool,
     pub calls: Vec<&'static str>,
 }
 
@@ -52,8 +53,9 @@ impl Port for TestPort {
     }
 
     fn flush(&mut self) -> bool {
-        self.0.borrow_mut().calls.push("flush");
-        false
+        let mut wire = self.0.borrow_mut();
+        wire.calls.push("flush");
+        wire.flushed
     }
 
     fn pre_transmission(&mut self) {

@@ -4,8 +4,10 @@ mod bench;
 mod properties;
 
 use bench::{frame, record, with_crc, Bench, Kept, Shared, TestPort, ALL, READ, REPLY};
+use mbm::engine::Buffers;
 use mbm::error::Status;
 use mbm::frame::{ascii, rtu, Framing};
+use mbm::master::Master;
 use mbm::packet::PduKind::{Request, Response};
 use mbm::pdu::custom::{Function, Rule};
 use mbm::port::Port;
@@ -334,6 +336,38 @@ fn the_other_functions_are_passed_on() {
     bench.wire.borrow_mut().now = 77;
     assert_eq!(bench.trace.micros(), 77);
     assert_eq!(bench.wire.borrow().calls, ["pre", "flush", "post"]);
+}
+
+#[test]
+fn a_master_sends_and_receives_through_a_trace() {
+    let Bench {
+        wire,
+        records,
+        trace,
+    } = Bench::new(Framing::Rtu, Request);
+    let buffers = Buffers::new([0; 256], [0; 8], [0; 8]);
+    let mut master = Master::new(17, trace, buffers);
+    assert_eq!(master.read_holding_registers(107, 3), Status::PENDING);
+    wire.borrow_mut().flushed = true;
+    let reply = frame(Framing::Rtu, REPLY);
+    while master.poll() == Status::PENDING {
+        wire.borrow_mut().now += 1_000;
+        if records.borrow().len() == 1 && wire.borrow().arriving.is_empty() {
+            wire.borrow_mut().arriving.extend(&reply);
+        }
+    }
+    assert_eq!(master.status(), Status::OK);
+    assert_eq!(master.response_word(0), 555);
+    let found = records.take();
+    let sent = record(
+        Sent,
+        Request,
+        Status::OK,
+        found[0].time,
+        &frame(Framing::Rtu, READ),
+    );
+    let received = record(Received, Response, Status::OK, found[1].time, &reply);
+    assert_eq!(found, [sent, received]);
 }
 
 #[test]

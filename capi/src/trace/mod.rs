@@ -302,7 +302,8 @@ fn code(result: Result<(), Status>) -> u8 {
 ///
 /// @param trace    the object; zero it before the first call
 /// @param port     is copied; its hooks read, write and micros are required. Its optional
-///                 hooks are passed on. It must not be the port of this trace
+///                 hooks are passed on. It must not be the port of this trace, nor
+///                 that of a trace that passes everything on to this one
 /// @param framing  the framing of the object that will use the port, and the declarations of
 ///                 your own functions, which must stay valid and unchanged. Without a
 ///                 declaration, the end of a received RTU frame is not known from its bytes

@@ -4,14 +4,13 @@ use super::check::{call, checked_call, is_status, refused_changes_nothing, span,
 use super::ports;
 use super::world::World;
 use mbm_c::*;
-use std::ffi::c_void;
 use std::ptr::null_mut;
 
 fn begin(w: &World, master: *mut mbm_master) {
     let slave = w.unit_id();
     let port = ports::port(w, MBM_FRAMING_RTU);
     // The context of any of the ports.
-    let context = usize::from(slave % 4) as *mut c_void;
+    let context = ports::context(port, slave);
     refused_changes_nothing(w, &[span(master)], "mbm_master_beginRtu", || {
         if slave & 4 == 0 {
             call!(w, master, mbm_master_beginRtu(master, slave, port))

@@ -25,6 +25,7 @@ mod server;
 mod serving;
 mod sniffer;
 mod text;
+mod trace;
 mod traffic;
 mod world;
 
@@ -39,6 +40,7 @@ fn step(w: &World) {
         10 | 11 => plan::step(w),
         12..=19 => server::step(w),
         20..=22 => sniffer::step(w),
+        23 if w.byte() & 1 == 0 => trace::step(w),
         23 => ring::step(w),
         24 | 25 => packet::step(w),
         26 | 27 => frame::step(w),

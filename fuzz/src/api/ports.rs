@@ -2,8 +2,8 @@
 
 use super::check::call;
 use super::port::Port;
-use super::traffic;
 use super::world::{Grant, World};
+use super::{trace, traffic};
 use mbm_c::{mbm_master, mbm_port};
 use std::ffi::c_void;
 
@@ -36,8 +36,26 @@ pub fn good(w: &World, index: usize, framing: u8) -> *const mbm_port {
     })
 }
 
-/// A port for an object of this framing; sometimes one that lacks a hook.
+/// A port for an object of this framing; sometimes that of a trace.
 pub fn port(w: &World, framing: u8) -> *const mbm_port {
+    if w.rarely(8) {
+        return trace::port(w);
+    }
+    plain(w, framing)
+}
+
+/// The context with which the hooks of a port may be called.
+pub fn context(port: *const mbm_port, index: u8) -> *mut c_void {
+    // SAFETY: NULL or a port.
+    match unsafe { port.as_ref() } {
+        // A trace, or the index of a port.
+        Some(port) if port.context as usize >= 4 => port.context,
+        _ => usize::from(index % 4) as *mut c_void,
+    }
+}
+
+/// A port for an object of this framing; sometimes one that lacks a hook.
+pub fn plain(w: &World, framing: u8) -> *const mbm_port {
     if w.rarely(64) {
         return std::ptr::null();
     }

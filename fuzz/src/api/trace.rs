@@ -1,0 +1,97 @@
+//! Traces, `mbm_trace_*`: before any port, and used by any object.
+
+use super::check::{bytes, call, is_status, refused_changes_nothing, span};
+use super::world::{Grant, World};
+use super::{packet, ports};
+use mbm_c::*;
+use std::ffi::c_void;
+use std::ptr::null_mut;
+
+/// The hook: looks at every byte of the record, and sometimes calls the API.
+unsafe extern "C" fn hook(_: *mut c_void, record: *const mbm_traceRecord) {
+    let w = World::current();
+    // SAFETY: the record that a trace hands out.
+    let record = unsafe { *record };
+    assert!(record.length > 0 && record.direction <= MBM_TRACE_SENT);
+    assert!(record.kind <= MBM_PACKET_RESPONSE);
+    is_status("a record", record.status);
+    assert_eq!(
+        bytes((record.bytes, record.length.into())).len(),
+        usize::from(record.length)
+    );
+    w.hook(Grant::Nothing, 64);
+}
+
+fn begin(w: &World, trace: *mut mbm_trace) {
+    let kind = w.byte();
+    let port = ports::plain(w, kind % 4);
+    let size = match w.byte() {
+        0..0x80 => 2 * MBM_MAX_ASCII_FRAME,
+        byte @ 0x80..0xC0 => u16::from(byte) % 64,
+        _ => w.word(),
+    };
+    let buffer = if w.rarely(64) {
+        null_mut()
+    } else {
+        w.buffer(size.into())
+    };
+    let (functions, count) = packet::functions(w);
+    let framing = w.put(mbm_framing {
+        functions,
+        functionCount: count,
+        kind: if kind >= 0xF0 { kind } else { kind % 4 },
+        delimiter: if w.rarely(8) { w.byte() } else { 0 },
+    });
+    let take = (!w.rarely(64)).then_some(hook as unsafe extern "C" fn(_, _));
+    let is_server = w.byte() & 1 != 0;
+    refused_changes_nothing(w, &[span(trace)], "mbm_trace_begin", || {
+        let context = null_mut();
+        if is_server {
+            call!(
+                w,
+                trace,
+                mbm_trace_beginServer(trace, port, framing, buffer, size, take, context)
+            )
+        } else {
+            call!(
+                w,
+                trace,
+                mbm_trace_beginClient(trace, port, framing, buffer, size, take, context)
+            )
+        }
+    });
+}
+
+/// The port of one of the traces; NULL if it was not begun, or while its hook runs.
+pub fn port(w: &World) -> *const mbm_port {
+    let trace = w.traces.pick(w);
+    call!(w, trace, mbm_trace_port(trace))
+}
+
+/// Makes calls with a trace.
+pub fn step(w: &World) {
+    let trace = w.traces.pick(w);
+    match w.byte() % 4 {
+        0 | 1 => begin(w, trace),
+        2 => {
+            let timeout = w.word();
+            refused_changes_nothing(w, &[span(trace)], "mbm_trace_setFrameTimeout", || {
+                call!(w, trace, mbm_trace_setFrameTimeout(trace, timeout))
+            });
+        }
+        _ => {
+            refused_changes_nothing(w, &[span(trace)], "mbm_trace_flush", || {
+                call!(w, trace, mbm_trace_flush(trace))
+            });
+        }
+    }
+    let event = w.events.any();
+    let record = w.unset::<mbm_traceRecord>();
+    let status = call!(w, event, mbm_trace_ofEvent(event, record));
+    if is_status("mbm_trace_ofEvent", status) == MBM_OK {
+        // SAFETY: the record of an event, whose memory is valid until the input has been run.
+        let record = unsafe { *record };
+        assert!(record.kind <= MBM_PACKET_RESPONSE && record.direction == MBM_TRACE_RECEIVED);
+        bytes((record.bytes, record.length.into()));
+    }
+}
