@@ -27,7 +27,8 @@ fn probes() -> Vec<(String, u64)> {
             mbm_service mbm_registerTable mbm_bitTable mbm_dataCallbacks mbm_file mbm_files mbm_fifo
             mbm_fifos mbm_exceptionStatus mbm_serverId mbm_identification mbm_request mbm_custom
             mbm_functionMask mbm_diagnostics mbm_sniffer mbm_event mbm_client mbm_clientRequest mbm_clientUnit mbm_linkHooks
-            mbm_turn;
+            mbm_turn mbm_gateway mbm_gatewayRoute mbm_gatewayLine mbm_gatewayConnection
+            mbm_gatewayRequest mbm_gatewayConfig;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
             mbm_counters { requests replies exceptions badCrc timeouts foreignFrames
@@ -37,6 +38,10 @@ fn probes() -> Vec<(String, u64)> {
             mbm_clientUnit { requests replies exceptions retries delayUs unit status }
             mbm_linkHooks { context disconnect connect }
             mbm_turn { master lastUse }
+            mbm_gatewayRoute { first last line unit }
+            mbm_gatewayLine { client context isReady inFlight }
+            mbm_gatewayConfig { routes lines connections requests requestCount routeCount lineCount
+                connectionCount }
             mbm_rule { kind bytes more }
             mbm_function { code request response }
             mbm_length { bytes kind }
@@ -109,7 +114,7 @@ fn probes() -> Vec<(String, u64)> {
             MBM_REPLY_EXCEPTION MBM_REPLY_NONE MBM_REPLY_PENDING MBM_EVENT_REQUEST MBM_EVENT_REPLY MBM_EVENT_EXCEPTION
             MBM_EVENT_UNPAIRED MBM_EVENT_TIMEOUT MBM_EVENT_BAD_CRC MBM_EVENT_NOISE MBM_DIRECTION_BOTH
             MBM_DIRECTION_CLIENT MBM_DIRECTION_SERVER MBM_MIN_SNIFFER_BUFFER MBM_MAX_SNIFFER_FUNCTIONS
-            MBM_MAX_SERVICES;
+            MBM_MAX_SERVICES MBM_GATEWAY_LOCAL MBM_GATEWAY_ALL_LINES;
     }
 }
 

@@ -44,18 +44,28 @@ pub struct Parts {
 }
 
 // SAFETY, of all functions here: begin requires arrays of the counts in the config, which
-// are valid for as long as the gateway is used; the core passes indexes below the counts. A
-// reference lives only until the core calls the next function of this trait.
+// are valid for as long as the gateway is used. An index that is too large becomes 0: if a
+// program lets two gateways use the same requests, one of them finds there what the other one
+// wrote. A reference lives only until the core calls the next function of this trait.
 impl Parts {
     fn request_at(&self, request: u16) -> *mut mbm_gatewayRequest {
+        let is_there = request < self.config.requestCount;
+        let request = if is_there { request } else { 0 };
         self.config.requests.wrapping_add(request.into())
     }
 
     fn connection_at(&self, connection: u8) -> *mut mbm_gatewayConnection {
+        let is_there = connection < self.config.connectionCount;
+        let connection = if is_there { connection } else { 0 };
         self.config.connections.wrapping_add(connection.into())
     }
 
     fn line_at(&self, line: u8) -> *mut mbm_gatewayLine {
+        let line = if line < self.config.lineCount {
+            line
+        } else {
+            0
+        };
         self.config.lines.wrapping_add(line.into())
     }
 
@@ -67,8 +77,9 @@ impl Parts {
     /// The bytes `from` to `until` of the frame of a request.
     fn bytes(&mut self, request: u16, from: u16, until: u16) -> &mut [u8] {
         let frame = mbm_gatewayRequest::frame(self.request_at(request));
-        debug_assert!(from <= until && until <= MBM_MAX_TCP_FRAME);
-        // SAFETY: see above; the core keeps `from` and `until` within the frame.
+        let from = from.min(MBM_MAX_TCP_FRAME);
+        let until = until.clamp(from, MBM_MAX_TCP_FRAME);
+        // SAFETY: see above.
         unsafe { from_raw_parts_mut(frame.add(from.into()), (until - from).into()) }
     }
 }
@@ -123,8 +134,14 @@ impl GatewayStorage for Parts {
     }
 
     fn now(&mut self, connection: u8) -> u32 {
-        // SAFETY: as for `read`.
-        unsafe { port::now(mbm_gatewayConnection::port(self.connection_at(connection))) }
+        let port = mbm_gatewayConnection::port(self.connection_at(connection));
+        // SAFETY: see above. The place is free if the program has zeroed it meanwhile.
+        unsafe {
+            match (*port).micros {
+                Some(_) => port::now(port),
+                None => 0,
+            }
+        }
     }
 
     fn poll_line(&mut self, line: u8) -> Status {
@@ -191,7 +208,9 @@ impl GatewayStorage for Parts {
         // SAFETY: see above. If the request is not pending any more, nothing happens.
         unsafe {
             let request = &raw mut (*self.request_at(request)).request;
-            mbm_client_cancel(self.client(line), request);
+            if line < self.config.lineCount {
+                mbm_client_cancel(self.client(line), request);
+            }
         }
     }
 

@@ -10,6 +10,7 @@ mod bits;
 mod check;
 mod client;
 mod frame;
+mod gateway;
 mod master;
 mod memory;
 mod packet;
@@ -35,7 +36,8 @@ fn step(w: &World) {
     match w.byte() % 32 {
         0..=4 => master::step(w),
         5..=11 => client::step(w),
-        12..=19 => server::step(w),
+        12..=17 => server::step(w),
+        18 | 19 => gateway::step(w),
         20..=22 => sniffer::step(w),
         23 => ring::step(w),
         24 | 25 => packet::step(w),

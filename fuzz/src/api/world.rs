@@ -53,6 +53,9 @@ pub struct World {
     pub lenders: RefCell<Vec<*mut mbm_client>>,
     pub requests: Pool<mbm_clientRequest>,
     pub servers: Pool<mbm_server>,
+    pub gateways: Pool<mbm_gateway>,
+    /// The configs of all gateways so far.
+    pub configs: RefCell<Vec<mbm_gatewayConfig>>,
     pub sniffers: Pool<mbm_sniffer>,
     pub rings: Pool<mbm_ring>,
     pub events: Pool<mbm_event>,
@@ -93,6 +96,8 @@ impl World {
             lenders: RefCell::default(),
             requests: Pool::new(),
             servers: Pool::new(),
+            gateways: Pool::new(),
+            configs: RefCell::default(),
             sniffers: Pool::new(),
             rings: Pool::new(),
             events: Pool::new(),
