@@ -133,12 +133,22 @@ impl<S: GatewayStorage> Gateway<S> {
             if state.stage == Stage::Free || state.connection != connection {
                 continue;
             }
-            if let Some(line) = state.line() {
+            if let Some(line) = state
+                .line()
+                .filter(|line| *line < self.storage.line_count())
+            {
                 self.storage.cancel(line, request);
             }
             self.storage.request(request).stage = Stage::Free;
         }
         self.storage.connection(connection).clear(false, status);
+    }
+
+    /// The connection of a request. It is checked: if the caller lets two gateways use the same
+    /// requests, one finds there what the other wrote.
+    pub(super) fn connection_of(&mut self, request: u16) -> u8 {
+        let last = self.storage.connection_count().saturating_sub(1);
+        self.storage.request(request).connection.min(last)
     }
 
     /// The next number in the order of requests and responses.
@@ -149,9 +159,8 @@ impl<S: GatewayStorage> Gateway<S> {
 
     /// Frees the place of a request.
     pub(super) fn release(&mut self, request: u16) {
-        let state = self.storage.request(request);
-        state.stage = Stage::Free;
-        let connection = state.connection;
+        self.storage.request(request).stage = Stage::Free;
+        let connection = self.connection_of(request);
         let state = self.storage.connection(connection);
         state.requests = state.requests.saturating_sub(1);
     }

@@ -56,7 +56,7 @@ impl<S: GatewayStorage> Gateway<S> {
     /// The place for the request that arrives on a connection.
     fn place(&mut self, connection: u8) -> Option<u16> {
         let receiving = self.storage.connection(connection).receiving;
-        if receiving != NONE {
+        if receiving < self.storage.request_count() {
             return Some(receiving);
         }
         if !self.may_have_more(connection) {
