@@ -309,6 +309,12 @@ clients: ## Build and check the client examples poll_table, scan and logger in b
 	@$(BUILD)/venv/bin/python scripts/check-clients $(BUILD)/plain
 	@$(BUILD)/venv/bin/python scripts/check-clients-lost $(BUILD)/plain
 
+.PHONY: gateway
+gateway: ## Show the gateway at work between pymodbus clients and devices of libmodbus and pymodbus
+	@scripts/need python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
+	@$(MAKE) --no-print-directory venv $(BUILD)/plain/linux/gateway $(PEERS)
+	@$(BUILD)/venv/bin/python scripts/check-gateway $(BUILD)/plain
+
 .PHONY: demo
 demo: ## Show every function against a libmodbus server, frame by frame
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev
