@@ -3281,7 +3281,8 @@ typedef struct mbm_gatewayLine {
     /**
      * The client of the line, in any framing. Begin it before the gateway, with a frame
      * buffer that holds every frame. Its settings hold: response timeout, retries, quiet
-     * time. You may send requests of your own with it.
+     * time. You may send requests of your own with it. Do not replace it by another client
+     * while the gateway has open connections.
      */
     struct mbm_client *client;
     /**

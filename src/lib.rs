@@ -216,7 +216,7 @@
 //! A module uses only modules to its left:
 //!
 //! ```text
-//! bytes -> frame -> pdu -> packet -> explain -> {sniffer, engine} -> {master, client, server}
+//! bytes -> frame -> pdu -> packet -> explain -> {sniffer, engine} -> {master, client, server, gateway}
 //! ```
 //!
 //! Each of them may use `atomic`, `error`, `time`, `port`, `ring` and `data`. `make check`
