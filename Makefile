@@ -318,6 +318,12 @@ trace: ## Compare what the examples print with --trace with what tshark reads in
 		$(patsubst %,$(BUILD)/plain/linux/%,basic custom_command gateway)
 	@$(BUILD)/venv/bin/python scripts/check-trace $(BUILD)/plain
 
+.PHONY: gateway
+gateway: ## Show the gateway at work between pymodbus clients and devices of libmodbus and pymodbus
+	@scripts/need python3 python3-venv gcc libc6-dev pkg-config libmodbus-dev
+	@$(MAKE) --no-print-directory venv $(BUILD)/plain/linux/gateway $(PEERS)
+	@$(BUILD)/venv/bin/python scripts/check-gateway $(BUILD)/plain
+
 .PHONY: demo
 demo: ## Show every function against a libmodbus server, frame by frame, and a plan at work
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev python3

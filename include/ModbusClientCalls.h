@@ -31,6 +31,8 @@
  * postTransmission makes the call. Addresses are those on the wire, from 0.
  */
 class ModbusClient {
+    template <typename, uint8_t, uint16_t> friend class ModbusTcpGateway;
+
 public:
     ModbusClient(const ModbusClient &) = delete;
     ModbusClient &operator=(const ModbusClient &) = delete;

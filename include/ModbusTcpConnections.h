@@ -30,11 +30,10 @@
 /** @endcond */
 
 /**
- * Up to `Connections` connections of a `Listener`, each with a server and a frame buffer.
- * `Derived` says what a connection serves.
+ * Up to `Connections` connections of a `Listener`. `Derived` serves them: `opened` begins with
+ * the port of a connection, `isServed` continues, `closed` ends.
  */
-template <typename Derived, typename Listener, uint8_t Connections, uint16_t FrameBytes>
-class ModbusTcpConnections {
+template <typename Derived, typename Listener, uint8_t Connections> class ModbusTcpConnections {
 public:
     ModbusTcpConnections(const ModbusTcpConnections &) = delete;
     ModbusTcpConnections &operator=(const ModbusTcpConnections &) = delete;
@@ -64,7 +63,7 @@ protected:
         source = &server;
     }
 
-    // Polls the server of each connection, and accepts a new one.
+    // Continues each connection, and accepts a new one.
     uint8_t pollAll()
     {
         if (source == nullptr)
@@ -75,8 +74,7 @@ protected:
         for (uint8_t i = 0; i < Connections; i++) {
             if (!places[i].taken)
                 continue;
-            const uint8_t status = mbm_server_poll(&places[i].server);
-            if (status == MBM_LINK_LOST || status == MBM_MALFORMED_FRAME)
+            if (!derived().isServed(i))
                 close(i);
         }
         acceptNext(0);
@@ -99,13 +97,12 @@ private:
         Link link;
         uint32_t used; // milliseconds: when the last bytes were received
         bool taken;
-        mbm_server server;
-        uint8_t frame[FrameBytes];
     };
 
     Listener *source;
     Place places[Connections];
 
+    Derived &derived() { return *static_cast<Derived *>(this); }
     static uint32_t clock() { return millis() & 0xFFFFFFFFu; }
 
     void close(uint8_t index)
@@ -114,7 +111,7 @@ private:
         place.link.stop();
         place.link = Link();
         place.taken = false;
-        static_cast<Derived *>(this)->closed(index);
+        derived().closed(index);
     }
 
     // accept returns each connection once. If a library lacks it, available returns each
@@ -165,13 +162,9 @@ private:
     {
         Place &place = places[index];
         const mbm_port port = modbusPort(&place, readHook, writeHook, clockHook);
-        uint8_t count = 1;
-        mbm_unit *units = static_cast<Derived *>(this)->unitsOf(index, count);
-        place.server = mbm_server();
         place.link = link;
         place.used = now;
-        place.taken = mbm_server_beginTcp(&place.server, &port, units, count, place.frame,
-                                          FrameBytes) == MBM_OK;
+        place.taken = derived().opened(index, port);
     }
 
     static int16_t readHook(void *context, uint8_t *bytes, uint16_t capacity)

@@ -52,11 +52,10 @@
 template <typename Listener, uint8_t Connections = MODBUSSERVER_CONNECTIONS>
 class ModbusTcpServer
     : public ModbusUnit,
-      public ModbusTcpConnections<ModbusTcpServer<Listener, Connections>, Listener, Connections,
-                                  MBM_MAX_TCP_FRAME> {
+      public ModbusTcpConnections<ModbusTcpServer<Listener, Connections>, Listener, Connections> {
 public:
     /** Uses neither clock nor network. */
-    ModbusTcpServer() : first(), count() {}
+    ModbusTcpServer() : first(), count(), servers() {}
 
     /**
      * Answers the clients of a listener as unit `id`. The sketch calls the listener's begin,
@@ -92,10 +91,16 @@ public:
     uint8_t poll() { return this->pollAll(); }
 
 private:
-    template <typename, typename, uint8_t, uint16_t> friend class ModbusTcpConnections;
+    template <typename, typename, uint8_t> friend class ModbusTcpConnections;
+
+    struct Server {
+        mbm_server server;
+        uint8_t frame[MBM_MAX_TCP_FRAME];
+    };
 
     ModbusUnit *first;
     uint8_t count;
+    Server servers[Connections];
 
     uint8_t serve(ModbusUnit &units, uint8_t quantity, Listener &listener)
     {
@@ -107,10 +112,17 @@ private:
         return MBM_OK;
     }
 
-    mbm_unit *unitsOf(uint8_t, uint8_t &quantity)
+    bool opened(uint8_t index, const mbm_port &port)
     {
-        quantity = count;
-        return &first->unit;
+        Server &place = servers[index];
+        place.server = mbm_server();
+        return mbm_server_beginTcp(&place.server, &port, &first->unit, count, place.frame,
+                                   MBM_MAX_TCP_FRAME) == MBM_OK;
+    }
+    bool isServed(uint8_t index)
+    {
+        const uint8_t status = mbm_server_poll(&servers[index].server);
+        return status != MBM_LINK_LOST && status != MBM_MALFORMED_FRAME;
     }
     void closed(uint8_t) {}
 };

@@ -15,6 +15,6 @@
         assert_memory_equal(before, &(object), sizeof(object));                                    \
     } while (0)
 
-static uint8_t before[8192];
+static uint8_t before[32768];
 
 #endif

@@ -28,7 +28,9 @@ fn probes() -> Vec<(String, u64)> {
             mbm_fifos mbm_access mbm_accessHooks mbm_recordHooks mbm_exceptionStatus mbm_serverId mbm_serverIdentification mbm_request mbm_custom
             mbm_functionMask mbm_diagnostics mbm_sniffer mbm_event mbm_client mbm_clientRequest mbm_clientUnit mbm_linkHooks
             mbm_turn mbm_plan mbm_planPosition mbm_planRead mbm_planSetup mbm_planUnitLimits
-            mbm_planExcludedRange mbm_planReadInfo mbm_planField mbm_trace mbm_traceRecord;
+            mbm_planExcludedRange mbm_planReadInfo mbm_planField mbm_trace mbm_traceRecord
+            mbm_gateway mbm_gatewayRoute mbm_gatewayLine mbm_gatewayConnection mbm_gatewayRequest
+            mbm_gatewayConfig;
         offsets:
             mbm_port { context read write micros flush preTransmission postTransmission idle }
             mbm_counters { requests replies exceptions badCrc timeouts foreignFrames
@@ -45,6 +47,10 @@ fn probes() -> Vec<(String, u64)> {
                 backoffMs longestBackoffMs fieldCount readCount dataWords bitsPerRead bitGap
                 registersPerRead registerGap requestCount unitCount excludedCount }
             mbm_traceRecord { bytes timeUs length direction kind status }
+            mbm_gatewayRoute { first last line unit }
+            mbm_gatewayLine { client context isReady inFlight }
+            mbm_gatewayConfig { routes lines connections requests requestCount routeCount lineCount
+                connectionCount }
             mbm_rule { kind bytes more }
             mbm_function { code request response }
             mbm_length { bytes kind }
@@ -124,7 +130,8 @@ fn probes() -> Vec<(String, u64)> {
             MBM_TABLE_HOLDING_REGISTERS MBM_TABLE_INPUT_REGISTERS MBM_TYPE_BIT MBM_TYPE_UINT16
             MBM_TYPE_INT16 MBM_TYPE_UINT32 MBM_TYPE_INT32 MBM_TYPE_UINT64 MBM_TYPE_INT64
             MBM_TYPE_FLOAT MBM_TYPE_DOUBLE MBM_TYPE_TEXT MBM_PLAN_LONGEST_INTERVAL
-            MBM_PLAN_MAX_FIELDS MBM_TRACE_RECEIVED MBM_TRACE_SENT MBM_MIN_TRACE_BUFFER;
+            MBM_PLAN_MAX_FIELDS MBM_TRACE_RECEIVED MBM_TRACE_SENT MBM_MIN_TRACE_BUFFER
+            MBM_GATEWAY_LOCAL MBM_GATEWAY_ALL_LINES;
     }
 }
 

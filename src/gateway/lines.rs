@@ -1,7 +1,7 @@
 //! Requests wait for their line, go to it, and end there.
 
 use super::object::{Gateway, PATH_UNAVAILABLE, TARGET_FAILED};
-use super::state::{Stage, Transaction};
+use super::state::Stage;
 use super::storage::{GatewayStorage, Outcome};
 use crate::error::Status;
 use crate::frame::tcp;
@@ -120,7 +120,7 @@ impl<S: GatewayStorage> Gateway<S> {
             if state.stage != Stage::Queued {
                 continue;
             }
-            if self.queue_time != 0 && self.left_in_queue(&state) == 0 {
+            if self.queue_time != 0 && self.left_in_queue(request) == 0 {
                 self.give_back(request);
                 continue;
             }
@@ -142,8 +142,10 @@ impl<S: GatewayStorage> Gateway<S> {
     }
 
     /// Microseconds for which a request may still wait for its line.
-    pub(super) fn left_in_queue(&mut self, state: &Transaction) -> u32 {
-        let now = self.storage.now(state.connection);
-        self.queue_time.saturating_sub(elapsed(now, state.since))
+    pub(super) fn left_in_queue(&mut self, request: u16) -> u32 {
+        let connection = self.connection_of(request);
+        let now = self.storage.now(connection);
+        let since = self.storage.request(request).since;
+        self.queue_time.saturating_sub(elapsed(now, since))
     }
 }

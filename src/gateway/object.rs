@@ -49,7 +49,7 @@ impl<S: GatewayStorage> Gateway<S> {
         }
         for connection in 0..self.storage.connection_count() {
             let state = self.storage.connection(connection);
-            state.clear(Status::NOT_INITIALISED);
+            state.clear(false, Status::OK);
         }
         for line in 0..self.storage.line_count() {
             *self.storage.line(line) = LineState::NEW;
@@ -78,25 +78,31 @@ impl<S: GatewayStorage> Gateway<S> {
 
     /// Serves the connection that the storage has at this place from now on.
     pub fn open(&mut self, connection: u8) {
-        self.storage.connection(connection).clear(Status::OK);
+        self.storage.connection(connection).clear(true, Status::OK);
     }
 
     /// Gives up a connection and its requests. Its place is free then.
     pub fn close(&mut self, connection: u8) {
-        self.lose(connection, Status::NOT_INITIALISED);
+        self.lose(connection, Status::OK);
     }
 
     /// [`Status::OK`] while the connection is open; [`Status::LINK_LOST`] or
     /// [`Status::MALFORMED_FRAME`] if the gateway has given it up;
     /// [`Status::NOT_INITIALISED`] for a free place.
     pub fn status(&mut self, connection: u8) -> Status {
-        self.storage.connection(connection).status
+        let state = self.storage.connection(connection);
+        match state.end {
+            _ if state.is_open => Status::OK,
+            Status::OK => Status::NOT_INITIALISED,
+            lost => lost,
+        }
     }
 
     /// How many requests of a connection are complete and not answered yet.
     pub fn pending(&mut self, connection: u8) -> u16 {
         let state = self.storage.connection(connection);
-        state.requests - u16::from(state.receiving != NONE)
+        let receiving = u16::from(state.receiving != NONE);
+        state.requests.saturating_sub(receiving)
     }
 
     /// True if the next poll reads bytes from a connection. Otherwise it has as many requests
@@ -119,19 +125,30 @@ impl<S: GatewayStorage> Gateway<S> {
         own < self.most && free > 0 && (own == 0 || free > kept)
     }
 
-    /// Gives up a connection and its requests. Its status becomes `status`.
+    /// Gives up a connection and its requests. `status` says why, [`Status::OK`] if the caller
+    /// wants it.
     pub(super) fn lose(&mut self, connection: u8, status: Status) {
         for request in 0..self.storage.request_count() {
             let state = *self.storage.request(request);
             if state.stage == Stage::Free || state.connection != connection {
                 continue;
             }
-            if let Some(line) = state.line() {
+            if let Some(line) = state
+                .line()
+                .filter(|line| *line < self.storage.line_count())
+            {
                 self.storage.cancel(line, request);
             }
             self.storage.request(request).stage = Stage::Free;
         }
-        self.storage.connection(connection).clear(status);
+        self.storage.connection(connection).clear(false, status);
+    }
+
+    /// The connection of a request. It is checked: if the caller lets two gateways use the same
+    /// requests, one finds there what the other wrote.
+    pub(super) fn connection_of(&mut self, request: u16) -> u8 {
+        let last = self.storage.connection_count().saturating_sub(1);
+        self.storage.request(request).connection.min(last)
     }
 
     /// The next number in the order of requests and responses.
@@ -142,9 +159,8 @@ impl<S: GatewayStorage> Gateway<S> {
 
     /// Frees the place of a request.
     pub(super) fn release(&mut self, request: u16) {
-        let state = self.storage.request(request);
-        state.stage = Stage::Free;
-        let connection = state.connection;
+        self.storage.request(request).stage = Stage::Free;
+        let connection = self.connection_of(request);
         let state = self.storage.connection(connection);
         state.requests = state.requests.saturating_sub(1);
     }

@@ -47,14 +47,16 @@ impl<S: GatewayStorage> Gateway<S> {
             delay = delay.min(self.storage.line_delay(line));
         }
         for request in 0..self.storage.request_count() {
-            let state = *self.storage.request(request);
-            let own = match state.stage {
+            let own = match self.storage.request(request).stage {
                 Stage::Local => EXTERNAL_POLL_DELAY,
-                Stage::Answered if self.storage.connection(state.connection).is_blocked => {
-                    EXTERNAL_POLL_DELAY
+                Stage::Answered => {
+                    let connection = self.connection_of(request);
+                    match self.storage.connection(connection).is_blocked {
+                        true => EXTERNAL_POLL_DELAY,
+                        false => 0,
+                    }
                 }
-                Stage::Answered => 0,
-                Stage::Queued if self.queue_time != 0 => self.left_in_queue(&state),
+                Stage::Queued if self.queue_time != 0 => self.left_in_queue(request),
                 _ => u32::MAX,
             };
             delay = delay.min(own);

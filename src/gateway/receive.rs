@@ -7,15 +7,22 @@ use super::storage::GatewayStorage;
 use crate::error::Status;
 use crate::frame::tcp;
 
+/// Most reads of a connection in one poll, so that a client whose requests need no response
+/// does not hold up the others.
+const MOST_READS: u8 = 64;
+
 /// Bytes of the shortest frame. The gateway reads them first, and then up to the end of the
 /// frame, so that no bytes of the next frame arrive.
 const SHORTEST: u16 = tcp::PDU as u16 + 1;
 
 impl<S: GatewayStorage> Gateway<S> {
-    /// Reads requests from a connection, until it has no more bytes or no place for them.
+    /// Reads requests from an open connection, until it has no more bytes or no place for them.
     pub(super) fn receive(&mut self, connection: u8) {
         self.storage.connection(connection).is_held = false;
-        while self.storage.connection(connection).is_open() {
+        for _ in 0..MOST_READS {
+            if !self.storage.connection(connection).is_open() {
+                return;
+            }
             let Some(request) = self.place(connection) else {
                 self.storage.connection(connection).is_held = true;
                 return;
@@ -49,7 +56,7 @@ impl<S: GatewayStorage> Gateway<S> {
     /// The place for the request that arrives on a connection.
     fn place(&mut self, connection: u8) -> Option<u16> {
         let receiving = self.storage.connection(connection).receiving;
-        if receiving != NONE {
+        if receiving < self.storage.request_count() {
             return Some(receiving);
         }
         if !self.may_have_more(connection) {
@@ -63,7 +70,7 @@ impl<S: GatewayStorage> Gateway<S> {
                 state.length = 0;
                 let state = self.storage.connection(connection);
                 state.receiving = request;
-                state.requests += 1;
+                state.requests = state.requests.saturating_add(1);
                 return Some(request);
             }
         }

@@ -33,7 +33,7 @@ impl<S: GatewayStorage> Gateway<S> {
     /// one that was known first.
     fn next_response(&mut self, connection: u8) -> Option<u16> {
         let sending = self.storage.connection(connection).sending;
-        if sending != NONE {
+        if sending < self.storage.request_count() {
             return Some(sending);
         }
         let mut found: Option<(u32, u16)> = None;

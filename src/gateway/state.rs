@@ -71,8 +71,10 @@ impl Transaction {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct ConnectionState {
-    /// [`Status::OK`] while it is open; [`Status::NOT_INITIALISED`] for a free place.
-    pub(super) status: Status,
+    /// The gateway reads and writes it.
+    pub(super) is_open: bool,
+    /// Why it is not open any more, or [`Status::OK`].
+    pub(super) end: Status,
     /// It accepted fewer bytes than were to be sent.
     pub(super) is_blocked: bool,
     /// It was not read, because there was no place for another request.
@@ -88,7 +90,8 @@ pub struct ConnectionState {
 impl ConnectionState {
     /// A free place.
     pub const FREE: ConnectionState = ConnectionState {
-        status: Status::NOT_INITIALISED,
+        is_open: false,
+        end: Status::OK,
         is_blocked: false,
         is_held: false,
         receiving: NONE,
@@ -98,13 +101,14 @@ impl ConnectionState {
 
     /// True while the gateway reads and writes it.
     pub fn is_open(&self) -> bool {
-        self.status == Status::OK
+        self.is_open
     }
 
     /// Forgets its requests. (Field by field: the assignment of the whole struct calls memcpy,
     /// which most firmware does not need otherwise.)
-    pub(super) fn clear(&mut self, status: Status) {
-        self.status = status;
+    pub(super) fn clear(&mut self, is_open: bool, end: Status) {
+        self.is_open = is_open;
+        self.end = end;
         self.is_blocked = false;
         self.is_held = false;
         self.receiving = NONE;

@@ -44,7 +44,8 @@ pub struct mbm_gatewayRoute {
 pub struct mbm_gatewayLine {
     /// The client of the line, in any framing. Begin it before the gateway, with a frame
     /// buffer that holds every frame. Its settings hold: response timeout, retries, quiet
-    /// time. You may send requests of your own with it.
+    /// time. You may send requests of your own with it. Do not replace it by another client
+    /// while the gateway has open connections.
     pub client: *mut mbm_client,
     /// Your pointer, passed to `isReady`; may be NULL.
     pub context: *mut c_void,

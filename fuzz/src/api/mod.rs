@@ -10,6 +10,7 @@ mod bits;
 mod check;
 mod client;
 mod frame;
+mod gateway;
 mod master;
 mod memory;
 mod packet;
@@ -38,7 +39,8 @@ fn step(w: &World) {
         0..=4 => master::step(w),
         5..=9 => client::step(w),
         10 | 11 => plan::step(w),
-        12..=19 => server::step(w),
+        12..=17 => server::step(w),
+        18 | 19 => gateway::step(w),
         20..=22 => sniffer::step(w),
         23 if w.byte() & 1 == 0 => trace::step(w),
         23 => ring::step(w),

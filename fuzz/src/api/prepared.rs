@@ -3,6 +3,7 @@
 
 use super::check::call;
 use super::plan;
+use super::gateway;
 use super::ports;
 use super::records;
 use super::sniffer;
@@ -24,6 +25,10 @@ pub fn prepare(w: &World) {
     }
     if what & 4 == 0 {
         server(w, what >> 6);
+    }
+    if what & 0x12 == 0 {
+        let gateway = w.gateways.make(w);
+        gateway::begin(w, gateway);
     }
     if what & 8 == 0 {
         let sniffer = w.sniffers.make(w);

@@ -54,6 +54,9 @@ pub struct World {
     pub lenders: RefCell<Vec<*mut mbm_client>>,
     pub requests: Pool<mbm_clientRequest>,
     pub servers: Pool<mbm_server>,
+    pub gateways: Pool<mbm_gateway>,
+    /// The configs of all gateways so far.
+    pub configs: RefCell<Vec<mbm_gatewayConfig>>,
     pub sniffers: Pool<mbm_sniffer>,
     pub rings: Pool<mbm_ring>,
     pub traces: Pool<mbm_trace>,
@@ -96,6 +99,8 @@ impl World {
             lenders: RefCell::default(),
             requests: Pool::new(),
             servers: Pool::new(),
+            gateways: Pool::new(),
+            configs: RefCell::default(),
             sniffers: Pool::new(),
             rings: Pool::new(),
             traces: Pool::new(),

@@ -1,0 +1,416 @@
+/* A gateway that is begun wrongly, begun again, and called from within hooks. */
+#include "gateway_bench.h"
+#include "test.h"
+
+#include <string.h>
+
+#include "refused.h"
+
+static gateway_bench b;
+
+static const mbm_gatewayRoute routes[] = {
+    {1, 31, 0, 0}, {101, 131, 1, 1}, {200, 200, MBM_GATEWAY_LOCAL, 0}};
+
+#define READ "\x03\x00\x10\x00\x01"
+#define VALUE "\x03\x02\x12\x34"
+#define OTHER_VALUE "\x03\x02\xAB\xCD"
+
+static int start(void **state)
+{
+    (void)state;
+    gateway_bench_start(&b, routes, COUNT(routes));
+    return 0;
+}
+
+/* --- refused --- */
+
+static void refuses_config(uint8_t status, mbm_gatewayConfig config)
+{
+    mbm_gateway other = {0};
+
+    REFUSED(status, b.gateway, mbm_gateway_begin(&b.gateway, &config));
+    IS(status, mbm_gateway_begin(&other, &config));
+    IS(MBM_NOT_INITIALISED, mbm_gateway_poll(&other));
+}
+
+static void a_gateway_goes_on_after_a_refused_begin(void **state)
+{
+    static const mbm_gatewayRoute bad[] = {{2, 1, 0, 0},
+                                           {1, 1, 2, 0},
+                                           {1, 11, 0, 246},
+                                           {0, 1, MBM_GATEWAY_ALL_LINES, 0},
+                                           {1, 1, MBM_GATEWAY_ALL_LINES, 0},
+                                           {0, 0, MBM_GATEWAY_ALL_LINES, 1}};
+    static mbm_client none;
+    mbm_gatewayLine line = {0};
+    mbm_gatewayConfig config;
+    unsigned i;
+
+    (void)state;
+    ASK(0, 1, 2, READ);
+    ON_LINE(0, 2, READ);
+    REFUSED(MBM_INVALID_ARGUMENT, b.gateway, mbm_gateway_begin(&b.gateway, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_gateway_begin(NULL, &b.config));
+#define REFUSES(status, field, value)                                                              \
+    config = b.config;                                                                             \
+    config.field = value;                                                                          \
+    refuses_config(status, config)
+    REFUSES(MBM_INVALID_ARGUMENT, routes, NULL);
+    REFUSES(MBM_INVALID_ARGUMENT, lines, NULL);
+    REFUSES(MBM_INVALID_ARGUMENT, connections, NULL);
+    REFUSES(MBM_INVALID_ARGUMENT, requests, NULL);
+    REFUSES(MBM_INVALID_ARGUMENT, routeCount, 0);
+    REFUSES(MBM_INVALID_ARGUMENT, connectionCount, 0);
+    REFUSES(MBM_INVALID_ARGUMENT, requestCount, BENCH_CONNECTIONS - 1);
+    REFUSES(MBM_INVALID_ARGUMENT, requestCount, 65535);
+    REFUSES(MBM_INVALID_ARGUMENT, lineCount, 254);
+    REFUSES(MBM_INVALID_ARGUMENT, lineCount, 1); /* a route leads to line 1 */
+    for (i = 0; i < COUNT(bad); i++) {
+        config = b.config;
+        config.routeCount = 1;
+        REFUSES(MBM_INVALID_ARGUMENT, routes, &bad[i]);
+    }
+    config = b.config;
+    config.lines = &line;
+    config.lineCount = config.routeCount = 1;
+    refuses_config(MBM_INVALID_ARGUMENT, config); /* no client */
+    line.client = &none;
+    refuses_config(MBM_NOT_INITIALISED, config);
+    /* The request is still under way. */
+    REPLY(0, 2, VALUE);
+    EXPECT(0, 1, 2, VALUE);
+}
+
+static void a_refused_call_changes_nothing(void **state)
+{
+    static const mbm_function bad[] = {{0x41, {0}, {0}}, {128, {0}, {0}}};
+    mbm_port port = memory_port_of(&b.sockets[0]), deaf = port;
+
+    (void)state;
+    deaf.read = NULL;
+    OK(mbm_gateway_close(&b.gateway, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_open(&b.gateway, 1, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_open(&b.gateway, 1, &deaf));
+    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_open(&b.gateway, BENCH_CONNECTIONS, &port));
+    REFUSED(MBM_BUSY, b, mbm_gateway_open(&b.gateway, 0, &port));
+    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_close(&b.gateway, BENCH_CONNECTIONS));
+    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_setInFlight(&b.gateway, 0));
+    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_serveUnits(&b.gateway, NULL, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_setFunctions(&b.gateway, NULL, 1));
+    REFUSED(MBM_INVALID_ARGUMENT, b, mbm_gateway_setFunctions(&b.gateway, bad, COUNT(bad)));
+    assert_int_equal(mbm_gateway_pending(&b.gateway, 250), 0);
+    assert_int_equal(mbm_gateway_isReading(&b.gateway, 250), 0);
+}
+
+static void an_object_that_was_never_begun_does_nothing(void **state)
+{
+    static mbm_gateway none;
+    const mbm_port port = memory_port_of(&b.sockets[0]);
+
+    (void)state;
+    IS(MBM_NOT_INITIALISED, mbm_gateway_poll(&none));
+    IS(MBM_INVALID_ARGUMENT, mbm_gateway_poll(NULL));
+    IS(MBM_NOT_INITIALISED, mbm_gateway_open(&none, 0, &port));
+    IS(MBM_NOT_INITIALISED, mbm_gateway_close(&none, 0));
+    IS(MBM_NOT_INITIALISED, mbm_gateway_status(&none, 0));
+    IS(MBM_INVALID_ARGUMENT, mbm_gateway_status(NULL, 0));
+    IS(MBM_NOT_INITIALISED, mbm_gateway_setInFlight(&none, 1));
+    IS(MBM_NOT_INITIALISED, mbm_gateway_setQueueTime(&none, 1));
+    IS(MBM_NOT_INITIALISED, mbm_gateway_serveUnits(&none, NULL, 0));
+    IS(MBM_NOT_INITIALISED, mbm_gateway_setFunctions(&none, NULL, 0));
+    assert_int_equal(mbm_gateway_pollDelay(&none), UINT32_MAX);
+    assert_int_equal(mbm_gateway_pollDelay(NULL), UINT32_MAX);
+    assert_int_equal(mbm_gateway_pending(&none, 0), 0);
+    assert_int_equal(mbm_gateway_isReading(&none, 0), 0);
+    assert_int_equal(mbm_gateway_inFlight(&none), 0);
+    assert_int_equal(mbm_gateway_queueTime(&none), 0);
+}
+
+/* --- begin again --- */
+
+static void begin_again_gives_up_all_connections_and_requests(void **state)
+{
+    (void)state;
+    OK(mbm_gateway_setInFlight(&b.gateway, 2));
+    OK(mbm_gateway_setQueueTime(&b.gateway, 20));
+    ASK(0, 1, 2, READ);
+    ASK(0, 2, 2, READ);
+    ASK(1, 1, 102, READ);
+    ON_LINE(0, 2, READ);
+    ON_LINE(1, 2, READ);
+    OK(mbm_gateway_begin(&b.gateway, &b.config));
+    assert_int_equal(mbm_client_pending(&b.clients[0]), 0);
+    assert_int_equal(mbm_client_pending(&b.clients[1]), 0);
+    assert_int_equal(mbm_gateway_inFlight(&b.gateway), 65535);
+    assert_int_equal(mbm_gateway_queueTime(&b.gateway), 0);
+    IS(MBM_NOT_INITIALISED, mbm_gateway_status(&b.gateway, 0));
+    assert_int_equal(mbm_gateway_pollDelay(&b.gateway), UINT32_MAX);
+    gateway_bench_open(&b, 0);
+    ASK(0, 3, 2, "\x03\x00\x20\x00\x01");
+    ON_LINE(0, 2, "\x03\x00\x20\x00\x01");
+    REPLY(0, 2, VALUE); /* late, to the request that was given up */
+    REPLY(0, 2, OTHER_VALUE);
+    EXPECT(0, 3, 2, OTHER_VALUE);
+}
+
+static void begin_again_with_other_parts_works(void **state)
+{
+    static mbm_gatewayConnection connections[2];
+    static mbm_gatewayRequest requests[2];
+    static mbm_gatewayLine line;
+    static const mbm_gatewayRoute route[] = {{9, 9, 0, 0}};
+    const mbm_gatewayConfig config = {.routes = route,
+                                      .routeCount = 1,
+                                      .lines = &line,
+                                      .lineCount = 1,
+                                      .connections = connections,
+                                      .connectionCount = 2,
+                                      .requests = requests,
+                                      .requestCount = 2};
+
+    (void)state;
+    ASK(0, 1, 2, READ);
+    ON_LINE(0, 2, READ);
+    line.client = &b.clients[1];
+    OK(mbm_gateway_begin(&b.gateway, &config));
+    assert_int_equal(mbm_client_pending(&b.clients[0]), 0);
+    memset(b.requests, 0xFF, sizeof b.requests); /* not the gateway's any more */
+    memset(b.connections, 0xFF, sizeof b.connections);
+    gateway_bench_open(&b, 1);
+    ASK(1, 1, 9, READ);
+    ON_LINE(1, 9, READ);
+    REPLY(1, 9, VALUE);
+    EXPECT(1, 1, 9, VALUE);
+}
+
+/* --- calls from within hooks --- */
+
+static unsigned entered;
+static mbm_port inner; /* the hooks that do the work */
+
+static void every_call_is_busy(void)
+{
+    static mbm_unit unit;
+    const mbm_port port = memory_port_of(&b.sockets[1]);
+
+    entered++;
+    REFUSED(MBM_BUSY, b.gateway, mbm_gateway_begin(&b.gateway, &b.config));
+    IS(MBM_BUSY, mbm_gateway_poll(&b.gateway));
+    assert_int_equal(mbm_gateway_pollDelay(&b.gateway), 0);
+    IS(MBM_BUSY, mbm_gateway_open(&b.gateway, 1, &port));
+    IS(MBM_BUSY, mbm_gateway_close(&b.gateway, 0));
+    IS(MBM_BUSY, mbm_gateway_close(&b.gateway, 1));
+    IS(MBM_BUSY, mbm_gateway_status(&b.gateway, 0));
+    assert_int_equal(mbm_gateway_pending(&b.gateway, 0), 0);
+    assert_int_equal(mbm_gateway_isReading(&b.gateway, 0), 0);
+    IS(MBM_BUSY, mbm_gateway_setInFlight(&b.gateway, 1));
+    assert_int_equal(mbm_gateway_inFlight(&b.gateway), 0);
+    IS(MBM_BUSY, mbm_gateway_setQueueTime(&b.gateway, 1));
+    assert_int_equal(mbm_gateway_queueTime(&b.gateway), 0);
+    IS(MBM_BUSY, mbm_gateway_serveUnits(&b.gateway, &unit, 1));
+    IS(MBM_BUSY, mbm_gateway_setFunctions(&b.gateway, NULL, 0));
+}
+
+static int16_t hooked_read(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    every_call_is_busy();
+    return inner.read(context, bytes, capacity);
+}
+
+static int16_t hooked_write(void *context, const uint8_t *bytes, uint16_t length)
+{
+    every_call_is_busy();
+    return inner.write(context, bytes, length);
+}
+
+static uint32_t hooked_micros(void *context)
+{
+    every_call_is_busy();
+    return inner.micros(context);
+}
+
+static mbm_port hooked(memory_port *m)
+{
+    mbm_port port = inner = memory_port_of(m);
+
+    port.read = hooked_read;
+    port.write = hooked_write;
+    port.micros = hooked_micros;
+    return port;
+}
+
+static uint8_t is_ready(void *context)
+{
+    (void)context;
+    every_call_is_busy();
+    return 1;
+}
+
+static uint16_t serve(void *context, const mbm_request *request, uint8_t *response,
+                      uint16_t capacity)
+{
+    (void)context;
+    (void)request;
+    (void)capacity;
+    every_call_is_busy();
+    response[0] = 0x77;
+    return 1;
+}
+
+static void done(void *context, mbm_clientRequest *request)
+{
+    (void)context;
+    (void)request;
+    every_call_is_busy();
+}
+
+static void exchange(void)
+{
+    ASK(0, 1, 2, READ);
+    ON_LINE(0, 2, READ);
+    REPLY(0, 2, VALUE);
+    EXPECT(0, 1, 2, VALUE);
+}
+
+static void hooks_of_a_connection_cannot_use_the_gateway(void **state)
+{
+    const mbm_port port = hooked(&b.sockets[0]);
+
+    (void)state;
+    OK(mbm_gateway_close(&b.gateway, 0));
+    OK(mbm_gateway_open(&b.gateway, 0, &port));
+    OK(mbm_gateway_setQueueTime(&b.gateway, 1000));
+    entered = 0;
+    exchange();
+    assert_true(entered > 3);
+}
+
+static void hooks_of_a_line_cannot_use_the_gateway(void **state)
+{
+    const mbm_port port = hooked(&b.wires[0]);
+
+    (void)state;
+    /* The clock of the new port is read at once, in begin, when nothing may be refused. */
+    memset(&b.clients[0], 0, sizeof b.clients[0]);
+    {
+        mbm_port begun = port;
+
+        begun.micros = inner.micros;
+        OK(mbm_client_beginRtu(&b.clients[0], &begun, b.frames[0], MBM_MAX_FRAME));
+    }
+    b.lines[0].isReady = is_ready;
+    entered = 0;
+    exchange();
+    assert_true(entered > 3);
+}
+
+static void functions_of_own_units_and_of_own_requests_cannot_use_the_gateway(void **state)
+{
+    static mbm_unit unit;
+    static mbm_custom custom = {.serve = serve, .code = 0x41};
+    static mbm_clientRequest own = {.unit = 9, .done = done};
+
+    (void)state;
+    OK(mbm_unit_serveCustom(&unit, &custom));
+    OK(mbm_gateway_serveUnits(&b.gateway, &unit, 1));
+    entered = 0;
+    ASK(0, 1, 200, "\x41");
+    EXPECT(0, 1, 200, "\x41\x77");
+    assert_int_equal(entered, 1);
+    IS(MBM_PENDING, mbm_client_readExceptionStatus(&b.clients[0], &own));
+    ON_LINE(0, 9, "\x07");
+    REPLY(0, 9, "\x07\x01");
+    while (own.status == MBM_PENDING)
+        gateway_bench_step(&b);
+    assert_int_equal(entered, 2);
+}
+
+/* A program may poll a line's client itself. While its port has the control, the gateway
+ * cannot take its requests back from it. */
+static void close_and_poll(int busy)
+{
+    const uint8_t expected = busy ? MBM_BUSY : MBM_OK;
+
+    IS(expected, mbm_gateway_poll(&b.gateway));
+    IS(expected, mbm_gateway_close(&b.gateway, 0));
+}
+
+static int16_t read_and_close(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    entered++;
+    IS(MBM_BUSY, mbm_gateway_begin(&b.gateway, &b.config));
+    close_and_poll(1);
+    return inner.read(context, bytes, capacity);
+}
+
+static void a_hook_of_a_line_that_the_program_polls_cannot_use_the_gateway(void **state)
+{
+    mbm_port port = inner = memory_port_of(&b.wires[0]);
+
+    (void)state;
+    port.read = read_and_close;
+    OK(mbm_client_beginRtu(&b.clients[0], &port, b.frames[0], MBM_MAX_FRAME));
+    ASK(0, 1, 2, READ);
+    inner.read = memory_port_of(&b.wires[0]).read;
+    entered = 0;
+    /* The gateway queues the request; then the program polls the client. */
+    OK(mbm_gateway_poll(&b.gateway));
+    while (entered == 0) {
+        b.wires[0].now += 1000;
+        IS(MBM_PENDING, mbm_client_poll(&b.clients[0]));
+    }
+    OK(mbm_gateway_status(&b.gateway, 0));
+    assert_int_equal(mbm_gateway_pending(&b.gateway, 0), 1);
+}
+
+/* `done` of a request may use the gateway, if the program itself polls the client. */
+static void done_and_close(void *context, mbm_clientRequest *request)
+{
+    (void)context;
+    (void)request;
+    entered++;
+    close_and_poll(0);
+}
+
+static void done_may_use_the_gateway_if_the_program_polls_the_line(void **state)
+{
+    static mbm_clientRequest own;
+
+    (void)state;
+    memset(&own, 0, sizeof own);
+    own.unit = 9;
+    own.done = done_and_close;
+    IS(MBM_PENDING, mbm_client_readExceptionStatus(&b.clients[0], &own));
+    ASK(0, 1, 2, READ);
+    ON_LINE(0, 9, "\x07");
+    REPLY(0, 9, "\x07\x01");
+    entered = 0;
+    while (entered == 0) {
+        b.wires[0].now += 1000;
+        (void)mbm_client_poll(&b.clients[0]);
+    }
+    IS(MBM_NOT_INITIALISED, mbm_gateway_status(&b.gateway, 0));
+    assert_int_equal(mbm_client_pending(&b.clients[0]), 0);
+    ASK(1, 1, 2, READ);
+    ON_LINE(0, 2, READ);
+}
+
+#define TEST(test) cmocka_unit_test_setup(test, start)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(a_gateway_goes_on_after_a_refused_begin),
+        TEST(a_refused_call_changes_nothing),
+        TEST(an_object_that_was_never_begun_does_nothing),
+        TEST(begin_again_gives_up_all_connections_and_requests),
+        TEST(begin_again_with_other_parts_works),
+        TEST(hooks_of_a_connection_cannot_use_the_gateway),
+        TEST(hooks_of_a_line_cannot_use_the_gateway),
+        TEST(functions_of_own_units_and_of_own_requests_cannot_use_the_gateway),
+        TEST(a_hook_of_a_line_that_the_program_polls_cannot_use_the_gateway),
+        TEST(done_may_use_the_gateway_if_the_program_polls_the_line),
+    };
+
+    return cmocka_run_group_tests_name("gateway misuse", tests, NULL, NULL);
+}

@@ -1,0 +1,408 @@
+/* A gateway with several requests at once: order, turns, places, time in the queue, and
+ * connections that close. All in memory. */
+#include "gateway_bench.h"
+#include "test.h"
+
+#include <string.h>
+
+static gateway_bench b;
+
+static const mbm_gatewayRoute routes[] = {{1, 31, 0, 0}, {101, 131, 1, 1}};
+
+#define READ "\x03\x00\x10\x00\x01"
+#define VALUE "\x03\x02\x12\x34"
+#define OTHER_VALUE "\x03\x02\xAB\xCD"
+#define NO_PATH "\x83\x0A"
+#define NO_RESPONSE "\x83\x0B"
+
+static int start(void **state)
+{
+    (void)state;
+    gateway_bench_start(&b, routes, COUNT(routes));
+    return 0;
+}
+
+static uint16_t pending(unsigned connection)
+{
+    return mbm_gateway_pending(&b.gateway, (uint8_t)connection);
+}
+
+/* --- several requests of one connection --- */
+
+static void replies_go_back_as_they_arrive_with_their_transaction_id(void **state)
+{
+    (void)state;
+    ASK(0, 0x0001, 2, READ);
+    ASK(0, 0xFFFF, 102, READ);
+    ON_LINE(0, 2, READ);
+    ON_LINE(1, 2, READ);
+    assert_int_equal(pending(0), 2);
+    REPLY(1, 2, OTHER_VALUE);
+    EXPECT(0, 0xFFFF, 102, OTHER_VALUE);
+    REPLY(0, 2, VALUE);
+    EXPECT(0, 0x0001, 2, VALUE);
+    assert_int_equal(pending(0), 0);
+}
+
+static void requests_of_one_connection_reach_their_line_in_order(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < 5; i++)
+        ASK(0, i, (uint8_t)(2 + i), READ);
+    for (i = 0; i < 5; i++) {
+        ON_LINE(0, (uint8_t)(2 + i), READ);
+        REPLY(0, (uint8_t)(2 + i), VALUE);
+        EXPECT(0, i, (uint8_t)(2 + i), VALUE);
+    }
+}
+
+static void requests_with_the_same_transaction_id_are_all_answered(void **state)
+{
+    (void)state;
+    ASK(0, 7, 2, READ);
+    ASK(0, 7, 3, READ);
+    ASK(1, 7, 4, READ);
+    ON_LINE(0, 2, READ);
+    REPLY(0, 2, VALUE);
+    EXPECT(0, 7, 2, VALUE);
+    ON_LINE(0, 4, READ);
+    REPLY(0, 4, VALUE);
+    EXPECT(1, 7, 4, VALUE);
+    ON_LINE(0, 3, READ);
+    REPLY(0, 3, OTHER_VALUE);
+    EXPECT(0, 7, 3, OTHER_VALUE);
+}
+
+static void a_connection_has_as_many_requests_as_the_setting_allows(void **state)
+{
+    (void)state;
+    assert_int_equal(mbm_gateway_inFlight(&b.gateway), 65535);
+    IS(MBM_INVALID_ARGUMENT, mbm_gateway_setInFlight(&b.gateway, 0));
+    OK(mbm_gateway_setInFlight(&b.gateway, 2));
+    assert_int_equal(mbm_gateway_inFlight(&b.gateway), 2);
+    ASK(0, 1, 2, READ);
+    ASK(0, 2, 3, READ);
+    ASK(0, 3, 4, READ);
+    ON_LINE(0, 2, READ);
+    assert_int_equal(pending(0), 2);
+    assert_int_equal(mbm_gateway_isReading(&b.gateway, 0), 0);
+    assert_int_equal(b.sockets[0].arriving_count, 12); /* the third one waits in the socket */
+    REPLY(0, 2, VALUE);
+    EXPECT(0, 1, 2, VALUE);
+    ON_LINE(0, 3, READ);
+    assert_int_equal(b.sockets[0].arriving_count, 0);
+    REPLY(0, 3, VALUE);
+    EXPECT(0, 2, 3, VALUE);
+    assert_int_equal(mbm_gateway_isReading(&b.gateway, 0), 1);
+    ON_LINE(0, 4, READ);
+}
+
+/* --- turns --- */
+
+/* The next request on line 0 is for the unit. It is answered at once. */
+static void next_is(uint8_t unit)
+{
+    ON_LINE(0, unit, READ);
+    REPLY(0, unit, VALUE);
+}
+
+static void the_connections_take_turns_on_a_line(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < 5; i++)
+        ASK(0, i, 2, READ);
+    ON_LINE(0, 2, READ); /* the flood has begun before the others come */
+    ASK(1, 0, 3, READ);
+    ASK(2, 0, 4, READ);
+    REPLY(0, 2, VALUE);
+    next_is(3);
+    next_is(4);
+    next_is(2);
+    ASK(2, 1, 4, READ);
+    next_is(4);
+    next_is(2);
+    next_is(2);
+    next_is(2);
+    SILENT(b.wires[0]);
+}
+
+/* However much one client sends: between two requests of another client at most two requests
+ * of others reach the line. Counted in requests, so it does not depend on time. */
+static void a_flood_of_one_client_does_not_starve_another(void **state)
+{
+    unsigned round, i, served = 0, others = 0;
+
+    (void)state;
+    ASK(1, 0, 3, READ);
+    for (round = 0; round < 300; round++) {
+        for (i = 0; b.sockets[0].arriving_count < 200; i++)
+            ASK(0, i, 2, READ);
+        while (b.wires[0].sent_count == 0)
+            assert_true(gateway_bench_step(&b));
+        if (b.wires[0].sent[0] == 3) {
+            assert_true(others <= 2);
+            others = 0;
+            served++;
+            ON_LINE(0, 3, READ);
+            REPLY(0, 3, VALUE);
+            ASK(1, served, 3, READ);
+        } else {
+            others++;
+            ON_LINE(0, 2, READ);
+            REPLY(0, 2, VALUE);
+        }
+        for (i = 0; i < 2; i++)
+            b.sockets[i].sent_count = 0;
+    }
+    assert_true(served >= 100);
+}
+
+static void a_client_that_floods_leaves_a_place_for_each_other(void **state)
+{
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < 20; i++)
+        ASK(0, i, 2, READ);
+    ON_LINE(0, 2, READ);
+    assert_int_equal(pending(0), BENCH_REQUESTS - (BENCH_CONNECTIONS - 1));
+    assert_int_equal(mbm_gateway_isReading(&b.gateway, 0), 0);
+    assert_int_equal(mbm_gateway_isReading(&b.gateway, 1), 1);
+    ASK(1, 1, 3, READ);
+    ASK(1, 2, 3, READ);
+    ASK(2, 1, 4, READ);
+    OK(mbm_gateway_poll(&b.gateway));
+    assert_int_equal(pending(1), 1);
+    assert_int_equal(pending(2), 1);
+    REPLY(0, 2, VALUE);
+    next_is(3);
+    next_is(4);
+    next_is(2);
+    /* The place that is free now is not for the one that has most. */
+    next_is(3);
+}
+
+/* --- time --- */
+
+static void a_request_that_waits_too_long_for_its_line_gets_0a(void **state)
+{
+    (void)state;
+    assert_int_equal(mbm_gateway_queueTime(&b.gateway), 0);
+    OK(mbm_gateway_setQueueTime(&b.gateway, 150));
+    assert_int_equal(mbm_gateway_queueTime(&b.gateway), 150);
+    ASK(0, 1, 2, READ);
+    ASK(0, 2, 3, READ);
+    ASK(0, 3, 4, READ);
+    ON_LINE(0, 2, READ);
+    EXPECT(0, 1, 2, NO_RESPONSE); /* after 100 ms and more */
+    ON_LINE(0, 3, READ);
+    EXPECT(0, 3, 4, NO_PATH); /* its client has given up meanwhile */
+    EXPECT(0, 2, 3, NO_RESPONSE);
+    SILENT(b.wires[0]);
+    /* The time on the line does not count. */
+    OK(mbm_gateway_setQueueTime(&b.gateway, 1));
+    ASK(1, 1, 5, READ);
+    ON_LINE(0, 5, READ);
+    EXPECT(1, 1, 5, NO_RESPONSE);
+}
+
+static void a_request_that_waits_is_answered_in_time_though_nothing_else_happens(void **state)
+{
+    (void)state;
+    OK(mbm_gateway_setQueueTime(&b.gateway, 30));
+    ASK(0, 1, 2, READ);
+    ASK(0, 2, 3, READ);
+    ON_LINE(0, 2, READ);
+    EXPECT(0, 2, 3, NO_PATH);
+    EXPECT(0, 1, 2, NO_RESPONSE); /* after 100 ms */
+}
+
+static void an_idle_gateway_has_nothing_to_do(void **state)
+{
+    (void)state;
+    OK(mbm_gateway_poll(&b.gateway));
+    assert_int_equal(mbm_gateway_pollDelay(&b.gateway), UINT32_MAX);
+    ASK(0, 1, 2, READ);
+    OK(mbm_gateway_poll(&b.gateway));
+    assert_true(mbm_gateway_pollDelay(&b.gateway) < 100000);
+}
+
+/* --- connections --- */
+
+static void a_connection_that_closes_gives_up_its_requests(void **state)
+{
+    (void)state;
+    ASK(0, 1, 2, READ);
+    ASK(0, 2, 3, READ);
+    ON_LINE(0, 2, READ);
+    ASK(1, 1, 4, READ);
+    b.sockets[0].is_lost = 1;
+    OK(mbm_gateway_poll(&b.gateway));
+    IS(MBM_LINK_LOST, mbm_gateway_status(&b.gateway, 0));
+    assert_int_equal(pending(0), 0);
+    /* The reply to the request that was given up comes late. */
+    REPLY(0, 2, VALUE);
+    ON_LINE(0, 4, READ);
+    REPLY(0, 4, OTHER_VALUE);
+    EXPECT(1, 1, 4, OTHER_VALUE);
+    SILENT(b.wires[0]);
+}
+
+/* The same unit, function and length: only the order of the replies tells them apart. */
+static void a_new_client_in_the_place_gets_only_its_own_reply(void **state)
+{
+    (void)state;
+    ASK(0, 5, 2, READ);
+    ON_LINE(0, 2, READ);
+    OK(mbm_gateway_close(&b.gateway, 0));
+    assert_int_equal(mbm_client_pending(&b.clients[0]), 0);
+    gateway_bench_open(&b, 0);
+    ASK(0, 5, 2, "\x03\x00\x20\x00\x01");
+    ON_LINE(0, 2, "\x03\x00\x20\x00\x01");
+    REPLY(0, 2, VALUE);
+    REPLY(0, 2, OTHER_VALUE);
+    EXPECT(0, 5, 2, OTHER_VALUE);
+    SILENT(b.sockets[0]);
+}
+
+static void half_a_request_dies_with_its_connection(void **state)
+{
+    (void)state;
+    memory_port_bytes(&b.sockets[0], (const uint8_t *)"\0\1\0\0\0\6\2\3\0", 9);
+    OK(mbm_gateway_poll(&b.gateway));
+    assert_int_equal(pending(0), 0);
+    OK(mbm_gateway_close(&b.gateway, 0));
+    gateway_bench_open(&b, 0);
+    ASK(0, 2, 3, READ);
+    ON_LINE(0, 3, READ);
+}
+
+static void bytes_that_are_not_modbus_end_their_connection_only(void **state)
+{
+    static const char *const bad[] = {"\0\1\0\1\0\6\2\3", "\0\1\0\0\0\0\2\3", "\0\1\0\0\1\0\2\3"};
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < COUNT(bad); i++) {
+        ASK(0, 1, 2, READ);
+        ON_LINE(0, 2, READ);
+        ASK(1, 1, 3, READ);
+        memory_port_bytes(&b.sockets[0], (const uint8_t *)bad[i], 8);
+        OK(mbm_gateway_poll(&b.gateway));
+        IS(MBM_MALFORMED_FRAME, mbm_gateway_status(&b.gateway, 0));
+        OK(mbm_gateway_status(&b.gateway, 1));
+        ON_LINE(0, 3, READ);
+        REPLY(0, 3, VALUE);
+        EXPECT(1, 1, 3, VALUE);
+        gateway_bench_open(&b, 0);
+        OK(mbm_gateway_status(&b.gateway, 0));
+    }
+}
+
+static void a_place_is_free_in_use_or_lost(void **state)
+{
+    const mbm_port port = memory_port_of(&b.sockets[0]);
+
+    (void)state;
+    IS(MBM_BUSY, mbm_gateway_open(&b.gateway, 0, &port));
+    OK(mbm_gateway_close(&b.gateway, 0));
+    IS(MBM_NOT_INITIALISED, mbm_gateway_status(&b.gateway, 0));
+    OK(mbm_gateway_close(&b.gateway, 0));
+    assert_int_equal(mbm_gateway_isReading(&b.gateway, 0), 0);
+    OK(mbm_gateway_open(&b.gateway, 0, &port));
+    IS(MBM_INVALID_ARGUMENT, mbm_gateway_status(&b.gateway, BENCH_CONNECTIONS));
+}
+
+/* --- ports --- */
+
+static size_t most; /* bytes that a socket reads or takes at a time */
+static mbm_port whole;
+
+static int16_t read_few(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    return whole.read(context, bytes, capacity < most ? capacity : (uint16_t)most);
+}
+
+static int16_t write_few(void *context, const uint8_t *bytes, uint16_t length)
+{
+    return whole.write(context, bytes, length < most ? length : (uint16_t)most);
+}
+
+static void open_narrow(void)
+{
+    mbm_port port;
+
+    OK(mbm_gateway_close(&b.gateway, 0));
+    port = whole = memory_port_of(&b.sockets[0]);
+    port.read = read_few;
+    port.write = write_few;
+    OK(mbm_gateway_open(&b.gateway, 0, &port));
+}
+
+static void requests_arrive_and_responses_leave_byte_by_byte(void **state)
+{
+    (void)state;
+    open_narrow();
+    most = 1;
+    ASK(0, 1, 2, READ);
+    ASK(0, 2, 102, READ);
+    ON_LINE(0, 2, READ);
+    ON_LINE(1, 2, READ);
+    REPLY(0, 2, VALUE);
+    REPLY(1, 2, OTHER_VALUE);
+    /* Each response is whole before the next one begins. */
+    EXPECT(0, 1, 2, VALUE);
+    EXPECT(0, 2, 102, OTHER_VALUE);
+}
+
+static void a_client_that_takes_no_responses_delays_no_other(void **state)
+{
+    (void)state;
+    open_narrow();
+    most = 20;
+    ASK(0, 1, 2, READ);
+    ON_LINE(0, 2, READ);
+    most = 0;
+    REPLY(0, 2, VALUE);
+    ASK(1, 1, 3, READ);
+    ON_LINE(0, 3, READ);
+    REPLY(0, 3, OTHER_VALUE);
+    EXPECT(1, 1, 3, OTHER_VALUE);
+    OK(mbm_gateway_poll(&b.gateway));
+    assert_int_equal(b.sockets[0].sent_count, 0);
+    assert_true(mbm_gateway_pollDelay(&b.gateway) <= 1000);
+    assert_true(mbm_gateway_pollDelay(&b.gateway) > 0);
+    most = 20;
+    EXPECT(0, 1, 2, VALUE);
+}
+
+#define TEST(test) cmocka_unit_test_setup(test, start)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(replies_go_back_as_they_arrive_with_their_transaction_id),
+        TEST(requests_of_one_connection_reach_their_line_in_order),
+        TEST(requests_with_the_same_transaction_id_are_all_answered),
+        TEST(a_connection_has_as_many_requests_as_the_setting_allows),
+        TEST(the_connections_take_turns_on_a_line),
+        TEST(a_flood_of_one_client_does_not_starve_another),
+        TEST(a_client_that_floods_leaves_a_place_for_each_other),
+        TEST(a_request_that_waits_too_long_for_its_line_gets_0a),
+        TEST(a_request_that_waits_is_answered_in_time_though_nothing_else_happens),
+        TEST(an_idle_gateway_has_nothing_to_do),
+        TEST(a_connection_that_closes_gives_up_its_requests),
+        TEST(a_new_client_in_the_place_gets_only_its_own_reply),
+        TEST(half_a_request_dies_with_its_connection),
+        TEST(bytes_that_are_not_modbus_end_their_connection_only),
+        TEST(a_place_is_free_in_use_or_lost),
+        TEST(requests_arrive_and_responses_leave_byte_by_byte),
+        TEST(a_client_that_takes_no_responses_delays_no_other),
+    };
+
+    return cmocka_run_group_tests_name("gateway turns", tests, NULL, NULL);
+}
