@@ -890,6 +890,87 @@ uint8_t mbm_master_status(const struct mbm_master *master);
 uint8_t mbm_master_getExceptionCode(const struct mbm_master *master);
 
 /**
+ * Returns the response timeout: see mbm_master_setResponseTimeout.
+ *
+ * @param master  the object
+ * @return milliseconds; 0 for an object that was never begun
+ */
+uint16_t mbm_master_getResponseTimeout(const struct mbm_master *master);
+
+/**
+ * Returns the silence before a request that is in effect: what mbm_master_setGap set, or t3.5
+ * of the rate that mbm_master_setBaudRate set, or 4 ms.
+ *
+ * @param master  the object
+ * @return microseconds; 0 for an object that was never begun
+ */
+uint32_t mbm_master_getGap(const struct mbm_master *master);
+
+/**
+ * Returns the turnaround delay: see mbm_master_setTurnaroundDelay.
+ *
+ * @param master  the object
+ * @return milliseconds; 0 for an object that was never begun
+ */
+uint16_t mbm_master_getTurnaroundDelay(const struct mbm_master *master);
+
+/**
+ * Returns the quiet time: see mbm_master_setQuietTime.
+ *
+ * @param master  the object
+ * @return milliseconds; 0 for an object that was never begun
+ */
+uint16_t mbm_master_getQuietTime(const struct mbm_master *master);
+
+/**
+ * Returns how often a request is repeated: see mbm_master_setRetries.
+ *
+ * @param master  the object
+ * @return 0 to 255; 0 for an object that was never begun
+ */
+uint8_t mbm_master_getRetries(const struct mbm_master *master);
+
+/**
+ * Returns whether echo discarding is on: see mbm_master_setEchoDiscard.
+ *
+ * @param master  the object
+ * @return 1 or 0; 0 for an object that was never begun
+ */
+uint8_t mbm_master_getEchoDiscard(const struct mbm_master *master);
+
+/**
+ * Returns whether deviating replies are accepted: see mbm_master_setLenient.
+ *
+ * @param master  the object
+ * @return 1 or 0; 0 for an object that was never begun
+ */
+uint8_t mbm_master_getLenient(const struct mbm_master *master);
+
+/**
+ * Returns how long the driver stays on after the flush: see mbm_master_setPostFlushHold.
+ *
+ * @param master  the object
+ * @return characters; 0 for an object that was never begun
+ */
+uint8_t mbm_master_getPostFlushHold(const struct mbm_master *master);
+
+/**
+ * Returns whether requests block: see mbm_master_setBlocking.
+ *
+ * @param master  the object
+ * @return 1 for blocking, 0 for non-blocking; 0 for an object that was never begun
+ */
+uint8_t mbm_master_getBlocking(const struct mbm_master *master);
+
+/**
+ * Returns the order of values: see mbm_master_setWordOrder.
+ *
+ * @param master  the object
+ * @return one of MBM_ORDER_...; MBM_ORDER_ABCD for an object that was never begun
+ */
+uint8_t mbm_master_getWordOrder(const struct mbm_master *master);
+
+/**
  * Function 01: reads coils into the response words, 16 in each word. The first coil is the
  * lowest bit; the last word is padded with zeros (V1.1b3, 6.1).
  *
@@ -1671,6 +1752,71 @@ uint8_t mbm_client_setDelimiter(struct mbm_client *client, uint8_t character);
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_client_setInFlight(struct mbm_client *client, uint8_t most);
+
+/**
+ * Returns the response timeout: see mbm_client_setResponseTimeout.
+ *
+ * @param client  the object
+ * @return milliseconds; 0 for an object that was never begun
+ */
+uint16_t mbm_client_getResponseTimeout(const struct mbm_client *client);
+
+/**
+ * Returns the silence before a request on an RTU line that is in effect: what
+ * mbm_client_setGap set, or t3.5 of the rate that mbm_client_setBaudRate set, or 4 ms.
+ *
+ * @param client  the object
+ * @return microseconds; 0 for an object that was never begun
+ */
+uint32_t mbm_client_getGap(const struct mbm_client *client);
+
+/**
+ * Returns the turnaround delay: see mbm_client_setTurnaroundDelay.
+ *
+ * @param client  the object
+ * @return milliseconds; 0 for an object that was never begun
+ */
+uint16_t mbm_client_getTurnaroundDelay(const struct mbm_client *client);
+
+/**
+ * Returns the quiet time: see mbm_client_setQuietTime.
+ *
+ * @param client  the object
+ * @return milliseconds; 0 for an object that was never begun
+ */
+uint16_t mbm_client_getQuietTime(const struct mbm_client *client);
+
+/**
+ * Returns how often a request is repeated: see mbm_client_setRetries.
+ *
+ * @param client  the object
+ * @return 0 to 255; 0 for an object that was never begun
+ */
+uint8_t mbm_client_getRetries(const struct mbm_client *client);
+
+/**
+ * Returns whether echo discarding is on: see mbm_client_setEchoDiscard.
+ *
+ * @param client  the object
+ * @return 1 or 0; 0 for an object that was never begun
+ */
+uint8_t mbm_client_getEchoDiscard(const struct mbm_client *client);
+
+/**
+ * Returns how long the driver stays on after the flush: see mbm_client_setPostFlushHold.
+ *
+ * @param client  the object
+ * @return characters; 0 for an object that was never begun
+ */
+uint8_t mbm_client_getPostFlushHold(const struct mbm_client *client);
+
+/**
+ * Returns how many requests may be under way at once: see mbm_client_setInFlight.
+ *
+ * @param client  the object
+ * @return 1 to 16; 1 on a serial line and in RTU over TCP; 0 for an object that was never begun
+ */
+uint8_t mbm_client_getInFlight(const struct mbm_client *client);
 
 /**
  * Closes the link and opens it again. The client discards an incomplete response. Requests
@@ -2986,6 +3132,15 @@ uint32_t mbm_server_pollDelay(const struct mbm_server *server);
 uint8_t mbm_server_setSilence(struct mbm_server *server, uint32_t silenceUs);
 
 /**
+ * Returns the silence that ends a frame: what mbm_server_setSilence set, or t3.5 of the rate
+ * that mbm_server_setBaudRate set, or the default of the framing.
+ *
+ * @param server  the object
+ * @return microseconds; 0 for an object that was never begun
+ */
+uint32_t mbm_server_getSilence(const struct mbm_server *server);
+
+/**
  * Sets the baud rate from which an RTU server computes t3.5 (serial line guide V1.02,
  * 2.5.1.1). It does not change the rate of the line. Other framings do not use t3.5: see
  * mbm_server_setSilence.
@@ -3008,6 +3163,14 @@ uint8_t mbm_server_setBaudRate(struct mbm_server *server, uint32_t baud);
  *         MBM_NOT_INITIALISED or MBM_BUSY
  */
 uint8_t mbm_server_setEchoDiscard(struct mbm_server *server, uint8_t on);
+
+/**
+ * Returns whether the server discards its own echo: see mbm_server_setEchoDiscard.
+ *
+ * @param server  the object
+ * @return 1 or 0; 0 for an object that was never begun
+ */
+uint8_t mbm_server_getEchoDiscard(const struct mbm_server *server);
 
 /* ==== 9. Units ====================================================================== */
 
@@ -3205,9 +3368,9 @@ typedef struct mbm_access {
  *
  * The server calls the hooks only for a request that is right and whose cells all exist.
  * Functions 16 and 17 (hex) read and write: for them the server calls beforeRead,
- * beforeWrite and afterWrite in this order. A request of function 14 or 15 (hex) has
- * several groups of records. The server calls each hook once for each group; it calls the
- * hook for all groups before it reads or writes any of them.
+ * beforeWrite and afterWrite in this order. A request of function 14 or 15 (hex) has one or
+ * more groups of records, and the server calls each hook once for each group. It calls
+ * beforeWrite for all groups before it writes any of them.
  *
  * A hook may change cells. It may call any function of this library but those on the
  * server that calls it, which return MBM_BUSY. If it changes its record, or sets other
@@ -3903,7 +4066,8 @@ typedef struct mbm_gatewayLine {
     /**
      * The client of the line, in any framing. Begin it before the gateway, with a frame
      * buffer that holds every frame. Its settings hold: response timeout, retries, quiet
-     * time. You may send requests of your own with it.
+     * time. You may send requests of your own with it. Do not replace it by another client
+     * while the gateway has open connections.
      */
     struct mbm_client *client;
     /**
@@ -5617,6 +5781,14 @@ uint8_t mbm_sniffer_setBaudRate(struct mbm_sniffer *sniffer, uint32_t baud);
 uint8_t mbm_sniffer_setResponseTimeout(struct mbm_sniffer *sniffer, uint16_t timeoutMs);
 
 /**
+ * Returns the response timeout: see mbm_sniffer_setResponseTimeout.
+ *
+ * @param sniffer  the object
+ * @return milliseconds; 0 for an object that was never begun
+ */
+uint16_t mbm_sniffer_getResponseTimeout(const struct mbm_sniffer *sniffer);
+
+/**
  * Sets how long the sniffer waits for the rest of an incomplete frame. Choose it longer
  * than the error of your time stamps. At first it is 50 ms in RTU and RTU over TCP,
  * which suits a USB adapter, and 1000 ms in ASCII and TCP.
@@ -5626,6 +5798,14 @@ uint8_t mbm_sniffer_setResponseTimeout(struct mbm_sniffer *sniffer, uint16_t tim
  * @return MBM_OK, MBM_INVALID_ARGUMENT or MBM_NOT_INITIALISED
  */
 uint8_t mbm_sniffer_setFrameTimeout(struct mbm_sniffer *sniffer, uint16_t timeoutMs);
+
+/**
+ * Returns the frame timeout: see mbm_sniffer_setFrameTimeout.
+ *
+ * @param sniffer  the object
+ * @return milliseconds; 0 for an object that was never begun
+ */
+uint16_t mbm_sniffer_getFrameTimeout(const struct mbm_sniffer *sniffer);
 
 /**
  * Passes received bytes to the sniffer. Then call mbm_sniffer_next until it returns 0.
@@ -5771,7 +5951,8 @@ typedef struct mbm_traceRecord {
  *
  * @param trace    the object; zero it before the first call
  * @param port     is copied; its hooks read, write and micros are required. Its optional
- *                 hooks are passed on. It must not be the port of this trace
+ *                 hooks are passed on. It must not be the port of this trace, nor
+ *                 that of a trace that passes everything on to this one
  * @param framing  the framing of the object that will use the port, and the declarations of
  *                 your own functions, which must stay valid and unchanged. Without a
  *                 declaration, the end of a received RTU frame is not known from its bytes

@@ -220,7 +220,7 @@ impl GatewayStorage for World {
         self.on_line[usize::from(line)].retain(|held| held.request != request);
         self.ended.remove(&request);
     }
-    fn serve(&mut self, request: u16, length: u16) -> Option<u16> {
+    fn serve(&mut self, _connection: u8, request: u16, length: u16) -> Option<u16> {
         assert_eq!(self.frames[usize::from(request)][6], 3);
         if self.random(3) == 0 {
             return None;

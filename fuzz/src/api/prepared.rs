@@ -2,8 +2,8 @@
 //! as far as a first reply.
 
 use super::check::call;
-use super::plan;
 use super::gateway;
+use super::plan;
 use super::ports;
 use super::records;
 use super::sniffer;
