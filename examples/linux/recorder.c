@@ -12,7 +12,7 @@ static void keep(recording *kept, const uint8_t *bytes, int16_t count)
 static int16_t record_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     recorder *wire = (recorder *)context;
-    int16_t count = wire->behind.read(wire->behind.context, bytes, capacity);
+    int16_t count = wire->line.read(wire->line.context, bytes, capacity);
 
     keep(&wire->received, bytes, count);
     return count;
@@ -21,7 +21,7 @@ static int16_t record_read(void *context, uint8_t *bytes, uint16_t capacity)
 static int16_t record_write(void *context, const uint8_t *bytes, uint16_t length)
 {
     recorder *wire = (recorder *)context;
-    int16_t count = wire->behind.write(wire->behind.context, bytes, length);
+    int16_t count = wire->line.write(wire->line.context, bytes, length);
 
     keep(&wire->sent, bytes, count);
     return count;
@@ -31,21 +31,21 @@ static uint32_t pass_micros(void *context)
 {
     recorder *wire = (recorder *)context;
 
-    return wire->behind.micros(wire->behind.context);
+    return wire->line.micros(wire->line.context);
 }
 
 static uint8_t pass_flush(void *context)
 {
     recorder *wire = (recorder *)context;
 
-    return wire->behind.flush(wire->behind.context);
+    return wire->line.flush(wire->line.context);
 }
 
 static void pass_idle(void *context, mbm_master *master)
 {
     recorder *wire = (recorder *)context;
 
-    wire->behind.idle(wire->behind.context, master);
+    wire->line.idle(wire->line.context, master);
 }
 
 void recorder_clear(recorder *wire)
@@ -54,17 +54,17 @@ void recorder_clear(recorder *wire)
     wire->received.length = 0;
 }
 
-mbm_port recorder_port(recorder *wire, const mbm_port *behind)
+mbm_port recorder_port(recorder *wire, const mbm_port *line)
 {
     mbm_port port = {0};
 
-    wire->behind = *behind;
+    wire->line = *line;
     recorder_clear(wire);
     port.context = wire;
     port.read = record_read;
     port.write = record_write;
     port.micros = pass_micros;
-    port.flush = behind->flush ? pass_flush : NULL;
-    port.idle = behind->idle ? pass_idle : NULL;
+    port.flush = line->flush ? pass_flush : NULL;
+    port.idle = line->idle ? pass_idle : NULL;
     return port;
 }

@@ -19,7 +19,7 @@ typedef struct recording {
 
 /** The other port, and the bytes that have gone through it. */
 typedef struct recorder {
-    mbm_port behind;
+    mbm_port line;
     recording sent;
     recording received;
 } recorder;
@@ -27,7 +27,7 @@ typedef struct recorder {
 /** Discards the recorded bytes. */
 void recorder_clear(recorder *wire);
 
-/** A port that records in `wire`, which must outlive it, and passes everything on to `behind`. */
-mbm_port recorder_port(recorder *wire, const mbm_port *behind);
+/** A port that records in `wire`, which must outlive it, and forwards every call to `line`. */
+mbm_port recorder_port(recorder *wire, const mbm_port *line);
 
 #endif
