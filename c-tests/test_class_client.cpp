@@ -397,5 +397,5 @@ int main()
         TEST(a_stream_that_returns_0_for_what_it_sends_works),
         TEST(a_sketch_may_sleep_until_the_next_poll_is_due),
     };
-    return cmocka_run_group_tests_name("class of a client", tests, nullptr, nullptr);
+    return cmocka_run_group_tests_name("ModbusSerialClient", tests, nullptr, nullptr);
 }

@@ -243,5 +243,5 @@ int main()
         TEST(values_past_the_end_are_refused),
     };
 
-    return cmocka_run_group_tests_name("functions of a client's class", tests, nullptr, nullptr);
+    return cmocka_run_group_tests_name("ModbusSerialClient: functions", tests, nullptr, nullptr);
 }

@@ -256,5 +256,5 @@ int main()
         SERVED(begin_is_refused_while_a_request_is_pending),
     };
 
-    return cmocka_run_group_tests_name("class of a TCP client", tests, nullptr, nullptr);
+    return cmocka_run_group_tests_name("ModbusTcpClient", tests, nullptr, nullptr);
 }

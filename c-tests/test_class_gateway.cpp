@@ -171,5 +171,5 @@ int main()
         SERVED(closing_a_connection_cancels_its_request),
     };
 
-    return cmocka_run_group_tests_name("class of a gateway", tests, nullptr, nullptr);
+    return cmocka_run_group_tests_name("ModbusTcpGateway", tests, nullptr, nullptr);
 }

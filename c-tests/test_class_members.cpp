@@ -408,5 +408,5 @@ int main()
         TEST(arrays_hold_independent_objects),
     };
 
-    return cmocka_run_group_tests_name("class members", tests, nullptr, nullptr);
+    return cmocka_run_group_tests_name("ModbusMaster: members", tests, nullptr, nullptr);
 }

@@ -112,5 +112,5 @@ int main()
         TEST(several_units_may_serve_one_array),
     };
 
-    return cmocka_run_group_tests_name("classes within callbacks", tests, nullptr, nullptr);
+    return cmocka_run_group_tests_name("classes: calls within callbacks", tests, nullptr, nullptr);
 }

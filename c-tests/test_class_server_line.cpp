@@ -243,5 +243,5 @@ int main()
         TEST(begin_may_be_called_again),
     };
 
-    return cmocka_run_group_tests_name("class that serves, line", tests, nullptr, nullptr);
+    return cmocka_run_group_tests_name("ModbusServer: the line", tests, nullptr, nullptr);
 }

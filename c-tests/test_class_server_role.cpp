@@ -326,5 +326,5 @@ int main()
         TEST(master_and_server_understand_each_other),
     };
 
-    return cmocka_run_group_tests_name("class that serves", tests, nullptr, nullptr);
+    return cmocka_run_group_tests_name("ModbusServer", tests, nullptr, nullptr);
 }

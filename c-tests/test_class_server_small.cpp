@@ -74,5 +74,5 @@ int main()
         SERVED(a_request_longer_than_the_buffer_is_ignored),
     };
 
-    return cmocka_run_group_tests_name("class that serves, small", tests, nullptr, nullptr);
+    return cmocka_run_group_tests_name("ModbusServer: small buffer", tests, nullptr, nullptr);
 }

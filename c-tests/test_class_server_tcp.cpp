@@ -289,5 +289,5 @@ int main()
         REAL(a_connection_that_takes_few_bytes_gets_the_whole_response),
     };
 
-    return cmocka_run_group_tests_name("class of a TCP server", tests, nullptr, nullptr);
+    return cmocka_run_group_tests_name("ModbusTcpServer", tests, nullptr, nullptr);
 }

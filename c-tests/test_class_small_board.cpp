@@ -212,5 +212,5 @@ int main()
         TEST(writes_of_more_than_the_buffer_send_nothing),
     };
 
-    return cmocka_run_group_tests_name("class on a small board", tests, nullptr, nullptr);
+    return cmocka_run_group_tests_name("ModbusMaster on a small board", tests, nullptr, nullptr);
 }

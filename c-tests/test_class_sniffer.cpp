@@ -190,5 +190,5 @@ int main()
         TEST(nothing_is_ever_sent),
     };
 
-    return cmocka_run_group_tests_name("class of a sniffer", tests, nullptr, nullptr);
+    return cmocka_run_group_tests_name("ModbusSniffer", tests, nullptr, nullptr);
 }

@@ -190,5 +190,5 @@ int main()
         TEST(coils_are_read_and_written_one_by_one),
     };
 
-    return cmocka_run_group_tests_name("class values", tests, nullptr, nullptr);
+    return cmocka_run_group_tests_name("ModbusMaster: values", tests, nullptr, nullptr);
 }

@@ -198,7 +198,7 @@ static void a_lost_line_keeps_its_descriptor(void **state)
 {
     enum { SERVED = 4 };
     static const uint8_t request[] = {0, 1, 0, 0, 0, 6, ABSENT, 3, 0, 0, 0, 1};
-    struct pollfd heard;
+    struct pollfd input;
     unsigned i;
 
     (void)state;
@@ -214,8 +214,8 @@ static void a_lost_line_keeps_its_descriptor(void **state)
     assert_int_equal(unlink(name), 0);
     assert_int_equal(symlink(line.path, name), 0);
     /* The gateway opens the line again when a request needs it, at most once a second. */
-    heard = (struct pollfd){line.ours, POLLIN, 0};
-    AWAIT((send(fds[0], request, sizeof request, MSG_NOSIGNAL), poll(&heard, 1, 100) == 1));
+    input = (struct pollfd){line.ours, POLLIN, 0};
+    AWAIT((send(fds[0], request, sizeof request, MSG_NOSIGNAL), poll(&input, 1, 100) == 1));
     stop();
 }
 

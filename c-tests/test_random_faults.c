@@ -52,8 +52,8 @@ typedef struct run {
     unsigned faults;      /* of this attempt */
     frame ledger[LEDGER]; /* undamaged replies to earlier requests */
     unsigned written;
-    uint8_t heard[4096]; /* the bytes that the master read for this request */
-    size_t heard_length;
+    uint8_t received[4096]; /* the bytes that the master read for this request */
+    size_t received_length;
     unsigned right, failed, intact, late, blind, wrong, exceptions;
     uint64_t longest;
 } run;
@@ -141,7 +141,7 @@ static void device(sim *s, const sim_frame *sent)
     uint64_t at = sent->end + 500 + draw(r, 10000);
     frame f;
 
-    r->heard_length = 0;
+    r->received_length = 0;
     assert_true(request_parse(&r->asked, sent->bytes, sent->length));
     r->faults = draw_faults(r);
     if (s->echo)
@@ -175,8 +175,8 @@ static void tap(sim *s, uint8_t byte)
 {
     run *r = (run *)s->context;
 
-    if (r->heard_length < sizeof r->heard)
-        r->heard[r->heard_length++] = byte;
+    if (r->received_length < sizeof r->received)
+        r->received[r->received_length++] = byte;
 }
 
 static uint16_t quantity(run *r, uint32_t most)
@@ -250,8 +250,8 @@ static int was_received(const run *r, const frame *f)
 {
     size_t at;
 
-    for (at = 0; at + f->length <= r->heard_length; at++)
-        if (memcmp(r->heard + at, f->bytes, f->length) == 0)
+    for (at = 0; at + f->length <= r->received_length; at++)
+        if (memcmp(r->received + at, f->bytes, f->length) == 0)
             return 1;
     return 0;
 }
@@ -274,11 +274,11 @@ static int is_blind(const sim *s, const run *r, uint8_t status)
     size_t at, length;
     frame f;
 
-    for (at = 0; at < r->heard_length; at++)
-        for (length = 5; length <= 256 && at + length <= r->heard_length; length++)
-            if (crc16(r->heard + at, length) == 0) {
+    for (at = 0; at < r->received_length; at++)
+        for (length = 5; length <= 256 && at + length <= r->received_length; length++)
+            if (crc16(r->received + at, length) == 0) {
                 f.length = length;
-                memcpy(f.bytes, r->heard + at, length);
+                memcpy(f.bytes, r->received + at, length);
                 if (agrees_with(s, r, status, &f))
                     return 1;
             }

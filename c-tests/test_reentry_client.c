@@ -93,7 +93,7 @@ static void every_request_of_the_client_answers(uint8_t status, mbm_clientReques
 
 static void every_function_of_the_client_is_busy(void)
 {
-    static mbm_master facade;
+    static mbm_master master;
     static const mbm_master zero;
     static const mbm_linkHooks link = {.context = NULL};
     static uint8_t asked[sizeof another];
@@ -114,9 +114,9 @@ static void every_function_of_the_client_is_busy(void)
     IS(MBM_BUSY, mbm_client_setDelimiter(&client, '!'));
     IS(MBM_BUSY, mbm_client_reconnect(&client, &link));
     IS(MBM_BUSY, mbm_client_suspend(&client, NULL));
-    IS(MBM_BUSY, mbm_client_suspend(&client, &facade));
-    IS(MBM_BUSY, mbm_client_resume(&client, &facade));
-    assert_memory_equal(&facade, &zero, sizeof zero);
+    IS(MBM_BUSY, mbm_client_suspend(&client, &master));
+    IS(MBM_BUSY, mbm_client_resume(&client, &master));
+    assert_memory_equal(&master, &zero, sizeof zero);
     IS(MBM_BUSY, mbm_client_poll(&client));
     assert_int_equal(mbm_client_pollDelay(&client), 0);
     assert_int_equal(mbm_client_pending(&client), 0);
@@ -211,7 +211,7 @@ static void connect_anew(void *context)
 static void done(void *context, mbm_clientRequest *ended)
 {
     const mbm_linkHooks link = {.disconnect = connect_anew};
-    static mbm_master facade;
+    static mbm_master master;
 
     (void)context;
     entered++;
@@ -233,11 +233,11 @@ static void done(void *context, mbm_clientRequest *ended)
         OK(mbm_client_suspend(&client, NULL));
         IS(MBM_BUSY, mbm_client_suspend(&client, NULL));
         OK(mbm_client_resume(&client, NULL));
-        memset(&facade, 0, sizeof facade);
-        OK(mbm_master_setBuffers(&facade, words, 1, words, 1, other_frame, 8));
+        memset(&master, 0, sizeof master);
+        OK(mbm_master_setBuffers(&master, words, 1, words, 1, other_frame, 8));
         if (framing_of_done % 3 == 0) {
-            OK(mbm_client_suspend(&client, &facade));
-            OK(mbm_client_resume(&client, &facade));
+            OK(mbm_client_suspend(&client, &master));
+            OK(mbm_client_resume(&client, &master));
         }
         break;
     case 3:

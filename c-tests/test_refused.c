@@ -33,13 +33,13 @@ static uint16_t later(void *context, const mbm_request *request, uint8_t *respon
 
 static void all_begins_are_refused(uint8_t *frame)
 {
-    mbm_port deaf = port;
+    mbm_port without_read = port;
     mbm_unit other;
 
-    deaf.read = NULL;
+    without_read.read = NULL;
     memset(&other, 0, sizeof other);
     REFUSED(MBM_INVALID_ARGUMENT, server,
-            mbm_server_beginRtu(&server, &deaf, &other, 1, frame, 20));
+            mbm_server_beginRtu(&server, &without_read, &other, 1, frame, 20));
     REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_beginRtu(&server, NULL, &other, 1, frame, 20));
     REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_beginRtu(&server, &port, NULL, 1, frame, 20));
     REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_beginRtu(&server, &port, &other, 1, NULL, 20));

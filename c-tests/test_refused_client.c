@@ -9,9 +9,9 @@
 #include "refused_wire.h"
 
 static mbm_client client;
-static mbm_master facade;
-static uint16_t facade_words[2];
-static uint8_t facade_frame[16];
+static mbm_master master;
+static uint16_t master_words[2];
+static uint8_t master_frame[16];
 static uint8_t *incoming, *outgoing;
 
 /* Begins in framing 0 to 3, with buffers of exactly this size. */
@@ -85,7 +85,7 @@ static void a_client_goes_on_after_refused_calls(void **state)
         memset(&client, 0, sizeof client);
         memset(&request, 0, sizeof request);
         memset(&other, 0, sizeof other);
-        memset(&facade, 0, sizeof facade);
+        memset(&master, 0, sizeof master);
         OK(begin_client(framing, 600, 600));
         all_settings_out_of_range_are_refused(framing);
         request.unit = 17;
@@ -110,8 +110,8 @@ static void a_client_goes_on_after_refused_calls(void **state)
         REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_readCoils(&client, NULL, 0, 1));
         REFUSED(MBM_BUSY, client, mbm_client_suspend(&client, NULL));
         REFUSED(framing == 0 || framing == 3 ? MBM_BUSY : MBM_INVALID_ARGUMENT, client,
-                mbm_client_suspend(&client, &facade));
-        assert_memory_equal(&facade, &zero, sizeof facade);
+                mbm_client_suspend(&client, &master));
+        assert_memory_equal(&master, &zero, sizeof master);
         /* A refused request has the status of the refusal and is not queued. */
         other.unit = 17;
         other.transaction = 7;
@@ -145,7 +145,7 @@ static void a_client_goes_on_after_refused_calls(void **state)
     incoming = outgoing = NULL;
 }
 
-static void a_full_queue_and_a_lent_line_change_nothing(void **state)
+static void a_full_queue_and_a_suspended_client_change_nothing(void **state)
 {
     static mbm_clientRequest requests[MBM_CLIENT_DEPTH + 1];
     static const mbm_master zero;
@@ -153,7 +153,7 @@ static void a_full_queue_and_a_lent_line_change_nothing(void **state)
 
     (void)state;
     memset(&client, 0, sizeof client);
-    memset(&facade, 0, sizeof facade);
+    memset(&master, 0, sizeof master);
     memset(requests, 0, sizeof requests);
     OK(begin_client(0, 256, 1));
     for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
@@ -163,21 +163,21 @@ static void a_full_queue_and_a_lent_line_change_nothing(void **state)
     requests[i].unit = 17;
     REFUSED(MBM_QUEUE_FULL, client, mbm_client_readCoils(&client, &requests[i], 0, 1));
     OK(mbm_client_suspend(&client, NULL));
-    REFUSED(MBM_BUSY, client, mbm_client_suspend(&client, &facade));
-    assert_memory_equal(&facade, &zero, sizeof facade);
+    REFUSED(MBM_BUSY, client, mbm_client_suspend(&client, &master));
+    assert_memory_equal(&master, &zero, sizeof master);
     REFUSED(MBM_BUSY, client, mbm_client_poll(&client));
     REFUSED(MBM_BUSY, client, mbm_client_reconnect(&client, NULL));
     OK(mbm_client_resume(&client, NULL));
     REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_resume(&client, NULL));
     /* While a master has a request under way, it can be neither given the line nor lose it. */
-    OK(mbm_master_setBuffers(&facade, facade_words, 2, facade_words, 0, facade_frame, 16));
-    OK(mbm_client_suspend(&client, &facade));
-    OK(mbm_master_setBlocking(&facade, 0));
-    IS(MBM_PENDING, mbm_master_readCoils(&facade, 0, 1));
-    REFUSED(MBM_BUSY, client, mbm_client_resume(&client, &facade));
-    REFUSED(MBM_BUSY, facade, mbm_client_resume(&client, &facade));
-    OK(mbm_master_cancel(&facade));
-    OK(mbm_client_resume(&client, &facade));
+    OK(mbm_master_setBuffers(&master, master_words, 2, master_words, 0, master_frame, 16));
+    OK(mbm_client_suspend(&client, &master));
+    OK(mbm_master_setBlocking(&master, 0));
+    IS(MBM_PENDING, mbm_master_readCoils(&master, 0, 1));
+    REFUSED(MBM_BUSY, client, mbm_client_resume(&client, &master));
+    REFUSED(MBM_BUSY, master, mbm_client_resume(&client, &master));
+    OK(mbm_master_cancel(&master));
+    OK(mbm_client_resume(&client, &master));
     free(incoming);
     free(outgoing);
     incoming = outgoing = NULL;
@@ -231,7 +231,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(a_zeroed_client_stays_zero_when_a_begin_is_refused),
         TEST(a_client_goes_on_after_refused_calls),
-        TEST(a_full_queue_and_a_lent_line_change_nothing),
+        TEST(a_full_queue_and_a_suspended_client_change_nothing),
         TEST(a_request_that_is_zeroed_while_it_is_pending_is_not_queued_twice),
     };
 

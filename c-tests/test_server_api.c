@@ -112,7 +112,7 @@ static void an_object_that_was_never_begun_is_not_initialised(void **state)
 
 static void null_is_an_invalid_argument(void **state)
 {
-    const mbm_port deaf = {.write = wire_write, .micros = wire_micros};
+    const mbm_port without_read = {.write = wire_write, .micros = wire_micros};
     uint16_t length;
 
     (void)state;
@@ -123,7 +123,7 @@ static void null_is_an_invalid_argument(void **state)
     IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(&server, NULL, &unit, 1, frame, 256));
     IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(&server, &port, NULL, 1, frame, 256));
     IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(&server, &port, &unit, 1, NULL, 256));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(&server, &deaf, &unit, 1, frame, 256));
+    IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(&server, &without_read, &unit, 1, frame, 256));
     IS(MBM_INVALID_ARGUMENT, mbm_server_beginRtu(&server, &port, &unit, 1, frame, 15));
     IS(MBM_INVALID_ARGUMENT, mbm_server_beginAscii(&server, &port, &unit, 1, frame, 31));
     IS(MBM_INVALID_ARGUMENT, mbm_server_beginTcp(&server, &port, &unit, 1, frame, 259));

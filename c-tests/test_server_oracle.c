@@ -22,9 +22,9 @@ static unsigned below(unsigned limit)
 
 /* The server's tables, with guard bytes around them that must not change. */
 static struct {
-    uint16_t before[GUARD], holding[CELLS], between[GUARD], inputs[CELLS], behind[GUARD];
+    uint16_t before[GUARD], holding[CELLS], between[GUARD], inputs[CELLS], after[GUARD];
     uint8_t bits_before[GUARD], coils[CELLS / 8], bits_between[GUARD], discrete[CELLS / 8];
-    uint8_t bits_behind[GUARD];
+    uint8_t bits_after[GUARD];
 } memory;
 
 /* The contents that the tables should have. */
@@ -354,9 +354,9 @@ static void compare_with_model(mbm_unit *asked)
     }
     assert_true(untouched(memory.before, sizeof memory.before));
     assert_true(untouched(memory.between, sizeof memory.between));
-    assert_true(untouched(memory.behind, sizeof memory.behind));
+    assert_true(untouched(memory.after, sizeof memory.after));
     assert_true(untouched(memory.bits_before, GUARD) && untouched(memory.bits_between, GUARD) &&
-                untouched(memory.bits_behind, GUARD));
+                untouched(memory.bits_after, GUARD));
 }
 
 static void only_valid_writes_change_an_array(void **state)

@@ -9,8 +9,8 @@ static int16_t read_bytes(void *context, uint8_t *bytes, uint16_t capacity)
     bus *b = tap->line;
     uint16_t count = 0;
 
-    while (count < capacity && tap->heard < b->count && b->bytes[tap->heard].end <= b->now) {
-        unsigned at = tap->heard++;
+    while (count < capacity && tap->next < b->count && b->bytes[tap->next].end <= b->now) {
+        unsigned at = tap->next++;
 
         /* A tap does not receive its own bytes, as with a driver that turns the receiver off. */
         if (b->bytes[at].from != tap)

@@ -18,7 +18,7 @@ typedef struct bus_tap {
     bus *line;
     uint32_t clock_start; /* the time that the tap's clock shows when the bus is started */
     uint64_t free;        /* when the last byte of the tap will have left */
-    unsigned heard;       /* index of the next byte of the bus to read */
+    unsigned next;        /* index of the next byte of the bus to read */
 } bus_tap;
 
 struct bus {

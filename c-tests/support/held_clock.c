@@ -20,9 +20,9 @@ static int64_t read_clock(held_clock *c)
 
     if (c->bytes > 0)
         return c->stopped;
-    if (now - c->behind > c->due)
-        c->behind = now - c->due;
-    return now - c->behind;
+    if (now - c->lag > c->due)
+        c->lag = now - c->due;
+    return now - c->lag;
 }
 
 /* Goes on from the time that it shows. The device still has `bytes` bytes to process. */
@@ -32,7 +32,7 @@ static void set(held_clock *c, uint32_t bytes)
 
     c->stopped = shown;
     c->bytes = bytes;
-    c->behind = machine() - shown;
+    c->lag = machine() - shown;
 }
 
 void held_clock_start(held_clock *c)

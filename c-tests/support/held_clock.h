@@ -15,7 +15,7 @@
 
 typedef struct held_clock {
     pthread_mutex_t lock;
-    int64_t behind;   /* microseconds by which this clock is late against the machine's */
+    int64_t lag;      /* microseconds by which this clock is late against the machine's */
     int64_t stopped;  /* the time that it shows while it stands still */
     int64_t readTime; /* the time that the master read last */
     int64_t due;      /* the time that it does not go beyond */

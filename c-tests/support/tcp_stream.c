@@ -84,7 +84,7 @@ void stream_release(stream *c, int64_t now, int one_was_sent)
         waiting *w = &c->held[i];
         reply r;
 
-        if (one_was_sent && w->behind > 0 && --w->behind == 0)
+        if (one_was_sent && w->replies_before > 0 && --w->replies_before == 0)
             w->due = now;
         if (w->due > now) {
             i++;
@@ -98,7 +98,7 @@ void stream_release(stream *c, int64_t now, int one_was_sent)
         flush_joined(c);
 }
 
-void stream_hold(stream *c, const reply *r, int64_t due, unsigned behind)
+void stream_hold(stream *c, const reply *r, int64_t due, unsigned replies_before)
 {
     waiting *w;
 
@@ -109,7 +109,7 @@ void stream_hold(stream *c, const reply *r, int64_t due, unsigned behind)
     w = &c->held[c->holds++];
     w->what = *r;
     w->due = due;
-    w->behind = behind;
+    w->replies_before = replies_before;
 }
 
 void stream_split(stream *c, const reply *r, unsigned pause)

@@ -16,7 +16,7 @@ typedef struct reply {
 typedef struct waiting {
     reply what;
     int64_t due;
-    unsigned behind;
+    unsigned replies_before;
 } waiting;
 
 typedef struct stream {
@@ -52,8 +52,8 @@ void stream_send_whole(stream *c, const reply *r);
 /* Sends a reply byte by byte, with pauses of `pause` milliseconds. */
 void stream_split(stream *c, const reply *r, unsigned pause);
 
-/* Sends a reply at the time `due`, or once `behind` other replies have been sent. */
-void stream_hold(stream *c, const reply *r, int64_t due, unsigned behind);
+/* Sends a reply at the time `due`, or once `replies_before` other replies have been sent. */
+void stream_hold(stream *c, const reply *r, int64_t due, unsigned replies_before);
 
 /* Sends this reply and the next `more` replies in one send, at the time `due` at the latest. */
 void stream_join(stream *c, const reply *r, int64_t due, unsigned more);

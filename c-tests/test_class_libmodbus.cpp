@@ -105,5 +105,5 @@ int main()
         SERVED(copies_take_turns_on_one_line),
     };
 
-    return cmocka_run_group_tests_name("class against libmodbus", tests, nullptr, nullptr);
+    return cmocka_run_group_tests_name("ModbusMaster with libmodbus", tests, nullptr, nullptr);
 }
