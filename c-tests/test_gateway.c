@@ -377,7 +377,7 @@ static void a_line_that_was_lost_between_requests_fails_no_request(void **state)
 /* A gateway with bad arguments prints no `ready` line and ends with exit code 2. */
 static void bad_arguments_end_the_program(void **state)
 {
-    static const char *const bad[][6] = {
+    static const char *const bad[][8] = {
         {"0", "300", "/dev/null,19200,E1,9-1"},
         {"0", "300", "/dev/null,1,E1,1-9"},
         {"0", "300", "/dev/null,19200,X1,1-9"},
@@ -385,6 +385,16 @@ static void bad_arguments_end_the_program(void **state)
         {"0", "300", "/dev/null,19200,E1,1-9", "/dev/zero,19200,E1,9-12"},
         {"0", "300x", "/dev/null,19200,E1,1-9"},
         {"0", "300", "/dev/null,19200,E1,1-9,and more"},
+        {"0", "300", "/dev/null,19200,E1"},
+        {"0", "300", "/dev/null,19200,E1,ascii"},
+        {"0", "300", "/dev/null,19200,E1,1-9,9-10"},
+        {"0", "300", "/dev/null,19200,E1,1-256"},
+        {"0", "300", "/dev/null,19200,E1,1-9="},
+        {"0", "300", "/dev/null,19200,E1,1-9x5"},
+        {"0", "300", "/dev/null,19200,E1,1-9=248"}, /* the last one would be 256 */
+        {"-f", "0", "0", "300", "/dev/null,19200,E1,1-9"},
+        {"-f", "129", "0", "300", "/dev/null,19200,E1,1-9"},
+        {"-w", "65536", "0", "300", "/dev/null,19200,E1,1-9"},
     };
     char text[64];
     unsigned i;

@@ -21,6 +21,9 @@ int main(void)
     line.client = &client;
 #endif
     USED(&port);
+    USED(response);
+    USED(transmit);
+    USED(frame);
     USED(line_frame);
     (void)CALL(mbm_client_beginRtu(&client, &port, line_frame, sizeof line_frame));
     (void)CALL(mbm_client_setResponseTimeout(&client, 500));
