@@ -81,6 +81,8 @@ inline const __FlashStringHelper *modbusStatusText(uint8_t status)
         return F("another pending request has this transaction id");
     case MBM_NOT_PENDING:
         return F("the request is not pending");
+    case MBM_NO_PROGRESS:
+        return F("the device repeats itself without an end");
     default:
         break;
     }

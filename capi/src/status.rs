@@ -91,6 +91,10 @@ pub const MBM_QUEUE_FULL: u8 = 0xF0;
 pub const MBM_DUPLICATE_TRANSACTION: u8 = 0xF1;
 /// The request has ended already, or was never queued on this client.
 pub const MBM_NOT_PENDING: u8 = 0xF2;
+/// The device says that more objects of its identification follow, but it sends objects that
+/// it has sent before, sends none, or names an object that does not come next. Reading on
+/// would never end.
+pub const MBM_NO_PROGRESS: u8 = 0xF8;
 
 statuses! {
     MBM_OK = Status::OK, c"success";
@@ -122,6 +126,7 @@ statuses! {
     MBM_QUEUE_FULL = Status::QUEUE_FULL, c"the queue is full";
     MBM_DUPLICATE_TRANSACTION = Status::DUPLICATE_TRANSACTION, c"another pending request has this transaction id";
     MBM_NOT_PENDING = Status::NOT_PENDING, c"the request is not pending";
+    MBM_NO_PROGRESS = Status::NO_PROGRESS, c"the device repeats itself without an end";
 }
 
 /// Explains a status in a few words of English.

@@ -1,19 +1,23 @@
 //! `mbm_client_*`: the client, whose functions never wait.
 
 mod begin;
+mod identification;
 mod kind;
 mod link;
 mod object;
 mod poll;
+mod reply;
 mod request;
 mod requests;
 mod settings;
 mod storage;
 
 pub use begin::*;
+pub use identification::*;
 pub use link::*;
 pub use object::mbm_client;
 pub use poll::*;
+pub use reply::*;
 pub use request::mbm_clientRequest;
 pub use requests::*;
 pub use settings::*;
