@@ -207,6 +207,13 @@ static void objects_that_were_sent_before_are_not_handed_out_again(void **state)
     ANSWER(0xFF, 2, 2, "\x00\x01m\x01\x01n");
     assert_ended(MBM_NO_PROGRESS, 2);
 
+    /* It goes back behind the object that it named, to one that is new. */
+    begin();
+    read_all(MBM_DEVICE_ID_EXTENDED);
+    ANSWER(0xFF, 5, 1, "\x00\x01m");
+    ANSWER(0xFF, 3, 1, "\x02\x01v");
+    assert_ended(MBM_NO_PROGRESS, 1);
+
     /* An object in two parts. */
     begin();
     read_all(MBM_DEVICE_ID_BASIC);

@@ -250,9 +250,9 @@ const char *mbm_version(void);
 #define MBM_NOT_PENDING 242
 
 /**
- * The device says that more objects of its identification follow, but it sends objects that
- * it has sent before, sends none, or names an object that does not come next. Reading on
- * would never end.
+ * The device says that more objects of its identification follow, but it sends none, names
+ * an object that is not after those that it has sent, or then sends one before the one that
+ * it named. Reading on might never end.
  */
 #define MBM_NO_PROGRESS 248
 

@@ -64,7 +64,7 @@ impl Status {
     pub const DUPLICATE_TRANSACTION: Status = Status(0xF1);
     /// The request is not pending: it has ended, or was never queued.
     pub const NOT_PENDING: Status = Status(0xF2);
-    /// A device says that more follows, but what it sends or names was there before.
+    /// A device says that more follows, but what it sends or names does not come next.
     pub const NO_PROGRESS: Status = Status(0xF8);
 
     /// The status for an exception code of the remote device.

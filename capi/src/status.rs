@@ -91,9 +91,9 @@ pub const MBM_QUEUE_FULL: u8 = 0xF0;
 pub const MBM_DUPLICATE_TRANSACTION: u8 = 0xF1;
 /// The request has ended already, or was never queued on this client.
 pub const MBM_NOT_PENDING: u8 = 0xF2;
-/// The device says that more objects of its identification follow, but it sends objects that
-/// it has sent before, sends none, or names an object that does not come next. Reading on
-/// would never end.
+/// The device says that more objects of its identification follow, but it sends none, names
+/// an object that is not after those that it has sent, or then sends one before the one that
+/// it named. Reading on might never end.
 pub const MBM_NO_PROGRESS: u8 = 0xF8;
 
 statuses! {

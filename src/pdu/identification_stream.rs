@@ -23,7 +23,8 @@ pub struct ObjectStream {
     code: u8,
     /// The object that the last request named.
     requested: u8,
-    /// The least id that the next reply may have: one more than the highest id so far.
+    /// The least id that the next reply may have: that of the object requested, except in the
+    /// first request.
     least: u16,
 }
 
@@ -50,8 +51,8 @@ impl ObjectStream {
     ///
     /// # Errors
     /// [`Status::MALFORMED_REPLY`] if a request for one object was answered with another.
-    /// [`Status::NO_PROGRESS`] if the reply has an object that does not come after those of
-    /// the replies before. On an error nothing changes.
+    /// [`Status::NO_PROGRESS`] if a later reply has an object before the one that the device
+    /// itself named. On an error nothing changes.
     pub fn take(&mut self, reply: &IdentificationReply) -> Result<Next, Status> {
         let mut least = self.least;
         for (id, _) in reply.objects.iter() {
@@ -74,6 +75,7 @@ impl ObjectStream {
             return Ok(Next::Stuck);
         }
         self.requested = next;
+        self.least = next.into();
         Ok(Next::Request(next))
     }
 }

@@ -4,7 +4,7 @@ use super::world::World;
 
 pub const OK: u8 = 0;
 pub const PENDING: u8 = 235;
-/// The greatest status.
+/// The greatest status, but for MBM_NO_PROGRESS.
 const LAST: u8 = 242;
 
 /// Calls a function of the C API. `$object` is marked as in use during the call.
@@ -82,7 +82,7 @@ pub fn bytes((start, length): Span) -> Vec<u8> {
 /// Checks that `status` is a status or an exception code of a device, and returns it.
 pub fn is_status(name: &str, status: u8) -> u8 {
     assert!(
-        status < 0x80 || (224..=LAST).contains(&status),
+        status < 0x80 || (224..=LAST).contains(&status) || status == mbm_c::MBM_NO_PROGRESS,
         "{name} returned {status}, which is not a status"
     );
     status

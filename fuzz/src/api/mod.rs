@@ -10,6 +10,7 @@ mod bits;
 mod check;
 mod client;
 mod frame;
+mod identification;
 mod master;
 mod memory;
 mod packet;

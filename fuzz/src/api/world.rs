@@ -52,6 +52,7 @@ pub struct World {
     /// Clients whose port a master uses, or used when it was copied.
     pub lenders: RefCell<Vec<*mut mbm_client>>,
     pub requests: Pool<mbm_clientRequest>,
+    pub identifications: Pool<mbm_identification>,
     pub servers: Pool<mbm_server>,
     pub sniffers: Pool<mbm_sniffer>,
     pub rings: Pool<mbm_ring>,
@@ -92,6 +93,7 @@ impl World {
             clients: Pool::new(),
             lenders: RefCell::default(),
             requests: Pool::new(),
+            identifications: Pool::new(),
             servers: Pool::new(),
             sniffers: Pool::new(),
             rings: Pool::new(),
