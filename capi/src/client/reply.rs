@@ -5,8 +5,8 @@ use crate::packet::{mbm_packet, MBM_PACKET_RESPONSE};
 use crate::pointers::{buffer, overlap, put};
 use mbm::client::ClientRequest as _;
 use mbm::error::Status;
-use mbm::packet::PduKind;
 use mbm::pdu::custom::{Function, Rule};
+use mbm::pdu::response::Response;
 
 /// Writes the PDU of the reply to `pdu`, and returns its fields.
 fn packet_of(request: RequestPtr, pdu: &mut [u8]) -> Result<mbm_packet, Status> {
@@ -43,7 +43,7 @@ fn packet_of(request: RequestPtr, pdu: &mut [u8]) -> Result<mbm_packet, Status> 
         request: Rule::Silence,
         response: Rule::Silence,
     };
-    packet.take(PduKind::Response, pdu, &[own])?;
+    packet.take_response(&Response::parse_with(pdu, &[own])?);
     Ok(packet)
 }
 

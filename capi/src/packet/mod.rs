@@ -195,7 +195,7 @@ impl mbm_packet {
     }
 
     /// Sets the fields from a PDU.
-    pub(crate) fn take(
+    pub(super) fn take(
         &mut self,
         side: PduKind,
         pdu: &[u8],
